@@ -1,0 +1,228 @@
+#!/usr/bin/env bash
+# The checks of this repository. `./ci.sh help` lists them.
+set -euo pipefail
+cd "$(dirname "$0")"
+
+PLAIN=(fmt clippy test doctest doc)
+FULL=(deny advisories python cortex-m)
+CARGO_DENY_VERSION=0.20.2
+THUMB=thumbv7em-none-eabihf
+
+WORK=target/ci
+RESULTS=$WORK/results
+SKIPPED=77
+
+# fmt: formatting
+step_fmt() {
+    cargo fmt --all --check
+}
+
+# clippy: lints of every target, and of the freestanding program, which needs its own profile
+step_clippy() {
+    cargo clippy --locked --workspace --all-targets -- -D warnings
+    if [[ $(uname -sm) == "Linux x86_64" ]]; then
+        cargo clippy --locked -p supple-bare --profile bare --features freestanding -- -D warnings
+    fi
+}
+
+# test: unit, property and whole-system tests; among them `arrows` and `bare`
+step_test() {
+    cargo test --locked --workspace --lib --bins --tests
+}
+
+# arrows: dependencies between the crates, as ARCHITECTURE.md draws them (part of `test`)
+step_arrows() {
+    cargo test --locked --test architecture
+}
+
+# bare: the freestanding program links, prints the right bits, and refuses to allocate (part of `test`)
+step_bare() {
+    [[ $(uname -sm) == "Linux x86_64" ]] || skip "written for Linux on x86-64, this is $(uname -sm)"
+    cargo test --locked --test bare
+}
+
+# doctest: examples in the documentation
+step_doctest() {
+    cargo test --locked --workspace --doc
+}
+
+# doc: the documentation builds without a warning
+step_doc() {
+    RUSTDOCFLAGS="-D warnings" cargo doc --locked --workspace --no-deps
+}
+
+# deny: licences, sources and bans of every dependency; installs cargo-deny under target/
+step_deny() {
+    cargo_deny check licenses sources bans
+}
+
+# advisories: known vulnerabilities, where their database can be fetched
+step_advisories() {
+    local log
+    if ! log=$(cargo_deny fetch db 2>&1); then
+        echo "$log"
+        skip "the advisory database is out of reach"
+    fi
+    cargo_deny check --disable-fetch advisories
+}
+
+# python: logs as Python's own readers see them; installs the readers in a virtual environment
+step_python() {
+    needs_command python3 python3
+    local environment=$WORK/python
+    if [[ ! -x $environment/bin/pip ]]; then
+        python3 -m venv "$environment" || {
+            needs_package python3-venv
+            python3 -m venv "$environment"
+        }
+    fi
+    "$environment/bin/pip" install --quiet --requirement tests/python/requirements.txt ||
+        skip "the readers of tests/python/requirements.txt cannot be installed"
+    SUPPLE_PYTHON=$PWD/$environment/bin/python \
+        cargo test --locked -p supple-log --test python_readers -- --ignored
+}
+
+# cortex-m: the freestanding program on an emulated Cortex-M4; installs QEMU and the compiler's target
+step_cortex-m() {
+    needs_command qemu-system-arm qemu-system-arm
+    if ! thumb_core && ! rustup target add $THUMB; then
+        [[ -d $(rustc --print sysroot)/lib/rustlib/src/rust/library ]] ||
+            rustup component add rust-src ||
+            skip "neither the $THUMB target nor the core library's source can be had"
+        export SUPPLE_BUILD_STD=1
+    fi
+    cargo test --locked --test bare -- --ignored cortex_m
+}
+
+thumb_core() {
+    compgen -G "$(rustc --print target-libdir --target $THUMB)/libcore-*" >/dev/null
+}
+
+cargo_deny() {
+    local root=target/tools
+    if [[ $("$root/bin/cargo-deny" --version 2>/dev/null) != "cargo-deny $CARGO_DENY_VERSION" ]]; then
+        cargo install --quiet --locked --root "$root" --target-dir "$root/build" \
+            cargo-deny@$CARGO_DENY_VERSION >&2
+        rm -rf "$root/build"
+    fi
+    "$root/bin/cargo-deny" "$@"
+}
+
+# Installs a package for a missing command.
+needs_command() {
+    command -v "$1" >/dev/null || needs_package "$2"
+}
+
+needs_package() {
+    local install="apt-get install --yes --no-install-recommends $1"
+    command -v apt-get >/dev/null || skip "needs the package $1"
+    [[ $(id -u) == 0 ]] || skip "needs the package $1: sudo $install"
+    export DEBIAN_FRONTEND=noninteractive
+    { apt-get update && $install; } >"$WORK/apt.log" 2>&1 || {
+        tail -n 5 "$WORK/apt.log"
+        skip "the package $1 cannot be installed"
+    }
+}
+
+# Ends a step that cannot run here.
+skip() {
+    echo "$*" >"$WORK/reason"
+    exit $SKIPPED
+}
+
+# Runs one step and records how it ended.
+run() {
+    local step=$1 start=$SECONDS status outcome reason=""
+    mkdir -p "$RESULTS"
+    rm -f "$WORK/reason"
+    echo "==> $step: $(describe "$step")"
+    set +e
+    (
+        set -e
+        "step_$step"
+    )
+    status=$?
+    set -e
+    case $status in
+    0) outcome=passed ;;
+    "$SKIPPED") outcome=skipped reason=": $(cat "$WORK/reason")" ;;
+    *) outcome=failed reason=": status $status" ;;
+    esac
+    printf '%s %s (%d s)%s\n' "$step" "$outcome" $((SECONDS - start)) "$reason" |
+        tee "$RESULTS/$step"
+}
+
+# One line a step (by default every step on record), then the counts; fails where a step failed.
+summary() {
+    local step passed=0 failed=0 skipped=0
+    [[ $# -gt 0 ]] || set -- $(ls -tr "$RESULTS")
+    echo "==> summary"
+    for step in "$@"; do
+        cat "$RESULTS/$step"
+        case $(cut -d ' ' -f 2 "$RESULTS/$step") in
+        passed) passed=$((passed + 1)) ;;
+        skipped) skipped=$((skipped + 1)) ;;
+        *) failed=$((failed + 1)) ;;
+        esac
+    done
+    echo "$passed passed, $failed failed, $skipped skipped"
+    [[ $failed == 0 ]]
+}
+
+run_all() {
+    local step
+    for step in "$@"; do
+        run "$step"
+    done
+}
+
+describe() {
+    sed -n "s/^# $1: //p" ci.sh
+}
+
+help() {
+    cat <<END
+./ci.sh          ${PLAIN[*]}: no root, nothing installed
+./ci.sh full     ${FULL[*]}: what the plain run leaves out; as root, installs packages
+./ci.sh summary  how every step on record ended
+./ci.sh STEP...  these steps:
+END
+    local step
+    for step in $(sed -n 's/^step_\(.*\)() {$/\1/p' ci.sh); do
+        printf '    %-12s %s\n' "$step" "$(describe "$step")"
+    done
+}
+
+main() {
+    case ${1:-plain} in
+    plain)
+        run_all "${PLAIN[@]}"
+        echo "==> left to ./ci.sh full, which installs what they need"
+        local step
+        for step in "${FULL[@]}"; do
+            echo "$step: $(describe "$step")"
+        done
+        summary "${PLAIN[@]}"
+        ;;
+    full)
+        run_all "${FULL[@]}"
+        summary "${FULL[@]}"
+        ;;
+    summary) summary ;;
+    help | -h | --help) help ;;
+    *)
+        local step
+        for step in "$@"; do
+            if ! declare -F "step_$step" >/dev/null; then
+                echo "no step named $step" >&2
+                help >&2
+                exit 2
+            fi
+        done
+        run_all "$@"
+        summary "$@"
+        ;;
+    esac
+}
+
+main "$@"

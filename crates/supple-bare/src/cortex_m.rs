@@ -1,0 +1,84 @@
+//! A Cortex-M4 with nothing on it, which prints through the debugger (semihosting).
+
+use core::arch::{asm, global_asm};
+use core::fmt;
+
+/// Semihosting operations and reasons, as ARM numbers them.
+const WRITE_CHARACTER: usize = 0x03;
+const EXIT: usize = 0x18;
+const APPLICATION_EXIT: usize = 0x20026;
+const RUNTIME_ERROR: usize = 0x20023;
+
+// Vector table (stack, reset, every exception a fault) and reset: the floating-point unit is off at
+// power-on and must be switched on before the first compiled instruction.
+global_asm!(
+    ".section .vector_table, \"a\", %progbits",
+    ".word _stack_top",
+    ".word reset",
+    ".rept 14",
+    ".word {fault}",
+    ".endr",
+    ".section .text.reset, \"ax\", %progbits",
+    ".global reset",
+    ".type reset, %function",
+    ".thumb_func",
+    "reset:",
+    "movw r0, #0xed88",
+    "movt r0, #0xe000",
+    "ldr r1, [r0]",
+    "orr r1, r1, #0xf00000",
+    "str r1, [r0]",
+    "dsb",
+    "isb",
+    "bl {run}",
+    "udf #0",
+    ".size reset, . - reset",
+    run = sym super::run,
+    fault = sym fault,
+);
+
+extern "C" fn fault() -> ! {
+    exit(false)
+}
+
+/// # Safety
+/// `argument` is what the operation asks for: a value, or the address of what it reads.
+unsafe fn call_debugger(operation: usize, argument: usize) {
+    // SAFETY: the debugger reads registers and memory at `argument`, and returns in r0.
+    unsafe {
+        asm!(
+            "bkpt #0xab",
+            inlateout("r0") operation => _,
+            in("r1") argument,
+            options(nostack),
+        );
+    }
+}
+
+/// The debugger's console.
+pub struct Console;
+
+impl fmt::Write for Console {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        for byte in text.bytes() {
+            // SAFETY: the operation reads one byte at the address.
+            unsafe { call_debugger(WRITE_CHARACTER, &raw const byte as usize) };
+        }
+        Ok(())
+    }
+}
+
+/// Ends the emulation with 0 when `good`, else 1.
+pub fn exit(good: bool) -> ! {
+    let reason = if good {
+        APPLICATION_EXIT
+    } else {
+        RUNTIME_ERROR
+    };
+    // SAFETY: on a 32-bit machine the reason is passed as a value.
+    unsafe { call_debugger(EXIT, reason) };
+    // A debugger that lets the program run on must not let it fall off its end.
+    loop {
+        core::hint::spin_loop();
+    }
+}

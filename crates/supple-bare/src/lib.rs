@@ -1,0 +1,48 @@
+//! What the freestanding program computes, apart from where it runs.
+//!
+//! [`report`] drives arms of 4 and of 7 joints through the core's dynamics and its controller and
+//! prints the bits. A hosted build of the same function must print the same text: the arithmetic of
+//! the core may depend neither on the standard library nor on the features that other crates switch
+//! on in nalgebra, whose sine may then be another one.
+#![no_std]
+#![forbid(unsafe_code)]
+
+mod arm;
+mod control;
+mod digest;
+mod motion;
+
+use core::fmt::{self, Write};
+use supple_core::Vector;
+
+/// Period of every step \[s\].
+const PERIOD_S: f64 = 1e-3;
+
+/// Prints, for an arm of 4 and one of 7 joints, torques, the state at the end of a motion and of a
+/// controlled run, and a digest of every number on the way. Numbers are given as their bits and in
+/// decimal.
+///
+/// # Errors
+/// What `out` returns, or [`fmt::Error`] when an arm or a configuration is refused, after saying why.
+pub fn report(out: &mut impl Write) -> fmt::Result {
+    motion::report::<4>(out)?;
+    control::report::<4>(out)?;
+    motion::report::<7>(out)?;
+    control::report::<7>(out)
+}
+
+fn print<const N: usize>(out: &mut impl Write, name: &str, values: &Vector<N>) -> fmt::Result {
+    write!(out, "{name}")?;
+    for value in values.iter() {
+        write!(out, " {:016x} ({value:.6})", value.to_bits())?;
+    }
+    writeln!(out)
+}
+
+/// Says why something was refused.
+fn refused<T>(result: Result<T, impl fmt::Display>, out: &mut impl Write) -> Result<T, fmt::Error> {
+    result.or_else(|error| {
+        writeln!(out, "refused: {error}")?;
+        Err(fmt::Error)
+    })
+}

@@ -1,0 +1,129 @@
+//! What the supervisor checks each cycle, before any torque is limited. A value that is not a number is
+//! beyond every limit.
+
+use super::fault::Fault;
+use crate::config::Limits;
+use crate::impedance::Torques;
+use crate::math::{Vector, Vector3, abs, all_finite, sqrt};
+
+fn beyond(value: f64, limit: f64) -> bool {
+    value > limit || value.is_nan()
+}
+
+/// Joint positions, joint speeds, tip speed.
+pub(super) fn motion<const N: usize>(
+    limits: &Limits<N>,
+    position_rad: &Vector<N>,
+    velocity_rad_per_s: &Vector<N>,
+    tip_velocity: &Vector3<f64>,
+) -> Result<(), Fault> {
+    for joint in 0..N {
+        let value_rad = position_rad[joint];
+        for (limit_rad, beyond) in [
+            (
+                limits.position_lower_rad[joint],
+                value_rad < limits.position_lower_rad[joint],
+            ),
+            (
+                limits.position_upper_rad[joint],
+                value_rad > limits.position_upper_rad[joint],
+            ),
+        ] {
+            if beyond {
+                return Err(Fault::JointPosition {
+                    joint,
+                    value_rad,
+                    limit_rad,
+                });
+            }
+        }
+        let value_rad_per_s = abs(velocity_rad_per_s[joint]);
+        let limit_rad_per_s = limits.joint_speed_rad_per_s[joint];
+        if beyond(value_rad_per_s, limit_rad_per_s) {
+            return Err(Fault::JointSpeed {
+                joint,
+                value_rad_per_s,
+                limit_rad_per_s,
+            });
+        }
+    }
+    let value_m_per_s = sqrt(tip_velocity.dot(tip_velocity));
+    let limit_m_per_s = limits.tip_speed_m_per_s;
+    if beyond(value_m_per_s, limit_m_per_s) {
+        return Err(Fault::TipSpeed {
+            value_m_per_s,
+            limit_m_per_s,
+        });
+    }
+    Ok(())
+}
+
+/// Distance of the tip from its reference.
+pub(super) fn tracking(limit_m: f64, error: &Vector3<f64>) -> Result<(), Fault> {
+    let value_m = sqrt(error.dot(error));
+    if beyond(value_m, limit_m) {
+        return Err(Fault::TrackingError { value_m, limit_m });
+    }
+    Ok(())
+}
+
+/// Distance of each joint from where its own stiff loop wants it.
+pub(super) fn joint_tracking<const N: usize>(
+    limits: &Limits<N>,
+    wanted_rad: &[Option<f64>; N],
+    position_rad: &Vector<N>,
+) -> Result<(), Fault> {
+    let limit_rad = limits.joint_tracking_error_rad;
+    for (joint, wanted) in wanted_rad.iter().enumerate() {
+        let value_rad = wanted.map_or(0.0, |wanted| abs(wanted - position_rad[joint]));
+        if beyond(value_rad, limit_rad) {
+            return Err(Fault::JointTrackingError {
+                joint,
+                value_rad,
+                limit_rad,
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Every term, and their sum.
+pub(super) fn torques_finite<const N: usize>(torques: &Torques<N>) -> Result<(), Fault> {
+    for (term, torque) in torques.named() {
+        if !all_finite(torque) {
+            return Err(Fault::TorqueNotFinite { term });
+        }
+    }
+    if all_finite(&torques.total()) {
+        Ok(())
+    } else {
+        Err(Fault::TorqueNotFinite { term: "total" })
+    }
+}
+
+/// Spring-dampers in the zones before the hard stops. The damper grows with the depth into the zone and
+/// resists only motion towards the stop, so that the torque is continuous and never pulls towards it. The
+/// spring does not grow beyond the stop itself.
+pub(super) fn soft_stop<const N: usize>(
+    limits: &Limits<N>,
+    position_rad: &Vector<N>,
+    velocity_rad_per_s: &Vector<N>,
+) -> Vector<N> {
+    let push = |joint: usize, depth: f64, rate: f64| {
+        let share = (depth / limits.soft_zone_rad).min(1.0);
+        limits.soft_stiffness_nm_per_rad[joint] * share * limits.soft_zone_rad
+            + limits.soft_damping_nm_s_per_rad[joint] * share * rate.max(0.0)
+    };
+    Vector::from_fn(|joint, _| {
+        let (q, v) = (position_rad[joint], velocity_rad_per_s[joint]);
+        let below = limits.position_lower_rad[joint] + limits.soft_zone_rad - q;
+        let above = q - (limits.position_upper_rad[joint] - limits.soft_zone_rad);
+        if below > 0.0 {
+            push(joint, below, -v)
+        } else if above > 0.0 {
+            -push(joint, above, v)
+        } else {
+            0.0
+        }
+    })
+}

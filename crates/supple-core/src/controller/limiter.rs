@@ -1,0 +1,129 @@
+//! The last three things done to a torque: the limit, the rate limit, the finite check.
+//!
+//! Both limits scale towards a torque that is allowed, along a straight line, so that what satisfies
+//! the joint limits goes on to satisfy the motor limits. Motors that share joints (the differential of
+//! shoulder pitch and roll) are scaled together, others are left alone.
+
+use crate::config::Limits;
+use crate::math::{Matrix, Vector, abs, all_finite};
+
+/// Joints that share motors with each other, directly or through others.
+#[derive(Clone, Copy, Debug)]
+pub struct MotorGroups<const N: usize> {
+    motor_from_joint_torque: Matrix<N, N>,
+    /// Least joint index of the group of each joint.
+    joint_group: [usize; N],
+    /// The same for each motor.
+    motor_group: [usize; N],
+}
+
+impl<const N: usize> MotorGroups<N> {
+    /// From `m2jp`, joint angles from motor angles.
+    pub fn new(joint_from_motor: &Matrix<N, N>) -> Self {
+        let mut joint_group: [usize; N] = core::array::from_fn(|i| i);
+        let mut motor_group = [usize::MAX; N];
+        // N passes spread the least index through any chain of couplings.
+        for _ in 0..N {
+            for motor in 0..N {
+                for joint in 0..N {
+                    if joint_from_motor[(joint, motor)] != 0.0 {
+                        let least = motor_group[motor].min(joint_group[joint]);
+                        motor_group[motor] = least;
+                        joint_group[joint] = least;
+                    }
+                }
+            }
+        }
+        MotorGroups {
+            motor_from_joint_torque: joint_from_motor.transpose(),
+            joint_group,
+            motor_group,
+        }
+    }
+
+    /// Motor torques that make the joint torques, `m2jp^T tau` \[N m\].
+    pub fn motor_torque_nm(&self, torque_nm: &Vector<N>) -> Vector<N> {
+        self.motor_from_joint_torque * torque_nm
+    }
+}
+
+/// A torque that may be sent, and what it took.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limited<const N: usize> {
+    /// The torque \[N m\].
+    pub torque_nm: Vector<N>,
+    /// A joint or motor limit cut it.
+    pub torque_limited: bool,
+    /// The rate limit cut it.
+    pub rate_limited: bool,
+    /// It was finite.
+    pub finite: bool,
+}
+
+/// Limit, rate limit, finite check, in this order. A torque that is not finite becomes zero here, and
+/// `finite` says so.
+pub fn limit<const N: usize>(
+    limits: &Limits<N>,
+    groups: &MotorGroups<N>,
+    last_nm: &Vector<N>,
+    demand_nm: &Vector<N>,
+    elapsed_s: f64,
+) -> Limited<N> {
+    let (allowed, torque_limited) = limit_torque(limits, groups, demand_nm);
+    let (torque_nm, rate_limited) = limit_rate(limits, groups, last_nm, &allowed, elapsed_s);
+    let finite = all_finite(&torque_nm);
+    Limited {
+        torque_nm: if finite { torque_nm } else { Vector::zeros() },
+        torque_limited,
+        rate_limited,
+        finite,
+    }
+}
+
+/// Joint limits one by one, then motor limits by scaling whole groups.
+pub fn limit_torque<const N: usize>(
+    limits: &Limits<N>,
+    groups: &MotorGroups<N>,
+    demand_nm: &Vector<N>,
+) -> (Vector<N>, bool) {
+    let mut torque: Vector<N> = Vector::from_fn(|i, _| {
+        demand_nm[i].clamp(-limits.joint_torque_nm[i], limits.joint_torque_nm[i])
+    });
+    let motors = groups.motor_torque_nm(&torque);
+    let mut scale = [1.0_f64; N];
+    for motor in 0..N {
+        let (value, limit) = (abs(motors[motor]), limits.motor_torque_nm[motor]);
+        if value > limit {
+            let group = groups.motor_group[motor];
+            scale[group] = scale[group].min(limit / value);
+        }
+    }
+    for joint in 0..N {
+        torque[joint] *= scale[groups.joint_group[joint]];
+    }
+    (torque, torque != *demand_nm)
+}
+
+fn limit_rate<const N: usize>(
+    limits: &Limits<N>,
+    groups: &MotorGroups<N>,
+    last_nm: &Vector<N>,
+    torque_nm: &Vector<N>,
+    elapsed_s: f64,
+) -> (Vector<N>, bool) {
+    let step = torque_nm - last_nm;
+    let mut share = [1.0_f64; N];
+    for joint in 0..N {
+        let greatest = limits.torque_rate_nm_per_s[joint] * elapsed_s;
+        if abs(step[joint]) > greatest {
+            let group = groups.joint_group[joint];
+            share[group] = share[group].min(greatest / abs(step[joint]));
+        }
+    }
+    let limited = share.iter().any(|share| *share < 1.0);
+    let torque = Vector::from_fn(|joint, _| match share[groups.joint_group[joint]] {
+        share if share < 1.0 => last_nm[joint] + step[joint] * share,
+        _ => torque_nm[joint],
+    });
+    (torque, limited)
+}

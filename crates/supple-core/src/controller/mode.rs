@@ -1,0 +1,158 @@
+//! Modes, the requests that change them, and why a request is refused.
+
+use crate::config::Gains;
+use crate::math::Vector;
+use crate::trajectory::{Trajectory, TrajectoryError};
+use core::fmt;
+
+/// What the controller is doing.
+///
+/// ```text
+/// idle <-> gravity hold <-> move, track, probe      any -> fault
+///          move, track, probe -> move, track, probe      fault -> gravity hold | idle  (reset)
+/// ```
+///
+/// Idle is reached from anywhere; asked for in a fault it takes the torque away and leaves the fault
+/// latched. From idle only gravity hold is reached. A reset leaves the fault for
+/// the mode that its safe action was: gravity hold, or idle where the angles could not be trusted or the
+/// fault came in idle. It is refused in a cycle that would raise a fault again. Every entry but those to
+/// idle and fault starts from the torque that was there and blends it out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mode {
+    /// No torque.
+    Idle,
+    /// The model holds the arm's weight, joints are damped, held joints keep their loop.
+    GravityHold,
+    /// Stiff joint-space motion to a pose, with model feed-forward; holds it at the end.
+    Move,
+    /// The impedance law follows a trajectory.
+    Track,
+    /// The impedance law follows the probing cycle.
+    Probe,
+    /// A fault is latched; the safe action runs until a reset.
+    Fault,
+}
+
+impl Mode {
+    /// Short name for logs and status lines.
+    pub fn name(self) -> &'static str {
+        match self {
+            Mode::Idle => "idle",
+            Mode::GravityHold => "gravity_hold",
+            Mode::Move => "move",
+            Mode::Track => "track",
+            Mode::Probe => "probe",
+            Mode::Fault => "fault",
+        }
+    }
+}
+
+/// What an operator or a programme asks for. Checked in the controller, never trusted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Request<const N: usize> {
+    /// To idle.
+    Idle,
+    /// To gravity hold.
+    GravityHold,
+    /// To a pose, along the minimum-jerk line in joint space. Held joints must be asked to go to their
+    /// own angle.
+    Move {
+        /// Pose \[rad\].
+        target_rad: Vector<N>,
+        /// Duration \[s\].
+        duration_s: f64,
+    },
+    /// Along a trajectory that starts near the tip; the mode is [`Mode::Probe`] for the probing cycle
+    /// and [`Mode::Track`] otherwise.
+    Track(Trajectory),
+    /// Other gains, reached along a straight line in `ramp_s`.
+    Gains {
+        /// Gains to reach.
+        gains: Gains,
+        /// Time to reach them \[s\], zero or more.
+        ramp_s: f64,
+    },
+    /// Out of the fault.
+    Reset,
+}
+
+/// Why a request changed nothing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Refusal {
+    /// Not from this mode.
+    Mode {
+        /// Mode in force.
+        mode: Mode,
+    },
+    /// An entry out of its range.
+    Value {
+        /// Name of the entry.
+        entry: &'static str,
+        /// Value asked for.
+        value: f64,
+        /// What it must be at most, or equal for a held joint.
+        limit: f64,
+    },
+    /// The move would take a joint beyond its stops.
+    Unreachable {
+        /// Joint index.
+        joint: usize,
+        /// Angle asked for \[rad\].
+        value_rad: f64,
+    },
+    /// The move would turn a joint faster than its limit.
+    TooFast {
+        /// Joint index.
+        joint: usize,
+        /// Peak speed of the move \[rad/s\].
+        value_rad_per_s: f64,
+        /// Limit \[rad/s\].
+        limit_rad_per_s: f64,
+    },
+    /// The trajectory starts too far from the tip.
+    FarFromStart {
+        /// Distance \[m\].
+        distance_m: f64,
+        /// Limit \[m\].
+        limit_m: f64,
+    },
+    /// The trajectory itself is wrong.
+    Trajectory(TrajectoryError),
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Refusal::Mode { mode } => write!(f, "refused: not from mode {}", mode.name()),
+            Refusal::Value {
+                entry,
+                value,
+                limit,
+            } => write!(f, "refused: {entry} is {value}, the limit is {limit}"),
+            Refusal::Unreachable { joint, value_rad } => write!(
+                f,
+                "refused: joint {joint} would go to {value_rad:.4} rad, beyond its stop"
+            ),
+            Refusal::TooFast {
+                joint,
+                value_rad_per_s,
+                limit_rad_per_s,
+            } => write!(
+                f,
+                "refused: joint {joint} would turn at {value_rad_per_s:.3} rad/s, limit \
+                 {limit_rad_per_s:.3} rad/s; give the move more time"
+            ),
+            Refusal::FarFromStart {
+                distance_m,
+                limit_m,
+            } => write!(
+                f,
+                "refused: the tip is {distance_m:.3} m from the start, limit {limit_m:.3} m; move \
+                 there first"
+            ),
+            Refusal::Trajectory(error) => write!(f, "refused: {error}"),
+        }
+    }
+}
+
+impl core::error::Error for Refusal {}

@@ -1,0 +1,266 @@
+//! What a controller remembers from cycle to cycle.
+
+use super::Controller;
+use super::activity::Activity;
+use super::fault::{Fault, SafeAction};
+use super::mode::Mode;
+use super::output::Input;
+use crate::config::{Config, Gains, Role};
+use crate::dynamics::Terms;
+use crate::estimator::Estimator;
+use crate::latch::Latch;
+use crate::math::{Vector, abs, all_finite};
+use crate::observer::MomentumObserver;
+
+/// Speed at which the set-point of a held joint approaches its angle \[rad/s\].
+const HELD_APPROACH_RAD_PER_S: f64 = 0.25;
+
+/// An angle is believed within this many times the joint's speed limit of where it is expected: far beyond
+/// what a joint can do in a cycle, far below what a corrupted reply shows.
+const JUMP_OVER_SPEED_LIMIT: f64 = 20.0;
+
+/// Gains on their way from one value to another.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct GainRamp {
+    pub from: Gains,
+    pub to: Gains,
+    pub elapsed_s: f64,
+    pub ramp_s: f64,
+}
+
+impl GainRamp {
+    pub fn now(&self) -> Gains {
+        if self.elapsed_s >= self.ramp_s {
+            return self.to;
+        }
+        let x = self.elapsed_s / self.ramp_s;
+        Gains {
+            stiffness_n_per_m: self
+                .from
+                .stiffness_n_per_m
+                .lerp(&self.to.stiffness_n_per_m, x),
+            damping_n_s_per_m: self
+                .from
+                .damping_n_s_per_m
+                .lerp(&self.to.damping_n_s_per_m, x),
+        }
+    }
+}
+
+/// Everything that changes. [`State::new`] is idle and has seen nothing.
+#[derive(Clone, Copy, Debug)]
+pub struct State<const N: usize> {
+    pub(super) activity: Activity<N>,
+    pub(super) activity_start: u64,
+    /// Number of the last state seen, once there was one.
+    pub(super) cycle: Option<u64>,
+    /// Cycles since then without a new one.
+    pub(super) stale: u32,
+    /// Consecutive lost replies of each encoder.
+    pub(super) missing: [u32; N],
+    pub(super) position: Vector<N>,
+    pub(super) estimator: Estimator<N>,
+    pub(super) observer: MomentumObserver<N>,
+    pub(super) latch: Latch,
+    pub(super) gains: GainRamp,
+    /// Set-points of held joints.
+    pub(super) held: Vector<N>,
+    /// Last torque and fallback that went out.
+    pub(super) torque: Vector<N>,
+    pub(super) fallback: Vector<N>,
+    /// Torque to blend out after a change of activity; `pending` until it is known.
+    pub(super) handover: Vector<N>,
+    pub(super) handover_pending: bool,
+    pub(super) fault: Option<Fault>,
+    pub(super) terms: Terms<N>,
+}
+
+impl<const N: usize> State<N> {
+    /// Idle, before the first cycle.
+    pub fn new(controller: &Controller<N>) -> Self {
+        let gains = controller.config().law.gains;
+        State {
+            activity: Activity::Idle,
+            activity_start: 0,
+            cycle: None,
+            stale: 0,
+            missing: [0; N],
+            position: Vector::zeros(),
+            estimator: Estimator::at_rest(Vector::zeros()),
+            observer: MomentumObserver::default(),
+            latch: Latch::default(),
+            gains: GainRamp {
+                from: gains,
+                to: gains,
+                elapsed_s: 0.0,
+                ramp_s: 0.0,
+            },
+            held: Vector::zeros(),
+            torque: Vector::zeros(),
+            fallback: Vector::zeros(),
+            handover: Vector::zeros(),
+            handover_pending: false,
+            fault: None,
+            terms: Terms::default(),
+        }
+    }
+
+    /// Mode in force.
+    pub fn mode(&self) -> Mode {
+        self.activity.mode()
+    }
+
+    /// Latched fault.
+    pub fn fault(&self) -> Option<Fault> {
+        self.fault
+    }
+
+    /// Takes in a state. Returns the time since the last one \[s\]; zero when it is the same again.
+    pub(super) fn receive(&mut self, config: &Config<N>, input: &Input<N>) -> Result<f64, Fault> {
+        let limit = config.limits.stale_cycles;
+        let out_of_order = match self.cycle {
+            Some(last) if input.cycle < last => {
+                // A peer that began again: start afresh from what it says, but not unnoticed.
+                self.cycle = None;
+                let received = input.cycle;
+                Some(Fault::StateOutOfOrder { last, received })
+            }
+            _ => None,
+        };
+        let force = match input.tip_force_n {
+            Some(force) if !all_finite(&force) => Err(Fault::MeasurementNotFinite { joint: None }),
+            _ => Ok(()),
+        };
+        let periods = self.cycle.map_or(0, |last| input.cycle - last);
+        if self.cycle.is_some() && periods == 0 {
+            self.stale = self.stale.saturating_add(1);
+            if self.stale > limit {
+                let cycles = u64::from(self.stale);
+                return Err(Fault::StateStale { cycles, limit });
+            }
+            return force.map(|()| 0.0);
+        }
+        let elapsed_s = periods as f64 * config.period_s;
+        self.receive_positions(config, &input.position_rad, elapsed_s)?;
+        self.cycle = Some(input.cycle);
+        self.stale = 0;
+        if let Some(fault) = out_of_order {
+            return Err(fault);
+        }
+        if periods > u64::from(limit) + 1 {
+            let cycles = periods - 1;
+            return Err(Fault::StateStale { cycles, limit });
+        }
+        force.map(|()| elapsed_s)
+    }
+
+    /// Positions into the estimator. A single lost reply is coasted over, once there was a state.
+    fn receive_positions(
+        &mut self,
+        config: &Config<N>,
+        measured_rad: &[Option<f64>; N],
+        elapsed_s: f64,
+    ) -> Result<(), Fault> {
+        let first = self.cycle.is_none();
+        let tolerated = if first { 0 } else { 1 };
+        for (joint, position) in measured_rad.iter().enumerate() {
+            match position {
+                Some(position) if position.is_finite() => self.missing[joint] = 0,
+                Some(_) => return Err(Fault::MeasurementNotFinite { joint: Some(joint) }),
+                None => self.missing[joint] = self.missing[joint].saturating_add(1),
+            }
+            if self.missing[joint] > tolerated {
+                return Err(Fault::EncoderLost { joint });
+            }
+        }
+        if first {
+            self.position = Vector::from(measured_rad.map(Option::unwrap_or_default));
+            self.estimator = Estimator::at_rest(self.position);
+            return Ok(());
+        }
+        for (joint, measured) in measured_rad.iter().enumerate() {
+            let expected =
+                self.position[joint] + self.estimator.velocity_rad_per_s[joint] * elapsed_s;
+            let limit_rad =
+                JUMP_OVER_SPEED_LIMIT * config.limits.joint_speed_rad_per_s[joint] * elapsed_s;
+            if let Some(measured) = measured
+                && abs(measured - expected) > limit_rad
+            {
+                return Err(Fault::EncoderJump {
+                    joint,
+                    value_rad: abs(measured - expected),
+                    limit_rad,
+                });
+            }
+        }
+        self.estimator
+            .update(measured_rad, elapsed_s, config.estimator_rad_per_s);
+        for (joint, position) in measured_rad.iter().enumerate() {
+            self.position[joint] = position.unwrap_or(self.estimator.position_rad[joint]);
+        }
+        Ok(())
+    }
+
+    /// Latches a fault. The first one stays, but a worse safe action replaces a milder one, and an arm
+    /// without torque is not given any.
+    pub(super) fn latch_fault(&mut self, fault: Fault) {
+        let action = if self.activity.is_limp() {
+            SafeAction::Idle
+        } else {
+            fault.safe_action()
+        };
+        match self.activity {
+            Activity::Fault(_) if action == SafeAction::Idle => {
+                self.activity = Activity::Fault(SafeAction::Idle);
+            }
+            Activity::Fault(_) => {}
+            _ => {
+                self.fault = Some(fault);
+                self.enter(Activity::Fault(action));
+                self.handover_pending = false;
+            }
+        }
+    }
+
+    /// Starts an activity; the torque that is there will be blended out, unless there was none.
+    pub(super) fn enter(&mut self, activity: Activity<N>) {
+        if self.holds_nothing() {
+            self.held = self.position;
+        }
+        self.handover_pending = !self.activity.is_limp() && !activity.is_limp();
+        self.handover = Vector::zeros();
+        self.activity = activity;
+        self.activity_start = self.cycle.unwrap_or(0);
+        self.latch = Latch::default();
+    }
+
+    /// Time since the activity began \[s\].
+    pub(super) fn activity_s(&self, config: &Config<N>) -> f64 {
+        let cycles = self.cycle.unwrap_or(0).saturating_sub(self.activity_start);
+        cycles as f64 * config.period_s
+    }
+
+    /// The state in hand is older than is tolerated: only gravity may still be computed from it.
+    pub(super) fn is_stale(&self, config: &Config<N>) -> bool {
+        self.stale > config.limits.stale_cycles
+    }
+
+    /// The loops of held joints do not act.
+    fn holds_nothing(&self) -> bool {
+        self.activity.is_limp() || matches!(self.activity, Activity::Move { .. })
+    }
+
+    /// Lets the set-points of held joints approach their angles; while nothing holds them they follow
+    /// the joints, so that taking hold is gentle wherever they are.
+    pub(super) fn advance_held(&mut self, config: &Config<N>, elapsed_s: f64) {
+        let free = self.holds_nothing();
+        let step = HELD_APPROACH_RAD_PER_S * elapsed_s;
+        for (joint, role) in config.roles.iter().enumerate() {
+            if free {
+                self.held[joint] = self.position[joint];
+            } else if let Role::Held { position_rad, .. } = role {
+                self.held[joint] += (position_rad - self.held[joint]).clamp(-step, step);
+            }
+        }
+    }
+}

@@ -1,0 +1,313 @@
+//! One control cycle.
+
+use super::activity::Activity;
+use super::fault::Fault;
+use super::mode::{Refusal, Request};
+use super::output::{Input, Output};
+use super::state::State;
+use super::{Controller, checks, limiter};
+use crate::config::{Config, Role};
+use crate::dynamics::terms;
+use crate::impedance::{Situation, Task, Torques, impedance};
+use crate::math::{Vector, Vector3, abs, smooth_step};
+use crate::trajectory::Reference;
+
+/// From measurements to torques. Allocates nothing, locks nothing, logs nothing, reads no clock.
+///
+/// In order: the state is received and checked; the model is evaluated; the request is heard; motion
+/// is checked against its limits; the external torque is observed; the torque of the activity is
+/// computed and every term checked finite; then torque limit, rate limit and a last finite check.
+pub fn step<const N: usize>(
+    controller: &Controller<N>,
+    state: &mut State<N>,
+    input: &Input<N>,
+) -> Output<N> {
+    let config = controller.config();
+    let (elapsed_s, sound) = match state.receive(config, input) {
+        Ok(elapsed_s) => (elapsed_s, true),
+        Err(fault) => {
+            state.latch_fault(fault);
+            (0.0, false)
+        }
+    };
+    let velocity = state.estimator.velocity_rad_per_s;
+    terms(&config.arm, &state.position, &velocity, &mut state.terms);
+    let task = Task::new(&state.terms, &config.roles);
+    if task.is_none() {
+        state.latch_fault(Fault::MassMatrix);
+    }
+    let refusal = input.request.and_then(|request| match request {
+        // A fault is not cleared in a cycle that would raise it.
+        Request::Reset if !sound || task.is_none() => Some(Refusal::Mode { mode: state.mode() }),
+        _ => state.request(config, &request).err(),
+    });
+    state.gains.elapsed_s += elapsed_s;
+    state.advance_held(config, elapsed_s);
+
+    let tip_position = state.terms.base_from_tip.translation;
+    let tip_velocity = state.terms.jacobian.fixed_rows::<3>(0) * velocity;
+    let mut reference = state.reference(config);
+    if let Err(fault) = state.check(config, &tip_velocity, reference.as_ref()) {
+        state.latch_fault(fault);
+        reference = None;
+    }
+    let external_force = state.observe(config, task.as_ref(), reference.as_ref(), elapsed_s);
+
+    let mut torques = state.demand(config, task.as_ref(), reference.as_ref(), input.tip_force_n);
+    state.hand_over(config, &mut torques);
+    if let Err(fault) = checks::torques_finite(&torques) {
+        state.latch_fault(fault);
+        reference = None;
+        torques = state.safe(config);
+        if checks::torques_finite(&torques).is_err() {
+            torques = Torques::zeros();
+        }
+    }
+    let limited = limiter::limit(
+        &config.limits,
+        controller.motors(),
+        &state.torque,
+        &torques.total(),
+        config.period_s,
+    );
+    if !limited.finite {
+        state.latch_fault(Fault::TorqueNotFinite { term: "total" });
+    }
+    state.torque = limited.torque_nm;
+    state.update_fallback(controller);
+
+    Output {
+        cycle: input.cycle,
+        torque_nm: limited.torque_nm,
+        fallback_torque_nm: state.fallback,
+        mode: state.mode(),
+        mode_time_s: state.activity_s(config),
+        fault: state.fault,
+        refusal,
+        torques,
+        torque_limited: limited.torque_limited,
+        rate_limited: limited.rate_limited,
+        position_rad: state.position,
+        velocity_rad_per_s: velocity,
+        tip_position_m: tip_position,
+        tip_velocity_m_per_s: tip_velocity,
+        reference,
+        gains: state.gains.now(),
+        external_torque_nm: state.observer.external_torque_nm(),
+        external_force_n: external_force,
+        force_against_n: state.latch.force_against_n(),
+        contact_threshold_n: state.latch.threshold_n(),
+        in_contact: state.latch.in_contact(),
+        friction_share: state.latch.friction_share(),
+        least_singular_value_m: task.map_or(0.0, |task| task.least_singular_value_m),
+    }
+}
+
+impl<const N: usize> State<N> {
+    fn reference(&self, config: &Config<N>) -> Option<Reference> {
+        match &self.activity {
+            Activity::Track(trajectory) => Some(trajectory.at(self.activity_s(config))),
+            _ => None,
+        }
+    }
+
+    fn check(
+        &self,
+        config: &Config<N>,
+        tip_velocity: &Vector3<f64>,
+        reference: Option<&Reference>,
+    ) -> Result<(), Fault> {
+        if self.activity.is_limp() {
+            return Ok(());
+        }
+        let velocity = &self.estimator.velocity_rad_per_s;
+        checks::motion(&config.limits, &self.position, velocity, tip_velocity)?;
+        let wanted = self.wanted(config);
+        checks::joint_tracking(&config.limits, &wanted, &self.position)?;
+        match reference {
+            Some(reference) => {
+                let error = reference.position - self.terms.base_from_tip.translation;
+                checks::tracking(config.limits.tracking_error_m, &error)
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Where the stiff loop of each joint wants it, if one acts \[rad\].
+    fn wanted(&self, config: &Config<N>) -> [Option<f64>; N] {
+        if let Activity::Move {
+            from_rad,
+            to_rad,
+            duration_s,
+        } = &self.activity
+        {
+            let (x, ..) = smooth_step(self.activity_s(config) / duration_s);
+            return core::array::from_fn(|i| Some(from_rad[i] + (to_rad[i] - from_rad[i]) * x));
+        }
+        core::array::from_fn(|i| (config.roles[i] != Role::Active).then_some(self.held[i]))
+    }
+
+    /// Observes the external torque and force, and lets the contact latch see them.
+    fn observe(
+        &mut self,
+        config: &Config<N>,
+        task: Option<&Task<N>>,
+        reference: Option<&Reference>,
+        elapsed_s: f64,
+    ) -> Vector3<f64> {
+        if self.activity.is_limp() {
+            // Motors may brake: nothing that the model knows balances.
+            self.observer.reset();
+            return Vector3::zeros();
+        }
+        if elapsed_s > 0.0 {
+            let velocity = &self.estimator.velocity_rad_per_s;
+            let friction: Vector<N> =
+                Vector::from_fn(|i, _| config.friction[i].torque_nm(velocity[i]));
+            let drive = self.torque + self.terms.kinetic_gradient - self.terms.gravity - friction;
+            let bandwidth = config.latch.observer_rad_per_s;
+            self.observer
+                .update(&self.terms.momentum, &drive, elapsed_s, bandwidth);
+        }
+        let external = self.observer.external_torque_nm();
+        let Some(task) = task else {
+            return Vector3::zeros();
+        };
+        let force = task.inverse.tr_mul(&external);
+        if let Some(reference) = reference {
+            self.latch.follow(&reference.velocity, elapsed_s);
+            let along = task.inverse * self.latch.direction();
+            let velocity = task.inverse * reference.velocity;
+            let doubt_n = (0..N)
+                .map(|i| {
+                    let friction = &config.friction[i];
+                    abs(along[i]) * friction.doubt_nm(velocity[i], config.latch.friction_error)
+                })
+                .sum();
+            self.latch.decide(&config.latch, &force, doubt_n, elapsed_s);
+        }
+        force
+    }
+
+    /// Torque of the activity, term by term.
+    fn demand(
+        &self,
+        config: &Config<N>,
+        task: Option<&Task<N>>,
+        reference: Option<&Reference>,
+        tip_force_n: Option<Vector3<f64>>,
+    ) -> Torques<N> {
+        match (&self.activity, task, reference) {
+            (Activity::Track(_), Some(task), Some(reference)) => {
+                let now = Situation {
+                    reference,
+                    velocity_rad_per_s: &self.estimator.velocity_rad_per_s,
+                    gains: &self.gains.now(),
+                    tip_force_n,
+                    friction_share: self.latch.friction_share(),
+                };
+                let (law, terms) = (&config.law, &self.terms);
+                let torques = impedance(law, &config.friction, &config.roles, terms, task, &now);
+                self.guarded(config, torques)
+            }
+            (Activity::Move { .. }, _, _) => self.guarded(config, self.moving(config)),
+            _ => self.safe(config),
+        }
+    }
+
+    /// Gravity hold with joint damping, or nothing: also the safe action.
+    fn safe(&self, config: &Config<N>) -> Torques<N> {
+        if self.activity.is_limp() {
+            return Torques::zeros();
+        }
+        if self.is_stale(config) {
+            // Neither the velocity nor the distance from a set-point is known any more.
+            return Torques {
+                gravity: self.terms.gravity,
+                ..Torques::zeros()
+            };
+        }
+        let velocity = &self.estimator.velocity_rad_per_s;
+        let torques = Torques {
+            gravity: self.terms.gravity,
+            damping: -config.hold_damping_nm_s_per_rad.component_mul(velocity),
+            ..Torques::zeros()
+        };
+        self.guarded(config, torques)
+    }
+
+    /// Minimum-jerk motion in joint space with the model and a stiff loop.
+    fn moving(&self, config: &Config<N>) -> Torques<N> {
+        let Activity::Move {
+            from_rad,
+            to_rad,
+            duration_s,
+        } = self.activity
+        else {
+            return Torques::zeros();
+        };
+        let (x, rate, rate_rate) = smooth_step(self.activity_s(config) / duration_s);
+        let way = to_rad - from_rad;
+        let position = from_rad + way * x;
+        let velocity = way * (rate / duration_s);
+        let acceleration = way * (rate_rate / (duration_s * duration_s));
+        let gains = &config.move_gains;
+        let position_error = position - self.position;
+        let velocity_error = velocity - self.estimator.velocity_rad_per_s;
+        Torques {
+            gravity: self.terms.gravity,
+            coriolis: self.terms.coriolis_gravity - self.terms.gravity,
+            friction: Vector::from_fn(|i, _| config.friction[i].torque_nm(velocity[i])),
+            inertial: self.terms.mass_matrix * acceleration,
+            joint_pd: gains.stiffness_nm_per_rad.component_mul(&position_error)
+                + gains.damping_nm_s_per_rad.component_mul(&velocity_error),
+            ..Torques::zeros()
+        }
+    }
+
+    /// Adds what runs beside every activity: the loops of held joints and the soft stops.
+    fn guarded(&self, config: &Config<N>, mut torques: Torques<N>) -> Torques<N> {
+        let velocity = &self.estimator.velocity_rad_per_s;
+        if !matches!(self.activity, Activity::Move { .. }) {
+            for (joint, role) in config.roles.iter().enumerate() {
+                if let Role::Held {
+                    stiffness_nm_per_rad,
+                    damping_nm_s_per_rad,
+                    ..
+                } = role
+                {
+                    torques.joint_pd[joint] += stiffness_nm_per_rad
+                        * (self.held[joint] - self.position[joint])
+                        - damping_nm_s_per_rad * velocity[joint];
+                    torques.damping[joint] = 0.0;
+                }
+            }
+        }
+        torques.soft_stop = checks::soft_stop(&config.limits, &self.position, velocity);
+        torques
+    }
+
+    /// Blends out, over `handover_s`, what the torque was more than it is now when the activity began.
+    fn hand_over(&mut self, config: &Config<N>, torques: &mut Torques<N>) {
+        if self.handover_pending {
+            self.handover_pending = false;
+            self.handover = self.torque - torques.total();
+        }
+        let (blended, ..) = smooth_step(self.activity_s(config) / config.handover_s);
+        torques.handover = self.handover * (1.0 - blended);
+    }
+
+    /// Gravity at the last trusted pose, within the torque limits; nothing where poses are not trusted.
+    fn update_fallback(&mut self, controller: &Controller<N>) {
+        if self.activity.is_limp() {
+            self.fallback = Vector::zeros();
+        } else if self.missing.iter().all(|missed| *missed == 0) {
+            let limits = &controller.config().limits;
+            let (gravity, _) =
+                limiter::limit_torque(limits, controller.motors(), &self.terms.gravity);
+            if crate::math::all_finite(&gravity) {
+                self.fallback = gravity;
+            }
+        }
+    }
+}

@@ -1,0 +1,272 @@
+//! What a configuration must satisfy.
+
+use crate::config::{ApparentInertia, Config, Gains, Role};
+use crate::friction::FrictionError;
+use crate::linalg::Cholesky;
+use crate::math::{Matrix, Vector};
+use core::fmt;
+
+/// Which entry of a configuration is wrong. Joints are counted from 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ConfigError {
+    /// Name of the entry.
+    pub entry: &'static str,
+    /// Joint index, where the entry has one value a joint.
+    pub joint: Option<usize>,
+    /// Value found.
+    pub value: f64,
+    /// What it must be.
+    pub must: &'static str,
+}
+
+impl fmt::Display for ConfigError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let ConfigError {
+            entry, value, must, ..
+        } = self;
+        match self.joint {
+            Some(joint) => write!(f, "{entry} of joint {joint} is {value}, it must be {must}"),
+            None => write!(f, "{entry} is {value}, it must be {must}"),
+        }
+    }
+}
+
+impl core::error::Error for ConfigError {}
+
+const POSITIVE: &str = "finite and positive";
+const NOT_NEGATIVE: &str = "finite and not negative";
+
+fn positive(entry: &'static str, value: f64) -> Result<(), ConfigError> {
+    check(
+        value.is_finite() && value > 0.0,
+        entry,
+        None,
+        value,
+        POSITIVE,
+    )
+}
+
+fn not_negative(entry: &'static str, value: f64) -> Result<(), ConfigError> {
+    check(
+        value.is_finite() && value >= 0.0,
+        entry,
+        None,
+        value,
+        NOT_NEGATIVE,
+    )
+}
+
+fn check(
+    sound: bool,
+    entry: &'static str,
+    joint: Option<usize>,
+    value: f64,
+    must: &'static str,
+) -> Result<(), ConfigError> {
+    if sound {
+        Ok(())
+    } else {
+        Err(ConfigError {
+            entry,
+            joint,
+            value,
+            must,
+        })
+    }
+}
+
+fn each<const N: usize>(
+    entry: &'static str,
+    values: &Vector<N>,
+    least_is_zero: bool,
+) -> Result<(), ConfigError> {
+    for (joint, value) in values.iter().enumerate() {
+        let result = if least_is_zero {
+            not_negative(entry, *value)
+        } else {
+            positive(entry, *value)
+        };
+        result.map_err(|error| ConfigError {
+            joint: Some(joint),
+            ..error
+        })?;
+    }
+    Ok(())
+}
+
+pub(super) fn gains(gains: &Gains, stiffness: f64, damping: f64) -> Result<(), ConfigError> {
+    let within = |entry, value: f64, limit: f64| {
+        check(
+            value.is_finite() && (0.0..=limit).contains(&value),
+            entry,
+            None,
+            value,
+            "finite, not negative and within its limit",
+        )
+    };
+    for axis in 0..3 {
+        within(
+            "stiffness_n_per_m",
+            gains.stiffness_n_per_m[axis],
+            stiffness,
+        )?;
+        within("damping_n_s_per_m", gains.damping_n_s_per_m[axis], damping)?;
+    }
+    Ok(())
+}
+
+pub(super) fn validate<const N: usize>(config: &Config<N>) -> Result<(), ConfigError> {
+    let Config {
+        law, latch, limits, ..
+    } = config;
+    for (joint, friction) in config.friction.iter().enumerate() {
+        friction
+            .validate()
+            .map_err(|FrictionError { entry, value, must }| ConfigError {
+                entry,
+                joint: Some(joint),
+                value,
+                must,
+            })?;
+    }
+    positive("soft_zone_rad", limits.soft_zone_rad)?;
+    positive("stiffness limit", limits.stiffness_n_per_m)?;
+    positive("damping limit", limits.damping_n_s_per_m)?;
+    roles(config)?;
+    let square = config.joint_from_motor * config.joint_from_motor.transpose();
+    let scale = square.trace() / N as f64;
+    // Where rounding leaves a matrix without an inverse with one.
+    let shift = Matrix::from_diagonal_element(1e-12);
+    check(
+        scale.is_finite() && Cholesky::new(&(square / scale - shift)).is_some(),
+        "joint_from_motor",
+        None,
+        scale,
+        "an invertible matrix",
+    )?;
+    positive("period_s", config.period_s)?;
+    positive("estimator_rad_per_s", config.estimator_rad_per_s)?;
+    positive("handover_s", config.handover_s)?;
+    gains(
+        &law.gains,
+        limits.stiffness_n_per_m,
+        limits.damping_n_s_per_m,
+    )?;
+    if let ApparentInertia::Chosen(mass) = &law.inertia {
+        let symmetric = (mass - mass.transpose()).iter().all(|x| *x == 0.0);
+        check(
+            symmetric && Cholesky::new(mass).is_some(),
+            "apparent inertia",
+            None,
+            mass.determinant(),
+            "symmetric and positive definite (the value is its determinant)",
+        )?;
+    }
+    not_negative(
+        "nullspace_damping_nm_s_per_rad",
+        law.nullspace_damping_nm_s_per_rad,
+    )?;
+    positive("observer_rad_per_s", latch.observer_rad_per_s)?;
+    positive("threshold_n", latch.threshold_n)?;
+    not_negative("friction_error", latch.friction_error)?;
+    not_negative("reversal_s", latch.reversal_s)?;
+    check(
+        (0.0..=1.0).contains(&latch.contact_share),
+        "contact_share",
+        None,
+        latch.contact_share,
+        "from 0 to 1",
+    )?;
+    positive("fade_s", latch.fade_s)?;
+    positive("restore_s", latch.restore_s)?;
+    each(
+        "move stiffness_nm_per_rad",
+        &config.move_gains.stiffness_nm_per_rad,
+        false,
+    )?;
+    each(
+        "move damping_nm_s_per_rad",
+        &config.move_gains.damping_nm_s_per_rad,
+        true,
+    )?;
+    each(
+        "hold_damping_nm_s_per_rad",
+        &config.hold_damping_nm_s_per_rad,
+        true,
+    )?;
+    each(
+        "soft_stiffness_nm_per_rad",
+        &limits.soft_stiffness_nm_per_rad,
+        true,
+    )?;
+    each(
+        "soft_damping_nm_s_per_rad",
+        &limits.soft_damping_nm_s_per_rad,
+        true,
+    )?;
+    each(
+        "joint_speed_rad_per_s",
+        &limits.joint_speed_rad_per_s,
+        false,
+    )?;
+    each("joint_torque_nm", &limits.joint_torque_nm, false)?;
+    each("motor_torque_nm", &limits.motor_torque_nm, false)?;
+    each("torque_rate_nm_per_s", &limits.torque_rate_nm_per_s, false)?;
+    positive("tip_speed_m_per_s", limits.tip_speed_m_per_s)?;
+    positive("tracking_error_m", limits.tracking_error_m)?;
+    positive("joint_tracking_error_rad", limits.joint_tracking_error_rad)?;
+    positive("start_error_m", limits.start_error_m)
+}
+
+fn roles<const N: usize>(config: &Config<N>) -> Result<(), ConfigError> {
+    let limits = &config.limits;
+    let mut active = 0;
+    for (joint, role) in config.roles.iter().enumerate() {
+        let (lower, upper) = (
+            limits.position_lower_rad[joint],
+            limits.position_upper_rad[joint],
+        );
+        check(
+            lower.is_finite() && upper.is_finite() && lower + 2.0 * limits.soft_zone_rad < upper,
+            "position range",
+            Some(joint),
+            upper - lower,
+            "finite and wider than its two soft zones",
+        )?;
+        let Role::Held {
+            position_rad,
+            stiffness_nm_per_rad,
+            damping_nm_s_per_rad,
+        } = *role
+        else {
+            active += 1;
+            continue;
+        };
+        let at = |entry, sound, value, must| check(sound, entry, Some(joint), value, must);
+        at(
+            "held position_rad",
+            (lower..=upper).contains(&position_rad),
+            position_rad,
+            "within the joint's stops",
+        )?;
+        at(
+            "held stiffness_nm_per_rad",
+            stiffness_nm_per_rad.is_finite() && stiffness_nm_per_rad > 0.0,
+            stiffness_nm_per_rad,
+            POSITIVE,
+        )?;
+        at(
+            "held damping_nm_s_per_rad",
+            damping_nm_s_per_rad.is_finite() && damping_nm_s_per_rad >= 0.0,
+            damping_nm_s_per_rad,
+            NOT_NEGATIVE,
+        )?;
+    }
+    check(
+        active >= 3,
+        "number of active joints",
+        None,
+        f64::from(active),
+        "at least 3: the task has three directions",
+    )
+}

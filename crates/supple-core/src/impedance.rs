@@ -1,0 +1,248 @@
+//! The impedance law, Eq. (3.6), each term apart.
+//!
+//! With `Jb = H^-1 J^T (J H^-1 J^T)^-1`, the dynamically consistent inverse (`J^-1` where three joints
+//! are active), and `A = J H^-1 J^T`:
+//!
+//! ```text
+//! own inertia     tau = G + C qd + D + H Jb (Xo'' - J' qd) + J^T [K (Xo - X) + B (Xo' - X')]
+//! chosen inertia  tau = G + C qd + D + H Jb (Xo'' - J' qd) - J^T F
+//!                       + H Jb M^-1 [F + K (Xo - X) + B (Xo' - X')]
+//! ```
+//!
+//! `F` is the measured force on the tip. `Xo''` is not in (3.6): it is the feed-forward `M Xo''` that
+//! (3.3) lacks. Joints that are held take no part in the task: their columns of `J` are zero and their
+//! rows of `H` are the identity in `Jb`; they receive the model's coupling torque `H Jb (..)`, and
+//! their own stiff loop elsewhere.
+//!
+//! **With more than three active joints** motion that leaves the tip alone is damped by
+//! `-d N^T N qd`, `N = 1 - Jb J`: `J H^-1 N^T = 0`, so the tip feels none of it, and with `N` on both
+//! sides it takes energy however the arm moves (`-d N^T qd` alone can put some in).
+//!
+//! **Near singular poses** `A` is damped: `A + f(sigma) / m_max I`, with `sigma` the least singular
+//! value of the active Jacobian, `f = (1 - (sigma / 0.18)^2)^2` below 0.18 and zero above (the paper's
+//! sinusoid stays above), `m_max` = 20 kg. At a singular pose the mass that the inertial terms command
+//! along the lost direction is thus `m_max` instead of infinite; on the way there it may be greater,
+//! about twice that for an arm like the WAM.
+
+use crate::config::{ApparentInertia, FrictionVelocity, Gains, Law, Role};
+use crate::dynamics::Terms;
+use crate::friction::Friction;
+use crate::linalg::{Cholesky, least_singular_value};
+use crate::math::{Matrix, Matrix3, Vector, Vector3};
+use crate::trajectory::Reference;
+
+/// Least singular value of the active Jacobian below which the inverse is damped \[m\].
+pub const SINGULAR_BELOW_M: f64 = 0.18;
+/// Greatest mass that the damped inverse commands along a lost direction \[kg\].
+pub const GREATEST_TASK_MASS_KG: f64 = 20.0;
+
+/// Damping of the task inverse at the least singular value `sigma_m` \[1/kg\]: zero from
+/// [`SINGULAR_BELOW_M`] on, `1 / GREATEST_TASK_MASS_KG` at zero.
+pub fn singularity_damping_per_kg(sigma_m: f64) -> f64 {
+    if sigma_m >= SINGULAR_BELOW_M {
+        return 0.0;
+    }
+    let x = sigma_m / SINGULAR_BELOW_M;
+    let f = 1.0 - x * x;
+    f * f / GREATEST_TASK_MASS_KG
+}
+
+/// The tip's position task on the active joints.
+#[derive(Clone, Copy, Debug)]
+pub struct Task<const N: usize> {
+    /// Linear Jacobian with the columns of held joints zero.
+    pub jacobian: Matrix<3, N>,
+    /// `Jb`, joint motion per tip motion; rows of held joints zero.
+    pub inverse: Matrix<N, 3>,
+    /// Least singular value of `jacobian` \[m\].
+    pub least_singular_value_m: f64,
+}
+
+impl<const N: usize> Task<N> {
+    /// `None` where the mass matrix of the active joints is not positive definite.
+    pub fn new(terms: &Terms<N>, roles: &[Role; N]) -> Option<Task<N>> {
+        let mut jacobian: Matrix<3, N> = terms.jacobian.fixed_rows::<3>(0).into_owned();
+        let mut mass_matrix = terms.mass_matrix;
+        for (i, role) in roles.iter().enumerate() {
+            if *role != Role::Active {
+                jacobian.column_mut(i).fill(0.0);
+                mass_matrix.row_mut(i).fill(0.0);
+                mass_matrix.column_mut(i).fill(0.0);
+                mass_matrix[(i, i)] = 1.0;
+            }
+        }
+        let least_singular_value_m = least_singular_value(&jacobian);
+        let mobile = Cholesky::new(&mass_matrix)?.solve(&jacobian.transpose());
+        let mobility: Matrix3<f64> = jacobian * mobile
+            + Matrix3::from_diagonal_element(singularity_damping_per_kg(least_singular_value_m));
+        let inverse = Cholesky::new(&mobility)?.solve(&mobile.transpose());
+        Some(Task {
+            jacobian,
+            inverse: inverse.transpose(),
+            least_singular_value_m,
+        })
+    }
+}
+
+/// Torques of the law and of what stands beside it, each term apart \[N m\].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Torques<const N: usize> {
+    /// `G`.
+    pub gravity: Vector<N>,
+    /// `C qd`.
+    pub coriolis: Vector<N>,
+    /// `D`, its dry part as far as the contact latch lets it through.
+    pub friction: Vector<N>,
+    /// `-H J^-1 J' qd`.
+    pub jacobian_rate: Vector<N>,
+    /// `M Xo''` brought to the joints; in the move mode `H qdd` of its reference.
+    pub inertial: Vector<N>,
+    /// `K (Xo - X)` brought to the joints.
+    pub stiffness: Vector<N>,
+    /// `B (Xo' - X')` brought to the joints; joint damping in gravity hold.
+    pub damping: Vector<N>,
+    /// What the measured tip force contributes; zero with the arm's own inertia.
+    pub force: Vector<N>,
+    /// Damping of motion that does not move the tip.
+    pub nullspace: Vector<N>,
+    /// Stiff loops of held joints, and of all joints in the move mode.
+    pub joint_pd: Vector<N>,
+    /// Spring-dampers before the hard stops.
+    pub soft_stop: Vector<N>,
+    /// Remainder of the torque before the last change of mode.
+    pub handover: Vector<N>,
+}
+
+impl<const N: usize> Torques<N> {
+    /// Nothing at all.
+    pub fn zeros() -> Self {
+        let zero = Vector::zeros();
+        Torques {
+            gravity: zero,
+            coriolis: zero,
+            friction: zero,
+            jacobian_rate: zero,
+            inertial: zero,
+            stiffness: zero,
+            damping: zero,
+            force: zero,
+            nullspace: zero,
+            joint_pd: zero,
+            soft_stop: zero,
+            handover: zero,
+        }
+    }
+
+    /// Every term with its name, in the order of the fields.
+    pub fn named(&self) -> [(&'static str, &Vector<N>); 12] {
+        [
+            ("gravity", &self.gravity),
+            ("coriolis", &self.coriolis),
+            ("friction", &self.friction),
+            ("jacobian_rate", &self.jacobian_rate),
+            ("inertial", &self.inertial),
+            ("stiffness", &self.stiffness),
+            ("damping", &self.damping),
+            ("force", &self.force),
+            ("nullspace", &self.nullspace),
+            ("joint_pd", &self.joint_pd),
+            ("soft_stop", &self.soft_stop),
+            ("handover", &self.handover),
+        ]
+    }
+
+    /// Sum of all terms \[N m\].
+    pub fn total(&self) -> Vector<N> {
+        let mut sum = Vector::zeros();
+        for (_, term) in self.named() {
+            sum += term;
+        }
+        sum
+    }
+
+    /// `K` and `B` together: what the paper calls the PD torque \[N m\].
+    pub fn feedback(&self) -> Vector<N> {
+        self.stiffness + self.damping
+    }
+}
+
+/// What the law is given besides the model.
+#[derive(Clone, Copy, Debug)]
+pub struct Situation<'a, const N: usize> {
+    /// Where the tip should be.
+    pub reference: &'a Reference,
+    /// Joint velocities \[rad/s\].
+    pub velocity_rad_per_s: &'a Vector<N>,
+    /// Gains in force now.
+    pub gains: &'a Gains,
+    /// Measured force on the tip, base axes \[N\].
+    pub tip_force_n: Option<Vector3<f64>>,
+    /// Share of the dry friction feed-forward to apply, 0 to 1.
+    pub friction_share: f64,
+}
+
+/// The law. Adds nothing for held joints but the model's own terms.
+pub fn impedance<const N: usize>(
+    law: &Law,
+    friction: &[Friction; N],
+    roles: &[Role; N],
+    terms: &Terms<N>,
+    task: &Task<N>,
+    now: &Situation<'_, N>,
+) -> Torques<N> {
+    let tip_velocity = terms.jacobian.fixed_rows::<3>(0) * now.velocity_rad_per_s;
+    let position_error = now.reference.position - terms.base_from_tip.translation;
+    let velocity_error = now.reference.velocity - tip_velocity;
+    let spring = now.gains.stiffness_n_per_m.component_mul(&position_error);
+    let damper = now.gains.damping_n_s_per_m.component_mul(&velocity_error);
+    let joints_of = |acceleration: Vector3<f64>| terms.mass_matrix * (task.inverse * acceleration);
+
+    let mut torques = Torques {
+        gravity: terms.gravity,
+        coriolis: terms.coriolis_gravity - terms.gravity,
+        jacobian_rate: joints_of(-terms.jacobian_dot_qd.fixed_rows::<3>(0).into_owned()),
+        ..Torques::zeros()
+    };
+    if law.inertial_feedforward {
+        torques.inertial = joints_of(now.reference.acceleration);
+    }
+    let chosen = match (law.inertia, now.tip_force_n) {
+        (ApparentInertia::Chosen(mass), Some(force)) => {
+            Cholesky::new(&mass).map(|mass| (mass, force))
+        }
+        _ => None,
+    };
+    if let Some((mass, force)) = chosen {
+        torques.stiffness = joints_of(mass.solve(&spring));
+        torques.damping = joints_of(mass.solve(&damper));
+        torques.force = joints_of(mass.solve(&force)) - task.jacobian.tr_mul(&force);
+    } else {
+        torques.stiffness = task.jacobian.tr_mul(&spring);
+        torques.damping = task.jacobian.tr_mul(&damper);
+    }
+
+    let reference_velocity = task.inverse * now.reference.velocity;
+    // The part of the joints' motion that moves the tip; the rest is loose.
+    let tip_motion = task.inverse * (task.jacobian * now.velocity_rad_per_s);
+    let mut loose = Vector::zeros();
+    let mut active = 0;
+    for i in 0..N {
+        let measured = now.velocity_rad_per_s[i];
+        let is_active = roles[i] == Role::Active;
+        let velocity = match law.friction_velocity {
+            FrictionVelocity::Measured if is_active => measured,
+            _ => reference_velocity[i],
+        };
+        let dry = friction[i].dry_torque_nm(velocity);
+        torques.friction[i] = friction[i].torque_nm(velocity) - dry * (1.0 - now.friction_share);
+        if is_active {
+            loose[i] = measured - tip_motion[i];
+            active += 1;
+        }
+    }
+    if active > 3 {
+        let damping = loose * -law.nullspace_damping_nm_s_per_rad;
+        torques.nullspace = damping - task.jacobian.tr_mul(&task.inverse.tr_mul(&damping));
+    }
+    torques
+}

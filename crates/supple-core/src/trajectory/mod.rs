@@ -1,0 +1,148 @@
+//! Where the tip should be: position, velocity and acceleration as pure functions of time.
+//!
+//! Every trajectory starts from rest. Where its path does not, time itself is ramped: the path is
+//! walked at a pace that grows smoothly from nothing to one. Where a velocity jumps by design (the
+//! corners of the quadrant) the acceleration is that of the piece, never the jump.
+
+mod arc;
+mod line;
+mod probe;
+mod quadrant;
+mod sinusoid;
+
+pub use arc::Arc;
+pub use line::Line;
+pub use probe::{Probe, ProbePhase};
+pub use quadrant::{Piece, Quadrant};
+pub use sinusoid::Sinusoid;
+
+use crate::math::{Vector3, all_finite, smooth_step};
+use core::fmt;
+
+/// Reference of the tip in base coordinates: `Xo`, `Xo'`, `Xo''`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reference {
+    /// `Xo` \[m\].
+    pub position: Vector3<f64>,
+    /// `Xo'` \[m/s\].
+    pub velocity: Vector3<f64>,
+    /// `Xo''` \[m/s^2\].
+    pub acceleration: Vector3<f64>,
+}
+
+impl Reference {
+    /// At rest at `position` \[m\].
+    pub fn at_rest(position: Vector3<f64>) -> Reference {
+        Reference {
+            position,
+            velocity: Vector3::zeros(),
+            acceleration: Vector3::zeros(),
+        }
+    }
+}
+
+/// Which entry of a trajectory is wrong, with its value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrajectoryError {
+    /// Name of the entry.
+    pub entry: &'static str,
+    /// Value found.
+    pub value: f64,
+    /// What it must be.
+    pub must: &'static str,
+}
+
+impl fmt::Display for TrajectoryError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "trajectory: {} is {}, it must be {}",
+            self.entry, self.value, self.must
+        )
+    }
+}
+
+impl core::error::Error for TrajectoryError {}
+
+/// A reference for the tip.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Trajectory {
+    /// Stays at a point \[m\].
+    Hold(Vector3<f64>),
+    /// Straight line from rest to rest.
+    Line(Line),
+    /// Back and forth along a line, figure 3a.
+    Sinusoid(Sinusoid),
+    /// Back and forth on a circle about the base axis.
+    Arc(Arc),
+    /// Quarter ellipse and its two straight edges, figure 3b.
+    Quadrant(Quadrant),
+    /// Down, up, out, figures 5 and 6.
+    Probe(Probe),
+}
+
+impl Trajectory {
+    /// Reference at `time_s` since the start; before the start it is the start.
+    pub fn at(&self, time_s: f64) -> Reference {
+        let time_s = time_s.max(0.0);
+        match self {
+            Trajectory::Hold(position) => Reference::at_rest(*position),
+            Trajectory::Line(line) => line.at(time_s),
+            Trajectory::Sinusoid(sinusoid) => sinusoid.at(time_s),
+            Trajectory::Arc(arc) => arc.at(time_s),
+            Trajectory::Quadrant(quadrant) => quadrant.at(time_s),
+            Trajectory::Probe(probe) => probe.at(time_s),
+        }
+    }
+
+    /// Refuses what cannot be followed: entries that are not finite or have the wrong sign.
+    ///
+    /// # Errors
+    /// The first entry that is wrong.
+    pub fn validate(&self) -> Result<(), TrajectoryError> {
+        match self {
+            Trajectory::Hold(position) => finite("position_m", position),
+            Trajectory::Line(line) => line.validate(),
+            Trajectory::Sinusoid(sinusoid) => sinusoid.validate(),
+            Trajectory::Arc(arc) => arc.validate(),
+            Trajectory::Quadrant(quadrant) => quadrant.validate(),
+            Trajectory::Probe(probe) => probe.validate(),
+        }
+    }
+}
+
+/// Time along the path when its pace is ramped from rest over `ramp_s`: value, first and second
+/// derivative. The path lags by half the ramp.
+fn ramped(time_s: f64, ramp_s: f64) -> (f64, f64, f64) {
+    if time_s >= ramp_s {
+        return (time_s - 0.5 * ramp_s, 1.0, 0.0);
+    }
+    let x = time_s / ramp_s;
+    let (pace, slope, _) = smooth_step(x);
+    let x4 = x * x * x * x;
+    (ramp_s * x4 * (2.5 + x * (x - 3.0)), pace, slope / ramp_s)
+}
+
+fn finite(entry: &'static str, v: &Vector3<f64>) -> Result<(), TrajectoryError> {
+    if all_finite(v) {
+        return Ok(());
+    }
+    let value = v.iter().copied().find(|x| !x.is_finite());
+    Err(TrajectoryError {
+        entry,
+        value: value.unwrap_or(f64::NAN),
+        must: "finite",
+    })
+}
+
+fn positive(entry: &'static str, value: f64) -> Result<(), TrajectoryError> {
+    if value > 0.0 && value.is_finite() {
+        Ok(())
+    } else {
+        Err(TrajectoryError {
+            entry,
+            value,
+            must: "finite and positive",
+        })
+    }
+}

@@ -1,0 +1,186 @@
+//! The probing cycle of the paper: down, up, out; at the radial limit the base advances.
+//!
+//! The stroke goes vertically down and up again at a constant speed with smooth ramps at its ends;
+//! then the tip steps out along the radius, from rest to rest. After the last stroke of a column the
+//! base turns by one step while the tip returns to the first radius, and the next column begins.
+
+use super::{Reference, TrajectoryError, finite, positive, ramped};
+use crate::math::{Vector3, sin_cos, smooth_step};
+
+/// Peak speed of a minimum-jerk move is this times its mean speed.
+const MINIMUM_JERK_PEAK: f64 = 1.875;
+
+/// Where in the cycle the reference is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ProbePhase {
+    /// Moving down.
+    Down,
+    /// Moving up.
+    Up,
+    /// Stepping out along the radius.
+    Out,
+    /// Turning the base and returning to the first radius.
+    Advance,
+}
+
+/// The probing cycle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Probe {
+    /// First distance from the base axis \[m\], positive.
+    pub radius_m: f64,
+    /// Strokes in a column, at least one.
+    pub strokes: u32,
+    /// Radial step between strokes \[m\], positive; the paper's is 6.67 mm.
+    pub radial_step_m: f64,
+    /// Height of the top of the stroke above the base frame \[m\].
+    pub top_m: f64,
+    /// Length of the stroke \[m\], positive; the paper's is 0.1 m.
+    pub stroke_m: f64,
+    /// Azimuth of the first column \[rad\].
+    pub azimuth_rad: f64,
+    /// Azimuth step between columns \[rad\].
+    pub azimuth_step_rad: f64,
+    /// Speed of the stroke and greatest speed of the steps \[m/s\], positive.
+    pub speed_m_per_s: f64,
+    /// Time to reach and to leave that speed \[s\], positive.
+    pub ramp_s: f64,
+}
+
+impl Probe {
+    fn stroke_s(&self) -> f64 {
+        self.stroke_m / self.speed_m_per_s + self.ramp_s
+    }
+
+    fn step_s(&self, way_m: f64) -> f64 {
+        (MINIMUM_JERK_PEAK * way_m / self.speed_m_per_s).max(2.0 * self.ramp_s)
+    }
+
+    fn advance_s(&self) -> f64 {
+        let sweep = libm::fabs(self.azimuth_step_rad) * self.last_radius();
+        self.step_s(sweep + self.radial_step_m * self.last_stroke())
+    }
+
+    fn last_radius(&self) -> f64 {
+        self.radius_m + self.radial_step_m * self.last_stroke()
+    }
+
+    fn last_stroke(&self) -> f64 {
+        f64::from(self.strokes.saturating_sub(1))
+    }
+
+    /// Time of one down, up and out \[s\].
+    pub fn cycle_s(&self) -> f64 {
+        2.0 * self.stroke_s() + self.step_s(self.radial_step_m)
+    }
+
+    /// Time of one column with the base advance that ends it \[s\].
+    pub fn column_s(&self) -> f64 {
+        self.cycle_s() * f64::from(self.strokes) - self.step_s(self.radial_step_m)
+            + self.advance_s()
+    }
+
+    /// Phase, time into it \[s\], stroke within the column and column at `time_s`.
+    pub fn phase_at(&self, time_s: f64) -> (ProbePhase, f64, u32, u32) {
+        let column = libm::floor(time_s.max(0.0) / self.column_s());
+        let in_column = time_s.max(0.0) - column * self.column_s();
+        let stroke = libm::floor(in_column / self.cycle_s()).min(self.last_stroke());
+        let t = in_column - stroke * self.cycle_s();
+        let (stroke, column) = (stroke as u32, column as u32);
+        let stroke_s = self.stroke_s();
+        if t < stroke_s {
+            (ProbePhase::Down, t, stroke, column)
+        } else if t < 2.0 * stroke_s {
+            (ProbePhase::Up, t - stroke_s, stroke, column)
+        } else if stroke + 1 < self.strokes {
+            (ProbePhase::Out, t - 2.0 * stroke_s, stroke, column)
+        } else {
+            (ProbePhase::Advance, t - 2.0 * stroke_s, stroke, column)
+        }
+    }
+
+    pub(super) fn at(&self, time_s: f64) -> Reference {
+        let (phase, t, stroke, column) = self.phase_at(time_s);
+        let radius = self.radius_m + self.radial_step_m * f64::from(stroke);
+        let azimuth = self.azimuth_rad + self.azimuth_step_rad * f64::from(column);
+        let still = (0.0, 0.0, 0.0);
+        let (r, phi, z) = match phase {
+            ProbePhase::Down => (still, still, self.stroke(t)),
+            ProbePhase::Up => {
+                let (z, rate, rate_rate) = self.stroke(t);
+                (still, still, (-self.stroke_m - z, -rate, -rate_rate))
+            }
+            ProbePhase::Out => (
+                step(t, self.step_s(self.radial_step_m), self.radial_step_m),
+                still,
+                still,
+            ),
+            ProbePhase::Advance => (
+                step(t, self.advance_s(), self.radius_m - radius),
+                step(t, self.advance_s(), self.azimuth_step_rad),
+                still,
+            ),
+        };
+        cylindrical(
+            (radius + r.0, r.1, r.2),
+            (azimuth + phi.0, phi.1, phi.2),
+            (self.top_m + z.0, z.1, z.2),
+        )
+    }
+
+    /// Height below the top during the stroke down, zero to `-stroke_m`.
+    fn stroke(&self, t: f64) -> (f64, f64, f64) {
+        let v = self.speed_m_per_s;
+        let stroke_s = self.stroke_s();
+        if t <= 0.5 * stroke_s {
+            let (s, pace, rate) = ramped(t, self.ramp_s);
+            (-v * s, -v * pace, -v * rate)
+        } else {
+            let (s, pace, rate) = ramped((stroke_s - t).max(0.0), self.ramp_s);
+            (-self.stroke_m + v * s, -v * pace, v * rate)
+        }
+    }
+
+    pub(super) fn validate(&self) -> Result<(), TrajectoryError> {
+        positive("radius_m", self.radius_m)?;
+        positive("strokes", f64::from(self.strokes))?;
+        positive("radial_step_m", self.radial_step_m)?;
+        positive("stroke_m", self.stroke_m)?;
+        positive("speed_m_per_s", self.speed_m_per_s)?;
+        positive("ramp_s", self.ramp_s)?;
+        if self.ramp_s * self.speed_m_per_s > self.stroke_m {
+            return Err(TrajectoryError {
+                entry: "ramp_s",
+                value: self.ramp_s,
+                must: "at most stroke_m / speed_m_per_s",
+            });
+        }
+        finite(
+            "top_m, azimuth_rad, azimuth_step_rad",
+            &Vector3::new(self.top_m, self.azimuth_rad, self.azimuth_step_rad),
+        )
+    }
+}
+
+fn step(t: f64, duration: f64, way: f64) -> (f64, f64, f64) {
+    let (x, rate, rate_rate) = smooth_step(t / duration);
+    (
+        way * x,
+        way * rate / duration,
+        way * rate_rate / (duration * duration),
+    )
+}
+
+/// Base coordinates of radius, azimuth and height, each with its first two derivatives.
+fn cylindrical(r: (f64, f64, f64), phi: (f64, f64, f64), z: (f64, f64, f64)) -> Reference {
+    let (sin, cos) = sin_cos(phi.0);
+    let radial = Vector3::new(cos, sin, 0.0);
+    let tangent = Vector3::new(-sin, cos, 0.0);
+    let up = Vector3::new(0.0, 0.0, 1.0);
+    Reference {
+        position: radial * r.0 + up * z.0,
+        velocity: radial * r.1 + tangent * (r.0 * phi.1) + up * z.1,
+        acceleration: radial * (r.2 - r.0 * phi.1 * phi.1)
+            + tangent * (r.0 * phi.2 + 2.0 * r.1 * phi.1)
+            + up * z.2,
+    }
+}

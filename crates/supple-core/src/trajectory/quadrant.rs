@@ -1,0 +1,232 @@
+//! Quarter ellipse with unequal semi-axes and the two straight edges that close it, figure 3b.
+//!
+//! The path starts at the centre, runs out along the first semi-axis, round the quarter ellipse, and
+//! back along the second semi-axis; then again. Speed is constant on each piece, so the velocity jumps
+//! at the three corners, where the acceleration stays that of the piece.
+
+use super::{Reference, TrajectoryError, finite, positive, ramped};
+use crate::math::{Vector3, abs, sin_cos, sqrt};
+
+/// Knots of the arc-length table.
+const KNOTS: usize = 9;
+/// Five-point Gauss-Legendre rule on (-1, 1).
+const GAUSS: [(f64, f64); 5] = [
+    (-0.906_179_845_938_664, 0.236_926_885_056_189_1),
+    (-0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
+    (0.0, 0.568_888_888_888_888_9),
+    (0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
+    (0.906_179_845_938_664, 0.236_926_885_056_189_1),
+];
+
+/// Which piece of the path the reference is on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Piece {
+    /// From the centre out along the first semi-axis.
+    Out,
+    /// The quarter ellipse.
+    Ellipse,
+    /// Back to the centre along the second semi-axis.
+    Back,
+}
+
+/// Quarter ellipse and edges, walked at constant speed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Quadrant {
+    centre_m: Vector3<f64>,
+    first_m: Vector3<f64>,
+    second_m: Vector3<f64>,
+    speed_m_per_s: f64,
+    ramp_s: f64,
+    /// Arc length of the ellipse from the first semi-axis at evenly spaced parameters.
+    arc_length_m: [f64; KNOTS],
+}
+
+impl Quadrant {
+    /// `centre_m` is the corner between the edges, `first_m` and `second_m` the semi-axes (orthogonal
+    /// vectors in base axes, they span the plane), `speed_m_per_s` the speed on every piece, `ramp_s`
+    /// the time over which the pace grows from nothing to one at the start.
+    pub fn new(
+        centre_m: Vector3<f64>,
+        first_m: Vector3<f64>,
+        second_m: Vector3<f64>,
+        speed_m_per_s: f64,
+        ramp_s: f64,
+    ) -> Quadrant {
+        let mut quadrant = Quadrant {
+            centre_m,
+            first_m,
+            second_m,
+            speed_m_per_s,
+            ramp_s,
+            arc_length_m: [0.0; KNOTS],
+        };
+        for k in 1..KNOTS {
+            quadrant.arc_length_m[k] =
+                quadrant.arc_length_m[k - 1] + quadrant.arc_between(knot(k - 1), knot(k));
+        }
+        quadrant
+    }
+
+    /// In the vertical plane `y = 0`: centre (0.48, 0, -0.06) m, 0.26 m along x, 0.32 m along z.
+    pub fn vertical(speed_m_per_s: f64) -> Quadrant {
+        Quadrant::new(
+            Vector3::new(0.48, 0.0, -0.06),
+            Vector3::new(0.26, 0.0, 0.0),
+            Vector3::new(0.0, 0.0, 0.32),
+            speed_m_per_s,
+            0.5,
+        )
+    }
+
+    /// The corner between the edges \[m\].
+    pub fn centre_m(&self) -> Vector3<f64> {
+        self.centre_m
+    }
+
+    /// First semi-axis \[m\].
+    pub fn first_m(&self) -> Vector3<f64> {
+        self.first_m
+    }
+
+    /// Second semi-axis \[m\].
+    pub fn second_m(&self) -> Vector3<f64> {
+        self.second_m
+    }
+
+    /// Speed on every piece \[m/s\].
+    pub fn speed_m_per_s(&self) -> f64 {
+        self.speed_m_per_s
+    }
+
+    /// Time over which the pace grows from nothing to one \[s\].
+    pub fn ramp_s(&self) -> f64 {
+        self.ramp_s
+    }
+
+    /// Lengths of the pieces in order \[m\].
+    pub fn lengths_m(&self) -> [f64; 3] {
+        [
+            norm(&self.first_m),
+            self.arc_length_m[KNOTS - 1],
+            norm(&self.second_m),
+        ]
+    }
+
+    /// Time of one round at full pace \[s\].
+    pub fn period_s(&self) -> f64 {
+        self.lengths_m().iter().sum::<f64>() / self.speed_m_per_s
+    }
+
+    /// Piece, share of it covered in 0..1, and rounds completed at `time_s`.
+    pub fn piece_at(&self, time_s: f64) -> (Piece, f64, u32) {
+        let (s, _, _) = ramped(time_s.max(0.0), self.ramp_s);
+        let (piece, along, round) = self.locate(s);
+        let lengths = self.lengths_m();
+        (piece, along / lengths[piece as usize], round)
+    }
+
+    fn locate(&self, path_time_s: f64) -> (Piece, f64, u32) {
+        let lengths = self.lengths_m();
+        let whole = lengths[0] + lengths[1] + lengths[2];
+        let distance = path_time_s * self.speed_m_per_s;
+        let round = libm::floor(distance / whole);
+        let along = distance - round * whole;
+        let round = round as u32;
+        if along < lengths[0] {
+            (Piece::Out, along, round)
+        } else if along < lengths[0] + lengths[1] {
+            (Piece::Ellipse, along - lengths[0], round)
+        } else {
+            (Piece::Back, along - lengths[0] - lengths[1], round)
+        }
+    }
+
+    pub(super) fn at(&self, time_s: f64) -> Reference {
+        let (s, pace, pace_rate) = ramped(time_s, self.ramp_s);
+        let (piece, along, _) = self.locate(s);
+        let (position, tangent, curvature) = match piece {
+            Piece::Out => {
+                let tangent = self.first_m / norm(&self.first_m);
+                (self.centre_m + tangent * along, tangent, Vector3::zeros())
+            }
+            Piece::Ellipse => self.on_ellipse(along),
+            Piece::Back => {
+                let tangent = -self.second_m / norm(&self.second_m);
+                let position = self.centre_m + self.second_m + tangent * along;
+                (position, tangent, Vector3::zeros())
+            }
+        };
+        let speed = self.speed_m_per_s * pace;
+        Reference {
+            position,
+            velocity: tangent * speed,
+            acceleration: curvature * (speed * speed) + tangent * (self.speed_m_per_s * pace_rate),
+        }
+    }
+
+    /// Position, unit tangent and curvature vector \[1/m\] at an arc length from the first semi-axis.
+    fn on_ellipse(&self, along: f64) -> (Vector3<f64>, Vector3<f64>, Vector3<f64>) {
+        let k = self.arc_length_m[1..KNOTS - 1]
+            .iter()
+            .take_while(|length| **length <= along)
+            .count();
+        let mut u = knot(k);
+        for _ in 0..6 {
+            let error = self.arc_length_m[k] + self.arc_between(knot(k), u) - along;
+            let step = error / self.stretch(u);
+            u -= step;
+            if abs(step) < 1e-15 {
+                break;
+            }
+        }
+        let (sin, cos) = sin_cos(u);
+        let rate = self.second_m * cos - self.first_m * sin;
+        let rate_rate = -(self.first_m * cos + self.second_m * sin);
+        let stretch2 = rate.dot(&rate);
+        let tangent = rate / sqrt(stretch2);
+        let curvature = (rate_rate - tangent * tangent.dot(&rate_rate)) / stretch2;
+        let position = self.centre_m + self.first_m * cos + self.second_m * sin;
+        (position, tangent, curvature)
+    }
+
+    fn stretch(&self, u: f64) -> f64 {
+        let (sin, cos) = sin_cos(u);
+        norm(&(self.second_m * cos - self.first_m * sin))
+    }
+
+    fn arc_between(&self, from: f64, to: f64) -> f64 {
+        let (mid, half) = (0.5 * (from + to), 0.5 * (to - from));
+        let sum: f64 = GAUSS
+            .iter()
+            .map(|(x, weight)| weight * self.stretch(mid + half * x))
+            .sum();
+        sum * half
+    }
+
+    pub(super) fn validate(&self) -> Result<(), TrajectoryError> {
+        finite("centre_m", &self.centre_m)?;
+        finite("first_m", &self.first_m)?;
+        finite("second_m", &self.second_m)?;
+        positive("length of first_m", norm(&self.first_m))?;
+        positive("length of second_m", norm(&self.second_m))?;
+        let cosine =
+            self.first_m.dot(&self.second_m) / (norm(&self.first_m) * norm(&self.second_m));
+        if abs(cosine) > 1e-9 {
+            return Err(TrajectoryError {
+                entry: "cosine between first_m and second_m",
+                value: cosine,
+                must: "zero: the semi-axes are orthogonal",
+            });
+        }
+        positive("speed_m_per_s", self.speed_m_per_s)?;
+        positive("ramp_s", self.ramp_s)
+    }
+}
+
+fn knot(k: usize) -> f64 {
+    core::f64::consts::FRAC_PI_2 * k as f64 / (KNOTS - 1) as f64
+}
+
+fn norm(v: &Vector3<f64>) -> f64 {
+    sqrt(v.dot(v))
+}

@@ -1,0 +1,209 @@
+//! Changes of mode with the arm in the loop: the torque does not jump, faults are not blended, and
+//! what was handed over dies out.
+
+use crate::support::configs::{four, rate_limited, three};
+use crate::support::plant::Plant;
+use crate::support::rig::{Rig, bent, probe_at};
+use crate::support::size;
+use supple_core::controller::{Mode, Request};
+use supple_core::math::Vector3;
+use supple_core::{Config, Input, Output, Trajectory, Vector};
+
+/// Greatest change of torque from one cycle to the next \[N m\].
+fn greatest_step<const N: usize>(outputs: &[Output<N>]) -> f64 {
+    outputs
+        .windows(2)
+        .map(|pair| size(&(pair[1].torque_nm - pair[0].torque_nm)))
+        .fold(0.0, f64::max)
+}
+
+/// A controller with its arm, after `seconds` in each requested mode.
+struct Run<const N: usize> {
+    rig: Rig<N>,
+    plant: Plant<N>,
+    last: Vec<Output<N>>,
+}
+
+impl<const N: usize> Run<N> {
+    fn new(config: Config<N>) -> Self {
+        let mut run = Run {
+            rig: Rig::new(config, bent()),
+            plant: Plant::at_rest(config.arm, bent()),
+            last: Vec::new(),
+        };
+        run.rig.cycle();
+        run.go(Some(Request::GravityHold), 1000);
+        run
+    }
+
+    fn go(&mut self, request: Option<Request<N>>, cycles: usize) {
+        let nothing = crate::support::plant::nothing;
+        let first = self.rig.drive(&mut self.plant, request, nothing);
+        assert_eq!((first.refusal, first.fault), (None, None), "{request:?}");
+        self.last = vec![first];
+        for _ in 1..cycles {
+            let output = self.rig.run(&mut self.plant);
+            assert_eq!(output.fault, None, "{request:?}");
+            self.last.push(output);
+        }
+    }
+
+    /// Changes the mode and holds the change against what was ordinary before and after.
+    fn change(&mut self, request: Request<N>, handover_s: f64) {
+        let before = self.last.clone();
+        self.go(Some(request), 600);
+        let (last, now) = (&before[before.len() - 1], &self.last);
+        let jump = size(&(now[0].torque_nm - last.torque_nm));
+        assert!(jump < 1e-9, "{request:?} jumps by {jump} N m");
+        // Blending a remainder out over the handover cannot go faster than 1.875 of its mean rate.
+        let blend = 1.875 * size(&now[0].torques.handover) / handover_s * 1e-3;
+        let settled = &now[now.len() / 2..];
+        let ordinary = greatest_step(&before).max(greatest_step(settled));
+        let step = greatest_step(now);
+        assert!(
+            step <= blend * 1.01 + ordinary + 0.05,
+            "{request:?}: {step} N m in a cycle, blending {blend}, ordinarily {ordinary}"
+        );
+        let over = (handover_s / 1e-3).ceil() as usize;
+        for (k, output) in now.iter().enumerate() {
+            let left = size(&output.torques.handover);
+            let whole = size(&now[0].torques.handover);
+            assert!(left <= whole, "the remainder only shrinks");
+            assert!(k < over || left == 0.0, "{left} N m left after {k} cycles");
+            if let Some(next) = now.get(k + 1) {
+                assert!(size(&next.torques.handover) <= left);
+            }
+        }
+    }
+}
+
+fn through_all_modes<const N: usize>(config: Config<N>) {
+    let handover_s = config.handover_s;
+    let mut run = Run::new(config);
+    let mut target = run.plant.q;
+    target[1] += 0.1;
+    let near = |run: &Run<N>| {
+        // Not quite where the tip is: the spring is loaded from the start.
+        let tip = supple_core::dynamics::tip_pose(&run.plant.arm, &run.plant.q).translation;
+        Request::Track(Trajectory::Hold(tip + Vector3::new(0.02, 0.01, -0.02)))
+    };
+    for (i, role) in config.roles.iter().enumerate() {
+        if let supple_core::config::Role::Held { position_rad, .. } = role {
+            target[i] = *position_rad;
+        }
+    }
+    run.change(
+        Request::Move {
+            target_rad: target,
+            duration_s: 0.5,
+        },
+        handover_s,
+    );
+    run.change(near(&run), handover_s);
+    run.change(Request::GravityHold, handover_s);
+    run.change(near(&run), handover_s);
+    let tip = supple_core::dynamics::tip_pose(&run.plant.arm, &run.plant.q).translation;
+    run.change(Request::Track(probe_at(&tip)), handover_s);
+    target[1] += 0.1;
+    run.change(
+        Request::Move {
+            target_rad: target,
+            duration_s: 0.5,
+        },
+        handover_s,
+    );
+    run.change(Request::GravityHold, handover_s);
+    assert_eq!(run.rig.state.mode(), Mode::GravityHold);
+}
+
+#[test]
+fn of_3_joints() {
+    through_all_modes(three());
+}
+
+#[test]
+fn of_4_joints() {
+    through_all_modes(four());
+}
+
+/// One change on the heels of another, before the first has died out.
+#[test]
+fn a_change_during_a_change() {
+    let mut run = Run::new(four());
+    let mut previous = run.last[run.last.len() - 1].torque_nm;
+    for k in 0..40 {
+        let request = match k % 4 {
+            0 => Request::Track(Trajectory::Hold(
+                supple_core::dynamics::tip_pose(&run.plant.arm, &run.plant.q).translation
+                    + Vector3::new(0.03, 0.0, -0.02),
+            )),
+            1 => Request::GravityHold,
+            2 => {
+                let mut target_rad = run.plant.q;
+                target_rad[2] = 0.0;
+                Request::Move {
+                    target_rad,
+                    duration_s: 1.0,
+                }
+            }
+            _ => Request::Gains {
+                gains: supple_core::config::Gains::isotropic(10.0 * f64::from(k), 5.0),
+                ramp_s: 0.05,
+            },
+        };
+        run.go(Some(request), 7);
+        let jump = size(&(run.last[0].torque_nm - previous));
+        assert!(jump < 0.05, "{jump} N m at change {k}");
+        previous = run.last[6].torque_nm;
+    }
+}
+
+/// After a fault the safe action is there at once, as far as the rate limit lets it.
+#[test]
+fn a_fault_is_not_blended() {
+    for request in [
+        Request::Track(Trajectory::Hold(Vector3::zeros())),
+        Request::Move {
+            target_rad: bent::<4>() + Vector::<4>::new(0.3, 0.2, 0.0, 0.2),
+            duration_s: 1.0,
+        },
+    ] {
+        let mut config = four();
+        config.limits.start_error_m = 5.0;
+        config.limits.tracking_error_m = 5.0;
+        let mut run = Run::new(config);
+        run.go(Some(request), 50);
+        run.rig.q = run.plant.q;
+        let before = run.last[49].torque_nm;
+        let output = run.rig.step(&Input {
+            tip_force_n: Some(Vector3::repeat(f64::NAN)),
+            ..run.rig.input()
+        });
+        assert_eq!(output.mode, Mode::Fault);
+        let torques = &output.torques;
+        assert_eq!(torques.handover, Vector::<4>::zeros());
+        let safe = torques.gravity + torques.damping + torques.joint_pd + torques.soft_stop;
+        assert_eq!(torques.total(), safe);
+        let expected = rate_limited(&config, &before, &safe);
+        assert!(size(&(output.torque_nm - expected)) < 1e-9);
+    }
+}
+
+/// The way back from a fault is bumpless like any other.
+#[test]
+fn a_reset_is_bumpless() {
+    let mut run = Run::new(four());
+    run.rig.q = run.plant.q;
+    run.rig.step(&Input {
+        tip_force_n: Some(Vector3::repeat(f64::NAN)),
+        ..run.rig.input()
+    });
+    for _ in 0..300 {
+        let output = run.rig.run(&mut run.plant);
+        assert_eq!(output.mode, Mode::Fault);
+        run.last.push(output);
+    }
+    run.last.drain(..run.last.len() - 200);
+    run.change(Request::Reset, 0.1);
+    assert_eq!(run.rig.state.mode(), Mode::GravityHold);
+}

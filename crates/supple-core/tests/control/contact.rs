@@ -1,0 +1,295 @@
+//! The contact latch in the loop: when it closes, what it takes away, when it opens.
+
+use crate::support::configs::{friction, three, unlimited};
+use crate::support::plant::{Plant, nothing, push};
+use crate::support::rig::Rig;
+use supple_core::config::{ContactLatch, Gains};
+use supple_core::controller::Request;
+use supple_core::math::Vector3;
+use supple_core::reach::reach;
+use supple_core::trajectory::Line;
+use supple_core::{Config, Friction, Output, Trajectory, Vector};
+
+const CENTRE: Vector3<f64> = Vector3::new(0.6, 0.0, 0.0);
+
+fn config(change: impl FnOnce(&mut ContactLatch)) -> Config<3> {
+    let mut config = three();
+    unlimited(&mut config);
+    config.law.gains = Gains::isotropic(100.0, 20.0);
+    config.limits.joint_speed_rad_per_s.fill(20.0);
+    config.limits.tip_speed_m_per_s = 20.0;
+    change(&mut config.latch);
+    config
+}
+
+/// The arm at the centre, tracking a line downwards at 0.05 m/s on average.
+struct Bench {
+    rig: Rig<3>,
+    plant: Plant<3>,
+}
+
+fn line(from_m: Vector3<f64>, way_m: Vector3<f64>) -> Request<3> {
+    Request::Track(Trajectory::Line(Line {
+        from_m,
+        to_m: from_m + way_m,
+        duration_s: 2.0,
+    }))
+}
+
+const DOWN: Vector3<f64> = Vector3::new(0.0, 0.0, -0.1);
+
+impl Bench {
+    fn new(config: Config<3>) -> Bench {
+        let seed = Vector::<3>::new(0.0, 0.4, 1.4);
+        let place = reach(&config.arm, &config.roles, &config.limits, &seed, &CENTRE);
+        let plant = Plant::at_rest(config.arm, place.position_rad);
+        let mut rig = Rig::holding(config, place.position_rad);
+        let mut bench = Bench {
+            plant,
+            rig: rig.clone(),
+        };
+        let first = rig.drive(&mut bench.plant, Some(line(CENTRE, DOWN)), nothing);
+        assert_eq!((first.refusal, first.fault), (None, None));
+        bench.rig = rig;
+        bench
+    }
+
+    /// One cycle; the arm has the friction that the controller expects, at the reference's velocity,
+    /// so that what is observed is the force alone; `force` pushes on the tip.
+    fn cycle(&mut self, request: Option<Request<3>>, force: Vector3<f64>) -> Output<3> {
+        let output = self
+            .rig
+            .drive(&mut self.plant, request, |arm, q, _| push(arm, q, &force));
+        assert_eq!((output.refusal, output.fault), (None, None));
+        output
+    }
+
+    fn cycles(&mut self, count: usize, force: Vector3<f64>) -> Vec<Output<3>> {
+        (0..count).map(|_| self.cycle(None, force)).collect()
+    }
+}
+
+fn up(newtons: f64) -> Vector3<f64> {
+    Vector3::new(0.0, 0.0, newtons)
+}
+
+/// Latched exactly from the cycle in which the force passes the threshold that is reported.
+#[test]
+fn it_closes_where_the_force_passes_the_threshold() {
+    let mut bench = Bench::new(config(|_| {}));
+    bench.cycles(600, up(0.0));
+    let mut closed = 0;
+    for k in 0..800 {
+        let output = bench.cycle(None, up(0.01 * f64::from(k)));
+        assert!(
+            (output.contact_threshold_n - 3.0).abs() < 1e-12,
+            "no friction, no doubt"
+        );
+        if closed == 0 {
+            let passed = output.force_against_n > output.contact_threshold_n;
+            assert_eq!(output.in_contact, passed, "at {} N", output.force_against_n);
+        }
+        closed += u32::from(output.in_contact);
+    }
+    assert!(closed > 300, "it never closed");
+}
+
+#[test]
+fn a_force_that_helps_or_crosses_is_no_contact() {
+    for force in [
+        up(-20.0),
+        Vector3::new(8.0, 0.0, 0.0),
+        Vector3::new(0.0, 8.0, 0.0),
+    ] {
+        let mut bench = Bench::new(config(|_| {}));
+        bench.cycles(300, up(0.0));
+        for output in bench.cycles(500, force) {
+            assert!(!output.in_contact, "{} N against", output.force_against_n);
+        }
+    }
+}
+
+/// After a start or a reversal the observer is still wrong: twice the threshold, for the time stated.
+#[test]
+fn the_threshold_is_doubled_after_a_start_and_a_reversal() {
+    let mut bench = Bench::new(config(|_| {}));
+    let thresholds = |outputs: &[Output<3>]| -> Vec<f64> {
+        outputs
+            .iter()
+            .map(|output| output.contact_threshold_n)
+            .collect()
+    };
+    let mut seen = thresholds(&bench.cycles(1000, up(0.0)));
+    let from = bench.rig.tip();
+    bench.cycle(Some(line(from, -DOWN)), up(0.0));
+    seen.extend(thresholds(&bench.cycles(1000, up(0.0))));
+    let doubled = seen.iter().filter(|threshold| **threshold == 6.0).count();
+    let single = seen.iter().filter(|threshold| **threshold == 3.0).count();
+    assert_eq!(doubled + single, seen.len());
+    // 0.2 s from where the reference moves at all, which it does a little after each request.
+    assert!((400..600).contains(&doubled), "{doubled} ms doubled");
+    assert_eq!(seen[999], 3.0);
+    assert_eq!(seen[1100], 6.0);
+    assert_eq!(seen[1999], 3.0);
+}
+
+/// Held against the arm after contact, then the reference turns back.
+fn touch_and_retreat(latch: impl FnOnce(&mut ContactLatch)) -> (Vec<Output<3>>, Vec<Output<3>>) {
+    let mut config = config(latch);
+    config.friction = friction().map(|friction: Friction| Friction {
+        offset_nm: 0.0,
+        ..friction
+    });
+    let mut bench = Bench::new(config);
+    bench.cycles(700, up(0.0));
+    let touching = bench.cycles(600, up(12.0));
+    let from = touching[599].tip_position_m;
+    let mut leaving = vec![bench.cycle(Some(line(from, -DOWN)), up(0.0))];
+    leaving.extend(bench.cycles(600, up(0.0)));
+    (touching, leaving)
+}
+
+fn first_contact(outputs: &[Output<3>]) -> usize {
+    outputs
+        .iter()
+        .position(|output| output.in_contact)
+        .expect("contact is noticed")
+}
+
+#[test]
+fn the_friction_is_gone_10_ms_after_contact_and_back_after_the_retreat() {
+    let (touching, leaving) = touch_and_retreat(|_| {});
+    let at = first_contact(&touching);
+    assert!(at < 60, "noticed after {at} ms");
+    for (k, output) in touching[at..].iter().enumerate() {
+        let expected = (1.0 - f64::from(k as u32 + 1) * 0.1).max(0.0);
+        assert!(
+            (output.friction_share - expected).abs() < 1e-9,
+            "{k} ms after contact"
+        );
+        assert!(
+            output.in_contact,
+            "it stays closed while the reference goes on"
+        );
+    }
+    assert!(touching[at + 9].friction_share < 1e-12, "gone in 10 ms");
+    // The reference turns: released, and nothing latches on the way back.
+    let share = |k: usize| leaving[k].friction_share;
+    assert!(leaving.iter().all(|output| !output.in_contact));
+    assert!((share(600) - 1.0).abs() < 1e-12 && share(0) <= share(30) && share(30) <= share(60));
+}
+
+/// Some of it can be left on in contact: it fades as fast, but no further.
+#[test]
+fn a_stated_share_of_the_friction_stays_in_contact() {
+    let (touching, leaving) = touch_and_retreat(|latch| latch.contact_share = 0.35);
+    let at = first_contact(&touching);
+    for (k, output) in touching[at..].iter().enumerate() {
+        let expected = (1.0 - f64::from(k as u32 + 1) * 0.1).max(0.35);
+        assert!(
+            (output.friction_share - expected).abs() < 1e-9,
+            "{k} ms after contact"
+        );
+    }
+    assert!((leaving[600].friction_share - 1.0).abs() < 1e-12);
+}
+
+/// What comes back comes back over the time stated.
+#[test]
+fn the_share_is_restored_within_its_time() {
+    let mut bench = Bench::new(config(|latch| latch.restore_s = 0.1));
+    bench.cycles(700, up(0.0));
+    let touched = bench.cycles(300, up(12.0));
+    assert!(touched[299].in_contact && touched[299].friction_share == 0.0);
+    // A trajectory asked for anew begins with a clean latch: the reversal must come in the same one.
+    let mut probing = Bench::new(config(|latch| latch.restore_s = 0.1));
+    let probe = crate::support::rig::probe_at(&probing.rig.tip());
+    probing.cycle(Some(Request::Track(probe)), up(0.0));
+    let mut outputs = probing.cycles(1000, up(0.0));
+    outputs.extend(probing.cycles(1000, up(12.0)));
+    assert!(outputs[1999].in_contact && outputs[1999].friction_share == 0.0);
+    let after = probing.cycles(1500, up(0.0));
+    let released = after
+        .iter()
+        .position(|output| !output.in_contact)
+        .expect("the retreat releases");
+    let velocity = after[released].reference.expect("a reference").velocity;
+    assert!(velocity.z > 0.0, "released by the retreat, not before it");
+    for (k, output) in after[released..].iter().take(150).enumerate() {
+        let expected = (f64::from(k as u32 + 1) * 0.01).min(1.0);
+        assert!(
+            (output.friction_share - expected).abs() < 1e-9,
+            "{k} ms after"
+        );
+    }
+}
+
+/// The force leaves but the reference does not turn: contact is remembered.
+#[test]
+fn it_stays_closed_until_the_reference_retreats() {
+    let mut bench = Bench::new(config(|_| {}));
+    bench.cycles(700, up(0.0));
+    assert!(bench.cycles(200, up(12.0))[199].in_contact);
+    for output in bench.cycles(800, up(0.0)) {
+        assert!(output.in_contact && output.friction_share == 0.0);
+    }
+    // The line has ended: a reference at rest does not retreat.
+    for output in bench.cycles(500, up(0.0)) {
+        assert!(output.in_contact);
+    }
+}
+
+#[test]
+fn without_the_fade_it_only_reports() {
+    let (touching, leaving) = touch_and_retreat(|latch| latch.fade = false);
+    first_contact(&touching);
+    for output in touching.iter().chain(&leaving) {
+        assert_eq!(output.friction_share, 1.0);
+    }
+    assert!(touching[599].in_contact && !leaving[600].in_contact);
+}
+
+/// Less friction fed forward is less force pushed with: the purpose of it all.
+#[test]
+fn the_torque_loses_the_dry_friction() {
+    let (fading, _) = touch_and_retreat(|_| {});
+    let (pushing, _) = touch_and_retreat(|latch| latch.fade = false);
+    let at = first_contact(&fading) + 30;
+    let norm = |outputs: &[Output<3>]| outputs[at].torques.friction.norm();
+    assert!(
+        norm(&pushing) > 0.5,
+        "{} N m are fed forward",
+        norm(&pushing)
+    );
+    assert!(norm(&fading) < 0.5 * norm(&pushing));
+}
+
+/// What friction may hide raises the threshold: more of it, or a worse model of it.
+#[test]
+fn doubt_about_friction_raises_the_threshold() {
+    let threshold = |coulomb_nm: f64, error: f64| {
+        let mut config = config(|latch| latch.friction_error = error);
+        config.friction = [Friction::coulomb(0.0, coulomb_nm); 3];
+        let mut bench = Bench::new(config);
+        let outputs = bench.cycles(1000, up(0.0));
+        outputs[999].contact_threshold_n
+    };
+    let none = threshold(0.0, 0.1);
+    assert!((none - 3.0).abs() < 1e-12);
+    assert!(threshold(1.0, 0.1) > none);
+    assert!(threshold(2.0, 0.1) > threshold(1.0, 0.1));
+    assert!(threshold(1.0, 0.3) > threshold(1.0, 0.1));
+}
+
+/// A reference that never moved has no direction to be blocked in.
+#[test]
+fn a_reference_at_rest_never_latches() {
+    let config = config(|_| {});
+    let mut bench = Bench::new(config);
+    let hold = bench.rig.stay();
+    bench.cycle(Some(hold), up(0.0));
+    for output in bench.cycles(1000, up(12.0)) {
+        assert!(!output.in_contact);
+        assert_eq!(output.force_against_n, 0.0);
+    }
+}

@@ -1,0 +1,106 @@
+//! The step is a pure function: the same inputs give the same bits, and a copied state the same future.
+
+use crate::support::configs::{four, friction, seven};
+use crate::support::rig::{Rig, bent, probe_at};
+use supple_core::config::Gains;
+use supple_core::controller::Request;
+use supple_core::math::Vector3;
+use supple_core::{Config, Input, Output, State, Vector, step};
+
+/// A run through the modes with a bad moment in it.
+fn script<const N: usize>(config: Config<N>) -> Vec<Input<N>> {
+    let mut rig = Rig::new(config, bent());
+    let mut inputs = Vec::new();
+    for k in 0_u32..1200 {
+        let t = 1e-3 * f64::from(k);
+        rig.q = bent::<N>() + Vector::<N>::from_fn(|i, _| 2e-3 * (3.0 * t + i as f64).sin());
+        let mut input = rig.input();
+        input.tip_force_n = Some(Vector3::new(t.sin(), t.cos(), 0.1));
+        input.request = match k {
+            5 => Some(Request::GravityHold),
+            200 => Some(Request::Move {
+                target_rad: bent(),
+                duration_s: 0.2,
+            }),
+            500 => Some(Request::Track(probe_at(&rig.tip()))),
+            600 => Some(Request::Gains {
+                gains: Gains::isotropic(25.0, 4.0),
+                ramp_s: 0.1,
+            }),
+            1000 => Some(Request::Reset),
+            1001 => Some(rig.stay()),
+            _ => None,
+        };
+        if k % 97 == 3 {
+            input.position_rad[1] = None;
+        }
+        if k == 900 {
+            input.tip_force_n = Some(Vector3::repeat(f64::NAN));
+        }
+        rig.cycle += 1;
+        inputs.push(input);
+    }
+    inputs
+}
+
+/// Every number of an output with its sign and its last digit: Rust prints floats so that they read
+/// back to the same bits.
+fn written<const N: usize>(output: &Output<N>) -> String {
+    format!("{output:?}")
+}
+
+fn same_bits<const N: usize>(mut config: Config<N>) {
+    config.friction = friction();
+    let inputs = script(config);
+    let run = |config: Config<N>| -> Vec<String> {
+        let mut rig = Rig::new(config, bent());
+        inputs
+            .iter()
+            .map(|input| written(&rig.step(input)))
+            .collect()
+    };
+    let first = run(config);
+    assert_eq!(first, run(config));
+    for mode in ["Idle", "GravityHold", "Move", "Track", "Probe", "Fault"] {
+        let entered = first
+            .iter()
+            .any(|text| text.contains(&format!("mode: {mode}")));
+        assert!(entered, "the script reaches {mode}");
+    }
+
+    // Forked anywhere, the copy and the original have the same future.
+    let mut rig = Rig::new(config, bent());
+    for (k, input) in inputs.iter().enumerate() {
+        if k % 151 == 0 {
+            let mut copy: State<N> = rig.state;
+            for (later, expected) in inputs.iter().zip(&first).skip(k).take(40) {
+                let output = step(&rig.controller, &mut copy, later);
+                assert_eq!(&written(&output), expected);
+            }
+        }
+        rig.step(input);
+    }
+}
+
+#[test]
+fn of_4_joints() {
+    same_bits(four());
+}
+
+#[test]
+fn of_7_joints() {
+    same_bits(seven());
+}
+
+/// What a controller does is a function of its own state alone: two in turn do not disturb each other.
+#[test]
+fn two_controllers_side_by_side() {
+    let inputs = script(four());
+    let (mut a, mut b) = (Rig::new(four(), bent()), Rig::new(four(), bent()));
+    let alone: Vec<_> = inputs.iter().map(|input| a.step(input)).collect();
+    let mut a = Rig::new(four(), bent());
+    for (input, expected) in inputs.iter().zip(&alone) {
+        assert_eq!(a.step(input), *expected);
+        assert_eq!(b.step(input), *expected);
+    }
+}

@@ -1,0 +1,284 @@
+//! Every fault: it comes exactly at its limit, says what broke it, stays until a reset, and the arm
+//! does what is safe.
+
+use crate::support::configs::{four, rate_limited, three, unlimited};
+use crate::support::rig::{Rig, bent};
+use supple_core::config::{Gains, Role};
+use supple_core::controller::{Fault, Mode, Request, SafeAction, limit_torque};
+use supple_core::dynamics::gravity;
+use supple_core::math::{Matrix3, Vector3};
+use supple_core::{Arm, Body, Config, Input, Joint, Output, Pose, Trajectory, Vector};
+
+/// The fault is latched with its cause, the safe action runs, a reset leaves it.
+#[track_caller]
+pub fn latched(mut rig: Rig<4>, first: &Output<4>, action: SafeAction) {
+    let fault = first.fault.expect("a fault");
+    assert_eq!((first.mode, fault.safe_action()), (Mode::Fault, action));
+    assert_eq!(
+        first.torques.handover.norm(),
+        0.0,
+        "a fault is not blended in"
+    );
+    assert!(!fault.to_string().is_empty() && !fault.name().is_empty());
+    // Back in good order, at rest: nothing changes by itself.
+    let output = rig.rest();
+    assert_eq!((output.mode, output.fault), (Mode::Fault, Some(fault)));
+    match action {
+        SafeAction::Idle => {
+            assert_eq!(output.torque_nm, Vector::<4>::zeros());
+            assert_eq!(first.fallback_torque_nm, Vector::<4>::zeros());
+            assert_eq!(output.fallback_torque_nm, Vector::<4>::zeros());
+        }
+        SafeAction::GravityHold => {
+            let config = rig.controller.config();
+            let held = gravity(&config.arm, &rig.q);
+            let total = output.torques.total();
+            let rest = total - held - output.torques.joint_pd - output.torques.soft_stop;
+            assert!(rest.norm() < 1e-6, "{rest} beside gravity");
+            let (allowed, _) = limit_torque(&config.limits, rig.controller.motors(), &total);
+            assert!((output.torque_nm - allowed).norm() < 1e-9);
+        }
+    }
+    // Another fault does not hide the first cause.
+    let cycle = rig.cycle - 2;
+    let output = rig.clone().step(&Input {
+        cycle,
+        ..rig.input()
+    });
+    assert_eq!((output.mode, output.fault), (Mode::Fault, Some(fault)));
+    let expected = match action {
+        SafeAction::GravityHold => Mode::GravityHold,
+        SafeAction::Idle => Mode::Idle,
+    };
+    let output = rig.ask(Request::Reset);
+    assert_eq!((output.mode, output.fault), (expected, None));
+    assert_eq!(output.refusal, None);
+    assert_eq!(rig.rest().mode, expected);
+}
+
+#[test]
+fn measurements_that_are_no_numbers() {
+    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        for joint in 0..4 {
+            let mut rig = Rig::holding(four(), bent());
+            let mut input = rig.input();
+            input.position_rad[joint] = Some(bad);
+            let output = rig.step(&input);
+            let expected = Fault::MeasurementNotFinite { joint: Some(joint) };
+            assert_eq!(output.fault, Some(expected));
+            latched(rig, &output, SafeAction::Idle);
+        }
+        for axis in 0..3 {
+            let mut rig = Rig::holding(four(), bent());
+            let mut force = Vector3::zeros();
+            force[axis] = bad;
+            let mut input = rig.input();
+            input.tip_force_n = Some(force);
+            let output = rig.step(&input);
+            let expected = Fault::MeasurementNotFinite { joint: None };
+            assert_eq!(output.fault, Some(expected));
+            latched(rig, &output, SafeAction::GravityHold);
+        }
+    }
+}
+
+/// A configuration in which nothing but arithmetic is a limit.
+fn boundless() -> Config<4> {
+    let mut config = four();
+    unlimited(&mut config);
+    config.limits.start_error_m = 1e3;
+    config.limits.tracking_error_m = 1e3;
+    config.limits.stiffness_n_per_m = f64::MAX;
+    config.limits.joint_speed_rad_per_s.fill(f64::MAX);
+    config.limits.tip_speed_m_per_s = f64::MAX;
+    config
+}
+
+/// A clamp would have made a limit of it.
+#[test]
+fn an_infinite_term_is_a_fault_and_not_a_clamp() {
+    let mut rig = Rig::holding(boundless(), bent());
+    let far = rig.tip() + Vector3::new(5.0, 5.0, 5.0);
+    rig.accept(Request::Track(Trajectory::Hold(far)));
+    let before = rig.rest();
+    assert!(before.fault.is_none());
+    let output = rig.ask(Request::Gains {
+        gains: Gains::isotropic(f64::MAX, 0.0),
+        ramp_s: 0.0,
+    });
+    assert_eq!(
+        output.fault,
+        Some(Fault::TorqueNotFinite { term: "stiffness" })
+    );
+    let weight = gravity(&rig.controller.config().arm, &rig.q);
+    assert!((output.torque_nm - weight).norm() < 1e-6);
+    latched(rig, &output, SafeAction::GravityHold);
+}
+
+/// Finite terms whose sum is not: the safe action has the same terms, so nothing is sent at all.
+#[test]
+fn an_infinite_sum_of_finite_terms_is_a_fault() {
+    let mut config = boundless();
+    config.limits.soft_zone_rad = 1.0;
+    config.limits.soft_stiffness_nm_per_rad[1] = 1.2e308;
+    config.hold_damping_nm_s_per_rad[1] = 1.2e308;
+    let mut q = bent::<4>();
+    q[1] = 0.5;
+    let mut rig = Rig::holding(config, q);
+    for k in 0..2000 {
+        rig.q[1] = 0.5 + 0.9e-3 * f64::from(k);
+        let output = rig.cycle();
+        for (_, torque) in output.torques.named() {
+            assert!(torque.iter().all(|x| x.is_finite()));
+        }
+        assert!(output.torque_nm.iter().all(|x| x.is_finite()));
+        if let Some(fault) = output.fault {
+            assert_eq!(fault, Fault::TorqueNotFinite { term: "total" });
+            assert_eq!(output.torque_nm[1], 0.0);
+            return;
+        }
+    }
+    panic!("no fault");
+}
+
+/// Two joints about the same line with next to nothing between them: no torque, and no way out.
+#[test]
+fn a_mass_matrix_that_is_none() {
+    let ball = |mass_kg: f64| Body {
+        mass_kg,
+        com_m: Vector3::new(0.0, 0.0, 0.25),
+        inertia_kg_m2: Matrix3::from_diagonal_element(0.1875 * mass_kg),
+    };
+    let joint = |axis: Vector3<f64>, mass_kg: f64| Joint {
+        parent_from_link: Pose::IDENTITY,
+        axis,
+        body: ball(mass_kg),
+        armature_kg_m2: 0.0,
+    };
+    let joints = [
+        joint(Vector3::z(), 1.0),
+        joint(Vector3::y(), 1e-30),
+        joint(Vector3::y(), 1.0),
+    ];
+    let tip = Pose::from_xyz_rpy([0.0, 0.0, 0.5], [0.0; 3]);
+    let mut config = three();
+    config.arm = Arm::new(&joints, tip, None, Vector3::new(0.0, 0.0, -9.81)).expect("an arm");
+    let mut rig = Rig::new(config, Vector::zeros());
+    let output = rig.cycle();
+    assert_eq!(output.fault, Some(Fault::MassMatrix));
+    assert_eq!(output.torque_nm, Vector::<3>::zeros());
+    let output = rig.ask(Request::Reset);
+    assert_eq!(output.fault, Some(Fault::MassMatrix));
+    assert!(output.refusal.is_some());
+}
+
+/// Where gravity hold was safe until the encoder went, it no longer is.
+#[test]
+fn a_worse_fault_takes_the_torque_away_but_keeps_the_first_cause() {
+    let mut rig = Rig::new(four(), bent());
+    rig.bring_to(Mode::Fault);
+    let first = rig.state.fault();
+    assert!(rig.rest().torque_nm.norm() > 1.0);
+    let mut input = rig.input();
+    input.position_rad[1] = Some(f64::NAN);
+    let output = rig.step(&input);
+    assert_eq!(output.fault, first);
+    assert_eq!(output.fallback_torque_nm, Vector::<4>::zeros());
+    assert_eq!(rig.rest().torque_nm, Vector::<4>::zeros());
+    assert_eq!(rig.ask(Request::Reset).mode, Mode::Idle);
+}
+
+/// Where the angle is not trusted the torque falls to zero as fast as the rate limit lets it, and the
+/// fallback is zero at once.
+#[test]
+fn a_lost_encoder_lets_go() {
+    let mut rig = Rig::holding(four(), bent());
+    let mut last = rig.rest().torque_nm;
+    let cycles = (last.amax() / 1000.0 / 1e-3).ceil() as usize;
+    let mut input = rig.input();
+    input.position_rad[3] = Some(f64::NAN);
+    let mut output = rig.step(&input);
+    for _ in 0..cycles {
+        assert_eq!(output.torques.total(), Vector::<4>::zeros());
+        assert_eq!(output.fallback_torque_nm, Vector::<4>::zeros());
+        let expected = rate_limited(&four(), &last, &Vector::zeros());
+        assert!((output.torque_nm - expected).norm() < 1e-9);
+        last = output.torque_nm;
+        output = rig.cycle();
+    }
+    assert_eq!(output.torque_nm, Vector::<4>::zeros());
+}
+
+/// A reset in the very cycle of a fault does not clear what nobody has seen yet.
+#[test]
+fn a_reset_does_not_outrun_its_fault() {
+    let bad_force = |input: &mut Input<4>| input.tip_force_n = Some(Vector3::repeat(f64::NAN));
+    let bad_angle = |input: &mut Input<4>| input.position_rad[1] = Some(f64::NAN);
+    let backwards = |input: &mut Input<4>| input.cycle -= 5;
+    let causes: [&dyn Fn(&mut Input<4>); 3] = [&bad_force, &bad_angle, &backwards];
+    for cause in causes {
+        let mut rig = Rig::holding(four(), bent());
+        let mut input = Input {
+            request: Some(Request::Reset),
+            ..rig.input()
+        };
+        cause(&mut input);
+        let output = rig.step(&input);
+        assert_eq!(output.mode, Mode::Fault);
+        assert!(output.fault.is_some() && output.refusal.is_some());
+        assert_eq!(rig.cycle().mode, Mode::Fault);
+    }
+    // Nor while its cause lasts.
+    let mut rig = Rig::holding(four(), bent());
+    for _ in 0..5 {
+        let mut input = Input {
+            request: Some(Request::Reset),
+            ..rig.input()
+        };
+        bad_angle(&mut input);
+        let output = rig.step(&input);
+        assert_eq!(output.mode, Mode::Fault);
+        assert!(output.fault.is_some());
+    }
+    // The states that could not be used count as missing: the first good one ends that.
+    assert_eq!(rig.cycle().mode, Mode::Fault);
+    assert_eq!(rig.ask(Request::Reset).mode, Mode::Idle);
+}
+
+/// Held joints keep their loop in the safe action.
+#[test]
+fn the_safe_action_keeps_held_joints() {
+    let mut rig = Rig::holding(four(), bent());
+    rig.bring_to(Mode::Fault);
+    rig.q[2] = 0.01;
+    let output = rig.rest();
+    let Role::Held {
+        stiffness_nm_per_rad,
+        ..
+    } = four().roles[2]
+    else {
+        panic!("the roll is held");
+    };
+    assert!((output.torques.joint_pd[2] + 0.01 * stiffness_nm_per_rad).abs() < 1e-6);
+}
+
+#[test]
+fn a_stale_state_leaves_gravity_alone() {
+    let config = four();
+    let mut rig = Rig::holding(config, bent());
+    for _ in 0..200 {
+        rig.q[1] += 1e-3;
+        rig.cycle();
+    }
+    let input = Input {
+        cycle: rig.cycle().cycle,
+        ..rig.input()
+    };
+    let mut output = rig.step(&input);
+    for _ in 0..200 {
+        output = rig.step(&input);
+    }
+    assert!(matches!(output.fault, Some(Fault::StateStale { .. })));
+    let gravity = output.torques.gravity;
+    assert!((output.torque_nm - gravity).norm() < 1e-12 * gravity.norm());
+}

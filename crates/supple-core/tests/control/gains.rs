@@ -1,0 +1,89 @@
+//! Gains change along straight ramps.
+
+use crate::support::configs::four;
+use crate::support::rig::{Rig, bent};
+use supple_core::config::Gains;
+use supple_core::controller::{Mode, Request};
+use supple_core::math::Vector3;
+
+fn ask(gains: Gains, ramp_s: f64) -> Request<4> {
+    Request::Gains { gains, ramp_s }
+}
+
+#[test]
+fn a_straight_ramp_per_axis() {
+    for mode in [Mode::Idle, Mode::GravityHold, Mode::Track, Mode::Fault] {
+        let mut rig = Rig::new(four(), bent());
+        rig.bring_to(mode);
+        let from = four().law.gains;
+        let to = Gains {
+            stiffness_n_per_m: Vector3::new(5.0, 500.0, 100.0),
+            damping_n_s_per_m: Vector3::new(1.5, 0.0, 60.0),
+        };
+        assert_eq!(rig.cycle().gains, from);
+        let mut output = rig.ask(ask(to, 0.2));
+        for k in 1..=300 {
+            let x = (f64::from(k) * 1e-3 / 0.2).min(1.0);
+            let expected = from.stiffness_n_per_m * (1.0 - x) + to.stiffness_n_per_m * x;
+            let error = output.gains.stiffness_n_per_m - expected;
+            assert!(error.norm() < 1e-9, "{mode:?}: {error} after {k} cycles");
+            let expected = from.damping_n_s_per_m * (1.0 - x) + to.damping_n_s_per_m * x;
+            assert!((output.gains.damping_n_s_per_m - expected).norm() < 1e-9);
+            output = rig.cycle();
+        }
+        assert_eq!(output.gains, to);
+    }
+}
+
+#[test]
+fn at_once_where_no_ramp_is_asked_for() {
+    let mut rig = Rig::holding(four(), bent());
+    let to = Gains::isotropic(7.0, 3.0);
+    assert_eq!(rig.accept(ask(to, 0.0)).gains, to);
+}
+
+#[test]
+fn a_new_ramp_starts_where_the_last_one_was() {
+    let mut rig = Rig::holding(four(), bent());
+    rig.accept(ask(Gains::isotropic(200.0, 20.0), 0.1));
+    let halfway = rig.cycles(50).gains;
+    assert!((halfway.stiffness_n_per_m.x - 150.0).abs() < 2.1);
+    let mut last = halfway.stiffness_n_per_m.x;
+    let mut output = rig.accept(ask(Gains::isotropic(100.0, 20.0), 0.1));
+    for _ in 0..150 {
+        let now = output.gains.stiffness_n_per_m.x;
+        assert!((now - last).abs() <= 0.6, "a jump from {last} to {now}");
+        last = now;
+        output = rig.cycle();
+    }
+    assert_eq!(output.gains, Gains::isotropic(100.0, 20.0));
+}
+
+/// The ramp counts the arm's time: it stands still while the state does, and catches up over a gap.
+#[test]
+fn a_ramp_runs_on_the_states_time() {
+    let mut rig = Rig::holding(four(), bent());
+    rig.accept(ask(Gains::isotropic(200.0, 20.0), 0.1));
+    let before = rig.cycle().gains;
+    let mut input = rig.input();
+    input.cycle -= 1;
+    assert_eq!(rig.step(&input).gains, before);
+    let mut input = rig.input();
+    input.cycle += 2;
+    let after = rig.step(&input).gains;
+    let gained = after.stiffness_n_per_m.x - before.stiffness_n_per_m.x;
+    assert!((gained - 3.0).abs() < 1e-9, "{gained}");
+}
+
+/// The gains in force are those the torque is made with.
+#[test]
+fn the_torque_follows_the_gains() {
+    let mut rig = Rig::new(four(), bent());
+    rig.bring_to(Mode::Track);
+    rig.q[0] += 0.01;
+    let soft = rig.rest().torques;
+    rig.ask(ask(Gains::isotropic(300.0, 20.0), 0.0));
+    let stiff = rig.rest().torques;
+    assert!((stiff.stiffness - soft.stiffness * 3.0).norm() < 1e-9);
+    assert!(soft.stiffness.norm() > 0.01);
+}

@@ -1,0 +1,262 @@
+//! Whatever comes in, for thousands of cycles: what goes out is finite, within every limit, and says
+//! so when something is wrong.
+
+use crate::support::configs::{four, seven, three};
+use crate::support::property::{check, per_joint};
+use crate::support::rig::{Rig, bent, probe_at};
+use proptest::prelude::*;
+use supple_core::config::{ApparentInertia, Gains};
+use supple_core::controller::{Mode, Request};
+use supple_core::math::{Matrix3, Vector3};
+use supple_core::trajectory::{Arc, Line, Quadrant, Sinusoid};
+use supple_core::{Config, Trajectory, Vector};
+
+/// Numbers that programs go wrong on, and ordinary ones.
+fn number() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        4 => -1.0..1.0,
+        1 => -1e3..1e3,
+        1 => any::<f64>(),
+        1 => prop::sample::select(vec![
+            f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX, f64::MIN, f64::MIN_POSITIVE,
+            5e-324, -5e-324, 0.0, -0.0, 1e-300, 1e300, -1e308,
+        ]),
+    ]
+}
+
+fn point() -> impl Strategy<Value = Vector3<f64>> {
+    [number(), number(), number()].prop_map(Vector3::from)
+}
+
+fn trajectory() -> impl Strategy<Value = Trajectory> {
+    prop_oneof![
+        point().prop_map(Trajectory::Hold),
+        (point(), point(), number()).prop_map(|(from_m, to_m, duration_s)| {
+            Trajectory::Line(Line {
+                from_m,
+                to_m,
+                duration_s,
+            })
+        }),
+        (point(), point(), number(), number()).prop_map(|(centre_m, amplitude_m, w, ramp_s)| {
+            Trajectory::Sinusoid(Sinusoid {
+                centre_m,
+                amplitude_m,
+                angular_frequency_rad_per_s: w,
+                ramp_s,
+            })
+        }),
+        (point(), point(), number(), number()).prop_map(|(p, q, w, ramp_s)| {
+            Trajectory::Arc(Arc {
+                radius_m: p.x,
+                height_m: p.y,
+                centre_rad: p.z,
+                amplitude_rad: q.x,
+                angular_frequency_rad_per_s: w,
+                ramp_s,
+            })
+        }),
+        (point(), point(), point(), number(), number())
+            .prop_map(|(c, a, b, v, r)| Trajectory::Quadrant(Quadrant::new(c, a, b, v, r))),
+    ]
+}
+
+/// A request, or a seed for one that depends on where the arm is.
+#[derive(Clone, Debug)]
+enum Wish<const N: usize> {
+    None,
+    Any(Request<N>),
+    Stay,
+    Probe,
+    MoveHere(f64),
+}
+
+fn wish<const N: usize>() -> impl Strategy<Value = Wish<N>> {
+    let any_of = prop_oneof![
+        Just(Request::Idle),
+        Just(Request::GravityHold),
+        Just(Request::Reset),
+        trajectory().prop_map(Request::Track),
+        (prop::collection::vec(number(), N), number()).prop_map(|(target, duration_s)| {
+            Request::Move {
+                target_rad: Vector::from_column_slice(&target),
+                duration_s,
+            }
+        }),
+        (point(), point(), number()).prop_map(|(k, b, ramp_s)| Request::Gains {
+            gains: Gains {
+                stiffness_n_per_m: k,
+                damping_n_s_per_m: b,
+            },
+            ramp_s,
+        }),
+    ];
+    prop_oneof![
+        12 => Just(Wish::None),
+        3 => any_of.prop_map(Wish::Any),
+        2 => prop::sample::select(vec![Request::Reset, Request::GravityHold]).prop_map(Wish::Any),
+        1 => Just(Wish::Stay),
+        1 => Just(Wish::Probe),
+        1 => (0.01..2.0).prop_map(Wish::MoveHere),
+    ]
+}
+
+/// One cycle's input before it is known where the arm is.
+#[derive(Clone, Debug)]
+struct Noise<const N: usize> {
+    wish: Wish<N>,
+    drift: Vector<N>,
+    angles: Vec<Option<Option<f64>>>,
+    force: Option<Vector3<f64>>,
+    cycle: i64,
+}
+
+fn noise<const N: usize>() -> impl Strategy<Value = Noise<N>> {
+    let angle = prop_oneof![
+        60 => Just(None),
+        1 => Just(Some(None)),
+        1 => number().prop_map(|x| Some(Some(x))),
+    ];
+    let force = prop_oneof![
+        4 => Just(None),
+        4 => [-20.0..20.0, -20.0..20.0, -20.0..20.0].prop_map(|f| Some(Vector3::from(f))),
+        1 => point().prop_map(Some),
+    ];
+    let cycle = prop_oneof![20 => Just(1_i64), 1 => -3_i64..6, 1 => any::<i64>()];
+    (
+        wish(),
+        per_joint::<N>(2e-3),
+        prop::collection::vec(angle, N),
+        force,
+        cycle,
+    )
+        .prop_map(|(wish, drift, angles, force, cycle)| Noise {
+            wish,
+            drift,
+            angles,
+            force,
+            cycle,
+        })
+}
+
+/// Runs 300 cycles of noise; counts the modes that were reached.
+fn survive<const N: usize>(config: Config<N>) {
+    let seen = std::cell::RefCell::new(std::collections::BTreeMap::<&str, u32>::new());
+    check(60, prop::collection::vec(noise::<N>(), 300), |cycles| {
+        let mut rig = Rig::new(config, bent());
+        let mut last = rig.cycle();
+        for noise in cycles {
+            rig.q += noise.drift;
+            let mut input = rig.input();
+            for (i, angle) in noise.angles.iter().enumerate() {
+                if let Some(angle) = angle {
+                    input.position_rad[i] = *angle;
+                }
+            }
+            input.tip_force_n = noise.force;
+            input.cycle = last.cycle.wrapping_add_signed(noise.cycle);
+            input.request = match noise.wish {
+                Wish::None => None,
+                Wish::Any(request) => Some(request),
+                Wish::Stay => Some(rig.stay()),
+                Wish::Probe => Some(Request::Track(probe_at(&rig.tip()))),
+                Wish::MoveHere(duration_s) => Some(Request::Move {
+                    target_rad: bent(),
+                    duration_s,
+                }),
+            };
+            let output = rig.step(&input);
+            let limits = &config.limits;
+            let motors = rig.controller.motors().motor_torque_nm(&output.torque_nm);
+            for i in 0..N {
+                let (torque, fallback) = (output.torque_nm[i], output.fallback_torque_nm[i]);
+                prop_assert!(torque.abs() <= limits.joint_torque_nm[i] * (1.0 + 1e-12));
+                prop_assert!(fallback.abs() <= limits.joint_torque_nm[i] * (1.0 + 1e-12));
+                prop_assert!(motors[i].abs() <= limits.motor_torque_nm[i] * (1.0 + 1e-12));
+                let step = (torque - last.torque_nm[i]).abs();
+                let greatest = limits.torque_rate_nm_per_s[i] * config.period_s;
+                // The one exception: a torque that is not finite is dropped, not ramped.
+                prop_assert!(step <= greatest * (1.0 + 1e-9) || torque == 0.0);
+            }
+            let bad = input.position_rad.iter().flatten().any(|x| !x.is_finite());
+            let fresh = input.cycle != last.cycle;
+            prop_assert!(!(bad && fresh) || output.mode == Mode::Fault);
+            prop_assert_eq!(output.mode == Mode::Fault, output.fault.is_some());
+            for gain in output
+                .gains
+                .stiffness_n_per_m
+                .iter()
+                .chain(&output.gains.damping_n_s_per_m)
+            {
+                prop_assert!(gain.is_finite() && *gain >= 0.0);
+            }
+            prop_assert!((0.0..=1.0).contains(&output.friction_share));
+            *seen.borrow_mut().entry(output.mode.name()).or_default() += 1;
+            last = output;
+        }
+        Ok(())
+    });
+    let seen = seen.into_inner();
+    for mode in ["idle", "gravity_hold", "move", "track", "probe", "fault"] {
+        let count = seen.get(mode).copied().unwrap_or(0);
+        assert!(count > 10, "{mode} was hardly reached: {seen:?}");
+    }
+}
+
+fn loose<const N: usize>(mut config: Config<N>) -> Config<N> {
+    config.limits.stale_cycles = 6;
+    config.limits.start_error_m = 2.0;
+    config.limits.tracking_error_m = 2.0;
+    config.limits.joint_speed_rad_per_s.fill(10.0);
+    config
+}
+
+#[test]
+fn of_3_joints_with_a_force_sensor() {
+    let mut config = loose(three());
+    config.law.inertia = ApparentInertia::Chosen(Matrix3::from_diagonal_element(2.0));
+    survive(config);
+}
+
+#[test]
+fn of_4_joints() {
+    survive(loose(four()));
+}
+
+#[test]
+fn of_7_joints() {
+    survive(loose(seven()));
+}
+
+/// Once it is in good order again, a reset and a while at rest bring back a sound gravity hold,
+/// whatever came before.
+#[test]
+fn garbage_leaves_no_trace() {
+    let config = loose(four());
+    check(60, prop::collection::vec(noise::<4>(), 100), |cycles| {
+        let mut rig = Rig::new(config, bent());
+        rig.cycle();
+        for noise in cycles {
+            let mut input = rig.input();
+            for (i, angle) in noise.angles.iter().enumerate() {
+                if let Some(angle) = angle {
+                    input.position_rad[i] = *angle;
+                }
+            }
+            input.tip_force_n = noise.force;
+            if let Wish::Any(request) = noise.wish {
+                input.request = Some(request);
+            }
+            rig.step(&input);
+        }
+        // Wild readings of up to 1e308 rad take the estimator seconds to forget.
+        rig.cycles(8000);
+        rig.ask(Request::Reset);
+        rig.ask(Request::GravityHold);
+        let output = rig.cycles(1000);
+        prop_assert_eq!((output.mode, output.fault), (Mode::GravityHold, None));
+        let weight = supple_core::dynamics::gravity(&config.arm, &rig.q);
+        prop_assert!((output.torque_nm - weight).norm() < 1e-6);
+        Ok(())
+    });
+}

@@ -1,0 +1,200 @@
+//! The order of the limits: torque in joints and motors, then rate, then a finite check.
+
+use crate::support::configs::{four, rate_limited, seven};
+use crate::support::property::{Outcome, check, per_joint};
+use crate::support::rig::{Rig, bent};
+use proptest::prelude::*;
+use supple_core::config::Limits;
+use supple_core::controller::{MotorGroups, Request, limit_torque};
+use supple_core::{Config, Output, Vector};
+
+/// Rounding of a product or two.
+const ULPS: f64 = 1.0 + 1e-12;
+
+/// Within the joint limits and the motor limits.
+fn allowed<const N: usize>(
+    limits: &Limits<N>,
+    motors: &MotorGroups<N>,
+    torque: &Vector<N>,
+) -> Outcome {
+    let at_motors = motors.motor_torque_nm(torque);
+    for i in 0..N {
+        let (joint, motor) = (limits.joint_torque_nm[i], limits.motor_torque_nm[i]);
+        prop_assert!(torque[i].abs() <= joint * ULPS, "joint {i}: {}", torque[i]);
+        prop_assert!(
+            at_motors[i].abs() <= motor * ULPS,
+            "motor {i}: {}",
+            at_motors[i]
+        );
+    }
+    Ok(())
+}
+
+fn torque_limit<const N: usize>(config: Config<N>) {
+    let motors = MotorGroups::new(&config.joint_from_motor);
+    let limits = config.limits;
+    let sizes = prop_oneof![Just(1.0), Just(30.0), Just(300.0), Just(1e300)];
+    check(2000, (per_joint::<N>(1.0), sizes), |(direction, size)| {
+        let demand = direction * size;
+        let (torque, cut) = limit_torque(&limits, &motors, &demand);
+        allowed(&limits, &motors, &torque)?;
+        prop_assert_eq!(cut, torque != demand);
+        if allowed(&limits, &motors, &demand).is_ok() {
+            prop_assert!((torque - demand).norm() <= 1e-11 * demand.norm());
+        }
+        let (again, _) = limit_torque(&limits, &motors, &torque);
+        prop_assert!((again - torque).norm() <= 1e-12 * torque.norm());
+        for i in 0..N {
+            // Smaller, and never the other way.
+            prop_assert!(torque[i].abs() <= demand[i].abs());
+            prop_assert!(torque[i] * demand[i] >= 0.0);
+        }
+        Ok(())
+    });
+}
+
+#[test]
+fn torque_limit_of_4_joints() {
+    torque_limit(four());
+}
+
+#[test]
+fn torque_limit_of_7_joints() {
+    torque_limit(seven());
+}
+
+/// Pitch and roll share two motors and are scaled together, in their own direction; base and elbow do
+/// not notice.
+#[test]
+fn the_differential_is_scaled_as_one() {
+    let config = four();
+    let motors = MotorGroups::new(&config.joint_from_motor);
+    let demand = Vector::<4>::new(10.0, 70.0, 40.0, 5.0);
+    let (torque, cut) = limit_torque(&config.limits, &motors, &demand);
+    assert!(cut);
+    assert_eq!((torque[0], torque[3]), (10.0, 5.0));
+    assert!((torque[1] / torque[2] - 70.0 / 40.0).abs() < 1e-12);
+    // 28.25 (m2 - m3) = 70, -16.8155 (m2 + m3) = 40: the third motor is the busier one.
+    let at_motors = motors.motor_torque_nm(&torque);
+    assert!((at_motors[2].abs() - 1.8).abs() < 1e-12, "{at_motors}");
+    assert!(at_motors[1].abs() < 1.8);
+    // By the published ratios: tau = j2mp^T m.
+    let back = 28.25 * (at_motors[1] - at_motors[2]);
+    assert!((back - torque[1]).abs() < 1e-9);
+}
+
+/// Every motor torque is `m2jp^T tau`.
+#[test]
+fn motor_torques_do_the_joints_work() {
+    let config = seven();
+    let motors = MotorGroups::new(&config.joint_from_motor);
+    check(
+        200,
+        (per_joint::<7>(50.0), per_joint::<7>(50.0)),
+        |(torque, motor_speed)| {
+            let joint_speed = config.joint_from_motor * motor_speed;
+            let (joints, drives) = (
+                torque.dot(&joint_speed),
+                motors.motor_torque_nm(&torque).dot(&motor_speed),
+            );
+            prop_assert!((joints - drives).abs() < 1e-9 * (1.0 + joints.abs()));
+            Ok(())
+        },
+    );
+}
+
+/// Tight limits of every kind, and an arm that is thrown about.
+fn thrown_about<const N: usize>(
+    mut config: Config<N>,
+    joint_torque: f64,
+    motor_torque: f64,
+    rate: f64,
+) {
+    config.limits.joint_torque_nm.fill(joint_torque);
+    config.limits.motor_torque_nm.fill(motor_torque);
+    config.limits.torque_rate_nm_per_s.fill(rate);
+    config.limits.joint_speed_rad_per_s.fill(1e6);
+    config.limits.tip_speed_m_per_s = 1e6;
+    config.limits.tracking_error_m = 1e6;
+    config.limits.joint_tracking_error_rad = 1e6;
+    config.limits.start_error_m = 1e6;
+    let jolts = proptest::collection::vec(per_joint::<N>(0.3), 60);
+    check(40, jolts, |jolts| {
+        let mut rig = Rig::holding(config, bent());
+        let mut last = rig.cycle();
+        let (mut torque_cuts, mut rate_cuts) = (0, 0);
+        for (k, jolt) in jolts.into_iter().enumerate() {
+            rig.q = bent::<N>() + jolt;
+            let output = match k % 20 {
+                3 => rig.ask(rig.stay()),
+                9 => rig.ask(Request::GravityHold),
+                15 => rig.ask(Request::Move {
+                    target_rad: bent(),
+                    duration_s: 0.5,
+                }),
+                _ => rig.cycle(),
+            };
+            prop_assert_eq!(output.fault, None);
+            sound(&rig, &last, &output)?;
+            torque_cuts += u32::from(output.torque_limited);
+            rate_cuts += u32::from(output.rate_limited);
+            last = output;
+        }
+        prop_assert!(
+            torque_cuts + rate_cuts > 5,
+            "{torque_cuts} and {rate_cuts}: tight"
+        );
+        Ok(())
+    });
+}
+
+/// One cycle's torque follows from the last one and the sum of the terms, by the limits in order.
+fn sound<const N: usize>(rig: &Rig<N>, last: &Output<N>, output: &Output<N>) -> Outcome {
+    let config = rig.controller.config();
+    let (limits, motors) = (&config.limits, rig.controller.motors());
+    allowed(limits, motors, &output.torque_nm)?;
+    let demand = output.torques.total();
+    let (wanted, cut) = limit_torque(limits, motors, &demand);
+    prop_assert_eq!(output.torque_limited, cut);
+    let expected = rate_limited(config, &last.torque_nm, &wanted);
+    let scale = 1.0 + wanted.norm();
+    prop_assert!((output.torque_nm - expected).norm() <= 1e-9 * scale);
+    prop_assert_eq!(output.rate_limited, output.torque_nm != wanted);
+    for i in 0..N {
+        let greatest = limits.torque_rate_nm_per_s[i] * config.period_s;
+        let step = (output.torque_nm[i] - last.torque_nm[i]).abs();
+        prop_assert!(step <= greatest * ULPS + 1e-13, "joint {i}: {step}");
+    }
+    Ok(())
+}
+
+#[test]
+fn every_cycle_obeys_limit_then_rate() {
+    thrown_about(four(), 12.0, 1.8, 3000.0);
+    thrown_about(four(), 80.0, 0.3, 2000.0);
+    thrown_about(four(), 80.0, 1.8, 100.0);
+    thrown_about(seven(), 10.0, 0.4, 1000.0);
+}
+
+/// Repeats and gaps do not buy a greater step.
+#[test]
+fn the_rate_is_per_answer() {
+    let mut config = four();
+    config.limits.torque_rate_nm_per_s.fill(500.0);
+    let mut rig = Rig::new(config, bent());
+    rig.cycle();
+    let mut last = rig.ask(Request::GravityHold);
+    for k in 0_u64..30 {
+        let mut input = rig.input();
+        input.cycle = match k % 3 {
+            0 => input.cycle - 1,
+            1 => input.cycle,
+            _ => input.cycle + 1,
+        };
+        let output = rig.step(&input);
+        assert_eq!(output.fault, None);
+        let step = (output.torque_nm - last.torque_nm).amax();
+        assert!(step <= 0.5 * ULPS, "{step}");
+        last = output;
+    }
+}

@@ -1,0 +1,124 @@
+//! What a fault says of itself: its joint, its value, its limit, and what is done about it.
+
+use std::collections::BTreeSet;
+use supple_core::controller::{Fault, SafeAction};
+
+/// Every fault, the words its message must have, and its safe action.
+fn faults() -> [(Fault, &'static [&'static str], SafeAction); 13] {
+    use SafeAction::{GravityHold, Idle};
+    [
+        (
+            Fault::MeasurementNotFinite { joint: Some(2) },
+            &["joint 2", "not a finite number"],
+            Idle,
+        ),
+        (
+            Fault::MeasurementNotFinite { joint: None },
+            &["tip force", "not a finite number"],
+            GravityHold,
+        ),
+        (
+            Fault::EncoderLost { joint: 3 },
+            &["joint 3", "encoder"],
+            Idle,
+        ),
+        (
+            Fault::StateStale {
+                cycles: 7,
+                limit: 2,
+            },
+            &["7 cycles", "2 are tolerated"],
+            GravityHold,
+        ),
+        (
+            Fault::StateOutOfOrder {
+                last: 41,
+                received: 12,
+            },
+            &["12 came after 41"],
+            GravityHold,
+        ),
+        (
+            Fault::JointPosition {
+                joint: 1,
+                value_rad: 2.0625,
+                limit_rad: 2.0,
+            },
+            &["joint 1", "2.0625 rad", "2.0000 rad"],
+            GravityHold,
+        ),
+        (
+            Fault::JointSpeed {
+                joint: 0,
+                value_rad_per_s: 2.25,
+                limit_rad_per_s: 2.0,
+            },
+            &["joint 0", "2.250 rad/s", "2.000 rad/s"],
+            GravityHold,
+        ),
+        (
+            Fault::TipSpeed {
+                value_m_per_s: 1.25,
+                limit_m_per_s: 1.0,
+            },
+            &["1.250 m/s", "1.000 m/s"],
+            GravityHold,
+        ),
+        (
+            Fault::TrackingError {
+                value_m: 0.375,
+                limit_m: 0.25,
+            },
+            &["0.375 m", "0.250 m"],
+            GravityHold,
+        ),
+        (
+            Fault::EncoderJump {
+                joint: 3,
+                value_rad: 0.5,
+                limit_rad: 0.0625,
+            },
+            &["joint 3", "0.5000 rad", "0.0625 rad"],
+            Idle,
+        ),
+        (
+            Fault::JointTrackingError {
+                joint: 2,
+                value_rad: 0.25,
+                limit_rad: 0.125,
+            },
+            &["joint 2", "0.2500 rad", "0.1250 rad"],
+            GravityHold,
+        ),
+        (Fault::MassMatrix, &["mass matrix"], GravityHold),
+        (
+            Fault::TorqueNotFinite { term: "damping" },
+            &["damping", "not a finite number"],
+            GravityHold,
+        ),
+    ]
+}
+
+#[test]
+fn messages_name_joint_value_and_limit() {
+    for (fault, words, _) in faults() {
+        let message = fault.to_string();
+        for word in words {
+            assert!(message.contains(word), "{message:?} does not say {word:?}");
+        }
+    }
+}
+
+#[test]
+fn only_what_leaves_the_angles_in_doubt_takes_gravity_away() {
+    for (fault, _, action) in faults() {
+        assert_eq!(fault.safe_action(), action, "{fault}");
+    }
+}
+
+#[test]
+fn names_tell_the_kinds_apart() {
+    let names: BTreeSet<_> = faults().iter().map(|(fault, ..)| fault.name()).collect();
+    // The two measurements share theirs.
+    assert_eq!(names.len(), faults().len() - 1);
+}

@@ -1,0 +1,104 @@
+//! The control step allocates nothing: counted by the program's own allocator.
+#![allow(
+    clippy::disallowed_methods,
+    reason = "references take their mathematics elsewhere"
+)]
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+mod support;
+use supple_core::Config;
+use supple_core::config::Gains;
+use supple_core::controller::{Mode, Request};
+use supple_core::math::Vector3;
+use support::configs::{four, friction, seven};
+use support::rig::{Rig, bent, probe_at};
+
+struct Counting;
+
+thread_local! {
+    /// Allocations of this thread; the test harness has threads of its own.
+    static COUNT: Cell<u64> = const { Cell::new(0) };
+}
+
+// SAFETY: every call is passed on to the system's allocator unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        COUNT.with(|count| count.set(count.get() + 1));
+        // SAFETY: the caller's promise is passed on.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: the caller's promise is passed on.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+fn allocations(work: impl FnOnce()) -> u64 {
+    let before = COUNT.with(Cell::get);
+    work();
+    COUNT.with(Cell::get) - before
+}
+
+/// Through every mode, a refusal, faults of two kinds and garbage.
+fn step_allocates_nothing<const N: usize>(mut config: Config<N>) {
+    config.friction = friction();
+    let mut rig = Rig::new(config, bent());
+    let mut modes = [false; 6];
+    let count = allocations(|| {
+        for k in 0..2000 {
+            let mut input = rig.input();
+            input.request = request(&rig, k);
+            match k {
+                1200 => input.tip_force_n = Some(Vector3::repeat(f64::NAN)),
+                1500 | 1501 => input.position_rad[1] = None,
+                1800 => input.cycle = 2,
+                _ => {}
+            }
+            let output = rig.step(&input);
+            modes[output.mode as usize] = true;
+        }
+    });
+    assert_eq!(modes, [true; 6], "every mode was run");
+    assert_eq!(count, 0);
+}
+
+fn request<const N: usize>(rig: &Rig<N>, cycle: u32) -> Option<Request<N>> {
+    match cycle {
+        5 | 1450 => Some(Request::GravityHold),
+        300 => Some(Request::Move {
+            target_rad: rig.q,
+            duration_s: 0.1,
+        }),
+        301 => Some(Request::Gains {
+            gains: Gains::isotropic(f64::NAN, 0.0),
+            ramp_s: 0.0,
+        }),
+        600 => Some(Request::Track(probe_at(&rig.tip()))),
+        900 => Some(rig.stay()),
+        1400 | 1700 => Some(Request::Reset),
+        _ => None,
+    }
+}
+
+#[test]
+fn of_4_joints() {
+    step_allocates_nothing(four());
+}
+
+#[test]
+fn of_7_joints() {
+    step_allocates_nothing(seven());
+}
+
+/// The count itself works.
+#[test]
+fn an_allocation_is_counted() {
+    let count = allocations(|| drop(std::hint::black_box(Box::new(Mode::Idle))));
+    assert_eq!(count, 1);
+}

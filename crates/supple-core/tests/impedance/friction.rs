@@ -1,0 +1,163 @@
+//! The friction feed-forward: no stiffness in it, and what fades and what stays.
+
+use crate::support::arms::{wam3, wam4};
+use crate::support::configs::{four, friction};
+use crate::support::property::{check, vector3};
+use crate::support::states::{Scene, scene};
+use proptest::prelude::*;
+use supple_core::config::{FrictionVelocity, Gains, Law, Role};
+use supple_core::impedance::SINGULAR_BELOW_M;
+use supple_core::{Friction, Vector};
+
+fn law(friction_velocity: FrictionVelocity) -> Law {
+    Law {
+        friction_velocity,
+        ..Law::paper_letter(Gains::isotropic(5.0, 1.5))
+    }
+}
+
+fn feedforward(scene: &Scene<4>, velocity: FrictionVelocity) -> Vector<4> {
+    let config = four();
+    scene
+        .torques(
+            &law(velocity),
+            &friction(),
+            &config.arm,
+            &config.roles,
+            None,
+        )
+        .friction
+}
+
+/// To the bit: a spring hidden in the friction would show here.
+#[test]
+fn it_does_not_depend_on_the_position_error() {
+    check(300, (scene::<4>(), vector3(2.0)), |(scene, position)| {
+        for velocity in [FrictionVelocity::Reference, FrictionVelocity::Measured] {
+            let mut elsewhere = scene.clone();
+            elsewhere.reference.position = position;
+            prop_assert_eq!(
+                feedforward(&scene, velocity),
+                feedforward(&elsewhere, velocity)
+            );
+        }
+        Ok(())
+    });
+}
+
+#[test]
+fn at_the_references_velocity_it_does_not_depend_on_the_measured_one() {
+    check(300, (scene::<4>(), vector3(2.0)), |(scene, other)| {
+        let mut moving = scene.clone();
+        moving.qd = Vector::<4>::new(other.x, other.y, 0.3, other.z);
+        let reference = FrictionVelocity::Reference;
+        prop_assert_eq!(
+            feedforward(&scene, reference),
+            feedforward(&moving, reference)
+        );
+        let measured = FrictionVelocity::Measured;
+        prop_assert_ne!(
+            feedforward(&scene, measured),
+            feedforward(&moving, measured)
+        );
+        Ok(())
+    });
+}
+
+#[test]
+fn it_is_the_model_at_its_velocity() {
+    let (arm, roles) = (wam3(), [Role::Active; 3]);
+    check(300, scene::<3>(), |mut scene| {
+        scene.friction_share = 1.0;
+        let task = scene.task(&arm, &roles);
+        let model: [Friction; 3] = friction();
+        let joint_velocity = task.inverse * scene.reference.velocity;
+        for (kind, velocity) in [
+            (FrictionVelocity::Reference, joint_velocity),
+            (FrictionVelocity::Measured, scene.qd),
+        ] {
+            let found = scene
+                .torques(&law(kind), &model, &arm, &roles, None)
+                .friction;
+            for i in 0..3 {
+                let expected = model[i].torque_nm(velocity[i]);
+                prop_assert!((found[i] - expected).abs() < 1e-13 * (1.0 + expected.abs()));
+            }
+        }
+        Ok(())
+    });
+}
+
+/// Fading takes the dry part away, evenly; what does not come from dry friction stays.
+#[test]
+fn offset_and_viscous_part_stay_when_the_dry_part_is_faded() {
+    let config = four();
+    let wet: [Friction; 4] = friction().map(|friction| Friction {
+        coulomb_nm: 0.0,
+        breakaway_nm: 0.0,
+        ..friction
+    });
+    check(300, scene::<4>(), |scene| {
+        let at = |model: &[Friction; 4], share: f64| {
+            let faded = Scene {
+                friction_share: share,
+                ..scene.clone()
+            };
+            let law = law(FrictionVelocity::Reference);
+            faded
+                .torques(&law, model, &config.arm, &config.roles, None)
+                .friction
+        };
+        let model = friction();
+        let (none, half, whole) = (at(&model, 0.0), at(&model, 0.5), at(&model, 1.0));
+        let tolerance = 1e-13 * (1.0 + whole.norm());
+        prop_assert!((none - at(&wet, 1.0)).norm() < tolerance);
+        prop_assert!((half * 2.0 - whole - none).norm() < tolerance);
+        Ok(())
+    });
+}
+
+/// A held joint has no reference that moves: its offset is all it gets.
+#[test]
+fn held_joints_get_their_offset_alone() {
+    check(200, scene::<4>(), |scene| {
+        for velocity in [FrictionVelocity::Reference, FrictionVelocity::Measured] {
+            let found = feedforward(&scene, velocity)[2];
+            prop_assert_eq!(found, friction::<4>()[2].offset_nm);
+        }
+        Ok(())
+    });
+}
+
+/// Why the reference's velocity: with an exact monotone model, what is left of the arm's friction
+/// takes energy from the error's motion, however the arm moves.
+#[test]
+fn what_is_left_of_friction_damps_the_error() {
+    let (arm, roles) = (
+        wam4(),
+        [Role::Active, Role::Active, four().roles[2], Role::Active],
+    );
+    let model = [Friction::coulomb(1.0, 1.5); 4];
+    check(300, scene::<4>(), |mut scene| {
+        scene.friction_share = 1.0;
+        scene.qd[2] = 0.0;
+        let task = scene.task(&arm, &roles);
+        if task.least_singular_value_m < SINGULAR_BELOW_M {
+            return Ok(());
+        }
+        let found = scene
+            .torques(
+                &law(FrictionVelocity::Reference),
+                &model,
+                &arm,
+                &roles,
+                None,
+            )
+            .friction;
+        let real = Vector::<4>::from_fn(|i, _| model[i].torque_nm(scene.qd[i]));
+        let error_velocity = scene.qd - task.inverse * scene.reference.velocity;
+        let power = (found - real).dot(&error_velocity);
+        prop_assert!(power <= 1e-12, "{power} W");
+        Ok(())
+    });
+}

@@ -1,0 +1,157 @@
+//! A fourth active joint: its motion is damped without the tip noticing.
+
+use crate::support::arms::{wam4, wam7};
+use crate::support::configs::seven;
+use crate::support::plant::{Plant, held_acceleration};
+use crate::support::property::{Outcome, check};
+use crate::support::states::{Scene, scene};
+use crate::support::{inverse, size};
+use proptest::prelude::*;
+use supple_core::config::{Gains, Law, Role};
+use supple_core::dynamics::{crba, jacobian, kinetic_energy};
+use supple_core::impedance::{SINGULAR_BELOW_M, Task};
+use supple_core::{Arm, Friction, Vector};
+
+const DAMPING: f64 = 2.0;
+
+fn law() -> Law {
+    Law {
+        nullspace_damping_nm_s_per_rad: DAMPING,
+        ..Law::paper_letter(Gains::isotropic(0.0, 0.0))
+    }
+}
+
+fn nullspace<const N: usize>(scene: &Scene<N>, arm: &Arm<N>, roles: &[Role; N]) -> Vector<N> {
+    let friction = [Friction::NONE; N];
+    scene.torques(&law(), &friction, arm, roles, None).nullspace
+}
+
+fn regular<const N: usize>(task: &Task<N>) -> bool {
+    task.least_singular_value_m > SINGULAR_BELOW_M
+}
+
+fn tip_feels_nothing<const N: usize>(arm: Arm<N>, roles: [Role; N]) {
+    check(300, scene::<N>(), |scene| -> Outcome {
+        if !regular(&scene.task(&arm, &roles)) {
+            return Ok(());
+        }
+        let (q, qd) = (&scene.q, &scene.qd);
+        let torque = nullspace(&scene, &arm, &roles);
+        prop_assert!(torque.norm() > 0.0);
+        let with = held_acceleration(&arm, &roles, q, qd, &torque);
+        let without = held_acceleration(&arm, &roles, q, qd, &Vector::zeros());
+        let tip = jacobian(&arm, q).fixed_rows::<3>(0) * (with - without);
+        prop_assert!(
+            tip.norm() < 1e-10 * (1.0 + (with - without).norm()),
+            "{tip}"
+        );
+        Ok(())
+    });
+}
+
+#[test]
+fn the_tip_of_4_joints_feels_nothing() {
+    tip_feels_nothing(wam4(), [Role::Active; 4]);
+}
+
+#[test]
+fn the_tip_of_4_joints_before_a_held_wrist_feels_nothing() {
+    tip_feels_nothing(wam7(), seven().roles);
+}
+
+/// In the words of the law: `J H^-1 tau = 0`.
+#[test]
+fn no_acceleration_of_the_tip_through_the_inverse_mass_matrix() {
+    let (arm, roles) = (wam4(), [Role::Active; 4]);
+    check(300, scene::<4>(), |scene| {
+        let task = scene.task(&arm, &roles);
+        if !regular(&task) {
+            return Ok(());
+        }
+        let torque = nullspace(&scene, &arm, &roles);
+        let tip = task.jacobian * inverse(&crba(&arm, &scene.q)) * torque;
+        prop_assert!(tip.norm() < 1e-11 * (1.0 + torque.norm()));
+        Ok(())
+    });
+}
+
+/// However the arm moves, near singular poses as elsewhere, the damping only takes energy.
+fn only_takes_energy<const N: usize>(arm: Arm<N>, roles: [Role; N]) {
+    check(1000, scene::<N>(), |scene| -> Outcome {
+        let power = nullspace(&scene, &arm, &roles).dot(&scene.qd);
+        prop_assert!(power <= 1e-12, "{power} W put in");
+        Ok(())
+    });
+}
+
+#[test]
+fn damping_of_4_joints_only_takes_energy() {
+    only_takes_energy(wam4(), [Role::Active; 4]);
+}
+
+#[test]
+fn damping_of_4_joints_before_a_held_wrist_only_takes_energy() {
+    only_takes_energy(wam7(), seven().roles);
+}
+
+/// Motion that leaves the tip alone meets the full damping.
+#[test]
+fn pure_null_motion_is_damped_as_stated() {
+    let (arm, roles) = (wam4(), [Role::Active; 4]);
+    check(300, scene::<4>(), |mut scene| {
+        let task = scene.task(&arm, &roles);
+        if !regular(&task) {
+            return Ok(());
+        }
+        scene.qd -= task.inverse * (task.jacobian * scene.qd);
+        let power = nullspace(&scene, &arm, &roles).dot(&scene.qd);
+        let expected = -DAMPING * scene.qd.norm_squared();
+        prop_assert!((power - expected).abs() < 1e-9, "{power} is not {expected}");
+        Ok(())
+    });
+}
+
+#[test]
+fn three_active_joints_have_no_null_motion() {
+    let config = crate::support::configs::four();
+    check(100, scene::<4>(), |scene| {
+        let torque = nullspace(&scene, &config.arm, &config.roles);
+        prop_assert_eq!(size(&torque), 0.0);
+        Ok(())
+    });
+}
+
+/// Null motion dies out in simulation while the law keeps the tip where it is.
+#[test]
+fn null_motion_dies_out() {
+    let (arm, roles) = (wam4(), [Role::Active; 4]);
+    let q = Vector::<4>::new(0.3, 0.7, 0.4, 1.4);
+    let mut scene = Scene {
+        q,
+        qd: Vector::<4>::new(0.0, 0.0, 1.0, 0.0),
+        reference: supple_core::Reference::at_rest(
+            supple_core::dynamics::tip_pose(&arm, &q).translation,
+        ),
+        gains: Gains::isotropic(100.0, 20.0),
+        force_n: supple_core::math::Vector3::zeros(),
+        friction_share: 1.0,
+    };
+    let task = scene.task(&arm, &roles);
+    scene.qd -= task.inverse * (task.jacobian * scene.qd);
+    let mut plant = Plant::at_rest(arm, q);
+    plant.qd = scene.qd;
+    let energy = kinetic_energy(&arm, &plant.q, &plant.qd);
+    let mut astray: f64 = 0.0;
+    for _ in 0..1500 {
+        (scene.q, scene.qd) = (plant.q, plant.qd);
+        let torque = scene
+            .torques(&law(), &[Friction::NONE; 4], &arm, &roles, None)
+            .total();
+        plant.advance(&torque, crate::support::plant::nothing, 1e-3, 2);
+        let tip = supple_core::dynamics::tip_pose(&arm, &plant.q).translation;
+        astray = astray.max((tip - scene.reference.position).norm());
+    }
+    let left = kinetic_energy(&arm, &plant.q, &plant.qd) / energy;
+    assert!(left < 1e-6, "{left} of the energy is left");
+    assert!(astray < 2e-3, "the tip went {astray} m astray");
+}

@@ -1,0 +1,170 @@
+//! Sound configurations of the WAM's size. No friction unless a test adds it.
+
+use super::arms::{wam3, wam4, wam7};
+use supple_core::config::{
+    ApparentInertia, ContactLatch, FrictionVelocity, Gains, Law, Limits, MoveGains, Role,
+};
+use supple_core::{Arm, Config, Friction, Matrix, Vector};
+
+/// Held as the shoulder roll is.
+pub fn held(position_rad: f64) -> Role {
+    Role::Held {
+        position_rad,
+        stiffness_nm_per_rad: 600.0,
+        damping_nm_s_per_rad: 10.0,
+    }
+}
+
+pub fn three() -> Config<3> {
+    config(
+        wam3(),
+        [Role::Active; 3],
+        Matrix::from_diagonal(&Vector::<3>::new(-1.0 / 42.0, 1.0 / 28.25, -1.0 / 18.0)),
+        [2.6, 2.0, 3.1],
+    )
+}
+
+/// The shoulder roll held at zero.
+pub fn four() -> Config<4> {
+    let (pitch, roll) = (1.0 / 56.5, 1.68 / 56.5);
+    #[rustfmt::skip]
+    let joint_from_motor = Matrix::<4, 4>::new(
+        -1.0 / 42.0, 0.0, 0.0, 0.0,
+        0.0, pitch, -pitch, 0.0,
+        0.0, -roll, -roll, 0.0,
+        0.0, 0.0, 0.0, -1.0 / 18.0,
+    );
+    let roles = [Role::Active, Role::Active, held(0.0), Role::Active];
+    config(wam4(), roles, joint_from_motor, [2.6, 2.0, 2.8, 3.1])
+}
+
+/// Four joints active, the wrist held.
+pub fn seven() -> Config<7> {
+    let mut roles = [Role::Active; 7];
+    for role in &mut roles[4..] {
+        *role = Role::Held {
+            position_rad: 0.0,
+            stiffness_nm_per_rad: 30.0,
+            damping_nm_s_per_rad: 0.5,
+        };
+    }
+    let mut joint_from_motor = Matrix::<7, 7>::identity() / 10.0;
+    joint_from_motor
+        .fixed_view_mut::<4, 4>(0, 0)
+        .copy_from(&four().joint_from_motor);
+    #[rustfmt::skip]
+    joint_from_motor.fixed_view_mut::<2, 2>(4, 4).copy_from(
+        &(Matrix::<2, 2>::new(1.0, 1.0, -1.0, 1.0) / (2.0 * 9.7)),
+    );
+    let reach = [2.6, 2.0, 2.8, 3.1, 1.2, 1.5, 3.0];
+    config(wam7(), roles, joint_from_motor, reach)
+}
+
+fn config<const N: usize>(
+    arm: Arm<N>,
+    roles: [Role; N],
+    joint_from_motor: Matrix<N, N>,
+    reach_rad: [f64; N],
+) -> Config<N> {
+    let all = Vector::<N>::repeat;
+    let reach = Vector::from(reach_rad);
+    Config {
+        arm,
+        friction: [Friction::NONE; N],
+        roles,
+        joint_from_motor,
+        period_s: 1e-3,
+        estimator_rad_per_s: 200.0,
+        law: Law {
+            gains: Gains::isotropic(100.0, 20.0),
+            inertia: ApparentInertia::Own,
+            friction_velocity: FrictionVelocity::Reference,
+            inertial_feedforward: true,
+            nullspace_damping_nm_s_per_rad: 2.0,
+        },
+        latch: latch(),
+        move_gains: MoveGains {
+            stiffness_nm_per_rad: all(600.0),
+            damping_nm_s_per_rad: all(10.0),
+        },
+        hold_damping_nm_s_per_rad: all(2.0),
+        handover_s: 0.1,
+        limits: Limits {
+            position_lower_rad: -reach,
+            position_upper_rad: reach,
+            soft_zone_rad: 0.1,
+            soft_stiffness_nm_per_rad: all(300.0),
+            soft_damping_nm_s_per_rad: all(10.0),
+            joint_speed_rad_per_s: all(2.0),
+            tip_speed_m_per_s: 1.5,
+            tracking_error_m: 0.25,
+            joint_tracking_error_rad: 0.2,
+            joint_torque_nm: all(80.0),
+            motor_torque_nm: all(1.8),
+            torque_rate_nm_per_s: all(1000.0),
+            stale_cycles: 2,
+            start_error_m: 0.05,
+            stiffness_n_per_m: 1000.0,
+            damping_n_s_per_m: 100.0,
+        },
+    }
+}
+
+/// Least joint index of those that share motors, for each joint of the configurations here.
+pub fn motor_groups<const N: usize>() -> [usize; N] {
+    let differential_and_wrist = [0, 1, 1, 3, 4, 4, 6];
+    std::array::from_fn(|i| if N == 3 { i } else { differential_and_wrist[i] })
+}
+
+/// The torque that follows `last_nm` on the way to `wanted_nm`: joints that share motors together, as
+/// far as the slowest of them may go.
+pub fn rate_limited<const N: usize>(
+    config: &Config<N>,
+    last_nm: &Vector<N>,
+    wanted_nm: &Vector<N>,
+) -> Vector<N> {
+    let way = wanted_nm - last_nm;
+    let groups = motor_groups::<N>();
+    Vector::from_fn(|i, _| {
+        let share = (0..N)
+            .filter(|j| groups[*j] == groups[i])
+            .fold(1.0, |share: f64, j| {
+                let greatest = config.limits.torque_rate_nm_per_s[j] * config.period_s;
+                share.min(greatest / way[j].abs())
+            });
+        last_nm[i] + way[i] * share
+    })
+}
+
+/// Contact latch with round numbers.
+pub fn latch() -> ContactLatch {
+    ContactLatch {
+        fade: true,
+        observer_rad_per_s: 40.0,
+        threshold_n: 3.0,
+        friction_error: 0.05,
+        contact_share: 0.0,
+        reversal_s: 0.2,
+        fade_s: 0.01,
+        restore_s: 0.05,
+    }
+}
+
+/// Friction of the WAM's size, with a dip and an offset.
+pub fn friction<const N: usize>() -> [Friction; N] {
+    std::array::from_fn(|i| Friction {
+        viscous_nm_s_per_rad: 1.6 / (1.0 + i as f64),
+        coulomb_nm: 1.2 / (1.0 + i as f64),
+        breakaway_nm: 1.4 / (1.0 + i as f64),
+        stribeck_rad_per_s: 0.05,
+        offset_nm: 0.1 - 0.05 * i as f64,
+        band_rad_per_s: 0.01,
+    })
+}
+
+/// No joint or motor limit, no rate limit that a test could meet.
+pub fn unlimited<const N: usize>(config: &mut Config<N>) {
+    config.limits.joint_torque_nm.fill(1e6);
+    config.limits.motor_torque_nm.fill(1e6);
+    config.limits.torque_rate_nm_per_s.fill(1e12);
+}

@@ -1,0 +1,186 @@
+//! A controller with its state, fed one cycle after another.
+
+use super::plant::{Plant, nothing};
+use supple_core::controller::{Fault, Mode, Request};
+use supple_core::math::Vector3;
+use supple_core::trajectory::Trajectory;
+use supple_core::{Arm, Config, Controller, Input, Output, State, Vector, step};
+
+/// Copying it forks the future.
+#[derive(Clone)]
+pub struct Rig<const N: usize> {
+    pub controller: Controller<N>,
+    pub state: State<N>,
+    /// Cycle number of the next input.
+    pub cycle: u64,
+    /// What the encoders say.
+    pub q: Vector<N>,
+    /// What the force sensor says.
+    pub force_n: Option<Vector3<f64>>,
+}
+
+impl<const N: usize> Rig<N> {
+    /// Idle, before its first cycle.
+    pub fn new(config: Config<N>, q: Vector<N>) -> Self {
+        let controller = Controller::new(config).expect("a sound configuration");
+        Rig {
+            state: State::new(&controller),
+            controller,
+            cycle: 1000,
+            q,
+            force_n: None,
+        }
+    }
+
+    /// In gravity hold, at rest, with the torques settled.
+    pub fn holding(config: Config<N>, q: Vector<N>) -> Self {
+        let mut rig = Rig::new(config, q);
+        rig.cycle();
+        rig.accept(Request::GravityHold);
+        rig.rest();
+        rig
+    }
+
+    pub fn input(&self) -> Input<N> {
+        Input {
+            cycle: self.cycle,
+            position_rad: std::array::from_fn(|i| Some(self.q[i])),
+            tip_force_n: self.force_n,
+            request: None,
+        }
+    }
+
+    /// Any input at all; the next cycle's number follows from it.
+    pub fn step(&mut self, input: &Input<N>) -> Output<N> {
+        self.cycle = input.cycle.saturating_add(1);
+        step(&self.controller, &mut self.state, input)
+    }
+
+    /// One ordinary cycle.
+    pub fn cycle(&mut self) -> Output<N> {
+        self.step(&self.input())
+    }
+
+    pub fn cycles(&mut self, count: usize) -> Output<N> {
+        let mut output = self.cycle();
+        for _ in 1..count {
+            output = self.cycle();
+        }
+        output
+    }
+
+    /// Half a second at the same place.
+    pub fn rest(&mut self) -> Output<N> {
+        self.cycles(500)
+    }
+
+    pub fn ask(&mut self, request: Request<N>) -> Output<N> {
+        self.step(&Input {
+            request: Some(request),
+            ..self.input()
+        })
+    }
+
+    /// Asks for what must be granted.
+    #[track_caller]
+    pub fn accept(&mut self, request: Request<N>) -> Output<N> {
+        let output = self.ask(request);
+        assert_eq!(output.refusal, None, "{request:?}");
+        assert_eq!(output.fault, None, "{request:?}");
+        output
+    }
+
+    /// Where the tip is.
+    pub fn tip(&self) -> Vector3<f64> {
+        supple_core::dynamics::tip_pose(&self.controller.config().arm, &self.q).translation
+    }
+
+    /// A reference that stays at the tip.
+    pub fn stay(&self) -> Request<N> {
+        Request::Track(Trajectory::Hold(self.tip()))
+    }
+
+    /// Puts the controller into `mode`, at rest where the rig is.
+    #[track_caller]
+    pub fn bring_to(&mut self, mode: Mode) {
+        self.cycle();
+        if mode == Mode::Idle {
+            return;
+        }
+        self.accept(Request::GravityHold);
+        self.rest();
+        match mode {
+            Mode::Idle | Mode::GravityHold => {}
+            Mode::Move => {
+                self.accept(Request::Move {
+                    target_rad: self.q,
+                    duration_s: 0.1,
+                });
+            }
+            Mode::Track => {
+                self.accept(self.stay());
+            }
+            Mode::Probe => {
+                self.accept(Request::Track(probe_at(&self.tip())));
+            }
+            Mode::Fault => {
+                let output = self.step(&Input {
+                    tip_force_n: Some(Vector3::repeat(f64::NAN)),
+                    ..self.input()
+                });
+                let expected = Fault::MeasurementNotFinite { joint: None };
+                assert_eq!(output.fault, Some(expected));
+            }
+        }
+        assert_eq!(self.state.mode(), mode);
+        if mode != Mode::Probe {
+            self.rest();
+        }
+    }
+
+    /// One cycle with `plant` in the loop, pushed by `external`.
+    pub fn drive(
+        &mut self,
+        plant: &mut Plant<N>,
+        request: Option<Request<N>>,
+        external: impl Fn(&Arm<N>, &Vector<N>, &Vector<N>) -> Vector<N>,
+    ) -> Output<N> {
+        self.q = plant.q;
+        let output = self.step(&Input {
+            request,
+            ..self.input()
+        });
+        let period_s = self.controller.config().period_s;
+        plant.advance(&output.torque_nm, external, period_s, 4);
+        output
+    }
+
+    /// One cycle with `plant` in the loop and nothing in its way.
+    pub fn run(&mut self, plant: &mut Plant<N>) -> Output<N> {
+        self.drive(plant, None, nothing)
+    }
+}
+
+/// The paper's probing cycle from where the tip is.
+pub fn probe_at(tip: &Vector3<f64>) -> Trajectory {
+    Trajectory::Probe(supple_core::trajectory::Probe {
+        radius_m: tip.x.hypot(tip.y),
+        strokes: 3,
+        radial_step_m: 0.00667,
+        top_m: tip.z,
+        stroke_m: 0.1,
+        azimuth_rad: tip.y.atan2(tip.x),
+        azimuth_step_rad: 0.05,
+        speed_m_per_s: 0.04,
+        ramp_s: 0.1,
+    })
+}
+
+/// A bent arm, far from stops and singular poses.
+pub fn bent<const N: usize>() -> Vector<N> {
+    let mut q = Vector::zeros();
+    q[0] = 0.3;
+    q[1] = 0.7;
+    q[if N == 3 { 2 } else { 3 }] = 1.4;
+    q
+}

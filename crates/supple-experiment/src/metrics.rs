@@ -1,0 +1,120 @@
+//! Numbers that describe a run.
+
+use serde::Serialize;
+
+/// Root mean square and greatest value of a stream.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Rms {
+    sum_of_squares: f64,
+    count: u64,
+    greatest: f64,
+}
+
+impl Rms {
+    /// Takes in a value.
+    pub fn add(&mut self, value: f64) {
+        self.sum_of_squares += value * value;
+        self.count += 1;
+        self.greatest = self.greatest.max(value.abs());
+    }
+
+    /// Root mean square; zero of nothing.
+    pub fn rms(&self) -> f64 {
+        if self.count == 0 {
+            return 0.0;
+        }
+        (self.sum_of_squares / self.count as f64).sqrt()
+    }
+
+    /// Greatest absolute value; zero of nothing.
+    pub fn greatest(&self) -> f64 {
+        self.greatest
+    }
+}
+
+/// Straight line through points by least squares.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct LineFit {
+    /// Change of y per x.
+    pub slope: f64,
+    /// y at x = 0.
+    pub intercept: f64,
+    /// Share of the variance of y that the line explains.
+    pub r2: f64,
+}
+
+impl LineFit {
+    /// `None` where the points do not determine a line.
+    pub fn new(points: &[(f64, f64)]) -> Option<LineFit> {
+        let n = points.len() as f64;
+        let mean_x = points.iter().map(|p| p.0).sum::<f64>() / n;
+        let mean_y = points.iter().map(|p| p.1).sum::<f64>() / n;
+        let sum = |f: &dyn Fn(f64, f64) -> f64| -> f64 {
+            points.iter().map(|p| f(p.0 - mean_x, p.1 - mean_y)).sum()
+        };
+        let (xx, xy, yy) = (sum(&|x, _| x * x), sum(&|x, y| x * y), sum(&|_, y| y * y));
+        if points.len() < 2 || xx <= 0.0 {
+            return None;
+        }
+        let slope = xy / xx;
+        Some(LineFit {
+            slope,
+            intercept: mean_y - slope * mean_x,
+            r2: if yy > 0.0 { xy * xy / (xx * yy) } else { 1.0 },
+        })
+    }
+}
+
+/// Middle value; the mean of the two middle ones of an even number. `None` of nothing.
+pub fn median(values: &[f64]) -> Option<f64> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let n = sorted.len();
+    match n {
+        0 => None,
+        _ if n % 2 == 1 => Some(sorted[n / 2]),
+        _ => Some(0.5 * (sorted[n / 2 - 1] + sorted[n / 2])),
+    }
+}
+
+/// (max - min) / median. `None` of nothing.
+pub fn spread(values: &[f64]) -> Option<f64> {
+    let middle = median(values)?;
+    let (least, greatest) = values
+        .iter()
+        .fold((f64::MAX, f64::MIN), |(l, g), v| (l.min(*v), g.max(*v)));
+    Some((greatest - least) / middle)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_is_found_again() {
+        let points: Vec<_> = (0..7)
+            .map(|k| (f64::from(k), 2.0 - 0.5 * f64::from(k)))
+            .collect();
+        let fit = LineFit::new(&points).expect("points determine a line");
+        assert!((fit.slope + 0.5).abs() < 1e-12 && (fit.intercept - 2.0).abs() < 1e-12);
+        assert!((fit.r2 - 1.0).abs() < 1e-12);
+        assert!(LineFit::new(&[(1.0, 1.0), (1.0, 2.0)]).is_none());
+    }
+
+    #[test]
+    fn medians_and_spreads() {
+        assert_eq!(median(&[3.0, 1.0, 2.0]), Some(2.0));
+        assert_eq!(median(&[4.0, 1.0, 2.0, 3.0]), Some(2.5));
+        assert_eq!(median(&[]), None);
+        assert_eq!(spread(&[1.0, 2.0, 3.0]), Some(1.0));
+    }
+
+    #[test]
+    fn root_mean_square() {
+        let mut rms = Rms::default();
+        [3.0, -4.0].into_iter().for_each(|x| rms.add(x));
+        assert!((rms.rms() - 12.5_f64.sqrt()).abs() < 1e-15);
+        assert_eq!(rms.greatest(), 4.0);
+        assert_eq!(Rms::default().rms(), 0.0);
+    }
+}

@@ -1,0 +1,138 @@
+//! What a probing run says about contact: one record a stroke.
+
+use crate::metrics::median;
+use serde::Serialize;
+use supple_core::trajectory::{Probe, ProbePhase};
+use supple_plant::{StepRecord, Truth};
+
+/// Window of the first transient after the first touch \[s\].
+const TRANSIENT_S: f64 = 0.05;
+/// Window before the reference turns in which the resting force is averaged \[s\].
+const REST_S: f64 = 0.3;
+
+/// Contact in one stroke.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Stroke {
+    /// Speed of the tip towards the block just before the first touch \[m/s\].
+    pub approach_m_per_s: f64,
+    /// Greatest force of the first transient through the 100 Hz filter \[N\].
+    pub peak_filtered_n: f64,
+    /// Time in contact over the whole cycle \[s\].
+    pub contact_s: f64,
+    /// Integral of the vertical force over the whole cycle \[N s\].
+    pub impulse_newton_s: f64,
+    /// The same over the first 50 ms after the first touch \[N s\].
+    pub impulse_first_50ms_newton_s: f64,
+    /// Mean vertical force over the last 0.3 s before the reference turns \[N\].
+    pub rest_force_n: f64,
+    /// From the first touch until the latch closed \[s\], if it did.
+    pub latched_after_s: Option<f64>,
+}
+
+/// Collects strokes from the cycles of a run.
+#[derive(Debug)]
+pub struct ContactMeter {
+    probe: Probe,
+    current: Option<((u32, u32), Stroke)>,
+    first_touch_s: Option<f64>,
+    last_speed_m_per_s: f64,
+    rest: (f64, u32),
+    done: Vec<Stroke>,
+}
+
+impl ContactMeter {
+    /// For a probing cycle.
+    pub fn new(probe: Probe) -> ContactMeter {
+        ContactMeter {
+            probe,
+            current: None,
+            first_touch_s: None,
+            last_speed_m_per_s: 0.0,
+            rest: (0.0, 0),
+            done: Vec::new(),
+        }
+    }
+
+    /// One cycle. `time_s` is the time since the trajectory began, `truth` the state at its start.
+    pub fn cycle<const N: usize>(
+        &mut self,
+        time_s: f64,
+        truth: &Truth<N>,
+        steps: &[StepRecord],
+        in_contact: bool,
+    ) {
+        let (phase, into_s, stroke, column) = self.probe.phase_at(time_s);
+        let number = (column, stroke);
+        if self.current.is_none_or(|(current, _)| current != number) {
+            self.close();
+            self.current = Some((number, Stroke::default()));
+        }
+        let Some((_, record)) = &mut self.current else {
+            return;
+        };
+        let mut before_s = truth.time_s;
+        for step in steps {
+            let dt_s = step.time_s - before_s;
+            before_s = step.time_s;
+            let force_n = step.force_n.z;
+            if force_n > 0.0 && self.first_touch_s.is_none() {
+                self.first_touch_s = Some(step.time_s);
+                record.approach_m_per_s = self.last_speed_m_per_s;
+            }
+            record.impulse_newton_s += force_n * dt_s;
+            if force_n > 0.0 {
+                record.contact_s += dt_s;
+            }
+            if let Some(touch_s) = self.first_touch_s
+                && step.time_s - touch_s < TRANSIENT_S
+            {
+                record.impulse_first_50ms_newton_s += force_n * dt_s;
+                record.peak_filtered_n = record.peak_filtered_n.max(step.filtered_force_n.z);
+            }
+        }
+        self.last_speed_m_per_s = -truth.tip_velocity_m_per_s.z;
+        if in_contact && record.latched_after_s.is_none() {
+            record.latched_after_s = self.first_touch_s.map(|touch_s| truth.time_s - touch_s);
+        }
+        let stroke_s = self.probe.stroke_m / self.probe.speed_m_per_s + self.probe.ramp_s;
+        if phase == ProbePhase::Down && into_s > stroke_s - REST_S {
+            self.rest.0 += truth.contact_force_n.z;
+            self.rest.1 += 1;
+        }
+    }
+
+    fn close(&mut self) {
+        if let Some((_, mut stroke)) = self.current.take() {
+            if self.rest.1 > 0 {
+                stroke.rest_force_n = self.rest.0 / f64::from(self.rest.1);
+            }
+            self.done.push(stroke);
+        }
+        self.first_touch_s = None;
+        self.rest = (0.0, 0);
+    }
+
+    /// All strokes. The last one is taken as it stands.
+    pub fn finish(mut self) -> Vec<Stroke> {
+        self.close();
+        self.done
+    }
+}
+
+/// Middle value of every entry over the strokes.
+pub fn median_stroke(strokes: &[Stroke]) -> Stroke {
+    let of = |entry: &dyn Fn(&Stroke) -> f64| {
+        let values: Vec<f64> = strokes.iter().map(entry).collect();
+        median(&values).unwrap_or_default()
+    };
+    let latched: Vec<f64> = strokes.iter().filter_map(|s| s.latched_after_s).collect();
+    Stroke {
+        approach_m_per_s: of(&|s| s.approach_m_per_s),
+        peak_filtered_n: of(&|s| s.peak_filtered_n),
+        contact_s: of(&|s| s.contact_s),
+        impulse_newton_s: of(&|s| s.impulse_newton_s),
+        impulse_first_50ms_newton_s: of(&|s| s.impulse_first_50ms_newton_s),
+        rest_force_n: of(&|s| s.rest_force_n),
+        latched_after_s: median(&latched),
+    }
+}

@@ -1,0 +1,70 @@
+//! The log of a run in virtual time.
+
+use crate::error::ExperimentError;
+use crate::rig::Cycle;
+use crate::run::Plan;
+use crate::trace::xyz;
+use std::path::Path;
+use supple_log::{Extras, LogError, PlantTruth, RunInfo, Writer};
+use supple_model::Description;
+
+/// Writes every cycle of a run as `<folder>/<name of the plan>.mcap`. Virtual time begins at zero.
+pub struct Recorder<const N: usize> {
+    writer: Writer<N>,
+    period_ns: u64,
+}
+
+impl<const N: usize> Recorder<N> {
+    /// Begins the log.
+    ///
+    /// # Errors
+    /// Where it cannot be written.
+    pub fn create(
+        folder: &Path,
+        description: &Description,
+        plan: &Plan<N>,
+        seed: u64,
+    ) -> Result<Recorder<N>, ExperimentError> {
+        let path = folder.join(format!("{}.mcap", plan.name));
+        let run = RunInfo {
+            experiment: plan.name.clone(),
+            seed: Some(seed),
+            ..RunInfo::default()
+        };
+        Ok(Recorder {
+            writer: Writer::create(path, description, &plan.config, &run)?,
+            period_ns: (plan.config.period_s * 1e9).round() as u64,
+        })
+    }
+
+    /// One cycle.
+    ///
+    /// # Errors
+    /// Where it cannot be written.
+    pub fn cycle(&mut self, cycle: &Cycle<'_, N>) -> Result<(), LogError> {
+        let truth = &cycle.truth;
+        let extras = Extras {
+            truth: Some(PlantTruth {
+                position_rad: truth.position_rad.into(),
+                velocity_rad_per_s: truth.velocity_rad_per_s.into(),
+                tip_position_m: xyz(&truth.tip_position_m),
+                tip_velocity_m_per_s: xyz(&truth.tip_velocity_m_per_s),
+                contact_force_n: xyz(&truth.contact_force_n),
+                friction_torque_nm: truth.friction_torque_nm.into(),
+                motor_torque_nm: truth.motor_torque_nm.into(),
+            }),
+            ..Extras::default()
+        };
+        let time_ns = cycle.input.cycle * self.period_ns;
+        self.writer
+            .write(time_ns, &cycle.input, &cycle.output, &extras)
+    }
+
+    /// Makes the log whole.
+    ///
+    /// # Errors
+    /// Where it cannot be written.
+    pub fn finish(self) -> Result<(), LogError> {
+        self.writer.finish().map(|_| ())
+    }
+}

@@ -1,0 +1,90 @@
+//! The paper's experiments: trajectory, scene, gains and duration of each.
+
+use supple_core::Trajectory;
+use supple_core::config::Gains;
+use supple_core::trajectory::{Arc, Probe, Quadrant, Sinusoid};
+use supple_plant::{FixedBlock, Scene};
+
+/// Stiffness of the free-motion experiments \[N/m\].
+pub const STIFFNESS_N_PER_M: f64 = 5.0;
+/// Damping that goes with it \[N s/m\].
+pub const DAMPING_N_S_PER_M: f64 = 1.5;
+/// Stiffnesses of the probing runs \[N/m\]; the fits of figure 6 start at the second.
+pub const PROBING_STIFFNESS_N_PER_M: [f64; 7] = [0.5, 5.0, 25.0, 50.0, 75.0, 100.0, 125.0];
+/// Speed of the quadrant in the headline run \[m/s\].
+pub const QUADRANT_SPEED_M_PER_S: f64 = 0.02 * core::f64::consts::PI;
+/// The greatest commanded speed in the paper \[m/s\].
+pub const QUADRANT_PAPER_SPEED_M_PER_S: f64 = 0.1 * core::f64::consts::PI;
+/// Height of the block's face above the base frame \[m\].
+pub const FACE_M: f64 = 0.0;
+/// Depth into the stroke at which the cap meets the face \[m\].
+const FACE_INTO_STROKE_M: f64 = 0.06;
+/// Columns of a probing run: the base advances between them.
+const COLUMNS: u32 = 2;
+
+/// Gains at a stiffness \[N/m\]: the damping grows with its square root, from 1.5 N s/m at 5 N/m, so
+/// that the damping ratio at the tip is the same for all.
+pub fn gains(stiffness_n_per_m: f64) -> Gains {
+    let damping = DAMPING_N_S_PER_M * (stiffness_n_per_m / STIFFNESS_N_PER_M).sqrt();
+    Gains::isotropic(stiffness_n_per_m, damping)
+}
+
+/// The sinusoid of figure 3a at `speed` times its pace: two periods. Trajectory and duration \[s\].
+pub fn sinusoid(speed: f64) -> (Trajectory, f64) {
+    let sinusoid = Sinusoid::paper(speed);
+    let duration_s = 2.0 * sinusoid.period_s() + 0.5 * sinusoid.ramp_s;
+    (Trajectory::Sinusoid(sinusoid), duration_s)
+}
+
+/// An arc at 0.65 m from the base axis that swings the base by 0.4 rad to both sides: two periods.
+pub fn arc() -> (Trajectory, f64) {
+    let arc = Arc {
+        radius_m: 0.65,
+        height_m: 0.0,
+        centre_rad: 0.0,
+        amplitude_rad: 0.4,
+        angular_frequency_rad_per_s: core::f64::consts::FRAC_PI_4,
+        ramp_s: 1.0,
+    };
+    let period_s = core::f64::consts::TAU / arc.angular_frequency_rad_per_s;
+    (Trajectory::Arc(arc), 2.0 * period_s + 0.5 * arc.ramp_s)
+}
+
+/// The quadrant of figure 3b in the vertical plane, two rounds. Trajectory, duration \[s\].
+pub fn quadrant(speed_m_per_s: f64) -> (Quadrant, f64) {
+    let quadrant = Quadrant::vertical(speed_m_per_s);
+    let duration_s = 2.0 * quadrant.period_s() + 0.25;
+    (quadrant, duration_s)
+}
+
+/// The probing cycle over the block for a cap of this radius: two strokes a column, two columns.
+/// Probe, duration \[s\].
+pub fn probe(tip_radius_m: f64) -> (Probe, f64) {
+    let probe = Probe {
+        radius_m: 0.70,
+        strokes: 2,
+        radial_step_m: 6.67e-3,
+        top_m: FACE_M + tip_radius_m + FACE_INTO_STROKE_M,
+        stroke_m: 0.10,
+        azimuth_rad: 0.0,
+        azimuth_step_rad: 0.05,
+        speed_m_per_s: 0.04,
+        ramp_s: 0.25,
+    };
+    (probe, probe.column_s() * f64::from(COLUMNS))
+}
+
+/// The wooden block beneath the probing cycle.
+pub fn block() -> Scene {
+    Scene {
+        fixed_blocks: vec![FixedBlock {
+            name: "block".to_owned(),
+            center_m: [0.70, 0.0, FACE_M - 0.05],
+            size_m: [0.20, 0.40, 0.10],
+            rpy_rad: [0.0; 3],
+            material: "wood".to_owned(),
+            layer: None,
+        }],
+        ..Scene::default()
+    }
+}

@@ -1,0 +1,177 @@
+//! Which combinations of the columns the data can tell apart.
+//!
+//! Columns are scaled to unit length and taken in turn by QR with column pivoting. Where the diagonal
+//! drops below `tolerance` of its first entry, the rest depend on those taken:
+//! `dependent = independent B`, so that `x_independent + B x_dependent` is what can be identified.
+
+use crate::error::IdentError;
+use nalgebra::{DMatrix, DVector};
+
+/// Diagonal entries below this share of the first are rounding.
+pub const RANK_TOLERANCE: f64 = 1e-8;
+
+/// Base parameters of a regressor.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Base {
+    /// Positions of the independent columns, increasing.
+    pub independent: Vec<usize>,
+    /// Positions of the others, increasing.
+    pub dependent: Vec<usize>,
+    /// `B`, (independent, dependent).
+    pub combination: DMatrix<f64>,
+    /// Greatest by least singular value of the independent columns, each scaled to unit length.
+    pub condition: f64,
+    gram_inverse: DMatrix<f64>,
+}
+
+impl Base {
+    /// Of the regressor `a`, or of its triangle.
+    ///
+    /// # Errors
+    /// [`IdentError::Singular`] if every column is zero.
+    pub fn of(a: &DMatrix<f64>, tolerance: f64) -> Result<Base, IdentError> {
+        let lengths: Vec<f64> = a.column_iter().map(|c| c.norm()).collect();
+        let longest = lengths.iter().copied().fold(0.0, f64::max);
+        if longest == 0.0 || !longest.is_finite() {
+            return Err(IdentError::Singular {
+                problem: format!("the regressor has columns of length {longest} at most"),
+                remedy: "give a log in which the joints move",
+            });
+        }
+        let scale = |j: usize| {
+            if lengths[j] > 1e-12 * longest {
+                1.0 / lengths[j]
+            } else {
+                0.0
+            }
+        };
+        let scaled = DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)] * scale(j));
+        let order = pivot_order(&scaled, tolerance);
+        let mut independent = order;
+        independent.sort_unstable();
+        let dependent: Vec<usize> = (0..a.ncols())
+            .filter(|j| independent.binary_search(j).is_err())
+            .collect();
+        let singular = || IdentError::Singular {
+            problem: "the independent columns are not".to_owned(),
+            remedy: "raise the tolerance of the rank",
+        };
+        let taken = scaled.select_columns(&independent);
+        let (q, r) = taken.clone().qr().unpack();
+        let projected = q.tr_mul(&scaled.select_columns(&dependent));
+        let mut combination = r.solve_upper_triangular(&projected).ok_or_else(singular)?;
+        for (i, &p) in independent.iter().enumerate() {
+            for (k, &d) in dependent.iter().enumerate() {
+                combination[(i, k)] *= scale(p) * if scale(d) > 0.0 { lengths[d] } else { 0.0 };
+            }
+        }
+        let identity = DMatrix::identity(r.nrows(), r.nrows());
+        let inverse = r.solve_upper_triangular(&identity).ok_or_else(singular)?;
+        let mut gram_inverse = &inverse * inverse.transpose();
+        for (i, &p) in independent.iter().enumerate() {
+            gram_inverse.row_mut(i).scale_mut(scale(p));
+            gram_inverse.column_mut(i).scale_mut(scale(p));
+        }
+        let singular_values = r.singular_values();
+        Ok(Base {
+            independent,
+            dependent,
+            combination,
+            condition: singular_values.max() / singular_values.min(),
+            gram_inverse,
+        })
+    }
+
+    /// The same, of columns that were `positions` of a larger set.
+    pub fn renumbered(mut self, positions: &[usize]) -> Base {
+        for list in [&mut self.independent, &mut self.dependent] {
+            list.iter_mut().for_each(|i| *i = positions[*i]);
+        }
+        self
+    }
+
+    /// Number of combinations that can be identified.
+    pub fn rank(&self) -> usize {
+        self.independent.len()
+    }
+
+    /// `x_independent + B x_dependent`.
+    pub fn values(&self, x: &DVector<f64>) -> DVector<f64> {
+        let part = |list: &[usize]| DVector::from_iterator(list.len(), list.iter().map(|i| x[*i]));
+        part(&self.independent) + &self.combination * part(&self.dependent)
+    }
+
+    /// Standard deviation of each base parameter for independent noise of `noise` on each row.
+    pub fn standard_deviations(&self, noise: f64) -> DVector<f64> {
+        self.gram_inverse.diagonal().map(|v| noise * v.sqrt())
+    }
+
+    /// Each base parameter in words, such as `Izz1 + 1 Iyy2 - 0.55 mcx2`.
+    pub fn text(&self, names: &[String]) -> Vec<String> {
+        let sum = |i: usize| {
+            let mut text = names[self.independent[i]].clone();
+            for (k, d) in self.dependent.iter().enumerate() {
+                text += &term(self.combination[(i, k)], &names[*d]);
+            }
+            text
+        };
+        (0..self.rank()).map(sum).collect()
+    }
+
+    /// Directions in which the parameters may move without any change of torque, in words: one for
+    /// each dependent column.
+    pub fn null_space_text(&self, names: &[String]) -> Vec<String> {
+        let direction = |k: usize| {
+            let mut text = names[self.dependent[k]].clone();
+            for (i, p) in self.independent.iter().enumerate() {
+                text += &term(-self.combination[(i, k)], &names[*p]);
+            }
+            text
+        };
+        (0..self.dependent.len()).map(direction).collect()
+    }
+}
+
+fn term(coefficient: f64, name: &str) -> String {
+    if coefficient.abs() < 1e-6 {
+        return String::new();
+    }
+    let sign = if coefficient < 0.0 { '-' } else { '+' };
+    let rounded = (coefficient.abs() * 1e6).round() / 1e6;
+    if rounded == 1.0 {
+        format!(" {sign} {name}")
+    } else {
+        format!(" {sign} {rounded} {name}")
+    }
+}
+
+/// Columns that pivoting takes before the rest are negligible. Each step takes the longest remainder
+/// and removes its direction, twice, from the others.
+fn pivot_order(columns: &DMatrix<f64>, tolerance: f64) -> Vec<usize> {
+    let mut rest = columns.clone();
+    let mut order: Vec<usize> = Vec::new();
+    let mut first = 0.0;
+    while order.len() < columns.ncols().min(columns.nrows()) {
+        let length = |j: usize| rest.column(j).norm();
+        let Some(pivot) = (0..rest.ncols())
+            .filter(|j| !order.contains(j))
+            .max_by(|a, b| length(*a).total_cmp(&length(*b)).then(b.cmp(a)))
+        else {
+            break;
+        };
+        let longest = length(pivot);
+        if order.is_empty() {
+            first = longest;
+        }
+        if longest <= tolerance * first {
+            break;
+        }
+        let direction = rest.column(pivot) / longest;
+        for _ in 0..2 {
+            let shares = rest.tr_mul(&direction);
+            rest.ger(-1.0, &direction, &shares, 1.0);
+        }
+        order.push(pivot);
+    }
+    order
+}

@@ -1,0 +1,246 @@
+//! Which columns the torques are explained by, in which order, and what each may be.
+//!
+//! ```text
+//! tau_j = sum_k Y_jk p_k + I_rj qdd_j + V_j qd_j + S_j p(qd_j/delta) + o_j + A_j |qd_j|
+//!         + B_j exp(-(qd_j/v_s)^2) p(qd_j/delta)        and for a gear coupling (a, b), on joint a,
+//!         + I_c (qdd_a + qdd_b) + V_c (qd_a + qd_b) + S_c p((qd_a + qd_b)/delta)
+//! ```
+//!
+//! `p` is the parabola of [`supple_core::friction`]. The rotor of a coupled motor turns with both
+//! joints: its torque acts on both.
+
+use crate::error::{IdentError, positive, shape_error};
+use supple_core::Friction;
+
+/// Names of the ten parameters of a link, in the order of [`supple_core::dynamics::parameters`].
+pub const LINK_NAMES: [&str; 10] = [
+    "m", "mcx", "mcy", "mcz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz",
+];
+
+/// Friction columns of every moving joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FrictionColumns {
+    /// `V`.
+    pub viscous: bool,
+    /// `S`.
+    pub coulomb: bool,
+    /// `o`: Coulomb friction that differs by direction is `S` and `o` together.
+    pub offset: bool,
+    /// `A`: viscous friction that differs by direction, `|A| <= V`.
+    pub asymmetry: bool,
+    /// `B`, with its `v_s` \[rad/s\].
+    pub stribeck_rad_per_s: Option<f64>,
+    /// `delta` of the parabola \[rad/s\].
+    pub band_rad_per_s: f64,
+}
+
+impl FrictionColumns {
+    /// No friction at all.
+    pub const NONE: FrictionColumns = FrictionColumns {
+        viscous: false,
+        coulomb: false,
+        offset: false,
+        asymmetry: false,
+        stribeck_rad_per_s: None,
+        band_rad_per_s: Friction::NONE.band_rad_per_s,
+    };
+    /// `V` and `S`.
+    pub const COULOMB: FrictionColumns = FrictionColumns {
+        viscous: true,
+        coulomb: true,
+        ..FrictionColumns::NONE
+    };
+    /// `V`, `S` and `o`.
+    pub const OFFSET: FrictionColumns = FrictionColumns {
+        offset: true,
+        ..FrictionColumns::COULOMB
+    };
+}
+
+/// What one column is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Column {
+    /// Parameter 0 to 9 of a link.
+    Link {
+        /// Joint that moves the link.
+        link: usize,
+        /// Entry of [`LINK_NAMES`].
+        entry: usize,
+    },
+    /// Rotor inertia of a joint.
+    Rotor(usize),
+    /// `V` of a joint.
+    Viscous(usize),
+    /// `S` of a joint.
+    Coulomb(usize),
+    /// `o` of a joint.
+    Offset(usize),
+    /// `A` of a joint.
+    Asymmetry(usize),
+    /// `B` of a joint.
+    Stribeck(usize),
+    /// Rotor inertia of a motor that turns with the sum of two joints.
+    CoupledRotor(usize, usize),
+    /// Its viscous friction.
+    CoupledViscous(usize, usize),
+    /// Its Coulomb friction.
+    CoupledCoulomb(usize, usize),
+}
+
+impl Column {
+    /// Whether the column turns over at once with the direction of motion.
+    pub fn jumps(&self) -> bool {
+        matches!(
+            self,
+            Column::Coulomb(_) | Column::Stribeck(_) | Column::CoupledCoulomb(..)
+        )
+    }
+}
+
+/// The columns of a regressor of an arm, links first.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Columns {
+    dof: usize,
+    moving: Vec<usize>,
+    friction: FrictionColumns,
+    columns: Vec<Column>,
+}
+
+impl Columns {
+    /// Ten for each of `dof` links, then rotor inertia and `friction` of each of the `moving` joints,
+    /// then three for each pair of `couplings`.
+    ///
+    /// # Errors
+    /// Joints that do not exist or do not move; a band or Stribeck speed that is not positive.
+    pub fn new(
+        dof: usize,
+        moving: &[usize],
+        rotor: bool,
+        friction: FrictionColumns,
+        couplings: &[(usize, usize)],
+    ) -> Result<Self, IdentError> {
+        crate::log::check_moving(dof, moving)?;
+        positive("band_rad_per_s", friction.band_rad_per_s)?;
+        if let Some(speed) = friction.stribeck_rad_per_s {
+            positive("stribeck_rad_per_s", speed)?;
+        }
+        if friction.asymmetry && !friction.viscous {
+            return Err(shape_error(
+                "friction",
+                "viscous columns beside those of its asymmetry",
+                "asymmetry alone",
+            ));
+        }
+        let mut columns = Vec::new();
+        for link in 0..dof {
+            columns.extend((0..10).map(|entry| Column::Link { link, entry }));
+        }
+        for &joint in moving {
+            let wanted = [
+                (rotor, Column::Rotor(joint)),
+                (friction.viscous, Column::Viscous(joint)),
+                (friction.coulomb, Column::Coulomb(joint)),
+                (friction.offset, Column::Offset(joint)),
+                (friction.asymmetry, Column::Asymmetry(joint)),
+                (
+                    friction.stribeck_rad_per_s.is_some(),
+                    Column::Stribeck(joint),
+                ),
+            ];
+            columns.extend(
+                wanted
+                    .iter()
+                    .filter(|(on, _)| *on)
+                    .map(|(_, column)| *column),
+            );
+        }
+        for &(a, b) in couplings {
+            if a == b || !moving.contains(&a) || !moving.contains(&b) {
+                let expected = format!("two of the moving joints {moving:?}");
+                return Err(shape_error("coupling", expected, format!("({a}, {b})")));
+            }
+            columns.extend([
+                Column::CoupledRotor(a, b),
+                Column::CoupledViscous(a, b),
+                Column::CoupledCoulomb(a, b),
+            ]);
+        }
+        Ok(Self {
+            dof,
+            moving: moving.to_vec(),
+            friction,
+            columns,
+        })
+    }
+
+    /// Number of joints of the arm.
+    pub fn dof(&self) -> usize {
+        self.dof
+    }
+
+    /// Joints whose torques are explained.
+    pub fn moving(&self) -> &[usize] {
+        &self.moving
+    }
+
+    /// Friction of each moving joint.
+    pub fn friction(&self) -> &FrictionColumns {
+        &self.friction
+    }
+
+    /// The columns, links first.
+    pub fn list(&self) -> &[Column] {
+        &self.columns
+    }
+
+    /// Number of columns.
+    pub fn len(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// Never: an arm has links.
+    pub fn is_empty(&self) -> bool {
+        self.columns.is_empty()
+    }
+
+    /// Position of a column.
+    pub fn position(&self, column: Column) -> Option<usize> {
+        self.columns.iter().position(|c| *c == column)
+    }
+
+    /// Names, such as `Izz2` or `S0`: links and joints are counted from 0.
+    pub fn names(&self) -> Vec<String> {
+        let name = |column: &Column| match *column {
+            Column::Link { link, entry } => format!("{}{link}", LINK_NAMES[entry]),
+            Column::Rotor(j) => format!("Ir{j}"),
+            Column::Viscous(j) => format!("V{j}"),
+            Column::Coulomb(j) => format!("S{j}"),
+            Column::Offset(j) => format!("offset{j}"),
+            Column::Asymmetry(j) => format!("A{j}"),
+            Column::Stribeck(j) => format!("B{j}"),
+            Column::CoupledRotor(a, b) => format!("Ir{a}+{b}"),
+            Column::CoupledViscous(a, b) => format!("V{a}+{b}"),
+            Column::CoupledCoulomb(a, b) => format!("S{a}+{b}"),
+        };
+        self.columns.iter().map(name).collect()
+    }
+
+    /// Linear forms `sum c_i x_i` that must not be negative: friction that takes energy, rotors that
+    /// have inertia. Each is a list of (position, coefficient).
+    pub fn not_negative(&self) -> Vec<Vec<(usize, f64)>> {
+        let mut forms = Vec::new();
+        for (i, column) in self.columns.iter().enumerate() {
+            match *column {
+                Column::Link { .. } | Column::Offset(_) => {}
+                Column::Asymmetry(joint) => {
+                    let viscous = self.position(Column::Viscous(joint)).map(|v| (v, 1.0));
+                    for sign in [1.0, -1.0] {
+                        forms.push(viscous.into_iter().chain([(i, sign)]).collect());
+                    }
+                }
+                _ => forms.push(vec![(i, 1.0)]),
+            }
+        }
+        forms
+    }
+}

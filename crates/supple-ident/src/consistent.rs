@@ -1,0 +1,288 @@
+//! Least squares over the parameters that an arm could have.
+//!
+//! ```text
+//! min 1/2 |A x - b|^2 + gamma sum_k [tr(P0_k^-1 P_k) - log det P_k]
+//! P_k(x) positive definite for every link,   g_i . x >= 0
+//! ```
+//!
+//! `P = [S h; h' m]`, `S = tr(I)/2 - I`, is the pseudo-inertia: positive definite if and only if some
+//! distribution of mass has it (Wensing, Kim and Slotine, 2018). The second term is the log-det
+//! divergence from the model `P0`, up to a constant; it also decides what the data leave open.
+//!
+//! Solved by Newton's method on `objective - mu (sum log det P_k + sum log g_i . x)`, with `mu` brought
+//! down in steps. At each centre the objective is within `mu nu` of the optimum, where `nu` is four for
+//! each link and one for each form: the certificate that the result carries.
+
+use crate::compress::Block;
+use crate::error::{IdentError, positive};
+use nalgebra::{Cholesky, DMatrix, DVector, Matrix4, SVector};
+
+/// Factor from one `mu` to the next.
+const REDUCTION: f64 = 0.1;
+/// The barrier's share of the prior at the end.
+const FAINT: f64 = 1e-6;
+/// Newton steps at most for each `mu`.
+const STEPS: usize = 60;
+
+/// The constraints and the prior.
+#[derive(Clone, Debug)]
+pub struct Constraints {
+    /// Ten parameters of each link of the model that the prior draws towards; they are the first
+    /// unknowns.
+    pub links: Vec<SVector<f64, 10>>,
+    /// Linear forms that must not be negative, as (unknown, coefficient).
+    pub not_negative: Vec<Vec<(usize, f64)>>,
+    /// `gamma`, positive: how many observations of one standard deviation the model is worth.
+    pub prior_weight: f64,
+    /// Certified distance from the optimum, relative to the objective, at which to stop.
+    pub tolerance: f64,
+}
+
+/// A solution that keeps every constraint strictly.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Solution {
+    /// The unknowns.
+    pub x: DVector<f64>,
+    /// Objective, without the barrier.
+    pub objective: f64,
+    /// Bound on the distance from the least objective.
+    pub gap: f64,
+    /// Newton steps taken.
+    pub steps: usize,
+}
+
+/// Pseudo-inertia of ten parameters.
+pub fn pseudo_inertia(p: &SVector<f64, 10>) -> Matrix4<f64> {
+    let [m, hx, hy, hz, xx, xy, yy, xz, yz, zz] = p.data.0[0];
+    let half = 0.5 * (xx + yy + zz);
+    Matrix4::new(
+        half - xx,
+        -xy,
+        -xz,
+        hx, //
+        -xy,
+        half - yy,
+        -yz,
+        hy, //
+        -xz,
+        -yz,
+        half - zz,
+        hz, //
+        hx,
+        hy,
+        hz,
+        m,
+    )
+}
+
+impl Constraints {
+    /// Degree of the barrier.
+    fn nu(&self) -> f64 {
+        (4 * self.links.len() + self.not_negative.len()) as f64
+    }
+}
+
+/// Solves for the unknowns of `block`, starting from the model.
+///
+/// # Errors
+/// [`IdentError::Option`] for a prior weight or tolerance that is not positive;
+/// [`IdentError::Singular`] if a link of the model is no body or the data are not finite.
+pub fn solve(block: &Block, constraints: &Constraints) -> Result<Solution, IdentError> {
+    positive("prior_weight", constraints.prior_weight)?;
+    positive("tolerance", constraints.tolerance)?;
+    let problem = Problem::new(block, constraints)?;
+    let mut x = problem.start();
+    let mut steps = 0;
+    let nu = constraints.nu();
+    let mut mu = problem.objective(&x).ok_or_else(not_a_model)?.abs() / nu;
+    loop {
+        steps += problem.centre(&mut x, mu)?;
+        let objective = problem.objective(&x).ok_or_else(not_a_model)?;
+        // What the data leave open is the model's only once the barrier is far below the prior.
+        let faint = mu <= FAINT * constraints.prior_weight;
+        if faint && mu * nu <= constraints.tolerance * (1.0 + objective.abs()) {
+            return Ok(Solution {
+                x,
+                objective,
+                gap: mu * nu,
+                steps,
+            });
+        }
+        mu *= REDUCTION;
+    }
+}
+
+fn not_a_model() -> IdentError {
+    IdentError::Singular {
+        problem: "a link of the model has no positive definite pseudo-inertia".to_owned(),
+        remedy: "correct its mass, centre of mass and inertia",
+    }
+}
+
+struct Problem<'a> {
+    constraints: &'a Constraints,
+    /// `A' A`.
+    gram: DMatrix<f64>,
+    a: DMatrix<f64>,
+    b: DVector<f64>,
+    prior_inverse: Vec<Matrix4<f64>>,
+    basis: [Matrix4<f64>; 10],
+}
+
+impl<'a> Problem<'a> {
+    fn new(block: &Block, constraints: &'a Constraints) -> Result<Self, IdentError> {
+        let a = block.a();
+        let inverse = |p: &SVector<f64, 10>| {
+            let inverse = Cholesky::new(pseudo_inertia(p)).map(|c| c.inverse());
+            inverse.ok_or_else(not_a_model)
+        };
+        let basis = std::array::from_fn(|i| {
+            let mut unit = SVector::<f64, 10>::zeros();
+            unit[i] = 1.0;
+            pseudo_inertia(&unit)
+        });
+        Ok(Self {
+            constraints,
+            gram: a.tr_mul(&a),
+            b: block.b(),
+            a,
+            prior_inverse: constraints
+                .links
+                .iter()
+                .map(inverse)
+                .collect::<Result<_, _>>()?,
+            basis,
+        })
+    }
+
+    /// The model, with every other constrained unknown at one.
+    fn start(&self) -> DVector<f64> {
+        let mut x = DVector::zeros(self.a.ncols());
+        for (k, link) in self.constraints.links.iter().enumerate() {
+            x.rows_mut(10 * k, 10).copy_from(link);
+        }
+        for form in &self.constraints.not_negative {
+            if let [(i, _)] = form[..] {
+                x[i] = 1.0;
+            }
+        }
+        x
+    }
+
+    fn link(&self, x: &DVector<f64>, k: usize) -> Option<Cholesky<f64, nalgebra::U4>> {
+        Cholesky::new(pseudo_inertia(&x.fixed_rows::<10>(10 * k).into_owned()))
+    }
+
+    fn form(form: &[(usize, f64)], x: &DVector<f64>) -> f64 {
+        form.iter().map(|(i, c)| c * x[*i]).sum()
+    }
+
+    /// `None` outside the constraints.
+    fn objective(&self, x: &DVector<f64>) -> Option<f64> {
+        self.value(x, 0.0)
+    }
+
+    fn value(&self, x: &DVector<f64>, mu: f64) -> Option<f64> {
+        let gamma = self.constraints.prior_weight;
+        let mut value = 0.5 * (&self.a * x - &self.b).norm_squared();
+        for (k, inverse) in self.prior_inverse.iter().enumerate() {
+            let root = self.link(x, k)?;
+            let p = pseudo_inertia(&x.fixed_rows::<10>(10 * k).into_owned());
+            value += gamma * inverse.dot(&p) - (gamma + mu) * root.ln_determinant();
+        }
+        for form in &self.constraints.not_negative {
+            let slack = Self::form(form, x);
+            if slack <= 0.0 {
+                return None;
+            }
+            value -= if mu > 0.0 { mu * slack.ln() } else { 0.0 };
+        }
+        value.is_finite().then_some(value)
+    }
+
+    fn slopes(&self, x: &DVector<f64>, mu: f64) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let gamma = self.constraints.prior_weight;
+        let mut gradient = self.a.tr_mul(&(&self.a * x - &self.b));
+        let mut hessian = self.gram.clone();
+        for (k, prior) in self.prior_inverse.iter().enumerate() {
+            let inverse = self.link(x, k)?.inverse();
+            let turned = self.basis.map(|e| inverse * e);
+            for (i, basis) in self.basis.iter().enumerate() {
+                gradient[10 * k + i] += gamma * prior.dot(basis) - (gamma + mu) * turned[i].trace();
+                for j in 0..10 {
+                    hessian[(10 * k + i, 10 * k + j)] +=
+                        (gamma + mu) * turned[i].dot(&turned[j].transpose());
+                }
+            }
+        }
+        for form in &self.constraints.not_negative {
+            let slack = Self::form(form, x);
+            for (i, a) in form {
+                gradient[*i] -= mu * a / slack;
+                for (j, b) in form {
+                    hessian[(*i, *j)] += mu * a * b / (slack * slack);
+                }
+            }
+        }
+        Some((gradient, hessian))
+    }
+
+    /// Newton's method with backtracking; the number of steps.
+    fn centre(&self, x: &mut DVector<f64>, mu: f64) -> Result<usize, IdentError> {
+        let mut value = self.value(x, mu).ok_or_else(not_a_model)?;
+        for taken in 0..STEPS {
+            let (gradient, hessian) = self.slopes(x, mu).ok_or_else(not_a_model)?;
+            let step = newton_step(&gradient, &hessian)?;
+            let decrement = -gradient.dot(&step);
+            if decrement <= 1e-6 * mu {
+                return Ok(taken);
+            }
+            let mut length = 1.0;
+            loop {
+                let next = &*x + &step * length;
+                let next_value = self.value(&next, mu);
+                if let Some(v) = next_value
+                    && v <= value - 1e-4 * length * decrement
+                {
+                    (*x, value) = (next, v);
+                    break;
+                }
+                length *= 0.5;
+                // Below rounding of the value there is nothing left to gain.
+                if length < 1e-10 {
+                    return Ok(taken);
+                }
+            }
+        }
+        Ok(STEPS)
+    }
+}
+
+/// `-H^-1 g`, with unknowns scaled so that the diagonal of `H` is one.
+fn newton_step(
+    gradient: &DVector<f64>,
+    hessian: &DMatrix<f64>,
+) -> Result<DVector<f64>, IdentError> {
+    let n = gradient.len();
+    let greatest = hessian.diagonal().amax();
+    let scale = DVector::from_fn(n, |i, _| {
+        1.0 / hessian[(i, i)]
+            .max(f64::EPSILON * f64::EPSILON * greatest)
+            .sqrt()
+    });
+    let scaled = DMatrix::from_fn(n, n, |i, j| hessian[(i, j)] * scale[i] * scale[j]);
+    let mut ridge = 0.0;
+    while ridge < 1e-3 {
+        let shifted = &scaled + DMatrix::identity(n, n) * ridge;
+        if let Some(root) = Cholesky::new(shifted) {
+            return Ok(-root
+                .solve(&gradient.component_mul(&scale))
+                .component_mul(&scale));
+        }
+        ridge = if ridge == 0.0 { 1e-14 } else { 10.0 * ridge };
+    }
+    Err(IdentError::Singular {
+        problem: "the data are not finite or leave a direction open".to_owned(),
+        remedy: "leave out columns, or raise the prior weight",
+    })
+}

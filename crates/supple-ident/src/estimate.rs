@@ -1,0 +1,128 @@
+//! Least squares without constraints: ordinary, weighted by joint, and robust (Huber).
+//!
+//! What the data leave open is filled from a prior: the solution nearest to it. Nothing here makes the
+//! result an arm; see [`crate::consistent`] for that.
+
+use crate::compress::Block;
+use crate::error::IdentError;
+use crate::regressor::JointRows;
+use nalgebra::{DMatrix, DVector};
+
+/// Residuals beyond so many standard deviations weigh less: 95 % efficiency for Gaussian noise.
+const HUBER: f64 = 1.345;
+/// Median absolute deviation to standard deviation of Gaussian noise.
+const MAD: f64 = 1.4826;
+/// Rounds of weighting.
+const ROUNDS: usize = 20;
+
+/// Moore-Penrose inverse; singular values below `tolerance` of the greatest, of columns scaled to
+/// unit length, are taken for zero.
+///
+/// # Errors
+/// [`IdentError::Singular`] if there is none.
+pub fn pseudo_inverse(a: &DMatrix<f64>, tolerance: f64) -> Result<DMatrix<f64>, IdentError> {
+    let greatest = a.singular_values().max();
+    a.clone()
+        .pseudo_inverse(tolerance * greatest)
+        .map_err(|problem| IdentError::Singular {
+            problem: problem.to_owned(),
+            remedy: "give a log in which the joints move",
+        })
+}
+
+/// Solution of least norm of `min |a x - b|`.
+///
+/// # Errors
+/// As [`pseudo_inverse`].
+pub fn least_norm(
+    a: &DMatrix<f64>,
+    b: &DVector<f64>,
+    tolerance: f64,
+) -> Result<DVector<f64>, IdentError> {
+    Ok(pseudo_inverse(a, tolerance)? * b)
+}
+
+/// The solution of `min |a x - b|` nearest to `prior`, columns measured by their length.
+///
+/// # Errors
+/// As [`pseudo_inverse`].
+pub fn nearest(block: &Block, prior: &DVector<f64>) -> Result<DVector<f64>, IdentError> {
+    let a = block.a();
+    let lengths: Vec<f64> = a.column_iter().map(|c| c.norm()).collect();
+    let longest = lengths.iter().copied().fold(0.0, f64::max);
+    let scale = |j: usize| {
+        if lengths[j] > 1e-12 * longest {
+            1.0 / lengths[j]
+        } else {
+            0.0
+        }
+    };
+    let scaled = DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)] * scale(j));
+    let step = least_norm(
+        &scaled,
+        &(block.b() - &a * prior),
+        crate::base::RANK_TOLERANCE,
+    )?;
+    Ok(prior + DVector::from_fn(prior.len(), |j, _| step[j] * scale(j)))
+}
+
+/// The joints' blocks, each divided by its noise, in one.
+pub fn weighted(blocks: &[Block], noise_nm: &[f64], columns: usize) -> Block {
+    let mut all = Block::empty(columns);
+    for (block, noise) in blocks.iter().zip(noise_nm) {
+        all.add(block, 1.0 / noise);
+    }
+    all
+}
+
+/// RMS residual of each joint \[N m\], no less than a millionth of the joint's torque: noise-free
+/// data must not divide by zero.
+pub fn noise_nm(blocks: &[Block], x: &DVector<f64>) -> Vec<f64> {
+    let rms = |block: &Block| {
+        let rows = block.rows().max(1) as f64;
+        let least = 1e-6 * (block.torque_squared() / rows).sqrt();
+        (block.error_squared(x) / rows)
+            .sqrt()
+            .max(least)
+            .max(f64::MIN_POSITIVE.sqrt())
+    };
+    blocks.iter().map(rms).collect()
+}
+
+/// Noise of each joint found together with the solution that it weighs: weighted least squares.
+///
+/// # Errors
+/// As [`pseudo_inverse`].
+pub fn weighted_least_squares(
+    blocks: &[Block],
+    prior: &DVector<f64>,
+) -> Result<(DVector<f64>, Vec<f64>), IdentError> {
+    let mut noise = vec![1.0; blocks.len()];
+    let mut x = nearest(&weighted(blocks, &noise, prior.len()), prior)?;
+    for _ in 0..ROUNDS {
+        let next = noise_nm(blocks, &x);
+        let change = next.iter().zip(&noise).map(|(a, b)| (a / b - 1.0).abs());
+        let settled = change.fold(0.0, f64::max) < 1e-3;
+        noise = next;
+        x = nearest(&weighted(blocks, &noise, prior.len()), prior)?;
+        if settled {
+            break;
+        }
+    }
+    Ok((x, noise))
+}
+
+/// Huber's weights of every sample by joint, from the residuals of `x`.
+pub fn huber_weights(joints: &[JointRows], x: &DVector<f64>) -> Vec<Vec<f64>> {
+    let of_joint = |joint: &JointRows| {
+        let residual = &joint.a * x - &joint.b;
+        let mut sizes: Vec<f64> = residual.iter().map(|r| r.abs()).collect();
+        let sizes_in_order = sizes.clone();
+        sizes.sort_by(f64::total_cmp);
+        let scale = MAD * sizes.get(sizes.len() / 2).copied().unwrap_or(0.0);
+        let bound = HUBER * scale;
+        let weight = |size: f64| if size <= bound { 1.0 } else { bound / size };
+        sizes_in_order.into_iter().map(weight).collect()
+    };
+    joints.iter().map(of_joint).collect()
+}

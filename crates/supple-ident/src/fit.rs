@@ -1,0 +1,320 @@
+//! From prepared motions to a model: rows, weights, solution, what it is worth.
+
+use crate::base::{Base, RANK_TOLERANCE};
+use crate::columns::{Column, Columns, FrictionColumns};
+use crate::compress::Block;
+use crate::consistent::{Constraints, solve};
+use crate::error::{IdentError, shape_error};
+use crate::estimate::{huber_weights, nearest, noise_nm, weighted, weighted_least_squares};
+use crate::model;
+use crate::motion::Motion;
+use crate::regressor::{JointRows, joint_rows};
+use nalgebra::DVector;
+use supple_core::{Arm, Friction};
+
+/// Rounds of robust or constrained weighting.
+const ROUNDS: usize = 5;
+
+/// What the joints' residuals weigh.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Weights {
+    /// All the same: ordinary least squares.
+    Equal,
+    /// Each joint by its own residual: weighted least squares.
+    Noise,
+    /// The same, and single samples far out count less (Huber).
+    Huber,
+    /// Stated noise of each moving joint \[N m\].
+    Given(Vec<f64>),
+}
+
+/// What to fit, and how.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// A rotor inertia for each moving joint; without, the model's rotors are taken as known.
+    pub rotor: bool,
+    /// Friction columns.
+    pub friction: FrictionColumns,
+    /// Pairs of joints whose sum turns a motor.
+    pub couplings: Vec<(usize, usize)>,
+    /// Samples of a joint slower than this are left out of its rows \[rad/s\]. A Stribeck column is
+    /// then fitted in a second stage, from the slow samples.
+    pub slow_rad_per_s: f64,
+    /// Weights of joints and samples.
+    pub weights: Weights,
+    /// Bodies, rotors and friction as they can be; `None` for plain least squares. The number is the
+    /// weight of the prior, see [`Constraints::prior_weight`].
+    pub consistent: Option<f64>,
+}
+
+impl Default for Options {
+    /// Viscous and Coulomb friction with offset and rotors, slow samples left out below 0.15 rad/s,
+    /// weighted by joint, physically consistent.
+    fn default() -> Self {
+        Self {
+            rotor: true,
+            friction: FrictionColumns::OFFSET,
+            couplings: Vec::new(),
+            slow_rad_per_s: 0.15,
+            weights: Weights::Noise,
+            consistent: Some(1.0),
+        }
+    }
+}
+
+/// A model found.
+#[derive(Clone, Debug)]
+pub struct Fit<const N: usize> {
+    /// The columns.
+    pub columns: Columns,
+    /// Their values.
+    pub x: DVector<f64>,
+    /// Combinations that the data determine, with rank and condition number.
+    pub base: Base,
+    /// Standard deviation of each base parameter.
+    pub base_std: DVector<f64>,
+    /// RMS residual of each moving joint \[N m\].
+    pub noise_nm: Vec<f64>,
+    /// Certified distance of the objective from its optimum, for a consistent fit.
+    pub gap: Option<f64>,
+    nominal: Arm<N>,
+}
+
+/// Fits `motions` of an arm of which `moving` joints are identified. What the data leave open is drawn
+/// to `nominal`.
+///
+/// # Errors
+/// What the columns, the shapes and the solver refuse.
+pub fn identify<const N: usize>(
+    nominal: &Arm<N>,
+    motions: &[Motion],
+    moving: &[usize],
+    options: &Options,
+) -> Result<Fit<N>, IdentError> {
+    let columns = Columns::new(
+        N,
+        moving,
+        options.rotor,
+        options.friction,
+        &options.couplings,
+    )?;
+    let parts = motions
+        .iter()
+        .map(|motion| joint_rows(nominal, &columns, motion));
+    let parts = parts.collect::<Result<Vec<_>, _>>()?;
+    let share = motions
+        .iter()
+        .map(|m| m.independent_share)
+        .fold(1.0, f64::min);
+    fit_rows(nominal, columns, &parts, share, options)
+}
+
+/// As [`identify`], from rows that were made before: one list of joints for each part.
+///
+/// # Errors
+/// As [`identify`].
+pub fn fit_rows<const N: usize>(
+    nominal: &Arm<N>,
+    columns: Columns,
+    parts: &[Vec<JointRows>],
+    independent_share: f64,
+    options: &Options,
+) -> Result<Fit<N>, IdentError> {
+    let second_stage =
+        options.slow_rad_per_s > 0.0 && options.friction.stribeck_rad_per_s.is_some();
+    let used: Vec<usize> = (0..columns.len())
+        .filter(|i| !(second_stage && matches!(columns.list()[*i], Column::Stribeck(_))))
+        .collect();
+    let stage = Stage {
+        columns: &columns,
+        used: &used,
+        parts,
+        options,
+        prior: model::prior(nominal, &columns).select_rows(&used),
+        links: model::link_parameters::<N>(&model::prior(nominal, &columns)).to_vec(),
+    };
+    let blocks = stage.blocks(None);
+    let rows: usize = blocks.iter().map(Block::rows).sum();
+    if rows < used.len() {
+        return Err(shape_error(
+            "log",
+            format!("at least {} rows above slow_rad_per_s", used.len()),
+            format!("{rows}"),
+        ));
+    }
+    let (solution, blocks, noise, gap) = stage.solve(blocks)?;
+    let whole = weighted(&blocks, &noise, used.len());
+    let base = Base::of(&whole.a(), RANK_TOLERANCE)?;
+    let freedom = (rows - base.rank().min(rows - 1)) as f64 * independent_share;
+    let spread = (whole.error_squared(&solution) / freedom.max(1.0)).sqrt();
+    let base_std = base.standard_deviations(spread);
+    let mut x = DVector::zeros(columns.len());
+    used.iter()
+        .enumerate()
+        .for_each(|(k, i)| x[*i] = solution[k]);
+    if second_stage {
+        fit_stribeck(&columns, parts, &mut x);
+    }
+    Ok(Fit {
+        base: base.renumbered(&used),
+        base_std,
+        noise_nm: noise_nm(&blocks, &solution),
+        columns,
+        x,
+        gap,
+        nominal: *nominal,
+    })
+}
+
+struct Stage<'a> {
+    columns: &'a Columns,
+    used: &'a [usize],
+    parts: &'a [Vec<JointRows>],
+    options: &'a Options,
+    prior: DVector<f64>,
+    links: Vec<nalgebra::SVector<f64, 10>>,
+}
+
+type Solved = (DVector<f64>, Vec<Block>, Vec<f64>, Option<f64>);
+
+impl Stage<'_> {
+    /// One block a joint, over all parts.
+    fn blocks(&self, weights: Option<&[Vec<Vec<f64>>]>) -> Vec<Block> {
+        let joints = self.columns.moving().len();
+        let of_joint = |j: usize| {
+            let mut all = Block::empty(self.used.len());
+            for (p, part) in self.parts.iter().enumerate() {
+                let weights = weights.map(|w| &w[p][j][..]);
+                let block = Block::of(&part[j], self.options.slow_rad_per_s, weights);
+                all.add(&block.select(self.used), 1.0);
+            }
+            all
+        };
+        (0..joints).map(of_joint).collect()
+    }
+
+    fn solve(&self, mut blocks: Vec<Block>) -> Result<Solved, IdentError> {
+        let joints = blocks.len();
+        let mut noise = match &self.options.weights {
+            Weights::Equal => vec![1.0; joints],
+            Weights::Given(noise) if noise.len() == joints => noise.clone(),
+            Weights::Given(noise) => {
+                let expected = format!("{joints} values, one for each moving joint");
+                return Err(shape_error("weights", expected, format!("{}", noise.len())));
+            }
+            Weights::Noise | Weights::Huber => weighted_least_squares(&blocks, &self.prior)?.1,
+        };
+        let (mut x, mut gap) = self.step(&blocks, &noise)?;
+        if matches!(self.options.weights, Weights::Noise | Weights::Huber) {
+            for _ in 0..ROUNDS {
+                if self.options.weights == Weights::Huber {
+                    let mut full = DVector::zeros(self.columns.len());
+                    self.used
+                        .iter()
+                        .enumerate()
+                        .for_each(|(k, i)| full[*i] = x[k]);
+                    let weights = self.parts.iter().map(|part| huber_weights(part, &full));
+                    blocks = self.blocks(Some(&weights.collect::<Vec<_>>()));
+                }
+                let next = noise_nm(&blocks, &x);
+                let change = next.iter().zip(&noise).map(|(a, b)| (a / b - 1.0).abs());
+                let settled = change.fold(0.0, f64::max) < 1e-3;
+                noise = next;
+                (x, gap) = self.step(&blocks, &noise)?;
+                if settled {
+                    break;
+                }
+            }
+        }
+        if self.options.weights == Weights::Equal {
+            noise = equal_noise(&blocks, &x);
+            (x, gap) = self.step(&blocks, &noise)?;
+        }
+        Ok((x, blocks, noise, gap))
+    }
+
+    fn step(
+        &self,
+        blocks: &[Block],
+        noise: &[f64],
+    ) -> Result<(DVector<f64>, Option<f64>), IdentError> {
+        let whole = weighted(blocks, noise, self.used.len());
+        let Some(prior_weight) = self.options.consistent else {
+            return Ok((nearest(&whole, &self.prior)?, None));
+        };
+        let place = |i: &usize| self.used.binary_search(i).ok();
+        let forms = self.columns.not_negative().into_iter();
+        let solution = solve(
+            &whole,
+            &Constraints {
+                links: self.links.clone(),
+                not_negative: forms
+                    .filter_map(|form| {
+                        let form = form.into_iter().map(|(i, c)| Some((place(&i)?, c)));
+                        form.collect::<Option<Vec<_>>>()
+                    })
+                    .collect(),
+                prior_weight,
+                tolerance: 1e-9,
+            },
+        )?;
+        Ok((solution.x, Some(solution.gap)))
+    }
+}
+
+/// The same noise for all joints, so that the prior weighs against residuals of about one.
+fn equal_noise(blocks: &[Block], x: &DVector<f64>) -> Vec<f64> {
+    let squares: f64 = noise_nm(blocks, x).iter().map(|n| n * n).sum();
+    vec![(squares / blocks.len() as f64).sqrt(); blocks.len()]
+}
+
+/// Second stage: each joint's `B` alone, zero or more, from its samples within three Stribeck speeds.
+fn fit_stribeck(columns: &Columns, parts: &[Vec<JointRows>], x: &mut DVector<f64>) {
+    let reach = 3.0 * columns.friction().stribeck_rad_per_s.unwrap_or(0.0);
+    for (row, &joint) in columns.moving().iter().enumerate() {
+        let Some(position) = columns.position(Column::Stribeck(joint)) else {
+            continue;
+        };
+        let (mut product, mut square) = (0.0, 0.0);
+        for part in parts {
+            let residual = &part[row].b - &part[row].a * &*x;
+            let shape = part[row].a.column(position);
+            for (i, speed) in part[row].speed.iter().enumerate() {
+                if *speed <= reach {
+                    product += shape[i] * residual[i];
+                    square += shape[i] * shape[i];
+                }
+            }
+        }
+        x[position] = if square > 0.0 {
+            (product / square).max(0.0)
+        } else {
+            0.0
+        };
+    }
+}
+
+impl<const N: usize> Fit<N> {
+    /// The arm found.
+    ///
+    /// # Errors
+    /// [`IdentError::NotPhysical`]: possible for plain least squares only.
+    pub fn arm(&self) -> Result<Arm<N>, IdentError> {
+        model::arm(&self.nominal, &self.columns, &self.x)
+    }
+
+    /// Friction of every joint of the arm, in the controller's law.
+    pub fn friction(&self) -> Vec<Friction> {
+        model::friction(&self.columns, &self.x)
+    }
+
+    /// The arm that fixes the kinematics and the prior.
+    pub fn nominal(&self) -> &Arm<N> {
+        &self.nominal
+    }
+
+    /// Values of the base parameters, in the order of [`Base::text`].
+    pub fn base_parameters(&self) -> DVector<f64> {
+        self.base.values(&self.x)
+    }
+}

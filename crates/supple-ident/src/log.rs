@@ -1,0 +1,208 @@
+//! A log as plain columns, and what makes it unusable.
+//!
+//! Not a file format: whoever reads files fills a [`Log`].
+
+use crate::error::{IdentError, Warning, log_error, shape_error};
+use nalgebra::DMatrix;
+
+/// Angles beyond this are taken for degrees \[rad\].
+const LARGEST_ANGLE_RAD: f64 = 25.0;
+/// A joint must cover this much to say anything of its own inertia and friction \[rad\].
+const LEAST_RANGE_RAD: f64 = 0.02;
+/// Steps of the clock longer than so many medians are gaps.
+const GAP_MEDIANS: f64 = 5.0;
+/// Shorter logs are taken with a warning \[s\].
+const SHORT_S: f64 = 5.0;
+
+/// Measurements of one run. Matrices are (samples, joints), all joints of the arm.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Log {
+    /// Time \[s\], strictly increasing; steps may vary.
+    pub t_s: Vec<f64>,
+    /// Joint angles \[rad\].
+    pub q_rad: DMatrix<f64>,
+    /// Joint velocities \[rad/s\], if they were measured; otherwise they are differentiated.
+    pub qd_rad_per_s: Option<DMatrix<f64>>,
+    /// Torques of the motors, at the joints \[N m\].
+    pub tau_nm: DMatrix<f64>,
+}
+
+impl Log {
+    /// Checks shapes, values, clock, units and motion. `moving` lists the joints to identify; the
+    /// others may rest.
+    ///
+    /// # Errors
+    /// [`IdentError`] with column, sample, value and remedy.
+    pub fn check(&self, dof: usize, moving: &[usize]) -> Result<Vec<Warning>, IdentError> {
+        self.check_shapes(dof)?;
+        check_moving(dof, moving)?;
+        self.check_values()?;
+        self.check_clock()?;
+        let mut warnings = self.check_motion(moving)?;
+        let duration = self.t_s[self.t_s.len() - 1] - self.t_s[0];
+        if duration < SHORT_S {
+            warnings.push(Warning {
+                column: "t".to_owned(),
+                problem: format!("the log lasts {duration:.3} s"),
+                remedy: "record 30 s or more of excitation",
+            });
+        }
+        Ok(warnings)
+    }
+
+    fn check_shapes(&self, dof: usize) -> Result<(), IdentError> {
+        let samples = self.t_s.len();
+        if samples < 3 {
+            return Err(shape_error("t", "at least 3 samples", format!("{samples}")));
+        }
+        for (name, matrix) in self.matrices() {
+            if matrix.shape() != (samples, dof) {
+                let (rows, columns) = matrix.shape();
+                return Err(shape_error(
+                    name,
+                    format!("({samples}, {dof}): one row a sample, one column a joint"),
+                    format!("({rows}, {columns})"),
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_values(&self) -> Result<(), IdentError> {
+        let remedy = "cut these rows out, or fill in what the recorder lost";
+        if let Some(i) = self.t_s.iter().position(|t| !t.is_finite()) {
+            return Err(log_error("t", format!("not finite at sample {i}"), remedy));
+        }
+        for (name, matrix) in self.matrices() {
+            for (joint, column) in matrix.column_iter().enumerate() {
+                if let Some(i) = column.iter().position(|x| !x.is_finite()) {
+                    let problem = format!("{} at sample {i}", column[i]);
+                    return Err(log_error(format!("{name}[{joint}]"), problem, remedy));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn check_clock(&self) -> Result<(), IdentError> {
+        let mut steps: Vec<f64> = self.t_s.windows(2).map(|w| w[1] - w[0]).collect();
+        if let Some(i) = steps.iter().position(|dt| *dt <= 0.0) {
+            let problem = format!(
+                "goes from {} to {} s at sample {i}",
+                self.t_s[i],
+                self.t_s[i + 1]
+            );
+            return Err(log_error(
+                "t",
+                problem,
+                "sort the rows and drop repeated ones",
+            ));
+        }
+        let largest = steps.iter().copied().fold(0.0, f64::max);
+        let at = steps.iter().position(|dt| *dt == largest).unwrap_or(0);
+        steps.sort_by(f64::total_cmp);
+        let median = steps[steps.len() / 2];
+        if largest > GAP_MEDIANS * median {
+            let problem = format!(
+                "a gap of {largest:.4} s after sample {at}, steps are {median:.4} s otherwise"
+            );
+            return Err(log_error(
+                "t",
+                problem,
+                "split the log there and give both parts",
+            ));
+        }
+        Ok(())
+    }
+
+    fn check_motion(&self, moving: &[usize]) -> Result<Vec<Warning>, IdentError> {
+        let mut warnings = Vec::new();
+        for (joint, column) in self.q_rad.column_iter().enumerate() {
+            let (least, greatest) = (column.min(), column.max());
+            let extreme = greatest.abs().max(least.abs());
+            if extreme > LARGEST_ANGLE_RAD {
+                return Err(log_error(
+                    format!("q[{joint}]"),
+                    format!("reaches {extreme:.1}, which looks like degrees"),
+                    "give radians: multiply by pi / 180",
+                ));
+            }
+            if !moving.contains(&joint) {
+                continue;
+            }
+            let range = greatest - least;
+            if range < LEAST_RANGE_RAD {
+                return Err(log_error(
+                    format!("q[{joint}]"),
+                    format!("moves by {range:.5} rad only: the joint is not excited"),
+                    "leave it out of the moving joints, or record a log that moves it",
+                ));
+            }
+            if range < 10.0 * LEAST_RANGE_RAD {
+                warnings.push(Warning {
+                    column: format!("q[{joint}]"),
+                    problem: format!("moves by {range:.3} rad only"),
+                    remedy: "excite it over a larger part of its range",
+                });
+            }
+            let torque = self.tau_nm.column(joint);
+            if torque.max() == torque.min() {
+                return Err(log_error(
+                    format!("tau[{joint}]"),
+                    format!("is {} throughout", torque[0]),
+                    "check that the right column was read, or leave the joint out of the moving ones",
+                ));
+            }
+            self.check_velocity_unit(joint)?;
+        }
+        Ok(warnings)
+    }
+
+    /// Velocity against the difference quotient of the angle: a factor of 57 is a unit.
+    fn check_velocity_unit(&self, joint: usize) -> Result<(), IdentError> {
+        let Some(qd) = &self.qd_rad_per_s else {
+            return Ok(());
+        };
+        let samples = self.t_s.len();
+        let (mut product, mut square) = (0.0, 0.0);
+        for i in 1..samples {
+            let dt = self.t_s[i] - self.t_s[i - 1];
+            let quotient = (self.q_rad[(i, joint)] - self.q_rad[(i - 1, joint)]) / dt;
+            let mean = 0.5 * (qd[(i, joint)] + qd[(i - 1, joint)]);
+            product += quotient * mean;
+            square += quotient * quotient;
+        }
+        let ratio = product / square;
+        if (0.5..2.0).contains(&ratio) {
+            return Ok(());
+        }
+        Err(log_error(
+            format!("qd[{joint}]"),
+            format!("is {ratio:.3} times the slope of q[{joint}]"),
+            "give rad/s and rad, and the same order of joints; or leave the velocities out",
+        ))
+    }
+
+    fn matrices(&self) -> impl Iterator<Item = (&'static str, &DMatrix<f64>)> {
+        [
+            ("q", Some(&self.q_rad)),
+            ("qd", self.qd_rad_per_s.as_ref()),
+            ("tau", Some(&self.tau_nm)),
+        ]
+        .into_iter()
+        .filter_map(|(name, matrix)| matrix.map(|matrix| (name, matrix)))
+    }
+}
+
+/// Refuses joints that do not exist, or are listed twice.
+pub(crate) fn check_moving(dof: usize, moving: &[usize]) -> Result<(), IdentError> {
+    let increasing = moving.windows(2).all(|w| w[0] < w[1]);
+    if !moving.is_empty() && increasing && moving.iter().all(|joint| *joint < dof) {
+        return Ok(());
+    }
+    Err(shape_error(
+        "moving",
+        format!("joint numbers below {dof}, increasing, at least one"),
+        format!("{moving:?}"),
+    ))
+}

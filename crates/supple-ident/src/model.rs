@@ -1,0 +1,120 @@
+//! Parameters of a fit as an arm, its friction, and back.
+
+use crate::columns::{Column, Columns};
+use crate::error::IdentError;
+use nalgebra::{DMatrix, DVector, SVector};
+use supple_core::arm::Link;
+use supple_core::dynamics::parameters;
+use supple_core::math::{Matrix3, Vector3};
+use supple_core::{Arm, Friction, Vector};
+
+/// Parameters of `arm` in the order of `columns`; friction is zero.
+pub fn prior<const N: usize>(arm: &Arm<N>, columns: &Columns) -> DVector<f64> {
+    let links = parameters(arm);
+    let value = |column: &Column| match *column {
+        Column::Link { link, entry } => links[link][entry],
+        Column::Rotor(joint) => arm.armature()[joint],
+        _ => 0.0,
+    };
+    DVector::from_iterator(columns.len(), columns.list().iter().map(value))
+}
+
+/// Ten parameters of each link of `x`.
+pub fn link_parameters<const N: usize>(x: &DVector<f64>) -> [SVector<f64, 10>; N] {
+    std::array::from_fn(|k| x.fixed_rows::<10>(10 * k).into_owned())
+}
+
+/// `nominal` with the inertial parameters of `x`; joints without a rotor column keep their rotor.
+///
+/// # Errors
+/// [`IdentError::NotPhysical`] if a link is no body or a rotor inertia is negative.
+pub fn arm<const N: usize>(
+    nominal: &Arm<N>,
+    columns: &Columns,
+    x: &DVector<f64>,
+) -> Result<Arm<N>, IdentError> {
+    let found = link_parameters::<N>(x);
+    let links: [Link; N] = std::array::from_fn(|k| {
+        let rotation = nominal.link_from_joint(k);
+        let [m, hx, hy, hz, xx, xy, yy, xz, yz, zz] = found[k].data.0[0];
+        let inertia = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+        let inertia = rotation.tr_mul(&(inertia * rotation));
+        Link {
+            mass: m,
+            first_moment: rotation.tr_mul(&Vector3::new(hx, hy, hz)),
+            inertia: (inertia + inertia.transpose()) * 0.5,
+            ..nominal.links()[k]
+        }
+    });
+    let rotors = Vector::<N>::from_fn(|j, _| rotor(nominal, columns, x, j));
+    Arm::from_links(links, rotors, nominal.joint_from_tip(), nominal.gravity())
+        .map_err(IdentError::NotPhysical)
+}
+
+/// Friction of each joint of the arm, in the law of the controller; what that law has no word for
+/// (asymmetry, couplings) stays in the columns. Joints that were held have none.
+pub fn friction(columns: &Columns, x: &DVector<f64>) -> Vec<Friction> {
+    let value = |column: Column| columns.position(column).map_or(0.0, |i| x[i]);
+    let of_joint = |j: usize| {
+        let coulomb_nm = value(Column::Coulomb(j));
+        let shape = columns.friction();
+        Friction {
+            viscous_nm_s_per_rad: value(Column::Viscous(j)),
+            coulomb_nm,
+            breakaway_nm: coulomb_nm + value(Column::Stribeck(j)),
+            stribeck_rad_per_s: shape
+                .stribeck_rad_per_s
+                .unwrap_or(Friction::NONE.stribeck_rad_per_s),
+            offset_nm: value(Column::Offset(j)),
+            band_rad_per_s: shape.band_rad_per_s,
+        }
+    };
+    (0..columns.dof()).map(of_joint).collect()
+}
+
+/// Mass matrix that `x` gives at `q`, physical or not, \[kg m^2\].
+pub fn mass_matrix<const N: usize>(
+    nominal: &Arm<N>,
+    columns: &Columns,
+    x: &DVector<f64>,
+    q: &Vector<N>,
+) -> Result<DMatrix<f64>, IdentError> {
+    let weightless = Arm::from_links(
+        *nominal.links(),
+        nominal.armature(),
+        nominal.joint_from_tip(),
+        Vector3::zeros(),
+    )
+    .map_err(IdentError::NotPhysical)?;
+    let found = link_parameters::<N>(x);
+    let mut mass = DMatrix::zeros(N, N);
+    for j in 0..N {
+        let mut unit = Vector::<N>::zeros();
+        unit[j] = 1.0;
+        let blocks = supple_core::dynamics::regressor(&weightless, q, &Vector::zeros(), &unit);
+        for (block, p) in blocks.iter().zip(&found) {
+            let torque = block * p;
+            (0..N).for_each(|i| mass[(i, j)] += torque[i]);
+        }
+        mass[(j, j)] += rotor(nominal, columns, x, j);
+    }
+    for column in columns.list() {
+        if let Column::CoupledRotor(a, b) = *column {
+            let inertia = columns.position(*column).map_or(0.0, |i| x[i]);
+            for (i, j) in [(a, a), (a, b), (b, a), (b, b)] {
+                mass[(i, j)] += inertia;
+            }
+        }
+    }
+    Ok(mass)
+}
+
+fn rotor<const N: usize>(
+    nominal: &Arm<N>,
+    columns: &Columns,
+    x: &DVector<f64>,
+    joint: usize,
+) -> f64 {
+    let column = columns.position(Column::Rotor(joint));
+    column.map_or(nominal.armature()[joint], |i| x[i])
+}

@@ -1,0 +1,147 @@
+//! From an irregular, noisy log to angles, velocities, accelerations and torques on one clock.
+//!
+//! Linear interpolation onto a regular grid, one zero-phase filter for angle, velocity and torque
+//! alike so that none lags or is damped more than another, central differences, then every n-th sample.
+
+use crate::error::{IdentError, Warning, positive};
+use crate::filter::{LowPass, differentiate};
+use crate::log::Log;
+use nalgebra::DMatrix;
+
+/// How a log is prepared.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Preparation {
+    /// Rate of the grid \[Hz\]; `None` takes the log's own mean rate.
+    pub rate_hz: Option<f64>,
+    /// Cutoff of the zero-phase filter \[Hz\]; `None` leaves the signals as they are.
+    pub cutoff_hz: Option<f64>,
+    /// Every so many samples of the grid are kept, 1 or more.
+    pub keep_every: usize,
+}
+
+impl Default for Preparation {
+    /// The log's own rate, 8 Hz, every sample.
+    fn default() -> Self {
+        Self {
+            rate_hz: None,
+            cutoff_hz: Some(8.0),
+            keep_every: 1,
+        }
+    }
+}
+
+/// Prepared measurements, (samples, joints), at a constant rate.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Motion {
+    /// Samples per second \[Hz\].
+    pub rate_hz: f64,
+    /// Angles \[rad\].
+    pub q: DMatrix<f64>,
+    /// Velocities \[rad/s\].
+    pub qd: DMatrix<f64>,
+    /// Accelerations \[rad/s^2\].
+    pub qdd: DMatrix<f64>,
+    /// Torques \[N m\].
+    pub tau: DMatrix<f64>,
+    /// Independent samples for each one kept, at most 1: filtered noise repeats itself.
+    pub independent_share: f64,
+    /// Cutoff of the zero-phase filter that the torques went through \[Hz\]: columns that jump with
+    /// the direction of motion are filtered alike.
+    pub cutoff_hz: Option<f64>,
+}
+
+impl Motion {
+    /// Checks `log` for an arm of `dof` joints of which `moving` are identified, and prepares it.
+    ///
+    /// # Errors
+    /// What [`Log::check`] refuses; an option out of range; too few samples to filter.
+    pub fn prepare(
+        log: &Log,
+        dof: usize,
+        moving: &[usize],
+        preparation: &Preparation,
+    ) -> Result<(Motion, Vec<Warning>), IdentError> {
+        let warnings = log.check(dof, moving)?;
+        if preparation.keep_every == 0 {
+            return Err(IdentError::Option {
+                option: "keep_every",
+                value: 0.0,
+                must: "1 or more",
+            });
+        }
+        let steps = (log.t_s.len() - 1) as f64;
+        let own_rate = steps / (log.t_s[log.t_s.len() - 1] - log.t_s[0]);
+        let rate_hz = preparation.rate_hz.unwrap_or(own_rate);
+        positive("rate_hz", rate_hz)?;
+        let low_pass = preparation
+            .cutoff_hz
+            .map(|cutoff_hz| LowPass::butterworth4(cutoff_hz, rate_hz))
+            .transpose()?;
+        let smooth = |column: &DMatrix<f64>| {
+            let grid = resample(&log.t_s, column, rate_hz);
+            low_pass.map_or_else(|| Ok(grid.clone()), |f| f.zero_phase_columns(&grid))
+        };
+        let q = smooth(&log.q_rad)?;
+        let qd = match &log.qd_rad_per_s {
+            Some(qd) => smooth(qd)?,
+            None => differentiate(&q, rate_hz)?,
+        };
+        let qdd = differentiate(&qd, rate_hz)?;
+        let tau = smooth(&log.tau_nm)?;
+        let every = preparation.keep_every;
+        let rows: Vec<usize> = (0..q.nrows()).step_by(every).collect();
+        let kept_hz = rate_hz / every as f64;
+        let share = preparation.cutoff_hz.map_or(1.0, |hz| 2.0 * hz / kept_hz);
+        let motion = Motion {
+            rate_hz: kept_hz,
+            q: q.select_rows(&rows),
+            qd: qd.select_rows(&rows),
+            qdd: qdd.select_rows(&rows),
+            tau: tau.select_rows(&rows),
+            independent_share: share.min(1.0),
+            cutoff_hz: preparation.cutoff_hz.filter(|hz| *hz < 0.45 * kept_hz),
+        };
+        Ok((motion, warnings))
+    }
+
+    /// Number of samples.
+    pub fn samples(&self) -> usize {
+        self.q.nrows()
+    }
+
+    /// The samples `range`, at the same rate.
+    pub fn part(&self, range: std::ops::Range<usize>) -> Motion {
+        let cut = |m: &DMatrix<f64>| m.rows_range(range.clone()).into_owned();
+        Motion {
+            q: cut(&self.q),
+            qd: cut(&self.qd),
+            qdd: cut(&self.qdd),
+            tau: cut(&self.tau),
+            ..*self
+        }
+    }
+}
+
+/// Linear interpolation onto a grid that starts with the log and ends within it. The clock must
+/// increase: [`Log::check`].
+pub fn resample(t_s: &[f64], columns: &DMatrix<f64>, rate_hz: f64) -> DMatrix<f64> {
+    let (Some(&start), Some(&end)) = (t_s.first(), t_s.last()) else {
+        return columns.clone();
+    };
+    // The slack keeps the last sample of a regular log on its own grid.
+    let samples = ((end - start) * rate_hz + 1e-6).floor() as usize + 1;
+    let mut resampled = DMatrix::zeros(samples, columns.ncols());
+    let mut right = 1;
+    for i in 0..samples {
+        let t = (start + i as f64 / rate_hz).min(end);
+        while right + 1 < t_s.len() && t_s[right] < t {
+            right += 1;
+        }
+        let share = (t - t_s[right - 1]) / (t_s[right] - t_s[right - 1]);
+        for j in 0..columns.ncols() {
+            let (a, b) = (columns[(right - 1, j)], columns[(right, j)]);
+            resampled[(i, j)] = a + share * (b - a);
+        }
+    }
+    resampled
+}

@@ -1,0 +1,148 @@
+//! Rows of the regressor: what each column contributes to each moving joint's torque.
+
+use crate::columns::{Column, Columns};
+use crate::error::{IdentError, shape_error};
+use crate::filter::LowPass;
+use crate::motion::Motion;
+use nalgebra::{DMatrix, DVector};
+use supple_core::dynamics::regressor;
+use supple_core::math::exp;
+use supple_core::{Arm, Friction, Vector};
+
+/// The rows of one moving joint: `a x = b`, one row a sample.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JointRows {
+    /// Regressor, (samples, columns).
+    pub a: DMatrix<f64>,
+    /// Torques, less that of rotors taken as known \[N m\].
+    pub b: DVector<f64>,
+    /// Speed of the joint \[rad/s\].
+    pub speed: Vec<f64>,
+}
+
+impl JointRows {
+    /// Samples `range`.
+    pub fn part(&self, range: std::ops::Range<usize>) -> JointRows {
+        JointRows {
+            a: self.a.rows_range(range.clone()).into_owned(),
+            b: self.b.rows_range(range.clone()).into_owned(),
+            speed: self.speed[range].to_vec(),
+        }
+    }
+}
+
+/// Regressor of one state, (moving joints, columns). Joints that do not move have no velocity and no
+/// acceleration, whatever `qd` and `qdd` say.
+pub fn rows<const N: usize>(
+    arm: &Arm<N>,
+    columns: &Columns,
+    q: &Vector<N>,
+    qd: &Vector<N>,
+    qdd: &Vector<N>,
+) -> DMatrix<f64> {
+    let held = |v: &Vector<N>| {
+        Vector::<N>::from_fn(|j, _| {
+            if columns.moving().contains(&j) {
+                v[j]
+            } else {
+                0.0
+            }
+        })
+    };
+    let (qd, qdd) = (held(qd), held(qdd));
+    let blocks = regressor(arm, q, &qd, &qdd);
+    let friction = columns.friction();
+    let dry = Friction {
+        band_rad_per_s: friction.band_rad_per_s,
+        ..Friction::coulomb(0.0, 1.0)
+    };
+    let moving = columns.moving();
+    let mut rows = DMatrix::zeros(moving.len(), columns.len());
+    for (c, column) in columns.list().iter().enumerate() {
+        let mut put = |joint: usize, value: f64| {
+            if let Ok(row) = moving.binary_search(&joint) {
+                rows[(row, c)] = value;
+            }
+        };
+        match *column {
+            Column::Link { link, entry } => {
+                for &joint in moving {
+                    put(joint, blocks[link][(joint, entry)]);
+                }
+            }
+            Column::Rotor(j) => put(j, qdd[j]),
+            Column::Viscous(j) => put(j, qd[j]),
+            Column::Coulomb(j) => put(j, dry.dry_torque_nm(qd[j])),
+            Column::Offset(j) => put(j, 1.0),
+            Column::Asymmetry(j) => put(j, qd[j].abs()),
+            Column::Stribeck(j) => {
+                let s = qd[j] / friction.stribeck_rad_per_s.unwrap_or(f64::INFINITY);
+                put(j, exp(-s * s) * dry.dry_torque_nm(qd[j]));
+            }
+            Column::CoupledRotor(a, b) => [a, b].iter().for_each(|j| put(*j, qdd[a] + qdd[b])),
+            Column::CoupledViscous(a, b) => [a, b].iter().for_each(|j| put(*j, qd[a] + qd[b])),
+            Column::CoupledCoulomb(a, b) => {
+                let torque = dry.dry_torque_nm(qd[a] + qd[b]);
+                [a, b].iter().for_each(|j| put(*j, torque));
+            }
+        }
+    }
+    rows
+}
+
+/// All rows of a motion, by moving joint. Dry friction turns over within a sample or two, faster than
+/// the filter that the torques went through: its columns go through the same one. Where there is no rotor column, the arm's rotor is known.
+///
+/// # Errors
+/// [`IdentError::Shape`] if arm, columns and motion have not the same number of joints.
+pub fn joint_rows<const N: usize>(
+    arm: &Arm<N>,
+    columns: &Columns,
+    motion: &Motion,
+) -> Result<Vec<JointRows>, IdentError> {
+    for (argument, found) in [("columns", columns.dof()), ("motion", motion.q.ncols())] {
+        if found != N {
+            return Err(shape_error(
+                argument,
+                format!("{N} joints"),
+                format!("{found}"),
+            ));
+        }
+    }
+    let (samples, moving) = (motion.samples(), columns.moving());
+    let known_rotor = |j: usize| match columns.position(Column::Rotor(j)) {
+        Some(_) => 0.0,
+        None => arm.armature()[j],
+    };
+    let mut joints: Vec<JointRows> = moving
+        .iter()
+        .map(|&j| JointRows {
+            a: DMatrix::zeros(samples, columns.len()),
+            b: motion.tau.column(j) - motion.qdd.column(j) * known_rotor(j),
+            speed: motion.qd.column(j).iter().map(|v| v.abs()).collect(),
+        })
+        .collect();
+    for i in 0..samples {
+        let at = |m: &DMatrix<f64>| Vector::<N>::from_fn(|j, _| m[(i, j)]);
+        let state = rows(
+            arm,
+            columns,
+            &at(&motion.q),
+            &at(&motion.qd),
+            &at(&motion.qdd),
+        );
+        for (row, joint) in joints.iter_mut().enumerate() {
+            joint.a.row_mut(i).copy_from(&state.row(row));
+        }
+    }
+    if let Some(cutoff_hz) = motion.cutoff_hz {
+        let filter = LowPass::butterworth4(cutoff_hz, motion.rate_hz)?;
+        for (c, _) in columns.list().iter().enumerate().filter(|(_, c)| c.jumps()) {
+            for joint in &mut joints {
+                let smooth = filter.zero_phase(joint.a.column(c).clone_owned().as_slice())?;
+                joint.a.column_mut(c).copy_from_slice(&smooth);
+            }
+        }
+    }
+    Ok(joints)
+}

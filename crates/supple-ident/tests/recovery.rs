@@ -1,0 +1,204 @@
+//! Random arms identified from what they did.
+
+mod support;
+
+use proptest::prelude::*;
+use supple_core::dynamics::{parameters, rnea};
+use supple_core::{Arm, Friction, Vector};
+use supple_ident::{FrictionColumns, Options, Weights, identify};
+use support::{Noise, motion, random_arm};
+
+fn friction<const N: usize>() -> [Friction; N] {
+    std::array::from_fn(|j| Friction {
+        offset_nm: 0.1 * j as f64,
+        ..Friction::coulomb(1.0 + 0.2 * j as f64, 0.8)
+    })
+}
+
+/// Torques of two arms at random states, apart from what friction and rotors share.
+fn furthest<const N: usize>(a: &Arm<N>, b: &Arm<N>, moving: &[usize]) -> f64 {
+    let mut noise = Noise(99);
+    let mut worst: f64 = 0.0;
+    for _ in 0..50 {
+        let q = Vector::<N>::from_fn(|j, _| {
+            if moving.contains(&j) {
+                3.0 * noise.draw()
+            } else {
+                0.3 + j as f64
+            }
+        });
+        let mut rate = || {
+            Vector::<N>::from_fn(|j, _| {
+                if moving.contains(&j) {
+                    2.0 * noise.draw()
+                } else {
+                    0.0
+                }
+            })
+        };
+        let (qd, qdd) = (rate(), rate());
+        let difference = rnea(a, &q, &qd, &qdd) - rnea(b, &q, &qd, &qdd);
+        worst = moving
+            .iter()
+            .fold(worst, |w, j| w.max(difference[*j].abs()));
+    }
+    worst
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 12, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn noise_free_data_give_the_arm_back_in_every_torque(seed in 1_u64..1000) {
+        let (truth, model) = (random_arm::<4>(seed), random_arm::<4>(seed));
+        // Same kinematics, other masses: the model is the truth with 1.3 times its inertia.
+        let mut links = *model.links();
+        for link in &mut links {
+            link.mass *= 1.3;
+            link.first_moment *= 1.3;
+            link.inertia *= 1.3;
+        }
+        let model = Arm::from_links(links, model.armature(), model.joint_from_tip(), model.gravity()).unwrap();
+        let joints = [0, 1, 2, 3];
+        let data = [motion(&truth, &friction(), &joints, 600, seed), motion(&truth, &friction(), &joints, 400, seed + 1)];
+        for weights in [Weights::Equal, Weights::Noise, Weights::Huber] {
+            let options = Options { weights, consistent: None, ..Options::default() };
+            let fit = identify(&model, &data, &joints, &options).unwrap();
+            let held_out = motion(&truth, &friction(), &joints, 300, seed + 7);
+            let checked = fit.validate(&held_out).unwrap();
+            prop_assert!(checked.total_relative < 1e-7, "{}", checked.total_relative);
+            for (found, true_one) in fit.friction().iter().zip(friction::<4>()) {
+                prop_assert!((found.coulomb_nm - true_one.coulomb_nm).abs() < 1e-5);
+                prop_assert!((found.viscous_nm_s_per_rad - true_one.viscous_nm_s_per_rad).abs() < 1e-5);
+            }
+        }
+    }
+
+    #[test]
+    fn consistent_fits_are_arms_whatever_the_noise(seed in 1_u64..1000) {
+        let truth = random_arm::<4>(seed);
+        let joints = [0, 1, 2, 3];
+        let mut data = motion(&truth, &friction(), &joints, 300, seed);
+        let mut noise = Noise(seed);
+        data.tau.iter_mut().for_each(|t| *t += 5.0 * noise.draw());
+        let fit = identify(&truth, &[data], &joints, &Options::default()).unwrap();
+        prop_assert!(fit.arm().is_ok());
+        prop_assert!(fit.friction().iter().all(|f| f.validate().is_ok()));
+        let checked = fit.validate(&motion(&truth, &friction(), &joints, 200, seed + 3)).unwrap();
+        prop_assert_eq!(checked.positive_definite, 1.0);
+        prop_assert!(checked.total_relative < 0.2, "{}", checked.total_relative);
+    }
+}
+
+#[test]
+fn consistent_fits_of_good_data_are_the_arm() {
+    let truth = random_arm::<4>(11);
+    let joints = [0, 1, 2, 3];
+    let data = motion(&truth, &friction(), &joints, 1500, 3);
+    let options = Options {
+        consistent: Some(1e-6),
+        ..Options::default()
+    };
+    let fit = identify(&truth, &[data], &joints, &options).unwrap();
+    assert!(furthest(&truth, &fit.arm().unwrap(), &joints) < 1e-3);
+    assert!(fit.gap.unwrap() > 0.0);
+}
+
+#[test]
+fn held_joints_are_neither_needed_nor_touched() {
+    let truth = random_arm::<4>(21);
+    let moving = [1, 3];
+    let mut data = motion(&truth, &friction(), &moving, 800, 5);
+    data.tau.column_mut(0).fill(f64::NAN);
+    let options = Options {
+        consistent: Some(1e-2),
+        ..Options::default()
+    };
+    let fit = identify(&truth, &[data], &moving, &options).unwrap();
+    let arm = fit.arm().unwrap();
+    assert!(furthest(&truth, &arm, &moving) < 1e-3);
+    // Nothing moved the first link: the model's own comes back.
+    let (before, after) = (parameters(&truth)[0], parameters(&arm)[0]);
+    assert!((before - after).amax() < 1e-4);
+    assert_eq!(fit.friction()[0].coulomb_nm, 0.0);
+}
+
+#[test]
+fn the_dip_is_found_in_the_second_stage_and_does_not_bias_the_first() {
+    let truth = random_arm::<3>(31);
+    let dip: [Friction; 3] = std::array::from_fn(|_| Friction {
+        breakaway_nm: 1.4,
+        stribeck_rad_per_s: 0.05,
+        ..Friction::coulomb(1.0, 1.0)
+    });
+    let data = motion(&truth, &dip, &[0, 1, 2], 3000, 4);
+    let options = Options {
+        friction: FrictionColumns {
+            stribeck_rad_per_s: Some(0.05),
+            ..FrictionColumns::COULOMB
+        },
+        consistent: Some(1e-6),
+        slow_rad_per_s: 0.3,
+        ..Options::default()
+    };
+    let fit = identify(&truth, &[data], &[0, 1, 2], &options).unwrap();
+    for found in fit.friction() {
+        assert!(
+            (found.coulomb_nm - 1.0).abs() < 1e-4,
+            "{}",
+            found.coulomb_nm
+        );
+        assert!(
+            (found.breakaway_nm - 1.4).abs() < 1e-3,
+            "{}",
+            found.breakaway_nm
+        );
+    }
+}
+
+#[test]
+fn a_motor_that_turns_with_two_joints_is_told_apart() {
+    let truth = random_arm::<3>(41);
+    let none = [Friction::coulomb(0.5, 0.2); 3];
+    let mut data = motion(&truth, &none, &[0, 1, 2], 1500, 6);
+    let band = Friction::coulomb(0.7, 0.4);
+    for i in 0..1500 {
+        let extra = 0.3 * (data.qdd[(i, 1)] + data.qdd[(i, 2)])
+            + band.torque_nm(data.qd[(i, 1)] + data.qd[(i, 2)]);
+        data.tau[(i, 1)] += extra;
+        data.tau[(i, 2)] += extra;
+    }
+    let options = Options {
+        couplings: vec![(1, 2)],
+        consistent: Some(1e-6),
+        ..Options::default()
+    };
+    let fit = identify(&truth, &[data], &[0, 1, 2], &options).unwrap();
+    let names = fit.columns.names();
+    let value = |name: &str| fit.x[names.iter().position(|n| n == name).unwrap()];
+    assert!((value("V1+2") - 0.7).abs() < 1e-3, "{}", value("V1+2"));
+    assert!((value("S1+2") - 0.4).abs() < 1e-3, "{}", value("S1+2"));
+}
+
+#[test]
+fn the_rank_of_an_arm_does_not_depend_on_the_log() {
+    let truth = random_arm::<4>(51);
+    let options = Options {
+        rotor: false,
+        friction: FrictionColumns::NONE,
+        consistent: None,
+        slow_rad_per_s: 0.0,
+        ..Options::default()
+    };
+    let ranks: Vec<usize> = (1..4)
+        .map(|seed| {
+            let data = motion(&truth, &[Friction::NONE; 4], &[0, 1, 2, 3], 800, seed);
+            identify(&truth, &[data], &[0, 1, 2, 3], &options)
+                .unwrap()
+                .base
+                .rank()
+        })
+        .collect();
+    // Seven a link in general position, three for the first, whose axis never turns.
+    assert_eq!(ranks, [24, 24, 24]);
+}

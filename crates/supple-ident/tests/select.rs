@@ -1,0 +1,85 @@
+//! Cross-validation finds the friction that was there, and does not pay for what was not.
+
+mod support;
+
+use supple_core::Friction;
+use supple_ident::select::{compare, friction_candidates, prior_candidates};
+use supple_ident::{Motion, Options};
+use support::{Noise, motion, random_arm};
+
+const JOINTS: [usize; 3] = [0, 1, 2];
+
+fn noisy(friction: Friction) -> Motion {
+    let mut data = motion(&random_arm::<3>(61), &[friction; 3], &JOINTS, 1200, 8);
+    let mut noise = Noise(8);
+    data.tau.iter_mut().for_each(|t| *t += 0.3 * noise.draw());
+    data
+}
+
+fn base() -> Options {
+    Options {
+        slow_rad_per_s: 0.0,
+        ..Options::default()
+    }
+}
+
+#[test]
+fn the_friction_that_was_there_is_chosen() {
+    let dip = Friction {
+        breakaway_nm: 3.0,
+        stribeck_rad_per_s: 0.5,
+        ..Friction::coulomb(0.6, 1.0)
+    };
+    let offset = Friction {
+        offset_nm: 2.0,
+        ..Friction::coulomb(0.6, 1.0)
+    };
+    let cases = [
+        (Friction::NONE, "no friction"),
+        (Friction::coulomb(2.0, 0.0), "viscous"),
+        (Friction::coulomb(0.6, 1.0), "viscous, Coulomb"),
+        (offset, "viscous, Coulomb, offset"),
+        (dip, "viscous, Coulomb, Stribeck 0.5 rad/s"),
+    ];
+    for (friction, expected) in cases {
+        let model = random_arm::<3>(61);
+        let candidates = friction_candidates(&base());
+        let table = compare(&model, &[noisy(friction)], &JOINTS, &candidates, 4).unwrap();
+        assert_eq!(
+            table.lines[table.chosen].candidate.name, expected,
+            "\n{table}"
+        );
+    }
+}
+
+#[test]
+fn a_prior_far_from_the_arm_is_not_trusted_and_the_right_one_is() {
+    let data = [noisy(Friction::coulomb(0.6, 1.0))];
+    let weight = |model| {
+        let table = compare(&model, &data, &JOINTS, &prior_candidates(&base()), 4).unwrap();
+        assert!(table.to_string().lines().count() == 7);
+        table.options().consistent.unwrap()
+    };
+    let right = random_arm::<3>(61);
+    let mut links = *right.links();
+    for link in &mut links {
+        link.mass *= 3.0;
+        link.first_moment *= -3.0;
+        link.inertia *= 3.0;
+    }
+    let wrong = supple_core::Arm::from_links(
+        links,
+        right.armature(),
+        right.joint_from_tip(),
+        right.gravity(),
+    );
+    assert!(weight(right) > weight(wrong.unwrap()));
+}
+
+#[test]
+fn refuses_one_part_and_no_candidates() {
+    let data = [noisy(Friction::NONE)];
+    let model = random_arm::<3>(61);
+    assert!(compare(&model, &data, &JOINTS, &friction_candidates(&base()), 1).is_err());
+    assert!(compare(&model, &data, &JOINTS, &[], 4).is_err());
+}

@@ -1,0 +1,174 @@
+//! The configuration in force as TOML, and back without the loss of a bit: numbers are written with
+//! the digits that read back as the same number.
+//!
+//! It is not the TOML of an arm, from which it may differ: a model perturbed or identified, other
+//! gains, another law. Links are in joint frames, as [`Arm::links`] gives them.
+
+use crate::toml_types::{
+    ContactLatchDef, FrictionDef, LawDef, LimitsDef, LinkDef, MoveGainsDef, PoseDef, RoleDef,
+    column, rows,
+};
+use serde::{Deserialize, Serialize};
+use supple_core::config::{ContactLatch, Law, Limits, MoveGains, Role};
+use supple_core::math::Vector3;
+use supple_core::{Arm, Config, Friction, Link, Matrix, Pose, Vector};
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Stored<const N: usize> {
+    period_s: f64,
+    estimator_rad_per_s: f64,
+    handover_s: f64,
+    #[serde(with = "column")]
+    hold_damping_nm_s_per_rad: Vector<N>,
+    #[serde(with = "rows")]
+    joint_from_motor: Matrix<N, N>,
+    #[serde(with = "column")]
+    gravity_m_per_s2: Vector3<f64>,
+    #[serde(with = "PoseDef")]
+    last_joint_from_tip: Pose,
+    #[serde(with = "LawDef")]
+    law: Law,
+    #[serde(with = "ContactLatchDef")]
+    latch: ContactLatch,
+    #[serde(with = "MoveGainsDef")]
+    move_gains: MoveGains<N>,
+    #[serde(with = "LimitsDef")]
+    limits: Limits<N>,
+    joints: Vec<Joint>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Joint {
+    armature_kg_m2: f64,
+    #[serde(with = "RoleDef")]
+    role: Role,
+    #[serde(with = "FrictionDef")]
+    friction: Friction,
+    #[serde(with = "LinkDef")]
+    link: Link,
+}
+
+pub(crate) fn to_toml<const N: usize>(config: &Config<N>) -> Result<String, toml::ser::Error> {
+    let Config {
+        arm,
+        friction,
+        roles,
+        joint_from_motor,
+        period_s,
+        estimator_rad_per_s,
+        law,
+        latch,
+        move_gains,
+        hold_damping_nm_s_per_rad,
+        handover_s,
+        limits,
+    } = *config;
+    toml::to_string(&Stored {
+        period_s,
+        estimator_rad_per_s,
+        handover_s,
+        hold_damping_nm_s_per_rad,
+        joint_from_motor,
+        gravity_m_per_s2: arm.gravity(),
+        last_joint_from_tip: arm.joint_from_tip(),
+        law,
+        latch,
+        move_gains,
+        limits,
+        joints: (0..N)
+            .map(|i| Joint {
+                armature_kg_m2: arm.armature()[i],
+                role: roles[i],
+                friction: friction[i],
+                link: arm.links()[i],
+            })
+            .collect(),
+    })
+}
+
+/// # Errors
+/// What is wrong, in words.
+pub(crate) fn from_toml<const N: usize>(text: &str) -> Result<Config<N>, String> {
+    let stored: Stored<N> = toml::from_str(text).map_err(|error| error.to_string())?;
+    let joints: [Joint; N] = stored
+        .joints
+        .try_into()
+        .map_err(|joints: Vec<Joint>| format!("{} joints, expected {N}", joints.len()))?;
+    let arm = Arm::from_links(
+        joints.each_ref().map(|joint| joint.link),
+        Vector::from_fn(|i, _| joints[i].armature_kg_m2),
+        stored.last_joint_from_tip,
+        stored.gravity_m_per_s2,
+    );
+    Ok(Config {
+        arm: arm.map_err(|error| error.to_string())?,
+        friction: joints.each_ref().map(|joint| joint.friction),
+        roles: joints.each_ref().map(|joint| joint.role),
+        joint_from_motor: stored.joint_from_motor,
+        period_s: stored.period_s,
+        estimator_rad_per_s: stored.estimator_rad_per_s,
+        law: stored.law,
+        latch: stored.latch,
+        move_gains: stored.move_gains,
+        hold_damping_nm_s_per_rad: stored.hold_damping_nm_s_per_rad,
+        handover_s: stored.handover_s,
+        limits: stored.limits,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use supple_core::config::{ApparentInertia, FrictionVelocity};
+    use supple_core::math::Matrix3;
+    use supple_model::Description;
+
+    fn round_trip<const N: usize>(config: &Config<N>) {
+        let text = to_toml(config).expect("writes");
+        let again = from_toml::<N>(&text).expect("reads");
+        // Debug prints the shortest decimal of every number: one text, one set of bits.
+        assert_eq!(format!("{again:?}"), format!("{config:?}"), "{text}");
+    }
+
+    #[test]
+    fn every_built_in_arm_comes_back_to_the_last_bit() {
+        round_trip(&config::<3>("paper3"));
+        round_trip(&config::<4>("wam4"));
+        round_trip(&config::<7>("wam7"));
+    }
+
+    #[test]
+    fn every_choice_of_the_law_comes_back() {
+        let mut config = config::<4>("wam4");
+        config.law.inertia = ApparentInertia::Chosen(Matrix3::new(
+            2.0,
+            0.1,
+            -0.0,
+            0.1,
+            3.0,
+            1e-300,
+            -0.0,
+            1e-300,
+            1.0 / 3.0,
+        ));
+        config.law.friction_velocity = FrictionVelocity::Measured;
+        config.law.inertial_feedforward = false;
+        config.latch.fade = false;
+        config.friction[2].offset_nm = f64::from_bits(0x3fb9_9999_9999_999b);
+        round_trip(&config);
+    }
+
+    #[test]
+    fn another_number_of_joints_and_an_unknown_key_are_refused() {
+        let text = to_toml(&config::<4>("wam4")).expect("writes");
+        assert!(from_toml::<3>(&text).is_err());
+        assert!(from_toml::<4>(&format!("stiff = 1\n{text}")).is_err());
+    }
+
+    fn config<const N: usize>(arm: &str) -> Config<N> {
+        let description = Description::asset(arm).expect("a built-in arm");
+        description.config().expect("its configuration")
+    }
+}

@@ -1,0 +1,79 @@
+//! A channel of a log as a table of comma-separated values.
+//!
+//! Columns follow the message definition inside the log, so that any channel can be exported:
+//! `torques.gravity.joint2`, `tip_position_m.x`. An entry per joint carries the joint's name. Numbers
+//! are written with the digits that read back as the same number, `true` and `false` as 1 and 0. The
+//! first column is the time in nanoseconds, so the message's header is left out.
+
+use crate::definition;
+use crate::error::LogError;
+use crate::reader::Reader;
+use crate::scan::{Item, Scan};
+use crate::table::Table;
+use std::collections::BTreeSet;
+use std::io::Write;
+use std::num::NonZeroU64;
+use std::path::Path;
+
+/// Writes every `every`-th message of `channel` to `out` and returns how many.
+///
+/// A file that is cut gives what is whole in it and then [`LogError::Incomplete`].
+///
+/// # Errors
+/// [`LogError::UnknownChannel`] with the channels there are; [`LogError::Format`] where its messages
+/// make no table; [`LogError::Output`]; whatever reading gives.
+pub fn export_csv(
+    path: impl AsRef<Path>,
+    channel: &str,
+    every: NonZeroU64,
+    out: &mut impl Write,
+) -> Result<u64, LogError> {
+    let path = path.as_ref();
+    let joints = &Reader::open(path)?.about().joints.clone();
+    let mut scan = Scan::open(path)?;
+    let mut known = BTreeSet::new();
+    let mut table: Option<Table> = None;
+    let (mut seen, mut rows) = (0_u64, 0);
+    while let Some(item) = scan.next()? {
+        let Item::Message(of, header, data) = item else {
+            continue;
+        };
+        if of.topic != channel {
+            if table.is_none() {
+                known.insert(of.topic.clone());
+            }
+            continue;
+        }
+        let broken = |message: String| LogError::Format {
+            file: path.display().to_string(),
+            message: format!("{channel} at {} ns: {message}", header.log_time),
+        };
+        let table = match &mut table {
+            Some(table) => table,
+            none => {
+                let text = String::from_utf8_lossy(&of.schema.text);
+                let definitions = definition::parse(&of.schema.name, &text).map_err(broken)?;
+                let table = Table::new(&definitions, &data, joints).map_err(broken)?;
+                let heading = table.heading();
+                out.write_all(heading.as_bytes())
+                    .map_err(LogError::Output)?;
+                none.insert(table)
+            }
+        };
+        if seen.is_multiple_of(every.get()) {
+            let row = table.row(header.log_time, &data).map_err(broken)?;
+            out.write_all(row.as_bytes()).map_err(LogError::Output)?;
+            rows += 1;
+        }
+        seen += 1;
+    }
+    if table.is_none() {
+        return Err(LogError::UnknownChannel {
+            file: path.display().to_string(),
+            channel: channel.to_owned(),
+            known: Vec::from_iter(known).join(", "),
+        });
+    }
+    out.flush().map_err(LogError::Output)?;
+    Ok(rows)
+}

@@ -1,0 +1,285 @@
+//! What is in a log, at a glance.
+
+use crate::cdr;
+use crate::error::LogError;
+use crate::messages::OwnedHeader;
+use crate::reader::{About, Reader};
+use crate::record::Record;
+use crate::scan::{Channel, Item, Scan};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::{Path, PathBuf};
+use supple_core::controller::Mode;
+use supple_model::with_dof;
+
+const CONTROLLER_STATE: &str = "/controller_state";
+
+/// What is in a log.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Info {
+    /// File.
+    pub file: PathBuf,
+    /// Its length.
+    pub bytes: u64,
+    /// Why it is not complete; `None` where it is.
+    pub incomplete: Option<String>,
+    /// What it says of itself.
+    pub about: About,
+    /// Times of the first and the last message \[ns\]; `None` where there is none.
+    pub span_ns: Option<(u64, u64)>,
+    /// Chunks.
+    pub chunks: u64,
+    /// Channels, in the order in which they appear.
+    pub channels: Vec<ChannelInfo>,
+    /// Files inside.
+    pub attachments: Vec<AttachmentInfo>,
+    /// Steps of the controller that the log has not: with any, it cannot be replayed.
+    pub missing_steps: u64,
+    /// Steps that the log has.
+    pub steps: u64,
+    /// Changes of mode, the first one included.
+    pub modes: Vec<ModeChange>,
+    /// Faults, each where it was latched.
+    pub faults: Vec<FaultInfo>,
+    /// Where it was recovered from a file that was not whole: length of that file and of what was
+    /// whole in it.
+    pub recovered: Option<(u64, u64)>,
+}
+
+/// A channel.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct ChannelInfo {
+    /// Name.
+    pub topic: String,
+    /// Type of its messages.
+    pub schema: String,
+    /// How many.
+    pub messages: u64,
+}
+
+/// A file inside.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct AttachmentInfo {
+    /// Name.
+    pub name: String,
+    /// Its length.
+    pub bytes: u64,
+}
+
+/// A change of mode.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct ModeChange {
+    /// When \[ns\].
+    pub time_ns: u64,
+    /// To which.
+    pub mode: String,
+}
+
+/// A fault.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct FaultInfo {
+    /// When \[ns\].
+    pub time_ns: u64,
+    /// In words.
+    pub fault: String,
+}
+
+/// Reads a log from end to end. A file that is cut gives what is whole in it.
+///
+/// # Errors
+/// [`LogError::Read`]; [`LogError::Format`] where it is no log of ours; [`LogError::Incomplete`] where
+/// not even its beginning is whole.
+pub fn info(path: impl AsRef<Path>) -> Result<Info, LogError> {
+    let path = path.as_ref();
+    let about = Reader::open(path)?.about().clone();
+    let metadata = std::fs::metadata(path).map_err(|source| LogError::Read {
+        file: path.display().to_string(),
+        source,
+    })?;
+    let mut survey = Survey {
+        glimpse: with_dof!(about.joints.len(), N => glimpse::<N> as Glimpsing)?,
+        last: None,
+        channels: BTreeMap::new(),
+        info: Info {
+            file: path.to_owned(),
+            bytes: metadata.len(),
+            incomplete: None,
+            about,
+            span_ns: None,
+            chunks: 0,
+            channels: Vec::new(),
+            attachments: Vec::new(),
+            missing_steps: 0,
+            steps: 0,
+            modes: Vec::new(),
+            faults: Vec::new(),
+            recovered: None,
+        },
+    };
+    match survey.items(&mut Scan::open(path)?) {
+        Ok(()) => {}
+        Err(LogError::Incomplete { cause, .. }) => survey.info.incomplete = Some(cause),
+        Err(error) => return Err(error),
+    }
+    Ok(survey.info)
+}
+
+/// What of a step an overview needs.
+#[derive(Clone, Copy, PartialEq)]
+struct Glimpse {
+    step: u64,
+    mode: &'static str,
+    fault: u8,
+}
+
+/// The glimpse, and the fault in words.
+type Glimpsing = fn(&[u8]) -> Result<(Glimpse, String), String>;
+
+fn glimpse<const N: usize>(data: &[u8]) -> Result<(Glimpse, String), String> {
+    let (_, record): (OwnedHeader, Record<N>) = cdr::decode(data)?;
+    let glimpse = Glimpse {
+        step: record.step,
+        mode: record.mode().map_or("unknown", Mode::name),
+        fault: record.fault,
+    };
+    Ok((glimpse, record.fault_text))
+}
+
+struct Survey {
+    glimpse: Glimpsing,
+    last: Option<Glimpse>,
+    /// Place in the list by name.
+    channels: BTreeMap<String, usize>,
+    info: Info,
+}
+
+impl Survey {
+    fn items(&mut self, scan: &mut Scan) -> Result<(), LogError> {
+        while let Some(item) = scan.next()? {
+            match item {
+                Item::Metadata(metadata) if metadata.name == "recovery" => {
+                    let number = |key| metadata.metadata.get(key)?.parse().ok();
+                    self.info.recovered = number("source_bytes").zip(number("kept_bytes"));
+                }
+                Item::Metadata(_) => {}
+                Item::Attachment(header, data) => self.info.attachments.push(AttachmentInfo {
+                    name: header.name,
+                    bytes: data.len() as u64,
+                }),
+                Item::Chunk => self.info.chunks += 1,
+                Item::Message(channel, header, data) => {
+                    let time_ns = header.log_time;
+                    let (first, last) = self.info.span_ns.unwrap_or((time_ns, time_ns));
+                    self.info.span_ns = Some((first.min(time_ns), last.max(time_ns)));
+                    self.count(&channel);
+                    if channel.topic == CONTROLLER_STATE {
+                        let seen = (self.glimpse)(&data).map_err(|message| LogError::Format {
+                            file: scan.file().to_owned(),
+                            message: format!("{CONTROLLER_STATE} at {time_ns} ns: {message}"),
+                        })?;
+                        self.step(time_ns, seen);
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn count(&mut self, channel: &Channel) {
+        let list = &mut self.info.channels;
+        let place = match self.channels.get(&channel.topic) {
+            Some(place) => *place,
+            None => {
+                self.channels.insert(channel.topic.clone(), list.len());
+                list.push(ChannelInfo {
+                    topic: channel.topic.clone(),
+                    schema: channel.schema.name.clone(),
+                    messages: 0,
+                });
+                list.len() - 1
+            }
+        };
+        list[place].messages += 1;
+    }
+
+    fn step(&mut self, time_ns: u64, (now, fault_text): (Glimpse, String)) {
+        let info = &mut self.info;
+        info.steps += 1;
+        let expected = self.last.map_or(0, |last| last.step + 1);
+        info.missing_steps += now.step.saturating_sub(expected);
+        if self.last.is_none_or(|last| last.mode != now.mode) {
+            let mode = now.mode.to_owned();
+            info.modes.push(ModeChange { time_ns, mode });
+        }
+        if now.fault != 0 && self.last.is_none_or(|last| last.fault != now.fault) {
+            let fault = fault_text;
+            info.faults.push(FaultInfo { time_ns, fault });
+        }
+        self.last = Some(now);
+    }
+}
+
+impl fmt::Display for Info {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let about = &self.about;
+        let (first_ns, last_ns) = self.span_ns.unwrap_or_default();
+        let seconds = |time_ns: u64| time_ns.saturating_sub(first_ns) as f64 * 1e-9;
+        writeln!(f, "{}", self.file.display())?;
+        writeln!(
+            f,
+            "  arm         {} ({})",
+            about.arm,
+            about.joints.join(", ")
+        )?;
+        write!(f, "  experiment  {}", about.experiment)?;
+        match about.seed {
+            Some(seed) => writeln!(f, ", seed {seed}")?,
+            None => writeln!(f)?,
+        }
+        for (name, note) in &about.notes {
+            writeln!(f, "  note        {name} = {note}")?;
+        }
+        writeln!(f, "  written by  {}", about.software)?;
+        writeln!(
+            f,
+            "  starts at   {first_ns} ns, lasts {:.3} s",
+            seconds(last_ns)
+        )?;
+        writeln!(
+            f,
+            "  size        {} bytes in {} chunks",
+            self.bytes, self.chunks
+        )?;
+        match &self.incomplete {
+            None => writeln!(f, "  complete    yes")?,
+            Some(cause) => writeln!(f, "  complete    no: {cause}; see `supple log recover`")?,
+        }
+        if let Some((source_bytes, kept_bytes)) = self.recovered {
+            writeln!(f, "  recovered   {kept_bytes} of {source_bytes} bytes")?;
+        }
+        let missing = match self.missing_steps {
+            0 => "none missing".to_owned(),
+            missing => format!("{missing} missing: it cannot be replayed"),
+        };
+        writeln!(f, "  steps       {}, {missing}", self.steps)?;
+        for ModeChange { time_ns, mode } in &self.modes {
+            writeln!(f, "  mode        {:>9.3} s  {mode}", seconds(*time_ns))?;
+        }
+        for FaultInfo { time_ns, fault } in &self.faults {
+            writeln!(f, "  fault       {:>9.3} s  {fault}", seconds(*time_ns))?;
+        }
+        for channel in &self.channels {
+            let (topic, schema) = (&channel.topic, &channel.schema);
+            writeln!(
+                f,
+                "  channel     {:>9}    {topic}  {schema}",
+                channel.messages
+            )?;
+        }
+        for file in &self.attachments {
+            writeln!(f, "  file inside {:>9} B  {}", file.bytes, file.name)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,55 @@
+//! MCAP logs of a controlled arm: write, read, recover.
+//!
+//! One file holds everything that a run was: each step of the controller with its input, its answer
+//! and every term in between, to the last bit; the arm's URDF and TOML and the configuration in force;
+//! and the joint states, wrenches and transforms that viewers draw. The same `supple_core::step` can be
+//! run over it again.
+//!
+//! Messages are ROS 2 CDR with `ros2msg` schemas, chunks are lz4. A log is written under
+//! `<name>.part` and takes its name when it is whole; what a crash leaves is made readable by
+//! [`recover`]. The same steps give the same bytes: nothing here reads a clock.
+//!
+//! It is not for a control thread: a write may wait for the disk.
+//!
+//! | channel | type | rate |
+//! |---|---|---|
+//! | `/controller_state` | `supple_msgs/msg/ControllerState` | every step |
+//! | `/joint_states` | `sensor_msgs/msg/JointState` | every step |
+//! | `/wrench_ext` | `geometry_msgs/msg/WrenchStamped` | every step with a measured tip force |
+//! | `/wrench_observed` | `geometry_msgs/msg/WrenchStamped` | every step with a tip trajectory |
+//! | `/tf` | `tf2_msgs/msg/TFMessage` | every 20th step |
+//! | `/robot_description` | `std_msgs/msg/String` | once |
+//! | `/cycle_timing` | `supple_msgs/msg/CycleTiming` | every step that was timed |
+//! | `/plant_truth` | `supple_msgs/msg/PlantTruth` | every step of a simulated plant |
+
+#![forbid(unsafe_code)]
+
+mod cdr;
+mod codes;
+mod config;
+mod definition;
+mod error;
+mod export;
+mod file;
+mod info;
+mod messages;
+mod parse;
+mod reader;
+mod record;
+mod recover;
+mod request;
+mod scan;
+mod schema;
+mod table;
+mod toml_types;
+mod writer;
+
+pub use error::LogError;
+pub use export::export_csv;
+pub use file::Written;
+pub use info::{AttachmentInfo, ChannelInfo, FaultInfo, Info, ModeChange, info};
+pub use messages::{CycleTiming, PlantTruth};
+pub use reader::{About, Messages, Reader, Timed};
+pub use record::{Record, TorqueTerms};
+pub use recover::{Recovery, recover};
+pub use writer::{Extras, RunInfo, Writer};

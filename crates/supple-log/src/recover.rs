@@ -1,0 +1,196 @@
+//! Making whole what a crash left: every chunk that is whole goes into a new file with an index.
+
+use crate::error::LogError;
+use crate::file::{LogFile, with_suffix};
+use crate::scan::{Channel, Item, Scan};
+use mcap::records::MessageHeader;
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Added to the name of a file that is being recovered: not that of a log being written, which may be
+/// the very file to recover.
+const SUFFIX: &str = ".recovering";
+
+/// What was recovered.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct Recovery {
+    /// File that was read.
+    pub from: PathBuf,
+    /// File that was written.
+    pub to: PathBuf,
+    /// Length of the file that was read.
+    pub source_bytes: u64,
+    /// Bytes of it that were whole.
+    pub kept_bytes: u64,
+    /// Messages kept, on all channels.
+    pub messages: u64,
+    /// Chunks kept.
+    pub chunks: u64,
+    /// Times of the first and the last message kept \[ns\].
+    pub span_ns: (u64, u64),
+    /// Why the file was read no further; `None` where it was complete.
+    pub stopped: Option<String>,
+}
+
+impl fmt::Display for Recovery {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (first, last) = self.span_ns;
+        let (to, messages, chunks) = (self.to.display(), self.messages, self.chunks);
+        let seconds = last.saturating_sub(first) as f64 * 1e-9;
+        write!(
+            f,
+            "{to}: {messages} messages over {seconds:.3} s in {chunks} chunks; "
+        )?;
+        match &self.stopped {
+            None => write!(f, "the file was complete"),
+            Some(cause) => write!(
+                f,
+                "of {} bytes the last {} were not whole ({cause})",
+                self.source_bytes,
+                self.source_bytes.saturating_sub(self.kept_bytes)
+            ),
+        }
+    }
+}
+
+/// Writes what is whole in `from` to `to`. A complete file is copied to the last byte.
+///
+/// # Errors
+/// [`LogError::NothingWhole`], [`LogError::SameFile`]; [`LogError::Format`] where `from` is no MCAP;
+/// whatever reading and writing give.
+pub fn recover(from: impl AsRef<Path>, to: impl AsRef<Path>) -> Result<Recovery, LogError> {
+    let (from, to) = (from.as_ref(), to.as_ref());
+    let mut scan = Scan::open(from)?;
+    let read_error = |source| LogError::Read {
+        file: from.display().to_string(),
+        source,
+    };
+    let source_bytes = std::fs::metadata(from).map_err(read_error)?.len();
+    refuse_same_file(from, to)?;
+    let mut copy = Copy {
+        file: LogFile::create(to, SUFFIX)?,
+        ids: BTreeMap::new(),
+        messages: 0,
+        span_ns: None,
+    };
+    let stopped = match copy.everything(&mut scan, source_bytes) {
+        Ok(stopped) => stopped,
+        Err(error) => {
+            copy.file.discard();
+            return Err(error);
+        }
+    };
+    let span_ns = copy.span_ns.unwrap_or_default();
+    let written = copy.file.finish()?;
+    Ok(Recovery {
+        from: from.to_owned(),
+        to: to.to_owned(),
+        source_bytes,
+        kept_bytes: if stopped.is_none() {
+            source_bytes
+        } else {
+            scan.whole_bytes()
+        },
+        messages: copy.messages,
+        chunks: written.chunks,
+        span_ns,
+        stopped,
+    })
+}
+
+/// `to`, and the name it has until it is whole, must not be `from`.
+fn refuse_same_file(from: &Path, to: &Path) -> Result<(), LogError> {
+    let read_error = |source| LogError::Read {
+        file: from.display().to_string(),
+        source,
+    };
+    let source = from.canonicalize().map_err(read_error)?;
+    let is_source = |path: &Path| path.canonicalize().is_ok_and(|path| path == source);
+    if is_source(to) || is_source(&with_suffix(to, SUFFIX)) {
+        return Err(LogError::SameFile {
+            file: from.display().to_string(),
+        });
+    }
+    Ok(())
+}
+
+struct Copy {
+    file: LogFile,
+    /// Channel of the new file by channel of the old one.
+    ids: BTreeMap<u16, u16>,
+    messages: u64,
+    span_ns: Option<(u64, u64)>,
+}
+
+impl Copy {
+    /// Returns why it stopped before the end of the file, if it did.
+    fn everything(
+        &mut self,
+        scan: &mut Scan,
+        source_bytes: u64,
+    ) -> Result<Option<String>, LogError> {
+        let stopped = match self.items(scan) {
+            Ok(()) => None,
+            Err(LogError::Incomplete { cause, .. }) => Some(cause),
+            Err(error) => return Err(error),
+        };
+        if self.messages == 0 {
+            return Err(LogError::NothingWhole {
+                file: scan.file().to_owned(),
+                bytes: source_bytes,
+            });
+        }
+        if stopped.is_some() {
+            let kept = BTreeMap::from([
+                ("source_bytes".to_owned(), source_bytes.to_string()),
+                ("kept_bytes".to_owned(), scan.whole_bytes().to_string()),
+            ]);
+            self.file.metadata("recovery", kept)?;
+        }
+        Ok(stopped)
+    }
+
+    fn items(&mut self, scan: &mut Scan) -> Result<(), LogError> {
+        while let Some(item) = scan.next()? {
+            match item {
+                Item::Metadata(metadata) => {
+                    self.file.metadata(&metadata.name, metadata.metadata)?;
+                }
+                Item::Attachment(header, data) => {
+                    self.file
+                        .attach(&header.name, &header.media_type, header.log_time, &data)?
+                }
+                Item::Chunk => self.file.close_chunk()?,
+                Item::Message(channel, header, data) => self.message(&channel, header, &data)?,
+            }
+        }
+        Ok(())
+    }
+
+    fn message(
+        &mut self,
+        channel: &Arc<Channel>,
+        header: MessageHeader,
+        data: &[u8],
+    ) -> Result<(), LogError> {
+        let channel_id = match self.ids.get(&header.channel_id) {
+            Some(id) => *id,
+            None => {
+                let id = self.file.channel(channel)?;
+                self.ids.insert(header.channel_id, id);
+                id
+            }
+        };
+        let time_ns = header.log_time;
+        let (first, last) = self.span_ns.unwrap_or((time_ns, time_ns));
+        self.span_ns = Some((first.min(time_ns), last.max(time_ns)));
+        self.messages += 1;
+        let header = MessageHeader {
+            channel_id,
+            ..header
+        };
+        self.file.message(&header, data)
+    }
+}

@@ -1,0 +1,212 @@
+//! Reading an MCAP file from its beginning, chunk by whole chunk, for as long as it is sound.
+//!
+//! A chunk is taken apart and its checksum compared before anything of it is handed on, so what comes
+//! from a file cut anywhere is what was whole in it.
+
+use crate::error::LogError;
+use crate::parse::{read_some, taken_apart};
+use mcap::McapError;
+use mcap::records::{AttachmentHeader, MessageHeader, Metadata, Record};
+use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use std::collections::{BTreeMap, VecDeque};
+use std::fs::File;
+use std::io::{BufReader, ErrorKind};
+use std::path::Path;
+use std::sync::Arc;
+
+/// Opcode and length before every record.
+const RECORD_PREFIX_BYTES: u64 = 9;
+
+/// A channel with its message definition.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Channel {
+    pub topic: String,
+    pub message_encoding: String,
+    /// Name, encoding, text; empty where there is none.
+    pub schema: Arc<Schema>,
+}
+
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Schema {
+    pub name: String,
+    pub encoding: String,
+    pub text: Vec<u8>,
+}
+
+/// What a file is made of.
+pub(crate) enum Item {
+    Metadata(Metadata),
+    Attachment(AttachmentHeader, Vec<u8>),
+    /// A whole chunk begins.
+    Chunk,
+    Message(Arc<Channel>, MessageHeader, Vec<u8>),
+}
+
+pub(crate) struct Scan {
+    file: String,
+    source: BufReader<File>,
+    reader: LinearReader,
+    /// Bytes of whole records so far.
+    whole_bytes: u64,
+    chunk: VecDeque<Record<'static>>,
+    schemas: BTreeMap<u16, Arc<Schema>>,
+    channels: BTreeMap<u16, Arc<Channel>>,
+    past_data: bool,
+    ended: bool,
+}
+
+impl Scan {
+    pub fn open(path: &Path) -> Result<Self, LogError> {
+        let file = path.display().to_string();
+        let source = File::open(path).and_then(|source| {
+            let metadata = source.metadata()?;
+            if metadata.is_dir() {
+                return Err(ErrorKind::IsADirectory.into());
+            }
+            Ok((source, metadata.len()))
+        });
+        let (source, bytes) = match source {
+            Ok((source, bytes)) => (BufReader::new(source), bytes),
+            Err(source) => return Err(LogError::Read { file, source }),
+        };
+        let options = LinearReaderOptions::default()
+            .with_emit_chunks(true)
+            .with_record_length_limit(usize::try_from(bytes).unwrap_or(usize::MAX));
+        Ok(Scan {
+            file,
+            source,
+            reader: LinearReader::new_with_options(options),
+            whole_bytes: mcap::MAGIC.len() as u64,
+            chunk: VecDeque::new(),
+            schemas: BTreeMap::new(),
+            channels: BTreeMap::new(),
+            past_data: false,
+            ended: false,
+        })
+    }
+
+    /// File, as messages name it.
+    pub fn file(&self) -> &str {
+        &self.file
+    }
+
+    /// Bytes of whole records so far.
+    pub fn whole_bytes(&self) -> u64 {
+        self.whole_bytes
+    }
+
+    /// The next item; `None` at the end of a complete file.
+    ///
+    /// # Errors
+    /// [`LogError::Incomplete`] where a file stops short or is damaged, and nothing after it;
+    /// [`LogError::Format`] where it is no MCAP at all; [`LogError::Read`].
+    pub fn next(&mut self) -> Result<Option<Item>, LogError> {
+        loop {
+            while let Some(record) = self.chunk.pop_front() {
+                if let Some(item) = self.of_chunk(record)? {
+                    return Ok(Some(item));
+                }
+            }
+            if self.ended {
+                return Ok(None);
+            }
+            let Some(record) = self.record()? else {
+                self.ended = true;
+                return Ok(None);
+            };
+            match record {
+                _ if self.past_data => {}
+                Record::DataEnd(_) => self.past_data = true,
+                Record::Metadata(metadata) => return Ok(Some(Item::Metadata(metadata))),
+                Record::Attachment { header, data, .. } => {
+                    return Ok(Some(Item::Attachment(header, data.into_owned())));
+                }
+                Record::Chunk { .. } => return Ok(Some(Item::Chunk)),
+                record => {
+                    if let Some(item) = self.of_chunk(record)? {
+                        return Ok(Some(item));
+                    }
+                }
+            }
+        }
+    }
+
+    /// The next record of the file itself. A chunk is taken apart on the way.
+    fn record(&mut self) -> Result<Option<Record<'static>>, LogError> {
+        loop {
+            match self.reader.next_event() {
+                None => return Ok(None),
+                Some(Ok(LinearReadEvent::ReadRequest(bytes))) => {
+                    let read = read_some(&mut self.source, self.reader.insert(bytes));
+                    let read = read.map_err(|source| LogError::Read {
+                        file: self.file.clone(),
+                        source,
+                    })?;
+                    self.reader.notify_read(read);
+                }
+                Some(Ok(LinearReadEvent::Record { opcode: 0, .. })) => {
+                    return Err(self.incomplete("a record of no kind"));
+                }
+                Some(Ok(LinearReadEvent::Record { opcode, data })) => {
+                    let bytes = RECORD_PREFIX_BYTES + data.len() as u64;
+                    match taken_apart(opcode, data) {
+                        Ok((record, chunk)) => {
+                            self.whole_bytes += bytes;
+                            self.chunk = chunk;
+                            return Ok(Some(record));
+                        }
+                        Err(error) => return Err(self.incomplete(&error.to_string())),
+                    }
+                }
+                Some(Err(McapError::BadMagic)) if !self.past_data => {
+                    return Err(LogError::Format {
+                        file: self.file.clone(),
+                        message: "it does not begin as an MCAP file does".into(),
+                    });
+                }
+                Some(Err(error)) => return Err(self.incomplete(&error.to_string())),
+            }
+        }
+    }
+
+    fn of_chunk(&mut self, record: Record<'static>) -> Result<Option<Item>, LogError> {
+        match record {
+            Record::Schema { header, data } => {
+                let schema = Schema {
+                    name: header.name,
+                    encoding: header.encoding,
+                    text: data.into_owned(),
+                };
+                self.schemas.insert(header.id, Arc::new(schema));
+            }
+            Record::Channel(channel) => {
+                let schema = self.schemas.get(&channel.schema_id).cloned();
+                let known = Channel {
+                    topic: channel.topic,
+                    message_encoding: channel.message_encoding,
+                    schema: schema.unwrap_or_default(),
+                };
+                self.channels.insert(channel.id, Arc::new(known));
+            }
+            Record::Message { header, data } => {
+                let channel = self.channels.get(&header.channel_id).cloned();
+                let channel = channel.ok_or_else(|| {
+                    self.incomplete(&format!("channel {} is not defined", header.channel_id))
+                })?;
+                return Ok(Some(Item::Message(channel, header, data.into_owned())));
+            }
+            _ => {}
+        }
+        Ok(None)
+    }
+
+    fn incomplete(&mut self, cause: &str) -> LogError {
+        self.ended = true;
+        self.chunk.clear();
+        LogError::Incomplete {
+            file: self.file.clone(),
+            cause: cause.to_owned(),
+            kept_bytes: self.whole_bytes,
+        }
+    }
+}

@@ -1,0 +1,195 @@
+//! The core's types as they stand in a TOML. The core itself knows no serde; serde's remote derive
+//! holds these against it field by field.
+
+use serde::{Deserialize, Serialize};
+use supple_core::config::{
+    ApparentInertia, ContactLatch, FrictionVelocity, Gains, Law, Limits, MoveGains, Role,
+};
+use supple_core::math::{Matrix3, Vector3};
+use supple_core::{Friction, Link, Pose, Vector};
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Pose", deny_unknown_fields)]
+pub(crate) struct PoseDef {
+    #[serde(with = "rows")]
+    rotation: Matrix3<f64>,
+    #[serde(with = "column")]
+    translation: Vector3<f64>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Link", deny_unknown_fields)]
+pub(crate) struct LinkDef {
+    mass: f64,
+    #[serde(with = "column")]
+    first_moment: Vector3<f64>,
+    #[serde(with = "rows")]
+    inertia: Matrix3<f64>,
+    #[serde(with = "rows")]
+    link_from_joint: Matrix3<f64>,
+    #[serde(with = "PoseDef")]
+    parent_from_joint: Pose,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Friction", deny_unknown_fields)]
+pub(crate) struct FrictionDef {
+    viscous_nm_s_per_rad: f64,
+    coulomb_nm: f64,
+    breakaway_nm: f64,
+    stribeck_rad_per_s: f64,
+    offset_nm: f64,
+    band_rad_per_s: f64,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Role", rename_all = "snake_case", deny_unknown_fields)]
+pub(crate) enum RoleDef {
+    Active,
+    Held {
+        position_rad: f64,
+        stiffness_nm_per_rad: f64,
+        damping_nm_s_per_rad: f64,
+    },
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Gains", deny_unknown_fields)]
+struct GainsDef {
+    #[serde(with = "column")]
+    stiffness_n_per_m: Vector3<f64>,
+    #[serde(with = "column")]
+    damping_n_s_per_m: Vector3<f64>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "ApparentInertia", rename_all = "snake_case")]
+enum ApparentInertiaDef {
+    Own,
+    Chosen(#[serde(with = "rows")] Matrix3<f64>),
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "FrictionVelocity", rename_all = "snake_case")]
+enum FrictionVelocityDef {
+    Reference,
+    Measured,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Law", deny_unknown_fields)]
+pub(crate) struct LawDef {
+    #[serde(with = "FrictionVelocityDef")]
+    friction_velocity: FrictionVelocity,
+    inertial_feedforward: bool,
+    nullspace_damping_nm_s_per_rad: f64,
+    #[serde(with = "ApparentInertiaDef")]
+    inertia: ApparentInertia,
+    #[serde(with = "GainsDef")]
+    gains: Gains,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "ContactLatch", deny_unknown_fields)]
+pub(crate) struct ContactLatchDef {
+    fade: bool,
+    observer_rad_per_s: f64,
+    threshold_n: f64,
+    friction_error: f64,
+    contact_share: f64,
+    reversal_s: f64,
+    fade_s: f64,
+    restore_s: f64,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "MoveGains", deny_unknown_fields)]
+pub(crate) struct MoveGainsDef<const N: usize> {
+    #[serde(with = "column")]
+    stiffness_nm_per_rad: Vector<N>,
+    #[serde(with = "column")]
+    damping_nm_s_per_rad: Vector<N>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Limits", deny_unknown_fields)]
+pub(crate) struct LimitsDef<const N: usize> {
+    #[serde(with = "column")]
+    position_lower_rad: Vector<N>,
+    #[serde(with = "column")]
+    position_upper_rad: Vector<N>,
+    soft_zone_rad: f64,
+    #[serde(with = "column")]
+    soft_stiffness_nm_per_rad: Vector<N>,
+    #[serde(with = "column")]
+    soft_damping_nm_s_per_rad: Vector<N>,
+    #[serde(with = "column")]
+    joint_speed_rad_per_s: Vector<N>,
+    tip_speed_m_per_s: f64,
+    tracking_error_m: f64,
+    joint_tracking_error_rad: f64,
+    #[serde(with = "column")]
+    joint_torque_nm: Vector<N>,
+    #[serde(with = "column")]
+    motor_torque_nm: Vector<N>,
+    #[serde(with = "column")]
+    torque_rate_nm_per_s: Vector<N>,
+    stale_cycles: u32,
+    start_error_m: f64,
+    stiffness_n_per_m: f64,
+    damping_n_s_per_m: f64,
+}
+
+/// A column as a list.
+pub(crate) mod column {
+    use serde::de::Error;
+    use serde::{Deserialize, Deserializer, Serializer};
+    use supple_core::Vector;
+
+    pub fn serialize<S: Serializer, const K: usize>(
+        column: &Vector<K>,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(column.iter())
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>, const K: usize>(
+        deserializer: D,
+    ) -> Result<Vector<K>, D::Error> {
+        let list = Vec::<f64>::deserialize(deserializer)?;
+        let found = list.len();
+        let array: [f64; K] = list
+            .try_into()
+            .map_err(|_| D::Error::invalid_length(found, &"one entry per joint or axis"))?;
+        Ok(Vector::from(array))
+    }
+}
+
+/// A matrix as a list of rows.
+pub(crate) mod rows {
+    use serde::de::Error;
+    use serde::{Deserialize, Deserializer, Serializer};
+    use supple_core::Matrix;
+
+    pub fn serialize<S: Serializer, const R: usize, const C: usize>(
+        matrix: &Matrix<R, C>,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(
+            (0..R).map(|r| core::array::from_fn::<f64, C, _>(|c| matrix[(r, c)]).to_vec()),
+        )
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>, const R: usize, const C: usize>(
+        deserializer: D,
+    ) -> Result<Matrix<R, C>, D::Error> {
+        let rows = Vec::<Vec<f64>>::deserialize(deserializer)?;
+        if rows.len() != R {
+            return Err(D::Error::invalid_length(rows.len(), &"a row per row"));
+        }
+        if let Some(row) = rows.iter().find(|row| row.len() != C) {
+            return Err(D::Error::invalid_length(row.len(), &"an entry per column"));
+        }
+        Ok(Matrix::from_fn(|r, c| rows[r][c]))
+    }
+}

@@ -1,0 +1,151 @@
+//! A run to log: a controller that moves the four-joint arm, integrated without friction, through
+//! every mode, with a request of every outcome, a lost encoder reply and a fault.
+
+#![allow(dead_code, reason = "each test uses its part")]
+
+use std::path::Path;
+use supple_core::config::Gains;
+use supple_core::controller::Request;
+use supple_core::dynamics::aba;
+use supple_core::math::Vector3;
+use supple_core::trajectory::{Line, Probe};
+use supple_core::{Config, Controller, Friction, Input, Output, State, Trajectory, Vector, step};
+use supple_log::{CycleTiming, Extras, LogError, PlantTruth, RunInfo, Writer, Written};
+use supple_model::Description;
+
+pub const N: usize = 4;
+pub const CYCLE_NS: u64 = 1_000_000;
+/// Two encoder replies are lost from here: a fault.
+pub const FAULT_AT: u64 = 1_500;
+/// Steps of a whole run.
+pub const STEPS: u64 = 1_800;
+
+pub fn description() -> Description {
+    Description::asset("wam4").expect("a built-in arm")
+}
+
+/// The arm's own configuration but for friction, which the plant has none of.
+pub fn config() -> Config<N> {
+    let config = description().config::<N>().expect("four joints");
+    Config {
+        friction: [Friction::NONE; N],
+        ..config
+    }
+}
+
+pub fn run_info() -> RunInfo {
+    RunInfo {
+        experiment: "sample".into(),
+        seed: Some(7),
+        start_ns: 0,
+        notes: [("stiffness_n_per_m".to_owned(), "200".to_owned())].into(),
+    }
+}
+
+/// One step as it is logged.
+pub struct Cycle {
+    pub time_ns: u64,
+    pub input: Input<N>,
+    pub output: Output<N>,
+    pub extras: Extras<N>,
+}
+
+/// Runs `steps` steps and shows each.
+pub fn run(steps: u64, mut watch: impl FnMut(&Cycle)) {
+    let config = config();
+    let controller = Controller::new(config).expect("a sound configuration");
+    let mut state = State::new(&controller);
+    let home = description().home::<N>().expect("four joints");
+    let (mut q, mut qd) = (home, Vector::<N>::zeros());
+    let mut tip = Vector3::zeros();
+    for k in 0..steps {
+        let input = Input {
+            cycle: k,
+            position_rad: core::array::from_fn(|i| answers(k, i).then_some(q[i])),
+            tip_force_n: (k >= 600).then(|| Vector3::new(0.1 * k as f64, -0.3, 1.0 / 3.0)),
+            request: request(k, &home, tip),
+        };
+        let output = step(&controller, &mut state, &input);
+        tip = output.tip_position_m;
+        let truth = PlantTruth {
+            position_rad: q.into(),
+            velocity_rad_per_s: qd.into(),
+            tip_position_m: tip.into(),
+            tip_velocity_m_per_s: output.tip_velocity_m_per_s.into(),
+            contact_force_n: [0.0; 3],
+            friction_torque_nm: [0.0; N],
+            motor_torque_nm: output.torque_nm.into(),
+        };
+        let timing = CycleTiming {
+            period_ns: CYCLE_NS,
+            latency_ns: 100 + k,
+            step_ns: 2_000,
+        };
+        watch(&Cycle {
+            time_ns: k * CYCLE_NS,
+            input,
+            output,
+            extras: Extras {
+                truth: Some(truth),
+                timing: Some(timing),
+                ..Extras::default()
+            },
+        });
+        qd += aba(&config.arm, &q, &qd, &output.torque_nm) * config.period_s;
+        q += qd * config.period_s;
+    }
+}
+
+/// Whether encoder `joint` answers in cycle `k`.
+fn answers(k: u64, joint: usize) -> bool {
+    let lost = (k == 1_300 && joint == 1) || ((FAULT_AT..FAULT_AT + 2).contains(&k) && joint == 2);
+    !lost
+}
+
+fn request(k: u64, home: &Vector<N>, tip: Vector3<f64>) -> Option<Request<N>> {
+    match k {
+        0 | 1_530 => Some(Request::GravityHold),
+        100 => Some(Request::Move {
+            target_rad: home + Vector::from([0.05, 0.05, 0.0, -0.05]),
+            duration_s: 0.4,
+        }),
+        600 => Some(Request::Track(Trajectory::Line(Line {
+            from_m: tip,
+            to_m: tip + Vector3::new(0.03, 0.0, -0.03),
+            duration_s: 1.0,
+        }))),
+        800 => Some(Request::Gains {
+            gains: Gains::isotropic(200.0, 20.0),
+            ramp_s: 0.1,
+        }),
+        1_200 => Some(Request::Track(Trajectory::Probe(Probe {
+            radius_m: 30.0,
+            strokes: 3,
+            radial_step_m: 0.01,
+            top_m: 0.0,
+            stroke_m: 0.1,
+            azimuth_rad: 0.0,
+            azimuth_step_rad: 0.1,
+            speed_m_per_s: 0.04,
+            ramp_s: 0.1,
+        }))),
+        1_510 => Some(Request::Reset),
+        _ => None,
+    }
+}
+
+/// Logs a run of `steps` steps.
+pub fn write(path: &Path, steps: u64) -> Result<Written, LogError> {
+    let mut writer = Writer::create(path, &description(), &config(), &run_info())?;
+    let mut failed = None;
+    run(steps, |cycle| {
+        if failed.is_none() {
+            let written = writer.write(cycle.time_ns, &cycle.input, &cycle.output, &cycle.extras);
+            failed = written.err();
+        }
+    });
+    match failed {
+        Some(error) => Err(error),
+        None => writer.finish(),
+    }
+}

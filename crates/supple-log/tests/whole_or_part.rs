@@ -1,0 +1,122 @@
+//! No half-written file passes as whole, and every failure names file and cause.
+
+mod common;
+
+use std::fs;
+use std::path::Path;
+use supple_log::{Extras, LogError, Writer};
+
+fn writer(path: &Path) -> Result<Writer<{ common::N }>, LogError> {
+    let (description, config) = (common::description(), common::config());
+    Writer::create(path, &description, &config, &common::run_info())
+}
+
+#[test]
+fn a_log_has_its_name_only_when_it_is_whole() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("run.mcap");
+    let part = folder.path().join("run.mcap.part");
+    fs::write(&path, "an older log").expect("written");
+
+    let dropped = writer(&path).expect("created");
+    assert!(part.exists());
+    drop(dropped);
+    assert!(part.exists());
+    assert_eq!(fs::read(&path).expect("read"), b"an older log");
+
+    common::write(&path, 10).expect("written over both");
+    assert!(!part.exists());
+    assert!(fs::read(&path).expect("read").starts_with(mcap::MAGIC));
+}
+
+#[test]
+fn two_writers_of_one_name_are_kept_apart() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("run.mcap");
+    let first = writer(&path).expect("created");
+    let Err(error) = writer(&path) else {
+        panic!("two logs are written into one file");
+    };
+    assert!(matches!(error, LogError::Busy { .. }), "{error}");
+    assert!(error.to_string().contains("run.mcap.part"));
+    first.finish().expect("undisturbed");
+}
+
+#[test]
+fn a_folder_that_cannot_be_written() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("file");
+    fs::write(&file, "").expect("written");
+    for path in [
+        folder.path().join("missing/run.mcap"),
+        file.join("run.mcap"),
+        "/proc/run.mcap".into(),
+    ] {
+        let Err(error) = writer(&path) else {
+            panic!("{} was created", path.display());
+        };
+        assert!(matches!(error, LogError::Create { .. }), "{error}");
+        assert!(error.to_string().contains("run.mcap"), "{error}");
+        assert!(error.to_string().contains("choose a folder"), "{error}");
+    }
+    assert!(matches!(
+        writer(folder.path()),
+        Err(LogError::Create { .. })
+    ));
+}
+
+/// A part file that is a link to the device that is always full.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("run.mcap");
+    let part = folder.path().join("run.mcap.part");
+    std::os::unix::fs::symlink("/dev/full", &part).expect("linked");
+
+    let error = common::write(&path, common::STEPS).expect_err("the disk is full");
+    assert!(matches!(error, LogError::Write { .. }), "{error}");
+    let message = error.to_string();
+    assert!(message.contains("run.mcap.part"), "{message}");
+    assert!(message.contains("No space left on device"), "{message}");
+    assert!(!path.exists());
+}
+
+/// The disk fills up in the middle of a run: after the write that fails every write fails, and so does
+/// finishing. The limit is one on the size of a file, for a child process of this test alone.
+#[cfg(unix)]
+#[test]
+fn a_disk_that_fills_up() {
+    const FILE: &str = "SUPPLE_LOG_LIMITED_FILE";
+    if let Some(path) = std::env::var_os(FILE) {
+        return write_until_full(Path::new(&path));
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("run.mcap");
+    let this = std::env::current_exe().expect("this test");
+    let child = std::process::Command::new("sh")
+        .args(["-c", "trap '' XFSZ; ulimit -f 300; exec \"$@\"", "sh"])
+        .arg(this)
+        .args(["--exact", "a_disk_that_fills_up", "--nocapture"])
+        .env(FILE, &path)
+        .status();
+    assert!(child.expect("a shell").success());
+    assert!(folder.path().join("run.mcap.part").exists());
+    assert!(!path.exists());
+}
+
+fn write_until_full(path: &Path) {
+    let mut writer = writer(path).expect("there is room for the beginning");
+    let (mut written, mut failures) = (0, Vec::new());
+    common::run(common::STEPS, |cycle| {
+        let extras = Extras::default();
+        match writer.write(cycle.time_ns, &cycle.input, &cycle.output, &extras) {
+            Ok(()) if failures.is_empty() => written += 1,
+            Ok(()) => panic!("a write after a failure was accepted"),
+            Err(error) => failures.push(error.to_string()),
+        }
+    });
+    assert!(written > 250, "{written} written");
+    assert!(failures[0].contains("run.mcap.part") && failures[0].contains("File too large"));
+    assert!(writer.finish().is_err());
+}

@@ -1,0 +1,52 @@
+//! The arms built into the crate. Each is a folder of `assets/`: `arm.toml` and `arm.urdf`.
+
+use crate::error::ModelError;
+
+macro_rules! asset {
+    ($name:literal) => {
+        (
+            $name,
+            include_str!(concat!("../../../assets/", $name, "/arm.toml")),
+            include_str!(concat!("../../../assets/", $name, "/arm.urdf")),
+        )
+    };
+}
+
+/// Name, TOML, URDF.
+const ASSETS: [(&str, &str, &str); 4] = [
+    asset!("paper3"),
+    asset!("wam3"),
+    asset!("wam4"),
+    asset!("wam7"),
+];
+
+const NAMES: [&str; ASSETS.len()] = {
+    let mut names = [""; ASSETS.len()];
+    let mut i = 0;
+    while i < names.len() {
+        names[i] = ASSETS[i].0;
+        i += 1;
+    }
+    names
+};
+
+/// Names of the built-in arms.
+///
+/// - `paper3`: a physical arm near the one that the paper identified, three joints.
+/// - `wam3`: the WAM with its roll joint welded at 0, three joints.
+/// - `wam4`: the 4-joint WAM, roll held.
+/// - `wam7`: the 7-joint WAM, roll and wrist held.
+pub fn assets() -> &'static [&'static str] {
+    &NAMES
+}
+
+/// TOML and URDF of a built-in arm.
+pub(crate) fn text(name: &str) -> Result<(&'static str, &'static str), ModelError> {
+    let found = ASSETS.iter().find(|(asset, ..)| *asset == name);
+    found
+        .map(|(_, toml, urdf)| (*toml, *urdf))
+        .ok_or_else(|| ModelError::UnknownAsset {
+            found: name.to_owned(),
+            expected: NAMES.join(", "),
+        })
+}

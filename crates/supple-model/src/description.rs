@@ -1,0 +1,260 @@
+//! An arm as it is described: read, checked, complete. Sizes are dynamic here; [`Description::arm`]
+//! and [`Description::config`] give the types of the core, whose size is in the type.
+
+use crate::error::{ModelError, Reporter};
+use crate::resolve::{self, JointResolved, Motors, Tool};
+use crate::settings::Settings;
+use crate::shapes::{self, Capsule, Transform};
+use crate::tree::{self, Chain};
+use crate::{assets, xml};
+use std::path::Path;
+use supple_core::Friction;
+use urdf_rs::Robot;
+
+/// An arm, read from a URDF and a TOML. It exists only if both are sound.
+#[derive(Clone, Debug)]
+pub struct Description {
+    pub(crate) settings: Settings,
+    pub(crate) chain: Chain,
+    pub(crate) joints: Vec<JointResolved>,
+    pub(crate) toml_file: String,
+    robot: Robot,
+    names: Vec<String>,
+    home_rad: Vec<f64>,
+    friction: Vec<Friction>,
+    motors: Motors,
+    tool: Option<Tool>,
+    capsules: Vec<Capsule>,
+    toml: String,
+    urdf: String,
+}
+
+impl Description {
+    /// Reads an arm from its TOML, or from the folder that holds it as `arm.toml`.
+    ///
+    /// # Errors
+    /// Whatever is wrong with either file.
+    pub fn load(path: impl AsRef<Path>) -> Result<Self, ModelError> {
+        let path = path.as_ref();
+        let toml_path = if path.is_dir() {
+            path.join("arm.toml")
+        } else {
+            path.to_owned()
+        };
+        let toml_file = toml_path.display().to_string();
+        let toml = read(
+            &toml_path,
+            "give the TOML of an arm, or the folder that holds it as arm.toml",
+        )?;
+        let settings = parse_toml(&toml_file, &toml)?;
+        let folder = toml_path.parent().unwrap_or(Path::new(""));
+        let urdf_path = folder.join(&settings.urdf);
+        let urdf = read(
+            &urdf_path,
+            "correct `urdf` in the TOML: it is relative to the TOML's folder",
+        )?;
+        Self::build(
+            settings,
+            toml_file,
+            toml,
+            urdf_path.display().to_string(),
+            urdf,
+        )
+    }
+
+    /// A built-in arm by its name, or another by the path of its TOML or folder.
+    ///
+    /// # Errors
+    /// [`ModelError::UnknownAsset`] if it is neither, or whatever is wrong with the files.
+    pub fn find(name_or_path: &str) -> Result<Self, ModelError> {
+        let is_path = name_or_path.contains(['/', '\\', '.']) || Path::new(name_or_path).exists();
+        if is_path && !assets::assets().contains(&name_or_path) {
+            return Self::load(name_or_path);
+        }
+        Self::asset(name_or_path)
+    }
+
+    /// A built-in arm, one of [`crate::assets`].
+    ///
+    /// # Errors
+    /// [`ModelError::UnknownAsset`] with the names there are.
+    pub fn asset(name: &str) -> Result<Self, ModelError> {
+        let (toml, urdf) = assets::text(name)?;
+        let file = |end: &str| format!("assets/{name}/{end}");
+        let settings = parse_toml(&file("arm.toml"), toml)?;
+        Self::build(
+            settings,
+            file("arm.toml"),
+            toml.into(),
+            file("arm.urdf"),
+            urdf.into(),
+        )
+    }
+
+    /// An arm from the texts of its two files, such as a log carries. Messages call them `arm.toml`
+    /// and by the name the TOML gives its URDF.
+    ///
+    /// # Errors
+    /// Whatever is wrong with either text.
+    pub fn from_text(toml: &str, urdf: &str) -> Result<Self, ModelError> {
+        let settings = parse_toml("arm.toml", toml)?;
+        let urdf_file = settings.urdf.clone();
+        Self::build(
+            settings,
+            "arm.toml".into(),
+            toml.into(),
+            urdf_file,
+            urdf.into(),
+        )
+    }
+
+    fn build(
+        settings: Settings,
+        toml_file: String,
+        toml: String,
+        urdf_file: String,
+        urdf: String,
+    ) -> Result<Self, ModelError> {
+        let in_urdf = Reporter { file: &urdf_file };
+        let in_toml = Reporter { file: &toml_file };
+        xml::check(in_urdf, &urdf)?;
+        let robot = urdf_rs::read_from_string(&urdf).map_err(|error| ModelError::Syntax {
+            file: urdf_file.clone(),
+            message: error.to_string(),
+            remedy: "correct the URDF",
+        })?;
+        resolve::check_names(in_toml, &settings, &robot)?;
+        let chain = tree::chain(
+            in_urdf,
+            in_toml,
+            &robot,
+            &settings.tip_frame,
+            &settings.fixed_joints_rad,
+        )?;
+        resolve::check_rest(in_toml, &settings)?;
+        let joints = resolve::joints(in_urdf, in_toml, &settings, &robot, &chain)?;
+        let motors = resolve::motors(in_toml, &settings, &joints)?;
+        let tool = resolve::tool(in_toml, &settings)?;
+        Ok(Self {
+            names: joints.iter().map(|joint| joint.name.clone()).collect(),
+            home_rad: joints.iter().map(|joint| joint.home_rad).collect(),
+            friction: joints.iter().map(|joint| joint.friction).collect(),
+            capsules: shapes::capsules(&robot, &chain),
+            settings,
+            chain,
+            joints,
+            toml_file,
+            robot,
+            motors,
+            tool,
+            toml,
+            urdf,
+        })
+    }
+
+    /// Name of the arm.
+    pub fn name(&self) -> &str {
+        &self.settings.name
+    }
+
+    /// Number of moving joints, held ones included.
+    pub fn dof(&self) -> usize {
+        self.joints.len()
+    }
+
+    /// Names of the moving joints, from the base to the tip.
+    pub fn joint_names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// The URDF, to the last byte.
+    pub fn urdf(&self) -> &str {
+        &self.urdf
+    }
+
+    /// The TOML, to the last byte.
+    pub fn toml(&self) -> &str {
+        &self.toml
+    }
+
+    /// The TOML as it was read, defaults of whole sections filled in.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// Pose that the arm starts from, one angle per joint \[rad\].
+    pub fn home_rad(&self) -> &[f64] {
+        &self.home_rad
+    }
+
+    /// Friction, one per joint.
+    pub fn friction(&self) -> &[Friction] {
+        &self.friction
+    }
+
+    /// Motors and transmission.
+    pub fn motors(&self) -> &Motors {
+        &self.motors
+    }
+
+    /// What is mounted at the tip.
+    pub fn tool(&self) -> Option<Tool> {
+        self.tool
+    }
+
+    /// Simple shapes of the links, for drawing.
+    pub fn capsules(&self) -> &[Capsule] {
+        &self.capsules
+    }
+
+    /// Pose of every URDF link in its parent link, at joint angles `q_rad`, one per moving joint: what
+    /// a transform tree is fed with.
+    ///
+    /// # Errors
+    /// [`ModelError::JointCount`] if `q_rad` has not one angle per moving joint.
+    pub fn transforms(&self, q_rad: &[f64]) -> Result<Vec<Transform<'_>>, ModelError> {
+        self.expect_dof(q_rad.len())?;
+        Ok(shapes::transforms(
+            &self.robot,
+            &self.chain,
+            &self.settings.fixed_joints_rad,
+            q_rad,
+        ))
+    }
+
+    /// Refuses a caller that expects another number of joints.
+    pub(crate) fn expect_dof(&self, expected: usize) -> Result<(), ModelError> {
+        if expected == self.dof() {
+            return Ok(());
+        }
+        Err(ModelError::JointCount {
+            file: self.toml_file.clone(),
+            arm: self.settings.name.clone(),
+            expected,
+            found: self.dof(),
+        })
+    }
+}
+
+fn read(path: &Path, remedy: &'static str) -> Result<String, ModelError> {
+    std::fs::read_to_string(path).map_err(|error| ModelError::Read {
+        file: path.display().to_string(),
+        error,
+        remedy,
+    })
+}
+
+fn parse_toml(file: &str, text: &str) -> Result<Settings, ModelError> {
+    if text.trim_start().starts_with('<') {
+        return Err(ModelError::Syntax {
+            file: file.to_owned(),
+            message: "this is XML where a TOML is expected".to_owned(),
+            remedy: "give the TOML of the arm: name, urdf (the path of this file) and tip_frame suffice",
+        });
+    }
+    toml::from_str(text).map_err(|error| ModelError::Syntax {
+        file: file.to_owned(),
+        message: error.to_string().trim_end().to_owned(),
+        remedy: "correct it: keys, types and units are those of assets/arm.schema.json",
+    })
+}

@@ -1,0 +1,178 @@
+//! The TOML held against the chain: every number checked, every default filled in, everything in the
+//! chain's order.
+
+mod hardware;
+mod joints;
+
+pub use hardware::{Motors, Tool};
+pub(crate) use hardware::{motors, tool};
+pub(crate) use joints::{JointResolved, joints};
+
+use crate::error::{ModelError, Reporter};
+use crate::settings::Settings;
+use std::collections::BTreeSet;
+use supple_core::math::Matrix3;
+use urdf_rs::{JointType, Robot};
+
+/// Refuses names under `[fixed_joints_rad]` and `[[joints]]` that mean nothing. Comes before the chain
+/// is read, so that a misspelt name is not reported as a branch that moves.
+pub(crate) fn check_names(
+    report: Reporter<'_>,
+    settings: &Settings,
+    robot: &Robot,
+) -> Result<(), ModelError> {
+    let movable: Vec<&urdf_rs::Joint> = robot
+        .joints
+        .iter()
+        .filter(|joint| !matches!(joint.joint_type, JointType::Fixed))
+        .collect();
+    let names: Vec<&str> = movable.iter().map(|joint| joint.name.as_str()).collect();
+    let unknown = |element: String, name: &str| {
+        report.invalid(
+            element,
+            "must name a movable joint of the URDF",
+            format!("`{name}`"),
+            format!("use one of {}", names.join(", ")),
+        )
+    };
+    for (name, angle_rad) in &settings.fixed_joints_rad {
+        let element = format!("[fixed_joints_rad] {name}");
+        let joint = movable.iter().find(|joint| joint.name == *name);
+        let joint = joint.ok_or_else(|| unknown(element.clone(), name))?;
+        report.finite(&element, *angle_rad)?;
+        let limited = matches!(joint.joint_type, JointType::Revolute);
+        let (lower, upper) = (joint.limit.lower, joint.limit.upper);
+        if limited && lower < upper && !(lower..=upper).contains(angle_rad) {
+            return Err(report.invalid(
+                element,
+                "must be within the joint's limits",
+                format!("{angle_rad} rad"),
+                format!("give an angle from {lower} to {upper} rad"),
+            ));
+        }
+    }
+    let mut seen = BTreeSet::new();
+    for joint in &settings.joints {
+        let element = format!("[[joints]] `{}`", joint.name);
+        if !names.contains(&joint.name.as_str()) {
+            return Err(unknown(element, &joint.name));
+        }
+        if settings.fixed_joints_rad.contains_key(&joint.name) {
+            return Err(report.invalid(
+                element,
+                "a joint is fixed or it moves",
+                "an entry under [fixed_joints_rad] too",
+                "remove one of the two",
+            ));
+        }
+        if !seen.insert(&joint.name) {
+            return Err(report.invalid(element, "one entry per joint", "two", "merge them"));
+        }
+    }
+    Ok(())
+}
+
+/// Numbers that are not one joint's.
+pub(crate) fn check_rest(report: Reporter<'_>, settings: &Settings) -> Result<(), ModelError> {
+    let (law, latch, limits) = (&settings.law, &settings.latch, &settings.limits);
+    for (axis, g) in settings.gravity_m_per_s2.iter().enumerate() {
+        report.finite(&format!("gravity_m_per_s2[{axis}]"), *g)?;
+    }
+    for (element, value) in [
+        ("period_s", settings.period_s),
+        ("estimator_rad_per_s", settings.estimator_rad_per_s),
+        ("handover_s", settings.handover_s),
+        ("[limits] soft_zone_rad", limits.soft_zone_rad),
+        ("[limits] tip_speed_m_per_s", limits.tip_speed_m_per_s),
+        ("[limits] tracking_error_m", limits.tracking_error_m),
+        (
+            "[limits] joint_tracking_error_rad",
+            limits.joint_tracking_error_rad,
+        ),
+        ("[limits] start_error_m", limits.start_error_m),
+        (
+            "[limits] greatest_stiffness_n_per_m",
+            limits.greatest_stiffness_n_per_m,
+        ),
+        (
+            "[limits] greatest_damping_n_s_per_m",
+            limits.greatest_damping_n_s_per_m,
+        ),
+        ("[latch] observer_rad_per_s", latch.observer_rad_per_s),
+        ("[latch] threshold_n", latch.threshold_n),
+        ("[latch] fade_s", latch.fade_s),
+        ("[latch] restore_s", latch.restore_s),
+    ] {
+        report.positive(element, value)?;
+    }
+    let (stiffness, damping) = (
+        limits.greatest_stiffness_n_per_m,
+        limits.greatest_damping_n_s_per_m,
+    );
+    for (element, values, limit, key) in [
+        (
+            "[law] stiffness_n_per_m",
+            law.stiffness_n_per_m,
+            stiffness,
+            "greatest_stiffness_n_per_m",
+        ),
+        (
+            "[law] damping_n_s_per_m",
+            law.damping_n_s_per_m,
+            damping,
+            "greatest_damping_n_s_per_m",
+        ),
+    ] {
+        for (axis, value) in values.iter().enumerate() {
+            let element = format!("{element}[{axis}]");
+            report.not_negative(&element, *value)?;
+            if *value > limit {
+                return Err(report.invalid(
+                    element,
+                    format!("must be at most [limits] {key}, {limit}"),
+                    value,
+                    "lower it, or raise the limit if the arm is known to be stable there",
+                ));
+            }
+        }
+    }
+    for (element, value) in [
+        (
+            "[law] nullspace_damping_nm_s_per_rad",
+            law.nullspace_damping_nm_s_per_rad,
+        ),
+        ("[latch] friction_error", latch.friction_error),
+        ("[latch] reversal_s", latch.reversal_s),
+    ] {
+        report.not_negative(element, value)?;
+    }
+    if !(0.0..=1.0).contains(&latch.contact_share) {
+        return Err(report.invalid(
+            "[latch] contact_share",
+            "must be a share, 0 to 1",
+            latch.contact_share,
+            "give the part of the dry friction feed-forward that stays on in contact",
+        ));
+    }
+    if let Some(rows) = law.apparent_inertia_kg {
+        let m = Matrix3::from_fn(|i, j| rows[i][j]);
+        if !(m.iter().all(|x| x.is_finite()) && m == m.transpose() && m.cholesky().is_some()) {
+            return Err(report.invalid(
+                "[law] apparent_inertia_kg",
+                "must be symmetric and positive definite",
+                format!("{rows:?}"),
+                "give a symmetric matrix in kg, or leave it out for the arm's own",
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn wrong_count(report: Reporter<'_>, element: &str, found: usize, expected: usize) -> ModelError {
+    report.invalid(
+        element,
+        format!("must have one entry per moving joint, {expected}"),
+        format!("{found} entries"),
+        "count the movable joints from the root link to tip_frame, fixed ones left out",
+    )
+}

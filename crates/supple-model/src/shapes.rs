@@ -1,0 +1,87 @@
+//! Where the links are and what they look like, for drawing and for transform trees. Physics takes
+//! nothing from here.
+//!
+//! Shapes are the `<visual>` primitives of the URDF: a cylinder or a capsule is a capsule of its axis,
+//! a sphere one of no length. Boxes and meshes have no capsule and are left to viewers that read the
+//! URDF themselves.
+
+use crate::tree::Chain;
+use std::collections::BTreeMap;
+use supple_core::Pose;
+use supple_core::math::Vector3;
+use urdf_rs::{Geometry, Robot};
+
+/// A capsule fixed to a link.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Capsule {
+    /// Moving joint whose link carries it, counted from the base; none for the base itself.
+    pub joint: Option<usize>,
+    /// Ends of its axis in that link's frame \[m\].
+    pub ends_m: [Vector3<f64>; 2],
+    /// Radius \[m\].
+    pub radius_m: f64,
+}
+
+/// Where a URDF link is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Transform<'a> {
+    /// Name of the parent link.
+    pub parent: &'a str,
+    /// Name of the link.
+    pub child: &'a str,
+    /// Frame of the link in the parent link's frame.
+    pub parent_from_child: Pose,
+}
+
+pub(crate) fn capsules(robot: &Robot, chain: &Chain) -> Vec<Capsule> {
+    let mut capsules = Vec::new();
+    for placed in &chain.links {
+        for visual in &robot.links[placed.link].visual {
+            let (radius_m, length_m) = match visual.geometry {
+                Geometry::Cylinder { radius, length } | Geometry::Capsule { radius, length } => {
+                    (radius, length)
+                }
+                Geometry::Sphere { radius } => (radius, 0.0),
+                Geometry::Box { .. } | Geometry::Mesh { .. } => continue,
+            };
+            let origin = Pose::from_xyz_rpy(visual.origin.xyz.0, visual.origin.rpy.0);
+            let frame = placed.carrier_from_link * origin;
+            let end = |z: f64| frame.transform_point(&Vector3::new(0.0, 0.0, z));
+            capsules.push(Capsule {
+                joint: placed.carrier,
+                ends_m: [end(-0.5 * length_m), end(0.5 * length_m)],
+                radius_m,
+            });
+        }
+    }
+    capsules
+}
+
+pub(crate) fn transforms<'a>(
+    robot: &'a Robot,
+    chain: &Chain,
+    fixed_rad: &BTreeMap<String, f64>,
+    q_rad: &[f64],
+) -> Vec<Transform<'a>> {
+    let angle = |index: usize| {
+        let moving = chain.moving.iter().position(|moving| moving.joint == index);
+        let fixed = || fixed_rad.get(&robot.joints[index].name).copied();
+        moving.map(|i| q_rad[i]).or_else(fixed)
+    };
+    let joints = robot.joints.iter().enumerate();
+    joints
+        .map(|(index, joint)| {
+            let origin = Pose::from_xyz_rpy(joint.origin.xyz.0, joint.origin.rpy.0);
+            let turned = angle(index).map(|angle_rad| {
+                let axis = Vector3::from(joint.axis.xyz.0);
+                let length = supple_core::math::sqrt(axis.dot(&axis));
+                origin * crate::tree::turn(&(axis / length), angle_rad)
+            });
+            Transform {
+                parent: &joint.parent.link,
+                child: &joint.child.link,
+                parent_from_child: turned.unwrap_or(origin),
+            }
+        })
+        .collect()
+}

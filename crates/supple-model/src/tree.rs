@@ -1,0 +1,409 @@
+//! The links and joints of a URDF as a tree, and the tree as a chain of moving bodies.
+//!
+//! The arm is the chain of movable joints from the root link to the tip frame. Links that cannot move
+//! against the link they hang on, by a `fixed` joint or because the TOML fixes their joint at an
+//! angle, are lumped into it: masses, first moments and inertias add, frames are composed. A branch
+//! that moves and does not carry the tip is refused, for nothing would be known of its angle.
+
+use crate::error::{ModelError, Reporter};
+use std::collections::BTreeMap;
+use supple_core::math::{Matrix3, Vector3, sin_cos};
+use supple_core::{Body, Pose};
+use urdf_rs::{JointType, Robot};
+
+/// A movable joint of the chain, with the link it moves.
+#[derive(Clone, Debug)]
+pub(crate) struct Moving {
+    /// Index in the URDF's list of joints.
+    pub joint: usize,
+    /// Frame of the link in the frame of the link before, at zero angle.
+    pub parent_from_link: Pose,
+    /// Unit axis in the link frame.
+    pub axis: Vector3<f64>,
+    /// The link with all that is lumped into it, in the link frame.
+    pub body: Body,
+}
+
+/// A URDF link, and where it is.
+#[derive(Clone, Debug)]
+pub(crate) struct Placed {
+    /// Index in the URDF's list of links.
+    pub link: usize,
+    /// Moving joint whose link it belongs to, counted along the chain; none for the base.
+    pub carrier: Option<usize>,
+    /// Its frame in the carrier's link frame.
+    pub carrier_from_link: Pose,
+}
+
+/// The chain from root to tip.
+#[derive(Clone, Debug)]
+pub(crate) struct Chain {
+    pub moving: Vec<Moving>,
+    pub links: Vec<Placed>,
+    pub last_link_from_tip: Pose,
+}
+
+/// Reads the chain. `fixed_rad` are the joints that the TOML freezes.
+pub(crate) fn chain(
+    report: Reporter<'_>,
+    toml: Reporter<'_>,
+    robot: &Robot,
+    tip_frame: &str,
+    fixed_rad: &BTreeMap<String, f64>,
+) -> Result<Chain, ModelError> {
+    let tree = Tree::new(report, robot)?;
+    let tip = tree
+        .link(tip_frame)
+        .ok_or_else(|| no_tip(toml, robot, tip_frame))?;
+    let path = tree.path_to(tip);
+    let on_chain = |joint: usize| {
+        path.contains(&joint)
+            && is_movable(&robot.joints[joint].joint_type)
+            && !fixed_rad.contains_key(&robot.joints[joint].name)
+    };
+    let mut builder = Builder {
+        tree: &tree,
+        fixed_rad,
+        on_chain: &on_chain,
+        body: None,
+        next: None,
+        links: Vec::new(),
+    };
+    let mut moving: Vec<Moving> = Vec::new();
+    let (mut root, mut carrier) = (tree.root, None);
+    loop {
+        builder.body = None;
+        builder.next = None;
+        builder.lump(root, carrier, Pose::IDENTITY)?;
+        if let Some(index) = carrier {
+            let joint: &mut Moving = &mut moving[index];
+            let Some(body) = builder.body else {
+                return Err(report.invalid(
+                    format!("link `{}`", robot.links[root].name),
+                    "a moving link must have an <inertial>",
+                    "none",
+                    format!(
+                        "give it mass, centre of mass and inertia, or fix joint `{}` under \
+                         [fixed_joints_rad]",
+                        robot.joints[joint.joint].name
+                    ),
+                ));
+            };
+            joint.body = body;
+        }
+        let Some((joint, parent_from_link)) = builder.next else {
+            break;
+        };
+        moving.push(Moving {
+            joint,
+            parent_from_link,
+            axis: tree.axis(joint)?,
+            body: Body::ball(1.0, 1.0, Vector3::zeros()),
+        });
+        root = tree.child[joint];
+        carrier = Some(moving.len() - 1);
+    }
+    let links = builder.links;
+    let last_link_from_tip = links
+        .iter()
+        .find(|placed| placed.link == tip)
+        .map_or(Pose::IDENTITY, |placed| placed.carrier_from_link);
+    Ok(Chain {
+        moving,
+        links,
+        last_link_from_tip,
+    })
+}
+
+struct Tree<'a> {
+    report: Reporter<'a>,
+    robot: &'a Robot,
+    root: usize,
+    /// Link index of each joint's parent.
+    parent: Vec<usize>,
+    /// Link index of each joint's child.
+    child: Vec<usize>,
+    /// Joints that hang on each link.
+    below: Vec<Vec<usize>>,
+    /// Joint that carries each link.
+    above: Vec<Option<usize>>,
+}
+
+impl<'a> Tree<'a> {
+    fn new(report: Reporter<'a>, robot: &'a Robot) -> Result<Self, ModelError> {
+        let index: BTreeMap<&str, usize> = robot
+            .links
+            .iter()
+            .map(|l| l.name.as_str())
+            .zip(0..)
+            .collect();
+        let (mut parents, mut child) = (Vec::new(), Vec::new());
+        let mut below = vec![Vec::new(); robot.links.len()];
+        let mut above: Vec<Option<usize>> = vec![None; robot.links.len()];
+        for (j, joint) in robot.joints.iter().enumerate() {
+            let find = |role: &str, link: &str| {
+                index.get(link).copied().ok_or_else(|| {
+                    report.invalid(
+                        format!("joint `{}` <{role}>", joint.name),
+                        "must name a link that exists",
+                        format!("`{link}`"),
+                        format!("add <link name=\"{link}\"/> or correct the name"),
+                    )
+                })
+            };
+            let parent = find("parent", &joint.parent.link)?;
+            let own = find("child", &joint.child.link)?;
+            if let Some(other) = above[own] {
+                return Err(report.invalid(
+                    format!("joint `{}` <child>", joint.name),
+                    "a link may be the child of one joint only",
+                    format!(
+                        "`{}`, already the child of joint `{}`",
+                        joint.child.link, robot.joints[other].name
+                    ),
+                    "remove one of the joints: closed loops are not supported",
+                ));
+            }
+            above[own] = Some(j);
+            below[parent].push(j);
+            parents.push(parent);
+            child.push(own);
+        }
+        let roots: Vec<usize> = (0..robot.links.len())
+            .filter(|l| above[*l].is_none())
+            .collect();
+        let names = |links: &[usize]| {
+            let quoted = links.iter().map(|l| format!("`{}`", robot.links[*l].name));
+            quoted.collect::<Vec<_>>().join(", ")
+        };
+        let root = match roots.as_slice() {
+            [root] => *root,
+            [] => {
+                return Err(report.invalid(
+                    "<robot>",
+                    "one link must be the root, the child of no joint",
+                    if robot.links.is_empty() {
+                        "no link"
+                    } else {
+                        "a cycle through every link"
+                    },
+                    "open the cycle: remove the joint that leads back to the base",
+                ));
+            }
+            several => {
+                return Err(report.invalid(
+                    format!("link `{}`", robot.links[several[1]].name),
+                    "all links must hang on one root",
+                    format!("{} roots: {}", several.len(), names(several)),
+                    "connect it with a joint or remove it",
+                ));
+            }
+        };
+        let tree = Self {
+            report,
+            robot,
+            root,
+            parent: parents,
+            child,
+            below,
+            above,
+        };
+        let mut reached = vec![false; robot.links.len()];
+        let mut open = vec![root];
+        while let Some(link) = open.pop() {
+            reached[link] = true;
+            open.extend(tree.below[link].iter().map(|j| tree.child[*j]));
+        }
+        let lost: Vec<usize> = (0..reached.len()).filter(|l| !reached[*l]).collect();
+        if !lost.is_empty() {
+            return Err(report.invalid(
+                format!("link `{}`", robot.links[lost[0]].name),
+                "must be connected to the root",
+                format!("a cycle of {}", names(&lost)),
+                "open the cycle: remove the joint that leads back",
+            ));
+        }
+        Ok(tree)
+    }
+
+    fn link(&self, name: &str) -> Option<usize> {
+        self.robot.links.iter().position(|link| link.name == name)
+    }
+
+    /// Joints from the root to the tip.
+    fn path_to(&self, tip: usize) -> Vec<usize> {
+        let mut path = Vec::new();
+        let mut link = tip;
+        while let Some(joint) = self.above[link] {
+            path.push(joint);
+            link = self.parent[joint];
+        }
+        path.reverse();
+        path
+    }
+
+    /// The unit axis of a movable joint. A URDF says that axes are of unit length; printed ones are
+    /// rounded, so any finite length above 1e-6 is scaled to 1.
+    fn axis(&self, joint: usize) -> Result<Vector3<f64>, ModelError> {
+        let joint = &self.robot.joints[joint];
+        let axis = Vector3::from(joint.axis.xyz.0);
+        let length = supple_core::math::sqrt(axis.dot(&axis));
+        if length > 1e-6 && length.is_finite() {
+            return Ok(axis / length);
+        }
+        Err(self.report.invalid(
+            format!("joint `{}` <axis>", joint.name),
+            "must have a length above 1e-6",
+            format!("{:?}", joint.axis.xyz.0),
+            "give the direction that the joint turns about, such as xyz=\"0 0 1\"",
+        ))
+    }
+
+    fn body(&self, link: usize) -> Result<Option<Body>, ModelError> {
+        let link = &self.robot.links[link];
+        let urdf_rs::Inertial {
+            origin,
+            mass,
+            inertia: i,
+        } = &link.inertial;
+        let entries = [i.ixx, i.iyy, i.izz, i.ixy, i.ixz, i.iyz];
+        // What urdf-rs makes of a missing <inertial>; one that is there and all zero says the same.
+        if mass.value == 0.0 && entries == [0.0; 6] {
+            return Ok(None);
+        }
+        let body = Body {
+            mass_kg: mass.value,
+            com_m: Vector3::zeros(),
+            #[rustfmt::skip]
+            inertia_kg_m2: Matrix3::new(
+                i.ixx, i.ixy, i.ixz,
+                i.ixy, i.iyy, i.iyz,
+                i.ixz, i.iyz, i.izz,
+            ),
+        };
+        body.validate().map_err(|error| {
+            self.report.invalid(
+                format!("link `{}` <inertial>", link.name),
+                error.to_string(),
+                format!(
+                    "mass {} kg, inertia (xx, yy, zz, xy, xz, yz) {entries:?}",
+                    mass.value
+                ),
+                "give inertia about the centre of mass in kg m^2 and mass in kg, or remove \
+                 <inertial> from a link that has no mass",
+            )
+        })?;
+        Ok(Some(body.seen_from(&Pose::from_xyz_rpy(
+            origin.xyz.0,
+            origin.rpy.0,
+        ))))
+    }
+}
+
+struct Builder<'a, 'b> {
+    tree: &'b Tree<'a>,
+    fixed_rad: &'b BTreeMap<String, f64>,
+    on_chain: &'b dyn Fn(usize) -> bool,
+    /// Everything lumped into the present link.
+    body: Option<Body>,
+    /// The chain's next joint, with its child's frame at zero angle.
+    next: Option<(usize, Pose)>,
+    links: Vec<Placed>,
+}
+
+impl Builder<'_, '_> {
+    fn lump(
+        &mut self,
+        link: usize,
+        carrier: Option<usize>,
+        carrier_from_link: Pose,
+    ) -> Result<(), ModelError> {
+        self.links.push(Placed {
+            link,
+            carrier,
+            carrier_from_link,
+        });
+        if let Some(body) = self.tree.body(link)? {
+            let body = body.seen_from(&carrier_from_link);
+            self.body = Some(self.body.map_or(body, |sum| sum.merged(&body)));
+        }
+        for joint in self.tree.below[link].clone() {
+            let urdf = &self.tree.robot.joints[joint];
+            let link_from_child =
+                carrier_from_link * Pose::from_xyz_rpy(urdf.origin.xyz.0, urdf.origin.rpy.0);
+            if (self.on_chain)(joint) {
+                check_chain_joint(self.tree.report, urdf)?;
+                self.next = Some((joint, link_from_child));
+            } else if matches!(urdf.joint_type, JointType::Fixed) {
+                self.lump(self.tree.child[joint], carrier, link_from_child)?;
+            } else if let Some(angle) = self.fixed_rad.get(&urdf.name) {
+                if !turns(&urdf.joint_type) {
+                    return Err(unsupported(self.tree.report, urdf));
+                }
+                let turned = link_from_child * turn(&self.tree.axis(joint)?, *angle);
+                self.lump(self.tree.child[joint], carrier, turned)?;
+            } else {
+                return Err(self.tree.report.invalid(
+                    format!("joint `{}`", urdf.name),
+                    "moves a branch that does not carry the tip",
+                    format!("{:?}", urdf.joint_type).to_lowercase(),
+                    "fix it at an angle under [fixed_joints_rad] of the TOML",
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn no_tip(toml: Reporter<'_>, robot: &Robot, tip_frame: &str) -> ModelError {
+    let names: Vec<&str> = robot.links.iter().map(|l| l.name.as_str()).collect();
+    toml.invalid(
+        "tip_frame",
+        "must name a link of the URDF",
+        format!("`{tip_frame}`"),
+        format!("use one of {}", names.join(", ")),
+    )
+}
+
+fn is_movable(kind: &JointType) -> bool {
+    !matches!(kind, JointType::Fixed)
+}
+
+fn turns(kind: &JointType) -> bool {
+    matches!(kind, JointType::Revolute | JointType::Continuous)
+}
+
+fn unsupported(report: Reporter<'_>, joint: &urdf_rs::Joint) -> ModelError {
+    report.invalid(
+        format!("joint `{}`", joint.name),
+        "only revolute, continuous and fixed joints are supported",
+        format!("{:?}", joint.joint_type).to_lowercase(),
+        "change its type to fixed in the URDF, or take another tip_frame",
+    )
+}
+
+fn check_chain_joint(report: Reporter<'_>, joint: &urdf_rs::Joint) -> Result<(), ModelError> {
+    if !turns(&joint.joint_type) {
+        return Err(unsupported(report, joint));
+    }
+    if let Some(mimic) = &joint.mimic {
+        return Err(report.invalid(
+            format!("joint `{}` <mimic>", joint.name),
+            "a joint that follows another is not supported on the way to the tip",
+            format!("`{}`", mimic.joint),
+            "remove <mimic>, or fix the joint at an angle under [fixed_joints_rad]",
+        ));
+    }
+    Ok(())
+}
+
+/// Turn about a unit axis.
+pub(crate) fn turn(axis: &Vector3<f64>, angle_rad: f64) -> Pose {
+    let onto = Pose::z_onto(axis);
+    let (s, c) = sin_cos(angle_rad);
+    let about_z = Pose {
+        rotation: Matrix3::new(c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0),
+        translation: Vector3::zeros(),
+    };
+    onto * about_z * onto.inverse()
+}

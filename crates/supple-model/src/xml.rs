@@ -1,0 +1,282 @@
+//! What a URDF must have for `urdf-rs` to read it as it was meant.
+//!
+//! `urdf-rs` drops elements and attributes that it does not know, drops words of a vector that are not
+//! numbers, and fills what is missing with zeros: a misspelt `<inertial>` becomes a weightless link, a
+//! missing `<limit>` a joint that may not move. Here the raw tree is held against the format before
+//! that happens. Elements directly under `<robot>` that are not links or joints are left alone: they
+//! are other programs' extensions.
+
+use crate::error::{ModelError, Reporter};
+use roxmltree::{Document, Node};
+
+/// Greatest magnitude of a length, mass or inertia, SI units: no arm comes near, and no product of
+/// such numbers overflows.
+pub(crate) const GREATEST: f64 = 1e6;
+
+/// Attributes that hold numbers, with how many words each has: element, attribute, count, required.
+const NUMBERS: &[(&str, &str, usize, bool)] = &[
+    ("origin", "xyz", 3, false),
+    ("origin", "rpy", 3, false),
+    ("origin", "quat_xyzw", 4, false),
+    ("axis", "xyz", 3, true),
+    ("mass", "value", 1, true),
+    ("inertia", "ixx", 1, true),
+    ("inertia", "ixy", 1, true),
+    ("inertia", "ixz", 1, true),
+    ("inertia", "iyy", 1, true),
+    ("inertia", "iyz", 1, true),
+    ("inertia", "izz", 1, true),
+    ("limit", "lower", 1, false),
+    ("limit", "upper", 1, false),
+    ("limit", "effort", 1, false),
+    ("limit", "velocity", 1, true),
+    ("limit", "acceleration", 1, false),
+    ("limit", "deceleration", 1, false),
+    ("limit", "jerk", 1, false),
+    ("dynamics", "damping", 1, false),
+    ("dynamics", "friction", 1, false),
+];
+
+/// Children that an element may have, those that it must have, and those that may stand more than once.
+struct Shape {
+    element: &'static str,
+    known: &'static [&'static str],
+    required: &'static [&'static str],
+    many: &'static [&'static str],
+}
+
+const SHAPES: &[Shape] = &[
+    Shape {
+        element: "link",
+        known: &["inertial", "visual", "collision", "contact"],
+        required: &[],
+        many: &["visual", "collision"],
+    },
+    Shape {
+        element: "inertial",
+        known: &["origin", "mass", "inertia"],
+        required: &["mass", "inertia"],
+        many: &[],
+    },
+    Shape {
+        element: "joint",
+        known: &[
+            "origin",
+            "parent",
+            "child",
+            "axis",
+            "calibration",
+            "dynamics",
+            "limit",
+            "mimic",
+            "safety_controller",
+        ],
+        required: &["parent", "child"],
+        many: &[],
+    },
+];
+
+/// Holds the text against the format.
+pub(crate) fn check(report: Reporter<'_>, text: &str) -> Result<(), ModelError> {
+    let document = Document::parse(text).map_err(|error| ModelError::Syntax {
+        file: report.file.to_owned(),
+        message: error.to_string(),
+        remedy: "a URDF is one well-formed XML document with <robot> at its root",
+    })?;
+    let robot = document.root_element();
+    if robot.tag_name().name() != "robot" {
+        return Err(report.invalid(
+            place(&robot),
+            "the root element must be <robot>",
+            format!("<{}>", robot.tag_name().name()),
+            "give a URDF (a xacro file must be expanded first)",
+        ));
+    }
+    for kind in ["link", "joint"] {
+        let mut seen = std::collections::BTreeSet::new();
+        for node in children(&robot).filter(|n| n.tag_name().name() == kind) {
+            let name = node.attribute("name").unwrap_or_default();
+            if name.is_empty() {
+                return Err(report.invalid(
+                    place(&node),
+                    format!("a {kind} must have a name"),
+                    "none",
+                    "add a `name` attribute",
+                ));
+            }
+            if !seen.insert(name) {
+                return Err(report.invalid(
+                    place(&node),
+                    format!("{kind} names must be unique"),
+                    format!("`{name}` twice"),
+                    "rename one of them",
+                ));
+            }
+            if kind == "joint" {
+                check_kind(report, &node)?;
+            }
+            check_element(report, &node)?;
+        }
+    }
+    Ok(())
+}
+
+fn check_kind(report: Reporter<'_>, joint: &Node<'_, '_>) -> Result<(), ModelError> {
+    const KINDS: [&str; 7] = [
+        "revolute",
+        "continuous",
+        "fixed",
+        "prismatic",
+        "floating",
+        "planar",
+        "spherical",
+    ];
+    let kind = joint.attribute("type").unwrap_or("none");
+    if kind == "revolute" {
+        let limit = children(joint).find(|child| child.has_tag_name("limit"));
+        let given = |end| limit.is_some_and(|limit| limit.has_attribute(end));
+        if !(given("lower") && given("upper")) {
+            return Err(report.invalid(
+                format!("{} <limit>", place(joint)),
+                "a revolute joint must have both ends of its range",
+                limit.map_or("no <limit>", |_| "<limit> without lower or upper"),
+                "add <limit lower=\"..\" upper=\"..\" effort=\"..\" velocity=\"..\"/> in rad, N m and \
+                 rad/s, or make the joint continuous",
+            ));
+        }
+    }
+    if KINDS.contains(&kind) {
+        return Ok(());
+    }
+    Err(report.invalid(
+        place(joint),
+        "attribute `type` must name a kind of joint",
+        format!("`{kind}`"),
+        "use revolute, continuous or fixed",
+    ))
+}
+
+fn check_element(report: Reporter<'_>, node: &Node<'_, '_>) -> Result<(), ModelError> {
+    let element = node.tag_name().name();
+    if let Some(shape) = SHAPES.iter().find(|shape| shape.element == element) {
+        for child in children(node) {
+            let name = child.tag_name().name();
+            if !shape.known.contains(&name) {
+                return Err(report.invalid(
+                    place(&child),
+                    format!("not an element of <{element}>, it would be lost"),
+                    format!("<{name}>"),
+                    format!("one of {} is meant, or remove it", shape.known.join(", ")),
+                ));
+            }
+            let count = children(node).filter(|c| c.has_tag_name(name)).count();
+            if count > 1 && !shape.many.contains(&name) {
+                return Err(report.invalid(
+                    place(&child),
+                    format!("<{element}> takes one <{name}>"),
+                    count,
+                    "keep one of them",
+                ));
+            }
+            check_element(report, &child)?;
+        }
+        for required in shape.required {
+            if !children(node).any(|child| child.has_tag_name(*required)) {
+                return Err(report.invalid(
+                    place(node),
+                    format!("<{required}> is missing"),
+                    "none",
+                    format!("add <{required}> to <{element}>"),
+                ));
+            }
+        }
+        return Ok(());
+    }
+    if matches!(element, "parent" | "child") && node.attribute("link").is_none() {
+        return Err(report.invalid(
+            place(node),
+            "attribute `link` is missing",
+            "none",
+            "add link=\"...\"",
+        ));
+    }
+    if matches!(element, "visual" | "collision") {
+        let mut origins = children(node).filter(|child| child.has_tag_name("origin"));
+        return origins.try_for_each(|origin| check_element(report, &origin));
+    }
+    check_numbers(report, node)
+}
+
+fn check_numbers(report: Reporter<'_>, node: &Node<'_, '_>) -> Result<(), ModelError> {
+    let element = node.tag_name().name();
+    let mut known = NUMBERS.iter().filter(|(e, ..)| *e == element).peekable();
+    if known.peek().is_none() {
+        return Ok(());
+    }
+    let names: Vec<&str> = known.clone().map(|(_, name, ..)| *name).collect();
+    if let Some(stray) = node.attributes().find(|a| !names.contains(&a.name())) {
+        return Err(report.invalid(
+            place(node),
+            "not an attribute of this element, it would be lost",
+            format!("{}=\"{}\"", stray.name(), stray.value()),
+            format!("one of {} is meant, or remove it", names.join(", ")),
+        ));
+    }
+    for (_, name, count, required) in known {
+        let Some(text) = node.attribute(*name) else {
+            if *required {
+                return Err(report.invalid(
+                    place(node),
+                    format!("attribute `{name}` is missing"),
+                    "none",
+                    format!("add {name}=\"...\""),
+                ));
+            }
+            continue;
+        };
+        let words: Vec<&str> = text.split_whitespace().collect();
+        // Limits may be as large as one likes: some files mean "none" by it.
+        let greatest = match element {
+            "limit" => f64::MAX,
+            _ => GREATEST,
+        };
+        let sound = |word: &&str| word.parse::<f64>().is_ok_and(|x| x.abs() <= greatest);
+        if words.len() != *count || !words.iter().all(sound) {
+            return Err(report.invalid(
+                place(node),
+                format!("attribute `{name}` takes {count} number(s) of at most {greatest:e}"),
+                format!("\"{text}\""),
+                "correct it (NaN, infinity and units are not numbers here; SI units)",
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn children<'a, 'input>(
+    node: &Node<'a, 'input>,
+) -> impl Iterator<Item = Node<'a, 'input>> + use<'a, 'input> {
+    node.children().filter(Node::is_element)
+}
+
+/// ``joint `elbow` <limit> (line 12)``.
+fn place(node: &Node<'_, '_>) -> String {
+    let owner = node
+        .ancestors()
+        .find(|n| n.has_tag_name("link") || n.has_tag_name("joint"))
+        .filter(|owner| owner.attribute("name").is_some());
+    let line = node.document().text_pos_at(node.range().start).row;
+    let tag = node.tag_name().name();
+    match owner {
+        Some(owner) => {
+            let kind = owner.tag_name().name();
+            let name = owner.attribute("name").unwrap_or_default();
+            if owner.id() == node.id() {
+                format!("{kind} `{name}` (line {line})")
+            } else {
+                format!("{kind} `{name}` <{tag}> (line {line})")
+            }
+        }
+        None => format!("<{tag}> (line {line})"),
+    }
+}

@@ -1,0 +1,87 @@
+//! Prints how many times faster than real time the plant runs on one core, at its default step.
+//!
+//! `cargo run --release -p supple-plant --example speed`
+
+#[path = "../tests/common/mod.rs"]
+mod common;
+
+use common::{block, tip_spring, wam4, wam4_at};
+use std::time::Instant;
+use supple_core::nalgebra::Vector3;
+use supple_core::{Friction, Vector};
+use supple_plant::{Drive, FreeBox, Ground, LuGre, Plant, PlantConfig, Scene};
+
+const DURATION_S: f64 = 10.0;
+
+fn plant(scene: Scene) -> Plant<4> {
+    let arm = wam4();
+    let friction = [
+        (1.605, 1.648),
+        (0.533, 2.364),
+        (0.372, 0.811),
+        (0.642, 0.601),
+    ]
+    .map(|(s, v)| LuGre::from_friction(&Friction::coulomb(v, s)));
+    let config = PlantConfig {
+        friction,
+        drive: Drive {
+            counts_per_motor_revolution: Vector::repeat(4096.0),
+            motor_torque_quantum_nm: Vector::repeat(1.0 / 2700.0),
+            torque_delay_cycles: 1,
+            ..Drive::direct()
+        },
+        scene,
+        ..PlantConfig::ideal(arm)
+    };
+    let q = wam4_at(&arm, 0.72, 0.06);
+    match Plant::new(config, q, Vector::zeros()) {
+        Ok(plant) => plant,
+        Err(error) => panic!("{error}"),
+    }
+}
+
+/// Up and down by 10 cm once a second about the block's face.
+fn probe(mut plant: Plant<4>) -> (f64, f64) {
+    let (mut in_plant, mut touching) = (0.0, 0.0);
+    let cycles = (DURATION_S / 1e-3) as u32;
+    for cycle in 0..cycles {
+        let phase = core::f64::consts::TAU * f64::from(cycle) * 1e-3;
+        let target = Vector3::new(0.72, 0.0, 0.02 + 0.05 * phase.cos());
+        let tau = tip_spring(&plant, &target, 300.0, 20.0);
+        let start = Instant::now();
+        let measured = plant.cycle(&tau);
+        in_plant += start.elapsed().as_secs_f64();
+        touching += f64::from(u8::from(measured.force_n.z > 0.1)) / f64::from(cycles);
+    }
+    (DURATION_S / in_plant, touching)
+}
+
+fn main() {
+    let with_box = Scene {
+        ground: Some(Ground {
+            height_m: -0.4,
+            material: "wood".to_owned(),
+        }),
+        free_boxes: vec![FreeBox {
+            name: "carton".to_owned(),
+            mass_kg: 2.0,
+            center_m: [0.3, 0.6, -0.3],
+            size_m: [0.1, 0.1, 0.2],
+            rpy_rad: [0.0; 3],
+            material: "wood".to_owned(),
+            layer: None,
+        }],
+        ..block()
+    };
+    for (name, scene) in [
+        ("empty space", Scene::default()),
+        ("fixed block", block()),
+        ("fixed block and free box", with_box),
+    ] {
+        let (speed, touching) = probe(plant(scene));
+        println!(
+            "{name}: {speed:.1} times real time, in contact {:.0} % of it",
+            100.0 * touching
+        );
+    }
+}

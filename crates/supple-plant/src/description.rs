@@ -1,0 +1,47 @@
+//! The plant of a described arm.
+
+use crate::config::{ForceSensor, PlantConfig, Stops};
+use crate::drive::Drive;
+use crate::friction::LuGre;
+use supple_core::Vector;
+use supple_model::{Description, ModelError};
+
+impl<const N: usize> PlantConfig<N> {
+    /// The plant that a description describes, in empty space: its arm and tool, its friction (with a
+    /// Stribeck dip and a loaded part, see [`LuGre::from_friction`]), its motors and encoders with a
+    /// cycle of delay, its hard stops and its cap. The force sensor is noiseless.
+    ///
+    /// # Errors
+    /// [`ModelError::JointCount`] if the arm has not `N` moving joints.
+    pub fn from_description(description: &Description) -> Result<PlantConfig<N>, ModelError> {
+        let told = description.config::<N>()?;
+        let motors = description.motors();
+        let counts = motors.counts_per_revolution.map_or(0.0, f64::from);
+        let quantum = motors.torque_quantum_nm.as_deref();
+        let ideal = PlantConfig::ideal(told.arm);
+        Ok(PlantConfig {
+            friction: told
+                .friction
+                .map(|friction| LuGre::from_friction(&friction)),
+            drive: Drive {
+                joint_from_motor: told.joint_from_motor,
+                counts_per_motor_revolution: Vector::repeat(counts),
+                motor_torque_quantum_nm: quantum
+                    .map_or_else(Vector::zeros, Vector::from_column_slice),
+                torque_delay_cycles: 1,
+                ..Drive::direct()
+            },
+            stops: Some(Stops::new(
+                told.limits.position_lower_rad,
+                told.limits.position_upper_rad,
+            )),
+            tip_radius_m: match description.tool() {
+                Some(tool) => tool.cap_radius_m,
+                None => ideal.tip_radius_m,
+            },
+            force_sensor: ForceSensor::default(),
+            cycle_s: told.period_s,
+            ..ideal
+        })
+    }
+}

@@ -1,0 +1,170 @@
+//! What stands around the arm: ground, fixed blocks, free boxes, rubber layers.
+//!
+//! Plain data, from code or from TOML:
+//!
+//! ```toml
+//! [ground]
+//! height_m = -0.35
+//! material = "wood"
+//!
+//! [[fixed_block]]
+//! name = "table"
+//! center_m = [0.70, 0.0, -0.05]
+//! size_m = [0.30, 0.60, 0.10]
+//! rpy_rad = [0.0, 0.0, 0.0]         # may be left out
+//! material = "wood"
+//! layer = { thickness_m = 0.008, material = "rubber" }   # may be left out
+//!
+//! [[free_box]]
+//! name = "carton"
+//! mass_kg = 2.0
+//! center_m = [0.70, 0.0, -0.25]
+//! size_m = [0.10, 0.10, 0.20]
+//! material = "wood"
+//!
+//! [[material]]                       # "wood" and "rubber" are built in; this overrides or adds
+//! name = "wood"
+//! stiffness_n_per_m_1_5 = 1.4e8
+//! dissipation_s_per_m = 40.0
+//! friction = 0.3
+//! ```
+//!
+//! Coordinates are the arm's base axes. A layer lies on the top face (+z of the block); once the tip
+//! has pressed it through its thickness, it meets the block beneath as well. Unknown keys are refused.
+
+mod validate;
+
+pub use validate::SceneError;
+
+use crate::contact::Material;
+use serde::{Deserialize, Serialize};
+use supple_core::Pose;
+use supple_core::nalgebra::Vector3;
+
+/// Everything around the arm. The default is empty space.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Scene {
+    /// Horizontal ground, if any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ground: Option<Ground>,
+    /// Blocks that do not move.
+    #[serde(rename = "fixed_block", skip_serializing_if = "Vec::is_empty")]
+    pub fixed_blocks: Vec<FixedBlock>,
+    /// Boxes that do.
+    #[serde(rename = "free_box", skip_serializing_if = "Vec::is_empty")]
+    pub free_boxes: Vec<FreeBox>,
+    /// Materials beside the built-in ones, or in their place.
+    #[serde(rename = "material", skip_serializing_if = "Vec::is_empty")]
+    pub materials: Vec<Material>,
+}
+
+/// The half-space below a height.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Ground {
+    /// Height of the surface on base z \[m\].
+    pub height_m: f64,
+    /// Name of its material.
+    pub material: String,
+}
+
+/// A cuboid that does not move.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FixedBlock {
+    /// Its own name, unique in the scene.
+    pub name: String,
+    /// Centre, base axes \[m\].
+    pub center_m: [f64; 3],
+    /// Edge lengths along its own axes, without the layer \[m\], positive.
+    pub size_m: [f64; 3],
+    /// Fixed-axis roll, pitch, yaw \[rad\]; zero by default.
+    #[serde(default)]
+    pub rpy_rad: [f64; 3],
+    /// Name of its material.
+    pub material: String,
+    /// What lies on its top face.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub layer: Option<Layer>,
+}
+
+/// A cuboid of uniform density that moves.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FreeBox {
+    /// Its own name, unique in the scene.
+    pub name: String,
+    /// Mass \[kg\], positive.
+    pub mass_kg: f64,
+    /// Centre at the start, base axes \[m\].
+    pub center_m: [f64; 3],
+    /// Edge lengths along its own axes, without the layer \[m\], positive.
+    pub size_m: [f64; 3],
+    /// Fixed-axis roll, pitch, yaw at the start \[rad\]; zero by default.
+    #[serde(default)]
+    pub rpy_rad: [f64; 3],
+    /// Name of its material.
+    pub material: String,
+    /// What lies on its top face; weightless.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub layer: Option<Layer>,
+}
+
+/// A sheet on the whole top face of a block or box.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Layer {
+    /// Thickness \[m\], positive.
+    pub thickness_m: f64,
+    /// Name of its material.
+    pub material: String,
+}
+
+impl FixedBlock {
+    /// Its frame, origin at the centre: `base_from_block`.
+    pub fn pose(&self) -> Pose {
+        Pose::from_xyz_rpy(self.center_m, self.rpy_rad)
+    }
+
+    /// A level wooden block whose top face has its middle at `top_m`.
+    pub fn wooden(name: &str, top_m: Vector3<f64>, size_m: [f64; 3]) -> FixedBlock {
+        FixedBlock {
+            name: name.to_owned(),
+            center_m: [top_m.x, top_m.y, top_m.z - 0.5 * size_m[2]],
+            size_m,
+            rpy_rad: [0.0; 3],
+            material: "wood".to_owned(),
+            layer: None,
+        }
+    }
+}
+
+impl FreeBox {
+    /// Its frame at the start, origin at the centre: `base_from_box`.
+    pub fn pose(&self) -> Pose {
+        Pose::from_xyz_rpy(self.center_m, self.rpy_rad)
+    }
+}
+
+impl Scene {
+    /// Reads and validates; `file` names the text in errors.
+    ///
+    /// # Errors
+    /// [`SceneError`] with the element, the field, its value and what to do.
+    pub fn from_toml(text: &str, file: &str) -> Result<Scene, SceneError> {
+        let scene: Scene = toml::from_str(text).map_err(|error| SceneError::Toml {
+            file: file.to_owned(),
+            message: error.to_string(),
+        })?;
+        scene.validate()?;
+        Ok(scene)
+    }
+
+    /// The material of that name: the scene's own, else the built-in one.
+    pub fn material(&self, name: &str) -> Option<Material> {
+        let built_in = [Material::wood(), Material::rubber()];
+        let mut all = self.materials.iter().chain(&built_in);
+        all.find(|m| m.name == name).cloned()
+    }
+}

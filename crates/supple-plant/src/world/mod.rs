@@ -1,0 +1,181 @@
+//! The rapier world, kept behind types of this crate and of nalgebra.
+
+mod arm;
+mod convert;
+mod surface;
+
+pub use surface::{Object, ObjectKind};
+
+use crate::config::PlantConfig;
+use crate::contact::Bristle;
+use crate::error::PlantError;
+use arm::insert_arm;
+use convert::vector;
+use rapier3d_f64::dynamics::{MultibodyJointHandle, RigidBodyHandle};
+use rapier3d_f64::geometry::Ball;
+use rapier3d_f64::pipeline::PhysicsWorld;
+use supple_core::Vector;
+use supple_core::nalgebra::Vector3;
+use surface::{Surface, insert_scene};
+
+/// Index of the angular x coordinate, the one a revolute joint leaves free.
+const ANGULAR_X: usize = 3;
+
+/// Motion of the tip's ball.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct TipMotion {
+    pub center_m: Vector3<f64>,
+    pub linear_m_per_s: Vector3<f64>,
+    pub angular_rad_per_s: Vector3<f64>,
+}
+
+/// A force on the tip and the moment it has about the tip's centre.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct TipForce {
+    pub force_n: Vector3<f64>,
+    pub moment_nm: Vector3<f64>,
+    pub depth_m: f64,
+}
+
+pub(crate) struct World<const N: usize> {
+    physics: PhysicsWorld,
+    links: [RigidBodyHandle; N],
+    last_joint: MultibodyJointHandle,
+    surfaces: Vec<Surface>,
+    tip: Ball,
+}
+
+impl<const N: usize> World<N> {
+    /// The configuration has been validated.
+    pub fn new(config: &PlantConfig<N>, q: &Vector<N>, qd: &Vector<N>) -> Result<Self, PlantError> {
+        let mut physics = PhysicsWorld::new();
+        physics.gravity = vector(&config.arm.gravity());
+        let parameters = &mut physics.integration_parameters;
+        // One solver iteration is one substep: the step is the caller's.
+        parameters.num_solver_iterations = 1;
+        // Fewer let a box on the ground creep.
+        parameters.num_internal_pgs_iterations = 8;
+        // Recycled contacts are millimetres out of date.
+        parameters.contact_recycling = false;
+        parameters.max_ccd_substeps = 0;
+        let (links, last_joint) = insert_arm(&mut physics, &config.arm);
+        let surfaces = insert_scene(&mut physics, &config.scene)?;
+        // A step of no duration resolves masses and degrees of freedom.
+        physics.integration_parameters.dt = 0.0;
+        physics.step();
+        if let Some((arm, _)) = physics.multibody_joints.get_mut(last_joint) {
+            // The engine damps joints unless told otherwise.
+            arm.damping_mut().fill(0.0);
+            let armature = config.arm.armature();
+            arm.armature_mut().copy_from_slice(armature.as_slice());
+        }
+        let mut world = World {
+            physics,
+            links,
+            last_joint,
+            surfaces,
+            tip: Ball::new(config.tip_radius_m),
+        };
+        world.set_state(q, qd);
+        Ok(world)
+    }
+
+    /// Joint angles \[rad\] and velocities \[rad/s\].
+    pub fn state(&self) -> (Vector<N>, Vector<N>) {
+        let (mut q, mut qd) = (Vector::zeros(), Vector::zeros());
+        if let Some((arm, _)) = self.physics.multibody_joints.get(self.last_joint) {
+            for (i, link) in arm.links().skip(1).enumerate() {
+                q[i] = link.joint().coords()[ANGULAR_X];
+                qd[i] = arm.generalized_velocity()[i];
+            }
+        }
+        (q, qd)
+    }
+
+    pub fn set_state(&mut self, q: &Vector<N>, qd: &Vector<N>) {
+        let (now, _) = self.state();
+        let PhysicsWorld {
+            multibody_joints,
+            bodies,
+            ..
+        } = &mut self.physics;
+        if let Some((arm, _)) = multibody_joints.get_mut(self.last_joint) {
+            arm.apply_displacements((q - now).as_slice());
+            arm.generalized_velocity_mut().copy_from(qd);
+            arm.forward_kinematics(bodies, false);
+            arm.update_rigid_bodies(bodies, true);
+        }
+        for surface in &mut self.surfaces {
+            surface.bristle = Bristle::default();
+        }
+    }
+
+    /// Meets the tip with every surface, pushes what is free, and gives the force on the tip.
+    pub fn touch(&mut self, tip: &TipMotion, dt_s: f64) -> TipForce {
+        let mut total = TipForce::default();
+        for surface in &mut self.surfaces {
+            let body = &self.physics.bodies[surface.body];
+            let contact = surface.contact(body, &self.tip, tip);
+            let force_n = surface
+                .bristle
+                .advance(contact.as_ref(), &surface.material, dt_s);
+            let Some(contact) = contact else { continue };
+            total.force_n += force_n;
+            total.moment_nm += (contact.point_m - tip.center_m).cross(&force_n);
+            total.depth_m = total.depth_m.max(contact.depth_m);
+            if body.is_dynamic() {
+                let (force, point) = (vector(&-force_n), vector(&contact.point_m));
+                self.physics.bodies[surface.body].add_force_at_point(force, point, true);
+            }
+        }
+        total
+    }
+
+    /// The object that the tip is deepest inside, and how deep \[m\].
+    pub fn deepest(&self, tip: &TipMotion) -> Option<(String, f64)> {
+        let met = self.surfaces.iter().filter_map(|surface| {
+            let body = &self.physics.bodies[surface.body];
+            let contact = surface.contact(body, &self.tip, tip)?;
+            Some((surface.object(body).name, contact.depth_m))
+        });
+        met.max_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    /// Advances everything by `dt_s` under a torque on each link and a force at a point of the last
+    /// one, base axes.
+    pub fn step(
+        &mut self,
+        link_torque_nm: &[Vector3<f64>; N],
+        tip: &TipForce,
+        tip_center_m: &Vector3<f64>,
+        dt_s: f64,
+    ) {
+        for (i, handle) in self.links.iter().enumerate() {
+            let link = &mut self.physics.bodies[*handle];
+            link.reset_forces(false);
+            link.reset_torques(false);
+            link.add_torque(vector(&link_torque_nm[i]), true);
+            if i + 1 == N {
+                link.add_torque(vector(&tip.moment_nm), true);
+                link.add_force_at_point(vector(&tip.force_n), vector(tip_center_m), true);
+            }
+        }
+        self.physics.integration_parameters.dt = dt_s;
+        self.physics.step();
+        for surface in &self.surfaces {
+            // Asking for a body mutably has the engine look it over again.
+            if self.physics.bodies[surface.body].is_dynamic() {
+                let body = &mut self.physics.bodies[surface.body];
+                body.reset_forces(false);
+                body.reset_torques(false);
+            }
+        }
+    }
+
+    /// Everything around the arm as it stands now.
+    pub fn objects(&self) -> impl Iterator<Item = Object> {
+        let bodies = &self.physics.bodies;
+        let surfaces = self.surfaces.iter();
+        surfaces.map(|surface| surface.object(&bodies[surface.body]))
+    }
+}

@@ -1,0 +1,170 @@
+//! The force/torque sensor: forces, torques and accelerations, each three 16-bit little-endian values.
+//!
+//! A request for [`Property::FT`] is answered by two frames, forces first. Setting it to 0 tares the
+//! sensor, which takes a little over a second, during which its outputs are zero and its status is
+//! [`SensorStatus::TARING`]. Source: libbarrett, OWD, btclient. libbarrett trusts neither role nor
+//! version of this puck; its list of properties is one.
+
+use crate::frame::{CanFrame, LengthError};
+use crate::id::{GroupId, MessageId, NodeId};
+use crate::property::{self, Property, PropertyId, PropertyTable, Value};
+use core::fmt;
+
+/// Which of the sensor's three frames, with unit and scale.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// Force, 1/256 N.
+    Force,
+    /// Torque, 1/4096 N m.
+    Torque,
+    /// Acceleration, 1/1024 m/s^2.
+    Acceleration,
+}
+
+impl Quantity {
+    /// Counts per N, N m or m/s^2.
+    pub const fn counts_per_unit(self) -> f64 {
+        match self {
+            Quantity::Force => 256.0,
+            Quantity::Torque => 4096.0,
+            Quantity::Acceleration => 1024.0,
+        }
+    }
+
+    /// Group that its frames go to.
+    pub const fn group(self) -> GroupId {
+        match self {
+            Quantity::Force => GroupId::FORCE,
+            Quantity::Torque => GroupId::TORQUE,
+            Quantity::Acceleration => GroupId::ACCELERATION,
+        }
+    }
+
+    /// Counts of three components \[N, N m or m/s^2\], each rounded to the nearest with halves away
+    /// from zero, and saturated at what 16 bits hold: 128 N, 8 N m or 32 m/s^2.
+    ///
+    /// # Errors
+    /// A component that is not finite.
+    pub fn counts(self, components: [f64; 3]) -> Result<[i16; 3], NotFinite> {
+        if let Some(axis) = components.iter().position(|value| !value.is_finite()) {
+            let value = components[axis];
+            return Err(NotFinite { axis, value });
+        }
+        // The cast saturates.
+        Ok(components.map(|value| libm::round(value * self.counts_per_unit()) as i16))
+    }
+}
+
+/// A component that is not finite.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NotFinite {
+    /// Axis, 0 to 2.
+    pub axis: usize,
+    /// Value found.
+    pub value: f64,
+}
+
+impl fmt::Display for NotFinite {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let axis = self.axis;
+        write!(f, "component {axis} is {}, it must be finite", self.value)
+    }
+}
+
+impl core::error::Error for NotFinite {}
+
+/// The seventh byte, documented of torque frames: which axes have saturated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SensorStatus(pub u8);
+
+impl SensorStatus {
+    /// Sent while taring.
+    pub const TARING: SensorStatus = SensorStatus(0x7f);
+
+    /// The data of this frame are bad: an axis is saturated now, or the sensor is taring.
+    pub const fn bad_now(self) -> bool {
+        self.0 & 0x40 != 0
+    }
+
+    /// Whether axis 0 to 5 has saturated since the last tare; `None` beyond.
+    pub const fn saturated_since_tare(self, axis: u8) -> Option<bool> {
+        if axis < 6 {
+            Some(self.0 & (1 << axis) != 0)
+        } else {
+            None
+        }
+    }
+}
+
+/// One frame of the sensor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SensorReading {
+    /// What was measured.
+    pub quantity: Quantity,
+    /// x, y and z \[[`Quantity::counts_per_unit`]\].
+    pub counts: [i16; 3],
+    /// Status, where the frame carries it.
+    pub status: Option<SensorStatus>,
+}
+
+impl SensorReading {
+    /// x, y and z \[N, N m or m/s^2\].
+    pub fn components(&self) -> [f64; 3] {
+        let scale = self.quantity.counts_per_unit();
+        self.counts.map(|counts| f64::from(counts) / scale)
+    }
+
+    /// Reads a frame of `quantity`, which its group tells; sender and group are not looked at.
+    ///
+    /// # Errors
+    /// A payload of neither six nor seven bytes.
+    pub fn parse(quantity: Quantity, frame: &CanFrame) -> Result<SensorReading, LengthError> {
+        let (bytes, status) = match *frame.payload() {
+            [a, b, c, d, e, f] => ([a, b, c, d, e, f], None),
+            [a, b, c, d, e, f, status] => ([a, b, c, d, e, f], Some(SensorStatus(status))),
+            _ => return Err(frame.wrong_length(&[6, 7])),
+        };
+        let [a, b, c, d, e, f] = bytes;
+        let counts = [[a, b], [c, d], [e, f]].map(i16::from_le_bytes);
+        Ok(SensorReading {
+            quantity,
+            counts,
+            status,
+        })
+    }
+
+    /// The frame that node `from` sends.
+    pub fn emit(&self, from: NodeId) -> CanFrame {
+        let id = MessageId::to_group(from, self.quantity.group());
+        let [[a, b], [c, d], [e, f]] = self.counts.map(i16::to_le_bytes);
+        match self.status {
+            None => CanFrame::of(id, [a, b, c, d, e, f]),
+            Some(status) => CanFrame::of(id, [a, b, c, d, e, f, status.0]),
+        }
+    }
+}
+
+const fn listed(property: Property) -> PropertyId {
+    match PropertyTable::FORCE_TORQUE.id(property) {
+        Some(id) => id,
+        None => panic!("the sensor's list lacks the property"),
+    }
+}
+
+const FORCE_AND_TORQUE: PropertyId = const { listed(Property::FT) };
+const ACCELERATION: PropertyId = const { listed(Property::A) };
+
+/// The host asks for a force frame and a torque frame.
+pub fn request() -> CanFrame {
+    property::get(NodeId::FORCE_TORQUE, FORCE_AND_TORQUE)
+}
+
+/// The host asks for an acceleration frame.
+pub fn request_acceleration() -> CanFrame {
+    property::get(NodeId::FORCE_TORQUE, ACCELERATION)
+}
+
+/// The host has the sensor take what it feels for zero, before its readings are used.
+pub fn tare() -> CanFrame {
+    property::set(NodeId::FORCE_TORQUE, FORCE_AND_TORQUE, Value::Wide(0))
+}

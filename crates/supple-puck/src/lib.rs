@@ -1,0 +1,40 @@
+//! Barrett's puck protocol: CAN frames to typed values and back.
+//!
+//! Bytes in, values out. This crate opens no socket, reads no clock, allocates nothing and keeps no
+//! state; who polls whom, and when, is decided elsewhere. Reading a frame may fail, and the error
+//! names the value found and the one expected; writing one cannot fail, because the types hold only
+//! what the wire can carry.
+//!
+//! The bus is classical CAN 2.0A with 11-bit ids at 1 Mbit/s. Facts are from Barrett's libbarrett
+//! (2018) and btclient (2013), OWD (2015) and the WAM Arm User's Manual D1001 (2008); each module
+//! names the sources that its facts have.
+//!
+//! ```
+//! use supple_puck::{CanFrame, Counts, GroupId, MessageId, NodeId, PositionReply};
+//!
+//! let id = MessageId::to_group(NodeId::joint(1).unwrap(), GroupId::POSITION);
+//! let frame = CanFrame::new(id, &[0x00, 0x10, 0x00])?;
+//! let reply = PositionReply::parse(&frame)?;
+//! assert_eq!(reply.motor, Counts::new(4096)?);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+#![no_std]
+#![forbid(unsafe_code)]
+
+pub mod force_torque;
+pub mod frame;
+pub mod id;
+pub mod inbound;
+pub mod position;
+pub mod property;
+pub mod safety;
+pub mod status;
+pub mod timing;
+pub mod torque;
+
+pub use frame::CanFrame;
+pub use id::{Destination, GroupId, MessageId, NodeId};
+pub use inbound::Inbound;
+pub use position::{Counts, PositionReply, PositionScale};
+pub use property::{Property, PropertyId, PropertyMessage, PropertyTable, PuckKind, Value, Width};
+pub use torque::{PackedTorques, PuckTorque, TorqueScale};

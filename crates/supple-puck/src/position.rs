@@ -1,0 +1,170 @@
+//! Position replies: 22-bit two's complement counts, most significant byte first, without a property
+//! byte, sent to [`GroupId::POSITION`].
+//!
+//! Three bytes are the motor's; six are the motor's and the joint encoder's. The two top bits of each
+//! triple are documented as zero; libbarrett's own check of them is disabled there as unsettled, and
+//! every public reader ignores them. So does this one. Source: libbarrett, btclient, OWD, manual.
+
+use crate::frame::{CanFrame, LengthError};
+use crate::id::{GroupId, MessageId, NodeId};
+use core::f64::consts::TAU;
+use core::fmt;
+
+/// An encoder's position, -2 097 152 to 2 097 151 counts: what 22 bits hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Counts(i32);
+
+/// A position that 22 bits do not hold.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum CountsError {
+    /// Counts beyond the range.
+    Beyond(i32),
+    /// An angle that is not finite, or beyond the range once in counts; the counts.
+    Angle(f64),
+}
+
+impl fmt::Display for CountsError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let range = "it must be -2097152 to 2097151";
+        match self {
+            CountsError::Beyond(counts) => write!(f, "position is {counts} counts, {range}"),
+            CountsError::Angle(counts) => write!(f, "position is {counts:.1} counts, {range}"),
+        }
+    }
+}
+
+impl core::error::Error for CountsError {}
+
+impl Counts {
+    /// Least position: -512 revolutions at 4096 counts.
+    pub const MIN: Counts = Counts(-(1 << 21));
+    /// Greatest position.
+    pub const MAX: Counts = Counts((1 << 21) - 1);
+
+    /// A position in range.
+    ///
+    /// # Errors
+    /// Counts that 22 bits do not hold.
+    pub const fn new(counts: i32) -> Result<Counts, CountsError> {
+        if counts >= Counts::MIN.0 && counts <= Counts::MAX.0 {
+            Ok(Counts(counts))
+        } else {
+            Err(CountsError::Beyond(counts))
+        }
+    }
+
+    /// Its number of counts.
+    pub const fn get(self) -> i32 {
+        self.0
+    }
+
+    const fn parse(bytes: [u8; 3]) -> Counts {
+        let word = u32::from_be_bytes([0, bytes[0], bytes[1], bytes[2]]);
+        Counts((word << 10) as i32 >> 10)
+    }
+
+    const fn emit(self) -> [u8; 3] {
+        let [_, high, middle, low] = self.0.to_be_bytes();
+        [high & 0x3f, middle, low]
+    }
+}
+
+/// Counts per revolution of an encoder.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PositionScale {
+    counts_per_rad: f64,
+}
+
+/// An encoder of no counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PositionScaleError(pub i32);
+
+impl fmt::Display for PositionScaleError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "encoder has {} counts per revolution, it must have 1 or more",
+            self.0
+        )
+    }
+}
+
+impl core::error::Error for PositionScaleError {}
+
+impl PositionScale {
+    /// From the value of [`Property::CTS`](crate::Property::CTS): 4096 for the magnetic encoder,
+    /// 40960 for the optical one.
+    ///
+    /// # Errors
+    /// A number that is not positive.
+    pub fn new(counts_per_revolution: i32) -> Result<PositionScale, PositionScaleError> {
+        if counts_per_revolution > 0 {
+            Ok(PositionScale {
+                counts_per_rad: f64::from(counts_per_revolution) / TAU,
+            })
+        } else {
+            Err(PositionScaleError(counts_per_revolution))
+        }
+    }
+
+    /// Angle of the encoder \[rad\].
+    pub fn rad(&self, counts: Counts) -> f64 {
+        f64::from(counts.0) / self.counts_per_rad
+    }
+
+    /// The nearest count to an angle of the encoder \[rad\], halves away from zero.
+    ///
+    /// # Errors
+    /// An angle that is not finite, or that 22 bits of counts do not hold.
+    pub fn counts(&self, angle_rad: f64) -> Result<Counts, CountsError> {
+        let counts = libm::round(angle_rad * self.counts_per_rad);
+        let (least, greatest) = (f64::from(Counts::MIN.0), f64::from(Counts::MAX.0));
+        if (least..=greatest).contains(&counts) {
+            Ok(Counts(counts as i32))
+        } else {
+            Err(CountsError::Angle(counts))
+        }
+    }
+}
+
+/// What a motor puck answers to a request for its position.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PositionReply {
+    /// Motor encoder.
+    pub motor: Counts,
+    /// Joint encoder of the pucks that have one. Not absolute before its index has been found.
+    pub joint: Option<Counts>,
+}
+
+impl PositionReply {
+    /// Reads a frame to [`GroupId::POSITION`]; whom it is for is not looked at.
+    ///
+    /// # Errors
+    /// A payload of neither three nor six bytes.
+    pub fn parse(frame: &CanFrame) -> Result<PositionReply, LengthError> {
+        match *frame.payload() {
+            [a, b, c] => Ok(PositionReply {
+                motor: Counts::parse([a, b, c]),
+                joint: None,
+            }),
+            [a, b, c, d, e, f] => Ok(PositionReply {
+                motor: Counts::parse([a, b, c]),
+                joint: Some(Counts::parse([d, e, f])),
+            }),
+            _ => Err(frame.wrong_length(&[3, 6])),
+        }
+    }
+
+    /// The frame that node `from` sends.
+    pub const fn emit(&self, from: NodeId) -> CanFrame {
+        let id = MessageId::to_group(from, GroupId::POSITION);
+        let [a, b, c] = self.motor.emit();
+        match self.joint {
+            None => CanFrame::of(id, [a, b, c]),
+            Some(joint) => {
+                let [d, e, f] = joint.emit();
+                CanFrame::of(id, [a, b, c, d, e, f])
+            }
+        }
+    }
+}

@@ -1,0 +1,247 @@
+//! Properties: the named values of a puck, asked for and set by id.
+//!
+//! ```text
+//! get    A=0 PPPPPPP                          1 byte
+//! set    A=1 PPPPPPP   00   value             4 bytes (16-bit value) or 6 (32-bit value)
+//! ```
+//!
+//! The value is little-endian two's complement. A puck's reply is a set frame to [`GroupId::REPLY`].
+//! Exceptions to this form have modules of their own: [`position`](crate::position),
+//! [`torque`](crate::torque), [`force_torque`](crate::force_torque). Which id a property has depends
+//! on the firmware: [`PropertyTable`]. Source: libbarrett, btclient, manual.
+
+mod ids;
+mod names;
+mod table;
+
+pub use table::{FirmwareTooOld, PropertyTable, PuckKind, Slot};
+
+use crate::frame::{CanFrame, LengthError};
+use crate::id::{Destination, GroupId, MessageId, NodeId};
+use core::fmt;
+
+pub(crate) const SET_BIT: u8 = 0x80;
+
+/// A property by its name in Barrett's lists. Its id is found in a [`PropertyTable`].
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Property(u8);
+
+impl Property {
+    /// All of them.
+    pub fn all() -> impl Iterator<Item = Property> {
+        (0..ids::NAMES.len() as u8).map(Property)
+    }
+
+    /// Its name; of two names the more usual.
+    pub fn name(self) -> &'static str {
+        ids::NAMES[usize::from(self.0)]
+    }
+
+    /// The property that has this name, in capitals; `None` where Barrett's lists have none.
+    pub fn from_name(name: &str) -> Option<Property> {
+        let alias = ids::ALIASES.iter().find(|(alias, _)| *alias == name);
+        let named = || Property::all().find(|property| property.name() == name);
+        alias.map(|&(_, property)| property).or_else(named)
+    }
+}
+
+impl fmt::Debug for Property {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl fmt::Display for Property {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// Number of a property in one firmware, 0 to 127.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct PropertyId(u8);
+
+impl PropertyId {
+    /// Id `number`; `None` above 127.
+    pub const fn new(number: u8) -> Option<PropertyId> {
+        if number & SET_BIT == 0 {
+            Some(PropertyId(number))
+        } else {
+            None
+        }
+    }
+
+    /// Its number, 0 to 127.
+    pub const fn number(self) -> u8 {
+        self.0
+    }
+
+    pub(crate) const fn from_byte(byte: u8) -> PropertyId {
+        PropertyId(byte & !SET_BIT)
+    }
+}
+
+/// Width of a value on the wire.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Width {
+    /// 16 bits, a frame of four bytes.
+    Narrow,
+    /// 32 bits, a frame of six bytes. The id after such a property's is left free.
+    Wide,
+}
+
+/// A property's value with its width.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Value {
+    /// 16 bits.
+    Narrow(i16),
+    /// 32 bits. A host may send this whatever the property's width.
+    Wide(i32),
+}
+
+impl Value {
+    /// Its number, the sign extended.
+    pub const fn get(self) -> i32 {
+        match self {
+            Value::Narrow(value) => value as i32,
+            Value::Wide(value) => value,
+        }
+    }
+
+    /// `value` in `width`; `None` where 16 bits do not hold it.
+    pub fn of_width(value: i32, width: Width) -> Option<Value> {
+        match width {
+            Width::Narrow => i16::try_from(value).ok().map(Value::Narrow),
+            Width::Wide => Some(Value::Wide(value)),
+        }
+    }
+}
+
+/// A request or an assignment.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PropertyMessage {
+    /// Asks for a value.
+    Get(PropertyId),
+    /// Sets a value, or replies with it.
+    Set(PropertyId, Value),
+}
+
+/// Why a frame is not a property message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PropertyError {
+    /// A payload of neither one, four nor six bytes.
+    Length(LengthError),
+    /// One byte, but with the set bit.
+    SetWithoutValue(u8),
+    /// A value, but behind a byte without the set bit.
+    GetWithValue(u8),
+    /// A second byte that is not zero.
+    Padding(u8),
+    /// A request where a reply was expected; the property's id.
+    NotAReply(PropertyId),
+}
+
+impl fmt::Display for PropertyError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            PropertyError::Length(error) => write!(f, "property message: {error}"),
+            PropertyError::SetWithoutValue(byte) => write!(
+                f,
+                "property message is the single byte {byte:#04x}, expected a value behind its set bit"
+            ),
+            PropertyError::GetWithValue(byte) => write!(
+                f,
+                "property message begins with {byte:#04x}, expected bit 0x80 set before a value"
+            ),
+            PropertyError::Padding(byte) => write!(
+                f,
+                "second byte of the property message is {byte:#04x}, expected 0"
+            ),
+            PropertyError::NotAReply(id) => {
+                write!(f, "request for property {}, expected a reply", id.0)
+            }
+        }
+    }
+}
+
+impl core::error::Error for PropertyError {}
+
+impl PropertyMessage {
+    /// Reads a property message; sender and destination are not looked at.
+    ///
+    /// # Errors
+    /// See [`PropertyError`].
+    pub fn parse(frame: &CanFrame) -> Result<PropertyMessage, PropertyError> {
+        let (head, padding, value) = match *frame.payload() {
+            [head] if head & SET_BIT == 0 => return Ok(PropertyMessage::Get(PropertyId(head))),
+            [head] => return Err(PropertyError::SetWithoutValue(head)),
+            [head, padding, a, b] => (head, padding, Value::Narrow(i16::from_le_bytes([a, b]))),
+            [head, padding, a, b, c, d] => {
+                let value = i32::from_le_bytes([a, b, c, d]);
+                (head, padding, Value::Wide(value))
+            }
+            _ => return Err(PropertyError::Length(frame.wrong_length(&[1, 4, 6]))),
+        };
+        if head & SET_BIT == 0 {
+            return Err(PropertyError::GetWithValue(head));
+        }
+        if padding != 0 {
+            return Err(PropertyError::Padding(padding));
+        }
+        Ok(PropertyMessage::Set(PropertyId::from_byte(head), value))
+    }
+
+    /// The frame from node to node or group.
+    pub const fn emit(&self, from: NodeId, to: Destination) -> CanFrame {
+        let id = MessageId::new(from, to);
+        match *self {
+            PropertyMessage::Get(property) => CanFrame::of(id, [property.0]),
+            PropertyMessage::Set(property, Value::Narrow(value)) => {
+                let [a, b] = value.to_le_bytes();
+                CanFrame::of(id, [property.0 | SET_BIT, 0, a, b])
+            }
+            PropertyMessage::Set(property, Value::Wide(value)) => {
+                let [a, b, c, d] = value.to_le_bytes();
+                CanFrame::of(id, [property.0 | SET_BIT, 0, a, b, c, d])
+            }
+        }
+    }
+}
+
+/// The host asks for a property.
+pub fn get(to: impl Into<Destination>, property: PropertyId) -> CanFrame {
+    PropertyMessage::Get(property).emit(NodeId::HOST, to.into())
+}
+
+/// The host sets a property. Pucks do not answer; read [`Property::STAT`] to know that it was taken.
+pub fn set(to: impl Into<Destination>, property: PropertyId, value: Value) -> CanFrame {
+    PropertyMessage::Set(property, value).emit(NodeId::HOST, to.into())
+}
+
+/// A puck's answer to a request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Reply {
+    /// Which property.
+    pub property: PropertyId,
+    /// Its value.
+    pub value: Value,
+}
+
+impl Reply {
+    /// Reads a frame to [`GroupId::REPLY`]; sender and destination are not looked at.
+    ///
+    /// # Errors
+    /// See [`PropertyError`]; a request is refused too.
+    pub fn parse(frame: &CanFrame) -> Result<Reply, PropertyError> {
+        match PropertyMessage::parse(frame)? {
+            PropertyMessage::Set(property, value) => Ok(Reply { property, value }),
+            PropertyMessage::Get(property) => Err(PropertyError::NotAReply(property)),
+        }
+    }
+
+    /// The frame that node `from` sends.
+    pub const fn emit(&self, from: NodeId) -> CanFrame {
+        let message = PropertyMessage::Set(self.property, self.value);
+        message.emit(from, Destination::Group(GroupId::REPLY))
+    }
+}

@@ -1,0 +1,53 @@
+//! The safety module: its mode, its limits, and the pendant's lights and buttons.
+//!
+//! It listens to torque commands and position replies and takes the motors out of torque mode on
+//! excess torque, speed or voltage and when positions stop. The host may lower its mode and never
+//! raise it: that takes a person at the pendant. Source: libbarrett, btclient, OWD, manual page 48.
+
+mod limits;
+mod pendant;
+
+pub use limits::{SafetyLimits, SafetyLimitsError, SpeedLimit, SpeedLimitError};
+pub use pendant::{Button, Level, PenWord, Pendant, PendantError, SevenSegment};
+
+use crate::status::UnknownValue;
+
+/// [`Property::MODE`](crate::Property::MODE) of the safety module, lowest first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum SafetyMode {
+    /// Emergency stop: the motor pucks have no power and forget their positions.
+    EStop = 0,
+    /// The motors brake.
+    Idle = 1,
+    /// The motors take torques.
+    Active = 2,
+}
+
+impl SafetyMode {
+    /// From the property's value.
+    ///
+    /// # Errors
+    /// Not 0, 1 or 2.
+    pub const fn from_value(value: i32) -> Result<SafetyMode, UnknownValue> {
+        match value {
+            0 => Ok(SafetyMode::EStop),
+            1 => Ok(SafetyMode::Idle),
+            2 => Ok(SafetyMode::Active),
+            _ => Err(UnknownValue {
+                property: "MODE of the safety module",
+                value,
+                expected: "0 (e-stop), 1 (idle) or 2 (active)",
+            }),
+        }
+    }
+
+    /// The property's value.
+    pub const fn value(self) -> i16 {
+        self as i16
+    }
+
+    /// The mode after the host asks for `requested`: lower modes are taken, higher ones ignored.
+    pub fn after_request(self, requested: SafetyMode) -> SafetyMode {
+        self.min(requested)
+    }
+}

@@ -1,0 +1,232 @@
+//! Values of the properties that say what a puck is and does. Source: libbarrett, btclient.
+
+use crate::property::PuckKind;
+use core::fmt;
+
+/// A value that a property of few values does not have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct UnknownValue {
+    /// Property.
+    pub property: &'static str,
+    /// Value found.
+    pub value: i32,
+    /// Values it has.
+    pub expected: &'static str,
+}
+
+impl fmt::Display for UnknownValue {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let UnknownValue {
+            property,
+            value,
+            expected,
+        } = self;
+        write!(f, "{property} is {value}, expected {expected}")
+    }
+}
+
+impl core::error::Error for UnknownValue {}
+
+/// [`Property::STAT`](crate::Property::STAT).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stat {
+    /// The monitor runs; the puck waits to be woken. Set, it restarts the puck.
+    Reset = 0,
+    /// Something is wrong.
+    Error = 1,
+    /// The firmware runs. Set, it wakes the puck.
+    Ready = 2,
+}
+
+impl Stat {
+    /// From the property's value.
+    ///
+    /// # Errors
+    /// Not 0, 1 or 2.
+    pub const fn from_value(value: i32) -> Result<Stat, UnknownValue> {
+        match value {
+            0 => Ok(Stat::Reset),
+            1 => Ok(Stat::Error),
+            2 => Ok(Stat::Ready),
+            _ => Err(UnknownValue {
+                property: "STAT",
+                value,
+                expected: "0 (reset), 1 (error) or 2 (ready)",
+            }),
+        }
+    }
+
+    /// The property's value.
+    pub const fn value(self) -> i16 {
+        self as i16
+    }
+}
+
+/// [`Property::MODE`](crate::Property::MODE) of a motor puck. The host sets `Idle`; torque mode is
+/// set by the safety module when the operator activates the arm.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MotorMode {
+    /// Windings shorted: the motor brakes, torque commands are ignored, the encoder lives.
+    Idle = 0,
+    /// Duty cycle.
+    Duty = 1,
+    /// Torque.
+    Torque = 2,
+    /// Position by the puck's own PID.
+    Pid = 3,
+    /// Velocity.
+    Velocity = 4,
+    /// Trapezoidal profile.
+    Trapezoidal = 5,
+}
+
+impl MotorMode {
+    /// From the property's value.
+    ///
+    /// # Errors
+    /// Not 0 to 5.
+    pub const fn from_value(value: i32) -> Result<MotorMode, UnknownValue> {
+        match value {
+            0 => Ok(MotorMode::Idle),
+            1 => Ok(MotorMode::Duty),
+            2 => Ok(MotorMode::Torque),
+            3 => Ok(MotorMode::Pid),
+            4 => Ok(MotorMode::Velocity),
+            5 => Ok(MotorMode::Trapezoidal),
+            _ => Err(UnknownValue {
+                property: "MODE of a motor puck",
+                value,
+                expected: "0 to 5",
+            }),
+        }
+    }
+
+    /// The property's value.
+    pub const fn value(self) -> i16 {
+        self as i16
+    }
+}
+
+/// [`Property::ROLE`](crate::Property::ROLE): what the puck is for, and with which options. A view
+/// over the property's low 16 bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Role(pub u16);
+
+/// The low five bits of a [`Role`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RoleType {
+    /// Motor of the arm.
+    Tater,
+    /// Gimbals.
+    Gimbals,
+    /// Safety module.
+    Safety,
+    /// Wraptor.
+    Wraptor,
+    /// Trigger.
+    Trigger,
+    /// Motor of the hand.
+    BarrettHand,
+    /// Force/torque sensor.
+    Force,
+}
+
+impl Role {
+    const TYPE_MASK: u16 = 0x1f;
+    /// A WAM's motor puck: magnetic encoder on the serial port.
+    pub const ARM_MOTOR: Role = Role(0x0100);
+    /// Motor of the arm with a joint encoder.
+    pub const ARM_MOTOR_WITH_JOINT_ENCODER: Role = Role(0x4100);
+    /// Safety module.
+    pub const SAFETY: Role = Role(0x0002);
+    /// Force/torque sensor.
+    pub const FORCE: Role = Role(0x0006);
+
+    /// From the property's value, whose sign means nothing.
+    pub const fn from_value(value: i32) -> Role {
+        Role(value as u16)
+    }
+
+    /// Type.
+    ///
+    /// # Errors
+    /// A type above 6.
+    pub const fn role_type(self) -> Result<RoleType, UnknownValue> {
+        match self.0 & Role::TYPE_MASK {
+            0 => Ok(RoleType::Tater),
+            1 => Ok(RoleType::Gimbals),
+            2 => Ok(RoleType::Safety),
+            3 => Ok(RoleType::Wraptor),
+            4 => Ok(RoleType::Trigger),
+            5 => Ok(RoleType::BarrettHand),
+            6 => Ok(RoleType::Force),
+            other => Err(UnknownValue {
+                property: "type in ROLE",
+                value: other as i32,
+                expected: "0 to 6",
+            }),
+        }
+    }
+
+    /// Family of property lists; `None` for types whose lists are not known. libbarrett takes the
+    /// motor's for taters, wraptors and hands.
+    pub const fn kind(self) -> Option<PuckKind> {
+        match self.role_type() {
+            Ok(RoleType::Tater | RoleType::Wraptor | RoleType::BarrettHand) => {
+                Some(PuckKind::Motor)
+            }
+            Ok(RoleType::Safety) => Some(PuckKind::Safety),
+            Ok(RoleType::Force) => Some(PuckKind::ForceTorque),
+            Ok(RoleType::Gimbals | RoleType::Trigger) | Err(_) => None,
+        }
+    }
+
+    const fn has(self, bit: u16) -> bool {
+        self.0 & bit != 0
+    }
+
+    /// Temperature sensor select.
+    pub const fn temperature_select(self) -> bool {
+        self.has(0x0040)
+    }
+
+    /// Processor at 20 MHz; else 32 MHz.
+    pub const fn clock_20_mhz(self) -> bool {
+        self.has(0x0080)
+    }
+
+    /// Absolute magnetic encoder on the serial port.
+    pub const fn magnetic_encoder_serial(self) -> bool {
+        self.has(0x0100)
+    }
+
+    /// Magnetic encoder on the hall port.
+    pub const fn magnetic_encoder_hall(self) -> bool {
+        self.has(0x0200)
+    }
+
+    /// Magnetic encoder on the encoder port.
+    pub const fn magnetic_encoder(self) -> bool {
+        self.has(0x0400)
+    }
+
+    /// Strain gauge.
+    pub const fn strain(self) -> bool {
+        self.has(0x0800)
+    }
+
+    /// Tactile sensor.
+    pub const fn tactile(self) -> bool {
+        self.has(0x1000)
+    }
+
+    /// Inertial sensor.
+    pub const fn imu(self) -> bool {
+        self.has(0x2000)
+    }
+
+    /// Optical joint encoder: position replies have six bytes.
+    pub const fn joint_encoder(self) -> bool {
+        self.has(0x4000)
+    }
+}

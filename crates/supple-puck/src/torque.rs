@@ -1,0 +1,191 @@
+//! Packed torques: four 14-bit two's complement values behind the property byte, most significant bit
+//! first. Each puck takes the slot that its [`Property::PIDX`](crate::Property::PIDX) names.
+//!
+//! Torques are rounded to the nearest unit with halves away from zero: the rounding is odd, so that it
+//! has no bias either way. (libbarrett rounds down, a bias of half a unit.) Beyond +-8191 units they
+//! saturate, as in libbarrett. Source: libbarrett, manual.
+
+use crate::frame::{CanFrame, LengthError};
+use crate::id::{GroupId, MessageId, NodeId};
+use crate::property::{PropertyId, SET_BIT};
+use core::fmt;
+
+/// A torque in a puck's units, -8192 to 8191; a host commands +-8191 at most. 1024 units are 1 A.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct PuckTorque(i16);
+
+impl PuckTorque {
+    /// No torque.
+    pub const ZERO: PuckTorque = PuckTorque(0);
+    /// The most that a host commands.
+    pub const MAX: PuckTorque = PuckTorque(8191);
+    /// The least that a host commands.
+    pub const MIN: PuckTorque = PuckTorque(-8191);
+
+    /// The nearest torque within +-8191 units.
+    pub const fn saturating(units: i32) -> PuckTorque {
+        if units > PuckTorque::MAX.0 as i32 {
+            PuckTorque::MAX
+        } else if units < PuckTorque::MIN.0 as i32 {
+            PuckTorque::MIN
+        } else {
+            PuckTorque(units as i16)
+        }
+    }
+
+    /// Its number of units.
+    pub const fn units(self) -> i16 {
+        self.0
+    }
+
+    const fn from_low_14_bits(bits: u64) -> PuckTorque {
+        PuckTorque(((bits as u16) << 2) as i16 >> 2)
+    }
+
+    const fn low_14_bits(self) -> u64 {
+        (self.0 as u16 & 0x3fff) as u64
+    }
+}
+
+/// Units of torque per N m of one puck's motor: where newton metres become puck units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TorqueScale {
+    units_per_nm: f64,
+}
+
+/// What cannot be turned into puck units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum TorqueError {
+    /// A scale that is not finite and positive \[1/(N m)\].
+    Scale(f64),
+    /// A torque that is not finite \[N m\].
+    Torque(f64),
+}
+
+impl fmt::Display for TorqueError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            TorqueError::Scale(scale) => write!(
+                f,
+                "torque scale is {scale} units per N m, it must be finite and positive"
+            ),
+            TorqueError::Torque(torque) => {
+                write!(f, "motor torque is {torque} N m, it must be finite")
+            }
+        }
+    }
+}
+
+impl core::error::Error for TorqueError {}
+
+impl TorqueScale {
+    /// From the value of [`Property::IPNM`](crate::Property::IPNM) or an identified one. Barrett's are
+    /// 2700 for motors 1 to 4, 6500 for 5 and 6, 17474 for 7.
+    ///
+    /// # Errors
+    /// A scale that is not finite and positive.
+    pub const fn new(units_per_nm: f64) -> Result<TorqueScale, TorqueError> {
+        if units_per_nm.is_finite() && units_per_nm > 0.0 {
+            Ok(TorqueScale { units_per_nm })
+        } else {
+            Err(TorqueError::Scale(units_per_nm))
+        }
+    }
+
+    /// Units per N m.
+    pub const fn units_per_nm(&self) -> f64 {
+        self.units_per_nm
+    }
+
+    /// Nearest torque of the motor to `torque_nm`, halves away from zero, within +-8191 units.
+    ///
+    /// # Errors
+    /// A torque that is not finite: saturation would make a limit of it.
+    pub fn puck_torque(&self, torque_nm: f64) -> Result<PuckTorque, TorqueError> {
+        if torque_nm.is_finite() {
+            // A float beyond the integers saturates in the cast, then again here.
+            let units = libm::round(torque_nm * self.units_per_nm) as i32;
+            Ok(PuckTorque::saturating(units))
+        } else {
+            Err(TorqueError::Torque(torque_nm))
+        }
+    }
+
+    /// Torque of the motor \[N m\].
+    pub fn torque_nm(&self, torque: PuckTorque) -> f64 {
+        f64::from(torque.0) / self.units_per_nm
+    }
+}
+
+/// One torque frame: the commands of up to four pucks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PackedTorques {
+    /// Id of [`Property::T`](crate::Property::T) in the pucks' firmware: 42 from version 61.
+    pub property: PropertyId,
+    /// By slot; zero where no puck is.
+    pub slots: [PuckTorque; 4],
+}
+
+/// Why a frame is not one of packed torques.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PackedTorquesError {
+    /// Not eight bytes.
+    Length(LengthError),
+    /// The first byte lacks the set bit.
+    NotASet(u8),
+}
+
+impl fmt::Display for PackedTorquesError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            PackedTorquesError::Length(error) => write!(f, "torque frame: {error}"),
+            PackedTorquesError::NotASet(byte) => write!(
+                f,
+                "torque frame begins with {byte:#04x}, expected a property id with bit 0x80 set"
+            ),
+        }
+    }
+}
+
+impl core::error::Error for PackedTorquesError {}
+
+impl PackedTorques {
+    /// Torque in slot `pidx`, 1 to 4 as the property counts them; `None` beyond.
+    pub fn slot(&self, pidx: u8) -> Option<PuckTorque> {
+        let index = usize::from(pidx).checked_sub(1)?;
+        self.slots.get(index).copied()
+    }
+
+    /// Reads a frame to [`GroupId::LOWER_TORQUES`] or [`GroupId::UPPER_TORQUES`]; whom it is for is
+    /// not looked at.
+    ///
+    /// # Errors
+    /// Not eight bytes, or a first byte that is a request.
+    pub fn parse(frame: &CanFrame) -> Result<PackedTorques, PackedTorquesError> {
+        let Ok([head, rest @ ..]) = <[u8; 8]>::try_from(frame.payload()) else {
+            return Err(PackedTorquesError::Length(frame.wrong_length(&[8])));
+        };
+        if head & SET_BIT == 0 {
+            return Err(PackedTorquesError::NotASet(head));
+        }
+        let [a, b, c, d, e, f, g] = rest;
+        let bits = u64::from_be_bytes([0, a, b, c, d, e, f, g]);
+        Ok(PackedTorques {
+            property: PropertyId::from_byte(head),
+            slots: [42, 28, 14, 0].map(|shift| PuckTorque::from_low_14_bits(bits >> shift)),
+        })
+    }
+
+    /// The frame that the host sends to `group`.
+    pub fn emit(&self, group: GroupId) -> CanFrame {
+        let bits = self
+            .slots
+            .iter()
+            .fold(0, |bits, torque| bits << 14 | torque.low_14_bits());
+        let [_, a, b, c, d, e, f, g] = bits.to_be_bytes();
+        CanFrame::of(
+            MessageId::to_group(NodeId::HOST, group),
+            [self.property.number() | SET_BIT, a, b, c, d, e, f, g],
+        )
+    }
+}

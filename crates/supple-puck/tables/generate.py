@@ -1,0 +1,171 @@
+#!/usr/bin/env python3
+"""Writes src/property/{names,ids}.rs from tests/data/property_ids.csv."""
+
+import csv
+import subprocess
+from collections import defaultdict
+from pathlib import Path
+
+CRATE = Path(__file__).resolve().parent.parent
+SOURCE = CRATE / "tests/data/property_ids.csv"
+FOLDER = CRATE / "src/property"
+
+ALIASES = {"TORQ": "T", "AP": "P", "B": "FET0", "TENSION": "FET1"}
+
+# 32 bits wide where the next id is left free for the upper half, and the pendant's word always.
+WIDE = "P DP E OT CT M MECH CTS IOFF HALLH EN JP JOFST".split()
+WIDE_WITHOUT_PLACE_HOLDER = "PEN"
+
+MEANING = {
+    "VERS": "Firmware version. Always valid.",
+    "ROLE": "What the puck is for, see [`Role`](crate::status::Role). Always valid.",
+    "SN": "Serial number. Always valid.",
+    "ID": "Node id. Always valid.",
+    "ERROR": "Error; its codes are not published. Always valid.",
+    "STAT": "Monitor or firmware, see [`Stat`](crate::status::Stat). Always valid.",
+    "ADDR": "`ADDR` of Barrett's lists. Always valid.",
+    "VALUE": "`VALUE` of Barrett's lists. Always valid.",
+    "MODE": "[`MotorMode`](crate::status::MotorMode) or [`SafetyMode`](crate::safety::SafetyMode).",
+    "TEMP": "Temperature \\\\[degrees Celsius\\\\].",
+    "PTEMP": "Peak temperature \\\\[degrees Celsius\\\\].",
+    "OTEMP": "Temperature limit \\\\[degrees Celsius\\\\], 60 by default.",
+    "LOCK": "Takes the sequence that unlocks a change of node id or role.",
+    "FET1": "`FET1` of Barrett's lists; `TENSION` is another name.",
+    "FET0": "`FET0` of Barrett's lists; `B` is another name.",
+    "THERM": "Temperature of the thermistor \\[degrees Celsius\\].",
+    "VBUS": "Bus voltage; 48 V nominal.",
+    "GRPA": "First group the puck listens to.",
+    "GRPB": "Second group the puck listens to.",
+    "GRPC": "Third group the puck listens to.",
+    "CMD": "Takes a command: 13 hand init, 18 close, 19 move, 20 open.",
+    "SAVE": "Set to a property id (or -1, all): writes it to the EEPROM.",
+    "LOAD": "Set to a property id: reads it back from the EEPROM.",
+    "DEF": "Set to a property id: restores its factory default.",
+    "T": "Torque command \\\\[puck units\\\\], usually packed, see [`PackedTorques`](crate::torque::PackedTorques); `TORQ` is another name.",
+    "MT": "Greatest torque the puck applies \\\\[puck units\\\\].",
+    "P": "Position \\\\[counts\\\\]; its reply is packed, see [`PositionReply`](crate::position::PositionReply); `AP` is another name.",
+    "MECH": "Absolute magnetic angle \\\\[counts\\\\]; firmware 118 and later, with the magnetic encoder of [`Role`](crate::status::Role).",
+    "CTS": "Encoder counts per revolution: 4096 magnetic, 40960 optical.",
+    "PIDX": "Slot of a packed torque frame, 1 to 4.",
+    "JIDX": "Number of the joint.",
+    "IPNM": "Puck torque units per N m, see [`TorqueScale`](crate::torque::TorqueScale).",
+    "POLES": "Poles of the motor: 12, 8 or 6.",
+    "ACCEL": "Acceleration of the trapezoidal mode; 100 by default.",
+    "KP": "Proportional gain of the PID mode; 2000 by default.",
+    "KI": "Integral gain of the PID mode; 0 by default.",
+    "KD": "Derivative gain of the PID mode; 8000 by default.",
+    "JP": "`JP` of Barrett's lists \\[counts\\].",
+    "JOFST": "`JOFST` of Barrett's lists \\[counts\\].",
+    "ECMAX": "Not 0, or `ECMIN` not 0, once the joint encoder's index is found.",
+    "ECMIN": "See `ECMAX`.",
+    "LFLAGS": "Loop flags; their bits are not published.",
+    "TACT": "Kind of tactile report: 0 none, 1 top ten, 2 full, 3 tare.",
+    "ZERO": "1 once the safety module has been told that the arm's zero is right.",
+    "PEN": "The pendant, see [`PenWord`](crate::safety::PenWord).",
+    "SAFE": "Service command of the safety module; 0, 4 and 5 are known, for the voltage calibration.",
+    "VL1": "Speed warning, see [`SpeedLimit`](crate::safety::SpeedLimit).",
+    "VL2": "Speed fault, see [`SpeedLimit`](crate::safety::SpeedLimit).",
+    "TL1": "Torque warning \\\\[puck units\\\\].",
+    "TL2": "Torque fault \\\\[puck units\\\\].",
+    "VOLTL1": "Low voltage warning \\\\[V\\\\], 36 by default.",
+    "VOLTL2": "Low voltage fault \\\\[V\\\\], 30 by default.",
+    "VOLTH1": "High voltage warning \\\\[V\\\\], 54 by default.",
+    "VOLTH2": "High voltage fault \\\\[V\\\\], 57 by default.",
+    "IFAULT": "How many of the next speed faults to ignore.",
+    "FT": "Force and torque, see [`force_torque`](crate::force_torque); set to 0 it tares.",
+    "A": "Acceleration, see [`force_torque`](crate::force_torque).",
+}
+UNKNOWN = "`{}` of Barrett's lists."
+
+
+def read_tables():
+    tables = defaultdict(dict)
+    with SOURCE.open(newline="") as file:
+        for row in csv.DictReader(file):
+            names = tables[row["puck_type"], int(row["min_firmware"])]
+            assert names.setdefault(row["property"], int(row["id"])) == int(row["id"]), row
+    for names in tables.values():
+        for alias, name in ALIASES.items():
+            if alias in names:
+                assert names.pop(alias) == names[name], alias
+    return tables
+
+
+def columns_of(tables):
+    """The distinct lists: the motor's, then those of the other kinds that are not one of them."""
+    motor = sorted(version for kind, version in tables if kind == "Motor")
+    for kind, version in tables:
+        if kind == "Safety" and version < 61:
+            assert tables[kind, version] == tables["Motor", version]
+    others = [("Safety", 61), ("ForceTorque", 0), ("Monitor", 0)]
+    return motor, [("Motor", version) for version in motor] + others
+
+
+def cell(names, name):
+    if name not in names:
+        return "NO"
+    number = names[name]
+    assert number < 127
+    wide = name == WIDE_WITHOUT_PLACE_HOLDER or (
+        name in WIDE and number + 1 not in names.values()
+    )
+    return f"W+{number}" if wide else str(number)
+
+
+def main():
+    tables = read_tables()
+    motor, columns = columns_of(tables)
+    newest = [tables[column] for column in (columns[motor.index(motor[-1])], *columns[len(motor):])]
+
+    def rank(name):
+        for index, names in enumerate(newest):
+            if name in names:
+                return (index, names[name], name)
+        return (len(newest), 0, name)
+
+    names = sorted({name for table in tables.values() for name in table}, key=rank)
+    header = "// Generated by tables/generate.py from tests/data/property_ids.csv: change those, not this."
+    lines = [header, "", "use super::Property;", "", "impl Property {"]
+    for index, name in enumerate(names):
+        meaning = MEANING.get(name, UNKNOWN.format(name)).replace("\\\\", "\\")
+        lines.append(f"    /// {meaning}")
+        lines.append(f"    pub const {name}: Property = Property({index});")
+    write("names.rs", lines + ["}"])
+
+    lines = [
+        header,
+        "",
+        "use super::Property;",
+        "",
+        "/// Marks an id whose property is 32 bits wide.",
+        "pub(super) const W: u8 = 0x80;",
+        "/// Not in this list.",
+        "pub(super) const NO: u8 = 0x7f;",
+        "",
+        "/// Least motor firmware of each of the first columns.",
+        f"pub(super) const MOTOR_VERSIONS: [u16; {len(motor)}] = [{', '.join(map(str, motor))}];",
+    ]
+    for index, (kind, version) in enumerate(columns[len(motor):], start=len(motor)):
+        lines.append(f"/// Column of {kind}{f', firmware {version} and later' if version else ''}.")
+        constant = {"Safety": "SAFETY", "ForceTorque": "FORCE_TORQUE", "Monitor": "MONITOR"}[kind]
+        lines.append(f"pub(super) const {constant}_COLUMN: u8 = {index};")
+    lines += ["", f"pub(super) const ALIASES: [(&str, Property); {len(ALIASES)}] = ["]
+    lines += [f'    ("{alias}", Property::{name}),' for alias, name in ALIASES.items()]
+    lines += ["];", "", f"pub(super) const NAMES: [&str; {len(names)}] = ["]
+    lines += [", ".join(f'"{name}"' for name in names)]
+    lines += ["];", "", "/// Row per property, column per list.", "#[rustfmt::skip]"]
+    lines.append(f"pub(super) const IDS: [[u8; {len(columns)}]; {len(names)}] = [")
+    for name in names:
+        cells = ", ".join(f"{cell(tables[column], name):>5}" for column in columns)
+        lines.append(f"    [{cells}], // {name}")
+    write("ids.rs", lines + ["];"])
+
+
+def write(name, lines):
+    path = FOLDER / name
+    path.write_text("\n".join(lines) + "\n")
+    subprocess.run(["rustfmt", "--edition", "2024", str(path)], check=True)
+
+
+if __name__ == "__main__":
+    main()

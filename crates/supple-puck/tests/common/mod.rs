@@ -1,0 +1,14 @@
+//! What every property test shares.
+
+use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
+
+/// So many cases, the same in every run.
+pub fn config(seed: u64) -> ProptestConfig {
+    ProptestConfig {
+        failure_persistence: None,
+        rng_seed: RngSeed::Fixed(seed),
+        cases: 1000,
+        ..ProptestConfig::default()
+    }
+}

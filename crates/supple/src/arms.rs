@@ -1,0 +1,64 @@
+//! Built-in arms and others.
+
+use crate::console::{say, say_json};
+use crate::exit::Failure;
+use serde::Serialize;
+use std::path::Path;
+use supple_model::{Description, assets};
+
+/// A built-in arm by its name, or one from a file. A built-in name wins; `./wam4` is a path.
+///
+/// # Errors
+/// [`Failure::UnknownArm`] or [`Failure::Model`].
+pub fn find(name_or_path: &str) -> Result<Description, Failure> {
+    if assets().contains(&name_or_path) {
+        return Ok(Description::asset(name_or_path)?);
+    }
+    let meant_as_path = name_or_path.contains(std::path::MAIN_SEPARATOR)
+        || name_or_path.ends_with(".toml")
+        || Path::new(name_or_path).exists();
+    if meant_as_path {
+        return Ok(Description::load(name_or_path)?);
+    }
+    Err(Failure::UnknownArm {
+        found: name_or_path.to_owned(),
+        known: assets().join(", "),
+    })
+}
+
+#[derive(Serialize)]
+struct Line {
+    name: String,
+    joints: Vec<String>,
+    source: Option<String>,
+}
+
+/// Lists the built-in arms.
+///
+/// # Errors
+/// [`Failure`] where an arm is not sound or standard output cannot be written.
+pub fn list(as_json: bool) -> Result<(), Failure> {
+    let lines = assets()
+        .iter()
+        .map(|name| {
+            let arm = Description::asset(name)?;
+            Ok(Line {
+                name: arm.name().to_owned(),
+                joints: arm.joint_names().to_vec(),
+                source: arm.settings().source.clone(),
+            })
+        })
+        .collect::<Result<Vec<_>, Failure>>()?;
+    if as_json {
+        return say_json(&lines);
+    }
+    for line in lines {
+        say(&format!(
+            "{:8} {} joints: {}",
+            line.name,
+            line.joints.len(),
+            line.joints.join(", ")
+        ))?;
+    }
+    Ok(())
+}

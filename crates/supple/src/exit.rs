@@ -1,0 +1,157 @@
+//! How the program ends when it does not end well: one type, one code, one line.
+//!
+//! | code | meaning |
+//! |---|---|
+//! | 0 | done |
+//! | 1 | a defect of the program: please report it |
+//! | 2 | wrong use of the command line |
+//! | 3 | the description of the arm is wrong, or there is no such arm |
+//! | 4 | the arm cannot do the experiment |
+//! | 5 | a fault ended a run that should have gone through; all results are written |
+//! | 6 | a file cannot be read or written |
+//! | 130 | interrupted |
+
+use crate::figures::FigureError;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use supple_experiment::ExperimentError;
+use supple_log::LogError;
+use supple_model::ModelError;
+
+/// The codes in words, as `--help` ends.
+pub const CODES: &str = "Exit codes:
+  0    done
+  1    a defect of the program: please report it
+  2    wrong use of the command line
+  3    the description of the arm is wrong, or there is no such arm
+  4    the arm cannot do the experiment
+  5    a fault ended a run that should have gone through; all results are written
+  6    a file cannot be read or written
+  130  interrupted";
+
+/// Why the program did not do what it was asked for. One line that names the cause and the remedy.
+#[derive(Debug, thiserror::Error)]
+pub enum Failure {
+    /// Neither a built-in arm nor a file.
+    #[error(
+        "no arm named `{found}` is built in and there is no such file; give one of {known}, or the \
+         path of an arm's TOML or of its folder"
+    )]
+    UnknownArm {
+        /// What was asked for.
+        found: String,
+        /// Built-in arms.
+        known: String,
+    },
+    /// The description of the arm.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// An experiment that could not be run.
+    #[error(transparent)]
+    Experiment(#[from] ExperimentError),
+    /// Runs ended by a fault, with all results written.
+    #[error("a fault ended {runs}; the results are in {}, with the fault in the report", out.display())]
+    Fault {
+        /// Runs and their faults.
+        runs: String,
+        /// Where the results are.
+        out: PathBuf,
+    },
+    /// A log.
+    #[error(transparent)]
+    Log(#[from] LogError),
+    /// A file.
+    #[error("cannot {action} {}: {error}; {remedy}", path.display())]
+    File {
+        /// What was tried: `create`, `write`, `rename` ...
+        action: &'static str,
+        /// Which.
+        path: PathBuf,
+        /// What the system says.
+        error: std::io::Error,
+        /// What to do about it.
+        remedy: &'static str,
+    },
+    /// A file that would be replaced.
+    #[error("{} exists; give another name, or --force to replace it", path.display())]
+    Exists {
+        /// Which.
+        path: PathBuf,
+    },
+    /// A figure.
+    #[error("{0}; this is a defect, please report it")]
+    Figure(#[from] FigureError),
+    /// The report or the summary.
+    #[error("the report cannot be composed: {0}; this is a defect, please report it")]
+    Compose(String),
+}
+
+impl Failure {
+    /// A file that could not be written.
+    pub fn file(action: &'static str, path: &Path, error: std::io::Error) -> Failure {
+        use std::io::ErrorKind;
+        let remedy = match error.kind() {
+            ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => {
+                "make room, or choose another folder with --out"
+            }
+            _ => "choose a folder that can be written with --out",
+        };
+        Failure::File {
+            action,
+            path: path.to_owned(),
+            error,
+            remedy,
+        }
+    }
+
+    /// Short name, as `--json` gives it.
+    pub fn kind(&self) -> &'static str {
+        match self.code() {
+            2 => "usage",
+            3 => "description",
+            4 => "experiment",
+            5 => "fault",
+            6 => "file",
+            _ => "internal",
+        }
+    }
+
+    /// Exit code, see the module.
+    pub fn code(&self) -> u8 {
+        match self {
+            Failure::UnknownArm { .. } | Failure::Model(_) => 3,
+            Failure::Experiment(error) => experiment_code(error),
+            Failure::Fault { .. } => 5,
+            Failure::Log(error) => log_code(error),
+            Failure::File { .. } | Failure::Exists { .. } => 6,
+            Failure::Figure(_) | Failure::Compose(_) => 1,
+        }
+    }
+}
+
+/// What the description of the arm brings about is an error of the description.
+fn experiment_code(error: &ExperimentError) -> u8 {
+    match error {
+        ExperimentError::Model(_)
+        | ExperimentError::Arm(_)
+        | ExperimentError::Config(_)
+        | ExperimentError::Plant(_) => 3,
+        ExperimentError::Unreachable { .. }
+        | ExperimentError::Refused { .. }
+        | ExperimentError::FaultAtStart { .. } => 4,
+        ExperimentError::Log(error) => log_code(error),
+    }
+}
+
+fn log_code(error: &LogError) -> u8 {
+    match error {
+        LogError::Model(_) => 3,
+        _ => 6,
+    }
+}
+
+impl From<&Failure> for ExitCode {
+    fn from(failure: &Failure) -> ExitCode {
+        ExitCode::from(failure.code())
+    }
+}

@@ -1,0 +1,55 @@
+//! The arc that moves the base: path from above and error.
+
+use super::axis::Axis;
+use super::panel::{Key, Panel, Room, legend};
+use super::style::{BLUE, REFERENCE, px};
+use super::ticks::{Ticks, extent};
+use super::{FigureError, distance, mm, sheet};
+use supple_experiment::Sample;
+
+/// The SVG.
+pub fn draw(samples: &[Sample]) -> Result<String, FigureError> {
+    let words = "Path of the tip along the arc seen from above, and its error over time";
+    sheet((760, 270), words, |area| {
+        let (path, error) = area.split_horizontally(px(300.0));
+        let coordinate = |axis: usize| {
+            extent(
+                samples
+                    .iter()
+                    .flat_map(move |s| [s.reference_m[axis], s.tip_m[axis]]),
+            )
+        };
+        let mut panel = Panel::new(
+            &path,
+            "path from above, x enlarged",
+            Room::default(),
+            &Axis::new("y [m]", Ticks::around(coordinate(1), 4)),
+            &Axis::new("x [m]", Ticks::around(coordinate(0), 4)),
+        )?;
+        panel.line(
+            samples.iter().map(|s| (s.reference_m[1], s.reference_m[0])),
+            REFERENCE,
+            5.0,
+        )?;
+        panel.line(samples.iter().map(|s| (s.tip_m[1], s.tip_m[0])), BLUE, 1.4)?;
+        let off = |s: &Sample| mm(distance(&s.tip_m, &s.reference_m));
+        let end = samples.last().map_or(1.0, |s| s.time_s.floor());
+        let greatest = extent(samples.iter().map(off)).end;
+        let mut panel = Panel::new(
+            &error,
+            "distance from the reference",
+            Room::default(),
+            &Axis::new("time [s]", Ticks::stepped(0.0..end, 2.0)),
+            &Axis::new("distance [mm]", Ticks::around(0.0..1.05 * greatest, 5)),
+        )?;
+        panel.line(samples.iter().map(|s| (s.time_s, off(s))), BLUE, 1.4)?;
+        legend(
+            &error,
+            (240.0, 14.0),
+            &[
+                ("reference", Key::Line(5.0), REFERENCE),
+                ("actual", Key::Line(1.4), BLUE),
+            ],
+        )
+    })
+}

@@ -1,0 +1,104 @@
+//! An axis: quantity with unit, range and round ticks, in the drawing library's terms.
+
+use super::ticks::{Ticks, number};
+use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
+use std::ops::Range;
+
+/// One axis.
+#[derive(Clone, Debug)]
+pub struct Axis<'a> {
+    /// Quantity and unit.
+    pub label: &'a str,
+    /// Where it is labelled and how far it goes.
+    pub scale: Scale,
+}
+
+impl<'a> Axis<'a> {
+    /// From the first tick to the last.
+    pub fn new(label: &'a str, ticks: Ticks) -> Axis<'a> {
+        let range = ticks.range();
+        Axis::bounded(label, ticks, range)
+    }
+
+    /// Over a range of its own; ticks outside it are left out.
+    pub fn bounded(label: &'a str, ticks: Ticks, range: Range<f64>) -> Axis<'a> {
+        let inside = |at: &f64| range.start <= *at && *at <= range.end;
+        let ticks = Ticks {
+            at: ticks.at.into_iter().filter(inside).collect(),
+            ..ticks
+        };
+        Axis {
+            label,
+            scale: Scale {
+                ticks,
+                range,
+                decades: false,
+            },
+        }
+    }
+
+    /// Evenly spaced decades over a range above zero; ticks at 1, 2 and 5.
+    pub fn logarithmic(label: &'a str, range: Range<f64>) -> Axis<'a> {
+        let first = range.start.log10().floor() as i32;
+        let last = range.end.log10().ceil() as i32;
+        let decades =
+            (first..=last).flat_map(|d| [1.0, 2.0, 5.0].map(|lead| lead * 10.0_f64.powi(d)));
+        let ticks = Ticks {
+            at: decades.collect(),
+            decimals: 0,
+        };
+        let mut axis = Axis::bounded(label, ticks, range);
+        axis.scale.decades = true;
+        axis
+    }
+}
+
+/// Numbers along an axis.
+#[derive(Clone, Debug)]
+pub struct Scale {
+    ticks: Ticks,
+    range: Range<f64>,
+    decades: bool,
+}
+
+impl Scale {
+    fn along(&self, value: f64) -> f64 {
+        if self.decades { value.log10() } else { value }
+    }
+}
+
+impl Ranged for Scale {
+    type FormatOption = NoDefaultFormatting;
+    type ValueType = f64;
+
+    fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
+        let (from, to) = (self.along(self.range.start), self.along(self.range.end));
+        let share = (self.along(*value) - from) / (to - from);
+        limit.0 + (share * f64::from(limit.1 - limit.0)).round() as i32
+    }
+
+    fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
+        if hint.weight().allow_light_points() {
+            return Vec::new();
+        }
+        self.ticks.at.clone()
+    }
+
+    fn range(&self) -> Range<f64> {
+        self.range.clone()
+    }
+}
+
+impl ValueFormatter<f64> for Scale {
+    fn format(value: &f64) -> String {
+        value.to_string()
+    }
+
+    fn format_ext(&self, value: &f64) -> String {
+        if self.decades {
+            let below_one = (-value.log10().floor()).max(0.0);
+            return number(*value, below_one as usize);
+        }
+        self.ticks.label(*value)
+    }
+}

@@ -1,0 +1,82 @@
+//! Figure 4: what the torque of shoulder pitch and elbow is made of during the sinusoid.
+
+use super::axis::Axis;
+use super::panel::{Area, Key, Panel, Room, legend};
+use super::style::{BLUE, GREEN, PURPLE, VERMILION, px};
+use super::ticks::{Ticks, extent};
+use super::{FigureError, sheet};
+use plotters::style::RGBColor;
+use supple_experiment::{Demo, JointTorque, Sample};
+
+/// Term, its colour, its value.
+type Term = (&'static str, RGBColor, fn(&JointTorque) -> f64);
+
+const TERMS: [Term; 4] = [
+    ("gravity", PURPLE, |t| t.gravity),
+    ("inertial", GREEN, |t| t.inertial),
+    ("feedback", BLUE, |t| t.feedback),
+    ("friction", VERMILION, |t| t.friction),
+];
+
+/// The sinusoid at the paper's pace.
+pub fn samples(demo: &Demo) -> &[Sample] {
+    let paper = demo.sinusoids.iter().find(|(pace, _)| *pace == 1.0);
+    paper.map_or(&[], |(_, run)| &run.trace.samples)
+}
+
+/// The SVG.
+pub fn draw(samples: &[Sample]) -> Result<String, FigureError> {
+    let words = "Torque components of shoulder pitch and elbow over time: gravity, friction, \
+                 inertial, feedback; below the same without gravity";
+    sheet((760, 470), words, |area| {
+        let (head, body) = area.split_vertically(px(24.0));
+        let keys = TERMS.map(|(name, colour, _)| (name, Key::Line(2.0), colour));
+        legend(&head, (170.0, 13.0), &keys)?;
+        let (all, small) = body.split_vertically(px(235.0));
+        let names = ["(a)  shoulder pitch, joint 2", "(b)  elbow, joint 3"];
+        for (joint, (whole, part)) in halves(&all).iter().zip(&halves(&small)).enumerate() {
+            panel(whole, names[joint], samples, joint, &TERMS)?;
+            panel(
+                part,
+                "the same without gravity",
+                samples,
+                joint,
+                &TERMS[1..],
+            )?;
+        }
+        Ok(())
+    })
+}
+
+fn halves<'a>(area: &Area<'a>) -> [Area<'a>; 2] {
+    let (left, right) = area.split_horizontally(px(380.0));
+    [left, right]
+}
+
+fn panel(
+    area: &Area<'_>,
+    title: &str,
+    samples: &[Sample],
+    joint: usize,
+    terms: &[Term],
+) -> Result<(), FigureError> {
+    let values = samples.iter().flat_map(|s| {
+        terms
+            .iter()
+            .map(move |(_, _, value)| value(&s.torques[joint]))
+    });
+    let range = extent(values.chain([0.0]));
+    let end = samples.last().map_or(1.0, |s| s.time_s.floor());
+    let mut panel = Panel::new(
+        area,
+        title,
+        Room::default(),
+        &Axis::new("time [s]", Ticks::stepped(0.0..end, 4.0)),
+        &Axis::new("torque [N m]", Ticks::around(range, 5)),
+    )?;
+    for (_, colour, value) in terms {
+        let curve = samples.iter().map(|s| (s.time_s, value(&s.torques[joint])));
+        panel.line(curve, *colour, 1.6)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,230 @@
+//! Figure 6: impulse of one contact over stiffness, with the line through it.
+
+use super::axis::Axis;
+use super::panel::{Area, Key, Mark, Panel, Room, legend};
+use super::style::{BLUE, GREEN, INK, VERMILION, px};
+use super::ticks::{Ticks, extent, number};
+use super::{FigureError, sheet};
+use plotters::style::RGBColor;
+use std::ops::Range;
+use supple_experiment::Demo;
+use supple_experiment::metrics::LineFit;
+use supple_experiment::summary::Exploration;
+
+/// What the second panel shows \[N/m\].
+const NEAR_ZERO_N_PER_M: f64 = 25.0;
+
+/// Impulses of runs that differ in stiffness only.
+pub struct Series {
+    /// `K` \[N/m\], impulse over the whole cycle \[N s\].
+    pub whole: Vec<(f64, f64)>,
+    /// `K` \[N/m\], impulse over the first 50 ms \[N s\].
+    pub first_50ms: Vec<(f64, f64)>,
+    /// Line through `whole`.
+    pub fit: Option<LineFit>,
+}
+
+/// With the fade of the friction feed-forward on and off.
+pub struct Impulses {
+    /// On.
+    pub fade_on: Series,
+    /// Off.
+    pub fade_off: Series,
+}
+
+impl Impulses {
+    /// Of a demo.
+    pub fn of(demo: &Demo) -> Impulses {
+        let summary = &demo.summary;
+        let series = |lines: &[Exploration], fit: Option<LineFit>| Series {
+            whole: column(lines, |e| e.contact.impulse_newton_s),
+            first_50ms: column(lines, |e| e.contact.impulse_first_50ms_newton_s),
+            fit,
+        };
+        Impulses {
+            fade_on: series(&summary.exploration, summary.contact.impulse_fit),
+            fade_off: series(&summary.exploration_fade_off, summary.fade_off.impulse_fit),
+        }
+    }
+}
+
+fn column(lines: &[Exploration], value: fn(&Exploration) -> f64) -> Vec<(f64, f64)> {
+    lines
+        .iter()
+        .map(|e| (e.stiffness_n_per_m, value(e)))
+        .collect()
+}
+
+/// The SVG.
+pub fn draw(impulses: &Impulses) -> Result<String, FigureError> {
+    let words = "Impulse of one contact over stiffness with a straight line through it, friction \
+                 feed-forward faded in contact and left on";
+    sheet((760, 400), words, |area| {
+        let (head, body) = area.split_vertically(px(46.0));
+        keys(&head, impulses)?;
+        let (whole, near_zero) = body.split_horizontally(px(470.0));
+        panel(
+            &whole,
+            "(a)  all stiffnesses",
+            impulses,
+            (-6.0..131.0, 25.0),
+        )?;
+        panel(
+            &near_zero,
+            "(b)  near zero",
+            impulses,
+            (-2.5..NEAR_ZERO_N_PER_M + 2.5, 5.0),
+        )
+    })
+}
+
+fn panel(
+    area: &Area<'_>,
+    title: &str,
+    impulses: &Impulses,
+    (stiffness, step): (Range<f64>, f64),
+) -> Result<(), FigureError> {
+    let series = [&impulses.fade_on, &impulses.fade_off];
+    let fits = series.iter().filter_map(|s| s.fit.map(|fit| fit.intercept));
+    let shown = |(k, impulse): &(f64, f64)| stiffness.contains(k).then_some(*impulse);
+    let all = series
+        .iter()
+        .flat_map(|s| s.whole.iter().chain(&s.first_50ms));
+    let values = extent(all.filter_map(shown).chain(fits).chain([0.0]));
+    let mut panel = Panel::new(
+        area,
+        title,
+        Room::default(),
+        &Axis::bounded(
+            "stiffness K [N/m]",
+            Ticks::stepped(stiffness.clone(), step),
+            stiffness,
+        ),
+        &Axis::new(
+            "impulse over one cycle [N s]",
+            Ticks::around(values.start..1.04 * values.end, 8),
+        ),
+    )?;
+    line_and_marks(&mut panel, &impulses.fade_off, Mark::Square, VERMILION)?;
+    line_and_marks(&mut panel, &impulses.fade_on, Mark::Dot, BLUE)?;
+    panel.marks(&impulses.fade_on.first_50ms, Mark::Triangle, GREEN)
+}
+
+fn keys(area: &Area<'_>, impulses: &Impulses) -> Result<(), FigureError> {
+    let formula = |words: &str, series: &Series| match series.fit {
+        Some(fit) => format!(
+            "{words}: {} + {} K, R\u{b2} = {}",
+            number(fit.intercept, 2),
+            number(fit.slope, 4),
+            number(fit.r2, 3)
+        ),
+        None => words.to_owned(),
+    };
+    let on = formula("fade on", &impulses.fade_on);
+    let off = formula("fade off", &impulses.fade_off);
+    let rows = [
+        [
+            (on.as_str(), Key::Mark(Mark::Dot), BLUE),
+            ("first 50 ms, fade on", Key::Mark(Mark::Triangle), GREEN),
+        ],
+        [
+            (off.as_str(), Key::Mark(Mark::Square), VERMILION),
+            ("intercept of a line", Key::Mark(Mark::Ring), INK),
+        ],
+    ];
+    for (row, y) in rows.iter().zip([14.0, 34.0]) {
+        legend(area, (52.0, y), &row[..1])?;
+        legend(area, (400.0, y), &row[1..])?;
+    }
+    Ok(())
+}
+
+fn line_and_marks(
+    panel: &mut Panel<'_, '_>,
+    series: &Series,
+    mark: Mark,
+    colour: RGBColor,
+) -> Result<(), FigureError> {
+    if let Some(LineFit {
+        slope, intercept, ..
+    }) = series.fit
+    {
+        let end = extent(series.whole.iter().map(|p| p.0)).end;
+        // In short steps: a panel leaves out what is beyond its range.
+        let steps = (0..=100).map(|k| end * f64::from(k) / 100.0);
+        panel.line(steps.map(|k| (k, intercept + slope * k)), colour, 1.4)?;
+        panel.marks(&[(0.0, intercept)], Mark::Ring, colour)?;
+    }
+    panel.marks(&series.whole, mark, colour)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Centres of the filled discs of a colour, legend left out.
+    fn discs(svg: &str, colour: &str) -> Vec<(f64, f64)> {
+        let document = roxmltree::Document::parse(svg).expect("XML");
+        let number = |node: &roxmltree::Node<'_, '_>, name| -> f64 {
+            let value = node.attribute(name).expect("an attribute");
+            value.parse().expect("a number")
+        };
+        document
+            .descendants()
+            .filter(|node| node.has_tag_name("circle") && node.attribute("fill") == Some(colour))
+            .map(|node| (number(&node, "cx"), number(&node, "cy")))
+            .filter(|(_, y)| *y > 600.0)
+            .collect()
+    }
+
+    #[test]
+    fn points_stand_where_the_data_say() {
+        let stiffnesses = [0.5, 5.0, 25.0, 50.0, 75.0, 100.0, 125.0];
+        let series = |intercept: f64| {
+            let whole: Vec<_> = stiffnesses.map(|k| (k, intercept + 0.02 * k)).into();
+            Series {
+                first_50ms: stiffnesses.map(|k| (k, 0.1)).into(),
+                fit: LineFit::new(&whole),
+                whole,
+            }
+        };
+        let svg = draw(&Impulses {
+            fade_on: series(0.2),
+            fade_off: series(0.9),
+        });
+        let svg = svg.expect("a figure");
+        let places = discs(&svg, "#0072B2");
+        let all = &places[..stiffnesses.len()];
+        let near_zero = &places[stiffnesses.len()..];
+        assert_eq!(near_zero.len(), 3, "0.5, 5 and 25 N/m");
+        // Both axes are linear: each step is in proportion to that of the data, to a pixel.
+        let [first, .., last] = all else { panic!() };
+        for (k, (x, y)) in stiffnesses.iter().zip(all) {
+            let share = (k - 0.5) / 124.5;
+            assert!(
+                (x - first.0 - share * (last.0 - first.0)).abs() < 2.0,
+                "{k}"
+            );
+            assert!(
+                (y - first.1 - share * (last.1 - first.1)).abs() < 2.0,
+                "{k}"
+            );
+        }
+        assert!(last.1 < first.1, "more is higher");
+        assert!(svg.contains("fade on: 0.20 + 0.0200 K"));
+    }
+
+    #[test]
+    fn no_line_is_no_failure() {
+        let none = || Series {
+            whole: vec![(5.0, f64::NAN)],
+            first_50ms: Vec::new(),
+            fit: None,
+        };
+        let svg = draw(&Impulses {
+            fade_on: none(),
+            fade_off: none(),
+        });
+        assert!(svg.expect("a figure").contains("fade on"));
+    }
+}

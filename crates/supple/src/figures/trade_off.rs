@@ -1,0 +1,64 @@
+//! The paper's trade-off: error in free motion against impulse in contact, over stiffness.
+
+use super::axis::Axis;
+use super::panel::{Mark, Panel, Room};
+use super::style::{BLUE, INK, REFERENCE};
+use super::ticks::{Ticks, extent};
+use super::{FigureError, mm, sheet};
+use plotters::style::text_anchor::HPos;
+use supple_experiment::Demo;
+
+/// One stiffness.
+pub struct Point {
+    /// `K` \[N/m\].
+    pub stiffness_n_per_m: f64,
+    /// Error in free motion, root mean square \[m\].
+    pub free_rms_m: f64,
+    /// Impulse over one cycle \[N s\].
+    pub impulse_newton_s: f64,
+}
+
+/// Of a demo, fade on.
+pub fn points(demo: &Demo) -> Vec<Point> {
+    let lines = demo.summary.exploration.iter();
+    lines
+        .map(|e| Point {
+            stiffness_n_per_m: e.stiffness_n_per_m,
+            free_rms_m: e.free_rms_m,
+            impulse_newton_s: e.contact.impulse_newton_s,
+        })
+        .collect()
+}
+
+/// The SVG.
+pub fn draw(points: &[Point]) -> Result<String, FigureError> {
+    let words = "Error in free motion against impulse in contact, one point a stiffness";
+    sheet((760, 400), words, |area| {
+        let places: Vec<_> = points
+            .iter()
+            .map(|p| (mm(p.free_rms_m), p.impulse_newton_s))
+            .collect();
+        let error = extent(places.iter().map(|p| p.0));
+        let impulse = extent(places.iter().map(|p| p.1)).end;
+        let mut panel = Panel::new(
+            area,
+            "",
+            Room::default(),
+            &Axis::logarithmic(
+                "error in free motion, RMS [mm]",
+                0.8 * error.start..1.4 * error.end,
+            ),
+            &Axis::new(
+                "impulse over one cycle [N s]",
+                Ticks::around(0.0..1.1 * impulse, 6),
+            ),
+        )?;
+        panel.line(places.iter().copied(), REFERENCE, 1.6)?;
+        panel.marks(&places, Mark::Dot, BLUE)?;
+        for (point, place) in points.iter().zip(&places) {
+            let words = format!("{} N/m", point.stiffness_n_per_m);
+            panel.note(&words, *place, (9.0, -9.0), HPos::Left, INK)?;
+        }
+        Ok(())
+    })
+}

@@ -1,0 +1,51 @@
+//! The command line of supple: the demo with its figures and report, and what is done with logs.
+//!
+//! A library only so that its parts can be tested; the program is `supple`.
+
+#![forbid(unsafe_code)]
+
+mod arms;
+mod cli;
+mod console;
+mod demo;
+pub mod exit;
+pub mod figures;
+mod interrupt;
+mod log;
+mod out;
+mod progress;
+pub mod report;
+pub mod sections;
+mod table;
+mod units;
+
+use clap::{CommandFactory, Parser};
+use cli::{Cli, Command};
+use exit::Failure;
+use std::process::ExitCode;
+
+/// The whole program, from its arguments to its exit code.
+pub fn run() -> ExitCode {
+    let cli = Cli::parse();
+    interrupt::install();
+    match dispatch(&cli.command) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            console::complain(&failure, cli.command.json());
+            ExitCode::from(&failure)
+        }
+    }
+}
+
+fn dispatch(command: &Command) -> Result<(), Failure> {
+    match command {
+        Command::Demo(args) => demo::run(args),
+        Command::Log(command) => log::run(command),
+        Command::Arms { json } => arms::list(*json),
+        Command::Completions { shell } => {
+            let mut script = Vec::new();
+            clap_complete::generate(*shell, &mut Cli::command(), "supple", &mut script);
+            console::say(String::from_utf8_lossy(&script).trim_end())
+        }
+    }
+}

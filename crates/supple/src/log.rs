@@ -1,0 +1,123 @@
+//! `supple log`: what is in a log, a channel as a table, and what can be saved of a log that was cut.
+
+use crate::cli::LogCommand;
+use crate::console::{say, say_json};
+use crate::exit::Failure;
+use std::fs::{self, File};
+use std::io::{BufWriter, ErrorKind, Write};
+use std::num::NonZeroU64;
+use std::path::{Path, PathBuf};
+use supple_log::{LogError, export_csv, info, recover};
+
+/// Ending of a log that is still being written, or was when its writer died.
+const PART: &str = "part";
+
+/// Does it.
+///
+/// # Errors
+/// [`Failure`].
+pub fn run(command: &LogCommand) -> Result<(), Failure> {
+    match command {
+        LogCommand::Info { file, json: false } => say(info(file)?.to_string().trim_end()),
+        LogCommand::Info { file, json: true } => say_json(&info(file)?),
+        LogCommand::Export {
+            file,
+            channel,
+            every,
+            out: None,
+        } => export_to_stdout(file, channel, *every),
+        LogCommand::Export {
+            file,
+            channel,
+            every,
+            out: Some(out),
+        } => export_to_file(file, channel, *every, out),
+        LogCommand::Recover {
+            from,
+            to,
+            force,
+            json,
+        } => {
+            let to = to.clone().unwrap_or_else(|| recovered_name(from));
+            if to.exists() && !force {
+                return Err(Failure::Exists { path: to });
+            }
+            let recovery = recover(from, &to)?;
+            match json {
+                true => say_json(&recovery),
+                false => say(&recovery.to_string()),
+            }
+        }
+    }
+}
+
+fn export_to_stdout(file: &Path, channel: &str, every: NonZeroU64) -> Result<(), Failure> {
+    let mut out = BufWriter::new(std::io::stdout().lock());
+    match export_csv(file, channel, every, &mut out) {
+        // A reader that has seen enough is no failure.
+        Err(LogError::Output(error)) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
+        Err(error) => Err(error.into()),
+        Ok(_) => Ok(()),
+    }
+}
+
+/// The table takes its name when it is whole.
+fn export_to_file(
+    file: &Path,
+    channel: &str,
+    every: NonZeroU64,
+    out: &Path,
+) -> Result<(), Failure> {
+    let part = with_ending(out, PART);
+    let failed = |action, error| Failure::file(action, out, error);
+    let mut table = BufWriter::new(File::create(&part).map_err(|error| failed("create", error))?);
+    let written = export_csv(file, channel, every, &mut table)
+        .map_err(|error| match error {
+            LogError::Output(error) => failed("write", error),
+            error => error.into(),
+        })
+        .and_then(|rows| {
+            let whole = table
+                .flush()
+                .and_then(|()| table.get_ref().sync_all())
+                .and_then(|()| fs::rename(&part, out));
+            whole.map(|()| rows).map_err(|error| failed("write", error))
+        });
+    match written {
+        Ok(rows) => say(&format!("{}: {rows} rows", out.display())),
+        Err(failure) => {
+            let _ = fs::remove_file(&part);
+            Err(failure)
+        }
+    }
+}
+
+fn with_ending(path: &Path, ending: &str) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".");
+    name.push(ending);
+    name.into()
+}
+
+/// `run.mcap` and `run.mcap.part` become `run.recovered.mcap`.
+fn recovered_name(from: &Path) -> PathBuf {
+    let named = match from.extension() {
+        Some(ending) if ending == PART => from.with_extension(""),
+        _ => from.to_owned(),
+    };
+    named.with_extension("recovered.mcap")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::recovered_name;
+    use std::path::Path;
+
+    #[test]
+    fn recovered_logs_are_told_from_what_they_come_from() {
+        for from in ["a/run.mcap", "a/run.mcap.part"] {
+            let to = recovered_name(Path::new(from));
+            assert_eq!(to, Path::new("a/run.recovered.mcap"));
+        }
+    }
+}

@@ -1,0 +1,156 @@
+//! `report.html`: one file that needs no other and no network.
+
+use crate::exit::Failure;
+use crate::figures::Figure;
+use crate::sections::{Section, faults, sections};
+use crate::units::{figures, percent, plain, seconds};
+use askama::Template;
+use supple_experiment::summary::{Exploration, Summary};
+use supple_experiment::{Demo, Mismatch};
+use supple_model::Description;
+use supple_plant::Material;
+
+#[derive(Template)]
+#[template(path = "report.html")]
+struct Report<'a> {
+    version: &'a str,
+    arm: &'a str,
+    joints: String,
+    seed: u64,
+    logs: bool,
+    faults: Vec<String>,
+    parts: Vec<Part<'a>>,
+    stiffness_tables: [StiffnessTable; 2],
+    gravity_off: String,
+    friction_off: String,
+    contact_stiffness: String,
+    contact_dissipation: String,
+    contact_friction: String,
+}
+
+struct Part<'a> {
+    section: Section,
+    svg: &'a str,
+}
+
+struct StiffnessTable {
+    title: &'static str,
+    head: [&'static str; 9],
+    rows: Vec<[String; 9]>,
+}
+
+/// The report of a demo.
+///
+/// # Errors
+/// [`Failure::Compose`].
+pub fn html(
+    demo: &Demo,
+    arm: &Description,
+    drawn: &[Figure],
+    logs: bool,
+) -> Result<String, Failure> {
+    let summary = &demo.summary;
+    let parts = sections(summary).into_iter().filter_map(|section| {
+        let figure = drawn.iter().find(|figure| figure.name == section.figure)?;
+        Some(Part {
+            section,
+            svg: &figure.svg,
+        })
+    });
+    let wood = Material::wood();
+    let off = Mismatch::identified(summary.seed);
+    let report = Report {
+        version: summary.version,
+        arm: &summary.arm,
+        joints: arm.joint_names().join(", "),
+        seed: summary.seed,
+        logs,
+        faults: fault_lines(summary),
+        parts: parts.collect(),
+        stiffness_tables: [
+            stiffness_table(
+                "Friction feed-forward fades in contact",
+                &summary.exploration,
+            ),
+            stiffness_table(
+                "Friction feed-forward left on",
+                &summary.exploration_fade_off,
+            ),
+        ],
+        gravity_off: percent(off.gravity),
+        friction_off: percent(off.friction),
+        contact_stiffness: scientific(wood.stiffness_n_per_m_1_5),
+        contact_dissipation: figures(wood.dissipation_s_per_m),
+        contact_friction: wood.friction.to_string(),
+    };
+    report
+        .render()
+        .map_err(|error| Failure::Compose(error.to_string()))
+}
+
+/// Each fault with its run.
+pub fn fault_lines(summary: &Summary) -> Vec<String> {
+    let lines = faults(summary).into_iter();
+    lines
+        .map(|(run, ended)| format!("{run} at {}: {}", seconds(ended.ended_s), ended.fault))
+        .collect()
+}
+
+fn scientific(value: f64) -> String {
+    let power = value.log10().floor() as i32;
+    let digits: String = power.to_string().chars().map(superscript).collect();
+    format!("{} \u{d7} 10{digits}", value / 10.0_f64.powi(power))
+}
+
+fn superscript(digit: char) -> char {
+    match digit {
+        '0' => '\u{2070}',
+        '1' => '\u{b9}',
+        '2' => '\u{b2}',
+        '3' => '\u{b3}',
+        '4'..='9' => char::from_u32('\u{2070}' as u32 + digit as u32 - '0' as u32).unwrap_or(digit),
+        _ => '\u{207b}',
+    }
+}
+
+fn stiffness_table(title: &'static str, lines: &[Exploration]) -> StiffnessTable {
+    let rows = lines.iter().map(|e| {
+        [
+            e.stiffness_n_per_m.to_string(),
+            plain(e.damping_n_s_per_m, 2),
+            plain(1e3 * e.contact.approach_m_per_s, 1),
+            plain(e.contact.peak_filtered_n, 1),
+            plain(e.contact.contact_s, 3),
+            plain(e.contact.impulse_newton_s, 3),
+            plain(e.contact.impulse_first_50ms_newton_s, 3),
+            plain(e.contact.rest_force_n, 2),
+            plain(1e3 * e.free_rms_m, 1),
+        ]
+    });
+    StiffnessTable {
+        title,
+        head: [
+            "K [N/m]",
+            "B [N\u{a0}s/m]",
+            "approach [mm/s]",
+            "peak [N]",
+            "contact [s]",
+            "impulse [N\u{a0}s]",
+            "first 50\u{a0}ms [N\u{a0}s]",
+            "at rest [N]",
+            "free RMS [mm]",
+        ],
+        rows: rows.collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::scientific;
+
+    #[test]
+    fn powers_are_raised() {
+        assert_eq!(scientific(1.4e8), "1.4 \u{d7} 10\u{2078}");
+        assert_eq!(scientific(2e-13), "2 \u{d7} 10\u{207b}\u{b9}\u{b3}");
+    }
+}

@@ -1,0 +1,100 @@
+//! What the paper reports beside what was measured, figure by figure, as the report says it.
+
+mod contact;
+mod free_motion;
+
+use supple_experiment::Ended;
+use supple_experiment::summary::{QuadrantSummary, Summary};
+
+/// One subject of the paper.
+#[derive(Clone, Debug)]
+pub struct Section {
+    /// Name of the figure that goes with it.
+    pub figure: &'static str,
+    /// Headline.
+    pub title: &'static str,
+    /// Where the paper speaks of it.
+    pub place: &'static str,
+    /// What the paper reports.
+    pub paper: &'static str,
+    /// What is shown, and what differs from the paper.
+    pub here: &'static str,
+    /// What was measured.
+    pub rows: Vec<Row>,
+}
+
+/// One measured quantity.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Row {
+    /// What.
+    pub quantity: String,
+    /// How much, with its unit.
+    pub measured: String,
+}
+
+/// All of them, in the order of the report.
+pub fn sections(summary: &Summary) -> Vec<Section> {
+    vec![
+        free_motion::sinusoid(summary),
+        free_motion::quadrant(summary),
+        free_motion::torques(summary),
+        free_motion::arc(summary),
+        contact::force(summary),
+        contact::impulse(summary),
+        contact::trade_off(summary),
+        free_motion::seeds(summary),
+        free_motion::paper_letter(summary),
+    ]
+}
+
+/// Runs that a fault ended though they should have gone through. (3.6) to the letter is not among them:
+/// that it runs away is a result.
+pub fn faults(summary: &Summary) -> Vec<(String, &Ended)> {
+    let mut runs: Vec<(String, &Option<Ended>)> = Vec::new();
+    for at in &summary.sinusoid_by_speed {
+        runs.push((
+            format!("sinusoid at {} times the pace", at.speed),
+            &at.tracking.ended,
+        ));
+    }
+    for (k, run) in summary.seed_runs.iter().enumerate() {
+        runs.push((format!("sinusoid, perturbed model {k}"), &run.ended));
+    }
+    runs.push(("arc".to_owned(), &summary.arc.ended));
+    for (quadrant, model) in kinds_of_quadrant(summary) {
+        let name = format!("quadrant at {:.3} m/s, {model}", quadrant.speed_m_per_s);
+        runs.push((name, &quadrant.tracking.ended));
+    }
+    let exact = &summary.sinusoid_exact_model;
+    for (name, tracking) in [("Coulomb", &exact.coulomb), ("Stribeck", &exact.stribeck)] {
+        runs.push((format!("sinusoid, exact model, {name}"), &tracking.ended));
+    }
+    for (fade, lines) in [
+        ("on", &summary.exploration),
+        ("off", &summary.exploration_fade_off),
+    ] {
+        for line in lines {
+            let name = format!("probing at {} N/m, fade {fade}", line.stiffness_n_per_m);
+            runs.push((name, &line.ended));
+        }
+    }
+    runs.into_iter()
+        .filter_map(|(name, ended)| Some((name, ended.as_ref()?)))
+        .collect()
+}
+
+/// Runs of the quadrant, each with the model of its controller.
+pub fn kinds_of_quadrant(summary: &Summary) -> [(&QuadrantSummary, &'static str); 3] {
+    [
+        (&summary.quadrant, "exact model"),
+        (&summary.quadrant_perturbed, "perturbed model"),
+        (&summary.quadrant_at_paper_speed, "exact model"),
+    ]
+}
+
+fn row(quantity: impl Into<String>, measured: impl Into<String>) -> Row {
+    Row {
+        quantity: quantity.into(),
+        measured: measured.into(),
+    }
+}

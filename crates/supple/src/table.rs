@@ -1,0 +1,167 @@
+//! The table that the demo prints: what was measured beside what the paper says in words.
+
+use crate::units::{figures, newton_seconds, newtons, percent, plain, seconds};
+use comfy_table::{ContentArrangement, Table, presets};
+use supple_experiment::JointTorque;
+use supple_experiment::metrics::median;
+use supple_experiment::summary::{Contact, Summary, Tracking};
+
+/// A line a quantity.
+pub fn table(summary: &Summary) -> String {
+    let mut table = Table::new();
+    table
+        .load_style(presets::NOTHING)
+        .set_content_arrangement(ContentArrangement::Disabled)
+        .set_header(["quantity", "measured here", "the paper"]);
+    for line in free_motion(summary).into_iter().chain(contact(summary)) {
+        table.add_row(line);
+    }
+    table.trim_fmt()
+}
+
+/// Quantity, measured, paper.
+type Line = [String; 3];
+
+fn line(quantity: &str, measured: String, paper: &str) -> Line {
+    [quantity.to_owned(), measured, paper.to_owned()]
+}
+
+fn free_motion(summary: &Summary) -> Vec<Line> {
+    let paces: Vec<_> = summary
+        .sinusoid_by_speed
+        .iter()
+        .filter(|at| at.speed != 1.0)
+        .collect();
+    let names: Vec<_> = paces
+        .iter()
+        .map(|at| format!("{} \u{d7}", at.speed))
+        .collect();
+    let exact = &summary.sinusoid_exact_model;
+    let worst = summary.seeds.iter().copied().fold(0.0, f64::max);
+    let torque = |t: &JointTorque| {
+        let terms = [t.gravity, t.friction, t.feedback].map(figures);
+        format!("{} N m", terms.join(", "))
+    };
+    vec![
+        line(
+            "sinusoid at 5 N/m, RMS error",
+            rms(&[&summary.sinusoid]),
+            "follows closely (fig. 3a)",
+        ),
+        line(
+            &format!("  at {} the pace", names.join(", ")),
+            rms(&paces.iter().map(|at| &at.tracking).collect::<Vec<_>>()),
+            "essentially unchanged",
+        ),
+        line(
+            &format!("  {} perturbed models: median, worst", summary.seeds.len()),
+            millimetres(&[median(&summary.seeds).unwrap_or(0.0), worst]),
+            "",
+        ),
+        line(
+            "  exact model: Coulomb, Stribeck",
+            rms(&[&exact.coulomb, &exact.stribeck]),
+            "",
+        ),
+        line(
+            "  (3.6) to the letter",
+            letter(&summary.paper_letter),
+            "the law it gives",
+        ),
+        line(
+            "quadrant, RMS error, exact model",
+            rms(&[&summary.quadrant.tracking]),
+            "errors at corners die out (fig. 3b)",
+        ),
+        line(
+            &format!(
+                "  perturbed; exact at {:.3} m/s",
+                summary.quadrant_at_paper_speed.speed_m_per_s
+            ),
+            rms(&[
+                &summary.quadrant_perturbed.tracking,
+                &summary.quadrant_at_paper_speed.tracking,
+            ]),
+            "",
+        ),
+        line("arc, RMS error", rms(&[&summary.arc]), ""),
+        line(
+            "shoulder: gravity, friction, feedback",
+            torque(&summary.torque_rms.shoulder_pitch),
+            "in this order (fig. 4)",
+        ),
+        line(
+            "elbow: gravity, friction, feedback",
+            torque(&summary.torque_rms.elbow),
+            "in this order (fig. 4)",
+        ),
+    ]
+}
+
+fn contact(summary: &Summary) -> Vec<Line> {
+    let lines = &summary.exploration;
+    let from_five = || lines.iter().filter(|e| e.stiffness_n_per_m >= 5.0);
+    let peaks: Vec<_> = from_five().map(|e| e.contact.peak_filtered_n).collect();
+    let first: Vec<_> = lines
+        .iter()
+        .map(|e| e.contact.impulse_first_50ms_newton_s)
+        .collect();
+    let or_none = |value: Option<String>| value.unwrap_or_else(|| "none".to_owned());
+    let fit = |contact: &Contact| {
+        let fit = contact.impulse_fit.as_ref();
+        or_none(fit.map(|fit| {
+            let [intercept, slope] = [fit.intercept, fit.slope].map(figures);
+            format!(
+                "({intercept} + {slope} K) N s, R\u{b2} {}",
+                plain(fit.r2, 3)
+            )
+        }))
+    };
+    let softest = from_five().next().map(|e| newtons(e.contact.rest_force_n));
+    vec![
+        line(
+            "first transient, median over K",
+            or_none(median(&peaks).map(newtons)),
+            "about 20 N (fig. 5)",
+        ),
+        line(
+            "  its spread over K",
+            or_none(summary.contact.peak_spread.map(percent)),
+            "largely independent of K",
+        ),
+        line("resting force at 5 N/m", or_none(softest), ""),
+        line(
+            "impulse over K, fade on",
+            fit(&summary.contact),
+            "linear, not zero at K = 0 (fig. 6)",
+        ),
+        line("  fade off", fit(&summary.fade_off), ""),
+        line(
+            "  first 50 ms, median, fade on",
+            or_none(median(&first).map(newton_seconds)),
+            "the impact's share",
+        ),
+    ]
+}
+
+fn rms(runs: &[&Tracking]) -> String {
+    let errors: Vec<_> = runs.iter().map(|run| run.rms_error_m).collect();
+    let ended = runs.iter().filter_map(|run| run.ended.as_ref()).count();
+    let errors = millimetres(&errors);
+    match ended {
+        0 => errors,
+        _ => format!("{errors}, ended by a fault"),
+    }
+}
+
+fn millimetres(metres: &[f64]) -> String {
+    let each: Vec<_> = metres.iter().map(|m| plain(1e3 * m, 1)).collect();
+    format!("{} mm", each.join(", "))
+}
+
+fn letter(run: &Tracking) -> String {
+    match &run.ended {
+        Some(ended) => format!("ended by a fault at {}", seconds(ended.ended_s)),
+        None => rms(&[run]),
+    }
+}

@@ -1,0 +1,130 @@
+//! The freestanding program: it links without std, allocator and C library, computes what a hosted
+//! build computes, to the bit, and stops linking as soon as something allocates.
+
+use std::env;
+use std::path::PathBuf;
+use std::process::{Command, Output};
+
+/// Apart from the outer build's folder, whose lock that build may hold.
+const TARGET_DIR: &str = concat!(env!("CARGO_TARGET_TMPDIR"), "/bare");
+const CORTEX_M: &str = "thumbv7em-none-eabihf";
+/// Builds the core library from source; a stable compiler has to be told that it may.
+const BUILD_CORE: &str = "-Zbuild-std=core";
+
+/// Builds the program with `features`; `arguments` go to cargo as they are.
+fn build(features: &str, arguments: &[&str]) -> Output {
+    let mut cargo = Command::new(env!("CARGO"));
+    if arguments.contains(&BUILD_CORE) {
+        cargo.env("RUSTC_BOOTSTRAP", "1");
+    }
+    cargo
+        .args(["build", "--locked", "--package", "supple-bare"])
+        .args(["--profile", "bare", "--features", features])
+        .args(["--target-dir", TARGET_DIR])
+        .args(arguments)
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .env("CARGO_TERM_COLOR", "never")
+        .output()
+        .expect("cargo starts")
+}
+
+/// Path of the program, in cargo's folder for `target` (empty: the host's).
+fn program(target: &str, arguments: &[&str]) -> PathBuf {
+    let built = build("freestanding", arguments);
+    assert!(built.status.success(), "{}", text(&built.stderr));
+    PathBuf::from(TARGET_DIR)
+        .join(target)
+        .join("bare")
+        .join("supple-bare")
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+fn hosted() -> String {
+    let mut report = String::new();
+    supple_bare::report(&mut report).expect("the arms are physical");
+    for wrong in ["NaN", "inf"] {
+        assert!(!report.contains(wrong), "{report}");
+    }
+    let followed = report.matches("mode track, fault none").count();
+    assert_eq!(followed, 2, "{report}");
+    report
+}
+
+#[test]
+#[cfg_attr(
+    not(all(target_arch = "x86_64", target_os = "linux")),
+    ignore = "the freestanding program is written for Linux on x86-64"
+)]
+fn prints_the_bits_of_a_hosted_build() {
+    let output = Command::new(program("", &[])).output().expect("it starts");
+    assert!(output.status.success(), "{output:?}");
+    assert_eq!(text(&output.stdout), hosted());
+}
+
+#[test]
+#[cfg_attr(
+    not(all(target_arch = "x86_64", target_os = "linux")),
+    ignore = "the freestanding program is written for Linux on x86-64"
+)]
+fn asks_for_no_loader_and_no_library() {
+    const DYNAMIC: u32 = 2;
+    const INTERPRETER: u32 = 3;
+    let elf = std::fs::read(program("", &[])).expect("the program is readable");
+    assert_eq!(&elf[..5], b"\x7fELF\x02", "64-bit ELF");
+    let number = |at: usize, bytes: usize| {
+        let bytes = elf[at..at + bytes].iter().rev();
+        bytes.fold(0, |n, byte| n << 8 | usize::from(*byte))
+    };
+    let (start, size, count) = (number(32, 8), number(54, 2), number(56, 2));
+    let kinds: Vec<u32> = (0..count)
+        .map(|i| number(start + i * size, 4) as u32)
+        .collect();
+    assert!(!kinds.is_empty());
+    assert!(
+        !kinds.contains(&DYNAMIC) && !kinds.contains(&INTERPRETER),
+        "program headers {kinds:?}"
+    );
+}
+
+#[test]
+#[cfg_attr(
+    not(all(target_arch = "x86_64", target_os = "linux")),
+    ignore = "the freestanding program is written for Linux on x86-64"
+)]
+fn one_allocation_and_it_does_not_build() {
+    let built = build("freestanding,negative-control", &[]);
+    assert!(!built.status.success(), "an allocation went unnoticed");
+    let stderr = text(&built.stderr);
+    let errors: Vec<&str> = stderr.lines().filter(|l| l.starts_with("error")).collect();
+    assert!(
+        matches!(errors[..], [first, last]
+            if first.contains("no global memory allocator found")
+                && last.contains("could not compile `supple-bare` (bin")),
+        "it failed for another reason:\n{stderr}"
+    );
+}
+
+/// With `SUPPLE_BUILD_STD` set, the core library is built from its source, where no built one can be
+/// installed.
+#[test]
+#[ignore = "needs the thumbv7em-none-eabihf target and QEMU: ./ci.sh cortex-m"]
+fn prints_the_same_bits_on_a_cortex_m4() {
+    let mut arguments = vec!["--target", CORTEX_M];
+    if env::var_os("SUPPLE_BUILD_STD").is_some() {
+        arguments.push(BUILD_CORE);
+    }
+    let output = Command::new("qemu-system-arm")
+        .args(["-machine", "mps2-an386", "-cpu", "cortex-m4"])
+        .args(["-display", "none", "-monitor", "none", "-serial", "none"])
+        .args(["-chardev", "stdio,id=console", "-semihosting-config"])
+        .arg("enable=on,target=native,chardev=console")
+        .arg("-kernel")
+        .arg(program(CORTEX_M, &arguments))
+        .output()
+        .expect("qemu-system-arm starts");
+    assert!(output.status.success(), "{output:?}");
+    assert_eq!(text(&output.stdout), hosted());
+}

@@ -1,0 +1,283 @@
+//! The paper's experiments as contracts: what must come out, whatever the seed.
+
+use supple_core::Trajectory;
+use supple_core::controller::Mode;
+use supple_core::dynamics::gravity;
+use supple_experiment::metrics::{LineFit, median, spread};
+use supple_experiment::probing::{ContactMeter, Stroke, median_stroke};
+use supple_experiment::{
+    EdgeMeter, ExperimentError, Mismatch, Plan, Run, Setup, Variant, run, scenario,
+};
+use supple_model::Description;
+use supple_plant::Scene;
+
+fn perturbed(seed: u64) -> Variant {
+    Variant {
+        mismatch: Some(Mismatch::identified(seed)),
+        ..Variant::EXACT
+    }
+}
+
+fn wam4() -> Setup<4> {
+    let description = Description::asset("wam4").expect("a built-in arm");
+    Setup::new(&description, 1).expect("four joints")
+}
+
+fn plan(setup: &Setup<4>, variant: &Variant, trajectory: Trajectory, duration_s: f64) -> Plan<4> {
+    let mut config = setup.config(variant).expect("a physical model");
+    config.law.gains = scenario::gains(scenario::STIFFNESS_N_PER_M);
+    Plan {
+        name: "test".to_owned(),
+        config,
+        plant: setup.plant(variant, Scene::default()),
+        trajectory,
+        duration_s,
+    }
+}
+
+fn sinusoid(variant: &Variant) -> Run {
+    let (trajectory, duration_s) = scenario::sinusoid(1.0);
+    run(
+        &plan(&wam4(), variant, trajectory, duration_s),
+        &mut |_, _| Ok(()),
+    )
+    .expect("the sinusoid runs")
+}
+
+fn probing(variant: &Variant, stiffness_n_per_m: f64) -> Stroke {
+    let setup = wam4();
+    let (probe, _) = scenario::probe(setup.tip_radius_m());
+    let mut plan = plan(&setup, variant, Trajectory::Probe(probe), probe.cycle_s());
+    plan.config.law.gains = scenario::gains(stiffness_n_per_m);
+    plan.plant.scene = scenario::block();
+    let mut meter = ContactMeter::new(probe);
+    run(&plan, &mut |cycle, time_s| {
+        if let Some(time_s) = time_s {
+            let in_contact = cycle.output.in_contact;
+            meter.cycle(time_s, &cycle.truth, cycle.steps, in_contact);
+        }
+        Ok(())
+    })
+    .expect("probing runs");
+    median_stroke(&meter.finish())
+}
+
+/// `f` of every item, two at a time.
+fn side_by_side<I: Sync, O: Send>(items: &[I], f: impl Fn(&I) -> O + Sync) -> Vec<O> {
+    let (front, back) = items.split_at(items.len() / 2);
+    std::thread::scope(|scope| {
+        let later = scope.spawn(|| back.iter().map(&f).collect::<Vec<_>>());
+        let mut results: Vec<O> = front.iter().map(&f).collect();
+        results.extend(later.join().expect("no experiment panics"));
+        results
+    })
+}
+
+#[test]
+fn five_newtons_a_metre_follow_the_sinusoid_with_models_that_are_off() {
+    let seeds: Vec<u64> = (0..10).collect();
+    let runs = side_by_side(&seeds, |seed| sinusoid(&perturbed(*seed)));
+    for (seed, run) in runs.iter().enumerate() {
+        assert_eq!(run.ended, None, "seed {seed}");
+        for joint in &run.torque_rms {
+            assert!(joint.gravity > joint.friction, "seed {seed}: {joint:?}");
+            assert!(joint.friction > joint.feedback, "seed {seed}: {joint:?}");
+        }
+    }
+    let errors: Vec<f64> = runs.iter().map(|run| run.rms_error_m).collect();
+    let worst = errors
+        .iter()
+        .fold(0.0_f64, |worst, error| worst.max(*error));
+    let middle = median(&errors).expect("ten runs");
+    assert!(middle <= 0.012 && worst <= 0.025, "{errors:?}");
+}
+
+#[test]
+fn a_perturbed_model_is_off_by_what_it_says() {
+    let setup = wam4();
+    let exact = setup.config(&Variant::EXACT).expect("sound").arm;
+    for seed in 0..10 {
+        let off = setup.config(&perturbed(seed)).expect("sound").arm;
+        let (mut difference, mut whole) = (0.0, 0.0);
+        for k in 0..50 {
+            let x = f64::from(k);
+            let q = [0.1 * x, (0.7 * x).sin(), 0.0, 1.0 + (1.3 * x).cos()].into();
+            let (a, b) = (gravity(&exact, &q), gravity(&off, &q));
+            difference += (a - b).norm_squared();
+            whole += a.norm_squared();
+        }
+        let relative = (difference / whole).sqrt();
+        // Signs are mixed: parts of it cancel.
+        assert!((1e-4..2e-3).contains(&relative), "seed {seed}: {relative}");
+    }
+}
+
+#[test]
+fn an_exact_model_follows_better() {
+    let exact = |stribeck| {
+        sinusoid(&Variant {
+            stribeck,
+            load: false,
+            ..Variant::EXACT
+        })
+    };
+    assert!(exact(false).rms_error_m <= 6e-3);
+    assert!(exact(true).rms_error_m <= 3e-3);
+}
+
+#[test]
+fn the_letter_of_the_law_runs_away_and_the_supervisor_ends_it() {
+    let run = sinusoid(&Variant {
+        paper_letter: true,
+        stribeck: false,
+        ..perturbed(0)
+    });
+    let ended = run.ended.expect("a fault ends it");
+    assert!(ended.ended_s > 0.5, "{ended:?}");
+    assert!(run.max_error_m <= 0.26, "{} m", run.max_error_m);
+}
+
+#[test]
+fn the_first_transient_does_not_depend_on_stiffness_and_the_impulse_does() {
+    let stiffness = &scenario::PROBING_STIFFNESS_N_PER_M[1..];
+    let strokes = side_by_side(stiffness, |k| probing(&Variant::EXACT, *k));
+    let peaks: Vec<f64> = strokes.iter().map(|s| s.peak_filtered_n).collect();
+    let over_speed: Vec<f64> = strokes
+        .iter()
+        .map(|s| s.peak_filtered_n / s.approach_m_per_s)
+        .collect();
+    let first_50ms: Vec<f64> = strokes
+        .iter()
+        .map(|s| s.impulse_first_50ms_newton_s)
+        .collect();
+    let middle = median(&peaks).expect("six runs");
+    assert!((15.0..=25.0).contains(&middle), "{peaks:?}");
+    assert!(spread(&peaks).expect("six runs") <= 0.35, "{peaks:?}");
+    assert!(
+        spread(&over_speed).expect("six runs") <= 0.15,
+        "{over_speed:?}"
+    );
+    assert!(strokes[0].rest_force_n <= 0.5, "{:?}", strokes[0]);
+
+    let points: Vec<(f64, f64)> = stiffness
+        .iter()
+        .zip(&strokes)
+        .map(|(k, stroke)| (*k, stroke.impulse_newton_s))
+        .collect();
+    let fit = LineFit::new(&points).expect("a line");
+    assert!(fit.slope > 0.0 && fit.r2 >= 0.97, "{fit:?}");
+    let impact = median(&first_50ms).expect("six runs");
+    assert!(
+        fit.intercept > 0.0 && fit.intercept <= 2.0 * impact,
+        "{fit:?} {impact}"
+    );
+}
+
+#[test]
+fn left_on_the_friction_feed_forward_becomes_the_contact_force() {
+    let faded = probing(&Variant::EXACT, 5.0);
+    let left_on = probing(
+        &Variant {
+            fade: false,
+            ..Variant::EXACT
+        },
+        5.0,
+    );
+    assert!(
+        left_on.rest_force_n > 2.0 * faded.rest_force_n,
+        "{left_on:?} {faded:?}"
+    );
+    assert!(left_on.impulse_newton_s > 1.5 * faded.impulse_newton_s);
+    let latched_s = faded.latched_after_s.expect("contact is noticed");
+    assert!(latched_s < 0.02, "{latched_s} s");
+}
+
+#[test]
+fn the_error_of_a_corner_dies_out_along_the_edge() {
+    let setup = wam4();
+    let (quadrant, duration_s) = scenario::quadrant(scenario::QUADRANT_SPEED_M_PER_S);
+    let trajectory = Trajectory::Quadrant(quadrant);
+    let mut meter = EdgeMeter::new(quadrant);
+    run(
+        &plan(&setup, &Variant::EXACT, trajectory, duration_s),
+        &mut |cycle, time_s| {
+            if let (Some(time_s), Some(reference)) = (time_s, cycle.output.reference) {
+                let error = reference.position - cycle.truth.tip_position_m;
+                meter.cycle(time_s, error.norm());
+            }
+            Ok(())
+        },
+    )
+    .expect("the quadrant runs");
+    let edges = meter.finish();
+    assert_eq!(edges.len(), 6);
+    for edge in edges.iter().filter(|edge| !edge.from_rest) {
+        assert!(
+            edge.last_quarter_error_m < 0.5 * edge.peak_error_m,
+            "{edge:?}"
+        );
+    }
+}
+
+#[test]
+fn reruns_give_the_same_bits() {
+    let torques = || {
+        let setup = wam4();
+        let (trajectory, _) = scenario::sinusoid(1.0);
+        let mut bits = Vec::new();
+        run(
+            &plan(&setup, &perturbed(5), trajectory, 1.0),
+            &mut |cycle, _| {
+                bits.extend(cycle.output.torque_nm.iter().map(|t| t.to_bits()));
+                Ok(())
+            },
+        )
+        .expect("the sinusoid runs");
+        bits
+    };
+    assert_eq!(torques(), torques());
+}
+
+#[test]
+fn no_contact_is_seen_in_free_motion() {
+    for (trajectory, duration_s) in [scenario::sinusoid(1.0), scenario::arc()] {
+        for seed in [0, 4] {
+            let plan = plan(&wam4(), &perturbed(seed), trajectory, duration_s);
+            run(&plan, &mut |cycle, time_s| {
+                let output = &cycle.output;
+                assert!(
+                    !output.in_contact,
+                    "seed {seed} at {time_s:?} s: {output:?}"
+                );
+                Ok(())
+            })
+            .expect("it runs");
+        }
+    }
+}
+
+#[test]
+fn what_cannot_be_reached_is_refused_with_point_and_distance() {
+    let setup = wam4();
+    let trajectory = Trajectory::Hold([1.5, 0.0, 0.0].into());
+    let plan = plan(&setup, &Variant::EXACT, trajectory, 1.0);
+    let error = run(&plan, &mut |_, _| Ok(())).expect_err("out of reach");
+    assert!(matches!(error, ExperimentError::Unreachable { .. }));
+    let text = error.to_string();
+    assert!(text.contains("1.500") && text.contains("test"), "{text}");
+}
+
+#[test]
+fn the_way_to_the_start_is_gravity_hold_and_a_move() {
+    let (trajectory, _) = scenario::sinusoid(1.0);
+    let plan = plan(&wam4(), &perturbed(2), trajectory, 0.5);
+    let mut modes = Vec::new();
+    run(&plan, &mut |cycle, _| {
+        if modes.last() != Some(&cycle.output.mode) {
+            modes.push(cycle.output.mode);
+        }
+        Ok(())
+    })
+    .expect("it runs");
+    assert_eq!(modes, [Mode::GravityHold, Mode::Move, Mode::Track]);
+}
