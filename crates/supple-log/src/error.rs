@@ -83,6 +83,19 @@ pub enum LogError {
         /// Joints found.
         found: usize,
     },
+    /// Steps of the controller are missing.
+    #[error(
+        "{file}: expected step {expected}, the log goes on with step {found}; what the controller \
+         knew after the gap is not in the log, so only a log without gaps is replayed"
+    )]
+    Gap {
+        /// File.
+        file: String,
+        /// First step that is missing.
+        expected: u64,
+        /// Step found in its place.
+        found: u64,
+    },
     /// No such channel.
     #[error("{file} has no channel {channel:?}; it has {known}")]
     UnknownChannel {

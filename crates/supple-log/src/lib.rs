@@ -2,8 +2,8 @@
 //!
 //! One file holds everything that a run was: each step of the controller with its input, its answer
 //! and every term in between, to the last bit; the arm's URDF and TOML and the configuration in force;
-//! and the joint states, wrenches and transforms that viewers draw. The same `supple_core::step` can be
-//! run over it again.
+//! and the joint states, wrenches and transforms that viewers draw. The same `supple_core::step` is
+//! run over it again by [`replay()`].
 //!
 //! Messages are ROS 2 CDR with `ros2msg` schemas, chunks are lz4. A log is written under
 //! `<name>.part` and takes its name when it is whole; what a crash leaves is made readable by
@@ -37,6 +37,7 @@ mod parse;
 mod reader;
 mod record;
 mod recover;
+mod replay;
 mod request;
 mod scan;
 mod schema;
@@ -52,4 +53,5 @@ pub use messages::{CycleTiming, PlantTruth};
 pub use reader::{About, Messages, Reader, Timed};
 pub use record::{Record, TorqueTerms};
 pub use recover::{Recovery, recover};
+pub use replay::{Difference, Replay, replay};
 pub use writer::{Extras, RunInfo, Writer};

@@ -86,6 +86,11 @@ impl Reader {
         })
     }
 
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// What it says of itself.
     pub fn about(&self) -> &About {
         &self.about

@@ -66,12 +66,34 @@ impl Table {
 
     /// One message, as a line.
     pub fn row(&mut self, time_ns: u64, data: &[u8]) -> Result<&str, String> {
-        self.row.clear();
-        push_cell(&mut self.row, &time_ns.to_string());
+        let mut row = std::mem::take(&mut self.row);
+        row.clear();
+        push_cell(&mut row, &time_ns.to_string());
+        let read = self.visit(data, |cell| push_cell(&mut row, cell));
+        end_line(&mut row);
+        self.row = row;
+        read.map(|()| self.row.as_str())
+    }
+
+    /// First column in which two messages differ, with both values.
+    pub fn difference(&self, a: &[u8], b: &[u8]) -> Result<Option<[String; 3]>, String> {
+        let mut cells = [Vec::new(), Vec::new()];
+        for (data, cells) in [a, b].iter().zip(&mut cells) {
+            self.visit(data, |cell| cells.push(cell.to_owned()))?;
+        }
+        let [a, b] = cells;
+        // The first column is the time, which is no cell of the message.
+        let mut columns = self.columns.iter().skip(1).zip(a.into_iter().zip(b));
+        let differs = columns.find(|(_, (a, b))| a != b);
+        Ok(differs.map(|(column, (a, b))| [column.clone(), a, b]))
+    }
+
+    /// Shows the cells of a message in the order of the columns.
+    fn visit(&self, data: &[u8], mut show: impl FnMut(&str)) -> Result<(), String> {
         let mut values = Values::new(data)?;
         for step in &self.steps {
             match step {
-                Step::Cell(kind) => push_cell(&mut self.row, values.next(kind)?),
+                Step::Cell(kind) => show(values.next(kind)?),
                 Step::Skip(kind) => {
                     values.next(kind)?;
                 }
@@ -88,13 +110,11 @@ impl Table {
                     for _ in 0..values.length()? {
                         list.push(values.next(kind)?.to_owned());
                     }
-                    push_cell(&mut self.row, &list.join(" "));
+                    show(&list.join(" "));
                 }
             }
         }
-        values.end()?;
-        end_line(&mut self.row);
-        Ok(&self.row)
+        values.end()
     }
 }
 

@@ -4,7 +4,6 @@ mod common;
 
 use common::{CYCLE_NS, N, STEPS};
 use supple_core::controller::Mode;
-use supple_core::{Controller, State, step};
 use supple_log::{LogError, Reader, Record};
 
 #[test]
@@ -146,27 +145,6 @@ fn the_sample_has_what_the_other_tests_look_for() {
     assert_eq!(modes, expected);
     assert_eq!(refusals, 1);
     assert_eq!(faults, 9);
-}
-
-#[test]
-fn a_log_is_replayed_from_itself() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let path = folder.path().join("run.mcap");
-    common::write(&path, STEPS).expect("written");
-
-    let reader = Reader::open(&path).expect("opened");
-    let config = reader.config::<N>().expect("the configuration in force");
-    let controller = Controller::new(config).expect("sound");
-    let mut state = State::new(&controller);
-    let mut steps = 0;
-    for read in reader.records::<N>().expect("four joints") {
-        let logged = read.expect("whole").value;
-        let input = logged.input().expect("a known request");
-        let output = step(&controller, &mut state, &input);
-        assert_eq!(Record::new(logged.step, &input, &output), logged);
-        steps += 1;
-    }
-    assert_eq!(steps, STEPS);
 }
 
 #[test]

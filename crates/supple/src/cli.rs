@@ -30,6 +30,13 @@ pub enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Look whether this machine can run an arm in real time.
+    #[command(after_help = CODES)]
+    Doctor {
+        /// As JSON.
+        #[arg(long)]
+        json: bool,
+    },
     /// Print the completions of a shell.
     Completions {
         /// Which.
@@ -85,6 +92,15 @@ pub enum LogCommand {
         #[arg(long, value_name = "FILE")]
         out: Option<PathBuf>,
     },
+    /// Run the controller over a log again and compare every answer to the last bit.
+    #[command(after_help = CODES)]
+    Replay {
+        /// The log; one with missing steps is refused.
+        file: PathBuf,
+        /// As JSON.
+        #[arg(long)]
+        json: bool,
+    },
     /// Save every whole chunk of a log that was cut or damaged.
     Recover {
         /// The log.
@@ -105,8 +121,12 @@ impl Command {
     pub fn json(&self) -> bool {
         match self {
             Command::Demo(args) => args.json,
-            Command::Arms { json } => *json,
-            Command::Log(LogCommand::Info { json, .. } | LogCommand::Recover { json, .. }) => *json,
+            Command::Arms { json } | Command::Doctor { json } => *json,
+            Command::Log(
+                LogCommand::Info { json, .. }
+                | LogCommand::Recover { json, .. }
+                | LogCommand::Replay { json, .. },
+            ) => *json,
             Command::Log(LogCommand::Export { .. }) | Command::Completions { .. } => false,
         }
     }

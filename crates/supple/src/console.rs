@@ -58,8 +58,7 @@ struct JsonError {
 /// expected there.
 pub fn complain(failure: &Failure, as_json: bool) {
     remark(&format!("error: {failure}"));
-    // The results are already on standard output where a fault ended a run.
-    if as_json && !matches!(failure, Failure::Fault { .. }) {
+    if as_json && !failure.comes_with_results() {
         let error = JsonError {
             kind: failure.kind(),
             exit_code: failure.code(),

@@ -9,6 +9,8 @@
 //! | 4 | the arm cannot do the experiment |
 //! | 5 | a fault ended a run that should have gone through; all results are written |
 //! | 6 | a file cannot be read or written |
+//! | 7 | a replay does not give the logged answers |
+//! | 8 | the machine cannot run an arm in real time as it should |
 //! | 130 | interrupted |
 
 use crate::figures::FigureError;
@@ -27,6 +29,8 @@ pub const CODES: &str = "Exit codes:
   4    the arm cannot do the experiment
   5    a fault ended a run that should have gone through; all results are written
   6    a file cannot be read or written
+  7    a replay does not give the logged answers
+  8    the machine cannot run an arm in real time as it should
   130  interrupted";
 
 /// Why the program did not do what it was asked for. One line that names the cause and the remedy.
@@ -60,6 +64,26 @@ pub enum Failure {
     /// A log.
     #[error(transparent)]
     Log(#[from] LogError),
+    /// A replay that is not the run.
+    #[error(
+        "{different} of {steps} steps of {} do not give the logged answers; the log is of another \
+         version of the controller, or was changed",
+        path.display()
+    )]
+    Different {
+        /// The log.
+        path: PathBuf,
+        /// Steps that differ.
+        different: u64,
+        /// All steps.
+        steps: u64,
+    },
+    /// A machine that is not ready for real time.
+    #[error("this machine is not ready for real time: {failed}; each line above says what to do")]
+    NotReady {
+        /// Names of the checks that failed.
+        failed: String,
+    },
     /// A file.
     #[error("cannot {action} {}: {error}; {remedy}", path.display())]
     File {
@@ -112,8 +136,18 @@ impl Failure {
             4 => "experiment",
             5 => "fault",
             6 => "file",
+            7 => "replay",
+            8 => "machine",
             _ => "internal",
         }
+    }
+
+    /// Its results are already on standard output, and say what went wrong.
+    pub fn comes_with_results(&self) -> bool {
+        matches!(
+            self,
+            Failure::Fault { .. } | Failure::Different { .. } | Failure::NotReady { .. }
+        )
     }
 
     /// Exit code, see the module.
@@ -124,6 +158,8 @@ impl Failure {
             Failure::Fault { .. } => 5,
             Failure::Log(error) => log_code(error),
             Failure::File { .. } | Failure::Exists { .. } => 6,
+            Failure::Different { .. } => 7,
+            Failure::NotReady { .. } => 8,
             Failure::Figure(_) | Failure::Compose(_) => 1,
         }
     }

@@ -8,6 +8,7 @@ mod arms;
 mod cli;
 mod console;
 mod demo;
+mod doctor;
 pub mod exit;
 pub mod figures;
 mod interrupt;
@@ -42,6 +43,7 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
         Command::Demo(args) => demo::run(args),
         Command::Log(command) => log::run(command),
         Command::Arms { json } => arms::list(*json),
+        Command::Doctor { json } => doctor::run(*json),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(*shell, &mut Cli::command(), "supple", &mut script);

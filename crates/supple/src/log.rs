@@ -1,4 +1,5 @@
-//! `supple log`: what is in a log, a channel as a table, and what can be saved of a log that was cut.
+//! `supple log`: what is in a log, a channel as a table, the run again, and what can be saved of a log
+//! that was cut.
 
 use crate::cli::LogCommand;
 use crate::console::{say, say_json};
@@ -7,7 +8,7 @@ use std::fs::{self, File};
 use std::io::{BufWriter, ErrorKind, Write};
 use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
-use supple_log::{LogError, export_csv, info, recover};
+use supple_log::{LogError, export_csv, info, recover, replay};
 
 /// Ending of a log that is still being written, or was when its writer died.
 const PART: &str = "part";
@@ -32,6 +33,21 @@ pub fn run(command: &LogCommand) -> Result<(), Failure> {
             every,
             out: Some(out),
         } => export_to_file(file, channel, *every, out),
+        LogCommand::Replay { file, json } => {
+            let replay = replay(file)?;
+            match json {
+                true => say_json(&replay)?,
+                false => say(&replay.to_string())?,
+            }
+            match replay.different_steps {
+                0 => Ok(()),
+                different => Err(Failure::Different {
+                    path: file.clone(),
+                    different,
+                    steps: replay.steps,
+                }),
+            }
+        }
         LogCommand::Recover {
             from,
             to,

@@ -127,3 +127,31 @@ fn standard_output_on_a_full_disk_is_code_6() {
     assert_eq!(answer.code, Some(6));
     assert_one_clear_line(&answer, &["standard output", "No space left"]);
 }
+
+#[test]
+fn the_doctor_names_every_check_and_agrees_with_its_exit_code() {
+    let answer = run(&["doctor", "--json"]);
+    let report: serde_json::Value = serde_json::from_str(&answer.stdout).expect("JSON");
+    let ready = report["ready"].as_bool().expect("a verdict");
+    assert_eq!(answer.code, Some(if ready { 0 } else { 8 }));
+    let names: Vec<_> = report["checks"]
+        .as_array()
+        .expect("a list")
+        .iter()
+        .filter_map(|check| check["name"].as_str())
+        .collect();
+    for name in [
+        "kernel",
+        "priority",
+        "memlock",
+        "governor",
+        "isolation",
+        "can",
+    ] {
+        assert!(names.contains(&name), "{name} in {names:?}");
+    }
+    let text = run(&["doctor"]).stdout;
+    for name in names {
+        assert!(text.contains(name), "{name} in {text}");
+    }
+}

@@ -311,6 +311,17 @@ fn a_log_is_looked_into_and_exported() {
 }
 
 #[test]
+fn a_log_is_replayed_to_the_last_bit() {
+    let log = ran().out.join(LOG);
+    let replay = run(&["log", "replay", arg(&log), "--json"]);
+    assert_eq!(replay.code, Some(0), "{}", replay.stderr);
+    let replay: Value = serde_json::from_str(&replay.stdout).expect("JSON");
+    assert!(replay["steps"].as_u64().expect("steps") > 1_000);
+    assert_eq!(replay["different_steps"], 0);
+    assert!(replay["first_difference"].is_null());
+}
+
+#[test]
 fn a_log_that_was_cut_gives_no_table_and_is_recovered() {
     let folder = tempfile::tempdir().expect("a folder");
     let log = fs::read(ran().out.join(LOG)).expect("the log");

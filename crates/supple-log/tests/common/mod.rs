@@ -43,6 +43,7 @@ pub fn run_info() -> RunInfo {
 }
 
 /// One step as it is logged.
+#[derive(Clone)]
 pub struct Cycle {
     pub time_ns: u64,
     pub input: Input<N>,

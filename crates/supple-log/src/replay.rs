@@ -1,0 +1,154 @@
+//! Running the controller over a log again: the same step, the same bits.
+//!
+//! The configuration, the inputs and the answers come from the log itself. Every logged answer, with
+//! every term in it, is compared to the last bit; timing and what a plant knew are not the controller's
+//! and are left out.
+
+use crate::cdr;
+use crate::error::LogError;
+use crate::messages::{Header, Stamp};
+use crate::reader::Reader;
+use crate::record::Record;
+use crate::{definition, schema, table::Table};
+use serde::Serialize;
+use std::fmt;
+use std::path::{Path, PathBuf};
+use supple_core::{Controller, State, step};
+use supple_model::with_dof;
+
+/// Type of a step's message.
+const RECORD: &str = "supple_msgs/ControllerState";
+
+/// What a replay gave.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Replay {
+    /// Log.
+    pub file: PathBuf,
+    /// Steps that were run again.
+    pub steps: u64,
+    /// Steps whose answer is not the logged one, bit for bit.
+    pub different_steps: u64,
+    /// Where the first of them differs.
+    pub first_difference: Option<Difference>,
+}
+
+/// Where an answer is not the logged one.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Difference {
+    /// Step of the controller.
+    pub step: u64,
+    /// Its time \[ns\].
+    pub time_ns: u64,
+    /// First field that differs, as `supple log export` names it.
+    pub field: String,
+    /// Its value in the log.
+    pub logged: String,
+    /// Its value now.
+    pub replayed: String,
+}
+
+/// Runs the controller over a log again.
+///
+/// # Errors
+/// [`LogError::Gap`] where steps are missing: the state after them is not known.
+/// [`LogError::Incomplete`] where the file is cut. [`LogError::Format`] where it holds a configuration
+/// or a request that this version does not know.
+pub fn replay(path: impl AsRef<Path>) -> Result<Replay, LogError> {
+    let reader = Reader::open(path)?;
+    with_dof!(reader.about().joints.len(), N => run::<N>(&reader))?
+}
+
+fn run<const N: usize>(reader: &Reader) -> Result<Replay, LogError> {
+    let file = reader.path();
+    let broken = |message: String| LogError::Format {
+        file: file.display().to_string(),
+        message,
+    };
+    let controller = Controller::new(reader.config::<N>()?)
+        .map_err(|error| broken(format!("controller.toml: {error}")))?;
+    let mut state = State::new(&controller);
+    let mut replay = Replay {
+        file: file.to_owned(),
+        steps: 0,
+        different_steps: 0,
+        first_difference: None,
+    };
+    for read in reader.records::<N>()? {
+        let read = read?;
+        let (time_ns, logged) = (read.time_ns, read.value);
+        if logged.step != replay.steps {
+            return Err(LogError::Gap {
+                file: file.display().to_string(),
+                expected: replay.steps,
+                found: logged.step,
+            });
+        }
+        let input = logged
+            .input()
+            .map_err(|message| broken(format!("step {}: {message}", logged.step)))?;
+        let output = step(&controller, &mut state, &input);
+        let again = Record::new(logged.step, &input, &output);
+        replay.steps += 1;
+        let (logged, again) = (encoded(time_ns, &logged), encoded(time_ns, &again));
+        let (logged, again) = (logged.map_err(broken)?, again.map_err(broken)?);
+        if logged != again {
+            replay.different_steps += 1;
+            if replay.first_difference.is_none() {
+                let found = difference::<N>(&reader.about().joints, &logged, &again);
+                let [field, logged, replayed] = found.map_err(broken)?;
+                replay.first_difference = Some(Difference {
+                    step: replay.steps - 1,
+                    time_ns,
+                    field,
+                    logged,
+                    replayed,
+                });
+            }
+        }
+    }
+    Ok(replay)
+}
+
+/// A record as a message, in which equal means equal to the last bit.
+fn encoded<const N: usize>(time_ns: u64, record: &Record<N>) -> Result<Vec<u8>, String> {
+    let header = Header {
+        stamp: Stamp::from_ns(time_ns),
+        frame_id: "",
+    };
+    let mut bytes = Vec::new();
+    cdr::encode(&(header, record), &mut bytes).map_err(|error| error.to_string())?;
+    Ok(bytes)
+}
+
+fn difference<const N: usize>(
+    joints: &[String],
+    logged: &[u8],
+    replayed: &[u8],
+) -> Result<[String; 3], String> {
+    let definitions = definition::parse(RECORD, &schema::text(RECORD, N)?)?;
+    let table = Table::new(&definitions, logged, joints)?;
+    let found = table.difference(logged, replayed)?;
+    found.ok_or_else(|| "two messages differ in no field".to_owned())
+}
+
+impl fmt::Display for Replay {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (file, steps) = (self.file.display(), self.steps);
+        match &self.first_difference {
+            None => write!(
+                f,
+                "{file}: {steps} steps replayed, the same to the last bit"
+            ),
+            Some(first) => write!(
+                f,
+                "{file}: {} of {steps} steps differ, first step {} at {} ns in {}: {} in the log, {} now",
+                self.different_steps,
+                first.step,
+                first.time_ns,
+                first.field,
+                first.logged,
+                first.replayed
+            ),
+        }
+    }
+}
