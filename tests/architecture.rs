@@ -26,6 +26,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ),
     ("supple-bare", &["supple-core"]),
     ("supple-puck", &["supple-core"]),
+    ("supple-bus", &["supple-puck"]),
     (
         "supple-ident",
         &["supple-core", "supple-model", "supple-log"],

@@ -1,0 +1,350 @@
+//! Faults put into any bus: a decorator, not a flag.
+//!
+//! A [`FaultRule`] says what happens to which frames, from when to when, and with what probability. Time
+//! is the bus's own; chance comes from a seed, so that a run repeats. What the injector holds back it
+//! hands over in the order of its times.
+
+use crate::bus::{Bus, BusFault, Event};
+use crate::error::BusError;
+use std::collections::VecDeque;
+use supple_puck::{CanFrame, MessageId};
+
+/// Frames of which direction a rule touches.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Traffic {
+    /// Frames that this node sends.
+    Sent,
+    /// Frames that this node would receive.
+    Received,
+}
+
+/// What is done to a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FaultKind {
+    /// It is lost. Of a received frame nothing is seen; a sent one is confirmed all the same, as when
+    /// it is lost behind the controller.
+    Loss,
+    /// A sent frame never leaves, is never confirmed, and no error is raised: the transmit buffer that
+    /// fails in silence. Received frames are lost.
+    SilentLoss,
+    /// It is late by so many nanoseconds; later frames may overtake it.
+    Delay(u64),
+    /// It comes twice.
+    Duplicate,
+    /// It changes places with the next one, or comes late by so many nanoseconds where none follows.
+    Reorder(u64),
+    /// One bit of its payload is inverted, and its check sum would still be right.
+    Corrupt,
+    /// The controller goes off the bus: a fault is reported once, and until the rule ends nothing is
+    /// sent, received or confirmed; then the controller restarts.
+    BusOff,
+}
+
+/// A fault with its window.
+#[derive(Clone, Copy, Debug)]
+pub struct FaultRule {
+    /// Which direction. Of no meaning for [`FaultKind::BusOff`].
+    pub traffic: Traffic,
+    /// Which frames; `None` for all of them.
+    pub only: Option<fn(MessageId) -> bool>,
+    /// From this time of the bus on \[ns\].
+    pub from_ns: u64,
+    /// Up to this time of the bus \[ns\].
+    pub until_ns: u64,
+    /// Probability for each frame, 0 to 1.
+    pub probability: f64,
+    /// What happens.
+    pub kind: FaultKind,
+}
+
+impl FaultRule {
+    /// Every frame of a direction, for all time.
+    pub fn always(traffic: Traffic, kind: FaultKind) -> FaultRule {
+        FaultRule {
+            traffic,
+            only: None,
+            from_ns: 0,
+            until_ns: u64::MAX,
+            probability: 1.0,
+            kind,
+        }
+    }
+
+    /// The same rule within a window of time \[ns\].
+    pub fn within(self, from_ns: u64, until_ns: u64) -> FaultRule {
+        FaultRule {
+            from_ns,
+            until_ns,
+            ..self
+        }
+    }
+
+    /// The same rule for frames of these ids only.
+    pub fn only(self, ids: fn(MessageId) -> bool) -> FaultRule {
+        FaultRule {
+            only: Some(ids),
+            ..self
+        }
+    }
+
+    /// The same rule with a probability for each frame, 0 to 1.
+    pub fn with_probability(self, probability: f64) -> FaultRule {
+        FaultRule {
+            probability,
+            ..self
+        }
+    }
+
+    fn covers(&self, now_ns: u64) -> bool {
+        (self.from_ns..self.until_ns).contains(&now_ns)
+    }
+}
+
+/// A bus with faults.
+#[derive(Debug)]
+pub struct FaultInjector<B> {
+    bus: B,
+    rules: Vec<FaultRule>,
+    random: u64,
+    /// Held back, with the time at which each is due; sorted by it.
+    events: VecDeque<(u64, Event)>,
+    frames: VecDeque<(u64, CanFrame)>,
+    /// Received frames waiting for the next one to overtake them.
+    overtaken: Option<(u64, Event)>,
+    off: bool,
+}
+
+impl<B: Bus> FaultInjector<B> {
+    /// A bus with no faults yet.
+    pub fn new(bus: B, seed: u64) -> FaultInjector<B> {
+        FaultInjector {
+            bus,
+            rules: Vec::new(),
+            random: seed,
+            events: VecDeque::with_capacity(256),
+            frames: VecDeque::with_capacity(256),
+            overtaken: None,
+            off: false,
+        }
+    }
+
+    /// Adds a rule. Of several that cover a frame the first added acts.
+    pub fn add(&mut self, rule: FaultRule) {
+        self.rules.push(rule);
+    }
+
+    /// Ends all rules; what is held back still comes.
+    pub fn clear(&mut self) {
+        self.rules.clear();
+    }
+
+    /// The bus within.
+    pub fn inner(&self) -> &B {
+        &self.bus
+    }
+
+    /// The bus within.
+    pub fn inner_mut(&mut self) -> &mut B {
+        &mut self.bus
+    }
+
+    /// SplitMix64, whose every output bit depends on every bit of the seed.
+    fn next_random(&mut self) -> u64 {
+        self.random = self.random.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.random;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    fn chance(&mut self, probability: f64) -> bool {
+        let unit = (self.next_random() >> 11) as f64 / (1u64 << 53) as f64;
+        unit < probability
+    }
+
+    fn fault_for(&mut self, traffic: Traffic, id: MessageId) -> Option<FaultKind> {
+        let now = self.bus.now_ns();
+        for i in 0..self.rules.len() {
+            let rule = self.rules[i];
+            let touches = rule.kind != FaultKind::BusOff
+                && rule.traffic == traffic
+                && rule.covers(now)
+                && rule.only.is_none_or(|ids| ids(id));
+            if touches && self.chance(rule.probability) {
+                return Some(rule.kind);
+            }
+        }
+        None
+    }
+
+    fn corrupted(&mut self, frame: &CanFrame) -> CanFrame {
+        let bits = 8 * frame.payload().len() as u64;
+        if bits == 0 {
+            return *frame;
+        }
+        let bit = (self.next_random() % bits) as usize;
+        let mut payload = [0; 8];
+        let length = frame.payload().len();
+        payload[..length].copy_from_slice(frame.payload());
+        payload[bit / 8] ^= 1 << (bit % 8);
+        CanFrame::new(frame.id(), &payload[..length]).unwrap_or(*frame)
+    }
+
+    fn hold_event(&mut self, due_ns: u64, event: Event) {
+        let at = self.events.partition_point(|(due, _)| *due <= due_ns);
+        self.events.insert(at, (due_ns, event));
+    }
+
+    fn hold_frame(&mut self, due_ns: u64, frame: CanFrame) {
+        let at = self.frames.partition_point(|(due, _)| *due <= due_ns);
+        self.frames.insert(at, (due_ns, frame));
+    }
+
+    /// Follows the bus-off rules; `Some` when the state has just changed.
+    fn update_off(&mut self) -> Option<Event> {
+        let now = self.bus.now_ns();
+        let mut rules = self.rules.iter();
+        let off = rules.any(|rule| rule.kind == FaultKind::BusOff && rule.covers(now));
+        let changed = off != self.off;
+        self.off = off;
+        changed.then_some(Event::Fault(if off {
+            BusFault::BusOff
+        } else {
+            BusFault::Restarted
+        }))
+    }
+
+    /// The next time at which the injector itself has something to do.
+    fn next_due_ns(&self) -> u64 {
+        let now = self.bus.now_ns();
+        let windows = self.rules.iter().filter(|r| r.kind == FaultKind::BusOff);
+        let edges = windows.flat_map(|rule| [rule.from_ns, rule.until_ns]);
+        let events = self.events.front().map(|(due, _)| *due);
+        let frames = self.frames.front().map(|(due, _)| *due);
+        let overtaken = self.overtaken.map(|(due, _)| due);
+        let held = [events, frames, overtaken].into_iter().flatten();
+        let edge = edges.filter(|edge| *edge > now).min();
+        held.chain(edge).min().unwrap_or(u64::MAX)
+    }
+
+    /// What is due now.
+    fn due(&mut self) -> Result<Option<Event>, BusError> {
+        if let Some(event) = self.update_off() {
+            return Ok(Some(event));
+        }
+        let now = self.bus.now_ns();
+        while let Some((due, frame)) = self.frames.front().copied() {
+            if due > now {
+                break;
+            }
+            self.frames.pop_front();
+            self.bus.send(&frame)?;
+        }
+        if let Some((due, event)) = self.overtaken
+            && due <= now
+        {
+            self.overtaken = None;
+            return Ok(Some(event));
+        }
+        match self.events.front().copied() {
+            Some((due, event)) if due <= now => {
+                self.events.pop_front();
+                Ok(Some(event))
+            }
+            _ => Ok(None),
+        }
+    }
+
+    /// What becomes of a received frame.
+    fn received(&mut self, frame: CanFrame) -> Option<Event> {
+        let now = self.bus.now_ns();
+        let event = Event::Frame(frame);
+        let kind = self.fault_for(Traffic::Received, frame.id());
+        if let (Some((_, first)), None) = (self.overtaken, kind) {
+            self.overtaken = None;
+            self.hold_event(now, first);
+            return Some(event);
+        }
+        match kind {
+            None | Some(FaultKind::BusOff) => Some(event),
+            Some(FaultKind::Loss | FaultKind::SilentLoss) => None,
+            Some(FaultKind::Delay(late_ns)) => {
+                self.hold_event(now + late_ns, event);
+                None
+            }
+            Some(FaultKind::Duplicate) => {
+                self.hold_event(now, event);
+                Some(event)
+            }
+            Some(FaultKind::Reorder(late_ns)) => match self.overtaken.take() {
+                Some((_, first)) => {
+                    self.hold_event(now, first);
+                    Some(event)
+                }
+                None => {
+                    self.overtaken = Some((now + late_ns, event));
+                    None
+                }
+            },
+            Some(FaultKind::Corrupt) => Some(Event::Frame(self.corrupted(&frame))),
+        }
+    }
+}
+
+impl<B: Bus> Bus for FaultInjector<B> {
+    fn now_ns(&self) -> u64 {
+        self.bus.now_ns()
+    }
+
+    fn send(&mut self, frame: &CanFrame) -> Result<(), BusError> {
+        let now = self.bus.now_ns();
+        if let Some(event) = self.update_off() {
+            self.hold_event(now, event);
+        }
+        if self.off {
+            return Ok(());
+        }
+        match self.fault_for(Traffic::Sent, frame.id()) {
+            None | Some(FaultKind::BusOff) => self.bus.send(frame),
+            Some(FaultKind::Loss) => {
+                self.hold_event(now, Event::Sent(*frame));
+                Ok(())
+            }
+            Some(FaultKind::SilentLoss) => Ok(()),
+            Some(FaultKind::Delay(late_ns) | FaultKind::Reorder(late_ns)) => {
+                self.hold_frame(now + late_ns, *frame);
+                Ok(())
+            }
+            Some(FaultKind::Duplicate) => {
+                self.bus.send(frame)?;
+                self.bus.send(frame)
+            }
+            Some(FaultKind::Corrupt) => {
+                let corrupted = self.corrupted(frame);
+                self.bus.send(&corrupted)
+            }
+        }
+    }
+
+    fn receive_until(&mut self, until_ns: u64) -> Result<Option<Event>, BusError> {
+        loop {
+            if let Some(event) = self.due()? {
+                return Ok(Some(event));
+            }
+            let target = until_ns.min(self.next_due_ns());
+            match self.bus.receive_until(target)? {
+                Some(_) if self.off => {}
+                Some(Event::Frame(frame)) => {
+                    if let Some(event) = self.received(frame) {
+                        return Ok(Some(event));
+                    }
+                }
+                Some(event) => return Ok(Some(event)),
+                None if self.bus.now_ns() >= until_ns && self.next_due_ns() > until_ns => {
+                    return self.due();
+                }
+                None => {}
+            }
+        }
+    }
+}

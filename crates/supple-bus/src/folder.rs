@@ -1,0 +1,116 @@
+//! A folder that its owner alone can enter, for sockets: mode 0700, sockets in it 0600.
+
+use crate::error::BusError;
+use rustix::fs::{Mode, chmod};
+use std::os::unix::fs::{DirBuilderExt, MetadataExt};
+use std::os::unix::net::UnixDatagram;
+use std::path::{Path, PathBuf};
+
+/// The longest path that fits a Unix address.
+const GREATEST_PATH: usize = 107;
+
+/// An existing folder of this user's, closed to everyone else.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct OwnerFolder(PathBuf);
+
+impl OwnerFolder {
+    /// Makes the folder, or takes one that is there if it is this user's own and closed to others.
+    ///
+    /// # Errors
+    /// [`BusError::Folder`] where it cannot be made, belongs to someone else, is a link, or is open to
+    /// others.
+    pub fn open(path: impl Into<PathBuf>) -> Result<OwnerFolder, BusError> {
+        let path = path.into();
+        let made = std::fs::DirBuilder::new()
+            .recursive(true)
+            .mode(0o700)
+            .create(&path);
+        let refused = |problem: String, remedy| BusError::Folder {
+            path: path.clone(),
+            problem,
+            remedy,
+        };
+        made.map_err(|error| {
+            refused(
+                format!("cannot be made: {error}"),
+                "choose a folder that you may write to",
+            )
+        })?;
+        let metadata = std::fs::symlink_metadata(&path).map_err(|error| {
+            refused(
+                format!("cannot be read: {error}"),
+                "choose a folder of your own",
+            )
+        })?;
+        let user = rustix::process::geteuid().as_raw();
+        if !metadata.is_dir() {
+            return Err(refused(
+                "is not a folder".into(),
+                "choose another path, links are not followed",
+            ));
+        }
+        if metadata.uid() != user {
+            return Err(refused(
+                format!("belongs to user {}, you are {user}", metadata.uid()),
+                "choose a folder of your own",
+            ));
+        }
+        if metadata.mode() & 0o077 != 0 {
+            return Err(refused(
+                format!("has mode {:o}, open to others", metadata.mode() & 0o777),
+                "close it with chmod 700",
+            ));
+        }
+        Ok(OwnerFolder(path))
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
+
+    /// Binds a datagram socket in it, for the owner alone. A socket left by a process that has ended is
+    /// replaced.
+    ///
+    /// # Errors
+    /// [`BusError::Taken`] where a process listens on it; [`BusError::Folder`] where it cannot be made.
+    pub fn bind(&self, name: &str) -> Result<UnixDatagram, BusError> {
+        let path = self.0.join(name);
+        let refused = |problem: String, remedy| BusError::Folder {
+            path: path.clone(),
+            problem,
+            remedy,
+        };
+        if path.as_os_str().len() > GREATEST_PATH {
+            return Err(refused(
+                format!("has {} bytes", path.as_os_str().len()),
+                "a socket's path may have 107: choose a shorter folder",
+            ));
+        }
+        if listens(&path) {
+            return Err(BusError::Taken { path });
+        }
+        match std::fs::remove_file(&path) {
+            Ok(()) => {}
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
+            Err(error) => {
+                return Err(refused(
+                    format!("cannot be replaced: {error}"),
+                    "remove it by hand",
+                ));
+            }
+        }
+        let bound = UnixDatagram::bind(&path);
+        let socket = bound.map_err(|error| {
+            refused(format!("cannot be made: {error}"), "choose another folder")
+        })?;
+        chmod(&path, Mode::RUSR | Mode::WUSR)
+            .map_err(BusError::io("closing a socket to others"))?;
+        Ok(socket)
+    }
+}
+
+/// Whether a process has this socket open.
+fn listens(path: &Path) -> bool {
+    UnixDatagram::unbound().is_ok_and(|probe| probe.connect(path).is_ok())
+}

@@ -1,0 +1,73 @@
+//! Every backend with a mirror on its other side; the first of the pair keeps the mirror alive.
+
+use crate::mirror::{Mirror, Worker};
+use supple_bus::virtual_time::{Direct, Lockstep, Responder};
+use supple_bus::{Bus, BusError, DatagramBus, FaultInjector, OwnerFolder, Side, SocketCan};
+use tempfile::TempDir;
+
+type Arm = (Option<Worker>, Option<TempDir>);
+type Opened = Option<(Arm, Box<dyn Bus>)>;
+
+/// A `vcan` interface for the tests; another name may be given in the environment.
+fn interface() -> String {
+    std::env::var("SUPPLE_CAN_INTERFACE").unwrap_or_else(|_| "vcan0".into())
+}
+
+fn folder() -> (TempDir, OwnerFolder) {
+    let temporary = tempfile::tempdir().unwrap();
+    let folder = OwnerFolder::open(temporary.path().join("bus")).unwrap();
+    (temporary, folder)
+}
+
+pub fn direct() -> Opened {
+    Some(((None, None), Box::new(Direct(Mirror::default()))))
+}
+
+pub fn lockstep() -> Opened {
+    let (temporary, folder) = folder();
+    let worker = Worker::responder(Responder::open(&folder).unwrap());
+    let bus = Lockstep::open(&folder).unwrap();
+    Some(((Some(worker), Some(temporary)), Box::new(bus)))
+}
+
+fn datagram_pair() -> (Arm, DatagramBus) {
+    let (temporary, folder) = folder();
+    let worker = Worker::on_bus(DatagramBus::open(&folder, Side::Arm).unwrap());
+    let bus = DatagramBus::open(&folder, Side::Host).unwrap();
+    ((Some(worker), Some(temporary)), bus)
+}
+
+pub fn datagram() -> Opened {
+    let (arm, bus) = datagram_pair();
+    Some((arm, Box::new(bus)))
+}
+
+/// `None`, with the reason said, where the kernel has no such interface. Tests of one interface run one
+/// after another: everyone on it sees every frame.
+pub fn socket_can() -> Opened {
+    let name = interface();
+    let bus = match SocketCan::open(&name) {
+        Ok(bus) => bus,
+        Err(error @ BusError::Interface { .. }) => {
+            assert!(
+                std::env::var_os("SUPPLE_CAN_INTERFACE").is_none(),
+                "{error}"
+            );
+            eprintln!("skipped: {error}");
+            return None;
+        }
+        Err(error) => panic!("{error}"),
+    };
+    let worker = Worker::on_bus(SocketCan::open(&name).unwrap());
+    Some(((Some(worker), None), Box::new(bus)))
+}
+
+pub fn injected_direct() -> Opened {
+    let bus = FaultInjector::new(Direct(Mirror::default()), 1);
+    Some(((None, None), Box::new(bus)))
+}
+
+pub fn injected_datagram() -> Opened {
+    let (arm, bus) = datagram_pair();
+    Some((arm, Box::new(FaultInjector::new(bus, 1))))
+}

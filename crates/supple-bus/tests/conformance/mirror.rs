@@ -1,0 +1,105 @@
+//! The other side of the bus: a mirror, as a peer in virtual time and as a thread on a real bus.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use supple_bus::virtual_time::{Peer, Responder};
+use supple_bus::{Bus, Event};
+use supple_puck::{CanFrame, GroupId, MessageId, NodeId};
+
+/// Time that a frame takes in virtual time \[ns\].
+const FRAME_NS: u64 = 100_000;
+
+/// Node 1's answer to a frame of the host.
+pub fn reflected(frame: &CanFrame) -> CanFrame {
+    let node = NodeId::new(1).unwrap();
+    CanFrame::new(MessageId::to_group(node, GroupId::REPLY), frame.payload()).unwrap()
+}
+
+#[derive(Default)]
+pub struct Mirror {
+    now_ns: u64,
+    busy_until_ns: u64,
+    events: VecDeque<(u64, Event)>,
+}
+
+impl Peer for Mirror {
+    fn now_ns(&self) -> u64 {
+        self.now_ns
+    }
+
+    fn host_sends(&mut self, frame: &CanFrame) {
+        for event in [Event::Sent(*frame), Event::Frame(reflected(frame))] {
+            self.busy_until_ns = self.busy_until_ns.max(self.now_ns) + FRAME_NS;
+            self.events.push_back((self.busy_until_ns, event));
+        }
+    }
+
+    fn run_until(&mut self, until_ns: u64) -> Option<Event> {
+        match self.events.front().copied() {
+            Some((due, event)) if due <= until_ns => {
+                self.events.pop_front();
+                self.now_ns = due.max(self.now_ns);
+                Some(event)
+            }
+            _ => {
+                self.now_ns = until_ns.max(self.now_ns);
+                None
+            }
+        }
+    }
+}
+
+/// A mirror at work in a thread; it ends when dropped.
+pub struct Worker {
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Worker {
+    fn run(work: impl Fn(&AtomicBool) + Send + 'static) -> Worker {
+        let stop = Arc::new(AtomicBool::new(false));
+        let seen = stop.clone();
+        Worker {
+            stop,
+            thread: Some(std::thread::spawn(move || work(&seen))),
+        }
+    }
+
+    pub fn on_bus<B: Bus + Send + 'static>(bus: B) -> Worker {
+        let bus = std::sync::Mutex::new(bus);
+        Worker::run(move |stop| {
+            let mut bus = bus.lock().unwrap();
+            while !stop.load(Ordering::Relaxed) {
+                let until_ns = bus.now_ns() + 5_000_000;
+                if let Some(Event::Frame(frame)) = bus.receive_until(until_ns).unwrap() {
+                    bus.send(&reflected(&frame)).unwrap();
+                }
+            }
+        })
+    }
+
+    pub fn responder(responder: Responder) -> Worker {
+        let responder = std::sync::Mutex::new((responder, Mirror::default()));
+        Worker::run(move |stop| {
+            let (responder, mirror) = &mut *responder.lock().unwrap();
+            while !stop.load(Ordering::Relaxed) {
+                responder.serve(mirror, 5_000_000).unwrap();
+            }
+        })
+    }
+}
+
+impl Drop for Worker {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            let ended = thread.join();
+            assert!(
+                ended.is_ok() || std::thread::panicking(),
+                "the mirror failed"
+            );
+        }
+    }
+}

@@ -1,0 +1,118 @@
+//! The cases. Each gets the host's bus.
+
+use crate::mirror::reflected;
+use supple_bus::{Bus, Event};
+use supple_puck::{CanFrame, MessageId};
+
+/// Long enough for a thread to be scheduled on a busy machine; only a failure waits so long.
+const PATIENCE_NS: u64 = 10_000_000_000;
+/// What a wait is tried with.
+const WAIT_NS: u64 = 3_000_000;
+
+type Subject = Box<dyn Bus>;
+
+fn frame(id: u32, payload: &[u8]) -> CanFrame {
+    CanFrame::from_raw(id, payload).unwrap()
+}
+
+fn next(bus: &mut Subject) -> Event {
+    let until_ns = bus.now_ns() + PATIENCE_NS;
+    loop {
+        if let Some(event) = bus.receive_until(until_ns).unwrap() {
+            return event;
+        }
+        assert!(bus.now_ns() < until_ns, "nothing came");
+    }
+}
+
+/// Own frames confirmed and answers, each in its order.
+fn collect(bus: &mut Subject, frames: usize) -> (Vec<CanFrame>, Vec<CanFrame>) {
+    let (mut sent, mut answers) = (Vec::new(), Vec::new());
+    while sent.len() < frames || answers.len() < frames {
+        match next(bus) {
+            Event::Sent(frame) => sent.push(frame),
+            Event::Frame(frame) => answers.push(frame),
+            Event::Fault(fault) => panic!("{fault}"),
+        }
+    }
+    (sent, answers)
+}
+
+pub fn a_frame_is_confirmed_once_and_then_answered(mut bus: Subject) {
+    let poll = frame(0x404, &[0x30]);
+    bus.send(&poll).unwrap();
+    assert_eq!(next(&mut bus), Event::Sent(poll));
+    assert_eq!(next(&mut bus), Event::Frame(reflected(&poll)));
+    let until_ns = bus.now_ns() + WAIT_NS;
+    assert_eq!(bus.receive_until(until_ns).unwrap(), None);
+}
+
+pub fn every_length_and_id_crosses_unchanged(mut bus: Subject) {
+    let payload = [0x80, 0, 0xff, 1, 0x55, 0xaa, 0x7f, 0xfe];
+    for (length, id) in [
+        0x000, 0x001, 0x0ff, 0x400, 0x401, 0x404, 0x41f, 0x01f, 0x00a,
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let sent = frame(id, &payload[..length]);
+        bus.send(&sent).unwrap();
+        let (confirmed, answers) = collect(&mut bus, 1);
+        assert_eq!(confirmed, [sent]);
+        assert_eq!(answers[0].payload(), sent.payload());
+        assert_eq!(answers[0].id(), MessageId::from_raw(0x426).unwrap());
+    }
+}
+
+pub fn frames_keep_their_order(mut bus: Subject) {
+    let sent: Vec<_> = (0..5).map(|i| frame(0x401, &[i])).collect();
+    for frame in &sent {
+        bus.send(frame).unwrap();
+    }
+    let (confirmed, answers) = collect(&mut bus, sent.len());
+    assert_eq!(confirmed, sent);
+    let expected: Vec<_> = sent.iter().map(reflected).collect();
+    assert_eq!(answers, expected);
+}
+
+/// A cycle of a seven-joint arm, over and over.
+pub fn a_cycle_of_frames_is_not_lost(mut bus: Subject) {
+    for cycle in 0..200u8 {
+        let sent: Vec<_> = (0..8)
+            .map(|i| frame(0x400 | u32::from(i), &[cycle, i]))
+            .collect();
+        for frame in &sent {
+            bus.send(frame).unwrap();
+        }
+        let (confirmed, answers) = collect(&mut bus, sent.len());
+        assert_eq!(confirmed, sent);
+        assert_eq!(answers.len(), sent.len());
+    }
+}
+
+pub fn waiting_ends_at_its_time(mut bus: Subject) {
+    let until_ns = bus.now_ns() + WAIT_NS;
+    // A signal may end a wait of the kernel early, never the bus's.
+    assert_eq!(bus.receive_until(until_ns).unwrap(), None);
+    assert!(bus.now_ns() >= until_ns);
+}
+
+pub fn a_time_past_gives_what_is_there(mut bus: Subject) {
+    assert_eq!(bus.receive_until(0).unwrap(), None);
+    let poll = frame(0x404, &[0x30]);
+    bus.send(&poll).unwrap();
+    collect(&mut bus, 1);
+    assert_eq!(bus.receive_until(0).unwrap(), None);
+}
+
+pub fn time_never_goes_back(mut bus: Subject) {
+    let mut last_ns = bus.now_ns();
+    for i in 0..20u8 {
+        bus.send(&frame(0x404, &[i])).unwrap();
+        for _ in 0..2 {
+            next(&mut bus);
+            assert!(bus.now_ns() >= last_ns);
+            last_ns = bus.now_ns();
+        }
+    }
+}

@@ -1,0 +1,203 @@
+//! What each injected fault does to frames, in virtual time.
+
+use std::collections::VecDeque;
+use supple_bus::virtual_time::{Direct, Peer};
+use supple_bus::{Bus, BusFault, Event, FaultInjector, FaultKind, FaultRule, Traffic};
+use supple_puck::{CanFrame, MessageId};
+
+/// Keeps what the host sends; frames for the host are scripted.
+#[derive(Default)]
+struct Script {
+    now_ns: u64,
+    heard: Vec<(u64, CanFrame)>,
+    events: VecDeque<(u64, Event)>,
+}
+
+impl Peer for Script {
+    fn now_ns(&self) -> u64 {
+        self.now_ns
+    }
+
+    fn host_sends(&mut self, frame: &CanFrame) {
+        self.heard.push((self.now_ns, *frame));
+        self.events.push_front((self.now_ns, Event::Sent(*frame)));
+    }
+
+    fn run_until(&mut self, until_ns: u64) -> Option<Event> {
+        match self.events.front().copied() {
+            Some((due, event)) if due <= until_ns.max(self.now_ns) => {
+                self.events.pop_front();
+                self.now_ns = self.now_ns.max(due);
+                Some(event)
+            }
+            _ => {
+                self.now_ns = self.now_ns.max(until_ns);
+                None
+            }
+        }
+    }
+}
+
+fn frame(id: u32, payload: &[u8]) -> CanFrame {
+    CanFrame::from_raw(id, payload).unwrap()
+}
+
+/// Frames for the host at 10, 20, 30 and 40 ns.
+fn scripted(rule: FaultRule) -> FaultInjector<Direct<Script>> {
+    let events = (1..=4u8).map(|i| (u64::from(i) * 10, Event::Frame(frame(0x423, &[0, 0, i]))));
+    let script = Script {
+        events: events.collect(),
+        ..Script::default()
+    };
+    let mut bus = FaultInjector::new(Direct(script), 7);
+    bus.add(rule);
+    bus
+}
+
+/// Last payload byte and time of every frame received until 100 ns.
+fn received(bus: &mut impl Bus) -> Vec<(u8, u64)> {
+    let mut frames = Vec::new();
+    while let Some(event) = bus.receive_until(100).unwrap() {
+        if let Event::Frame(frame) = event {
+            frames.push((frame.payload()[2], bus.now_ns()));
+        }
+    }
+    assert_eq!(bus.now_ns(), 100);
+    frames
+}
+
+fn third_only(kind: FaultKind) -> FaultRule {
+    FaultRule::always(Traffic::Received, kind).within(30, 31)
+}
+
+#[test]
+fn received_frames_are_lost_late_doubled_or_overtaken() {
+    let outcomes = [
+        (FaultKind::Loss, vec![(1, 10), (2, 20), (4, 40)]),
+        (FaultKind::SilentLoss, vec![(1, 10), (2, 20), (4, 40)]),
+        (
+            FaultKind::Delay(25),
+            vec![(1, 10), (2, 20), (4, 40), (3, 55)],
+        ),
+        (
+            FaultKind::Duplicate,
+            vec![(1, 10), (2, 20), (3, 30), (3, 30), (4, 40)],
+        ),
+        (
+            FaultKind::Reorder(50),
+            vec![(1, 10), (2, 20), (4, 40), (3, 40)],
+        ),
+        // No frame follows in time: late, not lost.
+        (
+            FaultKind::Reorder(5),
+            vec![(1, 10), (2, 20), (3, 35), (4, 40)],
+        ),
+    ];
+    for (kind, expected) in outcomes {
+        assert_eq!(
+            received(&mut scripted(third_only(kind))),
+            expected,
+            "{kind:?}"
+        );
+    }
+}
+
+#[test]
+fn corruption_inverts_one_bit() {
+    let mut bus = scripted(third_only(FaultKind::Corrupt));
+    let mut frames = Vec::new();
+    while let Some(Event::Frame(frame)) = bus.receive_until(100).unwrap() {
+        frames.push(frame);
+    }
+    let word = |frame: &CanFrame| {
+        frame
+            .payload()
+            .iter()
+            .fold(0, |w, b| w << 8 | u32::from(*b))
+    };
+    assert_eq!(frames.len(), 4);
+    assert_eq!((word(&frames[2]) ^ 3).count_ones(), 1);
+}
+
+#[test]
+fn a_lost_frame_is_confirmed_and_a_silently_lost_one_is_not() {
+    for (kind, confirmed) in [(FaultKind::Loss, true), (FaultKind::SilentLoss, false)] {
+        let mut bus = FaultInjector::new(Direct(Script::default()), 1);
+        bus.add(FaultRule::always(Traffic::Sent, kind));
+        let sent = frame(0x401, &[0xaa; 8]);
+        bus.send(&sent).unwrap();
+        let event = bus.receive_until(50).unwrap();
+        assert_eq!(event, confirmed.then_some(Event::Sent(sent)));
+        assert_eq!(bus.inner().0.heard, []);
+    }
+}
+
+#[test]
+fn a_late_frame_is_confirmed_when_it_leaves() {
+    let mut bus = FaultInjector::new(Direct(Script::default()), 1);
+    bus.add(FaultRule::always(Traffic::Sent, FaultKind::Delay(30)));
+    let sent = frame(0x401, &[0xaa; 8]);
+    bus.send(&sent).unwrap();
+    assert_eq!(bus.receive_until(29).unwrap(), None);
+    assert_eq!(bus.receive_until(100).unwrap(), Some(Event::Sent(sent)));
+    assert_eq!(bus.inner().0.heard, [(30, sent)]);
+}
+
+#[test]
+fn off_the_bus_nothing_passes_and_both_edges_are_told() {
+    let mut bus = scripted(FaultRule::always(Traffic::Sent, FaultKind::BusOff).within(15, 35));
+    let mut events = Vec::new();
+    while let Some(event) = bus.receive_until(100).unwrap() {
+        events.push((bus.now_ns(), event));
+        if event == Event::Fault(BusFault::BusOff) {
+            bus.send(&frame(0x401, &[0xaa; 8])).unwrap();
+        }
+    }
+    let arrived = |i: u8| Event::Frame(frame(0x423, &[0, 0, i]));
+    assert_eq!(
+        events,
+        [
+            (10, arrived(1)),
+            (15, Event::Fault(BusFault::BusOff)),
+            (35, Event::Fault(BusFault::Restarted)),
+            (40, arrived(4)),
+        ]
+    );
+    assert_eq!(bus.inner().0.heard, []);
+}
+
+#[test]
+fn rules_touch_only_their_frames() {
+    let mut bus = FaultInjector::new(Direct(Script::default()), 1);
+    let torques = |id: MessageId| id.raw() == 0x401;
+    bus.add(FaultRule::always(Traffic::Sent, FaultKind::SilentLoss).only(torques));
+    bus.send(&frame(0x401, &[0xaa; 8])).unwrap();
+    bus.send(&frame(0x404, &[0x30])).unwrap();
+    let heard: Vec<_> = bus
+        .inner()
+        .0
+        .heard
+        .iter()
+        .map(|(_, f)| f.id().raw())
+        .collect();
+    assert_eq!(heard, [0x404]);
+}
+
+#[test]
+fn chance_follows_the_probability_and_repeats_with_the_seed() {
+    let lost = |seed| {
+        let mut bus = FaultInjector::new(Direct(Script::default()), seed);
+        let rule = FaultRule::always(Traffic::Sent, FaultKind::SilentLoss);
+        bus.add(rule.with_probability(0.25));
+        for i in 0..4000u32 {
+            bus.send(&frame(0x401, &i.to_le_bytes())).unwrap();
+        }
+        let heard: Vec<_> = bus.inner().0.heard.iter().map(|(_, f)| *f).collect();
+        heard
+    };
+    let heard = lost(3);
+    // Four standard deviations of the binomial: 4 sqrt(4000 0.25 0.75) = 110.
+    assert!((2890..=3110).contains(&heard.len()), "{}", heard.len());
+    assert_eq!(heard, lost(3));
+    assert_ne!(heard, lost(4));
+}

@@ -1,0 +1,61 @@
+//! `struct can_frame`: every frame survives it, and no sixteen bytes can break its reader.
+
+use proptest::prelude::*;
+use supple_bus::{BusFault, WireFrame};
+use supple_puck::CanFrame;
+
+proptest! {
+    #[test]
+    fn a_data_frame_survives(id in 0u32..0x800, payload in proptest::collection::vec(any::<u8>(), 0..=8)) {
+        let frame = CanFrame::from_raw(id, &payload).unwrap();
+        prop_assert_eq!(WireFrame::parse(&WireFrame::data(&frame)), WireFrame::Data(frame));
+    }
+
+    #[test]
+    fn what_is_read_as_data_is_written_the_same(raw in any::<[u8; 16]>()) {
+        if let WireFrame::Data(frame) = WireFrame::parse(&raw) {
+            prop_assert_eq!(WireFrame::parse(&WireFrame::data(&frame)), WireFrame::Data(frame));
+        }
+    }
+
+    /// Extended ids and remote requests have no place on this bus.
+    #[test]
+    fn flagged_ids_are_foreign(id in 0u32..0x800, remote in any::<bool>()) {
+        let flag = if remote { 0x4000_0000 } else { 0x8000_0000u32 };
+        let mut raw = [0; 16];
+        raw[..4].copy_from_slice(&(id | flag).to_ne_bytes());
+        prop_assert_eq!(WireFrame::parse(&raw), WireFrame::Foreign);
+    }
+}
+
+/// Layout and numbers of `linux/can.h` and `linux/can/error.h`.
+#[test]
+fn layout_is_the_kernels() {
+    let frame = CanFrame::from_raw(0x423, &[0x00, 0x10, 0x00]).unwrap();
+    let mut expected = [0; 16];
+    expected[..4].copy_from_slice(&0x423u32.to_ne_bytes());
+    expected[4] = 3;
+    expected[8..11].copy_from_slice(&[0x00, 0x10, 0x00]);
+    assert_eq!(WireFrame::data(&frame), expected);
+
+    let error = |class: u32, controller: u8| {
+        let mut raw = [0; 16];
+        raw[..4].copy_from_slice(&(0x2000_0000 | class).to_ne_bytes());
+        raw[4] = 8;
+        raw[9] = controller;
+        WireFrame::parse(&raw)
+    };
+    for (class, controller, fault) in [
+        (0x040, 0, BusFault::BusOff),
+        (0x020, 0, BusFault::NoAcknowledge),
+        (0x100, 0, BusFault::Restarted),
+        (0x004, 0x01, BusFault::Overrun),
+        (0x004, 0x08, BusFault::Warning),
+        (0x004, 0x20, BusFault::Passive),
+        // Of several the worst: off the bus after nobody acknowledged.
+        (0x060, 0, BusFault::BusOff),
+    ] {
+        assert_eq!(error(class, controller), WireFrame::Fault(fault));
+    }
+    assert_eq!(error(0, 0), WireFrame::Foreign);
+}
