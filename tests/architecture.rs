@@ -27,6 +27,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("supple-bare", &["supple-core"]),
     ("supple-puck", &["supple-core"]),
     ("supple-bus", &["supple-puck"]),
+    ("supple-ipc", &["supple-core", "supple-model"]),
+    ("supple-realtime", &[]),
     (
         "supple-ident",
         &["supple-core", "supple-model", "supple-log"],

@@ -12,6 +12,7 @@
 
 pub mod arm;
 pub mod body;
+pub mod codes;
 pub mod config;
 pub mod controller;
 pub mod dynamics;

@@ -25,7 +25,6 @@
 #![forbid(unsafe_code)]
 
 mod cdr;
-mod codes;
 mod config;
 mod definition;
 mod error;
@@ -38,7 +37,6 @@ mod reader;
 mod record;
 mod recover;
 mod replay;
-mod request;
 mod scan;
 mod schema;
 mod table;

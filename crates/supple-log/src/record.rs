@@ -5,9 +5,8 @@
 //! that this one does not know can still be read.
 
 use crate::cdr::array;
-use crate::codes;
-use crate::request;
 use serde::{Deserialize, Serialize};
+use supple_core::codes::{self, FaultCode, RequestCode};
 use supple_core::controller::Mode;
 use supple_core::impedance::Torques;
 use supple_core::math::Vector3;
@@ -116,11 +115,8 @@ pub struct TorqueTerms<const N: usize> {
 impl<const N: usize> Record<N> {
     /// Of one step. `step` is its number since the controller started.
     pub fn new(step: u64, input: &Input<N>, output: &Output<N>) -> Self {
-        let (request, trajectory, request_values) = request::encode(&input.request);
-        let (fault, fault_joint, fault_value, fault_limit) = output
-            .fault
-            .as_ref()
-            .map_or((0, -1, 0.0, 0.0), codes::fault);
+        let request = RequestCode::new(input.request.as_ref());
+        let fault = FaultCode::new(output.fault.as_ref());
         let vector = |v: Vector3<f64>| -> [f64; 3] { v.into() };
         let reference = |of: fn(&supple_core::Reference) -> Vector3<f64>| {
             output
@@ -135,9 +131,9 @@ impl<const N: usize> Record<N> {
             measured_position_rad: input.position_rad.map(Option::unwrap_or_default),
             has_tip_force: input.tip_force_n.is_some(),
             tip_force_n: input.tip_force_n.map_or([0.0; 3], vector),
-            request,
-            trajectory,
-            request_values,
+            request: request.kind,
+            trajectory: request.trajectory,
+            request_values: request.values().to_vec(),
             cycle: output.cycle,
             mode: output.mode as u8,
             mode_time_s: output.mode_time_s,
@@ -163,12 +159,12 @@ impl<const N: usize> Record<N> {
             in_contact: output.in_contact,
             friction_share: output.friction_share,
             least_singular_value_m: output.least_singular_value_m,
-            fault,
-            fault_joint,
-            fault_value,
-            fault_limit,
+            fault: fault.kind,
+            fault_joint: fault.joint,
+            fault_value: fault.value,
+            fault_limit: fault.limit,
             fault_text: output.fault.map_or_else(String::new, |f| f.to_string()),
-            refusal: output.refusal.as_ref().map_or(0, codes::refusal),
+            refusal: codes::refusal(output.refusal.as_ref()),
             refusal_text: output.refusal.map_or_else(String::new, |r| r.to_string()),
         }
     }
@@ -180,17 +176,20 @@ impl<const N: usize> Record<N> {
     pub fn input(&self) -> Result<Input<N>, String> {
         let position =
             |i: usize| self.has_measured_position[i].then_some(self.measured_position_rad[i]);
+        let request = RequestCode::from_parts(self.request, self.trajectory, &self.request_values)
+            .and_then(|code| code.request())
+            .map_err(|error| error.to_string())?;
         Ok(Input {
             cycle: self.input_cycle,
             position_rad: core::array::from_fn(position),
             tip_force_n: self.has_tip_force.then(|| Vector3::from(self.tip_force_n)),
-            request: request::decode(self.request, self.trajectory, &self.request_values)?,
+            request,
         })
     }
 
     /// Mode in force; `None` if this version does not know it.
     pub fn mode(&self) -> Option<Mode> {
-        codes::MODES.get(usize::from(self.mode)).copied()
+        codes::mode(self.mode)
     }
 }
 

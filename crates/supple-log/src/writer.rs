@@ -151,6 +151,20 @@ impl<const N: usize> Writer<N> {
         extras: &Extras<N>,
     ) -> Result<(), LogError> {
         let step = extras.step.unwrap_or(self.next_step);
+        self.write_record(time_ns, &Record::new(step, input, output), extras)
+    }
+
+    /// One step that is a record already, such as another process has sent; `extras.step` has no say.
+    ///
+    /// # Errors
+    /// As [`Writer::write`].
+    pub fn write_record(
+        &mut self,
+        time_ns: u64,
+        record: &Record<N>,
+        extras: &Extras<N>,
+    ) -> Result<(), LogError> {
+        let step = record.step;
         self.next_step = step + 1;
         let channels = &mut self.channels;
         channels.file.close_chunk_if_due(time_ns)?;
@@ -158,8 +172,7 @@ impl<const N: usize> Writer<N> {
         let in_frame = |frame_id| Header { stamp, frame_id };
         let header = in_frame(&self.base);
 
-        let record = Record::new(step, input, output);
-        channels.put(Topic::ControllerState, step, time_ns, &(header, &record))?;
+        channels.put(Topic::ControllerState, step, time_ns, &(header, record))?;
         let joints = JointState {
             header,
             name: self.description.joint_names(),
@@ -168,16 +181,17 @@ impl<const N: usize> Writer<N> {
             effort: &record.torque_nm,
         };
         channels.put(Topic::JointStates, step, time_ns, &joints)?;
-        let wrench = |force: Vector3<f64>| WrenchStamped {
+        let wrench = |force: [f64; 3]| WrenchStamped {
             header: in_frame(WRENCH_FRAME),
-            force: force.into(),
+            force,
             torque: [0.0; 3],
         };
-        if let Some(force) = extras.tip_force_n.or(input.tip_force_n) {
+        let told = record.has_tip_force.then_some(record.tip_force_n);
+        if let Some(force) = extras.tip_force_n.map(Into::into).or(told) {
             channels.put(Topic::WrenchExt, step, time_ns, &wrench(force))?;
         }
-        if output.reference.is_some() {
-            let force = wrench(output.external_force_n);
+        if record.has_reference {
+            let force = wrench(record.external_force_n);
             channels.put(Topic::WrenchObserved, step, time_ns, &force)?;
         }
         if let Some(timing) = &extras.timing {
@@ -192,7 +206,7 @@ impl<const N: usize> Writer<N> {
                 let header = in_frame(t.parent);
                 TransformStamped::new(header, t.child, &t.parent_from_child)
             });
-            let tip = Pose::from_translation(output.tip_position_m);
+            let tip = Pose::from_translation(record.tip_position_m.into());
             let tip = TransformStamped::new(header, WRENCH_FRAME, &tip);
             let transforms: Vec<_> = transforms.chain([tip]).collect();
             channels.put(Topic::Tf, step, time_ns, &transforms)?;

@@ -34,6 +34,8 @@ pub struct Output<const N: usize> {
     pub mode: Mode,
     /// Time since the mode was entered \[s\].
     pub mode_time_s: f64,
+    /// No torque is wanted: idle, or a fault in which there must be none.
+    pub limp: bool,
     /// Latched fault.
     pub fault: Option<Fault>,
     /// Why this cycle's request was refused.

@@ -82,6 +82,7 @@ pub fn step<const N: usize>(
         fallback_torque_nm: state.fallback,
         mode: state.mode(),
         mode_time_s: state.activity_s(config),
+        limp: state.activity.is_limp(),
         fault: state.fault,
         refusal,
         torques,

@@ -1,0 +1,142 @@
+//! Requests as numbers: nothing is lost on the way there and back, and nonsense is refused.
+
+use proptest::prelude::*;
+use proptest::strategy::Union;
+use supple_core::codes::{RequestCode, RequestCodeError, VALUES};
+use supple_core::config::Gains;
+use supple_core::controller::Request;
+use supple_core::math::Vector3;
+use supple_core::trajectory::{Arc, Line, Probe, Quadrant, Sinusoid};
+use supple_core::{Trajectory, Vector};
+
+fn number() -> impl Strategy<Value = f64> {
+    prop_oneof![-10.0..10.0, Just(-0.0), Just(1e-308), Just(1.0 / 3.0)]
+}
+
+fn vector() -> impl Strategy<Value = Vector3<f64>> {
+    [number(), number(), number()].prop_map(Vector3::from)
+}
+
+/// One of every kind, by its number.
+fn trajectory() -> impl Strategy<Value = (u8, Trajectory)> {
+    let vectors = (vector(), vector(), vector());
+    let numbers = proptest::array::uniform8(number());
+    (1_u8..=6, vectors, numbers, any::<u32>()).prop_map(|(kind, (a, b, c), x, strokes)| {
+        let trajectory = match kind {
+            1 => Trajectory::Hold(a),
+            2 => Trajectory::Line(Line {
+                from_m: a,
+                to_m: b,
+                duration_s: x[0],
+            }),
+            3 => Trajectory::Sinusoid(Sinusoid {
+                centre_m: a,
+                amplitude_m: b,
+                angular_frequency_rad_per_s: x[0],
+                ramp_s: x[1],
+            }),
+            4 => Trajectory::Arc(Arc {
+                radius_m: x[0],
+                height_m: x[1],
+                centre_rad: x[2],
+                amplitude_rad: x[3],
+                angular_frequency_rad_per_s: x[4],
+                ramp_s: x[5],
+            }),
+            5 => Trajectory::Quadrant(Quadrant::new(a, b, c, x[0], x[1])),
+            _ => Trajectory::Probe(Probe {
+                radius_m: x[0],
+                strokes,
+                radial_step_m: x[1],
+                top_m: x[2],
+                stroke_m: x[3],
+                azimuth_rad: x[4],
+                azimuth_step_rad: x[5],
+                speed_m_per_s: x[6],
+                ramp_s: x[7],
+            }),
+        };
+        (kind, trajectory)
+    })
+}
+
+type Numbered = ((u8, u8), Option<Request<4>>);
+
+fn request() -> impl Strategy<Value = Numbered> {
+    let moving = ([number(), number(), number(), number()], number());
+    let gains = (vector(), vector(), number());
+    Union::new([
+        Just(((0, 0), None)).boxed(),
+        Just(((1, 0), Some(Request::Idle))).boxed(),
+        Just(((2, 0), Some(Request::GravityHold))).boxed(),
+        Just(((6, 0), Some(Request::Reset))).boxed(),
+        moving
+            .prop_map(|(target, duration_s)| {
+                let target_rad = Vector::from(target);
+                let request = Request::Move {
+                    target_rad,
+                    duration_s,
+                };
+                ((3, 0), Some(request))
+            })
+            .boxed(),
+        trajectory()
+            .prop_map(|(kind, trajectory)| ((4, kind), Some(Request::Track(trajectory))))
+            .boxed(),
+        gains
+            .prop_map(|(stiffness_n_per_m, damping_n_s_per_m, ramp_s)| {
+                let gains = Gains {
+                    stiffness_n_per_m,
+                    damping_n_s_per_m,
+                };
+                ((5, 0), Some(Request::Gains { gains, ramp_s }))
+            })
+            .boxed(),
+    ])
+}
+
+proptest! {
+    #[test]
+    fn every_request_comes_back_to_the_last_bit((numbers, request) in request()) {
+        let code = RequestCode::new(request.as_ref());
+        prop_assert_eq!((code.kind, code.trajectory), numbers);
+        prop_assert!(code.values().len() <= VALUES);
+        let parts = RequestCode::from_parts(code.kind, code.trajectory, code.values());
+        prop_assert_eq!(parts, Ok(code));
+        let again = code.request::<4>().expect("known");
+        // Debug tells -0 from 0, and prints every other number with all its digits.
+        prop_assert_eq!(format!("{again:?}"), format!("{request:?}"));
+    }
+}
+
+fn decode(
+    kind: u8,
+    trajectory: u8,
+    values: &[f64],
+) -> Result<Option<Request<4>>, RequestCodeError> {
+    RequestCode::from_parts(kind, trajectory, values)?.request()
+}
+
+#[test]
+fn what_is_not_known_or_not_whole_is_refused() {
+    assert_eq!(decode(7, 0, &[]), Err(RequestCodeError::Kind(7)));
+    assert_eq!(decode(4, 0, &[]), Err(RequestCodeError::Trajectory(0)));
+    assert_eq!(
+        decode(4, 7, &[0.0; 16]),
+        Err(RequestCodeError::Trajectory(7))
+    );
+    for (kind, found, expected) in [(3, 4, 5), (3, 6, 5), (1, 1, 0), (1, 17, 16)] {
+        assert_eq!(
+            decode(kind, 0, &[0.0; 17][..found]),
+            Err(RequestCodeError::Count { found, expected })
+        );
+    }
+    let strokes = |count| [0.1, count, 0.1, 0.0, 0.1, 0.0, 0.1, 0.04, 0.1];
+    assert!(decode(4, 6, &strokes(3.0)).is_ok());
+    for count in [2.5, -1.0] {
+        assert_eq!(
+            decode(4, 6, &strokes(count)),
+            Err(RequestCodeError::Strokes(count))
+        );
+    }
+}

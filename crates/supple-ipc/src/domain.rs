@@ -1,0 +1,142 @@
+//! Where the shared memory of one system lives, apart from that of every other.
+//!
+//! A system is known by its prefix: processes of the same user under the same prefix see each other, others
+//! do not. Sockets and service files are in a folder of the user alone; shared memory is created for the
+//! user alone. Nothing is ever sent over a network.
+
+use crate::error::IpcError;
+use iceoryx2::prelude::*;
+use rustix::fs::Mode;
+use std::fs::{self, DirBuilder, Metadata};
+use std::os::unix::fs::{DirBuilderExt, MetadataExt};
+use std::path::{Path as StdPath, PathBuf};
+
+/// Environment variable that gives the prefix where no option does.
+pub const PREFIX_VARIABLE: &str = "SUPPLE_PREFIX";
+/// The prefix where nobody gives one.
+pub const DEFAULT_PREFIX: &str = "supple";
+
+/// Permissions of the folder: its owner alone.
+const OWNER_ONLY: u32 = 0o700;
+
+/// A node of the shared-memory library, whose ports stay in the thread that made them.
+pub(crate) type Node = iceoryx2::node::Node<ipc::Service>;
+
+/// The place of one system.
+#[derive(Clone, Debug)]
+pub struct Domain {
+    prefix: String,
+    folder: PathBuf,
+    config: Config,
+}
+
+impl Domain {
+    /// The system of a prefix; without one, of [`PREFIX_VARIABLE`], or else of [`DEFAULT_PREFIX`]. Its folder
+    /// is `$XDG_RUNTIME_DIR/supple`, or `/tmp/supple-<uid>` where there is no such variable.
+    ///
+    /// # Errors
+    /// [`IpcError::Prefix`], [`IpcError::Folder`].
+    pub fn new(prefix: Option<&str>) -> Result<Domain, IpcError> {
+        let from_environment = std::env::var(PREFIX_VARIABLE).ok();
+        let prefix = prefix
+            .or(from_environment.as_deref())
+            .unwrap_or(DEFAULT_PREFIX);
+        let user = rustix::process::getuid().as_raw();
+        let folder = match std::env::var_os("XDG_RUNTIME_DIR") {
+            Some(runtime) if !runtime.is_empty() => PathBuf::from(runtime).join("supple"),
+            _ => PathBuf::from(format!("/tmp/supple-{user}")),
+        };
+        Domain::within(&folder, prefix)
+    }
+
+    /// The system of a prefix, with its files in a folder of the caller's choice.
+    ///
+    /// # Errors
+    /// [`IpcError::Prefix`], [`IpcError::Folder`].
+    pub fn within(folder: &StdPath, prefix: &str) -> Result<Domain, IpcError> {
+        let sound = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || "-_".contains(c);
+        if prefix.is_empty() || prefix.len() > 32 || !prefix.chars().all(sound) {
+            return Err(IpcError::Prefix {
+                found: prefix.to_owned(),
+            });
+        }
+        own(folder)?;
+        let user = rustix::process::getuid().as_raw();
+        let mut config = Config::default();
+        let unusable = |cause: String| IpcError::Folder {
+            folder: folder.to_owned(),
+            cause,
+            remedy: "set XDG_RUNTIME_DIR to a folder with a short path",
+        };
+        let root = Path::new(folder.as_os_str().as_encoded_bytes())
+            .map_err(|error| unusable(format!("{error:?}")))?;
+        config.global.set_root_path(&root);
+        config.global.prefix = FileName::new(format!("{prefix}_{user}_").as_bytes())
+            .map_err(|error| unusable(format!("{error:?}")))?;
+        Ok(Domain {
+            prefix: prefix.to_owned(),
+            folder: folder.to_owned(),
+            config,
+        })
+    }
+
+    /// The prefix.
+    pub fn prefix(&self) -> &str {
+        &self.prefix
+    }
+
+    /// The folder that holds sockets and service files, for the user alone.
+    pub fn folder(&self) -> &StdPath {
+        &self.folder
+    }
+
+    /// A node in this system. What processes that died have left is cleared away.
+    pub(crate) fn node(&self) -> Result<Node, IpcError> {
+        // Its own words are about its own terms: the errors here say what they mean to this system.
+        set_log_level(LogLevel::Fatal);
+        NodeBuilder::new()
+            .config(&self.config)
+            .signal_handling_mode(SignalHandlingMode::Disabled)
+            .create::<ipc::Service>()
+            .map_err(|error| IpcError::Service {
+                service: format!("a node under the prefix `{}`", self.prefix),
+                cause: error.to_string(),
+            })
+    }
+}
+
+/// Makes the folder, or makes sure that it is ours alone.
+fn own(folder: &StdPath) -> Result<(), IpcError> {
+    let failed = |cause: String, remedy| IpcError::Folder {
+        folder: folder.to_owned(),
+        cause,
+        remedy,
+    };
+    let made = DirBuilder::new()
+        .recursive(true)
+        .mode(OWNER_ONLY)
+        .create(folder);
+    made.map_err(|error| {
+        failed(
+            error.to_string(),
+            "set XDG_RUNTIME_DIR to a folder that can be written",
+        )
+    })?;
+    let found: Metadata = fs::symlink_metadata(folder)
+        .map_err(|error| failed(error.to_string(), "set XDG_RUNTIME_DIR to another folder"))?;
+    let ours = found.is_dir() && found.uid() == rustix::process::getuid().as_raw();
+    let others = Mode::from_raw_mode(found.mode()).bits() & 0o077;
+    if !ours {
+        return Err(failed(
+            "it belongs to somebody else".to_owned(),
+            "remove it, or set XDG_RUNTIME_DIR to a folder of your own",
+        ));
+    }
+    if others != 0 {
+        return Err(failed(
+            format!("others may enter it (mode {:o})", found.mode() & 0o777),
+            "chmod 700 it",
+        ));
+    }
+    Ok(())
+}

@@ -1,0 +1,46 @@
+//! What the processes of one system say to each other, in shared memory on one machine.
+//!
+//! | service | message | writer | readers |
+//! |---|---|---|---|
+//! | `arm_state` | [`ArmState`](message::ArmState) | the plant: `supple-sim` or `supple-can` | the controller |
+//! | `torque_command` | [`TorqueCommand`](message::TorqueCommand) | the controller: `supple-rt` | the plant |
+//! | `telemetry` | [`Telemetry`](message::Telemetry) | the controller | up to 8 |
+//! | `operator_request` | [`OperatorRequest`](message::OperatorRequest) | up to 8 operators | the controller |
+//! | `operator_reply` | [`OperatorReply`](message::OperatorReply) | the controller | up to 8 |
+//!
+//! The services are iceoryx2's. Each has one writer, which the library enforces, requests apart: they command
+//! nothing and are checked by the controller. Publishing and receiving allocate nothing. Everything is for
+//! one user alone and apart from other systems by a prefix, see [`Domain`]; a peer of another version is
+//! refused ([`IpcError::Version`]).
+//!
+//! ```
+//! use core::time::Duration;
+//! use supple_ipc::message::{ArmState, Drives, PlantReport};
+//! use supple_ipc::{ControllerLink, Domain, PlantLink};
+//!
+//! let folder = tempfile::tempdir()?;
+//! let domain = Domain::within(folder.path(), "example")?;
+//! let (plant, controller) = (PlantLink::new(&domain)?, ControllerLink::new(&domain)?);
+//! let position_rad = [Some(0.0), Some(-1.8), Some(0.0), None];
+//! let report = PlantReport::default();
+//! let state = ArmState::new(0, 0, &position_rad, None, Drives::Active, report);
+//! plant.publish(&state)?;
+//! let received = controller.wait(Duration::from_secs(1))?;
+//! assert_eq!(received, Some(state));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+#![forbid(unsafe_code)]
+
+mod domain;
+mod error;
+mod link;
+pub mod message;
+mod outside;
+mod port;
+
+pub use domain::{DEFAULT_PREFIX, Domain, PREFIX_VARIABLE};
+pub use error::IpcError;
+pub use link::{ControllerLink, Heard, PlantLink};
+pub use outside::{Operator, OutsideLink, TELEMETRY_DEPTH, TelemetryReader, pause};
+pub use port::Full;

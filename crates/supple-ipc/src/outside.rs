@@ -1,0 +1,237 @@
+//! The world outside the control path: telemetry, requests and replies.
+//!
+//! These never touch the control loop's thread: a status line that comes and goes costs it nothing.
+//!
+//! Requests are the one service with more than one writer, because operators come and go. They command
+//! nothing: each is checked by the controller, which is the only writer of replies, telemetry and torques.
+
+use crate::domain::Domain;
+use crate::error::IpcError;
+use crate::message::{OperatorReply, OperatorRequest, Outcome, Telemetry};
+use crate::port::{Full, Reader, Terms, Writer};
+use core::time::Duration;
+use rustix::thread::{NanosleepRelativeResult, Timespec, nanosleep};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Instant;
+use supple_core::controller::Request;
+
+/// Telemetry that a reader may lag behind, in cycles.
+pub const TELEMETRY_DEPTH: usize = 2048;
+
+const TELEMETRY: Terms = Terms {
+    name: "telemetry",
+    writers: 1,
+    readers: 8,
+    depth: TELEMETRY_DEPTH,
+    oldest_goes: false,
+};
+const REQUESTS: Terms = Terms {
+    name: "operator_request",
+    writers: 8,
+    readers: 1,
+    depth: 16,
+    oldest_goes: false,
+};
+const REPLIES: Terms = Terms {
+    name: "operator_reply",
+    writers: 1,
+    readers: 8,
+    depth: 64,
+    oldest_goes: true,
+};
+
+/// How often a waiting reader looks: telemetry has no bell, so that it cannot be made to ring in vain.
+const LOOK_EVERY: Duration = Duration::from_millis(1);
+
+/// The controller's end.
+#[derive(Debug)]
+pub struct OutsideLink {
+    telemetry: Writer<Telemetry>,
+    requests: Reader<OperatorRequest>,
+    replies: Writer<OperatorReply>,
+}
+
+impl OutsideLink {
+    /// Takes the controller's place. With [`Full::Wait`] a reader of telemetry that is full holds it up.
+    ///
+    /// # Errors
+    /// [`IpcError::SecondWriter`] where there is a controller already, and what else [`IpcError`] says.
+    pub fn new(domain: &Domain, full: Full) -> Result<OutsideLink, IpcError> {
+        let node = domain.node()?;
+        Ok(OutsideLink {
+            telemetry: Writer::new(domain, &node, &TELEMETRY, full)?,
+            requests: Reader::new(domain, &node, &REQUESTS)?,
+            replies: Writer::new(domain, &node, &REPLIES, Full::Lose)?,
+        })
+    }
+
+    /// Publishes the telemetry of a cycle.
+    ///
+    /// # Errors
+    /// [`IpcError::Service`].
+    pub fn publish(&self, telemetry: &Telemetry) -> Result<(), IpcError> {
+        self.telemetry.send(telemetry).map(|_| ())
+    }
+
+    /// The oldest request that was not read yet.
+    ///
+    /// # Errors
+    /// [`IpcError::Service`].
+    pub fn request(&self) -> Result<Option<OperatorRequest>, IpcError> {
+        self.requests.receive()
+    }
+
+    /// Answers one.
+    ///
+    /// # Errors
+    /// [`IpcError::Service`].
+    pub fn reply(&self, reply: &OperatorReply) -> Result<(), IpcError> {
+        self.replies.send(reply).map(|_| ())
+    }
+}
+
+/// A reader of telemetry that counts what it lost.
+#[derive(Debug)]
+pub struct TelemetryReader {
+    reader: Reader<Telemetry>,
+    expected: Option<u64>,
+    lost: u64,
+}
+
+impl TelemetryReader {
+    /// Joins; sees what is published from now on.
+    ///
+    /// # Errors
+    /// [`IpcError::TooManyReaders`] and what else [`IpcError`] says.
+    pub fn new(domain: &Domain) -> Result<TelemetryReader, IpcError> {
+        let node = domain.node()?;
+        Ok(TelemetryReader {
+            reader: Reader::new(domain, &node, &TELEMETRY)?,
+            expected: None,
+            lost: 0,
+        })
+    }
+
+    /// The oldest telemetry that was not read yet. A controller that began again is not a loss.
+    ///
+    /// # Errors
+    /// [`IpcError::Service`].
+    pub fn receive(&mut self) -> Result<Option<Telemetry>, IpcError> {
+        let next = self.reader.receive()?;
+        if let Some(telemetry) = &next {
+            if let Some(expected) = self.expected {
+                self.lost += telemetry.step.saturating_sub(expected);
+            }
+            self.expected = Some(telemetry.step + 1);
+        }
+        Ok(next)
+    }
+
+    /// As [`TelemetryReader::receive`], but waits for some at most for `timeout`.
+    ///
+    /// # Errors
+    /// [`IpcError::Service`].
+    pub fn wait(&mut self, timeout: Duration) -> Result<Option<Telemetry>, IpcError> {
+        let start = Instant::now();
+        loop {
+            if let Some(telemetry) = self.receive()? {
+                return Ok(Some(telemetry));
+            }
+            if start.elapsed() >= timeout {
+                return Ok(None);
+            }
+            pause(LOOK_EVERY);
+        }
+    }
+
+    /// Cycles whose telemetry was published and did not arrive here.
+    pub fn lost(&self) -> u64 {
+        self.lost
+    }
+}
+
+/// Somebody who asks the controller for something.
+#[derive(Debug)]
+pub struct Operator {
+    requests: Writer<OperatorRequest>,
+    replies: Reader<OperatorReply>,
+    number: u64,
+    sequence: u64,
+}
+
+impl Operator {
+    /// Joins.
+    ///
+    /// # Errors
+    /// [`IpcError`].
+    pub fn new(domain: &Domain) -> Result<Operator, IpcError> {
+        let node = domain.node()?;
+        Ok(Operator {
+            replies: Reader::new(domain, &node, &REPLIES)?,
+            requests: Writer::new(domain, &node, &REQUESTS, Full::Lose)?,
+            number: operator_number(),
+            sequence: 0,
+        })
+    }
+
+    /// Sends a request, to be heard in the next cycle or at `at_cycle`. Gives its sequence number; `None`
+    /// where no controller is there, or it has too many requests waiting.
+    ///
+    /// # Errors
+    /// [`IpcError::Service`].
+    pub fn send<const N: usize>(
+        &mut self,
+        request: &Request<N>,
+        at_cycle: Option<u64>,
+    ) -> Result<Option<u64>, IpcError> {
+        self.sequence += 1;
+        let message = OperatorRequest::new(self.number, self.sequence, at_cycle, request);
+        let reached = self.requests.send(&message)?;
+        Ok((reached > 0).then_some(self.sequence))
+    }
+
+    /// Waits for the reply to a request, at most for `timeout`. [`Outcome::Queued`] is a reply where
+    /// `queued_is_enough`.
+    ///
+    /// # Errors
+    /// [`IpcError::Service`].
+    pub fn reply(
+        &self,
+        sequence: u64,
+        queued_is_enough: bool,
+        timeout: Duration,
+    ) -> Result<Option<OperatorReply>, IpcError> {
+        let start = Instant::now();
+        loop {
+            while let Some(reply) = self.replies.receive()? {
+                let mine = reply.operator == self.number && reply.sequence == sequence;
+                if mine && (queued_is_enough || reply.outcome() != Outcome::Queued) {
+                    return Ok(Some(reply));
+                }
+            }
+            if start.elapsed() >= timeout {
+                return Ok(None);
+            }
+            pause(LOOK_EVERY);
+        }
+    }
+}
+
+/// A number that no other operator has: that of the process, and which of its operators it is.
+fn operator_number() -> u64 {
+    static OPERATORS: AtomicU64 = AtomicU64::new(0);
+    let process = u64::from(std::process::id());
+    process << 32 | OPERATORS.fetch_add(1, Ordering::Relaxed)
+}
+
+/// Lets others run for a while; a signal cuts it short.
+pub fn pause(duration: Duration) {
+    let Ok(request) = Timespec::try_from(duration) else {
+        return;
+    };
+    match nanosleep(&request) {
+        NanosleepRelativeResult::Ok
+        | NanosleepRelativeResult::Interrupted(_)
+        | NanosleepRelativeResult::Err(_) => {}
+    }
+}

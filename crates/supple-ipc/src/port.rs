@@ -1,0 +1,252 @@
+//! One-way services in shared memory: a writer, readers, and a bell that wakes whoever waits.
+//!
+//! Writing and reading allocate nothing once both sides are connected. A side that joins or leaves costs the
+//! other a few system calls and allocations at its next call: a control loop has no port but those to its
+//! plant.
+
+use crate::domain::{Domain, Node};
+use crate::error::IpcError;
+use core::fmt::Debug;
+use core::time::Duration;
+use iceoryx2::port::listener::{Listener, ListenerCreateError};
+use iceoryx2::port::notifier::{Notifier, NotifierCreateError};
+use iceoryx2::port::publisher::{Publisher, PublisherCreateError};
+use iceoryx2::port::subscriber::{Subscriber, SubscriberCreateError};
+use iceoryx2::prelude::*;
+use iceoryx2::service::builder::event::{EventOpenError, EventOpenOrCreateError};
+use iceoryx2::service::builder::publish_subscribe::{
+    PublishSubscribeOpenError, PublishSubscribeOpenOrCreateError,
+};
+use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
+
+/// What there is to know of a service before it is opened.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Terms {
+    /// Name within the system.
+    pub name: &'static str,
+    /// Writers that may be there at a time.
+    pub writers: usize,
+    /// Readers that may be there at a time.
+    pub readers: usize,
+    /// Samples that a slow reader may lag behind.
+    pub depth: usize,
+    /// What a full reader costs: the oldest sample it has not read, or else the newest.
+    pub oldest_goes: bool,
+}
+
+/// A type that is a message.
+pub(crate) trait Message: Debug + Copy + ZeroCopySend + 'static {}
+impl<T: Debug + Copy + ZeroCopySend + 'static> Message for T {}
+
+/// What to do where a reader is full and the oldest does not go.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Full {
+    /// It loses this sample.
+    Lose,
+    /// Wait for it: for virtual time only.
+    Wait,
+}
+
+/// The writer of a service.
+#[derive(Debug)]
+pub(crate) struct Writer<T: Message> {
+    publisher: Publisher<ipc::Service, T, ()>,
+    name: &'static str,
+}
+
+impl<T: Message> Writer<T> {
+    pub fn new(domain: &Domain, node: &Node, terms: &Terms, full: Full) -> Result<Self, IpcError> {
+        let service = open::<T>(domain, node, terms)?;
+        let strategy = match full {
+            Full::Lose => BackpressureStrategy::DiscardData,
+            Full::Wait => BackpressureStrategy::RetryUntilDelivered,
+        };
+        let publisher = service
+            .publisher_builder()
+            .max_loaned_samples(1)
+            .backpressure_strategy(strategy)
+            .create();
+        let publisher = publisher.map_err(|error| match error {
+            PublisherCreateError::ExceedsMaxSupportedPublishers => IpcError::SecondWriter {
+                service: terms.name.to_owned(),
+                prefix: domain.prefix().to_owned(),
+            },
+            error => failed(terms.name, &error),
+        })?;
+        Ok(Writer {
+            publisher,
+            name: terms.name,
+        })
+    }
+
+    /// Sends a copy; gives the number of readers that it reached.
+    pub fn send(&self, message: &T) -> Result<usize, IpcError> {
+        let sample = self.publisher.loan_uninit();
+        let sample = sample.map_err(|error| failed(self.name, &error))?;
+        let sent = sample.write_payload(*message).send();
+        sent.map_err(|error| failed(self.name, &error))
+    }
+}
+
+/// A reader of a service.
+#[derive(Debug)]
+pub(crate) struct Reader<T: Message> {
+    subscriber: Subscriber<ipc::Service, T, ()>,
+    name: &'static str,
+}
+
+impl<T: Message> Reader<T> {
+    pub fn new(domain: &Domain, node: &Node, terms: &Terms) -> Result<Self, IpcError> {
+        let service = open::<T>(domain, node, terms)?;
+        let subscriber = service.subscriber_builder().create();
+        let subscriber = subscriber.map_err(|error| match error {
+            SubscriberCreateError::ExceedsMaxSupportedSubscribers => IpcError::TooManyReaders {
+                service: terms.name.to_owned(),
+            },
+            error => failed(terms.name, &error),
+        })?;
+        Ok(Reader {
+            subscriber,
+            name: terms.name,
+        })
+    }
+
+    /// The oldest message that was not read yet.
+    pub fn receive(&self) -> Result<Option<T>, IpcError> {
+        let sample = self.subscriber.receive();
+        let sample = sample.map_err(|error| failed(self.name, &error))?;
+        Ok(sample.map(|sample| *sample))
+    }
+}
+
+/// The rope of a bell.
+#[derive(Debug)]
+pub(crate) struct Rope(Notifier<ipc::Service>);
+
+impl Rope {
+    pub fn new(domain: &Domain, node: &Node, name: &'static str) -> Result<Self, IpcError> {
+        let service = bell(node, name)?;
+        let notifier = service.notifier_builder().create();
+        let notifier = notifier.map_err(|error| match error {
+            NotifierCreateError::ExceedsMaxSupportedNotifiers => IpcError::SecondWriter {
+                service: name.to_owned(),
+                prefix: domain.prefix().to_owned(),
+            },
+            error => failed(name, &error),
+        })?;
+        Ok(Rope(notifier))
+    }
+
+    /// Wakes whoever waits. Who does not listen any more cannot be woken, which is not the ringer's concern.
+    pub fn ring(&self) {
+        let _ = self.0.notify();
+    }
+}
+
+/// The side of a bell that hears it.
+#[derive(Debug)]
+pub(crate) struct Bell {
+    listener: Listener<ipc::Service>,
+    name: &'static str,
+}
+
+impl Bell {
+    pub fn new(node: &Node, name: &'static str) -> Result<Self, IpcError> {
+        let service = bell(node, name)?;
+        let listener = service.listener_builder().create();
+        let listener = listener.map_err(|error| match error {
+            ListenerCreateError::ExceedsMaxSupportedListeners => IpcError::TooManyReaders {
+                service: name.to_owned(),
+            },
+            error => failed(name, &error),
+        })?;
+        Ok(Bell { listener, name })
+    }
+
+    /// Waits until it rings, or for `timeout`; false where it did not ring.
+    pub fn wait(&self, timeout: Duration) -> Result<bool, IpcError> {
+        let rung = self.listener.timed_wait_one(timeout);
+        let rung = rung.map_err(|error| failed(self.name, &error))?;
+        Ok(rung.is_some())
+    }
+}
+
+fn open<T: Message>(
+    domain: &Domain,
+    node: &Node,
+    terms: &Terms,
+) -> Result<PortFactory<ipc::Service, T, ()>, IpcError> {
+    let service = node
+        .service_builder(&service_name(terms.name)?)
+        .publish_subscribe::<T>()
+        .max_publishers(terms.writers)
+        .max_subscribers(terms.readers)
+        .max_nodes(NODES)
+        .subscriber_max_buffer_size(terms.depth)
+        .subscriber_max_borrowed_samples(1)
+        .history_size(0)
+        .enable_safe_overflow(terms.oldest_goes)
+        .open_or_create();
+    service.map_err(|error| {
+        use PublishSubscribeOpenError as Open;
+        let PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(open) = error else {
+            return failed(terms.name, &error);
+        };
+        match open {
+            Open::IncompatibleTypes
+            | Open::IncompatibleMessagingPattern
+            | Open::IncompatibleAttributes
+            | Open::IncompatibleOverflowBehavior
+            | Open::DoesNotSupportRequestedMinBufferSize
+            | Open::DoesNotSupportRequestedMinHistorySize
+            | Open::DoesNotSupportRequestedMinSubscriberBorrowedSamples
+            | Open::DoesNotSupportRequestedAmountOfPublishers
+            | Open::DoesNotSupportRequestedAmountOfSubscribers
+            | Open::DoesNotSupportRequestedAmountOfNodes => IpcError::Version {
+                service: terms.name.to_owned(),
+                expected: core::any::type_name::<T>(),
+                prefix: domain.prefix().to_owned(),
+            },
+            Open::ExceedsMaxNumberOfNodes => IpcError::TooManyReaders {
+                service: terms.name.to_owned(),
+            },
+            open => failed(terms.name, &open),
+        }
+    })
+}
+
+/// Processes that may have a service open: the writers, the readers, and some that are just leaving.
+const NODES: usize = 24;
+
+fn bell(
+    node: &Node,
+    name: &'static str,
+) -> Result<iceoryx2::service::port_factory::event::PortFactory<ipc::Service>, IpcError> {
+    let service = node
+        .service_builder(&service_name(name)?)
+        .event()
+        .max_notifiers(1)
+        .max_listeners(1)
+        .max_nodes(NODES)
+        .event_id_max_value(0)
+        .open_or_create();
+    service.map_err(|error| match error {
+        EventOpenOrCreateError::EventOpenError(EventOpenError::ExceedsMaxNumberOfNodes) => {
+            IpcError::TooManyReaders {
+                service: name.to_owned(),
+            }
+        }
+        error => failed(name, &error),
+    })
+}
+
+fn service_name(name: &str) -> Result<ServiceName, IpcError> {
+    ServiceName::new(name).map_err(|error| failed(name, &error))
+}
+
+fn failed(service: &str, cause: &dyn core::fmt::Display) -> IpcError {
+    IpcError::Service {
+        service: service.to_owned(),
+        cause: cause.to_string(),
+    }
+}

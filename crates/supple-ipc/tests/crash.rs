@@ -1,0 +1,76 @@
+//! A process that is killed leaves its place to the next one, without the other side being restarted.
+
+mod support;
+
+use core::time::Duration;
+use std::process::{Child, Command, Stdio};
+use supple_ipc::message::{ArmState, TorqueCommand};
+use supple_ipc::{ControllerLink, Domain, PlantLink};
+
+const FOLDER: &str = "SUPPLE_IPC_TEST_FOLDER";
+const PREFIX: &str = "SUPPLE_IPC_TEST_PREFIX";
+
+/// Not a test of its own: the controller that [`a_killed_controller_is_replaced`] starts and kills.
+#[test]
+#[ignore = "started by another test"]
+fn controller_process() {
+    let folder = std::env::var(FOLDER).expect("started by the test");
+    let prefix = std::env::var(PREFIX).expect("started by the test");
+    let domain = Domain::within(folder.as_ref(), &prefix).expect("a domain");
+    let controller = ControllerLink::new(&domain).expect("a controller");
+    loop {
+        if let Some(state) = controller.wait(Duration::from_secs(1)).expect("read") {
+            let output = support::answer(&state.input(None).expect("four joints"));
+            let command = TorqueCommand::new(&output, false);
+            controller.answer(&command).expect("answered");
+        }
+    }
+}
+
+fn start(system: &support::System) -> Child {
+    Command::new(std::env::current_exe().expect("this test"))
+        .args(["--ignored", "--exact", "controller_process"])
+        .env(FOLDER, &system.folder)
+        .env(PREFIX, system.domain.prefix())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("it starts")
+}
+
+/// Cycles until an answer comes; panics after very many.
+fn until_answered(plant: &PlantLink, from: u64) -> u64 {
+    for cycle in from..from + 2000 {
+        let state = ArmState {
+            cycle,
+            ..support::state(0)
+        };
+        plant.publish(&state).expect("published");
+        let heard = plant.answer(cycle, Duration::from_millis(10));
+        if heard.expect("read").answer.is_some() {
+            return cycle;
+        }
+    }
+    panic!("no answer came");
+}
+
+#[test]
+fn a_killed_controller_is_replaced() {
+    let system = support::system("crash");
+    let plant = PlantLink::new(&system.domain).expect("a plant");
+    let mut cycle = 0;
+    for _ in 0..3 {
+        let mut child = start(&system);
+        cycle = until_answered(&plant, cycle) + 1;
+        child.kill().expect("SIGKILL");
+        child.wait().expect("it is gone");
+        let state = ArmState {
+            cycle,
+            ..support::state(0)
+        };
+        plant.publish(&state).expect("a dead reader is no error");
+        let heard = plant.answer(cycle, Duration::from_millis(5));
+        assert_eq!(heard.expect("read").answer, None);
+        cycle += 1;
+    }
+}

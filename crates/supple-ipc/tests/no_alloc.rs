@@ -1,0 +1,90 @@
+//! Publishing and receiving allocate nothing, on the real services.
+
+mod support;
+
+use core::time::Duration;
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use supple_core::controller::{Mode, Request};
+use supple_ipc::message::*;
+use supple_ipc::*;
+
+thread_local! {
+    static COUNT: Cell<Option<u64>> = const { Cell::new(None) };
+}
+
+struct Counting;
+
+// SAFETY: hands every call on to the system's allocator unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        COUNT.with(|count| count.set(count.get().map(|n| n + 1)));
+        // SAFETY: as the caller promises.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        COUNT.with(|count| count.set(count.get().map(|n| n + 1)));
+        // SAFETY: as the caller promises.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// Allocations and deallocations of this thread in `work`.
+fn counted(work: impl FnOnce()) -> u64 {
+    COUNT.with(|count| count.set(Some(0)));
+    work();
+    COUNT.with(Cell::take).expect("counting")
+}
+
+#[test]
+fn the_counter_counts() {
+    assert_eq!(counted(|| drop(std::hint::black_box(Box::new(1)))), 2);
+    assert_eq!(counted(|| {}), 0);
+}
+
+#[test]
+fn a_thousand_cycles_allocate_nothing() {
+    let system = support::system("no-alloc");
+    let plant = PlantLink::new(&system.domain).expect("a plant");
+    let controller = ControllerLink::new(&system.domain).expect("a controller");
+    let outside = OutsideLink::new(&system.domain, Full::Lose).expect("a controller");
+    let mut reader = TelemetryReader::new(&system.domain).expect("a reader");
+    let mut operator = Operator::new(&system.domain).expect("an operator");
+    let input = support::state(0).input::<4>(None).expect("four joints");
+    let output = support::answer(&input);
+    let state = support::state(0);
+    let soon = Duration::from_secs(5);
+    let mut cycle = |k: u64| {
+        let mut state = state;
+        state.cycle = k;
+        plant.publish(&state).expect("published");
+        let received = controller.wait(soon).expect("read").expect("a state");
+        let mut command = TorqueCommand::new(&output, false);
+        command.cycle = received.cycle;
+        controller.answer(&command).expect("answered");
+        let heard = plant.answer(k, soon).expect("read");
+        assert!(heard.answer.is_some());
+        let timing = CycleTiming::default();
+        let telemetry = Telemetry::new(k, &state, &input, &output, timing);
+        outside.publish(&telemetry).expect("published");
+        assert!(reader.receive().expect("read").is_some());
+        let sequence = operator
+            .send::<4>(&Request::GravityHold, None)
+            .expect("sent")
+            .expect("there is a controller");
+        let request = outside.request().expect("read").expect("a request");
+        let reply = OperatorReply::new(&request, k, Mode::Idle, Outcome::Accepted, Text::EMPTY);
+        outside.reply(&reply).expect("replied");
+        let reply = operator.reply(sequence, false, soon).expect("read");
+        assert!(reply.is_some());
+        // A wait in vain as well.
+        assert!(controller.wait(Duration::ZERO).expect("read").is_none());
+    };
+    // Both sides meet at the first.
+    (0..4).for_each(&mut cycle);
+    assert_eq!(counted(|| (4..1004).for_each(&mut cycle)), 0);
+}

@@ -1,0 +1,290 @@
+//! The services themselves: one writer each, nothing shared between prefixes, readers that count what they
+//! lose, peers of another version refused, and only the owner may look.
+
+mod support;
+
+use core::time::Duration;
+use iceoryx2::prelude::*;
+use std::os::unix::fs::MetadataExt;
+use std::path::Path as StdPath;
+use supple_core::controller::{Mode, Request};
+use supple_ipc::message::*;
+use supple_ipc::*;
+use support::{answer, state, system};
+
+const SOON: Duration = Duration::from_secs(5);
+
+#[test]
+fn a_state_is_answered_in_its_cycle() {
+    let system = system("cycle");
+    let plant = PlantLink::new(&system.domain).expect("a plant");
+    let controller = ControllerLink::new(&system.domain).expect("a controller");
+    for cycle in 0..3 {
+        assert!(plant.publish(&state(cycle)).expect("published"));
+        let received = controller.wait(SOON).expect("read").expect("a state");
+        assert_eq!(received, state(cycle));
+        let output = answer(&received.input(None).expect("four joints"));
+        let command = TorqueCommand::new(&output, false);
+        controller.answer(&command).expect("answered");
+        let heard = plant.answer(cycle, SOON).expect("read");
+        assert_eq!(heard.answer, Some(command));
+        assert_eq!(heard.late, 0);
+    }
+}
+
+#[test]
+fn an_answer_to_another_cycle_is_late_and_not_used() {
+    let system = system("late");
+    let plant = PlantLink::new(&system.domain).expect("a plant");
+    let controller = ControllerLink::new(&system.domain).expect("a controller");
+    plant.publish(&state(1)).expect("published");
+    let received = controller.wait(SOON).expect("read").expect("a state");
+    let output = answer(&received.input(None).expect("four joints"));
+    controller
+        .answer(&TorqueCommand::new(&output, false))
+        .expect("answered");
+    let heard = plant.answer(2, Duration::from_millis(1)).expect("read");
+    assert_eq!((heard.answer, heard.late), (None, 1));
+}
+
+#[test]
+fn without_a_peer_a_wait_ends() {
+    let system = system("alone");
+    let plant = PlantLink::new(&system.domain).expect("a plant");
+    assert!(!plant.publish(&state(0)).expect("published"));
+    let heard = plant.answer(0, Duration::from_millis(2)).expect("read");
+    assert_eq!(heard, Heard::default());
+}
+
+#[test]
+fn a_controller_that_lags_sees_every_state() {
+    let system = system("lag");
+    let plant = PlantLink::new(&system.domain).expect("a plant");
+    let controller = ControllerLink::new(&system.domain).expect("a controller");
+    for cycle in 0..30 {
+        plant.publish(&state(cycle)).expect("published");
+    }
+    for cycle in 0..30 {
+        assert_eq!(controller.receive().expect("read"), Some(state(cycle)));
+    }
+    assert_eq!(controller.receive().expect("read"), None);
+}
+
+#[test]
+fn a_second_writer_is_refused_and_told_why() {
+    let system = system("second");
+    let _plant = PlantLink::new(&system.domain).expect("a plant");
+    let _controller = ControllerLink::new(&system.domain).expect("a controller");
+    let _outside = OutsideLink::new(&system.domain, Full::Lose).expect("a controller");
+    let refused = [
+        PlantLink::new(&system.domain).expect_err("there is one"),
+        ControllerLink::new(&system.domain).expect_err("there is one"),
+        OutsideLink::new(&system.domain, Full::Lose).expect_err("there is one"),
+    ];
+    for error in refused {
+        assert!(matches!(error, IpcError::SecondWriter { .. }), "{error}");
+        assert!(
+            error.to_string().contains(system.domain.prefix()),
+            "{error}"
+        );
+    }
+}
+
+#[test]
+fn systems_under_two_prefixes_do_not_meet() {
+    let (one, two) = (system("one"), system("two"));
+    let plant = PlantLink::new(&one.domain).expect("a plant");
+    let shared = Domain::within(one.domain.folder(), two.domain.prefix()).expect("same folder");
+    for other in [&two.domain, &shared] {
+        let controller = ControllerLink::new(other).expect("a controller");
+        assert!(!plant.publish(&state(0)).expect("published"));
+        assert_eq!(controller.receive().expect("read"), None);
+    }
+}
+
+#[test]
+fn telemetry_counts_what_a_slow_reader_loses() {
+    let system = system("slow");
+    let mut reader = TelemetryReader::new(&system.domain).expect("a reader");
+    let outside = OutsideLink::new(&system.domain, Full::Lose).expect("a controller");
+    let input = state(0).input::<4>(None).expect("four joints");
+    let output = answer(&input);
+    let publish = |step: u64| {
+        let telemetry = Telemetry::new(step, &state(step), &input, &output, CycleTiming::default());
+        outside.publish(&telemetry).expect("published");
+    };
+    let depth = TELEMETRY_DEPTH as u64;
+    (0..depth + 10).for_each(publish);
+    for step in 0..depth {
+        let telemetry = reader.receive().expect("read").expect("it is there");
+        assert_eq!(telemetry.step, step);
+    }
+    assert_eq!((reader.receive().expect("read"), reader.lost()), (None, 0));
+    publish(depth + 10);
+    let next = reader.receive().expect("read").expect("it is there");
+    assert_eq!((next.step, reader.lost()), (depth + 10, 10));
+}
+
+#[test]
+fn operators_hear_the_replies_to_their_own_requests() {
+    let system = system("operators");
+    let outside = OutsideLink::new(&system.domain, Full::Lose).expect("a controller");
+    let mut one = Operator::new(&system.domain).expect("an operator");
+    let mut two = Operator::new(&system.domain).expect("an operator");
+    let first = one.send::<4>(&Request::GravityHold, None).expect("sent");
+    let second = two.send::<4>(&Request::Reset, Some(100)).expect("sent");
+    let mut seen = Vec::new();
+    while let Some(request) = outside.request().expect("read") {
+        seen.push((
+            request.request::<4>(),
+            request.has_at_cycle,
+            request.at_cycle,
+        ));
+        let (outcome, text) = match request.kind {
+            2 => (Outcome::Accepted, Text::EMPTY),
+            _ => (Outcome::Refused, Text::of(&"no")),
+        };
+        let reply = OperatorReply::new(&request, 7, Mode::GravityHold, outcome, text);
+        outside.reply(&reply).expect("replied");
+    }
+    let expected = [
+        (Ok(Some(Request::GravityHold)), 0, 0),
+        (Ok(Some(Request::Reset)), 1, 100),
+    ];
+    assert_eq!(seen, expected);
+    let reply = |operator: &Operator, sequence: Option<u64>| {
+        let sequence = sequence.expect("there is a controller");
+        operator
+            .reply(sequence, false, SOON)
+            .expect("read")
+            .expect("a reply")
+    };
+    let accepted = reply(&one, first);
+    assert_eq!(accepted.outcome(), Outcome::Accepted);
+    assert_eq!(
+        (accepted.cycle, accepted.mode()),
+        (7, Some(Mode::GravityHold))
+    );
+    let refused = reply(&two, second);
+    assert_eq!(
+        (refused.outcome(), refused.text.as_str()),
+        (Outcome::Refused, "no")
+    );
+}
+
+#[test]
+fn a_request_without_a_controller_goes_nowhere() {
+    let system = system("nobody");
+    let mut operator = Operator::new(&system.domain).expect("an operator");
+    let sent = operator.send::<4>(&Request::Idle, None).expect("sent");
+    assert_eq!(sent, None);
+}
+
+/// What another version of this software might call by the same name.
+#[derive(Clone, Copy, Debug, ZeroCopySend)]
+#[repr(C)]
+#[type_name("supple.ArmState.v9")]
+struct OtherVersion {
+    cycle: u64,
+}
+
+#[test]
+fn a_peer_of_another_version_is_refused() {
+    let system = system("version");
+    let mut config = Config::default();
+    let root = Path::new(system.folder.as_os_str().as_encoded_bytes()).expect("a path");
+    config.global.set_root_path(&root);
+    let user = rustix::process::getuid().as_raw();
+    let prefix = format!("{}_{user}_", system.domain.prefix());
+    config.global.prefix = FileName::new(prefix.as_bytes()).expect("a name");
+    let node = NodeBuilder::new().config(&config);
+    let node = node.create::<ipc::Service>().expect("a node");
+    let service = node
+        .service_builder(&"arm_state".try_into().expect("a name"))
+        .publish_subscribe::<OtherVersion>()
+        .create()
+        .expect("a service");
+    let _publisher = service.publisher_builder().create().expect("a publisher");
+    let error = ControllerLink::new(&system.domain).expect_err("another version");
+    assert!(matches!(error, IpcError::Version { .. }), "{error}");
+    for word in ["arm_state", "another version", "ArmState", "one build"] {
+        assert!(error.to_string().contains(word), "{error}");
+    }
+}
+
+#[test]
+fn prefixes_that_are_no_file_names_are_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let long = "x".repeat(33);
+    for prefix in ["", "../up", "a b", "UPPER", "dot.dot", &long] {
+        let error = Domain::within(folder.path(), prefix).expect_err("no name");
+        assert!(error.to_string().contains("--prefix"), "{error}");
+    }
+}
+
+#[test]
+fn a_folder_that_others_may_enter_is_refused() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = tempfile::tempdir().expect("a folder");
+    let open = std::fs::Permissions::from_mode(0o755);
+    std::fs::set_permissions(folder.path(), open).expect("changed");
+    let error = Domain::within(folder.path(), "open").expect_err("open to others");
+    for word in ["755", "chmod 700"] {
+        assert!(error.to_string().contains(word), "{error}");
+    }
+}
+
+/// Every file below a folder.
+fn files(folder: &StdPath, found: &mut Vec<std::path::PathBuf>) {
+    for entry in std::fs::read_dir(folder).expect("readable").flatten() {
+        let path = entry.path();
+        if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+            files(&path, found);
+        } else {
+            found.push(path);
+        }
+    }
+}
+
+/// The library's one exception: an object of a few bytes a node, for its own bookkeeping and without data,
+/// that others of the machine may open.
+#[test]
+fn nobody_else_can_open_data() {
+    let system = system("permissions");
+    let plant = PlantLink::new(&system.domain).expect("a plant");
+    let _controller = ControllerLink::new(&system.domain).expect("a controller");
+    let _outside = OutsideLink::new(&system.domain, Full::Lose).expect("a controller");
+    let _reader = TelemetryReader::new(&system.domain).expect("a reader");
+    plant.publish(&state(0)).expect("published");
+    let mut found = Vec::new();
+    files(&system.folder, &mut found);
+    let shared = std::fs::read_dir("/dev/shm")
+        .expect("shared memory")
+        .flatten();
+    let ours = |name: &str| name.contains(system.domain.prefix());
+    found.extend(
+        shared
+            .filter(|entry| ours(&entry.file_name().to_string_lossy()))
+            .map(|entry| entry.path()),
+    );
+    assert!(found.len() > 10, "{found:?}");
+    let in_shared_memory = found.iter().filter(|path| path.starts_with("/dev/shm"));
+    assert!(in_shared_memory.count() > 3, "{found:?}");
+    for path in found {
+        // A file that a peer has just finished with.
+        let Ok(about) = path.symlink_metadata() else {
+            continue;
+        };
+        let open_to_others = about.mode() & 0o077 != 0;
+        let bookkeeping = path.starts_with("/dev/shm") && about.len() <= 16;
+        assert!(
+            !open_to_others || bookkeeping,
+            "{} of {} bytes has mode {:o}",
+            path.display(),
+            about.len(),
+            about.mode() & 0o777
+        );
+    }
+    let folder = system.folder.metadata().expect("it is there");
+    assert_eq!(folder.mode() & 0o777, 0o700);
+}

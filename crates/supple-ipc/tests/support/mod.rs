@@ -1,0 +1,60 @@
+//! A system of its own for each test.
+
+#![allow(dead_code, reason = "each test binary uses its part")]
+
+use std::path::PathBuf;
+use supple_core::Input;
+use supple_core::math::Vector3;
+use supple_core::{Controller, Output, State, step};
+use supple_ipc::Domain;
+use supple_ipc::message::{ArmState, Drives, PlantReport};
+use supple_model::Description;
+use tempfile::TempDir;
+
+pub struct System {
+    pub domain: Domain,
+    pub folder: PathBuf,
+    _guard: TempDir,
+}
+
+/// A fresh system under a prefix that no other test uses at the same time.
+pub fn system(prefix: &str) -> System {
+    let guard = tempfile::Builder::new()
+        .permissions(std::os::unix::fs::PermissionsExt::from_mode(0o700))
+        .tempdir()
+        .expect("a folder");
+    let prefix = format!("{prefix}-{}", std::process::id());
+    System {
+        domain: Domain::within(guard.path(), &prefix).expect("a domain"),
+        folder: guard.path().to_owned(),
+        _guard: guard,
+    }
+}
+
+/// A state of the 4-joint arm at home.
+pub fn state(cycle: u64) -> ArmState {
+    let home = Description::asset("wam4").expect("built in");
+    let home = home.home::<4>().expect("four joints");
+    let position_rad = core::array::from_fn(|i| Some(home[i]));
+    let force = Some(Vector3::new(0.1, -0.2, 0.3));
+    let plant = PlantReport {
+        missed: 3,
+        wake_ns: 1200,
+        ..PlantReport::default()
+    };
+    ArmState::new::<4>(
+        cycle,
+        cycle * 1_000_000,
+        &position_rad,
+        force,
+        Drives::Active,
+        plant,
+    )
+}
+
+/// What a controller of the 4-joint arm answers first.
+pub fn answer(input: &Input<4>) -> Output<4> {
+    let description = Description::asset("wam4").expect("built in");
+    let controller = Controller::new(description.config().expect("sound")).expect("sound");
+    step(&controller, &mut State::new(&controller), input)
+}
