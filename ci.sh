@@ -4,7 +4,7 @@ set -euo pipefail
 cd "$(dirname "$0")"
 
 PLAIN=(fmt clippy test doctest doc)
-FULL=(deny advisories python cortex-m)
+FULL=(deny advisories python package cortex-m)
 CARGO_DENY_VERSION=0.20.2
 THUMB=thumbv7em-none-eabihf
 
@@ -19,7 +19,7 @@ step_fmt() {
 
 # clippy: lints of every target, and of the freestanding program, which needs its own profile
 step_clippy() {
-    cargo clippy --locked --workspace --all-targets -- -D warnings
+    cargo clippy --locked --workspace --exclude supple-python --all-targets -- -D warnings
     if [[ $(uname -sm) == "Linux x86_64" ]]; then
         cargo clippy --locked -p supple-bare --profile bare --features freestanding -- -D warnings
     fi
@@ -27,7 +27,7 @@ step_clippy() {
 
 # test: unit, property and whole-system tests; among them `arrows` and `bare`
 step_test() {
-    cargo test --locked --workspace --lib --bins --tests
+    cargo test --locked --workspace --exclude supple-python --lib --bins --tests
 }
 
 # arrows: dependencies between the crates, as ARCHITECTURE.md draws them (part of `test`)
@@ -43,12 +43,12 @@ step_bare() {
 
 # doctest: examples in the documentation
 step_doctest() {
-    cargo test --locked --workspace --doc
+    cargo test --locked --workspace --exclude supple-python --doc
 }
 
 # doc: the documentation builds without a warning
 step_doc() {
-    RUSTDOCFLAGS="-D warnings" cargo doc --locked --workspace --no-deps
+    RUSTDOCFLAGS="-D warnings" cargo doc --locked --workspace --exclude supple-python --no-deps
 }
 
 # deny: licences, sources and bans of every dependency; installs cargo-deny under target/
@@ -68,18 +68,37 @@ step_advisories() {
 
 # python: logs as Python's own readers see them; installs the readers in a virtual environment
 step_python() {
+    virtual_environment python tests/python/requirements.txt
+    SUPPLE_PYTHON=$PWD/$WORK/python/bin/python \
+        cargo test --locked -p supple-log --test python_readers -- --ignored
+}
+
+# package: the Python package: lints, installation, stubs, tests beside its peers; installs those
+step_package() {
+    virtual_environment package python/requirements-test.txt
+    local bin=$PWD/$WORK/package/bin
+    PYO3_PYTHON=$bin/python cargo clippy --locked -p supple-python -- -D warnings
+    "$bin/pip" install --quiet ./python
+    (
+        cd python
+        "$bin/python" -m mypy package/supple benchmarks
+        "$bin/python" -m mypy.stubtest supple
+        "$bin/python" -m pytest
+    )
+}
+
+# Makes a virtual environment of this name with these requirements.
+virtual_environment() {
     needs_command python3 python3
-    local environment=$WORK/python
+    local environment=$WORK/$1
     if [[ ! -x $environment/bin/pip ]]; then
         python3 -m venv "$environment" || {
             needs_package python3-venv
             python3 -m venv "$environment"
         }
     fi
-    "$environment/bin/pip" install --quiet --requirement tests/python/requirements.txt ||
-        skip "the readers of tests/python/requirements.txt cannot be installed"
-    SUPPLE_PYTHON=$PWD/$environment/bin/python \
-        cargo test --locked -p supple-log --test python_readers -- --ignored
+    "$environment/bin/pip" install --quiet --requirement "$2" ||
+        skip "the packages of $2 cannot be installed"
 }
 
 # cortex-m: the freestanding program on an emulated Cortex-M4; installs QEMU and the compiler's target

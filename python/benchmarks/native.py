@@ -1,0 +1,91 @@
+"""Batched calls from Python beside the same loop in Rust: what crossing over costs.
+
+    python benchmarks/native.py [--samples 20000] [--rounds 9] [--json FILE]
+
+Rounds are taken in turn, each the least of three passes; the median of the ratios counts. Exits with
+1 where one is above 1.3.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import statistics
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import supple
+
+ROOT = Path(__file__).resolve().parents[2]
+MOST = 1.3
+
+
+def native_loop() -> Path:
+    """The loop in Rust, built."""
+    example = ["--release", "--package", "supple-model", "--example", "state_loop"]
+    command = ["cargo", "build", "--locked", *example, "--message-format", "json"]
+    built = subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True)
+    messages = [json.loads(line) for line in built.stdout.splitlines()]
+    return Path(next(m["executable"] for m in reversed(messages) if m.get("executable")))
+
+
+def batched(arm: supple.Arm, samples: int) -> dict[str, float]:
+    """Nanoseconds a state."""
+    states = np.random.default_rng(0).uniform(-1.5, 1.5, size=(3, samples, arm.dof))
+    costs = {}
+    for name, arguments in (
+        ("rnea", 3),
+        ("mass_matrix", 1),
+        ("forward_dynamics", 3),
+        ("gravity", 1),
+    ):
+        call = getattr(arm, name)
+        out = call(*states[:arguments])
+        passes = []
+        for _ in range(3):
+            start = time.perf_counter()
+            call(*states[:arguments], out=out)
+            passes.append(time.perf_counter() - start)
+        costs[name] = 1e9 * min(passes) / samples
+    return costs
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--arm", default="wam7", help="a built-in arm, or the path of its TOML")
+    parser.add_argument("--samples", type=int, default=20_000)
+    parser.add_argument("--rounds", type=int, default=9)
+    parser.add_argument("--json", type=Path, help="where the figures go")
+    options = parser.parse_args()
+
+    arm = supple.Arm.load(options.arm)
+    command = [str(native_loop()), options.arm, str(options.samples)]
+    rounds = []
+    for _ in range(options.rounds):
+        printed = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
+        rounds.append((json.loads(printed), batched(arm, options.samples)))
+    print(f"{arm.name}, {options.samples} states, {options.rounds} rounds in turn, ns a state")
+    print(f"{'':18} {'Rust':>8} {'Python':>8} {'ratio':>8}")
+    lines = []
+    for name in rounds[0][0]:
+        line = {
+            "name": name,
+            "rust_ns": statistics.median(native[name] for native, _ in rounds),
+            "python_ns": statistics.median(python[name] for _, python in rounds),
+            "ratio": statistics.median(python[name] / native[name] for native, python in rounds),
+        }
+        lines.append(line)
+        print(f"{name:18} {line['rust_ns']:8.0f} {line['python_ns']:8.0f} {line['ratio']:8.2f}")
+    if options.json:
+        options.json.write_text(json.dumps(lines, indent=2) + "\n")
+    slow = [line["name"] for line in lines if line["ratio"] > MOST]
+    if slow:
+        print(f"above {MOST} times the loop in Rust: {', '.join(slow)}", file=sys.stderr)
+    return 1 if slow else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

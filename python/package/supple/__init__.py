@@ -1,0 +1,30 @@
+"""Dynamics, identification and minimum-impedance control of backdrivable arms.
+
+Arrays are NumPy arrays of float64, SI units, with the unit in the name where there is no standard
+symbol: ``q`` (rad), ``qd`` (rad/s), ``qdd`` (rad/s^2), ``tau`` (N m). Logs are ``(samples, joints)``.
+Wrong input is refused by an exception that names argument, expected and given shape or value.
+
+>>> import numpy as np, supple
+>>> arm = supple.Arm.load("wam4")
+>>> arm.mass_matrix(arm.home_rad).shape
+(4, 4)
+"""
+
+from supple._log import Log, Truth, read_log
+from supple._native import Arm, Friction, __version__, assets
+from supple._simulate import Run, simulate
+from supple._sweep import Sweep, sweep
+
+__all__ = [
+    "Arm",
+    "Friction",
+    "Log",
+    "Run",
+    "Sweep",
+    "Truth",
+    "__version__",
+    "assets",
+    "read_log",
+    "simulate",
+    "sweep",
+]

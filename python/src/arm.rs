@@ -1,0 +1,602 @@
+//! The class `Arm`.
+
+use crate::arrays::{self, Argument, Array, Batch};
+use crate::dynamics::{Dynamics, Quantity};
+use crate::errors;
+use crate::friction::Friction;
+use pyo3::prelude::*;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use supple_model::{Description, ModelError, with_dof};
+
+/// A serial arm of 3 to 7 revolute joints with a tip frame. Immutable.
+///
+/// Built by :meth:`Arm.load` or :meth:`Arm.from_urdf`. Joint angles are in rad, torques in N m, lengths
+/// in m, masses in kg. Positions, forces and Jacobians are in *base axes*: those of the URDF's root link.
+///
+/// Every method takes one state, ``(N,)``, or a batch with any leading axes, ``(..., N)``; arguments of
+/// one call have the same leading axes, or none. Float64 arrays in C order are read without a copy, and
+/// the interpreter lock is released while a call computes. ``out``, where there is one, is a writable
+/// float64 array in C order of the result's shape, and is what the call returns.
+///
+/// Examples
+/// --------
+/// >>> import numpy as np, supple
+/// >>> arm = supple.Arm.load("wam4")
+/// >>> arm.dof, arm.joint_names
+/// (4, ['joint1', 'joint2', 'joint3', 'joint4'])
+/// >>> q = np.zeros((1000, arm.dof))
+/// >>> arm.rnea(q, 0 * q, 0 * q).shape
+/// (1000, 4)
+#[pyclass(frozen, module = "supple")]
+pub struct Arm {
+    description: Description,
+    dynamics: Box<dyn Dynamics>,
+}
+
+impl Arm {
+    /// The arm of a description.
+    pub fn new(description: Description) -> Result<Self, ModelError> {
+        let dynamics: Result<Box<dyn Dynamics>, ModelError> = with_dof!(description.dof(), N => {
+            let arm = description.arm::<N>()?;
+            Box::new(arm) as Box<dyn Dynamics>
+        });
+        Ok(Self {
+            dynamics: dynamics?,
+            description,
+        })
+    }
+
+    /// What it was read from.
+    pub fn description(&self) -> &Description {
+        &self.description
+    }
+
+    fn evaluate<'py>(
+        &self,
+        py: Python<'py>,
+        quantity: Quantity,
+        arguments: &[Argument<'_, 'py>],
+        out: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Array<'py>> {
+        let dof = self.description.dof();
+        let batch = Batch::read(arguments, dof)?;
+        let shape = [&batch.shape[..], &quantity.shape(dof)].concat();
+        let (array, mut writable) = arrays::output(py, out, &shape)?;
+        let states = batch.states()?;
+        let values = writable.as_slice_mut()?;
+        py.detach(|| self.dynamics.evaluate(quantity, &states, values));
+        Ok(array)
+    }
+}
+
+#[pymethods]
+impl Arm {
+    /// A built-in arm by its name, or another by the path of its TOML or of the folder that holds it.
+    ///
+    /// Parameters
+    /// ----------
+    /// name_or_path : str or os.PathLike
+    ///     One of :func:`supple.assets`, or the path of an ``arm.toml`` beside its URDF.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     For an arm that is not built in, or files that describe none.
+    /// FileNotFoundError
+    ///     For a path that leads nowhere.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import supple
+    /// >>> supple.Arm.load("wam7").dof
+    /// 7
+    #[staticmethod]
+    fn load(name_or_path: PathBuf) -> PyResult<Self> {
+        let description = Description::find(&name_or_path.to_string_lossy());
+        description.and_then(Self::new).map_err(errors::model)
+    }
+
+    /// The arm of a URDF: the chain of movable joints from the root link to the link ``tip``.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : str or os.PathLike
+    ///     The URDF.
+    /// tip : str
+    ///     Link whose origin is the tip. Default ``"tip"``.
+    /// gravity : array_like, (3,)
+    ///     Acceleration of free fall in base axes (m/s^2). Default (0, 0, -9.81).
+    /// armature : array_like, (N,), optional
+    ///     Rotor inertia of each joint, reflected to the joint (kg m^2). Default: none.
+    /// fixed_joints_rad : mapping of str to float, optional
+    ///     Movable joints that are frozen, each at an angle (rad). Those that do not carry the tip, such
+    ///     as a gripper's, must be here.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     For what is not physical, not connected or not meant, by file, element, value and remedy.
+    /// FileNotFoundError
+    ///     For a path that leads nowhere.
+    ///
+    /// Notes
+    /// -----
+    /// Friction is the URDF's ``<dynamics>``. Everything else that a controller needs has its default;
+    /// :meth:`Arm.load` reads a TOML that says it.
+    #[staticmethod]
+    #[pyo3(signature = (path, tip = "tip", *, gravity = None, armature = None, fixed_joints_rad = None),
+        text_signature = "(path, tip='tip', *, gravity=(0.0, 0.0, -9.81), armature=None, \
+        fixed_joints_rad=None)")]
+    fn from_urdf(
+        path: PathBuf,
+        tip: &str,
+        gravity: Option<&Bound<'_, PyAny>>,
+        armature: Option<&Bound<'_, PyAny>>,
+        fixed_joints_rad: Option<BTreeMap<String, f64>>,
+    ) -> PyResult<Self> {
+        let urdf = std::fs::read_to_string(&path).map_err(|cause| {
+            let message = format!("{}: cannot be read: {cause}", path.display());
+            errors::system(&cause, message)
+        })?;
+        let gravity = match gravity {
+            Some(gravity) => arrays::fixed("gravity", gravity, &[3])?
+                .as_slice()?
+                .to_vec(),
+            None => vec![0.0, 0.0, -9.81],
+        };
+        let name = path.file_stem().map(|stem| stem.to_string_lossy());
+        let mut settings = toml::Table::from_iter([
+            entry("name", name.as_deref().unwrap_or("arm")),
+            entry("urdf", path.to_string_lossy().into_owned()),
+            entry("tip_frame", tip),
+            entry("gravity_m_per_s2", gravity),
+        ]);
+        let fixed = fixed_joints_rad.into_iter().flatten();
+        let fixed: toml::Table = fixed.map(|(joint, angle)| (joint, angle.into())).collect();
+        settings.insert("fixed_joints_rad".to_owned(), fixed.into());
+        let read = |settings: &toml::Table| {
+            let description = Description::from_text(&settings.to_string(), &urdf);
+            description.map_err(errors::model)
+        };
+        let mut description = read(&settings)?;
+        if let Some(armature) = armature {
+            let armature = arrays::fixed("armature", armature, &[description.dof()])?;
+            let joints = description.joint_names().iter().zip(armature.as_slice()?);
+            let joints = joints.map(|(joint, inertia)| {
+                toml::Table::from_iter([
+                    entry("name", joint.as_str()),
+                    entry("armature_kg_m2", *inertia),
+                ])
+            });
+            let joints: Vec<toml::Table> = joints.collect();
+            settings.insert("joints".to_owned(), joints.into());
+            description = read(&settings)?;
+        }
+        Self::new(description).map_err(errors::model)
+    }
+
+    /// The arm of the texts of its two files, as a log carries them and as pickles do.
+    #[staticmethod]
+    fn _from_text(toml: &str, urdf: &str) -> PyResult<Self> {
+        let description = Description::from_text(toml, urdf);
+        description.and_then(Self::new).map_err(errors::model)
+    }
+
+    /// Name of the arm.
+    #[getter]
+    fn name(&self) -> &str {
+        self.description.name()
+    }
+
+    /// Number of joints, N.
+    #[getter]
+    pub fn dof(&self) -> usize {
+        self.description.dof()
+    }
+
+    /// Names of the joints, from the base to the tip.
+    #[getter]
+    fn joint_names(&self) -> Vec<String> {
+        self.description.joint_names().to_vec()
+    }
+
+    /// Inertial parameters, (10 N,), in the order of :meth:`regressor`.
+    ///
+    /// Ten a link, in the axes of the URDF's link frame: mass ``m`` (kg); first moments ``m cx, m cy,
+    /// m cz`` (kg m); inertia about the frame's origin ``Ixx, Ixy, Iyy, Ixz, Iyz, Izz`` (kg m^2). The
+    /// tool and links that cannot move belong to the link that carries them.
+    #[getter]
+    fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
+        arrays::array(py, self.dynamics.parameters(), &[10 * self.dof()])
+    }
+
+    /// Rotor inertia of each joint, reflected to the joint, (N,) (kg m^2).
+    #[getter]
+    fn armature<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
+        arrays::array(py, self.dynamics.armature(), &[self.dof()])
+    }
+
+    /// Acceleration of free fall in base axes, (3,) (m/s^2).
+    #[getter]
+    fn gravity_m_per_s2<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
+        arrays::array(py, self.dynamics.gravity_m_per_s2().to_vec(), &[3])
+    }
+
+    /// Friction of each joint.
+    #[getter]
+    fn friction(&self) -> Vec<Friction> {
+        let joints = self.description.friction().iter();
+        joints.map(|inner| Friction { inner: *inner }).collect()
+    }
+
+    /// Pose that the arm starts from, (N,) (rad).
+    #[getter]
+    fn home_rad<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
+        arrays::array(py, self.description.home_rad().to_vec(), &[self.dof()])
+    }
+
+    /// Text of the URDF.
+    #[getter]
+    fn urdf(&self) -> &str {
+        self.description.urdf()
+    }
+
+    /// Text of the TOML.
+    #[getter]
+    fn toml(&self) -> &str {
+        self.description.toml()
+    }
+
+    /// Inverse dynamics ``H(q) qdd + C(q, qd) qd + G(q)``, without friction.
+    ///
+    /// Parameters
+    /// ----------
+    /// q, qd, qdd : array_like, (..., N)
+    ///     Angles (rad), velocities (rad/s), accelerations (rad/s^2).
+    /// out : numpy.ndarray, (..., N), optional
+    ///     Where the result goes.
+    ///
+    /// Returns
+    /// -------
+    /// numpy.ndarray, (..., N)
+    ///     Joint torques (N m).
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     For shapes that do not fit; argument, expected and given shape are named.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import numpy as np, supple
+    /// >>> arm = supple.Arm.load("wam4")
+    /// >>> q, zero = arm.home_rad, np.zeros(arm.dof)
+    /// >>> bool(np.allclose(arm.rnea(q, zero, zero), arm.gravity(q)))
+    /// True
+    #[pyo3(signature = (q, qd, qdd, *, out = None))]
+    fn rnea<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'py, PyAny>,
+        qd: &Bound<'py, PyAny>,
+        qdd: &Bound<'py, PyAny>,
+        out: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Array<'py>> {
+        let arguments = [("q", q), ("qd", qd), ("qdd", qdd)];
+        self.evaluate(py, Quantity::Rnea, &arguments, out)
+    }
+
+    /// Mass matrix ``H(q)``, rotor inertias included.
+    ///
+    /// Parameters
+    /// ----------
+    /// q : array_like, (..., N)
+    ///     Angles (rad).
+    /// out : numpy.ndarray, (..., N, N), optional
+    ///     Where the result goes.
+    ///
+    /// Returns
+    /// -------
+    /// numpy.ndarray, (..., N, N)
+    ///     Symmetric, positive definite (kg m^2).
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     For shapes that do not fit.
+    #[pyo3(signature = (q, *, out = None))]
+    fn mass_matrix<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'py, PyAny>,
+        out: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Array<'py>> {
+        self.evaluate(py, Quantity::MassMatrix, &[("q", q)], out)
+    }
+
+    /// Torques ``G(q)`` that hold the arm still against gravity.
+    ///
+    /// Parameters
+    /// ----------
+    /// q : array_like, (..., N)
+    ///     Angles (rad).
+    /// out : numpy.ndarray, (..., N), optional
+    ///     Where the result goes.
+    ///
+    /// Returns
+    /// -------
+    /// numpy.ndarray, (..., N)
+    ///     Joint torques (N m).
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     For shapes that do not fit.
+    #[pyo3(signature = (q, *, out = None))]
+    fn gravity<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'py, PyAny>,
+        out: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Array<'py>> {
+        self.evaluate(py, Quantity::Gravity, &[("q", q)], out)
+    }
+
+    /// Forward dynamics: the accelerations that torques cause, without friction.
+    ///
+    /// Parameters
+    /// ----------
+    /// q, qd, tau : array_like, (..., N)
+    ///     Angles (rad), velocities (rad/s), joint torques (N m).
+    /// out : numpy.ndarray, (..., N), optional
+    ///     Where the result goes.
+    ///
+    /// Returns
+    /// -------
+    /// numpy.ndarray, (..., N)
+    ///     Accelerations (rad/s^2): the inverse of :meth:`rnea`.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     For shapes that do not fit.
+    #[pyo3(signature = (q, qd, tau, *, out = None))]
+    fn forward_dynamics<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'py, PyAny>,
+        qd: &Bound<'py, PyAny>,
+        tau: &Bound<'py, PyAny>,
+        out: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Array<'py>> {
+        let arguments = [("q", q), ("qd", qd), ("tau", tau)];
+        self.evaluate(py, Quantity::ForwardDynamics, &arguments, out)
+    }
+
+    /// Velocity products ``C(q, qd) qd``, without gravity.
+    ///
+    /// Parameters
+    /// ----------
+    /// q, qd : array_like, (..., N)
+    ///     Angles (rad), velocities (rad/s).
+    /// out : numpy.ndarray, (..., N), optional
+    ///     Where the result goes.
+    ///
+    /// Returns
+    /// -------
+    /// numpy.ndarray, (..., N)
+    ///     Joint torques (N m).
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     For shapes that do not fit.
+    #[pyo3(signature = (q, qd, *, out = None))]
+    fn coriolis<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'py, PyAny>,
+        qd: &Bound<'py, PyAny>,
+        out: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Array<'py>> {
+        self.evaluate(py, Quantity::Coriolis, &[("q", q), ("qd", qd)], out)
+    }
+
+    /// Christoffel matrix ``C(q, qd)``: ``H' - 2 C`` is skew.
+    ///
+    /// Parameters
+    /// ----------
+    /// q, qd : array_like, (..., N)
+    ///     Angles (rad), velocities (rad/s).
+    /// out : numpy.ndarray, (..., N, N), optional
+    ///     Where the result goes.
+    ///
+    /// Returns
+    /// -------
+    /// numpy.ndarray, (..., N, N)
+    ///     Torque for velocity (N m s/rad).
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     For shapes that do not fit.
+    #[pyo3(signature = (q, qd, *, out = None))]
+    fn coriolis_matrix<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'py, PyAny>,
+        qd: &Bound<'py, PyAny>,
+        out: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Array<'py>> {
+        self.evaluate(py, Quantity::CoriolisMatrix, &[("q", q), ("qd", qd)], out)
+    }
+
+    /// Pose of the tip in the base, ``base_from_tip``: it maps tip coordinates to base coordinates.
+    ///
+    /// Parameters
+    /// ----------
+    /// q : array_like, (..., N)
+    ///     Angles (rad).
+    /// out : numpy.ndarray, (..., 4, 4), optional
+    ///     Where the result goes.
+    ///
+    /// Returns
+    /// -------
+    /// numpy.ndarray, (..., 4, 4)
+    ///     Homogeneous matrix; the last column is the tip's position (m).
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     For shapes that do not fit.
+    #[pyo3(signature = (q, *, out = None))]
+    fn tip_pose<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'py, PyAny>,
+        out: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Array<'py>> {
+        self.evaluate(py, Quantity::TipPose, &[("q", q)], out)
+    }
+
+    /// Jacobian of the tip, base axes: linear rows first, then angular.
+    ///
+    /// Parameters
+    /// ----------
+    /// q : array_like, (..., N)
+    ///     Angles (rad).
+    /// out : numpy.ndarray, (..., 6, N), optional
+    ///     Where the result goes.
+    ///
+    /// Returns
+    /// -------
+    /// numpy.ndarray, (..., 6, N)
+    ///     Velocity of the tip (m/s) and angular velocity (rad/s) for joint velocities.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     For shapes that do not fit.
+    #[pyo3(signature = (q, *, out = None))]
+    fn jacobian<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'py, PyAny>,
+        out: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Array<'py>> {
+        self.evaluate(py, Quantity::Jacobian, &[("q", q)], out)
+    }
+
+    /// ``J' qd``: acceleration of the tip at ``qdd = 0``, base axes.
+    ///
+    /// Parameters
+    /// ----------
+    /// q, qd : array_like, (..., N)
+    ///     Angles (rad), velocities (rad/s).
+    /// out : numpy.ndarray, (..., 6), optional
+    ///     Where the result goes.
+    ///
+    /// Returns
+    /// -------
+    /// numpy.ndarray, (..., 6)
+    ///     Classical linear (m/s^2), then angular acceleration (rad/s^2).
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     For shapes that do not fit.
+    #[pyo3(signature = (q, qd, *, out = None))]
+    fn jacobian_dot_qd<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'py, PyAny>,
+        qd: &Bound<'py, PyAny>,
+        out: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Array<'py>> {
+        self.evaluate(py, Quantity::JacobianDotQd, &[("q", q), ("qd", qd)], out)
+    }
+
+    /// Torques as a linear function of the inertial parameters.
+    ///
+    /// ``rnea(q, qd, qdd) = regressor(q, qd, qdd) @ parameters + armature * qdd``.
+    ///
+    /// Parameters
+    /// ----------
+    /// q, qd, qdd : array_like, (..., N)
+    ///     Angles (rad), velocities (rad/s), accelerations (rad/s^2).
+    /// out : numpy.ndarray, (..., N, 10 N), optional
+    ///     Where the result goes.
+    ///
+    /// Returns
+    /// -------
+    /// numpy.ndarray, (..., N, 10 N)
+    ///     Ten columns a link, in the order of :attr:`parameters`.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     For shapes that do not fit.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import numpy as np, supple
+    /// >>> arm = supple.Arm.load("wam4")
+    /// >>> q, qd, qdd = np.random.default_rng(0).normal(size=(3, 100, arm.dof))
+    /// >>> tau = arm.regressor(q, qd, qdd) @ arm.parameters + arm.armature * qdd
+    /// >>> bool(np.allclose(tau, arm.rnea(q, qd, qdd)))
+    /// True
+    #[pyo3(signature = (q, qd, qdd, *, out = None))]
+    fn regressor<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'py, PyAny>,
+        qd: &Bound<'py, PyAny>,
+        qdd: &Bound<'py, PyAny>,
+        out: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Array<'py>> {
+        let arguments = [("q", q), ("qd", qd), ("qdd", qdd)];
+        self.evaluate(py, Quantity::Regressor, &arguments, out)
+    }
+
+    fn __eq__(&self, other: &Self) -> bool {
+        let (a, b) = (&self.description, &other.description);
+        a.toml() == b.toml() && a.urdf() == b.urdf()
+    }
+
+    fn __hash__(&self) -> u64 {
+        use std::hash::{DefaultHasher, Hash, Hasher};
+        let mut hasher = DefaultHasher::new();
+        (self.description.toml(), self.description.urdf()).hash(&mut hasher);
+        hasher.finish()
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (String, String))> {
+        let rebuild = py.get_type::<Self>().getattr("_from_text")?;
+        let texts = (
+            self.description.toml().to_owned(),
+            self.description.urdf().to_owned(),
+        );
+        Ok((rebuild, texts))
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<Arm {:?}, {} joints>", self.name(), self.dof())
+    }
+}
+
+fn entry(key: &str, value: impl Into<toml::Value>) -> (String, toml::Value) {
+    (key.to_owned(), value.into())
+}
+
+/// Names of the built-in arms, for :meth:`Arm.load`.
+///
+/// Examples
+/// --------
+/// >>> import supple
+/// >>> supple.assets()
+/// ['paper3', 'wam3', 'wam4', 'wam7']
+#[pyfunction]
+pub fn assets() -> Vec<&'static str> {
+    supple_model::assets().to_vec()
+}

@@ -1,0 +1,224 @@
+//! NumPy arrays in and out: shapes, batches, memory.
+//!
+//! Every argument of a state is `(..., width)`: the last axis is one state, those before it are the
+//! batch. Arguments of one call have the same batch, or none: one state then serves the whole batch.
+//! Float64 arrays in C order are read where they are; others are copied first.
+
+use numpy::{
+    IntoPyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArrayDyn,
+    PyUntypedArrayMethods,
+};
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::IntoPyDict;
+
+/// An array of float64.
+pub type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
+
+/// An argument as it was given.
+pub type Argument<'a, 'py> = (&'static str, &'a Bound<'py, PyAny>);
+
+/// Numbers of one argument: `width` for each state, or `width` for all.
+#[derive(Clone, Copy)]
+pub struct States<'a> {
+    values: &'a [f64],
+    stride: usize,
+    width: usize,
+}
+
+impl<'a> States<'a> {
+    /// The numbers of state `k`.
+    #[inline]
+    pub fn at(&self, k: usize) -> &'a [f64] {
+        &self.values[k * self.stride..][..self.width]
+    }
+}
+
+/// The arguments of one call, borrowed, and their batch.
+pub struct Batch<'py> {
+    arguments: Vec<PyReadonlyArrayDyn<'py, f64>>,
+    width: usize,
+    /// Axes before the last one, empty for a single state.
+    pub shape: Vec<usize>,
+}
+
+impl<'py> Batch<'py> {
+    /// Reads arguments of `width` numbers a state. `of` says what they are, such as `one angle a
+    /// joint`.
+    ///
+    /// # Errors
+    /// `TypeError` for what is not numbers, `ValueError` for shapes that do not fit.
+    pub fn read(arguments: &[Argument<'_, 'py>], width: usize) -> PyResult<Self> {
+        let mut arrays = Vec::with_capacity(arguments.len());
+        let mut batch: Option<(&'static str, Vec<usize>)> = None;
+        for (name, value) in arguments {
+            let array = numbers(name, value)?;
+            let Some((last, leading)) = array.shape().split_last() else {
+                return Err(wrong_shape(name, &expected(width), &[]));
+            };
+            if *last != width {
+                return Err(wrong_shape(name, &expected(width), array.shape()));
+            }
+            match &batch {
+                _ if leading.is_empty() => {}
+                None => batch = Some((name, leading.to_vec())),
+                Some((_, shape)) if shape == leading => {}
+                Some((first, shape)) => {
+                    let wanted = format!(
+                        "{}, the batch of {first}, or ({width},)",
+                        shape_text(&[&shape[..], &[width]].concat())
+                    );
+                    return Err(wrong_shape(name, &wanted, array.shape()));
+                }
+            }
+            arrays.push(array);
+        }
+        Ok(Self {
+            arguments: arrays,
+            width,
+            shape: batch.map_or_else(Vec::new, |(_, shape)| shape),
+        })
+    }
+
+    /// The numbers, argument by argument.
+    pub fn states(&self) -> PyResult<Vec<States<'_>>> {
+        let of = |array| {
+            Ok(States {
+                values: slice(array)?,
+                stride: if array.ndim() == 1 { 0 } else { self.width },
+                width: self.width,
+            })
+        };
+        self.arguments.iter().map(of).collect()
+    }
+}
+
+fn expected(width: usize) -> String {
+    format!("({width},) or (..., {width})")
+}
+
+fn slice<'a>(array: &'a PyReadonlyArrayDyn<'_, f64>) -> PyResult<&'a [f64]> {
+    Ok(array.as_slice()?)
+}
+
+/// An argument as float64 in C order, itself if it is that already.
+///
+/// # Errors
+/// `TypeError` for what is not numbers; `ValueError` for ragged lists and borrowed arrays.
+pub fn numbers<'py>(
+    name: &str,
+    value: &Bound<'py, PyAny>,
+) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
+    let array = match value.cast::<PyArrayDyn<f64>>() {
+        Ok(array) if array.is_c_contiguous() && array.is_aligned() => array.clone(),
+        _ => converted(name, value)?,
+    };
+    let borrowed = array.try_readonly();
+    borrowed.map_err(|error| PyValueError::new_err(format!("{name}: {error}; pass a copy")))
+}
+
+fn converted<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Array<'py>> {
+    static REQUIRE: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
+    let py = value.py();
+    // In C order and aligned.
+    let keywords = [("dtype", "float64"), ("requirements", "CA")].into_py_dict(py)?;
+    let array = REQUIRE
+        .import(py, "numpy", "require")?
+        .call((value,), Some(&keywords));
+    let array = array.map_err(|cause| {
+        let message = format!("{name}: expected numbers, got {}", type_name(value));
+        let error = if cause.is_instance_of::<PyTypeError>(py) {
+            PyTypeError::new_err(message)
+        } else {
+            PyValueError::new_err(message)
+        };
+        error.set_cause(py, Some(cause));
+        error
+    })?;
+    Ok(array.cast_into::<PyArrayDyn<f64>>()?)
+}
+
+fn type_name(value: &Bound<'_, PyAny>) -> String {
+    let name = value.get_type().name();
+    name.map_or_else(|_| "another object".to_owned(), |name| name.to_string())
+}
+
+/// An array of exactly this shape.
+///
+/// # Errors
+/// As [`numbers`]; `ValueError` for another shape.
+pub fn fixed<'py>(
+    name: &str,
+    value: &Bound<'py, PyAny>,
+    shape: &[usize],
+) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
+    let array = numbers(name, value)?;
+    if array.shape() == shape {
+        return Ok(array);
+    }
+    Err(wrong_shape(name, &shape_text(shape), array.shape()))
+}
+
+/// Where results go: `out`, or a new array.
+///
+/// # Errors
+/// `TypeError` and `ValueError` where `out` is not a writable float64 array in C order of this shape.
+pub fn output<'py>(
+    py: Python<'py>,
+    out: Option<&Bound<'py, PyAny>>,
+    shape: &[usize],
+) -> PyResult<(Array<'py>, PyReadwriteArrayDyn<'py, f64>)> {
+    let Some(out) = out else {
+        let array = PyArrayDyn::zeros(py, shape, false);
+        let writable = array.readwrite();
+        return Ok((array, writable));
+    };
+    let wanted = format!(
+        "a writable float64 array in C order of shape {}",
+        shape_text(shape)
+    );
+    let refuse = |found: String| format!("out: expected {wanted}, got {found}");
+    let Ok(array) = out.cast::<PyArrayDyn<f64>>() else {
+        return Err(PyTypeError::new_err(refuse(type_name(out))));
+    };
+    if array.shape() != shape {
+        return Err(PyValueError::new_err(refuse(format!(
+            "shape {}",
+            shape_text(array.shape())
+        ))));
+    }
+    if !(array.is_c_contiguous() && array.is_aligned()) {
+        return Err(PyValueError::new_err(refuse("another order".to_owned())));
+    }
+    let writable = array.try_readwrite().map_err(|error| {
+        PyValueError::new_err(refuse(format!(
+            "one that is not: {error}; it must not share memory with an argument"
+        )))
+    })?;
+    Ok((array.clone(), writable))
+}
+
+/// A new array of `shape` that takes over `values`.
+pub fn array<'py>(py: Python<'py>, values: Vec<f64>, shape: &[usize]) -> PyResult<Array<'py>> {
+    values.into_pyarray(py).reshape(shape.to_vec())
+}
+
+/// `ValueError` for an argument of another shape than expected.
+pub fn wrong_shape(name: &str, expected: &str, found: &[usize]) -> PyErr {
+    PyValueError::new_err(format!(
+        "{name}: expected shape {expected}, got {}",
+        shape_text(found)
+    ))
+}
+
+/// As Python writes a tuple.
+pub fn shape_text(shape: &[usize]) -> String {
+    match shape {
+        [one] => format!("({one},)"),
+        _ => {
+            let axes: Vec<String> = shape.iter().map(usize::to_string).collect();
+            format!("({})", axes.join(", "))
+        }
+    }
+}

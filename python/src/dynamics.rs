@@ -1,0 +1,180 @@
+//! The functions of [`supple_core::dynamics`] over batches, for any number of joints.
+//!
+//! The number of joints is in the type of an arm; [`Dynamics`] takes it out of the type, once a call,
+//! not once a state. Results are row by row, as NumPy has them.
+
+use crate::arrays::States;
+use supple_core::{Arm, Matrix, Vector, dynamics};
+
+/// What is computed of a state.
+#[derive(Clone, Copy, Debug)]
+pub enum Quantity {
+    /// Torques from `q`, `qd`, `qdd`.
+    Rnea,
+    /// Mass matrix from `q`.
+    MassMatrix,
+    /// Gravity torques from `q`.
+    Gravity,
+    /// Accelerations from `q`, `qd`, `tau`.
+    ForwardDynamics,
+    /// Velocity products from `q`, `qd`.
+    Coriolis,
+    /// Christoffel matrix from `q`, `qd`.
+    CoriolisMatrix,
+    /// Homogeneous pose from `q`.
+    TipPose,
+    /// Jacobian from `q`.
+    Jacobian,
+    /// Velocity-product acceleration of the tip from `q`, `qd`.
+    JacobianDotQd,
+    /// Regressor from `q`, `qd`, `qdd`.
+    Regressor,
+}
+
+impl Quantity {
+    /// Shape of one state's result.
+    pub fn shape(self, dof: usize) -> Vec<usize> {
+        match self {
+            Quantity::Rnea | Quantity::Gravity => vec![dof],
+            Quantity::ForwardDynamics | Quantity::Coriolis => vec![dof],
+            Quantity::MassMatrix | Quantity::CoriolisMatrix => vec![dof, dof],
+            Quantity::TipPose => vec![4, 4],
+            Quantity::Jacobian => vec![6, dof],
+            Quantity::JacobianDotQd => vec![6],
+            Quantity::Regressor => vec![dof, 10 * dof],
+        }
+    }
+}
+
+/// An arm of any number of joints.
+pub trait Dynamics: Send + Sync {
+    /// Fills `out`, one result after the other. `states` are the arguments that the quantity names,
+    /// in that order.
+    fn evaluate(&self, quantity: Quantity, states: &[States<'_>], out: &mut [f64]);
+
+    /// Ten parameters a link.
+    fn parameters(&self) -> Vec<f64>;
+
+    /// Rotor inertia of each joint \[kg m^2\].
+    fn armature(&self) -> Vec<f64>;
+
+    /// Acceleration of free fall \[m/s^2\].
+    fn gravity_m_per_s2(&self) -> [f64; 3];
+}
+
+impl<const N: usize> Dynamics for Arm<N> {
+    fn evaluate(&self, quantity: Quantity, states: &[States<'_>], out: &mut [f64]) {
+        let width = quantity.shape(N).iter().product();
+        let each = Each { states, width };
+        match quantity {
+            Quantity::Rnea => each.run(out, |[q, qd, qdd]: [Vector<N>; 3], out| {
+                out.copy_from_slice(dynamics::rnea(self, &q, &qd, &qdd).as_slice());
+            }),
+            Quantity::MassMatrix => each.run(out, |[q]: [Vector<N>; 1], out| {
+                by_rows(&dynamics::crba(self, &q), out);
+            }),
+            Quantity::Gravity => each.run(out, |[q]: [Vector<N>; 1], out| {
+                out.copy_from_slice(dynamics::gravity(self, &q).as_slice());
+            }),
+            Quantity::ForwardDynamics => each.run(out, |[q, qd, tau]: [Vector<N>; 3], out| {
+                out.copy_from_slice(dynamics::aba(self, &q, &qd, &tau).as_slice());
+            }),
+            Quantity::Coriolis => each.run(out, |[q, qd]: [Vector<N>; 2], out| {
+                out.copy_from_slice(dynamics::coriolis(self, &q, &qd).as_slice());
+            }),
+            Quantity::CoriolisMatrix => each.run(out, |[q, qd]: [Vector<N>; 2], out| {
+                by_rows(&dynamics::coriolis_matrix(self, &q, &qd), out);
+            }),
+            Quantity::TipPose => each.run(out, |[q]: [Vector<N>; 1], out| {
+                let pose = dynamics::tip_pose(self, &q);
+                let mut homogeneous = Matrix::<4, 4>::identity();
+                homogeneous
+                    .fixed_view_mut::<3, 3>(0, 0)
+                    .copy_from(&pose.rotation);
+                homogeneous
+                    .fixed_view_mut::<3, 1>(0, 3)
+                    .copy_from(&pose.translation);
+                by_rows(&homogeneous, out);
+            }),
+            Quantity::Jacobian => each.run(out, |[q]: [Vector<N>; 1], out| {
+                by_rows(&dynamics::jacobian(self, &q), out);
+            }),
+            Quantity::JacobianDotQd => each.run(out, |[q, qd]: [Vector<N>; 2], out| {
+                out.copy_from_slice(dynamics::jacobian_dot_qd(self, &q, &qd).as_slice());
+            }),
+            Quantity::Regressor => each.run_in_chunks(out, |[q, qd, qdd]: [Vector<N>; 3], out| {
+                dynamics::regressor_rows(self, &q, &qd, &qdd, |joint, link, row| {
+                    out[10 * (N * joint + link)..][..10].copy_from_slice(&row);
+                });
+            }),
+        }
+    }
+
+    fn parameters(&self) -> Vec<f64> {
+        let links = dynamics::parameters(self);
+        links.iter().flat_map(|link| link.iter().copied()).collect()
+    }
+
+    fn armature(&self) -> Vec<f64> {
+        Arm::armature(self).as_slice().to_vec()
+    }
+
+    fn gravity_m_per_s2(&self) -> [f64; 3] {
+        self.gravity().into()
+    }
+}
+
+/// States of which the results are moved together.
+const CHUNK: usize = 16;
+
+/// A batch with the width of its results.
+struct Each<'a> {
+    states: &'a [States<'a>],
+    width: usize,
+}
+
+impl Each<'_> {
+    /// Calls `f` for every state with its `K` arguments and the place of its result.
+    #[inline]
+    fn run<const N: usize, const K: usize>(
+        &self,
+        out: &mut [f64],
+        f: impl Fn([Vector<N>; K], &mut [f64]),
+    ) {
+        for (k, out) in out.chunks_exact_mut(self.width).enumerate() {
+            f(self.arguments(k), out);
+        }
+    }
+
+    /// As [`Each::run`], for wide results with zeros that `f` need not write. They are made in a buffer
+    /// that stays in the cache and moved to `out` many at a time: a long move does not fetch the memory
+    /// that it overwrites.
+    #[inline]
+    fn run_in_chunks<const N: usize, const K: usize>(
+        &self,
+        out: &mut [f64],
+        f: impl Fn([Vector<N>; K], &mut [f64]),
+    ) {
+        let chunk = out.len().min(CHUNK * self.width);
+        let mut buffer = vec![0.0; chunk];
+        let mut k = 0;
+        for out in out.chunks_mut(chunk.max(1)) {
+            let buffer = &mut buffer[..out.len()];
+            for result in buffer.chunks_exact_mut(self.width) {
+                f(self.arguments(k), result);
+                k += 1;
+            }
+            out.copy_from_slice(buffer);
+        }
+    }
+
+    #[inline]
+    fn arguments<const N: usize, const K: usize>(&self, k: usize) -> [Vector<N>; K] {
+        core::array::from_fn(|a| Vector::from_column_slice(self.states[a].at(k)))
+    }
+}
+
+#[inline]
+fn by_rows<const R: usize, const C: usize>(matrix: &Matrix<R, C>, out: &mut [f64]) {
+    out.copy_from_slice(matrix.transpose().as_slice());
+}

@@ -1,0 +1,45 @@
+//! Refusals of the crates as Python's exceptions, their messages unchanged.
+
+use pyo3::PyErr;
+use pyo3::exceptions::{PyFileNotFoundError, PyOSError, PyRuntimeError, PyValueError};
+use std::io;
+use supple_experiment::ExperimentError;
+use supple_log::LogError;
+use supple_model::ModelError;
+
+/// `FileNotFoundError` and `OSError` for what cannot be read, `ValueError` for what makes no sense.
+pub fn model(error: ModelError) -> PyErr {
+    match &error {
+        ModelError::Read { error: cause, .. } => system(cause, error.to_string()),
+        _ => PyValueError::new_err(error.to_string()),
+    }
+}
+
+/// What the system refused.
+pub fn system(cause: &io::Error, message: String) -> PyErr {
+    match cause.kind() {
+        io::ErrorKind::NotFound => PyFileNotFoundError::new_err(message),
+        _ => PyOSError::new_err(message),
+    }
+}
+
+/// Logs that cannot be read, or are not whole.
+pub fn log(error: LogError) -> PyErr {
+    match error {
+        LogError::Model(error) => model(error),
+        LogError::Create { ref source, .. }
+        | LogError::Write { ref source, .. }
+        | LogError::Read { ref source, .. } => system(source, error.to_string()),
+        _ => PyValueError::new_err(error.to_string()),
+    }
+}
+
+/// Experiments that cannot be run.
+pub fn experiment(error: ExperimentError) -> PyErr {
+    match error {
+        ExperimentError::Model(error) => model(error),
+        ExperimentError::Log(error) => log(error),
+        ExperimentError::FaultAtStart { .. } => PyRuntimeError::new_err(error.to_string()),
+        _ => PyValueError::new_err(error.to_string()),
+    }
+}

@@ -1,0 +1,168 @@
+//! Friction of a joint, as the controller's law has it.
+
+use crate::arrays;
+use numpy::PyUntypedArrayMethods;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use supple_core::friction;
+
+/// Friction of one joint: viscous and Coulomb, continuous over a band, with a Stribeck dip and an offset.
+///
+/// ``D(v) = V v + offset + [S + (S0 - S) exp(-(v / v_s)^2)] p(v / delta)`` with
+/// ``p(x) = 2 x - sign(x) x^2`` inside the band and ``sign(x)`` outside. Immutable.
+///
+/// Parameters
+/// ----------
+/// viscous_nm_s_per_rad : float
+///     ``V`` (N m s/rad), zero or more. Default 0.
+/// coulomb_nm : float
+///     ``S`` (N m), zero or more. Default 0.
+/// breakaway_nm : float, optional
+///     ``S0`` (N m), at least ``coulomb_nm``. Default: ``coulomb_nm``, no dip.
+/// stribeck_rad_per_s : float
+///     ``v_s`` (rad/s), positive. Default 0.05.
+/// offset_nm : float
+///     Torque that does not depend on the velocity (N m). Default 0.
+/// band_rad_per_s : float
+///     ``delta`` (rad/s), positive. Default 0.01.
+///
+/// Raises
+/// ------
+/// ValueError
+///     For friction that would feed energy into the joint.
+///
+/// Examples
+/// --------
+/// >>> import supple
+/// >>> friction = supple.Friction(viscous_nm_s_per_rad=2.0, coulomb_nm=0.5)
+/// >>> friction.torque_nm([-1.0, 0.0, 1.0])
+/// array([-2.5,  0. ,  2.5])
+#[pyclass(frozen, eq, module = "supple", from_py_object)]
+#[derive(Clone, Copy, PartialEq)]
+pub struct Friction {
+    pub inner: friction::Friction,
+}
+
+#[pymethods]
+impl Friction {
+    #[new]
+    #[pyo3(signature = (
+        *,
+        viscous_nm_s_per_rad = 0.0,
+        coulomb_nm = 0.0,
+        breakaway_nm = None,
+        stribeck_rad_per_s = friction::Friction::NONE.stribeck_rad_per_s,
+        offset_nm = 0.0,
+        band_rad_per_s = friction::Friction::NONE.band_rad_per_s,
+    ), text_signature = "(*, viscous_nm_s_per_rad=0.0, coulomb_nm=0.0, breakaway_nm=None, \
+        stribeck_rad_per_s=0.05, offset_nm=0.0, band_rad_per_s=0.01)")]
+    fn new(
+        viscous_nm_s_per_rad: f64,
+        coulomb_nm: f64,
+        breakaway_nm: Option<f64>,
+        stribeck_rad_per_s: f64,
+        offset_nm: f64,
+        band_rad_per_s: f64,
+    ) -> PyResult<Self> {
+        let inner = friction::Friction {
+            viscous_nm_s_per_rad,
+            coulomb_nm,
+            breakaway_nm: breakaway_nm.unwrap_or(coulomb_nm),
+            stribeck_rad_per_s,
+            offset_nm,
+            band_rad_per_s,
+        };
+        inner
+            .validate()
+            .map_err(|error| PyValueError::new_err(error.to_string()))?;
+        Ok(Self { inner })
+    }
+
+    /// Viscous friction (N m s/rad).
+    #[getter]
+    fn viscous_nm_s_per_rad(&self) -> f64 {
+        self.inner.viscous_nm_s_per_rad
+    }
+
+    /// Coulomb torque in steady sliding (N m).
+    #[getter]
+    fn coulomb_nm(&self) -> f64 {
+        self.inner.coulomb_nm
+    }
+
+    /// Torque that the Stribeck curve tends to at rest (N m).
+    #[getter]
+    fn breakaway_nm(&self) -> f64 {
+        self.inner.breakaway_nm
+    }
+
+    /// Speed over which the dip fades (rad/s).
+    #[getter]
+    fn stribeck_rad_per_s(&self) -> f64 {
+        self.inner.stribeck_rad_per_s
+    }
+
+    /// Torque that does not depend on the velocity (N m).
+    #[getter]
+    fn offset_nm(&self) -> f64 {
+        self.inner.offset_nm
+    }
+
+    /// Half-width of the band in which dry friction is a parabola (rad/s).
+    #[getter]
+    fn band_rad_per_s(&self) -> f64 {
+        self.inner.band_rad_per_s
+    }
+
+    /// Torque that overcomes friction (N m), of the shape of ``velocity_rad_per_s``.
+    ///
+    /// Parameters
+    /// ----------
+    /// velocity_rad_per_s : array_like
+    ///     Joint velocities (rad/s), any shape.
+    fn torque_nm<'py>(
+        &self,
+        py: Python<'py>,
+        velocity_rad_per_s: &Bound<'py, PyAny>,
+    ) -> PyResult<arrays::Array<'py>> {
+        let velocity = arrays::numbers("velocity_rad_per_s", velocity_rad_per_s)?;
+        let values = velocity.as_slice()?.iter();
+        let torques = values.map(|v| self.inner.torque_nm(*v)).collect();
+        arrays::array(py, torques, velocity.shape())
+    }
+
+    /// What a pickle calls: viscous, Coulomb, breakaway, Stribeck speed, offset, band.
+    #[staticmethod]
+    fn _of(values: [f64; 6]) -> PyResult<Self> {
+        let [viscous, coulomb, breakaway, stribeck, offset, band] = values;
+        Self::new(viscous, coulomb, Some(breakaway), stribeck, offset, band)
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, ([f64; 6],))> {
+        let f = &self.inner;
+        let rebuild = py.get_type::<Self>().getattr("_of")?;
+        let values = [
+            f.viscous_nm_s_per_rad,
+            f.coulomb_nm,
+            f.breakaway_nm,
+            f.stribeck_rad_per_s,
+            f.offset_nm,
+            f.band_rad_per_s,
+        ];
+        Ok((rebuild, (values,)))
+    }
+
+    fn __repr__(&self) -> String {
+        let f = &self.inner;
+        format!(
+            "Friction(viscous_nm_s_per_rad={}, coulomb_nm={}, breakaway_nm={}, \
+             stribeck_rad_per_s={}, offset_nm={}, band_rad_per_s={})",
+            f.viscous_nm_s_per_rad,
+            f.coulomb_nm,
+            f.breakaway_nm,
+            f.stribeck_rad_per_s,
+            f.offset_nm,
+            f.band_rad_per_s
+        )
+    }
+}

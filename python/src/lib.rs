@@ -1,0 +1,37 @@
+//! The native half of the Python package `supple`: its private module `supple._native`.
+//!
+//! It turns NumPy arrays into what the crates take, and their answers into NumPy arrays. It computes
+//! nothing itself: every number comes from the crates that the command line and the controller use.
+//! Shapes are checked here, before the interpreter is let go.
+#![deny(unsafe_code)]
+
+mod arm;
+mod arrays;
+mod dynamics;
+mod errors;
+mod friction;
+mod log;
+mod simulate;
+mod table;
+
+use pyo3::prelude::*;
+
+/// Private: what the package `supple` is built on.
+#[pymodule]
+mod _native {
+    use super::*;
+
+    #[pymodule_export]
+    use super::arm::{Arm, assets};
+    #[pymodule_export]
+    use super::friction::Friction;
+    #[pymodule_export]
+    use super::log::read_log;
+    #[pymodule_export]
+    use super::simulate::simulate;
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}

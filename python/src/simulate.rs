@@ -1,0 +1,170 @@
+//! An experiment of `supple-experiment`, as columns.
+
+use crate::arm::Arm;
+use crate::errors;
+use crate::table::Table;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::path::PathBuf;
+use supple_core::Trajectory;
+use supple_experiment::probing::{ContactMeter, Stroke};
+use supple_experiment::{
+    Cycle, ExperimentError, Mismatch, Plan, Recorder, Run, Setup, Variant, run, scenario,
+};
+use supple_model::{Description, with_dof};
+use supple_plant::Scene;
+
+/// What to run; the package has checked names and fills in defaults.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Options {
+    experiment: String,
+    duration_s: Option<f64>,
+    stiffness_n_per_m: f64,
+    speed: f64,
+    gravity_error: f64,
+    friction_error: f64,
+    stribeck: bool,
+    load: bool,
+    fade: bool,
+    seed: u64,
+    log_dir: Option<PathBuf>,
+}
+
+struct Outcome {
+    run: Run,
+    cycles: Table,
+    strokes: Vec<Stroke>,
+}
+
+/// Runs an experiment in virtual time.
+#[pyfunction]
+pub fn simulate<'py>(py: Python<'py>, arm: &Arm, options: Options) -> PyResult<Bound<'py, PyDict>> {
+    let description = arm.description();
+    let outcome = py.detach(|| {
+        with_dof!(description.dof(), N => sized::<N>(description, &options))
+            .map_err(ExperimentError::from)
+            .flatten()
+    });
+    let outcome = outcome.map_err(errors::experiment)?;
+    let dict = PyDict::new(py);
+    let log = options
+        .log_dir
+        .map(|folder| folder.join(format!("{}.mcap", outcome.run.name)));
+    dict.set_item("log", log)?;
+    dict.set_item("rms_error_m", outcome.run.rms_error_m)?;
+    dict.set_item("max_error_m", outcome.run.max_error_m)?;
+    let ended = outcome.run.ended.map(|ended| (ended.ended_s, ended.fault));
+    dict.set_item("ended", ended)?;
+    dict.set_item("cycles", outcome.cycles.into_dict(py)?)?;
+    dict.set_item("strokes", strokes(&outcome.strokes).into_dict(py)?)?;
+    Ok(dict)
+}
+
+fn sized<const N: usize>(
+    description: &Description,
+    options: &Options,
+) -> Result<Outcome, ExperimentError> {
+    let plan = plan::<N>(description, options)?;
+    let mut recorder = match &options.log_dir {
+        Some(folder) => Some(Recorder::create(folder, description, &plan, options.seed)?),
+        None => None,
+    };
+    let mut meter = match plan.trajectory {
+        Trajectory::Probe(probe) => Some(ContactMeter::new(probe)),
+        _ => None,
+    };
+    let mut cycles = Table::default();
+    let run = run(&plan, &mut |cycle, time_s| {
+        if let Some(recorder) = &mut recorder {
+            recorder.cycle(cycle)?;
+        }
+        if let Some(time_s) = time_s {
+            row(&mut cycles, time_s, cycle);
+            if let Some(meter) = &mut meter {
+                meter.cycle(time_s, &cycle.truth, cycle.steps, cycle.output.in_contact);
+            }
+        }
+        Ok(())
+    })?;
+    if let Some(recorder) = recorder {
+        recorder.finish()?;
+    }
+    Ok(Outcome {
+        run,
+        cycles,
+        strokes: meter.map_or_else(Vec::new, ContactMeter::finish),
+    })
+}
+
+fn plan<const N: usize>(
+    description: &Description,
+    options: &Options,
+) -> Result<Plan<N>, ExperimentError> {
+    let setup = Setup::<N>::new(description, options.seed)?;
+    let wrong = options.gravity_error != 0.0 || options.friction_error != 0.0;
+    let variant = Variant {
+        mismatch: wrong.then_some(Mismatch {
+            gravity: options.gravity_error,
+            friction: options.friction_error,
+            seed: options.seed,
+        }),
+        stribeck: options.stribeck,
+        load: options.load,
+        fade: options.fade,
+        ..Variant::EXACT
+    };
+    let mut config = setup.config(&variant)?;
+    config.law.gains = scenario::gains(options.stiffness_n_per_m);
+    let mut scene = Scene::default();
+    let (trajectory, whole_s) = match &options.experiment[..] {
+        "arc" => scenario::arc(),
+        "quadrant" => {
+            let speed = options.speed * scenario::QUADRANT_SPEED_M_PER_S;
+            let (quadrant, duration_s) = scenario::quadrant(speed);
+            (Trajectory::Quadrant(quadrant), duration_s)
+        }
+        "probing" => {
+            scene = scenario::block();
+            let (probe, duration_s) = scenario::probe(setup.tip_radius_m());
+            (Trajectory::Probe(probe), duration_s)
+        }
+        _ => scenario::sinusoid(options.speed),
+    };
+    Ok(Plan {
+        name: options.experiment.clone(),
+        config,
+        plant: setup.plant(&variant, scene),
+        trajectory,
+        duration_s: options.duration_s.unwrap_or(whole_s),
+    })
+}
+
+fn row<const N: usize>(table: &mut Table, t: f64, cycle: &Cycle<'_, N>) {
+    let (output, truth) = (&cycle.output, &cycle.truth);
+    let reference = output
+        .reference
+        .map_or(truth.tip_position_m, |r| r.position);
+    table.number("t", t);
+    table.vector("q", output.position_rad.as_slice());
+    table.vector("qd", output.velocity_rad_per_s.as_slice());
+    table.vector("tau", output.torque_nm.as_slice());
+    table.vector("reference_position_m", reference.as_slice());
+    table.vector("tip_position_m", truth.tip_position_m.as_slice());
+    table.vector("tip_force_n", cycle.measurement.force_n.as_slice());
+    table.number("in_contact", f64::from(u8::from(output.in_contact)));
+    table.end_row();
+}
+
+fn strokes(strokes: &[Stroke]) -> Table {
+    let mut table = Table::default();
+    for stroke in strokes {
+        table.number("approach_m_per_s", stroke.approach_m_per_s);
+        table.number("peak_filtered_n", stroke.peak_filtered_n);
+        table.number("contact_s", stroke.contact_s);
+        table.number("impulse_newton_s", stroke.impulse_newton_s);
+        table.number("rest_force_n", stroke.rest_force_n);
+        table.end_row();
+    }
+    table
+}

@@ -1,0 +1,78 @@
+"""Arms from names, paths and URDFs, and what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import supple
+from robots import random_urdf, write_random_urdf
+
+
+@pytest.mark.parametrize("name", supple.assets())
+def test_every_built_in_arm_loads(name):
+    arm = supple.Arm.load(name)
+    assert arm.name == name
+    assert 3 <= arm.dof <= 7
+    assert len(arm.friction) == len(arm.joint_names) == arm.dof
+    assert arm.home_rad.shape == (arm.dof,)
+    eigenvalues = np.linalg.eigvalsh(arm.mass_matrix(arm.home_rad))
+    assert (eigenvalues > 0.0).all()
+
+
+def test_an_arm_by_its_files(tmp_path):
+    arm = supple.Arm.load("wam4")
+    (tmp_path / "arm.toml").write_text(arm.toml)
+    (tmp_path / "arm.urdf").write_text(arm.urdf)
+    for path in (tmp_path, tmp_path / "arm.toml", str(tmp_path)):
+        assert supple.Arm.load(path) == arm
+
+
+def test_names_that_are_none():
+    with pytest.raises(ValueError, match="no arm named `wam9` is built in; .*wam4"):
+        supple.Arm.load("wam9")
+    with pytest.raises(FileNotFoundError, match="nowhere/arm.toml"):
+        supple.Arm.load("nowhere/arm.toml")
+    with pytest.raises(FileNotFoundError, match="nowhere.urdf"):
+        supple.Arm.from_urdf("nowhere.urdf")
+
+
+def test_wrong_urdfs_are_refused_by_file_element_and_value(tmp_path):
+    path = tmp_path / "negative.urdf"
+    text = random_urdf(3, 0)
+    mass = text.split('<mass value="')[1].split('"')[0]
+    path.write_text(text.replace(f'<mass value="{mass}"', '<mass value="-1"'))
+    with pytest.raises(ValueError, match="negative.urdf.*link1.*-1"):
+        supple.Arm.from_urdf(path)
+    path.write_text("not XML")
+    with pytest.raises(ValueError, match="negative.urdf"):
+        supple.Arm.from_urdf(path)
+
+
+def test_arguments_of_from_urdf(tmp_path):
+    path = write_random_urdf(tmp_path, 4, 1)
+    with pytest.raises(ValueError, match="flange"):
+        supple.Arm.from_urdf(path, tip="flange")
+    with pytest.raises(ValueError, match=r"gravity: expected shape \(3,\), got \(2,\)"):
+        supple.Arm.from_urdf(path, gravity=(0.0, -9.81))
+    with pytest.raises(ValueError, match=r"armature: expected shape \(4,\), got \(3,\)"):
+        supple.Arm.from_urdf(path, armature=[0.1] * 3)
+    with pytest.raises(ValueError, match="gravity_m_per_s2"):
+        supple.Arm.from_urdf(path, gravity=(0.0, 0.0, np.nan))
+
+
+@pytest.mark.parametrize("dof", [2, 8])
+def test_arms_of_other_sizes_are_refused(tmp_path, dof):
+    with pytest.raises(ValueError, match=f"an arm of {dof} moving joints is not supported"):
+        supple.Arm.from_urdf(write_random_urdf(tmp_path, dof, 0))
+
+
+def test_a_frozen_joint_joins_its_links(tmp_path):
+    path = write_random_urdf(tmp_path, 5, 2)
+    whole = supple.Arm.from_urdf(path)
+    frozen = supple.Arm.from_urdf(path, fixed_joints_rad={"joint3": 0.7})
+    assert frozen.joint_names == ["joint1", "joint2", "joint4", "joint5"]
+    q = np.random.default_rng(0).normal(size=(10, 4))
+    full = np.insert(q, 2, 0.7, axis=1)
+    np.testing.assert_allclose(frozen.tip_pose(q), whole.tip_pose(full), atol=1e-12)
+    expected = np.delete(whole.gravity(full), 2, axis=1)
+    np.testing.assert_allclose(frozen.gravity(q), expected, atol=1e-12)
