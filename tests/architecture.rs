@@ -30,6 +30,20 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("supple-ipc", &["supple-core", "supple-model"]),
     ("supple-realtime", &[]),
     (
+        "supple-can",
+        &["supple-core", "supple-model", "supple-puck", "supple-bus"],
+    ),
+    (
+        "supple-emu",
+        &[
+            "supple-core",
+            "supple-model",
+            "supple-puck",
+            "supple-bus",
+            "supple-plant",
+        ],
+    ),
+    (
         "supple-ident",
         &["supple-core", "supple-model", "supple-log"],
     ),

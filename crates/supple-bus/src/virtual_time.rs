@@ -204,30 +204,31 @@ impl Responder {
         })
     }
 
-    /// Serves the host until `idle_ns` of the machine's time have passed without a word from it.
+    /// Serves one message of the host; `false` if none came within `idle_ns` of the machine's time.
     ///
     /// # Errors
     /// Where the socket fails. A host that has gone is none: another may come.
-    pub fn serve(&mut self, peer: &mut impl Peer, idle_ns: u64) -> Result<(), BusError> {
-        while let Some(bytes) = self.next(idle_ns)? {
-            let message = Message::parse(&bytes);
-            match (message.kind, WireFrame::parse(&message.raw)) {
-                (FRAME, WireFrame::Data(frame)) => peer.host_sends(&frame),
-                (RUN_UNTIL, _) => {
-                    let event = peer.run_until(message.time_ns.max(peer.now_ns()));
-                    let (kind, raw) = match event {
-                        None => (REACHED, [0; CAN_FRAME_BYTES]),
-                        Some(Event::Frame(frame)) => (FRAME, WireFrame::data(&frame)),
-                        Some(Event::Sent(frame)) => (SENT, WireFrame::data(&frame)),
-                        Some(Event::Fault(fault)) => (FAULT, WireFrame::fault(fault)),
-                    };
-                    let time_ns = peer.now_ns();
-                    self.endpoint.send(&Message { kind, time_ns, raw }.emit())?;
-                }
-                _ => {}
+    pub fn serve(&mut self, peer: &mut impl Peer, idle_ns: u64) -> Result<bool, BusError> {
+        let Some(bytes) = self.next(idle_ns)? else {
+            return Ok(false);
+        };
+        let message = Message::parse(&bytes);
+        match (message.kind, WireFrame::parse(&message.raw)) {
+            (FRAME, WireFrame::Data(frame)) => peer.host_sends(&frame),
+            (RUN_UNTIL, _) => {
+                let event = peer.run_until(message.time_ns.max(peer.now_ns()));
+                let (kind, raw) = match event {
+                    None => (REACHED, [0; CAN_FRAME_BYTES]),
+                    Some(Event::Frame(frame)) => (FRAME, WireFrame::data(&frame)),
+                    Some(Event::Sent(frame)) => (SENT, WireFrame::data(&frame)),
+                    Some(Event::Fault(fault)) => (FAULT, WireFrame::fault(fault)),
+                };
+                let time_ns = peer.now_ns();
+                self.endpoint.send(&Message { kind, time_ns, raw }.emit())?;
             }
+            _ => {}
         }
-        Ok(())
+        Ok(true)
     }
 
     fn next(&self, idle_ns: u64) -> Result<Option<[u8; MESSAGE_BYTES]>, BusError> {

@@ -1,0 +1,83 @@
+//! The safety module during start-up: found, read, limited. Its mode is only ever lowered.
+
+use super::{always, motors};
+use crate::error::CanError;
+use crate::host::Host;
+use supple_bus::Bus;
+use supple_puck::safety::{SafetyLimits, SafetyMode};
+use supple_puck::status::{Role, RoleType};
+use supple_puck::{NodeId, Property, PropertyId, PropertyTable, PuckKind};
+
+/// Finds the module and its list of ids.
+pub fn find<B: Bus>(host: &mut Host<'_, B>) -> Result<PropertyTable, CanError> {
+    let node = NodeId::SAFETY;
+    let missing = CanError::Missing {
+        what: "the safety module",
+        node: node.number(),
+        remedy: "switch the arm on, check the CAN cable and that the interface is up at 1 Mbit/s",
+    };
+    let version = host.ask(node, always(Property::VERS)?)?.ok_or(missing)?;
+    let role = Role::from_value(motors::must(host, node, always(Property::ROLE)?)?);
+    if role.role_type() != Ok(RoleType::Safety) {
+        return Err(CanError::Role {
+            node: node.number(),
+            role: role.0,
+            expected: "a safety module (type 2 in the low five bits)",
+        });
+    }
+    PropertyTable::of_firmware(PuckKind::Safety, version).map_err(|source| CanError::Firmware {
+        node: node.number(),
+        source,
+    })
+}
+
+/// Id of a property of the module.
+pub fn listed(module: &PropertyTable, property: Property) -> Result<PropertyId, CanError> {
+    module.id(property).ok_or(CanError::Property {
+        node: NodeId::SAFETY.number(),
+        version: 0,
+        property,
+    })
+}
+
+/// The module's mode.
+pub fn mode<B: Bus>(
+    host: &mut Host<'_, B>,
+    module: &PropertyTable,
+) -> Result<SafetyMode, CanError> {
+    let id = listed(module, Property::MODE)?;
+    let found = motors::must(host, NodeId::SAFETY, id)?;
+    SafetyMode::from_value(found).map_err(|_| CanError::Value {
+        property: Property::MODE,
+        node: NodeId::SAFETY.number(),
+        found,
+    })
+}
+
+/// Takes an active module to idle.
+pub fn lower<B: Bus>(host: &mut Host<'_, B>, module: &PropertyTable) -> Result<(), CanError> {
+    let id = listed(module, Property::MODE)?;
+    let idle = i32::from(SafetyMode::Idle.value());
+    host.tell(NodeId::SAFETY, id, idle)?;
+    match mode(host, module)? {
+        SafetyMode::Active => Err(CanError::Mode {
+            found: SafetyMode::Active,
+            expected: SafetyMode::Idle,
+        }),
+        _ => Ok(()),
+    }
+}
+
+/// Sets the limits and reads them back. The module forgets them at power-up.
+pub fn set_limits<B: Bus>(
+    host: &mut Host<'_, B>,
+    module: &PropertyTable,
+    limits: &SafetyLimits,
+) -> Result<(), CanError> {
+    for (property, value) in limits.settings() {
+        let id = listed(module, property)?;
+        host.tell(NodeId::SAFETY, id, value.get())?;
+        motors::expect(host, NodeId::SAFETY, property, id, value.get())?;
+    }
+    Ok(())
+}

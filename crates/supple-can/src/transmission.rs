@@ -1,0 +1,78 @@
+//! Between motors and joints: `q = m2jp p` of the motor angles, `m2jp^T tau` for the motor torques.
+
+use supple_core::{Matrix, Vector};
+use supple_model::Description;
+use supple_puck::position::CountsError;
+use supple_puck::torque::TorqueError;
+use supple_puck::{Counts, PositionScale, PuckTorque, TorqueScale};
+
+/// Transmission, encoders and torque units of an arm.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Transmission<const N: usize> {
+    joint_from_motor: Matrix<N, N>,
+    motor_from_joint: Matrix<N, N>,
+    position: [PositionScale; N],
+    torque: [TorqueScale; N],
+}
+
+impl<const N: usize> Transmission<N> {
+    /// The described arm's matrix with what its pucks say of themselves. `None` where the description
+    /// has not `N` joints.
+    pub fn new(
+        description: &Description,
+        position: [PositionScale; N],
+        torque: [TorqueScale; N],
+    ) -> Option<Transmission<N>> {
+        let motors = description.motors();
+        if motors.joint_from_motor.shape() != (N, N) {
+            return None;
+        }
+        Some(Transmission {
+            joint_from_motor: Matrix::from_fn(|i, j| motors.joint_from_motor[(i, j)]),
+            motor_from_joint: Matrix::from_fn(|i, j| motors.motor_from_joint[(i, j)]),
+            position,
+            torque,
+        })
+    }
+
+    /// Joint angles \[rad\] from motor counts. A joint that is moved by a motor whose reply is missing has
+    /// no angle; the others have theirs.
+    pub fn joint_rad(&self, counts: &[Option<Counts>; N]) -> [Option<f64>; N] {
+        core::array::from_fn(|joint| {
+            let mut angle_rad = 0.0;
+            for (motor, counts) in counts.iter().enumerate() {
+                let ratio = self.joint_from_motor[(joint, motor)];
+                if ratio != 0.0 {
+                    angle_rad += ratio * self.position[motor].rad((*counts)?);
+                }
+            }
+            Some(angle_rad)
+        })
+    }
+
+    /// Motor counts at joint angles \[rad\].
+    ///
+    /// # Errors
+    /// An angle that is not finite, or beyond what a position holds.
+    pub fn counts(&self, joint_rad: &Vector<N>) -> Result<[Counts; N], CountsError> {
+        let motor_rad = self.motor_from_joint * joint_rad;
+        let mut counts = [Counts::new(0)?; N];
+        for (motor, counts) in counts.iter_mut().enumerate() {
+            *counts = self.position[motor].counts(motor_rad[motor])?;
+        }
+        Ok(counts)
+    }
+
+    /// Motor torques in puck units from joint torques \[N m\], rounded to the nearest.
+    ///
+    /// # Errors
+    /// A torque that is not finite.
+    pub fn puck_torques(&self, joint_nm: &Vector<N>) -> Result<[PuckTorque; N], TorqueError> {
+        let motor_nm = self.joint_from_motor.transpose() * joint_nm;
+        let mut torques = [PuckTorque::ZERO; N];
+        for (motor, torque) in torques.iter_mut().enumerate() {
+            *torque = self.torque[motor].puck_torque(motor_nm[motor])?;
+        }
+        Ok(torques)
+    }
+}

@@ -1,0 +1,143 @@
+//! What an emulated arm is told before it starts: everything that a real one has as it comes from the
+//! factory, with the default of each and where it comes from.
+
+use supple_puck::status::Role;
+
+/// Millisecond in nanoseconds.
+pub(crate) const MS: u64 = 1_000_000;
+
+/// One motor puck.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PuckConfig {
+    /// Firmware version; 175 by default, the newest list of property ids.
+    pub version: i32,
+    /// Role; a WAM motor with a magnetic encoder by default.
+    pub role: Role,
+    /// Units of torque per N m at the motor.
+    pub units_per_nm: i32,
+    /// Most torque that the puck applies \[puck units\].
+    pub max_torque: i32,
+    /// Poles of the motor, which tell the joint's motor type.
+    pub poles: i32,
+    /// Encoder counts per revolution.
+    pub counts_per_revolution: i32,
+    /// Groups that the puck listens to, as they are in its EEPROM.
+    pub groups: [u8; 3],
+    /// Slot in the packed torque frame, from 1.
+    pub slot: i32,
+    /// Temperature \[degrees Celsius\]; 30 by default.
+    pub temperature: i32,
+    /// Torque of the shorted motor per speed \[N m s/rad\]: `Kt^2 / R`.
+    pub braking_nm_s_per_rad: f64,
+    /// It answers at all; true by default.
+    pub present: bool,
+}
+
+impl PuckConfig {
+    /// Puck of joint `number`, 1 to 7, of a WAM. Units, limits and poles are Barrett's defaults (btutil,
+    /// btdiag); the motors' constants are those of the data sheet: Kt 0.457, 0.236 and 0.067 N m/A, R
+    /// 3.473, 6.213 and 5.205 ohm.
+    pub fn wam(number: usize) -> PuckConfig {
+        let (units_per_nm, poles, kt_nm_per_a, resistance_ohm) = match number {
+            1..=4 => (2700, 12, 0.457, 3.473),
+            5 | 6 => (6500, 8, 0.236, 6.213),
+            _ => (17_474, 6, 0.067, 5.205),
+        };
+        let lower = number <= 4;
+        PuckConfig {
+            version: 175,
+            role: Role::ARM_MOTOR,
+            units_per_nm,
+            max_torque: match number {
+                1..=3 => 4860,
+                4 => 4320,
+                5 | 6 => 3900,
+                _ => 1600,
+            },
+            poles,
+            counts_per_revolution: 4096,
+            groups: if lower { [0, 1, 4] } else { [0, 2, 4] },
+            slot: if lower { number } else { number - 4 } as i32,
+            temperature: 30,
+            braking_nm_s_per_rad: kt_nm_per_a * kt_nm_per_a / resistance_ohm,
+            present: true,
+        }
+    }
+}
+
+/// The safety module.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SafetyConfig {
+    /// Firmware version; 175 by default.
+    pub version: i32,
+    /// Silence of any arm puck after which positions count as no longer reported \[ns\]; 100 ms by
+    /// default, the longest that OWD waits. The real value is not published.
+    pub heartbeat_ns: u64,
+    /// Time in which the arm must have slowed down after a velocity fault, or an emergency stop follows
+    /// \[ns\]; 0.5 s, the documented one.
+    pub slow_down_ns: u64,
+    /// Bus voltage \[V\]; 48 by default.
+    pub voltage: i32,
+    /// It answers at all; true by default.
+    pub present: bool,
+}
+
+/// Everything.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EmulatorConfig {
+    /// Motor pucks, in the order of the joints.
+    pub pucks: Vec<PuckConfig>,
+    /// Safety module.
+    pub safety: SafetyConfig,
+    /// A force/torque sensor is mounted; true by default.
+    pub force_sensor: bool,
+    /// The arm's positions are known already, as when another program has run before: counts are
+    /// those of the joint angles and ZERO is 1. False by default: counts begin at 0 wherever the arm
+    /// stands.
+    pub zeroed: bool,
+    /// The arm lies in a cradle in its start pose until the motors first take torque; true by default.
+    /// Without, braking motors let it sink from the beginning.
+    pub cradle: bool,
+    /// Time between a frame's end and a node's answer to it \[ns\]; 10 us by default, chosen.
+    pub latency_ns: u64,
+    /// What is added to it, at most, by chance \[ns\]; 5 us by default, chosen.
+    pub jitter_ns: u64,
+    /// Time from "set STAT" to a puck's being ready \[ns\]; 0.8 s by default, within the 1 s that
+    /// libbarrett waits.
+    pub wake_ns: u64,
+    /// From this time after "set STAT" on, until it is ready, a puck's transceiver is off and on: a
+    /// frame on the bus then drives the host's controller off it \[ns\]; 0.2 s by default, chosen.
+    pub wake_quiet_from_ns: u64,
+    /// Speed of the bus-off recovery, the interface's `restart-ms` \[ns\]; 100 ms by default.
+    pub restart_ns: u64,
+    /// Step of the physics \[ns\]; 0.2 ms by default. Encoders are read and torques act on this grid.
+    pub step_ns: u64,
+    /// Seed of the jitter.
+    pub seed: u64,
+}
+
+impl EmulatorConfig {
+    /// A WAM of `joints` joints.
+    pub fn wam(joints: usize) -> EmulatorConfig {
+        EmulatorConfig {
+            pucks: (1..=joints).map(PuckConfig::wam).collect(),
+            safety: SafetyConfig {
+                version: 175,
+                heartbeat_ns: 100 * MS,
+                slow_down_ns: 500 * MS,
+                voltage: 48,
+                present: true,
+            },
+            force_sensor: true,
+            zeroed: false,
+            cradle: true,
+            latency_ns: 10_000,
+            jitter_ns: 5_000,
+            wake_ns: 800 * MS,
+            wake_quiet_from_ns: 200 * MS,
+            restart_ns: 100 * MS,
+            step_ns: MS / 5,
+            seed: 0,
+        }
+    }
+}

@@ -1,0 +1,60 @@
+//! Why an arm cannot be emulated.
+
+use supple_bus::BusError;
+use supple_model::ModelError;
+use supple_plant::PlantError;
+
+/// What an emulator cannot be built from, or run on.
+#[derive(Debug, thiserror::Error)]
+pub enum EmulatorError {
+    /// Not a WAM.
+    #[error("the arm has {found} moving joints, pucks are emulated for 4 or 7: give wam4 or wam7")]
+    Joints {
+        /// Joints found.
+        found: usize,
+    },
+    /// Pucks and joints differ in number.
+    #[error("{found} pucks are configured for {expected} joints: give one for each")]
+    Pucks {
+        /// Pucks found.
+        found: usize,
+        /// Joints.
+        expected: usize,
+    },
+    /// No list of property ids.
+    #[error(
+        "node {node} has firmware {version}, property ids are known from version 32: give a newer one"
+    )]
+    Firmware {
+        /// Node number.
+        node: usize,
+        /// Version found.
+        version: i32,
+    },
+    /// The motor-to-joint matrix has no inverse.
+    #[error("joint_from_motor is singular: correct [motors] in the arm's TOML")]
+    Transmission,
+    /// The plant refuses its configuration.
+    #[error(transparent)]
+    Plant(#[from] PlantError),
+    /// The description of the arm.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// The bus.
+    #[error(transparent)]
+    Bus(#[from] BusError),
+    /// A button press that cannot be read.
+    #[error("press `{text}`: expected BUTTON@SECONDS with one of idle, activate, e-stop, release")]
+    Press {
+        /// What was given.
+        text: String,
+    },
+    /// A file of the trace.
+    #[error("{file}: {source}; choose a file that can be written")]
+    Trace {
+        /// The file.
+        file: String,
+        /// What the system says.
+        source: std::io::Error,
+    },
+}

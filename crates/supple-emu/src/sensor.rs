@@ -1,0 +1,127 @@
+//! The force/torque sensor behind the tip.
+//!
+//! It answers a request by forces, then torques, both in its own axes, which are the tip's. Taring takes
+//! a little over a second, in which its outputs are zero and its status says so. Source: btclient, OWD.
+
+use crate::store::property_of;
+use supple_core::nalgebra::Vector3;
+use supple_puck::force_torque::{Quantity, SensorReading, SensorStatus};
+use supple_puck::status::{Role, Stat};
+use supple_puck::{
+    CanFrame, Destination, GroupId, NodeId, Property, PropertyMessage, PropertyTable, Value,
+};
+
+/// Time that taring takes \[ns\].
+const TARE_NS: u64 = 1_100_000_000;
+/// From the middle of the sensor to the tip, in its own axes \[m\].
+const SENSOR_TO_TIP_M: Vector3<f64> = Vector3::new(0.0, 0.0, 0.026);
+/// Its ranges: N in x and y, N in z, N m.
+const RANGES: [f64; 3] = [80.0, 135.0, 2.75];
+/// Gravity that it feels standing still is left out: the tool's weight is tared away.
+const AT_REST: Vector3<f64> = Vector3::new(0.0, 0.0, 0.0);
+
+/// The sensor.
+#[derive(Clone, Debug)]
+pub struct ForceSensor {
+    taring_until_ns: u64,
+    saturated: u8,
+    force_n: Vector3<f64>,
+}
+
+impl ForceSensor {
+    /// A sensor that is ready.
+    pub fn new() -> ForceSensor {
+        ForceSensor {
+            taring_until_ns: 0,
+            saturated: 0,
+            force_n: Vector3::zeros(),
+        }
+    }
+
+    /// The force that now acts on the tip, in the sensor's axes \[N\].
+    pub fn feel(&mut self, force_n: Vector3<f64>) {
+        self.force_n = force_n;
+    }
+
+    /// Takes a frame of another node; its answers.
+    pub fn hear(&mut self, now_ns: u64, frame: &CanFrame) -> [Option<CanFrame>; 2] {
+        if frame.id().to() != Destination::Node(NodeId::FORCE_TORQUE) {
+            return [None; 2];
+        }
+        let table = PropertyTable::FORCE_TORQUE;
+        match PropertyMessage::parse(frame) {
+            Ok(PropertyMessage::Get(id)) => match property_of(&table, id) {
+                Some(Property::FT) => self.read(now_ns),
+                Some(Property::A) => [reading(Quantity::Acceleration, AT_REST, None), None],
+                Some(property) => {
+                    let value = match property {
+                        Property::STAT => Stat::Ready.value(),
+                        Property::ROLE => Role::FORCE.0 as i16,
+                        Property::ID => i16::from(NodeId::FORCE_TORQUE.number()),
+                        Property::VERS => 24,
+                        _ => 0,
+                    };
+                    let reply = PropertyMessage::Set(id, Value::Narrow(value));
+                    let group = Destination::Group(GroupId::REPLY);
+                    [Some(reply.emit(NodeId::FORCE_TORQUE, group)), None]
+                }
+                None => [None; 2],
+            },
+            Ok(PropertyMessage::Set(id, value))
+                if property_of(&table, id) == Some(Property::FT) && value.get() == 0 =>
+            {
+                self.taring_until_ns = now_ns + TARE_NS;
+                self.saturated = 0;
+                [None; 2]
+            }
+            _ => [None; 2],
+        }
+    }
+
+    fn read(&mut self, now_ns: u64) -> [Option<CanFrame>; 2] {
+        if now_ns < self.taring_until_ns {
+            let status = Some(SensorStatus::TARING);
+            return [
+                reading(Quantity::Force, Vector3::zeros(), None),
+                reading(Quantity::Torque, Vector3::zeros(), status),
+            ];
+        }
+        let torque_nm = SENSOR_TO_TIP_M.cross(&self.force_n);
+        let [side, along, torque] = RANGES;
+        let limits = [side, side, along, torque, torque, torque];
+        let felt = self.force_n.iter().chain(torque_nm.iter());
+        let mut now = 0u8;
+        for (axis, (value, limit)) in felt.zip(limits).enumerate() {
+            if value.abs() > limit {
+                now |= 1 << axis;
+            }
+        }
+        self.saturated |= now;
+        let bad = if now == 0 { 0 } else { 0x40 };
+        let status = Some(SensorStatus(self.saturated | bad));
+        [
+            reading(Quantity::Force, self.force_n, None),
+            reading(Quantity::Torque, torque_nm, status),
+        ]
+    }
+}
+
+impl Default for ForceSensor {
+    fn default() -> Self {
+        ForceSensor::new()
+    }
+}
+
+fn reading(
+    quantity: Quantity,
+    components: Vector3<f64>,
+    status: Option<SensorStatus>,
+) -> Option<CanFrame> {
+    let counts = quantity.counts(components.into()).ok()?;
+    let reading = SensorReading {
+        quantity,
+        counts,
+        status,
+    };
+    Some(reading.emit(NodeId::FORCE_TORQUE))
+}

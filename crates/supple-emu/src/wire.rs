@@ -1,0 +1,142 @@
+//! The cable: one frame at a time, each as long as its bits at 1 Mbit/s.
+//!
+//! When the cable is free, of the frames that wait the one with the lowest id begins; a frame that has
+//! begun is not interrupted. Errors on the cable, and their retransmission, are left out.
+
+use supple_puck::{CanFrame, timing};
+
+const NS_PER_BIT: u64 = 1_000_000_000 / timing::BIT_RATE as u64;
+
+/// A frame that waits.
+#[derive(Clone, Copy, Debug)]
+struct Waiting {
+    ready_ns: u64,
+    frame: CanFrame,
+}
+
+/// The cable, with every frame that waits for it.
+#[derive(Clone, Debug, Default)]
+pub struct Wire {
+    waiting: Vec<Waiting>,
+    /// The frame under way and when it ends.
+    current: Option<(CanFrame, u64)>,
+    free_ns: u64,
+    busy_ns: u64,
+}
+
+impl Wire {
+    /// A frame wants the cable from `ready_ns` on. Frames of one node that are ready at the same time
+    /// keep their order.
+    pub fn queue(&mut self, ready_ns: u64, frame: CanFrame) {
+        self.waiting.push(Waiting { ready_ns, frame });
+    }
+
+    /// When the next frame ends \[ns\], if any is under way or waits. More frames may come first only if
+    /// they are queued before it begins.
+    pub fn next_end_ns(&self) -> Option<u64> {
+        match (self.current, self.next()) {
+            (Some((_, end_ns)), _) => Some(end_ns),
+            (None, Some((begin_ns, index))) => {
+                Some(begin_ns + duration_ns(&self.waiting[index].frame))
+            }
+            (None, None) => None,
+        }
+    }
+
+    /// Lets frames begin up to `now_ns`; the one that ends at or before it, if one does.
+    pub fn advance(&mut self, now_ns: u64) -> Option<(CanFrame, u64)> {
+        if self.current.is_none()
+            && let Some((begin_ns, index)) = self.next()
+            && begin_ns <= now_ns
+        {
+            let frame = self.waiting.remove(index).frame;
+            let end_ns = begin_ns + duration_ns(&frame);
+            self.busy_ns += end_ns - begin_ns;
+            self.current = Some((frame, end_ns));
+        }
+        match self.current {
+            Some((frame, end_ns)) if end_ns <= now_ns => {
+                self.current = None;
+                self.free_ns = end_ns;
+                Some((frame, end_ns))
+            }
+            _ => None,
+        }
+    }
+
+    /// Frames that wait are forgotten: the nodes that would send them have no power.
+    pub fn clear(&mut self) {
+        self.waiting.clear();
+    }
+
+    /// Time that frames have occupied the cable \[ns\].
+    pub fn busy_ns(&self) -> u64 {
+        self.busy_ns
+    }
+
+    /// When the next frame begins, and which.
+    fn next(&self) -> Option<(u64, usize)> {
+        let earliest = self.waiting.iter().map(|w| w.ready_ns).min()?;
+        let begin_ns = earliest.max(self.free_ns);
+        let ready = self.waiting.iter().enumerate();
+        let ready = ready.filter(|(_, w)| w.ready_ns <= begin_ns);
+        let (index, _) = ready.min_by_key(|(index, w)| (w.frame.id(), *index))?;
+        Some((begin_ns, index))
+    }
+}
+
+/// Time that a frame occupies the cable \[ns\].
+pub fn duration_ns(frame: &CanFrame) -> u64 {
+    u64::from(timing::bits(frame)) * NS_PER_BIT
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frame(id: u32, dlc: usize) -> CanFrame {
+        CanFrame::from_raw(id, &[0x55; 8][..dlc]).unwrap()
+    }
+
+    fn run(wire: &mut Wire) -> Vec<(u16, u64)> {
+        let mut ends = Vec::new();
+        while let Some(end_ns) = wire.next_end_ns() {
+            if let Some((frame, end_ns)) = wire.advance(end_ns) {
+                ends.push((frame.id().raw(), end_ns));
+            }
+        }
+        ends
+    }
+
+    #[test]
+    fn the_lowest_id_of_those_that_wait_begins() {
+        let mut wire = Wire::default();
+        wire.queue(0, frame(0x4e3, 3));
+        wire.queue(10, frame(0x443, 3));
+        wire.queue(20, frame(0x423, 3));
+        let order: Vec<_> = run(&mut wire).into_iter().map(|(id, _)| id).collect();
+        assert_eq!(order, [0x4e3, 0x423, 0x443]);
+    }
+
+    #[test]
+    fn frames_follow_each_other_without_overlap() {
+        let mut wire = Wire::default();
+        let frames: Vec<_> = (1..=7u32).map(|n| frame(0x403 | n << 5, 3)).collect();
+        for frame in &frames {
+            wire.queue(1000, *frame);
+        }
+        let total: u64 = frames.iter().map(duration_ns).sum();
+        assert_eq!(
+            run(&mut wire).last().map(|(_, end)| *end),
+            Some(1000 + total)
+        );
+        assert_eq!(wire.busy_ns(), total);
+    }
+
+    /// Barrett's own 75 us for a position reply lies between no stuffing and the worst of it.
+    #[test]
+    fn a_position_reply_takes_its_bits() {
+        let ns = duration_ns(&frame(0x423, 3));
+        assert!((71_000..=85_000).contains(&ns), "{ns}");
+    }
+}

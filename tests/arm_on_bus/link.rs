@@ -1,0 +1,63 @@
+//! The controller's own step at the end of the way, in the same process.
+
+use supple_can::{Answer, ArmReport, CanError, Command, Link};
+use supple_core::controller::Request;
+use supple_core::{Controller, Input, Output, State, step};
+
+pub struct Controlled<const N: usize> {
+    controller: Controller<N>,
+    state: State<N>,
+    pub request: Option<Request<N>>,
+    pub output: Option<Output<N>>,
+    pub report: Option<ArmReport<N>>,
+    /// As if it had been killed: states are not read and not answered.
+    pub dead: bool,
+}
+
+impl<const N: usize> Controlled<N> {
+    pub fn new(controller: Controller<N>) -> Self {
+        Controlled {
+            state: State::new(&controller),
+            controller,
+            request: None,
+            output: None,
+            report: None,
+            dead: false,
+        }
+    }
+}
+
+impl<const N: usize> Link<N> for Controlled<N> {
+    fn publish(&mut self, report: &ArmReport<N>) -> Result<(), CanError> {
+        self.report = Some(*report);
+        self.output = None;
+        if !self.dead {
+            let input = Input {
+                cycle: report.cycle,
+                position_rad: report.position_rad,
+                tip_force_n: report.tip_force_n,
+                request: self.request.take(),
+            };
+            self.output = Some(step(&self.controller, &mut self.state, &input));
+        }
+        Ok(())
+    }
+
+    fn answer(&mut self, cycle: u64, _wait_ns: u64) -> Result<Answer<N>, CanError> {
+        let answers = |output: &Output<N>| output.cycle == cycle;
+        let output = self.output.as_ref().filter(|output| answers(output));
+        let command = output.map(|output| Command {
+            torque_nm: output.torque_nm,
+            fallback_torque_nm: output.fallback_torque_nm,
+            wants_torque: wants_torque(output),
+        });
+        Ok(Answer { command, late: 0 })
+    }
+}
+
+/// Idle, and a fault whose safe action is idle, want none.
+fn wants_torque<const N: usize>(output: &Output<N>) -> bool {
+    use supple_core::controller::{Mode, SafeAction};
+    let limp = output.fault.map(|fault| fault.safe_action()) == Some(SafeAction::Idle);
+    output.mode != Mode::Idle && !limp
+}

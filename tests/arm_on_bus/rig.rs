@@ -1,0 +1,154 @@
+//! An emulated arm, a host, and a controller in between.
+
+use crate::link::Controlled;
+use supple_bus::FaultInjector;
+use supple_bus::virtual_time::{Direct, Peer};
+use supple_can::guard::{Action, Stage};
+use supple_can::{CanError, Cycle, Ready, Rhythm, StartUp, start_up};
+use supple_core::controller::Request;
+use supple_core::{Controller, Vector};
+use supple_emu::{Emulator, EmulatorConfig, Press};
+use supple_model::Description;
+use supple_plant::PlantConfig;
+use supple_puck::safety::{SafetyLimits, SpeedLimit};
+use supple_puck::status::MotorMode;
+
+pub const MS: u64 = 1_000_000;
+pub const PERIOD_NS: u64 = MS;
+pub const ANSWER_NS: u64 = MS / 20;
+
+pub type TestBus<const N: usize> = FaultInjector<Direct<Emulator<N>>>;
+
+pub fn arm(joints: usize) -> Description {
+    Description::asset(if joints == 4 { "wam4" } else { "wam7" }).unwrap()
+}
+
+pub fn emulator<const N: usize>(config: EmulatorConfig, pose: Vector<N>) -> Emulator<N> {
+    let plant = PlantConfig::from_description(&arm(N)).unwrap();
+    Emulator::new(config, plant, pose, 0).unwrap()
+}
+
+pub fn bus<const N: usize>(emulator: Emulator<N>) -> TestBus<N> {
+    seeded_bus(emulator, 1)
+}
+
+fn seeded_bus<const N: usize>(emulator: Emulator<N>, seed: u64) -> TestBus<N> {
+    FaultInjector::new(Direct(emulator), seed)
+}
+
+/// The arm stands in its home pose and the operator says so.
+pub fn wishes<const N: usize>() -> StartUp<N> {
+    StartUp {
+        zero_at_rad: Some(arm(N).home::<N>().unwrap()),
+        limits: SafetyLimits {
+            speed_fault: SpeedLimit::from_m_per_s(2.0).ok(),
+            ..SafetyLimits::default()
+        },
+        tare: false,
+    }
+}
+
+pub fn try_start<const N: usize>(
+    bus: &mut TestBus<N>,
+    wishes: &StartUp<N>,
+) -> Result<Ready<N>, CanError> {
+    start_up(bus, &arm(N), wishes, &|| false, &mut |_| ())
+}
+
+pub struct Rig<const N: usize> {
+    pub cycle: Cycle<N, TestBus<N>, Controlled<N>>,
+    /// Torque of each motor at the end of every cycle \[N m\], with the bus's time \[ns\].
+    pub history: Vec<(u64, Vector<N>)>,
+}
+
+impl<const N: usize> Rig<N> {
+    /// In service, the motors idle.
+    pub fn new() -> Rig<N> {
+        Rig::seeded(1)
+    }
+
+    /// The same with a seed for the injector.
+    pub fn seeded(seed: u64) -> Rig<N> {
+        Rig::set_up(arm(N).home::<N>().unwrap(), PERIOD_NS, seed)
+    }
+
+    /// The same from a pose, at a period.
+    pub fn at(pose: Vector<N>, period_ns: u64) -> Rig<N> {
+        Rig::set_up(pose, period_ns, 1)
+    }
+
+    fn set_up(pose: Vector<N>, period_ns: u64, seed: u64) -> Rig<N> {
+        let mut emulator = emulator(EmulatorConfig::wam(N), pose);
+        emulator.press(Press::Idle);
+        let mut bus = seeded_bus(emulator, seed);
+        let wishes = StartUp {
+            zero_at_rad: Some(pose),
+            ..wishes()
+        };
+        let ready = try_start(&mut bus, &wishes).unwrap();
+        let mut config = arm(N).config::<N>().unwrap();
+        config.period_s = period_ns as f64 * 1e-9;
+        let link = Controlled::new(Controller::new(config).unwrap());
+        let rhythm = Rhythm {
+            period_ns,
+            answer_ns: ANSWER_NS,
+        };
+        let cycle = Cycle::new(bus, link, ready, config.arm, rhythm).unwrap();
+        Rig {
+            cycle,
+            history: Vec::new(),
+        }
+    }
+
+    /// In gravity hold with the motors in torque mode.
+    pub fn holding() -> Rig<N> {
+        let mut rig = Rig::new();
+        rig.activate();
+        rig
+    }
+
+    pub fn activate(&mut self) {
+        self.ask(Request::GravityHold);
+        self.run(50);
+        self.emulator_mut().press(Press::Activate);
+        self.run(50);
+        assert_eq!(self.cycle.guard().stage(), Stage::Active);
+        assert!(self.motors_in(MotorMode::Torque));
+    }
+
+    pub fn emulator(&self) -> &Emulator<N> {
+        &self.cycle.bus().inner().0
+    }
+
+    pub fn emulator_mut(&mut self) -> &mut Emulator<N> {
+        &mut self.cycle.bus_mut().inner_mut().0
+    }
+
+    pub fn now_ns(&self) -> u64 {
+        self.emulator().now_ns()
+    }
+
+    pub fn ask(&mut self, request: Request<N>) {
+        self.cycle.link_mut().request = Some(request);
+    }
+
+    pub fn step(&mut self) -> Action {
+        let action = self.cycle.run().unwrap();
+        let torque_nm = self.emulator().motor_torque_nm();
+        self.history.push((self.now_ns(), torque_nm));
+        action
+    }
+
+    pub fn run(&mut self, cycles: usize) {
+        for _ in 0..cycles {
+            self.step();
+        }
+    }
+
+    pub fn motors_in(&self, mode: MotorMode) -> bool {
+        self.emulator()
+            .pucks()
+            .iter()
+            .all(|puck| puck.mode() == mode)
+    }
+}
