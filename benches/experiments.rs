@@ -37,6 +37,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let options = DemoOptions {
         seed: 0,
         log_dir: Some(folder.path().to_owned()),
+        model: None,
     };
     let mut seconds = Vec::new();
     for _ in 0..DEMO_ROUNDS {

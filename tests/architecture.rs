@@ -12,7 +12,13 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("supple-log", &["supple-core", "supple-model"]),
     (
         "supple-experiment",
-        &["supple-core", "supple-model", "supple-plant", "supple-log"],
+        &[
+            "supple-core",
+            "supple-model",
+            "supple-plant",
+            "supple-log",
+            "supple-ident",
+        ],
     ),
     (
         "supple",
@@ -22,6 +28,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "supple-log",
             "supple-plant",
             "supple-experiment",
+            "supple-ident",
         ],
     ),
     ("supple-bare", &["supple-core"]),

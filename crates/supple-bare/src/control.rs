@@ -9,8 +9,9 @@ use supple_core::config::{
 };
 use supple_core::controller::{Controller, Input, Output, Request, State, step};
 use supple_core::math::{Matrix3, Vector3, sqrt};
+use supple_core::ripple::Harmonic;
 use supple_core::trajectory::{Sinusoid, Trajectory};
-use supple_core::{Arm, Config, Matrix, Vector, dynamics};
+use supple_core::{Arm, Config, Matrix, RippleTable, Vector, dynamics};
 
 const STEPS: u64 = 1000;
 const LOST_REPLY: u64 = 700;
@@ -106,6 +107,7 @@ fn config<const N: usize>(arm: Arm<N>) -> Config<N> {
         friction: [friction(); N],
         roles,
         joint_from_motor,
+        ripple: [ripple(); N],
         period_s: PERIOD_S,
         estimator_rad_per_s: 200.0,
         law: Law {
@@ -150,6 +152,15 @@ fn config<const N: usize>(arm: Arm<N>) -> Config<N> {
             damping_n_s_per_m: 50.0,
         },
     }
+}
+
+fn ripple() -> RippleTable {
+    let line = |harmonic, sine_nm, cosine_nm| Harmonic {
+        harmonic,
+        sine_nm,
+        cosine_nm,
+    };
+    RippleTable::new(&[line(2, 0.01, -0.02), line(12, 0.005, 0.004)]).unwrap_or_default()
 }
 
 fn every_number<const N: usize>(digest: &mut Digest, output: &Output<N>) {

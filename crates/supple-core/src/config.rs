@@ -4,6 +4,7 @@
 use crate::arm::Arm;
 use crate::friction::Friction;
 use crate::math::{Matrix, Matrix3, Vector, Vector3};
+pub use crate::ripple::RippleTable;
 
 /// What a joint does while the impedance law runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -177,6 +178,8 @@ pub struct Config<const N: usize> {
     pub roles: [Role; N],
     /// `m2jp`: joint angles from motor angles, `q = m2jp p`; motor torques are `m2jp^T tau`.
     pub joint_from_motor: Matrix<N, N>,
+    /// Torque ripple of each motor, fed forward so that it cancels.
+    pub ripple: [RippleTable; N],
     /// Cycle period \[s\], positive.
     pub period_s: f64,
     /// Bandwidth of the velocity estimator \[rad/s\], positive.

@@ -91,11 +91,11 @@ pub struct Torques<const N: usize> {
     pub gravity: Vector<N>,
     /// `C qd`.
     pub coriolis: Vector<N>,
-    /// `D`, its dry part as far as the contact latch lets it through.
+    /// `D`, its dry part as far as the contact latch lets it through; in the breakaway mode the ramp.
     pub friction: Vector<N>,
     /// `-H J^-1 J' qd`.
     pub jacobian_rate: Vector<N>,
-    /// `M Xo''` brought to the joints; in the move mode `H qdd` of its reference.
+    /// `M Xo''` brought to the joints; in the move and excite modes `H qdd` of their reference.
     pub inertial: Vector<N>,
     /// `K (Xo - X)` brought to the joints.
     pub stiffness: Vector<N>,
@@ -105,10 +105,12 @@ pub struct Torques<const N: usize> {
     pub force: Vector<N>,
     /// Damping of motion that does not move the tip.
     pub nullspace: Vector<N>,
-    /// Stiff loops of held joints, and of all joints in the move mode.
+    /// Stiff loops of held joints, and of all joints in the move, excite and breakaway modes.
     pub joint_pd: Vector<N>,
     /// Spring-dampers before the hard stops.
     pub soft_stop: Vector<N>,
+    /// Against the torque ripple of the motors.
+    pub ripple: Vector<N>,
     /// Remainder of the torque before the last change of mode.
     pub handover: Vector<N>,
 }
@@ -129,12 +131,13 @@ impl<const N: usize> Torques<N> {
             nullspace: zero,
             joint_pd: zero,
             soft_stop: zero,
+            ripple: zero,
             handover: zero,
         }
     }
 
     /// Every term with its name, in the order of the fields.
-    pub fn named(&self) -> [(&'static str, &Vector<N>); 12] {
+    pub fn named(&self) -> [(&'static str, &Vector<N>); 13] {
         [
             ("gravity", &self.gravity),
             ("coriolis", &self.coriolis),
@@ -147,6 +150,7 @@ impl<const N: usize> Torques<N> {
             ("nullspace", &self.nullspace),
             ("joint_pd", &self.joint_pd),
             ("soft_stop", &self.soft_stop),
+            ("ripple", &self.ripple),
             ("handover", &self.handover),
         ]
     }

@@ -25,6 +25,7 @@ pub mod math;
 pub mod observer;
 pub mod pose;
 pub mod reach;
+pub mod ripple;
 pub mod trajectory;
 
 pub use arm::{Arm, ArmError, Joint, Link};
@@ -34,6 +35,7 @@ pub use controller::{Controller, Input, Output, State, step};
 pub use friction::Friction;
 pub use math::{Matrix, Vector};
 pub use pose::Pose;
+pub use ripple::RippleTable;
 pub use trajectory::{Reference, Trajectory};
 
 pub use nalgebra;

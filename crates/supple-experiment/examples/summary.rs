@@ -11,6 +11,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let options = DemoOptions {
         seed,
         log_dir: None,
+        model: None,
     };
     let demo = demo(&Description::asset(&arm)?, &options, &|progress| {
         eprintln!(

@@ -21,6 +21,9 @@ pub struct DemoOptions {
     pub seed: u64,
     /// Folder for one MCAP a run; it exists. `None` writes no logs.
     pub log_dir: Option<PathBuf>,
+    /// What every controller knows of the arm, unperturbed; `None` for the arm's own parameters,
+    /// perturbed where a run says so.
+    pub model: Option<Description>,
 }
 
 /// How far the demo is.
@@ -81,7 +84,10 @@ fn sized<const N: usize>(
     options: &DemoOptions,
     progress: &(dyn Fn(&Progress) + Sync),
 ) -> Result<Demo, ExperimentError> {
-    let setup = Setup::<N>::new(description, options.seed)?;
+    let setup = match &options.model {
+        Some(model) => Setup::<N>::with_model(description, model, options.seed)?,
+        None => Setup::<N>::new(description, options.seed)?,
+    };
     let jobs = jobs();
     let plans = jobs
         .iter()
@@ -227,6 +233,10 @@ fn assemble(
         version: env!("CARGO_PKG_VERSION"),
         arm: description.name().to_owned(),
         seed: options.seed,
+        model: options.model.as_ref().map(|model| {
+            let source = model.settings().source.clone();
+            source.unwrap_or_else(|| model.name().to_owned())
+        }),
         sinusoid: tracking(headline),
         sinusoid_by_speed: sinusoids
             .iter()

@@ -20,6 +20,12 @@ pub enum ExperimentError {
     /// The plant refuses its configuration.
     #[error("the plant: {0}")]
     Plant(#[from] PlantError),
+    /// The logs do not give a model.
+    #[error(transparent)]
+    Ident(#[from] supple_ident::IdentError),
+    /// The model cannot be described or saved.
+    #[error(transparent)]
+    Save(#[from] supple_ident::SaveError),
     /// A log cannot be written.
     #[error(transparent)]
     Log(#[from] supple_log::LogError),
@@ -46,6 +52,27 @@ pub enum ExperimentError {
         experiment: String,
         /// Why.
         refusal: Refusal,
+    },
+    /// A fault where none may be.
+    #[error("{experiment}: fault at {time_s:.2} s: {fault}")]
+    Fault {
+        /// Name of the experiment.
+        experiment: String,
+        /// Time since it began \[s\].
+        time_s: f64,
+        /// Which.
+        fault: Fault,
+    },
+    /// A joint that no ramp moved.
+    #[error(
+        "joint {joint} did not move at {torque_nm} N m: check its brake and its stops, or choose \
+         another pose"
+    )]
+    Stuck {
+        /// Joint index.
+        joint: usize,
+        /// Greatest torque tried \[N m\].
+        torque_nm: f64,
     },
     /// A fault before the experiment proper began.
     #[error("{experiment}: fault on the way to the start: {fault}")]

@@ -31,8 +31,12 @@
 
 #![forbid(unsafe_code)]
 
+mod breakaway;
+pub mod calibrate;
 mod demo;
 mod error;
+mod excite;
+mod foretell;
 mod job;
 pub mod metrics;
 mod mismatch;
@@ -42,18 +46,24 @@ mod record;
 mod rig;
 mod run;
 pub mod scenario;
+mod session;
 mod setup;
 mod start;
 pub mod summary;
 mod trace;
 
+pub use breakaway::{JointBreakaway, RATE_NM_PER_S, STOP_RAD, breakaway};
+pub use calibrate::{Calibrated, Calibration, Truthfulness, calibrate};
 pub use demo::{Demo, DemoOptions, ProbingRun, Progress, demo};
 pub use error::ExperimentError;
+pub use excite::excitation;
+pub use foretell::{Foretold, foretell};
 pub use mismatch::Mismatch;
 pub use quadrant::{Edge, EdgeMeter};
 pub use record::Recorder;
 pub use rig::{Cycle, Rig};
 pub use run::{Ended, Plan, Run, Watch, run};
+pub use session::{Onlooker, Recording, Session, Step};
 pub use setup::{Setup, Variant};
 pub use start::{active_joints, start_pose};
 pub use trace::{JointTorque, Sample, Trace};

@@ -5,6 +5,7 @@ use crate::rig::Cycle;
 use crate::run::Plan;
 use crate::trace::xyz;
 use std::path::Path;
+use supple_core::Config;
 use supple_log::{Extras, LogError, PlantTruth, RunInfo, Writer};
 use supple_model::Description;
 
@@ -25,15 +26,29 @@ impl<const N: usize> Recorder<N> {
         plan: &Plan<N>,
         seed: u64,
     ) -> Result<Recorder<N>, ExperimentError> {
-        let path = folder.join(format!("{}.mcap", plan.name));
+        Self::named(folder, description, &plan.name, &plan.config, seed)
+    }
+
+    /// Begins the log of something else than a plan.
+    ///
+    /// # Errors
+    /// Where it cannot be written.
+    pub fn named(
+        folder: &Path,
+        description: &Description,
+        name: &str,
+        config: &Config<N>,
+        seed: u64,
+    ) -> Result<Recorder<N>, ExperimentError> {
+        let path = folder.join(format!("{name}.mcap"));
         let run = RunInfo {
-            experiment: plan.name.clone(),
+            experiment: name.to_owned(),
             seed: Some(seed),
             ..RunInfo::default()
         };
         Ok(Recorder {
-            writer: Writer::create(path, description, &plan.config, &run)?,
-            period_ns: (plan.config.period_s * 1e9).round() as u64,
+            writer: Writer::create(path, description, config, &run)?,
+            period_ns: (config.period_s * 1e9).round() as u64,
         })
     }
 

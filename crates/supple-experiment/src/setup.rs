@@ -26,7 +26,7 @@ pub struct Variant {
 }
 
 impl Variant {
-    /// A model that knows the plant's parameters, Stribeck feed-forward, load-dependent friction in the
+    /// The unperturbed model, Stribeck feed-forward, load-dependent friction in the
     /// plant, fade on.
     pub const EXACT: Variant = Variant {
         mismatch: None,
@@ -42,9 +42,26 @@ impl Variant {
 pub struct Setup<const N: usize> {
     exact: Config<N>,
     plant: PlantConfig<N>,
+    /// `exact` is a model that was found, with a dip of its own or none.
+    identified: bool,
 }
 
 impl<const N: usize> Setup<N> {
+    /// The plant of one description, driven by a controller that knows another.
+    ///
+    /// # Errors
+    /// Where one of the descriptions does not have `N` joints.
+    pub fn with_model(
+        description: &Description,
+        model: &Description,
+        seed: u64,
+    ) -> Result<Setup<N>, ExperimentError> {
+        let mut setup = Setup::new(description, seed)?;
+        setup.exact = model.config::<N>()?;
+        setup.identified = true;
+        Ok(setup)
+    }
+
     /// Takes the description as the truth about the plant. Where its friction has no Stribeck dip, the
     /// plant's breakaway is 10 % above Coulomb all the same.
     ///
@@ -55,7 +72,11 @@ impl<const N: usize> Setup<N> {
         let mut plant = PlantConfig::from_description(description)?;
         plant.force_sensor.noise_n = FORCE_NOISE_N;
         plant.seed = seed;
-        Ok(Setup { exact, plant })
+        Ok(Setup {
+            exact,
+            plant,
+            identified: false,
+        })
     }
 
     /// Radius of the cap \[m\].
@@ -70,17 +91,17 @@ impl<const N: usize> Setup<N> {
     pub fn config(&self, variant: &Variant) -> Result<Config<N>, ExperimentError> {
         let mut config = self.exact;
         for (friction, truth) in config.friction.iter_mut().zip(&self.plant.friction) {
-            let breakaway_nm = if variant.stribeck {
-                truth.breakaway_nm
-            } else {
-                friction.coulomb_nm
+            let breakaway_nm = match (variant.stribeck, self.identified) {
+                (false, _) => friction.coulomb_nm,
+                (true, false) => truth.breakaway_nm,
+                (true, true) => friction.breakaway_nm,
             };
             *friction = Friction {
                 breakaway_nm,
                 ..*friction
             };
         }
-        if let Some(mismatch) = &variant.mismatch {
+        if let (Some(mismatch), false) = (&variant.mismatch, self.identified) {
             config = mismatch.apply(&config)?;
         }
         config.latch.fade = variant.fade;

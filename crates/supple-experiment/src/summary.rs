@@ -96,6 +96,10 @@ pub struct Summary {
     pub arm: String,
     /// Seed of the demo.
     pub seed: u64,
+    /// Where the controllers' model comes from, if it is not the arm's own parameters: it is then
+    /// unperturbed in every run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub model: Option<String>,
     /// Figure 3a.
     pub sinusoid: Tracking,
     /// At half, the same and twice the pace.

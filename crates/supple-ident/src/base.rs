@@ -5,6 +5,7 @@
 //! `dependent = independent B`, so that `x_independent + B x_dependent` is what can be identified.
 
 use crate::error::IdentError;
+use crate::random::Random;
 use nalgebra::{DMatrix, DVector};
 
 /// Diagonal entries below this share of the first are rounding.
@@ -104,6 +105,14 @@ impl Base {
     /// Standard deviation of each base parameter for independent noise of `noise` on each row.
     pub fn standard_deviations(&self, noise: f64) -> DVector<f64> {
         self.gram_inverse.diagonal().map(|v| noise * v.sqrt())
+    }
+
+    /// A draw from the normal distribution of the base parameters about zero, for independent noise of
+    /// `noise` on each row; `None` where rounding has left no covariance.
+    pub(crate) fn draw(&self, noise: f64, random: &mut Random) -> Option<DVector<f64>> {
+        let root = nalgebra::Cholesky::new(self.gram_inverse.clone())?;
+        let normal = DVector::from_fn(self.rank(), |_, _| random.normal());
+        Some(root.l() * normal * noise)
     }
 
     /// Each base parameter in words, such as `Izz1 + 1 Iyy2 - 0.55 mcx2`.

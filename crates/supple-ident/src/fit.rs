@@ -4,13 +4,20 @@ use crate::base::{Base, RANK_TOLERANCE};
 use crate::columns::{Column, Columns, FrictionColumns};
 use crate::compress::Block;
 use crate::consistent::{Constraints, solve};
-use crate::error::{IdentError, shape_error};
+use crate::error::{IdentError, Warning, shape_error};
 use crate::estimate::{huber_weights, nearest, noise_nm, weighted, weighted_least_squares};
 use crate::model;
-use crate::motion::Motion;
-use crate::regressor::{JointRows, joint_rows};
+use crate::motion::{Motion, Preparation};
+use crate::procedure::Choice;
+use crate::random::Random;
+use crate::regressor::{JointRows, joint_rows, rows};
 use nalgebra::DVector;
-use supple_core::{Arm, Friction};
+use supple_core::dynamics::regressor;
+use supple_core::{Arm, Friction, Vector};
+
+/// A joint slides steadily once it has gone this far since it turned round \[rad\]: the bristles of
+/// dry friction give by about a milliradian.
+pub const STEADY_RAD: f64 = 4e-3;
 
 /// Rounds of robust or constrained weighting.
 const ROUNDS: usize = 5;
@@ -77,6 +84,16 @@ pub struct Fit<const N: usize> {
     pub noise_nm: Vec<f64>,
     /// Certified distance of the objective from its optimum, for a consistent fit.
     pub gap: Option<f64>,
+    /// `|tau - tau_hat| / |tau|` over the samples that were fitted.
+    pub training_relative: f64,
+    /// How logs are prepared before they are held against the fit.
+    pub preparation: Preparation,
+    /// What was chosen by cross-validation, in order.
+    pub choices: Vec<Choice>,
+    /// What was let pass.
+    pub warnings: Vec<Warning>,
+    /// Standard deviation of weighted residuals, for what the filter leaves independent.
+    spread: f64,
     nominal: Arm<N>,
 }
 
@@ -85,7 +102,7 @@ pub struct Fit<const N: usize> {
 ///
 /// # Errors
 /// What the columns, the shapes and the solver refuse.
-pub fn identify<const N: usize>(
+pub fn fit<const N: usize>(
     nominal: &Arm<N>,
     motions: &[Motion],
     moving: &[usize],
@@ -109,10 +126,10 @@ pub fn identify<const N: usize>(
     fit_rows(nominal, columns, &parts, share, options)
 }
 
-/// As [`identify`], from rows that were made before: one list of joints for each part.
+/// As [`fit`], from rows that were made before: one list of joints for each part.
 ///
 /// # Errors
-/// As [`identify`].
+/// As [`fit`].
 pub fn fit_rows<const N: usize>(
     nominal: &Arm<N>,
     columns: Columns,
@@ -155,7 +172,14 @@ pub fn fit_rows<const N: usize>(
     if second_stage {
         fit_stribeck(&columns, parts, &mut x);
     }
+    let error: f64 = blocks.iter().map(|b| b.error_squared(&solution)).sum();
+    let torque: f64 = blocks.iter().map(Block::torque_squared).sum();
     Ok(Fit {
+        training_relative: (error / torque).sqrt(),
+        preparation: Preparation::default(),
+        choices: Vec::new(),
+        warnings: Vec::new(),
+        spread,
         base: base.renumbered(&used),
         base_std,
         noise_nm: noise_nm(&blocks, &solution),
@@ -268,26 +292,31 @@ fn equal_noise(blocks: &[Block], x: &DVector<f64>) -> Vec<f64> {
     vec![(squares / blocks.len() as f64).sqrt(); blocks.len()]
 }
 
-/// Second stage: each joint's `B` alone, zero or more, from its samples within three Stribeck speeds.
+/// Second stage: each joint's `B`, zero or more, from its samples within three Stribeck speeds that slide
+/// steadily. Beside it a constant is fitted and thrown away: what gravity may be off there.
 fn fit_stribeck(columns: &Columns, parts: &[Vec<JointRows>], x: &mut DVector<f64>) {
     let reach = 3.0 * columns.friction().stribeck_rad_per_s.unwrap_or(0.0);
     for (row, &joint) in columns.moving().iter().enumerate() {
         let Some(position) = columns.position(Column::Stribeck(joint)) else {
             continue;
         };
-        let (mut product, mut square) = (0.0, 0.0);
+        let mut sums = [0.0; 5];
         for part in parts {
             let residual = &part[row].b - &part[row].a * &*x;
             let shape = part[row].a.column(position);
             for (i, speed) in part[row].speed.iter().enumerate() {
-                if *speed <= reach {
-                    product += shape[i] * residual[i];
-                    square += shape[i] * shape[i];
+                if *speed <= reach && part[row].slid_rad[i] >= STEADY_RAD {
+                    let (s, r) = (shape[i], residual[i]);
+                    for (sum, term) in sums.iter_mut().zip([1.0, s, r, s * s, s * r]) {
+                        *sum += term;
+                    }
                 }
             }
         }
-        x[position] = if square > 0.0 {
-            (product / square).max(0.0)
+        let [n, s, r, ss, sr] = sums;
+        let determinant = n * ss - s * s;
+        x[position] = if determinant > 1e-9 * n * ss {
+            ((n * sr - s * r) / determinant).max(0.0)
         } else {
             0.0
         };
@@ -311,6 +340,68 @@ impl<const N: usize> Fit<N> {
     /// The arm that fixes the kinematics and the prior.
     pub fn nominal(&self) -> &Arm<N> {
         &self.nominal
+    }
+
+    /// Number of combinations of the columns that the data determine.
+    pub fn rank(&self) -> usize {
+        self.base.rank()
+    }
+
+    /// Greatest by least singular value of the independent columns, scaled to unit length.
+    pub fn condition(&self) -> f64 {
+        self.base.condition
+    }
+
+    /// Torques of one state \[N m\]. Joints that were held have no velocity and no acceleration,
+    /// whatever `qd` and `qdd` say, and no friction.
+    pub fn predict(&self, q: &Vector<N>, qd: &Vector<N>, qdd: &Vector<N>) -> Vector<N> {
+        let moving = self.columns.moving();
+        let held = |v: &Vector<N>| {
+            Vector::<N>::from_fn(|j, _| if moving.contains(&j) { v[j] } else { 0.0 })
+        };
+        let blocks = regressor(&self.nominal, q, &held(qd), &held(qdd));
+        let links = model::link_parameters::<N>(&self.x);
+        let mut torque = Vector::zeros();
+        for (block, link) in blocks.iter().zip(&links) {
+            torque += block * link;
+        }
+        let explained = rows(&self.nominal, &self.columns, q, qd, qdd) * &self.x;
+        for (row, &joint) in moving.iter().enumerate() {
+            let rotor = match self.columns.position(Column::Rotor(joint)) {
+                Some(_) => 0.0,
+                None => self.nominal.armature()[joint] * qdd[joint],
+            };
+            torque[joint] = explained[row] + rotor;
+        }
+        torque
+    }
+
+    /// An arm and friction that the logs could as well come from: the parameters with a draw from
+    /// their normal distribution added. Joints that were held have no friction.
+    ///
+    /// # Errors
+    /// [`IdentError::NotPhysical`] where the fit itself is no arm.
+    pub fn draw(&self, seed: u64) -> Result<(Arm<N>, Vec<Friction>), IdentError> {
+        let mut random = Random::new(seed);
+        let mut change = self
+            .base
+            .draw(self.spread, &mut random)
+            .unwrap_or_else(|| DVector::zeros(self.rank()));
+        loop {
+            let mut x = self.x.clone();
+            for (i, position) in self.base.independent.iter().enumerate() {
+                x[*position] += change[i];
+            }
+            let friction = model::friction(&self.columns, &x);
+            match model::arm(&self.nominal, &self.columns, &x) {
+                Ok(arm) if friction.iter().all(|f| f.validate().is_ok()) => {
+                    return Ok((arm, friction));
+                }
+                // A body at the edge of what can be has no neighbours on one side.
+                _ if change.amax() > 1e-12 => change *= 0.5,
+                _ => return Ok((self.arm()?, self.friction())),
+            }
+        }
     }
 
     /// Values of the base parameters, in the order of [`Base::text`].

@@ -17,15 +17,19 @@ pub struct Preparation {
     pub cutoff_hz: Option<f64>,
     /// Every so many samples of the grid are kept, 1 or more.
     pub keep_every: usize,
+    /// Time by which a logged torque acts later than the angle beside it was measured \[s\], zero or
+    /// more. Where the log has commands that act in the cycle after, it is one and a half periods.
+    pub torque_delay_s: f64,
 }
 
 impl Default for Preparation {
-    /// The log's own rate, 8 Hz, every sample.
+    /// The log's own rate, 8 Hz, every sample, torques as they are logged.
     fn default() -> Self {
         Self {
             rate_hz: None,
             cutoff_hz: Some(8.0),
             keep_every: 1,
+            torque_delay_s: 0.0,
         }
     }
 }
@@ -77,17 +81,25 @@ impl Motion {
             .cutoff_hz
             .map(|cutoff_hz| LowPass::butterworth4(cutoff_hz, rate_hz))
             .transpose()?;
-        let smooth = |column: &DMatrix<f64>| {
-            let grid = resample(&log.t_s, column, rate_hz);
+        let delay_s = preparation.torque_delay_s;
+        if !(delay_s.is_finite() && delay_s >= 0.0) {
+            return Err(IdentError::Option {
+                option: "torque_delay_s",
+                value: delay_s,
+                must: "finite and not negative",
+            });
+        }
+        let smooth = |column: &DMatrix<f64>, delay_s: f64| {
+            let grid = resample(&log.t_s, column, rate_hz, delay_s);
             low_pass.map_or_else(|| Ok(grid.clone()), |f| f.zero_phase_columns(&grid))
         };
-        let q = smooth(&log.q_rad)?;
+        let q = smooth(&log.q_rad, 0.0)?;
         let qd = match &log.qd_rad_per_s {
-            Some(qd) => smooth(qd)?,
+            Some(qd) => smooth(qd, 0.0)?,
             None => differentiate(&q, rate_hz)?,
         };
         let qdd = differentiate(&qd, rate_hz)?;
-        let tau = smooth(&log.tau_nm)?;
+        let tau = smooth(&log.tau_nm, delay_s)?;
         let every = preparation.keep_every;
         let rows: Vec<usize> = (0..q.nrows()).step_by(every).collect();
         let kept_hz = rate_hz / every as f64;
@@ -122,9 +134,10 @@ impl Motion {
     }
 }
 
-/// Linear interpolation onto a grid that starts with the log and ends within it. The clock must
-/// increase: [`Log::check`].
-pub fn resample(t_s: &[f64], columns: &DMatrix<f64>, rate_hz: f64) -> DMatrix<f64> {
+/// Linear interpolation onto a grid that starts with the log and ends within it, of what the columns
+/// were `delay_s` before; before the log it is its first sample. The clock must increase:
+/// [`Log::check`].
+pub fn resample(t_s: &[f64], columns: &DMatrix<f64>, rate_hz: f64, delay_s: f64) -> DMatrix<f64> {
     let (Some(&start), Some(&end)) = (t_s.first(), t_s.last()) else {
         return columns.clone();
     };
@@ -133,7 +146,7 @@ pub fn resample(t_s: &[f64], columns: &DMatrix<f64>, rate_hz: f64) -> DMatrix<f6
     let mut resampled = DMatrix::zeros(samples, columns.ncols());
     let mut right = 1;
     for i in 0..samples {
-        let t = (start + i as f64 / rate_hz).min(end);
+        let t = (start + i as f64 / rate_hz - delay_s).clamp(start, end);
         while right + 1 < t_s.len() && t_s[right] < t {
             right += 1;
         }

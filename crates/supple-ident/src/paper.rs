@@ -88,6 +88,7 @@ pub fn estimate(known: &Parameters, motion: &Motion) -> Result<Estimate, IdentEr
         a: DMatrix::zeros(3 * samples, 12),
         b: DVector::zeros(3 * samples),
         speed: vec![0.0; 3 * samples],
+        slid_rad: vec![0.0; 3 * samples],
     };
     for i in 0..samples {
         let at = |m: &DMatrix<f64>| Vector::<3>::from_fn(|j, _| m[(i, j)]);

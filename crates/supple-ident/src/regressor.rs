@@ -18,6 +18,8 @@ pub struct JointRows {
     pub b: DVector<f64>,
     /// Speed of the joint \[rad/s\].
     pub speed: Vec<f64>,
+    /// Way since the joint last turned round \[rad\].
+    pub slid_rad: Vec<f64>,
 }
 
 impl JointRows {
@@ -26,7 +28,8 @@ impl JointRows {
         JointRows {
             a: self.a.rows_range(range.clone()).into_owned(),
             b: self.b.rows_range(range.clone()).into_owned(),
-            speed: self.speed[range].to_vec(),
+            speed: self.speed[range.clone()].to_vec(),
+            slid_rad: self.slid_rad[range].to_vec(),
         }
     }
 }
@@ -90,6 +93,21 @@ pub fn rows<const N: usize>(
     rows
 }
 
+/// Way of joint `j` since it last turned round, sample by sample.
+fn slid(motion: &Motion, j: usize) -> Vec<f64> {
+    let (mut way, mut direction) = (0.0, 0.0_f64);
+    let step_s = 1.0 / motion.rate_hz;
+    let after = |v: &f64| {
+        if v * direction < 0.0 {
+            way = 0.0;
+        }
+        direction = v.signum();
+        way += v.abs() * step_s;
+        way
+    };
+    motion.qd.column(j).iter().map(after).collect()
+}
+
 /// All rows of a motion, by moving joint. Dry friction turns over within a sample or two, faster than
 /// the filter that the torques went through: its columns go through the same one. Where there is no rotor column, the arm's rotor is known.
 ///
@@ -120,6 +138,7 @@ pub fn joint_rows<const N: usize>(
             a: DMatrix::zeros(samples, columns.len()),
             b: motion.tau.column(j) - motion.qdd.column(j) * known_rotor(j),
             speed: motion.qd.column(j).iter().map(|v| v.abs()).collect(),
+            slid_rad: slid(motion, j),
         })
         .collect();
     for i in 0..samples {

@@ -2,10 +2,12 @@
 
 use crate::error::IdentError;
 use crate::fit::Fit;
+use crate::log::Log;
 use crate::model::mass_matrix;
 use crate::motion::Motion;
+use crate::random::Random;
 use crate::regressor::joint_rows;
-use nalgebra::Cholesky;
+use nalgebra::{Cholesky, DMatrix};
 use std::f64::consts::PI;
 use supple_core::Vector;
 
@@ -26,11 +28,21 @@ pub struct Validation {
 }
 
 impl<const N: usize> Fit<N> {
+    /// Prepares `log` as the fitted ones were, predicts its torques and compares.
+    ///
+    /// # Errors
+    /// What [`Log::check`] refuses.
+    pub fn validate(&self, log: &Log) -> Result<Validation, IdentError> {
+        let moving = self.columns.moving();
+        let (motion, _) = Motion::prepare(log, N, moving, &self.preparation)?;
+        self.validate_motion(&motion)
+    }
+
     /// Predicts the torques of `motion` and compares; nothing is left out.
     ///
     /// # Errors
     /// [`IdentError::Shape`] if the motion has another number of joints.
-    pub fn validate(&self, motion: &Motion) -> Result<Validation, IdentError> {
+    pub fn validate_motion(&self, motion: &Motion) -> Result<Validation, IdentError> {
         let joints = joint_rows(self.nominal(), &self.columns, motion)?;
         let samples = motion.samples() as f64;
         let (mut rms_nm, mut relative) = (Vec::new(), Vec::new());
@@ -51,11 +63,27 @@ impl<const N: usize> Fit<N> {
         })
     }
 
+    /// Torques of the moving joints over a motion, (samples, moving joints), dry friction filtered as the
+    /// measured torques were \[N m\].
+    ///
+    /// # Errors
+    /// [`IdentError::Shape`] if the motion has another number of joints.
+    pub fn predict_motion(&self, motion: &Motion) -> Result<DMatrix<f64>, IdentError> {
+        let joints = joint_rows(self.nominal(), &self.columns, motion)?;
+        let mut predicted = DMatrix::zeros(motion.samples(), joints.len());
+        for (row, (joint, measured)) in joints.iter().zip(self.columns.moving()).enumerate() {
+            // The rows leave out what rotors that are taken as known need.
+            let known = motion.tau.column(*measured) - &joint.b;
+            predicted.set_column(row, &(&joint.a * &self.x + known));
+        }
+        Ok(predicted)
+    }
+
     fn positive_definite_share(&self) -> Result<f64, IdentError> {
-        let mut state = 1_u64;
+        let mut random = Random::new(1);
         let mut sound = 0;
         for _ in 0..POSES {
-            let q = Vector::<N>::from_fn(|_, _| PI * uniform(&mut state));
+            let q = Vector::<N>::from_fn(|_, _| PI * random.signed());
             let mass = mass_matrix(self.nominal(), &self.columns, &self.x, &q)?;
             sound += usize::from(Cholesky::new(mass).is_some());
         }
@@ -84,13 +112,4 @@ impl Validation {
             "sound: {error:.2} % torque error on held-out data, positive definite everywhere tried"
         )
     }
-}
-
-/// Uniform in (-1, 1), splitmix64.
-fn uniform(state: &mut u64) -> f64 {
-    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let mut z = *state;
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    (z ^ (z >> 31)) as f64 / (1_u64 << 63) as f64 - 1.0
 }

@@ -109,7 +109,7 @@ fn a_line_on_an_irregular_clock_stays_a_line() {
         .map(|i| f64::from(i) * 0.01 + 0.002 * f64::from(i).sin())
         .collect();
     let x = DMatrix::from_fn(100, 1, |i, _| 2.0 * t[i] - 1.0);
-    let grid = resample(&t, &x, 100.0);
+    let grid = resample(&t, &x, 100.0, 0.0);
     for i in 0..grid.nrows() {
         let at = t[0] + i as f64 / 100.0;
         assert!((grid[(i, 0)] - (2.0 * at.min(t[99]) - 1.0)).abs() < 1e-12);

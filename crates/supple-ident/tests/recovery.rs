@@ -5,7 +5,7 @@ mod support;
 use proptest::prelude::*;
 use supple_core::dynamics::{parameters, rnea};
 use supple_core::{Arm, Friction, Vector};
-use supple_ident::{FrictionColumns, Options, Weights, identify};
+use supple_ident::{FrictionColumns, Options, Weights, fit};
 use support::{Noise, motion, random_arm};
 
 fn friction<const N: usize>() -> [Friction; N] {
@@ -63,9 +63,9 @@ proptest! {
         let data = [motion(&truth, &friction(), &joints, 600, seed), motion(&truth, &friction(), &joints, 400, seed + 1)];
         for weights in [Weights::Equal, Weights::Noise, Weights::Huber] {
             let options = Options { weights, consistent: None, ..Options::default() };
-            let fit = identify(&model, &data, &joints, &options).unwrap();
+            let fit = fit(&model, &data, &joints, &options).unwrap();
             let held_out = motion(&truth, &friction(), &joints, 300, seed + 7);
-            let checked = fit.validate(&held_out).unwrap();
+            let checked = fit.validate_motion(&held_out).unwrap();
             prop_assert!(checked.total_relative < 1e-7, "{}", checked.total_relative);
             for (found, true_one) in fit.friction().iter().zip(friction::<4>()) {
                 prop_assert!((found.coulomb_nm - true_one.coulomb_nm).abs() < 1e-5);
@@ -81,10 +81,10 @@ proptest! {
         let mut data = motion(&truth, &friction(), &joints, 300, seed);
         let mut noise = Noise(seed);
         data.tau.iter_mut().for_each(|t| *t += 5.0 * noise.draw());
-        let fit = identify(&truth, &[data], &joints, &Options::default()).unwrap();
+        let fit = fit(&truth, &[data], &joints, &Options::default()).unwrap();
         prop_assert!(fit.arm().is_ok());
         prop_assert!(fit.friction().iter().all(|f| f.validate().is_ok()));
-        let checked = fit.validate(&motion(&truth, &friction(), &joints, 200, seed + 3)).unwrap();
+        let checked = fit.validate_motion(&motion(&truth, &friction(), &joints, 200, seed + 3)).unwrap();
         prop_assert_eq!(checked.positive_definite, 1.0);
         prop_assert!(checked.total_relative < 0.2, "{}", checked.total_relative);
     }
@@ -99,7 +99,7 @@ fn consistent_fits_of_good_data_are_the_arm() {
         consistent: Some(1e-6),
         ..Options::default()
     };
-    let fit = identify(&truth, &[data], &joints, &options).unwrap();
+    let fit = fit(&truth, &[data], &joints, &options).unwrap();
     assert!(furthest(&truth, &fit.arm().unwrap(), &joints) < 1e-3);
     assert!(fit.gap.unwrap() > 0.0);
 }
@@ -114,7 +114,7 @@ fn held_joints_are_neither_needed_nor_touched() {
         consistent: Some(1e-2),
         ..Options::default()
     };
-    let fit = identify(&truth, &[data], &moving, &options).unwrap();
+    let fit = fit(&truth, &[data], &moving, &options).unwrap();
     let arm = fit.arm().unwrap();
     assert!(furthest(&truth, &arm, &moving) < 1e-3);
     // Nothing moved the first link: the model's own comes back.
@@ -141,7 +141,7 @@ fn the_dip_is_found_in_the_second_stage_and_does_not_bias_the_first() {
         slow_rad_per_s: 0.3,
         ..Options::default()
     };
-    let fit = identify(&truth, &[data], &[0, 1, 2], &options).unwrap();
+    let fit = fit(&truth, &[data], &[0, 1, 2], &options).unwrap();
     for found in fit.friction() {
         assert!(
             (found.coulomb_nm - 1.0).abs() < 1e-4,
@@ -173,7 +173,7 @@ fn a_motor_that_turns_with_two_joints_is_told_apart() {
         consistent: Some(1e-6),
         ..Options::default()
     };
-    let fit = identify(&truth, &[data], &[0, 1, 2], &options).unwrap();
+    let fit = fit(&truth, &[data], &[0, 1, 2], &options).unwrap();
     let names = fit.columns.names();
     let value = |name: &str| fit.x[names.iter().position(|n| n == name).unwrap()];
     assert!((value("V1+2") - 0.7).abs() < 1e-3, "{}", value("V1+2"));
@@ -193,7 +193,7 @@ fn the_rank_of_an_arm_does_not_depend_on_the_log() {
     let ranks: Vec<usize> = (1..4)
         .map(|seed| {
             let data = motion(&truth, &[Friction::NONE; 4], &[0, 1, 2, 3], 800, seed);
-            identify(&truth, &[data], &[0, 1, 2, 3], &options)
+            fit(&truth, &[data], &[0, 1, 2, 3], &options)
                 .unwrap()
                 .base
                 .rank()

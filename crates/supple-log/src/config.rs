@@ -5,8 +5,8 @@
 //! gains, another law. Links are in joint frames, as [`Arm::links`] gives them.
 
 use crate::toml_types::{
-    ContactLatchDef, FrictionDef, LawDef, LimitsDef, LinkDef, MoveGainsDef, PoseDef, RoleDef,
-    column, rows,
+    ContactLatchDef, FrictionDef, LawDef, LimitsDef, LinkDef, MoveGainsDef, PoseDef, RippleDef,
+    RoleDef, column, rows,
 };
 use serde::{Deserialize, Serialize};
 use supple_core::config::{ContactLatch, Law, Limits, MoveGains, Role};
@@ -29,6 +29,9 @@ struct Stored<const N: usize> {
     last_joint_from_tip: Pose,
     #[serde(with = "LawDef")]
     law: Law,
+    /// Harmonics of the motors' torque.
+    #[serde(default)]
+    ripple: Vec<RippleDef>,
     #[serde(with = "ContactLatchDef")]
     latch: ContactLatch,
     #[serde(with = "MoveGainsDef")]
@@ -56,6 +59,7 @@ pub(crate) fn to_toml<const N: usize>(config: &Config<N>) -> Result<String, toml
         friction,
         roles,
         joint_from_motor,
+        ripple,
         period_s,
         estimator_rad_per_s,
         law,
@@ -74,6 +78,7 @@ pub(crate) fn to_toml<const N: usize>(config: &Config<N>) -> Result<String, toml
         gravity_m_per_s2: arm.gravity(),
         last_joint_from_tip: arm.joint_from_tip(),
         law,
+        ripple: RippleDef::list(&ripple),
         latch,
         move_gains,
         limits,
@@ -107,6 +112,7 @@ pub(crate) fn from_toml<const N: usize>(text: &str) -> Result<Config<N>, String>
         friction: joints.each_ref().map(|joint| joint.friction),
         roles: joints.each_ref().map(|joint| joint.role),
         joint_from_motor: stored.joint_from_motor,
+        ripple: RippleDef::tables(&stored.ripple)?,
         period_s: stored.period_s,
         estimator_rad_per_s: stored.estimator_rad_per_s,
         law: stored.law,
@@ -121,8 +127,10 @@ pub(crate) fn from_toml<const N: usize>(text: &str) -> Result<Config<N>, String>
 #[cfg(test)]
 mod tests {
     use super::*;
+    use supple_core::RippleTable;
     use supple_core::config::{ApparentInertia, FrictionVelocity};
     use supple_core::math::Matrix3;
+    use supple_core::ripple::Harmonic;
     use supple_model::Description;
 
     fn round_trip<const N: usize>(config: &Config<N>) {
@@ -157,6 +165,12 @@ mod tests {
         config.law.inertial_feedforward = false;
         config.latch.fade = false;
         config.friction[2].offset_nm = f64::from_bits(0x3fb9_9999_9999_999b);
+        let line = |harmonic| Harmonic {
+            harmonic,
+            sine_nm: 1.0 / 3.0,
+            cosine_nm: -0.0,
+        };
+        config.ripple[1] = RippleTable::new(&[line(2), line(42)]).expect("a table");
         round_trip(&config);
     }
 

@@ -109,6 +109,8 @@ pub struct TorqueTerms<const N: usize> {
     #[serde(with = "array")]
     pub soft_stop: [f64; N],
     #[serde(with = "array")]
+    pub ripple: [f64; N],
+    #[serde(with = "array")]
     pub handover: [f64; N],
 }
 
@@ -207,6 +209,7 @@ impl<const N: usize> TorqueTerms<N> {
             nullspace: torques.nullspace.into(),
             joint_pd: torques.joint_pd.into(),
             soft_stop: torques.soft_stop.into(),
+            ripple: torques.ripple.into(),
             handover: torques.handover.into(),
         }
     }

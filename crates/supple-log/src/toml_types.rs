@@ -6,7 +6,8 @@ use supple_core::config::{
     ApparentInertia, ContactLatch, FrictionVelocity, Gains, Law, Limits, MoveGains, Role,
 };
 use supple_core::math::{Matrix3, Vector3};
-use supple_core::{Friction, Link, Pose, Vector};
+use supple_core::ripple::Harmonic;
+use supple_core::{Friction, Link, Pose, RippleTable, Vector};
 
 #[derive(Serialize, Deserialize)]
 #[serde(remote = "Pose", deny_unknown_fields)]
@@ -40,6 +41,52 @@ pub(crate) struct FrictionDef {
     stribeck_rad_per_s: f64,
     offset_nm: f64,
     band_rad_per_s: f64,
+}
+
+/// One line of the ripple tables, which stand one after the other.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct RippleDef {
+    motor: usize,
+    harmonic: u32,
+    sine_nm: f64,
+    cosine_nm: f64,
+}
+
+impl RippleDef {
+    pub fn list<const N: usize>(tables: &[RippleTable; N]) -> Vec<RippleDef> {
+        let lines = tables.iter().enumerate().flat_map(|(motor, table)| {
+            table.harmonics().iter().map(move |line| RippleDef {
+                motor,
+                harmonic: line.harmonic,
+                sine_nm: line.sine_nm,
+                cosine_nm: line.cosine_nm,
+            })
+        });
+        lines.collect()
+    }
+
+    /// # Errors
+    /// A motor that is not there, or a table that is not sound, in words.
+    pub fn tables<const N: usize>(list: &[RippleDef]) -> Result<[RippleTable; N], String> {
+        if let Some(line) = list.iter().find(|line| line.motor >= N) {
+            return Err(format!("ripple of motor {}, there are {N}", line.motor));
+        }
+        let mut tables = [RippleTable::NONE; N];
+        for (motor, table) in tables.iter_mut().enumerate() {
+            let lines = list.iter().filter(|line| line.motor == motor);
+            let lines: Vec<Harmonic> = lines
+                .map(|line| Harmonic {
+                    harmonic: line.harmonic,
+                    sine_nm: line.sine_nm,
+                    cosine_nm: line.cosine_nm,
+                })
+                .collect();
+            *table = RippleTable::new(&lines)
+                .ok_or_else(|| format!("the ripple of motor {motor} is not a table"))?;
+        }
+        Ok(tables)
+    }
 }
 
 #[derive(Serialize, Deserialize)]

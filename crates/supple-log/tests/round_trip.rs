@@ -68,6 +68,7 @@ fn a_record_is_what_the_controller_said() {
             ("nullspace", &t.nullspace),
             ("joint_pd", &t.joint_pd),
             ("soft_stop", &t.soft_stop),
+            ("ripple", &t.ripple),
             ("handover", &t.handover),
         ];
         for ((name, logged), (said_name, said)) in terms.iter().zip(o.torques.named()) {

@@ -222,6 +222,10 @@ impl Description {
         ))
     }
 
+    pub(crate) fn robot(&self) -> &Robot {
+        &self.robot
+    }
+
     /// Refuses a caller that expects another number of joints.
     pub(crate) fn expect_dof(&self, expected: usize) -> Result<(), ModelError> {
         if expected == self.dof() {

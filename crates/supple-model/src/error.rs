@@ -15,6 +15,14 @@ pub enum ModelError {
         /// What to do about it.
         remedy: &'static str,
     },
+    /// A file that cannot be written.
+    #[error("{file}: cannot be written: {error}; choose a folder that can be")]
+    Write {
+        /// Path.
+        file: String,
+        /// What the system says.
+        error: std::io::Error,
+    },
     /// A file that is not well formed, or has keys or types that are not in the schema. The message
     /// of the parser carries line, column and what was expected.
     #[error("{file}: {message}\n{remedy}")]

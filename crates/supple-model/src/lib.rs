@@ -11,6 +11,7 @@
 mod assets;
 mod description;
 mod error;
+mod identified;
 pub mod paper;
 mod resolve;
 pub mod settings;
@@ -22,6 +23,7 @@ mod xml;
 pub use assets::assets;
 pub use description::Description;
 pub use error::{Finding, ModelError};
+pub use identified::Replacement;
 pub use resolve::{Motors, Tool};
 pub use settings::{Settings, schema_json};
 pub use shapes::{Capsule, Transform};

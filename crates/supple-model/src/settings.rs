@@ -156,6 +156,24 @@ pub struct MotorSettings {
     pub torque_quantum_nm: Option<Vec<f64>>,
     /// Encoder counts per motor revolution, positive. Default: continuous.
     pub counts_per_revolution: Option<u32>,
+    /// Torque ripple that the motors are known to have, fed forward so that it cancels; at most 6
+    /// harmonics a motor. Default: none.
+    #[serde(default)]
+    pub ripple: Vec<RippleSettings>,
+}
+
+/// A harmonic of a motor's torque over its angle: `sine sin(harmonic p) + cosine cos(harmonic p)`.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RippleSettings {
+    /// Motor, counted from 0.
+    pub motor: usize,
+    /// Periods in a revolution of the motor, 1 or more.
+    pub harmonic: u32,
+    /// Amplitude of the sine, at the motor (N m).
+    pub sine_nm: f64,
+    /// Amplitude of the cosine, at the motor (N m).
+    pub cosine_nm: f64,
 }
 
 /// Limits that are not one joint's.

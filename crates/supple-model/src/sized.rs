@@ -108,6 +108,7 @@ impl Description {
             joint_from_motor: Matrix::<N, N>::from_fn(|i, j| {
                 self.motors().joint_from_motor[(i, j)]
             }),
+            ripple: core::array::from_fn(|m| self.motors().ripple[m]),
             period_s: settings.period_s,
             estimator_rad_per_s: settings.estimator_rad_per_s,
             law: self.law(),

@@ -1,6 +1,7 @@
 //! The command line: what can be asked for.
 
 use crate::exit::CODES;
+use crate::identification;
 use clap::{Parser, Subcommand};
 use clap_complete::Shell;
 use std::num::NonZeroU64;
@@ -24,6 +25,8 @@ pub enum Command {
     /// Look into logs.
     #[command(subcommand)]
     Log(LogCommand),
+    #[command(flatten)]
+    Identification(identification::Command),
     /// List the built-in arms.
     Arms {
         /// As JSON.
@@ -50,6 +53,10 @@ pub struct DemoArgs {
     /// A built-in arm (see `supple arms`), or the path of an arm's TOML or of its folder.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
+    /// What the controller knows of it, such as `supple identify` wrote: the path of a TOML or of its folder.
+    /// Default: the arm's own parameters, perturbed where the experiments say so.
+    #[arg(long, value_name = "PATH")]
+    pub model: Option<PathBuf>,
     /// Folder for all results. Files in it of the same names are replaced, others are left alone.
     #[arg(long, value_name = "DIR", default_value = "out/demo")]
     pub out: PathBuf,
@@ -121,12 +128,18 @@ impl Command {
     pub fn json(&self) -> bool {
         match self {
             Command::Demo(args) => args.json,
+<<<<<<< HEAD
             Command::Arms { json } | Command::Doctor { json } => *json,
             Command::Log(
                 LogCommand::Info { json, .. }
                 | LogCommand::Recover { json, .. }
                 | LogCommand::Replay { json, .. },
             ) => *json,
+=======
+            Command::Identification(command) => command.json(),
+            Command::Arms { json } => *json,
+            Command::Log(LogCommand::Info { json, .. } | LogCommand::Recover { json, .. }) => *json,
+>>>>>>> b026ec1 (Identification in the core, the libraries and on the command line)
             Command::Log(LogCommand::Export { .. }) | Command::Completions { .. } => false,
         }
     }

@@ -15,9 +15,11 @@ use supple_model::Description;
 /// [`Failure`]; [`Failure::Fault`] once everything is written.
 pub fn run(args: &DemoArgs) -> Result<(), Failure> {
     let arm = arms::find(&args.arm)?;
+    let model = args.model.as_ref().map(Description::load).transpose()?;
     let staging = Staging::new(&args.out)?;
     let options = DemoOptions {
         seed: args.seed,
+        model,
         log_dir: match args.no_logs {
             true => None,
             false => Some(staging.folder("logs")?),

@@ -11,6 +11,7 @@ mod demo;
 mod doctor;
 pub mod exit;
 pub mod figures;
+mod identification;
 mod interrupt;
 mod log;
 mod out;
@@ -42,6 +43,7 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
     match command {
         Command::Demo(args) => demo::run(args),
         Command::Log(command) => log::run(command),
+        Command::Identification(command) => identification::run(command),
         Command::Arms { json } => arms::list(*json),
         Command::Doctor { json } => doctor::run(*json),
         Command::Completions { shell } => {

@@ -1,17 +1,19 @@
 //! What the controller is busy with, and how a request changes it.
 
 use super::fault::SafeAction;
-use super::mode::{Mode, Refusal, Request};
+use super::mode::{Breakaway, Mode, Refusal, Request};
 use super::state::{GainRamp, State};
 use super::validate;
 use crate::config::{Config, Gains, Role};
 use crate::math::{Vector, abs, sqrt};
-use crate::trajectory::Trajectory;
+use crate::trajectory::{Beyond, Fourier, Trajectory};
 
 /// Peak speed of a minimum-jerk move is this times its mean speed.
 const MINIMUM_JERK_PEAK: f64 = 1.875;
 /// Angle by which the target of a held joint may differ from its own \[rad\].
 const HELD_TOLERANCE_RAD: f64 = 1e-6;
+/// Greatest distance of a joint from the start of an excitation \[rad\].
+const EXCITE_START_RAD: f64 = 0.02;
 
 /// A mode with what it needs.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,6 +26,11 @@ pub(super) enum Activity<const N: usize> {
         duration_s: f64,
     },
     Track(Trajectory),
+    Excite(Fourier<N>),
+    Breakaway {
+        ramp: Breakaway,
+        from_rad: Vector<N>,
+    },
     Fault(SafeAction),
 }
 
@@ -35,8 +42,18 @@ impl<const N: usize> Activity<N> {
             Activity::Move { .. } => Mode::Move,
             Activity::Track(Trajectory::Probe(_)) => Mode::Probe,
             Activity::Track(_) => Mode::Track,
+            Activity::Excite(_) => Mode::Excite,
+            Activity::Breakaway { .. } => Mode::Breakaway,
             Activity::Fault(_) => Mode::Fault,
         }
+    }
+
+    /// All joints, held ones too, have a stiff loop of this activity.
+    pub fn has_own_loops(&self) -> bool {
+        matches!(
+            self,
+            Activity::Move { .. } | Activity::Excite(_) | Activity::Breakaway { .. }
+        )
     }
 
     /// No torque at all.
@@ -53,10 +70,7 @@ impl<const N: usize> State<N> {
         request: &Request<N>,
     ) -> Result<(), Refusal> {
         let mode = self.mode();
-        let working = matches!(
-            mode,
-            Mode::GravityHold | Mode::Move | Mode::Track | Mode::Probe
-        );
+        let working = !matches!(mode, Mode::Idle | Mode::Fault);
         match *request {
             Request::Reset => {
                 let Activity::Fault(action) = self.activity else {
@@ -98,6 +112,15 @@ impl<const N: usize> State<N> {
                 }
                 self.enter(Activity::Track(trajectory));
             }
+            Request::Excite(series) => {
+                check_excitation(config, &self.position, &series)?;
+                self.enter(Activity::Excite(series));
+            }
+            Request::Breakaway(ramp) => {
+                check_breakaway(config, &ramp)?;
+                let from_rad = self.position;
+                self.enter(Activity::Breakaway { ramp, from_rad });
+            }
         }
         Ok(())
     }
@@ -130,6 +153,61 @@ impl<const N: usize> State<N> {
         };
         Ok(())
     }
+}
+
+fn check_excitation<const N: usize>(
+    config: &Config<N>,
+    from_rad: &Vector<N>,
+    series: &Fourier<N>,
+) -> Result<(), Refusal> {
+    series.validate().map_err(Refusal::Trajectory)?;
+    series
+        .within(&config.limits)
+        .map_err(|beyond| match beyond {
+            Beyond::Position(joint, value_rad) => Refusal::Unreachable { joint, value_rad },
+            Beyond::Speed(joint, value_rad_per_s, limit_rad_per_s) => Refusal::TooFast {
+                joint,
+                value_rad_per_s,
+                limit_rad_per_s,
+            },
+        })?;
+    let start = series.at(0.0).position_rad;
+    let value = (start - from_rad).amax();
+    if value <= EXCITE_START_RAD {
+        return Ok(());
+    }
+    Err(Refusal::Value {
+        entry: "distance of a joint from the start of the excitation",
+        value,
+        limit: EXCITE_START_RAD,
+    })
+}
+
+fn check_breakaway<const N: usize>(config: &Config<N>, ramp: &Breakaway) -> Result<(), Refusal> {
+    let refuse = |entry, value, limit| {
+        Err(Refusal::Value {
+            entry,
+            value,
+            limit,
+        })
+    };
+    if ramp.joint >= N {
+        return refuse("joint", ramp.joint as f64, (N - 1) as f64);
+    }
+    let fastest = config.limits.torque_rate_nm_per_s[ramp.joint];
+    let rate = abs(ramp.rate_nm_per_s);
+    if !(rate > 0.0 && rate <= fastest) {
+        return refuse("rate_nm_per_s", ramp.rate_nm_per_s, fastest);
+    }
+    let furthest = config.limits.joint_tracking_error_rad;
+    if !(ramp.stop_rad > 0.0 && ramp.stop_rad <= furthest) {
+        return refuse("stop_rad", ramp.stop_rad, furthest);
+    }
+    let strongest = config.limits.joint_torque_nm[ramp.joint];
+    if !(ramp.limit_nm > 0.0 && ramp.limit_nm <= strongest) {
+        return refuse("limit_nm", ramp.limit_nm, strongest);
+    }
+    Ok(())
 }
 
 fn check_move<const N: usize>(

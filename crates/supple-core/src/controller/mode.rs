@@ -2,14 +2,15 @@
 
 use crate::config::Gains;
 use crate::math::Vector;
-use crate::trajectory::{Trajectory, TrajectoryError};
+use crate::trajectory::{Fourier, Trajectory, TrajectoryError};
 use core::fmt;
 
 /// What the controller is doing.
 ///
 /// ```text
-/// idle <-> gravity hold <-> move, track, probe      any -> fault
-///          move, track, probe -> move, track, probe      fault -> gravity hold | idle  (reset)
+/// idle <-> gravity hold <-> work (move, track, probe, excite, breakaway)      any -> fault
+///          work -> work      breakaway -> gravity hold (done)
+///          fault -> gravity hold | idle  (reset)
 /// ```
 ///
 /// Idle is reached from anywhere; asked for in a fault it takes the torque away and leaves the fault
@@ -31,6 +32,11 @@ pub enum Mode {
     Probe,
     /// A fault is latched; the safe action runs until a reset.
     Fault,
+    /// Stiff joint-space motion along a Fourier series, with model feed-forward, for identification;
+    /// joints that the law holds move too. Holds its end.
+    Excite,
+    /// The torque of one joint is ramped until it moves, the others are held; then gravity hold.
+    Breakaway,
 }
 
 impl Mode {
@@ -43,6 +49,8 @@ impl Mode {
             Mode::Track => "track",
             Mode::Probe => "probe",
             Mode::Fault => "fault",
+            Mode::Excite => "excite",
+            Mode::Breakaway => "breakaway",
         }
     }
 }
@@ -65,6 +73,10 @@ pub enum Request<const N: usize> {
     /// Along a trajectory that starts near the tip; the mode is [`Mode::Probe`] for the probing cycle
     /// and [`Mode::Track`] otherwise.
     Track(Trajectory),
+    /// Along a Fourier series of all joints, from near its start.
+    Excite(Fourier<N>),
+    /// Finds where dry friction gives way.
+    Breakaway(Breakaway),
     /// Other gains, reached along a straight line in `ramp_s`.
     Gains {
         /// Gains to reach.
@@ -74,6 +86,19 @@ pub enum Request<const N: usize> {
     },
     /// Out of the fault.
     Reset,
+}
+
+/// A ramp of torque on one joint, beside gravity, until the joint has moved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Breakaway {
+    /// Joint index.
+    pub joint: usize,
+    /// Slope of the ramp \[N m/s\], not zero; its sign is the direction.
+    pub rate_nm_per_s: f64,
+    /// Angle from the start at which it ends \[rad\], positive.
+    pub stop_rad: f64,
+    /// Torque at which it ends without motion \[N m\], positive, within the joint's limit.
+    pub limit_nm: f64,
 }
 
 /// Why a request changed nothing.

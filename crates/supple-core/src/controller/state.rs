@@ -247,7 +247,7 @@ impl<const N: usize> State<N> {
 
     /// The loops of held joints do not act.
     fn holds_nothing(&self) -> bool {
-        self.activity.is_limp() || matches!(self.activity, Activity::Move { .. })
+        self.activity.is_limp() || self.activity.has_own_loops()
     }
 
     /// Lets the set-points of held joints approach their angles; while nothing holds them they follow

@@ -10,7 +10,8 @@ use crate::config::{Config, Role};
 use crate::dynamics::terms;
 use crate::impedance::{Situation, Task, Torques, impedance};
 use crate::math::{Vector, Vector3, abs, smooth_step};
-use crate::trajectory::Reference;
+use crate::ripple::compensation_nm;
+use crate::trajectory::{JointReference, Reference};
 
 /// From measurements to torques. Allocates nothing, locks nothing, logs nothing, reads no clock.
 ///
@@ -43,6 +44,7 @@ pub fn step<const N: usize>(
     });
     state.gains.elapsed_s += elapsed_s;
     state.advance_held(config, elapsed_s);
+    state.end_breakaway(config);
 
     let tip_position = state.terms.base_from_tip.translation;
     let tip_velocity = state.terms.jacobian.fixed_rows::<3>(0) * velocity;
@@ -54,6 +56,10 @@ pub fn step<const N: usize>(
     let external_force = state.observe(config, task.as_ref(), reference.as_ref(), elapsed_s);
 
     let mut torques = state.demand(config, task.as_ref(), reference.as_ref(), input.tip_force_n);
+    if !(state.activity.is_limp() || state.is_stale(config)) {
+        let tables = &config.ripple;
+        torques.ripple = compensation_nm(tables, controller.motor_from_joint(), &state.position);
+    }
     state.hand_over(config, &mut torques);
     if let Err(fault) = checks::torques_finite(&torques) {
         state.latch_fault(fault);
@@ -136,14 +142,11 @@ impl<const N: usize> State<N> {
 
     /// Where the stiff loop of each joint wants it, if one acts \[rad\].
     fn wanted(&self, config: &Config<N>) -> [Option<f64>; N] {
-        if let Activity::Move {
-            from_rad,
-            to_rad,
-            duration_s,
-        } = &self.activity
-        {
-            let (x, ..) = smooth_step(self.activity_s(config) / duration_s);
-            return core::array::from_fn(|i| Some(from_rad[i] + (to_rad[i] - from_rad[i]) * x));
+        if let Activity::Breakaway { ramp, from_rad } = &self.activity {
+            return core::array::from_fn(|i| (i != ramp.joint).then_some(from_rad[i]));
+        }
+        if let Some(reference) = self.joint_reference(config) {
+            return core::array::from_fn(|i| Some(reference.position_rad[i]));
         }
         core::array::from_fn(|i| (config.roles[i] != Role::Active).then_some(self.held[i]))
     }
@@ -211,7 +214,7 @@ impl<const N: usize> State<N> {
                 let torques = impedance(law, &config.friction, &config.roles, terms, task, &now);
                 self.guarded(config, torques)
             }
-            (Activity::Move { .. }, _, _) => self.guarded(config, self.moving(config)),
+            (activity, ..) if activity.has_own_loops() => self.moving(config),
             _ => self.safe(config),
         }
     }
@@ -237,39 +240,76 @@ impl<const N: usize> State<N> {
         self.guarded(config, torques)
     }
 
-    /// Minimum-jerk motion in joint space with the model and a stiff loop.
+    /// Where every joint should be, in the modes that move joints.
+    fn joint_reference(&self, config: &Config<N>) -> Option<JointReference<N>> {
+        let time_s = self.activity_s(config);
+        match &self.activity {
+            Activity::Move {
+                from_rad,
+                to_rad,
+                duration_s,
+            } => {
+                let (x, rate, rate_rate) = smooth_step(time_s / duration_s);
+                let way = to_rad - from_rad;
+                Some(JointReference {
+                    position_rad: from_rad + way * x,
+                    velocity_rad_per_s: way * (rate / duration_s),
+                    acceleration_rad_per_s2: way * (rate_rate / (duration_s * duration_s)),
+                })
+            }
+            Activity::Excite(series) => Some(series.at(time_s)),
+            Activity::Breakaway { from_rad, .. } => Some(JointReference {
+                position_rad: *from_rad,
+                velocity_rad_per_s: Vector::zeros(),
+                acceleration_rad_per_s2: Vector::zeros(),
+            }),
+            _ => None,
+        }
+    }
+
+    /// The reference of the joints with the model and a stiff loop; a joint that is ramped has neither
+    /// loop nor friction but the ramp.
     fn moving(&self, config: &Config<N>) -> Torques<N> {
-        let Activity::Move {
-            from_rad,
-            to_rad,
-            duration_s,
-        } = self.activity
-        else {
-            return Torques::zeros();
+        let Some(reference) = self.joint_reference(config) else {
+            return self.safe(config);
         };
-        let (x, rate, rate_rate) = smooth_step(self.activity_s(config) / duration_s);
-        let way = to_rad - from_rad;
-        let position = from_rad + way * x;
-        let velocity = way * (rate / duration_s);
-        let acceleration = way * (rate_rate / (duration_s * duration_s));
         let gains = &config.move_gains;
-        let position_error = position - self.position;
+        let position_error = reference.position_rad - self.position;
+        let velocity = reference.velocity_rad_per_s;
         let velocity_error = velocity - self.estimator.velocity_rad_per_s;
-        Torques {
+        let mut torques = Torques {
             gravity: self.terms.gravity,
             coriolis: self.terms.coriolis_gravity - self.terms.gravity,
             friction: Vector::from_fn(|i, _| config.friction[i].torque_nm(velocity[i])),
-            inertial: self.terms.mass_matrix * acceleration,
+            inertial: self.terms.mass_matrix * reference.acceleration_rad_per_s2,
             joint_pd: gains.stiffness_nm_per_rad.component_mul(&position_error)
                 + gains.damping_nm_s_per_rad.component_mul(&velocity_error),
             ..Torques::zeros()
+        };
+        if let Activity::Breakaway { ramp, .. } = &self.activity {
+            torques.friction[ramp.joint] = ramp.rate_nm_per_s * self.activity_s(config);
+            torques.joint_pd[ramp.joint] = 0.0;
+        }
+        self.guarded(config, torques)
+    }
+
+    /// Leaves the breakaway mode for gravity hold once its joint has moved or the ramp has reached its
+    /// limit.
+    fn end_breakaway(&mut self, config: &Config<N>) {
+        let Activity::Breakaway { ramp, from_rad } = self.activity else {
+            return;
+        };
+        let moved = abs(self.position[ramp.joint] - from_rad[ramp.joint]);
+        let torque = abs(ramp.rate_nm_per_s) * self.activity_s(config);
+        if moved >= ramp.stop_rad || torque >= ramp.limit_nm {
+            self.enter(Activity::GravityHold);
         }
     }
 
     /// Adds what runs beside every activity: the loops of held joints and the soft stops.
     fn guarded(&self, config: &Config<N>, mut torques: Torques<N>) -> Torques<N> {
         let velocity = &self.estimator.velocity_rad_per_s;
-        if !matches!(self.activity, Activity::Move { .. }) {
+        if !self.activity.has_own_loops() {
             for (joint, role) in config.roles.iter().enumerate() {
                 if let Role::Held {
                     stiffness_nm_per_rad,

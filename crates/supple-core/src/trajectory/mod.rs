@@ -5,12 +5,14 @@
 //! corners of the quadrant) the acceleration is that of the piece, never the jump.
 
 mod arc;
+mod fourier;
 mod line;
 mod probe;
 mod quadrant;
 mod sinusoid;
 
 pub use arc::Arc;
+pub use fourier::{Beyond, Fourier, HARMONICS, JointReference};
 pub use line::Line;
 pub use probe::{Probe, ProbePhase};
 pub use quadrant::{Piece, Quadrant};

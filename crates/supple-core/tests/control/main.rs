@@ -12,6 +12,7 @@ mod bumpless;
 mod closed_loop;
 mod contact;
 mod determinism;
+mod exciting;
 mod faults;
 mod gains;
 mod garbage;

@@ -1,19 +1,22 @@
 //! Every mode asked for everything: the table of transitions.
 
 use crate::support::configs::{four, seven, three};
-use crate::support::rig::{Rig, bent, probe_at};
+use crate::support::rig::{Rig, bent, probe_at, ramp};
 use std::collections::BTreeSet;
 use supple_core::config::Gains;
 use supple_core::controller::{Fault, Mode, Refusal, Request};
+use supple_core::trajectory::Fourier;
 use supple_core::{Config, Input};
 
-const MODES: [Mode; 6] = [
+const MODES: [Mode; 8] = [
     Mode::Idle,
     Mode::GravityHold,
     Mode::Move,
     Mode::Track,
     Mode::Probe,
     Mode::Fault,
+    Mode::Excite,
+    Mode::Breakaway,
 ];
 
 /// What is asked for, before it is known where the arm is.
@@ -24,16 +27,20 @@ enum Wish {
     Move,
     Track,
     Probe,
+    Excite,
+    Breakaway,
     Gains,
     Reset,
 }
 
-const WISHES: [Wish; 7] = [
+const WISHES: [Wish; 9] = [
     Wish::Idle,
     Wish::GravityHold,
     Wish::Move,
     Wish::Track,
     Wish::Probe,
+    Wish::Excite,
+    Wish::Breakaway,
     Wish::Gains,
     Wish::Reset,
 ];
@@ -48,6 +55,8 @@ fn request<const N: usize>(rig: &Rig<N>, wish: Wish) -> Request<N> {
         },
         Wish::Track => rig.stay(),
         Wish::Probe => Request::Track(probe_at(&rig.tip())),
+        Wish::Excite => Request::Excite(Fourier::at_rest(rig.q, 1.0)),
+        Wish::Breakaway => Request::Breakaway(ramp()),
         Wish::Gains => Request::Gains {
             gains: Gains::isotropic(10.0, 2.0),
             ramp_s: 0.1,
@@ -71,6 +80,8 @@ fn table(mode: Mode, wish: Wish) -> Option<Mode> {
         (_, Wish::Move) => Some(Mode::Move),
         (_, Wish::Track) => Some(Mode::Track),
         (_, Wish::Probe) => Some(Mode::Probe),
+        (_, Wish::Excite) => Some(Mode::Excite),
+        (_, Wish::Breakaway) => Some(Mode::Breakaway),
     }
 }
 

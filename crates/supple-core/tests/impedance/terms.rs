@@ -38,12 +38,13 @@ fn every_term_is_named_once_and_counted_once() {
         nullspace: one(256.0),
         joint_pd: one(512.0),
         soft_stop: one(1024.0),
-        handover: one(2048.0),
+        ripple: one(2048.0),
+        handover: one(4096.0),
     };
-    assert_eq!(torques.total(), one(4095.0));
+    assert_eq!(torques.total(), one(8191.0));
     assert_eq!(torques.feedback(), one(96.0));
     let names: BTreeSet<_> = torques.named().iter().map(|(name, _)| *name).collect();
-    assert_eq!(names.len(), 12);
+    assert_eq!(names.len(), 13);
     // The names are those of the fields, in their order.
     let written = format!("{torques:?}");
     let mut last = 0;

@@ -4,7 +4,7 @@ use super::arms::{wam3, wam4, wam7};
 use supple_core::config::{
     ApparentInertia, ContactLatch, FrictionVelocity, Gains, Law, Limits, MoveGains, Role,
 };
-use supple_core::{Arm, Config, Friction, Matrix, Vector};
+use supple_core::{Arm, Config, Friction, Matrix, RippleTable, Vector};
 
 /// Held as the shoulder roll is.
 pub fn held(position_rad: f64) -> Role {
@@ -73,6 +73,7 @@ fn config<const N: usize>(
         friction: [Friction::NONE; N],
         roles,
         joint_from_motor,
+        ripple: [RippleTable::NONE; N],
         period_s: 1e-3,
         estimator_rad_per_s: 200.0,
         law: Law {

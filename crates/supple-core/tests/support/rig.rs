@@ -1,9 +1,9 @@
 //! A controller with its state, fed one cycle after another.
 
 use super::plant::{Plant, nothing};
-use supple_core::controller::{Fault, Mode, Request};
+use supple_core::controller::{Breakaway, Fault, Mode, Request};
 use supple_core::math::Vector3;
-use supple_core::trajectory::Trajectory;
+use supple_core::trajectory::{Fourier, Trajectory};
 use supple_core::{Arm, Config, Controller, Input, Output, State, Vector, step};
 
 /// Copying it forks the future.
@@ -123,6 +123,12 @@ impl<const N: usize> Rig<N> {
             Mode::Probe => {
                 self.accept(Request::Track(probe_at(&self.tip())));
             }
+            Mode::Excite => {
+                self.accept(Request::Excite(Fourier::at_rest(self.q, 1.0)));
+            }
+            Mode::Breakaway => {
+                self.accept(Request::Breakaway(ramp()));
+            }
             Mode::Fault => {
                 let output = self.step(&Input {
                     tip_force_n: Some(Vector3::repeat(f64::NAN)),
@@ -158,6 +164,16 @@ impl<const N: usize> Rig<N> {
     /// One cycle with `plant` in the loop and nothing in its way.
     pub fn run(&mut self, plant: &mut Plant<N>) -> Output<N> {
         self.drive(plant, None, nothing)
+    }
+}
+
+/// A slow ramp on the second joint.
+pub fn ramp() -> Breakaway {
+    Breakaway {
+        joint: 1,
+        rate_nm_per_s: 0.5,
+        stop_rad: 0.035,
+        limit_nm: 4.0,
     }
 }
 

@@ -8,6 +8,7 @@
 mod support;
 
 mod derivatives;
+mod fourier;
 mod paths;
 mod probe;
 mod quadrant;

@@ -3,11 +3,12 @@
 use super::joints::JointResolved;
 use super::wrong_count;
 use crate::error::{ModelError, Reporter};
-use crate::settings::Settings;
+use crate::settings::{MotorSettings, Settings};
 use crate::xml::GREATEST;
 use nalgebra::DMatrix;
-use supple_core::Body;
 use supple_core::math::{Matrix3, Vector3};
+use supple_core::ripple::{Harmonic, LINES};
+use supple_core::{Body, RippleTable};
 
 /// Motors and transmission, one motor per joint, as many as moving joints.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,6 +23,8 @@ pub struct Motors {
     pub torque_quantum_nm: Option<Vec<f64>>,
     /// Encoder counts per motor revolution; none where it is continuous.
     pub counts_per_revolution: Option<u32>,
+    /// Torque ripple of each motor.
+    pub ripple: Vec<RippleTable>,
 }
 
 /// Force sensor and cap, mounted at the tip.
@@ -47,6 +50,7 @@ pub(crate) fn motors(
             torque_nm: joints.iter().map(|joint| joint.torque_nm).collect(),
             torque_quantum_nm: None,
             counts_per_revolution: None,
+            ripple: vec![RippleTable::NONE; n],
         });
     };
     let list = |key: &str, values: &[f64]| {
@@ -93,7 +97,54 @@ pub(crate) fn motors(
         torque_nm: motors.torque_nm.clone(),
         torque_quantum_nm: motors.torque_quantum_nm.clone(),
         counts_per_revolution: motors.counts_per_revolution,
+        ripple: ripple(report, motors, n)?,
     })
+}
+
+/// The harmonics by motor.
+fn ripple(
+    report: Reporter<'_>,
+    motors: &MotorSettings,
+    n: usize,
+) -> Result<Vec<RippleTable>, ModelError> {
+    let mut lines = vec![Vec::new(); n];
+    for (i, entry) in motors.ripple.iter().enumerate() {
+        let element = |key: &str| format!("[motors] ripple[{i}] {key}");
+        report.finite(&element("sine_nm"), entry.sine_nm)?;
+        report.finite(&element("cosine_nm"), entry.cosine_nm)?;
+        if entry.motor >= n {
+            return Err(report.invalid(
+                element("motor"),
+                format!("must be below the number of motors, {n}"),
+                entry.motor,
+                "count motors from 0",
+            ));
+        }
+        if entry.harmonic == 0 {
+            return Err(report.invalid(
+                element("harmonic"),
+                "must be 1 or more",
+                0,
+                "a constant torque is no ripple: put it into the joint's offset_nm",
+            ));
+        }
+        lines[entry.motor].push(Harmonic {
+            harmonic: entry.harmonic,
+            sine_nm: entry.sine_nm,
+            cosine_nm: entry.cosine_nm,
+        });
+    }
+    let tables = lines.iter().enumerate().map(|(motor, lines)| {
+        RippleTable::new(lines).ok_or_else(|| {
+            report.invalid(
+                format!("[motors] ripple of motor {motor}"),
+                format!("must have at most {LINES} harmonics"),
+                lines.len(),
+                "keep the largest",
+            )
+        })
+    });
+    tables.collect()
 }
 
 fn matrix(

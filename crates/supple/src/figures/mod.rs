@@ -8,6 +8,7 @@ mod figure_3b;
 mod figure_4;
 mod figure_5;
 mod figure_6;
+pub mod identification;
 mod panel;
 mod paper_letter;
 mod png;

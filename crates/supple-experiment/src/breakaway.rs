@@ -1,0 +1,112 @@
+//! Breakaway torque of each joint: its torque is ramped in small steps until it has moved by two
+//! degrees, both ways, while the others are held.
+//!
+//! What a joint holds back when it gives way is `S_0`, its torque in the slowest sliding. Half the sum of
+//! both directions is free of errors of the gravity model; half the difference is that error.
+
+use crate::error::ExperimentError;
+use crate::excite::{free_of_roles, move_to};
+use crate::session::{Session, Step};
+use serde::Serialize;
+use supple_core::controller::{Breakaway, Mode, Request};
+use supple_core::{Config, Vector};
+use supple_plant::PlantConfig;
+
+/// Slope of the ramp \[N m/s\]; 1e-4 N m a cycle of 1 ms.
+pub const RATE_NM_PER_S: f64 = 0.1;
+/// Where a ramp stops: two degrees \[rad\].
+pub const STOP_RAD: f64 = 0.034_907;
+/// Torque at which a joint is given up \[N m\].
+const LIMIT_NM: f64 = 6.0;
+/// Motion that is sliding, beyond the give of bristles and the steps of encoders \[rad\].
+const SLIDING_RAD: f64 = 1.5e-3;
+/// Rest between the two directions \[s\].
+const REST_S: f64 = 0.3;
+
+/// Breakaway of one joint.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct JointBreakaway {
+    /// Torque at which it gave way in the positive direction \[N m\].
+    pub positive_nm: f64,
+    /// The same in the negative direction, as a positive number \[N m\].
+    pub negative_nm: f64,
+}
+
+impl JointBreakaway {
+    /// `S_0` \[N m\].
+    pub fn breakaway_nm(&self) -> f64 {
+        0.5 * (self.positive_nm + self.negative_nm)
+    }
+
+    /// Torque that acts in one direction: gravity that the model does not have, or an offset \[N m\].
+    pub fn offset_nm(&self) -> f64 {
+        0.5 * (self.positive_nm - self.negative_nm)
+    }
+}
+
+/// Ramps each of `joints` both ways at `pose_rad`; friction in the order of `joints`.
+///
+/// # Errors
+/// [`ExperimentError`]; a joint that does not give way.
+pub fn breakaway<const N: usize>(
+    config: &Config<N>,
+    plant: &PlantConfig<N>,
+    pose_rad: &Vector<N>,
+    joints: &[usize],
+    done: &mut dyn FnMut(usize),
+) -> Result<Vec<JointBreakaway>, ExperimentError> {
+    let mut found = Vec::new();
+    for &joint in joints {
+        let torque = |direction: f64| -> Result<f64, ExperimentError> {
+            let limit_nm = LIMIT_NM.min(config.limits.joint_torque_nm[joint]);
+            let ramp = Breakaway {
+                joint,
+                rate_nm_per_s: direction * RATE_NM_PER_S,
+                stop_rad: STOP_RAD,
+                limit_nm,
+            };
+            let session = Session {
+                name: format!("breakaway of joint {joint}"),
+                config: free_of_roles(config),
+                plant: plant.clone(),
+                start_rad: *pose_rad,
+                steps: vec![
+                    Step::wait(Request::GravityHold, REST_S),
+                    move_to(pose_rad, pose_rad),
+                    Step {
+                        until_done: true,
+                        ..Step::wait(Request::Breakaway(ramp), limit_nm / RATE_NM_PER_S + REST_S)
+                    },
+                ],
+            };
+            // Ramp and angle, cycle by cycle.
+            let mut trace: Vec<(f64, f64)> = Vec::new();
+            session.perform(&mut |cycle, _| {
+                if cycle.output.mode == Mode::Breakaway {
+                    let ramp = cycle.output.torques.friction[joint].abs();
+                    trace.push((ramp, cycle.measurement.position_rad[joint]));
+                }
+                Ok(())
+            })?;
+            gives_way(&trace, direction).ok_or(ExperimentError::Stuck {
+                joint,
+                torque_nm: limit_nm,
+            })
+        };
+        found.push(JointBreakaway {
+            positive_nm: torque(1.0)?,
+            negative_nm: torque(-1.0)?,
+        });
+        done(joint);
+    }
+    Ok(found)
+}
+
+/// Ramp at the last moment at which the joint had not yet slid.
+fn gives_way(trace: &[(f64, f64)], direction: f64) -> Option<f64> {
+    let start = trace.first()?.1;
+    let slid = |q: f64| direction * (q - start) > SLIDING_RAD;
+    slid(trace.last()?.1).then_some(())?;
+    let last = trace.iter().rposition(|(_, q)| !slid(*q))?;
+    Some(trace[last].0)
+}

@@ -1,0 +1,60 @@
+//! Excitation of the simulated arm: a stiff move to the start of a series, the series, rest.
+
+use crate::session::{Session, Step};
+use supple_core::controller::Request;
+use supple_core::trajectory::Fourier;
+use supple_core::{Config, Vector};
+use supple_plant::PlantConfig;
+
+/// Gravity hold before the first move \[s\].
+const SETTLE_S: f64 = 0.1;
+/// Rest before a series \[s\].
+const REST_S: f64 = 0.4;
+/// Mean joint speed of the moves between series \[rad/s\].
+const MOVE_RAD_PER_S: f64 = 0.4;
+
+/// Each series in turn, recorded, from a plant that stands at `home_rad`.
+pub fn excitation<const N: usize>(
+    name: &str,
+    config: &Config<N>,
+    plant: &PlantConfig<N>,
+    home_rad: &Vector<N>,
+    series: &[Fourier<N>],
+) -> Session<N> {
+    let mut steps = vec![Step::wait(Request::GravityHold, SETTLE_S)];
+    let mut at = *home_rad;
+    for series in series {
+        let start = series.at(0.0).position_rad;
+        steps.push(move_to(&start, &at));
+        steps.push(Step {
+            recorded: true,
+            ..Step::wait(Request::Excite(*series), series.duration_s)
+        });
+        at = series.at(series.duration_s).position_rad;
+    }
+    Session {
+        name: name.to_owned(),
+        config: free_of_roles(config),
+        plant: plant.clone(),
+        start_rad: *home_rad,
+        steps,
+    }
+}
+
+/// A move and a rest.
+pub(crate) fn move_to<const N: usize>(target_rad: &Vector<N>, from_rad: &Vector<N>) -> Step<N> {
+    let duration_s = ((target_rad - from_rad).amax() / MOVE_RAD_PER_S).max(0.5);
+    let request = Request::Move {
+        target_rad: *target_rad,
+        duration_s,
+    };
+    Step::wait(request, duration_s + REST_S)
+}
+
+/// The same without held joints: to be identified they must go to where they are asked.
+pub(crate) fn free_of_roles<const N: usize>(config: &Config<N>) -> Config<N> {
+    Config {
+        roles: [supple_core::config::Role::Active; N],
+        ..*config
+    }
+}

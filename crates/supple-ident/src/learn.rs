@@ -1,0 +1,225 @@
+//! Friction and payload refitted from the prediction error of a motion that is repeated.
+//!
+//! What the model did not predict of the torque, in free motion and away from rest, is fitted by a change of
+//! each joint's viscous and dry friction and, if asked, by a body in the hand. The change is held to the
+//! model by a prior of stated size, so that joints which do not move keep what they had. The tracking error
+//! is never looked at: at low gain, adapting to it makes things worse.
+
+use crate::error::{IdentError, positive};
+use crate::filter::LowPass;
+use crate::motion::Motion;
+use nalgebra::{DMatrix, DVector, Vector4};
+use supple_core::dynamics::{regressor, rnea};
+use supple_core::math::{Matrix3, Vector3};
+use supple_core::{Arm, Friction, Vector};
+
+/// What may change, and by how much it is expected to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Learning {
+    /// Slower samples of a joint are left out \[rad/s\].
+    pub slow_rad_per_s: f64,
+    /// Expected relative change of friction.
+    pub friction_change: f64,
+    /// Expected payload \[kg\]; `None` takes the hand for empty.
+    pub payload_kg: Option<f64>,
+    /// Noise of the torques \[N m\].
+    pub noise_nm: f64,
+}
+
+impl Default for Learning {
+    /// Above 0.08 rad/s, friction by a fifth, no payload, 0.05 N m.
+    fn default() -> Self {
+        Learning {
+            slow_rad_per_s: 0.08,
+            friction_change: 0.2,
+            payload_kg: None,
+            noise_nm: 0.05,
+        }
+    }
+}
+
+/// What was learnt.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Learned<const N: usize> {
+    /// Friction of each joint.
+    pub friction: [Friction; N],
+    /// Mass \[kg\] and first moment in the last link's frame \[kg m\] that the hand holds more than the
+    /// model has.
+    pub payload: Option<Vector4<f64>>,
+    /// RMS prediction error of each joint before \[N m\].
+    pub before_nm: [f64; N],
+    /// The same after.
+    pub after_nm: [f64; N],
+}
+
+/// Learns from `motions` of the joints `moving`; the others are at rest.
+///
+/// # Errors
+/// Options out of range; no sample that moves.
+pub fn learn<const N: usize>(
+    arm: &Arm<N>,
+    friction: &[Friction; N],
+    motions: &[Motion],
+    moving: &[usize],
+    learning: &Learning,
+) -> Result<Learned<N>, IdentError> {
+    positive("slow_rad_per_s", learning.slow_rad_per_s)?;
+    positive("friction_change", learning.friction_change)?;
+    positive("noise_nm", learning.noise_nm)?;
+    crate::log::check_moving(N, moving)?;
+    let loads = if learning.payload_kg.is_some() { 4 } else { 0 };
+    let width = 2 * moving.len() + loads;
+    let mut gram = DMatrix::zeros(width, width);
+    let mut side = DVector::zeros(width);
+    let mut rows_of: Vec<(usize, DVector<f64>, f64)> = Vec::new();
+    for motion in motions {
+        for (joint, a, missing) in rows(arm, friction, motion, moving, learning, width)? {
+            // Filtered samples repeat each other.
+            let weight = motion.independent_share / learning.noise_nm.powi(2);
+            gram.ger(weight, &a, &a, 1.0);
+            side.axpy(weight * missing, &a, 1.0);
+            rows_of.push((joint, a, missing));
+        }
+    }
+    if rows_of.is_empty() {
+        return Err(IdentError::Singular {
+            problem: format!(
+                "no joint turned faster than {} rad/s",
+                learning.slow_rad_per_s
+            ),
+            remedy: "record the motion that is to be learnt, at its pace",
+        });
+    }
+    for i in 0..width {
+        gram[(i, i)] += expected(learning, moving.len(), i).powi(-2);
+    }
+    let change = nalgebra::Cholesky::new(gram)
+        .ok_or_else(|| IdentError::Singular {
+            problem: "the torques are not finite".to_owned(),
+            remedy: "cut out the samples that are not numbers",
+        })?
+        .solve(&side);
+    let mut learned = Learned {
+        friction: *friction,
+        payload: learning.payload_kg.map(|_| {
+            let first = 2 * moving.len();
+            Vector4::from_fn(|i, _| change[first + i])
+        }),
+        before_nm: [0.0; N],
+        after_nm: [0.0; N],
+    };
+    for (place, &joint) in moving.iter().enumerate() {
+        let old = friction[joint];
+        let scale = |share: f64| (1.0 + share).max(0.0);
+        learned.friction[joint] = Friction {
+            viscous_nm_s_per_rad: old.viscous_nm_s_per_rad * scale(change[2 * place]),
+            coulomb_nm: old.coulomb_nm * scale(change[2 * place + 1]),
+            breakaway_nm: old.breakaway_nm * scale(change[2 * place + 1]),
+            ..old
+        };
+    }
+    let mut counts = [0_u32; N];
+    for (joint, a, missing) in &rows_of {
+        counts[*joint] += 1;
+        learned.before_nm[*joint] += missing.powi(2);
+        learned.after_nm[*joint] += (missing - a.dot(&change)).powi(2);
+    }
+    for (j, count) in counts.iter().enumerate() {
+        for sum in [&mut learned.before_nm[j], &mut learned.after_nm[j]] {
+            *sum = (*sum / f64::from(*count.max(&1))).sqrt();
+        }
+    }
+    Ok(learned)
+}
+
+/// Expected size of unknown `i`: shares of friction, mass, first moments at a tenth of a metre.
+fn expected(learning: &Learning, moving: usize, i: usize) -> f64 {
+    let load = learning.payload_kg.unwrap_or(1.0);
+    match i.checked_sub(2 * moving) {
+        None => learning.friction_change,
+        Some(0) => load,
+        Some(_) => 0.1 * load,
+    }
+}
+
+type Row = (usize, DVector<f64>, f64);
+
+/// Joint, columns and missing torque of every sample that counts.
+fn rows<const N: usize>(
+    arm: &Arm<N>,
+    friction: &[Friction; N],
+    motion: &Motion,
+    moving: &[usize],
+    learning: &Learning,
+    width: usize,
+) -> Result<Vec<Row>, IdentError> {
+    let samples = motion.samples();
+    let low_pass = motion
+        .cutoff_hz
+        .map(|cutoff_hz| LowPass::butterworth4(cutoff_hz, motion.rate_hz))
+        .transpose()?;
+    // Dry friction turns over faster than the filter that the torques went through.
+    let dry: Vec<Vec<f64>> = moving
+        .iter()
+        .map(|&j| {
+            let raw: Vec<f64> = (0..samples)
+                .map(|i| friction[j].dry_torque_nm(motion.qd[(i, j)]))
+                .collect();
+            low_pass.map_or(Ok(raw.clone()), |filter| filter.zero_phase(&raw))
+        })
+        .collect::<Result<_, _>>()?;
+    let mut all = Vec::new();
+    for i in 0..samples {
+        let at = |m: &DMatrix<f64>| Vector::<N>::from_fn(|j, _| m[(i, j)]);
+        let held = |m: &DMatrix<f64>| {
+            Vector::<N>::from_fn(|j, _| if moving.contains(&j) { m[(i, j)] } else { 0.0 })
+        };
+        let (q, qd, qdd) = (at(&motion.q), held(&motion.qd), held(&motion.qdd));
+        let model = rnea(arm, &q, &qd, &qdd);
+        let hand = (width > 2 * moving.len()).then(|| regressor(arm, &q, &qd, &qdd)[N - 1]);
+        for (place, &joint) in moving.iter().enumerate() {
+            if qd[joint].abs() < learning.slow_rad_per_s {
+                continue;
+            }
+            let viscous = friction[joint].viscous_nm_s_per_rad * qd[joint];
+            let known = model[joint] + viscous + friction[joint].offset_nm + dry[place][i];
+            let mut a = DVector::zeros(width);
+            a[2 * place] = viscous;
+            a[2 * place + 1] = dry[place][i];
+            if let Some(hand) = &hand {
+                for k in 0..4 {
+                    a[2 * moving.len() + k] = hand[(joint, k)];
+                }
+            }
+            all.push((joint, a, motion.tau[(i, joint)] - known));
+        }
+    }
+    Ok(all)
+}
+
+/// `arm` with what the hand holds: mass and first moment in the last link's frame, taken for a point.
+///
+/// # Errors
+/// [`IdentError::NotPhysical`] where that leaves no body.
+pub fn with_payload<const N: usize>(
+    arm: &Arm<N>,
+    payload: Option<&Vector4<f64>>,
+) -> Result<Arm<N>, IdentError> {
+    let Some(payload) = payload else {
+        return Ok(*arm);
+    };
+    let mut links = *arm.links();
+    let last = &mut links[N - 1];
+    let mass = payload[0];
+    let moment = last
+        .link_from_joint
+        .tr_mul(&Vector3::new(payload[1], payload[2], payload[3]));
+    last.mass += mass;
+    last.first_moment += moment;
+    if mass != 0.0 {
+        let square = Matrix3::identity() * moment.dot(&moment) - moment * moment.transpose();
+        last.inertia += square / mass;
+    }
+    Arm::from_links(links, arm.armature(), arm.joint_from_tip(), arm.gravity())
+        .map_err(IdentError::NotPhysical)
+}

@@ -1,0 +1,231 @@
+//! Logs from files: the project's own MCAP, and comma-separated values.
+//!
+//! Of an MCAP the stretches are taken in which the arm moves freely under control: excitation, moves,
+//! tracking and probing without contact. A CSV has a line of names first: `t`, `q[0]`, `q[1]`, ...,
+//! `tau[0]`, ..., and `qd[0]`, ... if velocities were measured; SI units. `q0` is taken for `q[0]`.
+
+use crate::log::Log;
+use nalgebra::DMatrix;
+use std::path::Path;
+use supple_core::controller::Mode;
+use supple_log::{LogError, Reader};
+
+/// Stretches shorter than this are left out \[s\].
+const SHORTEST_S: f64 = 2.0;
+/// Time after contact, a fault or a change of mode that is left out \[s\].
+const SETTLE_S: f64 = 0.3;
+
+/// Why a file gives no log.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadError {
+    /// An MCAP that cannot be read.
+    #[error(transparent)]
+    Mcap(#[from] LogError),
+    /// A file that cannot be opened.
+    #[error("{file}: cannot be read: {error}")]
+    File {
+        /// Path.
+        file: String,
+        /// What the system says.
+        error: std::io::Error,
+    },
+    /// A table that is not one.
+    #[error("{file}: {problem}; {remedy}")]
+    Table {
+        /// Path.
+        file: String,
+        /// What is wrong, with line and column.
+        problem: String,
+        /// What to do.
+        remedy: &'static str,
+    },
+}
+
+/// All usable stretches of a file, by its ending: `.mcap`, otherwise CSV.
+///
+/// # Errors
+/// [`ReadError`]; an MCAP of an arm of another number of joints.
+pub fn read_logs<const N: usize>(path: &Path) -> Result<Vec<Log>, ReadError> {
+    if path.extension().is_some_and(|ending| ending == "mcap") {
+        read_mcap::<N>(path)
+    } else {
+        Ok(vec![read_csv(path, N)?])
+    }
+}
+
+/// The stretches of free motion of an MCAP, torques without what was added against ripple.
+///
+/// # Errors
+/// [`ReadError`].
+pub fn read_mcap<const N: usize>(path: &Path) -> Result<Vec<Log>, ReadError> {
+    let reader = Reader::open(path)?;
+    let mut logs = Vec::new();
+    let mut stretch: Vec<(f64, [f64; N], [f64; N])> = Vec::new();
+    let (mut settled_s, mut mode) = (f64::NEG_INFINITY, None);
+    for record in reader.records::<N>()? {
+        let record = record?;
+        let (t_s, value) = (record.time_ns as f64 * 1e-9, record.value);
+        let moves = matches!(
+            value.mode(),
+            Some(Mode::Move | Mode::Track | Mode::Probe | Mode::Excite)
+        );
+        if !moves || value.in_contact || value.mode() != mode {
+            settled_s = t_s + SETTLE_S;
+        }
+        mode = value.mode();
+        if !moves || t_s < settled_s {
+            finish(&mut stretch, &mut logs);
+            continue;
+        }
+        let torque = core::array::from_fn(|j| value.torque_nm[j] - value.torques.ripple[j]);
+        stretch.push((t_s, value.position_rad, torque));
+    }
+    finish(&mut stretch, &mut logs);
+    if logs.is_empty() {
+        return Err(ReadError::Table {
+            file: path.display().to_string(),
+            problem: format!("no stretch of {SHORTEST_S} s of free motion under control"),
+            remedy: "record an excitation: supple excite run",
+        });
+    }
+    Ok(logs)
+}
+
+fn finish<const N: usize>(stretch: &mut Vec<(f64, [f64; N], [f64; N])>, logs: &mut Vec<Log>) {
+    let rows = std::mem::take(stretch);
+    let (Some(first), Some(last)) = (rows.first(), rows.last()) else {
+        return;
+    };
+    if last.0 - first.0 < SHORTEST_S {
+        return;
+    }
+    logs.push(Log {
+        t_s: rows.iter().map(|row| row.0).collect(),
+        q_rad: DMatrix::from_fn(rows.len(), N, |i, j| rows[i].1[j]),
+        qd_rad_per_s: None,
+        tau_nm: DMatrix::from_fn(rows.len(), N, |i, j| rows[i].2[j]),
+    });
+}
+
+/// A table of numbers with a line of names.
+///
+/// # Errors
+/// [`ReadError`] with line and column.
+pub fn read_csv(path: &Path, dof: usize) -> Result<Log, ReadError> {
+    let file = path.display().to_string();
+    let text = std::fs::read_to_string(path).map_err(|error| ReadError::File {
+        file: file.clone(),
+        error,
+    })?;
+    parse_csv(&text, dof).map_err(|(problem, remedy)| ReadError::Table {
+        file,
+        problem,
+        remedy,
+    })
+}
+
+fn parse_csv(text: &str, dof: usize) -> Result<Log, (String, &'static str)> {
+    let names_remedy = "name the columns t, q[0].., tau[0].. and qd[0].. if there are velocities";
+    let mut lines = text
+        .lines()
+        .enumerate()
+        .filter(|(_, l)| !l.trim().is_empty());
+    let Some((_, header)) = lines.next() else {
+        return Err(("it is empty".to_owned(), names_remedy));
+    };
+    let names: Vec<String> = header
+        .split(',')
+        .map(|name| name.trim().replace(['[', ']'], ""))
+        .collect();
+    let place = |name: &str| names.iter().position(|n| n == name);
+    let time = place("t").ok_or_else(|| ("there is no column t".to_owned(), names_remedy))?;
+    let group = |name: &str| -> Result<Option<Vec<usize>>, (String, &'static str)> {
+        let found: Vec<Option<usize>> = (0..dof).map(|j| place(&format!("{name}{j}"))).collect();
+        if found.iter().all(Option::is_none) {
+            return Ok(None);
+        }
+        let all: Option<Vec<usize>> = found.iter().copied().collect();
+        let missing = found.iter().position(Option::is_none).unwrap_or(0);
+        all.map(Some).ok_or_else(|| {
+            (
+                format!("there is no column {name}[{missing}]"),
+                names_remedy,
+            )
+        })
+    };
+    let needed = |name: &str| {
+        group(name)?.ok_or_else(|| (format!("there are no columns {name}[0].."), names_remedy))
+    };
+    let (q, tau, qd) = (needed("q")?, needed("tau")?, group("qd")?);
+    let mut values: Vec<Vec<f64>> = Vec::new();
+    for (number, line) in lines {
+        let row = line
+            .split(',')
+            .enumerate()
+            .map(|(column, cell)| {
+                cell.trim().parse().map_err(|_| {
+                    let name = names.get(column).map_or("?", String::as_str);
+                    (
+                        format!("line {}, column {name}: `{cell}` is no number", number + 1),
+                        "correct the cell, or cut the line out",
+                    )
+                })
+            })
+            .collect::<Result<Vec<f64>, _>>()?;
+        if row.len() != names.len() {
+            let (found, wanted) = (row.len(), names.len());
+            return Err((
+                format!(
+                    "line {} has {found} cells, the names are {wanted}",
+                    number + 1
+                ),
+                "give every line all its cells",
+            ));
+        }
+        values.push(row);
+    }
+    let columns =
+        |places: &[usize]| DMatrix::from_fn(values.len(), dof, |i, j| values[i][places[j]]);
+    Ok(Log {
+        t_s: values.iter().map(|row| row[time]).collect(),
+        q_rad: columns(&q),
+        qd_rad_per_s: qd.as_deref().map(columns),
+        tau_nm: columns(&tau),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::parse_csv;
+
+    #[test]
+    fn a_table_is_read_by_its_names() {
+        let text = "tau[0],t,q0,extra\n1.5,0,0.25,9\n-2,0.01,0.5,9\n\n";
+        let log = parse_csv(text, 1).unwrap();
+        assert_eq!(log.t_s, [0.0, 0.01]);
+        assert_eq!(log.q_rad.as_slice(), [0.25, 0.5]);
+        assert_eq!(log.tau_nm.as_slice(), [1.5, -2.0]);
+        assert!(log.qd_rad_per_s.is_none());
+    }
+
+    #[test]
+    fn what_is_wrong_is_named() {
+        let wrong = [
+            ("", "empty"),
+            ("q[0],tau[0]\n1,2\n", "no column t"),
+            ("t,q[0]\n1,2\n", "tau[0]"),
+            ("t,q[0],tau[0],tau[1]\n1,2,3,4\n", "q[1]"),
+            (
+                "t,q[0],q[1],tau[0],tau[1]\n1,2,x,4,5\n",
+                "line 2, column q1",
+            ),
+            ("t,q[0],q[1],tau[0],tau[1]\n1,2,3,4\n", "line 2 has 4 cells"),
+        ];
+        for (text, word) in wrong {
+            let dof = if text.contains("[1]") { 2 } else { 1 };
+            let (problem, remedy) = parse_csv(text, dof).unwrap_err();
+            assert!(problem.contains(word), "{word} in {problem}");
+            assert!(!remedy.is_empty());
+        }
+    }
+}

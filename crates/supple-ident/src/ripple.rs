@@ -1,0 +1,196 @@
+//! Torque ripple of the motors from slow motion: harmonics of the motor angle in what a model leaves.
+//!
+//! The torque that the joints received but were not commanded, brought to the motors by `m2jp^T`, is
+//! fitted by sines and cosines of the motor angle. Beside them stand columns for what else a model may
+//! leave in slow motion (a constant, the direction, the speed, the angle), fitted and thrown away. Columns
+//! go through the filter that the torques went through. The harmonics with the largest amplitudes are kept
+//! where they stand out of the noise.
+
+use crate::error::{IdentError, positive};
+use crate::filter::LowPass;
+use crate::fit::{Fit, STEADY_RAD};
+use crate::motion::Motion;
+use crate::regressor::joint_rows;
+use nalgebra::{DMatrix, DVector};
+use supple_core::math::{cos, sin};
+use supple_core::ripple::{Harmonic, LINES};
+use supple_core::{Matrix, RippleTable, Vector};
+
+/// Amplitudes below so many standard deviations are noise.
+const SIGNIFICANT: f64 = 4.0;
+/// Columns for what else is left.
+const NUISANCE: usize = 5;
+
+/// What to look for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RippleSearch {
+    /// Harmonics of a motor turn, each 1 or more.
+    pub harmonics: Vec<u32>,
+    /// Faster samples are left out: the filter would have taken their ripple \[rad/s\].
+    pub fast_rad_per_s: f64,
+}
+
+impl Default for RippleSearch {
+    /// The first eight harmonics, joints below 0.2 rad/s.
+    fn default() -> Self {
+        RippleSearch {
+            harmonics: (1..=8).collect(),
+            fast_rad_per_s: 0.2,
+        }
+    }
+}
+
+/// Ripple of every motor, from what `fit` leaves of `motions`. All joints must be among those that were
+/// identified: a motor may drive several.
+///
+/// # Errors
+/// Options out of range; fewer slow samples than columns.
+pub fn fit_ripple<const N: usize>(
+    fit: &Fit<N>,
+    motions: &[Motion],
+    motor_from_joint: &Matrix<N, N>,
+    search: &RippleSearch,
+) -> Result<[RippleTable; N], IdentError> {
+    positive("fast_rad_per_s", search.fast_rad_per_s)?;
+    if fit.columns.moving().len() != N {
+        return Err(crate::error::shape_error(
+            "moving",
+            format!("all {N} joints, since motors may share them"),
+            format!("{:?}", fit.columns.moving()),
+        ));
+    }
+    let mut tables = [RippleTable::NONE; N];
+    let width = 2 * search.harmonics.len() + NUISANCE;
+    for (motor, table) in tables.iter_mut().enumerate() {
+        let mut all = Vec::new();
+        for motion in motions {
+            all.push(motor_rows(fit, motion, motor_from_joint, motor, search)?);
+        }
+        let samples: usize = all.iter().map(|(a, _)| a.nrows()).sum();
+        if samples < 2 * width {
+            return Err(IdentError::Singular {
+                problem: format!("motor {motor} has {samples} slow samples, {width} columns"),
+                remedy: "record slow motion of every joint",
+            });
+        }
+        let (mut a, mut b) = (DMatrix::zeros(samples, width), DVector::zeros(samples));
+        let mut at = 0;
+        for (rows, torques) in &all {
+            a.rows_mut(at, rows.nrows()).copy_from(rows);
+            b.rows_mut(at, rows.nrows()).copy_from(torques);
+            at += rows.nrows();
+        }
+        let share = motions
+            .iter()
+            .map(|m| m.independent_share)
+            .fold(1.0, f64::min);
+        *table = significant(&a, &b, search, share)?;
+    }
+    Ok(tables)
+}
+
+/// Columns and torques of one motor.
+fn motor_rows<const N: usize>(
+    fit: &Fit<N>,
+    motion: &Motion,
+    motor_from_joint: &Matrix<N, N>,
+    motor: usize,
+    search: &RippleSearch,
+) -> Result<(DMatrix<f64>, DVector<f64>), IdentError> {
+    let joints = joint_rows(fit.nominal(), &fit.columns, motion)?;
+    let joint_from_motor = motor_from_joint
+        .try_inverse()
+        .unwrap_or_else(Matrix::identity);
+    let samples = motion.samples();
+    // Missing from the command: what the joints needed less what they were sent.
+    let missing: Vec<DVector<f64>> = joints.iter().map(|j| &j.a * &fit.x - &j.b).collect();
+    let torque = DVector::from_fn(samples, |i, _| {
+        (0..N)
+            .map(|j| joint_from_motor[(j, motor)] * missing[j][i])
+            .sum()
+    });
+    let angle = |i: usize| -> f64 {
+        let q = Vector::<N>::from_fn(|j, _| motion.q[(i, j)]);
+        (motor_from_joint * q)[motor]
+    };
+    let speed = |i: usize| -> f64 {
+        let qd = Vector::<N>::from_fn(|j, _| motion.qd[(i, j)]);
+        (motor_from_joint * qd)[motor]
+    };
+    let lines = search.harmonics.len();
+    let mut columns = DMatrix::zeros(samples, 2 * lines + NUISANCE);
+    for i in 0..samples {
+        let (p, v) = (angle(i), speed(i));
+        for (k, harmonic) in search.harmonics.iter().enumerate() {
+            let phase = f64::from(*harmonic) * p;
+            columns[(i, 2 * k)] = sin(phase);
+            columns[(i, 2 * k + 1)] = cos(phase);
+        }
+        let rest = [1.0, v.signum(), v, p, p * p];
+        for (k, value) in rest.into_iter().enumerate() {
+            columns[(i, 2 * lines + k)] = value;
+        }
+    }
+    if let Some(cutoff_hz) = motion.cutoff_hz {
+        columns = LowPass::butterworth4(cutoff_hz, motion.rate_hz)?.zero_phase_columns(&columns)?;
+    }
+    // Of the joints that the motor drives, all slide, and slowly.
+    let slides = |i: usize| {
+        (0..N)
+            .filter(|j| joint_from_motor[(*j, motor)] != 0.0)
+            .all(|j| {
+                joints[j].slid_rad[i] >= STEADY_RAD && joints[j].speed[i] <= search.fast_rad_per_s
+            })
+    };
+    let kept: Vec<usize> = (0..samples).filter(|i| slides(*i)).collect();
+    Ok((columns.select_rows(&kept), torque.select_rows(&kept)))
+}
+
+/// The largest harmonics that stand out of the noise.
+fn significant(
+    a: &DMatrix<f64>,
+    b: &DVector<f64>,
+    search: &RippleSearch,
+    independent_share: f64,
+) -> Result<RippleTable, IdentError> {
+    let singular = || IdentError::Singular {
+        problem: "the slow motion does not tell the harmonics apart".to_owned(),
+        remedy: "move every joint over several turns of its motor",
+    };
+    // Columns to unit length, so that angles squared do not drown the rest.
+    let lengths: Vec<f64> = a
+        .column_iter()
+        .map(|c| c.norm().max(f64::MIN_POSITIVE))
+        .collect();
+    let scaled = DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)] / lengths[j]);
+    let mut gram = scaled.tr_mul(&scaled);
+    for i in 0..gram.nrows() {
+        gram[(i, i)] += 1e-12;
+    }
+    let root = nalgebra::Cholesky::new(gram).ok_or_else(singular)?;
+    let solution = root.solve(&scaled.tr_mul(b));
+    let freedom = (a.nrows() - a.ncols()) as f64 * independent_share;
+    let noise = (&scaled * &solution - b).norm() / freedom.max(1.0).sqrt();
+    let inverse = root.inverse();
+    let value = |j: usize| solution[j] / lengths[j];
+    let deviation = |j: usize| noise * inverse[(j, j)].sqrt() / lengths[j];
+    let mut lines: Vec<(f64, Harmonic)> = Vec::new();
+    for (k, harmonic) in search.harmonics.iter().enumerate() {
+        let (sine_nm, cosine_nm) = (value(2 * k), value(2 * k + 1));
+        let amplitude = sine_nm.hypot(cosine_nm);
+        if amplitude > SIGNIFICANT * deviation(2 * k).max(deviation(2 * k + 1)) {
+            lines.push((
+                amplitude,
+                Harmonic {
+                    harmonic: *harmonic,
+                    sine_nm,
+                    cosine_nm,
+                },
+            ));
+        }
+    }
+    lines.sort_by(|x, y| y.0.total_cmp(&x.0));
+    lines.truncate(LINES);
+    let harmonics: Vec<Harmonic> = lines.into_iter().map(|(_, line)| line).collect();
+    RippleTable::new(&harmonics).ok_or_else(singular)
+}

@@ -1,0 +1,266 @@
+//! A description with another model in it: what an identification found, as URDF and TOML.
+//!
+//! The texts are edited, not written anew: shapes, limits, gains and comments stay. Masses and inertias
+//! of each moving link, with all that is lumped into it and with the tool, go into the `<inertial>` of
+//! the link itself; links that ride on it lose theirs.
+
+use crate::description::Description;
+use crate::error::{ModelError, Reporter};
+use roxmltree::{Document, Node};
+use std::collections::BTreeMap;
+use std::path::Path;
+use supple_core::config::RippleTable;
+use supple_core::{Arm, Body, Friction, Pose};
+use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value, value};
+
+/// Name of the URDF beside the TOML of a saved description.
+const URDF: &str = "arm.urdf";
+/// Name of the TOML.
+const TOML: &str = "arm.toml";
+
+/// What replaces the model of a description.
+#[derive(Clone, Copy, Debug)]
+pub struct Replacement<'a, const N: usize> {
+    /// Masses, inertias and rotors; kinematics must be the description's.
+    pub arm: &'a Arm<N>,
+    /// Friction of each joint.
+    pub friction: &'a [Friction; N],
+    /// Torque ripple of each motor; `None` keeps the description's.
+    pub ripple: Option<&'a [RippleTable; N]>,
+    /// Where the numbers come from, for the `source` of the TOML.
+    pub source: &'a str,
+}
+
+impl Description {
+    /// The same arm with another model.
+    ///
+    /// # Errors
+    /// [`ModelError::JointCount`]; whatever is wrong with the new texts.
+    pub fn with_model<const N: usize>(
+        &self,
+        model: &Replacement<'_, N>,
+    ) -> Result<Description, ModelError> {
+        self.expect_dof(N)?;
+        let bodies: [Body; N] = core::array::from_fn(|i| {
+            model.arm.body(i).seen_from(&Pose {
+                rotation: model.arm.link_from_joint(i),
+                ..Pose::IDENTITY
+            })
+        });
+        Description::from_text(&self.toml_with(model)?, &self.urdf_with(&bodies)?)
+    }
+
+    /// Writes `arm.toml` and `arm.urdf` into a folder, made if need be; [`Description::load`] reads
+    /// them again.
+    ///
+    /// # Errors
+    /// [`ModelError::Write`].
+    pub fn save(&self, folder: &Path) -> Result<(), ModelError> {
+        let write = |name: &str, text: &str| {
+            let path = folder.join(name);
+            let part = folder.join(format!("{name}.part"));
+            std::fs::create_dir_all(folder)
+                .and_then(|()| std::fs::write(&part, text))
+                .and_then(|()| std::fs::rename(&part, &path))
+                .map_err(|error| ModelError::Write {
+                    file: path.display().to_string(),
+                    error,
+                })
+        };
+        write(URDF, self.urdf())?;
+        write(TOML, &self.toml_named(URDF)?)
+    }
+
+    fn urdf_with(&self, bodies: &[Body]) -> Result<String, ModelError> {
+        let text = self.urdf();
+        let document = Document::parse(text).map_err(|error| syntax(URDF, error.to_string()))?;
+        // What each link is to have: the lumped body, or none because it rides on another.
+        let mut wanted: BTreeMap<&str, Option<&Body>> = BTreeMap::new();
+        let mut seen = vec![false; bodies.len()];
+        for placed in &self.chain.links {
+            if let Some(carrier) = placed.carrier {
+                let first = !std::mem::replace(&mut seen[carrier], true);
+                let name = self.robot().links[placed.link].name.as_str();
+                wanted.insert(name, first.then_some(&bodies[carrier]));
+            }
+        }
+        let links = document
+            .root_element()
+            .children()
+            .filter(|node| node.has_tag_name("link"));
+        let mut edits: Vec<(std::ops::Range<usize>, String)> = Vec::new();
+        for link in links {
+            let body = link.attribute("name").and_then(|name| wanted.get(name));
+            if let Some(body) = body {
+                edits.extend(edit(&link, text, *body));
+            }
+        }
+        edits.sort_by_key(|(range, _)| std::cmp::Reverse(range.start));
+        let mut edited = text.to_owned();
+        for (range, replacement) in edits {
+            edited.replace_range(range, &replacement);
+        }
+        Ok(edited)
+    }
+
+    fn toml_with<const N: usize>(&self, model: &Replacement<'_, N>) -> Result<String, ModelError> {
+        let mut document = self.document()?;
+        document["urdf"] = value(URDF);
+        document["source"] = value(model.source);
+        if !document.contains_key("joints") {
+            document["joints"] = Item::ArrayOfTables(ArrayOfTables::new());
+        }
+        let Some(joints) = document["joints"].as_array_of_tables_mut() else {
+            return Err(self.not_tables("joints"));
+        };
+        for (i, name) in self.joint_names().iter().enumerate() {
+            let named = |table: &Table| table.get("name").and_then(Item::as_str) == Some(name);
+            if !joints.iter().any(named) {
+                let mut table = Table::new();
+                table["name"] = value(name);
+                joints.push(table);
+            }
+            let Some(joint) = joints.iter_mut().find(|table| named(table)) else {
+                continue;
+            };
+            put(joint, "source", model.source.into());
+            put(joint, "armature_kg_m2", model.arm.armature()[i].into());
+            put(joint, "friction", friction(&model.friction[i]).into());
+        }
+        if let Some(tool) = document.get_mut("tool").and_then(Item::as_table_like_mut) {
+            for key in ["mass_kg", "com_m", "inertia_kg_m2"] {
+                tool.remove(key);
+            }
+        }
+        if let Some(tables) = model.ripple {
+            self.put_ripple(&mut document, tables)?;
+        }
+        Ok(document.to_string())
+    }
+
+    fn put_ripple(
+        &self,
+        document: &mut DocumentMut,
+        tables: &[RippleTable],
+    ) -> Result<(), ModelError> {
+        let mut list = toml_edit::Array::new();
+        for (motor, table) in tables.iter().enumerate() {
+            for line in table.harmonics() {
+                let mut entry = InlineTable::new();
+                entry.insert("motor", i64::try_from(motor).unwrap_or(i64::MAX).into());
+                entry.insert("harmonic", i64::from(line.harmonic).into());
+                entry.insert("sine_nm", line.sine_nm.into());
+                entry.insert("cosine_nm", line.cosine_nm.into());
+                list.push(entry);
+            }
+        }
+        if !document.contains_key("motors") {
+            let mut motors = Table::new();
+            let limits: toml_edit::Array = self.motors().torque_nm.iter().copied().collect();
+            motors["torque_nm"] = value(limits);
+            document["motors"] = Item::Table(motors);
+        }
+        let Some(motors) = document["motors"].as_table_mut() else {
+            return Err(self.not_tables("motors"));
+        };
+        put(motors, "ripple", list.into());
+        Ok(())
+    }
+
+    fn toml_named(&self, urdf: &str) -> Result<String, ModelError> {
+        let mut document = self.document()?;
+        document["urdf"] = value(urdf);
+        Ok(document.to_string())
+    }
+
+    fn document(&self) -> Result<DocumentMut, ModelError> {
+        let document = self.toml().parse::<DocumentMut>();
+        document.map_err(|error| syntax(TOML, error.to_string()))
+    }
+
+    fn not_tables(&self, key: &str) -> ModelError {
+        let report = Reporter {
+            file: &self.toml_file,
+        };
+        report.invalid(
+            format!("`{key}`"),
+            "must be written as tables, to be edited",
+            "an inline value",
+            format!("write it as [{key}] or [[{key}]]"),
+        )
+    }
+}
+
+fn syntax(file: &str, message: String) -> ModelError {
+    ModelError::Syntax {
+        file: file.to_owned(),
+        message,
+        remedy: "correct the text",
+    }
+}
+
+/// Sets a key; a comment before it spoke of the value that goes.
+fn put(table: &mut Table, key: &str, new: Value) {
+    table[key] = value(new);
+    if let Some(mut key) = table.key_mut(key) {
+        key.leaf_decor_mut().clear();
+    }
+}
+
+fn friction(f: &Friction) -> InlineTable {
+    let mut table = InlineTable::new();
+    table.insert("viscous_nm_s_per_rad", f.viscous_nm_s_per_rad.into());
+    table.insert("coulomb_nm", f.coulomb_nm.into());
+    table.insert("breakaway_nm", f.breakaway_nm.into());
+    table.insert("stribeck_rad_per_s", f.stribeck_rad_per_s.into());
+    table.insert("offset_nm", f.offset_nm.into());
+    table.insert("band_rad_per_s", f.band_rad_per_s.into());
+    table
+}
+
+/// The changes of one `<link>`.
+fn edit(
+    link: &Node<'_, '_>,
+    text: &str,
+    body: Option<&Body>,
+) -> Option<(std::ops::Range<usize>, String)> {
+    let old = link.children().find(|child| child.has_tag_name("inertial"));
+    let new = body.map(inertial);
+    match (old, new) {
+        (Some(old), new) => Some((old.range(), new.unwrap_or_default())),
+        (None, None) => None,
+        (None, Some(new)) => {
+            let range = link.range();
+            match link.first_child() {
+                Some(first) => Some((first.range().start..first.range().start, new)),
+                None => {
+                    let tag = text[range.clone()]
+                        .trim_end_matches("</link>")
+                        .trim_end_matches("/>")
+                        .trim_end_matches('>');
+                    Some((range, format!("{tag}>{new}</link>")))
+                }
+            }
+        }
+    }
+}
+
+/// Debug prints numbers with the digits that read back as the same number.
+fn inertial(body: &Body) -> String {
+    let (c, i) = (&body.com_m, &body.inertia_kg_m2);
+    format!(
+        "<inertial>\n      <origin xyz=\"{:?} {:?} {:?}\" rpy=\"0 0 0\"/>\n      \
+         <mass value=\"{:?}\"/>\n      <inertia ixx=\"{:?}\" ixy=\"{:?}\" ixz=\"{:?}\" \
+         iyy=\"{:?}\" iyz=\"{:?}\" izz=\"{:?}\"/>\n    </inertial>",
+        c.x,
+        c.y,
+        c.z,
+        body.mass_kg,
+        i[(0, 0)],
+        i[(0, 1)],
+        i[(0, 2)],
+        i[(1, 1)],
+        i[(1, 2)],
+        i[(2, 2)],
+    )
+}

@@ -1,0 +1,65 @@
+//! `supple breakaway`: the torque at which each joint of the simulated arm gives way.
+
+use super::{BreakawayArgs, joints};
+use crate::arms;
+use crate::console::{say, say_json};
+use crate::exit::Failure;
+use serde::Serialize;
+use supple_core::Vector;
+use supple_experiment::calibrate::plant_of;
+use supple_experiment::{Calibration, ExperimentError, breakaway};
+use supple_model::with_dof;
+
+/// One joint.
+#[derive(Serialize)]
+pub struct Line {
+    /// Joint.
+    pub joint: String,
+    /// Half the sum of both directions \[N m\].
+    pub breakaway_nm: f64,
+    /// Half their difference: what gravity or an offset adds \[N m\].
+    pub offset_nm: f64,
+    /// The plant's own \[N m\].
+    pub truth_nm: f64,
+}
+
+/// Does it.
+///
+/// # Errors
+/// [`Failure`].
+pub fn run(args: &BreakawayArgs) -> Result<(), Failure> {
+    let arm = arms::find(&args.arm)?;
+    let joints = joints(&args.joints, arm.dof())?;
+    let lines = with_dof!(arm.dof(), N => {
+        let calibration = Calibration::new(args.seed);
+        let measure = || -> Result<Vec<Line>, ExperimentError> {
+            let config = calibration.start.apply(&arm.config::<N>()?)?;
+            let plant = plant_of::<N>(&arm, &calibration)?;
+            let pose = Vector::<N>::from_fn(|i, _| {
+                let zone = 2.0 * config.limits.soft_zone_rad;
+                let lower = config.limits.position_lower_rad[i] + zone;
+                let upper = config.limits.position_upper_rad[i] - zone;
+                0.0_f64.clamp(lower.min(upper), upper.max(lower))
+            });
+            let found = breakaway(&config, &plant, &pose, &joints, &mut |_| {})?;
+            Ok(joints.iter().zip(found).map(|(joint, found)| Line {
+                joint: arm.joint_names()[*joint].clone(),
+                breakaway_nm: found.breakaway_nm(),
+                offset_nm: found.offset_nm(),
+                truth_nm: plant.friction[*joint].breakaway_nm,
+            }).collect())
+        };
+        measure()
+    })??;
+    if args.json {
+        return say_json(&lines);
+    }
+    say("simulated arm; torque ramped by 0.1 N m/s until two degrees, both ways")?;
+    for line in &lines {
+        say(&format!(
+            "{:10} {:.3} N m, the plant's {:.3} N m; one-sided {:+.3} N m",
+            line.joint, line.breakaway_nm, line.truth_nm, line.offset_nm
+        ))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,132 @@
+//! `supple calibrate`: everything from breakaway to the demo on the simulated arm, in one command.
+
+use super::CalibrateArgs;
+use super::identify::{print, write};
+use super::report::{Found, summary};
+use crate::arms;
+use crate::cli::DemoArgs;
+use crate::console::{json, remark, say};
+use crate::demo;
+use crate::exit::Failure;
+use crate::out::Staging;
+use serde::Serialize;
+use supple_experiment::{Calibration, Truthfulness, calibrate, foretell};
+use supple_model::{Description, with_dof};
+
+/// Models drawn to foretell the tracking error.
+const DRAWS: u64 = 5;
+
+#[derive(Serialize)]
+struct Summary {
+    arm: String,
+    seed: u64,
+    /// Joint, measured and the plant's own \[N m\].
+    breakaway: Vec<(String, f64, f64)>,
+    identification: super::report::Summary,
+    /// Motor, harmonic, amplitude at the motor \[N m\].
+    ripple: Vec<(usize, u32, f64)>,
+    truth: Truthfulness,
+}
+
+/// Does it.
+///
+/// # Errors
+/// [`Failure`].
+pub fn run(args: &CalibrateArgs) -> Result<(), Failure> {
+    let arm = arms::find(&args.arm)?;
+    with_dof!(arm.dof(), N => sized::<N>(&arm, args))??;
+    if args.no_demo {
+        return Ok(());
+    }
+    demo::run(&DemoArgs {
+        arm: args.arm.clone(),
+        model: Some(args.out.clone()),
+        out: args.out.join("demo"),
+        seed: args.seed,
+        json: false,
+        quiet: args.quiet || args.json,
+        no_logs: true,
+    })
+}
+
+fn sized<const N: usize>(arm: &Description, args: &CalibrateArgs) -> Result<(), Failure> {
+    let staging = Staging::new(&args.out)?;
+    let calibration = Calibration {
+        ripple_nm: args.ripple,
+        load: args.load,
+        breakaway: true,
+        log_dir: Some(staging.folder("logs")?),
+        ..Calibration::new(args.seed)
+    };
+    let found = calibrate::<N>(arm, &calibration, &mut |step| {
+        if !args.quiet {
+            remark(step);
+        }
+    })?;
+    let foretold = foretell(&found.description, &found.fit, DRAWS)?;
+    let report = Found {
+        arm: &found.description,
+        fit: &found.fit,
+        logs: vec!["excitation".to_owned()],
+        held_out: vec![(
+            "another excitation".to_owned(),
+            found.held_out.clone(),
+            found.validation.clone(),
+        )],
+        foretold,
+    };
+    let identification = summary(&report);
+    write(&staging, &report, &identification)?;
+    let names = arm.joint_names();
+    let numbers = Summary {
+        arm: arm.name().to_owned(),
+        seed: args.seed,
+        breakaway: names
+            .iter()
+            .zip(&found.breakaway)
+            .map(|(name, (measured, truth))| (name.clone(), measured.breakaway_nm(), *truth))
+            .collect(),
+        ripple: found
+            .ripple
+            .iter()
+            .enumerate()
+            .flat_map(|(motor, table)| {
+                table
+                    .harmonics()
+                    .iter()
+                    .map(move |h| (motor, h.harmonic, h.sine_nm.hypot(h.cosine_nm)))
+            })
+            .collect(),
+        identification,
+        truth: found.truth.clone(),
+    };
+    let text = json(&numbers)?;
+    staging.write("calibration.json", format!("{text}\n").as_bytes())?;
+    staging.publish()?;
+    if args.json {
+        return say(&text);
+    }
+    for (name, measured, truth) in &numbers.breakaway {
+        say(&format!(
+            "breakaway of {name}: {measured:.3} N m, the plant's {truth:.3} N m"
+        ))?;
+    }
+    for (motor, harmonic, amplitude) in &numbers.ripple {
+        say(&format!(
+            "ripple of motor {motor}: harmonic {harmonic}, {amplitude:.5} N m"
+        ))?;
+    }
+    print(&numbers.identification, &args.out)?;
+    let friction: Vec<String> = numbers
+        .truth
+        .friction_relative
+        .iter()
+        .map(|x| format!("{:.2} %", 100.0 * x))
+        .collect();
+    say(&format!(
+        "against the simulated plant: gravity off by {:.3} %, friction curves by {}",
+        100.0 * numbers.truth.gravity_relative,
+        friction.join(", ")
+    ))?;
+    say("this is simulation: real fits of such arms leave 6.7 to 8.4 % of the torque")
+}

@@ -1,0 +1,179 @@
+//! `supple excite design`: a motion for identification, as a table, a figure and a summary.
+
+use super::{Criterion, DesignArgs, joints};
+use crate::arms;
+use crate::console::{json, remark, say};
+use crate::exit::Failure;
+use crate::figures::identification::{Curves, curves};
+use crate::out::Staging;
+use serde::Serialize;
+use std::fmt::Write;
+use supple_core::trajectory::Fourier;
+use supple_ident::design::{self, Design, Designed, Workspace, design};
+use supple_model::{Description, with_dof};
+
+/// Lines of the table per second.
+const TABLE_HZ: f64 = 100.0;
+
+#[derive(Serialize)]
+struct Summary<'a> {
+    arm: &'a str,
+    moving: Vec<usize>,
+    criterion: &'static str,
+    rank: usize,
+    condition: f64,
+    first_value: f64,
+    last_value: f64,
+    duration_s: f64,
+    angular_frequency_rad_per_s: f64,
+    centre_rad: Vec<f64>,
+    sine_rad: Vec<Vec<f64>>,
+    cosine_rad: Vec<Vec<f64>>,
+}
+
+/// Does it.
+///
+/// # Errors
+/// [`Failure`].
+pub fn run(args: &DesignArgs) -> Result<(), Failure> {
+    let arm = arms::find(&args.arm)?;
+    let moving = joints(&args.moving, arm.dof())?;
+    let workspace = match args.workspace[..] {
+        [a, b, c, d, e, f] => Some(Workspace {
+            lower_m: [a, b, c],
+            upper_m: [d, e, f],
+        }),
+        _ => None,
+    };
+    let request = Design {
+        period_s: args.period,
+        periods: args.periods,
+        criterion: match args.criterion {
+            Criterion::Condition => design::Criterion::Condition,
+            Criterion::DOptimality => design::Criterion::DOptimality,
+        },
+        workspace,
+        candidates: args.candidates,
+        seed: args.seed,
+        ..Design::of(&moving)
+    };
+    with_dof!(arm.dof(), N => sized::<N>(&arm, &request, args))?
+}
+
+fn sized<const N: usize>(
+    arm: &Description,
+    request: &Design,
+    args: &DesignArgs,
+) -> Result<(), Failure> {
+    let (config, home) = (arm.config::<N>()?, arm.home::<N>()?);
+    let every = (request.candidates / 10).max(1);
+    let found = design(&config, &home, request, &mut |tried, best| {
+        if !args.quiet && tried % every == 0 {
+            remark(&format!(
+                "{tried} of {} candidates: {best:.4}",
+                request.candidates
+            ));
+        }
+    })?;
+    let staging = Staging::new(&args.out)?;
+    staging.write("excitation.csv", table(&found.series).as_bytes())?;
+    staging.write("excitation.svg", figure(arm, &found)?.as_bytes())?;
+    let columns = |all: &[supple_core::Vector<N>]| {
+        all.iter()
+            .map(|c| c.as_slice().to_vec())
+            .collect::<Vec<_>>()
+    };
+    let series = &found.series;
+    let summary = Summary {
+        arm: arm.name(),
+        moving: request.moving.clone(),
+        criterion: match request.criterion {
+            design::Criterion::Condition => "condition",
+            design::Criterion::DOptimality => "d-optimality",
+        },
+        rank: found.rank,
+        condition: found.condition,
+        first_value: found
+            .history
+            .iter()
+            .copied()
+            .find(|value| value.is_finite())
+            .unwrap_or(f64::MAX),
+        last_value: found.history.last().copied().unwrap_or(f64::MAX),
+        duration_s: series.duration_s,
+        angular_frequency_rad_per_s: series.angular_frequency_rad_per_s,
+        centre_rad: series.centre_rad.as_slice().to_vec(),
+        sine_rad: columns(&series.sine_rad),
+        cosine_rad: columns(&series.cosine_rad),
+    };
+    let text = json(&summary)?;
+    staging.write("summary.json", format!("{text}\n").as_bytes())?;
+    staging.publish()?;
+    if args.json {
+        return say(&text);
+    }
+    say(&format!(
+        "{}: {:.1} s, rank {}, condition number {:.1}; {}",
+        arm.name(),
+        series.duration_s,
+        found.rank,
+        found.condition,
+        args.out.display()
+    ))
+}
+
+fn table<const N: usize>(series: &Fourier<N>) -> String {
+    let mut text = String::from("t");
+    for name in ["q", "qd", "qdd"] {
+        for j in 0..N {
+            let _ = write!(text, ",{name}[{j}]");
+        }
+    }
+    text.push('\n');
+    let count = (series.duration_s * TABLE_HZ).floor() as usize;
+    for i in 0..=count {
+        let t = i as f64 / TABLE_HZ;
+        let at = series.at(t);
+        let _ = write!(text, "{t}");
+        let all = [
+            at.position_rad,
+            at.velocity_rad_per_s,
+            at.acceleration_rad_per_s2,
+        ];
+        for value in all.iter().flat_map(|v| v.iter()) {
+            let _ = write!(text, ",{value:.9}");
+        }
+        text.push('\n');
+    }
+    text
+}
+
+fn figure<const N: usize>(arm: &Description, found: &Designed<N>) -> Result<String, Failure> {
+    let times: Vec<f64> = (0..600)
+        .map(|i| found.series.duration_s * f64::from(i) / 599.0)
+        .collect();
+    let panels: Vec<Curves> = (0..N)
+        .map(|j| Curves {
+            title: arm.joint_names()[j].clone(),
+            unit: "rad, rad/s",
+            first: (
+                "angle",
+                times
+                    .iter()
+                    .map(|t| (*t, found.series.at(*t).position_rad[j]))
+                    .collect(),
+            ),
+            second: (
+                "speed",
+                times
+                    .iter()
+                    .map(|t| (*t, found.series.at(*t).velocity_rad_per_s[j]))
+                    .collect(),
+            ),
+        })
+        .collect();
+    Ok(curves(
+        "Angle and speed of each joint of the excitation",
+        &panels,
+    )?)
+}

@@ -1,0 +1,281 @@
+//! Identification on the command line: design an excitation, measure breakaway, identify from logs, learn
+//! from repeated motion, or all of it on the simulated arm.
+
+mod breakaway;
+mod calibrate;
+mod excite;
+mod identify;
+mod learn;
+mod report;
+
+use crate::exit::{CODES, Failure};
+use clap::{Args, Subcommand, ValueEnum};
+use std::path::PathBuf;
+use supple_ident::{IdentError, Method};
+
+/// What to do.
+#[derive(Clone, Debug, Subcommand)]
+pub enum Command {
+    /// Identify an arm from logs: model, report, verdict.
+    #[command(after_help = CODES)]
+    Identify(IdentifyArgs),
+    /// Excitation for identification.
+    #[command(subcommand)]
+    Excite(ExciteCommand),
+    /// Breakaway torque of each joint of the simulated arm.
+    #[command(after_help = CODES)]
+    Breakaway(BreakawayArgs),
+    /// Breakaway, excitation, identification, validation and demo of the simulated arm.
+    #[command(after_help = CODES)]
+    Calibrate(CalibrateArgs),
+    /// Refit friction and payload from logs of a motion that was repeated.
+    #[command(after_help = CODES)]
+    Learn(LearnArgs),
+}
+
+/// What to do for an excitation.
+#[derive(Clone, Debug, Subcommand)]
+pub enum ExciteCommand {
+    /// Design a motion that tells the parameters of an arm apart, within its limits.
+    #[command(after_help = CODES)]
+    Design(DesignArgs),
+}
+
+/// Criterion of a design.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Criterion {
+    /// Condition number of the base regressor.
+    Condition,
+    /// Determinant of its information.
+    DOptimality,
+}
+
+/// Solver.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Solver {
+    /// Ordinary least squares.
+    Ols,
+    /// Weighted by joint.
+    Wls,
+    /// Weighted by joint, robust.
+    Irls,
+    /// Weighted, physically consistent.
+    Consistent,
+}
+
+impl From<Solver> for Method {
+    fn from(solver: Solver) -> Method {
+        match solver {
+            Solver::Ols => Method::Ols,
+            Solver::Wls => Method::Wls,
+            Solver::Irls => Method::Irls,
+            Solver::Consistent => Method::Consistent,
+        }
+    }
+}
+
+/// Arguments of `identify`.
+#[derive(Clone, Debug, Args)]
+pub struct IdentifyArgs {
+    /// Logs: the project's MCAP, or CSV with the columns t, q[0].., tau[0].. and, if measured, qd[0]..
+    #[arg(required = true, value_name = "LOG")]
+    pub logs: Vec<PathBuf>,
+    /// A built-in arm, or the path of an arm's TOML or of its folder: kinematics, and the prior.
+    #[arg(long, value_name = "NAME|PATH")]
+    pub arm: String,
+    /// Folder for arm.toml, arm.urdf, report.html and summary.json.
+    #[arg(long, value_name = "DIR", default_value = "out/identified")]
+    pub out: PathBuf,
+    /// Logs to predict, not fitted; without, the last fifth of the first log is kept back for it.
+    #[arg(long, value_name = "LOG")]
+    pub validate: Vec<PathBuf>,
+    /// Joints to identify, from 0; the others were held. Default: all.
+    #[arg(long, value_name = "J,J..", value_delimiter = ',')]
+    pub moving: Vec<usize>,
+    /// Two joints whose sum turns a motor, such as 4+5.
+    #[arg(long, value_name = "J+J", value_parser = pair)]
+    pub coupling: Vec<(usize, usize)>,
+    /// Cutoff of the zero-phase filter [Hz].
+    #[arg(long, value_name = "HZ", default_value_t = 8.0)]
+    pub cutoff: f64,
+    /// Rate of the grid [Hz]. Default: the log's own.
+    #[arg(long, value_name = "HZ")]
+    pub rate: Option<f64>,
+    /// Solver.
+    #[arg(long, value_enum, default_value = "consistent")]
+    pub method: Solver,
+    /// Leave out samples of a joint slower than this, and fit a Stribeck dip from them [rad/s].
+    #[arg(long, value_name = "RAD/S")]
+    pub slow: Option<f64>,
+    /// Standard deviation of the torque noise of each moving joint [N m]. Default: from residuals.
+    #[arg(long, value_name = "NM,NM..", value_delimiter = ',')]
+    pub noise: Vec<f64>,
+    /// Print the summary as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `excite design`.
+#[derive(Clone, Debug, Args)]
+pub struct DesignArgs {
+    /// A built-in arm, or the path of an arm's TOML or of its folder.
+    #[arg(long, value_name = "NAME|PATH")]
+    pub arm: String,
+    /// Folder for excitation.csv, excitation.svg and summary.json.
+    #[arg(long, value_name = "DIR", default_value = "out/excitation")]
+    pub out: PathBuf,
+    /// Joints to move, from 0. Default: all.
+    #[arg(long, value_name = "J,J..", value_delimiter = ',')]
+    pub moving: Vec<usize>,
+    /// What is to be small.
+    #[arg(long, value_enum, default_value = "condition")]
+    pub criterion: Criterion,
+    /// Length of a period [s].
+    #[arg(long, value_name = "S", default_value_t = 15.0)]
+    pub period: f64,
+    /// Number of periods.
+    #[arg(long, value_name = "N", default_value_t = 4.0)]
+    pub periods: f64,
+    /// Candidates tried.
+    #[arg(long, value_name = "N", default_value_t = 3000)]
+    pub candidates: usize,
+    /// Box that the tip stays in, base axes: least x, y, z, greatest x, y, z [m].
+    #[arg(
+        long,
+        value_name = "M",
+        value_delimiter = ',',
+        num_args = 6,
+        allow_hyphen_values = true
+    )]
+    pub workspace: Vec<f64>,
+    /// Seed of the search.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Print the summary as JSON.
+    #[arg(long)]
+    pub json: bool,
+    /// No progress.
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// Arguments of `breakaway`.
+#[derive(Clone, Debug, Args)]
+pub struct BreakawayArgs {
+    /// A built-in arm, or the path of an arm's TOML or of its folder.
+    #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
+    pub arm: String,
+    /// Joints, from 0. Default: all.
+    #[arg(long, value_name = "J,J..", value_delimiter = ',')]
+    pub joints: Vec<usize>,
+    /// Seed of the starting model and of every noise.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `calibrate`.
+#[derive(Clone, Debug, Args)]
+pub struct CalibrateArgs {
+    /// A built-in arm, or the path of an arm's TOML or of its folder: the simulated plant.
+    #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
+    pub arm: String,
+    /// Folder for the identified arm, the reports and the logs.
+    #[arg(long, value_name = "DIR", default_value = "out/calibrate")]
+    pub out: PathBuf,
+    /// Seed of the starting model and of every noise.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Torque ripple of the plant's motors, seen at the joints [N m].
+    #[arg(long, value_name = "NM", default_value_t = 0.0)]
+    pub ripple: f64,
+    /// The plant's friction depends on direction and load too.
+    #[arg(long)]
+    pub load: bool,
+    /// End with the model: no demo.
+    #[arg(long)]
+    pub no_demo: bool,
+    /// Print the summary as JSON.
+    #[arg(long)]
+    pub json: bool,
+    /// No progress.
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// Arguments of `learn`.
+#[derive(Clone, Debug, Args)]
+pub struct LearnArgs {
+    /// Logs of the motion, the project's MCAP or CSV; the last periods are enough.
+    #[arg(required = true, value_name = "LOG")]
+    pub logs: Vec<PathBuf>,
+    /// The model that was in use: a built-in arm, or the path of a TOML or of its folder.
+    #[arg(long, value_name = "NAME|PATH")]
+    pub arm: String,
+    /// Folder for the model with what was learnt.
+    #[arg(long, value_name = "DIR", default_value = "out/learnt")]
+    pub out: PathBuf,
+    /// Only so much of the end of each log counts [s]. Default: all.
+    #[arg(long, value_name = "S")]
+    pub last: Option<f64>,
+    /// Look for a body in the hand of about this mass too [kg].
+    #[arg(long, value_name = "KG")]
+    pub payload: Option<f64>,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl Command {
+    /// JSON is expected on standard output.
+    pub fn json(&self) -> bool {
+        match self {
+            Command::Identify(args) => args.json,
+            Command::Excite(ExciteCommand::Design(args)) => args.json,
+            Command::Breakaway(args) => args.json,
+            Command::Calibrate(args) => args.json,
+            Command::Learn(args) => args.json,
+        }
+    }
+}
+
+/// Does it.
+///
+/// # Errors
+/// [`Failure`].
+pub fn run(command: &Command) -> Result<(), Failure> {
+    match command {
+        Command::Identify(args) => identify::run(args),
+        Command::Excite(ExciteCommand::Design(args)) => excite::run(args),
+        Command::Breakaway(args) => breakaway::run(args),
+        Command::Calibrate(args) => calibrate::run(args),
+        Command::Learn(args) => learn::run(args),
+    }
+}
+
+fn pair(text: &str) -> Result<(usize, usize), String> {
+    let parts = text.split_once('+');
+    let number = |part: &str| part.trim().parse::<usize>();
+    match parts.map(|(a, b)| (number(a), number(b))) {
+        Some((Ok(a), Ok(b))) => Ok((a, b)),
+        _ => Err("give two joints as 4+5".to_owned()),
+    }
+}
+
+/// Joints asked for, or all of `dof`.
+fn joints(asked: &[usize], dof: usize) -> Result<Vec<usize>, Failure> {
+    if asked.is_empty() {
+        return Ok((0..dof).collect());
+    }
+    let increasing = asked.windows(2).all(|w| w[0] < w[1]);
+    if increasing && asked.iter().all(|joint| *joint < dof) {
+        return Ok(asked.to_vec());
+    }
+    Err(Failure::Ident(IdentError::Shape {
+        argument: "joints".to_owned(),
+        expected: format!("numbers below {dof}, increasing"),
+        found: format!("{asked:?}"),
+    }))
+}

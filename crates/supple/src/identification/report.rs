@@ -1,0 +1,236 @@
+//! The report of an identification: one HTML file that needs no other, and its numbers.
+
+use crate::exit::Failure;
+use crate::figures::identification::{Curves, curves};
+use askama::Template;
+use serde::Serialize;
+use supple_experiment::Foretold;
+use supple_ident::{DMatrix, Fit, Motion, Validation};
+use supple_model::Description;
+
+/// Points of a curve at most.
+const POINTS: usize = 900;
+/// Half-width of a 95 % confidence interval in standard deviations.
+const CONFIDENCE: f64 = 1.96;
+
+/// The numbers.
+#[derive(Clone, Debug, Serialize)]
+pub struct Summary {
+    /// The arm.
+    pub arm: String,
+    /// Logs that were fitted.
+    pub logs: Vec<String>,
+    /// Combinations that the data determine, of how many columns.
+    pub rank: usize,
+    /// Columns.
+    pub columns: usize,
+    /// Condition number of the base regressor, columns scaled to unit length.
+    pub condition: f64,
+    /// `|tau - tau_hat| / |tau|` on what was fitted.
+    pub training_relative: f64,
+    /// Held-out data, log by log.
+    pub held_out: Vec<HeldOut>,
+    /// Share of random poses with a positive definite mass matrix.
+    pub positive_definite: f64,
+    /// Friction, joint by joint.
+    pub friction: Vec<JointFriction>,
+    /// Base parameters with 95 % confidence intervals.
+    pub base: Vec<BaseParameter>,
+    /// Directions that change no torque.
+    pub null_space: Vec<String>,
+    /// What was chosen by cross-validation, as tables.
+    pub choices: Vec<(String, String)>,
+    /// What was let pass.
+    pub warnings: Vec<String>,
+    /// In plain words, from held-out data.
+    pub verdict: String,
+    /// In plain words, for 5 N/m.
+    pub verdict_at_5_n_per_m: String,
+    /// The tracking error behind it.
+    pub foretold: Option<Foretold>,
+}
+
+/// Prediction of one log.
+#[derive(Clone, Debug, Serialize)]
+pub struct HeldOut {
+    /// Which.
+    pub log: String,
+    /// RMS error of each moving joint \[N m\].
+    pub rms_nm: Vec<f64>,
+    /// Relative error of each moving joint.
+    pub relative: Vec<f64>,
+    /// The same over all joints.
+    pub total_relative: f64,
+}
+
+/// Friction of one joint.
+#[derive(Clone, Debug, Serialize)]
+pub struct JointFriction {
+    /// Joint.
+    pub joint: String,
+    /// `V`.
+    pub viscous_nm_s_per_rad: f64,
+    /// `S`.
+    pub coulomb_nm: f64,
+    /// `S_0`.
+    pub breakaway_nm: f64,
+    /// Offset.
+    pub offset_nm: f64,
+}
+
+/// One base parameter.
+#[derive(Clone, Debug, Serialize)]
+pub struct BaseParameter {
+    /// The combination in words.
+    pub combination: String,
+    /// Its value.
+    pub value: f64,
+    /// Half the width of its 95 % confidence interval.
+    pub interval: f64,
+}
+
+/// What the report is made of.
+pub struct Found<'a, const N: usize> {
+    /// The arm that was found.
+    pub arm: &'a Description,
+    /// The fit.
+    pub fit: &'a Fit<N>,
+    /// Names of the fitted logs.
+    pub logs: Vec<String>,
+    /// Held-out logs: name, motion, prediction.
+    pub held_out: Vec<(String, Motion, Validation)>,
+    /// Tracking error to expect.
+    pub foretold: Option<Foretold>,
+}
+
+/// The numbers of a fit.
+pub fn summary<const N: usize>(found: &Found<'_, N>) -> Summary {
+    let fit = found.fit;
+    let values = fit.base_parameters();
+    let words = fit.base.text(&fit.columns.names());
+    let base = words
+        .into_iter()
+        .enumerate()
+        .map(|(i, combination)| BaseParameter {
+            combination,
+            value: values[i],
+            interval: CONFIDENCE * fit.base_std[i],
+        });
+    let friction = fit.friction_with(found.arm.friction());
+    let names = found.arm.joint_names();
+    Summary {
+        arm: found.arm.name().to_owned(),
+        logs: found.logs.clone(),
+        rank: fit.rank(),
+        columns: fit.columns.len(),
+        condition: fit.condition(),
+        training_relative: fit.training_relative,
+        held_out: found
+            .held_out
+            .iter()
+            .map(|(log, _, v)| HeldOut {
+                log: log.clone(),
+                rms_nm: v.rms_nm.clone(),
+                relative: v.relative.clone(),
+                total_relative: v.total_relative,
+            })
+            .collect(),
+        positive_definite: found
+            .held_out
+            .iter()
+            .map(|(_, _, v)| v.positive_definite)
+            .fold(1.0, f64::min),
+        friction: (0..N)
+            .map(|j| JointFriction {
+                joint: names[j].clone(),
+                viscous_nm_s_per_rad: friction[j].viscous_nm_s_per_rad,
+                coulomb_nm: friction[j].coulomb_nm,
+                breakaway_nm: friction[j].breakaway_nm,
+                offset_nm: friction[j].offset_nm,
+            })
+            .collect(),
+        base: base.collect(),
+        null_space: fit.base.null_space_text(&fit.columns.names()),
+        choices: fit
+            .choices
+            .iter()
+            .map(|choice| (choice.of.to_owned(), choice.table.to_string()))
+            .collect(),
+        warnings: fit.warnings.iter().map(ToString::to_string).collect(),
+        verdict: found
+            .held_out
+            .first()
+            .map_or_else(|| "not validated".to_owned(), |(_, _, v)| v.verdict()),
+        verdict_at_5_n_per_m: found.foretold.as_ref().map_or_else(
+            || "not foretold: the arm cannot follow the paper's sinusoid".to_owned(),
+            Foretold::verdict,
+        ),
+        foretold: found.foretold.clone(),
+    }
+}
+
+#[derive(Template)]
+#[template(path = "identification.html")]
+struct Page<'a> {
+    summary: &'a Summary,
+    version: &'static str,
+    figures: Vec<(String, String, String)>,
+}
+
+/// The report.
+///
+/// # Errors
+/// [`Failure::Compose`], [`Failure::Figure`].
+pub fn html<const N: usize>(found: &Found<'_, N>, summary: &Summary) -> Result<String, Failure> {
+    let mut figures = Vec::new();
+    for (name, motion, _) in &found.held_out {
+        let (torques, residuals) = drawn(found, motion)?;
+        figures.push((name.clone(), torques, residuals));
+    }
+    let page = Page {
+        summary,
+        version: env!("CARGO_PKG_VERSION"),
+        figures,
+    };
+    page.render()
+        .map_err(|error| Failure::Compose(error.to_string()))
+}
+
+/// Measured against predicted, and what is left.
+fn drawn<const N: usize>(
+    found: &Found<'_, N>,
+    motion: &Motion,
+) -> Result<(String, String), Failure> {
+    let fit = found.fit;
+    let predicted: DMatrix<f64> = fit.predict_motion(motion)?;
+    let every = motion.samples().div_ceil(POINTS).max(1);
+    let (mut torques, mut residuals) = (Vec::new(), Vec::new());
+    for (row, &joint) in fit.columns.moving().iter().enumerate() {
+        let points = |value: &dyn Fn(usize) -> f64| -> Vec<(f64, f64)> {
+            (0..motion.samples())
+                .step_by(every)
+                .map(|i| (i as f64 / motion.rate_hz, value(i)))
+                .collect()
+        };
+        let title = found.arm.joint_names()[joint].clone();
+        torques.push(Curves {
+            title: title.clone(),
+            unit: "torque [N m]",
+            first: ("measured", points(&|i| motion.tau[(i, joint)])),
+            second: ("predicted", points(&|i| predicted[(i, row)])),
+        });
+        residuals.push(Curves {
+            title,
+            unit: "residual [N m]",
+            first: ("zero", points(&|_| 0.0)),
+            second: (
+                "measured - predicted",
+                points(&|i| motion.tau[(i, joint)] - predicted[(i, row)]),
+            ),
+        });
+    }
+    Ok((
+        curves("Measured and predicted torque of each joint", &torques)?,
+        curves("Residual torque of each joint", &residuals)?,
+    ))
+}
