@@ -4,9 +4,9 @@ use proptest::prelude::*;
 use proptest::strategy::Union;
 use supple_core::codes::{RequestCode, RequestCodeError, VALUES};
 use supple_core::config::Gains;
-use supple_core::controller::Request;
+use supple_core::controller::{Breakaway, Request};
 use supple_core::math::Vector3;
-use supple_core::trajectory::{Arc, Line, Probe, Quadrant, Sinusoid};
+use supple_core::trajectory::{Arc, Fourier, Line, Probe, Quadrant, Sinusoid};
 use supple_core::{Trajectory, Vector};
 
 fn number() -> impl Strategy<Value = f64> {
@@ -83,6 +83,31 @@ fn request() -> impl Strategy<Value = Numbered> {
         trajectory()
             .prop_map(|(kind, trajectory)| ((4, kind), Some(Request::Track(trajectory))))
             .boxed(),
+        proptest::collection::vec(number(), 47)
+            .prop_map(|x| {
+                let column = |i: usize| Vector::<4>::from_column_slice(&x[4 * i..4 * i + 4]);
+                let series = Fourier {
+                    centre_rad: column(0),
+                    sine_rad: std::array::from_fn(|k| column(1 + k)),
+                    cosine_rad: std::array::from_fn(|k| column(6 + k)),
+                    angular_frequency_rad_per_s: x[44],
+                    duration_s: x[45],
+                    ramp_s: x[46],
+                };
+                ((7, 0), Some(Request::Excite(series)))
+            })
+            .boxed(),
+        (any::<u8>(), number(), number(), number())
+            .prop_map(|(joint, rate_nm_per_s, stop_rad, limit_nm)| {
+                let ramp = Breakaway {
+                    joint: joint.into(),
+                    rate_nm_per_s,
+                    stop_rad,
+                    limit_nm,
+                };
+                ((8, 0), Some(Request::Breakaway(ramp)))
+            })
+            .boxed(),
         gains
             .prop_map(|(stiffness_n_per_m, damping_n_s_per_m, ramp_s)| {
                 let gains = Gains {
@@ -119,15 +144,15 @@ fn decode(
 
 #[test]
 fn what_is_not_known_or_not_whole_is_refused() {
-    assert_eq!(decode(7, 0, &[]), Err(RequestCodeError::Kind(7)));
+    assert_eq!(decode(9, 0, &[]), Err(RequestCodeError::Kind(9)));
     assert_eq!(decode(4, 0, &[]), Err(RequestCodeError::Trajectory(0)));
     assert_eq!(
         decode(4, 7, &[0.0; 16]),
         Err(RequestCodeError::Trajectory(7))
     );
-    for (kind, found, expected) in [(3, 4, 5), (3, 6, 5), (1, 1, 0), (1, 17, 16)] {
+    for (kind, found, expected) in [(3, 4, 5), (3, 6, 5), (1, 1, 0), (1, 81, 80)] {
         assert_eq!(
-            decode(kind, 0, &[0.0; 17][..found]),
+            decode(kind, 0, &[0.0; 81][..found]),
             Err(RequestCodeError::Count { found, expected })
         );
     }
@@ -136,7 +161,7 @@ fn what_is_not_known_or_not_whole_is_refused() {
     for count in [2.5, -1.0] {
         assert_eq!(
             decode(4, 6, &strokes(count)),
-            Err(RequestCodeError::Strokes(count))
+            Err(RequestCodeError::Whole(count))
         );
     }
 }

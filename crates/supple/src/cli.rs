@@ -128,18 +128,13 @@ impl Command {
     pub fn json(&self) -> bool {
         match self {
             Command::Demo(args) => args.json,
-<<<<<<< HEAD
+            Command::Identification(command) => command.json(),
             Command::Arms { json } | Command::Doctor { json } => *json,
             Command::Log(
                 LogCommand::Info { json, .. }
                 | LogCommand::Recover { json, .. }
                 | LogCommand::Replay { json, .. },
             ) => *json,
-=======
-            Command::Identification(command) => command.json(),
-            Command::Arms { json } => *json,
-            Command::Log(LogCommand::Info { json, .. } | LogCommand::Recover { json, .. }) => *json,
->>>>>>> b026ec1 (Identification in the core, the libraries and on the command line)
             Command::Log(LogCommand::Export { .. }) | Command::Completions { .. } => false,
         }
     }

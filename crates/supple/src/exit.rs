@@ -9,12 +9,9 @@
 //! | 4 | the arm cannot do the experiment |
 //! | 5 | a fault ended a run that should have gone through; all results are written |
 //! | 6 | a file cannot be read or written |
-<<<<<<< HEAD
 //! | 7 | a replay does not give the logged answers |
 //! | 8 | the machine cannot run an arm in real time as it should |
-=======
-//! | 7 | the logs do not give a model |
->>>>>>> b026ec1 (Identification in the core, the libraries and on the command line)
+//! | 9 | the logs do not give a model |
 //! | 130 | interrupted |
 
 use crate::figures::FigureError;
@@ -34,12 +31,9 @@ pub const CODES: &str = "Exit codes:
   4    the arm cannot do the experiment
   5    a fault ended a run that should have gone through; all results are written
   6    a file cannot be read or written
-<<<<<<< HEAD
   7    a replay does not give the logged answers
   8    the machine cannot run an arm in real time as it should
-=======
-  7    the logs do not give a model
->>>>>>> b026ec1 (Identification in the core, the libraries and on the command line)
+  9    the logs do not give a model
   130  interrupted";
 
 /// Why the program did not do what it was asked for. One line that names the cause and the remedy.
@@ -73,7 +67,6 @@ pub enum Failure {
     /// A log.
     #[error(transparent)]
     Log(#[from] LogError),
-<<<<<<< HEAD
     /// A replay that is not the run.
     #[error(
         "{different} of {steps} steps of {} do not give the logged answers; the log is of another \
@@ -94,7 +87,6 @@ pub enum Failure {
         /// Names of the checks that failed.
         failed: String,
     },
-=======
     /// Logs that give no model.
     #[error(transparent)]
     Ident(#[from] IdentError),
@@ -104,7 +96,6 @@ pub enum Failure {
     /// A model that cannot be described or saved.
     #[error(transparent)]
     Save(#[from] SaveError),
->>>>>>> b026ec1 (Identification in the core, the libraries and on the command line)
     /// A file.
     #[error("cannot {action} {}: {error}; {remedy}", path.display())]
     File {
@@ -157,12 +148,9 @@ impl Failure {
             4 => "experiment",
             5 => "fault",
             6 => "file",
-<<<<<<< HEAD
             7 => "replay",
             8 => "machine",
-=======
-            7 => "identification",
->>>>>>> b026ec1 (Identification in the core, the libraries and on the command line)
+            9 => "identification",
             _ => "internal",
         }
     }
@@ -183,14 +171,11 @@ impl Failure {
             Failure::Fault { .. } => 5,
             Failure::Log(error) => log_code(error),
             Failure::File { .. } | Failure::Exists { .. } => 6,
-<<<<<<< HEAD
             Failure::Different { .. } => 7,
             Failure::NotReady { .. } => 8,
-=======
-            Failure::Ident(_) => 7,
+            Failure::Ident(_) => 9,
             Failure::Read(error) => read_code(error),
             Failure::Save(error) => save_code(error),
->>>>>>> b026ec1 (Identification in the core, the libraries and on the command line)
             Failure::Figure(_) | Failure::Compose(_) => 1,
         }
     }
@@ -208,7 +193,7 @@ fn experiment_code(error: &ExperimentError) -> u8 {
         | ExperimentError::FaultAtStart { .. }
         | ExperimentError::Fault { .. }
         | ExperimentError::Stuck { .. } => 4,
-        ExperimentError::Ident(_) => 7,
+        ExperimentError::Ident(_) => 9,
         ExperimentError::Save(error) => save_code(error),
         ExperimentError::Log(error) => log_code(error),
     }
@@ -218,13 +203,13 @@ fn read_code(error: &ReadError) -> u8 {
     match error {
         ReadError::Mcap(error) => log_code(error),
         ReadError::File { .. } => 6,
-        ReadError::Table { .. } => 7,
+        ReadError::Table { .. } => 9,
     }
 }
 
 fn save_code(error: &SaveError) -> u8 {
     match error {
-        SaveError::Fit(_) => 7,
+        SaveError::Fit(_) => 9,
         SaveError::Model(ModelError::Write { .. }) => 6,
         SaveError::Model(_) => 3,
     }

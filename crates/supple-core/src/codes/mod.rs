@@ -10,13 +10,15 @@ pub use request::{RequestCode, RequestCodeError, VALUES};
 use crate::controller::{Fault, Mode, Refusal, SafeAction};
 
 /// Every mode, at the place of its number.
-pub const MODES: [Mode; 6] = [
+pub const MODES: [Mode; 8] = [
     Mode::Idle,
     Mode::GravityHold,
     Mode::Move,
     Mode::Track,
     Mode::Probe,
     Mode::Fault,
+    Mode::Excite,
+    Mode::Breakaway,
 ];
 
 /// A mode by its number.

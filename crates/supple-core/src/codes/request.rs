@@ -6,6 +6,8 @@
 //! |---|---|
 //! | move | `target_rad` (N), `duration_s` |
 //! | gains | `stiffness_n_per_m`, `damping_n_s_per_m`, `ramp_s` |
+//! | excite | `centre_rad` (N), `sine_rad` (5 harmonics of N), `cosine_rad` (5 of N), `angular_frequency_rad_per_s`, `duration_s`, `ramp_s` |
+//! | breakaway | `joint`, `rate_nm_per_s`, `stop_rad`, `limit_nm` |
 //! | hold | `position_m` |
 //! | line | `from_m`, `to_m`, `duration_s` |
 //! | sinusoid | `centre_m`, `amplitude_m`, `angular_frequency_rad_per_s`, `ramp_s` |
@@ -16,18 +18,19 @@
 //! Decoding says whether numbers are a request, not whether the request is sound: the controller does.
 
 use crate::config::Gains;
-use crate::controller::Request;
+use crate::controller::{Breakaway, Request};
 use crate::math::{Vector, Vector3};
-use crate::trajectory::{Arc, Line, Probe, Quadrant, Sinusoid, Trajectory};
+use crate::trajectory::{Arc, Fourier, HARMONICS, Line, Probe, Quadrant, Sinusoid, Trajectory};
 use core::fmt;
 
-/// Most values that a request carries.
-pub const VALUES: usize = 16;
+/// Most values that a request carries: those of an excitation of 7 joints.
+pub const VALUES: usize = 80;
 
 /// A request as numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RequestCode {
-    /// 0 none, 1 idle, 2 gravity hold, 3 move, 4 track, 5 gains, 6 reset.
+    /// 0 none, 1 idle, 2 gravity hold, 3 move, 4 track, 5 gains, 6 reset,
+    /// 7 excite, 8 breakaway.
     pub kind: u8,
     /// Of a track request: 1 hold, 2 line, 3 sinusoid, 4 arc, 5 quadrant, 6 probe; 0 otherwise.
     pub trajectory: u8,
@@ -51,22 +54,22 @@ pub enum RequestCodeError {
         /// Values that the request takes.
         expected: usize,
     },
-    /// A number of strokes that is not whole.
-    Strokes(f64),
+    /// A number of strokes, or of a joint, that is not whole.
+    Whole(f64),
 }
 
 impl fmt::Display for RequestCodeError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            RequestCodeError::Kind(kind) => write!(f, "request is {kind}, known are 0 to 6"),
+            RequestCodeError::Kind(kind) => write!(f, "request is {kind}, known are 0 to 8"),
             RequestCodeError::Trajectory(kind) => {
                 write!(f, "trajectory is {kind}, known are 1 to 6")
             }
             RequestCodeError::Count { found, expected } => {
                 write!(f, "the request has {found} values, it takes {expected}")
             }
-            RequestCodeError::Strokes(found) => {
-                write!(f, "strokes is {found}, expected a whole number")
+            RequestCodeError::Whole(found) => {
+                write!(f, "a count is {found}, expected a whole number")
             }
         }
     }
@@ -109,6 +112,27 @@ impl RequestCode {
                 code.numbers(&[*ramp_s]);
             }
             Some(Request::Reset) => code.kind = 6,
+            Some(Request::Excite(series)) => {
+                code.kind = 7;
+                let columns = series.sine_rad.iter().chain(&series.cosine_rad);
+                for column in [&series.centre_rad].into_iter().chain(columns) {
+                    code.numbers(column.as_slice());
+                }
+                code.numbers(&[
+                    series.angular_frequency_rad_per_s,
+                    series.duration_s,
+                    series.ramp_s,
+                ]);
+            }
+            Some(Request::Breakaway(ramp)) => {
+                code.kind = 8;
+                code.numbers(&[
+                    ramp.joint as f64,
+                    ramp.rate_nm_per_s,
+                    ramp.stop_rad,
+                    ramp.limit_nm,
+                ]);
+            }
         }
         code
     }
@@ -168,6 +192,13 @@ impl RequestCode {
                 ramp_s: rest.number(),
             }),
             6 => Some(Request::Reset),
+            7 => Some(Request::Excite(rest.series())),
+            8 => Some(Request::Breakaway(Breakaway {
+                joint: rest.count()? as usize,
+                rate_nm_per_s: rest.number(),
+                stop_rad: rest.number(),
+                limit_nm: rest.number(),
+            })),
             unknown => return Err(RequestCodeError::Kind(unknown)),
         };
         let (found, expected) = (rest.values.len(), rest.taken);
@@ -263,13 +294,28 @@ impl Rest<'_> {
         Vector3::from(self.take::<3>())
     }
 
+    fn series<const N: usize>(&mut self) -> Fourier<N> {
+        let mut column = || Vector::<N>::from(self.take::<N>());
+        let centre_rad = column();
+        let sine_rad = [(); HARMONICS].map(|()| column());
+        let cosine_rad = [(); HARMONICS].map(|()| column());
+        Fourier {
+            centre_rad,
+            sine_rad,
+            cosine_rad,
+            angular_frequency_rad_per_s: self.number(),
+            duration_s: self.number(),
+            ramp_s: self.number(),
+        }
+    }
+
     fn count(&mut self) -> Result<u32, RequestCodeError> {
         let number = self.number();
         let count = number as u32;
         if f64::from(count) == number {
             Ok(count)
         } else {
-            Err(RequestCodeError::Strokes(number))
+            Err(RequestCodeError::Whole(number))
         }
     }
 

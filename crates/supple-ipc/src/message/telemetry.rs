@@ -102,6 +102,7 @@ pub struct TermTorques {
     pub nullspace: [f64; MAX_DOF],
     pub joint_pd: [f64; MAX_DOF],
     pub soft_stop: [f64; MAX_DOF],
+    pub ripple: [f64; MAX_DOF],
     pub handover: [f64; MAX_DOF],
 }
 
@@ -133,6 +134,7 @@ impl TermTorques {
             nullspace: wide(&torques.nullspace),
             joint_pd: wide(&torques.joint_pd),
             soft_stop: wide(&torques.soft_stop),
+            ripple: wide(&torques.ripple),
             handover: wide(&torques.handover),
         }
     }
