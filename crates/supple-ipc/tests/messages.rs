@@ -18,9 +18,9 @@ fn there_is_no_padding_to_share() {
     );
     assert_eq!(size_of::<TorqueCommand>(), 8 + 2 * joints + 8);
     assert_eq!(size_of::<Text>(), 256);
-    assert_eq!(size_of::<OperatorRequest>(), 3 * 8 + 16 * 8 + 8);
+    assert_eq!(size_of::<OperatorRequest>(), 3 * 8 + 80 * 8 + 8);
     assert_eq!(size_of::<OperatorReply>(), 3 * 8 + size_of::<Text>() + 8);
-    assert_eq!(size_of::<TermTorques>(), 12 * joints);
+    assert_eq!(size_of::<TermTorques>(), 13 * joints);
     assert_eq!(size_of::<CycleTiming>(), 3 * 8);
     assert_eq!(
         size_of::<Telemetry>(),
