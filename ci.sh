@@ -81,7 +81,7 @@ step_package() {
     "$bin/pip" install --quiet ./python
     (
         cd python
-        "$bin/python" -m mypy package/supple benchmarks
+        "$bin/python" -m mypy package/supple benchmarks examples
         "$bin/python" -m mypy.stubtest supple
         "$bin/python" -m pytest
     )

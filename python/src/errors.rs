@@ -4,6 +4,7 @@ use pyo3::PyErr;
 use pyo3::exceptions::{PyFileNotFoundError, PyOSError, PyRuntimeError, PyValueError};
 use std::io;
 use supple_experiment::ExperimentError;
+use supple_ident::{IdentError, SaveError};
 use supple_log::LogError;
 use supple_model::ModelError;
 
@@ -41,5 +42,18 @@ pub fn experiment(error: ExperimentError) -> PyErr {
         ExperimentError::Log(error) => log(error),
         ExperimentError::FaultAtStart { .. } => PyRuntimeError::new_err(error.to_string()),
         _ => PyValueError::new_err(error.to_string()),
+    }
+}
+
+/// Logs and options that identification refuses.
+pub fn identification(error: IdentError) -> PyErr {
+    PyValueError::new_err(error.to_string())
+}
+
+/// Fits that are no arm.
+pub fn save(error: SaveError) -> PyErr {
+    match error {
+        SaveError::Fit(error) => identification(error),
+        SaveError::Model(error) => model(error),
     }
 }

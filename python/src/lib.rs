@@ -7,10 +7,14 @@
 
 mod arm;
 mod arrays;
+mod base;
 mod dynamics;
 mod errors;
+mod excite;
+mod fit;
 mod friction;
 mod log;
+mod samples;
 mod simulate;
 mod table;
 
@@ -23,6 +27,12 @@ mod _native {
 
     #[pymodule_export]
     use super::arm::{Arm, assets};
+    #[pymodule_export]
+    use super::base::base_parameters;
+    #[pymodule_export]
+    use super::excite::{design_excitation, excite};
+    #[pymodule_export]
+    use super::fit::{Fit, identify};
     #[pymodule_export]
     use super::friction::Friction;
     #[pymodule_export]

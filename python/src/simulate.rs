@@ -31,18 +31,33 @@ pub struct Options {
     log_dir: Option<PathBuf>,
 }
 
+/// The truth about the plant, and what its controller takes for it.
+struct Arms<'a> {
+    plant: &'a Description,
+    model: Option<&'a Description>,
+}
+
 struct Outcome {
     run: Run,
     cycles: Table,
     strokes: Vec<Stroke>,
 }
 
-/// Runs an experiment in virtual time.
+/// Runs an experiment in virtual time. `model` is what the controller takes the arm for; without, it
+/// knows the arm itself, but for the errors that are asked for.
 #[pyfunction]
-pub fn simulate<'py>(py: Python<'py>, arm: &Arm, options: Options) -> PyResult<Bound<'py, PyDict>> {
-    let description = arm.description();
+pub fn simulate<'py>(
+    py: Python<'py>,
+    arm: &Arm,
+    model: Option<&Arm>,
+    options: Options,
+) -> PyResult<Bound<'py, PyDict>> {
+    let arms = Arms {
+        plant: arm.description(),
+        model: model.map(Arm::description),
+    };
     let outcome = py.detach(|| {
-        with_dof!(description.dof(), N => sized::<N>(description, &options))
+        with_dof!(arms.plant.dof(), N => sized::<N>(&arms, &options))
             .map_err(ExperimentError::from)
             .flatten()
     });
@@ -61,11 +76,9 @@ pub fn simulate<'py>(py: Python<'py>, arm: &Arm, options: Options) -> PyResult<B
     Ok(dict)
 }
 
-fn sized<const N: usize>(
-    description: &Description,
-    options: &Options,
-) -> Result<Outcome, ExperimentError> {
-    let plan = plan::<N>(description, options)?;
+fn sized<const N: usize>(arms: &Arms<'_>, options: &Options) -> Result<Outcome, ExperimentError> {
+    let plan = plan::<N>(arms, options)?;
+    let description = arms.model.unwrap_or(arms.plant);
     let mut recorder = match &options.log_dir {
         Some(folder) => Some(Recorder::create(folder, description, &plan, options.seed)?),
         None => None,
@@ -97,11 +110,11 @@ fn sized<const N: usize>(
     })
 }
 
-fn plan<const N: usize>(
-    description: &Description,
-    options: &Options,
-) -> Result<Plan<N>, ExperimentError> {
-    let setup = Setup::<N>::new(description, options.seed)?;
+fn plan<const N: usize>(arms: &Arms<'_>, options: &Options) -> Result<Plan<N>, ExperimentError> {
+    let setup = match arms.model {
+        Some(model) => Setup::<N>::with_model(arms.plant, model, options.seed)?,
+        None => Setup::<N>::new(arms.plant, options.seed)?,
+    };
     let wrong = options.gravity_error != 0.0 || options.friction_error != 0.0;
     let variant = Variant {
         mismatch: wrong.then_some(Mismatch {

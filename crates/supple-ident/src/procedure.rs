@@ -113,7 +113,7 @@ pub fn identify<const N: usize>(
         warnings.extend(doubts);
     }
     let mut found = identify_motions(nominal, &motions, &moving, procedure)?;
-    warnings.extend(found.doubts());
+    warnings.append(&mut found.warnings);
     found.warnings = warnings;
     Ok(found)
 }
@@ -135,6 +135,7 @@ pub fn identify_motions<const N: usize>(
     let mut found = fit(nominal, motions, moving, &options)?;
     found.preparation = procedure.preparation;
     found.choices = choices;
+    found.warnings = found.doubts();
     Ok(found)
 }
 

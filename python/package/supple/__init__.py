@@ -10,6 +10,16 @@ Wrong input is refused by an exception that names argument, expected and given s
 (4, 4)
 """
 
+from supple._excite import Excitation, Recording, design_excitation, excite
+from supple._identify import (
+    BaseParameters,
+    DataWarning,
+    Fit,
+    FrictionColumns,
+    Validation,
+    base_parameters,
+    identify,
+)
 from supple._log import Log, Truth, read_log
 from supple._native import Arm, Friction, __version__, assets
 from supple._simulate import Run, simulate
@@ -17,13 +27,24 @@ from supple._sweep import Sweep, sweep
 
 __all__ = [
     "Arm",
+    "BaseParameters",
+    "DataWarning",
+    "Excitation",
+    "Fit",
     "Friction",
+    "FrictionColumns",
     "Log",
+    "Recording",
     "Run",
     "Sweep",
     "Truth",
+    "Validation",
     "__version__",
     "assets",
+    "base_parameters",
+    "design_excitation",
+    "excite",
+    "identify",
     "read_log",
     "simulate",
     "sweep",

@@ -1,6 +1,6 @@
 """Private: what the package is built on. Docstrings are in the module itself."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from os import PathLike
 from typing import Any, final
 
@@ -9,7 +9,19 @@ from numpy.typing import ArrayLike, NDArray
 
 _Array = NDArray[np.float64]
 
-__all__ = ["Arm", "Friction", "__version__", "assets", "read_log", "simulate"]
+__all__ = [
+    "Arm",
+    "Fit",
+    "Friction",
+    "__version__",
+    "assets",
+    "base_parameters",
+    "design_excitation",
+    "excite",
+    "identify",
+    "read_log",
+    "simulate",
+]
 __version__: str
 
 def assets() -> list[str]: ...
@@ -99,5 +111,26 @@ class Friction:
     def __ne__(self, other: object, /) -> bool: ...
     def __reduce__(self) -> tuple[Any, tuple[list[float]]]: ...
 
+@final
+class Fit:
+    def report(self) -> dict[str, Any]: ...
+    def motions(self) -> list[dict[str, _Array]]: ...
+    def arm_given(self) -> Arm: ...
+    def arm(self) -> Arm: ...
+    def predict(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> _Array: ...
+    def validate(self, log: dict[str, Any]) -> dict[str, Any]: ...
+
 def read_log(path: str) -> dict[str, Any]: ...
-def simulate(arm: Arm, options: dict[str, Any]) -> dict[str, Any]: ...
+def simulate(arm: Arm, model: Arm | None, options: dict[str, Any]) -> dict[str, Any]: ...
+def identify(
+    arm: Arm, logs: list[dict[str, Any]], options: dict[str, Any]
+) -> tuple[Fit, list[str]]: ...
+def base_parameters(
+    arm: Arm, states: list[_Array], rotor: bool, moving: list[int]
+) -> dict[str, Any]: ...
+def design_excitation(
+    arm: Arm, request: dict[str, Any], progress: Callable[[int, float], object] | None
+) -> dict[str, Any]: ...
+def excite(
+    arm: Arm, model: Arm, series: dict[str, Any], drive: dict[str, Any]
+) -> dict[str, Any]: ...

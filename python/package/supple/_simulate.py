@@ -65,6 +65,7 @@ def simulate(
     stiffness_n_per_m: float = 5.0,
     speed: float = 1.0,
     duration_s: float | None = None,
+    model: _native.Arm | None = None,
     gravity_error: float = 0.0,
     friction_error: float = 0.0,
     stribeck: bool = True,
@@ -92,6 +93,9 @@ def simulate(
         Pace of the sinusoid and the quadrant, 1 for the paper's.
     duration_s : float, optional
         Duration of the trajectory (s). Default: the paper's.
+    model : Arm, optional
+        What the controller takes the arm for, such as :attr:`Fit.arm`: its inertias, friction, limits
+        and gains. Default: the arm itself, but for the errors below.
     gravity_error, friction_error : float
         Relative errors of the controller's model, each parameter off by the full amount with a sign
         drawn from ``seed``. 1e-3 and 0.03 are those of a good identification. Default 0: exact.
@@ -138,8 +142,11 @@ def simulate(
             raise ValueError(f"{name}: expected a share below 1, got {value}")
     if seed < 0:
         raise ValueError(f"seed: expected zero or more, got {seed}")
+    if model is not None and (gravity_error or friction_error):
+        raise ValueError("gravity_error, friction_error: expected none beside a model of its own")
     result = _native.simulate(
         arm,
+        model,
         {
             "experiment": experiment,
             "stiffness_n_per_m": stiffness_n_per_m,

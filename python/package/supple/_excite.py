@@ -1,0 +1,211 @@
+"""Excitation: its design for any arm, and the simulated arm that follows it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from supple import _native
+
+Array = NDArray[np.float64]
+
+__all__ = ["Excitation", "Recording", "design_excitation", "excite"]
+
+
+@dataclass(frozen=True, eq=False)
+class Excitation:
+    """A motion that tells an arm's parameters apart: a Fourier series a joint, from rest to rest."""
+
+    t: Array
+    """Time, (samples,) (s)."""
+    q: Array
+    """Angles, (samples, N) (rad)."""
+    qd: Array
+    """Velocities, (samples, N) (rad/s)."""
+    qdd: Array
+    """Accelerations, (samples, N) (rad/s^2)."""
+    rank: int
+    """Rank of its base regressor."""
+    condition: float
+    """Condition number of its base regressor, columns scaled to unit length."""
+    history: Array
+    """Best value of the criterion after each candidate, (candidates,)."""
+    _series: dict[str, Any] = field(repr=False)
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """What an arm would have logged in an excitation: what :func:`identify` takes."""
+
+    t: Array
+    """Time, (samples,) (s)."""
+    q: Array
+    """Angles through the encoders, (samples, N) (rad)."""
+    tau: Array
+    """Joint torques commanded, (samples, N) (N m)."""
+    torque_delay_s: float
+    """Time by which they act later than the angles beside them were measured (s)."""
+    log: Path | None
+    """The log, if one was asked for."""
+
+
+def design_excitation(
+    arm: _native.Arm,
+    *,
+    moving: Sequence[int] | None = None,
+    period_s: float = 15.0,
+    periods: float = 4.0,
+    criterion: Literal["condition", "d-optimality"] = "condition",
+    workspace: ArrayLike | None = None,
+    candidates: int = 3000,
+    seed: int = 0,
+    rate_hz: float = 100.0,
+    progress: Callable[[int, float], object] | None = None,
+) -> Excitation:
+    """Search for an excitation within the arm's limits of angle, speed, torque and workspace.
+
+    Parameters
+    ----------
+    arm : Arm
+        The arm, with its limits.
+    moving : sequence of int, optional
+        Joints to excite, increasing from 0; the others rest at home. Default: all.
+    period_s : float
+        Length of a period (s).
+    periods : float
+        Number of periods.
+    criterion : {"condition", "d-optimality"}
+        What is to be small: the condition number of the base regressor, columns scaled to unit
+        length, or ``-log det(Y' Y) / rank``.
+    workspace : array_like, (2, 3), optional
+        Least and greatest coordinates of the tip, base axes (m).
+    candidates : int
+        Candidates tried.
+    seed : int
+        Seed of the search, zero or more.
+    rate_hz : float
+        Rate of the arrays of the result (Hz).
+    progress : callable, optional
+        Called as ``progress(tried, best)``; what it raises ends the search.
+
+    Returns
+    -------
+    Excitation
+        The motion, its rank and condition number.
+
+    Raises
+    ------
+    ValueError
+        For options out of range, or limits that no candidate meets.
+
+    Examples
+    --------
+    >>> import supple
+    >>> arm = supple.Arm.load("wam3")
+    >>> found = supple.design_excitation(arm, candidates=60, period_s=5.0, periods=1)
+    >>> found.q.shape[1], bool(found.history[-1] <= found.history[-30])
+    (3, True)
+    """
+    if criterion not in ("condition", "d-optimality"):
+        raise ValueError(f"criterion: expected condition or d-optimality, got {criterion!r}")
+    if candidates < 1:
+        raise ValueError(f"candidates: expected 1 or more, got {candidates}")
+    if not rate_hz > 0.0:
+        raise ValueError(f"rate_hz: expected a positive number, got {rate_hz}")
+    box = None
+    if workspace is not None:
+        array = np.asarray(workspace, float)
+        if array.shape != (2, 3):
+            raise ValueError(f"workspace: expected shape (2, 3), got {array.shape}")
+        box = (array[0].tolist(), array[1].tolist())
+    found = _native.design_excitation(
+        arm,
+        {
+            "moving": list(range(arm.dof)) if moving is None else [int(j) for j in moving],
+            "period_s": period_s,
+            "periods": periods,
+            "d_optimality": criterion == "d-optimality",
+            "workspace": box,
+            "candidates": candidates,
+            "seed": seed,
+            "rate_hz": rate_hz,
+        },
+        progress,
+    )
+    return Excitation(_series=found.pop("series"), **found)
+
+
+def excite(
+    arm: _native.Arm,
+    excitation: Excitation,
+    *,
+    model: _native.Arm | None = None,
+    encoder_noise_rad: float = 5e-4,
+    load: bool = False,
+    seed: int = 0,
+    log_dir: str | os.PathLike[str] | None = None,
+) -> Recording:
+    """Let the simulated arm follow an excitation, and record what it would have logged.
+
+    Parameters
+    ----------
+    arm : Arm
+        The truth about the plant.
+    excitation : Excitation
+        What to follow.
+    model : Arm, optional
+        What the controller takes the arm for. Default: ``arm``.
+    encoder_noise_rad : float
+        Standard deviation of encoder noise, beside quantisation (rad).
+    load : bool
+        The plant's friction has its part that depends on direction and load.
+    seed : int
+        Seed of every noise, zero or more.
+    log_dir : str or os.PathLike, optional
+        Folder for ``excitation.mcap``; see :func:`read_log`.
+
+    Returns
+    -------
+    Recording
+        Time, angles, torques.
+
+    Raises
+    ------
+    ValueError
+        For a motion that the controller refuses, or that ends in a fault.
+
+    Examples
+    --------
+    >>> import supple
+    >>> arm = supple.Arm.load("wam3")
+    >>> motion = supple.design_excitation(arm, candidates=60, period_s=5.0, periods=1)
+    >>> recording = supple.excite(arm, motion)
+    >>> recording.q.shape == recording.tau.shape
+    True
+    """
+    if not 0.0 <= encoder_noise_rad < np.inf:
+        raise ValueError(f"encoder_noise_rad: expected zero or more, got {encoder_noise_rad}")
+    if seed < 0:
+        raise ValueError(f"seed: expected zero or more, got {seed}")
+    if excitation.q.shape[1] != arm.dof:
+        raise ValueError(
+            f"excitation: expected {arm.dof} joints, as arm, got {excitation.q.shape[1]}"
+        )
+    found = _native.excite(
+        arm,
+        arm if model is None else model,
+        excitation._series,
+        {
+            "encoder_noise_rad": encoder_noise_rad,
+            "load": load,
+            "seed": seed,
+            "log_dir": None if log_dir is None else os.fspath(log_dir),
+        },
+    )
+    return Recording(torque_delay_s=1.5 * found.pop("period_s"), **found)

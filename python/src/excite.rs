@@ -1,0 +1,265 @@
+//! Excitation: its design, and a simulated arm that follows it.
+
+use crate::arm::Arm;
+use crate::arrays;
+use crate::errors;
+use crate::table::Table;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::path::PathBuf;
+use supple_core::Vector;
+use supple_core::trajectory::{Fourier, HARMONICS};
+use supple_experiment::calibrate::{Calibration, log_of, plant_of};
+use supple_experiment::{ExperimentError, Recorder, excitation};
+use supple_ident::design::{self, Criterion, Design, Designed, Workspace};
+use supple_ident::{IdentError, Log};
+use supple_model::{Description, ModelError, with_dof};
+
+/// What is asked for; the package has checked names and fills in defaults.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Request {
+    moving: Vec<usize>,
+    period_s: f64,
+    periods: f64,
+    d_optimality: bool,
+    workspace: Option<([f64; 3], [f64; 3])>,
+    candidates: usize,
+    seed: u64,
+    rate_hz: f64,
+}
+
+/// A series, its size no longer in its type.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Series {
+    centre_rad: Vec<f64>,
+    sine_rad: Vec<Vec<f64>>,
+    cosine_rad: Vec<Vec<f64>>,
+    angular_frequency_rad_per_s: f64,
+    duration_s: f64,
+    ramp_s: f64,
+}
+
+impl Series {
+    fn sized<const N: usize>(&self) -> Fourier<N> {
+        let column = |values: &[f64]| Vector::<N>::from_fn(|j, _| values[j]);
+        let columns = |all: &[Vec<f64>]| -> [Vector<N>; HARMONICS] {
+            core::array::from_fn(|k| column(&all[k]))
+        };
+        Fourier {
+            centre_rad: column(&self.centre_rad),
+            sine_rad: columns(&self.sine_rad),
+            cosine_rad: columns(&self.cosine_rad),
+            angular_frequency_rad_per_s: self.angular_frequency_rad_per_s,
+            duration_s: self.duration_s,
+            ramp_s: self.ramp_s,
+        }
+    }
+}
+
+/// Searches for an excitation. `progress` hears candidates tried and the best value so far, a hundred
+/// times at most; what it raises ends the search where it stands.
+#[pyfunction]
+pub fn design_excitation<'py>(
+    py: Python<'py>,
+    arm: &Arm,
+    request: Request,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let description = arm.description();
+    let every = (request.candidates / 100).max(1);
+    let mut raised: Option<PyErr> = None;
+    let mut hear = |tried: usize, best: f64| {
+        if raised.is_some() || !tried.is_multiple_of(every) {
+            return;
+        }
+        let heard = Python::attach(|py| {
+            py.check_signals()?;
+            match &progress {
+                Some(progress) => progress.call1(py, (tried, best)).map(drop),
+                None => Ok(()),
+            }
+        });
+        raised = heard.err();
+    };
+    let columns = py.detach(|| {
+        with_dof!(description.dof(), N => searched::<N>(description, &request, &mut hear))
+            .map_err(Refused::Model)
+            .flatten()
+    });
+    if let Some(error) = raised {
+        return Err(error);
+    }
+    let found = columns.map_err(|refused| match refused {
+        Refused::Model(error) => errors::model(error),
+        Refused::Design(error) => errors::identification(error),
+    })?;
+    let dict = found.table.into_dict(py)?;
+    dict.set_item("rank", found.rank)?;
+    dict.set_item("condition", found.condition)?;
+    let candidates = found.history.len();
+    dict.set_item("history", arrays::array(py, found.history, &[candidates])?)?;
+    let series = PyDict::new(py);
+    series.set_item("centre_rad", found.series.centre_rad)?;
+    series.set_item("sine_rad", found.series.sine_rad)?;
+    series.set_item("cosine_rad", found.series.cosine_rad)?;
+    let omega = found.series.angular_frequency_rad_per_s;
+    series.set_item("angular_frequency_rad_per_s", omega)?;
+    series.set_item("duration_s", found.series.duration_s)?;
+    series.set_item("ramp_s", found.series.ramp_s)?;
+    dict.set_item("series", series)?;
+    Ok(dict)
+}
+
+enum Refused {
+    Model(ModelError),
+    Design(IdentError),
+}
+
+struct Found {
+    table: Table,
+    series: Series,
+    rank: usize,
+    condition: f64,
+    history: Vec<f64>,
+}
+
+fn searched<const N: usize>(
+    description: &Description,
+    request: &Request,
+    hear: &mut dyn FnMut(usize, f64),
+) -> Result<Found, Refused> {
+    let config = description.config::<N>().map_err(Refused::Model)?;
+    let home = description.home::<N>().map_err(Refused::Model)?;
+    let wanted = Design {
+        moving: request.moving.clone(),
+        period_s: request.period_s,
+        periods: request.periods,
+        criterion: if request.d_optimality {
+            Criterion::DOptimality
+        } else {
+            Criterion::Condition
+        },
+        workspace: request
+            .workspace
+            .map(|(lower_m, upper_m)| Workspace { lower_m, upper_m }),
+        candidates: request.candidates,
+        seed: request.seed,
+    };
+    let designed = design::design(&config, &home, &wanted, hear).map_err(Refused::Design)?;
+    Ok(unsized_series(&designed, request.rate_hz))
+}
+
+fn unsized_series<const N: usize>(designed: &Designed<N>, rate_hz: f64) -> Found {
+    let series = &designed.series;
+    let mut table = Table::default();
+    for i in 0..=(series.duration_s * rate_hz).floor() as usize {
+        let t = i as f64 / rate_hz;
+        let at = series.at(t);
+        table.number("t", t);
+        table.vector("q", at.position_rad.as_slice());
+        table.vector("qd", at.velocity_rad_per_s.as_slice());
+        table.vector("qdd", at.acceleration_rad_per_s2.as_slice());
+        table.end_row();
+    }
+    let columns = |all: &[Vector<N>; HARMONICS]| {
+        all.iter()
+            .map(|column| column.as_slice().to_vec())
+            .collect()
+    };
+    Found {
+        table,
+        series: Series {
+            centre_rad: series.centre_rad.as_slice().to_vec(),
+            sine_rad: columns(&series.sine_rad),
+            cosine_rad: columns(&series.cosine_rad),
+            angular_frequency_rad_per_s: series.angular_frequency_rad_per_s,
+            duration_s: series.duration_s,
+            ramp_s: series.ramp_s,
+        },
+        rank: designed.rank,
+        condition: designed.condition,
+        history: designed.history.clone(),
+    }
+}
+
+/// How the simulated arm is driven; the package has checked names and fills in defaults.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Drive {
+    encoder_noise_rad: f64,
+    load: bool,
+    seed: u64,
+    log_dir: Option<PathBuf>,
+}
+
+/// The simulated arm follows a series; what it would have logged. `model` is what its controller knows.
+#[pyfunction]
+pub fn excite<'py>(
+    py: Python<'py>,
+    arm: &Arm,
+    model: &Arm,
+    series: Series,
+    drive: Drive,
+) -> PyResult<Bound<'py, PyDict>> {
+    let (truth, known) = (arm.description(), model.description());
+    let log = py.detach(|| {
+        with_dof!(truth.dof(), N => followed::<N>(truth, known, &series, &drive))
+            .map_err(ExperimentError::from)
+            .flatten()
+    });
+    let (log, period_s) = log.map_err(errors::experiment)?;
+    let (samples, joints) = log.q_rad.shape();
+    let dict = PyDict::new(py);
+    let rows = |columns: &supple_ident::DMatrix<f64>| {
+        arrays::array(
+            py,
+            columns.transpose().as_slice().to_vec(),
+            &[samples, joints],
+        )
+    };
+    dict.set_item("t", arrays::array(py, log.t_s.clone(), &[samples])?)?;
+    dict.set_item("q", rows(&log.q_rad)?)?;
+    dict.set_item("tau", rows(&log.tau_nm)?)?;
+    dict.set_item("period_s", period_s)?;
+    let path = drive.log_dir.map(|folder| folder.join("excitation.mcap"));
+    dict.set_item("log", path)?;
+    Ok(dict)
+}
+
+fn followed<const N: usize>(
+    truth: &Description,
+    known: &Description,
+    series: &Series,
+    drive: &Drive,
+) -> Result<(Log, f64), ExperimentError> {
+    let calibration = Calibration {
+        encoder_noise_rad: drive.encoder_noise_rad,
+        load: drive.load,
+        ..Calibration::new(drive.seed)
+    };
+    let plant = plant_of::<N>(truth, &calibration)?;
+    let (config, home) = (known.config::<N>()?, truth.home::<N>()?);
+    let session = excitation("excitation", &config, &plant, &home, &[series.sized()]);
+    let mut recorder = match &drive.log_dir {
+        Some(folder) => Some(Recorder::named(
+            folder,
+            known,
+            &session.name,
+            &session.config,
+            drive.seed,
+        )?),
+        None => None,
+    };
+    let recordings = session.perform(&mut |cycle, _| {
+        if let Some(recorder) = &mut recorder {
+            recorder.cycle(cycle)?;
+        }
+        Ok(())
+    })?;
+    if let Some(recorder) = recorder {
+        recorder.finish()?;
+    }
+    Ok((log_of(&recordings[0]), config.period_s))
+}

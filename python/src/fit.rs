@@ -1,0 +1,338 @@
+//! Identification: a fit of any number of joints.
+
+use crate::arm::Arm;
+use crate::arrays::{self, Argument, Array, Batch, States};
+use crate::errors;
+use crate::friction::Friction;
+use crate::samples::{Given, Samples};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use supple_core::Vector;
+use supple_ident::{
+    DMatrix, FrictionChoice, FrictionColumns, IdentError, Method, Motion, Preparation, Procedure,
+    SaveError, Validation, Warning, fit_with_dip, identify_motions,
+};
+use supple_model::{Description, ModelError, with_dof};
+
+/// What to fit, and how; the package has checked names and fills in defaults.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Options {
+    moving: Option<Vec<usize>>,
+    couplings: Vec<(usize, usize)>,
+    rate_hz: Option<f64>,
+    cutoff_hz: Option<f64>,
+    keep_every: usize,
+    torque_delay_s: f64,
+    method: String,
+    friction: Option<Shape>,
+    /// A Stribeck dip whose speed is found too.
+    dip: bool,
+    rotor: bool,
+    slow_rad_per_s: f64,
+    prior_weight: Option<f64>,
+    joint_noise_nm: Option<Vec<f64>>,
+}
+
+#[derive(FromPyObject)]
+struct Shape {
+    viscous: bool,
+    coulomb: bool,
+    offset: bool,
+    asymmetry: bool,
+    stribeck_rad_per_s: Option<f64>,
+    band_rad_per_s: f64,
+}
+
+impl Options {
+    fn procedure(self) -> PyResult<Procedure> {
+        let method = match &self.method[..] {
+            "ols" => Method::Ols,
+            "wls" => Method::Wls,
+            "irls" => Method::Irls,
+            "consistent" => Method::Consistent,
+            other => {
+                return Err(PyValueError::new_err(format!(
+                    "method: expected one of ols, wls, irls, consistent, got {other:?}"
+                )));
+            }
+        };
+        let columns = |shape: Shape| FrictionColumns {
+            viscous: shape.viscous,
+            coulomb: shape.coulomb,
+            offset: shape.offset,
+            asymmetry: shape.asymmetry,
+            stribeck_rad_per_s: shape.stribeck_rad_per_s,
+            band_rad_per_s: shape.band_rad_per_s,
+        };
+        Ok(Procedure {
+            moving: self.moving,
+            couplings: self.couplings,
+            preparation: Preparation {
+                rate_hz: self.rate_hz,
+                cutoff_hz: self.cutoff_hz,
+                keep_every: self.keep_every,
+                torque_delay_s: self.torque_delay_s,
+            },
+            method,
+            friction: self.friction.map_or(FrictionChoice::Auto, |shape| {
+                FrictionChoice::Columns(columns(shape))
+            }),
+            rotor: self.rotor,
+            slow_rad_per_s: self.slow_rad_per_s,
+            prior_weight: self.prior_weight,
+            joint_noise_nm: self.joint_noise_nm,
+        })
+    }
+}
+
+/// A fit of any number of joints.
+trait Model: Send + Sync {
+    fn predict(&self, states: &[States<'_>], out: &mut [f64]);
+    fn predict_motion(&self, motion: &Motion) -> Result<DMatrix<f64>, IdentError>;
+    fn validate(&self, samples: &Samples) -> Result<Validation, IdentError>;
+    fn description(&self, of: &Description) -> Result<Description, SaveError>;
+    fn report(&self, known: &[supple_core::Friction]) -> Report;
+}
+
+/// What a fit says of itself, its size no longer in its type.
+struct Report {
+    columns: Vec<(String, f64)>,
+    base_names: Vec<String>,
+    null_space: Vec<String>,
+    base_parameters: Vec<f64>,
+    std: Vec<f64>,
+    condition: f64,
+    moving: Vec<usize>,
+    noise_nm: Vec<f64>,
+    training_relative: f64,
+    gap: Option<f64>,
+    friction: Vec<supple_core::Friction>,
+    choices: Vec<(String, String)>,
+}
+
+impl<const N: usize> Model for supple_ident::Fit<N> {
+    fn predict(&self, states: &[States<'_>], out: &mut [f64]) {
+        for (k, out) in out.chunks_exact_mut(N).enumerate() {
+            let [q, qd, qdd] =
+                core::array::from_fn(|a| Vector::<N>::from_column_slice(states[a].at(k)));
+            let tau = supple_ident::Fit::predict(self, &q, &qd, &qdd);
+            out.copy_from_slice(tau.as_slice());
+        }
+    }
+
+    fn predict_motion(&self, motion: &Motion) -> Result<DMatrix<f64>, IdentError> {
+        supple_ident::Fit::predict_motion(self, motion)
+    }
+
+    fn validate(&self, samples: &Samples) -> Result<Validation, IdentError> {
+        let moving = self.columns.moving();
+        let (motion, _) = samples.motion(moving, &self.preparation)?;
+        self.validate_motion(&motion)
+    }
+
+    fn description(&self, of: &Description) -> Result<Description, SaveError> {
+        supple_ident::Fit::description(self, of, None)
+    }
+
+    fn report(&self, known: &[supple_core::Friction]) -> Report {
+        let names = self.columns.names();
+        Report {
+            base_names: self.base.text(&names),
+            null_space: self.base.null_space_text(&names),
+            columns: names.into_iter().zip(self.x.iter().copied()).collect(),
+            base_parameters: self.base_parameters().as_slice().to_vec(),
+            std: self.base_std.as_slice().to_vec(),
+            condition: self.base.condition,
+            moving: self.columns.moving().to_vec(),
+            noise_nm: self.noise_nm.clone(),
+            training_relative: self.training_relative,
+            gap: self.gap,
+            friction: self.friction_with(known).to_vec(),
+            choices: self
+                .choices
+                .iter()
+                .map(|choice| (choice.of.to_owned(), choice.table.to_string()))
+                .collect(),
+        }
+    }
+}
+
+/// Private: what `supple.Fit` is built on.
+#[pyclass(frozen, module = "supple._native")]
+pub struct Fit {
+    of: Description,
+    model: Box<dyn Model>,
+    motions: Vec<Motion>,
+}
+
+#[pymethods]
+impl Fit {
+    /// Everything that is one value, by name.
+    fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let report = self.model.report(self.of.friction());
+        let dict = PyDict::new(py);
+        let vector = |values: Vec<f64>| {
+            let shape = [values.len()];
+            arrays::array(py, values, &shape)
+        };
+        dict.set_item("columns", report.columns)?;
+        dict.set_item("base_names", report.base_names)?;
+        dict.set_item("null_space", report.null_space)?;
+        dict.set_item("base_parameters", vector(report.base_parameters)?)?;
+        dict.set_item("std", vector(report.std)?)?;
+        dict.set_item("condition", report.condition)?;
+        dict.set_item("moving", report.moving)?;
+        dict.set_item("noise_nm", vector(report.noise_nm)?)?;
+        dict.set_item("training_relative", report.training_relative)?;
+        dict.set_item("gap", report.gap)?;
+        let friction = report.friction.into_iter().map(|inner| Friction { inner });
+        dict.set_item("friction", friction.collect::<Vec<_>>())?;
+        dict.set_item("choices", report.choices)?;
+        Ok(dict)
+    }
+
+    /// The prepared samples of each log that was fitted; `predicted` has a column a moving joint, dry
+    /// friction filtered as the torques were.
+    fn motions<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        let of = |motion: &Motion| {
+            let dict = PyDict::new(py);
+            let predicted = self.model.predict_motion(motion);
+            let predicted = predicted.map_err(errors::identification)?;
+            dict.set_item("predicted", matrix(py, &predicted)?)?;
+            let times = (0..motion.samples()).map(|i| i as f64 / motion.rate_hz);
+            dict.set_item(
+                "t",
+                arrays::array(py, times.collect(), &[motion.samples()])?,
+            )?;
+            for (name, columns) in [
+                ("q", &motion.q),
+                ("qd", &motion.qd),
+                ("qdd", &motion.qdd),
+                ("tau", &motion.tau),
+            ] {
+                dict.set_item(name, matrix(py, columns)?)?;
+            }
+            Ok(dict)
+        };
+        self.motions.iter().map(of).collect()
+    }
+
+    /// The arm that was given.
+    fn arm_given(&self) -> PyResult<Arm> {
+        Arm::new(self.of.clone()).map_err(errors::model)
+    }
+
+    /// The arm found, as a description that the controller loads.
+    fn arm(&self) -> PyResult<Arm> {
+        let description = self.model.description(&self.of).map_err(errors::save)?;
+        Arm::new(description).map_err(errors::model)
+    }
+
+    fn predict<'py>(
+        &self,
+        py: Python<'py>,
+        q: &Bound<'py, PyAny>,
+        qd: &Bound<'py, PyAny>,
+        qdd: &Bound<'py, PyAny>,
+    ) -> PyResult<Array<'py>> {
+        let arguments: [Argument<'_, 'py>; 3] = [("q", q), ("qd", qd), ("qdd", qdd)];
+        let dof = self.of.dof();
+        let batch = Batch::read(&arguments, dof)?;
+        let shape = [&batch.shape[..], &[dof]].concat();
+        let (array, mut writable) = arrays::output(py, None, &shape)?;
+        let states = batch.states()?;
+        let values = writable.as_slice_mut()?;
+        py.detach(|| self.model.predict(&states, values));
+        Ok(array)
+    }
+
+    fn validate<'py>(&self, py: Python<'py>, log: Given<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let samples = Samples::read(&log, self.of.dof())?;
+        let validation = py.detach(|| self.model.validate(&samples));
+        let validation = validation.map_err(errors::identification)?;
+        let dict = PyDict::new(py);
+        let joints = validation.rms_nm.len();
+        dict.set_item("verdict", validation.verdict())?;
+        dict.set_item("rms", arrays::array(py, validation.rms_nm, &[joints])?)?;
+        dict.set_item(
+            "relative",
+            arrays::array(py, validation.relative, &[joints])?,
+        )?;
+        dict.set_item("total_relative", validation.total_relative)?;
+        dict.set_item("positive_definite", validation.positive_definite)?;
+        Ok(dict)
+    }
+}
+
+fn matrix<'py>(py: Python<'py>, columns: &DMatrix<f64>) -> PyResult<Array<'py>> {
+    let (rows, width) = columns.shape();
+    arrays::array(py, columns.transpose().as_slice().to_vec(), &[rows, width])
+}
+
+/// Identifies `arm` from logs: the fit, and what is doubtful about it.
+#[pyfunction]
+pub fn identify(
+    py: Python<'_>,
+    arm: &Arm,
+    logs: Vec<Given<'_>>,
+    options: Options,
+) -> PyResult<(Fit, Vec<String>)> {
+    let of = arm.description().clone();
+    let logs = logs.iter().map(|log| Samples::read(log, of.dof()));
+    let logs = logs.collect::<PyResult<Vec<_>>>()?;
+    let dip = options.dip;
+    let procedure = options.procedure()?;
+    let found = py.detach(|| -> Result<_, Refused> {
+        with_dof!(of.dof(), N => sized::<N>(&of, &logs, &procedure, dip))?
+    });
+    let (model, motions, warnings) = found.map_err(|refused| match refused {
+        Refused::Model(error) => errors::model(error),
+        Refused::Identification(error) => errors::identification(error),
+    })?;
+    let warnings = warnings.iter().map(Warning::to_string).collect();
+    Ok((Fit { of, model, motions }, warnings))
+}
+
+enum Refused {
+    Model(ModelError),
+    Identification(IdentError),
+}
+
+impl From<ModelError> for Refused {
+    fn from(error: ModelError) -> Self {
+        Refused::Model(error)
+    }
+}
+
+impl From<IdentError> for Refused {
+    fn from(error: IdentError) -> Self {
+        Refused::Identification(error)
+    }
+}
+
+type Found = (Box<dyn Model>, Vec<Motion>, Vec<Warning>);
+
+fn sized<const N: usize>(
+    of: &Description,
+    logs: &[Samples],
+    procedure: &Procedure,
+    dip: bool,
+) -> Result<Found, Refused> {
+    let arm = of.arm::<N>()?;
+    let moving = procedure.moving_joints(N)?;
+    let (mut motions, mut warnings) = (Vec::new(), Vec::new());
+    for log in logs {
+        let (motion, doubts) = log.motion(&moving, &procedure.preparation)?;
+        motions.push(motion);
+        warnings.extend(doubts);
+    }
+    let fit = if dip {
+        fit_with_dip(&arm, &motions, &moving, procedure)?
+    } else {
+        identify_motions(&arm, &motions, &moving, procedure)?
+    };
+    warnings.extend(fit.warnings.iter().cloned());
+    Ok((Box::new(fit), motions, warnings))
+}

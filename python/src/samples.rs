@@ -1,0 +1,117 @@
+//! Logs from NumPy to what identification takes.
+//!
+//! A log with accelerations is a list of states: nothing is differentiated, and without a filter the
+//! rows need not follow each other in time.
+
+use crate::arrays;
+use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use supple_ident::filter::LowPass;
+use supple_ident::{DMatrix, IdentError, Log, Motion, Preparation, Warning, resample};
+
+/// The columns of one log as they were given.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Given<'py> {
+    t: Bound<'py, PyAny>,
+    q: Bound<'py, PyAny>,
+    tau: Bound<'py, PyAny>,
+    qd: Option<Bound<'py, PyAny>>,
+    qdd: Option<Bound<'py, PyAny>>,
+}
+
+/// A log, with accelerations if there were any.
+pub struct Samples {
+    log: Log,
+    qdd_rad_per_s2: Option<DMatrix<f64>>,
+}
+
+impl Samples {
+    /// Reads the columns; `(samples, dof)` each, `t` `(samples,)`.
+    pub fn read(given: &Given<'_>, dof: usize) -> PyResult<Self> {
+        let t = arrays::numbers("t", &given.t)?;
+        if t.ndim() != 1 {
+            return Err(arrays::wrong_shape("t", "(samples,)", t.shape()));
+        }
+        let samples = t.len();
+        let matrix = |name: &str, value: &Bound<'_, PyAny>| -> PyResult<DMatrix<f64>> {
+            let array: PyReadonlyArrayDyn<'_, f64> = arrays::numbers(name, value)?;
+            if array.shape() != [samples, dof] {
+                let expected = format!("({samples}, {dof}), a row for each of t");
+                return Err(arrays::wrong_shape(name, &expected, array.shape()));
+            }
+            Ok(DMatrix::from_row_slice(samples, dof, array.as_slice()?))
+        };
+        let optional = |name: &str, value: &Option<Bound<'_, PyAny>>| {
+            value.as_ref().map(|value| matrix(name, value)).transpose()
+        };
+        Ok(Samples {
+            log: Log {
+                q_rad: matrix("q", &given.q)?,
+                qd_rad_per_s: optional("qd", &given.qd)?,
+                tau_nm: matrix("tau", &given.tau)?,
+                t_s: t.as_slice()?.to_vec(),
+            },
+            qdd_rad_per_s2: optional("qdd", &given.qdd)?,
+        })
+    }
+
+    /// Checked and prepared.
+    pub fn motion(
+        &self,
+        moving: &[usize],
+        preparation: &Preparation,
+    ) -> Result<(Motion, Vec<Warning>), IdentError> {
+        let dof = self.log.q_rad.ncols();
+        let (Some(qdd), Some(qd)) = (&self.qdd_rad_per_s2, &self.log.qd_rad_per_s) else {
+            return Motion::prepare(&self.log, dof, moving, preparation);
+        };
+        check_finite("qdd", qdd)?;
+        let as_given = preparation.cutoff_hz.is_none()
+            && preparation.rate_hz.is_none()
+            && preparation.keep_every == 1
+            && preparation.torque_delay_s == 0.0;
+        if !as_given {
+            let (motion, warnings) = Motion::prepare(&self.log, dof, moving, preparation)?;
+            let rate_hz = motion.rate_hz * preparation.keep_every as f64;
+            let mut grid = resample(&self.log.t_s, qdd, rate_hz, 0.0);
+            if let Some(cutoff_hz) = preparation.cutoff_hz {
+                grid = LowPass::butterworth4(cutoff_hz, rate_hz)?.zero_phase_columns(&grid)?;
+            }
+            let rows: Vec<usize> = (0..grid.nrows()).step_by(preparation.keep_every).collect();
+            let qdd = grid.select_rows(&rows);
+            return Ok((Motion { qdd, ..motion }, warnings));
+        }
+        check_finite("qd", qd)?;
+        // Rows that do not follow each other have no velocity of their own to check.
+        let unordered = Log {
+            qd_rad_per_s: None,
+            ..self.log.clone()
+        };
+        let warnings = unordered.check(dof, moving)?;
+        let t = &self.log.t_s;
+        let motion = Motion {
+            rate_hz: (t.len() - 1) as f64 / (t[t.len() - 1] - t[0]),
+            q: self.log.q_rad.clone(),
+            qd: qd.clone(),
+            qdd: qdd.clone(),
+            tau: self.log.tau_nm.clone(),
+            independent_share: 1.0,
+            cutoff_hz: None,
+        };
+        Ok((motion, warnings))
+    }
+}
+
+fn check_finite(name: &str, columns: &DMatrix<f64>) -> Result<(), IdentError> {
+    for (joint, column) in columns.column_iter().enumerate() {
+        if let Some(i) = column.iter().position(|x| !x.is_finite()) {
+            return Err(IdentError::Log {
+                column: format!("{name}[{joint}]"),
+                problem: format!("{} at sample {i}", column[i]),
+                remedy: "cut these rows out, or fill in what the recorder lost",
+            });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,96 @@
+"""Excitation, and the closed loop on the simulated arm: from a designed motion to a model in control."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import supple
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return supple.Arm.load("wam3")
+
+
+@pytest.fixture(scope="module")
+def excitation(arm):
+    return supple.design_excitation(arm, candidates=300, period_s=8.0, periods=2)
+
+
+def test_the_motion_is_one(arm, excitation):
+    """Derivatives fit each other, it begins and ends at rest, and the criterion only falls."""
+    dt = np.diff(excitation.t).mean()
+    np.testing.assert_allclose(np.gradient(excitation.q, dt, axis=0), excitation.qd, atol=0.02)
+    np.testing.assert_allclose(excitation.qd[0], 0.0, atol=1e-9)
+    np.testing.assert_allclose(excitation.qd[-1], 0.0, atol=1e-2)
+    assert (np.diff(excitation.history[np.isfinite(excitation.history)]) <= 0.0).all()
+    assert excitation.rank == supple.base_parameters(arm, rotor=True).rank + 2 * arm.dof
+    assert excitation.condition == pytest.approx(excitation.history[-1], rel=0.2)
+
+
+def test_the_tip_stays_in_its_box(arm):
+    box = np.array([[-1.0, -0.5, -0.6], [1.0, 0.5, 1.2]])
+    found = supple.design_excitation(
+        arm, candidates=200, period_s=8.0, periods=1, workspace=box, criterion="d-optimality"
+    )
+    tip = arm.tip_pose(found.q)[:, :3, 3]
+    assert (tip >= box[0] - 1e-2).all() and (tip <= box[1] + 1e-2).all()
+
+
+def test_progress_is_heard_and_may_end_the_search(arm):
+    heard = []
+    supple.design_excitation(
+        arm, candidates=50, period_s=5.0, periods=1, progress=lambda *seen: heard.append(seen)
+    )
+    assert [tried for tried, _ in heard] == list(range(1, 51))
+
+    def enough(tried, _best):
+        if tried == 10:
+            raise InterruptedError("enough")
+
+    with pytest.raises(InterruptedError, match="enough"):
+        supple.design_excitation(arm, candidates=50, period_s=5.0, periods=1, progress=enough)
+
+
+def test_the_identified_model_controls_the_arm_it_came_from(arm, excitation):
+    """Torques from a noisy, quantised log of the plant; the controller knows nothing else of it."""
+    first = supple.excite(arm, excitation, seed=1)
+    fit = supple.identify(
+        arm,
+        first.t,
+        first.q,
+        first.tau,
+        cutoff_hz=8.0,
+        keep_every=10,
+        torque_delay_s=first.torque_delay_s,
+        slow_rad_per_s=0.15,
+        friction="offset",
+    )
+    other = supple.design_excitation(arm, candidates=60, period_s=8.0, periods=1, seed=5)
+    second = supple.excite(arm, other, seed=2)
+    assert fit.validate(second.t, second.q, second.tau).total_relative < 0.1
+    exact = supple.simulate(arm, "sinusoid", duration_s=4.0, load=False)
+    found = supple.simulate(arm, "sinusoid", duration_s=4.0, load=False, model=fit.arm)
+    assert found.ended is None
+    assert found.rms_error_m < exact.rms_error_m + 0.02
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"criterion": "luck"}, "criterion: expected condition or d-optimality, got 'luck'"),
+        ({"workspace": [0.0, 1.0]}, r"workspace: expected shape \(2, 3\), got \(2,\)"),
+        ({"candidates": 0}, "candidates: expected 1 or more, got 0"),
+        ({"rate_hz": 0.0}, "rate_hz: expected a positive number, got 0.0"),
+        ({"moving": [0, 7]}, r"moving: expected joint numbers below 3"),
+        ({"period_s": -1.0}, "period_s is -1, it must be finite and positive"),
+    ],
+)
+def test_wrong_options_are_named(arm, options, message):
+    with pytest.raises(ValueError, match=message):
+        supple.design_excitation(arm, **{"candidates": 10, **options})
+
+
+def test_another_arm_is_refused(excitation):
+    with pytest.raises(ValueError, match="excitation: expected 4 joints, as arm, got 3"):
+        supple.excite(supple.Arm.load("wam4"), excitation)
