@@ -4,8 +4,9 @@ set -euo pipefail
 cd "$(dirname "$0")"
 
 PLAIN=(fmt clippy test doctest doc)
-FULL=(deny advisories python package cortex-m)
+FULL=(deny advisories python package instructions cortex-m)
 CARGO_DENY_VERSION=0.20.2
+GUNGRAUN_VERSION=0.20.0
 THUMB=thumbv7em-none-eabihf
 
 WORK=target/ci
@@ -99,6 +100,21 @@ virtual_environment() {
     fi
     "$environment/bin/pip" install --quiet --requirement "$2" ||
         skip "the packages of $2 cannot be installed"
+}
+
+# instructions: instruction counts of the core against committed limits; installs Valgrind and gungraun-runner
+step_instructions() {
+    [[ $(uname -sm) == "Linux x86_64" ]] || skip "the limits are those of Linux on x86-64, this is $(uname -sm)"
+    needs_command valgrind valgrind
+    [[ -e /usr/lib/debug/.build-id || -e /usr/share/doc/libc6-dbg ]] || needs_package libc6-dbg
+    local root=target/tools
+    if [[ $("$root/bin/gungraun-runner" --version 2>/dev/null) != "gungraun-runner $GUNGRAUN_VERSION" ]]; then
+        cargo install --quiet --locked --root "$root" --target-dir "$root/build" \
+            gungraun-runner@$GUNGRAUN_VERSION >&2
+        rm -rf "$root/build"
+    fi
+    GUNGRAUN_RUNNER=$PWD/$root/bin/gungraun-runner RUSTFLAGS="" \
+        cargo bench --locked -p supple-benches --bench instructions
 }
 
 # cortex-m: the freestanding program on an emulated Cortex-M4; installs QEMU and the compiler's target

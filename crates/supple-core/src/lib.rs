@@ -19,13 +19,16 @@ pub mod dynamics;
 pub mod estimator;
 pub mod friction;
 pub mod impedance;
+mod lanes;
 pub mod latch;
 pub mod linalg;
 pub mod math;
 pub mod observer;
+pub mod operational;
 pub mod pose;
 pub mod reach;
 pub mod ripple;
+pub mod sincos;
 pub mod trajectory;
 
 pub use arm::{Arm, ArmError, Joint, Link};

@@ -42,10 +42,19 @@ fn cholesky_solves<const N: usize>(b: &Matrix<N, N>, x: &Vector<N>) -> Result<()
     let factor = Cholesky::new(&a).expect("positive definite");
     prop_assert!(mixed_error(&factor.solve(&(a * x)), x) < 1e-10);
     prop_assert!(mixed_error(&factor.solve(&a), &identity) < 1e-10);
-    // L^-1 A L^-T is the identity and L^-1 is lower: A = L L^T.
+    // D^-1 L^-1 A L^-T is the identity and L^-1 is unit lower: A = L D L^T.
     let half = factor.solve_lower(&a);
-    prop_assert!(mixed_error(&factor.solve_lower(&half.transpose()), &identity) < 1e-10);
+    let whole = factor.divide(&factor.solve_lower(&half.transpose()));
+    prop_assert!(mixed_error(&whole, &identity) < 1e-10);
     let inverse = factor.solve_lower(&identity);
+    prop_assert_eq!(inverse.diagonal(), Vector::<N>::repeat(1.0));
+    prop_assert_eq!(
+        factor.solve_lower_right(b),
+        factor.solve_lower(&b.transpose()).transpose()
+    );
+    let gram = factor.gram(&factor.solve_lower_right(b)).lower_triangle();
+    let expected = b * factor.solve(&b.transpose());
+    prop_assert!(mixed_error(&gram, &expected.lower_triangle()) < 1e-10);
     for (row, column) in (0..N).flat_map(|j| (0..j).map(move |i| (i, j))) {
         prop_assert_eq!(inverse[(row, column)], 0.0);
     }

@@ -1,98 +1,228 @@
 //! Articulated bodies: forward dynamics.
+#![allow(
+    clippy::needless_range_loop,
+    reason = "joints, groups and lanes are counted: each index goes into several arrays"
+)]
 
-use super::{parent_rotations, wrench_to_parent, z_cross};
+use super::chain::parent_rotations;
+use super::vec3::{V3, add, cross, dot, rotate, rotate_back, scale};
 use crate::arm::Arm;
-use crate::math::{Matrix3, Vector, Vector3, skew};
+use crate::lanes::{in_groups, of_joint};
+use crate::math::Vector;
 
-/// Articulated inertia about the joint frame's origin, `(moment, force) = [A B; B^T C] (alpha, a)`,
-/// and the bias wrench.
+/// Symmetric 3 x 3 matrix `xx, xy, yy, xz, yz, zz`.
+type Symmetric = [f64; 6];
+
+/// Articulated inertia about the joint frame's origin, `(moment, force) = [A B; B^T C] (alpha, a)`, `B` by
+/// columns, and the bias wrench.
 #[derive(Clone, Copy)]
 struct Articulated {
-    a: Matrix3<f64>,
-    b: Matrix3<f64>,
-    c: Matrix3<f64>,
-    moment: Vector3<f64>,
-    force: Vector3<f64>,
+    a: Symmetric,
+    b: [f64; 9],
+    c: Symmetric,
+    moment: V3,
+    force: V3,
+}
+
+/// What is left of a joint for the way out.
+#[derive(Clone, Copy)]
+struct Hinge {
+    /// Velocity-dependent part of the acceleration, beside what the parent passes on.
+    bias_alpha: V3,
+    bias_accel: V3,
+    u_moment: V3,
+    u_force: V3,
+    inverse_d: f64,
+    drive: f64,
+}
+
+impl Hinge {
+    const NONE: Hinge = Hinge {
+        bias_alpha: [0.0; 3],
+        bias_accel: [0.0; 3],
+        u_moment: [0.0; 3],
+        u_force: [0.0; 3],
+        inverse_d: 0.0,
+        drive: 0.0,
+    };
 }
 
 /// Joint accelerations \[rad/s^2\] under the torques `tau` \[N m\], without friction.
 ///
 /// `q` \[rad\], `qd` \[rad/s\]. The inverse of [`rnea`](super::rnea).
+#[inline]
 pub fn aba<const N: usize>(
     arm: &Arm<N>,
     q: &Vector<N>,
     qd: &Vector<N>,
     tau: &Vector<N>,
 ) -> Vector<N> {
-    let rotations = parent_rotations(arm, q);
-    // Velocity-dependent part of each joint's acceleration, beside what the parent passes on.
-    let mut bias_alpha = [Vector3::zeros(); N];
-    let mut bias_accel = [Vector3::zeros(); N];
-    let mut omega = Vector3::zeros();
-    let mut bodies: [Articulated; N] = core::array::from_fn(|i| {
-        let link = &arm.links[i];
-        let origin = &link.parent_from_joint.translation;
-        bias_accel[i] = rotations[i].tr_mul(&omega.cross(&omega.cross(origin)));
-        omega = rotations[i].tr_mul(&omega);
-        bias_alpha[i] = -z_cross(&omega) * qd[i];
-        omega.z += qd[i];
-        Articulated {
-            a: link.inertia,
-            b: skew(&link.first_moment),
-            c: Matrix3::from_diagonal_element(link.mass),
-            moment: omega.cross(&(link.inertia * omega)),
-            force: omega.cross(&omega.cross(&link.first_moment)),
-        }
-    });
-    let mut u_moment = [Vector3::zeros(); N];
-    let mut u_force = [Vector3::zeros(); N];
-    let mut inverse_d = [0.0; N];
-    let mut drive = [0.0; N];
-    for i in (0..N).rev() {
-        let body = bodies[i];
-        u_moment[i] = body.a.column(2).into_owned();
-        u_force[i] = body.b.row(2).transpose();
-        inverse_d[i] = 1.0 / (u_moment[i].z + arm.armature[i]);
-        drive[i] = tau[i] - body.moment.z;
-        if i == 0 {
-            break;
-        }
-        let (um, uf) = (&u_moment[i], &u_force[i]);
-        let a = body.a - um * um.transpose() * inverse_d[i];
-        let b = body.b - um * uf.transpose() * inverse_d[i];
-        let c = body.c - uf * uf.transpose() * inverse_d[i];
-        let gain = drive[i] * inverse_d[i];
-        let moment = body.moment + a * bias_alpha[i] + b * bias_accel[i] + um * gain;
-        let force = body.force + b.tr_mul(&bias_alpha[i]) + c * bias_accel[i] + uf * gain;
+    in_groups!(N, forward_dynamics(arm, q, qd, tau))
+}
 
-        let r = &rotations[i];
-        let origin = &arm.links[i].parent_from_joint.translation;
-        let p = skew(origin);
-        let (a, b, c) = (
-            r * a * r.transpose(),
-            r * b * r.transpose(),
-            r * c * r.transpose(),
-        );
-        let (moment, force) = wrench_to_parent(&moment, &force, r, origin);
-        let pc = p * c;
-        let bp = b * p;
-        let parent = &mut bodies[i - 1];
-        // p is antisymmetric: p b^T = -(b p)^T, and so (b p)^T stands with a minus sign.
-        parent.a += a - bp - bp.transpose() - pc * p;
-        parent.b += b + pc;
-        parent.c += c;
-        parent.moment += moment;
-        parent.force += force;
+#[inline]
+fn forward_dynamics<const N: usize, const G: usize>(
+    arm: &Arm<N>,
+    q: &Vector<N>,
+    qd: &Vector<N>,
+    tau: &Vector<N>,
+) -> Vector<N> {
+    let rotations = parent_rotations::<N, G>(arm, q);
+    let origin = |i: usize| arm.links[i].parent_from_joint.translation.data.0[0];
+    let mut hinges = [Hinge::NONE; N];
+    let mut spins = [[0.0; 3]; N];
+    let mut spin = [0.0; 3];
+    for i in 0..N {
+        let r = of_joint(&rotations, i);
+        if i > 0 {
+            hinges[i].bias_accel = rotate_back(&r, cross(spin, cross(spin, origin(i))));
+            spin = rotate_back(&r, spin);
+            hinges[i].bias_alpha = [spin[1] * qd[i], -spin[0] * qd[i], 0.0];
+        }
+        spin[2] += qd[i];
+        spins[i] = spin;
+    }
+    let mut carried: Option<Articulated> = None;
+    for i in (0..N).rev() {
+        let mut body = link(arm, i, spins[i]);
+        if let Some(carried) = &carried {
+            body.add(carried);
+        }
+        let hinge = &mut hinges[i];
+        hinge.u_moment = [body.a[3], body.a[4], body.a[5]];
+        hinge.u_force = [body.b[2], body.b[5], body.b[8]];
+        hinge.inverse_d = 1.0 / (hinge.u_moment[2] + arm.armature[i]);
+        hinge.drive = tau[i] - body.moment[2];
+        if i > 0 {
+            body.release(hinge);
+            carried = Some(body.in_parent(&of_joint(&rotations, i), origin(i)));
+        }
     }
     let mut qdd = Vector::zeros();
-    let mut alpha = Vector3::zeros();
-    let mut accel = -arm.gravity;
+    let mut alpha = [0.0; 3];
+    let mut accel = arm.gravity.map(|g| -g).data.0[0];
     for i in 0..N {
-        let origin = &arm.links[i].parent_from_joint.translation;
-        accel = rotations[i].tr_mul(&(accel + alpha.cross(origin))) + bias_accel[i];
-        alpha = rotations[i].tr_mul(&alpha) + bias_alpha[i];
-        qdd[i] = (drive[i] - u_moment[i].dot(&alpha) - u_force[i].dot(&accel)) * inverse_d[i];
-        alpha.z += qdd[i];
+        let (hinge, r) = (&hinges[i], of_joint(&rotations, i));
+        if i > 0 {
+            accel = add(accel, cross(alpha, origin(i)));
+        }
+        accel = add(rotate_back(&r, accel), hinge.bias_accel);
+        alpha = add(rotate_back(&r, alpha), hinge.bias_alpha);
+        qdd[i] = (hinge.drive - dot(hinge.u_moment, alpha) - dot(hinge.u_force, accel))
+            * hinge.inverse_d;
+        alpha[2] += qdd[i];
     }
     qdd
+}
+
+/// Link `i` alone.
+#[inline(always)]
+fn link<const N: usize>(arm: &Arm<N>, i: usize, spin: V3) -> Articulated {
+    let body = |k: usize| arm.rows.body[k][i];
+    let (mass, h) = (body(0), [body(1), body(2), body(3)]);
+    let a = core::array::from_fn(|k| body(4 + k));
+    Articulated {
+        a,
+        b: [0.0, h[2], -h[1], -h[2], 0.0, h[0], h[1], -h[0], 0.0],
+        c: [mass, 0.0, mass, 0.0, 0.0, mass],
+        moment: cross(spin, times(&a, spin)),
+        force: cross(spin, cross(spin, h)),
+    }
+}
+
+#[inline(always)]
+fn times(m: &Symmetric, v: V3) -> V3 {
+    [
+        m[0] * v[0] + m[1] * v[1] + m[3] * v[2],
+        m[1] * v[0] + m[2] * v[1] + m[4] * v[2],
+        m[3] * v[0] + m[4] * v[1] + m[5] * v[2],
+    ]
+}
+
+/// `R M R^T`.
+#[inline(always)]
+fn turned(r: &[f64; 9], m: &Symmetric) -> Symmetric {
+    let (x, y, z) = (
+        rotate(r, [m[0], m[1], m[3]]),
+        rotate(r, [m[1], m[2], m[4]]),
+        rotate(r, [m[3], m[4], m[5]]),
+    );
+    let entry = |i: usize, j: usize| x[i] * r[j] + y[i] * r[3 + j] + z[i] * r[6 + j];
+    [
+        entry(0, 0),
+        entry(1, 0),
+        entry(1, 1),
+        entry(2, 0),
+        entry(2, 1),
+        entry(2, 2),
+    ]
+}
+
+/// Row and column of each entry of a [`Symmetric`].
+const ENTRIES: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
+
+impl Articulated {
+    #[inline(always)]
+    fn add(&mut self, other: &Articulated) {
+        for k in 0..6 {
+            self.a[k] += other.a[k];
+            self.c[k] += other.c[k];
+        }
+        for k in 0..9 {
+            self.b[k] += other.b[k];
+        }
+        self.moment = add(self.moment, other.moment);
+        self.force = add(self.force, other.force);
+    }
+
+    /// What the joint's parent feels: the joint itself gives way.
+    #[inline(always)]
+    fn release(&mut self, hinge: &Hinge) {
+        let (um, uf) = (hinge.u_moment, hinge.u_force);
+        let (dm, df) = (scale(um, hinge.inverse_d), scale(uf, hinge.inverse_d));
+        for (k, (i, j)) in ENTRIES.into_iter().enumerate() {
+            self.a[k] -= um[i] * dm[j];
+            self.c[k] -= uf[i] * df[j];
+        }
+        for k in 0..9 {
+            self.b[k] -= um[k % 3] * df[k / 3];
+        }
+        let (alpha, accel) = (hinge.bias_alpha, hinge.bias_accel);
+        let moment = add(times(&self.a, alpha), rotate(&self.b, accel));
+        let force = add(rotate_back(&self.b, alpha), times(&self.c, accel));
+        self.moment = add(self.moment, add(moment, scale(dm, hinge.drive)));
+        self.force = add(self.force, add(force, scale(df, hinge.drive)));
+    }
+
+    /// Seen from the parent's joint frame, in which this one stands at `p`, turned by `r`.
+    #[inline(always)]
+    fn in_parent(&self, r: &[f64; 9], p: V3) -> Articulated {
+        let (a, c) = (turned(r, &self.a), turned(r, &self.c));
+        let half = super::vec3::product(r, &self.b);
+        let b = super::vec3::product(&half, &super::vec3::transposed(r));
+        // With P = [p x]: B' = B + P C and A' = A - B' P - (B P)^T.
+        let shifted = super::vec3::join3(
+            cross(p, [c[0], c[1], c[3]]),
+            cross(p, [c[1], c[2], c[4]]),
+            cross(p, [c[3], c[4], c[5]]),
+        );
+        let shifted: [f64; 9] = core::array::from_fn(|k| b[k] + shifted[k]);
+        // Entry (i, j) of M P is the j-th of (row i of M) x p.
+        let row = |m: &[f64; 9], i: usize| cross([m[i], m[3 + i], m[6 + i]], p);
+        let (left, right) = (
+            [row(&shifted, 0), row(&shifted, 1), row(&shifted, 2)],
+            [row(&b, 0), row(&b, 1), row(&b, 2)],
+        );
+        let force = rotate(r, self.force);
+        Articulated {
+            a: core::array::from_fn(|k| {
+                let (i, j) = ENTRIES[k];
+                a[k] - left[i][j] - right[j][i]
+            }),
+            b: shifted,
+            c,
+            moment: add(rotate(r, self.moment), cross(p, force)),
+            force,
+        }
+    }
 }

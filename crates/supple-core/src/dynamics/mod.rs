@@ -5,14 +5,20 @@
 //! enters as an upward acceleration of the base.
 
 mod aba;
+mod body_motion;
+mod chain;
 mod coriolis;
 mod crba;
 mod energy;
+mod frames;
+mod inertia;
 mod kinematics;
 mod momentum;
+mod motion;
 mod regressor;
 mod rnea;
 mod terms;
+mod vec3;
 
 pub use aba::aba;
 pub use coriolis::{coriolis, coriolis_matrix};
@@ -22,79 +28,21 @@ pub use kinematics::{jacobian, jacobian_dot_qd, joint_poses, tip_pose};
 pub use momentum::{Momentum, momentum};
 pub use regressor::{parameters, regressor, regressor_rows};
 pub use rnea::{gravity, rnea};
+pub(crate) use terms::fill;
 pub use terms::{Terms, terms};
 
-use crate::arm::{Arm, Link};
-use crate::body::steiner;
-use crate::math::{Matrix3, Vector, Vector3, sin_cos};
-
-/// `z x a`, the cross product with the joint axis.
-#[inline]
-fn z_cross(a: &Vector3<f64>) -> Vector3<f64> {
-    Vector3::new(-a.y, a.x, 0.0)
-}
+use crate::arm::Arm;
+use crate::lanes::{in_groups, of_joint};
+use crate::math::{Matrix3, Vector};
 
 /// Rotation of joint frame `i` in its parent's joint frame, for every joint.
 #[inline]
 fn parent_rotations<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> [Matrix3<f64>; N] {
-    core::array::from_fn(|i| {
-        let (s, c) = sin_cos(q[i]);
-        let r = &arm.links[i].parent_from_joint.rotation;
-        let (x, y) = (r.column(0), r.column(1));
-        Matrix3::from_columns(&[x * c + y * s, y * c - x * s, r.column(2).into_owned()])
-    })
+    in_groups!(N, turned(arm, q))
 }
 
-/// Mass, first moment and inertia about the frame's origin, of a link and all that it carries.
-#[derive(Clone, Copy)]
-struct Composite {
-    mass: f64,
-    first_moment: Vector3<f64>,
-    inertia: Matrix3<f64>,
-}
-
-impl Composite {
-    #[inline]
-    fn of(link: &Link) -> Composite {
-        Composite {
-            mass: link.mass,
-            first_moment: link.first_moment,
-            inertia: link.inertia,
-        }
-    }
-
-    /// Adds a child given in its own frame, which stands at `origin`, turned by `rotation`.
-    #[inline]
-    fn add(&mut self, child: &Composite, rotation: &Matrix3<f64>, origin: &Vector3<f64>) {
-        let moment = rotation * child.first_moment;
-        let outer = origin * moment.transpose();
-        self.mass += child.mass;
-        self.first_moment += moment + origin * child.mass;
-        self.inertia += rotation * child.inertia * rotation.transpose()
-            + Matrix3::from_diagonal_element(2.0 * origin.dot(&moment))
-            - outer
-            - outer.transpose()
-            + steiner(child.mass, origin);
-    }
-
-    /// Moment about the origin and force that accelerate the composite about z by 1 rad/s^2.
-    #[inline]
-    fn unit_wrench(&self) -> (Vector3<f64>, Vector3<f64>) {
-        (
-            self.inertia.column(2).into_owned(),
-            z_cross(&self.first_moment),
-        )
-    }
-}
-
-/// A wrench of joint frame `i`, seen from the parent's joint frame.
 #[inline]
-fn wrench_to_parent(
-    moment: &Vector3<f64>,
-    force: &Vector3<f64>,
-    rotation: &Matrix3<f64>,
-    origin: &Vector3<f64>,
-) -> (Vector3<f64>, Vector3<f64>) {
-    let force = rotation * force;
-    (rotation * moment + origin.cross(&force), force)
+fn turned<const N: usize, const G: usize>(arm: &Arm<N>, q: &Vector<N>) -> [Matrix3<f64>; N] {
+    let rows = chain::parent_rotations::<N, G>(arm, q);
+    core::array::from_fn(|i| Matrix3::from_column_slice(&of_joint(&rows, i)))
 }

@@ -10,15 +10,23 @@
 //! v . a m  +  (v x alpha + (v x w) x w + a x e) . h  +  e . I alpha + (e x w) . I w
 //! ```
 //!
-//! so that six numbers go out along the chain for each joint, in place of the sixty of a link's wrench
-//! that would come back. All in axes of the link frame.
+//! so that each joint's twist is brought to the link, in place of the link's sixty numbers to each joint.
+//! All in axes of the link frame.
+#![allow(
+    clippy::needless_range_loop,
+    reason = "joints, groups and lanes are counted: each index goes into several arrays"
+)]
 
-use super::parent_rotations;
+use super::body_motion::body_motions;
+use super::chain::{Chain, parent_rotations};
+use super::vec3::{V3, add, cross, dot, product, rotate_back, sub, transposed};
 use crate::arm::Arm;
-use crate::math::{Matrix, Vector, Vector3};
+use crate::lanes::{Number, for_each_joint, in_groups, per_joint, splat};
+use crate::math::{Matrix, Vector};
 
 /// Joint-torque regressor, a block of ten columns a link \[N x 10 each\]:
 /// `rnea = sum_k Y_k p_k + armature qdd`, with `p_k` as [`parameters`] orders them.
+#[inline]
 pub fn regressor<const N: usize>(
     arm: &Arm<N>,
     q: &Vector<N>,
@@ -26,11 +34,12 @@ pub fn regressor<const N: usize>(
     qdd: &Vector<N>,
 ) -> [Matrix<N, 10>; N] {
     let mut blocks = [Matrix::<N, 10>::zeros(); N];
-    regressor_rows(arm, q, qd, qdd, |joint, link, row| {
-        for (column, value) in row.iter().enumerate() {
-            blocks[link][(joint, column)] = *value;
+    let put = |link: usize, columns: &[[f64; N]; 10]| {
+        for (column, found) in blocks[link].data.0.iter_mut().zip(columns) {
+            column[..=link].copy_from_slice(&found[..=link]);
         }
-    });
+    };
+    in_groups!(N, columns(arm, q, qd, qdd, put));
     blocks
 }
 
@@ -44,70 +53,63 @@ pub fn regressor_rows<const N: usize>(
     qdd: &Vector<N>,
     mut put: impl FnMut(usize, usize, [f64; 10]),
 ) {
-    let rotations = parent_rotations(arm, q);
-    let mut twists = [Twist::ZERO; N];
-    let mut omega = Vector3::zeros();
-    let mut alpha = Vector3::zeros();
-    let mut accel = -arm.gravity;
-    for k in 0..N {
-        let link = &arm.links[k];
-        let mut parent_from_link = rotations[k] * link.link_from_joint.transpose();
-        let mut origin = link.parent_from_joint.translation;
-        if k > 0 {
-            let parent = &arm.links[k - 1].link_from_joint;
-            parent_from_link = parent * parent_from_link;
-            origin = parent * origin;
+    let by_rows = |link: usize, columns: &[[f64; N]; 10]| {
+        for joint in 0..=link {
+            put(joint, link, columns.map(|column| column[joint]));
         }
-        let axis = link.link_from_joint.column(2).into_owned();
-        accel += alpha.cross(&origin) + omega.cross(&omega.cross(&origin));
-        accel = parent_from_link.tr_mul(&accel);
-        omega = parent_from_link.tr_mul(&omega);
-        alpha = parent_from_link.tr_mul(&alpha) + omega.cross(&axis) * qd[k] + axis * qdd[k];
-        omega += axis * qd[k];
-        for twist in &mut twists[..k] {
-            twist.linear += twist.angular.cross(&origin);
-            twist.linear = parent_from_link.tr_mul(&twist.linear);
-            twist.angular = parent_from_link.tr_mul(&twist.angular);
-        }
-        twists[k].angular = axis;
-        for (joint, twist) in twists[..=k].iter().enumerate() {
-            put(joint, k, twist.power(&omega, &alpha, &accel));
-        }
-    }
-}
-
-/// Motion of a link where one joint turns at unit rate.
-#[derive(Clone, Copy)]
-struct Twist {
-    angular: Vector3<f64>,
-    linear: Vector3<f64>,
-}
-
-impl Twist {
-    const ZERO: Twist = Twist {
-        angular: Vector3::new(0.0, 0.0, 0.0),
-        linear: Vector3::new(0.0, 0.0, 0.0),
     };
+    in_groups!(N, columns(arm, q, qd, qdd, by_rows));
+}
 
-    /// Power on the wrench of a link that moves so, as a function of its ten parameters.
-    #[inline]
-    fn power(&self, w: &Vector3<f64>, alpha: &Vector3<f64>, accel: &Vector3<f64>) -> [f64; 10] {
-        let (e, v) = (&self.angular, &self.linear);
-        let h = v.cross(alpha) + v.cross(w).cross(w) + accel.cross(e);
-        let u = e.cross(w);
-        [
-            v.dot(accel),
-            h.x,
-            h.y,
-            h.z,
-            e.x * alpha.x + u.x * w.x,
-            e.x * alpha.y + e.y * alpha.x + u.x * w.y + u.y * w.x,
-            e.y * alpha.y + u.y * w.y,
-            e.x * alpha.z + e.z * alpha.x + u.x * w.z + u.z * w.x,
-            e.y * alpha.z + e.z * alpha.y + u.y * w.z + u.z * w.y,
-            e.z * alpha.z + u.z * w.z,
-        ]
+/// The columns of every link, right for the joints up to it: `put(link, columns)`.
+#[inline]
+fn columns<const N: usize, const G: usize>(
+    arm: &Arm<N>,
+    q: &Vector<N>,
+    qd: &Vector<N>,
+    qdd: &Vector<N>,
+    mut put: impl FnMut(usize, &[[f64; N]; 10]),
+) {
+    let chain = Chain::<G>::new(arm, q);
+    let motions = body_motions(arm, &parent_rotations::<N, G>(arm, q), qd, qdd);
+    for link in 0..N {
+        let frame = chain.frame(link);
+        let mut link_from_joint = [0.0; 9];
+        link_from_joint.copy_from_slice(arm.links[link].link_from_joint.as_slice());
+        let joint_from_link = transposed(&link_from_joint);
+        let base_from_link = product(&frame.rotation, &joint_from_link);
+        let motion = &motions[link];
+        let [w, alpha, accel] = [motion.spin, motion.rate, motion.accel]
+            .map(|v| splat(rotate_back(&joint_from_link, v)));
+        let (base_from_link, here) = (splat(base_from_link), splat(frame.origin));
+        let rows = for_each_joint(&chain.rotations, &chain.origins, &[], |r, origin, []| {
+            let axis = [r[6], r[7], r[8]];
+            let linear = cross(axis, sub(here, origin));
+            let e = rotate_back(&base_from_link, axis);
+            let v = rotate_back(&base_from_link, linear);
+            power(e, v, w, alpha, accel)
+        });
+        put(link, &rows.map(|row| per_joint(&row)));
     }
+}
+
+/// Power of the twist `(e, v)` on the wrench of a link, as a function of the link's ten parameters.
+#[inline(always)]
+fn power<T: Number>(e: V3<T>, v: V3<T>, w: V3<T>, alpha: V3<T>, accel: V3<T>) -> [T; 10] {
+    let h = add(add(cross(v, alpha), cross(cross(v, w), w)), cross(accel, e));
+    let u = cross(e, w);
+    [
+        dot(v, accel),
+        h[0],
+        h[1],
+        h[2],
+        e[0] * alpha[0] + u[0] * w[0],
+        e[0] * alpha[1] + e[1] * alpha[0] + u[0] * w[1] + u[1] * w[0],
+        e[1] * alpha[1] + u[1] * w[1],
+        e[0] * alpha[2] + e[2] * alpha[0] + u[0] * w[2] + u[2] * w[0],
+        e[1] * alpha[2] + e[2] * alpha[1] + u[1] * w[2] + u[2] * w[1],
+        e[2] * alpha[2] + u[2] * w[2],
+    ]
 }
 
 /// Inertial parameters of every link, ten each, in its link frame; the last link with the tool.

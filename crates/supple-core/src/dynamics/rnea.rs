@@ -1,69 +1,100 @@
 //! Recursive Newton-Euler: inverse dynamics, and gravity alone.
+//!
+//! In joint frames, where precision does not depend on how far the wrist is from the base.
+#![allow(
+    clippy::needless_range_loop,
+    reason = "joints, groups and lanes are counted: each index goes into several arrays"
+)]
 
-use super::{parent_rotations, wrench_to_parent};
+use super::body_motion::body_motions;
+use super::chain::parent_rotations;
+use super::vec3::{V3, add, cross, rotate, rotate_back, scale};
 use crate::arm::Arm;
-use crate::math::{Vector, Vector3};
+use crate::lanes::{in_groups, of_joint};
+use crate::math::Vector;
 
 /// Joint torques that give the accelerations `qdd`: `H qdd + C qd + G` \[N m\], without friction.
 ///
 /// `q` \[rad\], `qd` \[rad/s\], `qdd` \[rad/s^2\]. Eq. (3.1).
+#[inline]
 pub fn rnea<const N: usize>(
     arm: &Arm<N>,
     q: &Vector<N>,
     qd: &Vector<N>,
     qdd: &Vector<N>,
 ) -> Vector<N> {
-    let rotations = parent_rotations(arm, q);
-    let mut moments = [Vector3::zeros(); N];
-    let mut forces = [Vector3::zeros(); N];
-    let mut omega = Vector3::zeros();
-    let mut alpha = Vector3::zeros();
-    let mut accel = -arm.gravity;
-    for i in 0..N {
-        let link = &arm.links[i];
-        let origin = &link.parent_from_joint.translation;
-        accel += alpha.cross(origin) + omega.cross(&omega.cross(origin));
-        accel = rotations[i].tr_mul(&accel);
-        omega = rotations[i].tr_mul(&omega);
-        alpha = rotations[i].tr_mul(&alpha);
-        // omega of the parent, crossed with z qd.
-        alpha += Vector3::new(omega.y * qd[i], -omega.x * qd[i], qdd[i]);
-        omega.z += qd[i];
-        let h = &link.first_moment;
-        forces[i] = accel * link.mass + alpha.cross(h) + omega.cross(&omega.cross(h));
-        moments[i] = link.inertia * alpha + omega.cross(&(link.inertia * omega)) + h.cross(&accel);
-    }
-    let mut tau = arm.armature.component_mul(qdd);
+    in_groups!(N, inverse_dynamics(arm, q, qd, qdd))
+}
+
+#[inline]
+fn inverse_dynamics<const N: usize, const G: usize>(
+    arm: &Arm<N>,
+    q: &Vector<N>,
+    qd: &Vector<N>,
+    qdd: &Vector<N>,
+) -> Vector<N> {
+    let rotations = parent_rotations::<N, G>(arm, q);
+    let motions = body_motions(arm, &rotations, qd, qdd);
+    let mut tau = Vector::zeros();
+    let (mut force, mut moment) = ([0.0; 3], [0.0; 3]);
     for i in (0..N).rev() {
-        tau[i] += moments[i].z;
+        let motion = &motions[i];
+        let body = |k: usize| arm.rows.body[k][i];
+        let h = [body(1), body(2), body(3)];
+        let inertia = |v: V3| -> V3 {
+            [
+                body(4) * v[0] + body(5) * v[1] + body(7) * v[2],
+                body(5) * v[0] + body(6) * v[1] + body(8) * v[2],
+                body(7) * v[0] + body(8) * v[1] + body(9) * v[2],
+            ]
+        };
+        let own = add(
+            add(inertia(motion.rate), cross(h, motion.accel)),
+            cross(motion.spin, inertia(motion.spin)),
+        );
+        moment = add(moment, own);
+        tau[i] = moment[2] + arm.armature[i] * qdd[i];
         if i > 0 {
-            let origin = &arm.links[i].parent_from_joint.translation;
-            let (moment, force) = wrench_to_parent(&moments[i], &forces[i], &rotations[i], origin);
-            moments[i - 1] += moment;
-            forces[i - 1] += force;
+            force = add(force, scale(motion.accel, body(0)));
+            force = add(force, rotate(&motion.gradient, h));
+            let r = of_joint(&rotations, i);
+            let origin = arm.links[i].parent_from_joint.translation.data.0[0];
+            force = rotate(&r, force);
+            moment = add(rotate(&r, moment), cross(origin, force));
         }
     }
     tau
 }
 
 /// Joint torques that hold the arm still against gravity, `G(q)` \[N m\].
+#[inline]
 pub fn gravity<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> Vector<N> {
-    let rotations = parent_rotations(arm, q);
-    let mut falls = [Vector3::zeros(); N];
-    let mut fall = arm.gravity;
+    in_groups!(N, weights(arm, q))
+}
+
+#[inline]
+fn weights<const N: usize, const G: usize>(arm: &Arm<N>, q: &Vector<N>) -> Vector<N> {
+    let rotations = parent_rotations::<N, G>(arm, q);
+    let mut falls = [[0.0; 3]; N];
+    let mut fall = arm.gravity.data.0[0];
     for i in 0..N {
-        fall = rotations[i].tr_mul(&fall);
+        fall = rotate_back(&of_joint(&rotations, i), fall);
         falls[i] = fall;
     }
-    let mut mass = 0.0;
-    let mut moment = Vector3::zeros();
+    let (mut mass, mut moment) = (0.0, [0.0; 3]);
     let mut tau = Vector::zeros();
     for i in (0..N).rev() {
-        let link = &arm.links[i];
-        mass += link.mass;
-        moment += link.first_moment;
-        tau[i] = moment.y * falls[i].x - moment.x * falls[i].y;
-        moment = rotations[i] * moment + link.parent_from_joint.translation * mass;
+        let body = |k: usize| arm.rows.body[k][i];
+        mass += body(0);
+        moment = add(moment, [body(1), body(2), body(3)]);
+        tau[i] = moment[1] * falls[i][0] - moment[0] * falls[i][1];
+        if i > 0 {
+            let origin = arm.links[i].parent_from_joint.translation.data.0[0];
+            moment = add(
+                rotate(&of_joint(&rotations, i), moment),
+                scale(origin, mass),
+            );
+        }
     }
     tau
 }

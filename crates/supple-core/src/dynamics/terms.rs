@@ -1,9 +1,14 @@
 //! Everything that the impedance law needs, in one sweep out and one back.
 
-use super::kinematics::jacobian_of;
-use super::{Composite, parent_rotations, wrench_to_parent};
+use super::chain::Chain;
+use super::crba::mass_matrix;
+use super::frames::{bodies, joint_motions, matrix};
+use super::inertia::weight_on;
+use super::motion::{Motion, split};
+use super::vec3::dot6;
 use crate::arm::Arm;
-use crate::math::{Matrix, Vector, Vector3};
+use crate::lanes::{for_each_joint, in_groups, per_joint, splat, sums_inward};
+use crate::math::{Matrix, Vector};
 use crate::pose::Pose;
 
 /// What [`terms`] fills.
@@ -44,105 +49,47 @@ impl<const N: usize> Default for Terms<N> {
     }
 }
 
-/// Motion of one joint frame and the wrenches it collects, in that frame.
-#[derive(Clone, Copy)]
-struct Sweep {
-    omega: Vector3<f64>,
-    velocity: Vector3<f64>,
-    moment: Vector3<f64>,
-    force: Vector3<f64>,
-    angular: Vector3<f64>,
-    linear: Vector3<f64>,
-    fall: Vector3<f64>,
+/// Fills `out` for the state `q` \[rad\], `qd` \[rad/s\].
+#[inline]
+pub fn terms<const N: usize>(arm: &Arm<N>, q: &Vector<N>, qd: &Vector<N>, out: &mut Terms<N>) {
+    in_groups!(N, fill(arm, q, qd, out));
 }
 
-/// Fills `out` for the state `q` \[rad\], `qd` \[rad/s\].
-pub fn terms<const N: usize>(arm: &Arm<N>, q: &Vector<N>, qd: &Vector<N>, out: &mut Terms<N>) {
-    let rotations = parent_rotations(arm, q);
-    let mut pose = Pose::IDENTITY;
-    let mut poses = [Pose::IDENTITY; N];
-    let mut omega = Vector3::zeros();
-    let mut alpha = Vector3::zeros();
-    let mut accel = -arm.gravity;
-    let mut velocity = Vector3::zeros();
-    let mut fall = arm.gravity;
-    let mut sweeps: [Sweep; N] = core::array::from_fn(|i| {
-        let link = &arm.links[i];
-        let origin = &link.parent_from_joint.translation;
-        pose = Pose {
-            rotation: pose.rotation * rotations[i],
-            translation: pose.transform_point(origin),
-        };
-        poses[i] = pose;
-        let swing = omega.cross(origin);
-        accel += alpha.cross(origin) + omega.cross(&swing);
-        velocity += swing;
-        accel = rotations[i].tr_mul(&accel);
-        velocity = rotations[i].tr_mul(&velocity);
-        fall = rotations[i].tr_mul(&fall);
-        omega = rotations[i].tr_mul(&omega);
-        alpha = rotations[i].tr_mul(&alpha);
-        alpha += Vector3::new(omega.y * qd[i], -omega.x * qd[i], 0.0);
-        omega.z += qd[i];
-        let h = &link.first_moment;
-        let spin = omega.cross(h);
-        let angular = link.inertia * omega;
-        Sweep {
-            omega,
-            velocity,
-            force: accel * link.mass + alpha.cross(h) + omega.cross(&spin),
-            moment: link.inertia * alpha + omega.cross(&angular) + h.cross(&accel),
-            linear: velocity * link.mass + spin,
-            angular: angular + h.cross(&velocity),
-            fall,
-        }
+/// In a caller that reads some of the terms only, the compiler leaves out what the others need.
+#[inline(always)]
+pub(crate) fn fill<const N: usize, const G: usize>(
+    arm: &Arm<N>,
+    q: &Vector<N>,
+    qd: &Vector<N>,
+    out: &mut Terms<N>,
+) {
+    let chain = Chain::<G>::new(arm, q);
+    let motions = joint_motions(&chain);
+    let bodies = bodies(arm, &chain);
+    out.base_from_tip = chain.tip.pose();
+    out.jacobian = matrix(&motions);
+
+    let gravity = arm.gravity.data.0[0];
+    let motion = Motion::<G>::new(&motions, qd, gravity);
+    out.jacobian_dot_qd = motion.tip_drift::<N>(gravity);
+    let held = sums_inward(motion.forces(&bodies));
+    let carried = sums_inward(bodies);
+    let falls = splat(gravity);
+    let [weight] = for_each_joint(&motions, &carried, &[], |axis, body, []| {
+        [weight_on(axis, body, falls)]
     });
-
-    let to_tip = &arm.joint_from_tip.translation;
-    let tip_accel = accel + alpha.cross(to_tip) + omega.cross(&omega.cross(to_tip)) + fall;
-    let (tip_accel, tip_alpha) = (pose.rotation * tip_accel, pose.rotation * alpha);
-    out.base_from_tip = pose * arm.joint_from_tip;
-    out.jacobian = jacobian_of(&poses, &out.base_from_tip.translation);
-    out.jacobian_dot_qd
-        .fixed_rows_mut::<3>(0)
-        .copy_from(&tip_accel);
-    out.jacobian_dot_qd
-        .fixed_rows_mut::<3>(3)
-        .copy_from(&tip_alpha);
-
-    let mut composites: [Composite; N] = core::array::from_fn(|i| Composite::of(&arm.links[i]));
-    out.mass_matrix = Matrix::from_diagonal(&arm.armature);
-    for j in (0..N).rev() {
-        let here = sweeps[j];
-        let composite = composites[j];
-        let (h, fall) = (&composite.first_moment, &here.fall);
-        out.gravity[j] = h.y * fall.x - h.x * fall.y;
-        out.coriolis_gravity[j] = here.moment.z;
-        out.momentum[j] = here.angular.z + arm.armature[j] * qd[j];
-        out.kinetic_gradient[j] = here.angular.x * here.omega.y - here.angular.y * here.omega.x
-            + here.linear.x * here.velocity.y
-            - here.linear.y * here.velocity.x;
-
-        let (mut moment, mut force) = composite.unit_wrench();
-        out.mass_matrix[(j, j)] += moment.z;
-        for i in (0..j).rev() {
-            let origin = &arm.links[i + 1].parent_from_joint.translation;
-            (moment, force) = wrench_to_parent(&moment, &force, &rotations[i + 1], origin);
-            out.mass_matrix[(i, j)] = moment.z;
-            out.mass_matrix[(j, i)] = moment.z;
-        }
-        if j > 0 {
-            let origin = &arm.links[j].parent_from_joint.translation;
-            composites[j - 1].add(&composite, &rotations[j], origin);
-            let parent = &mut sweeps[j - 1];
-            let (moment, force) =
-                wrench_to_parent(&here.moment, &here.force, &rotations[j], origin);
-            parent.moment += moment;
-            parent.force += force;
-            let (angular, linear) =
-                wrench_to_parent(&here.angular, &here.linear, &rotations[j], origin);
-            parent.angular += angular;
-            parent.linear += linear;
-        }
-    }
+    let [torque, momentum, gradient] =
+        for_each_joint(&motions, &motion.rates, &held, |axis, rate, held| {
+            let (force, momentum) = split(held);
+            [
+                dot6(axis, force),
+                dot6(axis, momentum),
+                dot6(rate, momentum),
+            ]
+        });
+    out.gravity = Vector::from(per_joint(&weight));
+    out.coriolis_gravity = Vector::from(per_joint(&torque));
+    out.momentum = Vector::from(per_joint(&momentum)) + arm.armature.component_mul(qd);
+    out.kinetic_gradient = Vector::from(per_joint(&gradient));
+    out.mass_matrix = mass_matrix(arm, &motions, &carried);
 }

@@ -1,0 +1,144 @@
+//! Instructions of each function on one state, counted by Valgrind, against committed limits: a gate that
+//! does not depend on the machine's mood. `./ci.sh instructions`.
+//!
+//! A limit is about a tenth above what was counted with the toolchain of `rust-toolchain.toml`, for the
+//! processor that a build without flags is for. Lower it when the function gets quicker; raise it with the
+//! reason in the commit message.
+#![allow(missing_docs, reason = "of what the macros make")]
+#![allow(
+    clippy::disallowed_methods,
+    reason = "the harness ends the process itself"
+)]
+
+use gungraun::prelude::*;
+use gungraun::{Callgrind, EventKind};
+use std::hint::black_box;
+use supple_benches::{NULLSPACE_DAMPING, Rig, State, config, gains, pool};
+use supple_core::Arm;
+use supple_core::dynamics::{self, Terms};
+use supple_core::operational::{pose_torque, position_torque};
+
+/// One call, its inputs and outputs hidden from the compiler.
+type Call = Box<dyn FnMut()>;
+
+fn call<const N: usize, T>(
+    asset: &str,
+    function: impl Fn(&Arm<N>, &State<N>) -> T + 'static,
+) -> Call {
+    let arm = config::<N>(asset).arm;
+    let state = pool(&arm)[0];
+    Box::new(move || {
+        black_box(function(black_box(&arm), black_box(&state)));
+    })
+}
+
+fn rnea<const N: usize>(asset: &str) -> Call {
+    call::<N, _>(asset, |arm, s| dynamics::rnea(arm, &s.q, &s.qd, &s.qdd))
+}
+
+fn crba<const N: usize>(asset: &str) -> Call {
+    call::<N, _>(asset, |arm, s| dynamics::crba(arm, &s.q))
+}
+
+fn aba<const N: usize>(asset: &str) -> Call {
+    call::<N, _>(asset, |arm, s| dynamics::aba(arm, &s.q, &s.qd, &s.tau))
+}
+
+fn gravity<const N: usize>(asset: &str) -> Call {
+    call::<N, _>(asset, |arm, s| dynamics::gravity(arm, &s.q))
+}
+
+fn jacobian<const N: usize>(asset: &str) -> Call {
+    call::<N, _>(asset, |arm, s| dynamics::jacobian(arm, &s.q))
+}
+
+fn jdot_qd<const N: usize>(asset: &str) -> Call {
+    call::<N, _>(asset, |arm, s| dynamics::jacobian_dot_qd(arm, &s.q, &s.qd))
+}
+
+fn regressor<const N: usize>(asset: &str) -> Call {
+    call::<N, _>(asset, |arm, s| {
+        dynamics::regressor(arm, &s.q, &s.qd, &s.qdd)
+    })
+}
+
+fn terms<const N: usize>(asset: &str) -> Call {
+    call::<N, _>(asset, |arm, s| {
+        let mut filled = Terms::default();
+        dynamics::terms(arm, &s.q, &s.qd, &mut filled);
+        filled
+    })
+}
+
+fn position_law<const N: usize>(asset: &str) -> Call {
+    call::<N, _>(asset, |arm, s| {
+        position_torque(
+            arm,
+            &s.q,
+            &s.qd,
+            &s.position,
+            &gains().linear,
+            NULLSPACE_DAMPING,
+        )
+    })
+}
+
+fn pose_law<const N: usize>(asset: &str) -> Call {
+    call::<N, _>(asset, |arm, s| {
+        pose_torque(arm, &s.q, &s.qd, &s.pose, &gains(), NULLSPACE_DAMPING)
+    })
+}
+
+fn controller_step<const N: usize>(asset: &str) -> Call {
+    let mut rig = Rig::<N>::tracking(asset);
+    Box::new(move || {
+        black_box(rig.step());
+    })
+}
+
+fn limit(instructions: u64) -> LibraryBenchmarkConfig {
+    let mut callgrind = Callgrind::default();
+    callgrind.hard_limits([(EventKind::Ir, instructions)]);
+    let mut config = LibraryBenchmarkConfig::default();
+    config.tool(callgrind);
+    config
+}
+
+#[library_benchmark]
+#[bench::rnea_3(args = (rnea::<3>("wam3")), config = limit(1_650))]
+#[bench::rnea_4(args = (rnea::<4>("wam4")), config = limit(2_250))]
+#[bench::rnea_7(args = (rnea::<7>("wam7")), config = limit(4_350))]
+#[bench::crba_3(args = (crba::<3>("wam3")), config = limit(2_200))]
+#[bench::crba_4(args = (crba::<4>("wam4")), config = limit(2_500))]
+#[bench::crba_7(args = (crba::<7>("wam7")), config = limit(7_200))]
+#[bench::aba_3(args = (aba::<3>("wam3")), config = limit(3_750))]
+#[bench::aba_4(args = (aba::<4>("wam4")), config = limit(5_250))]
+#[bench::aba_7(args = (aba::<7>("wam7")), config = limit(10_450))]
+#[bench::gravity_3(args = (gravity::<3>("wam3")), config = limit(800))]
+#[bench::gravity_4(args = (gravity::<4>("wam4")), config = limit(1_000))]
+#[bench::gravity_7(args = (gravity::<7>("wam7")), config = limit(1_650))]
+#[bench::jacobian_3(args = (jacobian::<3>("wam3")), config = limit(1_050))]
+#[bench::jacobian_4(args = (jacobian::<4>("wam4")), config = limit(1_300))]
+#[bench::jacobian_7(args = (jacobian::<7>("wam7")), config = limit(2_650))]
+#[bench::jdot_qd_3(args = (jdot_qd::<3>("wam3")), config = limit(1_150))]
+#[bench::jdot_qd_4(args = (jdot_qd::<4>("wam4")), config = limit(1_450))]
+#[bench::jdot_qd_7(args = (jdot_qd::<7>("wam7")), config = limit(2_750))]
+#[bench::regressor_3(args = (regressor::<3>("wam3")), config = limit(5_200))]
+#[bench::regressor_4(args = (regressor::<4>("wam4")), config = limit(7_100))]
+#[bench::regressor_7(args = (regressor::<7>("wam7")), config = limit(22_650))]
+#[bench::terms_3(args = (terms::<3>("wam3")), config = limit(4_250))]
+#[bench::terms_4(args = (terms::<4>("wam4")), config = limit(4_500))]
+#[bench::terms_7(args = (terms::<7>("wam7")), config = limit(12_950))]
+#[bench::law_3(args = (position_law::<3>("wam3")), config = limit(5_000))]
+#[bench::law_4(args = (position_law::<4>("wam4")), config = limit(5_550))]
+#[bench::law_7(args = (pose_law::<7>("wam7")), config = limit(17_900))]
+#[bench::step_3(args = (controller_step::<3>("wam3")), config = limit(7_800))]
+#[bench::step_4(args = (controller_step::<4>("wam4")), config = limit(9_150))]
+#[bench::step_7(args = (controller_step::<7>("wam7")), config = limit(19_750))]
+fn instructions(mut call: Call) {
+    call();
+}
+
+library_benchmark_group!(name = dynamics_group, benchmarks = [instructions]);
+
+main!(library_benchmark_groups = [dynamics_group]);

@@ -1,0 +1,177 @@
+//! Our side of the comparison: the twin of `harness.hpp` and of the programs beside it.
+//!
+//! `peers case.txt outputs.bin` prints `function mode median_ns minimum_ns` lines.
+
+mod case;
+
+use case::{Case, State};
+use std::fs::File;
+use std::hint::black_box;
+use std::io::{self, BufWriter, Write};
+use std::process::ExitCode;
+use std::time::Instant;
+use supple_core::dynamics;
+use supple_core::operational::{pose_torque, position_torque};
+use supple_core::{Matrix, Vector};
+
+const BATCHES: usize = 101;
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [case, outputs] = arguments.as_slice() else {
+        eprintln!("usage: peers case.txt outputs.bin");
+        return ExitCode::from(2);
+    };
+    match run(case, outputs) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{error}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn run(case: &str, outputs: &str) -> Result<(), case::CaseError> {
+    let numbers = case::numbers(case)?;
+    let mut out = BufWriter::new(File::create(outputs)?);
+    macro_rules! of_joints {
+        ($($n:literal)*) => {
+            match numbers.first() {
+                $(Some(&n) if n == f64::from($n) => all::<$n>(&numbers, &mut out)?,)*
+                _ => return Err(case::CaseError::Joints),
+            }
+        };
+    }
+    of_joints!(2 3 4 5 6 7 8 9 10 11 12);
+    match numbers[..] {
+        [3.0, 3.0, ..] => position_law::<3>(&numbers, &mut out)?,
+        [4.0, 3.0, ..] => position_law::<4>(&numbers, &mut out)?,
+        [7.0, 6.0, ..] => pose_law::<7>(&numbers, &mut out)?,
+        _ => {}
+    }
+    out.flush()?;
+    Ok(())
+}
+
+fn all<const N: usize>(numbers: &[f64], out: &mut impl Write) -> Result<(), case::CaseError> {
+    let mut case = Case::<N>::new(numbers)?;
+    let arm = case.arm;
+    let mut bench = Bench {
+        states: &mut case.states,
+        out,
+    };
+    bench.run("rnea", |s| dynamics::rnea(&arm, &s.q, &s.qd, &s.qdd))?;
+    bench.run("crba", |s| dynamics::crba(&arm, &s.q))?;
+    bench.run("aba", |s| dynamics::aba(&arm, &s.q, &s.qd, &s.tau))?;
+    bench.run("jacobian", |s| dynamics::jacobian(&arm, &s.q))?;
+    bench.run("jdot_qd", |s| dynamics::jacobian_dot_qd(&arm, &s.q, &s.qd))?;
+    bench.run("regressor", |s| {
+        dynamics::regressor(&arm, &s.q, &s.qd, &s.qdd)
+    })?;
+    Ok(())
+}
+
+fn position_law<const N: usize>(
+    numbers: &[f64],
+    out: &mut impl Write,
+) -> Result<(), case::CaseError> {
+    let mut case = Case::<N>::new(numbers)?;
+    let (arm, gains, damping) = (case.arm, case.gains.linear, case.nullspace_damping);
+    let states = &mut case.states;
+    Bench { states, out }.run("law", |s| {
+        position_torque(&arm, &s.q, &s.qd, &s.position, &gains, damping).unwrap_or(Vector::zeros())
+    })?;
+    Ok(())
+}
+
+fn pose_law<const N: usize>(numbers: &[f64], out: &mut impl Write) -> Result<(), case::CaseError> {
+    let mut case = Case::<N>::new(numbers)?;
+    let (arm, gains, damping) = (case.arm, case.gains, case.nullspace_damping);
+    let states = &mut case.states;
+    Bench { states, out }.run("law", |s| {
+        pose_torque(&arm, &s.q, &s.qd, &s.pose, &gains, damping).unwrap_or(Vector::zeros())
+    })?;
+    Ok(())
+}
+
+/// A result as numbers, in the order in which the peers store theirs.
+trait Numbers: Copy {
+    fn first(&self) -> f64;
+    fn write(&self, out: &mut impl Write) -> io::Result<()>;
+}
+
+impl<const R: usize, const C: usize> Numbers for Matrix<R, C> {
+    #[inline]
+    fn first(&self) -> f64 {
+        self[(0, 0)]
+    }
+
+    fn write(&self, out: &mut impl Write) -> io::Result<()> {
+        self.iter()
+            .try_for_each(|x| out.write_all(&x.to_le_bytes()))
+    }
+}
+
+impl<const N: usize> Numbers for [Matrix<N, 10>; N] {
+    #[inline]
+    fn first(&self) -> f64 {
+        self[0][(0, 0)]
+    }
+
+    fn write(&self, out: &mut impl Write) -> io::Result<()> {
+        self.iter().try_for_each(|block| block.write(out))
+    }
+}
+
+struct Bench<'a, const N: usize, W: Write> {
+    states: &'a mut [State<N>],
+    out: &'a mut W,
+}
+
+impl<const N: usize, W: Write> Bench<'_, N, W> {
+    fn run<T: Numbers>(
+        &mut self,
+        name: &str,
+        mut call: impl FnMut(&State<N>) -> T,
+    ) -> io::Result<()> {
+        for state in self.states.iter() {
+            call(state).write(self.out)?;
+        }
+        time(name, "independent", self.states, |state, _| {
+            black_box(&call(state));
+            0.0
+        });
+        time(name, "dependent", self.states, |state, before| {
+            // Too small to change the angle, but nobody knows that.
+            let angle = state.q[0];
+            state.q[0] += before * 1e-200;
+            let result = call(state);
+            black_box(&result);
+            state.q[0] = angle;
+            result.first()
+        });
+        Ok(())
+    }
+}
+
+fn time<const N: usize>(
+    name: &str,
+    mode: &str,
+    states: &mut [State<N>],
+    mut call: impl FnMut(&mut State<N>, f64) -> f64,
+) {
+    let mut ns = Vec::with_capacity(BATCHES);
+    let mut carry = 0.0;
+    for batch in 0..=BATCHES {
+        let begin = Instant::now();
+        for state in states.iter_mut() {
+            carry = call(state, carry);
+        }
+        let spent = begin.elapsed().as_nanos() as f64;
+        if batch > 0 {
+            ns.push(spent / states.len() as f64);
+        }
+    }
+    ns.sort_by(f64::total_cmp);
+    println!("{name} {mode} {:.3} {:.3}", ns[BATCHES / 2], ns[0]);
+}

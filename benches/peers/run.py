@@ -1,0 +1,208 @@
+"""Compiles the peers, runs all programs in turn, holds their outputs against each other, and writes
+RESULTS.md, results.json and growth.svg. `run.sh` calls it."""
+
+import argparse
+import importlib.metadata
+import json
+import pathlib
+import platform
+import statistics
+import subprocess
+import sys
+
+import cases
+import numpy as np
+import report
+
+HERE = pathlib.Path(__file__).parent
+ARMS = {"wam3": 3, "wam4": 3, "wam7": 6}
+GROWTH = range(2, 13)
+TOLERANCE = 1e-9
+CLANG = ["clang++", "-std=c++17", "-O3", "-march=native", "-DNDEBUG"]
+# Pinocchio's own build asks these of boost.
+BOOST = [
+    "-DBOOST_MPL_LIMIT_LIST_SIZE=30",
+    "-DBOOST_MPL_LIMIT_VECTOR_SIZE=30",
+    "-DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS",
+    "-DBOOST_FUSION_INVOKE_MAX_ARITY=10",
+]
+
+
+def compile_cpp(source, program, flags, depends):
+    newest = max(path.stat().st_mtime for path in [source, HERE / "harness.hpp", *depends])
+    if not program.exists() or program.stat().st_mtime < newest:
+        subprocess.run([*CLANG, *flags, str(source), "-o", str(program)], check=True)
+
+
+def pinocchio(folder):
+    prefix = next(folder.glob("python/lib/python*/site-packages/cmeel.prefix")) / "include"
+    program = folder / "pinocchio"
+    include = ["-isystem", str(prefix), "-isystem", str(prefix / "eigen3")]
+    compile_cpp(HERE / "pinocchio.cpp", program, [*BOOST, *include], [])
+    return program
+
+
+def symbolic(folder, arm):
+    code, program = folder / f"{arm}.c", folder / f"symbolic_{arm}"
+    subprocess.run(
+        [sys.executable, HERE / "symbolic.py", folder / f"{arm}.txt", code], check=True
+    )
+    compile_cpp(HERE / "symbolic.cpp", program, [f'-DARM_C="{code.resolve()}"'], [code])
+    return program
+
+
+class Runner:
+    """Runs programs pinned to one core and keeps their outputs."""
+
+    def __init__(self, folder, core):
+        self.folder, self.core = folder, core
+
+    def __call__(self, program, case):
+        outputs = self.folder / "outputs.bin"
+        command = ["taskset", "-c", str(self.core), str(program), self.folder / case, outputs]
+        printed = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+        found = []
+        for line in printed.splitlines():
+            name, mode, median, least = line.split()
+            if mode == "independent":
+                found.append((name, {}))
+            found[-1][1][mode] = (float(median), float(least))
+        return found, np.fromfile(outputs)
+
+
+def split(found, outputs, joints):
+    """The outputs of each measured function, a row a state."""
+    sizes = {
+        "rnea": joints,
+        "crba": joints**2,
+        "aba": joints,
+        "jacobian": 6 * joints,
+        "jdot_qd": 6,
+        "regressor": 10 * joints**2,
+        "law": joints,
+    }
+    at, out = 0, []
+    for name, _ in found:
+        count = sizes[name] * cases.STATES
+        out.append((name, outputs[at : at + count].reshape(cases.STATES, -1)))
+        at += count
+    if at != len(outputs):
+        sys.exit(f"{len(outputs)} numbers came out where {at} were expected")
+    return out
+
+
+def worst_difference(name, found, expected, joints):
+    """Greatest difference, mixed absolute and relative; accelerations relative to their greatest."""
+    if name == "crba":
+        # Pinocchio fills the upper triangle.
+        column, row = np.divmod(np.arange(joints**2), joints)
+        found, expected = found[:, row <= column], expected[:, row <= column]
+    size = np.abs(expected)
+    if name == "aba":
+        size = size.max(axis=1, keepdims=True)
+    worst = np.max(np.abs(found - expected) / (1.0 + size))
+    return worst if np.isfinite(worst) else np.inf
+
+
+def compare(arm, joints, ours, peer, label):
+    mine = dict(split(*ours, joints))
+    worst = {}
+    for name, values in split(*peer, joints):
+        worst[name] = max(
+            worst.get(name, 0.0), worst_difference(name, mine[name], values, joints)
+        )
+    wrong = {name: error for name, error in worst.items() if not error <= TOLERANCE}
+    if wrong:
+        sys.exit(f"{arm}: differs from {label} by more than {TOLERANCE}: {wrong}")
+    return max(worst.values())
+
+
+def collect(rounds):
+    """Per function and mode the medians and minima of all rounds, of the quicker way if there are two."""
+    ways = [name for name, _ in rounds[0]]
+    best = {}
+    for way, name in enumerate(ways):
+        times = {
+            mode: [found[way][1][mode] for found in rounds] for mode in ("independent", "dependent")
+        }
+        middle = statistics.median(median for median, _ in times["independent"])
+        if name not in best or middle < best[name][0]:
+            best[name] = (middle, times)
+    return {name: times for name, (_, times) in best.items()}
+
+
+def measure(run, programs, case, arm, joints, rounds):
+    """Times of every program; differences of the peers from ours in the same run."""
+    found = {label: [] for label in programs}
+    differences = {}
+    for _ in range(rounds):
+        results = {label: run(program, case) for label, program in programs.items()}
+        for label, result in results.items():
+            found[label].append(result[0])
+            if label != "ours":
+                error = compare(arm, joints, results["ours"], result, label)
+                differences[label] = max(differences.get(label, 0.0), error)
+    return {label: collect(rounds) for label, rounds in found.items()}, differences
+
+
+def first_line(*command):
+    return subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()[0]
+
+
+def machine():
+    cpu = next(
+        (
+            line.split(":")[1].strip()
+            for line in pathlib.Path("/proc/cpuinfo").read_text().splitlines()
+            if line.startswith("model name")
+        ),
+        platform.processor(),
+    )
+    versions = {name: importlib.metadata.version(name) for name in ("pin", "casadi")}
+    return {
+        "processor": cpu,
+        "system": f"{platform.system()} {platform.machine()}",
+        "rustc": first_line("rustc", "--version"),
+        "clang": first_line("clang++", "--version"),
+        **versions,
+    }
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--folder", type=pathlib.Path, required=True)
+    parser.add_argument("--rounds", type=int, default=11)
+    parser.add_argument("--core", type=int, default=0)
+    options = parser.parse_args()
+    folder = options.folder
+    run = Runner(folder, options.core)
+    random = np.random.default_rng(20261121)
+    ours, peer = folder / "cargo/release/peers", pinocchio(folder)
+    for stale in ("RESULTS.md", "results.json", "growth.svg"):
+        (HERE / stale).unlink(missing_ok=True)
+
+    arms, differences = {}, {}
+    for arm, task in ARMS.items():
+        description = cases.reference_arm(arm, task)
+        cases.write(folder / f"{arm}.txt", description, random)
+        programs = {"ours": ours, "pinocchio": peer, "codegen": symbolic(folder, arm)}
+        joints = len(description.joints)
+        arms[arm], differences[arm] = measure(
+            run, programs, f"{arm}.txt", arm, joints, options.rounds
+        )
+        print(f"{arm}: measured, outputs agree", flush=True)
+
+    growth = {}
+    for joints in GROWTH:
+        name = f"random{joints}"
+        cases.write(folder / f"{name}.txt", cases.random_arm(joints, random), random)
+        programs = {"ours": ours, "pinocchio": peer}
+        growth[joints], _ = measure(run, programs, f"{name}.txt", name, joints, 3)
+    print("random arms of 2 to 12 joints: measured, outputs agree")
+
+    report.write(HERE, machine(), arms, differences, growth, options.rounds)
+    print(f"written: {HERE / 'RESULTS.md'}, results.json, growth.svg")
+
+
+if __name__ == "__main__":
+    main()

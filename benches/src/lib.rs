@@ -1,0 +1,165 @@
+//! What the benchmarks share: an arm in a situation, and a pool of random states.
+//!
+//! Nothing here measures: `dynamics.rs` takes wall time, `instructions` counts instructions, and
+//! `peers` runs other libraries beside this one.
+
+use supple_core::config::Gains;
+use supple_core::config::Role;
+use supple_core::controller::{self, Mode, Request};
+use supple_core::math::Vector3;
+use supple_core::operational::{PoseGains, PoseReference};
+use supple_core::{Arm, Config, Controller, Input, Output, Reference, Trajectory, Vector};
+use supple_core::{dynamics, step};
+use supple_model::Description;
+
+/// States in a pool: more than a branch predictor learns by heart.
+pub const STATES: usize = 256;
+
+/// One state of an arm, and what the law is to do in it.
+#[derive(Clone, Copy, Debug)]
+pub struct State<const N: usize> {
+    /// \[rad\]
+    pub q: Vector<N>,
+    /// \[rad/s\]
+    pub qd: Vector<N>,
+    /// \[rad/s^2\]
+    pub qdd: Vector<N>,
+    /// \[N m\]
+    pub tau: Vector<N>,
+    /// For the law of the tip's position.
+    pub position: Reference,
+    /// For the law of the tip's pose.
+    pub pose: PoseReference,
+}
+
+/// Impedance of all benchmarks.
+pub fn gains() -> PoseGains {
+    PoseGains {
+        linear: Gains {
+            stiffness_n_per_m: Vector3::new(50.0, 60.0, 70.0),
+            damping_n_s_per_m: Vector3::new(15.0, 16.0, 17.0),
+        },
+        stiffness_nm_per_rad: Vector3::new(5.0, 6.0, 7.0),
+        damping_nm_s_per_rad: Vector3::new(0.5, 0.6, 0.7),
+    }
+}
+
+/// Damping of the null space in all benchmarks \[N m s/rad\].
+pub const NULLSPACE_DAMPING: f64 = 2.0;
+
+/// The configuration of a built-in arm.
+///
+/// # Panics
+/// Where the asset does not have `N` joints: a benchmark has nothing to measure then.
+pub fn config<const N: usize>(name: &str) -> Config<N> {
+    let description = Description::asset(name).expect("a built-in arm");
+    description.config::<N>().expect("as many joints as asked")
+}
+
+/// A pool of states of `arm`, the same ones each time.
+pub fn pool<const N: usize>(arm: &Arm<N>) -> Vec<State<N>> {
+    let mut random = Random(20_261_121);
+    (0..STATES).map(|_| random.state(arm)).collect()
+}
+
+/// A controller that holds the tip by the law.
+pub struct Rig<const N: usize> {
+    controller: Controller<N>,
+    state: controller::State<N>,
+    position_rad: Vector<N>,
+    cycle: u64,
+}
+
+impl<const N: usize> Rig<N> {
+    /// At a bent pose of a built-in arm, after the blends of the mode's entry.
+    ///
+    /// # Panics
+    /// Where the controller does not come to follow the law: there is nothing to measure then.
+    pub fn tracking(asset: &str) -> Self {
+        let config = config::<N>(asset);
+        let bent = [0.2, 0.8, 0.0, 0.9];
+        let position_rad = Vector::from_fn(|i, _| match config.roles[i] {
+            Role::Held { position_rad, .. } => position_rad,
+            Role::Active => bent[i % bent.len()],
+        });
+        let tip = dynamics::tip_pose(&config.arm, &position_rad).translation;
+        let controller = Controller::new(config).expect("built-in configurations are sound");
+        let mut rig = Rig {
+            state: controller::State::new(&controller),
+            controller,
+            position_rad,
+            cycle: 0,
+        };
+        let wishes = [Request::GravityHold, Request::Track(Trajectory::Hold(tip))];
+        for wish in wishes {
+            rig.cycle(Some(wish));
+            for _ in 0..1000 {
+                rig.step();
+            }
+        }
+        let mode = rig.step().mode;
+        assert_eq!(mode, Mode::Track, "the controller must follow the law");
+        rig
+    }
+
+    /// One cycle.
+    pub fn step(&mut self) -> Output<N> {
+        self.cycle(None)
+    }
+
+    fn cycle(&mut self, request: Option<Request<N>>) -> Output<N> {
+        let wobble_rad = 1e-5 * (self.cycle % 11) as f64;
+        let input = Input {
+            cycle: self.cycle,
+            position_rad: std::array::from_fn(|i| Some(self.position_rad[i] + wobble_rad)),
+            tip_force_n: None,
+            request,
+        };
+        self.cycle += 1;
+        step(&self.controller, &mut self.state, &input)
+    }
+}
+
+/// Sequence of Steele and Vigna's splitmix64.
+struct Random(u64);
+
+impl Random {
+    fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    fn within(&mut self, reach: f64) -> f64 {
+        ((self.bits() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0) * reach
+    }
+
+    fn vector<const R: usize>(&mut self, reach: f64) -> Vector<R> {
+        Vector::from_fn(|_, _| self.within(reach))
+    }
+
+    fn state<const N: usize>(&mut self, arm: &Arm<N>) -> State<N> {
+        let q = self.vector(3.0);
+        let base_from_tip = dynamics::tip_pose(arm, &q);
+        let position = base_from_tip.translation + self.vector::<3>(0.02);
+        let (velocity, acceleration) = (self.vector::<3>(0.3), self.vector::<3>(1.0));
+        State {
+            q,
+            qd: self.vector(2.0),
+            qdd: self.vector(5.0),
+            tau: self.vector(20.0),
+            position: Reference {
+                position,
+                velocity,
+                acceleration,
+            },
+            pose: PoseReference {
+                velocity_m_per_s: velocity,
+                acceleration_m_per_s2: acceleration,
+                ..PoseReference::at_rest(base_from_tip)
+            },
+        }
+    }
+}

@@ -1,0 +1,50 @@
+//! Joints and links in base axes about the tip's origin.
+//!
+//! There neither velocities nor forces have to be turned on their way along the arm: they are sums. The tip
+//! is the reference point, not the base, because the light bodies of the wrist are near it: about the base
+//! their inertias would vanish in their own distance.
+
+use super::chain::Chain;
+use super::inertia::in_base;
+use super::vec3::{cross, join, sub};
+use crate::arm::Arm;
+use crate::lanes::{Rows, for_each_joint, of_joint, rows, splat};
+use crate::math::Matrix;
+
+/// What each joint's unit speed gives the tip, linear then angular: the columns of the Jacobian.
+#[inline(always)]
+pub(super) fn joint_motions<const G: usize>(chain: &Chain<G>) -> Rows<6, G> {
+    let tip = splat(chain.tip.origin);
+    for_each_joint(&chain.rotations, &chain.origins, &[], |r, origin, []| {
+        let axis = [r[6], r[7], r[8]];
+        join(cross(axis, sub(tip, origin)), axis)
+    })
+}
+
+/// The links in base axes about the tip.
+#[inline(always)]
+pub(super) fn bodies<const N: usize, const G: usize>(
+    arm: &Arm<N>,
+    chain: &Chain<G>,
+) -> Rows<10, G> {
+    let tip = splat(chain.tip.origin);
+    let bodies = rows::<10, N, G>(|k, i| arm.rows.body[k][i]);
+    for_each_joint(
+        &bodies,
+        &chain.rotations,
+        &chain.origins,
+        |body, r, origin| in_base(body, &r, sub(origin, tip)),
+    )
+}
+
+/// A matrix with a column for each joint.
+#[inline(always)]
+pub(super) fn matrix<const K: usize, const N: usize, const G: usize>(
+    rows: &Rows<K, G>,
+) -> Matrix<K, N> {
+    let mut m = Matrix::zeros();
+    for (i, column) in m.data.0.iter_mut().enumerate() {
+        *column = of_joint(rows, i);
+    }
+    m
+}

@@ -1,0 +1,78 @@
+//! Velocities and accelerations of all links, and the forces that they take, in base axes about the tip.
+
+use super::inertia::{cross_force, cross_motion, times};
+use super::vec3::{V3, add, cross, halves};
+use crate::lanes::{Lanes, Rows, for_each_joint, of_joint, rows, sums_outward};
+use crate::math::Vector;
+
+/// How every link moves.
+pub(super) struct Motion<const G: usize> {
+    twists: Rows<6, G>,
+    /// Of each joint's motion: `v x S`.
+    pub rates: Rows<6, G>,
+    /// With the base accelerated upwards.
+    accelerations: Rows<6, G>,
+}
+
+impl<const G: usize> Motion<G> {
+    /// Under the joint speeds `qd` alone.
+    #[inline(always)]
+    pub fn new<const N: usize>(motions: &Rows<6, G>, qd: &Vector<N>, gravity: V3) -> Self {
+        let speeds = rows::<1, N, G>(|_, i| qd[i]);
+        let at_speed =
+            |[speed]: [Lanes; 1], motion: [Lanes; 6], []: [Lanes; 0]| motion.map(|x| x * speed);
+        let twists = for_each_joint(&speeds, motions, &[], at_speed);
+        let twists = sums_outward([0.0; 6], twists);
+        let rates = for_each_joint(&twists, motions, &[], |twist, motion, []| {
+            cross_motion(twist, motion)
+        });
+        let up = [-gravity[0], -gravity[1], -gravity[2], 0.0, 0.0, 0.0];
+        let accelerations = for_each_joint(&speeds, &rates, &[], at_speed);
+        Motion {
+            twists,
+            rates,
+            accelerations: sums_outward(up, accelerations),
+        }
+    }
+
+    /// Classical acceleration of the tip, without what gravity was given.
+    #[inline(always)]
+    pub fn tip_drift<const N: usize>(&self, gravity: V3) -> Vector<6> {
+        let (velocity, spin) = halves(of_joint(&self.twists, N - 1));
+        let (linear, angular) = halves(of_joint(&self.accelerations, N - 1));
+        let linear = add(add(linear, cross(spin, velocity)), gravity);
+        Vector::<6>::new(
+            linear[0], linear[1], linear[2], angular[0], angular[1], angular[2],
+        )
+    }
+
+    /// Force on each link, and its momentum.
+    #[inline(always)]
+    pub fn forces(&self, bodies: &Rows<10, G>) -> Rows<12, G> {
+        for_each_joint(
+            bodies,
+            &self.twists,
+            &self.accelerations,
+            |body, twist, accel| {
+                let momentum = times(body, twist);
+                let (inertial, gyroscopic) = (times(body, accel), cross_force(twist, momentum));
+                core::array::from_fn(|k| {
+                    if k < 6 {
+                        inertial[k] + gyroscopic[k]
+                    } else {
+                        momentum[k - 6]
+                    }
+                })
+            },
+        )
+    }
+}
+
+/// Force and momentum.
+#[inline(always)]
+pub(super) fn split(x: [Lanes; 12]) -> ([Lanes; 6], [Lanes; 6]) {
+    (
+        core::array::from_fn(|k| x[k]),
+        core::array::from_fn(|k| x[k + 6]),
+    )
+}

@@ -1,0 +1,93 @@
+//! Vectors and rotations as plain arrays, of one joint's numbers or of a group's ([`crate::lanes`]).
+//! Rotations and pairs of vectors are flat, by columns.
+
+use crate::lanes::Number;
+
+pub(super) type V3<T = f64> = [T; 3];
+
+#[inline(always)]
+pub(super) fn add<T: Number>(a: V3<T>, b: V3<T>) -> V3<T> {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+}
+
+#[inline(always)]
+pub(super) fn sub<T: Number>(a: V3<T>, b: V3<T>) -> V3<T> {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+#[inline(always)]
+pub(super) fn scale<T: Number>(a: V3<T>, s: T) -> V3<T> {
+    [a[0] * s, a[1] * s, a[2] * s]
+}
+
+#[inline(always)]
+pub(super) fn dot<T: Number>(a: V3<T>, b: V3<T>) -> T {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+#[inline(always)]
+pub(super) fn cross<T: Number>(a: V3<T>, b: V3<T>) -> V3<T> {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+/// `R v`.
+#[inline(always)]
+pub(super) fn rotate<T: Number>(r: &[T; 9], v: V3<T>) -> V3<T> {
+    [
+        r[0] * v[0] + r[3] * v[1] + r[6] * v[2],
+        r[1] * v[0] + r[4] * v[1] + r[7] * v[2],
+        r[2] * v[0] + r[5] * v[1] + r[8] * v[2],
+    ]
+}
+
+/// `R^T v`.
+#[inline(always)]
+pub(super) fn rotate_back<T: Number>(r: &[T; 9], v: V3<T>) -> V3<T> {
+    [
+        r[0] * v[0] + r[1] * v[1] + r[2] * v[2],
+        r[3] * v[0] + r[4] * v[1] + r[5] * v[2],
+        r[6] * v[0] + r[7] * v[1] + r[8] * v[2],
+    ]
+}
+
+/// `A B` of two rotations.
+#[inline(always)]
+pub(super) fn product<T: Number>(a: &[T; 9], b: &[T; 9]) -> [T; 9] {
+    join3(
+        rotate(a, [b[0], b[1], b[2]]),
+        rotate(a, [b[3], b[4], b[5]]),
+        rotate(a, [b[6], b[7], b[8]]),
+    )
+}
+
+/// `R^T`.
+#[inline(always)]
+pub(super) fn transposed<T: Number>(r: &[T; 9]) -> [T; 9] {
+    core::array::from_fn(|k| r[3 * (k % 3) + k / 3])
+}
+
+#[inline(always)]
+pub(super) fn join<T: Number>(a: V3<T>, b: V3<T>) -> [T; 6] {
+    [a[0], a[1], a[2], b[0], b[1], b[2]]
+}
+
+#[inline(always)]
+pub(super) fn join3<T: Number>(a: V3<T>, b: V3<T>, c: V3<T>) -> [T; 9] {
+    [a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2]]
+}
+
+/// The linear and the angular half.
+#[inline(always)]
+pub(super) fn halves<T: Number>(x: [T; 6]) -> (V3<T>, V3<T>) {
+    ([x[0], x[1], x[2]], [x[3], x[4], x[5]])
+}
+
+/// Dot product of a pair of vectors with another.
+#[inline(always)]
+pub(super) fn dot6<T: Number>(a: [T; 6], b: [T; 6]) -> T {
+    (a[0] * b[0] + a[1] * b[1] + a[2] * b[2]) + (a[3] * b[3] + a[4] * b[4] + a[5] * b[5])
+}
