@@ -1,9 +1,9 @@
 """Batched calls from Python beside the same loop in Rust: what crossing over costs.
 
-    python benchmarks/native.py [--samples 20000] [--rounds 9] [--json FILE]
+    python benchmarks/native.py [--samples 2000] [--rounds 60] [--json FILE]
 
-Rounds are taken in turn, each the least of three passes; the median of the ratios counts. Exits with
-1 where one is above 1.3.
+Rounds are taken in turn, each the least of three passes over states that fit in the cache; the median
+of the ratios counts. Exits with 1 where one is above 1.3.
 """
 
 from __future__ import annotations
@@ -56,8 +56,8 @@ def batched(arm: supple.Arm, samples: int) -> dict[str, float]:
 def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--arm", default="wam7", help="a built-in arm, or the path of its TOML")
-    parser.add_argument("--samples", type=int, default=20_000)
-    parser.add_argument("--rounds", type=int, default=9)
+    parser.add_argument("--samples", type=int, default=2_000)
+    parser.add_argument("--rounds", type=int, default=60)
     parser.add_argument("--json", type=Path, help="where the figures go")
     options = parser.parse_args()
 
