@@ -38,7 +38,14 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("supple-realtime", &[]),
     (
         "supple-can",
-        &["supple-core", "supple-model", "supple-puck", "supple-bus"],
+        &[
+            "supple-core",
+            "supple-model",
+            "supple-puck",
+            "supple-bus",
+            "supple-ipc",
+            "supple-realtime",
+        ],
     ),
     (
         "supple-emu",
@@ -48,6 +55,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "supple-puck",
             "supple-bus",
             "supple-plant",
+            "supple-realtime",
         ],
     ),
     ("supple-benches", &["supple-core", "supple-model"]),

@@ -18,6 +18,7 @@
 
 #![forbid(unsafe_code)]
 
+mod address;
 mod bus;
 mod can_frame;
 mod clock;
@@ -29,6 +30,7 @@ mod folder;
 mod socket_can;
 pub mod virtual_time;
 
+pub use address::{Address, AddressError};
 pub use bus::{Bus, BusFault, Event};
 pub use can_frame::{CAN_FRAME_BYTES, WireFrame};
 pub use clock::{monotonic_ns, wait_readable_until};

@@ -5,7 +5,7 @@
 //! Bit rate and automatic restart belong to the interface and are set by who brings it up:
 //! `ip link set can0 up type can bitrate 1000000 restart-ms 100`.
 
-use crate::bus::{Bus, Event};
+use crate::bus::{Bus, BusFault, Event};
 use crate::can_frame::{CAN_FRAME_BYTES, WireFrame};
 use crate::clock::{monotonic_ns, wait_readable_until};
 use crate::error::BusError;
@@ -50,6 +50,17 @@ impl SocketCan {
         };
         set_up().map_err(refused)?;
         Ok(SocketCan { socket })
+    }
+
+    /// Puts an error frame on the bus for the other sockets of this machine to see, where the interface
+    /// lets it, as `vcan` does.
+    ///
+    /// # Errors
+    /// Where the kernel refuses it.
+    pub fn send_fault(&mut self, fault: BusFault) -> Result<(), BusError> {
+        let sent = rustix::io::write(&self.socket, &WireFrame::fault(fault));
+        sent.map(|_| ())
+            .map_err(BusError::io("sending an error frame to the CAN interface"))
     }
 
     fn take(&mut self) -> Result<Option<Event>, BusError> {

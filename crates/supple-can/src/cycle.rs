@@ -171,6 +171,11 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
         }
     }
 
+    /// Some motor puck replied in the last cycle.
+    pub fn hears_motors(&self) -> bool {
+        self.counts.iter().any(Option::is_some)
+    }
+
     /// The pendant as it was last read.
     pub fn pendant(&self) -> Option<&Pendant> {
         self.pendant.as_ref()
@@ -300,7 +305,7 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
                 self.counters.round_trip_ns = self.bus.now_ns().saturating_sub(published_ns);
             }
             None => {
-                self.counters.missed += 1;
+                self.counters.missed += u64::from(self.drives() == Drives::Active);
                 self.counters.round_trip_ns = 0;
             }
         }

@@ -216,3 +216,20 @@ pub enum CanError {
     #[error("shared memory: {0}")]
     Link(Box<dyn std::error::Error + Send + Sync>),
 }
+
+impl CanError {
+    /// Exit code, as the command line has them: 3 a wrong arm or description, 9 the bus or shared memory, 4
+    /// an arm that is not as it has to be.
+    pub fn code(&self) -> u8 {
+        match self {
+            CanError::Model(_)
+            | CanError::Joints { .. }
+            | CanError::Described { .. }
+            | CanError::Overload(_)
+            | CanError::Home(_)
+            | CanError::Limits(_) => 3,
+            CanError::Bus(_) | CanError::BusFault(_) | CanError::Link(_) => 9,
+            _ => 4,
+        }
+    }
+}

@@ -20,7 +20,7 @@ pub enum Drives {
 pub struct Counters {
     /// Cycles begun.
     pub cycles: u64,
-    /// Cycles whose answer did not come in time.
+    /// Cycles with active motors whose answer did not come in time.
     pub missed: u64,
     /// Answers that came after their cycle.
     pub late_answers: u64,

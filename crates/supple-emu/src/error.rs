@@ -3,6 +3,7 @@
 use supple_bus::BusError;
 use supple_model::ModelError;
 use supple_plant::PlantError;
+use supple_realtime::StopError;
 
 /// What an emulator cannot be built from, or run on.
 #[derive(Debug, thiserror::Error)]
@@ -57,4 +58,29 @@ pub enum EmulatorError {
         /// What the system says.
         source: std::io::Error,
     },
+    /// A CAN interface in virtual time.
+    #[error("a CAN interface keeps its own time: leave out --virtual-time, or give unix:FOLDER")]
+    VirtualInterface,
+    /// Signals.
+    #[error(transparent)]
+    Stop(#[from] StopError),
+}
+
+impl EmulatorError {
+    /// Exit code, as the command line has them: 2 wrong use, 3 a wrong arm, 6 a file, 9 the bus, 1 the
+    /// system.
+    pub fn code(&self) -> u8 {
+        match self {
+            EmulatorError::Press { .. } | EmulatorError::VirtualInterface => 2,
+            EmulatorError::Joints { .. }
+            | EmulatorError::Pucks { .. }
+            | EmulatorError::Firmware { .. }
+            | EmulatorError::Transmission
+            | EmulatorError::Plant(_)
+            | EmulatorError::Model(_) => 3,
+            EmulatorError::Trace { .. } => 6,
+            EmulatorError::Bus(_) => 9,
+            EmulatorError::Stop(_) => 1,
+        }
+    }
 }

@@ -21,9 +21,15 @@ pub mod wire;
 
 mod emulator;
 mod error;
+mod options;
+mod pendant;
+mod program;
 mod store;
+mod trace;
 
 pub use config::{EmulatorConfig, PuckConfig, SafetyConfig};
 pub use emulator::{Emulator, Happening};
 pub use error::EmulatorError;
+pub use pendant::SOCKET as PENDANT_SOCKET;
+pub use program::{ArmsEnd, catch_up, listen, main};
 pub use safety::{Cause, Press};

@@ -1,0 +1,59 @@
+//! Which bus a program is to use, as it is given on a command line.
+
+use crate::error::BusError;
+use crate::folder::OwnerFolder;
+use core::fmt;
+use core::str::FromStr;
+use std::path::PathBuf;
+
+/// A bus by name.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Address {
+    /// `can:NAME`, a CAN interface.
+    Interface(String),
+    /// `unix:FOLDER`, sockets in an owner-only folder.
+    Folder(PathBuf),
+}
+
+/// A text that names no bus.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("bus `{0}`: expected can:NAME for a CAN interface, or unix:FOLDER for sockets")]
+pub struct AddressError(String);
+
+impl FromStr for Address {
+    type Err = AddressError;
+
+    fn from_str(text: &str) -> Result<Address, AddressError> {
+        match text.split_once(':') {
+            Some(("can", name)) if !name.is_empty() => Ok(Address::Interface(name.to_owned())),
+            Some(("unix", folder)) if !folder.is_empty() => Ok(Address::Folder(folder.into())),
+            _ => Err(AddressError(text.to_owned())),
+        }
+    }
+}
+
+impl fmt::Display for Address {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Address::Interface(name) => write!(f, "can:{name}"),
+            Address::Folder(folder) => write!(f, "unix:{}", folder.display()),
+        }
+    }
+}
+
+impl Address {
+    /// Sockets of the system of this prefix: `supple-bus/PREFIX` under `$XDG_RUNTIME_DIR`, or
+    /// `/tmp/supple-bus-UID/PREFIX` where there is no such variable.
+    ///
+    /// # Errors
+    /// Where the folder above is not the owner's alone.
+    pub fn of_system(prefix: &str) -> Result<Address, BusError> {
+        let user = rustix::process::geteuid().as_raw();
+        let above = match std::env::var_os("XDG_RUNTIME_DIR") {
+            Some(runtime) if !runtime.is_empty() => PathBuf::from(runtime).join("supple-bus"),
+            _ => PathBuf::from(format!("/tmp/supple-bus-{user}")),
+        };
+        let above = OwnerFolder::open(above)?;
+        Ok(Address::Folder(above.path().join(prefix)))
+    }
+}

@@ -1,0 +1,74 @@
+//! What the process is told.
+
+use clap::Parser;
+use supple_bus::Address;
+use supple_puck::safety::SpeedLimit;
+use supple_realtime::Settings;
+
+/// Takes an arm on its CAN bus into service: polls it, publishes its state, sends the torques that answer.
+///
+/// It never activates the arm: the operator does, at the pendant. It may lower it to idle at any time.
+#[derive(Clone, Debug, Parser)]
+#[command(name = "supple-can", version)]
+pub struct Options {
+    /// A WAM with 4 or 7 joints: a built-in arm, or the path of its TOML or of its folder.
+    #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
+    pub arm: String,
+    /// Which system this belongs to; SUPPLE_PREFIX or `supple` if not given.
+    #[arg(long, value_name = "NAME")]
+    pub prefix: Option<String>,
+    /// can:NAME or unix:FOLDER; an emulator's sockets of the same prefix if not given.
+    #[arg(long, value_name = "BUS")]
+    pub bus: Option<Address>,
+    /// The emulator keeps the time, and each cycle waits for its answer.
+    #[arg(long)]
+    pub virtual_time: bool,
+    /// The arm is in its home pose now: where its positions are lost, this is where it is.
+    #[arg(long)]
+    pub zero_at_home: bool,
+    /// Speed of elbow and forearm at which the safety module ends torque (m/s).
+    #[arg(long, value_name = "M_PER_S", default_value_t = 1.0, value_parser = speed)]
+    pub speed_limit_m_per_s: f64,
+    /// Takes what the force/torque sensor feels at the start for zero.
+    #[arg(long)]
+    pub tare: bool,
+    /// Time that is kept in each cycle for the controller's answer (us).
+    #[arg(long, value_name = "US", default_value_t = 100)]
+    pub answer_us: u64,
+    /// Ends after so many cycles.
+    #[arg(long, value_name = "N")]
+    pub cycles: Option<u64>,
+    /// Priority under SCHED_FIFO.
+    #[arg(long, value_name = "1-99", default_value_t = 79, value_parser = clap::value_parser!(u8).range(1..=99))]
+    pub priority: u8,
+    /// Processor for the cycle alone; any if not given.
+    #[arg(long, value_name = "N")]
+    pub cpu: Option<usize>,
+    /// Neither priority nor locked memory.
+    #[arg(long)]
+    pub no_realtime: bool,
+    /// Ends when the process that started it ends.
+    #[arg(long, hide = true)]
+    pub supervised: bool,
+}
+
+impl Options {
+    /// What to ask of the system.
+    pub fn realtime(&self) -> Settings {
+        if self.virtual_time || self.no_realtime {
+            return Settings::NONE;
+        }
+        Settings {
+            priority: Some(self.priority),
+            cpu: self.cpu,
+            lock_memory: true,
+        }
+    }
+}
+
+fn speed(text: &str) -> Result<f64, String> {
+    let speed = text.parse().map_err(|_| "give a number".to_owned())?;
+    SpeedLimit::from_m_per_s(speed)
+        .map(|_| speed)
+        .map_err(|error| error.to_string())
+}

@@ -1,0 +1,117 @@
+//! The way to the controller through shared memory.
+
+use crate::error::CanError;
+use crate::link::{Answer, ArmReport, Command, Drives, Link};
+use core::time::Duration;
+use supple_ipc::message::{self, ArmState, PlantReport};
+use supple_ipc::{IpcError, PlantLink, pause};
+use supple_realtime::Stop;
+
+/// How often virtual time looks whether a controller has come, or whether to stop.
+const LOOK_EVERY: Duration = Duration::from_millis(50);
+const JOIN_EVERY: Duration = Duration::from_millis(1);
+/// Looks after which a controller that does not answer in virtual time counts as lost: 2 s.
+const PATIENCE: u32 = 40;
+
+/// The plant's end of shared memory.
+pub struct SharedMemory {
+    link: PlantLink,
+    virtual_time: bool,
+    /// The last cycle in virtual time was not answered: the next are not waited for.
+    lost: bool,
+    stop: Stop,
+}
+
+impl SharedMemory {
+    /// By the wall clock an answer is waited for as long as the cycle says; in virtual time until it
+    /// comes, since no time passes on the bus.
+    pub fn new(link: PlantLink, virtual_time: bool, stop: Stop) -> SharedMemory {
+        SharedMemory {
+            link,
+            virtual_time,
+            lost: false,
+            stop,
+        }
+    }
+}
+
+impl From<IpcError> for CanError {
+    fn from(error: IpcError) -> CanError {
+        CanError::Link(Box::new(error))
+    }
+}
+
+impl From<message::MessageError> for CanError {
+    fn from(error: message::MessageError) -> CanError {
+        CanError::Link(Box::new(error))
+    }
+}
+
+impl<const N: usize> Link<N> for SharedMemory {
+    fn publish(&mut self, report: &ArmReport<N>) -> Result<(), CanError> {
+        let counters = &report.counters;
+        let state = ArmState::new(
+            report.cycle,
+            report.stamp_ns,
+            &report.position_rad,
+            report.tip_force_n,
+            match report.drives {
+                Drives::Off => message::Drives::Off,
+                Drives::Idle => message::Drives::Idle,
+                Drives::Active => message::Drives::Active,
+            },
+            PlantReport {
+                missed: counters.missed,
+                late: counters.late_answers,
+                tx_lost: counters.tx_lost,
+                wake_ns: counters.wake_ns,
+                round_trip_ns: counters.round_trip_ns,
+                bus_load: counters.bus_load,
+            },
+        );
+        while !self.link.publish(&state)? {
+            if !self.virtual_time || self.lost || self.stop.asked() {
+                break;
+            }
+            pause(JOIN_EVERY);
+        }
+        Ok(())
+    }
+
+    fn answer(&mut self, cycle: u64, wait_ns: u64) -> Result<Answer<N>, CanError> {
+        let mut late = 0;
+        let looks = match (self.virtual_time, self.lost) {
+            (false, _) | (true, true) => 1,
+            (true, false) => PATIENCE,
+        };
+        let wait = match (self.virtual_time, self.lost) {
+            (false, _) => Duration::from_nanos(wait_ns),
+            (true, true) => JOIN_EVERY,
+            (true, false) => LOOK_EVERY,
+        };
+        for _ in 0..looks {
+            let heard = self.link.answer(cycle, wait)?;
+            late += heard.late;
+            if let Some(command) = heard.answer {
+                self.lost = false;
+                let command = Command {
+                    torque_nm: command.torque::<N>()?,
+                    fallback_torque_nm: command.fallback_torque::<N>()?,
+                    wants_torque: command.wants_torque(),
+                };
+                return Ok(Answer {
+                    command: Some(command),
+                    late,
+                });
+            }
+            if self.stop.asked() {
+                break;
+            }
+        }
+        self.lost = self.virtual_time;
+        Ok(Answer {
+            command: None,
+            late,
+        })
+    }
+}

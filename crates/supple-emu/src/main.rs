@@ -1,0 +1,5 @@
+//! The emulated arm, as a process.
+
+fn main() -> std::process::ExitCode {
+    supple_emu::main()
+}

@@ -1,0 +1,216 @@
+//! The process: an arm held to the wall clock, or advanced by its host.
+
+use crate::config::EmulatorConfig;
+use crate::emulator::Emulator;
+use crate::error::EmulatorError;
+use crate::options::Options;
+use crate::pendant::PendantSocket;
+use crate::trace::TraceFile;
+use clap::Parser;
+use std::process::ExitCode;
+use supple_bus::virtual_time::{Peer, Responder};
+use supple_bus::{
+    Address, Bus, BusError, BusFault, DatagramBus, Event, OwnerFolder, Side, SocketCan,
+    monotonic_ns,
+};
+use supple_model::{Description, with_dof};
+use supple_plant::{FixedBlock, PlantConfig, Scene};
+use supple_puck::NodeId;
+use supple_realtime::{Stop, die_with_parent};
+
+/// A stretch of the wall clock in which this process did not run; the arm stood still in it \[ns\].
+const GAP_NS: u64 = 50_000_000;
+/// The longest wait before the pendant's socket is looked at \[ns\].
+const LOOK_NS: u64 = 1_000_000;
+/// The same in virtual time, where nothing happens while the host is silent \[ns\].
+const IDLE_NS: u64 = 10_000_000;
+/// Side of the block beneath the arm \[m\].
+const BLOCK_M: f64 = 2.4;
+
+/// The whole program, from its arguments to its exit code.
+pub fn main() -> ExitCode {
+    let options = Options::parse();
+    match start(&options) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("supple-emu: error: {error}");
+            ExitCode::from(error.code())
+        }
+    }
+}
+
+fn start(options: &Options) -> Result<(), EmulatorError> {
+    let stop = Stop::on_signals()?;
+    if options.supervised {
+        die_with_parent();
+    }
+    let description = Description::find(&options.arm)?;
+    with_dof!(description.dof(), N => run::<N>(&description, options, &stop))?
+}
+
+/// Runs until it is asked to end.
+fn run<const N: usize>(
+    description: &Description,
+    options: &Options,
+    stop: &Stop,
+) -> Result<(), EmulatorError> {
+    let mut config = EmulatorConfig::wam(N);
+    config.zeroed = options.zeroed;
+    config.force_sensor = !options.no_sensor;
+    let mut plant = PlantConfig::<N>::from_description(description)?;
+    if let Some(face_m) = options.block_m {
+        plant.scene = block(face_m);
+    }
+    let start_ns = if options.virtual_time {
+        0
+    } else {
+        monotonic_ns()
+    };
+    let mut emulator = Emulator::new(config, plant, description.home::<N>()?, start_ns)?;
+    for (press, seconds) in &options.press {
+        emulator.press_at(start_ns + (seconds * 1e9) as u64, *press);
+    }
+    let trace = match &options.trace {
+        Some(path) => Some(TraceFile::create(path, N)?),
+        None => None,
+    };
+    let own = Address::of_system(&options.prefix)?;
+    let address = options.bus.clone().unwrap_or_else(|| own.clone());
+    let folder = OwnerFolder::open(match (&address, &own) {
+        (Address::Folder(folder), _) | (_, Address::Folder(folder)) => folder.clone(),
+        (Address::Interface(name), _) => name.into(),
+    })?;
+    let pendant = PendantSocket::open(&folder)?;
+    eprintln!(
+        "supple-emu: {} on {address}, pendant at {}",
+        description.name(),
+        pendant.path().display()
+    );
+    let mut arm = Arm {
+        emulator,
+        pendant,
+        trace,
+    };
+    match (&address, options.virtual_time) {
+        (Address::Folder(_), true) => arm.follow(Responder::open(&folder)?, stop),
+        (Address::Folder(_), false) => arm.keep_pace(DatagramBus::open(&folder, Side::Arm)?, stop),
+        (Address::Interface(name), false) => arm.keep_pace(SocketCan::open(name)?, stop),
+        (Address::Interface(_), true) => Err(EmulatorError::VirtualInterface),
+    }
+}
+
+fn block(face_m: f64) -> Scene {
+    Scene {
+        fixed_blocks: vec![FixedBlock {
+            name: "block".to_owned(),
+            center_m: [0.0, 0.0, face_m - 0.05],
+            size_m: [BLOCK_M, BLOCK_M, 0.10],
+            rpy_rad: [0.0; 3],
+            material: "wood".to_owned(),
+            layer: None,
+        }],
+        ..Scene::default()
+    }
+}
+
+/// The arm's end of a bus by the wall clock.
+pub trait ArmsEnd: Bus {
+    /// The host is to see an error frame.
+    ///
+    /// # Errors
+    /// Where the bus is gone.
+    fn fault(&mut self, fault: BusFault) -> Result<(), BusError>;
+}
+
+impl ArmsEnd for DatagramBus {
+    fn fault(&mut self, fault: BusFault) -> Result<(), BusError> {
+        self.send_fault(fault)
+    }
+}
+
+impl ArmsEnd for SocketCan {
+    fn fault(&mut self, fault: BusFault) -> Result<(), BusError> {
+        self.send_fault(fault)
+    }
+}
+
+/// Lets an arm catch up with its bus's clock, and hands what it says to the bus. A time in which the
+/// process stood still is left out: the arm stood still with it.
+///
+/// # Errors
+/// Where the bus is gone.
+pub fn catch_up<const N: usize>(
+    emulator: &mut Emulator<N>,
+    bus: &mut impl ArmsEnd,
+) -> Result<(), BusError> {
+    let now_ns = bus.now_ns();
+    let behind_ns = now_ns.saturating_sub(emulator.now_ns());
+    if behind_ns > GAP_NS {
+        emulator.skip(behind_ns);
+    }
+    while let Some(event) = emulator.run_until(now_ns) {
+        match event {
+            // A host that does not read loses what it is told, as on a cable.
+            Event::Frame(frame) => match bus.send(&frame) {
+                Ok(()) | Err(BusError::Full) => {}
+                Err(error) => return Err(error),
+            },
+            Event::Fault(fault) => bus.fault(fault)?,
+            Event::Sent(_) => {}
+        }
+    }
+    Ok(())
+}
+
+/// Waits for a frame of the host until the arm has something to do by itself, at most for a millisecond.
+///
+/// # Errors
+/// Where the bus is gone.
+pub fn listen<const N: usize>(
+    emulator: &mut Emulator<N>,
+    bus: &mut impl ArmsEnd,
+) -> Result<(), BusError> {
+    let until_ns = emulator.next_ns().min(bus.now_ns() + LOOK_NS);
+    if let Some(Event::Frame(frame)) = bus.receive_until(until_ns)?
+        && frame.id().from() == NodeId::HOST
+    {
+        catch_up(emulator, bus)?;
+        emulator.host_sends(&frame);
+    }
+    Ok(())
+}
+
+struct Arm<const N: usize> {
+    emulator: Emulator<N>,
+    pendant: PendantSocket,
+    trace: Option<TraceFile>,
+}
+
+impl<const N: usize> Arm<N> {
+    fn look(&mut self) -> Result<(), EmulatorError> {
+        self.pendant.answer(&mut self.emulator);
+        match &mut self.trace {
+            Some(trace) => trace.note(&self.emulator),
+            None => Ok(()),
+        }
+    }
+
+    /// By the wall clock.
+    fn keep_pace(&mut self, mut bus: impl ArmsEnd, stop: &Stop) -> Result<(), EmulatorError> {
+        while !stop.asked() {
+            catch_up(&mut self.emulator, &mut bus)?;
+            self.look()?;
+            listen(&mut self.emulator, &mut bus)?;
+        }
+        Ok(())
+    }
+
+    /// As far as the host says.
+    fn follow(&mut self, mut responder: Responder, stop: &Stop) -> Result<(), EmulatorError> {
+        while !stop.asked() {
+            responder.serve(&mut self.emulator, IDLE_NS)?;
+            self.look()?;
+        }
+        Ok(())
+    }
+}
