@@ -6,7 +6,9 @@
 use crate::emulator::{Emulator, Happening};
 use crate::options::button;
 use serde::Serialize;
+use std::fs::Permissions;
 use std::io::{BufRead, BufReader, Write};
+use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -73,6 +75,7 @@ impl PendantSocket {
             _ => {}
         }
         let listener = UnixListener::bind(&path).map_err(failed)?;
+        std::fs::set_permissions(&path, Permissions::from_mode(0o600)).map_err(failed)?;
         let (sender, questions) = sync_channel(16);
         std::thread::Builder::new()
             .name("pendant".to_owned())

@@ -165,7 +165,10 @@ impl Bell {
 
     /// Waits until it rings, or for `timeout`; false where it did not ring.
     pub fn wait(&self, timeout: Duration) -> Result<bool, IpcError> {
-        let rung = self.listener.timed_wait_one(timeout);
+        // The socket beneath counts in microseconds, and none of them means without end.
+        let rung = self
+            .listener
+            .timed_wait_one(timeout.max(Duration::from_micros(1)));
         let rung = rung.map_err(|error| failed(self.name, &error))?;
         Ok(rung.is_some())
     }

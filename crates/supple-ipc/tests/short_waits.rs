@@ -1,0 +1,17 @@
+//! Waits of less than a microsecond end.
+
+use core::time::Duration;
+use supple_ipc::{ControllerLink, Domain, PlantLink};
+
+#[test]
+fn a_wait_below_the_sockets_resolution_is_not_without_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let domain = Domain::within(&folder.path().join("system"), "short").unwrap();
+    let plant = PlantLink::new(&domain).unwrap();
+    let controller = ControllerLink::new(&domain).unwrap();
+    for nanoseconds in [1, 300, 999] {
+        let wait = Duration::from_nanos(nanoseconds);
+        assert_eq!(plant.answer(0, wait).unwrap().answer, None);
+        assert_eq!(controller.wait(wait).unwrap(), None);
+    }
+}
