@@ -110,7 +110,7 @@ pub fn design<const N: usize>(
         config,
         request,
         home_rad,
-        independent: structural_base(config, &columns)?,
+        independent: structural_base(config, home_rad, &columns)?,
         columns,
     };
     let mut random = Random::new(request.seed);
@@ -197,9 +197,10 @@ fn range<const N: usize>(config: &Config<N>, joint: usize) -> (f64, f64) {
     )
 }
 
-/// Columns that random motion tells apart.
+/// Columns that random motion of the moving joints tells apart.
 fn structural_base<const N: usize>(
     config: &Config<N>,
+    home_rad: &Vector<N>,
     columns: &Columns,
 ) -> Result<Vec<usize>, IdentError> {
     let mut random = Random::new(1);
@@ -208,7 +209,11 @@ fn structural_base<const N: usize>(
     let mut all = DMatrix::zeros(states * moving, columns.len());
     for i in 0..states {
         let mut draw = |scale: f64| Vector::<N>::from_fn(|_, _| scale * random.signed());
-        let (q, qd, qdd) = (draw(PI), draw(2.0), draw(4.0));
+        let (anywhere, qd, qdd) = (draw(PI), draw(2.0), draw(4.0));
+        let q = Vector::<N>::from_fn(|j, _| {
+            let moves = columns.moving().contains(&j);
+            if moves { anywhere[j] } else { home_rad[j] }
+        });
         let block = rows(&config.arm, columns, &q, &qd, &qdd);
         all.rows_mut(i * moving, moving).copy_from(&block);
     }

@@ -19,6 +19,9 @@ use supple_core::{Arm, Friction, Vector};
 /// dry friction give by about a milliradian.
 pub const STEADY_RAD: f64 = 4e-3;
 
+/// Samples that a joint must have to be fitted.
+const LEAST_ROWS: usize = 20;
+
 /// Rounds of robust or constrained weighting.
 const ROUNDS: usize = 5;
 
@@ -151,6 +154,17 @@ pub fn fit_rows<const N: usize>(
         links: model::link_parameters::<N>(&model::prior(nominal, &columns)).to_vec(),
     };
     let blocks = stage.blocks(None);
+    // Where a joint has no rows, nothing holds its friction and its rotor: they would run away.
+    for (block, joint) in blocks.iter().zip(columns.moving()) {
+        if block.rows() < LEAST_ROWS {
+            let slow = options.slow_rad_per_s;
+            return Err(IdentError::Log {
+                column: format!("q[{joint}]"),
+                problem: format!("has {} samples faster than {slow} rad/s", block.rows()),
+                remedy: "move the joint faster, lower slow_rad_per_s, or leave it out of the moving joints",
+            });
+        }
+    }
     let rows: usize = blocks.iter().map(Block::rows).sum();
     if rows < used.len() {
         return Err(shape_error(
@@ -209,7 +223,11 @@ impl Stage<'_> {
             let mut all = Block::empty(self.used.len());
             for (p, part) in self.parts.iter().enumerate() {
                 let weights = weights.map(|w| &w[p][j][..]);
-                let block = Block::of(&part[j], self.options.slow_rad_per_s, weights);
+                let slow = self.options.slow_rad_per_s;
+                let block = match weights {
+                    None => part[j].block(slow),
+                    some => Block::of(&part[j], slow, some),
+                };
                 all.add(&block.select(self.used), 1.0);
             }
             all

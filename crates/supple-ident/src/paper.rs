@@ -84,12 +84,11 @@ pub fn estimate(known: &Parameters, motion: &Motion) -> Result<Estimate, IdentEr
         let expected = format!("({LEAST_SAMPLES} or more, 3)");
         return Err(shape_error("motion", expected, found));
     }
-    let mut stacked = JointRows {
-        a: DMatrix::zeros(3 * samples, 12),
-        b: DVector::zeros(3 * samples),
-        speed: vec![0.0; 3 * samples],
-        slid_rad: vec![0.0; 3 * samples],
-    };
+    let mut stacked = JointRows::new(
+        DMatrix::zeros(3 * samples, 12),
+        DVector::zeros(3 * samples),
+        vec![0.0; 3 * samples],
+    );
     for i in 0..samples {
         let at = |m: &DMatrix<f64>| Vector::<3>::from_fn(|j, _| m[(i, j)]);
         let (rows, rest) = lambda(known, &at(&motion.q), &at(&motion.qd), &at(&motion.qdd));

@@ -1,10 +1,12 @@
 //! Rows of the regressor: what each column contributes to each moving joint's torque.
 
 use crate::columns::{Column, Columns};
+use crate::compress::Block;
 use crate::error::{IdentError, shape_error};
 use crate::filter::LowPass;
 use crate::motion::Motion;
 use nalgebra::{DMatrix, DVector};
+use std::sync::OnceLock;
 use supple_core::dynamics::regressor;
 use supple_core::math::exp;
 use supple_core::{Arm, Friction, Vector};
@@ -20,9 +22,32 @@ pub struct JointRows {
     pub speed: Vec<f64>,
     /// Way since the joint last turned round \[rad\].
     pub slid_rad: Vec<f64>,
+    /// The rows above a speed, reduced once for all fits that use them.
+    reduced: OnceLock<(f64, Block)>,
 }
 
 impl JointRows {
+    /// Regressor, torques and speeds of one joint that slides steadily.
+    pub fn new(a: DMatrix<f64>, b: DVector<f64>, speed: Vec<f64>) -> JointRows {
+        JointRows {
+            slid_rad: vec![f64::INFINITY; speed.len()],
+            a,
+            b,
+            speed,
+            reduced: OnceLock::new(),
+        }
+    }
+
+    /// [`Block::of`] without weights, made once for a speed.
+    pub fn block(&self, slow_rad_per_s: f64) -> Block {
+        let make = || (slow_rad_per_s, Block::of(self, slow_rad_per_s, None));
+        let (speed, block) = self.reduced.get_or_init(make);
+        if *speed == slow_rad_per_s {
+            return block.clone();
+        }
+        make().1
+    }
+
     /// Samples `range`.
     pub fn part(&self, range: std::ops::Range<usize>) -> JointRows {
         JointRows {
@@ -30,6 +55,7 @@ impl JointRows {
             b: self.b.rows_range(range.clone()).into_owned(),
             speed: self.speed[range.clone()].to_vec(),
             slid_rad: self.slid_rad[range].to_vec(),
+            reduced: OnceLock::new(),
         }
     }
 }
@@ -139,6 +165,7 @@ pub fn joint_rows<const N: usize>(
             b: motion.tau.column(j) - motion.qdd.column(j) * known_rotor(j),
             speed: motion.qd.column(j).iter().map(|v| v.abs()).collect(),
             slid_rad: slid(motion, j),
+            reduced: OnceLock::new(),
         })
         .collect();
     for i in 0..samples {

@@ -13,16 +13,7 @@ type Link = Vector<10>;
 
 fn block(a: DMatrix<f64>, b: DVector<f64>) -> Block {
     let speed = vec![1.0; b.len()];
-    Block::of(
-        &JointRows {
-            a,
-            b,
-            slid_rad: speed.clone(),
-            speed,
-        },
-        0.0,
-        None,
-    )
+    Block::of(&JointRows::new(a, b, speed), 0.0, None)
 }
 
 fn ball() -> Link {

@@ -81,12 +81,15 @@ proptest! {
         let mut data = motion(&truth, &friction(), &joints, 300, seed);
         let mut noise = Noise(seed);
         data.tau.iter_mut().for_each(|t| *t += 5.0 * noise.draw());
-        let fit = fit(&truth, &[data], &joints, &Options::default()).unwrap();
+        // Some of these arms hardly move: no sample may be left out.
+        let options = Options { slow_rad_per_s: 0.0, ..Options::default() };
+        let fit = fit(&truth, &[data], &joints, &options).unwrap();
         prop_assert!(fit.arm().is_ok());
         prop_assert!(fit.friction().iter().all(|f| f.validate().is_ok()));
         let checked = fit.validate_motion(&motion(&truth, &friction(), &joints, 200, seed + 3)).unwrap();
         prop_assert_eq!(checked.positive_definite, 1.0);
-        prop_assert!(checked.total_relative < 0.2, "{}", checked.total_relative);
+        // Far below the noise it was found in.
+        prop_assert!(checked.rms_nm.iter().all(|rms| *rms < 5.0), "{:?}", checked.rms_nm);
     }
 }
 
@@ -102,6 +105,19 @@ fn consistent_fits_of_good_data_are_the_arm() {
     let fit = fit(&truth, &[data], &joints, &options).unwrap();
     assert!(furthest(&truth, &fit.arm().unwrap(), &joints) < 1e-3);
     assert!(fit.gap.unwrap() > 0.0);
+}
+
+#[test]
+fn a_joint_that_is_too_slow_throughout_is_refused() {
+    let truth = random_arm::<4>(13);
+    let joints = [0, 1, 2, 3];
+    let data = motion(&truth, &friction(), &joints, 400, 3);
+    let options = Options {
+        slow_rad_per_s: 50.0,
+        ..Options::default()
+    };
+    let error = fit(&truth, &[data], &joints, &options).unwrap_err();
+    assert!(error.to_string().contains("q[0]"), "{error}");
 }
 
 #[test]

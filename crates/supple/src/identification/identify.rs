@@ -16,6 +16,8 @@ use supple_model::{Description, with_dof};
 
 /// Part of the first log that is kept back where none is given to validate.
 const KEPT_BACK: f64 = 0.2;
+/// Slow samples of the project's own logs, which have the rate to tell them.
+const SLOW_RAD_PER_S: f64 = 0.15;
 /// Models drawn to foretell the tracking error.
 const DRAWS: u64 = 5;
 
@@ -30,7 +32,7 @@ pub fn run(args: &IdentifyArgs) -> Result<(), Failure> {
 
 fn procedure(args: &IdentifyArgs, period_s: f64) -> Procedure {
     let given = |list: &Vec<usize>| (!list.is_empty()).then(|| list.clone());
-    let ours = args.logs.iter().all(|path| is_mcap(path));
+    let ours = ours(args);
     Procedure {
         moving: given(&args.moving),
         couplings: args.coupling.clone(),
@@ -43,14 +45,23 @@ fn procedure(args: &IdentifyArgs, period_s: f64) -> Procedure {
         },
         method: args.method.into(),
         friction: FrictionChoice::Auto,
-        slow_rad_per_s: args.slow.unwrap_or(0.0),
+        slow_rad_per_s: slow(args).unwrap_or(0.0),
         joint_noise_nm: (!args.noise.is_empty()).then(|| args.noise.clone()),
         ..Procedure::default()
     }
 }
 
-fn is_mcap(path: &Path) -> bool {
-    path.extension().is_some_and(|ending| ending == "mcap")
+/// All logs are the project's own.
+fn ours(args: &IdentifyArgs) -> bool {
+    let is_mcap = |path: &std::path::PathBuf| path.extension().is_some_and(|end| end == "mcap");
+    args.logs.iter().all(is_mcap)
+}
+
+/// Speed below which samples are left out, if any are.
+fn slow(args: &IdentifyArgs) -> Option<f64> {
+    args.slow
+        .or(ours(args).then_some(SLOW_RAD_PER_S))
+        .filter(|speed| *speed > 0.0)
 }
 
 /// Motions of files, each with the name of its file.
@@ -94,7 +105,7 @@ fn sized<const N: usize>(arm: &Description, args: &IdentifyArgs) -> Result<(), F
         *motion = motion.part(0..cut);
     }
     let data: Vec<Motion> = fitted.iter().map(|(_, motion)| motion.clone()).collect();
-    let mut fit: Fit<N> = if args.slow.is_some() {
+    let mut fit: Fit<N> = if slow(args).is_some() {
         let given = Procedure {
             prior_weight: Some(1.0),
             ..procedure.clone()

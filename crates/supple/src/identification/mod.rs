@@ -104,7 +104,8 @@ pub struct IdentifyArgs {
     /// Solver.
     #[arg(long, value_enum, default_value = "consistent")]
     pub method: Solver,
-    /// Leave out samples of a joint slower than this, and fit a Stribeck dip from them [rad/s].
+    /// Leave out samples of a joint slower than this, and fit a Stribeck dip from them [rad/s]. Default:
+    /// 0.15 for MCAP, 0 (none) for CSV, where friction columns are chosen by cross-validation.
     #[arg(long, value_name = "RAD/S")]
     pub slow: Option<f64>,
     /// Standard deviation of the torque noise of each moving joint [N m]. Default: from residuals.

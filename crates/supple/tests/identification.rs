@@ -1,0 +1,93 @@
+//! Identification on the command line: results that are whole, and bad input refused with its column.
+
+mod support;
+
+use std::path::Path;
+use support::{arg, assert_one_clear_line, run};
+
+fn table(folder: &Path, name: &str, change: impl Fn(usize, &mut Vec<f64>)) -> String {
+    let mut text = "t,q[0],q[1],q[2],tau[0],tau[1],tau[2]\n".to_owned();
+    for i in 0..800 {
+        let t = 0.01 * i as f64;
+        let mut row = vec![t];
+        row.extend((0..3).map(|j| (t * (1.0 + 0.3 * f64::from(j))).sin()));
+        row.extend((0..3).map(|j| 3.0 * (t + f64::from(j)).cos()));
+        change(i, &mut row);
+        let cells: Vec<String> = row.iter().map(ToString::to_string).collect();
+        text += &(cells.join(",") + "\n");
+    }
+    let path = folder.join(name);
+    std::fs::write(&path, text).expect("written");
+    path.display().to_string()
+}
+
+#[test]
+fn a_bad_log_is_refused_with_its_column_and_a_remedy() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let nan = table(folder.path(), "nan.csv", |i, row| {
+        if i == 7 {
+            row[5] = f64::NAN;
+        }
+    });
+    let gap = table(folder.path(), "gap.csv", |i, row| {
+        if i >= 100 {
+            row[0] += 1.0;
+        }
+    });
+    let degrees = table(folder.path(), "degrees.csv", |_, row| {
+        row[2] = row[2].to_degrees();
+    });
+    let still = table(folder.path(), "still.csv", |_, row| row[3] = 0.5);
+    let out = folder.path().join("out");
+    for (log, words) in [
+        (&nan, ["tau[1]", "sample 7"]),
+        (&gap, ["t: a gap", "split the log"]),
+        (&degrees, ["q[1]", "degrees"]),
+        (&still, ["q[2]", "not excited"]),
+    ] {
+        let answer = run(&["identify", log, "--arm", "wam3", "--out", arg(&out)]);
+        assert_eq!(answer.code, Some(9), "{}", answer.stderr);
+        assert_one_clear_line(&answer, &words);
+        assert!(!out.exists());
+    }
+    let absent = run(&["identify", "nowhere.csv", "--arm", "wam3"]);
+    assert_eq!(absent.code, Some(6), "{}", absent.stderr);
+    let joints = run(&["identify", &still, "--arm", "wam3", "--moving", "0,7"]);
+    assert_eq!(joints.code, Some(9), "{}", joints.stderr);
+}
+
+#[test]
+fn a_design_leaves_a_table_a_figure_and_its_numbers() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("design");
+    let answer = run(&[
+        "excite",
+        "design",
+        "--arm",
+        "wam3",
+        "--candidates",
+        "30",
+        "--quiet",
+        "--json",
+        "--out",
+        arg(&out),
+    ]);
+    assert_eq!(answer.code, Some(0), "{}", answer.stderr);
+    let summary: serde_json::Value = serde_json::from_str(&answer.stdout).expect("JSON");
+    assert!(summary["condition"].as_f64().expect("a number") >= 1.0);
+    let figure = std::fs::read_to_string(out.join("excitation.svg")).expect("a figure");
+    roxmltree::Document::parse(&figure).expect("an SVG");
+    let table = std::fs::read_to_string(out.join("excitation.csv")).expect("a table");
+    assert!(table.starts_with("t,q[0],q[1],q[2],qd[0]"));
+    let duration_s = summary["duration_s"].as_f64().expect("a number");
+    assert_eq!(table.lines().count(), (100.0 * duration_s) as usize + 2);
+}
+
+#[test]
+fn help_lists_what_identification_offers() {
+    let help = run(&["--help"]).stdout;
+    for word in ["identify", "excite", "breakaway", "calibrate", "learn"] {
+        assert!(help.contains(word), "{word} in {help}");
+    }
+    assert!(run(&["demo", "--help"]).stdout.contains("--model"));
+}
