@@ -29,6 +29,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "supple-plant",
             "supple-experiment",
             "supple-ident",
+            "supple-ipc",
+            "supple-realtime",
         ],
     ),
     ("supple-bare", &["supple-core"]),
@@ -59,6 +61,25 @@ const ALLOWED: &[(&str, &[&str])] = &[
         ],
     ),
     ("supple-benches", &["supple-core", "supple-model"]),
+    (
+        "supple-rt",
+        &[
+            "supple-core",
+            "supple-model",
+            "supple-ipc",
+            "supple-realtime",
+        ],
+    ),
+    (
+        "supple-sim",
+        &[
+            "supple-core",
+            "supple-model",
+            "supple-ipc",
+            "supple-realtime",
+            "supple-plant",
+        ],
+    ),
     (
         "supple-ident",
         &["supple-core", "supple-model", "supple-log"],

@@ -61,7 +61,6 @@ impl Domain {
             });
         }
         own(folder)?;
-        let user = rustix::process::getuid().as_raw();
         let mut config = Config::default();
         let unusable = |cause: String| IpcError::Folder {
             folder: folder.to_owned(),
@@ -71,7 +70,7 @@ impl Domain {
         let root = Path::new(folder.as_os_str().as_encoded_bytes())
             .map_err(|error| unusable(format!("{error:?}")))?;
         config.global.set_root_path(&root);
-        config.global.prefix = FileName::new(format!("{prefix}_{user}_").as_bytes())
+        config.global.prefix = FileName::new(objects(folder, prefix).as_bytes())
             .map_err(|error| unusable(format!("{error:?}")))?;
         Ok(Domain {
             prefix: prefix.to_owned(),
@@ -83,6 +82,11 @@ impl Domain {
     /// The prefix.
     pub fn prefix(&self) -> &str {
         &self.prefix
+    }
+
+    /// What the names of the system's objects in shared memory begin with.
+    pub fn objects(&self) -> String {
+        objects(&self.folder, &self.prefix)
     }
 
     /// The folder that holds sockets and service files, for the user alone.
@@ -103,6 +107,17 @@ impl Domain {
                 cause: error.to_string(),
             })
     }
+}
+
+/// Shared memory has one space of names for the whole machine: user and folder are part of them.
+fn objects(folder: &StdPath, prefix: &str) -> String {
+    let user = rustix::process::getuid().as_raw();
+    // FNV-1a, 32 bits.
+    let hash = folder.as_os_str().as_encoded_bytes().iter();
+    let hash = hash.fold(0x811c_9dc5_u32, |hash, byte| {
+        (hash ^ u32::from(*byte)).wrapping_mul(0x0100_0193)
+    });
+    format!("{prefix}_{user}_{hash:08x}_")
 }
 
 /// Makes the folder, or makes sure that it is ours alone.

@@ -19,7 +19,7 @@
 //! use supple_ipc::{ControllerLink, Domain, PlantLink};
 //!
 //! let folder = tempfile::tempdir()?;
-//! let domain = Domain::within(folder.path(), "example")?;
+//! let domain = Domain::within(&folder.path().join("run"), "example")?;
 //! let (plant, controller) = (PlantLink::new(&domain)?, ControllerLink::new(&domain)?);
 //! let position_rad = [Some(0.0), Some(-1.8), Some(0.0), None];
 //! let report = PlantReport::default();

@@ -7,7 +7,7 @@
 
 use crate::domain::Domain;
 use crate::error::IpcError;
-use crate::message::{OperatorReply, OperatorRequest, Outcome, Telemetry};
+use crate::message::{OperatorReply, OperatorRequest, Telemetry};
 use crate::port::{Full, Reader, Terms, Writer};
 use core::time::Duration;
 use rustix::thread::{NanosleepRelativeResult, Timespec, nanosleep};
@@ -190,30 +190,18 @@ impl Operator {
         Ok((reached > 0).then_some(self.sequence))
     }
 
-    /// Waits for the reply to a request, at most for `timeout`. [`Outcome::Queued`] is a reply where
-    /// `queued_is_enough`.
+    /// The oldest reply to a request of this operator that was not read yet. A request that waits for its
+    /// cycle has two: [`Outcome::Queued`](crate::message::Outcome::Queued) first.
     ///
     /// # Errors
     /// [`IpcError::Service`].
-    pub fn reply(
-        &self,
-        sequence: u64,
-        queued_is_enough: bool,
-        timeout: Duration,
-    ) -> Result<Option<OperatorReply>, IpcError> {
-        let start = Instant::now();
-        loop {
-            while let Some(reply) = self.replies.receive()? {
-                let mine = reply.operator == self.number && reply.sequence == sequence;
-                if mine && (queued_is_enough || reply.outcome() != Outcome::Queued) {
-                    return Ok(Some(reply));
-                }
+    pub fn receive(&self) -> Result<Option<OperatorReply>, IpcError> {
+        while let Some(reply) = self.replies.receive()? {
+            if reply.operator == self.number {
+                return Ok(Some(reply));
             }
-            if start.elapsed() >= timeout {
-                return Ok(None);
-            }
-            pause(LOOK_EVERY);
         }
+        Ok(None)
     }
 }
 

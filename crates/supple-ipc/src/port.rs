@@ -18,6 +18,7 @@ use iceoryx2::service::builder::publish_subscribe::{
     PublishSubscribeOpenError, PublishSubscribeOpenOrCreateError,
 };
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
+use iceoryx2_cal::event::ListenerWaitError;
 
 /// What there is to know of a service before it is opened.
 #[derive(Clone, Copy, Debug)]
@@ -163,14 +164,15 @@ impl Bell {
         Ok(Bell { listener, name })
     }
 
-    /// Waits until it rings, or for `timeout`; false where it did not ring.
+    /// Waits until it rings, or for `timeout`, or until a signal comes; false where it did not ring.
     pub fn wait(&self, timeout: Duration) -> Result<bool, IpcError> {
         // The socket beneath counts in microseconds, and none of them means without end.
-        let rung = self
-            .listener
-            .timed_wait_one(timeout.max(Duration::from_micros(1)));
-        let rung = rung.map_err(|error| failed(self.name, &error))?;
-        Ok(rung.is_some())
+        let timeout = timeout.max(Duration::from_micros(1));
+        match self.listener.timed_wait_one(timeout) {
+            Ok(rung) => Ok(rung.is_some()),
+            Err(ListenerWaitError::InterruptSignal) => Ok(false),
+            Err(error) => Err(failed(self.name, &error)),
+        }
     }
 }
 

@@ -91,11 +91,13 @@ fn a_second_writer_is_refused_and_told_why() {
 }
 
 #[test]
-fn systems_under_two_prefixes_do_not_meet() {
+fn systems_under_another_prefix_or_in_another_folder_do_not_meet() {
     let (one, two) = (system("one"), system("two"));
     let plant = PlantLink::new(&one.domain).expect("a plant");
-    let shared = Domain::within(one.domain.folder(), two.domain.prefix()).expect("same folder");
-    for other in [&two.domain, &shared] {
+    let same_folder = Domain::within(one.domain.folder(), "other").expect("a domain");
+    let same_prefix = Domain::within(two.domain.folder(), one.domain.prefix());
+    let same_prefix = same_prefix.expect("a domain");
+    for other in [&two.domain, &same_folder, &same_prefix] {
         let controller = ControllerLink::new(other).expect("a controller");
         assert!(!plant.publish(&state(0)).expect("published"));
         assert_eq!(controller.receive().expect("read"), None);
@@ -153,11 +155,10 @@ fn operators_hear_the_replies_to_their_own_requests() {
     ];
     assert_eq!(seen, expected);
     let reply = |operator: &Operator, sequence: Option<u64>| {
-        let sequence = sequence.expect("there is a controller");
-        operator
-            .reply(sequence, false, SOON)
-            .expect("read")
-            .expect("a reply")
+        let reply = operator.receive().expect("read").expect("a reply");
+        assert_eq!(Some(reply.sequence), sequence);
+        assert_eq!(operator.receive().expect("read"), None);
+        reply
     };
     let accepted = reply(&one, first);
     assert_eq!(accepted.outcome(), Outcome::Accepted);
@@ -194,9 +195,8 @@ fn a_peer_of_another_version_is_refused() {
     let mut config = Config::default();
     let root = Path::new(system.folder.as_os_str().as_encoded_bytes()).expect("a path");
     config.global.set_root_path(&root);
-    let user = rustix::process::getuid().as_raw();
-    let prefix = format!("{}_{user}_", system.domain.prefix());
-    config.global.prefix = FileName::new(prefix.as_bytes()).expect("a name");
+    let objects = system.domain.objects();
+    config.global.prefix = FileName::new(objects.as_bytes()).expect("a name");
     let node = NodeBuilder::new().config(&config);
     let node = node.create::<ipc::Service>().expect("a node");
     let service = node
@@ -261,7 +261,7 @@ fn nobody_else_can_open_data() {
     let shared = std::fs::read_dir("/dev/shm")
         .expect("shared memory")
         .flatten();
-    let ours = |name: &str| name.contains(system.domain.prefix());
+    let ours = |name: &str| name.starts_with(&system.domain.objects());
     found.extend(
         shared
             .filter(|entry| ours(&entry.file_name().to_string_lossy()))

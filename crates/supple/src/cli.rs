@@ -2,12 +2,12 @@
 
 use crate::exit::CODES;
 use crate::identification;
-use clap::{Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use std::num::NonZeroU64;
 use std::path::PathBuf;
 
-/// Minimum-impedance control of a backdrivable arm, in simulation.
+/// Minimum-impedance control of a backdrivable arm.
 #[derive(Debug, Parser)]
 #[command(version, after_help = CODES, arg_required_else_help = true)]
 pub struct Cli {
@@ -22,6 +22,36 @@ pub enum Command {
     /// Run the paper's experiments: figures, report, summary and one log a run.
     #[command(after_help = CODES)]
     Demo(DemoArgs),
+    /// Run a system: controller and plant as processes, tracking the sinusoid at 5 N/m, with a log.
+    #[command(after_help = CODES)]
+    Up(UpArgs),
+    /// Say what a running system does.
+    Status(Place),
+    /// Put a running system into a mode.
+    Mode {
+        /// Which.
+        mode: ModeName,
+        /// Which system.
+        #[command(flatten)]
+        place: Place,
+    },
+    /// Change stiffness and damping of a running system, along a ramp.
+    Gains(GainsArgs),
+    /// Have a running system follow a trajectory; the arm moves to its start first.
+    Track(TrackArgs),
+    /// Have a running system probe for contact; the arm moves to the start first.
+    Probe {
+        /// The arm that runs.
+        #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
+        arm: String,
+        /// Which system.
+        #[command(flatten)]
+        place: Place,
+    },
+    /// Take a running system out of its fault.
+    Reset(Place),
+    /// End a running system in order.
+    Stop(Place),
     /// Look into logs.
     #[command(subcommand)]
     Log(LogCommand),
@@ -72,6 +102,116 @@ pub struct DemoArgs {
     /// Write no logs; all of them take about half a gigabyte.
     #[arg(long)]
     pub no_logs: bool,
+}
+
+/// Which system is meant, and how it is answered.
+#[derive(Clone, Debug, Args)]
+pub struct Place {
+    /// Which system; SUPPLE_PREFIX or `supple` if not given.
+    #[arg(long, value_name = "NAME")]
+    pub prefix: Option<String>,
+    /// As JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What plays the arm.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum PlantKind {
+    /// A simulated arm on shared memory.
+    Sim,
+}
+
+/// A mode that can be asked for by itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ModeName {
+    /// No torque; the motors brake.
+    Idle,
+    /// The model holds the arm's weight.
+    GravityHold,
+}
+
+/// A trajectory of the paper.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Shape {
+    /// Back and forth along a line.
+    Sinusoid,
+    /// Back and forth on a circle about the base.
+    Arc,
+    /// Quarter ellipse and its edges, in the vertical plane.
+    Quadrant,
+}
+
+/// Arguments of `up`.
+#[derive(Clone, Debug, Args)]
+pub struct UpArgs {
+    /// What plays the arm.
+    #[arg(long, value_enum)]
+    pub plant: PlantKind,
+    /// A built-in arm (see `supple arms`), or the path of an arm's TOML or of its folder.
+    #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
+    pub arm: String,
+    /// Shut down after so many seconds of control; until an interrupt or `supple stop` if not given.
+    #[arg(long = "for", value_name = "SECONDS", value_parser = seconds)]
+    pub for_s: Option<f64>,
+    /// As fast as the processes can, in lockstep. Needs --for.
+    #[arg(long, requires = "for_s")]
+    pub virtual_time: bool,
+    /// The log; one of that name is replaced.
+    #[arg(long, value_name = "FILE", default_value = "out/up.mcap")]
+    pub log: PathBuf,
+    /// Write no log.
+    #[arg(long, conflicts_with = "log")]
+    pub no_log: bool,
+    /// Which system this is to be; SUPPLE_PREFIX or `supple` if not given.
+    #[arg(long, value_name = "NAME")]
+    pub prefix: Option<String>,
+    /// Ask for neither priority nor locked memory.
+    #[arg(long)]
+    pub no_realtime: bool,
+    /// Print the summary as JSON; an error is then an object on standard output too.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `gains`.
+#[derive(Clone, Debug, Args)]
+pub struct GainsArgs {
+    /// Stiffness, for all axes or as X,Y,Z; as it is if not given.
+    #[arg(long, value_name = "N/M", value_delimiter = ',')]
+    pub stiffness: Vec<f64>,
+    /// Damping, for all axes or as X,Y,Z; as it is if not given.
+    #[arg(long, value_name = "N S/M", value_delimiter = ',')]
+    pub damping: Vec<f64>,
+    /// Time to reach them.
+    #[arg(long = "ramp", value_name = "SECONDS", default_value_t = 1.0)]
+    pub ramp_s: f64,
+    /// Which system.
+    #[command(flatten)]
+    pub place: Place,
+}
+
+/// Arguments of `track`.
+#[derive(Clone, Debug, Args)]
+pub struct TrackArgs {
+    /// Which trajectory.
+    pub shape: Shape,
+    /// Its pace, as a multiple of the paper's.
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
+    pub speed: f64,
+    /// The arm that runs.
+    #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
+    pub arm: String,
+    /// Which system.
+    #[command(flatten)]
+    pub place: Place,
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if seconds.is_finite() && seconds > 0.0 => Ok(seconds),
+        _ => Err("give a positive number of seconds".to_owned()),
+    }
 }
 
 /// What to do with a log.
@@ -129,6 +269,14 @@ impl Command {
         match self {
             Command::Demo(args) => args.json,
             Command::Identification(command) => command.json(),
+            Command::Up(args) => args.json,
+            Command::Gains(GainsArgs { place, .. })
+            | Command::Track(TrackArgs { place, .. })
+            | Command::Mode { place, .. }
+            | Command::Probe { place, .. }
+            | Command::Status(place)
+            | Command::Reset(place)
+            | Command::Stop(place) => place.json,
             Command::Arms { json } | Command::Doctor { json } => *json,
             Command::Log(
                 LogCommand::Info { json, .. }

@@ -12,6 +12,8 @@
 //! | 7 | a replay does not give the logged answers |
 //! | 8 | the machine cannot run an arm in real time as it should |
 //! | 9 | the logs do not give a model |
+//! | 10 | no system runs, or a process of it cannot start or has ended |
+//! | 11 | the controller refused a request |
 //! | 130 | interrupted |
 
 use crate::figures::FigureError;
@@ -19,6 +21,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use supple_experiment::ExperimentError;
 use supple_ident::{IdentError, ReadError, SaveError};
+use supple_ipc::IpcError;
 use supple_log::LogError;
 use supple_model::ModelError;
 
@@ -34,6 +37,8 @@ pub const CODES: &str = "Exit codes:
   7    a replay does not give the logged answers
   8    the machine cannot run an arm in real time as it should
   9    the logs do not give a model
+  10   no system runs, or a process of it cannot start or has ended
+  11   the controller refused a request
   130  interrupted";
 
 /// Why the program did not do what it was asked for. One line that names the cause and the remedy.
@@ -63,6 +68,60 @@ pub enum Failure {
         runs: String,
         /// Where the results are.
         out: PathBuf,
+    },
+    /// A run of a whole system ended by a fault, its log written.
+    #[error("a fault ended the run: {faults}; `supple log info` shows where in the log")]
+    RunFault {
+        /// The faults in words.
+        faults: String,
+    },
+    /// Shared memory.
+    #[error(transparent)]
+    Ipc(#[from] IpcError),
+    /// A system of that name is there.
+    #[error(
+        "a system runs already under the prefix `{prefix}`, by process {process}: `supple stop` ends it, \
+         or choose another --prefix"
+    )]
+    AlreadyRunning {
+        /// The prefix.
+        prefix: String,
+        /// Its `supple up`.
+        process: i32,
+    },
+    /// A program that belongs beside this one.
+    #[error(
+        "{} is missing: build it with `cargo build --release -p {name}`, or install it beside this \
+         program", program.display()
+    )]
+    NoSibling {
+        /// Its package and name.
+        name: &'static str,
+        /// Where it should be.
+        program: PathBuf,
+    },
+    /// A process of the system ended when it should not have.
+    #[error("{name} has ended ({status}); its own words are above")]
+    ProcessEnded {
+        /// Which.
+        name: &'static str,
+        /// How.
+        status: String,
+    },
+    /// No answer.
+    #[error(
+        "no system answers under the prefix `{prefix}`: start one with `supple up`, or choose another \
+         with --prefix"
+    )]
+    NotRunning {
+        /// The prefix.
+        prefix: String,
+    },
+    /// The controller says no.
+    #[error("the controller says: {words}")]
+    Refused {
+        /// Its words.
+        words: String,
     },
     /// A log.
     #[error(transparent)]
@@ -149,6 +208,8 @@ impl Failure {
             5 => "fault",
             6 => "file",
             7 => "replay",
+            10 => "system",
+            11 => "refused",
             8 => "machine",
             9 => "identification",
             _ => "internal",
@@ -168,7 +229,7 @@ impl Failure {
         match self {
             Failure::UnknownArm { .. } | Failure::Model(_) => 3,
             Failure::Experiment(error) => experiment_code(error),
-            Failure::Fault { .. } => 5,
+            Failure::Fault { .. } | Failure::RunFault { .. } => 5,
             Failure::Log(error) => log_code(error),
             Failure::File { .. } | Failure::Exists { .. } => 6,
             Failure::Different { .. } => 7,
@@ -176,6 +237,12 @@ impl Failure {
             Failure::Ident(_) => 9,
             Failure::Read(error) => read_code(error),
             Failure::Save(error) => save_code(error),
+            Failure::Ipc(_)
+            | Failure::AlreadyRunning { .. }
+            | Failure::NoSibling { .. }
+            | Failure::ProcessEnded { .. }
+            | Failure::NotRunning { .. } => 10,
+            Failure::Refused { .. } => 11,
             Failure::Figure(_) | Failure::Compose(_) => 1,
         }
     }

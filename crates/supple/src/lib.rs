@@ -1,4 +1,5 @@
-//! The command line of supple: the demo with its figures and report, and what is done with logs.
+//! The command line of supple: the demo with its figures and report, whole systems as processes, talking to
+//! them, and what is done with logs.
 //!
 //! A library only so that its parts can be tested; the program is `supple`.
 
@@ -14,12 +15,14 @@ pub mod figures;
 mod identification;
 mod interrupt;
 mod log;
+mod operate;
 mod out;
 mod progress;
 pub mod report;
 pub mod sections;
 mod table;
 mod units;
+mod up;
 
 use clap::{CommandFactory, Parser};
 use cli::{Cli, Command};
@@ -42,6 +45,14 @@ pub fn run() -> ExitCode {
 fn dispatch(command: &Command) -> Result<(), Failure> {
     match command {
         Command::Demo(args) => demo::run(args),
+        Command::Up(args) => up::run(args),
+        Command::Status(place) => operate::status(place),
+        Command::Mode { mode, place } => operate::mode(*mode, place),
+        Command::Gains(args) => operate::gains(args),
+        Command::Track(args) => operate::track(args),
+        Command::Probe { arm, place } => operate::probe(arm, place),
+        Command::Reset(place) => operate::reset(place),
+        Command::Stop(place) => operate::stop(place),
         Command::Log(command) => log::run(command),
         Command::Identification(command) => identification::run(command),
         Command::Arms { json } => arms::list(*json),

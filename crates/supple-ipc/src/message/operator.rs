@@ -80,7 +80,7 @@ impl OperatorRequest {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Outcome {
-    /// It waits for its cycle; another reply will follow.
+    /// The controller has it and it waits for its cycle; another reply will follow.
     Queued = 1,
     /// The controller does it.
     Accepted = 2,

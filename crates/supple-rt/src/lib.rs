@@ -1,0 +1,87 @@
+//! The controller as a realtime process: waits for an arm state, runs `step`, publishes torques.
+//!
+//! Two threads. The loop's thread has only the ports to the plant; after its start it allocates nothing,
+//! locks nothing and logs nothing ([`ControlLoop`]). Its helper has the ports to the outside and the disk:
+//! telemetry, requests, replies, and the last cycles before a fault ([`Helper`]). Between them are rings of
+//! fixed size.
+//!
+//! It knows no bus, no log format, no simulator. The plant owns the clock; in virtual time the loop waits for
+//! the plant however long it takes, and nothing it computes depends on a clock in either case.
+
+mod control_loop;
+mod error;
+mod fault_file;
+mod helper;
+mod options;
+mod queue;
+mod rings;
+mod timing;
+
+pub use control_loop::{ControlLoop, PLANT_LOST_AFTER};
+pub use error::RtError;
+pub use fault_file::{KEPT_CYCLES, LastCycles};
+pub use helper::Helper;
+pub use options::Options;
+pub use queue::Queue;
+pub use rings::{Inside, Outside, rings};
+pub use timing::{Spread, Timing};
+
+use clap::Parser;
+use std::process::ExitCode;
+use supple_core::Controller;
+use supple_ipc::{ControllerLink, Domain};
+use supple_model::{Description, with_dof};
+use supple_realtime::{Stop, die_with_parent, enter};
+
+/// The whole program, from its arguments to its exit code.
+pub fn main() -> ExitCode {
+    let options = Options::parse();
+    let stop = match Stop::on_signals() {
+        Ok(stop) => stop,
+        Err(error) => return complain(&error.into()),
+    };
+    if options.supervised {
+        die_with_parent();
+    }
+    let description = match Description::find(&options.arm) {
+        Ok(description) => description,
+        Err(error) => return complain(&error.into()),
+    };
+    let ran = with_dof!(description.dof(), N => run::<N>(&description, &options, &stop));
+    match ran.map_err(RtError::from).and_then(|ran| ran) {
+        Ok(timing) => {
+            eprintln!("supple-rt: {timing}");
+            ExitCode::SUCCESS
+        }
+        Err(error) => complain(&error),
+    }
+}
+
+fn complain(error: &RtError) -> ExitCode {
+    eprintln!("supple-rt: error: {error}");
+    ExitCode::from(error.code())
+}
+
+/// Runs until it is asked to end; gives how it kept its time.
+///
+/// # Errors
+/// [`RtError`]: an arm that is not sound, shared memory that cannot be used, an arm state of another arm.
+pub fn run<const N: usize>(
+    description: &Description,
+    options: &Options,
+    stop: &Stop,
+) -> Result<Timing, RtError> {
+    let controller = Controller::new(description.config::<N>()?)?;
+    let domain = Domain::new(options.prefix.as_deref())?;
+    let link = ControllerLink::new(&domain)?;
+    let (inside, outside) = rings();
+    let helper = Helper::start(&domain, outside, options)?;
+    let mut control = ControlLoop::new(controller, inside, options.virtual_time);
+    for shortfall in enter(&options.realtime()) {
+        eprintln!("supple-rt: warning: {shortfall}");
+    }
+    let ended = control.run(&link, stop);
+    let timing = control.into_timing();
+    helper.finish()?;
+    ended.map(|()| timing)
+}

@@ -1,0 +1,51 @@
+//! What the process is told.
+
+use clap::Parser;
+use std::path::PathBuf;
+use supple_realtime::Settings;
+
+/// The controller of one arm: waits for arm states in shared memory and answers with torques.
+///
+/// `supple up` starts it together with a plant; alone, it waits for one.
+#[derive(Clone, Debug, Parser)]
+#[command(name = "supple-rt", version)]
+pub struct Options {
+    /// A built-in arm (see `supple arms`), or the path of an arm's TOML or of its folder.
+    #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
+    pub arm: String,
+    /// Which system this belongs to; SUPPLE_PREFIX or `supple` if not given.
+    #[arg(long, value_name = "NAME")]
+    pub prefix: Option<String>,
+    /// Waits for the plant however long it takes, and loses no telemetry.
+    #[arg(long)]
+    pub virtual_time: bool,
+    /// Priority under SCHED_FIFO.
+    #[arg(long, value_name = "1-99", default_value_t = 80, value_parser = clap::value_parser!(u8).range(1..=99))]
+    pub priority: u8,
+    /// Processor for the control loop alone; any if not given.
+    #[arg(long, value_name = "N")]
+    pub cpu: Option<usize>,
+    /// Neither priority nor locked memory.
+    #[arg(long)]
+    pub no_realtime: bool,
+    /// Folder for the last cycles before a fault; `faults` beside the system's sockets if not given.
+    #[arg(long, value_name = "DIR")]
+    pub fault_dir: Option<PathBuf>,
+    /// Ends when the process that started it ends.
+    #[arg(long, hide = true)]
+    pub supervised: bool,
+}
+
+impl Options {
+    /// What to ask of the system.
+    pub fn realtime(&self) -> Settings {
+        if self.virtual_time || self.no_realtime {
+            return Settings::NONE;
+        }
+        Settings {
+            priority: Some(self.priority),
+            cpu: self.cpu,
+            lock_memory: true,
+        }
+    }
+}

@@ -1,0 +1,221 @@
+//! The real program against a scripted plant.
+
+use core::time::Duration;
+use rustix::process::{Pid, Signal, kill_process};
+use std::os::unix::fs::PermissionsExt;
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use supple_core::controller::{Mode, Request};
+use supple_core::{Controller, Input, State, step};
+use supple_ipc::message::{ArmState, Drives, Outcome, PlantReport, TorqueCommand};
+use supple_ipc::{Domain, Operator, PlantLink, TelemetryReader, pause};
+use supple_model::Description;
+use tempfile::TempDir;
+
+const SOON: Duration = Duration::from_secs(20);
+
+struct System {
+    folder: TempDir,
+    domain: Domain,
+}
+
+fn system() -> System {
+    let folder = tempfile::tempdir().expect("a folder");
+    let owner = std::fs::Permissions::from_mode(0o700);
+    std::fs::set_permissions(folder.path(), owner).expect("changed");
+    let domain = Domain::within(&folder.path().join("supple"), "process").expect("a domain");
+    System { folder, domain }
+}
+
+impl System {
+    fn start(&self, arguments: &[&str]) -> Child {
+        Command::new(env!("CARGO_BIN_EXE_supple-rt"))
+            .args(["--prefix", "process"])
+            .args(arguments)
+            .env("XDG_RUNTIME_DIR", self.folder.path())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("it starts")
+    }
+}
+
+fn home() -> [Option<f64>; 4] {
+    let description = Description::asset("wam4").expect("built in");
+    let home = description.home::<4>().expect("four joints");
+    core::array::from_fn(|i| Some(home[i]))
+}
+
+fn state(cycle: u64) -> ArmState {
+    let report = PlantReport::default();
+    ArmState::new(
+        cycle,
+        cycle * 1_000_000,
+        &home(),
+        None,
+        Drives::Active,
+        report,
+    )
+}
+
+/// Publishes until somebody is there to read.
+fn publish(plant: &PlantLink, state: &ArmState) {
+    for _ in 0..20_000 {
+        if plant.publish(state).expect("published") {
+            return;
+        }
+        pause(Duration::from_millis(1));
+    }
+    panic!("no controller came");
+}
+
+fn terminate(child: &Child) {
+    let process = i32::try_from(child.id()).expect("a process number");
+    let process = Pid::from_raw(process).expect("not zero");
+    kill_process(process, Signal::TERM).expect("it runs");
+}
+
+fn words(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+#[test]
+fn it_answers_as_step_does() {
+    let system = system();
+    let mut telemetry = TelemetryReader::new(&system.domain).expect("a reader");
+    let mut operator = Operator::new(&system.domain).expect("an operator");
+    let plant = PlantLink::new(&system.domain).expect("a plant");
+    let mut child = system.start(&["--virtual-time"]);
+    let sequence = loop {
+        if let Some(sequence) = operator
+            .send::<4>(&Request::GravityHold, Some(2))
+            .expect("sent")
+        {
+            break sequence;
+        }
+        pause(Duration::from_millis(1));
+    };
+    // The request is in the helper's hands before the first state is there.
+    pause(Duration::from_millis(50));
+    let description = Description::asset("wam4").expect("built in");
+    let controller = Controller::new(description.config::<4>().expect("sound")).expect("sound");
+    let mut reference = State::new(&controller);
+    for cycle in 0..20 {
+        publish(&plant, &state(cycle));
+        let heard = plant.answer(cycle, SOON).expect("read");
+        let input = Input {
+            cycle,
+            position_rad: home(),
+            tip_force_n: None,
+            request: (cycle == 2).then_some(Request::GravityHold),
+        };
+        let output = step(&controller, &mut reference, &input);
+        assert_eq!(heard.answer, Some(TorqueCommand::new(&output, false)));
+    }
+    let told = telemetry.wait(SOON).expect("read").expect("some");
+    assert_eq!((told.step, told.mode()), (0, Some(Mode::Idle)));
+    let reply = || -> (u64, Outcome) {
+        for _ in 0..5000 {
+            if let Some(reply) = operator.receive().expect("read") {
+                return (reply.sequence, reply.outcome());
+            }
+            pause(Duration::from_millis(1));
+        }
+        panic!("no reply came");
+    };
+    assert_eq!(reply(), (sequence, Outcome::Queued));
+    assert_eq!(reply(), (sequence, Outcome::Accepted));
+    child.kill().expect("SIGKILL");
+    child.wait().expect("it is gone");
+}
+
+#[test]
+fn a_fault_leaves_the_last_cycles_on_the_disk_for_the_owner_alone() {
+    let system = system();
+    let plant = PlantLink::new(&system.domain).expect("a plant");
+    let child = system.start(&["--virtual-time"]);
+    // From 5 to 9: states are missing.
+    for cycle in [0, 1, 2, 3, 4, 5, 9, 10] {
+        publish(&plant, &state(cycle));
+        assert!(plant.answer(cycle, SOON).expect("read").answer.is_some());
+    }
+    terminate(&child);
+    let output = child.wait_with_output().expect("it ends");
+    assert!(
+        words(&output).contains("no new arm state for 3 cycles"),
+        "{}",
+        words(&output)
+    );
+    let folder = system.domain.folder().join("faults");
+    let files: Vec<_> = std::fs::read_dir(&folder)
+        .expect("it is there")
+        .flatten()
+        .collect();
+    assert_eq!(files.len(), 1);
+    let path = files[0].path();
+    assert!(words(&output).contains(&path.display().to_string()));
+    let mode = |path: &Path| path.metadata().expect("it is there").permissions().mode() & 0o777;
+    assert_eq!((mode(&folder), mode(&path)), (0o700, 0o600));
+    let table = std::fs::read_to_string(&path).expect("readable");
+    let rows: Vec<Vec<&str>> = table
+        .lines()
+        .map(|line| line.split(',').collect())
+        .collect();
+    assert_eq!(
+        rows.len(),
+        1 + 7,
+        "a header, and the cycles up to the fault"
+    );
+    assert!(rows.iter().all(|row| row.len() == rows[0].len()), "{table}");
+    let column = |name: &str| {
+        rows[0]
+            .iter()
+            .position(|column| *column == name)
+            .expect("there")
+    };
+    assert_eq!(rows[7][column("cycle")], "9");
+    assert_eq!(rows[7][column("mode")], "fault");
+    let home = home()[1].expect("there").to_string();
+    assert_eq!(rows[1][column("measured_position_rad_1")], home);
+}
+
+#[test]
+fn a_second_controller_is_refused_with_the_reason() {
+    let system = system();
+    let plant = PlantLink::new(&system.domain).expect("a plant");
+    let mut first = system.start(&["--virtual-time"]);
+    publish(&plant, &state(0));
+    let second = system.start(&["--virtual-time"]);
+    let output = second.wait_with_output().expect("it ends");
+    assert_eq!(output.status.code(), Some(10), "{}", words(&output));
+    assert!(
+        words(&output).contains("has its writer already"),
+        "{}",
+        words(&output)
+    );
+    first.kill().expect("SIGKILL");
+    first.wait().expect("it is gone");
+    // The next one takes the place of the killed one.
+    let mut third = system.start(&["--virtual-time"]);
+    let mut cycle = 1;
+    while plant
+        .answer(cycle, Duration::from_millis(20))
+        .expect("read")
+        .answer
+        .is_none()
+    {
+        assert!(third.try_wait().expect("looked at").is_none(), "it runs");
+        cycle += 1;
+        publish(&plant, &state(cycle));
+    }
+    third.kill().expect("SIGKILL");
+    third.wait().expect("it is gone");
+}
+
+#[test]
+fn a_wrong_arm_is_code_3() {
+    let output = system().start(&["--arm", "wam9"]).wait_with_output();
+    let output = output.expect("it ends");
+    assert_eq!(output.status.code(), Some(3));
+    assert!(words(&output).contains("wam9"), "{}", words(&output));
+}

@@ -1,0 +1,38 @@
+//! Why the simulation's process ends.
+
+use supple_ipc::IpcError;
+use supple_ipc::message::MessageError;
+use supple_model::ModelError;
+use supple_plant::PlantError;
+use supple_realtime::StopError;
+
+/// Why the process cannot start, or cannot go on.
+#[derive(Debug, thiserror::Error)]
+pub enum SimError {
+    /// The description of the arm.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// The plant.
+    #[error("the plant: {0}")]
+    Plant(#[from] PlantError),
+    /// Shared memory.
+    #[error(transparent)]
+    Ipc(#[from] IpcError),
+    /// A command for another arm.
+    #[error(transparent)]
+    Message(#[from] MessageError),
+    /// Signals.
+    #[error(transparent)]
+    Stop(#[from] StopError),
+}
+
+impl SimError {
+    /// Exit code, as the command line has them: 3 a wrong arm, 10 shared memory, 1 the system.
+    pub fn code(&self) -> u8 {
+        match self {
+            SimError::Model(_) | SimError::Plant(_) => 3,
+            SimError::Ipc(_) | SimError::Message(_) => 10,
+            SimError::Stop(_) => 1,
+        }
+    }
+}

@@ -1,0 +1,78 @@
+//! The simulated arm in the place of a real one: same messages, same clock, no bus.
+//!
+//! It owns the clock. By the wall clock each cycle begins at its time, whatever the controller does; an
+//! answer that does not come is met as the arm's own side would ([`Motors`]). In virtual time each cycle
+//! waits for its answer, so that the same controller gives the same bits, as fast as both can.
+//!
+//! It knows no controller: what it sends is what an arm reports, what it takes is torques.
+
+mod error;
+mod motors;
+mod options;
+mod world;
+
+pub use error::SimError;
+pub use motors::Motors;
+pub use options::Options;
+pub use world::{Summary, World};
+
+use clap::Parser;
+use std::process::ExitCode;
+use supple_ipc::{Domain, PlantLink};
+use supple_model::{Description, with_dof};
+use supple_plant::{Plant, PlantConfig};
+use supple_realtime::{Stop, die_with_parent, enter};
+
+/// The whole program, from its arguments to its exit code.
+pub fn main() -> ExitCode {
+    let options = Options::parse();
+    let stop = match Stop::on_signals() {
+        Ok(stop) => stop,
+        Err(error) => return complain(&error.into()),
+    };
+    if options.supervised {
+        die_with_parent();
+    }
+    let description = match Description::find(&options.arm) {
+        Ok(description) => description,
+        Err(error) => return complain(&error.into()),
+    };
+    let ran = with_dof!(description.dof(), N => run::<N>(&description, &options, &stop));
+    match ran.map_err(SimError::from).and_then(|ran| ran) {
+        Ok(summary) => {
+            eprintln!("supple-sim: {summary}");
+            ExitCode::SUCCESS
+        }
+        Err(error) => complain(&error),
+    }
+}
+
+fn complain(error: &SimError) -> ExitCode {
+    eprintln!("supple-sim: error: {error}");
+    ExitCode::from(error.code())
+}
+
+/// Runs until it is asked to end, or for as many cycles as the options say.
+///
+/// # Errors
+/// [`SimError`]: an arm that is not sound, shared memory that cannot be used, commands for another arm.
+pub fn run<const N: usize>(
+    description: &Description,
+    options: &Options,
+    stop: &Stop,
+) -> Result<Summary, SimError> {
+    let config = PlantConfig::<N>::from_description(description)?;
+    let home_rad = description.home::<N>()?;
+    let motors = Motors::new(&config.arm.armature(), config.cycle_s);
+    let plant = Plant::new(config, home_rad, supple_core::Vector::zeros())?;
+    let domain = Domain::new(options.prefix.as_deref())?;
+    let link = PlantLink::new(&domain)?;
+    let mut world = World::new(plant, motors, link);
+    for shortfall in enter(&options.realtime()) {
+        eprintln!("supple-sim: warning: {shortfall}");
+    }
+    match options.virtual_time {
+        true => world.run_in_virtual_time(options.cycles, stop),
+        false => world.run_by_the_clock(options.cycles, options.answer_share, stop),
+    }
+}

@@ -1,0 +1,61 @@
+//! What the process is told.
+
+use clap::Parser;
+use supple_realtime::Settings;
+
+/// A simulated arm on shared memory, in the place of `supple-can` and a real one.
+///
+/// `supple up --plant sim` starts it together with a controller; alone, it waits for one with its motors
+/// idle.
+#[derive(Clone, Debug, Parser)]
+#[command(name = "supple-sim", version)]
+pub struct Options {
+    /// A built-in arm (see `supple arms`), or the path of an arm's TOML or of its folder.
+    #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
+    pub arm: String,
+    /// Which system this belongs to; SUPPLE_PREFIX or `supple` if not given.
+    #[arg(long, value_name = "NAME")]
+    pub prefix: Option<String>,
+    /// Each cycle waits for its answer, and begins when it has come.
+    #[arg(long)]
+    pub virtual_time: bool,
+    /// Ends after so many cycles.
+    #[arg(long, value_name = "N")]
+    pub cycles: Option<u64>,
+    /// Share of a cycle in which an answer is waited for.
+    #[arg(long, value_name = "0-1", default_value_t = 0.75, value_parser = share)]
+    pub answer_share: f64,
+    /// Priority under SCHED_FIFO.
+    #[arg(long, value_name = "1-99", default_value_t = 79, value_parser = clap::value_parser!(u8).range(1..=99))]
+    pub priority: u8,
+    /// Processor for the simulation alone; any if not given.
+    #[arg(long, value_name = "N")]
+    pub cpu: Option<usize>,
+    /// Neither priority nor locked memory.
+    #[arg(long)]
+    pub no_realtime: bool,
+    /// Ends when the process that started it ends.
+    #[arg(long, hide = true)]
+    pub supervised: bool,
+}
+
+impl Options {
+    /// What to ask of the system.
+    pub fn realtime(&self) -> Settings {
+        if self.virtual_time || self.no_realtime {
+            return Settings::NONE;
+        }
+        Settings {
+            priority: Some(self.priority),
+            cpu: self.cpu,
+            lock_memory: true,
+        }
+    }
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(share) if 0.0 < share && share < 1.0 => Ok(share),
+        _ => Err("give a number between 0 and 1".to_owned()),
+    }
+}

@@ -1,0 +1,171 @@
+//! The cycle: measure, publish, wait for the answer, move.
+
+use crate::error::SimError;
+use crate::motors::Motors;
+use core::fmt;
+use core::time::Duration;
+use supple_ipc::message::{ArmState, Drives, PlantReport};
+use supple_ipc::{Heard, PlantLink, pause};
+use supple_plant::Plant;
+use supple_realtime::{Stop, monotonic_ns, sleep_until_ns};
+
+/// How long one wait of virtual time lasts before it looks whether to stop.
+const LOOK_EVERY: Duration = Duration::from_millis(50);
+/// How often virtual time looks whether a controller has come.
+const JOIN_EVERY: Duration = Duration::from_millis(1);
+/// Periods by which the clock may be behind before it is set again instead of caught up with.
+const CATCH_UP: u64 = 20;
+
+/// A plant with its motors, at the plant's end of shared memory.
+pub struct World<const N: usize> {
+    plant: Plant<N>,
+    motors: Motors<N>,
+    link: PlantLink,
+    report: PlantReport,
+    period_ns: u64,
+}
+
+/// How a simulation went.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Summary {
+    /// Cycles.
+    pub cycles: u64,
+    /// Cycles with active motors whose answer did not come in time.
+    pub missed: u64,
+    /// Answers that came after their cycle.
+    pub late: u64,
+    /// Times that the clock was set again, because the machine had stood still.
+    pub clock_set_again: u64,
+}
+
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{} cycles, {} missed, {} late, clock set again {} times",
+            self.cycles, self.missed, self.late, self.clock_set_again
+        )
+    }
+}
+
+impl<const N: usize> World<N> {
+    /// Before its first cycle.
+    pub fn new(plant: Plant<N>, motors: Motors<N>, link: PlantLink) -> Self {
+        World {
+            period_ns: (plant.config().cycle_s * 1e9).round() as u64,
+            plant,
+            motors,
+            link,
+            report: PlantReport::default(),
+        }
+    }
+
+    /// Runs by the wall clock. An answer is waited for until `answer_share` of its cycle has passed.
+    ///
+    /// # Errors
+    /// [`SimError::Ipc`], [`SimError::Message`].
+    pub fn run_by_the_clock(
+        &mut self,
+        cycles: Option<u64>,
+        answer_share: f64,
+        stop: &Stop,
+    ) -> Result<Summary, SimError> {
+        let mut summary = Summary::default();
+        let wait_ns = (answer_share * self.period_ns as f64) as u64;
+        let mut due_ns = monotonic_ns() + self.period_ns;
+        while !stop.asked() && cycles.is_none_or(|cycles| summary.cycles < cycles) {
+            sleep_until_ns(due_ns);
+            let begin_ns = monotonic_ns();
+            if begin_ns > due_ns + CATCH_UP * self.period_ns {
+                summary.clock_set_again += 1;
+                due_ns = begin_ns;
+            }
+            self.report.wake_ns = begin_ns.saturating_sub(due_ns);
+            self.link.publish(&self.state(begin_ns))?;
+            let left_ns = (due_ns + wait_ns).saturating_sub(monotonic_ns());
+            let heard = self
+                .link
+                .answer(self.cycle(), Duration::from_nanos(left_ns))?;
+            self.note(&heard, begin_ns);
+            self.advance(&heard)?;
+            summary.cycles += 1;
+            due_ns += self.period_ns;
+        }
+        Ok(self.summed_up(summary))
+    }
+
+    /// Runs in lockstep with the controller: no cycle goes on without its answer.
+    ///
+    /// # Errors
+    /// [`SimError::Ipc`], [`SimError::Message`].
+    pub fn run_in_virtual_time(
+        &mut self,
+        cycles: Option<u64>,
+        stop: &Stop,
+    ) -> Result<Summary, SimError> {
+        let mut summary = Summary::default();
+        while cycles.is_none_or(|cycles| summary.cycles < cycles) {
+            let begin_ns = monotonic_ns();
+            let state = self.state(self.cycle() * self.period_ns);
+            while !self.link.publish(&state)? {
+                if stop.asked() {
+                    return Ok(self.summed_up(summary));
+                }
+                pause(JOIN_EVERY);
+            }
+            let mut heard = self.link.answer(self.cycle(), LOOK_EVERY)?;
+            while heard.answer.is_none() {
+                if stop.asked() {
+                    return Ok(self.summed_up(summary));
+                }
+                heard = self.link.answer(self.cycle(), LOOK_EVERY)?;
+            }
+            self.note(&heard, begin_ns);
+            self.advance(&heard)?;
+            summary.cycles += 1;
+        }
+        Ok(self.summed_up(summary))
+    }
+
+    fn cycle(&self) -> u64 {
+        self.plant.measurement().cycle
+    }
+
+    fn state(&self, stamp_ns: u64) -> ArmState {
+        let measured = self.plant.measurement();
+        ArmState::new::<N>(
+            measured.cycle,
+            stamp_ns,
+            &core::array::from_fn(|i| Some(measured.position_rad[i])),
+            Some(measured.force_n),
+            self.motors.drives(),
+            self.report,
+        )
+    }
+
+    fn note(&mut self, heard: &Heard, begin_ns: u64) {
+        self.report.late += heard.late;
+        self.report.round_trip_ns = match heard.answer {
+            Some(_) => monotonic_ns() - begin_ns,
+            None => 0,
+        };
+        if heard.answer.is_none() && self.motors.drives() == Drives::Active {
+            self.report.missed += 1;
+        }
+    }
+
+    fn advance(&mut self, heard: &Heard) -> Result<(), SimError> {
+        let velocity = self.plant.truth().velocity_rad_per_s;
+        let torque_nm = self.motors.torque(heard.answer.as_ref(), &velocity)?;
+        self.plant.cycle(&torque_nm);
+        Ok(())
+    }
+
+    fn summed_up(&self, summary: Summary) -> Summary {
+        Summary {
+            missed: self.report.missed,
+            late: self.report.late,
+            ..summary
+        }
+    }
+}

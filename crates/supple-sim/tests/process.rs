@@ -1,0 +1,152 @@
+//! The real program against a scripted controller.
+
+use core::time::Duration;
+use std::os::unix::fs::PermissionsExt;
+use std::process::{Child, Command, Stdio};
+use supple_core::controller::{Controller, Request, State};
+use supple_core::{Vector, step};
+use supple_ipc::message::{ArmState, Drives, TorqueCommand};
+use supple_ipc::{ControllerLink, Domain};
+use supple_model::Description;
+use supple_plant::{Plant, PlantConfig};
+use tempfile::TempDir;
+
+const SOON: Duration = Duration::from_secs(20);
+
+struct System {
+    folder: TempDir,
+    domain: Domain,
+}
+
+fn system() -> System {
+    let folder = tempfile::tempdir().expect("a folder");
+    let owner = std::fs::Permissions::from_mode(0o700);
+    std::fs::set_permissions(folder.path(), owner).expect("changed");
+    let domain = Domain::within(&folder.path().join("supple"), "process").expect("a domain");
+    System { folder, domain }
+}
+
+impl System {
+    fn start(&self, arguments: &[&str]) -> Child {
+        Command::new(env!("CARGO_BIN_EXE_supple-sim"))
+            .args(["--prefix", "process"])
+            .args(arguments)
+            .env("XDG_RUNTIME_DIR", self.folder.path())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("it starts")
+    }
+}
+
+/// A controller that holds the arm.
+struct Holding {
+    controller: Controller<4>,
+    state: State<4>,
+}
+
+impl Holding {
+    fn new() -> Holding {
+        let description = Description::asset("wam4").expect("built in");
+        let controller = Controller::new(description.config().expect("sound")).expect("sound");
+        Holding {
+            state: State::new(&controller),
+            controller,
+        }
+    }
+
+    fn answer(&mut self, arm: &ArmState) -> TorqueCommand {
+        let input = arm.input(Some(Request::GravityHold)).expect("four joints");
+        TorqueCommand::new(&step(&self.controller, &mut self.state, &input), false)
+    }
+}
+
+#[test]
+fn in_virtual_time_it_is_the_plant_to_the_last_bit() {
+    let system = system();
+    let link = ControllerLink::new(&system.domain).expect("a controller");
+    let child = system.start(&["--virtual-time", "--cycles", "200"]);
+    let description = Description::asset("wam4").expect("built in");
+    let config = PlantConfig::<4>::from_description(&description).expect("sound");
+    let home = description.home().expect("four joints");
+    let mut plant = Plant::new(config, home, Vector::zeros()).expect("sound");
+    let mut controller = Holding::new();
+    for cycle in 0..200 {
+        let arm = link.wait(SOON).expect("read").expect("a state");
+        let measured = plant.measurement();
+        let input = arm.input::<4>(None).expect("four joints");
+        assert_eq!((arm.cycle, arm.stamp_ns), (cycle, cycle * 1_000_000));
+        assert_eq!(
+            Vector::from(input.position_rad.map(Option::unwrap_or_default)),
+            measured.position_rad
+        );
+        assert_eq!(input.tip_force_n, Some(measured.force_n));
+        let drives = if cycle == 0 {
+            Drives::Idle
+        } else {
+            Drives::Active
+        };
+        assert_eq!(
+            (arm.drives(), arm.plant.missed, arm.plant.wake_ns),
+            (drives, 0, 0)
+        );
+        let command = controller.answer(&arm);
+        link.answer(&command).expect("answered");
+        plant.cycle(&command.torque().expect("four joints"));
+    }
+    let output = child.wait_with_output().expect("it ends by itself");
+    let words = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{words}");
+    assert!(words.contains("200 cycles, 0 missed"), "{words}");
+}
+
+#[test]
+fn by_the_clock_it_goes_on_without_answers_and_counts_them() {
+    let system = system();
+    let link = ControllerLink::new(&system.domain).expect("a controller");
+    let child = system.start(&["--cycles", "600"]);
+    let mut controller = Holding::new();
+    let mut last = None;
+    let mut answered = 0;
+    while let Some(arm) = link.wait(Duration::from_secs(10)).expect("read") {
+        if let Some(last) = last {
+            assert!(arm.cycle > last, "time goes on");
+        }
+        last = Some(arm.cycle);
+        if arm.drives() == Drives::Active {
+            answered += 1;
+        }
+        if answered < 100 {
+            link.answer(&controller.answer(&arm)).expect("answered");
+        }
+        if arm.cycle == 599 {
+            // The motors were let down long ago.
+            assert_eq!(arm.drives(), Drives::Idle);
+            assert!(arm.plant.missed >= 100, "{arm:?}");
+            break;
+        }
+    }
+    assert_eq!(last, Some(599));
+    let output = child.wait_with_output().expect("it ends by itself");
+    assert!(output.status.success());
+}
+
+#[test]
+fn a_second_plant_is_refused_with_the_reason() {
+    let system = system();
+    let mut first = system.start(&[]);
+    let link = ControllerLink::new(&system.domain).expect("a controller");
+    assert!(link.wait(SOON).expect("read").is_some());
+    let output = system.start(&[]).wait_with_output().expect("it ends");
+    let words = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(10), "{words}");
+    assert!(words.contains("has its writer already"), "{words}");
+    first.kill().expect("SIGKILL");
+    first.wait().expect("it is gone");
+    // The next one takes the place of the killed one, and the controller sees it.
+    while link.receive().expect("read").is_some() {}
+    let mut third = system.start(&[]);
+    assert!(link.wait(SOON).expect("read").is_some());
+    third.kill().expect("SIGKILL");
+    third.wait().expect("it is gone");
+}

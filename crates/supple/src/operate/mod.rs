@@ -1,0 +1,196 @@
+//! Talking to a running system: what it does, and asking for something else.
+//!
+//! Every request is checked by the controller; what is printed is its answer.
+
+mod approach;
+mod session;
+mod status;
+
+pub use approach::Approach;
+pub use session::Session;
+pub use status::status;
+
+use crate::arms;
+use crate::cli::{GainsArgs, ModeName, Place, Shape, TrackArgs};
+use crate::console::{say, say_json};
+use crate::exit::Failure;
+use crate::up::stop_running;
+use core::time::Duration;
+use serde::Serialize;
+use supple_core::Trajectory;
+use supple_core::config::Gains;
+use supple_core::controller::Request;
+use supple_core::math::Vector3;
+use supple_experiment::scenario;
+use supple_ipc::message::{OperatorReply, Telemetry};
+use supple_ipc::{Domain, TelemetryReader};
+use supple_model::{Description, with_dof};
+
+/// Longest wait for a sign of life.
+const ALIVE_WITHIN: Duration = Duration::from_secs(2);
+
+/// The answer to a request, as `--json` gives it.
+#[derive(Serialize)]
+struct Answer {
+    accepted: bool,
+    mode: &'static str,
+    cycle: u64,
+}
+
+/// The system of a place, with its latest telemetry.
+///
+/// # Errors
+/// [`Failure::NotRunning`] where there is none.
+fn running(place: &Place) -> Result<(Domain, TelemetryReader, Telemetry), Failure> {
+    let domain = Domain::new(place.prefix.as_deref())?;
+    let mut reader = TelemetryReader::new(&domain)?;
+    match reader.wait(ALIVE_WITHIN)? {
+        Some(telemetry) => Ok((domain, reader, telemetry)),
+        None => Err(Failure::NotRunning {
+            prefix: domain.prefix().to_owned(),
+        }),
+    }
+}
+
+/// To idle or to gravity hold.
+///
+/// # Errors
+/// [`Failure`].
+pub fn mode(mode: ModeName, place: &Place) -> Result<(), Failure> {
+    match mode {
+        ModeName::Idle => simple(place, Simple::Idle),
+        ModeName::GravityHold => simple(place, Simple::GravityHold),
+    }
+}
+
+/// Out of a fault.
+///
+/// # Errors
+/// [`Failure`].
+pub fn reset(place: &Place) -> Result<(), Failure> {
+    simple(place, Simple::Reset)
+}
+
+#[derive(Clone, Copy)]
+enum Simple {
+    Idle,
+    GravityHold,
+    Reset,
+    Gains(Gains, f64),
+}
+
+fn simple(place: &Place, wish: Simple) -> Result<(), Failure> {
+    fn ask<const N: usize>(domain: &Domain, wish: Simple) -> Result<OperatorReply, Failure> {
+        let request: Request<N> = match wish {
+            Simple::Idle => Request::Idle,
+            Simple::GravityHold => Request::GravityHold,
+            Simple::Reset => Request::Reset,
+            Simple::Gains(gains, ramp_s) => Request::Gains { gains, ramp_s },
+        };
+        Session::<N>::new(domain)?.ask(&request, None)
+    }
+    let (domain, _reader, telemetry) = running(place)?;
+    let dof = usize::from(telemetry.state.dof);
+    let reply = with_dof!(dof, N => ask::<N>(&domain, wish))??;
+    answered(place, &reply)
+}
+
+/// Other stiffness and damping, reached along a ramp. What is not given stays.
+///
+/// # Errors
+/// [`Failure`].
+pub fn gains(args: &GainsArgs) -> Result<(), Failure> {
+    let (_, _, telemetry) = running(&args.place)?;
+    let axes = |given: &[f64], now: [f64; 3]| match given {
+        [] => Vector3::from(now),
+        [all] => Vector3::repeat(*all),
+        [x, y, z, ..] => Vector3::new(*x, *y, *z),
+        [x, y] => Vector3::new(*x, *y, now[2]),
+    };
+    let gains = Gains {
+        stiffness_n_per_m: axes(&args.stiffness, telemetry.stiffness_n_per_m),
+        damping_n_s_per_m: axes(&args.damping, telemetry.damping_n_s_per_m),
+    };
+    simple(&args.place, Simple::Gains(gains, args.ramp_s))
+}
+
+/// To the start of a trajectory, and along it.
+///
+/// # Errors
+/// [`Failure`].
+pub fn track(args: &TrackArgs) -> Result<(), Failure> {
+    let (trajectory, duration_s) = match args.shape {
+        Shape::Sinusoid => scenario::sinusoid(args.speed),
+        Shape::Arc => scenario::arc(),
+        Shape::Quadrant => {
+            let speed_m_per_s = args.speed * scenario::QUADRANT_SPEED_M_PER_S;
+            let (quadrant, duration_s) = scenario::quadrant(speed_m_per_s);
+            (Trajectory::Quadrant(quadrant), duration_s)
+        }
+    };
+    let description = arms::find(&args.arm)?;
+    follow(&args.place, &description, trajectory, duration_s)
+}
+
+/// To the start of the probing cycle, and along it.
+///
+/// # Errors
+/// [`Failure`].
+pub fn probe(arm: &str, place: &Place) -> Result<(), Failure> {
+    let description = arms::find(arm)?;
+    let radius_m = description.tool().map_or(0.02, |tool| tool.cap_radius_m);
+    let (probe, duration_s) = scenario::probe(radius_m);
+    follow(place, &description, Trajectory::Probe(probe), duration_s)
+}
+
+fn follow(
+    place: &Place,
+    description: &Description,
+    trajectory: Trajectory,
+    duration_s: f64,
+) -> Result<(), Failure> {
+    fn sized<const N: usize>(
+        domain: &Domain,
+        telemetry: &Telemetry,
+        description: &Description,
+        trajectory: Trajectory,
+        duration_s: f64,
+    ) -> Result<OperatorReply, Failure> {
+        let approach = Approach::<N>::new(&description.config()?, trajectory, duration_s)?;
+        let position = core::array::from_fn(|i| telemetry.position_rad[i]);
+        let mut session = Session::<N>::new(domain)?;
+        session.follow(&approach, &position.into(), None)?;
+        session.wait_for_all(approach.longest_wait(&position.into()))
+    }
+    let (domain, _reader, telemetry) = running(place)?;
+    let reply = with_dof!(description.dof(), N => sized::<N>(
+        &domain, &telemetry, description, trajectory, duration_s
+    ))??;
+    answered(place, &reply)
+}
+
+/// Ends the `supple up` of a system.
+///
+/// # Errors
+/// [`Failure::NotRunning`].
+pub fn stop(place: &Place) -> Result<(), Failure> {
+    let domain = Domain::new(place.prefix.as_deref())?;
+    if stop_running(&domain)? {
+        return Ok(());
+    }
+    Err(Failure::NotRunning {
+        prefix: domain.prefix().to_owned(),
+    })
+}
+
+fn answered(place: &Place, reply: &OperatorReply) -> Result<(), Failure> {
+    let mode = reply.mode().map_or("unknown", |mode| mode.name());
+    if place.json {
+        return say_json(&Answer {
+            accepted: true,
+            mode,
+            cycle: reply.cycle,
+        });
+    }
+    say(&format!("mode {mode} since cycle {}", reply.cycle))
+}

@@ -1,0 +1,219 @@
+//! The processes of a system: started from beside this program, watched over, ended in order.
+
+use crate::exit::Failure;
+use core::time::Duration;
+use rustix::process::{Pid, Signal, kill_process};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::Instant;
+use supple_ipc::{Domain, pause};
+
+/// How often an ending process is looked at.
+const LOOK_EVERY: Duration = Duration::from_millis(5);
+
+/// The processes; what still runs when this is dropped is killed.
+#[derive(Debug, Default)]
+pub struct Children {
+    running: Vec<(&'static str, Child)>,
+    /// Programs that have ended well.
+    ended: Vec<&'static str>,
+}
+
+impl Children {
+    /// Starts a program that is beside this one.
+    ///
+    /// # Errors
+    /// [`Failure::NoSibling`] says how to build what is missing.
+    pub fn start(&mut self, name: &'static str, arguments: &[String]) -> Result<(), Failure> {
+        let program = sibling(name)?;
+        let child = Command::new(&program)
+            .args(arguments)
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .spawn()
+            .map_err(|error| Failure::file("start", &program, error))?;
+        self.running.push((name, child));
+        Ok(())
+    }
+
+    /// All of them run.
+    ///
+    /// # Errors
+    /// [`Failure::ProcessEnded`].
+    pub fn check(&mut self) -> Result<(), Failure> {
+        for (name, child) in &mut self.running {
+            if let Some(status) = status(child)? {
+                return Err(ended(name, status));
+            }
+        }
+        Ok(())
+    }
+
+    /// All of them run, or `may_end` has ended well where it may.
+    ///
+    /// # Errors
+    /// [`Failure::ProcessEnded`].
+    pub fn check_running(
+        &mut self,
+        one_may_end: bool,
+        may_end: &'static str,
+    ) -> Result<(), Failure> {
+        for (name, child) in &mut self.running {
+            if let Some(status) = status(child)? {
+                let expected = one_may_end && *name == may_end && status.success();
+                if !expected {
+                    return Err(ended(name, status));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// A program has done all it had to.
+    ///
+    /// # Errors
+    /// [`Failure::ProcessEnded`] where it ended otherwise.
+    pub fn all_ended_well(&mut self, name: &'static str) -> Result<bool, Failure> {
+        let Some((_, child)) = self.running.iter_mut().find(|(n, _)| *n == name) else {
+            return Ok(self.ended.contains(&name));
+        };
+        match status(child)? {
+            Some(status) if status.success() => Ok(true),
+            Some(status) => Err(ended(name, status)),
+            None => Ok(false),
+        }
+    }
+
+    /// Asks a program to end and waits for it, with `meanwhile` done again and again; kills it where it does
+    /// not end in time.
+    ///
+    /// # Errors
+    /// What `meanwhile` says.
+    pub fn end(
+        &mut self,
+        name: &'static str,
+        within: Duration,
+        meanwhile: &mut dyn FnMut() -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        let Some(place) = self.running.iter().position(|(n, _)| *n == name) else {
+            return Ok(());
+        };
+        let (name, mut child) = self.running.remove(place);
+        if status(&mut child)?.is_none() {
+            terminate(&child);
+        }
+        let start = Instant::now();
+        while status(&mut child)?.is_none() {
+            meanwhile()?;
+            if start.elapsed() > within {
+                kill(&mut child);
+                break;
+            }
+            pause(LOOK_EVERY);
+        }
+        self.ended.push(name);
+        Ok(())
+    }
+}
+
+impl Drop for Children {
+    fn drop(&mut self) {
+        for (_, child) in &mut self.running {
+            kill(child);
+        }
+    }
+}
+
+fn terminate(child: &Child) {
+    if let Some(pid) = i32::try_from(child.id()).ok().and_then(Pid::from_raw) {
+        // A process that has just ended needs no signal.
+        let _ = kill_process(pid, Signal::TERM);
+    }
+}
+
+fn kill(child: &mut Child) {
+    let _ = child.kill();
+    let _ = child.wait();
+}
+
+fn status(child: &mut Child) -> Result<Option<ExitStatus>, Failure> {
+    child
+        .try_wait()
+        .map_err(|error| Failure::file("wait for", Path::new("a process"), error))
+}
+
+fn ended(name: &'static str, status: ExitStatus) -> Failure {
+    Failure::ProcessEnded {
+        name,
+        status: status.to_string(),
+    }
+}
+
+fn sibling(name: &'static str) -> Result<PathBuf, Failure> {
+    let this = std::env::current_exe()
+        .map_err(|error| Failure::file("find", Path::new("this program"), error))?;
+    let program = this.with_file_name(name);
+    match program.is_file() {
+        true => Ok(program),
+        false => Err(Failure::NoSibling { name, program }),
+    }
+}
+
+/// Says which process runs the system, for `supple stop`.
+#[derive(Debug)]
+pub struct Pidfile {
+    path: PathBuf,
+}
+
+impl Pidfile {
+    /// Of a system that this process runs.
+    ///
+    /// # Errors
+    /// [`Failure::AlreadyRunning`], [`Failure::File`].
+    pub fn create(domain: &Domain) -> Result<Pidfile, Failure> {
+        let path = place(domain);
+        if let Some(process) = running(&path) {
+            return Err(Failure::AlreadyRunning {
+                prefix: domain.prefix().to_owned(),
+                process: process.as_raw_nonzero().get(),
+            });
+        }
+        fs::write(&path, std::process::id().to_string())
+            .map_err(|error| Failure::file("write", &path, error))?;
+        Ok(Pidfile { path })
+    }
+}
+
+impl Drop for Pidfile {
+    fn drop(&mut self) {
+        // What is left over is found stale by whoever reads it.
+        let _ = fs::remove_file(&self.path);
+    }
+}
+
+fn place(domain: &Domain) -> PathBuf {
+    domain.folder().join(format!("{}.pid", domain.prefix()))
+}
+
+/// Asks the `supple up` of a system to end. False where there is none.
+///
+/// # Errors
+/// [`Failure::File`].
+pub fn stop_running(domain: &Domain) -> Result<bool, Failure> {
+    let path = place(domain);
+    let Some(process) = running(&path) else {
+        return Ok(false);
+    };
+    kill_process(process, Signal::TERM)
+        .map(|()| true)
+        .map_err(|error| Failure::file("end the process of", &path, error.into()))
+}
+
+/// The `supple up` of a file, if it runs. A number that another program has by now is not meant.
+fn running(path: &Path) -> Option<Pid> {
+    let text = fs::read_to_string(path).ok()?;
+    let process = Pid::from_raw(text.trim().parse().ok()?)?;
+    let name = fs::read_to_string(format!("/proc/{}/comm", text.trim())).ok()?;
+    (name.trim() == "supple").then_some(process)
+}
