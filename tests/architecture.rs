@@ -215,9 +215,22 @@ fn links_of_the_documents_lead_somewhere() {
         let text = std::fs::read_to_string(root.join(document)).expect("a root document");
         for link in text.split("](").skip(1) {
             let target = link.split(')').next().expect("text before the bracket");
-            if !target.contains("://") {
-                assert!(root.join(target).exists(), "{document} -> {target}");
+            match target.strip_prefix('#') {
+                Some(anchor) => assert!(
+                    text.lines()
+                        .any(|line| heading_anchor(line).as_deref() == Some(anchor)),
+                    "{document} has no heading for #{anchor}"
+                ),
+                None if target.contains("://") => {}
+                None => assert!(root.join(target).exists(), "{document} -> {target}"),
             }
         }
     }
+}
+
+/// Anchor that a heading gets: its words in small letters, joined by hyphens.
+fn heading_anchor(line: &str) -> Option<String> {
+    let words = line.strip_prefix('#')?.trim_start_matches('#').trim();
+    let anchor = words.to_lowercase().replace(' ', "-");
+    Some(anchor.replace(|c: char| !c.is_alphanumeric() && c != '-', ""))
 }

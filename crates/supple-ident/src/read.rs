@@ -85,7 +85,7 @@ pub fn read_mcap<const N: usize>(path: &Path) -> Result<Vec<Log>, ReadError> {
         return Err(ReadError::Table {
             file: path.display().to_string(),
             problem: format!("no stretch of {SHORTEST_S} s of free motion under control"),
-            remedy: "record an excitation: supple excite run",
+            remedy: "record the arm following the series that `supple excite design` gives",
         });
     }
     Ok(logs)
