@@ -33,7 +33,7 @@ pub struct MotorPuck {
     pub torque: PropertyId,
     /// Its replies carry a joint encoder's position too.
     pub joint_encoder: bool,
-    /// Encoder counts per revolution; known after [`compare`], 4096 before.
+    /// Encoder counts per revolution; known after the start-up has compared roles, 4096 before.
     pub counts_per_revolution: i32,
 }
 
