@@ -6,6 +6,7 @@
 
 use crate::domain::{Domain, Node};
 use crate::error::IpcError;
+use core::cell::Cell;
 use core::fmt::Debug;
 use core::time::Duration;
 use iceoryx2::port::listener::{Listener, ListenerCreateError};
@@ -149,7 +150,13 @@ impl Rope {
 pub(crate) struct Bell {
     listener: Listener<ipc::Service>,
     name: &'static str,
+    /// Waits in a row that the library ended as failed.
+    failures: Cell<u32>,
 }
+
+/// Failed waits in a row from which on a bell is broken. A wait that a signal interrupts is reported as
+/// `InternalFailure`, like a broken socket; but signals do not interrupt every wait.
+const BROKEN_AFTER: u32 = 16;
 
 impl Bell {
     pub fn new(node: &Node, name: &'static str) -> Result<Self, IpcError> {
@@ -161,16 +168,25 @@ impl Bell {
             },
             error => failed(name, &error),
         })?;
-        Ok(Bell { listener, name })
+        Ok(Bell {
+            listener,
+            name,
+            failures: Cell::new(0),
+        })
     }
 
     /// Waits until it rings, or for `timeout`, or until a signal comes; false where it did not ring.
     pub fn wait(&self, timeout: Duration) -> Result<bool, IpcError> {
         // The socket beneath counts in microseconds, and none of them means without end.
         let timeout = timeout.max(Duration::from_micros(1));
+        let failures = self.failures.take();
         match self.listener.timed_wait_one(timeout) {
             Ok(rung) => Ok(rung.is_some()),
             Err(ListenerWaitError::InterruptSignal) => Ok(false),
+            Err(ListenerWaitError::InternalFailure) if failures < BROKEN_AFTER => {
+                self.failures.set(failures + 1);
+                Ok(false)
+            }
             Err(error) => Err(failed(self.name, &error)),
         }
     }
