@@ -19,7 +19,7 @@ pub const STOP_RAD: f64 = 0.034_907;
 /// Torque at which a joint is given up \[N m\].
 const LIMIT_NM: f64 = 6.0;
 /// Motion that is sliding, beyond the give of bristles and the steps of encoders \[rad\].
-const SLIDING_RAD: f64 = 5e-3;
+const SLIDING_RAD: f64 = 3.5e-3;
 /// Rest between the two directions \[s\].
 const REST_S: f64 = 0.3;
 
