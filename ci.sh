@@ -4,7 +4,7 @@ set -euo pipefail
 cd "$(dirname "$0")"
 
 PLAIN=(fmt clippy test doctest doc)
-FULL=(deny advisories python package instructions cortex-m)
+FULL=(deny advisories python package instructions fused cortex-m socketcan)
 CARGO_DENY_VERSION=0.20.2
 GUNGRAUN_VERSION=0.20.0
 THUMB=thumbv7em-none-eabihf
@@ -102,7 +102,7 @@ virtual_environment() {
         skip "the packages of $2 cannot be installed"
 }
 
-# instructions: instruction counts of the core against committed limits; installs Valgrind and gungraun-runner
+# instructions: instruction counts of the core against committed limits, and no bounds checks; installs Valgrind and gungraun-runner
 step_instructions() {
     [[ $(uname -sm) == "Linux x86_64" ]] || skip "the limits are those of Linux on x86-64, this is $(uname -sm)"
     needs_command valgrind valgrind
@@ -115,6 +115,16 @@ step_instructions() {
     fi
     GUNGRAUN_RUNNER=$PWD/$root/bin/gungraun-runner RUSTFLAGS="" \
         cargo bench --locked -p supple-benches --bench instructions
+    needs_command objdump binutils
+    local programs=(target/release/deps/instructions-*[0-9a-f])
+    benches/assembly.sh "$(ls -t "${programs[@]}" | head -n 1)"
+}
+
+# fused: the core's tests as built for this processor, where that has fused multiply-add
+step_fused() {
+    [[ $(rustc -C target-cpu=native --print cfg) == *'target_feature="fma"'* ]] ||
+        skip "this processor has no fused multiply-add"
+    RUSTFLAGS="-C target-cpu=native" cargo test --locked -p supple-core --tests --target-dir target/fused
 }
 
 # cortex-m: the freestanding program on an emulated Cortex-M4; installs QEMU and the compiler's target
@@ -127,6 +137,18 @@ step_cortex-m() {
         export SUPPLE_BUILD_STD=1
     fi
     cargo test --locked --test bare -- --ignored cortex_m
+}
+
+# socketcan: the arm's bus on a CAN interface of Debian's kernel in a virtual machine; installs QEMU, fetches the kernel
+step_socketcan() {
+    [[ $(uname -sm) == "Linux x86_64" ]] || skip "written for Linux on x86-64, this is $(uname -sm)"
+    needs_command qemu-system-x86_64 qemu-system-x86
+    needs_command busybox busybox-static
+    needs_command cpio cpio
+    local status=0
+    tests/socketcan/run.sh $WORK/socketcan | tee $WORK/socketcan.log || status=$?
+    [[ $status != "$SKIPPED" ]] || skip "$(tail -n 1 $WORK/socketcan.log)"
+    return $status
 }
 
 thumb_core() {

@@ -1,34 +1,14 @@
 //! Whole systems as processes, by the real programs: `supple up` with a simulated arm, and the commands that
 //! talk to it.
 
+mod support;
+
 use serde_json::Value;
 use std::os::unix::fs::PermissionsExt;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
-use std::sync::OnceLock;
+use support::programs;
 use tempfile::TempDir;
-
-/// Folder of the programs, built once: as all tests are, so that nothing is left to do where all run.
-fn programs() -> &'static Path {
-    static PROGRAMS: OnceLock<PathBuf> = OnceLock::new();
-    PROGRAMS.get_or_init(|| {
-        let selection =
-            "test --no-run --locked --workspace --exclude supple-python --lib --bins --tests";
-        let built = Command::new(env!("CARGO"))
-            .args(selection.split(' '))
-            .current_dir(env!("CARGO_MANIFEST_DIR"))
-            .output()
-            .expect("cargo runs");
-        assert!(
-            built.status.success(),
-            "{}",
-            String::from_utf8_lossy(&built.stderr)
-        );
-        let test = std::env::current_exe().expect("this test");
-        let deps = test.parent().expect("deps");
-        deps.parent().expect("the profile's folder").to_owned()
-    })
-}
 
 /// A place of its own for a system.
 fn place() -> TempDir {
@@ -63,35 +43,87 @@ fn words(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-#[test]
-fn virtual_time_gives_the_same_log_twice_and_it_replays() {
+/// Twice in virtual time: the same log, which replays. Gives the summary and the log.
+fn in_virtual_time(arguments: &[&str], seconds: &str, cycles: u64) -> (Value, TempDir) {
     let up = |name: &str| {
         let place = place();
         let log = format!("{name}.mcap");
-        let seconds = ["--for", "6", "--json", "--virtual-time", "--log", &log];
-        let output = run(
-            place.path(),
-            &[&["up", "--plant", "sim"], &seconds[..]].concat(),
-        );
+        let how = ["--for", seconds, "--json", "--virtual-time", "--log", &log];
+        let output = run(place.path(), &[&["up"], arguments, &how[..]].concat());
         assert!(output.status.success(), "{}", words(&output));
         let summary = json(&output);
-        assert_eq!(summary["cycles"], 6000, "{summary}");
+        let counted = summary["cycles"].as_u64();
+        // An arm on a bus is lowered to idle at the end, which takes it some cycles.
+        let lowering = if arguments.contains(&"emu") { 20 } else { 0 };
+        assert!(
+            counted.is_some_and(|n| (cycles..=cycles + lowering).contains(&n)),
+            "{summary}"
+        );
         for nothing in ["missed", "late", "tx_lost", "telemetry_lost"] {
             assert_eq!(summary[nothing], 0, "{nothing} in {summary}");
         }
         assert_eq!(summary["faults"], Value::Array(Vec::new()));
-        assert!(
-            summary["rms_error_m"]
-                .as_f64()
-                .is_some_and(|error_m| error_m < 0.02)
-        );
         let replayed = run(place.path(), &["log", "replay", &log]);
         assert!(replayed.status.success(), "{}", words(&replayed));
-        std::fs::read(place.path().join(&log)).expect("the log")
+        let bytes = std::fs::read(place.path().join(&log)).expect("the log");
+        (summary, bytes, place)
     };
-    let (one, two) = (up("one"), up("two"));
+    let (summary, one, place) = up("one");
+    let (_, two, _place) = up("two");
     assert!(one.len() > 100_000);
     assert!(one == two, "two runs wrote different logs");
+    (summary, place)
+}
+
+fn rms_error_m(summary: &Value) -> f64 {
+    let error_m = summary["rms_error_m"].as_f64();
+    error_m.unwrap_or_else(|| panic!("nothing was tracked: {summary}"))
+}
+
+#[test]
+fn virtual_time_gives_the_same_log_twice_and_it_replays() {
+    let (summary, _place) = in_virtual_time(&["--plant", "sim"], "6", 6000);
+    assert!(rms_error_m(&summary) < 0.02, "{summary}");
+    assert_eq!(summary["bus_load"], 0.0);
+}
+
+/// From power-up over the pendant to tracking, through every process there is.
+#[test]
+fn the_emulated_arm_starts_up_is_activated_and_tracks() {
+    let (summary, place) = in_virtual_time(&["--plant", "emu"], "7", 7000);
+    assert!(rms_error_m(&summary) < 0.02, "{summary}");
+    let bus_load = summary["bus_load"].as_f64().expect("a share");
+    assert!((0.45..0.64).contains(&bus_load), "{bus_load}");
+    let events = ["log", "export", "one.mcap", "--channel", "/arm_events"];
+    let output = run(place.path(), &events);
+    let events = String::from_utf8_lossy(&output.stdout).into_owned();
+    let at = |what: &str| {
+        let found = events.find(what);
+        found.unwrap_or_else(|| panic!("{what}: {events}{}", words(&output)))
+    };
+    assert!(at("Pressed(Idle)") < at("Pressed(Activate)"));
+    assert!(at("Pressed(Activate)") < at("motor 1 Torque"));
+}
+
+/// Seven joints: at 1 kHz on shared memory; on the bus at the rate that it carries, and not above it.
+#[test]
+fn seven_joints_run_as_processes() {
+    let seven = ["--arm", "wam7"];
+    let of = |plant: &'static str, rest: &[&'static str]| {
+        [&["--plant", plant], &seven[..], rest].concat()
+    };
+    let (summary, _place) = in_virtual_time(&of("sim", &[]), "6", 6000);
+    assert!(rms_error_m(&summary) < 0.02, "{summary}");
+    let (summary, _place) = in_virtual_time(&of("emu", &["--rate-hz", "700"]), "8", 5600);
+    assert!(rms_error_m(&summary) < 0.02, "{summary}");
+
+    let place = place();
+    let too_fast = ["--virtual-time", "--for", "1", "--no-log"];
+    let output = run(place.path(), &[&["up"], &of("emu", &too_fast)[..]].concat());
+    assert_eq!(output.status.code(), Some(10));
+    for part in ["positions 660 us", "1335 us", "749 Hz", "--rate-hz"] {
+        assert!(words(&output).contains(part), "{part}: {}", words(&output));
+    }
 }
 
 /// `supple up` in the background.

@@ -112,6 +112,9 @@ impl Arm {
     /// fixed_joints_rad : mapping of str to float, optional
     ///     Movable joints that are frozen, each at an angle (rad). Those that do not carry the tip, such
     ///     as a gripper's, must be here.
+    /// point_mass_radius_m : float, optional
+    ///     Links that have mass but an inertia of zeros are taken for solid balls of this radius (m).
+    ///     Default: they are refused.
     ///
     /// Raises
     /// ------
@@ -122,23 +125,29 @@ impl Arm {
     ///
     /// Notes
     /// -----
-    /// Friction is the URDF's ``<dynamics>``. Everything else that a controller needs has its default;
+    /// Friction is the URDF's ``<dynamics>``. A joint whose range, effort or velocity the URDF does not
+    /// state, or states as zero, has none: a turn either way, 1e9 N m, 1e9 rad/s. Dynamics and
+    /// identification ask for no limits, but :func:`design_excitation` and :func:`simulate` use what there
+    /// are: for them, state them. Everything else that a controller needs has its default;
     /// :meth:`Arm.load` reads a TOML that says it.
     #[staticmethod]
-    #[pyo3(signature = (path, tip = "tip", *, gravity = None, armature = None, fixed_joints_rad = None),
+    #[pyo3(signature = (path, tip = "tip", *, gravity = None, armature = None, fixed_joints_rad = None,
+        point_mass_radius_m = None),
         text_signature = "(path, tip='tip', *, gravity=(0.0, 0.0, -9.81), armature=None, \
-        fixed_joints_rad=None)")]
+        fixed_joints_rad=None, point_mass_radius_m=None)")]
     fn from_urdf(
         path: PathBuf,
         tip: &str,
         gravity: Option<&Bound<'_, PyAny>>,
         armature: Option<&Bound<'_, PyAny>>,
         fixed_joints_rad: Option<BTreeMap<String, f64>>,
+        point_mass_radius_m: Option<f64>,
     ) -> PyResult<Self> {
         let urdf = std::fs::read_to_string(&path).map_err(|cause| {
             let message = format!("{}: cannot be read: {cause}", path.display());
             errors::system(&cause, message)
         })?;
+        let urdf = supple_model::unlimited::with_limits(&urdf);
         let gravity = match gravity {
             Some(gravity) => arrays::fixed("gravity", gravity, &[3])?
                 .as_slice()?
@@ -152,6 +161,9 @@ impl Arm {
             entry("tip_frame", tip),
             entry("gravity_m_per_s2", gravity),
         ]);
+        if let Some(radius_m) = point_mass_radius_m {
+            settings.insert("point_mass_radius_m".to_owned(), radius_m.into());
+        }
         let fixed = fixed_joints_rad.into_iter().flatten();
         let fixed: toml::Table = fixed.map(|(joint, angle)| (joint, angle.into())).collect();
         settings.insert("fixed_joints_rad".to_owned(), fixed.into());

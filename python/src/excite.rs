@@ -7,12 +7,10 @@ use crate::table::Table;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
-use supple_core::Vector;
-use supple_core::trajectory::{Fourier, HARMONICS};
 use supple_experiment::calibrate::{Calibration, log_of, plant_of};
-use supple_experiment::{ExperimentError, Recorder, excitation};
+use supple_experiment::{ExperimentError, excitation};
 use supple_ident::design::{self, Criterion, Design, Designed, Workspace};
-use supple_ident::{IdentError, Log};
+use supple_ident::{IdentError, Log, SeriesLists};
 use supple_model::{Description, ModelError, with_dof};
 
 /// What is asked for; the package has checked names and fills in defaults.
@@ -41,19 +39,15 @@ pub struct Series {
     ramp_s: f64,
 }
 
-impl Series {
-    fn sized<const N: usize>(&self) -> Fourier<N> {
-        let column = |values: &[f64]| Vector::<N>::from_fn(|j, _| values[j]);
-        let columns = |all: &[Vec<f64>]| -> [Vector<N>; HARMONICS] {
-            core::array::from_fn(|k| column(&all[k]))
-        };
-        Fourier {
-            centre_rad: column(&self.centre_rad),
-            sine_rad: columns(&self.sine_rad),
-            cosine_rad: columns(&self.cosine_rad),
-            angular_frequency_rad_per_s: self.angular_frequency_rad_per_s,
-            duration_s: self.duration_s,
-            ramp_s: self.ramp_s,
+impl From<Series> for SeriesLists {
+    fn from(series: Series) -> SeriesLists {
+        SeriesLists {
+            centre_rad: series.centre_rad,
+            sine_rad: series.sine_rad,
+            cosine_rad: series.cosine_rad,
+            angular_frequency_rad_per_s: series.angular_frequency_rad_per_s,
+            duration_s: series.duration_s,
+            ramp_s: series.ramp_s,
         }
     }
 }
@@ -119,7 +113,7 @@ enum Refused {
 
 struct Found {
     table: Table,
-    series: Series,
+    series: SeriesLists,
     rank: usize,
     condition: f64,
     history: Vec<f64>,
@@ -163,21 +157,9 @@ fn unsized_series<const N: usize>(designed: &Designed<N>, rate_hz: f64) -> Found
         table.vector("qdd", at.acceleration_rad_per_s2.as_slice());
         table.end_row();
     }
-    let columns = |all: &[Vector<N>; HARMONICS]| {
-        all.iter()
-            .map(|column| column.as_slice().to_vec())
-            .collect()
-    };
     Found {
         table,
-        series: Series {
-            centre_rad: series.centre_rad.as_slice().to_vec(),
-            sine_rad: columns(&series.sine_rad),
-            cosine_rad: columns(&series.cosine_rad),
-            angular_frequency_rad_per_s: series.angular_frequency_rad_per_s,
-            duration_s: series.duration_s,
-            ramp_s: series.ramp_s,
-        },
+        series: SeriesLists::from(series),
         rank: designed.rank,
         condition: designed.condition,
         history: designed.history.clone(),
@@ -204,6 +186,7 @@ pub fn excite<'py>(
     drive: Drive,
 ) -> PyResult<Bound<'py, PyDict>> {
     let (truth, known) = (arm.description(), model.description());
+    let series = SeriesLists::from(series);
     let log = py.detach(|| {
         with_dof!(truth.dof(), N => followed::<N>(truth, known, &series, &drive))
             .map_err(ExperimentError::from)
@@ -231,7 +214,7 @@ pub fn excite<'py>(
 fn followed<const N: usize>(
     truth: &Description,
     known: &Description,
-    series: &Series,
+    series: &SeriesLists,
     drive: &Drive,
 ) -> Result<(Log, f64), ExperimentError> {
     let calibration = Calibration {
@@ -241,25 +224,8 @@ fn followed<const N: usize>(
     };
     let plant = plant_of::<N>(truth, &calibration)?;
     let (config, home) = (known.config::<N>()?, truth.home::<N>()?);
-    let session = excitation("excitation", &config, &plant, &home, &[series.sized()]);
-    let mut recorder = match &drive.log_dir {
-        Some(folder) => Some(Recorder::named(
-            folder,
-            known,
-            &session.name,
-            &session.config,
-            drive.seed,
-        )?),
-        None => None,
-    };
-    let recordings = session.perform(&mut |cycle, _| {
-        if let Some(recorder) = &mut recorder {
-            recorder.cycle(cycle)?;
-        }
-        Ok(())
-    })?;
-    if let Some(recorder) = recorder {
-        recorder.finish()?;
-    }
+    let series = series.fourier::<N>()?;
+    let session = excitation("excitation", &config, &plant, &home, &[series]);
+    let recordings = session.record(drive.log_dir.as_deref(), known, drive.seed)?;
     Ok((log_of(&recordings[0]), config.period_s))
 }

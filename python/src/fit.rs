@@ -4,100 +4,76 @@ use crate::arm::Arm;
 use crate::arrays::{self, Argument, Array, Batch, States};
 use crate::errors;
 use crate::friction::Friction;
+use crate::options::Options;
 use crate::samples::{Given, Samples};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use supple_core::Vector;
+use supple_core::ripple::{Harmonic, LINES};
+use supple_core::{Body, Matrix, RippleTable, Vector};
+use supple_ident::payload::{payload, torque_scale};
 use supple_ident::{
-    DMatrix, FrictionChoice, FrictionColumns, IdentError, Method, Motion, Preparation, Procedure,
-    SaveError, Validation, Warning, fit_with_dip, identify_motions,
+    DMatrix, IdentError, Motion, Preparation, Procedure, RippleSearch, SaveError, Validation,
+    Warning, fit_ripple, fit_with_dip, identify_motions,
 };
 use supple_model::{Description, ModelError, with_dof};
 
-/// What to fit, and how; the package has checked names and fills in defaults.
-#[derive(FromPyObject)]
-#[pyo3(from_item_all)]
-pub struct Options {
-    moving: Option<Vec<usize>>,
-    couplings: Vec<(usize, usize)>,
-    rate_hz: Option<f64>,
-    cutoff_hz: Option<f64>,
-    keep_every: usize,
-    torque_delay_s: f64,
-    method: String,
-    friction: Option<Shape>,
-    /// A Stribeck dip whose speed is found too.
-    dip: bool,
-    rotor: bool,
-    slow_rad_per_s: f64,
-    prior_weight: Option<f64>,
-    joint_noise_nm: Option<Vec<f64>>,
-}
-
-#[derive(FromPyObject)]
-struct Shape {
-    viscous: bool,
-    coulomb: bool,
-    offset: bool,
-    asymmetry: bool,
-    stribeck_rad_per_s: Option<f64>,
-    band_rad_per_s: f64,
-}
-
-impl Options {
-    fn procedure(self) -> PyResult<Procedure> {
-        let method = match &self.method[..] {
-            "ols" => Method::Ols,
-            "wls" => Method::Wls,
-            "irls" => Method::Irls,
-            "consistent" => Method::Consistent,
-            other => {
-                return Err(PyValueError::new_err(format!(
-                    "method: expected one of ols, wls, irls, consistent, got {other:?}"
-                )));
-            }
-        };
-        let columns = |shape: Shape| FrictionColumns {
-            viscous: shape.viscous,
-            coulomb: shape.coulomb,
-            offset: shape.offset,
-            asymmetry: shape.asymmetry,
-            stribeck_rad_per_s: shape.stribeck_rad_per_s,
-            band_rad_per_s: shape.band_rad_per_s,
-        };
-        Ok(Procedure {
-            moving: self.moving,
-            couplings: self.couplings,
-            preparation: Preparation {
-                rate_hz: self.rate_hz,
-                cutoff_hz: self.cutoff_hz,
-                keep_every: self.keep_every,
-                torque_delay_s: self.torque_delay_s,
-            },
-            method,
-            friction: self.friction.map_or(FrictionChoice::Auto, |shape| {
-                FrictionChoice::Columns(columns(shape))
-            }),
-            rotor: self.rotor,
-            slow_rad_per_s: self.slow_rad_per_s,
-            prior_weight: self.prior_weight,
-            joint_noise_nm: self.joint_noise_nm,
-        })
-    }
-}
-
 /// A fit of any number of joints.
-trait Model: Send + Sync {
+pub trait Model: Send + Sync {
+    fn payload(&self, motions: &[Motion], guess: &Body) -> Result<Body, IdentError>;
+    fn torque_scale(
+        &self,
+        motions: &[Motion],
+        known: &Body,
+    ) -> Result<Vec<Option<f64>>, IdentError>;
+    fn ripple(
+        &self,
+        of: &Description,
+        logs: &[Samples],
+        search: &RippleSearch,
+        cutoff_hz: f64,
+    ) -> Result<Vec<Vec<Line>>, SaveError>;
+    fn motion(&self, samples: &Samples) -> Result<Motion, IdentError>;
     fn predict(&self, states: &[States<'_>], out: &mut [f64]);
     fn predict_motion(&self, motion: &Motion) -> Result<DMatrix<f64>, IdentError>;
     fn validate(&self, samples: &Samples) -> Result<Validation, IdentError>;
-    fn description(&self, of: &Description) -> Result<Description, SaveError>;
+    fn description(
+        &self,
+        of: &Description,
+        ripple: Option<&[Vec<Line>]>,
+    ) -> Result<Description, SaveError>;
     fn report(&self, known: &[supple_core::Friction]) -> Report;
 }
 
+/// Harmonic, sine and cosine amplitude \[N m\].
+pub type Line = (u32, f64, f64);
+
+/// Lines of all motors as tables.
+fn tables<const N: usize>(ripple: &[Vec<Line>]) -> Result<[RippleTable; N], IdentError> {
+    let wrong = |found: String| IdentError::Shape {
+        argument: "ripple".to_owned(),
+        expected: format!("{N} motors, each with {LINES} lines at most, of harmonics from 1 on"),
+        found,
+    };
+    if ripple.len() != N {
+        return Err(wrong(format!("{} motors", ripple.len())));
+    }
+    let mut tables = [RippleTable::NONE; N];
+    for (table, lines) in tables.iter_mut().zip(ripple) {
+        let harmonics = lines
+            .iter()
+            .map(|&(harmonic, sine_nm, cosine_nm)| Harmonic {
+                harmonic,
+                sine_nm,
+                cosine_nm,
+            });
+        let harmonics: Vec<Harmonic> = harmonics.collect();
+        *table = RippleTable::new(&harmonics).ok_or_else(|| wrong(format!("{lines:?}")))?;
+    }
+    Ok(tables)
+}
+
 /// What a fit says of itself, its size no longer in its type.
-struct Report {
+pub struct Report {
     columns: Vec<(String, f64)>,
     base_names: Vec<String>,
     null_space: Vec<String>,
@@ -113,6 +89,51 @@ struct Report {
 }
 
 impl<const N: usize> Model for supple_ident::Fit<N> {
+    fn payload(&self, motions: &[Motion], guess: &Body) -> Result<Body, IdentError> {
+        payload(self, motions, guess)
+    }
+
+    fn torque_scale(
+        &self,
+        motions: &[Motion],
+        known: &Body,
+    ) -> Result<Vec<Option<f64>>, IdentError> {
+        torque_scale(self, motions, known)
+    }
+
+    fn ripple(
+        &self,
+        of: &Description,
+        logs: &[Samples],
+        search: &RippleSearch,
+        cutoff_hz: f64,
+    ) -> Result<Vec<Vec<Line>>, SaveError> {
+        let preparation = Preparation {
+            cutoff_hz: Some(cutoff_hz),
+            keep_every: 1,
+            ..self.preparation
+        };
+        let motions = logs
+            .iter()
+            .map(|log| log.motion(self.columns.moving(), &preparation));
+        let motions = motions.collect::<Result<Vec<_>, _>>()?;
+        let motions: Vec<_> = motions.into_iter().map(|(motion, _)| motion).collect();
+        let motors = of.motors();
+        let motor_from_joint = Matrix::<N, N>::from_fn(|i, j| motors.motor_from_joint[(i, j)]);
+        let tables = fit_ripple(self, &motions, &motor_from_joint, search)?;
+        let lines = |table: &RippleTable| {
+            let lines = table.harmonics().iter();
+            lines
+                .map(|line| (line.harmonic, line.sine_nm, line.cosine_nm))
+                .collect()
+        };
+        Ok(tables.iter().map(lines).collect())
+    }
+
+    fn motion(&self, samples: &Samples) -> Result<Motion, IdentError> {
+        Ok(samples.motion(self.columns.moving(), &self.preparation)?.0)
+    }
+
     fn predict(&self, states: &[States<'_>], out: &mut [f64]) {
         for (k, out) in out.chunks_exact_mut(N).enumerate() {
             let [q, qd, qdd] =
@@ -127,13 +148,16 @@ impl<const N: usize> Model for supple_ident::Fit<N> {
     }
 
     fn validate(&self, samples: &Samples) -> Result<Validation, IdentError> {
-        let moving = self.columns.moving();
-        let (motion, _) = samples.motion(moving, &self.preparation)?;
-        self.validate_motion(&motion)
+        self.validate_motion(&self.motion(samples)?)
     }
 
-    fn description(&self, of: &Description) -> Result<Description, SaveError> {
-        supple_ident::Fit::description(self, of, None)
+    fn description(
+        &self,
+        of: &Description,
+        ripple: Option<&[Vec<Line>]>,
+    ) -> Result<Description, SaveError> {
+        let tables = ripple.map(tables::<N>).transpose()?;
+        supple_ident::Fit::description(self, of, tables.as_ref())
     }
 
     fn report(&self, known: &[supple_core::Friction]) -> Report {
@@ -165,6 +189,26 @@ pub struct Fit {
     of: Description,
     model: Box<dyn Model>,
     motions: Vec<Motion>,
+}
+
+impl Fit {
+    /// The arm that was given.
+    pub fn description(&self) -> &Description {
+        &self.of
+    }
+
+    /// The fit itself.
+    pub fn model(&self) -> &dyn Model {
+        &*self.model
+    }
+
+    /// Logs prepared as the fitted ones were.
+    pub fn motions_of(&self, logs: &[Samples]) -> PyResult<Vec<Motion>> {
+        let motions = logs.iter().map(|log| self.model.motion(log));
+        motions
+            .collect::<Result<_, _>>()
+            .map_err(errors::identification)
+    }
 }
 
 #[pymethods]
@@ -225,8 +269,10 @@ impl Fit {
     }
 
     /// The arm found, as a description that the controller loads.
-    fn arm(&self) -> PyResult<Arm> {
-        let description = self.model.description(&self.of).map_err(errors::save)?;
+    #[pyo3(signature = (ripple = None))]
+    fn arm(&self, ripple: Option<Vec<Vec<Line>>>) -> PyResult<Arm> {
+        let description = self.model.description(&self.of, ripple.as_deref());
+        let description = description.map_err(errors::save)?;
         Arm::new(description).map_err(errors::model)
     }
 

@@ -13,7 +13,10 @@ mod errors;
 mod excite;
 mod fit;
 mod friction;
+mod learn;
+mod load;
 mod log;
+mod options;
 mod samples;
 mod simulate;
 mod table;
@@ -35,6 +38,10 @@ mod _native {
     use super::fit::{Fit, identify};
     #[pymodule_export]
     use super::friction::Friction;
+    #[pymodule_export]
+    use super::learn::learn;
+    #[pymodule_export]
+    use super::load::{payload, ripple, torque_scale};
     #[pymodule_export]
     use super::log::read_log;
     #[pymodule_export]

@@ -78,7 +78,7 @@ impl Samples {
             if let Some(cutoff_hz) = preparation.cutoff_hz {
                 grid = LowPass::butterworth4(cutoff_hz, rate_hz)?.zero_phase_columns(&grid)?;
             }
-            let rows: Vec<usize> = (0..grid.nrows()).step_by(preparation.keep_every).collect();
+            let rows = preparation.kept(rate_hz, grid.nrows())?;
             let qdd = grid.select_rows(&rows);
             return Ok((Motion { qdd, ..motion }, warnings));
         }

@@ -60,6 +60,22 @@ def test_arguments_of_from_urdf(tmp_path):
         supple.Arm.from_urdf(path, gravity=(0.0, 0.0, np.nan))
 
 
+@pytest.mark.parametrize("limit", ["", '<limit effort="0" velocity="0"/>'])
+def test_an_arm_without_limits_has_its_dynamics(tmp_path, limit):
+    path = write_random_urdf(tmp_path, 4, 1)
+    limited = supple.Arm.from_urdf(path)
+    stated = '<limit lower="-3" upper="3" effort="100" velocity="5"/>'
+    assert stated in path.read_text()
+    path.write_text(path.read_text().replace(stated, limit))
+    free = supple.Arm.from_urdf(path)
+    q, qd, qdd = np.random.default_rng(0).normal(size=(3, 20, 4))
+    np.testing.assert_array_equal(free.rnea(q, qd, qdd), limited.rnea(q, qd, qdd))
+    half = path.read_text().replace("</joint>", '<limit lower="-1" velocity="1"/></joint>', 1)
+    path.write_text(half.replace(limit, "", 1))
+    with pytest.raises(ValueError, match="joint1.*without lower or upper"):
+        supple.Arm.from_urdf(path)
+
+
 @pytest.mark.parametrize("dof", [2, 8])
 def test_arms_of_other_sizes_are_refused(tmp_path, dof):
     with pytest.raises(ValueError, match=f"an arm of {dof} moving joints is not supported"):

@@ -13,9 +13,9 @@ DRIVE_GAIN_NM_PER_A = np.array([14.87, 13.26, 11.13, 10.62, 11.03, 11.47])
 UR10E = os.environ.get("SUPPLE_UR10E_DIR")
 # Relative error of the whole torque, one fit for all three.
 UR10E_HELD_OUT = {
-    "ur-20_01_17-ptp_10_points.csv": (slice(700, 4200), 0.046),
-    "ur-20_02_12-40sec_12harm.csv": (slice(500, 4460), 0.039),
-    "ur-20_02_05-20sec_8harm.csv": (slice(320, 2310), 0.054),
+    "ur-20_01_17-ptp_10_points.csv": (slice(700, 4200), 0.040),
+    "ur-20_02_12-40sec_12harm.csv": (slice(500, 4460), 0.031),
+    "ur-20_02_05-20sec_8harm.csv": (slice(320, 2310), 0.044),
 }
 
 

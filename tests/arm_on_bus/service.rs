@@ -100,6 +100,60 @@ fn what_the_bus_does_not_carry_is_refused_with_the_arithmetic() {
     assert!(BusTime::new(4, 4, true, answer_ns).check(MS).is_err());
 }
 
+/// Every frame of every cycle, each in turn polling the module's mode, the pendant or the sensor.
+fn keeps_its_budget<const N: usize>(period_ns: u64) {
+    let mut rig = Rig::<N>::at(crate::rig::arm(N).home::<N>().unwrap(), period_ns);
+    rig.activate();
+    let budget = BusTime::new(N, 0, true, crate::rig::ANSWER_NS);
+    assert!(budget.least_period_ns() <= period_ns);
+    let mut greatest_ns = 0;
+    for _ in 0..1000 {
+        let busy_ns = rig.emulator().bus_busy_ns();
+        rig.step();
+        greatest_ns = greatest_ns.max(rig.emulator().bus_busy_ns() - busy_ns);
+    }
+    let allowed_ns = budget.least_period_ns() - budget.answer_ns;
+    assert!(greatest_ns <= allowed_ns, "{greatest_ns} {allowed_ns}");
+    // The sensor was polled: more than positions, torques and the pendant.
+    assert!(rig.cycle.link_mut().report.unwrap().tip_force_n.is_some());
+    assert_eq!(rig.cycle.counters().tx_lost, 0);
+}
+
+#[test]
+fn four_joints_keep_the_budget_at_1_khz() {
+    keeps_its_budget::<4>(PERIOD_NS);
+}
+
+#[test]
+fn seven_joints_keep_the_budget_at_700_hz() {
+    keeps_its_budget::<7>(1_428_000);
+}
+
+/// Lengths of the protocol's note: 65 us for a request, 85 for a reply, 135 for torques, 65 + 115 + 125 for the
+/// sensor.
+#[test]
+fn the_arithmetic_is_printed_frame_by_frame() {
+    let four = BusTime::new(4, 0, true, 100_000).budget(MS).to_string();
+    for line in [
+        "1 x  65 us =   65 us",
+        "4 x  85 us =  340 us",
+        "1 x 135 us =  135 us",
+        " 305 us",
+        " 945 us",
+        "1058 Hz",
+    ] {
+        assert!(four.contains(line), "{line} in: {four}");
+    }
+    let seven = BusTime::new(7, 4, false, 100_000).budget(MS).to_string();
+    for line in [
+        "3 x  85 us =  255 us",
+        "4 x 115 us =  460 us",
+        "2 x 135 us =  270 us",
+    ] {
+        assert!(seven.contains(line), "{line} in: {seven}");
+    }
+}
+
 fn tracks<const N: usize>(period_ns: u64) -> f64 {
     let (trajectory, _) = scenario::sinusoid(1.0);
     let config = crate::rig::arm(N).config::<N>().unwrap();

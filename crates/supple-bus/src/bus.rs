@@ -22,6 +22,12 @@ pub trait Bus {
     /// # Errors
     /// Where the bus itself is gone. Faults on the bus are events.
     fn receive_until(&mut self, until_ns: u64) -> Result<Option<Event>, BusError>;
+
+    /// What the machine's monotonic clock shows at a time of this bus \[ns\]; the same, but for a bus
+    /// that keeps its own time by the wall clock.
+    fn monotonic_ns(&self, time_ns: u64) -> u64 {
+        time_ns
+    }
 }
 
 impl<B: Bus + ?Sized> Bus for Box<B> {
@@ -35,6 +41,10 @@ impl<B: Bus + ?Sized> Bus for Box<B> {
 
     fn receive_until(&mut self, until_ns: u64) -> Result<Option<Event>, BusError> {
         (**self).receive_until(until_ns)
+    }
+
+    fn monotonic_ns(&self, time_ns: u64) -> u64 {
+        (**self).monotonic_ns(time_ns)
     }
 }
 

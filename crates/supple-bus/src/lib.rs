@@ -12,6 +12,7 @@
 //! | [`DatagramBus`] | Unix datagrams in an owner-only folder, each one a raw `struct can_frame` |
 //! | [`virtual_time::Direct`] | the other side in the same process |
 //! | [`virtual_time::Lockstep`] | the other side in another process |
+//! | [`Paced`] | the same by the wall clock, for an emulated arm |
 //! | [`FaultInjector`] | any of these, with faults |
 //!
 //! It knows frames, not what they mean: that is `supple-puck`. Sending and receiving allocate nothing.
@@ -27,6 +28,8 @@ mod endpoint;
 mod error;
 mod fault;
 mod folder;
+mod message;
+mod paced;
 mod socket_can;
 pub mod virtual_time;
 
@@ -38,4 +41,5 @@ pub use datagram::{DatagramBus, Side};
 pub use error::BusError;
 pub use fault::{FaultInjector, FaultKind, FaultRule, Traffic};
 pub use folder::OwnerFolder;
+pub use paced::{Paced, Pacer};
 pub use socket_can::SocketCan;

@@ -1,7 +1,8 @@
 //! A CAN interface of the Linux kernel.
 //!
 //! Opened with its own messages echoed, so that a frame counts as sent only when the driver says that
-//! it left, and with all error frames on. Frames with extended ids and remote requests are passed over.
+//! it left, with all error frames on, and with a count of the frames that were lost because nobody read
+//! them in time (`SO_RXQ_OVFL`). Frames with extended ids and remote requests are passed over.
 //! Bit rate and automatic restart belong to the interface and are set by who brings it up:
 //! `ip link set can0 up type can bitrate 1000000 restart-ms 100`.
 
@@ -9,9 +10,10 @@ use crate::bus::{Bus, BusFault, Event};
 use crate::can_frame::{CAN_FRAME_BYTES, WireFrame};
 use crate::clock::{monotonic_ns, wait_readable_until};
 use crate::error::BusError;
-use rustix::fd::{AsFd, BorrowedFd};
+use nix::sys::socket::{self as kernel, ControlMessageOwned, MsgFlags, setsockopt};
+use rustix::fd::{AsFd, AsRawFd, BorrowedFd};
 use rustix::io::{Errno, IoSliceMut};
-use rustix::net::{RecvAncillaryBuffer, RecvFlags, recvmsg, sockopt};
+use rustix::net::{RecvAncillaryBuffer, RecvFlags, ReturnFlags, recvmsg, sockopt};
 use socketcan::{CanSocket, Socket, SocketOptions};
 use std::io;
 use supple_puck::CanFrame;
@@ -27,6 +29,13 @@ const RECEIVE_BUFFER_BYTES: usize = 1 << 20;
 #[derive(Debug)]
 pub struct SocketCan {
     socket: CanSocket,
+    /// Frames have been lost: from then on each that is read says how many.
+    losing: bool,
+    /// Frames lost so far.
+    lost: u64,
+    /// The kernel's count of them, which wraps.
+    lost_by_kernel: u32,
+    control: Vec<u8>,
 }
 
 impl SocketCan {
@@ -46,10 +55,23 @@ impl SocketCan {
             socket.set_error_filter_accept_all()?;
             socket.set_nonblocking(true)?;
             sockopt::set_socket_recv_buffer_size(&socket, RECEIVE_BUFFER_BYTES)?;
+            setsockopt(&socket, kernel::sockopt::RxqOvfl, &1)?;
             Ok(())
         };
         set_up().map_err(refused)?;
-        Ok(SocketCan { socket })
+        Ok(SocketCan {
+            socket,
+            losing: false,
+            lost: 0,
+            lost_by_kernel: 0,
+            control: nix::cmsg_space!(u32),
+        })
+    }
+
+    /// Frames that were lost because they were not read in time, as far as those behind them have been read.
+    /// Each gap is told as [`BusFault::Overrun`] too.
+    pub fn lost(&self) -> u64 {
+        self.lost
     }
 
     /// Puts an error frame on the bus for the other sockets of this machine to see, where the interface
@@ -63,8 +85,41 @@ impl SocketCan {
             .map_err(BusError::io("sending an error frame to the CAN interface"))
     }
 
+    /// Whether frames were lost in front of the next one.
+    fn gap(&mut self) -> Result<bool, BusError> {
+        let mut raw = [0; CAN_FRAME_BYTES];
+        let mut buffers = [IoSliceMut::new(&mut raw)];
+        let peeked = kernel::recvmsg::<()>(
+            self.socket.as_raw_fd(),
+            &mut buffers,
+            Some(&mut self.control),
+            MsgFlags::MSG_PEEK | MsgFlags::MSG_DONTWAIT,
+        );
+        let failed = |errno: nix::Error| BusError::Io {
+            action: "looking for lost frames",
+            source: errno.into(),
+        };
+        let message = match peeked {
+            Ok(message) => message,
+            Err(nix::Error::EAGAIN | nix::Error::EINTR) => return Ok(false),
+            Err(errno) => return Err(failed(errno)),
+        };
+        for control in message.cmsgs().map_err(failed)? {
+            if let ControlMessageOwned::RxqOvfl(count) = control {
+                let more = count.wrapping_sub(self.lost_by_kernel);
+                self.lost += u64::from(more);
+                self.lost_by_kernel = count;
+                return Ok(more > 0);
+            }
+        }
+        Ok(false)
+    }
+
     fn take(&mut self) -> Result<Option<Event>, BusError> {
         loop {
+            if self.losing && self.gap()? {
+                return Ok(Some(Event::Fault(BusFault::Overrun)));
+            }
             let mut raw = [0; CAN_FRAME_BYTES];
             let received = recvmsg(
                 &self.socket,
@@ -78,6 +133,8 @@ impl SocketCan {
                 Err(Errno::INTR) => continue,
                 Err(errno) => return Err(BusError::io("receiving from the CAN interface")(errno)),
             };
+            // The count came with it and found no room: it is read in front of the next frame.
+            self.losing |= message.flags.contains(ReturnFlags::CTRUNC);
             match WireFrame::parse(&raw) {
                 WireFrame::Data(frame) if message.flags.bits() & CONFIRM != 0 => {
                     return Ok(Some(Event::Sent(frame)));

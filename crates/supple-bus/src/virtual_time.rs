@@ -1,24 +1,19 @@
 //! A bus in virtual time: whoever plays the arm owns the time, and it advances only while the host waits.
 //!
 //! In one process the arm is a [`Peer`] inside a [`Direct`]. Between processes the host has a
-//! [`Lockstep`], the arm's process a [`Responder`]; the two speak datagrams of 32 bytes in the folder of
-//! [`DatagramBus`](crate::DatagramBus):
-//!
-//! ```text
-//! 0 kind   8..16 time [ns], native order   16..32 struct can_frame
-//! host to arm: frame (sent now), run until      arm to host: frame, sent, fault, reached
-//! ```
+//! [`Lockstep`], the arm's process a [`Responder`]; the two speak datagrams in the folder of
+//! [`DatagramBus`](crate::DatagramBus).
 //!
 //! The host sends any number of frames, then "run until", and waits; the arm answers with the first event
 //! for the host, or "reached". So the same inputs give the same order of everything, at any speed.
 
 use crate::bus::{Bus, Event};
-use crate::can_frame::{CAN_FRAME_BYTES, WireFrame};
 use crate::clock::{monotonic_ns, wait_readable_until};
 use crate::datagram::Side;
 use crate::endpoint::{Delivery, Endpoint};
 use crate::error::BusError;
 use crate::folder::OwnerFolder;
+use crate::message::{Asked, MESSAGE_BYTES, Message};
 use rustix::fd::{AsFd, BorrowedFd};
 use supple_puck::CanFrame;
 
@@ -54,53 +49,9 @@ impl<P: Peer> Bus for Direct<P> {
     }
 }
 
-const MESSAGE_BYTES: usize = 32;
 /// How long a peer may take to answer, on the machine's clock. It is no deadline of the bus: it tells an
 /// arm's process that has ended from one that is busy.
 const PATIENCE_NS: u64 = 5_000_000_000;
-
-const FRAME: u8 = 1;
-const SENT: u8 = 2;
-const FAULT: u8 = 3;
-const RUN_UNTIL: u8 = 4;
-const REACHED: u8 = 5;
-
-#[derive(Clone, Copy, Debug)]
-struct Message {
-    kind: u8,
-    time_ns: u64,
-    raw: [u8; CAN_FRAME_BYTES],
-}
-
-impl Message {
-    fn bare(kind: u8, time_ns: u64) -> Message {
-        Message {
-            kind,
-            time_ns,
-            raw: [0; CAN_FRAME_BYTES],
-        }
-    }
-
-    fn emit(&self) -> [u8; MESSAGE_BYTES] {
-        let mut bytes = [0; MESSAGE_BYTES];
-        bytes[0] = self.kind;
-        bytes[8..16].copy_from_slice(&self.time_ns.to_ne_bytes());
-        bytes[16..].copy_from_slice(&self.raw);
-        bytes
-    }
-
-    fn parse(bytes: &[u8; MESSAGE_BYTES]) -> Message {
-        let mut time = [0; 8];
-        let mut raw = [0; CAN_FRAME_BYTES];
-        time.copy_from_slice(&bytes[8..16]);
-        raw.copy_from_slice(&bytes[16..]);
-        Message {
-            kind: bytes[0],
-            time_ns: u64::from_ne_bytes(time),
-            raw,
-        }
-    }
-}
 
 /// The host's bus, the arm in another process.
 #[derive(Debug)]
@@ -162,23 +113,15 @@ impl Bus for Lockstep {
     }
 
     fn send(&mut self, frame: &CanFrame) -> Result<(), BusError> {
-        self.post(&Message {
-            kind: FRAME,
-            time_ns: self.now_ns,
-            raw: WireFrame::data(frame),
-        })
+        self.post(&Message::frame(frame, self.now_ns))
     }
 
     fn receive_until(&mut self, until_ns: u64) -> Result<Option<Event>, BusError> {
-        self.post(&Message::bare(RUN_UNTIL, until_ns))?;
+        self.post(&Message::run_until(until_ns, 0))?;
         loop {
             let message = self.answer()?;
-            let event = match (message.kind, WireFrame::parse(&message.raw)) {
-                (REACHED, _) => None,
-                (FRAME, WireFrame::Data(frame)) => Some(Event::Frame(frame)),
-                (SENT, WireFrame::Data(frame)) => Some(Event::Sent(frame)),
-                (FAULT, WireFrame::Fault(fault)) => Some(Event::Fault(fault)),
-                _ => continue,
+            let Some(event) = message.event() else {
+                continue;
             };
             self.now_ns = message.time_ns;
             return Ok(event);
@@ -213,20 +156,14 @@ impl Responder {
             return Ok(false);
         };
         let message = Message::parse(&bytes);
-        match (message.kind, WireFrame::parse(&message.raw)) {
-            (FRAME, WireFrame::Data(frame)) => peer.host_sends(&frame),
-            (RUN_UNTIL, _) => {
+        match message.asked() {
+            Some(Asked::Frame(frame)) => peer.host_sends(&frame),
+            Some(Asked::RunUntil) => {
                 let event = peer.run_until(message.time_ns.max(peer.now_ns()));
-                let (kind, raw) = match event {
-                    None => (REACHED, [0; CAN_FRAME_BYTES]),
-                    Some(Event::Frame(frame)) => (FRAME, WireFrame::data(&frame)),
-                    Some(Event::Sent(frame)) => (SENT, WireFrame::data(&frame)),
-                    Some(Event::Fault(fault)) => (FAULT, WireFrame::fault(fault)),
-                };
-                let time_ns = peer.now_ns();
-                self.endpoint.send(&Message { kind, time_ns, raw }.emit())?;
+                let answer = Message::answer(event.as_ref(), peer.now_ns(), message.sequence, 0);
+                self.endpoint.send(&answer.emit())?;
             }
-            _ => {}
+            None => {}
         }
         Ok(true)
     }

@@ -211,7 +211,7 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
     /// # Errors
     /// Where the bus or the way to the controller is gone; faults on the bus are dealt with.
     pub fn run(&mut self) -> Result<Action, CanError> {
-        let start_ns = self.begin();
+        let start_ns = self.begin()?;
         let missing = self.collect(start_ns)?;
         let report = self.report(start_ns);
         self.link.publish(&report)?;
@@ -233,22 +233,32 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
         Ok(action)
     }
 
-    /// Takes up the period; one that is long past is passed over, its number with it.
-    fn begin(&mut self) -> u64 {
+    /// Takes up the period; one that is long past is passed over, its number with it, and so is one of which
+    /// too little is left for replies, answer and torques: motors that are not heard in it are not silent.
+    fn begin(&mut self) -> Result<u64, CanError> {
         let now_ns = self.bus.now_ns();
         let period_ns = self.rhythm.period_ns;
         let late_ns = now_ns.saturating_sub(self.next_ns);
-        let passed = late_ns / period_ns;
-        self.cycle += passed;
-        self.next_ns += passed * period_ns;
-        self.counters.skipped += passed;
+        self.pass_over(late_ns / period_ns);
+        if late_ns % period_ns > self.time.slack_ns(period_ns) {
+            self.pass_over(1);
+            while let Some(event) = self.bus.receive_until(self.next_ns)? {
+                self.hear(&event);
+            }
+        }
         self.counters.wake_ns = late_ns;
         self.counters.cycles += 1;
         self.counters.bus_load = self.bits as f64 * 1e3 / period_ns as f64;
         self.bits = 0;
         let start_ns = self.next_ns;
         self.next_ns += period_ns;
-        start_ns
+        Ok(start_ns)
+    }
+
+    fn pass_over(&mut self, periods: u64) {
+        self.cycle += periods;
+        self.next_ns += periods * self.rhythm.period_ns;
+        self.counters.skipped += periods;
     }
 
     /// Asks for the positions and collects the replies; which motors did not reply to a request that left.
@@ -285,7 +295,7 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
         let base_from_tip = tip_pose(&self.arm, &self.pose).rotation;
         ArmReport {
             cycle: self.cycle,
-            stamp_ns: start_ns,
+            stamp_ns: self.bus.monotonic_ns(start_ns),
             position_rad,
             tip_force_n: self.readings.force_n(now_ns).map(|f| base_from_tip * f),
             drives: self.drives(),
@@ -408,6 +418,7 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
             }
             Event::Fault(BusFault::BusOff) => self.bus_off = true,
             Event::Fault(BusFault::Restarted) => self.bus_off = false,
+            Event::Fault(BusFault::Overrun) => self.counters.overruns += 1,
             Event::Fault(_) => {}
             Event::Frame(frame) => {
                 self.bits += u64::from(bits(frame));

@@ -26,7 +26,7 @@ mod sensor;
 mod shared_memory;
 mod start_up;
 
-pub use bus_time::{BusTime, Overload};
+pub use bus_time::{Budget, BusTime, Overload};
 pub use cycle::{Cycle, Rhythm};
 pub use error::CanError;
 pub use guard::{Guard, Loss};

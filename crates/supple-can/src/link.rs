@@ -30,6 +30,8 @@ pub struct Counters {
     pub tx_lost: u64,
     /// Position replies that did not come.
     pub replies_lost: u64,
+    /// Times that received frames were lost because they were not read in time.
+    pub overruns: u64,
     /// By how much this cycle began late \[ns\].
     pub wake_ns: u64,
     /// From publishing the state of the previous cycle to its answer \[ns\]; zero where none came.
@@ -43,7 +45,7 @@ pub struct Counters {
 pub struct ArmReport<const N: usize> {
     /// Number of the cycle, one more each period.
     pub cycle: u64,
-    /// When positions were asked for, in the bus's time \[ns\].
+    /// When positions were asked for, by the machine's monotonic clock, or in virtual time \[ns\].
     pub stamp_ns: u64,
     /// Joint angles \[rad\]; `None` where a motor that moves the joint did not reply.
     pub position_rad: [Option<f64>; N],

@@ -2,6 +2,7 @@
 
 use clap::Parser;
 use supple_bus::Address;
+use supple_model::{Description, ModelError};
 use supple_puck::safety::SpeedLimit;
 use supple_realtime::Settings;
 
@@ -14,6 +15,9 @@ pub struct Options {
     /// A WAM with 4 or 7 joints: a built-in arm, or the path of its TOML or of its folder.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
+    /// Cycles per second; the arm's own if not given. All processes of a system need the same.
+    #[arg(long, value_name = "HZ", value_parser = clap::value_parser!(u32).range(10..=10_000))]
+    pub rate_hz: Option<u32>,
     /// Which system this belongs to; SUPPLE_PREFIX or `supple` if not given.
     #[arg(long, value_name = "NAME")]
     pub prefix: Option<String>,
@@ -35,6 +39,10 @@ pub struct Options {
     /// Time that is kept in each cycle for the controller's answer (us).
     #[arg(long, value_name = "US", default_value_t = 100)]
     pub answer_us: u64,
+    /// Prints what a cycle of this arm takes of the bus, with the force/torque sensor and without joint
+    /// encoders, and ends. The exit code says whether it fits.
+    #[arg(long)]
+    pub budget: bool,
     /// Ends after so many cycles.
     #[arg(long, value_name = "N")]
     pub cycles: Option<u64>,
@@ -53,6 +61,18 @@ pub struct Options {
 }
 
 impl Options {
+    /// The arm, at the rate asked for.
+    ///
+    /// # Errors
+    /// As [`Description::find`].
+    pub fn description(&self) -> Result<Description, ModelError> {
+        let description = Description::find(&self.arm)?;
+        match self.rate_hz {
+            Some(rate_hz) => description.at_rate(f64::from(rate_hz)),
+            None => Ok(description),
+        }
+    }
+
     /// What to ask of the system.
     pub fn realtime(&self) -> Settings {
         if self.virtual_time || self.no_realtime {

@@ -1,5 +1,6 @@
 //! The process: start-up, service, and again after the arm has lost its power.
 
+use crate::bus_time::BusTime;
 use crate::cycle::{Cycle, Rhythm};
 use crate::error::CanError;
 use crate::guard::{Loss, Stage};
@@ -10,13 +11,13 @@ use crate::start_up::{Progress, StartUp, start_up};
 use clap::Parser;
 use std::process::ExitCode;
 use supple_bus::virtual_time::Lockstep;
-use supple_bus::{Address, Bus, BusError, DatagramBus, OwnerFolder, Side, SocketCan, monotonic_ns};
+use supple_bus::{Address, Bus, BusError, OwnerFolder, Paced, SocketCan, monotonic_ns};
 use supple_ipc::{Domain, PlantLink, pause};
 use supple_model::{Description, with_dof};
 use supple_puck::safety::{SafetyLimits, SpeedLimit};
 use supple_realtime::{Stop, die_with_parent, enter};
 
-/// How long an emulator in virtual time may take to come \[ns\].
+/// How long an emulated arm may take to come \[ns\].
 const PEER_NS: u64 = 5_000_000_000;
 /// Silence of every motor puck after which the arm is looked for anew \[ns\].
 const SILENCE_NS: u64 = 500_000_000;
@@ -29,14 +30,16 @@ const LOOK: core::time::Duration = core::time::Duration::from_millis(200);
 pub fn main() -> ExitCode {
     let options = Options::parse();
     match start(&options) {
-        Ok(counters) => {
+        Ok(None) => ExitCode::SUCCESS,
+        Ok(Some(counters)) => {
             eprintln!(
-                "supple-can: {} cycles, {} missed, {} skipped, {} frames lost, {} replies lost",
+                "supple-can: {} cycles, {} missed, {} skipped, {} frames lost, {} replies lost, {} overruns",
                 counters.cycles,
                 counters.missed,
                 counters.skipped,
                 counters.tx_lost,
-                counters.replies_lost
+                counters.replies_lost,
+                counters.overruns
             );
             ExitCode::SUCCESS
         }
@@ -48,12 +51,13 @@ pub fn main() -> ExitCode {
     }
 }
 
-fn start(options: &Options) -> Result<Counters, CanError> {
+/// What was counted in service, if it came to service.
+fn start(options: &Options) -> Result<Option<Counters>, CanError> {
     let stop = Stop::on_signals().map_err(|error| CanError::Link(Box::new(error)))?;
     if options.supervised {
         die_with_parent();
     }
-    let description = Description::find(&options.arm)?;
+    let description = options.description()?;
     with_dof!(description.dof(), N => run::<N>(&description, options, &stop))?
 }
 
@@ -61,13 +65,19 @@ fn run<const N: usize>(
     description: &Description,
     options: &Options,
     stop: &Stop,
-) -> Result<Counters, CanError> {
+) -> Result<Option<Counters>, CanError> {
     let config = description.config::<N>()?;
     let home_rad = description.home::<N>()?;
     let rhythm = Rhythm {
         period_ns: (config.period_s * 1e9).round() as u64,
         answer_ns: options.answer_us * 1_000,
     };
+    if options.budget {
+        let time = BusTime::new(N, 0, true, rhythm.answer_ns);
+        println!("{}", time.budget(rhythm.period_ns));
+        time.check(rhythm.period_ns)?;
+        return Ok(None);
+    }
     let mut wishes = StartUp {
         zero_at_rad: options.zero_at_home.then_some(home_rad),
         limits: SafetyLimits {
@@ -90,7 +100,12 @@ fn run<const N: usize>(
         let ready = match ready {
             Ok(ready) => ready,
             // An arm that was there comes back: the others go on meanwhile.
-            Err(CanError::Missing { .. } | CanError::BusFault(_)) if !first && !stop.asked() => {
+            Err(
+                CanError::Missing { .. }
+                | CanError::BusFault(_)
+                // What nobody acknowledges stays in the queue.
+                | CanError::Bus(BusError::Full),
+            ) if !first && !stop.asked() => {
                 pause(LOOK);
                 continue;
             }
@@ -107,7 +122,7 @@ fn run<const N: usize>(
         counters = added(&counters, cycle.counters());
         (bus, link, _) = cycle.into_parts();
         if ended {
-            return Ok(counters);
+            return Ok(Some(counters));
         }
         eprintln!("supple-can: the arm has gone silent: looking for it");
     }
@@ -165,17 +180,17 @@ fn open(options: &Options, prefix: &str, stop: &Stop) -> Result<Box<dyn Bus>, Ca
         Address::Interface(name) => Ok(Box::new(SocketCan::open(&name)?)),
         Address::Folder(folder) => {
             let folder = OwnerFolder::open(folder)?;
-            if !options.virtual_time {
-                return Ok(Box::new(DatagramBus::open(&folder, Side::Host)?));
-            }
             let until_ns = monotonic_ns() + PEER_NS;
             loop {
-                match Lockstep::open(&folder) {
-                    Ok(bus) => return Ok(Box::new(bus)),
+                let opened: Result<Box<dyn Bus>, BusError> = match options.virtual_time {
+                    true => Lockstep::open(&folder).map(|bus| Box::new(bus) as _),
+                    false => Paced::open(&folder).map(|bus| Box::new(bus) as _),
+                };
+                match opened {
                     Err(BusError::NoPeer { .. }) if monotonic_ns() < until_ns && !stop.asked() => {
                         pause(LOOK);
                     }
-                    Err(error) => return Err(error.into()),
+                    opened => return Ok(opened?),
                 }
             }
         }
@@ -206,6 +221,7 @@ fn added(a: &Counters, b: &Counters) -> Counters {
         skipped: a.skipped + b.skipped,
         tx_lost: a.tx_lost + b.tx_lost,
         replies_lost: a.replies_lost + b.replies_lost,
+        overruns: a.overruns + b.overruns,
         ..*b
     }
 }

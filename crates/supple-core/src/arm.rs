@@ -6,6 +6,7 @@
 //! their origin and differ by a constant rotation.
 
 use crate::body::{Body, BodyError};
+use crate::link_rows::LinkRows;
 use crate::math::{Matrix3, Vector, Vector3, abs, sin_cos, sqrt};
 use crate::pose::Pose;
 use core::fmt;
@@ -110,32 +111,6 @@ pub struct Arm<const N: usize> {
     pub(crate) joint_from_tip: Pose,
     pub(crate) gravity: Vector3<f64>,
     pub(crate) rows: LinkRows<N>,
-}
-
-/// The links again, by rows, as `lanes` takes them.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct LinkRows<const N: usize> {
-    /// Rotation of the joint frame in its parent's at `q = 0`, by columns.
-    pub rotation: [[f64; N]; 9],
-    /// Mass, first moment, and inertia `xx, xy, yy, xz, yz, zz`.
-    pub body: [[f64; N]; 10],
-}
-
-impl<const N: usize> LinkRows<N> {
-    fn new(links: &[Link; N]) -> Self {
-        let row = |of: &dyn Fn(&Link) -> f64| core::array::from_fn(|i| of(&links[i]));
-        let inertia = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
-        LinkRows {
-            rotation: core::array::from_fn(|k| row(&|link| link.parent_from_joint.rotation[k])),
-            body: core::array::from_fn(|k| {
-                row(&|link| match k {
-                    0 => link.mass,
-                    1..4 => link.first_moment[k - 1],
-                    _ => link.inertia[inertia[k - 4]],
-                })
-            }),
-        }
-    }
 }
 
 impl<const N: usize> Arm<N> {

@@ -3,10 +3,18 @@
 //! What is known of each joint is kept by rows: a row for each quantity, in groups of [`LANES`] joints, the
 //! last group filled up with zeros. A function of one joint is applied to a group at a time. `wide` has
 //! the vector types: a processor without vector instructions gets the same results, to the bit.
+//!
+//! A product that is added to something is rounded once where the build is for processors with fused
+//! multiply-add ([`FUSED`]), and twice elsewhere. That is for the build to say, never for the processor on
+//! which it runs: all binaries of one build have the same bits.
 
 use core::array::from_fn;
 use core::ops::{Add, Mul, Neg, Sub};
 pub(crate) use wide::f64x4 as Lanes;
+
+/// Whether this build is for processors with fused multiply-add, as `-C target-cpu=native` may say: its
+/// results differ from those of other builds by rounding.
+pub const FUSED: bool = cfg!(all(target_arch = "x86_64", target_feature = "fma"));
 
 /// Joints in a group.
 pub(crate) const LANES: usize = 4;
@@ -14,18 +22,44 @@ pub(crate) const LANES: usize = 4;
 /// `K` quantities of each joint, in `G` groups.
 pub(crate) type Rows<const K: usize, const G: usize> = [[Lanes; G]; K];
 
+/// A vector over the joints, or over a task's directions, in `G` groups.
+pub(crate) type Column<const G: usize> = [Lanes; G];
+
+/// A matrix by columns.
+pub(crate) type Columns<const C: usize, const G: usize> = [Column<G>; C];
+
 /// A number of one joint, or of a group.
 pub(crate) trait Number:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
 {
     /// The same number for all.
     fn splat(x: f64) -> Self;
+
+    /// `self * factor + summand`, see [`FUSED`].
+    fn times_plus(self, factor: Self, summand: Self) -> Self;
 }
 
 impl Number for f64 {
     #[inline(always)]
     fn splat(x: f64) -> f64 {
         x
+    }
+
+    #[cfg(all(target_arch = "x86_64", target_feature = "fma"))]
+    #[inline(always)]
+    fn times_plus(self, factor: f64, summand: f64) -> f64 {
+        use safe_arch::{fused_mul_add_m128d_s, get_f64_from_m128d_s, set_m128d_s};
+        get_f64_from_m128d_s(fused_mul_add_m128d_s(
+            set_m128d_s(self),
+            set_m128d_s(factor),
+            set_m128d_s(summand),
+        ))
+    }
+
+    #[cfg(not(all(target_arch = "x86_64", target_feature = "fma")))]
+    #[inline(always)]
+    fn times_plus(self, factor: f64, summand: f64) -> f64 {
+        self * factor + summand
     }
 }
 
@@ -34,12 +68,25 @@ impl Number for Lanes {
     fn splat(x: f64) -> Lanes {
         Lanes::new([x; LANES])
     }
+
+    #[inline(always)]
+    fn times_plus(self, factor: Lanes, summand: Lanes) -> Lanes {
+        if FUSED {
+            Lanes::mul_add(self, factor, summand)
+        } else {
+            self * factor + summand
+        }
+    }
 }
 
 /// The same numbers for all joints of a group.
 #[inline(always)]
 pub(crate) fn splat<const K: usize>(x: [f64; K]) -> [Lanes; K] {
-    x.map(Number::splat)
+    let mut out = [Lanes::ZERO; K];
+    for (out, x) in out.iter_mut().zip(x) {
+        *out = Lanes::splat(x);
+    }
+    out
 }
 
 /// Calls a function of `<N, G>` with the number of groups that `N` joints need.
@@ -106,6 +153,29 @@ pub(crate) fn rows<const K: usize, const N: usize, const G: usize>(
 #[inline(always)]
 pub(crate) fn of_joint<const K: usize, const G: usize>(rows: &Rows<K, G>, i: usize) -> [f64; K] {
     from_fn(|k| rows[k][i / LANES].as_array()[i % LANES])
+}
+
+/// Entry `i` of a column.
+#[inline(always)]
+pub(crate) fn entry<const G: usize>(column: &Column<G>, i: usize) -> f64 {
+    column[i / LANES].as_array()[i % LANES]
+}
+
+/// A column of `N` numbers, filled up with zeros.
+#[inline(always)]
+pub(crate) fn column<const N: usize, const G: usize>(numbers: &[f64; N]) -> Column<G> {
+    let [column] = rows::<1, N, G>(|_, i| numbers[i]);
+    column
+}
+
+/// `s x`, entry by entry.
+#[inline(always)]
+pub(crate) fn scaled<const K: usize>(x: [Lanes; K], s: Lanes) -> [Lanes; K] {
+    let mut out = x;
+    for x in &mut out {
+        *x *= s;
+    }
+    out
 }
 
 /// One row, a number for each joint.

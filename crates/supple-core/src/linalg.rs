@@ -1,10 +1,11 @@
-//! The small linear algebra that the law needs, for sizes known at compile time.
+//! Small linear algebra for sizes known at compile time.
 #![allow(
     clippy::needless_range_loop,
     reason = "joints, groups and lanes are counted: each index goes into several arrays"
 )]
 
-use crate::math::{Matrix, Matrix3, Vector, abs, acos, cos, sqrt};
+use crate::lanes::Number;
+use crate::math::{Matrix, Matrix3, abs, acos, cos, sqrt};
 
 /// Cholesky factors without square roots of a symmetric positive definite matrix: `A = L D L^T`, `L` unit
 /// lower, `D` diagonal. The roots would be half of the time of a small solve.
@@ -19,18 +20,12 @@ impl<const N: usize> Cholesky<N> {
     /// Reads the lower triangle of `a`. `None` where `a` is not positive definite.
     #[inline]
     pub fn new(a: &Matrix<N, N>) -> Option<Self> {
-        Self::with_pivots(a, |_, pivot| pivot)
-    }
-
-    /// The same of `A + E`, `E` diagonal: what `replaced` adds to each pivot, counted from 0, on the way.
-    #[inline]
-    pub fn with_pivots(a: &Matrix<N, N>, replaced: impl Fn(usize, f64) -> f64) -> Option<Self> {
         let mut rest = a.data.0;
         let mut inverse_pivots = [0.0; N];
         let mut definite = true;
         for k in 0..N {
             let column = rest[k];
-            let pivot = replaced(k, column[k]);
+            let pivot = column[k];
             definite &= pivot > 0.0 && pivot < f64::INFINITY;
             let inverse = 1.0 / pivot;
             inverse_pivots[k] = inverse;
@@ -38,7 +33,7 @@ impl<const N: usize> Cholesky<N> {
             rest[k] = scaled;
             for j in k + 1..N {
                 for i in 0..N {
-                    rest[j][i] -= scaled[j] * column[i];
+                    rest[j][i] = (-scaled[j]).times_plus(column[i], rest[j][i]);
                 }
             }
         }
@@ -55,28 +50,11 @@ impl<const N: usize> Cholesky<N> {
         for column in &mut x.data.0 {
             for k in 0..N {
                 for i in k + 1..N {
-                    column[i] -= self.lower[k][i] * column[k];
+                    column[i] = (-self.lower[k][i]).times_plus(column[k], column[i]);
                 }
             }
         }
         x
-    }
-
-    /// `B L^-T`, the transpose of `L^-1 B^T`.
-    #[inline]
-    pub fn solve_lower_right<const R: usize>(&self, b: &Matrix<R, N>) -> Matrix<R, N> {
-        let mut x = b.data.0;
-        for k in 0..N {
-            let before = x[k];
-            for i in k + 1..N {
-                for (entry, other) in x[i].iter_mut().zip(&before) {
-                    *entry -= self.lower[k][i] * other;
-                }
-            }
-        }
-        let mut out = *b;
-        out.data.0 = x;
-        out
     }
 
     /// `D^-1 B`.
@@ -98,7 +76,7 @@ impl<const N: usize> Cholesky<N> {
         for column in &mut x.data.0 {
             for k in (0..N).rev() {
                 for i in 0..k {
-                    column[i] -= self.lower[i][k] * column[k];
+                    column[i] = (-self.lower[i][k]).times_plus(column[k], column[i]);
                 }
             }
         }
@@ -110,48 +88,6 @@ impl<const N: usize> Cholesky<N> {
     pub fn solve<const C: usize>(&self, b: &Matrix<N, C>) -> Matrix<N, C> {
         self.solve_upper(&self.divide(&self.solve_lower(b)))
     }
-
-    /// `B A^-1 B^T`, given `half`, `B L^-T`.
-    #[inline]
-    pub fn gram<const R: usize>(&self, half: &Matrix<R, N>) -> Matrix<R, R> {
-        let mut sum = Matrix::<R, R>::zeros();
-        for (column, inverse_pivot) in half.data.0.iter().zip(&self.inverse_pivots) {
-            for j in 0..R {
-                let scaled = column[j] * inverse_pivot;
-                for i in 0..R {
-                    sum.data.0[j][i] += column[i] * scaled;
-                }
-            }
-        }
-        sum
-    }
-}
-
-/// `M v`, without nalgebra's general product: it is what small loops are quick at.
-#[inline(always)]
-pub fn times<const R: usize, const C: usize>(m: &Matrix<R, C>, v: &Vector<C>) -> Vector<R> {
-    let mut out = [0.0; R];
-    for (column, x) in m.data.0.iter().zip(&v.data.0[0]) {
-        for (sum, entry) in out.iter_mut().zip(column) {
-            *sum += entry * x;
-        }
-    }
-    Vector::from(out)
-}
-
-/// `M^T v`.
-#[inline(always)]
-pub fn transpose_times<const R: usize, const C: usize>(
-    m: &Matrix<R, C>,
-    v: &Vector<R>,
-) -> Vector<C> {
-    let mut out = [0.0; C];
-    for (sum, column) in out.iter_mut().zip(&m.data.0) {
-        for (entry, x) in column.iter().zip(&v.data.0[0]) {
-            *sum += entry * x;
-        }
-    }
-    Vector::from(out)
 }
 
 /// Eigenvalues of a symmetric 3 x 3 matrix in ascending order; the upper triangle is read.
@@ -177,27 +113,29 @@ pub fn symmetric_eigenvalues(a: &Matrix3<f64>) -> [f64; 3] {
     [least, 3.0 * mean - greatest - least, greatest]
 }
 
-/// Whether the least singular value of a 3 x `N` matrix is above `bound`, without finding it: certain where
-/// it says yes; where it says no, ask [`least_singular_value`].
+/// Whether all singular values of a 3 x `N` matrix, given by columns, are above `bound`, to a rounding of
+/// their squares.
 ///
-/// Of eigenvalues `a <= b <= c` of the Gram matrix, `a = det / (b c) >= 4 det / trace^2`.
+/// Sylvester: they are where the leading minors of `J J^T - bound^2` are positive. Far cheaper than
+/// [`least_singular_value`].
 #[inline]
-pub fn singular_values_exceed<const N: usize>(j: &Matrix<3, N>, bound: f64) -> bool {
+pub fn singular_values_exceed<const N: usize>(j: &[[f64; 3]; N], bound: f64) -> bool {
     let [xx, xy, yy, xz, yz, zz] = gram_3(j);
-    let determinant =
-        xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz);
-    let trace = xx + yy + zz;
-    4.0 * determinant > bound * bound * trace * trace
+    let square = bound * bound;
+    let (xx, yy, zz) = (xx - square, yy - square, zz - square);
+    let minor = xx * yy - xy * xy;
+    let determinant = zz * minor + xz * (xy * yz - yy * xz) - yz * (xx * yz - xy * xz);
+    (xx > 0.0) & (minor > 0.0) & (determinant > 0.0)
 }
 
 /// `J J^T`: `xx, xy, yy, xz, yz, zz`.
 #[inline(always)]
-fn gram_3<const N: usize>(j: &Matrix<3, N>) -> [f64; 6] {
+fn gram_3<const N: usize>(j: &[[f64; 3]; N]) -> [f64; 6] {
     let mut sums = [0.0; 6];
-    for [x, y, z] in &j.data.0 {
-        let products = [x * x, x * y, y * y, x * z, y * z, z * z];
-        for (sum, product) in sums.iter_mut().zip(products) {
-            *sum += product;
+    for [x, y, z] in j {
+        let pairs = [(x, x), (x, y), (y, y), (x, z), (y, z), (z, z)];
+        for (sum, (a, b)) in sums.iter_mut().zip(pairs) {
+            *sum = a.times_plus(*b, *sum);
         }
     }
     sums
@@ -208,7 +146,7 @@ fn gram_3<const N: usize>(j: &Matrix<3, N>) -> [f64; 6] {
 /// Near zero the error is about 1e-8 times the greatest singular value, and up to 3e-4 times it where
 /// two vanish together: enough to schedule damping, not to decide rank.
 pub fn least_singular_value<const N: usize>(j: &Matrix<3, N>) -> f64 {
-    let [xx, xy, yy, xz, yz, zz] = gram_3(j);
+    let [xx, xy, yy, xz, yz, zz] = gram_3(&j.data.0);
     let gram = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
     let [least, ..] = symmetric_eigenvalues(&gram);
     sqrt(least.max(0.0))

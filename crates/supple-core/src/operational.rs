@@ -9,7 +9,8 @@
 //! N   = 1 - H^-1 J^T A^-1 J
 //! ```
 //!
-//! With `H = L D L^T` and `Y = J L^-T`, `A = Y D^-1 Y^T`: `H^-1 J^T` is never formed.
+//! With `H = L D L^T` and `Y = J L^-T`, `A = Y D^-1 Y^T`: `H^-1 J^T` is never formed. Three joints away from
+//! singular poses need neither: `J^-1` gives their accelerations, and inverse dynamics the torques.
 //!
 //! **Orientation.** The error is `e = (r1 x r1o + r2 x r2o + r3 x r3o) / 2 = sin(angle) axis`, with `ri`
 //! and `rio` the axes of the tip and of its reference (Luh, Walker and Paul, "Resolved-acceleration
@@ -24,15 +25,15 @@
 
 use crate::arm::Arm;
 use crate::config::Gains;
-use crate::dynamics::{Terms, fill};
+use crate::dynamics::Sweep;
+use crate::factors::Factors;
 use crate::impedance::{GREATEST_TASK_MASS_KG, SINGULAR_BELOW_M, singularity_damping_per_kg};
-use crate::lanes::in_groups;
-use crate::linalg::{
-    Cholesky, least_singular_value, singular_values_exceed, times, transpose_times,
-};
+use crate::lanes::{Column, Columns, Lanes, Number, column, entry, in_groups, of_joint, per_joint};
+use crate::linalg::{least_singular_value, singular_values_exceed};
 use crate::math::{Matrix, Matrix3, Vector, Vector3};
 use crate::pose::Pose;
 use crate::trajectory::Reference;
+use core::array::from_fn;
 
 /// Greatest moment of inertia that the damped inverse commands about a lost direction \[kg m^2\].
 pub const GREATEST_TASK_INERTIA_KG_M2: f64 = 2.0;
@@ -110,35 +111,36 @@ fn position<const N: usize, const G: usize>(
     gains: &Gains,
     nullspace_damping: f64,
 ) -> Option<Vector<N>> {
-    let mut terms = Terms::default();
-    fill::<N, G>(arm, q, qd, &mut terms);
-    let mut jacobian = Matrix::<3, N>::zeros();
-    for (linear, column) in jacobian.data.0.iter_mut().zip(&terms.jacobian.data.0) {
-        linear.copy_from_slice(&column[..3]);
-    }
-    let damping = if singular_values_exceed(&jacobian, SINGULAR_BELOW_M) {
+    let sweep = Sweep::<G>::new(arm, q, qd);
+    let columns: [[f64; 3]; N] = from_fn(|i| first(of_joint(&sweep.motions, i)));
+    let singularity_damping = if singular_values_exceed(&columns, SINGULAR_BELOW_M) {
         0.0
     } else {
-        singularity_damping_per_kg(least_singular_value(&jacobian))
+        singularity_damping_per_kg(least_singular_value(&Matrix::from(columns)))
     };
-    let error = reference.position - terms.base_from_tip.translation;
-    let rate = times(&jacobian, qd);
-    let drift = &terms.jacobian_dot_qd;
+    let position = Vector3::from(sweep.tip.origin);
+    let rate = Vector3::from(first(sweep.motion.tip_rate::<N>()));
+    let drift = Vector3::from(first(sweep.tip_drift(arm)));
+    let error = reference.position - position;
+    let rate_error = reference.velocity - rate;
     let task = Task {
-        jacobian,
-        acceleration: reference.acceleration - Vector3::new(drift[0], drift[1], drift[2]),
-        force: gains.stiffness_n_per_m.component_mul(&error)
-            + gains
-                .damping_n_s_per_m
-                .component_mul(&(reference.velocity - rate)),
-        rate,
+        rate: rate.data.0[0],
+        acceleration: (reference.acceleration - drift).data.0[0],
+        force: (gains.stiffness_n_per_m.component_mul(&error)
+            + gains.damping_n_s_per_m.component_mul(&rate_error))
+        .data
+        .0[0],
     };
-    if N == 3 && damping == 0.0 {
-        return task.square_torque(&terms);
+    if N == 3 && singularity_damping == 0.0 {
+        let columns = from_fn(|i| columns[i]);
+        return Some(task.square_torque(arm, sweep, columns));
     }
-    task.torque(&terms, qd, nullspace_damping, |a| {
-        Cholesky::new(&(a + Matrix3::from_diagonal_element(damping)))
-    })
+    let damped = |_, pivot| pivot + singularity_damping;
+    if N == 3 {
+        task.torque_apart::<N, G, 1>(arm, q, qd, damped)
+    } else {
+        task.torque::<N, G, 1>(arm, &sweep, qd, nullspace_damping, damped)
+    }
 }
 
 /// Joint torques that give the tip's pose the impedance `gains` \[N m\]. `q` \[rad\], `qd` \[rad/s\].
@@ -168,19 +170,14 @@ fn pose<const N: usize, const G: usize>(
     gains: &PoseGains,
     nullspace_damping: f64,
 ) -> Option<Vector<N>> {
-    let mut terms = Terms::default();
-    fill::<N, G>(arm, q, qd, &mut terms);
-    let rate = times(&terms.jacobian, qd);
-    let position = reference.base_from_tip.translation - terms.base_from_tip.translation;
-    let orientation = orientation_error(
-        &reference.base_from_tip.rotation,
-        &terms.base_from_tip.rotation,
+    let sweep = Sweep::<G>::new(arm, q, qd);
+    let (rate, drift) = (sweep.motion.tip_rate::<N>(), sweep.tip_drift(arm));
+    let tip = sweep.tip.pose();
+    let wanted = &reference.base_from_tip;
+    let error = pair(
+        &(wanted.translation - tip.translation),
+        &orientation_error(&wanted.rotation, &tip.rotation),
     );
-    let pair = |linear: &Vector3<f64>, angular: &Vector3<f64>| {
-        Vector::<6>::new(
-            linear.x, linear.y, linear.z, angular.x, angular.y, angular.z,
-        )
-    };
     let velocity = pair(
         &reference.velocity_m_per_s,
         &reference.angular_velocity_rad_per_s,
@@ -192,72 +189,115 @@ fn pose<const N: usize, const G: usize>(
     let stiffness = pair(&gains.linear.stiffness_n_per_m, &gains.stiffness_nm_per_rad);
     let damping = pair(&gains.linear.damping_n_s_per_m, &gains.damping_nm_s_per_rad);
     let task = Task {
-        jacobian: terms.jacobian,
-        acceleration: acceleration - terms.jacobian_dot_qd,
-        force: stiffness.component_mul(&pair(&position, &orientation))
-            + damping.component_mul(&(velocity - rate)),
         rate,
+        acceleration: from_fn(|k| acceleration[k] - drift[k]),
+        force: from_fn(|k| stiffness[k] * error[k] + damping[k] * (velocity[k] - rate[k])),
     };
-    task.torque(&terms, qd, nullspace_damping, |a| {
-        Cholesky::with_pivots(a, damped_pivot)
-    })
+    task.torque::<N, G, 2>(arm, &sweep, qd, nullspace_damping, damped_pivot)
 }
 
-/// A task of `D` dimensions, and what is asked of it.
-struct Task<const D: usize, const N: usize> {
-    jacobian: Matrix<D, N>,
-    /// `Xo'' - J' qd`.
-    acceleration: Vector<D>,
-    /// `K (Xo - X) + B (Xo' - X')`.
-    force: Vector<D>,
+#[inline(always)]
+fn pair(linear: &Vector3<f64>, angular: &Vector3<f64>) -> [f64; 6] {
+    [
+        linear.x, linear.y, linear.z, angular.x, angular.y, angular.z,
+    ]
+}
+
+/// The first `D` of six.
+#[inline(always)]
+fn first<const D: usize>(six: [f64; 6]) -> [f64; D] {
+    from_fn(|k| six[k])
+}
+
+/// What is asked of the first `D` directions of the tip's motion.
+struct Task<const D: usize> {
     /// `J qd`.
-    rate: Vector<D>,
+    rate: [f64; D],
+    /// `Xo'' - J' qd`.
+    acceleration: [f64; D],
+    /// `K (Xo - X) + B (Xo' - X')`.
+    force: [f64; D],
 }
 
-impl<const D: usize, const N: usize> Task<D, N> {
-    /// The law; `factor` turns `A` into its factors, damped where it must be.
-    #[inline]
-    fn torque(
+impl<const D: usize> Task<D> {
+    /// The law; `replaced` damps the pivots of `A` where they must be. `R` groups hold `D` directions.
+    #[inline(always)]
+    fn torque<const N: usize, const G: usize, const R: usize>(
         &self,
-        terms: &Terms<N>,
+        arm: &Arm<N>,
+        sweep: &Sweep<G>,
         qd: &Vector<N>,
         nullspace_damping: f64,
-        factor: impl FnOnce(&Matrix<D, D>) -> Option<Cholesky<D>>,
+        replaced: impl Fn(usize, f64) -> f64,
     ) -> Option<Vector<N>> {
-        let mass_matrix = Cholesky::new(&terms.mass_matrix)?;
-        let half = mass_matrix.solve_lower_right(&self.jacobian);
-        let mobility = factor(&mass_matrix.gram(&half))?;
+        let jacobian: Columns<N, R> =
+            from_fn(|i| column::<D, R>(&first(of_joint(&sweep.motions, i))));
+        let mass = Factors::new(sweep.mass(arm), |_, pivot| pivot)?;
+        let mobility = Factors::<D, R>::new(mass.gram(&mass.half(jacobian)), replaced)?;
         let mut acceleration = self.acceleration;
-        let mut tau = terms.coriolis_gravity;
+        let mut tau = Vector::from(per_joint(&sweep.held().torque));
         if N > D {
-            // H^-1 J^T x = L^-T D^-1 Y^T x, and its transpose.
-            let along = transpose_times(&half, &mobility.solve(&self.rate));
-            let loose = qd - mass_matrix.solve_upper(&mass_matrix.divide(&along));
-            let damping = loose * nullspace_damping;
-            let back = mass_matrix.divide(&mass_matrix.solve_lower(&damping));
-            acceleration += times(&half, &back);
-            tau -= damping;
+            // J^T A^-1 J qd, then H^-1 of it: the motion that moves the tip.
+            let moving = mass.solve(&per_joint(&self.joints(sweep, &mobility.solve(&self.rate))));
+            let damping: [f64; N] = from_fn(|i| nullspace_damping * (qd[i] - moving[i]));
+            let loose = mass.solve(&damping);
+            for (k, x) in acceleration.iter_mut().enumerate() {
+                for i in 0..N {
+                    *x = entry(&jacobian[i], k).times_plus(loose[i], *x);
+                }
+            }
+            tau -= Vector::from(damping);
         }
-        let force = mobility.solve(&acceleration) + self.force;
-        Some(tau + transpose_times(&self.jacobian, &force))
+        let inertial = mobility.solve(&acceleration);
+        let force = from_fn(|k| inertial[k] + self.force[k]);
+        Some(tau + Vector::from(per_joint(&self.joints(sweep, &force))))
+    }
+
+    /// The same where it is seldom needed: inlined, it would slow down what is done instead.
+    #[cold]
+    #[inline(never)]
+    fn torque_apart<const N: usize, const G: usize, const R: usize>(
+        &self,
+        arm: &Arm<N>,
+        q: &Vector<N>,
+        qd: &Vector<N>,
+        replaced: impl Fn(usize, f64) -> f64,
+    ) -> Option<Vector<N>> {
+        let sweep = Sweep::<G>::new(arm, q, qd);
+        self.torque::<N, G, R>(arm, &sweep, qd, 0.0, replaced)
+    }
+
+    /// `J^T f`.
+    #[inline(always)]
+    fn joints<const G: usize>(&self, sweep: &Sweep<G>, force: &[f64; D]) -> Column<G> {
+        let mut sum = [Lanes::ZERO; G];
+        for (row, f) in sweep.motions.iter().zip(force) {
+            for (sum, x) in sum.iter_mut().zip(row) {
+                *sum = x.times_plus(Lanes::splat(*f), *sum);
+            }
+        }
+        sum
     }
 }
 
-impl<const N: usize> Task<3, N> {
-    /// Three joints, away from singular poses: `H J^-1` in place of `J^T A^-1`.
-    #[inline]
-    fn square_torque(&self, terms: &Terms<N>) -> Option<Vector<N>> {
-        let column = |i: usize| self.jacobian.fixed_view::<3, 1>(0, i).into_owned();
+impl Task<3> {
+    /// Three joints, away from singular poses: `J^-1` gives their accelerations.
+    #[inline(always)]
+    fn square_torque<const N: usize, const G: usize>(
+        &self,
+        arm: &Arm<N>,
+        sweep: Sweep<G>,
+        columns: [[f64; 3]; 3],
+    ) -> Vector<N> {
+        let column = |i: usize| Vector3::from(columns[i]);
         let (a, b, c) = (column(0), column(1), column(2));
         let (bc, ca, ab) = (b.cross(&c), c.cross(&a), a.cross(&b));
-        let x = &self.acceleration;
+        let wanted = Vector3::from(self.acceleration);
         let scale = 1.0 / a.dot(&bc);
-        let mut qdd = Vector::zeros();
-        for (i, row) in [bc, ca, ab].iter().enumerate() {
-            qdd[i] = row.dot(x) * scale;
-        }
-        let tau = terms.coriolis_gravity + times(&terms.mass_matrix, &qdd);
-        Some(tau + transpose_times(&self.jacobian, &self.force))
+        let rows = [bc, ca, ab];
+        let qdd = from_fn(|i| rows[i].dot(&wanted) * scale);
+        let force = per_joint(&self.joints(&sweep, &self.force));
+        Vector::from(per_joint(&sweep.inverse_dynamics(arm, &qdd))) + Vector::from(force)
     }
 }
 

@@ -1,8 +1,8 @@
 //! Sines and cosines of all joints at once, without branches, so that the compiler takes several joints in
 //! one instruction.
 //!
-//! `x = n pi/2 + r`: `pi/2` is subtracted in three parts, the first two short enough that their products
-//! with `n` are exact (Cody and Waite), and `r` is kept in two words. On `|r| <= pi/4` sine and cosine are
+//! `x = n pi/2 + r`: `pi/2` is subtracted in parts whose products with `n` are exact (Cody and Waite): two
+//! where there is fused multiply-add, else three, of which two are short. `r` is kept in two words. On `|r| <= pi/4` sine and cosine are
 //! polynomials in `r^2`, interpolated at Chebyshev points so that they are off by less than 0.06 units in
 //! the last place; with rounding both results are within 1 unit (`tests/sincos.rs`). Beyond
 //! [`GREATEST_RAD`], and for what is not finite, `libm` is asked.
@@ -10,6 +10,8 @@
     clippy::needless_range_loop,
     reason = "joints, groups and lanes are counted: each index goes into several arrays"
 )]
+
+use crate::lanes::{FUSED, Number};
 
 /// Greatest angle that the polynomials are used for \[rad\]: a joint that has turned 159,000 times.
 pub const GREATEST_RAD: f64 = 1e6;
@@ -23,6 +25,8 @@ const HALF_PI: [f64; 3] = [
     6.077_100_506_303_966e-11,
     2.022_266_248_795_950_6e-21,
 ];
+/// What pi/2 is more than its nearest `f64`.
+const BEYOND_HALF_PI: f64 = 6.123_233_995_736_766e-17;
 /// `(sin(r) - r) / r^3` in powers of `r^2`.
 const SINE: [f64; 6] = [
     -0.166_666_666_666_666_32,
@@ -75,22 +79,28 @@ fn replace_far(angles_rad: &[f64], sines: &mut [f64], cosines: &mut [f64]) {
 /// Sine and cosine of an angle no greater than [`GREATEST_RAD`].
 #[inline(always)]
 fn near(x: f64) -> (f64, f64) {
-    let shifted = x * core::f64::consts::FRAC_2_PI + ROUND;
+    let shifted = x.times_plus(core::f64::consts::FRAC_2_PI, ROUND);
     let n = shifted - ROUND;
-    let first = x - n * HALF_PI[0];
-    let second = n * HALF_PI[1];
-    let coarse = first - second;
-    let rest = n * HALF_PI[2] - ((first - coarse) - second);
-    let r = coarse - rest;
-    let tail = (coarse - r) - rest;
+    let (r, tail) = if FUSED {
+        let coarse = (-n).times_plus(core::f64::consts::FRAC_PI_2, x);
+        let r = (-n).times_plus(BEYOND_HALF_PI, coarse);
+        (r, (-n).times_plus(BEYOND_HALF_PI, coarse - r))
+    } else {
+        let first = x - n * HALF_PI[0];
+        let second = n * HALF_PI[1];
+        let coarse = first - second;
+        let rest = n * HALF_PI[2] - ((first - coarse) - second);
+        let r = coarse - rest;
+        (r, (coarse - r) - rest)
+    };
 
     let z = r * r;
     let sine = polynomial(z, &SINE);
     let cosine = polynomial(z, &COSINE);
     let half = 0.5 * z;
     let one = 1.0 - half;
-    let sine = r + (z * r * sine + tail * one);
-    let cosine = one + (((1.0 - one) - half) + (z * z * cosine - r * tail));
+    let sine = r + (z * r).times_plus(sine, tail * one);
+    let cosine = one + (((1.0 - one) - half) + (z * z).times_plus(cosine, -(r * tail)));
 
     let quadrant = shifted.to_bits();
     let odd = quadrant & 1 != 0;
@@ -107,7 +117,7 @@ fn near(x: f64) -> (f64, f64) {
 #[inline(always)]
 fn polynomial(z: f64, c: &[f64; 6]) -> f64 {
     let w = z * z;
-    let even = c[0] + w * (c[2] + w * c[4]);
-    let odd = c[1] + w * (c[3] + w * c[5]);
-    even + z * odd
+    let even = w.times_plus(w.times_plus(c[4], c[2]), c[0]);
+    let odd = w.times_plus(w.times_plus(c[5], c[3]), c[1]);
+    z.times_plus(odd, even)
 }

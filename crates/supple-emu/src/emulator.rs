@@ -15,7 +15,7 @@ use supple_core::{Matrix, Vector};
 use supple_plant::{Drive, Plant, PlantConfig, Truth};
 use supple_puck::safety::SafetyMode;
 use supple_puck::status::MotorMode;
-use supple_puck::{CanFrame, NodeId};
+use supple_puck::{CanFrame, Destination, GroupId, NodeId, PackedTorques};
 
 /// Something worth telling, with its time \[ns\].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,8 +46,13 @@ pub struct Emulator<const N: usize> {
     report: Option<BusFault>,
     random: u64,
     happenings: Vec<(u64, Happening)>,
+    /// The machine's clock over the arm's time, now and at each happening \[ns\].
+    offset_ns: u64,
+    offsets_ns: Vec<u64>,
     /// Presses to come, the soonest first.
     presses: VecDeque<(u64, Press)>,
+    /// Presses that wait for the host's first torque, with their time after it \[ns\].
+    once_held: Vec<(u64, Press)>,
     powered: bool,
     in_cradle: bool,
 }
@@ -119,7 +124,10 @@ impl<const N: usize> Emulator<N> {
             report: None,
             random: config.seed,
             happenings: Vec::new(),
+            offset_ns: 0,
+            offsets_ns: Vec::new(),
             presses: VecDeque::new(),
+            once_held: Vec::new(),
             powered: false,
             in_cradle: config.cradle,
             config,
@@ -142,8 +150,7 @@ impl<const N: usize> Emulator<N> {
 
     /// An operator presses a button.
     pub fn press(&mut self, press: Press) {
-        self.happenings
-            .push((self.now_ns, Happening::Pressed(press)));
+        self.note(Happening::Pressed(press));
         let told = self.safety.press(self.now_ns, press);
         self.tell(told);
     }
@@ -152,6 +159,12 @@ impl<const N: usize> Emulator<N> {
     pub fn press_at(&mut self, time_ns: u64, press: Press) {
         let at = self.presses.partition_point(|(due, _)| *due <= time_ns);
         self.presses.insert(at, (time_ns, press));
+    }
+
+    /// An operator will press a button `after_ns` after the host first asks for a torque that is not zero: once
+    /// somebody wants to hold the arm.
+    pub fn press_once_held(&mut self, after_ns: u64, press: Press) {
+        self.once_held.push((after_ns, press));
     }
 
     /// Safety module with its pendant.
@@ -190,6 +203,27 @@ impl<const N: usize> Emulator<N> {
     /// What has happened so far, with its times \[ns\].
     pub fn happenings(&self) -> &[(u64, Happening)] {
         &self.happenings
+    }
+
+    /// The same, by the machine's monotonic clock where it differs \[ns\].
+    pub fn happenings_by_the_wall(&self) -> impl Iterator<Item = (u64, Happening)> {
+        let timed = self.happenings.iter().zip(&self.offsets_ns);
+        timed.map(|((time_ns, happening), offset_ns)| (time_ns + offset_ns, *happening))
+    }
+
+    /// The machine's monotonic clock over the arm's time from now on \[ns\].
+    pub fn set_offset_ns(&mut self, offset_ns: u64) {
+        self.offset_ns = offset_ns;
+    }
+
+    /// Now, by the machine's monotonic clock where it differs \[ns\].
+    pub fn wall_ns(&self) -> u64 {
+        self.now_ns + self.offset_ns
+    }
+
+    fn note(&mut self, happening: Happening) {
+        self.happenings.push((self.now_ns, happening));
+        self.offsets_ns.push(self.offset_ns);
     }
 
     /// Time that frames have occupied the bus \[ns\].
@@ -272,8 +306,7 @@ impl<const N: usize> Emulator<N> {
         };
         let mode = self.safety.mode();
         let cause = self.safety.cause();
-        self.happenings
-            .push((self.now_ns, Happening::Safety(mode, cause)));
+        self.note(Happening::Safety(mode, cause));
         let powered = mode != SafetyMode::EStop;
         if powered != self.powered {
             let modes: Vec<MotorMode> = self.pucks.iter().map(Puck::mode).collect();
@@ -291,11 +324,11 @@ impl<const N: usize> Emulator<N> {
     }
 
     fn note_modes(&mut self, before: &[MotorMode]) {
-        for (index, (puck, before)) in self.pucks.iter().zip(before).enumerate() {
-            if puck.mode() != *before {
-                self.in_cradle &= puck.mode() != MotorMode::Torque;
-                self.happenings
-                    .push((self.now_ns, Happening::Motor(index, puck.mode())));
+        for (index, before) in before.iter().enumerate() {
+            let mode = self.pucks[index].mode();
+            if mode != *before {
+                self.in_cradle &= mode != MotorMode::Torque;
+                self.note(Happening::Motor(index, mode));
             }
         }
     }
@@ -311,29 +344,36 @@ impl<const N: usize> Emulator<N> {
     fn deliver(&mut self, frame: CanFrame) -> Option<Event> {
         let from_host = frame.id().from() == NodeId::HOST;
         if from_host && self.waking() {
-            self.happenings
-                .push((self.now_ns, Happening::SpokeWhileWaking));
+            self.note(Happening::SpokeWhileWaking);
             self.host_off_until_ns = Some(self.now_ns + self.config.restart_ns);
             return Some(Event::Fault(BusFault::BusOff));
         }
+        if !self.once_held.is_empty() && from_host && asks_for_torque(&frame) {
+            for (after_ns, press) in core::mem::take(&mut self.once_held) {
+                self.press_at(self.now_ns + after_ns, press);
+            }
+        }
         let modes: Vec<MotorMode> = self.pucks.iter().map(Puck::mode).collect();
-        let mut answers: Vec<CanFrame> = Vec::new();
-        for puck in &mut self.pucks {
-            answers.extend(puck.hear(self.now_ns, &frame));
+        for index in 0..self.pucks.len() {
+            if let Some(answer) = self.pucks[index].hear(self.now_ns, &frame) {
+                let ready_ns = self.ready_ns();
+                self.wire.queue(ready_ns, answer);
+            }
         }
         self.note_modes(&modes);
         if let Some(sensor) = &mut self.sensor {
-            answers.extend(sensor.hear(self.now_ns, &frame).into_iter().flatten());
-        }
-        for answer in answers {
-            let ready_ns = self.now_ns + self.config.latency_ns + self.jitter_ns();
-            self.wire.queue(ready_ns, answer);
+            let readings = sensor.hear(self.now_ns, &frame);
+            // Both at once: a node keeps the order of its frames.
+            let ready_ns = self.ready_ns();
+            for reading in readings.into_iter().flatten() {
+                self.wire.queue(ready_ns, reading);
+            }
         }
         let before = self.safety.mode();
         let told = self.safety.hear(self.now_ns, &frame);
         if self.safety.mode() == before {
             if let Some(answer) = told {
-                let ready_ns = self.now_ns + self.config.latency_ns + self.jitter_ns();
+                let ready_ns = self.ready_ns();
                 self.wire.queue(ready_ns, answer);
             }
         } else {
@@ -349,6 +389,11 @@ impl<const N: usize> Emulator<N> {
         })
     }
 
+    /// When a node answers what it hears now \[ns\].
+    fn ready_ns(&mut self) -> u64 {
+        self.now_ns + self.config.latency_ns + self.jitter_ns()
+    }
+
     /// SplitMix64.
     fn jitter_ns(&mut self) -> u64 {
         self.random = self.random.wrapping_add(0x9e37_79b9_7f4a_7c15);
@@ -357,6 +402,16 @@ impl<const N: usize> Emulator<N> {
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         (z ^ (z >> 31)) % (self.config.jitter_ns + 1)
     }
+}
+
+/// A packed torque frame with a torque in it.
+fn asks_for_torque(frame: &CanFrame) -> bool {
+    let to_motors = matches!(
+        frame.id().to(),
+        Destination::Group(GroupId::LOWER_TORQUES | GroupId::UPPER_TORQUES)
+    );
+    let torques = PackedTorques::parse(frame);
+    to_motors && torques.is_ok_and(|torques| torques.slots.iter().any(|t| t.units() != 0))
 }
 
 impl<const N: usize> Peer for Emulator<N> {

@@ -2,7 +2,7 @@
 
 use supple_bus::BusError;
 use supple_model::ModelError;
-use supple_plant::PlantError;
+use supple_plant::{PlantError, TraceError};
 use supple_realtime::StopError;
 
 /// What an emulator cannot be built from, or run on.
@@ -45,19 +45,17 @@ pub enum EmulatorError {
     #[error(transparent)]
     Bus(#[from] BusError),
     /// A button press that cannot be read.
-    #[error("press `{text}`: expected BUTTON@SECONDS with one of idle, activate, e-stop, release")]
+    #[error(
+        "press `{text}`: expected BUTTON@SECONDS or BUTTON@held+SECONDS with one of idle, activate, e-stop, \
+         release"
+    )]
     Press {
         /// What was given.
         text: String,
     },
     /// A file of the trace.
-    #[error("{file}: {source}; choose a file that can be written")]
-    Trace {
-        /// The file.
-        file: String,
-        /// What the system says.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Trace(#[from] TraceError),
     /// A CAN interface in virtual time.
     #[error("a CAN interface keeps its own time: leave out --virtual-time, or give unix:FOLDER")]
     VirtualInterface,
@@ -78,7 +76,7 @@ impl EmulatorError {
             | EmulatorError::Transmission
             | EmulatorError::Plant(_)
             | EmulatorError::Model(_) => 3,
-            EmulatorError::Trace { .. } => 6,
+            EmulatorError::Trace(_) => 6,
             EmulatorError::Bus(_) => 9,
             EmulatorError::Stop(_) => 1,
         }

@@ -25,7 +25,6 @@ mod options;
 mod pendant;
 mod program;
 mod store;
-mod trace;
 
 pub use config::{EmulatorConfig, PuckConfig, SafetyConfig};
 pub use emulator::{Emulator, Happening};

@@ -1,16 +1,18 @@
 //! What the process is told.
 
+use crate::emulator::Emulator;
 use crate::error::EmulatorError;
 use crate::safety::Press;
 use clap::Parser;
 use std::path::PathBuf;
 use supple_bus::Address;
+use supple_realtime::Settings;
 
 /// The arm seen from its bus, in the place of a real one.
 ///
 /// It is powered up in the emergency stop, in its home pose, in a cradle until it is activated. Its
 /// pendant is the socket `pendant` in the bus's folder: a line per connection, one of idle, activate,
-/// e-stop, release, status or record; the answer is a line of JSON.
+/// e-stop, release, status, record, or a button with a time as in --press; the answer is a line of JSON.
 #[derive(Clone, Debug, Parser)]
 #[command(name = "supple-emu", version)]
 pub struct Options {
@@ -40,15 +42,39 @@ pub struct Options {
     /// A block of wood whose face is at this height above the base frame (m), beneath the whole reach.
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     pub block_m: Option<f64>,
-    /// Presses a button at a time (s) after the start: idle, activate, e-stop or release. May be repeated.
-    #[arg(long, value_name = "BUTTON@SECONDS", value_parser = press)]
-    pub press: Vec<(Press, f64)>,
+    /// Presses a button at a time (s) after the start, or after the host first asks for torque
+    /// (`activate@held+0.2`): idle, activate, e-stop or release. May be repeated.
+    #[arg(long, value_name = "BUTTON@TIME", value_parser = press)]
+    pub press: Vec<Later>,
     /// Writes what acts at the motors and on the tip, once a millisecond, as CSV.
     #[arg(long, value_name = "FILE")]
     pub trace: Option<PathBuf>,
+    /// Priority under SCHED_FIFO, above that of its host: a cable waits for nobody.
+    #[arg(long, value_name = "1-99", default_value_t = 81, value_parser = clap::value_parser!(u8).range(1..=99))]
+    pub priority: u8,
+    /// Processor for the arm alone; any if not given.
+    #[arg(long, value_name = "N")]
+    pub cpu: Option<usize>,
+    /// Neither priority nor locked memory.
+    #[arg(long)]
+    pub no_realtime: bool,
     /// Ends when the process that started it ends.
     #[arg(long, hide = true)]
     pub supervised: bool,
+}
+
+impl Options {
+    /// What to ask of the system.
+    pub fn realtime(&self) -> Settings {
+        if self.virtual_time || self.no_realtime {
+            return Settings::NONE;
+        }
+        Settings {
+            priority: Some(self.priority),
+            cpu: self.cpu,
+            lock_memory: true,
+        }
+    }
 }
 
 /// A button by its name on the command line and on the socket.
@@ -62,10 +88,38 @@ pub(crate) fn button(name: &str) -> Option<Press> {
     }
 }
 
-fn press(text: &str) -> Result<(Press, f64), EmulatorError> {
-    let parsed = text.split_once('@').and_then(|(name, seconds)| {
-        let seconds: f64 = seconds.parse().ok()?;
-        (seconds >= 0.0 && seconds.is_finite()).then_some((button(name)?, seconds))
+/// A button that will be pressed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Later {
+    /// Which.
+    pub press: Press,
+    /// When \[s\].
+    pub after_s: f64,
+    /// After the host first asks for torque, not after the start.
+    pub once_held: bool,
+}
+
+impl Later {
+    /// Has it pressed; `start_ns` is the time of the start.
+    pub fn plan<const N: usize>(&self, emulator: &mut Emulator<N>, start_ns: u64) {
+        let after_ns = (self.after_s * 1e9).round() as u64;
+        match self.once_held {
+            true => emulator.press_once_held(after_ns, self.press),
+            false => emulator.press_at(start_ns + after_ns, self.press),
+        }
+    }
+}
+
+/// `BUTTON@SECONDS` or `BUTTON@held+SECONDS`.
+pub(crate) fn press(text: &str) -> Result<Later, EmulatorError> {
+    let parsed = text.split_once('@').and_then(|(name, time)| {
+        let after_held = time.strip_prefix("held+");
+        let after_s: f64 = after_held.unwrap_or(time).parse().ok()?;
+        (after_s >= 0.0 && after_s.is_finite()).then_some(Later {
+            press: button(name)?,
+            after_s,
+            once_held: after_held.is_some(),
+        })
     });
     parsed.ok_or_else(|| EmulatorError::Press {
         text: text.to_owned(),

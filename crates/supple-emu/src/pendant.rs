@@ -4,7 +4,7 @@
 //! JSON. Nothing here is on the bus.
 
 use crate::emulator::{Emulator, Happening};
-use crate::options::button;
+use crate::options::{button, press};
 use serde::Serialize;
 use std::fs::Permissions;
 use std::io::{BufRead, BufReader, Write};
@@ -129,12 +129,23 @@ fn answer<const N: usize>(emulator: &mut Emulator<N>, line: &str) -> String {
         emulator.press(press);
         return json(&status(emulator));
     }
+    if line.contains('@') {
+        return match press(line) {
+            Ok(later) => {
+                later.plan(emulator, emulator.now_ns());
+                json(&status(emulator))
+            }
+            Err(error) => json(&Refusal {
+                error: error.to_string(),
+            }),
+        };
+    }
     match line {
         "status" => json(&status(emulator)),
         "record" => {
-            let happenings = emulator.happenings().iter();
+            let happenings = emulator.happenings_by_the_wall();
             let entries = happenings.map(|(time_ns, happening)| Entry {
-                time_ns: *time_ns,
+                time_ns,
                 what: match happening {
                     Happening::Motor(index, mode) => format!("motor {} {mode:?}", index + 1),
                     other => format!("{other:?}"),
@@ -152,7 +163,7 @@ fn status<const N: usize>(emulator: &Emulator<N>) -> Status {
     let truth = emulator.truth();
     let pucks = emulator.pucks().iter();
     Status {
-        time_ns: emulator.now_ns(),
+        time_ns: emulator.wall_ns(),
         safety_mode: format!("{:?}", emulator.safety().mode()),
         cause: format!("{:?}", emulator.safety().cause()),
         pendant: format!("{:?}", emulator.safety().pendant()),

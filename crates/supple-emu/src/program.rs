@@ -5,18 +5,19 @@ use crate::emulator::Emulator;
 use crate::error::EmulatorError;
 use crate::options::Options;
 use crate::pendant::PendantSocket;
-use crate::trace::TraceFile;
+use crate::puck::Puck;
 use clap::Parser;
 use std::process::ExitCode;
 use supple_bus::virtual_time::{Peer, Responder};
 use supple_bus::{
-    Address, Bus, BusError, BusFault, DatagramBus, Event, OwnerFolder, Side, SocketCan,
+    Address, Bus, BusError, BusFault, DatagramBus, Event, OwnerFolder, Pacer, SocketCan,
     monotonic_ns,
 };
 use supple_model::{Description, with_dof};
-use supple_plant::{FixedBlock, PlantConfig, Scene};
+use supple_plant::{PlantConfig, Scene, TraceFile};
 use supple_puck::NodeId;
-use supple_realtime::{Stop, die_with_parent};
+use supple_puck::status::MotorMode;
+use supple_realtime::{Stop, die_with_parent, enter};
 
 /// A stretch of the wall clock in which this process did not run; the arm stood still in it \[ns\].
 const GAP_NS: u64 = 50_000_000;
@@ -24,8 +25,12 @@ const GAP_NS: u64 = 50_000_000;
 const LOOK_NS: u64 = 1_000_000;
 /// The same in virtual time, where nothing happens while the host is silent \[ns\].
 const IDLE_NS: u64 = 10_000_000;
-/// Side of the block beneath the arm \[m\].
-const BLOCK_M: f64 = 2.4;
+
+/// How long the motors may take to come to rest at the end \[ns\].
+const REST_WITHIN_NS: u64 = 300_000_000;
+
+/// How long it goes on once they have \[ns\].
+const HEARD_WITHIN_NS: u64 = 50_000_000;
 
 /// The whole program, from its arguments to its exit code.
 pub fn main() -> ExitCode {
@@ -59,7 +64,7 @@ fn run<const N: usize>(
     config.force_sensor = !options.no_sensor;
     let mut plant = PlantConfig::<N>::from_description(description)?;
     if let Some(face_m) = options.block_m {
-        plant.scene = block(face_m);
+        plant.scene = Scene::beneath(face_m);
     }
     let start_ns = if options.virtual_time {
         0
@@ -67,8 +72,8 @@ fn run<const N: usize>(
         monotonic_ns()
     };
     let mut emulator = Emulator::new(config, plant, description.home::<N>()?, start_ns)?;
-    for (press, seconds) in &options.press {
-        emulator.press_at(start_ns + (seconds * 1e9) as u64, *press);
+    for later in &options.press {
+        later.plan(&mut emulator, start_ns);
     }
     let trace = match &options.trace {
         Some(path) => Some(TraceFile::create(path, N)?),
@@ -86,30 +91,24 @@ fn run<const N: usize>(
         description.name(),
         pendant.path().display()
     );
+    for shortfall in enter(&options.realtime()) {
+        eprintln!("supple-emu: warning: {shortfall}");
+    }
     let mut arm = Arm {
         emulator,
         pendant,
         trace,
+        ends_ns: None,
+        at_rest: false,
     };
     match (&address, options.virtual_time) {
         (Address::Folder(_), true) => arm.follow(Responder::open(&folder)?, stop),
-        (Address::Folder(_), false) => arm.keep_pace(DatagramBus::open(&folder, Side::Arm)?, stop),
+        (Address::Folder(_), false) => {
+            let now_ns = arm.emulator.now_ns();
+            arm.pace(Pacer::open(&folder, now_ns)?, stop)
+        }
         (Address::Interface(name), false) => arm.keep_pace(SocketCan::open(name)?, stop),
         (Address::Interface(_), true) => Err(EmulatorError::VirtualInterface),
-    }
-}
-
-fn block(face_m: f64) -> Scene {
-    Scene {
-        fixed_blocks: vec![FixedBlock {
-            name: "block".to_owned(),
-            center_m: [0.0, 0.0, face_m - 0.05],
-            size_m: [BLOCK_M, BLOCK_M, 0.10],
-            rpy_rad: [0.0; 3],
-            material: "wood".to_owned(),
-            layer: None,
-        }],
-        ..Scene::default()
     }
 }
 
@@ -184,20 +183,47 @@ struct Arm<const N: usize> {
     emulator: Emulator<N>,
     pendant: PendantSocket,
     trace: Option<TraceFile>,
+    /// When it ends at the latest, once asked to \[ns\].
+    ends_ns: Option<u64>,
+    /// Its motors were at rest when it was to end.
+    at_rest: bool,
 }
 
 impl<const N: usize> Arm<N> {
     fn look(&mut self) -> Result<(), EmulatorError> {
         self.pendant.answer(&mut self.emulator);
         match &mut self.trace {
-            Some(trace) => trace.note(&self.emulator),
+            Some(trace) => {
+                let arm = &self.emulator;
+                let modes = arm.pucks().iter().map(Puck::mode);
+                let active = modes.filter(|mode| *mode == MotorMode::Torque).count();
+                let torque_nm = arm.motor_torque_nm().into();
+                Ok(trace.note(arm.wall_ns(), active, &torque_nm, arm.truth())?)
+            }
             None => Ok(()),
         }
     }
 
-    /// By the wall clock.
+    /// It is asked to end, and its motors have come to rest or had the time for it: an arm does not go away
+    /// from under those who are lowering it.
+    fn ends(&mut self, stop: &Stop) -> bool {
+        if !stop.asked() {
+            return false;
+        }
+        let now_ns = monotonic_ns();
+        let until_ns = self.ends_ns.get_or_insert(now_ns + REST_WITHIN_NS);
+        let mut pucks = self.emulator.pucks().iter();
+        if pucks.all(|puck| puck.mode() != MotorMode::Torque) && !self.at_rest {
+            // Their host is still to hear of it.
+            self.at_rest = true;
+            *until_ns = (*until_ns).min(now_ns + HEARD_WITHIN_NS);
+        }
+        now_ns > *until_ns
+    }
+
+    /// By the wall clock, on a CAN interface.
     fn keep_pace(&mut self, mut bus: impl ArmsEnd, stop: &Stop) -> Result<(), EmulatorError> {
-        while !stop.asked() {
+        while !self.ends(stop) {
             catch_up(&mut self.emulator, &mut bus)?;
             self.look()?;
             listen(&mut self.emulator, &mut bus)?;
@@ -205,9 +231,19 @@ impl<const N: usize> Arm<N> {
         Ok(())
     }
 
+    /// By the wall clock, on sockets.
+    fn pace(&mut self, mut pacer: Pacer, stop: &Stop) -> Result<(), EmulatorError> {
+        while !self.ends(stop) {
+            pacer.turn(&mut self.emulator)?;
+            self.emulator.set_offset_ns(pacer.offset_ns());
+            self.look()?;
+        }
+        Ok(())
+    }
+
     /// As far as the host says.
     fn follow(&mut self, mut responder: Responder, stop: &Stop) -> Result<(), EmulatorError> {
-        while !stop.asked() {
+        while !self.ends(stop) {
             responder.serve(&mut self.emulator, IDLE_NS)?;
             self.look()?;
         }

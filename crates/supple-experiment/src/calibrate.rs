@@ -7,10 +7,10 @@
 
 use crate::breakaway::{JointBreakaway, breakaway};
 use crate::error::ExperimentError;
-use crate::excite::{excitation, free_of_roles};
+use crate::excite::{excitation, free_of_roles, slow_motion};
 use crate::metrics::Rms;
 use crate::mismatch::Mismatch;
-use crate::record::Recorder;
+use crate::ripple::ripple_on;
 use crate::session::Recording;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -18,12 +18,12 @@ use std::path::PathBuf;
 use supple_core::dynamics::gravity;
 use supple_core::ripple::{Harmonic, compensation_nm};
 use supple_core::{Config, RippleTable, Vector};
-use supple_ident::design::{Design, Designed, design, slow_series};
+use supple_ident::design::{Design, Designed, design};
 use supple_ident::{
     Fit, FrictionChoice, FrictionColumns, Log, Motion, Preparation, Procedure, RippleSearch,
     Validation, fit_ripple, fit_with_dip,
 };
-use supple_model::Description;
+use supple_model::{Description, Replacement};
 use supple_plant::{LuGre, PlantConfig, Ripple};
 
 /// Speeds of the friction curve that is compared \[rad/s\].
@@ -33,7 +33,7 @@ const POSES: usize = 500;
 /// Rounds of ripple and model.
 const ROUNDS: usize = 2;
 /// Cutoff of the filters for the model and for ripple, which is faster \[Hz\].
-const CUTOFF_HZ: (f64, f64) = (8.0, 40.0);
+pub(crate) const CUTOFF_HZ: (f64, f64) = (8.0, 40.0);
 /// Joints slower than this say nothing of inertia and Coulomb friction \[rad/s\].
 const SLOW_RAD_PER_S: f64 = 0.15;
 
@@ -150,6 +150,24 @@ fn ripple<const N: usize>(plant: &PlantConfig<N>, calibration: &Calibration) -> 
     lines
 }
 
+/// The description of a calibration's plant: `description` with the ripple that its motors have.
+///
+/// # Errors
+/// Where the description has not `N` joints.
+pub fn described_plant<const N: usize>(
+    description: &Description,
+    plant: &PlantConfig<N>,
+) -> Result<Description, ExperimentError> {
+    let told = description.config::<N>()?;
+    let table = |motor| table_of(&plant.drive.ripple, motor).unwrap_or(RippleTable::NONE);
+    Ok(description.with_model(&Replacement {
+        arm: &told.arm,
+        friction: &told.friction,
+        ripple: Some(&core::array::from_fn(table)),
+        source: "the simulated plant",
+    })?)
+}
+
 /// Carries it out. `progress` hears what begins.
 ///
 /// # Errors
@@ -166,10 +184,17 @@ pub fn calibrate<const N: usize>(
     let joints: Vec<usize> = (0..N).collect();
 
     let mut gave_way = Vec::new();
+    let free = free_of_roles(&start);
+    let slow = slow_motion(&free, &home, &joints)?;
     if calibration.breakaway {
+        let mut compensated = start;
+        if calibration.ripple_nm > 0.0 {
+            progress("torque ripple, from slow motion");
+            compensated.ripple = ripple_on(&start, &plant, &home)?;
+        }
         progress("breakaway");
         let pose = upright(&start);
-        let found = breakaway(&start, &plant, &pose, &joints, &mut |_| {})?;
+        let found = breakaway(&compensated, &plant, &pose, &joints, &mut |_| {})?;
         let truth = plant.friction.iter().map(|f| f.breakaway_nm);
         gave_way = found.into_iter().zip(truth).collect();
     }
@@ -180,7 +205,6 @@ pub fn calibrate<const N: usize>(
         candidates,
         ..Design::of(&joints)
     };
-    let free = free_of_roles(&start);
     let wanted = search(calibration.seed, calibration.candidates);
     let designed = design(&free, &home, &wanted, &mut |_, _| {})?;
     let other = search(
@@ -189,30 +213,12 @@ pub fn calibrate<const N: usize>(
     );
     let mut other = design(&free, &home, &other, &mut |_, _| {})?.series;
     other.duration_s = 2.0 * other.period_s() + other.ramp_s;
-    let slow = slow_series(&free, &home, &joints, 0.1, 60.0)?;
 
     progress("excitation");
     let series = [designed.series, slow, other];
     let session = excitation("excitation", &free, &plant, &home, &series);
-    let mut recorder = match &calibration.log_dir {
-        Some(folder) => Some(Recorder::named(
-            folder,
-            description,
-            &session.name,
-            &session.config,
-            calibration.seed,
-        )?),
-        None => None,
-    };
-    let recordings = session.perform(&mut |cycle, _| {
-        if let Some(recorder) = &mut recorder {
-            recorder.cycle(cycle)?;
-        }
-        Ok(())
-    })?;
-    if let Some(recorder) = recorder {
-        recorder.finish()?;
-    }
+    let folder = calibration.log_dir.as_deref();
+    let recordings = session.record(folder, description, calibration.seed)?;
     let logs: Vec<Log> = recordings.iter().map(log_of).collect();
 
     progress("identification");
@@ -366,7 +372,7 @@ pub fn truthfulness<const N: usize>(
 }
 
 /// The harmonics of a plant's motor as the controller's table has them.
-pub fn table_of(ripple: &[Ripple], motor: usize) -> Option<RippleTable> {
+fn table_of(ripple: &[Ripple], motor: usize) -> Option<RippleTable> {
     let lines: Vec<Harmonic> = ripple
         .iter()
         .filter(|line| line.motor == motor)

@@ -4,12 +4,16 @@ use crate::session::{Session, Step};
 use supple_core::controller::Request;
 use supple_core::trajectory::Fourier;
 use supple_core::{Config, Vector};
+use supple_ident::IdentError;
+use supple_ident::design::slow_series;
 use supple_plant::PlantConfig;
 
 /// Gravity hold before the first move \[s\].
 const SETTLE_S: f64 = 0.1;
 /// Rest before a series \[s\].
 const REST_S: f64 = 0.4;
+/// Greatest joint speed \[rad/s\] and period \[s\] of slow motion.
+const SLOW: (f64, f64) = (0.1, 60.0);
 /// Mean joint speed of the moves between series \[rad/s\].
 const MOVE_RAD_PER_S: f64 = 0.4;
 
@@ -39,6 +43,19 @@ pub fn excitation<const N: usize>(
         start_rad: *home_rad,
         steps,
     }
+}
+
+/// A minute of every one of `joints` up to 0.1 rad/s: what dry friction and torque ripple do is seen there.
+///
+/// # Errors
+/// Options out of range.
+pub fn slow_motion<const N: usize>(
+    config: &Config<N>,
+    home_rad: &Vector<N>,
+    joints: &[usize],
+) -> Result<Fourier<N>, IdentError> {
+    let (speed_rad_per_s, period_s) = SLOW;
+    slow_series(config, home_rad, joints, speed_rad_per_s, period_s)
 }
 
 /// A move and a rest.

@@ -2,10 +2,13 @@
 //! needs of the arm.
 
 use crate::error::ExperimentError;
+use crate::record::Recorder;
 use crate::rig::{Cycle, Rig};
 use nalgebra::DMatrix;
+use std::path::Path;
 use supple_core::controller::{Mode, Request};
 use supple_core::{Config, Controller, Vector};
+use supple_model::Description;
 use supple_plant::PlantConfig;
 
 /// One request and how long it is left to work.
@@ -67,6 +70,26 @@ impl<const N: usize> Session<N> {
     /// Simulated time at most \[s\].
     pub fn duration_s(&self) -> f64 {
         self.steps.iter().map(|step| step.duration_s).sum()
+    }
+
+    /// Carries it out, with its log as `<folder>/<name>.mcap` where a folder is given; `description` is
+    /// what the log says of the arm.
+    ///
+    /// # Errors
+    /// As [`Session::perform`]; where the log cannot be written.
+    pub fn record(
+        &self,
+        folder: Option<&Path>,
+        description: &Description,
+        seed: u64,
+    ) -> Result<Vec<Recording>, ExperimentError> {
+        let Some(folder) = folder else {
+            return self.perform(&mut |_, _| Ok(()));
+        };
+        let mut recorder = Recorder::named(folder, description, &self.name, &self.config, seed)?;
+        let recordings = self.perform(&mut |cycle, _| Ok(recorder.cycle(cycle)?))?;
+        recorder.finish()?;
+        Ok(recordings)
     }
 
     /// Carries it out; one recording for each recorded step.

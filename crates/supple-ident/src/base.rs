@@ -10,6 +10,9 @@ use nalgebra::{DMatrix, DVector};
 
 /// Diagonal entries below this share of the first are rounding.
 pub const RANK_TOLERANCE: f64 = 1e-8;
+/// Remainders as long as the longest but for this share of it are as long: the first column of them is
+/// taken. All columns start out equally long, so that rounding would choose otherwise.
+const TIE: f64 = 1e-6;
 
 /// Base parameters of a regressor.
 #[derive(Clone, Debug, PartialEq)]
@@ -154,28 +157,32 @@ fn term(coefficient: f64, name: &str) -> String {
     }
 }
 
-/// Columns that pivoting takes before the rest are negligible. Each step takes the longest remainder
-/// and removes its direction, twice, from the others.
+/// Columns that pivoting takes before the rest are negligible. Each step takes the longest remainder, the
+/// first of those that tie, and removes its direction, twice, from the others.
 fn pivot_order(columns: &DMatrix<f64>, tolerance: f64) -> Vec<usize> {
     let mut rest = columns.clone();
     let mut order: Vec<usize> = Vec::new();
     let mut first = 0.0;
     while order.len() < columns.ncols().min(columns.nrows()) {
-        let length = |j: usize| rest.column(j).norm();
-        let Some(pivot) = (0..rest.ncols())
+        let lengths: Vec<(usize, f64)> = (0..rest.ncols())
             .filter(|j| !order.contains(j))
-            .max_by(|a, b| length(*a).total_cmp(&length(*b)).then(b.cmp(a)))
-        else {
-            break;
-        };
-        let longest = length(pivot);
+            .map(|j| (j, rest.column(j).norm()))
+            .collect();
+        let longest = lengths
+            .iter()
+            .map(|(_, length)| *length)
+            .fold(0.0, f64::max);
         if order.is_empty() {
             first = longest;
         }
+        let ties = |(_, length): &&(usize, f64)| *length >= (1.0 - TIE) * longest;
+        let Some(&(pivot, length)) = lengths.iter().find(ties) else {
+            break;
+        };
         if longest <= tolerance * first {
             break;
         }
-        let direction = rest.column(pivot) / longest;
+        let direction = rest.column(pivot) / length;
         for _ in 0..2 {
             let shares = rest.tr_mul(&direction);
             rest.ger(-1.0, &direction, &shares, 1.0);
@@ -183,4 +190,40 @@ fn pivot_order(columns: &DMatrix<f64>, tolerance: f64) -> Vec<usize> {
         order.push(pivot);
     }
     order
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Base, RANK_TOLERANCE};
+    use crate::random::Random;
+    use nalgebra::DMatrix;
+
+    /// Eight columns of rank five, three of them combinations of others.
+    fn dependent(random: &mut Random) -> DMatrix<f64> {
+        let free = DMatrix::from_fn(60, 5, |_, _| random.normal());
+        let mix = DMatrix::from_fn(5, 8, |i, j| match (i, j) {
+            (i, j) if j < 5 => f64::from(u8::from(i == j)),
+            (0, 5) => -2.0,
+            (1 | 2, 6) | (3, 7) => 1.0,
+            _ => 0.0,
+        });
+        free * mix
+    }
+
+    #[test]
+    fn rounding_does_not_choose_the_columns() {
+        let mut random = Random::new(4);
+        let a = dependent(&mut random);
+        let chosen = Base::of(&a, RANK_TOLERANCE).unwrap();
+        assert_eq!(chosen.rank(), 5);
+        assert!(chosen.independent.contains(&0), "the first of equals");
+        for _ in 0..50 {
+            // The same columns in other coordinates: only rounding differs.
+            let turn = DMatrix::from_fn(60, 60, |_, _| random.normal()).qr().q();
+            let turned = turn * &a * (0.1 + random.uniform());
+            let again = Base::of(&turned, RANK_TOLERANCE).unwrap();
+            assert_eq!(again.independent, chosen.independent);
+            assert!((again.combination - &chosen.combination).amax() < 1e-9);
+        }
+    }
 }

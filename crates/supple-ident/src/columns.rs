@@ -2,12 +2,14 @@
 //!
 //! ```text
 //! tau_j = sum_k Y_jk p_k + I_rj qdd_j + V_j qd_j + S_j p(qd_j/delta) + o_j + A_j |qd_j|
-//!         + B_j exp(-(qd_j/v_s)^2) p(qd_j/delta)        and for a gear coupling (a, b), on joint a,
+//!         + B_j exp(-(qd_j/v_s)^2) p(qd_j/delta) + L_j |g_j| p(qd_j/delta)
+//!                                                      and for a gear coupling (a, b), on joint a,
 //!         + I_c (qdd_a + qdd_b) + V_c (qd_a + qd_b) + S_c p((qd_a + qd_b)/delta)
 //! ```
 //!
-//! `p` is the parabola of [`supple_core::friction`]. The rotor of a coupled motor turns with both
-//! joints: its torque acts on both.
+//! `p` is the parabola of [`supple_core::friction`]. `g_j` is the torque that the gear of joint j passes on
+//! to the links, by the model that the fit starts from: gears rub harder under load. The rotor of a coupled
+//! motor turns with both joints: its torque acts on both.
 
 use crate::error::{IdentError, positive, shape_error};
 use supple_core::Friction;
@@ -28,6 +30,8 @@ pub struct FrictionColumns {
     pub offset: bool,
     /// `A`: viscous friction that differs by direction, `|A| <= V`.
     pub asymmetry: bool,
+    /// `L`: Coulomb friction that grows with the torque passed on to the links.
+    pub load: bool,
     /// `B`, with its `v_s` \[rad/s\].
     pub stribeck_rad_per_s: Option<f64>,
     /// `delta` of the parabola \[rad/s\].
@@ -41,6 +45,7 @@ impl FrictionColumns {
         coulomb: false,
         offset: false,
         asymmetry: false,
+        load: false,
         stribeck_rad_per_s: None,
         band_rad_per_s: Friction::NONE.band_rad_per_s,
     };
@@ -79,6 +84,8 @@ pub enum Column {
     Asymmetry(usize),
     /// `B` of a joint.
     Stribeck(usize),
+    /// `L` of a joint.
+    Load(usize),
     /// Rotor inertia of a motor that turns with the sum of two joints.
     CoupledRotor(usize, usize),
     /// Its viscous friction.
@@ -92,7 +99,7 @@ impl Column {
     pub fn jumps(&self) -> bool {
         matches!(
             self,
-            Column::Coulomb(_) | Column::Stribeck(_) | Column::CoupledCoulomb(..)
+            Column::Coulomb(_) | Column::Stribeck(_) | Column::Load(_) | Column::CoupledCoulomb(..)
         )
     }
 }
@@ -124,12 +131,23 @@ impl Columns {
         if let Some(speed) = friction.stribeck_rad_per_s {
             positive("stribeck_rad_per_s", speed)?;
         }
-        if friction.asymmetry && !friction.viscous {
-            return Err(shape_error(
-                "friction",
-                "viscous columns beside those of its asymmetry",
+        for (part, whole, without, expected) in [
+            (
+                friction.asymmetry,
+                friction.viscous,
                 "asymmetry alone",
-            ));
+                "viscous columns beside those of its asymmetry",
+            ),
+            (
+                friction.load,
+                friction.coulomb,
+                "load alone",
+                "Coulomb columns beside those of its load",
+            ),
+        ] {
+            if part && !whole {
+                return Err(shape_error("friction", expected, without));
+            }
         }
         let mut columns = Vec::new();
         for link in 0..dof {
@@ -146,6 +164,7 @@ impl Columns {
                     friction.stribeck_rad_per_s.is_some(),
                     Column::Stribeck(joint),
                 ),
+                (friction.load, Column::Load(joint)),
             ];
             columns.extend(
                 wanted
@@ -218,6 +237,7 @@ impl Columns {
             Column::Offset(j) => format!("offset{j}"),
             Column::Asymmetry(j) => format!("A{j}"),
             Column::Stribeck(j) => format!("B{j}"),
+            Column::Load(j) => format!("L{j}"),
             Column::CoupledRotor(a, b) => format!("Ir{a}+{b}"),
             Column::CoupledViscous(a, b) => format!("V{a}+{b}"),
             Column::CoupledCoulomb(a, b) => format!("S{a}+{b}"),

@@ -95,6 +95,9 @@ pub struct Fit<const N: usize> {
     pub choices: Vec<Choice>,
     /// What was let pass.
     pub warnings: Vec<Warning>,
+    /// Load of each moving joint \[N m\] at which friction that depends on it is, over the fitted samples,
+    /// nearest to friction that does not; zero without such columns.
+    pub load_nm: Vec<f64>,
     /// Standard deviation of weighted residuals, for what the filter leaves independent.
     spread: f64,
     nominal: Arm<N>,
@@ -197,6 +200,7 @@ pub fn fit_rows<const N: usize>(
         base: base.renumbered(&used),
         base_std,
         noise_nm: noise_nm(&blocks, &solution),
+        load_nm: loads(&columns, parts),
         columns,
         x,
         gap,
@@ -304,6 +308,24 @@ impl Stage<'_> {
     }
 }
 
+/// The multiple of its Coulomb column that is nearest to each moving joint's load column.
+fn loads(columns: &Columns, parts: &[Vec<JointRows>]) -> Vec<f64> {
+    let of_joint = |(row, &joint): (usize, &usize)| {
+        let places = [Column::Load(joint), Column::Coulomb(joint)].map(|c| columns.position(c));
+        let [Some(load), Some(dry)] = places else {
+            return 0.0;
+        };
+        let (mut product, mut square) = (0.0, 0.0);
+        for part in parts {
+            let dry = part[row].a.column(dry);
+            product += dry.dot(&part[row].a.column(load));
+            square += dry.norm_squared();
+        }
+        product / square.max(f64::MIN_POSITIVE)
+    };
+    columns.moving().iter().enumerate().map(of_joint).collect()
+}
+
 /// The same noise for all joints, so that the prior weighs against residuals of about one.
 fn equal_noise(blocks: &[Block], x: &DVector<f64>) -> Vec<f64> {
     let squares: f64 = noise_nm(blocks, x).iter().map(|n| n * n).sum();
@@ -350,9 +372,10 @@ impl<const N: usize> Fit<N> {
         model::arm(&self.nominal, &self.columns, &self.x)
     }
 
-    /// Friction of every joint of the arm, in the controller's law.
+    /// Friction of every joint of the arm, in the controller's law; where it depends on load, at
+    /// [`Fit::load_nm`].
     pub fn friction(&self) -> Vec<Friction> {
-        model::friction(&self.columns, &self.x)
+        model::friction(&self.columns, &self.x, &self.load_nm)
     }
 
     /// The arm that fixes the kinematics and the prior.
@@ -410,7 +433,7 @@ impl<const N: usize> Fit<N> {
             for (i, position) in self.base.independent.iter().enumerate() {
                 x[*position] += change[i];
             }
-            let friction = model::friction(&self.columns, &x);
+            let friction = model::friction(&self.columns, &x, &self.load_nm);
             match model::arm(&self.nominal, &self.columns, &x) {
                 Ok(arm) if friction.iter().all(|f| f.validate().is_ok()) => {
                     return Ok((arm, friction));

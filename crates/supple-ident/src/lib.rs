@@ -39,6 +39,7 @@ pub mod regressor;
 pub mod ripple;
 mod save;
 pub mod select;
+mod series;
 pub mod validate;
 
 pub use base::Base;
@@ -54,4 +55,5 @@ pub use procedure::{Choice, FrictionChoice, Method, Procedure, identify, identif
 pub use read::{ReadError, read_csv, read_logs, read_mcap};
 pub use ripple::{RippleSearch, fit_ripple};
 pub use save::SaveError;
+pub use series::SeriesLists;
 pub use validate::Validation;

@@ -52,11 +52,16 @@ pub fn arm<const N: usize>(
 }
 
 /// Friction of each joint of the arm, in the law of the controller; what that law has no word for
-/// (asymmetry, couplings) stays in the columns. Joints that were held have none.
-pub fn friction(columns: &Columns, x: &DVector<f64>) -> Vec<Friction> {
+/// (asymmetry, couplings) stays in the columns, and what depends on load is taken at `load_nm` of each
+/// moving joint. Joints that were held have none.
+pub fn friction(columns: &Columns, x: &DVector<f64>, load_nm: &[f64]) -> Vec<Friction> {
     let value = |column: Column| columns.position(column).map_or(0.0, |i| x[i]);
+    let load = |j: usize| {
+        let row = columns.moving().binary_search(&j);
+        row.map_or(0.0, |row| load_nm[row] * value(Column::Load(j)))
+    };
     let of_joint = |j: usize| {
-        let coulomb_nm = value(Column::Coulomb(j));
+        let coulomb_nm = value(Column::Coulomb(j)) + load(j);
         let shape = columns.friction();
         Friction {
             viscous_nm_s_per_rad: value(Column::Viscous(j)),

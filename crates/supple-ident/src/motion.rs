@@ -2,11 +2,16 @@
 //!
 //! Linear interpolation onto a regular grid, one zero-phase filter for angle, velocity and torque
 //! alike so that none lags or is damped more than another, central differences, then every n-th sample.
+//! What the filter makes up at the ends of a log, where it knows no motion beyond, is cut off.
 
-use crate::error::{IdentError, Warning, positive};
+use crate::error::{IdentError, Warning, positive, shape_error};
 use crate::filter::{LowPass, differentiate};
 use crate::log::Log;
 use nalgebra::DMatrix;
+
+/// Length of the filter's transient at an end, in periods of its cutoff: its slowest pole pair has died
+/// out to 1 %.
+const TRANSIENT_PERIODS: f64 = 2.0;
 
 /// How a log is prepared.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,6 +36,29 @@ impl Default for Preparation {
             keep_every: 1,
             torque_delay_s: 0.0,
         }
+    }
+}
+
+impl Preparation {
+    /// Rows of a grid of `samples` at `rate_hz` that are kept: every so many, without the ends that the
+    /// filter has no neighbours for.
+    ///
+    /// # Errors
+    /// [`IdentError::Shape`] if the ends are all there is.
+    pub fn kept(&self, rate_hz: f64, samples: usize) -> Result<Vec<usize>, IdentError> {
+        let ends = |cutoff_hz: f64| (TRANSIENT_PERIODS * rate_hz / cutoff_hz).ceil() as usize;
+        let end = self.cutoff_hz.map_or(0, ends);
+        if samples < 2 * end + 3 * self.keep_every {
+            return Err(shape_error(
+                "log",
+                format!(
+                    "more than {:.3} s: the filter's transient at both ends is cut off",
+                    (2 * end + 3 * self.keep_every) as f64 / rate_hz
+                ),
+                format!("{:.3} s", samples as f64 / rate_hz),
+            ));
+        }
+        Ok((end..samples - end).step_by(self.keep_every).collect())
     }
 }
 
@@ -101,7 +129,7 @@ impl Motion {
         let qdd = differentiate(&qd, rate_hz)?;
         let tau = smooth(&log.tau_nm, delay_s)?;
         let every = preparation.keep_every;
-        let rows: Vec<usize> = (0..q.nrows()).step_by(every).collect();
+        let rows = preparation.kept(rate_hz, q.nrows())?;
         let kept_hz = rate_hz / every as f64;
         let share = preparation.cutoff_hz.map_or(1.0, |hz| 2.0 * hz / kept_hz);
         let motion = Motion {

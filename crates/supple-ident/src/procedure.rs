@@ -9,7 +9,8 @@ use crate::fit::{Fit, Options, Weights, fit};
 use crate::log::{Log, check_moving};
 use crate::motion::{Motion, Preparation};
 use crate::select::{
-    Table, band_candidates, compare, friction_candidates, prior_candidates, weights_candidates,
+    Table, band_candidates, compare, friction_candidates, load_candidates, prior_candidates,
+    weights_candidates,
 };
 use supple_core::{Arm, Friction};
 
@@ -89,7 +90,7 @@ impl Default for Procedure {
 /// What was chosen, and the table of held-out errors that decided it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice {
-    /// `friction`, `band`, `prior` or `weights`.
+    /// `friction`, `load`, `band`, `prior` or `weights`.
     pub of: &'static str,
     /// The candidates.
     pub table: Table,
@@ -189,16 +190,18 @@ impl Procedure {
         let prior = consistent && self.prior_weight.is_none();
         let weights = consistent && auto && self.joint_noise_nm.is_none();
         type Candidates = fn(&Options) -> Vec<crate::select::Candidate>;
-        let steps: [(&'static str, bool, Candidates); 4] = [
+        let steps: [(&'static str, bool, Candidates); 5] = [
             ("friction", auto, friction_candidates),
+            ("load", auto, load_candidates),
             ("band", auto, band_candidates),
             ("prior", prior, prior_candidates),
             ("weights", weights, weights_candidates),
         ];
         let mut choices = Vec::new();
         for (of, wanted, candidates) in steps {
-            if wanted {
-                let table = compare(nominal, motions, moving, &candidates(&options), PARTS)?;
+            let candidates = candidates(&options);
+            if wanted && !candidates.is_empty() {
+                let table = compare(nominal, motions, moving, &candidates, PARTS)?;
                 options = table.options().clone();
                 choices.push(Choice { of, table });
             }

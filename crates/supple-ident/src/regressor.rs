@@ -7,7 +7,7 @@ use crate::filter::LowPass;
 use crate::motion::Motion;
 use nalgebra::{DMatrix, DVector};
 use std::sync::OnceLock;
-use supple_core::dynamics::regressor;
+use supple_core::dynamics::{parameters, regressor};
 use supple_core::math::exp;
 use supple_core::{Arm, Friction, Vector};
 
@@ -81,6 +81,10 @@ pub fn rows<const N: usize>(
     let (qd, qdd) = (held(qd), held(qdd));
     let blocks = regressor(arm, q, &qd, &qdd);
     let friction = columns.friction();
+    let load = friction.load.then(|| {
+        let links = blocks.iter().zip(parameters(arm));
+        links.fold(Vector::<N>::zeros(), |sum, (block, p)| sum + block * p)
+    });
     let dry = Friction {
         band_rad_per_s: friction.band_rad_per_s,
         ..Friction::coulomb(0.0, 1.0)
@@ -107,6 +111,10 @@ pub fn rows<const N: usize>(
             Column::Stribeck(j) => {
                 let s = qd[j] / friction.stribeck_rad_per_s.unwrap_or(f64::INFINITY);
                 put(j, exp(-s * s) * dry.dry_torque_nm(qd[j]));
+            }
+            Column::Load(j) => {
+                let load_nm = load.map_or(0.0, |load| load[j].abs());
+                put(j, load_nm * dry.dry_torque_nm(qd[j]));
             }
             Column::CoupledRotor(a, b) => [a, b].iter().for_each(|j| put(*j, qdd[a] + qdd[b])),
             Column::CoupledViscous(a, b) => [a, b].iter().for_each(|j| put(*j, qd[a] + qd[b])),

@@ -88,7 +88,7 @@ pub fn friction_candidates(base: &Options) -> Vec<Candidate> {
             asymmetric,
         ),
     ];
-    for speed in [0.05, 0.2, 0.5, 1.0, 2.0] {
+    for speed in [0.05, 0.2, 0.5, 1.0, 1.5, 2.0] {
         let shape = FrictionColumns {
             stribeck_rad_per_s: Some(speed),
             ..FrictionColumns::COULOMB
@@ -105,6 +105,26 @@ pub fn friction_candidates(base: &Options) -> Vec<Candidate> {
     shapes.into_iter().map(candidate).collect()
 }
 
+/// Coulomb friction that does not depend on load, and that does; none where there is no such friction.
+pub fn load_candidates(base: &Options) -> Vec<Candidate> {
+    if !base.friction.coulomb {
+        return Vec::new();
+    }
+    let candidate = |(name, load): (&str, bool)| Candidate {
+        name: name.to_owned(),
+        options: Options {
+            friction: FrictionColumns {
+                load,
+                ..base.friction
+            },
+            ..base.clone()
+        },
+    };
+    [("at any load the same", false), ("growing with load", true)]
+        .map(candidate)
+        .to_vec()
+}
+
 /// Widths of the band around rest, everything else as in `base`.
 pub fn band_candidates(base: &Options) -> Vec<Candidate> {
     let candidate = |band_rad_per_s: f64| Candidate {
@@ -117,7 +137,9 @@ pub fn band_candidates(base: &Options) -> Vec<Candidate> {
             ..base.clone()
         },
     };
-    [0.005, 0.01, 0.015, 0.02, 0.03].map(candidate).to_vec()
+    [0.005, 0.01, 0.015, 0.02, 0.03, 0.05]
+        .map(candidate)
+        .to_vec()
 }
 
 /// Ways to weigh joints and samples, everything else as in `base`.

@@ -137,6 +137,33 @@ fn a_regular_log_keeps_its_samples() {
     assert!((motion.q - log(601).q_rad).amax() < 1e-12);
 }
 
+/// A log that starts and ends in full motion: no made-up acceleration is left at its ends.
+#[test]
+fn the_filters_transient_is_cut_off() {
+    let preparation = Preparation {
+        keep_every: 2,
+        ..Preparation::default()
+    };
+    let samples = 601;
+    let (motion, _) = Motion::prepare(&log(samples), 2, &[0, 1], &preparation).unwrap();
+    let first = (samples - 2 * motion.samples()).div_ceil(2);
+    assert!(
+        (10..40).contains(&first),
+        "{first} samples cut off at each end"
+    );
+    for i in 0..motion.samples() {
+        let t = (first + 2 * i) as f64 / 100.0;
+        for j in 0..2 {
+            let w = 1.0 + j as f64;
+            let exact = -w * w * (w * t).sin();
+            let error = motion.qdd[(i, j)] - exact;
+            assert!(error.abs() < 0.03 * w * w, "sample {i}, joint {j}: {error}");
+        }
+    }
+    let error = Motion::prepare(&log(50), 2, &[0, 1], &preparation).unwrap_err();
+    assert!(error.to_string().contains("transient"), "{error}");
+}
+
 #[test]
 fn bad_logs_are_refused_by_column_with_a_remedy() {
     let refused = |change: fn(&mut Log), column: &str| {

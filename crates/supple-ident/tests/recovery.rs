@@ -5,7 +5,7 @@ mod support;
 use proptest::prelude::*;
 use supple_core::dynamics::{parameters, rnea};
 use supple_core::{Arm, Friction, Vector};
-use supple_ident::{FrictionColumns, Options, Weights, fit};
+use supple_ident::{Columns, DMatrix, FrictionColumns, Options, Weights, fit};
 use support::{Noise, motion, random_arm};
 
 fn friction<const N: usize>() -> [Friction; N] {
@@ -78,9 +78,11 @@ proptest! {
     fn consistent_fits_are_arms_whatever_the_noise(seed in 1_u64..1000) {
         let truth = random_arm::<4>(seed);
         let joints = [0, 1, 2, 3];
-        let mut data = motion(&truth, &friction(), &joints, 300, seed);
+        let (samples, amplitude_nm) = (300, 5.0);
+        let exact = motion(&truth, &friction(), &joints, samples, seed);
+        let mut data = exact.clone();
         let mut noise = Noise(seed);
-        data.tau.iter_mut().for_each(|t| *t += 5.0 * noise.draw());
+        data.tau.iter_mut().for_each(|t| *t += amplitude_nm * noise.draw());
         // Some of these arms hardly move: no sample may be left out.
         let options = Options { slow_rad_per_s: 0.0, ..Options::default() };
         let fit = fit(&truth, &[data], &joints, &options).unwrap();
@@ -88,8 +90,13 @@ proptest! {
         prop_assert!(fit.friction().iter().all(|f| f.validate().is_ok()));
         let checked = fit.validate_motion(&motion(&truth, &friction(), &joints, 200, seed + 3)).unwrap();
         prop_assert_eq!(checked.positive_definite, 1.0);
-        // Far below the noise it was found in.
-        prop_assert!(checked.rms_nm.iter().all(|rms| *rms < 5.0), "{:?}", checked.rms_nm);
+        // Of noise of `sigma`, least squares leave `sigma sqrt(p / n)` in the torques of the motion itself:
+        // its square is that of p independent draws. Half as much again is out of their reach.
+        let sigma_nm = amplitude_nm / 3.0_f64.sqrt();
+        let expected_nm = sigma_nm * (fit.rank() as f64 / samples as f64).sqrt();
+        let itself = fit.validate_motion(&exact).unwrap();
+        let found_nm = itself.rms_nm.iter().map(|rms| rms * rms).sum::<f64>().sqrt();
+        prop_assert!(found_nm < 1.5 * expected_nm, "{found_nm} N m, {expected_nm} N m expected");
     }
 }
 
@@ -194,6 +201,61 @@ fn a_motor_that_turns_with_two_joints_is_told_apart() {
     let value = |name: &str| fit.x[names.iter().position(|n| n == name).unwrap()];
     assert!((value("V1+2") - 0.7).abs() < 1e-3, "{}", value("V1+2"));
     assert!((value("S1+2") - 0.4).abs() < 1e-3, "{}", value("S1+2"));
+}
+
+/// Each joint's friction grows by a twentieth of what its gear passes on to the links.
+#[test]
+fn friction_that_grows_with_load_is_told_apart() {
+    let truth = random_arm::<3>(43);
+    let weightless_rotors = Arm::from_links(
+        *truth.links(),
+        Vector::zeros(),
+        truth.joint_from_tip(),
+        truth.gravity(),
+    )
+    .unwrap();
+    let dry = Friction::coulomb(0.0, 1.0);
+    let loaded = |seed| {
+        let mut data = motion(&truth, &friction(), &[0, 1, 2], 1500, seed);
+        for i in 0..data.samples() {
+            let at = |m: &DMatrix<f64>| Vector::<3>::from_fn(|j, _| m[(i, j)]);
+            let (q, qd, qdd) = (at(&data.q), at(&data.qd), at(&data.qdd));
+            let passed_on = rnea(&weightless_rotors, &q, &qd, &qdd);
+            for j in 0..3 {
+                data.tau[(i, j)] += 0.05 * passed_on[j].abs() * dry.dry_torque_nm(qd[j]);
+            }
+        }
+        data
+    };
+    let options = Options {
+        friction: FrictionColumns {
+            load: true,
+            ..FrictionColumns::OFFSET
+        },
+        consistent: Some(1e-6),
+        ..Options::default()
+    };
+    let fit = fit(&truth, &[loaded(9)], &[0, 1, 2], &options).unwrap();
+    let names = fit.columns.names();
+    for j in 0..3 {
+        let value = fit.x[names.iter().position(|n| *n == format!("L{j}")).unwrap()];
+        assert!((value - 0.05).abs() < 1e-4, "{value}");
+        // The controller, which knows no load, gets what the joint needed on average.
+        let coulomb_nm = fit.friction()[j].coulomb_nm - friction::<3>()[j].coulomb_nm;
+        let mean_nm = 0.05 * fit.load_nm[j];
+        assert!(
+            (coulomb_nm - mean_nm).abs() < 1e-3,
+            "{coulomb_nm} {mean_nm}"
+        );
+        assert!(fit.load_nm[j] > 0.0);
+    }
+    assert!(fit.validate_motion(&loaded(10)).unwrap().total_relative < 1e-4);
+    let alone = FrictionColumns {
+        coulomb: false,
+        ..options.friction
+    };
+    let error = Columns::new(3, &[0], true, alone, &[]).unwrap_err();
+    assert!(error.to_string().contains("load alone"), "{error}");
 }
 
 #[test]

@@ -2,9 +2,10 @@
 
 mod support;
 
-use supple_core::Friction;
-use supple_ident::select::{compare, friction_candidates, prior_candidates};
-use supple_ident::{Motion, Options};
+use supple_core::dynamics::gravity;
+use supple_core::{Friction, Vector};
+use supple_ident::select::{compare, friction_candidates, load_candidates, prior_candidates};
+use supple_ident::{DMatrix, FrictionColumns, Motion, Options};
 use support::{Noise, motion, random_arm};
 
 const JOINTS: [usize; 3] = [0, 1, 2];
@@ -50,6 +51,38 @@ fn the_friction_that_was_there_is_chosen() {
             "\n{table}"
         );
     }
+}
+
+#[test]
+fn friction_that_does_not_grow_with_load_is_not_said_to() {
+    let model = random_arm::<3>(61);
+    let options = Options {
+        friction: FrictionColumns::COULOMB,
+        ..base()
+    };
+    let choose = |data: Motion| {
+        let table = compare(&model, &[data], &JOINTS, &load_candidates(&options), 4).unwrap();
+        table.options().friction.load
+    };
+    let steady = noisy(Friction::coulomb(0.6, 1.0));
+    let mut loaded = steady.clone();
+    let dry = Friction::coulomb(0.0, 1.0);
+    for i in 0..loaded.samples() {
+        let at = |m: &DMatrix<f64>| Vector::<3>::from_fn(|j, _| m[(i, j)]);
+        let passed_on = gravity(&model, &at(&loaded.q));
+        for j in JOINTS {
+            loaded.tau[(i, j)] += 0.1 * passed_on[j].abs() * dry.dry_torque_nm(loaded.qd[(i, j)]);
+        }
+    }
+    assert!(!choose(steady));
+    assert!(choose(loaded));
+    assert!(
+        load_candidates(&Options {
+            friction: FrictionColumns::NONE,
+            ..base()
+        })
+        .is_empty()
+    );
 }
 
 #[test]

@@ -2,12 +2,11 @@
 //! the second. See `data/tx40/README.md`.
 
 use std::f64::consts::FRAC_PI_2;
-use supple_ident::{DMatrix, Log, Motion, Preparation, Procedure, identify_motions};
+use supple_ident::{DMatrix, Log, Preparation, Procedure, identify};
 use supple_model::Description;
 
 const GEAR: [f64; 6] = [32.0, 32.0, 45.0, -48.0, 45.0, 32.0];
 const RATE_HZ: f64 = 5000.0;
-const JOINTS: [usize; 6] = [0, 1, 2, 3, 4, 5];
 
 fn table(text: &str) -> Vec<[f64; 6]> {
     let row = |line: &str| {
@@ -37,6 +36,16 @@ fn log() -> Log {
     }
 }
 
+fn part(log: &Log, rows: std::ops::Range<usize>) -> Log {
+    let cut = |m: &DMatrix<f64>| m.rows_range(rows.clone()).into_owned();
+    Log {
+        t_s: log.t_s[rows.clone()].to_vec(),
+        q_rad: cut(&log.q_rad),
+        qd_rad_per_s: None,
+        tau_nm: cut(&log.tau_nm),
+    }
+}
+
 fn description() -> Description {
     let urdf = include_str!("data/tx40/tx40.urdf");
     let none = r#"ixx="0.000" ixy="0.000" ixz="0.000" iyy="0.000" iyz="0.000" izz="0.000""#;
@@ -62,14 +71,15 @@ fn the_second_half_is_predicted_from_the_first() {
         },
         ..Procedure::default()
     };
-    let (motion, _) = Motion::prepare(&log(), 6, &JOINTS, &procedure.preparation).unwrap();
-    let half = motion.samples() / 2;
-    let (first, second) = (motion.part(0..half), motion.part(half..motion.samples()));
-    let fit = identify_motions(&arm, &[first], &JOINTS, &procedure).unwrap();
+    let whole = log();
+    let half = whole.t_s.len() / 2;
+    let first = part(&whole, 0..half);
+    let second = part(&whole, half..whole.t_s.len());
+    let fit = identify(&arm, &[first], &procedure).unwrap();
     for choice in &fit.choices {
         println!("{}\n{}", choice.of, choice.table);
     }
-    let checked = fit.validate_motion(&second).unwrap();
+    let checked = fit.validate(&second).unwrap();
     println!("{} {:.2?}", checked.verdict(), checked.relative);
     fit.arm().expect("every link is a body");
     assert_eq!(checked.positive_definite, 1.0);

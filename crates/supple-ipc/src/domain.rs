@@ -5,6 +5,7 @@
 //! user alone. Nothing is ever sent over a network.
 
 use crate::error::IpcError;
+use crate::last_out;
 use iceoryx2::prelude::*;
 use rustix::fs::Mode;
 use std::fs::{self, DirBuilder, Metadata};
@@ -94,8 +95,17 @@ impl Domain {
         &self.folder
     }
 
+    pub(crate) fn config(&self) -> &Config {
+        &self.config
+    }
+
     /// A node in this system. What processes that died have left is cleared away.
     pub(crate) fn node(&self) -> Result<Node, IpcError> {
+        let _joining = last_out::joining(self).map_err(|error| IpcError::Folder {
+            folder: self.folder.clone(),
+            cause: error.to_string(),
+            remedy: "set XDG_RUNTIME_DIR to a folder that can be written",
+        })?;
         // Its own words are about its own terms: the errors here say what they mean to this system.
         set_log_level(LogLevel::Fatal);
         NodeBuilder::new()

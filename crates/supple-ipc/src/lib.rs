@@ -34,6 +34,7 @@
 
 mod domain;
 mod error;
+mod last_out;
 mod link;
 pub mod message;
 mod outside;

@@ -5,6 +5,7 @@
 
 use crate::domain::Domain;
 use crate::error::IpcError;
+use crate::last_out::LastOut;
 use crate::message::{ArmState, TorqueCommand};
 use crate::port::{Bell, Full, Reader, Rope, Terms, Writer};
 use core::time::Duration;
@@ -35,6 +36,7 @@ pub struct PlantLink {
     commands: Reader<TorqueCommand>,
     rope: Rope,
     bell: Bell,
+    _last_out: LastOut,
 }
 
 /// What a plant heard while it waited for the answer of a cycle.
@@ -58,6 +60,7 @@ impl PlantLink {
             commands: Reader::new(domain, &node, &COMMANDS)?,
             rope: Rope::new(domain, &node, STATE_BELL)?,
             bell: Bell::new(&node, COMMAND_BELL)?,
+            _last_out: LastOut::of(domain),
         })
     }
 
@@ -101,6 +104,7 @@ pub struct ControllerLink {
     commands: Writer<TorqueCommand>,
     rope: Rope,
     bell: Bell,
+    _last_out: LastOut,
 }
 
 impl ControllerLink {
@@ -115,6 +119,7 @@ impl ControllerLink {
             states: Reader::new(domain, &node, &STATES)?,
             rope: Rope::new(domain, &node, COMMAND_BELL)?,
             bell: Bell::new(&node, STATE_BELL)?,
+            _last_out: LastOut::of(domain),
         })
     }
 

@@ -7,6 +7,7 @@
 
 use crate::domain::Domain;
 use crate::error::IpcError;
+use crate::last_out::LastOut;
 use crate::message::{OperatorReply, OperatorRequest, Telemetry};
 use crate::port::{Full, Reader, Terms, Writer};
 use core::time::Duration;
@@ -49,6 +50,7 @@ pub struct OutsideLink {
     telemetry: Writer<Telemetry>,
     requests: Reader<OperatorRequest>,
     replies: Writer<OperatorReply>,
+    _last_out: LastOut,
 }
 
 impl OutsideLink {
@@ -62,6 +64,7 @@ impl OutsideLink {
             telemetry: Writer::new(domain, &node, &TELEMETRY, full)?,
             requests: Reader::new(domain, &node, &REQUESTS)?,
             replies: Writer::new(domain, &node, &REPLIES, Full::Lose)?,
+            _last_out: LastOut::of(domain),
         })
     }
 
@@ -96,6 +99,7 @@ pub struct TelemetryReader {
     reader: Reader<Telemetry>,
     expected: Option<u64>,
     lost: u64,
+    _last_out: LastOut,
 }
 
 impl TelemetryReader {
@@ -109,6 +113,7 @@ impl TelemetryReader {
             reader: Reader::new(domain, &node, &TELEMETRY)?,
             expected: None,
             lost: 0,
+            _last_out: LastOut::of(domain),
         })
     }
 
@@ -157,6 +162,7 @@ pub struct Operator {
     replies: Reader<OperatorReply>,
     number: u64,
     sequence: u64,
+    _last_out: LastOut,
 }
 
 impl Operator {
@@ -171,6 +177,7 @@ impl Operator {
             requests: Writer::new(domain, &node, &REQUESTS, Full::Lose)?,
             number: operator_number(),
             sequence: 0,
+            _last_out: LastOut::of(domain),
         })
     }
 

@@ -6,7 +6,6 @@
 
 use crate::domain::{Domain, Node};
 use crate::error::IpcError;
-use core::cell::Cell;
 use core::fmt::Debug;
 use core::time::Duration;
 use iceoryx2::port::listener::{Listener, ListenerCreateError};
@@ -19,6 +18,9 @@ use iceoryx2::service::builder::publish_subscribe::{
     PublishSubscribeOpenError, PublishSubscribeOpenOrCreateError,
 };
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
+use iceoryx2_bb_posix::file_descriptor_set::{
+    FileDescriptorSet, FileDescriptorSetWaitError, FileEvent,
+};
 use iceoryx2_cal::event::ListenerWaitError;
 
 /// What there is to know of a service before it is opened.
@@ -150,13 +152,10 @@ impl Rope {
 pub(crate) struct Bell {
     listener: Listener<ipc::Service>,
     name: &'static str,
-    /// Waits in a row that the library ended as failed.
-    failures: Cell<u32>,
+    /// Waits for it. The listener's own time-out is that of its socket, which the kernel counts in ticks of
+    /// several milliseconds: a plant whose answer does not come would be late by as much.
+    waits: FileDescriptorSet,
 }
-
-/// Failed waits in a row from which on a bell is broken. A wait that a signal interrupts is reported as
-/// `InternalFailure`, like a broken socket; but signals do not interrupt every wait.
-const BROKEN_AFTER: u32 = 16;
 
 impl Bell {
     pub fn new(node: &Node, name: &'static str) -> Result<Self, IpcError> {
@@ -168,27 +167,41 @@ impl Bell {
             },
             error => failed(name, &error),
         })?;
+        let waits = FileDescriptorSet::new();
+        // Whatever the set allocates for one listener it allocates here.
+        drop(
+            waits
+                .add(&listener)
+                .map_err(|error| wait_failed(name, error))?,
+        );
         Ok(Bell {
             listener,
             name,
-            failures: Cell::new(0),
+            waits,
         })
     }
 
     /// Waits until it rings, or for `timeout`, or until a signal comes; false where it did not ring.
     pub fn wait(&self, timeout: Duration) -> Result<bool, IpcError> {
-        // The socket beneath counts in microseconds, and none of them means without end.
-        let timeout = timeout.max(Duration::from_micros(1));
-        let failures = self.failures.take();
-        match self.listener.timed_wait_one(timeout) {
-            Ok(rung) => Ok(rung.is_some()),
-            Err(ListenerWaitError::InterruptSignal) => Ok(false),
-            Err(ListenerWaitError::InternalFailure) if failures < BROKEN_AFTER => {
-                self.failures.set(failures + 1);
-                Ok(false)
-            }
-            Err(error) => Err(failed(self.name, &error)),
+        let attached = self.waits.add(&self.listener);
+        let _attached = attached.map_err(|error| wait_failed(self.name, error))?;
+        match self.waits.timed_wait(timeout, FileEvent::Read, |_| ()) {
+            Ok(0) | Err(FileDescriptorSetWaitError::Interrupt) => Ok(false),
+            Ok(_) => match self.listener.try_wait_one() {
+                Ok(rung) => Ok(rung.is_some()),
+                Err(ListenerWaitError::InterruptSignal) => Ok(false),
+                Err(error) => Err(failed(self.name, &error)),
+            },
+            Err(error) => Err(wait_failed(self.name, error)),
         }
+    }
+}
+
+/// These errors have no words of their own.
+fn wait_failed(service: &str, cause: impl Debug) -> IpcError {
+    IpcError::Service {
+        service: service.to_owned(),
+        cause: format!("waiting failed: {cause:?}"),
     }
 }
 

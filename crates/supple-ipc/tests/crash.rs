@@ -73,4 +73,7 @@ fn a_killed_controller_is_replaced() {
         assert_eq!(heard.expect("read").answer, None);
         cycle += 1;
     }
+    // The last controller was killed too; what it left goes with the last who leaves.
+    drop(plant);
+    assert_eq!(support::objects(&system.domain), [""; 0]);
 }

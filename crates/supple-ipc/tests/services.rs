@@ -204,12 +204,14 @@ fn a_peer_of_another_version_is_refused() {
         .publish_subscribe::<OtherVersion>()
         .create()
         .expect("a service");
-    let _publisher = service.publisher_builder().create().expect("a publisher");
+    let publisher = service.publisher_builder().create().expect("a publisher");
     let error = ControllerLink::new(&system.domain).expect_err("another version");
     assert!(matches!(error, IpcError::Version { .. }), "{error}");
     for word in ["arm_state", "another version", "ArmState", "one build"] {
         assert!(error.to_string().contains(word), "{error}");
     }
+    drop((publisher, service, node));
+    drop(ControllerLink::new(&system.domain).expect("the place is free"));
 }
 
 #[test]

@@ -21,6 +21,7 @@
 //! | `/robot_description` | `std_msgs/msg/String` | once |
 //! | `/cycle_timing` | `supple_msgs/msg/CycleTiming` | every step that was timed |
 //! | `/plant_truth` | `supple_msgs/msg/PlantTruth` | every step of a simulated plant |
+//! | `/arm_events` | `std_msgs/msg/String` | when a button is pressed, drives change their mode |
 
 #![forbid(unsafe_code)]
 

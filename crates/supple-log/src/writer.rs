@@ -61,10 +61,11 @@ enum Topic {
     RobotDescription,
     CycleTiming,
     PlantTruth,
+    ArmEvents,
 }
 
 impl Topic {
-    const COUNT: usize = 8;
+    const COUNT: usize = 9;
 
     /// Topic, package and type.
     fn names(self) -> (&'static str, &'static str, &'static str) {
@@ -77,6 +78,7 @@ impl Topic {
             Topic::RobotDescription => ("/robot_description", "std_msgs", "String"),
             Topic::CycleTiming => ("/cycle_timing", "supple_msgs", "CycleTiming"),
             Topic::PlantTruth => ("/plant_truth", "supple_msgs", "PlantTruth"),
+            Topic::ArmEvents => ("/arm_events", "std_msgs", "String"),
         }
     }
 }
@@ -91,6 +93,7 @@ pub struct Writer<const N: usize> {
     base: String,
     next_step: u64,
     written: u64,
+    events: u64,
 }
 
 impl<const N: usize> Writer<N> {
@@ -135,6 +138,7 @@ impl<const N: usize> Writer<N> {
             base,
             next_step: 0,
             written: 0,
+            events: 0,
         })
     }
 
@@ -213,6 +217,18 @@ impl<const N: usize> Writer<N> {
         }
         self.written += 1;
         Ok(())
+    }
+
+    /// What happened to the arm besides, such as a button of its pendant, with its time as in
+    /// [`Writer::write`]. It may be told of late: its place in the file is here, its time is its own.
+    ///
+    /// # Errors
+    /// [`LogError::Write`].
+    pub fn event(&mut self, time_ns: u64, text: &str) -> Result<(), LogError> {
+        self.channels.file.close_chunk_if_due(time_ns)?;
+        self.events += 1;
+        let number = self.events - 1;
+        self.channels.put(Topic::ArmEvents, number, time_ns, &text)
     }
 
     /// Writes the index, waits for the disk and gives the file its name; an older file of that name is

@@ -118,11 +118,15 @@ impl Description {
         let in_urdf = Reporter { file: &urdf_file };
         let in_toml = Reporter { file: &toml_file };
         xml::check(in_urdf, &urdf)?;
-        let robot = urdf_rs::read_from_string(&urdf).map_err(|error| ModelError::Syntax {
+        let mut robot = urdf_rs::read_from_string(&urdf).map_err(|error| ModelError::Syntax {
             file: urdf_file.clone(),
             message: error.to_string(),
             remedy: "correct the URDF",
         })?;
+        if let Some(radius_m) = settings.point_mass_radius_m {
+            in_toml.positive("point_mass_radius_m", radius_m)?;
+            tree::inflate(&mut robot, radius_m);
+        }
         resolve::check_names(in_toml, &settings, &robot)?;
         let chain = tree::chain(
             in_urdf,
@@ -150,6 +154,17 @@ impl Description {
             toml,
             urdf,
         })
+    }
+
+    /// The same arm, controlled at another rate \[Hz\]: its period is that of the rate in whole nanoseconds.
+    ///
+    /// # Errors
+    /// [`ModelError::Invalid`] for a rate that is not positive.
+    pub fn at_rate(mut self, rate_hz: f64) -> Result<Self, ModelError> {
+        let file = &self.toml_file;
+        Reporter { file }.positive("the rate of control (Hz)", rate_hz)?;
+        self.settings.period_s = (1e9 / rate_hz).round() * 1e-9;
+        Ok(self)
     }
 
     /// Name of the arm.

@@ -18,6 +18,7 @@ pub mod settings;
 mod shapes;
 mod sized;
 mod tree;
+pub mod unlimited;
 mod xml;
 
 pub use assets::assets;

@@ -24,6 +24,9 @@ pub struct Settings {
     /// Acceleration of free fall in root link axes (m/s^2). Default (0, 0, -9.81).
     #[serde(default = "default::gravity_m_per_s2")]
     pub gravity_m_per_s2: [f64; 3],
+    /// Links that have mass but an inertia of zeros are taken for solid balls of this radius (m). Default:
+    /// they are refused.
+    pub point_mass_radius_m: Option<f64>,
     /// Cycle period (s). Default 0.001.
     #[serde(default = "default::period_s")]
     pub period_s: f64,

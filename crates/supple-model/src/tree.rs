@@ -115,6 +115,18 @@ pub(crate) fn chain(
     })
 }
 
+/// Gives links with mass and an inertia of zeros that of a solid ball of `radius_m`.
+pub(crate) fn inflate(robot: &mut Robot, radius_m: f64) {
+    for link in &mut robot.links {
+        let mass_kg = link.inertial.mass.value;
+        let i = &mut link.inertial.inertia;
+        if mass_kg > 0.0 && [i.ixx, i.iyy, i.izz, i.ixy, i.ixz, i.iyz] == [0.0; 6] {
+            let ball = Body::ball(mass_kg, radius_m, Vector3::zeros());
+            [i.ixx, i.iyy, i.izz] = [ball.inertia_kg_m2[(0, 0)]; 3];
+        }
+    }
+}
+
 struct Tree<'a> {
     report: Reporter<'a>,
     robot: &'a Robot,
@@ -290,7 +302,8 @@ impl<'a> Tree<'a> {
                     mass.value
                 ),
                 "give inertia about the centre of mass in kg m^2 and mass in kg, or remove \
-                 <inertial> from a link that has no mass",
+                 <inertial> from a link that has no mass; point_mass_radius_m takes a mass without \
+                 inertia for a ball",
             )
         })?;
         Ok(Some(body.seen_from(&Pose::from_xyz_rpy(

@@ -21,6 +21,38 @@ fn small() -> Description {
 }
 
 #[test]
+fn a_mass_without_inertia_is_a_ball_where_that_is_said() {
+    let start = URDF.find("<inertia ").unwrap();
+    let end = start + URDF[start..].find("/>").unwrap() + 2;
+    let zeros = r#"<inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/>"#;
+    let urdf = URDF.replacen(&URDF[start..end], zeros, 1);
+    let error = Description::from_text(&free(), &urdf).unwrap_err();
+    assert!(error.to_string().contains("point_mass_radius_m"), "{error}");
+    let said = |radius: &str| {
+        Description::from_text(
+            &format!("point_mass_radius_m = {radius}\n{}", free()),
+            &urdf,
+        )
+    };
+    let radius_m = 0.05;
+    let (ball, whole) = (said("0.05").unwrap(), small());
+    let (ball, whole) = (ball.arm::<3>().unwrap(), whole.arm::<3>().unwrap());
+    let differs: Vec<usize> = (0..3).filter(|i| ball.body(*i) != whole.body(*i)).collect();
+    let [link] = differs[..] else {
+        panic!("links {differs:?} differ");
+    };
+    let (found, mass_kg) = (ball.body(link), whole.body(link).mass_kg);
+    assert_eq!(found.mass_kg, mass_kg);
+    assert_eq!(found.com_m, whole.body(link).com_m);
+    let expected = 0.4 * mass_kg * radius_m * radius_m;
+    for i in 0..3 {
+        assert!((found.inertia_kg_m2[(i, i)] - expected).abs() < 1e-12 * mass_kg);
+    }
+    let error = said("-1.0").unwrap_err();
+    assert!(error.to_string().contains("above zero"), "{error}");
+}
+
+#[test]
 fn the_chain_is_the_movable_joints_to_the_tip() {
     let description = small();
     assert_eq!(description.joint_names(), ["yaw", "shoulder", "elbow"]);

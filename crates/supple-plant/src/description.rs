@@ -1,15 +1,15 @@
 //! The plant of a described arm.
 
 use crate::config::{ForceSensor, PlantConfig, Stops};
-use crate::drive::Drive;
+use crate::drive::{Drive, Ripple};
 use crate::friction::LuGre;
 use supple_core::Vector;
 use supple_model::{Description, ModelError};
 
 impl<const N: usize> PlantConfig<N> {
     /// The plant that a description describes, in empty space: its arm and tool, its friction (with a
-    /// Stribeck dip and a loaded part, see [`LuGre::from_friction`]), its motors and encoders with a
-    /// cycle of delay, its hard stops and its cap. The force sensor is noiseless.
+    /// Stribeck dip and a loaded part, see [`LuGre::from_friction`]), its motors with their ripple, and
+    /// encoders with a cycle of delay, its hard stops and its cap. The force sensor is noiseless.
     ///
     /// # Errors
     /// [`ModelError::JointCount`] if the arm has not `N` moving joints.
@@ -19,6 +19,14 @@ impl<const N: usize> PlantConfig<N> {
         let counts = motors.counts_per_revolution.map_or(0.0, f64::from);
         let quantum = motors.torque_quantum_nm.as_deref();
         let ideal = PlantConfig::ideal(told.arm);
+        let ripple = told.ripple.iter().enumerate().flat_map(|(motor, table)| {
+            table.harmonics().iter().map(move |line| Ripple {
+                motor,
+                harmonic: line.harmonic,
+                amplitude_nm: libm::hypot(line.sine_nm, line.cosine_nm),
+                phase_rad: libm::atan2(line.cosine_nm, line.sine_nm),
+            })
+        });
         Ok(PlantConfig {
             friction: told
                 .friction
@@ -29,6 +37,7 @@ impl<const N: usize> PlantConfig<N> {
                 motor_torque_quantum_nm: quantum
                     .map_or_else(Vector::zeros, Vector::from_column_slice),
                 torque_delay_cycles: 1,
+                ripple: ripple.collect(),
                 ..Drive::direct()
             },
             stops: Some(Stops::new(

@@ -41,6 +41,7 @@ mod description;
 mod error;
 mod plant;
 mod record;
+mod trace_file;
 mod world;
 
 pub use config::{ForceSensor, PlantConfig, Stops};
@@ -51,4 +52,5 @@ pub use friction::LuGre;
 pub use plant::Plant;
 pub use record::{Measurement, StepRecord, Truth};
 pub use scene::{FixedBlock, FreeBox, Ground, Layer, Scene, SceneError};
+pub use trace_file::{TraceError, TraceFile};
 pub use world::{Object, ObjectKind};

@@ -42,6 +42,14 @@ pub struct ControlLoop<const N: usize> {
     leaving: Option<u32>,
 }
 
+/// A step with all that is told about it.
+#[derive(Debug)]
+struct Stepped<const N: usize> {
+    input: Input<N>,
+    output: Output<N>,
+    timing: CycleTiming,
+}
+
 impl<const N: usize> ControlLoop<N> {
     /// Idle, before the first state.
     pub fn new(controller: Controller<N>, inside: Inside, virtual_time: bool) -> Self {
@@ -90,9 +98,12 @@ impl<const N: usize> ControlLoop<N> {
             self.cycle(&arm)?;
             arm = newer;
         }
-        let output = self.cycle(&arm)?;
+        let stepped = self.step(&arm)?;
+        let output = stepped.output;
         let leaving = self.leaving.is_some();
+        // The plant waits for this; whoever else wants to know does not.
         link.answer(&TorqueCommand::new(&output, leaving))?;
+        self.tell(&arm, &stepped);
         let Some(cycles) = &mut self.leaving else {
             return Ok(true);
         };
@@ -106,8 +117,15 @@ impl<const N: usize> ControlLoop<N> {
         self.timing
     }
 
-    /// One step, with what was asked for and what is told about it.
-    fn cycle(&mut self, arm: &ArmState) -> Result<Output<N>, RtError> {
+    /// One step, which nobody waits for.
+    fn cycle(&mut self, arm: &ArmState) -> Result<(), RtError> {
+        let stepped = self.step(arm)?;
+        self.tell(arm, &stepped);
+        Ok(())
+    }
+
+    /// One step, with what was asked for.
+    fn step(&mut self, arm: &ArmState) -> Result<Stepped<N>, RtError> {
         let begin_ns = monotonic_ns();
         let heard = self.hear(arm.cycle);
         let input = arm.input::<N>(heard.as_ref().map(|(_, request)| *request))?;
@@ -136,9 +154,11 @@ impl<const N: usize> ControlLoop<N> {
             step_ns,
         };
         self.last_begin_ns = Some(begin_ns);
-        self.timing.record(&timing);
-        self.tell(arm, &input, &output, timing);
-        Ok(output)
+        Ok(Stepped {
+            input,
+            output,
+            timing,
+        })
     }
 
     /// The request of this cycle, if there is one.
@@ -190,14 +210,20 @@ impl<const N: usize> ControlLoop<N> {
 
     /// Hands the cycle to the helper. Where it is behind, the record is lost and its number shows it; in
     /// virtual time the loop waits.
-    fn tell(&mut self, arm: &ArmState, input: &Input<N>, output: &Output<N>, timing: CycleTiming) {
+    fn tell(&mut self, arm: &ArmState, stepped: &Stepped<N>) {
+        let Stepped {
+            input,
+            output,
+            timing,
+        } = stepped;
+        self.timing.record(timing);
         while self.virtual_time
             && self.inside.telemetry.is_full()
             && !self.inside.telemetry.is_abandoned()
         {
             std::thread::yield_now();
         }
-        let telemetry = Telemetry::new(self.steps, arm, input, output, timing);
+        let telemetry = Telemetry::new(self.steps, arm, input, output, *timing);
         self.steps += 1;
         let _ = self.inside.telemetry.push(telemetry);
     }

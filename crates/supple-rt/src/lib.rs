@@ -43,7 +43,7 @@ pub fn main() -> ExitCode {
     if options.supervised {
         die_with_parent();
     }
-    let description = match Description::find(&options.arm) {
+    let description = match options.description() {
         Ok(description) => description,
         Err(error) => return complain(&error.into()),
     };

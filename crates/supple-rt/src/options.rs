@@ -2,6 +2,7 @@
 
 use clap::Parser;
 use std::path::PathBuf;
+use supple_model::{Description, ModelError};
 use supple_realtime::Settings;
 
 /// The controller of one arm: waits for arm states in shared memory and answers with torques.
@@ -13,6 +14,9 @@ pub struct Options {
     /// A built-in arm (see `supple arms`), or the path of an arm's TOML or of its folder.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
+    /// Cycles per second; the arm's own if not given. All processes of a system need the same.
+    #[arg(long, value_name = "HZ", value_parser = clap::value_parser!(u32).range(10..=10_000))]
+    pub rate_hz: Option<u32>,
     /// Which system this belongs to; SUPPLE_PREFIX or `supple` if not given.
     #[arg(long, value_name = "NAME")]
     pub prefix: Option<String>,
@@ -37,6 +41,18 @@ pub struct Options {
 }
 
 impl Options {
+    /// The arm, at the rate asked for.
+    ///
+    /// # Errors
+    /// As [`Description::find`].
+    pub fn description(&self) -> Result<Description, ModelError> {
+        let description = Description::find(&self.arm)?;
+        match self.rate_hz {
+            Some(rate_hz) => description.at_rate(f64::from(rate_hz)),
+            None => Ok(description),
+        }
+    }
+
     /// What to ask of the system.
     pub fn realtime(&self) -> Settings {
         if self.virtual_time || self.no_realtime {

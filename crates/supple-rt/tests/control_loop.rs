@@ -1,9 +1,11 @@
 //! The loop against a scripted plant, on the real services: its answers are those of `step`, it allocates
 //! nothing, requests are heard in their cycle, and it leaves in order.
 
+#[path = "../../../tests/support/counting.rs"]
+mod counting;
+
 use core::time::Duration;
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
+use counting::counted;
 use supple_core::controller::{Mode, Request};
 use supple_core::math::Vector3;
 use supple_core::{Controller, Input, Output, State, Vector, step};
@@ -16,37 +18,6 @@ use supple_model::Description;
 use supple_realtime::Stop;
 use supple_rt::{ControlLoop, Outside, rings};
 use tempfile::TempDir;
-
-thread_local! {
-    static COUNT: Cell<Option<u64>> = const { Cell::new(None) };
-}
-
-struct Counting;
-
-// SAFETY: hands every call on to the system's allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        COUNT.with(|count| count.set(count.get().map(|n| n + 1)));
-        // SAFETY: as the caller promises.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        COUNT.with(|count| count.set(count.get().map(|n| n + 1)));
-        // SAFETY: as the caller promises.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
-
-/// Allocations and deallocations of this thread in `work`.
-fn counted(work: impl FnOnce()) -> u64 {
-    COUNT.with(|count| count.set(Some(0)));
-    work();
-    COUNT.with(Cell::take).expect("counting")
-}
 
 const SOON: Duration = Duration::from_secs(5);
 

@@ -20,7 +20,7 @@ use clap::Parser;
 use std::process::ExitCode;
 use supple_ipc::{Domain, PlantLink};
 use supple_model::{Description, with_dof};
-use supple_plant::{Plant, PlantConfig};
+use supple_plant::{Plant, PlantConfig, Scene, TraceFile};
 use supple_realtime::{Stop, die_with_parent, enter};
 
 /// The whole program, from its arguments to its exit code.
@@ -33,7 +33,7 @@ pub fn main() -> ExitCode {
     if options.supervised {
         die_with_parent();
     }
-    let description = match Description::find(&options.arm) {
+    let description = match options.description() {
         Ok(description) => description,
         Err(error) => return complain(&error.into()),
     };
@@ -61,13 +61,19 @@ pub fn run<const N: usize>(
     options: &Options,
     stop: &Stop,
 ) -> Result<Summary, SimError> {
-    let config = PlantConfig::<N>::from_description(description)?;
+    let mut config = PlantConfig::<N>::from_description(description)?;
+    if let Some(face_m) = options.block_m {
+        config.scene = Scene::beneath(face_m);
+    }
     let home_rad = description.home::<N>()?;
     let motors = Motors::new(&config.arm.armature(), config.cycle_s);
     let plant = Plant::new(config, home_rad, supple_core::Vector::zeros())?;
     let domain = Domain::new(options.prefix.as_deref())?;
     let link = PlantLink::new(&domain)?;
     let mut world = World::new(plant, motors, link);
+    if let Some(file) = &options.trace {
+        world.trace(TraceFile::create(file, N)?);
+    }
     for shortfall in enter(&options.realtime()) {
         eprintln!("supple-sim: warning: {shortfall}");
     }

@@ -1,6 +1,8 @@
 //! What the process is told.
 
 use clap::Parser;
+use std::path::PathBuf;
+use supple_model::{Description, ModelError};
 use supple_realtime::Settings;
 
 /// A simulated arm on shared memory, in the place of `supple-can` and a real one.
@@ -13,12 +15,21 @@ pub struct Options {
     /// A built-in arm (see `supple arms`), or the path of an arm's TOML or of its folder.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
+    /// Cycles per second; the arm's own if not given. All processes of a system need the same.
+    #[arg(long, value_name = "HZ", value_parser = clap::value_parser!(u32).range(10..=10_000))]
+    pub rate_hz: Option<u32>,
     /// Which system this belongs to; SUPPLE_PREFIX or `supple` if not given.
     #[arg(long, value_name = "NAME")]
     pub prefix: Option<String>,
     /// Each cycle waits for its answer, and begins when it has come.
     #[arg(long)]
     pub virtual_time: bool,
+    /// A block of wood whose face is at this height above the base frame (m), beneath the whole reach.
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    pub block_m: Option<f64>,
+    /// Writes what acts at the joints and on the tip, once a millisecond, as CSV.
+    #[arg(long, value_name = "FILE")]
+    pub trace: Option<PathBuf>,
     /// Ends after so many cycles.
     #[arg(long, value_name = "N")]
     pub cycles: Option<u64>,
@@ -40,6 +51,18 @@ pub struct Options {
 }
 
 impl Options {
+    /// The arm, at the rate asked for.
+    ///
+    /// # Errors
+    /// As [`Description::find`].
+    pub fn description(&self) -> Result<Description, ModelError> {
+        let description = Description::find(&self.arm)?;
+        match self.rate_hz {
+            Some(rate_hz) => description.at_rate(f64::from(rate_hz)),
+            None => Ok(description),
+        }
+    }
+
     /// What to ask of the system.
     pub fn realtime(&self) -> Settings {
         if self.virtual_time || self.no_realtime {

@@ -6,13 +6,15 @@ use core::fmt;
 use core::time::Duration;
 use supple_ipc::message::{ArmState, Drives, PlantReport};
 use supple_ipc::{Heard, PlantLink, pause};
-use supple_plant::Plant;
+use supple_plant::{Plant, TraceFile};
 use supple_realtime::{Stop, monotonic_ns, sleep_until_ns};
 
 /// How long one wait of virtual time lasts before it looks whether to stop.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 /// How often virtual time looks whether a controller has come.
 const JOIN_EVERY: Duration = Duration::from_millis(1);
+/// How long the motors may take to come to rest at the end \[ns\].
+const REST_NS: u64 = 300_000_000;
 /// Periods by which the clock may be behind before it is set again instead of caught up with.
 const CATCH_UP: u64 = 20;
 
@@ -23,6 +25,7 @@ pub struct World<const N: usize> {
     link: PlantLink,
     report: PlantReport,
     period_ns: u64,
+    trace: Option<TraceFile>,
 }
 
 /// How a simulation went.
@@ -57,7 +60,13 @@ impl<const N: usize> World<N> {
             motors,
             link,
             report: PlantReport::default(),
+            trace: None,
         }
+    }
+
+    /// From now on what acts at the joints is written.
+    pub fn trace(&mut self, trace: TraceFile) {
+        self.trace = Some(trace);
     }
 
     /// Runs by the wall clock. An answer is waited for until `answer_share` of its cycle has passed.
@@ -73,7 +82,15 @@ impl<const N: usize> World<N> {
         let mut summary = Summary::default();
         let wait_ns = (answer_share * self.period_ns as f64) as u64;
         let mut due_ns = monotonic_ns() + self.period_ns;
-        while !stop.asked() && cycles.is_none_or(|cycles| summary.cycles < cycles) {
+        let mut rest_cycles = REST_NS / self.period_ns;
+        while cycles.is_none_or(|cycles| summary.cycles < cycles) {
+            if stop.asked() {
+                // An arm does not go away from under those who are lowering it.
+                if self.motors.drives() != Drives::Active || rest_cycles == 0 {
+                    break;
+                }
+                rest_cycles -= 1;
+            }
             sleep_until_ns(due_ns);
             let begin_ns = monotonic_ns();
             if begin_ns > due_ns + CATCH_UP * self.period_ns {
@@ -87,7 +104,7 @@ impl<const N: usize> World<N> {
                 .link
                 .answer(self.cycle(), Duration::from_nanos(left_ns))?;
             self.note(&heard, begin_ns);
-            self.advance(&heard)?;
+            self.advance(&heard, begin_ns)?;
             summary.cycles += 1;
             due_ns += self.period_ns;
         }
@@ -121,7 +138,7 @@ impl<const N: usize> World<N> {
                 heard = self.link.answer(self.cycle(), LOOK_EVERY)?;
             }
             self.note(&heard, begin_ns);
-            self.advance(&heard)?;
+            self.advance(&heard, state.stamp_ns)?;
             summary.cycles += 1;
         }
         Ok(self.summed_up(summary))
@@ -154,10 +171,18 @@ impl<const N: usize> World<N> {
         }
     }
 
-    fn advance(&mut self, heard: &Heard) -> Result<(), SimError> {
+    fn advance(&mut self, heard: &Heard, time_ns: u64) -> Result<(), SimError> {
         let velocity = self.plant.truth().velocity_rad_per_s;
         let torque_nm = self.motors.torque(heard.answer.as_ref(), &velocity)?;
         self.plant.cycle(&torque_nm);
+        if let Some(trace) = &mut self.trace {
+            let active = if self.motors.drives() == Drives::Active {
+                N
+            } else {
+                0
+            };
+            trace.note(time_ns, active, &torque_nm.into(), self.plant.truth())?;
+        }
         Ok(())
     }
 

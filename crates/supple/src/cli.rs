@@ -6,6 +6,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use std::num::NonZeroU64;
 use std::path::PathBuf;
+use supple_bus::Address;
 
 /// Minimum-impedance control of a backdrivable arm.
 #[derive(Debug, Parser)]
@@ -48,6 +49,18 @@ pub enum Command {
         #[command(flatten)]
         place: Place,
     },
+    /// Press a button at the pendant of a running system's emulated arm, or ask what it shows.
+    Pendant {
+        /// What to do at it.
+        #[arg(value_enum)]
+        action: PendantAction,
+        /// Which system.
+        #[arg(long, value_name = "NAME")]
+        prefix: Option<String>,
+    },
+    /// Kill and stop each process of a tracking system in turn, and measure what the simulated arm does.
+    #[command(after_help = CODES)]
+    Drill(DrillArgs),
     /// Take a running system out of its fault.
     Reset(Place),
     /// End a running system in order.
@@ -120,6 +133,47 @@ pub struct Place {
 pub enum PlantKind {
     /// A simulated arm on shared memory.
     Sim,
+    /// A simulated arm behind an emulated bus, with its pucks, safety module and pendant.
+    Emu,
+    /// An arm on a CAN bus; its operator activates it at its pendant.
+    Can,
+}
+
+/// Arguments of `drill`.
+#[derive(Clone, Debug, Args)]
+pub struct DrillArgs {
+    /// Only with this plant, `sim` or `emu`; with both if not given.
+    #[arg(long, value_enum)]
+    pub plant: Option<PlantKind>,
+    /// Only the loss of this process, such as `supple-rt`.
+    #[arg(long, value_name = "NAME")]
+    pub process: Option<String>,
+    /// A built-in arm (see `supple arms`), or the path of an arm's TOML or of its folder.
+    #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
+    pub arm: String,
+    /// Ask for neither priority nor locked memory.
+    #[arg(long)]
+    pub no_realtime: bool,
+    /// Print the table as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What can be done at a pendant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum PendantAction {
+    /// Shift and Idle: faults are cleared, the motors have power and brake.
+    Idle,
+    /// Shift and Activate: the motors take torques, unless a fault is shown.
+    Activate,
+    /// Press the emergency stop; it stays in.
+    EStop,
+    /// Pull the emergency stop out; power comes back with `idle`.
+    Release,
+    /// What the arm does.
+    Status,
+    /// What has happened to it since its start.
+    Record,
 }
 
 /// A mode that can be asked for by itself.
@@ -129,6 +183,19 @@ pub enum ModeName {
     Idle,
     /// The model holds the arm's weight.
     GravityHold,
+}
+
+/// What a system follows from its start on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Course {
+    /// Back and forth along a line.
+    Sinusoid,
+    /// Back and forth on a circle about the base.
+    Arc,
+    /// Quarter ellipse and its edges, in the vertical plane.
+    Quadrant,
+    /// The probing cycle; with --block-m 0 it meets what it probes for.
+    Probe,
 }
 
 /// A trajectory of the paper.
@@ -151,6 +218,28 @@ pub struct UpArgs {
     /// A built-in arm (see `supple arms`), or the path of an arm's TOML or of its folder.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
+    /// What the arm is brought to and follows.
+    #[arg(long, value_enum, default_value = "sinusoid")]
+    pub track: Course,
+    /// The arm's bus, can:NAME or unix:FOLDER; can:can0 for `can`, sockets of its own for `emu`.
+    #[arg(long, value_name = "BUS")]
+    pub bus: Option<Address>,
+    /// The arm on the bus is in its home pose now: where its positions are lost, this is where it is. An
+    /// emulated arm always is.
+    #[arg(long)]
+    pub zero_at_home: bool,
+    /// Take what the arm's force/torque sensor feels at the start for zero.
+    #[arg(long)]
+    pub tare: bool,
+    /// A block of wood beneath a simulated or emulated arm, its face at this height above the base frame (m).
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    pub block_m: Option<f64>,
+    /// Write what acts at the motors and on the tip of a simulated or emulated arm, as CSV.
+    #[arg(long, value_name = "FILE")]
+    pub trace: Option<PathBuf>,
+    /// Cycles per second; the arm's own if not given.
+    #[arg(long, value_name = "HZ", value_parser = clap::value_parser!(u32).range(10..=10_000))]
+    pub rate_hz: Option<u32>,
     /// Shut down after so many seconds of control; until an interrupt or `supple stop` if not given.
     #[arg(long = "for", value_name = "SECONDS", value_parser = seconds)]
     pub for_s: Option<f64>,
@@ -270,6 +359,7 @@ impl Command {
             Command::Demo(args) => args.json,
             Command::Identification(command) => command.json(),
             Command::Up(args) => args.json,
+            Command::Drill(args) => args.json,
             Command::Gains(GainsArgs { place, .. })
             | Command::Track(TrackArgs { place, .. })
             | Command::Mode { place, .. }
@@ -277,6 +367,8 @@ impl Command {
             | Command::Status(place)
             | Command::Reset(place)
             | Command::Stop(place) => place.json,
+            // Its answers are JSON already, its failures are words.
+            Command::Pendant { .. } => false,
             Command::Arms { json } | Command::Doctor { json } => *json,
             Command::Log(
                 LogCommand::Info { json, .. }

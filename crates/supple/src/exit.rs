@@ -14,11 +14,13 @@
 //! | 9 | the logs do not give a model |
 //! | 10 | no system runs, or a process of it cannot start or has ended |
 //! | 11 | the controller refused a request |
+//! | 12 | a drill did not end as it should |
 //! | 130 | interrupted |
 
 use crate::figures::FigureError;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use supple_bus::BusError;
 use supple_experiment::ExperimentError;
 use supple_ident::{IdentError, ReadError, SaveError};
 use supple_ipc::IpcError;
@@ -39,6 +41,7 @@ pub const CODES: &str = "Exit codes:
   9    the logs do not give a model
   10   no system runs, or a process of it cannot start or has ended
   11   the controller refused a request
+  12   a drill did not end as it should
   130  interrupted";
 
 /// Why the program did not do what it was asked for. One line that names the cause and the remedy.
@@ -78,6 +81,25 @@ pub enum Failure {
     /// Shared memory.
     #[error(transparent)]
     Ipc(#[from] IpcError),
+    /// Where the arm's bus is.
+    #[error(transparent)]
+    Bus(#[from] BusError),
+    /// An emulated arm's pendant that does not answer.
+    #[error(
+        "the pendant at {} does not answer: {cause}; an emulated arm has one, start it with `supple up \
+         --plant emu`", socket.display()
+    )]
+    Pendant {
+        /// Its socket.
+        socket: PathBuf,
+        /// What the system says, or what came back.
+        cause: String,
+    },
+    /// A clock that an arm cannot have.
+    #[error(
+        "an arm on a CAN interface keeps its own time: leave out --virtual-time, or use --plant emu"
+    )]
+    RealClock,
     /// A system of that name is there.
     #[error(
         "a system runs already under the prefix `{prefix}`, by process {process}: `supple stop` ends it, \
@@ -100,6 +122,12 @@ pub enum Failure {
         /// Where it should be.
         program: PathBuf,
     },
+    /// A process that the system has not.
+    #[error("no process {name} belongs to this system: see `supple drill` for those there are")]
+    NoSuchProcess {
+        /// Which.
+        name: &'static str,
+    },
     /// A process of the system ended when it should not have.
     #[error("{name} has ended ({status}); its own words are above")]
     ProcessEnded {
@@ -107,6 +135,23 @@ pub enum Failure {
         name: &'static str,
         /// How.
         status: String,
+    },
+    /// A drill with people's limbs within reach.
+    #[error(
+        "a drill drops the arm on what is beneath it: only --plant sim and --plant emu have one"
+    )]
+    RealArm,
+    /// A system that is to be drilled and does not work.
+    #[error(
+        "the system did not come to track within 20 s, three times: its processes say why above; \
+         `supple doctor` looks at the machine"
+    )]
+    NotTracking,
+    /// A loss that was not met as it should have been.
+    #[error("the drill did not end as it should: {rows}; the table above says what was expected")]
+    Drill {
+        /// The losses.
+        rows: String,
     },
     /// No answer.
     #[error(
@@ -211,6 +256,7 @@ impl Failure {
             10 => "system",
             11 => "refused",
             8 => "machine",
+            12 => "drill",
             9 => "identification",
             _ => "internal",
         }
@@ -220,7 +266,10 @@ impl Failure {
     pub fn comes_with_results(&self) -> bool {
         matches!(
             self,
-            Failure::Fault { .. } | Failure::Different { .. } | Failure::NotReady { .. }
+            Failure::Fault { .. }
+                | Failure::Different { .. }
+                | Failure::NotReady { .. }
+                | Failure::Drill { .. }
         )
     }
 
@@ -237,7 +286,12 @@ impl Failure {
             Failure::Ident(_) => 9,
             Failure::Read(error) => read_code(error),
             Failure::Save(error) => save_code(error),
+            Failure::RealClock | Failure::RealArm => 2,
+            Failure::NoSuchProcess { .. } => 2,
+            Failure::Drill { .. } | Failure::NotTracking => 12,
             Failure::Ipc(_)
+            | Failure::Bus(_)
+            | Failure::Pendant { .. }
             | Failure::AlreadyRunning { .. }
             | Failure::NoSibling { .. }
             | Failure::ProcessEnded { .. }

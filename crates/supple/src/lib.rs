@@ -10,6 +10,7 @@ mod cli;
 mod console;
 mod demo;
 mod doctor;
+mod drill;
 pub mod exit;
 pub mod figures;
 mod identification;
@@ -46,11 +47,13 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
     match command {
         Command::Demo(args) => demo::run(args),
         Command::Up(args) => up::run(args),
+        Command::Drill(args) => drill::run(args),
         Command::Status(place) => operate::status(place),
         Command::Mode { mode, place } => operate::mode(*mode, place),
         Command::Gains(args) => operate::gains(args),
         Command::Track(args) => operate::track(args),
         Command::Probe { arm, place } => operate::probe(arm, place),
+        Command::Pendant { action, prefix } => operate::pendant(*action, prefix.as_deref()),
         Command::Reset(place) => operate::reset(place),
         Command::Stop(place) => operate::stop(place),
         Command::Log(command) => log::run(command),

@@ -83,6 +83,126 @@ fn a_design_leaves_a_table_a_figure_and_its_numbers() {
     assert_eq!(table.lines().count(), (100.0 * duration_s) as usize + 2);
 }
 
+/// Design, log, model, correction: each command takes what the one before has left.
+#[test]
+fn a_designed_motion_becomes_a_model_that_loads() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    let (design, excited, identified, learnt) =
+        (at("design"), at("excited"), at("identified"), at("learnt"));
+    let done = |arguments: &[&str]| -> serde_json::Value {
+        let answer = run(arguments);
+        assert_eq!(answer.code, Some(0), "{arguments:?}: {}", answer.stderr);
+        serde_json::from_str(&answer.stdout).expect("JSON")
+    };
+    let short = [
+        "--candidates",
+        "40",
+        "--period",
+        "8",
+        "--periods",
+        "2",
+        "--quiet",
+        "--json",
+    ];
+    done(
+        &[
+            &["excite", "design", "--arm", "wam3", "--out", &design],
+            &short[..],
+        ]
+        .concat(),
+    );
+    let followed = done(&[
+        "excite", "run", "--arm", "wam3", "--design", &design, "--out", &excited, "--json",
+    ]);
+    let log = followed["log"].as_str().expect("a path");
+    let found = done(&[
+        "identify",
+        log,
+        "--arm",
+        "wam3",
+        "--out",
+        &identified,
+        "--json",
+    ]);
+    assert_eq!(found["positive_definite"], 1.0);
+    let error = found["held_out"][0]["total_relative"]
+        .as_f64()
+        .expect("a number");
+    assert!(error < 0.15, "{error}");
+    let report = std::fs::read_to_string(folder.path().join("identified/report.html"));
+    let report = report.expect("a report");
+    assert!(report.contains("<svg"));
+    let corrected = done(&[
+        "learn",
+        log,
+        "--arm",
+        &identified,
+        "--out",
+        &learnt,
+        "--last",
+        "10",
+        "--json",
+    ]);
+    let joints = corrected["joints"].as_array().expect("a list");
+    assert_eq!(joints.len(), 3);
+    let empty = run(&[
+        "excite",
+        "run",
+        "--arm",
+        "wam4",
+        "--design",
+        &design,
+        "--out",
+        &at("no"),
+    ]);
+    assert_eq!(empty.code, Some(9), "{}", empty.stderr);
+    assert_one_clear_line(&empty, &["centre_rad", "4 joints"]);
+    let absent = run(&["excite", "run", "--arm", "wam3", "--design", &at("nowhere")]);
+    assert_eq!(absent.code, Some(6), "{}", absent.stderr);
+    let log = run(&["learn", "nowhere.mcap", "--arm", "wam3"]);
+    assert_eq!(log.code, Some(6), "{}", log.stderr);
+}
+
+#[test]
+fn a_calibration_says_what_it_is_worth_and_that_it_is_simulation() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("calibrated");
+    let answer = run(&[
+        "calibrate",
+        "--ripple",
+        "0.3",
+        "--no-demo",
+        "--quiet",
+        "--out",
+        arg(&out),
+    ]);
+    assert_eq!(answer.code, Some(0), "{}", answer.stderr);
+    for words in [
+        "breakaway of joint1",
+        "ripple of motor 3: harmonic 6",
+        "good for 5 N/m",
+        "sinusoid at 5 N/m with this model",
+        "this is simulation",
+    ] {
+        assert!(
+            answer.stdout.contains(words),
+            "{words} in {}",
+            answer.stdout
+        );
+    }
+    for file in [
+        "arm.toml",
+        "arm.urdf",
+        "report.html",
+        "calibration.json",
+        "logs",
+        "plant/arm.toml",
+    ] {
+        assert!(out.join(file).exists(), "{file}");
+    }
+}
+
 #[test]
 fn help_lists_what_identification_offers() {
     let help = run(&["--help"]).stdout;

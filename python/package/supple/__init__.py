@@ -16,10 +16,12 @@ from supple._identify import (
     DataWarning,
     Fit,
     FrictionColumns,
+    Payload,
     Validation,
     base_parameters,
     identify,
 )
+from supple._learn import Learned, learn
 from supple._log import Log, Truth, read_log
 from supple._native import Arm, Friction, __version__, assets
 from supple._simulate import Run, simulate
@@ -33,7 +35,9 @@ __all__ = [
     "Fit",
     "Friction",
     "FrictionColumns",
+    "Learned",
     "Log",
+    "Payload",
     "Recording",
     "Run",
     "Sweep",
@@ -45,6 +49,7 @@ __all__ = [
     "design_excitation",
     "excite",
     "identify",
+    "learn",
     "read_log",
     "simulate",
     "sweep",

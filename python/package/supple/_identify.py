@@ -25,6 +25,7 @@ __all__ = [
     "DataWarning",
     "Fit",
     "FrictionColumns",
+    "Payload",
     "Validation",
     "base_parameters",
     "identify",
@@ -47,6 +48,9 @@ class FrictionColumns:
     """Constant: with it, Coulomb friction may differ by direction."""
     asymmetry: bool = False
     """``A |qd|``: viscous friction that differs by direction. Needs ``viscous``."""
+    load: bool = False
+    """``L |g| p(qd / band)``: Coulomb friction that grows with the torque ``g`` which the joint's gear
+    passes on to the links, by the arm that the fit starts from. Needs ``coulomb``."""
     stribeck_rad_per_s: float | None = None
     """Speed over which a Stribeck dip fades (rad/s); ``None`` for no dip."""
     band_rad_per_s: float = 0.01
@@ -59,10 +63,42 @@ _FRICTION = {
     "coulomb": FrictionColumns(),
     "offset": FrictionColumns(offset=True),
     "asymmetric": FrictionColumns(offset=True, asymmetry=True),
+    "load": FrictionColumns(load=True),
     "stribeck": FrictionColumns(offset=True),
 }
 # Of the fit with a dip, where nothing is said (rad/s).
 _SLOW_RAD_PER_S = 0.15
+
+
+Ripple = tuple[tuple[tuple[int, float, float], ...], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Payload:
+    """A body in the last link's frame."""
+
+    mass_kg: float
+    """Mass (kg)."""
+    com_m: ArrayLike
+    """Centre of mass, (3,) (m)."""
+    inertia_kg_m2: ArrayLike
+    """Inertia about the centre of mass, (3, 3) (kg m^2)."""
+
+    @staticmethod
+    def ball(mass_kg: float, radius_m: float, com_m: ArrayLike) -> Payload:
+        """A solid ball."""
+        return Payload(mass_kg, com_m, 0.4 * mass_kg * radius_m**2 * np.eye(3))
+
+    def _dict(self) -> dict[str, Any]:
+        com, inertia = np.asarray(self.com_m, float), np.asarray(self.inertia_kg_m2, float)
+        for name, array, shape in (("com_m", com, (3,)), ("inertia_kg_m2", inertia, (3, 3))):
+            if array.shape != shape:
+                raise ValueError(f"{name}: expected shape {shape}, got {array.shape}")
+        return {
+            "mass_kg": float(self.mass_kg),
+            "com_m": com.tolist(),
+            "inertia_kg_m2": inertia.tolist(),
+        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,7 +216,7 @@ class Fit:
     _fit: _native.Fit = field(repr=False)
     columns: Mapping[str, float]
     """Every column by name with its value: ``"Izz2"``, rotor ``"Ir0"``, viscous ``"V0"``, Coulomb
-    ``"S0"``, ``"offset0"``, asymmetry ``"A0"``, Stribeck ``"B0"``; joints are counted from 0. SI units."""
+    ``"S0"``, ``"offset0"``, asymmetry ``"A0"``, Stribeck ``"B0"``, load ``"L0"``; joints are counted from 0. SI units."""
     base_names: tuple[str, ...]
     """Each base parameter in words, (rank,)."""
     base_parameters: Array
@@ -265,11 +301,115 @@ class Fit:
             found[name] = whole
         return Validation(**found)
 
-    def save(self, path: str | os.PathLike[str]) -> Path:
+    def payload(
+        self,
+        t: ArrayLike | Sequence[ArrayLike],
+        q: ArrayLike | Sequence[ArrayLike],
+        tau: ArrayLike | Sequence[ArrayLike],
+        qd: ArrayLike | Sequence[ArrayLike] | None = None,
+        qdd: ArrayLike | Sequence[ArrayLike] | None = None,
+        *,
+        guess: Payload,
+    ) -> Payload:
+        """The body in the hand that explains what this fit, of the arm without it, leaves of logs with it.
+
+        Parameters
+        ----------
+        t, q, tau, qd, qdd
+            The log or logs, as in :func:`identify`; prepared as the fitted ones were.
+        guess : Payload
+            What it is drawn to where the logs do not tell.
+
+        Raises
+        ------
+        ValueError
+            As :func:`identify`; for a guess that is no body.
+        """
+        found = _native.payload(self._fit, _logs(t, q, tau, qd, qdd), guess._dict())
+        return Payload(**found)
+
+    def torque_scale(
+        self,
+        t: ArrayLike | Sequence[ArrayLike],
+        q: ArrayLike | Sequence[ArrayLike],
+        tau: ArrayLike | Sequence[ArrayLike],
+        qd: ArrayLike | Sequence[ArrayLike] | None = None,
+        qdd: ArrayLike | Sequence[ArrayLike] | None = None,
+        *,
+        known: Payload,
+    ) -> tuple[float | None, ...]:
+        """True by logged torque of each moving joint, (M,), from logs with a known body in the hand.
+
+        Published torque constants of one arm differ by a fifth; a weight tells. ``None`` where the body
+        adds too little to a joint's torque. Multiply ``tau`` by it and identify again, twice where the
+        scales of the joints differ: joints share links, and the first fit is off where they do.
+
+        Parameters
+        ----------
+        t, q, tau, qd, qdd
+            The log or logs, as in :func:`identify`; prepared as the fitted ones were, torques of the same
+            scale as theirs.
+        known : Payload
+            The body.
+
+        Raises
+        ------
+        ValueError
+            As :func:`identify`; for a body that is none.
+        """
+        return tuple(_native.torque_scale(self._fit, _logs(t, q, tau, qd, qdd), known._dict()))
+
+    def ripple(
+        self,
+        t: ArrayLike | Sequence[ArrayLike],
+        q: ArrayLike | Sequence[ArrayLike],
+        tau: ArrayLike | Sequence[ArrayLike],
+        *,
+        harmonics: Sequence[int] = range(1, 9),
+        fast_rad_per_s: float = 0.2,
+        cutoff_hz: float = 40.0,
+    ) -> Ripple:
+        """Torque ripple of every motor, from slow motion of all joints.
+
+        Parameters
+        ----------
+        t, q, tau
+            The log or logs, as in :func:`identify`.
+        harmonics : sequence of int
+            Periods in a revolution of the motor to look for.
+        fast_rad_per_s : float
+            Faster samples are left out (rad/s).
+        cutoff_hz : float
+            Cutoff of the filter (Hz): ripple is faster than what the model is fitted to.
+
+        Returns
+        -------
+        tuple of tuples of (int, float, float)
+            Motor by motor, the harmonics that stand out of the noise, the largest first: harmonic, sine
+            and cosine amplitude at the motor (N m). :meth:`save` takes it.
+
+        Raises
+        ------
+        ValueError
+            As :func:`identify`; where not all joints were identified, or there is too little slow motion.
+        """
+        orders = [int(harmonic) for harmonic in harmonics]
+        logs = _logs(t, q, tau, None, None)
+        found = _native.ripple(self._fit, logs, orders, fast_rad_per_s, cutoff_hz)
+        return tuple(tuple(lines) for lines in found)
+
+    def save(self, path: str | os.PathLike[str], *, ripple: Ripple | None = None) -> Path:
         """Write the model as ``arm.toml`` and ``arm.urdf`` into the folder ``path``.
 
         The controller loads it (``supple demo --arm path``), and so does :meth:`Arm.load`. The folder is
         made if need be; files in it are replaced.
+
+        Parameters
+        ----------
+        path : str or os.PathLike
+            The folder.
+        ripple : optional
+            Torque ripple of the motors, as :meth:`ripple` gives it. Default: that of the arm given.
 
         Returns
         -------
@@ -283,7 +423,7 @@ class Fit:
         OSError
             Where it cannot be written.
         """
-        arm = self.arm
+        arm = self._fit.arm(ripple)
         folder = Path(path)
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in (("arm.urdf", arm.urdf), ("arm.toml", arm.toml)):
@@ -407,8 +547,10 @@ def identify(
     method : {"consistent", "wls", "irls", "ols"}
         Weighted with every link a body that can be and friction that takes energy; weighted least
         squares; robust (Huber); ordinary least squares.
-    friction : "auto", {"none", "viscous", "coulomb", "offset", "asymmetric", "stribeck"} or FrictionColumns
-        Friction columns of every moving joint. ``"auto"`` chooses by cross-validation. ``"stribeck"`` is
+    friction : "auto", {"none", "viscous", "coulomb", "offset", "asymmetric", "load", "stribeck"} or FrictionColumns
+        Friction columns of every moving joint. ``"auto"`` chooses by cross-validation. ``"load"`` is
+        viscous and Coulomb, which grows with the load; the controller's friction, which knows none, has
+        it at the mean load. ``"stribeck"`` is
         viscous and Coulomb with offset, and a dip, its speed included, from slow motion in a second
         stage.
     rate_hz : float, optional

@@ -1,6 +1,6 @@
 """Private: what the package is built on. Docstrings are in the module itself."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
 from typing import Any, final
 
@@ -19,8 +19,12 @@ __all__ = [
     "design_excitation",
     "excite",
     "identify",
+    "learn",
+    "payload",
     "read_log",
+    "ripple",
     "simulate",
+    "torque_scale",
 ]
 __version__: str
 
@@ -37,6 +41,7 @@ class Arm:
         gravity: ArrayLike = ...,
         armature: ArrayLike | None = None,
         fixed_joints_rad: Mapping[str, float] | None = None,
+        point_mass_radius_m: float | None = None,
     ) -> Arm: ...
     @staticmethod
     def _from_text(toml: str, urdf: str) -> Arm: ...
@@ -116,7 +121,7 @@ class Fit:
     def report(self) -> dict[str, Any]: ...
     def motions(self) -> list[dict[str, _Array]]: ...
     def arm_given(self) -> Arm: ...
-    def arm(self) -> Arm: ...
+    def arm(self, ripple: Sequence[Sequence[tuple[int, float, float]]] | None = None) -> Arm: ...
     def predict(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> _Array: ...
     def validate(self, log: dict[str, Any]) -> dict[str, Any]: ...
 
@@ -134,3 +139,15 @@ def design_excitation(
 def excite(
     arm: Arm, model: Arm, series: dict[str, Any], drive: dict[str, Any]
 ) -> dict[str, Any]: ...
+def learn(arm: Arm, logs: list[dict[str, Any]], options: dict[str, Any]) -> dict[str, Any]: ...
+def payload(fit: Fit, logs: list[dict[str, Any]], guess: dict[str, Any]) -> dict[str, Any]: ...
+def torque_scale(
+    fit: Fit, logs: list[dict[str, Any]], known: dict[str, Any]
+) -> list[float | None]: ...
+def ripple(
+    fit: Fit,
+    logs: list[dict[str, Any]],
+    harmonics: list[int],
+    fast_rad_per_s: float,
+    cutoff_hz: float,
+) -> list[list[tuple[int, float, float]]]: ...

@@ -2,7 +2,9 @@
 
 use crate::mirror::{Mirror, Worker};
 use supple_bus::virtual_time::{Direct, Lockstep, Responder};
-use supple_bus::{Bus, BusError, DatagramBus, FaultInjector, OwnerFolder, Side, SocketCan};
+use supple_bus::{
+    Bus, BusError, DatagramBus, FaultInjector, OwnerFolder, Paced, Pacer, Side, SocketCan,
+};
 use tempfile::TempDir;
 
 type Arm = (Option<Worker>, Option<TempDir>);
@@ -27,6 +29,13 @@ pub fn lockstep() -> Opened {
     let (temporary, folder) = folder();
     let worker = Worker::responder(Responder::open(&folder).unwrap());
     let bus = Lockstep::open(&folder).unwrap();
+    Some(((Some(worker), Some(temporary)), Box::new(bus)))
+}
+
+pub fn paced() -> Opened {
+    let (temporary, folder) = folder();
+    let worker = Worker::pacer(Pacer::open(&folder, 0).unwrap());
+    let bus = Paced::open(&folder).unwrap();
     Some(((Some(worker), Some(temporary)), Box::new(bus)))
 }
 

@@ -38,6 +38,7 @@ macro_rules! on_every_backend {
 on_every_backend!(
     direct,
     lockstep,
+    paced,
     datagram,
     socket_can,
     injected_direct,

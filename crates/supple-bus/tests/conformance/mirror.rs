@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use supple_bus::virtual_time::{Peer, Responder};
-use supple_bus::{Bus, Event};
+use supple_bus::{Bus, Event, Pacer};
 use supple_puck::{CanFrame, GroupId, MessageId, NodeId};
 
 /// Time that a frame takes in virtual time \[ns\].
@@ -86,6 +86,18 @@ impl Worker {
             let (responder, mirror) = &mut *responder.lock().unwrap();
             while !stop.load(Ordering::Relaxed) {
                 responder.serve(mirror, 5_000_000).unwrap();
+            }
+        })
+    }
+}
+
+impl Worker {
+    pub fn pacer(pacer: Pacer) -> Worker {
+        let pacer = std::sync::Mutex::new((pacer, Mirror::default()));
+        Worker::run(move |stop| {
+            let (pacer, mirror) = &mut *pacer.lock().unwrap();
+            while !stop.load(Ordering::Relaxed) {
+                pacer.turn(mirror).unwrap();
             }
         })
     }

@@ -5,9 +5,11 @@
 )]
 
 use super::chain::parent_rotations;
-use super::vec3::{V3, add, cross, dot, rotate, rotate_back, scale};
+use super::vec3::{
+    V3, add, add_cross, add_rotated, add_scaled, cross, dot, rotate, rotate_back, scale,
+};
 use crate::arm::Arm;
-use crate::lanes::{in_groups, of_joint};
+use crate::lanes::{Number, in_groups, of_joint};
 use crate::math::Vector;
 
 /// Symmetric 3 x 3 matrix `xx, xy, yy, xz, yz, zz`.
@@ -104,7 +106,7 @@ fn forward_dynamics<const N: usize, const G: usize>(
     for i in 0..N {
         let (hinge, r) = (&hinges[i], of_joint(&rotations, i));
         if i > 0 {
-            accel = add(accel, cross(alpha, origin(i)));
+            accel = add_cross(accel, alpha, origin(i));
         }
         accel = add(rotate_back(&r, accel), hinge.bias_accel);
         alpha = add(rotate_back(&r, alpha), hinge.bias_alpha);
@@ -118,7 +120,7 @@ fn forward_dynamics<const N: usize, const G: usize>(
 /// Link `i` alone.
 #[inline(always)]
 fn link<const N: usize>(arm: &Arm<N>, i: usize, spin: V3) -> Articulated {
-    let body = |k: usize| arm.rows.body[k][i];
+    let body = |k: usize| arm.rows.body(k, i);
     let (mass, h) = (body(0), [body(1), body(2), body(3)]);
     let a = core::array::from_fn(|k| body(4 + k));
     Articulated {
@@ -133,9 +135,9 @@ fn link<const N: usize>(arm: &Arm<N>, i: usize, spin: V3) -> Articulated {
 #[inline(always)]
 fn times(m: &Symmetric, v: V3) -> V3 {
     [
-        m[0] * v[0] + m[1] * v[1] + m[3] * v[2],
-        m[1] * v[0] + m[2] * v[1] + m[4] * v[2],
-        m[3] * v[0] + m[4] * v[1] + m[5] * v[2],
+        dot([m[0], m[1], m[3]], v),
+        dot([m[1], m[2], m[4]], v),
+        dot([m[3], m[4], m[5]], v),
     ]
 }
 
@@ -147,7 +149,7 @@ fn turned(r: &[f64; 9], m: &Symmetric) -> Symmetric {
         rotate(r, [m[1], m[2], m[4]]),
         rotate(r, [m[3], m[4], m[5]]),
     );
-    let entry = |i: usize, j: usize| x[i] * r[j] + y[i] * r[3 + j] + z[i] * r[6 + j];
+    let entry = |i: usize, j: usize| dot([x[i], y[i], z[i]], [r[j], r[3 + j], r[6 + j]]);
     [
         entry(0, 0),
         entry(1, 0),
@@ -181,17 +183,17 @@ impl Articulated {
         let (um, uf) = (hinge.u_moment, hinge.u_force);
         let (dm, df) = (scale(um, hinge.inverse_d), scale(uf, hinge.inverse_d));
         for (k, (i, j)) in ENTRIES.into_iter().enumerate() {
-            self.a[k] -= um[i] * dm[j];
-            self.c[k] -= uf[i] * df[j];
+            self.a[k] = (-um[i]).times_plus(dm[j], self.a[k]);
+            self.c[k] = (-uf[i]).times_plus(df[j], self.c[k]);
         }
         for k in 0..9 {
-            self.b[k] -= um[k % 3] * df[k / 3];
+            self.b[k] = (-um[k % 3]).times_plus(df[k / 3], self.b[k]);
         }
         let (alpha, accel) = (hinge.bias_alpha, hinge.bias_accel);
-        let moment = add(times(&self.a, alpha), rotate(&self.b, accel));
+        let moment = add_rotated(times(&self.a, alpha), &self.b, accel);
         let force = add(rotate_back(&self.b, alpha), times(&self.c, accel));
-        self.moment = add(self.moment, add(moment, scale(dm, hinge.drive)));
-        self.force = add(self.force, add(force, scale(df, hinge.drive)));
+        self.moment = add(self.moment, add_scaled(moment, dm, hinge.drive));
+        self.force = add(self.force, add_scaled(force, df, hinge.drive));
     }
 
     /// Seen from the parent's joint frame, in which this one stands at `p`, turned by `r`.
@@ -202,11 +204,10 @@ impl Articulated {
         let b = super::vec3::product(&half, &super::vec3::transposed(r));
         // With P = [p x]: B' = B + P C and A' = A - B' P - (B P)^T.
         let shifted = super::vec3::join3(
-            cross(p, [c[0], c[1], c[3]]),
-            cross(p, [c[1], c[2], c[4]]),
-            cross(p, [c[3], c[4], c[5]]),
+            add_cross([b[0], b[1], b[2]], p, [c[0], c[1], c[3]]),
+            add_cross([b[3], b[4], b[5]], p, [c[1], c[2], c[4]]),
+            add_cross([b[6], b[7], b[8]], p, [c[3], c[4], c[5]]),
         );
-        let shifted: [f64; 9] = core::array::from_fn(|k| b[k] + shifted[k]);
         // Entry (i, j) of M P is the j-th of (row i of M) x p.
         let row = |m: &[f64; 9], i: usize| cross([m[i], m[3 + i], m[6 + i]], p);
         let (left, right) = (
@@ -221,7 +222,7 @@ impl Articulated {
             }),
             b: shifted,
             c,
-            moment: add(rotate(r, self.moment), cross(p, force)),
+            moment: add_cross(rotate(r, self.moment), p, force),
             force,
         }
     }

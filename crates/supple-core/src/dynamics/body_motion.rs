@@ -6,9 +6,9 @@
     reason = "joints, groups and lanes are counted: each index goes into several arrays"
 )]
 
-use super::vec3::{V3, add, rotate, rotate_back};
+use super::vec3::{V3, add_rotated, rotate_back};
 use crate::arm::Arm;
-use crate::lanes::{Rows, of_joint};
+use crate::lanes::{Number, Rows, of_joint};
 use crate::math::Vector;
 
 /// Motion of a joint frame, in its own axes.
@@ -51,9 +51,9 @@ pub(super) fn body_motions<const N: usize, const G: usize>(
         if i > 0 {
             spin = rotate_back(&r, last.spin);
             rate = rotate_back(&r, last.rate);
-            rate[0] += spin[1] * qd[i];
-            rate[1] -= spin[0] * qd[i];
-            accel = add(accel, rotate(&last.gradient, origin));
+            rate[0] = spin[1].times_plus(qd[i], rate[0]);
+            rate[1] = (-spin[0]).times_plus(qd[i], rate[1]);
+            accel = add_rotated(accel, &last.gradient, origin);
         }
         rate[2] += qdd[i];
         spin[2] += qd[i];
@@ -71,17 +71,16 @@ pub(super) fn body_motions<const N: usize, const G: usize>(
 /// `W`, by columns.
 #[inline(always)]
 pub(super) fn gradient(w: V3, rate: V3) -> [f64; 9] {
-    let (xx, yy, zz) = (w[0] * w[0], w[1] * w[1], w[2] * w[2]);
-    let (xy, xz, yz) = (w[0] * w[1], w[0] * w[2], w[1] * w[2]);
+    let zz = w[2] * w[2];
     [
-        -(yy + zz),
-        xy + rate[2],
-        xz - rate[1],
-        xy - rate[2],
-        -(xx + zz),
-        yz + rate[0],
-        xz + rate[1],
-        yz - rate[0],
-        -(xx + yy),
+        -w[1].times_plus(w[1], zz),
+        w[0].times_plus(w[1], rate[2]),
+        w[0].times_plus(w[2], -rate[1]),
+        w[0].times_plus(w[1], -rate[2]),
+        -w[0].times_plus(w[0], zz),
+        w[1].times_plus(w[2], rate[0]),
+        w[0].times_plus(w[2], rate[1]),
+        w[1].times_plus(w[2], -rate[0]),
+        -w[0].times_plus(w[0], w[1] * w[1]),
     ]
 }

@@ -1,22 +1,61 @@
-//! Where every joint frame stands in the base, joint after joint.
+//! Where every joint frame stands in the base.
+//!
+//! Poses are composed by pairs, then pairs of pairs, then group after group: in four lanes that is two steps
+//! where joint after joint takes three, and all joints stay in their lanes.
 #![allow(
     clippy::needless_range_loop,
     reason = "joints, groups and lanes are counted: each index goes into several arrays"
 )]
 
-use super::vec3::{V3, add, product, rotate};
+use super::vec3::{V3, add_rotated, product};
 use crate::arm::Arm;
-use crate::lanes::{Lanes, Rows, for_each_joint, of_joint, rows};
+use crate::lanes::{Column, LANES, Lanes, Number, Rows, for_each_joint, of_joint, splat};
 use crate::math::{Matrix3, Vector, Vector3};
 use crate::pose::Pose;
 use crate::sincos::sin_cos_all;
+use core::array::from_fn;
 
 /// Rotation by columns, and origin.
 #[derive(Clone, Copy)]
-pub(super) struct Frame {
-    pub rotation: [f64; 9],
-    pub origin: V3,
+pub(crate) struct Place<T> {
+    pub rotation: [T; 9],
+    pub origin: V3<T>,
 }
+
+/// Of one joint, or of the tip.
+pub(crate) type Frame = Place<f64>;
+
+impl<T: Number> Place<T> {
+    /// Of frame `c` in `a`, where `self` is frame `b` in `a`.
+    #[inline(always)]
+    fn then(&self, b_from_c: &Place<T>) -> Place<T> {
+        Place {
+            rotation: product(&self.rotation, &b_from_c.rotation),
+            origin: add_rotated(self.origin, &self.rotation, b_from_c.origin),
+        }
+    }
+}
+
+impl Place<Lanes> {
+    #[inline(always)]
+    fn base() -> Place<Lanes> {
+        Place {
+            rotation: splat(UNTURNED),
+            origin: splat([0.0; 3]),
+        }
+    }
+
+    /// Joints moved to other lanes; `moved` is also given the number that the base has there.
+    #[inline(always)]
+    fn shifted(&self, moved: impl Fn([f64; LANES], f64) -> [f64; LANES]) -> Place<Lanes> {
+        Place {
+            rotation: from_fn(|k| Lanes::new(moved(self.rotation[k].to_array(), UNTURNED[k]))),
+            origin: from_fn(|k| Lanes::new(moved(self.origin[k].to_array(), 0.0))),
+        }
+    }
+}
+
+const UNTURNED: [f64; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
 
 impl Frame {
     /// Axis about which the joint turns.
@@ -43,15 +82,6 @@ impl Frame {
             translation: Vector3::from(self.origin),
         }
     }
-
-    /// Of frame `c` in `a`, where `self` is frame `b` in `a`.
-    #[inline(always)]
-    fn then(&self, b_from_c: &Frame) -> Frame {
-        Frame {
-            rotation: product(&self.rotation, &b_from_c.rotation),
-            origin: add(self.origin, rotate(&self.rotation, b_from_c.origin)),
-        }
-    }
 }
 
 /// `base_from_joint` of every joint, by rows, and `base_from_tip`.
@@ -65,20 +95,39 @@ impl<const G: usize> Chain<G> {
     #[inline(always)]
     pub fn new<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> Self {
         let local = parent_rotations::<N, G>(arm, q);
-        let mut base = Frame::of(&Pose::IDENTITY);
-        let mut frames = [base; N];
-        for (i, frame) in frames.iter_mut().enumerate() {
-            let step = Frame {
-                rotation: of_joint(&local, i),
-                origin: arm.links[i].parent_from_joint.translation.data.0[0],
+        let steps = arm.rows.origins::<G>();
+        let (mut rotations, mut origins) = ([[Lanes::ZERO; G]; 9], [[Lanes::ZERO; G]; 3]);
+        let mut before = Place::<Lanes>::base();
+        for group in 0..G {
+            let step = Place {
+                rotation: from_fn(|k| local[k][group]),
+                origin: from_fn(|k| steps[k][group]),
             };
-            base = if i == 0 { step } else { base.then(&step) };
-            *frame = base;
+            let pairs = step
+                .shifted(|[a, b, c, _], base| [base, a, b, c])
+                .then(&step);
+            let mut place = pairs
+                .shifted(|[a, b, ..], base| [base, base, a, b])
+                .then(&pairs);
+            if group > 0 {
+                place = before.then(&place);
+            }
+            before = place.shifted(|[.., last], _| [last; LANES]);
+            for (row, x) in rotations.iter_mut().zip(place.rotation) {
+                row[group] = x;
+            }
+            for (row, x) in origins.iter_mut().zip(place.origin) {
+                row[group] = x;
+            }
         }
+        let last = Frame {
+            rotation: of_joint(&rotations, N - 1),
+            origin: of_joint(&origins, N - 1),
+        };
         Chain {
-            rotations: rows::<9, N, G>(|k, i| frames[i].rotation[k]),
-            origins: rows::<3, N, G>(|k, i| frames[i].origin[k]),
-            tip: base.then(&Frame::of(&arm.joint_from_tip)),
+            tip: last.then(&Frame::of(&arm.joint_from_tip)),
+            rotations,
+            origins,
         }
     }
 
@@ -97,21 +146,23 @@ pub(super) fn parent_rotations<const N: usize, const G: usize>(
     arm: &Arm<N>,
     q: &Vector<N>,
 ) -> Rows<9, G> {
-    let [angles] = rows::<1, N, G>(|_, i| q[i]);
+    // The last angle again where there is no joint: with a constant there the compiler takes the group apart.
+    let angles: Column<G> =
+        from_fn(|group| Lanes::new(from_fn(|lane| q[(group * LANES + lane).min(N - 1)])));
     let mut turns = [[Lanes::ZERO; G]; 2];
     for group in 0..G {
         let (sines, cosines) = sin_cos_all(&angles[group].to_array());
         (turns[0][group], turns[1][group]) = (Lanes::new(sines), Lanes::new(cosines));
     }
-    let constant = rows::<9, N, G>(|k, i| arm.rows.rotation[k][i]);
+    let constant = arm.rows.rotations::<G>();
     for_each_joint(&turns, &constant, &[], |[s, c], r, []| {
         [
-            r[0] * c + r[3] * s,
-            r[1] * c + r[4] * s,
-            r[2] * c + r[5] * s,
-            r[3] * c - r[0] * s,
-            r[4] * c - r[1] * s,
-            r[5] * c - r[2] * s,
+            Number::times_plus(r[3], s, r[0] * c),
+            Number::times_plus(r[4], s, r[1] * c),
+            Number::times_plus(r[5], s, r[2] * c),
+            Number::times_plus(r[3], c, -(r[0] * s)),
+            Number::times_plus(r[4], c, -(r[1] * s)),
+            Number::times_plus(r[5], c, -(r[2] * s)),
             r[6],
             r[7],
             r[8],

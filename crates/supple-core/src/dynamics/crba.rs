@@ -9,7 +9,9 @@ use super::frames::{bodies, joint_motions};
 use super::inertia::times;
 use super::vec3::dot6;
 use crate::arm::Arm;
-use crate::lanes::{LANES, Rows, for_each_joint, in_groups, of_joint, splat, sums_inward};
+use crate::lanes::{
+    Columns, LANES, Lanes, Rows, entry, for_each_joint, in_groups, of_joint, splat, sums_inward,
+};
 use crate::math::{Matrix, Vector};
 
 /// Mass matrix `H(q)`, symmetric, rotor inertias on the diagonal \[kg m^2\]. `q` \[rad\].
@@ -21,35 +23,48 @@ pub fn crba<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> Matrix<N, N> {
 #[inline]
 fn of_position<const N: usize, const G: usize>(arm: &Arm<N>, q: &Vector<N>) -> Matrix<N, N> {
     let chain = Chain::<G>::new(arm, q);
-    let carried = sums_inward(bodies(arm, &chain));
-    mass_matrix(arm, &joint_motions(&chain), &carried)
+    let last = of_joint(&chain.origins, N - 1);
+    let carried = sums_inward(bodies(arm, &chain, last));
+    symmetric(&mass_columns(arm, &joint_motions(&chain, last), &carried))
 }
 
-/// From the joints' motions and what they carry.
+/// From the joints' motions and what they carry, right from the diagonal downwards.
 #[inline(always)]
-pub(super) fn mass_matrix<const N: usize, const G: usize>(
+pub(super) fn mass_columns<const N: usize, const G: usize>(
     arm: &Arm<N>,
     motions: &Rows<6, G>,
     carried: &Rows<10, G>,
-) -> Matrix<N, N> {
+) -> Columns<N, G> {
+    // The force is that of all a joint carries: right for itself and for the joints before it.
     let forces = for_each_joint(motions, carried, &[], |axis, body, []| times(body, axis));
-    let mut h = Matrix::<N, N>::zeros();
-    let columns = &mut h.data.0;
+    let mut columns = [[Lanes::ZERO; G]; N];
     for j in 0..N {
-        let f = splat(of_joint(&forces, j));
-        // The force is that of all joint j carries: right for itself and for the joints before it.
-        for group in 0..=j / LANES {
-            let motion = core::array::from_fn(|k| motions[k][group]);
-            let torques = dot6(motion, f).to_array();
-            for lane in 0..LANES {
-                let i = group * LANES + lane;
-                if i <= j {
-                    columns[j][i] = torques[lane];
-                    columns[i][j] = torques[lane];
-                }
-            }
+        let motion = splat(of_joint(motions, j));
+        for group in j / LANES..G {
+            columns[j][group] = dot6(motion, core::array::from_fn(|k| forces[k][group]));
         }
-        columns[j][j] += arm.armature[j];
+        let rotor = core::array::from_fn(|lane| {
+            if lane == j % LANES {
+                arm.armature[j]
+            } else {
+                0.0
+            }
+        });
+        columns[j][j / LANES] += Lanes::new(rotor);
     }
-    h
+    columns
+}
+
+/// The whole of a symmetric matrix of which the lower triangle is known.
+#[inline(always)]
+pub(super) fn symmetric<const N: usize, const G: usize>(columns: &Columns<N, G>) -> Matrix<N, N> {
+    let mut whole = Matrix::<N, N>::zeros();
+    for j in 0..N {
+        for i in j..N {
+            let x = entry(&columns[j], i);
+            whole.data.0[j][i] = x;
+            whole.data.0[i][j] = x;
+        }
+    }
+    whole
 }

@@ -1,39 +1,39 @@
-//! Joints and links in base axes about the tip's origin.
+//! Joints and links in base axes about one point.
 //!
-//! There neither velocities nor forces have to be turned on their way along the arm: they are sums. The tip
-//! is the reference point, not the base, because the light bodies of the wrist are near it: about the base
+//! There neither velocities nor forces have to be turned on their way along the arm: they are sums. The point
+//! is the tip or the last joint, not the base, because the light bodies of the wrist are near it: about the base
 //! their inertias would vanish in their own distance.
 
 use super::chain::Chain;
 use super::inertia::in_base;
-use super::vec3::{cross, join, sub};
+use super::vec3::{V3, cross, join, sub};
 use crate::arm::Arm;
-use crate::lanes::{Rows, for_each_joint, of_joint, rows, splat};
+use crate::lanes::{Rows, for_each_joint, of_joint, splat};
 use crate::math::Matrix;
 
-/// What each joint's unit speed gives the tip, linear then angular: the columns of the Jacobian.
+/// What each joint's unit speed gives a point, linear then angular: of the tip, the Jacobian's columns.
 #[inline(always)]
-pub(super) fn joint_motions<const G: usize>(chain: &Chain<G>) -> Rows<6, G> {
-    let tip = splat(chain.tip.origin);
+pub(super) fn joint_motions<const G: usize>(chain: &Chain<G>, point: V3) -> Rows<6, G> {
+    let point = splat(point);
     for_each_joint(&chain.rotations, &chain.origins, &[], |r, origin, []| {
         let axis = [r[6], r[7], r[8]];
-        join(cross(axis, sub(tip, origin)), axis)
+        join(cross(axis, sub(point, origin)), axis)
     })
 }
 
-/// The links in base axes about the tip.
+/// The links in base axes about a point.
 #[inline(always)]
 pub(super) fn bodies<const N: usize, const G: usize>(
     arm: &Arm<N>,
     chain: &Chain<G>,
+    point: V3,
 ) -> Rows<10, G> {
-    let tip = splat(chain.tip.origin);
-    let bodies = rows::<10, N, G>(|k, i| arm.rows.body[k][i]);
+    let point = splat(point);
     for_each_joint(
-        &bodies,
+        &arm.rows.bodies(),
         &chain.rotations,
         &chain.origins,
-        |body, r, origin| in_base(body, &r, sub(origin, tip)),
+        |body, r, origin| in_base(body, &r, sub(origin, point)),
     )
 }
 

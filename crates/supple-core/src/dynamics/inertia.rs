@@ -4,7 +4,7 @@
 //! forces are pairs of vectors, linear before angular, of the body's point that is at the reference
 //! point now.
 
-use super::vec3::{V3, add, cross, dot, halves, join, rotate, scale};
+use super::vec3::{V3, add_cross, add_scaled, cross, dot, halves, join, rotate, scale};
 use crate::lanes::Number;
 
 /// A body of a joint frame `rotation` (by columns), whose origin is at `r` from the reference point.
@@ -19,24 +19,30 @@ pub(super) fn in_base<T: Number>(body: [T; 10], rotation: &[T; 9], r: V3<T>) -> 
         rotate(rotation, [xy, yy, yz]),
         rotate(rotation, [xz, yz, zz]),
     );
-    let entry =
-        |i: usize, j: usize| a[i] * rotation[j] + b[i] * rotation[3 + j] + c[i] * rotation[6 + j];
+    let row = |i: usize, j: usize| {
+        dot(
+            [a[i], b[i], c[i]],
+            [rotation[j], rotation[3 + j], rotation[6 + j]],
+        )
+    };
     // Shifted by r: 2 (r . s) 1 - r s^T - s r^T with s = h + m r / 2.
-    let s = add(moment, scale(r, T::splat(0.5) * mass));
+    let s = add_scaled(moment, r, T::splat(0.5) * mass);
     let (x, y, z) = (r[0] * s[0], r[1] * s[1], r[2] * s[2]);
-    let shifted = add(moment, scale(r, mass));
+    let shifted = add_scaled(moment, r, mass);
     let two = T::splat(2.0);
+    let product =
+        |i: usize, j: usize| (-r[i]).times_plus(s[j], (-r[j]).times_plus(s[i], row(i, j)));
     [
         mass,
         shifted[0],
         shifted[1],
         shifted[2],
-        entry(0, 0) + two * (y + z),
-        entry(1, 0) - (r[0] * s[1] + r[1] * s[0]),
-        entry(1, 1) + two * (x + z),
-        entry(2, 0) - (r[0] * s[2] + r[2] * s[0]),
-        entry(2, 1) - (r[1] * s[2] + r[2] * s[1]),
-        entry(2, 2) + two * (x + y),
+        two.times_plus(y + z, row(0, 0)),
+        product(1, 0),
+        two.times_plus(x + z, row(1, 1)),
+        product(2, 0),
+        product(2, 1),
+        two.times_plus(x + y, row(2, 2)),
     ]
 }
 
@@ -46,13 +52,13 @@ pub(super) fn times<T: Number>(body: [T; 10], motion: [T; 6]) -> [T; 6] {
     let (linear, angular) = halves(motion);
     let moment = [body[1], body[2], body[3]];
     let spun = [
-        body[4] * angular[0] + body[5] * angular[1] + body[7] * angular[2],
-        body[5] * angular[0] + body[6] * angular[1] + body[8] * angular[2],
-        body[7] * angular[0] + body[8] * angular[1] + body[9] * angular[2],
+        dot([body[4], body[5], body[7]], angular),
+        dot([body[5], body[6], body[8]], angular),
+        dot([body[7], body[8], body[9]], angular),
     ];
     join(
-        add(scale(linear, body[0]), cross(angular, moment)),
-        add(spun, cross(moment, linear)),
+        add_cross(scale(linear, body[0]), angular, moment),
+        add_cross(spun, moment, linear),
     )
 }
 
@@ -60,14 +66,14 @@ pub(super) fn times<T: Number>(body: [T; 10], motion: [T; 6]) -> [T; 6] {
 #[inline(always)]
 pub(super) fn cross_motion<T: Number>(twist: [T; 6], motion: [T; 6]) -> [T; 6] {
     let ((v, w), (linear, angular)) = (halves(twist), halves(motion));
-    join(add(cross(w, linear), cross(v, angular)), cross(w, angular))
+    join(add_cross(cross(w, linear), v, angular), cross(w, angular))
 }
 
 /// Rate of a momentum that is fixed in a body of velocity `twist`.
 #[inline(always)]
 pub(super) fn cross_force<T: Number>(twist: [T; 6], force: [T; 6]) -> [T; 6] {
     let ((v, w), (linear, angular)) = (halves(twist), halves(force));
-    join(cross(w, linear), add(cross(w, angular), cross(v, linear)))
+    join(cross(w, linear), add_cross(cross(w, angular), v, linear))
 }
 
 /// Torque about an axis through which the body falls: what holds it, `-S . (m g, h x g)`.

@@ -6,7 +6,7 @@
 
 use super::chain::Chain;
 use super::frames::{joint_motions, matrix};
-use super::vec3::{add, cross, scale, sub};
+use super::vec3::{add, add_cross, cross, scale, sub};
 use crate::arm::Arm;
 use crate::lanes::in_groups;
 use crate::math::{Matrix, Vector};
@@ -43,7 +43,8 @@ pub fn jacobian<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> Matrix<6, N> {
 
 #[inline]
 fn columns<const N: usize, const G: usize>(arm: &Arm<N>, q: &Vector<N>) -> Matrix<6, N> {
-    matrix(&joint_motions(&Chain::<G>::new(arm, q)))
+    let chain = Chain::<G>::new(arm, q);
+    matrix(&joint_motions(&chain, chain.tip.origin))
 }
 
 /// `J' qd`: classical acceleration of the tip at `qdd = 0` \[m/s^2, rad/s^2\], base axes.
@@ -59,7 +60,7 @@ fn drift<const N: usize, const G: usize>(arm: &Arm<N>, q: &Vector<N>, qd: &Vecto
     for i in 0..N {
         let frame = chain.frame(i);
         let axis = scale(frame.axis(), qd[i]);
-        rate = add(rate, cross(spin, axis));
+        rate = add_cross(rate, spin, axis);
         spin = add(spin, axis);
         let next = if i + 1 < N {
             chain.frame(i + 1)
@@ -67,7 +68,7 @@ fn drift<const N: usize, const G: usize>(arm: &Arm<N>, q: &Vector<N>, qd: &Vecto
             chain.tip
         };
         let way = sub(next.origin, frame.origin);
-        accel = add(accel, add(cross(rate, way), cross(spin, cross(spin, way))));
+        accel = add_cross(add_cross(accel, rate, way), spin, cross(spin, way));
     }
     Vector::<6>::new(accel[0], accel[1], accel[2], rate[0], rate[1], rate[2])
 }

@@ -17,6 +17,7 @@ mod momentum;
 mod motion;
 mod regressor;
 mod rnea;
+mod sweep;
 mod terms;
 mod vec3;
 
@@ -28,7 +29,7 @@ pub use kinematics::{jacobian, jacobian_dot_qd, joint_poses, tip_pose};
 pub use momentum::{Momentum, momentum};
 pub use regressor::{parameters, regressor, regressor_rows};
 pub use rnea::{gravity, rnea};
-pub(crate) use terms::fill;
+pub(crate) use sweep::Sweep;
 pub use terms::{Terms, terms};
 
 use crate::arm::Arm;

@@ -5,9 +5,9 @@
 //! `dT/dq_i = -h_i . (S_i x v_i)` with `h_i` the momentum of all that joint `i` carries: one sweep out
 //! and one back, no matrix.
 
-use super::terms::{Terms, fill};
+use super::sweep::Sweep;
 use crate::arm::Arm;
-use crate::lanes::in_groups;
+use crate::lanes::{in_groups, per_joint};
 use crate::math::Vector;
 
 /// Generalised momentum and kinetic gradient.
@@ -31,10 +31,9 @@ fn of_state<const N: usize, const G: usize>(
     q: &Vector<N>,
     qd: &Vector<N>,
 ) -> Momentum<N> {
-    let mut terms = Terms::default();
-    fill::<N, G>(arm, q, qd, &mut terms);
+    let held = Sweep::<G>::new(arm, q, qd).held();
     Momentum {
-        momentum: terms.momentum,
-        kinetic_gradient: terms.kinetic_gradient,
+        momentum: Vector::from(per_joint(&held.momentum)) + arm.armature.component_mul(qd),
+        kinetic_gradient: Vector::from(per_joint(&held.kinetic_gradient)),
     }
 }

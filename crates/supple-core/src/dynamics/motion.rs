@@ -1,13 +1,13 @@
 //! Velocities and accelerations of all links, and the forces that they take, in base axes about the tip.
 
 use super::inertia::{cross_force, cross_motion, times};
-use super::vec3::{V3, add, cross, halves};
-use crate::lanes::{Lanes, Rows, for_each_joint, of_joint, rows, sums_outward};
+use super::vec3::{V3, add, add_cross, halves, join};
+use crate::lanes::{Lanes, Rows, column, for_each_joint, of_joint, scaled, sums_outward};
 use crate::math::Vector;
 
 /// How every link moves.
-pub(super) struct Motion<const G: usize> {
-    twists: Rows<6, G>,
+pub(crate) struct Motion<const G: usize> {
+    pub twists: Rows<6, G>,
     /// Of each joint's motion: `v x S`.
     pub rates: Rows<6, G>,
     /// With the base accelerated upwards.
@@ -18,9 +18,9 @@ impl<const G: usize> Motion<G> {
     /// Under the joint speeds `qd` alone.
     #[inline(always)]
     pub fn new<const N: usize>(motions: &Rows<6, G>, qd: &Vector<N>, gravity: V3) -> Self {
-        let speeds = rows::<1, N, G>(|_, i| qd[i]);
+        let speeds = [column::<N, G>(&qd.data.0[0])];
         let at_speed =
-            |[speed]: [Lanes; 1], motion: [Lanes; 6], []: [Lanes; 0]| motion.map(|x| x * speed);
+            |[speed]: [Lanes; 1], motion: [Lanes; 6], []: [Lanes; 0]| scaled(motion, speed);
         let twists = for_each_joint(&speeds, motions, &[], at_speed);
         let twists = sums_outward([0.0; 6], twists);
         let rates = for_each_joint(&twists, motions, &[], |twist, motion, []| {
@@ -35,15 +35,38 @@ impl<const G: usize> Motion<G> {
         }
     }
 
-    /// Classical acceleration of the tip, without what gravity was given.
+    /// The same with the joint accelerations `qdd`.
     #[inline(always)]
-    pub fn tip_drift<const N: usize>(&self, gravity: V3) -> Vector<6> {
-        let (velocity, spin) = halves(of_joint(&self.twists, N - 1));
+    pub fn accelerated<const N: usize>(mut self, motions: &Rows<6, G>, qdd: &[f64; N]) -> Self {
+        let rates = [column::<N, G>(qdd)];
+        let own = for_each_joint(&rates, motions, &[], |[rate], motion, []| {
+            scaled(motion, rate)
+        });
+        for (row, own) in self
+            .accelerations
+            .iter_mut()
+            .zip(sums_outward([0.0; 6], own))
+        {
+            for (x, own) in row.iter_mut().zip(own) {
+                *x += own;
+            }
+        }
+        self
+    }
+
+    /// Velocity of the tip, `J qd`.
+    #[inline(always)]
+    pub fn tip_rate<const N: usize>(&self) -> [f64; 6] {
+        of_joint(&self.twists, N - 1)
+    }
+
+    /// Classical acceleration of the tip at `qdd = 0`, `J' qd`.
+    #[inline(always)]
+    pub fn tip_drift<const N: usize>(&self, gravity: V3) -> [f64; 6] {
+        let (velocity, spin) = halves(self.tip_rate::<N>());
         let (linear, angular) = halves(of_joint(&self.accelerations, N - 1));
-        let linear = add(add(linear, cross(spin, velocity)), gravity);
-        Vector::<6>::new(
-            linear[0], linear[1], linear[2], angular[0], angular[1], angular[2],
-        )
+        let linear = add(add_cross(linear, spin, velocity), gravity);
+        join(linear, angular)
     }
 
     /// Force on each link, and its momentum.

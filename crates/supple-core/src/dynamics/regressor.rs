@@ -19,9 +19,13 @@
 
 use super::body_motion::body_motions;
 use super::chain::{Chain, parent_rotations};
-use super::vec3::{V3, add, cross, dot, product, rotate_back, sub, transposed};
+use super::vec3::{
+    V3, add_cross, cross, dot, join3, product, rotate, rotate_back, sub, transposed,
+};
 use crate::arm::Arm;
-use crate::lanes::{Number, for_each_joint, in_groups, per_joint, splat};
+use crate::lanes::{
+    LANES, Lanes, Number, for_each_joint, in_groups, of_joint, per_joint, rows, splat,
+};
 use crate::math::{Matrix, Vector};
 
 /// Joint-torque regressor, a block of ten columns a link \[N x 10 each\]:
@@ -34,11 +38,7 @@ pub fn regressor<const N: usize>(
     qdd: &Vector<N>,
 ) -> [Matrix<N, 10>; N] {
     let mut blocks = [Matrix::<N, 10>::zeros(); N];
-    let put = |link: usize, columns: &[[f64; N]; 10]| {
-        for (column, found) in blocks[link].data.0.iter_mut().zip(columns) {
-            column[..=link].copy_from_slice(&found[..=link]);
-        }
-    };
+    let put = |link: usize, parameter: usize, column| blocks[link].data.0[parameter] = column;
     in_groups!(N, columns(arm, q, qd, qdd, put));
     blocks
 }
@@ -53,62 +53,95 @@ pub fn regressor_rows<const N: usize>(
     qdd: &Vector<N>,
     mut put: impl FnMut(usize, usize, [f64; 10]),
 ) {
-    let by_rows = |link: usize, columns: &[[f64; N]; 10]| {
-        for joint in 0..=link {
-            put(joint, link, columns.map(|column| column[joint]));
+    let mut of_link = [[0.0; 10]; N];
+    let by_rows = |link: usize, parameter: usize, column: [f64; N]| {
+        for (row, x) in of_link.iter_mut().zip(column) {
+            row[parameter] = x;
+        }
+        if parameter == 9 {
+            for (joint, row) in of_link.iter().enumerate().take(link + 1) {
+                put(joint, link, *row);
+            }
         }
     };
     in_groups!(N, columns(arm, q, qd, qdd, by_rows));
 }
 
-/// The columns of every link, right for the joints up to it: `put(link, columns)`.
+/// The columns of every link, one for each of its parameters: `put(link, parameter, column)`.
 #[inline]
 fn columns<const N: usize, const G: usize>(
     arm: &Arm<N>,
     q: &Vector<N>,
     qd: &Vector<N>,
     qdd: &Vector<N>,
-    mut put: impl FnMut(usize, &[[f64; N]; 10]),
+    mut put: impl FnMut(usize, usize, [f64; N]),
 ) {
     let chain = Chain::<G>::new(arm, q);
     let motions = body_motions(arm, &parent_rotations::<N, G>(arm, q), qd, qdd);
+    let places = rows::<1, N, G>(|_, i| i as f64)[0];
+    let link_from_joint = arm.rows.links_from_joints::<G>();
+    let base_from_link =
+        for_each_joint(&chain.rotations, &link_from_joint, &[], |base, link, []| {
+            product(&base, &transposed(&link))
+        });
+    let motions = rows::<9, N, G>(|k, i| {
+        let motion = &motions[i];
+        [motion.spin, motion.rate, motion.accel][k / 3][k % 3]
+    });
+    let motions = for_each_joint(&motions, &link_from_joint, &[], |motion, link, []| {
+        let seen = |k: usize| rotate(&link, [motion[k], motion[k + 1], motion[k + 2]]);
+        join3(seen(0), seen(3), seen(6))
+    });
     for link in 0..N {
-        let frame = chain.frame(link);
-        let mut link_from_joint = [0.0; 9];
-        link_from_joint.copy_from_slice(arm.links[link].link_from_joint.as_slice());
-        let joint_from_link = transposed(&link_from_joint);
-        let base_from_link = product(&frame.rotation, &joint_from_link);
-        let motion = &motions[link];
-        let [w, alpha, accel] = [motion.spin, motion.rate, motion.accel]
-            .map(|v| splat(rotate_back(&joint_from_link, v)));
-        let (base_from_link, here) = (splat(base_from_link), splat(frame.origin));
-        let rows = for_each_joint(&chain.rotations, &chain.origins, &[], |r, origin, []| {
-            let axis = [r[6], r[7], r[8]];
+        let motion = splat(of_joint(&motions, link));
+        let third = |k: usize| [motion[k], motion[k + 1], motion[k + 2]];
+        let (w, alpha, accel) = (third(0), third(3), third(6));
+        let base_from_link = splat(of_joint(&base_from_link, link));
+        let here = splat(of_joint(&chain.origins, link));
+        let mut found = [[Lanes::ZERO; G]; 10];
+        for group in 0..=link / LANES {
+            let (r, o) = (
+                |k: usize| chain.rotations[k][group],
+                |k: usize| chain.origins[k][group],
+            );
+            let axis = [r(6), r(7), r(8)];
+            let origin = [o(0), o(1), o(2)];
             let linear = cross(axis, sub(here, origin));
             let e = rotate_back(&base_from_link, axis);
             let v = rotate_back(&base_from_link, linear);
-            power(e, v, w, alpha, accel)
-        });
-        put(link, &rows.map(|row| per_joint(&row)));
+            // Joints beyond the link do not move it.
+            let moves = places[group].simd_le(Lanes::splat(link as f64));
+            for (row, x) in found.iter_mut().zip(power(e, v, w, alpha, accel)) {
+                row[group] = x & moves;
+            }
+        }
+        for (parameter, row) in found.iter().enumerate() {
+            put(link, parameter, per_joint(row));
+        }
     }
 }
 
 /// Power of the twist `(e, v)` on the wrench of a link, as a function of the link's ten parameters.
 #[inline(always)]
 fn power<T: Number>(e: V3<T>, v: V3<T>, w: V3<T>, alpha: V3<T>, accel: V3<T>) -> [T; 10] {
-    let h = add(add(cross(v, alpha), cross(cross(v, w), w)), cross(accel, e));
+    let h = add_cross(add_cross(cross(v, alpha), cross(v, w), w), accel, e);
     let u = cross(e, w);
+    let square = |i: usize| e[i].times_plus(alpha[i], u[i] * w[i]);
+    let mixed = |i: usize, j: usize| {
+        let spun = u[i].times_plus(w[j], u[j] * w[i]);
+        e[i].times_plus(alpha[j], e[j].times_plus(alpha[i], spun))
+    };
     [
         dot(v, accel),
         h[0],
         h[1],
         h[2],
-        e[0] * alpha[0] + u[0] * w[0],
-        e[0] * alpha[1] + e[1] * alpha[0] + u[0] * w[1] + u[1] * w[0],
-        e[1] * alpha[1] + u[1] * w[1],
-        e[0] * alpha[2] + e[2] * alpha[0] + u[0] * w[2] + u[2] * w[0],
-        e[1] * alpha[2] + e[2] * alpha[1] + u[1] * w[2] + u[2] * w[1],
-        e[2] * alpha[2] + u[2] * w[2],
+        square(0),
+        mixed(0, 1),
+        square(1),
+        mixed(0, 2),
+        mixed(1, 2),
+        square(2),
     ]
 }
 

@@ -8,9 +8,9 @@
 
 use super::body_motion::body_motions;
 use super::chain::parent_rotations;
-use super::vec3::{V3, add, cross, rotate, rotate_back, scale};
+use super::vec3::{V3, add, add_cross, add_rotated, add_scaled, dot, rotate, rotate_back};
 use crate::arm::Arm;
-use crate::lanes::{in_groups, of_joint};
+use crate::lanes::{Number, in_groups, of_joint};
 use crate::math::Vector;
 
 /// Joint torques that give the accelerations `qdd`: `H qdd + C qd + G` \[N m\], without friction.
@@ -39,28 +39,26 @@ fn inverse_dynamics<const N: usize, const G: usize>(
     let (mut force, mut moment) = ([0.0; 3], [0.0; 3]);
     for i in (0..N).rev() {
         let motion = &motions[i];
-        let body = |k: usize| arm.rows.body[k][i];
+        let body = |k: usize| arm.rows.body(k, i);
         let h = [body(1), body(2), body(3)];
         let inertia = |v: V3| -> V3 {
             [
-                body(4) * v[0] + body(5) * v[1] + body(7) * v[2],
-                body(5) * v[0] + body(6) * v[1] + body(8) * v[2],
-                body(7) * v[0] + body(8) * v[1] + body(9) * v[2],
+                dot([body(4), body(5), body(7)], v),
+                dot([body(5), body(6), body(8)], v),
+                dot([body(7), body(8), body(9)], v),
             ]
         };
-        let own = add(
-            add(inertia(motion.rate), cross(h, motion.accel)),
-            cross(motion.spin, inertia(motion.spin)),
-        );
-        moment = add(moment, own);
-        tau[i] = moment[2] + arm.armature[i] * qdd[i];
+        moment = add(moment, inertia(motion.rate));
+        moment = add_cross(moment, h, motion.accel);
+        moment = add_cross(moment, motion.spin, inertia(motion.spin));
+        tau[i] = arm.armature[i].times_plus(qdd[i], moment[2]);
         if i > 0 {
-            force = add(force, scale(motion.accel, body(0)));
-            force = add(force, rotate(&motion.gradient, h));
+            force = add_scaled(force, motion.accel, body(0));
+            force = add_rotated(force, &motion.gradient, h);
             let r = of_joint(&rotations, i);
             let origin = arm.links[i].parent_from_joint.translation.data.0[0];
             force = rotate(&r, force);
-            moment = add(rotate(&r, moment), cross(origin, force));
+            moment = add_cross(rotate(&r, moment), origin, force);
         }
     }
     tau
@@ -84,16 +82,13 @@ fn weights<const N: usize, const G: usize>(arm: &Arm<N>, q: &Vector<N>) -> Vecto
     let (mut mass, mut moment) = (0.0, [0.0; 3]);
     let mut tau = Vector::zeros();
     for i in (0..N).rev() {
-        let body = |k: usize| arm.rows.body[k][i];
+        let body = |k: usize| arm.rows.body(k, i);
         mass += body(0);
         moment = add(moment, [body(1), body(2), body(3)]);
-        tau[i] = moment[1] * falls[i][0] - moment[0] * falls[i][1];
+        tau[i] = moment[1].times_plus(falls[i][0], -(moment[0] * falls[i][1]));
         if i > 0 {
             let origin = arm.links[i].parent_from_joint.translation.data.0[0];
-            moment = add(
-                rotate(&of_joint(&rotations, i), moment),
-                scale(origin, mass),
-            );
+            moment = add_scaled(rotate(&of_joint(&rotations, i), moment), origin, mass);
         }
     }
     tau

@@ -1,13 +1,10 @@
 //! Everything that the impedance law needs, in one sweep out and one back.
 
-use super::chain::Chain;
-use super::crba::mass_matrix;
-use super::frames::{bodies, joint_motions, matrix};
-use super::inertia::weight_on;
-use super::motion::{Motion, split};
-use super::vec3::dot6;
+use super::crba::symmetric;
+use super::frames::matrix;
+use super::sweep::Sweep;
 use crate::arm::Arm;
-use crate::lanes::{for_each_joint, in_groups, per_joint, splat, sums_inward};
+use crate::lanes::{in_groups, per_joint};
 use crate::math::{Matrix, Vector};
 use crate::pose::Pose;
 
@@ -55,41 +52,21 @@ pub fn terms<const N: usize>(arm: &Arm<N>, q: &Vector<N>, qd: &Vector<N>, out: &
     in_groups!(N, fill(arm, q, qd, out));
 }
 
-/// In a caller that reads some of the terms only, the compiler leaves out what the others need.
 #[inline(always)]
-pub(crate) fn fill<const N: usize, const G: usize>(
+fn fill<const N: usize, const G: usize>(
     arm: &Arm<N>,
     q: &Vector<N>,
     qd: &Vector<N>,
     out: &mut Terms<N>,
 ) {
-    let chain = Chain::<G>::new(arm, q);
-    let motions = joint_motions(&chain);
-    let bodies = bodies(arm, &chain);
-    out.base_from_tip = chain.tip.pose();
-    out.jacobian = matrix(&motions);
-
-    let gravity = arm.gravity.data.0[0];
-    let motion = Motion::<G>::new(&motions, qd, gravity);
-    out.jacobian_dot_qd = motion.tip_drift::<N>(gravity);
-    let held = sums_inward(motion.forces(&bodies));
-    let carried = sums_inward(bodies);
-    let falls = splat(gravity);
-    let [weight] = for_each_joint(&motions, &carried, &[], |axis, body, []| {
-        [weight_on(axis, body, falls)]
-    });
-    let [torque, momentum, gradient] =
-        for_each_joint(&motions, &motion.rates, &held, |axis, rate, held| {
-            let (force, momentum) = split(held);
-            [
-                dot6(axis, force),
-                dot6(axis, momentum),
-                dot6(rate, momentum),
-            ]
-        });
-    out.gravity = Vector::from(per_joint(&weight));
-    out.coriolis_gravity = Vector::from(per_joint(&torque));
-    out.momentum = Vector::from(per_joint(&momentum)) + arm.armature.component_mul(qd);
-    out.kinetic_gradient = Vector::from(per_joint(&gradient));
-    out.mass_matrix = mass_matrix(arm, &motions, &carried);
+    let sweep = Sweep::<G>::new(arm, q, qd);
+    let held = sweep.held();
+    out.base_from_tip = sweep.tip.pose();
+    out.jacobian = matrix(&sweep.motions);
+    out.jacobian_dot_qd = Vector::from(sweep.tip_drift(arm));
+    out.gravity = Vector::from(per_joint(&sweep.gravity(arm)));
+    out.coriolis_gravity = Vector::from(per_joint(&held.torque));
+    out.momentum = Vector::from(per_joint(&held.momentum)) + arm.armature.component_mul(qd);
+    out.kinetic_gradient = Vector::from(per_joint(&held.kinetic_gradient));
+    out.mass_matrix = symmetric(&sweep.mass(arm));
 }

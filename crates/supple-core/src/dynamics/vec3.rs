@@ -22,25 +22,59 @@ pub(super) fn scale<T: Number>(a: V3<T>, s: T) -> V3<T> {
 
 #[inline(always)]
 pub(super) fn dot<T: Number>(a: V3<T>, b: V3<T>) -> T {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    a[2].times_plus(b[2], a[1].times_plus(b[1], a[0] * b[0]))
 }
 
 #[inline(always)]
 pub(super) fn cross<T: Number>(a: V3<T>, b: V3<T>) -> V3<T> {
     [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
+        a[1].times_plus(b[2], -(a[2] * b[1])),
+        a[2].times_plus(b[0], -(a[0] * b[2])),
+        a[0].times_plus(b[1], -(a[1] * b[0])),
     ]
+}
+
+/// `c + s v`.
+#[inline(always)]
+pub(super) fn add_scaled<T: Number>(c: V3<T>, v: V3<T>, s: T) -> V3<T> {
+    [
+        v[0].times_plus(s, c[0]),
+        v[1].times_plus(s, c[1]),
+        v[2].times_plus(s, c[2]),
+    ]
+}
+
+/// `c + a x b`.
+#[inline(always)]
+pub(super) fn add_cross<T: Number>(c: V3<T>, a: V3<T>, b: V3<T>) -> V3<T> {
+    [
+        a[1].times_plus(b[2], (-a[2]).times_plus(b[1], c[0])),
+        a[2].times_plus(b[0], (-a[0]).times_plus(b[2], c[1])),
+        a[0].times_plus(b[1], (-a[1]).times_plus(b[0], c[2])),
+    ]
+}
+
+/// `c + R v`.
+#[inline(always)]
+pub(super) fn add_rotated<T: Number>(c: V3<T>, r: &[T; 9], v: V3<T>) -> V3<T> {
+    add_scaled(
+        add_scaled(
+            add_scaled(c, [r[0], r[1], r[2]], v[0]),
+            [r[3], r[4], r[5]],
+            v[1],
+        ),
+        [r[6], r[7], r[8]],
+        v[2],
+    )
 }
 
 /// `R v`.
 #[inline(always)]
 pub(super) fn rotate<T: Number>(r: &[T; 9], v: V3<T>) -> V3<T> {
     [
-        r[0] * v[0] + r[3] * v[1] + r[6] * v[2],
-        r[1] * v[0] + r[4] * v[1] + r[7] * v[2],
-        r[2] * v[0] + r[5] * v[1] + r[8] * v[2],
+        r[6].times_plus(v[2], r[3].times_plus(v[1], r[0] * v[0])),
+        r[7].times_plus(v[2], r[4].times_plus(v[1], r[1] * v[0])),
+        r[8].times_plus(v[2], r[5].times_plus(v[1], r[2] * v[0])),
     ]
 }
 
@@ -48,9 +82,9 @@ pub(super) fn rotate<T: Number>(r: &[T; 9], v: V3<T>) -> V3<T> {
 #[inline(always)]
 pub(super) fn rotate_back<T: Number>(r: &[T; 9], v: V3<T>) -> V3<T> {
     [
-        r[0] * v[0] + r[1] * v[1] + r[2] * v[2],
-        r[3] * v[0] + r[4] * v[1] + r[5] * v[2],
-        r[6] * v[0] + r[7] * v[1] + r[8] * v[2],
+        dot([r[0], r[1], r[2]], v),
+        dot([r[3], r[4], r[5]], v),
+        dot([r[6], r[7], r[8]], v),
     ]
 }
 
@@ -89,5 +123,6 @@ pub(super) fn halves<T: Number>(x: [T; 6]) -> (V3<T>, V3<T>) {
 /// Dot product of a pair of vectors with another.
 #[inline(always)]
 pub(super) fn dot6<T: Number>(a: [T; 6], b: [T; 6]) -> T {
-    (a[0] * b[0] + a[1] * b[1] + a[2] * b[2]) + (a[3] * b[3] + a[4] * b[4] + a[5] * b[5])
+    let ((a, c), (b, d)) = (halves(a), halves(b));
+    dot(a, b) + dot(c, d)
 }

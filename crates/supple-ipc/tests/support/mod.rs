@@ -58,3 +58,13 @@ pub fn answer(input: &Input<4>) -> Output<4> {
     let controller = Controller::new(description.config().expect("sound")).expect("sound");
     step(&controller, &mut State::new(&controller), input)
 }
+
+/// What is in shared memory of a system.
+pub fn objects(domain: &Domain) -> Vec<String> {
+    let names = std::fs::read_dir("/dev/shm").expect("shared memory");
+    let names = names.map(|entry| entry.expect("an entry").file_name());
+    let names = names.map(|name| name.to_string_lossy().into_owned());
+    names
+        .filter(|name| name.starts_with(&domain.objects()))
+        .collect()
+}

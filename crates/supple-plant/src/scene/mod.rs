@@ -161,6 +161,22 @@ impl Scene {
         Ok(scene)
     }
 
+    /// A block of wood beneath the whole reach of an arm, its face at this height \[m\].
+    pub fn beneath(face_m: f64) -> Scene {
+        let (side_m, height_m) = (2.4, 0.1);
+        Scene {
+            fixed_blocks: vec![FixedBlock {
+                name: "block".to_owned(),
+                center_m: [0.0, 0.0, face_m - 0.5 * height_m],
+                size_m: [side_m, side_m, height_m],
+                rpy_rad: [0.0; 3],
+                material: "wood".to_owned(),
+                layer: None,
+            }],
+            ..Scene::default()
+        }
+    }
+
     /// The material of that name: the scene's own, else the built-in one.
     pub fn material(&self, name: &str) -> Option<Material> {
         let built_in = [Material::wood(), Material::rubber()];

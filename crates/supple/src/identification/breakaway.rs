@@ -7,7 +7,7 @@ use crate::exit::Failure;
 use serde::Serialize;
 use supple_core::Vector;
 use supple_experiment::calibrate::plant_of;
-use supple_experiment::{Calibration, ExperimentError, breakaway};
+use supple_experiment::{Calibration, ExperimentError, breakaway, ripple_on};
 use supple_model::with_dof;
 
 /// One joint.
@@ -31,10 +31,16 @@ pub fn run(args: &BreakawayArgs) -> Result<(), Failure> {
     let arm = arms::find(&args.arm)?;
     let joints = joints(&args.joints, arm.dof())?;
     let lines = with_dof!(arm.dof(), N => {
-        let calibration = Calibration::new(args.seed);
+        let calibration = Calibration {
+            ripple_nm: args.ripple,
+            ..Calibration::new(args.seed)
+        };
         let measure = || -> Result<Vec<Line>, ExperimentError> {
-            let config = calibration.start.apply(&arm.config::<N>()?)?;
+            let mut config = calibration.start.apply(&arm.config::<N>()?)?;
             let plant = plant_of::<N>(&arm, &calibration)?;
+            if args.ripple > 0.0 {
+                config.ripple = ripple_on(&config, &plant, &arm.home::<N>()?)?;
+            }
             let pose = Vector::<N>::from_fn(|i, _| {
                 let zone = 2.0 * config.limits.soft_zone_rad;
                 let lower = config.limits.position_lower_rad[i] + zone;

@@ -10,11 +10,15 @@ use crate::demo;
 use crate::exit::Failure;
 use crate::out::Staging;
 use serde::Serialize;
-use supple_experiment::{Calibration, Truthfulness, calibrate, foretell};
+use supple_experiment::calibrate::{described_plant, plant_of};
+use supple_experiment::{Calibration, Tracking, Truthfulness, calibrate, foretell, tracking};
 use supple_model::{Description, with_dof};
 
 /// Models drawn to foretell the tracking error.
 const DRAWS: u64 = 5;
+
+/// Folder of the plant's own description, where it is not that of `--arm`.
+const PLANT: &str = "plant";
 
 #[derive(Serialize)]
 struct Summary {
@@ -26,6 +30,10 @@ struct Summary {
     /// Motor, harmonic, amplitude at the motor \[N m\].
     ripple: Vec<(usize, u32, f64)>,
     truth: Truthfulness,
+    /// The sinusoid with this model; `None` where the arm cannot reach it.
+    tracking: Option<Tracking>,
+    /// The same where calibration and plant are without friction that depends on direction and load.
+    tracking_without_load: Option<Tracking>,
 }
 
 /// Does it.
@@ -38,8 +46,12 @@ pub fn run(args: &CalibrateArgs) -> Result<(), Failure> {
     if args.no_demo {
         return Ok(());
     }
+    let plant = args.out.join(PLANT);
     demo::run(&DemoArgs {
-        arm: args.arm.clone(),
+        arm: match args.ripple > 0.0 {
+            true => plant.display().to_string(),
+            false => args.arm.clone(),
+        },
         model: Some(args.out.clone()),
         out: args.out.join("demo"),
         seed: args.seed,
@@ -63,6 +75,24 @@ fn sized<const N: usize>(arm: &Description, args: &CalibrateArgs) -> Result<(), 
             remark(step);
         }
     })?;
+    let follow = |calibration: &Calibration, found: &Description| -> Result<_, Failure> {
+        Ok(tracking(found, &plant_of::<N>(arm, calibration)?)?)
+    };
+    let followed = follow(&calibration, &found.description)?;
+    let mut without_load = None;
+    if args.load {
+        if !args.quiet {
+            remark("the same without friction that depends on direction and load");
+        }
+        let other = Calibration {
+            load: false,
+            breakaway: false,
+            log_dir: None,
+            ..calibration.clone()
+        };
+        let found = calibrate::<N>(arm, &other, &mut |_| {})?;
+        without_load = follow(&other, &found.description)?;
+    }
     let foretold = foretell(&found.description, &found.fit, DRAWS)?;
     let report = Found {
         arm: &found.description,
@@ -75,6 +105,11 @@ fn sized<const N: usize>(arm: &Description, args: &CalibrateArgs) -> Result<(), 
         )],
         foretold,
     };
+    if args.ripple > 0.0 {
+        // The demo that follows runs on the plant as it is.
+        let plant = plant_of::<N>(arm, &calibration)?;
+        described_plant(arm, &plant)?.save(&staging.folder(PLANT)?)?;
+    }
     let identification = summary(&report);
     write(&staging, &report, &identification)?;
     let names = arm.joint_names();
@@ -99,6 +134,8 @@ fn sized<const N: usize>(arm: &Description, args: &CalibrateArgs) -> Result<(), 
             .collect(),
         identification,
         truth: found.truth.clone(),
+        tracking: followed,
+        tracking_without_load: without_load,
     };
     let text = json(&numbers)?;
     staging.write("calibration.json", format!("{text}\n").as_bytes())?;
@@ -128,5 +165,25 @@ fn sized<const N: usize>(arm: &Description, args: &CalibrateArgs) -> Result<(), 
         100.0 * numbers.truth.gravity_relative,
         friction.join(", ")
     ))?;
+    if let Some(tracking) = &numbers.tracking {
+        say(&format!(
+            "sinusoid at 5 N/m with this model: {}",
+            both(tracking)
+        ))?;
+    }
+    if let Some(tracking) = &numbers.tracking_without_load {
+        say(&format!(
+            "without friction that depends on direction and load: {}; the rest is its share",
+            both(tracking)
+        ))?;
+    }
     say("this is simulation: real fits of such arms leave 6.7 to 8.4 % of the torque")
+}
+
+fn both(tracking: &Tracking) -> String {
+    format!(
+        "{:.2} mm RMS with Coulomb friction, {:.2} mm with the dip",
+        1e3 * tracking.coulomb_m,
+        1e3 * tracking.stribeck_m
+    )
 }

@@ -9,6 +9,7 @@ use crate::out::Staging;
 use serde::Serialize;
 use std::fmt::Write;
 use supple_core::trajectory::Fourier;
+use supple_ident::SeriesLists;
 use supple_ident::design::{self, Design, Designed, Workspace, design};
 use supple_model::{Description, with_dof};
 
@@ -24,11 +25,8 @@ struct Summary<'a> {
     condition: f64,
     first_value: f64,
     last_value: f64,
-    duration_s: f64,
-    angular_frequency_rad_per_s: f64,
-    centre_rad: Vec<f64>,
-    sine_rad: Vec<Vec<f64>>,
-    cosine_rad: Vec<Vec<f64>>,
+    #[serde(flatten)]
+    series: SeriesLists,
 }
 
 /// Does it.
@@ -78,11 +76,6 @@ fn sized<const N: usize>(
     let staging = Staging::new(&args.out)?;
     staging.write("excitation.csv", table(&found.series).as_bytes())?;
     staging.write("excitation.svg", figure(arm, &found)?.as_bytes())?;
-    let columns = |all: &[supple_core::Vector<N>]| {
-        all.iter()
-            .map(|c| c.as_slice().to_vec())
-            .collect::<Vec<_>>()
-    };
     let series = &found.series;
     let summary = Summary {
         arm: arm.name(),
@@ -100,11 +93,7 @@ fn sized<const N: usize>(
             .find(|value| value.is_finite())
             .unwrap_or(f64::MAX),
         last_value: found.history.last().copied().unwrap_or(f64::MAX),
-        duration_s: series.duration_s,
-        angular_frequency_rad_per_s: series.angular_frequency_rad_per_s,
-        centre_rad: series.centre_rad.as_slice().to_vec(),
-        sine_rad: columns(&series.sine_rad),
-        cosine_rad: columns(&series.cosine_rad),
+        series: SeriesLists::from(series),
     };
     let text = json(&summary)?;
     staging.write("summary.json", format!("{text}\n").as_bytes())?;

@@ -4,6 +4,7 @@
 mod breakaway;
 mod calibrate;
 mod excite;
+mod follow;
 mod identify;
 mod learn;
 mod report;
@@ -39,6 +40,9 @@ pub enum ExciteCommand {
     /// Design a motion that tells the parameters of an arm apart, within its limits.
     #[command(after_help = CODES)]
     Design(DesignArgs),
+    /// Let the simulated arm follow a designed motion, then a slow one, and log both.
+    #[command(after_help = CODES)]
+    Run(RunArgs),
 }
 
 /// Criterion of a design.
@@ -160,6 +164,35 @@ pub struct DesignArgs {
     pub quiet: bool,
 }
 
+/// Arguments of `excite run`.
+#[derive(Clone, Debug, Args)]
+pub struct RunArgs {
+    /// A built-in arm, or the path of an arm's TOML or of its folder: plant and controller.
+    #[arg(long, value_name = "NAME|PATH")]
+    pub arm: String,
+    /// Folder that `excite design` wrote, or its summary.json.
+    #[arg(long, value_name = "PATH", default_value = "out/excitation")]
+    pub design: PathBuf,
+    /// Folder for logs/excitation.mcap and summary.json.
+    #[arg(long, value_name = "DIR", default_value = "out/excited")]
+    pub out: PathBuf,
+    /// Seed of every noise.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Torque ripple of the plant's motors, seen at the joints [N m].
+    #[arg(long, value_name = "NM", default_value_t = 0.0)]
+    pub ripple: f64,
+    /// The plant's friction depends on direction and load too.
+    #[arg(long)]
+    pub load: bool,
+    /// Leave out the slow motion, from which dry friction at low speed is told.
+    #[arg(long)]
+    pub no_slow: bool,
+    /// Print the summary as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
 /// Arguments of `breakaway`.
 #[derive(Clone, Debug, Args)]
 pub struct BreakawayArgs {
@@ -172,6 +205,10 @@ pub struct BreakawayArgs {
     /// Seed of the starting model and of every noise.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
+    /// Torque ripple of the plant's motors, seen at the joints [N m]; found from slow motion first, and
+    /// compensated.
+    #[arg(long, value_name = "NM", default_value_t = 0.0)]
+    pub ripple: f64,
     /// Print the result as JSON.
     #[arg(long)]
     pub json: bool,
@@ -235,6 +272,7 @@ impl Command {
         match self {
             Command::Identify(args) => args.json,
             Command::Excite(ExciteCommand::Design(args)) => args.json,
+            Command::Excite(ExciteCommand::Run(args)) => args.json,
             Command::Breakaway(args) => args.json,
             Command::Calibrate(args) => args.json,
             Command::Learn(args) => args.json,
@@ -250,6 +288,7 @@ pub fn run(command: &Command) -> Result<(), Failure> {
     match command {
         Command::Identify(args) => identify::run(args),
         Command::Excite(ExciteCommand::Design(args)) => excite::run(args),
+        Command::Excite(ExciteCommand::Run(args)) => follow::run(args),
         Command::Breakaway(args) => breakaway::run(args),
         Command::Calibrate(args) => calibrate::run(args),
         Command::Learn(args) => learn::run(args),

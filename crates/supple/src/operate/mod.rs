@@ -3,15 +3,17 @@
 //! Every request is checked by the controller; what is printed is its answer.
 
 mod approach;
+mod pendant;
 mod session;
 mod status;
 
 pub use approach::Approach;
+pub use pendant::{Pendant, pendant};
 pub use session::Session;
 pub use status::status;
 
 use crate::arms;
-use crate::cli::{GainsArgs, ModeName, Place, Shape, TrackArgs};
+use crate::cli::{Course, GainsArgs, ModeName, Place, Shape, TrackArgs};
 use crate::console::{say, say_json};
 use crate::exit::Failure;
 use crate::up::stop_running;
@@ -26,6 +28,8 @@ use supple_ipc::message::{OperatorReply, Telemetry};
 use supple_ipc::{Domain, TelemetryReader};
 use supple_model::{Description, with_dof};
 
+/// Cap of an arm without a tool \[m\].
+const CAP_M: f64 = 0.02;
 /// Longest wait for a sign of life.
 const ALIVE_WITHIN: Duration = Duration::from_secs(2);
 
@@ -114,6 +118,23 @@ pub fn gains(args: &GainsArgs) -> Result<(), Failure> {
     simple(&args.place, Simple::Gains(gains, args.ramp_s))
 }
 
+/// What a system follows, with its duration \[s\].
+pub fn course(course: Course, description: &Description) -> (Trajectory, f64) {
+    match course {
+        Course::Sinusoid => scenario::sinusoid(1.0),
+        Course::Arc => scenario::arc(),
+        Course::Quadrant => {
+            let (quadrant, duration_s) = scenario::quadrant(scenario::QUADRANT_SPEED_M_PER_S);
+            (Trajectory::Quadrant(quadrant), duration_s)
+        }
+        Course::Probe => {
+            let radius_m = description.tool().map_or(CAP_M, |tool| tool.cap_radius_m);
+            let (probe, duration_s) = scenario::probe(radius_m);
+            (Trajectory::Probe(probe), duration_s)
+        }
+    }
+}
+
 /// To the start of a trajectory, and along it.
 ///
 /// # Errors
@@ -138,9 +159,8 @@ pub fn track(args: &TrackArgs) -> Result<(), Failure> {
 /// [`Failure`].
 pub fn probe(arm: &str, place: &Place) -> Result<(), Failure> {
     let description = arms::find(arm)?;
-    let radius_m = description.tool().map_or(0.02, |tool| tool.cap_radius_m);
-    let (probe, duration_s) = scenario::probe(radius_m);
-    follow(place, &description, Trajectory::Probe(probe), duration_s)
+    let (trajectory, duration_s) = course(Course::Probe, &description);
+    follow(place, &description, trajectory, duration_s)
 }
 
 fn follow(

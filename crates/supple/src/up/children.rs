@@ -1,5 +1,6 @@
 //! The processes of a system: started from beside this program, watched over, ended in order.
 
+use super::plan::Program;
 use crate::exit::Failure;
 use core::time::Duration;
 use rustix::process::{Pid, Signal, kill_process};
@@ -25,7 +26,8 @@ impl Children {
     ///
     /// # Errors
     /// [`Failure::NoSibling`] says how to build what is missing.
-    pub fn start(&mut self, name: &'static str, arguments: &[String]) -> Result<(), Failure> {
+    pub fn start(&mut self, program: &Program) -> Result<(), Failure> {
+        let Program { name, arguments } = program;
         let program = sibling(name)?;
         let child = Command::new(&program)
             .args(arguments)
@@ -83,6 +85,32 @@ impl Children {
             Some(status) => Err(ended(name, status)),
             None => Ok(false),
         }
+    }
+
+    /// Sends a program a signal.
+    ///
+    /// # Errors
+    /// [`Failure::NoSuchProcess`] where it is none of these.
+    pub fn signal(&self, name: &'static str, signal: Signal) -> Result<(), Failure> {
+        let Some((_, child)) = self.running.iter().find(|(n, _)| *n == name) else {
+            return Err(Failure::NoSuchProcess { name });
+        };
+        if let Some(pid) = i32::try_from(child.id()).ok().and_then(Pid::from_raw) {
+            // A process that has just ended needs no signal.
+            let _ = kill_process(pid, signal);
+        }
+        Ok(())
+    }
+
+    /// Starts a program again that was killed.
+    ///
+    /// # Errors
+    /// As [`Children::start`].
+    pub fn restart(&mut self, program: &Program) -> Result<(), Failure> {
+        if let Some(place) = self.running.iter().position(|(n, _)| *n == program.name) {
+            kill(&mut self.running.remove(place).1);
+        }
+        self.start(program)
     }
 
     /// Asks a program to end and waits for it, with `meanwhile` done again and again; kills it where it does

@@ -65,6 +65,8 @@ pub struct UpSummary {
     pub rms_error_m: Option<f64>,
     /// Faults that latched, in words.
     pub faults: Vec<String>,
+    /// Time of the arm over time of the wall; none where they are the same.
+    pub times_real_time: Option<f64>,
 }
 
 impl Default for Meter {
@@ -138,6 +140,7 @@ impl Meter {
             telemetry_lost,
             rms_error_m: mean(self.squared_error_m2, self.tracked).map(f64::sqrt),
             faults: self.faults.clone(),
+            times_real_time: None,
         }
     }
 }
@@ -169,6 +172,9 @@ impl fmt::Display for UpSummary {
                 "{name}: p50 {:.1}, p99 {:.1}, p99.9 {:.1}, max {:.1} {unit}",
                 s.p50, s.p99, s.p999, s.max
             )?;
+        }
+        if let Some(times) = self.times_real_time {
+            writeln!(f, "{times:.1} times real time")?;
         }
         match self.rms_error_m {
             Some(error_m) => write!(f, "tip error while tracking: {:.2} mm RMS", error_m * 1e3),

@@ -76,6 +76,14 @@ impl<const N: usize> Recorder<N> {
         Ok(self.writer.write_record(self.latest_ns, &record, &extras)?)
     }
 
+    /// Something that happened to the arm, by the clock of its states.
+    ///
+    /// # Errors
+    /// [`Failure::Log`].
+    pub fn event(&mut self, stamp_ns: u64, text: &str) -> Result<(), Failure> {
+        Ok(self.writer.event(stamp_ns + self.offset_ns, text)?)
+    }
+
     /// The log is whole.
     ///
     /// # Errors

@@ -2,7 +2,8 @@
 
 use super::Meter;
 use std::io::{IsTerminal, Write};
-use supple_ipc::message::Telemetry;
+use supple_core::controller::Mode;
+use supple_ipc::message::{Drives, Telemetry};
 
 /// Cycles between two looks of the line.
 const EVERY: u64 = 200;
@@ -33,10 +34,15 @@ impl StatusLine {
             || "-".to_owned(),
             |error_m| format!("{:.1} mm", error_m * 1e3),
         );
+        let waits = match (telemetry.mode(), telemetry.state.drives()) {
+            (Some(Mode::Idle | Mode::Fault) | None, _) | (_, Drives::Active) => "",
+            (_, Drives::Idle) => " (waiting for Shift-Activate)",
+            (_, Drives::Off) => " (waiting for Shift-Idle: emergency stop)",
+        };
         // A terminal that cannot be written is no reason to stop an arm.
         let _ = write!(
             std::io::stderr().lock(),
-            "\r\x1b[K{}  answer p50 {:.0} p99 {:.0} max {:.0} us  missed {}  bus {:.0} %  tip error {error}",
+            "\r\x1b[K{}{waits}  answer p50 {:.0} p99 {:.0} max {:.0} us  missed {}  bus {:.0} %  tip error {error}",
             telemetry.mode().map_or("unknown", |mode| mode.name()),
             cycle.p50,
             cycle.p99,

@@ -1,0 +1,90 @@
+//! A system of two processes at work, seen through its telemetry.
+
+use crate::{Common, Failure, Measured};
+use core::time::Duration;
+use rustix::process::{Pid, Signal, kill_process};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use supple_core::controller::{Mode, Request};
+use supple_ipc::message::{Drives, Telemetry};
+use supple_ipc::{Domain, Operator, TelemetryReader, pause};
+
+const PREFIX: &str = "latency";
+/// Cycles in gravity hold before those that count.
+const WARM_UP: u64 = 1000;
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// The processes, the controller first; they end with this, in order.
+struct Processes(Vec<Child>);
+
+impl Drop for Processes {
+    fn drop(&mut self) {
+        for child in &mut self.0 {
+            let id = i32::try_from(child.id()).ok().and_then(Pid::from_raw);
+            // One that has ended already needs no signal.
+            if let Some(id) = id {
+                let _ = kill_process(id, Signal::TERM);
+            }
+            let _ = child.wait();
+        }
+    }
+}
+
+fn start(program: &Path, common: &Common) -> Result<Child, Failure> {
+    let mut command = Command::new(program);
+    command
+        .args(["--prefix", PREFIX, "--cpu", &common.cpu.to_string()])
+        .stdout(Stdio::null());
+    if common.no_realtime {
+        command.arg("--no-realtime");
+    }
+    command
+        .spawn()
+        .map_err(|error| format!("{}: {error}", program.display()).into())
+}
+
+fn next(reader: &mut TelemetryReader) -> Result<Telemetry, Failure> {
+    reader
+        .wait(PATIENCE)?
+        .ok_or_else(|| "no telemetry: did supple-rt or supple-sim end?".into())
+}
+
+pub fn measure(programs: &Path, common: &Common) -> Result<Measured, Failure> {
+    let domain = Domain::new(Some(PREFIX))?;
+    let mut reader = TelemetryReader::new(&domain)?;
+    let mut operator = Operator::new(&domain)?;
+    let _processes = Processes(vec![
+        start(&programs.join("supple-rt"), common)?,
+        start(&programs.join("supple-sim"), common)?,
+    ]);
+    next(&mut reader)?;
+    while operator.send::<4>(&Request::GravityHold, None)?.is_none() {
+        pause(Duration::from_millis(10));
+    }
+    let mut telemetry = next(&mut reader)?;
+    while telemetry.state.drives() != Drives::Active {
+        telemetry = next(&mut reader)?;
+    }
+    for _ in 0..WARM_UP {
+        telemetry = next(&mut reader)?;
+    }
+    let missed = telemetry.state.plant.missed;
+    let mut measured = Measured::with_capacity(common.cycles());
+    for _ in 0..common.cycles() {
+        telemetry = next(&mut reader)?;
+        let plant = &telemetry.state.plant;
+        measured.wake_ns.push(plant.wake_ns);
+        // Zero where no answer came in time, which is counted.
+        if plant.round_trip_ns > 0 {
+            measured.round_trip_ns.push(plant.round_trip_ns);
+        }
+    }
+    measured.missed = telemetry.state.plant.missed - missed;
+    if telemetry.mode() != Some(Mode::GravityHold) {
+        return Err(format!("the controller left gravity hold: {}", telemetry.fault_text).into());
+    }
+    match reader.lost() {
+        0 => Ok(measured),
+        lost => Err(format!("{lost} records of telemetry were lost").into()),
+    }
+}

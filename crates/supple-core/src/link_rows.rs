@@ -1,0 +1,103 @@
+//! The links of an arm again, by rows, as [`crate::lanes`] takes them.
+
+use crate::arm::Link;
+use crate::lanes::{LANES, Lanes, Rows};
+use core::array::from_fn;
+
+/// Rotation of the joint frame in its parent's at `q = 0`, by columns; then its origin there.
+const PARENT_FROM_JOINT: usize = 0;
+/// Mass, first moment, and inertia `xx, xy, yy, xz, yz, zz`, in the joint frame.
+const BODY: usize = 12;
+/// Rotation of the joint frame in the link frame, by columns.
+const LINK_FROM_JOINT: usize = 22;
+/// The last group of the last row is read beyond its end.
+const ROWS: usize = 31 + LANES - 1;
+
+/// Constants of each link, a row for each.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LinkRows<const N: usize> {
+    rows: [[f64; N]; ROWS],
+}
+
+impl<const N: usize> LinkRows<N> {
+    pub fn new(links: &[Link; N]) -> Self {
+        let mut rows = [[0.0; N]; ROWS];
+        for (i, link) in links.iter().enumerate() {
+            let pose = &link.parent_from_joint;
+            let mut put = |first: usize, numbers: &[f64]| {
+                for (row, x) in rows[first..].iter_mut().zip(numbers) {
+                    row[i] = *x;
+                }
+            };
+            let inertia = &link.inertia;
+            put(PARENT_FROM_JOINT, pose.rotation.as_slice());
+            put(PARENT_FROM_JOINT + 9, pose.translation.as_slice());
+            put(BODY, &[link.mass]);
+            put(BODY + 1, link.first_moment.as_slice());
+            let entries = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
+            put(BODY + 4, &entries.map(|entry| inertia[entry]));
+            put(LINK_FROM_JOINT, link.link_from_joint.as_slice());
+        }
+        LinkRows { rows }
+    }
+
+    /// Rotation of each joint frame in its parent's at `q = 0`, by columns. Beyond the last joint: anything
+    /// finite.
+    #[inline(always)]
+    pub fn rotations<const G: usize>(&self) -> Rows<9, G> {
+        self.groups(PARENT_FROM_JOINT)
+    }
+
+    /// Origin of each joint frame in its parent's. Beyond the last joint: anything finite.
+    #[inline(always)]
+    pub fn origins<const G: usize>(&self) -> Rows<3, G> {
+        self.groups(PARENT_FROM_JOINT + 9)
+    }
+
+    /// Rotation of each joint frame in its link frame, by columns. Beyond the last joint: anything finite.
+    #[inline(always)]
+    pub fn links_from_joints<const G: usize>(&self) -> Rows<9, G> {
+        self.groups(LINK_FROM_JOINT)
+    }
+
+    /// Each link's ten numbers. Beyond the last joint: zeros.
+    #[inline(always)]
+    pub fn bodies<const G: usize>(&self) -> Rows<10, G> {
+        let mut bodies = self.groups(BODY);
+        for row in &mut bodies {
+            for (group, x) in row.iter_mut().enumerate() {
+                *x &= joints::<N>(group);
+            }
+        }
+        bodies
+    }
+
+    /// Number `k` of the body of link `i`.
+    #[inline(always)]
+    pub fn body(&self, k: usize, i: usize) -> f64 {
+        self.rows[BODY + k][i]
+    }
+
+    #[inline(always)]
+    fn groups<const K: usize, const G: usize>(&self, first: usize) -> Rows<K, G> {
+        let numbers = self.rows.as_flattened();
+        from_fn(|k| {
+            from_fn(|group| {
+                let begin = (first + k) * N + group * LANES;
+                let is_used = group * LANES < N;
+                Lanes::new(from_fn(
+                    |lane| if is_used { numbers[begin + lane] } else { 0.0 },
+                ))
+            })
+        })
+    }
+}
+
+/// All bits of the lanes that have a joint.
+#[inline(always)]
+fn joints<const N: usize>(group: usize) -> Lanes {
+    let all = f64::from_bits(u64::MAX);
+    Lanes::new(from_fn(
+        |lane| if group * LANES + lane < N { all } else { 0.0 },
+    ))
+}

@@ -1,0 +1,115 @@
+//! A URDF of which dynamics alone are wanted, with the limits that it does not state.
+//!
+//! A controller must know where an arm ends and what it bears: [`crate::Description`] refuses joints
+//! without limits. Dynamics and identification ask for none, and many URDFs have none.
+
+use roxmltree::{Document, Node};
+use std::f64::consts::TAU;
+use std::ops::Range;
+
+/// Torque (N m) and speed (rad/s) of a joint that has no limits: beyond any arm's.
+pub const UNLIMITED: f64 = 1e9;
+
+/// `urdf` in which every movable joint has limits: where it states none, or zero, a range of a turn either
+/// way, and [`UNLIMITED`] as effort and velocity. A text that is no XML is given back as it is.
+pub fn with_limits(urdf: &str) -> String {
+    let Ok(document) = Document::parse(urdf) else {
+        return urdf.to_owned();
+    };
+    let movable = |node: &Node<'_, '_>| {
+        node.has_tag_name("joint")
+            && matches!(node.attribute("type"), Some("revolute" | "continuous"))
+    };
+    let joints = document.root_element().children().filter(movable);
+    let mut edits: Vec<(Range<usize>, String)> = joints.filter_map(|joint| edit(&joint)).collect();
+    edits.sort_by_key(|(range, _)| std::cmp::Reverse(range.start));
+    let mut edited = urdf.to_owned();
+    for (range, text) in edits {
+        edited.replace_range(range, &text);
+    }
+    edited
+}
+
+/// The `<limit>` that a joint lacks, or with what it lacks.
+fn edit(joint: &Node<'_, '_>) -> Option<(Range<usize>, String)> {
+    let limit = joint.children().find(|child| child.has_tag_name("limit"));
+    let stated = |name: &str| limit.and_then(|limit| limit.attribute(name));
+    let mut added = String::new();
+    let mut dropped = Vec::new();
+    // One end alone is a mistake, and refused as such.
+    if stated("lower").is_none() && stated("upper").is_none() {
+        added += &format!(" lower=\"{:?}\" upper=\"{TAU:?}\"", -TAU);
+    }
+    for name in ["effort", "velocity"] {
+        let zero = |text: &str| text.trim().parse::<f64>().is_ok_and(|value| value == 0.0);
+        if stated(name).is_none_or(zero) {
+            added += &format!(" {name}=\"{UNLIMITED:?}\"");
+            dropped.push(name);
+        }
+    }
+    if added.is_empty() {
+        return None;
+    }
+    let kept: String = limit
+        .iter()
+        .flat_map(Node::attributes)
+        .filter(|attribute| !dropped.contains(&attribute.name()))
+        .map(|attribute| format!(" {}=\"{}\"", attribute.name(), attribute.value()))
+        .collect();
+    let text = format!("<limit{kept}{added}/>");
+    match limit {
+        Some(limit) => Some((limit.range(), text)),
+        None => {
+            let start = joint.first_child()?.range().start;
+            Some((start..start, text))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::with_limits;
+
+    #[test]
+    fn what_is_stated_stays_and_what_is_not_is_added() {
+        let joint = |kind: &str, limit: &str| {
+            format!(
+                "<robot><joint name=\"j\" type=\"{kind}\"><parent link=\"a\"/>{limit}</joint></robot>"
+            )
+        };
+        let whole = "<limit lower=\"-1\" upper=\"2\" effort=\"3\" velocity=\"4\"/>";
+        for unchanged in [
+            joint("revolute", whole),
+            joint("fixed", ""),
+            "<robot".to_owned(),
+        ] {
+            assert_eq!(with_limits(&unchanged), unchanged);
+        }
+        let bare = with_limits(&joint("revolute", ""));
+        for word in [
+            "<limit",
+            "lower=\"-6.28",
+            "upper=\"6.28",
+            "effort=\"1000",
+            "velocity=\"1000",
+        ] {
+            assert!(bare.contains(word), "{word} in {bare}");
+        }
+        let weak = with_limits(&joint(
+            "revolute",
+            "<limit lower=\"-1\" upper=\"2\" effort=\"0\" velocity=\"4\"/>",
+        ));
+        for word in [
+            "lower=\"-1\"",
+            "upper=\"2\"",
+            "velocity=\"4\"",
+            "effort=\"1000000000.0\"",
+        ] {
+            assert!(weak.contains(word), "{word} in {weak}");
+        }
+        assert_eq!(weak.matches("effort").count(), 1);
+        // Half a range is a mistake that someone must see.
+        let half = with_limits(&joint("revolute", "<limit lower=\"-1\"/>"));
+        assert!(!half.contains("upper"), "{half}");
+    }
+}

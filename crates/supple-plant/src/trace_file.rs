@@ -1,0 +1,82 @@
+//! What acts at the motors and on the tip of a simulated arm, once a millisecond, as CSV.
+//!
+//! Not a log of a controller: it goes on when the controller is gone.
+
+use crate::record::Truth;
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+const EVERY_NS: u64 = 1_000_000;
+
+/// The file cannot be written.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: {source}; choose a file that can be written with --trace", file.display())]
+pub struct TraceError {
+    /// Which.
+    pub file: PathBuf,
+    /// What the system says.
+    pub source: std::io::Error,
+}
+
+/// The file.
+#[derive(Debug)]
+pub struct TraceFile {
+    path: PathBuf,
+    file: BufWriter<File>,
+    next_ns: u64,
+}
+
+impl TraceFile {
+    /// A new file with its head line, for an arm of `joints` motors.
+    ///
+    /// # Errors
+    /// [`TraceError`].
+    pub fn create(path: &Path, joints: usize) -> Result<TraceFile, TraceError> {
+        let file = File::create(path).map_err(|source| TraceError {
+            file: path.to_owned(),
+            source,
+        })?;
+        let mut trace = TraceFile {
+            path: path.to_owned(),
+            file: BufWriter::new(file),
+            next_ns: 0,
+        };
+        let motors: String = (1..=joints).map(|i| format!(",motor{i}_nm")).collect();
+        trace.line(&format!(
+            "time_ns,motors_in_torque_mode{motors},force_x_n,force_y_n,force_z_n,tip_z_m"
+        ))?;
+        Ok(trace)
+    }
+
+    /// Writes a line if it is time for one. `time_ns` is when, `active` how many motors take torques,
+    /// `torque_nm` what acts at each, braking included.
+    ///
+    /// # Errors
+    /// [`TraceError`].
+    pub fn note<const N: usize>(
+        &mut self,
+        time_ns: u64,
+        active: usize,
+        torque_nm: &[f64; N],
+        truth: &Truth<N>,
+    ) -> Result<(), TraceError> {
+        if time_ns < self.next_ns {
+            return Ok(());
+        }
+        self.next_ns = time_ns + EVERY_NS;
+        let torques: String = torque_nm.iter().map(|t| format!(",{t:.6}")).collect();
+        let force = truth.contact_force_n;
+        self.line(&format!(
+            "{time_ns},{active}{torques},{:.4},{:.4},{:.4},{:.6}",
+            force.x, force.y, force.z, truth.tip_position_m.z
+        ))
+    }
+
+    fn line(&mut self, text: &str) -> Result<(), TraceError> {
+        writeln!(self.file, "{text}").map_err(|source| TraceError {
+            file: self.path.clone(),
+            source,
+        })
+    }
+}

@@ -1,0 +1,117 @@
+"""Learning from the prediction error of a motion that is repeated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from supple import _native
+from supple._identify import _logs
+
+Array = NDArray[np.float64]
+
+__all__ = ["Learned", "learn"]
+
+
+@dataclass(frozen=True, eq=False)
+class Learned:
+    """An arm with what repeated motion has taught."""
+
+    arm: _native.Arm
+    """The arm with its new friction, and with what the hand holds where that was looked for."""
+    before_nm: Array
+    """RMS prediction error of each joint before, (N,) (N m); zero for joints that did not move."""
+    after_nm: Array
+    """The same after, (N,) (N m)."""
+    payload_kg: float | None
+    """Mass that the hand holds more than the arm given (kg); ``None`` where it was not looked for."""
+    payload_first_moment_kg_m: Array | None
+    """Its first moment in the last link's frame, (3,) (kg m)."""
+
+
+def learn(
+    arm: _native.Arm,
+    t: ArrayLike | Sequence[ArrayLike],
+    q: ArrayLike | Sequence[ArrayLike],
+    tau: ArrayLike | Sequence[ArrayLike],
+    qd: ArrayLike | Sequence[ArrayLike] | None = None,
+    *,
+    moving: Sequence[int] | None = None,
+    cutoff_hz: float = 8.0,
+    keep_every: int = 1,
+    torque_delay_s: float = 0.0,
+    slow_rad_per_s: float = 0.08,
+    friction_change: float = 0.2,
+    payload_kg: float | None = None,
+    noise_nm: float = 0.05,
+) -> Learned:
+    """Refit friction, and a body in the hand, from what the model did not predict of the torques.
+
+    For a few periods of a motion in free space: too little to identify an arm, enough to correct what
+    changes from day to day. Friction scales by joint, held to the model by a prior; masses stay.
+
+    Parameters
+    ----------
+    arm : Arm
+        The model that was in use.
+    t, q, tau, qd
+        The log or logs, as in :func:`identify`.
+    moving : sequence of int, optional
+        Joints that moved, increasing from 0. Default: all.
+    cutoff_hz, keep_every, torque_delay_s
+        Preparation, as in :func:`identify`.
+    slow_rad_per_s : float
+        Slower samples of a joint are left out (rad/s).
+    friction_change : float
+        Expected relative change of friction.
+    payload_kg : float, optional
+        Expected mass of a body in the hand (kg). Default: the hand is empty.
+    noise_nm : float
+        Noise of the torques (N m).
+
+    Raises
+    ------
+    ValueError
+        As :func:`identify`, and where no joint turned faster than ``slow_rad_per_s``.
+
+    Examples
+    --------
+    Viscous and dry friction a tenth above the model's, no noise:
+
+    >>> import numpy as np, supple
+    >>> arm = supple.Arm.load("wam4")
+    >>> t = np.arange(0.0, 10.0, 0.01)
+    >>> w = 2.0 * np.pi * np.array([0.3, 0.4, 0.5, 0.6])
+    >>> q, qd, qdd = (0.3 * np.sin(w * t[:, None]), 0.3 * w * np.cos(w * t[:, None]),
+    ...               -0.3 * w**2 * np.sin(w * t[:, None]))
+    >>> friction = np.stack([f.torque_nm(qd[:, j]) for j, f in enumerate(arm.friction)], axis=1)
+    >>> found = supple.learn(arm, t, q, arm.rnea(q, qd, qdd) + 1.1 * friction)
+    >>> ratios = [a.coulomb_nm / b.coulomb_nm for a, b in zip(found.arm.friction, arm.friction)]
+    >>> bool(np.allclose(ratios, 1.1, atol=0.02))
+    True
+    """
+    found = _native.learn(
+        arm,
+        _logs(t, q, tau, qd, None),
+        {
+            "moving": list(range(arm.dof)) if moving is None else [int(joint) for joint in moving],
+            "cutoff_hz": cutoff_hz,
+            "keep_every": keep_every,
+            "torque_delay_s": torque_delay_s,
+            "slow_rad_per_s": slow_rad_per_s,
+            "friction_change": friction_change,
+            "payload_kg": payload_kg,
+            "noise_nm": noise_nm,
+        },
+    )
+    payload = found["payload"]
+    return Learned(
+        arm=found["arm"],
+        before_nm=found["before_nm"],
+        after_nm=found["after_nm"],
+        payload_kg=None if payload is None else payload[0],
+        payload_first_moment_kg_m=None if payload is None else np.array(payload[1:]),
+    )

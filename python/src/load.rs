@@ -1,0 +1,98 @@
+//! What a fit of an arm tells beside its model: a body in the hand, the scale of the torques, torque ripple.
+
+use crate::arrays;
+use crate::errors;
+use crate::fit::Fit;
+use crate::samples::{Given, Samples};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use supple_core::Body;
+use supple_core::math::{Matrix3, Vector3};
+use supple_ident::{Motion, RippleSearch};
+
+/// A body in the last link's frame.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Hand {
+    mass_kg: f64,
+    com_m: [f64; 3],
+    inertia_kg_m2: [[f64; 3]; 3],
+}
+
+impl From<Hand> for Body {
+    fn from(hand: Hand) -> Body {
+        Body {
+            mass_kg: hand.mass_kg,
+            com_m: Vector3::from(hand.com_m),
+            inertia_kg_m2: Matrix3::from_fn(|i, j| hand.inertia_kg_m2[i][j]),
+        }
+    }
+}
+
+fn motions(fit: &Fit, logs: &[Given<'_>]) -> PyResult<Vec<Motion>> {
+    fit.motions_of(&read(fit, logs)?)
+}
+
+fn read(fit: &Fit, logs: &[Given<'_>]) -> PyResult<Vec<Samples>> {
+    let dof = fit.description().dof();
+    logs.iter().map(|log| Samples::read(log, dof)).collect()
+}
+
+/// The body that explains what the fit leaves of logs with it; what they do not tell is drawn to `guess`.
+#[pyfunction]
+pub fn payload<'py>(
+    py: Python<'py>,
+    fit: &Fit,
+    logs: Vec<Given<'py>>,
+    guess: Hand,
+) -> PyResult<Bound<'py, PyDict>> {
+    let motions = motions(fit, &logs)?;
+    let guess = Body::from(guess);
+    let found = py.detach(|| fit.model().payload(&motions, &guess));
+    let body = found.map_err(errors::identification)?;
+    let dict = PyDict::new(py);
+    dict.set_item("mass_kg", body.mass_kg)?;
+    dict.set_item(
+        "com_m",
+        arrays::array(py, body.com_m.as_slice().to_vec(), &[3])?,
+    )?;
+    let inertia = body.inertia_kg_m2.transpose().as_slice().to_vec();
+    dict.set_item("inertia_kg_m2", arrays::array(py, inertia, &[3, 3])?)?;
+    Ok(dict)
+}
+
+/// True by logged torque of each moving joint, `None` where the known body adds too little to tell.
+#[pyfunction]
+pub fn torque_scale(
+    py: Python<'_>,
+    fit: &Fit,
+    logs: Vec<Given<'_>>,
+    known: Hand,
+) -> PyResult<Vec<Option<f64>>> {
+    let motions = motions(fit, &logs)?;
+    let known = Body::from(known);
+    let found = py.detach(|| fit.model().torque_scale(&motions, &known));
+    found.map_err(errors::identification)
+}
+
+/// Harmonic, sine and cosine amplitude of every line, motor by motor.
+#[pyfunction]
+pub fn ripple(
+    py: Python<'_>,
+    fit: &Fit,
+    logs: Vec<Given<'_>>,
+    harmonics: Vec<u32>,
+    fast_rad_per_s: f64,
+    cutoff_hz: f64,
+) -> PyResult<Vec<Vec<(u32, f64, f64)>>> {
+    let samples = read(fit, &logs)?;
+    let search = RippleSearch {
+        harmonics,
+        fast_rad_per_s,
+    };
+    let found = py.detach(|| {
+        fit.model()
+            .ripple(fit.description(), &samples, &search, cutoff_hz)
+    });
+    found.map_err(errors::save)
+}

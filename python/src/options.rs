@@ -1,0 +1,80 @@
+//! The options of an identification, as the package gives them.
+
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use supple_ident::{FrictionChoice, FrictionColumns, Method, Preparation, Procedure};
+
+/// What to fit, and how; the package has checked names and fills in defaults.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Options {
+    moving: Option<Vec<usize>>,
+    couplings: Vec<(usize, usize)>,
+    rate_hz: Option<f64>,
+    cutoff_hz: Option<f64>,
+    keep_every: usize,
+    torque_delay_s: f64,
+    method: String,
+    friction: Option<Shape>,
+    /// A Stribeck dip whose speed is found too.
+    pub dip: bool,
+    rotor: bool,
+    slow_rad_per_s: f64,
+    prior_weight: Option<f64>,
+    joint_noise_nm: Option<Vec<f64>>,
+}
+
+#[derive(FromPyObject)]
+struct Shape {
+    viscous: bool,
+    coulomb: bool,
+    offset: bool,
+    asymmetry: bool,
+    load: bool,
+    stribeck_rad_per_s: Option<f64>,
+    band_rad_per_s: f64,
+}
+
+impl Options {
+    /// What the crate takes.
+    pub fn procedure(self) -> PyResult<Procedure> {
+        let method = match &self.method[..] {
+            "ols" => Method::Ols,
+            "wls" => Method::Wls,
+            "irls" => Method::Irls,
+            "consistent" => Method::Consistent,
+            other => {
+                return Err(PyValueError::new_err(format!(
+                    "method: expected one of ols, wls, irls, consistent, got {other:?}"
+                )));
+            }
+        };
+        let columns = |shape: Shape| FrictionColumns {
+            viscous: shape.viscous,
+            coulomb: shape.coulomb,
+            offset: shape.offset,
+            asymmetry: shape.asymmetry,
+            load: shape.load,
+            stribeck_rad_per_s: shape.stribeck_rad_per_s,
+            band_rad_per_s: shape.band_rad_per_s,
+        };
+        Ok(Procedure {
+            moving: self.moving,
+            couplings: self.couplings,
+            preparation: Preparation {
+                rate_hz: self.rate_hz,
+                cutoff_hz: self.cutoff_hz,
+                keep_every: self.keep_every,
+                torque_delay_s: self.torque_delay_s,
+            },
+            method,
+            friction: self.friction.map_or(FrictionChoice::Auto, |shape| {
+                FrictionChoice::Columns(columns(shape))
+            }),
+            rotor: self.rotor,
+            slow_rad_per_s: self.slow_rad_per_s,
+            prior_weight: self.prior_weight,
+            joint_noise_nm: self.joint_noise_nm,
+        })
+    }
+}

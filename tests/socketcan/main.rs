@@ -1,0 +1,159 @@
+//! `supple-can` against the emulated arm over a CAN interface of the kernel, at 1 kHz: from the wake-up to
+//! torque mode, a thousand cycles, error frames, silent loss. `./ci.sh socketcan` runs it in a virtual machine
+//! that has such an interface and whose clock counts instructions, so that 1 kHz is kept at any speed of the
+//! host; elsewhere `SUPPLE_CAN_INTERFACE` names an interface.
+
+mod arm;
+#[path = "../support/counting.rs"]
+mod counting;
+#[path = "../arm_on_bus/link.rs"]
+mod link;
+
+use arm::Arm;
+use link::Controlled;
+use supple_bus::{BusFault, FaultInjector, FaultKind, FaultRule, SocketCan, Traffic};
+use supple_can::guard::Stage;
+use supple_can::{Cycle, Loss, Rhythm, StartUp, start_up};
+use supple_core::Controller;
+use supple_core::controller::Request;
+use supple_emu::Press;
+use supple_model::Description;
+use supple_puck::safety::SafetyLimits;
+use supple_puck::status::MotorMode;
+use supple_realtime::{Settings, enter};
+
+const PERIOD_NS: u64 = 1_000_000;
+const ANSWER_NS: u64 = 50_000;
+/// Cycles in which every safe action is done: 20 ms.
+const SAFE: usize = 20;
+/// Cycles for the operator's button to reach the motors and the host: 50 ms.
+const PRESSED: usize = 50;
+
+/// Of the host's thread and the arm's: hardware waits for nobody.
+const HOST_PRIORITY: u8 = 79;
+const ARM_PRIORITY: u8 = 80;
+
+type Service = Cycle<4, FaultInjector<SocketCan>, Controlled<4>>;
+
+fn realtime(priority: u8) {
+    let settings = Settings {
+        priority: Some(priority),
+        ..Settings::NONE
+    };
+    for shortfall in enter(&settings) {
+        eprintln!("{shortfall}");
+    }
+}
+
+fn run(cycle: &mut Service, cycles: usize) {
+    for _ in 0..cycles {
+        cycle.run().unwrap();
+    }
+}
+
+/// In service with idle motors, as the program comes there.
+fn in_service(interface: &str) -> Service {
+    let description = Description::asset("wam4").unwrap();
+    let config = description.config::<4>().unwrap();
+    let mut bus = FaultInjector::new(SocketCan::open(interface).unwrap(), 1);
+    let wishes = StartUp {
+        zero_at_rad: Some(description.home::<4>().unwrap()),
+        limits: SafetyLimits::default(),
+        tare: false,
+    };
+    let mut said = Vec::new();
+    let ready = start_up(
+        &mut bus,
+        &description,
+        &wishes,
+        &|| false,
+        &mut |progress| {
+            said.push(progress);
+        },
+    );
+    let ready = ready.unwrap_or_else(|error| panic!("{error}, after {said:?}"));
+    let link = Controlled::new(Controller::new(config).unwrap());
+    let rhythm = Rhythm {
+        period_ns: PERIOD_NS,
+        answer_ns: ANSWER_NS,
+    };
+    Cycle::new(bus, link, ready, config.arm, rhythm).unwrap()
+}
+
+fn activate(cycle: &mut Service, arm: &Arm) {
+    arm.press(Press::Idle);
+    run(cycle, PRESSED);
+    arm.press(Press::Activate);
+    run(cycle, PRESSED);
+    assert_eq!(cycle.guard().stage(), Stage::Active);
+    assert!(arm.motors_in(MotorMode::Torque));
+}
+
+#[test]
+fn an_arm_on_the_kernels_bus_wakes_serves_and_is_lowered() {
+    let Ok(interface) = std::env::var("SUPPLE_CAN_INTERFACE") else {
+        eprintln!("skipped: SUPPLE_CAN_INTERFACE is not set; ./ci.sh socketcan has one");
+        return;
+    };
+    let arm = Arm::start(&interface);
+    arm.press(Press::Idle);
+    realtime(HOST_PRIORITY);
+    let mut cycle = in_service(&interface);
+    cycle.link_mut().request = Some(Request::GravityHold);
+    activate(&mut cycle, &arm);
+
+    let (before, before_rad) = (*cycle.counters(), arm.position_rad());
+    let allocations = counting::counted(|| run(&mut cycle, 1000));
+    assert_eq!(allocations, 0);
+    let counters = *cycle.counters();
+    eprintln!("{counters:?}");
+    assert_eq!(cycle.guard().stage(), Stage::Active);
+    assert_eq!(counters.cycles - before.cycles, 1000);
+    assert_eq!(counters.tx_lost, before.tx_lost);
+    assert_eq!(counters.replies_lost, before.replies_lost);
+    assert_eq!(counters.missed, before.missed);
+    let after_rad = arm.position_rad();
+    assert!((after_rad - before_rad).amax() < 2e-3, "the weight is held");
+    let report = cycle.link_mut().report.unwrap();
+    for (measured, truth) in report.position_rad.iter().zip(after_rad.iter()) {
+        assert!((measured.unwrap() - truth).abs() < 2e-4);
+    }
+
+    // What a controller reports and then copes with changes nothing.
+    for fault in [
+        BusFault::ArbitrationLost,
+        BusFault::Warning,
+        BusFault::Passive,
+        BusFault::Protocol,
+        BusFault::Overrun,
+    ] {
+        arm.fault(fault);
+        run(&mut cycle, SAFE);
+        assert_eq!(cycle.guard().stage(), Stage::Active, "{fault}");
+    }
+    assert_eq!(cycle.counters().overruns, 1);
+    arm.fault(BusFault::BusOff);
+    run(&mut cycle, SAFE);
+    assert_eq!(cycle.guard().last_loss().unwrap().0, Loss::BusOff);
+    assert!(arm.motors_in(MotorMode::Idle));
+
+    // Torque frames that never leave, in silence: noticed in the cycle, lowered soon after.
+    arm.fault(BusFault::Restarted);
+    activate(&mut cycle, &arm);
+    let lost = cycle.counters().tx_lost;
+    let rule = FaultRule::always(Traffic::Sent, FaultKind::SilentLoss);
+    cycle.bus_mut().add(rule.only(|id| id.raw() == 0x401));
+    run(&mut cycle, 1);
+    assert_eq!(cycle.counters().tx_lost, lost + 1);
+    run(&mut cycle, SAFE);
+    assert_eq!(cycle.guard().last_loss().unwrap().0, Loss::Transmit);
+    assert!(arm.motors_in(MotorMode::Idle));
+
+    // A controller that answers no more.
+    cycle.bus_mut().clear();
+    activate(&mut cycle, &arm);
+    cycle.link_mut().dead = true;
+    run(&mut cycle, SAFE);
+    assert_eq!(cycle.guard().last_loss().unwrap().0, Loss::Answer);
+    assert!(arm.motors_in(MotorMode::Idle));
+}

@@ -1,0 +1,44 @@
+//! An allocator that counts what a thread asks of it.
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+thread_local! {
+    static COUNT: Cell<Option<u64>> = const { Cell::new(None) };
+}
+
+struct Counting;
+
+// SAFETY: hands every call on to the system's allocator unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        COUNT.with(|count| count.set(count.get().map(|n| n + 1)));
+        // SAFETY: as the caller promises.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        COUNT.with(|count| count.set(count.get().map(|n| n + 1)));
+        // SAFETY: as the caller promises.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// Allocations and deallocations of this thread in `work`.
+pub fn counted(work: impl FnOnce()) -> u64 {
+    COUNT.with(|count| count.set(Some(0)));
+    work();
+    COUNT.with(Cell::take).expect("counting")
+}
+
+/// Work in the midst of counted work that does not count.
+#[allow(dead_code, reason = "not everyone has such")]
+pub fn uncounted<T>(work: impl FnOnce() -> T) -> T {
+    let before = COUNT.with(Cell::take);
+    let done = work();
+    COUNT.with(|count| count.set(before));
+    done
+}

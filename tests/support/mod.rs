@@ -1,0 +1,24 @@
+//! What tests of the real programs need.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+
+/// Folder of the programs, built once: as all tests are, so that nothing is left to do where all run.
+pub fn programs() -> &'static Path {
+    static PROGRAMS: OnceLock<PathBuf> = OnceLock::new();
+    PROGRAMS.get_or_init(|| {
+        let selection =
+            "test --no-run --locked --workspace --exclude supple-python --lib --bins --tests";
+        let built = Command::new(env!("CARGO"))
+            .args(selection.split(' '))
+            .current_dir(env!("CARGO_MANIFEST_DIR"))
+            .output()
+            .expect("cargo runs");
+        let words = String::from_utf8_lossy(&built.stderr);
+        assert!(built.status.success(), "{words}");
+        let test = std::env::current_exe().expect("this test");
+        let deps = test.parent().expect("deps");
+        deps.parent().expect("the profile's folder").to_owned()
+    })
+}
