@@ -2,6 +2,7 @@
 
 use proptest::prelude::*;
 use proptest::strategy::Union;
+use proptest::test_runner::RngSeed;
 use supple_core::codes::{RequestCode, RequestCodeError, VALUES};
 use supple_core::config::Gains;
 use supple_core::controller::{Breakaway, Request};
@@ -121,6 +122,12 @@ fn request() -> impl Strategy<Value = Numbered> {
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig {
+        failure_persistence: None,
+        rng_seed: RngSeed::Fixed(20_260_106),
+        ..ProptestConfig::default()
+    })]
+
     #[test]
     fn every_request_comes_back_to_the_last_bit((numbers, request) in request()) {
         let code = RequestCode::new(request.as_ref());

@@ -159,7 +159,7 @@ fn term(coefficient: f64, name: &str) -> String {
 
 /// Columns that pivoting takes before the rest are negligible. Each step takes the longest remainder, the
 /// first of those that tie, and removes its direction, twice, from the others.
-fn pivot_order(columns: &DMatrix<f64>, tolerance: f64) -> Vec<usize> {
+pub(crate) fn pivot_order(columns: &DMatrix<f64>, tolerance: f64) -> Vec<usize> {
     let mut rest = columns.clone();
     let mut order: Vec<usize> = Vec::new();
     let mut first = 0.0;

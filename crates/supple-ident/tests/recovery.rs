@@ -3,6 +3,7 @@
 mod support;
 
 use proptest::prelude::*;
+use proptest::test_runner::{RngSeed, TestCaseError};
 use supple_core::dynamics::{parameters, rnea};
 use supple_core::{Arm, Friction, Vector};
 use supple_ident::{Columns, DMatrix, FrictionColumns, Options, Weights, fit};
@@ -45,33 +46,57 @@ fn furthest<const N: usize>(a: &Arm<N>, b: &Arm<N>, moving: &[usize]) -> f64 {
     worst
 }
 
+/// Fits `random_arm(seed)` from a model with other masses, without noise.
+fn arm_is_given_back(seed: u64) -> Result<(), TestCaseError> {
+    let (truth, model) = (random_arm::<4>(seed), random_arm::<4>(seed));
+    // Same kinematics, other masses: the model is the truth with 1.3 times its inertia.
+    let mut links = *model.links();
+    for link in &mut links {
+        link.mass *= 1.3;
+        link.first_moment *= 1.3;
+        link.inertia *= 1.3;
+    }
+    let model = Arm::from_links(
+        links,
+        model.armature(),
+        model.joint_from_tip(),
+        model.gravity(),
+    )
+    .unwrap();
+    let joints = [0, 1, 2, 3];
+    let data = [
+        motion(&truth, &friction(), &joints, 600, seed),
+        motion(&truth, &friction(), &joints, 400, seed + 1),
+    ];
+    for weights in [Weights::Equal, Weights::Noise, Weights::Huber] {
+        let options = Options {
+            weights,
+            consistent: None,
+            ..Options::default()
+        };
+        let fit = fit(&model, &data, &joints, &options).unwrap();
+        let held_out = motion(&truth, &friction(), &joints, 300, seed + 7);
+        let checked = fit.validate_motion(&held_out).unwrap();
+        prop_assert!(checked.total_relative < 1e-11, "{}", checked.total_relative);
+        for (found, true_one) in fit.friction().iter().zip(friction::<4>()) {
+            prop_assert!((found.coulomb_nm - true_one.coulomb_nm).abs() < 1e-9);
+            prop_assert!((found.viscous_nm_s_per_rad - true_one.viscous_nm_s_per_rad).abs() < 1e-9);
+        }
+    }
+    Ok(())
+}
+
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 12, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig {
+        cases: 12,
+        failure_persistence: None,
+        rng_seed: RngSeed::Fixed(20_260_501),
+        ..ProptestConfig::default()
+    })]
 
     #[test]
     fn noise_free_data_give_the_arm_back_in_every_torque(seed in 1_u64..1000) {
-        let (truth, model) = (random_arm::<4>(seed), random_arm::<4>(seed));
-        // Same kinematics, other masses: the model is the truth with 1.3 times its inertia.
-        let mut links = *model.links();
-        for link in &mut links {
-            link.mass *= 1.3;
-            link.first_moment *= 1.3;
-            link.inertia *= 1.3;
-        }
-        let model = Arm::from_links(links, model.armature(), model.joint_from_tip(), model.gravity()).unwrap();
-        let joints = [0, 1, 2, 3];
-        let data = [motion(&truth, &friction(), &joints, 600, seed), motion(&truth, &friction(), &joints, 400, seed + 1)];
-        for weights in [Weights::Equal, Weights::Noise, Weights::Huber] {
-            let options = Options { weights, consistent: None, ..Options::default() };
-            let fit = fit(&model, &data, &joints, &options).unwrap();
-            let held_out = motion(&truth, &friction(), &joints, 300, seed + 7);
-            let checked = fit.validate_motion(&held_out).unwrap();
-            prop_assert!(checked.total_relative < 1e-7, "{}", checked.total_relative);
-            for (found, true_one) in fit.friction().iter().zip(friction::<4>()) {
-                prop_assert!((found.coulomb_nm - true_one.coulomb_nm).abs() < 1e-5);
-                prop_assert!((found.viscous_nm_s_per_rad - true_one.viscous_nm_s_per_rad).abs() < 1e-5);
-            }
-        }
+        arm_is_given_back(seed)?;
     }
 
     #[test]
@@ -97,6 +122,14 @@ proptest! {
         let itself = fit.validate_motion(&exact).unwrap();
         let found_nm = itself.rms_nm.iter().map(|rms| rms * rms).sum::<f64>().sqrt();
         prop_assert!(found_nm < 1.5 * expected_nm, "{found_nm} N m, {expected_nm} N m expected");
+    }
+}
+
+/// Singular regressors whose singular values an inexact solver has got wrong in the third digit.
+#[test]
+fn regressors_that_are_hard_to_decompose_give_the_arm_back() {
+    for seed in [634, 658] {
+        arm_is_given_back(seed).unwrap();
     }
 }
 

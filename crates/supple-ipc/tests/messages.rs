@@ -3,6 +3,7 @@
 mod support;
 
 use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 use std::mem::size_of;
 use supple_core::controller::{Mode, Request};
 use supple_core::{Trajectory, Vector, trajectory::Sinusoid};
@@ -38,6 +39,12 @@ fn there_is_no_padding_to_share() {
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig {
+        failure_persistence: None,
+        rng_seed: RngSeed::Fixed(20_260_401),
+        ..ProptestConfig::default()
+    })]
+
     #[test]
     fn an_arm_state_gives_the_input_it_was_made_of(
         cycle in any::<u64>(),
