@@ -166,7 +166,7 @@ fn core_depends_on_nothing_but_mathematics() {
         .collect();
     assert_eq!(
         normal,
-        BTreeSet::from(["libm", "nalgebra", "safe_arch", "wide"])
+        BTreeSet::from(["bytemuck", "libm", "nalgebra", "safe_arch", "wide"])
     );
 }
 

@@ -10,7 +10,7 @@ use std::hint::black_box;
 use std::io::{self, BufWriter, Write};
 use std::process::ExitCode;
 use std::time::Instant;
-use supple_core::dynamics;
+use supple_core::dynamics::{self, Regressor};
 use supple_core::operational::{pose_torque, position_torque};
 use supple_core::{Matrix, Vector};
 
@@ -112,14 +112,20 @@ impl<const R: usize, const C: usize> Numbers for Matrix<R, C> {
     }
 }
 
-impl<const N: usize> Numbers for [Matrix<N, 10>; N] {
+/// By columns, as the peers have it.
+impl<const N: usize> Numbers for Regressor<N> {
     #[inline]
     fn first(&self) -> f64 {
-        self[0][(0, 0)]
+        self[0][0][0]
     }
 
     fn write(&self, out: &mut impl Write) -> io::Result<()> {
-        self.iter().try_for_each(|block| block.write(out))
+        for (link, parameter) in (0..N).flat_map(|link| (0..10).map(move |p| (link, p))) {
+            for row in self {
+                out.write_all(&row[link][parameter].to_le_bytes())?;
+            }
+        }
+        Ok(())
     }
 }
 

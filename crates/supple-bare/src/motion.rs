@@ -60,7 +60,7 @@ fn every_function<const N: usize>(
     digest.matrix(&dynamics::jacobian_dot_qd(arm, q, qd));
     digest.number(dynamics::kinetic_energy(arm, q, qd));
     digest.number(dynamics::potential_energy(arm, q));
-    for block in dynamics::regressor(arm, q, qd, qdd) {
-        digest.matrix(&block);
+    for row in dynamics::regressor(arm, q, qd, qdd).as_flattened() {
+        digest.matrix(row);
     }
 }

@@ -149,6 +149,19 @@ pub(crate) fn rows<const K: usize, const N: usize, const G: usize>(
     })
 }
 
+/// The quantities of a group.
+#[inline(always)]
+pub(crate) fn of_group<const K: usize, const G: usize>(
+    rows: &Rows<K, G>,
+    group: usize,
+) -> [Lanes; K] {
+    let mut out = [Lanes::ZERO; K];
+    for (out, row) in out.iter_mut().zip(rows) {
+        *out = row[group];
+    }
+    out
+}
+
 /// The quantities of joint `i`.
 #[inline(always)]
 pub(crate) fn of_joint<const K: usize, const G: usize>(rows: &Rows<K, G>, i: usize) -> [f64; K] {

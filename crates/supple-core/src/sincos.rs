@@ -1,5 +1,4 @@
-//! Sines and cosines of all joints at once, without branches, so that the compiler takes several joints in
-//! one instruction.
+//! Sines and cosines of all joints at once, without branches, four joints in one instruction.
 //!
 //! `x = n pi/2 + r`: `pi/2` is subtracted in parts whose products with `n` are exact (Cody and Waite): two
 //! where there is fused multiply-add, else three, of which two are short. `r` is kept in two words. On `|r| <= pi/4` sine and cosine are
@@ -11,7 +10,10 @@
     reason = "joints, groups and lanes are counted: each index goes into several arrays"
 )]
 
-use crate::lanes::{FUSED, Number};
+use crate::lanes::{Column, FUSED, Lanes, Number, column, in_groups, per_joint, splat};
+use bytemuck::cast;
+use core::f64::consts::{FRAC_2_PI, FRAC_PI_2};
+use wide::u64x4;
 
 /// Greatest angle that the polynomials are used for \[rad\]: a joint that has turned 159,000 times.
 pub const GREATEST_RAD: f64 = 1e6;
@@ -47,49 +49,59 @@ const COSINE: [f64; 6] = [
 ];
 
 /// Sines and cosines of angles in radians. Each depends on its own angle alone.
-#[inline(always)]
 pub fn sin_cos_all<const N: usize>(angles_rad: &[f64; N]) -> ([f64; N], [f64; N]) {
-    let (mut sines, mut cosines) = ([0.0; N], [0.0; N]);
-    let mut greatest = 0.0;
-    for i in 0..N {
-        (sines[i], cosines[i]) = near(angles_rad[i]);
-        let size = f64::from_bits(angles_rad[i].to_bits() & !SIGN);
-        greatest = if size <= greatest { greatest } else { size };
-    }
-    if is_far(greatest) {
-        replace_far(angles_rad, &mut sines, &mut cosines);
-    }
-    (sines, cosines)
+    in_groups!(N, of_numbers(angles_rad))
 }
 
-#[inline]
-fn is_far(angle_rad: f64) -> bool {
-    !(-GREATEST_RAD..=GREATEST_RAD).contains(&angle_rad)
+fn of_numbers<const N: usize, const G: usize>(angles_rad: &[f64; N]) -> ([f64; N], [f64; N]) {
+    let [sines, cosines] = sin_cos(&column::<N, G>(angles_rad));
+    (per_joint(&sines), per_joint(&cosines))
+}
+
+/// Sines, then cosines.
+#[inline(always)]
+pub(crate) fn sin_cos<const G: usize>(angles_rad: &Column<G>) -> [Column<G>; 2] {
+    let [mut sines, mut cosines] = [[Lanes::ZERO; G]; 2];
+    let mut all_near = Lanes::splat(f64::from_bits(u64::MAX));
+    for group in 0..G {
+        let x = angles_rad[group];
+        (sines[group], cosines[group]) = near(x);
+        all_near &= x.abs().simd_le(Lanes::splat(GREATEST_RAD));
+    }
+    if !all_near.all() {
+        replace_far(angles_rad, &mut sines, &mut cosines);
+    }
+    [sines, cosines]
 }
 
 #[cold]
-fn replace_far(angles_rad: &[f64], sines: &mut [f64], cosines: &mut [f64]) {
+fn replace_far(angles_rad: &[Lanes], sines: &mut [Lanes], cosines: &mut [Lanes]) {
     for ((angle, sine), cosine) in angles_rad.iter().zip(sines).zip(cosines) {
-        if is_far(*angle) {
-            (*sine, *cosine) = libm::sincos(*angle);
+        let lanes = sine.as_mut_array().iter_mut().zip(cosine.as_mut_array());
+        for (angle, (sine, cosine)) in angle.as_array().iter().zip(lanes) {
+            if !(-GREATEST_RAD..=GREATEST_RAD).contains(angle) {
+                (*sine, *cosine) = libm::sincos(*angle);
+            }
         }
     }
 }
 
-/// Sine and cosine of an angle no greater than [`GREATEST_RAD`].
+/// Sine and cosine of angles no greater than [`GREATEST_RAD`].
 #[inline(always)]
-fn near(x: f64) -> (f64, f64) {
-    let shifted = x.times_plus(core::f64::consts::FRAC_2_PI, ROUND);
-    let n = shifted - ROUND;
+fn near(x: Lanes) -> (Lanes, Lanes) {
+    let shifted = Number::times_plus(x, Lanes::splat(FRAC_2_PI), Lanes::splat(ROUND));
+    let n = shifted - Lanes::splat(ROUND);
     let (r, tail) = if FUSED {
-        let coarse = (-n).times_plus(core::f64::consts::FRAC_PI_2, x);
-        let r = (-n).times_plus(BEYOND_HALF_PI, coarse);
-        (r, (-n).times_plus(BEYOND_HALF_PI, coarse - r))
+        let beyond = Lanes::splat(BEYOND_HALF_PI);
+        let coarse = Number::times_plus(-n, Lanes::splat(FRAC_PI_2), x);
+        let r = Number::times_plus(-n, beyond, coarse);
+        (r, Number::times_plus(-n, beyond, coarse - r))
     } else {
-        let first = x - n * HALF_PI[0];
-        let second = n * HALF_PI[1];
+        let [a, b, c] = splat(HALF_PI);
+        let first = x - n * a;
+        let second = n * b;
         let coarse = first - second;
-        let rest = n * HALF_PI[2] - ((first - coarse) - second);
+        let rest = n * c - ((first - coarse) - second);
         let r = coarse - rest;
         (r, (coarse - r) - rest)
     };
@@ -97,27 +109,27 @@ fn near(x: f64) -> (f64, f64) {
     let z = r * r;
     let sine = polynomial(z, &SINE);
     let cosine = polynomial(z, &COSINE);
-    let half = 0.5 * z;
-    let one = 1.0 - half;
-    let sine = r + (z * r).times_plus(sine, tail * one);
-    let cosine = one + (((1.0 - one) - half) + (z * z).times_plus(cosine, -(r * tail)));
+    let half = Lanes::splat(0.5) * z;
+    let one = Lanes::splat(1.0) - half;
+    let sine = r + Number::times_plus(z * r, sine, tail * one);
+    let rounded = (Lanes::splat(1.0) - one) - half;
+    let cosine = one + (rounded + Number::times_plus(z * z, cosine, -(r * tail)));
 
-    let quadrant = shifted.to_bits();
-    let odd = quadrant & 1 != 0;
-    let (s, c) = if odd { (cosine, sine) } else { (sine, cosine) };
-    let sign_of_sine = (quadrant & 2) << 62;
-    let sign_of_cosine = (quadrant.wrapping_add(1) & 2) << 62;
+    let quadrant: u64x4 = cast(shifted);
+    let odd: Lanes = cast(u64x4::ZERO - (quadrant & u64x4::splat(1)));
+    let sign = |quadrant: u64x4| cast::<_, Lanes>((quadrant << 62_u64) & u64x4::splat(SIGN));
     (
-        f64::from_bits(s.to_bits() ^ sign_of_sine),
-        f64::from_bits(c.to_bits() ^ sign_of_cosine),
+        odd.bitselect(cosine, sine) ^ sign(quadrant),
+        odd.bitselect(sine, cosine) ^ sign(quadrant + u64x4::splat(1)),
     )
 }
 
 /// Even and odd powers apart, so that they are added at the same time.
 #[inline(always)]
-fn polynomial(z: f64, c: &[f64; 6]) -> f64 {
+fn polynomial(z: Lanes, coefficients: &[f64; 6]) -> Lanes {
+    let c = splat(*coefficients);
     let w = z * z;
-    let even = w.times_plus(w.times_plus(c[4], c[2]), c[0]);
-    let odd = w.times_plus(w.times_plus(c[5], c[3]), c[1]);
-    z.times_plus(odd, even)
+    let even = Number::times_plus(w, Number::times_plus(w, c[4], c[2]), c[0]);
+    let odd = Number::times_plus(w, Number::times_plus(w, c[5], c[3]), c[1]);
+    Number::times_plus(z, odd, even)
 }

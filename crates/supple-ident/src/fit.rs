@@ -12,7 +12,7 @@ use crate::procedure::Choice;
 use crate::random::Random;
 use crate::regressor::{JointRows, joint_rows, rows};
 use nalgebra::DVector;
-use supple_core::dynamics::regressor;
+use supple_core::dynamics::{regressor, regressor_times};
 use supple_core::{Arm, Friction, Vector};
 
 /// A joint slides steadily once it has gone this far since it turned round \[rad\]: the bristles of
@@ -400,12 +400,9 @@ impl<const N: usize> Fit<N> {
         let held = |v: &Vector<N>| {
             Vector::<N>::from_fn(|j, _| if moving.contains(&j) { v[j] } else { 0.0 })
         };
-        let blocks = regressor(&self.nominal, q, &held(qd), &held(qdd));
+        let of_links = regressor(&self.nominal, q, &held(qd), &held(qdd));
         let links = model::link_parameters::<N>(&self.x);
-        let mut torque = Vector::zeros();
-        for (block, link) in blocks.iter().zip(&links) {
-            torque += block * link;
-        }
+        let mut torque = regressor_times(&of_links, &links);
         let explained = rows(&self.nominal, &self.columns, q, qd, qdd) * &self.x;
         for (row, &joint) in moving.iter().enumerate() {
             let rotor = match self.columns.position(Column::Rotor(joint)) {

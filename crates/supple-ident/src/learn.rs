@@ -176,7 +176,7 @@ fn rows<const N: usize>(
         };
         let (q, qd, qdd) = (at(&motion.q), held(&motion.qd), held(&motion.qdd));
         let model = rnea(arm, &q, &qd, &qdd);
-        let hand = (width > 2 * moving.len()).then(|| regressor(arm, &q, &qd, &qdd)[N - 1]);
+        let of_links = (width > 2 * moving.len()).then(|| regressor(arm, &q, &qd, &qdd));
         for (place, &joint) in moving.iter().enumerate() {
             if qd[joint].abs() < learning.slow_rad_per_s {
                 continue;
@@ -186,9 +186,9 @@ fn rows<const N: usize>(
             let mut a = DVector::zeros(width);
             a[2 * place] = viscous;
             a[2 * place + 1] = dry[place][i];
-            if let Some(hand) = &hand {
+            if let Some(rows) = &of_links {
                 for k in 0..4 {
-                    a[2 * moving.len() + k] = hand[(joint, k)];
+                    a[2 * moving.len() + k] = rows[joint][N - 1][k];
                 }
             }
             all.push((joint, a, motion.tau[(i, joint)] - known));

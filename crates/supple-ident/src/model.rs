@@ -4,7 +4,7 @@ use crate::columns::{Column, Columns};
 use crate::error::IdentError;
 use nalgebra::{DMatrix, DVector, SVector};
 use supple_core::arm::Link;
-use supple_core::dynamics::parameters;
+use supple_core::dynamics::{parameters, regressor, regressor_times};
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::{Arm, Friction, Vector};
 
@@ -96,11 +96,9 @@ pub fn mass_matrix<const N: usize>(
     for j in 0..N {
         let mut unit = Vector::<N>::zeros();
         unit[j] = 1.0;
-        let blocks = supple_core::dynamics::regressor(&weightless, q, &Vector::zeros(), &unit);
-        for (block, p) in blocks.iter().zip(&found) {
-            let torque = block * p;
-            (0..N).for_each(|i| mass[(i, j)] += torque[i]);
-        }
+        let of_links = regressor(&weightless, q, &Vector::zeros(), &unit);
+        let torque = regressor_times(&of_links, &found);
+        (0..N).for_each(|i| mass[(i, j)] = torque[i]);
         mass[(j, j)] += rotor(nominal, columns, x, j);
     }
     for column in columns.list() {

@@ -119,10 +119,10 @@ fn added<const N: usize>(empty: &Fit<N>, motion: &Motion) -> Result<Vec<JointRow
             Vector::<N>::from_fn(|j, _| if moving.contains(&j) { m[(i, j)] } else { 0.0 })
         };
         let (q, qd, qdd) = (at(&motion.q), held(&motion.qd), held(&motion.qdd));
-        let hand = regressor(empty.nominal(), &q, &qd, &qdd)[N - 1];
+        let rows = regressor(empty.nominal(), &q, &qd, &qdd);
         for (joint, row) in moving.iter().zip(&mut joints) {
             for k in 0..10 {
-                row.a[(i, k)] = hand[(*joint, k)];
+                row.a[(i, k)] = rows[*joint][N - 1][k];
             }
         }
     }

@@ -7,7 +7,7 @@ use crate::filter::LowPass;
 use crate::motion::Motion;
 use nalgebra::{DMatrix, DVector};
 use std::sync::OnceLock;
-use supple_core::dynamics::{parameters, regressor};
+use supple_core::dynamics::{parameters, regressor, regressor_times};
 use supple_core::math::exp;
 use supple_core::{Arm, Friction, Vector};
 
@@ -79,12 +79,11 @@ pub fn rows<const N: usize>(
         })
     };
     let (qd, qdd) = (held(qd), held(qdd));
-    let blocks = regressor(arm, q, &qd, &qdd);
+    let of_links = regressor(arm, q, &qd, &qdd);
     let friction = columns.friction();
-    let load = friction.load.then(|| {
-        let links = blocks.iter().zip(parameters(arm));
-        links.fold(Vector::<N>::zeros(), |sum, (block, p)| sum + block * p)
-    });
+    let load = friction
+        .load
+        .then(|| regressor_times(&of_links, &parameters(arm)));
     let dry = Friction {
         band_rad_per_s: friction.band_rad_per_s,
         ..Friction::coulomb(0.0, 1.0)
@@ -100,7 +99,7 @@ pub fn rows<const N: usize>(
         match *column {
             Column::Link { link, entry } => {
                 for &joint in moving {
-                    put(joint, blocks[link][(joint, entry)]);
+                    put(joint, of_links[joint][link][entry]);
                 }
             }
             Column::Rotor(j) => put(j, qdd[j]),

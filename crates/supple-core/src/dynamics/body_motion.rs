@@ -70,7 +70,7 @@ pub(super) fn body_motions<const N: usize, const G: usize>(
 
 /// `W`, by columns.
 #[inline(always)]
-pub(super) fn gradient(w: V3, rate: V3) -> [f64; 9] {
+pub(super) fn gradient<T: Number>(w: V3<T>, rate: V3<T>) -> [T; 9] {
     let zz = w[2] * w[2];
     [
         -w[1].times_plus(w[1], zz),

@@ -12,7 +12,7 @@ use crate::arm::Arm;
 use crate::lanes::{Column, LANES, Lanes, Number, Rows, for_each_joint, of_joint, splat};
 use crate::math::{Matrix3, Vector, Vector3};
 use crate::pose::Pose;
-use crate::sincos::sin_cos_all;
+use crate::sincos::sin_cos;
 use core::array::from_fn;
 
 /// Rotation by columns, and origin.
@@ -149,11 +149,7 @@ pub(super) fn parent_rotations<const N: usize, const G: usize>(
     // The last angle again where there is no joint: with a constant there the compiler takes the group apart.
     let angles: Column<G> =
         from_fn(|group| Lanes::new(from_fn(|lane| q[(group * LANES + lane).min(N - 1)])));
-    let mut turns = [[Lanes::ZERO; G]; 2];
-    for group in 0..G {
-        let (sines, cosines) = sin_cos_all(&angles[group].to_array());
-        (turns[0][group], turns[1][group]) = (Lanes::new(sines), Lanes::new(cosines));
-    }
+    let turns = sin_cos(&angles);
     let constant = arm.rows.rotations::<G>();
     for_each_joint(&turns, &constant, &[], |[s, c], r, []| {
         [

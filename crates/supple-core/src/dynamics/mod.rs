@@ -27,7 +27,7 @@ pub use crba::crba;
 pub use energy::{kinetic_energy, potential_energy};
 pub use kinematics::{jacobian, jacobian_dot_qd, joint_poses, tip_pose};
 pub use momentum::{Momentum, momentum};
-pub use regressor::{parameters, regressor, regressor_rows};
+pub use regressor::{Regressor, parameters, regressor, regressor_rows, regressor_times};
 pub use rnea::{gravity, rnea};
 pub(crate) use sweep::Sweep;
 pub use terms::{Terms, terms};

@@ -10,8 +10,8 @@ pub(crate) struct Motion<const G: usize> {
     pub twists: Rows<6, G>,
     /// Of each joint's motion: `v x S`.
     pub rates: Rows<6, G>,
-    /// With the base accelerated upwards.
-    accelerations: Rows<6, G>,
+    /// With the base accelerated upwards, of the link's point that is at the reference point: spatial.
+    pub accelerations: Rows<6, G>,
 }
 
 impl<const G: usize> Motion<G> {

@@ -3,146 +3,173 @@
 //! Ten numbers a link, in its *link frame* (the one of the description): mass, first moments
 //! `m cx, m cy, m cz`, and inertia about the frame's origin `Ixx, Ixy, Iyy, Ixz, Iyz, Izz`.
 //!
-//! The row of joint `i` for link `k` is the power that the link's inertial wrench takes where joint `i`
-//! turns at unit rate: with `(e, v)` the twist of that motion, and `w`, `alpha`, `a` those of the link,
+//! A link's force is linear in its ten numbers: each has a wrench of its own, here in base axes about the
+//! last joint. With `a` the acceleration of the link frame's origin, which is at `p`, with `r_i` the frame's
+//! axes and `W = [alpha x] + [w x][w x]`, these are
 //!
 //! ```text
-//! v . a m  +  (v x alpha + (v x w) x w + a x e) . h  +  e . I alpha + (e x w) . I w
+//!               force    moment
+//! m             a        p x a
+//! m c_i         W r_i    p x W r_i + r_i x a
+//! I_ii          0        r_i alpha_i + w x r_i w_i
+//! I_ij          0        r_i alpha_j + r_j alpha_i + w x (r_i w_j + r_j w_i)
 //! ```
 //!
-//! so that each joint's twist is brought to the link, in place of the link's sixty numbers to each joint.
-//! All in axes of the link frame.
+//! The row of a joint is the power that they take where it turns at unit rate. Wrenches are found for four
+//! links at once, then rows for four numbers at once.
 #![allow(
     clippy::needless_range_loop,
     reason = "joints, groups and lanes are counted: each index goes into several arrays"
 )]
 
-use super::body_motion::body_motions;
-use super::chain::{Chain, parent_rotations};
+use super::body_motion::gradient;
+use super::chain::Chain;
+use super::frames::joint_motions;
+use super::motion::Motion;
 use super::vec3::{
-    V3, add_cross, cross, dot, join3, product, rotate, rotate_back, sub, transposed,
+    V3, add_cross, add_scaled, cross, dot, halves, product, rotate, rotate_back, scale, sub,
+    transposed,
 };
 use crate::arm::Arm;
-use crate::lanes::{
-    LANES, Lanes, Number, for_each_joint, in_groups, of_joint, per_joint, rows, splat,
-};
-use crate::math::{Matrix, Vector};
+use crate::lanes::{LANES, Lanes, in_groups, of_group, of_joint, splat};
+use crate::math::Vector;
 
-/// Joint-torque regressor, a block of ten columns a link \[N x 10 each\]:
-/// `rnea = sum_k Y_k p_k + armature qdd`, with `p_k` as [`parameters`] orders them.
+/// `[i][k]` is what the torque of joint `i` has of each of the ten numbers of link `k`; zero where the link
+/// comes before the joint.
+pub type Regressor<const N: usize> = [[Vector<10>; N]; N];
+
+/// Joint-torque regressor: `rnea = Y p + armature qdd`, with [`parameters`] `p` and [`regressor_times`] for
+/// the product. `q` \[rad\], `qd` \[rad/s\], `qdd` \[rad/s^2\].
 #[inline]
 pub fn regressor<const N: usize>(
     arm: &Arm<N>,
     q: &Vector<N>,
     qd: &Vector<N>,
     qdd: &Vector<N>,
-) -> [Matrix<N, 10>; N] {
-    let mut blocks = [Matrix::<N, 10>::zeros(); N];
-    let put = |link: usize, parameter: usize, column| blocks[link].data.0[parameter] = column;
-    in_groups!(N, columns(arm, q, qd, qdd, put));
-    blocks
+) -> Regressor<N> {
+    let mut whole = [[Vector::zeros(); N]; N];
+    let put = |joint: usize, link: usize, row| whole[joint][link] = Vector::from(row);
+    regressor_rows(arm, q, qd, qdd, put);
+    whole
 }
 
-/// As [`regressor`], row by row: `put(joint, link, row)` for every joint and every link that it moves.
-/// The other rows are zero.
+/// As [`regressor`], piece by piece: `put(joint, link, row)` for every joint and every link that it moves.
 #[inline]
 pub fn regressor_rows<const N: usize>(
     arm: &Arm<N>,
     q: &Vector<N>,
     qd: &Vector<N>,
     qdd: &Vector<N>,
-    mut put: impl FnMut(usize, usize, [f64; 10]),
+    put: impl FnMut(usize, usize, [f64; 10]),
 ) {
-    let mut of_link = [[0.0; 10]; N];
-    let by_rows = |link: usize, parameter: usize, column: [f64; N]| {
-        for (row, x) in of_link.iter_mut().zip(column) {
-            row[parameter] = x;
-        }
-        if parameter == 9 {
-            for (joint, row) in of_link.iter().enumerate().take(link + 1) {
-                put(joint, link, *row);
-            }
-        }
-    };
-    in_groups!(N, columns(arm, q, qd, qdd, by_rows));
+    in_groups!(N, rows(arm, q, qd, qdd, put));
 }
 
-/// The columns of every link, one for each of its parameters: `put(link, parameter, column)`.
 #[inline]
-fn columns<const N: usize, const G: usize>(
+fn rows<const N: usize, const G: usize>(
     arm: &Arm<N>,
     q: &Vector<N>,
     qd: &Vector<N>,
     qdd: &Vector<N>,
-    mut put: impl FnMut(usize, usize, [f64; N]),
+    mut put: impl FnMut(usize, usize, [f64; 10]),
 ) {
     let chain = Chain::<G>::new(arm, q);
-    let motions = body_motions(arm, &parent_rotations::<N, G>(arm, q), qd, qdd);
-    let places = rows::<1, N, G>(|_, i| i as f64)[0];
-    let link_from_joint = arm.rows.links_from_joints::<G>();
-    let base_from_link =
-        for_each_joint(&chain.rotations, &link_from_joint, &[], |base, link, []| {
-            product(&base, &transposed(&link))
+    let point = of_joint(&chain.origins, N - 1);
+    let motions = joint_motions(&chain, point);
+    let motion = Motion::new(&motions, qd, arm.gravity.data.0[0]);
+    let motion = motion.accelerated(&motions, &qdd.data.0[0]);
+    let links_from_joints = arm.rows.links_from_joints::<G>();
+    let mut links = [Wrenches::default(); N];
+    for group in 0..G {
+        let found = wrenches(&Links {
+            axes: product(
+                &of_group(&chain.rotations, group),
+                &transposed(&of_group(&links_from_joints, group)),
+            ),
+            origin: sub(of_group(&chain.origins, group), splat(point)),
+            twist: of_group(&motion.twists, group),
+            acceleration: of_group(&motion.accelerations, group),
         });
-    let motions = rows::<9, N, G>(|k, i| {
-        let motion = &motions[i];
-        [motion.spin, motion.rate, motion.accel][k / 3][k % 3]
-    });
-    let motions = for_each_joint(&motions, &link_from_joint, &[], |motion, link, []| {
-        let seen = |k: usize| rotate(&link, [motion[k], motion[k + 1], motion[k + 2]]);
-        join3(seen(0), seen(3), seen(6))
-    });
-    for link in 0..N {
-        let motion = splat(of_joint(&motions, link));
-        let third = |k: usize| [motion[k], motion[k + 1], motion[k + 2]];
-        let (w, alpha, accel) = (third(0), third(3), third(6));
-        let base_from_link = splat(of_joint(&base_from_link, link));
-        let here = splat(of_joint(&chain.origins, link));
-        let mut found = [[Lanes::ZERO; G]; 10];
-        for group in 0..=link / LANES {
-            let (r, o) = (
-                |k: usize| chain.rotations[k][group],
-                |k: usize| chain.origins[k][group],
-            );
-            let axis = [r(6), r(7), r(8)];
-            let origin = [o(0), o(1), o(2)];
-            let linear = cross(axis, sub(here, origin));
-            let e = rotate_back(&base_from_link, axis);
-            let v = rotate_back(&base_from_link, linear);
-            // Joints beyond the link do not move it.
-            let moves = places[group].simd_le(Lanes::splat(link as f64));
-            for (row, x) in found.iter_mut().zip(power(e, v, w, alpha, accel)) {
-                row[group] = x & moves;
+        for part in 0..4 {
+            for k in 0..3 {
+                let numbers = Lanes::transpose(found[part][k]);
+                for link in group * LANES..N.min(group * LANES + LANES) {
+                    links[link][part][k] = numbers[link - group * LANES];
+                }
             }
         }
-        for (parameter, row) in found.iter().enumerate() {
-            put(link, parameter, per_joint(row));
+    }
+    for joint in 0..N {
+        let (linear, angular) = halves(splat(of_joint(&motions, joint)));
+        for link in joint..N {
+            let [forces, moments, couples, more] = links[link];
+            let [m, cx, cy, cz] = (dot(linear, forces) + dot(angular, moments)).to_array();
+            let [xx, xy, yy, xz] = dot(angular, couples).to_array();
+            let [yz, zz, ..] = dot(angular, more).to_array();
+            put(joint, link, [m, cx, cy, cz, xx, xy, yy, xz, yz, zz]);
         }
     }
 }
 
-/// Power of the twist `(e, v)` on the wrench of a link, as a function of the link's ten parameters.
+/// Four links.
+struct Links {
+    axes: [Lanes; 9],
+    origin: V3<Lanes>,
+    twist: [Lanes; 6],
+    /// Of the point of the link that is at the reference point, not of the link's points one after another.
+    acceleration: [Lanes; 6],
+}
+
+/// Wrenches of the ten numbers: forces of the mass and the first moments, their moments, then moments of the
+/// inertia, the last two with two numbers that nobody reads. Each by components.
+type Wrenches<T = Lanes> = [V3<T>; 4];
+
+/// Of each number, four links.
 #[inline(always)]
-fn power<T: Number>(e: V3<T>, v: V3<T>, w: V3<T>, alpha: V3<T>, accel: V3<T>) -> [T; 10] {
-    let h = add_cross(add_cross(cross(v, alpha), cross(v, w), w), accel, e);
-    let u = cross(e, w);
-    let square = |i: usize| e[i].times_plus(alpha[i], u[i] * w[i]);
+fn wrenches(links: &Links) -> Wrenches<[Lanes; 4]> {
+    let ((velocity, w), (linear, alpha)) = (halves(links.twist), halves(links.acceleration));
+    let p = links.origin;
+    let accel = add_cross(linear, alpha, p);
+    let accel = add_cross(accel, w, add_cross(velocity, w, p));
+    let gradient = gradient(w, alpha);
+    let a = &links.axes;
+    let axis = [[a[0], a[1], a[2]], [a[3], a[4], a[5]], [a[6], a[7], a[8]]];
+    let push = |r: V3<Lanes>| rotate(&gradient, r);
+    let pushed = [push(axis[0]), push(axis[1]), push(axis[2])];
+    let lever = |i: usize| add_cross(cross(p, pushed[i]), axis[i], accel);
+    let levers = [lever(0), lever(1), lever(2)];
+    let moment = cross(p, accel);
+
+    let (own_w, own_alpha) = (rotate_back(&links.axes, w), rotate_back(&links.axes, alpha));
+    let spun = [cross(w, axis[0]), cross(w, axis[1]), cross(w, axis[2])];
+    let single = |i: usize| add_scaled(scale(axis[i], own_alpha[i]), spun[i], own_w[i]);
     let mixed = |i: usize, j: usize| {
-        let spun = u[i].times_plus(w[j], u[j] * w[i]);
-        e[i].times_plus(alpha[j], e[j].times_plus(alpha[i], spun))
+        let turned = add_scaled(scale(axis[i], own_alpha[j]), axis[j], own_alpha[i]);
+        add_scaled(add_scaled(turned, spun[i], own_w[j]), spun[j], own_w[i])
     };
+    let (xx, xy, yy, xz) = (single(0), mixed(0, 1), single(1), mixed(0, 2));
+    let (yz, zz) = (mixed(1, 2), single(2));
     [
-        dot(v, accel),
-        h[0],
-        h[1],
-        h[2],
-        square(0),
-        mixed(0, 1),
-        square(1),
-        mixed(0, 2),
-        mixed(1, 2),
-        square(2),
+        turned([accel, pushed[0], pushed[1], pushed[2]]),
+        turned([moment, levers[0], levers[1], levers[2]]),
+        turned([xx, xy, yy, xz]),
+        turned([yz, zz, zz, zz]),
     ]
+}
+
+/// Components of four vectors, one component after another.
+#[inline(always)]
+fn turned([a, b, c, d]: [V3<Lanes>; 4]) -> V3<[Lanes; 4]> {
+    [
+        [a[0], b[0], c[0], d[0]],
+        [a[1], b[1], c[1], d[1]],
+        [a[2], b[2], c[2], d[2]],
+    ]
+}
+
+/// Joint torques of links with these parameters, `Y p` \[N m\].
+pub fn regressor_times<const N: usize>(y: &Regressor<N>, p: &[Vector<10>; N]) -> Vector<N> {
+    Vector::from_fn(|i, _| y[i].iter().zip(p).map(|(row, p)| row.dot(p)).sum())
 }
 
 /// Inertial parameters of every link, ten each, in its link frame; the last link with the tool.

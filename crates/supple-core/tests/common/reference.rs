@@ -1,6 +1,8 @@
 //! The reference arms and the states recorded for them; see `data/README.md`.
 
 use serde_json::Value;
+use std::array::from_fn;
+use supple_core::dynamics::Regressor;
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::{Arm, Body, Joint, Matrix, Pose, Vector};
 
@@ -31,7 +33,7 @@ pub struct Sample<const N: usize> {
     pub kinetic_energy: f64,
     pub potential_energy: f64,
     /// Blocks of ten columns a link; for the first states only.
-    pub regressor: Option<[Matrix<N, 10>; N]>,
+    pub regressor: Option<Regressor<N>>,
 }
 
 pub fn wam3() -> Reference<3> {
@@ -70,7 +72,7 @@ fn read<const N: usize>(name: &str, states: &str) -> Reference<N> {
         coriolis_matrix: matrix(&s["coriolis_matrix"][k]),
         kinetic_energy: number(&s["kinetic_energy"][k]),
         potential_energy: number(&s["potential_energy"][k]),
-        regressor: regressors.get(k).map(blocks),
+        regressor: regressors.get(k).map(regressor),
     };
     Reference {
         arm: arm(&json(ARMS)[name], vector(&states["gravity"])),
@@ -131,6 +133,6 @@ fn matrix<const R: usize, const C: usize>(rows: &Value) -> Matrix<R, C> {
     Matrix::from_fn(|i, j| number(&rows[i][j]))
 }
 
-fn blocks<const N: usize>(rows: &Value) -> [Matrix<N, 10>; N] {
-    std::array::from_fn(|k| Matrix::from_fn(|i, j| number(&rows[i][10 * k + j])))
+fn regressor<const N: usize>(rows: &Value) -> Regressor<N> {
+    from_fn(|i| from_fn(|k| Vector::from_fn(|p, _| number(&rows[i][10 * k + p]))))
 }

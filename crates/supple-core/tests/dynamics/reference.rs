@@ -4,7 +4,8 @@ use crate::common::numeric::{error_at_scale, mixed_error, scalar, size};
 use crate::common::reference::{Sample, wam3, wam4, wam7};
 use supple_core::dynamics::{
     Terms, aba, coriolis, coriolis_matrix, crba, gravity, jacobian, jacobian_dot_qd,
-    kinetic_energy, momentum, parameters, potential_energy, regressor, rnea, terms, tip_pose,
+    kinetic_energy, momentum, parameters, potential_energy, regressor, regressor_times, rnea,
+    terms, tip_pose,
 };
 use supple_core::{Arm, Pose, Vector};
 
@@ -68,12 +69,12 @@ on_the_reference_arms! {
     regressor_agrees: |arm, s| {
         let Some(expected) = &s.regressor else { return 0.0 };
         let found = regressor(arm, &s.q, &s.qd, &s.qdd);
-        found.iter().zip(expected).map(|(f, e)| mixed_error(f, e)).fold(0.0, f64::max)
+        let rows = found.as_flattened().iter().zip(expected.as_flattened());
+        rows.map(|(f, e)| mixed_error(f, e)).fold(0.0, f64::max)
     };
     regressor_of_pinocchio_times_parameters_agrees: |arm, s| {
         let Some(expected) = &s.regressor else { return 0.0 };
-        let tau = expected.iter().zip(parameters(arm)).map(|(y, p)| y * p).sum::<Vector<_>>();
-        mixed_error(&tau, &s.rnea)
+        mixed_error(&regressor_times(expected, &parameters(arm)), &s.rnea)
     };
     terms_agree: |arm, s| {
         let mut found = Terms::default();
