@@ -106,32 +106,32 @@ macro_rules! in_groups {
 }
 pub(crate) use in_groups;
 
-/// Applies `body` to every joint: to its quantities of `a`, of `b` and of `c`.
-#[inline(always)]
-pub(crate) fn for_each_joint<
-    const A: usize,
-    const B: usize,
-    const C: usize,
-    const OUT: usize,
-    const G: usize,
->(
-    a: &Rows<A, G>,
-    b: &Rows<B, G>,
-    c: &Rows<C, G>,
-    body: impl Fn([Lanes; A], [Lanes; B], [Lanes; C]) -> [Lanes; OUT],
-) -> Rows<OUT, G> {
-    let mut out = [[Lanes::ZERO; G]; OUT];
-    for group in 0..G {
-        let result = body(
-            from_fn(|k| a[k][group]),
-            from_fn(|k| b[k][group]),
-            from_fn(|k| c[k][group]),
-        );
-        for (row, lanes) in out.iter_mut().zip(result) {
-            row[group] = lanes;
+/// Rows of what is found from the quantities of each joint, a group at a time:
+/// `for_each_joint!(axis in &motions, body in &bodies => times(body, axis))`.
+///
+/// A macro, not a function of a closure: the compiler would leave large closures as calls.
+macro_rules! for_each_joint {
+    ($($quantities:pat in $rows:expr),+ => $found:expr) => {{
+        let mut out = [[$crate::lanes::Lanes::ZERO; G]; _];
+        for group in 0..G {
+            $(let $quantities = $crate::lanes::of_group($rows, group);)+
+            $crate::lanes::put_group(&mut out, group, $found);
         }
+        out
+    }};
+}
+pub(crate) use for_each_joint;
+
+/// Quantities of a group into its place.
+#[inline(always)]
+pub(crate) fn put_group<const K: usize, const G: usize>(
+    rows: &mut Rows<K, G>,
+    group: usize,
+    quantities: [Lanes; K],
+) {
+    for (row, x) in rows.iter_mut().zip(quantities) {
+        row[group] = x;
     }
-    out
 }
 
 /// Quantities that are kept joint by joint, by rows: `of(k, joint)`.
@@ -139,14 +139,20 @@ pub(crate) fn for_each_joint<
 pub(crate) fn rows<const K: usize, const N: usize, const G: usize>(
     of: impl Fn(usize, usize) -> f64,
 ) -> Rows<K, G> {
-    from_fn(|k| {
-        from_fn(|group| {
-            Lanes::new(from_fn(|lane| {
+    let mut out = [[Lanes::ZERO; G]; K];
+    for (k, row) in out.iter_mut().enumerate() {
+        for (group, x) in row.iter_mut().enumerate() {
+            let mut lanes = [0.0; LANES];
+            for (lane, number) in lanes.iter_mut().enumerate() {
                 let joint = group * LANES + lane;
-                if joint < N { of(k, joint) } else { 0.0 }
-            }))
-        })
-    })
+                if joint < N {
+                    *number = of(k, joint);
+                }
+            }
+            *x = Lanes::new(lanes);
+        }
+    }
+    out
 }
 
 /// The quantities of a group.
@@ -165,7 +171,20 @@ pub(crate) fn of_group<const K: usize, const G: usize>(
 /// The quantities of joint `i`.
 #[inline(always)]
 pub(crate) fn of_joint<const K: usize, const G: usize>(rows: &Rows<K, G>, i: usize) -> [f64; K] {
-    from_fn(|k| rows[k][i / LANES].as_array()[i % LANES])
+    from_fn(|k| entry(&rows[k], i))
+}
+
+/// The quantities of joint `i`, for all lanes.
+#[inline(always)]
+pub(crate) fn of_joint_for_all<const K: usize, const G: usize>(
+    rows: &Rows<K, G>,
+    i: usize,
+) -> [Lanes; K] {
+    let mut out = [Lanes::ZERO; K];
+    for (out, row) in out.iter_mut().zip(rows) {
+        *out = Lanes::splat(entry(row, i));
+    }
+    out
 }
 
 /// Entry `i` of a column.
@@ -194,7 +213,7 @@ pub(crate) fn scaled<const K: usize>(x: [Lanes; K], s: Lanes) -> [Lanes; K] {
 /// One row, a number for each joint.
 #[inline(always)]
 pub(crate) fn per_joint<const N: usize, const G: usize>(row: &[Lanes; G]) -> [f64; N] {
-    from_fn(|i| row[i / LANES].as_array()[i % LANES])
+    from_fn(|i| entry(row, i))
 }
 
 /// Of each joint, the sum of `start` and of the terms of the joints up to it.

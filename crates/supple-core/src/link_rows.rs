@@ -81,15 +81,17 @@ impl<const N: usize> LinkRows<N> {
     #[inline(always)]
     fn groups<const K: usize, const G: usize>(&self, first: usize) -> Rows<K, G> {
         let numbers = self.rows.as_flattened();
-        from_fn(|k| {
-            from_fn(|group| {
+        let mut out = [[Lanes::ZERO; G]; K];
+        for (k, row) in out.iter_mut().enumerate() {
+            for (group, x) in row.iter_mut().enumerate() {
                 let begin = (first + k) * N + group * LANES;
-                let is_used = group * LANES < N;
-                Lanes::new(from_fn(
-                    |lane| if is_used { numbers[begin + lane] } else { 0.0 },
-                ))
-            })
-        })
+                if group * LANES < N {
+                    let n = &numbers[begin..begin + LANES];
+                    *x = Lanes::new([n[0], n[1], n[2], n[3]]);
+                }
+            }
+        }
+        out
     }
 }
 

@@ -9,7 +9,9 @@
 
 use super::vec3::{V3, add_rotated, product};
 use crate::arm::Arm;
-use crate::lanes::{Column, LANES, Lanes, Number, Rows, for_each_joint, of_joint, splat};
+use crate::lanes::{
+    Column, LANES, Lanes, Number, Rows, for_each_joint, of_group, of_joint, put_group, splat,
+};
 use crate::math::{Matrix3, Vector, Vector3};
 use crate::pose::Pose;
 use crate::sincos::sin_cos;
@@ -48,10 +50,14 @@ impl Place<Lanes> {
     /// Joints moved to other lanes; `moved` is also given the number that the base has there.
     #[inline(always)]
     fn shifted(&self, moved: impl Fn([f64; LANES], f64) -> [f64; LANES]) -> Place<Lanes> {
-        Place {
-            rotation: from_fn(|k| Lanes::new(moved(self.rotation[k].to_array(), UNTURNED[k]))),
-            origin: from_fn(|k| Lanes::new(moved(self.origin[k].to_array(), 0.0))),
+        let mut place = *self;
+        for (x, base) in place.rotation.iter_mut().zip(UNTURNED) {
+            *x = Lanes::new(moved(x.to_array(), base));
         }
+        for x in &mut place.origin {
+            *x = Lanes::new(moved(x.to_array(), 0.0));
+        }
+        place
     }
 }
 
@@ -100,8 +106,8 @@ impl<const G: usize> Chain<G> {
         let mut before = Place::<Lanes>::base();
         for group in 0..G {
             let step = Place {
-                rotation: from_fn(|k| local[k][group]),
-                origin: from_fn(|k| steps[k][group]),
+                rotation: of_group(&local, group),
+                origin: of_group(&steps, group),
             };
             let pairs = step
                 .shifted(|[a, b, c, _], base| [base, a, b, c])
@@ -113,12 +119,8 @@ impl<const G: usize> Chain<G> {
                 place = before.then(&place);
             }
             before = place.shifted(|[.., last], _| [last; LANES]);
-            for (row, x) in rotations.iter_mut().zip(place.rotation) {
-                row[group] = x;
-            }
-            for (row, x) in origins.iter_mut().zip(place.origin) {
-                row[group] = x;
-            }
+            put_group(&mut rotations, group, place.rotation);
+            put_group(&mut origins, group, place.origin);
         }
         let last = Frame {
             rotation: of_joint(&rotations, N - 1),
@@ -151,7 +153,7 @@ pub(super) fn parent_rotations<const N: usize, const G: usize>(
         from_fn(|group| Lanes::new(from_fn(|lane| q[(group * LANES + lane).min(N - 1)])));
     let turns = sin_cos(&angles);
     let constant = arm.rows.rotations::<G>();
-    for_each_joint(&turns, &constant, &[], |[s, c], r, []| {
+    for_each_joint!([s, c] in &turns, r in &constant => {
         [
             Number::times_plus(r[3], s, r[0] * c),
             Number::times_plus(r[4], s, r[1] * c),

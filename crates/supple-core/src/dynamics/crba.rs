@@ -10,7 +10,8 @@ use super::inertia::times;
 use super::vec3::dot6;
 use crate::arm::Arm;
 use crate::lanes::{
-    Columns, LANES, Lanes, Rows, entry, for_each_joint, in_groups, of_joint, splat, sums_inward,
+    Columns, LANES, Lanes, Rows, entry, for_each_joint, in_groups, of_group, of_joint,
+    of_joint_for_all, sums_inward,
 };
 use crate::math::{Matrix, Vector};
 
@@ -36,12 +37,12 @@ pub(super) fn mass_columns<const N: usize, const G: usize>(
     carried: &Rows<10, G>,
 ) -> Columns<N, G> {
     // The force is that of all a joint carries: right for itself and for the joints before it.
-    let forces = for_each_joint(motions, carried, &[], |axis, body, []| times(body, axis));
+    let forces = for_each_joint!(axis in motions, body in carried => times(body, axis));
     let mut columns = [[Lanes::ZERO; G]; N];
     for j in 0..N {
-        let motion = splat(of_joint(motions, j));
+        let motion = of_joint_for_all(motions, j);
         for group in j / LANES..G {
-            columns[j][group] = dot6(motion, core::array::from_fn(|k| forces[k][group]));
+            columns[j][group] = dot6(motion, of_group(&forces, group));
         }
         let rotor = core::array::from_fn(|lane| {
             if lane == j % LANES {

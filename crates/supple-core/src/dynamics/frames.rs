@@ -15,7 +15,7 @@ use crate::math::Matrix;
 #[inline(always)]
 pub(super) fn joint_motions<const G: usize>(chain: &Chain<G>, point: V3) -> Rows<6, G> {
     let point = splat(point);
-    for_each_joint(&chain.rotations, &chain.origins, &[], |r, origin, []| {
+    for_each_joint!(r in &chain.rotations, origin in &chain.origins => {
         let axis = [r[6], r[7], r[8]];
         join(cross(axis, sub(point, origin)), axis)
     })
@@ -29,11 +29,9 @@ pub(super) fn bodies<const N: usize, const G: usize>(
     point: V3,
 ) -> Rows<10, G> {
     let point = splat(point);
-    for_each_joint(
-        &arm.rows.bodies(),
-        &chain.rotations,
-        &chain.origins,
-        |body, r, origin| in_base(body, &r, sub(origin, point)),
+    for_each_joint!(
+        body in &arm.rows.bodies::<G>(), r in &chain.rotations, origin in &chain.origins
+        => in_base(body, &r, sub(origin, point))
     )
 }
 

@@ -19,15 +19,14 @@ impl<const G: usize> Motion<G> {
     #[inline(always)]
     pub fn new<const N: usize>(motions: &Rows<6, G>, qd: &Vector<N>, gravity: V3) -> Self {
         let speeds = [column::<N, G>(&qd.data.0[0])];
-        let at_speed =
-            |[speed]: [Lanes; 1], motion: [Lanes; 6], []: [Lanes; 0]| scaled(motion, speed);
-        let twists = for_each_joint(&speeds, motions, &[], at_speed);
+        let twists =
+            for_each_joint!([speed] in &speeds, motion in motions => scaled(motion, speed));
         let twists = sums_outward([0.0; 6], twists);
-        let rates = for_each_joint(&twists, motions, &[], |twist, motion, []| {
-            cross_motion(twist, motion)
-        });
+        let rates =
+            for_each_joint!(twist in &twists, motion in motions => cross_motion(twist, motion));
         let up = [-gravity[0], -gravity[1], -gravity[2], 0.0, 0.0, 0.0];
-        let accelerations = for_each_joint(&speeds, &rates, &[], at_speed);
+        let accelerations =
+            for_each_joint!([speed] in &speeds, rate in &rates => scaled(rate, speed));
         Motion {
             twists,
             rates,
@@ -39,9 +38,7 @@ impl<const G: usize> Motion<G> {
     #[inline(always)]
     pub fn accelerated<const N: usize>(mut self, motions: &Rows<6, G>, qdd: &[f64; N]) -> Self {
         let rates = [column::<N, G>(qdd)];
-        let own = for_each_joint(&rates, motions, &[], |[rate], motion, []| {
-            scaled(motion, rate)
-        });
+        let own = for_each_joint!([rate] in &rates, motion in motions => scaled(motion, rate));
         for (row, own) in self
             .accelerations
             .iter_mut()
@@ -72,21 +69,17 @@ impl<const G: usize> Motion<G> {
     /// Force on each link, and its momentum.
     #[inline(always)]
     pub fn forces(&self, bodies: &Rows<10, G>) -> Rows<12, G> {
-        for_each_joint(
-            bodies,
-            &self.twists,
-            &self.accelerations,
-            |body, twist, accel| {
+        for_each_joint!(
+            body in bodies, twist in &self.twists, accel in &self.accelerations => {
                 let momentum = times(body, twist);
                 let (inertial, gyroscopic) = (times(body, accel), cross_force(twist, momentum));
-                core::array::from_fn(|k| {
-                    if k < 6 {
-                        inertial[k] + gyroscopic[k]
-                    } else {
-                        momentum[k - 6]
-                    }
-                })
-            },
+                let mut both = [Lanes::ZERO; 12];
+                for k in 0..6 {
+                    both[k] = inertial[k] + gyroscopic[k];
+                    both[k + 6] = momentum[k];
+                }
+                both
+            }
         )
     }
 }
@@ -95,7 +88,7 @@ impl<const G: usize> Motion<G> {
 #[inline(always)]
 pub(super) fn split(x: [Lanes; 12]) -> ([Lanes; 6], [Lanes; 6]) {
     (
-        core::array::from_fn(|k| x[k]),
-        core::array::from_fn(|k| x[k + 6]),
+        [x[0], x[1], x[2], x[3], x[4], x[5]],
+        [x[6], x[7], x[8], x[9], x[10], x[11]],
     )
 }

@@ -62,9 +62,7 @@ impl<const G: usize> Sweep<G> {
     #[inline(always)]
     pub fn gravity<const N: usize>(&self, arm: &Arm<N>) -> Column<G> {
         let (carried, falls) = (sums_inward(self.bodies), splat(arm.gravity.data.0[0]));
-        let [weight] = for_each_joint(&self.motions, &carried, &[], |axis, body, []| {
-            [weight_on(axis, body, falls)]
-        });
+        let [weight] = for_each_joint!(axis in &self.motions, body in &carried => [weight_on(axis, body, falls)]);
         weight
     }
 
@@ -73,15 +71,14 @@ impl<const G: usize> Sweep<G> {
     pub fn held(&self) -> Held<G> {
         let held = sums_inward(self.motion.forces(&self.bodies));
         let rates = &self.motion.rates;
-        let [torque, momentum, kinetic_gradient] =
-            for_each_joint(&self.motions, rates, &held, |axis, rate, held| {
-                let (force, momentum) = split(held);
-                [
-                    dot6(axis, force),
-                    dot6(axis, momentum),
-                    dot6(rate, momentum),
-                ]
-            });
+        let [torque, momentum, kinetic_gradient] = for_each_joint!(axis in &self.motions, rate in rates, held in &held => {
+            let (force, momentum) = split(held);
+            [
+                dot6(axis, force),
+                dot6(axis, momentum),
+                dot6(rate, momentum),
+            ]
+        });
         Held {
             torque,
             momentum,

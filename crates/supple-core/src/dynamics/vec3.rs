@@ -101,7 +101,7 @@ pub(super) fn product<T: Number>(a: &[T; 9], b: &[T; 9]) -> [T; 9] {
 /// `R^T`.
 #[inline(always)]
 pub(super) fn transposed<T: Number>(r: &[T; 9]) -> [T; 9] {
-    core::array::from_fn(|k| r[3 * (k % 3) + k / 3])
+    [r[0], r[3], r[6], r[1], r[4], r[7], r[2], r[5], r[8]]
 }
 
 #[inline(always)]
