@@ -127,9 +127,15 @@ impl Friction {
     /// `D(v)`, the torque that overcomes friction at joint velocity `velocity_rad_per_s` \[N m\].
     #[inline]
     pub fn torque_nm(&self, velocity_rad_per_s: f64) -> f64 {
+        self.torque_with_dry_share_nm(velocity_rad_per_s, 1.0)
+    }
+
+    /// `D(v)` with only a share of its dry part, 0 to 1 \[N m\].
+    #[inline]
+    pub fn torque_with_dry_share_nm(&self, velocity_rad_per_s: f64, share: f64) -> f64 {
         self.viscous_nm_s_per_rad * velocity_rad_per_s
             + self.offset_nm
-            + self.dry_torque_nm(velocity_rad_per_s)
+            + self.dry_torque_nm(velocity_rad_per_s) * share
     }
 
     /// The dry part of `D(v)`: Coulomb torque with its dip, parabolic in the band \[N m\].

@@ -27,7 +27,7 @@
 use crate::config::{ApparentInertia, FrictionVelocity, Gains, Law, Role};
 use crate::dynamics::Terms;
 use crate::friction::Friction;
-use crate::linalg::{Cholesky, least_singular_value};
+use crate::linalg::{Cholesky, least_singular_value, singular_values_exceed};
 use crate::math::{Matrix, Matrix3, Vector, Vector3};
 use crate::trajectory::Reference;
 
@@ -73,8 +73,13 @@ impl<const N: usize> Task<N> {
         }
         let least_singular_value_m = least_singular_value(&jacobian);
         let mobile = Cholesky::new(&mass_matrix)?.solve(&jacobian.transpose());
-        let mobility: Matrix3<f64> = jacobian * mobile
-            + Matrix3::from_diagonal_element(singularity_damping_per_kg(least_singular_value_m));
+        // So that nothing waits for the singular value: it takes as long as the rest.
+        let damping = if singular_values_exceed(&jacobian.data.0, SINGULAR_BELOW_M) {
+            0.0
+        } else {
+            singularity_damping_per_kg(least_singular_value_m)
+        };
+        let mobility: Matrix3<f64> = jacobian * mobile + Matrix3::from_diagonal_element(damping);
         let inverse = Cholesky::new(&mobility)?.solve(&mobile.transpose());
         Some(Task {
             jacobian,
@@ -237,8 +242,7 @@ pub fn impedance<const N: usize>(
             FrictionVelocity::Measured if is_active => measured,
             _ => reference_velocity[i],
         };
-        let dry = friction[i].dry_torque_nm(velocity);
-        torques.friction[i] = friction[i].torque_nm(velocity) - dry * (1.0 - now.friction_share);
+        torques.friction[i] = friction[i].torque_with_dry_share_nm(velocity, now.friction_share);
         if is_active {
             loose[i] = measured - tip_motion[i];
             active += 1;

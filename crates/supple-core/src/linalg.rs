@@ -5,7 +5,8 @@
 )]
 
 use crate::lanes::Number;
-use crate::math::{Matrix, Matrix3, abs, acos, cos, sqrt};
+use crate::math::{Matrix, Matrix3, abs, acos, sqrt};
+use crate::sincos::sin_cos_all;
 
 /// Cholesky factors without square roots of a symmetric positive definite matrix: `A = L D L^T`, `L` unit
 /// lower, `D` diagonal. The roots would be half of the time of a small solve.
@@ -108,8 +109,9 @@ pub fn symmetric_eigenvalues(a: &Matrix3<f64>) -> [f64; 3] {
     let half = (determinant / (2.0 * spread * spread * spread)).clamp(-1.0, 1.0);
     let angle = acos(half) / 3.0;
     let third = 2.0 * core::f64::consts::FRAC_PI_3;
-    let greatest = mean + 2.0 * spread * cos(angle);
-    let least = mean + 2.0 * spread * cos(angle + third);
+    let (_, [first, last]) = sin_cos_all(&[angle, angle + third]);
+    let greatest = mean + 2.0 * spread * first;
+    let least = mean + 2.0 * spread * last;
     [least, 3.0 * mean - greatest - least, greatest]
 }
 

@@ -87,18 +87,16 @@ pub(super) fn joint_tracking<const N: usize>(
     Ok(())
 }
 
-/// Every term, and their sum.
-pub(super) fn torques_finite<const N: usize>(torques: &Torques<N>) -> Result<(), Fault> {
-    for (term, torque) in torques.named() {
-        if !all_finite(torque) {
-            return Err(Fault::TorqueNotFinite { term });
-        }
+/// The sum of all terms, where it is finite: no sum is that has a term which is not.
+pub(super) fn total<const N: usize>(torques: &Torques<N>) -> Result<Vector<N>, Fault> {
+    let total = torques.total();
+    if all_finite(&total) {
+        return Ok(total);
     }
-    if all_finite(&torques.total()) {
-        Ok(())
-    } else {
-        Err(Fault::TorqueNotFinite { term: "total" })
-    }
+    let named = torques.named();
+    let wrong = named.iter().find(|(_, torque)| !all_finite(torque));
+    let term = wrong.map_or("total", |(term, _)| term);
+    Err(Fault::TorqueNotFinite { term })
 }
 
 /// Spring-dampers in the zones before the hard stops. The damper grows with the depth into the zone and

@@ -61,19 +61,20 @@ pub fn step<const N: usize>(
         torques.ripple = compensation_nm(tables, controller.motor_from_joint(), &state.position);
     }
     state.hand_over(config, &mut torques);
-    if let Err(fault) = checks::torques_finite(&torques) {
+    let total = checks::total(&torques).unwrap_or_else(|fault| {
         state.latch_fault(fault);
         reference = None;
         torques = state.safe(config);
-        if checks::torques_finite(&torques).is_err() {
+        checks::total(&torques).unwrap_or_else(|_| {
             torques = Torques::zeros();
-        }
-    }
+            Vector::zeros()
+        })
+    });
     let limited = limiter::limit(
         &config.limits,
         controller.motors(),
         &state.torque,
-        &torques.total(),
+        &total,
         config.period_s,
     );
     if !limited.finite {

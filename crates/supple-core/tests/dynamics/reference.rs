@@ -7,7 +7,7 @@ use supple_core::dynamics::{
     kinetic_energy, momentum, parameters, potential_energy, regressor, regressor_times, rnea,
     terms, tip_pose,
 };
-use supple_core::{Arm, Pose, Vector};
+use supple_core::{Arm, Pose};
 
 const TOLERANCE: f64 = 1e-10;
 
