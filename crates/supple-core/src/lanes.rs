@@ -187,6 +187,20 @@ pub(crate) fn of_joint_for_all<const K: usize, const G: usize>(
     out
 }
 
+/// The quantities of every joint, joint by joint.
+#[inline(always)]
+pub(crate) fn by_joint<const K: usize, const N: usize, const G: usize>(
+    rows: &Rows<K, G>,
+) -> [[f64; K]; N] {
+    let mut out = [[0.0; K]; N];
+    for (k, row) in rows.iter().enumerate() {
+        for (out, x) in out.iter_mut().zip(per_joint::<N, G>(row)) {
+            out[k] = x;
+        }
+    }
+    out
+}
+
 /// Entry `i` of a column.
 #[inline(always)]
 pub(crate) fn entry<const G: usize>(column: &Column<G>, i: usize) -> f64 {

@@ -28,9 +28,9 @@ pub(super) fn bodies<const N: usize, const G: usize>(
     chain: &Chain<G>,
     point: V3,
 ) -> Rows<10, G> {
-    let point = splat(point);
+    let (point, links) = (splat(point), arm.rows.bodies::<G>());
     for_each_joint!(
-        body in &arm.rows.bodies::<G>(), r in &chain.rotations, origin in &chain.origins
+        body in &links, r in &chain.rotations, origin in &chain.origins
         => in_base(body, &r, sub(origin, point))
     )
 }

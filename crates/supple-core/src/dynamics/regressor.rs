@@ -31,7 +31,7 @@ use super::vec3::{
     transposed,
 };
 use crate::arm::Arm;
-use crate::lanes::{LANES, Lanes, in_groups, of_group, of_joint, of_joint_for_all, splat};
+use crate::lanes::{LANES, Lanes, by_joint, in_groups, of_group, of_joint, splat};
 use crate::math::Vector;
 
 /// `[i][k]` is what the torque of joint `i` has of each of the ten numbers of link `k`; zero where the link
@@ -99,8 +99,9 @@ fn rows<const N: usize, const G: usize>(
             }
         }
     }
+    let motions = by_joint::<6, N, G>(&motions);
     for joint in 0..N {
-        let (linear, angular) = halves(of_joint_for_all(&motions, joint));
+        let (linear, angular) = halves(splat(motions[joint]));
         for link in joint..N {
             let [forces, moments, couples, more] = links[link];
             let [m, cx, cy, cz] = (dot(linear, forces) + dot(angular, moments)).to_array();
