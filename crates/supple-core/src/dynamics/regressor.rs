@@ -79,9 +79,9 @@ fn rows<const N: usize, const G: usize>(
     let motion = Motion::new(&motions, qd, arm.gravity.data.0[0]);
     let motion = motion.accelerated(&motions, &qdd.data.0[0]);
     let links_from_joints = arm.rows.links_from_joints::<G>();
-    let mut links = [Wrenches::default(); N];
+    let motions = by_joint::<6, N, G>(&motions);
     for group in 0..G {
-        let found = wrenches(&Links {
+        let links = wrenches(&Links {
             axes: product(
                 &of_group(&chain.rotations, group),
                 &transposed(&of_group(&links_from_joints, group)),
@@ -90,24 +90,17 @@ fn rows<const N: usize, const G: usize>(
             twist: of_group(&motion.twists, group),
             acceleration: of_group(&motion.accelerations, group),
         });
-        for part in 0..4 {
-            for k in 0..3 {
-                let numbers = Lanes::transpose(found[part][k]);
-                for link in group * LANES..N.min(group * LANES + LANES) {
-                    links[link][part][k] = numbers[link - group * LANES];
-                }
+        for link in group * LANES..N.min(group * LANES + LANES) {
+            let lane = link - group * LANES;
+            let of_link = |part: usize| [0, 1, 2].map(|k| links[part][k][lane]);
+            let [forces, moments, couples, more] = [of_link(0), of_link(1), of_link(2), of_link(3)];
+            for joint in 0..=link {
+                let (linear, angular) = halves(splat(motions[joint]));
+                let [m, cx, cy, cz] = (dot(linear, forces) + dot(angular, moments)).to_array();
+                let [xx, xy, yy, xz] = dot(angular, couples).to_array();
+                let [yz, zz, ..] = dot(angular, more).to_array();
+                put(joint, link, [m, cx, cy, cz, xx, xy, yy, xz, yz, zz]);
             }
-        }
-    }
-    let motions = by_joint::<6, N, G>(&motions);
-    for joint in 0..N {
-        let (linear, angular) = halves(splat(motions[joint]));
-        for link in joint..N {
-            let [forces, moments, couples, more] = links[link];
-            let [m, cx, cy, cz] = (dot(linear, forces) + dot(angular, moments)).to_array();
-            let [xx, xy, yy, xz] = dot(angular, couples).to_array();
-            let [yz, zz, ..] = dot(angular, more).to_array();
-            put(joint, link, [m, cx, cy, cz, xx, xy, yy, xz, yz, zz]);
         }
     }
 }
@@ -121,13 +114,13 @@ struct Links {
     acceleration: [Lanes; 6],
 }
 
-/// Wrenches of the ten numbers: forces of the mass and the first moments, their moments, then moments of the
-/// inertia, the last two with two numbers that nobody reads. Each by components.
-type Wrenches<T = Lanes> = [V3<T>; 4];
+/// Wrenches of the ten numbers of four links: forces of the mass and the first moments, their moments, then
+/// moments of the inertia, the last two with two numbers that nobody reads. Each by components, then links.
+type Wrenches = [V3<[Lanes; LANES]>; 4];
 
-/// Of each number, four links.
+/// Link by link.
 #[inline(always)]
-fn wrenches(links: &Links) -> Wrenches<[Lanes; 4]> {
+fn wrenches(links: &Links) -> Wrenches {
     let ((velocity, w), (linear, alpha)) = (halves(links.twist), halves(links.acceleration));
     let p = links.origin;
     let accel = add_cross(linear, alpha, p);
@@ -158,13 +151,13 @@ fn wrenches(links: &Links) -> Wrenches<[Lanes; 4]> {
     ]
 }
 
-/// Components of four vectors, one component after another.
+/// Of four vectors for each of four links the components: the links apart, the vectors in the lanes.
 #[inline(always)]
-fn turned([a, b, c, d]: [V3<Lanes>; 4]) -> V3<[Lanes; 4]> {
+fn turned([a, b, c, d]: [V3<Lanes>; 4]) -> V3<[Lanes; LANES]> {
     [
-        [a[0], b[0], c[0], d[0]],
-        [a[1], b[1], c[1], d[1]],
-        [a[2], b[2], c[2], d[2]],
+        Lanes::transpose([a[0], b[0], c[0], d[0]]),
+        Lanes::transpose([a[1], b[1], c[1], d[1]]),
+        Lanes::transpose([a[2], b[2], c[2], d[2]]),
     ]
 }
 
