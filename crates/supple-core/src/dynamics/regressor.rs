@@ -92,8 +92,12 @@ fn rows<const N: usize, const G: usize>(
         });
         for link in group * LANES..N.min(group * LANES + LANES) {
             let lane = link - group * LANES;
-            let of_link = |part: usize| [0, 1, 2].map(|k| links[part][k][lane]);
-            let [forces, moments, couples, more] = [of_link(0), of_link(1), of_link(2), of_link(3)];
+            let of_link = |part: usize| {
+                let [x, y, z] = &links[part];
+                [x[lane], y[lane], z[lane]]
+            };
+            let (forces, moments) = (of_link(0), of_link(1));
+            let (couples, more) = (of_link(2), of_link(3));
             for joint in 0..=link {
                 let (linear, angular) = halves(splat(motions[joint]));
                 let [m, cx, cy, cz] = (dot(linear, forces) + dot(angular, moments)).to_array();
