@@ -49,14 +49,15 @@ pub fn fit_with_dip<const N: usize>(
         .ok_or_else(|| crate::error::shape_error("motions", "at least one", "none"))
 }
 
-/// Squares of what is left of slow, steady sliding, each joint by its mean.
+/// Squares of what is left of slow, steady sliding outside the band, each joint by its mean.
 fn slow_error<const N: usize>(found: &Fit<N>, motions: &[Motion]) -> Result<f64, IdentError> {
+    let slow = found.columns.friction().band_rad_per_s..=SLOW_RAD_PER_S;
     let mut total = 0.0;
     for motion in motions {
         for joint in joint_rows(found.nominal(), &found.columns, motion)? {
             let residual = &joint.a * &found.x - &joint.b;
             let kept: Vec<f64> = (0..residual.len())
-                .filter(|i| joint.speed[*i] <= SLOW_RAD_PER_S && joint.slid_rad[*i] >= STEADY_RAD)
+                .filter(|i| slow.contains(&joint.speed[*i]) && joint.slid_rad[*i] >= STEADY_RAD)
                 .map(|i| residual[i])
                 .collect();
             let mean = kept.iter().sum::<f64>() / kept.len().max(1) as f64;

@@ -333,9 +333,11 @@ fn equal_noise(blocks: &[Block], x: &DVector<f64>) -> Vec<f64> {
 }
 
 /// Second stage: each joint's `B`, zero or more, from its samples within three Stribeck speeds that slide
-/// steadily. Beside it a constant is fitted and thrown away: what gravity may be off there.
+/// steadily, outside the band: there the law is a parabola through zero, whereas an arm that comes to rest
+/// keeps its friction to the end, which would pass for a dip that is deeper and narrower. Beside it a constant is fitted and thrown away: what gravity may be off there.
 fn fit_stribeck(columns: &Columns, parts: &[Vec<JointRows>], x: &mut DVector<f64>) {
     let reach = 3.0 * columns.friction().stribeck_rad_per_s.unwrap_or(0.0);
+    let band = columns.friction().band_rad_per_s;
     for (row, &joint) in columns.moving().iter().enumerate() {
         let Some(position) = columns.position(Column::Stribeck(joint)) else {
             continue;
@@ -345,7 +347,8 @@ fn fit_stribeck(columns: &Columns, parts: &[Vec<JointRows>], x: &mut DVector<f64
             let residual = &part[row].b - &part[row].a * &*x;
             let shape = part[row].a.column(position);
             for (i, speed) in part[row].speed.iter().enumerate() {
-                if *speed <= reach && part[row].slid_rad[i] >= STEADY_RAD {
+                let slow = (band..=reach).contains(speed);
+                if slow && part[row].slid_rad[i] >= STEADY_RAD {
                     let (s, r) = (shape[i], residual[i]);
                     for (sum, term) in sums.iter_mut().zip([1.0, s, r, s * s, s * r]) {
                         *sum += term;
