@@ -45,9 +45,24 @@ fn an_arm_is_found_well_enough_for_five_newtons_a_metre() {
         let calibration = Calibration::new(seed);
         let found = found(&calibration);
         let errors = sinusoid(&found, &calibration);
-        (found.truth, found.validation.positive_definite, errors)
+        let plant = plant_of::<4>(&wam4(), &calibration).expect("four joints");
+        let model = found.description.config::<4>().expect("four joints");
+        let friction = model.friction.iter().zip(&plant.friction);
+        let breakaway = friction.map(|(found, truth)| found.breakaway_nm / truth.breakaway_nm);
+        let breakaway: Vec<f64> = breakaway.collect();
+        (
+            found.truth,
+            breakaway,
+            found.validation.positive_definite,
+            errors,
+        )
     });
-    for (truth, positive_definite, errors) in results {
+    for (truth, breakaway, positive_definite, errors) in results {
+        // The dip is not hidden by how the bristles turn round, nor by the law's band.
+        assert!(
+            breakaway.iter().all(|ratio| (ratio - 1.0).abs() < 0.02),
+            "{breakaway:?}"
+        );
         let (coulomb_m, stribeck_m) = (errors.coulomb_m, errors.stribeck_m);
         println!("{truth:?} {coulomb_m} {stribeck_m}");
         assert!(truth.gravity_relative <= 5e-4, "{truth:?}");
@@ -61,9 +76,10 @@ fn an_arm_is_found_well_enough_for_five_newtons_a_metre() {
     }
 }
 
+/// Ripple of 0.3 N m at each joint, identified from runs at constant speed.
 #[test]
 fn ripple_is_found_and_compensated() {
-    let errors = side_by_side(2, |seed| {
+    let errors = side_by_side(SEEDS, |seed| {
         let calibration = Calibration {
             ripple_nm: 0.3,
             ..Calibration::new(seed)
@@ -75,19 +91,30 @@ fn ripple_is_found_and_compensated() {
                 .iter()
                 .all(|table| !table.harmonics().is_empty())
         );
-        let with = sinusoid(&found, &calibration).coulomb_m;
-        let mut without = found.clone();
-        let model = without
-            .description
-            .toml()
-            .replace("ripple = ", "# ripple = ");
-        without.description =
-            Description::from_text(&model, without.description.urdf()).expect("sound");
-        (with, sinusoid(&without, &calibration).coulomb_m)
+        let with = sinusoid(&found, &calibration);
+        // What it costs where it is not compensated is told by a few.
+        let without = (seed < 2).then(|| {
+            let mut without = found.clone();
+            let model = without
+                .description
+                .toml()
+                .replace("ripple = ", "# ripple = ");
+            without.description =
+                Description::from_text(&model, without.description.urdf()).expect("sound");
+            sinusoid(&without, &calibration).coulomb_m
+        });
+        (with, without)
     });
-    for (with_m, without_m) in errors {
-        assert!(with_m <= 8e-3, "{with_m} m");
-        assert!(with_m < 0.7 * without_m, "{with_m} m against {without_m} m");
+    for (with, without) in errors {
+        println!("{with:?}, not compensated {without:?}");
+        assert!(with.coulomb_m <= 8e-3, "{with:?}");
+        assert!(with.stribeck_m <= 8e-3, "{with:?}");
+        if let Some(without_m) = without {
+            assert!(
+                with.coulomb_m < 0.7 * without_m,
+                "{with:?} against {without_m} m"
+            );
+        }
     }
 }
 

@@ -22,7 +22,8 @@ pub trait Model: Send + Sync {
     fn payload(&self, motions: &[Motion], guess: &Body) -> Result<Body, IdentError>;
     fn torque_scale(
         &self,
-        motions: &[Motion],
+        without: &[Motion],
+        with: &[Motion],
         known: &Body,
     ) -> Result<Vec<Option<f64>>, IdentError>;
     fn ripple(
@@ -95,10 +96,11 @@ impl<const N: usize> Model for supple_ident::Fit<N> {
 
     fn torque_scale(
         &self,
-        motions: &[Motion],
+        without: &[Motion],
+        with: &[Motion],
         known: &Body,
     ) -> Result<Vec<Option<f64>>, IdentError> {
-        torque_scale(self, motions, known)
+        torque_scale(self, without, with, known)
     }
 
     fn ripple(
@@ -200,6 +202,11 @@ impl Fit {
     /// The fit itself.
     pub fn model(&self) -> &dyn Model {
         &*self.model
+    }
+
+    /// The logs that were fitted, as they were prepared.
+    pub fn fitted(&self) -> &[Motion] {
+        &self.motions
     }
 
     /// Logs prepared as the fitted ones were.

@@ -71,7 +71,7 @@ pub fn torque_scale(
 ) -> PyResult<Vec<Option<f64>>> {
     let motions = motions(fit, &logs)?;
     let known = Body::from(known);
-    let found = py.detach(|| fit.model().torque_scale(&motions, &known));
+    let found = py.detach(|| fit.model().torque_scale(fit.fitted(), &motions, &known));
     found.map_err(errors::identification)
 }
 

@@ -45,8 +45,8 @@ def test_a_body_in_the_hand_is_found(arm, empty):
         empty.payload(t, q, tau, qd, qdd, guess=supple.Payload(1.0, (0.0, 0.0), np.eye(3)))
 
 
-def test_a_known_weight_tells_the_scale_of_the_torques(arm):
-    scale = 0.8
+def test_a_known_weight_tells_the_scale_of_the_torques_of_each_joint(arm):
+    scale = np.array([0.8, 1.1, 0.9, 1.25])
     t, q, qd, qdd = motion(4, 32)
     fit = supple.identify(
         arm, t, q, torques(arm, q, qd, qdd) / scale, qd, qdd, method="wls", friction="coulomb"
@@ -54,7 +54,7 @@ def test_a_known_weight_tells_the_scale_of_the_torques(arm):
     t, q, qd, qdd = motion(4, 33)
     tau = (torques(arm, q, qd, qdd) + loaded(arm, BALL)(q, qd, qdd)) / scale
     found = fit.torque_scale(t, q, tau, qd, qdd, known=BALL)
-    assert found == pytest.approx((scale,) * 4, rel=1e-4)
+    assert found == pytest.approx(tuple(scale), rel=1e-6)
     nothing = supple.Payload.ball(-1.0, 0.05, (0.0, 0.0, 0.1))
     with pytest.raises(ValueError, match="payload"):
         fit.torque_scale(t, q, tau, qd, qdd, known=nothing)

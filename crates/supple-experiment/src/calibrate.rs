@@ -7,7 +7,7 @@
 
 use crate::breakaway::{JointBreakaway, breakaway};
 use crate::error::ExperimentError;
-use crate::excite::{excitation, free_of_roles, slow_motion};
+use crate::excite::{constant_speed_runs, excitation, free_of_roles, slow_motion};
 use crate::metrics::Rms;
 use crate::mismatch::Mismatch;
 use crate::ripple::ripple_on;
@@ -189,7 +189,7 @@ pub fn calibrate<const N: usize>(
     if calibration.breakaway {
         let mut compensated = start;
         if calibration.ripple_nm > 0.0 {
-            progress("torque ripple, from slow motion");
+            progress("torque ripple, from runs at constant speed");
             compensated.ripple = ripple_on(&start, &plant, &home)?;
         }
         progress("breakaway");
@@ -215,14 +215,17 @@ pub fn calibrate<const N: usize>(
     other.duration_s = 2.0 * other.period_s() + other.ramp_s;
 
     progress("excitation");
-    let series = [designed.series, slow, other];
+    let mut series = vec![designed.series, slow, other];
+    if calibration.ripple_nm > 0.0 {
+        series.extend(constant_speed_runs(&free, &home, &joints)?);
+    }
     let session = excitation("excitation", &free, &plant, &home, &series);
     let folder = calibration.log_dir.as_deref();
     let recordings = session.record(folder, description, calibration.seed)?;
     let logs: Vec<Log> = recordings.iter().map(log_of).collect();
 
     progress("identification");
-    let (fit, ripple) = identify(&start, &logs[..2], calibration.ripple_nm > 0.0)?;
+    let (fit, ripple) = identify(&start, &logs[..2], &logs[3..])?;
     let motor_from_joint = *supple_core::Controller::new(told)?.motor_from_joint();
     let unrippled = without_ripple(&logs[2], &ripple, &motor_from_joint);
     let (held_out, _) = Motion::prepare(&unrippled, N, &joints, &fit.preparation)?;
@@ -291,14 +294,15 @@ pub fn without_ripple<const N: usize>(
     log
 }
 
-/// Model and ripple from a fast and a slow log of all joints.
+/// The model from a fast and a slow log of all joints, and ripple from `runs` of them at constant speed;
+/// without runs there is none.
 ///
 /// # Errors
 /// [`ExperimentError::Ident`].
 pub fn identify<const N: usize>(
     start: &Config<N>,
     logs: &[Log],
-    with_ripple: bool,
+    runs: &[Log],
 ) -> Result<(Fit<N>, [RippleTable; N]), ExperimentError> {
     let joints: Vec<usize> = (0..N).collect();
     let motor_from_joint = *supple_core::Controller::new(*start)?.motor_from_joint();
@@ -311,9 +315,9 @@ pub fn identify<const N: usize>(
     };
     let fine = preparation(start.period_s, CUTOFF_HZ.1);
     let mut tables = [RippleTable::NONE; N];
-    let mut rounds = if with_ripple { ROUNDS } else { 0 };
+    let mut rounds = if runs.is_empty() { 0 } else { ROUNDS };
     loop {
-        let prepare = |preparation: &Preparation, tables: &[RippleTable; N]| {
+        let prepare = |logs: &[Log], preparation: &Preparation, tables: &[RippleTable; N]| {
             logs.iter()
                 .map(|log| {
                     let log = without_ripple(log, tables, &motor_from_joint);
@@ -321,13 +325,13 @@ pub fn identify<const N: usize>(
                 })
                 .collect::<Result<Vec<_>, _>>()
         };
-        let motions = prepare(&procedure.preparation, &tables)?;
+        let motions = prepare(logs, &procedure.preparation, &tables)?;
         let fit = fit_with_dip(&start.arm, &motions, &joints, &procedure)?;
         if rounds == 0 {
             return Ok((fit, tables));
         }
         rounds -= 1;
-        let raw = prepare(&fine, &[RippleTable::NONE; N])?;
+        let raw = prepare(runs, &fine, &[RippleTable::NONE; N])?;
         tables = fit_ripple(&fit, &raw, &motor_from_joint, &RippleSearch::default())?;
     }
 }

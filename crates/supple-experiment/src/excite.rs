@@ -5,7 +5,7 @@ use supple_core::controller::Request;
 use supple_core::trajectory::Fourier;
 use supple_core::{Config, Vector};
 use supple_ident::IdentError;
-use supple_ident::design::slow_series;
+use supple_ident::design::{constant_speed_series, slow_series};
 use supple_plant::PlantConfig;
 
 /// Gravity hold before the first move \[s\].
@@ -14,6 +14,8 @@ const SETTLE_S: f64 = 0.1;
 const REST_S: f64 = 0.4;
 /// Greatest joint speed \[rad/s\] and period \[s\] of slow motion.
 const SLOW: (f64, f64) = (0.1, 60.0);
+/// Speeds of the runs at constant speed \[rad/s\], and the period of each \[s\].
+const RUNS: ([f64; 2], f64) = ([0.05, 0.1], 40.0);
 /// Mean joint speed of the moves between series \[rad/s\].
 const MOVE_RAD_PER_S: f64 = 0.4;
 
@@ -45,7 +47,7 @@ pub fn excitation<const N: usize>(
     }
 }
 
-/// A minute of every one of `joints` up to 0.1 rad/s: what dry friction and torque ripple do is seen there.
+/// A minute of every one of `joints` up to 0.1 rad/s: what dry friction does is seen there.
 ///
 /// # Errors
 /// Options out of range.
@@ -56,6 +58,20 @@ pub fn slow_motion<const N: usize>(
 ) -> Result<Fourier<N>, IdentError> {
     let (speed_rad_per_s, period_s) = SLOW;
     slow_series(config, home_rad, joints, speed_rad_per_s, period_s)
+}
+
+/// To and fro of every one of `joints` at constant speeds: torque ripple is identified from it.
+///
+/// # Errors
+/// Options out of range.
+pub fn constant_speed_runs<const N: usize>(
+    config: &Config<N>,
+    home_rad: &Vector<N>,
+    joints: &[usize],
+) -> Result<Vec<Fourier<N>>, IdentError> {
+    let (speeds, period_s) = RUNS;
+    let run = |speed| constant_speed_series(config, home_rad, joints, speed, period_s);
+    speeds.into_iter().map(run).collect()
 }
 
 /// A move and a rest.

@@ -58,7 +58,7 @@ pub use breakaway::{JointBreakaway, RATE_NM_PER_S, STOP_RAD, breakaway};
 pub use calibrate::{Calibrated, Calibration, Truthfulness, calibrate};
 pub use demo::{Demo, DemoOptions, ProbingRun, Progress, demo};
 pub use error::ExperimentError;
-pub use excite::{excitation, slow_motion};
+pub use excite::{constant_speed_runs, excitation, slow_motion};
 pub use foretell::{Foretold, foretell};
 pub use mismatch::Mismatch;
 pub use quadrant::{Edge, EdgeMeter};

@@ -1,11 +1,12 @@
-//! Torque ripple of a plant before anything else is known of it: from slow motion of all joints.
+//! Torque ripple of a plant before anything else is known of it: from slow runs of all joints at constant
+//! speed.
 //!
 //! Gravity and friction are fitted beside it, from a model that is off as a data sheet is, and thrown
 //! away; what is left turns with the motors' angles.
 
 use crate::calibrate::{CUTOFF_HZ, log_of, preparation};
 use crate::error::ExperimentError;
-use crate::excite::{excitation, slow_motion};
+use crate::excite::{constant_speed_runs, excitation};
 use supple_core::{Config, RippleTable, Vector};
 use supple_ident::{
     FrictionChoice, FrictionColumns, Log, Motion, Procedure, RippleSearch, fit_ripple,
@@ -24,8 +25,8 @@ pub fn ripple_on<const N: usize>(
     home_rad: &Vector<N>,
 ) -> Result<[RippleTable; N], ExperimentError> {
     let joints: Vec<usize> = (0..N).collect();
-    let slow = slow_motion(start, home_rad, &joints)?;
-    let session = excitation("slow motion", start, plant, home_rad, &[slow]);
+    let runs = constant_speed_runs(start, home_rad, &joints)?;
+    let session = excitation("constant speed", start, plant, home_rad, &runs);
     let recordings = session.perform(&mut |_, _| Ok(()))?;
     let logs: Vec<Log> = recordings.iter().map(log_of).collect();
     let prepare = |cutoff_hz| {

@@ -87,7 +87,8 @@ impl Block {
         self.stacked.column(self.unknowns()).norm_squared()
     }
 
-    fn unknowns(&self) -> usize {
+    /// Number of unknowns.
+    pub fn unknowns(&self) -> usize {
         self.stacked.ncols() - 1
     }
 

@@ -3,16 +3,21 @@
 //! Published torque constants of one arm differ by a fifth. A weight that is known tells: the torque it
 //! must add at each joint against the torque that was logged more than without it.
 
+use crate::base::{Base, RANK_TOLERANCE};
 use crate::compress::Block;
 use crate::consistent::{Constraints, solve};
 use crate::error::{IdentError, shape_error};
+use crate::estimate::nearest;
 use crate::fit::Fit;
 use crate::motion::Motion;
 use crate::regressor::{JointRows, joint_rows};
-use nalgebra::{DMatrix, SVector};
+use nalgebra::{DMatrix, DVector, SVector};
 use supple_core::dynamics::regressor;
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::{Body, Vector};
+
+/// Greatest standard deviation of a scale that is told, by the scale.
+const TOLD: f64 = 0.05;
 
 /// Ten parameters of `body`, given in the last link's frame, as [`supple_core::dynamics::parameters`]
 /// orders them.
@@ -73,36 +78,65 @@ pub fn payload<const N: usize>(
     })
 }
 
-/// True by logged torque of each moving joint, from motions with the `known` body in the last link's frame
-/// and a fit of the arm without it to torques of the same scale. `None` where the body adds too little to
-/// a joint to tell.
+/// True by logged torque of each moving joint, from motions of the arm `without` the `known` body, which
+/// the fit was made from, and motions `with` it in the last link's frame, torques of the same scales.
+///
+/// Each joint is told by itself: `tau_j = Y_j x_j + k_j Y_hand p`, where only the last term is there with the
+/// body alone, and the scale is `1 / k_j`. Joints share links, so that parameters common to them all would
+/// carry the scale of one joint into another. `None` where the body adds too little to a joint to tell.
 ///
 /// # Errors
-/// Shapes that do not agree; a body of no mass.
+/// Shapes that do not agree; a body that is none.
 pub fn torque_scale<const N: usize>(
     empty: &Fit<N>,
-    motions: &[Motion],
+    without: &[Motion],
+    with: &[Motion],
     known: &Body,
 ) -> Result<Vec<Option<f64>>, IdentError> {
     known
         .validate()
         .map_err(|error| shape_error("known payload", "a physical body", error.to_string()))?;
     let p = parameters_of(known);
-    let joints = empty.columns.moving().len();
-    let mut sums = vec![[0.0; 3]; joints];
-    for motion in motions {
-        for (sum, load) in sums.iter_mut().zip(added(empty, motion)?) {
-            let expected = &load.a * p;
-            sum[0] += expected.dot(&expected);
-            sum[1] += expected.dot(&load.b);
-            sum[2] += load.b.len() as f64;
+    let mut blocks = vec![Block::empty(empty.columns.len() + 2); empty.columns.moving().len()];
+    let mut independent_share: f64 = 1.0;
+    for (motions, carries) in [(without, false), (with, true)] {
+        for motion in motions {
+            independent_share = independent_share.min(motion.independent_share);
+            let arm = joint_rows(empty.nominal(), &empty.columns, motion)?;
+            let hand = added(empty, motion)?;
+            for (row, &joint) in empty.columns.moving().iter().enumerate() {
+                let load = &hand[row].a * p * f64::from(u8::from(carries));
+                // With the rotor as a column even where it is known: known, it is of another scale.
+                let mut a = arm[row]
+                    .a
+                    .clone()
+                    .resize_horizontally(blocks[row].unknowns(), 0.0);
+                a.set_column(empty.columns.len(), &motion.qdd.column(joint));
+                a.set_column(empty.columns.len() + 1, &load);
+                let tau = motion.tau.column(joint).into_owned();
+                let rows = JointRows::new(a, tau, arm[row].speed.clone());
+                blocks[row].add(&Block::of(&rows, 0.0, None), 1.0);
+            }
         }
     }
-    let scale = |(row, [square, product, count]): (usize, &[f64; 3])| {
-        let told = (square / count.max(1.0)).sqrt() > 3.0 * empty.noise_nm[row];
-        (told && *product > 0.0).then(|| square / product)
+    blocks
+        .iter()
+        .map(|block| scale_of(block, independent_share))
+        .collect()
+}
+
+/// One over the last unknown, where it is told.
+fn scale_of(block: &Block, independent_share: f64) -> Result<Option<f64>, IdentError> {
+    let base = Base::of(&block.a(), RANK_TOLERANCE)?;
+    let Ok(place) = base.independent.binary_search(&(block.unknowns() - 1)) else {
+        return Ok(None);
     };
-    Ok(sums.iter().enumerate().map(scale).collect())
+    let x = nearest(block, &DVector::zeros(block.unknowns()))?;
+    let found = x[block.unknowns() - 1];
+    let freedom = block.rows().saturating_sub(base.rank()) as f64 * independent_share;
+    let noise = (block.error_squared(&x) / freedom.max(1.0)).sqrt();
+    let deviation = base.standard_deviations(noise)[place];
+    Ok((found > 0.0 && deviation <= TOLD * found).then(|| 1.0 / found))
 }
 
 /// Rows of the body's ten parameters, and what the arm alone leaves, by moving joint.

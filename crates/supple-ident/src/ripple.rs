@@ -1,4 +1,4 @@
-//! Torque ripple of the motors from slow motion: harmonics of the motor angle in what a model leaves.
+//! Torque ripple of the motors from slow motion, best at constant speed: harmonics of the motor angle in what a model leaves.
 //!
 //! The torque that the joints received but were not commanded, brought to the motors by `m2jp^T`, is
 //! fitted by sines and cosines of the motor angle. Beside them stand columns for what else a model may

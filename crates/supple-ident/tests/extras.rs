@@ -6,7 +6,9 @@ use supple_core::dynamics::{gravity, rnea, tip_pose};
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::ripple::Harmonic;
 use supple_core::{Body, Friction, Matrix, RippleTable, Vector};
-use supple_ident::design::{Criterion, Design, Workspace, design, slow_series};
+use supple_ident::design::{
+    Criterion, Design, Workspace, constant_speed_series, design, slow_series,
+};
 use supple_ident::learn::with_payload;
 use supple_ident::payload::{parameters_of, payload, torque_scale};
 use supple_ident::{
@@ -94,6 +96,39 @@ fn a_subset_moves_alone() {
             assert_eq!([at.position_rad[0], at.position_rad[2]], [home[0], home[2]]);
             assert!(at.velocity_rad_per_s.amax() <= 2.0);
         }
+    }
+}
+
+#[test]
+fn runs_at_constant_speed_are() {
+    let description = Description::asset("wam4").unwrap();
+    let (config, home) = (wam4(), description.home::<4>().unwrap());
+    let (speed, period_s) = (0.05, 40.0);
+    let run = constant_speed_series(&config, &home, &ALL, speed, period_s).unwrap();
+    run.within(&config.limits).unwrap();
+    let steady = 4000;
+    for joint in ALL {
+        let (mut there, mut back, mut fastest) = (0, 0, 0.0_f64);
+        for i in 0..steady {
+            // One period at full pace.
+            let at =
+                run.at(run.ramp_s + (period_s - run.ramp_s) * f64::from(i) / f64::from(steady));
+            let v = at.velocity_rad_per_s[joint];
+            there += i32::from((v / speed - 1.0).abs() < 0.015);
+            back += i32::from((-v / speed - 1.0).abs() < 0.015);
+            fastest = fastest.max(v.abs());
+        }
+        let share = |count| f64::from(count) / f64::from(steady);
+        assert!(
+            share(there + back) > 0.55,
+            "joint {joint}: {}",
+            share(there + back)
+        );
+        assert!(
+            share(there) > 0.2 && share(back) > 0.2,
+            "joint {joint}: both ways"
+        );
+        assert!(fastest < 1.015 * speed, "{fastest}");
     }
 }
 
@@ -282,22 +317,30 @@ fn a_payload_is_found_and_a_known_one_gives_the_torque_scale() {
     assert!((got.mass_kg - 2.0).abs() < 0.02, "{}", got.mass_kg);
     assert!((got.com_m - weight().com_m).amax() < 5e-3, "{}", got.com_m);
 
-    // The same arm through amplifiers that report 0.8 of the torque on joints 1 and 3.
+    // The same arm through amplifiers that report a share of the torque, another on each joint; the
+    // rotors are once to be found, once taken as known.
+    let shares = [0.9, 0.8, 1.15, 0.7];
     let scaled = |mut data: Motion| {
-        for j in [1, 3] {
-            data.tau.column_mut(j).scale_mut(0.8);
+        for (j, share) in shares.into_iter().enumerate() {
+            data.tau.column_mut(j).scale_mut(share);
         }
         data
     };
-    let plain = Options {
-        consistent: None,
-        rotor: true,
-        ..options()
-    };
-    let found = fit(&arm, &[scaled(empty)], &ALL, &plain).unwrap();
-    let scale = torque_scale(&found, &[scaled(loaded)], &weight()).unwrap();
-    for (joint, wanted) in [(1, 1.25), (3, 1.25)] {
-        let got = scale[joint].expect("gravity of the weight acts on it");
-        assert!((got / wanted - 1.0).abs() < 0.05, "joint {joint}: {got}");
+    let (empty, loaded) = ([scaled(empty)], [scaled(loaded)]);
+    for rotor in [true, false] {
+        let plain = Options {
+            consistent: None,
+            rotor,
+            ..options()
+        };
+        let found = fit(&arm, &empty, &ALL, &plain).unwrap();
+        let scale = torque_scale(&found, &empty, &loaded, &weight()).unwrap();
+        for (joint, share) in shares.into_iter().enumerate() {
+            let got = scale[joint].expect("the weight moves with every joint");
+            assert!((got * share - 1.0).abs() < 0.01, "joint {joint}: {got}");
+        }
+        // Nothing in the hand tells nothing.
+        let none = torque_scale(&found, &empty, &empty, &weight()).unwrap();
+        assert_eq!(none, [None; 4]);
     }
 }

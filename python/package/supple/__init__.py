@@ -10,17 +10,10 @@ Wrong input is refused by an exception that names argument, expected and given s
 (4, 4)
 """
 
+from supple._base import BaseParameters, base_parameters
 from supple._excite import Excitation, Recording, design_excitation, excite
-from supple._identify import (
-    BaseParameters,
-    DataWarning,
-    Fit,
-    FrictionColumns,
-    Payload,
-    Validation,
-    base_parameters,
-    identify,
-)
+from supple._fit import Fit, Payload, Validation
+from supple._identify import DataWarning, FrictionColumns, identify
 from supple._learn import Learned, learn
 from supple._log import Log, Truth, read_log
 from supple._native import Arm, Friction, __version__, assets

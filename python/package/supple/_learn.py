@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple import _native
-from supple._identify import _logs
+from supple._given import given_logs
 
 Array = NDArray[np.float64]
 
@@ -95,7 +95,7 @@ def learn(
     """
     found = _native.learn(
         arm,
-        _logs(t, q, tau, qd, None),
+        given_logs(t, q, tau, qd, None),
         {
             "moving": list(range(arm.dof)) if moving is None else [int(joint) for joint in moving],
             "cutoff_hz": cutoff_hz,

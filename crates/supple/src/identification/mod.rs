@@ -205,7 +205,7 @@ pub struct BreakawayArgs {
     /// Seed of the starting model and of every noise.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
-    /// Torque ripple of the plant's motors, seen at the joints [N m]; found from slow motion first, and
+    /// Torque ripple of the plant's motors, seen at the joints [N m]; found from slow runs first, and
     /// compensated.
     #[arg(long, value_name = "NM", default_value_t = 0.0)]
     pub ripple: f64,
