@@ -88,7 +88,7 @@ fn functions<const N: usize>(criterion: &mut Criterion, asset: &str) {
         "regressor",
         &states,
         |s| dynamics::regressor(&arm, &s.q, &s.qd, &s.qdd),
-        |blocks| blocks[0][(0, 0)],
+        |rows| rows[0][0][0],
     );
     let mut filled = Terms::default();
     bench(

@@ -155,8 +155,8 @@ fn added<const N: usize>(empty: &Fit<N>, motion: &Motion) -> Result<Vec<JointRow
         let (q, qd, qdd) = (at(&motion.q), held(&motion.qd), held(&motion.qdd));
         let rows = regressor(empty.nominal(), &q, &qd, &qdd);
         for (joint, row) in moving.iter().zip(&mut joints) {
-            for k in 0..10 {
-                row.a[(i, k)] = rows[*joint][N - 1][k];
+            for (k, value) in rows[*joint][N - 1].iter().enumerate() {
+                row.a[(i, k)] = *value;
             }
         }
     }
