@@ -27,21 +27,18 @@ pub struct PuckConfig {
     pub slot: i32,
     /// Temperature \[degrees Celsius\]; 30 by default.
     pub temperature: i32,
-    /// Torque of the shorted motor per speed \[N m s/rad\]: `Kt^2 / R`.
-    pub braking_nm_s_per_rad: f64,
     /// It answers at all; true by default.
     pub present: bool,
 }
 
 impl PuckConfig {
     /// Puck of joint `number`, 1 to 7, of a WAM. Units, limits and poles are Barrett's defaults (btutil,
-    /// btdiag); the motors' constants are those of the data sheet: Kt 0.457, 0.236 and 0.067 N m/A, R
-    /// 3.473, 6.213 and 5.205 ohm.
+    /// btdiag).
     pub fn wam(number: usize) -> PuckConfig {
-        let (units_per_nm, poles, kt_nm_per_a, resistance_ohm) = match number {
-            1..=4 => (2700, 12, 0.457, 3.473),
-            5 | 6 => (6500, 8, 0.236, 6.213),
-            _ => (17_474, 6, 0.067, 5.205),
+        let (units_per_nm, poles) = match number {
+            1..=4 => (2700, 12),
+            5 | 6 => (6500, 8),
+            _ => (17_474, 6),
         };
         let lower = number <= 4;
         PuckConfig {
@@ -59,7 +56,6 @@ impl PuckConfig {
             groups: if lower { [0, 1, 4] } else { [0, 2, 4] },
             slot: if lower { number } else { number - 4 } as i32,
             temperature: 30,
-            braking_nm_s_per_rad: kt_nm_per_a * kt_nm_per_a / resistance_ohm,
             present: true,
         }
     }

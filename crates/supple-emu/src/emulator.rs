@@ -59,7 +59,7 @@ pub struct Emulator<const N: usize> {
 
 impl<const N: usize> Emulator<N> {
     /// An arm at rest at `start_rad`, powered up in the emergency stop, at time `start_ns`. Of the
-    /// plant's drive only the transmission is used: counts and torque units are the pucks'.
+    /// plant's drive transmission, ripple and braking are used: counts and torque units are the pucks'.
     ///
     /// # Errors
     /// An arm that has not 4 or 7 joints, a puck without a list of ids, or what the plant refuses.
@@ -85,6 +85,7 @@ impl<const N: usize> Emulator<N> {
         plant.drive = Drive {
             joint_from_motor,
             ripple: plant.drive.ripple,
+            braking_nm_s_per_rad: plant.drive.braking_nm_s_per_rad,
             ..Drive::direct()
         };
         plant.step_s = config.step_ns as f64 * 1e-9;
@@ -192,12 +193,25 @@ impl<const N: usize> Emulator<N> {
         &self.plant
     }
 
+    /// The same.
+    pub fn plant_mut(&mut self) -> &mut Plant<N> {
+        &mut self.plant
+    }
+
     /// Torque of each motor, braking included \[N m\].
     pub fn motor_torque_nm(&self) -> Vector<N> {
         let speed = self.motor_from_joint * self.plant.truth().velocity_rad_per_s;
-        Vector::from_fn(|i, _| {
-            self.pucks[i].torque_nm() - self.pucks[i].braking_nm_s_per_rad() * speed[i]
+        let braking = &self.plant.config().drive.braking_nm_s_per_rad;
+        let commanded = self.commanded_nm();
+        Vector::from_fn(|i, _| match self.pucks[i].brakes() {
+            true => commanded[i] - braking[i] * speed[i],
+            false => commanded[i],
         })
+    }
+
+    /// Torque that each motor is commanded \[N m\].
+    fn commanded_nm(&self) -> Vector<N> {
+        Vector::from_fn(|i, _| self.pucks[i].torque_nm())
     }
 
     /// What has happened so far, with its times \[ns\].
@@ -265,7 +279,9 @@ impl<const N: usize> Emulator<N> {
     /// One step of the physics, and whatever the nodes do by themselves.
     fn tick(&mut self) {
         if !self.in_cradle {
-            let motor = self.motor_torque_nm();
+            let motor = self.commanded_nm();
+            self.plant
+                .short(core::array::from_fn(|i| self.pucks[i].brakes()));
             self.plant
                 .cycle(&(self.motor_from_joint.transpose() * motor));
             self.turn_motors();

@@ -194,11 +194,12 @@ impl<const N: usize> Arm<N> {
         self.pendant.answer(&mut self.emulator);
         match &mut self.trace {
             Some(trace) => {
-                let arm = &self.emulator;
+                let arm = &mut self.emulator;
                 let modes = arm.pucks().iter().map(Puck::mode);
                 let active = modes.filter(|mode| *mode == MotorMode::Torque).count();
                 let torque_nm = arm.motor_torque_nm().into();
-                Ok(trace.note(arm.wall_ns(), active, &torque_nm, arm.truth())?)
+                let wall_ns = arm.wall_ns();
+                Ok(trace.note(wall_ns, active, &torque_nm, arm.plant_mut())?)
             }
             None => Ok(()),
         }

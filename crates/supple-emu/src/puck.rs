@@ -118,12 +118,9 @@ impl Puck {
         }
     }
 
-    /// Torque of the shorted motor per speed \[N m s/rad\]; zero in torque mode.
-    pub fn braking_nm_s_per_rad(&self) -> f64 {
-        match (self.power, self.mode) {
-            (Power::Ready, MotorMode::Torque) => 0.0,
-            _ => self.config.braking_nm_s_per_rad,
-        }
+    /// Its motor is shorted and brakes: always but in torque mode.
+    pub fn brakes(&self) -> bool {
+        (self.power, self.mode) != (Power::Ready, MotorMode::Torque)
     }
 
     /// Turns the motor to an angle \[rad\], from where it stood at the beginning.

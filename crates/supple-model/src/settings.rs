@@ -157,6 +157,9 @@ pub struct MotorSettings {
     pub torque_nm: Vec<f64>,
     /// Least step of each motor's torque command, at the motor (N m), positive. Default: continuous.
     pub torque_quantum_nm: Option<Vec<f64>>,
+    /// Torque of each motor per its speed when its terminals are shorted, `Kt^2 / R` (N m s/rad), positive: what
+    /// brakes it in idle. Default: what stops the rotor alone with a time constant of 2 ms.
+    pub braking_nm_s_per_rad: Option<Vec<f64>>,
     /// Encoder counts per motor revolution, positive. Default: continuous.
     pub counts_per_revolution: Option<u32>,
     /// Torque ripple that the motors are known to have, fed forward so that it cancels; at most 6

@@ -3,8 +3,12 @@
 use crate::config::{ForceSensor, PlantConfig, Stops};
 use crate::drive::{Drive, Ripple};
 use crate::friction::LuGre;
-use supple_core::Vector;
+use supple_core::{Matrix, Vector};
 use supple_model::{Description, ModelError};
+
+/// Time constant with which a shorted motor stops its own rotor where its constants are not known \[s\]: that of
+/// the WAM's motors is 1.8 to 2.0 ms.
+const SHORTED_S: f64 = 2e-3;
 
 impl<const N: usize> PlantConfig<N> {
     /// The plant that a description describes, in empty space: its arm and tool, its friction (with a
@@ -18,6 +22,10 @@ impl<const N: usize> PlantConfig<N> {
         let motors = description.motors();
         let counts = motors.counts_per_revolution.map_or(0.0, f64::from);
         let quantum = motors.torque_quantum_nm.as_deref();
+        let braking = motors.braking_nm_s_per_rad.as_deref();
+        let rotors_kg_m2 = told.joint_from_motor.transpose()
+            * Matrix::from_diagonal(&told.arm.armature())
+            * told.joint_from_motor;
         let ideal = PlantConfig::ideal(told.arm);
         let ripple = told.ripple.iter().enumerate().flat_map(|(motor, table)| {
             table.harmonics().iter().map(move |line| Ripple {
@@ -36,6 +44,10 @@ impl<const N: usize> PlantConfig<N> {
                 counts_per_motor_revolution: Vector::repeat(counts),
                 motor_torque_quantum_nm: quantum
                     .map_or_else(Vector::zeros, Vector::from_column_slice),
+                braking_nm_s_per_rad: braking.map_or_else(
+                    || rotors_kg_m2.diagonal() / SHORTED_S,
+                    Vector::from_column_slice,
+                ),
                 torque_delay_cycles: 1,
                 ripple: ripple.collect(),
                 ..Drive::direct()

@@ -2,7 +2,9 @@
 //!
 //! Joint angles are `q = m2jp p` of the motor angles `p`, motor torques `m2jp^T tau` of the joint
 //! torques. A commanded torque is rounded to the amplifier's steps and acts a whole number of cycles
-//! later; a measured angle is rounded to the encoder's counts. The cables between are taken as rigid.
+//! later; a measured angle is rounded to the encoder's counts. A motor whose terminals are shorted, as an
+//! amplifier in idle does it, brakes by its own current: `tau = -(Kt^2 / R) p'` at the motor, the current's own
+//! time (inductance over resistance) left out. The cables between are taken as rigid.
 
 use crate::error::{PlantError, entry};
 use crate::noise::Noise;
@@ -35,6 +37,8 @@ pub struct Drive<const N: usize> {
     pub encoder_noise_rad: Vector<N>,
     /// Least change of each motor's torque \[N m\], zero or more; zero commands without rounding.
     pub motor_torque_quantum_nm: Vector<N>,
+    /// Torque of each motor per its speed when it is shorted, `Kt^2 / R` \[N m s/rad\], zero or more.
+    pub braking_nm_s_per_rad: Vector<N>,
     /// Cycles after which a commanded torque acts; 1 on an arm whose drives take over at the next
     /// cycle.
     pub torque_delay_cycles: usize,
@@ -50,6 +54,7 @@ impl<const N: usize> Drive<N> {
             counts_per_motor_revolution: Vector::zeros(),
             encoder_noise_rad: Vector::zeros(),
             motor_torque_quantum_nm: Vector::zeros(),
+            braking_nm_s_per_rad: Vector::zeros(),
             torque_delay_cycles: 0,
             ripple: Vec::new(),
         }
@@ -63,6 +68,10 @@ pub(crate) struct DriveState<const N: usize> {
     motor_from_joint: Matrix<N, N>,
     pending: VecDeque<Vector<N>>,
     last_command: Vector<N>,
+    /// Which motors are shorted.
+    shorted: [bool; N],
+    /// Joint torque against joint velocity that they make \[N m s/rad\].
+    braking: Matrix<N, N>,
 }
 
 impl<const N: usize> DriveState<N> {
@@ -77,6 +86,7 @@ impl<const N: usize> DriveState<N> {
                 ),
                 ("encoder_noise_rad", drive.encoder_noise_rad[i]),
                 ("motor_torque_quantum_nm", drive.motor_torque_quantum_nm[i]),
+                ("braking_nm_s_per_rad", drive.braking_nm_s_per_rad[i]),
             ] {
                 let sound = value >= 0.0 && value.is_finite();
                 let name = format!("{field} of motor {i}");
@@ -96,6 +106,8 @@ impl<const N: usize> DriveState<N> {
             motor_from_joint,
             pending: VecDeque::new(),
             last_command: Vector::zeros(),
+            shorted: [false; N],
+            braking: Matrix::zeros(),
         };
         state.restart(held);
         Ok(state)
@@ -132,6 +144,30 @@ impl<const N: usize> DriveState<N> {
             }
         }
         self.motor_from_joint.transpose() * motor
+    }
+
+    /// Shorts these motors and no others.
+    pub fn short(&mut self, motors: [bool; N]) {
+        if motors == self.shorted {
+            return;
+        }
+        self.shorted = motors;
+        let at_motors = Vector::from_fn(|i, _| match motors[i] {
+            true => self.drive.braking_nm_s_per_rad[i],
+            false => 0.0,
+        });
+        self.braking = self.motor_from_joint.transpose()
+            * Matrix::from_diagonal(&at_motors)
+            * self.motor_from_joint;
+    }
+
+    /// Joint torque of the shorted motors at joint velocities `qd`.
+    pub fn braking(&self, qd: &Vector<N>) -> Vector<N> {
+        if self.shorted.contains(&true) {
+            -(self.braking * qd)
+        } else {
+            Vector::zeros()
+        }
     }
 
     /// Joint torque of the motors' ripple at joint angles `q`.

@@ -30,6 +30,7 @@ pub struct Plant<const N: usize> {
     measurement: Measurement<N>,
     truth: Truth<N>,
     poses: [Pose; N],
+    greatest_force_n: Vector3<f64>,
 }
 
 impl<const N: usize> Plant<N> {
@@ -78,6 +79,7 @@ impl<const N: usize> Plant<N> {
                 motor_torque_nm: held,
             },
             poses: [Pose::IDENTITY; N],
+            greatest_force_n: Vector3::zeros(),
             config,
         };
         plant.read_state();
@@ -109,6 +111,17 @@ impl<const N: usize> Plant<N> {
         self.truth.time_s = self.measurement.cycle as f64 * self.config.cycle_s;
         self.measure(filtered);
         self.measurement
+    }
+
+    /// Shorts these motors from now on and no others: they brake, beside whatever torque is commanded. None is
+    /// at the start.
+    pub fn short(&mut self, motors: [bool; N]) {
+        self.drive.short(motors);
+    }
+
+    /// The greatest contact force on the tip since this was last asked, over all steps, base axes \[N\].
+    pub fn take_greatest_force_n(&mut self) -> Vector3<f64> {
+        core::mem::take(&mut self.greatest_force_n)
     }
 
     /// The measurement at the end of the last cycle, or at the start.
@@ -194,7 +207,7 @@ impl<const N: usize> Plant<N> {
     fn step(&mut self, applied: &Vector<N>) -> TipForce {
         let dt_s = self.config.step_s;
         let (q, qd) = (self.truth.position_rad, self.truth.velocity_rad_per_s);
-        let motor = applied + self.drive.ripple(&q);
+        let motor = applied + self.drive.ripple(&q) + self.drive.braking(&qd);
         let friction = self.friction(&qd, dt_s);
         let mut torque = motor - friction;
         if let Some(stops) = &self.config.stops {
@@ -211,6 +224,9 @@ impl<const N: usize> Plant<N> {
             None => about_axis[i],
         });
         self.world.step(&link_torque, &touch, &tip.center_m, dt_s);
+        if touch.force_n.norm_squared() > self.greatest_force_n.norm_squared() {
+            self.greatest_force_n = touch.force_n;
+        }
         self.truth.contact_force_n = touch.force_n;
         self.truth.friction_torque_nm = friction;
         self.truth.motor_torque_nm = motor;

@@ -33,7 +33,7 @@ pub struct Truth<const N: usize> {
     pub contact_force_n: Vector3<f64>,
     /// Friction torque over the last step, positive against positive motion \[N m\].
     pub friction_torque_nm: Vector<N>,
-    /// Torque of the motors over the last step, ripple included \[N m\].
+    /// Torque of the motors over the last step, ripple and braking included \[N m\].
     pub motor_torque_nm: Vector<N>,
 }
 

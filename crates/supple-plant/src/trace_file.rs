@@ -2,7 +2,7 @@
 //!
 //! Not a log of a controller: it goes on when the controller is gone.
 
-use crate::record::Truth;
+use crate::plant::Plant;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -50,7 +50,8 @@ impl TraceFile {
     }
 
     /// Writes a line if it is time for one. `time_ns` is when, `active` how many motors take torques,
-    /// `torque_nm` what acts at each, braking included.
+    /// `torque_nm` what acts at each, braking included. The force is the greatest since the line before: an
+    /// impact is over in less time than two lines are apart.
     ///
     /// # Errors
     /// [`TraceError`].
@@ -59,17 +60,20 @@ impl TraceFile {
         time_ns: u64,
         active: usize,
         torque_nm: &[f64; N],
-        truth: &Truth<N>,
+        plant: &mut Plant<N>,
     ) -> Result<(), TraceError> {
         if time_ns < self.next_ns {
             return Ok(());
         }
         self.next_ns = time_ns + EVERY_NS;
         let torques: String = torque_nm.iter().map(|t| format!(",{t:.6}")).collect();
-        let force = truth.contact_force_n;
+        let force = plant.take_greatest_force_n();
         self.line(&format!(
             "{time_ns},{active}{torques},{:.4},{:.4},{:.4},{:.6}",
-            force.x, force.y, force.z, truth.tip_position_m.z
+            force.x,
+            force.y,
+            force.z,
+            plant.truth().tip_position_m.z
         ))
     }
 

@@ -66,7 +66,7 @@ pub fn run<const N: usize>(
         config.scene = Scene::beneath(face_m);
     }
     let home_rad = description.home::<N>()?;
-    let motors = Motors::new(&config.arm.armature(), config.cycle_s);
+    let motors = Motors::new(config.cycle_s);
     let plant = Plant::new(config, home_rad, supple_core::Vector::zeros())?;
     let domain = Domain::new(options.prefix.as_deref())?;
     let link = PlantLink::new(&domain)?;

@@ -172,16 +172,14 @@ impl<const N: usize> World<N> {
     }
 
     fn advance(&mut self, heard: &Heard, time_ns: u64) -> Result<(), SimError> {
-        let velocity = self.plant.truth().velocity_rad_per_s;
-        let torque_nm = self.motors.torque(heard.answer.as_ref(), &velocity)?;
+        let torque_nm = self.motors.torque(heard.answer.as_ref())?;
+        let active = self.motors.drives() == Drives::Active;
+        self.plant.short([!active; N]);
         self.plant.cycle(&torque_nm);
         if let Some(trace) = &mut self.trace {
-            let active = if self.motors.drives() == Drives::Active {
-                N
-            } else {
-                0
-            };
-            trace.note(time_ns, active, &torque_nm.into(), self.plant.truth())?;
+            let active = if active { N } else { 0 };
+            let torque_nm = self.plant.truth().motor_torque_nm.into();
+            trace.note(time_ns, active, &torque_nm, &mut self.plant)?;
         }
         Ok(())
     }

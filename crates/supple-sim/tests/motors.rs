@@ -24,11 +24,7 @@ fn answer(request: Option<Request<4>>) -> TorqueCommand {
 }
 
 fn motors() -> Motors<4> {
-    Motors::new(&Vector::repeat(0.1), 1e-3)
-}
-
-fn still() -> Vector<4> {
-    Vector::zeros()
+    Motors::new(1e-3)
 }
 
 #[test]
@@ -36,11 +32,11 @@ fn torque_is_made_as_soon_as_it_is_wanted_and_not_before() {
     let (hold, idle) = (answer(Some(Request::GravityHold)), answer(None));
     let mut motors = motors();
     assert_eq!(motors.drives(), Drives::Idle);
-    assert_eq!(motors.torque(Some(&idle), &still()), Ok(Vector::zeros()));
+    assert_eq!(motors.torque(Some(&idle)), Ok(Vector::zeros()));
     assert_eq!(motors.drives(), Drives::Idle);
-    assert_eq!(motors.torque(Some(&hold), &still()), hold.torque());
+    assert_eq!(motors.torque(Some(&hold)), hold.torque());
     assert_eq!(motors.drives(), Drives::Active);
-    assert_eq!(motors.torque(Some(&idle), &still()), Ok(Vector::zeros()));
+    assert_eq!(motors.torque(Some(&idle)), Ok(Vector::zeros()));
     assert_eq!(motors.drives(), Drives::Idle);
 }
 
@@ -48,20 +44,18 @@ fn torque_is_made_as_soon_as_it_is_wanted_and_not_before() {
 fn the_fallback_acts_for_100_ms_and_then_the_motors_brake() {
     let hold = answer(Some(Request::GravityHold));
     let mut motors = motors();
-    motors.torque(Some(&hold), &still()).expect("four joints");
+    motors.torque(Some(&hold)).expect("four joints");
     for _ in 0..FALLBACK_CYCLES {
-        assert_eq!(motors.torque(None, &still()), hold.fallback_torque());
+        assert_eq!(motors.torque(None), hold.fallback_torque());
         assert_eq!(motors.drives(), Drives::Active);
     }
-    assert_eq!(motors.torque(None, &still()), Ok(Vector::zeros()));
+    assert_eq!(motors.torque(None), Ok(Vector::zeros()));
     assert_eq!(motors.drives(), Drives::Idle);
     // The one who was lost has to have been idle before it gets torque again.
-    assert_eq!(motors.torque(Some(&hold), &still()), Ok(Vector::zeros()));
+    assert_eq!(motors.torque(Some(&hold)), Ok(Vector::zeros()));
     assert_eq!(motors.drives(), Drives::Idle);
-    motors
-        .torque(Some(&answer(None)), &still())
-        .expect("four joints");
-    assert_eq!(motors.torque(Some(&hold), &still()), hold.torque());
+    motors.torque(Some(&answer(None))).expect("four joints");
+    assert_eq!(motors.torque(Some(&hold)), hold.torque());
 }
 
 #[test]
@@ -69,35 +63,16 @@ fn an_answer_in_between_begins_the_100_ms_anew() {
     let hold = answer(Some(Request::GravityHold));
     let mut motors = motors();
     for _ in 0..5 {
-        motors.torque(Some(&hold), &still()).expect("four joints");
+        motors.torque(Some(&hold)).expect("four joints");
         for _ in 0..FALLBACK_CYCLES {
-            assert_eq!(motors.torque(None, &still()), hold.fallback_torque());
+            assert_eq!(motors.torque(None), hold.fallback_torque());
         }
     }
     assert_eq!(motors.drives(), Drives::Active);
 }
 
 #[test]
-fn braking_takes_energy_and_never_gives_any() {
-    let mut motors = motors();
-    for velocity in [
-        Vector::from([0.3, -0.2, 1.5, 0.0]),
-        Vector::from([-2.0, 0.1, 0.0, 0.7]),
-    ] {
-        let torque = motors.torque(None, &velocity).expect("four joints");
-        for joint in 0..4 {
-            assert!(torque[joint] * velocity[joint] <= 0.0);
-            assert_eq!(torque[joint] == 0.0, velocity[joint] == 0.0);
-        }
-    }
-}
-
-#[test]
 fn an_answer_for_another_arm_is_refused() {
-    let mut motors = Motors::<3>::new(&Vector::repeat(0.1), 1e-3);
-    assert!(
-        motors
-            .torque(Some(&answer(None)), &Vector::zeros())
-            .is_err()
-    );
+    let mut motors = Motors::<3>::new(1e-3);
+    assert!(motors.torque(Some(&answer(None))).is_err());
 }

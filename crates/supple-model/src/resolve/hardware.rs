@@ -21,6 +21,8 @@ pub struct Motors {
     pub torque_nm: Vec<f64>,
     /// Least step of each motor's torque command \[N m\]; none where it is continuous.
     pub torque_quantum_nm: Option<Vec<f64>>,
+    /// Torque of each shorted motor per its speed \[N m s/rad\]; none where it is not known.
+    pub braking_nm_s_per_rad: Option<Vec<f64>>,
     /// Encoder counts per motor revolution; none where it is continuous.
     pub counts_per_revolution: Option<u32>,
     /// Torque ripple of each motor.
@@ -49,6 +51,7 @@ pub(crate) fn motors(
             motor_from_joint: DMatrix::identity(n, n),
             torque_nm: joints.iter().map(|joint| joint.torque_nm).collect(),
             torque_quantum_nm: None,
+            braking_nm_s_per_rad: None,
             counts_per_revolution: None,
             ripple: vec![RippleTable::NONE; n],
         });
@@ -68,6 +71,9 @@ pub(crate) fn motors(
     list("torque_nm", &motors.torque_nm)?;
     if let Some(quanta) = &motors.torque_quantum_nm {
         list("torque_quantum_nm", quanta)?;
+    }
+    if let Some(braking) = &motors.braking_nm_s_per_rad {
+        list("braking_nm_s_per_rad", braking)?;
     }
     if motors.counts_per_revolution == Some(0) {
         return Err(report.invalid(
@@ -96,6 +102,7 @@ pub(crate) fn motors(
         motor_from_joint,
         torque_nm: motors.torque_nm.clone(),
         torque_quantum_nm: motors.torque_quantum_nm.clone(),
+        braking_nm_s_per_rad: motors.braking_nm_s_per_rad.clone(),
         counts_per_revolution: motors.counts_per_revolution,
         ripple: ripple(report, motors, n)?,
     })
