@@ -23,6 +23,21 @@ pub trait Bus {
     /// Where the bus itself is gone. Faults on the bus are events.
     fn receive_until(&mut self, until_ns: u64) -> Result<Option<Event>, BusError>;
 
+    /// As [`Bus::receive_until`], where the host promises to send nothing before `frames` more frames of other
+    /// nodes have come, or `until_ns` is reached: a bus in another process need then be asked but once.
+    ///
+    /// # Errors
+    /// As [`Bus::receive_until`].
+    fn receive_ahead(&mut self, until_ns: u64, frames: u32) -> Result<Option<Event>, BusError> {
+        let _ = frames;
+        self.receive_until(until_ns)
+    }
+
+    /// How long the time of this bus has stood still so far while the machine's went on \[ns\].
+    fn stood_still_ns(&self) -> u64 {
+        0
+    }
+
     /// What the machine's monotonic clock shows at a time of this bus \[ns\]; the same, but for a bus
     /// that keeps its own time by the wall clock.
     fn monotonic_ns(&self, time_ns: u64) -> u64 {
@@ -41,6 +56,14 @@ impl<B: Bus + ?Sized> Bus for Box<B> {
 
     fn receive_until(&mut self, until_ns: u64) -> Result<Option<Event>, BusError> {
         (**self).receive_until(until_ns)
+    }
+
+    fn receive_ahead(&mut self, until_ns: u64, frames: u32) -> Result<Option<Event>, BusError> {
+        (**self).receive_ahead(until_ns, frames)
+    }
+
+    fn stood_still_ns(&self) -> u64 {
+        (**self).stood_still_ns()
     }
 
     fn monotonic_ns(&self, time_ns: u64) -> u64 {

@@ -63,12 +63,22 @@ impl Endpoint {
     pub fn receive<const N: usize>(&self) -> Result<Option<[u8; N]>, BusError> {
         let mut buffer = [0; 64];
         loop {
-            match self.socket.recv(&mut buffer) {
-                Ok(length) => {
-                    if let Ok(datagram) = buffer[..length].try_into() {
+            match self.receive_into(&mut buffer)? {
+                Some(datagram) => {
+                    if let Ok(datagram) = datagram.try_into() {
                         return Ok(Some(datagram));
                     }
                 }
+                None => return Ok(None),
+            }
+        }
+    }
+
+    /// A datagram, cut off where it is longer than the buffer.
+    pub fn receive_into<'a>(&self, buffer: &'a mut [u8]) -> Result<Option<&'a [u8]>, BusError> {
+        loop {
+            match self.socket.recv(buffer) {
+                Ok(length) => return Ok(Some(&buffer[..length])),
                 Err(error) => match error.kind() {
                     ErrorKind::WouldBlock => return Ok(None),
                     ErrorKind::Interrupted | ErrorKind::ConnectionReset => {}

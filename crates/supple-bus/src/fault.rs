@@ -292,6 +292,10 @@ impl<B: Bus> FaultInjector<B> {
 }
 
 impl<B: Bus> Bus for FaultInjector<B> {
+    fn stood_still_ns(&self) -> u64 {
+        self.bus.stood_still_ns()
+    }
+
     fn monotonic_ns(&self, time_ns: u64) -> u64 {
         self.bus.monotonic_ns(time_ns)
     }

@@ -20,6 +20,8 @@
 #![forbid(unsafe_code)]
 
 mod address;
+mod asked;
+mod asking;
 mod bus;
 mod can_frame;
 mod clock;

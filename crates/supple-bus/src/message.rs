@@ -1,130 +1,223 @@
-//! What a host and an arm in another process say to each other where the arm keeps the time: datagrams of
-//! 48 bytes, native order.
+//! What a host and an arm in another process say to each other where the arm keeps the time: datagrams,
+//! native order.
 //!
 //! ```text
-//! 0 kind   4..8 sequence   8..16 time [ns]   16..32 struct can_frame   32..40 offset [ns]   40..48 sent [ns]
-//! host to arm: frame (sent now), run until      arm to host: frame, sent, fault, reached
+//! 0 kind   4..8 sequence   8..16 time [ns]   16..24 offset [ns]   24..32 sent [ns]   32..36 frames   36..40 entries
+//! then for each entry: 0 kind   8..16 time [ns]   16..32 struct can_frame
 //! ```
 //!
-//! An answer carries the sequence of the "run until" that it answers. Where the arm keeps to the wall clock,
-//! the offset is that of the machine's monotonic clock over the arm's time, and "sent" is when the host asked
-//! by that clock.
+//! A question says until when the arm is to run, and brings the frames that the host has handed over since the
+//! last one, each with its time. The answer brings what happened up to its own time, which is that of the last
+//! event, or the one asked for if that was reached. `frames` is 0 where the host wants to hear of the first
+//! event whatever it is; otherwise it is how many frames of others have to come before the host will say
+//! anything again. An answer carries the sequence of its question. Where the arm keeps to the wall clock, the
+//! offset is that of the machine's monotonic clock over the arm's time, and "sent" is when this was sent by that
+//! clock.
 
 use crate::bus::Event;
 use crate::can_frame::{CAN_FRAME_BYTES, WireFrame};
 use supple_puck::CanFrame;
 
-pub(crate) const MESSAGE_BYTES: usize = 48;
+/// Entries of one datagram at the most. A bus at 1 Mbit/s has no more frames in three milliseconds.
+pub(crate) const ENTRIES: usize = 64;
+/// The longest datagram.
+pub(crate) const LONGEST_BYTES: usize = HEAD_BYTES + ENTRIES * ENTRY_BYTES;
+
+const HEAD_BYTES: usize = 40;
+const ENTRY_BYTES: usize = 32;
 
 const FRAME: u8 = 1;
 const SENT: u8 = 2;
 const FAULT: u8 = 3;
 const RUN_UNTIL: u8 = 4;
 const REACHED: u8 = 5;
+const STOPPED: u8 = 6;
 
-#[derive(Clone, Copy, Debug, Default)]
+/// What a message is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// The host waits.
+    RunUntil,
+    /// The arm has run as far as it was asked to.
+    Reached,
+    /// The arm stands at the last event.
+    Stopped,
+}
+
+/// Something on the bus with its time \[ns\]; of the host, a frame that it hands over, as [`Event::Sent`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Entry {
+    pub time_ns: u64,
+    pub event: Event,
+}
+
+/// A question or an answer.
+#[derive(Clone, Debug)]
 pub(crate) struct Message {
-    pub kind: u8,
+    pub kind: Kind,
     pub sequence: u32,
     pub time_ns: u64,
     pub offset_ns: u64,
     pub sent_ns: u64,
-    pub raw: [u8; CAN_FRAME_BYTES],
-}
-
-/// What a host asks of the arm.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Asked {
-    Frame(CanFrame),
-    RunUntil,
+    pub frames: u32,
+    entries: [Option<Entry>; ENTRIES],
+    count: usize,
 }
 
 impl Message {
-    /// The host hands over a frame.
-    pub fn frame(frame: &CanFrame, time_ns: u64) -> Message {
-        Message {
-            kind: FRAME,
-            time_ns,
-            raw: WireFrame::data(frame),
-            ..Message::default()
-        }
-    }
-
-    /// The host waits.
-    pub fn run_until(time_ns: u64, sequence: u32) -> Message {
-        Message {
-            kind: RUN_UNTIL,
-            time_ns,
-            sequence,
-            ..Message::default()
-        }
-    }
-
-    /// What the arm answers to "run until".
-    pub fn answer(event: Option<&Event>, time_ns: u64, sequence: u32, offset_ns: u64) -> Message {
-        let (kind, raw) = match event {
-            None => (REACHED, [0; CAN_FRAME_BYTES]),
-            Some(Event::Frame(frame)) => (FRAME, WireFrame::data(frame)),
-            Some(Event::Sent(frame)) => (SENT, WireFrame::data(frame)),
-            Some(Event::Fault(fault)) => (FAULT, WireFrame::fault(*fault)),
-        };
+    /// Without entries.
+    pub fn new(kind: Kind, time_ns: u64, sequence: u32) -> Message {
         Message {
             kind,
             sequence,
             time_ns,
-            offset_ns,
-            raw,
-            ..Message::default()
+            offset_ns: 0,
+            sent_ns: 0,
+            frames: 0,
+            entries: [None; ENTRIES],
+            count: 0,
         }
     }
 
-    /// As an answer: the event, or none where the time was reached; `None` for what is no answer.
-    pub fn event(&self) -> Option<Option<Event>> {
-        match (self.kind, WireFrame::parse(&self.raw)) {
-            (REACHED, _) => Some(None),
-            (FRAME, WireFrame::Data(frame)) => Some(Some(Event::Frame(frame))),
-            (SENT, WireFrame::Data(frame)) => Some(Some(Event::Sent(frame))),
-            (FAULT, WireFrame::Fault(fault)) => Some(Some(Event::Fault(fault))),
+    /// False where there is no room.
+    pub fn push(&mut self, time_ns: u64, event: Event) -> bool {
+        let Some(place) = self.entries.get_mut(self.count) else {
+            return false;
+        };
+        *place = Some(Entry { time_ns, event });
+        self.count += 1;
+        true
+    }
+
+    /// It brings nothing any more.
+    pub fn clear(&mut self) {
+        self.count = 0;
+    }
+
+    /// It brings nothing.
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    /// No more entries go into it.
+    pub fn is_full(&self) -> bool {
+        self.count == ENTRIES
+    }
+
+    /// What it brings, in order.
+    pub fn entries(&self) -> impl Iterator<Item = &Entry> {
+        self.entries[..self.count].iter().flatten()
+    }
+
+    /// The frame that the host hands over in an entry.
+    pub fn handed_over(&self, index: usize) -> Option<(u64, CanFrame)> {
+        match self.entries[..self.count].get(index)?.as_ref()? {
+            Entry {
+                time_ns,
+                event: Event::Sent(frame),
+            } => Some((*time_ns, *frame)),
             _ => None,
         }
     }
 
-    /// As a question.
-    pub fn asked(&self) -> Option<Asked> {
-        match (self.kind, WireFrame::parse(&self.raw)) {
-            (FRAME, WireFrame::Data(frame)) => Some(Asked::Frame(frame)),
-            (RUN_UNTIL, _) => Some(Asked::RunUntil),
-            _ => None,
-        }
-    }
-
-    pub fn emit(&self) -> [u8; MESSAGE_BYTES] {
-        let mut bytes = [0; MESSAGE_BYTES];
-        bytes[0] = self.kind;
+    /// Writes it; the bytes to send.
+    pub fn emit<'a>(&self, bytes: &'a mut [u8; LONGEST_BYTES]) -> &'a [u8] {
+        bytes[..HEAD_BYTES].fill(0);
+        bytes[0] = match self.kind {
+            Kind::RunUntil => RUN_UNTIL,
+            Kind::Reached => REACHED,
+            Kind::Stopped => STOPPED,
+        };
         bytes[4..8].copy_from_slice(&self.sequence.to_ne_bytes());
         bytes[8..16].copy_from_slice(&self.time_ns.to_ne_bytes());
-        bytes[16..32].copy_from_slice(&self.raw);
-        bytes[32..40].copy_from_slice(&self.offset_ns.to_ne_bytes());
-        bytes[40..].copy_from_slice(&self.sent_ns.to_ne_bytes());
-        bytes
+        bytes[16..24].copy_from_slice(&self.offset_ns.to_ne_bytes());
+        bytes[24..32].copy_from_slice(&self.sent_ns.to_ne_bytes());
+        bytes[32..36].copy_from_slice(&self.frames.to_ne_bytes());
+        bytes[36..40].copy_from_slice(&(self.count as u32).to_ne_bytes());
+        let end = HEAD_BYTES + self.count * ENTRY_BYTES;
+        let places = bytes[HEAD_BYTES..end].chunks_exact_mut(ENTRY_BYTES);
+        for (place, entry) in places.zip(self.entries()) {
+            let (kind, raw) = match &entry.event {
+                Event::Frame(frame) => (FRAME, WireFrame::data(frame)),
+                Event::Sent(frame) => (SENT, WireFrame::data(frame)),
+                Event::Fault(fault) => (FAULT, WireFrame::fault(*fault)),
+            };
+            place[..8].fill(0);
+            place[0] = kind;
+            place[8..16].copy_from_slice(&entry.time_ns.to_ne_bytes());
+            place[16..].copy_from_slice(&raw);
+        }
+        &bytes[..end]
     }
 
-    pub fn parse(bytes: &[u8; MESSAGE_BYTES]) -> Message {
-        let u64_at = |at: usize| {
-            let mut raw = [0; 8];
-            raw.copy_from_slice(&bytes[at..at + 8]);
-            u64::from_ne_bytes(raw)
+    /// Reads one; `None` for what is none.
+    pub fn parse(bytes: &[u8]) -> Option<Message> {
+        let kind = match *bytes.first()? {
+            RUN_UNTIL => Kind::RunUntil,
+            REACHED => Kind::Reached,
+            STOPPED => Kind::Stopped,
+            _ => return None,
         };
-        let (mut sequence, mut raw) = ([0; 4], [0; CAN_FRAME_BYTES]);
-        sequence.copy_from_slice(&bytes[4..8]);
-        raw.copy_from_slice(&bytes[16..32]);
-        Message {
-            kind: bytes[0],
-            sequence: u32::from_ne_bytes(sequence),
-            time_ns: u64_at(8),
-            offset_ns: u64_at(32),
-            sent_ns: u64_at(40),
-            raw,
+        let mut message = Message::new(kind, u64_at(bytes, 8)?, u32_at(bytes, 4)?);
+        message.offset_ns = u64_at(bytes, 16)?;
+        message.sent_ns = u64_at(bytes, 24)?;
+        message.frames = u32_at(bytes, 32)?;
+        let count = usize::try_from(u32_at(bytes, 36)?).ok()?;
+        if count > ENTRIES || bytes.len() != HEAD_BYTES + count * ENTRY_BYTES {
+            return None;
         }
+        for place in bytes[HEAD_BYTES..].chunks_exact(ENTRY_BYTES) {
+            let raw: &[u8; CAN_FRAME_BYTES] = place[16..].try_into().ok()?;
+            let event = match (place[0], WireFrame::parse(raw)) {
+                (FRAME, WireFrame::Data(frame)) => Event::Frame(frame),
+                (SENT, WireFrame::Data(frame)) => Event::Sent(frame),
+                (FAULT, WireFrame::Fault(fault)) => Event::Fault(fault),
+                _ => return None,
+            };
+            message.push(u64_at(place, 8)?, event);
+        }
+        Some(message)
+    }
+}
+
+fn u64_at(bytes: &[u8], at: usize) -> Option<u64> {
+    let raw = bytes.get(at..at + 8)?.try_into().ok()?;
+    Some(u64::from_ne_bytes(raw))
+}
+
+fn u32_at(bytes: &[u8], at: usize) -> Option<u32> {
+    let raw = bytes.get(at..at + 4)?.try_into().ok()?;
+    Some(u32::from_ne_bytes(raw))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bus::BusFault;
+
+    #[test]
+    fn a_message_is_read_as_it_was_written_and_half_of_it_is_none() {
+        let frame = CanFrame::from_raw(0x423, &[1, 2, 3]).expect("a frame");
+        let mut message = Message::new(Kind::Stopped, 12, 7);
+        (message.offset_ns, message.sent_ns, message.frames) = (3, 4, 5);
+        for (time_ns, event) in [
+            (9, Event::Sent(frame)),
+            (10, Event::Frame(frame)),
+            (12, Event::Fault(BusFault::BusOff)),
+        ] {
+            assert!(message.push(time_ns, event));
+        }
+        let mut bytes = [0; LONGEST_BYTES];
+        let written = message.emit(&mut bytes);
+        let read = Message::parse(written).expect("a message");
+        assert_eq!(format!("{read:?}"), format!("{message:?}"));
+        assert_eq!(read.handed_over(0), Some((9, frame)));
+        assert_eq!(read.handed_over(1), None);
+        for length in 0..written.len() {
+            assert!(Message::parse(&written[..length]).is_none(), "{length}");
+        }
+        while message.push(12, Event::Frame(frame)) {}
+        assert!(message.is_full());
+        assert_eq!(message.emit(&mut bytes).len(), LONGEST_BYTES);
     }
 }

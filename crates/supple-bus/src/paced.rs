@@ -1,21 +1,22 @@
-//! An emulated bus by the wall clock: the arm's process keeps the time and holds it to the wall's.
+//! An emulated bus by the wall clock: the arm's process keeps the time, its host holds it to the wall's.
 //!
 //! A cable answers within microseconds whatever the machine does; a process that plays one does not. So the
-//! host asks as in virtual time ([`Lockstep`](crate::virtual_time::Lockstep)), and the arm answers when the
-//! wall clock has come to the event. Where the arm's process is held up, the emulated time stands still for
-//! both sides: no reply is lost to a busy machine. A host that is held up is late, by [`MOST_NS`] at the most.
-//! But a host that is silent for [`SILENCE_NS`] does not hold up the time: the arm goes on without it; and an
-//! arm that is silent is one without power.
+//! host asks as in virtual time ([`Lockstep`](crate::virtual_time::Lockstep)), the arm computes and answers at
+//! once, and the host takes the answer in when the wall clock has come to it. Where the arm's process is held
+//! up, the emulated time stands still for both sides: no reply is lost to a busy machine. A host that is held up
+//! is late, by [`MOST_NS`] at the most. But a host that is silent for [`SILENCE_NS`] does not hold up the time:
+//! the arm goes on without it; and an arm that is silent is one without power.
 
+use crate::asked::Asked;
+use crate::asking::{Asking, Next};
 use crate::bus::{Bus, Event};
-use crate::clock::{monotonic_ns, wait_readable_until};
+use crate::clock::{monotonic_ns, sleep_until_ns, wait_readable_until};
 use crate::datagram::Side;
 use crate::endpoint::{Delivery, Endpoint};
 use crate::error::BusError;
 use crate::folder::OwnerFolder;
-use crate::message::{Asked, MESSAGE_BYTES, Message};
+use crate::message::{Kind, LONGEST_BYTES, Message};
 use crate::virtual_time::Peer;
-use std::collections::VecDeque;
 use supple_puck::CanFrame;
 
 /// By how much a host that was held up is late at the most \[ns\].
@@ -29,23 +30,25 @@ const HELD_UP_NS: u64 = 20_000_000;
 
 /// How long an arm may take for its first answer \[ns\].
 const OPEN_NS: u64 = 1_000_000_000;
-/// Longest that the arm's side is at work before it returns \[ns\].
+/// Longest that the arm's side runs or waits before it returns \[ns\].
 const SLICE_NS: u64 = 1_000_000;
-/// Events that came while a frame was handed over; a bus at 1 Mbit/s has fewer in a millisecond.
-const WAITING: usize = 64;
+/// By how much the arm's side is before the wall clock at the most \[ns\]: what an operator does at the pendant
+/// comes no later than that.
+const AHEAD_NS: u64 = 2_000_000;
 
 /// The host's bus.
 #[derive(Debug)]
 pub struct Paced {
     endpoint: Endpoint,
+    asking: Asking,
     /// The arm's time as it was last known \[ns\].
     base_ns: u64,
     /// The machine's clock over the arm's time \[ns\].
     offset_ns: u64,
-    sequence: u32,
+    /// The same at the beginning: what came since is time that stood still \[ns\].
+    first_offset_ns: u64,
     /// The arm did not answer the last question.
     lost: bool,
-    waiting: VecDeque<Event>,
 }
 
 impl Paced {
@@ -57,21 +60,25 @@ impl Paced {
         let (own, peer) = Side::Host.sockets();
         let mut bus = Paced {
             endpoint: Endpoint::new(folder, own, peer)?,
+            asking: Asking::new(),
             base_ns: 0,
             offset_ns: 0,
-            sequence: 0,
+            first_offset_ns: 0,
             lost: false,
-            waiting: VecDeque::with_capacity(WAITING),
         };
-        bus.sequence = 1;
-        if bus.post(&Message::run_until(0, 1))? != Delivery::Delivered {
+        bus.asking.ask(0, 0);
+        if bus.asking.post(&bus.endpoint)? != Delivery::Delivered {
             return Err(bus.no_peer());
         }
-        let patience_ns = monotonic_ns() + OPEN_NS;
-        if bus.answer(patience_ns)?.is_none() {
-            return Err(bus.no_peer());
+        match bus.answer(monotonic_ns() + OPEN_NS)? {
+            Some(answer) => {
+                bus.offset_ns = answer.offset_ns;
+                bus.first_offset_ns = answer.offset_ns;
+                bus.base_ns = answer.time_ns;
+                Ok(bus)
+            }
+            None => Err(bus.no_peer()),
         }
-        Ok(bus)
     }
 
     fn no_peer(&self) -> BusError {
@@ -80,21 +87,11 @@ impl Paced {
         }
     }
 
-    fn post(&self, message: &Message) -> Result<Delivery, BusError> {
-        self.endpoint.send(&message.emit())
-    }
-
-    /// The answer to the last question, until the machine's clock shows `until_ns`: with or without an event.
-    fn answer(&mut self, until_ns: u64) -> Result<Option<Option<Event>>, BusError> {
+    /// The answer to the last question, until the machine's clock shows `until_ns`.
+    fn answer(&mut self, until_ns: u64) -> Result<Option<Message>, BusError> {
         loop {
-            while let Some(bytes) = self.endpoint.receive::<MESSAGE_BYTES>()? {
-                let message = Message::parse(&bytes);
-                // What answers an older question was waited for in vain: a reply that did not come.
-                if let (Some(event), true) = (message.event(), message.sequence == self.sequence) {
-                    self.offset_ns = self.offset_ns.max(message.offset_ns);
-                    self.base_ns = self.base_ns.max(message.time_ns);
-                    return Ok(Some(event));
-                }
+            if let Some(answer) = self.asking.answer(&self.endpoint)? {
+                return Ok(Some(answer));
             }
             if monotonic_ns() >= until_ns {
                 return Ok(None);
@@ -116,16 +113,17 @@ impl Paced {
         }
     }
 
-    /// Lets the arm run to `until_ns`, but at least to now, or to an event.
-    fn exchange(&mut self, until_ns: u64) -> Result<Option<Event>, BusError> {
+    /// Lets the arm run as far as it is to, and waits until the wall clock has come there.
+    fn exchange(&mut self, until_ns: u64, frames: u32) -> Result<(), BusError> {
         self.offset_ns += self.held_up_ns();
         let until_ns = until_ns.max(self.now_ns());
-        self.sequence = self.sequence.wrapping_add(1);
-        let delivered = self.post(&Message {
-            offset_ns: self.offset_ns,
-            sent_ns: monotonic_ns(),
-            ..Message::run_until(until_ns, self.sequence)
-        })?;
+        let asked_ns = monotonic_ns();
+        let question = self.asking.ask(until_ns, frames);
+        question.offset_ns = self.offset_ns;
+        question.sent_ns = asked_ns;
+        let delivered = self.asking.post(&self.endpoint)?;
+        // A frame to nobody is never confirmed.
+        self.asking.over();
         let wall_ns = until_ns + self.offset_ns;
         let patience_ns = match delivered {
             Delivery::Delivered if !self.lost => wall_ns + SILENCE_NS,
@@ -133,10 +131,30 @@ impl Paced {
         };
         let answer = self.answer(patience_ns)?;
         self.lost = answer.is_none();
-        if self.lost {
-            self.base_ns = self.base_ns.max(until_ns);
+        match answer {
+            Some(answer) => {
+                self.offset_ns = self.offset_ns.max(answer.offset_ns);
+                self.base_ns = self.base_ns.max(answer.time_ns);
+                let due_ns = asked_ns.max(answer.time_ns + self.offset_ns);
+                self.stand_still(answer.sent_ns.saturating_sub(due_ns));
+                self.sleep_until(answer.time_ns);
+            }
+            None => self.base_ns = self.base_ns.max(until_ns),
         }
-        Ok(answer.flatten())
+        Ok(())
+    }
+
+    /// The time by which an answer is late did not pass, unless nobody waited for it any more.
+    fn stand_still(&mut self, late_ns: u64) {
+        if (FORGIVEN_NS..=SILENCE_NS).contains(&late_ns) {
+            self.offset_ns += late_ns;
+        }
+    }
+
+    fn sleep_until(&self, time_ns: u64) {
+        while self.wall_ns() < time_ns {
+            sleep_until_ns(time_ns + self.offset_ns);
+        }
     }
 }
 
@@ -150,29 +168,28 @@ impl Bus for Paced {
         time_ns + self.offset_ns
     }
 
+    fn stood_still_ns(&self) -> u64 {
+        self.offset_ns - self.first_offset_ns
+    }
+
     fn send(&mut self, frame: &CanFrame) -> Result<(), BusError> {
-        let now_ns = self.now_ns();
-        while self.base_ns < now_ns
-            && self.waiting.len() < WAITING
-            && let Some(event) = self.exchange(now_ns)?
-        {
-            self.waiting.push_back(event);
-        }
-        let message = Message {
-            offset_ns: self.offset_ns,
-            ..Message::frame(frame, now_ns)
-        };
-        match self.post(&message)? {
-            // A frame to nobody is never confirmed.
-            Delivery::Delivered | Delivery::NoPeer => Ok(()),
-            Delivery::Full => Err(BusError::Full),
-        }
+        self.asking.hand_over(frame, self.now_ns())
     }
 
     fn receive_until(&mut self, until_ns: u64) -> Result<Option<Event>, BusError> {
-        match self.waiting.pop_front() {
-            Some(event) => Ok(Some(event)),
-            None => self.exchange(until_ns),
+        self.receive_ahead(until_ns, 0)
+    }
+
+    fn receive_ahead(&mut self, until_ns: u64, frames: u32) -> Result<Option<Event>, BusError> {
+        match self.asking.next(until_ns) {
+            Next::Event(entry) => return Ok(Some(entry.event)),
+            Next::Reached(_) => return Ok(None),
+            Next::Ask => self.exchange(until_ns, frames)?,
+        }
+        match self.asking.next(until_ns) {
+            Next::Event(entry) => Ok(Some(entry.event)),
+            // An arm that does not answer tells nothing.
+            Next::Reached(_) | Next::Ask => Ok(None),
         }
     }
 }
@@ -185,7 +202,7 @@ pub struct Pacer {
     /// When the host was last heard \[ns\].
     heard_ns: u64,
     /// What the host waits for.
-    asked: Option<Message>,
+    asked: Option<Asked>,
 }
 
 impl Pacer {
@@ -208,35 +225,24 @@ impl Pacer {
         monotonic_ns().saturating_sub(self.offset_ns)
     }
 
-    /// Lets the arm run and serves its host, for about a millisecond at the most.
+    /// Serves its host: lets the arm run for about a millisecond of its time, or waits for as long.
     ///
     /// # Errors
     /// Where the socket fails. A host that has gone is none: another may come.
     pub fn turn(&mut self, peer: &mut impl Peer) -> Result<(), BusError> {
-        if let Some(asked) = self.asked {
-            let until_ns = asked.time_ns.max(peer.now_ns());
-            let event = peer.run_until(until_ns.min(peer.now_ns() + SLICE_NS));
-            let now_ns = peer.now_ns();
-            while self.wall_ns() < now_ns {
-                wait_readable_until(&self.endpoint, now_ns + self.offset_ns)?;
-            }
-            if event.is_some() || now_ns >= until_ns {
-                self.stand_still(now_ns, asked.sent_ns);
-                let event = event.as_ref();
-                let answer = Message::answer(event, now_ns, asked.sequence, self.offset_ns);
-                self.endpoint.send(&answer.emit())?;
-                self.asked = None;
-                self.heard_ns = monotonic_ns();
-            }
-            return Ok(());
+        let mut bytes = [0; LONGEST_BYTES];
+        if self.asked.is_none() {
+            self.asked = self.next(&mut bytes)?;
         }
-        if let Some(message) = self.next()? {
-            self.heard_ns = monotonic_ns();
-            self.offset_ns = self.offset_ns.max(message.offset_ns);
-            match message.asked() {
-                Some(Asked::Frame(frame)) => peer.host_sends(&frame),
-                Some(Asked::RunUntil) => self.asked = Some(message),
-                None => {}
+        if let Some(asked) = &mut self.asked {
+            let not_before_ns = peer.now_ns().saturating_sub(AHEAD_NS) + self.offset_ns;
+            sleep_until_ns(not_before_ns);
+            if let Some(answer) = asked.run(peer, SLICE_NS) {
+                answer.offset_ns = self.offset_ns;
+                answer.sent_ns = monotonic_ns();
+                self.heard_ns = answer.sent_ns;
+                self.endpoint.send(answer.emit(&mut bytes))?;
+                self.asked = None;
             }
         } else if monotonic_ns() > self.heard_ns + SILENCE_NS {
             let wall_ns = self.wall_ns();
@@ -245,22 +251,20 @@ impl Pacer {
         Ok(())
     }
 
-    fn next(&mut self) -> Result<Option<Message>, BusError> {
-        let mut bytes = self.endpoint.receive::<MESSAGE_BYTES>()?;
-        if bytes.is_none() {
+    /// The next question, if one comes within a millisecond.
+    fn next(&mut self, bytes: &mut [u8]) -> Result<Option<Asked>, BusError> {
+        let mut read = self.endpoint.receive_into(bytes)?.map(<[u8]>::len);
+        if read.is_none() {
             wait_readable_until(&self.endpoint, monotonic_ns() + SLICE_NS)?;
-            bytes = self.endpoint.receive()?;
+            read = self.endpoint.receive_into(bytes)?.map(<[u8]>::len);
         }
-        Ok(bytes.as_ref().map(Message::parse))
-    }
-
-    /// The time by which an answer is late did not pass, unless nobody waited for it any more.
-    fn stand_still(&mut self, now_ns: u64, sent_ns: u64) {
-        let due_ns = sent_ns.max(now_ns + self.offset_ns);
-        let late_ns = monotonic_ns().saturating_sub(due_ns);
-        if (FORGIVEN_NS..=SILENCE_NS).contains(&late_ns) {
-            self.offset_ns += late_ns;
-        }
+        let message = read.and_then(|length| Message::parse(&bytes[..length]));
+        let question = message.filter(|m| m.kind == Kind::RunUntil);
+        Ok(question.map(|question| {
+            self.heard_ns = monotonic_ns();
+            self.offset_ns = self.offset_ns.max(question.offset_ns);
+            Asked::new(question)
+        }))
     }
 
     /// The machine's monotonic clock over the arm's time \[ns\].

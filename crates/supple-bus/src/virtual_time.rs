@@ -5,15 +5,19 @@
 //! [`DatagramBus`](crate::DatagramBus).
 //!
 //! The host sends any number of frames, then "run until", and waits; the arm answers with the first event
-//! for the host, or "reached". So the same inputs give the same order of everything, at any speed.
+//! for the host, or "reached"; or, where the host has said that it will be silent meanwhile
+//! ([`Bus::receive_ahead`]), with all that has happened until then. So the same inputs give the same order of
+//! everything, at any speed.
 
+use crate::asked::Asked;
+use crate::asking::{Asking, Next};
 use crate::bus::{Bus, Event};
 use crate::clock::{monotonic_ns, wait_readable_until};
 use crate::datagram::Side;
 use crate::endpoint::{Delivery, Endpoint};
 use crate::error::BusError;
 use crate::folder::OwnerFolder;
-use crate::message::{Asked, MESSAGE_BYTES, Message};
+use crate::message::{Kind, LONGEST_BYTES, Message};
 use rustix::fd::{AsFd, BorrowedFd};
 use supple_puck::CanFrame;
 
@@ -57,6 +61,7 @@ const PATIENCE_NS: u64 = 5_000_000_000;
 #[derive(Debug)]
 pub struct Lockstep {
     endpoint: Endpoint,
+    asking: Asking,
     now_ns: u64,
 }
 
@@ -69,40 +74,36 @@ impl Lockstep {
         let (own, peer) = Side::Host.sockets();
         let mut bus = Lockstep {
             endpoint: Endpoint::new(folder, own, peer)?,
+            asking: Asking::new(),
             now_ns: 0,
         };
         while bus.receive_until(0)?.is_some() {}
         Ok(bus)
     }
 
-    fn post(&self, message: &Message) -> Result<(), BusError> {
+    fn exchange(&mut self) -> Result<(), BusError> {
         let patience = monotonic_ns() + PATIENCE_NS;
         loop {
-            match self.endpoint.send(&message.emit())? {
-                Delivery::Delivered => return Ok(()),
+            match self.asking.post(&self.endpoint)? {
+                Delivery::Delivered => break,
                 // No time passes on the bus while the peer reads what is queued.
                 Delivery::Full if monotonic_ns() < patience => std::thread::yield_now(),
                 Delivery::Full | Delivery::NoPeer => return Err(self.no_peer()),
             }
         }
+        self.asking.over();
+        while self.asking.answer(&self.endpoint)?.is_none() {
+            if monotonic_ns() > patience {
+                return Err(self.no_peer());
+            }
+            wait_readable_until(&self.endpoint, patience)?;
+        }
+        Ok(())
     }
 
     fn no_peer(&self) -> BusError {
         BusError::NoPeer {
             path: self.endpoint.peer().to_owned(),
-        }
-    }
-
-    fn answer(&self) -> Result<Message, BusError> {
-        let patience = monotonic_ns() + PATIENCE_NS;
-        loop {
-            if let Some(bytes) = self.endpoint.receive::<MESSAGE_BYTES>()? {
-                return Ok(Message::parse(&bytes));
-            }
-            if monotonic_ns() > patience {
-                return Err(self.no_peer());
-            }
-            wait_readable_until(&self.endpoint, patience)?;
         }
     }
 }
@@ -113,18 +114,29 @@ impl Bus for Lockstep {
     }
 
     fn send(&mut self, frame: &CanFrame) -> Result<(), BusError> {
-        self.post(&Message::frame(frame, self.now_ns))
+        self.asking.hand_over(frame, self.now_ns)
     }
 
     fn receive_until(&mut self, until_ns: u64) -> Result<Option<Event>, BusError> {
-        self.post(&Message::run_until(until_ns, 0))?;
+        self.receive_ahead(until_ns, 0)
+    }
+
+    fn receive_ahead(&mut self, until_ns: u64, frames: u32) -> Result<Option<Event>, BusError> {
         loop {
-            let message = self.answer()?;
-            let Some(event) = message.event() else {
-                continue;
-            };
-            self.now_ns = message.time_ns;
-            return Ok(event);
+            match self.asking.next(until_ns) {
+                Next::Event(entry) => {
+                    self.now_ns = entry.time_ns;
+                    return Ok(Some(entry.event));
+                }
+                Next::Reached(time_ns) => {
+                    self.now_ns = time_ns;
+                    return Ok(None);
+                }
+                Next::Ask => {
+                    self.asking.ask(until_ns, frames);
+                    self.exchange()?;
+                }
+            }
         }
     }
 }
@@ -147,33 +159,30 @@ impl Responder {
         })
     }
 
-    /// Serves one message of the host; `false` if none came within `idle_ns` of the machine's time.
+    /// Serves one question of the host; `false` if none came within `idle_ns` of the machine's time.
     ///
     /// # Errors
     /// Where the socket fails. A host that has gone is none: another may come.
     pub fn serve(&mut self, peer: &mut impl Peer, idle_ns: u64) -> Result<bool, BusError> {
-        let Some(bytes) = self.next(idle_ns)? else {
+        let mut bytes = [0; LONGEST_BYTES];
+        let Some(length) = self.next(&mut bytes, idle_ns)? else {
             return Ok(false);
         };
-        let message = Message::parse(&bytes);
-        match message.asked() {
-            Some(Asked::Frame(frame)) => peer.host_sends(&frame),
-            Some(Asked::RunUntil) => {
-                let event = peer.run_until(message.time_ns.max(peer.now_ns()));
-                let answer = Message::answer(event.as_ref(), peer.now_ns(), message.sequence, 0);
-                self.endpoint.send(&answer.emit())?;
-            }
-            None => {}
+        let message = Message::parse(&bytes[..length]);
+        if let Some(question) = message.filter(|m| m.kind == Kind::RunUntil)
+            && let Some(answer) = Asked::new(question).run(peer, u64::MAX)
+        {
+            self.endpoint.send(answer.emit(&mut bytes))?;
         }
         Ok(true)
     }
 
-    fn next(&self, idle_ns: u64) -> Result<Option<[u8; MESSAGE_BYTES]>, BusError> {
-        if let Some(bytes) = self.endpoint.receive()? {
-            return Ok(Some(bytes));
+    fn next(&self, bytes: &mut [u8], idle_ns: u64) -> Result<Option<usize>, BusError> {
+        if let Some(read) = self.endpoint.receive_into(bytes)? {
+            return Ok(Some(read.len()));
         }
         wait_readable_until(&self.endpoint, monotonic_ns() + idle_ns)?;
-        self.endpoint.receive()
+        Ok(self.endpoint.receive_into(bytes)?.map(<[u8]>::len))
     }
 }
 

@@ -242,9 +242,7 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
         self.pass_over(late_ns / period_ns);
         if late_ns % period_ns > self.time.slack_ns(period_ns) {
             self.pass_over(1);
-            while let Some(event) = self.bus.receive_until(self.next_ns)? {
-                self.hear(&event);
-            }
+            self.listen()?;
         }
         self.counters.wake_ns = late_ns;
         self.counters.cycles += 1;
@@ -269,8 +267,12 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
         // Later than this the answer and the torques would not fit any more.
         let reserved_ns = self.time.torques_ns + self.rhythm.answer_ns;
         let until_ns = start_ns + self.rhythm.period_ns - reserved_ns;
-        while self.counts.iter().any(Option::is_none) {
-            let Some(event) = self.bus.receive_until(until_ns)? else {
+        loop {
+            let waited_for = self.counts.iter().filter(|counts| counts.is_none()).count() as u32;
+            if waited_for == 0 {
+                break;
+            }
+            let Some(event) = self.bus.receive_ahead(until_ns, waited_for)? else {
                 break;
             };
             self.hear(&event);
@@ -391,12 +393,18 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
 
     /// Hears what comes until the next period; what has not left by then is lost.
     fn drain(&mut self) -> Result<(), CanError> {
-        while let Some(event) = self.bus.receive_until(self.next_ns)? {
-            self.hear(&event);
-        }
+        self.listen()?;
         let lost = self.outbox.close();
         self.counters.tx_lost += lost;
         self.unsent = lost > 0;
+        Ok(())
+    }
+
+    /// Hears what comes until the next period, and says nothing.
+    fn listen(&mut self) -> Result<(), CanError> {
+        while let Some(event) = self.bus.receive_ahead(self.next_ns, u32::MAX)? {
+            self.hear(&event);
+        }
         Ok(())
     }
 

@@ -28,6 +28,7 @@ macro_rules! on_every_backend {
             every_length_and_id_crosses_unchanged,
             frames_keep_their_order,
             a_cycle_of_frames_is_not_lost,
+            a_silent_host_hears_what_one_hears_that_asks_each_time,
             waiting_ends_at_its_time,
             a_time_past_gives_what_is_there,
             time_never_goes_back,

@@ -90,6 +90,31 @@ pub fn a_cycle_of_frames_is_not_lost(mut bus: Subject) {
     }
 }
 
+/// A host that says it will be silent hears the same, in the same order, up to the same time.
+pub fn a_silent_host_hears_what_one_hears_that_asks_each_time(mut bus: Subject) {
+    let sent: Vec<_> = (0..4).map(|i| frame(0x404, &[i])).collect();
+    for frame in &sent {
+        bus.send(frame).unwrap();
+    }
+    let until_ns = bus.now_ns() + PATIENCE_NS;
+    let (mut confirmed, mut answers) = (Vec::new(), Vec::new());
+    while answers.len() < sent.len() {
+        let missing = (sent.len() - answers.len()) as u32;
+        match bus.receive_ahead(until_ns, missing).unwrap() {
+            Some(Event::Sent(frame)) => confirmed.push(frame),
+            Some(Event::Frame(frame)) => answers.push(frame),
+            other => panic!("{other:?}"),
+        }
+    }
+    // The time is that of the last answer, not the one that was waited for at the most.
+    assert!(bus.now_ns() < until_ns);
+    assert_eq!(confirmed, sent);
+    assert_eq!(answers, sent.iter().map(reflected).collect::<Vec<_>>());
+    let until_ns = bus.now_ns() + WAIT_NS;
+    assert_eq!(bus.receive_ahead(until_ns, 1).unwrap(), None);
+    assert!(bus.now_ns() >= until_ns);
+}
+
 pub fn waiting_ends_at_its_time(mut bus: Subject) {
     let until_ns = bus.now_ns() + WAIT_NS;
     // A signal may end a wait of the kernel early, never the bus's.
