@@ -19,7 +19,7 @@ use supple_plant::Scene;
 use support::programs;
 
 /// From power-up to tracking in `supple up --plant emu`, and something of the trajectory \[s\].
-const SINUSOID_S: &str = "16";
+const TRACKED_S: &str = "16";
 /// The same with the first stroke down to the block.
 const PROBE_S: &str = "10";
 /// Most of the difference between the two RMS errors \[m\].
@@ -80,15 +80,32 @@ fn in_one_process(trajectory: Trajectory, duration_s: f64, scene: Scene) -> (f64
     (run.rms_error_m, forces)
 }
 
+/// The RMS errors of a course on the bus and in one process, with the exact model, as the emulated arm is
+/// described to its controller.
+fn tracked_as_in_one_process(course: &str, trajectory: Trajectory) {
+    let (summary, _) = on_the_bus(&["--track", course, "--for", TRACKED_S]);
+    let on_bus_m = summary["rms_error_m"].as_f64().expect("it tracked");
+    let (alone_m, _) = in_one_process(trajectory, 8.0, Scene::default());
+    println!("RMS error of {course}: {on_bus_m} m on the bus, {alone_m} m in one process");
+    assert!((on_bus_m - alone_m).abs() < RMS_M, "{on_bus_m} {alone_m}");
+}
+
 #[test]
 fn the_sinusoid_is_tracked_as_in_one_process() {
-    let (summary, _) = on_the_bus(&["--for", SINUSOID_S]);
-    let on_bus_m = summary["rms_error_m"].as_f64().expect("it tracked");
-    // The exact model, as the emulated arm is described to its controller.
     let (trajectory, _) = scenario::sinusoid(1.0);
-    let (alone_m, _) = in_one_process(trajectory, 8.0, Scene::default());
-    println!("RMS error: {on_bus_m} m on the bus, {alone_m} m in one process");
-    assert!((on_bus_m - alone_m).abs() < RMS_M, "{on_bus_m} {alone_m}");
+    tracked_as_in_one_process("sinusoid", trajectory);
+}
+
+#[test]
+fn the_arc_is_tracked_as_in_one_process() {
+    let (trajectory, _) = scenario::arc();
+    tracked_as_in_one_process("arc", trajectory);
+}
+
+#[test]
+fn the_quadrant_is_tracked_as_in_one_process() {
+    let (quadrant, _) = scenario::quadrant(scenario::QUADRANT_SPEED_M_PER_S);
+    tracked_as_in_one_process("quadrant", Trajectory::Quadrant(quadrant));
 }
 
 /// Greatest force of the first transient, and the mean at rest before the stroke turns \[N\].

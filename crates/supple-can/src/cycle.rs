@@ -248,6 +248,7 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
         self.counters.cycles += 1;
         self.counters.bus_load = self.bits as f64 * 1e3 / period_ns as f64;
         self.bits = 0;
+        self.counters.stood_still_ns = self.bus.stood_still_ns();
         let start_ns = self.next_ns;
         self.next_ns += period_ns;
         Ok(start_ns)

@@ -38,6 +38,8 @@ pub struct Counters {
     pub round_trip_ns: u64,
     /// Share of the previous cycle in which the bus was busy, 0 to 1.
     pub bus_load: f64,
+    /// How long the bus's time has stood still \[ns\], see [`supple_bus::Bus::stood_still_ns`].
+    pub stood_still_ns: u64,
 }
 
 /// The arm at the start of a cycle.

@@ -46,6 +46,10 @@ pub struct Options {
     /// Ends after so many cycles.
     #[arg(long, value_name = "N")]
     pub cycles: Option<u64>,
+    /// Time in which an answer is looked for without sleeping (us), of this processor's time in each cycle; 50 if
+    /// not given where the thread may use several processors, else 0.
+    #[arg(long, value_name = "US", value_parser = clap::value_parser!(u32).range(0..=1000))]
+    pub spin_us: Option<u32>,
     /// Priority under SCHED_FIFO.
     #[arg(long, value_name = "1-99", default_value_t = 79, value_parser = clap::value_parser!(u8).range(1..=99))]
     pub priority: u8,

@@ -15,7 +15,7 @@ use supple_bus::{Address, Bus, BusError, OwnerFolder, Paced, SocketCan, monotoni
 use supple_ipc::{Domain, PlantLink, pause};
 use supple_model::{Description, with_dof};
 use supple_puck::safety::{SafetyLimits, SpeedLimit};
-use supple_realtime::{Stop, die_with_parent, enter};
+use supple_realtime::{Stop, die_with_parent, enter, spin_for};
 
 /// How long an emulated arm may take to come \[ns\].
 const PEER_NS: u64 = 5_000_000_000;
@@ -115,6 +115,7 @@ fn run<const N: usize>(
             for shortfall in enter(&options.realtime()) {
                 eprintln!("supple-can: warning: {shortfall}");
             }
+            link.spin(spin_for(options.spin_us));
         }
         first = false;
         let mut cycle = Cycle::new(bus, link, ready, config.arm, rhythm)?;

@@ -33,6 +33,11 @@ impl SharedMemory {
             stop,
         }
     }
+
+    /// Looks for an answer for so long before sleeping, see [`PlantLink::spin`].
+    pub fn spin(&mut self, at_most: Duration) {
+        self.link.spin(at_most);
+    }
 }
 
 impl From<IpcError> for CanError {
@@ -67,6 +72,7 @@ impl<const N: usize> Link<N> for SharedMemory {
                 wake_ns: counters.wake_ns,
                 round_trip_ns: counters.round_trip_ns,
                 bus_load: counters.bus_load,
+                stood_still_ns: counters.stood_still_ns,
             },
         );
         while !self.link.publish(&state)? {

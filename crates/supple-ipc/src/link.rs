@@ -36,6 +36,7 @@ pub struct PlantLink {
     commands: Reader<TorqueCommand>,
     rope: Rope,
     bell: Bell,
+    spin: Duration,
     _last_out: LastOut,
 }
 
@@ -60,8 +61,16 @@ impl PlantLink {
             commands: Reader::new(domain, &node, &COMMANDS)?,
             rope: Rope::new(domain, &node, STATE_BELL)?,
             bell: Bell::new(&node, COMMAND_BELL)?,
+            spin: Duration::ZERO,
             _last_out: LastOut::of(domain),
         })
+    }
+
+    /// From now on an answer is looked for again and again, for so long after it begins to wait, before the
+    /// thread sleeps until the bell: to be woken takes longer than many an answer. It costs the processor that
+    /// time of each cycle.
+    pub fn spin(&mut self, at_most: Duration) {
+        self.spin = at_most;
     }
 
     /// Publishes the state of a cycle and wakes the controller. Gives whether there is one to read it.
@@ -81,6 +90,7 @@ impl PlantLink {
     pub fn answer(&self, cycle: u64, timeout: Duration) -> Result<Heard, IpcError> {
         let mut heard = Heard::default();
         let start = Instant::now();
+        let mut slept = false;
         loop {
             while let Some(command) = self.commands.receive()? {
                 match command.cycle {
@@ -88,10 +98,19 @@ impl PlantLink {
                     _ => heard.late += 1,
                 }
             }
-            let left = timeout.saturating_sub(start.elapsed());
+            let waited = start.elapsed();
+            let left = timeout.saturating_sub(waited);
             if heard.answer.is_some() || left.is_zero() {
+                if !slept {
+                    self.bell.silence()?;
+                }
                 return Ok(heard);
             }
+            if waited < self.spin {
+                core::hint::spin_loop();
+                continue;
+            }
+            slept = true;
             self.bell.wait(left)?;
         }
     }

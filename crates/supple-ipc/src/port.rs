@@ -6,6 +6,7 @@
 
 use crate::domain::{Domain, Node};
 use crate::error::IpcError;
+use crate::outside::pause;
 use core::fmt::Debug;
 use core::time::Duration;
 use iceoryx2::port::listener::{Listener, ListenerCreateError};
@@ -13,15 +14,16 @@ use iceoryx2::port::notifier::{Notifier, NotifierCreateError};
 use iceoryx2::port::publisher::{Publisher, PublisherCreateError};
 use iceoryx2::port::subscriber::{Subscriber, SubscriberCreateError};
 use iceoryx2::prelude::*;
-use iceoryx2::service::builder::event::{EventOpenError, EventOpenOrCreateError};
+use iceoryx2::service::builder::event::{EventCreateError, EventOpenError, EventOpenOrCreateError};
 use iceoryx2::service::builder::publish_subscribe::{
-    PublishSubscribeOpenError, PublishSubscribeOpenOrCreateError,
+    PublishSubscribeCreateError, PublishSubscribeOpenError, PublishSubscribeOpenOrCreateError,
 };
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use iceoryx2_bb_posix::file_descriptor_set::{
     FileDescriptorSet, FileDescriptorSetWaitError, FileEvent,
 };
 use iceoryx2_cal::event::ListenerWaitError;
+use std::time::Instant;
 
 /// What there is to know of a service before it is opened.
 #[derive(Clone, Copy, Debug)]
@@ -181,6 +183,14 @@ impl Bell {
         })
     }
 
+    /// Forgets that it has rung: what it rang for is known.
+    pub fn silence(&self) -> Result<(), IpcError> {
+        match self.listener.try_wait_one() {
+            Ok(_) | Err(ListenerWaitError::InterruptSignal) => Ok(()),
+            Err(error) => Err(failed(self.name, &error)),
+        }
+    }
+
     /// Waits until it rings, or for `timeout`, or until a signal comes; false where it did not ring.
     pub fn wait(&self, timeout: Duration) -> Result<bool, IpcError> {
         let attached = self.waits.add(&self.listener);
@@ -210,17 +220,43 @@ fn open<T: Message>(
     node: &Node,
     terms: &Terms,
 ) -> Result<PortFactory<ipc::Service, T, ()>, IpcError> {
-    let service = node
-        .service_builder(&service_name(terms.name)?)
-        .publish_subscribe::<T>()
-        .max_publishers(terms.writers)
-        .max_subscribers(terms.readers)
-        .max_nodes(NODES)
-        .subscriber_max_buffer_size(terms.depth)
-        .subscriber_max_borrowed_samples(1)
-        .history_size(0)
-        .enable_safe_overflow(terms.oldest_goes)
-        .open_or_create();
+    let name = service_name(terms.name)?;
+    let service = settled(
+        SETTLES_WITHIN,
+        || {
+            node.service_builder(&name)
+                .publish_subscribe::<T>()
+                .max_publishers(terms.writers)
+                .max_subscribers(terms.readers)
+                .max_nodes(NODES)
+                .subscriber_max_buffer_size(terms.depth)
+                .subscriber_max_borrowed_samples(1)
+                .history_size(0)
+                .enable_safe_overflow(terms.oldest_goes)
+                .open_or_create()
+        },
+        |error| {
+            use PublishSubscribeCreateError as Create;
+            use PublishSubscribeOpenError as Open;
+            use PublishSubscribeOpenOrCreateError as Either;
+            matches!(
+                error,
+                Either::SystemInFlux
+                    | Either::PublishSubscribeOpenError(
+                        Open::DoesNotExist
+                            | Open::IsMarkedForDestruction
+                            | Open::ServiceInCorruptedState
+                            | Open::HangsInCreation
+                    )
+                    | Either::PublishSubscribeCreateError(
+                        Create::AlreadyExists
+                            | Create::IsBeingCreatedByAnotherInstance
+                            | Create::ServiceInCorruptedState
+                            | Create::HangsInCreation
+                    )
+            )
+        },
+    );
     service.map_err(|error| {
         use PublishSubscribeOpenError as Open;
         let PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(open) = error else {
@@ -256,14 +292,38 @@ fn bell(
     node: &Node,
     name: &'static str,
 ) -> Result<iceoryx2::service::port_factory::event::PortFactory<ipc::Service>, IpcError> {
-    let service = node
-        .service_builder(&service_name(name)?)
-        .event()
-        .max_notifiers(1)
-        .max_listeners(1)
-        .max_nodes(NODES)
-        .event_id_max_value(0)
-        .open_or_create();
+    let full_name = service_name(name)?;
+    let service = settled(
+        SETTLES_WITHIN,
+        || {
+            node.service_builder(&full_name)
+                .event()
+                .max_notifiers(1)
+                .max_listeners(1)
+                .max_nodes(NODES)
+                .event_id_max_value(0)
+                .open_or_create()
+        },
+        |error| {
+            use EventOpenOrCreateError as Either;
+            matches!(
+                error,
+                Either::SystemInFlux
+                    | Either::EventOpenError(
+                        EventOpenError::DoesNotExist
+                            | EventOpenError::IsMarkedForDestruction
+                            | EventOpenError::ServiceInCorruptedState
+                            | EventOpenError::HangsInCreation
+                    )
+                    | Either::EventCreateError(
+                        EventCreateError::AlreadyExists
+                            | EventCreateError::IsBeingCreatedByAnotherInstance
+                            | EventCreateError::ServiceInCorruptedState
+                            | EventCreateError::HangsInCreation
+                    )
+            )
+        },
+    );
     service.map_err(|error| match error {
         EventOpenOrCreateError::EventOpenError(EventOpenError::ExceedsMaxNumberOfNodes) => {
             IpcError::TooManyReaders {
@@ -274,6 +334,28 @@ fn bell(
     })
 }
 
+/// How long a service may take to settle that others are just making or taking away.
+const SETTLES_WITHIN: Duration = Duration::from_secs(3);
+/// How long it is waited before it is asked for again.
+const ASK_AGAIN: Duration = Duration::from_millis(2);
+
+/// Opens what others may be making and taking away at the same time: the library gives up on it after a few
+/// rounds of its own, or takes what is half there for broken.
+fn settled<T, E>(
+    within: Duration,
+    mut open: impl FnMut() -> Result<T, E>,
+    in_flux: impl Fn(&E) -> bool,
+) -> Result<T, E> {
+    let start = Instant::now();
+    loop {
+        let opened = open();
+        match &opened {
+            Err(error) if in_flux(error) && start.elapsed() < within => pause(ASK_AGAIN),
+            _ => return opened,
+        }
+    }
+}
+
 fn service_name(name: &str) -> Result<ServiceName, IpcError> {
     ServiceName::new(name).map_err(|error| failed(name, &error))
 }
@@ -282,5 +364,34 @@ fn failed(service: &str, cause: &dyn core::fmt::Display) -> IpcError {
     IpcError::Service {
         service: service.to_owned(),
         cause: cause.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Opens at the `at`th attempt, refused with `error` until then; the attempts that were made.
+    fn attempts(at: u32, error: &'static str) -> (Result<(), &'static str>, u32) {
+        let mut made = 0;
+        let opened = settled(
+            Duration::from_millis(50),
+            || {
+                made += 1;
+                if made < at { Err(error) } else { Ok(()) }
+            },
+            |error| *error == "in flux",
+        );
+        (opened, made)
+    }
+
+    #[test]
+    fn what_is_in_flux_is_asked_for_again_but_not_for_ever() {
+        assert_eq!(attempts(1, "in flux"), (Ok(()), 1));
+        assert_eq!(attempts(3, "in flux"), (Ok(()), 3));
+        let (opened, made) = attempts(u32::MAX, "in flux");
+        assert_eq!(opened, Err("in flux"));
+        assert!(made > 1, "{made}");
+        assert_eq!(attempts(2, "another version"), (Err("another version"), 1));
     }
 }

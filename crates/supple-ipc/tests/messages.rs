@@ -12,7 +12,7 @@ use supple_ipc::message::*;
 #[test]
 fn there_is_no_padding_to_share() {
     let joints = MAX_DOF * 8;
-    assert_eq!(size_of::<PlantReport>(), 6 * 8);
+    assert_eq!(size_of::<PlantReport>(), 7 * 8);
     assert_eq!(
         size_of::<ArmState>(),
         2 * 8 + joints + 3 * 8 + size_of::<PlantReport>() + 8

@@ -70,6 +70,61 @@ fn a_controller_that_lags_sees_every_state() {
     assert_eq!(controller.receive().expect("read"), None);
 }
 
+/// Several that come and go at once make and take away the same services under each other's hands.
+#[test]
+fn who_comes_while_others_come_and_go_is_let_in() {
+    let system = system("flux");
+    std::thread::scope(|scope| {
+        for _ in 0..3 {
+            scope.spawn(|| {
+                for _ in 0..20 {
+                    TelemetryReader::new(&system.domain).expect("a reader");
+                }
+            });
+        }
+        scope.spawn(|| {
+            for _ in 0..20 {
+                ControllerLink::new(&system.domain).expect("the only controller");
+            }
+        });
+    });
+}
+
+/// A plant that looks for its answer before it sleeps gets the same, and is not woken by what it has had.
+#[test]
+fn a_plant_that_spins_gets_its_answers_and_sleeps_when_none_comes() {
+    let system = system("spin");
+    let mut plant = PlantLink::new(&system.domain).expect("a plant");
+    plant.spin(Duration::from_millis(1));
+    let domain = &system.domain;
+    std::thread::scope(|scope| {
+        scope.spawn(move || {
+            let controller = ControllerLink::new(domain).expect("a controller");
+            while let Some(state) = controller.wait(SOON).expect("read") {
+                let output = answer(&state.input(None).expect("four joints"));
+                let mut command = TorqueCommand::new(&output, false);
+                command.cycle = state.cycle;
+                if state.cycle < 50 {
+                    controller.answer(&command).expect("answered");
+                } else {
+                    break;
+                }
+            }
+        });
+        while !plant.publish(&state(0)).expect("published") {
+            pause(Duration::from_millis(1));
+        }
+        for cycle in 0..50 {
+            plant.publish(&state(cycle)).expect("published");
+            let heard = plant.answer(cycle, SOON).expect("read");
+            assert_eq!(heard.answer.map(|command| command.cycle), Some(cycle));
+        }
+        plant.publish(&state(50)).expect("published");
+        let heard = plant.answer(50, Duration::from_millis(5)).expect("read");
+        assert_eq!(heard.answer, None);
+    });
+}
+
 #[test]
 fn a_second_writer_is_refused_and_told_why() {
     let system = system("second");

@@ -7,9 +7,11 @@
 mod clock;
 mod memory;
 mod schedule;
+mod spin;
 mod stop;
 
 pub use clock::{monotonic_ns, sleep_until_ns};
+pub use spin::spin_for;
 pub use stop::{Stop, StopError, die_with_parent};
 
 use std::io::Error;

@@ -21,7 +21,7 @@ use std::process::ExitCode;
 use supple_ipc::{Domain, PlantLink};
 use supple_model::{Description, with_dof};
 use supple_plant::{Plant, PlantConfig, Scene, TraceFile};
-use supple_realtime::{Stop, die_with_parent, enter};
+use supple_realtime::{Stop, die_with_parent, enter, spin_for};
 
 /// The whole program, from its arguments to its exit code.
 pub fn main() -> ExitCode {
@@ -77,6 +77,7 @@ pub fn run<const N: usize>(
     for shortfall in enter(&options.realtime()) {
         eprintln!("supple-sim: warning: {shortfall}");
     }
+    world.spin(spin_for(options.spin_us));
     match options.virtual_time {
         true => world.run_in_virtual_time(options.cycles, stop),
         false => world.run_by_the_clock(options.cycles, options.answer_share, stop),

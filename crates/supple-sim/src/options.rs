@@ -36,6 +36,10 @@ pub struct Options {
     /// Share of a cycle in which an answer is waited for.
     #[arg(long, value_name = "0-1", default_value_t = 0.75, value_parser = share)]
     pub answer_share: f64,
+    /// Time in which an answer is looked for without sleeping (us), of this processor's time in each cycle; 50 if
+    /// not given where the thread may use several processors, else 0.
+    #[arg(long, value_name = "US", value_parser = clap::value_parser!(u32).range(0..=1000))]
+    pub spin_us: Option<u32>,
     /// Priority under SCHED_FIFO.
     #[arg(long, value_name = "1-99", default_value_t = 79, value_parser = clap::value_parser!(u8).range(1..=99))]
     pub priority: u8,

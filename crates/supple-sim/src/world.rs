@@ -64,6 +64,11 @@ impl<const N: usize> World<N> {
         }
     }
 
+    /// Looks for an answer for so long before sleeping, see [`PlantLink::spin`].
+    pub fn spin(&mut self, at_most: Duration) {
+        self.link.spin(at_most);
+    }
+
     /// From now on what acts at the joints is written.
     pub fn trace(&mut self, trace: TraceFile) {
         self.trace = Some(trace);
@@ -95,6 +100,7 @@ impl<const N: usize> World<N> {
             let begin_ns = monotonic_ns();
             if begin_ns > due_ns + CATCH_UP * self.period_ns {
                 summary.clock_set_again += 1;
+                self.report.stood_still_ns += begin_ns - due_ns;
                 due_ns = begin_ns;
             }
             self.report.wake_ns = begin_ns.saturating_sub(due_ns);

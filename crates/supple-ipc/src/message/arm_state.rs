@@ -9,7 +9,7 @@ use supple_core::math::Vector3;
 /// What the arm was at the start of a cycle, and how the plant's own side fares.
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
 #[repr(C)]
-#[type_name("supple.ArmState.v1")]
+#[type_name("supple.ArmState.v2")]
 pub struct ArmState {
     /// Number of the cycle, one more each period.
     pub cycle: u64,
@@ -36,7 +36,7 @@ pub struct ArmState {
 /// Counters and times of the process that owns the clock. Counts are since its start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
 #[repr(C)]
-#[type_name("supple.PlantReport.v1")]
+#[type_name("supple.PlantReport.v2")]
 pub struct PlantReport {
     /// Cycles whose answer did not come in time.
     pub missed: u64,
@@ -50,6 +50,9 @@ pub struct PlantReport {
     pub round_trip_ns: u64,
     /// Share of the previous cycle in which the bus was busy, 0 to 1; 0 without a bus.
     pub bus_load: f64,
+    /// How long the simulated or emulated arm's time has stood still because the machine held it up \[ns\]; 0 on
+    /// a real arm, and in virtual time.
+    pub stood_still_ns: u64,
 }
 
 impl ArmState {

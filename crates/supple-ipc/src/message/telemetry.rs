@@ -11,7 +11,7 @@ use supple_core::{Input, Output, Reference};
 /// One cycle of the controller, input, output and timing.
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
 #[repr(C)]
-#[type_name("supple.Telemetry.v1")]
+#[type_name("supple.Telemetry.v2")]
 pub struct Telemetry {
     /// Number of the step since the controller started; a reader that sees a gap has lost records.
     pub step: u64,

@@ -58,6 +58,8 @@ pub struct UpSummary {
     pub bus_load: f64,
     /// Frames that were not seen to leave.
     pub tx_lost: u64,
+    /// How long the arm's time stood still because the machine held up what plays it.
+    pub stood_still_ms: f64,
     /// Cycles whose telemetry did not arrive here; they are missing in the log.
     pub telemetry_lost: u64,
     /// Distance of the tip from its reference, by the encoders, root mean square while tracking; none where
@@ -137,6 +139,7 @@ impl Meter {
             round_trip_us: self.round_trip_us(),
             bus_load: mean(self.bus_load, self.cycles).unwrap_or_default(),
             tx_lost: self.plant.tx_lost,
+            stood_still_ms: self.plant.stood_still_ns as f64 * 1e-6,
             telemetry_lost,
             rms_error_m: mean(self.squared_error_m2, self.tracked).map(f64::sqrt),
             faults: self.faults.clone(),
@@ -171,6 +174,13 @@ impl fmt::Display for UpSummary {
                 f,
                 "{name}: p50 {:.1}, p99 {:.1}, p99.9 {:.1}, max {:.1} {unit}",
                 s.p50, s.p99, s.p999, s.max
+            )?;
+        }
+        if self.stood_still_ms > 0.0 {
+            writeln!(
+                f,
+                "the arm's time stood still for {:.1} ms",
+                self.stood_still_ms
             )?;
         }
         if let Some(times) = self.times_real_time {
