@@ -100,7 +100,7 @@ fn of_a_process<const N: usize>(
 ) -> Result<(u64, Seen), Failure> {
     let mut system = System::<N>::new(up, description, domain)?;
     system.start(description)?;
-    until(&mut system, WITHIN, |t| tracks(t, TRACKED_S))?.ok_or(Failure::NotTracking)?;
+    until(|| system.turn(), WITHIN, |t| tracks(t, TRACKED_S))?.ok_or(Failure::NotTracking)?;
     let begin_ns = monotonic_ns();
     match case.loss {
         Loss::Nothing => {}
@@ -130,15 +130,15 @@ fn of_a_process<const N: usize>(
     Ok((begin_ns, seen))
 }
 
-/// Takes in what comes until it is as it should be; the telemetry that was so.
-fn until<const N: usize>(
-    system: &mut System<'_, N>,
+/// Takes in what `next` gives until it is as it should be; the telemetry that was so.
+fn until(
+    mut next: impl FnMut() -> Result<Option<Telemetry>, Failure>,
     within: Duration,
     is_so: impl Fn(&Telemetry) -> bool,
 ) -> Result<Option<Telemetry>, Failure> {
     let start = Instant::now();
     while start.elapsed() < within {
-        if let Some(telemetry) = system.turn()?
+        if let Some(telemetry) = next()?
             && is_so(&telemetry)
         {
             return Ok(Some(telemetry));
@@ -166,12 +166,12 @@ fn rejoins<const N: usize>(system: &mut System<'_, N>, plant: PlantKind) -> Resu
     if plant == PlantKind::Emu {
         // The arm may have had to be woken: its bus is looked after by its own process.
         let alive = |t: &Telemetry| t.state.position_present.count_ones() as usize == N;
-        if until_quiet(system, WITHIN, alive)?.is_none() {
+        if until(|| system.hear(), WITHIN, alive)?.is_none() {
             return Ok(false);
         }
     }
     system.begin_again();
-    Ok(until(system, WITHIN, |t| tracks(t, 0.2))?.is_some())
+    Ok(until(|| system.turn(), WITHIN, |t| tracks(t, 0.2))?.is_some())
 }
 
 /// The controller is idle and without a fault, and so are the drives.
@@ -187,24 +187,7 @@ fn rests<const N: usize>(system: &mut System<'_, N>) -> Result<bool, Failure> {
     let rests = |t: &Telemetry| {
         t.mode() == Some(Mode::Idle) && t.fault == 0 && t.state.drives() == Drives::Idle
     };
-    Ok(until_quiet(system, RESTED_WITHIN, rests)?.is_some())
-}
-
-/// As [`until`], asking for nothing meanwhile.
-fn until_quiet<const N: usize>(
-    system: &mut System<'_, N>,
-    within: Duration,
-    is_so: impl Fn(&Telemetry) -> bool,
-) -> Result<Option<Telemetry>, Failure> {
-    let start = Instant::now();
-    while start.elapsed() < within {
-        if let Some(telemetry) = system.hear()?
-            && is_so(&telemetry)
-        {
-            return Ok(Some(telemetry));
-        }
-    }
-    Ok(None)
+    Ok(until(|| system.hear(), RESTED_WITHIN, rests)?.is_some())
 }
 
 /// `supple up` itself, as a process of its own.
@@ -250,7 +233,7 @@ impl Drop for Up {
 fn of_up(case: &Case, up: &UpArgs, domain: &Domain) -> Result<(u64, Seen), Failure> {
     let mut reader = TelemetryReader::new(domain)?;
     let mut running = Up::start(up)?;
-    wait(&mut reader, WITHIN, |t| tracks(t, TRACKED_S))?.ok_or(Failure::NotTracking)?;
+    until(|| hear(&mut reader), WITHIN, |t| tracks(t, TRACKED_S))?.ok_or(Failure::NotTracking)?;
     let begin_ns = monotonic_ns();
     running.signal(match case.loss {
         Loss::Stop => Signal::STOP,
@@ -258,7 +241,7 @@ fn of_up(case: &Case, up: &UpArgs, domain: &Domain) -> Result<(u64, Seen), Failu
     });
     let (mut last, start) = (None, Instant::now());
     while start.elapsed() < WATCHED {
-        last = reader.wait(Duration::from_millis(20))?.or(last);
+        last = hear(&mut reader)?.or(last);
     }
     let mut seen = Seen {
         fault: None,
@@ -278,24 +261,13 @@ fn of_up(case: &Case, up: &UpArgs, domain: &Domain) -> Result<(u64, Seen), Failu
             running = Up::start(&again)?;
         }
     }
-    let again = wait(&mut reader, WITHIN, |t| tracks(t, 0.2))?;
+    let again = until(|| hear(&mut reader), WITHIN, |t| tracks(t, 0.2))?;
     seen.rejoined_after_s = again.map(|_| back.elapsed().as_secs_f64());
     running.end();
     Ok((begin_ns, seen))
 }
 
-fn wait(
-    reader: &mut TelemetryReader,
-    within: Duration,
-    is_so: impl Fn(&Telemetry) -> bool,
-) -> Result<Option<Telemetry>, Failure> {
-    let start = Instant::now();
-    while start.elapsed() < within {
-        if let Some(telemetry) = reader.wait(Duration::from_millis(20))?
-            && is_so(&telemetry)
-        {
-            return Ok(Some(telemetry));
-        }
-    }
-    Ok(None)
+/// The next telemetry, waited for a little.
+fn hear(reader: &mut TelemetryReader) -> Result<Option<Telemetry>, Failure> {
+    Ok(reader.wait(Duration::from_millis(20))?)
 }

@@ -65,6 +65,8 @@ pub struct UpSummary {
     /// Distance of the tip from its reference, by the encoders, root mean square while tracking; none where
     /// nothing was tracked.
     pub rms_error_m: Option<f64>,
+    /// Cycles of them.
+    pub tracked_cycles: u64,
     /// Faults that latched, in words.
     pub faults: Vec<String>,
     /// Time of the arm over time of the wall; none where they are the same.
@@ -142,6 +144,7 @@ impl Meter {
             stood_still_ms: self.plant.stood_still_ns as f64 * 1e-6,
             telemetry_lost,
             rms_error_m: mean(self.squared_error_m2, self.tracked).map(f64::sqrt),
+            tracked_cycles: self.tracked,
             faults: self.faults.clone(),
             times_real_time: None,
         }
