@@ -214,8 +214,8 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
         let start_ns = self.begin()?;
         let missing = self.collect(start_ns)?;
         let report = self.report(start_ns);
-        self.link.publish(&report)?;
         let published_ns = self.bus.now_ns();
+        self.link.publish(&report)?;
         let command = self.answer(start_ns, published_ns)?;
         let seen = Seen {
             now_ns: self.bus.now_ns(),

@@ -1,8 +1,9 @@
 //! The simulated arm in the place of a real one: same messages, same clock, no bus.
 //!
-//! It owns the clock. By the wall clock each cycle begins at its time, whatever the controller does; an
-//! answer that does not come is met as the arm's own side would ([`Motors`]). In virtual time each cycle
-//! waits for its answer, so that the same controller gives the same bits, as fast as both can.
+//! It owns the clock. By the wall clock each cycle begins at its time, whatever the controller does, and the
+//! arm's time stands still while the machine holds up this process; an answer that does not come is met as
+//! the arm's own side would ([`Motors`]). In virtual time each cycle waits for its answer, so that the same
+//! controller gives the same bits, as fast as both can.
 //!
 //! It knows no controller: what it sends is what an arm reports, what it takes is torques.
 

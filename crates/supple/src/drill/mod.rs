@@ -10,7 +10,7 @@
 //! | `supple up` | killed, the others leave in order; stopped, nothing |
 //!
 //! An arm that brakes sinks, at the speed at which shorted motors and friction take what gravity gives: the
-//! 4-joint arm at 0.09 m/s, so that it meets the block with 190 N for a millisecond or two and then rests on it.
+//! 4-joint arm at 0.09 m/s, so that it meets the block with about 200 N for a millisecond or two and then rests on it.
 //! That is the price of braking, alike in both plants (`supple-plant/tests/braking.rs`).
 
 mod case;
