@@ -6,7 +6,7 @@ use std::thread::available_parallelism;
 /// About as long as a controller's answer takes on another processor.
 const SPIN_US: u32 = 50;
 
-/// What was asked for \[us\]; else [`SPIN_US`] where the calling thread may use several processors. On one alone
+/// What was asked for \[us\]; else 50 us where the calling thread may use several processors. On one alone
 /// it would keep the other process from answering, unless that one has the higher priority. To be called after
 /// [`crate::enter`].
 pub fn spin_for(asked_us: Option<u32>) -> Duration {
