@@ -2,9 +2,9 @@
 //!
 //! `x = n pi/2 + r`: `pi/2` is subtracted in parts whose products with `n` are exact (Cody and Waite): two
 //! where there is fused multiply-add, else three, of which two are short. `r` is kept in two words. On
-//! `|r| <= pi/4` sine and cosine are polynomials in `r^2`, interpolated at Chebyshev points so that they are off by less than 0.06 units in
-//! the last place; with rounding both results are within 1 unit (`tests/sincos.rs`). Beyond
-//! [`GREATEST_RAD`], and for what is not finite, `libm` is asked.
+//! `|r| <= pi/4` sine and cosine are polynomials in `r^2`, interpolated at Chebyshev points so that they are
+//! off by less than 0.06 units in the last place; with rounding both results are within 1 unit
+//! (`tests/sincos.rs`). Beyond [`GREATEST_RAD`], and for what is not finite, `libm` is asked.
 #![allow(
     clippy::needless_range_loop,
     reason = "joints, groups and lanes are counted: each index goes into several arrays"
