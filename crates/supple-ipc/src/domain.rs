@@ -5,10 +5,12 @@
 //! user alone. Nothing is ever sent over a network.
 
 use crate::error::IpcError;
-use crate::last_out;
+use crate::turn;
 use iceoryx2::prelude::*;
 use rustix::fs::Mode;
 use std::fs::{self, DirBuilder, Metadata};
+use std::io;
+use std::os::fd::OwnedFd;
 use std::os::unix::fs::{DirBuilderExt, MetadataExt};
 use std::path::{Path as StdPath, PathBuf};
 
@@ -22,6 +24,13 @@ const OWNER_ONLY: u32 = 0o700;
 
 /// A node of the shared-memory library, whose ports stay in the thread that made them.
 pub(crate) type Node = iceoryx2::node::Node<ipc::Service>;
+
+/// A process that is joining: it has the turn until it has opened what it wants.
+#[derive(Debug)]
+pub(crate) struct Joining {
+    pub node: Node,
+    _turn: OwnedFd,
+}
 
 /// The place of one system.
 #[derive(Clone, Debug)]
@@ -99,23 +108,31 @@ impl Domain {
         &self.config
     }
 
-    /// A node in this system. What processes that died have left is cleared away.
-    pub(crate) fn node(&self) -> Result<Node, IpcError> {
-        let _joining = last_out::joining(self).map_err(|error| IpcError::Folder {
+    /// A place in this system, to open services from. What processes that died have left is cleared away.
+    pub(crate) fn join(&self) -> Result<Joining, IpcError> {
+        let turn = turn::wait(self).and_then(|turn| {
+            turn::remove_unfinished(self)?;
+            Ok(turn)
+        });
+        let turn = turn.map_err(|error| IpcError::Folder {
             folder: self.folder.clone(),
             cause: error.to_string(),
-            remedy: "set XDG_RUNTIME_DIR to a folder that can be written",
+            remedy: match error.kind() {
+                io::ErrorKind::TimedOut => "end it, if it does not go on",
+                _ => "set XDG_RUNTIME_DIR to a folder that can be written",
+            },
         })?;
         // Its own words are about its own terms: the errors here say what they mean to this system.
         set_log_level(LogLevel::Fatal);
-        NodeBuilder::new()
+        let node = NodeBuilder::new()
             .config(&self.config)
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<ipc::Service>()
             .map_err(|error| IpcError::Service {
                 service: format!("a node under the prefix `{}`", self.prefix),
                 cause: error.to_string(),
-            })
+            })?;
+        Ok(Joining { node, _turn: turn })
     }
 }
 

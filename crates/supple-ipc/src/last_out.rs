@@ -2,18 +2,14 @@
 //!
 //! The library removes what a port or a service has made, and clears up after processes that died; its own
 //! books on a system stay. Where no process of the system is there any more, all of its objects go. A process
-//! that comes meanwhile waits: joining and leaving take turns on a lock file in the system's folder.
+//! that comes meanwhile waits for its turn.
 
 use crate::domain::{Domain, Node};
+use crate::turn;
 use iceoryx2::node::NodeState;
 use iceoryx2::prelude::CallbackProgression;
-use rustix::fs::{FlockOperation, Mode, OFlags, flock, open};
 use std::fs;
 use std::io;
-use std::os::fd::OwnedFd;
-
-/// Where Linux keeps shared memory by its name.
-const SHARED_MEMORY: &str = "/dev/shm";
 
 /// A field of everything that has ports, behind them.
 #[derive(Debug)]
@@ -32,40 +28,30 @@ impl Drop for LastOut {
     }
 }
 
-/// The right to join, until it is dropped; shared by all who join.
-pub(crate) fn joining(domain: &Domain) -> io::Result<OwnedFd> {
-    turn(domain, FlockOperation::LockShared)
-}
-
-fn turn(domain: &Domain, operation: FlockOperation) -> io::Result<OwnedFd> {
-    let path = domain.folder().join(format!("{}.lock", domain.prefix()));
-    let flags = OFlags::CREATE | OFlags::RDWR | OFlags::CLOEXEC;
-    let file = open(path, flags, Mode::RUSR | Mode::WUSR)?;
-    flock(&file, operation)?;
-    Ok(file)
-}
-
 fn clear(domain: &Domain) -> io::Result<()> {
     // Where somebody is joining, somebody else will be the last.
-    let _turn = turn(domain, FlockOperation::NonBlockingLockExclusive)?;
+    let Some(_turn) = turn::at_once(domain)? else {
+        return Ok(());
+    };
+    turn::remove_unfinished(domain)?;
     let mut inhabited = false;
     let listed = Node::list(domain.config(), |state| {
-        inhabited |= match state {
-            NodeState::Dead(node) => node.try_remove_stale_resources().is_err(),
-            NodeState::Alive(_) | NodeState::Inaccessible(_) | NodeState::Undefined(_) => true,
-        };
+        match state {
+            NodeState::Dead(node) => {
+                // What it leaves all the same goes below.
+                let _ = node.try_remove_stale_resources();
+            }
+            // Nobody is joining: it was killed when it did.
+            NodeState::Undefined(_) => {}
+            NodeState::Alive(_) | NodeState::Inaccessible(_) => inhabited = true,
+        }
         CallbackProgression::Continue
     });
     if inhabited || listed.is_err() {
         return Ok(());
     }
-    let objects = domain.objects();
-    for entry in fs::read_dir(SHARED_MEMORY)? {
-        let entry = entry?;
-        let name = entry.file_name();
-        if name.as_encoded_bytes().starts_with(objects.as_bytes()) {
-            fs::remove_file(entry.path())?;
-        }
+    for object in turn::objects(domain)? {
+        fs::remove_file(object)?;
     }
     Ok(())
 }

@@ -39,6 +39,7 @@ mod link;
 pub mod message;
 mod outside;
 mod port;
+mod turn;
 
 pub use domain::{DEFAULT_PREFIX, Domain, PREFIX_VARIABLE};
 pub use error::IpcError;

@@ -55,12 +55,12 @@ impl PlantLink {
     /// # Errors
     /// [`IpcError::SecondWriter`] where there is a plant already, and what else [`IpcError`] says.
     pub fn new(domain: &Domain) -> Result<PlantLink, IpcError> {
-        let node = domain.node()?;
+        let joining = domain.join()?;
         Ok(PlantLink {
-            states: Writer::new(domain, &node, &STATES, Full::Lose)?,
-            commands: Reader::new(domain, &node, &COMMANDS)?,
-            rope: Rope::new(domain, &node, STATE_BELL)?,
-            bell: Bell::new(&node, COMMAND_BELL)?,
+            states: Writer::new(domain, &joining.node, &STATES, Full::Lose)?,
+            commands: Reader::new(domain, &joining.node, &COMMANDS)?,
+            rope: Rope::new(domain, &joining.node, STATE_BELL)?,
+            bell: Bell::new(&joining.node, COMMAND_BELL)?,
             spin: Duration::ZERO,
             _last_out: LastOut::of(domain),
         })
@@ -132,12 +132,12 @@ impl ControllerLink {
     /// # Errors
     /// [`IpcError::SecondWriter`] where there is a controller already, and what else [`IpcError`] says.
     pub fn new(domain: &Domain) -> Result<ControllerLink, IpcError> {
-        let node = domain.node()?;
+        let joining = domain.join()?;
         Ok(ControllerLink {
-            commands: Writer::new(domain, &node, &COMMANDS, Full::Lose)?,
-            states: Reader::new(domain, &node, &STATES)?,
-            rope: Rope::new(domain, &node, COMMAND_BELL)?,
-            bell: Bell::new(&node, STATE_BELL)?,
+            commands: Writer::new(domain, &joining.node, &COMMANDS, Full::Lose)?,
+            states: Reader::new(domain, &joining.node, &STATES)?,
+            rope: Rope::new(domain, &joining.node, COMMAND_BELL)?,
+            bell: Bell::new(&joining.node, STATE_BELL)?,
             _last_out: LastOut::of(domain),
         })
     }

@@ -59,11 +59,11 @@ impl OutsideLink {
     /// # Errors
     /// [`IpcError::SecondWriter`] where there is a controller already, and what else [`IpcError`] says.
     pub fn new(domain: &Domain, full: Full) -> Result<OutsideLink, IpcError> {
-        let node = domain.node()?;
+        let joining = domain.join()?;
         Ok(OutsideLink {
-            telemetry: Writer::new(domain, &node, &TELEMETRY, full)?,
-            requests: Reader::new(domain, &node, &REQUESTS)?,
-            replies: Writer::new(domain, &node, &REPLIES, Full::Lose)?,
+            telemetry: Writer::new(domain, &joining.node, &TELEMETRY, full)?,
+            requests: Reader::new(domain, &joining.node, &REQUESTS)?,
+            replies: Writer::new(domain, &joining.node, &REPLIES, Full::Lose)?,
             _last_out: LastOut::of(domain),
         })
     }
@@ -108,9 +108,9 @@ impl TelemetryReader {
     /// # Errors
     /// [`IpcError::TooManyReaders`] and what else [`IpcError`] says.
     pub fn new(domain: &Domain) -> Result<TelemetryReader, IpcError> {
-        let node = domain.node()?;
+        let joining = domain.join()?;
         Ok(TelemetryReader {
-            reader: Reader::new(domain, &node, &TELEMETRY)?,
+            reader: Reader::new(domain, &joining.node, &TELEMETRY)?,
             expected: None,
             lost: 0,
             _last_out: LastOut::of(domain),
@@ -171,10 +171,10 @@ impl Operator {
     /// # Errors
     /// [`IpcError`].
     pub fn new(domain: &Domain) -> Result<Operator, IpcError> {
-        let node = domain.node()?;
+        let joining = domain.join()?;
         Ok(Operator {
-            replies: Reader::new(domain, &node, &REPLIES)?,
-            requests: Writer::new(domain, &node, &REQUESTS, Full::Lose)?,
+            replies: Reader::new(domain, &joining.node, &REPLIES)?,
+            requests: Writer::new(domain, &joining.node, &REQUESTS, Full::Lose)?,
             number: operator_number(),
             sequence: 0,
             _last_out: LastOut::of(domain),

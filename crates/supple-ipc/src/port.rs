@@ -7,6 +7,7 @@
 use crate::domain::{Domain, Node};
 use crate::error::IpcError;
 use crate::outside::pause;
+use crate::turn;
 use core::fmt::Debug;
 use core::time::Duration;
 use iceoryx2::port::listener::{Listener, ListenerCreateError};
@@ -23,6 +24,7 @@ use iceoryx2_bb_posix::file_descriptor_set::{
     FileDescriptorSet, FileDescriptorSetWaitError, FileEvent,
 };
 use iceoryx2_cal::event::ListenerWaitError;
+use std::os::fd::OwnedFd;
 use std::time::Instant;
 
 /// What there is to know of a service before it is opened.
@@ -30,7 +32,7 @@ use std::time::Instant;
 pub(crate) struct Terms {
     /// Name within the system.
     pub name: &'static str,
-    /// Writers that may be there at a time.
+    /// Writers that may be there at a time. One alone has the lock of that name.
     pub writers: usize,
     /// Readers that may be there at a time.
     pub readers: usize,
@@ -58,10 +60,19 @@ pub enum Full {
 pub(crate) struct Writer<T: Message> {
     publisher: Publisher<ipc::Service, T, ()>,
     name: &'static str,
+    _alone: Option<OwnedFd>,
 }
 
 impl<T: Message> Writer<T> {
     pub fn new(domain: &Domain, node: &Node, terms: &Terms, full: Full) -> Result<Self, IpcError> {
+        let taken = || IpcError::SecondWriter {
+            service: terms.name.to_owned(),
+            prefix: domain.prefix().to_owned(),
+        };
+        let alone = match terms.writers {
+            1 => Some(lock(domain, terms.name)?.ok_or_else(taken)?),
+            _ => None,
+        };
         let service = open::<T>(domain, node, terms)?;
         let strategy = match full {
             Full::Lose => BackpressureStrategy::DiscardData,
@@ -73,15 +84,13 @@ impl<T: Message> Writer<T> {
             .backpressure_strategy(strategy)
             .create();
         let publisher = publisher.map_err(|error| match error {
-            PublisherCreateError::ExceedsMaxSupportedPublishers => IpcError::SecondWriter {
-                service: terms.name.to_owned(),
-                prefix: domain.prefix().to_owned(),
-            },
+            PublisherCreateError::ExceedsMaxSupportedPublishers => taken(),
             error => failed(terms.name, &error),
         })?;
         Ok(Writer {
             publisher,
             name: terms.name,
+            _alone: alone,
         })
     }
 
@@ -226,8 +235,8 @@ fn open<T: Message>(
         || {
             node.service_builder(&name)
                 .publish_subscribe::<T>()
-                .max_publishers(terms.writers)
-                .max_subscribers(terms.readers)
+                .max_publishers(places(terms.writers))
+                .max_subscribers(places(terms.readers))
                 .max_nodes(NODES)
                 .subscriber_max_buffer_size(terms.depth)
                 .subscriber_max_borrowed_samples(1)
@@ -286,7 +295,24 @@ fn open<T: Message>(
 }
 
 /// Processes that may have a service open: the writers, the readers, and some that are just leaving.
-const NODES: usize = 24;
+const NODES: usize = 24 + LOST_PLACES;
+
+/// A process that is killed in the very milliseconds in which it joins may leave a place taken for good, of its
+/// services' writers or readers (iceoryx2 0.9.3 clears only what was finished). So many may be lost where there
+/// is one place, before whoever made the services has to be restarted; where there are many, some are not used.
+const LOST_PLACES: usize = 8;
+
+fn places(wanted: usize) -> usize {
+    match wanted {
+        1 => 1 + LOST_PLACES,
+        several => several,
+    }
+}
+
+/// The lock of a service's one writer.
+fn lock(domain: &Domain, service: &str) -> Result<Option<OwnedFd>, IpcError> {
+    turn::lock(domain, service).map_err(|error| failed(service, &error))
+}
 
 fn bell(
     node: &Node,
@@ -298,8 +324,8 @@ fn bell(
         || {
             node.service_builder(&full_name)
                 .event()
-                .max_notifiers(1)
-                .max_listeners(1)
+                .max_notifiers(places(1))
+                .max_listeners(places(1))
                 .max_nodes(NODES)
                 .event_id_max_value(0)
                 .open_or_create()

@@ -29,11 +29,10 @@ fn controller_process() {
 
 fn start(system: &support::System) -> Child {
     Command::new(std::env::current_exe().expect("this test"))
-        .args(["--ignored", "--exact", "controller_process"])
+        .args(["--ignored", "--nocapture", "--exact", "controller_process"])
         .env(FOLDER, &system.folder)
         .env(PREFIX, system.domain.prefix())
         .stdout(Stdio::null())
-        .stderr(Stdio::null())
         .spawn()
         .expect("it starts")
 }
@@ -75,5 +74,46 @@ fn a_killed_controller_is_replaced() {
     }
     // The last controller was killed too; what it left goes with the last who leaves.
     drop(plant);
+    assert_eq!(support::objects(&system.domain), [""; 0]);
+}
+
+/// Wherever in its start a controller is killed, whoever comes next finds the system usable.
+#[test]
+fn a_controller_killed_while_it_joins_is_replaced() {
+    let system = support::system("joining");
+    let plant = PlantLink::new(&system.domain).expect("a plant");
+    for tenths_ms in 0..120 {
+        let mut child = start(&system);
+        supple_ipc::pause(Duration::from_micros(100 * tenths_ms));
+        child.kill().expect("SIGKILL");
+        child.wait().expect("it is gone");
+        plant.publish(&support::state(0)).expect("published");
+        plant.answer(0, Duration::ZERO).expect("read");
+    }
+    let mut child = start(&system);
+
+    until_answered(&plant, 0);
+    child.kill().expect("SIGKILL");
+    child.wait().expect("it is gone");
+    drop(plant);
+    assert_eq!(support::objects(&system.domain), [""; 0]);
+}
+
+/// What the kernel leaves of a process that is killed between making an object and giving it a size.
+#[test]
+fn objects_without_a_size_hold_nobody_up() {
+    let system = support::system("no-size");
+    let plant = PlantLink::new(&system.domain).expect("a plant");
+    let names = support::objects(&system.domain);
+    drop(plant);
+    assert!(!names.is_empty());
+    for name in names {
+        std::fs::write(format!("/dev/shm/{name}"), []).expect("made");
+    }
+    let (sender, receiver) = std::sync::mpsc::channel();
+    let domain = system.domain.clone();
+    std::thread::spawn(move || sender.send(PlantLink::new(&domain).map(drop)));
+    let joined = receiver.recv_timeout(Duration::from_secs(30));
+    joined.expect("it does not wait for ever").expect("a plant");
     assert_eq!(support::objects(&system.domain), [""; 0]);
 }

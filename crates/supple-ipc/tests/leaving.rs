@@ -68,7 +68,7 @@ fn coming_and_going_at_once_is_safe() {
 fn the_lock_is_the_owners_alone() {
     let system = support::system("lock");
     drop(PlantLink::new(&system.domain).expect("a plant"));
-    let name = format!("{}.lock", system.domain.prefix());
+    let name = format!("{}.turn.lock", system.domain.prefix());
     let lock = std::fs::metadata(system.folder.join(name)).expect("a lock");
     assert_eq!(lock.permissions().mode() & 0o777, 0o600);
 }

@@ -1,0 +1,101 @@
+//! Joining and leaving take turns, on a lock file in the system's folder.
+//!
+//! Whoever has the turn opens and makes services, and nobody else does. A process that is killed while it makes
+//! one may leave a shared-memory object without a size, for which the library waits without end wherever it
+//! meets it (iceoryx2 0.9.3, `MappingSizeIsZero`). So the first thing done with a turn is to take these away.
+
+use crate::domain::Domain;
+use crate::outside::pause;
+use core::time::Duration;
+use rustix::fs::{FlockOperation, Mode, OFlags, flock, open};
+use rustix::io::Errno;
+use std::fs;
+use std::io;
+use std::os::fd::OwnedFd;
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// Where Linux keeps shared memory by its name.
+const SHARED_MEMORY: &str = "/dev/shm";
+/// Name of its lock.
+const TURN: &str = "turn";
+/// A turn is over after milliseconds, unless its process was stopped in the middle.
+const LONGEST_TURN: Duration = Duration::from_secs(10);
+/// How often it is looked whether another's turn is over, and whether an object got its size.
+const LOOK_EVERY: Duration = Duration::from_millis(1);
+/// An object without a size that is older than this gets none any more. Its maker takes microseconds.
+const UNFINISHED_AFTER: Duration = Duration::from_millis(200);
+
+/// The turn, until it is dropped; waits for those of others.
+pub(crate) fn wait(domain: &Domain) -> io::Result<OwnedFd> {
+    let start = Instant::now();
+    loop {
+        if let Some(turn) = at_once(domain)? {
+            return Ok(turn);
+        }
+        if start.elapsed() > LONGEST_TURN {
+            let cause = format!(
+                "another process has been joining or leaving for {} s (`fuser {}` shows which)",
+                LONGEST_TURN.as_secs(),
+                path(domain, TURN).display()
+            );
+            return Err(io::Error::new(io::ErrorKind::TimedOut, cause));
+        }
+        pause(LOOK_EVERY);
+    }
+}
+
+/// The turn, where nobody else has it.
+pub(crate) fn at_once(domain: &Domain) -> io::Result<Option<OwnedFd>> {
+    lock(domain, TURN)
+}
+
+/// A lock of the system, where nobody else has it. The kernel gives it back when its process is gone, however
+/// that ended.
+pub(crate) fn lock(domain: &Domain, name: &str) -> io::Result<Option<OwnedFd>> {
+    let flags = OFlags::CREATE | OFlags::RDWR | OFlags::CLOEXEC;
+    let file = open(path(domain, name), flags, Mode::RUSR | Mode::WUSR)?;
+    match flock(&file, FlockOperation::NonBlockingLockExclusive) {
+        Ok(()) => Ok(Some(file)),
+        Err(Errno::WOULDBLOCK) => Ok(None),
+        Err(error) => Err(error.into()),
+    }
+}
+
+fn path(domain: &Domain, lock: &str) -> PathBuf {
+    let name = format!("{}.{lock}.lock", domain.prefix());
+    domain.folder().join(name)
+}
+
+/// The system's objects in shared memory.
+pub(crate) fn objects(domain: &Domain) -> io::Result<Vec<PathBuf>> {
+    let begin = domain.objects();
+    let mut objects = Vec::new();
+    for entry in fs::read_dir(SHARED_MEMORY)? {
+        let entry = entry?;
+        if entry
+            .file_name()
+            .as_encoded_bytes()
+            .starts_with(begin.as_bytes())
+        {
+            objects.push(entry.path());
+        }
+    }
+    Ok(objects)
+}
+
+/// Takes away the objects whose makers died before they gave them a size. To be called with the turn. Who is
+/// connecting to another's ports has no turn: its objects are given the time to get their size.
+pub(crate) fn remove_unfinished(domain: &Domain) -> io::Result<()> {
+    for object in objects(domain)? {
+        let first_seen = Instant::now();
+        while fs::metadata(&object).is_ok_and(|found| found.len() == 0) {
+            if first_seen.elapsed() > UNFINISHED_AFTER {
+                fs::remove_file(&object)?;
+                break;
+            }
+            pause(LOOK_EVERY);
+        }
+    }
+    Ok(())
+}
