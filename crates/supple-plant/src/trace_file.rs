@@ -25,6 +25,7 @@ pub struct TraceFile {
     path: PathBuf,
     file: BufWriter<File>,
     next_ns: u64,
+    active: usize,
 }
 
 impl TraceFile {
@@ -41,6 +42,7 @@ impl TraceFile {
             path: path.to_owned(),
             file: BufWriter::new(file),
             next_ns: 0,
+            active: 0,
         };
         let motors: String = (1..=joints).map(|i| format!(",motor{i}_nm")).collect();
         trace.line(&format!(
@@ -49,7 +51,7 @@ impl TraceFile {
         Ok(trace)
     }
 
-    /// Writes a line if it is time for one. `time_ns` is when, `active` how many motors take torques,
+    /// Writes a line if it is time for one, or if motors came to brake or ceased to. `time_ns` is when, `active` how many motors take torques,
     /// `torque_nm` what acts at each, braking included. The force is the greatest since the line before: an
     /// impact is over in less time than two lines are apart.
     ///
@@ -62,9 +64,10 @@ impl TraceFile {
         torque_nm: &[f64; N],
         plant: &mut Plant<N>,
     ) -> Result<(), TraceError> {
-        if time_ns < self.next_ns {
+        if time_ns < self.next_ns && active == self.active {
             return Ok(());
         }
+        self.active = active;
         self.next_ns = time_ns + EVERY_NS;
         let torques: String = torque_nm.iter().map(|t| format!(",{t:.6}")).collect();
         let force = plant.take_greatest_force_n();
@@ -82,5 +85,36 @@ impl TraceFile {
             file: self.path.clone(),
             source,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::PlantConfig;
+    use supple_core::Vector;
+    use supple_model::Description;
+
+    /// A system that ends is over within the millisecond in which its motors came to brake.
+    #[test]
+    fn motors_that_come_to_brake_are_noted_between_two_lines() {
+        let wam = Description::asset("wam4").expect("built in");
+        let config = PlantConfig::<4>::from_description(&wam).expect("sound");
+        let home_rad = wam.home::<4>().expect("four joints");
+        let mut plant = Plant::new(config, home_rad, Vector::zeros()).expect("sound");
+        let file = tempfile::NamedTempFile::new().expect("a file");
+        let mut trace = TraceFile::create(file.path(), 4).expect("created");
+        for (time_ns, active) in [(0, 4), (600_000, 4), (700_000, 0), (800_000, 0)] {
+            let noted = trace.note(time_ns, active, &[0.0; 4], &mut plant);
+            noted.expect("written");
+        }
+        drop(trace);
+        let text = std::fs::read_to_string(file.path()).expect("readable");
+        let lines: Vec<&str> = text.lines().skip(1).collect();
+        assert_eq!(lines.len(), 2, "{text}");
+        assert!(
+            lines[0].starts_with("0,4,") && lines[1].starts_with("700000,0,"),
+            "{text}"
+        );
     }
 }
