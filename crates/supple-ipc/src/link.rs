@@ -150,7 +150,8 @@ impl ControllerLink {
         self.states.receive()
     }
 
-    /// The oldest state that was not read yet; waits for one at most for `timeout`.
+    /// The oldest state that was not read yet; waits for one at most for `timeout`, which the kernel counts in
+    /// ticks of up to 10 ms.
     ///
     /// # Errors
     /// [`IpcError::Service`].
@@ -164,7 +165,7 @@ impl ControllerLink {
             if left.is_zero() {
                 return Ok(None);
             }
-            self.bell.wait(left)?;
+            self.bell.wait_in_ticks(left)?;
         }
     }
 
