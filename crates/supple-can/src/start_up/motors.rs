@@ -15,6 +15,9 @@ pub const ARM_GROUPS: [[GroupId; 3]; 2] = [
     [GroupId::ACTUATORS, GroupId::LOWER_TORQUES, GroupId::ARM],
     [GroupId::ACTUATORS, GroupId::UPPER_TORQUES, GroupId::ARM],
 ];
+/// How often a node that answered before is asked as one that may not be there is. An emulated one is held up
+/// with the machine that it runs on.
+const ROUNDS: u32 = 4;
 /// By how much a puck's torque units may differ from the description's: the rounding of its quantum.
 const UNITS_TOLERANCE: f64 = 1e-3;
 
@@ -131,7 +134,12 @@ pub fn must<B: Bus>(
     node: NodeId,
     property: PropertyId,
 ) -> Result<i32, CanError> {
-    host.ask(node, property)?.ok_or(CanError::Missing {
+    for _ in 0..ROUNDS {
+        if let Some(value) = host.ask(node, property)? {
+            return Ok(value);
+        }
+    }
+    Err(CanError::Missing {
         what: "a node that answered before",
         node: node.number(),
         remedy: "check its cable, then switch the arm off and on",
