@@ -27,7 +27,9 @@ def native_loop() -> Path:
     """The loop in Rust, built."""
     example = ["--release", "--package", "supple-model", "--example", "state_loop"]
     command = ["cargo", "build", "--locked", *example, "--message-format", "json"]
-    built = subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True)
+    # Where the package's own compiler flags count.
+    folder = ROOT / "python"
+    built = subprocess.run(command, cwd=folder, check=True, stdout=subprocess.PIPE, text=True)
     messages = [json.loads(line) for line in built.stdout.splitlines()]
     return Path(next(m["executable"] for m in reversed(messages) if m.get("executable")))
 

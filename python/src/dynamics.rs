@@ -168,9 +168,16 @@ impl Each<'_> {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn arguments<const N: usize, const K: usize>(&self, k: usize) -> [Vector<N>; K] {
-        core::array::from_fn(|a| Vector::from_column_slice(self.states[a].at(k)))
+        let mut arguments = [Vector::zeros(); K];
+        for (argument, states) in arguments.iter_mut().zip(self.states) {
+            // By value: a copy of a length that is known is a few moves.
+            if let Some(state) = states.at(k).first_chunk::<N>() {
+                *argument = Vector::from(*state);
+            }
+        }
+        arguments
     }
 }
 
