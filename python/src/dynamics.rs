@@ -68,19 +68,19 @@ impl<const N: usize> Dynamics for Arm<N> {
         let each = Each { states, width };
         match quantity {
             Quantity::Rnea => each.run(out, |[q, qd, qdd]: [Vector<N>; 3], out| {
-                out.copy_from_slice(dynamics::rnea(self, &q, &qd, &qdd).as_slice());
+                put(&dynamics::rnea(self, &q, &qd, &qdd), out);
             }),
             Quantity::MassMatrix => each.run(out, |[q]: [Vector<N>; 1], out| {
                 by_rows(&dynamics::crba(self, &q), out);
             }),
             Quantity::Gravity => each.run(out, |[q]: [Vector<N>; 1], out| {
-                out.copy_from_slice(dynamics::gravity(self, &q).as_slice());
+                put(&dynamics::gravity(self, &q), out);
             }),
             Quantity::ForwardDynamics => each.run(out, |[q, qd, tau]: [Vector<N>; 3], out| {
-                out.copy_from_slice(dynamics::aba(self, &q, &qd, &tau).as_slice());
+                put(&dynamics::aba(self, &q, &qd, &tau), out);
             }),
             Quantity::Coriolis => each.run(out, |[q, qd]: [Vector<N>; 2], out| {
-                out.copy_from_slice(dynamics::coriolis(self, &q, &qd).as_slice());
+                put(&dynamics::coriolis(self, &q, &qd), out);
             }),
             Quantity::CoriolisMatrix => each.run(out, |[q, qd]: [Vector<N>; 2], out| {
                 by_rows(&dynamics::coriolis_matrix(self, &q, &qd), out);
@@ -100,7 +100,7 @@ impl<const N: usize> Dynamics for Arm<N> {
                 by_rows(&dynamics::jacobian(self, &q), out);
             }),
             Quantity::JacobianDotQd => each.run(out, |[q, qd]: [Vector<N>; 2], out| {
-                out.copy_from_slice(dynamics::jacobian_dot_qd(self, &q, &qd).as_slice());
+                put(&dynamics::jacobian_dot_qd(self, &q, &qd), out);
             }),
             Quantity::Regressor => each.run_in_chunks(out, |[q, qd, qdd]: [Vector<N>; 3], out| {
                 dynamics::regressor_rows(self, &q, &qd, &qdd, |joint, link, row| {
@@ -170,14 +170,22 @@ impl Each<'_> {
 
     #[inline(always)]
     fn arguments<const N: usize, const K: usize>(&self, k: usize) -> [Vector<N>; K] {
+        // In a loop: a closure may be left as a call.
         let mut arguments = [Vector::zeros(); K];
         for (argument, states) in arguments.iter_mut().zip(self.states) {
-            // By value: a copy of a length that is known is a few moves.
             if let Some(state) = states.at(k).first_chunk::<N>() {
                 *argument = Vector::from(*state);
             }
         }
         arguments
+    }
+}
+
+/// A copy of a length that is known is a few moves.
+#[inline(always)]
+fn put<const N: usize>(result: &Vector<N>, out: &mut [f64]) {
+    if let Some(out) = out.first_chunk_mut() {
+        *out = (*result).into();
     }
 }
 
