@@ -4,7 +4,7 @@ use clap::Parser;
 use supple_bus::Address;
 use supple_model::{Description, ModelError};
 use supple_puck::safety::SpeedLimit;
-use supple_realtime::Settings;
+use supple_realtime::{RealtimeOptions, Settings};
 
 /// Takes an arm on its CAN bus into service: polls it, publishes its state, sends the torques that answer.
 ///
@@ -53,40 +53,27 @@ pub struct Options {
     /// Priority under SCHED_FIFO.
     #[arg(long, value_name = "1-99", default_value_t = 79, value_parser = clap::value_parser!(u8).range(1..=99))]
     pub priority: u8,
-    /// Processor for the cycle alone; any if not given.
-    #[arg(long, value_name = "N")]
-    pub cpu: Option<usize>,
-    /// Neither priority nor locked memory.
-    #[arg(long)]
-    pub no_realtime: bool,
-    /// Ends when the process that started it ends.
-    #[arg(long, hide = true)]
-    pub supervised: bool,
+    #[command(flatten)]
+    realtime: RealtimeOptions,
 }
 
 impl Options {
     /// The arm, at the rate asked for.
     ///
     /// # Errors
-    /// As [`Description::find`].
+    /// As [`Description::find_at_rate`].
     pub fn description(&self) -> Result<Description, ModelError> {
-        let description = Description::find(&self.arm)?;
-        match self.rate_hz {
-            Some(rate_hz) => description.at_rate(f64::from(rate_hz)),
-            None => Ok(description),
-        }
+        Description::find_at_rate(&self.arm, self.rate_hz)
+    }
+
+    /// It is to end with the process that started it.
+    pub fn supervised(&self) -> bool {
+        self.realtime.supervised
     }
 
     /// What to ask of the system.
     pub fn realtime(&self) -> Settings {
-        if self.virtual_time || self.no_realtime {
-            return Settings::NONE;
-        }
-        Settings {
-            priority: Some(self.priority),
-            cpu: self.cpu,
-            lock_memory: true,
-        }
+        self.realtime.settings(self.priority, self.virtual_time)
     }
 }
 

@@ -54,7 +54,7 @@ pub fn main() -> ExitCode {
 /// What was counted in service, if it came to service.
 fn start(options: &Options) -> Result<Option<Counters>, CanError> {
     let stop = Stop::on_signals().map_err(|error| CanError::Link(Box::new(error)))?;
-    if options.supervised {
+    if options.supervised() {
         die_with_parent();
     }
     let description = options.description()?;

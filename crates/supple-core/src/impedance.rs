@@ -47,6 +47,16 @@ pub fn singularity_damping_per_kg(sigma_m: f64) -> f64 {
     f * f / GREATEST_TASK_MASS_KG
 }
 
+/// The same of the columns of a Jacobian. Nothing waits for the singular value, which takes as long as the rest
+/// of the law, where it is surely great enough.
+#[inline]
+pub(crate) fn singularity_damping<const N: usize>(jacobian: &[[f64; 3]; N]) -> f64 {
+    if singular_values_exceed(jacobian, SINGULAR_BELOW_M) {
+        return 0.0;
+    }
+    singularity_damping_per_kg(least_singular_value(&Matrix::from(*jacobian)))
+}
+
 /// The tip's position task on the active joints.
 #[derive(Clone, Copy, Debug)]
 pub struct Task<const N: usize> {
@@ -73,12 +83,7 @@ impl<const N: usize> Task<N> {
         }
         let least_singular_value_m = least_singular_value(&jacobian);
         let mobile = Cholesky::new(&mass_matrix)?.solve(&jacobian.transpose());
-        // So that nothing waits for the singular value: it takes as long as the rest.
-        let damping = if singular_values_exceed(&jacobian.data.0, SINGULAR_BELOW_M) {
-            0.0
-        } else {
-            singularity_damping_per_kg(least_singular_value_m)
-        };
+        let damping = singularity_damping(&jacobian.data.0);
         let mobility: Matrix3<f64> = jacobian * mobile + Matrix3::from_diagonal_element(damping);
         let inverse = Cholesky::new(&mobility)?.solve(&mobile.transpose());
         Some(Task {

@@ -27,10 +27,9 @@ use crate::arm::Arm;
 use crate::config::Gains;
 use crate::dynamics::Sweep;
 use crate::factors::Factors;
-use crate::impedance::{GREATEST_TASK_MASS_KG, SINGULAR_BELOW_M, singularity_damping_per_kg};
+use crate::impedance::{GREATEST_TASK_MASS_KG, singularity_damping};
 use crate::lanes::{Column, Columns, Lanes, Number, column, entry, in_groups, of_joint, per_joint};
-use crate::linalg::{least_singular_value, singular_values_exceed};
-use crate::math::{Matrix, Matrix3, Vector, Vector3};
+use crate::math::{Matrix3, Vector, Vector3};
 use crate::pose::Pose;
 use crate::trajectory::Reference;
 use core::array::from_fn;
@@ -113,11 +112,7 @@ fn position<const N: usize, const G: usize>(
 ) -> Option<Vector<N>> {
     let sweep = Sweep::<G>::new(arm, q, qd);
     let columns: [[f64; 3]; N] = from_fn(|i| first(of_joint(&sweep.motions, i)));
-    let singularity_damping = if singular_values_exceed(&columns, SINGULAR_BELOW_M) {
-        0.0
-    } else {
-        singularity_damping_per_kg(least_singular_value(&Matrix::from(columns)))
-    };
+    let singularity_damping = singularity_damping(&columns);
     let position = Vector3::from(sweep.tip.origin);
     let rate = Vector3::from(first(sweep.motion.tip_rate::<N>()));
     let drift = Vector3::from(first(sweep.tip_drift(arm)));

@@ -6,7 +6,7 @@ use crate::safety::Press;
 use clap::Parser;
 use std::path::PathBuf;
 use supple_bus::Address;
-use supple_realtime::Settings;
+use supple_realtime::{RealtimeOptions, Settings};
 
 /// The arm seen from its bus, in the place of a real one.
 ///
@@ -52,28 +52,19 @@ pub struct Options {
     /// Priority under SCHED_FIFO, above that of its host: a cable waits for nobody.
     #[arg(long, value_name = "1-99", default_value_t = 81, value_parser = clap::value_parser!(u8).range(1..=99))]
     pub priority: u8,
-    /// Processor for the arm alone; any if not given.
-    #[arg(long, value_name = "N")]
-    pub cpu: Option<usize>,
-    /// Neither priority nor locked memory.
-    #[arg(long)]
-    pub no_realtime: bool,
-    /// Ends when the process that started it ends.
-    #[arg(long, hide = true)]
-    pub supervised: bool,
+    #[command(flatten)]
+    realtime: RealtimeOptions,
 }
 
 impl Options {
+    /// It is to end with the process that started it.
+    pub fn supervised(&self) -> bool {
+        self.realtime.supervised
+    }
+
     /// What to ask of the system.
     pub fn realtime(&self) -> Settings {
-        if self.virtual_time || self.no_realtime {
-            return Settings::NONE;
-        }
-        Settings {
-            priority: Some(self.priority),
-            cpu: self.cpu,
-            lock_memory: true,
-        }
+        self.realtime.settings(self.priority, self.virtual_time)
     }
 }
 

@@ -46,7 +46,7 @@ pub fn main() -> ExitCode {
 
 fn start(options: &Options) -> Result<(), EmulatorError> {
     let stop = Stop::on_signals()?;
-    if options.supervised {
+    if options.supervised() {
         die_with_parent();
     }
     let description = Description::find(&options.arm)?;

@@ -74,6 +74,18 @@ impl Description {
         Self::asset(name_or_path)
     }
 
+    /// As [`Description::find`]; controlled at another rate than its own where one is given \[Hz\].
+    ///
+    /// # Errors
+    /// As [`Description::find`] and [`Description::at_rate`].
+    pub fn find_at_rate(name_or_path: &str, rate_hz: Option<u32>) -> Result<Self, ModelError> {
+        let description = Self::find(name_or_path)?;
+        match rate_hz {
+            Some(rate_hz) => description.at_rate(f64::from(rate_hz)),
+            None => Ok(description),
+        }
+    }
+
     /// A built-in arm, one of [`crate::assets`].
     ///
     /// # Errors

@@ -6,11 +6,13 @@
 
 mod clock;
 mod memory;
+mod options;
 mod schedule;
 mod spin;
 mod stop;
 
 pub use clock::{monotonic_ns, sleep_until_ns};
+pub use options::RealtimeOptions;
 pub use spin::spin_for;
 pub use stop::{Stop, StopError, die_with_parent};
 

@@ -40,7 +40,7 @@ pub fn main() -> ExitCode {
         Ok(stop) => stop,
         Err(error) => return complain(&error.into()),
     };
-    if options.supervised {
+    if options.supervised() {
         die_with_parent();
     }
     let description = match options.description() {

@@ -1,0 +1,32 @@
+//! What every process with a period is told alike.
+
+use crate::Settings;
+use clap::Args;
+
+/// Options of a process with a period, beside the priority of its thread.
+#[derive(Args, Clone, Copy, Debug)]
+pub struct RealtimeOptions {
+    /// Processor for the thread that keeps the period alone; any if not given.
+    #[arg(long, value_name = "N")]
+    pub cpu: Option<usize>,
+    /// Neither priority nor locked memory.
+    #[arg(long)]
+    pub no_realtime: bool,
+    /// Ends when the process that started it ends.
+    #[arg(long, hide = true)]
+    pub supervised: bool,
+}
+
+impl RealtimeOptions {
+    /// What to ask of the system for a thread of this priority: nothing in virtual time.
+    pub fn settings(&self, priority: u8, virtual_time: bool) -> Settings {
+        if virtual_time || self.no_realtime {
+            return Settings::NONE;
+        }
+        Settings {
+            priority: Some(priority),
+            cpu: self.cpu,
+            lock_memory: true,
+        }
+    }
+}
