@@ -14,7 +14,7 @@ def arm():
 
 @pytest.fixture(scope="module")
 def run(arm, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("logs")
+    folder = tmp_path_factory.mktemp("logs") / "not" / "there"
     return supple.simulate(arm, "sinusoid", duration_s=2.0, seed=3, log_dir=folder)
 
 

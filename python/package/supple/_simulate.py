@@ -108,7 +108,7 @@ def simulate(
     seed : int
         Seed of every noise and of the signs above, zero or more.
     log_dir : str or os.PathLike, optional
-        Folder for ``<experiment>.mcap``; see :func:`read_log`.
+        Folder for ``<experiment>.mcap``, made if it is not there; see :func:`read_log`.
 
     Returns
     -------
@@ -144,6 +144,8 @@ def simulate(
         raise ValueError(f"seed: expected zero or more, got {seed}")
     if model is not None and (gravity_error or friction_error):
         raise ValueError("gravity_error, friction_error: expected none beside a model of its own")
+    if log_dir is not None:
+        Path(log_dir).mkdir(parents=True, exist_ok=True)
     result = _native.simulate(
         arm,
         model,
