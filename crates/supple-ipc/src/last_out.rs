@@ -29,8 +29,8 @@ impl Drop for LastOut {
 }
 
 fn clear(domain: &Domain) -> io::Result<()> {
-    // Where somebody is joining, somebody else will be the last.
-    let Some(_turn) = turn::at_once(domain)? else {
+    // Where others join and leave all the time, one of them will be the last.
+    let Some(_turn) = turn::to_leave(domain)? else {
         return Ok(());
     };
     turn::remove_unfinished(domain)?;

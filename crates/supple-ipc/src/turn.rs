@@ -21,6 +21,10 @@ const SHARED_MEMORY: &str = "/dev/shm";
 const TURN: &str = "turn";
 /// A turn is over after milliseconds, unless its process was stopped in the middle.
 const LONGEST_TURN: Duration = Duration::from_secs(10);
+/// How long one who leaves waits for it.
+const LEAVES_WITHIN: Duration = Duration::from_secs(1);
+/// A process that starts another shares its locks with it for a moment, given back ones too.
+const HELD_BY_A_FORK: Duration = Duration::from_millis(200);
 /// How often it is looked whether another's turn is over, and whether an object got its size.
 const LOOK_EVERY: Duration = Duration::from_millis(1);
 /// An object without a size that is older than this gets none any more. Its maker takes microseconds.
@@ -28,37 +32,39 @@ const UNFINISHED_AFTER: Duration = Duration::from_millis(200);
 
 /// The turn, until it is dropped; waits for those of others.
 pub(crate) fn wait(domain: &Domain) -> io::Result<OwnedFd> {
-    let start = Instant::now();
-    loop {
-        if let Some(turn) = at_once(domain)? {
-            return Ok(turn);
-        }
-        if start.elapsed() > LONGEST_TURN {
-            let cause = format!(
-                "another process has been joining or leaving for {} s (`fuser {}` shows which)",
-                LONGEST_TURN.as_secs(),
-                path(domain, TURN).display()
-            );
-            return Err(io::Error::new(io::ErrorKind::TimedOut, cause));
-        }
-        pause(LOOK_EVERY);
-    }
+    let turn = lock_within(domain, TURN, LONGEST_TURN)?;
+    turn.ok_or_else(|| {
+        let cause = format!(
+            "another process has been joining or leaving for {} s (`fuser {}` shows which)",
+            LONGEST_TURN.as_secs(),
+            path(domain, TURN).display()
+        );
+        io::Error::new(io::ErrorKind::TimedOut, cause)
+    })
 }
 
-/// The turn, where nobody else has it.
-pub(crate) fn at_once(domain: &Domain) -> io::Result<Option<OwnedFd>> {
-    lock(domain, TURN)
+/// The turn of one who leaves, and who does not wait for long.
+pub(crate) fn to_leave(domain: &Domain) -> io::Result<Option<OwnedFd>> {
+    lock_within(domain, TURN, LEAVES_WITHIN)
 }
 
 /// A lock of the system, where nobody else has it. The kernel gives it back when its process is gone, however
 /// that ended.
 pub(crate) fn lock(domain: &Domain, name: &str) -> io::Result<Option<OwnedFd>> {
+    lock_within(domain, name, HELD_BY_A_FORK)
+}
+
+fn lock_within(domain: &Domain, name: &str, longest: Duration) -> io::Result<Option<OwnedFd>> {
     let flags = OFlags::CREATE | OFlags::RDWR | OFlags::CLOEXEC;
     let file = open(path(domain, name), flags, Mode::RUSR | Mode::WUSR)?;
-    match flock(&file, FlockOperation::NonBlockingLockExclusive) {
-        Ok(()) => Ok(Some(file)),
-        Err(Errno::WOULDBLOCK) => Ok(None),
-        Err(error) => Err(error.into()),
+    let start = Instant::now();
+    loop {
+        match flock(&file, FlockOperation::NonBlockingLockExclusive) {
+            Ok(()) => return Ok(Some(file)),
+            Err(Errno::WOULDBLOCK) if start.elapsed() < longest => pause(LOOK_EVERY),
+            Err(Errno::WOULDBLOCK) => return Ok(None),
+            Err(error) => return Err(error.into()),
+        }
     }
 }
 
