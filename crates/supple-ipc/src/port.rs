@@ -158,6 +158,7 @@ impl Rope {
     }
 }
 
+/// The library waits for ever where the time-out is zero in the socket's unit, the microsecond.
 const SHORTEST_WAIT: Duration = Duration::from_micros(100);
 
 /// The side of a bell that hears it.
@@ -203,9 +204,8 @@ impl Bell {
     }
 
     /// As [`Bell::wait`], with the time-out of the socket, for who is seldom left waiting. It sets no timer of
-    /// high resolution, which costs a virtual machine two exits to its host in every wait.
+    /// high resolution, which is dear in a virtual machine (`benches/latency`).
     pub fn wait_in_ticks(&self, timeout: Duration) -> Result<bool, IpcError> {
-        // The library waits for ever where the time-out is zero in the socket's unit.
         match self.listener.timed_wait_one(timeout.max(SHORTEST_WAIT)) {
             Ok(rung) => Ok(rung.is_some()),
             // It takes a signal for a failure; of what is one the other wait has the words.

@@ -91,7 +91,6 @@ fn a_controller_killed_while_it_joins_is_replaced() {
         plant.answer(0, Duration::ZERO).expect("read");
     }
     let mut child = start(&system);
-
     until_answered(&plant, 0);
     child.kill().expect("SIGKILL");
     child.wait().expect("it is gone");
