@@ -251,13 +251,7 @@ impl<const N: usize> Arm<N> {
 
     /// Link `i` (the last one with the tool) in joint frame `i`.
     pub fn body(&self, i: usize) -> Body {
-        let link = &self.links[i];
-        let com_m = link.first_moment / link.mass;
-        Body {
-            mass_kg: link.mass,
-            com_m,
-            inertia_kg_m2: link.inertia - crate::body::steiner(link.mass, &com_m),
-        }
+        self.links[i].body()
     }
 
     /// Tip frame in the last joint frame.
@@ -274,6 +268,16 @@ impl Link {
         inertia: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
         link_from_joint: Pose::IDENTITY.rotation,
     };
+
+    /// About its centre of mass, in the joint frame.
+    pub(crate) fn body(&self) -> Body {
+        let com_m = self.first_moment / self.mass;
+        Body {
+            mass_kg: self.mass,
+            com_m,
+            inertia_kg_m2: self.inertia - crate::body::steiner(self.mass, &com_m),
+        }
+    }
 }
 
 fn check_gravity(gravity_m_per_s2: &Vector3<f64>) -> Result<(), ArmError> {

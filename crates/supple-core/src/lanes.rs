@@ -230,6 +230,20 @@ pub(crate) fn per_joint<const N: usize, const G: usize>(row: &[Lanes; G]) -> [f6
     from_fn(|i| entry(row, i))
 }
 
+/// Sum over the joints.
+#[inline(always)]
+pub(crate) fn total<const G: usize>(row: &Column<G>) -> f64 {
+    let mut sum = row[0];
+    for x in &row[1..] {
+        sum += *x;
+    }
+    let [a, b, c, d] = sum.to_array();
+    (a + b) + (c + d)
+}
+
+/// What changes no number that it is added to, and takes no instruction: `-0 + 0` is not `-0`.
+pub(crate) const NOTHING: f64 = -0.0;
+
 /// Of each joint, the sum of `start` and of the terms of the joints up to it.
 #[inline(always)]
 pub(crate) fn sums_outward<const K: usize, const G: usize>(
@@ -253,7 +267,7 @@ pub(crate) fn sums_outward<const K: usize, const G: usize>(
 #[inline(always)]
 pub(crate) fn sums_inward<const K: usize, const G: usize>(mut terms: Rows<K, G>) -> Rows<K, G> {
     for row in &mut terms {
-        let mut beyond = Lanes::ZERO;
+        let mut beyond = Lanes::splat(NOTHING);
         for x in row.iter_mut().rev() {
             let [_, b, c, d] = x.to_array();
             let pairs = *x + Lanes::new([b, c, d, 0.0]);

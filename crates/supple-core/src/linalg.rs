@@ -4,6 +4,7 @@
     reason = "joints, groups and lanes are counted: each index goes into several arrays"
 )]
 
+use crate::dynamics::vec3::{V3, cross, dot};
 use crate::lanes::Number;
 use crate::math::{Matrix, Matrix3, abs, acos, sqrt};
 use crate::sincos::sin_cos_all;
@@ -130,6 +131,41 @@ pub fn singular_values_exceed<const N: usize>(j: &[[f64; 3]; N], bound: f64) -> 
     (xx > 0.0) & (minor > 0.0) & (determinant > 0.0)
 }
 
+/// Inverse of a 3 x 3 matrix that is given by columns.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Inverse3 {
+    /// Its rows times the determinant.
+    rows: [V3; 3],
+    determinant: f64,
+}
+
+impl Inverse3 {
+    #[inline(always)]
+    pub fn new([a, b, c]: [V3; 3]) -> Inverse3 {
+        let rows = [cross(b, c), cross(c, a), cross(a, b)];
+        Inverse3 {
+            rows,
+            determinant: dot(a, rows[0]),
+        }
+    }
+
+    /// Whether all singular values of the matrix are surely above `bound`: its Frobenius norm bounds the
+    /// greatest one of the inverse. Cheaper than [`singular_values_exceed`], which finds all for which it is so.
+    #[inline(always)]
+    pub fn surely_exceeds(&self, bound: f64) -> bool {
+        let [a, b, c] = self.rows;
+        let squares = dot(a, a) + dot(b, b) + dot(c, c);
+        squares * (bound * bound) < self.determinant * self.determinant
+    }
+
+    /// The inverse times `x`.
+    #[inline(always)]
+    pub fn times(&self, x: V3) -> V3 {
+        let scale = 1.0 / self.determinant;
+        self.rows.map(|row| dot(row, x) * scale)
+    }
+}
+
 /// `J J^T`: `xx, xy, yy, xz, yz, zz`.
 #[inline(always)]
 fn gram_3<const N: usize>(j: &[[f64; 3]; N]) -> [f64; 6] {
@@ -152,4 +188,50 @@ pub fn least_singular_value<const N: usize>(j: &Matrix<3, N>) -> f64 {
     let gram = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
     let [least, ..] = symmetric_eigenvalues(&gram);
     sqrt(least.max(0.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Inverse3, singular_values_exceed};
+    use crate::math::{Matrix3, Vector3};
+    use proptest::array::uniform3;
+    use proptest::prelude::*;
+    use proptest::test_runner::RngSeed;
+
+    proptest! {
+        #![proptest_config(ProptestConfig {
+            failure_persistence: None,
+            rng_seed: RngSeed::Fixed(20_261_122),
+            ..ProptestConfig::default()
+        })]
+
+        #[test]
+        fn an_inverse_of_three_columns(
+            columns in uniform3(uniform3(-2.0..2.0)),
+            x in uniform3(-2.0..2.0),
+            bound in 1e-3..2.0,
+        ) {
+            let (inverse, matrix) = (Inverse3::new(columns), Matrix3::from(columns));
+            let again = inverse.times((matrix * Vector3::from(x)).data.0[0]);
+            let error = Vector3::from(again) - Vector3::from(x);
+            // Beside the entries of the matrix, the least singular value is a measure of its condition.
+            let least = matrix.singular_values().min();
+            prop_assert!(error.amax() * least * least < 1e-12, "{error}");
+            if inverse.surely_exceeds(bound) {
+                prop_assert!(singular_values_exceed(&columns, bound * (1.0 - 1e-9)));
+            }
+            // Not far from all: the Frobenius norm is at most the root of three times the greatest.
+            if singular_values_exceed(&columns, bound * 1.8) {
+                prop_assert!(inverse.surely_exceeds(bound));
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_is_sure_of_a_singular_matrix() {
+        let flat = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]];
+        assert!(!Inverse3::new(flat).surely_exceeds(1e-9));
+        assert!(!Inverse3::new([[0.0; 3]; 3]).surely_exceeds(0.0));
+        assert!(!Inverse3::new([[f64::NAN; 3]; 3]).surely_exceeds(0.1));
+    }
 }

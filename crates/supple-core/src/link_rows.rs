@@ -10,8 +10,10 @@ const PARENT_FROM_JOINT: usize = 0;
 const BODY: usize = 12;
 /// Rotation of the joint frame in the link frame, by columns.
 const LINK_FROM_JOINT: usize = 22;
+/// Centre of mass, and inertia about it `xx, xy, yy, xz, yz, zz`, in the joint frame.
+const CENTRAL: usize = 31;
 /// The last group of the last row is read beyond its end.
-const ROWS: usize = 31 + LANES - 1;
+const ROWS: usize = 40 + LANES - 1;
 
 /// Constants of each link, a row for each.
 #[derive(Clone, Copy, Debug)]
@@ -29,7 +31,7 @@ impl<const N: usize> LinkRows<N> {
                     row[i] = *x;
                 }
             };
-            let inertia = &link.inertia;
+            let (inertia, central) = (&link.inertia, link.body());
             put(PARENT_FROM_JOINT, pose.rotation.as_slice());
             put(PARENT_FROM_JOINT + 9, pose.translation.as_slice());
             put(BODY, &[link.mass]);
@@ -37,6 +39,11 @@ impl<const N: usize> LinkRows<N> {
             let entries = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
             put(BODY + 4, &entries.map(|entry| inertia[entry]));
             put(LINK_FROM_JOINT, link.link_from_joint.as_slice());
+            put(CENTRAL, central.com_m.as_slice());
+            put(
+                CENTRAL + 3,
+                &entries.map(|entry| central.inertia_kg_m2[entry]),
+            );
         }
         LinkRows { rows }
     }
@@ -63,13 +70,19 @@ impl<const N: usize> LinkRows<N> {
     /// Each link's ten numbers. Beyond the last joint: zeros.
     #[inline(always)]
     pub fn bodies<const G: usize>(&self) -> Rows<10, G> {
-        let mut bodies = self.groups(BODY);
-        for row in &mut bodies {
-            for (group, x) in row.iter_mut().enumerate() {
-                *x &= joints::<N>(group);
-            }
-        }
-        bodies
+        only_joints::<10, N, G>(self.groups(BODY))
+    }
+
+    /// Each link's mass. Beyond the last joint: zeros.
+    #[inline(always)]
+    pub fn masses<const G: usize>(&self) -> Rows<1, G> {
+        only_joints::<1, N, G>(self.groups(BODY))
+    }
+
+    /// Each link's centre of mass, then its inertia about it. Beyond the last joint: zeros.
+    #[inline(always)]
+    pub fn central<const G: usize>(&self) -> Rows<9, G> {
+        only_joints::<9, N, G>(self.groups(CENTRAL))
     }
 
     /// Number `k` of the body of link `i`.
@@ -93,6 +106,17 @@ impl<const N: usize> LinkRows<N> {
         }
         out
     }
+}
+
+/// Zeros beyond the last joint.
+#[inline(always)]
+fn only_joints<const K: usize, const N: usize, const G: usize>(mut rows: Rows<K, G>) -> Rows<K, G> {
+    for row in &mut rows {
+        for (group, x) in row.iter_mut().enumerate() {
+            *x &= joints::<N>(group);
+        }
+    }
+    rows
 }
 
 /// All bits of the lanes that have a joint.

@@ -27,8 +27,9 @@ use crate::arm::Arm;
 use crate::config::Gains;
 use crate::dynamics::Sweep;
 use crate::factors::Factors;
-use crate::impedance::{GREATEST_TASK_MASS_KG, singularity_damping};
+use crate::impedance::{GREATEST_TASK_MASS_KG, SINGULAR_BELOW_M, singularity_damping};
 use crate::lanes::{Column, Columns, Lanes, Number, column, entry, in_groups, of_joint, per_joint};
+use crate::linalg::Inverse3;
 use crate::math::{Matrix3, Vector, Vector3};
 use crate::pose::Pose;
 use crate::trajectory::Reference;
@@ -112,10 +113,15 @@ fn position<const N: usize, const G: usize>(
 ) -> Option<Vector<N>> {
     let sweep = Sweep::<G>::new(arm, q, qd);
     let columns: [[f64; 3]; N] = from_fn(|i| first(of_joint(&sweep.motions, i)));
-    let singularity_damping = singularity_damping(&columns);
-    let position = Vector3::from(sweep.tip.origin);
+    let inverse = Inverse3::new(from_fn(|i| columns[i]));
+    let singularity_damping = if N == 3 && inverse.surely_exceeds(SINGULAR_BELOW_M) {
+        0.0
+    } else {
+        singularity_damping(&columns)
+    };
+    let position = Vector3::from(sweep.chain.tip.origin);
     let rate = Vector3::from(first(sweep.motion.tip_rate::<N>()));
-    let drift = Vector3::from(first(sweep.tip_drift(arm)));
+    let drift = Vector3::from(first(sweep.tip_drift::<N>()));
     let error = reference.position - position;
     let rate_error = reference.velocity - rate;
     let task = Task {
@@ -127,8 +133,7 @@ fn position<const N: usize, const G: usize>(
         .0[0],
     };
     if N == 3 && singularity_damping == 0.0 {
-        let columns = from_fn(|i| columns[i]);
-        return Some(task.square_torque(arm, sweep, columns));
+        return Some(task.square_torque(arm, sweep, &inverse));
     }
     let damped = |_, pivot| pivot + singularity_damping;
     if N == 3 {
@@ -166,8 +171,8 @@ fn pose<const N: usize, const G: usize>(
     nullspace_damping: f64,
 ) -> Option<Vector<N>> {
     let sweep = Sweep::<G>::new(arm, q, qd);
-    let (rate, drift) = (sweep.motion.tip_rate::<N>(), sweep.tip_drift(arm));
-    let tip = sweep.tip.pose();
+    let (rate, drift) = (sweep.motion.tip_rate::<N>(), sweep.tip_drift::<N>());
+    let tip = sweep.chain.tip.pose();
     let wanted = &reference.base_from_tip;
     let error = pair(
         &(wanted.translation - tip.translation),
@@ -282,15 +287,10 @@ impl Task<3> {
         &self,
         arm: &Arm<N>,
         sweep: Sweep<G>,
-        columns: [[f64; 3]; 3],
+        inverse: &Inverse3,
     ) -> Vector<N> {
-        let column = |i: usize| Vector3::from(columns[i]);
-        let (a, b, c) = (column(0), column(1), column(2));
-        let (bc, ca, ab) = (b.cross(&c), c.cross(&a), a.cross(&b));
-        let wanted = Vector3::from(self.acceleration);
-        let scale = 1.0 / a.dot(&bc);
-        let rows = [bc, ca, ab];
-        let qdd = from_fn(|i| rows[i].dot(&wanted) * scale);
+        let rates = inverse.times(self.acceleration);
+        let qdd = from_fn(|i| rates[i]);
         let force = per_joint(&self.joints(&sweep, &self.force));
         Vector::from(per_joint(&sweep.inverse_dynamics(arm, &qdd))) + Vector::from(force)
     }

@@ -61,6 +61,13 @@ impl Place<Lanes> {
     }
 }
 
+/// With another number in the first lane.
+#[inline(always)]
+fn first_lane(x: Lanes, first: f64) -> Lanes {
+    let [_, b, c, d] = x.to_array();
+    Lanes::new([first, b, c, d])
+}
+
 const UNTURNED: [f64; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
 
 impl Frame {
@@ -91,7 +98,7 @@ impl Frame {
 }
 
 /// `base_from_joint` of every joint, by rows, and `base_from_tip`.
-pub(super) struct Chain<const G: usize> {
+pub(crate) struct Chain<const G: usize> {
     pub rotations: Rows<9, G>,
     pub origins: Rows<3, G>,
     pub tip: Frame,
@@ -100,8 +107,31 @@ pub(super) struct Chain<const G: usize> {
 impl<const G: usize> Chain<G> {
     #[inline(always)]
     pub fn new<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> Self {
-        let local = parent_rotations::<N, G>(arm, q);
-        let steps = arm.rows.origins::<G>();
+        Self::of_steps(arm, parent_rotations::<N, G>(arm, q), arm.rows.origins(), N)
+    }
+
+    /// The same in the axes of the first joint, about its origin: what is of the joints alone is not changed by
+    /// it, and three joints have one composition less.
+    #[inline(always)]
+    pub fn from_first_joint<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> Self {
+        let (mut turns, mut origins) = (parent_rotations::<N, G>(arm, q), arm.rows.origins::<G>());
+        for (row, x) in turns.iter_mut().zip(UNTURNED) {
+            row[0] = first_lane(row[0], x);
+        }
+        for row in &mut origins {
+            row[0] = first_lane(row[0], 0.0);
+        }
+        Self::of_steps(arm, turns, origins, N - 1)
+    }
+
+    /// From the pose of each joint in its parent's, of which all but `turned` are the identity.
+    #[inline(always)]
+    fn of_steps<const N: usize>(
+        arm: &Arm<N>,
+        local: Rows<9, G>,
+        steps: Rows<3, G>,
+        turned: usize,
+    ) -> Self {
         let (mut rotations, mut origins) = ([[Lanes::ZERO; G]; 9], [[Lanes::ZERO; G]; 3]);
         let mut before = Place::<Lanes>::base();
         for group in 0..G {
@@ -112,9 +142,12 @@ impl<const G: usize> Chain<G> {
             let pairs = step
                 .shifted(|[a, b, c, _], base| [base, a, b, c])
                 .then(&step);
-            let mut place = pairs
-                .shifted(|[a, b, ..], base| [base, base, a, b])
-                .then(&pairs);
+            let mut place = pairs;
+            if turned > 2 {
+                place = pairs
+                    .shifted(|[a, b, ..], base| [base, base, a, b])
+                    .then(&pairs);
+            }
             if group > 0 {
                 place = before.then(&place);
             }

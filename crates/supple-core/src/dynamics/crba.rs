@@ -23,7 +23,10 @@ pub fn crba<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> Matrix<N, N> {
 
 #[inline]
 fn of_position<const N: usize, const G: usize>(arm: &Arm<N>, q: &Vector<N>) -> Matrix<N, N> {
-    let chain = Chain::<G>::new(arm, q);
+    let chain = match N {
+        ..=3 => Chain::<G>::from_first_joint(arm, q),
+        _ => Chain::new(arm, q),
+    };
     let last = of_joint(&chain.origins, N - 1);
     let carried = sums_inward(bodies(arm, &chain, last));
     symmetric(&mass_columns(arm, &joint_motions(&chain, last), &carried))

@@ -51,15 +51,21 @@ pub(super) fn in_base<T: Number>(body: [T; 10], rotation: &[T; 9], r: V3<T>) -> 
 pub(super) fn times<T: Number>(body: [T; 10], motion: [T; 6]) -> [T; 6] {
     let (linear, angular) = halves(motion);
     let moment = [body[1], body[2], body[3]];
-    let spun = [
-        dot([body[4], body[5], body[7]], angular),
-        dot([body[5], body[6], body[8]], angular),
-        dot([body[7], body[8], body[9]], angular),
-    ];
+    let inertia = [body[4], body[5], body[6], body[7], body[8], body[9]];
     join(
         add_cross(scale(linear, body[0]), angular, moment),
-        add_cross(spun, moment, linear),
+        add_cross(spun(inertia, angular), moment, linear),
     )
+}
+
+/// `I w`, with `I` as `xx, xy, yy, xz, yz, zz`.
+#[inline(always)]
+pub(super) fn spun<T: Number>([xx, xy, yy, xz, yz, zz]: [T; 6], w: V3<T>) -> V3<T> {
+    [
+        dot([xx, xy, xz], w),
+        dot([xy, yy, yz], w),
+        dot([xz, yz, zz], w),
+    ]
 }
 
 /// Rate of a motion that is fixed in a body of velocity `twist`.

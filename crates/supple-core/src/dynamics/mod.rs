@@ -19,7 +19,7 @@ mod regressor;
 mod rnea;
 mod sweep;
 mod terms;
-mod vec3;
+pub(crate) mod vec3;
 
 pub use aba::aba;
 pub use coriolis::{coriolis, coriolis_matrix};

@@ -1,8 +1,13 @@
 //! Velocities and accelerations of all links, and the forces that they take, in base axes about the tip.
 
-use super::inertia::{cross_force, cross_motion, times};
-use super::vec3::{V3, add, add_cross, halves, join};
-use crate::lanes::{Lanes, Rows, column, for_each_joint, of_joint, scaled, sums_outward};
+use super::chain::Chain;
+use super::inertia::{cross_force, cross_motion, spun, times};
+use super::vec3::{V3, add, add_cross, add_rotated, cross, halves, join, rotate_back, scale, sub};
+use crate::arm::Arm;
+use crate::lanes::{
+    Lanes, NOTHING, Number, Rows, column, for_each_joint, of_joint, scaled, splat, sums_outward,
+    total,
+};
 use crate::math::Vector;
 
 /// How every link moves.
@@ -12,6 +17,12 @@ pub(crate) struct Motion<const G: usize> {
     pub rates: Rows<6, G>,
     /// With the base accelerated upwards, of the link's point that is at the reference point: spatial.
     pub accelerations: Rows<6, G>,
+    /// What each joint adds to the velocity of the one before.
+    steps: Rows<6, G>,
+    /// What each joint adds to the acceleration of the one before.
+    added: Rows<6, G>,
+    /// Acceleration of the base.
+    base: [f64; 6],
 }
 
 impl<const G: usize> Motion<G> {
@@ -19,35 +30,32 @@ impl<const G: usize> Motion<G> {
     #[inline(always)]
     pub fn new<const N: usize>(motions: &Rows<6, G>, qd: &Vector<N>, gravity: V3) -> Self {
         let speeds = [column::<N, G>(&qd.data.0[0])];
-        let twists =
-            for_each_joint!([speed] in &speeds, motion in motions => scaled(motion, speed));
-        let twists = sums_outward([0.0; 6], twists);
+        let steps = for_each_joint!([speed] in &speeds, motion in motions => scaled(motion, speed));
+        let twists = sums_outward([NOTHING; 6], steps);
         let rates =
             for_each_joint!(twist in &twists, motion in motions => cross_motion(twist, motion));
-        let up = [-gravity[0], -gravity[1], -gravity[2], 0.0, 0.0, 0.0];
-        let accelerations =
-            for_each_joint!([speed] in &speeds, rate in &rates => scaled(rate, speed));
+        let base = join(gravity.map(|g| -g), [NOTHING; 3]);
+        let added = for_each_joint!([speed] in &speeds, rate in &rates => scaled(rate, speed));
         Motion {
             twists,
             rates,
-            accelerations: sums_outward(up, accelerations),
+            accelerations: sums_outward(base, added),
+            steps,
+            added,
+            base,
         }
     }
 
     /// The same with the joint accelerations `qdd`.
     #[inline(always)]
     pub fn accelerated<const N: usize>(mut self, motions: &Rows<6, G>, qdd: &[f64; N]) -> Self {
-        let rates = [column::<N, G>(qdd)];
-        let own = for_each_joint!([rate] in &rates, motion in motions => scaled(motion, rate));
-        for (row, own) in self
-            .accelerations
-            .iter_mut()
-            .zip(sums_outward([0.0; 6], own))
-        {
-            for (x, own) in row.iter_mut().zip(own) {
-                *x += own;
+        let qdd = column::<N, G>(qdd);
+        for (added, motion) in self.added.iter_mut().zip(motions) {
+            for group in 0..G {
+                added[group] = motion[group].times_plus(qdd[group], added[group]);
             }
         }
+        self.accelerations = sums_outward(self.base, self.added);
         self
     }
 
@@ -57,13 +65,19 @@ impl<const G: usize> Motion<G> {
         of_joint(&self.twists, N - 1)
     }
 
-    /// Classical acceleration of the tip at `qdd = 0`, `J' qd`.
+    /// Classical acceleration of the tip at `qdd = 0`, `J' qd`: joint `i` turns what the joints before it give
+    /// the tip, and they what it gives.
     #[inline(always)]
-    pub fn tip_drift<const N: usize>(&self, gravity: V3) -> [f64; 6] {
-        let (velocity, spin) = halves(self.tip_rate::<N>());
-        let (linear, angular) = halves(of_joint(&self.accelerations, N - 1));
-        let linear = add(add_cross(linear, spin, velocity), gravity);
-        join(linear, angular)
+    pub fn tip_drift<const N: usize>(&self) -> [f64; 6] {
+        let linear: Rows<3, G> = for_each_joint!(twist in &self.twists, step in &self.steps => {
+            let ((_, spin), (linear, angular)) = (halves(twist), halves(step));
+            cross(sub(add(spin, spin), angular), linear)
+        });
+        let (_, angular) = halves(of_joint(&self.accelerations, N - 1));
+        join(
+            [total(&linear[0]), total(&linear[1]), total(&linear[2])],
+            angular,
+        )
     }
 
     /// Force on each link, and its momentum.
@@ -79,6 +93,31 @@ impl<const G: usize> Motion<G> {
                     both[k + 6] = momentum[k];
                 }
                 both
+            }
+        )
+    }
+
+    /// The force alone, by Newton and Euler about the centre of mass: no inertia has to be brought to the base.
+    #[inline(always)]
+    pub fn forces_of_links<const N: usize>(
+        &self,
+        arm: &Arm<N>,
+        chain: &Chain<G>,
+        point: V3,
+    ) -> Rows<6, G> {
+        let point = splat(point);
+        let (masses, links) = (arm.rows.masses::<G>(), arm.rows.central::<G>());
+        for_each_joint!(
+            [mass] in &masses, link in &links, r in &chain.rotations, origin in &chain.origins,
+            twist in &self.twists, accel in &self.accelerations => {
+                let [x, y, z, inertia @ ..] = link;
+                let com = add_rotated(sub(origin, point), &r, [x, y, z]);
+                let ((v, w), (a, rate)) = (halves(twist), halves(accel));
+                let com_accel = add_cross(add_cross(a, rate, com), w, add_cross(v, w, com));
+                let force = scale(com_accel, mass);
+                let (w, rate) = (rotate_back(&r, w), rotate_back(&r, rate));
+                let moment = add_cross(spun(inertia, rate), w, spun(inertia, w));
+                join(force, add_rotated(cross(com, force), &r, moment))
             }
         )
     }

@@ -1,7 +1,7 @@
 //! The one sweep out and back that gives every term of the law, in groups of joints: [`super::terms`] puts
 //! it into matrices, [`crate::operational`] goes on with it as it is.
 
-use super::chain::{Chain, Frame};
+use super::chain::Chain;
 use super::crba::mass_columns;
 use super::frames::{bodies, joint_motions};
 use super::inertia::weight_on;
@@ -13,8 +13,8 @@ use crate::math::Vector;
 
 /// An arm in a state. What nobody asks for is not computed: everything here is inlined.
 pub(crate) struct Sweep<const G: usize> {
-    /// `base_from_tip`.
-    pub tip: Frame,
+    /// Where the joints and the tip are.
+    pub chain: Chain<G>,
     /// The Jacobian's rows.
     pub motions: Rows<6, G>,
     /// Velocities, and accelerations without those of the joints.
@@ -41,15 +41,15 @@ impl<const G: usize> Sweep<G> {
         Sweep {
             motion: Motion::new(&motions, qd, arm.gravity.data.0[0]),
             bodies: bodies(arm, &chain, chain.tip.origin),
-            tip: chain.tip,
             motions,
+            chain,
         }
     }
 
     /// `J' qd` of the tip.
     #[inline(always)]
-    pub fn tip_drift<const N: usize>(&self, arm: &Arm<N>) -> [f64; 6] {
-        self.motion.tip_drift::<N>(arm.gravity.data.0[0])
+    pub fn tip_drift<const N: usize>(&self) -> [f64; 6] {
+        self.motion.tip_drift::<N>()
     }
 
     /// The mass matrix, right from the diagonal downwards, with rotor inertias.
@@ -90,7 +90,10 @@ impl<const G: usize> Sweep<G> {
     #[inline(always)]
     pub fn inverse_dynamics<const N: usize>(self, arm: &Arm<N>, qdd: &[f64; N]) -> Column<G> {
         let motion = self.motion.accelerated(&self.motions, qdd);
-        let mut torque = Sweep { motion, ..self }.held().torque;
+        let forces = motion.forces_of_links(arm, &self.chain, self.chain.tip.origin);
+        let held = sums_inward(forces);
+        let [mut torque] =
+            for_each_joint!(axis in &self.motions, force in &held => [dot6(axis, force)]);
         let (armature, qdd) = (column::<N, G>(&arm.armature.data.0[0]), column::<N, G>(qdd));
         for group in 0..G {
             torque[group] += armature[group] * qdd[group];

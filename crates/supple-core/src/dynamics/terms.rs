@@ -61,9 +61,9 @@ fn fill<const N: usize, const G: usize>(
 ) {
     let sweep = Sweep::<G>::new(arm, q, qd);
     let held = sweep.held();
-    out.base_from_tip = sweep.tip.pose();
+    out.base_from_tip = sweep.chain.tip.pose();
     out.jacobian = matrix(&sweep.motions);
-    out.jacobian_dot_qd = Vector::from(sweep.tip_drift(arm));
+    out.jacobian_dot_qd = Vector::from(sweep.tip_drift::<N>());
     out.gravity = Vector::from(per_joint(&sweep.gravity(arm)));
     out.coriolis_gravity = Vector::from(per_joint(&held.torque));
     out.momentum = Vector::from(per_joint(&held.momentum)) + arm.armature.component_mul(qd);
