@@ -28,6 +28,10 @@ impl<const N: usize> Controlled<N> {
 }
 
 impl<const N: usize> Link<N> for Controlled<N> {
+    fn announce(&mut self) -> Result<(), CanError> {
+        Ok(())
+    }
+
     fn publish(&mut self, report: &ArmReport<N>) -> Result<(), CanError> {
         self.report = Some(*report);
         self.output = None;

@@ -265,6 +265,7 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
         self.counts = [None; N];
         let request = get(GroupId::ARM, self.ids.position);
         self.send(&request)?;
+        self.link.announce()?;
         // Later than this the answer and the torques would not fit any more.
         let reserved_ns = self.time.torques_ns + self.rhythm.answer_ns;
         let until_ns = start_ns + self.rhythm.period_ns - reserved_ns;

@@ -81,6 +81,12 @@ pub struct Answer<const N: usize> {
 
 /// The way to the controller.
 pub trait Link<const N: usize> {
+    /// Tells the controller that it will soon be told about the arm, where that is of use to it.
+    ///
+    /// # Errors
+    /// Where the way is broken, not where the controller is missing.
+    fn announce(&mut self) -> Result<(), CanError>;
+
     /// Tells the controller about the arm.
     ///
     /// # Errors

@@ -53,6 +53,13 @@ impl From<message::MessageError> for CanError {
 }
 
 impl<const N: usize> Link<N> for SharedMemory {
+    fn announce(&mut self) -> Result<(), CanError> {
+        if !self.virtual_time {
+            self.link.announce()?;
+        }
+        Ok(())
+    }
+
     fn publish(&mut self, report: &ArmReport<N>) -> Result<(), CanError> {
         let counters = &report.counters;
         let state = ArmState::new(

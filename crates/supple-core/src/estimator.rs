@@ -10,7 +10,11 @@
 //! velocity of standard deviation `d sqrt(omega^3 T / 48)` for `omega T` small: 1.1 mrad/s for 85 urad,
 //! 200 rad/s and 1 ms. A difference over one cycle would give 35 mrad/s.
 
-use crate::math::{Vector, exp};
+use crate::math::{Vector, abs, exp};
+
+/// Speeds below this are none \[rad/s\]: a turn in 200,000 years. The velocity of a joint that stands still would
+/// otherwise decay to a subnormal number, with which many a processor takes a hundred times as long.
+const LEAST_SPEED_RAD_PER_S: f64 = 1e-12;
 
 /// State of the estimator.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,6 +52,9 @@ impl<const N: usize> Estimator<N> {
                 let innovation = y - self.position_rad[i];
                 self.position_rad[i] += position_gain * innovation;
                 self.velocity_rad_per_s[i] += velocity_gain * innovation;
+                if abs(self.velocity_rad_per_s[i]) < LEAST_SPEED_RAD_PER_S {
+                    self.velocity_rad_per_s[i] = 0.0;
+                }
                 if !(self.position_rad[i].is_finite() && self.velocity_rad_per_s[i].is_finite()) {
                     (self.position_rad[i], self.velocity_rad_per_s[i]) = (*y, 0.0);
                 }

@@ -189,3 +189,23 @@ fn readings_so_far_apart_that_they_overflow() {
     assert!((estimator.position_rad[0] - 0.5).abs() < 1e-9);
     assert!(estimator.velocity_rad_per_s[0].abs() < 1e-9);
 }
+
+/// A number that is nearly zero and no longer of full precision is slow to compute with, and would stay: an arm
+/// that stood still would be one whose controller is late.
+#[test]
+fn a_joint_that_comes_to_rest_has_no_subnormal_velocity() {
+    for (omega, period_s) in [(200.0, 1e-3), (50.0, 2e-3), (700.0, 5e-4)] {
+        for start in [0.0, 0.3, -2.7] {
+            let mut estimator = Estimator::at_rest(one(start));
+            for k in 0..20_000_u32 {
+                let y = start + 0.7 * period_s * f64::from(k.min(40));
+                estimator.update(&[Some(y)], period_s, omega);
+                let velocity = estimator.velocity_rad_per_s[0];
+                assert!(
+                    velocity == 0.0 || velocity.abs() > 1e-13,
+                    "{velocity} at {k}"
+                );
+            }
+        }
+    }
+}

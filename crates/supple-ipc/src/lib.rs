@@ -32,6 +32,7 @@
 
 #![forbid(unsafe_code)]
 
+mod bell;
 mod domain;
 mod error;
 mod last_out;
@@ -43,6 +44,6 @@ mod turn;
 
 pub use domain::{DEFAULT_PREFIX, Domain, PREFIX_VARIABLE};
 pub use error::IpcError;
-pub use link::{ControllerLink, Heard, PlantLink};
+pub use link::{ControllerLink, Heard, PlantLink, Woken};
 pub use outside::{Operator, OutsideLink, TELEMETRY_DEPTH, TelemetryReader, pause};
 pub use port::Full;

@@ -1,13 +1,17 @@
 //! The control path: arm states one way, torque commands the other, a bell for each.
 //!
 //! The plant owns the clock: it publishes a state and rings, the controller answers with the command of the
-//! same cycle and rings back. Neither waits for the other without a bound.
+//! same cycle and rings back. Neither waits for the other without a bound. Where both share a processor, whatever
+//! the controller does between its ring and its sleep keeps the plant waiting: so the plant rings before a state
+//! too, when there is time for everything else.
 
+use crate::bell::{Bell, Ring, Rope};
 use crate::domain::Domain;
 use crate::error::IpcError;
 use crate::last_out::LastOut;
 use crate::message::{ArmState, TorqueCommand};
-use crate::port::{Bell, Full, Reader, Rope, Terms, Writer};
+use crate::port::{Full, Reader, Terms, Writer};
+use core::cell::{Cell, LazyCell};
 use core::time::Duration;
 use std::time::Instant;
 
@@ -26,17 +30,20 @@ const COMMANDS: Terms = Terms {
     depth: 2,
     oldest_goes: true,
 };
-const STATE_BELL: &str = "arm_state_bell";
-const COMMAND_BELL: &str = "torque_command_bell";
+const STATE_BELL: &str = "arm_state";
+const COMMAND_BELL: &str = "torque_command";
 
 /// The plant's end, of `supple-sim` or `supple-can`. It stays in the thread that made it.
 #[derive(Debug)]
 pub struct PlantLink {
+    // Given up before the place is: the bell of the next is not to be taken away.
+    bell: Bell,
+    rope: Rope,
     states: Writer<ArmState>,
     commands: Reader<TorqueCommand>,
-    rope: Rope,
-    bell: Bell,
     spin: Duration,
+    /// Its ring of an answer that was found without it.
+    rung: Cell<bool>,
     _last_out: LastOut,
 }
 
@@ -59,9 +66,10 @@ impl PlantLink {
         Ok(PlantLink {
             states: Writer::new(domain, &joining.node, &STATES, Full::Lose)?,
             commands: Reader::new(domain, &joining.node, &COMMANDS)?,
-            rope: Rope::new(domain, &joining.node, STATE_BELL)?,
-            bell: Bell::new(&joining.node, COMMAND_BELL)?,
+            rope: Rope::new(domain, STATE_BELL)?,
+            bell: Bell::new(domain, COMMAND_BELL)?,
             spin: Duration::ZERO,
+            rung: Cell::new(false),
             _last_out: LastOut::of(domain),
         })
     }
@@ -78,9 +86,29 @@ impl PlantLink {
     /// # Errors
     /// [`IpcError::Service`].
     pub fn publish(&self, state: &ArmState) -> Result<bool, IpcError> {
+        self.silence()?;
         let readers = self.states.send(state)?;
-        self.rope.ring();
+        self.rope.ring(Ring::Sent);
         Ok(readers > 0)
+    }
+
+    /// Tells the controller that a state follows within some tens or hundreds of microseconds: what it has to do
+    /// besides it does best now, while nobody waits for it. It may be left out.
+    ///
+    /// # Errors
+    /// [`IpcError::Service`].
+    pub fn announce(&self) -> Result<(), IpcError> {
+        self.silence()?;
+        self.rope.ring(Ring::Announced);
+        Ok(())
+    }
+
+    /// Forgets a ring that was not waited for.
+    fn silence(&self) -> Result<(), IpcError> {
+        match self.rung.replace(false) {
+            true => self.bell.silence(),
+            false => Ok(()),
+        }
     }
 
     /// Waits for the answer to a cycle, at most for `timeout`.
@@ -89,8 +117,8 @@ impl PlantLink {
     /// [`IpcError::Service`].
     pub fn answer(&self, cycle: u64, timeout: Duration) -> Result<Heard, IpcError> {
         let mut heard = Heard::default();
-        let start = Instant::now();
-        let mut slept = false;
+        let start = LazyCell::new(Instant::now);
+        self.rung.set(true);
         loop {
             while let Some(command) = self.commands.receive()? {
                 match command.cycle {
@@ -98,31 +126,46 @@ impl PlantLink {
                     _ => heard.late += 1,
                 }
             }
+            if heard.answer.is_some() {
+                return Ok(heard);
+            }
             let waited = start.elapsed();
             let left = timeout.saturating_sub(waited);
-            if heard.answer.is_some() || left.is_zero() {
-                if !slept {
-                    self.bell.silence()?;
-                }
+            if left.is_zero() {
                 return Ok(heard);
             }
             if waited < self.spin {
                 core::hint::spin_loop();
                 continue;
             }
-            slept = true;
-            self.bell.wait(left)?;
+            if self.bell.wait(left)? {
+                self.rung.set(false);
+            }
         }
     }
+}
+
+/// What woke a controller.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Woken {
+    /// The oldest state that was not read yet.
+    State(ArmState),
+    /// A state follows soon, see [`PlantLink::announce`].
+    Announced,
+    /// Nothing.
+    Silence,
 }
 
 /// The controller's end, of `supple-rt`. It stays in the thread that made it.
 #[derive(Debug)]
 pub struct ControllerLink {
+    // As with the plant.
+    bell: Bell,
+    rope: Rope,
     states: Reader<ArmState>,
     commands: Writer<TorqueCommand>,
-    rope: Rope,
-    bell: Bell,
+    /// There was no state left, so that the next one has its ring yet to come.
+    read_all: Cell<bool>,
     _last_out: LastOut,
 }
 
@@ -136,8 +179,9 @@ impl ControllerLink {
         Ok(ControllerLink {
             commands: Writer::new(domain, &joining.node, &COMMANDS, Full::Lose)?,
             states: Reader::new(domain, &joining.node, &STATES)?,
-            rope: Rope::new(domain, &joining.node, COMMAND_BELL)?,
-            bell: Bell::new(&joining.node, STATE_BELL)?,
+            rope: Rope::new(domain, COMMAND_BELL)?,
+            bell: Bell::new(domain, STATE_BELL)?,
+            read_all: Cell::new(false),
             _last_out: LastOut::of(domain),
         })
     }
@@ -147,7 +191,9 @@ impl ControllerLink {
     /// # Errors
     /// [`IpcError::Service`].
     pub fn receive(&self) -> Result<Option<ArmState>, IpcError> {
-        self.states.receive()
+        let state = self.states.receive()?;
+        self.read_all.set(state.is_none());
+        Ok(state)
     }
 
     /// The oldest state that was not read yet; waits for one at most for `timeout`, which the kernel counts in
@@ -158,14 +204,35 @@ impl ControllerLink {
     pub fn wait(&self, timeout: Duration) -> Result<Option<ArmState>, IpcError> {
         let start = Instant::now();
         loop {
-            if let Some(state) = self.states.receive()? {
-                return Ok(Some(state));
+            match self.wake(timeout.saturating_sub(start.elapsed()))? {
+                Woken::State(state) => return Ok(Some(state)),
+                Woken::Announced => {}
+                Woken::Silence => return Ok(None),
             }
-            let left = timeout.saturating_sub(start.elapsed());
-            if left.is_zero() {
-                return Ok(None);
+        }
+    }
+
+    /// As [`ControllerLink::wait`], but wakes too when a state is announced.
+    ///
+    /// # Errors
+    /// [`IpcError::Service`].
+    pub fn wake(&self, timeout: Duration) -> Result<Woken, IpcError> {
+        let start = Instant::now();
+        let mut left = timeout;
+        loop {
+            // Whoever has read all goes to sleep at once, and the plant on his processor goes on.
+            if !self.read_all.get() || left.is_zero() {
+                match self.receive()? {
+                    Some(state) => return Ok(Woken::State(state)),
+                    None if left.is_zero() => return Ok(Woken::Silence),
+                    None => {}
+                }
             }
-            self.bell.wait_in_ticks(left)?;
+            if self.bell.wait_in_ticks(left)? == Some(Ring::Announced) {
+                return Ok(Woken::Announced);
+            }
+            self.read_all.set(false);
+            left = timeout.saturating_sub(start.elapsed());
         }
     }
 
@@ -175,7 +242,7 @@ impl ControllerLink {
     /// [`IpcError::Service`].
     pub fn answer(&self, command: &TorqueCommand) -> Result<(), IpcError> {
         self.commands.send(command)?;
-        self.rope.ring();
+        self.rope.ring(Ring::Sent);
         Ok(())
     }
 }

@@ -1,4 +1,4 @@
-//! One-way services in shared memory: a writer, readers, and a bell that wakes whoever waits.
+//! One-way services in shared memory: a writer and readers.
 //!
 //! Writing and reading allocate nothing once both sides are connected. A side that joins or leaves costs the
 //! other a few system calls and allocations at its next call: a control loop has no port but those to its
@@ -10,20 +10,13 @@ use crate::outside::pause;
 use crate::turn;
 use core::fmt::Debug;
 use core::time::Duration;
-use iceoryx2::port::listener::{Listener, ListenerCreateError};
-use iceoryx2::port::notifier::{Notifier, NotifierCreateError};
 use iceoryx2::port::publisher::{Publisher, PublisherCreateError};
 use iceoryx2::port::subscriber::{Subscriber, SubscriberCreateError};
 use iceoryx2::prelude::*;
-use iceoryx2::service::builder::event::{EventCreateError, EventOpenError, EventOpenOrCreateError};
 use iceoryx2::service::builder::publish_subscribe::{
     PublishSubscribeCreateError, PublishSubscribeOpenError, PublishSubscribeOpenOrCreateError,
 };
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
-use iceoryx2_bb_posix::file_descriptor_set::{
-    FileDescriptorSet, FileDescriptorSetWaitError, FileEvent,
-};
-use iceoryx2_cal::event::ListenerWaitError;
 use std::os::fd::OwnedFd;
 use std::time::Instant;
 
@@ -134,109 +127,6 @@ impl<T: Message> Reader<T> {
     }
 }
 
-/// The rope of a bell.
-#[derive(Debug)]
-pub(crate) struct Rope(Notifier<ipc::Service>);
-
-impl Rope {
-    pub fn new(domain: &Domain, node: &Node, name: &'static str) -> Result<Self, IpcError> {
-        let service = bell(node, name)?;
-        let notifier = service.notifier_builder().create();
-        let notifier = notifier.map_err(|error| match error {
-            NotifierCreateError::ExceedsMaxSupportedNotifiers => IpcError::SecondWriter {
-                service: name.to_owned(),
-                prefix: domain.prefix().to_owned(),
-            },
-            error => failed(name, &error),
-        })?;
-        Ok(Rope(notifier))
-    }
-
-    /// Wakes whoever waits. Who does not listen any more cannot be woken, which is not the ringer's concern.
-    pub fn ring(&self) {
-        let _ = self.0.notify();
-    }
-}
-
-/// The library waits for ever where the time-out is zero in the socket's unit, the microsecond.
-const SHORTEST_WAIT: Duration = Duration::from_micros(100);
-
-/// The side of a bell that hears it.
-#[derive(Debug)]
-pub(crate) struct Bell {
-    listener: Listener<ipc::Service>,
-    name: &'static str,
-    /// Waits for it. The listener's own time-out is that of its socket, which the kernel counts in ticks of
-    /// several milliseconds: a plant whose answer does not come would be late by as much.
-    waits: FileDescriptorSet,
-}
-
-impl Bell {
-    pub fn new(node: &Node, name: &'static str) -> Result<Self, IpcError> {
-        let service = bell(node, name)?;
-        let listener = service.listener_builder().create();
-        let listener = listener.map_err(|error| match error {
-            ListenerCreateError::ExceedsMaxSupportedListeners => IpcError::TooManyReaders {
-                service: name.to_owned(),
-            },
-            error => failed(name, &error),
-        })?;
-        let waits = FileDescriptorSet::new();
-        // Whatever the set allocates for one listener it allocates here.
-        drop(
-            waits
-                .add(&listener)
-                .map_err(|error| wait_failed(name, error))?,
-        );
-        Ok(Bell {
-            listener,
-            name,
-            waits,
-        })
-    }
-
-    /// Forgets that it has rung: what it rang for is known.
-    pub fn silence(&self) -> Result<(), IpcError> {
-        match self.listener.try_wait_one() {
-            Ok(_) | Err(ListenerWaitError::InterruptSignal) => Ok(()),
-            Err(error) => Err(failed(self.name, &error)),
-        }
-    }
-
-    /// As [`Bell::wait`], with the time-out of the socket, for who is seldom left waiting. It sets no timer of
-    /// high resolution, which is dear in a virtual machine (`benches/latency`).
-    pub fn wait_in_ticks(&self, timeout: Duration) -> Result<bool, IpcError> {
-        match self.listener.timed_wait_one(timeout.max(SHORTEST_WAIT)) {
-            Ok(rung) => Ok(rung.is_some()),
-            // It takes a signal for a failure; of what is one the other wait has the words.
-            Err(_) => self.wait(Duration::ZERO),
-        }
-    }
-
-    /// Waits until it rings, or for `timeout`, or until a signal comes; false where it did not ring.
-    pub fn wait(&self, timeout: Duration) -> Result<bool, IpcError> {
-        let attached = self.waits.add(&self.listener);
-        let _attached = attached.map_err(|error| wait_failed(self.name, error))?;
-        match self.waits.timed_wait(timeout, FileEvent::Read, |_| ()) {
-            Ok(0) | Err(FileDescriptorSetWaitError::Interrupt) => Ok(false),
-            Ok(_) => match self.listener.try_wait_one() {
-                Ok(rung) => Ok(rung.is_some()),
-                Err(ListenerWaitError::InterruptSignal) => Ok(false),
-                Err(error) => Err(failed(self.name, &error)),
-            },
-            Err(error) => Err(wait_failed(self.name, error)),
-        }
-    }
-}
-
-/// These errors have no words of their own.
-fn wait_failed(service: &str, cause: impl Debug) -> IpcError {
-    IpcError::Service {
-        service: service.to_owned(),
-        cause: format!("waiting failed: {cause:?}"),
-    }
-}
-
 fn open<T: Message>(
     domain: &Domain,
     node: &Node,
@@ -325,52 +215,6 @@ fn places(wanted: usize) -> usize {
 /// The lock of a service's one writer.
 fn lock(domain: &Domain, service: &str) -> Result<Option<OwnedFd>, IpcError> {
     turn::lock(domain, service).map_err(|error| failed(service, &error))
-}
-
-fn bell(
-    node: &Node,
-    name: &'static str,
-) -> Result<iceoryx2::service::port_factory::event::PortFactory<ipc::Service>, IpcError> {
-    let full_name = service_name(name)?;
-    let service = settled(
-        SETTLES_WITHIN,
-        || {
-            node.service_builder(&full_name)
-                .event()
-                .max_notifiers(places(1))
-                .max_listeners(places(1))
-                .max_nodes(NODES)
-                .event_id_max_value(0)
-                .open_or_create()
-        },
-        |error| {
-            use EventOpenOrCreateError as Either;
-            matches!(
-                error,
-                Either::SystemInFlux
-                    | Either::EventOpenError(
-                        EventOpenError::DoesNotExist
-                            | EventOpenError::IsMarkedForDestruction
-                            | EventOpenError::ServiceInCorruptedState
-                            | EventOpenError::HangsInCreation
-                    )
-                    | Either::EventCreateError(
-                        EventCreateError::AlreadyExists
-                            | EventCreateError::IsBeingCreatedByAnotherInstance
-                            | EventCreateError::ServiceInCorruptedState
-                            | EventCreateError::HangsInCreation
-                    )
-            )
-        },
-    );
-    service.map_err(|error| match error {
-        EventOpenOrCreateError::EventOpenError(EventOpenError::ExceedsMaxNumberOfNodes) => {
-            IpcError::TooManyReaders {
-                service: name.to_owned(),
-            }
-        }
-        error => failed(name, &error),
-    })
 }
 
 /// How long a service may take to settle that others are just making or taking away.

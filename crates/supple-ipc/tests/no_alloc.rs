@@ -31,6 +31,8 @@ fn a_thousand_cycles_allocate_nothing() {
     let mut cycle = |k: u64| {
         let mut state = state;
         state.cycle = k;
+        plant.announce().expect("announced");
+        assert_eq!(controller.wake(soon).expect("read"), Woken::Announced);
         plant.publish(&state).expect("published");
         let received = controller.wait(soon).expect("read").expect("a state");
         let mut command = TorqueCommand::new(&output, false);
@@ -51,8 +53,13 @@ fn a_thousand_cycles_allocate_nothing() {
         outside.reply(&reply).expect("replied");
         let reply = operator.receive().expect("read").expect("a reply");
         assert_eq!(reply.sequence, sequence);
-        // A wait in vain as well.
+        // Waits in vain as well, with and without sleep.
         assert!(controller.wait(Duration::ZERO).expect("read").is_none());
+        if k.is_multiple_of(100) {
+            let moment = Duration::from_micros(200);
+            assert!(controller.wait(moment).expect("read").is_none());
+            assert!(plant.answer(k, moment).expect("read").answer.is_none());
+        }
     };
     // Both sides meet at the first.
     (0..4).for_each(&mut cycle);

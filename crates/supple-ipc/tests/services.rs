@@ -33,6 +33,39 @@ fn a_state_is_answered_in_its_cycle() {
 }
 
 #[test]
+fn a_state_may_be_announced() {
+    let system = system("announced");
+    let plant = PlantLink::new(&system.domain).expect("a plant");
+    let controller = ControllerLink::new(&system.domain).expect("a controller");
+    for cycle in 0..200 {
+        if cycle % 2 == 0 {
+            plant.announce().expect("announced");
+            assert_eq!(controller.wake(SOON).expect("read"), Woken::Announced);
+        }
+        plant.publish(&state(cycle)).expect("published");
+        if cycle % 5 == 0 {
+            // Its ring is still to come when the state has been read.
+            let received = controller.receive().expect("read");
+            assert_eq!(received, Some(state(cycle)));
+        } else {
+            let woken = controller.wake(SOON).expect("read");
+            assert_eq!(woken, Woken::State(state(cycle)));
+        }
+        assert_eq!(controller.receive().expect("read"), None);
+        let mut command = TorqueCommand::new(&answer(&state(0).input(None).expect("four")), false);
+        command.cycle = cycle;
+        controller.answer(&command).expect("answered");
+        let heard = plant.answer(cycle, SOON).expect("read");
+        assert_eq!(heard.answer.map(|command| command.cycle), Some(cycle));
+    }
+    let moment = Duration::from_millis(1);
+    assert_eq!(controller.wake(moment).expect("read"), Woken::Silence);
+    // Who waits for states alone is not woken by it.
+    plant.announce().expect("announced");
+    assert_eq!(controller.wait(moment).expect("read"), None);
+}
+
+#[test]
 fn an_answer_to_another_cycle_is_late_and_not_used() {
     let system = system("late");
     let plant = PlantLink::new(&system.domain).expect("a plant");

@@ -1,5 +1,8 @@
 //! The loop: a state, a step, an answer.
 //!
+//! Nothing else is done before the answer, and nothing after it: when the plant announces its next state, the loop
+//! hands over what there is to tell of the last one, and rehearses the step.
+//!
 //! A loop that lags takes the states that came meanwhile one by one, so that velocities stay right, and
 //! answers the newest. A plant that falls silent is stepped over with its last state, until the controller
 //! finds it stale. On the way out the loop goes to gravity hold and asks the plant to lower the drives to
@@ -9,14 +12,15 @@ use crate::error::RtError;
 use crate::queue::Queue;
 use crate::rings::Inside;
 use crate::timing::Timing;
+use core::hint::black_box;
 use core::time::Duration;
 use supple_core::controller::{Controller, Mode, Request, State, step};
 use supple_core::{Input, Output};
-use supple_ipc::ControllerLink;
 use supple_ipc::message::{
     ArmState, CycleTiming, Drives, OperatorReply, OperatorRequest, Outcome, Telemetry, Text,
     TorqueCommand,
 };
+use supple_ipc::{ControllerLink, Woken};
 use supple_realtime::{Stop, monotonic_ns};
 
 /// Silence of the plant after which its last state counts as seen again.
@@ -37,7 +41,9 @@ pub struct ControlLoop<const N: usize> {
     virtual_time: bool,
     steps: u64,
     last_begin_ns: Option<u64>,
-    last_seen: Option<ArmState>,
+    last: Option<Stepped<N>>,
+    /// Nobody was told of the last step yet.
+    untold: bool,
     /// Cycles since the loop began to leave.
     leaving: Option<u32>,
 }
@@ -45,6 +51,7 @@ pub struct ControlLoop<const N: usize> {
 /// A step with all that is told about it.
 #[derive(Debug)]
 struct Stepped<const N: usize> {
+    arm: ArmState,
     input: Input<N>,
     output: Output<N>,
     timing: CycleTiming,
@@ -62,7 +69,8 @@ impl<const N: usize> ControlLoop<N> {
             virtual_time,
             steps: 0,
             last_begin_ns: None,
-            last_seen: None,
+            last: None,
+            untold: false,
             leaving: None,
         }
     }
@@ -73,6 +81,7 @@ impl<const N: usize> ControlLoop<N> {
     /// [`RtError`]: shared memory, or a state of another arm.
     pub fn run(&mut self, link: &ControllerLink, stop: &Stop) -> Result<(), RtError> {
         while self.turn(link, stop)? {}
+        self.tell_last();
         Ok(())
     }
 
@@ -84,31 +93,32 @@ impl<const N: usize> ControlLoop<N> {
         if stop.asked() {
             self.leaving.get_or_insert(0);
         }
-        let Some(mut arm) = link.wait(PLANT_LOST_AFTER)? else {
-            if let Some(cycles) = &mut self.leaving {
-                *cycles += SILENT_CYCLES;
-                return Ok(*cycles < LEAVING_CYCLES);
+        let mut arm = match link.wake(PLANT_LOST_AFTER)? {
+            Woken::State(arm) => arm,
+            Woken::Announced => {
+                self.tell_last();
+                self.rehearse()?;
+                return Ok(true);
             }
-            if let (Some(seen), false) = (self.last_seen, self.virtual_time) {
-                self.cycle(&seen)?;
-            }
-            return Ok(true);
+            Woken::Silence => return self.silence(),
         };
         while let Some(newer) = link.receive()? {
             self.cycle(&arm)?;
             arm = newer;
         }
-        let stepped = self.step(&arm)?;
-        let output = stepped.output;
         let leaving = self.leaving.is_some();
-        // The plant waits for this; whoever else wants to know does not.
-        link.answer(&TorqueCommand::new(&output, leaving))?;
-        self.tell(&arm, &stepped);
+        let output = &self.step(&arm)?.output;
+        let limp = output.limp;
+        // The plant waits for this; whoever else wants to know hears of it when it announces the next state.
+        link.answer(&TorqueCommand::new(output, leaving))?;
+        if self.virtual_time {
+            self.tell_last();
+        }
         let Some(cycles) = &mut self.leaving else {
             return Ok(true);
         };
         *cycles += 1;
-        let lowered = arm.drives() != Drives::Active || output.limp;
+        let lowered = arm.drives() != Drives::Active || limp;
         Ok(!lowered && *cycles < LEAVING_CYCLES)
     }
 
@@ -117,15 +127,40 @@ impl<const N: usize> ControlLoop<N> {
         self.timing
     }
 
+    /// A wait in vain.
+    fn silence(&mut self) -> Result<bool, RtError> {
+        if let Some(cycles) = &mut self.leaving {
+            *cycles += SILENT_CYCLES;
+            return Ok(*cycles < LEAVING_CYCLES);
+        }
+        if let (Some(last), false) = (&self.last, self.virtual_time) {
+            self.cycle(&last.arm.clone())?;
+        }
+        Ok(true)
+    }
+
+    /// Does what the next cycle will do, and forgets it: code and data that a whole period has driven out of the
+    /// processor's caches take longer than the step itself.
+    fn rehearse(&mut self) -> Result<(), RtError> {
+        if let Some(last) = &self.last {
+            let mut input = last.arm.input::<N>(None)?;
+            input.cycle += 1;
+            let mut state = self.state;
+            black_box(step(&self.controller, &mut state, &input));
+        }
+        Ok(())
+    }
+
     /// One step, which nobody waits for.
     fn cycle(&mut self, arm: &ArmState) -> Result<(), RtError> {
-        let stepped = self.step(arm)?;
-        self.tell(arm, &stepped);
+        self.step(arm)?;
+        self.tell_last();
         Ok(())
     }
 
     /// One step, with what was asked for.
-    fn step(&mut self, arm: &ArmState) -> Result<Stepped<N>, RtError> {
+    fn step(&mut self, arm: &ArmState) -> Result<&Stepped<N>, RtError> {
+        self.tell_last();
         let begin_ns = monotonic_ns();
         let heard = self.hear(arm.cycle);
         let input = arm.input::<N>(heard.as_ref().map(|(_, request)| *request))?;
@@ -133,7 +168,6 @@ impl<const N: usize> ControlLoop<N> {
         let step_begin_ns = monotonic_ns();
         let output = step(&self.controller, &mut self.state, &input);
         let step_ns = monotonic_ns() - step_begin_ns;
-        self.last_seen = Some(*arm);
         if let Some((message, _)) = &heard {
             let (outcome, text) = match &output.refusal {
                 None => (Outcome::Accepted, Text::EMPTY),
@@ -154,11 +188,13 @@ impl<const N: usize> ControlLoop<N> {
             step_ns,
         };
         self.last_begin_ns = Some(begin_ns);
-        Ok(Stepped {
+        self.untold = true;
+        Ok(self.last.insert(Stepped {
+            arm: *arm,
             input,
             output,
             timing,
-        })
+        }))
     }
 
     /// The request of this cycle, if there is one.
@@ -208,22 +244,27 @@ impl<const N: usize> ControlLoop<N> {
         let _ = self.inside.replies.push(reply);
     }
 
-    /// Hands the cycle to the helper. Where it is behind, the record is lost and its number shows it; in
-    /// virtual time the loop waits.
-    fn tell(&mut self, arm: &ArmState, stepped: &Stepped<N>) {
-        let Stepped {
-            input,
-            output,
-            timing,
-        } = stepped;
-        self.timing.record(timing);
+    /// Hands the last step to the helper, where that is still to be done. Where the helper is behind, the record
+    /// is lost and its number shows it; in virtual time the loop waits.
+    fn tell_last(&mut self) {
+        let (Some(last), true) = (&self.last, self.untold) else {
+            return;
+        };
+        self.untold = false;
+        self.timing.record(&last.timing);
         while self.virtual_time
             && self.inside.telemetry.is_full()
             && !self.inside.telemetry.is_abandoned()
         {
             std::thread::yield_now();
         }
-        let telemetry = Telemetry::new(self.steps, arm, input, output, *timing);
+        let telemetry = Telemetry::new(
+            self.steps,
+            &last.arm,
+            &last.input,
+            &last.output,
+            last.timing,
+        );
         self.steps += 1;
         let _ = self.inside.telemetry.push(telemetry);
     }

@@ -12,24 +12,24 @@ pub const ROOM: usize = 16;
 #[derive(Clone, Debug, Default)]
 pub struct Queue {
     places: [Option<OperatorRequest>; ROOM],
+    waiting: usize,
 }
 
 impl Queue {
     /// Puts a request last; false where there is no room.
     pub fn push(&mut self, request: OperatorRequest) -> bool {
-        match self.places.iter_mut().find(|place| place.is_none()) {
-            Some(place) => {
-                *place = Some(request);
-                true
-            }
-            None => false,
-        }
+        let Some(place) = self.places.get_mut(self.waiting) else {
+            return false;
+        };
+        *place = Some(request);
+        self.waiting += 1;
+        true
     }
 
     /// Takes the first that may be heard in this cycle.
     pub fn due(&mut self, cycle: u64) -> Option<OperatorRequest> {
         let is_due = |place: &Option<OperatorRequest>| place.is_some_and(|r| r.is_due(cycle));
-        let first = self.places.iter().position(is_due)?;
+        let first = self.places[..self.waiting].iter().position(is_due)?;
         self.take(first)
     }
 
@@ -39,8 +39,9 @@ impl Queue {
     }
 
     fn take(&mut self, place: usize) -> Option<OperatorRequest> {
-        let taken = self.places[place].take();
-        self.places[place..].rotate_left(1);
-        taken
+        let taken = self.places[place].take()?;
+        self.places[place..self.waiting].rotate_left(1);
+        self.waiting -= 1;
+        Some(taken)
     }
 }

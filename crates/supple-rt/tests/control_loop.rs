@@ -72,6 +72,12 @@ impl Bench {
         )
     }
 
+    /// The plant announces a state.
+    fn announce(&mut self) {
+        self.plant.announce().expect("announced");
+        assert!(self.control.turn(&self.link, &self.stop).expect("a turn"));
+    }
+
     /// One cycle from end to end; the loop's answer and whether it goes on.
     fn cycle(&mut self, drives: Drives) -> (TorqueCommand, bool) {
         self.plant.publish(&self.state(drives)).expect("published");
@@ -123,6 +129,31 @@ fn its_answers_are_those_of_step_to_the_last_bit() {
 }
 
 #[test]
+fn what_it_does_when_a_state_is_announced_changes_no_answer() {
+    let (mut announced, mut plain) = (bench(false), bench(false));
+    for cycle in 0..200 {
+        for bench in [&mut announced, &mut plain] {
+            if cycle == 3 {
+                bench.ask(&Request::GravityHold, None);
+            }
+            // An arm that moves: a step that was not forgotten would be seen.
+            bench.home_rad[1] += 1e-4;
+        }
+        if cycle % 3 > 0 {
+            announced.announce();
+            // All is told then, and nothing twice: of the last step, and of one before which nobody announced.
+            let told = 1 + usize::from(cycle % 3 == 1 && cycle > 1);
+            assert_eq!(announced.telemetry().len(), told);
+        }
+        let (with, _) = announced.cycle(Drives::Active);
+        let (without, _) = plain.cycle(Drives::Active);
+        assert_eq!(with, without);
+    }
+    // Whoever does not announce hears of a step one step later.
+    assert_eq!(plain.telemetry().len(), 199);
+}
+
+#[test]
 fn a_thousand_cycles_with_requests_and_a_fault_allocate_nothing() {
     let mut bench = bench(false);
     for _ in 0..4 {
@@ -139,6 +170,9 @@ fn a_thousand_cycles_with_requests_and_a_fault_allocate_nothing() {
                 900 => bench.cycle += 3,
                 _ => {}
             }
+            if k % 7 > 0 {
+                bench.announce();
+            }
             bench.cycle(Drives::Active);
             if k % 50 == 0 {
                 while bench.outside.telemetry().is_some() {}
@@ -146,6 +180,7 @@ fn a_thousand_cycles_with_requests_and_a_fault_allocate_nothing() {
         }
     });
     assert_eq!(allocations, 0);
+    bench.announce();
     let last = bench.telemetry().pop().expect("some");
     assert!(
         last.fault_text.as_str().contains("no new arm state"),
@@ -171,6 +206,7 @@ fn a_loop_that_lags_steps_over_every_state_and_answers_the_newest() {
     let (answer, _) = bench.cycle(Drives::Active);
     assert_eq!(answer.cycle, 10);
     assert_eq!((answer.mode(), answer.fault), (Some(Mode::GravityHold), 0));
+    bench.announce();
     assert_eq!(bench.telemetry().len(), 11);
 }
 
