@@ -5,7 +5,7 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
-use supple_benches::{NULLSPACE_DAMPING, Rig, State, config, gains, pool};
+use supple_benches::{NULLSPACE_DAMPING, Rig, State, config, gains, pool, regular_pool};
 use supple_core::Matrix;
 use supple_core::dynamics::{self, Terms};
 use supple_core::operational::{pose_torque, position_torque};
@@ -105,7 +105,7 @@ fn functions<const N: usize>(criterion: &mut Criterion, asset: &str) {
 
 fn position_law<const N: usize>(criterion: &mut Criterion, asset: &str) {
     let arm = config::<N>(asset).arm;
-    let (states, gains) = (pool(&arm), gains());
+    let (states, gains) = (regular_pool(&arm), gains());
     let law = |s: &State<N>| {
         position_torque(
             &arm,
@@ -123,7 +123,7 @@ fn position_law<const N: usize>(criterion: &mut Criterion, asset: &str) {
 
 fn pose_law<const N: usize>(criterion: &mut Criterion, asset: &str) {
     let arm = config::<N>(asset).arm;
-    let (states, gains) = (pool(&arm), gains());
+    let (states, gains) = (regular_pool(&arm), gains());
     let law = |s: &State<N>| pose_torque(&arm, &s.q, &s.qd, &s.pose, &gains, NULLSPACE_DAMPING);
     bench(criterion, "law", &states, law, |tau| {
         tau.map_or(0.0, |tau| tau[0])

@@ -6,6 +6,8 @@
 use supple_core::config::Gains;
 use supple_core::config::Role;
 use supple_core::controller::{self, Mode, Request};
+use supple_core::impedance::SINGULAR_BELOW_M;
+use supple_core::linalg::least_singular_value;
 use supple_core::math::Vector3;
 use supple_core::operational::{PoseGains, PoseReference};
 use supple_core::{Arm, Config, Controller, Input, Output, Reference, Trajectory, Vector};
@@ -60,6 +62,21 @@ pub fn config<const N: usize>(name: &str) -> Config<N> {
 pub fn pool<const N: usize>(arm: &Arm<N>) -> Vec<State<N>> {
     let mut random = Random(20_261_121);
     (0..STATES).map(|_| random.state(arm)).collect()
+}
+
+/// The same, of poses that are not near singular ones: there the law takes another way.
+pub fn regular_pool<const N: usize>(arm: &Arm<N>) -> Vec<State<N>> {
+    let mut random = Random(20_261_122);
+    let regular = |state: &State<N>| {
+        let jacobian = dynamics::jacobian(arm, &state.q)
+            .fixed_rows::<3>(0)
+            .into_owned();
+        least_singular_value(&jacobian) > SINGULAR_BELOW_M
+    };
+    core::iter::repeat_with(|| random.state(arm))
+        .filter(regular)
+        .take(STATES)
+        .collect()
 }
 
 /// A controller that holds the tip by the law.

@@ -11,7 +11,20 @@ pub type Vector<const N: usize> = nalgebra::SVector<f64, N>;
 pub type Matrix<const R: usize, const C: usize> = nalgebra::SMatrix<f64, R, C>;
 pub use nalgebra::{Matrix3, Vector3};
 
-pub use libm::{acos, atan2, cos, exp, fabs as abs, sin, sqrt};
+pub use libm::{acos, atan2, cos, exp, fabs as abs, sin};
+
+/// Square root, rounded to the nearest.
+///
+/// That of `libm` is an instruction without the encoding of AVX, for which a processor with wide registers in use
+/// makes the code around it wait: a step took a quarter longer.
+#[inline]
+pub fn sqrt(x: f64) -> f64 {
+    if cfg!(target_arch = "x86_64") {
+        wide::f64x2::splat(x).sqrt().to_array()[0]
+    } else {
+        libm::sqrt(x)
+    }
+}
 
 /// Sine and cosine of an angle in radians.
 #[inline]
