@@ -13,10 +13,10 @@
 use gungraun::prelude::*;
 use gungraun::{Callgrind, EventKind};
 use std::hint::black_box;
-use supple_benches::{NULLSPACE_DAMPING, Rig, State, config, gains, pool};
-use supple_core::Arm;
+use supple_benches::{NULLSPACE_DAMPING, Rig, State, config, gains, pool, regular_pool};
 use supple_core::dynamics::{self, Terms};
 use supple_core::operational::{pose_torque, position_torque};
+use supple_core::{Arm, Vector};
 
 /// One call, its inputs and outputs hidden from the compiler.
 type Call = Box<dyn FnMut()>;
@@ -26,7 +26,14 @@ fn call<const N: usize, T>(
     function: impl Fn(&Arm<N>, &State<N>) -> T + 'static,
 ) -> Call {
     let arm = config::<N>(asset).arm;
-    let state = pool(&arm)[0];
+    call_in(arm, pool(&arm)[0], function)
+}
+
+fn call_in<const N: usize, T>(
+    arm: Arm<N>,
+    state: State<N>,
+    function: impl Fn(&Arm<N>, &State<N>) -> T + 'static,
+) -> Call {
     Box::new(move || {
         black_box(function(black_box(&arm), black_box(&state)));
     })
@@ -70,17 +77,18 @@ fn terms<const N: usize>(asset: &str) -> Call {
     })
 }
 
+fn torque<const N: usize>(arm: &Arm<N>, s: &State<N>) -> Option<Vector<N>> {
+    let gains = gains().linear;
+    position_torque(arm, &s.q, &s.qd, &s.position, &gains, NULLSPACE_DAMPING)
+}
+
 fn position_law<const N: usize>(asset: &str) -> Call {
-    call::<N, _>(asset, |arm, s| {
-        position_torque(
-            arm,
-            &s.q,
-            &s.qd,
-            &s.position,
-            &gains().linear,
-            NULLSPACE_DAMPING,
-        )
-    })
+    call::<N, _>(asset, torque)
+}
+
+fn regular_law<const N: usize>(asset: &str) -> Call {
+    let arm = config::<N>(asset).arm;
+    call_in(arm, regular_pool(&arm)[0], torque)
 }
 
 fn pose_law<const N: usize>(asset: &str) -> Call {
@@ -108,8 +116,8 @@ fn limit(instructions: u64) -> LibraryBenchmarkConfig {
 #[bench::rnea_3(args = (rnea::<3>("wam3")), config = limit(1_650))]
 #[bench::rnea_4(args = (rnea::<4>("wam4")), config = limit(2_150))]
 #[bench::rnea_7(args = (rnea::<7>("wam7")), config = limit(4_150))]
-#[bench::crba_3(args = (crba::<3>("wam3")), config = limit(2_200))]
-#[bench::crba_4(args = (crba::<4>("wam4")), config = limit(2_300))]
+#[bench::crba_3(args = (crba::<3>("wam3")), config = limit(1_850))]
+#[bench::crba_4(args = (crba::<4>("wam4")), config = limit(2_250))]
 #[bench::crba_7(args = (crba::<7>("wam7")), config = limit(6_200))]
 #[bench::aba_3(args = (aba::<3>("wam3")), config = limit(3_600))]
 #[bench::aba_4(args = (aba::<4>("wam4")), config = limit(5_000))]
@@ -125,16 +133,17 @@ fn limit(instructions: u64) -> LibraryBenchmarkConfig {
 #[bench::jdot_qd_7(args = (jdot_qd::<7>("wam7")), config = limit(3_300))]
 #[bench::regressor_3(args = (regressor::<3>("wam3")), config = limit(4_600))]
 #[bench::regressor_4(args = (regressor::<4>("wam4")), config = limit(5_100))]
-#[bench::regressor_7(args = (regressor::<7>("wam7")), config = limit(16_350))]
-#[bench::terms_3(args = (terms::<3>("wam3")), config = limit(3_900))]
+#[bench::regressor_7(args = (regressor::<7>("wam7")), config = limit(12_950))]
+#[bench::terms_3(args = (terms::<3>("wam3")), config = limit(3_800))]
 #[bench::terms_4(args = (terms::<4>("wam4")), config = limit(3_950))]
 #[bench::terms_7(args = (terms::<7>("wam7")), config = limit(9_950))]
+#[bench::law_3_regular(args = (regular_law::<3>("wam3")), config = limit(2_750))]
 // Near a singular pose, where three joints take the longer way.
-#[bench::law_3(args = (position_law::<3>("wam3")), config = limit(5_350))]
-#[bench::law_4(args = (position_law::<4>("wam4")), config = limit(4_550))]
+#[bench::law_3(args = (position_law::<3>("wam3")), config = limit(5_200))]
+#[bench::law_4(args = (position_law::<4>("wam4")), config = limit(4_450))]
 #[bench::law_7(args = (pose_law::<7>("wam7")), config = limit(14_150))]
-#[bench::step_3(args = (controller_step::<3>("wam3")), config = limit(7_250))]
-#[bench::step_4(args = (controller_step::<4>("wam4")), config = limit(8_200))]
+#[bench::step_3(args = (controller_step::<3>("wam3")), config = limit(7_150))]
+#[bench::step_4(args = (controller_step::<4>("wam4")), config = limit(8_150))]
 #[bench::step_7(args = (controller_step::<7>("wam7")), config = limit(18_650))]
 fn instructions(mut call: Call) {
     call();
