@@ -32,6 +32,7 @@ pub mod reach;
 pub mod ripple;
 pub mod sincos;
 pub mod trajectory;
+mod vec3;
 
 pub use arm::{Arm, ArmError, Joint, Link};
 pub use body::{Body, BodyError};

@@ -4,9 +4,9 @@
     reason = "joints, groups and lanes are counted: each index goes into several arrays"
 )]
 
-use crate::dynamics::vec3::{V3, cross, dot};
 use crate::lanes::Number;
 use crate::math::{Matrix, Matrix3, abs, sqrt};
+use crate::vec3::{V3, cross, dot};
 use core::f64::consts::SQRT_2;
 
 /// Cholesky factors without square roots of a symmetric positive definite matrix: `A = L D L^T`, `L` unit

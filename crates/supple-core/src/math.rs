@@ -1,7 +1,7 @@
 //! Scalars and fixed-size matrices.
 //!
 //! Every transcendental of the core is taken from here, and from `libm` below it (those of the joint angles
-//! from [`crate::sincos`]): neither `std` nor
+//! from [`crate::sincos`]), and so is every square root: neither `std` nor
 //! nalgebra is asked, because features unify across a workspace and the same step must give the same
 //! bits in every binary.
 

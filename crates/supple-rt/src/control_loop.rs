@@ -80,9 +80,15 @@ impl<const N: usize> ControlLoop<N> {
     /// # Errors
     /// [`RtError`]: shared memory, or a state of another arm.
     pub fn run(&mut self, link: &ControllerLink, stop: &Stop) -> Result<(), RtError> {
-        while self.turn(link, stop)? {}
+        let ended = loop {
+            match self.turn(link, stop) {
+                Ok(true) => {}
+                ended => break ended.map(|_| ()),
+            }
+        };
+        // Whatever ended it, nothing is announced any more.
         self.tell_last();
-        Ok(())
+        ended
     }
 
     /// One turn of the loop: what came is answered, or nothing came. False when the loop is to end.
@@ -134,7 +140,8 @@ impl<const N: usize> ControlLoop<N> {
             return Ok(*cycles < LEAVING_CYCLES);
         }
         if let (Some(last), false) = (&self.last, self.virtual_time) {
-            self.cycle(&last.arm.clone())?;
+            let arm = last.arm;
+            self.cycle(&arm)?;
         }
         Ok(true)
     }

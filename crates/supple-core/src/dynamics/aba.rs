@@ -5,12 +5,12 @@
 )]
 
 use super::chain::parent_rotations;
-use super::vec3::{
-    V3, add, add_cross, add_rotated, add_scaled, cross, dot, rotate, rotate_back, scale,
-};
 use crate::arm::Arm;
 use crate::lanes::{Number, in_groups, of_joint};
 use crate::math::Vector;
+use crate::vec3::{
+    V3, add, add_cross, add_rotated, add_scaled, cross, dot, rotate, rotate_back, scale,
+};
 
 /// Symmetric 3 x 3 matrix `xx, xy, yy, xz, yz, zz`.
 type Symmetric = [f64; 6];
@@ -200,10 +200,10 @@ impl Articulated {
     #[inline(always)]
     fn in_parent(&self, r: &[f64; 9], p: V3) -> Articulated {
         let (a, c) = (turned(r, &self.a), turned(r, &self.c));
-        let half = super::vec3::product(r, &self.b);
-        let b = super::vec3::product(&half, &super::vec3::transposed(r));
+        let half = crate::vec3::product(r, &self.b);
+        let b = crate::vec3::product(&half, &crate::vec3::transposed(r));
         // With P = [p x]: B' = B + P C and A' = A - B' P - (B P)^T.
-        let shifted = super::vec3::join3(
+        let shifted = crate::vec3::join3(
             add_cross([b[0], b[1], b[2]], p, [c[0], c[1], c[3]]),
             add_cross([b[3], b[4], b[5]], p, [c[1], c[2], c[4]]),
             add_cross([b[6], b[7], b[8]], p, [c[3], c[4], c[5]]),

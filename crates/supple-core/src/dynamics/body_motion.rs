@@ -6,10 +6,10 @@
     reason = "joints, groups and lanes are counted: each index goes into several arrays"
 )]
 
-use super::vec3::{V3, add_rotated, rotate_back};
 use crate::arm::Arm;
 use crate::lanes::{Number, Rows, of_joint};
 use crate::math::Vector;
+use crate::vec3::{V3, add_rotated, rotate_back};
 
 /// Motion of a joint frame, in its own axes.
 #[derive(Clone, Copy)]

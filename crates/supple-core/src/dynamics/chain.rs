@@ -7,7 +7,6 @@
     reason = "joints, groups and lanes are counted: each index goes into several arrays"
 )]
 
-use super::vec3::{V3, add_rotated, product};
 use crate::arm::Arm;
 use crate::lanes::{
     Column, LANES, Lanes, Number, Rows, for_each_joint, of_group, of_joint, put_group, splat,
@@ -15,6 +14,7 @@ use crate::lanes::{
 use crate::math::{Matrix3, Vector, Vector3};
 use crate::pose::Pose;
 use crate::sincos::sin_cos;
+use crate::vec3::{V3, add_rotated, product};
 use core::array::from_fn;
 
 /// Rotation by columns, and origin.

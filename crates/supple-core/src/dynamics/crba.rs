@@ -7,13 +7,13 @@
 use super::chain::Chain;
 use super::frames::{bodies, joint_motions};
 use super::inertia::times;
-use super::vec3::dot6;
 use crate::arm::Arm;
 use crate::lanes::{
     Columns, LANES, Lanes, Rows, entry, for_each_joint, in_groups, of_group, of_joint,
     of_joint_for_all, sums_inward,
 };
 use crate::math::{Matrix, Vector};
+use crate::vec3::dot6;
 
 /// Mass matrix `H(q)`, symmetric, rotor inertias on the diagonal \[kg m^2\]. `q` \[rad\].
 #[inline]

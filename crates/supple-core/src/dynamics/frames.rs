@@ -6,10 +6,10 @@
 
 use super::chain::Chain;
 use super::inertia::in_base;
-use super::vec3::{V3, cross, join, sub};
 use crate::arm::Arm;
 use crate::lanes::{Rows, for_each_joint, of_joint, splat};
 use crate::math::Matrix;
+use crate::vec3::{V3, cross, join, sub};
 
 /// What each joint's unit speed gives a point, linear then angular: of the tip, the Jacobian's columns.
 #[inline(always)]

@@ -4,8 +4,8 @@
 //! forces are pairs of vectors, linear before angular, of the body's point that is at the reference
 //! point now.
 
-use super::vec3::{V3, add_cross, add_scaled, cross, dot, halves, join, rotate, scale};
 use crate::lanes::Number;
+use crate::vec3::{V3, add_cross, add_scaled, cross, dot, halves, join, rotate, scale};
 
 /// A body of a joint frame `rotation` (by columns), whose origin is at `r` from the reference point.
 #[inline(always)]

@@ -6,11 +6,11 @@
 
 use super::chain::Chain;
 use super::frames::{joint_motions, matrix};
-use super::vec3::{add, add_cross, cross, scale, sub};
 use crate::arm::Arm;
 use crate::lanes::in_groups;
 use crate::math::{Matrix, Vector};
 use crate::pose::Pose;
+use crate::vec3::{add, add_cross, cross, scale, sub};
 
 /// Pose of every joint frame in the base, `base_from_joint`. `q` \[rad\].
 #[inline]

@@ -19,7 +19,6 @@ mod regressor;
 mod rnea;
 mod sweep;
 mod terms;
-pub(crate) mod vec3;
 
 pub use aba::aba;
 pub use coriolis::{coriolis, coriolis_matrix};

@@ -2,13 +2,13 @@
 
 use super::chain::Chain;
 use super::inertia::{cross_force, cross_motion, spun, times};
-use super::vec3::{V3, add, add_cross, add_rotated, cross, halves, join, rotate_back, scale, sub};
 use crate::arm::Arm;
 use crate::lanes::{
     Lanes, NOTHING, Number, Rows, column, for_each_joint, of_joint, scaled, splat, sums_outward,
     total,
 };
 use crate::math::Vector;
+use crate::vec3::{V3, add, add_cross, add_rotated, cross, halves, join, rotate_back, scale, sub};
 
 /// How every link moves.
 pub(crate) struct Motion<const G: usize> {

@@ -26,13 +26,13 @@ use super::body_motion::gradient;
 use super::chain::Chain;
 use super::frames::joint_motions;
 use super::motion::Motion;
-use super::vec3::{
-    V3, add_cross, add_scaled, cross, dot, halves, product, rotate, rotate_back, scale, sub,
-    transposed,
-};
 use crate::arm::Arm;
 use crate::lanes::{LANES, Lanes, by_joint, in_groups, of_group, of_joint, splat};
 use crate::math::Vector;
+use crate::vec3::{
+    V3, add_cross, add_scaled, cross, dot, halves, product, rotate, rotate_back, scale, sub,
+    transposed,
+};
 
 /// `[i][k]` is what the torque of joint `i` has of each of the ten numbers of link `k`; zero where the link
 /// comes before the joint.

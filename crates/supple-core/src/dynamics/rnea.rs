@@ -8,10 +8,10 @@
 
 use super::body_motion::body_motions;
 use super::chain::parent_rotations;
-use super::vec3::{V3, add, add_cross, add_rotated, add_scaled, dot, rotate, rotate_back};
 use crate::arm::Arm;
 use crate::lanes::{Number, in_groups, of_joint};
 use crate::math::Vector;
+use crate::vec3::{V3, add, add_cross, add_rotated, add_scaled, dot, rotate, rotate_back};
 
 /// Joint torques that give the accelerations `qdd`: `H qdd + C qd + G` \[N m\], without friction.
 ///

@@ -6,10 +6,10 @@ use super::crba::mass_columns;
 use super::frames::{bodies, joint_motions};
 use super::inertia::weight_on;
 use super::motion::{Motion, split};
-use super::vec3::dot6;
 use crate::arm::Arm;
 use crate::lanes::{Column, Columns, Rows, column, for_each_joint, splat, sums_inward};
 use crate::math::Vector;
+use crate::vec3::dot6;
 
 /// An arm in a state. What nobody asks for is not computed: everything here is inlined.
 pub(crate) struct Sweep<const G: usize> {
