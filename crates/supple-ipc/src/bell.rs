@@ -25,6 +25,15 @@ pub(crate) enum Ring {
     Announced = 1,
 }
 
+/// What ended a wait.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Awoken {
+    By(Ring),
+    BySignal,
+    /// It did not ring in time.
+    InVain,
+}
+
 fn path(domain: &Domain, name: &str) -> PathBuf {
     let name = format!("{}.{name}.bell", domain.prefix());
     domain.folder().join(name)
@@ -107,11 +116,10 @@ impl Bell {
         Ok(())
     }
 
-    /// Waits until it rings, or for `timeout`, more than zero, or until a signal comes; `None` where it did not
-    /// ring. For who is seldom left waiting: the kernel counts the socket's time-out in ticks of several
+    /// Waits until it rings, or for `timeout`, more than zero, or until a signal comes. For who is seldom left waiting: the kernel counts the socket's time-out in ticks of several
     /// milliseconds, and sets no timer of high resolution, which is dear in a virtual machine
     /// (`benches/latency`).
-    pub fn wait_in_ticks(&self, timeout: Duration) -> Result<Option<Ring>, IpcError> {
+    pub fn wait_in_ticks(&self, timeout: Duration) -> Result<Awoken, IpcError> {
         if self.timeout.get() != timeout {
             let set = self.socket.set_read_timeout(Some(timeout));
             set.map_err(|error| failed(self.name, &error))?;
@@ -119,10 +127,11 @@ impl Bell {
         }
         let mut why = [0];
         match self.socket.recv(&mut why) {
-            Ok(_) if why == [Ring::Announced as u8] => Ok(Some(Ring::Announced)),
-            Ok(_) => Ok(Some(Ring::Sent)),
+            Ok(_) if why == [Ring::Announced as u8] => Ok(Awoken::By(Ring::Announced)),
+            Ok(_) => Ok(Awoken::By(Ring::Sent)),
             Err(error) => match error.kind() {
-                ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted => Ok(None),
+                ErrorKind::WouldBlock | ErrorKind::TimedOut => Ok(Awoken::InVain),
+                ErrorKind::Interrupted => Ok(Awoken::BySignal),
                 _ => Err(failed(self.name, &error)),
             },
         }

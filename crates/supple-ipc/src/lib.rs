@@ -4,6 +4,7 @@
 //! |---|---|---|---|
 //! | `arm_state` | [`ArmState`](message::ArmState) | the plant: `supple-sim` or `supple-can` | the controller |
 //! | `torque_command` | [`TorqueCommand`](message::TorqueCommand) | the controller: `supple-rt` | the plant |
+//! | `plant_asleep` | [`PlantAsleep`](message::PlantAsleep) | the plant | the controller |
 //! | `telemetry` | [`Telemetry`](message::Telemetry) | the controller | up to 8 |
 //! | `operator_request` | [`OperatorRequest`](message::OperatorRequest) | up to 8 operators | the controller |
 //! | `operator_reply` | [`OperatorReply`](message::OperatorReply) | the controller | up to 8 |

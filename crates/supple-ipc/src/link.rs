@@ -2,16 +2,18 @@
 //!
 //! The plant owns the clock: it publishes a state and rings, the controller answers with the command of the
 //! same cycle and rings back. Neither waits for the other without a bound. Where both share a processor, whatever
-//! the controller does between its ring and its sleep keeps the plant waiting: so the plant rings before a state
-//! too, when there is time for everything else.
+//! the controller does between its answer and its sleep keeps the plant waiting: so the plant rings before a state
+//! too, when there is time for everything else, and is rung only where it sleeps. It says so before it does, and
+//! looks once more: of the answer and the word, one always comes in time for the other.
 
-use crate::bell::{Bell, Ring, Rope};
+use crate::bell::{Awoken, Bell, Ring, Rope};
 use crate::domain::Domain;
 use crate::error::IpcError;
 use crate::last_out::LastOut;
-use crate::message::{ArmState, TorqueCommand};
+use crate::message::{ArmState, PlantAsleep, TorqueCommand};
 use crate::port::{Full, Reader, Terms, Writer};
 use core::cell::{Cell, LazyCell};
+use core::sync::atomic::{Ordering, fence};
 use core::time::Duration;
 use std::time::Instant;
 
@@ -30,6 +32,13 @@ const COMMANDS: Terms = Terms {
     depth: 2,
     oldest_goes: true,
 };
+const ASLEEP: Terms = Terms {
+    name: "plant_asleep",
+    writers: 1,
+    readers: 1,
+    depth: 1,
+    oldest_goes: true,
+};
 const STATE_BELL: &str = "arm_state";
 const COMMAND_BELL: &str = "torque_command";
 
@@ -41,8 +50,9 @@ pub struct PlantLink {
     rope: Rope,
     states: Writer<ArmState>,
     commands: Reader<TorqueCommand>,
+    asleep: Writer<PlantAsleep>,
     spin: Duration,
-    /// Its ring of an answer that was found without it.
+    /// A ring was asked for that was not waited for.
     rung: Cell<bool>,
     _last_out: LastOut,
 }
@@ -66,6 +76,7 @@ impl PlantLink {
         Ok(PlantLink {
             states: Writer::new(domain, &joining.node, &STATES, Full::Lose)?,
             commands: Reader::new(domain, &joining.node, &COMMANDS)?,
+            asleep: Writer::new(domain, &joining.node, &ASLEEP, Full::Lose)?,
             rope: Rope::new(domain, STATE_BELL)?,
             bell: Bell::new(domain, COMMAND_BELL)?,
             spin: Duration::ZERO,
@@ -118,16 +129,14 @@ impl PlantLink {
     pub fn answer(&self, cycle: u64, timeout: Duration) -> Result<Heard, IpcError> {
         let mut heard = Heard::default();
         let start = LazyCell::new(Instant::now);
-        self.rung.set(true);
+        let mut told = false;
         loop {
             while let Some(command) = self.commands.receive()? {
-                match command.cycle {
-                    answered if answered == cycle => heard.answer = Some(command),
-                    _ => heard.late += 1,
+                if command.cycle == cycle {
+                    heard.answer = Some(command);
+                    return Ok(heard);
                 }
-            }
-            if heard.answer.is_some() {
-                return Ok(heard);
+                heard.late += 1;
             }
             let waited = start.elapsed();
             let left = timeout.saturating_sub(waited);
@@ -138,7 +147,15 @@ impl PlantLink {
                 core::hint::spin_loop();
                 continue;
             }
+            if !told {
+                self.asleep.send(&PlantAsleep { cycle })?;
+                fence(Ordering::SeqCst);
+                told = true;
+                self.rung.set(true);
+                continue;
+            }
             if self.bell.wait(left)? {
+                told = false;
                 self.rung.set(false);
             }
         }
@@ -164,6 +181,7 @@ pub struct ControllerLink {
     rope: Rope,
     states: Reader<ArmState>,
     commands: Writer<TorqueCommand>,
+    asleep: Reader<PlantAsleep>,
     /// There was no state left, so that the next one has its ring yet to come.
     read_all: Cell<bool>,
     _last_out: LastOut,
@@ -178,6 +196,8 @@ impl ControllerLink {
         let joining = domain.join()?;
         Ok(ControllerLink {
             commands: Writer::new(domain, &joining.node, &COMMANDS, Full::Lose)?,
+            // Before the states: who waits for the answer to one is heard.
+            asleep: Reader::new(domain, &joining.node, &ASLEEP)?,
             states: Reader::new(domain, &joining.node, &STATES)?,
             rope: Rope::new(domain, COMMAND_BELL)?,
             bell: Bell::new(domain, STATE_BELL)?,
@@ -212,37 +232,89 @@ impl ControllerLink {
         }
     }
 
-    /// As [`ControllerLink::wait`], but wakes too when a state is announced.
+    /// As [`ControllerLink::wait`], but wakes too when a state is announced. It reads no clock: the time counts
+    /// anew where a signal or the ring of a state that was read already comes between.
     ///
     /// # Errors
     /// [`IpcError::Service`].
     pub fn wake(&self, timeout: Duration) -> Result<Woken, IpcError> {
-        let start = Instant::now();
-        let mut left = timeout;
+        let mut in_vain = timeout.is_zero();
         loop {
             // Whoever has read all goes to sleep at once, and the plant on his processor goes on.
-            if !self.read_all.get() || left.is_zero() {
+            if !self.read_all.get() || in_vain {
                 match self.receive()? {
                     Some(state) => return Ok(Woken::State(state)),
-                    None if left.is_zero() => return Ok(Woken::Silence),
+                    None if in_vain => return Ok(Woken::Silence),
                     None => {}
                 }
             }
-            if self.bell.wait_in_ticks(left)? == Some(Ring::Announced) {
-                return Ok(Woken::Announced);
+            match self.bell.wait_in_ticks(timeout)? {
+                Awoken::By(Ring::Announced) => {
+                    self.read_all.set(false);
+                    return Ok(Woken::Announced);
+                }
+                // Of a state that was read before it rang, perhaps: then there is another wait.
+                Awoken::By(Ring::Sent) | Awoken::BySignal => self.read_all.set(false),
+                Awoken::InVain => in_vain = true,
             }
-            self.read_all.set(false);
-            left = timeout.saturating_sub(start.elapsed());
         }
     }
 
-    /// Publishes the answer to a state and wakes the plant.
+    /// Publishes the answer to a state and wakes the plant where it sleeps.
     ///
     /// # Errors
     /// [`IpcError::Service`].
     pub fn answer(&self, command: &TorqueCommand) -> Result<(), IpcError> {
         self.commands.send(command)?;
-        self.rope.ring(Ring::Sent);
+        fence(Ordering::SeqCst);
+        if self.asleep.receive()?.is_some() {
+            self.rope.ring(Ring::Sent);
+        }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::message::{Drives, PlantReport};
+
+    const SOON: Duration = Duration::from_secs(5);
+
+    #[test]
+    fn a_plant_is_rung_where_it_said_that_it_sleeps_and_only_there() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let domain = Domain::within(&folder.path().join("run"), "asleep").expect("a domain");
+        let plant = PlantLink::new(&domain).expect("a plant");
+        let controller = ControllerLink::new(&domain).expect("a controller");
+        for (cycle, asleep) in [(0, false), (1, true), (2, false), (3, true), (4, true)] {
+            let report = PlantReport::default();
+            let state = ArmState::new(cycle, 0, &[Some(0.0); 4], None, Drives::Idle, report);
+            plant.publish(&state).expect("published");
+            if asleep {
+                let in_vain = plant.answer(cycle, Duration::from_millis(1)).expect("read");
+                assert_eq!(in_vain, Heard::default());
+            }
+            assert_eq!(controller.wait(SOON).expect("read"), Some(state));
+            let command = TorqueCommand {
+                cycle,
+                torque_nm: Default::default(),
+                fallback_torque_nm: Default::default(),
+                dof: 4,
+                mode: 0,
+                fault: 0,
+                safe_action: 0,
+                drives: Drives::Idle as u8,
+                reserved: Default::default(),
+            };
+            controller.answer(&command).expect("answered");
+            assert_eq!(
+                plant.bell.wait(Duration::ZERO).expect("heard"),
+                asleep,
+                "cycle {cycle}"
+            );
+            let heard = plant.answer(cycle, SOON).expect("read");
+            assert_eq!(heard.answer, Some(command));
+        }
     }
 }

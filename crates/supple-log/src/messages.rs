@@ -86,7 +86,7 @@ pub struct CycleTiming {
     pub period_ns: u64,
     /// From the measurement to the beginning of the step \[ns\].
     pub latency_ns: u64,
-    /// The step itself \[ns\].
+    /// From there until its torques are known, with a look for requests \[ns\].
     pub step_ns: u64,
 }
 

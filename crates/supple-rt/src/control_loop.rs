@@ -172,9 +172,8 @@ impl<const N: usize> ControlLoop<N> {
         let heard = self.hear(arm.cycle);
         let input = arm.input::<N>(heard.as_ref().map(|(_, request)| *request))?;
         let had_fault = self.state.fault().is_some();
-        let step_begin_ns = monotonic_ns();
         let output = step(&self.controller, &mut self.state, &input);
-        let step_ns = monotonic_ns() - step_begin_ns;
+        let step_ns = monotonic_ns() - begin_ns;
         if let Some((message, _)) = &heard {
             let (outcome, text) = match &output.refusal {
                 None => (Outcome::Accepted, Text::EMPTY),

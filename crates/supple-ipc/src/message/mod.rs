@@ -7,12 +7,14 @@
 
 mod arm_state;
 mod operator;
+mod plant_asleep;
 mod telemetry;
 mod text;
 mod torque_command;
 
 pub use arm_state::{ArmState, PlantReport};
 pub use operator::{OperatorReply, OperatorRequest, Outcome};
+pub use plant_asleep::PlantAsleep;
 pub use telemetry::{CycleTiming, Telemetry, TermTorques};
 pub use text::Text;
 pub use torque_command::TorqueCommand;
