@@ -91,10 +91,14 @@ impl<const N: usize> Rig<N> {
     /// At a bent pose of a built-in arm, after the blends of the mode's entry.
     ///
     /// # Panics
-    /// Where the controller does not come to follow the law: there is nothing to measure then.
+    /// Where the controller does not come to follow the law, or does so near a singular pose: there is nothing to
+    /// measure then.
     pub fn tracking(asset: &str) -> Self {
         let config = config::<N>(asset);
-        let bent = [0.2, 0.8, 0.0, 0.9];
+        let bent = match N {
+            3 => [0.2, 0.8, 1.6, 0.0],
+            _ => [0.2, 0.8, 0.0, 1.6],
+        };
         let position_rad = Vector::from_fn(|i, _| match config.roles[i] {
             Role::Held { position_rad, .. } => position_rad,
             Role::Active => bent[i % bent.len()],
@@ -114,8 +118,16 @@ impl<const N: usize> Rig<N> {
                 rig.step();
             }
         }
-        let mode = rig.step().mode;
-        assert_eq!(mode, Mode::Track, "the controller must follow the law");
+        let output = rig.step();
+        assert_eq!(
+            output.mode,
+            Mode::Track,
+            "the controller must follow the law"
+        );
+        assert!(
+            output.least_singular_value_m > SINGULAR_BELOW_M,
+            "the pose must be regular"
+        );
         rig
     }
 

@@ -27,7 +27,9 @@
 use crate::config::{ApparentInertia, FrictionVelocity, Gains, Law, Role};
 use crate::dynamics::Terms;
 use crate::friction::Friction;
-use crate::linalg::{Cholesky, least_singular_value, singular_values_exceed};
+use crate::linalg::{
+    Cholesky, Inverse3, is_positive_definite_3, least_singular_value, singular_values_exceed,
+};
 use crate::math::{Matrix, Matrix3, Vector, Vector3};
 use crate::trajectory::Reference;
 
@@ -81,17 +83,55 @@ impl<const N: usize> Task<N> {
                 mass_matrix[(i, i)] = 1.0;
             }
         }
-        let least_singular_value_m = least_singular_value(&jacobian);
-        let mobile = Cholesky::new(&mass_matrix)?.solve(&jacobian.transpose());
         let damping = singularity_damping(&jacobian.data.0);
-        let mobility: Matrix3<f64> = jacobian * mobile + Matrix3::from_diagonal_element(damping);
-        let inverse = Cholesky::new(&mobility)?.solve(&mobile.transpose());
+        let inverse = match three_active(roles) {
+            Some(joints) if damping == 0.0 => {
+                // What the inverse does not ask for, but the arm has to be.
+                if !is_positive_definite_3(&mass_matrix, joints) {
+                    return None;
+                }
+                inverse_of_three(&jacobian, joints)
+            }
+            _ => {
+                let mobile = Cholesky::new(&mass_matrix)?.solve(&jacobian.transpose());
+                let mobility = jacobian * mobile + Matrix3::from_diagonal_element(damping);
+                let inverse = Cholesky::new(&mobility)?.solve(&mobile.transpose());
+                inverse.transpose()
+            }
+        };
         Some(Task {
+            least_singular_value_m: least_singular_value(&jacobian),
             jacobian,
-            inverse: inverse.transpose(),
-            least_singular_value_m,
+            inverse,
         })
     }
+}
+
+/// The active joints, where they are three: as many as the tip has directions.
+#[inline]
+fn three_active<const N: usize>(roles: &[Role; N]) -> Option<[usize; 3]> {
+    let mut joints = [0; 3];
+    let mut active = 0;
+    for (joint, role) in roles.iter().enumerate() {
+        if *role == Role::Active {
+            *joints.get_mut(active)? = joint;
+            active += 1;
+        }
+    }
+    (active == 3).then_some(joints)
+}
+
+/// `J^-1` on three joints: where only one motion of theirs moves the tip in a given way, no mass matrix has a say.
+#[inline]
+fn inverse_of_three<const N: usize>(jacobian: &Matrix<3, N>, joints: [usize; 3]) -> Matrix<N, 3> {
+    let rows = Inverse3::new(joints.map(|joint| jacobian.data.0[joint])).rows();
+    let mut inverse = Matrix::zeros();
+    for (joint, row) in joints.into_iter().zip(rows) {
+        for (direction, entry) in row.into_iter().enumerate() {
+            inverse[(joint, direction)] = entry;
+        }
+    }
+    inverse
 }
 
 /// Torques of the law and of what stands beside it, each term apart \[N m\].

@@ -181,6 +181,18 @@ pub fn singular_values_exceed<const N: usize>(j: &[[f64; 3]; N], bound: f64) -> 
     (xx > 0.0) & (minor > 0.0) & (determinant > 0.0)
 }
 
+/// Whether the three rows and columns `at` of a symmetric matrix are positive definite by themselves, by their
+/// leading minors. The lower triangle is read.
+#[inline]
+pub(crate) fn is_positive_definite_3<const N: usize>(a: &Matrix<N, N>, at: [usize; 3]) -> bool {
+    let [x, y, z] = at;
+    let (xx, yx, yy) = (a[(x, x)], a[(y, x)], a[(y, y)]);
+    let (zx, zy, zz) = (a[(z, x)], a[(z, y)], a[(z, z)]);
+    let minor = xx * yy - yx * yx;
+    let determinant = zz * minor + zx * (yx * zy - yy * zx) - zy * (xx * zy - yx * zx);
+    (xx > 0.0) & (minor > 0.0) & (determinant > 0.0) & (determinant < f64::INFINITY)
+}
+
 /// Inverse of a 3 x 3 matrix that is given by columns.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Inverse3 {
@@ -206,6 +218,13 @@ impl Inverse3 {
         let [a, b, c] = self.rows;
         let squares = dot(a, a) + dot(b, b) + dot(c, c);
         squares * (bound * bound) < self.determinant * self.determinant
+    }
+
+    /// The rows of the inverse.
+    #[inline(always)]
+    pub fn rows(&self) -> [V3; 3] {
+        let scale = 1.0 / self.determinant;
+        self.rows.map(|row| row.map(|entry| entry * scale))
     }
 
     /// The inverse times `x`.

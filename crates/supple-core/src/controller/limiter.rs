@@ -90,16 +90,17 @@ pub fn limit_torque<const N: usize>(
         demand_nm[i].clamp(-limits.joint_torque_nm[i], limits.joint_torque_nm[i])
     });
     let motors = groups.motor_torque_nm(&torque);
-    let mut scale = [1.0_f64; N];
-    for motor in 0..N {
-        let (value, limit) = (abs(motors[motor]), limits.motor_torque_nm[motor]);
-        if value > limit {
+    let beyond = |motor: usize| abs(motors[motor]) > limits.motor_torque_nm[motor];
+    // Mostly none is, and there is nothing to divide.
+    if (0..N).fold(false, |any, motor| any | beyond(motor)) {
+        let mut scale = [1.0_f64; N];
+        for motor in (0..N).filter(|motor| beyond(*motor)) {
             let group = groups.motor_group[motor];
-            scale[group] = scale[group].min(limit / value);
+            scale[group] = scale[group].min(limits.motor_torque_nm[motor] / abs(motors[motor]));
         }
-    }
-    for joint in 0..N {
-        torque[joint] *= scale[groups.joint_group[joint]];
+        for joint in 0..N {
+            torque[joint] *= scale[groups.joint_group[joint]];
+        }
     }
     (torque, torque != *demand_nm)
 }
@@ -112,13 +113,15 @@ fn limit_rate<const N: usize>(
     elapsed_s: f64,
 ) -> (Vector<N>, bool) {
     let step = torque_nm - last_nm;
+    let greatest = limits.torque_rate_nm_per_s * elapsed_s;
+    let beyond = |joint: usize| abs(step[joint]) > greatest[joint];
+    if !(0..N).fold(false, |any, joint| any | beyond(joint)) {
+        return (*torque_nm, false);
+    }
     let mut share = [1.0_f64; N];
-    for joint in 0..N {
-        let greatest = limits.torque_rate_nm_per_s[joint] * elapsed_s;
-        if abs(step[joint]) > greatest {
-            let group = groups.joint_group[joint];
-            share[group] = share[group].min(greatest / abs(step[joint]));
-        }
+    for joint in (0..N).filter(|joint| beyond(*joint)) {
+        let group = groups.joint_group[joint];
+        share[group] = share[group].min(greatest[joint] / abs(step[joint]));
     }
     let limited = share.iter().any(|share| *share < 1.0);
     let torque = Vector::from_fn(|joint, _| match share[groups.joint_group[joint]] {

@@ -37,10 +37,10 @@ pub fn step<const N: usize>(
     if task.is_none() {
         state.latch_fault(Fault::MassMatrix);
     }
-    let refusal = input.request.and_then(|request| match request {
+    let refusal = input.request.as_ref().and_then(|request| match request {
         // A fault is not cleared in a cycle that would raise it.
         Request::Reset if !sound || task.is_none() => Some(Refusal::Mode { mode: state.mode() }),
-        _ => state.request(config, &request).err(),
+        _ => state.request(config, request).err(),
     });
     state.gains.elapsed_s += elapsed_s;
     state.advance_held(config, elapsed_s);
@@ -212,8 +212,10 @@ impl<const N: usize> State<N> {
                     friction_share: self.latch.friction_share(),
                 };
                 let (law, terms) = (&config.law, &self.terms);
-                let torques = impedance(law, &config.friction, &config.roles, terms, task, &now);
-                self.guarded(config, torques)
+                let mut torques =
+                    impedance(law, &config.friction, &config.roles, terms, task, &now);
+                self.guard(config, &mut torques);
+                torques
             }
             (activity, ..) if activity.has_own_loops() => self.moving(config),
             _ => self.safe(config),
@@ -233,12 +235,13 @@ impl<const N: usize> State<N> {
             };
         }
         let velocity = &self.estimator.velocity_rad_per_s;
-        let torques = Torques {
+        let mut torques = Torques {
             gravity: self.terms.gravity,
             damping: -config.hold_damping_nm_s_per_rad.component_mul(velocity),
             ..Torques::zeros()
         };
-        self.guarded(config, torques)
+        self.guard(config, &mut torques);
+        torques
     }
 
     /// Where every joint should be, in the modes that move joints.
@@ -291,7 +294,8 @@ impl<const N: usize> State<N> {
             torques.friction[ramp.joint] = ramp.rate_nm_per_s * self.activity_s(config);
             torques.joint_pd[ramp.joint] = 0.0;
         }
-        self.guarded(config, torques)
+        self.guard(config, &mut torques);
+        torques
     }
 
     /// Leaves the breakaway mode for gravity hold once its joint has moved or the ramp has reached its
@@ -308,7 +312,7 @@ impl<const N: usize> State<N> {
     }
 
     /// Adds what runs beside every activity: the loops of held joints and the soft stops.
-    fn guarded(&self, config: &Config<N>, mut torques: Torques<N>) -> Torques<N> {
+    fn guard(&self, config: &Config<N>, torques: &mut Torques<N>) {
         let velocity = &self.estimator.velocity_rad_per_s;
         if !self.activity.has_own_loops() {
             for (joint, role) in config.roles.iter().enumerate() {
@@ -326,7 +330,6 @@ impl<const N: usize> State<N> {
             }
         }
         torques.soft_stop = checks::soft_stop(&config.limits, &self.position, velocity);
-        torques
     }
 
     /// Blends out, over `handover_s`, what the torque was more than it is now when the activity began.

@@ -9,6 +9,7 @@ mod support;
 
 mod closed_loop;
 mod friction;
+mod inverse;
 mod redundancy;
 mod singular;
 mod terms;
