@@ -116,7 +116,7 @@ fn limit(instructions: u64) -> LibraryBenchmarkConfig {
 #[bench::rnea_3(args = (rnea::<3>("wam3")), config = limit(1_650))]
 #[bench::rnea_4(args = (rnea::<4>("wam4")), config = limit(2_150))]
 #[bench::rnea_7(args = (rnea::<7>("wam7")), config = limit(4_150))]
-#[bench::crba_3(args = (crba::<3>("wam3")), config = limit(1_850))]
+#[bench::crba_3(args = (crba::<3>("wam3")), config = limit(1_800))]
 #[bench::crba_4(args = (crba::<4>("wam4")), config = limit(2_250))]
 #[bench::crba_7(args = (crba::<7>("wam7")), config = limit(6_200))]
 #[bench::aba_3(args = (aba::<3>("wam3")), config = limit(3_600))]
@@ -133,7 +133,8 @@ fn limit(instructions: u64) -> LibraryBenchmarkConfig {
 #[bench::jdot_qd_7(args = (jdot_qd::<7>("wam7")), config = limit(3_300))]
 #[bench::regressor_3(args = (regressor::<3>("wam3")), config = limit(4_600))]
 #[bench::regressor_4(args = (regressor::<4>("wam4")), config = limit(5_100))]
-#[bench::regressor_7(args = (regressor::<7>("wam7")), config = limit(12_950))]
+// 11,800, or 3,100 more where the compiler clears 3,920 bytes by a memset, which is counted byte by byte.
+#[bench::regressor_7(args = (regressor::<7>("wam7")), config = limit(16_400))]
 #[bench::terms_3(args = (terms::<3>("wam3")), config = limit(3_800))]
 #[bench::terms_4(args = (terms::<4>("wam4")), config = limit(3_950))]
 #[bench::terms_7(args = (terms::<7>("wam7")), config = limit(9_950))]
@@ -142,9 +143,9 @@ fn limit(instructions: u64) -> LibraryBenchmarkConfig {
 #[bench::law_3(args = (position_law::<3>("wam3")), config = limit(5_200))]
 #[bench::law_4(args = (position_law::<4>("wam4")), config = limit(4_450))]
 #[bench::law_7(args = (pose_law::<7>("wam7")), config = limit(14_150))]
-#[bench::step_3(args = (controller_step::<3>("wam3")), config = limit(7_150))]
-#[bench::step_4(args = (controller_step::<4>("wam4")), config = limit(8_150))]
-#[bench::step_7(args = (controller_step::<7>("wam7")), config = limit(18_650))]
+#[bench::step_3(args = (controller_step::<3>("wam3")), config = limit(6_900))]
+#[bench::step_4(args = (controller_step::<4>("wam4")), config = limit(7_650))]
+#[bench::step_7(args = (controller_step::<7>("wam7")), config = limit(16_700))]
 fn instructions(mut call: Call) {
     call();
 }

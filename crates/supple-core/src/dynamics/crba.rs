@@ -6,30 +6,85 @@
 
 use super::chain::Chain;
 use super::frames::{bodies, joint_motions};
-use super::inertia::times;
+use super::inertia::{spun, times};
 use crate::arm::Arm;
 use crate::lanes::{
     Columns, LANES, Lanes, Rows, entry, for_each_joint, in_groups, of_group, of_joint,
-    of_joint_for_all, sums_inward,
+    of_joint_for_all, splat, sums_inward,
 };
 use crate::math::{Matrix, Vector};
-use crate::vec3::dot6;
+use crate::vec3::{add, cross, dot, dot6, rotate, rotate_back, scale, sub};
 
 /// Mass matrix `H(q)`, symmetric, rotor inertias on the diagonal \[kg m^2\]. `q` \[rad\].
 #[inline]
 pub fn crba<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> Matrix<N, N> {
-    in_groups!(N, of_position(arm, q))
+    match N {
+        ..=3 => link_by_link(arm, q),
+        _ => in_groups!(N, of_position(arm, q)),
+    }
 }
 
 #[inline]
 fn of_position<const N: usize, const G: usize>(arm: &Arm<N>, q: &Vector<N>) -> Matrix<N, N> {
-    let chain = match N {
-        ..=3 => Chain::<G>::from_first_joint(arm, q),
-        _ => Chain::new(arm, q),
-    };
+    let chain = Chain::<G>::new(arm, q);
     let last = of_joint(&chain.origins, N - 1);
     let carried = sums_inward(bodies(arm, &chain, last));
     symmetric(&mass_columns(arm, &joint_motions(&chain, last), &carried))
+}
+
+/// Of so few joints that each link's share of every entry is found at once,
+/// `H_ij = sum over k of m_k v_ik . v_jk + w_ik . I_k w_jk`: joint `i` alone, at unit rate, moves the centre of mass
+/// of link `k` at `v_ik` and turns the link at `w_ik`. `v` is in the axes of the first joint, `w` in the link's own.
+#[inline]
+fn link_by_link<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> Matrix<N, N> {
+    let chain = Chain::<1>::from_first_joint(arm, q);
+    let (r, origin) = (of_group(&chain.rotations, 0), of_group(&chain.origins, 0));
+    let [mass] = of_group(&arm.rows.masses::<1>(), 0);
+    let [cx, cy, cz, xx, xy, yy, xz, yz, zz] = of_group(&arm.rows.central::<1>(), 0);
+    let lever = rotate(&r, [cx, cy, cz]);
+    let com = add(origin, lever);
+    let (mut v, mut w) = ([[Lanes::ZERO; 3]; N], [[Lanes::ZERO; 3]; N]);
+    for joint in 0..N {
+        let axis = match joint {
+            0 => {
+                // About the z of these axes.
+                (v[0], w[0]) = ([-com[1], com[0], Lanes::ZERO], [r[2], r[5], r[8]]);
+                continue;
+            }
+            // It moves the last link alone, about that link's own z.
+            last if last == N - 1 => {
+                v[last] = cross([r[6], r[7], r[8]], lever);
+                continue;
+            }
+            _ => splat(chain.frame(joint).axis()),
+        };
+        v[joint] = cross(axis, sub(com, splat(of_joint(&chain.origins, joint))));
+        w[joint] = rotate_back(&r, axis);
+    }
+    let mut whole = Matrix::<N, N>::zeros();
+    for j in 0..N {
+        let momentum = scale(v[j], mass);
+        let spin = match j {
+            last if last > 0 && last == N - 1 => [xz, yz, zz],
+            _ => spun([xx, xy, yy, xz, yz, zz], w[j]),
+        };
+        for i in 0..=j {
+            let turning = match i {
+                last if last > 0 && last == N - 1 => zz,
+                _ => dot(w[i], spin),
+            };
+            let shares = (dot(v[i], momentum) + turning).to_array();
+            // Joint `j` moves the links from its own on.
+            let mut sum = shares[j];
+            for link in j + 1..N {
+                sum += shares[link];
+            }
+            whole.data.0[j][i] = sum;
+            whole.data.0[i][j] = sum;
+        }
+        whole.data.0[j][j] += arm.armature[j];
+    }
+    whole
 }
 
 /// From the joints' motions and what they carry, right from the diagonal downwards.
