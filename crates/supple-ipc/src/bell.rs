@@ -116,9 +116,9 @@ impl Bell {
         Ok(())
     }
 
-    /// Waits until it rings, or for `timeout`, more than zero, or until a signal comes. For who is seldom left waiting: the kernel counts the socket's time-out in ticks of several
-    /// milliseconds, and sets no timer of high resolution, which is dear in a virtual machine
-    /// (`benches/latency`).
+    /// Waits until it rings, or for `timeout`, more than zero, or until a signal comes. For who is seldom left
+    /// waiting: the kernel counts the socket's time-out in ticks of several milliseconds, and sets no timer of high
+    /// resolution, which is dear in a virtual machine (`benches/latency`).
     pub fn wait_in_ticks(&self, timeout: Duration) -> Result<Awoken, IpcError> {
         if self.timeout.get() != timeout {
             let set = self.socket.set_read_timeout(Some(timeout));

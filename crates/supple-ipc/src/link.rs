@@ -1,10 +1,10 @@
 //! The control path: arm states one way, torque commands the other, a bell for each.
 //!
 //! The plant owns the clock: it publishes a state and rings, the controller answers with the command of the
-//! same cycle and rings back. Neither waits for the other without a bound. Where both share a processor, whatever
+//! same cycle. Neither waits for the other without a bound. Where both share a processor, whatever
 //! the controller does between its answer and its sleep keeps the plant waiting: so the plant rings before a state
-//! too, when there is time for everything else, and is rung only where it sleeps. It says so before it does, and
-//! looks once more: of the answer and the word, one always comes in time for the other.
+//! too, when there is time for everything else, and is rung back only where it said that it goes to sleep. It says so
+//! before it does, and looks once more: of the answer and the word, one always comes in time for the other.
 
 use crate::bell::{Awoken, Bell, Ring, Rope};
 use crate::domain::Domain;
@@ -110,6 +110,8 @@ impl PlantLink {
     /// [`IpcError::Service`].
     pub fn announce(&self) -> Result<(), IpcError> {
         self.silence()?;
+        self.states.connect()?;
+        self.asleep.connect()?;
         self.rope.ring(Ring::Announced);
         Ok(())
     }
@@ -127,8 +129,21 @@ impl PlantLink {
     /// # Errors
     /// [`IpcError::Service`].
     pub fn answer(&self, cycle: u64, timeout: Duration) -> Result<Heard, IpcError> {
+        self.answer_within(cycle, || timeout)
+    }
+
+    /// As [`PlantLink::answer`], but how long to wait is asked only where the answer is not there already: it is most
+    /// of the time where both share a processor, and no clock has to be read then.
+    ///
+    /// # Errors
+    /// [`IpcError::Service`].
+    pub fn answer_within(
+        &self,
+        cycle: u64,
+        timeout: impl FnOnce() -> Duration,
+    ) -> Result<Heard, IpcError> {
         let mut heard = Heard::default();
-        let start = LazyCell::new(Instant::now);
+        let begun = LazyCell::new(|| (Instant::now(), timeout()));
         let mut told = false;
         loop {
             while let Some(command) = self.commands.receive()? {
@@ -138,6 +153,7 @@ impl PlantLink {
                 }
                 heard.late += 1;
             }
+            let (start, timeout) = *begun;
             let waited = start.elapsed();
             let left = timeout.saturating_sub(waited);
             if left.is_zero() {
@@ -232,30 +248,37 @@ impl ControllerLink {
         }
     }
 
-    /// As [`ControllerLink::wait`], but wakes too when a state is announced. It reads no clock: the time counts
-    /// anew where a signal or the ring of a state that was read already comes between.
+    /// As [`ControllerLink::wait`], but wakes too when a state is announced. It reads no clock before it was woken in
+    /// vain, by a signal or the ring of a state that was read already: the time counts anew from the first of them.
     ///
     /// # Errors
     /// [`IpcError::Service`].
     pub fn wake(&self, timeout: Duration) -> Result<Woken, IpcError> {
-        let mut in_vain = timeout.is_zero();
+        let mut left = timeout;
+        let mut in_vain_since = None;
         loop {
             // Whoever has read all goes to sleep at once, and the plant on his processor goes on.
-            if !self.read_all.get() || in_vain {
+            if !self.read_all.get() || left.is_zero() {
                 match self.receive()? {
                     Some(state) => return Ok(Woken::State(state)),
-                    None if in_vain => return Ok(Woken::Silence),
+                    None if left.is_zero() => return Ok(Woken::Silence),
                     None => {}
                 }
             }
-            match self.bell.wait_in_ticks(timeout)? {
+            match self.bell.wait_in_ticks(left)? {
                 Awoken::By(Ring::Announced) => {
+                    // To look once more costs nobody anything now, and makes the next look quicker.
                     self.read_all.set(false);
                     return Ok(Woken::Announced);
                 }
-                // Of a state that was read before it rang, perhaps: then there is another wait.
-                Awoken::By(Ring::Sent) | Awoken::BySignal => self.read_all.set(false),
-                Awoken::InVain => in_vain = true,
+                Awoken::By(Ring::Sent) | Awoken::BySignal => {
+                    if let Some(state) = self.receive()? {
+                        return Ok(Woken::State(state));
+                    }
+                    let since = *in_vain_since.get_or_insert_with(Instant::now);
+                    left = timeout.saturating_sub(since.elapsed());
+                }
+                Awoken::InVain => left = Duration::ZERO,
             }
         }
     }
@@ -278,6 +301,7 @@ impl ControllerLink {
 mod tests {
     use super::*;
     use crate::message::{Drives, PlantReport};
+    use core::sync::atomic::AtomicBool;
 
     const SOON: Duration = Duration::from_secs(5);
 
@@ -316,5 +340,25 @@ mod tests {
             let heard = plant.answer(cycle, SOON).expect("read");
             assert_eq!(heard.answer, Some(command));
         }
+    }
+
+    #[test]
+    fn rings_without_a_state_hold_a_controller_no_longer_than_twice_its_patience() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let domain = Domain::within(&folder.path().join("run"), "rings").expect("a domain");
+        let controller = ControllerLink::new(&domain).expect("a controller");
+        let heard = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                let rope = Rope::new(&domain, STATE_BELL).expect("a rope");
+                while !heard.load(Ordering::Relaxed) {
+                    rope.ring(Ring::Sent);
+                    crate::outside::pause(Duration::from_millis(2));
+                }
+            });
+            let woken = controller.wake(Duration::from_millis(50)).expect("read");
+            heard.store(true, Ordering::Relaxed);
+            assert_eq!(woken, Woken::Silence);
+        });
     }
 }

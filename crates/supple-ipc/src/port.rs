@@ -12,6 +12,7 @@ use core::fmt::Debug;
 use core::time::Duration;
 use iceoryx2::port::publisher::{Publisher, PublisherCreateError};
 use iceoryx2::port::subscriber::{Subscriber, SubscriberCreateError};
+use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::*;
 use iceoryx2::service::builder::publish_subscribe::{
     PublishSubscribeCreateError, PublishSubscribeOpenError, PublishSubscribeOpenOrCreateError,
@@ -85,6 +86,12 @@ impl<T: Message> Writer<T> {
             name: terms.name,
             _alone: alone,
         })
+    }
+
+    /// Meets readers that have come, as the next sending would, which then has the time.
+    pub fn connect(&self) -> Result<(), IpcError> {
+        let connected = self.publisher.update_connections();
+        connected.map_err(|error| failed(self.name, &error))
     }
 
     /// Sends a copy; gives the number of readers that it reached.

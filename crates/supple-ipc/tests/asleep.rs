@@ -1,4 +1,4 @@
-//! The plant is rung where it sleeps, whenever the answer comes, and only there.
+//! The plant is rung where it sleeps, whenever the answer comes.
 
 mod support;
 

@@ -59,7 +59,7 @@ impl Timing {
         Spread::of(&self.latency)
     }
 
-    /// The step itself.
+    /// From there until the torques are known, with a look for requests.
     pub fn step(&self) -> Spread {
         Spread::of(&self.step)
     }

@@ -109,8 +109,8 @@ impl<const N: usize> World<N> {
                 due_ns = begin_ns;
             }
             self.link.publish(&self.state(begin_ns))?;
-            let left = Duration::from_nanos((due_ns + wait_ns).saturating_sub(begin_ns));
-            let heard = self.link.answer(self.cycle(), left)?;
+            let left = || Duration::from_nanos((due_ns + wait_ns).saturating_sub(monotonic_ns()));
+            let heard = self.link.answer_within(self.cycle(), left)?;
             self.note(&heard, begin_ns);
             self.advance(&heard, begin_ns)?;
             summary.cycles += 1;

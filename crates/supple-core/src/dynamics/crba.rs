@@ -1,4 +1,5 @@
-//! Composite rigid bodies: the mass matrix, `H_ij = S_i . I_j S_j` with `I_j` all that joint `j` carries.
+//! The mass matrix by composite rigid bodies, `H_ij = S_i . I_j S_j` with `I_j` all that joint `j` carries; of up to
+//! three joints link by link.
 #![allow(
     clippy::needless_range_loop,
     reason = "joints, groups and lanes are counted: each index goes into several arrays"

@@ -9,7 +9,7 @@ use supple_core::{Output, Vector};
 /// Torques of a cycle, and those to fall back on if the next answer does not come.
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
 #[repr(C)]
-#[type_name("supple.TorqueCommand.v1")]
+#[type_name("supple.TorqueCommand.v2")]
 pub struct TorqueCommand {
     /// Cycle of the arm state that this answers. An answer to another cycle is not to be used.
     pub cycle: u64,
