@@ -7,7 +7,9 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
 use supple_benches::{NULLSPACE_DAMPING, Rig, State, config, gains, pool, regular_pool};
 use supple_core::Matrix;
+use supple_core::config::Role;
 use supple_core::dynamics::{self, Terms};
+use supple_core::impedance::{Situation, Task, impedance};
 use supple_core::operational::{pose_torque, position_torque};
 
 /// Calls `function` on the pool in turn, both ways.
@@ -105,7 +107,7 @@ fn functions<const N: usize>(criterion: &mut Criterion, asset: &str) {
 
 fn position_law<const N: usize>(criterion: &mut Criterion, asset: &str) {
     let arm = config::<N>(asset).arm;
-    let (states, gains) = (regular_pool(&arm), gains());
+    let (states, gains) = (regular_pool(&arm, &[Role::Active; N]), gains());
     let law = |s: &State<N>| {
         position_torque(
             &arm,
@@ -123,9 +125,32 @@ fn position_law<const N: usize>(criterion: &mut Criterion, asset: &str) {
 
 fn pose_law<const N: usize>(criterion: &mut Criterion, asset: &str) {
     let arm = config::<N>(asset).arm;
-    let (states, gains) = (regular_pool(&arm), gains());
+    let (states, gains) = (regular_pool(&arm, &[Role::Active; N]), gains());
     let law = |s: &State<N>| pose_torque(&arm, &s.q, &s.qd, &s.pose, &gains, NULLSPACE_DAMPING);
     bench(criterion, "law", &states, law, |tau| {
+        tau.map_or(0.0, |tau| tau[0])
+    });
+}
+
+/// The law as a controller has it, its terms apart and its held joints left alone.
+fn law_by_terms<const N: usize>(criterion: &mut Criterion, asset: &str) {
+    let config = config::<N>(asset);
+    let (states, gains) = (regular_pool(&config.arm, &config.roles), gains());
+    let mut filled = Terms::default();
+    let law = |s: &State<N>| {
+        dynamics::terms(&config.arm, &s.q, &s.qd, &mut filled);
+        let now = Situation {
+            reference: &s.position,
+            velocity_rad_per_s: &s.qd,
+            gains: &gains.linear,
+            tip_force_n: None,
+            friction_share: 1.0,
+        };
+        let (law, friction, roles) = (&config.law, &config.friction, &config.roles);
+        Task::new(&filled, roles)
+            .map(|task| impedance(law, friction, roles, &filled, &task, &now).total())
+    };
+    bench(criterion, "law_by_terms", &states, law, |tau| {
         tau.map_or(0.0, |tau| tau[0])
     });
 }
@@ -143,6 +168,9 @@ fn all(criterion: &mut Criterion) {
     position_law::<3>(criterion, "wam3");
     position_law::<4>(criterion, "wam4");
     pose_law::<7>(criterion, "wam7");
+    law_by_terms::<3>(criterion, "wam3");
+    law_by_terms::<4>(criterion, "wam4");
+    law_by_terms::<7>(criterion, "wam7");
     step::<3>(criterion, "wam3");
     step::<4>(criterion, "wam4");
     step::<7>(criterion, "wam7");

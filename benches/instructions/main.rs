@@ -14,6 +14,7 @@ use gungraun::prelude::*;
 use gungraun::{Callgrind, EventKind};
 use std::hint::black_box;
 use supple_benches::{NULLSPACE_DAMPING, Rig, State, config, gains, pool, regular_pool};
+use supple_core::config::Role;
 use supple_core::dynamics::{self, Terms};
 use supple_core::operational::{pose_torque, position_torque};
 use supple_core::{Arm, Vector};
@@ -88,7 +89,7 @@ fn position_law<const N: usize>(asset: &str) -> Call {
 
 fn regular_law<const N: usize>(asset: &str) -> Call {
     let arm = config::<N>(asset).arm;
-    call_in(arm, regular_pool(&arm)[0], torque)
+    call_in(arm, regular_pool(&arm, &[Role::Active; N])[0], torque)
 }
 
 fn pose_law<const N: usize>(asset: &str) -> Call {

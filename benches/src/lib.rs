@@ -64,13 +64,16 @@ pub fn pool<const N: usize>(arm: &Arm<N>) -> Vec<State<N>> {
     (0..STATES).map(|_| random.state(arm)).collect()
 }
 
-/// The same, of poses that are not near singular ones: there the law takes another way.
-pub fn regular_pool<const N: usize>(arm: &Arm<N>) -> Vec<State<N>> {
+/// The same, of poses that are not near singular ones of the active joints: there the law takes another way.
+pub fn regular_pool<const N: usize>(arm: &Arm<N>, roles: &[Role; N]) -> Vec<State<N>> {
     let mut random = Random(20_261_122);
     let regular = |state: &State<N>| {
-        let jacobian = dynamics::jacobian(arm, &state.q)
+        let mut jacobian = dynamics::jacobian(arm, &state.q)
             .fixed_rows::<3>(0)
             .into_owned();
+        for joint in (0..N).filter(|joint| roles[*joint] != Role::Active) {
+            jacobian.column_mut(joint).fill(0.0);
+        }
         least_singular_value(&jacobian) > SINGULAR_BELOW_M
     };
     core::iter::repeat_with(|| random.state(arm))
