@@ -83,7 +83,8 @@ impl<const N: usize> Task<N> {
                 mass_matrix[(i, i)] = 1.0;
             }
         }
-        let damping = singularity_damping(&jacobian.data.0);
+        let least_singular_value_m = least_singular_value(&jacobian);
+        let damping = singularity_damping_per_kg(least_singular_value_m);
         let inverse = match three_active(roles) {
             Some(joints) if damping == 0.0 => {
                 // What the inverse does not ask for, but the arm has to be.
@@ -100,9 +101,9 @@ impl<const N: usize> Task<N> {
             }
         };
         Some(Task {
-            least_singular_value_m: least_singular_value(&jacobian),
             jacobian,
             inverse,
+            least_singular_value_m,
         })
     }
 }
