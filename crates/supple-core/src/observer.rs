@@ -5,7 +5,11 @@
 //! inverse of the mass matrix. It sees what the model leaves out as well: at rest, dry friction of up
 //! to `S` hides in it.
 
-use crate::math::Vector;
+use crate::math::{Vector, abs};
+
+/// Torques below this are none \[N m\]. The residual of an arm at rest would otherwise decay to a subnormal number, with
+/// which many a processor takes a hundred times as long.
+const LEAST_TORQUE_NM: f64 = 1e-12;
 
 /// State of the observer.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,5 +58,10 @@ impl<const N: usize> MomentumObserver<N> {
         let gain = bandwidth_rad_per_s / (1.0 + bandwidth_rad_per_s * elapsed_s);
         self.residual = (momentum - self.integral) * gain;
         self.integral += self.residual * elapsed_s;
+        for joint in 0..N {
+            if abs(self.residual[joint]) < LEAST_TORQUE_NM {
+                (self.residual[joint], self.integral[joint]) = (0.0, momentum[joint]);
+            }
+        }
     }
 }

@@ -194,3 +194,21 @@ fn any_bandwidth_is_stable() {
         assert!((residual - 2.0).abs() < 1e-3, "{residual} at {omega}");
     }
 }
+
+#[test]
+fn an_arm_that_comes_to_rest_has_no_subnormal_torque() {
+    let (omega, period_s) = (50.0, 1e-3);
+    let mut observer = MomentumObserver::<2>::default();
+    let rest = Vector::zeros();
+    for k in 0..60_000 {
+        let drive = if k < 100 {
+            Vector::from([0.4, -3.0])
+        } else {
+            rest
+        };
+        observer.update(&rest, &drive, period_s, omega);
+        for torque in &observer.external_torque_nm() {
+            assert!(*torque == 0.0 || torque.abs() > 1e-13, "{torque} at {k}");
+        }
+    }
+}
