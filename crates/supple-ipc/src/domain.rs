@@ -15,7 +15,7 @@ use std::os::unix::fs::{DirBuilderExt, MetadataExt};
 use std::path::{Path as StdPath, PathBuf};
 
 /// How many writers that are gone may have left something unread at a reader. It looks for all of them in every
-/// call: the library's own number, 128, costs 70 ns each time (`benches/latency`).
+/// call: the library's own number, 128, costs some 70 ns each time.
 const GONE_WRITERS: usize = 8;
 
 /// Environment variable that gives the prefix where no option does.
