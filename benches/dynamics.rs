@@ -140,6 +140,7 @@ fn law_by_terms<const N: usize>(criterion: &mut Criterion, asset: &str) {
     let law = |s: &State<N>| {
         dynamics::terms(&config.arm, &s.q, &s.qd, &mut filled);
         let now = Situation {
+            spring_limit_n: f64::MAX,
             reference: &s.position,
             velocity_rad_per_s: &s.qd,
             gains: &gains.linear,

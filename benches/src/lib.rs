@@ -145,6 +145,7 @@ impl<const N: usize> Rig<N> {
             cycle: self.cycle,
             position_rad: std::array::from_fn(|i| Some(self.position_rad[i] + wobble_rad)),
             tip_force_n: None,
+            drives_active: true,
             request,
         };
         self.cycle += 1;

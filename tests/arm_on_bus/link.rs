@@ -40,6 +40,7 @@ impl<const N: usize> Link<N> for Controlled<N> {
                 cycle: report.cycle,
                 position_rad: report.position_rad,
                 tip_force_n: report.tip_force_n,
+                drives_active: report.drives == supple_can::Drives::Active,
                 request: self.request.take(),
             };
             self.output = Some(step(&self.controller, &mut self.state, &input));
@@ -54,6 +55,8 @@ impl<const N: usize> Link<N> for Controlled<N> {
             torque_nm: output.torque_nm,
             fallback_torque_nm: output.fallback_torque_nm,
             wants_torque: wants_torque(output),
+            mode: Some(output.mode),
+            fault: output.fault.is_some(),
         });
         Ok(Answer { command, late: 0 })
     }
@@ -61,7 +64,5 @@ impl<const N: usize> Link<N> for Controlled<N> {
 
 /// Idle, and a fault whose safe action is idle, want none.
 fn wants_torque<const N: usize>(output: &Output<N>) -> bool {
-    use supple_core::controller::{Mode, SafeAction};
-    let limp = output.fault.map(|fault| fault.safe_action()) == Some(SafeAction::Idle);
-    output.mode != Mode::Idle && !limp
+    !output.limp
 }

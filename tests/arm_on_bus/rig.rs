@@ -93,7 +93,7 @@ impl<const N: usize> Rig<N> {
             period_ns,
             answer_ns: ANSWER_NS,
         };
-        let cycle = Cycle::new(bus, link, ready, config.arm, rhythm).unwrap();
+        let cycle = Cycle::new(bus, link, ready, &config, rhythm).unwrap();
         Rig {
             cycle,
             history: Vec::new(),

@@ -63,7 +63,7 @@ fn in_service() -> Service {
         answer_ns: MS / 20,
     };
     let link = Controlled::new(Controller::new(config).unwrap());
-    Cycle::new(bus, link, ready, config.arm, rhythm).unwrap()
+    Cycle::new(bus, link, ready, &config, rhythm).unwrap()
 }
 
 fn run(cycle: &mut Service, cycles: usize) {

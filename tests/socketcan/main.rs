@@ -77,7 +77,7 @@ fn in_service(interface: &str) -> Service {
         period_ns: PERIOD_NS,
         answer_ns: ANSWER_NS,
     };
-    Cycle::new(bus, link, ready, config.arm, rhythm).unwrap()
+    Cycle::new(bus, link, ready, &config, rhythm).unwrap()
 }
 
 fn activate(cycle: &mut Service, arm: &Arm) {

@@ -5,7 +5,8 @@ use crate::digest::Digest;
 use crate::{PERIOD_S, print, refused};
 use core::fmt::{self, Write};
 use supple_core::config::{
-    ApparentInertia, ContactLatch, FrictionVelocity, Gains, Law, Limits, MoveGains, Role,
+    ApparentInertia, Collision, ContactLatch, FrictionVelocity, Gains, Law, Limits, MoveGains,
+    Plausible, Role, Workspace,
 };
 use supple_core::controller::{Controller, Input, Output, Request, State, step};
 use supple_core::math::{Matrix3, Vector3, sqrt};
@@ -33,6 +34,7 @@ pub fn report<const N: usize>(out: &mut impl Write) -> fmt::Result {
                 (cycle != LOST_REPLY || i != 1).then(|| quantised(q[i]))
             }),
             tip_force_n: Some(Vector3::new(0.1, -0.2, 0.3)),
+            drives_active: true,
             request: request(&arm, cycle),
         };
         let output = step(&controller, &mut state, &input);
@@ -141,6 +143,9 @@ fn config<const N: usize>(arm: Arm<N>) -> Config<N> {
             soft_damping_nm_s_per_rad: all(1.0),
             joint_speed_rad_per_s: all(4.0),
             tip_speed_m_per_s: 2.0,
+            tip_acceleration_m_per_s2: 20.0,
+            joint_acceleration_rad_per_s2: all(100.0),
+            joint_jerk_rad_per_s3: all(1e4),
             tracking_error_m: 0.2,
             joint_tracking_error_rad: 0.2,
             joint_torque_nm: all(120.0),
@@ -151,6 +156,9 @@ fn config<const N: usize>(arm: Arm<N>) -> Config<N> {
             stiffness_n_per_m: 200.0,
             damping_n_s_per_m: 50.0,
         },
+        collision: Collision::never(),
+        plausible: Plausible::anything(),
+        workspace: Workspace::UNBOUNDED,
     }
 }
 

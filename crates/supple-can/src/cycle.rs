@@ -10,14 +10,15 @@
 
 use crate::bus_time::BusTime;
 use crate::error::CanError;
-use crate::guard::{Action, Guard, Seen, Torque};
+use crate::guard::{Action, Guard, Loss, Seen, Torque};
 use crate::link::{ArmReport, Command, Counters, Drives, Link};
 use crate::outbox::Outbox;
 use crate::sensor::Readings;
 use crate::start_up::Ready;
 use supple_bus::{Bus, BusError, BusFault, Event};
+use supple_core::drive_guard::DriveGuard;
 use supple_core::dynamics::tip_pose;
-use supple_core::{Arm, Vector};
+use supple_core::{Arm, Config, Vector};
 use supple_puck::force_torque;
 use supple_puck::property::{get, set};
 use supple_puck::safety::{PenWord, Pendant, SafetyMode};
@@ -67,6 +68,7 @@ pub struct Cycle<const N: usize, B, L> {
     rhythm: Rhythm,
     time: BusTime,
     guard: Guard,
+    drives: DriveGuard<N>,
     cycle: u64,
     next_ns: u64,
     counts: [Option<Counts>; N],
@@ -96,7 +98,7 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
         bus: B,
         link: L,
         ready: Ready<N>,
-        arm: Arm<N>,
+        config: &Config<N>,
         rhythm: Rhythm,
     ) -> Result<Cycle<N, B, L>, CanError> {
         let joint_encoders = ready.pucks.iter().filter(|p| p.joint_encoder).count();
@@ -122,7 +124,8 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
             bus,
             link,
             ready,
-            arm,
+            arm: config.arm,
+            drives: DriveGuard::new(config),
             ids,
             rhythm,
             time,
@@ -217,9 +220,15 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
         let published_ns = self.bus.now_ns();
         self.link.publish(&report)?;
         let command = self.answer(start_ns, published_ns)?;
+        self.drives.observe(&report.position_rad);
+        let active = self.drives() == Drives::Active;
+        let judged = self
+            .drives
+            .judge(command.as_ref().map(Command::drive).as_ref(), active);
         let seen = Seen {
             now_ns: self.bus.now_ns(),
             answer: command.map(|command| command.wants_torque),
+            judged: judged.err().map(Loss::from),
             missing,
             unsent: self.unsent,
             bus_off: self.bus_off,
@@ -328,12 +337,18 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
 
     /// Sends the torques, and lowers what is to be lowered.
     fn act(&mut self, action: &Action, command: Option<&Command<N>>) -> Result<(), CanError> {
-        let torque_nm = match (action.torque, command) {
-            (Torque::Command, Some(command)) => command.torque_nm,
-            (Torque::Fallback, _) => self.fallback_nm,
-            (Torque::Command | Torque::None, _) => Vector::zeros(),
+        let (wanted_nm, stopping) = match (action.torque, command) {
+            (Torque::Command, Some(command)) => (command.torque_nm, command.fault),
+            (Torque::Fallback, _) => (self.fallback_nm, true),
+            (Torque::Command | Torque::None, _) => (Vector::zeros(), true),
         };
-        // The controller checks its torques for being finite; one that is not is not sent.
+        let torque_nm = if self.drives() == Drives::Active && action.torque != Torque::None {
+            self.drives.limited_nm(&wanted_nm, stopping)
+        } else {
+            self.drives.rest(&wanted_nm);
+            wanted_nm
+        };
+        // One that is not finite is not sent.
         let torques = self.ready.transmission.puck_torques(&torque_nm);
         let torques = torques.unwrap_or([PuckTorque::ZERO; N]);
         for (motors, group) in torques

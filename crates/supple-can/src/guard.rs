@@ -12,6 +12,7 @@
 //! would drop the arm. A lost encoder ends torque at once: never gravity from that encoder. The module is
 //! lowered, never raised. It knows no bus and no clock: time is an argument.
 
+use supple_core::drive_guard::GuardReason;
 use supple_puck::safety::SafetyMode;
 
 /// How long answers or transmissions may fail before the module is lowered \[ns\].
@@ -30,6 +31,12 @@ pub enum Loss {
     Answer,
     /// The controller wants no torque.
     Unwanted,
+    /// A joint is far too fast; its index.
+    Overspeed(usize),
+    /// A joint does not stop although the controller is in a fault; its index.
+    NotStopped(usize),
+    /// The motors were activated while the controller was not in gravity hold.
+    Activated,
     /// A motor puck did not reply; its index.
     Encoder(usize),
     /// Frames did not leave.
@@ -47,6 +54,16 @@ impl core::fmt::Display for Loss {
         match self {
             Loss::Answer => f.write_str("the controller did not answer"),
             Loss::Unwanted => f.write_str("the controller wants no torque"),
+            Loss::Overspeed(joint) => write!(f, "joint {joint} is twice as fast as it may be"),
+            Loss::NotStopped(joint) => {
+                write!(
+                    f,
+                    "joint {joint} does not stop although the controller is in a fault"
+                )
+            }
+            Loss::Activated => f.write_str(
+                "the motors were activated while the controller was not in gravity hold",
+            ),
             Loss::Encoder(index) => {
                 write!(f, "motor puck {} did not reply in two cycles", index + 1)
             }
@@ -58,6 +75,27 @@ impl core::fmt::Display for Loss {
     }
 }
 
+impl Loss {
+    /// Gravity from the last pose holds the arm until the motors brake; not where that pose, or the torque that
+    /// came of it, is what is wrong.
+    fn keeps_the_fallback(self) -> bool {
+        !matches!(
+            self,
+            Loss::Encoder(_) | Loss::Overspeed(_) | Loss::NotStopped(_)
+        )
+    }
+}
+
+impl From<GuardReason> for Loss {
+    fn from(reason: GuardReason) -> Loss {
+        match reason {
+            GuardReason::Overspeed { joint, .. } => Loss::Overspeed(joint),
+            GuardReason::NotStopped { joint, .. } => Loss::NotStopped(joint),
+            GuardReason::NotInGravityHold => Loss::Activated,
+        }
+    }
+}
+
 /// What a cycle saw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Seen {
@@ -65,6 +103,8 @@ pub struct Seen {
     pub now_ns: u64,
     /// Whether the controller answered, and if so whether it wants torque.
     pub answer: Option<bool>,
+    /// What the drives' guard made of motion and answer, if it ended torque.
+    pub judged: Option<Loss>,
     /// For each motor, bit by bit: its reply is missing although the request left.
     pub missing: u8,
     /// Frames of the previous cycle did not leave.
@@ -167,8 +207,8 @@ impl Guard {
             }
             Stage::Lowering(..) if !active => self.stage = Stage::Resting,
             Stage::Lowering(before, since_ns) => {
-                // A lost encoder on the way ends the fallback too.
-                if let Some(loss @ Loss::Encoder(_)) = loss {
+                // A lost encoder, or motion that does not stop, ends the fallback too.
+                if let Some(loss) = loss.filter(|loss| !loss.keeps_the_fallback()) {
                     self.stage = Stage::Lowering(loss, since_ns);
                 } else {
                     self.stage = Stage::Lowering(before, since_ns);
@@ -195,7 +235,7 @@ impl Guard {
             },
             Stage::Lowering(loss, since_ns) => {
                 let overdue = seen.now_ns >= since_ns + FALLBACK_NS;
-                let held = !overdue && !matches!(loss, Loss::Encoder(_));
+                let held = !overdue && loss.keeps_the_fallback();
                 Action {
                     torque: if held { Torque::Fallback } else { Torque::None },
                     lower_module: true,
@@ -250,6 +290,9 @@ impl Guard {
         }
         if seen.answer == Some(false) {
             return Some(Loss::Unwanted);
+        }
+        if seen.judged.is_some() {
+            return seen.judged;
         }
         match seen.module {
             Some((SafetyMode::Active, heard_ns)) if seen.now_ns > heard_ns + MODULE_SILENCE_NS => {

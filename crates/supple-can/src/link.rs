@@ -2,6 +2,8 @@
 
 use crate::error::CanError;
 use supple_core::Vector;
+use supple_core::controller::Mode;
+use supple_core::drive_guard::DriveCommand;
 use supple_core::nalgebra::Vector3;
 
 /// What the motors do.
@@ -68,6 +70,21 @@ pub struct Command<const N: usize> {
     pub fallback_torque_nm: Vector<N>,
     /// The torques are meant. Otherwise the motors are to be lowered to idle.
     pub wants_torque: bool,
+    /// The controller's mode, where it is known.
+    pub mode: Option<Mode>,
+    /// The controller is in a fault.
+    pub fault: bool,
+}
+
+impl<const N: usize> Command<N> {
+    /// What the drives' guard judges.
+    pub(crate) fn drive(&self) -> DriveCommand<N> {
+        DriveCommand {
+            torque_nm: self.torque_nm,
+            mode: self.mode,
+            fault: self.fault,
+        }
+    }
 }
 
 /// What came back within the time given.

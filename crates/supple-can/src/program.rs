@@ -118,7 +118,7 @@ fn run<const N: usize>(
             link.spin(spin_for(options.spin_us));
         }
         first = false;
-        let mut cycle = Cycle::new(bus, link, ready, config.arm, rhythm)?;
+        let mut cycle = Cycle::new(bus, link, ready, &config, rhythm)?;
         let ended = serve(&mut cycle, options, stop)?;
         counters = added(&counters, cycle.counters());
         (bus, link, _) = cycle.into_parts();

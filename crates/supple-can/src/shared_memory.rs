@@ -111,6 +111,8 @@ impl<const N: usize> Link<N> for SharedMemory {
                     torque_nm: command.torque::<N>()?,
                     fallback_torque_nm: command.fallback_torque::<N>()?,
                     wants_torque: command.wants_torque(),
+                    mode: command.mode(),
+                    fault: command.fault != 0,
                 };
                 return Ok(Answer {
                     command: Some(command),

@@ -5,6 +5,7 @@ use crate::arm::Arm;
 use crate::friction::Friction;
 use crate::math::{Matrix, Matrix3, Vector, Vector3};
 pub use crate::ripple::RippleTable;
+pub use crate::workspace::{Border, Workspace, Zone};
 
 /// What a joint does while the impedance law runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -119,6 +120,57 @@ pub struct ContactLatch {
     pub restore_s: f64,
 }
 
+/// External forces that end the motion, as the momentum observer sees them. They are well above what an
+/// inexact model leaves as a residual in free motion, dry friction included.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Collision<const N: usize> {
+    /// External torque of a joint \[N m\], positive.
+    pub joint_torque_nm: Vector<N>,
+    /// Force on the tip \[N\], positive.
+    pub tip_force_n: f64,
+    /// Share of both that ends motion in the modes with stiff joint loops (move, excite, breakaway), above 0,
+    /// at most 1.
+    pub move_share: f64,
+}
+
+impl<const N: usize> Collision<N> {
+    /// No force ends the motion: what logs from before there were thresholds are replayed with.
+    pub fn never() -> Collision<N> {
+        Collision {
+            joint_torque_nm: Vector::repeat(f64::MAX),
+            tip_force_n: f64::MAX,
+            move_share: 1.0,
+        }
+    }
+}
+
+/// How far measurements, commands and model may be apart before one of them is taken to be wrong.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plausible {
+    /// Lost replies of an encoder that are tolerated, where each is made up for by eight that came.
+    pub lost_replies: u32,
+    /// Travel of a joint's reference in which its encoder may say the very same angle \[rad\], positive.
+    pub stuck_rad: f64,
+    /// Share of a joint's torque limit by which it may be driven one way while it gathers speed the other way,
+    /// positive.
+    pub against_share: f64,
+    /// Force on the tip along gravity that is a load which the model lacks, in gravity hold and where a move
+    /// has ended \[N\], positive.
+    pub load_n: f64,
+}
+
+impl Plausible {
+    /// Everything is believed: what logs from before this was looked at are replayed with.
+    pub fn anything() -> Plausible {
+        Plausible {
+            lost_replies: u32::MAX / 16,
+            stuck_rad: f64::MAX,
+            against_share: f64::MAX,
+            load_n: f64::MAX,
+        }
+    }
+}
+
 /// Joint gains of the stiffer `move` mode.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MoveGains<const N: usize> {
@@ -145,6 +197,12 @@ pub struct Limits<const N: usize> {
     pub joint_speed_rad_per_s: Vector<N>,
     /// Tip speed that faults \[m/s\], positive.
     pub tip_speed_m_per_s: f64,
+    /// Greatest acceleration of a tip trajectory that is asked for \[m/s^2\], positive.
+    pub tip_acceleration_m_per_s2: f64,
+    /// Greatest acceleration of a move that is asked for \[rad/s^2\], positive.
+    pub joint_acceleration_rad_per_s2: Vector<N>,
+    /// Greatest jerk of a move that is asked for \[rad/s^3\], positive.
+    pub joint_jerk_rad_per_s3: Vector<N>,
     /// Distance of the tip from its reference that faults while tracking or probing \[m\], positive.
     pub tracking_error_m: f64,
     /// Distance of a joint from where its own loop wants it that faults, in the move mode and where it is
@@ -190,10 +248,16 @@ pub struct Config<const N: usize> {
     pub latch: ContactLatch,
     /// Gains of the move mode.
     pub move_gains: MoveGains<N>,
-    /// Joint damping of gravity hold and of the safe action \[N m s/rad\], zero or more.
+    /// Joint damping of gravity hold \[N m s/rad\], zero or more.
     pub hold_damping_nm_s_per_rad: Vector<N>,
     /// Time over which a change of mode blends the torque \[s\], positive.
     pub handover_s: f64,
     /// Limits.
     pub limits: Limits<N>,
+    /// External forces that end the motion.
+    pub collision: Collision<N>,
+    /// What is believed.
+    pub plausible: Plausible,
+    /// Where the tip may be.
+    pub workspace: Workspace,
 }

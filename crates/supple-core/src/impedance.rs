@@ -30,7 +30,7 @@ use crate::friction::Friction;
 use crate::linalg::{
     Cholesky, Inverse3, is_positive_definite_3, least_singular_value, singular_values_exceed,
 };
-use crate::math::{Matrix, Matrix3, Vector, Vector3};
+use crate::math::{Matrix, Matrix3, Vector, Vector3, sqrt};
 use crate::trajectory::Reference;
 
 /// Least singular value of the active Jacobian below which the inverse is damped \[m\].
@@ -232,6 +232,8 @@ pub struct Situation<'a, const N: usize> {
     pub gains: &'a Gains,
     /// Measured force on the tip, base axes \[N\].
     pub tip_force_n: Option<Vector3<f64>>,
+    /// Greatest force of the spring \[N\], positive; `f64::MAX` for none.
+    pub spring_limit_n: f64,
     /// Share of the dry friction feed-forward to apply, 0 to 1.
     pub friction_share: f64,
 }
@@ -248,7 +250,11 @@ pub fn impedance<const N: usize>(
     let tip_velocity = terms.jacobian.fixed_rows::<3>(0) * now.velocity_rad_per_s;
     let position_error = now.reference.position - terms.base_from_tip.translation;
     let velocity_error = now.reference.velocity - tip_velocity;
-    let spring = now.gains.stiffness_n_per_m.component_mul(&position_error);
+    let mut spring = now.gains.stiffness_n_per_m.component_mul(&position_error);
+    let pull_n2 = spring.dot(&spring);
+    if pull_n2 > now.spring_limit_n * now.spring_limit_n {
+        spring *= now.spring_limit_n / sqrt(pull_n2);
+    }
     let damper = now.gains.damping_n_s_per_m.component_mul(&velocity_error);
     let joints_of = |acceleration: Vector3<f64>| terms.mass_matrix * (task.inverse * acceleration);
 

@@ -15,6 +15,7 @@ pub mod body;
 pub mod codes;
 pub mod config;
 pub mod controller;
+pub mod drive_guard;
 pub mod dynamics;
 pub mod estimator;
 mod factors;
@@ -33,6 +34,7 @@ pub mod ripple;
 pub mod sincos;
 pub mod trajectory;
 mod vec3;
+pub mod workspace;
 
 pub use arm::{Arm, ArmError, Joint, Link};
 pub use body::{Body, BodyError};

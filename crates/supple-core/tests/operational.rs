@@ -163,6 +163,7 @@ fn is_the_law_in_terms<const N: usize>(case: &Case<N>) -> Outcome {
     let roles = [Role::Active; N];
     let task = Task::new(&terms, &roles).expect("positive definite");
     let now = Situation {
+        spring_limit_n: f64::MAX,
         reference: &reference,
         velocity_rad_per_s: qd,
         gains: &gains,

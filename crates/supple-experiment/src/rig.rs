@@ -60,6 +60,7 @@ impl<const N: usize> Rig<N> {
             cycle: measurement.cycle,
             position_rad: core::array::from_fn(|i| Some(measurement.position_rad[i])),
             tip_force_n: Some(measurement.force_n),
+            drives_active: true,
             request,
         };
         let output = step(&self.controller, &mut self.state, &input);

@@ -5,11 +5,13 @@
 //! gains, another law. Links are in joint frames, as [`Arm::links`] gives them.
 
 use crate::toml_types::{
-    ContactLatchDef, FrictionDef, LawDef, LimitsDef, LinkDef, MoveGainsDef, PoseDef, RippleDef,
-    RoleDef, column, rows,
+    CollisionDef, ContactLatchDef, FrictionDef, LawDef, LimitsDef, LinkDef, MoveGainsDef,
+    PlausibleDef, PoseDef, RippleDef, RoleDef, WorkspaceDef, column, rows,
 };
 use serde::{Deserialize, Serialize};
-use supple_core::config::{ContactLatch, Law, Limits, MoveGains, Role};
+use supple_core::config::{
+    Collision, ContactLatch, Law, Limits, MoveGains, Plausible, Role, Workspace,
+};
 use supple_core::math::Vector3;
 use supple_core::{Arm, Config, Friction, Link, Matrix, Pose, Vector};
 
@@ -38,6 +40,13 @@ struct Stored<const N: usize> {
     move_gains: MoveGains<N>,
     #[serde(with = "LimitsDef")]
     limits: Limits<N>,
+    /// Logs from before there were thresholds have none.
+    #[serde(with = "CollisionDef", default = "Collision::never")]
+    collision: Collision<N>,
+    #[serde(with = "PlausibleDef", default = "Plausible::anything")]
+    plausible: Plausible,
+    #[serde(default)]
+    workspace: Option<WorkspaceDef>,
     joints: Vec<Joint>,
 }
 
@@ -68,6 +77,9 @@ pub(crate) fn to_toml<const N: usize>(config: &Config<N>) -> Result<String, toml
         hold_damping_nm_s_per_rad,
         handover_s,
         limits,
+        collision,
+        plausible,
+        workspace,
     } = *config;
     toml::to_string(&Stored {
         period_s,
@@ -82,6 +94,9 @@ pub(crate) fn to_toml<const N: usize>(config: &Config<N>) -> Result<String, toml
         latch,
         move_gains,
         limits,
+        collision,
+        plausible,
+        workspace: Some(WorkspaceDef::new(&workspace)),
         joints: (0..N)
             .map(|i| Joint {
                 armature_kg_m2: arm.armature()[i],
@@ -121,6 +136,12 @@ pub(crate) fn from_toml<const N: usize>(text: &str) -> Result<Config<N>, String>
         hold_damping_nm_s_per_rad: stored.hold_damping_nm_s_per_rad,
         handover_s: stored.handover_s,
         limits: stored.limits,
+        collision: stored.collision,
+        plausible: stored.plausible,
+        workspace: match &stored.workspace {
+            Some(workspace) => workspace.workspace()?,
+            None => Workspace::UNBOUNDED,
+        },
     })
 }
 
@@ -128,7 +149,7 @@ pub(crate) fn from_toml<const N: usize>(text: &str) -> Result<Config<N>, String>
 mod tests {
     use super::*;
     use supple_core::RippleTable;
-    use supple_core::config::{ApparentInertia, FrictionVelocity};
+    use supple_core::config::{ApparentInertia, Border, FrictionVelocity, Zone};
     use supple_core::math::Matrix3;
     use supple_core::ripple::Harmonic;
     use supple_model::Description;
@@ -169,6 +190,28 @@ mod tests {
             harmonic,
             sine_nm: 1.0 / 3.0,
             cosine_nm: -0.0,
+        };
+        config.workspace = Workspace {
+            borders: core::array::from_fn(|i| match i {
+                0 => Some(Border::Wall {
+                    normal: Vector3::new(0.6, 0.0, -0.8),
+                    offset_m: 1.0 / 3.0,
+                }),
+                1 => Some(Border::KeepOut {
+                    lower_m: Vector3::new(-0.1, -0.2, -0.3),
+                    upper_m: Vector3::new(0.1, 0.2, 0.3),
+                }),
+                _ => None,
+            }),
+            zones: core::array::from_fn(|i| {
+                (i == 0).then_some(Zone {
+                    lower_m: Vector3::repeat(-1.0),
+                    upper_m: Vector3::repeat(1.0),
+                    tip_speed_m_per_s: 0.25,
+                    tip_force_n: f64::MAX,
+                })
+            }),
+            ..config.workspace
         };
         config.ripple[1] = RippleTable::new(&[line(2), line(42)]).expect("a table");
         round_trip(&config);

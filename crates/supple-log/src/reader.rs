@@ -126,7 +126,7 @@ impl Reader {
     /// # Errors
     /// [`LogError::JointCount`]; [`LogError::Read`].
     pub fn records<const N: usize>(&self) -> Result<Messages<Record<N>>, LogError> {
-        self.messages::<N, _>("/controller_state", without_header)
+        self.messages::<N, _>("/controller_state", record)
     }
 
     /// Timing of the cycles that were timed, as [`Reader::records`].
@@ -262,6 +262,16 @@ impl<T> Iterator for Messages<T> {
 fn without_header<T: DeserializeOwned>(data: &[u8]) -> Result<T, String> {
     let (_, value): (OwnedHeader, T) = cdr::decode(data)?;
     Ok(value)
+}
+
+/// A step. The last field, `drives_active`, is not in logs from before it was added: the drives were taken for
+/// active then.
+fn record<const N: usize>(data: &[u8]) -> Result<Record<N>, String> {
+    without_header(data).or_else(|error| {
+        let mut longer = data.to_vec();
+        longer.push(u8::from(true));
+        without_header(&longer).map_err(|_| error)
+    })
 }
 
 fn format(path: &Path, message: &str) -> LogError {

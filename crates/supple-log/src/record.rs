@@ -80,6 +80,8 @@ pub struct Record<const N: usize> {
     pub refusal: u8,
     /// The refusal in words.
     pub refusal_text: String,
+    /// The motors carried out torques; logs from before this was known say that they did.
+    pub drives_active: bool,
 }
 
 /// The terms of [`Torques`] \[N m\].
@@ -168,6 +170,7 @@ impl<const N: usize> Record<N> {
             fault_text: output.fault.map_or_else(String::new, |f| f.to_string()),
             refusal: codes::refusal(output.refusal.as_ref()),
             refusal_text: output.refusal.map_or_else(String::new, |r| r.to_string()),
+            drives_active: input.drives_active,
         }
     }
 
@@ -185,6 +188,7 @@ impl<const N: usize> Record<N> {
             cycle: self.input_cycle,
             position_rad: core::array::from_fn(position),
             tip_force_n: self.has_tip_force.then(|| Vector3::from(self.tip_force_n)),
+            drives_active: self.drives_active,
             request,
         })
     }

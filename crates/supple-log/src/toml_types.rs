@@ -3,10 +3,12 @@
 
 use serde::{Deserialize, Serialize};
 use supple_core::config::{
-    ApparentInertia, ContactLatch, FrictionVelocity, Gains, Law, Limits, MoveGains, Role,
+    ApparentInertia, Border, Collision, ContactLatch, FrictionVelocity, Gains, Law, Limits,
+    MoveGains, Plausible, Role, Workspace, Zone,
 };
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::ripple::Harmonic;
+use supple_core::workspace::PLACES;
 use supple_core::{Friction, Link, Pose, RippleTable, Vector};
 
 #[derive(Serialize, Deserialize)]
@@ -173,6 +175,12 @@ pub(crate) struct LimitsDef<const N: usize> {
     #[serde(with = "column")]
     joint_speed_rad_per_s: Vector<N>,
     tip_speed_m_per_s: f64,
+    #[serde(default = "any")]
+    tip_acceleration_m_per_s2: f64,
+    #[serde(with = "column", default = "any_of_joints")]
+    joint_acceleration_rad_per_s2: Vector<N>,
+    #[serde(with = "column", default = "any_of_joints")]
+    joint_jerk_rad_per_s3: Vector<N>,
     tracking_error_m: f64,
     joint_tracking_error_rad: f64,
     #[serde(with = "column")]
@@ -185,6 +193,132 @@ pub(crate) struct LimitsDef<const N: usize> {
     start_error_m: f64,
     stiffness_n_per_m: f64,
     damping_n_s_per_m: f64,
+}
+
+/// Acceleration and jerk that logs from before they were limited were recorded with: the greatest that a
+/// controller takes.
+fn any() -> f64 {
+    1e3
+}
+
+fn any_of_joints<const N: usize>() -> Vector<N> {
+    Vector::repeat(1e4)
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Collision", deny_unknown_fields)]
+pub(crate) struct CollisionDef<const N: usize> {
+    #[serde(with = "column")]
+    joint_torque_nm: Vector<N>,
+    tip_force_n: f64,
+    move_share: f64,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Plausible", deny_unknown_fields)]
+pub(crate) struct PlausibleDef {
+    lost_replies: u32,
+    stuck_rad: f64,
+    against_share: f64,
+    load_n: f64,
+}
+
+/// A wall or a box of the workspace, with the entries of the one it is.
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+enum BorderDef {
+    Wall {
+        normal: [f64; 3],
+        offset_m: f64,
+    },
+    KeepOut {
+        lower_m: [f64; 3],
+        upper_m: [f64; 3],
+    },
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ZoneDef {
+    lower_m: [f64; 3],
+    upper_m: [f64; 3],
+    tip_speed_m_per_s: f64,
+    tip_force_n: f64,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct WorkspaceDef {
+    margin_m: f64,
+    stiffness_n_per_m: f64,
+    damping_n_s_per_m: f64,
+    #[serde(default)]
+    borders: Vec<BorderDef>,
+    #[serde(default)]
+    zones: Vec<ZoneDef>,
+}
+
+impl WorkspaceDef {
+    pub fn new(workspace: &Workspace) -> WorkspaceDef {
+        let borders = workspace
+            .borders
+            .iter()
+            .flatten()
+            .map(|border| match border {
+                Border::Wall { normal, offset_m } => BorderDef::Wall {
+                    normal: (*normal).into(),
+                    offset_m: *offset_m,
+                },
+                Border::KeepOut { lower_m, upper_m } => BorderDef::KeepOut {
+                    lower_m: (*lower_m).into(),
+                    upper_m: (*upper_m).into(),
+                },
+            });
+        let zones = workspace.zones.iter().flatten().map(|zone| ZoneDef {
+            lower_m: zone.lower_m.into(),
+            upper_m: zone.upper_m.into(),
+            tip_speed_m_per_s: zone.tip_speed_m_per_s,
+            tip_force_n: zone.tip_force_n,
+        });
+        WorkspaceDef {
+            margin_m: workspace.margin_m,
+            stiffness_n_per_m: workspace.stiffness_n_per_m,
+            damping_n_s_per_m: workspace.damping_n_s_per_m,
+            borders: borders.collect(),
+            zones: zones.collect(),
+        }
+    }
+
+    /// # Errors
+    /// More borders or zones than there is room for, in words.
+    pub fn workspace(&self) -> Result<Workspace, String> {
+        if self.borders.len().max(self.zones.len()) > PLACES {
+            return Err(format!("more than {PLACES} borders or zones"));
+        }
+        let border = |border: &BorderDef| match border {
+            BorderDef::Wall { normal, offset_m } => Border::Wall {
+                normal: Vector3::from(*normal),
+                offset_m: *offset_m,
+            },
+            BorderDef::KeepOut { lower_m, upper_m } => Border::KeepOut {
+                lower_m: Vector3::from(*lower_m),
+                upper_m: Vector3::from(*upper_m),
+            },
+        };
+        let zone = |zone: &ZoneDef| Zone {
+            lower_m: Vector3::from(zone.lower_m),
+            upper_m: Vector3::from(zone.upper_m),
+            tip_speed_m_per_s: zone.tip_speed_m_per_s,
+            tip_force_n: zone.tip_force_n,
+        };
+        Ok(Workspace {
+            borders: core::array::from_fn(|i| self.borders.get(i).map(border)),
+            zones: core::array::from_fn(|i| self.zones.get(i).map(zone)),
+            margin_m: self.margin_m,
+            stiffness_n_per_m: self.stiffness_n_per_m,
+            damping_n_s_per_m: self.damping_n_s_per_m,
+        })
+    }
 }
 
 /// A column as a list.

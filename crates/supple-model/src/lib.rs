@@ -9,6 +9,8 @@
 //! [`supple_core::Config`], and the few numbers that a plant and a drawing need besides.
 
 mod assets;
+mod borders;
+mod bounds;
 mod description;
 mod error;
 mod identified;

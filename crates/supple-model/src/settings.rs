@@ -51,6 +51,15 @@ pub struct Settings {
     /// Limits that are not one joint's.
     #[serde(default)]
     pub limits: LimitSettings,
+    /// External forces that end the motion.
+    #[serde(default)]
+    pub collision: CollisionSettings,
+    /// What is believed of measurements and model.
+    #[serde(default)]
+    pub plausible: PlausibleSettings,
+    /// Where the tip may be. Default: anywhere.
+    #[serde(default)]
+    pub workspace: WorkspaceSettings,
     /// The impedance law.
     #[serde(default)]
     pub law: LawSettings,
@@ -102,7 +111,15 @@ pub struct JointSettings {
     /// Derivative gain of the move mode (N m s/rad). Default 5.
     #[serde(default = "default::move_damping_nm_s_per_rad")]
     pub move_damping_nm_s_per_rad: f64,
-    /// Damping of gravity hold and of the safe action (N m s/rad). Default 1.
+    /// Greatest acceleration of a move (rad/s^2). Default 20.
+    #[serde(default = "default::acceleration_rad_per_s2")]
+    pub acceleration_rad_per_s2: f64,
+    /// Greatest jerk of a move (rad/s^3). Default 1000.
+    #[serde(default = "default::jerk_rad_per_s3")]
+    pub jerk_rad_per_s3: f64,
+    /// Observed external torque that ends the motion (N m). Default: 0.3 of `torque_nm`.
+    pub collision_torque_nm: Option<f64>,
+    /// Damping of gravity hold (N m s/rad). Default 1.
     #[serde(default = "default::hold_damping_nm_s_per_rad")]
     pub hold_damping_nm_s_per_rad: f64,
 }
@@ -192,6 +209,8 @@ pub struct LimitSettings {
     pub soft_zone_rad: f64,
     /// Tip speed that faults (m/s). Default 1.
     pub tip_speed_m_per_s: f64,
+    /// Greatest acceleration of a tip trajectory (m/s^2). Default 10.
+    pub tip_acceleration_m_per_s2: f64,
     /// Distance of the tip from its reference that faults while tracking or probing (m). Default 0.25.
     pub tracking_error_m: f64,
     /// Distance of a joint from where its own loop wants it that faults, on moves and where it is held
@@ -205,6 +224,95 @@ pub struct LimitSettings {
     pub greatest_stiffness_n_per_m: f64,
     /// Greatest damping that may be asked for (N s/m). Default 100.
     pub greatest_damping_n_s_per_m: f64,
+}
+
+/// External forces that end the motion: observed from motion and torques, without a sensor. The joints' own
+/// thresholds are `collision_torque_nm` of each.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct CollisionSettings {
+    /// Where these numbers come from.
+    pub source: Option<String>,
+    /// Observed force on the tip (N). Default 60.
+    pub tip_force_n: f64,
+    /// Share of all thresholds that counts in the modes with stiff joint loops: move, excite, breakaway.
+    /// Default 0.5.
+    pub move_share: f64,
+}
+
+/// How far measurements, commands and model may be apart before one of them is taken to be wrong.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct PlausibleSettings {
+    /// Where these numbers come from.
+    pub source: Option<String>,
+    /// Lost replies of an encoder that are tolerated, where each is made up for by eight that came. Default 3.
+    pub lost_replies: u32,
+    /// Travel of a joint's reference in which its encoder may say the very same angle (rad). Default 0.1.
+    pub stuck_rad: f64,
+    /// Share of a joint's torque limit by which it may be driven one way while it gathers speed the other way.
+    /// Default 0.05.
+    pub against_share: f64,
+    /// Force on the tip along gravity, in gravity hold and where a move has ended, that is a load which the model
+    /// does not have (N). Default 8.
+    pub load_n: f64,
+}
+
+/// Where the tip may be, base axes. Before every border is a margin in which the tip is pushed back.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct WorkspaceSettings {
+    /// Where these numbers come from.
+    pub source: Option<String>,
+    /// Width of the margin (m). Default 0.05.
+    pub margin_m: f64,
+    /// Stiffness in the margin (N/m). Default 400.
+    pub stiffness_n_per_m: f64,
+    /// Damping in the margin, and of a tip that is too fast for its zone (N s/m). Default 20.
+    pub damping_n_s_per_m: f64,
+    /// Planes that the tip does not cross; at most 8 borders in all, a box to stay in counts six.
+    pub wall: Vec<WallSettings>,
+    /// A box that the tip stays in.
+    pub keep_in: Option<BoxSettings>,
+    /// Boxes that the tip stays out of.
+    pub keep_out: Vec<BoxSettings>,
+    /// Boxes with limits of their own; at most 8.
+    pub zone: Vec<ZoneSettings>,
+}
+
+/// A plane: the tip stays where `normal . x <= offset_m`.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct WallSettings {
+    /// Points out of the allowed side; any length but zero.
+    pub normal: [f64; 3],
+    /// Distance from the base's origin along the normal (m).
+    pub offset_m: f64,
+}
+
+/// A box with edges parallel to the base axes.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BoxSettings {
+    /// Corner of the least coordinates (m).
+    pub lower_m: [f64; 3],
+    /// Corner of the greatest coordinates (m).
+    pub upper_m: [f64; 3],
+}
+
+/// A box with limits of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ZoneSettings {
+    /// Corner of the least coordinates (m).
+    pub lower_m: [f64; 3],
+    /// Corner of the greatest coordinates (m).
+    pub upper_m: [f64; 3],
+    /// Tip speed that faults (m/s). Default: no other than everywhere.
+    pub tip_speed_m_per_s: Option<f64>,
+    /// Observed force on the tip that faults; the law's spring pushes with no more (N). Default: no other than
+    /// everywhere.
+    pub tip_force_n: Option<f64>,
 }
 
 /// Velocity at which the friction feed-forward is taken.
@@ -288,12 +396,50 @@ impl Default for LimitSettings {
             source: None,
             soft_zone_rad: 0.1,
             tip_speed_m_per_s: 1.0,
+            tip_acceleration_m_per_s2: 10.0,
             tracking_error_m: 0.25,
             joint_tracking_error_rad: 0.2,
             stale_cycles: 1,
             start_error_m: 0.02,
             greatest_stiffness_n_per_m: 1000.0,
             greatest_damping_n_s_per_m: 100.0,
+        }
+    }
+}
+
+impl Default for CollisionSettings {
+    fn default() -> Self {
+        Self {
+            source: None,
+            tip_force_n: 60.0,
+            move_share: 0.5,
+        }
+    }
+}
+
+impl Default for PlausibleSettings {
+    fn default() -> Self {
+        Self {
+            source: None,
+            lost_replies: 3,
+            stuck_rad: 0.1,
+            against_share: 0.05,
+            load_n: 8.0,
+        }
+    }
+}
+
+impl Default for WorkspaceSettings {
+    fn default() -> Self {
+        Self {
+            source: None,
+            margin_m: 0.05,
+            stiffness_n_per_m: 400.0,
+            damping_n_s_per_m: 20.0,
+            wall: Vec::new(),
+            keep_in: None,
+            keep_out: Vec::new(),
+            zone: Vec::new(),
         }
     }
 }
@@ -346,6 +492,9 @@ impl JointSettings {
             soft_damping_nm_s_per_rad: default::soft_damping_nm_s_per_rad(),
             move_stiffness_nm_per_rad: default::move_stiffness_nm_per_rad(),
             move_damping_nm_s_per_rad: default::move_damping_nm_s_per_rad(),
+            acceleration_rad_per_s2: default::acceleration_rad_per_s2(),
+            jerk_rad_per_s3: default::jerk_rad_per_s3(),
+            collision_torque_nm: None,
             hold_damping_nm_s_per_rad: default::hold_damping_nm_s_per_rad(),
         }
     }
@@ -391,6 +540,12 @@ mod default {
     }
     pub fn move_damping_nm_s_per_rad() -> f64 {
         5.0
+    }
+    pub fn acceleration_rad_per_s2() -> f64 {
+        20.0
+    }
+    pub fn jerk_rad_per_s3() -> f64 {
+        1000.0
     }
     pub fn hold_damping_nm_s_per_rad() -> f64 {
         1.0

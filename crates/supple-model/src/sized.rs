@@ -1,14 +1,18 @@
 //! From a description, whose size is dynamic, to the types of the core.
 
+use crate::bounds::beyond;
 use crate::description::Description;
 use crate::error::{ModelError, Reporter};
 use crate::settings::FrictionVelocity;
 use supple_core::config::{
-    self, ApparentInertia, ContactLatch, Gains, Law, Limits, MoveGains, Role,
+    self, ApparentInertia, Collision, ContactLatch, Gains, Law, Limits, MoveGains, Plausible, Role,
 };
 use supple_core::controller::ConfigError;
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::{Arm, Body, Config, Controller, Friction, Joint, Matrix, Pose, Vector};
+
+/// Share of a joint's torque limit that is a collision where the TOML says nothing.
+const COLLISION_SHARE: f64 = 0.3;
 
 /// What an [`Arm`] is built from, open to change: a model that differs from the arm by a stated
 /// amount is made by changing these.
@@ -127,6 +131,9 @@ impl Description {
                 soft_damping_nm_s_per_rad: gain(|joint| joint.soft_damping_nm_s_per_rad),
                 joint_speed_rad_per_s: Vector::from_fn(|i, _| self.joints[i].speed_rad_per_s),
                 tip_speed_m_per_s: settings.limits.tip_speed_m_per_s,
+                tip_acceleration_m_per_s2: settings.limits.tip_acceleration_m_per_s2,
+                joint_acceleration_rad_per_s2: gain(|joint| joint.acceleration_rad_per_s2),
+                joint_jerk_rad_per_s3: gain(|joint| joint.jerk_rad_per_s3),
                 tracking_error_m: settings.limits.tracking_error_m,
                 joint_tracking_error_rad: settings.limits.joint_tracking_error_rad,
                 joint_torque_nm: Vector::from_fn(|i, _| self.joints[i].torque_nm),
@@ -137,8 +144,27 @@ impl Description {
                 stiffness_n_per_m: settings.limits.greatest_stiffness_n_per_m,
                 damping_n_s_per_m: settings.limits.greatest_damping_n_s_per_m,
             },
+            collision: Collision {
+                joint_torque_nm: Vector::from_fn(|i, _| {
+                    let joint = &self.joints[i];
+                    let given = joint.gains.collision_torque_nm;
+                    given.unwrap_or(COLLISION_SHARE * joint.torque_nm)
+                }),
+                tip_force_n: settings.collision.tip_force_n,
+                move_share: settings.collision.move_share,
+            },
+            plausible: Plausible {
+                lost_replies: settings.plausible.lost_replies,
+                stuck_rad: settings.plausible.stuck_rad,
+                against_share: settings.plausible.against_share,
+                load_n: settings.plausible.load_n,
+            },
+            workspace: self.workspace()?,
         };
         Controller::new(config).map_err(|error| self.refused(&error))?;
+        if let Some(error) = beyond(&config) {
+            return Err(self.refused(&error));
+        }
         Ok(config)
     }
 

@@ -7,11 +7,13 @@ use roxmltree::{Document, Node};
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-/// Torque (N m) and speed (rad/s) of a joint that has no limits: beyond any arm's.
-pub const UNLIMITED: f64 = 1e9;
+/// Torque (N m) of a joint that has no limits: beyond any arm's.
+pub const UNLIMITED_NM: f64 = 1e5;
+/// Speed (rad/s) of a joint that has no limits: beyond any arm's.
+pub const UNLIMITED_RAD_PER_S: f64 = 100.0;
 
 /// `urdf` in which every movable joint has limits: where it states none, or zero, a range of a turn either
-/// way, and [`UNLIMITED`] as effort and velocity. A text that is no XML is given back as it is.
+/// way, [`UNLIMITED_NM`] as effort and [`UNLIMITED_RAD_PER_S`] as velocity. A text that is no XML is given back as it is.
 pub fn with_limits(urdf: &str) -> String {
     let Ok(document) = Document::parse(urdf) else {
         return urdf.to_owned();
@@ -40,10 +42,10 @@ fn edit(joint: &Node<'_, '_>) -> Option<(Range<usize>, String)> {
     if stated("lower").is_none() && stated("upper").is_none() {
         added += &format!(" lower=\"{:?}\" upper=\"{TAU:?}\"", -TAU);
     }
-    for name in ["effort", "velocity"] {
+    for (name, unlimited) in [("effort", UNLIMITED_NM), ("velocity", UNLIMITED_RAD_PER_S)] {
         let zero = |text: &str| text.trim().parse::<f64>().is_ok_and(|value| value == 0.0);
         if stated(name).is_none_or(zero) {
-            added += &format!(" {name}=\"{UNLIMITED:?}\"");
+            added += &format!(" {name}=\"{unlimited:?}\"");
             dropped.push(name);
         }
     }

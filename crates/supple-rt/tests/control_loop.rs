@@ -113,6 +113,7 @@ fn its_answers_are_those_of_step_to_the_last_bit() {
             cycle,
             position_rad: core::array::from_fn(|i| Some(bench.home_rad[i])),
             tip_force_n: Some(Vector3::zeros()),
+            drives_active: true,
             request: (cycle == 3).then_some(Request::GravityHold),
         };
         let output: Output<4> = step(&controller, &mut state, &input);

@@ -107,6 +107,7 @@ fn it_answers_as_step_does() {
             cycle,
             position_rad: home(),
             tip_force_n: None,
+            drives_active: true,
             request: (cycle == 2).then_some(Request::GravityHold),
         };
         let output = step(&controller, &mut reference, &input);

@@ -19,6 +19,7 @@ pub use world::{Summary, World};
 
 use clap::Parser;
 use std::process::ExitCode;
+use supple_core::drive_guard::DriveGuard;
 use supple_ipc::{Domain, PlantLink};
 use supple_model::{Description, with_dof};
 use supple_plant::{Plant, PlantConfig, Scene, TraceFile};
@@ -67,7 +68,7 @@ pub fn run<const N: usize>(
         config.scene = Scene::beneath(face_m);
     }
     let home_rad = description.home::<N>()?;
-    let motors = Motors::new(config.cycle_s);
+    let motors = Motors::new(config.cycle_s, DriveGuard::new(&description.config()?));
     let plant = Plant::new(config, home_rad, supple_core::Vector::zeros())?;
     let domain = Domain::new(options.prefix.as_deref())?;
     let link = PlantLink::new(&domain)?;

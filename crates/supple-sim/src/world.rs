@@ -196,7 +196,9 @@ impl<const N: usize> World<N> {
     }
 
     fn advance(&mut self, heard: &Heard, time_ns: u64) -> Result<(), SimError> {
-        let torque_nm = self.motors.torque(heard.answer.as_ref())?;
+        let measured = self.plant.measurement();
+        let position_rad = core::array::from_fn(|i| Some(measured.position_rad[i]));
+        let torque_nm = self.motors.torque(&position_rad, heard.answer.as_ref())?;
         let active = self.motors.drives() == Drives::Active;
         self.plant.short([!active; N]);
         self.plant.cycle(&torque_nm);

@@ -86,6 +86,30 @@ impl FaultCode {
                 value_rad,
                 limit_rad,
             } => (12, index(joint), value_rad, limit_rad),
+            Fault::JointCollision {
+                joint,
+                value_nm,
+                limit_nm,
+            } => (13, index(joint), value_nm, limit_nm),
+            Fault::TipCollision { value_n, limit_n } => (14, -1, value_n, limit_n),
+            Fault::EncoderStuck {
+                joint,
+                value_rad,
+                limit_rad,
+            } => (15, index(joint), value_rad, limit_rad),
+            Fault::EncoderUnreliable { joint } => (16, index(joint), 0.0, 0.0),
+            Fault::AgainstTorque {
+                joint,
+                value_nm,
+                limit_nm,
+            } => (17, index(joint), value_nm, limit_nm),
+            Fault::UnmodelledLoad { value_n, limit_n } => (18, -1, value_n, limit_n),
+            Fault::Workspace { value_m, border } => (19, -1, value_m, border as f64),
+            Fault::ZoneSpeed {
+                value_m_per_s,
+                limit_m_per_s,
+            } => (20, -1, value_m_per_s, limit_m_per_s),
+            Fault::ZoneForce { value_n, limit_n } => (21, -1, value_n, limit_n),
         };
         FaultCode {
             kind,
@@ -115,5 +139,9 @@ pub fn refusal(refusal: Option<&Refusal>) -> u8 {
         Some(Refusal::TooFast { .. }) => 4,
         Some(Refusal::FarFromStart { .. }) => 5,
         Some(Refusal::Trajectory(_)) => 6,
+        Some(Refusal::DrivesIdle) => 7,
+        Some(Refusal::OutOfReach { .. }) => 8,
+        Some(Refusal::TooMuchTorque { .. }) => 9,
+        Some(Refusal::Workspace { .. }) => 10,
     }
 }

@@ -60,17 +60,17 @@ pub struct Limited<const N: usize> {
     pub finite: bool,
 }
 
-/// Limit, rate limit, finite check, in this order. A torque that is not finite becomes zero here, and
-/// `finite` says so.
+/// Limit, rate limit, finite check, in this order. The torque changes by at most `step_nm` since the last one.
+/// A torque that is not finite becomes zero here, and `finite` says so.
 pub fn limit<const N: usize>(
     limits: &Limits<N>,
     groups: &MotorGroups<N>,
     last_nm: &Vector<N>,
     demand_nm: &Vector<N>,
-    elapsed_s: f64,
+    step_nm: &Vector<N>,
 ) -> Limited<N> {
     let (allowed, torque_limited) = limit_torque(limits, groups, demand_nm);
-    let (torque_nm, rate_limited) = limit_rate(limits, groups, last_nm, &allowed, elapsed_s);
+    let (torque_nm, rate_limited) = limit_rate(groups, last_nm, &allowed, step_nm);
     let finite = all_finite(&torque_nm);
     Limited {
         torque_nm: if finite { torque_nm } else { Vector::zeros() },
@@ -106,14 +106,12 @@ pub fn limit_torque<const N: usize>(
 }
 
 fn limit_rate<const N: usize>(
-    limits: &Limits<N>,
     groups: &MotorGroups<N>,
     last_nm: &Vector<N>,
     torque_nm: &Vector<N>,
-    elapsed_s: f64,
+    greatest: &Vector<N>,
 ) -> (Vector<N>, bool) {
     let step = torque_nm - last_nm;
-    let greatest = limits.torque_rate_nm_per_s * elapsed_s;
     let beyond = |joint: usize| abs(step[joint]) > greatest[joint];
     if !(0..N).fold(false, |any, joint| any | beyond(joint)) {
         return (*torque_nm, false);

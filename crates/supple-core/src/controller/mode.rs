@@ -14,7 +14,9 @@ use core::fmt;
 /// ```
 ///
 /// Idle is reached from anywhere; asked for in a fault it takes the torque away and leaves the fault
-/// latched. From idle only gravity hold is reached. A reset leaves the fault for
+/// latched. From idle only gravity hold is reached. While the drives are idle, every mode with torque gives way
+/// to gravity hold at the pose that the arm is in, and work is refused: drives come to life in gravity hold
+/// alone. A reset leaves the fault for
 /// the mode that its safe action was: gravity hold, or idle where the angles could not be trusted or the
 /// fault came in idle. It is refused in a cycle that would raise a fault again. Every entry but those to
 /// idle and fault starts from the torque that was there and blends it out.
@@ -143,6 +145,31 @@ pub enum Refusal {
     },
     /// The trajectory itself is wrong.
     Trajectory(TrajectoryError),
+    /// Motion was asked for while the drives are idle.
+    DrivesIdle,
+    /// The tip cannot come to a point of the trajectory.
+    OutOfReach {
+        /// Time of the point since the start \[s\].
+        time_s: f64,
+        /// Distance that remains \[m\].
+        distance_m: f64,
+    },
+    /// The motion would take more torque than a joint has.
+    TooMuchTorque {
+        /// Joint index.
+        joint: usize,
+        /// Torque that the model asks for \[N m\].
+        value_nm: f64,
+        /// Limit \[N m\].
+        limit_nm: f64,
+    },
+    /// The trajectory leaves the workspace.
+    Workspace {
+        /// Border, counted from 0.
+        border: usize,
+        /// Greatest distance beyond it \[m\].
+        value_m: f64,
+    },
 }
 
 impl fmt::Display for Refusal {
@@ -176,6 +203,27 @@ impl fmt::Display for Refusal {
                  there first"
             ),
             Refusal::Trajectory(error) => write!(f, "refused: {error}"),
+            Refusal::DrivesIdle => {
+                f.write_str("refused: the drives are idle; activate them in gravity hold first")
+            }
+            Refusal::OutOfReach { time_s, distance_m } => write!(
+                f,
+                "refused: {time_s:.2} s after its start the trajectory is {distance_m:.3} m out of reach; \
+                 move it nearer to the arm or make it smaller"
+            ),
+            Refusal::TooMuchTorque {
+                joint,
+                value_nm,
+                limit_nm,
+            } => write!(
+                f,
+                "refused: joint {joint} would need {value_nm:.2} N m, limit {limit_nm:.2} N m; ask for a \
+                 slower motion"
+            ),
+            Refusal::Workspace { border, value_m } => write!(
+                f,
+                "refused: the motion would go {value_m:.3} m beyond border {border} of the workspace"
+            ),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! What goes into a step and what comes out.
 
-use super::fault::Fault;
+use super::fault::{Fault, SafeAction};
 use super::mode::{Mode, Refusal, Request};
 use crate::config::Gains;
 use crate::impedance::Torques;
@@ -16,6 +16,9 @@ pub struct Input<const N: usize> {
     pub position_rad: [Option<f64>; N],
     /// Measured force on the tip, base axes \[N\]; used only with a chosen apparent inertia.
     pub tip_force_n: Option<Vector3<f64>>,
+    /// The motors carry out the torques that they are sent. Where they do not, the controller holds gravity at the
+    /// pose that the arm is in, ready for their return.
+    pub drives_active: bool,
     /// What is asked for, if anything.
     pub request: Option<Request<N>>,
 }
@@ -38,6 +41,8 @@ pub struct Output<const N: usize> {
     pub limp: bool,
     /// Latched fault.
     pub fault: Option<Fault>,
+    /// What is done about it now; braking, where the arm did not come to rest otherwise.
+    pub safe_action: Option<SafeAction>,
     /// Why this cycle's request was refused.
     pub refusal: Option<Refusal>,
     /// Terms whose sum was limited to `torque_nm`.

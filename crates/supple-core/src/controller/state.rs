@@ -5,6 +5,7 @@ use super::activity::Activity;
 use super::fault::{Fault, SafeAction};
 use super::mode::Mode;
 use super::output::Input;
+use super::plausibility::Plausibility;
 use crate::config::{Config, Gains, Role};
 use crate::dynamics::Terms;
 use crate::estimator::Estimator;
@@ -73,6 +74,11 @@ pub struct State<const N: usize> {
     pub(super) handover_pending: bool,
     pub(super) fault: Option<Fault>,
     pub(super) terms: Terms<N>,
+    /// The motors carry out torques.
+    pub(super) drives_active: bool,
+    pub(super) plausibility: Plausibility<N>,
+    /// Greatest kinetic energy of late; in a fault, before it \[J\].
+    pub(super) energy_j: f64,
 }
 
 impl<const N: usize> State<N> {
@@ -102,6 +108,9 @@ impl<const N: usize> State<N> {
             handover_pending: false,
             fault: None,
             terms: Terms::default(),
+            drives_active: false,
+            plausibility: Plausibility::default(),
+            energy_j: 0.0,
         }
     }
 
@@ -113,6 +122,14 @@ impl<const N: usize> State<N> {
     /// Latched fault.
     pub fn fault(&self) -> Option<Fault> {
         self.fault
+    }
+
+    /// What is done about a fault now.
+    pub fn safe_action(&self) -> Option<SafeAction> {
+        match self.activity {
+            Activity::Fault(action) => Some(action),
+            _ => None,
+        }
     }
 
     /// Takes in a state. Returns the time since the last one \[s\]; zero when it is the same again.
@@ -173,6 +190,7 @@ impl<const N: usize> State<N> {
                 return Err(Fault::EncoderLost { joint });
             }
         }
+        self.plausibility.receive(&config.plausible, measured_rad)?;
         if first {
             self.position = Vector::from(measured_rad.map(Option::unwrap_or_default));
             self.estimator = Estimator::at_rest(self.position);
@@ -232,6 +250,28 @@ impl<const N: usize> State<N> {
         self.activity = activity;
         self.activity_start = self.cycle.unwrap_or(0);
         self.latch = Latch::default();
+        self.plausibility.begin();
+    }
+
+    /// Where the drives take no torque, whatever was at work gives way to gravity hold; when they come back, it
+    /// begins anew, from the weight of the arm alone.
+    pub(super) fn follow_drives(&mut self, active: bool) {
+        let came_back = active && !self.drives_active;
+        self.drives_active = active;
+        match self.activity {
+            Activity::Idle | Activity::Fault(_) => {}
+            Activity::GravityHold if !came_back => {}
+            Activity::GravityHold => self.enter(Activity::GravityHold),
+            _ if !active => {
+                self.enter(Activity::GravityHold);
+                self.handover_pending = false;
+            }
+            _ => {}
+        }
+        if !active {
+            // What is left of another activity's torque would be there at their return.
+            self.handover = Vector::zeros();
+        }
     }
 
     /// Time since the activity began \[s\].
@@ -247,7 +287,7 @@ impl<const N: usize> State<N> {
 
     /// The loops of held joints do not act.
     fn holds_nothing(&self) -> bool {
-        self.activity.is_limp() || self.activity.has_own_loops()
+        !self.drives_active || self.activity.is_limp() || self.activity.has_own_loops()
     }
 
     /// Lets the set-points of held joints approach their angles; while nothing holds them they follow

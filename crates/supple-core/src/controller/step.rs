@@ -4,6 +4,7 @@ use super::activity::Activity;
 use super::fault::Fault;
 use super::mode::{Refusal, Request};
 use super::output::{Input, Output};
+use super::plausibility::Evidence;
 use super::state::State;
 use super::{Controller, checks, limiter};
 use crate::config::{Config, Role};
@@ -12,6 +13,7 @@ use crate::impedance::{Situation, Task, Torques, impedance};
 use crate::math::{Vector, Vector3, abs, smooth_step};
 use crate::ripple::compensation_nm;
 use crate::trajectory::{JointReference, Reference};
+use crate::workspace::Crossing;
 
 /// From measurements to torques. Allocates nothing, locks nothing, logs nothing, reads no clock.
 ///
@@ -37,10 +39,11 @@ pub fn step<const N: usize>(
     if task.is_none() {
         state.latch_fault(Fault::MassMatrix);
     }
+    state.follow_drives(input.drives_active);
     let refusal = input.request.as_ref().and_then(|request| match request {
         // A fault is not cleared in a cycle that would raise it.
         Request::Reset if !sound || task.is_none() => Some(Refusal::Mode { mode: state.mode() }),
-        _ => state.request(config, request).err(),
+        _ => state.request(controller, task.as_ref(), request).err(),
     });
     state.gains.elapsed_s += elapsed_s;
     state.advance_held(config, elapsed_s);
@@ -53,10 +56,27 @@ pub fn step<const N: usize>(
         state.latch_fault(fault);
         reference = None;
     }
-    let external_force = state.observe(config, task.as_ref(), reference.as_ref(), elapsed_s);
+    let external_force = match state.observe(config, task.as_ref(), reference.as_ref(), elapsed_s) {
+        Ok(force_n) => force_n,
+        Err((force_n, fault)) => {
+            state.latch_fault(fault);
+            reference = None;
+            force_n
+        }
+    };
+    if let Err(fault) = state.keep_within(config, &tip_velocity, &external_force) {
+        state.latch_fault(fault);
+        reference = None;
+    }
+    state.watch_the_stop(controller, &tip_velocity, elapsed_s);
 
-    let mut torques = state.demand(config, task.as_ref(), reference.as_ref(), input.tip_force_n);
-    if !(state.activity.is_limp() || state.is_stale(config)) {
+    let mut torques = state.demand(
+        controller,
+        task.as_ref(),
+        reference.as_ref(),
+        input.tip_force_n,
+    );
+    if !(state.activity.is_limp() || state.fault.is_some() || state.is_stale(config)) {
         let tables = &config.ripple;
         torques.ripple = compensation_nm(tables, controller.motor_from_joint(), &state.position);
     }
@@ -64,7 +84,7 @@ pub fn step<const N: usize>(
     let total = checks::total(&torques).unwrap_or_else(|fault| {
         state.latch_fault(fault);
         reference = None;
-        torques = state.safe(config);
+        torques = state.safe(controller);
         checks::total(&torques).unwrap_or_else(|_| {
             torques = Torques::zeros();
             Vector::zeros()
@@ -75,7 +95,7 @@ pub fn step<const N: usize>(
         controller.motors(),
         &state.torque,
         &total,
-        config.period_s,
+        controller.torque_step_nm(state.fault.is_some()),
     );
     if !limited.finite {
         state.latch_fault(Fault::TorqueNotFinite { term: "total" });
@@ -91,6 +111,7 @@ pub fn step<const N: usize>(
         mode_time_s: state.activity_s(config),
         limp: state.activity.is_limp(),
         fault: state.fault,
+        safe_action: state.safe_action(),
         refusal,
         torques,
         torque_limited: limited.torque_limited,
@@ -125,7 +146,7 @@ impl<const N: usize> State<N> {
         tip_velocity: &Vector3<f64>,
         reference: Option<&Reference>,
     ) -> Result<(), Fault> {
-        if self.activity.is_limp() {
+        if self.activity.is_limp() || !self.drives_active {
             return Ok(());
         }
         let velocity = &self.estimator.velocity_rad_per_s;
@@ -152,33 +173,39 @@ impl<const N: usize> State<N> {
         core::array::from_fn(|i| (config.roles[i] != Role::Active).then_some(self.held[i]))
     }
 
-    /// Observes the external torque and force, and lets the contact latch see them.
+    /// Observes the external torque and force, lets the contact latch see them, and holds them against what is
+    /// plausible and allowed. The force is known in either case.
     fn observe(
         &mut self,
         config: &Config<N>,
         task: Option<&Task<N>>,
         reference: Option<&Reference>,
         elapsed_s: f64,
-    ) -> Vector3<f64> {
-        if self.activity.is_limp() {
+    ) -> Result<Vector3<f64>, (Vector3<f64>, Fault)> {
+        if self.activity.is_limp() || !self.drives_active {
             // Motors may brake: nothing that the model knows balances.
             self.observer.reset();
-            return Vector3::zeros();
+            return Ok(Vector3::zeros());
         }
+        let mut drive = Vector::zeros();
         if elapsed_s > 0.0 {
             let velocity = &self.estimator.velocity_rad_per_s;
             let friction: Vector<N> =
                 Vector::from_fn(|i, _| config.friction[i].torque_nm(velocity[i]));
-            let drive = self.torque + self.terms.kinetic_gradient - self.terms.gravity - friction;
+            drive = self.torque + self.terms.kinetic_gradient - self.terms.gravity - friction;
             let bandwidth = config.latch.observer_rad_per_s;
             self.observer
                 .update(&self.terms.momentum, &drive, elapsed_s, bandwidth);
         }
         let external = self.observer.external_torque_nm();
         let Some(task) = task else {
-            return Vector3::zeros();
+            return Ok(Vector3::zeros());
         };
         let force = task.inverse.tr_mul(&external);
+        let mut reference_rad_per_s = Vector::zeros();
+        if let Some(reference) = self.joint_reference(config) {
+            reference_rad_per_s = reference.velocity_rad_per_s;
+        }
         if let Some(reference) = reference {
             self.latch.follow(&reference.velocity, elapsed_s);
             let along = task.inverse * self.latch.direction();
@@ -190,22 +217,66 @@ impl<const N: usize> State<N> {
                 })
                 .sum();
             self.latch.decide(&config.latch, &force, doubt_n, elapsed_s);
+            reference_rad_per_s = velocity;
         }
-        force
+        let evidence = Evidence {
+            reference_rad_per_s: &reference_rad_per_s,
+            drive_nm: &drive,
+            force_n: &force,
+            elapsed_s,
+        };
+        match self.weigh(config, &evidence) {
+            Ok(()) => Ok(force),
+            Err(fault) => Err((force, fault)),
+        }
+    }
+
+    /// The borders and zones of the workspace.
+    fn keep_within(
+        &self,
+        config: &Config<N>,
+        tip_velocity: &Vector3<f64>,
+        force_n: &Vector3<f64>,
+    ) -> Result<(), Fault> {
+        let workspace = &config.workspace;
+        if workspace.is_unbounded() || self.activity.is_limp() || !self.drives_active {
+            return Ok(());
+        }
+        let tip = self.terms.base_from_tip.translation;
+        match workspace.crossing(&tip, tip_velocity, force_n) {
+            None => Ok(()),
+            Some(crossing) => Err(match crossing {
+                Crossing::Border { index, beyond_m } => Fault::Workspace {
+                    value_m: beyond_m,
+                    border: index,
+                },
+                Crossing::Speed {
+                    value_m_per_s,
+                    limit_m_per_s,
+                } => Fault::ZoneSpeed {
+                    value_m_per_s,
+                    limit_m_per_s,
+                },
+                Crossing::Force { value_n, limit_n } => Fault::ZoneForce { value_n, limit_n },
+            }),
+        }
     }
 
     /// Torque of the activity, term by term.
     fn demand(
         &self,
-        config: &Config<N>,
+        controller: &Controller<N>,
         task: Option<&Task<N>>,
         reference: Option<&Reference>,
         tip_force_n: Option<Vector3<f64>>,
     ) -> Torques<N> {
+        let config = controller.config();
         match (&self.activity, task, reference) {
             (Activity::Track(_), Some(task), Some(reference)) => {
+                let tip = self.terms.base_from_tip.translation;
                 let now = Situation {
                     reference,
+                    spring_limit_n: config.workspace.spring_limit_n(&tip),
                     velocity_rad_per_s: &self.estimator.velocity_rad_per_s,
                     gains: &self.gains.now(),
                     tip_force_n,
@@ -217,22 +288,27 @@ impl<const N: usize> State<N> {
                 self.guard(config, &mut torques);
                 torques
             }
-            (activity, ..) if activity.has_own_loops() => self.moving(config),
-            _ => self.safe(config),
+            (activity, ..) if activity.has_own_loops() => self.moving(controller),
+            _ => self.safe(controller),
         }
     }
 
-    /// Gravity hold with joint damping, or nothing: also the safe action.
-    fn safe(&self, config: &Config<N>) -> Torques<N> {
+    /// Gravity hold with joint damping, the safe action, or nothing.
+    fn safe(&self, controller: &Controller<N>) -> Torques<N> {
+        let config = controller.config();
         if self.activity.is_limp() {
             return Torques::zeros();
         }
-        if self.is_stale(config) {
-            // Neither the velocity nor the distance from a set-point is known any more.
+        if self.is_stale(config) || !self.drives_active {
+            // Neither the velocity nor the distance from a set-point is known any more; or nothing more is wanted
+            // of drives that come back.
             return Torques {
                 gravity: self.terms.gravity,
                 ..Torques::zeros()
             };
+        }
+        if self.fault.is_some() {
+            return self.stopping(controller);
         }
         let velocity = &self.estimator.velocity_rad_per_s;
         let mut torques = Torques {
@@ -273,9 +349,10 @@ impl<const N: usize> State<N> {
 
     /// The reference of the joints with the model and a stiff loop; a joint that is ramped has neither
     /// loop nor friction but the ramp.
-    fn moving(&self, config: &Config<N>) -> Torques<N> {
+    fn moving(&self, controller: &Controller<N>) -> Torques<N> {
+        let config = controller.config();
         let Some(reference) = self.joint_reference(config) else {
-            return self.safe(config);
+            return self.safe(controller);
         };
         let gains = &config.move_gains;
         let position_error = reference.position_rad - self.position;
@@ -330,6 +407,12 @@ impl<const N: usize> State<N> {
             }
         }
         torques.soft_stop = checks::soft_stop(&config.limits, &self.position, velocity);
+        if !config.workspace.is_unbounded() {
+            let jacobian = self.terms.jacobian.fixed_rows::<3>(0);
+            let tip = self.terms.base_from_tip.translation;
+            let force = config.workspace.soft_force(&tip, &(jacobian * velocity));
+            torques.soft_stop += jacobian.tr_mul(&force);
+        }
     }
 
     /// Blends out, over `handover_s`, what the torque was more than it is now when the activity began.
@@ -337,6 +420,9 @@ impl<const N: usize> State<N> {
         if self.handover_pending {
             self.handover_pending = false;
             self.handover = self.torque - torques.total();
+        }
+        if self.fault.is_some() {
+            self.handover = Vector::zeros();
         }
         let (blended, ..) = smooth_step(self.activity_s(config) / config.handover_s);
         torques.handover = self.handover * (1.0 - blended);

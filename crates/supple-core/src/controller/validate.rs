@@ -213,6 +213,41 @@ pub(super) fn validate<const N: usize>(config: &Config<N>) -> Result<(), ConfigE
     each("motor_torque_nm", &limits.motor_torque_nm, false)?;
     each("torque_rate_nm_per_s", &limits.torque_rate_nm_per_s, false)?;
     positive("tip_speed_m_per_s", limits.tip_speed_m_per_s)?;
+    positive(
+        "tip_acceleration_m_per_s2",
+        limits.tip_acceleration_m_per_s2,
+    )?;
+    each(
+        "joint_acceleration_rad_per_s2",
+        &limits.joint_acceleration_rad_per_s2,
+        false,
+    )?;
+    each(
+        "joint_jerk_rad_per_s3",
+        &limits.joint_jerk_rad_per_s3,
+        false,
+    )?;
+    let collision = &config.collision;
+    each(
+        "collision joint_torque_nm",
+        &collision.joint_torque_nm,
+        false,
+    )?;
+    positive("collision tip_force_n", collision.tip_force_n)?;
+    let plausible = &config.plausible;
+    positive("plausible stuck_rad", plausible.stuck_rad)?;
+    positive("plausible against_share", plausible.against_share)?;
+    positive("plausible load_n", plausible.load_n)?;
+    check(
+        collision.move_share > 0.0 && collision.move_share <= 1.0,
+        "collision move_share",
+        None,
+        collision.move_share,
+        "above 0, at most 1",
+    )?;
+    if let Some((entry, value, must)) = config.workspace.unsound() {
+        return check(false, entry, None, value, must);
+    }
     positive("tracking_error_m", limits.tracking_error_m)?;
     positive("joint_tracking_error_rad", limits.joint_tracking_error_rad)?;
     positive("start_error_m", limits.start_error_m)

@@ -1,7 +1,7 @@
 //! Back and forth on a horizontal circle about the base axis: what the sinusoid never moves.
 
-use super::{Reference, TrajectoryError, positive, ramped};
-use crate::math::{Vector3, sin_cos};
+use super::{MINIMUM_JERK_SPEED, Reference, TrajectoryError, positive, ramped};
+use crate::math::{Vector3, abs, sin_cos};
 
 /// Azimuth `centre + amplitude sin(omega s(t))` at constant radius and height.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,6 +36,14 @@ impl Arc {
             velocity: tangent * rate,
             acceleration: tangent * rate_rate - radial * (rate * rate),
         }
+    }
+
+    /// As [`super::Trajectory::peaks`].
+    pub(super) fn peaks(&self) -> (f64, f64) {
+        let w = self.angular_frequency_rad_per_s;
+        let rate = abs(self.amplitude_rad) * w;
+        let speed = self.radius_m * rate;
+        (speed, speed * (MINIMUM_JERK_SPEED / self.ramp_s + w + rate))
     }
 
     pub(super) fn validate(&self) -> Result<(), TrajectoryError> {

@@ -1,7 +1,9 @@
 //! Straight line from rest to rest with minimum jerk.
 
-use super::{Reference, TrajectoryError, finite, positive};
-use crate::math::{Vector3, smooth_step};
+use super::{
+    MINIMUM_JERK_ACCELERATION, MINIMUM_JERK_SPEED, Reference, TrajectoryError, finite, positive,
+};
+use crate::math::{Vector3, smooth_step, sqrt};
 
 /// From one point to another in a given time; it stays at the end.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,6 +25,16 @@ impl Line {
             velocity: way * (rate / self.duration_s),
             acceleration: way * (rate_rate / (self.duration_s * self.duration_s)),
         }
+    }
+
+    /// As [`super::Trajectory::peaks`].
+    pub(super) fn peaks(&self) -> (f64, f64) {
+        let way = self.to_m - self.from_m;
+        let mean = sqrt(way.dot(&way)) / self.duration_s;
+        (
+            MINIMUM_JERK_SPEED * mean,
+            MINIMUM_JERK_ACCELERATION * mean / self.duration_s,
+        )
     }
 
     pub(super) fn validate(&self) -> Result<(), TrajectoryError> {

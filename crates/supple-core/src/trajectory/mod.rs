@@ -21,6 +21,13 @@ pub use sinusoid::Sinusoid;
 use crate::math::{Vector3, all_finite, smooth_step};
 use core::fmt;
 
+/// Peak speed of a minimum-jerk motion over its mean speed.
+pub const MINIMUM_JERK_SPEED: f64 = 1.875;
+/// Peak acceleration of a minimum-jerk motion over its way by its duration squared: 10 / sqrt(3).
+pub const MINIMUM_JERK_ACCELERATION: f64 = 5.773_502_691_896_258;
+/// Peak jerk of a minimum-jerk motion over its way by its duration cubed.
+pub const MINIMUM_JERK_JERK: f64 = 60.0;
+
 /// Reference of the tip in base coordinates: `Xo`, `Xo'`, `Xo''`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reference {
@@ -94,6 +101,35 @@ impl Trajectory {
             Trajectory::Arc(arc) => arc.at(time_s),
             Trajectory::Quadrant(quadrant) => quadrant.at(time_s),
             Trajectory::Probe(probe) => probe.at(time_s),
+        }
+    }
+
+    /// Bounds on its speed \[m/s\] and acceleration \[m/s^2\] over its whole length; velocities that jump by design
+    /// apart.
+    pub fn peaks(&self) -> (f64, f64) {
+        match self {
+            Trajectory::Hold(_) => (0.0, 0.0),
+            Trajectory::Line(line) => line.peaks(),
+            Trajectory::Sinusoid(sinusoid) => sinusoid.peaks(),
+            Trajectory::Arc(arc) => arc.peaks(),
+            Trajectory::Quadrant(quadrant) => quadrant.peaks(),
+            Trajectory::Probe(probe) => probe.peaks(),
+        }
+    }
+
+    /// Time after which it rests, or repeats itself \[s\].
+    pub fn length_s(&self) -> f64 {
+        match self {
+            Trajectory::Hold(_) => 0.0,
+            Trajectory::Line(line) => line.duration_s,
+            Trajectory::Sinusoid(sinusoid) => {
+                sinusoid.ramp_s + core::f64::consts::TAU / sinusoid.angular_frequency_rad_per_s
+            }
+            Trajectory::Arc(arc) => {
+                arc.ramp_s + core::f64::consts::TAU / arc.angular_frequency_rad_per_s
+            }
+            Trajectory::Quadrant(quadrant) => quadrant.length_s(),
+            Trajectory::Probe(probe) => probe.column_s(),
         }
     }
 

@@ -4,7 +4,10 @@
 //! then the tip steps out along the radius, from rest to rest. After the last stroke of a column the
 //! base turns by one step while the tip returns to the first radius, and the next column begins.
 
-use super::{Reference, TrajectoryError, finite, positive, ramped};
+use super::{
+    MINIMUM_JERK_ACCELERATION, MINIMUM_JERK_SPEED, Reference, TrajectoryError, finite, positive,
+    ramped,
+};
 use crate::math::{Vector3, sin_cos, smooth_step};
 
 /// Peak speed of a minimum-jerk move is this times its mean speed.
@@ -138,6 +141,21 @@ impl Probe {
             let (s, pace, rate) = ramped((stroke_s - t).max(0.0), self.ramp_s);
             (-self.stroke_m + v * s, -v * pace, v * rate)
         }
+    }
+
+    /// As [`super::Trajectory::peaks`].
+    pub(super) fn peaks(&self) -> (f64, f64) {
+        let speed = self.speed_m_per_s;
+        // A step of length L is as long as its peak speed asks for: L / T^2 is speed^2 / L but for a factor.
+        let shortest = self.radial_step_m;
+        let steps = speed * MINIMUM_JERK_ACCELERATION / (MINIMUM_JERK_SPEED * MINIMUM_JERK_SPEED);
+        let turning = if self.azimuth_step_rad == 0.0 {
+            0.0
+        } else {
+            3.0 * speed / self.radius_m
+        };
+        let stroke = MINIMUM_JERK_SPEED / self.ramp_s;
+        (speed, speed * stroke.max(steps / shortest + turning))
     }
 
     pub(super) fn validate(&self) -> Result<(), TrajectoryError> {

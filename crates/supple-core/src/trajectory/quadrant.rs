@@ -4,7 +4,7 @@
 //! back along the second semi-axis; then again. Speed is constant on each piece, so the velocity jumps
 //! at the three corners, where the acceleration stays that of the piece.
 
-use super::{Reference, TrajectoryError, finite, positive, ramped};
+use super::{MINIMUM_JERK_SPEED, Reference, TrajectoryError, finite, positive, ramped};
 use crate::math::{Vector3, abs, sin_cos, sqrt};
 
 /// Knots of the arc-length table.
@@ -201,6 +201,20 @@ impl Quadrant {
             .map(|(x, weight)| weight * self.stretch(mid + half * x))
             .sum();
         sum * half
+    }
+
+    /// As [`super::Trajectory::peaks`]; the ellipse is bent most at the end of its longer semi-axis.
+    pub(super) fn peaks(&self) -> (f64, f64) {
+        let (first, second) = (norm(&self.first_m), norm(&self.second_m));
+        let (long, short) = (first.max(second), first.min(second));
+        let speed = self.speed_m_per_s;
+        let bend = speed * long / (short * short);
+        (speed, speed * (MINIMUM_JERK_SPEED / self.ramp_s + bend))
+    }
+
+    /// The ramp and a round \[s\].
+    pub(super) fn length_s(&self) -> f64 {
+        self.ramp_s + self.period_s()
     }
 
     pub(super) fn validate(&self) -> Result<(), TrajectoryError> {

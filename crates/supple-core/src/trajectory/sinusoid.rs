@@ -1,7 +1,7 @@
 //! Sinusoid along a line: the paper's `x(t) = 0.6 + 0.2 sin(pi t / 4)`.
 
-use super::{Reference, TrajectoryError, finite, positive, ramped};
-use crate::math::{Vector3, sin_cos};
+use super::{MINIMUM_JERK_SPEED, Reference, TrajectoryError, finite, positive, ramped};
+use crate::math::{Vector3, sin_cos, sqrt};
 
 /// `Xo = centre + amplitude sin(omega s(t))`, with the pace of `s` ramped from rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,6 +41,13 @@ impl Sinusoid {
             velocity: self.amplitude_m * (w * cos * pace),
             acceleration: self.amplitude_m * (w * cos * pace_rate - w * w * sin * pace * pace),
         }
+    }
+
+    /// As [`super::Trajectory::peaks`].
+    pub(super) fn peaks(&self) -> (f64, f64) {
+        let w = self.angular_frequency_rad_per_s;
+        let speed = sqrt(self.amplitude_m.dot(&self.amplitude_m)) * w;
+        (speed, speed * (MINIMUM_JERK_SPEED / self.ramp_s + w))
     }
 
     pub(super) fn validate(&self) -> Result<(), TrajectoryError> {

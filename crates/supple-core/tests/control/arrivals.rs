@@ -7,8 +7,15 @@ use supple_core::{Input, Output, Vector};
 
 /// Steadily turning, in gravity hold.
 fn turning() -> (Rig<4>, Vector<4>) {
+    turning_with(four().plausible.lost_replies)
+}
+
+/// The same with so many lost replies tolerated.
+fn turning_with(lost_replies: u32) -> (Rig<4>, Vector<4>) {
     let speed = Vector::<4>::new(0.3, 0.2, 0.0, -0.4);
-    let mut rig = Rig::holding(four(), bent());
+    let mut config = four();
+    config.plausible.lost_replies = lost_replies;
+    let mut rig = Rig::holding(config, bent());
     for _ in 0..300 {
         rig.q += speed * 1e-3;
         let output = rig.cycle();
@@ -47,14 +54,23 @@ fn a_single_lost_reply_is_coasted_over() {
 }
 
 #[test]
-fn every_other_reply_lost_is_tolerated() {
-    let (mut rig, speed) = turning();
-    for k in 0..200 {
-        rig.q += speed * 1e-3;
-        let lost: &[usize] = if k % 2 == 0 { &[1] } else { &[0, 3] };
-        let output = rig.step(&without(&rig, lost));
-        assert_eq!(output.fault, None, "cycle {k}");
-    }
+fn every_other_reply_lost_is_a_fault_and_one_in_ten_is_not() {
+    let losing = |every: u64| {
+        let (mut rig, speed) = turning_with(3);
+        for k in 0..400 {
+            rig.q += speed * 1e-3;
+            let lost: &[usize] = if k % every == 0 { &[1] } else { &[] };
+            if let Some(fault) = rig.step(&without(&rig, lost)).fault {
+                return Some((k, fault));
+            }
+        }
+        None
+    };
+    assert_eq!(losing(10), None);
+    let (cycle, fault) = losing(2).expect("a fault");
+    assert_eq!(fault, Fault::EncoderUnreliable { joint: 1 });
+    assert!(cycle < 20, "after {cycle} cycles");
+    assert!(losing(5).is_some());
 }
 
 #[test]

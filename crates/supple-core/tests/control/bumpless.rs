@@ -1,7 +1,7 @@
 //! Changes of mode with the arm in the loop: the torque does not jump, faults are not blended, and
 //! what was handed over dies out.
 
-use crate::support::configs::{four, rate_limited, three};
+use crate::support::configs::{four, stop_limited, three};
 use crate::support::plant::Plant;
 use crate::support::rig::{Rig, bent, probe_at};
 use crate::support::size;
@@ -182,9 +182,9 @@ fn a_fault_is_not_blended() {
         assert_eq!(output.mode, Mode::Fault);
         let torques = &output.torques;
         assert_eq!(torques.handover, Vector::<4>::zeros());
-        let safe = torques.gravity + torques.damping + torques.joint_pd + torques.soft_stop;
+        let safe = torques.gravity + torques.damping;
         assert_eq!(torques.total(), safe);
-        let expected = rate_limited(&config, &before, &safe);
+        let expected = stop_limited(&config, &before, &safe);
         assert!(size(&(output.torque_nm - expected)) < 1e-9);
     }
 }

@@ -1,7 +1,7 @@
 //! Every fault: it comes exactly at its limit, says what broke it, stays until a reset, and the arm
 //! does what is safe.
 
-use crate::support::configs::{four, rate_limited, three, unlimited};
+use crate::support::configs::{four, stop_limited, three, unlimited};
 use crate::support::rig::{Rig, bent};
 use supple_core::config::{Gains, Role};
 use supple_core::controller::{Fault, Mode, Request, SafeAction, limit_torque};
@@ -115,7 +115,7 @@ fn an_infinite_term_is_a_fault_and_not_a_clamp() {
     latched(rig, &output, SafeAction::GravityHold);
 }
 
-/// Finite terms whose sum is not: the safe action has the same terms, so nothing is sent at all.
+/// Finite terms whose sum is not: the safe action has none of them.
 #[test]
 fn an_infinite_sum_of_finite_terms_is_a_fault() {
     let mut config = boundless();
@@ -134,7 +134,8 @@ fn an_infinite_sum_of_finite_terms_is_a_fault() {
         assert!(output.torque_nm.iter().all(|x| x.is_finite()));
         if let Some(fault) = output.fault {
             assert_eq!(fault, Fault::TorqueNotFinite { term: "total" });
-            assert_eq!(output.torque_nm[1], 0.0);
+            let weight = gravity(&rig.controller.config().arm, &rig.q);
+            assert!((rig.rest().torque_nm - weight).norm() < 1e-6);
             return;
         }
     }
@@ -188,20 +189,19 @@ fn a_worse_fault_takes_the_torque_away_but_keeps_the_first_cause() {
     assert_eq!(rig.ask(Request::Reset).mode, Mode::Idle);
 }
 
-/// Where the angle is not trusted the torque falls to zero as fast as the rate limit lets it, and the
-/// fallback is zero at once.
+/// Where the angle is not trusted the torque falls to zero in 5 ms, and the fallback is zero at once.
 #[test]
 fn a_lost_encoder_lets_go() {
     let mut rig = Rig::holding(four(), bent());
     let mut last = rig.rest().torque_nm;
-    let cycles = (last.amax() / 1000.0 / 1e-3).ceil() as usize;
     let mut input = rig.input();
     input.position_rad[3] = Some(f64::NAN);
     let mut output = rig.step(&input);
-    for _ in 0..cycles {
+    // In 5 ms it may all be gone.
+    for _ in 0..5 {
         assert_eq!(output.torques.total(), Vector::<4>::zeros());
         assert_eq!(output.fallback_torque_nm, Vector::<4>::zeros());
-        let expected = rate_limited(&four(), &last, &Vector::zeros());
+        let expected = stop_limited(&four(), &last, &Vector::zeros());
         assert!((output.torque_nm - expected).norm() < 1e-9);
         last = output.torque_nm;
         output = rig.cycle();
@@ -245,21 +245,17 @@ fn a_reset_does_not_outrun_its_fault() {
     assert_eq!(rig.ask(Request::Reset).mode, Mode::Idle);
 }
 
-/// Held joints keep their loop in the safe action.
+/// No stiff loop acts in the safe action, that of a held joint neither; nor do soft stops.
 #[test]
-fn the_safe_action_keeps_held_joints() {
+fn the_safe_action_has_no_stiff_loop() {
     let mut rig = Rig::holding(four(), bent());
     rig.bring_to(Mode::Fault);
     rig.q[2] = 0.01;
+    rig.q[0] = four().limits.position_upper_rad[0] - 0.01;
     let output = rig.rest();
-    let Role::Held {
-        stiffness_nm_per_rad,
-        ..
-    } = four().roles[2]
-    else {
-        panic!("the roll is held");
-    };
-    assert!((output.torques.joint_pd[2] + 0.01 * stiffness_nm_per_rad).abs() < 1e-6);
+    assert_eq!(output.mode, Mode::Fault);
+    let torques = &output.torques;
+    assert_eq!(torques.total(), torques.gravity + torques.damping);
 }
 
 #[test]

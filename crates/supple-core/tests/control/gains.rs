@@ -18,7 +18,7 @@ fn a_straight_ramp_per_axis() {
         let from = four().law.gains;
         let to = Gains {
             stiffness_n_per_m: Vector3::new(5.0, 500.0, 100.0),
-            damping_n_s_per_m: Vector3::new(1.5, 0.0, 60.0),
+            damping_n_s_per_m: Vector3::new(1.5, 0.0, 25.0),
         };
         assert_eq!(rig.cycle().gains, from);
         let mut output = rig.ask(ask(to, 0.2));

@@ -174,7 +174,8 @@ fn survive<const N: usize>(config: Config<N>) {
                 prop_assert!(fallback.abs() <= limits.joint_torque_nm[i] * (1.0 + 1e-12));
                 prop_assert!(motors[i].abs() <= limits.motor_torque_nm[i] * (1.0 + 1e-12));
                 let step = (torque - last.torque_nm[i]).abs();
-                let greatest = limits.torque_rate_nm_per_s[i] * config.period_s;
+                let in_fault = output.mode == Mode::Fault;
+                let greatest = rig.controller.torque_step_nm(in_fault)[i];
                 // The one exception: a torque that is not finite is dropped, not ramped.
                 prop_assert!(step <= greatest * (1.0 + 1e-9) || torque == 0.0);
             }

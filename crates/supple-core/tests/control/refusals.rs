@@ -224,7 +224,7 @@ fn gains_out_of_range() {
         });
         says(refusal, &["ramp_s", &format!("{ramp_s}")]);
     }
-    let most = Gains::isotropic(1000.0, 100.0);
+    let most = Gains::isotropic(1000.0, 25.0);
     for gains in [most, Gains::isotropic(0.0, 0.0)] {
         Rig::holding(four(), bent()).accept(Request::Gains { gains, ramp_s: 0.0 });
     }

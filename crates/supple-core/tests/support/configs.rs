@@ -2,7 +2,8 @@
 
 use super::arms::{wam3, wam4, wam7};
 use supple_core::config::{
-    ApparentInertia, ContactLatch, FrictionVelocity, Gains, Law, Limits, MoveGains, Role,
+    ApparentInertia, Collision, ContactLatch, FrictionVelocity, Gains, Law, Limits, MoveGains,
+    Plausible, Role, Workspace,
 };
 use supple_core::{Arm, Config, Friction, Matrix, RippleTable, Vector};
 
@@ -98,6 +99,9 @@ fn config<const N: usize>(
             soft_damping_nm_s_per_rad: all(10.0),
             joint_speed_rad_per_s: all(2.0),
             tip_speed_m_per_s: 1.5,
+            tip_acceleration_m_per_s2: 20.0,
+            joint_acceleration_rad_per_s2: all(100.0),
+            joint_jerk_rad_per_s3: all(1e4),
             tracking_error_m: 0.25,
             joint_tracking_error_rad: 0.2,
             joint_torque_nm: all(80.0),
@@ -108,6 +112,9 @@ fn config<const N: usize>(
             stiffness_n_per_m: 1000.0,
             damping_n_s_per_m: 100.0,
         },
+        collision: Collision::never(),
+        plausible: Plausible::anything(),
+        workspace: Workspace::UNBOUNDED,
     }
 }
 
@@ -124,14 +131,36 @@ pub fn rate_limited<const N: usize>(
     last_nm: &Vector<N>,
     wanted_nm: &Vector<N>,
 ) -> Vector<N> {
+    reached(
+        &(config.limits.torque_rate_nm_per_s * config.period_s),
+        last_nm,
+        wanted_nm,
+    )
+}
+
+/// The same in a fault, where a joint's whole torque may go in 5 ms.
+pub fn stop_limited<const N: usize>(
+    config: &Config<N>,
+    last_nm: &Vector<N>,
+    wanted_nm: &Vector<N>,
+) -> Vector<N> {
+    let fast = config.limits.joint_torque_nm / 5e-3;
+    let rate = fast.sup(&config.limits.torque_rate_nm_per_s);
+    reached(&(rate * config.period_s), last_nm, wanted_nm)
+}
+
+fn reached<const N: usize>(
+    greatest_nm: &Vector<N>,
+    last_nm: &Vector<N>,
+    wanted_nm: &Vector<N>,
+) -> Vector<N> {
     let way = wanted_nm - last_nm;
     let groups = motor_groups::<N>();
     Vector::from_fn(|i, _| {
         let share = (0..N)
             .filter(|j| groups[*j] == groups[i])
             .fold(1.0, |share: f64, j| {
-                let greatest = config.limits.torque_rate_nm_per_s[j] * config.period_s;
-                share.min(greatest / way[j].abs())
+                share.min(greatest_nm[j] / way[j].abs())
             });
         last_nm[i] + way[i] * share
     })

@@ -17,6 +17,8 @@ pub struct Rig<const N: usize> {
     pub q: Vector<N>,
     /// What the force sensor says.
     pub force_n: Option<Vector3<f64>>,
+    /// The drives take torques.
+    pub drives_active: bool,
 }
 
 impl<const N: usize> Rig<N> {
@@ -29,6 +31,7 @@ impl<const N: usize> Rig<N> {
             cycle: 1000,
             q,
             force_n: None,
+            drives_active: true,
         }
     }
 
@@ -46,6 +49,7 @@ impl<const N: usize> Rig<N> {
             cycle: self.cycle,
             position_rad: std::array::from_fn(|i| Some(self.q[i])),
             tip_force_n: self.force_n,
+            drives_active: self.drives_active,
             request: None,
         }
     }

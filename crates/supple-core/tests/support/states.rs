@@ -70,6 +70,7 @@ impl<const N: usize> Scene<N> {
         tip_force_n: Option<Vector3<f64>>,
     ) -> Torques<N> {
         let now = Situation {
+            spring_limit_n: f64::MAX,
             reference: &self.reference,
             velocity_rad_per_s: &self.qd,
             gains: &self.gains,

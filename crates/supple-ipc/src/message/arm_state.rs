@@ -97,6 +97,7 @@ impl ArmState {
             cycle: self.cycle,
             position_rad: core::array::from_fn(|i| present(i).then_some(self.position_rad[i])),
             tip_force_n: (self.has_tip_force != 0).then(|| Vector3::from(self.tip_force_n)),
+            drives_active: self.drives() == Drives::Active,
             request,
         })
     }

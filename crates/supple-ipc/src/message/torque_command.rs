@@ -37,7 +37,6 @@ pub struct TorqueCommand {
 impl TorqueCommand {
     /// The answer that is the output of a step. `leaving` where the controller is about to end.
     pub fn new<const N: usize>(output: &Output<N>, leaving: bool) -> TorqueCommand {
-        let safe_action = output.fault.map(|fault| fault.safe_action());
         let drives = if output.limp || leaving {
             Drives::Idle
         } else {
@@ -50,7 +49,7 @@ impl TorqueCommand {
             dof: N as u8,
             mode: output.mode as u8,
             fault: codes::FaultCode::new(output.fault.as_ref()).kind,
-            safe_action: codes::safe_action(safe_action),
+            safe_action: codes::safe_action(output.safe_action),
             drives: drives as u8,
             reserved: [0; 3],
         }

@@ -64,6 +64,7 @@ pub fn run(steps: u64, mut watch: impl FnMut(&Cycle)) {
             cycle: k,
             position_rad: core::array::from_fn(|i| answers(k, i).then_some(q[i])),
             tip_force_n: (k >= 600).then(|| Vector3::new(0.1 * k as f64, -0.3, 1.0 / 3.0)),
+            drives_active: true,
             request: request(k, &home, tip),
         };
         let output = step(&controller, &mut state, &input);

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
 use supple_core::Config;
-use supple_ipc::message::{MAX_DOF, Telemetry};
+use supple_ipc::message::{Drives, MAX_DOF, Telemetry};
 use supple_log::{CycleTiming, Extras, Record, RunInfo, TorqueTerms, Writer};
 use supple_model::Description;
 
@@ -166,5 +166,6 @@ fn record<const N: usize>(t: &Telemetry) -> Record<N> {
         fault_text: t.fault_text.to_string(),
         refusal: t.refusal,
         refusal_text: t.refusal_text.to_string(),
+        drives_active: t.state.drives() == Drives::Active,
     }
 }

@@ -1,0 +1,158 @@
+//! Whether a motion can be carried out over its whole length: reach, joint stops, joint speeds, torques, and the
+//! borders of the workspace. Not for the control loop: it takes some milliseconds.
+
+use super::Controller;
+use super::mode::{Refusal, Request};
+use crate::config::{Config, Role};
+use crate::dynamics::{Terms, terms};
+use crate::impedance::Task;
+use crate::math::{Vector, abs, smooth_step};
+use crate::reach::reach;
+use crate::trajectory::{JointReference, Trajectory};
+
+/// Points at which a motion is looked at.
+const POINTS: u32 = 128;
+/// Distance from a point of a trajectory that counts as reached \[m\].
+const REACHED_M: f64 = 1e-3;
+/// Share of the torque limits that a motion may plan with; the rest is for feedback.
+const PLANNED_SHARE: f64 = 0.9;
+
+/// Looks along the motion that is asked for, from the pose that the arm is in. Requests without a motion pass.
+///
+/// # Errors
+/// The first [`Refusal`] on the way.
+pub fn plan<const N: usize>(
+    controller: &Controller<N>,
+    position_rad: &Vector<N>,
+    request: &Request<N>,
+) -> Result<(), Refusal> {
+    let config = controller.config();
+    match request {
+        Request::Track(trajectory) => {
+            trajectory.validate().map_err(Refusal::Trajectory)?;
+            along_trajectory(config, position_rad, trajectory)
+        }
+        Request::Move {
+            target_rad,
+            duration_s,
+        } => {
+            let way = target_rad - position_rad;
+            along(config, *duration_s, |time_s| {
+                let (x, rate, rate_rate) = smooth_step(time_s / duration_s);
+                JointReference {
+                    position_rad: position_rad + way * x,
+                    velocity_rad_per_s: way * (rate / duration_s),
+                    acceleration_rad_per_s2: way * (rate_rate / (duration_s * duration_s)),
+                }
+            })
+        }
+        Request::Excite(series) => along(config, series.duration_s, |time_s| series.at(time_s)),
+        _ => Ok(()),
+    }
+}
+
+fn along_trajectory<const N: usize>(
+    config: &Config<N>,
+    from_rad: &Vector<N>,
+    trajectory: &Trajectory,
+) -> Result<(), Refusal> {
+    let mut seed = *from_rad;
+    let length_s = trajectory.length_s();
+    for k in 0..=POINTS {
+        let time_s = length_s * f64::from(k) / f64::from(POINTS);
+        let reference = trajectory.at(time_s);
+        if let Some((border, value_m)) = config.workspace.beyond(&reference.position) {
+            return Err(Refusal::Workspace { border, value_m });
+        }
+        let found = reach(
+            &config.arm,
+            &config.roles,
+            &config.limits,
+            &seed,
+            &reference.position,
+        );
+        if found.distance_m > REACHED_M {
+            return Err(Refusal::OutOfReach {
+                time_s,
+                distance_m: found.distance_m,
+            });
+        }
+        seed = found.position_rad;
+        let mut state = Terms::default();
+        terms(&config.arm, &seed, &Vector::zeros(), &mut state);
+        let Some(task) = Task::new(&state, &config.roles) else {
+            continue;
+        };
+        let velocity = task.inverse * reference.velocity;
+        terms(&config.arm, &seed, &velocity, &mut state);
+        let drift = state.jacobian_dot_qd.fixed_rows::<3>(0);
+        let acceleration = task.inverse * (reference.acceleration - drift);
+        joints(config, &state, &velocity, &acceleration)?;
+    }
+    Ok(())
+}
+
+fn along<const N: usize>(
+    config: &Config<N>,
+    length_s: f64,
+    at: impl Fn(f64) -> JointReference<N>,
+) -> Result<(), Refusal> {
+    let mut state = Terms::default();
+    for k in 0..=POINTS {
+        let reference = at(length_s * f64::from(k) / f64::from(POINTS));
+        let (q, qd) = (reference.position_rad, reference.velocity_rad_per_s);
+        terms(&config.arm, &q, &qd, &mut state);
+        let tip = state.base_from_tip.translation;
+        if k > 0
+            && let Some((border, value_m)) = config.workspace.beyond(&tip)
+        {
+            return Err(Refusal::Workspace { border, value_m });
+        }
+        let tip_velocity = state.jacobian.fixed_rows::<3>(0) * qd;
+        let (value, limit) = (tip_velocity.norm(), config.limits.tip_speed_m_per_s);
+        if value > limit {
+            return Err(Refusal::Value {
+                entry: "greatest tip speed of the motion [m/s]",
+                value,
+                limit,
+            });
+        }
+        joints(config, &state, &qd, &reference.acceleration_rad_per_s2)?;
+    }
+    Ok(())
+}
+
+/// Speeds and torques of a point.
+fn joints<const N: usize>(
+    config: &Config<N>,
+    state: &Terms<N>,
+    velocity: &Vector<N>,
+    acceleration: &Vector<N>,
+) -> Result<(), Refusal> {
+    let torque = state.coriolis_gravity + state.mass_matrix * acceleration;
+    for joint in 0..N {
+        let limit_rad_per_s = config.limits.joint_speed_rad_per_s[joint];
+        let value_rad_per_s = abs(velocity[joint]);
+        if value_rad_per_s > limit_rad_per_s {
+            return Err(Refusal::TooFast {
+                joint,
+                value_rad_per_s,
+                limit_rad_per_s,
+            });
+        }
+        if config.roles[joint] != Role::Active && velocity[joint] == 0.0 {
+            continue;
+        }
+        let friction = config.friction[joint].torque_nm(velocity[joint]);
+        let limit_nm = PLANNED_SHARE * config.limits.joint_torque_nm[joint];
+        let value_nm = abs(torque[joint] + friction);
+        if value_nm > limit_nm {
+            return Err(Refusal::TooMuchTorque {
+                joint,
+                value_nm,
+                limit_nm,
+            });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,315 @@
+//! How a request changes what the controller is busy with, and why it may not.
+//!
+//! What is looked at here takes no longer than a cycle allows; the whole length of a motion is looked at by
+//! [`super::plan()`], before it is asked for.
+
+use super::Controller;
+use super::activity::Activity;
+use super::fault::SafeAction;
+use super::mode::{Breakaway, Mode, Refusal, Request};
+use super::state::{GainRamp, State};
+use super::validate;
+use crate::config::{Config, Gains, Role};
+use crate::impedance::Task;
+use crate::linalg::Cholesky;
+use crate::math::{Matrix3, Vector, abs, sqrt};
+use crate::trajectory::{
+    Beyond, Fourier, MINIMUM_JERK_ACCELERATION, MINIMUM_JERK_JERK, MINIMUM_JERK_SPEED, Trajectory,
+};
+
+/// Angle by which the target of a held joint may differ from its own \[rad\].
+const HELD_TOLERANCE_RAD: f64 = 1e-6;
+/// Greatest distance of a joint from the start of an excitation \[rad\].
+const EXCITE_START_RAD: f64 = 0.02;
+/// Longest ramp of gains \[s\].
+const LONGEST_RAMP_S: f64 = 3600.0;
+/// A damping acts on what is a delay old: with `B delay / mass` at most this, half of what would make it ring up,
+/// it takes energy.
+const DAMPING_MARGIN: f64 = core::f64::consts::FRAC_PI_4;
+
+impl<const N: usize> State<N> {
+    /// Carries out a request, or says why not.
+    pub(super) fn request(
+        &mut self,
+        controller: &Controller<N>,
+        task: Option<&Task<N>>,
+        request: &Request<N>,
+    ) -> Result<(), Refusal> {
+        let config = controller.config();
+        let mode = self.mode();
+        let working = !matches!(mode, Mode::Idle | Mode::Fault);
+        match *request {
+            Request::Reset => {
+                let Activity::Fault(action) = self.activity else {
+                    return Err(Refusal::Mode { mode });
+                };
+                self.fault = None;
+                self.enter(match action {
+                    SafeAction::GravityHold => Activity::GravityHold,
+                    SafeAction::Idle => Activity::Idle,
+                });
+            }
+            Request::Gains { gains, ramp_s } => {
+                check_gains(config, &gains, ramp_s)?;
+                self.check_damping(controller, task, &gains)?;
+                self.set_gains(gains, ramp_s);
+            }
+            // The fault stays latched, but nobody has to reset it to let go of the arm.
+            Request::Idle if mode == Mode::Fault => self.enter(Activity::Fault(SafeAction::Idle)),
+            _ if mode == Mode::Fault => return Err(Refusal::Mode { mode }),
+            Request::Idle => self.enter(Activity::Idle),
+            Request::GravityHold => self.enter(Activity::GravityHold),
+            _ if !working => return Err(Refusal::Mode { mode }),
+            _ if !self.drives_active => return Err(Refusal::DrivesIdle),
+            Request::Move {
+                target_rad,
+                duration_s,
+            } => {
+                check_move(config, &self.position, &target_rad, duration_s)?;
+                self.enter(Activity::Move {
+                    from_rad: self.position,
+                    to_rad: target_rad,
+                    duration_s,
+                });
+            }
+            Request::Track(trajectory) => {
+                trajectory.validate().map_err(Refusal::Trajectory)?;
+                check_peak(config, &trajectory)?;
+                self.check_damping(controller, task, &self.gains.to)?;
+                let way = trajectory.at(0.0).position - self.terms.base_from_tip.translation;
+                let (distance_m, limit_m) = (sqrt(way.dot(&way)), config.limits.start_error_m);
+                if distance_m > limit_m || distance_m.is_nan() {
+                    return Err(Refusal::FarFromStart {
+                        distance_m,
+                        limit_m,
+                    });
+                }
+                self.enter(Activity::Track(trajectory));
+            }
+            Request::Excite(series) => {
+                check_excitation(config, &self.position, &series)?;
+                self.enter(Activity::Excite(series));
+            }
+            Request::Breakaway(ramp) => {
+                check_breakaway(config, &ramp)?;
+                let from_rad = self.position;
+                self.enter(Activity::Breakaway { ramp, from_rad });
+            }
+        }
+        Ok(())
+    }
+
+    fn set_gains(&mut self, gains: Gains, ramp_s: f64) {
+        self.gains = GainRamp {
+            from: self.gains.now(),
+            to: gains,
+            elapsed_s: 0.0,
+            ramp_s,
+        };
+    }
+
+    /// Refuses damping that would excite the arm through the delay of the loop, at the pose that it is in.
+    fn check_damping(
+        &self,
+        controller: &Controller<N>,
+        task: Option<&Task<N>>,
+        gains: &Gains,
+    ) -> Result<(), Refusal> {
+        let Some(task) = task else {
+            return Ok(());
+        };
+        let Some(mass) = Cholesky::new(&self.terms.mass_matrix) else {
+            return Ok(());
+        };
+        let mobility = task.jacobian * mass.solve(&task.jacobian.transpose());
+        let root = Matrix3::from_diagonal(&gains.damping_n_s_per_m.map(sqrt));
+        // No less than the fastest rate at which the damping takes velocity away, and no more than sqrt(3) of it.
+        let rate_per_s = sqrt((root * mobility * root).norm_squared());
+        let share = rate_per_s * controller.delay_s() / DAMPING_MARGIN;
+        if share > 1.0 {
+            let value = gains.damping_n_s_per_m.max();
+            let limit = value / share;
+            let entry = "damping_n_s_per_m with the delay of this loop";
+            return Err(Refusal::Value {
+                entry,
+                value,
+                limit,
+            });
+        }
+        Ok(())
+    }
+}
+
+fn check_gains<const N: usize>(
+    config: &Config<N>,
+    gains: &Gains,
+    ramp_s: f64,
+) -> Result<(), Refusal> {
+    let limits = &config.limits;
+    validate::gains(gains, limits.stiffness_n_per_m, limits.damping_n_s_per_m).map_err(
+        |error| Refusal::Value {
+            entry: error.entry,
+            value: error.value,
+            limit: if error.entry == "stiffness_n_per_m" {
+                limits.stiffness_n_per_m
+            } else {
+                limits.damping_n_s_per_m
+            },
+        },
+    )?;
+    if (0.0..=LONGEST_RAMP_S).contains(&ramp_s) {
+        return Ok(());
+    }
+    Err(Refusal::Value {
+        entry: "ramp_s",
+        value: ramp_s,
+        limit: if ramp_s > 0.0 { LONGEST_RAMP_S } else { 0.0 },
+    })
+}
+
+fn check_peak<const N: usize>(config: &Config<N>, trajectory: &Trajectory) -> Result<(), Refusal> {
+    let (speed, acceleration) = trajectory.peaks();
+    for (entry, value, limit) in [
+        (
+            "greatest speed of the trajectory [m/s]",
+            speed,
+            config.limits.tip_speed_m_per_s,
+        ),
+        (
+            "greatest acceleration of the trajectory [m/s^2]",
+            acceleration,
+            config.limits.tip_acceleration_m_per_s2,
+        ),
+    ] {
+        if value > limit || value.is_nan() {
+            return Err(Refusal::Value {
+                entry,
+                value,
+                limit,
+            });
+        }
+    }
+    Ok(())
+}
+
+fn check_excitation<const N: usize>(
+    config: &Config<N>,
+    from_rad: &Vector<N>,
+    series: &Fourier<N>,
+) -> Result<(), Refusal> {
+    series.validate().map_err(Refusal::Trajectory)?;
+    series
+        .within(&config.limits)
+        .map_err(|beyond| match beyond {
+            Beyond::Position(joint, value_rad) => Refusal::Unreachable { joint, value_rad },
+            Beyond::Speed(joint, value_rad_per_s, limit_rad_per_s) => Refusal::TooFast {
+                joint,
+                value_rad_per_s,
+                limit_rad_per_s,
+            },
+        })?;
+    let start = series.at(0.0).position_rad;
+    let value = (start - from_rad).amax();
+    if value <= EXCITE_START_RAD {
+        return Ok(());
+    }
+    Err(Refusal::Value {
+        entry: "distance of a joint from the start of the excitation",
+        value,
+        limit: EXCITE_START_RAD,
+    })
+}
+
+fn check_breakaway<const N: usize>(config: &Config<N>, ramp: &Breakaway) -> Result<(), Refusal> {
+    let refuse = |entry, value, limit| {
+        Err(Refusal::Value {
+            entry,
+            value,
+            limit,
+        })
+    };
+    if ramp.joint >= N {
+        return refuse("joint", ramp.joint as f64, (N - 1) as f64);
+    }
+    let fastest = config.limits.torque_rate_nm_per_s[ramp.joint];
+    let rate = abs(ramp.rate_nm_per_s);
+    if !(rate > 0.0 && rate <= fastest) {
+        return refuse("rate_nm_per_s", ramp.rate_nm_per_s, fastest);
+    }
+    let furthest = config.limits.joint_tracking_error_rad;
+    if !(ramp.stop_rad > 0.0 && ramp.stop_rad <= furthest) {
+        return refuse("stop_rad", ramp.stop_rad, furthest);
+    }
+    let strongest = config.limits.joint_torque_nm[ramp.joint];
+    if !(ramp.limit_nm > 0.0 && ramp.limit_nm <= strongest) {
+        return refuse("limit_nm", ramp.limit_nm, strongest);
+    }
+    Ok(())
+}
+
+fn check_move<const N: usize>(
+    config: &Config<N>,
+    from_rad: &Vector<N>,
+    to_rad: &Vector<N>,
+    duration_s: f64,
+) -> Result<(), Refusal> {
+    let limits = &config.limits;
+    if !(duration_s.is_finite() && duration_s > 0.0) {
+        return Err(Refusal::Value {
+            entry: "duration_s",
+            value: duration_s,
+            limit: f64::MAX,
+        });
+    }
+    for joint in 0..N {
+        let value_rad = to_rad[joint];
+        let (lower, upper) = (
+            limits.position_lower_rad[joint],
+            limits.position_upper_rad[joint],
+        );
+        if !(lower..=upper).contains(&value_rad) {
+            return Err(Refusal::Unreachable { joint, value_rad });
+        }
+        if let Role::Held { position_rad, .. } = config.roles[joint]
+            && abs(value_rad - position_rad) > HELD_TOLERANCE_RAD
+        {
+            return Err(Refusal::Value {
+                entry: "target_rad of a held joint",
+                value: value_rad,
+                limit: position_rad,
+            });
+        }
+        let value_rad_per_s = MINIMUM_JERK_SPEED * abs(value_rad - from_rad[joint]) / duration_s;
+        let limit_rad_per_s = limits.joint_speed_rad_per_s[joint];
+        if value_rad_per_s > limit_rad_per_s || value_rad_per_s.is_nan() {
+            return Err(Refusal::TooFast {
+                joint,
+                value_rad_per_s,
+                limit_rad_per_s,
+            });
+        }
+        let way_rad = abs(value_rad - from_rad[joint]);
+        let per_s2 = way_rad / (duration_s * duration_s);
+        for (entry, value, limit) in [
+            (
+                "greatest joint acceleration of the move [rad/s^2]",
+                MINIMUM_JERK_ACCELERATION * per_s2,
+                limits.joint_acceleration_rad_per_s2[joint],
+            ),
+            (
+                "greatest joint jerk of the move [rad/s^3]",
+                MINIMUM_JERK_JERK * per_s2 / duration_s,
+                limits.joint_jerk_rad_per_s3[joint],
+            ),
+        ] {
+            if value > limit || value.is_nan() {
+                return Err(Refusal::Value {
+                    entry,
+                    value,
+                    limit,
+                });
+            }
+        }
+    }
+    Ok(())
+}
