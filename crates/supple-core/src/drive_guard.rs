@@ -7,7 +7,7 @@
 //! - torque and torque rate are limited again;
 //! - drives come to life in gravity hold alone;
 //! - a joint that is twice as fast as it may be ends torque;
-//! - in a fault, a joint that still moves after 0.35 s, or that gathers speed, ends torque.
+//! - in a fault, a joint that still moves after 0.25 s, or that gathers speed, ends torque.
 //!
 //! Ended torque stays ended until the controller wants none: [`DriveGuard::judge`] then says so again.
 
@@ -22,7 +22,7 @@ const OVERSPEED: f64 = 2.0;
 /// Share of a joint's speed limit above which it moves.
 const MOVING_SHARE: f64 = 0.25;
 /// Time after a fault from which nothing may move any more \[s\]: a little more than the controller gives itself.
-const STOPPED_AFTER_S: f64 = 0.35;
+const STOPPED_AFTER_S: f64 = 0.25;
 /// Time after a fault in which a joint's speed is taken for what it had before it \[s\].
 const SETTLES_S: f64 = 0.02;
 /// Speed over that before the fault from which a joint gathers speed.

@@ -137,7 +137,7 @@ fn an_arm_that_does_not_stop_in_a_fault_is_braked() {
         fault: 6,
         ..hold
     };
-    for (speed_rad_per_s, command, within) in [(1.0, fault, 351..=400), (9.0, hold, 1..=40)] {
+    for (speed_rad_per_s, command, within) in [(1.0, fault, 251..=300), (9.0, hold, 1..=40)] {
         let mut motors = motors();
         let mut angles = home();
         for _ in 0..100 {

@@ -75,6 +75,11 @@ impl<const N: usize> Plausibility<N> {
         Ok(())
     }
 
+    /// The encoder of a joint said in this cycle what it had said before.
+    pub fn stands_still(&self, joint: usize) -> bool {
+        self.still[joint]
+    }
+
     /// What another activity asked of the joints says nothing of this one.
     pub fn begin(&mut self) {
         self.travel_rad = [0.0; N];

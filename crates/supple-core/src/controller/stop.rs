@@ -17,12 +17,16 @@
 //! **It gives way to braking** (no torque, drives that short their motors) where the arm does not come to rest:
 //! because an encoder, a motor or the model is not what it is taken for. Moving is faster than a fifth of a joint's
 //! or of the tip's speed limit. An arm that moves with more kinetic energy than it had before the fault, by a
-//! quarter, brakes from then on; an arm that still moves 0.3 s after the fault brakes too.
+//! quarter, brakes from then on; an arm that still moves 0.2 s after the fault brakes too. So does one that bears,
+//! for 50 ms, an external torque of a tenth of a joint's limit, 0.15 s after the fault or at a joint whose encoder says
+//! the same angle again and again; and one with such an encoder on a joint that moved before the fault: it may be
+//! stuck. (A joint that is slowed with `t_s` shows motion for ten times that long.)
 
 use super::Controller;
 use super::activity::Activity;
 use super::fault::SafeAction;
 use super::state::State;
+use crate::config::Config;
 use crate::impedance::Torques;
 use crate::math::{Vector, Vector3, abs};
 
@@ -33,11 +37,17 @@ const SETTLES_OVER_DELAY: f64 = 2.0;
 /// Share of a speed limit above which a joint or the tip moves.
 pub(crate) const MOVING_SHARE: f64 = 0.2;
 /// Time after which nothing moves any more \[s\].
-pub(crate) const STOPPED_AFTER_S: f64 = 0.3;
+pub(crate) const STOPPED_AFTER_S: f64 = 0.2;
 /// Kinetic energy over that before the fault from which the arm gathers speed.
 pub(crate) const GATHERS: f64 = 1.25;
-/// Time in which the kinetic energy that the arm had is forgotten \[s\].
-const ENERGY_MEMORY_S: f64 = 0.2;
+/// Share of a joint's torque limit that does not go unnoticed by a joint that stands still.
+const UNEXPLAINED_SHARE: f64 = 0.1;
+/// Time for which such a torque may act, or such a joint be still \[s\].
+const UNEXPLAINED_S: f64 = 0.05;
+/// Time after which an impact, and what the observer makes of it, is over \[s\].
+const IMPACT_S: f64 = 0.15;
+/// Time in which the motion that the arm had is forgotten \[s\].
+const MEMORY_S: f64 = 0.2;
 
 impl<const N: usize> State<N> {
     /// Gravity, and what takes the momentum away within the limits.
@@ -69,8 +79,12 @@ impl<const N: usize> State<N> {
         let energy_j = 0.5 * self.terms.momentum.dot(velocity);
         let config = controller.config();
         if !matches!(self.activity, Activity::Fault(SafeAction::GravityHold)) {
-            let kept = (1.0 - elapsed_s / ENERGY_MEMORY_S).max(0.0);
+            let kept = (1.0 - elapsed_s / MEMORY_S).max(0.0);
             self.energy_j = energy_j.max(self.energy_j * kept);
+            for joint in 0..N {
+                let speed = abs(velocity[joint]);
+                self.speed_rad_per_s[joint] = speed.max(self.speed_rad_per_s[joint] * kept);
+            }
             return;
         }
         if self.activity_s(config) <= SETTLES_OVER_DELAY * controller.delay_s() {
@@ -84,10 +98,33 @@ impl<const N: usize> State<N> {
         for joint in 0..N {
             moving |= abs(velocity[joint]) > MOVING_SHARE * limits.joint_speed_rad_per_s[joint];
         }
-        let late = self.activity_s(config) > STOPPED_AFTER_S;
-        if moving && (late || energy_j > GATHERS * self.energy_j) {
+        let time_s = self.activity_s(config);
+        let late = time_s > STOPPED_AFTER_S;
+        let gathers = energy_j > GATHERS * self.energy_j;
+        self.unexplained_s = if self.is_unexplained(config) {
+            self.unexplained_s + elapsed_s
+        } else {
+            0.0
+        };
+        if moving && (late || gathers) || self.unexplained_s > UNEXPLAINED_S {
             self.activity = Activity::Fault(SafeAction::Idle);
         }
+    }
+
+    /// A joint whose encoder says the same angle again has moved of late, or bears a torque that would move it; or
+    /// a joint bears such a torque when an impact is long over.
+    fn is_unexplained(&self, config: &Config<N>) -> bool {
+        let external_nm = self.observer.external_torque_nm();
+        let limits = &config.limits;
+        let settled = self.activity_s(config) > IMPACT_S;
+        (0..N).any(|joint| {
+            let torque_nm = abs(external_nm[joint]);
+            let strong = UNEXPLAINED_SHARE * limits.joint_torque_nm[joint];
+            let moving = MOVING_SHARE * limits.joint_speed_rad_per_s[joint];
+            let moved = self.speed_rad_per_s[joint] > moving;
+            let still = self.plausibility.stands_still(joint);
+            torque_nm > strong && (still || settled) || still && moved
+        })
     }
 }
 

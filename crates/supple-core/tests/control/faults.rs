@@ -3,7 +3,7 @@
 
 use crate::support::configs::{four, stop_limited, three, unlimited};
 use crate::support::rig::{Rig, bent};
-use supple_core::config::{Gains, Role};
+use supple_core::config::Gains;
 use supple_core::controller::{Fault, Mode, Request, SafeAction, limit_torque};
 use supple_core::dynamics::gravity;
 use supple_core::math::{Matrix3, Vector3};

@@ -26,3 +26,4 @@ mod observing;
 mod refusals;
 mod settings;
 mod stiffness;
+mod stopping;
