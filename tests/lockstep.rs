@@ -66,7 +66,10 @@ fn over_shared_memory(folder: &Path) -> Vec<Telemetry> {
     let world = thread::spawn(move || {
         let config = plant();
         let home = description().home().expect("four joints");
-        let motors = Motors::new(config.cycle_s);
+        let motors = Motors::new(
+            config.cycle_s,
+            supple_core::drive_guard::DriveGuard::new(&description().config().expect("sound")),
+        );
         let link = PlantLink::new(&of_plant).expect("a plant");
         let plant = Plant::new(config, home, Vector::zeros()).expect("sound");
         World::new(plant, motors, link).run_in_virtual_time(Some(CYCLES), &Stop::default())

@@ -3,7 +3,7 @@
 //! | finding | how |
 //! |---|---|
 //! | replies lost too often | each loss weighs eight replies; too many losses on balance |
-//! | encoder stuck | the very same angle while the joint's reference moves on, out of contact |
+//! | encoder stuck | the very same angle while the joint's reference moves on, out of contact; or from one cycle to the next, of a joint that moved |
 //! | moves against its torque | 20 cycles in which a joint's momentum grows against what drives it |
 //! | unmodelled load | a force along gravity for 50 ms, in gravity hold or where a move has ended |
 //! | collision | the observed external torque or force is beyond its threshold |
@@ -11,10 +11,14 @@
 use super::activity::Activity;
 use super::fault::Fault;
 use super::state::State;
+use super::stop::MOVING_SHARE;
 use crate::config::{Collision, Config, Plausible};
 use crate::math::{Vector, Vector3, abs, sqrt};
 
 const LOSS_WEIGHT: u32 = 8;
+/// Way that a moving joint would have gone on since its encoder last changed, over the travel of a reference that
+/// counts as one: 0.02 rad for 0.1 rad.
+const HALTED_SHARE: f64 = 0.2;
 const AGAINST_CYCLES: u32 = 20;
 const LOAD_S: f64 = 0.05;
 /// Share of the force along gravity that may act across it.
@@ -27,6 +31,9 @@ pub(super) struct Plausibility<const N: usize> {
     last_measured: [Option<f64>; N],
     /// The encoder said in this cycle what it had said before.
     still: [bool; N],
+    /// Speed of the joint when the encoder last changed \[rad/s\], and time since then \[s\].
+    speed_rad_per_s: [f64; N],
+    still_s: [f64; N],
     /// How far the reference has moved since the encoder last changed \[rad\].
     travel_rad: [f64; N],
     against: [u32; N],
@@ -40,6 +47,8 @@ impl<const N: usize> Default for Plausibility<N> {
             losses: [0; N],
             last_measured: [None; N],
             still: [false; N],
+            speed_rad_per_s: [0.0; N],
+            still_s: [0.0; N],
             travel_rad: [0.0; N],
             against: [0; N],
             last_momentum: Vector::zeros(),
@@ -85,6 +94,33 @@ impl<const N: usize> Plausibility<N> {
         self.travel_rad = [0.0; N];
         self.against = [0; N];
         self.load_s = 0.0;
+    }
+
+    /// A joint that moved does not come to rest from one cycle to the next.
+    fn halted(
+        &mut self,
+        limit_rad: f64,
+        velocity_rad_per_s: &Vector<N>,
+        moving_rad_per_s: &Vector<N>,
+        elapsed_s: f64,
+    ) -> Result<(), Fault> {
+        for joint in 0..N {
+            if !self.still[joint] {
+                self.speed_rad_per_s[joint] = abs(velocity_rad_per_s[joint]);
+                self.still_s[joint] = 0.0;
+                continue;
+            }
+            self.still_s[joint] += elapsed_s;
+            let value_rad = self.speed_rad_per_s[joint] * self.still_s[joint];
+            if self.speed_rad_per_s[joint] > moving_rad_per_s[joint] && value_rad > limit_rad {
+                return Err(Fault::EncoderStuck {
+                    joint,
+                    value_rad,
+                    limit_rad,
+                });
+            }
+        }
+        Ok(())
     }
 
     fn stuck(
@@ -190,6 +226,10 @@ impl<const N: usize> State<N> {
         };
         let seen = &mut self.plausibility;
         if evidence.elapsed_s > 0.0 {
+            let halted_rad = HALTED_SHARE * config.plausible.stuck_rad;
+            let moving = config.limits.joint_speed_rad_per_s * MOVING_SHARE;
+            let velocity = &self.estimator.velocity_rad_per_s;
+            seen.halted(halted_rad, velocity, &moving, evidence.elapsed_s)?;
             let limits = config.limits.joint_torque_nm * config.plausible.against_share;
             let against = seen.against(&self.terms.momentum, evidence.drive_nm, &limits);
             // What stops the arm takes no notice of what throws it back; `stop.rs` sees whether it stops.

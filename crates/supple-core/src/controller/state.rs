@@ -79,8 +79,6 @@ pub struct State<const N: usize> {
     pub(super) plausibility: Plausibility<N>,
     /// Greatest kinetic energy of late; in a fault, before it \[J\].
     pub(super) energy_j: f64,
-    /// Greatest speed of each joint of late; in a fault, before it \[rad/s\].
-    pub(super) speed_rad_per_s: Vector<N>,
     /// How long, in a fault, a torque has acted that nothing explains \[s\].
     pub(super) unexplained_s: f64,
 }
@@ -115,7 +113,6 @@ impl<const N: usize> State<N> {
             drives_active: false,
             plausibility: Plausibility::default(),
             energy_j: 0.0,
-            speed_rad_per_s: Vector::zeros(),
             unexplained_s: 0.0,
         }
     }

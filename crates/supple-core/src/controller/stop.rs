@@ -19,8 +19,7 @@
 //! or of the tip's speed limit. An arm that moves with more kinetic energy than it had before the fault, by a
 //! quarter, brakes from then on; an arm that still moves 0.2 s after the fault brakes too. So does one that bears,
 //! for 50 ms, an external torque of a tenth of a joint's limit, 0.15 s after the fault or at a joint whose encoder says
-//! the same angle again and again; and one with such an encoder on a joint that moved before the fault: it may be
-//! stuck. (A joint that is slowed with `t_s` shows motion for ten times that long.)
+//! the same angle again and again: it may be stuck.
 
 use super::Controller;
 use super::activity::Activity;
@@ -81,10 +80,6 @@ impl<const N: usize> State<N> {
         if !matches!(self.activity, Activity::Fault(SafeAction::GravityHold)) {
             let kept = (1.0 - elapsed_s / MEMORY_S).max(0.0);
             self.energy_j = energy_j.max(self.energy_j * kept);
-            for joint in 0..N {
-                let speed = abs(velocity[joint]);
-                self.speed_rad_per_s[joint] = speed.max(self.speed_rad_per_s[joint] * kept);
-            }
             return;
         }
         if self.activity_s(config) <= SETTLES_OVER_DELAY * controller.delay_s() {
@@ -111,8 +106,8 @@ impl<const N: usize> State<N> {
         }
     }
 
-    /// A joint whose encoder says the same angle again has moved of late, or bears a torque that would move it; or
-    /// a joint bears such a torque when an impact is long over.
+    /// A joint whose encoder says the same angle again bears a torque that would move it; or any joint bears such a
+    /// torque when an impact is long over.
     fn is_unexplained(&self, config: &Config<N>) -> bool {
         let external_nm = self.observer.external_torque_nm();
         let limits = &config.limits;
@@ -120,10 +115,7 @@ impl<const N: usize> State<N> {
         (0..N).any(|joint| {
             let torque_nm = abs(external_nm[joint]);
             let strong = UNEXPLAINED_SHARE * limits.joint_torque_nm[joint];
-            let moving = MOVING_SHARE * limits.joint_speed_rad_per_s[joint];
-            let moved = self.speed_rad_per_s[joint] > moving;
-            let still = self.plausibility.stands_still(joint);
-            torque_nm > strong && (still || settled) || still && moved
+            torque_nm > strong && (settled || self.plausibility.stands_still(joint))
         })
     }
 }
