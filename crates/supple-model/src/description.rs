@@ -11,6 +11,9 @@ use std::path::Path;
 use supple_core::Friction;
 use urdf_rs::Robot;
 
+/// Longest URDF or TOML that is read \[bytes\]: a hundred times that of any arm.
+const MOST_BYTES: u64 = 16 << 20;
+
 /// An arm, read from a URDF and a TOML. It exists only if both are sound.
 #[derive(Clone, Debug)]
 pub struct Description {
@@ -268,7 +271,7 @@ impl Description {
 }
 
 fn read(path: &Path, remedy: &'static str) -> Result<String, ModelError> {
-    std::fs::read_to_string(path).map_err(|error| ModelError::Read {
+    supple_files::read_text(path, MOST_BYTES).map_err(|error| ModelError::Read {
         file: path.display().to_string(),
         error,
         remedy,

@@ -16,7 +16,9 @@ pub enum ModelError {
         remedy: &'static str,
     },
     /// A file that cannot be written.
-    #[error("{file}: cannot be written: {error}; choose a folder that can be")]
+    #[error(
+        "{file}: cannot be written: {error}; name a folder in which it can be, as a regular file"
+    )]
     Write {
         /// Path.
         file: String,

@@ -29,12 +29,13 @@ pub struct TraceFile {
 }
 
 impl TraceFile {
-    /// A new file with its head line, for an arm of `joints` motors.
+    /// A new file with its head line, for an arm of `joints` motors. A device, FIFO, socket or folder of that
+    /// name is refused.
     ///
     /// # Errors
     /// [`TraceError`].
     pub fn create(path: &Path, joints: usize) -> Result<TraceFile, TraceError> {
-        let file = File::create(path).map_err(|source| TraceError {
+        let file = supple_files::create_output(path).map_err(|source| TraceError {
             file: path.to_owned(),
             source,
         })?;

@@ -16,7 +16,7 @@ use supple_model::Description;
 pub fn run(args: &DemoArgs) -> Result<(), Failure> {
     let arm = arms::find(&args.arm)?;
     let model = args.model.as_ref().map(Description::load).transpose()?;
-    let staging = Staging::new(&args.out)?;
+    let staging = Staging::new(&args.out, &["report.html", "summary.json"])?;
     let options = DemoOptions {
         seed: args.seed,
         model,

@@ -1,7 +1,7 @@
 //! `supple calibrate`: everything from breakaway to the demo on the simulated arm, in one command.
 
 use super::CalibrateArgs;
-use super::identify::{print, write};
+use super::identify::{FILES, print, write};
 use super::report::{Found, summary};
 use crate::arms;
 use crate::cli::DemoArgs;
@@ -62,7 +62,7 @@ pub fn run(args: &CalibrateArgs) -> Result<(), Failure> {
 }
 
 fn sized<const N: usize>(arm: &Description, args: &CalibrateArgs) -> Result<(), Failure> {
-    let staging = Staging::new(&args.out)?;
+    let staging = Staging::new(&args.out, &[&FILES[..], &["calibration.json"]].concat())?;
     let calibration = Calibration {
         ripple_nm: args.ripple,
         load: args.load,
