@@ -1,7 +1,7 @@
 //! An arm as it is described: read, checked, complete. Sizes are dynamic here; [`Description::arm`]
 //! and [`Description::config`] give the types of the core, whose size is in the type.
 
-use crate::error::{ModelError, Reporter};
+use crate::error::{Finding, ModelError, Reporter};
 use crate::resolve::{self, JointResolved, Motors, Tool};
 use crate::settings::Settings;
 use crate::shapes::{self, Capsule, Transform};
@@ -30,6 +30,7 @@ pub struct Description {
     capsules: Vec<Capsule>,
     toml: String,
     urdf: String,
+    warnings: Vec<Finding>,
 }
 
 impl Description {
@@ -132,12 +133,13 @@ impl Description {
     ) -> Result<Self, ModelError> {
         let in_urdf = Reporter { file: &urdf_file };
         let in_toml = Reporter { file: &toml_file };
-        xml::check(in_urdf, &urdf)?;
-        let mut robot = urdf_rs::read_from_string(&urdf).map_err(|error| ModelError::Syntax {
-            file: urdf_file.clone(),
-            message: error.to_string(),
-            remedy: "correct the URDF",
-        })?;
+        let checked = xml::check(in_urdf, &urdf)?;
+        let mut robot =
+            urdf_rs::read_from_string(&checked.text).map_err(|error| ModelError::Syntax {
+                file: urdf_file.clone(),
+                message: error.to_string(),
+                remedy: "correct the URDF",
+            })?;
         if let Some(radius_m) = settings.point_mass_radius_m {
             in_toml.positive("point_mass_radius_m", radius_m)?;
             tree::inflate(&mut robot, radius_m);
@@ -168,7 +170,39 @@ impl Description {
             tool,
             toml,
             urdf,
+            warnings: checked.warnings,
         })
+    }
+
+    /// What the URDF holds that is not read, each kind once with its first place: Gazebo's elements,
+    /// `mu_coulomb`, an `<origin>` of a link. Dynamics and limits do not depend on it; what they would depend on
+    /// is refused. Empty for the built-in arms.
+    pub fn warnings(&self) -> &[Finding] {
+        &self.warnings
+    }
+
+    /// The same arm, if nothing of its URDF was left out.
+    ///
+    /// # Errors
+    /// [`ModelError::Strict`] with all [`Description::warnings`].
+    pub fn strict(self) -> Result<Self, ModelError> {
+        match self.warnings.is_empty() {
+            true => Ok(self),
+            false => Err(ModelError::Strict {
+                findings: self.warnings,
+            }),
+        }
+    }
+
+    /// [`Description::strict`] where `strict` is set, otherwise as it is.
+    ///
+    /// # Errors
+    /// As [`Description::strict`].
+    pub fn strict_if(self, strict: bool) -> Result<Self, ModelError> {
+        match strict {
+            true => self.strict(),
+            false => Ok(self),
+        }
     }
 
     /// The same arm, controlled at another rate \[Hz\]: its period is that of the rate in whole nanoseconds.

@@ -39,6 +39,12 @@ pub enum ModelError {
     /// An element that is read but cannot be true.
     #[error(transparent)]
     Invalid(Box<Finding>),
+    /// A URDF with what is not read, where nothing may be left out.
+    #[error("{}; remove it, or load the arm without strict", lines(findings))]
+    Strict {
+        /// What is left out, each kind once.
+        findings: Vec<Finding>,
+    },
     /// An arm that is not built in.
     #[error(
         "no arm named `{found}` is built in; the built-in arms are {expected}; another \
@@ -95,6 +101,11 @@ pub struct Finding {
     pub value: String,
     /// What to do about it.
     pub remedy: String,
+}
+
+fn lines(findings: &[Finding]) -> String {
+    let lines: Vec<String> = findings.iter().map(ToString::to_string).collect();
+    lines.join("; ")
 }
 
 /// Speaks about one file.
