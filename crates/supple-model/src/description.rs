@@ -142,6 +142,7 @@ impl Description {
             })?;
         if let Some(radius_m) = settings.point_mass_radius_m {
             in_toml.positive("point_mass_radius_m", radius_m)?;
+            in_toml.within("point_mass_radius_m", radius_m, 1e-6..=10.0, "m")?;
             tree::inflate(&mut robot, radius_m);
         }
         resolve::check_names(in_toml, &settings, &robot)?;
@@ -208,10 +209,12 @@ impl Description {
     /// The same arm, controlled at another rate \[Hz\]: its period is that of the rate in whole nanoseconds.
     ///
     /// # Errors
-    /// [`ModelError::Invalid`] for a rate that is not positive.
+    /// [`ModelError::Invalid`] for a rate that is not from 10 Hz to 10 kHz.
     pub fn at_rate(mut self, rate_hz: f64) -> Result<Self, ModelError> {
         let file = &self.toml_file;
-        Reporter { file }.positive("the rate of control (Hz)", rate_hz)?;
+        let report = Reporter { file };
+        report.positive("the rate of control (Hz)", rate_hz)?;
+        report.within("the rate of control (Hz)", rate_hz, 10.0..=1e4, "Hz")?;
         self.settings.period_s = (1e9 / rate_hz).round() * 1e-9;
         Ok(self)
     }

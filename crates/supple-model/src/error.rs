@@ -148,6 +148,26 @@ impl Reporter<'_> {
         self.check(element, value, sound, "finite and not negative")
     }
 
+    /// Refuses what is not within a range, ends included.
+    pub fn within(
+        &self,
+        element: &str,
+        value: f64,
+        range: core::ops::RangeInclusive<f64>,
+        unit: &str,
+    ) -> Result<(), ModelError> {
+        if range.contains(&value) {
+            return Ok(());
+        }
+        let (least, greatest) = range.into_inner();
+        Err(self.invalid(
+            element,
+            format!("must be from {least} to {greatest} {unit}"),
+            value,
+            "give a number in this range, in this unit",
+        ))
+    }
+
     fn check(&self, element: &str, value: f64, sound: bool, must: &str) -> Result<(), ModelError> {
         if sound {
             return Ok(());

@@ -7,7 +7,7 @@
 //! | 2 | wrong use of the command line |
 //! | 3 | the description of the arm is wrong, or there is no such arm |
 //! | 4 | the arm cannot do the experiment |
-//! | 5 | a fault ended a run that should have gone through; all results are written |
+//! | 5 | a fault ended a run, or is latched in the system that was asked; all results are written |
 //! | 6 | a file cannot be read or written |
 //! | 7 | a replay does not give the logged answers |
 //! | 8 | the machine cannot run an arm in real time as it should |
@@ -34,7 +34,7 @@ pub const CODES: &str = "Exit codes:
   2    wrong use of the command line
   3    the description of the arm is wrong, or there is no such arm
   4    the arm cannot do the experiment
-  5    a fault ended a run that should have gone through; all results are written
+  5    a fault ended a run, or is latched in the system that was asked; all results are written
   6    a file cannot be read or written
   7    a replay does not give the logged answers
   8    the machine cannot run an arm in real time as it should
@@ -77,6 +77,24 @@ pub enum Failure {
     RunFault {
         /// The faults in words.
         faults: String,
+    },
+    /// A request was accepted by a system that is in a fault.
+    #[error(
+        "the system is in a fault: `supple status` says in which, `supple reset` takes it out once the \
+         cause is gone"
+    )]
+    InFault,
+    /// A log that ended before its run, the run being over.
+    #[error("the log ends before the run: {cause}")]
+    LogEnded {
+        /// Why, with the file and the remedy.
+        cause: Box<Failure>,
+    },
+    /// The trace of a simulated arm ended before its run.
+    #[error("the trace ends before the run, as {name} says above; all else is whole")]
+    TraceEnded {
+        /// The process that wrote it.
+        name: &'static str,
     },
     /// Shared memory.
     #[error(transparent)]
@@ -273,6 +291,10 @@ impl Failure {
                 | Failure::Different { .. }
                 | Failure::NotReady { .. }
                 | Failure::Drill { .. }
+                | Failure::InFault
+                | Failure::RunFault { .. }
+                | Failure::LogEnded { .. }
+                | Failure::TraceEnded { .. }
         )
     }
 
@@ -281,9 +303,12 @@ impl Failure {
         match self {
             Failure::UnknownArm { .. } | Failure::Model(_) => 3,
             Failure::Experiment(error) => experiment_code(error),
-            Failure::Fault { .. } | Failure::RunFault { .. } => 5,
+            Failure::Fault { .. } | Failure::RunFault { .. } | Failure::InFault => 5,
             Failure::Log(error) => log_code(error),
-            Failure::File { .. } | Failure::Exists { .. } => 6,
+            Failure::File { .. }
+            | Failure::Exists { .. }
+            | Failure::LogEnded { .. }
+            | Failure::TraceEnded { .. } => 6,
             Failure::Different { .. } => 7,
             Failure::NotReady { .. } => 8,
             Failure::Ident(_) => 9,

@@ -41,7 +41,7 @@ struct Summary {
 /// # Errors
 /// [`Failure`].
 pub fn run(args: &CalibrateArgs) -> Result<(), Failure> {
-    let arm = arms::find(&args.arm)?;
+    let arm = arms::find(&args.arm, args.strict)?;
     with_dof!(arm.dof(), N => sized::<N>(&arm, args))??;
     if args.no_demo {
         return Ok(());
@@ -52,6 +52,7 @@ pub fn run(args: &CalibrateArgs) -> Result<(), Failure> {
             true => plant.display().to_string(),
             false => args.arm.clone(),
         },
+        strict: args.strict,
         model: Some(args.out.clone()),
         out: args.out.join("demo"),
         seed: args.seed,

@@ -38,7 +38,7 @@ struct Summary<'a> {
 /// # Errors
 /// [`Failure`].
 pub fn run(args: &RunArgs) -> Result<(), Failure> {
-    let arm = arms::find(&args.arm)?;
+    let arm = arms::find(&args.arm, args.strict)?;
     let design = read(&args.design)?;
     with_dof!(arm.dof(), N => sized::<N>(&arm, &design, args))?
 }

@@ -29,7 +29,7 @@ pub const FILES: [&str; 4] = ["arm.urdf", "arm.toml", "report.html", "summary.js
 /// # Errors
 /// [`Failure`].
 pub fn run(args: &IdentifyArgs) -> Result<(), Failure> {
-    let arm = arms::find(&args.arm)?;
+    let arm = arms::find(&args.arm, args.strict)?;
     with_dof!(arm.dof(), N => sized::<N>(&arm, args))?
 }
 
