@@ -7,7 +7,7 @@ use std::io;
 pub enum LogError {
     /// The file could not be created.
     #[error(
-        "cannot create {file}: {source}; name a regular file in a folder that exists and can be written"
+        "cannot create {file}: {source}; choose a folder that exists and can be written, and the name of a regular file"
     )]
     Create {
         /// File.

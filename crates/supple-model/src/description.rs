@@ -11,9 +11,6 @@ use std::path::Path;
 use supple_core::Friction;
 use urdf_rs::Robot;
 
-/// Longest URDF or TOML that is read \[bytes\]: a hundred times that of any arm.
-const MOST_BYTES: u64 = 16 << 20;
-
 /// An arm, read from a URDF and a TOML. It exists only if both are sound.
 #[derive(Clone, Debug)]
 pub struct Description {
@@ -34,6 +31,9 @@ pub struct Description {
 }
 
 impl Description {
+    /// Longest URDF or TOML that is read \[bytes\]: a hundred times that of any arm.
+    pub const MOST_BYTES: u64 = 16 << 20;
+
     /// Reads an arm from its TOML, or from the folder that holds it as `arm.toml`.
     ///
     /// # Errors
@@ -308,7 +308,7 @@ impl Description {
 }
 
 fn read(path: &Path, remedy: &'static str) -> Result<String, ModelError> {
-    supple_files::read_text(path, MOST_BYTES).map_err(|error| ModelError::Read {
+    supple_files::read_text(path, Description::MOST_BYTES).map_err(|error| ModelError::Read {
         file: path.display().to_string(),
         error,
         remedy,
