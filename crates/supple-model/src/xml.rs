@@ -114,6 +114,15 @@ fn of(element: &str) -> &'static [&'static str] {
     shape.map_or(&[], |shape| shape.known)
 }
 
+/// The element is of the format, not of another program: it is in the namespace of the whole, if there is one.
+fn is_own(node: &Node<'_, '_>) -> bool {
+    node.tag_name().namespace() == node.document().root_element().tag_name().namespace()
+}
+
+fn is_known(node: &Node<'_, '_>, names: &[&str]) -> bool {
+    is_own(node) && names.contains(&node.tag_name().name())
+}
+
 /// Holds the text against the format.
 pub(crate) fn check(report: Reporter<'_>, text: &str) -> Result<Checked, ModelError> {
     let document = bounds::parse(report, text)?;
@@ -129,7 +138,7 @@ pub(crate) fn check(report: Reporter<'_>, text: &str) -> Result<Checked, ModelEr
     }
     for kind in ["link", "joint"] {
         let mut seen = std::collections::BTreeSet::new();
-        for node in children(&robot).filter(|n| n.tag_name().name() == kind) {
+        for node in children(&robot).filter(|n| is_own(n) && n.has_tag_name(kind)) {
             let name = node.attribute("name").unwrap_or_default();
             if name.is_empty() {
                 return Err(report.invalid(
@@ -154,7 +163,7 @@ pub(crate) fn check(report: Reporter<'_>, text: &str) -> Result<Checked, ModelEr
         }
     }
     foreign.attributes(report, &robot, words("robot").unwrap_or_default())?;
-    for node in children(&robot).filter(|n| !of("robot").contains(&n.tag_name().name())) {
+    for node in children(&robot).filter(|n| !is_known(n, of("robot"))) {
         foreign.element(report, "robot", &node, of("robot"))?;
     }
     check_quaternions(report, &robot)?;
@@ -205,7 +214,7 @@ fn check_kind(report: Reporter<'_>, joint: &Node<'_, '_>) -> Result<(), ModelErr
     ];
     let kind = joint.attribute("type").unwrap_or("none");
     if kind == "revolute" {
-        let limit = children(joint).find(|child| child.has_tag_name("limit"));
+        let limit = children(joint).find(|child| is_known(child, &["limit"]));
         let given = |end| limit.is_some_and(|limit| limit.has_attribute(end));
         if !(given("lower") && given("upper")) {
             return Err(report.invalid(
@@ -239,7 +248,7 @@ fn check_element(
     }
     if let Some(shape) = SHAPES.iter().find(|shape| shape.element == element) {
         let (known, unknown): (Vec<_>, Vec<_>) =
-            children(node).partition(|child| shape.known.contains(&child.tag_name().name()));
+            children(node).partition(|child| is_known(child, shape.known));
         for child in &unknown {
             foreign.element(report, element, child, shape.known)?;
         }
@@ -248,7 +257,7 @@ fn check_element(
             check_element(report, child, foreign)?;
         }
         for required in shape.required {
-            if !children(node).any(|child| child.has_tag_name(*required)) {
+            if !known.iter().any(|child| child.has_tag_name(*required)) {
                 return Err(report.invalid(
                     place(node),
                     format!("<{required}> is missing"),

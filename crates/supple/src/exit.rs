@@ -252,7 +252,7 @@ impl Failure {
             ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => {
                 "make room, or choose another folder with --out"
             }
-            ErrorKind::InvalidInput | ErrorKind::IsADirectory | ErrorKind::NotADirectory => {
+            ErrorKind::InvalidInput | ErrorKind::IsADirectory => {
                 "name a regular file, or one that is not there yet, in a folder"
             }
             _ => "choose a folder that can be written with --out",

@@ -1,7 +1,7 @@
 //! A URDF without what is not read, for `urdf-rs`: what other programs add, and shapes that it cannot read,
 //! are no reason to refuse an arm.
 
-use super::children;
+use super::{children, is_known, is_own};
 use roxmltree::{Document, Node};
 
 /// The text without everything from which neither dynamics nor a drawing are read. Places of what stays move.
@@ -12,6 +12,7 @@ pub(super) fn cut(document: &Document<'_>) -> String {
     let mut at = 0;
     for node in children(&robot) {
         match node.tag_name().name() {
+            _ if !is_own(&node) => leave_out(text, &node, &mut at, &mut kept),
             "link" => {
                 for part in children(&node).filter(|part| !is_read(part)) {
                     leave_out(text, &part, &mut at, &mut kept);
@@ -21,8 +22,7 @@ pub(super) fn cut(document: &Document<'_>) -> String {
                 let unread = ["calibration", "safety_controller"];
                 let known = super::of("joint");
                 let cut = |part: &Node<'_, '_>| {
-                    let name = part.tag_name().name();
-                    unread.contains(&name) || !known.contains(&name)
+                    unread.contains(&part.tag_name().name()) || !is_known(part, known)
                 };
                 for part in children(&node).filter(cut) {
                     leave_out(text, &part, &mut at, &mut kept);
@@ -42,6 +42,7 @@ fn leave_out(text: &str, node: &Node<'_, '_>, at: &mut usize, kept: &mut String)
 /// Masses, and shapes that can be drawn as capsules.
 fn is_read(part: &Node<'_, '_>) -> bool {
     match part.tag_name().name() {
+        _ if !is_own(part) => false,
         "inertial" => true,
         "visual" => children(part).any(|child| child.has_tag_name("geometry") && is_round(&child)),
         _ => false,

@@ -10,10 +10,12 @@
 //! - a name that dynamics are read from in a place where they are not, such as `<mass>` in `<link>`;
 //! - a name within a letter or two of one of these, such as `<axes>` or `frction`;
 //! - `<loop_joint>`, which closes a chain, and elements of xacro, which stand for others.
+//!
+//! What has a namespace of its own is another program's, whatever it is called.
 
-use super::place;
+use super::{is_own, place};
 use crate::error::{Finding, ModelError, Reporter};
-use roxmltree::Node;
+use roxmltree::{Attribute, Node};
 use std::collections::BTreeMap;
 
 /// Elements that dynamics are read from.
@@ -58,7 +60,7 @@ impl Foreign {
                 "expand the file first, as `xacro robot.urdf.xacro > robot.urdf` does",
             ));
         }
-        let refused = namespace.is_none()
+        let refused = is_own(node)
             && (CLOSED.contains(&parent)
                 || ALWAYS_REFUSED.contains(&name)
                 || (name != "origin" && meant(name, DYNAMIC).is_some()));
@@ -87,7 +89,8 @@ impl Foreign {
         known: &[&str],
     ) -> Result<(), ModelError> {
         let element = node.tag_name().name();
-        for stray in node.attributes().filter(|a| !known.contains(&a.name())) {
+        let unknown = |a: &Attribute<'_, '_>| a.namespace().is_some() || !known.contains(&a.name());
+        for stray in node.attributes().filter(unknown) {
             let name = stray.name();
             let refused = stray.namespace().is_none()
                 && (CLOSED.contains(&element)

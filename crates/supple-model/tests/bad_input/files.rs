@@ -69,7 +69,7 @@ fn more_links_than_any_arm_has() {
     );
     let many = Description::from_text(TOML, &fixed(900)).expect("900 frames in a row");
     let few = Description::from_text(TOML, URDF).expect("sound");
-    assert_eq!(many.arm::<3>().unwrap(), few.arm::<3>().unwrap());
+    assert_eq!(many.parts::<3>().unwrap(), few.parts::<3>().unwrap());
 }
 
 #[test]

@@ -28,7 +28,8 @@ fn published() -> String {
         (
             "<limit lower=\"-1.5\" upper=\"1.5\" effort=\"40\" velocity=\"2\"/>",
             "<limit lower=\"-1.5\" upper=\"1.5\" effort=\"40\" velocity=\"2\" \
-             drake:acceleration=\"7.5\"/><safety_controller k_position=\"100\"/><hardwareInterface/>",
+             drake:acceleration=\"7.5\"/><safety_controller k_position=\"100\"/><hardwareInterface/><drake:limit \
+             effort=\"9\"/>",
         ),
         (
             "<limit lower=\"-2.5\" upper=\"2.5\" effort=\"20\" velocity=\"2\"/>",
@@ -57,7 +58,8 @@ fn a_published_urdf_is_the_same_arm_with_each_kind_listed_once() {
     assert!(plain.warnings().is_empty());
     assert!(plain.clone().strict().is_ok());
     let arm = Description::from_text(TOML, &published()).expect("as published");
-    assert_eq!(arm.arm::<3>().unwrap(), plain.arm::<3>().unwrap());
+    assert_eq!(arm.parts::<3>().unwrap(), plain.parts::<3>().unwrap());
+    assert_eq!(arm.motors(), plain.motors());
     assert_eq!(arm.friction(), plain.friction());
     assert_eq!(arm.home_rad(), plain.home_rad());
     let lines: Vec<String> = arm.warnings().iter().map(ToString::to_string).collect();
@@ -75,6 +77,7 @@ fn a_published_urdf_is_the_same_arm_with_each_kind_listed_once() {
             "<hardwareInterface>",
         ),
         ("joint `shoulder` <limit>", "acceleration=\"7.5\""),
+        ("joint `shoulder` <limit>", "<limit>"),
         ("joint `shoulder` <dynamics>", "D=\"1\" first of 2"),
         ("joint `shoulder` <dynamics>", "K=\"7000\" first of 2"),
         ("joint `shoulder` <dynamics>", "mu_coulomb=\"0\""),
@@ -88,10 +91,10 @@ fn a_published_urdf_is_the_same_arm_with_each_kind_listed_once() {
         let said = lines.iter().filter(is_said).count();
         assert_eq!(said, 1, "{place} {value} in {lines:#?}");
     }
-    assert_eq!(lines.len(), 11, "{lines:#?}");
+    assert_eq!(lines.len(), 12, "{lines:#?}");
     assert!(lines.iter().all(|line| line.starts_with("small.urdf: ")));
     let refused = arm.strict().expect_err("something was left out");
-    assert!(matches!(&refused, ModelError::Strict { findings } if findings.len() == 11));
+    assert!(matches!(&refused, ModelError::Strict { findings } if findings.len() == 12));
     for line in &lines {
         assert!(refused.to_string().contains(line), "{line} in {refused}");
     }
