@@ -331,7 +331,7 @@ fn a_grid_of_more_samples_than_there_is_memory_is_refused() {
     let mut table = "t,q0,q1,q2,q3,tau0,tau1,tau2,tau3\n".to_owned();
     for i in 0..2000 {
         let q = f64::from(i % 100) * 1e-2;
-        table += &format!("{i},{q},{q},{q},{q},1,{q},2,{q}\n");
+        table += &format!("{i},{q},{q},{q},{q},{q},{q},{q},{q}\n");
     }
     fs::write(folder.path().join("log.csv"), table).expect("written");
     let args = ["identify", "--arm", "wam4", "log.csv", "--rate", "1e5"];
