@@ -5,10 +5,11 @@
 //! each kind of it is a [`Finding`], once, with its first place. What would silently change the dynamics is
 //! still refused:
 //!
-//! - anything unknown in `<inertial>` or as an attribute of `<origin>`, `<axis>`, `<mass>`, `<inertia>`,
-//!   `<limit>`, `<mimic>`, `<parent>` or `<child>`: a number under another name is a number lost;
+//! - anything unknown in `<inertial>` or as an attribute of `<origin>`, `<axis>`, `<mass>`, `<inertia>`, `<mimic>`,
+//!   `<parent>` or `<child>`: a number under another name is a number lost;
 //! - a name that dynamics are read from in a place where they are not, such as `<mass>` in `<link>`;
-//! - a name within a letter or two of one of these, such as `<axes>` or `frction`;
+//! - a name within a letter or two of one of these, such as `<axes>` or `frction`, and `min` and `max` of
+//!   a `<limit>`;
 //! - `<loop_joint>`, which closes a chain, and elements of xacro, which stand for others.
 //!
 //! What has a namespace of its own is another program's, whatever it is called.
@@ -25,9 +26,11 @@ const DYNAMIC: &[&str] = &[
 ];
 /// Attributes that dynamics are read from, where the element is not one of [`CLOSED`].
 const DYNAMIC_ATTRIBUTES: &[&str] = &["damping", "friction"];
+/// Attributes that say how far and how fast, by their names and by what they are called elsewhere.
+const LIMIT_ATTRIBUTES: &[&str] = &["lower", "upper", "effort", "velocity", "min", "max"];
 /// Elements in which nothing unknown is let pass.
 const CLOSED: &[&str] = &[
-    "inertial", "origin", "axis", "mass", "inertia", "limit", "mimic", "parent", "child",
+    "inertial", "origin", "axis", "mass", "inertia", "mimic", "parent", "child",
 ];
 /// Elements that other programs take for joints of their own.
 const ALWAYS_REFUSED: &[&str] = &["loop_joint"];
@@ -95,6 +98,7 @@ impl Foreign {
             let refused = stray.namespace().is_none()
                 && (CLOSED.contains(&element)
                     || meant(name, DYNAMIC).is_some()
+                    || (element == "limit" && meant(name, LIMIT_ATTRIBUTES).is_some())
                     || meant(name, DYNAMIC_ATTRIBUTES).is_some());
             let value: String = stray.value().chars().take(60).collect();
             if refused {

@@ -28,6 +28,7 @@ fn published() -> String {
         (
             "<limit lower=\"-1.5\" upper=\"1.5\" effort=\"40\" velocity=\"2\"/>",
             "<limit lower=\"-1.5\" upper=\"1.5\" effort=\"40\" velocity=\"2\" \
+             command_effort=\"40\" \
              drake:acceleration=\"7.5\"/><safety_controller k_position=\"100\"/><hardwareInterface/><drake:limit \
              effort=\"9\"/>",
         ),
@@ -77,6 +78,7 @@ fn a_published_urdf_is_the_same_arm_with_each_kind_listed_once() {
             "<hardwareInterface>",
         ),
         ("joint `shoulder` <limit>", "acceleration=\"7.5\""),
+        ("joint `shoulder` <limit>", "command_effort=\"40\""),
         ("joint `shoulder` <limit>", "<limit>"),
         ("joint `shoulder` <dynamics>", "D=\"1\" first of 2"),
         ("joint `shoulder` <dynamics>", "K=\"7000\" first of 2"),
@@ -91,10 +93,10 @@ fn a_published_urdf_is_the_same_arm_with_each_kind_listed_once() {
         let said = lines.iter().filter(is_said).count();
         assert_eq!(said, 1, "{place} {value} in {lines:#?}");
     }
-    assert_eq!(lines.len(), 12, "{lines:#?}");
+    assert_eq!(lines.len(), 13, "{lines:#?}");
     assert!(lines.iter().all(|line| line.starts_with("small.urdf: ")));
     let refused = arm.strict().expect_err("something was left out");
-    assert!(matches!(&refused, ModelError::Strict { findings } if findings.len() == 12));
+    assert!(matches!(&refused, ModelError::Strict { findings } if findings.len() == 13));
     for line in &lines {
         assert!(refused.to_string().contains(line), "{line} in {refused}");
     }
