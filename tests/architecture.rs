@@ -7,9 +7,16 @@ use std::process::Command;
 /// is not here is refused too.
 const ALLOWED: &[(&str, &[&str])] = &[
     ("supple-core", &[]),
-    ("supple-model", &["supple-core"]),
-    ("supple-plant", &["supple-core", "supple-model"]),
-    ("supple-log", &["supple-core", "supple-model"]),
+    ("supple-files", &[]),
+    ("supple-model", &["supple-core", "supple-files"]),
+    (
+        "supple-plant",
+        &["supple-core", "supple-files", "supple-model"],
+    ),
+    (
+        "supple-log",
+        &["supple-core", "supple-files", "supple-model"],
+    ),
     (
         "supple-experiment",
         &[
@@ -24,6 +31,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         "supple",
         &[
             "supple-core",
+            "supple-files",
             "supple-model",
             "supple-log",
             "supple-plant",
@@ -87,12 +95,13 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ),
     (
         "supple-ident",
-        &["supple-core", "supple-model", "supple-log"],
+        &["supple-core", "supple-files", "supple-model", "supple-log"],
     ),
     (
         "supple-python",
         &[
             "supple-core",
+            "supple-files",
             "supple-model",
             "supple-log",
             "supple-plant",

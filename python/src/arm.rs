@@ -78,6 +78,9 @@ impl Arm {
     /// ----------
     /// name_or_path : str or os.PathLike
     ///     One of :func:`supple.assets`, or the path of an ``arm.toml`` beside its URDF.
+    /// strict : bool
+    ///     Refuse a URDF that holds what is not read, such as Gazebo's elements. Default: each kind of it is a
+    ///     warning. What the dynamics would depend on is refused in either case.
     ///
     /// Raises
     /// ------
@@ -85,6 +88,13 @@ impl Arm {
     ///     For an arm that is not built in, or files that describe none.
     /// FileNotFoundError
     ///     For a path that leads nowhere.
+    /// OSError
+    ///     For what is no regular file, such as a FIFO, or longer than 16 MiB.
+    ///
+    /// Warns
+    /// -----
+    /// UserWarning
+    ///     For each kind of element and attribute that is left out, with its first place.
     ///
     /// Examples
     /// --------
@@ -92,9 +102,13 @@ impl Arm {
     /// >>> supple.Arm.load("wam7").dof
     /// 7
     #[staticmethod]
-    fn load(name_or_path: PathBuf) -> PyResult<Self> {
+    #[pyo3(signature = (name_or_path, *, strict = false))]
+    fn load(py: Python<'_>, name_or_path: PathBuf, strict: bool) -> PyResult<Self> {
         let description = Description::find(&name_or_path.to_string_lossy());
-        description.and_then(Self::new).map_err(errors::model)
+        let description = description.and_then(|found| found.strict_if(strict));
+        let description = description.map_err(errors::model)?;
+        errors::warn(py, &description)?;
+        Self::new(description).map_err(errors::model)
     }
 
     /// The arm of a URDF: the chain of movable joints from the root link to the link ``tip``.
@@ -115,6 +129,8 @@ impl Arm {
     /// point_mass_radius_m : float, optional
     ///     Links that have mass but an inertia of zeros are taken for solid balls of this radius (m).
     ///     Default: they are refused.
+    /// strict : bool
+    ///     As of :meth:`Arm.load`.
     ///
     /// Raises
     /// ------
@@ -122,6 +138,13 @@ impl Arm {
     ///     For what is not physical, not connected or not meant, by file, element, value and remedy.
     /// FileNotFoundError
     ///     For a path that leads nowhere.
+    /// OSError
+    ///     For what is no regular file, such as a FIFO, or longer than 16 MiB.
+    ///
+    /// Warns
+    /// -----
+    /// UserWarning
+    ///     As :meth:`Arm.load`.
     ///
     /// Notes
     /// -----
@@ -132,18 +155,24 @@ impl Arm {
     /// :meth:`Arm.load` reads a TOML that says it.
     #[staticmethod]
     #[pyo3(signature = (path, tip = "tip", *, gravity = None, armature = None, fixed_joints_rad = None,
-        point_mass_radius_m = None),
+        point_mass_radius_m = None, strict = false),
         text_signature = "(path, tip='tip', *, gravity=(0.0, 0.0, -9.81), armature=None, \
-        fixed_joints_rad=None, point_mass_radius_m=None)")]
+        fixed_joints_rad=None, point_mass_radius_m=None, strict=False)")]
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "all but the path are keywords in Python"
+    )]
     fn from_urdf(
+        py: Python<'_>,
         path: PathBuf,
         tip: &str,
         gravity: Option<&Bound<'_, PyAny>>,
         armature: Option<&Bound<'_, PyAny>>,
         fixed_joints_rad: Option<BTreeMap<String, f64>>,
         point_mass_radius_m: Option<f64>,
+        strict: bool,
     ) -> PyResult<Self> {
-        let urdf = std::fs::read_to_string(&path).map_err(|cause| {
+        let urdf = supple_files::read_text(&path, Description::MOST_BYTES).map_err(|cause| {
             let message = format!("{}: cannot be read: {cause}", path.display());
             errors::system(&cause, message)
         })?;
@@ -169,6 +198,7 @@ impl Arm {
         settings.insert("fixed_joints_rad".to_owned(), fixed.into());
         let read = |settings: &toml::Table| {
             let description = Description::from_text(&settings.to_string(), &urdf);
+            let description = description.and_then(|found| found.strict_if(strict));
             description.map_err(errors::model)
         };
         let mut description = read(&settings)?;
@@ -185,6 +215,7 @@ impl Arm {
             settings.insert("joints".to_owned(), joints.into());
             description = read(&settings)?;
         }
+        errors::warn(py, &description)?;
         Self::new(description).map_err(errors::model)
     }
 
@@ -193,6 +224,11 @@ impl Arm {
     fn _from_text(toml: &str, urdf: &str) -> PyResult<Self> {
         let description = Description::from_text(toml, urdf);
         description.and_then(Self::new).map_err(errors::model)
+    }
+
+    /// Writes its two files into a folder, made if need be.
+    fn _save(&self, folder: PathBuf) -> PyResult<()> {
+        self.description.save(&folder).map_err(errors::model)
     }
 
     /// Name of the arm.

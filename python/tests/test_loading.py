@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 import pytest
 import supple
@@ -46,6 +48,42 @@ def test_wrong_urdfs_are_refused_by_file_element_and_value(tmp_path):
     path.write_text("not XML")
     with pytest.raises(ValueError, match="negative.urdf"):
         supple.Arm.from_urdf(path)
+
+
+def test_what_other_programs_add_is_a_warning_or_refused(tmp_path):
+    path = write_random_urdf(tmp_path, 4, 1)
+    plain = supple.Arm.from_urdf(path, strict=True)
+    added = '<gazebo reference="link1"><mu1>0.2</mu1></gazebo><gazebo/></robot>'
+    path.write_text(path.read_text().replace("</robot>", added))
+    with pytest.warns(UserWarning, match=r"<gazebo> \(line .*first of 2") as caught:
+        arm = supple.Arm.from_urdf(path)
+    assert len(caught) == 1
+    q = np.random.default_rng(0).normal(size=(5, 4))
+    np.testing.assert_array_equal(arm.gravity(q), plain.gravity(q))
+    with pytest.raises(ValueError, match="<gazebo>"):
+        supple.Arm.from_urdf(path, strict=True)
+    (tmp_path / "arm.toml").write_text(arm.toml)
+    (tmp_path / "arm.urdf").write_text(arm.urdf)
+    toml = (tmp_path / "arm.toml").read_text().replace(str(path), "arm.urdf")
+    (tmp_path / "arm.toml").write_text(toml)
+    with pytest.warns(UserWarning, match="<gazebo>"):
+        supple.Arm.load(tmp_path)
+    with pytest.raises(ValueError, match="<gazebo>"):
+        supple.Arm.load(tmp_path, strict=True)
+
+
+def test_what_is_no_regular_file_is_refused(tmp_path):
+    fifo = tmp_path / "arm.urdf"
+    os.mkfifo(fifo)
+    for path in (fifo, "/dev/zero", tmp_path):
+        with pytest.raises(OSError, match="not a regular file"):
+            supple.Arm.from_urdf(path)
+    toml = tmp_path / "arm.toml"
+    os.mkfifo(toml)
+    with pytest.raises(OSError, match="a FIFO"):
+        supple.Arm.load(toml)
+    with pytest.raises(OSError, match="a FIFO"):
+        supple.read_log(fifo)
 
 
 def test_arguments_of_from_urdf(tmp_path):

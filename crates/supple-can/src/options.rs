@@ -15,6 +15,9 @@ pub struct Options {
     /// A WAM with 4 or 7 joints: a built-in arm, or the path of its TOML or of its folder.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
+    /// Refuses an arm whose URDF holds what is not read, instead of a warning.
+    #[arg(long)]
+    pub strict: bool,
     /// Cycles per second; the arm's own if not given. All processes of a system need the same.
     #[arg(long, value_name = "HZ", value_parser = clap::value_parser!(u32).range(10..=10_000))]
     pub rate_hz: Option<u32>,
@@ -37,7 +40,7 @@ pub struct Options {
     #[arg(long)]
     pub tare: bool,
     /// Time that is kept in each cycle for the controller's answer (us).
-    #[arg(long, value_name = "US", default_value_t = 100)]
+    #[arg(long, value_name = "US", default_value_t = 100, value_parser = clap::value_parser!(u64).range(0..=1_000_000))]
     pub answer_us: u64,
     /// Prints what a cycle of this arm takes of the bus, with the force/torque sensor and without joint
     /// encoders, and ends. The exit code says whether it fits.
@@ -61,9 +64,9 @@ impl Options {
     /// The arm, at the rate asked for.
     ///
     /// # Errors
-    /// As [`Description::find_at_rate`].
+    /// As [`Description::find_at_rate`]; what is left out of its URDF where nothing may be.
     pub fn description(&self) -> Result<Description, ModelError> {
-        Description::find_at_rate(&self.arm, self.rate_hz)
+        Description::find_at_rate(&self.arm, self.rate_hz)?.strict_if(self.strict)
     }
 
     /// It is to end with the process that started it.

@@ -58,6 +58,14 @@ fn start(options: &Options) -> Result<Option<Counters>, CanError> {
         die_with_parent();
     }
     let description = options.description()?;
+    // Who supervises has said them.
+    for warning in description
+        .warnings()
+        .iter()
+        .filter(|_| !options.supervised())
+    {
+        eprintln!("supple-can: warning: {warning}");
+    }
     with_dof!(description.dof(), N => run::<N>(&description, options, &stop))?
 }
 

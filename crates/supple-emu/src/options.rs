@@ -19,6 +19,9 @@ pub struct Options {
     /// A WAM with 4 or 7 joints: a built-in arm, or the path of its TOML or of its folder.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
+    /// Refuses an arm whose URDF holds what is not read, instead of a warning.
+    #[arg(long)]
+    pub strict: bool,
     /// Which system this belongs to, where no bus is given.
     #[arg(
         long,
@@ -40,7 +43,7 @@ pub struct Options {
     #[arg(long)]
     pub no_sensor: bool,
     /// A block of wood whose face is at this height above the base frame (m), beneath the whole reach.
-    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = height)]
     pub block_m: Option<f64>,
     /// Presses a button at a time (s) after the start, or after the host first asks for torque
     /// (`activate@held+0.2`): idle, activate, e-stop or release. May be repeated.
@@ -66,6 +69,12 @@ impl Options {
     pub fn realtime(&self) -> Settings {
         self.realtime.settings(self.priority, self.virtual_time)
     }
+}
+
+fn height(text: &str) -> Result<f64, String> {
+    let height = text.parse().ok();
+    let height = height.filter(|m| (-10.0..=10.0).contains(m));
+    height.ok_or_else(|| "give a height from -10 to 10 m".to_owned())
 }
 
 /// A button by its name on the command line and on the socket.
@@ -101,12 +110,15 @@ impl Later {
     }
 }
 
+/// Latest time of a button \[s\].
+const LATEST_S: f64 = 1e8;
+
 /// `BUTTON@SECONDS` or `BUTTON@held+SECONDS`.
 pub(crate) fn press(text: &str) -> Result<Later, EmulatorError> {
     let parsed = text.split_once('@').and_then(|(name, time)| {
         let after_held = time.strip_prefix("held+");
         let after_s: f64 = after_held.unwrap_or(time).parse().ok()?;
-        (after_s >= 0.0 && after_s.is_finite()).then_some(Later {
+        (0.0..=LATEST_S).contains(&after_s).then_some(Later {
             press: button(name)?,
             after_s,
             once_held: after_held.is_some(),

@@ -49,7 +49,15 @@ fn start(options: &Options) -> Result<(), EmulatorError> {
     if options.supervised() {
         die_with_parent();
     }
-    let description = Description::find(&options.arm)?;
+    let description = Description::find(&options.arm)?.strict_if(options.strict)?;
+    // Who supervises has said them.
+    for warning in description
+        .warnings()
+        .iter()
+        .filter(|_| !options.supervised())
+    {
+        eprintln!("supple-emu: warning: {warning}");
+    }
     with_dof!(description.dof(), N => run::<N>(&description, options, &stop))?
 }
 
@@ -101,7 +109,7 @@ fn run<const N: usize>(
         ends_ns: None,
         at_rest: false,
     };
-    match (&address, options.virtual_time) {
+    let ran = match (&address, options.virtual_time) {
         (Address::Folder(_), true) => arm.follow(Responder::open(&folder)?, stop),
         (Address::Folder(_), false) => {
             let now_ns = arm.emulator.now_ns();
@@ -109,6 +117,11 @@ fn run<const N: usize>(
         }
         (Address::Interface(name), false) => arm.keep_pace(SocketCan::open(name)?, stop),
         (Address::Interface(_), true) => Err(EmulatorError::VirtualInterface),
+    };
+    ran?;
+    match arm.trace.take() {
+        Some(trace) => Ok(trace.finish()?),
+        None => Ok(()),
     }
 }
 
@@ -190,18 +203,15 @@ struct Arm<const N: usize> {
 }
 
 impl<const N: usize> Arm<N> {
-    fn look(&mut self) -> Result<(), EmulatorError> {
+    fn look(&mut self) {
         self.pendant.answer(&mut self.emulator);
-        match &mut self.trace {
-            Some(trace) => {
-                let arm = &mut self.emulator;
-                let modes = arm.pucks().iter().map(Puck::mode);
-                let active = modes.filter(|mode| *mode == MotorMode::Torque).count();
-                let torque_nm = arm.motor_torque_nm().into();
-                let wall_ns = arm.wall_ns();
-                Ok(trace.note(wall_ns, active, &torque_nm, arm.plant_mut())?)
-            }
-            None => Ok(()),
+        if let Some(trace) = &mut self.trace {
+            let arm = &mut self.emulator;
+            let modes = arm.pucks().iter().map(Puck::mode);
+            let active = modes.filter(|mode| *mode == MotorMode::Torque).count();
+            let torque_nm = arm.motor_torque_nm().into();
+            let wall_ns = arm.wall_ns();
+            trace.note(wall_ns, active, &torque_nm, arm.plant_mut());
         }
     }
 
@@ -226,7 +236,7 @@ impl<const N: usize> Arm<N> {
     fn keep_pace(&mut self, mut bus: impl ArmsEnd, stop: &Stop) -> Result<(), EmulatorError> {
         while !self.ends(stop) {
             catch_up(&mut self.emulator, &mut bus)?;
-            self.look()?;
+            self.look();
             listen(&mut self.emulator, &mut bus)?;
         }
         Ok(())
@@ -237,7 +247,7 @@ impl<const N: usize> Arm<N> {
         while !self.ends(stop) {
             pacer.turn(&mut self.emulator)?;
             self.emulator.set_offset_ns(pacer.offset_ns());
-            self.look()?;
+            self.look();
         }
         Ok(())
     }
@@ -246,7 +256,7 @@ impl<const N: usize> Arm<N> {
     fn follow(&mut self, mut responder: Responder, stop: &Stop) -> Result<(), EmulatorError> {
         while !self.ends(stop) {
             responder.serve(&mut self.emulator, IDLE_NS)?;
-            self.look()?;
+            self.look();
         }
         Ok(())
     }

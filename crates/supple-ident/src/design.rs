@@ -32,6 +32,11 @@ const STEADY: [(usize, f64); 3] = [(1, 1.218), (3, -0.279), (5, 0.072)];
 /// Greatest sum of their sines by their order: 1.218 + 0.279 / 3 + 0.072 / 5.
 const STEADY_WAY: f64 = 1.3254;
 
+/// Candidates that are tried at most.
+pub const MOST_CANDIDATES: usize = 1_000_000;
+/// Longest motion \[s\].
+pub const LONGEST_S: f64 = 7200.0;
+
 /// What is to be small.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Criterion {
@@ -64,7 +69,7 @@ pub struct Design {
     pub criterion: Criterion,
     /// Where the tip must stay, if anywhere.
     pub workspace: Option<Workspace>,
-    /// Candidates tried.
+    /// Candidates tried, at most [`MOST_CANDIDATES`].
     pub candidates: usize,
     /// Seed of the search.
     pub seed: u64,
@@ -111,6 +116,21 @@ pub fn design<const N: usize>(
     positive("period_s", request.period_s)?;
     positive("periods", request.periods)?;
     positive("candidates", request.candidates as f64)?;
+    if request.candidates > MOST_CANDIDATES {
+        return Err(IdentError::Option {
+            option: "candidates",
+            value: request.candidates as f64,
+            must: "at most 1000000",
+        });
+    }
+    let duration_s = request.period_s * request.periods;
+    if duration_s > LONGEST_S {
+        return Err(IdentError::Option {
+            option: "period_s times periods",
+            value: duration_s,
+            must: "at most 7200 s",
+        });
+    }
     let columns = Columns::new(N, &request.moving, true, FrictionColumns::COULOMB, &[])?;
     let search = Search {
         config,

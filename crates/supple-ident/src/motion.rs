@@ -13,6 +13,9 @@ use nalgebra::DMatrix;
 /// out to 1 %.
 const TRANSIENT_PERIODS: f64 = 2.0;
 
+/// Samples of a grid at most: three hours at 1 kHz.
+const MOST_SAMPLES: f64 = 1e7;
+
 /// How a log is prepared.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Preparation {
@@ -105,6 +108,14 @@ impl Motion {
         let own_rate = steps / (log.t_s[log.t_s.len() - 1] - log.t_s[0]);
         let rate_hz = preparation.rate_hz.unwrap_or(own_rate);
         positive("rate_hz", rate_hz)?;
+        let samples = (log.t_s[log.t_s.len() - 1] - log.t_s[0]) * rate_hz;
+        if samples > MOST_SAMPLES {
+            return Err(shape_error(
+                "log",
+                format!("at most {MOST_SAMPLES:e} samples at the rate of the grid, {rate_hz} Hz"),
+                format!("{samples:e}: give a lower rate, or correct the column t (s)"),
+            ));
+        }
         let low_pass = preparation
             .cutoff_hz
             .map(|cutoff_hz| LowPass::butterworth4(cutoff_hz, rate_hz))

@@ -1,6 +1,7 @@
 //! A Fourier series as plain lists, its number of joints no longer in its type: what files and other
 //! languages hold of [`Fourier`].
 
+use crate::design::LONGEST_S;
 use crate::error::{IdentError, shape_error};
 use serde::{Deserialize, Serialize};
 use supple_core::Vector;
@@ -44,7 +45,7 @@ impl SeriesLists {
     /// The series of an arm of `N` joints.
     ///
     /// # Errors
-    /// [`IdentError::Shape`] for lists of other lengths.
+    /// [`IdentError::Shape`] for lists of other lengths, or a duration out of range.
     pub fn fourier<const N: usize>(&self) -> Result<Fourier<N>, IdentError> {
         let column = |name: &str, values: &[f64]| {
             if values.len() == N {
@@ -67,6 +68,12 @@ impl SeriesLists {
             }
             Ok(found)
         };
+        for (name, value) in [("duration_s", self.duration_s), ("ramp_s", self.ramp_s)] {
+            if !(0.0..=LONGEST_S).contains(&value) {
+                let expected = format!("0 to {LONGEST_S} s");
+                return Err(shape_error(name, expected, format!("{value} s")));
+            }
+        }
         Ok(Fourier {
             centre_rad: column("centre_rad", &self.centre_rad)?,
             sine_rad: columns("sine_rad", &self.sine_rad)?,

@@ -2,6 +2,11 @@
 
 use std::collections::BTreeMap;
 
+/// Messages within each other at most; those of ROS have five.
+const MOST_DEPTH: usize = 32;
+/// Longest text that is read \[bytes\]: a hundred times that of any message.
+const MOST_BYTES: usize = 1 << 20;
+
 /// Line between the definitions of a text.
 pub(crate) const SEPARATOR: &str =
     "================================================================================";
@@ -61,7 +66,7 @@ impl Definitions {
         self.types.get(name).map_or(&[], Vec::as_slice)
     }
 
-    /// Refuses a type that is used and not defined, and one without fields.
+    /// Refuses a type that is used and not defined, one without fields, and one that holds itself.
     pub fn check(&self) -> Result<(), String> {
         let used = self.types.values().flatten().filter_map(|f| match &f.kind {
             Kind::Message(name) => Some(name),
@@ -72,12 +77,54 @@ impl Definitions {
                 return Err(format!("{name} is used and not defined"));
             }
         }
+        let mut depths = BTreeMap::new();
+        for name in self.types.keys() {
+            self.depth(name, 0, &mut depths)?;
+        }
         Ok(())
+    }
+
+    /// Messages within each other from `name` on, itself included. `above` are around it; `depths` are known.
+    fn depth<'a>(
+        &'a self,
+        name: &'a str,
+        above: usize,
+        depths: &mut BTreeMap<&'a str, usize>,
+    ) -> Result<usize, String> {
+        let too_deep = || {
+            format!(
+                "{name} holds itself, or messages are nested more than {MOST_DEPTH} deep: such a type has \
+                 no table"
+            )
+        };
+        if let Some(depth) = depths.get(name) {
+            return match above + depth > MOST_DEPTH {
+                true => Err(too_deep()),
+                false => Ok(*depth),
+            };
+        }
+        if above >= MOST_DEPTH {
+            return Err(too_deep());
+        }
+        let mut depth = 1;
+        for field in self.fields(name) {
+            if let Kind::Message(inner) = &field.kind {
+                depth = depth.max(1 + self.depth(inner, above + 1, depths)?);
+            }
+        }
+        depths.insert(name, depth);
+        Ok(depth)
     }
 }
 
 /// The definitions in `text`, whose first is that of `root`. `package/msg/Type` is `package/Type`.
 pub(crate) fn parse(root: &str, text: &str) -> Result<Definitions, String> {
+    if text.len() > MOST_BYTES {
+        let bytes = text.len();
+        return Err(format!(
+            "a definition of {bytes} bytes, at most {MOST_BYTES} are read"
+        ));
+    }
     let root = root.replace("/msg/", "/");
     let mut types = BTreeMap::new();
     for (index, part) in text.split(SEPARATOR).enumerate() {
@@ -181,6 +228,31 @@ mod tests {
             ]
         );
         assert_eq!(definitions.fields("p/Part")[0].kind, Kind::Int16);
+    }
+
+    #[test]
+    fn refuses_what_holds_itself_and_what_is_nested_too_deep() {
+        let own = |text: &str| parse("p/A", text).expect_err("no table has such a type");
+        for text in [
+            "A a\n".to_owned(),
+            "A[] a\n".to_owned(),
+            format!("B b\n{SEPARATOR}\nMSG: p/B\nA[2] a\n"),
+        ] {
+            let error = own(&text);
+            assert!(error.contains("holds itself"), "{error}");
+        }
+        let chain = |length: usize| {
+            let mut text = "M1 m\n".to_owned();
+            for i in 1..length {
+                text += &format!("{SEPARATOR}\nMSG: p/M{i}\nM{} m\n", i + 1);
+            }
+            text + &format!("{SEPARATOR}\nMSG: p/M{length}\nint8 x\n")
+        };
+        assert!(parse("p/A", &chain(MOST_DEPTH - 1)).is_ok());
+        for length in [MOST_DEPTH, 10_000] {
+            let error = own(&chain(length));
+            assert!(error.contains("32 deep"), "{error}");
+        }
     }
 
     #[test]

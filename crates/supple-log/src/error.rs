@@ -6,7 +6,9 @@ use std::io;
 #[derive(Debug, thiserror::Error)]
 pub enum LogError {
     /// The file could not be created.
-    #[error("cannot create {file}: {source}; choose a folder that exists and can be written")]
+    #[error(
+        "cannot create {file}: {source}; choose a folder that exists and can be written, and the name of a regular file"
+    )]
     Create {
         /// File.
         file: String,
@@ -20,7 +22,10 @@ pub enum LogError {
         file: String,
     },
     /// The file could not be written to its end; what was written stays under this name.
-    #[error("cannot write {file}: {source}; make room and run again, the file is incomplete")]
+    #[error(
+        "cannot write {file}: {source}; make room and run again, the file is incomplete and `supple log \
+         recover` keeps what is whole in it"
+    )]
     Write {
         /// File.
         file: String,

@@ -7,9 +7,10 @@ use mcap::write::NoSeek;
 use mcap::{Attachment, Compression, McapError, WriteOptions};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::fs::{File, OpenOptions, TryLockError};
+use std::fs::{File, TryLockError};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
+use supple_files::{check_output, open_output, with_suffix};
 
 /// Data in one chunk: what a crash can lose \[ns\].
 const CHUNK_NS: u64 = 250_000_000;
@@ -39,25 +40,17 @@ pub(crate) struct LogFile {
 }
 
 impl LogFile {
-    /// Creates `<target><suffix>`, replacing one that nobody writes any more.
+    /// Creates `<target><suffix>`, replacing one that nobody writes any more. A device, FIFO, socket or folder
+    /// at either name is refused before anything is written.
     pub fn create(target: &Path, suffix: &str) -> Result<Self, LogError> {
         let part = with_suffix(target, suffix);
-        let failed = |source| LogError::Create {
-            file: part.display().to_string(),
+        let cannot_create = |path: &Path, source| LogError::Create {
+            file: path.display().to_string(),
             source,
         };
-        if target.is_dir() {
-            return Err(LogError::Create {
-                file: target.display().to_string(),
-                source: std::io::ErrorKind::IsADirectory.into(),
-            });
-        }
-        let file = OpenOptions::new()
-            .write(true)
-            .create(true)
-            .truncate(false)
-            .open(&part)
-            .map_err(failed)?;
+        let failed = |source| cannot_create(&part, source);
+        check_output(target).map_err(|source| cannot_create(target, source))?;
+        let file = open_output(&part).map_err(failed)?;
         // A file system that has no locks is no reason not to write.
         if let Err(TryLockError::WouldBlock) = file.try_lock() {
             return Err(LogError::Busy {
@@ -185,6 +178,8 @@ impl LogFile {
         let named = flush(mcap.into_inner().into_inner()).and_then(|file| {
             file.sync_all()?;
             let bytes = file.metadata()?.len();
+            // Something may have been put there while the log was written.
+            check_output(&target)?;
             std::fs::rename(&part, &target)?;
             Ok(bytes)
         });
@@ -199,12 +194,6 @@ impl LogFile {
             chunks: u64::from(statistics.chunk_count),
         })
     }
-}
-
-pub(crate) fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
-    let mut name = path.as_os_str().to_owned();
-    name.push(suffix);
-    name.into()
 }
 
 fn flush(mut file: BufWriter<File>) -> std::io::Result<File> {

@@ -1,13 +1,14 @@
 //! Making whole what a crash left: every chunk that is whole goes into a new file with an index.
 
 use crate::error::LogError;
-use crate::file::{LogFile, with_suffix};
+use crate::file::LogFile;
 use crate::scan::{Channel, Item, Scan};
 use mcap::records::MessageHeader;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use supple_files::with_suffix;
 
 /// Added to the name of a file that is being recovered: not that of a log being written, which may be
 /// the very file to recover.

@@ -10,12 +10,14 @@ use mcap::records::{AttachmentHeader, MessageHeader, Metadata, Record};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use std::collections::{BTreeMap, VecDeque};
 use std::fs::File;
-use std::io::{BufReader, ErrorKind};
+use std::io::BufReader;
 use std::path::Path;
 use std::sync::Arc;
 
 /// Opcode and length before every record.
 const RECORD_PREFIX_BYTES: u64 = 9;
+/// A longer record is damage, not data, and would ask for as much memory.
+const RECORD_LIMIT_BYTES: u64 = 1 << 28;
 
 /// A channel with its message definition.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -58,20 +60,13 @@ pub(crate) struct Scan {
 impl Scan {
     pub fn open(path: &Path) -> Result<Self, LogError> {
         let file = path.display().to_string();
-        let source = File::open(path).and_then(|source| {
-            let metadata = source.metadata()?;
-            if metadata.is_dir() {
-                return Err(ErrorKind::IsADirectory.into());
-            }
-            Ok((source, metadata.len()))
-        });
-        let (source, bytes) = match source {
+        let (source, bytes) = match supple_files::open_input(path) {
             Ok((source, bytes)) => (BufReader::new(source), bytes),
             Err(source) => return Err(LogError::Read { file, source }),
         };
         let options = LinearReaderOptions::default()
             .with_emit_chunks(true)
-            .with_record_length_limit(usize::try_from(bytes).unwrap_or(usize::MAX));
+            .with_record_length_limit(usize::try_from(bytes.min(RECORD_LIMIT_BYTES)).unwrap_or(0));
         Ok(Scan {
             file,
             source,

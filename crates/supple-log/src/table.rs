@@ -10,6 +10,10 @@ use cdr_encoding::CdrDeserializer;
 use serde::Deserialize;
 use std::fmt::Write;
 
+/// Fields, elements of arrays included, of which a table is laid out at most: those of no use take no bytes of
+/// a message, however many there are.
+const MOST_FIELDS: usize = 100_000;
+
 /// Steps that read a message, names of the columns that they fill.
 pub(crate) struct Table {
     steps: Vec<Step>,
@@ -41,6 +45,7 @@ impl Table {
             values: Values::new(first)?,
             steps: Vec::new(),
             columns: vec!["log_time_ns".to_owned()],
+            fields: 0,
         };
         for field in definitions.root() {
             let header = field.kind == Kind::Message("std_msgs/Header".to_owned());
@@ -124,10 +129,24 @@ struct Layout<'a> {
     values: Values<'a>,
     steps: Vec<Step>,
     columns: Vec<String>,
+    /// Fields and elements visited so far.
+    fields: usize,
 }
 
 impl Layout<'_> {
+    fn count(&mut self, name: &str) -> Result<(), String> {
+        self.fields += 1;
+        match self.fields > MOST_FIELDS {
+            true => Err(format!(
+                "at {name}: a table has at most {MOST_FIELDS} fields, elements of arrays included; export \
+                 another channel, or one with shorter arrays"
+            )),
+            false => Ok(()),
+        }
+    }
+
     fn field(&mut self, field: &Field, name: &str, skip: bool) -> Result<(), String> {
+        self.count(name)?;
         match field.count {
             Count::One => self.value(&field.kind, name, skip),
             Count::Array(count) => self.elements(&field.kind, name, count, skip),
@@ -155,6 +174,7 @@ impl Layout<'_> {
         skip: bool,
     ) -> Result<(), String> {
         for i in 0..count {
+            self.count(name)?;
             let element = match self.joints.get(i) {
                 Some(joint) if count == self.joints.len() => format!("{name}.{joint}"),
                 _ => format!("{name}.{i}"),

@@ -65,21 +65,43 @@ fn a_folder_that_cannot_be_written() {
     ));
 }
 
-/// A part file that is a link to the device that is always full.
-#[cfg(target_os = "linux")]
+/// Devices, FIFOs and folders at the name of the log, or of the part that it is written under: refused before
+/// anything is written, and left as they are.
+#[cfg(unix)]
 #[test]
-fn a_full_disk() {
+fn what_is_no_regular_file_is_not_replaced() {
+    use std::os::unix::fs::{FileTypeExt, symlink};
     let folder = tempfile::tempdir().expect("a folder");
-    let path = folder.path().join("run.mcap");
-    let part = folder.path().join("run.mcap.part");
-    std::os::unix::fs::symlink("/dev/full", &part).expect("linked");
-
-    let error = common::write(&path, common::STEPS).expect_err("the disk is full");
-    assert!(matches!(error, LogError::Write { .. }), "{error}");
-    let message = error.to_string();
-    assert!(message.contains("run.mcap.part"), "{message}");
-    assert!(message.contains("No space left on device"), "{message}");
-    assert!(!path.exists());
+    let at = |name: &str| folder.path().join(name);
+    for fifo in ["fifo", "a.mcap.part"] {
+        let made = std::process::Command::new("mkfifo").arg(at(fifo)).status();
+        assert!(made.expect("mkfifo is there").success());
+    }
+    symlink("/dev/null", at("b.mcap.part")).expect("linked");
+    symlink("/dev/null", at("c.mcap")).expect("linked");
+    fs::create_dir(at("d.mcap.part")).expect("made");
+    for (path, word) in [
+        (at("fifo"), "a FIFO"),
+        (at("a.mcap"), "a FIFO"),
+        (at("b.mcap"), "a character device"),
+        (at("c.mcap"), "a character device"),
+        (at("d.mcap"), "a folder"),
+        ("/dev/null".into(), "a character device"),
+        (folder.path().into(), "a folder"),
+    ] {
+        let Err(error) = writer(&path) else {
+            panic!("{} was created", path.display());
+        };
+        assert!(matches!(error, LogError::Create { .. }), "{error}");
+        for word in [word, "regular file"] {
+            assert!(error.to_string().contains(word), "{error}");
+        }
+    }
+    let device = fs::metadata("/dev/null").expect("still there").file_type();
+    assert!(device.is_char_device());
+    let link = fs::symlink_metadata(at("c.mcap")).expect("still there");
+    assert!(link.is_symlink());
+    assert!(!at("a.mcap").exists() && !at("b.mcap").exists() && !at("d.mcap").exists());
 }
 
 /// The disk fills up in the middle of a run: after the write that fails every write fails, and so does

@@ -1,7 +1,7 @@
 //! An arm as it is described: read, checked, complete. Sizes are dynamic here; [`Description::arm`]
 //! and [`Description::config`] give the types of the core, whose size is in the type.
 
-use crate::error::{ModelError, Reporter};
+use crate::error::{Finding, ModelError, Reporter};
 use crate::resolve::{self, JointResolved, Motors, Tool};
 use crate::settings::Settings;
 use crate::shapes::{self, Capsule, Transform};
@@ -27,9 +27,13 @@ pub struct Description {
     capsules: Vec<Capsule>,
     toml: String,
     urdf: String,
+    warnings: Vec<Finding>,
 }
 
 impl Description {
+    /// Longest URDF or TOML that is read \[bytes\]: a hundred times that of any arm.
+    pub const MOST_BYTES: u64 = 16 << 20;
+
     /// Reads an arm from its TOML, or from the folder that holds it as `arm.toml`.
     ///
     /// # Errors
@@ -129,14 +133,16 @@ impl Description {
     ) -> Result<Self, ModelError> {
         let in_urdf = Reporter { file: &urdf_file };
         let in_toml = Reporter { file: &toml_file };
-        xml::check(in_urdf, &urdf)?;
-        let mut robot = urdf_rs::read_from_string(&urdf).map_err(|error| ModelError::Syntax {
-            file: urdf_file.clone(),
-            message: error.to_string(),
-            remedy: "correct the URDF",
-        })?;
+        let checked = xml::check(in_urdf, &urdf)?;
+        let mut robot =
+            urdf_rs::read_from_string(&checked.text).map_err(|error| ModelError::Syntax {
+                file: urdf_file.clone(),
+                message: error.to_string(),
+                remedy: "correct the URDF",
+            })?;
         if let Some(radius_m) = settings.point_mass_radius_m {
             in_toml.positive("point_mass_radius_m", radius_m)?;
+            in_toml.within("point_mass_radius_m", radius_m, 1e-6..=10.0, "m")?;
             tree::inflate(&mut robot, radius_m);
         }
         resolve::check_names(in_toml, &settings, &robot)?;
@@ -165,16 +171,50 @@ impl Description {
             tool,
             toml,
             urdf,
+            warnings: checked.warnings,
         })
+    }
+
+    /// What the URDF holds that is not read, each kind once with its first place: Gazebo's elements,
+    /// `mu_coulomb`, an `<origin>` of a link. Dynamics and limits do not depend on it; what they would depend on
+    /// is refused. Empty for the built-in arms.
+    pub fn warnings(&self) -> &[Finding] {
+        &self.warnings
+    }
+
+    /// The same arm, if nothing of its URDF was left out.
+    ///
+    /// # Errors
+    /// [`ModelError::Strict`] with all [`Description::warnings`].
+    pub fn strict(self) -> Result<Self, ModelError> {
+        match self.warnings.is_empty() {
+            true => Ok(self),
+            false => Err(ModelError::Strict {
+                findings: self.warnings,
+            }),
+        }
+    }
+
+    /// [`Description::strict`] where `strict` is set, otherwise as it is.
+    ///
+    /// # Errors
+    /// As [`Description::strict`].
+    pub fn strict_if(self, strict: bool) -> Result<Self, ModelError> {
+        match strict {
+            true => self.strict(),
+            false => Ok(self),
+        }
     }
 
     /// The same arm, controlled at another rate \[Hz\]: its period is that of the rate in whole nanoseconds.
     ///
     /// # Errors
-    /// [`ModelError::Invalid`] for a rate that is not positive.
+    /// [`ModelError::Invalid`] for a rate that is not from 10 Hz to 10 kHz.
     pub fn at_rate(mut self, rate_hz: f64) -> Result<Self, ModelError> {
         let file = &self.toml_file;
-        Reporter { file }.positive("the rate of control (Hz)", rate_hz)?;
+        let report = Reporter { file };
+        report.positive("the rate of control (Hz)", rate_hz)?;
+        report.within("the rate of control (Hz)", rate_hz, 10.0..=1e4, "Hz")?;
         self.settings.period_s = (1e9 / rate_hz).round() * 1e-9;
         Ok(self)
     }
@@ -268,7 +308,7 @@ impl Description {
 }
 
 fn read(path: &Path, remedy: &'static str) -> Result<String, ModelError> {
-    std::fs::read_to_string(path).map_err(|error| ModelError::Read {
+    supple_files::read_text(path, Description::MOST_BYTES).map_err(|error| ModelError::Read {
         file: path.display().to_string(),
         error,
         remedy,

@@ -16,7 +16,9 @@ pub enum ModelError {
         remedy: &'static str,
     },
     /// A file that cannot be written.
-    #[error("{file}: cannot be written: {error}; choose a folder that can be")]
+    #[error(
+        "{file}: cannot be written: {error}; name a folder in which it can be, as a regular file"
+    )]
     Write {
         /// Path.
         file: String,
@@ -37,6 +39,12 @@ pub enum ModelError {
     /// An element that is read but cannot be true.
     #[error(transparent)]
     Invalid(Box<Finding>),
+    /// A URDF with what is not read, where nothing may be left out.
+    #[error("{}; remove it, or load the arm without strict", lines(findings))]
+    Strict {
+        /// What is left out, each kind once.
+        findings: Vec<Finding>,
+    },
     /// An arm that is not built in.
     #[error(
         "no arm named `{found}` is built in; the built-in arms are {expected}; another \
@@ -95,6 +103,11 @@ pub struct Finding {
     pub remedy: String,
 }
 
+fn lines(findings: &[Finding]) -> String {
+    let lines: Vec<String> = findings.iter().map(ToString::to_string).collect();
+    lines.join("; ")
+}
+
 /// Speaks about one file.
 #[derive(Clone, Copy)]
 pub(crate) struct Reporter<'a> {
@@ -133,6 +146,26 @@ impl Reporter<'_> {
     pub fn not_negative(&self, element: &str, value: f64) -> Result<(), ModelError> {
         let sound = value.is_finite() && value >= 0.0;
         self.check(element, value, sound, "finite and not negative")
+    }
+
+    /// Refuses what is not within a range, ends included.
+    pub fn within(
+        &self,
+        element: &str,
+        value: f64,
+        range: core::ops::RangeInclusive<f64>,
+        unit: &str,
+    ) -> Result<(), ModelError> {
+        if range.contains(&value) {
+            return Ok(());
+        }
+        let (least, greatest) = range.into_inner();
+        Err(self.invalid(
+            element,
+            format!("must be from {least} to {greatest} {unit}"),
+            value,
+            "give a number in this range, in this unit",
+        ))
     }
 
     fn check(&self, element: &str, value: f64, sound: bool, must: &str) -> Result<(), ModelError> {

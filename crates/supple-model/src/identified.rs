@@ -51,24 +51,27 @@ impl Description {
     }
 
     /// Writes `arm.toml` and `arm.urdf` into a folder, made if need be; [`Description::load`] reads
-    /// them again.
+    /// them again. Older files of these names are replaced.
     ///
     /// # Errors
-    /// [`ModelError::Write`].
+    /// [`ModelError::Write`], before anything is written where a device, FIFO, socket or folder has one of the
+    /// names.
     pub fn save(&self, folder: &Path) -> Result<(), ModelError> {
-        let write = |name: &str, text: &str| {
-            let path = folder.join(name);
-            let part = folder.join(format!("{name}.part"));
-            std::fs::create_dir_all(folder)
-                .and_then(|()| std::fs::write(&part, text))
-                .and_then(|()| std::fs::rename(&part, &path))
-                .map_err(|error| ModelError::Write {
-                    file: path.display().to_string(),
-                    error,
-                })
+        let refused = |path: &Path, error| ModelError::Write {
+            file: path.display().to_string(),
+            error,
         };
-        write(URDF, self.urdf())?;
-        write(TOML, &self.toml_named(URDF)?)
+        let files = [(URDF, self.urdf()), (TOML, &self.toml_named(URDF)?)];
+        let files = files.map(|(name, text)| (folder.join(name), text));
+        // Both before either is written: half an arm is none.
+        for (path, _) in &files {
+            supple_files::check_output(path).map_err(|error| refused(path, error))?;
+        }
+        std::fs::create_dir_all(folder).map_err(|error| refused(folder, error))?;
+        files.iter().try_for_each(|(path, text)| {
+            let written = supple_files::write_whole(path, text.as_bytes());
+            written.map_err(|error| refused(path, error))
+        })
     }
 
     fn urdf_with(&self, bodies: &[Body]) -> Result<String, ModelError> {

@@ -74,7 +74,7 @@ pub(crate) fn chain(
     loop {
         builder.body = None;
         builder.next = None;
-        builder.lump(root, carrier, Pose::IDENTITY)?;
+        builder.lump(root, carrier)?;
         if let Some(index) = carrier {
             let joint: &mut Moving = &mut moving[index];
             let Some(body) = builder.body else {
@@ -325,11 +325,26 @@ struct Builder<'a, 'b> {
 }
 
 impl Builder<'_, '_> {
-    fn lump(
+    /// The link `root` and all that cannot move against it, each before what hangs on it.
+    fn lump(&mut self, root: usize, carrier: Option<usize>) -> Result<(), ModelError> {
+        // A list, not recursion: how deep fixed links hang on each other is up to the file.
+        let mut open = vec![(root, Pose::IDENTITY)];
+        while let Some((link, carrier_from_link)) = open.pop() {
+            let first = open.len();
+            self.lump_one(link, carrier, carrier_from_link, &mut open)?;
+            // In the order of the file: sums of masses depend on it to the last bit.
+            open[first..].reverse();
+        }
+        Ok(())
+    }
+
+    /// One link; those fixed to it are added to `open`.
+    fn lump_one(
         &mut self,
         link: usize,
         carrier: Option<usize>,
         carrier_from_link: Pose,
+        open: &mut Vec<(usize, Pose)>,
     ) -> Result<(), ModelError> {
         self.links.push(Placed {
             link,
@@ -340,7 +355,7 @@ impl Builder<'_, '_> {
             let body = body.seen_from(&carrier_from_link);
             self.body = Some(self.body.map_or(body, |sum| sum.merged(&body)));
         }
-        for joint in self.tree.below[link].clone() {
+        for joint in self.tree.below[link].iter().copied() {
             let urdf = &self.tree.robot.joints[joint];
             let link_from_child =
                 carrier_from_link * Pose::from_xyz_rpy(urdf.origin.xyz.0, urdf.origin.rpy.0);
@@ -348,13 +363,13 @@ impl Builder<'_, '_> {
                 check_chain_joint(self.tree.report, urdf)?;
                 self.next = Some((joint, link_from_child));
             } else if matches!(urdf.joint_type, JointType::Fixed) {
-                self.lump(self.tree.child[joint], carrier, link_from_child)?;
+                open.push((self.tree.child[joint], link_from_child));
             } else if let Some(angle) = self.fixed_rad.get(&urdf.name) {
                 if !turns(&urdf.joint_type) {
                     return Err(unsupported(self.tree.report, urdf));
                 }
                 let turned = link_from_child * turn(&self.tree.axis(joint)?, *angle);
-                self.lump(self.tree.child[joint], carrier, turned)?;
+                open.push((self.tree.child[joint], turned));
             } else {
                 return Err(self.tree.report.invalid(
                     format!("joint `{}`", urdf.name),

@@ -3,7 +3,9 @@
 //! A controller must know where an arm ends and what it bears: [`crate::Description`] refuses joints
 //! without limits. Dynamics and identification ask for none, and many URDFs have none.
 
-use roxmltree::{Document, Node};
+use crate::error::Reporter;
+use crate::xml;
+use roxmltree::Node;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
@@ -13,9 +15,10 @@ pub const UNLIMITED_NM: f64 = 1e5;
 pub const UNLIMITED_RAD_PER_S: f64 = 100.0;
 
 /// `urdf` in which every movable joint has limits: where it states none, or zero, a range of a turn either
-/// way, [`UNLIMITED_NM`] as effort and [`UNLIMITED_RAD_PER_S`] as velocity. A text that is no XML is given back as it is.
+/// way, [`UNLIMITED_NM`] as effort and [`UNLIMITED_RAD_PER_S`] as velocity. A text that is no XML, or out of all
+/// proportion, is given back as it is: whoever reads it says why.
 pub fn with_limits(urdf: &str) -> String {
-    let Ok(document) = Document::parse(urdf) else {
+    let Ok(document) = xml::bounds::parse(Reporter { file: "" }, urdf) else {
         return urdf.to_owned();
     };
     let movable = |node: &Node<'_, '_>| {

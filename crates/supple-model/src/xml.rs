@@ -3,11 +3,15 @@
 //! `urdf-rs` drops elements and attributes that it does not know, drops words of a vector that are not
 //! numbers, and fills what is missing with zeros: a misspelt `<inertial>` becomes a weightless link, a
 //! missing `<limit>` a joint that may not move. Here the raw tree is held against the format before
-//! that happens. Elements directly under `<robot>` that are not links or joints are left alone: they
-//! are other programs' extensions.
+//! that happens. What other programs add is listed, see [`foreign`].
 
-use crate::error::{ModelError, Reporter};
-use roxmltree::{Document, Node};
+pub(crate) mod bounds;
+mod cut;
+mod foreign;
+
+use crate::error::{Finding, ModelError, Reporter};
+use foreign::Foreign;
+use roxmltree::Node;
 
 /// Greatest magnitude of a length, mass or inertia, SI units: no arm comes near, and no product of
 /// such numbers overflows.
@@ -47,6 +51,12 @@ struct Shape {
 
 const SHAPES: &[Shape] = &[
     Shape {
+        element: "robot",
+        known: &["link", "joint", "material"],
+        required: &[],
+        many: &["link", "joint", "material"],
+    },
+    Shape {
         element: "link",
         known: &["inertial", "visual", "collision", "contact"],
         required: &[],
@@ -76,13 +86,47 @@ const SHAPES: &[Shape] = &[
     },
 ];
 
+/// Attributes that are no numbers; `xmlns` and the like are none of them.
+const WORDS: &[(&str, &[&str])] = &[
+    ("robot", &["name", "version"]),
+    ("link", &["name"]),
+    ("joint", &["name", "type"]),
+    ("inertial", &[]),
+    ("parent", &["link"]),
+    ("child", &["link"]),
+    ("mimic", &["joint", "multiplier", "offset"]),
+    ("visual", &["name"]),
+    ("collision", &["name"]),
+];
+
+/// A URDF that was held against the format.
+#[derive(Debug)]
+pub(crate) struct Checked {
+    /// What is left out, each kind once.
+    pub warnings: Vec<Finding>,
+    /// The text without it, for `urdf-rs`.
+    pub text: String,
+}
+
+/// Children of an element that are known.
+fn of(element: &str) -> &'static [&'static str] {
+    let shape = SHAPES.iter().find(|shape| shape.element == element);
+    shape.map_or(&[], |shape| shape.known)
+}
+
+/// The element is of the format, not of another program: it is in the namespace of the whole, if there is one.
+fn is_own(node: &Node<'_, '_>) -> bool {
+    node.tag_name().namespace() == node.document().root_element().tag_name().namespace()
+}
+
+fn is_known(node: &Node<'_, '_>, names: &[&str]) -> bool {
+    is_own(node) && names.contains(&node.tag_name().name())
+}
+
 /// Holds the text against the format.
-pub(crate) fn check(report: Reporter<'_>, text: &str) -> Result<(), ModelError> {
-    let document = Document::parse(text).map_err(|error| ModelError::Syntax {
-        file: report.file.to_owned(),
-        message: error.to_string(),
-        remedy: "a URDF is one well-formed XML document with <robot> at its root",
-    })?;
+pub(crate) fn check(report: Reporter<'_>, text: &str) -> Result<Checked, ModelError> {
+    let document = bounds::parse(report, text)?;
+    let mut foreign = Foreign::default();
     let robot = document.root_element();
     if robot.tag_name().name() != "robot" {
         return Err(report.invalid(
@@ -94,7 +138,7 @@ pub(crate) fn check(report: Reporter<'_>, text: &str) -> Result<(), ModelError> 
     }
     for kind in ["link", "joint"] {
         let mut seen = std::collections::BTreeSet::new();
-        for node in children(&robot).filter(|n| n.tag_name().name() == kind) {
+        for node in children(&robot).filter(|n| is_own(n) && n.has_tag_name(kind)) {
             let name = node.attribute("name").unwrap_or_default();
             if name.is_empty() {
                 return Err(report.invalid(
@@ -115,7 +159,44 @@ pub(crate) fn check(report: Reporter<'_>, text: &str) -> Result<(), ModelError> 
             if kind == "joint" {
                 check_kind(report, &node)?;
             }
-            check_element(report, &node)?;
+            check_element(report, &node, &mut foreign)?;
+        }
+    }
+    foreign.attributes(report, &robot, words("robot").unwrap_or_default())?;
+    for node in children(&robot).filter(|n| !is_known(n, of("robot"))) {
+        foreign.element(report, "robot", &node, of("robot"))?;
+    }
+    check_quaternions(report, &robot)?;
+    Ok(Checked {
+        warnings: foreign.into_findings(),
+        text: cut::cut(&document),
+    })
+}
+
+fn words(element: &str) -> Option<&'static [&'static str]> {
+    let words = WORDS.iter().find(|(of, _)| *of == element);
+    words.map(|(_, names)| *names)
+}
+
+/// A quaternion is read from version 1.1 on; before, it would be lost and the frame left unturned.
+fn check_quaternions(report: Reporter<'_>, robot: &Node<'_, '_>) -> Result<(), ModelError> {
+    let version = robot.attribute("version").unwrap_or("1.0").trim();
+    let number = |part: Option<&str>| part.and_then(|part| part.parse::<u32>().ok());
+    let mut parts = version.split('.');
+    if (number(parts.next()), number(parts.next())) >= (Some(1), Some(1)) {
+        return Ok(());
+    }
+    let frames = |node: &Node<'_, '_>| matches!(node.tag_name().name(), "joint" | "inertial");
+    let owners = children(robot).flat_map(|owner| [owner].into_iter().chain(children(&owner)));
+    let origins = owners.filter(frames).flat_map(|owner| children(&owner));
+    for origin in origins.filter(|node| node.has_tag_name("origin")) {
+        if let Some(given) = origin.attribute("quat_xyzw") {
+            return Err(report.invalid(
+                place(&origin),
+                "attribute `quat_xyzw` is of version 1.1 of the format, it would be lost",
+                format!("\"{given}\" with <robot version=\"{version}\">"),
+                "give rpy=\"...\", or <robot version=\"1.1\"> if that is what the file is",
+            ));
         }
     }
     Ok(())
@@ -133,7 +214,7 @@ fn check_kind(report: Reporter<'_>, joint: &Node<'_, '_>) -> Result<(), ModelErr
     ];
     let kind = joint.attribute("type").unwrap_or("none");
     if kind == "revolute" {
-        let limit = children(joint).find(|child| child.has_tag_name("limit"));
+        let limit = children(joint).find(|child| is_known(child, &["limit"]));
         let given = |end| limit.is_some_and(|limit| limit.has_attribute(end));
         if !(given("lower") && given("upper")) {
             return Err(report.invalid(
@@ -156,32 +237,27 @@ fn check_kind(report: Reporter<'_>, joint: &Node<'_, '_>) -> Result<(), ModelErr
     ))
 }
 
-fn check_element(report: Reporter<'_>, node: &Node<'_, '_>) -> Result<(), ModelError> {
+fn check_element(
+    report: Reporter<'_>,
+    node: &Node<'_, '_>,
+    foreign: &mut Foreign,
+) -> Result<(), ModelError> {
     let element = node.tag_name().name();
+    if let Some(known) = words(element) {
+        foreign.attributes(report, node, known)?;
+    }
     if let Some(shape) = SHAPES.iter().find(|shape| shape.element == element) {
-        for child in children(node) {
-            let name = child.tag_name().name();
-            if !shape.known.contains(&name) {
-                return Err(report.invalid(
-                    place(&child),
-                    format!("not an element of <{element}>, it would be lost"),
-                    format!("<{name}>"),
-                    format!("one of {} is meant, or remove it", shape.known.join(", ")),
-                ));
-            }
-            let count = children(node).filter(|c| c.has_tag_name(name)).count();
-            if count > 1 && !shape.many.contains(&name) {
-                return Err(report.invalid(
-                    place(&child),
-                    format!("<{element}> takes one <{name}>"),
-                    count,
-                    "keep one of them",
-                ));
-            }
-            check_element(report, &child)?;
+        let (known, unknown): (Vec<_>, Vec<_>) =
+            children(node).partition(|child| is_known(child, shape.known));
+        for child in &unknown {
+            foreign.element(report, element, child, shape.known)?;
+        }
+        foreign::check_once(report, &known, shape.many)?;
+        for child in &known {
+            check_element(report, child, foreign)?;
         }
         for required in shape.required {
-            if !children(node).any(|child| child.has_tag_name(*required)) {
+            if !known.iter().any(|child| child.has_tag_name(*required)) {
                 return Err(report.invalid(
                     place(node),
                     format!("<{required}> is missing"),
@@ -202,26 +278,23 @@ fn check_element(report: Reporter<'_>, node: &Node<'_, '_>) -> Result<(), ModelE
     }
     if matches!(element, "visual" | "collision") {
         let mut origins = children(node).filter(|child| child.has_tag_name("origin"));
-        return origins.try_for_each(|origin| check_element(report, &origin));
+        return origins.try_for_each(|origin| check_element(report, &origin, foreign));
     }
-    check_numbers(report, node)
+    check_numbers(report, node, foreign)
 }
 
-fn check_numbers(report: Reporter<'_>, node: &Node<'_, '_>) -> Result<(), ModelError> {
+fn check_numbers(
+    report: Reporter<'_>,
+    node: &Node<'_, '_>,
+    foreign: &mut Foreign,
+) -> Result<(), ModelError> {
     let element = node.tag_name().name();
     let mut known = NUMBERS.iter().filter(|(e, ..)| *e == element).peekable();
     if known.peek().is_none() {
         return Ok(());
     }
     let names: Vec<&str> = known.clone().map(|(_, name, ..)| *name).collect();
-    if let Some(stray) = node.attributes().find(|a| !names.contains(&a.name())) {
-        return Err(report.invalid(
-            place(node),
-            "not an attribute of this element, it would be lost",
-            format!("{}=\"{}\"", stray.name(), stray.value()),
-            format!("one of {} is meant, or remove it", names.join(", ")),
-        ));
-    }
+    foreign.attributes(report, node, &names)?;
     for (_, name, count, required) in known {
         let Some(text) = node.attribute(*name) else {
             if *required {

@@ -1,6 +1,7 @@
 //! What acts at the motors and on the tip of a simulated arm, once a millisecond, as CSV.
 //!
-//! Not a log of a controller: it goes on when the controller is gone.
+//! Not a log of a controller: it goes on when the controller is gone. A disk that is full ends it and not the
+//! arm: what was in the way is said by [`TraceFile::finish`].
 
 use crate::plant::Plant;
 use std::fs::File;
@@ -24,48 +25,49 @@ pub struct TraceError {
 pub struct TraceFile {
     path: PathBuf,
     file: BufWriter<File>,
+    /// Why it ended before the run.
+    failed: Option<std::io::Error>,
     next_ns: u64,
     active: usize,
 }
 
 impl TraceFile {
-    /// A new file with its head line, for an arm of `joints` motors.
+    /// A new file with its head line, for an arm of `joints` motors. A device, FIFO, socket or folder of that
+    /// name is refused.
     ///
     /// # Errors
     /// [`TraceError`].
     pub fn create(path: &Path, joints: usize) -> Result<TraceFile, TraceError> {
-        let file = File::create(path).map_err(|source| TraceError {
+        let file = supple_files::create_output(path).map_err(|source| TraceError {
             file: path.to_owned(),
             source,
         })?;
         let mut trace = TraceFile {
             path: path.to_owned(),
             file: BufWriter::new(file),
+            failed: None,
             next_ns: 0,
             active: 0,
         };
         let motors: String = (1..=joints).map(|i| format!(",motor{i}_nm")).collect();
         trace.line(&format!(
             "time_ns,motors_in_torque_mode{motors},force_x_n,force_y_n,force_z_n,tip_z_m"
-        ))?;
+        ));
         Ok(trace)
     }
 
     /// Writes a line if it is time for one, or if motors came to brake or ceased to. `time_ns` is when, `active` how many motors take torques,
     /// `torque_nm` what acts at each, braking included. The force is the greatest since the line before: an
-    /// impact is over in less time than two lines are apart.
-    ///
-    /// # Errors
-    /// [`TraceError`].
+    /// impact is over in less time than two lines are apart. Nothing is written any more once a line could not be.
     pub fn note<const N: usize>(
         &mut self,
         time_ns: u64,
         active: usize,
         torque_nm: &[f64; N],
         plant: &mut Plant<N>,
-    ) -> Result<(), TraceError> {
+    ) {
         if time_ns < self.next_ns && active == self.active {
-            return Ok(());
+            return;
         }
         self.active = active;
         self.next_ns = time_ns + EVERY_NS;
@@ -77,14 +79,26 @@ impl TraceFile {
             force.y,
             force.z,
             plant.truth().tip_position_m.z
-        ))
+        ));
     }
 
-    fn line(&mut self, text: &str) -> Result<(), TraceError> {
-        writeln!(self.file, "{text}").map_err(|source| TraceError {
-            file: self.path.clone(),
+    /// The end of the run.
+    ///
+    /// # Errors
+    /// [`TraceError`] where the file ends before it.
+    pub fn finish(mut self) -> Result<(), TraceError> {
+        let flushed = self.file.flush();
+        let failed = self.failed.map_or(flushed, Err);
+        failed.map_err(|source| TraceError {
+            file: self.path,
             source,
         })
+    }
+
+    fn line(&mut self, text: &str) {
+        if self.failed.is_none() {
+            self.failed = writeln!(self.file, "{text}").err();
+        }
     }
 }
 
@@ -105,10 +119,9 @@ mod tests {
         let file = tempfile::NamedTempFile::new().expect("a file");
         let mut trace = TraceFile::create(file.path(), 4).expect("created");
         for (time_ns, active) in [(0, 4), (600_000, 4), (700_000, 0), (800_000, 0)] {
-            let noted = trace.note(time_ns, active, &[0.0; 4], &mut plant);
-            noted.expect("written");
+            trace.note(time_ns, active, &[0.0; 4], &mut plant);
         }
-        drop(trace);
+        trace.finish().expect("written");
         let text = std::fs::read_to_string(file.path()).expect("readable");
         let lines: Vec<&str> = text.lines().skip(1).collect();
         assert_eq!(lines.len(), 2, "{text}");

@@ -14,7 +14,7 @@ mod stop;
 pub use clock::{monotonic_ns, sleep_until_ns};
 pub use options::RealtimeOptions;
 pub use spin::spin_for;
-pub use stop::{Stop, StopError, die_with_parent};
+pub use stop::{Stop, StopError, die_with_parent, keep_running};
 
 use std::io::Error;
 

@@ -19,6 +19,7 @@ impl Stop {
     /// # Errors
     /// [`StopError`] where it was called before or the system refuses.
     pub fn on_signals() -> Result<Stop, StopError> {
+        keep_running();
         let stop = Stop::default();
         let asked = stop.clone();
         ctrlc::set_handler(move || asked.ask())?;
@@ -33,6 +34,16 @@ impl Stop {
     /// Somebody has asked to end.
     pub fn asked(&self) -> bool {
         self.0.load(Ordering::Acquire)
+    }
+}
+
+/// From now on a file that may not grow any more is an error of its write, not the end of the process, and a
+/// terminal is written by a process in the background too, which would be stopped. Programs that are started
+/// have it so as well.
+pub fn keep_running() {
+    for signal in [libc::SIGXFSZ, libc::SIGTTOU] {
+        // SAFETY: to ignore a signal runs no code of ours.
+        unsafe { libc::signal(signal, libc::SIG_IGN) };
     }
 }
 

@@ -47,6 +47,14 @@ pub fn main() -> ExitCode {
         Ok(description) => description,
         Err(error) => return complain(&error.into()),
     };
+    // Who supervises has said them.
+    for warning in description
+        .warnings()
+        .iter()
+        .filter(|_| !options.supervised())
+    {
+        eprintln!("supple-rt: warning: {warning}");
+    }
     let ran = with_dof!(description.dof(), N => run::<N>(&description, &options, &stop));
     match ran.map_err(RtError::from).and_then(|ran| ran) {
         Ok(timing) => {

@@ -14,6 +14,9 @@ pub struct Options {
     /// A built-in arm (see `supple arms`), or the path of an arm's TOML or of its folder.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
+    /// Refuses an arm whose URDF holds what is not read, instead of a warning.
+    #[arg(long)]
+    pub strict: bool,
     /// Cycles per second; the arm's own if not given. All processes of a system need the same.
     #[arg(long, value_name = "HZ", value_parser = clap::value_parser!(u32).range(10..=10_000))]
     pub rate_hz: Option<u32>,
@@ -37,9 +40,9 @@ impl Options {
     /// The arm, at the rate asked for.
     ///
     /// # Errors
-    /// As [`Description::find_at_rate`].
+    /// As [`Description::find_at_rate`]; what is left out of its URDF where nothing may be.
     pub fn description(&self) -> Result<Description, ModelError> {
-        Description::find_at_rate(&self.arm, self.rate_hz)
+        Description::find_at_rate(&self.arm, self.rate_hz)?.strict_if(self.strict)
     }
 
     /// It is to end with the process that started it.

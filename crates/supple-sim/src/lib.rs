@@ -39,6 +39,14 @@ pub fn main() -> ExitCode {
         Ok(description) => description,
         Err(error) => return complain(&error.into()),
     };
+    // Who supervises has said them.
+    for warning in description
+        .warnings()
+        .iter()
+        .filter(|_| !options.supervised())
+    {
+        eprintln!("supple-sim: warning: {warning}");
+    }
     let ran = with_dof!(description.dof(), N => run::<N>(&description, &options, &stop));
     match ran.map_err(SimError::from).and_then(|ran| ran) {
         Ok(summary) => {
@@ -80,8 +88,10 @@ pub fn run<const N: usize>(
         eprintln!("supple-sim: warning: {shortfall}");
     }
     world.spin(spin_for(options.spin_us));
-    match options.virtual_time {
+    let ran = match options.virtual_time {
         true => world.run_in_virtual_time(options.cycles, stop),
         false => world.run_by_the_clock(options.cycles, options.answer_share, stop),
-    }
+    };
+    let summary = ran?;
+    world.end_trace().map(|()| summary)
 }

@@ -15,6 +15,9 @@ pub struct Options {
     /// A built-in arm (see `supple arms`), or the path of an arm's TOML or of its folder.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
+    /// Refuses an arm whose URDF holds what is not read, instead of a warning.
+    #[arg(long)]
+    pub strict: bool,
     /// Cycles per second; the arm's own if not given. All processes of a system need the same.
     #[arg(long, value_name = "HZ", value_parser = clap::value_parser!(u32).range(10..=10_000))]
     pub rate_hz: Option<u32>,
@@ -25,7 +28,7 @@ pub struct Options {
     #[arg(long)]
     pub virtual_time: bool,
     /// A block of wood whose face is at this height above the base frame (m), beneath the whole reach.
-    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = height)]
     pub block_m: Option<f64>,
     /// Writes what acts at the joints and on the tip, once a millisecond, as CSV.
     #[arg(long, value_name = "FILE")]
@@ -51,9 +54,9 @@ impl Options {
     /// The arm, at the rate asked for.
     ///
     /// # Errors
-    /// As [`Description::find_at_rate`].
+    /// As [`Description::find_at_rate`]; what is left out of its URDF where nothing may be.
     pub fn description(&self) -> Result<Description, ModelError> {
-        Description::find_at_rate(&self.arm, self.rate_hz)
+        Description::find_at_rate(&self.arm, self.rate_hz)?.strict_if(self.strict)
     }
 
     /// It is to end with the process that started it.
@@ -65,6 +68,12 @@ impl Options {
     pub fn realtime(&self) -> Settings {
         self.realtime.settings(self.priority, self.virtual_time)
     }
+}
+
+fn height(text: &str) -> Result<f64, String> {
+    let height = text.parse().ok();
+    let height = height.filter(|m| (-10.0..=10.0).contains(m));
+    height.ok_or_else(|| "give a height from -10 to 10 m".to_owned())
 }
 
 fn share(text: &str) -> Result<f64, String> {

@@ -80,6 +80,17 @@ impl<const N: usize> World<N> {
         self.trace = Some(trace);
     }
 
+    /// The end of what is written.
+    ///
+    /// # Errors
+    /// [`SimError::Trace`] where it ended before the run.
+    pub fn end_trace(&mut self) -> Result<(), SimError> {
+        match self.trace.take() {
+            Some(trace) => Ok(trace.finish()?),
+            None => Ok(()),
+        }
+    }
+
     /// Runs by the wall clock. An answer is waited for until `answer_share` of its cycle has passed.
     ///
     /// # Errors
@@ -205,7 +216,7 @@ impl<const N: usize> World<N> {
         if let Some(trace) = &mut self.trace {
             let active = if active { N } else { 0 };
             let torque_nm = self.plant.truth().motor_torque_nm.into();
-            trace.note(time_ns, active, &torque_nm, &mut self.plant)?;
+            trace.note(time_ns, active, &torque_nm, &mut self.plant);
         }
         Ok(())
     }

@@ -1,16 +1,22 @@
 //! Built-in arms and others.
 
-use crate::console::{say, say_json};
+use crate::console::{remark, say, say_json};
 use crate::exit::Failure;
 use serde::Serialize;
+use std::collections::BTreeSet;
 use std::path::Path;
+use std::sync::Mutex;
 use supple_model::{Description, assets};
 
-/// A built-in arm by its name, or one from a file. A built-in name wins; `./wam4` is a path.
+/// Warnings that were said.
+static SAID: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
+
+/// A built-in arm by its name, or one from a file. A built-in name wins; `./wam4` is a path. What its URDF
+/// holds and is not read is said on standard error, or refused where `strict` is set.
 ///
 /// # Errors
 /// [`Failure::UnknownArm`] or [`Failure::Model`].
-pub fn find(name_or_path: &str) -> Result<Description, Failure> {
+pub fn find(name_or_path: &str, strict: bool) -> Result<Description, Failure> {
     if assets().contains(&name_or_path) {
         return Ok(Description::asset(name_or_path)?);
     }
@@ -18,12 +24,29 @@ pub fn find(name_or_path: &str) -> Result<Description, Failure> {
         || name_or_path.ends_with(".toml")
         || Path::new(name_or_path).exists();
     if meant_as_path {
-        return Ok(Description::load(name_or_path)?);
+        return load(Path::new(name_or_path), strict);
     }
     Err(Failure::UnknownArm {
         found: name_or_path.to_owned(),
         known: assets().join(", "),
     })
+}
+
+/// One from a file, as [`find`].
+///
+/// # Errors
+/// [`Failure::Model`].
+pub fn load(path: &Path, strict: bool) -> Result<Description, Failure> {
+    let description = Description::load(path)?.strict_if(strict)?;
+    let mut said = SAID.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    for warning in description.warnings() {
+        let line = format!("warning: {warning}");
+        // A command may load an arm more than once.
+        if said.insert(line.clone()) {
+            remark(&line);
+        }
+    }
+    Ok(description)
 }
 
 #[derive(Serialize)]

@@ -2,6 +2,7 @@
 
 use crate::exit::CODES;
 use crate::identification;
+use crate::range::between;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use std::num::NonZeroU64;
@@ -45,6 +46,9 @@ pub enum Command {
         /// The arm that runs.
         #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
         arm: String,
+        /// Refuse an arm whose URDF holds what is not read, instead of warning.
+        #[arg(long)]
+        strict: bool,
         /// Which system.
         #[command(flatten)]
         place: Place,
@@ -96,6 +100,9 @@ pub struct DemoArgs {
     /// A built-in arm (see `supple arms`), or the path of an arm's TOML or of its folder.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
+    /// Refuse an arm whose URDF holds what is not read, instead of warning.
+    #[arg(long)]
+    pub strict: bool,
     /// What the controller knows of it, such as `supple identify` wrote: the path of a TOML or of its folder.
     /// Default: the arm's own parameters, perturbed where the experiments say so.
     #[arg(long, value_name = "PATH")]
@@ -151,6 +158,9 @@ pub struct DrillArgs {
     /// A built-in arm (see `supple arms`), or the path of an arm's TOML or of its folder.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
+    /// Refuse an arm whose URDF holds what is not read, instead of warning.
+    #[arg(long)]
+    pub strict: bool,
     /// Ask for neither priority nor locked memory.
     #[arg(long)]
     pub no_realtime: bool,
@@ -218,6 +228,9 @@ pub struct UpArgs {
     /// A built-in arm (see `supple arms`), or the path of an arm's TOML or of its folder.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
+    /// Refuse an arm whose URDF holds what is not read, instead of warning.
+    #[arg(long)]
+    pub strict: bool,
     /// What the arm is brought to and follows.
     #[arg(long, value_enum, default_value = "sinusoid")]
     pub track: Course,
@@ -232,7 +245,7 @@ pub struct UpArgs {
     #[arg(long)]
     pub tare: bool,
     /// A block of wood beneath a simulated or emulated arm, its face at this height above the base frame (m).
-    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = between(-10.0, 10.0))]
     pub block_m: Option<f64>,
     /// Write what acts at the motors and on the tip of a simulated or emulated arm, as CSV.
     #[arg(long, value_name = "FILE")]
@@ -241,7 +254,7 @@ pub struct UpArgs {
     #[arg(long, value_name = "HZ", value_parser = clap::value_parser!(u32).range(10..=10_000))]
     pub rate_hz: Option<u32>,
     /// Shut down after so many seconds of control; until an interrupt or `supple stop` if not given.
-    #[arg(long = "for", value_name = "SECONDS", value_parser = seconds)]
+    #[arg(long = "for", value_name = "SECONDS", value_parser = between(1e-6, 1e8))]
     pub for_s: Option<f64>,
     /// As fast as the processes can, in lockstep. Needs --for.
     #[arg(long, requires = "for_s")]
@@ -267,13 +280,13 @@ pub struct UpArgs {
 #[derive(Clone, Debug, Args)]
 pub struct GainsArgs {
     /// Stiffness, for all axes or as X,Y,Z; as it is if not given.
-    #[arg(long, value_name = "N/M", value_delimiter = ',')]
+    #[arg(long, value_name = "N/M", value_delimiter = ',', value_parser = between(0.0, 1e6))]
     pub stiffness: Vec<f64>,
     /// Damping, for all axes or as X,Y,Z; as it is if not given.
-    #[arg(long, value_name = "N S/M", value_delimiter = ',')]
+    #[arg(long, value_name = "N S/M", value_delimiter = ',', value_parser = between(0.0, 1e6))]
     pub damping: Vec<f64>,
     /// Time to reach them.
-    #[arg(long = "ramp", value_name = "SECONDS", default_value_t = 1.0)]
+    #[arg(long = "ramp", value_name = "SECONDS", default_value_t = 1.0, value_parser = between(0.0, 3600.0))]
     pub ramp_s: f64,
     /// Which system.
     #[command(flatten)]
@@ -286,21 +299,17 @@ pub struct TrackArgs {
     /// Which trajectory.
     pub shape: Shape,
     /// Its pace, as a multiple of the paper's.
-    #[arg(long, value_name = "FACTOR", default_value_t = 1.0)]
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = between(1e-6, 1e6))]
     pub speed: f64,
     /// The arm that runs.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
+    /// Refuse an arm whose URDF holds what is not read, instead of warning.
+    #[arg(long)]
+    pub strict: bool,
     /// Which system.
     #[command(flatten)]
     pub place: Place,
-}
-
-fn seconds(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(seconds) if seconds.is_finite() && seconds > 0.0 => Ok(seconds),
-        _ => Err("give a positive number of seconds".to_owned()),
-    }
 }
 
 /// What to do with a log.

@@ -14,9 +14,13 @@ use supple_model::Description;
 /// # Errors
 /// [`Failure`]; [`Failure::Fault`] once everything is written.
 pub fn run(args: &DemoArgs) -> Result<(), Failure> {
-    let arm = arms::find(&args.arm)?;
-    let model = args.model.as_ref().map(Description::load).transpose()?;
-    let staging = Staging::new(&args.out)?;
+    let arm = arms::find(&args.arm, args.strict)?;
+    let model = args
+        .model
+        .as_ref()
+        .map(|path| arms::load(path, args.strict));
+    let model = model.transpose()?;
+    let staging = Staging::new(&args.out, &["report.html", "summary.json"])?;
     let options = DemoOptions {
         seed: args.seed,
         model,

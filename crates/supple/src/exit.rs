@@ -7,7 +7,7 @@
 //! | 2 | wrong use of the command line |
 //! | 3 | the description of the arm is wrong, or there is no such arm |
 //! | 4 | the arm cannot do the experiment |
-//! | 5 | a fault ended a run that should have gone through; all results are written |
+//! | 5 | a fault ended a run, or is latched in the system that was asked; all results are written |
 //! | 6 | a file cannot be read or written |
 //! | 7 | a replay does not give the logged answers |
 //! | 8 | the machine cannot run an arm in real time as it should |
@@ -34,7 +34,7 @@ pub const CODES: &str = "Exit codes:
   2    wrong use of the command line
   3    the description of the arm is wrong, or there is no such arm
   4    the arm cannot do the experiment
-  5    a fault ended a run that should have gone through; all results are written
+  5    a fault ended a run, or is latched in the system that was asked; all results are written
   6    a file cannot be read or written
   7    a replay does not give the logged answers
   8    the machine cannot run an arm in real time as it should
@@ -77,6 +77,24 @@ pub enum Failure {
     RunFault {
         /// The faults in words.
         faults: String,
+    },
+    /// A request was accepted by a system that is in a fault.
+    #[error(
+        "the system is in a fault: `supple status` says in which, `supple reset` takes it out once the \
+         cause is gone"
+    )]
+    InFault,
+    /// A log that ended before its run, the run being over.
+    #[error("the log ends before the run: {cause}")]
+    LogEnded {
+        /// Why, with the file and the remedy.
+        cause: Box<Failure>,
+    },
+    /// The trace of a simulated arm ended before its run.
+    #[error("the trace ends before the run, as {name} says above; all else is whole")]
+    TraceEnded {
+        /// The process that wrote it.
+        name: &'static str,
     },
     /// Shared memory.
     #[error(transparent)]
@@ -234,6 +252,9 @@ impl Failure {
             ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => {
                 "make room, or choose another folder with --out"
             }
+            ErrorKind::InvalidInput | ErrorKind::IsADirectory => {
+                "name a regular file, or one that is not there yet, in a folder"
+            }
             _ => "choose a folder that can be written with --out",
         };
         Failure::File {
@@ -270,6 +291,10 @@ impl Failure {
                 | Failure::Different { .. }
                 | Failure::NotReady { .. }
                 | Failure::Drill { .. }
+                | Failure::InFault
+                | Failure::RunFault { .. }
+                | Failure::LogEnded { .. }
+                | Failure::TraceEnded { .. }
         )
     }
 
@@ -278,9 +303,12 @@ impl Failure {
         match self {
             Failure::UnknownArm { .. } | Failure::Model(_) => 3,
             Failure::Experiment(error) => experiment_code(error),
-            Failure::Fault { .. } | Failure::RunFault { .. } => 5,
+            Failure::Fault { .. } | Failure::RunFault { .. } | Failure::InFault => 5,
             Failure::Log(error) => log_code(error),
-            Failure::File { .. } | Failure::Exists { .. } => 6,
+            Failure::File { .. }
+            | Failure::Exists { .. }
+            | Failure::LogEnded { .. }
+            | Failure::TraceEnded { .. } => 6,
             Failure::Different { .. } => 7,
             Failure::NotReady { .. } => 8,
             Failure::Ident(_) => 9,
@@ -346,5 +374,174 @@ fn log_code(error: &LogError) -> u8 {
 impl From<&Failure> for ExitCode {
     fn from(failure: &Failure) -> ExitCode {
         ExitCode::from(failure.code())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+    use std::io::ErrorKind;
+
+    /// Rows of the table that are no [`Failure`]: done, wrong use as clap has it, interrupted.
+    const ELSEWHERE: [u8; 3] = [0, 2, 130];
+
+    /// The rows of `--help`: code and meaning.
+    fn rows() -> Vec<(u8, &'static str)> {
+        let rows = CODES.lines().skip(1).map(|line| {
+            let (code, meaning) = line.trim().split_once(' ').expect("a code and its meaning");
+            (code.parse().expect("a number"), meaning.trim())
+        });
+        rows.collect()
+    }
+
+    fn io() -> std::io::Error {
+        ErrorKind::StorageFull.into()
+    }
+
+    /// A failure of each kind, with words of the row that it belongs to.
+    fn failures() -> Vec<(Failure, &'static str)> {
+        let words = String::new;
+        let path = || PathBuf::from("file");
+        let model = || ModelError::Dof { found: 2 };
+        let mcap = || LogError::Busy { file: words() };
+        let ident = || IdentError::Shape {
+            argument: words(),
+            expected: words(),
+            found: words(),
+        };
+        let file = || Failure::file("write", Path::new("file"), io());
+        let arm = "the description of the arm";
+        let (fault, disk, system) = ("a fault", "a file cannot be", "no system runs");
+        let runs = words();
+        vec![
+            (Failure::Compose(words()), "a defect"),
+            (Failure::RealClock, "wrong use"),
+            (Failure::RealArm, "wrong use"),
+            (Failure::NoSuchProcess { name: "" }, "wrong use"),
+            (Failure::Model(model()), arm),
+            (
+                Failure::UnknownArm {
+                    found: words(),
+                    known: words(),
+                },
+                arm,
+            ),
+            (Failure::Log(LogError::Model(model())), arm),
+            (Failure::Save(SaveError::Model(model())), arm),
+            (Failure::Experiment(ExperimentError::Model(model())), arm),
+            (Failure::Fault { runs, out: path() }, fault),
+            (Failure::RunFault { faults: words() }, fault),
+            (Failure::InFault, fault),
+            (file(), disk),
+            (Failure::Exists { path: path() }, disk),
+            (Failure::Log(mcap()), disk),
+            (Failure::Read(ReadError::Mcap(mcap())), disk),
+            (
+                Failure::LogEnded {
+                    cause: Box::new(file()),
+                },
+                disk,
+            ),
+            (Failure::TraceEnded { name: "supple-sim" }, disk),
+            (
+                Failure::Save(SaveError::Model(ModelError::Write {
+                    file: words(),
+                    error: io(),
+                })),
+                disk,
+            ),
+            (
+                Failure::Different {
+                    path: path(),
+                    different: 1,
+                    steps: 2,
+                },
+                "a replay",
+            ),
+            (Failure::NotReady { failed: words() }, "the machine"),
+            (Failure::Ident(ident()), "the logs do not give"),
+            (
+                Failure::Save(SaveError::Fit(ident())),
+                "the logs do not give",
+            ),
+            (
+                Failure::Experiment(ExperimentError::Ident(ident())),
+                "the logs do not give",
+            ),
+            (Failure::NotRunning { prefix: words() }, system),
+            (
+                Failure::ProcessEnded {
+                    name: "",
+                    status: words(),
+                },
+                system,
+            ),
+            (
+                Failure::AlreadyRunning {
+                    prefix: words(),
+                    process: 1,
+                },
+                system,
+            ),
+            (
+                Failure::NoSibling {
+                    name: "",
+                    program: path(),
+                },
+                system,
+            ),
+            (
+                Failure::Pendant {
+                    socket: path(),
+                    cause: words(),
+                },
+                system,
+            ),
+            (Failure::Refused { words: words() }, "refused a request"),
+            (Failure::NotTracking, "a drill"),
+            (Failure::Drill { rows: words() }, "a drill"),
+            (
+                Failure::Experiment(ExperimentError::Stuck {
+                    joint: 0,
+                    torque_nm: 1.0,
+                }),
+                "the arm cannot do",
+            ),
+        ]
+    }
+
+    #[test]
+    fn every_failure_has_the_code_of_its_row_and_every_row_its_failure() {
+        let rows = rows();
+        let mut seen = BTreeSet::from(ELSEWHERE);
+        for (failure, words) in failures() {
+            let code = failure.code();
+            let row = rows.iter().find(|(of, _)| *of == code);
+            let (_, meaning) = row.unwrap_or_else(|| panic!("{code} of {failure} is in no row"));
+            assert!(meaning.contains(words), "{failure}: {code} is `{meaning}`");
+            assert_ne!(failure.kind(), "", "{failure}");
+            assert_eq!(failure.kind() == "internal", code == 1, "{failure}");
+            seen.insert(code);
+        }
+        let stated: BTreeSet<u8> = rows.iter().map(|(code, _)| *code).collect();
+        assert_eq!(seen, stated);
+        assert_eq!(stated.len(), rows.len(), "a code has one row");
+    }
+
+    /// The table of the module is that of `--help`.
+    #[test]
+    fn both_tables_say_the_same() {
+        let source = include_str!("exit.rs");
+        let documented: Vec<(u8, &str)> = source
+            .lines()
+            .filter_map(|line| {
+                line.strip_prefix("//! | ")?
+                    .strip_suffix(" |")?
+                    .split_once(" | ")
+            })
+            .filter_map(|(code, meaning)| Some((code.parse().ok()?, meaning)))
+            .collect();
+        assert_eq!(documented, rows());
     }
 }

@@ -31,6 +31,7 @@ pub fn guard(partial: Option<PathBuf>) {
     reason = "an interrupt ends the program at once; what it would leave is removed first"
 )]
 pub fn install() {
+    supple_realtime::keep_running();
     // Without the handler the system ends the program as well, only the folder stays.
     let _ = ctrlc::set_handler(|| {
         if let Some(stop) = CAUGHT.get() {

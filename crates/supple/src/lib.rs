@@ -19,6 +19,7 @@ mod log;
 mod operate;
 mod out;
 mod progress;
+mod range;
 pub mod report;
 pub mod sections;
 mod table;
@@ -52,7 +53,7 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
         Command::Mode { mode, place } => operate::mode(*mode, place),
         Command::Gains(args) => operate::gains(args),
         Command::Track(args) => operate::track(args),
-        Command::Probe { arm, place } => operate::probe(arm, place),
+        Command::Probe { arm, strict, place } => operate::probe(arm, *strict, place),
         Command::Pendant { action, prefix } => operate::pendant(*action, prefix.as_deref()),
         Command::Reset(place) => operate::reset(place),
         Command::Stop(place) => operate::stop(place),

@@ -4,14 +4,17 @@
 use crate::cli::LogCommand;
 use crate::console::{say, say_json};
 use crate::exit::Failure;
-use std::fs::{self, File};
+use std::fs;
 use std::io::{BufWriter, ErrorKind, Write};
 use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
+use supple_files::{check_output, create_output, with_suffix};
 use supple_log::{LogError, export_csv, info, recover, replay};
 
 /// Ending of a log that is still being written, or was when its writer died.
 const PART: &str = "part";
+/// The same with its dot.
+const PART_SUFFIX: &str = ".part";
 
 /// Does it.
 ///
@@ -84,9 +87,10 @@ fn export_to_file(
     every: NonZeroU64,
     out: &Path,
 ) -> Result<(), Failure> {
-    let part = with_ending(out, PART);
+    let part = with_suffix(out, PART_SUFFIX);
     let failed = |action, error| Failure::file(action, out, error);
-    let mut table = BufWriter::new(File::create(&part).map_err(|error| failed("create", error))?);
+    let created = check_output(out).and_then(|()| create_output(&part));
+    let mut table = BufWriter::new(created.map_err(|error| failed("create", error))?);
     let written = export_csv(file, channel, every, &mut table)
         .map_err(|error| match error {
             LogError::Output(error) => failed("write", error),
@@ -106,13 +110,6 @@ fn export_to_file(
             Err(failure)
         }
     }
-}
-
-fn with_ending(path: &Path, ending: &str) -> PathBuf {
-    let mut name = path.as_os_str().to_owned();
-    name.push(".");
-    name.push(ending);
-    name.into()
 }
 
 /// `run.mcap` and `run.mcap.part` become `run.recovered.mcap`.

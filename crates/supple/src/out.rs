@@ -3,13 +3,15 @@
 //! Files are written to a hidden folder beside their place, on the same file system. When all are
 //! whole they are waited for until they are on the disk, and moved: the folder as one where there was
 //! none, otherwise file by file, each replacing one of its name at once. What else is in the folder
-//! stays. A run that fails or is interrupted leaves no file.
+//! stays. A run that fails or is interrupted leaves no file. Where a device, a FIFO, a socket or a folder has
+//! the name of a result, nothing is run and nothing is written.
 
 use crate::exit::Failure;
 use crate::interrupt;
 use std::fs::{self, File};
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use supple_files::{check_output, create_output};
 
 /// The file whose presence says that the results are whole: it is moved last.
 const LAST: &str = "summary.json";
@@ -22,11 +24,11 @@ pub struct Staging {
 }
 
 impl Staging {
-    /// For results that are to end up in `target`.
+    /// For results that are to end up in `target`, `names` among them.
     ///
     /// # Errors
-    /// [`Failure::File`] where nothing can be written there.
-    pub fn new(target: &Path) -> Result<Staging, Failure> {
+    /// [`Failure::File`] where nothing can be written there, or what has one of the names is no file.
+    pub fn new(target: &Path, names: &[&str]) -> Result<Staging, Failure> {
         let process = std::process::id();
         let partial = if target.is_dir() {
             target.join(format!(".partial-{process}"))
@@ -37,6 +39,9 @@ impl Staging {
         if !target.is_dir() && target.symlink_metadata().is_ok() {
             let error = std::io::ErrorKind::NotADirectory.into();
             return Err(Failure::file("write into", target, error));
+        }
+        for place in names.iter().map(|name| target.join(name)) {
+            refuse_special(&place)?;
         }
         fs::create_dir_all(&partial).map_err(|error| Failure::file("create", target, error))?;
         interrupt::guard(Some(partial.clone()));
@@ -63,14 +68,15 @@ impl Staging {
     /// [`Failure::File`].
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), Failure> {
         let path = self.partial.join(name);
-        let written = File::create(&path).and_then(|mut file| file.write_all(bytes));
+        let written = create_output(&path).and_then(|mut file| file.write_all(bytes));
         written.map_err(|error| Failure::file("write", &self.target.join(name), error))
     }
 
     /// Moves everything to its place.
     ///
     /// # Errors
-    /// [`Failure::File`]; every file that is in its place is whole then too.
+    /// [`Failure::File`]; every file that is in its place is whole then too. None is moved where what has the
+    /// name of one is no file.
     pub fn publish(self) -> Result<(), Failure> {
         let files =
             files_in(&self.partial).map_err(|error| Failure::file("read", &self.partial, error))?;
@@ -80,6 +86,9 @@ impl Staging {
         }
         if !self.target.exists() && fs::rename(&self.partial, &self.target).is_ok() {
             return Ok(());
+        }
+        for place in files.iter().map(|file| self.target.join(file)) {
+            refuse_special(&place)?;
         }
         let (last, others): (Vec<_>, Vec<_>) = files
             .iter()
@@ -93,6 +102,16 @@ impl Staging {
             moved.map_err(|error| Failure::file("replace", &place, error))?;
         }
         Ok(())
+    }
+}
+
+fn refuse_special(place: &Path) -> Result<(), Failure> {
+    match check_output(place) {
+        // A file where a folder is wanted is found when the folder is made.
+        Err(error) if error.kind() != std::io::ErrorKind::NotADirectory => {
+            Err(Failure::file("replace", place, error))
+        }
+        _ => Ok(()),
     }
 }
 
@@ -134,7 +153,7 @@ mod tests {
     }
 
     fn staged(target: &Path) -> Staging {
-        let staging = Staging::new(target).expect("it can be written");
+        let staging = Staging::new(target, &[]).expect("it can be written");
         staging.folder("figures").expect("a folder");
         for name in ["figures/a.svg", "report.html", LAST] {
             staging.write(name, b"whole").expect("written");
@@ -163,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_cannot_be_replaced_leaves_the_rest_whole_and_the_summary_unmoved() {
+    fn a_folder_in_the_place_of_a_file_is_refused_and_nothing_is_moved() {
         let folder = tempfile::tempdir().expect("a folder");
         let target = folder.path();
         fs::create_dir_all(target.join("report.html/in the way")).expect("a folder");
@@ -172,8 +191,29 @@ mod tests {
             .expect_err("a folder is in the way");
         assert_eq!(failure.code(), 6);
         assert!(failure.to_string().contains("report.html"), "{failure}");
-        assert_eq!(names(target), ["figures/a.svg"]);
-        let moved = fs::read(target.join("figures/a.svg")).expect("moved");
-        assert_eq!(moved, b"whole");
+        assert!(names(target).is_empty(), "{:?}", names(target));
+        Staging::new(target, &["report.html"]).expect_err("before anything is run, if told");
+        assert!(names(target).is_empty() && target.join("report.html").is_dir());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_fifo_in_the_place_of_a_file_stays() {
+        use std::os::unix::fs::FileTypeExt;
+        let folder = tempfile::tempdir().expect("a folder");
+        let fifo = folder.path().join(LAST);
+        let made = std::process::Command::new("mkfifo").arg(&fifo).status();
+        assert!(made.expect("mkfifo is there").success());
+        let failure = Staging::new(folder.path(), &[LAST]).expect_err("refused");
+        let later = staged(folder.path()).publish().expect_err("refused");
+        for failure in [failure, later] {
+            assert_eq!(failure.code(), 6);
+            for word in [LAST, "a FIFO", "regular file"] {
+                assert!(failure.to_string().contains(word), "{failure}");
+            }
+        }
+        assert_eq!(names(folder.path()), [LAST]);
+        let kind = fs::metadata(&fifo).expect("there").file_type();
+        assert!(kind.is_fifo());
     }
 }

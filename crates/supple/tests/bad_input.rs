@@ -168,3 +168,209 @@ fn an_interrupt_is_code_130_and_leaves_nothing() {
     assert_eq!(status.code(), Some(130));
     assert!(tree(folder.path()).is_empty(), "{:?}", tree(folder.path()));
 }
+
+/// Runs it in a folder of its own.
+fn run_in(folder: &Path, args: &[&str]) -> Answer {
+    let output = supple(args)
+        .current_dir(folder)
+        .env("XDG_RUNTIME_DIR", folder)
+        .output();
+    output.expect("it starts").into()
+}
+
+#[cfg(unix)]
+fn fifo(path: &Path) {
+    let made = std::process::Command::new("mkfifo").arg(path).status();
+    assert!(made.expect("mkfifo is there").success());
+}
+
+/// Nothing is written to a device here: it is asserted that it is refused, and still one.
+#[cfg(unix)]
+#[test]
+fn outputs_that_are_no_regular_files_are_code_6_before_anything_is_written() {
+    use std::os::unix::fs::FileTypeExt;
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name);
+    fifo(&at("fifo"));
+    for out in ["demo", "design"] {
+        fs::create_dir(at(out)).expect("made");
+        fifo(&at(out).join("summary.json"));
+    }
+    fs::write(at("a.mcap"), "no log").expect("written");
+    let before = tree(folder.path());
+    for (word, args) in [
+        (
+            "a character device",
+            &["up", "--plant", "sim", "--log", "/dev/null"][..],
+        ),
+        ("a FIFO", &["up", "--plant", "sim", "--log", "fifo"]),
+        ("a folder", &["up", "--plant", "sim", "--log", "demo"]),
+        (
+            "a FIFO",
+            &["up", "--plant", "sim", "--no-log", "--trace", "fifo"],
+        ),
+        (
+            "a character device",
+            &["up", "--plant", "sim", "--no-log", "--trace", "/dev/full"],
+        ),
+        ("a FIFO", &["demo", "--quiet", "--out", "demo"]),
+        (
+            "a FIFO",
+            &["excite", "design", "--arm", "wam4", "--out", "design"],
+        ),
+        (
+            "a character device",
+            &["log", "export", "a.mcap", "--out", "/dev/null"],
+        ),
+        ("a FIFO", &["log", "export", "a.mcap", "--out", "fifo"]),
+    ] {
+        let answer = run_in(folder.path(), args);
+        assert_eq!(answer.code, Some(6), "{args:?}: {}", answer.stderr);
+        assert_one_clear_line(&answer, &[word, "regular file"]);
+    }
+    let answer = run_in(folder.path(), &["demo", "--quiet", "--out", "/dev/null"]);
+    assert_eq!(answer.code, Some(6), "{}", answer.stderr);
+    assert_one_clear_line(&answer, &["/dev/null: not a directory", "--out"]);
+    assert_eq!(tree(folder.path()), before, "nothing beside what was there");
+    for device in ["/dev/null", "/dev/full"] {
+        let kind = fs::metadata(device).expect("still there").file_type();
+        assert!(kind.is_char_device(), "{device}");
+    }
+    let kind = fs::metadata(at("fifo")).expect("still there").file_type();
+    assert!(kind.is_fifo());
+}
+
+#[cfg(unix)]
+#[test]
+fn inputs_that_are_no_regular_files_are_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fifo(&folder.path().join("fifo"));
+    fifo(&folder.path().join("fifo.mcap"));
+    for (code, args) in [
+        (3, &["demo", "--arm", "./fifo"][..]),
+        (3, &["demo", "--arm", "/dev/zero"]),
+        (3, &["demo", "--model", "./fifo"]),
+        (6, &["log", "info", "fifo.mcap"]),
+        (6, &["log", "replay", "/dev/zero"]),
+        (6, &["log", "recover", "fifo.mcap", "to.mcap"]),
+        (6, &["identify", "--arm", "wam4", "fifo"]),
+        (6, &["identify", "--arm", "wam4", "/dev/zero"]),
+        (6, &["learn", "--arm", "wam4", "fifo.mcap"]),
+        (6, &["excite", "run", "--arm", "wam4", "--design", "fifo"]),
+    ] {
+        let answer = run_in(folder.path(), args);
+        assert_eq!(answer.code, Some(code), "{args:?}: {}", answer.stderr);
+        assert_one_clear_line(&answer, &["not a regular file"]);
+    }
+}
+
+#[test]
+fn numbers_out_of_all_proportion_are_code_2_with_their_range() {
+    let design = ["excite", "design", "--arm", "wam4"];
+    let identify = ["identify", "--arm", "wam4", "log.csv"];
+    let up = ["up", "--plant", "sim"];
+    let gains = ["gains"];
+    let folder = tempfile::tempdir().expect("a folder");
+    for (command, option, value) in [
+        (&design[..], "--candidates", "4294967296"),
+        (&design, "--candidates", "0"),
+        (&design, "--period", "1e300"),
+        (&design, "--periods", "1e300"),
+        (&design, "--periods", "nan"),
+        (&identify, "--rate", "1e300"),
+        (&identify, "--cutoff", "inf"),
+        (&identify, "--slow", "-1e300"),
+        (&identify, "--noise", "1e300"),
+        (&["breakaway"], "--ripple", "1e300"),
+        (&["calibrate"], "--ripple", "nan"),
+        (&["learn", "--arm", "wam4", "log.csv"], "--last", "1e300"),
+        (&["learn", "--arm", "wam4", "log.csv"], "--payload", "1e300"),
+        (&up, "--for", "1e300"),
+        (&up, "--block-m", "1e300"),
+        (&up, "--rate-hz", "4294967295"),
+        (&gains, "--stiffness", "1e300"),
+        (&gains, "--damping", "nan"),
+        (&gains, "--ramp", "1e300"),
+        (&["track", "sinusoid"], "--speed", "1e300"),
+    ] {
+        let value = format!("{option}={value}");
+        let answer = run_in(folder.path(), &[command, &[value.as_str()]].concat());
+        assert_eq!(
+            answer.code,
+            Some(2),
+            "{command:?} {value}: {}",
+            answer.stderr
+        );
+        let line = answer.stderr.lines().next().unwrap_or_default();
+        assert!(line.contains(option), "{option} in {line}");
+        assert!(
+            line.contains(" to ") || line.contains("..="),
+            "a range in {line}"
+        );
+    }
+    assert!(tree(folder.path()).is_empty());
+}
+
+/// Long in one piece, though each number is within its range.
+#[test]
+fn an_excitation_of_days_is_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let long = ["--period", "3600", "--periods", "1000", "--quiet"];
+    let answer = run_in(
+        folder.path(),
+        &[&["excite", "design", "--arm", "wam4"], &long[..]].concat(),
+    );
+    assert_eq!(answer.code, Some(9), "{}", answer.stderr);
+    assert_one_clear_line(&answer, &["period_s times periods", "3600000", "7200 s"]);
+}
+
+/// Half an hour, sampled once a second, on a grid of 100 kHz asks for gigabytes.
+#[test]
+fn a_grid_of_more_samples_than_there_is_memory_is_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut table = "t,q0,q1,q2,q3,tau0,tau1,tau2,tau3\n".to_owned();
+    for i in 0..2000 {
+        let q = f64::from(i % 100) * 1e-2;
+        table += &format!("{i},{q},{q},{q},{q},{q},{q},{q},{q}\n");
+    }
+    fs::write(folder.path().join("log.csv"), table).expect("written");
+    let args = ["identify", "--arm", "wam4", "log.csv", "--rate", "1e5"];
+    let answer = run_in(folder.path(), &args);
+    assert_eq!(answer.code, Some(9), "{}", answer.stderr);
+    assert_one_clear_line(&answer, &["samples at the rate of the grid", "1.999e8"]);
+}
+
+/// Said once on standard error, or refused; no system runs, so that nothing else happens.
+#[test]
+fn what_other_programs_add_to_a_urdf_is_a_warning_and_strict_refuses_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let gazebo = |urdf: String| replaced(urdf, "</robot>", "<gazebo/><gazebo/></robot>");
+    let arm = arm_in(folder.path(), same, gazebo);
+    let track = ["track", "sinusoid", "--arm", arg(&arm)];
+    let answer = run_in(folder.path(), &track);
+    assert_eq!(answer.code, Some(10), "{}", answer.stderr);
+    let warnings = answer.stderr.matches("warning: ").count();
+    assert_eq!(warnings, 1, "{}", answer.stderr);
+    assert!(
+        answer.stderr.contains("<gazebo> first of 2"),
+        "{}",
+        answer.stderr
+    );
+    for command in [
+        &track[..],
+        &["probe", "--arm", arg(&arm)],
+        &["demo", "--arm", arg(&arm)],
+        &["up", "--plant", "sim", "--arm", arg(&arm)],
+        &["drill", "--arm", arg(&arm)],
+        &["excite", "design", "--arm", arg(&arm)],
+        &["excite", "run", "--arm", arg(&arm)],
+        &["breakaway", "--arm", arg(&arm)],
+        &["calibrate", "--arm", arg(&arm)],
+        &["identify", "--arm", arg(&arm), "log.csv"],
+        &["learn", "--arm", arg(&arm), "log.csv"],
+    ] {
+        let answer = run_in(folder.path(), &[command, &["--strict"]].concat());
+        assert_eq!(answer.code, Some(3), "{command:?}: {}", answer.stderr);
+        assert_one_clear_line(&answer, &["arm.urdf", "<gazebo>", "without strict"]);
+    }
+}

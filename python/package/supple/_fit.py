@@ -282,15 +282,11 @@ class Fit:
         ValueError
             As :attr:`arm`.
         OSError
-            Where it cannot be written.
+            Where it cannot be written, or a device, FIFO, socket or folder has the name of a file.
         """
         arm = self._fit.arm(ripple)
         folder = Path(path)
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, text in (("arm.urdf", arm.urdf), ("arm.toml", arm.toml)):
-            temporary = folder / f".{name}.part"
-            temporary.write_text(text, encoding="utf-8")
-            temporary.replace(folder / name)
+        arm._save(folder)
         return folder / "arm.toml"
 
     def plot(self, log: int = 0) -> Figure:

@@ -185,6 +185,7 @@ pub(crate) fn tool(report: Reporter<'_>, settings: &Settings) -> Result<Option<T
         return Ok(None);
     };
     report.positive("[tool] cap_radius_m", tool.cap_radius_m)?;
+    report.within("[tool] cap_radius_m", tool.cap_radius_m, 1e-6..=1.0, "m")?;
     let Some(mass_kg) = tool.mass_kg else {
         if tool.com_m.is_some() || tool.inertia_kg_m2.is_some() {
             return Err(report.invalid(

@@ -91,7 +91,21 @@ fn joint(
     }
     let home = home_rad.or(entry.held.map(|held| held.position_rad));
     let home = home.unwrap_or(0.5 * (lower + upper));
-    within(format!("home_rad of joint `{}`", entry.name), home)?;
+    let element = || format!("home_rad of joint `{}`", entry.name);
+    within(element(), home)?;
+    // In a soft stop the arm would be pushed away from where it is to rest.
+    let (inner_lower, inner_upper) = (lower + soft_zone_rad, upper - soft_zone_rad);
+    if home_rad.is_some() && !(inner_lower..=inner_upper).contains(&home) {
+        return Err(toml.invalid(
+            element(),
+            "must be outside the soft stops",
+            format!("{home} rad"),
+            format!(
+                "give an angle from {inner_lower} to {inner_upper} rad, or make [limits] soft_zone_rad \
+                 ({soft_zone_rad} rad) smaller"
+            ),
+        ));
+    }
     let or_urdf = |key: &str, given: Option<f64>, attribute: &str, from_urdf: f64| match given {
         Some(value) => toml.positive(&at(key), value).map(|()| value),
         None if from_urdf > 0.0 && from_urdf.is_finite() => Ok(from_urdf),

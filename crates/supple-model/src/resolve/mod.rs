@@ -14,6 +14,13 @@ use std::collections::BTreeSet;
 use supple_core::math::Matrix3;
 use urdf_rs::{JointType, Robot};
 
+/// Free fall on any planet that has a ground to stand on, along each axis \[m/s^2\].
+const MOST_GRAVITY: f64 = 30.0;
+/// Cycle periods, 10 kHz to 10 Hz \[s\].
+const PERIODS_S: core::ops::RangeInclusive<f64> = 1e-4..=0.1;
+/// Ten turns either way \[rad\].
+const TURNS_RAD: f64 = 63.0;
+
 /// Refuses names under `[fixed_joints_rad]` and `[[joints]]` that mean nothing. Comes before the chain
 /// is read, so that a misspelt name is not reported as a branch that moves.
 pub(crate) fn check_names(
@@ -40,6 +47,7 @@ pub(crate) fn check_names(
         let joint = movable.iter().find(|joint| joint.name == *name);
         let joint = joint.ok_or_else(|| unknown(element.clone(), name))?;
         report.finite(&element, *angle_rad)?;
+        report.within(&element, *angle_rad, -TURNS_RAD..=TURNS_RAD, "rad")?;
         let limited = matches!(joint.joint_type, JointType::Revolute);
         let (lower, upper) = (joint.limit.lower, joint.limit.upper);
         if limited && lower < upper && !(lower..=upper).contains(angle_rad) {
@@ -76,10 +84,13 @@ pub(crate) fn check_names(
 pub(crate) fn check_rest(report: Reporter<'_>, settings: &Settings) -> Result<(), ModelError> {
     let (law, latch, limits) = (&settings.law, &settings.latch, &settings.limits);
     for (axis, g) in settings.gravity_m_per_s2.iter().enumerate() {
-        report.finite(&format!("gravity_m_per_s2[{axis}]"), *g)?;
+        let element = format!("gravity_m_per_s2[{axis}]");
+        report.finite(&element, *g)?;
+        report.within(&element, *g, -MOST_GRAVITY..=MOST_GRAVITY, "m/s^2")?;
     }
+    report.positive("period_s", settings.period_s)?;
+    report.within("period_s", settings.period_s, PERIODS_S, "s")?;
     for (element, value) in [
-        ("period_s", settings.period_s),
         ("estimator_rad_per_s", settings.estimator_rad_per_s),
         ("handover_s", settings.handover_s),
         ("[limits] soft_zone_rad", limits.soft_zone_rad),

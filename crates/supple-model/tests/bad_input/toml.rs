@@ -303,6 +303,40 @@ fn broken_toml() {
             ),
             (
                 "home_rad = [0.0, 0.5, 0.2]",
+                "gravity_m_per_s2 = [0.0, 0.0, -981.0]",
+                ["gravity_m_per_s2[2]", "found -981", "from -30 to 30 m/s^2"],
+            ),
+            (
+                "home_rad = [0.0, 0.5, 0.2]",
+                "period_s = 10.0",
+                ["period_s", "found 10", "from 0.0001 to 0.1 s"],
+            ),
+            (
+                "home_rad = [0.0, 0.5, 0.2]",
+                "period_s = 1e-9",
+                ["period_s", "found 0.000000001", "from 0.0001 to 0.1 s"],
+            ),
+            (
+                "home_rad = [0.0, 0.5, 0.2]",
+                "point_mass_radius_m = 1e300",
+                ["point_mass_radius_m", "found 1", "0.000001 to 10 m"],
+            ),
+            (
+                "home_rad = [0.0, 0.5, 0.2]",
+                "home_rad = [0.0, 1.45, 0.2]",
+                [
+                    "home_rad of joint `shoulder`",
+                    "1.45 rad",
+                    "from -1.3 to 1.3 rad, or make [limits] soft_zone_rad",
+                ],
+            ),
+            (
+                "cap_radius_m = 0.02",
+                "cap_radius_m = 1e300",
+                ["[tool] cap_radius_m", "found 1", "from 0.000001 to 1 m"],
+            ),
+            (
+                "home_rad = [0.0, 0.5, 0.2]",
                 "period_s = 0.0",
                 ["period_s", "found 0", "above zero"],
             ),

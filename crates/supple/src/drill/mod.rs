@@ -32,7 +32,7 @@ use supple_model::with_dof;
 /// # Errors
 /// [`Failure::Drill`] where an outcome is not the expected one.
 pub fn run(args: &DrillArgs) -> Result<(), Failure> {
-    let description = arms::find(&args.arm)?;
+    let description = arms::find(&args.arm, args.strict)?;
     let stop = interrupt::catch();
     let plants = match args.plant {
         Some(plant) => vec![plant],

@@ -49,6 +49,7 @@ pub fn perform<const N: usize>(
     let up = UpArgs {
         plant: case.plant,
         arm: args.arm.clone(),
+        strict: args.strict,
         track: Course::Sinusoid,
         bus: None,
         zero_at_home: false,

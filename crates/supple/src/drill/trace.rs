@@ -3,6 +3,9 @@
 use crate::exit::Failure;
 use std::path::Path;
 
+/// Longest trace that is read \[bytes\].
+const MOST_BYTES: u64 = 1 << 30;
+
 /// One line.
 #[derive(Clone, Debug, PartialEq)]
 struct Line {
@@ -27,8 +30,8 @@ impl After {
     /// # Errors
     /// [`Failure::File`].
     pub fn read(file: &Path, begin_ns: u64, for_ns: u64) -> Result<After, Failure> {
-        let text =
-            std::fs::read_to_string(file).map_err(|error| Failure::file("read", file, error))?;
+        let text = supple_files::read_text(file, MOST_BYTES)
+            .map_err(|error| Failure::file("read", file, error))?;
         let lines = text.lines().filter_map(Line::parse);
         let within = |line: &Line| (begin_ns..begin_ns + for_ns).contains(&line.time_ns);
         Ok(After {

@@ -28,7 +28,7 @@ pub struct Line {
 /// # Errors
 /// [`Failure`].
 pub fn run(args: &BreakawayArgs) -> Result<(), Failure> {
-    let arm = arms::find(&args.arm)?;
+    let arm = arms::find(&args.arm, args.strict)?;
     let joints = joints(&args.joints, arm.dof())?;
     let lines = with_dof!(arm.dof(), N => {
         let calibration = Calibration {

@@ -1,7 +1,7 @@
 //! `supple calibrate`: everything from breakaway to the demo on the simulated arm, in one command.
 
 use super::CalibrateArgs;
-use super::identify::{print, write};
+use super::identify::{FILES, print, write};
 use super::report::{Found, summary};
 use crate::arms;
 use crate::cli::DemoArgs;
@@ -41,7 +41,7 @@ struct Summary {
 /// # Errors
 /// [`Failure`].
 pub fn run(args: &CalibrateArgs) -> Result<(), Failure> {
-    let arm = arms::find(&args.arm)?;
+    let arm = arms::find(&args.arm, args.strict)?;
     with_dof!(arm.dof(), N => sized::<N>(&arm, args))??;
     if args.no_demo {
         return Ok(());
@@ -52,6 +52,7 @@ pub fn run(args: &CalibrateArgs) -> Result<(), Failure> {
             true => plant.display().to_string(),
             false => args.arm.clone(),
         },
+        strict: args.strict,
         model: Some(args.out.clone()),
         out: args.out.join("demo"),
         seed: args.seed,
@@ -62,7 +63,7 @@ pub fn run(args: &CalibrateArgs) -> Result<(), Failure> {
 }
 
 fn sized<const N: usize>(arm: &Description, args: &CalibrateArgs) -> Result<(), Failure> {
-    let staging = Staging::new(&args.out)?;
+    let staging = Staging::new(&args.out, &[&FILES[..], &["calibration.json"]].concat())?;
     let calibration = Calibration {
         ripple_nm: args.ripple,
         load: args.load,

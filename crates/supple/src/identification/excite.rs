@@ -34,7 +34,7 @@ struct Summary<'a> {
 /// # Errors
 /// [`Failure`].
 pub fn run(args: &DesignArgs) -> Result<(), Failure> {
-    let arm = arms::find(&args.arm)?;
+    let arm = arms::find(&args.arm, args.strict)?;
     let moving = joints(&args.moving, arm.dof())?;
     let workspace = match args.workspace[..] {
         [a, b, c, d, e, f] => Some(Workspace {
@@ -63,6 +63,10 @@ fn sized<const N: usize>(
     request: &Design,
     args: &DesignArgs,
 ) -> Result<(), Failure> {
+    let staging = Staging::new(
+        &args.out,
+        &["excitation.csv", "excitation.svg", "summary.json"],
+    )?;
     let (config, home) = (arm.config::<N>()?, arm.home::<N>()?);
     let every = (request.candidates / 10).max(1);
     let found = design(&config, &home, request, &mut |tried, best| {
@@ -73,7 +77,6 @@ fn sized<const N: usize>(
             ));
         }
     })?;
-    let staging = Staging::new(&args.out)?;
     staging.write("excitation.csv", table(&found.series).as_bytes())?;
     staging.write("excitation.svg", figure(arm, &found)?.as_bytes())?;
     let series = &found.series;

@@ -12,6 +12,9 @@ use supple_experiment::{Calibration, excitation, slow_motion};
 use supple_ident::{ReadError, SeriesLists};
 use supple_model::{Description, with_dof};
 
+/// Longest design that is read \[bytes\].
+const MOST_BYTES: u64 = 1 << 20;
+
 /// What a design leaves in `summary.json`, as far as it is needed.
 #[derive(Deserialize)]
 struct Designed {
@@ -35,7 +38,7 @@ struct Summary<'a> {
 /// # Errors
 /// [`Failure`].
 pub fn run(args: &RunArgs) -> Result<(), Failure> {
-    let arm = arms::find(&args.arm)?;
+    let arm = arms::find(&args.arm, args.strict)?;
     let design = read(&args.design)?;
     with_dof!(arm.dof(), N => sized::<N>(&arm, &design, args))?
 }
@@ -46,7 +49,7 @@ fn read(path: &Path) -> Result<Designed, Failure> {
         false => path.to_owned(),
     };
     let file = path.display().to_string();
-    let text = std::fs::read_to_string(&path).map_err(|error| ReadError::File {
+    let text = supple_files::read_text(&path, MOST_BYTES).map_err(|error| ReadError::File {
         file: file.clone(),
         error,
     })?;
@@ -69,6 +72,7 @@ fn sized<const N: usize>(
         ripple_nm: args.ripple,
         ..Calibration::new(args.seed)
     };
+    let staging = Staging::new(&args.out, &["summary.json", "logs/excitation.mcap"])?;
     let plant = plant_of::<N>(arm, &calibration)?;
     let (config, home) = (arm.config::<N>()?, arm.home::<N>()?);
     let mut series = vec![design.series.fourier::<N>()?];
@@ -76,7 +80,6 @@ fn sized<const N: usize>(
         series.push(slow_motion(&config, &home, &design.moving)?);
     }
     let session = excitation("excitation", &config, &plant, &home, &series);
-    let staging = Staging::new(&args.out)?;
     session.record(Some(&staging.folder("logs")?), arm, args.seed)?;
     let summary = Summary {
         arm: arm.name(),

@@ -21,12 +21,15 @@ const SLOW_RAD_PER_S: f64 = 0.15;
 /// Models drawn to foretell the tracking error.
 const DRAWS: u64 = 5;
 
+/// What it leaves.
+pub const FILES: [&str; 4] = ["arm.urdf", "arm.toml", "report.html", "summary.json"];
+
 /// Does it.
 ///
 /// # Errors
 /// [`Failure`].
 pub fn run(args: &IdentifyArgs) -> Result<(), Failure> {
-    let arm = arms::find(&args.arm)?;
+    let arm = arms::find(&args.arm, args.strict)?;
     with_dof!(arm.dof(), N => sized::<N>(&arm, args))?
 }
 
@@ -86,6 +89,7 @@ fn motions<const N: usize>(
 }
 
 fn sized<const N: usize>(arm: &Description, args: &IdentifyArgs) -> Result<(), Failure> {
+    let staging = Staging::new(&args.out, &FILES)?;
     let nominal = arm.arm::<N>()?;
     let procedure = procedure(args, arm.settings().period_s);
     let moving = procedure.moving_joints(N)?;
@@ -133,7 +137,6 @@ fn sized<const N: usize>(arm: &Description, args: &IdentifyArgs) -> Result<(), F
         foretold: foretell(&described, &fit, DRAWS)?,
     };
     let numbers = summary(&found);
-    let staging = Staging::new(&args.out)?;
     write(&staging, &found, &numbers)?;
     staging.publish()?;
     if args.json {

@@ -33,7 +33,7 @@ struct Summary<'a> {
 /// # Errors
 /// [`Failure`].
 pub fn run(args: &LearnArgs) -> Result<(), Failure> {
-    let arm = arms::find(&args.arm)?;
+    let arm = arms::find(&args.arm, args.strict)?;
     with_dof!(arm.dof(), N => sized::<N>(&arm, args))?
 }
 

@@ -10,8 +10,11 @@ mod learn;
 mod report;
 
 use crate::exit::{CODES, Failure};
+use crate::range::between;
+use clap::builder::RangedU64ValueParser;
 use clap::{Args, Subcommand, ValueEnum};
 use std::path::PathBuf;
+use supple_ident::design::MOST_CANDIDATES;
 use supple_ident::{IdentError, Method};
 
 /// What to do.
@@ -87,6 +90,9 @@ pub struct IdentifyArgs {
     /// A built-in arm, or the path of an arm's TOML or of its folder: kinematics, and the prior.
     #[arg(long, value_name = "NAME|PATH")]
     pub arm: String,
+    /// Refuse an arm whose URDF holds what is not read, instead of warning.
+    #[arg(long)]
+    pub strict: bool,
     /// Folder for arm.toml, arm.urdf, report.html and summary.json.
     #[arg(long, value_name = "DIR", default_value = "out/identified")]
     pub out: PathBuf,
@@ -100,20 +106,20 @@ pub struct IdentifyArgs {
     #[arg(long, value_name = "J+J", value_parser = pair)]
     pub coupling: Vec<(usize, usize)>,
     /// Cutoff of the zero-phase filter [Hz].
-    #[arg(long, value_name = "HZ", default_value_t = 8.0)]
+    #[arg(long, value_name = "HZ", default_value_t = 8.0, value_parser = between(1e-3, 1e5))]
     pub cutoff: f64,
     /// Rate of the grid [Hz]. Default: the log's own.
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", value_parser = between(1e-1, 1e5))]
     pub rate: Option<f64>,
     /// Solver.
     #[arg(long, value_enum, default_value = "consistent")]
     pub method: Solver,
     /// Leave out samples of a joint slower than this, and fit a Stribeck dip from them [rad/s]. Default:
     /// 0.15 for MCAP, 0 (none) for CSV, where friction columns are chosen by cross-validation.
-    #[arg(long, value_name = "RAD/S")]
+    #[arg(long, value_name = "RAD/S", value_parser = between(0.0, 100.0))]
     pub slow: Option<f64>,
     /// Standard deviation of the torque noise of each moving joint [N m]. Default: from residuals.
-    #[arg(long, value_name = "NM,NM..", value_delimiter = ',')]
+    #[arg(long, value_name = "NM,NM..", value_delimiter = ',', value_parser = between(1e-9, 1e6))]
     pub noise: Vec<f64>,
     /// Print the summary as JSON.
     #[arg(long)]
@@ -126,6 +132,9 @@ pub struct DesignArgs {
     /// A built-in arm, or the path of an arm's TOML or of its folder.
     #[arg(long, value_name = "NAME|PATH")]
     pub arm: String,
+    /// Refuse an arm whose URDF holds what is not read, instead of warning.
+    #[arg(long)]
+    pub strict: bool,
     /// Folder for excitation.csv, excitation.svg and summary.json.
     #[arg(long, value_name = "DIR", default_value = "out/excitation")]
     pub out: PathBuf,
@@ -136,13 +145,18 @@ pub struct DesignArgs {
     #[arg(long, value_enum, default_value = "condition")]
     pub criterion: Criterion,
     /// Length of a period [s].
-    #[arg(long, value_name = "S", default_value_t = 15.0)]
+    #[arg(long, value_name = "S", default_value_t = 15.0, value_parser = between(0.1, 3600.0))]
     pub period: f64,
     /// Number of periods.
-    #[arg(long, value_name = "N", default_value_t = 4.0)]
+    #[arg(long, value_name = "N", default_value_t = 4.0, value_parser = between(0.1, 1000.0))]
     pub periods: f64,
     /// Candidates tried.
-    #[arg(long, value_name = "N", default_value_t = 3000)]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 3000,
+        value_parser = RangedU64ValueParser::<usize>::new().range(1..=MOST_CANDIDATES as u64)
+    )]
     pub candidates: usize,
     /// Box that the tip stays in, base axes: least x, y, z, greatest x, y, z [m].
     #[arg(
@@ -150,6 +164,7 @@ pub struct DesignArgs {
         value_name = "M",
         value_delimiter = ',',
         num_args = 6,
+        value_parser = between(-1e3, 1e3),
         allow_hyphen_values = true
     )]
     pub workspace: Vec<f64>,
@@ -170,6 +185,9 @@ pub struct RunArgs {
     /// A built-in arm, or the path of an arm's TOML or of its folder: plant and controller.
     #[arg(long, value_name = "NAME|PATH")]
     pub arm: String,
+    /// Refuse an arm whose URDF holds what is not read, instead of warning.
+    #[arg(long)]
+    pub strict: bool,
     /// Folder that `excite design` wrote, or its summary.json.
     #[arg(long, value_name = "PATH", default_value = "out/excitation")]
     pub design: PathBuf,
@@ -180,7 +198,7 @@ pub struct RunArgs {
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
     /// Torque ripple of the plant's motors, seen at the joints [N m].
-    #[arg(long, value_name = "NM", default_value_t = 0.0)]
+    #[arg(long, value_name = "NM", default_value_t = 0.0, value_parser = between(0.0, 100.0))]
     pub ripple: f64,
     /// The plant's friction depends on direction and load too.
     #[arg(long)]
@@ -199,6 +217,9 @@ pub struct BreakawayArgs {
     /// A built-in arm, or the path of an arm's TOML or of its folder.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
+    /// Refuse an arm whose URDF holds what is not read, instead of warning.
+    #[arg(long)]
+    pub strict: bool,
     /// Joints, from 0. Default: all.
     #[arg(long, value_name = "J,J..", value_delimiter = ',')]
     pub joints: Vec<usize>,
@@ -207,7 +228,7 @@ pub struct BreakawayArgs {
     pub seed: u64,
     /// Torque ripple of the plant's motors, seen at the joints [N m]; found from slow runs first, and
     /// compensated.
-    #[arg(long, value_name = "NM", default_value_t = 0.0)]
+    #[arg(long, value_name = "NM", default_value_t = 0.0, value_parser = between(0.0, 100.0))]
     pub ripple: f64,
     /// Print the result as JSON.
     #[arg(long)]
@@ -220,6 +241,9 @@ pub struct CalibrateArgs {
     /// A built-in arm, or the path of an arm's TOML or of its folder: the simulated plant.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
+    /// Refuse an arm whose URDF holds what is not read, instead of warning.
+    #[arg(long)]
+    pub strict: bool,
     /// Folder for the identified arm, the reports and the logs.
     #[arg(long, value_name = "DIR", default_value = "out/calibrate")]
     pub out: PathBuf,
@@ -227,7 +251,7 @@ pub struct CalibrateArgs {
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
     /// Torque ripple of the plant's motors, seen at the joints [N m].
-    #[arg(long, value_name = "NM", default_value_t = 0.0)]
+    #[arg(long, value_name = "NM", default_value_t = 0.0, value_parser = between(0.0, 100.0))]
     pub ripple: f64,
     /// The plant's friction depends on direction and load too.
     #[arg(long)]
@@ -252,14 +276,17 @@ pub struct LearnArgs {
     /// The model that was in use: a built-in arm, or the path of a TOML or of its folder.
     #[arg(long, value_name = "NAME|PATH")]
     pub arm: String,
+    /// Refuse an arm whose URDF holds what is not read, instead of warning.
+    #[arg(long)]
+    pub strict: bool,
     /// Folder for the model with what was learnt.
     #[arg(long, value_name = "DIR", default_value = "out/learnt")]
     pub out: PathBuf,
     /// Only so much of the end of each log counts [s]. Default: all.
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", value_parser = between(1e-3, 1e9))]
     pub last: Option<f64>,
     /// Look for a body in the hand of about this mass too [kg].
-    #[arg(long, value_name = "KG")]
+    #[arg(long, value_name = "KG", value_parser = between(1e-6, 1e3))]
     pub payload: Option<f64>,
     /// Print the result as JSON.
     #[arg(long)]

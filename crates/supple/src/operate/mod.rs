@@ -21,7 +21,7 @@ use core::time::Duration;
 use serde::Serialize;
 use supple_core::Trajectory;
 use supple_core::config::Gains;
-use supple_core::controller::Request;
+use supple_core::controller::{Mode, Request};
 use supple_core::math::Vector3;
 use supple_experiment::scenario;
 use supple_ipc::message::{OperatorReply, Telemetry};
@@ -149,7 +149,7 @@ pub fn track(args: &TrackArgs) -> Result<(), Failure> {
             (Trajectory::Quadrant(quadrant), duration_s)
         }
     };
-    let description = arms::find(&args.arm)?;
+    let description = arms::find(&args.arm, args.strict)?;
     follow(&args.place, &description, trajectory, duration_s)
 }
 
@@ -157,8 +157,8 @@ pub fn track(args: &TrackArgs) -> Result<(), Failure> {
 ///
 /// # Errors
 /// [`Failure`].
-pub fn probe(arm: &str, place: &Place) -> Result<(), Failure> {
-    let description = arms::find(arm)?;
+pub fn probe(arm: &str, strict: bool, place: &Place) -> Result<(), Failure> {
+    let description = arms::find(arm, strict)?;
     let (trajectory, duration_s) = course(Course::Probe, &description);
     follow(place, &description, trajectory, duration_s)
 }
@@ -205,12 +205,16 @@ pub fn stop(place: &Place) -> Result<(), Failure> {
 
 fn answered(place: &Place, reply: &OperatorReply) -> Result<(), Failure> {
     let mode = reply.mode().map_or("unknown", |mode| mode.name());
-    if place.json {
-        return say_json(&Answer {
+    match place.json {
+        true => say_json(&Answer {
             accepted: true,
             mode,
             cycle: reply.cycle,
-        });
+        }),
+        false => say(&format!("mode {mode} since cycle {}", reply.cycle)),
+    }?;
+    match reply.mode() {
+        Some(Mode::Fault) => Err(Failure::InFault),
+        _ => Ok(()),
     }
-    say(&format!("mode {mode} since cycle {}", reply.cycle))
 }

@@ -5,11 +5,14 @@ use crate::exit::Failure;
 use core::time::Duration;
 use rustix::process::{Pid, Signal, kill_process};
 use std::fs;
+use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::Instant;
 use supple_ipc::{Domain, pause};
 
+/// Exit code of a program that could not write a file.
+const FILE_CODE: i32 = 6;
 /// How often an ending process is looked at.
 const LOOK_EVERY: Duration = Duration::from_millis(5);
 
@@ -17,12 +20,13 @@ const LOOK_EVERY: Duration = Duration::from_millis(5);
 #[derive(Debug, Default)]
 pub struct Children {
     running: Vec<(&'static str, Child)>,
-    /// Programs that have ended well.
-    ended: Vec<&'static str>,
+    /// Programs that have ended, each with how.
+    ended: Vec<(&'static str, ExitStatus)>,
 }
 
 impl Children {
-    /// Starts a program that is beside this one.
+    /// Starts a program that is beside this one. It hears no interrupt of a terminal: it is ended in order,
+    /// after what it knows has been asked of it.
     ///
     /// # Errors
     /// [`Failure::NoSibling`] says how to build what is missing.
@@ -33,6 +37,7 @@ impl Children {
             .args(arguments)
             .stdin(Stdio::null())
             .stdout(Stdio::null())
+            .process_group(0)
             .spawn()
             .map_err(|error| Failure::file("start", &program, error))?;
         self.running.push((name, child));
@@ -78,7 +83,7 @@ impl Children {
     /// [`Failure::ProcessEnded`] where it ended otherwise.
     pub fn all_ended_well(&mut self, name: &'static str) -> Result<bool, Failure> {
         let Some((_, child)) = self.running.iter_mut().find(|(n, _)| *n == name) else {
-            return Ok(self.ended.contains(&name));
+            return Ok(self.ended.iter().any(|(n, _)| *n == name));
         };
         match status(child)? {
             Some(status) if status.success() => Ok(true),
@@ -113,11 +118,18 @@ impl Children {
         self.start(program)
     }
 
-    /// Asks a program to end and waits for it, with `meanwhile` done again and again; kills it where it does
-    /// not end in time.
+    /// A program whose trace ended before its run.
+    pub fn trace_ended(&self) -> Option<&'static str> {
+        let mut ended = self.ended.iter();
+        let found = ended.find(|(_, status)| status.code() == Some(FILE_CODE));
+        found.map(|(name, _)| *name)
+    }
+
+    /// Asks a program to end and waits for it, with `meanwhile` done again and again until it fails; kills it
+    /// where it does not end in time.
     ///
     /// # Errors
-    /// What `meanwhile` says.
+    /// What `meanwhile` says, once the program has ended.
     pub fn end(
         &mut self,
         name: &'static str,
@@ -132,16 +144,21 @@ impl Children {
             terminate(&child);
         }
         let start = Instant::now();
-        while status(&mut child)?.is_none() {
-            meanwhile()?;
+        let mut done = Ok(());
+        let status = loop {
+            if let Some(status) = status(&mut child)? {
+                break status;
+            }
+            if done.is_ok() {
+                done = meanwhile();
+            }
             if start.elapsed() > within {
                 kill(&mut child);
-                break;
             }
             pause(LOOK_EVERY);
-        }
-        self.ended.push(name);
-        Ok(())
+        };
+        self.ended.push((name, status));
+        done
     }
 }
 

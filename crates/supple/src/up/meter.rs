@@ -69,6 +69,8 @@ pub struct UpSummary {
     pub tracked_cycles: u64,
     /// Faults that latched, in words.
     pub faults: Vec<String>,
+    /// Why the log or the trace ended before the run; none where both are whole.
+    pub cut_short: Option<String>,
     /// Time of the arm over time of the wall; none where they are the same.
     pub times_real_time: Option<f64>,
 }
@@ -108,6 +110,11 @@ impl Meter {
             self.squared_error_m2 += error_m * error_m;
             self.tracked += 1;
         }
+        self.note_fault(telemetry);
+    }
+
+    /// Takes note of a fault that has latched, of a cycle that is not counted otherwise.
+    pub fn note_fault(&mut self, telemetry: &Telemetry) {
         if telemetry.fault != self.fault && telemetry.fault != 0 {
             self.faults.push(telemetry.fault_text.to_string());
         }
@@ -146,6 +153,7 @@ impl Meter {
             rms_error_m: mean(self.squared_error_m2, self.tracked).map(f64::sqrt),
             tracked_cycles: self.tracked,
             faults: self.faults.clone(),
+            cut_short: None,
             times_real_time: None,
         }
     }

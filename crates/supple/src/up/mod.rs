@@ -34,11 +34,16 @@ use supple_model::{Description, with_dof};
 /// # Errors
 /// [`Failure`]; [`Failure::RunFault`] once everything is shut down and written.
 pub fn run(args: &UpArgs) -> Result<(), Failure> {
-    let description = args.at_rate(arms::find(&args.arm)?)?;
+    let description = args.at_rate(arms::find(&args.arm, args.strict)?)?;
     with_dof!(description.dof(), N => sized::<N>(args, &description))?
 }
 
 fn sized<const N: usize>(args: &UpArgs, description: &Description) -> Result<(), Failure> {
+    // Before there is a process or a file.
+    for output in args.log_file().iter().chain(&args.trace) {
+        let checked = supple_files::check_output(output);
+        checked.map_err(|error| Failure::file("write", output, error))?;
+    }
     let domain = Domain::new(args.prefix.as_deref())?;
     let stop = interrupt::catch();
     let _pidfile = Pidfile::create(&domain)?;
@@ -46,20 +51,30 @@ fn sized<const N: usize>(args: &UpArgs, description: &Description) -> Result<(),
     let started = system.start(description);
     let ended = started.and_then(|()| system.watch(&stop));
     let shut_down = system.end();
-    let (summary, log) = (system.finish()?, args.log_file());
-    ended.and(shut_down)?;
+    let mut summary = system.finish();
+    let cut_short = system.cut_short();
+    summary.cut_short = cut_short.as_ref().map(ToString::to_string);
+    let fault = (!summary.faults.is_empty()).then(|| Failure::RunFault {
+        faults: summary.faults.join("; "),
+    });
+    match (ended.and(shut_down), &fault) {
+        (Ok(()), _) => {}
+        // What was asked for was refused because of the fault.
+        (Err(Failure::Refused { words }), Some(_)) => remark(&words),
+        (Err(failure), fault) => {
+            if let Some(fault) = fault {
+                remark(&fault.to_string());
+            }
+            return Err(failure);
+        }
+    }
     if args.json {
         say_json(&summary)?;
     } else {
         say(&summary.to_string())?;
-        if let Some(log) = log {
+        if let (Some(log), None) = (args.log_file(), &cut_short) {
             remark(&format!("log: {}", log.display()));
         }
     }
-    match summary.faults.is_empty() {
-        true => Ok(()),
-        false => Err(Failure::RunFault {
-            faults: summary.faults.join("; "),
-        }),
-    }
+    fault.or(cut_short).map_or(Ok(()), Err)
 }

@@ -136,6 +136,7 @@ impl UpArgs {
             PlantKind::Can => "can",
         });
         words.extend(self.no_realtime.then_some("--no-realtime"));
+        words.extend(self.strict.then_some("--strict"));
         let mut words: Vec<String> = words.into_iter().map(str::to_owned).collect();
         if let Some(prefix) = &self.prefix {
             words.extend(["--prefix".to_owned(), prefix.clone()]);
@@ -167,6 +168,9 @@ impl UpArgs {
         ];
         if self.virtual_time {
             arguments.push("--virtual-time".to_owned());
+        }
+        if self.strict {
+            arguments.push("--strict".to_owned());
         }
         if self.no_realtime {
             arguments.push("--no-realtime".to_owned());

@@ -1,5 +1,6 @@
-//! Telemetry into a log.
+//! Telemetry into a log, for as long as it can be written: a full disk ends the log, not the arm.
 
+use crate::console::remark;
 use crate::exit::Failure;
 use std::fs;
 use std::path::Path;
@@ -8,6 +9,60 @@ use supple_core::Config;
 use supple_ipc::message::{Drives, MAX_DOF, Telemetry};
 use supple_log::{CycleTiming, Extras, Record, RunInfo, TorqueTerms, Writer};
 use supple_model::Description;
+
+/// The log of a run, if there is one, and why it ended before the run, if it did.
+pub struct Journal<const N: usize> {
+    recorder: Option<Recorder<N>>,
+    ended: Option<Failure>,
+}
+
+impl<const N: usize> Journal<N> {
+    /// Of a run with a log or without.
+    pub fn new(recorder: Option<Recorder<N>>) -> Self {
+        Journal {
+            recorder,
+            ended: None,
+        }
+    }
+
+    /// A cycle.
+    pub fn add(&mut self, telemetry: &Telemetry) {
+        self.write(|recorder| recorder.add(telemetry));
+    }
+
+    /// Something that happened to the arm, by the clock of its states.
+    pub fn event(&mut self, stamp_ns: u64, text: &str) {
+        self.write(|recorder| recorder.event(stamp_ns, text));
+    }
+
+    /// The log is whole, or it is said why it is not.
+    pub fn finish(&mut self) {
+        let finished = self.recorder.take().map_or(Ok(()), Recorder::finish);
+        self.end_with(finished);
+    }
+
+    /// Why it ended before the run.
+    pub fn ended(&mut self) -> Option<Failure> {
+        self.ended.take()
+    }
+
+    fn write(&mut self, write: impl FnOnce(&mut Recorder<N>) -> Result<(), Failure>) {
+        if let Some(recorder) = &mut self.recorder {
+            let written = write(recorder);
+            self.end_with(written);
+        }
+    }
+
+    fn end_with(&mut self, written: Result<(), Failure>) {
+        if let Err(failure) = written {
+            remark(&format!(
+                "warning: the log ends here, the arm goes on: {failure}"
+            ));
+            self.recorder = None;
+            self.ended = Some(failure);
+        }
+    }
+}
 
 /// A log that grows by a record a cycle.
 pub struct Recorder<const N: usize> {

@@ -3,7 +3,7 @@
 use super::children::Children;
 use super::meter::{Meter, UpSummary};
 use super::plan::Plan;
-use super::recorder::Recorder;
+use super::recorder::{Journal, Recorder};
 use super::stages::{Stages, cycles_of};
 use super::status_line::StatusLine;
 use crate::cli::UpArgs;
@@ -35,7 +35,7 @@ pub struct System<'a, const N: usize> {
     limit: Option<u64>,
     approach: Approach<N>,
     stages: Stages,
-    recorder: Option<Recorder<N>>,
+    journal: Journal<N>,
     reader: TelemetryReader,
     session: Session<N>,
     children: Children,
@@ -66,7 +66,7 @@ impl<'a, const N: usize> System<'a, N> {
         Ok(System {
             stages: Stages::new(plan.pendant.clone(), args.plant, period_s),
             approach: Approach::new(&config, trajectory, duration_s)?,
-            recorder: recorder.transpose()?,
+            journal: Journal::new(recorder.transpose()?),
             // Readers before writers, so that nothing is missed.
             reader: TelemetryReader::new(domain)?,
             session: Session::new(domain)?,
@@ -111,7 +111,7 @@ impl<'a, const N: usize> System<'a, N> {
     /// Until it is over, is asked to end, or something fails.
     ///
     /// # Errors
-    /// A process that ended, a request that was refused, a log that cannot be written.
+    /// A process that ended, a request that was refused. A log that cannot be written is said, and no error.
     pub fn watch(&mut self, stop: &Stop) -> Result<(), Failure> {
         let mut fault_seen = false;
         while !stop.asked() {
@@ -149,7 +149,7 @@ impl<'a, const N: usize> System<'a, N> {
         let Some(telemetry) = self.reader.wait(LOOK_EVERY)? else {
             return Ok(None);
         };
-        self.add(&telemetry)?;
+        self.add(&telemetry);
         self.line.show(&telemetry, &self.meter);
         if !self.args.virtual_time {
             let session = &mut self.session;
@@ -161,76 +161,76 @@ impl<'a, const N: usize> System<'a, N> {
     /// As [`System::turn`], asking for nothing.
     ///
     /// # Errors
-    /// Shared memory or the log.
+    /// Shared memory.
     pub fn hear(&mut self) -> Result<Option<Telemetry>, Failure> {
         let telemetry = self.reader.wait(LOOK_EVERY)?;
         if let Some(telemetry) = &telemetry {
-            self.add(telemetry)?;
+            self.add(telemetry);
         }
         Ok(telemetry)
     }
 
-    fn add(&mut self, telemetry: &Telemetry) -> Result<(), Failure> {
+    fn add(&mut self, telemetry: &Telemetry) {
         let now = Instant::now();
         self.seen = Some((self.seen.map_or(now, |(first, _)| first), now));
         self.meter.add(telemetry);
-        match &mut self.recorder {
-            Some(recorder) => recorder.add(telemetry),
-            None => Ok(()),
-        }
+        self.journal.add(telemetry);
     }
 
-    /// Ends the processes in order and hears what they still say.
+    /// Ends the processes in order, whatever fails on the way, and hears what they still say.
     ///
     /// # Errors
-    /// A log that cannot be written.
+    /// The first that failed: shared memory, or a process that cannot be waited for.
     pub fn end(&mut self) -> Result<(), Failure> {
         self.line.end();
-        let (reader, recorder, meter) = (&mut self.reader, &mut self.recorder, &mut self.meter);
+        let (reader, journal, meter) = (&mut self.reader, &mut self.journal, &mut self.meter);
         let virtual_time = self.args.virtual_time;
         let mut drain = || -> Result<(), Failure> {
             while let Some(telemetry) = reader.receive()? {
-                if virtual_time {
-                    meter.add(&telemetry);
+                match virtual_time {
+                    true => meter.add(&telemetry),
+                    false => meter.note_fault(&telemetry),
                 }
-                if let Some(recorder) = recorder.as_mut() {
-                    recorder.add(&telemetry)?;
-                }
+                journal.add(&telemetry);
             }
             Ok(())
         };
         let children = &mut self.children;
-        children.end(self.plan.controller.name, END_WITHIN, &mut drain)?;
-        children.end(self.plan.clock.name, END_WITHIN, &mut drain)?;
-        drain()?;
-        if let (Some(pendant), Some(recorder)) = (&self.plan.pendant, recorder.as_mut()) {
+        let controller = children.end(self.plan.controller.name, END_WITHIN, &mut drain);
+        let clock = children.end(self.plan.clock.name, END_WITHIN, &mut drain);
+        let heard = drain();
+        if let Some(pendant) = &self.plan.pendant {
             match pendant.record() {
                 Ok(happenings) => {
                     for happening in happenings {
-                        recorder.event(happening.time_ns, &happening.what)?;
+                        journal.event(happening.time_ns, &happening.what);
                     }
                 }
                 // An arm that was lost tells no more; the log is whole without.
                 Err(failure) => remark(&format!("no events of the arm in the log: {failure}")),
             }
         }
-        match &self.plan.arm {
+        let arm = match &self.plan.arm {
             Some(arm) => children.end(arm.name, END_WITHIN, &mut || Ok(())),
             None => Ok(()),
-        }
+        };
+        controller.and(clock).and(heard).and(arm)
     }
 
-    /// The log is whole; what the run was in numbers.
-    ///
-    /// # Errors
-    /// [`Failure::Log`].
-    pub fn finish(&mut self) -> Result<UpSummary, Failure> {
-        if let Some(recorder) = self.recorder.take() {
-            recorder.finish()?;
-        }
+    /// Closes the log; what the run was in numbers.
+    pub fn finish(&mut self) -> UpSummary {
+        self.journal.finish();
         let mut summary = self.meter.summary(self.reader.lost());
         summary.times_real_time = self.times_real_time();
-        Ok(summary)
+        summary
+    }
+
+    /// What was to be written and is not whole, once all is over.
+    pub fn cut_short(&mut self) -> Option<Failure> {
+        let cause = self.journal.ended().map(Box::new);
+        let log = cause.map(|cause| Failure::LogEnded { cause });
+        let trace = || self.children.trace_ended();
+        log.or_else(|| trace().map(|name| Failure::TraceEnded { name }))
     }
 
     /// Sends a process a signal.

@@ -1,0 +1,119 @@
+//! How large a URDF may be, so that whatever follows ends soon: a text of a few megabytes can hold elements
+//! that are nested deeper than a stack, or links by the ten thousand.
+
+use super::{children, place};
+use crate::error::{ModelError, Reporter};
+use roxmltree::{Document, Node, ParsingOptions};
+
+/// Nodes of the document, text between elements included: a hundred times those of a humanoid.
+const MOST_NODES: u32 = 500_000;
+/// Elements in each other; a URDF as published has ten.
+const MOST_DEPTH: usize = 64;
+/// Attributes of one element: the parser compares each with each.
+const MOST_ATTRIBUTES: usize = 256;
+/// Links, and joints.
+const MOST_LINKS: usize = 1000;
+
+const REMEDY: &str = "give the URDF of an arm, without what belongs to other programs";
+
+/// The document of a text that is not out of all proportion.
+pub(crate) fn parse<'a>(report: Reporter<'_>, text: &'a str) -> Result<Document<'a>, ModelError> {
+    check_attributes(report, text)?;
+    let options = ParsingOptions {
+        nodes_limit: MOST_NODES,
+        ..ParsingOptions::default()
+    };
+    let document = Document::parse_with_options(text, options);
+    let document = document.map_err(|error| match error {
+        roxmltree::Error::NodesLimitReached => report.invalid(
+            "<robot>",
+            format!("may have at most {MOST_NODES} elements and texts"),
+            "more",
+            REMEDY,
+        ),
+        error => ModelError::Syntax {
+            file: report.file.to_owned(),
+            message: error.to_string(),
+            remedy: "a URDF is one well-formed XML document with <robot> at its root",
+        },
+    })?;
+    check_depth(report, &document)?;
+    let robot = document.root_element();
+    for kind in ["link", "joint"] {
+        let count = children(&robot).filter(|n| n.has_tag_name(kind)).count();
+        if count > MOST_LINKS {
+            return Err(report.invalid(
+                place(&robot),
+                format!("may have at most {MOST_LINKS} of <{kind}>"),
+                count,
+                REMEDY,
+            ));
+        }
+    }
+    Ok(document)
+}
+
+/// Values that are given between one `<` and the next are those of at most one element.
+fn check_attributes(report: Reporter<'_>, text: &str) -> Result<(), ModelError> {
+    let values = |tag: &str| {
+        let mut before = 0_u8;
+        let mut count = 0;
+        for byte in tag.bytes().filter(|byte| !byte.is_ascii_whitespace()) {
+            count += usize::from(before == b'=' && matches!(byte, b'"' | b'\''));
+            before = byte;
+        }
+        count
+    };
+    for tag in text.split('<') {
+        let count = values(tag);
+        if count > MOST_ATTRIBUTES {
+            let name: String = tag.chars().take_while(|c| c.is_alphanumeric()).collect();
+            return Err(report.invalid(
+                format!("<{name}>"),
+                format!("may have at most {MOST_ATTRIBUTES} attributes"),
+                count,
+                REMEDY,
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn check_depth(report: Reporter<'_>, document: &Document<'_>) -> Result<(), ModelError> {
+    let mut depth = 0;
+    let mut node = document.root();
+    loop {
+        node = match node.first_child() {
+            Some(child) => {
+                depth += 1;
+                child
+            }
+            None => match next_beside(node, &mut depth) {
+                Some(next) => next,
+                None => return Ok(()),
+            },
+        };
+        if depth > MOST_DEPTH {
+            return Err(report.invalid(
+                place(&node),
+                format!("elements may be nested at most {MOST_DEPTH} deep"),
+                "more",
+                REMEDY,
+            ));
+        }
+    }
+}
+
+/// The next node that is not inside `node`, in the order of the text.
+fn next_beside<'a, 'input>(
+    mut node: Node<'a, 'input>,
+    depth: &mut usize,
+) -> Option<Node<'a, 'input>> {
+    loop {
+        if let Some(next) = node.next_sibling() {
+            return Some(next);
+        }
+        node = node.parent()?;
+        *depth -= 1;
+    }
+}
