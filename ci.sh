@@ -4,8 +4,9 @@ set -euo pipefail
 cd "$(dirname "$0")"
 
 PLAIN=(fmt clippy test doctest doc)
-FULL=(deny advisories python package instructions fused cortex-m socketcan)
+FULL=(deny advisories python package instructions fused cycles fuzz cortex-m socketcan services)
 CARGO_DENY_VERSION=0.20.2
+CARGO_FUZZ_VERSION=0.13.2
 GUNGRAUN_VERSION=0.20.0
 THUMB=thumbv7em-none-eabihf
 
@@ -127,6 +128,56 @@ step_fused() {
     RUSTFLAGS="-C target-cpu=native" cargo test --locked -p supple-core --tests --target-dir target/fused
 }
 
+# cycles: 10 million cycles of the core with random requests and inputs, optimised; SUPPLE_CYCLES for another number
+step_cycles() {
+    SUPPLE_CYCLES=${SUPPLE_CYCLES:-10000000} cargo test --locked --release -p supple-core --test cycles
+}
+
+# fuzz: each target of tests/fuzz for 10 s, SUPPLE_FUZZ_S for another time; without a nightly compiler, seeded mutations
+step_fuzz() {
+    local seconds=${SUPPLE_FUZZ_S:-10}
+    if ! nightly_fuzz; then
+        echo "no nightly compiler or no cargo-fuzz: seeded mutations on the stable compiler"
+        SUPPLE_FUZZ_FACTOR=$seconds cargo test --locked --release -p supple-fuzz --test corpus
+        return
+    fi
+    local work=$PWD/$WORK/fuzz programs=tests/fuzz/libfuzzer target
+    rm -rf "$work"
+    mkdir -p "$work/tmp" "$work/artifacts"
+    SUPPLE_FUZZ_WRITE=$work/corpus cargo test --locked --workspace --exclude supple-python --test corpus -- \
+        --ignored write_seeds
+    cargo +nightly fuzz build --fuzz-dir $programs --target-dir "$PWD/target/fuzz" --sanitizer none
+    for target in $(sed -n 's/^name = "\(.*\)"$/\1/p' $programs/Cargo.toml | tail -n +2); do
+        # New inputs go into the first folder, which is thrown away; what fails is kept among the artifacts.
+        TMPDIR=$work/tmp "$(fuzz_program "$target")" "$work/corpus/$target" "tests/fuzz/corpus/$target" \
+            -artifact_prefix="$work/artifacts/$target-" -max_total_time="$seconds" -timeout=10 -rss_limit_mb=2048 \
+            -print_final_stats=1 >"$work/$target.log" 2>&1 || {
+            tail -n 40 "$work/$target.log"
+            echo "target $target failed: the input is in $work/artifacts"
+            return 1
+        }
+        echo "$target: $(sed -n 's/^stat::number_of_executed_units: *//p' "$work/$target.log") inputs in $seconds s"
+    done
+}
+
+# Whether programs for libFuzzer can be built here; installs what it takes.
+nightly_fuzz() {
+    cargo +nightly --version >/dev/null 2>&1 ||
+        rustup toolchain install nightly --profile minimal >&2 ||
+        return 1
+    local root=target/tools
+    if [[ $("$root/bin/cargo-fuzz" --version 2>/dev/null) != "cargo-fuzz $CARGO_FUZZ_VERSION" ]]; then
+        cargo install --quiet --locked --root "$root" --target-dir "$root/build" \
+            cargo-fuzz@$CARGO_FUZZ_VERSION >&2 || return 1
+        rm -rf "$root/build"
+    fi
+    export PATH=$PWD/$root/bin:$PATH
+}
+
+fuzz_program() {
+    echo "target/fuzz/$(rustc -vV | sed -n 's/^host: //p')/release/$1"
+}
+
 # cortex-m: the freestanding program on an emulated Cortex-M4; installs QEMU and the compiler's target
 step_cortex-m() {
     needs_command qemu-system-arm qemu-system-arm
@@ -149,6 +200,20 @@ step_socketcan() {
     tests/socketcan/run.sh $WORK/socketcan | tee $WORK/socketcan.log || status=$?
     [[ $status != "$SKIPPED" ]] || skip "$(tail -n 1 $WORK/socketcan.log)"
     return $status
+}
+
+# services: the units of assets/systemd are sound and expose at most 2.0 of 10 points; installs systemd's tools
+step_services() {
+    needs_command systemd-analyze systemd
+    local unit copy
+    mkdir -p $WORK/services
+    for unit in assets/systemd/*.service; do
+        # Verified where the programs are not installed.
+        copy=$WORK/services/$(basename "$unit")
+        sed 's#^ExecStart=/usr/local/bin/[a-z-]*#ExecStart=/bin/true#' "$unit" >"$copy"
+        systemd-analyze verify --man=no "$copy"
+        systemd-analyze security --offline=true --no-pager --threshold=20 "$unit" | tail -n 1
+    done
 }
 
 thumb_core() {

@@ -98,6 +98,20 @@ const ALLOWED: &[(&str, &[&str])] = &[
         &["supple-core", "supple-files", "supple-model", "supple-log"],
     ),
     (
+        "supple-fuzz",
+        &[
+            "supple-core",
+            "supple-model",
+            "supple-log",
+            "supple-plant",
+            "supple-puck",
+            "supple-bus",
+            "supple-ipc",
+            "supple-emu",
+            "supple-ident",
+        ],
+    ),
+    (
         "supple-python",
         &[
             "supple-core",

@@ -47,7 +47,7 @@ pub enum EmulatorError {
     /// A button press that cannot be read.
     #[error(
         "press `{text}`: expected BUTTON@SECONDS or BUTTON@held+SECONDS with one of idle, activate, e-stop, \
-         release"
+         release, and at most 1e6 s"
     )]
     Press {
         /// What was given.

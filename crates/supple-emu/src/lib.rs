@@ -29,6 +29,6 @@ mod store;
 pub use config::{EmulatorConfig, PuckConfig, SafetyConfig};
 pub use emulator::{Emulator, Happening};
 pub use error::EmulatorError;
-pub use pendant::SOCKET as PENDANT_SOCKET;
+pub use pendant::{SOCKET as PENDANT_SOCKET, answer as answer_pendant};
 pub use program::{ArmsEnd, catch_up, listen, main};
 pub use safety::{Cause, Press};

@@ -110,8 +110,8 @@ impl Later {
     }
 }
 
-/// Latest time of a button \[s\].
-const LATEST_S: f64 = 1e8;
+/// The latest time of a press \[s\]: eleven days, far below the end of a clock that counts nanoseconds.
+const LATEST_S: f64 = 1e6;
 
 /// `BUTTON@SECONDS` or `BUTTON@held+SECONDS`.
 pub(crate) fn press(text: &str) -> Result<Later, EmulatorError> {
@@ -127,4 +127,25 @@ pub(crate) fn press(text: &str) -> Result<Later, EmulatorError> {
     parsed.ok_or_else(|| EmulatorError::Press {
         text: text.to_owned(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_press_beyond_the_clock_is_refused() {
+        for text in [
+            "idle@1e300",
+            "idle@held+1e300",
+            "idle@1000001",
+            "idle@-1",
+            "idle@nan",
+            "idle@inf",
+        ] {
+            let error = press(text).unwrap_err().to_string();
+            assert!(error.contains(text) && error.contains("1e6"), "{error}");
+        }
+        assert_eq!(press("release@held+1e6").unwrap().after_s, 1e6);
+    }
 }

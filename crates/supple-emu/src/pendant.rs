@@ -124,7 +124,8 @@ fn serve(stream: &UnixStream, questions: &SyncSender<Question>) {
     }
 }
 
-fn answer<const N: usize>(emulator: &mut Emulator<N>, line: &str) -> String {
+/// What the socket answers to a line, which is done to the arm: one line of JSON.
+pub fn answer<const N: usize>(emulator: &mut Emulator<N>, line: &str) -> String {
     if let Some(press) = button(line) {
         emulator.press(press);
         return json(&status(emulator));

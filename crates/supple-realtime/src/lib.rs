@@ -1,17 +1,21 @@
 //! What a thread needs from Linux to keep a period: memory that stays, a place before other threads, a
-//! processor of its own, a clock, and a word when to end.
+//! processor of its own, a clock, a word when to end, and signs of life for the service manager.
 //!
 //! Nothing here is needed for a right answer, only for a timely one: what the system does not grant is
 //! reported as a [`Shortfall`] and the process goes on. It knows no arm and no controller.
 
 mod clock;
+mod heartbeat;
 mod memory;
+mod notify;
 mod options;
 mod schedule;
 mod spin;
 mod stop;
 
 pub use clock::{monotonic_ns, sleep_until_ns};
+pub use heartbeat::{Heartbeat, Pulse, Watch};
+pub use notify::{ManagerVariables, Notifier, NotifyError};
 pub use options::RealtimeOptions;
 pub use spin::spin_for;
 pub use stop::{Stop, StopError, die_with_parent, keep_running};

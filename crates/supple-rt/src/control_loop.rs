@@ -96,6 +96,7 @@ impl<const N: usize> ControlLoop<N> {
     /// # Errors
     /// As [`ControlLoop::run`].
     pub fn turn(&mut self, link: &ControllerLink, stop: &Stop) -> Result<bool, RtError> {
+        self.inside.pulse.beat();
         if stop.asked() {
             self.leaving.get_or_insert(0);
         }

@@ -4,7 +4,7 @@ use supple_core::controller::ConfigError;
 use supple_ipc::IpcError;
 use supple_ipc::message::MessageError;
 use supple_model::ModelError;
-use supple_realtime::StopError;
+use supple_realtime::{NotifyError, StopError};
 
 /// Why the process cannot start, or cannot go on.
 #[derive(Debug, thiserror::Error)]
@@ -24,6 +24,9 @@ pub enum RtError {
     /// Signals.
     #[error(transparent)]
     Stop(#[from] StopError),
+    /// The service manager.
+    #[error(transparent)]
+    Notify(#[from] NotifyError),
     /// The helper's thread.
     #[error("no second thread can be started: {0}; raise the user's limit of processes")]
     Thread(std::io::Error),
@@ -38,7 +41,7 @@ impl RtError {
         match self {
             RtError::Model(_) | RtError::Config(_) => 3,
             RtError::Ipc(_) | RtError::Message(_) => 10,
-            RtError::Stop(_) | RtError::Thread(_) | RtError::Helper => 1,
+            RtError::Stop(_) | RtError::Notify(_) | RtError::Thread(_) | RtError::Helper => 1,
         }
     }
 }

@@ -73,6 +73,7 @@ fn work(
     // Nobody waits for it any more only where the start was given up.
     let _ = ready.send(());
     loop {
+        outside.pulse.beat();
         let ended = outside.ended();
         while let Some(telemetry) = outside.telemetry() {
             link.publish(&telemetry)?;

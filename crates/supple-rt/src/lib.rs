@@ -3,7 +3,8 @@
 //! Two threads. The loop's thread has only the ports to the plant; after its start it allocates nothing,
 //! locks nothing and logs nothing ([`ControlLoop`]). Its helper has the ports to the outside and the disk:
 //! telemetry, requests, replies, and the last cycles before a fault ([`Helper`]). Between them are rings of
-//! fixed size.
+//! fixed size. Where a service manager watches the process, a third thread tells it that both go on
+//! ([`supple_realtime::Heartbeat`]).
 //!
 //! It knows no bus, no log format, no simulator. The plant owns the clock; in virtual time the loop waits for
 //! the plant however long it takes, and nothing it computes depends on a clock in either case.
@@ -31,7 +32,7 @@ use std::process::ExitCode;
 use supple_core::Controller;
 use supple_ipc::{ControllerLink, Domain};
 use supple_model::{Description, with_dof};
-use supple_realtime::{Stop, die_with_parent, enter};
+use supple_realtime::{Heartbeat, ManagerVariables, Notifier, Stop, die_with_parent, enter};
 
 /// The whole program, from its arguments to its exit code.
 pub fn main() -> ExitCode {
@@ -81,14 +82,19 @@ pub fn run<const N: usize>(
 ) -> Result<Timing, RtError> {
     let controller = Controller::new(description.config::<N>()?)?;
     let domain = Domain::new(options.prefix.as_deref())?;
+    let notifier = Notifier::new(&ManagerVariables::of_process())?;
     let link = ControllerLink::new(&domain)?;
     let (inside, outside) = rings();
+    let pulses = [inside.pulse(), outside.pulse()];
     let helper = Helper::start(&domain, outside, options)?;
     let mut control = ControlLoop::new(controller, inside, options.virtual_time);
+    let heartbeat = notifier.map(|notifier| Heartbeat::start(notifier, &pulses));
+    let heartbeat = heartbeat.transpose()?;
     for shortfall in enter(&options.realtime()) {
         eprintln!("supple-rt: warning: {shortfall}");
     }
     let ended = control.run(&link, stop);
+    drop(heartbeat);
     let timing = control.into_timing();
     helper.finish()?;
     ended.map(|()| timing)

@@ -2,6 +2,7 @@
 
 use rtrb::{Consumer, Producer, RingBuffer};
 use supple_ipc::message::{OperatorReply, OperatorRequest, Telemetry};
+use supple_realtime::Pulse;
 
 /// Cycles that the helper may be behind.
 const TELEMETRY: usize = 1024;
@@ -14,6 +15,7 @@ pub struct Inside {
     pub(crate) telemetry: Producer<Telemetry>,
     pub(crate) requests: Consumer<OperatorRequest>,
     pub(crate) replies: Producer<OperatorReply>,
+    pub(crate) pulse: Pulse,
 }
 
 /// The helper's ends.
@@ -22,6 +24,7 @@ pub struct Outside {
     pub(crate) telemetry: Consumer<Telemetry>,
     pub(crate) requests: Producer<OperatorRequest>,
     pub(crate) replies: Consumer<OperatorReply>,
+    pub(crate) pulse: Pulse,
 }
 
 /// All rings, empty.
@@ -33,16 +36,30 @@ pub fn rings() -> (Inside, Outside) {
         telemetry: telemetry_in,
         requests: requests_out,
         replies: replies_in,
+        pulse: Pulse::default(),
     };
     let outside = Outside {
         telemetry: telemetry_out,
         requests: requests_in,
         replies: replies_out,
+        pulse: Pulse::default(),
     };
     (inside, outside)
 }
 
+impl Inside {
+    /// Counts the loop's turns.
+    pub fn pulse(&self) -> Pulse {
+        self.pulse.clone()
+    }
+}
+
 impl Outside {
+    /// Counts the helper's turns.
+    pub fn pulse(&self) -> Pulse {
+        self.pulse.clone()
+    }
+
     /// Telemetry that was not taken yet.
     pub fn telemetry(&mut self) -> Option<Telemetry> {
         self.telemetry.pop().ok()

@@ -1,0 +1,33 @@
+//! Tables of measurements, and the motion that a design leaves.
+
+use crate::bytes::with_file;
+use supple_core::trajectory::Fourier;
+use supple_ident::{SeriesLists, read_csv};
+
+/// Where it begins with a brace a motion of three joints, JSON; otherwise a table for three joints.
+pub fn csv(data: &[u8]) {
+    if data.starts_with(b"{") {
+        return series(data);
+    }
+    with_file("input.csv", data, |path| match read_csv(path, 3) {
+        Err(error) => assert!(!error.to_string().is_empty()),
+        Ok(log) => {
+            assert_eq!(log.q_rad.shape(), (log.t_s.len(), 3));
+            if let Err(error) = log.check(3, &[0, 1, 2]) {
+                assert!(!error.to_string().is_empty());
+            }
+        }
+    });
+}
+
+fn series(data: &[u8]) {
+    let Ok(lists) = serde_json::from_slice::<SeriesLists>(data) else {
+        return;
+    };
+    if let Ok(series) = lists.fourier::<3>() {
+        assert_eq!(SeriesLists::from(&series), lists);
+        if Fourier::validate(&series).is_ok() {
+            let _ = series.at(0.5 * series.duration_s);
+        }
+    }
+}
