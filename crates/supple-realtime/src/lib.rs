@@ -1,16 +1,19 @@
 //! What a thread needs from Linux to keep a period: memory that stays, a place before other threads, a
-//! processor of its own, a clock, and a word when to end.
+//! processor of its own, a clock, a word when to end, and somebody else who waits for disks and terminals.
 //!
 //! Nothing here is needed for a right answer, only for a timely one: what the system does not grant is
 //! reported as a [`Shortfall`] and the process goes on. It knows no arm and no controller.
 
+mod background;
 mod clock;
+pub mod diagnostics;
 mod memory;
 mod options;
 mod schedule;
 mod spin;
 mod stop;
 
+pub use background::BackgroundWriter;
 pub use clock::{monotonic_ns, sleep_until_ns};
 pub use options::RealtimeOptions;
 pub use spin::spin_for;
