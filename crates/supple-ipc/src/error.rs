@@ -55,6 +55,31 @@ pub enum IpcError {
         /// The prefix.
         prefix: String,
     },
+    /// No memory for the ports of a process.
+    #[error(
+        "/dev/shm has {} MB free, {} MB are wanted: remove what is not needed there, or make it larger \
+         (mount -o remount,size=256M /dev/shm; for a container --shm-size=256m)",
+        free_bytes / 1_000_000, wanted_bytes.div_ceil(1_000_000)
+    )]
+    NoRoom {
+        /// What the process reserves at its start \[bytes\].
+        wanted_bytes: u64,
+        /// What is there \[bytes\].
+        free_bytes: u64,
+    },
+    /// Somebody else's object under a name of this system.
+    #[error(
+        "{} belongs to user {owner} and is named as an object of the system `{prefix}`: have it removed, or choose \
+         another --prefix", object.display()
+    )]
+    Foreign {
+        /// Which.
+        object: PathBuf,
+        /// Number of the user.
+        owner: u32,
+        /// The prefix.
+        prefix: String,
+    },
     /// What the library reports besides.
     #[error("{service}: {cause}; `ls /dev/shm` shows what is there, a reboot clears it")]
     Service {

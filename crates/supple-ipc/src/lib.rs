@@ -36,15 +36,19 @@
 mod bell;
 mod domain;
 mod error;
+mod idle;
 mod last_out;
 mod link;
 pub mod message;
 mod outside;
 mod port;
+mod shared_memory;
 mod turn;
+mod writer_identity;
 
 pub use domain::{DEFAULT_PREFIX, Domain, PREFIX_VARIABLE};
 pub use error::IpcError;
+pub use idle::{IdleAnswer, IdleServer, ask_for_idle, idle_reply};
 pub use link::{ControllerLink, Heard, PlantLink, Woken};
 pub use outside::{Operator, OutsideLink, TELEMETRY_DEPTH, TelemetryReader, pause};
 pub use port::Full;

@@ -59,12 +59,22 @@ impl OutsideLink {
     /// # Errors
     /// [`IpcError::SecondWriter`] where there is a controller already, and what else [`IpcError`] says.
     pub fn new(domain: &Domain, full: Full) -> Result<OutsideLink, IpcError> {
-        let joining = domain.join()?;
+        let bytes = TELEMETRY.bytes_of::<Telemetry>()
+            + REPLIES.bytes_of::<OperatorReply>()
+            + REQUESTS.bytes_of_reader();
+        let (ports, last_out) = domain.join(bytes, |node| {
+            Ok((
+                Writer::new(domain, node, &TELEMETRY, full)?,
+                Reader::new(domain, node, &REQUESTS)?,
+                Writer::new(domain, node, &REPLIES, Full::Lose)?,
+            ))
+        })?;
+        let (telemetry, requests, replies) = ports;
         Ok(OutsideLink {
-            telemetry: Writer::new(domain, &joining.node, &TELEMETRY, full)?,
-            requests: Reader::new(domain, &joining.node, &REQUESTS)?,
-            replies: Writer::new(domain, &joining.node, &REPLIES, Full::Lose)?,
-            _last_out: LastOut::of(domain),
+            telemetry,
+            requests,
+            replies,
+            _last_out: last_out,
         })
     }
 
@@ -108,12 +118,14 @@ impl TelemetryReader {
     /// # Errors
     /// [`IpcError::TooManyReaders`] and what else [`IpcError`] says.
     pub fn new(domain: &Domain) -> Result<TelemetryReader, IpcError> {
-        let joining = domain.join()?;
+        let (reader, last_out) = domain.join(TELEMETRY.bytes_of_reader(), |node| {
+            Reader::new(domain, node, &TELEMETRY)
+        })?;
         Ok(TelemetryReader {
-            reader: Reader::new(domain, &joining.node, &TELEMETRY)?,
+            reader,
             expected: None,
             lost: 0,
-            _last_out: LastOut::of(domain),
+            _last_out: last_out,
         })
     }
 
@@ -171,13 +183,20 @@ impl Operator {
     /// # Errors
     /// [`IpcError`].
     pub fn new(domain: &Domain) -> Result<Operator, IpcError> {
-        let joining = domain.join()?;
+        let bytes = REQUESTS.bytes_of::<OperatorRequest>() + REPLIES.bytes_of_reader();
+        let (ports, last_out) = domain.join(bytes, |node| {
+            Ok((
+                Reader::new(domain, node, &REPLIES)?,
+                Writer::new(domain, node, &REQUESTS, Full::Lose)?,
+            ))
+        })?;
+        let (replies, requests) = ports;
         Ok(Operator {
-            replies: Reader::new(domain, &joining.node, &REPLIES)?,
-            requests: Writer::new(domain, &joining.node, &REQUESTS, Full::Lose)?,
+            replies,
+            requests,
             number: operator_number(),
             sequence: 0,
-            _last_out: LastOut::of(domain),
+            _last_out: last_out,
         })
     }
 
