@@ -1,9 +1,10 @@
 //! The controller as a realtime process: waits for an arm state, runs `step`, publishes torques.
 //!
-//! Two threads. The loop's thread has only the ports to the plant; after its start it allocates nothing,
-//! locks nothing and logs nothing ([`ControlLoop`]). Its helper has the ports to the outside and the disk:
-//! telemetry, requests, replies, and the last cycles before a fault ([`Helper`]). Between them are rings of
-//! fixed size.
+//! The loop's thread has only the ports to the plant; after its start it allocates nothing, locks nothing and logs
+//! nothing ([`ControlLoop`]). Its helper has the ports to the outside: telemetry, requests, replies ([`Helper`]). A third
+//! thread hears requests for idle and nothing else ([`IdleWatch`]). Disk and standard error have threads of their own,
+//! which the others never wait for. Between them are rings of fixed size. Where the helper or the watch is gone, nobody
+//! is heard any more: the loop leaves in order, and the process ends with an error.
 //!
 //! It knows no bus, no log format, no simulator. The plant owns the clock; in virtual time the loop waits for
 //! the plant however long it takes, and nothing it computes depends on a clock in either case.
@@ -12,6 +13,7 @@ mod control_loop;
 mod error;
 mod fault_file;
 mod helper;
+mod idle_watch;
 mod options;
 mod queue;
 mod rings;
@@ -19,11 +21,12 @@ mod timing;
 
 pub use control_loop::{ControlLoop, PLANT_LOST_AFTER};
 pub use error::RtError;
-pub use fault_file::{KEPT_CYCLES, LastCycles};
+pub use fault_file::{FaultFiles, KEPT_CYCLES, KEPT_FILES, LastCycles};
 pub use helper::Helper;
+pub use idle_watch::IdleWatch;
 pub use options::Options;
-pub use queue::Queue;
-pub use rings::{Inside, Outside, rings};
+pub use queue::{NoPlace, Queue};
+pub use rings::{IdleInside, IdleOutside, Inside, Outside, idle_path, rings};
 pub use timing::{Spread, Timing};
 
 use clap::Parser;
@@ -31,11 +34,12 @@ use std::process::ExitCode;
 use supple_core::Controller;
 use supple_ipc::{ControllerLink, Domain};
 use supple_model::{Description, with_dof};
-use supple_realtime::{Stop, die_with_parent, enter};
+use supple_realtime::{Stop, diagnostics, die_with_parent, enter};
 
 /// The whole program, from its arguments to its exit code.
 pub fn main() -> ExitCode {
     let options = Options::parse();
+    diagnostics::start();
     let stop = match Stop::on_signals() {
         Ok(stop) => stop,
         Err(error) => return complain(&error.into()),
@@ -50,7 +54,8 @@ pub fn main() -> ExitCode {
     let ran = with_dof!(description.dof(), N => run::<N>(&description, &options, &stop));
     match ran.map_err(RtError::from).and_then(|ran| ran) {
         Ok(timing) => {
-            eprintln!("supple-rt: {timing}");
+            diagnostics::post(format_args!("supple-rt: {timing}"));
+            diagnostics::flush();
             ExitCode::SUCCESS
         }
         Err(error) => complain(&error),
@@ -58,7 +63,8 @@ pub fn main() -> ExitCode {
 }
 
 fn complain(error: &RtError) -> ExitCode {
-    eprintln!("supple-rt: error: {error}");
+    diagnostics::post(format_args!("supple-rt: error: {error}"));
+    diagnostics::flush();
     ExitCode::from(error.code())
 }
 
@@ -76,12 +82,16 @@ pub fn run<const N: usize>(
     let link = ControllerLink::new(&domain)?;
     let (inside, outside) = rings();
     let helper = Helper::start(&domain, outside, options)?;
+    let (idle_inside, idle_outside) = idle_path();
+    let watch = IdleWatch::start(&domain, idle_outside, options.realtime())?;
     let mut control = ControlLoop::new(controller, inside, options.virtual_time);
+    control.hear_idle(idle_inside);
     for shortfall in enter(&options.realtime()) {
-        eprintln!("supple-rt: warning: {shortfall}");
+        diagnostics::post(format_args!("supple-rt: warning: {shortfall}"));
     }
     let ended = control.run(&link, stop);
     let timing = control.into_timing();
     helper.finish()?;
+    watch.finish()?;
     ended.map(|()| timing)
 }
