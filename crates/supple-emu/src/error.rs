@@ -65,7 +65,7 @@ pub enum EmulatorError {
 }
 
 impl EmulatorError {
-    /// Exit code, as the command line has them: 2 wrong use, 3 a wrong arm, 6 a file, 9 the bus, 1 the
+    /// Exit code, as the command line has them: 2 wrong use, 3 a wrong arm, 6 a file, 10 the bus, 1 the
     /// system.
     pub fn code(&self) -> u8 {
         match self {
@@ -77,7 +77,7 @@ impl EmulatorError {
             | EmulatorError::Plant(_)
             | EmulatorError::Model(_) => 3,
             EmulatorError::Trace(_) => 6,
-            EmulatorError::Bus(_) => 9,
+            EmulatorError::Bus(_) => 10,
             EmulatorError::Stop(_) => 1,
         }
     }
