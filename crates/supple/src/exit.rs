@@ -7,7 +7,7 @@
 //! | 2 | wrong use of the command line |
 //! | 3 | the description of the arm is wrong, or there is no such arm |
 //! | 4 | the arm cannot do the experiment |
-//! | 5 | a fault ended a run that should have gone through; all results are written |
+//! | 5 | a fault ended a run that should have gone through, or is latched; all results are written |
 //! | 6 | a file cannot be read or written |
 //! | 7 | a replay does not give the logged answers |
 //! | 8 | the machine cannot run an arm in real time as it should |
@@ -34,7 +34,7 @@ pub const CODES: &str = "Exit codes:
   2    wrong use of the command line
   3    the description of the arm is wrong, or there is no such arm
   4    the arm cannot do the experiment
-  5    a fault ended a run that should have gone through; all results are written
+  5    a fault ended a run that should have gone through, or is latched; all results are written
   6    a file cannot be read or written
   7    a replay does not give the logged answers
   8    the machine cannot run an arm in real time as it should
@@ -77,6 +77,15 @@ pub enum Failure {
     RunFault {
         /// The faults in words.
         faults: String,
+    },
+    /// A request was accepted, and the controller is in a fault all the same.
+    #[error(
+        "the controller is in a fault since cycle {cycle} at the latest: `supple status` says in which, \
+         `supple reset` ends it"
+    )]
+    Latched {
+        /// Cycle in which the request was heard.
+        cycle: u64,
     },
     /// Shared memory.
     #[error(transparent)]
@@ -267,6 +276,7 @@ impl Failure {
         matches!(
             self,
             Failure::Fault { .. }
+                | Failure::Latched { .. }
                 | Failure::Different { .. }
                 | Failure::NotReady { .. }
                 | Failure::Drill { .. }
@@ -278,7 +288,7 @@ impl Failure {
         match self {
             Failure::UnknownArm { .. } | Failure::Model(_) => 3,
             Failure::Experiment(error) => experiment_code(error),
-            Failure::Fault { .. } | Failure::RunFault { .. } => 5,
+            Failure::Fault { .. } | Failure::RunFault { .. } | Failure::Latched { .. } => 5,
             Failure::Log(error) => log_code(error),
             Failure::File { .. } | Failure::Exists { .. } => 6,
             Failure::Different { .. } => 7,

@@ -22,7 +22,7 @@ pub use system::System;
 
 use crate::arms;
 use crate::cli::UpArgs;
-use crate::console::{remark, say, say_json};
+use crate::console::{remark, say, say_json, wait_for_no_reader};
 use crate::exit::Failure;
 use crate::interrupt;
 use children::Pidfile;
@@ -40,6 +40,7 @@ pub fn run(args: &UpArgs) -> Result<(), Failure> {
 
 fn sized<const N: usize>(args: &UpArgs, description: &Description) -> Result<(), Failure> {
     let domain = Domain::new(args.prefix.as_deref())?;
+    wait_for_no_reader();
     let stop = interrupt::catch();
     let _pidfile = Pidfile::create(&domain)?;
     let mut system = System::<N>::new(args, description, &domain)?;
@@ -47,7 +48,12 @@ fn sized<const N: usize>(args: &UpArgs, description: &Description) -> Result<(),
     let ended = started.and_then(|()| system.watch(&stop));
     let shut_down = system.end();
     let (summary, log) = (system.finish()?, args.log_file());
-    ended.and(shut_down)?;
+    let ended = ended.and(shut_down);
+    // A run that ended in a fault says so, whatever came of the fault.
+    match &ended {
+        Err(failure) if !summary.faults.is_empty() => remark(&format!("error: {failure}")),
+        _ => ended?,
+    }
     if args.json {
         say_json(&summary)?;
     } else {

@@ -113,6 +113,16 @@ impl<'a, const N: usize> System<'a, N> {
     /// # Errors
     /// A process that ended, a request that was refused, a log that cannot be written.
     pub fn watch(&mut self, stop: &Stop) -> Result<(), Failure> {
+        match self.watch_on(stop) {
+            // The controller is asked to end by the same word, and may be the first.
+            Err(Failure::ProcessEnded { .. } | Failure::NotRunning { .. }) if stop.asked() => {
+                Ok(())
+            }
+            ended => ended,
+        }
+    }
+
+    fn watch_on(&mut self, stop: &Stop) -> Result<(), Failure> {
         let mut fault_seen = false;
         while !stop.asked() {
             match self.turn()? {
