@@ -141,6 +141,8 @@ fn idle_passes_readers_operators_requests_and_a_lock_that_others_hold() {
     }
     let refused = up.ask(&["status"]);
     assert_eq!(refused.status.code(), Some(10), "all places are taken");
+    let holder = std::process::id().to_string();
+    assert!(words(&refused).contains(&holder), "{}", words(&refused));
     // A process that is stopped while it joins.
     let lock = up.domain.folder().join(format!("{PREFIX}.turn.lock"));
     let lock = std::fs::File::open(lock).expect("a lock");

@@ -42,6 +42,18 @@ pub enum IpcError {
         /// Name of the service.
         service: String,
     },
+    /// As many of one kind as there may be.
+    #[error(
+        "all {places} places of {kind} are taken, by processes {holders}: end one, also one that is stopped"
+    )]
+    NoPlace {
+        /// Who takes such places.
+        kind: &'static str,
+        /// How many there are.
+        places: usize,
+        /// Numbers of the processes that hold them.
+        holders: String,
+    },
     /// The other side is of another version.
     #[error(
         "{service} was set up by another version of this software: it carries {expected} here; end all \

@@ -68,8 +68,8 @@ impl<'a, const N: usize> System<'a, N> {
             approach: Approach::new(&config, trajectory, duration_s)?,
             recorder: recorder.transpose()?,
             // Readers before writers, so that nothing is missed.
-            reader: TelemetryReader::new(domain)?,
-            session: Session::new(domain)?,
+            reader: TelemetryReader::for_log(domain)?,
+            session: Session::for_system(domain)?,
             children: Children::default(),
             meter: Meter::default(),
             line: StatusLine::new(args.json),
