@@ -56,6 +56,25 @@ fn weight_nm(rig: &Rig<4>) -> Vector<4> {
     arm.joint_from_motor.transpose() * gravity(&arm.arm, &q)
 }
 
+/// As of a controller that does not answer: never zero torque from one cycle to the next.
+#[test]
+fn torques_that_are_no_numbers_leave_the_weight_held_and_then_the_motors_brake() {
+    let mut rig = Rig::<4>::holding();
+    rig.run(500);
+    rig.cycle.link_mut().not_finite = true;
+    let begin_ns = rig.now_ns();
+    assert_eq!(rig.step().torque, Torque::Fallback);
+    let held = rig.history.last().unwrap().1;
+    assert!((held - weight_nm(&rig)).amax() < 2.0 * QUANTUM_NM);
+    rig.run(30);
+    assert_idle_in_time(&rig, begin_ns);
+    assert_eq!(
+        rig.cycle.guard().last_loss().map(|(loss, _)| loss),
+        Some(Loss::Answer)
+    );
+    assert!(rig.cycle.counters().unusable >= 10);
+}
+
 #[test]
 fn a_dead_controller_leaves_the_weight_held_and_then_brakes() {
     let mut rig = Rig::<4>::holding();

@@ -12,6 +12,8 @@ pub struct Controlled<const N: usize> {
     pub report: Option<ArmReport<N>>,
     /// As if it had been killed: states are not read and not answered.
     pub dead: bool,
+    /// Torques are not numbers.
+    pub not_finite: bool,
 }
 
 impl<const N: usize> Controlled<N> {
@@ -23,6 +25,7 @@ impl<const N: usize> Controlled<N> {
             output: None,
             report: None,
             dead: false,
+            not_finite: false,
         }
     }
 }
@@ -52,7 +55,10 @@ impl<const N: usize> Link<N> for Controlled<N> {
         let answers = |output: &Output<N>| output.cycle == cycle;
         let output = self.output.as_ref().filter(|output| answers(output));
         let command = output.map(|output| Command {
-            torque_nm: output.torque_nm,
+            torque_nm: match self.not_finite {
+                true => output.torque_nm * f64::NAN,
+                false => output.torque_nm,
+            },
             fallback_torque_nm: output.fallback_torque_nm,
             wants_torque: wants_torque(output),
             mode: Some(output.mode),

@@ -33,6 +33,7 @@ pub fn answer(common: &Common) -> Result<(), Failure> {
     common.enter(ANSWERING_PRIORITY);
     while let Some(state) = link.wait(PATIENCE)? {
         link.answer(&TorqueCommand {
+            writer: 0,
             cycle: state.cycle,
             torque_nm: Default::default(),
             fallback_torque_nm: Default::default(),

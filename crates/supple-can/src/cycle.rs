@@ -322,7 +322,10 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
         let answer = self.link.answer(self.cycle, wait_ns)?;
         self.cycle += 1;
         self.counters.late_answers += answer.late;
-        match &answer.command {
+        // The last fallback acts instead of torques that are none.
+        let command = answer.command.filter(Command::is_finite);
+        self.counters.unusable += u64::from(answer.command.is_some() && command.is_none());
+        match &command {
             Some(command) => {
                 self.fallback_nm = command.fallback_torque_nm;
                 self.counters.round_trip_ns = self.bus.now_ns().saturating_sub(published_ns);
@@ -332,7 +335,7 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
                 self.counters.round_trip_ns = 0;
             }
         }
-        Ok(answer.command)
+        Ok(command)
     }
 
     /// Sends the torques, and lowers what is to be lowered.
@@ -348,7 +351,7 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
             self.drives.rest(&wanted_nm);
             wanted_nm
         };
-        // One that is not finite is not sent.
+        // Finite joint torques may be too large for a puck's number: those are not sent.
         let torques = self.ready.transmission.puck_torques(&torque_nm);
         let torques = torques.unwrap_or([PuckTorque::ZERO; N]);
         for (motors, group) in torques

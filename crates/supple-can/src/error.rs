@@ -218,8 +218,8 @@ pub enum CanError {
 }
 
 impl CanError {
-    /// Exit code, as the command line has them: 3 a wrong arm or description, 9 the bus or shared memory, 4
-    /// an arm that is not as it has to be.
+    /// Exit code, as the command line has them: 3 a wrong arm or description, 4 an arm that is not as it has to be,
+    /// 10 the bus, shared memory or the system.
     pub fn code(&self) -> u8 {
         match self {
             CanError::Model(_)
@@ -228,7 +228,7 @@ impl CanError {
             | CanError::Overload(_)
             | CanError::Home(_)
             | CanError::Limits(_) => 3,
-            CanError::Bus(_) | CanError::BusFault(_) | CanError::Link(_) => 9,
+            CanError::Bus(_) | CanError::BusFault(_) | CanError::Link(_) => 10,
             _ => 4,
         }
     }

@@ -26,6 +26,8 @@ pub struct Counters {
     pub missed: u64,
     /// Answers that came after their cycle.
     pub late_answers: u64,
+    /// Answers that counted as none, because a torque of them was not finite.
+    pub unusable: u64,
     /// Periods that were passed over because a cycle began too late.
     pub skipped: u64,
     /// Frames that were not seen to leave.
@@ -59,6 +61,14 @@ pub struct ArmReport<const N: usize> {
     pub drives: Drives,
     /// How it fares.
     pub counters: Counters,
+}
+
+impl<const N: usize> Command<N> {
+    /// Every torque of it is finite.
+    pub fn is_finite(&self) -> bool {
+        let mut torques = self.torque_nm.iter().chain(&self.fallback_torque_nm);
+        torques.all(|torque_nm| torque_nm.is_finite())
+    }
 }
 
 /// The controller's answer to a cycle.

@@ -15,7 +15,7 @@ use supple_bus::{Address, Bus, BusError, OwnerFolder, Paced, SocketCan, monotoni
 use supple_ipc::{Domain, PlantLink, pause};
 use supple_model::{Description, with_dof};
 use supple_puck::safety::{SafetyLimits, SpeedLimit};
-use supple_realtime::{Stop, die_with_parent, enter, spin_for};
+use supple_realtime::{Stop, diagnostics, die_with_parent, enter, spin_for};
 
 /// How long an emulated arm may take to come \[ns\].
 const PEER_NS: u64 = 5_000_000_000;
@@ -29,23 +29,27 @@ const LOOK: core::time::Duration = core::time::Duration::from_millis(200);
 /// The whole program, from its arguments to its exit code.
 pub fn main() -> ExitCode {
     let options = Options::parse();
+    diagnostics::start();
     match start(&options) {
         Ok(None) => ExitCode::SUCCESS,
         Ok(Some(counters)) => {
-            eprintln!(
-                "supple-can: {} cycles, {} missed, {} skipped, {} frames lost, {} replies lost, {} overruns",
+            diagnostics::post(format_args!(
+                "supple-can: {} cycles, {} missed, {} unusable, {} skipped, {} frames lost, {} replies lost, {} overruns",
                 counters.cycles,
                 counters.missed,
+                counters.unusable,
                 counters.skipped,
                 counters.tx_lost,
                 counters.replies_lost,
                 counters.overruns
-            );
+            ));
+            diagnostics::flush();
             ExitCode::SUCCESS
         }
         Err(CanError::Stopped) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("supple-can: error: {error}");
+            diagnostics::post(format_args!("supple-can: error: {error}"));
+            diagnostics::flush();
             ExitCode::from(error.code())
         }
     }
@@ -121,7 +125,7 @@ fn run<const N: usize>(
         };
         if first {
             for shortfall in enter(&options.realtime()) {
-                eprintln!("supple-can: warning: {shortfall}");
+                diagnostics::post(format_args!("supple-can: warning: {shortfall}"));
             }
             link.spin(spin_for(options.spin_us));
         }
@@ -133,7 +137,9 @@ fn run<const N: usize>(
         if ended {
             return Ok(Some(counters));
         }
-        eprintln!("supple-can: the arm has gone silent: looking for it");
+        diagnostics::post(format_args!(
+            "supple-can: the arm has gone silent: looking for it"
+        ));
     }
 }
 
@@ -161,13 +167,13 @@ fn serve<const N: usize, B: Bus>(
         if guard.last_loss() != loss {
             loss = guard.last_loss();
             if let Some((loss, _)) = loss {
-                eprintln!("supple-can: lowered to idle: {loss}");
+                diagnostics::post(format_args!("supple-can: lowered to idle: {loss}"));
             }
         }
         if guard.stage() != stage {
             stage = guard.stage();
             if stage == Stage::Active {
-                eprintln!("supple-can: active");
+                diagnostics::post(format_args!("supple-can: active"));
             }
         }
     }
@@ -184,7 +190,7 @@ fn open(options: &Options, prefix: &str, stop: &Stop) -> Result<Box<dyn Bus>, Ca
         Some(address) => address.clone(),
         None => Address::of_system(prefix)?,
     };
-    eprintln!("supple-can: bus {address}");
+    diagnostics::post(format_args!("supple-can: bus {address}"));
     match address {
         Address::Interface(name) => Ok(Box::new(SocketCan::open(&name)?)),
         Address::Folder(folder) => {
@@ -209,16 +215,28 @@ fn open(options: &Options, prefix: &str, stop: &Stop) -> Result<Box<dyn Bus>, Ca
 fn tell(progress: Progress) {
     match progress {
         Progress::WaitingForIdle => {
-            eprintln!("supple-can: release the emergency stop and press Shift-Idle at the pendant");
+            diagnostics::post(format_args!(
+                "supple-can: release the emergency stop and press Shift-Idle at the pendant"
+            ));
         }
-        Progress::Enumerating => eprintln!("supple-can: looking for the nodes of the arm"),
-        Progress::Waking(pucks) => eprintln!("supple-can: waking {pucks} pucks"),
-        Progress::Checking => eprintln!("supple-can: comparing the pucks with the description"),
-        Progress::Zeroing => eprintln!("supple-can: taking the arm's pose for its home pose"),
-        Progress::Taring => eprintln!("supple-can: taring the force/torque sensor"),
-        Progress::Ready => eprintln!(
+        Progress::Enumerating => {
+            diagnostics::post(format_args!("supple-can: looking for the nodes of the arm"))
+        }
+        Progress::Waking(pucks) => {
+            diagnostics::post(format_args!("supple-can: waking {pucks} pucks"))
+        }
+        Progress::Checking => diagnostics::post(format_args!(
+            "supple-can: comparing the pucks with the description"
+        )),
+        Progress::Zeroing => diagnostics::post(format_args!(
+            "supple-can: taking the arm's pose for its home pose"
+        )),
+        Progress::Taring => {
+            diagnostics::post(format_args!("supple-can: taring the force/torque sensor"))
+        }
+        Progress::Ready => diagnostics::post(format_args!(
             "supple-can: ready; with a controller that holds the arm, press Shift-Activate"
-        ),
+        )),
     }
 }
 
@@ -229,6 +247,7 @@ fn added(a: &Counters, b: &Counters) -> Counters {
         late_answers: a.late_answers + b.late_answers,
         skipped: a.skipped + b.skipped,
         tx_lost: a.tx_lost + b.tx_lost,
+        unusable: a.unusable + b.unusable,
         replies_lost: a.replies_lost + b.replies_lost,
         overruns: a.overruns + b.overruns,
         ..*b

@@ -3,7 +3,7 @@
 use crate::error::CanError;
 use crate::link::{Answer, ArmReport, Command, Drives, Link};
 use core::time::Duration;
-use supple_ipc::message::{self, ArmState, PlantReport};
+use supple_ipc::message::{self, ArmState, PlantReport, TorqueCommand};
 use supple_ipc::{IpcError, PlantLink, pause};
 use supple_realtime::Stop;
 
@@ -19,6 +19,8 @@ pub struct SharedMemory {
     virtual_time: bool,
     /// The last cycle in virtual time was not answered: the next are not waited for.
     lost: bool,
+    /// Commands for another arm.
+    unusable: u64,
     stop: Stop,
 }
 
@@ -30,8 +32,25 @@ impl SharedMemory {
             link,
             virtual_time,
             lost: false,
+            unusable: 0,
             stop,
         }
+    }
+
+    /// What a command says; one for another arm is counted and is no answer.
+    fn read<const N: usize>(&mut self, command: &TorqueCommand) -> Option<Command<N>> {
+        let torques = (command.torque::<N>(), command.fallback_torque::<N>());
+        let (Ok(torque_nm), Ok(fallback_torque_nm)) = torques else {
+            self.unusable += 1;
+            return None;
+        };
+        Some(Command {
+            torque_nm,
+            fallback_torque_nm,
+            wants_torque: command.wants_torque(),
+            mode: command.mode(),
+            fault: command.fault != 0,
+        })
     }
 
     /// Looks for an answer for so long before sleeping, see [`PlantLink::spin`].
@@ -42,12 +61,6 @@ impl SharedMemory {
 
 impl From<IpcError> for CanError {
     fn from(error: IpcError) -> CanError {
-        CanError::Link(Box::new(error))
-    }
-}
-
-impl From<message::MessageError> for CanError {
-    fn from(error: message::MessageError) -> CanError {
         CanError::Link(Box::new(error))
     }
 }
@@ -75,6 +88,8 @@ impl<const N: usize> Link<N> for SharedMemory {
             PlantReport {
                 missed: counters.missed,
                 late: counters.late_answers,
+                foreign: self.link.foreign(),
+                unusable: self.unusable + counters.unusable,
                 tx_lost: counters.tx_lost,
                 wake_ns: counters.wake_ns,
                 round_trip_ns: counters.round_trip_ns,
@@ -107,15 +122,8 @@ impl<const N: usize> Link<N> for SharedMemory {
             late += heard.late;
             if let Some(command) = heard.answer {
                 self.lost = false;
-                let command = Command {
-                    torque_nm: command.torque::<N>()?,
-                    fallback_torque_nm: command.fallback_torque::<N>()?,
-                    wants_torque: command.wants_torque(),
-                    mode: command.mode(),
-                    fault: command.fault != 0,
-                };
                 return Ok(Answer {
-                    command: Some(command),
+                    command: self.read::<N>(&command),
                     late,
                 });
             }

@@ -23,6 +23,7 @@ mod emulator;
 mod error;
 mod options;
 mod pendant;
+mod pendant_clients;
 mod program;
 mod store;
 

@@ -1,27 +1,22 @@
 //! The pendant's socket: an operator's buttons from outside, and what the arm is doing.
 //!
 //! A thread takes connections and hands each line to the loop that owns the arm; the answer is one line of
-//! JSON. Nothing here is on the bus.
+//! JSON. Clients that say nothing, or do not read, hold up nobody (`pendant_clients.rs`). Nothing here is on the bus.
 
 use crate::emulator::{Emulator, Happening};
 use crate::options::{button, press};
+use crate::pendant_clients::{Question, serve};
 use serde::Serialize;
 use std::fs::Permissions;
-use std::io::{BufRead, BufReader, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, channel};
 use supple_bus::virtual_time::Peer;
 use supple_bus::{BusError, OwnerFolder};
 
 /// Name of the socket in the bus's folder.
 pub const SOCKET: &str = "pendant";
-
-struct Question {
-    line: String,
-    answer: SyncSender<String>,
-}
 
 /// The socket, and what came over it.
 pub struct PendantSocket {
@@ -76,14 +71,11 @@ impl PendantSocket {
         }
         let listener = UnixListener::bind(&path).map_err(failed)?;
         std::fs::set_permissions(&path, Permissions::from_mode(0o600)).map_err(failed)?;
-        let (sender, questions) = sync_channel(16);
+        listener.set_nonblocking(true).map_err(failed)?;
+        let (sender, questions) = channel();
         std::thread::Builder::new()
             .name("pendant".to_owned())
-            .spawn(move || {
-                for stream in listener.incoming().flatten() {
-                    serve(&stream, &sender);
-                }
-            })
+            .spawn(move || serve(&listener, &sender))
             .map_err(failed)?;
         Ok(PendantSocket { path, questions })
     }
@@ -106,21 +98,6 @@ impl PendantSocket {
 impl Drop for PendantSocket {
     fn drop(&mut self) {
         let _ = std::fs::remove_file(&self.path);
-    }
-}
-
-fn serve(stream: &UnixStream, questions: &SyncSender<Question>) {
-    let mut line = String::new();
-    let limit = std::io::Read::take(stream, 256);
-    if BufReader::new(limit).read_line(&mut line).is_err() {
-        return;
-    }
-    let (answer, answered) = sync_channel(1);
-    if questions.send(Question { line, answer }).is_ok()
-        && let Ok(text) = answered.recv()
-    {
-        let mut stream = stream;
-        let _ = writeln!(stream, "{text}");
     }
 }
 

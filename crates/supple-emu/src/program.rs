@@ -17,7 +17,7 @@ use supple_model::{Description, with_dof};
 use supple_plant::{PlantConfig, Scene, TraceFile};
 use supple_puck::NodeId;
 use supple_puck::status::MotorMode;
-use supple_realtime::{Stop, die_with_parent, enter};
+use supple_realtime::{Stop, diagnostics, die_with_parent, enter};
 
 /// A stretch of the wall clock in which this process did not run; the arm stood still in it \[ns\].
 const GAP_NS: u64 = 50_000_000;
@@ -35,10 +35,12 @@ const HEARD_WITHIN_NS: u64 = 50_000_000;
 /// The whole program, from its arguments to its exit code.
 pub fn main() -> ExitCode {
     let options = Options::parse();
+    diagnostics::start();
     match start(&options) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("supple-emu: error: {error}");
+            diagnostics::post(format_args!("supple-emu: error: {error}"));
+            diagnostics::flush();
             ExitCode::from(error.code())
         }
     }
@@ -94,13 +96,13 @@ fn run<const N: usize>(
         (Address::Interface(name), _) => name.into(),
     })?;
     let pendant = PendantSocket::open(&folder)?;
-    eprintln!(
+    diagnostics::post(format_args!(
         "supple-emu: {} on {address}, pendant at {}",
         description.name(),
         pendant.path().display()
-    );
+    ));
     for shortfall in enter(&options.realtime()) {
-        eprintln!("supple-emu: warning: {shortfall}");
+        diagnostics::post(format_args!("supple-emu: warning: {shortfall}"));
     }
     let mut arm = Arm {
         emulator,

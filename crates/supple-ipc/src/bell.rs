@@ -170,7 +170,7 @@ impl Drop for Bell {
     }
 }
 
-fn failed(name: &str, cause: &io::Error) -> IpcError {
+pub(crate) fn failed(name: &str, cause: &io::Error) -> IpcError {
     IpcError::Service {
         service: name.to_owned(),
         cause: cause.to_string(),

@@ -5,12 +5,13 @@
 //! user alone. Nothing is ever sent over a network.
 
 use crate::error::IpcError;
+use crate::last_out::LastOut;
+use crate::shared_memory;
 use crate::turn;
 use iceoryx2::prelude::*;
 use rustix::fs::Mode;
 use std::fs::{self, DirBuilder, Metadata};
 use std::io;
-use std::os::fd::OwnedFd;
 use std::os::unix::fs::{DirBuilderExt, MetadataExt};
 use std::path::{Path as StdPath, PathBuf};
 
@@ -28,13 +29,6 @@ const OWNER_ONLY: u32 = 0o700;
 
 /// A node of the shared-memory library, whose ports stay in the thread that made them.
 pub(crate) type Node = iceoryx2::node::Node<ipc::Service>;
-
-/// A process that is joining: it has the turn until it has opened what it wants.
-#[derive(Debug)]
-pub(crate) struct Joining {
-    pub node: Node,
-    _turn: OwnedFd,
-}
 
 /// The place of one system.
 #[derive(Clone, Debug)]
@@ -114,8 +108,13 @@ impl Domain {
         &self.config
     }
 
-    /// A place in this system, to open services from. What processes that died have left is cleared away.
-    pub(crate) fn join(&self) -> Result<Joining, IpcError> {
+    /// Opens ports in this system, whose messages take so much shared memory \[bytes\]; they are followed by what
+    /// clears up after the last who leaves. What processes that died have left is cleared away first.
+    pub(crate) fn join<P>(
+        &self,
+        messages_bytes: u64,
+        open: impl FnOnce(&Node) -> Result<P, IpcError>,
+    ) -> Result<(P, LastOut), IpcError> {
         let turn = turn::wait(self).and_then(|turn| {
             turn::remove_unfinished(self)?;
             Ok(turn)
@@ -128,6 +127,22 @@ impl Domain {
                 _ => "set XDG_RUNTIME_DIR to a folder that can be written",
             },
         })?;
+        // Dropped before what clears up, which takes a turn of its own.
+        let last_out = LastOut::of(self);
+        let opened = self.open(messages_bytes, open);
+        drop(turn);
+        match opened {
+            Ok(ports) => Ok((ports, last_out)),
+            Err(error) => Err(shared_memory::explained(self, error)),
+        }
+    }
+
+    fn open<P>(
+        &self,
+        messages_bytes: u64,
+        open: impl FnOnce(&Node) -> Result<P, IpcError>,
+    ) -> Result<P, IpcError> {
+        shared_memory::expect_room(messages_bytes)?;
         // Its own words are about its own terms: the errors here say what they mean to this system.
         set_log_level(LogLevel::Fatal);
         let node = NodeBuilder::new()
@@ -138,7 +153,10 @@ impl Domain {
                 service: format!("a node under the prefix `{}`", self.prefix),
                 cause: error.to_string(),
             })?;
-        Ok(Joining { node, _turn: turn })
+        let ports = open(&node)?;
+        shared_memory::reserve(self)?;
+        shared_memory::refuse_foreign(self)?;
+        Ok(ports)
     }
 }
 

@@ -42,6 +42,18 @@ pub enum IpcError {
         /// Name of the service.
         service: String,
     },
+    /// As many of one kind as there may be.
+    #[error(
+        "all {places} places of {kind} are taken, by processes {holders}: end one, also one that is stopped"
+    )]
+    NoPlace {
+        /// Who takes such places.
+        kind: &'static str,
+        /// How many there are.
+        places: usize,
+        /// Numbers of the processes that hold them.
+        holders: String,
+    },
     /// The other side is of another version.
     #[error(
         "{service} was set up by another version of this software: it carries {expected} here; end all \
@@ -52,6 +64,31 @@ pub enum IpcError {
         service: String,
         /// Type that this process knows.
         expected: &'static str,
+        /// The prefix.
+        prefix: String,
+    },
+    /// No memory for the ports of a process.
+    #[error(
+        "/dev/shm has {} MB free, {} MB are wanted: remove what is not needed there, or make it larger \
+         (mount -o remount,size=256M /dev/shm; for a container --shm-size=256m)",
+        free_bytes / 1_000_000, wanted_bytes.div_ceil(1_000_000)
+    )]
+    NoRoom {
+        /// What the process reserves at its start \[bytes\].
+        wanted_bytes: u64,
+        /// What is there \[bytes\].
+        free_bytes: u64,
+    },
+    /// Somebody else's object under a name of this system.
+    #[error(
+        "{} belongs to user {owner} and is named as an object of the system `{prefix}`: have it removed, or choose \
+         another --prefix", object.display()
+    )]
+    Foreign {
+        /// Which.
+        object: PathBuf,
+        /// Number of the user.
+        owner: u32,
         /// The prefix.
         prefix: String,
     },

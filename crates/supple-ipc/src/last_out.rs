@@ -5,6 +5,7 @@
 //! that comes meanwhile waits for its turn.
 
 use crate::domain::{Domain, Node};
+use crate::shared_memory;
 use crate::turn;
 use iceoryx2::node::NodeState;
 use iceoryx2::prelude::CallbackProgression;
@@ -50,7 +51,7 @@ fn clear(domain: &Domain) -> io::Result<()> {
     if inhabited || listed.is_err() {
         return Ok(());
     }
-    for object in turn::objects(domain)? {
+    for object in shared_memory::objects(domain)?.ours {
         fs::remove_file(object)?;
     }
     Ok(())

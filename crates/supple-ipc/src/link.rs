@@ -12,6 +12,7 @@ use crate::error::IpcError;
 use crate::last_out::LastOut;
 use crate::message::{ArmState, PlantAsleep, TorqueCommand};
 use crate::port::{Full, Reader, Terms, Writer};
+use crate::writer_identity::KnownWriter;
 use core::cell::{Cell, LazyCell};
 use core::sync::atomic::{Ordering, fence};
 use core::time::Duration;
@@ -39,6 +40,8 @@ const ASLEEP: Terms = Terms {
     depth: 1,
     oldest_goes: true,
 };
+/// Messages of others that are passed over in one look: they may write as fast as they like.
+const MOST_FOREIGN: u32 = 64;
 const STATE_BELL: &str = "arm_state";
 const COMMAND_BELL: &str = "torque_command";
 
@@ -51,6 +54,7 @@ pub struct PlantLink {
     states: Writer<ArmState>,
     commands: Reader<TorqueCommand>,
     asleep: Writer<PlantAsleep>,
+    controller: KnownWriter,
     spin: Duration,
     /// A ring was asked for that was not waited for.
     rung: Cell<bool>,
@@ -72,16 +76,28 @@ impl PlantLink {
     /// # Errors
     /// [`IpcError::SecondWriter`] where there is a plant already, and what else [`IpcError`] says.
     pub fn new(domain: &Domain) -> Result<PlantLink, IpcError> {
-        let joining = domain.join()?;
+        let bytes = STATES.bytes_of::<ArmState>()
+            + ASLEEP.bytes_of::<PlantAsleep>()
+            + COMMANDS.bytes_of_reader();
+        let (ports, last_out) = domain.join(bytes, |node| {
+            Ok((
+                Writer::new(domain, node, &STATES, Full::Lose)?,
+                Reader::new(domain, node, &COMMANDS)?,
+                Writer::new(domain, node, &ASLEEP, Full::Lose)?,
+                Bell::new(domain, COMMAND_BELL)?,
+            ))
+        })?;
+        let (states, commands, asleep, bell) = ports;
         Ok(PlantLink {
-            states: Writer::new(domain, &joining.node, &STATES, Full::Lose)?,
-            commands: Reader::new(domain, &joining.node, &COMMANDS)?,
-            asleep: Writer::new(domain, &joining.node, &ASLEEP, Full::Lose)?,
+            states,
+            commands,
+            asleep,
+            bell,
             rope: Rope::new(domain, STATE_BELL)?,
-            bell: Bell::new(domain, COMMAND_BELL)?,
+            controller: KnownWriter::of(domain, COMMANDS.name)?,
             spin: Duration::ZERO,
             rung: Cell::new(false),
-            _last_out: LastOut::of(domain),
+            _last_out: last_out,
         })
     }
 
@@ -98,9 +114,17 @@ impl PlantLink {
     /// [`IpcError::Service`].
     pub fn publish(&self, state: &ArmState) -> Result<bool, IpcError> {
         self.silence()?;
-        let readers = self.states.send(state)?;
+        let readers = self.states.send(&ArmState {
+            writer: self.states.number(),
+            ..*state
+        })?;
         self.rope.ring(Ring::Sent);
         Ok(readers > 0)
+    }
+
+    /// Commands that were dropped because this system's controller did not write them.
+    pub fn foreign(&self) -> u64 {
+        self.controller.dropped()
     }
 
     /// Tells the controller that a state follows within some tens or hundreds of microseconds: what it has to do
@@ -146,9 +170,18 @@ impl PlantLink {
         let begun = LazyCell::new(|| (Instant::now(), timeout()));
         let mut told = false;
         loop {
-            while let Some(command) = self.commands.receive()? {
+            for _ in 0..MOST_FOREIGN {
+                let Some(command) = self.commands.receive()? else {
+                    break;
+                };
+                if !self.controller.wrote(command.writer) {
+                    continue;
+                }
                 if command.cycle == cycle {
-                    heard.answer = Some(command);
+                    heard.answer = Some(TorqueCommand {
+                        writer: 0,
+                        ..command
+                    });
                     return Ok(heard);
                 }
                 heard.late += 1;
@@ -198,6 +231,7 @@ pub struct ControllerLink {
     states: Reader<ArmState>,
     commands: Writer<TorqueCommand>,
     asleep: Reader<PlantAsleep>,
+    plant: KnownWriter,
     /// There was no state left, so that the next one has its ring yet to come.
     read_all: Cell<bool>,
     _last_out: LastOut,
@@ -209,16 +243,28 @@ impl ControllerLink {
     /// # Errors
     /// [`IpcError::SecondWriter`] where there is a controller already, and what else [`IpcError`] says.
     pub fn new(domain: &Domain) -> Result<ControllerLink, IpcError> {
-        let joining = domain.join()?;
+        let bytes = COMMANDS.bytes_of::<TorqueCommand>()
+            + STATES.bytes_of_reader()
+            + ASLEEP.bytes_of_reader();
+        let (ports, last_out) = domain.join(bytes, |node| {
+            Ok((
+                Writer::new(domain, node, &COMMANDS, Full::Lose)?,
+                // Before the states: who waits for the answer to one is heard.
+                Reader::new(domain, node, &ASLEEP)?,
+                Reader::new(domain, node, &STATES)?,
+                Bell::new(domain, STATE_BELL)?,
+            ))
+        })?;
+        let (commands, asleep, states, bell) = ports;
         Ok(ControllerLink {
-            commands: Writer::new(domain, &joining.node, &COMMANDS, Full::Lose)?,
-            // Before the states: who waits for the answer to one is heard.
-            asleep: Reader::new(domain, &joining.node, &ASLEEP)?,
-            states: Reader::new(domain, &joining.node, &STATES)?,
+            commands,
+            asleep,
+            states,
+            bell,
             rope: Rope::new(domain, COMMAND_BELL)?,
-            bell: Bell::new(domain, STATE_BELL)?,
+            plant: KnownWriter::of(domain, STATES.name)?,
             read_all: Cell::new(false),
-            _last_out: LastOut::of(domain),
+            _last_out: last_out,
         })
     }
 
@@ -227,9 +273,26 @@ impl ControllerLink {
     /// # Errors
     /// [`IpcError::Service`].
     pub fn receive(&self) -> Result<Option<ArmState>, IpcError> {
-        let state = self.states.receive()?;
-        self.read_all.set(state.is_none());
-        Ok(state)
+        for _ in 0..MOST_FOREIGN {
+            match self.states.receive()? {
+                Some(state) if self.plant.wrote(state.writer) => {
+                    self.read_all.set(false);
+                    return Ok(Some(ArmState { writer: 0, ..state }));
+                }
+                Some(_) => {}
+                None => {
+                    self.read_all.set(true);
+                    return Ok(None);
+                }
+            }
+        }
+        self.read_all.set(false);
+        Ok(None)
+    }
+
+    /// States that were dropped because this system's plant did not write them.
+    pub fn foreign(&self) -> u64 {
+        self.plant.dropped()
     }
 
     /// The oldest state that was not read yet; waits for one at most for `timeout`, which the kernel counts in
@@ -288,7 +351,10 @@ impl ControllerLink {
     /// # Errors
     /// [`IpcError::Service`].
     pub fn answer(&self, command: &TorqueCommand) -> Result<(), IpcError> {
-        self.commands.send(command)?;
+        self.commands.send(&TorqueCommand {
+            writer: self.commands.number(),
+            ..*command
+        })?;
         fence(Ordering::SeqCst);
         if self.asleep.receive()?.is_some() {
             self.rope.ring(Ring::Sent);
@@ -321,6 +387,7 @@ mod tests {
             }
             assert_eq!(controller.wait(SOON).expect("read"), Some(state));
             let command = TorqueCommand {
+                writer: 0,
                 cycle,
                 torque_nm: Default::default(),
                 fallback_torque_nm: Default::default(),

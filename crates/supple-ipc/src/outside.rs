@@ -9,6 +9,7 @@ use crate::domain::Domain;
 use crate::error::IpcError;
 use crate::last_out::LastOut;
 use crate::message::{OperatorReply, OperatorRequest, Telemetry};
+use crate::place::{Kind, Place};
 use crate::port::{Full, Reader, Terms, Writer};
 use core::time::Duration;
 use rustix::thread::{NanosleepRelativeResult, Timespec, nanosleep};
@@ -41,6 +42,31 @@ const REPLIES: Terms = Terms {
     oldest_goes: true,
 };
 
+/// Those who look, and those who ask, may hang: some places are not theirs. Together as many as the services have.
+const LOOKERS: Kind = Kind {
+    name: "reader",
+    words: "those who look at telemetry",
+    places: 5,
+};
+const RECORDERS: Kind = Kind {
+    name: "recorder",
+    words: "those who record telemetry",
+    places: 3,
+};
+const ASKERS: Kind = Kind {
+    name: "operator",
+    words: "operators",
+    places: 5,
+};
+const KEEPERS: Kind = Kind {
+    name: "keeper",
+    words: "programs that run the system",
+    places: 3,
+};
+const _: () = assert!(LOOKERS.places + RECORDERS.places == TELEMETRY.readers);
+const _: () = assert!(ASKERS.places + KEEPERS.places == REQUESTS.writers);
+const _: () = assert!(REPLIES.readers == REQUESTS.writers);
+
 /// How often a waiting reader looks: telemetry has no bell, so that it cannot be made to ring in vain.
 const LOOK_EVERY: Duration = Duration::from_millis(1);
 
@@ -59,12 +85,22 @@ impl OutsideLink {
     /// # Errors
     /// [`IpcError::SecondWriter`] where there is a controller already, and what else [`IpcError`] says.
     pub fn new(domain: &Domain, full: Full) -> Result<OutsideLink, IpcError> {
-        let joining = domain.join()?;
+        let bytes = TELEMETRY.bytes_of::<Telemetry>()
+            + REPLIES.bytes_of::<OperatorReply>()
+            + REQUESTS.bytes_of_reader();
+        let (ports, last_out) = domain.join(bytes, |node| {
+            Ok((
+                Writer::new(domain, node, &TELEMETRY, full)?,
+                Reader::new(domain, node, &REQUESTS)?,
+                Writer::new(domain, node, &REPLIES, Full::Lose)?,
+            ))
+        })?;
+        let (telemetry, requests, replies) = ports;
         Ok(OutsideLink {
-            telemetry: Writer::new(domain, &joining.node, &TELEMETRY, full)?,
-            requests: Reader::new(domain, &joining.node, &REQUESTS)?,
-            replies: Writer::new(domain, &joining.node, &REPLIES, Full::Lose)?,
-            _last_out: LastOut::of(domain),
+            telemetry,
+            requests,
+            replies,
+            _last_out: last_out,
         })
     }
 
@@ -100,20 +136,37 @@ pub struct TelemetryReader {
     expected: Option<u64>,
     lost: u64,
     _last_out: LastOut,
+    _place: Place,
 }
 
 impl TelemetryReader {
-    /// Joins; sees what is published from now on.
+    /// Joins to look; sees what is published from now on.
     ///
     /// # Errors
-    /// [`IpcError::TooManyReaders`] and what else [`IpcError`] says.
+    /// [`IpcError::NoPlace`] where 5 others look, and what else [`IpcError`] says.
     pub fn new(domain: &Domain) -> Result<TelemetryReader, IpcError> {
-        let joining = domain.join()?;
+        TelemetryReader::of(domain, &LOOKERS)
+    }
+
+    /// As [`TelemetryReader::new`], for a log: in a place that those who look cannot take.
+    ///
+    /// # Errors
+    /// As there, where 3 others record.
+    pub fn for_log(domain: &Domain) -> Result<TelemetryReader, IpcError> {
+        TelemetryReader::of(domain, &RECORDERS)
+    }
+
+    fn of(domain: &Domain, kind: &Kind) -> Result<TelemetryReader, IpcError> {
+        let place = Place::take(domain, kind)?;
+        let (reader, last_out) = domain.join(TELEMETRY.bytes_of_reader(), |node| {
+            Reader::new(domain, node, &TELEMETRY)
+        })?;
         Ok(TelemetryReader {
-            reader: Reader::new(domain, &joining.node, &TELEMETRY)?,
+            reader,
             expected: None,
             lost: 0,
-            _last_out: LastOut::of(domain),
+            _last_out: last_out,
+            _place: place,
         })
     }
 
@@ -163,21 +216,43 @@ pub struct Operator {
     number: u64,
     sequence: u64,
     _last_out: LastOut,
+    _place: Place,
 }
 
 impl Operator {
-    /// Joins.
+    /// Joins to ask for something.
     ///
     /// # Errors
-    /// [`IpcError`].
+    /// [`IpcError::NoPlace`] where 5 others do, and what else [`IpcError`] says.
     pub fn new(domain: &Domain) -> Result<Operator, IpcError> {
-        let joining = domain.join()?;
+        Operator::of(domain, &ASKERS)
+    }
+
+    /// As [`Operator::new`], for a program that runs the system: in a place that others cannot take.
+    ///
+    /// # Errors
+    /// As there, where 3 others do.
+    pub fn for_system(domain: &Domain) -> Result<Operator, IpcError> {
+        Operator::of(domain, &KEEPERS)
+    }
+
+    fn of(domain: &Domain, kind: &Kind) -> Result<Operator, IpcError> {
+        let place = Place::take(domain, kind)?;
+        let bytes = REQUESTS.bytes_of::<OperatorRequest>() + REPLIES.bytes_of_reader();
+        let (ports, last_out) = domain.join(bytes, |node| {
+            Ok((
+                Reader::new(domain, node, &REPLIES)?,
+                Writer::new(domain, node, &REQUESTS, Full::Lose)?,
+            ))
+        })?;
+        let (replies, requests) = ports;
         Ok(Operator {
-            replies: Reader::new(domain, &joining.node, &REPLIES)?,
-            requests: Writer::new(domain, &joining.node, &REQUESTS, Full::Lose)?,
+            replies,
+            requests,
             number: operator_number(),
             sequence: 0,
-            _last_out: LastOut::of(domain),
+            _last_out: last_out,
+            _place: place,
         })
     }
 

@@ -7,7 +7,7 @@
 use crate::domain::{Domain, Node};
 use crate::error::IpcError;
 use crate::outside::pause;
-use crate::turn;
+use crate::writer_identity::WriterLock;
 use core::fmt::Debug;
 use core::time::Duration;
 use iceoryx2::port::publisher::{Publisher, PublisherCreateError};
@@ -18,7 +18,6 @@ use iceoryx2::service::builder::publish_subscribe::{
     PublishSubscribeCreateError, PublishSubscribeOpenError, PublishSubscribeOpenOrCreateError,
 };
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
-use std::os::fd::OwnedFd;
 use std::time::Instant;
 
 /// What there is to know of a service before it is opened.
@@ -35,6 +34,23 @@ pub(crate) struct Terms {
     /// What a full reader costs: the oldest sample it has not read, or else the newest.
     pub oldest_goes: bool,
 }
+
+impl Terms {
+    /// Shared memory for the messages of one writer: as many as all readers may lag behind, with a header each, and
+    /// the connections' lists of them \[bytes\].
+    pub const fn bytes_of<T>(&self) -> u64 {
+        let messages = places(self.readers) * (self.depth + 2) + 2;
+        (messages * (size_of::<T>() + HEADER_BYTES)) as u64
+    }
+
+    /// Shared memory for what one reader is connected by \[bytes\].
+    pub const fn bytes_of_reader(&self) -> u64 {
+        (places(self.writers) * (self.depth + 2) * HEADER_BYTES) as u64
+    }
+}
+
+/// Header of a message and its places in lists, rounded up \[bytes\].
+const HEADER_BYTES: usize = 64;
 
 /// A type that is a message.
 pub(crate) trait Message: Debug + Copy + ZeroCopySend + 'static {}
@@ -54,7 +70,7 @@ pub enum Full {
 pub(crate) struct Writer<T: Message> {
     publisher: Publisher<ipc::Service, T, ()>,
     name: &'static str,
-    _alone: Option<OwnedFd>,
+    alone: Option<WriterLock>,
 }
 
 impl<T: Message> Writer<T> {
@@ -64,7 +80,7 @@ impl<T: Message> Writer<T> {
             prefix: domain.prefix().to_owned(),
         };
         let alone = match terms.writers {
-            1 => Some(lock(domain, terms.name)?.ok_or_else(taken)?),
+            1 => Some(WriterLock::take(domain, terms.name)?.ok_or_else(taken)?),
             _ => None,
         };
         let service = open::<T>(domain, node, terms)?;
@@ -84,8 +100,13 @@ impl<T: Message> Writer<T> {
         Ok(Writer {
             publisher,
             name: terms.name,
-            _alone: alone,
+            alone,
         })
+    }
+
+    /// What tells the messages of a service's one writer from those of others; 0 where there may be several.
+    pub fn number(&self) -> u64 {
+        self.alone.as_ref().map_or(0, WriterLock::number)
     }
 
     /// Meets readers that have come, as the next sending would, which then has the time.
@@ -212,16 +233,11 @@ const NODES: usize = 24 + LOST_PLACES;
 /// is one place, before whoever made the services has to be restarted; where there are many, some are not used.
 const LOST_PLACES: usize = 8;
 
-fn places(wanted: usize) -> usize {
+const fn places(wanted: usize) -> usize {
     match wanted {
         1 => 1 + LOST_PLACES,
         several => several,
     }
-}
-
-/// The lock of a service's one writer.
-fn lock(domain: &Domain, service: &str) -> Result<Option<OwnedFd>, IpcError> {
-    turn::lock(domain, service).map_err(|error| failed(service, &error))
 }
 
 /// How long a service may take to settle that others are just making or taking away.
@@ -250,7 +266,7 @@ fn service_name(name: &str) -> Result<ServiceName, IpcError> {
     ServiceName::new(name).map_err(|error| failed(name, &error))
 }
 
-fn failed(service: &str, cause: &dyn core::fmt::Display) -> IpcError {
+pub(crate) fn failed(service: &str, cause: &dyn core::fmt::Display) -> IpcError {
     IpcError::Service {
         service: service.to_owned(),
         cause: cause.to_string(),

@@ -6,6 +6,7 @@
 
 use crate::domain::Domain;
 use crate::outside::pause;
+use crate::shared_memory;
 use core::time::Duration;
 use rustix::fs::{FlockOperation, Mode, OFlags, flock, open};
 use rustix::io::Errno;
@@ -15,8 +16,6 @@ use std::os::fd::OwnedFd;
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// Where Linux keeps shared memory by its name.
-const SHARED_MEMORY: &str = "/dev/shm";
 /// Name of its lock.
 const TURN: &str = "turn";
 /// A turn is over after milliseconds, unless its process was stopped in the middle.
@@ -55,8 +54,7 @@ pub(crate) fn lock(domain: &Domain, name: &str) -> io::Result<Option<OwnedFd>> {
 }
 
 fn lock_within(domain: &Domain, name: &str, longest: Duration) -> io::Result<Option<OwnedFd>> {
-    let flags = OFlags::CREATE | OFlags::RDWR | OFlags::CLOEXEC;
-    let file = open(path(domain, name), flags, Mode::RUSR | Mode::WUSR)?;
+    let file = lock_file(domain, name)?;
     let start = Instant::now();
     loop {
         match flock(&file, FlockOperation::NonBlockingLockExclusive) {
@@ -68,32 +66,21 @@ fn lock_within(domain: &Domain, name: &str, longest: Duration) -> io::Result<Opt
     }
 }
 
+/// The file of a lock, made where it is not there yet.
+pub(crate) fn lock_file(domain: &Domain, name: &str) -> io::Result<OwnedFd> {
+    let flags = OFlags::CREATE | OFlags::RDWR | OFlags::CLOEXEC;
+    Ok(open(path(domain, name), flags, Mode::RUSR | Mode::WUSR)?)
+}
+
 fn path(domain: &Domain, lock: &str) -> PathBuf {
     let name = format!("{}.{lock}.lock", domain.prefix());
     domain.folder().join(name)
 }
 
-/// The system's objects in shared memory.
-pub(crate) fn objects(domain: &Domain) -> io::Result<Vec<PathBuf>> {
-    let begin = domain.objects();
-    let mut objects = Vec::new();
-    for entry in fs::read_dir(SHARED_MEMORY)? {
-        let entry = entry?;
-        if entry
-            .file_name()
-            .as_encoded_bytes()
-            .starts_with(begin.as_bytes())
-        {
-            objects.push(entry.path());
-        }
-    }
-    Ok(objects)
-}
-
 /// Takes away the objects whose makers died before they gave them a size. To be called with the turn. Who is
 /// connecting to another's ports has no turn: its objects are given the time to get their size.
 pub(crate) fn remove_unfinished(domain: &Domain) -> io::Result<()> {
-    for object in objects(domain)? {
+    for object in shared_memory::objects(domain)?.ours {
         let first_seen = Instant::now();
         while fs::metadata(&object).is_ok_and(|found| found.len() == 0) {
             if first_seen.elapsed() > UNFINISHED_AFTER {

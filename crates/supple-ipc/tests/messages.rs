@@ -12,12 +12,12 @@ use supple_ipc::message::*;
 #[test]
 fn there_is_no_padding_to_share() {
     let joints = MAX_DOF * 8;
-    assert_eq!(size_of::<PlantReport>(), 7 * 8);
+    assert_eq!(size_of::<PlantReport>(), 9 * 8);
     assert_eq!(
         size_of::<ArmState>(),
-        2 * 8 + joints + 3 * 8 + size_of::<PlantReport>() + 8
+        3 * 8 + joints + 3 * 8 + size_of::<PlantReport>() + 8
     );
-    assert_eq!(size_of::<TorqueCommand>(), 8 + 2 * joints + 8);
+    assert_eq!(size_of::<TorqueCommand>(), 2 * 8 + 2 * joints + 8);
     assert_eq!(size_of::<Text>(), 256);
     assert_eq!(size_of::<OperatorRequest>(), 3 * 8 + 80 * 8 + 8);
     assert_eq!(size_of::<OperatorReply>(), 3 * 8 + size_of::<Text>() + 8);
@@ -25,7 +25,8 @@ fn there_is_no_padding_to_share() {
     assert_eq!(size_of::<CycleTiming>(), 3 * 8);
     assert_eq!(
         size_of::<Telemetry>(),
-        8 + size_of::<ArmState>()
+        2 * 8
+            + size_of::<ArmState>()
             + size_of::<OperatorRequest>()
             + 8
             + 5 * joints

@@ -1,10 +1,13 @@
 //! What a thread needs from Linux to keep a period: memory that stays, a place before other threads, a
-//! processor of its own, a clock, a word when to end, and signs of life for the service manager.
+//! processor of its own, a clock, a word when to end, somebody else who waits for disks and terminals, and signs of
+//! life for the service manager.
 //!
 //! Nothing here is needed for a right answer, only for a timely one: what the system does not grant is
 //! reported as a [`Shortfall`] and the process goes on. It knows no arm and no controller.
 
+mod background;
 mod clock;
+pub mod diagnostics;
 mod heartbeat;
 mod memory;
 mod notify;
@@ -13,6 +16,7 @@ mod schedule;
 mod spin;
 mod stop;
 
+pub use background::BackgroundWriter;
 pub use clock::{monotonic_ns, sleep_until_ns};
 pub use heartbeat::{Heartbeat, Pulse, Watch};
 pub use notify::{ManagerVariables, Notifier, NotifyError};

@@ -1,82 +1,200 @@
-//! The last cycles before a fault, as a table on the disk.
+//! The last cycles before a fault, as a table on the disk; a thread of its own waits for the disk.
 
+use core::time::Duration;
 use std::fmt::Write as _;
 use std::fs::{self, DirBuilder, OpenOptions};
-use std::io::{Error, Write as _};
-use std::os::unix::fs::{DirBuilderExt, OpenOptionsExt};
-use std::path::PathBuf;
-use supple_ipc::message::{MAX_DOF, Telemetry};
+use std::io::{self, ErrorKind, Write as _};
+use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use supple_ipc::message::{MAX_DOF, Telemetry, Text};
+use supple_realtime::{BackgroundWriter, diagnostics};
 
 /// Cycles that are kept.
 pub const KEPT_CYCLES: usize = 1000;
+/// Tables that are kept in the folder: the newest.
+pub const KEPT_FILES: usize = 20;
+/// Tables that may wait for the disk, some megabytes each.
+const WAITING: usize = 2;
+
+/// Where the tables go, and who writes them there.
+#[derive(Debug)]
+pub struct FaultFiles {
+    writer: BackgroundWriter,
+    folder: Arc<Path>,
+}
+
+impl FaultFiles {
+    /// Starts the thread that writes.
+    ///
+    /// # Errors
+    /// Where the system gives no thread.
+    pub fn start(folder: PathBuf) -> io::Result<FaultFiles> {
+        Ok(FaultFiles {
+            writer: BackgroundWriter::start("supple-rt-disk", WAITING)?,
+            folder: folder.into(),
+        })
+    }
+
+    /// Hands a table over; where too many wait for the disk, it is lost, counted, and said so.
+    fn write(&self, table: Table, step: u64) {
+        let folder = self.folder.clone();
+        let accepted = self.writer.submit(move || table.save(&folder, step));
+        if !accepted {
+            diagnostics::post(format_args!(
+                "supple-rt: warning: the disk of {} is behind: the last cycles before this fault are lost, as of {} \
+                 faults so far; choose another folder with --fault-dir",
+                self.folder.display(),
+                self.writer.dropped()
+            ));
+        }
+    }
+
+    /// Tables that were lost.
+    pub fn dropped(&self) -> u64 {
+        self.writer.dropped()
+    }
+
+    /// The thread that writes, to be handed other work.
+    pub fn writer(&self) -> &BackgroundWriter {
+        &self.writer
+    }
+}
 
 /// The last [`KEPT_CYCLES`] cycles; a fault that latches sends them to the disk.
 #[derive(Debug)]
 pub struct LastCycles {
+    cycles: Table,
+    fault: u8,
+    files: FaultFiles,
+}
+
+/// Cycles in a ring.
+#[derive(Clone, Debug)]
+struct Table {
     kept: Vec<Telemetry>,
     /// Where the next one goes, once all places are taken.
     next: usize,
-    fault: u8,
-    folder: PathBuf,
 }
 
 impl LastCycles {
     /// None yet.
-    pub fn new(folder: PathBuf) -> LastCycles {
+    pub fn new(files: FaultFiles) -> LastCycles {
         LastCycles {
-            kept: Vec::with_capacity(KEPT_CYCLES),
-            next: 0,
+            cycles: Table {
+                kept: Vec::with_capacity(KEPT_CYCLES),
+                next: 0,
+            },
             fault: 0,
-            folder,
+            files,
         }
     }
 
-    /// A cycle. Where a fault has just latched, the table is written and its place said on standard error.
+    /// A cycle. Where a fault has just latched, it is said on standard error, and the table is handed to the thread
+    /// that writes; neither is waited for.
     pub fn add(&mut self, telemetry: &Telemetry) {
-        if self.kept.len() < KEPT_CYCLES {
-            self.kept.push(*telemetry);
+        let Table { kept, next } = &mut self.cycles;
+        if kept.len() < KEPT_CYCLES {
+            kept.push(*telemetry);
         } else {
-            self.kept[self.next] = *telemetry;
-            self.next = (self.next + 1) % KEPT_CYCLES;
+            kept[*next] = *telemetry;
+            *next = (*next + 1) % KEPT_CYCLES;
         }
         let latched = telemetry.fault != 0 && self.fault == 0;
         self.fault = telemetry.fault;
         if latched {
-            let fault = telemetry.fault_text;
-            match self.write(telemetry.step) {
-                Ok(file) => eprintln!(
-                    "supple-rt: fault: {fault}; the last {} cycles are in {}",
-                    self.kept.len(),
-                    file.display()
-                ),
-                Err(error) => eprintln!(
-                    "supple-rt: fault: {fault}; the last cycles cannot be written to {}: {error}; \
-                     choose another folder with --fault-dir",
-                    self.folder.display()
-                ),
-            }
+            let fault: Text = telemetry.fault_text;
+            diagnostics::post(format_args!("supple-rt: fault: {fault}"));
+            self.files.write(self.cycles.clone(), telemetry.step);
         }
     }
 
-    fn write(&self, step: u64) -> Result<PathBuf, Error> {
+    /// Waits for the disk at most for `timeout`, and says where it is not done by then.
+    pub fn finish(&self, timeout: Duration) {
+        if !self.files.writer.flush(timeout) {
+            diagnostics::post(format_args!(
+                "supple-rt: warning: the disk of {} does not answer: the last cycles before a fault may be missing",
+                self.files.folder.display()
+            ));
+        }
+    }
+
+    /// Where the tables go.
+    pub fn files(&self) -> &FaultFiles {
+        &self.files
+    }
+}
+
+/// Name of a table; `None` for what is none.
+fn is_table(name: &str) -> bool {
+    let numbers = name
+        .strip_prefix("fault-")
+        .and_then(|rest| rest.strip_suffix(".csv"));
+    let numbers = numbers.and_then(|numbers| numbers.split_once('-'));
+    let digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+    numbers.is_some_and(|(process, step)| digits(process) && digits(step))
+}
+
+/// Removes the oldest tables of this user, so that [`KEPT_FILES`] are left. What is no table stays.
+fn prune(folder: &Path) -> io::Result<()> {
+    let user = rustix::process::getuid().as_raw();
+    let mut tables = Vec::new();
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        let (name, about) = (entry.file_name(), entry.metadata()?);
+        if name.to_str().is_some_and(is_table) && about.is_file() && about.uid() == user {
+            tables.push((about.mtime(), about.mtime_nsec(), entry.path()));
+        }
+    }
+    tables.sort();
+    let surplus = tables.len().saturating_sub(KEPT_FILES);
+    for (_, _, table) in tables.into_iter().take(surplus) {
+        fs::remove_file(table)?;
+    }
+    Ok(())
+}
+
+impl Table {
+    /// Writes it and says where; what fails is said too.
+    fn save(&self, folder: &Path, step: u64) {
+        match self.write(folder, step) {
+            Ok(file) => diagnostics::post(format_args!(
+                "supple-rt: the last {} cycles before the fault are in {}",
+                self.kept.len(),
+                file.display()
+            )),
+            Err(error) => diagnostics::post(format_args!(
+                "supple-rt: warning: the last cycles before the fault cannot be written to {}: {error}; \
+                 choose another folder with --fault-dir",
+                folder.display()
+            )),
+        }
+    }
+
+    fn write(&self, folder: &Path, step: u64) -> io::Result<PathBuf> {
         DirBuilder::new()
             .recursive(true)
             .mode(0o700)
-            .create(&self.folder)?;
+            .create(folder)?;
         let process = std::process::id();
-        let file = self.folder.join(format!("fault-{process}-{step}.csv"));
+        let file = folder.join(format!("fault-{process}-{step}.csv"));
         let part = file.with_extension("csv.part");
+        match fs::remove_file(&part) {
+            Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
+            _ => {}
+        }
         let mut options = OpenOptions::new();
-        options.write(true).create(true).truncate(true).mode(0o600);
+        options.write(true).create_new(true).mode(0o600);
         let mut table = options.open(&part)?;
-        table.write_all(self.table().as_bytes())?;
+        table.write_all(self.text().as_bytes())?;
         table.sync_all()?;
         fs::rename(&part, &file)?;
+        prune(folder)?;
         Ok(file)
     }
 
     /// The table, oldest cycle first.
-    fn table(&self) -> String {
+    fn text(&self) -> String {
         let (newer, older) = self.kept.split_at(self.next);
         let cycles = older.iter().chain(newer);
         let dof = self.kept.first().map_or(0, |t| usize::from(t.state.dof));

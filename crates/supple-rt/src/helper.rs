@@ -1,21 +1,27 @@
-//! The helper's thread: everything of the controller's process that may wait for somebody.
+//! The helper's thread: the ports to the outside. It waits for nobody: disks and standard error have threads of their
+//! own.
 
 use crate::error::RtError;
-use crate::fault_file::LastCycles;
+use crate::fault_file::{FaultFiles, LastCycles};
 use crate::options::Options;
 use crate::rings::Outside;
+use core::fmt::Display;
 use core::time::Duration;
-use std::path::PathBuf;
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::{Builder, JoinHandle};
 use supple_core::controller::Mode;
 use supple_ipc::message::{OperatorReply, OperatorRequest, Outcome, Text};
 use supple_ipc::{Domain, Full, IpcError, OutsideLink, pause};
+use supple_realtime::diagnostics;
 
 /// How often the helper looks.
 const LOOK_EVERY: Duration = Duration::from_millis(1);
+/// Most of one kind that is done before the others have their turn.
+const MOST: usize = 256;
 /// Folder for faults beside the system's sockets.
 const FAULTS: &str = "faults";
+/// How long the end waits for a disk.
+const DISK_WITHIN: Duration = Duration::from_secs(2);
 
 /// The helper at work.
 #[derive(Debug)]
@@ -35,11 +41,12 @@ impl Helper {
         };
         let folder = options.fault_dir.clone();
         let folder = folder.unwrap_or_else(|| domain.folder().join(FAULTS));
+        let files = FaultFiles::start(folder).map_err(RtError::Thread)?;
         let domain = domain.clone();
         let (ready, is_ready) = sync_channel(1);
         let thread = Builder::new()
             .name("supple-rt-helper".to_owned())
-            .spawn(move || work(&domain, full, outside, folder, &ready))
+            .spawn(move || work(&domain, full, outside, files, &ready))
             .map_err(RtError::Thread)?;
         let helper = Helper { thread };
         match is_ready.recv() {
@@ -52,7 +59,7 @@ impl Helper {
     /// Waits until everything of a loop that has ended is told.
     ///
     /// # Errors
-    /// [`RtError::Ipc`] where something could not be told.
+    /// [`RtError::Ipc`] where it never had its ports, [`RtError::Helper`] where it ended by a defect.
     pub fn finish(self) -> Result<(), RtError> {
         match self.thread.join() {
             Ok(worked) => Ok(worked?),
@@ -64,40 +71,104 @@ impl Helper {
 fn work(
     domain: &Domain,
     full: Full,
-    mut outside: Outside,
-    folder: PathBuf,
+    outside: Outside,
+    files: FaultFiles,
     ready: &SyncSender<()>,
 ) -> Result<(), IpcError> {
     let link = OutsideLink::new(domain, full)?;
-    let mut last_cycles = LastCycles::new(folder);
     // Nobody waits for it any more only where the start was given up.
     let _ = ready.send(());
+    let mut desk = Desk {
+        link,
+        outside,
+        last_cycles: LastCycles::new(files),
+        failed: false,
+        told_of_states: false,
+    };
     loop {
-        outside.pulse.beat();
-        let ended = outside.ended();
-        while let Some(telemetry) = outside.telemetry() {
-            link.publish(&telemetry)?;
-            last_cycles.add(&telemetry);
-        }
-        while let Some(reply) = outside.reply() {
-            link.reply(&reply)?;
-        }
-        while let Some(request) = link.request()? {
-            let handed_in = outside.request(request);
-            match (handed_in, request.has_at_cycle != 0) {
-                // The loop hears it before the step of its cycle, whenever that is.
-                (true, true) => link.reply(&early(&request, Outcome::Queued, ""))?,
-                (true, false) => {}
-                (false, _) => {
-                    let text = "refused: too many requests at once";
-                    link.reply(&early(&request, Outcome::Refused, text))?;
-                }
-            }
-        }
+        desk.outside.pulse.beat();
+        let ended = desk.outside.ended();
+        desk.requests();
+        desk.telemetry();
+        desk.replies();
         if ended {
+            desk.last_cycles.finish(DISK_WITHIN);
             return Ok(());
         }
         pause(LOOK_EVERY);
+    }
+}
+
+/// The ports with what is handed over at them. A port that fails ends nothing: the next message tries it again.
+struct Desk {
+    link: OutsideLink,
+    outside: Outside,
+    last_cycles: LastCycles,
+    failed: bool,
+    told_of_states: bool,
+}
+
+impl Desk {
+    fn requests(&mut self) {
+        for _ in 0..MOST {
+            let request = match self.link.request() {
+                Ok(Some(request)) => request,
+                Ok(None) => break,
+                Err(error) => return self.port_failed(&error),
+            };
+            let handed_in = self.outside.request(request);
+            match (handed_in, request.has_at_cycle != 0) {
+                // The loop hears it before the step of its cycle, whenever that is.
+                (true, true) => self.reply(&early(&request, Outcome::Queued, "")),
+                (true, false) => {}
+                (false, _) => {
+                    let text = "refused: too many requests at once";
+                    self.reply(&early(&request, Outcome::Refused, text));
+                }
+            }
+        }
+    }
+
+    fn telemetry(&mut self) {
+        for _ in 0..MOST {
+            let Some(telemetry) = self.outside.telemetry() else {
+                break;
+            };
+            if let Err(error) = self.link.publish(&telemetry) {
+                self.port_failed(&error);
+            }
+            self.last_cycles.add(&telemetry);
+        }
+        if self.outside.states_dropped() > 0 && !self.told_of_states {
+            self.told_of_states = true;
+            diagnostics::post(
+                "supple-rt: warning: arm states are dropped: they are of another arm, or another program than this \
+                 system's plant writes them; start every process with the same --arm, and one plant",
+            );
+        }
+    }
+
+    fn replies(&mut self) {
+        for _ in 0..MOST {
+            let Some(reply) = self.outside.reply() else {
+                break;
+            };
+            self.reply(&reply);
+        }
+    }
+
+    fn reply(&mut self, reply: &OperatorReply) {
+        if let Err(error) = self.link.reply(reply) {
+            self.port_failed(&error);
+        }
+    }
+
+    /// Says so once.
+    fn port_failed(&mut self, error: &dyn Display) {
+        if !self.failed {
+            self.failed = true;
+            diagnostics::post(format_args!("supple-rt: warning: {error}"));
+        }
     }
 }
 

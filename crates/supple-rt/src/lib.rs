@@ -1,9 +1,11 @@
 //! The controller as a realtime process: waits for an arm state, runs `step`, publishes torques.
 //!
-//! Two threads. The loop's thread has only the ports to the plant; after its start it allocates nothing,
-//! locks nothing and logs nothing ([`ControlLoop`]). Its helper has the ports to the outside and the disk:
-//! telemetry, requests, replies, and the last cycles before a fault ([`Helper`]). Between them are rings of
-//! fixed size. Where a service manager watches the process, a third thread tells it that both go on
+//! The loop's thread has only the ports to the plant; after its start it allocates nothing, locks nothing and logs
+//! nothing ([`ControlLoop`]). Its helper has the ports to the outside: telemetry, requests, replies ([`Helper`]). A third
+//! thread hears requests for idle and nothing else ([`IdleWatch`]). Disk and standard error have threads of their own,
+//! which the others never wait for. Between them are rings of fixed size. Where the helper or the watch is gone, nobody
+//! is heard any more: the loop leaves in order, and the process ends with an error. Where
+//! a service manager watches the process, one thread more tells it that loop and helper go on
 //! ([`supple_realtime::Heartbeat`]).
 //!
 //! It knows no bus, no log format, no simulator. The plant owns the clock; in virtual time the loop waits for
@@ -13,6 +15,7 @@ mod control_loop;
 mod error;
 mod fault_file;
 mod helper;
+mod idle_watch;
 mod options;
 mod queue;
 mod rings;
@@ -20,11 +23,12 @@ mod timing;
 
 pub use control_loop::{ControlLoop, PLANT_LOST_AFTER};
 pub use error::RtError;
-pub use fault_file::{KEPT_CYCLES, LastCycles};
+pub use fault_file::{FaultFiles, KEPT_CYCLES, KEPT_FILES, LastCycles};
 pub use helper::Helper;
+pub use idle_watch::IdleWatch;
 pub use options::Options;
-pub use queue::Queue;
-pub use rings::{Inside, Outside, rings};
+pub use queue::{NoPlace, Queue};
+pub use rings::{IdleInside, IdleOutside, Inside, Outside, idle_path, rings};
 pub use timing::{Spread, Timing};
 
 use clap::Parser;
@@ -32,11 +36,14 @@ use std::process::ExitCode;
 use supple_core::Controller;
 use supple_ipc::{ControllerLink, Domain};
 use supple_model::{Description, with_dof};
-use supple_realtime::{Heartbeat, ManagerVariables, Notifier, Stop, die_with_parent, enter};
+use supple_realtime::{
+    Heartbeat, ManagerVariables, Notifier, Stop, diagnostics, die_with_parent, enter,
+};
 
 /// The whole program, from its arguments to its exit code.
 pub fn main() -> ExitCode {
     let options = Options::parse();
+    diagnostics::start();
     let stop = match Stop::on_signals() {
         Ok(stop) => stop,
         Err(error) => return complain(&error.into()),
@@ -59,7 +66,8 @@ pub fn main() -> ExitCode {
     let ran = with_dof!(description.dof(), N => run::<N>(&description, &options, &stop));
     match ran.map_err(RtError::from).and_then(|ran| ran) {
         Ok(timing) => {
-            eprintln!("supple-rt: {timing}");
+            diagnostics::post(format_args!("supple-rt: {timing}"));
+            diagnostics::flush();
             ExitCode::SUCCESS
         }
         Err(error) => complain(&error),
@@ -67,7 +75,8 @@ pub fn main() -> ExitCode {
 }
 
 fn complain(error: &RtError) -> ExitCode {
-    eprintln!("supple-rt: error: {error}");
+    diagnostics::post(format_args!("supple-rt: error: {error}"));
+    diagnostics::flush();
     ExitCode::from(error.code())
 }
 
@@ -87,15 +96,19 @@ pub fn run<const N: usize>(
     let (inside, outside) = rings();
     let pulses = [inside.pulse(), outside.pulse()];
     let helper = Helper::start(&domain, outside, options)?;
+    let (idle_inside, idle_outside) = idle_path();
+    let watch = IdleWatch::start(&domain, idle_outside, options.realtime())?;
     let mut control = ControlLoop::new(controller, inside, options.virtual_time);
     let heartbeat = notifier.map(|notifier| Heartbeat::start(notifier, &pulses));
     let heartbeat = heartbeat.transpose()?;
+    control.hear_idle(idle_inside);
     for shortfall in enter(&options.realtime()) {
-        eprintln!("supple-rt: warning: {shortfall}");
+        diagnostics::post(format_args!("supple-rt: warning: {shortfall}"));
     }
     let ended = control.run(&link, stop);
     drop(heartbeat);
     let timing = control.into_timing();
     helper.finish()?;
+    watch.finish()?;
     ended.map(|()| timing)
 }

@@ -1,12 +1,37 @@
 //! Requests that wait for their cycle.
 //!
-//! Those that are due are heard in the order in which they came, one a cycle. When the arm is let go of, or a
-//! fault stops it, what still waits was asked of another situation and is dropped.
+//! Those that are due are heard in the order in which they came, one a cycle; one for idle goes before all others. When
+//! the arm is let go of, or a fault stops it, what still waits was asked of another situation and is dropped. No operator
+//! has more than half of the places, so that one who floods them leaves room for the others.
 
+use core::fmt;
 use supple_ipc::message::OperatorRequest;
 
 /// Most requests that wait.
 pub const ROOM: usize = 16;
+/// Most of one operator.
+pub const ROOM_OF_ONE: usize = 8;
+
+/// Why a request finds no place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NoPlace {
+    /// All places are taken.
+    Full,
+    /// Its operator has taken his share.
+    Share,
+}
+
+impl fmt::Display for NoPlace {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            NoPlace::Full => f.write_str("too many requests wait for their cycle"),
+            NoPlace::Share => write!(
+                f,
+                "{ROOM_OF_ONE} requests of this operator wait for their cycle, more may not"
+            ),
+        }
+    }
+}
 
 /// Requests in the order in which they came.
 #[derive(Clone, Debug, Default)]
@@ -16,21 +41,34 @@ pub struct Queue {
 }
 
 impl Queue {
-    /// Puts a request last; false where there is no room.
-    pub fn push(&mut self, request: OperatorRequest) -> bool {
-        let Some(place) = self.places.get_mut(self.waiting) else {
-            return false;
-        };
+    /// Puts a request last.
+    ///
+    /// # Errors
+    /// [`NoPlace`].
+    pub fn push(&mut self, request: OperatorRequest) -> Result<(), NoPlace> {
+        let waiting = self.places.iter().flatten();
+        let of_one = waiting.filter(|waits| waits.operator == request.operator);
+        if of_one.count() >= ROOM_OF_ONE {
+            return Err(NoPlace::Share);
+        }
+        let place = self.places.get_mut(self.waiting).ok_or(NoPlace::Full)?;
         *place = Some(request);
         self.waiting += 1;
-        true
+        Ok(())
     }
 
-    /// Takes the first that may be heard in this cycle.
+    /// Takes the first that may be heard in this cycle, one for idle before others.
     pub fn due(&mut self, cycle: u64) -> Option<OperatorRequest> {
-        let is_due = |place: &Option<OperatorRequest>| place.is_some_and(|r| r.is_due(cycle));
-        let first = self.places[..self.waiting].iter().position(is_due)?;
-        self.take(first)
+        let waiting = self.places[..self.waiting].iter().flatten();
+        let mut due = waiting.enumerate().filter(|(_, r)| r.is_due(cycle));
+        let idle = due.clone().find(|(_, r)| r.asks_for_idle());
+        let (place, _) = idle.or_else(|| due.next())?;
+        self.take(place)
+    }
+
+    /// Nothing waits.
+    pub fn is_empty(&self) -> bool {
+        self.waiting == 0
     }
 
     /// Takes the first, due or not.

@@ -16,7 +16,7 @@ use supple_ipc::message::{
 use supple_ipc::{ControllerLink, Domain, PlantLink};
 use supple_model::Description;
 use supple_realtime::Stop;
-use supple_rt::{ControlLoop, Outside, rings};
+use supple_rt::{ControlLoop, IdleOutside, Outside, idle_path, rings};
 use tempfile::TempDir;
 
 const SOON: Duration = Duration::from_secs(5);
@@ -27,6 +27,7 @@ struct Bench {
     link: ControllerLink,
     plant: PlantLink,
     outside: Outside,
+    idle: IdleOutside,
     stop: Stop,
     home_rad: Vector<4>,
     cycle: u64,
@@ -46,11 +47,15 @@ fn bench(virtual_time: bool) -> Bench {
     let folder = tempfile::tempdir().expect("a folder");
     let domain = Domain::within(&folder.path().join("run"), "loop").expect("a domain");
     let (inside, outside) = rings();
+    let (idle_inside, idle) = idle_path();
+    let mut control = ControlLoop::new(controller(), inside, virtual_time);
+    control.hear_idle(idle_inside);
     Bench {
-        control: ControlLoop::new(controller(), inside, virtual_time),
+        control,
         link: ControllerLink::new(&domain).expect("a controller"),
         plant: PlantLink::new(&domain).expect("a plant"),
         outside,
+        idle,
         stop: Stop::default(),
         home_rad: description().home().expect("four joints"),
         cycle: 0,
@@ -167,6 +172,15 @@ fn a_thousand_cycles_with_requests_and_a_fault_allocate_nothing() {
                 200 => bench.ask(&Request::Idle, Some(bench.cycle + 50)),
                 // Refused in idle: words are made.
                 300 | 301 => bench.ask(&Request::Reset, None),
+                // On the way for idle, and states of another arm.
+                400 => bench.idle.ask(1),
+                500 => {
+                    let other = ArmState {
+                        dof: 7,
+                        ..bench.state(Drives::Active)
+                    };
+                    bench.plant.publish(&other).expect("published");
+                }
                 // Two cycles are left out: a fault, with words.
                 900 => bench.cycle += 3,
                 _ => {}

@@ -23,11 +23,12 @@ use supple_core::drive_guard::DriveGuard;
 use supple_ipc::{Domain, PlantLink};
 use supple_model::{Description, with_dof};
 use supple_plant::{Plant, PlantConfig, Scene, TraceFile};
-use supple_realtime::{Stop, die_with_parent, enter, spin_for};
+use supple_realtime::{Stop, diagnostics, die_with_parent, enter, spin_for};
 
 /// The whole program, from its arguments to its exit code.
 pub fn main() -> ExitCode {
     let options = Options::parse();
+    diagnostics::start();
     let stop = match Stop::on_signals() {
         Ok(stop) => stop,
         Err(error) => return complain(&error.into()),
@@ -50,7 +51,8 @@ pub fn main() -> ExitCode {
     let ran = with_dof!(description.dof(), N => run::<N>(&description, &options, &stop));
     match ran.map_err(SimError::from).and_then(|ran| ran) {
         Ok(summary) => {
-            eprintln!("supple-sim: {summary}");
+            diagnostics::post(format_args!("supple-sim: {summary}"));
+            diagnostics::flush();
             ExitCode::SUCCESS
         }
         Err(error) => complain(&error),
@@ -58,14 +60,15 @@ pub fn main() -> ExitCode {
 }
 
 fn complain(error: &SimError) -> ExitCode {
-    eprintln!("supple-sim: error: {error}");
+    diagnostics::post(format_args!("supple-sim: error: {error}"));
+    diagnostics::flush();
     ExitCode::from(error.code())
 }
 
 /// Runs until it is asked to end, or for as many cycles as the options say.
 ///
 /// # Errors
-/// [`SimError`]: an arm that is not sound, shared memory that cannot be used, commands for another arm.
+/// [`SimError`]: an arm that is not sound, shared memory that cannot be used.
 pub fn run<const N: usize>(
     description: &Description,
     options: &Options,
@@ -85,7 +88,7 @@ pub fn run<const N: usize>(
         world.trace(TraceFile::create(file, N)?);
     }
     for shortfall in enter(&options.realtime()) {
-        eprintln!("supple-sim: warning: {shortfall}");
+        diagnostics::post(format_args!("supple-sim: warning: {shortfall}"));
     }
     world.spin(spin_for(options.spin_us));
     let ran = match options.virtual_time {

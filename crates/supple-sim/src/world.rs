@@ -122,6 +122,7 @@ impl<const N: usize> World<N> {
             self.link.publish(&self.state(begin_ns))?;
             let left = || Duration::from_nanos((due_ns + wait_ns).saturating_sub(monotonic_ns()));
             let heard = self.link.answer_within(self.cycle(), left)?;
+            let heard = self.usable(heard);
             self.note(&heard, begin_ns);
             self.advance(&heard, begin_ns)?;
             summary.cycles += 1;
@@ -156,6 +157,7 @@ impl<const N: usize> World<N> {
                 }
                 heard = self.link.answer(self.cycle(), LOOK_EVERY)?;
             }
+            let heard = self.usable(heard);
             self.note(&heard, begin_ns);
             self.advance(&heard, state.stamp_ns)?;
             summary.cycles += 1;
@@ -193,6 +195,19 @@ impl<const N: usize> World<N> {
             self.motors.drives(),
             self.report,
         )
+    }
+
+    /// A command that is not for this arm, or not finite, is no answer: it is counted, and the fallback acts.
+    fn usable(&mut self, mut heard: Heard) -> Heard {
+        if heard
+            .answer
+            .is_some_and(|command| !command.is_usable::<N>())
+        {
+            heard.answer = None;
+            self.report.unusable += 1;
+        }
+        self.report.foreign = self.link.foreign();
+        heard
     }
 
     fn note(&mut self, heard: &Heard, begin_ns: u64) {

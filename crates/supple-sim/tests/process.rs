@@ -150,3 +150,55 @@ fn a_second_plant_is_refused_with_the_reason() {
     third.kill().expect("SIGKILL");
     third.wait().expect("it is gone");
 }
+
+/// A command for another arm, or with a torque that is none, counts as no answer: the last fallback acts, the count is
+/// told, and the next command is heard.
+#[test]
+fn a_command_that_cannot_be_used_is_no_answer_and_ends_nobody() {
+    let system = system();
+    let link = ControllerLink::new(&system.domain).expect("a controller");
+    let child = system.start(&["--virtual-time", "--cycles", "40"]);
+    let description = Description::asset("wam4").expect("built in");
+    let config = PlantConfig::<4>::from_description(&description).expect("sound");
+    let home = description.home().expect("four joints");
+    let mut plant = Plant::new(config, home, Vector::zeros()).expect("sound");
+    let mut controller = Holding::new();
+    let mut fallback_nm = Vector::<4>::zeros();
+    let mut unusable = 0;
+    for cycle in 0..40 {
+        let arm = link.wait(SOON).expect("read").expect("a state");
+        let measured = arm.input::<4>(None).expect("four joints").position_rad;
+        let expected = plant.measurement().position_rad;
+        assert_eq!(
+            Vector::from(measured.map(Option::unwrap_or_default)),
+            expected
+        );
+        assert_eq!((arm.plant.unusable, arm.plant.missed), (unusable, unusable));
+        let command = controller.answer(&arm);
+        let spoilt = match cycle {
+            10 => TorqueCommand {
+                torque_nm: [f64::NAN; 7],
+                ..command
+            },
+            20 => TorqueCommand { dof: 7, ..command },
+            30 => TorqueCommand {
+                fallback_torque_nm: [f64::INFINITY; 7],
+                ..command
+            },
+            _ => command,
+        };
+        link.answer(&spoilt).expect("answered");
+        if spoilt.is_usable::<4>() {
+            fallback_nm = command.fallback_torque().expect("four joints");
+            plant.cycle(&command.torque().expect("four joints"));
+        } else {
+            unusable += 1;
+            assert!(fallback_nm.amax() > 0.0);
+            plant.cycle(&fallback_nm);
+        }
+    }
+    let output = child.wait_with_output().expect("it ends by itself");
+    let words = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{words}");
+    assert!(words.contains("40 cycles, 3 missed"), "{words}");
+}

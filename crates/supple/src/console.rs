@@ -4,6 +4,8 @@ use crate::exit::Failure;
 use serde::Serialize;
 use std::io::{ErrorKind, Write};
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+use supple_realtime::diagnostics;
 
 /// Writes a line to standard output. A reader that has gone is no failure.
 ///
@@ -36,9 +38,35 @@ pub fn json(value: &impl Serialize) -> Result<String, Failure> {
     serde_json::to_string_pretty(value).map_err(|error| Failure::Compose(error.to_string()))
 }
 
+/// Standard error is written by a thread of its own.
+static IN_BACKGROUND: AtomicBool = AtomicBool::new(false);
+
+/// From now on nothing that is written to standard error is waited for: this process looks after an arm.
+pub fn wait_for_no_reader() {
+    diagnostics::start();
+    IN_BACKGROUND.store(true, Ordering::Relaxed);
+}
+
+/// Waits a moment for what is still to be written to standard error.
+pub fn flush() {
+    if IN_BACKGROUND.load(Ordering::Relaxed) {
+        diagnostics::flush();
+    }
+}
+
 /// Writes a line to standard error; there is nobody to tell where that fails.
 pub fn remark(text: &str) {
-    let _ = writeln!(std::io::stderr().lock(), "{text}");
+    remark_part(format!("{text}\n"));
+}
+
+/// As [`remark`], of text that is no whole line.
+pub fn remark_part(text: String) {
+    match IN_BACKGROUND.load(Ordering::Relaxed) {
+        true => diagnostics::post_part(text),
+        false => {
+            let _ = std::io::stderr().lock().write_all(text.as_bytes());
+        }
+    }
 }
 
 /// A failure as `--json` gives it.

@@ -288,10 +288,10 @@ impl Failure {
         matches!(
             self,
             Failure::Fault { .. }
+                | Failure::InFault
                 | Failure::Different { .. }
                 | Failure::NotReady { .. }
                 | Failure::Drill { .. }
-                | Failure::InFault
                 | Failure::RunFault { .. }
                 | Failure::LogEnded { .. }
                 | Failure::TraceEnded { .. }

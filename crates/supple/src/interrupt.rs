@@ -1,6 +1,9 @@
 //! An interrupted run leaves no half-written folder.
 
+use rustix::process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal};
+use std::os::fd::OwnedFd;
 use std::path::PathBuf;
+use std::process::Child;
 use std::sync::{Mutex, OnceLock};
 use supple_realtime::Stop;
 
@@ -12,6 +15,30 @@ static PARTIAL: Mutex<Option<PathBuf>> = Mutex::new(None);
 
 /// Somebody ends in order when asked to.
 static CAUGHT: OnceLock<Stop> = OnceLock::new();
+
+/// The process that is asked to end at once, whatever this one waits for just then.
+static FIRST: Mutex<Option<OwnedFd>> = Mutex::new(None);
+
+/// From now on an interrupt that is caught asks this child to end as well, before whoever ends in order comes to it.
+pub fn pass_on_to(child: &Child) {
+    let process = i32::try_from(child.id()).ok().and_then(Pid::from_raw);
+    // A descriptor means this very process, even when its number is somebody else's. Without one the child is asked to
+    // end in its turn.
+    let process = process.and_then(|pid| pidfd_open(pid, PidfdFlags::empty()).ok());
+    *FIRST
+        .lock()
+        .unwrap_or_else(|poisoned| poisoned.into_inner()) = process;
+}
+
+fn pass_on() {
+    let first = FIRST
+        .lock()
+        .unwrap_or_else(|poisoned| poisoned.into_inner());
+    if let Some(process) = first.as_ref() {
+        // One that has ended needs no signal.
+        let _ = pidfd_send_signal(process, Signal::TERM);
+    }
+}
 
 /// From now on an interrupt ends nothing by itself: it is asked for, and whoever called this ends in order.
 pub fn catch() -> Stop {
@@ -35,7 +62,8 @@ pub fn install() {
     // Without the handler the system ends the program as well, only the folder stays.
     let _ = ctrlc::set_handler(|| {
         if let Some(stop) = CAUGHT.get() {
-            return stop.ask();
+            stop.ask();
+            return pass_on();
         }
         let partial = PARTIAL
             .lock()

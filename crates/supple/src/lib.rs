@@ -35,13 +35,15 @@ use std::process::ExitCode;
 pub fn run() -> ExitCode {
     let cli = Cli::parse();
     interrupt::install();
-    match dispatch(&cli.command) {
+    let code = match dispatch(&cli.command) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             console::complain(&failure, cli.command.json());
             ExitCode::from(&failure)
         }
-    }
+    };
+    console::flush();
+    code
 }
 
 fn dispatch(command: &Command) -> Result<(), Failure> {

@@ -9,8 +9,11 @@ use supple_core::math::Vector3;
 /// What the arm was at the start of a cycle, and how the plant's own side fares.
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
 #[repr(C)]
-#[type_name("supple.ArmState.v2")]
+#[type_name("supple.ArmState.v3")]
 pub struct ArmState {
+    /// Who wrote it: the number that the holder of the writer's lock drew. Zero outside of shared memory; a reader
+    /// takes no state of another writer.
+    pub writer: u64,
     /// Number of the cycle, one more each period.
     pub cycle: u64,
     /// When it was measured \[ns\]: the system's monotonic clock, or since the start in virtual time.
@@ -36,12 +39,16 @@ pub struct ArmState {
 /// Counters and times of the process that owns the clock. Counts are since its start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
 #[repr(C)]
-#[type_name("supple.PlantReport.v2")]
+#[type_name("supple.PlantReport.v3")]
 pub struct PlantReport {
     /// Cycles whose answer did not come in time.
     pub missed: u64,
     /// Answers that came after their cycle.
     pub late: u64,
+    /// Torque commands that were dropped because the controller of this system did not write them.
+    pub foreign: u64,
+    /// Torque commands that counted as no answer: of another number of joints, or not finite.
+    pub unusable: u64,
     /// Frames that were not seen to leave; 0 without a bus.
     pub tx_lost: u64,
     /// By how much this cycle began late \[ns\]; 0 in virtual time.
@@ -70,6 +77,7 @@ impl ArmState {
             .enumerate()
             .fold(0, |bits, (i, p)| bits | (u8::from(p.is_some()) << i));
         ArmState {
+            writer: 0,
             cycle,
             stamp_ns,
             position_rad: widened::<N>(&position_rad.map(Option::unwrap_or_default)),
@@ -100,6 +108,11 @@ impl ArmState {
             drives_active: self.drives() == Drives::Active,
             request,
         })
+    }
+
+    /// It is of an arm with `N` joints.
+    pub fn is_of<const N: usize>(&self) -> bool {
+        usize::from(self.dof) == N
     }
 
     /// What the motors do; a number that is not known is taken as [`Drives::Off`].

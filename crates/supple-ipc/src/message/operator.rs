@@ -5,6 +5,9 @@ use iceoryx2::prelude::ZeroCopySend;
 use supple_core::codes::{self, RequestCode, VALUES};
 use supple_core::controller::{Mode, Request};
 
+/// Kind of a request for idle, see [`RequestCode`].
+const IDLE: u8 = 1;
+
 /// A request, checked in the controller and never trusted.
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
 #[repr(C)]
@@ -70,6 +73,16 @@ impl OperatorRequest {
         code.request().map_err(MessageError::Request)
     }
 
+    /// It asks for idle in the next cycle, and goes before all that does not.
+    pub fn is_for_idle_now(&self) -> bool {
+        self.has_at_cycle == 0 && self.asks_for_idle()
+    }
+
+    /// It asks for idle, now or in its cycle.
+    pub fn asks_for_idle(&self) -> bool {
+        self.kind == IDLE
+    }
+
     /// It may be heard in this cycle.
     pub fn is_due(&self, cycle: u64) -> bool {
         self.has_at_cycle == 0 || cycle >= self.at_cycle
@@ -86,6 +99,16 @@ pub enum Outcome {
     Accepted = 2,
     /// The controller does not, and says why.
     Refused = 3,
+}
+
+impl Outcome {
+    /// By its number; what is not known counts as refused.
+    pub fn from_code(code: u8) -> Outcome {
+        [Outcome::Queued, Outcome::Accepted]
+            .into_iter()
+            .find(|outcome| *outcome as u8 == code)
+            .unwrap_or(Outcome::Refused)
+    }
 }
 
 /// The answer to a request.
@@ -131,14 +154,25 @@ impl OperatorReply {
 
     /// What became of it; what is not known counts as refused.
     pub fn outcome(&self) -> Outcome {
-        [Outcome::Queued, Outcome::Accepted]
-            .into_iter()
-            .find(|outcome| *outcome as u8 == self.outcome)
-            .unwrap_or(Outcome::Refused)
+        Outcome::from_code(self.outcome)
     }
 
     /// Mode after it, if this version knows it.
     pub fn mode(&self) -> Option<Mode> {
         codes::mode(self.mode)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn idle_is_known_by_its_number() {
+        let asks = |request: Request<4>| OperatorRequest::new(1, 1, None, &request).asks_for_idle();
+        assert!(asks(Request::Idle));
+        assert!(!asks(Request::GravityHold) && !asks(Request::Reset));
+        let later = OperatorRequest::new(1, 1, Some(5), &Request::<4>::Idle);
+        assert!(later.asks_for_idle() && !later.is_for_idle_now());
     }
 }

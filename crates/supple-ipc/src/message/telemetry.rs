@@ -11,12 +11,14 @@ use supple_core::{Input, Output, Reference};
 /// One cycle of the controller, input, output and timing.
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
 #[repr(C)]
-#[type_name("supple.Telemetry.v2")]
+#[type_name("supple.Telemetry.v3")]
 pub struct Telemetry {
     /// Number of the step since the controller started; a reader that sees a gap has lost records.
     pub step: u64,
     /// What the controller was given, with the report of the plant.
     pub state: ArmState,
+    /// Arm states dropped since the start: of another writer than this system's plant, or of another arm.
+    pub states_dropped: u64,
     /// The request that it heard in this cycle; of kind 0 where there was none.
     pub request: OperatorRequest,
     /// Time since the mode was entered \[s\].
@@ -159,6 +161,7 @@ impl Telemetry {
         Telemetry {
             step,
             state: *state,
+            states_dropped: 0,
             request: OperatorRequest {
                 operator: 0,
                 sequence: 0,

@@ -9,8 +9,10 @@ use supple_core::{Output, Vector};
 /// Torques of a cycle, and those to fall back on if the next answer does not come.
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
 #[repr(C)]
-#[type_name("supple.TorqueCommand.v2")]
+#[type_name("supple.TorqueCommand.v3")]
 pub struct TorqueCommand {
+    /// Who wrote it, as in an arm state.
+    pub writer: u64,
     /// Cycle of the arm state that this answers. An answer to another cycle is not to be used.
     pub cycle: u64,
     /// Joint torques \[N m\].
@@ -43,6 +45,7 @@ impl TorqueCommand {
             Drives::Active
         };
         TorqueCommand {
+            writer: 0,
             cycle: output.cycle,
             torque_nm: widened::<N>(output.torque_nm.as_slice()),
             fallback_torque_nm: widened::<N>(output.fallback_torque_nm.as_slice()),
@@ -53,6 +56,14 @@ impl TorqueCommand {
             drives: drives as u8,
             reserved: [0; 3],
         }
+    }
+
+    /// It is for an arm with `N` joints, and every torque of it is finite. A command that is not counts as no answer.
+    pub fn is_usable<const N: usize>(&self) -> bool {
+        let finite = |torque: Result<Vector<N>, MessageError>| {
+            torque.is_ok_and(|torque| torque.iter().all(|t| t.is_finite()))
+        };
+        finite(self.torque::<N>()) && finite(self.fallback_torque::<N>())
     }
 
     /// Joint torques \[N m\].

@@ -24,8 +24,8 @@ use supple_core::config::Gains;
 use supple_core::controller::{Mode, Request};
 use supple_core::math::Vector3;
 use supple_experiment::scenario;
-use supple_ipc::message::{OperatorReply, Telemetry};
-use supple_ipc::{Domain, TelemetryReader};
+use supple_ipc::message::{OperatorReply, Outcome, Telemetry};
+use supple_ipc::{Domain, TelemetryReader, ask_for_idle};
 use supple_model::{Description, with_dof};
 
 /// Cap of an arm without a tool \[m\].
@@ -62,8 +62,22 @@ fn running(place: &Place) -> Result<(Domain, TelemetryReader, Telemetry), Failur
 /// [`Failure`].
 pub fn mode(mode: ModeName, place: &Place) -> Result<(), Failure> {
     match mode {
-        ModeName::Idle => simple(place, Simple::Idle),
+        ModeName::Idle => idle(place),
         ModeName::GravityHold => simple(place, Simple::GravityHold),
+    }
+}
+
+/// To idle, on a way that takes no reader's or operator's place, no shared memory and no lock.
+fn idle(place: &Place) -> Result<(), Failure> {
+    let domain = Domain::new(place.prefix.as_deref())?;
+    match ask_for_idle(&domain, ALIVE_WITHIN)? {
+        Some(answer) if answer.outcome == Outcome::Refused => Err(Failure::Refused {
+            words: answer.words,
+        }),
+        Some(answer) => told(place, answer.mode, answer.cycle),
+        None => Err(Failure::NotRunning {
+            prefix: domain.prefix().to_owned(),
+        }),
     }
 }
 
@@ -77,7 +91,6 @@ pub fn reset(place: &Place) -> Result<(), Failure> {
 
 #[derive(Clone, Copy)]
 enum Simple {
-    Idle,
     GravityHold,
     Reset,
     Gains(Gains, f64),
@@ -86,7 +99,6 @@ enum Simple {
 fn simple(place: &Place, wish: Simple) -> Result<(), Failure> {
     fn ask<const N: usize>(domain: &Domain, wish: Simple) -> Result<OperatorReply, Failure> {
         let request: Request<N> = match wish {
-            Simple::Idle => Request::Idle,
             Simple::GravityHold => Request::GravityHold,
             Simple::Reset => Request::Reset,
             Simple::Gains(gains, ramp_s) => Request::Gains { gains, ramp_s },
@@ -204,16 +216,21 @@ pub fn stop(place: &Place) -> Result<(), Failure> {
 }
 
 fn answered(place: &Place, reply: &OperatorReply) -> Result<(), Failure> {
-    let mode = reply.mode().map_or("unknown", |mode| mode.name());
+    told(place, reply.mode(), reply.cycle)
+}
+
+/// Says what a request that was accepted has led to; a fault is no success.
+fn told(place: &Place, mode: Option<Mode>, cycle: u64) -> Result<(), Failure> {
+    let name = mode.map_or("unknown", |mode| mode.name());
     match place.json {
         true => say_json(&Answer {
             accepted: true,
-            mode,
-            cycle: reply.cycle,
-        }),
-        false => say(&format!("mode {mode} since cycle {}", reply.cycle)),
-    }?;
-    match reply.mode() {
+            mode: name,
+            cycle,
+        })?,
+        false => say(&format!("mode {name} since cycle {cycle}"))?,
+    }
+    match mode {
         Some(Mode::Fault) => Err(Failure::InFault),
         _ => Ok(()),
     }

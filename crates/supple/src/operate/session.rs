@@ -28,8 +28,20 @@ impl<const N: usize> Session<N> {
     /// # Errors
     /// [`Failure::Ipc`].
     pub fn new(domain: &Domain) -> Result<Self, Failure> {
+        Session::of(domain, Operator::new(domain)?)
+    }
+
+    /// As [`Session::new`], for a program that runs the system.
+    ///
+    /// # Errors
+    /// [`Failure::Ipc`].
+    pub fn for_system(domain: &Domain) -> Result<Self, Failure> {
+        Session::of(domain, Operator::for_system(domain)?)
+    }
+
+    fn of(domain: &Domain, operator: Operator) -> Result<Self, Failure> {
         Ok(Session {
-            operator: Operator::new(domain)?,
+            operator,
             prefix: domain.prefix().to_owned(),
             waiting: Vec::new(),
         })

@@ -25,6 +25,10 @@ struct Status {
     cycles: u64,
     missed: u64,
     late: u64,
+    /// Torque commands that counted as no answer: of another arm, or not finite.
+    unusable: u64,
+    /// Messages dropped because another program than this system's controller or plant wrote them, or of another arm.
+    foreign: u64,
     tx_lost: u64,
     bus_load: f64,
     wake_us: Spread,
@@ -70,6 +74,8 @@ impl Status {
             cycles: seen.cycles,
             missed: last.state.plant.missed,
             late: last.state.plant.late,
+            unusable: last.state.plant.unusable,
+            foreign: last.state.plant.foreign + last.states_dropped,
             tx_lost: last.state.plant.tx_lost,
             bus_load: seen.bus_load,
             wake_us: seen.wake_us,
@@ -118,6 +124,14 @@ impl fmt::Display for Status {
             self.late,
             self.tx_lost,
             self.bus_load * 100.0
-        )
+        )?;
+        if self.unusable + self.foreign > 0 {
+            write!(
+                f,
+                "\ndropped   {} unusable commands, {} messages of other writers: look for a second controller or plant",
+                self.unusable, self.foreign
+            )?;
+        }
+        Ok(())
     }
 }

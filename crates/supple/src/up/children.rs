@@ -1,10 +1,16 @@
 //! The processes of a system: started from beside this program, watched over, ended in order.
 
-use super::plan::Program;
+use super::plan::{CONTROLLER, Program};
+use crate::console::remark;
 use crate::exit::Failure;
+use crate::interrupt;
 use core::time::Duration;
+use rustix::fs::{FlockOperation, flock};
+use rustix::io::Errno;
 use rustix::process::{Pid, Signal, kill_process};
-use std::fs;
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Write};
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -13,6 +19,8 @@ use supple_ipc::{Domain, pause};
 
 /// Exit code of a program that could not write a file.
 const FILE_CODE: i32 = 6;
+/// How long another process's lock may be one that it has just given back.
+const HELD_BY_A_FORK: Duration = Duration::from_millis(200);
 /// How often an ending process is looked at.
 const LOOK_EVERY: Duration = Duration::from_millis(5);
 
@@ -40,6 +48,9 @@ impl Children {
             .process_group(0)
             .spawn()
             .map_err(|error| Failure::file("start", &program, error))?;
+        if *name == CONTROLLER {
+            interrupt::pass_on_to(&child);
+        }
         self.running.push((name, child));
         Ok(())
     }
@@ -157,6 +168,11 @@ impl Children {
             }
             pause(LOOK_EVERY);
         };
+        if !status.success() {
+            remark(&format!(
+                "{name} has ended ({status}); its own words are above"
+            ));
+        }
         self.ended.push((name, status));
         done
     }
@@ -205,10 +221,11 @@ fn sibling(name: &'static str) -> Result<PathBuf, Failure> {
     }
 }
 
-/// Says which process runs the system, for `supple stop`.
+/// Says which process runs the system, for `supple stop`; a lock on it keeps a second one out.
 #[derive(Debug)]
 pub struct Pidfile {
     path: PathBuf,
+    _locked: File,
 }
 
 impl Pidfile {
@@ -218,21 +235,49 @@ impl Pidfile {
     /// [`Failure::AlreadyRunning`], [`Failure::File`].
     pub fn create(domain: &Domain) -> Result<Pidfile, Failure> {
         let path = place(domain);
-        if let Some(process) = running(&path) {
-            return Err(Failure::AlreadyRunning {
-                prefix: domain.prefix().to_owned(),
-                process: process.as_raw_nonzero().get(),
+        let failed = |error: io::Error| Failure::file("write", &path, error);
+        let start = Instant::now();
+        loop {
+            let mut options = OpenOptions::new();
+            options.read(true).write(true).create(true).mode(0o600);
+            let mut file = options.open(&path).map_err(failed)?;
+            match flock(&file, FlockOperation::NonBlockingLockExclusive) {
+                // A process that starts another shares its locks with it for a moment.
+                Err(Errno::WOULDBLOCK) if start.elapsed() < HELD_BY_A_FORK => {
+                    pause(LOOK_EVERY);
+                    continue;
+                }
+                Err(Errno::WOULDBLOCK) => {
+                    return Err(Failure::AlreadyRunning {
+                        prefix: domain.prefix().to_owned(),
+                        process: fs::read_to_string(&path)
+                            .ok()
+                            .and_then(|text| text.trim().parse().ok())
+                            .unwrap_or_default(),
+                    });
+                }
+                locked => locked.map_err(|error| failed(error.into()))?,
+            }
+            // One that was removed meanwhile is not the one that others find.
+            let is_there = fs::metadata(&path)
+                .is_ok_and(|there| file.metadata().is_ok_and(|mine| mine.ino() == there.ino()));
+            if !is_there {
+                continue;
+            }
+            file.set_len(0).map_err(failed)?;
+            file.write_all(std::process::id().to_string().as_bytes())
+                .map_err(failed)?;
+            return Ok(Pidfile {
+                path,
+                _locked: file,
             });
         }
-        fs::write(&path, std::process::id().to_string())
-            .map_err(|error| Failure::file("write", &path, error))?;
-        Ok(Pidfile { path })
     }
 }
 
 impl Drop for Pidfile {
     fn drop(&mut self) {
-        // What is left over is found stale by whoever reads it.
+        // What is left over is found stale by whoever reads it. Removed before it is unlocked.
         let _ = fs::remove_file(&self.path);
     }
 }

@@ -16,6 +16,7 @@ const DIGITS: u8 = 3;
 pub struct Meter {
     cycles: u64,
     plant: PlantReport,
+    states_dropped: u64,
     wake: Histogram<u64>,
     step: Histogram<u64>,
     round_trip: Histogram<u64>,
@@ -48,6 +49,10 @@ pub struct UpSummary {
     pub missed: u64,
     /// Answers that came after their cycle.
     pub late: u64,
+    /// Torque commands that counted as no answer: of another arm, or not finite.
+    pub unusable: u64,
+    /// Messages dropped because another program than this system's controller or plant wrote them, or of another arm.
+    pub foreign: u64,
     /// By how much a cycle began late.
     pub wake_us: Spread,
     /// The controller's step.
@@ -82,6 +87,7 @@ impl Default for Meter {
         Meter {
             cycles: 0,
             plant: PlantReport::default(),
+            states_dropped: 0,
             wake: histogram.clone(),
             step: histogram.clone(),
             round_trip: histogram,
@@ -99,6 +105,7 @@ impl Meter {
     pub fn add(&mut self, telemetry: &Telemetry) {
         self.cycles += 1;
         self.plant = telemetry.state.plant;
+        self.states_dropped = telemetry.states_dropped;
         self.wake.saturating_record(self.plant.wake_ns);
         self.step.saturating_record(telemetry.timing.step_ns);
         if self.plant.round_trip_ns > 0 {
@@ -143,6 +150,8 @@ impl Meter {
             cycles: self.cycles,
             missed: self.plant.missed,
             late: self.plant.late,
+            unusable: self.plant.unusable,
+            foreign: self.plant.foreign + self.states_dropped,
             wake_us: spread(&self.wake, 1e-3),
             step_ns: spread(&self.step, 1.0),
             round_trip_us: self.round_trip_us(),

@@ -22,7 +22,7 @@ pub use system::System;
 
 use crate::arms;
 use crate::cli::UpArgs;
-use crate::console::{remark, say, say_json};
+use crate::console::{remark, say, say_json, wait_for_no_reader};
 use crate::exit::Failure;
 use crate::interrupt;
 use children::Pidfile;
@@ -45,6 +45,7 @@ fn sized<const N: usize>(args: &UpArgs, description: &Description) -> Result<(),
         checked.map_err(|error| Failure::file("write", output, error))?;
     }
     let domain = Domain::new(args.prefix.as_deref())?;
+    wait_for_no_reader();
     let stop = interrupt::catch();
     let _pidfile = Pidfile::create(&domain)?;
     let mut system = System::<N>::new(args, description, &domain)?;

@@ -1,7 +1,8 @@
 //! One line on the terminal that says how it goes.
 
 use super::Meter;
-use std::io::{IsTerminal, Write};
+use crate::console::remark_part;
+use std::io::IsTerminal;
 use supple_core::controller::Mode;
 use supple_ipc::message::{Drives, Telemetry};
 
@@ -40,8 +41,7 @@ impl StatusLine {
             (_, Drives::Off) => " (waiting for Shift-Idle: emergency stop)",
         };
         // A terminal that cannot be written is no reason to stop an arm.
-        let _ = write!(
-            std::io::stderr().lock(),
+        remark_part(format!(
             "\r\x1b[K{}{waits}  answer p50 {:.0} p99 {:.0} max {:.0} us  missed {}  bus {:.0} %  tip error {error}",
             telemetry.mode().map_or("unknown", |mode| mode.name()),
             cycle.p50,
@@ -49,14 +49,14 @@ impl StatusLine {
             cycle.max,
             meter.plant().missed,
             meter.plant().bus_load * 100.0,
-        );
+        ));
         self.shown = true;
     }
 
     /// Leaves the line as it is.
     pub fn end(&self) {
         if self.shown {
-            let _ = writeln!(std::io::stderr().lock());
+            remark_part("\n".to_owned());
         }
     }
 }

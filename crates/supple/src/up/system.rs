@@ -68,8 +68,8 @@ impl<'a, const N: usize> System<'a, N> {
             approach: Approach::new(&config, trajectory, duration_s)?,
             journal: Journal::new(recorder.transpose()?),
             // Readers before writers, so that nothing is missed.
-            reader: TelemetryReader::new(domain)?,
-            session: Session::new(domain)?,
+            reader: TelemetryReader::for_log(domain)?,
+            session: Session::for_system(domain)?,
             children: Children::default(),
             meter: Meter::default(),
             line: StatusLine::new(args.json),
@@ -113,6 +113,16 @@ impl<'a, const N: usize> System<'a, N> {
     /// # Errors
     /// A process that ended, a request that was refused. A log that cannot be written is said, and no error.
     pub fn watch(&mut self, stop: &Stop) -> Result<(), Failure> {
+        match self.watch_on(stop) {
+            // The controller is asked to end by the same word, and may be the first.
+            Err(Failure::ProcessEnded { .. } | Failure::NotRunning { .. }) if stop.asked() => {
+                Ok(())
+            }
+            ended => ended,
+        }
+    }
+
+    fn watch_on(&mut self, stop: &Stop) -> Result<(), Failure> {
         let mut fault_seen = false;
         while !stop.asked() {
             match self.turn()? {

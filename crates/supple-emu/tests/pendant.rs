@@ -1,0 +1,117 @@
+//! The pendant's socket of the real program: whoever says nothing, or does not listen, holds up nobody.
+
+use core::time::Duration;
+use std::io::{Read, Write};
+use std::os::unix::fs::PermissionsExt;
+use std::os::unix::net::UnixStream;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::Instant;
+use tempfile::TempDir;
+
+/// Longer than any test takes: a pendant that answers later is one that does not.
+const WITHIN: Duration = Duration::from_secs(60);
+
+struct Arm {
+    child: Child,
+    folder: TempDir,
+}
+
+impl Arm {
+    fn start() -> Arm {
+        let folder = tempfile::tempdir().expect("a folder");
+        let owner = std::fs::Permissions::from_mode(0o700);
+        std::fs::set_permissions(folder.path(), owner).expect("changed");
+        let child = Command::new(env!("CARGO_BIN_EXE_supple-emu"))
+            .arg("--virtual-time")
+            .arg("--bus")
+            .arg(format!("unix:{}", folder.path().join("bus").display()))
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("it starts");
+        let arm = Arm { child, folder };
+        let start = Instant::now();
+        while arm.connect().is_none() {
+            assert!(start.elapsed() < WITHIN, "no pendant came");
+            std::thread::yield_now();
+        }
+        arm
+    }
+
+    fn connect(&self) -> Option<UnixStream> {
+        UnixStream::connect(Path::new(self.folder.path()).join("bus/pendant")).ok()
+    }
+
+    /// Says something and hears the answer.
+    fn ask(&self, words: &str) -> String {
+        let mut stream = self.connect().expect("it listens");
+        stream.set_read_timeout(Some(WITHIN)).expect("set");
+        writeln!(stream, "{words}").expect("written");
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer).expect("an answer");
+        answer
+    }
+}
+
+impl Drop for Arm {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+#[test]
+fn the_emergency_stop_passes_clients_that_say_nothing_or_half_a_line() {
+    let arm = Arm::start();
+    let silent: Vec<UnixStream> = (0..40)
+        .map(|k| {
+            let mut stream = arm.connect().expect("it listens");
+            if k % 2 == 0 {
+                stream.write_all(b"id").expect("written");
+            }
+            stream
+        })
+        .collect();
+    assert!(arm.ask("idle").contains("\"safety_mode\""));
+    assert!(arm.ask("e-stop").contains("EStop"));
+    drop(silent);
+    assert!(arm.ask("status").contains("EStop"));
+}
+
+#[test]
+fn clients_that_do_not_listen_hold_up_nobody() {
+    let arm = Arm::start();
+    let deaf: Vec<UnixStream> = (0..100)
+        .map(|_| {
+            let mut stream = arm.connect().expect("it listens");
+            writeln!(stream, "record").expect("written");
+            stream
+        })
+        .collect();
+    // Those before it are served by then: its place is behind theirs.
+    loop {
+        let answer = arm.ask("e-stop");
+        if answer.contains("EStop") {
+            break;
+        }
+        // Too many were waiting to be answered: what was asked for is done all the same.
+        assert_eq!(answer, "");
+    }
+    drop(deaf);
+}
+
+/// A line in pieces, and one without its end from a client that has said all.
+#[test]
+fn a_line_may_come_in_pieces() {
+    let arm = Arm::start();
+    let mut stream = arm.connect().expect("it listens");
+    stream.set_read_timeout(Some(WITHIN)).expect("set");
+    for piece in ["sta", "tu", "s"] {
+        stream.write_all(piece.as_bytes()).expect("written");
+        std::thread::yield_now();
+    }
+    stream.shutdown(std::net::Shutdown::Write).expect("shut");
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).expect("an answer");
+    assert!(answer.contains("\"safety_mode\""), "{answer}");
+}

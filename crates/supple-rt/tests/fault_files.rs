@@ -1,0 +1,93 @@
+//! The last cycles before a fault: whoever tells of them waits for no disk, and old tables go.
+
+use core::time::Duration;
+use std::fs;
+use std::sync::mpsc::sync_channel;
+use supple_core::math::Vector3;
+use supple_core::{Controller, Input, State, step};
+use supple_ipc::message::{ArmState, CycleTiming, Drives, PlantReport, Telemetry};
+use supple_model::Description;
+use supple_rt::{FaultFiles, KEPT_FILES, LastCycles};
+
+/// The telemetry of one cycle, in which a fault is latched or not.
+fn telemetry(step_number: u64, fault: u8) -> Telemetry {
+    let description = Description::asset("wam4").expect("built in");
+    let controller: Controller<4> =
+        Controller::new(description.config().expect("sound")).expect("sound");
+    let home = description.home::<4>().expect("four joints");
+    let input = Input {
+        cycle: 0,
+        position_rad: core::array::from_fn(|i| Some(home[i])),
+        tip_force_n: Some(Vector3::zeros()),
+        drives_active: true,
+        request: None,
+    };
+    let output = step(&controller, &mut State::new(&controller), &input);
+    let state = ArmState::new(
+        0,
+        0,
+        &input.position_rad,
+        None,
+        Drives::Active,
+        PlantReport::default(),
+    );
+    Telemetry {
+        fault,
+        ..Telemetry::new(step_number, &state, &input, &output, CycleTiming::default())
+    }
+}
+
+/// A disk that does not come back for as long as the test likes.
+#[test]
+fn a_disk_that_hangs_holds_up_nobody_and_what_finds_no_room_is_counted() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let faults = folder.path().join("faults");
+    let files = FaultFiles::start(faults.clone()).expect("a thread");
+    let (open, gate) = sync_channel::<()>(0);
+    let (begun, has_begun) = sync_channel(1);
+    assert!(files.writer().submit(move || {
+        begun.send(()).expect("the test waits");
+        gate.recv().expect("the test opens");
+    }));
+    has_begun.recv().expect("it begins");
+    let mut last = LastCycles::new(files);
+    let (calm, fault) = (telemetry(0, 0), telemetry(0, 1));
+    for step in 0..5 {
+        last.add(&Telemetry { step, ..fault });
+        last.add(&calm);
+    }
+    // Five faults were told of; two tables wait for the disk.
+    assert_eq!(last.files().dropped(), 3);
+    assert!(!faults.exists());
+    open.send(()).expect("the disk hangs");
+    last.finish(Duration::from_secs(60));
+    let names = fs::read_dir(&faults).expect("there").count();
+    assert_eq!(names, 2);
+}
+
+#[test]
+fn the_newest_tables_are_kept_and_nothing_else_is_touched() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path();
+    for step in 0..30 {
+        fs::write(path.join(format!("fault-1-{step}.csv")), "old").expect("written");
+    }
+    let others = ["fault-1-2.txt", "fault-x-2.csv", "fault-.csv", "notes.csv"];
+    for other in others {
+        fs::write(path.join(other), "kept").expect("written");
+    }
+    let files = FaultFiles::start(path.to_owned()).expect("a thread");
+    let mut last = LastCycles::new(files);
+    last.add(&telemetry(77, 1));
+    last.finish(Duration::from_secs(60));
+    let mut names: Vec<String> = fs::read_dir(path)
+        .expect("readable")
+        .map(|entry| entry.expect("an entry").file_name())
+        .map(|name| name.to_string_lossy().into_owned())
+        .collect();
+    names.retain(|name| !others.contains(&name.as_str()));
+    assert_eq!(names.len(), KEPT_FILES);
+    let newest = format!("fault-{}-77.csv", std::process::id());
+    assert!(names.contains(&newest), "{names:?}");
+    assert!(others.iter().all(|other| path.join(other).exists()));
+}

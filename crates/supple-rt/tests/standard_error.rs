@@ -1,0 +1,156 @@
+//! The real program with a standard error that nobody reads: full, or closed.
+
+use core::time::Duration;
+use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
+use rustix::process::{Pid, Signal, kill_process};
+use std::io::{PipeReader, PipeWriter, Write, pipe};
+use std::process::{Child, Command, Stdio};
+use supple_core::controller::{Mode, Request};
+use supple_ipc::message::{ArmState, Drives, Outcome, PlantReport};
+use supple_ipc::{Domain, IdleAnswer, Operator, PlantLink, ask_for_idle, pause};
+use supple_model::Description;
+use tempfile::TempDir;
+
+/// Period of the scripted plant: longer than the arm's, so that cycles count and not the machine's load.
+const PERIOD: Duration = Duration::from_millis(2);
+/// Cycles in which idle is to be heard.
+const HEARD_WITHIN: u64 = 20;
+/// Whoever is held up is so each time; a machine that is busy is not.
+const ATTEMPTS: u32 = 5;
+
+/// A pipe with no room left.
+fn full() -> (PipeReader, PipeWriter) {
+    let (reader, mut writer) = pipe().expect("a pipe");
+    let flags = fcntl_getfl(&writer).expect("flags");
+    fcntl_setfl(&writer, flags | OFlags::NONBLOCK).expect("set");
+    while writer.write(&[b'.'; 4096]).is_ok() {}
+    while writer.write(b".").is_ok() {}
+    fcntl_setfl(&writer, flags).expect("set");
+    (reader, writer)
+}
+
+struct Bench {
+    plant: PlantLink,
+    child: Child,
+    domain: Domain,
+    cycle: u64,
+    _folder: TempDir,
+}
+
+impl Bench {
+    fn start(stderr: PipeWriter) -> Bench {
+        let folder = tempfile::tempdir().expect("a folder");
+        let domain = Domain::within(&folder.path().join("supple"), "stderr").expect("a domain");
+        let plant = PlantLink::new(&domain).expect("a plant");
+        let child = Command::new(env!("CARGO_BIN_EXE_supple-rt"))
+            .args(["--prefix", "stderr", "--no-realtime"])
+            .env("XDG_RUNTIME_DIR", folder.path())
+            .stdout(Stdio::null())
+            .stderr(stderr)
+            .spawn()
+            .expect("it starts");
+        Bench {
+            plant,
+            child,
+            domain,
+            cycle: 0,
+            _folder: folder,
+        }
+    }
+
+    /// A cycle; the mode that the controller answers with.
+    fn cycle(&mut self) -> Option<Mode> {
+        let home = Description::asset("wam4").expect("built in").home::<4>();
+        let home = home.expect("four joints");
+        let position: [_; 4] = core::array::from_fn(|i| Some(home[i]));
+        let report = PlantReport::default();
+        let state = ArmState::new(self.cycle, 0, &position, None, Drives::Active, report);
+        self.plant.publish(&state).expect("published");
+        let heard = self.plant.answer(self.cycle, PERIOD).expect("read");
+        self.cycle += 1;
+        pause(PERIOD);
+        heard.answer.and_then(|answer| answer.mode())
+    }
+
+    fn until(&mut self, mode: Mode) {
+        for _ in 0..10_000 {
+            if self.cycle() == Some(mode) {
+                return;
+            }
+        }
+        panic!("mode {} did not come", mode.name());
+    }
+
+    /// Asks for idle while the plant goes on; the answer, and the cycles that it took.
+    fn idle(&mut self) -> (IdleAnswer, u64) {
+        let domain = self.domain.clone();
+        let asked = self.cycle;
+        let asker = std::thread::spawn(move || ask_for_idle(&domain, Duration::from_secs(30)));
+        while !asker.is_finished() {
+            self.cycle();
+        }
+        let answer = asker.join().expect("no panic").expect("asked");
+        let answer = answer.expect("an answer");
+        let took = answer.cycle.saturating_sub(asked);
+        (answer, took)
+    }
+
+    fn hold(&mut self, operator: &mut Operator) {
+        // Where there is no controller yet, there is nobody to send to.
+        while operator
+            .send::<4>(&Request::GravityHold, None)
+            .expect("sent")
+            .is_none()
+        {
+            pause(PERIOD);
+        }
+        self.until(Mode::GravityHold);
+    }
+
+    fn all_of_it(mut self) {
+        let mut operator = Operator::new(&self.domain).expect("an operator");
+        let mut quickest = u64::MAX;
+        for _ in 0..ATTEMPTS {
+            self.hold(&mut operator);
+            let (answer, took) = self.idle();
+            assert_eq!(answer.outcome, Outcome::Accepted);
+            assert_eq!(answer.mode, Some(Mode::Idle));
+            quickest = quickest.min(took);
+            if quickest <= HEARD_WITHIN {
+                break;
+            }
+        }
+        assert!(quickest <= HEARD_WITHIN, "{quickest} cycles");
+        self.hold(&mut operator);
+        // States are missing: a fault, with words for standard error.
+        self.cycle += 10;
+        self.until(Mode::Fault);
+        // Whoever writes them has had the time to be held up.
+        (0..50).for_each(|_| drop(self.cycle()));
+        let (answer, _) = self.idle();
+        assert_eq!(
+            (answer.outcome, answer.mode),
+            (Outcome::Accepted, Some(Mode::Fault))
+        );
+        let reset = operator.send::<4>(&Request::Reset, None).expect("sent");
+        assert!(reset.is_some(), "the helper is there");
+        self.until(Mode::Idle);
+        let process = i32::try_from(self.child.id()).ok().and_then(Pid::from_raw);
+        kill_process(process.expect("a number"), Signal::TERM).expect("it runs");
+        let status = self.child.wait().expect("it ends");
+        assert_eq!(status.code(), Some(0), "{status}");
+    }
+}
+
+#[test]
+fn a_standard_error_that_is_full_holds_up_neither_requests_nor_the_end() {
+    let (_reader, writer) = full();
+    Bench::start(writer).all_of_it();
+}
+
+#[test]
+fn a_standard_error_that_is_closed_ends_nobody() {
+    let (reader, writer) = pipe().expect("a pipe");
+    drop(reader);
+    Bench::start(writer).all_of_it();
+}
