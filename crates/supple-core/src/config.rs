@@ -126,7 +126,7 @@ pub struct ContactLatch {
 pub struct Collision<const N: usize> {
     /// External torque of a joint \[N m\], positive.
     pub joint_torque_nm: Vector<N>,
-    /// Force on the tip \[N\], positive.
+    /// Force on the tip \[N\], positive; away from singular poses.
     pub tip_force_n: f64,
     /// Share of both that ends motion in the modes with stiff joint loops (move, excite, breakaway), above 0,
     /// at most 1.

@@ -204,6 +204,9 @@ pub(super) struct Evidence<'a, const N: usize> {
     pub drive_nm: &'a Vector<N>,
     /// Observed force on the tip, base axes \[N\].
     pub force_n: &'a Vector3<f64>,
+    /// The pose is regular: near a singular one a small torque is a great force along the lost direction, and the
+    /// joints' thresholds alone count.
+    pub regular: bool,
     /// Since the last cycle \[s\].
     pub elapsed_s: f64,
 }
@@ -247,7 +250,11 @@ impl<const N: usize> State<N> {
         } else {
             1.0
         };
-        collision(&config.collision, share, &external, evidence.force_n)?;
+        joint_collision(&config.collision, share, &external)?;
+        if !evidence.regular {
+            return Ok(());
+        }
+        tip_collision(&config.collision, share, evidence.force_n)?;
         if resting {
             let (gravity, limit_n) = (config.arm.gravity(), config.plausible.load_n);
             self.plausibility
@@ -257,11 +264,10 @@ impl<const N: usize> State<N> {
     }
 }
 
-fn collision<const N: usize>(
+fn joint_collision<const N: usize>(
     thresholds: &Collision<N>,
     share: f64,
     external_nm: &Vector<N>,
-    force_n: &Vector3<f64>,
 ) -> Result<(), Fault> {
     for joint in 0..N {
         let (value_nm, limit_nm) = (
@@ -276,6 +282,14 @@ fn collision<const N: usize>(
             });
         }
     }
+    Ok(())
+}
+
+fn tip_collision<const N: usize>(
+    thresholds: &Collision<N>,
+    share: f64,
+    force_n: &Vector3<f64>,
+) -> Result<(), Fault> {
     let limit_n = share * thresholds.tip_force_n;
     if force_n.dot(force_n) > limit_n * limit_n {
         return Err(Fault::TipCollision {

@@ -9,7 +9,7 @@ use super::state::State;
 use super::{Controller, checks, limiter};
 use crate::config::{Config, Role};
 use crate::dynamics::terms;
-use crate::impedance::{Situation, Task, Torques, impedance};
+use crate::impedance::{SINGULAR_BELOW_M, Situation, Task, Torques, impedance};
 use crate::math::{Vector, Vector3, abs, smooth_step};
 use crate::ripple::compensation_nm;
 use crate::trajectory::{JointReference, Reference};
@@ -223,6 +223,7 @@ impl<const N: usize> State<N> {
             reference_rad_per_s: &reference_rad_per_s,
             drive_nm: &drive,
             force_n: &force,
+            regular: task.least_singular_value_m >= SINGULAR_BELOW_M,
             elapsed_s,
         };
         match self.weigh(config, &evidence) {
