@@ -19,6 +19,7 @@ fn telemetry(step_number: u64, fault: u8) -> Telemetry {
         cycle: 0,
         position_rad: core::array::from_fn(|i| Some(home[i])),
         tip_force_n: Some(Vector3::zeros()),
+        drives_active: true,
         request: None,
     };
     let output = step(&controller, &mut State::new(&controller), &input);
