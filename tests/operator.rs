@@ -103,11 +103,13 @@ impl Drop for Up {
 /// Reads until the controller is in a mode; the cycle.
 fn until(reader: &mut TelemetryReader, mode: Mode) -> u64 {
     for _ in 0..60_000 {
-        if let Some(telemetry) = reader.wait(SOON).expect("read")
-            && telemetry.mode() == Some(mode)
-        {
+        let Some(telemetry) = reader.wait(SOON).expect("read") else {
+            break;
+        };
+        if telemetry.mode() == Some(mode) {
             return telemetry.state.cycle;
         }
+        assert_eq!(telemetry.fault, 0, "{}", telemetry.fault_text);
     }
     panic!("mode {} did not come", mode.name());
 }

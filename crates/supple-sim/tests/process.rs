@@ -4,11 +4,13 @@ use core::time::Duration;
 use std::os::unix::fs::PermissionsExt;
 use std::process::{Child, Command, Stdio};
 use supple_core::controller::{Controller, Request, State};
+use supple_core::drive_guard::DriveGuard;
 use supple_core::{Vector, step};
 use supple_ipc::message::{ArmState, Drives, TorqueCommand};
 use supple_ipc::{ControllerLink, Domain};
 use supple_model::Description;
 use supple_plant::{Plant, PlantConfig};
+use supple_sim::Motors;
 use tempfile::TempDir;
 
 const SOON: Duration = Duration::from_secs(20);
@@ -163,7 +165,8 @@ fn a_command_that_cannot_be_used_is_no_answer_and_ends_nobody() {
     let home = description.home().expect("four joints");
     let mut plant = Plant::new(config, home, Vector::zeros()).expect("sound");
     let mut controller = Holding::new();
-    let mut fallback_nm = Vector::<4>::zeros();
+    let guard = DriveGuard::new(&description.config().expect("sound"));
+    let mut motors = Motors::<4>::new(1e-3, guard);
     let mut unusable = 0;
     for cycle in 0..40 {
         let arm = link.wait(SOON).expect("read").expect("a state");
@@ -188,14 +191,15 @@ fn a_command_that_cannot_be_used_is_no_answer_and_ends_nobody() {
             _ => command,
         };
         link.answer(&spoilt).expect("answered");
-        if spoilt.is_usable::<4>() {
-            fallback_nm = command.fallback_torque().expect("four joints");
-            plant.cycle(&command.torque().expect("four joints"));
-        } else {
-            unusable += 1;
-            assert!(fallback_nm.amax() > 0.0);
-            plant.cycle(&fallback_nm);
+        let answer = spoilt.is_usable::<4>().then_some(&spoilt);
+        unusable += u64::from(answer.is_none());
+        let torque_nm = motors.torque(&measured, answer).expect("four joints");
+        if answer.is_none() {
+            // Not zero from one cycle to the next.
+            assert!(torque_nm.amax() > 0.1, "{torque_nm}");
         }
+        plant.short([motors.drives() != Drives::Active; 4]);
+        plant.cycle(&torque_nm);
     }
     let output = child.wait_with_output().expect("it ends by itself");
     let words = String::from_utf8_lossy(&output.stderr).into_owned();
