@@ -9,8 +9,9 @@ use core::fmt::Display;
 use core::time::Duration;
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::{Builder, JoinHandle};
-use supple_core::controller::Mode;
-use supple_ipc::message::{OperatorReply, OperatorRequest, Outcome, Text};
+use supple_core::Vector;
+use supple_core::controller::{Controller, Mode, Refusal, plan};
+use supple_ipc::message::{MAX_DOF, OperatorReply, OperatorRequest, Outcome, Text};
 use supple_ipc::{Domain, Full, IpcError, OutsideLink, pause};
 use supple_realtime::diagnostics;
 
@@ -23,6 +24,21 @@ const FAULTS: &str = "faults";
 /// How long the end waits for a disk.
 const DISK_WITHIN: Duration = Duration::from_secs(2);
 
+/// Looks along a motion that is asked for, from the pose that the arm is in: whether it can be carried out over its
+/// whole length ([`supple_core::controller::plan()`]).
+pub type Planner = Box<dyn Fn(&OperatorRequest, &[f64; MAX_DOF]) -> Result<(), Refusal> + Send>;
+
+/// A planner for an arm of `N` joints. What is no request is left to the loop, which says so.
+pub fn planner<const N: usize>(controller: Controller<N>) -> Planner {
+    Box::new(move |message, from_rad| match message.request::<N>() {
+        Ok(Some(request)) => {
+            let from_rad = Vector::from_fn(|i, _| from_rad[i]);
+            plan(&controller, &from_rad, &request)
+        }
+        _ => Ok(()),
+    })
+}
+
 /// The helper at work.
 #[derive(Debug)]
 pub struct Helper {
@@ -30,11 +46,16 @@ pub struct Helper {
 }
 
 impl Helper {
-    /// Starts it and waits until it has its ports.
+    /// Starts it and waits until it has its ports. `planner` looks along the motions that are asked for.
     ///
     /// # Errors
     /// [`RtError::Ipc`] where the ports are not to be had, [`RtError::Thread`].
-    pub fn start(domain: &Domain, outside: Outside, options: &Options) -> Result<Helper, RtError> {
+    pub fn start(
+        domain: &Domain,
+        outside: Outside,
+        options: &Options,
+        planner: Planner,
+    ) -> Result<Helper, RtError> {
         let full = match options.virtual_time {
             true => Full::Wait,
             false => Full::Lose,
@@ -46,7 +67,7 @@ impl Helper {
         let (ready, is_ready) = sync_channel(1);
         let thread = Builder::new()
             .name("supple-rt-helper".to_owned())
-            .spawn(move || work(&domain, full, outside, files, &ready))
+            .spawn(move || work(&domain, full, outside, files, planner, &ready))
             .map_err(RtError::Thread)?;
         let helper = Helper { thread };
         match is_ready.recv() {
@@ -73,6 +94,7 @@ fn work(
     full: Full,
     outside: Outside,
     files: FaultFiles,
+    planner: Planner,
     ready: &SyncSender<()>,
 ) -> Result<(), IpcError> {
     let link = OutsideLink::new(domain, full)?;
@@ -82,6 +104,8 @@ fn work(
         link,
         outside,
         last_cycles: LastCycles::new(files),
+        planner,
+        position_rad: None,
         failed: false,
         told_of_states: false,
     };
@@ -104,6 +128,9 @@ struct Desk {
     link: OutsideLink,
     outside: Outside,
     last_cycles: LastCycles,
+    planner: Planner,
+    /// Where the arm was last.
+    position_rad: Option<[f64; MAX_DOF]>,
     failed: bool,
     told_of_states: bool,
 }
@@ -116,6 +143,14 @@ impl Desk {
                 Ok(None) => break,
                 Err(error) => return self.port_failed(&error),
             };
+            // One that waits for its cycle begins from a pose that nobody knows yet.
+            if let (Some(from_rad), 0) = (&self.position_rad, request.has_at_cycle)
+                && let Err(refusal) = (self.planner)(&request, from_rad)
+            {
+                let text = refusal.to_string();
+                self.reply(&early(&request, Outcome::Refused, &text));
+                continue;
+            }
             let handed_in = self.outside.request(request);
             match (handed_in, request.has_at_cycle != 0) {
                 // The loop hears it before the step of its cycle, whenever that is.
@@ -138,6 +173,7 @@ impl Desk {
                 self.port_failed(&error);
             }
             self.last_cycles.add(&telemetry);
+            self.position_rad = Some(telemetry.position_rad);
         }
         if self.outside.states_dropped() > 0 && !self.told_of_states {
             self.told_of_states = true;

@@ -24,7 +24,7 @@ mod timing;
 pub use control_loop::{ControlLoop, PLANT_LOST_AFTER};
 pub use error::RtError;
 pub use fault_file::{FaultFiles, KEPT_CYCLES, KEPT_FILES, LastCycles};
-pub use helper::Helper;
+pub use helper::{Helper, Planner, planner};
 pub use idle_watch::IdleWatch;
 pub use options::Options;
 pub use queue::{NoPlace, Queue};
@@ -95,7 +95,7 @@ pub fn run<const N: usize>(
     let link = ControllerLink::new(&domain)?;
     let (inside, outside) = rings();
     let pulses = [inside.pulse(), outside.pulse()];
-    let helper = Helper::start(&domain, outside, options)?;
+    let helper = Helper::start(&domain, outside, options, planner(controller))?;
     let (idle_inside, idle_outside) = idle_path();
     let watch = IdleWatch::start(&domain, idle_outside, options.realtime())?;
     let mut control = ControlLoop::new(controller, inside, options.virtual_time);

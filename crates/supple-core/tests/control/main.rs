@@ -23,6 +23,7 @@ mod modes;
 mod motion;
 mod moving;
 mod observing;
+mod protecting;
 mod refusals;
 mod settings;
 mod stiffness;
