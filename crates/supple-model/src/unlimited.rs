@@ -96,7 +96,7 @@ mod tests {
             "lower=\"-6.28",
             "upper=\"6.28",
             "effort=\"1000",
-            "velocity=\"1000",
+            "velocity=\"100",
         ] {
             assert!(bare.contains(word), "{word} in {bare}");
         }

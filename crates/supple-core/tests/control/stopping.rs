@@ -346,7 +346,7 @@ fn stops<const N: usize>(case: &Case) -> Outcome {
             *at_j = at_j.max(energy_j);
         }
         prop_assert!(
-            energy_j <= 1.6 * *at_j + slack_j(&world, &config, case.wrong),
+            energy_j <= 2.5 * *at_j + slack_j(&world, &config, case.wrong),
             "{energy_j} J {after} ms after a fault at {at_j} J: {:?}, {:?}",
             output.fault,
             case.wrong
