@@ -12,7 +12,7 @@ use supple_bus::{BusFault, Event};
 use supple_core::dynamics::tip_pose;
 use supple_core::nalgebra::Matrix4;
 use supple_core::{Matrix, Vector};
-use supple_plant::{Drive, Plant, PlantConfig, Truth};
+use supple_plant::{Drive, Injection, InjectionError, Injector, Plant, PlantConfig, Sight, Truth};
 use supple_puck::safety::SafetyMode;
 use supple_puck::status::MotorMode;
 use supple_puck::{CanFrame, Destination, GroupId, NodeId, PackedTorques};
@@ -37,6 +37,7 @@ pub struct Emulator<const N: usize> {
     next_tick_ns: u64,
     wire: Wire,
     plant: Plant<N>,
+    injector: Injector<N>,
     motor_from_joint: Matrix<N, N>,
     pucks: Vec<Puck>,
     safety: SafetyModule,
@@ -112,11 +113,13 @@ impl<const N: usize> Emulator<N> {
             node: usize::from(NodeId::SAFETY.number()),
             version: config.safety.version,
         })?;
+        let plant = Plant::new(plant, start_rad, Vector::zeros())?;
         let mut emulator = Emulator {
+            injector: Injector::none(&plant),
             now_ns: start_ns,
             next_tick_ns: start_ns + config.step_ns,
             wire: Wire::default(),
-            plant: Plant::new(plant, start_rad, Vector::zeros())?,
+            plant,
             motor_from_joint,
             pucks,
             safety,
@@ -147,6 +150,29 @@ impl<const N: usize> Emulator<N> {
             emulator.safety.set_zeroed(true);
         }
         Ok(emulator)
+    }
+
+    /// Puts faults into the arm, in the place of those given before; to be called before time goes on. Delays are
+    /// counted in control cycles of `period_s`. Encoders are those of joints, replies those of pucks.
+    ///
+    /// # Errors
+    /// What an arm on a bus cannot do, and a joint or motor that this one has not.
+    pub fn inject(
+        &mut self,
+        injections: &[Injection],
+        period_s: f64,
+    ) -> Result<(), InjectionError> {
+        for injection in injections {
+            injection.on_bus()?;
+        }
+        self.injector = Injector::new(injections, &mut self.plant, period_s)?;
+        self.turn_motors();
+        Ok(())
+    }
+
+    /// How many of them have begun.
+    pub fn injections_begun(&self) -> usize {
+        self.injector.begun()
     }
 
     /// An operator presses a button.
@@ -204,6 +230,7 @@ impl<const N: usize> Emulator<N> {
         let braking = &self.plant.config().drive.braking_nm_s_per_rad;
         let commanded = self.commanded_nm();
         Vector::from_fn(|i, _| match self.pucks[i].brakes() {
+            _ if self.injector.is_dead(i) => 0.0,
             true => commanded[i] - braking[i] * speed[i],
             false => commanded[i],
         })
@@ -270,7 +297,7 @@ impl<const N: usize> Emulator<N> {
     }
 
     fn turn_motors(&mut self) {
-        let angles = self.motor_from_joint * self.plant.truth().position_rad;
+        let angles = self.motor_from_joint * self.injector.position_rad();
         for (puck, angle) in self.pucks.iter_mut().zip(angles.iter()) {
             puck.turn(*angle);
         }
@@ -280,10 +307,14 @@ impl<const N: usize> Emulator<N> {
     fn tick(&mut self) {
         if !self.in_cradle {
             let motor = self.commanded_nm();
-            self.plant
-                .short(core::array::from_fn(|i| self.pucks[i].brakes()));
-            self.plant
-                .cycle(&(self.motor_from_joint.transpose() * motor));
+            let shorted = core::array::from_fn(|i| self.pucks[i].brakes());
+            let sight = Sight {
+                active: !shorted.contains(&true),
+                mode: None,
+            };
+            let torque_nm = self.motor_from_joint.transpose() * motor;
+            self.injector
+                .cycle(&mut self.plant, sight, &torque_nm, shorted);
             self.turn_motors();
         }
         let modes: Vec<MotorMode> = self.pucks.iter().map(Puck::mode).collect();
@@ -371,7 +402,10 @@ impl<const N: usize> Emulator<N> {
         }
         let modes: Vec<MotorMode> = self.pucks.iter().map(Puck::mode).collect();
         for index in 0..self.pucks.len() {
-            if let Some(answer) = self.pucks[index].hear(self.now_ns, &frame) {
+            let answer = self.pucks[index].hear(self.now_ns, &frame);
+            if let Some(answer) = answer
+                && !(is_position(&answer) && self.injector.loses_reply(index))
+            {
                 let ready_ns = self.ready_ns();
                 self.wire.queue(ready_ns, answer);
             }
@@ -418,6 +452,11 @@ impl<const N: usize> Emulator<N> {
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         (z ^ (z >> 31)) % (self.config.jitter_ns + 1)
     }
+}
+
+/// A puck's answer to a request for its position.
+fn is_position(frame: &CanFrame) -> bool {
+    frame.id().to() == Destination::Group(GroupId::POSITION)
 }
 
 /// A packed torque frame with a torque in it.

@@ -2,7 +2,7 @@
 
 use supple_bus::BusError;
 use supple_model::ModelError;
-use supple_plant::{PlantError, TraceError};
+use supple_plant::{InjectionError, PlantError, TraceError};
 use supple_realtime::StopError;
 
 /// What an emulator cannot be built from, or run on.
@@ -53,6 +53,9 @@ pub enum EmulatorError {
         /// What was given.
         text: String,
     },
+    /// A fault to be put into the arm.
+    #[error("--inject: {0}")]
+    Injection(#[from] InjectionError),
     /// A file of the trace.
     #[error(transparent)]
     Trace(#[from] TraceError),
@@ -69,7 +72,9 @@ impl EmulatorError {
     /// system.
     pub fn code(&self) -> u8 {
         match self {
-            EmulatorError::Press { .. } | EmulatorError::VirtualInterface => 2,
+            EmulatorError::Press { .. }
+            | EmulatorError::Injection(_)
+            | EmulatorError::VirtualInterface => 2,
             EmulatorError::Joints { .. }
             | EmulatorError::Pucks { .. }
             | EmulatorError::Firmware { .. }

@@ -6,6 +6,7 @@ use crate::safety::Press;
 use clap::Parser;
 use std::path::PathBuf;
 use supple_bus::Address;
+use supple_plant::Injection;
 use supple_realtime::{RealtimeOptions, Settings};
 
 /// The arm seen from its bus, in the place of a real one.
@@ -49,6 +50,10 @@ pub struct Options {
     /// (`activate@held+0.2`): idle, activate, e-stop or release. May be repeated.
     #[arg(long, value_name = "BUTTON@TIME", value_parser = press)]
     pub press: Vec<Later>,
+    /// Puts a fault into the arm: KIND or KIND:key=value,... as in encoder-stuck:joint=1,at-s=2; see --help. May
+    /// be repeated.
+    #[arg(long, value_name = "SPEC", long_help = supple_plant::injection::HELP)]
+    pub inject: Vec<Injection>,
     /// Writes what acts at the motors and on the tip, once a millisecond, as CSV.
     #[arg(long, value_name = "FILE")]
     pub trace: Option<PathBuf>,

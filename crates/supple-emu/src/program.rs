@@ -14,7 +14,7 @@ use supple_bus::{
     monotonic_ns,
 };
 use supple_model::{Description, with_dof};
-use supple_plant::{PlantConfig, Scene, TraceFile};
+use supple_plant::{PlantConfig, Sample, Scene, TraceFile};
 use supple_puck::NodeId;
 use supple_puck::status::MotorMode;
 use supple_realtime::{Stop, diagnostics, die_with_parent, enter};
@@ -82,6 +82,7 @@ fn run<const N: usize>(
         monotonic_ns()
     };
     let mut emulator = Emulator::new(config, plant, description.home::<N>()?, start_ns)?;
+    emulator.inject(&options.inject, description.config::<N>()?.period_s)?;
     for later in &options.press {
         later.plan(&mut emulator, start_ns);
     }
@@ -210,10 +211,15 @@ impl<const N: usize> Arm<N> {
         if let Some(trace) = &mut self.trace {
             let arm = &mut self.emulator;
             let modes = arm.pucks().iter().map(Puck::mode);
-            let active = modes.filter(|mode| *mode == MotorMode::Torque).count();
-            let torque_nm = arm.motor_torque_nm().into();
-            let wall_ns = arm.wall_ns();
-            trace.note(wall_ns, active, &torque_nm, arm.plant_mut());
+            let sample = Sample {
+                time_ns: arm.wall_ns(),
+                active: modes.filter(|mode| *mode == MotorMode::Torque).count(),
+                torque_nm: arm.motor_torque_nm().into(),
+                mode: None,
+                fault: None,
+                injections: arm.injections_begun(),
+            };
+            trace.note(&sample, arm.plant_mut());
         }
     }
 

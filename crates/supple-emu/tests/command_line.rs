@@ -35,6 +35,19 @@ fn a_button_that_is_none_is_named_with_those_that_are() {
 }
 
 #[test]
+fn an_injection_that_cannot_be_is_code_2() {
+    for (wrong, remedy) in [
+        ("encoder-stick", "encoder-stuck"),
+        ("encoder-nan", "reply-lost:every=1"),
+    ] {
+        let output = emu(&["--inject", wrong]);
+        assert_eq!(output.status.code(), Some(2), "{wrong}");
+        let words = words(&output);
+        assert!(words.contains(remedy), "{words}");
+    }
+}
+
+#[test]
 fn a_can_interface_has_no_virtual_time() {
     let folder = tempfile::tempdir().expect("a folder");
     let output = Command::new(env!("CARGO_BIN_EXE_supple-emu"))

@@ -34,6 +34,7 @@ pub mod contact;
 pub mod drive;
 pub mod filter;
 pub mod friction;
+pub mod injection;
 pub mod noise;
 pub mod scene;
 
@@ -49,8 +50,9 @@ pub use contact::{Contact, Material};
 pub use drive::{Drive, Ripple};
 pub use error::PlantError;
 pub use friction::LuGre;
+pub use injection::{Injection, InjectionError, InjectionKind, Injector, Sight, Trigger};
 pub use plant::Plant;
 pub use record::{Measurement, StepRecord, Truth};
 pub use scene::{FixedBlock, FreeBox, Ground, Layer, Scene, SceneError};
-pub use trace_file::{TraceError, TraceFile};
+pub use trace_file::{Sample, TraceError, TraceFile};
 pub use world::{Object, ObjectKind};

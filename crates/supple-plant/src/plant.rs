@@ -8,9 +8,9 @@ use crate::noise::Noise;
 use crate::record::{Measurement, StepRecord, Truth};
 use crate::world::{Object, TipForce, TipMotion, World};
 use core::array;
-use supple_core::dynamics::{gravity, joint_poses};
+use supple_core::dynamics::{gravity, joint_poses, kinetic_energy};
 use supple_core::nalgebra::Vector3;
-use supple_core::{Arm, Pose, Vector};
+use supple_core::{Arm, ArmError, Body, Pose, Vector};
 
 /// Penetration at which a tip may be put \[m\]; a tip at rest is in by hundredths of a millimetre.
 const GREATEST_START_DEPTH_M: f64 = 1e-3;
@@ -119,6 +119,62 @@ impl<const N: usize> Plant<N> {
         self.drive.short(motors);
     }
 
+    /// Adds to the joint velocities \[rad/s\]: a blow that is over at once.
+    ///
+    /// # Errors
+    /// An entry that is not finite.
+    pub fn push(&mut self, change: &Vector<N>) -> Result<(), PlantError> {
+        finite("velocity change", change)?;
+        self.world.push(change);
+        self.read_state();
+        Ok(())
+    }
+
+    /// Gravity turns round, as if the arm were mounted upside down.
+    pub fn reverse_gravity(&mut self) {
+        let arm = &self.config.arm;
+        // The arm was sound, and is so with the opposite of a finite vector.
+        if let Ok(arm) = with_load(arm, arm.body(N - 1), -arm.gravity()) {
+            self.load_bound_nm = load_bound(&arm);
+            self.world.replace_load(&arm);
+            self.config.arm = arm;
+        }
+    }
+
+    /// Fixes a ball of this mass \[kg\] to the tip, as large as the tip's own; it touches nothing. It is part of
+    /// the arm from now on, and of [`Plant::config`].
+    ///
+    /// # Errors
+    /// A mass that is not finite and positive.
+    pub fn add_payload(&mut self, mass_kg: f64) -> Result<(), PlantError> {
+        let sound = mass_kg > 0.0 && mass_kg.is_finite();
+        entry(sound, "payload mass_kg", mass_kg, "finite and positive")?;
+        let arm = &self.config.arm;
+        let at_m = arm.joint_from_tip().translation;
+        let payload = Body::ball(mass_kg, self.config.tip_radius_m, at_m);
+        let loaded = with_load(arm, arm.body(N - 1).merged(&payload), arm.gravity());
+        let must = "such that the last link stays a physical body";
+        let arm = loaded.or(Err(PlantError::Entry {
+            entry: "payload mass_kg".to_owned(),
+            value: mass_kg,
+            must,
+        }))?;
+        self.load_bound_nm = load_bound(&arm);
+        self.world.replace_load(&arm);
+        self.config.arm = arm;
+        Ok(())
+    }
+
+    /// Kinetic energy of the arm with its rotors and payload \[J\].
+    pub fn kinetic_energy_j(&self) -> f64 {
+        let truth = &self.truth;
+        kinetic_energy(
+            &self.config.arm,
+            &truth.position_rad,
+            &truth.velocity_rad_per_s,
+        )
+    }
+
     /// The greatest contact force on the tip since this was last asked, over all steps, base axes \[N\].
     pub fn take_greatest_force_n(&mut self) -> Vector3<f64> {
         core::mem::take(&mut self.greatest_force_n)
@@ -139,7 +195,7 @@ impl<const N: usize> Plant<N> {
         &self.steps
     }
 
-    /// What it was built from.
+    /// What it was built from, with the load that was added.
     pub fn config(&self) -> &PlantConfig<N> {
         &self.config
     }
@@ -295,6 +351,25 @@ fn finite<const N: usize>(name: &str, values: &Vector<N>) -> Result<(), PlantErr
         Some((joint, value)) => entry(false, format!("{name} of joint {joint}"), *value, "finite"),
         None => Ok(()),
     }
+}
+
+/// The same arm with another last link and another gravity.
+fn with_load<const N: usize>(
+    arm: &Arm<N>,
+    last: Body,
+    gravity_m_per_s2: Vector3<f64>,
+) -> Result<Arm<N>, ArmError> {
+    let mut links = *arm.links();
+    let link = &mut links[N - 1];
+    link.mass = last.mass_kg;
+    link.first_moment = last.com_m * last.mass_kg;
+    link.inertia = last.inertia_about_origin();
+    Arm::from_links(
+        links,
+        arm.armature(),
+        arm.joint_from_tip(),
+        gravity_m_per_s2,
+    )
 }
 
 /// Moment on each joint if everything beyond it lay in a level line: mass times gravity times the

@@ -20,6 +20,23 @@ pub struct TraceError {
     pub source: std::io::Error,
 }
 
+/// What a line says beside what the plant knows itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample<const N: usize> {
+    /// When \[ns\].
+    pub time_ns: u64,
+    /// How many motors take torques.
+    pub active: usize,
+    /// What acts at each motor, braking included \[N m\].
+    pub torque_nm: [f64; N],
+    /// Mode of the controller, a number of [`supple_core::codes::MODES`]; empty where it is not told.
+    pub mode: Option<u8>,
+    /// Kind of its fault, see [`supple_core::codes::FaultCode`], 0 for none; empty where it is not told.
+    pub fault: Option<u8>,
+    /// How many injections have begun.
+    pub injections: usize,
+}
+
 /// The file.
 #[derive(Debug)]
 pub struct TraceFile {
@@ -51,35 +68,46 @@ impl TraceFile {
         };
         let motors: String = (1..=joints).map(|i| format!(",motor{i}_nm")).collect();
         trace.line(&format!(
-            "time_ns,motors_in_torque_mode{motors},force_x_n,force_y_n,force_z_n,tip_z_m"
+            "time_ns,motors_in_torque_mode{motors},force_x_n,force_y_n,force_z_n,tip_x_m,tip_y_m,tip_z_m,\
+             tip_speed_m_per_s,joint_speed_rad_per_s,kinetic_energy_j,mode,fault,injections"
         ));
         Ok(trace)
     }
 
-    /// Writes a line if it is time for one, or if motors came to brake or ceased to. `time_ns` is when, `active` how many motors take torques,
-    /// `torque_nm` what acts at each, braking included. The force is the greatest since the line before: an
-    /// impact is over in less time than two lines are apart. Nothing is written any more once a line could not be.
-    pub fn note<const N: usize>(
-        &mut self,
-        time_ns: u64,
-        active: usize,
-        torque_nm: &[f64; N],
-        plant: &mut Plant<N>,
-    ) {
+    /// Writes a line if it is time for one, or if motors came to brake or ceased to. The force is the greatest
+    /// since the line before: an impact is over in less time than two lines are apart. Nothing is written any more
+    /// once a line could not be.
+    pub fn note<const N: usize>(&mut self, sample: &Sample<N>, plant: &mut Plant<N>) {
+        let Sample {
+            time_ns, active, ..
+        } = *sample;
         if time_ns < self.next_ns && active == self.active {
             return;
         }
         self.active = active;
         self.next_ns = time_ns + EVERY_NS;
-        let torques: String = torque_nm.iter().map(|t| format!(",{t:.6}")).collect();
+        let torques = sample.torque_nm.iter().map(|t| format!(",{t:.6}"));
         let force = plant.take_greatest_force_n();
-        self.line(&format!(
-            "{time_ns},{active}{torques},{:.4},{:.4},{:.4},{:.6}",
+        let truth = plant.truth();
+        let tip = truth.tip_position_m;
+        let told = |code: Option<u8>| code.map_or_else(String::new, |code| code.to_string());
+        let line = format!(
+            "{time_ns},{active}{},{:.4},{:.4},{:.4},{:.6},{:.6},{:.6},{:.6},{:.6},{:.6},{},{},{}",
+            torques.collect::<String>(),
             force.x,
             force.y,
             force.z,
-            plant.truth().tip_position_m.z
-        ));
+            tip.x,
+            tip.y,
+            tip.z,
+            truth.tip_velocity_m_per_s.norm(),
+            truth.velocity_rad_per_s.amax(),
+            plant.kinetic_energy_j(),
+            told(sample.mode),
+            told(sample.fault),
+            sample.injections
+        );
+        self.line(&line);
     }
 
     /// The end of the run.
@@ -119,7 +147,15 @@ mod tests {
         let file = tempfile::NamedTempFile::new().expect("a file");
         let mut trace = TraceFile::create(file.path(), 4).expect("created");
         for (time_ns, active) in [(0, 4), (600_000, 4), (700_000, 0), (800_000, 0)] {
-            trace.note(time_ns, active, &[0.0; 4], &mut plant);
+            let sample = Sample {
+                time_ns,
+                active,
+                torque_nm: [0.0; 4],
+                mode: (active > 0).then_some(3),
+                fault: None,
+                injections: 1,
+            };
+            trace.note(&sample, &mut plant);
         }
         trace.finish().expect("written");
         let text = std::fs::read_to_string(file.path()).expect("readable");
@@ -129,5 +165,12 @@ mod tests {
             lines[0].starts_with("0,4,") && lines[1].starts_with("700000,0,"),
             "{text}"
         );
+        assert!(
+            lines[0].ends_with(",0.000000,3,,1") && lines[1].ends_with(",0.000000,,,1"),
+            "{text}"
+        );
+        let columns = |line: &str| line.split(',').count();
+        let head = text.lines().next().expect("a head");
+        assert!(lines.iter().all(|line| columns(line) == columns(head)));
     }
 }

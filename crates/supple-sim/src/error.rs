@@ -3,7 +3,7 @@
 use supple_ipc::IpcError;
 use supple_ipc::message::MessageError;
 use supple_model::ModelError;
-use supple_plant::{PlantError, TraceError};
+use supple_plant::{InjectionError, PlantError, TraceError};
 use supple_realtime::StopError;
 
 /// Why the process cannot start, or cannot go on.
@@ -15,6 +15,9 @@ pub enum SimError {
     /// The plant.
     #[error("the plant: {0}")]
     Plant(#[from] PlantError),
+    /// A fault to be put into the arm.
+    #[error("--inject: {0}")]
+    Injection(#[from] InjectionError),
     /// A file of the trace.
     #[error(transparent)]
     Trace(#[from] TraceError),
@@ -30,9 +33,10 @@ pub enum SimError {
 }
 
 impl SimError {
-    /// Exit code, as the command line has them: 3 a wrong arm, 6 a file, 10 shared memory, 1 the system.
+    /// Exit code, as the command line has them: 2 wrong use, 3 a wrong arm, 6 a file, 10 shared memory, 1 the system.
     pub fn code(&self) -> u8 {
         match self {
+            SimError::Injection(_) => 2,
             SimError::Model(_) | SimError::Plant(_) => 3,
             SimError::Trace(_) => 6,
             SimError::Ipc(_) | SimError::Message(_) => 10,

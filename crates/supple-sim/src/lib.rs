@@ -84,6 +84,7 @@ pub fn run<const N: usize>(
     let domain = Domain::new(options.prefix.as_deref())?;
     let link = PlantLink::new(&domain)?;
     let mut world = World::new(plant, motors, link);
+    world.inject(&options.inject)?;
     if let Some(file) = &options.trace {
         world.trace(TraceFile::create(file, N)?);
     }

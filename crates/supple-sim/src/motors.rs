@@ -54,6 +54,11 @@ impl<const N: usize> Motors<N> {
         }
     }
 
+    /// Somebody lowers them; they come back as from any rest, with a torque that is wanted in gravity hold.
+    pub fn lower(&mut self) {
+        self.active = false;
+    }
+
     /// Why the guard last ended torque.
     pub fn ended_by(&self) -> Option<GuardReason> {
         self.ended_by
@@ -76,7 +81,11 @@ impl<const N: usize> Motors<N> {
             self.fallback_nm = command.fallback_nm;
             self.lost &= command.wanted;
             let resting = command.drive.mode == Some(Mode::GravityHold);
-            self.active = command.wanted && !self.lost && (self.active || resting);
+            let was_active = self.active;
+            self.active = command.wanted && !self.lost && (was_active || resting);
+            if !was_active {
+                self.guard.rest(&command.drive.torque_nm);
+            }
         } else if self.active {
             self.missed_in_a_row += 1;
             if self.missed_in_a_row > self.fallback_cycles {

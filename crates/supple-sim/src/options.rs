@@ -3,6 +3,7 @@
 use clap::Parser;
 use std::path::PathBuf;
 use supple_model::{Description, ModelError};
+use supple_plant::Injection;
 use supple_realtime::{RealtimeOptions, Settings};
 
 /// A simulated arm on shared memory, in the place of `supple-can` and a real one.
@@ -33,6 +34,10 @@ pub struct Options {
     /// Writes what acts at the joints and on the tip, once a millisecond, as CSV.
     #[arg(long, value_name = "FILE")]
     pub trace: Option<PathBuf>,
+    /// Puts a fault into the arm: KIND or KIND:key=value,... as in encoder-stuck:joint=1,at-s=2; see --help. May
+    /// be repeated.
+    #[arg(long, value_name = "SPEC", long_help = supple_plant::injection::HELP)]
+    pub inject: Vec<Injection>,
     /// Ends after so many cycles.
     #[arg(long, value_name = "N")]
     pub cycles: Option<u64>,

@@ -4,9 +4,9 @@ use crate::error::SimError;
 use crate::motors::Motors;
 use core::fmt;
 use core::time::Duration;
-use supple_ipc::message::{ArmState, Drives, PlantReport};
+use supple_ipc::message::{ArmState, Drives, PlantReport, TorqueCommand};
 use supple_ipc::{Heard, PlantLink, pause};
-use supple_plant::{Plant, TraceFile};
+use supple_plant::{Injection, Injector, Plant, Sample, Sight, TraceFile};
 use supple_realtime::{Stop, monotonic_ns, sleep_until_ns};
 
 /// How long before its cycle a thread is woken at most \[ns\]: longer than most wake-ups take.
@@ -24,6 +24,9 @@ const FORGIVEN_NS: u64 = 100_000;
 /// A plant with its motors, at the plant's end of shared memory.
 pub struct World<const N: usize> {
     plant: Plant<N>,
+    injector: Injector<N>,
+    /// What the encoders said in this cycle \[rad\].
+    replies: [Option<f64>; N],
     motors: Motors<N>,
     link: PlantLink,
     report: PlantReport,
@@ -62,12 +65,24 @@ impl<const N: usize> World<N> {
     pub fn new(plant: Plant<N>, motors: Motors<N>, link: PlantLink) -> Self {
         World {
             period_ns: (plant.config().cycle_s * 1e9).round() as u64,
+            injector: Injector::none(&plant),
+            replies: [None; N],
             plant,
             motors,
             link,
             report: PlantReport::default(),
             trace: None,
         }
+    }
+
+    /// Puts faults into the arm; to be called before the first cycle.
+    ///
+    /// # Errors
+    /// [`SimError::Injection`]: a joint or motor that the arm has not.
+    pub fn inject(&mut self, injections: &[Injection]) -> Result<(), SimError> {
+        let period_s = self.plant.config().cycle_s;
+        self.injector = Injector::new(injections, &mut self.plant, period_s)?;
+        Ok(())
     }
 
     /// Looks for an answer for so long before sleeping, see [`PlantLink::spin`].
@@ -119,7 +134,8 @@ impl<const N: usize> World<N> {
                 self.report.stood_still_ns += self.report.wake_ns;
                 due_ns = begin_ns;
             }
-            self.link.publish(&self.state(begin_ns))?;
+            let state = self.state(begin_ns);
+            self.link.publish(&state)?;
             let left = || Duration::from_nanos((due_ns + wait_ns).saturating_sub(monotonic_ns()));
             let heard = self.link.answer_within(self.cycle(), left)?;
             let heard = self.usable(heard);
@@ -185,12 +201,14 @@ impl<const N: usize> World<N> {
         self.plant.measurement().cycle
     }
 
-    fn state(&self, stamp_ns: u64) -> ArmState {
+    /// The state of a cycle; to be made once for each, as the replies of encoders are counted.
+    fn state(&mut self, stamp_ns: u64) -> ArmState {
+        self.replies = self.injector.replies();
         let measured = self.plant.measurement();
         ArmState::new::<N>(
             measured.cycle,
             stamp_ns,
-            &core::array::from_fn(|i| Some(measured.position_rad[i])),
+            &self.replies,
             Some(measured.force_n),
             self.motors.drives(),
             self.report,
@@ -222,16 +240,28 @@ impl<const N: usize> World<N> {
     }
 
     fn advance(&mut self, heard: &Heard, time_ns: u64) -> Result<(), SimError> {
-        let measured = self.plant.measurement();
-        let position_rad = core::array::from_fn(|i| Some(measured.position_rad[i]));
-        let torque_nm = self.motors.torque(&position_rad, heard.answer.as_ref())?;
+        let torque_nm = self.motors.torque(&self.replies, heard.answer.as_ref())?;
         let active = self.motors.drives() == Drives::Active;
-        self.plant.short([!active; N]);
-        self.plant.cycle(&torque_nm);
+        let sight = Sight {
+            active,
+            mode: heard.answer.as_ref().and_then(TorqueCommand::mode),
+        };
+        self.injector
+            .cycle(&mut self.plant, sight, &torque_nm, [!active; N]);
+        if self.injector.drives_idle() {
+            self.motors.lower();
+        }
         if let Some(trace) = &mut self.trace {
-            let active = if active { N } else { 0 };
-            let torque_nm = self.plant.truth().motor_torque_nm.into();
-            trace.note(time_ns, active, &torque_nm, &mut self.plant);
+            let active = self.motors.drives() == Drives::Active;
+            let sample = Sample {
+                time_ns,
+                active: if active { N } else { 0 },
+                torque_nm: self.plant.truth().motor_torque_nm.into(),
+                mode: heard.answer.map(|answer| answer.mode),
+                fault: heard.answer.map(|answer| answer.fault),
+                injections: self.injector.begun(),
+            };
+            trace.note(&sample, &mut self.plant);
         }
         Ok(())
     }

@@ -153,6 +153,35 @@ fn a_second_plant_is_refused_with_the_reason() {
     third.wait().expect("it is gone");
 }
 
+/// What was put into the arm is in what it reports, from the first state on.
+#[test]
+fn an_injection_is_in_the_states_that_the_process_sends() {
+    let system = system();
+    let link = ControllerLink::new(&system.domain).expect("a controller");
+    let arguments = [
+        "--virtual-time",
+        "--cycles",
+        "30",
+        "--inject",
+        "encoder-offset:joint=3,offset-rad=0.25",
+        "--inject",
+        "reply-lost:every=2,joint=0",
+    ];
+    let child = system.start(&arguments);
+    let description = Description::asset("wam4").expect("built in");
+    let home_rad = description.home::<4>().expect("four joints");
+    let mut holding = Holding::new();
+    for cycle in 0..30 {
+        let state = link.wait(SOON).expect("read").expect("a state");
+        assert!((state.position_rad[3] - home_rad[3] - 0.25).abs() < 0.01);
+        let present = state.position_present & 1 != 0;
+        assert_eq!(present, cycle % 2 == 0, "cycle {cycle}");
+        link.answer(&holding.answer(&state)).expect("answered");
+    }
+    let output = child.wait_with_output().expect("it ends");
+    assert!(output.status.success());
+}
+
 /// A command for another arm, or with a torque that is none, counts as no answer: the last fallback acts, the count is
 /// told, and the next command is heard.
 #[test]

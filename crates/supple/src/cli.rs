@@ -8,6 +8,7 @@ use clap_complete::Shell;
 use std::num::NonZeroU64;
 use std::path::PathBuf;
 use supple_bus::Address;
+use supple_plant::Injection;
 
 /// Minimum-impedance control of a backdrivable arm.
 #[derive(Debug, Parser)]
@@ -62,7 +63,7 @@ pub enum Command {
         #[arg(long, value_name = "NAME")]
         prefix: Option<String>,
     },
-    /// Kill and stop each process of a tracking system in turn, and measure what the simulated arm does.
+    /// Put simulated arms through losses, faults, collisions and wrong requests, each with what is expected of it.
     #[command(after_help = CODES)]
     Drill(DrillArgs),
     /// Take a running system out of its fault.
@@ -152,9 +153,19 @@ pub struct DrillArgs {
     /// Only with this plant, `sim` or `emu`; with both if not given.
     #[arg(long, value_enum)]
     pub plant: Option<PlantKind>,
-    /// Only the loss of this process, such as `supple-rt`.
-    #[arg(long, value_name = "NAME")]
-    pub process: Option<String>,
+    /// Only rows whose name contains this, such as `track/`, `kill-supple-rt` or a whole name of --list. May be
+    /// repeated: rows with any of them.
+    #[arg(long, value_name = "PATTERN")]
+    pub only: Vec<String>,
+    /// Say which rows there are and what is expected of each, and run none.
+    #[arg(long)]
+    pub list: bool,
+    /// Only rows in virtual time, which do not depend on how busy the machine is.
+    #[arg(long)]
+    pub virtual_time: bool,
+    /// Write the table as a page of Markdown too.
+    #[arg(long, value_name = "FILE")]
+    pub markdown: Option<PathBuf>,
     /// A built-in arm (see `supple arms`), or the path of an arm's TOML or of its folder.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
@@ -247,6 +258,10 @@ pub struct UpArgs {
     /// A block of wood beneath a simulated or emulated arm, its face at this height above the base frame (m).
     #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = between(-10.0, 10.0))]
     pub block_m: Option<f64>,
+    /// Put a fault into the simulated or emulated arm: KIND or KIND:key=value,... as in
+    /// encoder-stuck:joint=1,at-s=2; see --help. May be repeated.
+    #[arg(long, value_name = "SPEC", long_help = supple_plant::injection::HELP)]
+    pub inject: Vec<Injection>,
     /// Write what acts at the motors and on the tip of a simulated or emulated arm, as CSV.
     #[arg(long, value_name = "FILE")]
     pub trace: Option<PathBuf>,

@@ -26,6 +26,7 @@ use supple_ident::{IdentError, ReadError, SaveError};
 use supple_ipc::IpcError;
 use supple_log::LogError;
 use supple_model::ModelError;
+use supple_plant::InjectionError;
 
 /// The codes in words, as `--help` ends.
 pub const CODES: &str = "Exit codes:
@@ -159,6 +160,18 @@ pub enum Failure {
         "a drill drops the arm on what is beneath it: only --plant sim and --plant emu have one"
     )]
     RealArm,
+    /// No row of the drill has such a name.
+    #[error("no row of the drill contains {patterns}: see `supple drill --list`")]
+    NoSuchRow {
+        /// What was asked for.
+        patterns: String,
+    },
+    /// A fault to be put into an arm, that it cannot have.
+    #[error("--inject: {0}")]
+    Injection(#[from] InjectionError),
+    /// A fault to be put into a real arm.
+    #[error("--inject puts faults into a simulated arm: use --plant sim or --plant emu")]
+    InjectionIntoRealArm,
     /// A system that is to be drilled and does not work.
     #[error(
         "the system did not come to track within 20 s, three times: its processes say why above; \
@@ -315,7 +328,8 @@ impl Failure {
             Failure::Read(error) => read_code(error),
             Failure::Save(error) => save_code(error),
             Failure::RealClock | Failure::RealArm => 2,
-            Failure::NoSuchProcess { .. } => 2,
+            Failure::Injection(_) | Failure::InjectionIntoRealArm => 2,
+            Failure::NoSuchProcess { .. } | Failure::NoSuchRow { .. } => 2,
             Failure::Drill { .. } | Failure::NotTracking => 12,
             Failure::Ipc(_)
             | Failure::Bus(_)

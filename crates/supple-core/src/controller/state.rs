@@ -265,7 +265,10 @@ impl<const N: usize> State<N> {
         match self.activity {
             Activity::Idle | Activity::Fault(_) => {}
             Activity::GravityHold if !came_back => {}
-            Activity::GravityHold => self.enter(Activity::GravityHold),
+            Activity::GravityHold => {
+                self.enter(Activity::GravityHold);
+                self.handover_pending = false;
+            }
             _ if !active => {
                 self.enter(Activity::GravityHold);
                 self.handover_pending = false;

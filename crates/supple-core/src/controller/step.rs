@@ -90,6 +90,10 @@ pub fn step<const N: usize>(
             Vector::zeros()
         })
     });
+    if !state.drives_active {
+        // Nothing carries it out: there is no rate to keep to, and the arm's weight is there when they come.
+        state.torque = total;
+    }
     let limited = limiter::limit(
         &config.limits,
         controller.motors(),

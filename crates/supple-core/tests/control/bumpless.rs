@@ -207,3 +207,24 @@ fn a_reset_is_bumpless() {
     run.change(Request::Reset, 0.1);
     assert_eq!(run.rig.state.mode(), Mode::GravityHold);
 }
+
+/// Whether they come a cycle after gravity hold was asked for or later: nothing is blended in, nothing is limited by
+/// a rate that nobody kept to.
+#[test]
+fn drives_that_come_take_the_weight_of_the_arm_at_once() {
+    for idle_cycles in [1, 300] {
+        let mut rig = Rig::new(four(), bent());
+        rig.drives_active = false;
+        rig.cycle();
+        rig.accept(Request::GravityHold);
+        rig.cycles(idle_cycles);
+        rig.drives_active = true;
+        let weight = supple_core::dynamics::gravity(&rig.controller.config().arm, &rig.q);
+        assert!(size(&weight) > 5.0, "{weight}");
+        for cycle in 0..100 {
+            let torque_nm = rig.cycle().torque_nm;
+            let missing = size(&(torque_nm - weight));
+            assert!(missing < 1e-6, "{idle_cycles}, cycle {cycle}: {missing}");
+        }
+    }
+}

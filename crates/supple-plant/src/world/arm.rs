@@ -8,7 +8,7 @@ use rapier3d_f64::dynamics::{
 };
 use rapier3d_f64::pipeline::PhysicsWorld;
 use supple_core::nalgebra::{Matrix3, Vector3};
-use supple_core::{Arm, Pose};
+use supple_core::{Arm, Body, Pose};
 
 /// Chain of links on a fixed base; each body's frame is the joint frame, whose z is the joint's axis.
 pub fn insert_arm<const N: usize>(
@@ -17,15 +17,9 @@ pub fn insert_arm<const N: usize>(
 ) -> ([RigidBodyHandle; N], MultibodyJointHandle) {
     let base = physics.insert_body(RigidBodyBuilder::fixed());
     let links = array::from_fn(|i| {
-        let body = arm.body(i);
-        let properties = MassProperties::with_inertia_matrix(
-            vector(&body.com_m),
-            body.mass_kg,
-            matrix(&body.inertia_kg_m2),
-        );
         let builder = RigidBodyBuilder::dynamic()
             .can_sleep(false)
-            .additional_mass_properties(properties);
+            .additional_mass_properties(mass_properties(&arm.body(i)));
         physics.insert_body(builder)
     });
     // The engine's revolute joint turns about x.
@@ -44,4 +38,13 @@ pub fn insert_arm<const N: usize>(
         }
     }
     (links, last)
+}
+
+/// A body as the engine has it.
+pub fn mass_properties(body: &Body) -> MassProperties {
+    MassProperties::with_inertia_matrix(
+        vector(&body.com_m),
+        body.mass_kg,
+        matrix(&body.inertia_kg_m2),
+    )
 }

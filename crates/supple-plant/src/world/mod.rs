@@ -9,13 +9,13 @@ pub use surface::{Object, ObjectKind};
 use crate::config::PlantConfig;
 use crate::contact::Bristle;
 use crate::error::PlantError;
-use arm::insert_arm;
+use arm::{insert_arm, mass_properties};
 use convert::vector;
 use rapier3d_f64::dynamics::{MultibodyJointHandle, RigidBodyHandle};
 use rapier3d_f64::geometry::Ball;
 use rapier3d_f64::pipeline::PhysicsWorld;
-use supple_core::Vector;
 use supple_core::nalgebra::Vector3;
+use supple_core::{Arm, Vector};
 use surface::{Surface, insert_scene};
 
 /// Index of the angular x coordinate, the one a revolute joint leaves free.
@@ -108,6 +108,29 @@ impl<const N: usize> World<N> {
         for surface in &mut self.surfaces {
             surface.bristle = Bristle::default();
         }
+    }
+
+    /// Adds to the joint velocities \[rad/s\], as an impulse does.
+    pub fn push(&mut self, change: &Vector<N>) {
+        let PhysicsWorld {
+            multibody_joints,
+            bodies,
+            ..
+        } = &mut self.physics;
+        if let Some((arm, _)) = multibody_joints.get_mut(self.last_joint) {
+            for (speed, change) in arm.generalized_velocity_mut().iter_mut().zip(change.iter()) {
+                *speed += change;
+            }
+            arm.forward_kinematics(bodies, false);
+            arm.update_rigid_bodies(bodies, true);
+        }
+    }
+
+    /// From now on gravity and the last link are those of `arm`, otherwise the same one.
+    pub fn replace_load(&mut self, arm: &Arm<N>) {
+        self.physics.gravity = vector(&arm.gravity());
+        let last = &mut self.physics.bodies[self.links[N - 1]];
+        last.set_additional_mass_properties(mass_properties(&arm.body(N - 1)), true);
     }
 
     /// Meets the tip with every surface, pushes what is free, and gives the force on the tip.

@@ -1,77 +1,121 @@
-//! `supple drill`: each process of a tracking system is killed and stopped in turn, by the wall clock, above a
-//! block; what the simulated motors do and what the block feels is measured by the arm's own process, which
-//! goes on when a controller does not. Then the process comes back, the others having gone on.
+//! `supple drill`: whole systems with simulated arms are put through losses, faults, collisions and wrong requests,
+//! and what the arm really did is held against what was expected before ([`matrix`]).
 //!
-//! | lost | expected |
+//! | what happens | how |
 //! |---|---|
-//! | controller | fallback torque (gravity) at once, then idle: on a bus within 25 ms, in `sim` after 100 ms |
-//! | the bus's process | the motors keep the last torque until the safety module's own time-out of 100 ms |
-//! | the arm's process | there is no arm; the controller latches a fault and takes the next one on a reset |
-//! | `supple up` | killed, the others leave in order; stopped, nothing |
+//! | a process is killed or stopped; sixteen requests wait | by the wall clock ([`perform`]), above a block |
+//! | everything else | in virtual time ([`lockstep`]): each run is the same to the bit, and faster than real time |
+//!
+//! What is measured comes from the arm's own process, which goes on when a controller does not.
 //!
 //! An arm that brakes sinks, at the speed at which shorted motors and friction take what gravity gives: the
 //! 4-joint arm at 0.09 m/s, so that it meets the block with about 200 N for a millisecond or two and then rests on it.
 //! That is the price of braking, alike in both plants (`supple-plant/tests/braking.rs`).
 
-mod case;
+mod fault_name;
+mod judge;
+mod lockstep;
+mod matrix;
+mod measure;
 mod perform;
 mod row;
+mod spec;
 mod trace;
+mod work;
 
 use crate::arms;
 use crate::cli::{DrillArgs, PlantKind};
 use crate::console::{remark, say, say_json};
 use crate::exit::Failure;
 use crate::interrupt;
-use case::Case;
 use row::Row;
-use supple_model::with_dof;
+use spec::Spec;
+use supple_model::{Description, with_dof};
 
 /// Runs it.
 ///
 /// # Errors
-/// [`Failure::Drill`] where an outcome is not the expected one.
+/// [`Failure::Drill`] where an outcome is not the expected one; [`Failure::NoSuchRow`].
 pub fn run(args: &DrillArgs) -> Result<(), Failure> {
     let description = arms::find(&args.arm, args.strict)?;
+    let specs = chosen(args)?;
+    if args.list {
+        let lines: Vec<String> = specs
+            .iter()
+            .map(|spec| format!("{}  ({})", spec.name(), spec.expected))
+            .collect();
+        return say(&lines.join("\n"));
+    }
     let stop = interrupt::catch();
-    let plants = match args.plant {
-        Some(plant) => vec![plant],
-        None => vec![PlantKind::Sim, PlantKind::Emu],
-    };
     let mut rows: Vec<Row> = Vec::new();
-    for plant in plants {
-        if plant == PlantKind::Can {
-            return Err(Failure::RealArm);
+    for (index, spec) in specs.iter().enumerate() {
+        if stop.asked() {
+            break;
         }
-        let wanted = |case: &Case| args.process.as_deref().is_none_or(|p| p == case.process);
-        let mut without_n = None;
-        for case in Case::all(plant).into_iter().filter(wanted) {
-            if stop.asked() {
-                break;
-            }
-            remark(&format!("{:?}: {} {}", case.plant, case.loss, case.process));
-            let row = with_dof!(description.dof(), N => {
-                perform::perform::<N>(&case, args, &description)
-            })??;
-            if case.loss == case::Loss::Nothing {
-                without_n = Some(row.peak_force_n);
-            }
-            rows.push(Row {
-                peak_force_without_n: without_n,
-                ..row
-            });
-        }
+        remark(&format!("{}/{}: {}", index + 1, specs.len(), spec.name()));
+        rows.push(perform(spec, args, &description)?);
     }
     match args.json {
         true => say_json(&rows)?,
         false => say(&row::table(&rows))?,
     }
+    if let Some(file) = &args.markdown {
+        supple_files::write_whole(file, row::page(&rows, &command(args)).as_bytes())
+            .map_err(|error| Failure::file("write", file, error))?;
+    }
     let failed = rows.iter().filter(|row| !row.as_expected);
-    let failed: Vec<String> = failed.map(Row::name).collect();
+    let failed: Vec<&str> = failed.map(|row| row.name.as_str()).collect();
     match failed.is_empty() {
         true => Ok(()),
         false => Err(Failure::Drill {
             rows: failed.join(", "),
         }),
+    }
+}
+
+/// The words that chose the rows.
+fn command(args: &DrillArgs) -> String {
+    let mut words = vec!["supple drill".to_owned()];
+    if let Some(plant) = args.plant {
+        words.push(format!("--plant {plant:?}").to_lowercase());
+    }
+    words.extend(args.only.iter().map(|part| format!("--only {part}")));
+    words.extend(args.virtual_time.then(|| "--virtual-time".to_owned()));
+    words.push("--markdown docs/drill.md".to_owned());
+    words.join(" ")
+}
+
+fn chosen(args: &DrillArgs) -> Result<Vec<Spec>, Failure> {
+    let plants = match args.plant {
+        Some(PlantKind::Can) => return Err(Failure::RealArm),
+        Some(plant) => vec![plant],
+        None => vec![PlantKind::Sim, PlantKind::Emu],
+    };
+    let wanted = |spec: &Spec| {
+        let name = spec.name();
+        let named = args.only.is_empty() || args.only.iter().any(|part| name.contains(part));
+        named && !(args.virtual_time && spec.by_the_wall())
+    };
+    let specs = plants.into_iter().flat_map(matrix::all).filter(wanted);
+    let specs: Vec<Spec> = specs.collect();
+    match specs.is_empty() {
+        true => Err(Failure::NoSuchRow {
+            patterns: args.only.join(", "),
+        }),
+        false => Ok(specs),
+    }
+}
+
+/// A row that cannot be performed is one that is not as expected: the others go on.
+fn perform(spec: &Spec, args: &DrillArgs, description: &Description) -> Result<Row, Failure> {
+    let performed = with_dof!(description.dof(), N => match spec.by_the_wall() {
+        true => perform::perform::<N>(spec, args, description),
+        false => lockstep::perform::<N>(spec, args, description),
+    })?;
+    match performed {
+        Ok(row) => Ok(row),
+        // A program that is missing is missing in every row.
+        Err(failure @ Failure::NoSibling { .. }) => Err(failure),
+        Err(failure) => Ok(Row::failed(spec, &failure.to_string())),
     }
 }

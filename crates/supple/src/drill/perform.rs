@@ -1,17 +1,20 @@
-//! One loss, from a system that tracks to one that tracks again.
+//! A row by the wall clock, from a system at work to one that works again.
 
-use super::case::{Case, Loss, UP};
 use super::row::{Row, Seen};
+use super::spec::{Event, Loss, Spec, UP, Work};
 use super::trace::After;
+use super::work;
 use crate::cli::{Course, DrillArgs, PlantKind, UpArgs};
 use crate::console::remark;
 use crate::exit::Failure;
+use crate::operate::Session;
 use crate::up::System;
 use core::time::Duration;
 use rustix::process::{Pid, Signal, kill_process};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Instant;
+use supple_core::config::Gains;
 use supple_core::controller::{Mode, Request};
 use supple_ipc::message::{Drives, Telemetry};
 use supple_ipc::{Domain, TelemetryReader};
@@ -20,25 +23,31 @@ use supple_realtime::monotonic_ns;
 
 /// Height of the block's face beneath the trajectory, whose height is 0, less the cap \[m\].
 const BENEATH_M: f64 = 0.05;
-/// Tracking before the loss \[s\].
-const TRACKED_S: f64 = 1.0;
-/// What is watched after it.
-const WATCHED: Duration = Duration::from_secs(2);
+/// Work before the loss \[s\].
+const WORKED_S: f64 = 0.5;
+/// What is watched after it, where the process comes back, and where it does not.
+const WATCHED: [Duration; 2] = [Duration::from_secs(2), Duration::from_millis(1200)];
 /// Longest way to tracking.
 const WITHIN: Duration = Duration::from_secs(20);
-/// How often a system that does not come to track is started before there is nothing to lose.
+/// How often a system that does not come to work is started before there is nothing to lose.
 const ATTEMPTS: u32 = 3;
 /// How long the controller and the drives may take to come to idle: a braked arm sinks.
 const RESTED_WITHIN: Duration = Duration::from_millis(200);
 /// Cap of an arm without a tool \[m\].
 const CAP_M: f64 = 0.02;
+/// Requests that wait for their cycle: as many as there is room for.
+const WAITING: u64 = 16;
+/// How far ahead those cycles are.
+const FAR: u64 = 1_000_000_000;
+/// Time of the move to the start of an excitation \[s\].
+const BACK_S: f64 = 1.0;
 
-/// Performs a case.
+/// Performs a row.
 ///
 /// # Errors
-/// A system that cannot be started, or that does not come to track in the first place.
+/// A system that cannot be started, or that does not come to work in the first place.
 pub fn perform<const N: usize>(
-    case: &Case,
+    spec: &Spec,
     args: &DrillArgs,
     description: &Description,
 ) -> Result<Row, Failure> {
@@ -47,14 +56,22 @@ pub fn perform<const N: usize>(
     let trace = domain.folder().join(format!("{prefix}.csv"));
     let cap_m = description.tool().map_or(CAP_M, |tool| tool.cap_radius_m);
     let up = UpArgs {
-        plant: case.plant,
+        plant: spec.plant,
         arm: args.arm.clone(),
         strict: args.strict,
-        track: Course::Sinusoid,
+        track: match spec.work {
+            Work::Probe => Course::Probe,
+            _ => Course::Sinusoid,
+        },
         bus: None,
         zero_at_home: false,
         tare: false,
-        block_m: Some(-(BENEATH_M + cap_m)),
+        // What moves the arm downwards would meet it.
+        block_m: match spec.work {
+            Work::Move | Work::Excite => None,
+            _ => Some(-(BENEATH_M + cap_m)),
+        },
+        inject: Vec::new(),
         trace: Some(trace.clone()),
         rate_hz: None,
         for_s: None,
@@ -65,70 +82,162 @@ pub fn perform<const N: usize>(
         no_realtime: args.no_realtime,
         json: true,
     };
-    let lose = || match case.process {
-        UP => of_up(case, &up, &domain),
-        _ => of_a_process::<N>(case, &up, description, &domain),
+    let lose = || match spec.event {
+        Event::Process { name: UP, .. } => of_up::<N>(spec, &up, description, &domain),
+        _ => of_a_process::<N>(spec, &up, description, &domain),
     };
     let mut lost = lose();
     for _ in 1..ATTEMPTS {
         if !matches!(lost, Err(Failure::NotTracking)) {
             break;
         }
-        remark("the system did not come to track: once more");
+        remark("the system did not come to work: once more");
         lost = lose();
     }
     let row = lost.and_then(|(begin_ns, seen)| {
-        let after = After::read(&trace, begin_ns, WATCHED.as_nanos() as u64)?;
-        Ok(Row::new(case, &after, &seen))
+        let after = After::read(&trace, begin_ns, watched(spec).as_nanos() as u64)?;
+        Ok(Row::wall(spec, &after, &seen))
     });
     // It was this drill's alone; a next one writes its own.
     let _ = std::fs::remove_file(&trace);
     row
 }
 
-fn tracks(telemetry: &Telemetry, for_s: f64) -> bool {
-    telemetry.mode() == Some(Mode::Track)
+/// A process that was lost while the arm tracked comes back.
+fn rejoins_after(spec: &Spec) -> bool {
+    spec.work == Work::Track && !matches!(spec.event, Event::Flood)
+}
+
+fn watched(spec: &Spec) -> Duration {
+    WATCHED[usize::from(!rejoins_after(spec))]
+}
+
+fn mode_of(work: Work) -> Mode {
+    match work {
+        Work::GravityHold => Mode::GravityHold,
+        Work::Move => Mode::Move,
+        Work::Track => Mode::Track,
+        Work::Probe => Mode::Probe,
+        Work::Excite => Mode::Excite,
+    }
+}
+
+fn is_in(mode: Mode, telemetry: &Telemetry, for_s: f64) -> bool {
+    telemetry.mode() == Some(mode)
         && telemetry.state.drives() == Drives::Active
         && telemetry.mode_time_s >= for_s
 }
 
+/// From a system that comes to track by itself to one at the row's work.
+fn go_to_work<const N: usize>(
+    spec: &Spec,
+    description: &Description,
+    domain: &Domain,
+    mut next: impl FnMut() -> Result<Option<Telemetry>, Failure>,
+) -> Result<(), Failure> {
+    let first = match spec.work {
+        Work::Probe => Mode::Probe,
+        _ => Mode::Track,
+    };
+    let mode = mode_of(spec.work);
+    let worked_s = if first == mode { WORKED_S } else { 0.0 };
+    let there = until(&mut next, WITHIN, |t| is_in(first, t, worked_s))?;
+    there.ok_or(Failure::NotTracking)?;
+    if first == mode {
+        return Ok(());
+    }
+    let config = description.config::<N>()?;
+    let mut session = Session::<N>::new(domain)?;
+    let request = work::request(spec, &config, description)?;
+    if let Request::Excite(series) = &request {
+        let back = Request::Move {
+            target_rad: series.at(0.0).position_rad,
+            duration_s: BACK_S,
+        };
+        session.ask(&back, None)?;
+        until(&mut next, WITHIN, |t| is_in(Mode::Move, t, BACK_S + 0.2))?
+            .ok_or(Failure::NotTracking)?;
+    }
+    session.ask(&request, None)?;
+    until(&mut next, WITHIN, |t| is_in(mode, t, WORKED_S))?.ok_or(Failure::NotTracking)?;
+    Ok(())
+}
+
 /// A process that this program has started itself.
 fn of_a_process<const N: usize>(
-    case: &Case,
+    spec: &Spec,
     up: &UpArgs,
     description: &Description,
     domain: &Domain,
 ) -> Result<(u64, Seen), Failure> {
     let mut system = System::<N>::new(up, description, domain)?;
     system.start(description)?;
-    until(|| system.turn(), WITHIN, |t| tracks(t, TRACKED_S))?.ok_or(Failure::NotTracking)?;
+    go_to_work::<N>(spec, description, domain, || system.turn())?;
     let begin_ns = monotonic_ns();
-    match case.loss {
-        Loss::Nothing => {}
-        Loss::Kill => system.signal(case.process, Signal::KILL)?,
-        Loss::Stop => system.signal(case.process, Signal::STOP)?,
+    let mut idle_after_ms = None;
+    match spec.event {
+        Event::Process { name, loss } => system.signal(name, signal(loss))?,
+        Event::Flood => idle_after_ms = Some(idle_past_a_full_queue::<N>(&mut system, domain)?),
+        _ => {}
     }
     let mut last = None;
     let start = Instant::now();
-    while start.elapsed() < WATCHED {
-        last = system.turn()?.or(last);
+    while start.elapsed() < watched(spec) {
+        last = system.hear()?.or(last);
     }
+    let mode = mode_of(spec.work);
     let fault = |t: &Telemetry| (t.fault != 0).then(|| t.fault_text.to_string());
     let mut seen = Seen {
         fault: last.as_ref().and_then(fault),
-        tracked_on: last.as_ref().is_some_and(|t| tracks(t, TRACKED_S)),
+        worked_on: last.as_ref().is_some_and(|t| is_in(mode, t, WORKED_S)),
+        to_rejoin: rejoins_after(spec),
         rejoined_after_s: None,
+        idle_after_ms,
     };
     let back = Instant::now();
-    match case.loss {
-        Loss::Nothing => {}
-        Loss::Kill => system.restart(case.process)?,
-        Loss::Stop => system.signal(case.process, Signal::CONT)?,
+    if let Event::Process { name, loss } = spec.event {
+        match loss {
+            Loss::Kill => system.restart(name)?,
+            Loss::Stop => system.signal(name, Signal::CONT)?,
+        }
     }
-    let again = case.loss == Loss::Nothing || rejoins(&mut system, case.plant)?;
-    seen.rejoined_after_s = again.then(|| back.elapsed().as_secs_f64());
+    if seen.to_rejoin {
+        let lost = matches!(spec.event, Event::Process { .. });
+        let again = !lost || rejoins(&mut system, spec.plant)?;
+        seen.rejoined_after_s = again.then(|| back.elapsed().as_secs_f64());
+    }
     system.end()?;
     Ok((begin_ns, seen))
+}
+
+fn signal(loss: Loss) -> Signal {
+    match loss {
+        Loss::Kill => Signal::KILL,
+        Loss::Stop => Signal::STOP,
+    }
+}
+
+/// From the request to idle to its answer \[ms\], where all places of the queue are taken; or why it was refused.
+fn idle_past_a_full_queue<const N: usize>(
+    system: &mut System<'_, N>,
+    domain: &Domain,
+) -> Result<Result<f64, String>, Failure> {
+    let cycle = until(|| system.hear(), WITHIN, |_| true)?.ok_or(Failure::NotTracking)?;
+    let far = cycle.state.cycle + FAR;
+    let mut others = Session::<N>::new(domain)?;
+    let gains = Request::Gains {
+        gains: Gains::isotropic(5.0, 1.5),
+        ramp_s: 1.0,
+    };
+    for request in 0..WAITING {
+        others.queue(&gains, far + request)?;
+    }
+    let begin = Instant::now();
+    match Session::<N>::new(domain)?.ask(&Request::Idle, None) {
+        Ok(_) => Ok(Ok(begin.elapsed().as_secs_f64() * 1e3)),
+        Err(Failure::Refused { words }) => Ok(Err(words)),
+        Err(failure) => Err(failure),
+    }
 }
 
 /// Takes in what `next` gives until it is as it should be; the telemetry that was so.
@@ -172,7 +281,7 @@ fn rejoins<const N: usize>(system: &mut System<'_, N>, plant: PlantKind) -> Resu
         }
     }
     system.begin_again();
-    Ok(until(|| system.turn(), WITHIN, |t| tracks(t, 0.2))?.is_some())
+    Ok(until(|| system.turn(), WITHIN, |t| is_in(Mode::Track, t, 0.2))?.is_some())
 }
 
 /// The controller is idle and without a fault, and so are the drives.
@@ -231,28 +340,38 @@ impl Drop for Up {
     }
 }
 
-fn of_up(case: &Case, up: &UpArgs, domain: &Domain) -> Result<(u64, Seen), Failure> {
+fn of_up<const N: usize>(
+    spec: &Spec,
+    up: &UpArgs,
+    description: &Description,
+    domain: &Domain,
+) -> Result<(u64, Seen), Failure> {
     let mut reader = TelemetryReader::new(domain)?;
     let mut running = Up::start(up)?;
-    until(|| hear(&mut reader), WITHIN, |t| tracks(t, TRACKED_S))?.ok_or(Failure::NotTracking)?;
+    go_to_work::<N>(spec, description, domain, || hear(&mut reader))?;
     let begin_ns = monotonic_ns();
-    running.signal(match case.loss {
-        Loss::Stop => Signal::STOP,
-        Loss::Kill | Loss::Nothing => Signal::KILL,
-    });
+    let stopped = matches!(
+        spec.event,
+        Event::Process {
+            loss: Loss::Stop,
+            ..
+        }
+    );
+    running.signal(if stopped { Signal::STOP } else { Signal::KILL });
     let (mut last, start) = (None, Instant::now());
-    while start.elapsed() < WATCHED {
+    while start.elapsed() < watched(spec) {
         last = hear(&mut reader)?.or(last);
     }
+    let mode = mode_of(spec.work);
     let mut seen = Seen {
-        fault: None,
-        tracked_on: last.as_ref().is_some_and(|t| tracks(t, TRACKED_S)),
-        rejoined_after_s: None,
+        worked_on: last.as_ref().is_some_and(|t| is_in(mode, t, WORKED_S)),
+        to_rejoin: rejoins_after(spec),
+        ..Seen::default()
     };
     let back = Instant::now();
-    match case.loss {
-        Loss::Stop => running.signal(Signal::CONT),
-        Loss::Kill | Loss::Nothing => {
+    match stopped {
+        true => running.signal(Signal::CONT),
+        false if seen.to_rejoin => {
             // The trace of the next system is not that of this one.
             let again = UpArgs {
                 trace: None,
@@ -261,9 +380,12 @@ fn of_up(case: &Case, up: &UpArgs, domain: &Domain) -> Result<(u64, Seen), Failu
             drop(running);
             running = Up::start(&again)?;
         }
+        false => {}
     }
-    let again = until(|| hear(&mut reader), WITHIN, |t| tracks(t, 0.2))?;
-    seen.rejoined_after_s = again.map(|_| back.elapsed().as_secs_f64());
+    if seen.to_rejoin {
+        let again = until(|| hear(&mut reader), WITHIN, |t| is_in(Mode::Track, t, 0.2))?;
+        seen.rejoined_after_s = again.map(|_| back.elapsed().as_secs_f64());
+    }
     running.end();
     Ok((begin_ns, seen))
 }

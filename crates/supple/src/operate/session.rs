@@ -142,7 +142,11 @@ impl<const N: usize> Session<N> {
         }
     }
 
-    fn queue(&mut self, request: &Request<N>, at_cycle: u64) -> Result<(), Failure> {
+    /// Asks for something in a cycle to come, and waits until the controller has it in its queue.
+    ///
+    /// # Errors
+    /// As [`Session::ask`].
+    pub fn queue(&mut self, request: &Request<N>, at_cycle: u64) -> Result<(), Failure> {
         match self.operator.send(request, Some(at_cycle))? {
             Some(sequence) => self.wait_for_place(sequence),
             None => Err(self.nobody()),

@@ -18,6 +18,7 @@ mod system;
 pub use children::stop_running;
 pub use meter::{Meter, Spread};
 pub use plan::CONTROLLER;
+pub use stages::{HELD_S, START_S};
 pub use system::System;
 
 use crate::arms;

@@ -1,12 +1,13 @@
 //! Which processes a system has, and what each is told.
 
-use crate::cli::{PlantKind, UpArgs};
+use crate::cli::{Course, PlantKind, UpArgs};
 use crate::exit::Failure;
 use crate::operate::Pendant;
 use std::path::PathBuf;
 use supple_bus::Address;
 use supple_ipc::Domain;
 use supple_model::{Description, ModelError};
+use supple_plant::Injection;
 
 /// The controller.
 pub const CONTROLLER: &str = "supple-rt";
@@ -39,8 +40,9 @@ impl Plan {
     /// For these arguments; in virtual time the clock ends after `cycles`.
     ///
     /// # Errors
-    /// [`Failure::Bus`] where the folder of an emulated bus is not this user's; [`Failure::RealClock`].
+    /// [`Failure::Injection`]: what this plant cannot do; [`Failure::Bus`] where the folder of an emulated bus is not this user's; [`Failure::RealClock`].
     pub fn new(args: &UpArgs, domain: &Domain, cycles: Option<u64>) -> Result<Plan, Failure> {
+        args.check_injections()?;
         let controller = Program {
             name: CONTROLLER,
             arguments: args.timed_arguments(domain),
@@ -135,6 +137,13 @@ impl UpArgs {
             PlantKind::Emu => "emu",
             PlantKind::Can => "can",
         });
+        words.push("--track");
+        words.push(match self.track {
+            Course::Sinusoid => "sinusoid",
+            Course::Arc => "arc",
+            Course::Quadrant => "quadrant",
+            Course::Probe => "probe",
+        });
         words.extend(self.no_realtime.then_some("--no-realtime"));
         words.extend(self.strict.then_some("--strict"));
         let mut words: Vec<String> = words.into_iter().map(str::to_owned).collect();
@@ -145,7 +154,7 @@ impl UpArgs {
         words
     }
 
-    /// What a simulated arm stands in, and where it is written what acts on it.
+    /// What a simulated arm stands in, what is put into it, and where it is written what acts on it.
     fn surroundings(&self) -> Vec<String> {
         let mut arguments = Vec::new();
         if let Some(face_m) = self.block_m {
@@ -154,7 +163,19 @@ impl UpArgs {
         if let Some(file) = &self.trace {
             arguments.extend(["--trace".to_owned(), file.display().to_string()]);
         }
+        for injection in &self.inject {
+            arguments.extend(["--inject".to_owned(), injection.to_string()]);
+        }
         arguments
+    }
+
+    fn check_injections(&self) -> Result<(), Failure> {
+        match self.plant {
+            PlantKind::Sim => Ok(()),
+            PlantKind::Emu => Ok(self.inject.iter().try_for_each(Injection::on_bus)?),
+            PlantKind::Can if self.inject.is_empty() => Ok(()),
+            PlantKind::Can => Err(Failure::InjectionIntoRealArm),
+        }
     }
 
     /// What every process is told.

@@ -16,9 +16,12 @@ use supple_ipc::message::{Drives, Telemetry};
 /// Gravity hold before the way to the start \[s\].
 const SETTLE_S: f64 = 0.1;
 /// Gravity hold before the pendant is pressed \[s\].
-const HELD_S: f64 = 0.2;
+pub const HELD_S: f64 = 0.2;
 /// From the pendant's button to drives that are active at the latest, and known to be \[s\].
 const ACTIVATION_S: f64 = 0.1;
+
+/// When the way to the start may begin in virtual time, of a simulated and of an emulated arm \[s\].
+pub const START_S: [f64; 2] = [SETTLE_S, SETTLE_S + HELD_S + ACTIVATION_S];
 
 /// How far it has come.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,10 +67,9 @@ impl Stages {
     /// # Errors
     /// [`Failure::Pendant`].
     pub fn plan(&mut self) -> Result<u64, Failure> {
-        let mut start_s = SETTLE_S;
+        let start_s = START_S[usize::from(self.pendant.is_some())];
         if let Some(pendant) = &self.pendant {
             pendant.press(&format!("activate@held+{HELD_S}"))?;
-            start_s += HELD_S + ACTIVATION_S;
         }
         self.stage = Stage::Following;
         Ok(cycles_of(start_s, self.period_s))

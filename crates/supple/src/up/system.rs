@@ -4,7 +4,7 @@ use super::children::Children;
 use super::meter::{Meter, UpSummary};
 use super::plan::Plan;
 use super::recorder::{Journal, Recorder};
-use super::stages::{Stages, cycles_of};
+use super::stages::{HELD_S, START_S, Stages, cycles_of};
 use super::status_line::StatusLine;
 use crate::cli::UpArgs;
 use crate::console::remark;
@@ -87,6 +87,47 @@ impl<'a, const N: usize> System<'a, N> {
     /// # Errors
     /// A process that cannot start or does not come.
     pub fn start(&mut self, description: &Description) -> Result<(), Failure> {
+        self.launch()?;
+        if self.args.virtual_time {
+            let home = description.home::<N>()?;
+            self.hold_first()?;
+            let start = self.stages.plan()?;
+            self.session.follow(&self.approach, &home, Some(start))?;
+        }
+        self.children.start(&self.plan.clock)
+    }
+
+    /// As [`System::start`] in virtual time, with requests of another's choice, each with its cycle from when the way
+    /// to the start may begin, and presses of an emulated arm's pendant.
+    ///
+    /// # Errors
+    /// As [`System::start`].
+    pub fn start_scripted(
+        &mut self,
+        requests: &[(u64, Request<N>)],
+        activate: bool,
+        presses: &[String],
+    ) -> Result<(), Failure> {
+        self.launch()?;
+        self.hold_first()?;
+        let start_s = START_S[usize::from(self.plan.pendant.is_some())];
+        if let Some(pendant) = &self.plan.pendant {
+            if activate {
+                pendant.press(&format!("activate@held+{HELD_S}"))?;
+            }
+            for press in presses {
+                pendant.press(press)?;
+            }
+        }
+        let start = cycles_of(start_s, self.period_s);
+        for (cycle, request) in requests {
+            self.session.queue(request, start + cycle)?;
+        }
+        self.children.start(&self.plan.clock)
+    }
+
+    /// Starts all but the process that owns the clock.
+    fn launch(&mut self) -> Result<(), Failure> {
         let children = &mut self.children;
         if let Some(arm) = &self.plan.arm {
             children.start(arm)?;
@@ -96,16 +137,38 @@ impl<'a, const N: usize> System<'a, N> {
             pendant.press("idle")?;
         }
         children.start(&self.plan.controller)?;
-        if self.args.virtual_time {
-            let home = description.home::<N>()?;
-            let hold = Request::GravityHold;
-            let mut check = || children.check();
-            self.session
-                .ask_when_there(&hold, Some(0), JOIN_S, &mut check)?;
-            let start = self.stages.plan()?;
-            self.session.follow(&self.approach, &home, Some(start))?;
+        Ok(())
+    }
+
+    /// Gravity hold in the first cycle.
+    fn hold_first(&mut self) -> Result<(), Failure> {
+        let (children, hold) = (&mut self.children, Request::GravityHold);
+        let mut check = || children.check();
+        self.session
+            .ask_when_there(&hold, Some(0), JOIN_S, &mut check)
+    }
+
+    /// In virtual time: the process that owns the clock has run all its cycles.
+    ///
+    /// # Errors
+    /// [`Failure::ProcessEnded`]: it ended otherwise.
+    pub fn clock_has_ended(&mut self) -> Result<bool, Failure> {
+        self.children.all_ended_well(self.plan.clock.name)
+    }
+
+    /// What was refused since this was last asked, in the controller's words.
+    ///
+    /// # Errors
+    /// Shared memory.
+    pub fn refusals(&mut self) -> Result<Vec<String>, Failure> {
+        let mut refusals = Vec::new();
+        loop {
+            match self.session.check() {
+                Ok(_) => return Ok(refusals),
+                Err(Failure::Refused { words }) => refusals.push(words),
+                Err(failure) => return Err(failure),
+            }
         }
-        self.children.start(&self.plan.clock)
     }
 
     /// Until it is over, is asked to end, or something fails.

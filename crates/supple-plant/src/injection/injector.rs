@@ -1,0 +1,298 @@
+//! Carries injections out on a plant.
+
+use super::{Injection, InjectionError, InjectionKind, Trigger};
+use crate::error::PlantError;
+use crate::plant::Plant;
+use core::array;
+use std::collections::VecDeque;
+use supple_core::controller::Mode;
+use supple_core::{Matrix, Vector};
+
+/// What the arm's side sees of its controller in a cycle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sight {
+    /// The drives take torques.
+    pub active: bool,
+    /// Mode of the torque command of this cycle; `None` where there is none, or where it is not told.
+    pub mode: Option<Mode>,
+}
+
+/// Stands between a plant and whoever reads its encoders and commands its torques. Without injections it passes
+/// everything on, to the bit.
+#[derive(Clone, Debug)]
+pub struct Injector<const N: usize> {
+    running: Vec<Running<N>>,
+    /// Cycles of the plant so far.
+    cycle: u64,
+    cycle_s: f64,
+    joint_from_motor: Matrix<N, N>,
+    motor_from_joint: Matrix<N, N>,
+    /// What the encoders say.
+    position_rad: Vector<N>,
+}
+
+#[derive(Clone, Debug)]
+struct Running<const N: usize> {
+    injection: Injection,
+    /// When it begins, once its trigger has come.
+    due: Option<u64>,
+    begun: bool,
+    /// Angles reported when it began.
+    start_rad: Vector<N>,
+    /// Angles or torques on their way, for delays.
+    pending: VecDeque<Vector<N>>,
+    /// How many cycles of the plant they are on their way.
+    delay: usize,
+    /// Replies of each joint since it began.
+    replies: [u32; N],
+}
+
+impl<const N: usize> Injector<N> {
+    /// Passes everything on.
+    pub fn none(plant: &Plant<N>) -> Self {
+        let config = plant.config();
+        let joint_from_motor = config.drive.joint_from_motor;
+        Injector {
+            running: Vec::new(),
+            cycle: 0,
+            cycle_s: config.cycle_s,
+            // A plant has found its transmission regular.
+            motor_from_joint: joint_from_motor
+                .try_inverse()
+                .unwrap_or_else(Matrix::identity),
+            joint_from_motor,
+            position_rad: plant.measurement().position_rad,
+        }
+    }
+
+    /// For a plant that has not moved yet: what begins at once begins here. `period_s` is the control cycle, in
+    /// which delays are counted; the plant's own may be shorter.
+    ///
+    /// # Errors
+    /// [`InjectionError::Index`]: a joint or motor that the arm has not; [`InjectionError::Value`]: a value out of
+    /// its range.
+    pub fn new(
+        injections: &[Injection],
+        plant: &mut Plant<N>,
+        period_s: f64,
+    ) -> Result<Self, InjectionError> {
+        for injection in injections {
+            // What was built by hand is held to the same ranges as what was read.
+            injection.to_string().parse::<Injection>()?;
+            if let Some((key, value)) = injection.kind.index()
+                && value >= N
+            {
+                let kind = injection.kind.name();
+                return Err(InjectionError::Index {
+                    kind,
+                    key,
+                    value,
+                    joints: N,
+                });
+            }
+        }
+        let mut injector = Injector::none(plant);
+        let delay_of = |injection: &Injection| match injection.kind {
+            InjectionKind::EncoderLate { cycles, .. } | InjectionKind::TorqueLate { cycles } => {
+                (f64::from(cycles) * period_s / injector.cycle_s).round() as usize
+            }
+            _ => 0,
+        };
+        let running = injections.iter().map(|injection| {
+            let delay = delay_of(injection);
+            Running {
+                injection: *injection,
+                due: (injection.trigger == Trigger::AtOnce).then_some(0),
+                begun: false,
+                start_rad: Vector::zeros(),
+                pending: VecDeque::with_capacity(delay + 2),
+                delay,
+                replies: [0; N],
+            }
+        });
+        injector.running = running.collect();
+        injector.begin_due(plant);
+        injector.read(plant);
+        Ok(injector)
+    }
+
+    /// A cycle of the plant under `torque_nm` with these motors shorted, in the place of [`Plant::short`] and
+    /// [`Plant::cycle`].
+    pub fn cycle(
+        &mut self,
+        plant: &mut Plant<N>,
+        sight: Sight,
+        torque_nm: &Vector<N>,
+        shorted: [bool; N],
+    ) {
+        self.trigger(sight);
+        self.begin_due(plant);
+        let (mut torque_nm, mut shorted) = (*torque_nm, shorted);
+        if self.drives_idle() {
+            torque_nm = Vector::zeros();
+            shorted = [true; N];
+        }
+        for running in self.running.iter_mut().filter(|running| running.begun) {
+            match running.injection.kind {
+                InjectionKind::MotorDead { motor } => {
+                    let mut at_motors = self.joint_from_motor.transpose() * torque_nm;
+                    at_motors[motor] = 0.0;
+                    torque_nm = self.motor_from_joint.transpose() * at_motors;
+                    shorted[motor] = false;
+                }
+                InjectionKind::TorqueSign { joint } => torque_nm[joint] = -torque_nm[joint],
+                InjectionKind::TorqueLate { .. } => torque_nm = running.later(torque_nm),
+                _ => {}
+            }
+        }
+        plant.short(shorted);
+        plant.cycle(&torque_nm);
+        self.cycle += 1;
+        self.read(plant);
+    }
+
+    /// Joint angles as the encoders give them at the end of the last cycle \[rad\].
+    pub fn position_rad(&self) -> &Vector<N> {
+        &self.position_rad
+    }
+
+    /// The same as the replies of a cycle, `None` for one that is lost. To be asked once a control cycle.
+    pub fn replies(&mut self) -> [Option<f64>; N] {
+        array::from_fn(|joint| {
+            let lost = self.loses_reply(joint);
+            (!lost).then_some(self.position_rad[joint])
+        })
+    }
+
+    /// Counts a reply of a joint, or on a bus of a motor; it is not to be sent.
+    pub fn loses_reply(&mut self, joint: usize) -> bool {
+        let mut lost = false;
+        for running in self.running.iter_mut().filter(|running| running.begun) {
+            if let InjectionKind::ReplyLost { joint: of, every } = running.injection.kind
+                && of.is_none_or(|of| of == joint)
+            {
+                running.replies[joint] += 1;
+                if running.replies[joint] == every {
+                    running.replies[joint] = 0;
+                    lost = true;
+                }
+            }
+        }
+        lost
+    }
+
+    /// The drives are idle against their controller's will.
+    pub fn drives_idle(&self) -> bool {
+        self.running.iter().any(|running| {
+            let InjectionKind::DrivesIdle { for_s } = running.injection.kind else {
+                return false;
+            };
+            let since = running.due.unwrap_or(self.cycle);
+            let over = for_s.is_some_and(|for_s| {
+                self.cycle.saturating_sub(since) >= cycles_of(for_s, self.cycle_s)
+            });
+            running.begun && !over
+        })
+    }
+
+    /// This motor makes no torque and does not brake.
+    pub fn is_dead(&self, motor: usize) -> bool {
+        let mut running = self.running.iter().filter(|running| running.begun);
+        running.any(|running| running.injection.kind == InjectionKind::MotorDead { motor })
+    }
+
+    /// How many injections have begun.
+    pub fn begun(&self) -> usize {
+        self.running.iter().filter(|running| running.begun).count()
+    }
+
+    fn trigger(&mut self, sight: Sight) {
+        for running in self.running.iter_mut().filter(|r| r.due.is_none()) {
+            let after_s = match running.injection.trigger {
+                Trigger::AtOnce => Some(0.0),
+                Trigger::Active { at_s } => sight.active.then_some(at_s),
+                Trigger::Mode { mode, after_s } => {
+                    (sight.active && sight.mode == Some(mode)).then_some(after_s)
+                }
+            };
+            running.due = after_s.map(|after_s| self.cycle + cycles_of(after_s, self.cycle_s));
+        }
+    }
+
+    fn begin_due(&mut self, plant: &mut Plant<N>) {
+        for running in &mut self.running {
+            if running.begun || running.due.is_none_or(|due| due > self.cycle) {
+                continue;
+            }
+            running.begun = true;
+            running.start_rad = self.position_rad;
+            let done: Result<(), PlantError> = match running.injection.kind {
+                InjectionKind::GravityReversed => {
+                    plant.reverse_gravity();
+                    Ok(())
+                }
+                InjectionKind::Bump {
+                    joint,
+                    speed_rad_per_s,
+                } => {
+                    let mut change = Vector::zeros();
+                    change[joint] = speed_rad_per_s;
+                    plant.push(&change)
+                }
+                InjectionKind::Payload { mass_kg } => plant.add_payload(mass_kg),
+                _ => Ok(()),
+            };
+            // Masses and speeds are bounded by their ranges.
+            debug_assert!(done.is_ok(), "{done:?}");
+        }
+    }
+
+    fn read(&mut self, plant: &Plant<N>) {
+        let mut position_rad = plant.measurement().position_rad;
+        for running in self.running.iter_mut().filter(|running| running.begun) {
+            running.falsify(&mut position_rad);
+        }
+        self.position_rad = position_rad;
+    }
+}
+
+impl<const N: usize> Running<N> {
+    /// Puts a value in and takes out the one that was put in `delay` cycles ago, or the first one.
+    fn later(&mut self, value: Vector<N>) -> Vector<N> {
+        self.pending.push_back(value);
+        if self.pending.len() > self.delay + 1 {
+            self.pending.pop_front();
+        }
+        self.pending.front().copied().unwrap_or(value)
+    }
+
+    fn falsify(&mut self, position_rad: &mut Vector<N>) {
+        let start_rad = self.start_rad;
+        let mut each = |joint: Option<usize>, value: &dyn Fn(usize, f64) -> f64| {
+            for i in (0..N).filter(|i| joint.is_none_or(|joint| joint == *i)) {
+                position_rad[i] = value(i, position_rad[i]);
+            }
+        };
+        match self.injection.kind {
+            InjectionKind::EncoderStuck { joint } => each(joint, &|i, _| start_rad[i]),
+            InjectionKind::EncoderSign { joint } => {
+                each(joint, &|i, now| start_rad[i] - (now - start_rad[i]));
+            }
+            InjectionKind::EncoderOffset { joint, offset_rad } => {
+                each(joint, &|_, now| now + offset_rad);
+            }
+            InjectionKind::EncoderNan { joint } => each(joint, &|_, _| f64::NAN),
+            InjectionKind::EncoderLate { joint, .. } => {
+                let late_rad = self.later(*position_rad);
+                for i in (0..N).filter(|i| joint.is_none_or(|joint| joint == *i)) {
+                    position_rad[i] = late_rad[i];
+                }
+            }
+            _ => {}
+        }
+    }
+}
+
+fn cycles_of(time_s: f64, cycle_s: f64) -> u64 {
+    (time_s / cycle_s).round() as u64
+}
