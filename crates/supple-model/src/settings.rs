@@ -248,13 +248,13 @@ pub struct PlausibleSettings {
     pub source: Option<String>,
     /// Lost replies of an encoder that are tolerated, where each is made up for by eight that came. Default 3.
     pub lost_replies: u32,
-    /// Travel of a joint's reference in which its encoder may say the very same angle (rad). Default 0.1.
+    /// Travel of a joint's reference in which its encoder may say the very same angle (rad). Default 0.05.
     pub stuck_rad: f64,
     /// Share of a joint's torque limit by which it may be driven one way while it gathers speed the other way.
     /// Default 0.05.
     pub against_share: f64,
     /// Force on the tip along gravity, in gravity hold and where a move has ended, that is a load which the model
-    /// does not have (N). Default 8.
+    /// does not have (N). Default 5.
     pub load_n: f64,
 }
 
@@ -422,9 +422,9 @@ impl Default for PlausibleSettings {
         Self {
             source: None,
             lost_replies: 3,
-            stuck_rad: 0.1,
+            stuck_rad: 0.05,
             against_share: 0.05,
-            load_n: 8.0,
+            load_n: 5.0,
         }
     }
 }

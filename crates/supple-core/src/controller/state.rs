@@ -265,10 +265,7 @@ impl<const N: usize> State<N> {
         match self.activity {
             Activity::Idle | Activity::Fault(_) => {}
             Activity::GravityHold if !came_back => {}
-            Activity::GravityHold => {
-                self.enter(Activity::GravityHold);
-                self.handover_pending = false;
-            }
+            Activity::GravityHold => self.enter(Activity::GravityHold),
             _ if !active => {
                 self.enter(Activity::GravityHold);
                 self.handover_pending = false;
