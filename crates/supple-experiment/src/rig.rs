@@ -1,7 +1,8 @@
 //! Controller and plant in one process, in virtual time: a cycle at a time, as fast as it goes.
 
 use crate::error::ExperimentError;
-use supple_core::{Controller, Input, Output, State, Vector, controller::Request, step};
+use supple_core::controller::{Mode, Request};
+use supple_core::{Controller, Input, Output, State, Vector, step};
 use supple_plant::{Measurement, Plant, PlantConfig, StepRecord, Truth};
 
 /// A controller that drives a plant.
@@ -9,6 +10,8 @@ pub struct Rig<const N: usize> {
     controller: Controller<N>,
     state: State<N>,
     plant: Plant<N>,
+    /// The motors carry out torques: as in `supple-sim`, from gravity hold on until no torque is wanted.
+    active: bool,
 }
 
 /// One cycle, seen from outside.
@@ -39,6 +42,7 @@ impl<const N: usize> Rig<N> {
             state: State::new(&controller),
             controller,
             plant: Plant::new(plant, start_rad, Vector::zeros())?,
+            active: false,
         })
     }
 
@@ -60,11 +64,17 @@ impl<const N: usize> Rig<N> {
             cycle: measurement.cycle,
             position_rad: core::array::from_fn(|i| Some(measurement.position_rad[i])),
             tip_force_n: Some(measurement.force_n),
-            drives_active: true,
+            drives_active: self.active,
             request,
         };
         let output = step(&self.controller, &mut self.state, &input);
-        self.plant.cycle(&output.torque_nm);
+        self.active = !output.limp && (self.active || output.mode == Mode::GravityHold);
+        self.plant.short([!self.active; N]);
+        let torque_nm = match self.active {
+            true => output.torque_nm,
+            false => Vector::zeros(),
+        };
+        self.plant.cycle(&torque_nm);
         Cycle {
             input,
             output,

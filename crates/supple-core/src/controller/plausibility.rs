@@ -19,6 +19,10 @@ const LOSS_WEIGHT: u32 = 8;
 /// Way that a moving joint would have gone on since its encoder last changed, over the travel of a reference that
 /// counts as one: 0.02 rad for 0.1 rad.
 const HALTED_SHARE: f64 = 0.2;
+/// Time for which the encoder of a joint that something collides with does not say the same angle \[s\].
+const STILL_S: f64 = 0.03;
+/// Speed of a joint that is not held up \[rad/s\].
+const OTHERS_RAD_PER_S: f64 = 0.1;
 const AGAINST_CYCLES: u32 = 20;
 const LOAD_S: f64 = 0.05;
 /// Share of the force along gravity that may act across it.
@@ -121,6 +125,23 @@ impl<const N: usize> Plausibility<N> {
             }
         }
         Ok(())
+    }
+
+    /// A torque from outside on a joint whose encoder has said the same angle for some time: that encoder is as likely
+    /// to be wrong as something to be in the way, and gravity from a wrong angle would not hold the arm.
+    fn or_stuck(&self, plausible: &Plausible, fault: Fault) -> Fault {
+        match fault {
+            Fault::JointCollision { joint, .. }
+                if self.still_s[joint] > STILL_S && plausible.stuck_rad < f64::MAX =>
+            {
+                Fault::EncoderStuck {
+                    joint,
+                    value_rad: self.travel_rad[joint],
+                    limit_rad: plausible.stuck_rad,
+                }
+            }
+            fault => fault,
+        }
     }
 
     fn stuck(
@@ -239,7 +260,9 @@ impl<const N: usize> State<N> {
             if !matches!(self.activity, Activity::Fault(_)) {
                 against?;
             }
-            if !self.latch.in_contact() {
+            // Where the tip is held up, joints stand still though their references move on; but not one of them alone.
+            let others_move = (0..N).any(|joint| abs(velocity[joint]) > OTHERS_RAD_PER_S);
+            if others_move || !self.latch.in_contact() {
                 let limit_rad = config.plausible.stuck_rad;
                 seen.stuck(limit_rad, evidence.reference_rad_per_s, evidence.elapsed_s)?;
             }
@@ -250,7 +273,8 @@ impl<const N: usize> State<N> {
         } else {
             1.0
         };
-        joint_collision(&config.collision, share, &external)?;
+        joint_collision(&config.collision, share, &external)
+            .map_err(|fault| self.plausibility.or_stuck(&config.plausible, fault))?;
         if !evidence.regular {
             return Ok(());
         }
