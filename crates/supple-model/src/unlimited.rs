@@ -108,7 +108,7 @@ mod tests {
             "lower=\"-1\"",
             "upper=\"2\"",
             "velocity=\"4\"",
-            "effort=\"1000000000.0\"",
+            "effort=\"100000.0\"",
         ] {
             assert!(weak.contains(word), "{word} in {weak}");
         }
