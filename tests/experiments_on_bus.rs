@@ -25,8 +25,9 @@ const PROBE_S: &str = "10";
 /// Most of the difference between the two RMS errors \[m\].
 const RMS_M: f64 = 3e-4;
 /// Most of the difference between the first transients, as a share of the one in one process.
-/// Of it only one sample a millisecond is seen there.
-const TRANSIENT_SHARE: f64 = 0.1;
+/// Of it only one sample a millisecond is seen there; and the speed at which an arm on 5 N/m meets the block depends on
+/// where in the stroke's friction it began: on the bus it comes from a move, in one process it stands at its start.
+const TRANSIENT_SHARE: f64 = 0.2;
 /// Most of the difference between the forces at rest \[N\]. The same controller leaves the same of its dry friction;
 /// one that knew the plant's breakaway would rest with 0.3 N more.
 const REST_N: f64 = 0.05;
