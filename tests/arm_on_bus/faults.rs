@@ -222,7 +222,7 @@ fn back_on_the_bus_the_host_lowers_the_module() {
 
 /// A single bit of a single reply, in many places: either it passes for a small error of an encoder, or
 /// the controller does not believe it and the arm goes to idle. Torque never grows by more than its rate
-/// limit allows; in the fault it goes faster than that.
+/// limit allows, but for what the stop of a motion that is none may ask for: a fifth of the joint's limit a cycle.
 #[test]
 fn a_corrupted_reply_is_believed_or_ends_torque() {
     let (mut believed, mut ended) = (0, 0);
@@ -248,9 +248,15 @@ fn a_corrupted_reply_is_believed_or_ends_torque() {
             let to_joints = joint_from_motor.transpose().try_inverse().unwrap();
             let (before, after) = (to_joints * pair[0].1, to_joints * pair[1].1);
             let growth = after.abs() - before.abs();
+            let stopping = rig
+                .cycle
+                .link_mut()
+                .output
+                .is_some_and(|o| o.fault.is_some());
             if rig.motors_in(MotorMode::Torque) {
                 assert!(
-                    growth.max() < limit_nm + 0.1,
+                    growth.max() < limit_nm + 0.1
+                        || stopping && (growth - config.limits.joint_torque_nm * 0.2).max() <= 0.1,
                     "{growth} in seed {seed}, from {before} to {after}, {:?}, {:?}",
                     rig.cycle.guard().last_loss(),
                     rig.cycle
