@@ -136,6 +136,7 @@ step_cycles() {
 # fuzz: each target of tests/fuzz for 10 s, SUPPLE_FUZZ_S for another time; without a nightly compiler, seeded mutations
 step_fuzz() {
     local seconds=${SUPPLE_FUZZ_S:-10}
+    [[ $seconds != 0 ]] || skip "SUPPLE_FUZZ_S=0: seeded mutations of every target are part of \`test\`"
     if ! nightly_fuzz; then
         echo "no nightly compiler or no cargo-fuzz: seeded mutations on the stable compiler"
         SUPPLE_FUZZ_FACTOR=$seconds cargo test --locked --release -p supple-fuzz --test corpus
