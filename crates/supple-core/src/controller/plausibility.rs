@@ -80,7 +80,7 @@ impl<const N: usize> Plausibility<N> {
                     self.still[joint] = true;
                 }
             }
-            if self.losses[joint] > LOSS_WEIGHT * plausible.lost_replies {
+            if self.losses[joint] > LOSS_WEIGHT.saturating_mul(plausible.lost_replies) {
                 self.losses[joint] = 0;
                 return Err(Fault::EncoderUnreliable { joint });
             }
@@ -98,6 +98,13 @@ impl<const N: usize> Plausibility<N> {
         self.travel_rad = [0.0; N];
         self.against = [0; N];
         self.load_s = 0.0;
+    }
+
+    /// Nothing is weighed in this cycle: what a joint did before says nothing of what it does afterwards.
+    pub fn pause(&mut self, momentum: &Vector<N>) {
+        self.last_momentum = *momentum;
+        self.speed_rad_per_s = [0.0; N];
+        self.still_s = [0.0; N];
     }
 
     /// A joint that moved does not come to rest from one cycle to the next.
@@ -239,10 +246,6 @@ impl<const N: usize> State<N> {
         config: &Config<N>,
         evidence: &Evidence<'_, N>,
     ) -> Result<(), Fault> {
-        if self.activity.is_limp() || !self.drives_active {
-            self.plausibility.last_momentum = self.terms.momentum;
-            return Ok(());
-        }
         let resting = match &self.activity {
             Activity::GravityHold => true,
             Activity::Move { duration_s, .. } => self.activity_s(config) > *duration_s,

@@ -189,6 +189,7 @@ impl<const N: usize> State<N> {
         if self.activity.is_limp() || !self.drives_active {
             // Motors may brake: nothing that the model knows balances.
             self.observer.reset();
+            self.plausibility.pause(&self.terms.momentum);
             return Ok(Vector3::zeros());
         }
         let mut drive = Vector::zeros();

@@ -292,3 +292,21 @@ fn an_encoder_that_stands_still_is_found() {
         Some(supple_core::controller::SafeAction::Idle)
     );
 }
+
+/// A joint that moved when the drives went idle, and rests when they come back, has a sound encoder.
+#[test]
+fn an_arm_that_came_to_rest_on_its_brakes_is_taken_up_again() {
+    let mut config = guarded();
+    config.plausible.stuck_rad = 0.1;
+    let mut rig = Rig::holding(config, bent());
+    for _ in 0..300 {
+        rig.q[0] += 6e-4;
+        assert_eq!(rig.cycle().fault, None);
+    }
+    rig.drives_active = false;
+    rig.rest();
+    rig.drives_active = true;
+    for _ in 0..500 {
+        assert_eq!(rig.cycle().fault, None);
+    }
+}
