@@ -4,7 +4,7 @@ set -euo pipefail
 cd "$(dirname "$0")"
 
 PLAIN=(fmt clippy test doctest doc)
-FULL=(deny advisories python package instructions fused cycles fuzz cortex-m socketcan services)
+FULL=(deny advisories python package ur10e instructions fused edits cycles fuzz cortex-m socketcan services)
 CARGO_DENY_VERSION=0.20.2
 CARGO_FUZZ_VERSION=0.13.2
 GUNGRAUN_VERSION=0.20.0
@@ -126,6 +126,19 @@ step_fused() {
     [[ $(rustc -C target-cpu=native --print cfg) == *'target_feature="fma"'* ]] ||
         skip "this processor has no fused multiply-add"
     RUSTFLAGS="-C target-cpu=native" cargo test --locked -p supple-core --tests --target-dir target/fused
+}
+
+# ur10e: identification from logs of a real UR10e, where SUPPLE_UR10E_DIR names their folder
+step_ur10e() {
+    local folder=${SUPPLE_UR10E_DIR:-}
+    [[ -n $folder && -f $folder/ur10e.urdf ]] || skip "SUPPLE_UR10E_DIR names no folder with ur10e.urdf and the logs"
+    SUPPLE_UR10E_DIR=$(realpath "$folder") \
+        cargo test --locked --workspace --exclude supple-python --test ur10e -- --ignored
+}
+
+# edits: a scalar and a torque term are added to a copy of the tree by two edits each; its logs have them
+step_edits() {
+    cargo test --locked --workspace --exclude supple-python --test record_edits -- --ignored
 }
 
 # cycles: 10 million cycles of the core with random requests and inputs, optimised; SUPPLE_CYCLES for another number

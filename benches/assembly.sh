@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# No bounds check is left in the dynamics and the law: none of their functions, and none of the loops that
-# call them, as compiled for release, can reach a panic. Fails where one can. `./ci.sh instructions` calls it.
+# Checks that the release code of the dynamics and the law contains no bounds check: no function, and no loop
+# that calls one, may reach a panic. `./ci.sh instructions` calls it.
 #
-#     benches/assembly.sh [PROGRAM]       by default the one that benches/peers/run.sh has built
+#     benches/assembly.sh [PROGRAM] by default the program that benches/peers/run.sh builds
 set -euo pipefail
 cd "$(dirname "$0")/.."
 command -v objdump >/dev/null || {
@@ -31,6 +31,6 @@ objdump --disassemble --demangle --no-show-raw-insn "$program" | awk '
     END {
         for (name in seen) { kinds++ }
         printf "%d functions (%d names), %d instructions, %d calls that panic\n", functions, kinds, instructions, found
-        # Far fewer would mean that the names have changed and nothing was looked at.
+        # Far fewer functions mean that the names have changed and nothing was checked.
         exit found > 0 || functions < 10 || instructions < 10000
     }'

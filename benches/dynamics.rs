@@ -1,7 +1,7 @@
-//! Wall time of the core on the built-in arms: each function called on a pool of states, once with nothing
-//! between the calls and once with each call waiting for the result before.
+//! Wall-clock time of the core functions on the built-in arms: independent calls, and calls that each depend on
+//! the previous result.
 //!
-//! `cargo bench -p supple-benches --bench dynamics`. `peers` has the comparison with other libraries.
+//! `cargo bench -p supple-benches --bench dynamics`. `peers` compares with other libraries.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
@@ -9,10 +9,10 @@ use supple_benches::{NULLSPACE_DAMPING, Rig, State, config, gains, pool, regular
 use supple_core::Matrix;
 use supple_core::config::Role;
 use supple_core::dynamics::{self, Terms};
-use supple_core::impedance::{Situation, Task, impedance};
+use supple_core::impedance::{LawInput, Task, impedance};
 use supple_core::operational::{pose_torque, position_torque};
 
-/// Calls `function` on the pool in turn, both ways.
+/// Measures `function` over the pool, with independent and with dependent calls.
 fn bench<const N: usize, T>(
     criterion: &mut Criterion,
     name: &str,
@@ -31,7 +31,7 @@ fn bench<const N: usize, T>(
         b.iter(|| {
             let mut state = turn.next().copied();
             if let Some(state) = &mut state {
-                // Too small to change the angle, but nobody knows that.
+                // Too small to change the angle, but the compiler cannot know that.
                 state.q[0] += before * 1e-200;
                 let result = function(state);
                 before = first(&result);
@@ -132,14 +132,14 @@ fn pose_law<const N: usize>(criterion: &mut Criterion, asset: &str) {
     });
 }
 
-/// The law as a controller has it, its terms apart and its held joints left alone.
+/// The law as the controller computes it: term by term and without torques on held joints.
 fn law_by_terms<const N: usize>(criterion: &mut Criterion, asset: &str) {
     let config = config::<N>(asset);
     let (states, gains) = (regular_pool(&config.arm, &config.roles), gains());
     let mut filled = Terms::default();
     let law = |s: &State<N>| {
         dynamics::terms(&config.arm, &s.q, &s.qd, &mut filled);
-        let now = Situation {
+        let now = LawInput {
             spring_limit_n: f64::MAX,
             reference: &s.position,
             velocity_rad_per_s: &s.qd,
@@ -156,7 +156,7 @@ fn law_by_terms<const N: usize>(criterion: &mut Criterion, asset: &str) {
     });
 }
 
-/// The whole cycle while the law holds the tip where it is, the arm moving within 0.1 mrad.
+/// The complete cycle while the law holds the tip and the arm moves within 0.1 mrad.
 fn step<const N: usize>(criterion: &mut Criterion, asset: &str) {
     let mut rig = Rig::<N>::tracking(asset);
     criterion.bench_function(&format!("step/{N}"), |b| b.iter(|| rig.step()));

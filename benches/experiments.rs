@@ -1,5 +1,6 @@
-//! How fast the experiments run: a single probing run on one core against real time (20 times is asked),
-//! and the whole demo on all cores with its logs (90 s on two is allowed). Several rounds; least, middle and greatest are printed.
+//! Speed of the experiments: a single probing run on one core relative to real time (target: factor 20), and
+//! the complete demo with logs on all cores (limit: 90 s on two). Prints minimum, median and maximum over
+//! several rounds.
 
 use std::time::Instant;
 use supple_core::Trajectory;
@@ -29,7 +30,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         ratios.push(run.simulated_s / begin.elapsed().as_secs_f64());
     }
     print(
-        "single probing run, times real time on one core",
+        "single probing run, real-time factor on one core",
         &mut ratios,
     );
 
@@ -45,16 +46,19 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         demo(&description, &options, &|_| {})?;
         seconds.push(begin.elapsed().as_secs_f64());
     }
-    print("whole demo with logs, seconds on all cores", &mut seconds);
+    print(
+        "complete demo with logs, seconds on all cores",
+        &mut seconds,
+    );
     Ok(())
 }
 
 fn print(what: &str, values: &mut [f64]) {
     values.sort_by(f64::total_cmp);
-    let (least, middle, greatest) = (
+    let (min, median, max) = (
         values[0],
         values[values.len() / 2],
         values[values.len() - 1],
     );
-    println!("{what}: least {least:.1}, middle {middle:.1}, greatest {greatest:.1}");
+    println!("{what}: minimum {min:.1}, median {median:.1}, maximum {max:.1}");
 }

@@ -1,12 +1,12 @@
-//! Time of one physically consistent solve of a 7-joint arm, after the rows were reduced to a triangle:
+//! Time of one physically consistent solve of a 7-joint arm, after the QR reduction of its rows:
 //! `cargo bench --bench identification`.
 
 use std::hint::black_box;
 use std::time::Instant;
 use supple_core::dynamics::rnea;
 use supple_core::{Friction, Vector};
-use supple_ident::compress::Block;
 use supple_ident::consistent::{Constraints, solve};
+use supple_ident::qr_reduction::ReducedSystem;
 use supple_ident::regressor::joint_rows;
 use supple_ident::{Columns, DMatrix, FrictionColumns, Motion, model};
 use supple_model::Description;
@@ -48,14 +48,14 @@ fn main() {
         qd,
         qdd,
         tau,
-        independent_share: 1.0,
+        independent_fraction: 1.0,
         cutoff_hz: None,
     };
     let columns = Columns::new(7, &JOINTS, true, FrictionColumns::OFFSET, &[]).expect("columns");
     let before = Instant::now();
-    let mut block = Block::empty(columns.len());
+    let mut block = ReducedSystem::empty(columns.len());
     for joint in joint_rows(&arm, &columns, &motion).expect("rows") {
-        block.add(&Block::of(&joint, 0.0, None), 10.0);
+        block.add(&joint.reduced(0.0, None), 10.0);
     }
     let reduced_s = before.elapsed().as_secs_f64();
     let constraints = Constraints {

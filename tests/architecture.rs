@@ -1,129 +1,8 @@
-//! The arrows of ARCHITECTURE.md, held against what cargo sees.
+//! Checks the dependencies between crates against ARCHITECTURE.md.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 use std::process::Command;
-
-/// Crate, and the crates of ours it may depend on. An arrow that is not here is refused; a crate that
-/// is not here is refused too.
-const ALLOWED: &[(&str, &[&str])] = &[
-    ("supple-core", &[]),
-    ("supple-files", &[]),
-    ("supple-model", &["supple-core", "supple-files"]),
-    (
-        "supple-plant",
-        &["supple-core", "supple-files", "supple-model"],
-    ),
-    (
-        "supple-log",
-        &["supple-core", "supple-files", "supple-model"],
-    ),
-    (
-        "supple-experiment",
-        &[
-            "supple-core",
-            "supple-model",
-            "supple-plant",
-            "supple-log",
-            "supple-ident",
-        ],
-    ),
-    (
-        "supple",
-        &[
-            "supple-core",
-            "supple-files",
-            "supple-model",
-            "supple-log",
-            "supple-plant",
-            "supple-experiment",
-            "supple-ident",
-            "supple-bus",
-            "supple-ipc",
-            "supple-realtime",
-        ],
-    ),
-    ("supple-bare", &["supple-core"]),
-    ("supple-puck", &["supple-core"]),
-    ("supple-bus", &["supple-puck"]),
-    ("supple-ipc", &["supple-core", "supple-model"]),
-    ("supple-realtime", &[]),
-    (
-        "supple-can",
-        &[
-            "supple-core",
-            "supple-model",
-            "supple-puck",
-            "supple-bus",
-            "supple-ipc",
-            "supple-realtime",
-        ],
-    ),
-    (
-        "supple-emu",
-        &[
-            "supple-core",
-            "supple-model",
-            "supple-puck",
-            "supple-bus",
-            "supple-plant",
-            "supple-realtime",
-        ],
-    ),
-    ("supple-benches", &["supple-core", "supple-model"]),
-    (
-        "supple-latency",
-        &["supple-core", "supple-ipc", "supple-realtime"],
-    ),
-    (
-        "supple-rt",
-        &[
-            "supple-core",
-            "supple-model",
-            "supple-ipc",
-            "supple-realtime",
-        ],
-    ),
-    (
-        "supple-sim",
-        &[
-            "supple-core",
-            "supple-model",
-            "supple-ipc",
-            "supple-realtime",
-            "supple-plant",
-        ],
-    ),
-    (
-        "supple-ident",
-        &["supple-core", "supple-files", "supple-model", "supple-log"],
-    ),
-    (
-        "supple-fuzz",
-        &[
-            "supple-core",
-            "supple-model",
-            "supple-log",
-            "supple-plant",
-            "supple-puck",
-            "supple-bus",
-            "supple-ipc",
-            "supple-emu",
-            "supple-ident",
-        ],
-    ),
-    (
-        "supple-python",
-        &[
-            "supple-core",
-            "supple-files",
-            "supple-model",
-            "supple-log",
-            "supple-plant",
-            "supple-experiment",
-            "supple-ident",
-        ],
-    ),
-];
 
 fn metadata() -> serde_json::Value {
     let output = Command::new(env!("CARGO"))
@@ -139,44 +18,197 @@ fn metadata() -> serde_json::Value {
     serde_json::from_slice(&output.stdout).expect("cargo metadata prints JSON")
 }
 
-/// Every crate of ours with its dependencies on crates of ours, whatever their kind.
-fn arrows() -> BTreeMap<String, BTreeSet<String>> {
+/// Dependencies of a crate on crates of the workspace: always, and of its tests alone.
+type Arrows = [BTreeSet<String>; 2];
+
+/// Arrows of every crate, from its manifest.
+fn arrows() -> BTreeMap<String, Arrows> {
     let metadata = metadata();
     let packages = metadata["packages"].as_array().expect("packages");
     let name = |value: &serde_json::Value| value["name"].as_str().unwrap_or_default().to_owned();
     let ours: BTreeSet<String> = packages.iter().map(name).collect();
-    packages
-        .iter()
-        .filter(|package| name(package) != "supple-workspace")
-        .map(|package| {
-            let dependencies = package["dependencies"].as_array().expect("dependencies");
-            let dependencies = dependencies.iter().map(name);
-            (
-                name(package),
-                dependencies.filter(|d| ours.contains(d)).collect(),
-            )
-        })
-        .collect()
+    let of = |package: &serde_json::Value| {
+        let dependencies = package["dependencies"].as_array().expect("dependencies");
+        let of_kind = |dev: bool| -> BTreeSet<String> {
+            let kind = |d: &&serde_json::Value| (d["kind"] == "dev") == dev;
+            let names = dependencies.iter().filter(kind).map(name);
+            names.filter(|d| ours.contains(d)).collect()
+        };
+        let (always, tests) = (of_kind(false), of_kind(true));
+        let tests = tests.difference(&always).cloned().collect();
+        (name(package), [always, tests])
+    };
+    let packages = packages.iter().filter(|p| name(p) != "supple-workspace");
+    packages.map(of).collect()
+}
+
+/// Arrows of every crate, from the table in ARCHITECTURE.md.
+fn documented_arrows() -> BTreeMap<String, Arrows> {
+    let text = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/ARCHITECTURE.md"));
+    let text = text.expect("a document");
+    let names = |list: &str| {
+        let names = list.split(',').map(str::trim);
+        let names = names.filter(|name| !name.is_empty() && *name != "nothing");
+        names.map(|name| format!("supple-{name}")).collect()
+    };
+    let row = |line: &str| {
+        let mut cells = line.strip_prefix("| `supple")?.split('|').map(str::trim);
+        let name = format!("supple{}", cells.next()?.strip_suffix('`')?);
+        let depends_on = cells.nth(1)?;
+        let (always, tests) = depends_on
+            .split_once("; tests:")
+            .unwrap_or((depends_on, ""));
+        Some((name, [names(always), names(tests)]))
+    };
+    let table = text
+        .lines()
+        .skip_while(|line| !line.starts_with("| crate |"));
+    let table = table.take_while(|line| line.starts_with('|'));
+    table.filter_map(row).collect()
 }
 
 #[test]
-fn only_the_drawn_arrows_exist() {
-    let allowed: BTreeMap<&str, &[&str]> = ALLOWED.iter().copied().collect();
-    for (package, dependencies) in arrows() {
-        let permitted = allowed
-            .get(package.as_str())
-            .unwrap_or_else(|| panic!("{package} is not in the drawing"));
-        for dependency in dependencies {
+fn documented_dependencies_are_the_real_ones() {
+    let (documented, real) = (documented_arrows(), arrows());
+    let names = |map: &BTreeMap<String, Arrows>| map.keys().cloned().collect::<Vec<_>>();
+    assert_eq!(names(&documented), names(&real), "crates");
+    for (package, arrows) in real {
+        assert_eq!(documented[&package], arrows, "{package}: documented, real");
+    }
+}
+
+/// Files of a crate by their module paths, such as `controller::step`; `mod.rs` and `lib.rs` are their folder's.
+fn modules(source: &Path) -> BTreeMap<String, String> {
+    let mut modules = BTreeMap::new();
+    let mut open = vec![(source.to_owned(), Vec::<String>::new())];
+    while let Some((folder, path)) = open.pop() {
+        for entry in std::fs::read_dir(folder).expect("a folder") {
+            let entry = entry.expect("an entry").path();
+            let stem = entry
+                .file_stem()
+                .expect("a name")
+                .to_string_lossy()
+                .into_owned();
+            let inner = |name: String| path.iter().cloned().chain([name]).collect::<Vec<_>>();
+            if entry.is_dir() {
+                open.push((entry, inner(stem)));
+            } else if entry.extension().is_some_and(|end| end == "rs") {
+                let own = match stem.as_str() {
+                    "mod" | "lib" | "main" => path.clone(),
+                    _ => inner(stem),
+                };
+                let text = std::fs::read_to_string(&entry).expect("readable");
+                modules
+                    .entry(own.join("::"))
+                    .or_insert_with(String::new)
+                    .push_str(&text);
+            }
+        }
+    }
+    modules
+}
+
+/// Modules that a file imports from by `use crate::..` or `use super::..`; a parent that re-exports its children does not
+/// import them so.
+fn imports(module: &str, text: &str, known: &BTreeMap<String, String>) -> BTreeSet<String> {
+    let mut found = BTreeSet::new();
+    let mut text = format!("\n{text}");
+    for visible in ["pub", "pub(crate)", "pub(super)"] {
+        text = text.replace(&format!("\n{visible} use "), "\nuse ");
+    }
+    for statement in text.split("\nuse ").skip(1) {
+        let statement = statement.split(';').next().unwrap_or_default();
+        let (head, list) = statement.split_once('{').unwrap_or((statement, ""));
+        let mut head: Vec<&str> = head
+            .trim()
+            .split("::")
+            .filter(|part| !part.is_empty())
+            .collect();
+        let mut base: Vec<&str> = Vec::new();
+        match head.first() {
+            Some(&"crate") => {}
+            Some(&"super") => {
+                base = module.split("::").collect();
+                base.pop();
+                while head.get(1) == Some(&"super") {
+                    base.pop();
+                    head.remove(1);
+                }
+            }
+            _ => continue,
+        }
+        head.remove(0);
+        let names = list.split([',', '{', '}']).map(str::trim).map(|name| {
+            let path = name.split(" as ").next().unwrap_or_default();
+            path.split("::").collect::<Vec<_>>()
+        });
+        for name in names.chain([Vec::new()]) {
+            let path = [&base[..], &head[..], &name[..]].concat();
+            let whole = (0..=path.len()).rev().map(|end| path[..end].join("::"));
+            let whole = whole.map(|path| path.trim_end_matches(':').to_owned());
+            if let Some(target) = whole.into_iter().find(|path| known.contains_key(path)) {
+                found.insert(target);
+            }
+        }
+    }
+    found.remove(module);
+    found
+}
+
+/// Layers of supple-core, as ARCHITECTURE.md lists them, from the lowest to the highest.
+const LAYERS: [&str; 8] = [
+    "math",
+    "model",
+    "record",
+    "config",
+    "dynamics",
+    "trajectory",
+    "law",
+    "controller",
+];
+
+#[test]
+fn layers_of_the_core_import_only_from_lower_ones() {
+    let known = modules(&Path::new(env!("CARGO_MANIFEST_DIR")).join("crates/supple-core/src"));
+    let layer = |module: &str| {
+        let folder = module.split("::").next().unwrap_or_default();
+        LAYERS.iter().position(|name| *name == folder)
+    };
+    for (module, text) in known.iter().filter(|(module, _)| !module.is_empty()) {
+        let own = layer(module).unwrap_or_else(|| panic!("{module} is in no layer"));
+        for imported in imports(module, text, &known) {
+            let other = layer(&imported);
             assert!(
-                permitted.contains(&dependency.as_str()),
-                "{package} -> {dependency} is not in the drawing"
+                imported.is_empty() || other <= Some(own),
+                "{module} imports {imported}"
             );
         }
     }
 }
 
 #[test]
-fn core_depends_on_nothing_but_mathematics() {
+fn no_two_files_import_each_other() {
+    let crates = Path::new(env!("CARGO_MANIFEST_DIR")).join("crates");
+    let mut pairs = Vec::new();
+    for folder in std::fs::read_dir(crates).expect("crates").flatten() {
+        let known = modules(&folder.path().join("src"));
+        let all: BTreeMap<&String, BTreeSet<String>> = known
+            .iter()
+            .map(|(module, text)| (module, imports(module, text, &known)))
+            .collect();
+        for (module, imported) in &all {
+            for other in imported {
+                if other > *module && all[other].contains(*module) {
+                    pairs.push(format!("{}: {module} <-> {other}", folder.path().display()));
+                }
+            }
+        }
+    }
+    assert!(pairs.is_empty(), "{pairs:#?}");
+}
+
+#[test]
+fn core_depends_only_on_mathematical_crates() {
     let metadata = metadata();
     let packages = metadata["packages"].as_array().expect("packages");
     let core = packages.iter().find(|p| p["name"] == "supple-core");
@@ -193,8 +225,8 @@ fn core_depends_on_nothing_but_mathematics() {
     );
 }
 
-/// With a package of its own profile in the default build, plain `cargo build` would fail or, worse,
-/// abort on panic everywhere; with the Python package in it, it would need an interpreter.
+/// If the default build contained the freestanding program, plain `cargo build` would fail or, worse, abort on panic
+/// everywhere; if it contained the Python package, it would need an interpreter.
 #[test]
 fn only_the_freestanding_program_and_the_python_package_stay_out_of_the_default_build() {
     let metadata = metadata();
@@ -214,7 +246,7 @@ fn only_the_freestanding_program_and_the_python_package_stay_out_of_the_default_
 }
 
 #[test]
-fn every_crate_takes_the_lints_of_the_workspace() {
+fn every_crate_uses_the_workspace_lints() {
     let metadata = metadata();
     let packages = metadata["packages"].as_array().expect("packages").iter();
     for package in packages.filter(|p| p["name"] != "supple-workspace") {
@@ -240,10 +272,14 @@ fn core_and_protocol_have_neither_std_nor_unsafe_code() {
 }
 
 #[test]
-fn links_of_the_documents_lead_somewhere() {
-    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
-    for document in ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md"] {
-        let text = std::fs::read_to_string(root.join(document)).expect("a root document");
+fn links_in_the_documents_have_targets() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let documents = ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md"].map(|name| root.join(name));
+    let pages = std::fs::read_dir(root.join("docs")).expect("a folder");
+    let pages = pages.map(|page| page.expect("an entry").path());
+    for path in documents.into_iter().chain(pages) {
+        let (document, folder) = (path.display(), path.parent().expect("a folder"));
+        let text = std::fs::read_to_string(&path).expect("a document");
         for link in text.split("](").skip(1) {
             let target = link.split(')').next().expect("text before the bracket");
             match target.strip_prefix('#') {
@@ -253,13 +289,13 @@ fn links_of_the_documents_lead_somewhere() {
                     "{document} has no heading for #{anchor}"
                 ),
                 None if target.contains("://") => {}
-                None => assert!(root.join(target).exists(), "{document} -> {target}"),
+                None => assert!(folder.join(target).exists(), "{document} -> {target}"),
             }
         }
     }
 }
 
-/// Anchor that a heading gets: its words in small letters, joined by hyphens.
+/// Anchor of a heading: its words in lower case, joined by hyphens.
 fn heading_anchor(line: &str) -> Option<String> {
     let words = line.strip_prefix('#')?.trim_start_matches('#').trim();
     let anchor = words.to_lowercase().replace(' ', "-");

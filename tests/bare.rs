@@ -1,17 +1,17 @@
-//! The freestanding program: it links without std, allocator and C library, computes what a hosted
-//! build computes, to the bit, and stops linking as soon as something allocates.
+//! The freestanding program: it links without std, allocator and C library, computes the same results as a hosted
+//! build, bit for bit, and fails to link if anything allocates.
 
 use std::env;
 use std::path::PathBuf;
 use std::process::{Command, Output};
 
-/// Apart from the outer build's folder, whose lock that build may hold.
+/// Separate from the target folder of the outer build, which may hold the lock of that folder.
 const TARGET_DIR: &str = concat!(env!("CARGO_TARGET_TMPDIR"), "/bare");
 const CORTEX_M: &str = "thumbv7em-none-eabihf";
-/// Builds the core library from source; a stable compiler has to be told that it may.
+/// Builds the core library from source; a stable compiler needs RUSTC_BOOTSTRAP for this.
 const BUILD_CORE: &str = "-Zbuild-std=core";
 
-/// Builds the program with `features`; `arguments` go to cargo as they are.
+/// Builds the program with `features`; `arguments` are passed to cargo.
 fn build(features: &str, arguments: &[&str]) -> Output {
     let mut cargo = Command::new(env!("CARGO"));
     if arguments.contains(&BUILD_CORE) {
@@ -28,7 +28,7 @@ fn build(features: &str, arguments: &[&str]) -> Output {
         .expect("cargo starts")
 }
 
-/// Path of the program, in cargo's folder for `target` (empty: the host's).
+/// Builds the program; returns its path in cargo's folder for `target` (empty: the host).
 fn program(target: &str, arguments: &[&str]) -> PathBuf {
     let built = build("freestanding", arguments);
     assert!(built.status.success(), "{}", text(&built.stderr));
@@ -58,7 +58,7 @@ fn hosted() -> String {
     not(all(target_arch = "x86_64", target_os = "linux")),
     ignore = "the freestanding program is written for Linux on x86-64"
 )]
-fn prints_the_bits_of_a_hosted_build() {
+fn prints_the_same_bits_as_a_hosted_build() {
     let output = Command::new(program("", &[])).output().expect("it starts");
     assert!(output.status.success(), "{output:?}");
     assert_eq!(text(&output.stdout), hosted());
@@ -69,7 +69,7 @@ fn prints_the_bits_of_a_hosted_build() {
     not(all(target_arch = "x86_64", target_os = "linux")),
     ignore = "the freestanding program is written for Linux on x86-64"
 )]
-fn asks_for_no_loader_and_no_library() {
+fn needs_no_loader_and_no_shared_library() {
     const DYNAMIC: u32 = 2;
     const INTERPRETER: u32 = 3;
     let elf = std::fs::read(program("", &[])).expect("the program is readable");
@@ -94,7 +94,7 @@ fn asks_for_no_loader_and_no_library() {
     not(all(target_arch = "x86_64", target_os = "linux")),
     ignore = "the freestanding program is written for Linux on x86-64"
 )]
-fn one_allocation_and_it_does_not_build() {
+fn one_allocation_makes_the_build_fail() {
     let built = build("freestanding,negative-control", &[]);
     assert!(!built.status.success(), "an allocation went unnoticed");
     let stderr = text(&built.stderr);
@@ -107,8 +107,8 @@ fn one_allocation_and_it_does_not_build() {
     );
 }
 
-/// With `SUPPLE_BUILD_STD` set, the core library is built from its source, where no built one can be
-/// installed.
+/// With `SUPPLE_BUILD_STD` set, the core library is built from source, for machines on which the prebuilt one cannot
+/// be installed.
 #[test]
 #[ignore = "needs the thumbv7em-none-eabihf target and QEMU: ./ci.sh cortex-m"]
 fn prints_the_same_bits_on_a_cortex_m4() {

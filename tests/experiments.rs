@@ -1,4 +1,4 @@
-//! The paper's experiments as contracts: what must come out, whatever the seed.
+//! Required results of the paper's experiments, for any seed.
 
 use supple_core::Trajectory;
 use supple_core::controller::Mode;
@@ -62,7 +62,7 @@ fn probing(variant: &Variant, stiffness_n_per_m: f64) -> Stroke {
     median_stroke(&meter.finish())
 }
 
-/// `f` of every item, two at a time.
+/// Applies `f` to every item on two threads.
 fn side_by_side<I: Sync, O: Send>(items: &[I], f: impl Fn(&I) -> O + Sync) -> Vec<O> {
     let (front, back) = items.split_at(items.len() / 2);
     std::thread::scope(|scope| {
@@ -74,7 +74,7 @@ fn side_by_side<I: Sync, O: Send>(items: &[I], f: impl Fn(&I) -> O + Sync) -> Ve
 }
 
 #[test]
-fn five_newtons_a_metre_follow_the_sinusoid_with_models_that_are_off() {
+fn perturbed_models_track_the_sinusoid_at_5_n_per_m() {
     let seeds: Vec<u64> = (0..10).collect();
     let runs = side_by_side(&seeds, |seed| sinusoid(&perturbed(*seed)));
     for (seed, run) in runs.iter().enumerate() {
@@ -93,7 +93,7 @@ fn five_newtons_a_metre_follow_the_sinusoid_with_models_that_are_off() {
 }
 
 #[test]
-fn a_perturbed_model_is_off_by_what_it_says() {
+fn a_perturbed_model_has_the_stated_error() {
     let setup = wam4();
     let exact = setup.config(&Variant::EXACT).expect("sound").arm;
     for seed in 0..10 {
@@ -107,13 +107,13 @@ fn a_perturbed_model_is_off_by_what_it_says() {
             whole += a.norm_squared();
         }
         let relative = (difference / whole).sqrt();
-        // Signs are mixed: parts of it cancel.
+        // The signs are mixed, so the errors partly cancel.
         assert!((1e-4..2e-3).contains(&relative), "seed {seed}: {relative}");
     }
 }
 
 #[test]
-fn an_exact_model_follows_better() {
+fn an_exact_model_tracks_better() {
     let exact = |stribeck| {
         sinusoid(&Variant {
             stribeck,
@@ -126,7 +126,7 @@ fn an_exact_model_follows_better() {
 }
 
 #[test]
-fn the_letter_of_the_law_runs_away_and_the_supervisor_ends_it() {
+fn the_law_as_printed_diverges_and_ends_in_a_fault() {
     let run = sinusoid(&Variant {
         paper_letter: true,
         stribeck: false,
@@ -138,7 +138,7 @@ fn the_letter_of_the_law_runs_away_and_the_supervisor_ends_it() {
 }
 
 #[test]
-fn the_first_transient_does_not_depend_on_stiffness_and_the_impulse_does() {
+fn the_impulse_depends_on_stiffness_and_the_first_transient_does_not() {
     let stiffness = &scenario::PROBING_STIFFNESS_N_PER_M[1..];
     let strokes = side_by_side(stiffness, |k| probing(&Variant::EXACT, *k));
     let peaks: Vec<f64> = strokes.iter().map(|s| s.peak_filtered_n).collect();
@@ -174,7 +174,7 @@ fn the_first_transient_does_not_depend_on_stiffness_and_the_impulse_does() {
 }
 
 #[test]
-fn left_on_the_friction_feed_forward_becomes_the_contact_force() {
+fn without_fading_the_friction_feed_forward_becomes_contact_force() {
     let faded = probing(&Variant::EXACT, 5.0);
     let left_on = probing(
         &Variant {
@@ -193,7 +193,7 @@ fn left_on_the_friction_feed_forward_becomes_the_contact_force() {
 }
 
 #[test]
-fn the_error_of_a_corner_dies_out_along_the_edge() {
+fn the_error_after_a_corner_decays_along_the_edge() {
     let setup = wam4();
     let (quadrant, duration_s) = scenario::quadrant(scenario::QUADRANT_SPEED_M_PER_S);
     let trajectory = Trajectory::Quadrant(quadrant);
@@ -220,7 +220,7 @@ fn the_error_of_a_corner_dies_out_along_the_edge() {
 }
 
 #[test]
-fn reruns_give_the_same_bits() {
+fn reruns_are_bit_identical() {
     let torques = || {
         let setup = wam4();
         let (trajectory, _) = scenario::sinusoid(1.0);
@@ -239,7 +239,7 @@ fn reruns_give_the_same_bits() {
 }
 
 #[test]
-fn no_contact_is_seen_in_free_motion() {
+fn no_contact_is_detected_in_free_motion() {
     for (trajectory, duration_s) in [scenario::sinusoid(1.0), scenario::arc()] {
         for seed in [0, 4] {
             let plan = plan(&wam4(), &perturbed(seed), trajectory, duration_s);
@@ -257,18 +257,18 @@ fn no_contact_is_seen_in_free_motion() {
 }
 
 #[test]
-fn what_cannot_be_reached_is_refused_with_point_and_distance() {
+fn an_unreachable_point_is_rejected_with_point_and_distance() {
     let setup = wam4();
     let trajectory = Trajectory::Hold([1.5, 0.0, 0.0].into());
     let plan = plan(&setup, &Variant::EXACT, trajectory, 1.0);
     let error = run(&plan, &mut |_, _| Ok(())).expect_err("out of reach");
-    assert!(matches!(error, ExperimentError::Unreachable { .. }));
+    assert!(matches!(error, ExperimentError::BeyondJointStop { .. }));
     let text = error.to_string();
     assert!(text.contains("1.500") && text.contains("test"), "{text}");
 }
 
 #[test]
-fn the_way_to_the_start_is_gravity_hold_and_a_move() {
+fn a_run_starts_with_gravity_hold_and_a_move() {
     let (trajectory, _) = scenario::sinusoid(1.0);
     let plan = plan(&wam4(), &perturbed(2), trajectory, 0.5);
     let mut modes = Vec::new();

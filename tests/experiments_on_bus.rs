@@ -1,10 +1,11 @@
-//! The paper's experiments through every process there is, in virtual time, beside the same in one process:
-//! controller, shared memory, bus, pucks and the arm on the one side, controller and plant on the other.
+//! Compares the paper's experiments through all processes in virtual time (controller, shared memory, bus,
+//! pucks, arm) with the same experiments in one process (controller and plant).
 //!
-//! What differs, and the bounds that it explains: the bus reads encoders and applies torques some 0.7 ms apart
-//! where one process has a whole cycle of delay; counts and torque units are the pucks' own; motors and
-//! encoders act on the physics' grid of 0.2 ms instead of 1 ms. None of it is seen in slow free motion beyond
-//! a fraction of a millimetre; the force of an impact of a few milliseconds is sampled once in each.
+//! Differences between the two, which explain the tolerances: on the bus encoders are read and torques applied
+//! some 0.7 ms apart, while one process has a whole cycle of delay; counts and torque units are those of the
+//! pucks; motors and encoders act on the physics' grid of 0.2 ms instead of 1 ms. In slow free motion these
+//! differences cause at most a fraction of a millimetre; the force of an impact of a few milliseconds is sampled
+//! once per millisecond.
 
 mod support;
 
@@ -18,39 +19,39 @@ use supple_model::Description;
 use supple_plant::Scene;
 use support::programs;
 
-/// From power-up to tracking in `supple up --plant emu`, and something of the trajectory \[s\].
+/// Duration from power-up to tracking in `supple up --plant emu`, and a part of the trajectory \[s\].
 const TRACKED_S: &str = "16";
-/// The same with the first stroke down to the block.
+/// Duration up to and including the first stroke down to the block \[s\].
 const PROBE_S: &str = "10";
-/// Most of the difference between the two RMS errors \[m\].
-const RMS_M: f64 = 3e-4;
-/// Most of the difference between the first transients, as a share of the one in one process.
-/// Of it only one sample a millisecond is seen there; and the speed at which an arm on 5 N/m meets the block depends on
-/// where in the stroke's friction it began: on the bus it comes from a move, in one process it stands at its start.
-const TRANSIENT_SHARE: f64 = 0.2;
-/// Most of the difference between the forces at rest \[N\]. The same controller leaves the same of its dry friction;
-/// one that knew the plant's breakaway would rest with 0.3 N more.
-const REST_N: f64 = 0.05;
+/// Maximum difference between the two RMS errors \[m\].
+const MAX_RMS_DIFFERENCE_M: f64 = 3e-4;
+/// Maximum difference between the first transients, as a fraction of the one in one process. The bus samples the
+/// force only once per millisecond, and the impact speed at 5 N/m depends on the friction state at the start of
+/// the stroke: on the bus the arm comes from a move, in one process it starts at rest.
+const TRANSIENT_FRACTION: f64 = 0.2;
+/// Maximum difference between the forces at rest \[N\]. The same controller leaves the same residual dry
+/// friction; one that knew the plant's breakaway would rest with 0.3 N more.
+const MAX_REST_DIFFERENCE_N: f64 = 0.05;
 /// Window of the first transient \[ms\].
 const TRANSIENT_MS: usize = 50;
 
-/// The summary of a run on the emulated arm, and its trace as vertical forces, one a millisecond.
+/// Summary of a run on the emulated arm, and the vertical forces of its trace, one per millisecond.
 fn on_the_bus(arguments: &[&str]) -> (Value, Vec<f64>) {
-    let place = tempfile::tempdir().expect("a folder");
+    let folder = tempfile::tempdir().expect("a folder");
     let owner = std::fs::Permissions::from_mode(0o700);
-    std::fs::set_permissions(place.path(), owner).expect("changed");
+    std::fs::set_permissions(folder.path(), owner).expect("changed");
     let always = "up --plant emu --virtual-time --no-log --json --trace trace.csv";
     let output = Command::new(programs().join("supple"))
         .args(always.split(' '))
         .args(arguments)
-        .current_dir(place.path())
-        .env("XDG_RUNTIME_DIR", place.path())
+        .current_dir(folder.path())
+        .env("XDG_RUNTIME_DIR", folder.path())
         .output()
         .expect("it runs");
-    let words = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{words}");
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{stderr}");
     let summary = serde_json::from_slice(&output.stdout).expect("JSON");
-    let trace = std::fs::read_to_string(place.path().join("trace.csv")).expect("a trace");
+    let trace = std::fs::read_to_string(folder.path().join("trace.csv")).expect("a trace");
     let mut lines = trace
         .lines()
         .map(|line| line.split(',').collect::<Vec<_>>());
@@ -61,14 +62,14 @@ fn on_the_bus(arguments: &[&str]) -> (Value, Vec<f64>) {
     (summary, forces.collect())
 }
 
-/// The same in one process: RMS error, and vertical forces, one a cycle.
+/// RMS error and vertical forces, one per cycle, of the same run in one process.
 fn in_one_process(trajectory: Trajectory, duration_s: f64, scene: Scene) -> (f64, Vec<f64>) {
     let description = Description::asset("wam4").expect("built in");
-    let setup = Setup::<4>::new(&description, 0).expect("sound");
+    let setup = Setup::<4>::new(&description, 0).expect("valid");
     let plan = Plan {
         name: "beside the bus".to_owned(),
-        // What an arm is described as: it does not say by how much breakaway is above Coulomb friction.
-        config: description.config().expect("sound"),
+        // Configuration from the description, which does not specify how far breakaway exceeds Coulomb friction.
+        config: description.config().expect("valid"),
         plant: setup.plant(&Variant::EXACT, scene),
         trajectory,
         duration_s,
@@ -83,50 +84,53 @@ fn in_one_process(trajectory: Trajectory, duration_s: f64, scene: Scene) -> (f64
     (run.rms_error_m, forces)
 }
 
-/// The RMS errors of a course on the bus and in one process, over the same stretch of it.
-fn tracked_as_in_one_process(course: &str, trajectory: Trajectory) {
-    let (summary, _) = on_the_bus(&["--track", course, "--for", TRACKED_S]);
+/// Compares the RMS errors of a trajectory on the bus and in one process, over the same part of it.
+fn assert_same_tracking_error(trajectory_name: &str, trajectory: Trajectory) {
+    let (summary, _) = on_the_bus(&["--track", trajectory_name, "--for", TRACKED_S]);
     let on_bus_m = summary["rms_error_m"].as_f64().expect("it tracked");
     let cycles = summary["tracked_cycles"].as_u64().expect("it tracked");
     assert!(cycles > 6000, "{summary}");
     let (alone_m, _) = in_one_process(trajectory, cycles as f64 * 1e-3, Scene::default());
-    println!("RMS error of {course}: {on_bus_m} m on the bus, {alone_m} m in one process");
-    assert!((on_bus_m - alone_m).abs() < RMS_M, "{on_bus_m} {alone_m}");
+    println!("RMS error of {trajectory_name}: {on_bus_m} m on the bus, {alone_m} m in one process");
+    assert!(
+        (on_bus_m - alone_m).abs() < MAX_RMS_DIFFERENCE_M,
+        "{on_bus_m} {alone_m}"
+    );
 }
 
 #[test]
-fn the_sinusoid_is_tracked_as_in_one_process() {
+fn the_sinusoid_tracking_error_matches_one_process() {
     let (trajectory, _) = scenario::sinusoid(1.0);
-    tracked_as_in_one_process("sinusoid", trajectory);
+    assert_same_tracking_error("sinusoid", trajectory);
 }
 
 #[test]
-fn the_arc_is_tracked_as_in_one_process() {
+fn the_arc_tracking_error_matches_one_process() {
     let (trajectory, _) = scenario::arc();
-    tracked_as_in_one_process("arc", trajectory);
+    assert_same_tracking_error("arc", trajectory);
 }
 
 #[test]
-fn the_quadrant_is_tracked_as_in_one_process() {
+fn the_quadrant_tracking_error_matches_one_process() {
     let (quadrant, _) = scenario::quadrant(scenario::QUADRANT_SPEED_M_PER_S);
-    tracked_as_in_one_process("quadrant", Trajectory::Quadrant(quadrant));
+    assert_same_tracking_error("quadrant", Trajectory::Quadrant(quadrant));
 }
 
-/// Greatest force of the first transient, and the mean at rest before the stroke turns \[N\].
+/// Maximum force of the first transient, and mean force at rest before the stroke reverses \[N\].
 fn contact(forces: &[f64], probe: &Probe) -> (f64, f64) {
     let touch = forces.iter().position(|force| *force > 0.0);
-    let touch = touch.expect("the block is met");
+    let touch = touch.expect("contact with the block");
     let transient = &forces[touch..touch + TRANSIENT_MS];
     let peak_n = transient.iter().copied().fold(0.0, f64::max);
-    // The cap meets the face 0.06 m into a stroke of 0.1 m: what is left of it, less a margin.
+    // The cap meets the face 0.06 m into a stroke of 0.1 m: the remaining time, less a margin.
     let stroke_s = probe.stroke_m / probe.speed_m_per_s;
-    let left = (0.4 * stroke_s * 1e3) as usize;
-    let rest = &forces[touch + left - 300..touch + left];
+    let remaining = (0.4 * stroke_s * 1e3) as usize;
+    let rest = &forces[touch + remaining - 300..touch + remaining];
     (peak_n, rest.iter().sum::<f64>() / rest.len() as f64)
 }
 
 #[test]
-fn the_block_is_met_and_rested_on_as_in_one_process() {
+fn contact_forces_match_those_in_one_process() {
     let (summary, forces) = on_the_bus(&["--track", "probe", "--block-m", "0", "--for", PROBE_S]);
     assert_eq!(summary["faults"], Value::Array(Vec::new()));
     let radius_m = Description::asset("wam4").expect("built in").tool();
@@ -134,18 +138,18 @@ fn the_block_is_met_and_rested_on_as_in_one_process() {
     let (probe, _) = scenario::probe(radius_m);
     assert_eq!(probe.phase_at(0.0).0, ProbePhase::Down);
     let trajectory = Trajectory::Probe(probe);
-    let (_, alone) = in_one_process(trajectory, 3.0, Scene::beneath(0.0));
+    let (_, alone) = in_one_process(trajectory, 3.0, Scene::with_block_at(0.0));
     let ((peak_n, rest_n), (alone_peak_n, alone_rest_n)) =
         (contact(&forces, &probe), contact(&alone, &probe));
     println!("first transient: {peak_n} N on the bus, {alone_peak_n} N in one process");
     println!("at rest: {rest_n} N on the bus, {alone_rest_n} N in one process");
     let difference = (peak_n - alone_peak_n).abs();
     assert!(
-        difference < TRANSIENT_SHARE * alone_peak_n,
+        difference < TRANSIENT_FRACTION * alone_peak_n,
         "{peak_n} {alone_peak_n}"
     );
     assert!(
-        (rest_n - alone_rest_n).abs() < REST_N,
+        (rest_n - alone_rest_n).abs() < MAX_REST_DIFFERENCE_N,
         "{rest_n} {alone_rest_n}"
     );
 }

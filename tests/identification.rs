@@ -1,13 +1,13 @@
-//! Identification closed over the simulated arm: what is found is held against the plant, and followed at
-//! 5 N/m. Nothing of the plant is known to the fit but what the arm logs.
+//! Closed-loop identification of the simulated arm: the result is compared with the plant and used to track at
+//! 5 N/m. The fit uses only what the arm logs.
 
 use nalgebra::DMatrix;
 use supple_core::Vector;
 use supple_core::dynamics::gravity;
 use supple_experiment::calibrate::{plant_of, preparation};
 use supple_experiment::{
-    Calibrated, Calibration, Plan, Tracking, breakaway, calibrate, foretell, ripple_on, run,
-    scenario, tracking,
+    Calibrated, Calibration, IdentifiedModelTracking, Plan, breakaway, calibrate, identify_ripple,
+    predict_tracking_error, run, scenario, track_with_identified_model,
 };
 use supple_ident::{Learning, Log, Motion, learn};
 use supple_model::Description;
@@ -22,10 +22,10 @@ fn found(calibration: &Calibration) -> Calibrated<4> {
     calibrate::<4>(&wam4(), calibration, &mut |_| {}).expect("it is calibrated")
 }
 
-/// The sinusoid with the model that was found, on the plant that it was found on.
-fn sinusoid(found: &Calibrated<4>, calibration: &Calibration) -> Tracking {
+/// Tracks the sinusoid with the identified model on the plant that it was identified on.
+fn sinusoid(found: &Calibrated<4>, calibration: &Calibration) -> IdentifiedModelTracking {
     let plant = plant_of::<4>(&wam4(), calibration).expect("four joints");
-    tracking(&found.description, &plant)
+    track_with_identified_model(&found.description, &plant)
         .expect("the sinusoid runs")
         .expect("the arm reaches it")
 }
@@ -40,7 +40,7 @@ fn side_by_side<O: Send>(seeds: u64, f: impl Fn(u64) -> O + Sync) -> Vec<O> {
 }
 
 #[test]
-fn an_arm_is_found_well_enough_for_five_newtons_a_metre() {
+fn the_identified_model_is_accurate_enough_for_5_n_per_m() {
     let results = side_by_side(SEEDS, |seed| {
         let calibration = Calibration::new(seed);
         let found = found(&calibration);
@@ -58,7 +58,7 @@ fn an_arm_is_found_well_enough_for_five_newtons_a_metre() {
         )
     });
     for (truth, breakaway, positive_definite, errors) in results {
-        // The dip is not hidden by how the bristles turn round, nor by the law's band.
+        // Neither the reversal of the bristles nor the law's band hides the Stribeck effect.
         assert!(
             breakaway.iter().all(|ratio| (ratio - 1.0).abs() < 0.02),
             "{breakaway:?}"
@@ -78,7 +78,7 @@ fn an_arm_is_found_well_enough_for_five_newtons_a_metre() {
 
 /// Ripple of 0.3 N m at each joint, identified from runs at constant speed.
 #[test]
-fn ripple_is_found_and_compensated() {
+fn ripple_is_identified_and_compensated() {
     let errors = side_by_side(SEEDS, |seed| {
         let calibration = Calibration {
             ripple_nm: 0.3,
@@ -92,7 +92,7 @@ fn ripple_is_found_and_compensated() {
                 .all(|table| !table.harmonics().is_empty())
         );
         let with = sinusoid(&found, &calibration);
-        // What it costs where it is not compensated is told by a few.
+        // The cost without compensation is measured for a few seeds only.
         let without = (seed < 2).then(|| {
             let mut without = found.clone();
             let model = without
@@ -119,7 +119,7 @@ fn ripple_is_found_and_compensated() {
 }
 
 #[test]
-fn friction_that_depends_on_load_costs_little() {
+fn load_dependent_friction_increases_the_error_little() {
     let calibration = Calibration {
         load: true,
         ..Calibration::new(3)
@@ -131,14 +131,14 @@ fn friction_that_depends_on_load_costs_little() {
 }
 
 #[test]
-fn breakaway_is_that_of_the_plant() {
+fn measured_breakaway_torque_matches_the_plant() {
     let calibration = Calibration::new(0);
     let description = wam4();
     let config = description.config::<4>().expect("four joints");
     let off = calibration.start.apply(&config).expect("an arm");
     let plant = plant_of::<4>(&description, &calibration).expect("four joints");
     let pose = [0.0, 0.3, 0.0, 0.5].into();
-    let found = breakaway(&off, &plant, &pose, &[1, 3], &mut |_| {}).expect("both give way");
+    let found = breakaway(&off, &plant, &pose, &[1, 3], &mut |_| {}).expect("both slide");
     for (joint, found) in [1, 3].into_iter().zip(found) {
         let truth = plant.friction[joint].breakaway_nm;
         let relative = found.breakaway_nm() / truth - 1.0;
@@ -146,7 +146,7 @@ fn breakaway_is_that_of_the_plant() {
             relative.abs() < 0.08,
             "joint {joint}: {found:?} against {truth}"
         );
-        // What differs between the directions is what the model lacks of gravity.
+        // The difference between the directions is the error of the gravity model.
         let lacking_nm = (gravity(&config.arm, &pose) - gravity(&off.arm, &pose))[joint];
         let offset_nm = found.offset_nm();
         assert!(
@@ -156,9 +156,9 @@ fn breakaway_is_that_of_the_plant() {
     }
 }
 
-/// With 0.3 N m of ripple at each joint: the table comes from slow motion, before any model is known.
+/// With 0.3 N m of ripple at each joint; the table is identified from slow motion before any model.
 #[test]
-fn breakaway_is_seen_through_ripple_that_is_compensated() {
+fn ripple_compensation_improves_the_breakaway_measurement() {
     let calibration = Calibration {
         ripple_nm: 0.3,
         ..Calibration::new(0)
@@ -169,10 +169,10 @@ fn breakaway_is_seen_through_ripple_that_is_compensated() {
     let plant = plant_of::<4>(&description, &calibration).expect("four joints");
     let home = description.home::<4>().expect("four joints");
     let mut compensated = off;
-    compensated.ripple = ripple_on(&off, &plant, &home).expect("ripple");
+    compensated.ripple = identify_ripple(&off, &plant, &home).expect("ripple");
     let pose = [0.0, 0.3, 0.0, 0.5].into();
     let error_nm = |config| {
-        let found = breakaway(config, &plant, &pose, &[1, 3], &mut |_| {}).expect("both give way");
+        let found = breakaway(config, &plant, &pose, &[1, 3], &mut |_| {}).expect("both slide");
         let errors = [1, 3].into_iter().zip(found);
         errors
             .map(|(joint, found)| (found.breakaway_nm() - plant.friction[joint].breakaway_nm).abs())
@@ -192,26 +192,26 @@ fn breakaway_is_seen_through_ripple_that_is_compensated() {
 }
 
 #[test]
-fn what_a_fit_foretells_holds() {
+fn predicted_tracking_error_bounds_the_measured_one() {
     let calibration = Calibration::new(2);
     let found = found(&calibration);
-    let foretold = foretell(&found.description, &found.fit, 3)
+    let predicted = predict_tracking_error(&found.description, &found.fit, 3)
         .expect("it runs")
         .expect("the arm reaches the sinusoid");
-    let real = sinusoid(&found, &calibration).stribeck_m;
+    let measured = sinusoid(&found, &calibration).stribeck_m;
     assert!(
-        foretold.verdict().starts_with("good for 5 N/m"),
-        "{foretold:?}"
+        predicted.verdict().starts_with("good for 5 N/m"),
+        "{predicted:?}"
     );
     assert!(
-        real <= 2.0 * foretold.worst_m,
-        "{real} m against {foretold:?}"
+        measured <= 2.0 * predicted.worst_m,
+        "{measured} m against {predicted:?}"
     );
 }
 
-/// Friction a tenth too small in every joint; learnt from each period's prediction error alone.
+/// Friction is 10 % too small in every joint and is learnt from each period's prediction error only.
 #[test]
-fn a_tenth_of_friction_is_learnt_within_four_periods() {
+fn a_friction_error_of_10_percent_is_learnt_within_four_periods() {
     let description = wam4();
     let plant = plant_of::<4>(&description, &Calibration::new(0)).expect("four joints");
     let mut config = description.config::<4>().expect("four joints");

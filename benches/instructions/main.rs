@@ -1,10 +1,9 @@
-//! Instructions of each function on one state, counted by Valgrind, against committed limits: a gate that
-//! does not depend on the machine's mood. `./ci.sh instructions`.
+//! Instruction counts of each function on one state (Valgrind), checked against committed limits; independent
+//! of the load of the machine. `./ci.sh instructions`.
 //!
-//! A limit is about a tenth above what was counted with the toolchain of `rust-toolchain.toml`, for the
-//! processor that a build without flags is for. Lower it when the function gets quicker; raise it with the
-//! reason in the commit message.
-#![allow(missing_docs, reason = "of what the macros make")]
+//! A limit is about 10 % above the count with the toolchain of `rust-toolchain.toml` for the default target
+//! processor. Lower it when the function gets faster; raise it with the reason in the commit message.
+#![allow(missing_docs, reason = "in code that the macros generate")]
 #![allow(
     clippy::disallowed_methods,
     reason = "the harness ends the process itself"
@@ -19,7 +18,7 @@ use supple_core::dynamics::{self, Terms};
 use supple_core::operational::{pose_torque, position_torque};
 use supple_core::{Arm, Vector};
 
-/// One call, its inputs and outputs hidden from the compiler.
+/// One call, with inputs and outputs hidden from the compiler.
 type Call = Box<dyn FnMut()>;
 
 fn call<const N: usize, T>(
@@ -134,13 +133,13 @@ fn limit(instructions: u64) -> LibraryBenchmarkConfig {
 #[bench::jdot_qd_7(args = (jdot_qd::<7>("wam7")), config = limit(3_400))]
 #[bench::regressor_3(args = (regressor::<3>("wam3")), config = limit(4_600))]
 #[bench::regressor_4(args = (regressor::<4>("wam4")), config = limit(5_100))]
-// 11,800, or 3,100 more where the compiler clears 3,920 bytes by a memset, which is counted byte by byte.
+// 11,800, or 3,100 more if the compiler clears 3,920 bytes by a memset, which is counted byte by byte.
 #[bench::regressor_7(args = (regressor::<7>("wam7")), config = limit(16_400))]
 #[bench::terms_3(args = (terms::<3>("wam3")), config = limit(3_800))]
 #[bench::terms_4(args = (terms::<4>("wam4")), config = limit(3_950))]
 #[bench::terms_7(args = (terms::<7>("wam7")), config = limit(9_950))]
 #[bench::law_3_regular(args = (regular_law::<3>("wam3")), config = limit(2_750))]
-// Near a singular pose, where three joints take the longer way.
+// Near a singular pose, where the law for three joints takes the longer code path.
 #[bench::law_3(args = (position_law::<3>("wam3")), config = limit(5_200))]
 #[bench::law_4(args = (position_law::<4>("wam4")), config = limit(4_450))]
 #[bench::law_7(args = (pose_law::<7>("wam7")), config = limit(14_150))]

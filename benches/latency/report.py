@@ -1,16 +1,16 @@
-"""RESULTS.md and results.json from what `run.py` measured."""
+"""Writes RESULTS.md and results.json from the measurements of `run.py`."""
 
 import collections
 import statistics
 
 SHARES = {"p50": 0.50, "p99": 0.99, "p999": 0.999}
-# Greatest ratios asked for.
-ASKED_WAKE = {"p99": 1.5}
-ASKED_ROUND_TRIP = {"p50": 1.5, "p99": 2.0}
+# Maximum ratios (targets).
+WAKE_TARGETS = {"p99": 1.5}
+ROUND_TRIP_TARGETS = {"p50": 1.5, "p99": 2.0}
 
 
 def percentiles(histogram):
-    """Percentiles and the greatest value of {value: count}."""
+    """Percentiles and maximum of {value: count}."""
     found, total, seen = {}, sum(histogram.values()), 0
     for value in sorted(histogram):
         seen += histogram[value]
@@ -39,7 +39,7 @@ class Round:
 
 
 def ratio(pairs, name):
-    """Median over the rounds of ours over the other's; a wake-up within the same microsecond counts as one."""
+    """Median over the rounds of our time divided by the peer's; times below 1 us count as 1 us."""
     return statistics.median(max(ours[name], 1) / max(other[name], 1) for ours, other in pairs)
 
 
@@ -48,20 +48,20 @@ def row(label, found):
     return f"| {label} | " + " | ".join(cells) + f" | {max(times['max'] for times in found):g} |"
 
 
-def comparison(pairs, label, asked):
+def comparison(pairs, label, targets):
     cells = []
     for name in SHARES:
         found = ratio(pairs, name)
         text = f"{found:.2f}"
-        if name in asked:
-            text = f"**{text}**" if found > asked[name] else text
-            text += f" ({asked[name]})"
+        if name in targets:
+            text = f"**{text}**" if found > targets[name] else text
+            text += f" ({targets[name]})"
         cells.append(text)
     return f"| {label} | " + " | ".join(cells) + " | |"
 
 
 def octaves(histogram):
-    """Share of the times in [1, 2), [2, 4), ... us; what is below 1 us is in the first."""
+    """Fraction of the times in [1, 2), [2, 4), ... us; times below 1 us are in the first."""
     found = collections.Counter()
     for value, count in histogram.items():
         found[max(int(value), 1).bit_length() - 1] += count
@@ -82,8 +82,9 @@ def histogram_table(columns):
         yield f"| {2**octave} to {2 ** (octave + 1)} | " + " | ".join(cells) + " |"
 
 
-def section(rounds, kind, asked):
-    """Table of percentiles, ratios and histogram of one kind of time; what is asked holds beside the first peer."""
+def section(rounds, kind, targets):
+    """Table of percentiles, ratios and histogram of one kind of time; the targets apply to the first
+    peer."""
     found = [getattr(each, kind) for each in rounds]
     raw = [getattr(each, f"{kind}_us") for each in rounds]
     names = list(found[0])
@@ -93,40 +94,40 @@ def section(rounds, kind, asked):
         yield row(name, [each[name] for each in found])
     for number, peer in enumerate(names[1:]):
         pairs = [(each["system"], each[peer]) for each in found]
-        label = f"system / {peer}" + (" (asked)" if number == 0 else "")
-        yield comparison(pairs, label, asked if number == 0 else {})
+        label = f"system / {peer}" + (" (target)" if number == 0 else "")
+        yield comparison(pairs, label, targets if number == 0 else {})
     yield ""
     yield from histogram_table({name: [each[name] for each in raw] for name in names})
 
 
 def lines(machine, rounds, seconds):
     return [
-        "# Wake-up and answer",
+        "# Wake-up and reply",
         "",
         f"Written by `benches/latency/run.sh`; do not edit. {len(rounds)} rounds of {seconds} s each for the system,",
-        "cyclictest, the echo and the messages alone, in turn, all at 1 kHz on one core. Percentiles are medians",
-        "over the rounds, max the greatest of all; a ratio is the median over the rounds of ours over the other's in the same round, **bold**",
-        "where it is above what is asked for. The host decides the tail of a virtual machine, and the load beside it:",
-        "only the ratios are worth comparing.",
+        "cyclictest, the echo and the messages alone, alternating, all at 1 kHz on one core. Percentiles are medians",
+        "over the rounds, max is the maximum of all rounds; a ratio is the median over the rounds of the system's time",
+        "divided by the peer's in the same round, **bold** if it exceeds its target. On a virtual machine the host and",
+        "its load determine the tail: compare only the ratios.",
         "",
         *(f"- {key}: {value}" for key, value in machine.items()),
-        f"- cycles of the system without an answer in time: {sum(each.missed for each in rounds)} of "
+        f"- cycles of the system without a reply in time: {sum(each.missed for each in rounds)} of "
         f"{len(rounds) * seconds * 1000}",
         "",
         "## Wake-up",
         "",
-        "From when a cycle was due to when it began: `supple-sim`, which sets its timer to 50 us before and then",
-        "watches the clock, beside cyclictest, which does not.",
+        "Delay from the due time to the start of a cycle: `supple-sim`, which sets its timer 50 us early and then",
+        "polls the clock, compared with cyclictest, which does not.",
         "",
-        *section(rounds, "wake", ASKED_WAKE),
+        *section(rounds, "wake", WAKE_TARGETS),
         "",
         "## State published to command received",
         "",
-        "`supple-sim` and `supple-rt` in gravity hold, the controller's step included, beside two processes that do",
-        "nothing but exchange Unix datagrams of the same sizes (echo), and beside two that exchange the system's own",
-        "messages through shared memory and compute nothing (messages alone).",
+        "`supple-sim` and `supple-rt` in gravity hold, the controller's step included, compared with two processes that",
+        "only exchange Unix datagrams of the same sizes (echo), and with two that exchange the system's own messages",
+        "through shared memory without any computation (messages alone).",
         "",
-        *section(rounds, "round_trip", ASKED_ROUND_TRIP),
+        *section(rounds, "round_trip", ROUND_TRIP_TARGETS),
     ]
 
 

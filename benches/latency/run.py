@@ -1,4 +1,5 @@
-"""Runs the system, cyclictest and the echo in turn and writes RESULTS.md and results.json. `run.sh` calls it."""
+"""Alternates the system, cyclictest and the echo and writes RESULTS.md and results.json. `run.sh` calls
+it."""
 
 import argparse
 import collections
@@ -15,8 +16,8 @@ import report
 
 HERE = pathlib.Path(__file__).parent
 PRIORITY = 79
-# cyclictest counts what is longer apart (us).
-LONGEST_US = 20_000
+# Range of cyclictest's histogram; longer times are counted separately (us).
+HISTOGRAM_US = 20_000
 PERIOD_US = 1_000
 
 
@@ -32,7 +33,7 @@ def realtime_is_granted():
 
 @contextlib.contextmanager
 def processors_kept_awake():
-    """What cyclictest asks for, during all runs: no idle state that is left slowly."""
+    """Disables CPU idle states with long exit latency during all runs, as cyclictest does."""
     try:
         with open("/dev/cpu_dma_latency", "wb", buffering=0) as file:
             file.write((0).to_bytes(4, sys.byteorder))
@@ -41,7 +42,7 @@ def processors_kept_awake():
         yield False
 
 
-def ours(arguments, what, realtime):
+def run_latency_program(arguments, what, realtime):
     command = [arguments.programs / "latency", what, "--seconds", str(arguments.seconds)]
     command += ["--cpu", str(arguments.core)]
     if what == "system":
@@ -52,24 +53,24 @@ def ours(arguments, what, realtime):
 
 
 def cyclictest(arguments, realtime):
-    """Wake-up times as {us: count}, and how many were too long to be told apart."""
+    """Wake-up times as {us: count}; times beyond the histogram are counted together."""
     with tempfile.TemporaryDirectory() as folder:
         file = pathlib.Path(folder) / "cyclictest.json"
         command = ["cyclictest", "--quiet", "--threads=1", f"--affinity={arguments.core}"]
         command += [f"--interval={PERIOD_US}", f"--duration={arguments.seconds}"]
-        command += [f"--histogram={LONGEST_US}", f"--json={file}"]
+        command += [f"--histogram={HISTOGRAM_US}", f"--json={file}"]
         command += ["--mlockall", f"--priority={PRIORITY}"] if realtime else ["--policy=other"]
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
         thread = json.loads(file.read_text())["thread"]["0"]
     histogram = {int(us): count for us, count in thread["histogram"].items()}
     beyond = thread["cycles"] - sum(histogram.values())
     if beyond > 0:
-        histogram[max(LONGEST_US, thread["max"])] = beyond
+        histogram[max(HISTOGRAM_US, thread["max"])] = beyond
     return histogram
 
 
 def in_us(times_ns):
-    """Whole microseconds, cut off as cyclictest does."""
+    """Times in whole microseconds, truncated as by cyclictest."""
     return dict(collections.Counter(time_ns // 1000 for time_ns in times_ns))
 
 
@@ -94,10 +95,10 @@ def main():
     rounds = []
     with processors_kept_awake() as awake:
         for number in range(arguments.rounds):
-            system = ours(arguments, "system", realtime)
+            system = run_latency_program(arguments, "system", realtime)
             wake = cyclictest(arguments, realtime)
-            echo = ours(arguments, "echo", realtime)
-            messages = ours(arguments, "messages", realtime)
+            echo = run_latency_program(arguments, "echo", realtime)
+            messages = run_latency_program(arguments, "messages", realtime)
             trips = {"system": system, "echo": echo, "messages alone": messages}
             rounds.append(report.Round(in_us(system["wake_ns"]), wake, trips))
             print(f"{number + 1}/{arguments.rounds}: {rounds[-1]}", flush=True)

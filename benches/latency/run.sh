@@ -1,15 +1,16 @@
 #!/usr/bin/env bash
-# How soon the processes of a system wake and answer: the simulated arm with its controller, cyclictest, a bare
-# echo of datagrams of the same sizes, and the system's messages alone, in turn on one core. Rewrites RESULTS.md
-# and results.json beside this file.
+# Measures the latency of the processes of a system: the simulated arm with its controller, cyclictest, a bare
+# echo of datagrams of the same sizes, and the system's messages alone, alternating on one core. Rewrites
+# RESULTS.md and results.json in this folder.
 #
 #     benches/latency/run.sh [--seconds N] [--rounds N] [--core N] [--smoke]
 #
 #     benches/latency/run.sh --system [--seconds N] [--rounds N]
 #
-# The second runs whole systems, `supple up --plant sim` and `--plant emu`, in turn with cyclictest, and rewrites
-# SYSTEM.md. As root all of them have SCHED_FIFO and locked memory; without the right none has. --smoke: two seconds, one
-# round, and nothing is written. Installs cyclictest from the system's packages (as root).
+# The second form runs complete systems, `supple up --plant sim` and `--plant emu`, alternating with cyclictest,
+# and rewrites SYSTEM.md. With real-time permission (root) all of them use SCHED_FIFO and locked memory,
+# otherwise none does. --smoke: one round of two seconds; writes no files. Installs cyclictest from the system's
+# packages (as root).
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 

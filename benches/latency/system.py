@@ -1,7 +1,8 @@
-"""Runs whole systems by the wall clock and cyclictest in turn and writes SYSTEM.md. `run.sh --system` calls it.
+"""Alternates complete systems in wall-clock time with cyclictest and writes SYSTEM.md. `run.sh --system`
+calls it.
 
-An overrun is the same for both: a cycle that begins so late that its answer cannot come in time. A plant waits
-for its answer until three quarters of the period have passed; an answer takes some 50 us.
+For both, an overrun is a cycle that starts so late that its reply cannot arrive in time. A plant waits
+for the reply until three quarters of the period have passed; a reply takes some 50 us.
 """
 
 import argparse
@@ -16,11 +17,11 @@ import run
 
 HERE = pathlib.Path(__file__).parent
 OVERRUN_US = 700
-ASKED_PERCENT = 0.1
+TARGET_PERCENT = 0.1
 
 
 def up(arguments, plant):
-    """The summary of `supple up`."""
+    """Runs `supple up` and returns its summary."""
     with tempfile.TemporaryDirectory() as folder:
         environment = dict(os.environ, XDG_RUNTIME_DIR=folder)
         command = [arguments.programs.resolve() / "supple", "up", "--plant", plant, "--json"]
@@ -32,11 +33,12 @@ def up(arguments, plant):
 
 
 def cyclictest(arguments, realtime):
-    """Share of overruns, p99 and greatest wake-up of one thread that may run anywhere, as the system's may."""
+    """Cycles, overruns and maximum wake-up time of one thread without CPU affinity, like the system's
+    threads."""
     with tempfile.TemporaryDirectory() as folder:
         file = pathlib.Path(folder) / "cyclictest.json"
         command = ["cyclictest", "--quiet", "--threads=1", f"--interval={run.PERIOD_US}"]
-        command += [f"--duration={arguments.seconds}", f"--histogram={run.LONGEST_US}", f"--json={file}"]
+        command += [f"--duration={arguments.seconds}", f"--histogram={run.HISTOGRAM_US}", f"--json={file}"]
         command += ["--mlockall", f"--priority={run.PRIORITY}"] if realtime else ["--policy=other"]
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
         thread = json.loads(file.read_text())["thread"]["0"]
@@ -51,16 +53,16 @@ def share(part, whole):
 
 
 def lines(machine, rounds, seconds):
-    text = ["# Whole systems by the wall clock", ""]
+    text = ["# Complete systems in wall-clock time", ""]
     text += [
         f"Written by `benches/latency/run.sh --system`; do not edit. {len(rounds)} rounds of {seconds} s each for",
-        "`supple up --plant sim`, `--plant emu` and cyclictest in turn, all at 1 kHz, none bound to a processor.",
-        f"An overrun of cyclictest is a wake-up later than {OVERRUN_US} us, which leaves no time for an answer;",
-        f"asked for are {ASKED_PERCENT} % of missed cycles, or no more than twice cyclictest's overruns beside them.",
+        "`supple up --plant sim`, `--plant emu` and cyclictest, alternating, all at 1 kHz, none bound to a CPU.",
+        f"An overrun of cyclictest is a wake-up later than {OVERRUN_US} us, which leaves no time for a reply;",
+        f"the target is {TARGET_PERCENT} % of missed cycles, or at most twice cyclictest's overruns of the same round.",
         "",
     ]
     text += [f"- {key}: {value}" for key, value in machine.items()]
-    text += ["", "| round | cyclictest overruns % | max us | plant | missed % | tx_lost | stood still ms | step p99 us |"]
+    text += ["", "| round | cyclictest overruns % | max us | plant | missed % | tx_lost | clock stall ms | step p99 us |"]
     text += ["|---|---|---|---|---|---|---|---|"]
     for number, beside in enumerate(rounds, 1):
         bare = beside["cyclictest"]
@@ -75,9 +77,9 @@ def lines(machine, rounds, seconds):
     bare = statistics.median(share(r["cyclictest"]["overruns"], r["cyclictest"]["cycles"]) for r in rounds)
     for plant in ("sim", "emu"):
         missed = statistics.median(share(r[plant]["missed"], r[plant]["cycles"]) for r in rounds)
-        met = missed <= max(ASKED_PERCENT, 2 * bare)
+        met = missed <= max(TARGET_PERCENT, 2 * bare)
         text.append(
-            f"- `{plant}`: median {missed:.3f} % missed beside {bare:.3f} % of overruns: {'met' if met else '**not met**'}"
+            f"- `{plant}`: median {missed:.3f} % missed, {bare:.3f} % overruns of cyclictest: {'met' if met else '**not met**'}"
         )
     return text
 

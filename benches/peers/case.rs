@@ -5,7 +5,7 @@ use supple_core::math::{Matrix3, Vector3};
 use supple_core::operational::{PoseGains, PoseReference};
 use supple_core::{Arm, Body, Joint, Pose, Reference, Vector};
 
-/// Why a case cannot be run.
+/// Error of reading a case.
 #[derive(Debug)]
 pub enum CaseError {
     File(std::io::Error),
@@ -20,7 +20,7 @@ impl std::fmt::Display for CaseError {
         match self {
             CaseError::File(error) => write!(f, "case or outputs: {error}"),
             CaseError::Number(text) => write!(f, "case: {text} is not a number"),
-            CaseError::Short => write!(f, "case: ends early, write it anew with cases.py"),
+            CaseError::Short => write!(f, "case: truncated, generate it again with cases.py"),
             CaseError::Joints => write!(f, "case: the first number must be 2 to 12 joints"),
             CaseError::Arm(error) => write!(f, "case: {error}"),
         }
@@ -41,7 +41,7 @@ pub struct Case<const N: usize> {
     pub states: Vec<State<N>>,
 }
 
-/// One state and what the law is to do in it.
+/// One state and the references of the law in it.
 #[derive(Clone, Copy)]
 pub struct State<const N: usize> {
     pub q: Vector<N>,

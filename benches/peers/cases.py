@@ -1,5 +1,5 @@
-"""Arms and pools of random states as plain numbers, in the order that `harness.hpp` and the Rust
-program read them. `read` gives back what `write` wrote."""
+"""Arms and pools of random states as plain numbers, in the order that `harness.hpp` and the Rust program
+read them. `read` reads the files of `write`."""
 
 import json
 import pathlib
@@ -9,8 +9,8 @@ import numpy as np
 
 ARMS = pathlib.Path(__file__).parents[2] / "crates/supple-core/tests/data/arms.json"
 STATES = 256
-# Near singular poses ours damps the law and the peers do not: a pool keeps away from them. Position: least
-# singular value [m]; pose: greatest effective mass [kg] along, and inertia [kg m^2] about, any base axis.
+# Near singular poses our law is damped and the peers' is not, so a pool excludes such poses. Position: minimum
+# singular value [m]; pose: maximum effective mass [kg] along, and inertia [kg m^2] about, any base axis.
 LEAST_SINGULAR_VALUE = 0.2
 GREATEST_MASS = 20.0
 GREATEST_INERTIA = 2.0
@@ -35,7 +35,7 @@ def pose(origin):
 
 
 def reference_arm(name, task):
-    """One of the arms of the tests of the core."""
+    """One of the arms of the core's tests."""
     arm = json.loads(ARMS.read_text())[name]
     joints = []
     for joint in arm["joints"]:
@@ -65,7 +65,7 @@ def reference_arm(name, task):
 
 
 def random_arm(count, random):
-    """Bodies of a few point masses, axes along the coordinate axes, frames anywhere."""
+    """A random arm: bodies of a few point masses, axes along the coordinate axes, random frames."""
     joints = []
     for _ in range(count):
         points, masses = random.uniform(-0.2, 0.2, (6, 3)), random.uniform(0.05, 1.0, 6)
@@ -107,7 +107,7 @@ def skew(v):
 
 
 def jacobian(links, point, moved):
-    """Of a point that the first `moved` joints carry."""
+    """Jacobian of a point that the first `moved` joints carry."""
     columns = np.zeros((6, len(links)))
     for i, (_, position, axis) in enumerate(links[:moved]):
         columns[:, i] = np.concatenate([np.cross(axis, point - position), axis])
@@ -170,7 +170,7 @@ def write(path, arm, random):
 
 
 def read(path):
-    """The arm alone, without its states."""
+    """The arm without its states."""
     numbers = iter(map(float, pathlib.Path(path).read_text().split()))
 
     def take(*shape):

@@ -1,9 +1,9 @@
-// What the benchmarks of the peers share: the case file, the clock, the outputs.
+// Shared by the benchmarks of the peers: the case file, the clock, the outputs.
 //
 //     PROGRAM case.txt outputs.bin     prints "function mode median_ns minimum_ns" lines
 //
 // A case is one arm and a pool of states as plain numbers, in the order in which `Case` reads them.
-// Independent calls take each state of the pool in turn; dependent calls wait for the result before.
+// Independent calls take the states of the pool one after the other; dependent calls wait for the previous result.
 #pragma once
 
 #include <algorithm>
@@ -92,7 +92,7 @@ public:
       return 0.0;
     });
     time(name, "dependent", [&](State &s, double before) {
-      // Too small to change the angle, but nobody knows that.
+      // Too small to change the angle, but the compiler cannot know that.
       const double angle = s.q[0];
       s.q[0] += before * 1e-200;
       call(s, result.data());

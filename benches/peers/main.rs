@@ -1,4 +1,4 @@
-//! Our side of the comparison: the twin of `harness.hpp` and of the programs beside it.
+//! Our program of the comparison, the counterpart of `harness.hpp` and the peers' programs.
 //!
 //! `peers case.txt outputs.bin` prints `function mode median_ns minimum_ns` lines.
 
@@ -94,7 +94,7 @@ fn pose_law<const N: usize>(numbers: &[f64], out: &mut impl Write) -> Result<(),
     Ok(())
 }
 
-/// A result as numbers, in the order in which the peers store theirs.
+/// A result as numbers, in the order in which the peers store them.
 trait Numbers: Copy {
     fn first(&self) -> f64;
     fn write(&self, out: &mut impl Write) -> io::Result<()>;
@@ -112,7 +112,7 @@ impl<const R: usize, const C: usize> Numbers for Matrix<R, C> {
     }
 }
 
-/// By columns, as the peers have it.
+/// By columns, as the peers store it.
 impl<const N: usize> Numbers for Regressor<N> {
     #[inline]
     fn first(&self) -> f64 {
@@ -148,7 +148,7 @@ impl<const N: usize, W: Write> Bench<'_, N, W> {
             0.0
         });
         time(name, "dependent", self.states, |state, before| {
-            // Too small to change the angle, but nobody knows that.
+            // Too small to change the angle, but the compiler cannot know that.
             let angle = state.q[0];
             state.q[0] += before * 1e-200;
             let result = call(state);

@@ -1,5 +1,5 @@
-// Pinocchio, with the law tuned by hand: one crba and one nle, J and J' qd from their by-products,
-// Eigen matrices of fixed size. Where Pinocchio offers two ways, the quicker one is reported.
+// Pinocchio, with the law tuned by hand: one crba and one nle, J and J' qd from their by-products, Eigen
+// matrices of fixed size. If Pinocchio has two functions, the faster one is reported.
 #define EIGEN_NO_DEBUG
 #include <pinocchio/fwd.hpp>
 
@@ -37,7 +37,7 @@ static Model model_of(const Case &c) {
     const Vector3d axis = Map<const Vector3d>(j.axis);
     const auto placement = pose(j.rotation, j.translation);
     const auto name = "joint" + std::to_string(i + 1);
-    // As its URDF reader chooses them.
+    // As Pinocchio's URDF reader chooses them.
     if (axis == Vector3d::UnitX())
       parent = model.addJoint(parent, pin::JointModelRX(), placement, name);
     else if (axis == Vector3d::UnitY())
@@ -55,7 +55,7 @@ static Model model_of(const Case &c) {
   return model;
 }
 
-// What the law takes from one crba and one nle.
+// Quantities that the law derives from one crba and one nle.
 template <int N> struct Terms {
   Matrix<double, 6, N> jacobian;
   Vector6 drift;
@@ -131,12 +131,12 @@ static Matrix<double, N, 1> redundant_law(const Gains &gains, const State &s, co
   const Eigen::LLT<Matrix<double, D, D>> mobility(y.transpose() * y);
   const Task velocity = j * qd;
   const Task wanted = Map<const Task>(s.acceleration) - t.drift.template head<D>();
-  const Matrix<double, N, 1> loose =
+  const Matrix<double, N, 1> nullspace_velocity =
       qd - factor.matrixU().solve(y * mobility.solve(velocity));
-  const Task back = y.transpose() * factor.matrixL().solve(loose);
+  const Task back = y.transpose() * factor.matrixL().solve(nullspace_velocity);
   const Task through = mobility.solve(wanted + gains.nullspace * back);
   const Task force = feedback<D>(gains, s, t, velocity);
-  return t.nle + j.transpose() * (through + force) - gains.nullspace * loose;
+  return t.nle + j.transpose() * (through + force) - gains.nullspace * nullspace_velocity;
 }
 
 template <int N, int D> static void law(Bench &bench, const Gains &gains, const Model &model) {
@@ -163,7 +163,7 @@ int main(int count, char **arguments) {
   const auto frame = model.getFrameId("tip");
   const VectorXd zero = VectorXd::Zero(n);
   const auto aligned = pin::LOCAL_WORLD_ALIGNED;
-  // Copied once, as a user of the library would hold them.
+  // Copied once, as a user of the library would store them.
   struct Vectors {
     VectorXd q, qd, qdd, tau;
   };

@@ -1,7 +1,7 @@
 // MuJoCo steps the arm that `plant.py` describes, the tip pressed against a block by the contact law of
 // supple-plant, up and down once a second: `crates/supple-plant/examples/speed.rs` with another engine.
 //
-//     PROGRAM arm.xml     prints how many times real time, and the share of time in contact
+//     PROGRAM arm.xml prints the real-time factor and the fraction of time in contact
 #include <mujoco/mujoco.h>
 
 #include <algorithm>

@@ -1,10 +1,11 @@
-"""The plant beside MuJoCo: the 4-joint arm pressed against a block at a step of 0.2 ms, in turn on one core.
+"""Compares the plant with MuJoCo: the 4-joint arm pressed against a block at a step of 0.2 ms, on one
+core.
 
-    benches/peers/run.sh                         once, for the environment
+    benches/peers/run.sh                         once, to install the environment
     target/peers/python/bin/python benches/peers/plant.py [--rounds N] [--core N]
 
-Ours does more in a step than the peer: joint friction with a state, quantised encoders and torques, a
-force sensor with its filter, the arm's contact with a scene.
+Our plant computes more per step than MuJoCo: joint friction with a state, quantised encoders and
+torques, a force sensor with its filter, the arm's contact with a scene.
 """
 
 import argparse
@@ -77,10 +78,10 @@ def main():
         printed = subprocess.run(command, check=True, capture_output=True, text=True).stdout
         speed, share = map(float, printed.split())
         if not 0.2 < share < 0.8:
-            raise SystemExit(f"the peer's tip is in contact {share:.0%} of the time: not this motion")
+            raise SystemExit(f"the peer's tip is in contact {share:.0%} of the time, expected 20 to 80 %")
         peer.append(speed)
     ratio = statistics.median(a / b for a, b in zip(ours, peer))
-    print(f"times real time at 0.2 ms, median of {options.rounds} rounds, one core:")
+    print(f"real-time factor at 0.2 ms, median of {options.rounds} rounds, one core:")
     print(f"ours {statistics.median(ours):.1f}, MuJoCo {mujoco.__version__} {statistics.median(peer):.1f}")
     print(f"ours over MuJoCo's: {ratio:.2f}")
 

@@ -1,4 +1,4 @@
-"""RESULTS.md, results.json and growth.svg from what `run.py` measured."""
+"""Writes RESULTS.md, results.json and growth.svg from the measurements of `run.py`."""
 
 import json
 import statistics
@@ -11,8 +11,8 @@ import matplotlib.pyplot as plt
 
 FUNCTIONS = ("rnea", "crba", "aba", "jacobian", "jdot_qd", "regressor", "law")
 GROWING = ("rnea", "crba", "aba", "jacobian", "jdot_qd", "regressor")
-# Greatest ratios asked for: to Pinocchio, to generated code.
-ASKED = {
+# Maximum ratios (targets): to Pinocchio, to generated code.
+TARGETS = {
     "rnea": (0.40, 1.5),
     "crba": (0.50, 1.6),
     "aba": (0.50, None),
@@ -28,12 +28,12 @@ def median(times, mode="independent"):
     return statistics.median(middle for middle, _ in times[mode])
 
 
-def least(times, mode="independent"):
+def minimum(times, mode="independent"):
     return min(low for _, low in times[mode])
 
 
 def ratio(ours, peer, mode="independent"):
-    """Median over the rounds of our median over the peer's in the same round."""
+    """Median over the rounds of our median divided by the peer's in the same round."""
     pairs = zip(ours[mode], peer[mode])
     return statistics.median(mine / theirs for (mine, _), (theirs, _) in pairs)
 
@@ -59,41 +59,41 @@ def write(folder, machine, arms, differences, growth, rounds):
 
 
 def head(machine, differences, rounds):
-    yield "# Beside the peers"
+    yield "# Comparison with other libraries"
     yield ""
-    yield "Written by `benches/peers/run.sh`; do not edit. ns a call, one pinned core: median of "
-    yield f"{rounds} rounds (least of all in brackets); each round runs ours, Pinocchio and the generated code"
-    yield "in turn on the same 256 random states of each arm. A ratio is the median over the rounds of ours over"
-    yield "the peer's; **bold** where it is above what is asked for (in the column's head)."
+    yield "Written by `benches/peers/run.sh`; do not edit. ns per call, one pinned core: median of "
+    yield f"{rounds} rounds (minimum in brackets); each round runs ours, Pinocchio and the generated code"
+    yield "alternately on the same 256 random states of each arm. A ratio is the median over the rounds of our time divided by"
+    yield "the peer's; **bold** if it exceeds its target (in brackets)."
     yield ""
     for key, value in machine.items():
         yield f"- {key}: {value}"
     yield "- the peers' flags: `clang++ -O3 -march=native -DNDEBUG`; ours: `-C target-cpu=native`, release"
     yield "  profile"
     worst = max(error for by_peer in differences.values() for error in by_peer.values())
-    yield f"- greatest difference between outputs, mixed absolute and relative: {worst:.1e}"
+    yield f"- maximum difference between outputs, mixed absolute and relative: {worst:.1e}"
     yield ""
     yield "`law` is Eq. (3.6) with the arm's own inertia, without friction, from joint angles to torques: the"
     yield "position of the tip for 3 and 4 joints, its pose for 7, null space damped for 4 and 7. Pinocchio's is"
     yield "tuned by hand (one crba, one nle, the rest from their by-products, Eigen matrices of fixed size); the"
-    yield "generated law is one symbolic expression of one arm. Where Pinocchio offers two ways, the quicker counts."
+    yield "generated law is one symbolic expression of one arm. If Pinocchio has two functions, the faster one is used."
 
 
 def table(arms, mode):
-    yield "| function | arm | ours | Pinocchio | generated | ours / Pinocchio (asked) | ours / generated (asked) |"
+    yield "| function | arm | ours | Pinocchio | generated | ours / Pinocchio (target) | ours / generated (target) |"
     yield "|---|---|---|---|---|---|---|"
     for name in FUNCTIONS:
         for arm, times in arms.items():
             cells = [
-                f"{median(times[label][name], mode):.0f} ({least(times[label][name], mode):.0f})"
+                f"{median(times[label][name], mode):.0f} ({minimum(times[label][name], mode):.0f})"
                 for label in ("ours", *PEERS)
             ]
-            for peer, asked in zip(PEERS, ASKED[name]):
+            for peer, target in zip(PEERS, TARGETS[name]):
                 found = ratio(times["ours"][name], times[peer][name], mode)
                 text = f"{found:.2f}"
-                if asked is not None:
-                    text = f"**{text}**" if found > asked else text
-                    text += f" ({asked})"
+                if target is not None:
+                    text = f"**{text}**" if found > target else text
+                    text += f" ({target})"
                 cells.append(text)
             yield f"| {name} | {arm} | " + " | ".join(cells) + " |"
 
@@ -107,9 +107,9 @@ def fit(growth, label, name):
 
 def slopes(growth):
     yield f"Random arms of {min(growth)} to {max(growth)} joints, `growth.svg`. Exponent of the fitted power law, and"
-    yield "the fitted straight line's ns for each further joint."
+    yield "the slope of the fitted straight line in ns per joint."
     yield ""
-    yield "| function | ours: exponent | Pinocchio: exponent | ours: ns a joint | Pinocchio: ns a joint |"
+    yield "| function | ours: exponent | Pinocchio: exponent | ours: ns per joint | Pinocchio: ns per joint |"
     yield "|---|---|---|---|---|"
     for name in GROWING:
         (a, b), (c, d) = fit(growth, "ours", name), fit(growth, "pinocchio", name)
@@ -124,7 +124,7 @@ def plot(path, growth):
             axis.plot(list(growth), ns, marker="o", markersize=3, label=title)
         axis.set_title(name)
         axis.set_ylim(bottom=0)
-        axis.set_ylabel("ns a call")
+        axis.set_ylabel("ns per call")
         axis.set_xlabel("joints")
     axes.flat[0].legend()
     figure.tight_layout()

@@ -1,5 +1,5 @@
-"""Compiles the peers, runs all programs in turn, holds their outputs against each other, and writes
-RESULTS.md, results.json and growth.svg. `run.sh` calls it."""
+"""Compiles the peers, alternates all programs, compares their outputs, and writes RESULTS.md,
+results.json and growth.svg. `run.sh` calls it."""
 
 import argparse
 import importlib.metadata
@@ -19,7 +19,7 @@ ARMS = {"wam3": 3, "wam4": 3, "wam7": 6}
 GROWTH = range(2, 13)
 TOLERANCE = 1e-9
 CLANG = ["clang++", "-std=c++17", "-O3", "-march=native", "-DNDEBUG"]
-# Pinocchio's own build asks these of boost.
+# Options that Pinocchio's own build sets for Boost.
 BOOST = [
     "-DBOOST_MPL_LIMIT_LIST_SIZE=30",
     "-DBOOST_MPL_LIMIT_VECTOR_SIZE=30",
@@ -63,15 +63,15 @@ class Runner:
         printed = subprocess.run(command, check=True, capture_output=True, text=True).stdout
         found = []
         for line in printed.splitlines():
-            name, mode, median, least = line.split()
+            name, mode, median, minimum = line.split()
             if mode == "independent":
                 found.append((name, {}))
-            found[-1][1][mode] = (float(median), float(least))
+            found[-1][1][mode] = (float(median), float(minimum))
         return found, np.fromfile(outputs)
 
 
 def split(found, outputs, joints):
-    """The outputs of each measured function, a row a state."""
+    """The outputs of each measured function, one row per state."""
     sizes = {
         "rnea": joints,
         "crba": joints**2,
@@ -87,12 +87,12 @@ def split(found, outputs, joints):
         out.append((name, outputs[at : at + count].reshape(cases.STATES, -1)))
         at += count
     if at != len(outputs):
-        sys.exit(f"{len(outputs)} numbers came out where {at} were expected")
+        sys.exit(f"{len(outputs)} numbers were written, {at} were expected")
     return out
 
 
 def worst_difference(name, found, expected, joints):
-    """Greatest difference, mixed absolute and relative; accelerations relative to their greatest."""
+    """Maximum difference, mixed absolute and relative; accelerations relative to the largest one."""
     if name == "crba":
         # Pinocchio fills the upper triangle.
         column, row = np.divmod(np.arange(joints**2), joints)
@@ -118,12 +118,13 @@ def compare(arm, joints, ours, peer, label):
 
 
 def collect(rounds):
-    """Per function and mode the medians and minima of all rounds, of the quicker way if there are two."""
-    ways = [name for name, _ in rounds[0]]
+    """Medians and minima of all rounds for each function and mode, of the faster variant if there are
+    two."""
+    variants = [name for name, _ in rounds[0]]
     best = {}
-    for way, name in enumerate(ways):
+    for variant, name in enumerate(variants):
         times = {
-            mode: [found[way][1][mode] for found in rounds] for mode in ("independent", "dependent")
+            mode: [found[variant][1][mode] for found in rounds] for mode in ("independent", "dependent")
         }
         middle = statistics.median(median for median, _ in times["independent"])
         if name not in best or middle < best[name][0]:
@@ -132,7 +133,7 @@ def collect(rounds):
 
 
 def measure(run, programs, case, arm, joints, rounds):
-    """Times of every program; differences of the peers from ours in the same run."""
+    """Times of every program, and differences between the peers' outputs and ours in the same run."""
     found = {label: [] for label in programs}
     differences = {}
     for _ in range(rounds):

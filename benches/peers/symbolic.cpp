@@ -4,7 +4,7 @@
 
 #include ARM_C
 
-// Such a function takes pointers to its inputs and results; it needs no other memory.
+// Such a function takes pointers to its inputs and results and needs no other memory.
 template <class Function>
 static void call(Function function, std::initializer_list<const double *> inputs, double *out) {
   const double *arguments[8];

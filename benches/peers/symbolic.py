@@ -2,8 +2,8 @@
 
     python3 symbolic.py case.txt arm.c
 
-The recursions are the textbook's, on 3-vectors in joint frames; what is zero or one in the arm
-disappears, common subexpressions are shared. The law is one symbolic function from state to torques.
+The recursions are the textbook's, on 3-vectors in joint frames; zeros and ones of the arm are
+eliminated, common subexpressions are shared. The law is one symbolic function from state to torques.
 """
 
 import sys
@@ -15,7 +15,7 @@ import cases
 
 
 def constant(values):
-    """Numbers as symbols, without the rounding that turns by 90 degrees leave."""
+    """Numbers as symbols, without the rounding errors of rotations by 90 degrees."""
     rounded = np.array(values, dtype=float)
     for exact in (0.0, 1.0, -1.0):
         rounded[np.abs(rounded - exact) < 1e-14] = exact
@@ -40,7 +40,7 @@ class Arm:
         self.links = []
         turned = np.eye(3)
         for joint in case.joints:
-            # Joint frames turn about their own z, as ours do.
+            # Joint frames rotate about their own z axis, as ours do.
             to_axis = z_onto(joint.axis)
             com = to_axis.T @ joint.com
             inertia = to_axis.T @ joint.inertia @ to_axis
@@ -231,14 +231,14 @@ class Arm:
         lower = cholesky(mass)
         y = solve_lower(lower, j.T)
         mobility = cholesky(gram(y))
-        loose = qd - solve_upper(lower, y @ solve(mobility, speed))
-        back = y.T @ solve_lower(lower, loose)
+        nullspace_velocity = qd - solve_upper(lower, y @ solve(mobility, speed))
+        back = y.T @ solve_lower(lower, nullspace_velocity)
         through = solve(mobility, wanted + k.nullspace * back)
-        return nle + j.T @ (through + force) - k.nullspace * loose
+        return nle + j.T @ (through + force) - k.nullspace * nullspace_velocity
 
 
 def z_onto(axis):
-    """A rotation that turns z onto a unit vector."""
+    """A rotation that maps z to a unit vector."""
     helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
     if axis[2] == 1.0:
         return np.eye(3)
@@ -248,7 +248,8 @@ def z_onto(axis):
 
 
 def steiner(mass, p, moment):
-    """Inertia that a shift of the origin by `p` adds, with `moment` the first moment in the new axes."""
+    """Change of the inertia for a shift of the origin by `p`; `moment` is the first moment in the new
+    axes."""
     outer = p @ moment.T
     return (
         ca.SX.eye(3) * (2 * ca.dot(p, moment) + mass * ca.dot(p, p))
@@ -301,7 +302,7 @@ def solve(factor, b):
 
 
 def symmetric(n, entry):
-    """Each entry once, mirrored."""
+    """Copies the upper triangle to the lower one, so that each entry is computed once."""
     out = ca.SX.zeros(n, n)
     for i in range(n):
         for j in range(i + 1):

@@ -1,23 +1,23 @@
-//! What the benchmarks share: an arm in a situation, and a pool of random states.
+//! Shared by the benchmarks: an arm in a given state, and a pool of random states.
 //!
-//! Nothing here measures: `dynamics.rs` takes wall time, `instructions` counts instructions, and
-//! `peers` runs other libraries beside this one.
+//! `dynamics.rs` measures wall-clock time, `instructions` counts instructions, and `peers` compares with other
+//! libraries.
 
 use supple_core::config::Gains;
 use supple_core::config::Role;
 use supple_core::controller::{self, Mode, Request};
 use supple_core::impedance::SINGULAR_BELOW_M;
-use supple_core::linalg::least_singular_value;
+use supple_core::linalg::min_singular_value;
 use supple_core::math::Vector3;
 use supple_core::operational::{PoseGains, PoseReference};
 use supple_core::{Arm, Config, Controller, Input, Output, Reference, Trajectory, Vector};
 use supple_core::{dynamics, step};
 use supple_model::Description;
 
-/// States in a pool: more than a branch predictor learns by heart.
+/// Number of states in a pool: more than a branch predictor can memorise.
 pub const STATES: usize = 256;
 
-/// One state of an arm, and what the law is to do in it.
+/// One state of an arm and the references of the law in it.
 #[derive(Clone, Copy, Debug)]
 pub struct State<const N: usize> {
     /// \[rad\]
@@ -28,9 +28,9 @@ pub struct State<const N: usize> {
     pub qdd: Vector<N>,
     /// \[N m\]
     pub tau: Vector<N>,
-    /// For the law of the tip's position.
+    /// Reference of the position law.
     pub position: Reference,
-    /// For the law of the tip's pose.
+    /// Reference of the pose law.
     pub pose: PoseReference,
 }
 
@@ -52,19 +52,20 @@ pub const NULLSPACE_DAMPING: f64 = 2.0;
 /// The configuration of a built-in arm.
 ///
 /// # Panics
-/// Where the asset does not have `N` joints: a benchmark has nothing to measure then.
+/// If the asset does not have `N` joints.
 pub fn config<const N: usize>(name: &str) -> Config<N> {
     let description = Description::asset(name).expect("a built-in arm");
-    description.config::<N>().expect("as many joints as asked")
+    description.config::<N>().expect("N joints")
 }
 
-/// A pool of states of `arm`, the same ones each time.
+/// A pool of states of `arm`, the same in every run.
 pub fn pool<const N: usize>(arm: &Arm<N>) -> Vec<State<N>> {
     let mut random = Random(20_261_121);
     (0..STATES).map(|_| random.state(arm)).collect()
 }
 
-/// The same, of poses that are not near singular ones of the active joints: there the law takes another way.
+/// As [`pool`], without poses near singular ones of the active joints, where the law takes a different code
+/// path.
 pub fn regular_pool<const N: usize>(arm: &Arm<N>, roles: &[Role; N]) -> Vec<State<N>> {
     let mut random = Random(20_261_122);
     let regular = |state: &State<N>| {
@@ -74,7 +75,7 @@ pub fn regular_pool<const N: usize>(arm: &Arm<N>, roles: &[Role; N]) -> Vec<Stat
         for joint in (0..N).filter(|joint| roles[*joint] != Role::Active) {
             jacobian.column_mut(joint).fill(0.0);
         }
-        least_singular_value(&jacobian) > SINGULAR_BELOW_M
+        min_singular_value(&jacobian) > SINGULAR_BELOW_M
     };
     core::iter::repeat_with(|| random.state(arm))
         .filter(regular)
@@ -82,7 +83,7 @@ pub fn regular_pool<const N: usize>(arm: &Arm<N>, roles: &[Role; N]) -> Vec<Stat
         .collect()
 }
 
-/// A controller that holds the tip by the law.
+/// A controller that holds the tip by the impedance law.
 pub struct Rig<const N: usize> {
     controller: Controller<N>,
     state: controller::State<N>,
@@ -91,11 +92,11 @@ pub struct Rig<const N: usize> {
 }
 
 impl<const N: usize> Rig<N> {
-    /// At a bent pose of a built-in arm, after the blends of the mode's entry.
+    /// Creates a rig in a bent pose of a built-in arm and runs it until the blends after the change of mode are
+    /// over.
     ///
     /// # Panics
-    /// Where the controller does not come to follow the law, or does so near a singular pose: there is nothing to
-    /// measure then.
+    /// If the controller does not reach the mode, or the pose is near a singular one.
     pub fn tracking(asset: &str) -> Self {
         let config = config::<N>(asset);
         let bent = match N {
@@ -107,16 +108,16 @@ impl<const N: usize> Rig<N> {
             Role::Active => bent[i % bent.len()],
         });
         let tip = dynamics::tip_pose(&config.arm, &position_rad).translation;
-        let controller = Controller::new(config).expect("built-in configurations are sound");
+        let controller = Controller::new(config).expect("a valid configuration");
         let mut rig = Rig {
             state: controller::State::new(&controller),
             controller,
             position_rad,
             cycle: 0,
         };
-        let wishes = [Request::GravityHold, Request::Track(Trajectory::Hold(tip))];
-        for wish in wishes {
-            rig.cycle(Some(wish));
+        let requests = [Request::GravityHold, Request::Track(Trajectory::Hold(tip))];
+        for request in requests {
+            rig.cycle(Some(request));
             for _ in 0..1000 {
                 rig.step();
             }
@@ -134,16 +135,16 @@ impl<const N: usize> Rig<N> {
         rig
     }
 
-    /// One cycle.
+    /// Runs one cycle.
     pub fn step(&mut self) -> Output<N> {
         self.cycle(None)
     }
 
     fn cycle(&mut self, request: Option<Request<N>>) -> Output<N> {
-        let wobble_rad = 1e-5 * (self.cycle % 11) as f64;
+        let jitter_rad = 1e-5 * (self.cycle % 11) as f64;
         let input = Input {
             cycle: self.cycle,
-            position_rad: std::array::from_fn(|i| Some(self.position_rad[i] + wobble_rad)),
+            position_rad: std::array::from_fn(|i| Some(self.position_rad[i] + jitter_rad)),
             tip_force_n: None,
             drives_active: true,
             request,

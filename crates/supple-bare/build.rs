@@ -1,4 +1,4 @@
-//! Link arguments of the freestanding program. They reach this package's binary and nothing else.
+//! Link arguments of the freestanding program. They apply to this package's binary only.
 
 use std::env::var;
 

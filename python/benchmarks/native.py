@@ -1,9 +1,9 @@
-"""Batched calls from Python beside the same loop in Rust: what crossing over costs.
+"""Overhead of batched calls from Python relative to the same loop in Rust.
 
     python benchmarks/native.py [--samples 2000] [--rounds 60] [--json FILE]
 
-Rounds are taken in turn, each the least of three passes over states that fit in the cache; the median
-of the ratios counts. Exits with 1 where one is above 1.3.
+Rounds alternate; each takes the minimum of three passes over states that fit in the cache. The result is
+the median of the ratios. Exits with 1 if one is above 1.3.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ import numpy as np
 import supple
 
 ROOT = Path(__file__).resolve().parents[2]
-MOST = 1.3
+MAX_RATIO = 1.3
 
 
 def native_loop() -> Path:
-    """The loop in Rust, built."""
+    """Builds the loop in Rust and returns its path."""
     example = ["--release", "--package", "supple-model", "--example", "state_loop"]
     command = ["cargo", "build", "--locked", *example, "--message-format", "json"]
-    # Where the package's own compiler flags count.
+    # The folder in which the package's own compiler flags apply.
     folder = ROOT / "python"
     built = subprocess.run(command, cwd=folder, check=True, stdout=subprocess.PIPE, text=True)
     messages = [json.loads(line) for line in built.stdout.splitlines()]
@@ -35,7 +35,7 @@ def native_loop() -> Path:
 
 
 def batched(arm: supple.Arm, samples: int) -> dict[str, float]:
-    """Nanoseconds a state."""
+    """Nanoseconds per state of each function."""
     states = np.random.default_rng(0).uniform(-1.5, 1.5, size=(3, samples, arm.dof))
     costs = {}
     for name, arguments in (
@@ -60,7 +60,7 @@ def main() -> int:
     parser.add_argument("--arm", default="wam7", help="a built-in arm, or the path of its TOML")
     parser.add_argument("--samples", type=int, default=2_000)
     parser.add_argument("--rounds", type=int, default=60)
-    parser.add_argument("--json", type=Path, help="where the figures go")
+    parser.add_argument("--json", type=Path, help="output file for the results")
     options = parser.parse_args()
 
     arm = supple.Arm.load(options.arm)
@@ -69,7 +69,7 @@ def main() -> int:
     for _ in range(options.rounds):
         printed = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
         rounds.append((json.loads(printed), batched(arm, options.samples)))
-    print(f"{arm.name}, {options.samples} states, {options.rounds} rounds in turn, ns a state")
+    print(f"{arm.name}, {options.samples} states, {options.rounds} alternating rounds, ns per state")
     print(f"{'':18} {'Rust':>8} {'Python':>8} {'ratio':>8}")
     lines = []
     for name in rounds[0][0]:
@@ -83,9 +83,9 @@ def main() -> int:
         print(f"{name:18} {line['rust_ns']:8.0f} {line['python_ns']:8.0f} {line['ratio']:8.2f}")
     if options.json:
         options.json.write_text(json.dumps(lines, indent=2) + "\n")
-    slow = [line["name"] for line in lines if line["ratio"] > MOST]
+    slow = [line["name"] for line in lines if line["ratio"] > MAX_RATIO]
     if slow:
-        print(f"above {MOST} times the loop in Rust: {', '.join(slow)}", file=sys.stderr)
+        print(f"above {MAX_RATIO} times the loop in Rust: {', '.join(slow)}", file=sys.stderr)
     return 1 if slow else 0
 
 

@@ -1,11 +1,11 @@
-"""Batched calls of supple beside a loop over Pinocchio, on the same states, in the same run.
+"""Compares batched calls of supple with a loop over Pinocchio, on the same states in the same run.
 
-Both fill a preallocated array on one thread and are compared number by number; rounds are taken in
-turn and the median of the ratios is what counts: the two share whatever else the machine does.
+Both fill a preallocated array on one thread, and their results are compared number by number. Rounds
+alternate, so that other load of the machine affects both; the result is the median of the ratios.
 
     python benchmarks/regressor.py [--samples 100000] [--rounds 7] [--json FILE]
 
-Exits with 1 where the numbers disagree, or where the regressor is less than 5 times faster.
+Exits with 1 if the numbers disagree, or if the regressor is less than 5 times faster.
 """
 
 from __future__ import annotations
@@ -52,9 +52,9 @@ def compare(
     shape: tuple[int, ...],
     rounds: int,
 ) -> dict[str, Any]:
-    """Times in turn; one line of the table."""
+    """Measures both alternately; returns one line of the table."""
     samples = len(arguments[0])
-    # Ones, so that every page is there before the first round.
+    # Ones, so that every page is mapped before the first round.
     mine, peer = np.ones((samples, *shape)), np.ones((samples, *shape))
     times: list[tuple[float, float]] = []
     for _ in range(rounds):
@@ -81,7 +81,7 @@ def main() -> int:
     parser.add_argument("--arm", default="wam7", help="a built-in arm, or the path of its TOML")
     parser.add_argument("--samples", type=int, default=100_000)
     parser.add_argument("--rounds", type=int, default=7)
-    parser.add_argument("--json", type=Path, help="where the figures go")
+    parser.add_argument("--json", type=Path, help="output file for the results")
     options = parser.parse_args()
 
     arm = supple.Arm.load(options.arm)
@@ -89,7 +89,7 @@ def main() -> int:
         path = Path(folder) / "arm.urdf"
         path.write_text(arm.urdf)
         model = pin.buildModelFromUrdf(str(path))
-    # The tool of the TOML is no part of the URDF: the peer gets the parameters of ours.
+    # The tool of the TOML is not part of the URDF: the peer receives our parameters.
     for link, parameters in enumerate(arm.parameters.reshape(arm.dof, 10), start=1):
         model.inertias[link] = pin.Inertia.FromDynamicParameters(parameters)
     model.gravity.linear = arm.gravity_m_per_s2
@@ -103,7 +103,7 @@ def main() -> int:
         upper = pin.crba(model, data, q)
         return np.asarray(np.triu(upper) + np.triu(upper, 1).T)
 
-    print(f"{arm.name}, {options.samples} states, {options.rounds} rounds in turn, one thread")
+    print(f"{arm.name}, {options.samples} states, {options.rounds} alternating rounds, one thread")
     print(f"{'':18} {'supple ns':>10} {'pinocchio ns':>12} {'ratio':>8} {'disagreement':>14}")
     lines = [
         compare(
@@ -141,7 +141,7 @@ def main() -> int:
         print(f"disagreement above {AGREEMENT}: {', '.join(wrong)}", file=sys.stderr)
         return 1
     if lines[0]["ratio"] < TARGET:
-        print(f"regressor: {lines[0]['ratio']:.1f} times faster, {TARGET} wanted", file=sys.stderr)
+        print(f"regressor: {lines[0]['ratio']:.1f} times faster, target {TARGET}", file=sys.stderr)
         return 1
     return 0
 

@@ -1,10 +1,10 @@
-"""From a log to a controller that uses it: identify, validate, save, run.
+"""From a log to a controller with the identified model: identify, validate, save, run.
 
     python identify_from_log.py --out identified
     python identify_from_log.py --log training.mcap --held-out other.mcap --arm wam4 --out identified
 
-Without logs of your own, two are recorded on the simulated arm first. The last step runs the paper's
-sinusoid at 5 N/m with the model that was saved: simulation, not a proof for a real arm.
+Without your own logs, two are first recorded on the simulated arm. The last step runs the paper's
+sinusoid at 5 N/m with the saved model, in simulation: no evidence for a real arm.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from pathlib import Path
 
 import supple
 
-# Commands act in the cycle after, for a cycle: one and a half periods after the angle beside them.
+# Commands act during the next cycle: on average 1.5 periods after the angle in the same row.
 TORQUE_DELAY_S = 1.5e-3
 
 
 def record(arm: supple.Arm, folder: Path, seed: int, candidates: int) -> Path:
-    """A designed excitation, followed by the simulated arm."""
+    """Records a designed excitation on the simulated arm."""
     motion = supple.design_excitation(arm, candidates=candidates, period_s=10.0, periods=2, seed=seed)
     print(f"excitation of {motion.t[-1]:.0f} s, condition number {motion.condition:.1f}")
     folder.mkdir(parents=True, exist_ok=True)
@@ -32,9 +32,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--arm", default="wam4", help="a built-in arm, or the path of its TOML")
     parser.add_argument("--log", type=Path, help="the log to fit")
-    parser.add_argument("--held-out", type=Path, help="a log to judge the fit by")
+    parser.add_argument("--held-out", type=Path, help="a log to validate the fit")
     parser.add_argument("--out", type=Path, default=Path("identified"))
-    parser.add_argument("--candidates", type=int, default=1000, help="of the excitation's search")
+    parser.add_argument("--candidates", type=int, default=1000, help="number of candidates of the excitation design")
     options = parser.parse_args()
 
     arm = supple.Arm.load(options.arm)

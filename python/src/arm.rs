@@ -14,10 +14,10 @@ use supple_model::{Description, ModelError, with_dof};
 /// Built by :meth:`Arm.load` or :meth:`Arm.from_urdf`. Joint angles are in rad, torques in N m, lengths
 /// in m, masses in kg. Positions, forces and Jacobians are in *base axes*: those of the URDF's root link.
 ///
-/// Every method takes one state, ``(N,)``, or a batch with any leading axes, ``(..., N)``; arguments of
-/// one call have the same leading axes, or none. Float64 arrays in C order are read without a copy, and
-/// the interpreter lock is released while a call computes. ``out``, where there is one, is a writable
-/// float64 array in C order of the result's shape, and is what the call returns.
+/// Every method takes one state, ``(N,)``, or a batch with any leading axes, ``(..., N)``; arguments of one
+/// call have the same leading axes, or none. Float64 arrays in C order are read without a copy, and the
+/// interpreter lock is released while a call computes. ``out``, if given, is a writable float64 array in C
+/// order of the result's shape; the call returns it.
 ///
 /// Examples
 /// --------
@@ -35,7 +35,7 @@ pub struct Arm {
 }
 
 impl Arm {
-    /// The arm of a description.
+    /// Creates the arm of a description.
     pub fn new(description: Description) -> Result<Self, ModelError> {
         let dynamics: Result<Box<dyn Dynamics>, ModelError> = with_dof!(description.dof(), N => {
             let arm = description.arm::<N>()?;
@@ -47,7 +47,7 @@ impl Arm {
         })
     }
 
-    /// What it was read from.
+    /// The description of the arm.
     pub fn description(&self) -> &Description {
         &self.description
     }
@@ -72,29 +72,29 @@ impl Arm {
 
 #[pymethods]
 impl Arm {
-    /// A built-in arm by its name, or another by the path of its TOML or of the folder that holds it.
+    /// Load a built-in arm by its name, or another by the path of its TOML or of the folder that contains it.
     ///
     /// Parameters
     /// ----------
     /// name_or_path : str or os.PathLike
     ///     One of :func:`supple.assets`, or the path of an ``arm.toml`` beside its URDF.
     /// strict : bool
-    ///     Refuse a URDF that holds what is not read, such as Gazebo's elements. Default: each kind of it is a
-    ///     warning. What the dynamics would depend on is refused in either case.
+    ///     Reject a URDF with elements that are not read, such as Gazebo's. Default: a warning for each kind of
+    ///     element. Unsupported elements that affect the dynamics are always rejected.
     ///
     /// Raises
     /// ------
     /// ValueError
-    ///     For an arm that is not built in, or files that describe none.
+    ///     If no arm of that name is built in, or the files are invalid.
     /// FileNotFoundError
-    ///     For a path that leads nowhere.
+    ///     If the path does not exist.
     /// OSError
-    ///     For what is no regular file, such as a FIFO, or longer than 16 MiB.
+    ///     If the path is not a regular file, or the file exceeds 16 MiB.
     ///
     /// Warns
     /// -----
     /// UserWarning
-    ///     For each kind of element and attribute that is left out, with its first place.
+    ///     For each kind of element and attribute that is ignored, with its first position.
     ///
     /// Examples
     /// --------
@@ -111,7 +111,7 @@ impl Arm {
         Self::new(description).map_err(errors::model)
     }
 
-    /// The arm of a URDF: the chain of movable joints from the root link to the link ``tip``.
+    /// Load the arm of a URDF: the chain of movable joints from the root link to the link ``tip``.
     ///
     /// Parameters
     /// ----------
@@ -120,26 +120,27 @@ impl Arm {
     /// tip : str
     ///     Link whose origin is the tip. Default ``"tip"``.
     /// gravity : array_like, (3,)
-    ///     Acceleration of free fall in base axes (m/s^2). Default (0, 0, -9.81).
+    ///     Gravitational acceleration in base axes (m/s^2). Default (0, 0, -9.81).
     /// armature : array_like, (N,), optional
     ///     Rotor inertia of each joint, reflected to the joint (kg m^2). Default: none.
     /// fixed_joints_rad : mapping of str to float, optional
-    ///     Movable joints that are frozen, each at an angle (rad). Those that do not carry the tip, such
-    ///     as a gripper's, must be here.
+    ///     Movable joints that are fixed, each at an angle (rad). Joints that do not carry the tip, such as a
+    ///     gripper's, must be listed.
     /// point_mass_radius_m : float, optional
-    ///     Links that have mass but an inertia of zeros are taken for solid balls of this radius (m).
-    ///     Default: they are refused.
+    ///     Links with mass but zero inertia are modelled as solid balls of this radius (m). Default: they are
+    ///     rejected.
     /// strict : bool
-    ///     As of :meth:`Arm.load`.
+    ///     As in :meth:`Arm.load`.
     ///
     /// Raises
     /// ------
     /// ValueError
-    ///     For what is not physical, not connected or not meant, by file, element, value and remedy.
+    ///     If the model is physically inconsistent, not connected or unsupported; the message names file,
+    ///     element, value and remedy.
     /// FileNotFoundError
-    ///     For a path that leads nowhere.
+    ///     If the path does not exist.
     /// OSError
-    ///     For what is no regular file, such as a FIFO, or longer than 16 MiB.
+    ///     If the path is not a regular file, or the file exceeds 16 MiB.
     ///
     /// Warns
     /// -----
@@ -148,11 +149,10 @@ impl Arm {
     ///
     /// Notes
     /// -----
-    /// Friction is the URDF's ``<dynamics>``. A joint whose range, effort or velocity the URDF does not
-    /// state, or states as zero, has none: a turn either way, 1e9 N m, 1e9 rad/s. Dynamics and
-    /// identification ask for no limits, but :func:`design_excitation` and :func:`simulate` use what there
-    /// are: for them, state them. Everything else that a controller needs has its default;
-    /// :meth:`Arm.load` reads a TOML that says it.
+    /// Friction is read from the URDF's ``<dynamics>``. A joint whose range, effort or velocity the URDF omits
+    /// or sets to zero is practically unlimited: one turn in either direction, 1e5 N m, 100 rad/s. Dynamics and
+    /// identification use no limits, but :func:`design_excitation` and :func:`simulate` do: specify them there.
+    /// All other settings of a controller have defaults; :meth:`Arm.load` reads them from a TOML.
     #[staticmethod]
     #[pyo3(signature = (path, tip = "tip", *, gravity = None, armature = None, fixed_joints_rad = None,
         point_mass_radius_m = None, strict = false),
@@ -172,11 +172,11 @@ impl Arm {
         point_mass_radius_m: Option<f64>,
         strict: bool,
     ) -> PyResult<Self> {
-        let urdf = supple_files::read_text(&path, Description::MOST_BYTES).map_err(|cause| {
+        let urdf = supple_files::read_text(&path, Description::MAX_BYTES).map_err(|cause| {
             let message = format!("{}: cannot be read: {cause}", path.display());
             errors::system(&cause, message)
         })?;
-        let urdf = supple_model::unlimited::with_limits(&urdf);
+        let urdf = supple_model::unlimited::with_default_limits(&urdf);
         let gravity = match gravity {
             Some(gravity) => arrays::fixed("gravity", gravity, &[3])?
                 .as_slice()?
@@ -219,14 +219,14 @@ impl Arm {
         Self::new(description).map_err(errors::model)
     }
 
-    /// The arm of the texts of its two files, as a log carries them and as pickles do.
+    /// Creates an arm from the texts of its two files, as logs and pickles contain them.
     #[staticmethod]
     fn _from_text(toml: &str, urdf: &str) -> PyResult<Self> {
         let description = Description::from_text(toml, urdf);
         description.and_then(Self::new).map_err(errors::model)
     }
 
-    /// Writes its two files into a folder, made if need be.
+    /// Writes its two files into a folder, which is created if necessary.
     fn _save(&self, folder: PathBuf) -> PyResult<()> {
         self.description.save(&folder).map_err(errors::model)
     }
@@ -251,9 +251,9 @@ impl Arm {
 
     /// Inertial parameters, (10 N,), in the order of :meth:`regressor`.
     ///
-    /// Ten a link, in the axes of the URDF's link frame: mass ``m`` (kg); first moments ``m cx, m cy,
-    /// m cz`` (kg m); inertia about the frame's origin ``Ixx, Ixy, Iyy, Ixz, Iyz, Izz`` (kg m^2). The
-    /// tool and links that cannot move belong to the link that carries them.
+    /// Ten for each link, in the axes of the URDF's link frame: mass ``m`` (kg); first moments ``m cx, m cy, m
+    /// cz`` (kg m); inertia about the frame's origin ``Ixx, Ixy, Iyy, Ixz, Iyz, Izz`` (kg m^2). The tool and
+    /// fixed links are part of the link that carries them.
     #[getter]
     fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
         arrays::array(py, self.dynamics.parameters(), &[10 * self.dof()])
@@ -265,7 +265,7 @@ impl Arm {
         arrays::array(py, self.dynamics.armature(), &[self.dof()])
     }
 
-    /// Acceleration of free fall in base axes, (3,) (m/s^2).
+    /// Gravitational acceleration in base axes, (3,) (m/s^2).
     #[getter]
     fn gravity_m_per_s2<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
         arrays::array(py, self.dynamics.gravity_m_per_s2().to_vec(), &[3])
@@ -278,7 +278,7 @@ impl Arm {
         joints.map(|inner| Friction { inner: *inner }).collect()
     }
 
-    /// Pose that the arm starts from, (N,) (rad).
+    /// Start pose of the arm, (N,) (rad).
     #[getter]
     fn home_rad<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
         arrays::array(py, self.description.home_rad().to_vec(), &[self.dof()])
@@ -303,7 +303,7 @@ impl Arm {
     /// q, qd, qdd : array_like, (..., N)
     ///     Angles (rad), velocities (rad/s), accelerations (rad/s^2).
     /// out : numpy.ndarray, (..., N), optional
-    ///     Where the result goes.
+    ///     Array for the result.
     ///
     /// Returns
     /// -------
@@ -313,7 +313,7 @@ impl Arm {
     /// Raises
     /// ------
     /// ValueError
-    ///     For shapes that do not fit; argument, expected and given shape are named.
+    ///     If the shapes do not agree; the message names argument, expected and actual shape.
     ///
     /// Examples
     /// --------
@@ -342,7 +342,7 @@ impl Arm {
     /// q : array_like, (..., N)
     ///     Angles (rad).
     /// out : numpy.ndarray, (..., N, N), optional
-    ///     Where the result goes.
+    ///     Array for the result.
     ///
     /// Returns
     /// -------
@@ -352,7 +352,7 @@ impl Arm {
     /// Raises
     /// ------
     /// ValueError
-    ///     For shapes that do not fit.
+    ///     If the shapes do not agree.
     #[pyo3(signature = (q, *, out = None))]
     fn mass_matrix<'py>(
         &self,
@@ -370,7 +370,7 @@ impl Arm {
     /// q : array_like, (..., N)
     ///     Angles (rad).
     /// out : numpy.ndarray, (..., N), optional
-    ///     Where the result goes.
+    ///     Array for the result.
     ///
     /// Returns
     /// -------
@@ -380,7 +380,7 @@ impl Arm {
     /// Raises
     /// ------
     /// ValueError
-    ///     For shapes that do not fit.
+    ///     If the shapes do not agree.
     #[pyo3(signature = (q, *, out = None))]
     fn gravity<'py>(
         &self,
@@ -398,7 +398,7 @@ impl Arm {
     /// q, qd, tau : array_like, (..., N)
     ///     Angles (rad), velocities (rad/s), joint torques (N m).
     /// out : numpy.ndarray, (..., N), optional
-    ///     Where the result goes.
+    ///     Array for the result.
     ///
     /// Returns
     /// -------
@@ -408,7 +408,7 @@ impl Arm {
     /// Raises
     /// ------
     /// ValueError
-    ///     For shapes that do not fit.
+    ///     If the shapes do not agree.
     #[pyo3(signature = (q, qd, tau, *, out = None))]
     fn forward_dynamics<'py>(
         &self,
@@ -429,7 +429,7 @@ impl Arm {
     /// q, qd : array_like, (..., N)
     ///     Angles (rad), velocities (rad/s).
     /// out : numpy.ndarray, (..., N), optional
-    ///     Where the result goes.
+    ///     Array for the result.
     ///
     /// Returns
     /// -------
@@ -439,7 +439,7 @@ impl Arm {
     /// Raises
     /// ------
     /// ValueError
-    ///     For shapes that do not fit.
+    ///     If the shapes do not agree.
     #[pyo3(signature = (q, qd, *, out = None))]
     fn coriolis<'py>(
         &self,
@@ -458,7 +458,7 @@ impl Arm {
     /// q, qd : array_like, (..., N)
     ///     Angles (rad), velocities (rad/s).
     /// out : numpy.ndarray, (..., N, N), optional
-    ///     Where the result goes.
+    ///     Array for the result.
     ///
     /// Returns
     /// -------
@@ -468,7 +468,7 @@ impl Arm {
     /// Raises
     /// ------
     /// ValueError
-    ///     For shapes that do not fit.
+    ///     If the shapes do not agree.
     #[pyo3(signature = (q, qd, *, out = None))]
     fn coriolis_matrix<'py>(
         &self,
@@ -487,7 +487,7 @@ impl Arm {
     /// q : array_like, (..., N)
     ///     Angles (rad).
     /// out : numpy.ndarray, (..., 4, 4), optional
-    ///     Where the result goes.
+    ///     Array for the result.
     ///
     /// Returns
     /// -------
@@ -497,7 +497,7 @@ impl Arm {
     /// Raises
     /// ------
     /// ValueError
-    ///     For shapes that do not fit.
+    ///     If the shapes do not agree.
     #[pyo3(signature = (q, *, out = None))]
     fn tip_pose<'py>(
         &self,
@@ -515,7 +515,7 @@ impl Arm {
     /// q : array_like, (..., N)
     ///     Angles (rad).
     /// out : numpy.ndarray, (..., 6, N), optional
-    ///     Where the result goes.
+    ///     Array for the result.
     ///
     /// Returns
     /// -------
@@ -525,7 +525,7 @@ impl Arm {
     /// Raises
     /// ------
     /// ValueError
-    ///     For shapes that do not fit.
+    ///     If the shapes do not agree.
     #[pyo3(signature = (q, *, out = None))]
     fn jacobian<'py>(
         &self,
@@ -543,7 +543,7 @@ impl Arm {
     /// q, qd : array_like, (..., N)
     ///     Angles (rad), velocities (rad/s).
     /// out : numpy.ndarray, (..., 6), optional
-    ///     Where the result goes.
+    ///     Array for the result.
     ///
     /// Returns
     /// -------
@@ -553,7 +553,7 @@ impl Arm {
     /// Raises
     /// ------
     /// ValueError
-    ///     For shapes that do not fit.
+    ///     If the shapes do not agree.
     #[pyo3(signature = (q, qd, *, out = None))]
     fn jacobian_dot_qd<'py>(
         &self,
@@ -574,17 +574,17 @@ impl Arm {
     /// q, qd, qdd : array_like, (..., N)
     ///     Angles (rad), velocities (rad/s), accelerations (rad/s^2).
     /// out : numpy.ndarray, (..., N, 10 N), optional
-    ///     Where the result goes.
+    ///     Array for the result.
     ///
     /// Returns
     /// -------
     /// numpy.ndarray, (..., N, 10 N)
-    ///     Ten columns a link, in the order of :attr:`parameters`.
+    ///     Ten columns for each link, in the order of :attr:`parameters`.
     ///
     /// Raises
     /// ------
     /// ValueError
-    ///     For shapes that do not fit.
+    ///     If the shapes do not agree.
     ///
     /// Examples
     /// --------

@@ -1,8 +1,8 @@
-//! NumPy arrays in and out: shapes, batches, memory.
+//! Conversion of NumPy arrays: shapes, batches, memory.
 //!
-//! Every argument of a state is `(..., width)`: the last axis is one state, those before it are the
-//! batch. Arguments of one call have the same batch, or none: one state then serves the whole batch.
-//! Float64 arrays in C order are read where they are; others are copied first.
+//! Every argument of a state has shape `(..., width)`: the last axis is one state, the leading axes are the
+//! batch. All arguments of one call have the same batch axes or none; a single state is used for the whole
+//! batch. Float64 arrays in C order are read without a copy; others are copied first.
 
 use numpy::{
     IntoPyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArrayDyn,
@@ -16,10 +16,10 @@ use pyo3::types::IntoPyDict;
 /// An array of float64.
 pub type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 
-/// An argument as it was given.
+/// Name and value of an argument.
 pub type Argument<'a, 'py> = (&'static str, &'a Bound<'py, PyAny>);
 
-/// Numbers of one argument: `width` for each state, or `width` for all.
+/// Values of one argument: `width` for each state, or `width` for all states together.
 #[derive(Clone, Copy)]
 pub struct States<'a> {
     values: &'a [f64],
@@ -28,27 +28,26 @@ pub struct States<'a> {
 }
 
 impl<'a> States<'a> {
-    /// The numbers of state `k`.
+    /// The values of state `k`.
     #[inline]
     pub fn at(&self, k: usize) -> &'a [f64] {
         &self.values[k * self.stride..][..self.width]
     }
 }
 
-/// The arguments of one call, borrowed, and their batch.
+/// The borrowed arguments of one call and their batch.
 pub struct Batch<'py> {
     arguments: Vec<PyReadonlyArrayDyn<'py, f64>>,
     width: usize,
-    /// Axes before the last one, empty for a single state.
+    /// Leading axes, empty for a single state.
     pub shape: Vec<usize>,
 }
 
 impl<'py> Batch<'py> {
-    /// Reads arguments of `width` numbers a state. `of` says what they are, such as `one angle a
-    /// joint`.
+    /// Reads arguments of `width` numbers for each state.
     ///
     /// # Errors
-    /// `TypeError` for what is not numbers, `ValueError` for shapes that do not fit.
+    /// `TypeError` if an argument is not numeric, `ValueError` if the shapes do not agree.
     pub fn read(arguments: &[Argument<'_, 'py>], width: usize) -> PyResult<Self> {
         let mut arrays = Vec::with_capacity(arguments.len());
         let mut batch: Option<(&'static str, Vec<usize>)> = None;
@@ -81,7 +80,7 @@ impl<'py> Batch<'py> {
         })
     }
 
-    /// The numbers, argument by argument.
+    /// The values of each argument.
     pub fn states(&self) -> PyResult<Vec<States<'_>>> {
         let of = |array| {
             Ok(States {
@@ -102,10 +101,10 @@ fn slice<'a>(array: &'a PyReadonlyArrayDyn<'_, f64>) -> PyResult<&'a [f64]> {
     Ok(array.as_slice()?)
 }
 
-/// An argument as float64 in C order, itself if it is that already.
+/// An argument as a float64 array in C order, without a copy if it already is one.
 ///
 /// # Errors
-/// `TypeError` for what is not numbers; `ValueError` for ragged lists and borrowed arrays.
+/// `TypeError` if it is not numeric; `ValueError` for ragged lists and borrowed arrays.
 pub fn numbers<'py>(
     name: &str,
     value: &Bound<'py, PyAny>,
@@ -147,7 +146,7 @@ fn type_name(value: &Bound<'_, PyAny>) -> String {
 /// An array of exactly this shape.
 ///
 /// # Errors
-/// As [`numbers`]; `ValueError` for another shape.
+/// As [`numbers`]; `ValueError` if the shape differs.
 pub fn fixed<'py>(
     name: &str,
     value: &Bound<'py, PyAny>,
@@ -160,10 +159,10 @@ pub fn fixed<'py>(
     Err(wrong_shape(name, &shape_text(shape), array.shape()))
 }
 
-/// Where results go: `out`, or a new array.
+/// The array for the results: `out`, or a new array.
 ///
 /// # Errors
-/// `TypeError` and `ValueError` where `out` is not a writable float64 array in C order of this shape.
+/// `TypeError` and `ValueError` if `out` is not a writable float64 array in C order of this shape.
 pub fn output<'py>(
     py: Python<'py>,
     out: Option<&Bound<'py, PyAny>>,
@@ -193,18 +192,18 @@ pub fn output<'py>(
     }
     let writable = array.try_readwrite().map_err(|error| {
         PyValueError::new_err(refuse(format!(
-            "one that is not: {error}; it must not share memory with an argument"
+            "a read-only or borrowed array: {error}; it must not share memory with an argument"
         )))
     })?;
     Ok((array.clone(), writable))
 }
 
-/// A new array of `shape` that takes over `values`.
+/// A new array of `shape` that takes ownership of `values`.
 pub fn array<'py>(py: Python<'py>, values: Vec<f64>, shape: &[usize]) -> PyResult<Array<'py>> {
     values.into_pyarray(py).reshape(shape.to_vec())
 }
 
-/// `ValueError` for an argument of another shape than expected.
+/// `ValueError` for an argument of unexpected shape.
 pub fn wrong_shape(name: &str, expected: &str, found: &[usize]) -> PyErr {
     PyValueError::new_err(format!(
         "{name}: expected shape {expected}, got {}",
@@ -212,7 +211,7 @@ pub fn wrong_shape(name: &str, expected: &str, found: &[usize]) -> PyErr {
     ))
 }
 
-/// As Python writes a tuple.
+/// A shape as Python prints a tuple.
 pub fn shape_text(shape: &[usize]) -> String {
     match shape {
         [one] => format!("({one},)"),

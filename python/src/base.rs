@@ -1,4 +1,4 @@
-//! Base parameters of an arm: what any motion could tell of it.
+//! Base parameters of an arm: the combinations that any motion can identify.
 
 use crate::arm::Arm;
 use crate::arrays;
@@ -8,10 +8,10 @@ use pyo3::types::PyDict;
 use supple_core::Vector;
 use supple_ident::base::RANK_TOLERANCE;
 use supple_ident::regressor::rows;
-use supple_ident::{Base, Columns, DMatrix, DVector, FrictionColumns, IdentError, model};
+use supple_ident::{BaseParameters, Columns, DMatrix, DVector, FrictionColumns, IdentError, model};
 use supple_model::{ModelError, with_dof};
 
-/// Base parameters, of the regressor stacked over given states.
+/// Base parameters of the regressor stacked over given states.
 #[pyfunction]
 pub fn base_parameters<'py>(
     py: Python<'py>,
@@ -57,8 +57,8 @@ pub fn base_parameters<'py>(
     Ok(dict)
 }
 
-/// The base, the columns that it is of, and the values of all columns.
-type Found = (Base, Columns, DVector<f64>);
+/// The base parameters, their columns, and the values of all columns.
+type Found = (BaseParameters, Columns, DVector<f64>);
 
 fn sized<const N: usize>(
     arm: &supple_core::Arm<N>,
@@ -76,8 +76,8 @@ fn sized<const N: usize>(
             .rows_mut(k * moving.len(), moving.len())
             .copy_from(&block);
     }
-    // The triangle has the same columns' lengths and angles, and is small.
-    let base = Base::of(&stacked.qr().r(), RANK_TOLERANCE)?;
+    // The triangular factor has the same column norms and angles and is small.
+    let base = BaseParameters::of(&stacked.qr().r(), RANK_TOLERANCE)?;
     let values = model::prior(arm, &columns);
     Ok((base, columns, values))
 }

@@ -1,12 +1,12 @@
 //! The functions of [`supple_core::dynamics`] over batches, for any number of joints.
 //!
-//! The number of joints is in the type of an arm; [`Dynamics`] takes it out of the type, once a call,
-//! not once a state. Results are row by row, as NumPy has them.
+//! [`Dynamics`] dispatches on the number of joints once per call, not once per state. Results are stored by
+//! rows, as in NumPy.
 
 use crate::arrays::States;
 use supple_core::{Arm, Matrix, Vector, dynamics};
 
-/// What is computed of a state.
+/// Quantity to compute for a state.
 #[derive(Clone, Copy, Debug)]
 pub enum Quantity {
     /// Torques from `q`, `qd`, `qdd`.
@@ -46,19 +46,19 @@ impl Quantity {
     }
 }
 
-/// An arm of any number of joints.
+/// An arm with any number of joints.
 pub trait Dynamics: Send + Sync {
-    /// Fills `out`, one result after the other. `states` are the arguments that the quantity names,
-    /// in that order.
+    /// Writes the results to `out`, one after the other. `states` are the arguments of the quantity, in its
+    /// order.
     fn evaluate(&self, quantity: Quantity, states: &[States<'_>], out: &mut [f64]);
 
-    /// Ten parameters a link.
+    /// Ten parameters for each link.
     fn parameters(&self) -> Vec<f64>;
 
     /// Rotor inertia of each joint \[kg m^2\].
     fn armature(&self) -> Vec<f64>;
 
-    /// Acceleration of free fall \[m/s^2\].
+    /// Gravitational acceleration \[m/s^2\].
     fn gravity_m_per_s2(&self) -> [f64; 3];
 }
 
@@ -124,17 +124,17 @@ impl<const N: usize> Dynamics for Arm<N> {
     }
 }
 
-/// States of which the results are moved together.
+/// Number of states whose results are copied together.
 const CHUNK: usize = 16;
 
-/// A batch with the width of its results.
+/// A batch and the width of its results.
 struct Each<'a> {
     states: &'a [States<'a>],
     width: usize,
 }
 
 impl Each<'_> {
-    /// Calls `f` for every state with its `K` arguments and the place of its result.
+    /// Calls `f` for every state with its `K` arguments and the slice for its result.
     #[inline]
     fn run<const N: usize, const K: usize>(
         &self,
@@ -146,9 +146,8 @@ impl Each<'_> {
         }
     }
 
-    /// As [`Each::run`], for wide results with zeros that `f` need not write. They are made in a buffer
-    /// that stays in the cache and moved to `out` many at a time: a long move does not fetch the memory
-    /// that it overwrites.
+    /// As [`Each::run`], for wide results with zeros that `f` need not write. Results are computed in a
+    /// cache-resident buffer and copied in large blocks, so that the copy does not read the destination first.
     #[inline]
     fn run_in_chunks<const N: usize, const K: usize>(
         &self,
@@ -170,7 +169,7 @@ impl Each<'_> {
 
     #[inline(always)]
     fn arguments<const N: usize, const K: usize>(&self, k: usize) -> [Vector<N>; K] {
-        // In a loop: a closure may be left as a call.
+        // A loop, since a closure might not be inlined.
         let mut arguments = [Vector::zeros(); K];
         for (argument, states) in arguments.iter_mut().zip(self.states) {
             if let Some(state) = states.at(k).first_chunk::<N>() {
@@ -181,7 +180,7 @@ impl Each<'_> {
     }
 }
 
-/// A copy of a length that is known is a few moves.
+/// A copy of known length compiles to a few moves.
 #[inline(always)]
 fn put<const N: usize>(result: &Vector<N>, out: &mut [f64]) {
     if let Some(out) = out.first_chunk_mut() {

@@ -1,4 +1,4 @@
-//! Refusals of the crates as Python's exceptions, their messages unchanged.
+//! Conversion of the crates' errors to Python exceptions with unchanged messages.
 
 use pyo3::PyErr;
 use pyo3::exceptions::{
@@ -12,7 +12,7 @@ use supple_ident::{IdentError, SaveError};
 use supple_log::LogError;
 use supple_model::{Description, ModelError};
 
-/// `FileNotFoundError` and `OSError` for what cannot be read, `ValueError` for what makes no sense.
+/// `FileNotFoundError` and `OSError` for files that cannot be read, `ValueError` for invalid content.
 pub fn model(error: ModelError) -> PyErr {
     match &error {
         ModelError::Read { error: cause, .. } | ModelError::Write { error: cause, .. } => {
@@ -22,17 +22,18 @@ pub fn model(error: ModelError) -> PyErr {
     }
 }
 
-/// What a URDF holds and is not read, as a `UserWarning` each; an error where the interpreter makes one of it.
+/// A `UserWarning` for each URDF element that is not read; an error if the interpreter turns warnings into
+/// errors.
 pub fn warn(py: Python<'_>, description: &Description) -> PyResult<()> {
     let category = py.get_type::<PyUserWarning>();
     description.warnings().iter().try_for_each(|warning| {
-        // No text of an XML document has a zero byte.
+        // XML text contains no zero byte.
         let text = CString::new(warning.to_string().replace('\0', " "))?;
         PyErr::warn(py, &category, &text, 1)
     })
 }
 
-/// What the system refused.
+/// Errors of the operating system.
 pub fn system(cause: &io::Error, message: String) -> PyErr {
     match cause.kind() {
         io::ErrorKind::NotFound => PyFileNotFoundError::new_err(message),
@@ -40,7 +41,7 @@ pub fn system(cause: &io::Error, message: String) -> PyErr {
     }
 }
 
-/// Logs that cannot be read, or are not whole.
+/// Errors of reading logs.
 pub fn log(error: LogError) -> PyErr {
     match error {
         LogError::Model(error) => model(error),
@@ -51,7 +52,7 @@ pub fn log(error: LogError) -> PyErr {
     }
 }
 
-/// Experiments that cannot be run.
+/// Errors of experiments.
 pub fn experiment(error: ExperimentError) -> PyErr {
     match error {
         ExperimentError::Model(error) => model(error),
@@ -61,12 +62,12 @@ pub fn experiment(error: ExperimentError) -> PyErr {
     }
 }
 
-/// Logs and options that identification refuses.
+/// Errors of identification.
 pub fn identification(error: IdentError) -> PyErr {
     PyValueError::new_err(error.to_string())
 }
 
-/// Fits that are no arm.
+/// Errors of converting or saving a fit.
 pub fn save(error: SaveError) -> PyErr {
     match error {
         SaveError::Fit(error) => identification(error),

@@ -1,4 +1,4 @@
-//! Excitation: its design, and a simulated arm that follows it.
+//! Excitation: its design, and a simulated arm that tracks it.
 
 use crate::arm::Arm;
 use crate::arrays;
@@ -9,11 +9,11 @@ use pyo3::types::PyDict;
 use std::path::PathBuf;
 use supple_experiment::calibrate::{Calibration, log_of, plant_of};
 use supple_experiment::{ExperimentError, excitation};
-use supple_ident::design::{self, Criterion, Design, Designed, Workspace};
+use supple_ident::design::{self, Criterion, DesignOptions, ExcitationDesign, Workspace};
 use supple_ident::{IdentError, Log, SeriesLists};
 use supple_model::{Description, ModelError, with_dof};
 
-/// What is asked for; the package has checked names and fills in defaults.
+/// Options of the design; the package checks names and fills in defaults.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct Request {
@@ -27,7 +27,7 @@ pub struct Request {
     rate_hz: f64,
 }
 
-/// A series, its size no longer in its type.
+/// A Fourier series with a run-time number of joints.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct Series {
@@ -52,8 +52,8 @@ impl From<Series> for SeriesLists {
     }
 }
 
-/// Searches for an excitation. `progress` hears candidates tried and the best value so far, a hundred
-/// times at most; what it raises ends the search where it stands.
+/// Searches for an excitation. `progress` receives the number of candidates and the best value so far, at most
+/// a hundred times. An exception in `progress` stops the search.
 #[pyfunction]
 pub fn design_excitation<'py>(
     py: Python<'py>,
@@ -64,21 +64,21 @@ pub fn design_excitation<'py>(
     let description = arm.description();
     let every = (request.candidates / 100).max(1);
     let mut raised: Option<PyErr> = None;
-    let mut hear = |tried: usize, best: f64| {
+    let mut report_progress = |tried: usize, best: f64| {
         if raised.is_some() || !tried.is_multiple_of(every) {
             return;
         }
-        let heard = Python::attach(|py| {
+        let result = Python::attach(|py| {
             py.check_signals()?;
             match &progress {
                 Some(progress) => progress.call1(py, (tried, best)).map(drop),
                 None => Ok(()),
             }
         });
-        raised = heard.err();
+        raised = result.err();
     };
     let columns = py.detach(|| {
-        with_dof!(description.dof(), N => searched::<N>(description, &request, &mut hear))
+        with_dof!(description.dof(), N => searched::<N>(description, &request, &mut report_progress))
             .map_err(Refused::Model)
             .flatten()
     });
@@ -122,11 +122,11 @@ struct Found {
 fn searched<const N: usize>(
     description: &Description,
     request: &Request,
-    hear: &mut dyn FnMut(usize, f64),
+    report_progress: &mut dyn FnMut(usize, f64),
 ) -> Result<Found, Refused> {
     let config = description.config::<N>().map_err(Refused::Model)?;
     let home = description.home::<N>().map_err(Refused::Model)?;
-    let wanted = Design {
+    let wanted = DesignOptions {
         moving: request.moving.clone(),
         period_s: request.period_s,
         periods: request.periods,
@@ -141,11 +141,12 @@ fn searched<const N: usize>(
         candidates: request.candidates,
         seed: request.seed,
     };
-    let designed = design::design(&config, &home, &wanted, hear).map_err(Refused::Design)?;
-    Ok(unsized_series(&designed, request.rate_hz))
+    let designed =
+        design::design(&config, &home, &wanted, report_progress).map_err(Refused::Design)?;
+    Ok(series_for_python(&designed, request.rate_hz))
 }
 
-fn unsized_series<const N: usize>(designed: &Designed<N>, rate_hz: f64) -> Found {
+fn series_for_python<const N: usize>(designed: &ExcitationDesign<N>, rate_hz: f64) -> Found {
     let series = &designed.series;
     let mut table = Table::default();
     for i in 0..=(series.duration_s * rate_hz).floor() as usize {
@@ -166,29 +167,29 @@ fn unsized_series<const N: usize>(designed: &Designed<N>, rate_hz: f64) -> Found
     }
 }
 
-/// How the simulated arm is driven; the package has checked names and fills in defaults.
+/// Options of the simulated excitation; the package checks names and fills in defaults.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-pub struct Drive {
+pub struct ExciteOptions {
     encoder_noise_rad: f64,
     load: bool,
     seed: u64,
     log_dir: Option<PathBuf>,
 }
 
-/// The simulated arm follows a series; what it would have logged. `model` is what its controller knows.
+/// Simulates an arm that tracks a series and returns its log. `model` is the controller's model of the arm.
 #[pyfunction]
 pub fn excite<'py>(
     py: Python<'py>,
     arm: &Arm,
     model: &Arm,
     series: Series,
-    drive: Drive,
+    options: ExciteOptions,
 ) -> PyResult<Bound<'py, PyDict>> {
     let (truth, known) = (arm.description(), model.description());
     let series = SeriesLists::from(series);
     let log = py.detach(|| {
-        with_dof!(truth.dof(), N => followed::<N>(truth, known, &series, &drive))
+        with_dof!(truth.dof(), N => followed::<N>(truth, known, &series, &options))
             .map_err(ExperimentError::from)
             .flatten()
     });
@@ -206,7 +207,7 @@ pub fn excite<'py>(
     dict.set_item("q", rows(&log.q_rad)?)?;
     dict.set_item("tau", rows(&log.tau_nm)?)?;
     dict.set_item("period_s", period_s)?;
-    let path = drive.log_dir.map(|folder| folder.join("excitation.mcap"));
+    let path = options.log_dir.map(|folder| folder.join("excitation.mcap"));
     dict.set_item("log", path)?;
     Ok(dict)
 }
@@ -215,17 +216,17 @@ fn followed<const N: usize>(
     truth: &Description,
     known: &Description,
     series: &SeriesLists,
-    drive: &Drive,
+    options: &ExciteOptions,
 ) -> Result<(Log, f64), ExperimentError> {
     let calibration = Calibration {
-        encoder_noise_rad: drive.encoder_noise_rad,
-        load: drive.load,
-        ..Calibration::new(drive.seed)
+        encoder_noise_rad: options.encoder_noise_rad,
+        load: options.load,
+        ..Calibration::new(options.seed)
     };
     let plant = plant_of::<N>(truth, &calibration)?;
     let (config, home) = (known.config::<N>()?, truth.home::<N>()?);
     let series = series.fourier::<N>()?;
-    let session = excitation("excitation", &config, &plant, &home, &[series]);
-    let recordings = session.record(drive.log_dir.as_deref(), known, drive.seed)?;
+    let sequence = excitation("excitation", &config, &plant, &home, &[series]);
+    let recordings = sequence.record(options.log_dir.as_deref(), known, options.seed)?;
     Ok((log_of(&recordings[0]), config.period_s))
 }

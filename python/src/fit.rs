@@ -1,11 +1,11 @@
-//! Identification: a fit of any number of joints.
+//! Identification: a fit with any number of joints.
 
 use crate::arm::Arm;
 use crate::arrays::{self, Argument, Array, Batch, States};
 use crate::errors;
 use crate::friction::Friction;
 use crate::options::Options;
-use crate::samples::{Given, Samples};
+use crate::samples::{LogInput, Samples};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use supple_core::ripple::{Harmonic, LINES};
@@ -13,11 +13,11 @@ use supple_core::{Body, Matrix, RippleTable, Vector};
 use supple_ident::payload::{payload, torque_scale};
 use supple_ident::{
     DMatrix, IdentError, Motion, Preparation, Procedure, RippleSearch, SaveError, Validation,
-    Warning, fit_ripple, fit_with_dip, identify_motions,
+    Warning, fit_ripple, fit_with_stribeck, identify_motions,
 };
 use supple_model::{Description, ModelError, with_dof};
 
-/// A fit of any number of joints.
+/// A fit with any number of joints.
 pub trait Model: Send + Sync {
     fn payload(&self, motions: &[Motion], guess: &Body) -> Result<Body, IdentError>;
     fn torque_scale(
@@ -48,7 +48,7 @@ pub trait Model: Send + Sync {
 /// Harmonic, sine and cosine amplitude \[N m\].
 pub type Line = (u32, f64, f64);
 
-/// Lines of all motors as tables.
+/// Converts the lines of all motors to ripple tables.
 fn tables<const N: usize>(ripple: &[Vec<Line>]) -> Result<[RippleTable; N], IdentError> {
     let wrong = |found: String| IdentError::Shape {
         argument: "ripple".to_owned(),
@@ -73,7 +73,7 @@ fn tables<const N: usize>(ripple: &[Vec<Line>]) -> Result<[RippleTable; N], Iden
     Ok(tables)
 }
 
-/// What a fit says of itself, its size no longer in its type.
+/// Results of a fit with a run-time number of joints.
 pub struct Report {
     columns: Vec<(String, f64)>,
     base_names: Vec<String>,
@@ -174,18 +174,18 @@ impl<const N: usize> Model for supple_ident::Fit<N> {
             moving: self.columns.moving().to_vec(),
             noise_nm: self.noise_nm.clone(),
             training_relative: self.training_relative,
-            gap: self.gap,
+            gap: self.optimality_gap,
             friction: self.friction_with(known).to_vec(),
             choices: self
                 .choices
                 .iter()
-                .map(|choice| (choice.of.to_owned(), choice.table.to_string()))
+                .map(|choice| (choice.subject.to_owned(), choice.table.to_string()))
                 .collect(),
         }
     }
 }
 
-/// Private: what `supple.Fit` is built on.
+/// Private class on which `supple.Fit` is built.
 #[pyclass(frozen, module = "supple._native")]
 pub struct Fit {
     of: Description,
@@ -194,22 +194,22 @@ pub struct Fit {
 }
 
 impl Fit {
-    /// The arm that was given.
+    /// The nominal arm.
     pub fn description(&self) -> &Description {
         &self.of
     }
 
-    /// The fit itself.
+    /// The fit.
     pub fn model(&self) -> &dyn Model {
         &*self.model
     }
 
-    /// The logs that were fitted, as they were prepared.
+    /// The fitted logs, as prepared.
     pub fn fitted(&self) -> &[Motion] {
         &self.motions
     }
 
-    /// Logs prepared as the fitted ones were.
+    /// Prepares logs like the fitted ones.
     pub fn motions_of(&self, logs: &[Samples]) -> PyResult<Vec<Motion>> {
         let motions = logs.iter().map(|log| self.model.motion(log));
         motions
@@ -220,7 +220,7 @@ impl Fit {
 
 #[pymethods]
 impl Fit {
-    /// Everything that is one value, by name.
+    /// All results by name.
     fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let report = self.model.report(self.of.friction());
         let dict = PyDict::new(py);
@@ -244,8 +244,8 @@ impl Fit {
         Ok(dict)
     }
 
-    /// The prepared samples of each log that was fitted; `predicted` has a column a moving joint, dry
-    /// friction filtered as the torques were.
+    /// The prepared samples of each fitted log; `predicted` has one column for each moving joint, with dry
+    /// friction filtered like the torques.
     fn motions<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let of = |motion: &Motion| {
             let dict = PyDict::new(py);
@@ -270,12 +270,12 @@ impl Fit {
         self.motions.iter().map(of).collect()
     }
 
-    /// The arm that was given.
+    /// The nominal arm.
     fn arm_given(&self) -> PyResult<Arm> {
         Arm::new(self.of.clone()).map_err(errors::model)
     }
 
-    /// The arm found, as a description that the controller loads.
+    /// The identified arm, as a description that the controller loads.
     #[pyo3(signature = (ripple = None))]
     fn arm(&self, ripple: Option<Vec<Vec<Line>>>) -> PyResult<Arm> {
         let description = self.model.description(&self.of, ripple.as_deref());
@@ -301,7 +301,7 @@ impl Fit {
         Ok(array)
     }
 
-    fn validate<'py>(&self, py: Python<'py>, log: Given<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn validate<'py>(&self, py: Python<'py>, log: LogInput<'py>) -> PyResult<Bound<'py, PyDict>> {
         let samples = Samples::read(&log, self.of.dof())?;
         let validation = py.detach(|| self.model.validate(&samples));
         let validation = validation.map_err(errors::identification)?;
@@ -324,21 +324,21 @@ fn matrix<'py>(py: Python<'py>, columns: &DMatrix<f64>) -> PyResult<Array<'py>> 
     arrays::array(py, columns.transpose().as_slice().to_vec(), &[rows, width])
 }
 
-/// Identifies `arm` from logs: the fit, and what is doubtful about it.
+/// Identifies `arm` from logs; returns the fit and its warnings.
 #[pyfunction]
 pub fn identify(
     py: Python<'_>,
     arm: &Arm,
-    logs: Vec<Given<'_>>,
+    logs: Vec<LogInput<'_>>,
     options: Options,
 ) -> PyResult<(Fit, Vec<String>)> {
     let of = arm.description().clone();
     let logs = logs.iter().map(|log| Samples::read(log, of.dof()));
     let logs = logs.collect::<PyResult<Vec<_>>>()?;
-    let dip = options.dip;
+    let find_stribeck = options.find_stribeck;
     let procedure = options.procedure()?;
     let found = py.detach(|| -> Result<_, Refused> {
-        with_dof!(of.dof(), N => sized::<N>(&of, &logs, &procedure, dip))?
+        with_dof!(of.dof(), N => sized::<N>(&of, &logs, &procedure, find_stribeck))?
     });
     let (model, motions, warnings) = found.map_err(|refused| match refused {
         Refused::Model(error) => errors::model(error),
@@ -371,18 +371,18 @@ fn sized<const N: usize>(
     of: &Description,
     logs: &[Samples],
     procedure: &Procedure,
-    dip: bool,
+    find_stribeck: bool,
 ) -> Result<Found, Refused> {
     let arm = of.arm::<N>()?;
     let moving = procedure.moving_joints(N)?;
     let (mut motions, mut warnings) = (Vec::new(), Vec::new());
     for log in logs {
-        let (motion, doubts) = log.motion(&moving, &procedure.preparation)?;
+        let (motion, result_warnings) = log.motion(&moving, &procedure.preparation)?;
         motions.push(motion);
-        warnings.extend(doubts);
+        warnings.extend(result_warnings);
     }
-    let fit = if dip {
-        fit_with_dip(&arm, &motions, &moving, procedure)?
+    let fit = if find_stribeck {
+        fit_with_stribeck(&arm, &motions, &moving, procedure)?
     } else {
         identify_motions(&arm, &motions, &moving, procedure)?
     };

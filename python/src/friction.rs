@@ -1,4 +1,4 @@
-//! Friction of a joint, as the controller's law has it.
+//! Friction of a joint in the controller's law.
 
 use crate::arrays;
 use numpy::PyUntypedArrayMethods;
@@ -6,7 +6,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use supple_core::friction;
 
-/// Friction of one joint: viscous and Coulomb, continuous over a band, with a Stribeck dip and an offset.
+/// Friction of one joint: viscous and Coulomb, continuous over a band, with Stribeck effect and offset.
 ///
 /// ``D(v) = V v + offset + [S + (S0 - S) exp(-(v / v_s)^2)] p(v / delta)`` with
 /// ``p(x) = 2 x - sign(x) x^2`` inside the band and ``sign(x)`` outside. Immutable.
@@ -18,7 +18,7 @@ use supple_core::friction;
 /// coulomb_nm : float
 ///     ``S`` (N m), zero or more. Default 0.
 /// breakaway_nm : float, optional
-///     ``S0`` (N m), at least ``coulomb_nm``. Default: ``coulomb_nm``, no dip.
+///     ``S0`` (N m), at least ``coulomb_nm``. Default: ``coulomb_nm``, no Stribeck effect.
 /// stribeck_rad_per_s : float
 ///     ``v_s`` (rad/s), positive. Default 0.05.
 /// offset_nm : float
@@ -29,7 +29,7 @@ use supple_core::friction;
 /// Raises
 /// ------
 /// ValueError
-///     For friction that would feed energy into the joint.
+///     If the friction would supply energy to the joint.
 ///
 /// Examples
 /// --------
@@ -90,13 +90,13 @@ impl Friction {
         self.inner.coulomb_nm
     }
 
-    /// Torque that the Stribeck curve tends to at rest (N m).
+    /// Limit of the Stribeck curve at standstill (N m).
     #[getter]
     fn breakaway_nm(&self) -> f64 {
         self.inner.breakaway_nm
     }
 
-    /// Speed over which the dip fades (rad/s).
+    /// Stribeck speed (rad/s).
     #[getter]
     fn stribeck_rad_per_s(&self) -> f64 {
         self.inner.stribeck_rad_per_s
@@ -114,7 +114,7 @@ impl Friction {
         self.inner.band_rad_per_s
     }
 
-    /// Torque that overcomes friction (N m), of the shape of ``velocity_rad_per_s``.
+    /// Torque that compensates friction (N m), of the shape of ``velocity_rad_per_s``.
     ///
     /// Parameters
     /// ----------
@@ -131,7 +131,7 @@ impl Friction {
         arrays::array(py, torques, velocity.shape())
     }
 
-    /// What a pickle calls: viscous, Coulomb, breakaway, Stribeck speed, offset, band.
+    /// Constructor for pickles: viscous, Coulomb, breakaway, Stribeck speed, offset, band.
     #[staticmethod]
     fn _of(values: [f64; 6]) -> PyResult<Self> {
         let [viscous, coulomb, breakaway, stribeck, offset, band] = values;

@@ -1,16 +1,16 @@
-//! Learning from the prediction error of repeated motion.
+//! Learning from the prediction error of a repeated motion.
 
 use crate::arm::Arm;
 use crate::arrays;
 use crate::errors;
-use crate::samples::{Given, Samples};
+use crate::samples::{LogInput, Samples};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use supple_ident::learn::with_payload;
 use supple_ident::{Learned, Learning, Preparation, SaveError, learn as learned};
-use supple_model::{Description, Replacement, with_dof};
+use supple_model::{Description, IdentifiedModel, with_dof};
 
-/// What may change; the package has filled in defaults.
+/// Options of the learning; the package fills in defaults.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct Options {
@@ -31,12 +31,12 @@ struct Found {
     payload: Option<[f64; 4]>,
 }
 
-/// The arm with what logs of repeated motion have taught.
+/// Updates friction and payload of an arm from logs of a repeated motion.
 #[pyfunction]
 pub fn learn<'py>(
     py: Python<'py>,
     arm: &Arm,
-    logs: Vec<Given<'py>>,
+    logs: Vec<LogInput<'py>>,
     options: Options,
 ) -> PyResult<Bound<'py, PyDict>> {
     let description = arm.description();
@@ -93,7 +93,7 @@ fn sized<const N: usize>(
         &learning,
     )?;
     let arm = with_payload(&config.arm, payload.as_ref())?;
-    let description = of.with_model(&Replacement {
+    let description = of.with_model(&IdentifiedModel {
         arm: &arm,
         friction: &friction,
         ripple: None,

@@ -1,8 +1,8 @@
-//! The native half of the Python package `supple`: its private module `supple._native`.
+//! Native part of the Python package `supple`: its private module `supple._native`.
 //!
-//! It turns NumPy arrays into what the crates take, and their answers into NumPy arrays. It computes
-//! nothing itself: every number comes from the crates that the command line and the controller use.
-//! Shapes are checked here, before the interpreter is let go.
+//! It converts NumPy arrays to the crates' types and their results to NumPy arrays. It computes nothing itself:
+//! every number comes from the crates that the command line and the controller use. Shapes are checked here,
+//! before the GIL is released.
 #![deny(unsafe_code)]
 
 mod arm;
@@ -23,7 +23,7 @@ mod table;
 
 use pyo3::prelude::*;
 
-/// Private: what the package `supple` is built on.
+/// Private module on which the package `supple` is built.
 #[pymodule]
 mod _native {
     use super::*;

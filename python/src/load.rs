@@ -1,50 +1,51 @@
-//! What a fit of an arm tells beside its model: a body in the hand, the scale of the torques, torque ripple.
+//! Further results of a fit: payload, torque scale and torque ripple.
 
 use crate::arrays;
 use crate::errors;
 use crate::fit::Fit;
-use crate::samples::{Given, Samples};
+use crate::samples::{LogInput, Samples};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use supple_core::Body;
 use supple_core::math::{Matrix3, Vector3};
 use supple_ident::{Motion, RippleSearch};
 
-/// A body in the last link's frame.
+/// A payload in the last link's frame.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-pub struct Hand {
+pub struct PayloadBody {
     mass_kg: f64,
     com_m: [f64; 3],
     inertia_kg_m2: [[f64; 3]; 3],
 }
 
-impl From<Hand> for Body {
-    fn from(hand: Hand) -> Body {
+impl From<PayloadBody> for Body {
+    fn from(payload: PayloadBody) -> Body {
         Body {
-            mass_kg: hand.mass_kg,
-            com_m: Vector3::from(hand.com_m),
-            inertia_kg_m2: Matrix3::from_fn(|i, j| hand.inertia_kg_m2[i][j]),
+            mass_kg: payload.mass_kg,
+            com_m: Vector3::from(payload.com_m),
+            inertia_kg_m2: Matrix3::from_fn(|i, j| payload.inertia_kg_m2[i][j]),
         }
     }
 }
 
-fn motions(fit: &Fit, logs: &[Given<'_>]) -> PyResult<Vec<Motion>> {
+fn motions(fit: &Fit, logs: &[LogInput<'_>]) -> PyResult<Vec<Motion>> {
     fit.motions_of(&read(fit, logs)?)
 }
 
-fn read(fit: &Fit, logs: &[Given<'_>]) -> PyResult<Vec<Samples>> {
+fn read(fit: &Fit, logs: &[LogInput<'_>]) -> PyResult<Vec<Samples>> {
     let dof = fit.description().dof();
     logs.iter().map(|log| Samples::read(log, dof)).collect()
 }
 
-/// The body that explains what the fit leaves of logs with it; what they do not tell is drawn to `guess`.
+/// Identifies a payload from the residual of the fit over logs with it; undetermined parameters are regularised
+/// towards `guess`.
 #[pyfunction]
 pub fn payload<'py>(
     py: Python<'py>,
     fit: &Fit,
-    logs: Vec<Given<'py>>,
-    guess: Hand,
+    logs: Vec<LogInput<'py>>,
+    guess: PayloadBody,
 ) -> PyResult<Bound<'py, PyDict>> {
     let motions = motions(fit, &logs)?;
     let guess = Body::from(guess);
@@ -61,13 +62,13 @@ pub fn payload<'py>(
     Ok(dict)
 }
 
-/// True by logged torque of each moving joint, `None` where the known body adds too little to tell.
+/// Ratio of true to logged torque of each moving joint; `None` if the known payload adds too little torque.
 #[pyfunction]
 pub fn torque_scale(
     py: Python<'_>,
     fit: &Fit,
-    logs: Vec<Given<'_>>,
-    known: Hand,
+    logs: Vec<LogInput<'_>>,
+    known: PayloadBody,
 ) -> PyResult<Vec<Option<f64>>> {
     let motions = motions(fit, &logs)?;
     let known = Body::from(known);
@@ -75,12 +76,12 @@ pub fn torque_scale(
     found.map_err(errors::identification)
 }
 
-/// Harmonic, sine and cosine amplitude of every line, motor by motor.
+/// Harmonic, sine and cosine amplitude of every line of each motor.
 #[pyfunction]
 pub fn ripple(
     py: Python<'_>,
     fit: &Fit,
-    logs: Vec<Given<'_>>,
+    logs: Vec<LogInput<'_>>,
     harmonics: Vec<u32>,
     fast_rad_per_s: f64,
     cutoff_hz: f64,

@@ -6,7 +6,9 @@ use crate::table::Table;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
-use supple_log::{CycleTiming, LogError, PlantTruth, Reader, Record, Timed};
+use supple_core::controller::CycleRecord;
+use supple_core::record::{Cell, for_each_column};
+use supple_log::{CycleTiming, LogError, PlantTruth, Reader, Timed};
 use supple_model::with_dof;
 
 /// What a log holds, before it has a form in Python.
@@ -65,7 +67,9 @@ fn sized<const N: usize>(reader: &Reader) -> Result<Columns, LogError> {
         if value.fault != fault {
             fault = value.fault;
             if fault != 0 {
-                columns.faults.push((seconds(time_ns), value.fault_text));
+                columns
+                    .faults
+                    .push((seconds(time_ns), value.fault_text.to_string()));
             }
         }
     }
@@ -80,38 +84,43 @@ fn sized<const N: usize>(reader: &Reader) -> Result<Columns, LogError> {
     Ok(columns)
 }
 
-fn step<const N: usize>(table: &mut Table, t: f64, r: &Record<N>) {
-    let flag = |on: bool| f64::from(u8::from(on));
+/// Every field of a record under its name, the terms of the torque as `torques.<term>`; texts and lists are not numbers.
+fn step<const N: usize>(table: &mut Table, t: f64, record: &CycleRecord<N>) {
     table.number("t", t);
-    table.vector("q", &r.position_rad);
-    table.vector("qd", &r.velocity_rad_per_s);
-    table.vector("tau", &r.torque_nm);
-    table.vector("tip_position_m", &r.tip_position_m);
-    table.vector("tip_velocity_m_per_s", &r.tip_velocity_m_per_s);
-    table.number("has_reference", flag(r.has_reference));
-    table.vector("reference_position_m", &r.reference_position_m);
-    table.vector("reference_velocity_m_per_s", &r.reference_velocity_m_per_s);
-    table.number("has_tip_force", flag(r.has_tip_force));
-    table.vector("tip_force_n", &r.tip_force_n);
-    table.vector("external_torque_nm", &r.external_torque_nm);
-    table.vector("external_force_n", &r.external_force_n);
-    table.vector("stiffness_n_per_m", &r.stiffness_n_per_m);
-    table.vector("damping_n_s_per_m", &r.damping_n_s_per_m);
-    table.number("in_contact", flag(r.in_contact));
-    table.number("friction_share", r.friction_share);
-    let terms = &r.torques;
-    table.vector("gravity_nm", &terms.gravity);
-    table.vector("coriolis_nm", &terms.coriolis);
-    table.vector("friction_nm", &terms.friction);
-    table.vector("jacobian_rate_nm", &terms.jacobian_rate);
-    table.vector("inertial_nm", &terms.inertial);
-    table.vector("stiffness_nm", &terms.stiffness);
-    table.vector("damping_nm", &terms.damping);
-    table.vector("force_nm", &terms.force);
-    table.vector("nullspace_nm", &terms.nullspace);
-    table.vector("joint_pd_nm", &terms.joint_pd);
-    table.vector("soft_stop_nm", &terms.soft_stop);
-    table.vector("handover_nm", &terms.handover);
+    let mut words = vec![0; CycleRecord::<N>::words(N)];
+    record.pack(&mut words);
+    let mut values = Vec::new();
+    let mut open: Option<(&str, Option<&str>)> = None;
+    let close = |table: &mut Table, values: &mut Vec<f64>, name: (&str, Option<&str>)| {
+        match name {
+            (field, Some(term)) => table.vector(&format!("{field}.{term}"), values),
+            (field, None) => table.vector(field, values),
+        }
+        values.clear();
+    };
+    for_each_column(CycleRecord::<N>::FIELDS, &words, N, |column, cell| {
+        let value = match cell {
+            Cell::Flag(flag) => f64::from(u8::from(flag)),
+            Cell::Index(index) => f64::from(index),
+            Cell::Count(count) => count as f64,
+            Cell::Number(number) => number,
+            Cell::Numbers(_) | Cell::Text(_) => return,
+        };
+        let name = (column.field, column.term);
+        if let Some(before) = open.filter(|before| *before != name) {
+            close(table, &mut values, before);
+            open = None;
+        }
+        if column.part.is_none() {
+            table.number(column.field, value);
+        } else {
+            values.push(value);
+            open = Some(name);
+        }
+    });
+    if let Some(last) = open {
+        close(table, &mut values, last);
+    }
     table.end_row();
 }
 

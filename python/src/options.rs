@@ -1,10 +1,10 @@
-//! The options of an identification, as the package gives them.
+//! Options of an identification, as the package passes them.
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use supple_ident::{FrictionChoice, FrictionColumns, Method, Preparation, Procedure};
 
-/// What to fit, and how; the package has checked names and fills in defaults.
+/// Options of an identification; the package checks names and fills in defaults.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct Options {
@@ -16,8 +16,8 @@ pub struct Options {
     torque_delay_s: f64,
     method: String,
     friction: Option<Shape>,
-    /// A Stribeck dip whose speed is found too.
-    pub dip: bool,
+    /// Whether to fit a Stribeck effect, its speed included.
+    pub find_stribeck: bool,
     rotor: bool,
     slow_rad_per_s: f64,
     prior_weight: Option<f64>,
@@ -36,7 +36,7 @@ struct Shape {
 }
 
 impl Options {
-    /// What the crate takes.
+    /// Converts the options to those of the crate.
     pub fn procedure(self) -> PyResult<Procedure> {
         let method = match &self.method[..] {
             "ols" => Method::Ols,

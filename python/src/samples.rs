@@ -1,7 +1,7 @@
-//! Logs from NumPy to what identification takes.
+//! Conversion of NumPy logs for identification.
 //!
-//! A log with accelerations is a list of states: nothing is differentiated, and without a filter the
-//! rows need not follow each other in time.
+//! A log with velocities and accelerations is a list of states: nothing is differentiated, and its rows are used as
+//! they are unless a filter, a rate or a decimation is asked for.
 
 use crate::arrays;
 use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
@@ -9,10 +9,10 @@ use pyo3::prelude::*;
 use supple_ident::filter::LowPass;
 use supple_ident::{DMatrix, IdentError, Log, Motion, Preparation, Warning, resample};
 
-/// The columns of one log as they were given.
+/// The columns of one log as Python passes them.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-pub struct Given<'py> {
+pub struct LogInput<'py> {
     t: Bound<'py, PyAny>,
     q: Bound<'py, PyAny>,
     tau: Bound<'py, PyAny>,
@@ -20,15 +20,15 @@ pub struct Given<'py> {
     qdd: Option<Bound<'py, PyAny>>,
 }
 
-/// A log, with accelerations if there were any.
+/// A log, with accelerations if they were given.
 pub struct Samples {
     log: Log,
     qdd_rad_per_s2: Option<DMatrix<f64>>,
 }
 
 impl Samples {
-    /// Reads the columns; `(samples, dof)` each, `t` `(samples,)`.
-    pub fn read(given: &Given<'_>, dof: usize) -> PyResult<Self> {
+    /// Reads the columns: `(samples, dof)` each, `t` `(samples,)`.
+    pub fn read(given: &LogInput<'_>, dof: usize) -> PyResult<Self> {
         let t = arrays::numbers("t", &given.t)?;
         if t.ndim() != 1 {
             return Err(arrays::wrong_shape("t", "(samples,)", t.shape()));
@@ -56,7 +56,7 @@ impl Samples {
         })
     }
 
-    /// Checked and prepared.
+    /// Checks and prepares the log.
     pub fn motion(
         &self,
         moving: &[usize],
@@ -83,7 +83,7 @@ impl Samples {
             return Ok((Motion { qdd, ..motion }, warnings));
         }
         check_finite("qd", qd)?;
-        // Rows that do not follow each other have no velocity of their own to check.
+        // The velocities of unordered rows cannot be compared with slopes of the angles.
         let unordered = Log {
             qd_rad_per_s: None,
             ..self.log.clone()
@@ -96,7 +96,7 @@ impl Samples {
             qd: qd.clone(),
             qdd: qdd.clone(),
             tau: self.log.tau_nm.clone(),
-            independent_share: 1.0,
+            independent_fraction: 1.0,
             cutoff_hz: None,
         };
         Ok((motion, warnings))
@@ -109,7 +109,7 @@ fn check_finite(name: &str, columns: &DMatrix<f64>) -> Result<(), IdentError> {
             return Err(IdentError::Log {
                 column: format!("{name}[{joint}]"),
                 problem: format!("{} at sample {i}", column[i]),
-                remedy: "cut these rows out, or fill in what the recorder lost",
+                remedy: "remove these rows, or interpolate the missing samples",
             });
         }
     }

@@ -1,4 +1,4 @@
-//! An experiment of `supple-experiment`, as columns.
+//! An experiment of `supple-experiment`, returned as columns.
 
 use crate::arm::Arm;
 use crate::errors;
@@ -14,7 +14,7 @@ use supple_experiment::{
 use supple_model::{Description, with_dof};
 use supple_plant::Scene;
 
-/// What to run; the package has checked names and fills in defaults.
+/// Options of an experiment; the package checks names and fills in defaults.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct Options {
@@ -31,7 +31,7 @@ pub struct Options {
     log_dir: Option<PathBuf>,
 }
 
-/// The truth about the plant, and what its controller takes for it.
+/// The plant and the controller's model of it.
 struct Arms<'a> {
     plant: &'a Description,
     model: Option<&'a Description>,
@@ -43,8 +43,8 @@ struct Outcome {
     strokes: Vec<Stroke>,
 }
 
-/// Runs an experiment in virtual time. `model` is what the controller takes the arm for; without, it
-/// knows the arm itself, but for the errors that are asked for.
+/// Runs an experiment in virtual time. `model` is the controller's model of the arm; without it, the controller
+/// uses the arm itself with the given errors.
 #[pyfunction]
 pub fn simulate<'py>(
     py: Python<'py>,

@@ -1,10 +1,10 @@
-//! Columns that grow a row at a time and end as NumPy arrays.
+//! Columns that are filled by rows and converted to NumPy arrays.
 
 use crate::arrays;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// Named columns of numbers, each `width` numbers a row.
+/// Named columns of numbers, each with `width` numbers per row.
 #[derive(Default)]
 pub struct Table {
     columns: Vec<Column>,
@@ -12,32 +12,32 @@ pub struct Table {
 }
 
 struct Column {
-    name: &'static str,
-    /// `None`: one number a row, and an array of one axis.
+    name: String,
+    /// `None`: one number per row, and a one-dimensional array.
     width: Option<usize>,
     values: Vec<f64>,
 }
 
 impl Table {
-    /// One number under `name`. A row gives the same names in the same order as the first one.
-    pub fn number(&mut self, name: &'static str, value: f64) {
+    /// Adds one number under `name`. Every row has the same names in the same order as the first one.
+    pub fn number(&mut self, name: &str, value: f64) {
         self.push(name, None, &[value]);
     }
 
-    /// Several numbers under `name`.
-    pub fn vector(&mut self, name: &'static str, values: &[f64]) {
+    /// Adds several numbers under `name`.
+    pub fn vector(&mut self, name: &str, values: &[f64]) {
         self.push(name, Some(values.len()), values);
     }
 
-    /// The row is complete.
+    /// Ends the row.
     pub fn end_row(&mut self) {
         self.next = 0;
     }
 
-    fn push(&mut self, name: &'static str, width: Option<usize>, values: &[f64]) {
+    fn push(&mut self, name: &str, width: Option<usize>, values: &[f64]) {
         if self.next == self.columns.len() {
             self.columns.push(Column {
-                name,
+                name: name.to_owned(),
                 width,
                 values: Vec::new(),
             });

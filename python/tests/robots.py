@@ -1,4 +1,4 @@
-"""Random serial arms as URDF text: any axis, any origin, full inertias."""
+"""Random serial arms as URDF text: random axes and origins, full inertias."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ import numpy as np
 
 
 def random_rotation(rng: np.random.Generator) -> np.ndarray:
-    """Uniform over the rotations."""
+    """A uniformly distributed random rotation."""
     q, r = np.linalg.qr(rng.normal(size=(3, 3)))
     q *= np.sign(np.diag(r))
     return q if np.linalg.det(q) > 0 else -q
 
 
 def random_body(rng: np.random.Generator) -> str:
-    """A cloud of point masses: whatever it is, a body has it."""
+    """Inertia of a random cloud of point masses, hence physically consistent."""
     points = rng.normal(scale=0.1, size=(12, 3)) + rng.normal(scale=0.1, size=3)
     masses = rng.uniform(0.05, 0.5, size=12)
     mass = masses.sum()
     com = masses @ points / mass
-    # Given in axes turned against the link's, so that the <origin rpy> of inertias matters.
+    # In axes rotated relative to the link's, so that the <origin rpy> of inertias matters.
     rotation = random_rotation(rng)
     about = (points - com) @ rotation
     second = (masses[:, None] * about).T @ about

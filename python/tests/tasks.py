@@ -1,4 +1,4 @@
-"""Functions that other processes import."""
+"""Task functions that other processes import."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ import supple
 
 
 def draw(scale, seed):
-    """A random number of the task's own."""
+    """A random number that depends on the seed of the task."""
     return scale * np.random.default_rng(seed).normal()
 
 
 def process(_parameter, _seed):
-    """Where a task runs."""
+    """The process in which a task runs."""
     return os.getpid()
 
 
 def gravity_of_random_pose(arm, seed):
-    """An arm travels to the task."""
+    """Uses an arm that is pickled to the task."""
     q = np.random.default_rng(seed).uniform(-1.0, 1.0, size=arm.dof)
     return arm.gravity(q)
 
 
 def tracking_error(friction_error, seed):
-    """A second of the sinusoid with a wrong model."""
+    """One second of the sinusoid with a perturbed model."""
     arm = supple.Arm.load("wam4")
     run = supple.simulate(arm, duration_s=1.0, friction_error=friction_error, seed=seed)
     return run.rms_error_m

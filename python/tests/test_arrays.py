@@ -40,7 +40,7 @@ def states(method, *batch):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_batch_is_its_states_one_by_one(arm, method):
+def test_a_batch_equals_its_single_states(arm, method):
     call = getattr(arm, method)
     arguments = states(method, 3, 5)
     batched = call(*arguments)
@@ -53,12 +53,12 @@ def test_a_batch_is_its_states_one_by_one(arm, method):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_no_states_give_no_results(arm, method):
+def test_an_empty_batch_gives_an_empty_result(arm, method):
     assert getattr(arm, method)(*states(method, 0)).shape == (0, *SHAPES[method])
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_any_order_and_type_of_numbers(arm, method):
+def test_other_orders_and_dtypes_are_accepted(arm, method):
     call = getattr(arm, method)
     arguments = [np.round(a, 1) for a in states(method, 6)]
     reference = call(*arguments)
@@ -71,7 +71,7 @@ def test_any_order_and_type_of_numbers(arm, method):
     np.testing.assert_array_equal(call(*unaligned), reference)
 
 
-def test_one_state_serves_a_batch(arm):
+def test_one_state_is_broadcast_to_a_batch(arm):
     q, qd, qdd = states("rnea", 7)
     expected = arm.rnea(q, np.tile(qd[0], (7, 1)), qdd)
     np.testing.assert_array_equal(arm.rnea(q, qd[0], qdd), expected)
@@ -94,12 +94,12 @@ def test_out_is_filled_and_returned(arm, method):
         (np.zeros((4, 2)).T, ValueError, "got another order"),
     ],
 )
-def test_out_that_does_not_fit_is_refused(arm, out, error, message):
+def test_an_unsuitable_out_is_rejected(arm, out, error, message):
     with pytest.raises(error, match=re.escape(message).replace(r"\.\*", ".*")):
         arm.gravity(np.zeros((2, 4)), out=out)
 
 
-def test_out_must_be_writable_and_apart(arm):
+def test_out_must_be_writable_and_not_overlap(arm):
     out = np.zeros((2, 4))
     out.flags.writeable = False
     with pytest.raises(ValueError, match="out: .*not writeable"):
@@ -122,12 +122,12 @@ def test_out_must_be_writable_and_apart(arm):
         (([[0.0] * 4, [0.0] * 3], np.zeros(4), np.zeros(4)), "q: expected numbers, got list"),
     ],
 )
-def test_shapes_that_do_not_fit_are_named(arm, arguments, message):
+def test_shape_mismatches_are_reported(arm, arguments, message):
     with pytest.raises(ValueError, match=re.escape(message)):
         arm.rnea(*arguments)
 
 
-def test_what_is_no_number_is_refused(arm):
+def test_non_numeric_arguments_are_rejected(arm):
     with pytest.raises(TypeError, match="q: expected numbers, got dict"):
         arm.gravity({})
     with pytest.raises(ValueError, match="q: expected numbers, got str"):
@@ -144,7 +144,7 @@ def test_an_arm_is_immutable(arm):
         type("Mine", (supple.Arm,), {})
 
 
-def test_arms_travel_to_other_processes(arm, tmp_path):
+def test_arms_can_be_pickled_to_other_processes(arm, tmp_path):
     copy = pickle.loads(pickle.dumps(arm))
     assert copy == arm and hash(copy) == hash(arm)
     np.testing.assert_array_equal(copy.parameters, arm.parameters)
@@ -154,8 +154,8 @@ def test_arms_travel_to_other_processes(arm, tmp_path):
     assert pickle.loads(pickle.dumps(friction)) == friction
 
 
-def test_the_interpreter_is_free_while_a_call_computes(arm):
-    """Another thread counts while one call runs: with the lock held it could not."""
+def test_the_gil_is_released_during_a_call(arm):
+    """Another thread counts while a call runs, which needs the released lock."""
     q, qd, qdd = np.random.default_rng(0).normal(size=(3, 400_000, 4))
     running, counted = threading.Event(), []
 

@@ -1,4 +1,4 @@
-"""Dynamics against Pinocchio, on arms that neither side has seen."""
+"""Dynamics compared with Pinocchio, on random arms."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ pin = pytest.importorskip("pinocchio")
 
 SAMPLES = 25
 GRAVITY = (0.3, -1.2, -9.6)
-# Pinocchio's parameters: m, mc, Ixx, Ixy, Iyy, Ixz, Iyz, Izz: the order here too.
+# Pinocchio orders the parameters as supple does: m, mc, Ixx, Ixy, Iyy, Ixz, Iyz, Izz.
 TOLERANCE = 1e-10
 
 
 @pytest.fixture(params=[(dof, seed) for dof in range(3, 8) for seed in range(4)], ids=str)
 def case(request, tmp_path):
-    """An arm, its peer, and random states of it."""
+    """An arm, its Pinocchio model, and random states."""
     dof, seed = request.param
     path = write_random_urdf(tmp_path, dof, seed)
     rng = np.random.default_rng([dof, seed])

@@ -1,4 +1,5 @@
-"""Excitation, and the closed loop on the simulated arm: from a designed motion to a model in control."""
+"""Excitation and closed-loop identification on the simulated arm: from the design to a controller with
+the model."""
 
 from __future__ import annotations
 
@@ -17,8 +18,9 @@ def excitation(arm):
     return supple.design_excitation(arm, candidates=300, period_s=8.0, periods=2)
 
 
-def test_the_motion_is_one(arm, excitation):
-    """Derivatives fit each other, it begins and ends at rest, and the criterion only falls."""
+def test_the_motion_is_consistent(arm, excitation):
+    """The derivatives are consistent, the motion starts and ends at rest, and the criterion never
+    increases."""
     dt = np.diff(excitation.t).mean()
     np.testing.assert_allclose(np.gradient(excitation.q, dt, axis=0), excitation.qd, atol=0.02)
     np.testing.assert_allclose(excitation.qd[0], 0.0, atol=1e-9)
@@ -28,7 +30,7 @@ def test_the_motion_is_one(arm, excitation):
     assert excitation.condition == pytest.approx(excitation.history[-1], rel=0.2)
 
 
-def test_the_tip_stays_in_its_box(arm):
+def test_the_tip_stays_in_the_workspace(arm):
     box = np.array([[-1.0, -0.5, -0.6], [1.0, 0.5, 1.2]])
     found = supple.design_excitation(
         arm, candidates=200, period_s=8.0, periods=1, workspace=box, criterion="d-optimality"
@@ -37,7 +39,7 @@ def test_the_tip_stays_in_its_box(arm):
     assert (tip >= box[0] - 1e-2).all() and (tip <= box[1] + 1e-2).all()
 
 
-def test_progress_is_heard_and_may_end_the_search(arm):
+def test_progress_is_reported_and_may_stop_the_search(arm):
     heard = []
     supple.design_excitation(
         arm, candidates=50, period_s=5.0, periods=1, progress=lambda *seen: heard.append(seen)
@@ -53,7 +55,7 @@ def test_progress_is_heard_and_may_end_the_search(arm):
 
 
 def test_the_identified_model_controls_the_arm_it_came_from(arm, excitation):
-    """Torques from a noisy, quantised log of the plant; the controller knows nothing else of it."""
+    """The controller's model is identified from a noisy, quantised log of the plant only."""
     first = supple.excite(arm, excitation, seed=1)
     fit = supple.identify(
         arm,
@@ -86,11 +88,11 @@ def test_the_identified_model_controls_the_arm_it_came_from(arm, excitation):
         ({"period_s": -1.0}, "period_s is -1, it must be finite and positive"),
     ],
 )
-def test_wrong_options_are_named(arm, options, message):
+def test_invalid_options_are_reported(arm, options, message):
     with pytest.raises(ValueError, match=message):
         supple.design_excitation(arm, **{"candidates": 10, **options})
 
 
-def test_another_arm_is_refused(excitation):
+def test_an_excitation_of_another_arm_is_rejected(excitation):
     with pytest.raises(ValueError, match="excitation: expected 4 joints, as arm, got 3"):
         supple.excite(supple.Arm.load("wam4"), excitation)

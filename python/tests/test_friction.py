@@ -7,7 +7,7 @@ import pytest
 import supple
 
 
-def test_the_law_is_the_written_one():
+def test_the_law_matches_its_formula():
     friction = supple.Friction(
         viscous_nm_s_per_rad=1.5,
         coulomb_nm=0.8,
@@ -32,6 +32,6 @@ def test_the_law_is_the_written_one():
         {"band_rad_per_s": 0.0},
     ],
 )
-def test_friction_that_feeds_energy_is_refused(wrong):
+def test_friction_that_supplies_energy_is_rejected(wrong):
     with pytest.raises(ValueError, match=list(wrong)[-1]):
         supple.Friction(**wrong)

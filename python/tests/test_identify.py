@@ -1,4 +1,4 @@
-"""Identification from Python: recovery, the constrained optimum, held joints, bad logs, results."""
+"""Identification from Python: recovery, constrained optimum, held joints, invalid logs, results."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def noisy(arm):
 
 
 @pytest.mark.parametrize("method", ["ols", "wls", "irls", "consistent"])
-def test_torques_without_noise_are_found_again(arm, method):
+def test_noise_free_torques_are_recovered(arm, method):
     t, q, qd, qdd = motion(4, 3)
     tau = torques(arm, q, qd, qdd)
     weak = {"prior_weight": 1e-6} if method == "consistent" else {}
@@ -56,7 +56,7 @@ def test_torques_without_noise_are_found_again(arm, method):
         assert found.viscous_nm_s_per_rad == pytest.approx(true.viscous_nm_s_per_rad, abs=bound)
 
 
-def test_the_report_is_whole(arm, noisy):
+def test_the_report_is_complete(arm, noisy):
     assert noisy.rank == len(noisy.base_parameters) == len(noisy.base_names) == len(noisy.std)
     assert noisy.rank + len(noisy.null_space) == len(noisy.columns) == 10 * 4 + 3 * 4
     assert (noisy.std > 0.0).all() and noisy.condition > 1.0
@@ -66,7 +66,7 @@ def test_the_report_is_whole(arm, noisy):
     assert "rank" in str(noisy) and noisy.arm_given == arm
 
 
-def test_the_found_arm_is_the_fit(noisy):
+def test_the_identified_arm_equals_the_fit(noisy):
     found = noisy.arm
     x = np.array(list(noisy.columns.values()))
     np.testing.assert_allclose(found.parameters, x[:40], atol=1e-9)
@@ -74,9 +74,9 @@ def test_the_found_arm_is_the_fit(noisy):
     np.testing.assert_allclose(torques(found, q, qd, qdd), noisy.predict(q, qd, qdd), atol=1e-7)
 
 
-def test_standard_deviations_are_those_of_repeated_fits(arm):
-    """Spread of the base parameters over noise that is drawn anew. Which columns stand for a
-    combination may change with the noise: those that always do are compared."""
+def test_standard_deviations_match_repeated_fits(arm):
+    """Spread of the base parameters over repeated noise. The independent columns may change with the
+    noise: those that are always independent are compared."""
     t, q, qd, qdd = motion(4, 6, samples=600)
     tau = torques(arm, q, qd, qdd)
     found = []
@@ -93,7 +93,7 @@ def test_standard_deviations_are_those_of_repeated_fits(arm):
     assert (ratio > 0.6).all() and (ratio < 1.5).all()
 
 
-def test_the_constrained_fit_is_the_optimum_that_clarabel_finds():
+def test_the_constrained_fit_matches_the_optimum_of_clarabel():
     cvxpy = pytest.importorskip("cvxpy")
     arm = supple.Arm.load("wam3")
     t, q, qd, qdd = motion(3, 7, samples=400)
@@ -163,7 +163,7 @@ def test_the_constrained_fit_is_the_optimum_that_clarabel_finds():
     np.testing.assert_allclose(a @ ours, a @ x.value, atol=1e-3 * np.abs(b).max())
 
 
-def test_held_joints_keep_the_friction_that_was_given(arm):
+def test_held_joints_keep_their_nominal_friction(arm):
     t, q, qd, qdd = motion(4, 9)
     for joint, held_at in ((0, 0.2), (2, -0.3)):
         q[:, joint], qd[:, joint], qdd[:, joint] = held_at, 0.0, 0.0
@@ -181,7 +181,7 @@ def test_held_joints_keep_the_friction_that_was_given(arm):
     assert validation.total_relative < 1e-9
 
 
-def test_a_coupled_motor_is_found(arm):
+def test_a_coupled_motor_is_identified(arm):
     t, q, qd, qdd = motion(4, 10)
     tau = torques(arm, q, qd, qdd)
     both = 0.07 * (qdd[:, 2] + qdd[:, 3]) + 0.4 * (qd[:, 2] + qd[:, 3])
@@ -216,11 +216,11 @@ def test_differentiation_and_filter(arm):
     validation = fit.validate(t, q, torques(arm, q, qd, qdd))
     assert validation.total_relative < 0.03
     assert validation.positive_definite == 1.0
-    assert validation.verdict.startswith("sound")
+    assert validation.verdict.startswith("good")
     assert validation.rms.shape == validation.relative.shape == (4,)
 
 
-def test_what_is_saved_is_what_is_loaded(noisy, tmp_path):
+def test_a_saved_fit_is_loaded_unchanged(noisy, tmp_path):
     path = noisy.save(tmp_path / "identified")
     loaded = supple.Arm.load(path)
     assert loaded == noisy.arm
@@ -229,7 +229,7 @@ def test_what_is_saved_is_what_is_loaded(noisy, tmp_path):
         assert found.coulomb_nm == pytest.approx(true.coulomb_nm, rel=1e-9)
 
 
-def test_the_figure_has_an_axis_a_joint(noisy, tmp_path):
+def test_the_figure_has_one_axis_per_joint(noisy, tmp_path):
     pytest.importorskip("matplotlib")
     figure = noisy.plot()
     assert len(figure.axes) == 4
@@ -243,7 +243,7 @@ def test_the_figure_has_an_axis_a_joint(noisy, tmp_path):
 
 @pytest.mark.parametrize("rotor", [False, True])
 @pytest.mark.parametrize("name", supple.assets())
-def test_base_parameters_are_what_the_regressor_tells(name, rotor):
+def test_base_parameters_match_the_regressor(name, rotor):
     arm = supple.Arm.load(name)
     base = supple.base_parameters(arm, rotor=rotor)
     q, qd, qdd = np.random.default_rng(1).normal(scale=1.5, size=(3, 400, arm.dof))
@@ -264,7 +264,7 @@ def test_base_parameters_are_what_the_regressor_tells(name, rotor):
 
 
 def broken(name, change):
-    """Columns of which one is changed."""
+    """Log columns with one of them changed."""
     t, q, qd, qdd = motion(4, 16, samples=600)
     columns = {"t": t, "q": q, "tau": 10.0 * np.sin(q), "qd": qd}
     columns[name] = change(columns[name].copy())
@@ -282,7 +282,7 @@ def put(index, value):
 @pytest.mark.parametrize(
     ("name", "change", "message"),
     [
-        ("q", put((40, 2), np.nan), r"q\[2\]: NaN at sample 40; cut these rows out"),
+        ("q", put((40, 2), np.nan), r"q\[2\]: NaN at sample 40; remove these rows"),
         ("tau", put((7, 1), np.inf), r"tau\[1\]: inf at sample 7"),
         ("t", put(30, -1.0), r"t: goes from .* at sample 29; sort the rows"),
         ("t", lambda t: np.where(np.arange(600) > 300, t + 2.0, t), r"t: a gap of 2.\d* s after"),
@@ -294,7 +294,7 @@ def put(index, value):
         ("tau", put((slice(None), 0), 2.0), r"tau\[0\]: is 2 throughout; check"),
     ],
 )
-def test_columns_that_cannot_be_used_are_named(arm, name, change, message):
+def test_unusable_columns_are_reported(arm, name, change, message):
     with pytest.raises(ValueError, match=message):
         supple.identify(arm, **broken(name, change))
 
@@ -313,7 +313,7 @@ def test_columns_that_cannot_be_used_are_named(arm, name, change, message):
         ({"joint_noise_nm": [0.1, 0.1]}, "weights: expected 4 values"),
     ],
 )
-def test_options_out_of_range_are_named(arm, options, message):
+def test_options_out_of_range_are_reported(arm, options, message):
     t, q, qd, qdd = motion(4, 17, samples=600)
     with pytest.raises(ValueError, match=message):
         supple.identify(arm, t, q, torques(arm, q, qd, qdd), qd, **options)
@@ -321,11 +321,11 @@ def test_options_out_of_range_are_named(arm, options, message):
 
 def test_accelerations_need_velocities(arm):
     t, q, _, qdd = motion(4, 18, samples=100)
-    with pytest.raises(ValueError, match="qd: expected velocities beside the accelerations"):
+    with pytest.raises(ValueError, match="qd: expected velocities together with the accelerations"):
         supple.identify(arm, t, q, q, qdd=qdd)
 
 
-def test_doubts_are_warnings(arm):
+def test_doubtful_data_give_warnings(arm):
     t, q, qd, qdd = motion(4, 19, samples=200)
     with pytest.warns(supple.DataWarning, match=re.escape("t: the log lasts 3.980 s; record")):
         fit = supple.identify(

@@ -1,4 +1,4 @@
-"""Learning, payload, torque scale and ripple, each against an arm that is known."""
+"""Learning, payload, torque scale and ripple, each compared with a known arm."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def arm():
 
 
 def loaded(arm, payload):
-    """Torques that a body in the last link's frame adds: the regressor of the last link times its own."""
+    """Torques of a payload in the last link's frame: the last link's regressor times its parameters."""
     c = np.asarray(payload.com_m)
     about = payload.inertia_kg_m2 + payload.mass_kg * (c @ c * np.eye(3) - np.outer(c, c))
     entries = [(0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)]
@@ -33,7 +33,7 @@ def empty(arm):
     )
 
 
-def test_a_body_in_the_hand_is_found(arm, empty):
+def test_a_payload_is_identified(arm, empty):
     t, q, qd, qdd = motion(4, 31)
     tau = torques(arm, q, qd, qdd) + loaded(arm, BALL)(q, qd, qdd)
     guess = supple.Payload.ball(1.0, 0.03, (0.0, 0.0, 0.05))
@@ -45,7 +45,7 @@ def test_a_body_in_the_hand_is_found(arm, empty):
         empty.payload(t, q, tau, qd, qdd, guess=supple.Payload(1.0, (0.0, 0.0), np.eye(3)))
 
 
-def test_a_known_weight_tells_the_scale_of_the_torques_of_each_joint(arm):
+def test_a_known_payload_gives_the_torque_scale_of_each_joint(arm):
     scale = np.array([0.8, 1.1, 0.9, 1.25])
     t, q, qd, qdd = motion(4, 32)
     fit = supple.identify(
@@ -60,7 +60,7 @@ def test_a_known_weight_tells_the_scale_of_the_torques_of_each_joint(arm):
         fit.torque_scale(t, q, tau, qd, qdd, known=nothing)
 
 
-def test_changed_friction_is_learnt_and_the_rest_stays(arm):
+def test_changed_friction_is_learnt_and_the_rest_is_unchanged(arm):
     t, q, qd, qdd = motion(4, 34)
     still = [0, 2]
     q[:, still], qd[:, still], qdd[:, still] = 0.2, 0.0, 0.0
@@ -76,7 +76,7 @@ def test_changed_friction_is_learnt_and_the_rest_stays(arm):
     np.testing.assert_allclose(found.arm.parameters, arm.parameters, atol=1e-9)
 
 
-def test_a_weight_is_learnt_beside_friction(arm):
+def test_a_payload_is_learnt_together_with_friction(arm):
     t, q, qd, qdd = motion(4, 35)
     tau = torques(arm, q, qd, qdd) + loaded(arm, BALL)(q, qd, qdd)
     found = supple.learn(arm, t, q, tau, qd, payload_kg=1.0)
@@ -89,18 +89,18 @@ def test_a_weight_is_learnt_beside_friction(arm):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"slow_rad_per_s": 100.0}, "no joint turned faster than 100 rad/s"),
+        ({"slow_rad_per_s": 100.0}, "no joint moved faster than 100 rad/s"),
         ({"friction_change": 0.0}, "friction_change is 0, it must be finite and positive"),
         ({"moving": [3, 1]}, "moving: expected joint numbers below 4, increasing"),
     ],
 )
-def test_wrong_options_of_learn_are_named(arm, options, message):
+def test_invalid_options_of_learn_are_reported(arm, options, message):
     t, q, qd, qdd = motion(4, 36, samples=600)
     with pytest.raises(ValueError, match=message):
         supple.learn(arm, t, q, torques(arm, q, qd, qdd), qd, **options)
 
 
-def test_ripple_is_found_and_saved(arm, tmp_path):
+def test_ripple_is_identified_and_saved(arm, tmp_path):
     """On wam3, one motor a joint: 5 Nmm of the third harmonic at the second motor."""
     small = supple.Arm.load("wam3")
     t, q, qd, qdd = motion(3, 37)

@@ -1,4 +1,4 @@
-"""Arms from names, paths and URDFs, and what is refused."""
+"""Arms from names, paths and URDFs, and rejected input."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def test_every_built_in_arm_loads(name):
     assert (eigenvalues > 0.0).all()
 
 
-def test_an_arm_by_its_files(tmp_path):
+def test_an_arm_loads_from_its_files(tmp_path):
     arm = supple.Arm.load("wam4")
     (tmp_path / "arm.toml").write_text(arm.toml)
     (tmp_path / "arm.urdf").write_text(arm.urdf)
@@ -29,7 +29,7 @@ def test_an_arm_by_its_files(tmp_path):
         assert supple.Arm.load(path) == arm
 
 
-def test_names_that_are_none():
+def test_unknown_names_and_paths_are_rejected():
     with pytest.raises(ValueError, match="no arm named `wam9` is built in; .*wam4"):
         supple.Arm.load("wam9")
     with pytest.raises(FileNotFoundError, match="nowhere/arm.toml"):
@@ -38,7 +38,7 @@ def test_names_that_are_none():
         supple.Arm.from_urdf("nowhere.urdf")
 
 
-def test_wrong_urdfs_are_refused_by_file_element_and_value(tmp_path):
+def test_invalid_urdfs_are_rejected_with_file_element_and_value(tmp_path):
     path = tmp_path / "negative.urdf"
     text = random_urdf(3, 0)
     mass = text.split('<mass value="')[1].split('"')[0]
@@ -50,7 +50,7 @@ def test_wrong_urdfs_are_refused_by_file_element_and_value(tmp_path):
         supple.Arm.from_urdf(path)
 
 
-def test_what_other_programs_add_is_a_warning_or_refused(tmp_path):
+def test_unsupported_urdf_elements_give_a_warning_or_are_rejected(tmp_path):
     path = write_random_urdf(tmp_path, 4, 1)
     plain = supple.Arm.from_urdf(path, strict=True)
     added = '<gazebo reference="link1"><mu1>0.2</mu1></gazebo><gazebo/></robot>'
@@ -72,7 +72,7 @@ def test_what_other_programs_add_is_a_warning_or_refused(tmp_path):
         supple.Arm.load(tmp_path, strict=True)
 
 
-def test_what_is_no_regular_file_is_refused(tmp_path):
+def test_special_files_are_rejected(tmp_path):
     fifo = tmp_path / "arm.urdf"
     os.mkfifo(fifo)
     for path in (fifo, "/dev/zero", tmp_path):
@@ -99,7 +99,7 @@ def test_arguments_of_from_urdf(tmp_path):
 
 
 @pytest.mark.parametrize("limit", ["", '<limit effort="0" velocity="0"/>'])
-def test_an_arm_without_limits_has_its_dynamics(tmp_path, limit):
+def test_dynamics_need_no_joint_limits(tmp_path, limit):
     path = write_random_urdf(tmp_path, 4, 1)
     limited = supple.Arm.from_urdf(path)
     stated = '<limit lower="-3" upper="3" effort="100" velocity="5"/>'
@@ -115,12 +115,12 @@ def test_an_arm_without_limits_has_its_dynamics(tmp_path, limit):
 
 
 @pytest.mark.parametrize("dof", [2, 8])
-def test_arms_of_other_sizes_are_refused(tmp_path, dof):
+def test_unsupported_numbers_of_joints_are_rejected(tmp_path, dof):
     with pytest.raises(ValueError, match=f"an arm of {dof} moving joints is not supported"):
         supple.Arm.from_urdf(write_random_urdf(tmp_path, dof, 0))
 
 
-def test_a_frozen_joint_joins_its_links(tmp_path):
+def test_a_fixed_joint_merges_its_links(tmp_path):
     path = write_random_urdf(tmp_path, 5, 2)
     whole = supple.Arm.from_urdf(path)
     frozen = supple.Arm.from_urdf(path, fixed_joints_rad={"joint3": 0.7})

@@ -1,4 +1,4 @@
-"""Logs of real robots. They are not ours to ship: each test says what it skips without them."""
+"""Logs of real robots. They may not be redistributed: without them each test is skipped."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import supple
 
 DRIVE_GAIN_NM_PER_A = np.array([14.87, 13.26, 11.13, 10.62, 11.03, 11.47])
 UR10E = os.environ.get("SUPPLE_UR10E_DIR")
-# Relative error of the whole torque, one fit for all three.
+# Maximum relative torque error, with one fit for all three.
 UR10E_HELD_OUT = {
     "ur-20_01_17-ptp_10_points.csv": (slice(700, 4200), 0.040),
     "ur-20_02_12-40sec_12harm.csv": (slice(500, 4460), 0.031),
@@ -24,7 +24,7 @@ UR10E_HELD_OUT = {
     reason="prediction of three UR10e logs: name the folder of dynamic_calibration/dataset_ur10e, "
     "with ur10e.urdf in it, in SUPPLE_UR10E_DIR",
 )
-def test_a_ur10e_is_predicted_from_one_log_of_it():
+def test_one_ur10e_log_predicts_the_others():
     folder = Path(UR10E)
 
     def columns(name, rows):

@@ -23,7 +23,7 @@ def log(run):
     return supple.read_log(run.log)
 
 
-def test_the_error_is_that_of_the_rows(run):
+def test_the_error_matches_the_rows(run):
     distance = np.linalg.norm(run.reference_position_m - run.tip_position_m, axis=1)
     assert run.rms_error_m == pytest.approx(np.sqrt(np.mean(distance**2)), rel=1e-9)
     assert run.max_error_m == pytest.approx(distance.max(), rel=1e-9)
@@ -39,7 +39,7 @@ def test_the_same_arguments_give_the_same_numbers(arm, run):
     assert other.rms_error_m > run.rms_error_m
 
 
-def test_the_log_holds_the_run(arm, run, log):
+def test_the_log_contains_the_run(arm, run, log):
     assert log.arm == arm
     assert (log.experiment, log.seed) == ("sinusoid", 3)
     assert log.faults == ()
@@ -63,7 +63,7 @@ def test_the_log_agrees_with_the_model(arm, log):
     np.testing.assert_allclose(total[tracking], log.tau[tracking], atol=1e-9)
 
 
-def test_probing_meets_the_block(arm):
+def test_probing_touches_the_block(arm):
     run = supple.simulate(arm, "probing", duration_s=7.0, stiffness_n_per_m=25.0)
     assert run.in_contact.any()
     assert run.strokes["peak_filtered_n"].shape == run.strokes["contact_s"].shape
@@ -77,16 +77,16 @@ def test_probing_meets_the_block(arm):
         ({"stiffness_n_per_m": -1.0}, "stiffness_n_per_m: expected .* not negative, got -1.0"),
         ({"speed": 0.0}, "speed: expected .* positive, got 0.0"),
         ({"duration_s": float("nan")}, "duration_s: expected .*, got nan"),
-        ({"friction_error": 1.5}, "friction_error: expected a share below 1, got 1.5"),
+        ({"friction_error": 1.5}, "friction_error: expected a fraction below 1, got 1.5"),
         ({"seed": -2}, "seed: expected zero or more, got -2"),
     ],
 )
-def test_wrong_arguments_are_named(arm, arguments, message):
+def test_invalid_arguments_are_reported(arm, arguments, message):
     with pytest.raises(ValueError, match=message):
         supple.simulate(arm, **arguments)
 
 
-def test_logs_that_are_none(tmp_path, run):
+def test_invalid_logs_are_rejected(tmp_path, run):
     with pytest.raises(FileNotFoundError, match="nowhere.mcap"):
         supple.read_log("nowhere.mcap")
     path = tmp_path / "text.mcap"

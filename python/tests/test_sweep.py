@@ -1,4 +1,4 @@
-"""Sweeps on no executor, threads, processes and a Dask cluster: the same results, all distinct."""
+"""Sweeps without executor, on threads, processes and a Dask cluster give the same, distinct results."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def processes():
         yield executor
 
 
-def test_every_task_has_a_seed_of_its_own(reference):
+def test_every_task_has_its_own_seed(reference):
     assert len(reference) == len(set(reference.seeds)) == len(set(reference)) == TASKS
     assert reference.parameters == (1.0,) * TASKS
     assert all(0 <= seed < 2**63 for seed in reference.seeds)
@@ -46,7 +46,7 @@ def test_every_task_has_a_seed_of_its_own(reference):
         assert reference[i] == tasks.draw(reference.parameters[i], reference.seeds[i])
 
 
-def test_the_seed_of_the_sweep_decides(reference):
+def test_results_depend_on_the_seed_of_the_sweep(reference):
     assert supple.sweep(tasks.draw, [1.0] * TASKS, seed=5) == reference
     other = supple.sweep(tasks.draw, [1.0] * TASKS, seed=6)
     assert not set(other) & set(reference)
@@ -63,14 +63,14 @@ def test_processes(processes, reference):
     assert os.getpid() not in where
 
 
-def test_dask_runs_identical_calls_each_for_itself(cluster, reference):
+def test_dask_does_not_merge_identical_calls(cluster, reference):
     swept = supple.sweep(tasks.draw, [1.0] * TASKS, seed=5, executor=cluster)
     assert swept == reference
     assert len(set(swept)) == TASKS
     assert os.getpid() not in supple.sweep(tasks.process, range(8), seed=0, executor=cluster)
 
 
-def test_arms_travel_to_the_cluster(cluster):
+def test_arms_can_be_sent_to_the_cluster(cluster):
     arm = supple.Arm.load("wam7")
     swept = supple.sweep(tasks.gravity_of_random_pose, [arm] * 10, seed=2, executor=cluster)
     here = supple.sweep(tasks.gravity_of_random_pose, [arm] * 10, seed=2)
@@ -90,7 +90,7 @@ def test_progress_counts_every_task():
 
 
 @pytest.mark.parametrize("workers", [0, 2])
-def test_what_a_task_raises_comes_back(workers):
+def test_exceptions_of_a_task_are_raised(workers):
     if workers == 0:
         with pytest.raises(RuntimeError, match="three"):
             supple.sweep(tasks.fail_at_three, range(5), seed=0)
@@ -99,7 +99,7 @@ def test_what_a_task_raises_comes_back(workers):
         supple.sweep(tasks.fail_at_three, range(5), seed=0, executor=executor)
 
 
-def test_wrong_arguments():
+def test_invalid_arguments_are_rejected():
     with pytest.raises(ValueError, match="seed: expected zero or more, got -1"):
         supple.sweep(tasks.draw, [1.0], seed=-1)
     with pytest.raises(TypeError, match="function: expected a callable, got int"):

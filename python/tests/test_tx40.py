@@ -1,5 +1,5 @@
 """A real Stäubli TX40, joints 5 and 6 coupled by a gear, from its raw log: fitted on the first half,
-judged on the second. Provenance and gear ratios: crates/supple-ident/tests/data/tx40/README.md."""
+validated on the second. Provenance and gear ratios: crates/supple-ident/tests/data/tx40/README.md."""
 
 from __future__ import annotations
 
@@ -46,6 +46,6 @@ def test_the_second_half_is_predicted_from_the_first(log, arm, options):
     assert alone.total_relative > validation.total_relative
 
 
-def test_a_link_without_inertia_is_refused_unless_it_is_said_what_it_is():
+def test_a_link_without_inertia_needs_a_point_mass_radius():
     with pytest.raises(ValueError, match=r"link `link_6` .*must be positive.*point_mass_radius_m"):
         supple.Arm.from_urdf(DATA / "tx40.urdf", tip="tool0")

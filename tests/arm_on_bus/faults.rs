@@ -1,22 +1,22 @@
-//! Every injected fault to its end at the emulated motors: what acts there, how soon, and that nothing
-//! makes the arm stiffer.
+//! Follows every injected fault to the emulated motors: which torque acts, how soon, and that the arm never
+//! becomes stiffer.
 
 use crate::rig::{MS, Rig, TestBus};
 use supple_bus::virtual_time::Peer;
 use supple_bus::{FaultKind, FaultRule, Traffic};
 use supple_can::guard::{Stage, Torque};
-use supple_can::{Drives, Loss};
+use supple_can::{Drives, LossReason};
 use supple_core::Vector;
 use supple_core::controller::{Fault, Mode, Request};
 use supple_core::dynamics::gravity;
-use supple_emu::{Cause, Happening, Press};
+use supple_emu::{ArmEvent, ButtonPress, Cause};
 use supple_puck::MessageId;
 use supple_puck::safety::SafetyMode;
 use supple_puck::status::MotorMode;
 
-/// The bound on every safe action.
+/// Time limit of every safe action.
 const SAFE_NS: u64 = 20 * MS;
-/// Least torque of a motor puck \[N m\].
+/// Torque resolution of a motor puck \[N m\].
 const QUANTUM_NM: f64 = 1.0 / 2700.0;
 
 fn torques(id: MessageId) -> bool {
@@ -35,10 +35,10 @@ fn injector(rig: &mut Rig<4>) -> &mut TestBus<4> {
     rig.cycle.bus_mut()
 }
 
-/// When the motors came to idle, since `begin_ns` \[ns\].
+/// Time from `begin_ns` until the motors became idle \[ns\].
 fn idle_after_ns(rig: &Rig<4>, begin_ns: u64) -> Option<u64> {
-    let happenings = rig.emulator().happenings().iter();
-    let mut idle = happenings.filter(|(_, h)| matches!(h, Happening::Motor(_, MotorMode::Idle)));
+    let arm_events = rig.emulator().arm_events().iter();
+    let mut idle = arm_events.filter(|(_, h)| matches!(h, ArmEvent::Motor(_, MotorMode::Idle)));
     let first = idle.find(|(time_ns, _)| *time_ns >= begin_ns);
     first.map(|(time_ns, _)| time_ns - begin_ns)
 }
@@ -49,16 +49,16 @@ fn assert_idle_in_time(rig: &Rig<4>, begin_ns: u64) {
     assert!(after_ns.is_some_and(|ns| ns <= SAFE_NS), "{after_ns:?}");
 }
 
-/// Motor torques that hold the arm's weight where it is.
+/// Motor torques that hold the arm's weight in its current pose.
 fn weight_nm(rig: &Rig<4>) -> Vector<4> {
     let arm = crate::rig::arm(4).config::<4>().unwrap();
     let q = rig.emulator().truth().position_rad;
     arm.joint_from_motor.transpose() * gravity(&arm.arm, &q)
 }
 
-/// As of a controller that does not answer: never zero torque from one cycle to the next.
+/// Treated like a missing answer: the torque never drops to zero within one cycle.
 #[test]
-fn torques_that_are_no_numbers_leave_the_weight_held_and_then_the_motors_brake() {
+fn nonfinite_torques_lead_to_the_fallback_torque_and_then_to_braking() {
     let mut rig = Rig::<4>::holding();
     rig.run(500);
     rig.cycle.link_mut().not_finite = true;
@@ -70,36 +70,36 @@ fn torques_that_are_no_numbers_leave_the_weight_held_and_then_the_motors_brake()
     assert_idle_in_time(&rig, begin_ns);
     assert_eq!(
         rig.cycle.guard().last_loss().map(|(loss, _)| loss),
-        Some(Loss::Answer)
+        Some(LossReason::Answer)
     );
     assert!(rig.cycle.counters().unusable >= 10);
 }
 
 #[test]
-fn a_dead_controller_leaves_the_weight_held_and_then_brakes() {
+fn a_dead_controller_leads_to_the_fallback_torque_and_then_to_braking() {
     let mut rig = Rig::<4>::holding();
     rig.run(500);
     rig.cycle.link_mut().dead = true;
     let begin_ns = rig.now_ns();
-    // From the very first cycle without an answer.
+    // From the first cycle without an answer on.
     assert_eq!(rig.step().torque, Torque::Fallback);
     let held = rig.history.last().unwrap().1;
     assert!((held - weight_nm(&rig)).amax() < 2.0 * QUANTUM_NM);
-    // It does not answer to motion: it is no spring.
+    // The fallback torque does not depend on the position: it is not a spring.
     while rig.motors_in(MotorMode::Torque) {
         assert_eq!(rig.history.last().unwrap().1, held);
         rig.step();
     }
     assert_idle_in_time(&rig, begin_ns);
     assert_eq!(rig.emulator().safety().cause(), Cause::Host);
-    assert_eq!(rig.cycle.guard().last_loss().unwrap().0, Loss::Answer);
-    // Braking alone from here on.
+    assert_eq!(rig.cycle.guard().last_loss().unwrap().0, LossReason::Answer);
+    // After this the motors only brake.
     rig.run(300);
     assert!(rig.emulator().pucks().iter().all(|p| p.torque_nm() == 0.0));
 }
 
 #[test]
-fn a_short_pause_of_the_controller_costs_nothing_but_its_cycles() {
+fn a_short_pause_of_the_controller_only_costs_its_cycles() {
     let mut rig = Rig::<4>::holding();
     rig.cycle.link_mut().dead = true;
     for _ in 0..5 {
@@ -113,18 +113,18 @@ fn a_short_pause_of_the_controller_costs_nothing_but_its_cycles() {
 }
 
 #[test]
-fn service_is_taken_up_again_from_the_pendant() {
+fn the_arm_is_reenabled_only_from_the_pendant() {
     let mut rig = Rig::<4>::holding();
     rig.cycle.link_mut().dead = true;
     rig.run(50);
     assert!(rig.motors_in(MotorMode::Idle));
     rig.cycle.link_mut().dead = false;
     rig.run(5);
-    // Nothing raises the module but the operator.
+    // Only the operator can re-enable the safety module.
     rig.ask(Request::Reset);
     rig.run(300);
     assert!(rig.motors_in(MotorMode::Idle));
-    rig.emulator_mut().press(Press::Activate);
+    rig.emulator_mut().press(ButtonPress::Activate);
     rig.run(50);
     assert_eq!(rig.cycle.guard().stage(), Stage::Active);
     assert!(rig.motors_in(MotorMode::Torque));
@@ -156,14 +156,17 @@ fn a_lost_encoder_ends_torque_at_once() {
     assert!(action.lower_module);
     rig.run(30);
     assert_idle_in_time(&rig, now_ns);
-    assert_eq!(rig.cycle.guard().last_loss().unwrap().0, Loss::Encoder(1));
-    // Joints 2 and 3 share the motor; the others are still known.
+    assert_eq!(
+        rig.cycle.guard().last_loss().unwrap().0,
+        LossReason::Encoder(1)
+    );
+    // Joints 2 and 3 depend on this motor; the other angles are still known.
     let known = rig.cycle.link_mut().report.unwrap().position_rad;
     assert_eq!(known.map(|p| p.is_some()), [true, false, false, true]);
 }
 
 #[test]
-fn one_lost_torque_frame_is_noticed_in_its_cycle_and_made_good_in_the_next() {
+fn one_lost_torque_frame_is_detected_in_its_cycle_and_does_not_end_torque() {
     let mut rig = Rig::<4>::holding();
     let now_ns = rig.now_ns();
     let rule = FaultRule::always(Traffic::Sent, FaultKind::SilentLoss).only(torques);
@@ -176,7 +179,7 @@ fn one_lost_torque_frame_is_noticed_in_its_cycle_and_made_good_in_the_next() {
 }
 
 #[test]
-fn torques_that_never_leave_lower_the_module() {
+fn torque_frames_that_are_never_sent_lower_the_module() {
     let mut rig = Rig::<4>::holding();
     let now_ns = rig.now_ns();
     let rule = FaultRule::always(Traffic::Sent, FaultKind::SilentLoss).only(torques);
@@ -185,13 +188,15 @@ fn torques_that_never_leave_lower_the_module() {
     assert_eq!(rig.cycle.counters().tx_lost, 1);
     rig.run(30);
     assert_idle_in_time(&rig, now_ns);
-    assert_eq!(rig.cycle.guard().last_loss().unwrap().0, Loss::Transmit);
+    assert_eq!(
+        rig.cycle.guard().last_loss().unwrap().0,
+        LossReason::Transmit
+    );
 }
 
-/// Then the host can say nothing any more: the safety module notices by itself that positions stop, as
-/// late as its own time-out, 100 ms here.
+/// The host cannot transmit any more; the safety module detects missing positions by its own 100 ms timeout.
 #[test]
-fn a_host_that_cannot_speak_is_noticed_by_the_safety_module() {
+fn the_safety_module_detects_a_host_that_cannot_transmit() {
     let mut rig = Rig::<4>::holding();
     let now_ns = rig.now_ns();
     let rule = FaultRule::always(Traffic::Sent, FaultKind::SilentLoss);
@@ -200,7 +205,7 @@ fn a_host_that_cannot_speak_is_noticed_by_the_safety_module() {
     assert!(rig.cycle.counters().tx_lost >= 2);
     let before = rig.history.last().unwrap().1;
     rig.run(90);
-    // Meanwhile the motors keep the last torque: no stiffer.
+    // Meanwhile the motors keep the last torque, so that the arm does not become stiffer.
     assert_eq!(rig.history.last().unwrap().1, before);
     rig.run(30);
     assert!(rig.motors_in(MotorMode::Idle));
@@ -208,7 +213,7 @@ fn a_host_that_cannot_speak_is_noticed_by_the_safety_module() {
 }
 
 #[test]
-fn back_on_the_bus_the_host_lowers_the_module() {
+fn after_bus_off_the_host_lowers_the_module() {
     let mut rig = Rig::<4>::holding();
     let now_ns = rig.now_ns();
     let off = FaultRule::always(Traffic::Sent, FaultKind::BusOff);
@@ -217,15 +222,15 @@ fn back_on_the_bus_the_host_lowers_the_module() {
     assert!(rig.motors_in(MotorMode::Torque));
     rig.run(30);
     assert_idle_in_time(&rig, now_ns + 30 * MS);
-    assert_eq!(rig.cycle.guard().last_loss().unwrap().0, Loss::BusOff);
+    assert_eq!(rig.cycle.guard().last_loss().unwrap().0, LossReason::BusOff);
 }
 
-/// A single bit of a single reply, in many places: either it passes for a small error of an encoder, or
-/// the controller does not believe it and the arm goes to idle. Torque never grows by more than its rate
-/// limit allows, but for what the stop of a motion that is none may ask for: a fifth of the joint's limit a cycle.
+/// Flips one bit of one reply. Either the error is small and accepted, or the controller rejects it and the arm
+/// goes to idle. Torque grows at most at its rate limit, except during the stop of an apparent motion, which may
+/// use a fifth of the joint's limit per cycle.
 #[test]
-fn a_corrupted_reply_is_believed_or_ends_torque() {
-    let (mut believed, mut ended) = (0, 0);
+fn a_corrupted_reply_is_accepted_or_ends_torque() {
+    let (mut accepted, mut ended) = (0, 0);
     for seed in 0..24 {
         let mut rig = Rig::<4>::seeded(seed);
         rig.activate();
@@ -267,7 +272,7 @@ fn a_corrupted_reply_is_believed_or_ends_torque() {
             }
         }
         match rig.cycle.guard().stage() {
-            Stage::Active => believed += 1,
+            Stage::Active => accepted += 1,
             _ => {
                 assert_idle_in_time(&rig, now_ns);
                 let fault = rig.cycle.link_mut().output.unwrap().fault;
@@ -286,11 +291,11 @@ fn a_corrupted_reply_is_believed_or_ends_torque() {
             }
         }
     }
-    assert!(believed > 0 && ended > 0, "{believed} {ended}");
+    assert!(accepted > 0 && ended > 0, "{accepted} {ended}");
 }
 
 #[test]
-fn doubled_and_reordered_frames_change_nothing() {
+fn duplicated_and_reordered_frames_have_no_effect() {
     for kind in [FaultKind::Duplicate, FaultKind::Reorder(20_000)] {
         let mut rig = Rig::<4>::holding();
         injector(&mut rig).add(FaultRule::always(Traffic::Received, kind));
@@ -300,9 +305,9 @@ fn doubled_and_reordered_frames_change_nothing() {
     }
 }
 
-/// Replies so late that they fall into the next cycle are lost ones.
+/// Replies that arrive in the next cycle count as lost.
 #[test]
-fn late_replies_are_lost_replies() {
+fn late_replies_count_as_lost() {
     let mut rig = Rig::<4>::holding();
     let now_ns = rig.now_ns();
     let rule = FaultRule::always(Traffic::Received, FaultKind::Delay(900_000)).only(of_puck_2);
@@ -313,9 +318,9 @@ fn late_replies_are_lost_replies() {
 }
 
 #[test]
-fn the_emergency_stop_is_told_to_the_controller() {
+fn the_emergency_stop_is_reported_to_the_controller() {
     let mut rig = Rig::<4>::holding();
-    rig.emulator_mut().press(Press::EStop);
+    rig.emulator_mut().press(ButtonPress::EStop);
     rig.run(20);
     assert_eq!(rig.cycle.drives(), Drives::Off);
     let report = rig.cycle.link_mut().report.unwrap();
@@ -324,10 +329,10 @@ fn the_emergency_stop_is_told_to_the_controller() {
 }
 
 #[test]
-fn a_mode_that_the_module_changes_is_known_within_the_bound() {
+fn a_mode_change_of_the_module_is_known_within_the_time_limit() {
     let mut rig = Rig::<4>::holding();
     let begin_ns = rig.now_ns();
-    rig.emulator_mut().press(Press::Idle);
+    rig.emulator_mut().press(ButtonPress::Idle);
     while rig.cycle.link_mut().report.unwrap().drives == Drives::Active {
         rig.step();
     }
@@ -336,7 +341,7 @@ fn a_mode_that_the_module_changes_is_known_within_the_bound() {
 }
 
 #[test]
-fn a_dead_host_is_noticed_by_the_safety_module() {
+fn the_safety_module_detects_a_dead_host() {
     let mut rig = Rig::<4>::holding();
     let dead_ns = rig.now_ns();
     while rig.now_ns() < dead_ns + 150 * MS {
@@ -345,7 +350,7 @@ fn a_dead_host_is_noticed_by_the_safety_module() {
     let after_ns = idle_after_ns(&rig, dead_ns).unwrap();
     assert!((99 * MS..102 * MS).contains(&after_ns), "{after_ns}");
     assert_eq!(rig.emulator().safety().cause(), Cause::Heartbeat);
-    // It comes back: periods are passed over, and the arm stays in idle.
+    // After the host resumes, missed periods are skipped and the arm stays idle.
     let number = rig.cycle.cycle_number();
     rig.run(50);
     assert!(rig.cycle.cycle_number() - number >= 199);
@@ -355,19 +360,20 @@ fn a_dead_host_is_noticed_by_the_safety_module() {
 }
 
 #[test]
-fn a_program_that_ends_lowers_the_module_first() {
+fn shutdown_lowers_the_module_first() {
     let mut rig = Rig::<4>::holding();
     let begin_ns = rig.now_ns();
-    rig.cycle.leave();
+    rig.cycle.begin_shutdown();
     let action = rig.step();
     assert_eq!(action.torque, Torque::Fallback);
     rig.run(20);
     assert_idle_in_time(&rig, begin_ns);
 }
 
-/// A safety module that does not hear: the fallback ends after 100 ms and the motors are told directly.
+/// If the safety module does not react, the fallback torque ends after 100 ms and the motors are set to idle
+/// directly.
 #[test]
-fn without_the_module_the_motors_are_set_to_idle_themselves() {
+fn without_the_module_the_motors_are_set_to_idle_directly() {
     let mut rig = Rig::<4>::holding();
     let begin_ns = rig.now_ns();
     let rule = FaultRule::always(Traffic::Sent, FaultKind::Loss).only(to_module);
@@ -382,15 +388,15 @@ fn without_the_module_the_motors_are_set_to_idle_themselves() {
     assert_eq!(rig.emulator().safety().mode(), SafetyMode::Active);
 }
 
-/// A module that falls silent while the arm is active.
+/// The safety module stops replying while the arm is active.
 #[test]
-fn a_silent_module_ends_service() {
+fn a_silent_module_ends_torque() {
     let mut rig = Rig::<4>::holding();
     let begin_ns = rig.now_ns();
     let silent = |id: MessageId| id.raw() == 0x546;
     let rule = FaultRule::always(Traffic::Received, FaultKind::Loss).only(silent);
     injector(&mut rig).add(rule.within(begin_ns, u64::MAX));
     rig.run(150);
-    assert_eq!(rig.cycle.guard().last_loss().unwrap().0, Loss::Module);
+    assert_eq!(rig.cycle.guard().last_loss().unwrap().0, LossReason::Module);
     assert_eq!(rig.emulator().safety().mode(), SafetyMode::Idle);
 }

@@ -1,24 +1,24 @@
-//! The controller's own step at the end of the way, in the same process.
+//! In-process link that calls the controller step directly.
 
 use supple_can::{Answer, ArmReport, CanError, Command, Link};
 use supple_core::controller::Request;
 use supple_core::{Controller, Input, Output, State, step};
 
-pub struct Controlled<const N: usize> {
+pub struct InProcessLink<const N: usize> {
     controller: Controller<N>,
     state: State<N>,
     pub request: Option<Request<N>>,
     pub output: Option<Output<N>>,
     pub report: Option<ArmReport<N>>,
-    /// As if it had been killed: states are not read and not answered.
+    /// Simulates a killed controller: states are neither read nor answered.
     pub dead: bool,
-    /// Torques are not numbers.
+    /// Replaces the torques with NaN.
     pub not_finite: bool,
 }
 
-impl<const N: usize> Controlled<N> {
+impl<const N: usize> InProcessLink<N> {
     pub fn new(controller: Controller<N>) -> Self {
-        Controlled {
+        InProcessLink {
             state: State::new(&controller),
             controller,
             request: None,
@@ -30,7 +30,7 @@ impl<const N: usize> Controlled<N> {
     }
 }
 
-impl<const N: usize> Link<N> for Controlled<N> {
+impl<const N: usize> Link<N> for InProcessLink<N> {
     fn announce(&mut self) -> Result<(), CanError> {
         Ok(())
     }
@@ -68,7 +68,7 @@ impl<const N: usize> Link<N> for Controlled<N> {
     }
 }
 
-/// Idle, and a fault whose safe action is idle, want none.
+/// False in idle and in faults whose safe action is torque off.
 fn wants_torque<const N: usize>(output: &Output<N>) -> bool {
-    !output.limp
+    !output.torque_off
 }

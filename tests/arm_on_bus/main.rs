@@ -1,5 +1,5 @@
-//! `supple-can` against the emulated arm, in one process and in virtual time: start-up, service, and every
-//! injected fault to its end at the emulated motors.
+//! `supple-can` with the emulated arm, in one process and in virtual time: start-up, normal operation, and the
+//! effect of every injected fault on the emulated motors.
 
 mod faults;
 mod link;

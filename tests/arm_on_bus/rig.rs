@@ -1,13 +1,13 @@
-//! An emulated arm, a host, and a controller in between.
+//! Test rig: an emulated arm, the host, and the controller.
 
-use crate::link::Controlled;
+use crate::link::InProcessLink;
 use supple_bus::FaultInjector;
-use supple_bus::virtual_time::{Direct, Peer};
+use supple_bus::virtual_time::{DirectBus, Peer};
 use supple_can::guard::{Action, Stage};
-use supple_can::{CanError, Cycle, Ready, Rhythm, StartUp, start_up};
+use supple_can::{CanError, Cycle, CycleConfig, Ready, StartupConfig, start_up};
 use supple_core::controller::Request;
 use supple_core::{Controller, Vector};
-use supple_emu::{Emulator, EmulatorConfig, Press};
+use supple_emu::{ButtonPress, Emulator, EmulatorConfig};
 use supple_model::Description;
 use supple_plant::PlantConfig;
 use supple_puck::safety::{SafetyLimits, SpeedLimit};
@@ -17,7 +17,7 @@ pub const MS: u64 = 1_000_000;
 pub const PERIOD_NS: u64 = MS;
 pub const ANSWER_NS: u64 = MS / 20;
 
-pub type TestBus<const N: usize> = FaultInjector<Direct<Emulator<N>>>;
+pub type TestBus<const N: usize> = FaultInjector<DirectBus<Emulator<N>>>;
 
 pub fn arm(joints: usize) -> Description {
     Description::asset(if joints == 4 { "wam4" } else { "wam7" }).unwrap()
@@ -33,12 +33,12 @@ pub fn bus<const N: usize>(emulator: Emulator<N>) -> TestBus<N> {
 }
 
 fn seeded_bus<const N: usize>(emulator: Emulator<N>, seed: u64) -> TestBus<N> {
-    FaultInjector::new(Direct(emulator), seed)
+    FaultInjector::new(DirectBus(emulator), seed)
 }
 
-/// The arm stands in its home pose and the operator says so.
-pub fn wishes<const N: usize>() -> StartUp<N> {
-    StartUp {
+/// Start-up configuration of an arm in its home pose (`--zero-at-home`).
+pub fn startup_config<const N: usize>() -> StartupConfig<N> {
+    StartupConfig {
         zero_at_rad: Some(arm(N).home::<N>().unwrap()),
         limits: SafetyLimits {
             speed_fault: SpeedLimit::from_m_per_s(2.0).ok(),
@@ -50,50 +50,50 @@ pub fn wishes<const N: usize>() -> StartUp<N> {
 
 pub fn try_start<const N: usize>(
     bus: &mut TestBus<N>,
-    wishes: &StartUp<N>,
+    startup_config: &StartupConfig<N>,
 ) -> Result<Ready<N>, CanError> {
-    start_up(bus, &arm(N), wishes, &|| false, &mut |_| ())
+    start_up(bus, &arm(N), startup_config, &|| false, &mut |_| ())
 }
 
 pub struct Rig<const N: usize> {
-    pub cycle: Cycle<N, TestBus<N>, Controlled<N>>,
-    /// Torque of each motor at the end of every cycle \[N m\], with the bus's time \[ns\].
+    pub cycle: Cycle<N, TestBus<N>, InProcessLink<N>>,
+    /// Torque of each motor at the end of every cycle \[N m\], with the bus time \[ns\].
     pub history: Vec<(u64, Vector<N>)>,
 }
 
 impl<const N: usize> Rig<N> {
-    /// In service, the motors idle.
+    /// Started up, with idle motors.
     pub fn new() -> Rig<N> {
         Rig::seeded(1)
     }
 
-    /// The same with a seed for the injector.
+    /// As [`Rig::new`], with a seed for the injector.
     pub fn seeded(seed: u64) -> Rig<N> {
         Rig::set_up(arm(N).home::<N>().unwrap(), PERIOD_NS, seed)
     }
 
-    /// The same from a pose, at a period.
+    /// As [`Rig::new`], from another pose and at another period.
     pub fn at(pose: Vector<N>, period_ns: u64) -> Rig<N> {
         Rig::set_up(pose, period_ns, 1)
     }
 
     fn set_up(pose: Vector<N>, period_ns: u64, seed: u64) -> Rig<N> {
         let mut emulator = emulator(EmulatorConfig::wam(N), pose);
-        emulator.press(Press::Idle);
+        emulator.press(ButtonPress::Idle);
         let mut bus = seeded_bus(emulator, seed);
-        let wishes = StartUp {
+        let startup_config = StartupConfig {
             zero_at_rad: Some(pose),
-            ..wishes()
+            ..startup_config()
         };
-        let ready = try_start(&mut bus, &wishes).unwrap();
+        let ready = try_start(&mut bus, &startup_config).unwrap();
         let mut config = arm(N).config::<N>().unwrap();
         config.period_s = period_ns as f64 * 1e-9;
-        let link = Controlled::new(Controller::new(config).unwrap());
-        let rhythm = Rhythm {
+        let link = InProcessLink::new(Controller::new(config).unwrap());
+        let cycle_config = CycleConfig {
             period_ns,
             answer_ns: ANSWER_NS,
         };
-        let cycle = Cycle::new(bus, link, ready, &config, rhythm).unwrap();
+        let cycle = Cycle::new(bus, link, ready, &config, cycle_config).unwrap();
         Rig {
             cycle,
             history: Vec::new(),
@@ -110,7 +110,7 @@ impl<const N: usize> Rig<N> {
     pub fn activate(&mut self) {
         self.ask(Request::GravityHold);
         self.run(50);
-        self.emulator_mut().press(Press::Activate);
+        self.emulator_mut().press(ButtonPress::Activate);
         self.run(50);
         assert_eq!(self.cycle.guard().stage(), Stage::Active);
         assert!(self.motors_in(MotorMode::Torque));

@@ -1,4 +1,4 @@
-//! The arm in service: torques that arrive, a trajectory that is tracked, a bus that carries it.
+//! Normal operation: activation, trajectory tracking, and the load of the bus.
 
 use crate::rig::{MS, PERIOD_NS, Rig};
 use supple_bus::virtual_time::Peer;
@@ -6,43 +6,43 @@ use supple_can::guard::Stage;
 use supple_can::{BusTime, Drives};
 use supple_core::Vector;
 use supple_core::controller::{Mode, Request};
-use supple_emu::{Cause, Press};
+use supple_emu::{ButtonPress, Cause};
 use supple_experiment::{scenario, start_pose};
 use supple_puck::safety::SafetyMode;
 use supple_puck::status::MotorMode;
 
 #[test]
-fn torque_mode_comes_from_the_pendant_alone() {
+fn torque_mode_is_entered_only_from_the_pendant() {
     let mut rig = Rig::<4>::new();
     rig.ask(Request::GravityHold);
     rig.run(500);
     assert!(rig.motors_in(MotorMode::Idle));
     assert_eq!(rig.cycle.drives(), Drives::Idle);
-    rig.emulator_mut().press(Press::Activate);
+    rig.emulator_mut().press(ButtonPress::Activate);
     rig.run(50);
     assert!(rig.motors_in(MotorMode::Torque));
     assert_eq!(rig.cycle.drives(), Drives::Active);
 }
 
-/// The weight is held before and after: at the moment of activation no joint moves away.
+/// The weight is compensated from the moment of activation: no joint moves away.
 #[test]
 fn activation_is_bumpless() {
     let mut rig = Rig::<4>::new();
     rig.ask(Request::GravityHold);
     rig.run(100);
     let before = rig.emulator().truth().position_rad;
-    rig.emulator_mut().press(Press::Activate);
+    rig.emulator_mut().press(ButtonPress::Activate);
     rig.run(500);
     let moved = rig.emulator().truth().position_rad - before;
     assert!(moved.amax() < 2e-3, "{moved}");
 }
 
-/// An operator who activates an arm whose controller is idle gets an idle arm.
+/// If the controller is idle, activating the arm leaves it idle.
 #[test]
-fn without_a_willing_controller_the_motors_are_lowered_again() {
+fn an_idle_controller_sets_activated_motors_to_idle() {
     let mut rig = Rig::<4>::new();
     rig.run(20);
-    rig.emulator_mut().press(Press::Activate);
+    rig.emulator_mut().press(ButtonPress::Activate);
     rig.run(30);
     assert_eq!(rig.emulator().safety().mode(), SafetyMode::Idle);
     assert_eq!(rig.emulator().safety().cause(), Cause::Host);
@@ -50,23 +50,23 @@ fn without_a_willing_controller_the_motors_are_lowered_again() {
 }
 
 #[test]
-fn positions_and_force_are_the_arms() {
+fn reported_positions_and_force_match_the_arm() {
     let mut rig = Rig::<4>::holding();
     rig.run(200);
     let report = rig.cycle.link_mut().report.unwrap();
     let truth = rig.emulator().truth().position_rad;
     for (measured, truth) in report.position_rad.iter().zip(truth.iter()) {
-        // Half a count of each motor behind the joint, and what it moves in a cycle.
+        // Half a count of each motor of the joint, and the motion within a cycle.
         assert!((measured.unwrap() - truth).abs() < 2e-4);
     }
     let force_n = report.tip_force_n.unwrap();
     assert!(force_n.norm() < 0.1, "nothing touches the tip: {force_n}");
 }
 
-/// 450 to 540 us is the note of the protocol for poll, four replies and torques; the further polls add
-/// a few per cent.
+/// The protocol note specifies 450 to 540 us for poll, four replies and torques; the auxiliary polls add a few
+/// per cent.
 #[test]
-fn bus_load_is_the_sum_of_its_frames() {
+fn bus_load_is_the_sum_of_the_frames() {
     let mut rig = Rig::<4>::holding();
     let (begin_ns, busy_ns) = (rig.now_ns(), rig.emulator().bus_busy_ns());
     let mut reported = 0.0;
@@ -87,7 +87,7 @@ fn bus_load_is_the_sum_of_its_frames() {
 }
 
 #[test]
-fn what_the_bus_does_not_carry_is_refused_with_the_arithmetic() {
+fn a_period_beyond_the_bus_bandwidth_is_rejected_with_the_frame_times() {
     let answer_ns = 100_000;
     assert!(BusTime::new(4, 0, true, answer_ns).check(MS).is_ok());
     let seven = BusTime::new(7, 0, true, answer_ns);
@@ -100,20 +100,20 @@ fn what_the_bus_does_not_carry_is_refused_with_the_arithmetic() {
     assert!(BusTime::new(4, 4, true, answer_ns).check(MS).is_err());
 }
 
-/// Every frame of every cycle, each in turn polling the module's mode, the pendant or the sensor.
+/// Checks every cycle; the cycles poll the module's mode, the pendant and the sensor in rotation.
 fn keeps_its_budget<const N: usize>(period_ns: u64) {
     let mut rig = Rig::<N>::at(crate::rig::arm(N).home::<N>().unwrap(), period_ns);
     rig.activate();
     let budget = BusTime::new(N, 0, true, crate::rig::ANSWER_NS);
-    assert!(budget.least_period_ns() <= period_ns);
-    let mut greatest_ns = 0;
+    assert!(budget.min_period_ns() <= period_ns);
+    let mut max_ns = 0;
     for _ in 0..1000 {
         let busy_ns = rig.emulator().bus_busy_ns();
         rig.step();
-        greatest_ns = greatest_ns.max(rig.emulator().bus_busy_ns() - busy_ns);
+        max_ns = max_ns.max(rig.emulator().bus_busy_ns() - busy_ns);
     }
-    let allowed_ns = budget.least_period_ns() - budget.answer_ns;
-    assert!(greatest_ns <= allowed_ns, "{greatest_ns} {allowed_ns}");
+    let allowed_ns = budget.min_period_ns() - budget.answer_ns;
+    assert!(max_ns <= allowed_ns, "{max_ns} {allowed_ns}");
     // The sensor was polled: more than positions, torques and the pendant.
     assert!(rig.cycle.link_mut().report.unwrap().tip_force_n.is_some());
     assert_eq!(rig.cycle.counters().tx_lost, 0);
@@ -129,10 +129,10 @@ fn seven_joints_keep_the_budget_at_700_hz() {
     keeps_its_budget::<7>(1_428_000);
 }
 
-/// Lengths of the protocol's note: 65 us for a request, 85 for a reply, 135 for torques, 65 + 115 + 125 for the
+/// Durations of the protocol note: 65 us for a request, 85 for a reply, 135 for torques, 65 + 115 + 125 for the
 /// sensor.
 #[test]
-fn the_arithmetic_is_printed_frame_by_frame() {
+fn the_budget_is_printed_frame_by_frame() {
     let four = BusTime::new(4, 0, true, 100_000).budget(MS).to_string();
     for line in [
         "1 x  65 us =   65 us",
@@ -180,8 +180,8 @@ fn tracks<const N: usize>(period_ns: u64) -> f64 {
     (sum / count as f64).sqrt()
 }
 
-/// The exact model tracks within millimetres in one process; the bus adds half a cycle of delay and
-/// the arm its own.
+/// In one process the exact model tracks within millimetres; the bus adds half a cycle of delay, and the arm
+/// adds its own.
 #[test]
 fn four_joints_track_at_1_khz() {
     let rms_m = tracks::<4>(PERIOD_NS);
@@ -195,7 +195,7 @@ fn seven_joints_track_at_700_hz() {
 }
 
 #[test]
-fn the_same_run_gives_the_same_bits() {
+fn identical_runs_are_bit_identical() {
     let run = || {
         let mut rig = Rig::<4>::holding();
         rig.ask(Request::Move {

@@ -1,11 +1,11 @@
-//! From power-up to service, and every arm that is not the described one.
+//! Start-up from power-on to normal operation, and rejection of arms that differ from the description.
 
-use crate::rig::{self, MS, emulator, try_start, wishes};
+use crate::rig::{self, MS, emulator, startup_config, try_start};
 use supple_bus::Bus;
-use supple_can::{CanError, Progress, StartUp, start_up};
+use supple_can::{CanError, Progress, StartupConfig, start_up};
 use supple_core::Vector;
 use supple_emu::puck::Power;
-use supple_emu::{EmulatorConfig, Happening, Press};
+use supple_emu::{ArmEvent, ButtonPress, EmulatorConfig};
 use supple_puck::safety::SafetyMode;
 use supple_puck::status::{MotorMode, Role};
 use supple_puck::{Property, PropertyTable};
@@ -17,24 +17,24 @@ fn home<const N: usize>() -> Vector<N> {
 /// An arm in its home pose whose operator has pressed Shift-Idle.
 fn idle_arm<const N: usize>(config: EmulatorConfig) -> rig::TestBus<N> {
     let mut emulator = emulator(config, home::<N>());
-    emulator.press(Press::Idle);
+    emulator.press(ButtonPress::Idle);
     rig::bus(emulator)
 }
 
-fn refusal(config: EmulatorConfig) -> String {
-    try_start(&mut idle_arm::<4>(config), &wishes())
+fn startup_error(config: EmulatorConfig) -> String {
+    try_start(&mut idle_arm::<4>(config), &startup_config())
         .unwrap_err()
         .to_string()
 }
 
 fn starts<const N: usize>() {
     let mut bus = idle_arm::<N>(EmulatorConfig::wam(N));
-    let ready = try_start(&mut bus, &wishes()).unwrap();
+    let ready = try_start(&mut bus, &startup_config()).unwrap();
     assert!(ready.sensor);
     let emulator = &bus.inner().0;
     assert!(emulator.pucks().iter().all(|p| p.power() == Power::Ready));
     assert_eq!(emulator.safety().mode(), SafetyMode::Idle);
-    // Counts mean the home pose, as the sagging arm has left it.
+    // The counts match the home pose, after the arm has sagged a little.
     let counts = ready.transmission.counts(&emulator.truth().position_rad);
     for (puck, counts) in emulator.pucks().iter().zip(counts.unwrap()) {
         assert!(
@@ -43,13 +43,13 @@ fn starts<const N: usize>() {
             puck.counts()
         );
     }
-    for (_, happening) in emulator.happenings() {
+    for (_, arm_event) in emulator.arm_events() {
         assert!(
             !matches!(
-                happening,
-                Happening::SpokeWhileWaking | Happening::Motor(_, MotorMode::Torque)
+                arm_event,
+                ArmEvent::HostSentDuringWakeUp | ArmEvent::Motor(_, MotorMode::Torque)
             ),
-            "{happening:?}"
+            "{arm_event:?}"
         );
     }
 }
@@ -66,29 +66,36 @@ fn seven_pucks_start() {
 
 /// Old and new firmware have position, pole count and slot at different ids.
 #[test]
-fn every_list_of_ids_will_do() {
+fn every_firmware_list_is_supported() {
     for version in [61, 64, 65, 68, 114, 132, 175, 200] {
         let mut config = EmulatorConfig::wam(4);
         for puck in &mut config.pucks {
             puck.version = version;
         }
         let table = PropertyTable::of_firmware(supple_puck::PuckKind::Motor, version).unwrap();
-        let ready = try_start(&mut idle_arm::<4>(config), &wishes()).unwrap();
+        let ready = try_start(&mut idle_arm::<4>(config), &startup_config()).unwrap();
         assert_eq!(Some(ready.pucks[0].position), table.id(Property::P));
         assert_eq!(ready.pucks[3].version, version);
     }
 }
 
 #[test]
-fn it_waits_for_the_operator() {
+fn start_up_waits_for_the_operator() {
     let mut emulator = emulator(EmulatorConfig::wam(4), home::<4>());
-    emulator.press_at(700 * MS, Press::Idle);
+    emulator.press_at(700 * MS, ButtonPress::Idle);
     let mut bus = rig::bus(emulator);
-    let mut seen = Vec::new();
-    let progress = &mut |progress| seen.push(progress);
-    start_up(&mut bus, &rig::arm(4), &wishes::<4>(), &|| false, progress).unwrap();
+    let mut reported = Vec::new();
+    let progress = &mut |progress| reported.push(progress);
+    start_up(
+        &mut bus,
+        &rig::arm(4),
+        &startup_config::<4>(),
+        &|| false,
+        progress,
+    )
+    .unwrap();
     assert_eq!(
-        seen,
+        reported,
         [
             Progress::WaitingForIdle,
             Progress::Enumerating,
@@ -101,44 +108,44 @@ fn it_waits_for_the_operator() {
 }
 
 #[test]
-fn it_can_be_ended_while_it_waits() {
+fn start_up_can_be_stopped_while_it_waits() {
     let mut bus = rig::bus(emulator(EmulatorConfig::wam(4), home::<4>()));
     let ended = start_up(
         &mut bus,
         &rig::arm(4),
-        &wishes::<4>(),
+        &startup_config::<4>(),
         &|| true,
         &mut |_| (),
     );
     assert!(matches!(ended, Err(CanError::Stopped)), "{ended:?}");
 }
 
-/// A host that comes back finds the arm awake, zeroed and active: it takes it to idle first.
+/// A restarted host finds the arm awake, zeroed and active, and first switches it to idle.
 #[test]
-fn a_second_start_finds_everything_as_it_is() {
+fn a_second_start_accepts_an_arm_that_is_awake_and_zeroed() {
     let mut config = EmulatorConfig::wam(4);
     config.zeroed = true;
     let mut emulator = emulator(config, home::<4>());
-    emulator.press(Press::Activate);
+    emulator.press(ButtonPress::Activate);
     let mut bus = rig::bus(emulator);
-    let wishes = StartUp {
+    let startup_config = StartupConfig {
         zero_at_rad: None,
-        ..wishes::<4>()
+        ..startup_config::<4>()
     };
     let begun_ns = bus.now_ns();
-    try_start(&mut bus, &wishes).unwrap();
+    try_start(&mut bus, &startup_config).unwrap();
     assert_eq!(bus.inner().0.safety().mode(), SafetyMode::Idle);
-    // Nobody sleeps, so nobody is waited for.
+    // All pucks are awake, so start-up does not wait.
     assert!(bus.now_ns() - begun_ns < 1000 * MS);
 }
 
 #[test]
-fn an_arm_without_positions_is_refused() {
-    let wishes = StartUp {
+fn an_arm_without_positions_is_rejected() {
+    let startup_config = StartupConfig {
         zero_at_rad: None,
-        ..wishes::<4>()
+        ..startup_config::<4>()
     };
-    let error = try_start(&mut idle_arm::<4>(EmulatorConfig::wam(4)), &wishes);
+    let error = try_start(&mut idle_arm::<4>(EmulatorConfig::wam(4)), &startup_config);
     let error = error.unwrap_err().to_string();
     assert!(error.contains("ZERO is 0"), "{error}");
     assert!(error.contains("--zero-at-home"), "{error}");
@@ -149,7 +156,7 @@ fn an_arm_without_positions_is_refused() {
 fn a_missing_puck_is_named() {
     let mut config = EmulatorConfig::wam(4);
     config.pucks[2].present = false;
-    let error = refusal(config);
+    let error = startup_error(config);
     assert!(
         error.contains("a motor puck (node 3) does not answer"),
         "{error}"
@@ -160,58 +167,58 @@ fn a_missing_puck_is_named() {
 fn a_missing_safety_module_is_named() {
     let mut config = EmulatorConfig::wam(4);
     config.safety.present = false;
-    let error = refusal(config);
+    let error = startup_error(config);
     assert!(error.contains("the safety module (node 10)"), "{error}");
 }
 
 #[test]
-fn a_wrong_role_is_refused() {
+fn a_wrong_role_is_rejected() {
     let mut config = EmulatorConfig::wam(4);
     config.pucks[1].role = Role(0x0105);
-    let error = refusal(config);
+    let error = startup_error(config);
     assert!(error.contains("node 2 has role 0x0105"), "{error}");
 }
 
 #[test]
-fn mixed_firmware_is_refused() {
+fn mixed_firmware_is_rejected() {
     let mut config = EmulatorConfig::wam(4);
     config.pucks[3].version = 60;
-    let error = refusal(config);
+    let error = startup_error(config);
     assert!(error.contains("node 4 has torque at id"), "{error}");
 }
 
 #[test]
-fn other_torque_units_are_refused() {
+fn other_torque_units_are_rejected() {
     let mut config = EmulatorConfig::wam(4);
     config.pucks[0].units_per_nm = 2562;
-    let error = refusal(config);
+    let error = startup_error(config);
     assert!(error.contains("IPNM of motor puck 1 is 2562"), "{error}");
     assert!(error.contains("torque_quantum_nm"), "{error}");
 }
 
 #[test]
-fn another_encoder_is_refused() {
+fn another_encoder_is_rejected() {
     let mut config = EmulatorConfig::wam(4);
     config.pucks[0].counts_per_revolution = 40960;
-    let error = refusal(config);
+    let error = startup_error(config);
     assert!(error.contains("CTS of motor puck 1 is 40960"), "{error}");
 }
 
 #[test]
-fn a_hot_puck_is_refused() {
+fn a_hot_puck_is_rejected() {
     let mut config = EmulatorConfig::wam(4);
     config.pucks[1].temperature = 61;
-    let error = refusal(config);
+    let error = startup_error(config);
     assert!(error.contains("motor puck 2 is at 61 degrees"), "{error}");
 }
 
 #[test]
-fn an_arm_with_more_pucks_is_refused() {
+fn an_arm_with_more_pucks_is_rejected() {
     let mut bus = idle_arm::<7>(EmulatorConfig::wam(7));
     let error = start_up(
         &mut bus,
         &rig::arm(4),
-        &wishes::<4>(),
+        &startup_config::<4>(),
         &|| false,
         &mut |_| (),
     );
@@ -219,9 +226,9 @@ fn an_arm_with_more_pucks_is_refused() {
     assert!(error.contains("motor puck 5 answers"), "{error}");
 }
 
-/// Groups of the 2008 manual, slots of nobody: they are set, and the torque limit is the description's.
+/// Groups of the 2008 manual and unused slots are corrected, and the torque limit is set to the description's.
 #[test]
-fn settings_that_differ_are_set() {
+fn settings_that_differ_are_corrected() {
     let mut config = EmulatorConfig::wam(7);
     for puck in &mut config.pucks {
         puck.groups = [0, 0, 5];
@@ -229,7 +236,7 @@ fn settings_that_differ_are_set() {
         puck.max_torque = 8000;
     }
     let mut bus = idle_arm::<7>(config);
-    try_start(&mut bus, &wishes()).unwrap();
-    let ready_again = try_start(&mut bus, &wishes());
+    try_start(&mut bus, &startup_config()).unwrap();
+    let ready_again = try_start(&mut bus, &startup_config());
     assert!(ready_again.is_ok(), "{ready_again:?}");
 }

@@ -1,20 +1,20 @@
-//! A cycle of `supple-can` allocates nothing: with active motors, with every poll, while it loses replies and
-//! frames, and on the way down. The emulated arm in the same thread is not counted.
+//! A `supple-can` cycle allocates nothing: with active motors, with every poll, with lost replies and frames,
+//! and during shutdown. The emulated arm in the same thread is not counted.
 
 #[path = "../support/counting.rs"]
 mod counting;
 #[path = "../arm_on_bus/link.rs"]
 mod link;
 
-use counting::{counted, uncounted};
-use link::Controlled;
-use supple_bus::virtual_time::Direct;
+use counting::{count_allocations, without_counting};
+use link::InProcessLink;
+use supple_bus::virtual_time::DirectBus;
 use supple_bus::{Bus, BusError, Event, FaultInjector, FaultKind, FaultRule, Traffic};
 use supple_can::guard::Stage;
-use supple_can::{Cycle, Rhythm, StartUp, start_up};
+use supple_can::{Cycle, CycleConfig, StartupConfig, start_up};
 use supple_core::Controller;
 use supple_core::controller::Request;
-use supple_emu::{Emulator, EmulatorConfig, Press};
+use supple_emu::{ButtonPress, Emulator, EmulatorConfig};
 use supple_model::Description;
 use supple_plant::PlantConfig;
 use supple_puck::CanFrame;
@@ -22,7 +22,7 @@ use supple_puck::safety::SafetyLimits;
 
 const MS: u64 = 1_000_000;
 
-struct Uncounted(Direct<Emulator<4>>);
+struct Uncounted(DirectBus<Emulator<4>>);
 
 impl Bus for Uncounted {
     fn now_ns(&self) -> u64 {
@@ -30,17 +30,17 @@ impl Bus for Uncounted {
     }
 
     fn send(&mut self, frame: &CanFrame) -> Result<(), BusError> {
-        uncounted(|| self.0.send(frame))
+        without_counting(|| self.0.send(frame))
     }
 
     fn receive_until(&mut self, until_ns: u64) -> Result<Option<Event>, BusError> {
-        uncounted(|| self.0.receive_until(until_ns))
+        without_counting(|| self.0.receive_until(until_ns))
     }
 }
 
-type Service = Cycle<4, FaultInjector<Uncounted>, Controlled<4>>;
+type Service = Cycle<4, FaultInjector<Uncounted>, InProcessLink<4>>;
 
-fn press(cycle: &mut Service, press: Press) {
+fn press(cycle: &mut Service, press: ButtonPress) {
     cycle.bus_mut().inner_mut().0.0.press(press);
 }
 
@@ -49,21 +49,28 @@ fn in_service() -> Service {
     let plant = PlantConfig::<4>::from_description(&description).unwrap();
     let home_rad = description.home::<4>().unwrap();
     let mut arm = Emulator::new(EmulatorConfig::wam(4), plant, home_rad, 0).unwrap();
-    arm.press(Press::Idle);
-    let mut bus = FaultInjector::new(Uncounted(Direct(arm)), 1);
-    let wishes = StartUp {
+    arm.press(ButtonPress::Idle);
+    let mut bus = FaultInjector::new(Uncounted(DirectBus(arm)), 1);
+    let startup_config = StartupConfig {
         zero_at_rad: Some(home_rad),
         limits: SafetyLimits::default(),
         tare: false,
     };
-    let ready = start_up(&mut bus, &description, &wishes, &|| false, &mut |_| ()).unwrap();
+    let ready = start_up(
+        &mut bus,
+        &description,
+        &startup_config,
+        &|| false,
+        &mut |_| (),
+    )
+    .unwrap();
     let config = description.config::<4>().unwrap();
-    let rhythm = Rhythm {
+    let cycle_config = CycleConfig {
         period_ns: MS,
         answer_ns: MS / 20,
     };
-    let link = Controlled::new(Controller::new(config).unwrap());
-    Cycle::new(bus, link, ready, &config, rhythm).unwrap()
+    let link = InProcessLink::new(Controller::new(config).unwrap());
+    Cycle::new(bus, link, ready, &config, cycle_config).unwrap()
 }
 
 fn run(cycle: &mut Service, cycles: usize) {
@@ -73,11 +80,11 @@ fn run(cycle: &mut Service, cycles: usize) {
 }
 
 #[test]
-fn the_counter_counts() {
+fn the_counter_counts_allocations() {
     let boxed = || drop(std::hint::black_box(Box::new(1)));
-    assert_eq!(counted(boxed), 2);
-    assert_eq!(counted(|| uncounted(boxed)), 0);
-    assert_eq!(counted(|| {}), 0);
+    assert_eq!(count_allocations(boxed), 2);
+    assert_eq!(count_allocations(|| without_counting(boxed)), 0);
+    assert_eq!(count_allocations(|| {}), 0);
 }
 
 #[test]
@@ -85,27 +92,27 @@ fn a_thousand_cycles_allocate_nothing() {
     let mut cycle = in_service();
     cycle.link_mut().request = Some(Request::GravityHold);
     run(&mut cycle, 50);
-    press(&mut cycle, Press::Activate);
+    press(&mut cycle, ButtonPress::Activate);
     run(&mut cycle, 50);
     assert_eq!(cycle.guard().stage(), Stage::Active);
-    assert_eq!(counted(|| run(&mut cycle, 1000)), 0);
+    assert_eq!(count_allocations(|| run(&mut cycle, 1000)), 0);
     assert_eq!(cycle.guard().stage(), Stage::Active);
 }
 
 #[test]
-fn nor_do_cycles_that_lose_things() {
+fn cycles_with_lost_frames_allocate_nothing() {
     let mut cycle = in_service();
     cycle.link_mut().request = Some(Request::GravityHold);
     run(&mut cycle, 50);
-    press(&mut cycle, Press::Activate);
+    press(&mut cycle, ButtonPress::Activate);
     run(&mut cycle, 50);
     let lost = FaultRule::always(Traffic::Received, FaultKind::Loss).with_probability(0.01);
     cycle.bus_mut().add(lost);
-    assert_eq!(counted(|| run(&mut cycle, 100)), 0);
+    assert_eq!(count_allocations(|| run(&mut cycle, 100)), 0);
     let silent = FaultRule::always(Traffic::Sent, FaultKind::SilentLoss);
     cycle.bus_mut().add(silent.only(|id| id.raw() == 0x401));
     cycle.link_mut().dead = true;
-    assert_eq!(counted(|| run(&mut cycle, 300)), 0);
+    assert_eq!(count_allocations(|| run(&mut cycle, 300)), 0);
     assert_eq!(cycle.guard().stage(), Stage::Resting);
     assert!(cycle.counters().tx_lost > 0);
 }

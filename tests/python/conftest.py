@@ -1,4 +1,4 @@
-"""A log to read: the one named by SUPPLE_TEST_LOG, or one that is written for the occasion."""
+"""The log under test: the file named by SUPPLE_TEST_LOG, or one that is written for the test."""
 
 import os
 import subprocess
@@ -28,7 +28,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def cut_log(log: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The first two thirds of it, as a crash would leave it."""
+    """The first two thirds of the log, as after a crash."""
     path = tmp_path_factory.mktemp("cut") / "cut.mcap"
     content = log.read_bytes()
     path.write_bytes(content[: len(content) * 2 // 3])
@@ -37,7 +37,7 @@ def cut_log(log: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def recovered_log(cut_log: Path) -> Path:
-    """What is whole in the cut log."""
+    """The records recovered from the truncated log."""
     path = cut_log.with_name("recovered.mcap")
     example("recover_log", cut_log, path)
     return path

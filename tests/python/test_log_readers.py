@@ -1,7 +1,7 @@
-"""Logs through Python's standard readers, which know nothing of supple.
+"""Reads logs with Python's standard readers, which do not depend on supple.
 
-Every message is decoded by the definition inside the file, and its values are held against each
-other: transforms against the tip that the controller reports, torque terms against their sum.
+Every message is decoded by the definition inside the file, and its values are checked for consistency:
+transforms with the tip that the controller reports, torque terms with their sum.
 """
 
 import math
@@ -29,7 +29,7 @@ SCHEMAS = {
 ALWAYS = {"/controller_state", "/joint_states", "/tf", "/robot_description"}
 TERMS = (
     "gravity coriolis friction jacobian_rate inertial stiffness damping force nullspace joint_pd "
-    "soft_stop handover"
+    "soft_stop ripple handover"
 ).split()
 
 
@@ -89,7 +89,7 @@ def test_profile_channels_and_counts(log: Path, messages) -> None:
     assert counts["/robot_description"] == 1
 
 
-def test_chunks_hold_a_quarter_of_a_second(log: Path) -> None:
+def test_chunks_are_shorter_than_a_quarter_of_a_second(log: Path) -> None:
     with log.open("rb") as stream:
         chunks = make_reader(stream).get_summary().chunk_indexes
     assert len(chunks) > 1
@@ -97,7 +97,7 @@ def test_chunks_hold_a_quarter_of_a_second(log: Path) -> None:
         assert chunk.message_end_time - chunk.message_start_time < 250_000_000
 
 
-def test_index_leads_to_the_same_messages(log: Path, messages) -> None:
+def test_the_index_gives_the_same_messages(log: Path, messages) -> None:
     times = [time for time, _ in messages["/controller_state"]]
     start, end = times[len(times) // 3], times[len(times) // 2]
     part = decoded(log, topics=["/controller_state"], starting_at=start, ending_before=end)
@@ -181,7 +181,7 @@ def test_wrenches(messages) -> None:
 
 
 def rotated(q, v):
-    """The vector `v` turned by the unit quaternion `q`."""
+    """The vector `v` rotated by the unit quaternion `q`."""
     u = (q.x, q.y, q.z)
     t = [2.0 * c for c in cross(u, v)]
     s = cross(u, t)
@@ -226,7 +226,7 @@ def test_timing_and_truth(messages, joints) -> None:
         assert len(truth.position_rad) == len(truth.motor_torque_nm) == len(joints)
 
 
-def test_a_cut_log_is_refused(cut_log: Path) -> None:
+def test_a_truncated_log_is_rejected(cut_log: Path) -> None:
     with pytest.raises(McapError), cut_log.open("rb") as stream:
         make_reader(stream).get_summary()
     with pytest.raises(McapError), cut_log.open("rb") as stream:

@@ -1,83 +1,85 @@
-//! The emulated arm in a thread of its own, on its own socket, as the program `supple-emu` runs it.
+//! The emulated arm in its own thread, on its own socket, as in the program `supple-emu`.
 
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 use supple_bus::{Bus, BusFault, SocketCan};
 use supple_core::Vector;
-use supple_emu::{ArmsEnd, Emulator, EmulatorConfig, Press, catch_up, listen};
+use supple_emu::{
+    ArmBus, ButtonPress, Emulator, EmulatorConfig, advance_to_bus_time, receive_host_frame,
+};
 use supple_model::Description;
 use supple_plant::PlantConfig;
 use supple_puck::status::MotorMode;
 
-enum Order {
-    Press(Press),
+enum ArmCommand {
+    Press(ButtonPress),
     Fault(BusFault),
-    Look(Sender<Look>),
+    Snapshot(Sender<ArmSnapshot>),
     End,
 }
 
-struct Look {
+struct ArmSnapshot {
     modes: Vec<MotorMode>,
     position_rad: Vector<4>,
 }
 
 pub struct Arm {
-    orders: Sender<Order>,
+    commands: Sender<ArmCommand>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Arm {
-    /// It is there when this returns.
+    /// Returns when the arm is running.
     pub fn start(interface: &str) -> Arm {
-        let (orders, received) = channel();
+        let (commands, received) = channel();
         let interface = interface.to_owned();
         let arm = Arm {
-            orders,
+            commands,
             thread: Some(std::thread::spawn(move || emulate(&interface, &received))),
         };
         assert!(arm.motors_in(MotorMode::Idle));
         arm
     }
 
-    pub fn press(&self, press: Press) {
-        self.order(Order::Press(press));
+    pub fn press(&self, press: ButtonPress) {
+        self.send_command(ArmCommand::Press(press));
     }
 
-    /// The host's interface reports this.
+    /// Makes the host's interface report a fault.
     pub fn fault(&self, fault: BusFault) {
-        self.order(Order::Fault(fault));
+        self.send_command(ArmCommand::Fault(fault));
     }
 
     pub fn motors_in(&self, mode: MotorMode) -> bool {
-        self.look().modes.iter().all(|m| *m == mode)
+        self.snapshot().modes.iter().all(|m| *m == mode)
     }
 
     pub fn position_rad(&self) -> Vector<4> {
-        self.look().position_rad
+        self.snapshot().position_rad
     }
 
-    fn order(&self, order: Order) {
-        self.orders.send(order).expect("the arm is there");
+    fn send_command(&self, command: ArmCommand) {
+        self.commands.send(command).expect("the arm runs");
     }
 
-    fn look(&self) -> Look {
-        let (sender, look) = channel();
-        self.order(Order::Look(sender));
-        look.recv().expect("the arm answers")
+    fn snapshot(&self) -> ArmSnapshot {
+        let (sender, snapshot) = channel();
+        self.send_command(ArmCommand::Snapshot(sender));
+        snapshot.recv().expect("the arm answers")
     }
 }
 
 impl Drop for Arm {
     fn drop(&mut self) {
-        // One that has failed already says so in its own panic.
-        let _ = self.orders.send(Order::End);
+        // An arm thread that has failed has already reported its panic.
+        let _ = self.commands.send(ArmCommand::End);
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
         }
     }
 }
 
-fn emulate(interface: &str, orders: &Receiver<Order>) {
+fn emulate(interface: &str, commands: &Receiver<ArmCommand>) {
     let description = Description::asset("wam4").unwrap();
     let plant = PlantConfig::<4>::from_description(&description).unwrap();
     let home_rad = description.home::<4>().unwrap();
@@ -86,19 +88,19 @@ fn emulate(interface: &str, orders: &Receiver<Order>) {
     let mut emulator =
         Emulator::new(EmulatorConfig::wam(4), plant, home_rad, bus.now_ns()).unwrap();
     loop {
-        catch_up(&mut emulator, &mut bus).unwrap();
-        listen(&mut emulator, &mut bus).unwrap();
-        match orders.try_recv() {
-            Ok(Order::Press(press)) => emulator.press(press),
-            Ok(Order::Fault(fault)) => bus.fault(fault).unwrap(),
-            Ok(Order::Look(answer)) => {
-                let look = Look {
+        advance_to_bus_time(&mut emulator, &mut bus).unwrap();
+        receive_host_frame(&mut emulator, &mut bus).unwrap();
+        match commands.try_recv() {
+            Ok(ArmCommand::Press(press)) => emulator.press(press),
+            Ok(ArmCommand::Fault(fault)) => bus.fault(fault).unwrap(),
+            Ok(ArmCommand::Snapshot(answer)) => {
+                let snapshot = ArmSnapshot {
                     modes: emulator.pucks().iter().map(|puck| puck.mode()).collect(),
                     position_rad: emulator.truth().position_rad,
                 };
-                answer.send(look).unwrap();
+                answer.send(snapshot).unwrap();
             }
-            Ok(Order::End) => return,
+            Ok(ArmCommand::End) => return,
             Err(_) => {}
         }
     }

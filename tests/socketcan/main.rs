@@ -1,7 +1,7 @@
-//! `supple-can` against the emulated arm over a CAN interface of the kernel, at 1 kHz: from the wake-up to
-//! torque mode, a thousand cycles, error frames, silent loss. `./ci.sh socketcan` runs it in a virtual machine
-//! that has such an interface and whose clock counts instructions, so that 1 kHz is kept at any speed of the
-//! host; elsewhere `SUPPLE_CAN_INTERFACE` names an interface.
+//! `supple-can` with the emulated arm over a CAN interface of the kernel, at 1 kHz: wake-up, torque mode, a
+//! thousand cycles, error frames, silent loss. `./ci.sh socketcan` runs it in a virtual machine that has such an
+//! interface and whose clock counts instructions, so that it runs at 1 kHz at any speed of the host; elsewhere
+//! `SUPPLE_CAN_INTERFACE` names an interface.
 
 mod arm;
 #[path = "../support/counting.rs"]
@@ -10,38 +10,38 @@ mod counting;
 mod link;
 
 use arm::Arm;
-use link::Controlled;
+use link::InProcessLink;
 use supple_bus::{BusFault, FaultInjector, FaultKind, FaultRule, SocketCan, Traffic};
 use supple_can::guard::Stage;
-use supple_can::{Cycle, Loss, Rhythm, StartUp, start_up};
+use supple_can::{Cycle, CycleConfig, LossReason, StartupConfig, start_up};
 use supple_core::Controller;
 use supple_core::controller::Request;
-use supple_emu::Press;
+use supple_emu::ButtonPress;
 use supple_model::Description;
 use supple_puck::safety::SafetyLimits;
 use supple_puck::status::MotorMode;
-use supple_realtime::{Settings, enter};
+use supple_realtime::{Settings, apply_realtime_settings};
 
 const PERIOD_NS: u64 = 1_000_000;
 const ANSWER_NS: u64 = 50_000;
-/// Cycles in which every safe action is done: 20 ms.
+/// Cycles within which every safe action is complete: 20 ms.
 const SAFE: usize = 20;
 /// Cycles for the operator's button to reach the motors and the host: 50 ms.
 const PRESSED: usize = 50;
 
-/// Of the host's thread and the arm's: hardware waits for nobody.
+/// Priorities of host and arm thread; the arm is higher, like real hardware.
 const HOST_PRIORITY: u8 = 79;
 const ARM_PRIORITY: u8 = 80;
 
-type Service = Cycle<4, FaultInjector<SocketCan>, Controlled<4>>;
+type Service = Cycle<4, FaultInjector<SocketCan>, InProcessLink<4>>;
 
 fn realtime(priority: u8) {
     let settings = Settings {
         priority: Some(priority),
         ..Settings::NONE
     };
-    for shortfall in enter(&settings) {
-        eprintln!("{shortfall}");
+    for realtime_warning in apply_realtime_settings(&settings) {
+        eprintln!("{realtime_warning}");
     }
 }
 
@@ -51,59 +51,59 @@ fn run(cycle: &mut Service, cycles: usize) {
     }
 }
 
-/// In service with idle motors, as the program comes there.
+/// Starts the arm up as the program does; the motors are idle.
 fn in_service(interface: &str) -> Service {
     let description = Description::asset("wam4").unwrap();
     let config = description.config::<4>().unwrap();
     let mut bus = FaultInjector::new(SocketCan::open(interface).unwrap(), 1);
-    let wishes = StartUp {
+    let startup_config = StartupConfig {
         zero_at_rad: Some(description.home::<4>().unwrap()),
         limits: SafetyLimits::default(),
         tare: false,
     };
-    let mut said = Vec::new();
+    let mut progress_so_far = Vec::new();
     let ready = start_up(
         &mut bus,
         &description,
-        &wishes,
+        &startup_config,
         &|| false,
         &mut |progress| {
-            said.push(progress);
+            progress_so_far.push(progress);
         },
     );
-    let ready = ready.unwrap_or_else(|error| panic!("{error}, after {said:?}"));
-    let link = Controlled::new(Controller::new(config).unwrap());
-    let rhythm = Rhythm {
+    let ready = ready.unwrap_or_else(|error| panic!("{error}, after {progress_so_far:?}"));
+    let link = InProcessLink::new(Controller::new(config).unwrap());
+    let cycle_config = CycleConfig {
         period_ns: PERIOD_NS,
         answer_ns: ANSWER_NS,
     };
-    Cycle::new(bus, link, ready, &config, rhythm).unwrap()
+    Cycle::new(bus, link, ready, &config, cycle_config).unwrap()
 }
 
 fn activate(cycle: &mut Service, arm: &Arm) {
-    arm.press(Press::Idle);
+    arm.press(ButtonPress::Idle);
     run(cycle, PRESSED);
-    arm.press(Press::Activate);
+    arm.press(ButtonPress::Activate);
     run(cycle, PRESSED);
     assert_eq!(cycle.guard().stage(), Stage::Active);
     assert!(arm.motors_in(MotorMode::Torque));
 }
 
 #[test]
-fn an_arm_on_the_kernels_bus_wakes_serves_and_is_lowered() {
+fn an_arm_on_a_kernel_can_interface_runs_and_is_lowered_after_every_loss() {
     let Ok(interface) = std::env::var("SUPPLE_CAN_INTERFACE") else {
-        eprintln!("skipped: SUPPLE_CAN_INTERFACE is not set; ./ci.sh socketcan has one");
+        eprintln!("skipped: SUPPLE_CAN_INTERFACE is not set; ./ci.sh socketcan provides one");
         return;
     };
     let arm = Arm::start(&interface);
-    arm.press(Press::Idle);
+    arm.press(ButtonPress::Idle);
     realtime(HOST_PRIORITY);
     let mut cycle = in_service(&interface);
     cycle.link_mut().request = Some(Request::GravityHold);
     activate(&mut cycle, &arm);
 
     let (before, before_rad) = (*cycle.counters(), arm.position_rad());
-    let allocations = counting::counted(|| run(&mut cycle, 1000));
+    let allocations = counting::count_allocations(|| run(&mut cycle, 1000));
     assert_eq!(allocations, 0);
     let counters = *cycle.counters();
     eprintln!("{counters:?}");
@@ -119,7 +119,7 @@ fn an_arm_on_the_kernels_bus_wakes_serves_and_is_lowered() {
         assert!((measured.unwrap() - truth).abs() < 2e-4);
     }
 
-    // What a controller reports and then copes with changes nothing.
+    // Errors that the CAN controller reports and recovers from have no effect.
     for fault in [
         BusFault::ArbitrationLost,
         BusFault::Warning,
@@ -134,10 +134,10 @@ fn an_arm_on_the_kernels_bus_wakes_serves_and_is_lowered() {
     assert_eq!(cycle.counters().overruns, 1);
     arm.fault(BusFault::BusOff);
     run(&mut cycle, SAFE);
-    assert_eq!(cycle.guard().last_loss().unwrap().0, Loss::BusOff);
+    assert_eq!(cycle.guard().last_loss().unwrap().0, LossReason::BusOff);
     assert!(arm.motors_in(MotorMode::Idle));
 
-    // Torque frames that never leave, in silence: noticed in the cycle, lowered soon after.
+    // Torque frames that are silently lost: detected in the cycle, switched to idle soon after.
     arm.fault(BusFault::Restarted);
     activate(&mut cycle, &arm);
     let lost = cycle.counters().tx_lost;
@@ -146,14 +146,14 @@ fn an_arm_on_the_kernels_bus_wakes_serves_and_is_lowered() {
     run(&mut cycle, 1);
     assert_eq!(cycle.counters().tx_lost, lost + 1);
     run(&mut cycle, SAFE);
-    assert_eq!(cycle.guard().last_loss().unwrap().0, Loss::Transmit);
+    assert_eq!(cycle.guard().last_loss().unwrap().0, LossReason::Transmit);
     assert!(arm.motors_in(MotorMode::Idle));
 
-    // A controller that answers no more.
+    // A controller that stops answering.
     cycle.bus_mut().clear();
     activate(&mut cycle, &arm);
     cycle.link_mut().dead = true;
     run(&mut cycle, SAFE);
-    assert_eq!(cycle.guard().last_loss().unwrap().0, Loss::Answer);
+    assert_eq!(cycle.guard().last_loss().unwrap().0, LossReason::Answer);
     assert!(arm.motors_in(MotorMode::Idle));
 }

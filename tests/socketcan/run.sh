@@ -3,9 +3,9 @@
 #
 #     tests/socketcan/run.sh FOLDER
 #
-# FOLDER keeps the kernel between runs. Exit code 77: something that it needs is not to be had, and the last
-# line says what. The machine is emulated, instruction by instruction: its clock counts these, a nanosecond
-# each, and jumps over idle time. So a millisecond is a millisecond to what runs in it, however slow the host.
+# FOLDER caches the kernel between runs. Exit code 77: a requirement is missing, named in the last line. The
+# machine is emulated instruction by instruction: its clock advances one nanosecond per instruction and skips
+# idle time, so that timing inside it does not depend on the speed of the host.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 folder=$1
@@ -19,7 +19,7 @@ lacks() {
     exit 77
 }
 
-# The kernel that Debian's metapackage stands for, unpacked: kernel/vmlinuz and the modules.
+# Unpacks the kernel of Debian's metapackage: kernel/vmlinuz and the modules.
 fetch_kernel() {
     local package
     package=$(apt-cache depends linux-image-amd64 2>/dev/null |
@@ -47,7 +47,7 @@ fetch_kernel() {
     rm -rf "$folder/download"
 }
 
-# A program with the libraries that it is linked to.
+# Installs a program with its shared libraries.
 install_program() {
     cp "$1" "$root/bin/$2"
     local library
@@ -84,7 +84,7 @@ for module in "${modules[@]}"; do
     cp "$folder/kernel/$module.ko" "$root/modules/"
 done
 
-# The driver echoes a frame itself when it has been sent, as the drivers of real cards do.
+# The driver echoes each sent frame, as the drivers of real cards do.
 cat >"$root/init" <<END
 #!/bin/busybox sh
 busybox=/bin/busybox
@@ -110,7 +110,7 @@ chmod +x "$root/init"
 (cd "$root" && find . | cpio --create --format=newc --quiet | gzip -1) >"$folder/initramfs"
 
 start=$SECONDS
-# The exit code of the emulator tells nothing of the guest.
+# The exit code of the emulator does not reflect the guest's result.
 timeout 600 qemu-system-x86_64 -machine q35 -accel tcg -icount shift=0,sleep=off -m 512 \
     -display none -monitor none -serial "file:$console" -net none -no-reboot \
     -kernel "$folder/kernel/vmlinuz" -initrd "$folder/initramfs" \

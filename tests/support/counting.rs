@@ -1,4 +1,4 @@
-//! An allocator that counts what a thread asks of it.
+//! An allocator that counts the allocations of a thread.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -9,7 +9,7 @@ thread_local! {
 
 struct Counting;
 
-// SAFETY: hands every call on to the system's allocator unchanged.
+// SAFETY: forwards every call to the system's allocator unchanged.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         COUNT.with(|count| count.set(count.get().map(|n| n + 1)));
@@ -28,15 +28,15 @@ unsafe impl GlobalAlloc for Counting {
 static ALLOCATOR: Counting = Counting;
 
 /// Allocations and deallocations of this thread in `work`.
-pub fn counted(work: impl FnOnce()) -> u64 {
+pub fn count_allocations(work: impl FnOnce()) -> u64 {
     COUNT.with(|count| count.set(Some(0)));
     work();
     COUNT.with(Cell::take).expect("counting")
 }
 
-/// Work in the midst of counted work that does not count.
-#[allow(dead_code, reason = "not everyone has such")]
-pub fn uncounted<T>(work: impl FnOnce() -> T) -> T {
+/// Runs a part of counted work without counting.
+#[allow(dead_code, reason = "not every test uses it")]
+pub fn without_counting<T>(work: impl FnOnce() -> T) -> T {
     let before = COUNT.with(Cell::take);
     let done = work();
     COUNT.with(|count| count.set(before));

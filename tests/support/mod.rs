@@ -1,10 +1,10 @@
-//! What tests of the real programs need.
+//! Support for tests of the real programs.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-/// Folder of the programs, built once: as all tests are, so that nothing is left to do where all run.
+/// Folder of the programs; built once with the same selection as the test run, so that nothing is rebuilt.
 pub fn programs() -> &'static Path {
     static PROGRAMS: OnceLock<PathBuf> = OnceLock::new();
     PROGRAMS.get_or_init(|| {

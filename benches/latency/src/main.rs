@@ -1,5 +1,5 @@
-//! Measures a running system, or a bare echo with the same rhythm, and prints every time measured as JSON.
-//! `run.sh` runs it in turn with cyclictest.
+//! Measures a running system, or a bare echo at the same rate, and prints all times as JSON. `run.sh`
+//! alternates it with cyclictest.
 
 mod echo;
 mod messages;
@@ -9,13 +9,13 @@ use clap::{Args, Parser, Subcommand};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::process::{Child, Command, ExitCode};
-use supple_realtime::{Settings, enter, monotonic_ns, sleep_until_ns};
+use supple_realtime::{Settings, apply_realtime_settings, monotonic_ns, sleep_until_ns};
 
-/// As `supple-sim` and `supple-rt` have them: who answers comes before who asks.
-const ASKING_PRIORITY: u8 = 79;
-const ANSWERING_PRIORITY: u8 = 80;
+/// Priorities of `supple-sim` and `supple-rt`: the replying process has the higher priority.
+const PLANT_PRIORITY: u8 = 79;
+const CONTROLLER_PRIORITY: u8 = 80;
 const PERIOD_NS: u64 = 1_000_000;
-/// Cycles before those that count.
+/// Number of cycles before the measurement.
 const WARM_UP: u64 = 1000;
 
 #[derive(Parser)]
@@ -27,7 +27,7 @@ struct Options {
 
 #[derive(Subcommand)]
 enum What {
-    /// The simulated arm and its controller, as processes, holding the arm.
+    /// The simulated arm and its controller as processes, in gravity hold.
     System {
         /// Folder of supple-sim and supple-rt.
         #[arg(long)]
@@ -35,23 +35,23 @@ enum What {
         #[command(flatten)]
         common: Common,
     },
-    /// Two processes and a Unix datagram there and back, of the same sizes.
+    /// Two processes that exchange Unix datagrams of the same sizes.
     Echo {
         #[command(flatten)]
         common: Common,
     },
-    /// Two processes and the messages of a system, through shared memory, with nothing computed on either side.
+    /// Two processes that exchange the messages of a system through shared memory without any computation.
     Messages {
         #[command(flatten)]
         common: Common,
     },
-    /// The other process of the messages.
+    /// The replying process of the messages.
     #[command(hide = true)]
     Answer {
         #[command(flatten)]
         common: Common,
     },
-    /// The other process of the echo, on its standard input.
+    /// The replying process of the echo, with the socket as standard input.
     #[command(hide = true)]
     Reflect {
         #[command(flatten)]
@@ -61,13 +61,13 @@ enum What {
 
 #[derive(Args, Clone)]
 struct Common {
-    /// How long to measure (s).
+    /// Duration of the measurement (s).
     #[arg(long, default_value_t = 60)]
     seconds: u64,
-    /// Processor of both processes.
+    /// CPU of both processes.
     #[arg(long)]
     cpu: usize,
-    /// Neither priority nor locked memory.
+    /// Use neither real-time priority nor locked memory.
     #[arg(long)]
     no_realtime: bool,
 }
@@ -79,8 +79,8 @@ impl Common {
             cpu: Some(self.cpu),
             lock_memory: !self.no_realtime,
         };
-        for shortfall in enter(&settings) {
-            eprintln!("latency: warning: {shortfall}");
+        for realtime_warning in apply_realtime_settings(&settings) {
+            eprintln!("latency: warning: {realtime_warning}");
         }
     }
 
@@ -89,14 +89,14 @@ impl Common {
     }
 }
 
-/// Times of all cycles \[ns\].
+/// Measured times of all cycles \[ns\].
 #[derive(Default, Serialize)]
 struct Measured {
-    /// From when a cycle was due to when it began.
+    /// Delay from the due time to the start of each cycle.
     wake_ns: Vec<u64>,
-    /// From when it asked to when it had its answer.
+    /// Time from each request to its reply.
     round_trip_ns: Vec<u64>,
-    /// Cycles without an answer.
+    /// Number of cycles without a reply.
     missed: u64,
 }
 
@@ -111,35 +111,35 @@ impl Measured {
     }
 }
 
-/// This program again, as the other side of an exchange; ends with this.
-struct Other(Child);
+/// A second process of this program, the peer of an exchange; it is ended on drop.
+struct PeerProcess(Child);
 
-impl Other {
+impl PeerProcess {
     fn start(
         what: &str,
         common: &Common,
         set_up: impl FnOnce(&mut Command),
-    ) -> Result<Other, Failure> {
+    ) -> Result<PeerProcess, Failure> {
         let mut command = Command::new(std::env::current_exe()?);
         command.args([what, "--cpu", &common.cpu.to_string()]);
         if common.no_realtime {
             command.arg("--no-realtime");
         }
         set_up(&mut command);
-        Ok(Other(command.spawn()?))
+        Ok(PeerProcess(command.spawn()?))
     }
 }
 
-impl Drop for Other {
+impl Drop for PeerProcess {
     fn drop(&mut self) {
-        // It ends when this side does; this is for one that has not noticed.
+        // The peer ends by itself when this process ends; kill it in case it has not noticed.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
 }
 
-/// Does an exchange once a period, and measures it.
-fn once_a_period(
+/// Runs and measures one exchange per period.
+fn run_periodically(
     common: &Common,
     mut exchange: impl FnMut(u64) -> Result<(), Failure>,
 ) -> Result<Measured, Failure> {
@@ -154,7 +154,7 @@ fn once_a_period(
             measured.wake_ns.push(begin_ns.saturating_sub(due_ns));
             measured.round_trip_ns.push(end_ns - begin_ns);
         }
-        // A period that is long past is not caught up with.
+        // Skip periods that have been missed.
         due_ns = (due_ns + PERIOD_NS).max(end_ns);
     }
     Ok(measured)
@@ -167,7 +167,7 @@ fn run(what: &What) -> Result<(), Failure> {
         What::System { programs, common } => system::measure(programs, common)?,
         What::Echo { common } => echo::measure(common)?,
         What::Messages { common } => messages::measure(common)?,
-        What::Reflect { common } => return echo::reflect(common),
+        What::Reflect { common } => return echo::answer_echo(common),
         What::Answer { common } => return messages::answer(common),
     };
     println!("{}", serde_json::to_string(&measured)?);

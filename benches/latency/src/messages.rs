@@ -1,16 +1,18 @@
-//! What the messages of a system cost by themselves: an arm state there, torques back, in shared memory.
+//! Latency of the messages of a system alone: an arm state in one direction and torques in the other, in shared memory.
 
-use crate::{ANSWERING_PRIORITY, ASKING_PRIORITY, Common, Failure, Measured, Other, once_a_period};
+use crate::{
+    CONTROLLER_PRIORITY, Common, Failure, Measured, PLANT_PRIORITY, PeerProcess, run_periodically,
+};
 use core::time::Duration;
 use supple_ipc::message::{ArmState, Drives, PlantReport, TorqueCommand};
 use supple_ipc::{ControllerLink, Domain, PlantLink, pause};
 
 const PREFIX: &str = "latency";
-const PATIENCE: Duration = Duration::from_secs(5);
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(5);
 
 pub fn measure(common: &Common) -> Result<Measured, Failure> {
     let link = PlantLink::new(&Domain::new(Some(PREFIX))?)?;
-    let _answering = Other::start("answer", common, |_| ())?;
+    let _answering = PeerProcess::start("answer", common, |_| ())?;
     let state = |cycle| {
         let report = PlantReport::default();
         ArmState::new(cycle, 0, &[Some(0.0); 4], None, Drives::Idle, report)
@@ -18,20 +20,20 @@ pub fn measure(common: &Common) -> Result<Measured, Failure> {
     while !link.publish(&state(0))? {
         pause(Duration::from_millis(1));
     }
-    common.enter(ASKING_PRIORITY);
-    once_a_period(common, |cycle| {
+    common.enter(PLANT_PRIORITY);
+    run_periodically(common, |cycle| {
         link.publish(&state(cycle))?;
-        match link.answer(cycle, PATIENCE)?.answer {
+        match link.answer(cycle, ANSWER_TIMEOUT)?.answer {
             Some(_) => Ok(()),
-            None => Err("the other side does not answer".into()),
+            None => Err("the peer does not reply".into()),
         }
     })
 }
 
 pub fn answer(common: &Common) -> Result<(), Failure> {
     let link = ControllerLink::new(&Domain::new(Some(PREFIX))?)?;
-    common.enter(ANSWERING_PRIORITY);
-    while let Some(state) = link.wait(PATIENCE)? {
+    common.enter(CONTROLLER_PRIORITY);
+    while let Some(state) = link.wait(ANSWER_TIMEOUT)? {
         link.answer(&TorqueCommand {
             writer: 0,
             cycle: state.cycle,

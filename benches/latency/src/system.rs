@@ -1,4 +1,4 @@
-//! A system of two processes at work, seen through its telemetry.
+//! Measures a running system of two processes through its telemetry.
 
 use crate::{Common, Failure, Measured};
 use core::time::Duration;
@@ -7,21 +7,21 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use supple_core::controller::{Mode, Request};
 use supple_ipc::message::{Drives, Telemetry};
-use supple_ipc::{Domain, Operator, TelemetryReader, pause};
+use supple_ipc::{Domain, OperatorClient, TelemetryReader, pause};
 
 const PREFIX: &str = "latency";
-/// Cycles in gravity hold before those that count.
+/// Number of cycles in gravity hold before the measurement.
 const WARM_UP: u64 = 1000;
-const PATIENCE: Duration = Duration::from_secs(10);
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// The processes, the controller first; they end with this, in order.
+/// The processes, the controller first; they are ended in this order on drop.
 struct Processes(Vec<Child>);
 
 impl Drop for Processes {
     fn drop(&mut self) {
         for child in &mut self.0 {
             let id = i32::try_from(child.id()).ok().and_then(Pid::from_raw);
-            // One that has ended already needs no signal.
+            // A process that has already ended needs no signal.
             if let Some(id) = id {
                 let _ = kill_process(id, Signal::TERM);
             }
@@ -45,14 +45,14 @@ fn start(program: &Path, common: &Common) -> Result<Child, Failure> {
 
 fn next(reader: &mut TelemetryReader) -> Result<Telemetry, Failure> {
     reader
-        .wait(PATIENCE)?
+        .wait(ANSWER_TIMEOUT)?
         .ok_or_else(|| "no telemetry: did supple-rt or supple-sim end?".into())
 }
 
 pub fn measure(programs: &Path, common: &Common) -> Result<Measured, Failure> {
     let domain = Domain::new(Some(PREFIX))?;
     let mut reader = TelemetryReader::new(&domain)?;
-    let mut operator = Operator::new(&domain)?;
+    let mut operator = OperatorClient::new(&domain)?;
     let _processes = Processes(vec![
         start(&programs.join("supple-rt"), common)?,
         start(&programs.join("supple-sim"), common)?,
@@ -74,14 +74,18 @@ pub fn measure(programs: &Path, common: &Common) -> Result<Measured, Failure> {
         telemetry = next(&mut reader)?;
         let plant = &telemetry.state.plant;
         measured.wake_ns.push(plant.wake_ns);
-        // Zero where no answer came in time, which is counted.
+        // Zero if no reply arrived in time; such cycles are counted as missed.
         if plant.round_trip_ns > 0 {
             measured.round_trip_ns.push(plant.round_trip_ns);
         }
     }
     measured.missed = telemetry.state.plant.missed - missed;
-    if telemetry.mode() != Some(Mode::GravityHold) {
-        return Err(format!("the controller left gravity hold: {}", telemetry.fault_text).into());
+    if telemetry.record().mode() != Some(Mode::GravityHold) {
+        return Err(format!(
+            "the controller left gravity hold: {}",
+            telemetry.record().fault_text
+        )
+        .into());
     }
     match reader.lost() {
         0 => Ok(measured),

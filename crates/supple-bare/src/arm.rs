@@ -1,4 +1,4 @@
-//! An arm of any number of joints, with nothing about it aligned or diagonal.
+//! An arm with N joints, skew axes and full inertias.
 
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::{Arm, ArmError, Body, Friction, Joint, Pose};

@@ -6,7 +6,7 @@ use crate::{PERIOD_S, print, refused};
 use core::fmt::{self, Write};
 use supple_core::config::{
     ApparentInertia, Collision, ContactLatch, FrictionVelocity, Gains, Law, Limits, MoveGains,
-    Plausible, Role, Workspace,
+    PlausibilityLimits, Role, Workspace,
 };
 use supple_core::controller::{Controller, Input, Output, Request, State, step};
 use supple_core::math::{Matrix3, Vector3, sqrt};
@@ -16,7 +16,7 @@ use supple_core::{Arm, Config, Matrix, RippleTable, Vector, dynamics};
 
 const STEPS: u64 = 1000;
 const LOST_REPLY: u64 = 700;
-/// Encoder steps in a turn of a joint.
+/// Encoder counts per revolution of a joint.
 const COUNTS: f64 = 16_384.0;
 
 pub fn report<const N: usize>(out: &mut impl Write) -> fmt::Result {
@@ -43,14 +43,14 @@ pub fn report<const N: usize>(out: &mut impl Write) -> fmt::Result {
         qd += dynamics::aba(&arm, &q, &qd, &tau) * PERIOD_S;
         q += qd * PERIOD_S;
         if cycle + 1 == STEPS {
-            say(out, &output)?;
+            print_state(out, &output)?;
         }
     }
     let digest = digest.value();
     writeln!(out, "control of {N} joints, {STEPS} steps: {digest:016x}")
 }
 
-fn say<const N: usize>(out: &mut impl Write, output: &Output<N>) -> fmt::Result {
+fn print_state<const N: usize>(out: &mut impl Write, output: &Output<N>) -> fmt::Result {
     print(out, "torque_nm", &output.torque_nm)?;
     let mode = output.mode.name();
     let fault = output.fault.map_or("none", |fault| fault.name());
@@ -88,7 +88,7 @@ fn request<const N: usize>(arm: &Arm<N>, cycle: u64) -> Option<Request<N>> {
     }
 }
 
-/// With more than four joints the third is held and the tip's inertia is chosen.
+/// Configuration; with more than four joints the third is held and the apparent inertia is chosen.
 fn config<const N: usize>(arm: Arm<N>) -> Config<N> {
     let all = Vector::repeat;
     let mut roles = [Role::Active; N];
@@ -156,8 +156,8 @@ fn config<const N: usize>(arm: Arm<N>) -> Config<N> {
             stiffness_n_per_m: 200.0,
             damping_n_s_per_m: 50.0,
         },
-        collision: Collision::never(),
-        plausible: Plausible::anything(),
+        collision: Collision::disabled(),
+        plausible: PlausibilityLimits::disabled(),
         workspace: Workspace::UNBOUNDED,
     }
 }

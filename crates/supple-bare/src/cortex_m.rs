@@ -1,9 +1,9 @@
-//! A Cortex-M4 with nothing on it, which prints through the debugger (semihosting).
+//! A bare-metal Cortex-M4 that prints through the debugger (semihosting).
 
 use core::arch::{asm, global_asm};
 use core::fmt;
 
-/// Semihosting operations and reasons, as ARM numbers them.
+/// Semihosting operations and exit reasons, numbered by ARM.
 const WRITE_CHARACTER: usize = 0x03;
 const EXIT: usize = 0x18;
 const APPLICATION_EXIT: usize = 0x20026;
@@ -42,7 +42,7 @@ extern "C" fn fault() -> ! {
 }
 
 /// # Safety
-/// `argument` is what the operation asks for: a value, or the address of what it reads.
+/// `argument` is the operation's argument: a value, or the address of its data.
 unsafe fn call_debugger(operation: usize, argument: usize) {
     // SAFETY: the debugger reads registers and memory at `argument`, and returns in r0.
     unsafe {
@@ -77,7 +77,7 @@ pub fn exit(good: bool) -> ! {
     };
     // SAFETY: on a 32-bit machine the reason is passed as a value.
     unsafe { call_debugger(EXIT, reason) };
-    // A debugger that lets the program run on must not let it fall off its end.
+    // Loops forever if the debugger lets the program continue.
     loop {
         core::hint::spin_loop();
     }

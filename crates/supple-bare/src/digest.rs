@@ -1,8 +1,8 @@
-//! A fingerprint of many numbers.
+//! A hash of many numbers.
 
 use supple_core::{Matrix, Pose};
 
-/// Fowler-Noll-Vo hash, 64 bits, of the bytes of every number it is fed.
+/// Fowler-Noll-Vo hash, 64 bits, of the bytes of all added numbers.
 pub struct Digest(u64);
 
 impl Digest {

@@ -1,9 +1,9 @@
-//! What the freestanding program computes, apart from where it runs.
+//! Platform-independent part of the freestanding program.
 //!
-//! [`report`] drives arms of 4 and of 7 joints through the core's dynamics and its controller and
-//! prints the bits. A hosted build of the same function must print the same text: the arithmetic of
-//! the core may depend neither on the standard library nor on the features that other crates switch
-//! on in nalgebra, whose sine may then be another one.
+//! [`report`] runs the core's dynamics and its controller on arms of 4 and of 7 joints and prints
+//! the results bit for bit. A hosted build of the same function must print the same text: the
+//! arithmetic of the core must not depend on the standard library, nor on the nalgebra features
+//! that other crates enable, which may select another implementation of the sine.
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -19,11 +19,12 @@ use supple_core::Vector;
 const PERIOD_S: f64 = 1e-3;
 
 /// Prints, for an arm of 4 and one of 7 joints, torques, the state at the end of a motion and of a
-/// controlled run, and a digest of every number on the way. Numbers are given as their bits and in
-/// decimal.
+/// controlled run, and a digest of all intermediate numbers. Numbers are printed as their bits and
+/// in decimal.
 ///
 /// # Errors
-/// What `out` returns, or [`fmt::Error`] when an arm or a configuration is refused, after saying why.
+/// The error of `out`, or [`fmt::Error`] if an arm or a configuration is rejected, after printing
+/// the reason.
 pub fn report(out: &mut impl Write) -> fmt::Result {
     motion::report::<4>(out)?;
     control::report::<4>(out)?;
@@ -39,7 +40,7 @@ fn print<const N: usize>(out: &mut impl Write, name: &str, values: &Vector<N>) -
     writeln!(out)
 }
 
-/// Says why something was refused.
+/// Prints why something was rejected.
 fn refused<T>(result: Result<T, impl fmt::Display>, out: &mut impl Write) -> Result<T, fmt::Error> {
     result.or_else(|error| {
         writeln!(out, "refused: {error}")?;

@@ -7,7 +7,7 @@ const WRITE: usize = 1;
 const EXIT_GROUP: usize = 231;
 const STANDARD_OUTPUT: usize = 1;
 
-/// The program's first instruction. The kernel aligns the stack to 16 bytes, as a call expects.
+/// Entry point of the program. The kernel aligns the stack to 16 bytes, as a call expects.
 #[unsafe(no_mangle)]
 #[unsafe(naked)]
 extern "C" fn _start() -> ! {

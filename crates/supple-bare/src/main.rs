@@ -1,7 +1,7 @@
-//! The freestanding program: no std, no allocator, no C library, its own first instruction.
+//! The freestanding program: no std, no allocator, no C library, its own entry point.
 //!
-//! That it links proves that the core needs none of them, as no build for a host can: there, the
-//! features of every crate unify and the standard library is always at hand. It prints
+//! Successful linking proves that the core needs none of them. A hosted build cannot prove this,
+//! because cargo unifies features and the standard library is always available. It prints
 //! [`supple_bare::report`] and ends with 0.
 #![no_std]
 #![no_main]
@@ -16,7 +16,7 @@ mod memory;
 use core::fmt::Write;
 use core::panic::PanicInfo;
 
-/// Called by the first instructions, on a fresh stack.
+/// Called by the entry point, on a fresh stack.
 extern "C" fn run() -> ! {
     #[cfg(feature = "negative-control")]
     allocate();
@@ -26,7 +26,7 @@ extern "C" fn run() -> ! {
 
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
-    // Nowhere left to report that the console failed.
+    // If the console fails, there is no other way to report it.
     let _ = writeln!(system::Console, "{info}");
     system::exit(false)
 }

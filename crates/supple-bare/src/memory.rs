@@ -1,12 +1,13 @@
-//! The five memory functions that the compiler may call anywhere and that a C library would bring.
+//! The five memory functions that the compiler may call anywhere and that a C library would
+//! provide.
 //!
-//! Written as string instructions, so that the compiler cannot turn their loops into calls of
-//! themselves. Contracts as in C, which is the safety condition of each.
+//! For x86-64. Copies and fills are string instructions, so that the compiler cannot turn their loops
+//! into calls of themselves. The safety condition of each is its contract in C.
 
 use core::arch::asm;
 
 /// # Safety
-/// `n` bytes readable at `from` and writable at `to`, not overlapping.
+/// `n` bytes readable at `from` and writable at `to`, not overlapping unless `to` is below `from`.
 #[unsafe(no_mangle)]
 unsafe extern "C" fn memcpy(to: *mut u8, from: *const u8, n: usize) -> *mut u8 {
     // SAFETY: the caller's; the direction flag is clear on entry to every function.

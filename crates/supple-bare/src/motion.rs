@@ -1,4 +1,4 @@
-//! An arm that falls, held back by friction and pushed by sinusoidal torques.
+//! A falling arm with friction and sinusoidal torques.
 
 use crate::arm::{arm, friction};
 use crate::digest::Digest;

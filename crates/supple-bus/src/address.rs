@@ -1,4 +1,4 @@
-//! Which bus a program is to use, as it is given on a command line.
+//! Name of a bus on the command line.
 
 use crate::error::BusError;
 use crate::folder::OwnerFolder;
@@ -6,7 +6,7 @@ use core::fmt;
 use core::str::FromStr;
 use std::path::PathBuf;
 
-/// A bus by name.
+/// Address of a bus.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Address {
     /// `can:NAME`, a CAN interface.
@@ -15,7 +15,7 @@ pub enum Address {
     Folder(PathBuf),
 }
 
-/// A text that names no bus.
+/// Error: the text is not a bus address.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("bus `{0}`: expected can:NAME for a CAN interface, or unix:FOLDER for sockets")]
 pub struct AddressError(String);
@@ -42,11 +42,11 @@ impl fmt::Display for Address {
 }
 
 impl Address {
-    /// Sockets of the system of this prefix: `supple-bus/PREFIX` under `$XDG_RUNTIME_DIR`, or
-    /// `/tmp/supple-bus-UID/PREFIX` where there is no such variable.
+    /// Socket folder of the system with this prefix: `supple-bus/PREFIX` under `$XDG_RUNTIME_DIR`, or
+    /// `/tmp/supple-bus-UID/PREFIX` if the variable is not set.
     ///
     /// # Errors
-    /// Where the folder above is not the owner's alone.
+    /// If the parent folder is not accessible only to its owner.
     pub fn of_system(prefix: &str) -> Result<Address, BusError> {
         let user = rustix::process::geteuid().as_raw();
         let above = match std::env::var_os("XDG_RUNTIME_DIR") {

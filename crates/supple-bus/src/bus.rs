@@ -1,4 +1,4 @@
-//! The trait, and what a bus reports.
+//! The trait [`Bus`], and the events of a bus.
 
 use crate::error::BusError;
 use core::fmt;
@@ -6,40 +6,44 @@ use supple_puck::CanFrame;
 
 /// One node's view of a CAN bus.
 pub trait Bus {
-    /// Time of this bus \[ns\]: never goes back, starts anywhere.
+    /// Time of this bus \[ns\]: monotonic, with an arbitrary origin.
     fn now_ns(&self) -> u64;
 
-    /// Hands a frame over for sending and returns at once. That it left is told by [`Event::Sent`],
-    /// not by this returning.
+    /// Queues a frame for sending and returns at once. [`Event::Sent`] confirms that it was sent.
     ///
     /// # Errors
-    /// [`BusError::Full`] when there is no room for another frame; the frame is then not sent.
+    /// [`BusError::Full`] if the transmit queue is full; the frame is then not sent.
     fn send(&mut self, frame: &CanFrame) -> Result<(), BusError>;
 
-    /// The next event, or `None` once [`Bus::now_ns`] has reached `until_ns`. A time already past asks
-    /// for what is there now.
+    /// The next event, or `None` once [`Bus::now_ns`] has reached `until_ns`. With a time in the past, returns
+    /// only an event that has already arrived.
     ///
     /// # Errors
-    /// Where the bus itself is gone. Faults on the bus are events.
+    /// If the bus itself fails. Faults on the bus are events.
     fn receive_until(&mut self, until_ns: u64) -> Result<Option<Event>, BusError>;
 
-    /// As [`Bus::receive_until`], where the host promises to send nothing before `frames` more frames of other
-    /// nodes have come, or `until_ns` is reached: a bus in another process need then be asked but once.
+    /// As [`Bus::receive_until`], with lookahead: the host promises to send nothing until `frames` more frames
+    /// of other nodes have arrived or `until_ns` is reached. A bus in another process then needs only one
+    /// exchange.
     ///
     /// # Errors
     /// As [`Bus::receive_until`].
-    fn receive_ahead(&mut self, until_ns: u64, frames: u32) -> Result<Option<Event>, BusError> {
+    fn receive_with_lookahead(
+        &mut self,
+        until_ns: u64,
+        frames: u32,
+    ) -> Result<Option<Event>, BusError> {
         let _ = frames;
         self.receive_until(until_ns)
     }
 
-    /// How long the time of this bus has stood still so far while the machine's went on \[ns\].
-    fn stood_still_ns(&self) -> u64 {
+    /// Total time for which the clock of this bus was paused relative to the machine's clock \[ns\].
+    fn clock_stall_ns(&self) -> u64 {
         0
     }
 
-    /// What the machine's monotonic clock shows at a time of this bus \[ns\]; the same, but for a bus
-    /// that keeps its own time by the wall clock.
+    /// The machine's monotonic clock at a time of this bus \[ns\]. They differ only for an emulated bus that is
+    /// synchronised to the wall clock.
     fn monotonic_ns(&self, time_ns: u64) -> u64 {
         time_ns
     }
@@ -58,12 +62,16 @@ impl<B: Bus + ?Sized> Bus for Box<B> {
         (**self).receive_until(until_ns)
     }
 
-    fn receive_ahead(&mut self, until_ns: u64, frames: u32) -> Result<Option<Event>, BusError> {
-        (**self).receive_ahead(until_ns, frames)
+    fn receive_with_lookahead(
+        &mut self,
+        until_ns: u64,
+        frames: u32,
+    ) -> Result<Option<Event>, BusError> {
+        (**self).receive_with_lookahead(until_ns, frames)
     }
 
-    fn stood_still_ns(&self) -> u64 {
-        (**self).stood_still_ns()
+    fn clock_stall_ns(&self) -> u64 {
+        (**self).clock_stall_ns()
     }
 
     fn monotonic_ns(&self, time_ns: u64) -> u64 {
@@ -71,39 +79,39 @@ impl<B: Bus + ?Sized> Bus for Box<B> {
     }
 }
 
-/// What happens on the bus.
+/// An event on the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
-    /// Another node sent this.
+    /// Another node sent this frame.
     Frame(CanFrame),
-    /// This frame of one's own has left.
+    /// A frame of this node was sent.
     Sent(CanFrame),
-    /// Something is wrong on the bus.
+    /// A fault on the bus.
     Fault(BusFault),
 }
 
-/// What a controller reports in an error frame, the worst of it.
+/// The most severe fault that a CAN controller reports in an error frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum BusFault {
-    /// The controller works again after a bus-off.
+    /// The controller was restarted after a bus-off.
     Restarted,
-    /// Another node won the bus.
+    /// Another node won the arbitration.
     ArbitrationLost,
     /// The error counters passed the warning limit.
     Warning,
-    /// A violation of the protocol: bits, stuffing, check sum.
+    /// Protocol violation: bit, stuffing or checksum error.
     Protocol,
     /// The error counters passed the passive limit: this node no longer flags errors.
     Passive,
     /// Frames were lost because they were not read in time.
     Overrun,
-    /// The transceiver is at fault: a wire open or shorted.
+    /// Transceiver fault: a wire is open or shorted.
     Transceiver,
-    /// Nobody acknowledged a frame: there is no other node.
+    /// No node acknowledged a frame: there is no other node.
     NoAcknowledge,
-    /// A frame did not leave in time.
+    /// A frame was not sent in time.
     TransmitTimeout,
-    /// The controller took itself off the bus: nothing is sent or received until it restarts.
+    /// The controller is bus-off: it neither sends nor receives until it restarts.
     BusOff,
 }
 
@@ -118,7 +126,7 @@ impl fmt::Display for BusFault {
             BusFault::Overrun => "received frames were lost because they were not read in time",
             BusFault::Transceiver => "the transceiver reports an open or shorted wire",
             BusFault::NoAcknowledge => "no node acknowledged a frame; is the arm on and connected?",
-            BusFault::TransmitTimeout => "a frame did not leave in time",
+            BusFault::TransmitTimeout => "a frame was not sent in time",
             BusFault::BusOff => {
                 "the CAN controller is off the bus; check cable and termination, then restart it"
             }

@@ -1,4 +1,4 @@
-//! `struct can_frame` of Linux: what a SocketCAN socket reads and writes, 16 bytes.
+//! `struct can_frame` of Linux, which a SocketCAN socket reads and writes: 16 bytes.
 //!
 //! ```text
 //! 0..4 id with flags, native order   4 length   5..8 zero   8..16 data
@@ -17,7 +17,7 @@ const EXTENDED: u32 = 0x8000_0000;
 const REMOTE: u32 = 0x4000_0000;
 const ERROR: u32 = 0x2000_0000;
 
-/// Classes of an error frame, from its id, with the fault each stands for.
+/// Error classes in the id of an error frame, with the corresponding faults.
 const CLASSES: [(u32, BusFault); 8] = [
     (0x001, BusFault::TransmitTimeout),
     (0x002, BusFault::ArbitrationLost),
@@ -28,7 +28,7 @@ const CLASSES: [(u32, BusFault); 8] = [
     (0x080, BusFault::Protocol),
     (0x100, BusFault::Restarted),
 ];
-/// The class whose second data byte says what the controller's counters did.
+/// The class whose second data byte reports the state of the controller.
 const CONTROLLER: u32 = 0x004;
 /// Flags of that byte.
 const CONTROLLER_FLAGS: [(u8, BusFault); 3] = [
@@ -37,33 +37,33 @@ const CONTROLLER_FLAGS: [(u8, BusFault); 3] = [
     (0x30, BusFault::Passive),
 ];
 
-/// What a raw frame is.
+/// A parsed raw frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WireFrame {
     /// A data frame with an 11-bit id.
     Data(CanFrame),
     /// An error frame.
     Fault(BusFault),
-    /// What this bus does not have: extended ids, remote requests, lengths above eight, and error frames
-    /// that report nothing.
-    Foreign,
+    /// Frames that this bus does not support: extended ids, remote requests, lengths above eight, and error
+    /// frames without a known fault.
+    Unsupported,
 }
 
 impl WireFrame {
-    /// Reads a raw frame.
+    /// Parses a raw frame.
     pub fn parse(raw: &[u8; CAN_FRAME_BYTES]) -> WireFrame {
         let [a, b, c, d, length, _, _, _, data @ ..] = *raw;
         let id = u32::from_ne_bytes([a, b, c, d]);
         if id & ERROR != 0 {
-            return fault(id, data).map_or(WireFrame::Foreign, WireFrame::Fault);
+            return fault(id, data).map_or(WireFrame::Unsupported, WireFrame::Fault);
         }
         if id & (EXTENDED | REMOTE) != 0 {
-            return WireFrame::Foreign;
+            return WireFrame::Unsupported;
         }
         let payload = data.get(..usize::from(length));
         payload
             .and_then(|payload| CanFrame::from_raw(id, payload).ok())
-            .map_or(WireFrame::Foreign, WireFrame::Data)
+            .map_or(WireFrame::Unsupported, WireFrame::Data)
     }
 
     /// The raw form of a data frame.
@@ -88,7 +88,7 @@ impl WireFrame {
     }
 }
 
-/// The worst of what an error frame reports.
+/// The most severe fault in an error frame.
 fn fault(id: u32, data: [u8; 8]) -> Option<BusFault> {
     let classes = CLASSES.iter().filter(|(class, _)| id & class != 0);
     let flags = CONTROLLER_FLAGS

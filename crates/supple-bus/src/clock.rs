@@ -1,4 +1,4 @@
-//! The monotonic clock, and waiting on it for a descriptor.
+//! The monotonic clock, and waiting for a descriptor until a time on it.
 
 use crate::error::BusError;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -15,13 +15,13 @@ pub fn monotonic_ns() -> u64 {
     now.tv_sec as u64 * NS_PER_S + now.tv_nsec as u64
 }
 
-/// Sleeps until the monotonic clock shows `time_ns`, or a signal comes.
+/// Sleeps until the monotonic clock reaches `time_ns` or a signal arrives.
 pub(crate) fn sleep_until_ns(time_ns: u64) {
     let until = Timespec {
         tv_sec: (time_ns / NS_PER_S) as i64,
         tv_nsec: (time_ns % NS_PER_S) as _,
     };
-    // A signal ends it early, and the caller looks at the clock.
+    // A signal ends the sleep early; the caller checks the clock.
     let _ = clock_nanosleep_absolute(ClockId::Monotonic, &until);
 }
 
@@ -29,7 +29,7 @@ pub(crate) fn sleep_until_ns(time_ns: u64) {
 /// with `false`.
 ///
 /// # Errors
-/// Where the kernel refuses to wait.
+/// If the system call fails.
 pub fn wait_readable_until(fd: impl AsFd, until_ns: u64) -> Result<bool, BusError> {
     let left = until_ns.saturating_sub(monotonic_ns());
     let timeout = Timespec {

@@ -1,8 +1,8 @@
-//! A bus of two nodes made of Unix datagrams: the host and whoever plays the arm.
+//! A bus of two nodes over Unix datagrams: the host and the emulated arm.
 //!
-//! Each datagram is a raw `struct can_frame`; data frames and error frames both. There is no bit rate:
-//! the arm's side delays its frames if it wants to. A frame counts as sent when the peer's socket took
-//! it; without a peer nobody acknowledges, as on a cable without an arm. Nothing leaves the machine.
+//! Each datagram is a raw `struct can_frame`, either a data frame or an error frame. There is no bit rate: the
+//! arm's side may delay its frames. A frame counts as sent when the peer's socket has accepted it; without a
+//! peer frames are not acknowledged, as on a real bus without an arm. No data leave the machine.
 
 use crate::bus::{Bus, BusFault, Event};
 use crate::can_frame::{CAN_FRAME_BYTES, WireFrame};
@@ -14,20 +14,20 @@ use rustix::fd::{AsFd, BorrowedFd};
 use std::collections::VecDeque;
 use supple_puck::CanFrame;
 
-/// Confirmations that may wait to be read; the least that a transmit queue of the kernel has is ten.
-const QUEUE: usize = 64;
+/// Maximum number of unread confirmations; a transmit queue of the kernel has at least ten entries.
+const CONFIRMATIONS: usize = 64;
 
-/// Which node of the bus.
+/// A node of the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
-    /// The computer.
+    /// The host computer.
     Host,
-    /// Everything else.
+    /// All nodes of the arm.
     Arm,
 }
 
 impl Side {
-    /// Names of its socket and of the other's.
+    /// Names of the own socket and of the peer's.
     pub(crate) fn sockets(self) -> (&'static str, &'static str) {
         match self {
             Side::Host => ("host.can", "arm.can"),
@@ -40,39 +40,39 @@ impl Side {
 #[derive(Debug)]
 pub struct DatagramBus {
     endpoint: Endpoint,
-    own: VecDeque<Event>,
+    confirmations: VecDeque<Event>,
 }
 
 impl DatagramBus {
-    /// Opens one side in a folder; the other side may come later, and may come and go.
+    /// Opens one side in a folder; the other side may connect later, and may disconnect and connect again.
     ///
     /// # Errors
-    /// Where the folder is not the owner's alone, or another process is this side.
+    /// If the folder is not accessible only to its owner, or another process has opened this side.
     pub fn open(folder: &OwnerFolder, side: Side) -> Result<DatagramBus, BusError> {
         let (own, peer) = side.sockets();
         Ok(DatagramBus {
             endpoint: Endpoint::new(folder, own, peer)?,
-            own: VecDeque::with_capacity(QUEUE),
+            confirmations: VecDeque::with_capacity(CONFIRMATIONS),
         })
     }
 
-    /// Puts an error frame on the bus for the other side to see.
+    /// Sends an error frame to the other side.
     ///
     /// # Errors
-    /// Where the socket fails.
+    /// If the socket fails.
     pub fn send_fault(&mut self, fault: BusFault) -> Result<(), BusError> {
         self.endpoint.send(&WireFrame::fault(fault)).map(|_| ())
     }
 
-    fn take(&mut self) -> Result<Option<Event>, BusError> {
-        if let Some(event) = self.own.pop_front() {
+    fn read_event(&mut self) -> Result<Option<Event>, BusError> {
+        if let Some(event) = self.confirmations.pop_front() {
             return Ok(Some(event));
         }
         while let Some(raw) = self.endpoint.receive::<CAN_FRAME_BYTES>()? {
             match WireFrame::parse(&raw) {
                 WireFrame::Data(frame) => return Ok(Some(Event::Frame(frame))),
                 WireFrame::Fault(fault) => return Ok(Some(Event::Fault(fault))),
-                WireFrame::Foreign => {}
+                WireFrame::Unsupported => {}
             }
         }
         Ok(None)
@@ -85,7 +85,7 @@ impl Bus for DatagramBus {
     }
 
     fn send(&mut self, frame: &CanFrame) -> Result<(), BusError> {
-        if self.own.len() == QUEUE {
+        if self.confirmations.len() == CONFIRMATIONS {
             return Err(BusError::Full);
         }
         let event = match self.endpoint.send(&WireFrame::data(frame))? {
@@ -93,17 +93,17 @@ impl Bus for DatagramBus {
             Delivery::NoPeer => Event::Fault(BusFault::NoAcknowledge),
             Delivery::Full => return Err(BusError::Full),
         };
-        self.own.push_back(event);
+        self.confirmations.push_back(event);
         Ok(())
     }
 
     fn receive_until(&mut self, until_ns: u64) -> Result<Option<Event>, BusError> {
         loop {
-            if let Some(event) = self.take()? {
+            if let Some(event) = self.read_event()? {
                 return Ok(Some(event));
             }
             wait_readable_until(&self.endpoint, until_ns)?;
-            if let Some(event) = self.take()? {
+            if let Some(event) = self.read_event()? {
                 return Ok(Some(event));
             }
             if monotonic_ns() >= until_ns {

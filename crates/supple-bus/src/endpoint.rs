@@ -1,4 +1,4 @@
-//! A datagram socket with the path of its one peer, which may come and go.
+//! A datagram socket with the path of its only peer, which may connect and disconnect.
 
 use crate::error::BusError;
 use crate::folder::OwnerFolder;
@@ -14,11 +14,11 @@ pub(crate) struct Endpoint {
     peer: PathBuf,
 }
 
-/// How a datagram left.
+/// Result of sending a datagram.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Delivery {
     Delivered,
-    /// The peer is there, but does not read.
+    /// The peer exists, but its queue is full.
     Full,
     NoPeer,
 }
@@ -59,7 +59,7 @@ impl Endpoint {
         }
     }
 
-    /// A datagram of exactly the buffer's size; others are passed over.
+    /// Receives a datagram of exactly `N` bytes; discards others.
     pub fn receive<const N: usize>(&self) -> Result<Option<[u8; N]>, BusError> {
         let mut buffer = [0; 64];
         loop {
@@ -74,7 +74,7 @@ impl Endpoint {
         }
     }
 
-    /// A datagram, cut off where it is longer than the buffer.
+    /// Receives a datagram; one longer than the buffer is truncated.
     pub fn receive_into<'a>(&self, buffer: &'a mut [u8]) -> Result<Option<&'a [u8]>, BusError> {
         loop {
             match self.socket.recv(buffer) {
@@ -102,7 +102,7 @@ impl AsFd for Endpoint {
 
 impl Drop for Endpoint {
     fn drop(&mut self) {
-        // Where it is gone already there is nothing to do.
+        // If the socket file is already removed there is nothing to do.
         let _ = std::fs::remove_file(&self.path);
     }
 }

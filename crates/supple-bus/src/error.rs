@@ -1,52 +1,54 @@
-//! Why a bus cannot be opened or used.
+//! Errors of opening and using a bus.
 
 use std::io;
 use std::path::PathBuf;
 
-/// The bus itself is not there, or not usable. What goes wrong on it is a [`crate::BusFault`].
+/// The bus itself is missing or unusable. Faults on the bus are [`crate::BusFault`]s.
 #[derive(Debug, thiserror::Error)]
 pub enum BusError {
-    /// No room for another frame.
-    #[error("the transmit queue is full: the bus carries less than is sent, or nothing leaves")]
+    /// The transmit queue is full.
+    #[error(
+        "the transmit queue is full: frames are queued faster than the bus sends them, or it sends none"
+    )]
     Full,
     /// A CAN interface that cannot be opened.
     #[error("CAN interface `{interface}`: {source}; {remedy}")]
     Interface {
-        /// Name asked for.
+        /// Requested name.
         interface: String,
-        /// What the kernel says.
+        /// Error of the kernel.
         source: io::Error,
-        /// What to do.
+        /// Remedy.
         remedy: &'static str,
     },
-    /// A folder or socket that is not the owner's alone.
+    /// A folder or socket that is not accessible only to its owner.
     #[error("{} {problem}; {remedy}", path.display())]
     Folder {
         /// The folder or socket.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The problem.
         problem: String,
-        /// What to do.
+        /// Remedy.
         remedy: &'static str,
     },
-    /// Another process is this node already.
+    /// Another process already uses this node.
     #[error("{} belongs to a process that is running: end it, or choose another folder", path.display())]
-    Taken {
+    SocketInUse {
         /// The socket.
         path: PathBuf,
     },
-    /// The other side of a bus in virtual time does not answer.
-    #[error("{} does not answer: start the emulator in virtual time first, or it has ended", path.display())]
+    /// The other side of an emulated bus does not answer.
+    #[error("{} does not answer: start the emulator first (with --virtual-time if the host has it), or check whether it has ended", path.display())]
     NoPeer {
         /// The socket.
         path: PathBuf,
     },
-    /// The kernel refuses a call on an open bus.
+    /// A system call on an open bus failed.
     #[error("{action} failed: {source}")]
     Io {
-        /// What was attempted.
+        /// Attempted action.
         action: &'static str,
-        /// What the kernel says.
+        /// Error of the kernel.
         source: io::Error,
     },
 }

@@ -1,15 +1,17 @@
-//! Faults put into any bus: a decorator, not a flag.
+//! Fault injection: a decorator for any bus.
 //!
-//! A [`FaultRule`] says what happens to which frames, from when to when, and with what probability. Time
-//! is the bus's own; chance comes from a seed, so that a run repeats. What the injector holds back it
-//! hands over in the order of its times.
+//! A [`FaultRule`] specifies the fault, the frames, the time window, and the probability. Time is bus time; the
+//! random numbers come from a seed, so that runs are reproducible. Delayed frames and events are released in the
+//! order of their due times.
 
 use crate::bus::{Bus, BusFault, Event};
 use crate::error::BusError;
+use rand_xoshiro::SplitMix64;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use std::collections::VecDeque;
 use supple_puck::{CanFrame, MessageId};
 
-/// Frames of which direction a rule touches.
+/// Direction of the frames that a rule affects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Traffic {
     /// Frames that this node sends.
@@ -18,47 +20,46 @@ pub enum Traffic {
     Received,
 }
 
-/// What is done to a frame.
+/// Kind of fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FaultKind {
-    /// It is lost. Of a received frame nothing is seen; a sent one is confirmed all the same, as when
-    /// it is lost behind the controller.
+    /// The frame is lost. A sent frame is still confirmed, as if it were lost after the controller.
     Loss,
-    /// A sent frame never leaves, is never confirmed, and no error is raised: the transmit buffer that
-    /// fails in silence. Received frames are lost.
+    /// A sent frame is neither transmitted nor confirmed, and no error is reported: a silent failure of the
+    /// transmit buffer. Received frames are lost.
     SilentLoss,
-    /// It is late by so many nanoseconds; later frames may overtake it.
+    /// The frame is delayed by this many nanoseconds; later frames may overtake it.
     Delay(u64),
-    /// It comes twice.
+    /// The frame arrives twice.
     Duplicate,
-    /// It changes places with the next one, or comes late by so many nanoseconds where none follows.
+    /// The frame is swapped with the next frame, or delayed by this many nanoseconds if none follows.
     Reorder(u64),
-    /// One bit of its payload is inverted, and its check sum would still be right.
+    /// One bit of the payload is inverted, without a checksum error.
     Corrupt,
-    /// The controller goes off the bus: a fault is reported once, and until the rule ends nothing is
-    /// sent, received or confirmed; then the controller restarts.
+    /// The controller goes bus-off: the fault is reported once, and nothing is sent, received or confirmed until
+    /// the rule ends; then the controller restarts.
     BusOff,
 }
 
-/// A fault with its window.
+/// A fault with its time window.
 #[derive(Clone, Copy, Debug)]
 pub struct FaultRule {
-    /// Which direction. Of no meaning for [`FaultKind::BusOff`].
+    /// Direction. Ignored for [`FaultKind::BusOff`].
     pub traffic: Traffic,
-    /// Which frames; `None` for all of them.
+    /// Frames that the rule affects; `None` for all.
     pub only: Option<fn(MessageId) -> bool>,
-    /// From this time of the bus on \[ns\].
+    /// Start of the window in bus time \[ns\].
     pub from_ns: u64,
-    /// Up to this time of the bus \[ns\].
+    /// End of the window in bus time \[ns\].
     pub until_ns: u64,
     /// Probability for each frame, 0 to 1.
     pub probability: f64,
-    /// What happens.
+    /// Kind of fault.
     pub kind: FaultKind,
 }
 
 impl FaultRule {
-    /// Every frame of a direction, for all time.
+    /// A rule for every frame of a direction, at all times.
     pub fn always(traffic: Traffic, kind: FaultKind) -> FaultRule {
         FaultRule {
             traffic,
@@ -100,27 +101,27 @@ impl FaultRule {
     }
 }
 
-/// A bus with faults.
+/// A bus with injected faults.
 #[derive(Debug)]
 pub struct FaultInjector<B> {
     bus: B,
     rules: Vec<FaultRule>,
-    random: u64,
-    /// Held back, with the time at which each is due; sorted by it.
+    random: SplitMix64,
+    /// Delayed events with their due times, in that order; likewise the frames.
     events: VecDeque<(u64, Event)>,
     frames: VecDeque<(u64, CanFrame)>,
-    /// Received frames waiting for the next one to overtake them.
+    /// A received frame that the next one is to overtake.
     overtaken: Option<(u64, Event)>,
     off: bool,
 }
 
 impl<B: Bus> FaultInjector<B> {
-    /// A bus with no faults yet.
+    /// Wraps a bus, without faults at first.
     pub fn new(bus: B, seed: u64) -> FaultInjector<B> {
         FaultInjector {
             bus,
             rules: Vec::new(),
-            random: seed,
+            random: SplitMix64::seed_from_u64(seed),
             events: VecDeque::with_capacity(256),
             frames: VecDeque::with_capacity(256),
             overtaken: None,
@@ -128,37 +129,28 @@ impl<B: Bus> FaultInjector<B> {
         }
     }
 
-    /// Adds a rule. Of several that cover a frame the first added acts.
+    /// Adds a rule. If several rules match a frame, the first one added applies.
     pub fn add(&mut self, rule: FaultRule) {
         self.rules.push(rule);
     }
 
-    /// Ends all rules; what is held back still comes.
+    /// Removes all rules; delayed frames are still delivered.
     pub fn clear(&mut self) {
         self.rules.clear();
     }
 
-    /// The bus within.
+    /// The wrapped bus.
     pub fn inner(&self) -> &B {
         &self.bus
     }
 
-    /// The bus within.
+    /// The wrapped bus.
     pub fn inner_mut(&mut self) -> &mut B {
         &mut self.bus
     }
 
-    /// SplitMix64, whose every output bit depends on every bit of the seed.
-    fn next_random(&mut self) -> u64 {
-        self.random = self.random.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.random;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
     fn chance(&mut self, probability: f64) -> bool {
-        let unit = (self.next_random() >> 11) as f64 / (1u64 << 53) as f64;
+        let unit = (self.random.next_u64() >> 11) as f64 / (1u64 << 53) as f64;
         unit < probability
     }
 
@@ -182,7 +174,7 @@ impl<B: Bus> FaultInjector<B> {
         if bits == 0 {
             return *frame;
         }
-        let bit = (self.next_random() % bits) as usize;
+        let bit = (self.random.next_u64() % bits) as usize;
         let mut payload = [0; 8];
         let length = frame.payload().len();
         payload[..length].copy_from_slice(frame.payload());
@@ -200,7 +192,7 @@ impl<B: Bus> FaultInjector<B> {
         self.frames.insert(at, (due_ns, frame));
     }
 
-    /// Follows the bus-off rules; `Some` when the state has just changed.
+    /// Updates the bus-off state from the rules; returns the event if the state has changed.
     fn update_off(&mut self) -> Option<Event> {
         let now = self.bus.now_ns();
         let mut rules = self.rules.iter();
@@ -214,7 +206,7 @@ impl<B: Bus> FaultInjector<B> {
         }))
     }
 
-    /// The next time at which the injector itself has something to do.
+    /// Time of the injector's next own action.
     fn next_due_ns(&self) -> u64 {
         let now = self.bus.now_ns();
         let windows = self.rules.iter().filter(|r| r.kind == FaultKind::BusOff);
@@ -227,7 +219,7 @@ impl<B: Bus> FaultInjector<B> {
         held.chain(edge).min().unwrap_or(u64::MAX)
     }
 
-    /// What is due now.
+    /// Sends the frames that are due and returns an event that is due.
     fn due(&mut self) -> Result<Option<Event>, BusError> {
         if let Some(event) = self.update_off() {
             return Ok(Some(event));
@@ -255,7 +247,7 @@ impl<B: Bus> FaultInjector<B> {
         }
     }
 
-    /// What becomes of a received frame.
+    /// Applies the rules to a received frame.
     fn received(&mut self, frame: CanFrame) -> Option<Event> {
         let now = self.bus.now_ns();
         let event = Event::Frame(frame);
@@ -292,8 +284,8 @@ impl<B: Bus> FaultInjector<B> {
 }
 
 impl<B: Bus> Bus for FaultInjector<B> {
-    fn stood_still_ns(&self) -> u64 {
-        self.bus.stood_still_ns()
+    fn clock_stall_ns(&self) -> u64 {
+        self.bus.clock_stall_ns()
     }
 
     fn monotonic_ns(&self, time_ns: u64) -> u64 {

@@ -1,4 +1,4 @@
-//! A folder that its owner alone can enter, for sockets: mode 0700, sockets in it 0600.
+//! A folder for sockets that only its owner can enter: mode 0700, sockets in it 0600.
 
 use crate::error::BusError;
 use rustix::fs::{Mode, chmod};
@@ -7,18 +7,17 @@ use std::os::unix::net::UnixDatagram;
 use std::path::{Path, PathBuf};
 
 /// The longest path that fits a Unix address.
-const GREATEST_PATH: usize = 107;
+const MAX_PATH_BYTES: usize = 107;
 
-/// An existing folder of this user's, closed to everyone else.
+/// An existing folder that belongs to this user and is closed to all others.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct OwnerFolder(PathBuf);
 
 impl OwnerFolder {
-    /// Makes the folder, or takes one that is there if it is this user's own and closed to others.
+    /// Creates the folder, or uses an existing one if it belongs to this user and is closed to others.
     ///
     /// # Errors
-    /// [`BusError::Folder`] where it cannot be made, belongs to someone else, is a link, or is open to
-    /// others.
+    /// [`BusError::Folder`] if it cannot be created, belongs to another user, is a link, or is open to others.
     pub fn open(path: impl Into<PathBuf>) -> Result<OwnerFolder, BusError> {
         let path = path.into();
         let made = std::fs::DirBuilder::new()
@@ -32,7 +31,7 @@ impl OwnerFolder {
         };
         made.map_err(|error| {
             refused(
-                format!("cannot be made: {error}"),
+                format!("cannot be created: {error}"),
                 "choose a folder that you may write to",
             )
         })?;
@@ -45,8 +44,8 @@ impl OwnerFolder {
         let user = rustix::process::geteuid().as_raw();
         if !metadata.is_dir() {
             return Err(refused(
-                "is not a folder".into(),
-                "choose another path, links are not followed",
+                "is a link or no folder".into(),
+                "name the folder itself, links are not followed",
             ));
         }
         if metadata.uid() != user {
@@ -64,16 +63,16 @@ impl OwnerFolder {
         Ok(OwnerFolder(path))
     }
 
-    /// Where it is.
+    /// Path of the folder.
     pub fn path(&self) -> &Path {
         &self.0
     }
 
-    /// Binds a datagram socket in it, for the owner alone. A socket left by a process that has ended is
-    /// replaced.
+    /// Binds a datagram socket in the folder, accessible only to the owner. Replaces a file of this name
+    /// that no process listens on.
     ///
     /// # Errors
-    /// [`BusError::Taken`] where a process listens on it; [`BusError::Folder`] where it cannot be made.
+    /// [`BusError::SocketInUse`] if a process listens on it; [`BusError::Folder`] if it cannot be created.
     pub fn bind(&self, name: &str) -> Result<UnixDatagram, BusError> {
         let path = self.0.join(name);
         let refused = |problem: String, remedy| BusError::Folder {
@@ -81,14 +80,14 @@ impl OwnerFolder {
             problem,
             remedy,
         };
-        if path.as_os_str().len() > GREATEST_PATH {
+        if path.as_os_str().len() > MAX_PATH_BYTES {
             return Err(refused(
                 format!("has {} bytes", path.as_os_str().len()),
                 "a socket's path may have 107: choose a shorter folder",
             ));
         }
         if listens(&path) {
-            return Err(BusError::Taken { path });
+            return Err(BusError::SocketInUse { path });
         }
         match std::fs::remove_file(&path) {
             Ok(()) => {}
@@ -102,10 +101,13 @@ impl OwnerFolder {
         }
         let bound = UnixDatagram::bind(&path);
         let socket = bound.map_err(|error| {
-            refused(format!("cannot be made: {error}"), "choose another folder")
+            refused(
+                format!("cannot be created: {error}"),
+                "choose another folder",
+            )
         })?;
         chmod(&path, Mode::RUSR | Mode::WUSR)
-            .map_err(BusError::io("closing a socket to others"))?;
+            .map_err(BusError::io("restricting the permissions of a socket"))?;
         Ok(socket)
     }
 }

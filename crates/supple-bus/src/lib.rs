@@ -1,27 +1,26 @@
-//! The arm's CAN bus, seen from one node of it.
+//! One node's view of the arm's CAN bus.
 //!
-//! A [`Bus`] sends frames and gives back [`Event`]s: frames of other nodes, confirmations that own
-//! frames have left, and faults of the bus. It also owns the time: [`Bus::receive_until`] is the only
-//! way to wait. On a real bus that is the machine's monotonic clock; in [`virtual_time`] it is the time
-//! of whoever plays the arm, which advances exactly as far as the host waits. The same host code runs
-//! on either, and in virtual time it runs as fast as it can and gives the same bits every time.
+//! A [`Bus`] sends frames and returns [`Event`]s: frames of other nodes, confirmations of sent frames, and bus
+//! faults. It also owns the time: [`Bus::receive_until`] is the only way to wait. On a real bus the time is the
+//! machine's monotonic clock; in [`virtual_time`] it is the time of the emulated arm, which advances exactly as
+//! far as the host waits. The same host code runs on both; in virtual time it runs as fast as possible, and its
+//! results are bit-identical in every run.
 //!
 //! | backend | is |
 //! |---|---|
 //! | [`SocketCan`] | a CAN interface of the kernel, real or `vcan` |
 //! | [`DatagramBus`] | Unix datagrams in an owner-only folder, each one a raw `struct can_frame` |
-//! | [`virtual_time::Direct`] | the other side in the same process |
-//! | [`virtual_time::Lockstep`] | the other side in another process |
-//! | [`Paced`] | the same by the wall clock, for an emulated arm |
-//! | [`FaultInjector`] | any of these, with faults |
+//! | [`virtual_time::DirectBus`] | the emulated arm in the same process |
+//! | [`virtual_time::LockstepBus`] | the emulated arm in another process |
+//! | [`PacedBus`] | an emulated arm in another process, synchronised to the wall clock |
+//! | [`FaultInjector`] | a decorator that injects faults into any of these |
 //!
-//! It knows frames, not what they mean: that is `supple-puck`. Sending and receiving allocate nothing.
+//! It transports frames; `supple-puck` encodes and decodes their contents. Sending and receiving allocate
+//! nothing.
 
 #![forbid(unsafe_code)]
 
 mod address;
-mod asked;
-mod asking;
 mod bus;
 mod can_frame;
 mod clock;
@@ -30,8 +29,11 @@ mod endpoint;
 mod error;
 mod fault;
 mod folder;
+mod lockstep_client;
+mod lockstep_server;
 mod message;
 mod paced;
+mod peer;
 mod socket_can;
 pub mod virtual_time;
 
@@ -43,5 +45,5 @@ pub use datagram::{DatagramBus, Side};
 pub use error::BusError;
 pub use fault::{FaultInjector, FaultKind, FaultRule, Traffic};
 pub use folder::OwnerFolder;
-pub use paced::{Paced, Pacer};
+pub use paced::{PacedBus, PacedResponder};
 pub use socket_can::SocketCan;

@@ -1,27 +1,26 @@
-//! What a host and an arm in another process say to each other where the arm keeps the time: datagrams,
-//! native order.
+//! Lockstep protocol between a host and an arm in another process that owns the time: datagrams, native byte
+//! order.
 //!
 //! ```text
 //! 0 kind   4..8 sequence   8..16 time [ns]   16..24 offset [ns]   24..32 sent [ns]   32..36 frames   36..40 entries
 //! then for each entry: 0 kind   8..16 time [ns]   16..32 struct can_frame
 //! ```
 //!
-//! A question says until when the arm is to run, and brings the frames that the host has handed over since the
-//! last one, each with its time. The answer brings what happened up to its own time, which is that of the last
-//! event, or the one asked for if that was reached. `frames` is 0 where the host wants to hear of the first
-//! event whatever it is; otherwise it is how many frames of others have to come before the host will say
-//! anything again. An answer carries the sequence of its question. Where the arm keeps to the wall clock, the
-//! offset is that of the machine's monotonic clock over the arm's time, and "sent" is when this was sent by that
-//! clock.
+//! A request gives the time to run until, and the frames that the host has sent since the last request, each
+//! with its time. The answer contains the events up to its own time: that of the last event, or the requested
+//! time if it was reached. `frames` is 0 if the arm must answer at the first event; otherwise the arm answers
+//! after that many frames of other nodes (the host promises to send nothing before). An answer has the sequence
+//! number of its request. If the arm is synchronised to the wall clock, the offset is that of the machine's
+//! monotonic clock from the arm's time, and "sent" is the time of sending by that clock.
 
 use crate::bus::Event;
 use crate::can_frame::{CAN_FRAME_BYTES, WireFrame};
 use supple_puck::CanFrame;
 
-/// Entries of one datagram at the most. A bus at 1 Mbit/s has no more frames in three milliseconds.
+/// Maximum number of entries in a datagram. A bus at 1 Mbit/s carries no more frames in three milliseconds.
 pub(crate) const ENTRIES: usize = 64;
-/// The longest datagram.
-pub(crate) const LONGEST_BYTES: usize = HEAD_BYTES + ENTRIES * ENTRY_BYTES;
+/// Maximum size of a datagram.
+pub(crate) const MAX_BYTES: usize = HEAD_BYTES + ENTRIES * ENTRY_BYTES;
 
 const HEAD_BYTES: usize = 40;
 const ENTRY_BYTES: usize = 32;
@@ -33,25 +32,25 @@ const RUN_UNTIL: u8 = 4;
 const REACHED: u8 = 5;
 const STOPPED: u8 = 6;
 
-/// What a message is.
+/// Kind of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
-    /// The host waits.
+    /// Request of the host to run until a time.
     RunUntil,
-    /// The arm has run as far as it was asked to.
+    /// Answer: the arm has reached the requested time.
     Reached,
-    /// The arm stands at the last event.
+    /// Answer: the arm has stopped at the last event.
     Stopped,
 }
 
-/// Something on the bus with its time \[ns\]; of the host, a frame that it hands over, as [`Event::Sent`].
+/// An event on the bus with its time \[ns\]; [`Event::Sent`] in a request is a frame of the host.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Entry {
     pub time_ns: u64,
     pub event: Event,
 }
 
-/// A question or an answer.
+/// A request or an answer.
 #[derive(Clone, Debug)]
 pub(crate) struct Message {
     pub kind: Kind,
@@ -65,7 +64,7 @@ pub(crate) struct Message {
 }
 
 impl Message {
-    /// Without entries.
+    /// A message without entries.
     pub fn new(kind: Kind, time_ns: u64, sequence: u32) -> Message {
         Message {
             kind,
@@ -79,38 +78,38 @@ impl Message {
         }
     }
 
-    /// False where there is no room.
+    /// Appends an entry; false if the message is full.
     pub fn push(&mut self, time_ns: u64, event: Event) -> bool {
-        let Some(place) = self.entries.get_mut(self.count) else {
+        let Some(slot) = self.entries.get_mut(self.count) else {
             return false;
         };
-        *place = Some(Entry { time_ns, event });
+        *slot = Some(Entry { time_ns, event });
         self.count += 1;
         true
     }
 
-    /// It brings nothing any more.
+    /// Removes all entries.
     pub fn clear(&mut self) {
         self.count = 0;
     }
 
-    /// It brings nothing.
+    /// Whether there are no entries.
     pub fn is_empty(&self) -> bool {
         self.count == 0
     }
 
-    /// No more entries go into it.
+    /// Whether no more entries fit.
     pub fn is_full(&self) -> bool {
         self.count == ENTRIES
     }
 
-    /// What it brings, in order.
+    /// Entries in order.
     pub fn entries(&self) -> impl Iterator<Item = &Entry> {
         self.entries[..self.count].iter().flatten()
     }
 
-    /// The frame that the host hands over in an entry.
-    pub fn handed_over(&self, index: usize) -> Option<(u64, CanFrame)> {
+    /// The host's frame in an entry, with its time.
+    pub fn host_frame(&self, index: usize) -> Option<(u64, CanFrame)> {
         match self.entries[..self.count].get(index)?.as_ref()? {
             Entry {
                 time_ns,
@@ -120,8 +119,8 @@ impl Message {
         }
     }
 
-    /// Writes it; the bytes to send.
-    pub fn emit<'a>(&self, bytes: &'a mut [u8; LONGEST_BYTES]) -> &'a [u8] {
+    /// Encodes the message; returns the bytes to send.
+    pub fn emit<'a>(&self, bytes: &'a mut [u8; MAX_BYTES]) -> &'a [u8] {
         bytes[..HEAD_BYTES].fill(0);
         bytes[0] = match self.kind {
             Kind::RunUntil => RUN_UNTIL,
@@ -135,22 +134,22 @@ impl Message {
         bytes[32..36].copy_from_slice(&self.frames.to_ne_bytes());
         bytes[36..40].copy_from_slice(&(self.count as u32).to_ne_bytes());
         let end = HEAD_BYTES + self.count * ENTRY_BYTES;
-        let places = bytes[HEAD_BYTES..end].chunks_exact_mut(ENTRY_BYTES);
-        for (place, entry) in places.zip(self.entries()) {
+        let slots = bytes[HEAD_BYTES..end].chunks_exact_mut(ENTRY_BYTES);
+        for (slot, entry) in slots.zip(self.entries()) {
             let (kind, raw) = match &entry.event {
                 Event::Frame(frame) => (FRAME, WireFrame::data(frame)),
                 Event::Sent(frame) => (SENT, WireFrame::data(frame)),
                 Event::Fault(fault) => (FAULT, WireFrame::fault(*fault)),
             };
-            place[..8].fill(0);
-            place[0] = kind;
-            place[8..16].copy_from_slice(&entry.time_ns.to_ne_bytes());
-            place[16..].copy_from_slice(&raw);
+            slot[..8].fill(0);
+            slot[0] = kind;
+            slot[8..16].copy_from_slice(&entry.time_ns.to_ne_bytes());
+            slot[16..].copy_from_slice(&raw);
         }
         &bytes[..end]
     }
 
-    /// Reads one; `None` for what is none.
+    /// Parses a message; `None` if the bytes are not a message.
     pub fn parse(bytes: &[u8]) -> Option<Message> {
         let kind = match *bytes.first()? {
             RUN_UNTIL => Kind::RunUntil,
@@ -166,15 +165,15 @@ impl Message {
         if count > ENTRIES || bytes.len() != HEAD_BYTES + count * ENTRY_BYTES {
             return None;
         }
-        for place in bytes[HEAD_BYTES..].chunks_exact(ENTRY_BYTES) {
-            let raw: &[u8; CAN_FRAME_BYTES] = place[16..].try_into().ok()?;
-            let event = match (place[0], WireFrame::parse(raw)) {
+        for slot in bytes[HEAD_BYTES..].chunks_exact(ENTRY_BYTES) {
+            let raw: &[u8; CAN_FRAME_BYTES] = slot[16..].try_into().ok()?;
+            let event = match (slot[0], WireFrame::parse(raw)) {
                 (FRAME, WireFrame::Data(frame)) => Event::Frame(frame),
                 (SENT, WireFrame::Data(frame)) => Event::Sent(frame),
                 (FAULT, WireFrame::Fault(fault)) => Event::Fault(fault),
                 _ => return None,
             };
-            message.push(u64_at(place, 8)?, event);
+            message.push(u64_at(slot, 8)?, event);
         }
         Some(message)
     }
@@ -196,7 +195,7 @@ mod tests {
     use crate::bus::BusFault;
 
     #[test]
-    fn a_message_is_read_as_it_was_written_and_half_of_it_is_none() {
+    fn messages_round_trip_and_truncated_ones_are_rejected() {
         let frame = CanFrame::from_raw(0x423, &[1, 2, 3]).expect("a frame");
         let mut message = Message::new(Kind::Stopped, 12, 7);
         (message.offset_ns, message.sent_ns, message.frames) = (3, 4, 5);
@@ -207,17 +206,17 @@ mod tests {
         ] {
             assert!(message.push(time_ns, event));
         }
-        let mut bytes = [0; LONGEST_BYTES];
+        let mut bytes = [0; MAX_BYTES];
         let written = message.emit(&mut bytes);
         let read = Message::parse(written).expect("a message");
         assert_eq!(format!("{read:?}"), format!("{message:?}"));
-        assert_eq!(read.handed_over(0), Some((9, frame)));
-        assert_eq!(read.handed_over(1), None);
+        assert_eq!(read.host_frame(0), Some((9, frame)));
+        assert_eq!(read.host_frame(1), None);
         for length in 0..written.len() {
             assert!(Message::parse(&written[..length]).is_none(), "{length}");
         }
         while message.push(12, Event::Frame(frame)) {}
         assert!(message.is_full());
-        assert_eq!(message.emit(&mut bytes).len(), LONGEST_BYTES);
+        assert_eq!(message.emit(&mut bytes).len(), MAX_BYTES);
     }
 }

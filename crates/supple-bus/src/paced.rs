@@ -1,76 +1,77 @@
-//! An emulated bus by the wall clock: the arm's process keeps the time, its host holds it to the wall's.
+//! An emulated bus in real time: the arm's process owns the time, and the host synchronises it to the wall
+//! clock.
 //!
-//! A cable answers within microseconds whatever the machine does; a process that plays one does not. So the
-//! host asks as in virtual time ([`Lockstep`](crate::virtual_time::Lockstep)), the arm computes and answers at
-//! once, and the host takes the answer in when the wall clock has come to it. Where the arm's process is held
-//! up, the emulated time stands still for both sides: no reply is lost to a busy machine. A host that is held up
-//! is late, by [`MOST_NS`] at the most. But a host that is silent for [`SILENCE_NS`] does not hold up the time:
-//! the arm goes on without it; and an arm that is silent is one without power.
+//! A real bus answers within microseconds whatever the load of the machine; an emulating process may not. The
+//! host therefore sends requests as in virtual time ([`LockstepBus`](crate::virtual_time::LockstepBus)), the arm
+//! computes the answer at once, and the host delivers its events when the wall clock reaches their time. If the
+//! arm's process stalls, emulated time pauses for both sides, so that no reply is lost. If the host stalls, it
+//! is late by at most [`MAX_HOST_LATENESS_NS`]; the rest pauses the time too. If the host is silent for
+//! [`PEER_TIMEOUT_NS`], the arm continues without it; if the arm is silent for as long, it counts as powered
+//! off.
 
-use crate::asked::Asked;
-use crate::asking::{Asking, Next};
 use crate::bus::{Bus, Event};
 use crate::clock::{monotonic_ns, sleep_until_ns, wait_readable_until};
 use crate::datagram::Side;
 use crate::endpoint::{Delivery, Endpoint};
 use crate::error::BusError;
 use crate::folder::OwnerFolder;
-use crate::message::{Kind, LONGEST_BYTES, Message};
-use crate::virtual_time::Peer;
+use crate::lockstep_client::{LockstepClient, Next};
+use crate::lockstep_server::LockstepServer;
+use crate::message::{Kind, MAX_BYTES, Message};
+use crate::peer::Peer;
 use supple_puck::CanFrame;
 
-/// By how much a host that was held up is late at the most \[ns\].
-pub const MOST_NS: u64 = 250_000;
-/// By how much an answer of the arm may be late before the time stood still instead \[ns\].
-const FORGIVEN_NS: u64 = 100_000;
-/// Silence of one side after which the other goes on alone \[ns\].
-pub const SILENCE_NS: u64 = 30_000_000;
-/// How long a host may have been held up before the time has gone on without it \[ns\].
-const HELD_UP_NS: u64 = 20_000_000;
+/// Maximum lateness that a host sees after a stall \[ns\].
+pub const MAX_HOST_LATENESS_NS: u64 = 250_000;
+/// Lateness of an answer above which emulated time pauses \[ns\].
+const STALL_THRESHOLD_NS: u64 = 100_000;
+/// Silence of one side after which the other continues without it \[ns\].
+pub const PEER_TIMEOUT_NS: u64 = 30_000_000;
+/// Stall of the host above which the arm continued without it, so that no time is paused \[ns\].
+const MAX_HOST_STALL_NS: u64 = 20_000_000;
 
-/// How long an arm may take for its first answer \[ns\].
-const OPEN_NS: u64 = 1_000_000_000;
-/// Longest that the arm's side runs or waits before it returns \[ns\].
+/// Timeout for the first answer of the arm \[ns\].
+const FIRST_ANSWER_TIMEOUT_NS: u64 = 1_000_000_000;
+/// Maximum time that the arm's side runs or waits before it returns \[ns\].
 const SLICE_NS: u64 = 1_000_000;
-/// By how much the arm's side is before the wall clock at the most \[ns\]: what an operator does at the pendant
-/// comes no later than that.
-const AHEAD_NS: u64 = 2_000_000;
+/// Maximum lead of the arm's time over the wall clock \[ns\]; a button press is delayed by at most this.
+const MAX_LEAD_NS: u64 = 2_000_000;
 
 /// The host's bus.
 #[derive(Debug)]
-pub struct Paced {
+pub struct PacedBus {
     endpoint: Endpoint,
-    asking: Asking,
-    /// The arm's time as it was last known \[ns\].
+    client: LockstepClient,
+    /// Last known time of the arm \[ns\].
     base_ns: u64,
-    /// The machine's clock over the arm's time \[ns\].
+    /// Offset of the monotonic clock from the arm's time \[ns\].
     offset_ns: u64,
-    /// The same at the beginning: what came since is time that stood still \[ns\].
+    /// Offset at the start \[ns\]; its growth since then is the paused time.
     first_offset_ns: u64,
-    /// The arm did not answer the last question.
+    /// The arm did not answer the last request.
     lost: bool,
 }
 
-impl Paced {
-    /// Opens the host's side and takes over the time of the arm's process, which must be there.
+impl PacedBus {
+    /// Opens the host's side and adopts the time of the arm's process, which must be running.
     ///
     /// # Errors
-    /// Where the folder is not the owner's alone, another process is the host, or no arm answers.
-    pub fn open(folder: &OwnerFolder) -> Result<Paced, BusError> {
+    /// If the folder is not accessible only to its owner, another process is the host, or no arm answers.
+    pub fn open(folder: &OwnerFolder) -> Result<PacedBus, BusError> {
         let (own, peer) = Side::Host.sockets();
-        let mut bus = Paced {
+        let mut bus = PacedBus {
             endpoint: Endpoint::new(folder, own, peer)?,
-            asking: Asking::new(),
+            client: LockstepClient::new(),
             base_ns: 0,
             offset_ns: 0,
             first_offset_ns: 0,
             lost: false,
         };
-        bus.asking.ask(0, 0);
-        if bus.asking.post(&bus.endpoint)? != Delivery::Delivered {
+        bus.client.prepare_request(0, 0);
+        if bus.client.send_request(&bus.endpoint)? != Delivery::Delivered {
             return Err(bus.no_peer());
         }
-        match bus.answer(monotonic_ns() + OPEN_NS)? {
+        match bus.answer(monotonic_ns() + FIRST_ANSWER_TIMEOUT_NS)? {
             Some(answer) => {
                 bus.offset_ns = answer.offset_ns;
                 bus.first_offset_ns = answer.offset_ns;
@@ -87,10 +88,10 @@ impl Paced {
         }
     }
 
-    /// The answer to the last question, until the machine's clock shows `until_ns`.
+    /// Waits for the answer to the last request until the monotonic clock reaches `until_ns`.
     fn answer(&mut self, until_ns: u64) -> Result<Option<Message>, BusError> {
         loop {
-            if let Some(answer) = self.asking.answer(&self.endpoint)? {
+            if let Some(answer) = self.client.answer(&self.endpoint)? {
                 return Ok(Some(answer));
             }
             if monotonic_ns() >= until_ns {
@@ -105,38 +106,38 @@ impl Paced {
         monotonic_ns().saturating_sub(self.offset_ns)
     }
 
-    /// By how much the time stood still for a host that was held up \[ns\].
-    fn held_up_ns(&self) -> u64 {
+    /// Pause of emulated time due to the current stall of the host \[ns\].
+    fn host_stall_ns(&self) -> u64 {
         match self.wall_ns().saturating_sub(self.base_ns) {
-            since if self.lost || since > HELD_UP_NS => 0,
-            since => since.saturating_sub(MOST_NS),
+            since if self.lost || since > MAX_HOST_STALL_NS => 0,
+            since => since.saturating_sub(MAX_HOST_LATENESS_NS),
         }
     }
 
-    /// Lets the arm run as far as it is to, and waits until the wall clock has come there.
+    /// Advances the arm to `until_ns`, and waits until the wall clock reaches the answer's time.
     fn exchange(&mut self, until_ns: u64, frames: u32) -> Result<(), BusError> {
-        self.offset_ns += self.held_up_ns();
+        self.offset_ns += self.host_stall_ns();
         let until_ns = until_ns.max(self.now_ns());
-        let asked_ns = monotonic_ns();
-        let question = self.asking.ask(until_ns, frames);
-        question.offset_ns = self.offset_ns;
-        question.sent_ns = asked_ns;
-        let delivered = self.asking.post(&self.endpoint)?;
-        // A frame to nobody is never confirmed.
-        self.asking.over();
+        let requested_ns = monotonic_ns();
+        let request = self.client.prepare_request(until_ns, frames);
+        request.offset_ns = self.offset_ns;
+        request.sent_ns = requested_ns;
+        let delivered = self.client.send_request(&self.endpoint)?;
+        // Cleared even if not delivered: a frame without a receiver is never confirmed.
+        self.client.clear_request();
         let wall_ns = until_ns + self.offset_ns;
-        let patience_ns = match delivered {
-            Delivery::Delivered if !self.lost => wall_ns + SILENCE_NS,
+        let deadline_ns = match delivered {
+            Delivery::Delivered if !self.lost => wall_ns + PEER_TIMEOUT_NS,
             _ => wall_ns,
         };
-        let answer = self.answer(patience_ns)?;
+        let answer = self.answer(deadline_ns)?;
         self.lost = answer.is_none();
         match answer {
             Some(answer) => {
                 self.offset_ns = self.offset_ns.max(answer.offset_ns);
                 self.base_ns = self.base_ns.max(answer.time_ns);
-                let due_ns = asked_ns.max(answer.time_ns + self.offset_ns);
-                self.stand_still(answer.sent_ns.saturating_sub(due_ns));
+                let due_ns = requested_ns.max(answer.time_ns + self.offset_ns);
+                self.add_stall(answer.sent_ns.saturating_sub(due_ns));
                 self.sleep_until(answer.time_ns);
             }
             None => self.base_ns = self.base_ns.max(until_ns),
@@ -144,9 +145,9 @@ impl Paced {
         Ok(())
     }
 
-    /// The time by which an answer is late did not pass, unless nobody waited for it any more.
-    fn stand_still(&mut self, late_ns: u64) {
-        if (FORGIVEN_NS..=SILENCE_NS).contains(&late_ns) {
+    /// Pauses emulated time by the lateness of the answer, unless the request has timed out.
+    fn add_stall(&mut self, late_ns: u64) {
+        if (STALL_THRESHOLD_NS..=PEER_TIMEOUT_NS).contains(&late_ns) {
             self.offset_ns += late_ns;
         }
     }
@@ -158,9 +159,9 @@ impl Paced {
     }
 }
 
-impl Bus for Paced {
+impl Bus for PacedBus {
     fn now_ns(&self) -> u64 {
-        let wall_ns = self.wall_ns() - self.held_up_ns();
+        let wall_ns = self.wall_ns() - self.host_stall_ns();
         wall_ns.max(self.base_ns)
     }
 
@@ -168,55 +169,59 @@ impl Bus for Paced {
         time_ns + self.offset_ns
     }
 
-    fn stood_still_ns(&self) -> u64 {
+    fn clock_stall_ns(&self) -> u64 {
         self.offset_ns - self.first_offset_ns
     }
 
     fn send(&mut self, frame: &CanFrame) -> Result<(), BusError> {
-        self.asking.hand_over(frame, self.now_ns())
+        self.client.queue_frame(frame, self.now_ns())
     }
 
     fn receive_until(&mut self, until_ns: u64) -> Result<Option<Event>, BusError> {
-        self.receive_ahead(until_ns, 0)
+        self.receive_with_lookahead(until_ns, 0)
     }
 
-    fn receive_ahead(&mut self, until_ns: u64, frames: u32) -> Result<Option<Event>, BusError> {
-        match self.asking.next(until_ns) {
+    fn receive_with_lookahead(
+        &mut self,
+        until_ns: u64,
+        frames: u32,
+    ) -> Result<Option<Event>, BusError> {
+        match self.client.next(until_ns) {
             Next::Event(entry) => return Ok(Some(entry.event)),
             Next::Reached(_) => return Ok(None),
-            Next::Ask => self.exchange(until_ns, frames)?,
+            Next::NeedRequest => self.exchange(until_ns, frames)?,
         }
-        match self.asking.next(until_ns) {
+        match self.client.next(until_ns) {
             Next::Event(entry) => Ok(Some(entry.event)),
-            // An arm that does not answer tells nothing.
-            Next::Reached(_) | Next::Ask => Ok(None),
+            // No events come from an arm that does not answer.
+            Next::Reached(_) | Next::NeedRequest => Ok(None),
         }
     }
 }
 
-/// The arm's side of a [`Paced`].
+/// The arm's side of a [`PacedBus`].
 #[derive(Debug)]
-pub struct Pacer {
+pub struct PacedResponder {
     endpoint: Endpoint,
     offset_ns: u64,
-    /// When the host was last heard \[ns\].
-    heard_ns: u64,
-    /// What the host waits for.
-    asked: Option<Asked>,
+    /// Time of the host's last request or its answer \[ns\].
+    last_seen_ns: u64,
+    /// The host's request in progress.
+    server: Option<LockstepServer>,
 }
 
-impl Pacer {
-    /// Opens the arm's side in a folder; the arm's time is `now_ns`.
+impl PacedResponder {
+    /// Opens the arm's side in a folder; the arm's time is now `now_ns`.
     ///
     /// # Errors
-    /// Where the folder is not the owner's alone, or another process is the arm.
-    pub fn open(folder: &OwnerFolder, now_ns: u64) -> Result<Pacer, BusError> {
+    /// If the folder is not accessible only to its owner, or another process is the arm.
+    pub fn open(folder: &OwnerFolder, now_ns: u64) -> Result<PacedResponder, BusError> {
         let (own, peer) = Side::Arm.sockets();
-        Ok(Pacer {
+        Ok(PacedResponder {
             endpoint: Endpoint::new(folder, own, peer)?,
             offset_ns: monotonic_ns().saturating_sub(now_ns),
-            heard_ns: 0,
-            asked: None,
+            last_seen_ns: 0,
+            server: None,
         })
     }
 
@@ -225,49 +230,49 @@ impl Pacer {
         monotonic_ns().saturating_sub(self.offset_ns)
     }
 
-    /// Serves its host: lets the arm run for about a millisecond of its time, or waits for as long.
+    /// Serves one slice: advances the arm by up to a millisecond of its time, or waits that long for a request.
     ///
     /// # Errors
-    /// Where the socket fails. A host that has gone is none: another may come.
-    pub fn turn(&mut self, peer: &mut impl Peer) -> Result<(), BusError> {
-        let mut bytes = [0; LONGEST_BYTES];
-        if self.asked.is_none() {
-            self.asked = self.next(&mut bytes)?;
+    /// If the socket fails. A missing host is not an error; another may connect.
+    pub fn serve(&mut self, peer: &mut impl Peer) -> Result<(), BusError> {
+        let mut bytes = [0; MAX_BYTES];
+        if self.server.is_none() {
+            self.server = self.next(&mut bytes)?;
         }
-        if let Some(asked) = &mut self.asked {
-            let not_before_ns = peer.now_ns().saturating_sub(AHEAD_NS) + self.offset_ns;
+        if let Some(server) = &mut self.server {
+            let not_before_ns = peer.now_ns().saturating_sub(MAX_LEAD_NS) + self.offset_ns;
             sleep_until_ns(not_before_ns);
-            if let Some(answer) = asked.run(peer, SLICE_NS) {
+            if let Some(answer) = server.run(peer, SLICE_NS) {
                 answer.offset_ns = self.offset_ns;
                 answer.sent_ns = monotonic_ns();
-                self.heard_ns = answer.sent_ns;
+                self.last_seen_ns = answer.sent_ns;
                 self.endpoint.send(answer.emit(&mut bytes))?;
-                self.asked = None;
+                self.server = None;
             }
-        } else if monotonic_ns() > self.heard_ns + SILENCE_NS {
+        } else if monotonic_ns() > self.last_seen_ns + PEER_TIMEOUT_NS {
             let wall_ns = self.wall_ns();
             while peer.run_until(wall_ns.max(peer.now_ns())).is_some() {}
         }
         Ok(())
     }
 
-    /// The next question, if one comes within a millisecond.
-    fn next(&mut self, bytes: &mut [u8]) -> Result<Option<Asked>, BusError> {
+    /// The next request, if one arrives within a millisecond.
+    fn next(&mut self, bytes: &mut [u8]) -> Result<Option<LockstepServer>, BusError> {
         let mut read = self.endpoint.receive_into(bytes)?.map(<[u8]>::len);
         if read.is_none() {
             wait_readable_until(&self.endpoint, monotonic_ns() + SLICE_NS)?;
             read = self.endpoint.receive_into(bytes)?.map(<[u8]>::len);
         }
         let message = read.and_then(|length| Message::parse(&bytes[..length]));
-        let question = message.filter(|m| m.kind == Kind::RunUntil);
-        Ok(question.map(|question| {
-            self.heard_ns = monotonic_ns();
-            self.offset_ns = self.offset_ns.max(question.offset_ns);
-            Asked::new(question)
+        let request = message.filter(|m| m.kind == Kind::RunUntil);
+        Ok(request.map(|request| {
+            self.last_seen_ns = monotonic_ns();
+            self.offset_ns = self.offset_ns.max(request.offset_ns);
+            LockstepServer::new(request)
         }))
     }
 
-    /// The machine's monotonic clock over the arm's time \[ns\].
+    /// Offset of the machine's monotonic clock from the arm's time \[ns\].
     pub fn offset_ns(&self) -> u64 {
         self.offset_ns
     }

@@ -1,9 +1,9 @@
 //! A CAN interface of the Linux kernel.
 //!
-//! Opened with its own messages echoed, so that a frame counts as sent only when the driver says that
-//! it left, with all error frames on, and with a count of the frames that were lost because nobody read
-//! them in time (`SO_RXQ_OVFL`). Frames with extended ids and remote requests are passed over.
-//! Bit rate and automatic restart belong to the interface and are set by who brings it up:
+//! The socket receives its own messages as echoes, so that a frame counts as sent only when the driver confirms
+//! it, all error frames, and a count of the frames that were lost because they were not read in time
+//! (`SO_RXQ_OVFL`). Frames with extended ids and remote requests are ignored. Bit rate and automatic restart are
+//! properties of the interface, set when it is brought up:
 //! `ip link set can0 up type can bitrate 1000000 restart-ms 100`.
 
 use crate::bus::{Bus, BusFault, Event};
@@ -18,22 +18,22 @@ use socketcan::{CanSocket, Socket, SocketOptions};
 use std::io;
 use supple_puck::CanFrame;
 
-/// Set by the kernel on an echoed frame of the very socket that reads it (`MSG_CONFIRM`).
+/// Flag of the kernel for an echo of a frame that the reading socket itself sent (`MSG_CONFIRM`).
 const CONFIRM: u32 = 0x800;
 
-/// The kernel accounts several times a frame's size for each; this holds a few hundred frames, where the
-/// default may lose most of a burst in silence.
+/// The kernel charges several times a frame's size to the buffer. This size holds a few hundred frames; the
+/// default may silently drop most of a burst.
 const RECEIVE_BUFFER_BYTES: usize = 1 << 20;
 
 /// A raw CAN socket.
 #[derive(Debug)]
 pub struct SocketCan {
     socket: CanSocket,
-    /// Frames have been lost: from then on each that is read says how many.
-    losing: bool,
-    /// Frames lost so far.
+    /// An overrun has occurred: from then on the kernel attaches its counter to every frame.
+    overrun_counting: bool,
+    /// Number of frames lost.
     lost: u64,
-    /// The kernel's count of them, which wraps.
+    /// The kernel's counter of lost frames, which wraps.
     lost_by_kernel: u32,
     control: Vec<u8>,
 }
@@ -42,7 +42,7 @@ impl SocketCan {
     /// Opens an interface by its name, such as `can0`.
     ///
     /// # Errors
-    /// [`BusError::Interface`] says what the kernel says and what to do.
+    /// [`BusError::Interface`] with the kernel's error and a remedy.
     pub fn open(interface: &str) -> Result<SocketCan, BusError> {
         let refused = |source: io::Error| BusError::Interface {
             interface: interface.to_owned(),
@@ -61,32 +61,31 @@ impl SocketCan {
         set_up().map_err(refused)?;
         Ok(SocketCan {
             socket,
-            losing: false,
+            overrun_counting: false,
             lost: 0,
             lost_by_kernel: 0,
             control: nix::cmsg_space!(u32),
         })
     }
 
-    /// Frames that were lost because they were not read in time, as far as those behind them have been read.
-    /// Each gap is told as [`BusFault::Overrun`] too.
+    /// Number of frames that were lost because they were not read in time, up to the last frame read. Each gap
+    /// is also reported as [`BusFault::Overrun`].
     pub fn lost(&self) -> u64 {
         self.lost
     }
 
-    /// Puts an error frame on the bus for the other sockets of this machine to see, where the interface
-    /// lets it, as `vcan` does.
+    /// Sends an error frame to the other sockets of this machine, if the interface supports it, as `vcan` does.
     ///
     /// # Errors
-    /// Where the kernel refuses it.
+    /// If the kernel rejects it.
     pub fn send_fault(&mut self, fault: BusFault) -> Result<(), BusError> {
         let sent = rustix::io::write(&self.socket, &WireFrame::fault(fault));
         sent.map(|_| ())
             .map_err(BusError::io("sending an error frame to the CAN interface"))
     }
 
-    /// Whether frames were lost in front of the next one.
-    fn gap(&mut self) -> Result<bool, BusError> {
+    /// Whether frames were lost before the next one.
+    fn detect_overrun(&mut self) -> Result<bool, BusError> {
         let mut raw = [0; CAN_FRAME_BYTES];
         let mut buffers = [IoSliceMut::new(&mut raw)];
         let peeked = kernel::recvmsg::<()>(
@@ -96,7 +95,7 @@ impl SocketCan {
             MsgFlags::MSG_PEEK | MsgFlags::MSG_DONTWAIT,
         );
         let failed = |errno: nix::Error| BusError::Io {
-            action: "looking for lost frames",
+            action: "checking for lost frames",
             source: errno.into(),
         };
         let message = match peeked {
@@ -115,9 +114,9 @@ impl SocketCan {
         Ok(false)
     }
 
-    fn take(&mut self) -> Result<Option<Event>, BusError> {
+    fn read_event(&mut self) -> Result<Option<Event>, BusError> {
         loop {
-            if self.losing && self.gap()? {
+            if self.overrun_counting && self.detect_overrun()? {
                 return Ok(Some(Event::Fault(BusFault::Overrun)));
             }
             let mut raw = [0; CAN_FRAME_BYTES];
@@ -133,15 +132,15 @@ impl SocketCan {
                 Err(Errno::INTR) => continue,
                 Err(errno) => return Err(BusError::io("receiving from the CAN interface")(errno)),
             };
-            // The count came with it and found no room: it is read in front of the next frame.
-            self.losing |= message.flags.contains(ReturnFlags::CTRUNC);
+            // This read had no buffer for the counter; it is read with the next frame.
+            self.overrun_counting |= message.flags.contains(ReturnFlags::CTRUNC);
             match WireFrame::parse(&raw) {
                 WireFrame::Data(frame) if message.flags.bits() & CONFIRM != 0 => {
                     return Ok(Some(Event::Sent(frame)));
                 }
                 WireFrame::Data(frame) => return Ok(Some(Event::Frame(frame))),
                 WireFrame::Fault(fault) => return Ok(Some(Event::Fault(fault))),
-                WireFrame::Foreign => {}
+                WireFrame::Unsupported => {}
             }
         }
     }
@@ -162,7 +161,7 @@ impl Bus for SocketCan {
 
     fn receive_until(&mut self, until_ns: u64) -> Result<Option<Event>, BusError> {
         loop {
-            if let Some(event) = self.take()? {
+            if let Some(event) = self.read_event()? {
                 return Ok(Some(event));
             }
             let readable = wait_readable_until(&self.socket, until_ns)?;
@@ -190,7 +189,7 @@ fn remedy(error: &io::Error) -> &'static str {
         Some(Errno::NETDOWN) => {
             "bring it up: ip link set can0 up type can bitrate 1000000 restart-ms 100"
         }
-        Some(Errno::PERM | Errno::ACCESS) => "you may not open it: ask for CAP_NET_RAW",
+        Some(Errno::PERM | Errno::ACCESS) => "you may not open it: CAP_NET_RAW is required",
         _ => "see `ip -details link`",
     }
 }

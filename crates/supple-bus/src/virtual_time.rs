@@ -1,44 +1,31 @@
-//! A bus in virtual time: whoever plays the arm owns the time, and it advances only while the host waits.
+//! A bus in virtual time: the arm's side owns the time, which advances only while the host waits.
 //!
-//! In one process the arm is a [`Peer`] inside a [`Direct`]. Between processes the host has a
-//! [`Lockstep`], the arm's process a [`Responder`]; the two speak datagrams in the folder of
+//! In one process the arm is a [`Peer`] inside a [`DirectBus`]. Between processes the host has a
+//! [`LockstepBus`], the arm's process a [`LockstepResponder`]; the two exchange datagrams in the folder of
 //! [`DatagramBus`](crate::DatagramBus).
 //!
-//! The host sends any number of frames, then "run until", and waits; the arm answers with the first event
-//! for the host, or "reached"; or, where the host has said that it will be silent meanwhile
-//! ([`Bus::receive_ahead`]), with all that has happened until then. So the same inputs give the same order of
-//! everything, at any speed.
+//! The host sends any number of frames, then "run until", and waits. The arm answers with the first event for
+//! the host, or "reached"; with lookahead ([`Bus::receive_with_lookahead`]) it answers with all events up to
+//! that point. The same inputs therefore give the same order of events at any speed.
 
-use crate::asked::Asked;
-use crate::asking::{Asking, Next};
 use crate::bus::{Bus, Event};
 use crate::clock::{monotonic_ns, wait_readable_until};
 use crate::datagram::Side;
 use crate::endpoint::{Delivery, Endpoint};
 use crate::error::BusError;
 use crate::folder::OwnerFolder;
-use crate::message::{Kind, LONGEST_BYTES, Message};
+use crate::lockstep_client::{LockstepClient, Next};
+use crate::lockstep_server::LockstepServer;
+use crate::message::{Kind, MAX_BYTES, Message};
+pub use crate::peer::Peer;
 use rustix::fd::{AsFd, BorrowedFd};
 use supple_puck::CanFrame;
 
-/// Everything on the bus but the host.
-pub trait Peer {
-    /// Its time \[ns\].
-    fn now_ns(&self) -> u64;
-
-    /// The host hands over a frame, now.
-    fn host_sends(&mut self, frame: &CanFrame);
-
-    /// Runs to the next event for the host, or to `until_ns`, whichever comes first; its time is then
-    /// that of the event, or `until_ns`.
-    fn run_until(&mut self, until_ns: u64) -> Option<Event>;
-}
-
-/// The bus of a host in the peer's own process.
+/// The host's bus, with the peer in the same process.
 #[derive(Debug)]
-pub struct Direct<P>(pub P);
+pub struct DirectBus<P>(pub P);
 
-impl<P: Peer> Bus for Direct<P> {
+impl<P: Peer> Bus for DirectBus<P> {
     fn now_ns(&self) -> u64 {
         self.0.now_ns()
     }
@@ -53,28 +40,27 @@ impl<P: Peer> Bus for Direct<P> {
     }
 }
 
-/// How long a peer may take to answer, on the machine's clock. It is no deadline of the bus: it tells an
-/// arm's process that has ended from one that is busy.
-const PATIENCE_NS: u64 = 5_000_000_000;
+/// Timeout for an answer, in real time. It does not affect bus time; it detects an arm process that has ended.
+const ANSWER_TIMEOUT_NS: u64 = 5_000_000_000;
 
-/// The host's bus, the arm in another process.
+/// The host's bus, with the arm in another process.
 #[derive(Debug)]
-pub struct Lockstep {
+pub struct LockstepBus {
     endpoint: Endpoint,
-    asking: Asking,
+    client: LockstepClient,
     now_ns: u64,
 }
 
-impl Lockstep {
-    /// Opens the host's side and takes over the time of the arm's process, which must be there.
+impl LockstepBus {
+    /// Opens the host's side and adopts the time of the arm's process, which must be running.
     ///
     /// # Errors
-    /// Where the folder is not the owner's alone, another process is the host, or no arm answers.
-    pub fn open(folder: &OwnerFolder) -> Result<Lockstep, BusError> {
+    /// If the folder is not accessible only to its owner, another process is the host, or no arm answers.
+    pub fn open(folder: &OwnerFolder) -> Result<LockstepBus, BusError> {
         let (own, peer) = Side::Host.sockets();
-        let mut bus = Lockstep {
+        let mut bus = LockstepBus {
             endpoint: Endpoint::new(folder, own, peer)?,
-            asking: Asking::new(),
+            client: LockstepClient::new(),
             now_ns: 0,
         };
         while bus.receive_until(0)?.is_some() {}
@@ -82,21 +68,21 @@ impl Lockstep {
     }
 
     fn exchange(&mut self) -> Result<(), BusError> {
-        let patience = monotonic_ns() + PATIENCE_NS;
+        let deadline_ns = monotonic_ns() + ANSWER_TIMEOUT_NS;
         loop {
-            match self.asking.post(&self.endpoint)? {
+            match self.client.send_request(&self.endpoint)? {
                 Delivery::Delivered => break,
-                // No time passes on the bus while the peer reads what is queued.
-                Delivery::Full if monotonic_ns() < patience => std::thread::yield_now(),
+                // Bus time does not advance while the peer reads its queue.
+                Delivery::Full if monotonic_ns() < deadline_ns => std::thread::yield_now(),
                 Delivery::Full | Delivery::NoPeer => return Err(self.no_peer()),
             }
         }
-        self.asking.over();
-        while self.asking.answer(&self.endpoint)?.is_none() {
-            if monotonic_ns() > patience {
+        self.client.clear_request();
+        while self.client.answer(&self.endpoint)?.is_none() {
+            if monotonic_ns() > deadline_ns {
                 return Err(self.no_peer());
             }
-            wait_readable_until(&self.endpoint, patience)?;
+            wait_readable_until(&self.endpoint, deadline_ns)?;
         }
         Ok(())
     }
@@ -108,22 +94,26 @@ impl Lockstep {
     }
 }
 
-impl Bus for Lockstep {
+impl Bus for LockstepBus {
     fn now_ns(&self) -> u64 {
         self.now_ns
     }
 
     fn send(&mut self, frame: &CanFrame) -> Result<(), BusError> {
-        self.asking.hand_over(frame, self.now_ns)
+        self.client.queue_frame(frame, self.now_ns)
     }
 
     fn receive_until(&mut self, until_ns: u64) -> Result<Option<Event>, BusError> {
-        self.receive_ahead(until_ns, 0)
+        self.receive_with_lookahead(until_ns, 0)
     }
 
-    fn receive_ahead(&mut self, until_ns: u64, frames: u32) -> Result<Option<Event>, BusError> {
+    fn receive_with_lookahead(
+        &mut self,
+        until_ns: u64,
+        frames: u32,
+    ) -> Result<Option<Event>, BusError> {
         loop {
-            match self.asking.next(until_ns) {
+            match self.client.next(until_ns) {
                 Next::Event(entry) => {
                     self.now_ns = entry.time_ns;
                     return Ok(Some(entry.event));
@@ -132,8 +122,8 @@ impl Bus for Lockstep {
                     self.now_ns = time_ns;
                     return Ok(None);
                 }
-                Next::Ask => {
-                    self.asking.ask(until_ns, frames);
+                Next::NeedRequest => {
+                    self.client.prepare_request(until_ns, frames);
                     self.exchange()?;
                 }
             }
@@ -141,36 +131,36 @@ impl Bus for Lockstep {
     }
 }
 
-/// The arm's side of a [`Lockstep`].
+/// The arm's side of a [`LockstepBus`].
 #[derive(Debug)]
-pub struct Responder {
+pub struct LockstepResponder {
     endpoint: Endpoint,
 }
 
-impl Responder {
+impl LockstepResponder {
     /// Opens the arm's side in a folder.
     ///
     /// # Errors
-    /// Where the folder is not the owner's alone, or another process is the arm.
-    pub fn open(folder: &OwnerFolder) -> Result<Responder, BusError> {
+    /// If the folder is not accessible only to its owner, or another process is the arm.
+    pub fn open(folder: &OwnerFolder) -> Result<LockstepResponder, BusError> {
         let (own, peer) = Side::Arm.sockets();
-        Ok(Responder {
+        Ok(LockstepResponder {
             endpoint: Endpoint::new(folder, own, peer)?,
         })
     }
 
-    /// Serves one question of the host; `false` if none came within `idle_ns` of the machine's time.
+    /// Serves one request of the host; `false` if none arrived within `idle_ns` of real time.
     ///
     /// # Errors
-    /// Where the socket fails. A host that has gone is none: another may come.
+    /// If the socket fails. A missing host is not an error; another may connect.
     pub fn serve(&mut self, peer: &mut impl Peer, idle_ns: u64) -> Result<bool, BusError> {
-        let mut bytes = [0; LONGEST_BYTES];
+        let mut bytes = [0; MAX_BYTES];
         let Some(length) = self.next(&mut bytes, idle_ns)? else {
             return Ok(false);
         };
         let message = Message::parse(&bytes[..length]);
-        if let Some(question) = message.filter(|m| m.kind == Kind::RunUntil)
-            && let Some(answer) = Asked::new(question).run(peer, u64::MAX)
+        if let Some(request) = message.filter(|m| m.kind == Kind::RunUntil)
+            && let Some(answer) = LockstepServer::new(request).run(peer, u64::MAX)
         {
             self.endpoint.send(answer.emit(&mut bytes))?;
         }
@@ -186,7 +176,7 @@ impl Responder {
     }
 }
 
-impl AsFd for Responder {
+impl AsFd for LockstepResponder {
     fn as_fd(&self) -> BorrowedFd<'_> {
         self.endpoint.as_fd()
     }

@@ -1,15 +1,15 @@
-//! What each injected fault does to frames, in virtual time.
+//! Effect of each injected fault on frames, in virtual time.
 
 use std::collections::VecDeque;
-use supple_bus::virtual_time::{Direct, Peer};
+use supple_bus::virtual_time::{DirectBus, Peer};
 use supple_bus::{Bus, BusFault, Event, FaultInjector, FaultKind, FaultRule, Traffic};
 use supple_puck::{CanFrame, MessageId};
 
-/// Keeps what the host sends; frames for the host are scripted.
+/// Records the frames of the host; frames for the host are scripted.
 #[derive(Default)]
 struct Script {
     now_ns: u64,
-    heard: Vec<(u64, CanFrame)>,
+    received: Vec<(u64, CanFrame)>,
     events: VecDeque<(u64, Event)>,
 }
 
@@ -19,7 +19,7 @@ impl Peer for Script {
     }
 
     fn host_sends(&mut self, frame: &CanFrame) {
-        self.heard.push((self.now_ns, *frame));
+        self.received.push((self.now_ns, *frame));
         self.events.push_front((self.now_ns, Event::Sent(*frame)));
     }
 
@@ -43,13 +43,13 @@ fn frame(id: u32, payload: &[u8]) -> CanFrame {
 }
 
 /// Frames for the host at 10, 20, 30 and 40 ns.
-fn scripted(rule: FaultRule) -> FaultInjector<Direct<Script>> {
+fn scripted(rule: FaultRule) -> FaultInjector<DirectBus<Script>> {
     let events = (1..=4u8).map(|i| (u64::from(i) * 10, Event::Frame(frame(0x423, &[0, 0, i]))));
     let script = Script {
         events: events.collect(),
         ..Script::default()
     };
-    let mut bus = FaultInjector::new(Direct(script), 7);
+    let mut bus = FaultInjector::new(DirectBus(script), 7);
     bus.add(rule);
     bus
 }
@@ -71,7 +71,7 @@ fn third_only(kind: FaultKind) -> FaultRule {
 }
 
 #[test]
-fn received_frames_are_lost_late_doubled_or_overtaken() {
+fn received_frames_are_lost_delayed_duplicated_or_reordered() {
     let outcomes = [
         (FaultKind::Loss, vec![(1, 10), (2, 20), (4, 40)]),
         (FaultKind::SilentLoss, vec![(1, 10), (2, 20), (4, 40)]),
@@ -87,7 +87,7 @@ fn received_frames_are_lost_late_doubled_or_overtaken() {
             FaultKind::Reorder(50),
             vec![(1, 10), (2, 20), (4, 40), (3, 40)],
         ),
-        // No frame follows in time: late, not lost.
+        // No frame follows in time: it is delayed, not lost.
         (
             FaultKind::Reorder(5),
             vec![(1, 10), (2, 20), (3, 35), (4, 40)],
@@ -122,29 +122,29 @@ fn corruption_inverts_one_bit() {
 #[test]
 fn a_lost_frame_is_confirmed_and_a_silently_lost_one_is_not() {
     for (kind, confirmed) in [(FaultKind::Loss, true), (FaultKind::SilentLoss, false)] {
-        let mut bus = FaultInjector::new(Direct(Script::default()), 1);
+        let mut bus = FaultInjector::new(DirectBus(Script::default()), 1);
         bus.add(FaultRule::always(Traffic::Sent, kind));
         let sent = frame(0x401, &[0xaa; 8]);
         bus.send(&sent).unwrap();
         let event = bus.receive_until(50).unwrap();
         assert_eq!(event, confirmed.then_some(Event::Sent(sent)));
-        assert_eq!(bus.inner().0.heard, []);
+        assert_eq!(bus.inner().0.received, []);
     }
 }
 
 #[test]
-fn a_late_frame_is_confirmed_when_it_leaves() {
-    let mut bus = FaultInjector::new(Direct(Script::default()), 1);
+fn a_delayed_frame_is_confirmed_when_it_is_sent() {
+    let mut bus = FaultInjector::new(DirectBus(Script::default()), 1);
     bus.add(FaultRule::always(Traffic::Sent, FaultKind::Delay(30)));
     let sent = frame(0x401, &[0xaa; 8]);
     bus.send(&sent).unwrap();
     assert_eq!(bus.receive_until(29).unwrap(), None);
     assert_eq!(bus.receive_until(100).unwrap(), Some(Event::Sent(sent)));
-    assert_eq!(bus.inner().0.heard, [(30, sent)]);
+    assert_eq!(bus.inner().0.received, [(30, sent)]);
 }
 
 #[test]
-fn off_the_bus_nothing_passes_and_both_edges_are_told() {
+fn bus_off_blocks_all_frames_and_reports_start_and_end() {
     let mut bus = scripted(FaultRule::always(Traffic::Sent, FaultKind::BusOff).within(15, 35));
     let mut events = Vec::new();
     while let Some(event) = bus.receive_until(100).unwrap() {
@@ -163,41 +163,45 @@ fn off_the_bus_nothing_passes_and_both_edges_are_told() {
             (40, arrived(4)),
         ]
     );
-    assert_eq!(bus.inner().0.heard, []);
+    assert_eq!(bus.inner().0.received, []);
 }
 
 #[test]
-fn rules_touch_only_their_frames() {
-    let mut bus = FaultInjector::new(Direct(Script::default()), 1);
+fn rules_affect_only_their_frames() {
+    let mut bus = FaultInjector::new(DirectBus(Script::default()), 1);
     let torques = |id: MessageId| id.raw() == 0x401;
     bus.add(FaultRule::always(Traffic::Sent, FaultKind::SilentLoss).only(torques));
     bus.send(&frame(0x401, &[0xaa; 8])).unwrap();
     bus.send(&frame(0x404, &[0x30])).unwrap();
-    let heard: Vec<_> = bus
+    let received: Vec<_> = bus
         .inner()
         .0
-        .heard
+        .received
         .iter()
         .map(|(_, f)| f.id().raw())
         .collect();
-    assert_eq!(heard, [0x404]);
+    assert_eq!(received, [0x404]);
 }
 
 #[test]
-fn chance_follows_the_probability_and_repeats_with_the_seed() {
+fn losses_follow_the_probability_and_repeat_with_the_seed() {
     let lost = |seed| {
-        let mut bus = FaultInjector::new(Direct(Script::default()), seed);
+        let mut bus = FaultInjector::new(DirectBus(Script::default()), seed);
         let rule = FaultRule::always(Traffic::Sent, FaultKind::SilentLoss);
         bus.add(rule.with_probability(0.25));
         for i in 0..4000u32 {
             bus.send(&frame(0x401, &i.to_le_bytes())).unwrap();
         }
-        let heard: Vec<_> = bus.inner().0.heard.iter().map(|(_, f)| *f).collect();
-        heard
+        let received: Vec<_> = bus.inner().0.received.iter().map(|(_, f)| *f).collect();
+        received
     };
-    let heard = lost(3);
+    let received = lost(3);
     // Four standard deviations of the binomial: 4 sqrt(4000 0.25 0.75) = 110.
-    assert!((2890..=3110).contains(&heard.len()), "{}", heard.len());
-    assert_eq!(heard, lost(3));
-    assert_ne!(heard, lost(4));
+    assert!(
+        (2890..=3110).contains(&received.len()),
+        "{}",
+        received.len()
+    );
+    assert_eq!(received, lost(3));
+    assert_ne!(received, lost(4));
 }

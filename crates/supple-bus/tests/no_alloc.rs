@@ -3,7 +3,7 @@
 #[path = "../../../tests/support/counting.rs"]
 mod counting;
 
-use counting::counted;
+use counting::count_allocations;
 use supple_bus::{Bus, DatagramBus, Event, FaultInjector, FaultKind, FaultRule};
 use supple_bus::{OwnerFolder, Side, Traffic};
 use supple_puck::CanFrame;
@@ -26,10 +26,10 @@ fn a_thousand_exchanges_allocate_nothing() {
         assert_eq!(arm.receive_until(0).unwrap(), Some(Event::Sent(reply)));
         assert_eq!(host.receive_until(0).unwrap(), Some(Event::Sent(request)));
         assert_eq!(host.receive_until(0).unwrap(), Some(Event::Frame(reply)));
-        // And a wait in vain.
+        // And a wait that times out.
         let soon_ns = host.now_ns() + 1_000;
         assert_eq!(host.receive_until(soon_ns).unwrap(), None);
     };
     exchange();
-    assert_eq!(counted(|| (0..1000).for_each(|_| exchange())), 0);
+    assert_eq!(count_allocations(|| (0..1000).for_each(|_| exchange())), 0);
 }

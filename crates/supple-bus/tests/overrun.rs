@@ -1,25 +1,25 @@
-//! Frames that are not read in time, on a CAN interface of the kernel: lost, but neither silently nor
-//! uncounted. `./ci.sh socketcan` has such an interface.
+//! Frames that are not read in time from a CAN interface of the kernel are lost, but reported and counted.
+//! `./ci.sh socketcan` provides such an interface.
 
 use supple_bus::{Bus, BusError, BusFault, Event, SocketCan};
 use supple_puck::CanFrame;
 
-/// More than any receive buffer that was asked for holds.
+/// More frames than the requested receive buffer holds.
 const FLOOD: u64 = 20_000;
-/// A queue that is full empties within this \[ns\].
-const PATIENCE_NS: u64 = 1_000_000_000;
+/// Time within which a full queue empties \[ns\].
+const ANSWER_TIMEOUT_NS: u64 = 1_000_000_000;
 
 fn send(bus: &mut SocketCan, number: u64) {
     let frame = CanFrame::from_raw(0x123, &number.to_le_bytes()).unwrap();
-    let until_ns = bus.now_ns() + PATIENCE_NS;
+    let until_ns = bus.now_ns() + ANSWER_TIMEOUT_NS;
     while let Err(error) = bus.send(&frame) {
         assert!(matches!(error, BusError::Full), "{error}");
-        assert!(bus.now_ns() < until_ns, "the queue stays full");
+        assert!(bus.now_ns() < until_ns, "the queue remains full");
     }
     while bus.receive_until(0).unwrap().is_some() {}
 }
 
-/// Frames and gaps in what there is to read.
+/// Numbers of frames and gaps that can be read.
 fn read(bus: &mut SocketCan) -> (u64, u64) {
     let (mut frames, mut gaps) = (0, 0);
     while let Some(event) = bus.receive_until(0).unwrap() {
@@ -33,7 +33,7 @@ fn read(bus: &mut SocketCan) -> (u64, u64) {
 }
 
 #[test]
-fn lost_frames_are_told_and_counted() {
+fn lost_frames_are_reported_and_counted() {
     let Ok(interface) = std::env::var("SUPPLE_CAN_INTERFACE") else {
         eprintln!("skipped: SUPPLE_CAN_INTERFACE is not set; ./ci.sh socketcan has one");
         return;
@@ -45,7 +45,7 @@ fn lost_frames_are_told_and_counted() {
     (1..=FLOOD).for_each(|number| send(&mut sender, number));
     let (mut frames, mut gaps) = read(&mut reader);
     assert!(frames < FLOOD, "nothing was lost");
-    // What was lost last is told with whatever comes next.
+    // The last loss is reported with the next frame.
     for number in 1..=2 {
         send(&mut sender, FLOOD + number);
         let (more_frames, more_gaps) = read(&mut reader);
@@ -53,7 +53,7 @@ fn lost_frames_are_told_and_counted() {
     }
     assert!(gaps > 0);
     assert_eq!(frames + reader.lost(), FLOOD + 2);
-    // And once it reads in time again, no more.
+    // After that, with timely reads, there are no further losses.
     let lost = reader.lost();
     send(&mut sender, 0);
     assert_eq!(read(&mut reader), (1, 0));

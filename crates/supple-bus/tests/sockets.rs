@@ -1,7 +1,7 @@
-//! Sockets and folders: whose they are, and what happens when the other side is not there.
+//! Sockets and folders: ownership, and behaviour without the other side.
 
 use std::os::unix::fs::PermissionsExt;
-use supple_bus::virtual_time::Lockstep;
+use supple_bus::virtual_time::LockstepBus;
 use supple_bus::{Bus, BusError, BusFault, DatagramBus, Event, OwnerFolder, Side, SocketCan};
 use supple_puck::CanFrame;
 
@@ -10,7 +10,7 @@ fn mode(path: &std::path::Path) -> u32 {
 }
 
 #[test]
-fn folder_and_sockets_are_the_owners_alone() {
+fn folder_and_sockets_are_accessible_only_to_the_owner() {
     let temporary = tempfile::tempdir().unwrap();
     let folder = OwnerFolder::open(temporary.path().join("a/b")).unwrap();
     let _bus = DatagramBus::open(&folder, Side::Host).unwrap();
@@ -19,7 +19,7 @@ fn folder_and_sockets_are_the_owners_alone() {
 }
 
 #[test]
-fn a_folder_open_to_others_is_refused() {
+fn a_folder_open_to_others_is_rejected() {
     let temporary = tempfile::tempdir().unwrap();
     let path = temporary.path().join("open");
     std::fs::create_dir(&path).unwrap();
@@ -33,16 +33,19 @@ fn a_folder_open_to_others_is_refused() {
     let real = OwnerFolder::open(temporary.path().join("real")).unwrap();
     std::os::unix::fs::symlink(real.path(), &link).unwrap();
     let error = OwnerFolder::open(&link).unwrap_err().to_string();
-    assert!(error.contains("is not a folder"), "{error}");
+    assert!(error.contains("is a link or no folder"), "{error}");
 }
 
 #[test]
-fn a_side_has_one_process_and_outlives_its_end() {
+fn a_side_belongs_to_one_process_and_can_be_reopened() {
     let temporary = tempfile::tempdir().unwrap();
     let folder = OwnerFolder::open(temporary.path().join("bus")).unwrap();
     let first = DatagramBus::open(&folder, Side::Host).unwrap();
     let second = DatagramBus::open(&folder, Side::Host);
-    assert!(matches!(second, Err(BusError::Taken { .. })), "{second:?}");
+    assert!(
+        matches!(second, Err(BusError::SocketInUse { .. })),
+        "{second:?}"
+    );
     drop(first);
     DatagramBus::open(&folder, Side::Host).unwrap();
 }
@@ -51,13 +54,13 @@ fn a_side_has_one_process_and_outlives_its_end() {
 fn a_socket_left_behind_is_replaced() {
     let temporary = tempfile::tempdir().unwrap();
     let folder = OwnerFolder::open(temporary.path().join("bus")).unwrap();
-    // As a process that was killed leaves it: bound, and nobody listens.
+    // As a killed process leaves it: bound, without a listener.
     drop(std::os::unix::net::UnixDatagram::bind(folder.path().join("host.can")).unwrap());
     DatagramBus::open(&folder, Side::Host).unwrap();
 }
 
 #[test]
-fn without_a_peer_nobody_acknowledges_and_a_peer_may_come_later() {
+fn frames_are_not_acknowledged_until_a_peer_connects() {
     let temporary = tempfile::tempdir().unwrap();
     let folder = OwnerFolder::open(temporary.path().join("bus")).unwrap();
     let mut host = DatagramBus::open(&folder, Side::Host).unwrap();
@@ -75,7 +78,7 @@ fn without_a_peer_nobody_acknowledges_and_a_peer_may_come_later() {
     assert_eq!(event, Some(Event::Fault(BusFault::NoAcknowledge)));
 }
 
-/// The arm stops reading: the queue fills, and that is said.
+/// If the arm stops reading, the queue fills, which is an error.
 #[test]
 fn a_full_queue_is_an_error_and_nothing_is_confirmed() {
     let temporary = tempfile::tempdir().unwrap();
@@ -101,7 +104,7 @@ fn a_full_queue_is_an_error_and_nothing_is_confirmed() {
 }
 
 #[test]
-fn error_frames_cross_as_faults() {
+fn error_frames_arrive_as_faults() {
     let temporary = tempfile::tempdir().unwrap();
     let folder = OwnerFolder::open(temporary.path().join("bus")).unwrap();
     let mut host = DatagramBus::open(&folder, Side::Host).unwrap();
@@ -124,15 +127,15 @@ fn error_frames_cross_as_faults() {
 }
 
 #[test]
-fn virtual_time_needs_its_arm() {
+fn virtual_time_requires_a_running_arm() {
     let temporary = tempfile::tempdir().unwrap();
     let folder = OwnerFolder::open(temporary.path().join("bus")).unwrap();
-    let error = Lockstep::open(&folder).unwrap_err();
+    let error = LockstepBus::open(&folder).unwrap_err();
     assert!(matches!(error, BusError::NoPeer { .. }), "{error}");
 }
 
 #[test]
-fn an_interface_that_is_not_there_is_named_with_a_remedy() {
+fn a_missing_interface_is_named_with_a_remedy() {
     let error = SocketCan::open("no_such_can").unwrap_err().to_string();
     assert!(error.contains("`no_such_can`"), "{error}");
     assert!(

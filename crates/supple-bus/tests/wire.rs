@@ -1,4 +1,4 @@
-//! `struct can_frame`: every frame survives it, and no sixteen bytes can break its reader.
+//! `struct can_frame`: every frame round-trips, and the parser accepts any sixteen bytes without a panic.
 
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -13,31 +13,31 @@ proptest! {
     })]
 
     #[test]
-    fn a_data_frame_survives(id in 0u32..0x800, payload in proptest::collection::vec(any::<u8>(), 0..=8)) {
+    fn data_frames_round_trip(id in 0u32..0x800, payload in proptest::collection::vec(any::<u8>(), 0..=8)) {
         let frame = CanFrame::from_raw(id, &payload).unwrap();
         prop_assert_eq!(WireFrame::parse(&WireFrame::data(&frame)), WireFrame::Data(frame));
     }
 
     #[test]
-    fn what_is_read_as_data_is_written_the_same(raw in any::<[u8; 16]>()) {
+    fn parsed_data_frames_are_re_encoded_identically(raw in any::<[u8; 16]>()) {
         if let WireFrame::Data(frame) = WireFrame::parse(&raw) {
             prop_assert_eq!(WireFrame::parse(&WireFrame::data(&frame)), WireFrame::Data(frame));
         }
     }
 
-    /// Extended ids and remote requests have no place on this bus.
+    /// Extended ids and remote requests are not supported on this bus.
     #[test]
-    fn flagged_ids_are_foreign(id in 0u32..0x800, remote in any::<bool>()) {
+    fn flagged_ids_are_unsupported(id in 0u32..0x800, remote in any::<bool>()) {
         let flag = if remote { 0x4000_0000 } else { 0x8000_0000u32 };
         let mut raw = [0; 16];
         raw[..4].copy_from_slice(&(id | flag).to_ne_bytes());
-        prop_assert_eq!(WireFrame::parse(&raw), WireFrame::Foreign);
+        prop_assert_eq!(WireFrame::parse(&raw), WireFrame::Unsupported);
     }
 }
 
 /// Layout and numbers of `linux/can.h` and `linux/can/error.h`.
 #[test]
-fn layout_is_the_kernels() {
+fn layout_matches_the_kernel() {
     let frame = CanFrame::from_raw(0x423, &[0x00, 0x10, 0x00]).unwrap();
     let mut expected = [0; 16];
     expected[..4].copy_from_slice(&0x423u32.to_ne_bytes());
@@ -59,10 +59,10 @@ fn layout_is_the_kernels() {
         (0x004, 0x01, BusFault::Overrun),
         (0x004, 0x08, BusFault::Warning),
         (0x004, 0x20, BusFault::Passive),
-        // Of several the worst: off the bus after nobody acknowledged.
+        // The most severe of several: bus-off over a missing acknowledgement.
         (0x060, 0, BusFault::BusOff),
     ] {
         assert_eq!(error(class, controller), WireFrame::Fault(fault));
     }
-    assert_eq!(error(0, 0), WireFrame::Foreign);
+    assert_eq!(error(0, 0), WireFrame::Unsupported);
 }

@@ -1,21 +1,22 @@
-//! The cycle: positions in, torques out, once a period.
+//! The polling cycle: positions in, torques out, once per period.
 //!
 //! ```text
 //! 0  request positions -> collect replies -> motors to joints -> publish -> wait for the answer
-//!    -> guard -> joints to motors -> torque frames -> a further poll, if it fits -> drain until the
-//!    next period: every frame of the cycle has to have left by then
+//!    -> guard -> joints to motors -> torque frames -> an auxiliary poll, if it fits -> drain until the
+//!    next period: every frame of the cycle must be sent by then
 //! ```
 //!
-//! It computes no torques. A cycle allocates nothing, locks nothing and logs nothing.
+//! It computes no torques. A cycle allocates no memory, takes no lock and writes no log.
 
 use crate::bus_time::BusTime;
 use crate::error::CanError;
-use crate::guard::{Action, Guard, Loss, Seen, Torque};
+use crate::guard::{Action, GuardInput, LossReason, SafeActionMachine, Stage, Torque};
 use crate::link::{ArmReport, Command, Counters, Drives, Link};
-use crate::outbox::Outbox;
 use crate::sensor::Readings;
 use crate::start_up::Ready;
+use crate::unconfirmed::UnconfirmedFrames;
 use supple_bus::{Bus, BusError, BusFault, Event};
+use supple_core::controller::Mode;
 use supple_core::drive_guard::DriveGuard;
 use supple_core::dynamics::tip_pose;
 use supple_core::{Arm, Config, Vector};
@@ -28,19 +29,19 @@ use supple_puck::{
     Value,
 };
 
-/// How often the further polls come round, in cycles of the bus's time \[ns\].
-const FURTHER_NS: u64 = 10_000_000;
+/// Period in which every auxiliary poll is sent once, in bus time \[ns\].
+const AUXILIARY_POLL_PERIOD_NS: u64 = 10_000_000;
 
-/// What the cycle is told before it begins.
+/// Configuration of the cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Rhythm {
+pub struct CycleConfig {
     /// Period \[ns\].
     pub period_ns: u64,
-    /// Time kept for the controller's answer when the period is checked \[ns\].
+    /// Time reserved for the controller's answer \[ns\].
     pub answer_ns: u64,
 }
 
-/// Ids that the cycle uses.
+/// Property ids that the cycle uses.
 #[derive(Clone, Copy, Debug)]
 struct Ids {
     position: PropertyId,
@@ -50,36 +51,38 @@ struct Ids {
     pendant: PropertyId,
 }
 
-/// A further poll.
+/// An auxiliary poll.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Further {
+enum AuxiliaryPoll {
     Mode,
     Pendant,
     Sensor,
 }
 
-/// The arm in service.
+/// The polling cycle of a running arm.
 pub struct Cycle<const N: usize, B, L> {
     bus: B,
     link: L,
     ready: Ready<N>,
     arm: Arm<N>,
     ids: Ids,
-    rhythm: Rhythm,
+    cycle_config: CycleConfig,
     time: BusTime,
-    guard: Guard,
-    drives: DriveGuard<N>,
+    guard: SafeActionMachine,
+    drive_guard: DriveGuard<N>,
     cycle: u64,
+    /// Cycle of the last angles that the drive guard observed.
+    observed_cycle: Option<u64>,
     next_ns: u64,
     counts: [Option<Counts>; N],
-    /// Joint angles when all were known last.
-    pose: Vector<N>,
+    /// Last joint angles for which all encoders replied \[rad\].
+    last_pose_rad: Vector<N>,
     readings: Readings,
     module: Option<(SafetyMode, u64)>,
     pendant: Option<Pendant>,
-    outbox: Outbox,
-    further: Further,
-    further_due_ns: u64,
+    unconfirmed: UnconfirmedFrames,
+    auxiliary_poll: AuxiliaryPoll,
+    auxiliary_due_ns: u64,
     sent_request: bool,
     unsent: bool,
     bus_off: bool,
@@ -90,22 +93,22 @@ pub struct Cycle<const N: usize, B, L> {
 }
 
 impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
-    /// Takes an arm that is ready into service.
+    /// Starts the cycle of an arm that has completed start-up.
     ///
     /// # Errors
-    /// [`CanError::Overload`] for a period that the bus does not carry; a firmware that lacks a property.
+    /// [`CanError::Overload`] if the period exceeds the bus bandwidth; an error if a firmware lacks a property.
     pub fn new(
         bus: B,
         link: L,
         ready: Ready<N>,
         config: &Config<N>,
-        rhythm: Rhythm,
+        cycle_config: CycleConfig,
     ) -> Result<Cycle<N, B, L>, CanError> {
         let joint_encoders = ready.pucks.iter().filter(|p| p.joint_encoder).count();
-        let time = BusTime::new(N, joint_encoders, ready.sensor, rhythm.answer_ns);
-        time.check(rhythm.period_ns)?;
+        let time = BusTime::new(N, joint_encoders, ready.sensor, cycle_config.answer_ns);
+        time.check(cycle_config.period_ns)?;
         let motor = ready.pucks[0];
-        let listed = |table: supple_puck::PropertyTable, node: NodeId, property: Property| {
+        let property_id = |table: supple_puck::PropertyTable, node: NodeId, property: Property| {
             table.id(property).ok_or(CanError::Property {
                 node: node.number(),
                 version: motor.version,
@@ -115,9 +118,9 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
         let ids = Ids {
             position: motor.position,
             torque: motor.torque,
-            motor_mode: listed(motor.table, motor.node, Property::MODE)?,
-            module_mode: listed(ready.module, NodeId::SAFETY, Property::MODE)?,
-            pendant: listed(ready.module, NodeId::SAFETY, Property::PEN)?,
+            motor_mode: property_id(motor.table, motor.node, Property::MODE)?,
+            module_mode: property_id(ready.module, NodeId::SAFETY, Property::MODE)?,
+            pendant: property_id(ready.module, NodeId::SAFETY, Property::PEN)?,
         };
         let next_ns = bus.now_ns();
         Ok(Cycle {
@@ -125,21 +128,22 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
             link,
             ready,
             arm: config.arm,
-            drives: DriveGuard::new(config),
+            drive_guard: DriveGuard::new(config),
             ids,
-            rhythm,
+            cycle_config,
             time,
-            guard: Guard::new(),
+            guard: SafeActionMachine::new(),
             cycle: 0,
+            observed_cycle: None,
             next_ns,
             counts: [None; N],
-            pose: Vector::zeros(),
+            last_pose_rad: Vector::zeros(),
             readings: Readings::default(),
             module: None,
             pendant: None,
-            outbox: Outbox::default(),
-            further: Further::Mode,
-            further_due_ns: next_ns,
+            unconfirmed: UnconfirmedFrames::default(),
+            auxiliary_poll: AuxiliaryPoll::Mode,
+            auxiliary_due_ns: next_ns,
             sent_request: false,
             unsent: false,
             bus_off: false,
@@ -150,22 +154,22 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
         })
     }
 
-    /// From now on the motors are to be lowered: the program is about to end.
-    pub fn leave(&mut self) {
+    /// Requests idle motors from this call on, because the program is about to end.
+    pub fn begin_shutdown(&mut self) {
         self.leaving = true;
     }
 
-    /// How it fares.
+    /// Counters of the cycle.
     pub fn counters(&self) -> &Counters {
         &self.counters
     }
 
-    /// The safe action and its reasons.
-    pub fn guard(&self) -> &Guard {
+    /// State machine of the safe action.
+    pub fn guard(&self) -> &SafeActionMachine {
         &self.guard
     }
 
-    /// What the motors do, as far as the safety module has said.
+    /// State of the drives, from the last known mode of the safety module.
     pub fn drives(&self) -> Drives {
         match self.module {
             Some((SafetyMode::Active, _)) => Drives::Active,
@@ -174,12 +178,12 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
         }
     }
 
-    /// Some motor puck replied in the last cycle.
-    pub fn hears_motors(&self) -> bool {
+    /// Whether any motor puck replied in the last cycle.
+    pub fn motors_replied(&self) -> bool {
         self.counts.iter().any(Option::is_some)
     }
 
-    /// The pendant as it was last read.
+    /// Last known state of the pendant.
     pub fn pendant(&self) -> Option<&Pendant> {
         self.pendant.as_ref()
     }
@@ -199,96 +203,100 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
         &mut self.bus
     }
 
-    /// The way to the controller.
+    /// Link to the controller.
     pub fn link_mut(&mut self) -> &mut L {
         &mut self.link
     }
 
-    /// Bus, way to the controller and description of what is there, when service ends.
+    /// Returns the bus, the link to the controller and the start-up results after the last cycle.
     pub fn into_parts(self) -> (B, L, Ready<N>) {
         (self.bus, self.link, self.ready)
     }
 
-    /// One cycle, to the beginning of the next period.
+    /// Runs one cycle, up to the start of the next period.
     ///
     /// # Errors
-    /// Where the bus or the way to the controller is gone; faults on the bus are dealt with.
+    /// If the bus or the link to the controller fails. Faults on the bus are handled.
     pub fn run(&mut self) -> Result<Action, CanError> {
-        let start_ns = self.begin()?;
-        let missing = self.collect(start_ns)?;
+        let start_ns = self.start_period()?;
+        let missing = self.collect_positions(start_ns)?;
         let report = self.report(start_ns);
         let published_ns = self.bus.now_ns();
         self.link.publish(&report)?;
         let command = self.answer(start_ns, published_ns)?;
-        self.drives.observe(&report.position_rad);
+        let periods = report.cycle - self.observed_cycle.unwrap_or(report.cycle);
+        self.observed_cycle = Some(report.cycle);
+        self.drive_guard.observe(&report.position_rad, periods);
         let active = self.drives() == Drives::Active;
-        let judged = self
-            .drives
-            .judge(command.as_ref().map(Command::drive).as_ref(), active);
-        let seen = Seen {
+        let drive_guard_loss = self
+            .drive_guard
+            .check_command(command.as_ref().map(Command::drive).as_ref(), active);
+        let input = GuardInput {
             now_ns: self.bus.now_ns(),
             answer: command.map(|command| command.wants_torque),
-            judged: judged.err().map(Loss::from),
+            drive_guard_loss: drive_guard_loss.err().map(LossReason::from),
             missing,
             unsent: self.unsent,
             bus_off: self.bus_off,
             module: self.module,
             leaving: self.leaving,
         };
-        let action = self.guard.cycle(&seen);
-        self.act(&action, command.as_ref())?;
-        self.poll_further(&action)?;
+        let action = self.guard.cycle(&input);
+        self.send_torques(&action, command.as_ref())?;
+        self.poll_auxiliary(&action)?;
         self.drain()?;
         Ok(action)
     }
 
-    /// Takes up the period; one that is long past is passed over, its number with it, and so is one of which
-    /// too little is left for replies, answer and torques: motors that are not heard in it are not silent.
-    fn begin(&mut self) -> Result<u64, CanError> {
+    /// Starts the next period. Skips periods that are over, and one whose remaining time is too short for
+    /// replies, answer and torques; a skipped period does not count as missing replies.
+    fn start_period(&mut self) -> Result<u64, CanError> {
         let now_ns = self.bus.now_ns();
-        let period_ns = self.rhythm.period_ns;
+        let period_ns = self.cycle_config.period_ns;
         let late_ns = now_ns.saturating_sub(self.next_ns);
-        self.pass_over(late_ns / period_ns);
+        self.skip_periods(late_ns / period_ns);
         if late_ns % period_ns > self.time.slack_ns(period_ns) {
-            self.pass_over(1);
-            self.listen()?;
+            self.skip_periods(1);
+            self.receive_until_next_period()?;
         }
         self.counters.wake_ns = late_ns;
         self.counters.cycles += 1;
         self.counters.bus_load = self.bits as f64 * 1e3 / period_ns as f64;
         self.bits = 0;
-        self.counters.stood_still_ns = self.bus.stood_still_ns();
+        self.counters.clock_stall_ns = self.bus.clock_stall_ns();
         let start_ns = self.next_ns;
         self.next_ns += period_ns;
         Ok(start_ns)
     }
 
-    fn pass_over(&mut self, periods: u64) {
+    fn skip_periods(&mut self, periods: u64) {
         self.cycle += periods;
-        self.next_ns += periods * self.rhythm.period_ns;
+        self.next_ns += periods * self.cycle_config.period_ns;
         self.counters.skipped += periods;
     }
 
-    /// Asks for the positions and collects the replies; which motors did not reply to a request that left.
-    fn collect(&mut self, start_ns: u64) -> Result<u8, CanError> {
+    /// Requests the positions and collects the replies. Returns a bit mask of the motors that did not reply, if
+    /// the request was sent.
+    fn collect_positions(&mut self, start_ns: u64) -> Result<u8, CanError> {
         self.counts = [None; N];
         let request = get(GroupId::ARM, self.ids.position);
         self.send(&request)?;
         self.link.announce()?;
-        // Later than this the answer and the torques would not fit any more.
-        let reserved_ns = self.time.torques_ns + self.rhythm.answer_ns;
-        let until_ns = start_ns + self.rhythm.period_ns - reserved_ns;
+        // After this time the answer and the torques would not fit the period.
+        let reserved_ns = self.time.torques_ns + self.cycle_config.answer_ns;
+        let until_ns = start_ns + self.cycle_config.period_ns - reserved_ns;
         loop {
-            let waited_for = self.counts.iter().filter(|counts| counts.is_none()).count() as u32;
-            if waited_for == 0 {
+            let missing_replies =
+                self.counts.iter().filter(|counts| counts.is_none()).count() as u32;
+            if missing_replies == 0 {
                 break;
             }
-            let Some(event) = self.bus.receive_ahead(until_ns, waited_for)? else {
+            let Some(event) = self.bus.receive_with_lookahead(until_ns, missing_replies)? else {
                 break;
             };
-            self.hear(&event);
+            self.handle_event(&event);
         }
-        self.sent_request = !self.outbox.holds(&request);
+        self.sent_request = !self.unconfirmed.holds(&request);
         let mut missing = 0;
         for (index, counts) in self.counts.iter().enumerate() {
             if counts.is_none() {
@@ -302,10 +310,10 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
     fn report(&mut self, start_ns: u64) -> ArmReport<N> {
         let position_rad = self.ready.transmission.joint_rad(&self.counts);
         if position_rad.iter().all(Option::is_some) {
-            self.pose = Vector::from(position_rad.map(Option::unwrap_or_default));
+            self.last_pose_rad = Vector::from(position_rad.map(Option::unwrap_or_default));
         }
         let now_ns = self.bus.now_ns();
-        let base_from_tip = tip_pose(&self.arm, &self.pose).rotation;
+        let base_from_tip = tip_pose(&self.arm, &self.last_pose_rad).rotation;
         ArmReport {
             cycle: self.cycle,
             stamp_ns: self.bus.monotonic_ns(start_ns),
@@ -317,12 +325,12 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
     }
 
     fn answer(&mut self, start_ns: u64, published_ns: u64) -> Result<Option<Command<N>>, CanError> {
-        let until_ns = start_ns + self.rhythm.period_ns - self.time.torques_ns;
+        let until_ns = start_ns + self.cycle_config.period_ns - self.time.torques_ns;
         let wait_ns = until_ns.saturating_sub(self.bus.now_ns());
         let answer = self.link.answer(self.cycle, wait_ns)?;
         self.cycle += 1;
         self.counters.late_answers += answer.late;
-        // The last fallback acts instead of torques that are none.
+        // A command that is not finite counts as missing: the last fallback torque is applied.
         let command = answer.command.filter(Command::is_finite);
         self.counters.unusable += u64::from(answer.command.is_some() && command.is_none());
         match &command {
@@ -332,26 +340,36 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
             }
             None => {
                 self.counters.missed += u64::from(self.drives() == Drives::Active);
+                if self.guard.stage() == Stage::Resting {
+                    // The arm may move before the motors are activated, so the old fallback torque is not valid.
+                    self.fallback_nm = Vector::zeros();
+                }
                 self.counters.round_trip_ns = 0;
             }
         }
         Ok(command)
     }
 
-    /// Sends the torques, and lowers what is to be lowered.
-    fn act(&mut self, action: &Action, command: Option<&Command<N>>) -> Result<(), CanError> {
+    /// Sends the torques, and sets the safety module or the motors to idle if the action requires it.
+    fn send_torques(
+        &mut self,
+        action: &Action,
+        command: Option<&Command<N>>,
+    ) -> Result<(), CanError> {
         let (wanted_nm, stopping) = match (action.torque, command) {
             (Torque::Command, Some(command)) => (command.torque_nm, command.fault),
             (Torque::Fallback, _) => (self.fallback_nm, true),
             (Torque::Command | Torque::None, _) => (Vector::zeros(), true),
         };
         let torque_nm = if self.drives() == Drives::Active && action.torque != Torque::None {
-            self.drives.limited_nm(&wanted_nm, stopping)
+            self.drive_guard.limited_nm(&wanted_nm, stopping)
         } else {
-            self.drives.rest(&wanted_nm);
-            wanted_nm
+            // The motors become active some cycles before this program learns of it; until then send gravity
+            // compensation only, within the limits.
+            let holds = command.is_some_and(|command| command.mode == Some(Mode::GravityHold));
+            let ready_nm = if holds { wanted_nm } else { Vector::zeros() };
+            self.drive_guard.reset_rate_limit(&ready_nm)
         };
-        // Finite joint torques may be too large for a puck's number: those are not sent.
         let torques = self.ready.transmission.puck_torques(&torque_nm);
         let torques = torques.unwrap_or([PuckTorque::ZERO; N]);
         for (motors, group) in torques
@@ -376,72 +394,72 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
         Ok(())
     }
 
-    /// Asks for one thing more, by turns, if its replies fit before the next period. While the module is
-    /// being lowered its mode is all that is asked for.
-    fn poll_further(&mut self, action: &Action) -> Result<(), CanError> {
+    /// Sends one auxiliary poll in rotation, if its replies fit before the next period. While the safety module
+    /// is being switched to idle, polls only its mode.
+    fn poll_auxiliary(&mut self, action: &Action) -> Result<(), CanError> {
         let now_ns = self.bus.now_ns();
         let lowering = action.lower_module;
-        let fits = now_ns + self.time.torques_ns + self.time.further_ns <= self.next_ns;
-        // Replies that stay away leave no time in any cycle; then it comes all the same.
-        let overdue = now_ns >= self.further_due_ns + FURTHER_NS;
-        let due = fits && now_ns >= self.further_due_ns;
+        let fits = now_ns + self.time.torques_ns + self.time.auxiliary_poll_ns <= self.next_ns;
+        // Missing replies use up the time of every cycle; an overdue poll is sent anyway.
+        let overdue = now_ns >= self.auxiliary_due_ns + AUXILIARY_POLL_PERIOD_NS;
+        let due = fits && now_ns >= self.auxiliary_due_ns;
         if !due && !overdue && !lowering {
             return Ok(());
         }
-        let further = if lowering {
-            Further::Mode
+        let poll = if lowering {
+            AuxiliaryPoll::Mode
         } else {
-            self.further
+            self.auxiliary_poll
         };
-        let request = match further {
-            Further::Mode => get(NodeId::SAFETY, self.ids.module_mode),
-            Further::Pendant => get(NodeId::SAFETY, self.ids.pendant),
-            Further::Sensor => force_torque::request(),
+        let request = match poll {
+            AuxiliaryPoll::Mode => get(NodeId::SAFETY, self.ids.module_mode),
+            AuxiliaryPoll::Pendant => get(NodeId::SAFETY, self.ids.pendant),
+            AuxiliaryPoll::Sensor => force_torque::request(),
         };
         self.send(&request)?;
         if !lowering {
-            self.further = match (self.further, self.ready.sensor) {
-                (Further::Mode, true) => Further::Sensor,
-                (Further::Mode, false) | (Further::Sensor, _) => Further::Pendant,
-                (Further::Pendant, _) => Further::Mode,
+            self.auxiliary_poll = match (self.auxiliary_poll, self.ready.sensor) {
+                (AuxiliaryPoll::Mode, true) => AuxiliaryPoll::Sensor,
+                (AuxiliaryPoll::Mode, false) | (AuxiliaryPoll::Sensor, _) => AuxiliaryPoll::Pendant,
+                (AuxiliaryPoll::Pendant, _) => AuxiliaryPoll::Mode,
             };
             let polls = if self.ready.sensor { 3 } else { 2 };
-            self.further_due_ns = now_ns + FURTHER_NS / polls;
+            self.auxiliary_due_ns = now_ns + AUXILIARY_POLL_PERIOD_NS / polls;
         }
         Ok(())
     }
 
-    /// Hears what comes until the next period; what has not left by then is lost.
+    /// Receives events until the next period; frames not sent by then count as lost.
     fn drain(&mut self) -> Result<(), CanError> {
-        self.listen()?;
-        let lost = self.outbox.close();
+        self.receive_until_next_period()?;
+        let lost = self.unconfirmed.take_count();
         self.counters.tx_lost += lost;
         self.unsent = lost > 0;
         Ok(())
     }
 
-    /// Hears what comes until the next period, and says nothing.
-    fn listen(&mut self) -> Result<(), CanError> {
-        while let Some(event) = self.bus.receive_ahead(self.next_ns, u32::MAX)? {
-            self.hear(&event);
+    /// Receives events until the next period without sending.
+    fn receive_until_next_period(&mut self) -> Result<(), CanError> {
+        while let Some(event) = self.bus.receive_with_lookahead(self.next_ns, u32::MAX)? {
+            self.handle_event(&event);
         }
         Ok(())
     }
 
-    /// Hands a frame over. One that finds no room is lost, as one that does not leave.
+    /// Queues a frame for sending. If the transmit queue is full, the frame counts as lost.
     fn send(&mut self, frame: &CanFrame) -> Result<(), CanError> {
-        self.outbox.put(frame);
+        self.unconfirmed.add(frame);
         match self.bus.send(frame) {
             Ok(()) | Err(BusError::Full) => Ok(()),
             Err(error) => Err(error.into()),
         }
     }
 
-    fn hear(&mut self, event: &Event) {
+    fn handle_event(&mut self, event: &Event) {
         let now_ns = self.bus.now_ns();
         match event {
             Event::Sent(frame) => {
-                self.outbox.confirm(frame);
+                self.unconfirmed.confirm(frame);
                 self.bits += u64::from(bits(frame));
             }
             Event::Fault(BusFault::BusOff) => self.bus_off = true,
@@ -450,15 +468,15 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
             Event::Fault(_) => {}
             Event::Frame(frame) => {
                 self.bits += u64::from(bits(frame));
-                // A frame that cannot be read is one that did not come.
+                // A malformed frame counts as missing.
                 if let Ok((from, inbound)) = Inbound::parse(frame) {
-                    self.take(from, &inbound, now_ns);
+                    self.handle_frame(from, &inbound, now_ns);
                 }
             }
         }
     }
 
-    fn take(&mut self, from: NodeId, inbound: &Inbound, now_ns: u64) {
+    fn handle_frame(&mut self, from: NodeId, inbound: &Inbound, now_ns: u64) {
         match inbound {
             Inbound::Position(reply) => {
                 let index = usize::from(from.number()).wrapping_sub(1);
@@ -477,12 +495,12 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
                 }
             }
             Inbound::Sensor(reading) if from == NodeId::FORCE_TORQUE => {
-                self.readings.take(reading, now_ns);
+                self.readings.update(reading, now_ns);
             }
-            // The module speaks to the motors: its mode is about to be other than it was.
+            // The safety module sends the motors a mode change, so poll its mode next.
             Inbound::Other if from == NodeId::SAFETY => {
-                self.further = Further::Mode;
-                self.further_due_ns = now_ns;
+                self.auxiliary_poll = AuxiliaryPoll::Mode;
+                self.auxiliary_due_ns = now_ns;
             }
             Inbound::Reply(_) | Inbound::Sensor(_) | Inbound::Other => {}
         }

@@ -1,4 +1,4 @@
-//! Why the arm was not taken into service, and why service ended.
+//! Errors of start-up and operation.
 
 use crate::bus_time::Overload;
 use supple_bus::{BusError, BusFault};
@@ -9,22 +9,22 @@ use supple_puck::property::FirmwareTooOld;
 use supple_puck::safety::{SafetyLimitsError, SafetyMode};
 use supple_puck::torque::TorqueError;
 
-/// What keeps the arm from service. Each says what was found, what was expected, and what to do.
+/// Errors of start-up and operation. Each message gives the value found, the value expected, and the remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum CanError {
-    /// The bus itself.
+    /// Error of the bus itself.
     #[error(transparent)]
     Bus(#[from] BusError),
-    /// Something is wrong on the bus.
+    /// A fault on the bus.
     #[error("the bus failed: {0}")]
     BusFault(BusFault),
-    /// The rate that the bus does not carry.
+    /// The rate exceeds the bus bandwidth.
     #[error(transparent)]
     Overload(#[from] Overload),
-    /// The description of the arm.
+    /// Error in the description of the arm.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// An arm that this program does not drive.
+    /// An arm that is not a WAM with 4 or 7 joints.
     #[error(
         "arm `{arm}` has {found} moving joints, a WAM has 4 or 7 motor pucks: give such an arm"
     )]
@@ -34,9 +34,9 @@ pub enum CanError {
         /// Joints found.
         found: usize,
     },
-    /// A description without what the pucks are compared with.
-    #[error("arm `{arm}`: [motors] {key} is missing: give it, the pucks are checked against it")]
-    Described {
+    /// The description lacks a value that the pucks are checked against.
+    #[error("arm `{arm}`: [motors] {key} is missing: add it, the pucks are checked against it")]
+    MissingKey {
         /// Name of the arm.
         arm: String,
         /// Key of the TOML.
@@ -45,61 +45,61 @@ pub enum CanError {
     /// A node that does not answer.
     #[error("{what} (node {node}) does not answer: {remedy}")]
     Missing {
-        /// What it is.
+        /// Kind of node.
         what: &'static str,
-        /// Its number.
+        /// Number of the node.
         node: u8,
-        /// What to do.
+        /// Remedy.
         remedy: &'static str,
     },
     /// More motors than joints.
     #[error(
-        "motor puck {node} answers, but arm `{arm}` has {joints} joints: give the arm that is there"
+        "motor puck {node} answers, but arm `{arm}` has {joints} joints: select the connected arm with --arm"
     )]
-    Surplus {
-        /// Its number.
+    UnexpectedMotor {
+        /// Number of the node.
         node: u8,
         /// Name of the arm.
         arm: String,
         /// Joints of the arm.
         joints: usize,
     },
-    /// A puck that is something else.
+    /// A puck with another role.
     #[error(
         "node {node} has role {role:#06x}, expected {expected}: check that the arm is wired as described"
     )]
     Role {
-        /// Its number.
+        /// Number of the node.
         node: u8,
         /// Role found.
         role: u16,
-        /// What was expected.
+        /// Expected role.
         expected: &'static str,
     },
-    /// A firmware without a list of ids.
+    /// A firmware without a known list of ids.
     #[error("node {node}: {source}; update it")]
     Firmware {
-        /// Its number.
+        /// Number of the node.
         node: u8,
-        /// Version found and least version.
+        /// Version found and minimum version.
         source: FirmwareTooOld,
     },
     /// A firmware that lacks a property.
     #[error("firmware {version} of node {node} has no property {property}: update it")]
     Property {
-        /// Its number.
+        /// Number of the node.
         node: u8,
         /// Version found.
         version: i32,
         /// Property.
         property: Property,
     },
-    /// Pucks that share a torque frame but not the id of the torque.
+    /// Pucks of one torque frame with different torque ids.
     #[error(
         "node {node} has torque at id {found}, its group at {expected}: give all pucks of a group one firmware"
     )]
-    Mixed {
-        /// Its number.
+    MixedTorqueIds {
+        /// Number of the node.
         node: u8,
         /// Id found.
         found: u8,
@@ -108,17 +108,17 @@ pub enum CanError {
     },
     /// A puck that does not wake up.
     #[error("motor puck {node} stays at STAT {stat} after the wake-up: switch the arm off and on")]
-    Asleep {
-        /// Its number.
+    NotAwake {
+        /// Number of the node.
         node: u8,
         /// Value found.
         stat: i32,
     },
-    /// A value that was set and is not there.
+    /// A setting that was not applied.
     #[error(
         "{property} of node {node} is {found} after it was set to {expected}: switch the arm off and on"
     )]
-    NotTaken {
+    SettingIgnored {
         /// Property.
         property: Property,
         /// Node.
@@ -130,7 +130,7 @@ pub enum CanError {
     },
     /// A puck that contradicts the description.
     #[error(
-        "{property} of motor puck {node} is {found}, the arm's {key} means {expected}: correct the TOML or the puck"
+        "{property} of motor puck {node} is {found}, the arm's {key} requires {expected}: correct the TOML or the puck"
     )]
     Contradiction {
         /// Property.
@@ -141,14 +141,14 @@ pub enum CanError {
         found: i32,
         /// Key of the TOML.
         key: &'static str,
-        /// What the description says.
+        /// Value of the description.
         expected: f64,
     },
-    /// A hot puck.
+    /// A puck above its temperature limit.
     #[error(
         "motor puck {node} is at {found} degrees Celsius, its limit is {limit}: let it cool down"
     )]
-    Hot {
+    OverTemperature {
         /// Node.
         node: u8,
         /// Temperature.
@@ -156,29 +156,29 @@ pub enum CanError {
         /// Limit.
         limit: i32,
     },
-    /// Encoder of no counts.
+    /// Invalid number of encoder counts.
     #[error("node {node}: {source}")]
     Counts {
         /// Node.
         node: u8,
-        /// What is wrong with CTS.
+        /// The error in CTS.
         source: PositionScaleError,
     },
-    /// Torque units that make no sense.
+    /// Invalid torque units.
     #[error("node {node}: {source}")]
     Units {
         /// Node.
         node: u8,
-        /// What is wrong with IPNM.
+        /// The error in IPNM.
         source: TorqueError,
     },
-    /// Home pose beyond what positions hold.
+    /// A home pose outside the range of positions.
     #[error("home pose: {0}; correct home_rad")]
     Home(#[from] CountsError),
-    /// Limits of the safety module that contradict themselves.
+    /// Inconsistent limits of the safety module.
     #[error("safety limits: {0}")]
     Limits(#[from] SafetyLimitsError),
-    /// Positions are not known.
+    /// The positions are unknown.
     #[error(
         "the safety module's ZERO is {zero}: the arm has lost its positions; put it into its home pose \
          {home} rad, and start again with --zero-at-home"
@@ -186,10 +186,10 @@ pub enum CanError {
     NotZeroed {
         /// Value found.
         zero: i32,
-        /// Home pose in words.
+        /// Home pose as text.
         home: String,
     },
-    /// The module is in another mode than it was brought to.
+    /// The module is in another mode than requested.
     #[error(
         "the safety module is in {found:?}, expected {expected:?}: press Shift-Idle at the pendant and start again"
     )]
@@ -199,8 +199,8 @@ pub enum CanError {
         /// Expected.
         expected: SafetyMode,
     },
-    /// A value that the protocol does not have.
-    #[error("{property} of node {node} is {found}, which means nothing: check the node's firmware")]
+    /// A value that the protocol does not define.
+    #[error("{property} of node {node} is {found}, an unknown value: check the node's firmware")]
     Value {
         /// Property.
         property: Property,
@@ -209,22 +209,22 @@ pub enum CanError {
         /// Value found.
         found: i32,
     },
-    /// The operator ended it.
-    #[error("ended before the arm was in service")]
+    /// A shutdown was requested.
+    #[error("stopped before start-up was complete")]
     Stopped,
-    /// The controller's side.
+    /// Error of the link to the controller.
     #[error("shared memory: {0}")]
     Link(Box<dyn std::error::Error + Send + Sync>),
 }
 
 impl CanError {
-    /// Exit code, as the command line has them: 3 a wrong arm or description, 4 an arm that is not as it has to be,
-    /// 10 the bus, shared memory or the system.
+    /// Exit code, as for the command line: 3 for a wrong arm or description, 4 for an arm that fails a check, 10
+    /// for the bus, shared memory or the system.
     pub fn code(&self) -> u8 {
         match self {
             CanError::Model(_)
             | CanError::Joints { .. }
-            | CanError::Described { .. }
+            | CanError::MissingKey { .. }
             | CanError::Overload(_)
             | CanError::Home(_)
             | CanError::Limits(_) => 3,

@@ -1,37 +1,39 @@
-//! What is sent when something is lost: the safe action, as a small machine of its own.
+//! State machine of the safe action: which torque is sent, and when the safety module is switched to idle, after
+//! a loss.
 //!
 //! ```text
-//! resting --(operator activates, controller wants torque)--> active
-//! active  --(loss, or the controller wants none)--> lowering --(module idle, or 100 ms)--> resting
+//! resting --(operator activates, controller requests torque)--> active
+//! active  --(loss, or the controller requests none)--> lowering --(module idle, or 100 ms)--> resting
 //! ```
 //!
-//! Torques go out in active and, since idle motors ignore them, in resting too, so that the operator
-//! activates an arm whose weight is held already. While the answer is missing the fallback goes out from
-//! the first cycle on; after [`PATIENCE_NS`] the safety module is lowered to idle, in which the motors
-//! brake, and the fallback stays on until they do, for at most [`FALLBACK_NS`]: dropping the torque first
-//! would drop the arm. A lost encoder ends torque at once: never gravity from that encoder. The module is
-//! lowered, never raised. It knows no bus and no clock: time is an argument.
+//! Torques are sent in the active stage and also in the resting stage, in which idle motors ignore them, so that
+//! the weight of the arm is compensated from the moment the operator activates it. While the answer is missing,
+//! the fallback torque is sent from the first cycle on. After [`ANSWER_TIMEOUT_NS`] the safety module is lowered
+//! to idle, in which the motors brake; the fallback continues until they do, for at most [`FALLBACK_NS`],
+//! because the arm would drop without torque before the motors brake. A lost encoder ends torque at once,
+//! because gravity computed from it would be wrong. The module is only lowered, never raised. The machine has no
+//! access to bus or clock: time is an argument.
 
 use supple_core::drive_guard::GuardReason;
 use supple_puck::safety::SafetyMode;
 
-/// How long answers or transmissions may fail before the module is lowered \[ns\].
-pub const PATIENCE_NS: u64 = 10_000_000;
-/// How long the fallback torque is applied at most \[ns\].
+/// Time for which answers or transmissions may fail before the module is lowered \[ns\].
+pub const ANSWER_TIMEOUT_NS: u64 = 10_000_000;
+/// Maximum time of the fallback torque after a loss \[ns\].
 pub const FALLBACK_NS: u64 = 100_000_000;
-/// Cycles in which a motor may miss its reply; in the next one its encoder is lost.
-const TOLERATED_REPLIES: u32 = 1;
-/// Silence of the safety module after which it is lost \[ns\].
+/// Consecutive cycles in which a motor may miss its reply; in the next one its encoder counts as lost.
+const TOLERATED_MISSED_REPLIES: u32 = 1;
+/// Silence of the safety module after which it counts as lost \[ns\].
 const MODULE_SILENCE_NS: u64 = 100_000_000;
 
-/// Why the motors were lowered.
+/// Reason for which the motors were set to idle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Loss {
+pub enum LossReason {
     /// The controller did not answer.
     Answer,
-    /// The controller wants no torque.
-    Unwanted,
-    /// A joint is far too fast; its index.
+    /// The controller requests no torque.
+    TorqueNotWanted,
+    /// A joint is at twice its speed limit; its index.
     Overspeed(usize),
     /// A joint does not stop although the controller is in a fault; its index.
     NotStopped(usize),
@@ -39,9 +41,9 @@ pub enum Loss {
     Activated,
     /// A motor puck did not reply; its index.
     Encoder(usize),
-    /// Frames did not leave.
+    /// Frames were not sent.
     Transmit,
-    /// The controller of the CAN interface went off the bus.
+    /// The controller of the CAN interface is bus-off.
     BusOff,
     /// The safety module did not answer.
     Module,
@@ -49,75 +51,77 @@ pub enum Loss {
     Leaving,
 }
 
-impl core::fmt::Display for Loss {
+impl core::fmt::Display for LossReason {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
-            Loss::Answer => f.write_str("the controller did not answer"),
-            Loss::Unwanted => f.write_str("the controller wants no torque"),
-            Loss::Overspeed(joint) => write!(f, "joint {joint} is twice as fast as it may be"),
-            Loss::NotStopped(joint) => {
+            LossReason::Answer => f.write_str("the controller did not answer"),
+            LossReason::TorqueNotWanted => f.write_str("the controller requests no torque"),
+            LossReason::Overspeed(joint) => {
+                write!(f, "joint {joint} moves at twice its speed limit")
+            }
+            LossReason::NotStopped(joint) => {
                 write!(
                     f,
                     "joint {joint} does not stop although the controller is in a fault"
                 )
             }
-            Loss::Activated => f.write_str(
+            LossReason::Activated => f.write_str(
                 "the motors were activated while the controller was not in gravity hold",
             ),
-            Loss::Encoder(index) => {
+            LossReason::Encoder(index) => {
                 write!(f, "motor puck {} did not reply in two cycles", index + 1)
             }
-            Loss::Transmit => f.write_str("frames do not leave the CAN interface"),
-            Loss::BusOff => f.write_str("the CAN interface is off the bus"),
-            Loss::Module => f.write_str("the safety module does not answer"),
-            Loss::Leaving => f.write_str("the program ends"),
+            LossReason::Transmit => f.write_str("the CAN interface does not send its frames"),
+            LossReason::BusOff => f.write_str("the CAN interface is bus-off"),
+            LossReason::Module => f.write_str("the safety module does not answer"),
+            LossReason::Leaving => f.write_str("the program is shutting down"),
         }
     }
 }
 
-impl Loss {
-    /// Gravity from the last pose holds the arm until the motors brake; not where that pose, or the torque that
-    /// came of it, is what is wrong.
-    fn keeps_the_fallback(self) -> bool {
+impl LossReason {
+    /// Whether the fallback torque (gravity at the last pose) may hold the arm until the motors brake: not if
+    /// the pose or its torque is itself in doubt.
+    fn allows_fallback(self) -> bool {
         !matches!(
             self,
-            Loss::Encoder(_) | Loss::Overspeed(_) | Loss::NotStopped(_)
+            LossReason::Encoder(_) | LossReason::Overspeed(_) | LossReason::NotStopped(_)
         )
     }
 }
 
-impl From<GuardReason> for Loss {
-    fn from(reason: GuardReason) -> Loss {
+impl From<GuardReason> for LossReason {
+    fn from(reason: GuardReason) -> LossReason {
         match reason {
-            GuardReason::Overspeed { joint, .. } => Loss::Overspeed(joint),
-            GuardReason::NotStopped { joint, .. } => Loss::NotStopped(joint),
-            GuardReason::NotInGravityHold => Loss::Activated,
+            GuardReason::Overspeed { joint, .. } => LossReason::Overspeed(joint),
+            GuardReason::NotStopped { joint, .. } => LossReason::NotStopped(joint),
+            GuardReason::NotInGravityHold => LossReason::Activated,
         }
     }
 }
 
-/// What a cycle saw.
+/// Observations of one cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Seen {
+pub struct GuardInput {
     /// Time of the bus \[ns\].
     pub now_ns: u64,
-    /// Whether the controller answered, and if so whether it wants torque.
+    /// Whether the controller's answer requests torque; `None` without an answer.
     pub answer: Option<bool>,
-    /// What the drives' guard made of motion and answer, if it ended torque.
-    pub judged: Option<Loss>,
-    /// For each motor, bit by bit: its reply is missing although the request left.
+    /// Verdict of the drive guard, if it ended the torque.
+    pub drive_guard_loss: Option<LossReason>,
+    /// Bit `i` is set if motor `i` did not reply although the request was sent.
     pub missing: u8,
-    /// Frames of the previous cycle did not leave.
+    /// Frames of the previous cycle were not sent.
     pub unsent: bool,
-    /// The interface is off the bus.
+    /// The interface is bus-off.
     pub bus_off: bool,
-    /// Mode of the safety module as it was last told, and when \[ns\].
+    /// Last known mode of the safety module, and when it was received \[ns\].
     pub module: Option<(SafetyMode, u64)>,
     /// The program is about to end.
     pub leaving: bool,
 }
 
-/// Which torque a cycle sends.
+/// Torque that a cycle sends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Torque {
     /// The command of this cycle.
@@ -128,49 +132,49 @@ pub enum Torque {
     None,
 }
 
-/// What a cycle does.
+/// Action of a cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Action {
     /// Torque to send.
     pub torque: Torque,
-    /// Ask the safety module for idle.
+    /// Request idle from the safety module.
     pub lower_module: bool,
-    /// Set the motors themselves to idle: the module did not do it.
+    /// Set the motors directly to idle, because the module did not.
     pub idle_motors: bool,
 }
 
-/// Where the machine is.
+/// State of the state machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
     /// The motors brake.
     Resting,
-    /// The motors take torques.
+    /// The motors apply torques.
     Active,
-    /// On the way from active to resting, since this time \[ns\].
-    Lowering(Loss, u64),
+    /// Between active and resting: the reason, and since when \[ns\].
+    Lowering(LossReason, u64),
 }
 
-/// The machine.
+/// State machine of the safe action.
 #[derive(Clone, Copy, Debug)]
-pub struct Guard {
+pub struct SafeActionMachine {
     stage: Stage,
-    /// When answers, or transmissions, began to fail \[ns\].
+    /// Times at which answers and transmissions began to fail \[ns\].
     unanswered_ns: Option<u64>,
     unsent_ns: Option<u64>,
     missing: [u32; 8],
-    last_loss: Option<(Loss, u64)>,
+    last_loss: Option<(LossReason, u64)>,
 }
 
-impl Default for Guard {
+impl Default for SafeActionMachine {
     fn default() -> Self {
-        Guard::new()
+        SafeActionMachine::new()
     }
 }
 
-impl Guard {
-    /// Resting, nothing lost.
-    pub const fn new() -> Guard {
-        Guard {
+impl SafeActionMachine {
+    /// A machine in the resting stage, without a loss.
+    pub const fn new() -> SafeActionMachine {
+        SafeActionMachine {
             stage: Stage::Resting,
             unanswered_ns: None,
             unsent_ns: None,
@@ -179,36 +183,36 @@ impl Guard {
         }
     }
 
-    /// Where it is.
+    /// Current stage.
     pub fn stage(&self) -> Stage {
         self.stage
     }
 
     /// The last loss that ended torque, with its time \[ns\].
-    pub fn last_loss(&self) -> Option<(Loss, u64)> {
+    pub fn last_loss(&self) -> Option<(LossReason, u64)> {
         self.last_loss
     }
 
-    /// One cycle.
-    pub fn cycle(&mut self, seen: &Seen) -> Action {
-        let loss = self.watch(seen);
-        let active = matches!(seen.module, Some((SafetyMode::Active, _)));
+    /// Runs one cycle.
+    pub fn cycle(&mut self, input: &GuardInput) -> Action {
+        let loss = self.watch(input);
+        let active = matches!(input.module, Some((SafetyMode::Active, _)));
         match self.stage {
             Stage::Resting if active && loss.is_none() => self.stage = Stage::Active,
             Stage::Resting if active => {
-                // Activated by the operator while something is wrong: straight back.
-                self.lower(loss.unwrap_or(Loss::Answer), seen.now_ns);
+                // The operator activated the arm while a loss is present: switch it to idle again at once.
+                self.lower(loss.unwrap_or(LossReason::Answer), input.now_ns);
             }
             Stage::Active if !active => self.stage = Stage::Resting,
             Stage::Active => {
                 if let Some(loss) = loss {
-                    self.lower(loss, seen.now_ns);
+                    self.lower(loss, input.now_ns);
                 }
             }
             Stage::Lowering(..) if !active => self.stage = Stage::Resting,
             Stage::Lowering(before, since_ns) => {
                 // A lost encoder, or motion that does not stop, ends the fallback too.
-                if let Some(loss) = loss.filter(|loss| !loss.keeps_the_fallback()) {
+                if let Some(loss) = loss.filter(|loss| !loss.allows_fallback()) {
                     self.stage = Stage::Lowering(loss, since_ns);
                 } else {
                     self.stage = Stage::Lowering(before, since_ns);
@@ -216,7 +220,7 @@ impl Guard {
             }
             Stage::Resting => {}
         }
-        let wanted = seen.answer == Some(true);
+        let wanted = input.answer == Some(true);
         let commanded = |otherwise| if wanted { Torque::Command } else { otherwise };
         match self.stage {
             Stage::Resting => Action {
@@ -234,8 +238,8 @@ impl Guard {
                 idle_motors: false,
             },
             Stage::Lowering(loss, since_ns) => {
-                let overdue = seen.now_ns >= since_ns + FALLBACK_NS;
-                let held = !overdue && loss.keeps_the_fallback();
+                let overdue = input.now_ns >= since_ns + FALLBACK_NS;
+                let held = !overdue && loss.allows_fallback();
                 Action {
                     torque: if held { Torque::Fallback } else { Torque::None },
                     lower_module: true,
@@ -245,19 +249,21 @@ impl Guard {
         }
     }
 
-    fn lower(&mut self, loss: Loss, now_ns: u64) {
+    fn lower(&mut self, loss: LossReason, now_ns: u64) {
         self.stage = Stage::Lowering(loss, now_ns);
         self.last_loss = Some((loss, now_ns));
     }
 
     fn encoder_lost(&self) -> bool {
-        self.missing.iter().any(|count| *count > TOLERATED_REPLIES)
+        self.missing
+            .iter()
+            .any(|count| *count > TOLERATED_MISSED_REPLIES)
     }
 
-    /// What is lost for too long, the worst first.
-    fn watch(&mut self, seen: &Seen) -> Option<Loss> {
+    /// Returns the most severe loss that has lasted longer than its tolerance.
+    fn watch(&mut self, input: &GuardInput) -> Option<LossReason> {
         for (index, count) in self.missing.iter_mut().enumerate() {
-            *count = if seen.missing >> index & 1 == 1 {
+            *count = if input.missing >> index & 1 == 1 {
                 count.saturating_add(1)
             } else {
                 0
@@ -268,35 +274,43 @@ impl Guard {
                 *began = None;
                 return false;
             }
-            seen.now_ns >= *began.get_or_insert(seen.now_ns) + PATIENCE_NS
+            input.now_ns >= *began.get_or_insert(input.now_ns) + ANSWER_TIMEOUT_NS
         };
-        let unanswered = since(&mut self.unanswered_ns, seen.answer.is_none());
-        let unsent = since(&mut self.unsent_ns, seen.unsent);
+        let unanswered = since(&mut self.unanswered_ns, input.answer.is_none());
+        let unsent = since(&mut self.unsent_ns, input.unsent);
         let mut counts = self.missing.iter();
-        if let Some(index) = counts.position(|count| *count > TOLERATED_REPLIES) {
-            return Some(Loss::Encoder(index));
+        if let Some(index) = counts.position(|count| *count > TOLERATED_MISSED_REPLIES) {
+            return Some(LossReason::Encoder(index));
         }
-        if seen.bus_off {
-            return Some(Loss::BusOff);
+        if let Some(loss) = input
+            .drive_guard_loss
+            .filter(|loss| !loss.allows_fallback())
+        {
+            return Some(loss);
+        }
+        if input.bus_off {
+            return Some(LossReason::BusOff);
         }
         if unsent {
-            return Some(Loss::Transmit);
+            return Some(LossReason::Transmit);
         }
-        if seen.leaving {
-            return Some(Loss::Leaving);
+        if input.leaving {
+            return Some(LossReason::Leaving);
         }
         if unanswered {
-            return Some(Loss::Answer);
+            return Some(LossReason::Answer);
         }
-        if seen.answer == Some(false) {
-            return Some(Loss::Unwanted);
+        if input.answer == Some(false) {
+            return Some(LossReason::TorqueNotWanted);
         }
-        if seen.judged.is_some() {
-            return seen.judged;
+        if input.drive_guard_loss.is_some() {
+            return input.drive_guard_loss;
         }
-        match seen.module {
-            Some((SafetyMode::Active, heard_ns)) if seen.now_ns > heard_ns + MODULE_SILENCE_NS => {
-                Some(Loss::Module)
+        match input.module {
+            Some((SafetyMode::Active, last_reply_ns))
+                if input.now_ns > last_reply_ns + MODULE_SILENCE_NS =>
+            {
+                Some(LossReason::Module)
             }
             _ => None,
         }

@@ -1,34 +1,38 @@
-//! Questions and answers before the cycle begins: one property at a time.
+//! Blocking property access during start-up, one property at a time.
 
 use crate::error::CanError;
 use supple_bus::{Bus, BusFault, Event};
 use supple_puck::property::{get, set};
 use supple_puck::{CanFrame, Destination, GroupId, Inbound, NodeId, PropertyId, Value};
 
-/// Millisecond in nanoseconds.
+/// One millisecond in nanoseconds.
 pub const MS: u64 = 1_000_000;
-/// How long a node may take; libbarrett found 1 ms too short on fast computers.
+/// Timeout of a reply; libbarrett found 1 ms too short on fast computers.
 const REPLY_NS: u64 = 5 * MS;
-/// Least time between frames that configure a node.
-const PACE_NS: u64 = 10 * MS;
-/// How often a question is put before a node counts as silent.
-const TRIES: u32 = 3;
+/// Minimum time between frames that configure a node.
+const SETTING_INTERVAL_NS: u64 = 10 * MS;
+/// Number of requests before a node counts as silent.
+const MAX_ATTEMPTS: u32 = 3;
 
 /// The host's end of the bus during start-up.
 pub struct Host<'a, B> {
     /// The bus.
     pub bus: &'a mut B,
-    /// Asked now and then; `true` ends the start-up.
+    /// Called repeatedly; `true` ends the start-up.
     pub stop: &'a dyn Fn() -> bool,
 }
 
 impl<B: Bus> Host<'_, B> {
-    /// The value of a property; `None` where the node does not answer.
+    /// Reads a property; `None` if the node does not answer.
     ///
     /// # Errors
-    /// Where the bus fails.
-    pub fn ask(&mut self, node: NodeId, property: PropertyId) -> Result<Option<i32>, CanError> {
-        for _ in 0..TRIES {
+    /// If the bus fails.
+    pub fn get_property(
+        &mut self,
+        node: NodeId,
+        property: PropertyId,
+    ) -> Result<Option<i32>, CanError> {
+        for _ in 0..MAX_ATTEMPTS {
             self.bus.send(&get(node, property))?;
             let until_ns = self.bus.now_ns() + REPLY_NS;
             while let Some(frame) = self.next(until_ns)? {
@@ -38,7 +42,7 @@ impl<B: Bus> Host<'_, B> {
                     {
                         return Ok(Some(reply.value.get()));
                     }
-                    // Whatever else is on the bus answers someone else, or an earlier question.
+                    // Other frames are replies to other requests; ignored.
                     _ => {}
                 }
             }
@@ -46,25 +50,25 @@ impl<B: Bus> Host<'_, B> {
         Ok(None)
     }
 
-    /// Sets a property of a node or group, and leaves the bus alone for a while.
+    /// Sets a property of a node or group, then keeps the bus silent for [`SETTING_INTERVAL_NS`].
     ///
     /// # Errors
-    /// Where the bus fails, or the operator ends the start-up.
-    pub fn tell(
+    /// If the bus fails, or a shutdown is requested.
+    pub fn set_property(
         &mut self,
         to: impl Into<Destination>,
         property: PropertyId,
         value: i32,
     ) -> Result<(), CanError> {
         self.bus.send(&set(to, property, Value::Wide(value)))?;
-        self.quiet(PACE_NS)
+        self.wait_silently(SETTING_INTERVAL_NS)
     }
 
-    /// Says nothing for a while.
+    /// Receives for this time without sending.
     ///
     /// # Errors
-    /// Where the bus fails, or the operator ends the start-up.
-    pub fn quiet(&mut self, duration_ns: u64) -> Result<(), CanError> {
+    /// If the bus fails, or a shutdown is requested.
+    pub fn wait_silently(&mut self, duration_ns: u64) -> Result<(), CanError> {
         let until_ns = self.bus.now_ns() + duration_ns;
         while self.next(until_ns)?.is_some() {}
         if (self.stop)() {
@@ -73,10 +77,10 @@ impl<B: Bus> Host<'_, B> {
         Ok(())
     }
 
-    /// One position of every node that answers until `joints` have.
+    /// Requests the positions; returns them once `joints` nodes have replied or the timeout has passed.
     ///
     /// # Errors
-    /// Where the bus fails.
+    /// If the bus fails.
     pub fn positions(
         &mut self,
         property: PropertyId,
@@ -95,8 +99,7 @@ impl<B: Bus> Host<'_, B> {
         Ok(positions)
     }
 
-    /// The next frame of another node. A bus without anybody on it is not a fault here: nodes are being
-    /// looked for.
+    /// The next frame of another node. Missing acknowledgements are not an error during enumeration.
     fn next(&mut self, until_ns: u64) -> Result<Option<CanFrame>, CanError> {
         loop {
             match self.bus.receive_until(until_ns)? {

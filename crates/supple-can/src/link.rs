@@ -1,4 +1,4 @@
-//! What the cycle says to the controller and hears from it, however it reaches it.
+//! Interface between the bus cycle and the controller, independent of the transport.
 
 use crate::error::CanError;
 use supple_core::Vector;
@@ -6,65 +6,65 @@ use supple_core::controller::Mode;
 use supple_core::drive_guard::DriveCommand;
 use supple_core::nalgebra::Vector3;
 
-/// What the motors do.
+/// State of the drives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Drives {
-    /// No power: the emergency stop.
+    /// Without power: emergency stop.
     Off,
-    /// They brake and take no torque.
+    /// The motors brake and ignore torques.
     Idle,
-    /// They take torques.
+    /// The motors apply torques.
     Active,
 }
 
-/// How the bus and the clock fare, since the start unless said otherwise.
+/// Counters and timing of the bus, since the start unless stated otherwise.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Counters {
-    /// Cycles begun.
+    /// Cycles started.
     pub cycles: u64,
-    /// Cycles with active motors whose answer did not come in time.
+    /// Cycles with active motors whose answer did not arrive in time.
     pub missed: u64,
-    /// Answers that came after their cycle.
+    /// Answers that arrived after their cycle.
     pub late_answers: u64,
-    /// Answers that counted as none, because a torque of them was not finite.
+    /// Answers that were discarded because a torque was not finite.
     pub unusable: u64,
-    /// Periods that were passed over because a cycle began too late.
+    /// Periods that were skipped because a cycle started too late.
     pub skipped: u64,
-    /// Frames that were not seen to leave.
+    /// Frames that the interface did not confirm.
     pub tx_lost: u64,
-    /// Position replies that did not come.
+    /// Missing position replies.
     pub replies_lost: u64,
-    /// Times that received frames were lost because they were not read in time.
+    /// Number of gaps in the received frames because they were not read in time.
     pub overruns: u64,
-    /// By how much this cycle began late \[ns\].
+    /// Delay of the start of this cycle \[ns\].
     pub wake_ns: u64,
-    /// From publishing the state of the previous cycle to its answer \[ns\]; zero where none came.
+    /// Time from publishing the state of the previous cycle to its answer \[ns\]; zero without an answer.
     pub round_trip_ns: u64,
-    /// Share of the previous cycle in which the bus was busy, 0 to 1.
+    /// Fraction of the previous cycle in which the bus was busy, 0 to 1.
     pub bus_load: f64,
-    /// How long the bus's time has stood still \[ns\], see [`supple_bus::Bus::stood_still_ns`].
-    pub stood_still_ns: u64,
+    /// Total time for which bus time was paused \[ns\], see [`supple_bus::Bus::clock_stall_ns`].
+    pub clock_stall_ns: u64,
 }
 
 /// The arm at the start of a cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ArmReport<const N: usize> {
-    /// Number of the cycle, one more each period.
+    /// Cycle number, incremented every period.
     pub cycle: u64,
-    /// When positions were asked for, by the machine's monotonic clock, or in virtual time \[ns\].
+    /// Time of the position request, by the machine's monotonic clock or in virtual time \[ns\].
     pub stamp_ns: u64,
-    /// Joint angles \[rad\]; `None` where a motor that moves the joint did not reply.
+    /// Joint angles \[rad\]; `None` if a motor that moves the joint did not reply.
     pub position_rad: [Option<f64>; N],
     /// Force on the tip, base axes \[N\]; `None` without a sensor, or while its data are bad.
     pub tip_force_n: Option<Vector3<f64>>,
-    /// What the motors do.
+    /// State of the drives.
     pub drives: Drives,
-    /// How it fares.
+    /// Counters of the cycle.
     pub counters: Counters,
 }
 
 impl<const N: usize> Command<N> {
-    /// Every torque of it is finite.
+    /// Whether every torque is finite.
     pub fn is_finite(&self) -> bool {
         let mut torques = self.torque_nm.iter().chain(&self.fallback_torque_nm);
         torques.all(|torque_nm| torque_nm.is_finite())
@@ -76,18 +76,18 @@ impl<const N: usize> Command<N> {
 pub struct Command<const N: usize> {
     /// Joint torques \[N m\].
     pub torque_nm: Vector<N>,
-    /// Joint torques to send while no answer comes \[N m\].
+    /// Joint torques to send while answers are missing \[N m\].
     pub fallback_torque_nm: Vector<N>,
-    /// The torques are meant. Otherwise the motors are to be lowered to idle.
+    /// Apply the torques; otherwise switch the motors to idle.
     pub wants_torque: bool,
-    /// The controller's mode, where it is known.
+    /// The controller's mode, if known.
     pub mode: Option<Mode>,
     /// The controller is in a fault.
     pub fault: bool,
 }
 
 impl<const N: usize> Command<N> {
-    /// What the drives' guard judges.
+    /// Input of the drive guard.
     pub(crate) fn drive(&self) -> DriveCommand<N> {
         DriveCommand {
             torque_nm: self.torque_nm,
@@ -97,33 +97,33 @@ impl<const N: usize> Command<N> {
     }
 }
 
-/// What came back within the time given.
+/// Result of waiting for an answer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Answer<const N: usize> {
     /// The answer to this cycle.
     pub command: Option<Command<N>>,
-    /// Answers to earlier cycles that came only now.
+    /// Number of answers to earlier cycles, which are discarded.
     pub late: u64,
 }
 
-/// The way to the controller.
+/// Link to the controller.
 pub trait Link<const N: usize> {
-    /// Tells the controller that it will soon be told about the arm, where that is of use to it.
+    /// Announces to the controller that a report follows soon; a transport may ignore it.
     ///
     /// # Errors
-    /// Where the way is broken, not where the controller is missing.
+    /// If the transport fails. A missing controller is not an error.
     fn announce(&mut self) -> Result<(), CanError>;
 
-    /// Tells the controller about the arm.
+    /// Sends the report to the controller.
     ///
     /// # Errors
-    /// Where the way is broken, not where the controller is missing.
+    /// If the transport fails. A missing controller is not an error.
     fn publish(&mut self, report: &ArmReport<N>) -> Result<(), CanError>;
 
-    /// Waits for the answer to a cycle, at most for `wait_ns`; in virtual time no time of the bus passes
+    /// Waits for the answer to a cycle, at most for `wait_ns`; in virtual time bus time does not advance
     /// meanwhile.
     ///
     /// # Errors
-    /// Where the way is broken, not where the controller is missing.
+    /// If the transport fails. A missing controller is not an error.
     fn answer(&mut self, cycle: u64, wait_ns: u64) -> Result<Answer<N>, CanError>;
 }

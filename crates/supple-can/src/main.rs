@@ -1,4 +1,4 @@
-//! The arm's bus and clock, as a process.
+//! The program `supple-can`.
 
 fn main() -> std::process::ExitCode {
     supple_can::main()

@@ -1,30 +1,30 @@
-//! The process: start-up, service, and again after the arm has lost its power.
+//! The process: start-up, then cycles; repeated after the arm has lost its power.
 
 use crate::bus_time::BusTime;
-use crate::cycle::{Cycle, Rhythm};
+use crate::cycle::{Cycle, CycleConfig};
 use crate::error::CanError;
-use crate::guard::{Loss, Stage};
+use crate::guard::{LossReason, Stage};
 use crate::link::{Counters, Drives};
 use crate::options::Options;
-use crate::shared_memory::SharedMemory;
-use crate::start_up::{Progress, StartUp, start_up};
+use crate::shared_memory::SharedMemoryLink;
+use crate::start_up::{Progress, StartupConfig, start_up};
 use clap::Parser;
 use std::process::ExitCode;
-use supple_bus::virtual_time::Lockstep;
-use supple_bus::{Address, Bus, BusError, OwnerFolder, Paced, SocketCan, monotonic_ns};
+use supple_bus::virtual_time::LockstepBus;
+use supple_bus::{Address, Bus, BusError, OwnerFolder, PacedBus, SocketCan, monotonic_ns};
 use supple_ipc::{Domain, PlantLink, pause};
 use supple_model::{Description, with_dof};
 use supple_puck::safety::{SafetyLimits, SpeedLimit};
-use supple_realtime::{Stop, diagnostics, die_with_parent, enter, spin_for};
+use supple_realtime::{Stop, apply_realtime_settings, diagnostics, die_with_parent, spin_duration};
 
-/// How long an emulated arm may take to come \[ns\].
-const PEER_NS: u64 = 5_000_000_000;
-/// Silence of every motor puck after which the arm is looked for anew \[ns\].
-const SILENCE_NS: u64 = 500_000_000;
-/// How long the way to idle may take at the end \[ns\].
-const LEAVE_NS: u64 = 250_000_000;
-/// How often a lost arm is looked for.
-const LOOK: core::time::Duration = core::time::Duration::from_millis(200);
+/// Timeout for an emulated arm to appear \[ns\].
+const EMULATOR_TIMEOUT_NS: u64 = 5_000_000_000;
+/// Time without a reply from any motor puck after which start-up is repeated \[ns\].
+const ARM_LOST_AFTER_NS: u64 = 500_000_000;
+/// Maximum time for switching to idle at shutdown \[ns\].
+const SHUTDOWN_TIMEOUT_NS: u64 = 250_000_000;
+/// Interval at which a lost arm is searched for.
+const SEARCH_INTERVAL: core::time::Duration = core::time::Duration::from_millis(200);
 
 /// The whole program, from its arguments to its exit code.
 pub fn main() -> ExitCode {
@@ -55,14 +55,14 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// What was counted in service, if it came to service.
+/// Runs the process; returns the counters if start-up succeeded.
 fn start(options: &Options) -> Result<Option<Counters>, CanError> {
     let stop = Stop::on_signals().map_err(|error| CanError::Link(Box::new(error)))?;
     if options.supervised() {
         die_with_parent();
     }
     let description = options.description()?;
-    // Who supervises has said them.
+    // The supervising process has already printed the warnings.
     for warning in description
         .warnings()
         .iter()
@@ -80,17 +80,17 @@ fn run<const N: usize>(
 ) -> Result<Option<Counters>, CanError> {
     let config = description.config::<N>()?;
     let home_rad = description.home::<N>()?;
-    let rhythm = Rhythm {
+    let cycle_config = CycleConfig {
         period_ns: (config.period_s * 1e9).round() as u64,
         answer_ns: options.answer_us * 1_000,
     };
     if options.budget {
-        let time = BusTime::new(N, 0, true, rhythm.answer_ns);
-        println!("{}", time.budget(rhythm.period_ns));
-        time.check(rhythm.period_ns)?;
+        let time = BusTime::new(N, 0, true, cycle_config.answer_ns);
+        println!("{}", time.budget(cycle_config.period_ns));
+        time.check(cycle_config.period_ns)?;
         return Ok(None);
     }
-    let mut wishes = StartUp {
+    let mut startup_config = StartupConfig {
         zero_at_rad: options.zero_at_home.then_some(home_rad),
         limits: SafetyLimits {
             speed_fault: SpeedLimit::from_m_per_s(options.speed_limit_m_per_s).ok(),
@@ -98,72 +98,81 @@ fn run<const N: usize>(
         },
         tare: options.tare,
     };
-    let warning = wishes.limits.speed_warning.min(wishes.limits.speed_fault);
-    wishes.limits.speed_warning = warning;
+    let warning = startup_config
+        .limits
+        .speed_warning
+        .min(startup_config.limits.speed_fault);
+    startup_config.limits.speed_warning = warning;
     let domain = Domain::new(options.prefix.as_deref())?;
     let link = PlantLink::new(&domain)?;
-    let mut link = SharedMemory::new(link, options.virtual_time, stop.clone());
+    let mut link = SharedMemoryLink::new(link, options.virtual_time, stop.clone());
     let mut bus = open(options, domain.prefix(), stop)?;
     let mut counters = Counters::default();
     let mut first = true;
     loop {
-        let asked = || stop.asked();
-        let ready = start_up(&mut bus, description, &wishes, &asked, &mut tell);
+        let stop_requested = || stop.shutdown_requested();
+        let ready = start_up(
+            &mut bus,
+            description,
+            &startup_config,
+            &stop_requested,
+            &mut report_progress,
+        );
         let ready = match ready {
             Ok(ready) => ready,
-            // An arm that was there comes back: the others go on meanwhile.
+            // After a power loss keep trying; the other processes continue meanwhile.
             Err(
                 CanError::Missing { .. }
                 | CanError::BusFault(_)
-                // What nobody acknowledges stays in the queue.
+                // Unacknowledged frames fill the transmit queue.
                 | CanError::Bus(BusError::Full),
-            ) if !first && !stop.asked() => {
-                pause(LOOK);
+            ) if !first && !stop.shutdown_requested() => {
+                pause(SEARCH_INTERVAL);
                 continue;
             }
             Err(error) => return Err(error),
         };
         if first {
-            for shortfall in enter(&options.realtime()) {
-                diagnostics::post(format_args!("supple-can: warning: {shortfall}"));
+            for realtime_warning in apply_realtime_settings(&options.realtime()) {
+                diagnostics::post(format_args!("supple-can: warning: {realtime_warning}"));
             }
-            link.spin(spin_for(options.spin_us));
+            link.spin(spin_duration(options.spin_us));
         }
         first = false;
-        let mut cycle = Cycle::new(bus, link, ready, &config, rhythm)?;
+        let mut cycle = Cycle::new(bus, link, ready, &config, cycle_config)?;
         let ended = serve(&mut cycle, options, stop)?;
-        counters = added(&counters, cycle.counters());
+        counters = sum_counters(&counters, cycle.counters());
         (bus, link, _) = cycle.into_parts();
         if ended {
             return Ok(Some(counters));
         }
         diagnostics::post(format_args!(
-            "supple-can: the arm has gone silent: looking for it"
+            "supple-can: the arm does not reply any more: searching for it"
         ));
     }
 }
 
-/// Cycles until it is asked to end (`true`), or the arm has no power any more.
+/// Runs cycles until a shutdown is requested (`true`) or the arm has lost its power.
 fn serve<const N: usize, B: Bus>(
-    cycle: &mut Cycle<N, B, SharedMemory>,
+    cycle: &mut Cycle<N, B, SharedMemoryLink>,
     options: &Options,
     stop: &Stop,
 ) -> Result<bool, CanError> {
-    let mut heard_ns = cycle.bus().now_ns();
-    let mut loss: Option<(Loss, u64)> = None;
+    let mut last_reply_ns = cycle.bus().now_ns();
+    let mut loss: Option<(LossReason, u64)> = None;
     let mut stage = Stage::Resting;
-    let enough = |cycles: u64| options.cycles.is_some_and(|most| cycles >= most);
-    while !stop.asked() && !enough(cycle.counters().cycles) {
+    let all_cycles_done = |cycles: u64| options.cycles.is_some_and(|max| cycles >= max);
+    while !stop.shutdown_requested() && !all_cycles_done(cycle.counters().cycles) {
         cycle.run()?;
         let now_ns = cycle.bus().now_ns();
-        if cycle.hears_motors() {
-            heard_ns = now_ns;
+        if cycle.motors_replied() {
+            last_reply_ns = now_ns;
         }
-        if now_ns > heard_ns + SILENCE_NS {
+        if now_ns > last_reply_ns + ARM_LOST_AFTER_NS {
             return Ok(false);
         }
         let guard = cycle.guard();
-        // Said on the way out of service and into it, never in between.
+        // Messages only when the drives become active or idle, never during operation.
         if guard.last_loss() != loss {
             loss = guard.last_loss();
             if let Some((loss, _)) = loss {
@@ -177,8 +186,8 @@ fn serve<const N: usize, B: Bus>(
             }
         }
     }
-    cycle.leave();
-    let until_ns = cycle.bus().now_ns() + LEAVE_NS;
+    cycle.begin_shutdown();
+    let until_ns = cycle.bus().now_ns() + SHUTDOWN_TIMEOUT_NS;
     while cycle.drives() == Drives::Active && cycle.bus().now_ns() < until_ns {
         cycle.run()?;
     }
@@ -195,15 +204,17 @@ fn open(options: &Options, prefix: &str, stop: &Stop) -> Result<Box<dyn Bus>, Ca
         Address::Interface(name) => Ok(Box::new(SocketCan::open(&name)?)),
         Address::Folder(folder) => {
             let folder = OwnerFolder::open(folder)?;
-            let until_ns = monotonic_ns() + PEER_NS;
+            let until_ns = monotonic_ns() + EMULATOR_TIMEOUT_NS;
             loop {
                 let opened: Result<Box<dyn Bus>, BusError> = match options.virtual_time {
-                    true => Lockstep::open(&folder).map(|bus| Box::new(bus) as _),
-                    false => Paced::open(&folder).map(|bus| Box::new(bus) as _),
+                    true => LockstepBus::open(&folder).map(|bus| Box::new(bus) as _),
+                    false => PacedBus::open(&folder).map(|bus| Box::new(bus) as _),
                 };
                 match opened {
-                    Err(BusError::NoPeer { .. }) if monotonic_ns() < until_ns && !stop.asked() => {
-                        pause(LOOK);
+                    Err(BusError::NoPeer { .. })
+                        if monotonic_ns() < until_ns && !stop.shutdown_requested() =>
+                    {
+                        pause(SEARCH_INTERVAL);
                     }
                     opened => return Ok(opened?),
                 }
@@ -212,16 +223,16 @@ fn open(options: &Options, prefix: &str, stop: &Stop) -> Result<Box<dyn Bus>, Ca
     }
 }
 
-fn tell(progress: Progress) {
+fn report_progress(progress: Progress) {
     match progress {
         Progress::WaitingForIdle => {
             diagnostics::post(format_args!(
                 "supple-can: release the emergency stop and press Shift-Idle at the pendant"
             ));
         }
-        Progress::Enumerating => {
-            diagnostics::post(format_args!("supple-can: looking for the nodes of the arm"))
-        }
+        Progress::Enumerating => diagnostics::post(format_args!(
+            "supple-can: searching for the nodes of the arm"
+        )),
         Progress::Waking(pucks) => {
             diagnostics::post(format_args!("supple-can: waking {pucks} pucks"))
         }
@@ -229,7 +240,7 @@ fn tell(progress: Progress) {
             "supple-can: comparing the pucks with the description"
         )),
         Progress::Zeroing => diagnostics::post(format_args!(
-            "supple-can: taking the arm's pose for its home pose"
+            "supple-can: setting the positions to the home pose"
         )),
         Progress::Taring => {
             diagnostics::post(format_args!("supple-can: taring the force/torque sensor"))
@@ -240,7 +251,7 @@ fn tell(progress: Progress) {
     }
 }
 
-fn added(a: &Counters, b: &Counters) -> Counters {
+fn sum_counters(a: &Counters, b: &Counters) -> Counters {
     Counters {
         cycles: a.cycles + b.cycles,
         missed: a.missed + b.missed,

@@ -1,9 +1,9 @@
-//! Readings of the force/torque sensor, put together from their two frames.
+//! Readings of the force/torque sensor, combined from their two frames.
 
 use supple_core::nalgebra::Vector3;
 use supple_puck::force_torque::{Quantity, SensorReading};
 
-/// A reading older than this is none \[ns\].
+/// Age after which a reading is discarded \[ns\].
 const STALE_NS: u64 = 100_000_000;
 
 /// The last reading.
@@ -14,12 +14,12 @@ pub struct Readings {
 }
 
 impl Readings {
-    /// Takes a frame. A force counts once the torque frame behind it says that the data are good.
-    pub fn take(&mut self, reading: &SensorReading, now_ns: u64) {
+    /// Processes a frame. A force becomes valid when the status of the torque frame after it reports good data.
+    pub fn update(&mut self, reading: &SensorReading, now_ns: u64) {
         match reading.quantity {
             Quantity::Force => self.pending_n = Some(Vector3::from(reading.components())),
             Quantity::Torque => {
-                let bad = reading.status.is_some_and(|status| status.bad_now());
+                let bad = reading.status.is_some_and(|status| status.is_bad());
                 let force_n = self.pending_n.take().filter(|_| !bad);
                 self.force_n = force_n.map(|force_n| (force_n, now_ns));
             }
@@ -27,7 +27,7 @@ impl Readings {
         }
     }
 
-    /// Force on the tip, in the sensor's axes \[N\], unless it is old.
+    /// Force on the tip, in the sensor's axes \[N\], unless it is stale.
     pub fn force_n(&self, now_ns: u64) -> Option<Vector3<f64>> {
         let (force_n, taken_ns) = self.force_n?;
         (now_ns <= taken_ns + STALE_NS).then_some(force_n)

@@ -1,4 +1,4 @@
-//! The way to the controller through shared memory.
+//! Link to the controller through shared memory.
 
 use crate::error::CanError;
 use crate::link::{Answer, ArmReport, Command, Drives, Link};
@@ -7,28 +7,28 @@ use supple_ipc::message::{self, ArmState, PlantReport, TorqueCommand};
 use supple_ipc::{IpcError, PlantLink, pause};
 use supple_realtime::Stop;
 
-/// How often virtual time looks whether a controller has come, or whether to stop.
-const LOOK_EVERY: Duration = Duration::from_millis(50);
-const JOIN_EVERY: Duration = Duration::from_millis(1);
-/// Looks after which a controller that does not answer in virtual time counts as lost: 2 s.
-const PATIENCE: u32 = 40;
+/// Poll intervals in virtual time for an answer (and shutdown), and for a controller to join.
+const ANSWER_POLL_INTERVAL: Duration = Duration::from_millis(50);
+const JOIN_POLL_INTERVAL: Duration = Duration::from_millis(1);
+/// Polls without an answer after which the controller counts as lost in virtual time (2 s).
+const MAX_UNANSWERED_POLLS: u32 = 40;
 
 /// The plant's end of shared memory.
-pub struct SharedMemory {
+pub struct SharedMemoryLink {
     link: PlantLink,
     virtual_time: bool,
-    /// The last cycle in virtual time was not answered: the next are not waited for.
+    /// The last cycle in virtual time was not answered, so the next ones do not wait.
     lost: bool,
-    /// Commands for another arm.
+    /// Number of commands for another arm.
     unusable: u64,
     stop: Stop,
 }
 
-impl SharedMemory {
-    /// By the wall clock an answer is waited for as long as the cycle says; in virtual time until it
-    /// comes, since no time passes on the bus.
-    pub fn new(link: PlantLink, virtual_time: bool, stop: Stop) -> SharedMemory {
-        SharedMemory {
+impl SharedMemoryLink {
+    /// In real time an answer is awaited for as long as the cycle allows; in virtual time until it arrives, as bus
+    /// time does not advance meanwhile.
+    pub fn new(link: PlantLink, virtual_time: bool, stop: Stop) -> SharedMemoryLink {
+        SharedMemoryLink {
             link,
             virtual_time,
             lost: false,
@@ -37,7 +37,7 @@ impl SharedMemory {
         }
     }
 
-    /// What a command says; one for another arm is counted and is no answer.
+    /// Decodes a command; one for another arm is counted and discarded.
     fn read<const N: usize>(&mut self, command: &TorqueCommand) -> Option<Command<N>> {
         let torques = (command.torque::<N>(), command.fallback_torque::<N>());
         let (Ok(torque_nm), Ok(fallback_torque_nm)) = torques else {
@@ -53,7 +53,7 @@ impl SharedMemory {
         })
     }
 
-    /// Looks for an answer for so long before sleeping, see [`PlantLink::spin`].
+    /// Sets the time to poll for an answer before blocking, see [`PlantLink::spin`].
     pub fn spin(&mut self, at_most: Duration) {
         self.link.spin(at_most);
     }
@@ -65,7 +65,7 @@ impl From<IpcError> for CanError {
     }
 }
 
-impl<const N: usize> Link<N> for SharedMemory {
+impl<const N: usize> Link<N> for SharedMemoryLink {
     fn announce(&mut self) -> Result<(), CanError> {
         if !self.virtual_time {
             self.link.announce()?;
@@ -94,40 +94,40 @@ impl<const N: usize> Link<N> for SharedMemory {
                 wake_ns: counters.wake_ns,
                 round_trip_ns: counters.round_trip_ns,
                 bus_load: counters.bus_load,
-                stood_still_ns: counters.stood_still_ns,
+                clock_stall_ns: counters.clock_stall_ns,
             },
         );
         while !self.link.publish(&state)? {
-            if !self.virtual_time || self.lost || self.stop.asked() {
+            if !self.virtual_time || self.lost || self.stop.shutdown_requested() {
                 break;
             }
-            pause(JOIN_EVERY);
+            pause(JOIN_POLL_INTERVAL);
         }
         Ok(())
     }
 
     fn answer(&mut self, cycle: u64, wait_ns: u64) -> Result<Answer<N>, CanError> {
         let mut late = 0;
-        let looks = match (self.virtual_time, self.lost) {
+        let polls = match (self.virtual_time, self.lost) {
             (false, _) | (true, true) => 1,
-            (true, false) => PATIENCE,
+            (true, false) => MAX_UNANSWERED_POLLS,
         };
         let wait = match (self.virtual_time, self.lost) {
             (false, _) => Duration::from_nanos(wait_ns),
-            (true, true) => JOIN_EVERY,
-            (true, false) => LOOK_EVERY,
+            (true, true) => JOIN_POLL_INTERVAL,
+            (true, false) => ANSWER_POLL_INTERVAL,
         };
-        for _ in 0..looks {
-            let heard = self.link.answer(cycle, wait)?;
-            late += heard.late;
-            if let Some(command) = heard.answer {
+        for _ in 0..polls {
+            let received = self.link.answer(cycle, wait)?;
+            late += received.late;
+            if let Some(command) = received.answer {
                 self.lost = false;
                 return Ok(Answer {
                     command: self.read::<N>(&command),
                     late,
                 });
             }
-            if self.stop.asked() {
+            if self.stop.shutdown_requested() {
                 break;
             }
         }

@@ -1,4 +1,5 @@
-//! Between motors and joints: `q = m2jp p` of the motor angles, `m2jp^T tau` for the motor torques.
+//! Transmission between motors and joints: `q = m2jp p` from the motor angles, `m2jp^T tau` for the motor
+//! torques.
 
 use supple_core::{Matrix, Vector};
 use supple_model::Description;
@@ -16,8 +17,8 @@ pub struct Transmission<const N: usize> {
 }
 
 impl<const N: usize> Transmission<N> {
-    /// The described arm's matrix with what its pucks say of themselves. `None` where the description
-    /// has not `N` joints.
+    /// Combines the description's transmission matrix with the scales that the pucks report. `None` if the
+    /// description does not have `N` joints.
     pub fn new(
         description: &Description,
         position: [PositionScale; N],
@@ -35,8 +36,8 @@ impl<const N: usize> Transmission<N> {
         })
     }
 
-    /// Joint angles \[rad\] from motor counts. A joint that is moved by a motor whose reply is missing has
-    /// no angle; the others have theirs.
+    /// Joint angles \[rad\] from motor counts. A joint has no angle if the reply of a motor that moves it is
+    /// missing.
     pub fn joint_rad(&self, counts: &[Option<Counts>; N]) -> [Option<f64>; N] {
         core::array::from_fn(|joint| {
             let mut angle_rad = 0.0;
@@ -53,7 +54,7 @@ impl<const N: usize> Transmission<N> {
     /// Motor counts at joint angles \[rad\].
     ///
     /// # Errors
-    /// An angle that is not finite, or beyond what a position holds.
+    /// An angle that is not finite, or outside the range of a position.
     pub fn counts(&self, joint_rad: &Vector<N>) -> Result<[Counts; N], CountsError> {
         let motor_rad = self.motor_from_joint * joint_rad;
         let mut counts = [Counts::new(0)?; N];

@@ -1,4 +1,4 @@
-//! The real program: what it is told wrongly is said with the remedy.
+//! The real program: invalid arguments are reported with the remedy.
 
 use std::process::{Command, Output};
 
@@ -7,31 +7,35 @@ fn can(arguments: &[&str]) -> Output {
     command.args(arguments).output().expect("it runs")
 }
 
-fn words(output: &Output) -> String {
+fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
 #[test]
-fn a_wrong_arm_is_code_3() {
+fn an_unknown_arm_exits_with_code_3() {
     let output = can(&["--arm", "wam9"]);
     assert_eq!(output.status.code(), Some(3));
-    assert!(words(&output).contains("wam9"), "{}", words(&output));
+    assert!(stderr(&output).contains("wam9"), "{}", stderr(&output));
 }
 
 #[test]
-fn a_bus_that_is_none_is_refused_with_what_one_is() {
+fn an_invalid_bus_is_rejected_with_the_valid_forms() {
     let output = can(&["--bus", "usb:1"]);
     assert_eq!(output.status.code(), Some(2));
-    let words = words(&output);
+    let stderr = stderr(&output);
     assert!(
-        words.contains("can:NAME") && words.contains("unix:FOLDER"),
-        "{words}"
+        stderr.contains("can:NAME") && stderr.contains("unix:FOLDER"),
+        "{stderr}"
     );
 }
 
 #[test]
-fn a_rate_out_of_range_is_refused() {
+fn a_rate_out_of_range_is_rejected() {
     let output = can(&["--rate-hz", "5"]);
     assert_eq!(output.status.code(), Some(2));
-    assert!(words(&output).contains("10..=10000"), "{}", words(&output));
+    assert!(
+        stderr(&output).contains("10..=10000"),
+        "{}",
+        stderr(&output)
+    );
 }

@@ -1,13 +1,13 @@
-//! Everything that a controller is told before it starts. Plain data: [`crate::Controller::new`]
-//! refuses what is not sound, so a `Controller` cannot be wrong.
+//! Configuration of a controller as plain data. [`crate::Controller::new`] validates it, so a
+//! `Controller` always has a valid configuration.
 
-use crate::arm::Arm;
-use crate::friction::Friction;
 use crate::math::{Matrix, Matrix3, Vector, Vector3};
-pub use crate::ripple::RippleTable;
-pub use crate::workspace::{Border, Workspace, Zone};
+use crate::model::arm::Arm;
+use crate::model::friction::Friction;
+pub use crate::model::ripple::RippleTable;
+pub use crate::model::workspace::{Border, Workspace, Zone};
 
-/// What a joint does while the impedance law runs.
+/// Role of a joint while the impedance law runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Role {
     /// The law acts on it.
@@ -52,37 +52,37 @@ pub enum ApparentInertia {
     Chosen(Matrix3<f64>),
 }
 
-/// The velocity at which the friction feed-forward is taken.
+/// Velocity at which the friction feed-forward is evaluated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrictionVelocity {
-    /// `J^-1 Xo'`, the velocity of the reference. The default: the error then sees a dissipative
-    /// difference.
+    /// `J^-1 Xo'`, the velocity of the reference. The default: the remaining friction is then
+    /// dissipative for the tracking error.
     Reference,
-    /// The estimated joint velocity, as (3.6) is printed: cancels all damping of the arm and runs away
-    /// at low gains.
+    /// The estimated joint velocity, as (3.6) is printed: cancels all damping of the arm and is
+    /// unstable at low gains.
     Measured,
 }
 
-/// Choices within the law (3.6).
+/// Parameters and variants of the law (3.6).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Law {
-    /// `K` and `B` at start; they can be changed on request, by ramps.
+    /// Initial `K` and `B`; requests can change them, by ramps.
     pub gains: Gains,
     /// `M`.
     pub inertia: ApparentInertia,
     /// Velocity in `D`.
     pub friction_velocity: FrictionVelocity,
-    /// Adds `M Xo''`, which (3.3) lacks.
+    /// Adds `M Xo''`, which (3.3) does not contain.
     pub inertial_feedforward: bool,
-    /// Damping of motions that do not move the tip, where more than three joints are active
-    /// \[N m s/rad\], zero or more.
+    /// Damping of null-space motion if more than three joints are active \[N m s/rad\], zero or
+    /// more.
     pub nullspace_damping_nm_s_per_rad: f64,
 }
 
 impl Law {
-    /// Equation (3.6) to the letter, with the continuous (3.2): measured velocity in the friction, no
-    /// `M Xo''`, the arm's own inertia.
-    pub fn paper_letter(gains: Gains) -> Law {
+    /// Equation (3.6) exactly as printed, with the continuous (3.2): measured velocity in the
+    /// friction, no `M Xo''`, the arm's own inertia.
+    pub fn as_published(gains: Gains) -> Law {
         Law {
             gains,
             inertia: ApparentInertia::Own,
@@ -93,49 +93,49 @@ impl Law {
     }
 }
 
-/// When friction feed-forward is taken away because the tip has met something.
+/// Parameters of contact detection, which fades the friction feed-forward.
 ///
-/// The threshold on the observed force against the reference's motion is
-/// `threshold_n + sum_i |(Jb d)_i| S_i (friction_error + exp(-(v_i / v_s)^2))`: what is known to be
-/// uncertain about each joint's friction, seen along the direction `d` of the reference. A joint whose
-/// reference `v_i` is slow may stick, and then all of its friction is in doubt.
+/// The threshold of the observed force against the reference's motion is `threshold_n + sum_i |(Jb
+/// d)_i| S_i (friction_error + exp(-(v_i / v_s)^2))`: the uncertainty of each joint's friction,
+/// projected onto the direction `d` of the reference. A joint with a slow reference `v_i` may
+/// stick; then all of its friction torque is uncertain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactLatch {
     /// Fades the friction feed-forward on contact. Without it the latch still reports.
     pub fade: bool,
     /// Bandwidth of the momentum observer \[rad/s\], positive.
     pub observer_rad_per_s: f64,
-    /// Force against the reference's motion that latches where friction is not in doubt \[N\],
-    /// positive.
+    /// Contact force threshold without friction uncertainty \[N\], positive.
     pub threshold_n: f64,
     /// Relative error of the friction model in steady sliding, zero or more.
     pub friction_error: f64,
     /// Time after a reversal or start of the reference in which the threshold is doubled \[s\].
     pub reversal_s: f64,
-    /// Share of the dry friction feed-forward that stays on in contact, 0 to 1.
+    /// Fraction of the dry friction feed-forward that stays on in contact, 0 to 1.
     pub contact_share: f64,
-    /// Time in which the whole feed-forward would fade \[s\], positive.
+    /// Time for fading the full feed-forward to zero \[s\], positive.
     pub fade_s: f64,
-    /// Time for it to come back after release \[s\], positive.
+    /// Time for restoring the full feed-forward after release \[s\], positive.
     pub restore_s: f64,
 }
 
-/// External forces that end the motion, as the momentum observer sees them. They are well above what an
-/// inexact model leaves as a residual in free motion, dry friction included.
+/// Thresholds on the external forces that the momentum observer estimates; above them the motion
+/// ends. They are well above the residual of an inexact model in free motion, dry friction
+/// included.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Collision<const N: usize> {
     /// External torque of a joint \[N m\], positive.
     pub joint_torque_nm: Vector<N>,
     /// Force on the tip \[N\], positive; away from singular poses.
     pub tip_force_n: f64,
-    /// Share of both that ends motion in the modes with stiff joint loops (move, excite, breakaway), above 0,
-    /// at most 1.
+    /// Fraction of both thresholds that applies in the modes with stiff joint loops (move, excite,
+    /// breakaway), above 0, at most 1.
     pub move_share: f64,
 }
 
 impl<const N: usize> Collision<N> {
-    /// No force ends the motion: what logs from before there were thresholds are replayed with.
-    pub fn never() -> Collision<N> {
+    /// Disables collision detection; used to replay logs recorded before these thresholds existed.
+    pub fn disabled() -> Collision<N> {
         Collision {
             joint_torque_nm: Vector::repeat(f64::MAX),
             tip_force_n: f64::MAX,
@@ -144,25 +144,26 @@ impl<const N: usize> Collision<N> {
     }
 }
 
-/// How far measurements, commands and model may be apart before one of them is taken to be wrong.
+/// Plausibility limits: allowed disagreement between measurements, commands and model.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Plausible {
-    /// Lost replies of an encoder that are tolerated, where each is made up for by eight that came.
+pub struct PlausibilityLimits {
+    /// Tolerated lost encoder replies; eight received replies cancel one lost reply.
     pub lost_replies: u32,
-    /// Travel of a joint's reference in which its encoder may say the very same angle \[rad\], positive.
-    pub stuck_rad: f64,
-    /// Share of a joint's torque limit by which it may be driven one way while it gathers speed the other way,
+    /// Travel of a joint's reference during which its encoder value may stay unchanged \[rad\],
     /// positive.
+    pub stuck_rad: f64,
+    /// Fraction of a joint's torque limit: net torque above it that opposes an accelerating joint
+    /// is a fault. Positive.
     pub against_share: f64,
-    /// Force on the tip along gravity that is a load which the model lacks, in gravity hold and where a move
-    /// has ended \[N\], positive.
+    /// Tip force along gravity above which an unmodelled load is assumed, in gravity hold and after
+    /// the end of a move \[N\], positive.
     pub load_n: f64,
 }
 
-impl Plausible {
-    /// Everything is believed: what logs from before this was looked at are replayed with.
-    pub fn anything() -> Plausible {
-        Plausible {
+impl PlausibilityLimits {
+    /// Disables the plausibility checks; used to replay logs recorded before they existed.
+    pub fn disabled() -> PlausibilityLimits {
+        PlausibilityLimits {
             lost_replies: u32::MAX / 16,
             stuck_rad: f64::MAX,
             against_share: f64::MAX,
@@ -180,7 +181,7 @@ pub struct MoveGains<const N: usize> {
     pub damping_nm_s_per_rad: Vector<N>,
 }
 
-/// Limits that the supervisor holds.
+/// Limits that the supervisor enforces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits<const N: usize> {
     /// Lower hard stops \[rad\].
@@ -197,46 +198,46 @@ pub struct Limits<const N: usize> {
     pub joint_speed_rad_per_s: Vector<N>,
     /// Tip speed that faults \[m/s\], positive.
     pub tip_speed_m_per_s: f64,
-    /// Greatest acceleration of a tip trajectory that is asked for \[m/s^2\], positive.
+    /// Maximum acceleration of a requested tip trajectory \[m/s^2\], positive.
     pub tip_acceleration_m_per_s2: f64,
-    /// Greatest acceleration of a move that is asked for \[rad/s^2\], positive.
+    /// Maximum acceleration of a requested move \[rad/s^2\], positive.
     pub joint_acceleration_rad_per_s2: Vector<N>,
-    /// Greatest jerk of a move that is asked for \[rad/s^3\], positive.
+    /// Maximum jerk of a requested move \[rad/s^3\], positive.
     pub joint_jerk_rad_per_s3: Vector<N>,
-    /// Distance of the tip from its reference that faults while tracking or probing \[m\], positive.
+    /// Tracking error of the tip that faults while tracking or probing \[m\], positive.
     pub tracking_error_m: f64,
-    /// Distance of a joint from where its own loop wants it that faults, in the move mode and where it is
-    /// held \[rad\], positive.
+    /// Joint tracking error that faults, for joints with a position loop (move mode, held joints)
+    /// \[rad\], positive.
     pub joint_tracking_error_rad: f64,
     /// Joint torque limits \[N m\], positive.
     pub joint_torque_nm: Vector<N>,
     /// Motor torque limits \[N m\] at the motor, positive.
     pub motor_torque_nm: Vector<N>,
-    /// Greatest change of joint torque \[N m/s\], positive.
+    /// Maximum rate of change of joint torque \[N m/s\], positive.
     pub torque_rate_nm_per_s: Vector<N>,
-    /// Cycles without a new state that are tolerated, whether the same state is seen again or states
-    /// are missing.
+    /// Tolerated cycles without a new state, whether the same state is repeated or states are
+    /// missing.
     pub stale_cycles: u32,
-    /// Greatest distance of the tip from the start of a trajectory that is asked for \[m\], positive.
+    /// Maximum distance of the tip from the start of a requested trajectory \[m\], positive.
     pub start_error_m: f64,
-    /// Greatest stiffness that may be asked for \[N/m\], positive.
+    /// Maximum stiffness that may be requested \[N/m\], positive.
     pub stiffness_n_per_m: f64,
-    /// Greatest damping that may be asked for \[N s/m\], positive.
+    /// Maximum damping that may be requested \[N s/m\], positive.
     pub damping_n_s_per_m: f64,
 }
 
-/// All of it.
+/// Configuration of a controller.
 #[derive(Clone, Copy, Debug)]
 pub struct Config<const N: usize> {
-    /// The arm as the controller believes it.
+    /// The controller's model of the arm.
     pub arm: Arm<N>,
-    /// Friction as the controller believes it.
+    /// The controller's model of the friction.
     pub friction: [Friction; N],
-    /// What each joint does.
+    /// Role of each joint.
     pub roles: [Role; N],
     /// `m2jp`: joint angles from motor angles, `q = m2jp p`; motor torques are `m2jp^T tau`.
     pub joint_from_motor: Matrix<N, N>,
-    /// Torque ripple of each motor, fed forward so that it cancels.
+    /// Torque ripple of each motor, compensated by feed-forward.
     pub ripple: [RippleTable; N],
     /// Cycle period \[s\], positive.
     pub period_s: f64,
@@ -250,14 +251,14 @@ pub struct Config<const N: usize> {
     pub move_gains: MoveGains<N>,
     /// Joint damping of gravity hold \[N m s/rad\], zero or more.
     pub hold_damping_nm_s_per_rad: Vector<N>,
-    /// Time over which a change of mode blends the torque \[s\], positive.
+    /// Time over which the torque is blended after a change of mode \[s\], positive.
     pub handover_s: f64,
     /// Limits.
     pub limits: Limits<N>,
-    /// External forces that end the motion.
+    /// Collision thresholds.
     pub collision: Collision<N>,
-    /// What is believed.
-    pub plausible: Plausible,
-    /// Where the tip may be.
+    /// Plausibility limits.
+    pub plausible: PlausibilityLimits,
+    /// Workspace limits of the tip.
     pub workspace: Workspace,
 }

@@ -1,8 +1,8 @@
 //! Minimum-impedance control of backdrivable arms: dynamics, friction, impedance law, supervisor.
 //!
-//! The heart is [`controller::step`]: one pure function from measurements to torques. It reads no
-//! clock, allocates nothing, locks nothing and logs nothing, so the same function runs in realtime,
-//! in virtual time, in replay and from Python.
+//! The central function is [`controller::step`]: a pure function from measurements to torques. It
+//! reads no clock, allocates nothing, locks nothing and logs nothing, so the same function runs in
+//! realtime, in virtual time, in replay and from Python.
 //!
 //! Equation numbers are those of Desai and Howe, "Towards the development of a humanoid arm by
 //! minimizing interaction forces through minimum impedance control". SI units throughout; matrices
@@ -10,31 +10,20 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
-pub mod arm;
-pub mod body;
-pub mod codes;
 pub mod config;
 pub mod controller;
-pub mod drive_guard;
 pub mod dynamics;
-pub mod estimator;
-mod factors;
-pub mod friction;
-pub mod impedance;
-mod lanes;
-pub mod latch;
-pub mod linalg;
-mod link_rows;
+mod law;
 pub mod math;
-pub mod observer;
-pub mod operational;
-pub mod pose;
-pub mod reach;
-pub mod ripple;
-pub mod sincos;
+mod model;
+pub mod record;
 pub mod trajectory;
-mod vec3;
-pub mod workspace;
+
+pub use controller::{codes, drive_guard, estimator, latch, observer};
+pub use dynamics::inverse_kinematics;
+pub use law::{impedance, operational, torques};
+pub use math::{linalg, sincos};
+pub use model::{arm, body, friction, pose, ripple, workspace};
 
 pub use arm::{Arm, ArmError, Joint, Link};
 pub use body::{Body, BodyError};

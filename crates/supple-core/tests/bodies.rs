@@ -1,7 +1,8 @@
-//! Poses and bodies: URDF angles, composition, welding, against nalgebra and point masses.
+//! Poses and bodies: URDF angles, composition, merging of bodies; compared with nalgebra and point
+//! masses.
 #![allow(
     clippy::disallowed_methods,
-    reason = "references take their mathematics elsewhere"
+    reason = "reference values use other mathematical functions"
 )]
 
 mod common;
@@ -40,7 +41,7 @@ proptest! {
     }
 
     #[test]
-    fn z_is_turned_onto_any_axis(axis in direction()) {
+    fn z_is_rotated_onto_any_axis(axis in direction()) {
         let pose = Pose::z_onto(&axis);
         let r = pose.rotation;
         prop_assert_eq!(r.column(2).into_owned(), axis);
@@ -50,13 +51,13 @@ proptest! {
     }
 
     #[test]
-    fn a_body_seen_from_elsewhere_is_the_same_points(cloud in cloud(), a_from_b in pose()) {
-        let found = cloud.body().seen_from(&a_from_b);
-        same_body(&found, &cloud.seen_from(&a_from_b).body())?;
+    fn expressed_in_matches_transformed_points(cloud in cloud(), a_from_b in pose()) {
+        let found = cloud.body().expressed_in(&a_from_b);
+        same_body(&found, &cloud.expressed_in(&a_from_b).body())?;
     }
 
     #[test]
-    fn welded_bodies_are_the_points_of_both(one in cloud(), two in cloud()) {
+    fn merged_bodies_match_the_points_of_both(one in cloud(), two in cloud()) {
         let found = one.body().merged(&two.body());
         same_body(&found, &one.clone().joined(two.clone()).body())?;
         let origin = Vector3::zeros();
@@ -81,12 +82,12 @@ fn same_body(found: &Body, expected: &Body) -> Result<(), TestCaseError> {
 }
 
 #[test]
-fn z_onto_z_is_the_identity_to_the_last_bit() {
+fn z_onto_z_is_bit_exact_identity() {
     assert_eq!(Pose::z_onto(&Vector3::z()), Pose::IDENTITY);
 }
 
 #[test]
-fn a_ball_is_as_thick_every_way() {
+fn inertia_of_a_ball_is_isotropic() {
     let ball = Body::ball(2.0, 0.05, Vector3::new(0.0, 0.0, 0.1));
     assert_eq!(ball.validate(), Ok(()));
     let expected = Matrix3::identity() * (2.0 / 5.0 * 2.0 * 0.05 * 0.05);

@@ -1,4 +1,4 @@
-//! What an arm refuses to be built from, and that the refusal names the part and the value.
+//! Rejected descriptions of an arm; the error names the part and the value.
 
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::{Arm, ArmError, Body, BodyError, Joint, Pose};
@@ -22,14 +22,15 @@ fn joints() -> [Joint; 3] {
     }; 3]
 }
 
-/// The refusal of an arm whose joint 1 was spoilt.
+/// The error for an arm with joint 1 changed by `spoil`.
 fn refusal(spoil: impl Fn(&mut Joint)) -> ArmError {
     let mut joints = joints();
     spoil(&mut joints[1]);
     Arm::new(&joints, Pose::IDENTITY, None, DOWN).expect_err("joint 1 is not physical")
 }
 
-/// The refusal of an arm whose link 1 was spoilt, and of a spoilt tool: the same error.
+/// The error for an arm with link 1 changed by `spoil`; the same change of the tool gives the same
+/// error.
 fn body_refusal(spoil: impl Fn(&mut Body)) -> BodyError {
     let ArmError::Body { joint: 1, error } = refusal(|joint| spoil(&mut joint.body)) else {
         panic!("the link of joint 1 is what is wrong");
@@ -37,7 +38,7 @@ fn body_refusal(spoil: impl Fn(&mut Body)) -> BodyError {
     let mut tool = rod();
     spoil(&mut tool);
     let of_tool = Arm::new(&joints(), Pose::IDENTITY, Some(tool), DOWN).expect_err("bad tool");
-    // NaN differs from itself: compare what is printed.
+    // NaN differs from itself, so the texts are compared.
     assert_eq!(of_tool.to_string(), ArmError::Tool(error).to_string());
     assert!(of_tool.to_string().starts_with("tool: "), "{of_tool}");
     let of_link = ArmError::Body { joint: 1, error }.to_string();
@@ -102,10 +103,10 @@ fn inertia_asymmetric() {
 fn inertia_not_positive() {
     let error = body_refusal(|body| body.inertia_kg_m2[(1, 1)] = -0.03);
     assert!(matches!(error, BodyError::NotPositive(_)), "{error:?}");
-    says(error, &["least principal moment", "-0.03", "positive"]);
+    says(error, &["smallest principal moment", "-0.03", "positive"]);
     let flat = body_refusal(|body| body.inertia_kg_m2 = Matrix3::zeros());
     says(flat, &["0 kg m^2"]);
-    // Positive entries all over, and yet indefinite.
+    // All entries positive, but indefinite.
     let hidden = body_refusal(|body| {
         body.inertia_kg_m2 = Matrix3::new(0.02, 0.03, 0.0, 0.03, 0.02, 0.0, 0.0, 0.0, 0.02);
     });
@@ -119,23 +120,23 @@ fn inertia_beyond_the_triangle() {
     let inertia = turned * Matrix3::from_diagonal(&moments) * turned.transpose();
     let inertia = (inertia + inertia.transpose()) * 0.5;
     let error = body_refusal(|body| body.inertia_kg_m2 = inertia);
-    let BodyError::Triangle { greatest, others } = error else {
+    let BodyError::Triangle { max_moment, others } = error else {
         panic!("{error:?}");
     };
-    assert!((greatest - 0.05).abs() < 1e-12 && (others - 0.04).abs() < 1e-12);
+    assert!((max_moment - 0.05).abs() < 1e-12 && (others - 0.04).abs() < 1e-12);
     says(
         error,
         &[
-            &format!("{greatest} kg m^2"),
+            &format!("{max_moment} kg m^2"),
             &format!("{others} kg m^2"),
-            "no body",
+            "impossible",
         ],
     );
 }
 
-/// However large or small the numbers are.
+/// The checks do not depend on the magnitude of the entries.
 #[test]
-fn inertia_of_any_size_is_judged() {
+fn inertia_is_checked_at_any_magnitude() {
     for size in [1e-200, 1e-110, 1e-20, 1e20, 1e110, 1e300] {
         let judge = |x, y, z| {
             body_refusal(|body| {
@@ -157,7 +158,7 @@ fn inertia_of_any_size_is_judged() {
     }
 }
 
-/// A plate is a body, and so is one whose published moments are rounded.
+/// A thin plate is accepted, also with rounded moments.
 #[test]
 fn a_flat_body_is_accepted() {
     let mut joints = joints();
@@ -203,7 +204,7 @@ fn transform() {
         |pose| pose.translation.z = f64::NAN,
         |pose| pose.rotation[(1, 2)] = f64::INFINITY,
         |pose| pose.rotation *= 1.01,
-        // A reflection keeps lengths and is no motion.
+        // A reflection preserves lengths but is not a rigid motion.
         |pose| pose.rotation = -pose.rotation,
     ];
     for spoil in broken {
@@ -240,16 +241,17 @@ fn gravity() {
     says(error, &["gravity", "NaN m/s^2", "finite"]);
 }
 
-/// Bits of everything that an arm is made of.
+/// Text that represents every number of an arm bit for bit.
 fn bits<const N: usize>(arm: &Arm<N>) -> String {
     let (links, armature) = (arm.links(), arm.armature());
     let (tip, gravity) = (arm.joint_from_tip(), arm.gravity());
-    // The shortest decimal that reads back as the same number: one text, one set of bits.
+    // Debug prints the shortest decimal that parses to the same number, so equal texts mean equal
+    // bits.
     format!("{links:?} {armature:?} {tip:?} {gravity:?}")
 }
 
 #[test]
-fn taken_apart_and_put_together() {
+fn arm_rebuilt_from_its_links_is_identical() {
     let tip = Pose::from_xyz_rpy([0.1, 0.0, 0.3], [0.2, 0.7, -0.4]);
     let arm = Arm::new(&joints(), tip, Some(rod()), DOWN).expect("a physical arm");
     let parts = (arm.armature(), arm.joint_from_tip(), arm.gravity());

@@ -1,7 +1,7 @@
-//! The control step allocates nothing: counted by the program's own allocator.
+//! The control step allocates nothing: a counting global allocator checks it.
 #![allow(
     clippy::disallowed_methods,
-    reason = "references take their mathematics elsewhere"
+    reason = "reference values use other mathematical functions"
 )]
 
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -18,7 +18,7 @@ use support::rig::{Rig, bent, probe_at};
 struct Counting;
 
 thread_local! {
-    /// Allocations of this thread; the test harness has threads of its own.
+    /// Allocations of this thread; the test harness has its own threads.
     static COUNT: Cell<u64> = const { Cell::new(0) };
 }
 
@@ -26,12 +26,12 @@ thread_local! {
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         COUNT.with(|count| count.set(count.get() + 1));
-        // SAFETY: the caller's promise is passed on.
+        // SAFETY: the caller upholds the contract.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller's promise is passed on.
+        // SAFETY: the caller upholds the contract.
         unsafe { System.dealloc(pointer, layout) }
     }
 }
@@ -45,7 +45,7 @@ fn allocations(work: impl FnOnce()) -> u64 {
     COUNT.with(Cell::get) - before
 }
 
-/// Through every mode, a refusal, faults of two kinds and garbage.
+/// Runs through every mode, a refusal, two kinds of fault and random input.
 fn step_allocates_nothing<const N: usize>(mut config: Config<N>) {
     config.friction = friction();
     let mut rig = Rig::new(config, bent());
@@ -96,7 +96,7 @@ fn of_7_joints() {
     step_allocates_nothing(seven());
 }
 
-/// The count itself works.
+/// Checks that the counter itself works.
 #[test]
 fn an_allocation_is_counted() {
     let count = allocations(|| drop(std::hint::black_box(Box::new(Mode::Idle))));

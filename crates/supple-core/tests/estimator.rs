@@ -1,7 +1,7 @@
-//! The velocity estimator: its promises about ramps, delay, noise and lost readings.
+//! The velocity estimator: ramps, delay, noise and lost readings.
 #![allow(
     clippy::disallowed_methods,
-    reason = "references take their mathematics elsewhere"
+    reason = "reference values use other mathematical functions"
 )]
 
 use proptest::prelude::*;
@@ -40,7 +40,7 @@ fn a_ramp_is_followed_without_error() {
     );
 }
 
-/// Both poles at `r`: after a sudden start the error of the velocity is `(1 + n (1 - r)) r^n` of the
+/// With both poles at `r`, the velocity error after a sudden start is `(1 + n (1 - r)) r^n` of the
 /// speed, `n` updates after the first.
 #[test]
 fn a_sudden_start_is_followed_as_a_critically_damped_loop() {
@@ -56,15 +56,15 @@ fn a_sudden_start_is_followed_as_a_critically_damped_loop() {
         last = velocity;
         errors.push((speed - velocity) / speed);
     }
-    // Two poles at r: successive errors obey e[n+2] - 2 r e[n+1] + r^2 e[n] = 0.
+    // Two poles at r: successive errors satisfy e[n+2] - 2 r e[n+1] + r^2 e[n] = 0.
     for e in errors.windows(3) {
         assert!((e[2] - 2.0 * r * e[1] + r * r * e[0]).abs() < 1e-12);
     }
 }
 
-/// Under a constant acceleration the velocity is late by `2 / omega`, to a period.
+/// Under constant acceleration the velocity lags by `2 / omega`, to within a period.
 #[test]
-fn delay() {
+fn velocity_lags_by_two_over_omega() {
     let parameters = (-5.0..5.0, 50.0..400.0, 2.0e-4..2e-3);
     check(
         200,
@@ -92,9 +92,9 @@ fn delay() {
     );
 }
 
-/// Standard deviation of what quantisation adds to the velocity: two estimators see the same motion,
-/// one of them quantised. The motion sweeps over many quanta a cycle at ever other speeds, so that the
-/// error is as good as white; a steady speed would repeat its errors in a pattern.
+/// Standard deviation of the velocity noise due to quantisation: two estimators receive the same
+/// motion, one of them quantised. The motion covers many quanta per cycle at varying speed, so that
+/// the error is nearly white; a constant speed would give a periodic error.
 fn noise(quantum: f64, omega: f64, period_s: f64, quanta_per_cycle: f64) -> f64 {
     let mut exact = Estimator::at_rest(one(0.0));
     let mut quantised = exact;
@@ -130,7 +130,7 @@ fn noise_of_quantised_positions() {
             );
         }
     }
-    // The figure that the documentation gives.
+    // The value given in the documentation.
     let documented = 85e-6 * (200.0_f64.powi(3) * 1e-3 / 48.0).sqrt();
     assert!((documented - 1.1e-3).abs() < 0.05e-3);
 }
@@ -154,14 +154,14 @@ fn a_lost_reading_is_coasted_over_at_the_last_velocity() {
     assert_eq!(estimator.position_rad[0], coasted);
     assert!((estimator.position_rad[0] - 0.5 * t).abs() < 1e-12);
     assert!((estimator.position_rad[1] + 0.3 * t).abs() < 1e-12);
-    // It goes on as if nothing had been lost.
+    // The estimate continues as if no reading had been lost.
     let t = 402.0 * period_s;
     estimator.update(&[Some(0.5 * t), Some(-0.3 * t)], period_s, omega);
     assert!((estimator.velocity_rad_per_s[0] - 0.5).abs() < 1e-9);
 }
 
 #[test]
-fn missing_cycles_are_one_long_one() {
+fn missing_cycles_equal_one_long_cycle() {
     let omega = 200.0;
     let mut estimator = Estimator::at_rest(one(0.0));
     let mut time_s = 0.0;
@@ -174,9 +174,10 @@ fn missing_cycles_are_one_long_one() {
         }
     }
 }
-/// Readings that no arm can give leave an estimate that is finite, and forgotten once it is right again.
+/// After physically impossible readings the estimate is finite and converges again with valid
+/// readings.
 #[test]
-fn readings_so_far_apart_that_they_overflow() {
+fn the_estimator_recovers_from_overflowing_readings() {
     let mut estimator = Estimator::at_rest(one(0.0));
     for y in [f64::MAX, -f64::MAX, f64::MAX, 0.0, -f64::MAX] {
         estimator.update(&[Some(y)], 1e-3, 200.0);
@@ -190,8 +191,8 @@ fn readings_so_far_apart_that_they_overflow() {
     assert!(estimator.velocity_rad_per_s[0].abs() < 1e-9);
 }
 
-/// A number that is nearly zero and no longer of full precision is slow to compute with, and would stay: an arm
-/// that stood still would be one whose controller is late.
+/// Subnormal numbers are slow to compute with and would persist: the controller of an arm at rest
+/// would be late.
 #[test]
 fn a_joint_that_comes_to_rest_has_no_subnormal_velocity() {
     for (omega, period_s) in [(200.0, 1e-3), (50.0, 2e-3), (700.0, 5e-4)] {

@@ -1,14 +1,15 @@
-//! Friction, Eq. (3.2): continuity, slopes, symmetry, passivity, and what the printed form does.
+//! Friction, Eq. (3.2): continuity, slopes, symmetry, passivity, and the discontinuity of the
+//! printed form.
 #![allow(
     clippy::disallowed_methods,
-    reason = "references take their mathematics elsewhere"
+    reason = "reference values use other mathematical functions"
 )]
 
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use supple_core::Friction;
 
-/// Numbers of the paper's shoulder pitch.
+/// Parameters of the paper's shoulder pitch.
 const SHOULDER: Friction = Friction::coulomb(1.9823, 1.4985);
 const BAND: f64 = SHOULDER.band_rad_per_s;
 
@@ -37,7 +38,7 @@ fn any_friction() -> impl Strategy<Value = Friction> {
         })
 }
 
-/// Slope by differences from one side: towards greater speeds where `h > 0`.
+/// One-sided difference quotient: towards larger speeds if `h > 0`.
 fn one_sided_slope(friction: &Friction, v: f64, h: f64) -> f64 {
     let d = |k: f64| friction.torque_nm(v + k * h);
     (-3.0 * d(0.0) + 4.0 * d(1.0) - d(2.0)) / (2.0 * h)
@@ -52,7 +53,7 @@ fn close(found: f64, expected: f64, tolerance: f64) {
 }
 
 #[test]
-fn meets_coulomb_and_viscous_friction_at_the_edge_of_the_band() {
+fn equals_coulomb_and_viscous_friction_at_the_edge_of_the_band() {
     let Friction {
         viscous_nm_s_per_rad: v,
         coulomb_nm: s,
@@ -81,9 +82,9 @@ fn meets_coulomb_and_viscous_friction_at_the_edge_of_the_band() {
 }
 
 /// The inner branch of (3.2) as printed gives `3 S` at the edge of the band, where the outer branch
-/// gives `S`: why the sign of the parabola is turned here.
+/// gives `S`: therefore the sign of the parabola is reversed here.
 #[test]
-fn the_printed_parabola_would_jump_by_twice_the_coulomb_torque() {
+fn the_printed_parabola_jumps_by_twice_the_coulomb_torque() {
     let Friction {
         viscous_nm_s_per_rad: v,
         coulomb_nm: s,
@@ -93,13 +94,13 @@ fn the_printed_parabola_would_jump_by_twice_the_coulomb_torque() {
     let outside = SHOULDER.torque_nm(BAND * (1.0 + 1e-9));
     close(printed(BAND) - outside, 2.0 * s, 1e-8);
     close(SHOULDER.torque_nm(BAND) - outside, 0.0, 1e-8);
-    // Both are steepest at rest alike: they differ only in the square.
+    // Both have the same slope at rest: they differ only in the square.
     let h = 1e-9 * BAND;
     close(printed(h) / h, SHOULDER.torque_nm(h) / h, 1e-6 * s / BAND);
 }
 
 #[test]
-fn the_dip_starts_at_breakaway_and_ends_at_coulomb() {
+fn stribeck_friction_falls_from_breakaway_to_coulomb() {
     let without_viscous = Friction {
         viscous_nm_s_per_rad: 0.0,
         ..WITH_DIP
@@ -112,12 +113,12 @@ fn the_dip_starts_at_breakaway_and_ends_at_coulomb() {
     close(narrow.torque_nm(10.0 * 0.05), WITH_DIP.coulomb_nm, 1e-12);
     let at_stribeck = WITH_DIP.coulomb_nm + 0.6015 * (-1.0_f64).exp();
     close(without_viscous.torque_nm(0.05), at_stribeck, 1e-12);
-    // It is a dip: torque falls with speed between the two.
+    // Stribeck effect: the torque falls with speed between the two.
     assert!(without_viscous.torque_nm(0.03) > without_viscous.torque_nm(0.06));
 }
 
 #[test]
-fn none_is_none() {
+fn no_friction_has_zero_torque() {
     for v in [-3.0, -0.005, 0.0, 0.005, 3.0] {
         assert_eq!(Friction::NONE.torque_nm(v), 0.0);
     }
@@ -140,7 +141,7 @@ proptest! {
     }
 
     #[test]
-    fn never_feeds_the_joint(friction in any_friction(), v in -3.0..3.0) {
+    fn friction_is_dissipative(friction in any_friction(), v in -3.0..3.0) {
         for v in [v, v * friction.band_rad_per_s, 0.0] {
             let dissipated_w = v * (friction.torque_nm(v) - friction.offset_nm);
             prop_assert!(dissipated_w >= -1e-15, "{dissipated_w} W at {v} rad/s");
@@ -148,7 +149,7 @@ proptest! {
     }
 
     #[test]
-    fn grows_with_speed_where_there_is_no_dip(
+    fn grows_with_speed_without_stribeck_effect(
         friction in any_friction(),
         slow in -3.0..3.0,
         more in 0.0..1.0,
@@ -160,13 +161,13 @@ proptest! {
         }
     }
 
-    /// The slopes from both sides are one, at the edges of the band, at rest and anywhere.
+    /// The slopes from both sides are equal at the edges of the band, at rest and anywhere else.
     #[test]
     fn is_smooth_across_the_band(friction in any_friction(), elsewhere in -2.0..2.0) {
         let band = friction.band_rad_per_s;
         for v in [-band, 0.0, band, elsewhere * band, elsewhere] {
-            // Second-order one-sided slopes: wrong by the third derivative times h^2, and by the jump
-            // of the second derivative, 2 S_0 / band^2, times h.
+            // Second-order one-sided slopes: their error is the third derivative times h^2, plus
+            // the jump of the second derivative, 2 S_0 / band^2, times h.
             let h = 1e-6 * band.min(friction.stribeck_rad_per_s);
             let left = one_sided_slope(&friction, v, -h);
             let right = one_sided_slope(&friction, v, h);
@@ -177,13 +178,13 @@ proptest! {
     }
 
     #[test]
-    fn what_is_valid_is_accepted(friction in any_friction()) {
+    fn valid_friction_is_accepted(friction in any_friction()) {
         prop_assert_eq!(friction.validate(), Ok(()));
     }
 }
 
 #[test]
-fn refuses_what_friction_cannot_be() {
+fn invalid_friction_is_rejected() {
     type Entry = (&'static str, fn(&mut Friction, f64), &'static [f64]);
     const NAN: f64 = f64::NAN;
     const INF: f64 = f64::INFINITY;

@@ -1,7 +1,8 @@
-//! The contact latch by itself: direction, threshold, memory. In the control loop: `control/contact.rs`.
+//! Unit tests of the contact latch: direction, threshold, memory. Tests in the control loop:
+//! `control/contact.rs`.
 #![allow(
     clippy::disallowed_methods,
-    reason = "references take their mathematics elsewhere"
+    reason = "reference values use other mathematical functions"
 )]
 
 use supple_core::config::ContactLatch;
@@ -13,7 +14,7 @@ use support::configs::latch;
 
 const PERIOD_S: f64 = 1e-3;
 
-/// A latch whose reference has been moving along x for a second.
+/// A latch after one second of reference motion along x.
 fn moving(config: &ContactLatch) -> Latch {
     let mut latch = Latch::default();
     for _ in 0..1000 {
@@ -25,21 +26,26 @@ fn moving(config: &ContactLatch) -> Latch {
 
 /// One cycle with a force of `against_n` opposite to x.
 fn cycle(latch: &mut Latch, config: &ContactLatch, velocity: Vector3<f64>, against_n: f64) {
-    latch.follow(&velocity, PERIOD_S);
-    latch.decide(config, &(-Vector3::x() * against_n), 0.0, PERIOD_S);
+    latch.update_direction(&velocity, PERIOD_S);
+    latch.update_contact(config, &(-Vector3::x() * against_n), 0.0, PERIOD_S);
 }
 
-/// Held against by `newtons` while going on along x: is it contact?
-fn closes(config: &ContactLatch, newtons: f64, doubt_n: f64) -> bool {
+/// Whether `newtons` against a continued motion along x latch contact.
+fn closes(config: &ContactLatch, newtons: f64, friction_uncertainty_n: f64) -> bool {
     let mut latch = moving(config);
-    latch.follow(&(Vector3::x() * 0.04), PERIOD_S);
-    latch.decide(config, &(-Vector3::x() * newtons), doubt_n, PERIOD_S);
+    latch.update_direction(&(Vector3::x() * 0.04), PERIOD_S);
+    latch.update_contact(
+        config,
+        &(-Vector3::x() * newtons),
+        friction_uncertainty_n,
+        PERIOD_S,
+    );
     assert_eq!(latch.force_against_n(), newtons);
     latch.in_contact()
 }
 
 #[test]
-fn it_closes_above_its_threshold_and_not_at_it() {
+fn the_latch_closes_above_its_threshold_and_not_at_it() {
     let config = latch();
     assert!(!closes(&config, config.threshold_n, 0.0));
     assert!(closes(&config, config.threshold_n.next_up(), 0.0));
@@ -49,7 +55,7 @@ fn it_closes_above_its_threshold_and_not_at_it() {
 }
 
 #[test]
-fn twice_the_threshold_for_a_while_after_a_start_and_a_reversal() {
+fn the_threshold_is_doubled_after_a_start_and_a_reversal() {
     let config = latch();
     let mut latch = Latch::default();
     let mut doubled = [0, 0];
@@ -63,14 +69,14 @@ fn twice_the_threshold_for_a_while_after_a_start_and_a_reversal() {
             }
         }
     }
-    // 0.2 s of a millisecond each, to one.
+    // 0.2 s in cycles of 1 ms, to within one cycle.
     for count in doubled {
         assert!((199..=201).contains(&count), "{count} cycles");
     }
 }
 
-/// A bend of the way is no reversal, until it has turned by more than a right angle from where contact
-/// was made, however gradually.
+/// A curved path is no reversal until its direction differs by more than a right angle from that at
+/// contact, however gradually.
 #[test]
 fn contact_is_remembered_by_its_direction() {
     let config = latch();
@@ -85,7 +91,7 @@ fn contact_is_remembered_by_its_direction() {
     }
 }
 
-/// The same bend without contact: the direction goes along, and nothing is doubled.
+/// The same curve without contact: the direction follows, and the threshold is not doubled.
 #[test]
 fn without_contact_the_direction_follows_the_reference() {
     let config = latch();
@@ -99,7 +105,8 @@ fn without_contact_the_direction_follows_the_reference() {
     }
 }
 
-/// A reference that creeps has no direction: it neither releases nor begins anything.
+/// A reference slower than the minimum speed has no direction: it neither releases contact nor
+/// starts a new direction.
 #[test]
 fn a_creeping_reference_is_at_rest() {
     let config = latch();
@@ -111,16 +118,16 @@ fn a_creeping_reference_is_at_rest() {
     }
     cycle(&mut latch, &config, Vector3::x() * -2e-3, 0.0);
     assert!(!latch.in_contact(), "the retreat releases");
-    // Before it has moved there is no way to be in.
+    // Before the reference has moved there is no direction.
     let mut new = Latch::default();
     cycle(&mut new, &config, Vector3::x() * 5e-4, 50.0);
     assert_eq!(new.direction(), Vector3::zeros());
     assert!(!new.in_contact());
 }
 
-/// Whatever the fade and the pauses, the share stays a share.
+/// The fraction stays between its bounds for any fade time and any pauses.
 #[test]
-fn the_share_stays_between_its_ends() {
+fn the_friction_fraction_stays_within_its_bounds() {
     for contact_share in [0.0, 0.4, 1.0] {
         let config = ContactLatch {
             contact_share,
@@ -142,13 +149,13 @@ fn the_share_stays_between_its_ends() {
     }
 }
 
-/// A state seen again takes no time: nothing fades.
+/// A repeated state takes no time: nothing fades.
 #[test]
-fn no_time_changes_nothing_but_the_verdict() {
+fn zero_elapsed_time_updates_contact_without_fading() {
     let config = latch();
     let mut latch = moving(&config);
-    latch.follow(&(Vector3::x() * 0.04), 0.0);
-    latch.decide(&config, &(-Vector3::x() * 10.0), 0.0, 0.0);
+    latch.update_direction(&(Vector3::x() * 0.04), 0.0);
+    latch.update_contact(&config, &(-Vector3::x() * 10.0), 0.0, 0.0);
     assert!(latch.in_contact());
     assert_eq!(latch.friction_share(), 1.0);
 }

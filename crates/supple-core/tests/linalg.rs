@@ -1,7 +1,7 @@
-//! The small linear algebra against nalgebra and against its own definitions.
+//! The small linear algebra compared with nalgebra and with its definitions.
 #![allow(
     clippy::disallowed_methods,
-    reason = "references take their mathematics elsewhere"
+    reason = "reference values use other mathematical functions"
 )]
 
 mod common;
@@ -12,7 +12,7 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use supple_core::linalg::{
-    Cholesky, least_singular_value, singular_values_exceed, symmetric_eigenvalues,
+    Cholesky, min_singular_value, singular_values_exceed, symmetric_eigenvalues,
 };
 use supple_core::math::{Matrix3, Vector3, all_finite, smooth_step};
 use supple_core::{Matrix, Vector};
@@ -21,16 +21,17 @@ fn matrix<const R: usize, const C: usize>() -> impl Strategy<Value = Matrix<R, C
     vec(-2.0..2.0, R * C).prop_map(|v| Matrix::from_column_slice(&v))
 }
 
-/// Nothing, or anything from the rounding to the size of the rest.
+/// Zero, or any magnitude between rounding and one.
 fn gap() -> impl Strategy<Value = f64> {
     prop_oneof![Just(0.0), (-14.0..0.5).prop_map(|e| 10.0_f64.powf(e))]
 }
 
-/// A symmetric matrix in turned axes, and its eigenvalues in ascending order, often close together.
+/// A symmetric matrix in rotated axes, and its eigenvalues in ascending order, often close
+/// together.
 fn symmetric() -> impl Strategy<Value = (Matrix3<f64>, [f64; 3])> {
-    let least = prop_oneof![Just(0.0), -2.0..2.0];
-    (least, gap(), gap(), pose()).prop_map(|(least, first, second, frame)| {
-        let values = [least, least + first, least + first + second];
+    let min = prop_oneof![Just(0.0), -2.0..2.0];
+    (min, gap(), gap(), pose()).prop_map(|(min, first, second, frame)| {
+        let values = [min, min + first, min + first + second];
         let r = frame.rotation;
         let a = r * Matrix3::from_diagonal(&Vector3::from(values)) * r.transpose();
         ((a + a.transpose()) * 0.5, values)
@@ -84,22 +85,22 @@ proptest! {
         cholesky_solves(&b, &x)?;
     }
 
-    /// Positive definite for nalgebra's eigenvalues, or refused.
+    /// Matrices that are not positive definite by nalgebra's eigenvalues are rejected.
     #[test]
-    fn cholesky_refuses_what_is_not_positive_definite(b in matrix::<4, 4>()) {
+    fn cholesky_rejects_matrices_that_are_not_positive_definite(b in matrix::<4, 4>()) {
         let a = b + b.transpose() + Matrix::<4, 4>::identity() * 3.0;
-        let least = a.symmetric_eigenvalues().min();
-        prop_assume!(least.abs() > 1e-9);
-        prop_assert_eq!(Cholesky::new(&a).is_some(), least > 0.0);
+        let min = a.symmetric_eigenvalues().min();
+        prop_assume!(min.abs() > 1e-9);
+        prop_assert_eq!(Cholesky::new(&a).is_some(), min > 0.0);
     }
 
-    /// To the rounding where the eigenvalues are apart, to its square root where two coincide.
+    /// Accurate to rounding for distinct eigenvalues, to its square root if two coincide.
     #[test]
-    fn eigenvalues_are_those_built_in((a, expected) in symmetric()) {
+    fn eigenvalues_match_the_constructed_ones((a, expected) in symmetric()) {
         let found = symmetric_eigenvalues(&a);
-        let [least, middle, greatest] = expected;
-        let spread = greatest - least;
-        let gap = (middle - least).min(greatest - middle).max(f64::MIN_POSITIVE);
+        let [min, middle, max] = expected;
+        let spread = max - min;
+        let gap = (middle - min).min(max - middle).max(f64::MIN_POSITIVE);
         let rounding = 1e-15 * size(&a);
         let allowed = rounding + (rounding * spread / gap).min(3.0 * (rounding * spread).sqrt());
         for (f, e) in found.iter().zip(expected) {
@@ -110,7 +111,7 @@ proptest! {
     }
 
     #[test]
-    fn eigenvalues_have_trace_and_determinant(b in matrix::<3, 3>()) {
+    fn eigenvalues_match_trace_and_determinant(b in matrix::<3, 3>()) {
         let a = b + b.transpose();
         let [x, y, z] = symmetric_eigenvalues(&a);
         prop_assert!((x + y + z - a.trace()).abs() < 1e-13);
@@ -121,41 +122,41 @@ proptest! {
     }
 
     #[test]
-    fn least_singular_value_is_that_of_nalgebra(
+    fn min_singular_value_matches_nalgebra(
         three in matrix::<3, 3>(),
         four in matrix::<3, 4>(),
         seven in matrix::<3, 7>(),
     ) {
-        prop_assert!((least_singular_value(&three) - three.singular_values().min()).abs() < 1e-7);
-        prop_assert!((least_singular_value(&four) - four.singular_values().min()).abs() < 1e-7);
-        prop_assert!((least_singular_value(&seven) - seven.singular_values().min()).abs() < 1e-7);
+        prop_assert!((min_singular_value(&three) - three.singular_values().min()).abs() < 1e-7);
+        prop_assert!((min_singular_value(&four) - four.singular_values().min()).abs() < 1e-7);
+        prop_assert!((min_singular_value(&seven) - seven.singular_values().min()).abs() < 1e-7);
     }
 
     #[test]
-    fn singular_values_exceed_what_the_least_of_them_does(
+    fn singular_values_exceed_agrees_with_the_minimum(
         three in matrix::<3, 3>(),
         seven in matrix::<3, 7>(),
         bound in 0.01..2.0_f64,
     ) {
-        let least = three.singular_values().min();
-        prop_assume!((least - bound).abs() > 1e-9);
-        prop_assert_eq!(singular_values_exceed(&three.data.0, bound), least > bound);
-        let least = seven.singular_values().min();
-        prop_assume!((least - bound).abs() > 1e-9);
-        prop_assert_eq!(singular_values_exceed(&seven.data.0, bound), least > bound);
+        let min = three.singular_values().min();
+        prop_assume!((min - bound).abs() > 1e-9);
+        prop_assert_eq!(singular_values_exceed(&three.data.0, bound), min > bound);
+        let min = seven.singular_values().min();
+        prop_assume!((min - bound).abs() > 1e-9);
+        prop_assert_eq!(singular_values_exceed(&seven.data.0, bound), min > bound);
     }
 
-    /// Columns in one plane, then along one line.
+    /// Columns in a plane, then along a line.
     #[test]
-    fn least_singular_value_vanishes_with_the_rank(b in matrix::<3, 4>(), a in matrix::<2, 4>()) {
+    fn min_singular_value_vanishes_with_the_rank(b in matrix::<3, 4>(), a in matrix::<2, 4>()) {
         let plane = Matrix::<3, 4>::from_rows(&[
             a.row(0).into_owned(),
             a.row(1).into_owned(),
             a.row(0) - a.row(1) * 2.0,
         ]);
-        prop_assert!(least_singular_value(&plane) <= 3e-4 * plane.norm());
+        prop_assert!(min_singular_value(&plane) <= 3e-4 * plane.norm());
         let line = b.column(0) * a.row(0);
-        prop_assert!(least_singular_value(&line) <= 3e-4 * line.norm());
+        prop_assert!(min_singular_value(&line) <= 3e-4 * line.norm());
     }
 
     #[test]
@@ -170,7 +171,7 @@ proptest! {
 }
 
 #[test]
-fn cholesky_refuses_the_edge_and_what_is_no_number() {
+fn cholesky_rejects_semidefinite_and_nan() {
     assert!(Cholesky::new(&Matrix3::zeros()).is_none());
     assert!(Cholesky::new(&Matrix3::repeat(1.0)).is_none());
     assert!(Cholesky::new(&-Matrix3::<f64>::identity()).is_none());
@@ -184,13 +185,13 @@ fn cholesky_refuses_the_edge_and_what_is_no_number() {
 }
 
 #[test]
-fn eigenvalues_of_a_multiple_of_the_identity_are_it() {
+fn eigenvalues_of_a_multiple_of_the_identity_are_equal() {
     assert_eq!(
         symmetric_eigenvalues(&(Matrix3::identity() * 0.3)),
         [0.3; 3]
     );
     assert_eq!(symmetric_eigenvalues(&Matrix3::zeros()), [0.0; 3]);
-    assert_eq!(least_singular_value(&Matrix::<3, 7>::zeros()), 0.0);
+    assert_eq!(min_singular_value(&Matrix::<3, 7>::zeros()), 0.0);
 }
 
 #[test]
@@ -206,7 +207,7 @@ fn smooth_step_rests_at_both_ends() {
 }
 
 #[test]
-fn all_finite_sees_each_entry() {
+fn all_finite_checks_each_entry() {
     let mut m = Matrix::<2, 3>::zeros();
     assert!(all_finite(&m));
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {

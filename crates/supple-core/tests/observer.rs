@@ -1,7 +1,7 @@
 //! The momentum observer on an exactly simulated arm: a first-order lag of the stated bandwidth.
 #![allow(
     clippy::disallowed_methods,
-    reason = "references take their mathematics elsewhere"
+    reason = "reference values use other mathematical functions"
 )]
 
 use supple_core::config::Role;
@@ -16,8 +16,8 @@ use support::arms::{wam3, wam4};
 use support::configs::four;
 use support::plant::{Plant, push};
 
-/// Runs the observer beside an arm that is driven to swing about, with `external` torque on it.
-/// Returns the residual after each cycle, the arm's angles then, and the greatest rate of `C^T qd - G`.
+/// Runs the observer on an oscillating arm with the torque `external` on it. Returns the residual
+/// and the arm's angles after each cycle, and the maximum rate of `C^T qd - G`.
 fn observe<const N: usize>(
     arm: Arm<N>,
     external: impl Fn(f64, &Arm<N>, &Vector<N>) -> Vector<N>,
@@ -41,7 +41,8 @@ fn observe<const N: usize>(
     for k in 0..cycles {
         let time_s = f64::from(k) * period_s;
         let before = now.kinetic_gradient - now.gravity;
-        // Weight carried about, a soft spring to the start, and a swing: well-behaved motion.
+        // Gravity compensation, a soft spring to the start, and an oscillating torque: smooth
+        // motion.
         let torque = now.gravity - (plant.q - start) * 10.0 - plant.qd * 2.0
             + Vector::from_fn(|i, _| 2.0 * (3.0 * time_s + i as f64).sin());
         plant.advance(&torque, |arm, q, _| external(time_s, arm, q), period_s, 20);
@@ -67,9 +68,9 @@ fn nothing<const N: usize>(_: f64, _: &Arm<N>, _: &Vector<N>) -> Vector<N> {
     Vector::zeros()
 }
 
-/// The drift is taken at the end of each cycle: half a period's change of it is all that shows.
+/// `C^T qd - G` is sampled at the end of each cycle: the error is its change over half a period.
 #[test]
-fn nothing_external_is_nothing_observed_but_discretisation() {
+fn without_external_torque_only_discretisation_error_remains() {
     let worst = |period_s: f64| {
         let run = observe(wam4(), nothing, 40.0, period_s, 2.0);
         let worst = run.residuals.iter().map(support::size).fold(0.0, f64::max);
@@ -112,10 +113,10 @@ fn a_step_is_followed_as_a_first_order_lag() {
     }
 }
 
-/// A turning force on the tip, told from the residual by `Jb^T`: amplitude and phase of a first-order
-/// lag at that frequency.
+/// A rotating force on the tip, computed from the residual by `Jb^T`: amplitude and phase of a
+/// first-order lag at that frequency.
 #[test]
-fn a_swinging_tip_force_is_seen_with_the_lags_gain_and_delay() {
+fn a_rotating_tip_force_is_observed_with_first_order_gain_and_lag() {
     let (omega, w, period_s) = (40.0, 12.0, 2.5e-4);
     let force = move |time_s: f64| {
         let (sin, cos) = (w * time_s).sin_cos();
@@ -147,14 +148,14 @@ fn a_swinging_tip_force_is_seen_with_the_lags_gain_and_delay() {
         worst = worst.max((seen - expected).norm());
         last = time_s;
     }
-    // The pose changes within the lag, by a few per cent.
+    // The pose changes during the lag, by a few per cent.
     assert!(worst < 0.15 * 4.5, "{worst} N off");
     assert!(last > 1.5);
 }
 
-/// At rest in the hand of someone: the residual is the torque itself.
+/// At rest under an external torque the residual equals that torque.
 #[test]
-fn a_steady_force_is_seen_whole() {
+fn a_constant_force_is_observed_completely() {
     let config = four();
     let arm = config.arm;
     let q = support::rig::bent::<4>();
@@ -164,7 +165,7 @@ fn a_steady_force_is_seen_whole() {
     let external = push(&arm, &q, &force);
     let mut observer = MomentumObserver::default();
     for _ in 0..2000 {
-        // What holds the arm against it is the drive.
+        // The net torque of the motors balances the external one.
         let drive = -external;
         observer.update(&here.momentum, &drive, 1e-3, 40.0);
     }
@@ -174,7 +175,7 @@ fn a_steady_force_is_seen_whole() {
     assert_eq!(observer, MomentumObserver::default());
 }
 
-/// Implicit in the residual: no bandwidth makes it unstable.
+/// The update is implicit in the residual: no bandwidth makes it unstable.
 #[test]
 fn any_bandwidth_is_stable() {
     for omega in [1.0, 1e3, 1e5, 1e9] {

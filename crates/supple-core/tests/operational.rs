@@ -1,8 +1,9 @@
-//! The law in one piece: the accelerations that it gives the tip, and what it is made of.
+//! The law as a single sum: the resulting accelerations of the tip, and agreement with the law term
+//! by term.
 
 #![allow(
     clippy::disallowed_methods,
-    reason = "references take their mathematics elsewhere"
+    reason = "reference values use other mathematical functions"
 )]
 
 mod common;
@@ -14,11 +15,11 @@ use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
 use supple_core::config::{Gains, Law, Role};
 use supple_core::dynamics::{Terms, aba, crba, terms};
-use supple_core::impedance::{GREATEST_TASK_MASS_KG, SINGULAR_BELOW_M, Situation, Task, impedance};
+use supple_core::impedance::{LawInput, MAX_TASK_MASS_KG, SINGULAR_BELOW_M, Task, impedance};
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::nalgebra::{Rotation3, Unit};
 use supple_core::operational::{
-    GREATEST_TASK_INERTIA_KG_M2, PoseGains, PoseReference, orientation_error, pose_torque,
+    MAX_TASK_INERTIA_KG_M2, PoseGains, PoseReference, orientation_error, pose_torque,
     position_torque,
 };
 use supple_core::{Arm, Friction, Matrix, Pose, Reference, Vector};
@@ -45,7 +46,7 @@ fn gains() -> PoseGains {
     }
 }
 
-/// Some way off from where the tip is, as far as the case's accelerations happen to say.
+/// A reference at a random distance from the tip, derived from the case's accelerations.
 fn reference<const N: usize>(case: &Case<N>, terms: &Terms<N>) -> PoseReference {
     let [a, b, c] = [case.qdd[0], case.qdd[1], case.qdd[2]].map(|x| 0.05 * x);
     let turn = Pose::from_xyz_rpy([0.0; 3], [a, b, c]).rotation;
@@ -65,14 +66,15 @@ fn pair(linear: &Vector3<f64>, angular: &Vector3<f64>) -> Vector<6> {
     Vector::<6>::from_iterator(linear.iter().chain(angular.iter()).copied())
 }
 
-/// Whether the pose's damped inverse is the inverse.
+/// Whether the inverse of the pose's mobility is undamped.
 fn regular<const N: usize>(mobility: &Matrix<6, 6>) -> bool {
     let felt = inverse(mobility).diagonal();
-    felt.fixed_rows::<3>(0).max() < GREATEST_TASK_MASS_KG
-        && felt.fixed_rows::<3>(3).max() < GREATEST_TASK_INERTIA_KG_M2
+    felt.fixed_rows::<3>(0).max() < MAX_TASK_MASS_KG
+        && felt.fixed_rows::<3>(3).max() < MAX_TASK_INERTIA_KG_M2
 }
 
-/// The tip is accelerated as the reference, and by the spring's and damper's force through its own mobility.
+/// The tip accelerates with the reference, plus the force of spring and damper through its own
+/// mobility.
 fn tip_moves_as_stated<const N: usize>(case: &Case<N>) -> Outcome {
     let (arm, q, qd) = (case.arm(), &case.q, &case.qd);
     let terms = filled(&arm, q, qd);
@@ -126,7 +128,8 @@ fn tip_of_7_joints_moves_as_stated() {
     check(tip_moves_as_stated::<7>);
 }
 
-/// Motion that leaves the pose alone is damped; the damping never puts energy in, singular or not.
+/// Motion that does not change the pose is damped; the damping never adds energy, also in singular
+/// poses.
 #[test]
 fn null_space_damping_of_the_pose_only_takes_energy() {
     fn takes(case: &Case<7>) -> Outcome {
@@ -138,13 +141,13 @@ fn null_space_damping_of_the_pose_only_takes_energy() {
         let damping = with.expect("definite") - without.expect("definite");
         let power = damping.dot(qd);
         let size = 1.0 + with.expect("definite").norm() * qd.norm();
-        prop_assert!(power <= 1e-12 * size, "{power} W put in");
+        prop_assert!(power <= 1e-12 * size, "{power} W added");
         Ok(())
     }
     check(takes);
 }
 
-/// The same as the law whose terms are apart, near singular poses too.
+/// Equal to the law computed term by term, also near singular poses.
 fn is_the_law_in_terms<const N: usize>(case: &Case<N>) -> Outcome {
     let (arm, qd) = (case.arm(), &case.qd);
     let terms = filled(&arm, &case.q, qd);
@@ -158,11 +161,11 @@ fn is_the_law_in_terms<const N: usize>(case: &Case<N>) -> Outcome {
     let law = Law {
         inertial_feedforward: true,
         nullspace_damping_nm_s_per_rad: DAMPING,
-        ..Law::paper_letter(gains)
+        ..Law::as_published(gains)
     };
     let roles = [Role::Active; N];
     let task = Task::new(&terms, &roles).expect("positive definite");
-    let now = Situation {
+    let now = LawInput {
         spring_limit_n: f64::MAX,
         reference: &reference,
         velocity_rad_per_s: qd,
@@ -228,7 +231,7 @@ fn singular_poses_have_a_finite_torque() {
             ..PoseReference::at_rest(terms.base_from_tip)
         };
         let tau = pose_torque(&arm, &q, &qd, &reference, &gains(), DAMPING).expect("definite");
-        // What gravity, the motion and accelerating 20 kg at 1 m could ask for, and not more.
+        // Bound: gravity, the motion, and accelerating 20 kg at 1 m.
         assert!(tau.norm() < 300.0, "{tau}");
     }
 }

@@ -1,4 +1,5 @@
-//! Requests as numbers: nothing is lost on the way there and back, and nonsense is refused.
+//! Requests encoded as numbers: encoding and decoding is lossless, and invalid numbers are
+//! rejected.
 
 use proptest::prelude::*;
 use proptest::strategy::Union;
@@ -18,7 +19,7 @@ fn vector() -> impl Strategy<Value = Vector3<f64>> {
     [number(), number(), number()].prop_map(Vector3::from)
 }
 
-/// One of every kind, by its number.
+/// One trajectory of every kind, with its code.
 fn trajectory() -> impl Strategy<Value = (u8, Trajectory)> {
     let vectors = (vector(), vector(), vector());
     let numbers = proptest::array::uniform8(number());
@@ -129,14 +130,14 @@ proptest! {
     })]
 
     #[test]
-    fn every_request_comes_back_to_the_last_bit((numbers, request) in request()) {
+    fn every_request_round_trips_bit_exact((numbers, request) in request()) {
         let code = RequestCode::new(request.as_ref());
         prop_assert_eq!((code.kind, code.trajectory), numbers);
         prop_assert!(code.values().len() <= VALUES);
         let parts = RequestCode::from_parts(code.kind, code.trajectory, code.values());
         prop_assert_eq!(parts, Ok(code));
         let again = code.request::<4>().expect("known");
-        // Debug tells -0 from 0, and prints every other number with all its digits.
+        // Debug distinguishes -0 from 0, and prints every other number with all its digits.
         prop_assert_eq!(format!("{again:?}"), format!("{request:?}"));
     }
 }
@@ -150,7 +151,7 @@ fn decode(
 }
 
 #[test]
-fn what_is_not_known_or_not_whole_is_refused() {
+fn unknown_and_incomplete_codes_are_rejected() {
     assert_eq!(decode(9, 0, &[]), Err(RequestCodeError::Kind(9)));
     assert_eq!(decode(4, 0, &[]), Err(RequestCodeError::Trajectory(0)));
     assert_eq!(

@@ -1,20 +1,21 @@
-//! Sines and cosines of all joints against `libm`, and against sums of their series in twice the precision.
+//! Sines and cosines of all joints compared with `libm`, and with their series in double-double
+//! arithmetic.
 #![allow(
     clippy::disallowed_methods,
-    reason = "references take their mathematics elsewhere"
+    reason = "reference values use other mathematical functions"
 )]
 
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use std::f64::consts::{FRAC_PI_2, PI};
-use supple_core::sincos::{GREATEST_RAD, sin_cos_all};
+use supple_core::sincos::{MAX_ANGLE_RAD, sin_cos_all};
 
 fn sin_cos(angle: f64) -> (f64, f64) {
     let ([sine], [cosine]) = sin_cos_all(&[angle]);
     (sine, cosine)
 }
 
-/// A sum of two numbers that do not overlap.
+/// Double-double number: a sum of two numbers that do not overlap.
 #[derive(Clone, Copy)]
 struct Double(f64, f64);
 
@@ -41,7 +42,7 @@ impl Double {
     }
 }
 
-/// Power series about zero, for `|x| <= 10`: exact to about 1e-28 there.
+/// Power series about zero, for `|x| <= 10`: accurate to about 1e-28 there.
 fn series(x: f64) -> (Double, Double) {
     let x = Double(x, 0.0);
     let (mut sine, mut cosine) = (Double(0.0, 0.0), Double(0.0, 0.0));
@@ -62,7 +63,7 @@ fn series(x: f64) -> (Double, Double) {
     (sine, cosine)
 }
 
-/// Units in the last place of the reference.
+/// Error in units in the last place of the reference.
 fn ulps(found: f64, expected: Double) -> f64 {
     let exact = expected.0 + expected.1;
     let unit = f64::from_bits(exact.abs().to_bits() + 1) - exact.abs();
@@ -91,13 +92,13 @@ proptest! {
         let x = f64::from(n) * FRAC_PI_2 + off;
         let (sine, cosine) = sin_cos(x);
         let (expected_sine, expected_cosine) = series(x);
-        // The series itself is good to 1e-28.
+        // The series itself is accurate to 1e-28.
         prop_assert!(ulps(sine, expected_sine) < 1.0 || expected_sine.0.abs() < 1e-11, "sin({x:e})");
         prop_assert!(ulps(cosine, expected_cosine) < 1.0 || expected_cosine.0.abs() < 1e-11, "cos({x:e})");
     }
 
     #[test]
-    fn beyond_the_joints_it_is_libm_to_two_units(x in -2.0 * GREATEST_RAD..2.0 * GREATEST_RAD) {
+    fn within_two_units_of_libm_beyond_the_range_of_joints(x in -2.0 * MAX_ANGLE_RAD..2.0 * MAX_ANGLE_RAD) {
         let (sine, cosine) = sin_cos(x);
         let (s, c) = libm::sincos(x);
         prop_assert!(ulps(sine, Double(s, 0.0)) <= 2.0, "sin({x:e})");
@@ -105,7 +106,7 @@ proptest! {
     }
 
     #[test]
-    fn each_depends_on_its_own_angle_alone(x in -4.0..4.0_f64, others in [-1e9..1e9_f64, -4.0..4.0, -4.0..4.0]) {
+    fn each_result_depends_on_its_own_angle_alone(x in -4.0..4.0_f64, others in [-1e9..1e9_f64, -4.0..4.0, -4.0..4.0]) {
         let [a, b, c] = others;
         let (sines, cosines) = sin_cos_all(&[a, b, x, c]);
         prop_assert_eq!((sines[2], cosines[2]), sin_cos(x));
@@ -113,7 +114,7 @@ proptest! {
 }
 
 #[test]
-fn what_is_far_or_no_number_is_libm() {
+fn large_and_nonfinite_angles_use_libm() {
     for x in [1e6_f64.next_up(), -1e7, 1e22, f64::MAX] {
         assert_eq!(sin_cos(x), libm::sincos(x));
     }
@@ -133,7 +134,7 @@ fn quarter_turns_and_small_angles() {
     );
     let (sine, cosine) = sin_cos(FRAC_PI_2);
     assert_eq!(sine, 1.0);
-    // The rest of pi/2 beyond its double.
+    // Difference of pi/2 and its nearest double.
     assert!((cosine - 6.123_233_995_736_766e-17).abs() < 1e-32);
     let (sine, cosine) = sin_cos(-PI);
     assert!((sine + 1.224_646_799_147_353_2e-16).abs() < 1e-31);

@@ -1,12 +1,12 @@
-//! What an emulated arm is told before it starts: everything that a real one has as it comes from the
-//! factory, with the default of each and where it comes from.
+//! Configuration of an emulated arm: the factory settings of a real one, each with its default and the source of
+//! that default.
 
 use supple_puck::status::Role;
 
-/// Millisecond in nanoseconds.
+/// One millisecond in nanoseconds.
 pub(crate) const MS: u64 = 1_000_000;
 
-/// One motor puck.
+/// Configuration of a motor puck.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PuckConfig {
     /// Firmware version; 175 by default, the newest list of property ids.
@@ -15,19 +15,19 @@ pub struct PuckConfig {
     pub role: Role,
     /// Units of torque per N m at the motor.
     pub units_per_nm: i32,
-    /// Most torque that the puck applies \[puck units\].
+    /// Maximum torque that the puck applies \[puck units\].
     pub max_torque: i32,
-    /// Poles of the motor, which tell the joint's motor type.
+    /// Poles of the motor, which identify the motor type.
     pub poles: i32,
     /// Encoder counts per revolution.
     pub counts_per_revolution: i32,
-    /// Groups that the puck listens to, as they are in its EEPROM.
+    /// Groups of the puck, as stored in its EEPROM.
     pub groups: [u8; 3],
     /// Slot in the packed torque frame, from 1.
     pub slot: i32,
     /// Temperature \[degrees Celsius\]; 30 by default.
     pub temperature: i32,
-    /// It answers at all; true by default.
+    /// Whether the node answers at all; true by default.
     pub present: bool,
 }
 
@@ -61,50 +61,49 @@ impl PuckConfig {
     }
 }
 
-/// The safety module.
+/// Configuration of the safety module.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SafetyConfig {
     /// Firmware version; 175 by default.
     pub version: i32,
-    /// Silence of any arm puck after which positions count as no longer reported \[ns\]; 100 ms by
-    /// default, the longest that OWD waits. The real value is not published.
+    /// Silence of an arm puck after which its positions count as missing \[ns\]; 100 ms by default, the longest
+    /// wait of OWD. The real value is not published.
     pub heartbeat_ns: u64,
-    /// Time in which the arm must have slowed down after a velocity fault, or an emergency stop follows
-    /// \[ns\]; 0.5 s, the documented one.
+    /// Time within which the arm must slow down after a velocity fault to avoid an emergency stop \[ns\]; 0.5 s
+    /// as documented.
     pub slow_down_ns: u64,
     /// Bus voltage \[V\]; 48 by default.
     pub voltage: i32,
-    /// It answers at all; true by default.
+    /// Whether the node answers at all; true by default.
     pub present: bool,
 }
 
-/// Everything.
+/// Configuration of the emulated arm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EmulatorConfig {
     /// Motor pucks, in the order of the joints.
     pub pucks: Vec<PuckConfig>,
     /// Safety module.
     pub safety: SafetyConfig,
-    /// A force/torque sensor is mounted; true by default.
+    /// Whether a force/torque sensor is mounted; true by default.
     pub force_sensor: bool,
-    /// The arm's positions are known already, as when another program has run before: counts are
-    /// those of the joint angles and ZERO is 1. False by default: counts begin at 0 wherever the arm
-    /// stands.
+    /// Whether the positions are already known, as after a run of another program: the counts match the joint
+    /// angles and ZERO is 1. False by default: the counts start at 0 in any pose.
     pub zeroed: bool,
-    /// The arm lies in a cradle in its start pose until the motors first take torque; true by default.
-    /// Without, braking motors let it sink from the beginning.
+    /// Whether a cradle holds the arm in its start pose until the motors first enter torque mode; true by
+    /// default. Otherwise the arm descends against the braking motors from the start.
     pub cradle: bool,
-    /// Time between a frame's end and a node's answer to it \[ns\]; 10 us by default, chosen.
+    /// Time between a frame's end and a node's answer to it \[ns\]; 10 us by default, an assumption.
     pub latency_ns: u64,
-    /// What is added to it, at most, by chance \[ns\]; 5 us by default, chosen.
+    /// Maximum random addition to the latency \[ns\]; 5 us by default, an assumption.
     pub jitter_ns: u64,
-    /// Time from "set STAT" to a puck's being ready \[ns\]; 0.8 s by default, within the 1 s that
-    /// libbarrett waits.
+    /// Time from "set STAT" until a puck is ready \[ns\]; 0.8 s by default, within the 1 s that libbarrett
+    /// waits.
     pub wake_ns: u64,
-    /// From this time after "set STAT" on, until it is ready, a puck's transceiver is off and on: a
-    /// frame on the bus then drives the host's controller off it \[ns\]; 0.2 s by default, chosen.
+    /// From this time after "set STAT" until the puck is ready, its transceiver switches off and on, and a frame
+    /// of the host makes the host's controller go bus-off \[ns\]; 0.2 s by default, an assumption.
     pub wake_quiet_from_ns: u64,
-    /// Speed of the bus-off recovery, the interface's `restart-ms` \[ns\]; 100 ms by default.
+    /// Time of the bus-off recovery, the interface's `restart-ms` \[ns\]; 100 ms by default.
     pub restart_ns: u64,
     /// Step of the physics \[ns\]; 0.2 ms by default. Encoders are read and torques act on this grid.
     pub step_ns: u64,
@@ -113,7 +112,7 @@ pub struct EmulatorConfig {
 }
 
 impl EmulatorConfig {
-    /// A WAM of `joints` joints.
+    /// Configuration of a WAM with `joints` joints.
     pub fn wam(joints: usize) -> EmulatorConfig {
         EmulatorConfig {
             pucks: (1..=joints).map(PuckConfig::wam).collect(),

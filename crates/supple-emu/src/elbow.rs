@@ -1,7 +1,7 @@
-//! Where the safety module watches the arm: the elbow and a point of the forearm.
+//! Points of the arm that the safety module monitors: the elbow and a point of the forearm.
 //!
-//! The module knows the WAM's own kinematics and nothing of what is mounted on it: the elbow 550 mm from
-//! the shoulder and 45 mm to the side, and the point 350 mm beyond it. With `q1` to `q4` the joints:
+//! The module uses the WAM's kinematics without any tool: the elbow 550 mm from the shoulder and 45 mm to the
+//! side, and the point 350 mm beyond it. With `q1` to `q4` the joints:
 //!
 //! ```text
 //! elbow   = Rz(q1) Ry(q2) Rz(q3) (0.045, 0, 0.55)
@@ -17,11 +17,11 @@ const SHOULDER_TO_ELBOW_M: Vector3<f64> = Vector3::new(0.045, 0.0, 0.55);
 const ELBOW_TO_FOREARM_M: Vector3<f64> = Vector3::new(-0.045, 0.0, 0.35);
 
 /// Both points at the first four joint angles \[rad\], from the shoulder \[m\].
-pub fn watched_points_m(q: &[f64; 4]) -> [Vector3<f64>; 2] {
-    let turn = |roll: [f64; 3]| Pose::from_xyz_rpy([0.0; 3], roll).rotation;
-    let upper = turn([0.0, q[1], q[0]]) * turn([0.0, 0.0, q[2]]);
+pub fn monitored_points_m(q: &[f64; 4]) -> [Vector3<f64>; 2] {
+    let rotation = |roll: [f64; 3]| Pose::from_xyz_rpy([0.0; 3], roll).rotation;
+    let upper = rotation([0.0, q[1], q[0]]) * rotation([0.0, 0.0, q[2]]);
     let elbow = upper * SHOULDER_TO_ELBOW_M;
-    let forearm = elbow + upper * turn([0.0, q[3], 0.0]) * ELBOW_TO_FOREARM_M;
+    let forearm = elbow + upper * rotation([0.0, q[3], 0.0]) * ELBOW_TO_FOREARM_M;
     [elbow, forearm]
 }
 
@@ -31,9 +31,9 @@ mod tests {
     use supple_core::dynamics::joint_poses;
     use supple_model::Description;
 
-    /// The description has the same arm, framed by another convention.
+    /// The description models the same arm with another frame convention.
     #[test]
-    fn the_elbow_is_the_described_arms() {
+    fn the_elbow_matches_the_described_arm() {
         let config = Description::asset("wam4").unwrap().config::<4>().unwrap();
         for q in [
             [0.0, 0.0, 0.0, 0.0],
@@ -42,7 +42,7 @@ mod tests {
         ] {
             let poses = joint_poses(&config.arm, &q.into());
             let shoulder = poses[1].translation;
-            let [elbow, forearm] = watched_points_m(&q);
+            let [elbow, forearm] = monitored_points_m(&q);
             assert!((poses[3].translation - shoulder - elbow).norm() < 1e-6);
             assert!(((forearm - elbow).norm() - ELBOW_TO_FOREARM_M.norm()).abs() < 1e-12);
         }

@@ -1,33 +1,37 @@
-//! The whole arm on its bus: an event at a time, in virtual time.
+//! The complete arm on its bus: an event-driven simulation in virtual time.
 
 use crate::config::EmulatorConfig;
 use crate::error::EmulatorError;
 use crate::puck::{Power, Puck};
-use crate::safety::{Press, SafetyModule};
+use crate::safety::{ButtonPress, SafetyModule};
 use crate::sensor::ForceSensor;
 use crate::wire::Wire;
+use rand_xoshiro::SplitMix64;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use std::collections::VecDeque;
 use supple_bus::virtual_time::Peer;
 use supple_bus::{BusFault, Event};
 use supple_core::dynamics::tip_pose;
 use supple_core::nalgebra::Matrix4;
 use supple_core::{Matrix, Vector};
-use supple_plant::{Drive, Injection, InjectionError, Injector, Plant, PlantConfig, Sight, Truth};
+use supple_plant::{
+    ActuatorModel, ControllerView, Injection, InjectionError, Injector, Plant, PlantConfig, Truth,
+};
 use supple_puck::safety::SafetyMode;
 use supple_puck::status::MotorMode;
 use supple_puck::{CanFrame, Destination, GroupId, NodeId, PackedTorques};
 
-/// Something worth telling, with its time \[ns\].
+/// An event of the emulated arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Happening {
+pub enum ArmEvent {
     /// An operator pressed a button.
-    Pressed(Press),
-    /// The safety module came to this mode.
+    Pressed(ButtonPress),
+    /// The safety module entered this mode, for this cause.
     Safety(SafetyMode, crate::safety::Cause),
-    /// A motor puck came to this mode.
+    /// A motor puck entered this mode.
     Motor(usize, MotorMode),
-    /// The host spoke while pucks were waking and was driven off the bus.
-    SpokeWhileWaking,
+    /// The host sent a frame while pucks were waking up, and went bus-off.
+    HostSentDuringWakeUp,
 }
 
 /// The emulated arm.
@@ -42,28 +46,29 @@ pub struct Emulator<const N: usize> {
     pucks: Vec<Puck>,
     safety: SafetyModule,
     sensor: Option<ForceSensor>,
-    /// Until then the host is off the bus \[ns\].
+    /// Until this time the host is bus-off \[ns\].
     host_off_until_ns: Option<u64>,
     report: Option<BusFault>,
-    random: u64,
-    happenings: Vec<(u64, Happening)>,
-    /// The machine's clock over the arm's time, now and at each happening \[ns\].
+    random: SplitMix64,
+    arm_events: Vec<(u64, ArmEvent)>,
+    /// Offset of the monotonic clock from the arm's time \[ns\]: now, and at each event.
     offset_ns: u64,
     offsets_ns: Vec<u64>,
-    /// Presses to come, the soonest first.
-    presses: VecDeque<(u64, Press)>,
-    /// Presses that wait for the host's first torque, with their time after it \[ns\].
-    once_held: Vec<(u64, Press)>,
+    /// Scheduled button presses in order of time.
+    presses: VecDeque<(u64, ButtonPress)>,
+    /// Button presses scheduled relative to the host's first torque, with their delay after it \[ns\].
+    after_first_torque: Vec<(u64, ButtonPress)>,
     powered: bool,
     in_cradle: bool,
 }
 
 impl<const N: usize> Emulator<N> {
-    /// An arm at rest at `start_rad`, powered up in the emergency stop, at time `start_ns`. Of the
-    /// plant's drive transmission, ripple and braking are used: counts and torque units are the pucks'.
+    /// An arm at rest at `start_rad`, powered up in the emergency stop, at time `start_ns`. Transmission, ripple
+    /// and braking come from the plant's actuator model; counts and torque units from the pucks.
     ///
     /// # Errors
-    /// An arm that has not 4 or 7 joints, a puck without a list of ids, or what the plant refuses.
+    /// If the arm does not have 4 or 7 joints, a puck has no list of ids, or the plant rejects its
+    /// configuration.
     pub fn new(
         config: EmulatorConfig,
         mut plant: PlantConfig<N>,
@@ -79,15 +84,15 @@ impl<const N: usize> Emulator<N> {
                 expected: N,
             });
         }
-        let joint_from_motor = plant.drive.joint_from_motor;
+        let joint_from_motor = plant.actuators.joint_from_motor;
         let motor_from_joint = joint_from_motor
             .try_inverse()
             .ok_or(EmulatorError::Transmission)?;
-        plant.drive = Drive {
+        plant.actuators = ActuatorModel {
             joint_from_motor,
-            ripple: plant.drive.ripple,
-            braking_nm_s_per_rad: plant.drive.braking_nm_s_per_rad,
-            ..Drive::direct()
+            ripple: plant.actuators.ripple,
+            braking_nm_s_per_rad: plant.actuators.braking_nm_s_per_rad,
+            ..ActuatorModel::direct()
         };
         plant.step_s = config.step_ns as f64 * 1e-9;
         plant.cycle_s = plant.step_s;
@@ -126,12 +131,12 @@ impl<const N: usize> Emulator<N> {
             sensor: config.force_sensor.then(ForceSensor::new),
             host_off_until_ns: None,
             report: None,
-            random: config.seed,
-            happenings: Vec::new(),
+            random: SplitMix64::seed_from_u64(config.seed),
+            arm_events: Vec::new(),
             offset_ns: 0,
             offsets_ns: Vec::new(),
             presses: VecDeque::new(),
-            once_held: Vec::new(),
+            after_first_torque: Vec::new(),
             powered: false,
             in_cradle: config.cradle,
             config,
@@ -139,67 +144,66 @@ impl<const N: usize> Emulator<N> {
         for puck in &mut emulator.pucks {
             puck.power_down();
         }
-        emulator.turn_motors();
+        emulator.update_motor_angles();
         if emulator.config.zeroed {
-            emulator.press(Press::Idle);
+            emulator.press(ButtonPress::Idle);
             let counts: Vec<i32> = emulator.true_counts();
             for (puck, counts) in emulator.pucks.iter_mut().zip(counts) {
                 puck.wake_at_once();
-                puck.define(counts);
+                puck.set_counts(counts);
             }
             emulator.safety.set_zeroed(true);
         }
         Ok(emulator)
     }
 
-    /// Puts faults into the arm, in the place of those given before; to be called before time goes on. Delays are
-    /// counted in control cycles of `period_s`. Encoders are those of joints, replies those of pucks.
+    /// Injects faults into the arm, replacing earlier ones. Call it before advancing time. Delays are counted in
+    /// control cycles of `period_s`. Encoder faults refer to joints, reply faults to pucks.
     ///
     /// # Errors
-    /// What an arm on a bus cannot do, and a joint or motor that this one has not.
+    /// If a fault is not supported on a bus, or its joint or motor does not exist.
     pub fn inject(
         &mut self,
         injections: &[Injection],
         period_s: f64,
     ) -> Result<(), InjectionError> {
         for injection in injections {
-            injection.on_bus()?;
+            injection.check_bus_support()?;
         }
         self.injector = Injector::new(injections, &mut self.plant, period_s)?;
-        self.turn_motors();
+        self.update_motor_angles();
         Ok(())
     }
 
-    /// How many of them have begun.
+    /// Number of injected faults that have started.
     pub fn injections_begun(&self) -> usize {
         self.injector.begun()
     }
 
-    /// An operator presses a button.
-    pub fn press(&mut self, press: Press) {
-        self.note(Happening::Pressed(press));
-        let told = self.safety.press(self.now_ns, press);
-        self.tell(told);
+    /// Presses a button of the pendant.
+    pub fn press(&mut self, press: ButtonPress) {
+        self.record(ArmEvent::Pressed(press));
+        let safety_frame = self.safety.press(self.now_ns, press);
+        self.apply_safety_mode(safety_frame);
     }
 
-    /// An operator will press a button at a time \[ns\].
-    pub fn press_at(&mut self, time_ns: u64, press: Press) {
+    /// Schedules a button press at a time \[ns\].
+    pub fn press_at(&mut self, time_ns: u64, press: ButtonPress) {
         let at = self.presses.partition_point(|(due, _)| *due <= time_ns);
         self.presses.insert(at, (time_ns, press));
     }
 
-    /// An operator will press a button `after_ns` after the host first asks for a torque that is not zero: once
-    /// somebody wants to hold the arm.
-    pub fn press_once_held(&mut self, after_ns: u64, press: Press) {
-        self.once_held.push((after_ns, press));
+    /// Schedules a button press `after_ns` after the host first commands a nonzero torque.
+    pub fn press_after_first_torque(&mut self, after_ns: u64, press: ButtonPress) {
+        self.after_first_torque.push((after_ns, press));
     }
 
-    /// Safety module with its pendant.
+    /// The safety module with its pendant.
     pub fn safety(&self) -> &SafetyModule {
         &self.safety
     }
 
-    /// The same, to set the bus voltage.
+    /// The safety module, to set the bus voltage.
     pub fn safety_mut(&mut self) -> &mut SafetyModule {
         &mut self.safety
     }
@@ -209,7 +213,7 @@ impl<const N: usize> Emulator<N> {
         &self.pucks
     }
 
-    /// What the arm really does.
+    /// Ground truth of the arm's motion.
     pub fn truth(&self) -> &Truth<N> {
         self.plant.truth()
     }
@@ -219,7 +223,7 @@ impl<const N: usize> Emulator<N> {
         &self.plant
     }
 
-    /// The same.
+    /// The plant.
     pub fn plant_mut(&mut self) -> &mut Plant<N> {
         &mut self.plant
     }
@@ -227,7 +231,7 @@ impl<const N: usize> Emulator<N> {
     /// Torque of each motor, braking included \[N m\].
     pub fn motor_torque_nm(&self) -> Vector<N> {
         let speed = self.motor_from_joint * self.plant.truth().velocity_rad_per_s;
-        let braking = &self.plant.config().drive.braking_nm_s_per_rad;
+        let braking = &self.plant.config().actuators.braking_nm_s_per_rad;
         let commanded = self.commanded_nm();
         Vector::from_fn(|i, _| match self.pucks[i].brakes() {
             _ if self.injector.is_dead(i) => 0.0,
@@ -236,34 +240,34 @@ impl<const N: usize> Emulator<N> {
         })
     }
 
-    /// Torque that each motor is commanded \[N m\].
+    /// Commanded torque of each motor \[N m\].
     fn commanded_nm(&self) -> Vector<N> {
         Vector::from_fn(|i, _| self.pucks[i].torque_nm())
     }
 
-    /// What has happened so far, with its times \[ns\].
-    pub fn happenings(&self) -> &[(u64, Happening)] {
-        &self.happenings
+    /// All events so far, with their times \[ns\].
+    pub fn arm_events(&self) -> &[(u64, ArmEvent)] {
+        &self.arm_events
     }
 
-    /// The same, by the machine's monotonic clock where it differs \[ns\].
-    pub fn happenings_by_the_wall(&self) -> impl Iterator<Item = (u64, Happening)> {
-        let timed = self.happenings.iter().zip(&self.offsets_ns);
-        timed.map(|((time_ns, happening), offset_ns)| (time_ns + offset_ns, *happening))
+    /// All events so far, with their times by the machine's monotonic clock \[ns\].
+    pub fn events_in_wall_time(&self) -> impl Iterator<Item = (u64, ArmEvent)> {
+        let timed = self.arm_events.iter().zip(&self.offsets_ns);
+        timed.map(|((time_ns, arm_event), offset_ns)| (time_ns + offset_ns, *arm_event))
     }
 
-    /// The machine's monotonic clock over the arm's time from now on \[ns\].
+    /// Sets the offset of the machine's monotonic clock from the arm's time \[ns\].
     pub fn set_offset_ns(&mut self, offset_ns: u64) {
         self.offset_ns = offset_ns;
     }
 
-    /// Now, by the machine's monotonic clock where it differs \[ns\].
+    /// Current time by the machine's monotonic clock \[ns\].
     pub fn wall_ns(&self) -> u64 {
         self.now_ns + self.offset_ns
     }
 
-    fn note(&mut self, happening: Happening) {
-        self.happenings.push((self.now_ns, happening));
+    fn record(&mut self, arm_event: ArmEvent) {
+        self.arm_events.push((self.now_ns, arm_event));
         self.offsets_ns.push(self.offset_ns);
     }
 
@@ -272,21 +276,21 @@ impl<const N: usize> Emulator<N> {
         self.wire.busy_ns()
     }
 
-    /// When something will happen next without the host \[ns\].
+    /// Time of the next event that does not depend on the host \[ns\].
     pub fn next_ns(&self) -> u64 {
         let wire = self.wire.next_end_ns().unwrap_or(u64::MAX);
         wire.min(self.next_tick_ns)
     }
 
-    /// The world stands still while `gap_ns` pass: every time that is waited for moves on.
-    pub fn skip(&mut self, gap_ns: u64) {
+    /// Pauses the arm for `gap_ns`: shifts its clock and all pending times by that much.
+    pub fn shift_clock(&mut self, gap_ns: u64) {
         let now = self.now_ns + gap_ns;
         self.wire.clear();
         self.next_tick_ns += gap_ns;
         self.now_ns = now;
     }
 
-    /// Counts that stand for where the motors really are.
+    /// Encoder counts of the true motor angles.
     fn true_counts(&self) -> Vec<i32> {
         let angles = self.motor_from_joint * self.plant.truth().position_rad;
         let scale = |i: usize| f64::from(self.config.pucks[i].counts_per_revolution);
@@ -296,37 +300,37 @@ impl<const N: usize> Emulator<N> {
             .collect()
     }
 
-    fn turn_motors(&mut self) {
+    fn update_motor_angles(&mut self) {
         let angles = self.motor_from_joint * self.injector.position_rad();
         for (puck, angle) in self.pucks.iter_mut().zip(angles.iter()) {
-            puck.turn(*angle);
+            puck.set_motor_angle(*angle);
         }
     }
 
-    /// One step of the physics, and whatever the nodes do by themselves.
+    /// One physics step, and the time-driven behaviour of the nodes.
     fn tick(&mut self) {
         if !self.in_cradle {
             let motor = self.commanded_nm();
             let shorted = core::array::from_fn(|i| self.pucks[i].brakes());
-            let sight = Sight {
+            let view = ControllerView {
                 active: !shorted.contains(&true),
                 mode: None,
             };
             let torque_nm = self.motor_from_joint.transpose() * motor;
             self.injector
-                .cycle(&mut self.plant, sight, &torque_nm, shorted);
-            self.turn_motors();
+                .cycle(&mut self.plant, view, &torque_nm, shorted);
+            self.update_motor_angles();
         }
         let modes: Vec<MotorMode> = self.pucks.iter().map(Puck::mode).collect();
         for puck in &mut self.pucks {
             puck.tick(self.now_ns, self.config.wake_ns);
         }
-        self.note_modes(&modes);
+        self.record_modes(&modes);
         if let Some(sensor) = &mut self.sensor {
             let q = self.plant.truth().position_rad;
             let base_from_tip = tip_pose(&self.plant.config().arm, &q);
             let force_n = self.plant.measurement().force_n;
-            sensor.feel(base_from_tip.rotation.transpose() * force_n);
+            sensor.set_force(base_from_tip.rotation.transpose() * force_n);
         }
         while let Some((due, press)) = self.presses.front().copied()
             && due <= self.now_ns
@@ -334,8 +338,8 @@ impl<const N: usize> Emulator<N> {
             self.presses.pop_front();
             self.press(press);
         }
-        let told = self.safety.tick(self.now_ns);
-        self.tell(told);
+        let safety_frame = self.safety.tick(self.now_ns);
+        self.apply_safety_mode(safety_frame);
         if self
             .host_off_until_ns
             .is_some_and(|until| self.now_ns >= until)
@@ -346,14 +350,14 @@ impl<const N: usize> Emulator<N> {
         self.next_tick_ns += self.config.step_ns;
     }
 
-    /// Lets the safety module speak, and the power follow its mode.
-    fn tell(&mut self, frame: Option<CanFrame>) {
+    /// Sends the safety module's frame, and switches the pucks' power according to its mode.
+    fn apply_safety_mode(&mut self, frame: Option<CanFrame>) {
         let Some(frame) = frame else {
             return;
         };
         let mode = self.safety.mode();
         let cause = self.safety.cause();
-        self.note(Happening::Safety(mode, cause));
+        self.record(ArmEvent::Safety(mode, cause));
         let powered = mode != SafetyMode::EStop;
         if powered != self.powered {
             let modes: Vec<MotorMode> = self.pucks.iter().map(Puck::mode).collect();
@@ -364,70 +368,70 @@ impl<const N: usize> Emulator<N> {
                     puck.power_down();
                 }
             }
-            self.note_modes(&modes);
+            self.record_modes(&modes);
             self.powered = powered;
         }
         self.wire.queue(self.now_ns, frame);
     }
 
-    fn note_modes(&mut self, before: &[MotorMode]) {
+    fn record_modes(&mut self, before: &[MotorMode]) {
         for (index, before) in before.iter().enumerate() {
             let mode = self.pucks[index].mode();
             if mode != *before {
                 self.in_cradle &= mode != MotorMode::Torque;
-                self.note(Happening::Motor(index, mode));
+                self.record(ArmEvent::Motor(index, mode));
             }
         }
     }
 
-    fn waking(&self) -> bool {
+    fn any_waking(&self) -> bool {
         self.pucks.iter().any(|puck| match puck.power() {
             Power::Waking(since_ns) => self.now_ns >= since_ns + self.config.wake_quiet_from_ns,
             _ => false,
         })
     }
 
-    /// A frame has ended: every other node hears it. What the host notices of it.
+    /// A frame transmission is complete: delivers it to all other nodes. Returns the event for the host.
     fn deliver(&mut self, frame: CanFrame) -> Option<Event> {
         let from_host = frame.id().from() == NodeId::HOST;
-        if from_host && self.waking() {
-            self.note(Happening::SpokeWhileWaking);
+        if from_host && self.any_waking() {
+            self.record(ArmEvent::HostSentDuringWakeUp);
             self.host_off_until_ns = Some(self.now_ns + self.config.restart_ns);
             return Some(Event::Fault(BusFault::BusOff));
         }
-        if !self.once_held.is_empty() && from_host && asks_for_torque(&frame) {
-            for (after_ns, press) in core::mem::take(&mut self.once_held) {
+        if !self.after_first_torque.is_empty() && from_host && commands_torque(&frame) {
+            for (after_ns, press) in core::mem::take(&mut self.after_first_torque) {
                 self.press_at(self.now_ns + after_ns, press);
             }
         }
         let modes: Vec<MotorMode> = self.pucks.iter().map(Puck::mode).collect();
         for index in 0..self.pucks.len() {
-            let answer = self.pucks[index].hear(self.now_ns, &frame);
+            let answer = self.pucks[index].handle_frame(self.now_ns, &frame);
             if let Some(answer) = answer
-                && !(is_position(&answer) && self.injector.loses_reply(index))
+                && !(is_position(&answer) && self.injector.drops_reply(index))
             {
                 let ready_ns = self.ready_ns();
                 self.wire.queue(ready_ns, answer);
             }
         }
-        self.note_modes(&modes);
+        self.record_modes(&modes);
         if let Some(sensor) = &mut self.sensor {
-            let readings = sensor.hear(self.now_ns, &frame);
-            // Both at once: a node keeps the order of its frames.
+            let readings = sensor.handle_frame(self.now_ns, &frame);
+            // Both have the same time: a node keeps the order of its frames.
             let ready_ns = self.ready_ns();
             for reading in readings.into_iter().flatten() {
                 self.wire.queue(ready_ns, reading);
             }
         }
         let before = self.safety.mode();
-        let told = self.safety.hear(self.now_ns, &frame);
+        let safety_frame = self.safety.handle_frame(self.now_ns, &frame);
         if self.safety.mode() == before {
-            if let Some(answer) = told {
+            if let Some(answer) = safety_frame {
                 let ready_ns = self.ready_ns();
                 self.wire.queue(ready_ns, answer);
             }
         } else {
-            self.tell(told);
+            self.apply_safety_mode(safety_frame);
         }
         if self.host_off_until_ns.is_some() {
             return None;
@@ -439,28 +443,24 @@ impl<const N: usize> Emulator<N> {
         })
     }
 
-    /// When a node answers what it hears now \[ns\].
+    /// Time at which a node's answer to the current frame is ready \[ns\].
     fn ready_ns(&mut self) -> u64 {
         self.now_ns + self.config.latency_ns + self.jitter_ns()
     }
 
-    /// SplitMix64.
+    /// Random jitter \[ns\].
     fn jitter_ns(&mut self) -> u64 {
-        self.random = self.random.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.random;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (z ^ (z >> 31)) % (self.config.jitter_ns + 1)
+        self.random.next_u64() % (self.config.jitter_ns + 1)
     }
 }
 
-/// A puck's answer to a request for its position.
+/// Whether the frame is a puck's reply to a position request.
 fn is_position(frame: &CanFrame) -> bool {
     frame.id().to() == Destination::Group(GroupId::POSITION)
 }
 
-/// A packed torque frame with a torque in it.
-fn asks_for_torque(frame: &CanFrame) -> bool {
+/// Whether the frame is a packed torque frame with a nonzero torque.
+fn commands_torque(frame: &CanFrame) -> bool {
     let to_motors = matches!(
         frame.id().to(),
         Destination::Group(GroupId::LOWER_TORQUES | GroupId::UPPER_TORQUES)
@@ -489,7 +489,7 @@ impl<const N: usize> Peer for Emulator<N> {
             let end_ns = self.wire.next_end_ns().unwrap_or(u64::MAX);
             let next_ns = end_ns.min(self.next_tick_ns);
             if next_ns > until_ns {
-                // A frame that begins before the host speaks again is not overtaken by what it says.
+                // Frames that start before the host's next frame go first.
                 self.wire.advance(until_ns);
                 self.now_ns = until_ns;
                 return None;

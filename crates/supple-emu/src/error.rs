@@ -1,20 +1,20 @@
-//! Why an arm cannot be emulated.
+//! Errors of the emulator.
 
 use supple_bus::BusError;
 use supple_model::ModelError;
 use supple_plant::{InjectionError, PlantError, TraceError};
 use supple_realtime::StopError;
 
-/// What an emulator cannot be built from, or run on.
+/// Errors in the configuration or operation of an emulator.
 #[derive(Debug, thiserror::Error)]
 pub enum EmulatorError {
-    /// Not a WAM.
+    /// The arm is not a WAM.
     #[error("the arm has {found} moving joints, pucks are emulated for 4 or 7: give wam4 or wam7")]
     Joints {
         /// Joints found.
         found: usize,
     },
-    /// Pucks and joints differ in number.
+    /// The numbers of pucks and joints differ.
     #[error("{found} pucks are configured for {expected} joints: give one for each")]
     Pucks {
         /// Pucks found.
@@ -22,7 +22,7 @@ pub enum EmulatorError {
         /// Joints.
         expected: usize,
     },
-    /// No list of property ids.
+    /// The firmware has no known list of property ids.
     #[error(
         "node {node} has firmware {version}, property ids are known from version 32: give a newer one"
     )]
@@ -35,41 +35,41 @@ pub enum EmulatorError {
     /// The motor-to-joint matrix has no inverse.
     #[error("joint_from_motor is singular: correct [motors] in the arm's TOML")]
     Transmission,
-    /// The plant refuses its configuration.
+    /// The plant rejects its configuration.
     #[error(transparent)]
     Plant(#[from] PlantError),
-    /// The description of the arm.
+    /// Error in the description of the arm.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// The bus.
+    /// Error of the bus.
     #[error(transparent)]
     Bus(#[from] BusError),
-    /// A button press that cannot be read.
+    /// An invalid button press.
     #[error(
         "press `{text}`: expected BUTTON@SECONDS or BUTTON@held+SECONDS with one of idle, activate, e-stop, \
          release, and at most 1e6 s"
     )]
     Press {
-        /// What was given.
+        /// Text given.
         text: String,
     },
-    /// A fault to be put into the arm.
+    /// An invalid fault to inject.
     #[error("--inject: {0}")]
     Injection(#[from] InjectionError),
-    /// A file of the trace.
+    /// Error in writing the trace file.
     #[error(transparent)]
     Trace(#[from] TraceError),
-    /// A CAN interface in virtual time.
+    /// A CAN interface was combined with virtual time.
     #[error("a CAN interface keeps its own time: leave out --virtual-time, or give unix:FOLDER")]
     VirtualInterface,
-    /// Signals.
+    /// Error in setting up signal handling.
     #[error(transparent)]
     Stop(#[from] StopError),
 }
 
 impl EmulatorError {
-    /// Exit code, as the command line has them: 2 wrong use, 3 a wrong arm, 6 a file, 10 the bus, 1 the
-    /// system.
+    /// Exit code, as for the command line: 2 for wrong use, 3 for a wrong arm, 6 for a file, 10 for the bus, 1
+    /// for the system.
     pub fn code(&self) -> u8 {
         match self {
             EmulatorError::Press { .. }

@@ -1,14 +1,14 @@
-//! The arm seen from the bus: motor pucks, force/torque sensor, safety module and pendant, moved by the
-//! simulated plant.
+//! Emulates the arm as seen from the bus: motor pucks, force/torque sensor, safety module and pendant, driven by
+//! the simulated plant.
 //!
-//! An [`Emulator`] hears every frame that the host sends, answers as the nodes of the arm do, and
-//! accounts for the time of every frame at 1 Mbit/s. It runs in virtual time, an event at a time; the
-//! program `supple-emu` holds it to the wall clock on Unix datagrams or a CAN interface, or lets a host
-//! in another process advance it in lockstep.
+//! An [`Emulator`] receives every frame of the host, answers as the arm's nodes do, and models the transmission
+//! time of every frame at 1 Mbit/s. It is event-driven and runs in virtual time; the program `supple-emu`
+//! synchronises it to the wall clock on Unix datagrams or a CAN interface, or lets a host in another process
+//! advance it in lockstep.
 //!
-//! It is the independent check of the host: it shares nothing with `supple-can` but the codec and the
-//! bus, and knows no controller. What the arm's makers have not published is a parameter of
-//! [`EmulatorConfig`], with its reason.
+//! It checks the host independently: it shares only the codec and the bus with `supple-can`, and does not depend
+//! on the controller. Properties that the manufacturer has not published are parameters of [`EmulatorConfig`],
+//! each with the reason for its value.
 
 #![forbid(unsafe_code)]
 
@@ -28,8 +28,8 @@ mod program;
 mod store;
 
 pub use config::{EmulatorConfig, PuckConfig, SafetyConfig};
-pub use emulator::{Emulator, Happening};
+pub use emulator::{ArmEvent, Emulator};
 pub use error::EmulatorError;
 pub use pendant::{SOCKET as PENDANT_SOCKET, answer as answer_pendant};
-pub use program::{ArmsEnd, catch_up, listen, main};
-pub use safety::{Cause, Press};
+pub use program::{ArmBus, advance_to_bus_time, main, receive_host_frame};
+pub use safety::{ButtonPress, Cause};

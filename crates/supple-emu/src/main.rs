@@ -1,4 +1,4 @@
-//! The emulated arm, as a process.
+//! The program `supple-emu`.
 
 fn main() -> std::process::ExitCode {
     supple_emu::main()

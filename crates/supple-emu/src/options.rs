@@ -1,29 +1,29 @@
-//! What the process is told.
+//! Command-line options.
 
 use crate::emulator::Emulator;
 use crate::error::EmulatorError;
-use crate::safety::Press;
+use crate::safety::ButtonPress;
 use clap::Parser;
 use std::path::PathBuf;
 use supple_bus::Address;
 use supple_plant::Injection;
 use supple_realtime::{RealtimeOptions, Settings};
 
-/// The arm seen from its bus, in the place of a real one.
+/// Emulates an arm on its bus, instead of a real one.
 ///
-/// It is powered up in the emergency stop, in its home pose, in a cradle until it is activated. Its
-/// pendant is the socket `pendant` in the bus's folder: a line per connection, one of idle, activate,
-/// e-stop, release, status, record, or a button with a time as in --press; the answer is a line of JSON.
+/// It starts in the emergency stop, in its home pose, held by a cradle until it is activated. Its pendant is the
+/// socket `pendant` in the bus's folder. It accepts one line per connection: idle, activate, e-stop, release,
+/// status, record, or a button with a time as in --press; the answer is a line of JSON.
 #[derive(Clone, Debug, Parser)]
 #[command(name = "supple-emu", version)]
 pub struct Options {
     /// A WAM with 4 or 7 joints: a built-in arm, or the path of its TOML or of its folder.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
-    /// Refuses an arm whose URDF holds what is not read, instead of a warning.
+    /// Treats URDF elements that are not supported as errors instead of warnings.
     #[arg(long)]
     pub strict: bool,
-    /// Which system this belongs to, where no bus is given.
+    /// Prefix of the system, if no bus is given.
     #[arg(
         long,
         value_name = "NAME",
@@ -31,33 +31,33 @@ pub struct Options {
         default_value = "supple"
     )]
     pub prefix: String,
-    /// can:NAME or unix:FOLDER; sockets of the system of the prefix if not given.
+    /// can:NAME or unix:FOLDER; default: the sockets of the system with the prefix.
     #[arg(long, value_name = "BUS")]
     pub bus: Option<Address>,
     /// The host advances the time; on sockets only.
     #[arg(long)]
     pub virtual_time: bool,
-    /// Positions are known and the pucks are awake, as when another program has run before.
+    /// Positions are known and the pucks are awake, as after a run of another program.
     #[arg(long)]
     pub zeroed: bool,
     /// Without a force/torque sensor.
     #[arg(long)]
     pub no_sensor: bool,
-    /// A block of wood whose face is at this height above the base frame (m), beneath the whole reach.
+    /// Adds a wooden block below the workspace; its top face is at this height above the base frame (m).
     #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = height)]
     pub block_m: Option<f64>,
-    /// Presses a button at a time (s) after the start, or after the host first asks for torque
-    /// (`activate@held+0.2`): idle, activate, e-stop or release. May be repeated.
+    /// Presses a button (idle, activate, e-stop or release) at a time (s) after the start, or after the host
+    /// first commands torque (`activate@held+0.2`). May be repeated.
     #[arg(long, value_name = "BUTTON@TIME", value_parser = press)]
-    pub press: Vec<Later>,
-    /// Puts a fault into the arm: KIND or KIND:key=value,... as in encoder-stuck:joint=1,at-s=2; see --help. May
-    /// be repeated.
+    pub press: Vec<ScheduledPress>,
+    /// Injects a fault: KIND or KIND:key=value,..., for example encoder-stuck:joint=1,at-s=2; see --help. May be
+    /// repeated.
     #[arg(long, value_name = "SPEC", long_help = supple_plant::injection::HELP)]
     pub inject: Vec<Injection>,
-    /// Writes what acts at the motors and on the tip, once a millisecond, as CSV.
+    /// Writes motor torques and tip forces as CSV, once per millisecond.
     #[arg(long, value_name = "FILE")]
     pub trace: Option<PathBuf>,
-    /// Priority under SCHED_FIFO, above that of its host: a cable waits for nobody.
+    /// Priority under SCHED_FIFO; above that of the host, because a real bus does not wait for a process.
     #[arg(long, value_name = "1-99", default_value_t = 81, value_parser = clap::value_parser!(u8).range(1..=99))]
     pub priority: u8,
     #[command(flatten)]
@@ -65,12 +65,12 @@ pub struct Options {
 }
 
 impl Options {
-    /// It is to end with the process that started it.
+    /// Whether the process must end when its parent ends.
     pub fn supervised(&self) -> bool {
         self.realtime.supervised
     }
 
-    /// What to ask of the system.
+    /// Real-time settings of the process.
     pub fn realtime(&self) -> Settings {
         self.realtime.settings(self.priority, self.virtual_time)
     }
@@ -82,52 +82,54 @@ fn height(text: &str) -> Result<f64, String> {
     height.ok_or_else(|| "give a height from -10 to 10 m".to_owned())
 }
 
-/// A button by its name on the command line and on the socket.
-pub(crate) fn button(name: &str) -> Option<Press> {
+/// Parses the name of a button on the command line or the socket.
+pub(crate) fn button(name: &str) -> Option<ButtonPress> {
     match name {
-        "idle" => Some(Press::Idle),
-        "activate" => Some(Press::Activate),
-        "e-stop" => Some(Press::EStop),
-        "release" => Some(Press::Release),
+        "idle" => Some(ButtonPress::Idle),
+        "activate" => Some(ButtonPress::Activate),
+        "e-stop" => Some(ButtonPress::EStop),
+        "release" => Some(ButtonPress::Release),
         _ => None,
     }
 }
 
-/// A button that will be pressed.
+/// A scheduled button press.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Later {
-    /// Which.
-    pub press: Press,
-    /// When \[s\].
+pub struct ScheduledPress {
+    /// The button.
+    pub press: ButtonPress,
+    /// Delay \[s\].
     pub after_s: f64,
-    /// After the host first asks for torque, not after the start.
-    pub once_held: bool,
+    /// Whether the delay counts from the host's first torque instead of the start.
+    pub after_first_torque: bool,
 }
 
-impl Later {
-    /// Has it pressed; `start_ns` is the time of the start.
-    pub fn plan<const N: usize>(&self, emulator: &mut Emulator<N>, start_ns: u64) {
+impl ScheduledPress {
+    /// Schedules the button press; `start_ns` is the time of the start.
+    pub fn schedule<const N: usize>(&self, emulator: &mut Emulator<N>, start_ns: u64) {
         let after_ns = (self.after_s * 1e9).round() as u64;
-        match self.once_held {
-            true => emulator.press_once_held(after_ns, self.press),
+        match self.after_first_torque {
+            true => emulator.press_after_first_torque(after_ns, self.press),
             false => emulator.press_at(start_ns + after_ns, self.press),
         }
     }
 }
 
-/// The latest time of a press \[s\]: eleven days, far below the end of a clock that counts nanoseconds.
+/// Maximum delay of a press \[s\]: eleven days, far below the range of a nanosecond clock.
 const LATEST_S: f64 = 1e6;
 
-/// `BUTTON@SECONDS` or `BUTTON@held+SECONDS`.
-pub(crate) fn press(text: &str) -> Result<Later, EmulatorError> {
+/// Parses `BUTTON@SECONDS` or `BUTTON@held+SECONDS`.
+pub(crate) fn press(text: &str) -> Result<ScheduledPress, EmulatorError> {
     let parsed = text.split_once('@').and_then(|(name, time)| {
         let after_held = time.strip_prefix("held+");
         let after_s: f64 = after_held.unwrap_or(time).parse().ok()?;
-        (0.0..=LATEST_S).contains(&after_s).then_some(Later {
-            press: button(name)?,
-            after_s,
-            once_held: after_held.is_some(),
-        })
+        (0.0..=LATEST_S)
+            .contains(&after_s)
+            .then_some(ScheduledPress {
+                press: button(name)?,
+                after_s,
+                after_first_torque: after_held.is_some(),
+            })
     });
     parsed.ok_or_else(|| EmulatorError::Press {
         text: text.to_owned(),
@@ -139,7 +141,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_press_beyond_the_clock_is_refused() {
+    fn a_press_outside_the_time_range_is_rejected() {
         for text in [
             "idle@1e300",
             "idle@held+1e300",

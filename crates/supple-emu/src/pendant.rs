@@ -1,11 +1,12 @@
-//! The pendant's socket: an operator's buttons from outside, and what the arm is doing.
+//! The pendant's socket: accepts button presses and reports the state of the arm.
 //!
-//! A thread takes connections and hands each line to the loop that owns the arm; the answer is one line of
-//! JSON. Clients that say nothing, or do not read, hold up nobody (`pendant_clients.rs`). Nothing here is on the bus.
+//! A thread accepts connections and forwards each line to the loop that owns the arm; the answer is one line of
+//! JSON. Idle clients and clients that do not read block nobody (`pendant_clients.rs`). The socket is separate
+//! from the bus.
 
-use crate::emulator::{Emulator, Happening};
+use crate::emulator::{ArmEvent, Emulator};
 use crate::options::{button, press};
-use crate::pendant_clients::{Question, serve};
+use crate::pendant_clients::{PendantRequest, serve};
 use serde::Serialize;
 use std::fs::Permissions;
 use std::os::unix::fs::PermissionsExt;
@@ -18,10 +19,10 @@ use supple_bus::{BusError, OwnerFolder};
 /// Name of the socket in the bus's folder.
 pub const SOCKET: &str = "pendant";
 
-/// The socket, and what came over it.
+/// The socket and its pending requests.
 pub struct PendantSocket {
     path: PathBuf,
-    questions: Receiver<Question>,
+    requests: Receiver<PendantRequest>,
 }
 
 #[derive(Serialize)]
@@ -45,22 +46,22 @@ struct Entry {
 }
 
 #[derive(Serialize)]
-struct Refusal {
+struct ErrorReply {
     error: String,
 }
 
 impl PendantSocket {
-    /// Listens in the folder, for the owner alone. A socket left by a process that has ended is replaced.
+    /// Listens in the folder, accessible only to the owner. Replaces the socket of a process that has ended.
     ///
     /// # Errors
-    /// Where the socket cannot be made.
+    /// If the socket cannot be created.
     pub fn open(folder: &OwnerFolder) -> Result<PendantSocket, BusError> {
         let path = folder.path().join(SOCKET);
         if UnixStream::connect(&path).is_ok() {
-            return Err(BusError::Taken { path });
+            return Err(BusError::SocketInUse { path });
         }
         let failed = |source| BusError::Io {
-            action: "making the pendant's socket",
+            action: "creating the pendant's socket",
             source,
         };
         match std::fs::remove_file(&path) {
@@ -72,25 +73,25 @@ impl PendantSocket {
         let listener = UnixListener::bind(&path).map_err(failed)?;
         std::fs::set_permissions(&path, Permissions::from_mode(0o600)).map_err(failed)?;
         listener.set_nonblocking(true).map_err(failed)?;
-        let (sender, questions) = channel();
+        let (sender, requests) = channel();
         std::thread::Builder::new()
             .name("pendant".to_owned())
             .spawn(move || serve(&listener, &sender))
             .map_err(failed)?;
-        Ok(PendantSocket { path, questions })
+        Ok(PendantSocket { path, requests })
     }
 
-    /// Where it is.
+    /// Path of the socket.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Answers what has come.
+    /// Answers all pending requests.
     pub fn answer<const N: usize>(&self, emulator: &mut Emulator<N>) {
-        while let Ok(question) = self.questions.try_recv() {
-            let answer = answer(emulator, question.line.trim());
-            // Who asked may have gone.
-            let _ = question.answer.send(answer);
+        while let Ok(request) = self.requests.try_recv() {
+            let answer = answer(emulator, request.line.trim());
+            // The client may have disconnected.
+            let _ = request.answer.send(answer);
         }
     }
 }
@@ -101,7 +102,7 @@ impl Drop for PendantSocket {
     }
 }
 
-/// What the socket answers to a line, which is done to the arm: one line of JSON.
+/// Applies a line from the socket to the arm; returns the answer, one line of JSON.
 pub fn answer<const N: usize>(emulator: &mut Emulator<N>, line: &str) -> String {
     if let Some(press) = button(line) {
         emulator.press(press);
@@ -109,11 +110,11 @@ pub fn answer<const N: usize>(emulator: &mut Emulator<N>, line: &str) -> String 
     }
     if line.contains('@') {
         return match press(line) {
-            Ok(later) => {
-                later.plan(emulator, emulator.now_ns());
+            Ok(scheduled) => {
+                scheduled.schedule(emulator, emulator.now_ns());
                 json(&status(emulator))
             }
-            Err(error) => json(&Refusal {
+            Err(error) => json(&ErrorReply {
                 error: error.to_string(),
             }),
         };
@@ -121,18 +122,18 @@ pub fn answer<const N: usize>(emulator: &mut Emulator<N>, line: &str) -> String 
     match line {
         "status" => json(&status(emulator)),
         "record" => {
-            let happenings = emulator.happenings_by_the_wall();
-            let entries = happenings.map(|(time_ns, happening)| Entry {
+            let arm_events = emulator.events_in_wall_time();
+            let entries = arm_events.map(|(time_ns, arm_event)| Entry {
                 time_ns,
-                what: match happening {
-                    Happening::Motor(index, mode) => format!("motor {} {mode:?}", index + 1),
+                what: match arm_event {
+                    ArmEvent::Motor(index, mode) => format!("motor {} {mode:?}", index + 1),
                     other => format!("{other:?}"),
                 },
             });
             json(&entries.collect::<Vec<_>>())
         }
-        other => json(&Refusal {
-            error: format!("`{other}` is none of idle, activate, e-stop, release, status, record"),
+        other => json(&ErrorReply {
+            error: format!("`{other}`: expected idle, activate, e-stop, release, status or record"),
         }),
     }
 }
@@ -155,6 +156,6 @@ fn status<const N: usize>(emulator: &Emulator<N>) -> Status {
 }
 
 fn json(value: &impl Serialize) -> String {
-    // Plain data always has a form; its absence would show as an empty line.
+    // Plain data can always be serialised; an error would show as an empty line.
     serde_json::to_string(value).unwrap_or_default()
 }

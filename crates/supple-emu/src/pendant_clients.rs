@@ -1,7 +1,7 @@
-//! Who is connected to the pendant's socket: lines are collected from all of them, and none holds up another.
+//! Client connections of the pendant socket: reads lines from all clients without blocking on any.
 //!
-//! A client that says nothing keeps its place until others need it; one that does not read its answer is left after a
-//! while. The number of both is bounded.
+//! A silent client stays connected until its slot is needed; one that does not read its answer is dropped after
+//! a timeout. Both numbers are bounded.
 
 use core::time::Duration;
 use rustix::event::{PollFd, PollFlags, poll};
@@ -11,73 +11,73 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Sender, SyncSender, sync_channel};
 
-/// Clients that have not said their line yet; of more, the one that came first is hung up on.
-const SILENT: usize = 16;
-/// Clients that wait for their answer, or read it; of more, what they ask is done and not answered.
-const ANSWERED: usize = 32;
-/// Longest line \[bytes\].
+/// Maximum number of clients that have not sent their line yet; beyond it the oldest is disconnected.
+const MAX_WAITING_CLIENTS: usize = 16;
+/// Maximum number of clients with a pending answer; beyond it commands are carried out without an answer.
+const MAX_ANSWERING_CLIENTS: usize = 32;
+/// Maximum length of a line \[bytes\].
 const LINE_BYTES: usize = 256;
-/// How long an answer is waited for, and how long its reader.
-const ANSWER_WITHIN: Duration = Duration::from_secs(2);
+/// Timeout for an answer, and for writing it to the client.
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// How long it is waited before the next attempt where a connection cannot be taken.
-const NO_DESCRIPTOR: Duration = Duration::from_millis(1);
+/// Time before the next attempt if a connection cannot be accepted.
+const ACCEPT_RETRY_INTERVAL: Duration = Duration::from_millis(1);
 
-/// A line, and where its answer goes.
-pub(crate) struct Question {
+/// A line of a client, and the channel for its answer.
+pub(crate) struct PendantRequest {
     pub line: String,
     pub answer: SyncSender<String>,
 }
 
-/// One that has not said its line yet.
+/// A client that has not sent its line yet.
 struct Client {
     stream: UnixStream,
     line: Vec<u8>,
 }
 
-/// What came of listening to a client.
-enum Said {
-    /// Nothing yet, or the beginning of a line.
-    NotYet,
-    /// All of it.
+/// Result of reading from a client.
+enum ReadResult {
+    /// No complete line yet.
+    Incomplete,
+    /// A complete line.
     Line(String),
-    /// It has gone.
-    Gone,
+    /// The client has disconnected.
+    Disconnected,
 }
 
-/// Takes connections and hands on their lines, until nobody takes them any more.
-pub(crate) fn serve(listener: &UnixListener, questions: &Sender<Question>) {
+/// Accepts connections and forwards their lines until the receiver is gone.
+pub(crate) fn serve(listener: &UnixListener, requests: &Sender<PendantRequest>) {
     let answering = Arc::new(AtomicUsize::new(0));
-    let mut silent: Vec<Client> = Vec::with_capacity(SILENT);
+    let mut waiting: Vec<Client> = Vec::with_capacity(MAX_WAITING_CLIENTS);
     loop {
-        wait(listener, &silent);
+        wait(listener, &waiting);
         match listener.accept() {
             Ok((stream, _)) if stream.set_nonblocking(true).is_ok() => {
-                if silent.len() == SILENT {
-                    silent.remove(0);
+                if waiting.len() == MAX_WAITING_CLIENTS {
+                    waiting.remove(0);
                 }
-                silent.push(Client {
+                waiting.push(Client {
                     stream,
                     line: Vec::with_capacity(LINE_BYTES),
                 });
             }
             Err(error) if error.kind() != ErrorKind::WouldBlock => {
-                // No descriptor is left for it: the oldest gives up his.
-                if !silent.is_empty() {
-                    silent.remove(0);
+                // No file descriptor is left: close the oldest client.
+                if !waiting.is_empty() {
+                    waiting.remove(0);
                 }
-                std::thread::park_timeout(NO_DESCRIPTOR);
+                std::thread::park_timeout(ACCEPT_RETRY_INTERVAL);
             }
             _ => {}
         }
         let mut index = 0;
-        while let Some(client) = silent.get_mut(index) {
-            match client.listen() {
-                Said::NotYet => index += 1,
-                Said::Gone => drop(silent.remove(index)),
-                Said::Line(line) => {
-                    let stream = silent.remove(index).stream;
-                    if !hand_on(stream, line, questions, &answering) {
+        while let Some(client) = waiting.get_mut(index) {
+            match client.read_line() {
+                ReadResult::Incomplete => index += 1,
+                ReadResult::Disconnected => drop(waiting.remove(index)),
+                ReadResult::Line(line) => {
+                    let stream = waiting.remove(index).stream;
+                    if !dispatch(stream, line, requests, &answering) {
                         return;
                     }
                 }
@@ -86,55 +86,55 @@ pub(crate) fn serve(listener: &UnixListener, questions: &Sender<Question>) {
     }
 }
 
-/// Until a client comes or says something.
-fn wait(listener: &UnixListener, silent: &[Client]) {
-    let mut waited = vec![PollFd::new(listener, PollFlags::IN)];
-    waited.extend(
-        silent
+/// Waits until a client connects or sends data.
+fn wait(listener: &UnixListener, waiting: &[Client]) {
+    let mut polled = vec![PollFd::new(listener, PollFlags::IN)];
+    polled.extend(
+        waiting
             .iter()
             .map(|client| PollFd::new(&client.stream, PollFlags::IN)),
     );
-    // A signal in between costs one look.
-    let _ = poll(&mut waited, None);
+    // A signal causes one extra iteration.
+    let _ = poll(&mut polled, None);
 }
 
 impl Client {
-    fn listen(&mut self) -> Said {
+    fn read_line(&mut self) -> ReadResult {
         let mut bytes = [0; LINE_BYTES];
-        let room = LINE_BYTES - self.line.len();
-        let ended = match self.stream.read(&mut bytes[..room]) {
-            Ok(0) if self.line.is_empty() => return Said::Gone,
+        let space = LINE_BYTES - self.line.len();
+        let ended = match self.stream.read(&mut bytes[..space]) {
+            Ok(0) if self.line.is_empty() => return ReadResult::Disconnected,
             Ok(length) => {
                 self.line.extend(&bytes[..length]);
                 length == 0 || self.line.contains(&b'\n') || self.line.len() == LINE_BYTES
             }
             Err(error) => match error.kind() {
                 ErrorKind::WouldBlock | ErrorKind::Interrupted => false,
-                _ => return Said::Gone,
+                _ => return ReadResult::Disconnected,
             },
         };
         match ended {
-            false => Said::NotYet,
+            false => ReadResult::Incomplete,
             true => {
                 let line = self.line.split(|byte| *byte == b'\n').next();
-                Said::Line(String::from_utf8_lossy(line.unwrap_or_default()).into_owned())
+                ReadResult::Line(String::from_utf8_lossy(line.unwrap_or_default()).into_owned())
             }
         }
     }
 }
 
-/// Hands a line on, and has its answer written by a thread of its own; false where nobody takes lines any more.
-fn hand_on(
+/// Forwards a line and starts a thread that writes the answer; false if the receiver is gone.
+fn dispatch(
     stream: UnixStream,
     line: String,
-    questions: &Sender<Question>,
+    requests: &Sender<PendantRequest>,
     answering: &Arc<AtomicUsize>,
 ) -> bool {
-    let (answer, answered) = sync_channel(1);
-    if questions.send(Question { line, answer }).is_err() {
+    let (answer, receiver) = sync_channel(1);
+    if requests.send(PendantRequest { line, answer }).is_err() {
         return false;
     }
-    if answering.load(Ordering::Relaxed) >= ANSWERED {
+    if answering.load(Ordering::Relaxed) >= MAX_ANSWERING_CLIENTS {
         return true;
     }
     answering.fetch_add(1, Ordering::Relaxed);
@@ -142,8 +142,8 @@ fn hand_on(
     let started = std::thread::Builder::new()
         .name("pendant-answer".to_owned())
         .spawn(move || {
-            if let Ok(text) = answered.recv_timeout(ANSWER_WITHIN) {
-                write_within(stream, &text);
+            if let Ok(text) = receiver.recv_timeout(ANSWER_TIMEOUT) {
+                write_with_timeout(stream, &text);
             }
             done.fetch_sub(1, Ordering::Relaxed);
         });
@@ -153,12 +153,12 @@ fn hand_on(
     true
 }
 
-fn write_within(mut stream: UnixStream, text: &str) {
+fn write_with_timeout(mut stream: UnixStream, text: &str) {
     let ready = stream
         .set_nonblocking(false)
-        .and_then(|()| stream.set_write_timeout(Some(ANSWER_WITHIN)));
+        .and_then(|()| stream.set_write_timeout(Some(ANSWER_TIMEOUT)));
     if ready.is_ok() {
-        // Who asked may have gone.
+        // The client may have disconnected.
         let _ = writeln!(stream, "{text}");
     }
 }

@@ -1,4 +1,4 @@
-//! The process: an arm held to the wall clock, or advanced by its host.
+//! The process: runs the emulated arm in real time, or as its host advances it.
 
 use crate::config::EmulatorConfig;
 use crate::emulator::Emulator;
@@ -8,29 +8,29 @@ use crate::pendant::PendantSocket;
 use crate::puck::Puck;
 use clap::Parser;
 use std::process::ExitCode;
-use supple_bus::virtual_time::{Peer, Responder};
+use supple_bus::virtual_time::{LockstepResponder, Peer};
 use supple_bus::{
-    Address, Bus, BusError, BusFault, DatagramBus, Event, OwnerFolder, Pacer, SocketCan,
+    Address, Bus, BusError, BusFault, DatagramBus, Event, OwnerFolder, PacedResponder, SocketCan,
     monotonic_ns,
 };
 use supple_model::{Description, with_dof};
 use supple_plant::{PlantConfig, Sample, Scene, TraceFile};
 use supple_puck::NodeId;
 use supple_puck::status::MotorMode;
-use supple_realtime::{Stop, diagnostics, die_with_parent, enter};
+use supple_realtime::{Stop, apply_realtime_settings, diagnostics, die_with_parent};
 
-/// A stretch of the wall clock in which this process did not run; the arm stood still in it \[ns\].
-const GAP_NS: u64 = 50_000_000;
-/// The longest wait before the pendant's socket is looked at \[ns\].
-const LOOK_NS: u64 = 1_000_000;
-/// The same in virtual time, where nothing happens while the host is silent \[ns\].
+/// Delay above which this process counts as stalled; the arm's clock pauses for it \[ns\].
+const STALL_THRESHOLD_NS: u64 = 50_000_000;
+/// Maximum wait between polls of the pendant's socket \[ns\].
+const POLL_INTERVAL_NS: u64 = 1_000_000;
+/// Maximum wait in virtual time, which pauses while the host is silent \[ns\].
 const IDLE_NS: u64 = 10_000_000;
 
-/// How long the motors may take to come to rest at the end \[ns\].
-const REST_WITHIN_NS: u64 = 300_000_000;
+/// Maximum time until the motors are idle at shutdown \[ns\].
+const SHUTDOWN_TIMEOUT_NS: u64 = 300_000_000;
 
-/// How long it goes on once they have \[ns\].
-const HEARD_WITHIN_NS: u64 = 50_000_000;
+/// Time for which it continues after that \[ns\].
+const FINAL_REPORT_NS: u64 = 50_000_000;
 
 /// The whole program, from its arguments to its exit code.
 pub fn main() -> ExitCode {
@@ -52,7 +52,7 @@ fn start(options: &Options) -> Result<(), EmulatorError> {
         die_with_parent();
     }
     let description = Description::find(&options.arm)?.strict_if(options.strict)?;
-    // Who supervises has said them.
+    // The supervising process has already printed the warnings.
     for warning in description
         .warnings()
         .iter()
@@ -63,7 +63,7 @@ fn start(options: &Options) -> Result<(), EmulatorError> {
     with_dof!(description.dof(), N => run::<N>(&description, options, &stop))?
 }
 
-/// Runs until it is asked to end.
+/// Runs until a shutdown is requested.
 fn run<const N: usize>(
     description: &Description,
     options: &Options,
@@ -74,7 +74,7 @@ fn run<const N: usize>(
     config.force_sensor = !options.no_sensor;
     let mut plant = PlantConfig::<N>::from_description(description)?;
     if let Some(face_m) = options.block_m {
-        plant.scene = Scene::beneath(face_m);
+        plant.scene = Scene::with_block_at(face_m);
     }
     let start_ns = if options.virtual_time {
         0
@@ -83,8 +83,8 @@ fn run<const N: usize>(
     };
     let mut emulator = Emulator::new(config, plant, description.home::<N>()?, start_ns)?;
     emulator.inject(&options.inject, description.config::<N>()?.period_s)?;
-    for later in &options.press {
-        later.plan(&mut emulator, start_ns);
+    for scheduled in &options.press {
+        scheduled.schedule(&mut emulator, start_ns);
     }
     let trace = match &options.trace {
         Some(path) => Some(TraceFile::create(path, N)?),
@@ -102,23 +102,23 @@ fn run<const N: usize>(
         description.name(),
         pendant.path().display()
     ));
-    for shortfall in enter(&options.realtime()) {
-        diagnostics::post(format_args!("supple-emu: warning: {shortfall}"));
+    for realtime_warning in apply_realtime_settings(&options.realtime()) {
+        diagnostics::post(format_args!("supple-emu: warning: {realtime_warning}"));
     }
     let mut arm = Arm {
         emulator,
         pendant,
         trace,
-        ends_ns: None,
+        deadline_ns: None,
         at_rest: false,
     };
     let ran = match (&address, options.virtual_time) {
-        (Address::Folder(_), true) => arm.follow(Responder::open(&folder)?, stop),
+        (Address::Folder(_), true) => arm.run_in_lockstep(LockstepResponder::open(&folder)?, stop),
         (Address::Folder(_), false) => {
             let now_ns = arm.emulator.now_ns();
-            arm.pace(Pacer::open(&folder, now_ns)?, stop)
+            arm.run_on_sockets(PacedResponder::open(&folder, now_ns)?, stop)
         }
-        (Address::Interface(name), false) => arm.keep_pace(SocketCan::open(name)?, stop),
+        (Address::Interface(name), false) => arm.run_on_can(SocketCan::open(name)?, stop),
         (Address::Interface(_), true) => Err(EmulatorError::VirtualInterface),
     };
     ran?;
@@ -128,44 +128,44 @@ fn run<const N: usize>(
     }
 }
 
-/// The arm's end of a bus by the wall clock.
-pub trait ArmsEnd: Bus {
-    /// The host is to see an error frame.
+/// The arm's side of a bus in real time.
+pub trait ArmBus: Bus {
+    /// Sends an error frame to the host.
     ///
     /// # Errors
-    /// Where the bus is gone.
+    /// If the bus fails.
     fn fault(&mut self, fault: BusFault) -> Result<(), BusError>;
 }
 
-impl ArmsEnd for DatagramBus {
+impl ArmBus for DatagramBus {
     fn fault(&mut self, fault: BusFault) -> Result<(), BusError> {
         self.send_fault(fault)
     }
 }
 
-impl ArmsEnd for SocketCan {
+impl ArmBus for SocketCan {
     fn fault(&mut self, fault: BusFault) -> Result<(), BusError> {
         self.send_fault(fault)
     }
 }
 
-/// Lets an arm catch up with its bus's clock, and hands what it says to the bus. A time in which the
-/// process stood still is left out: the arm stood still with it.
+/// Advances the arm to the bus time and sends its frames. If this process stalled, the arm's clock pauses for
+/// that time instead.
 ///
 /// # Errors
-/// Where the bus is gone.
-pub fn catch_up<const N: usize>(
+/// If the bus fails.
+pub fn advance_to_bus_time<const N: usize>(
     emulator: &mut Emulator<N>,
-    bus: &mut impl ArmsEnd,
+    bus: &mut impl ArmBus,
 ) -> Result<(), BusError> {
     let now_ns = bus.now_ns();
     let behind_ns = now_ns.saturating_sub(emulator.now_ns());
-    if behind_ns > GAP_NS {
-        emulator.skip(behind_ns);
+    if behind_ns > STALL_THRESHOLD_NS {
+        emulator.shift_clock(behind_ns);
     }
     while let Some(event) = emulator.run_until(now_ns) {
         match event {
-            // A host that does not read loses what it is told, as on a cable.
+            // If the host does not read, frames are lost, as on a real bus.
             Event::Frame(frame) => match bus.send(&frame) {
                 Ok(()) | Err(BusError::Full) => {}
                 Err(error) => return Err(error),
@@ -177,19 +177,19 @@ pub fn catch_up<const N: usize>(
     Ok(())
 }
 
-/// Waits for a frame of the host until the arm has something to do by itself, at most for a millisecond.
+/// Waits for a frame of the host until the arm's next own event, at most for a millisecond.
 ///
 /// # Errors
-/// Where the bus is gone.
-pub fn listen<const N: usize>(
+/// If the bus fails.
+pub fn receive_host_frame<const N: usize>(
     emulator: &mut Emulator<N>,
-    bus: &mut impl ArmsEnd,
+    bus: &mut impl ArmBus,
 ) -> Result<(), BusError> {
-    let until_ns = emulator.next_ns().min(bus.now_ns() + LOOK_NS);
+    let until_ns = emulator.next_ns().min(bus.now_ns() + POLL_INTERVAL_NS);
     if let Some(Event::Frame(frame)) = bus.receive_until(until_ns)?
         && frame.id().from() == NodeId::HOST
     {
-        catch_up(emulator, bus)?;
+        advance_to_bus_time(emulator, bus)?;
         emulator.host_sends(&frame);
     }
     Ok(())
@@ -199,14 +199,14 @@ struct Arm<const N: usize> {
     emulator: Emulator<N>,
     pendant: PendantSocket,
     trace: Option<TraceFile>,
-    /// When it ends at the latest, once asked to \[ns\].
-    ends_ns: Option<u64>,
-    /// Its motors were at rest when it was to end.
+    /// Deadline of the shutdown, once requested \[ns\].
+    deadline_ns: Option<u64>,
+    /// Whether the motors have become idle during shutdown.
     at_rest: bool,
 }
 
 impl<const N: usize> Arm<N> {
-    fn look(&mut self) {
+    fn serve_pendant(&mut self) {
         self.pendant.answer(&mut self.emulator);
         if let Some(trace) = &mut self.trace {
             let arm = &mut self.emulator;
@@ -219,52 +219,60 @@ impl<const N: usize> Arm<N> {
                 fault: None,
                 injections: arm.injections_begun(),
             };
-            trace.note(&sample, arm.plant_mut());
+            trace.write_sample(&sample, arm.plant_mut());
         }
     }
 
-    /// It is asked to end, and its motors have come to rest or had the time for it: an arm does not go away
-    /// from under those who are lowering it.
-    fn ends(&mut self, stop: &Stop) -> bool {
-        if !stop.asked() {
+    /// Whether to end: shutdown was requested, and the motors are idle or the timeout has passed, so that the
+    /// host can complete its own shutdown first.
+    fn is_finished(&mut self, stop: &Stop) -> bool {
+        if !stop.shutdown_requested() {
             return false;
         }
         let now_ns = monotonic_ns();
-        let until_ns = self.ends_ns.get_or_insert(now_ns + REST_WITHIN_NS);
+        let until_ns = self.deadline_ns.get_or_insert(now_ns + SHUTDOWN_TIMEOUT_NS);
         let mut pucks = self.emulator.pucks().iter();
         if pucks.all(|puck| puck.mode() != MotorMode::Torque) && !self.at_rest {
-            // Their host is still to hear of it.
+            // The host must still receive the idle mode.
             self.at_rest = true;
-            *until_ns = (*until_ns).min(now_ns + HEARD_WITHIN_NS);
+            *until_ns = (*until_ns).min(now_ns + FINAL_REPORT_NS);
         }
         now_ns > *until_ns
     }
 
-    /// By the wall clock, on a CAN interface.
-    fn keep_pace(&mut self, mut bus: impl ArmsEnd, stop: &Stop) -> Result<(), EmulatorError> {
-        while !self.ends(stop) {
-            catch_up(&mut self.emulator, &mut bus)?;
-            self.look();
-            listen(&mut self.emulator, &mut bus)?;
+    /// Runs in real time on a CAN interface.
+    fn run_on_can(&mut self, mut bus: impl ArmBus, stop: &Stop) -> Result<(), EmulatorError> {
+        while !self.is_finished(stop) {
+            advance_to_bus_time(&mut self.emulator, &mut bus)?;
+            self.serve_pendant();
+            receive_host_frame(&mut self.emulator, &mut bus)?;
         }
         Ok(())
     }
 
-    /// By the wall clock, on sockets.
-    fn pace(&mut self, mut pacer: Pacer, stop: &Stop) -> Result<(), EmulatorError> {
-        while !self.ends(stop) {
-            pacer.turn(&mut self.emulator)?;
-            self.emulator.set_offset_ns(pacer.offset_ns());
-            self.look();
+    /// Runs in real time on sockets.
+    fn run_on_sockets(
+        &mut self,
+        mut responder: PacedResponder,
+        stop: &Stop,
+    ) -> Result<(), EmulatorError> {
+        while !self.is_finished(stop) {
+            responder.serve(&mut self.emulator)?;
+            self.emulator.set_offset_ns(responder.offset_ns());
+            self.serve_pendant();
         }
         Ok(())
     }
 
-    /// As far as the host says.
-    fn follow(&mut self, mut responder: Responder, stop: &Stop) -> Result<(), EmulatorError> {
-        while !self.ends(stop) {
+    /// Runs in lockstep with the host.
+    fn run_in_lockstep(
+        &mut self,
+        mut responder: LockstepResponder,
+        stop: &Stop,
+    ) -> Result<(), EmulatorError> {
+        while !self.is_finished(stop) {
             responder.serve(&mut self.emulator, IDLE_NS)?;
-            self.look();
+            self.serve_pendant();
         }
         Ok(())
     }

@@ -1,13 +1,13 @@
-//! One motor puck: its states, its properties, its motor.
+//! A motor puck: states, properties and motor.
 //!
 //! ```text
 //! no power -> monitor (STAT 0) -> waking -> ready (STAT 2), MODE idle <-> torque
 //!        emergency stop: no power, counts forgotten
 //! ```
 //!
-//! In the monitor only the properties of its list are answered. Once ready, ids are those of the puck's
-//! firmware. What a property means beyond these, such as the puck's own position loops, is left out: the
-//! value is kept and given back. Source: libbarrett, btclient, the user's manual.
+//! In the monitor the puck answers only the properties of the monitor's list. Once ready, it uses the ids of its
+//! firmware. Other properties, such as the gains of the puck's own position loops, have no effect: their values
+//! are stored and returned. Source: libbarrett, btclient, the user's manual.
 
 use crate::config::PuckConfig;
 use crate::store::{PropertyStore, property_of};
@@ -17,14 +17,14 @@ use supple_puck::{
     PropertyId, PropertyMessage, PropertyTable, PuckKind, Value, Width,
 };
 
-/// How far a puck has come.
+/// Power state of a puck.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Power {
-    /// No power: it is not on the bus.
+    /// No power: the puck is not on the bus.
     Off,
     /// The monitor runs.
     Monitor,
-    /// Woken at this time \[ns\]; neither hears nor answers.
+    /// Waking up since this time \[ns\]; neither receives nor answers.
     Waking(u64),
     /// The firmware runs.
     Ready,
@@ -40,15 +40,15 @@ pub struct Puck {
     mode: MotorMode,
     /// Commanded torque \[puck units\], within the puck's limit.
     torque: i32,
-    /// Reported counts less the encoder's own.
+    /// Offset from encoder counts to reported counts.
     offset: i64,
-    /// The encoder's own counts, from where the motor stood at the beginning.
+    /// Encoder counts relative to the initial motor angle.
     encoder: i64,
     store: PropertyStore,
 }
 
 impl Puck {
-    /// Puck of joint `number`, from 1, in its monitor. `None` where its firmware has no list of ids.
+    /// Puck of joint `number`, from 1, in its monitor. `None` if its firmware has no list of ids.
     pub fn new(number: usize, config: PuckConfig) -> Option<Puck> {
         let node = NodeId::new(number as u8).ok()?;
         let table = PropertyTable::of_firmware(PuckKind::Motor, config.version).ok()?;
@@ -98,17 +98,17 @@ impl Puck {
         })
     }
 
-    /// How far it has come.
+    /// Power state.
     pub fn power(&self) -> Power {
         self.power
     }
 
-    /// Its mode.
+    /// Motor mode.
     pub fn mode(&self) -> MotorMode {
         self.mode
     }
 
-    /// Torque that its motor gives \[N m\], braking apart; zero unless it is in torque mode.
+    /// Motor torque without braking \[N m\]; zero unless it is in torque mode.
     pub fn torque_nm(&self) -> f64 {
         match (self.power, self.mode) {
             (Power::Ready, MotorMode::Torque) => {
@@ -118,49 +118,49 @@ impl Puck {
         }
     }
 
-    /// Its motor is shorted and brakes: always but in torque mode.
+    /// Whether the motor is shorted and brakes: always except in torque mode.
     pub fn brakes(&self) -> bool {
         (self.power, self.mode) != (Power::Ready, MotorMode::Torque)
     }
 
-    /// Turns the motor to an angle \[rad\], from where it stood at the beginning.
-    pub fn turn(&mut self, angle_rad: f64) {
-        let turns = angle_rad / core::f64::consts::TAU;
-        self.encoder = (turns * f64::from(self.config.counts_per_revolution)).round() as i64;
+    /// Sets the motor angle relative to the initial one \[rad\].
+    pub fn set_motor_angle(&mut self, angle_rad: f64) {
+        let revolutions = angle_rad / core::f64::consts::TAU;
+        self.encoder = (revolutions * f64::from(self.config.counts_per_revolution)).round() as i64;
     }
 
-    /// Position as it is reported: the counter has 22 bits.
+    /// Reported position: the counter has 22 bits.
     pub fn counts(&self) -> i32 {
         ((self.encoder + self.offset) as i32) << 10 >> 10
     }
 
-    /// The counter says `counts` where the motor stands now.
-    pub fn define(&mut self, counts: i32) {
+    /// Sets the reported counts of the current motor angle.
+    pub fn set_counts(&mut self, counts: i32) {
         self.offset = i64::from(counts) - self.encoder;
     }
 
-    /// Power comes: the monitor runs, the counter begins at 0.
+    /// Switches the power on: the monitor runs, the counter starts at 0.
     pub fn power_up(&mut self) {
         if self.config.present && self.power == Power::Off {
             self.power = Power::Monitor;
-            self.define(0);
+            self.set_counts(0);
         }
     }
 
-    /// Power goes.
+    /// Switches the power off.
     pub fn power_down(&mut self) {
         self.power = Power::Off;
-        self.rest();
+        self.set_idle();
     }
 
-    /// Ready at once, without a wake-up.
+    /// Makes the puck ready at once, without a wake-up.
     pub fn wake_at_once(&mut self) {
         if self.power != Power::Off {
             self.power = Power::Ready;
         }
     }
 
-    /// Time passes.
+    /// Advances time.
     pub fn tick(&mut self, now_ns: u64, wake_ns: u64) {
         if let Power::Waking(since_ns) = self.power
             && now_ns >= since_ns + wake_ns
@@ -169,18 +169,18 @@ impl Puck {
         }
     }
 
-    fn rest(&mut self) {
+    fn set_idle(&mut self) {
         self.mode = MotorMode::Idle;
         self.torque = 0;
     }
 
-    /// Takes a frame of another node; what it answers, if anything.
-    pub fn hear(&mut self, now_ns: u64, frame: &CanFrame) -> Option<CanFrame> {
-        let for_it = match frame.id().to() {
+    /// Handles a frame of another node; returns the reply, if any.
+    pub fn handle_frame(&mut self, now_ns: u64, frame: &CanFrame) -> Option<CanFrame> {
+        let addressed = match frame.id().to() {
             Destination::Node(node) => node == self.node,
-            Destination::Group(group) => self.listens_to(group),
+            Destination::Group(group) => self.belongs_to(group),
         };
-        if !for_it {
+        if !addressed {
             return None;
         }
         match (self.power, frame.id().to()) {
@@ -188,7 +188,7 @@ impl Puck {
             (_, Destination::Group(GroupId::LOWER_TORQUES | GroupId::UPPER_TORQUES))
                 if frame.dlc() == 8 =>
             {
-                self.take_torque(frame);
+                self.apply_torque_frame(frame);
                 None
             }
             _ => match PropertyMessage::parse(frame).ok()? {
@@ -201,7 +201,7 @@ impl Puck {
         }
     }
 
-    fn listens_to(&self, group: GroupId) -> bool {
+    fn belongs_to(&self, group: GroupId) -> bool {
         let groups = [Property::GRPA, Property::GRPB, Property::GRPC];
         let mut groups = groups.into_iter().map(|p| self.store.get(p));
         self.power == Power::Ready && groups.any(|g| g == Some(i32::from(group.number())))
@@ -215,7 +215,7 @@ impl Puck {
         }
     }
 
-    fn take_torque(&mut self, frame: &CanFrame) {
+    fn apply_torque_frame(&mut self, frame: &CanFrame) {
         let Ok(torques) = PackedTorques::parse(frame) else {
             return;
         };
@@ -225,8 +225,8 @@ impl Puck {
             command,
             self.table.id(Property::T) == Some(torques.property),
         ) {
-            let most = self.store.get(Property::MT).unwrap_or(0).max(0);
-            self.torque = i32::from(command.units()).clamp(-most, most);
+            let limit = self.store.get(Property::MT).unwrap_or(0).max(0);
+            self.torque = i32::from(command.units()).clamp(-limit, limit);
         }
     }
 
@@ -265,8 +265,8 @@ impl Puck {
                 (Ok(Stat::Ready), Power::Monitor) => self.power = Power::Waking(now_ns),
                 (Ok(Stat::Reset), _) => {
                     self.power = Power::Monitor;
-                    self.rest();
-                    self.define(0);
+                    self.set_idle();
+                    self.set_counts(0);
                 }
                 _ => {}
             },
@@ -278,18 +278,18 @@ impl Puck {
                     }
                 }
             }
-            Some(Property::P) => self.define(value),
+            Some(Property::P) => self.set_counts(value),
             Some(Property::T) => {
-                let most = self.store.get(Property::MT).unwrap_or(0).max(0);
-                self.torque = value.clamp(-most, most);
+                let limit = self.store.get(Property::MT).unwrap_or(0).max(0);
+                self.torque = value.clamp(-limit, limit);
             }
-            // Of the factory: a maintenance tool unlocks them first.
+            // Factory settings, which a maintenance tool must unlock first.
             Some(Property::VERS | Property::ROLE | Property::SN | Property::ID) | None => {}
             Some(property) => self.store.set(property, value),
         }
     }
 
-    /// What the puck is for.
+    /// Role of the puck.
     pub fn role(&self) -> Role {
         self.config.role
     }

@@ -5,14 +5,14 @@
 //!        <-- button -----      <-- fault, host --
 //! ```
 //!
-//! It hears torque commands and position replies. In active, a torque or a speed above its fault limit,
-//! a bus voltage outside its limits, or positions that are no longer reported, take it to idle; an arm
-//! that has not slowed down half a second after a velocity fault, to the emergency stop. Faults stay on
-//! the pendant until Shift-Idle. It tells the motors their mode by a frame to all actuators (0x540),
-//! whose payload is not published: here it is a set of MODE. Source: libbarrett, btclient, OWD.
+//! It receives torque commands and position replies. In active, a torque or a speed above its fault limit, a bus
+//! voltage outside its limits, or missing positions switch it to idle; an arm that has not slowed down half a
+//! second after a velocity fault switches it to the emergency stop. Faults stay on the pendant until Shift-Idle.
+//! It sends the motors their mode in a frame to all actuators (0x540), whose payload is not published: here it
+//! sets MODE. Source: libbarrett, btclient, OWD.
 
 use crate::config::SafetyConfig;
-use crate::elbow::watched_points_m;
+use crate::elbow::monitored_points_m;
 use crate::store::{PropertyStore, property_of};
 use supple_core::nalgebra::{Matrix4, Vector3, Vector4};
 use supple_puck::safety::{Button, Level, Pendant, SafetyLimits, SafetyMode, SevenSegment};
@@ -22,44 +22,44 @@ use supple_puck::{
     PropertyMessage, PropertyTable, PuckKind, Value, Width,
 };
 
-/// How long a pressed button shows in the pendant's word \[ns\].
+/// Time for which the pendant word shows a pressed button \[ns\].
 const PRESS_NS: u64 = 200_000_000;
-/// Position sets over which a speed is taken: the module's history.
+/// Number of position sets from which the speed is computed.
 const HISTORY: usize = 5;
 /// Limits of the bus voltage \[V\]: VOLTL1, VOLTL2, VOLTH1, VOLTH2.
 const VOLTAGE_V: [i32; 4] = [36, 30, 54, 57];
 
-/// What an operator does at the pendant.
+/// Action of an operator at the pendant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Press {
-    /// Shift and Idle: faults are cleared, the motors have power and brake.
+pub enum ButtonPress {
+    /// Shift-Idle: clears the faults; the motors have power and brake.
     Idle,
-    /// Shift and Activate: the motors take torques, unless a fault is shown.
+    /// Shift-Activate: the motors apply torques, unless a fault is shown.
     Activate,
-    /// The emergency stop is pressed and stays in.
+    /// The emergency stop is pressed and latches.
     EStop,
-    /// The emergency stop is pulled out; the power stays off until Shift-Idle.
+    /// The emergency stop is released; the power stays off until Shift-Idle.
     Release,
 }
 
-/// Why the module left active.
+/// Cause of the module's last change of mode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
-    /// At the pendant.
+    /// The operator, at the pendant.
     Operator,
-    /// The host asked for it.
+    /// A request of the host.
     Host,
     /// The arm was too fast.
     Velocity,
-    /// A commanded torque was too great.
+    /// A commanded torque was too large.
     Torque,
     /// The bus voltage was outside its limits.
     Voltage,
-    /// Positions were no longer reported.
+    /// Positions were missing.
     Heartbeat,
 }
 
-/// The module.
+/// The safety module.
 #[derive(Clone, Debug)]
 pub struct SafetyModule {
     config: SafetyConfig,
@@ -76,8 +76,8 @@ pub struct SafetyModule {
     heartbeat: Level,
     joint_from_motor: Matrix4<f64>,
     rad_per_count: [f64; 4],
-    heard_ns: Vec<u64>,
-    /// Positions of the present set, as far as they have come.
+    last_seen_ns: Vec<u64>,
+    /// Positions of the current set that have arrived.
     counts: [Option<i32>; 4],
     history: Vec<(u64, [Vector3<f64>; 2])>,
     velocity_fault_ns: Option<u64>,
@@ -85,8 +85,8 @@ pub struct SafetyModule {
 }
 
 impl SafetyModule {
-    /// Powered up in the emergency stop, for an arm of `joints` pucks. The transmission is that of
-    /// joints 1 to 4. `None` where its firmware has no list of ids.
+    /// A module in the emergency stop, for an arm of `joints` pucks, with the transmission of joints 1 to 4.
+    /// `None` if its firmware has no list of ids.
     pub fn new(
         config: SafetyConfig,
         joints: usize,
@@ -129,7 +129,7 @@ impl SafetyModule {
             heartbeat: Level::Safe,
             joint_from_motor,
             rad_per_count,
-            heard_ns: vec![0; joints],
+            last_seen_ns: vec![0; joints],
             counts: [None; 4],
             history: Vec::with_capacity(HISTORY + 1),
             velocity_fault_ns: None,
@@ -137,28 +137,28 @@ impl SafetyModule {
         })
     }
 
-    /// Its mode.
+    /// Current mode.
     pub fn mode(&self) -> SafetyMode {
         self.mode
     }
 
-    /// Why it came to this mode.
+    /// Cause of the current mode.
     pub fn cause(&self) -> Cause {
         self.cause
     }
 
-    /// Bus voltage from now on \[V\].
+    /// Sets the bus voltage \[V\].
     pub fn set_voltage(&mut self, voltage: i32) {
         self.config.voltage = voltage;
     }
 
-    /// The arm's positions are known.
+    /// Sets whether the arm's positions are known.
     pub fn set_zeroed(&mut self, zeroed: bool) {
         self.store.set(Property::ZERO, i32::from(zeroed));
         self.history.clear();
     }
 
-    /// The pendant as it looks.
+    /// State of the pendant.
     pub fn pendant(&self) -> Pendant {
         let digit = match self.mode {
             SafetyMode::EStop => 'E',
@@ -182,11 +182,11 @@ impl SafetyModule {
         }
     }
 
-    /// An operator presses a button; what the module tells the motors, if anything.
-    pub fn press(&mut self, now_ns: u64, press: Press) -> Option<CanFrame> {
+    /// Handles a button press; returns the mode frame to the motors, if the mode changes.
+    pub fn press(&mut self, now_ns: u64, press: ButtonPress) -> Option<CanFrame> {
         self.pressed_ns = now_ns;
         match press {
-            Press::Idle if !self.latched => {
+            ButtonPress::Idle if !self.latched => {
                 self.button = Button::Idle;
                 for level in [
                     &mut self.velocity,
@@ -199,29 +199,29 @@ impl SafetyModule {
                 self.velocity_fault_ns = None;
                 self.enter(SafetyMode::Idle, Cause::Operator)
             }
-            Press::Activate if !self.latched => {
+            ButtonPress::Activate if !self.latched => {
                 self.button = Button::Activate;
                 if self.mode != SafetyMode::Idle || self.pendant().worst() == Level::Fault {
                     return None;
                 }
-                self.heard_ns.fill(now_ns);
+                self.last_seen_ns.fill(now_ns);
                 self.enter(SafetyMode::Active, Cause::Operator)
             }
-            Press::EStop => {
+            ButtonPress::EStop => {
                 self.latched = true;
                 self.button = Button::EStop;
                 self.enter(SafetyMode::EStop, Cause::Operator)
             }
-            Press::Release => {
+            ButtonPress::Release => {
                 self.latched = false;
                 self.button = Button::None;
                 None
             }
-            Press::Idle | Press::Activate => None,
+            ButtonPress::Idle | ButtonPress::Activate => None,
         }
     }
 
-    /// Time passes; what the module tells the motors, if anything.
+    /// Advances time; returns the mode frame to the motors, if the mode changes.
     pub fn tick(&mut self, now_ns: u64) -> Option<CanFrame> {
         if !self.latched && now_ns >= self.pressed_ns + PRESS_NS {
             self.button = Button::None;
@@ -235,8 +235,8 @@ impl SafetyModule {
             self.voltage = if warn { Level::Warning } else { Level::Safe };
         }
         if self.mode == SafetyMode::Active {
-            let silent = |heard: &u64| now_ns > heard + self.config.heartbeat_ns;
-            if self.heard_ns.iter().any(silent) {
+            let silent = |last_ns: &u64| now_ns > last_ns + self.config.heartbeat_ns;
+            if self.last_seen_ns.iter().any(silent) {
                 self.heartbeat = Level::Fault;
                 return self.enter(SafetyMode::Idle, Cause::Heartbeat);
             }
@@ -256,16 +256,16 @@ impl SafetyModule {
         }
     }
 
-    /// Takes a frame of another node; what it answers or tells the motors.
-    pub fn hear(&mut self, now_ns: u64, frame: &CanFrame) -> Option<CanFrame> {
+    /// Handles a frame of another node; returns its reply or its mode frame to the motors.
+    pub fn handle_frame(&mut self, now_ns: u64, frame: &CanFrame) -> Option<CanFrame> {
         if !self.config.present {
             return None;
         }
         match frame.id().to() {
             Destination::Group(GroupId::LOWER_TORQUES | GroupId::UPPER_TORQUES) => {
-                self.hear_torques(frame)
+                self.check_torques(frame)
             }
-            Destination::Group(GroupId::POSITION) => self.hear_position(now_ns, frame),
+            Destination::Group(GroupId::POSITION) => self.update_position(now_ns, frame),
             Destination::Node(NodeId::SAFETY) => match PropertyMessage::parse(frame).ok()? {
                 PropertyMessage::Get(id) => {
                     let property = property_of(&self.table, id)?;
@@ -334,18 +334,18 @@ impl SafetyModule {
         self.store.get(property).unwrap_or(0)
     }
 
-    fn hear_torques(&mut self, frame: &CanFrame) -> Option<CanFrame> {
+    fn check_torques(&mut self, frame: &CanFrame) -> Option<CanFrame> {
         let torques = PackedTorques::parse(frame).ok()?;
-        let greatest = torques.slots.iter().map(|t| i32::from(t.units()).abs());
-        let greatest = greatest.max().unwrap_or(0);
+        let max_torque = torques.slots.iter().map(|t| i32::from(t.units()).abs());
+        let max_torque = max_torque.max().unwrap_or(0);
         if self.mode != SafetyMode::Active || self.torque == Level::Fault {
             return None;
         }
-        if greatest > self.limit(Property::TL2) {
+        if max_torque > self.limit(Property::TL2) {
             self.torque = Level::Fault;
             return self.enter(SafetyMode::Idle, Cause::Torque);
         }
-        self.torque = if greatest > self.limit(Property::TL1) {
+        self.torque = if max_torque > self.limit(Property::TL1) {
             Level::Warning
         } else {
             Level::Safe
@@ -353,9 +353,9 @@ impl SafetyModule {
         None
     }
 
-    fn hear_position(&mut self, now_ns: u64, frame: &CanFrame) -> Option<CanFrame> {
+    fn update_position(&mut self, now_ns: u64, frame: &CanFrame) -> Option<CanFrame> {
         let index = usize::from(frame.id().from().number()).checked_sub(1)?;
-        *self.heard_ns.get_mut(index)? = now_ns;
+        *self.last_seen_ns.get_mut(index)? = now_ns;
         let reply = PositionReply::parse(frame).ok()?;
         *self.counts.get_mut(index)? = Some(reply.motor.get());
         let [Some(a), Some(b), Some(c), Some(d)] = self.counts else {
@@ -364,7 +364,7 @@ impl SafetyModule {
         self.counts = [None; 4];
         let counts = [a, b, c, d];
         let motors = Vector4::from_fn(|i, _| f64::from(counts[i]) * self.rad_per_count[i]);
-        let points = watched_points_m(&(self.joint_from_motor * motors).into());
+        let points = monitored_points_m(&(self.joint_from_motor * motors).into());
         self.history.push((now_ns, points));
         if self.history.len() <= HISTORY {
             return None;

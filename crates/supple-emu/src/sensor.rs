@@ -1,7 +1,8 @@
 //! The force/torque sensor behind the tip.
 //!
-//! It answers a request by forces, then torques, both in its own axes, which are the tip's. Taring takes
-//! a little over a second, in which its outputs are zero and its status says so. Source: btclient, OWD.
+//! It answers a request with a frame of forces and one of torques, both in its own axes, which are the tip's.
+//! Taring takes a little over a second, during which the outputs are zero and the status reports taring. Source:
+//! btclient, OWD.
 
 use crate::store::property_of;
 use supple_core::nalgebra::Vector3;
@@ -13,12 +14,12 @@ use supple_puck::{
 
 /// Time that taring takes \[ns\].
 const TARE_NS: u64 = 1_100_000_000;
-/// From the middle of the sensor to the tip, in its own axes \[m\].
+/// Offset from the centre of the sensor to the tip, in the sensor's axes \[m\].
 const SENSOR_TO_TIP_M: Vector3<f64> = Vector3::new(0.0, 0.0, 0.026);
-/// Its ranges: N in x and y, N in z, N m.
+/// Ranges: force in x and y \[N\], force in z \[N\], torque \[N m\].
 const RANGES: [f64; 3] = [80.0, 135.0, 2.75];
-/// Gravity that it feels standing still is left out: the tool's weight is tared away.
-const AT_REST: Vector3<f64> = Vector3::new(0.0, 0.0, 0.0);
+/// Acceleration reported at rest: gravity is not modelled, as the tool's weight is tared.
+const ACCELERATION_AT_REST: Vector3<f64> = Vector3::new(0.0, 0.0, 0.0);
 
 /// The sensor.
 #[derive(Clone, Debug)]
@@ -29,7 +30,7 @@ pub struct ForceSensor {
 }
 
 impl ForceSensor {
-    /// A sensor that is ready.
+    /// A sensor that is not taring.
     pub fn new() -> ForceSensor {
         ForceSensor {
             taring_until_ns: 0,
@@ -38,13 +39,13 @@ impl ForceSensor {
         }
     }
 
-    /// The force that now acts on the tip, in the sensor's axes \[N\].
-    pub fn feel(&mut self, force_n: Vector3<f64>) {
+    /// Sets the force on the tip, in the sensor's axes \[N\].
+    pub fn set_force(&mut self, force_n: Vector3<f64>) {
         self.force_n = force_n;
     }
 
-    /// Takes a frame of another node; its answers.
-    pub fn hear(&mut self, now_ns: u64, frame: &CanFrame) -> [Option<CanFrame>; 2] {
+    /// Handles a frame of another node; returns the replies.
+    pub fn handle_frame(&mut self, now_ns: u64, frame: &CanFrame) -> [Option<CanFrame>; 2] {
         if frame.id().to() != Destination::Node(NodeId::FORCE_TORQUE) {
             return [None; 2];
         }
@@ -52,7 +53,10 @@ impl ForceSensor {
         match PropertyMessage::parse(frame) {
             Ok(PropertyMessage::Get(id)) => match property_of(&table, id) {
                 Some(Property::FT) => self.read(now_ns),
-                Some(Property::A) => [reading(Quantity::Acceleration, AT_REST, None), None],
+                Some(Property::A) => [
+                    reading(Quantity::Acceleration, ACCELERATION_AT_REST, None),
+                    None,
+                ],
                 Some(property) => {
                     let value = match property {
                         Property::STAT => Stat::Ready.value(),
@@ -89,9 +93,9 @@ impl ForceSensor {
         let torque_nm = SENSOR_TO_TIP_M.cross(&self.force_n);
         let [side, along, torque] = RANGES;
         let limits = [side, side, along, torque, torque, torque];
-        let felt = self.force_n.iter().chain(torque_nm.iter());
+        let loads = self.force_n.iter().chain(torque_nm.iter());
         let mut now = 0u8;
-        for (axis, (value, limit)) in felt.zip(limits).enumerate() {
+        for (axis, (value, limit)) in loads.zip(limits).enumerate() {
             if value.abs() > limit {
                 now |= 1 << axis;
             }

@@ -1,26 +1,26 @@
-//! Values of properties, and which property an id stands for.
+//! Property values, and the mapping from ids to properties.
 
 use std::collections::BTreeMap;
 use supple_puck::property::Slot;
 use supple_puck::{Property, PropertyId, PropertyTable};
 
-/// Values that are kept and given back.
+/// Stored property values.
 #[derive(Clone, Debug, Default)]
 pub struct PropertyStore(BTreeMap<Property, i32>);
 
 impl PropertyStore {
-    /// Its value; `None` for one that was never set.
+    /// Value of a property; `None` if it was never set.
     pub fn get(&self, property: Property) -> Option<i32> {
         self.0.get(&property).copied()
     }
 
-    /// Keeps a value.
+    /// Stores a value.
     pub fn set(&mut self, property: Property, value: i32) {
         self.0.insert(property, value);
     }
 }
 
-/// The property that an id stands for in a firmware.
+/// Property of an id in a firmware.
 pub fn property_of(table: &PropertyTable, id: PropertyId) -> Option<Property> {
     match table.slot(id) {
         Slot::Property(property) => Some(property),

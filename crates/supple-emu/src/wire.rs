@@ -1,38 +1,38 @@
-//! The cable: one frame at a time, each as long as its bits at 1 Mbit/s.
+//! Model of the bus medium: one frame at a time, for the duration of its bits at 1 Mbit/s.
 //!
-//! When the cable is free, of the frames that wait the one with the lowest id begins; a frame that has
-//! begun is not interrupted. Errors on the cable, and their retransmission, are left out.
+//! When the bus is free, the waiting frame with the lowest id starts; a frame that has started is not
+//! interrupted. Bus errors and retransmissions are not modelled.
 
 use supple_puck::{CanFrame, timing};
 
 const NS_PER_BIT: u64 = 1_000_000_000 / timing::BIT_RATE as u64;
 
-/// A frame that waits.
+/// A waiting frame.
 #[derive(Clone, Copy, Debug)]
 struct Waiting {
     ready_ns: u64,
     frame: CanFrame,
 }
 
-/// The cable, with every frame that waits for it.
+/// The bus medium with all waiting frames.
 #[derive(Clone, Debug, Default)]
 pub struct Wire {
     waiting: Vec<Waiting>,
-    /// The frame under way and when it ends.
+    /// The current frame and its end time \[ns\].
     current: Option<(CanFrame, u64)>,
     free_ns: u64,
     busy_ns: u64,
 }
 
 impl Wire {
-    /// A frame wants the cable from `ready_ns` on. Frames of one node that are ready at the same time
-    /// keep their order.
+    /// Queues a frame for transmission from `ready_ns` on. Frames of one node with the same time keep their
+    /// order.
     pub fn queue(&mut self, ready_ns: u64, frame: CanFrame) {
         self.waiting.push(Waiting { ready_ns, frame });
     }
 
-    /// When the next frame ends \[ns\], if any is under way or waits. More frames may come first only if
-    /// they are queued before it begins.
+    /// End time of the current or next frame \[ns\], if any. A frame queued later may go first only if this one
+    /// has not started.
     pub fn next_end_ns(&self) -> Option<u64> {
         match (self.current, self.next()) {
             (Some((_, end_ns)), _) => Some(end_ns),
@@ -43,7 +43,7 @@ impl Wire {
         }
     }
 
-    /// Lets frames begin up to `now_ns`; the one that ends at or before it, if one does.
+    /// Starts the next frame if it is due by `now_ns`; returns the current frame if it ends by then.
     pub fn advance(&mut self, now_ns: u64) -> Option<(CanFrame, u64)> {
         if self.current.is_none()
             && let Some((begin_ns, index)) = self.next()
@@ -64,17 +64,17 @@ impl Wire {
         }
     }
 
-    /// Frames that wait are forgotten: the nodes that would send them have no power.
+    /// Discards all waiting frames.
     pub fn clear(&mut self) {
         self.waiting.clear();
     }
 
-    /// Time that frames have occupied the cable \[ns\].
+    /// Total time for which frames have occupied the bus \[ns\].
     pub fn busy_ns(&self) -> u64 {
         self.busy_ns
     }
 
-    /// When the next frame begins, and which.
+    /// Start time and index of the next frame.
     fn next(&self) -> Option<(u64, usize)> {
         let earliest = self.waiting.iter().map(|w| w.ready_ns).min()?;
         let begin_ns = earliest.max(self.free_ns);
@@ -85,7 +85,7 @@ impl Wire {
     }
 }
 
-/// Time that a frame occupies the cable \[ns\].
+/// Duration of a frame on the bus \[ns\].
 pub fn duration_ns(frame: &CanFrame) -> u64 {
     u64::from(timing::bits(frame)) * NS_PER_BIT
 }
@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn the_lowest_id_of_those_that_wait_begins() {
+    fn the_waiting_frame_with_the_lowest_id_starts() {
         let mut wire = Wire::default();
         wire.queue(0, frame(0x4e3, 3));
         wire.queue(10, frame(0x443, 3));
@@ -133,9 +133,9 @@ mod tests {
         assert_eq!(wire.busy_ns(), total);
     }
 
-    /// Barrett's own 75 us for a position reply lies between no stuffing and the worst of it.
+    /// Barrett's 75 us for a position reply lies between no stuffing and the maximum.
     #[test]
-    fn a_position_reply_takes_its_bits() {
+    fn a_position_reply_lasts_for_its_bits() {
         let ns = duration_ns(&frame(0x423, 3));
         assert!((71_000..=85_000).contains(&ns), "{ns}");
     }

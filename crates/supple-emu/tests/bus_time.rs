@@ -1,13 +1,13 @@
-//! The time of the cable at 1 Mbit/s, against bits counted by hand.
+//! Frame durations at 1 Mbit/s, compared with bits counted by hand.
 //!
-//! The request for positions, id 0x404 and payload 30, from the start bit to the end of its check sum; the bits
-//! in brackets are stuffed, each after five equal ones:
+//! The position request, id 0x404 and payload 30, from the start bit to the end of its checksum; the bits in
+//! brackets are stuff bits, each after five equal ones:
 //!
 //! ```text
 //! 0 100000[1]00100 000[1] 0001 00110000 0[1]10101011011110
 //! ```
 //!
-//! 42 bits and 3 stuffed ones, then the delimiters and the acknowledge (3), the end (7) and the gap (3): 58.
+//! 42 bits and 3 stuff bits, then delimiters and acknowledge (3), end of frame (7) and interframe space (3): 58.
 
 mod support;
 
@@ -16,7 +16,7 @@ use support::{Host, MS, P, frame};
 
 const US: u64 = 1_000;
 
-/// How long a frame of the host that nobody answers takes, in microseconds.
+/// Duration of a frame of the host without a reply, in microseconds.
 fn lasts_us(host: &mut Host, id: u32, payload: &[u8]) -> u64 {
     host.listen(MS);
     let (begin_ns, busy_ns) = (host.now_ns(), host.arm().bus_busy_ns());
@@ -36,7 +36,7 @@ fn a_frame_lasts_its_bits() {
         (0x01f, &[][..], 51),
         (0x01f, &[0x55; 8], 113),
         (0x01f, &[0x00; 8], 127),
-        // The packed torques [1, 2, 3, 4] of the protocol's note, to a group that nobody is in.
+        // The packed torques [1, 2, 3, 4] of the protocol note, to a group without members.
         (
             0x41e,
             &[0xaa, 0x00, 0x04, 0x00, 0x20, 0x00, 0xc0, 0x04],
@@ -44,7 +44,7 @@ fn a_frame_lasts_its_bits() {
         ),
     ] {
         assert_eq!(lasts_us(&mut host, id, payload), bits, "{payload:x?}");
-        assert_eq!(counted(id, payload), bits, "{payload:x?}");
+        assert_eq!(count_bits(id, payload), bits, "{payload:x?}");
     }
 }
 
@@ -58,12 +58,12 @@ fn any_frame_lasts_its_bits() {
         word ^= word << 17;
         let payload = &(word & word >> 20).to_be_bytes()[..length];
         let bits = lasts_us(&mut host, 0x41e, payload);
-        assert_eq!(bits, counted(0x41e, payload), "{payload:x?}");
+        assert_eq!(bits, count_bits(0x41e, payload), "{payload:x?}");
     }
 }
 
-/// The bits of a frame as a text of zeros and ones, the check sum by long division.
-fn counted(id: u32, payload: &[u8]) -> u64 {
+/// Counts the bits of a frame as a string of zeros and ones, with the checksum by long division.
+fn count_bits(id: u32, payload: &[u8]) -> u64 {
     let mut bits = format!("0{id:011b}000{:04b}", payload.len());
     bits.extend(payload.iter().map(|byte| format!("{byte:08b}")));
     let number = |c: char| u32::from(c == '1');
@@ -90,7 +90,7 @@ fn counted(id: u32, payload: &[u8]) -> u64 {
 }
 
 /// Request and four replies, all counters at zero: 58 bits, and 78, 77, 77, 77 for ids 0x423, 0x443, 0x463 and
-/// 0x483 with three bytes of zero. The replies follow each other without a gap, behind the pucks' latency.
+/// 0x483 with three bytes of zero. The replies follow each other without a gap, after the latency of the pucks.
 #[test]
 fn a_request_for_positions_lasts_all_its_frames() {
     let mut host = Host::awake();

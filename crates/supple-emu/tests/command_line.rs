@@ -1,4 +1,4 @@
-//! The real program: what it is told wrongly is said with the remedy.
+//! The real program: invalid arguments are reported with the remedy.
 
 use std::process::{Command, Output};
 
@@ -7,19 +7,19 @@ fn emu(arguments: &[&str]) -> Output {
     command.args(arguments).output().expect("it runs")
 }
 
-fn words(output: &Output) -> String {
+fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
 #[test]
-fn a_wrong_arm_is_code_3() {
+fn an_unknown_arm_exits_with_code_3() {
     let output = emu(&["--arm", "wam9"]);
     assert_eq!(output.status.code(), Some(3));
-    assert!(words(&output).contains("wam9"), "{}", words(&output));
+    assert!(stderr(&output).contains("wam9"), "{}", stderr(&output));
 }
 
 #[test]
-fn a_button_that_is_none_is_named_with_those_that_are() {
+fn an_unknown_button_is_rejected_with_the_valid_names() {
     for wrong in [
         "fire@1",
         "idle",
@@ -29,32 +29,39 @@ fn a_button_that_is_none_is_named_with_those_that_are() {
     ] {
         let output = emu(&["--press", wrong]);
         assert_eq!(output.status.code(), Some(2), "{wrong}");
-        let words = words(&output);
-        assert!(words.contains(wrong) && words.contains("e-stop"), "{words}");
+        let stderr = stderr(&output);
+        assert!(
+            stderr.contains(wrong) && stderr.contains("e-stop"),
+            "{stderr}"
+        );
     }
 }
 
 #[test]
-fn an_injection_that_cannot_be_is_code_2() {
+fn an_invalid_injection_exits_with_code_2() {
     for (wrong, remedy) in [
         ("encoder-stick", "encoder-stuck"),
         ("encoder-nan", "reply-lost:every=1"),
     ] {
         let output = emu(&["--inject", wrong]);
         assert_eq!(output.status.code(), Some(2), "{wrong}");
-        let words = words(&output);
-        assert!(words.contains(remedy), "{words}");
+        let stderr = stderr(&output);
+        assert!(stderr.contains(remedy), "{stderr}");
     }
 }
 
 #[test]
-fn a_can_interface_has_no_virtual_time() {
+fn a_can_interface_with_virtual_time_is_rejected() {
     let folder = tempfile::tempdir().expect("a folder");
     let output = Command::new(env!("CARGO_BIN_EXE_supple-emu"))
         .args(["--bus", "can:vcan0", "--virtual-time"])
         .env("XDG_RUNTIME_DIR", folder.path())
         .output()
         .expect("it runs");
-    assert_eq!(output.status.code(), Some(2), "{}", words(&output));
-    assert!(words(&output).contains("unix:FOLDER"), "{}", words(&output));
+    assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
+    assert!(
+        stderr(&output).contains("unix:FOLDER"),
+        "{}",
+        stderr(&output)
+    );
 }

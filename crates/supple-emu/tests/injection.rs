@@ -1,4 +1,4 @@
-//! Faults put into the arm, as its host meets them on the bus.
+//! Injected faults, as the host observes them on the bus.
 
 mod support;
 
@@ -11,16 +11,16 @@ fn injected(specs: &[&str]) -> Host {
     let mut host = Host::awake();
     let read: Result<Vec<Injection>, _> = specs.iter().map(|spec| spec.parse()).collect();
     let arm = host.arm_mut();
-    arm.inject(&read.expect("sound"), PERIOD_S).expect("taken");
-    host.press(supple_emu::Press::Activate);
+    arm.inject(&read.expect("valid"), PERIOD_S).expect("taken");
+    host.press(supple_emu::ButtonPress::Activate);
     host
 }
 
-/// Positions that the pucks report, each asked by itself.
+/// Positions that the pucks report to separate requests.
 fn counts(host: &mut Host) -> Vec<Option<i32>> {
     (1..=4)
         .map(|node| {
-            let reply = host.ask(node, P)?;
+            let reply = host.get(node, P)?;
             Some(i32::from_be_bytes([0, reply[0], reply[1], reply[2]]) << 10 >> 10)
         })
         .collect()
@@ -33,7 +33,7 @@ fn active(host: &mut Host) {
 }
 
 #[test]
-fn a_stuck_encoder_is_stuck_for_the_host_while_the_arm_falls() {
+fn a_stuck_encoder_reports_a_constant_angle_while_the_arm_falls() {
     let mut host = injected(&["encoder-stuck:joint=3,at-s=0.05"]);
     active(&mut host);
     host.cycles(100);
@@ -63,14 +63,14 @@ fn every_second_reply_of_a_puck_is_not_sent() {
 }
 
 #[test]
-fn what_a_bus_cannot_do_is_refused_with_a_remedy() {
+fn faults_without_bus_support_are_rejected_with_a_remedy() {
     for (spec, remedy) in [
         ("encoder-stuck:when=track", "at-s=SECONDS"),
         ("encoder-nan:joint=1", "reply-lost:every=1"),
         ("drives-idle:at-s=1", "pendant"),
         ("motor-dead:motor=4", "count from 0 to 3"),
     ] {
-        let injection: Injection = spec.parse().expect("sound");
+        let injection: Injection = spec.parse().expect("valid");
         let refused = Host::awake().arm_mut().inject(&[injection], PERIOD_S);
         let words = refused.expect_err(spec).to_string();
         assert!(words.contains(remedy), "{spec}: {words}");

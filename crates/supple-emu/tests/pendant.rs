@@ -1,4 +1,4 @@
-//! The pendant's socket of the real program: whoever says nothing, or does not listen, holds up nobody.
+//! The pendant socket of the real program: clients that are silent or do not read block no other client.
 
 use core::time::Duration;
 use std::io::{Read, Write};
@@ -9,7 +9,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::Instant;
 use tempfile::TempDir;
 
-/// Longer than any test takes: a pendant that answers later is one that does not.
+/// Timeout of an answer, longer than any test takes.
 const WITHIN: Duration = Duration::from_secs(60);
 
 struct Arm {
@@ -32,7 +32,7 @@ impl Arm {
         let arm = Arm { child, folder };
         let start = Instant::now();
         while arm.connect().is_none() {
-            assert!(start.elapsed() < WITHIN, "no pendant came");
+            assert!(start.elapsed() < WITHIN, "no pendant socket");
             std::thread::yield_now();
         }
         arm
@@ -42,7 +42,7 @@ impl Arm {
         UnixStream::connect(Path::new(self.folder.path()).join("bus/pendant")).ok()
     }
 
-    /// Says something and hears the answer.
+    /// Sends a line and returns the answer.
     fn ask(&self, words: &str) -> String {
         let mut stream = self.connect().expect("it listens");
         stream.set_read_timeout(Some(WITHIN)).expect("set");
@@ -61,7 +61,7 @@ impl Drop for Arm {
 }
 
 #[test]
-fn the_emergency_stop_passes_clients_that_say_nothing_or_half_a_line() {
+fn the_emergency_stop_is_not_blocked_by_clients_without_a_complete_line() {
     let arm = Arm::start();
     let silent: Vec<UnixStream> = (0..40)
         .map(|k| {
@@ -79,7 +79,7 @@ fn the_emergency_stop_passes_clients_that_say_nothing_or_half_a_line() {
 }
 
 #[test]
-fn clients_that_do_not_listen_hold_up_nobody() {
+fn clients_that_do_not_read_block_no_other_client() {
     let arm = Arm::start();
     let deaf: Vec<UnixStream> = (0..100)
         .map(|_| {
@@ -88,21 +88,21 @@ fn clients_that_do_not_listen_hold_up_nobody() {
             stream
         })
         .collect();
-    // Those before it are served by then: its place is behind theirs.
+    // The clients before it have been served by then: it was queued after them.
     loop {
         let answer = arm.ask("e-stop");
         if answer.contains("EStop") {
             break;
         }
-        // Too many were waiting to be answered: what was asked for is done all the same.
+        // Too many answers were pending: the command is carried out anyway.
         assert_eq!(answer, "");
     }
     drop(deaf);
 }
 
-/// A line in pieces, and one without its end from a client that has said all.
+/// A line in pieces, and one without a newline from a client that has closed its sending side.
 #[test]
-fn a_line_may_come_in_pieces() {
+fn a_line_may_arrive_in_pieces() {
     let arm = Arm::start();
     let mut stream = arm.connect().expect("it listens");
     stream.set_read_timeout(Some(WITHIN)).expect("set");

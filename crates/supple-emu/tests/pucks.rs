@@ -1,10 +1,10 @@
-//! Motor pucks by the tables of the protocol's note: states, ids by firmware, torques.
+//! Motor pucks as in the tables of the protocol note: states, ids by firmware, torques.
 
 mod support;
 
 use supple_bus::{BusFault, Event};
 use supple_emu::puck::Power;
-use supple_emu::{EmulatorConfig, Happening, Press};
+use supple_emu::{ArmEvent, ButtonPress, EmulatorConfig};
 use support::{E_STOP, Host, IDLE, MODE, MODULE, MS, MT, P, STAT, VERS, ZERO, packed};
 
 fn with_firmware(version: i32) -> Host {
@@ -18,9 +18,9 @@ fn with_firmware(version: i32) -> Host {
     Host::new(config)
 }
 
-/// Counts a revolution, torque units a N m and poles, by Barrett's lists of 51, 61, 65 and 175.
+/// Counts per revolution, torque units per N m and poles, at the ids of Barrett's lists for 51, 61, 65 and 175.
 #[test]
-fn ids_are_those_of_the_firmware() {
+fn ids_depend_on_the_firmware() {
     for (version, counts, units, poles) in [
         (51, 30, 108, 112),
         (61, 65, 83, 87),
@@ -38,12 +38,12 @@ fn ids_are_those_of_the_firmware() {
 
 /// Before version 61 the position is 26.
 #[test]
-fn an_old_position_has_another_id() {
+fn old_firmware_has_another_id_for_the_position() {
     let position = |version, id| {
         let mut host = with_firmware(version);
         host.send(3, &[id]);
-        let heard = host.hear(MS).into_iter();
-        let mut replies = heard.filter(|(id, _)| *id == 0x463);
+        let received = host.receive_frames(MS).into_iter();
+        let mut replies = received.filter(|(id, _)| *id == 0x463);
         replies.next().map(|(_, payload)| payload.len())
     };
     assert_eq!(position(51, 26), Some(3));
@@ -57,44 +57,44 @@ fn the_first_eight_ids_are_always_valid() {
     for version in [51, 61, 119, 175] {
         let mut host = with_firmware(version);
         for property in 0..8 {
-            assert!(host.ask(2, property).is_some(), "{property} of {version}");
+            assert!(host.get(2, property).is_some(), "{property} of {version}");
         }
     }
 }
 
-/// The monitor answers what it must and neither groups nor position.
+/// The monitor answers its own list of properties, but neither group requests nor positions.
 #[test]
-fn a_sleeping_puck_answers_little() {
+fn the_monitor_answers_only_its_own_properties() {
     let mut host = Host::new(EmulatorConfig::wam(4));
-    assert_eq!(host.ask(1, STAT), None, "no power");
-    host.press(Press::Idle);
+    assert_eq!(host.get(1, STAT), None, "no power");
+    host.press(ButtonPress::Idle);
     assert_eq!(host.value(1, STAT), 0);
     assert_eq!(host.value(1, VERS), 175);
-    assert_eq!(host.ask(1, P), None);
+    assert_eq!(host.get(1, P), None);
     host.send(0x404, &[P]);
-    assert_eq!(host.hear(MS), []);
+    assert_eq!(host.receive_frames(MS), []);
 }
 
 #[test]
-fn waking_takes_its_time() {
+fn waking_takes_the_configured_time() {
     let mut host = Host::new(EmulatorConfig::wam(4));
-    host.press(Press::Idle);
+    host.press(ButtonPress::Idle);
     host.set(1, STAT, 2);
     host.listen(100 * MS);
-    assert_eq!(host.ask(1, STAT), None, "it is waking");
-    assert_eq!(host.value(2, STAT), 0, "the others are not");
+    assert_eq!(host.get(1, STAT), None, "puck 1 is waking");
+    assert_eq!(host.value(2, STAT), 0, "puck 2 is not waking");
     host.listen(695 * MS);
     assert!(matches!(host.arm().pucks()[0].power(), Power::Waking(_)));
     host.listen(10 * MS);
     assert_eq!(host.value(1, STAT), 2);
-    assert_eq!(host.ask(1, P).map(|reply| reply.len()), Some(3));
+    assert_eq!(host.get(1, P).map(|reply| reply.len()), Some(3));
 }
 
-/// Transceivers that drop off and return: a frame on the bus then drives the host off it, for 100 ms.
+/// Transceivers leave the bus and return: a frame of the host then makes it go bus-off, for 100 ms.
 #[test]
-fn talking_while_pucks_wake_drives_the_host_off_the_bus() {
+fn sending_while_pucks_wake_makes_the_host_go_bus_off() {
     let mut host = Host::new(EmulatorConfig::wam(4));
-    host.press(Press::Idle);
+    host.press(ButtonPress::Idle);
     host.set(1, STAT, 2);
     host.listen(300 * MS);
     host.send(2, &[STAT]);
@@ -104,14 +104,14 @@ fn talking_while_pucks_wake_drives_the_host_off_the_bus() {
     assert_eq!(faults, [off, Event::Fault(BusFault::Restarted)]);
     let away_ns = events[1].0 - events[0].0;
     assert!((100 * MS..101 * MS).contains(&away_ns), "{away_ns}");
-    let seen = host.arm().happenings().iter();
+    let seen = host.arm().arm_events().iter();
     assert!(
         seen.map(|(_, h)| h)
-            .any(|h| *h == Happening::SpokeWhileWaking)
+            .any(|h| *h == ArmEvent::HostSentDuringWakeUp)
     );
 }
 
-/// 22 bits, and no more: one turn beyond the end is the other end.
+/// The counter has 22 bits and wraps from one end to the other.
 #[test]
 fn a_counter_wraps_at_22_bits() {
     let mut host = Host::awake();
@@ -122,11 +122,11 @@ fn a_counter_wraps_at_22_bits() {
         (-12_345, [0x3f, 0xcf, 0xc7]),
     ] {
         host.set(2, P, defined);
-        assert_eq!(host.ask(2, P), Some(reply.to_vec()), "{defined}");
+        assert_eq!(host.get(2, P), Some(reply.to_vec()), "{defined}");
     }
 }
 
-/// 2700 units a N m; never more than MT; nothing in idle.
+/// 2700 units per N m; at most MT; zero in idle.
 #[test]
 fn torques_are_scaled_limited_and_ignored_in_idle() {
     let torque_nm = |host: &mut Host, torques| {
@@ -147,18 +147,18 @@ fn torques_are_scaled_limited_and_ignored_in_idle() {
     assert_eq!(torque_nm(&mut host, [0, 0, -4000, 0])[2], -1000.0 / 2700.0);
 }
 
-/// The emergency stop takes the power: counts are lost, and everyone sleeps.
+/// The emergency stop switches the power off: counts are lost, and all pucks return to the monitor.
 #[test]
-fn an_emergency_stop_forgets_everything() {
+fn an_emergency_stop_resets_the_pucks() {
     let mut host = Host::active();
-    host.press(Press::EStop);
+    host.press(ButtonPress::EStop);
     host.listen(MS);
     assert_eq!(host.module_mode(), E_STOP);
-    assert_eq!(host.ask(1, STAT), None);
-    host.press(Press::Idle);
-    assert_eq!(host.module_mode(), E_STOP, "the button is in");
-    host.press(Press::Release);
-    host.press(Press::Idle);
+    assert_eq!(host.get(1, STAT), None);
+    host.press(ButtonPress::Idle);
+    assert_eq!(host.module_mode(), E_STOP, "the button is latched");
+    host.press(ButtonPress::Release);
+    host.press(ButtonPress::Idle);
     host.listen(MS);
     assert_eq!(host.module_mode(), IDLE);
     assert_eq!(host.value(1, STAT), 0);
@@ -166,7 +166,7 @@ fn an_emergency_stop_forgets_everything() {
 }
 
 #[test]
-fn the_host_wakes_no_motor() {
+fn the_host_cannot_activate_motors() {
     let mut host = Host::awake();
     host.set(MODULE, MODE, 2);
     assert_eq!(host.module_mode(), IDLE);

@@ -1,11 +1,11 @@
-//! The safety module by the tables of the protocol's note: what takes an active arm to idle, what to the
-//! emergency stop, what is refused, and what the pendant shows.
+//! The safety module as in the tables of the protocol note: causes of idle and of the emergency stop, rejected
+//! requests, and the state of the pendant.
 
 mod support;
 
 use supple_core::dynamics::{joint_poses, tip_pose};
 use supple_core::nalgebra::Vector3;
-use supple_emu::{Cause, EmulatorConfig, Press};
+use supple_emu::{ButtonPress, Cause, EmulatorConfig};
 use supple_model::Description;
 use supple_puck::status::MotorMode;
 use support::*;
@@ -18,7 +18,7 @@ fn motors_in(host: &Host, mode: MotorMode) -> bool {
     host.arm().pucks().iter().all(|puck| puck.mode() == mode)
 }
 
-/// The default limits are 4731 and 5204: what is above warns, or takes the arm to idle.
+/// The default limits are 4731 and 5204: a larger torque is a warning, or switches the arm to idle.
 #[test]
 fn torque_faults_follow_the_commanded_torque() {
     for (torque, lamp, mode) in [
@@ -42,20 +42,20 @@ fn torque_faults_follow_the_commanded_torque() {
     }
 }
 
-/// The module tells the motors their mode by a frame to all actuators.
+/// The module sends the motors their mode in a frame to all actuators.
 #[test]
-fn a_change_of_mode_is_told_on_the_bus() {
+fn a_change_of_mode_is_sent_on_the_bus() {
     let mut host = Host::awake();
     host.listen(MS);
-    host.press(Press::Activate);
-    assert_eq!(host.hear(MS), [(0x540, vec![0x88, 0, 2, 0])]);
+    host.press(ButtonPress::Activate);
+    assert_eq!(host.receive_frames(MS), [(0x540, vec![0x88, 0, 2, 0])]);
     assert!(motors_in(&host, MotorMode::Torque));
     host.set(MODULE, MODE, IDLE);
     assert!(motors_in(&host, MotorMode::Idle));
 }
 
 #[test]
-fn the_host_lowers_and_never_raises() {
+fn host_can_only_lower_the_mode() {
     let mut host = Host::active();
     host.set(MODULE, MODE, IDLE);
     assert_eq!((host.module_mode(), cause(&host)), (IDLE, Cause::Host));
@@ -68,9 +68,9 @@ fn the_host_lowers_and_never_raises() {
     assert_eq!(host.module_mode(), E_STOP);
 }
 
-/// Positions that are no longer reported: idle after the time that was set, and not before.
+/// Missing positions switch the arm to idle after the configured time, and not before.
 #[test]
-fn the_heart_stops_beating_with_the_polls() {
+fn heartbeat_fault_when_polling_stops() {
     for heartbeat_ns in [100 * MS, 50 * MS] {
         let mut config = EmulatorConfig {
             zeroed: true,
@@ -78,9 +78,9 @@ fn the_heart_stops_beating_with_the_polls() {
         };
         config.safety.heartbeat_ns = heartbeat_ns;
         let mut host = Host::new(config);
-        host.press(Press::Activate);
+        host.press(ButtonPress::Activate);
         host.cycles(5);
-        // The last replies have ended within the millisecond of their request.
+        // The last replies end within the millisecond of their request.
         host.listen(heartbeat_ns - 2 * MS);
         assert!(motors_in(&host, MotorMode::Torque));
         host.listen(2 * MS);
@@ -92,7 +92,7 @@ fn the_heart_stops_beating_with_the_polls() {
 
 /// Limits 30, 36, 54 and 57 V.
 #[test]
-fn the_bus_voltage_has_its_limits() {
+fn the_bus_voltage_is_monitored() {
     for (volts, lamp, mode) in [
         (48, SAFE, ACTIVE),
         (36, SAFE, ACTIVE),
@@ -112,24 +112,24 @@ fn the_bus_voltage_has_its_limits() {
     }
 }
 
-/// A fault stays on the pendant and keeps the arm from being activated, until Shift-Idle.
+/// A fault stays on the pendant and blocks activation until Shift-Idle.
 #[test]
-fn a_fault_is_cleared_at_the_pendant_alone() {
+fn a_fault_is_cleared_only_at_the_pendant() {
     let mut host = Host::active();
     host.send(0x401, &packed([8191, 0, 0, 0]));
     host.listen(MS);
-    host.press(Press::Activate);
+    host.press(ButtonPress::Activate);
     assert_eq!(host.module_mode(), IDLE);
     assert_eq!(host.lamps()[1], FAULT);
-    host.press(Press::Idle);
+    host.press(ButtonPress::Idle);
     assert_eq!(host.lamps()[1], SAFE);
-    host.press(Press::Activate);
+    host.press(ButtonPress::Activate);
     assert_eq!(host.module_mode(), ACTIVE);
 }
 
-/// Faster of the elbow and the point 350 mm beyond it, 10 mm behind the tip, by the described arm's kinematics
-/// \[m/s\].
-fn watched_speed(before: &[f64; 4], after: &[f64; 4], elapsed_s: f64) -> f64 {
+/// Larger speed of the elbow and of the point 350 mm beyond it, 10 mm behind the tip, by the described arm's
+/// kinematics \[m/s\].
+fn monitored_speed(before: &[f64; 4], after: &[f64; 4], elapsed_s: f64) -> f64 {
     let config = Description::asset("wam4").unwrap().config::<4>().unwrap();
     let points = |q: &[f64; 4]| {
         let elbow = joint_poses(&config.arm, &(*q).into())[3].translation;
@@ -141,7 +141,7 @@ fn watched_speed(before: &[f64; 4], after: &[f64; 4], elapsed_s: f64) -> f64 {
     moved.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max) / elapsed_s
 }
 
-/// An arm that falls: idle as soon as it is faster than VL2, seen over the module's history of five sets.
+/// A falling arm is switched to idle as soon as its speed over five position sets exceeds VL2.
 #[test]
 fn a_falling_arm_is_stopped_at_the_limit() {
     let mut host = Host::active();
@@ -156,19 +156,19 @@ fn a_falling_arm_is_stopped_at_the_limit() {
             break;
         }
         let after = pose(&host);
-        speed = watched_speed(&before, &after, 1e-3);
+        speed = monitored_speed(&before, &after, 1e-3);
         before = after;
         warned |= host.arm().safety().pendant().velocity == supple_puck::safety::Level::Warning;
     }
     assert_eq!(cause(&host), Cause::Velocity);
-    // An arm in free fall gains 5 cm/s in the time of the module's history.
+    // An arm in free fall gains 5 cm/s during the module's history.
     assert!((0.5..0.56).contains(&speed), "{speed} m/s");
     assert!(warned);
     assert_eq!(host.lamps()[0], FAULT);
 }
 
 #[test]
-fn a_limit_of_zero_is_none() {
+fn a_limit_of_zero_disables_the_limit() {
     let mut host = Host::active();
     host.set(MODULE, VL1, 0);
     host.set(MODULE, VL2, 0);
@@ -177,7 +177,7 @@ fn a_limit_of_zero_is_none() {
     assert_eq!(host.lamps()[0], SAFE);
 }
 
-/// Moves where the counter of motor 1 says it is, `step` counts each of `cycles` milliseconds.
+/// Changes the reported position of motor 1 by `step` counts in each of `cycles` milliseconds.
 fn count_up(host: &mut Host, step: i32, cycles: usize) {
     for _ in 0..cycles {
         let counts = host.arm().pucks()[0].counts();
@@ -186,8 +186,8 @@ fn count_up(host: &mut Host, step: i32, cycles: usize) {
     }
 }
 
-/// A counter that jumps is a velocity fault, unless IFAULT says to ignore it: once for each set of positions in
-/// which the jump is seen.
+/// A counter jump is a velocity fault, unless IFAULT says to ignore it: once for each position set whose history
+/// contains the jump.
 #[test]
 fn redefined_positions_are_faults_unless_ignored() {
     let mut host = Host::active();
@@ -208,7 +208,7 @@ fn redefined_positions_are_faults_unless_ignored() {
 
 /// Half a second after a velocity fault the arm must be slower than VL2.
 #[test]
-fn an_arm_that_does_not_slow_down_loses_its_power() {
+fn an_arm_that_does_not_slow_down_enters_the_emergency_stop() {
     for (goes_on, mode) in [(true, E_STOP), (false, IDLE)] {
         let mut host = Host::active();
         host.set(MODULE, VL2, 4096);

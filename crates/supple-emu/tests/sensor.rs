@@ -1,4 +1,5 @@
-//! The force/torque sensor by the protocol's note: two frames, little-endian, tared in a little over a second.
+//! The force/torque sensor as in the protocol note: two little-endian frames, and a tare time of a little over a
+//! second.
 
 mod support;
 
@@ -9,14 +10,14 @@ const FT: u8 = 54;
 
 fn read(host: &mut Host) -> (Vec<u8>, Vec<u8>) {
     host.send(8, &[FT]);
-    let heard = host.hear(MS);
-    let ids: Vec<_> = heard.iter().map(|(id, _)| *id).collect();
+    let received = host.receive_frames(MS);
+    let ids: Vec<_> = received.iter().map(|(id, _)| *id).collect();
     assert_eq!(ids, [0x50a, 0x50b]);
-    (heard[0].1.clone(), heard[1].1.clone())
+    (received[0].1.clone(), received[1].1.clone())
 }
 
 #[test]
-fn a_reading_is_forces_and_then_torques_with_their_state() {
+fn a_reading_is_a_force_frame_and_a_torque_frame_with_status() {
     let mut host = Host::awake();
     host.listen(MS);
     let (force, torque) = read(&mut host);
@@ -32,7 +33,7 @@ fn a_reading_is_forces_and_then_torques_with_their_state() {
 }
 
 #[test]
-fn taring_gives_zeros_that_say_so() {
+fn taring_gives_zeros_with_the_taring_status() {
     let mut host = Host::awake();
     host.set(8, FT, 0);
     host.listen(1000 * MS);

@@ -1,4 +1,4 @@
-//! Calibrates the simulated arm for several seeds and follows the sinusoid at 5 N/m with what was found:
+//! Calibrates the simulated arm for several seeds and tracks the sinusoid at 5 N/m with the identified model:
 //! `cargo run --release -p supple-experiment --example calibrate -- SEEDS [RIPPLE_NM] [load]`.
 
 use rayon::prelude::*;

@@ -1,10 +1,11 @@
-//! What the numbers of the contact latch rest on, for an arm with its roll held (`wam4`).
+//! Data behind the contact-detection parameters, for an arm with held roll (`wam4`).
 //!
-//! First table: for several bandwidths, the greatest force against the reference's motion that free
-//! motion shows beyond what friction explains, over perturbed models, and the least that a first
-//! touch shows within 40 ms. A threshold between the two tells them apart.
-//! Second table: for several shares of the dry feed-forward left on in contact, the resting force over
-//! the spring's, and the line of the impulse over stiffness.
+//! First table: for several bandwidths, the maximum opposing force beyond friction in free motion over
+//! perturbed models, and its minimum within 40 ms of a first touch. A threshold between the two distinguishes
+//! contact from free motion.
+//!
+//! Second table: for several fractions of the dry feed-forward left on in contact, the resting force minus the
+//! spring force, and the line of the impulse against stiffness.
 
 use rayon::prelude::*;
 use supple_core::Trajectory;
@@ -16,9 +17,9 @@ use supple_model::Description;
 use supple_plant::Scene;
 
 const BANDWIDTHS: [(f64, f64); 4] = [(180.0, 40.0), (400.0, 80.0), (500.0, 120.0), (600.0, 120.0)];
-const SHARES: [f64; 5] = [0.0, 0.3, 0.55, 0.7, 1.0];
+const FRACTIONS: [f64; 5] = [0.0, 0.3, 0.55, 0.7, 1.0];
 const STIFFNESS_N_PER_M: [f64; 4] = [5.0, 25.0, 75.0, 125.0];
-/// A threshold that nothing reaches.
+/// A threshold that is never reached.
 const NEVER_N: f64 = 1e9;
 const FIRST_TOUCH_S: f64 = 0.04;
 
@@ -29,30 +30,37 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for (estimator, observer) in BANDWIDTHS {
         let free = (0..12)
             .into_par_iter()
-            .map(|seed| beyond_doubt(&free_plan(&setup, seed)?, estimator, observer, None))
+            .map(|seed| {
+                force_beyond_friction_uncertainty(
+                    &free_plan(&setup, seed)?,
+                    estimator,
+                    observer,
+                    None,
+                )
+            })
             .collect::<Result<Vec<_>, _>>()?;
         let touch = STIFFNESS_N_PER_M
             .par_iter()
             .map(|stiffness| {
                 let (plan, probe) = probing_plan(&setup, *stiffness)?;
-                beyond_doubt(&plan, estimator, observer, Some(probe))
+                force_beyond_friction_uncertainty(&plan, estimator, observer, Some(probe))
             })
             .collect::<Result<Vec<_>, _>>()?;
-        let greatest = free.into_iter().fold(0.0, f64::max);
-        let least = touch.into_iter().fold(f64::MAX, f64::min);
-        println!("{estimator:9}  {observer:8}  {greatest:11.2}  {least:11.2}");
+        let max_free = free.into_iter().fold(0.0, f64::max);
+        let min_touch = touch.into_iter().fold(f64::MAX, f64::min);
+        println!("{estimator:9}  {observer:8}  {max_free:11.2}  {min_touch:11.2}");
     }
-    println!("\nshare  rest force - K e at 5, 25, 75, 125 N/m [N]   impulse over K [N s]");
-    let press_m = press_m(setup.tip_radius_m());
-    for share in SHARES {
+    println!("\nfraction  rest force - K e at 5, 25, 75, 125 N/m [N]   impulse over K [N s]");
+    let commanded_penetration_m = commanded_penetration_m(setup.tip_radius_m());
+    for fraction in FRACTIONS {
         let strokes = STIFFNESS_N_PER_M
             .par_iter()
-            .map(|stiffness| probe_once(&setup, *stiffness, share))
+            .map(|stiffness| probe_once(&setup, *stiffness, fraction))
             .collect::<Result<Vec<_>, _>>()?;
         let beyond: Vec<String> = strokes
             .iter()
             .zip(STIFFNESS_N_PER_M)
-            .map(|(stroke, k)| format!("{:6.2}", stroke.rest_force_n - k * press_m))
+            .map(|(stroke, k)| format!("{:6.2}", stroke.rest_force_n - k * commanded_penetration_m))
             .collect();
         let points: Vec<_> = strokes
             .iter()
@@ -61,7 +69,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             .collect();
         if let Some(fit) = LineFit::new(&points) {
             println!(
-                "{share:5}  {}                  {:.3} + {:.4} K, R2 {:.3}",
+                "{fraction:5}  {}                  {:.3} + {:.4} K, R2 {:.3}",
                 beyond.join(" "),
                 fit.intercept,
                 fit.slope,
@@ -72,9 +80,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// How far the reference is beyond the cap's rest on the block, on average over the last 0.3 s of the
-/// stroke, in which the resting force is taken \[m\].
-fn press_m(tip_radius_m: f64) -> f64 {
+/// Mean commanded penetration of the cap into the block over the last 0.3 s of the stroke, the time over which
+/// the resting force is averaged \[m\].
+fn commanded_penetration_m(tip_radius_m: f64) -> f64 {
     let (probe, _) = scenario::probe(tip_radius_m);
     let stroke_s = probe.stroke_m / probe.speed_m_per_s + probe.ramp_s;
     let below = |k: u32| {
@@ -127,9 +135,8 @@ fn probing_plan(
     Ok((plan, probe))
 }
 
-/// Greatest force against the reference's motion beyond the doubt of friction; with a probe, within
-/// 40 ms of the first touch.
-fn beyond_doubt(
+/// Maximum opposing force beyond the friction uncertainty; with a probe, within 40 ms of the first touch.
+fn force_beyond_friction_uncertainty(
     plan: &Plan<4>,
     estimator_rad_per_s: f64,
     observer_rad_per_s: f64,
@@ -139,7 +146,7 @@ fn beyond_doubt(
     plan.config.estimator_rad_per_s = estimator_rad_per_s;
     plan.config.latch.observer_rad_per_s = observer_rad_per_s;
     plan.config.latch.threshold_n = NEVER_N;
-    let mut greatest = 0.0_f64;
+    let mut max_force_n = 0.0_f64;
     let mut touched_s = None;
     run(&plan, &mut |cycle, time_s| {
         let Some(time_s) = time_s else {
@@ -154,15 +161,16 @@ fn beyond_doubt(
             (Some(_), None) => false,
         };
         if counts {
-            // After a reversal the threshold is doubled, doubt and all.
+            // After a reversal the whole threshold is doubled, including the friction uncertainty.
             let reversing = cycle.output.contact_threshold_n > 1.5 * NEVER_N;
-            let share = if reversing { 2.0 } else { 1.0 };
-            let doubt_n = cycle.output.contact_threshold_n / share - NEVER_N;
-            greatest = greatest.max(cycle.output.force_against_n / share - doubt_n);
+            let factor = if reversing { 2.0 } else { 1.0 };
+            let friction_uncertainty_n = cycle.output.contact_threshold_n / factor - NEVER_N;
+            max_force_n =
+                max_force_n.max(cycle.output.force_against_n / factor - friction_uncertainty_n);
         }
         Ok(())
     })?;
-    Ok(greatest)
+    Ok(max_force_n)
 }
 
 fn probe_once(

@@ -1,12 +1,12 @@
-//! Breakaway torque of each joint: its torque is ramped in small steps until it has moved by two
-//! degrees, both ways, while the others are held.
+//! Measures the breakaway torque of each joint: ramps its torque in both directions until it has moved by two
+//! degrees, while the other joints are held.
 //!
-//! What a joint holds back when it gives way is `S_0`, its torque in the slowest sliding. Half the sum of
-//! both directions is free of errors of the gravity model; half the difference is that error.
+//! The torque at which a joint starts to slide is `S_0`. Half the sum of both directions is independent of
+//! errors of the gravity model; half the difference is that error.
 
 use crate::error::ExperimentError;
-use crate::excite::{free_of_roles, move_to};
-use crate::session::{Session, Step};
+use crate::excite::{move_to, without_held_joints};
+use crate::request_sequence::{RequestSequence, Step};
 use serde::Serialize;
 use supple_core::controller::{Breakaway, Mode, Request};
 use supple_core::{Config, Vector};
@@ -14,11 +14,11 @@ use supple_plant::PlantConfig;
 
 /// Slope of the ramp \[N m/s\]; 1e-4 N m a cycle of 1 ms.
 pub const RATE_NM_PER_S: f64 = 0.1;
-/// Where a ramp stops: two degrees \[rad\].
+/// Motion at which a ramp stops: two degrees \[rad\].
 pub const STOP_RAD: f64 = 0.034_907;
-/// Torque at which a joint is given up \[N m\].
+/// Maximum ramp torque; beyond it the joint counts as blocked \[N m\].
 const LIMIT_NM: f64 = 6.0;
-/// Motion that is sliding, beyond the give of bristles and the steps of encoders \[rad\].
+/// Motion that counts as sliding: more than bristle deflection and encoder resolution \[rad\].
 const SLIDING_RAD: f64 = 3.5e-3;
 /// Rest between the two directions \[s\].
 const REST_S: f64 = 0.3;
@@ -26,9 +26,9 @@ const REST_S: f64 = 0.3;
 /// Breakaway of one joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct JointBreakaway {
-    /// Torque at which it gave way in the positive direction \[N m\].
+    /// Torque at which the joint started to slide in the positive direction \[N m\].
     pub positive_nm: f64,
-    /// The same in the negative direction, as a positive number \[N m\].
+    /// Torque at which the joint started to slide in the negative direction, as a positive number \[N m\].
     pub negative_nm: f64,
 }
 
@@ -38,16 +38,16 @@ impl JointBreakaway {
         0.5 * (self.positive_nm + self.negative_nm)
     }
 
-    /// Torque that acts in one direction: gravity that the model does not have, or an offset \[N m\].
+    /// Direction-independent torque: error of the gravity model, or a friction offset \[N m\].
     pub fn offset_nm(&self) -> f64 {
         0.5 * (self.positive_nm - self.negative_nm)
     }
 }
 
-/// Ramps each of `joints` both ways at `pose_rad`; friction in the order of `joints`.
+/// Ramps each of `joints` in both directions at `pose_rad`; results are in the order of `joints`.
 ///
 /// # Errors
-/// [`ExperimentError`]; a joint that does not give way.
+/// [`ExperimentError`]; a joint that does not start to slide.
 pub fn breakaway<const N: usize>(
     config: &Config<N>,
     plant: &PlantConfig<N>,
@@ -65,9 +65,9 @@ pub fn breakaway<const N: usize>(
                 stop_rad: STOP_RAD,
                 limit_nm,
             };
-            let session = Session {
+            let sequence = RequestSequence {
                 name: format!("breakaway of joint {joint}"),
-                config: free_of_roles(config),
+                config: without_held_joints(config),
                 plant: plant.clone(),
                 start_rad: *pose_rad,
                 steps: vec![
@@ -79,16 +79,16 @@ pub fn breakaway<const N: usize>(
                     },
                 ],
             };
-            // Ramp and angle, cycle by cycle.
+            // Ramp torque and angle of each cycle.
             let mut trace: Vec<(f64, f64)> = Vec::new();
-            session.perform(&mut |cycle, _| {
+            sequence.perform(&mut |cycle, _| {
                 if cycle.output.mode == Mode::Breakaway {
                     let ramp = cycle.output.torques.friction[joint].abs();
                     trace.push((ramp, cycle.measurement.position_rad[joint]));
                 }
                 Ok(())
             })?;
-            gives_way(&trace, direction).ok_or(ExperimentError::Stuck {
+            torque_before_sliding(&trace, direction).ok_or(ExperimentError::Stuck {
                 joint,
                 torque_nm: limit_nm,
             })
@@ -102,8 +102,8 @@ pub fn breakaway<const N: usize>(
     Ok(found)
 }
 
-/// Ramp at the last moment at which the joint had not yet slid.
-fn gives_way(trace: &[(f64, f64)], direction: f64) -> Option<f64> {
+/// Ramp torque of the last cycle before the joint slid.
+fn torque_before_sliding(trace: &[(f64, f64)], direction: f64) -> Option<f64> {
     let start = trace.first()?.1;
     let slid = |q: f64| direction * (q - start) > SLIDING_RAD;
     slid(trace.last()?.1).then_some(())?;

@@ -1,66 +1,65 @@
-//! The whole of identification on the simulated arm: breakaway, excitation, fit, validation.
+//! Complete identification of the simulated arm: breakaway, excitation, fit, validation.
 //!
-//! The controller starts from a model that is off as a data sheet is, and nothing of the plant is known to
-//! the fit but what the arm logs: angles through noisy, quantised encoders, and commanded torques. The
-//! truth is looked at once, at the end, to say how far the result is from it. This is simulation: on real
-//! arms of this kind the best published models leave 6.7 to 8.4 % of the torque.
+//! The controller starts with data-sheet errors in its model; the fit uses only what the arm logs: noisy,
+//! quantised angles and commanded torques. The ground truth is used once, at the end, to report the error. This
+//! is simulation: on real arms of this kind the best published models leave 6.7 to 8.4 % of the torque
+//! unexplained.
 
 use crate::breakaway::{JointBreakaway, breakaway};
 use crate::error::ExperimentError;
-use crate::excite::{constant_speed_runs, excitation, free_of_roles, slow_motion};
+use crate::excite::{constant_speed_runs, excitation, slow_motion, without_held_joints};
 use crate::metrics::Rms;
 use crate::mismatch::Mismatch;
-use crate::ripple::ripple_on;
-use crate::session::Recording;
+use crate::recorded_logs::CUTOFF_HZ;
+pub use crate::recorded_logs::{log_of, preparation};
+use crate::ripple::identify_ripple;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::path::PathBuf;
 use supple_core::dynamics::gravity;
 use supple_core::ripple::{Harmonic, compensation_nm};
 use supple_core::{Config, RippleTable, Vector};
-use supple_ident::design::{Design, Designed, design};
+use supple_ident::design::{DesignOptions, ExcitationDesign, design};
 use supple_ident::{
     Fit, FrictionChoice, FrictionColumns, Log, Motion, Preparation, Procedure, RippleSearch,
-    Validation, fit_ripple, fit_with_dip,
+    Validation, fit_ripple, fit_with_stribeck,
 };
-use supple_model::{Description, Replacement};
+use supple_model::{Description, IdentifiedModel};
 use supple_plant::{LuGre, PlantConfig, Ripple};
 
 /// Speeds of the friction curve that is compared \[rad/s\].
 const CURVE_RAD_PER_S: (f64, f64, usize) = (0.02, 0.5, 49);
-/// Poses at which gravity is compared.
+/// Number of poses at which gravity is compared.
 const POSES: usize = 500;
-/// Rounds of ripple and model.
+/// Number of alternations between the fits of ripple and model.
 const ROUNDS: usize = 2;
-/// Cutoff of the filters for the model and for ripple, which is faster \[Hz\].
-pub(crate) const CUTOFF_HZ: (f64, f64) = (8.0, 40.0);
-/// Joints slower than this say nothing of inertia and Coulomb friction \[rad/s\].
+/// Samples of joints slower than this are excluded \[rad/s\].
 const SLOW_RAD_PER_S: f64 = 0.15;
 
-/// How the arm is calibrated, and what its plant is like.
+/// Options of a calibration and of its simulated plant.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Calibration {
-    /// Seed of the starting model, of the search for a motion and of every noise.
+    /// Seed of the starting model, of the excitation design and of all noise.
     pub seed: u64,
-    /// Errors of the model that it starts from.
+    /// Errors of the starting model.
     pub start: Mismatch,
     /// Standard deviation of the noise on each motor angle \[rad\].
     pub encoder_noise_rad: f64,
-    /// The plant's friction has its part that depends on direction and load.
+    /// Whether the plant's friction depends on direction and load.
     pub load: bool,
-    /// Amplitude of the torque ripple of each motor, seen at its joint \[N m\]; zero for none.
+    /// Amplitude of the torque ripple of each motor, reflected to its joint \[N m\]; zero for none.
     pub ripple_nm: f64,
-    /// Candidates of the search for a motion.
+    /// Number of candidates of the excitation design.
     pub candidates: usize,
-    /// Measure breakaway first.
+    /// Whether to measure breakaway first.
     pub breakaway: bool,
-    /// Folder for the MCAP of the excitation; it exists. `None` writes none.
+    /// Existing folder for the MCAP of the excitation; `None` writes no log.
     pub log_dir: Option<PathBuf>,
 }
 
 impl Calibration {
-    /// A model that is 5 % off in gravity and 30 % in friction, encoder noise of a third of a count, load
-    /// and ripple off.
+    /// Model errors of 5 % in gravity and 30 % in friction, encoder noise of a third of a count, no load
+    /// dependence, no ripple.
     pub fn new(seed: u64) -> Calibration {
         Calibration {
             seed,
@@ -79,70 +78,70 @@ impl Calibration {
     }
 }
 
-/// How far a model is from the plant that it was found on.
+/// Accuracy of an identified model against the plant.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub struct Truthfulness {
-    /// Root mean square of the gravity error over that of gravity, at random poses.
+pub struct ModelAccuracy {
+    /// Root mean square of the gravity error relative to that of gravity, at random poses.
     pub gravity_relative: f64,
-    /// Root mean square error of the friction curve from 0.02 to 0.5 rad/s, both ways, over that of the
-    /// curve, joint by joint.
+    /// Root mean square error of the friction curve from 0.02 to 0.5 rad/s in both directions, relative to that
+    /// of the curve, for each joint.
     pub friction_relative: Vec<f64>,
 }
 
-/// What came of it.
+/// Results of a calibration.
 #[derive(Clone, Debug)]
 pub struct Calibrated<const N: usize> {
-    /// Breakaway, if it was measured, joint by joint, and the plant's own \[N m\].
+    /// Measured breakaway of each joint with the plant's own \[N m\]; empty if it was not measured.
     pub breakaway: Vec<(JointBreakaway, f64)>,
-    /// The motion.
-    pub designed: Designed<N>,
+    /// The designed excitation.
+    pub designed: ExcitationDesign<N>,
     /// The fit.
     pub fit: Fit<N>,
-    /// Ripple of each motor.
+    /// Identified torque ripple of each motor.
     pub ripple: [RippleTable; N],
-    /// The identified arm, as the controller loads it.
+    /// The identified arm as a description that the controller loads.
     pub description: Description,
-    /// Against a motion that was not fitted.
+    /// Validation on a held-out motion.
     pub validation: Validation,
-    /// That motion with the ripple taken out, for figures.
+    /// The held-out motion with the ripple removed, for figures.
     pub held_out: Motion,
-    /// Against the truth.
-    pub truth: Truthfulness,
+    /// Accuracy against the ground truth.
+    pub truth: ModelAccuracy,
 }
 
-/// The plant of a calibration: the description's, with its noises.
+/// The plant of a calibration: the description's plant with noise and ripple.
 ///
 /// # Errors
-/// Where the description has not `N` joints.
+/// If the description does not have `N` joints.
 pub fn plant_of<const N: usize>(
     description: &Description,
     calibration: &Calibration,
 ) -> Result<PlantConfig<N>, ExperimentError> {
     let mut plant = PlantConfig::<N>::from_description(description)?;
     plant.seed = calibration.seed;
-    plant.drive.encoder_noise_rad = Vector::repeat(calibration.encoder_noise_rad);
+    plant.actuators.encoder_noise_rad = Vector::repeat(calibration.encoder_noise_rad);
     if !calibration.load {
         plant.friction = plant.friction.map(LuGre::without_load);
     }
     if calibration.ripple_nm > 0.0 {
-        plant.drive.ripple = ripple(&plant, calibration);
+        plant.actuators.ripple = ripple(&plant, calibration);
     }
     Ok(plant)
 }
 
-/// Two harmonics a motor, of seeded phases, whose amplitudes at the joint add to the one asked for.
+/// Two harmonics for each motor, with seeded phases; their amplitudes at the joint add up to `ripple_nm`.
 fn ripple<const N: usize>(plant: &PlantConfig<N>, calibration: &Calibration) -> Vec<Ripple> {
     let mut random = ChaCha8Rng::seed_from_u64(calibration.seed ^ 0x7269);
-    let to_joint = &plant.drive.joint_from_motor;
+    let to_joint = &plant.actuators.joint_from_motor;
     let mut lines = Vec::new();
     for motor in 0..N {
         // A torque of 1 N m at the motor is the inverse of the largest ratio at the joints.
         let per_joint = to_joint.column(motor).amax();
-        for (harmonic, share) in [(2, 0.4), (6, 0.6)] {
+        for (harmonic, fraction) in [(2, 0.4), (6, 0.6)] {
             lines.push(Ripple {
                 motor,
                 harmonic,
-                amplitude_nm: calibration.ripple_nm * share * per_joint,
+                amplitude_nm: calibration.ripple_nm * fraction * per_joint,
                 phase_rad: std::f64::consts::TAU * random.random::<f64>(),
             });
         }
@@ -150,25 +149,25 @@ fn ripple<const N: usize>(plant: &PlantConfig<N>, calibration: &Calibration) -> 
     lines
 }
 
-/// The description of a calibration's plant: `description` with the ripple that its motors have.
+/// The description of a calibration's plant: `description` with the plant's torque ripple.
 ///
 /// # Errors
-/// Where the description has not `N` joints.
+/// If the description does not have `N` joints.
 pub fn described_plant<const N: usize>(
     description: &Description,
     plant: &PlantConfig<N>,
 ) -> Result<Description, ExperimentError> {
-    let told = description.config::<N>()?;
-    let table = |motor| table_of(&plant.drive.ripple, motor).unwrap_or(RippleTable::NONE);
-    Ok(description.with_model(&Replacement {
-        arm: &told.arm,
-        friction: &told.friction,
+    let nominal = description.config::<N>()?;
+    let table = |motor| table_of(&plant.actuators.ripple, motor).unwrap_or(RippleTable::NONE);
+    Ok(description.with_model(&IdentifiedModel {
+        arm: &nominal.arm,
+        friction: &nominal.friction,
         ripple: Some(&core::array::from_fn(table)),
         source: "the simulated plant",
     })?)
 }
 
-/// Carries it out. `progress` hears what begins.
+/// Runs the calibration. `progress` is called with the name of each stage.
 ///
 /// # Errors
 /// [`ExperimentError`].
@@ -177,33 +176,33 @@ pub fn calibrate<const N: usize>(
     calibration: &Calibration,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Calibrated<N>, ExperimentError> {
-    let told = description.config::<N>()?;
-    let start = calibration.start.apply(&told)?;
+    let nominal = description.config::<N>()?;
+    let start = calibration.start.apply(&nominal)?;
     let plant = plant_of::<N>(description, calibration)?;
     let home = description.home::<N>()?;
     let joints: Vec<usize> = (0..N).collect();
 
-    let mut gave_way = Vec::new();
-    let free = free_of_roles(&start);
+    let mut breakaway_results = Vec::new();
+    let free = without_held_joints(&start);
     let slow = slow_motion(&free, &home, &joints)?;
     if calibration.breakaway {
         let mut compensated = start;
         if calibration.ripple_nm > 0.0 {
             progress("torque ripple, from runs at constant speed");
-            compensated.ripple = ripple_on(&start, &plant, &home)?;
+            compensated.ripple = identify_ripple(&start, &plant, &home)?;
         }
         progress("breakaway");
         let pose = upright(&start);
         let found = breakaway(&compensated, &plant, &pose, &joints, &mut |_| {})?;
         let truth = plant.friction.iter().map(|f| f.breakaway_nm);
-        gave_way = found.into_iter().zip(truth).collect();
+        breakaway_results = found.into_iter().zip(truth).collect();
     }
 
     progress("design of the excitation");
-    let search = |seed, candidates| Design {
+    let search = |seed, candidates| DesignOptions {
         seed,
         candidates,
-        ..Design::of(&joints)
+        ..DesignOptions::of(&joints)
     };
     let wanted = search(calibration.seed, calibration.candidates);
     let designed = design(&free, &home, &wanted, &mut |_, _| {})?;
@@ -219,21 +218,21 @@ pub fn calibrate<const N: usize>(
     if calibration.ripple_nm > 0.0 {
         series.extend(constant_speed_runs(&free, &home, &joints)?);
     }
-    let session = excitation("excitation", &free, &plant, &home, &series);
+    let sequence = excitation("excitation", &free, &plant, &home, &series);
     let folder = calibration.log_dir.as_deref();
-    let recordings = session.record(folder, description, calibration.seed)?;
+    let recordings = sequence.record(folder, description, calibration.seed)?;
     let logs: Vec<Log> = recordings.iter().map(log_of).collect();
 
     progress("identification");
     let (fit, ripple) = identify(&start, &logs[..2], &logs[3..])?;
-    let motor_from_joint = *supple_core::Controller::new(told)?.motor_from_joint();
+    let motor_from_joint = *supple_core::Controller::new(nominal)?.motor_from_joint();
     let unrippled = without_ripple(&logs[2], &ripple, &motor_from_joint);
     let (held_out, _) = Motion::prepare(&unrippled, N, &joints, &fit.preparation)?;
     let validation = fit.validate_motion(&held_out)?;
     let described = fit.description(description, Some(&ripple))?;
-    let truth = truthfulness(&described.config::<N>()?, &plant, calibration.seed);
+    let truth = model_accuracy(&described.config::<N>()?, &plant, calibration.seed);
     Ok(Calibrated {
-        breakaway: gave_way,
+        breakaway: breakaway_results,
         designed,
         fit,
         ripple,
@@ -244,7 +243,7 @@ pub fn calibrate<const N: usize>(
     })
 }
 
-/// A pose with little gravity on the joints: all at zero where they may be.
+/// A pose with little gravity torque: all joints at zero, or as close to it as their limits permit.
 fn upright<const N: usize>(config: &Config<N>) -> Vector<N> {
     let limits = &config.limits;
     Vector::from_fn(|i, _| {
@@ -257,29 +256,7 @@ fn upright<const N: usize>(config: &Config<N>) -> Vector<N> {
     })
 }
 
-/// A recording as the columns that identification takes.
-pub fn log_of(recording: &Recording) -> Log {
-    Log {
-        t_s: recording.t_s.clone(),
-        q_rad: recording.q_rad.clone(),
-        qd_rad_per_s: None,
-        tau_nm: recording.tau_nm.clone(),
-    }
-}
-
-/// How the project's own logs are prepared: commands act in the cycle after, for a cycle.
-pub fn preparation(period_s: f64, cutoff_hz: f64) -> Preparation {
-    let kept_hz = 12.5 * cutoff_hz;
-    let keep_every = ((1.0 / period_s) / kept_hz).round().max(1.0) as usize;
-    Preparation {
-        rate_hz: Some(1.0 / period_s),
-        cutoff_hz: Some(cutoff_hz),
-        keep_every,
-        torque_delay_s: 1.5 * period_s,
-    }
-}
-
-/// The log with the torques that the joints received, ripple included.
+/// The log with the torques that the joints received: commanded torques plus ripple.
 pub fn without_ripple<const N: usize>(
     log: &Log,
     tables: &[RippleTable; N],
@@ -294,8 +271,8 @@ pub fn without_ripple<const N: usize>(
     log
 }
 
-/// The model from a fast and a slow log of all joints, and ripple from `runs` of them at constant speed;
-/// without runs there is none.
+/// Identifies the model from a fast and a slow log of all joints, and torque ripple from `runs` at constant
+/// speed; without runs the ripple tables are empty.
 ///
 /// # Errors
 /// [`ExperimentError::Ident`].
@@ -326,7 +303,7 @@ pub fn identify<const N: usize>(
                 .collect::<Result<Vec<_>, _>>()
         };
         let motions = prepare(logs, &procedure.preparation, &tables)?;
-        let fit = fit_with_dip(&start.arm, &motions, &joints, &procedure)?;
+        let fit = fit_with_stribeck(&start.arm, &motions, &joints, &procedure)?;
         if rounds == 0 {
             return Ok((fit, tables));
         }
@@ -336,15 +313,15 @@ pub fn identify<const N: usize>(
     }
 }
 
-/// Holds a model against the plant.
-pub fn truthfulness<const N: usize>(
+/// Compares a model with the plant.
+pub fn model_accuracy<const N: usize>(
     model: &Config<N>,
     plant: &PlantConfig<N>,
     seed: u64,
-) -> Truthfulness {
+) -> ModelAccuracy {
     let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x7472_7574);
     let limits = &model.limits;
-    let (mut wrong, mut whole) = (Rms::default(), Rms::default());
+    let (mut error, mut reference) = (Rms::default(), Rms::default());
     for _ in 0..POSES {
         let q = Vector::<N>::from_fn(|i, _| {
             let (lower, upper) = (limits.position_lower_rad[i], limits.position_upper_rad[i]);
@@ -352,30 +329,30 @@ pub fn truthfulness<const N: usize>(
         });
         let (a, b) = (gravity(&model.arm, &q), gravity(&plant.arm, &q));
         for j in 0..N {
-            wrong.add(a[j] - b[j]);
-            whole.add(b[j]);
+            error.add(a[j] - b[j]);
+            reference.add(b[j]);
         }
     }
-    let (least, greatest, count) = CURVE_RAD_PER_S;
+    let (min, max, count) = CURVE_RAD_PER_S;
     let friction_relative = (0..N).map(|j| {
-        let (mut wrong, mut whole) = (Rms::default(), Rms::default());
+        let (mut error, mut reference) = (Rms::default(), Rms::default());
         for k in 0..count {
-            let speed = least + (greatest - least) * k as f64 / (count - 1) as f64;
+            let speed = min + (max - min) * k as f64 / (count - 1) as f64;
             for v in [speed, -speed] {
                 let truth = plant.friction[j].steady_torque_nm(v, 0.0);
-                wrong.add(model.friction[j].torque_nm(v) - truth);
-                whole.add(truth);
+                error.add(model.friction[j].torque_nm(v) - truth);
+                reference.add(truth);
             }
         }
-        wrong.rms() / whole.rms().max(f64::MIN_POSITIVE)
+        error.rms() / reference.rms().max(f64::MIN_POSITIVE)
     });
-    Truthfulness {
-        gravity_relative: wrong.rms() / whole.rms().max(f64::MIN_POSITIVE),
+    ModelAccuracy {
+        gravity_relative: error.rms() / reference.rms().max(f64::MIN_POSITIVE),
         friction_relative: friction_relative.collect(),
     }
 }
 
-/// The harmonics of a plant's motor as the controller's table has them.
+/// Converts the plant's harmonics of a motor to the controller's ripple table.
 fn table_of(ripple: &[Ripple], motor: usize) -> Option<RippleTable> {
     let lines: Vec<Harmonic> = ripple
         .iter()

@@ -1,39 +1,30 @@
-//! The paper's experiments, all of them: the main job.
+//! Runs all experiments of the paper.
 
+use crate::demo_options::DemoOptions;
 use crate::error::ExperimentError;
-use crate::job::{Done, Job, QUADRANT, QUADRANT_FAST, QUADRANT_PERTURBED, SEEDS, SPEEDS, jobs};
+use crate::job::{
+    Job, JobResult, QUADRANT, QUADRANT_FAST, QUADRANT_PERTURBED, SEEDS, SPEEDS, jobs,
+};
 use crate::metrics::{LineFit, spread};
 use crate::probing::{Stroke, median_stroke};
 use crate::run::Run;
 use crate::scenario;
 use crate::setup::Setup;
 use crate::summary::{
-    AtSpeed, Contact, ExactModel, Exploration, QuadrantSummary, Summary, TorqueRms, Tracking,
+    AtSpeed, ContactStatistics, ExactModel, ProbingSummary, QuadrantSummary, Summary, TorqueRms,
+    TrackingError,
 };
 use rayon::prelude::*;
-use std::path::PathBuf;
 use supple_model::{Description, with_dof};
 
-/// What to run and where to put the logs.
-#[derive(Clone, Debug)]
-pub struct DemoOptions {
-    /// Seed of the perturbed models and of every noise.
-    pub seed: u64,
-    /// Folder for one MCAP a run; it exists. `None` writes no logs.
-    pub log_dir: Option<PathBuf>,
-    /// What every controller knows of the arm, unperturbed; `None` for the arm's own parameters,
-    /// perturbed where a run says so.
-    pub model: Option<Description>,
-}
-
-/// How far the demo is.
+/// Progress of the demo.
 #[derive(Clone, Debug)]
 pub struct Progress {
-    /// Simulated time done \[s\].
+    /// Simulated time completed \[s\].
     pub done_s: f64,
-    /// Simulated time in all \[s\].
+    /// Total simulated time \[s\].
     pub total_s: f64,
-    /// The run that has just ended.
+    /// Name of the run that has just ended.
     pub finished: String,
 }
 
@@ -42,28 +33,28 @@ pub struct Progress {
 pub struct ProbingRun {
     /// The run.
     pub run: Run,
-    /// Stroke by stroke.
+    /// Contact of each stroke.
     pub strokes: Vec<Stroke>,
-    /// Its line of the summary.
-    pub exploration: Exploration,
+    /// Its entry in the summary.
+    pub exploration: ProbingSummary,
 }
 
-/// What the demo gave.
+/// Results of the demo.
 #[derive(Clone, Debug)]
 pub struct Demo {
     /// All numbers.
     pub summary: Summary,
-    /// Figure 3a and 4, at each pace.
+    /// Figures 3a and 4, for each speed factor.
     pub sinusoids: Vec<(f64, Run)>,
     /// The arc.
     pub arc: Run,
-    /// Figure 3b; the same with the perturbed model; the same at the paper's greatest speed.
+    /// Figure 3b: with the exact model, with the perturbed model, and at the paper's maximum speed.
     pub quadrants: [Run; 3],
     /// Figures 5 and 6.
     pub probing: Vec<ProbingRun>,
-    /// The same with the friction feed-forward left on in contact.
+    /// Probing with the friction feed-forward left on in contact.
     pub probing_fade_off: Vec<ProbingRun>,
-    /// (3.6) to the letter.
+    /// Equation (3.6) exactly as printed.
     pub paper_letter: Run,
 }
 
@@ -111,20 +102,20 @@ fn sized<const N: usize>(
             });
             Ok(done)
         })
-        .collect::<Result<Vec<Done>, ExperimentError>>()?;
+        .collect::<Result<Vec<JobResult>, ExperimentError>>()?;
     Ok(assemble(description, options, &jobs, results))
 }
 
-fn tracking(run: &Run) -> Tracking {
-    Tracking {
+fn tracking(run: &Run) -> TrackingError {
+    TrackingError {
         rms_error_m: run.rms_error_m,
         max_error_m: run.max_error_m,
         ended: run.ended.clone(),
     }
 }
 
-fn exploration(stiffness_n_per_m: f64, done: &Done) -> Exploration {
-    Exploration {
+fn exploration(stiffness_n_per_m: f64, done: &JobResult) -> ProbingSummary {
+    ProbingSummary {
         stiffness_n_per_m,
         damping_n_s_per_m: scenario::gains(stiffness_n_per_m).damping_n_s_per_m.x,
         contact: median_stroke(&done.strokes),
@@ -133,7 +124,7 @@ fn exploration(stiffness_n_per_m: f64, done: &Done) -> Exploration {
     }
 }
 
-fn contact(explorations: &[Exploration]) -> Contact {
+fn contact(explorations: &[ProbingSummary]) -> ContactStatistics {
     let from_five = || {
         explorations
             .iter()
@@ -146,23 +137,23 @@ fn contact(explorations: &[Exploration]) -> Contact {
     let over_speed: Vec<_> = from_five()
         .map(|e| e.contact.peak_filtered_n / e.contact.approach_m_per_s)
         .collect();
-    Contact {
+    ContactStatistics {
         impulse_fit: LineFit::new(&points),
         peak_spread: spread(&peaks),
         peak_over_speed_spread: spread(&over_speed),
     }
 }
 
-/// Hands every result to its place.
+/// Distributes the job results.
 struct Results {
     jobs: Vec<Job>,
-    done: Vec<Option<Done>>,
+    done: Vec<Option<JobResult>>,
 }
 
 impl Results {
-    fn take(&mut self, job: Job) -> Done {
-        let place = self.jobs.iter().position(|other| *other == job);
-        let done = place.and_then(|place| self.done[place].take());
+    fn take(&mut self, job: Job) -> JobResult {
+        let index = self.jobs.iter().position(|other| *other == job);
+        let done = index.and_then(|index| self.done[index].take());
         done.expect("every job is run once and taken once")
     }
 
@@ -201,7 +192,7 @@ fn assemble(
     description: &Description,
     options: &DemoOptions,
     jobs: &[Job],
-    done: Vec<Done>,
+    done: Vec<JobResult>,
 ) -> Demo {
     let mut results = Results {
         jobs: jobs.to_vec(),
@@ -218,7 +209,7 @@ fn assemble(
     let (fast, quadrant_at_paper_speed) = results.quadrant(QUADRANT_FAST);
     let probing = results.probing(true);
     let probing_fade_off = results.probing(false);
-    let lines = |runs: &[ProbingRun]| -> Vec<Exploration> {
+    let lines = |runs: &[ProbingRun]| -> Vec<ProbingSummary> {
         runs.iter().map(|run| run.exploration.clone()).collect()
     };
     let exploration = lines(&probing);
@@ -226,7 +217,7 @@ fn assemble(
     let paper_letter = results.take(Job::PaperLetter).run;
     let exact =
         |results: &mut Results, stribeck| tracking(&results.take(Job::Exact { stribeck }).run);
-    let seed_runs: Vec<Tracking> = (0..SEEDS)
+    let seed_runs: Vec<TrackingError> = (0..SEEDS)
         .map(|seed| tracking(&results.take(Job::Seed(seed)).run))
         .collect();
     let summary = Summary {

@@ -1,48 +1,47 @@
-//! Why an experiment could not be run.
+//! Errors of experiments.
 
 use supple_core::ArmError;
 use supple_core::controller::{ConfigError, Fault, Refusal};
 use supple_plant::PlantError;
 
-/// Why an experiment could not be run. A fault of the controller *during* a run is a result, not an
-/// error.
+/// Error of an experiment. A fault of the controller *during* a run is a result, not an error.
 #[derive(Debug, thiserror::Error)]
 pub enum ExperimentError {
-    /// The description is not sound, or of another size.
+    /// The description is invalid, or has another number of joints.
     #[error(transparent)]
     Model(#[from] supple_model::ModelError),
-    /// The controller's model is not an arm.
+    /// The controller's model is physically inconsistent.
     #[error("the controller's model: {0}")]
     Arm(#[from] ArmError),
-    /// The controller refuses its configuration.
+    /// The controller rejects its configuration.
     #[error("the controller's configuration: {0}")]
     Config(#[from] ConfigError),
-    /// The plant refuses its configuration.
+    /// The plant rejects its configuration.
     #[error("the plant: {0}")]
     Plant(#[from] PlantError),
-    /// The logs do not give a model.
+    /// The identification failed.
     #[error(transparent)]
     Ident(#[from] supple_ident::IdentError),
-    /// The model cannot be described or saved.
+    /// The model cannot be converted to a description or saved.
     #[error(transparent)]
     Save(#[from] supple_ident::SaveError),
     /// A log cannot be written.
     #[error(transparent)]
     Log(#[from] supple_log::LogError),
-    /// The arm cannot follow a trajectory.
+    /// The arm cannot reach a point of the trajectory.
     #[error(
         "the arm cannot reach ({:.3}, {:.3}, {:.3}) m, needed at {time_s:.2} s of the {experiment}: \
          it stays {distance_m:.4} m away; choose an arm with more reach or a trajectory nearer to it",
         point_m[0], point_m[1], point_m[2]
     )]
-    Unreachable {
+    BeyondJointStop {
         /// Name of the experiment.
         experiment: String,
         /// Time into the trajectory \[s\].
         time_s: f64,
         /// Point, base axes \[m\].
         point_m: [f64; 3],
-        /// Least distance found \[m\].
+        /// Minimum distance found \[m\].
         distance_m: f64,
     },
     /// The controller refused a request of the experiment.
@@ -50,20 +49,20 @@ pub enum ExperimentError {
     Refused {
         /// Name of the experiment.
         experiment: String,
-        /// Why.
+        /// Reason.
         refusal: Refusal,
     },
-    /// A fault where none may be.
+    /// A fault during an experiment that must not fault.
     #[error("{experiment}: fault at {time_s:.2} s: {fault}")]
     Fault {
         /// Name of the experiment.
         experiment: String,
-        /// Time since it began \[s\].
+        /// Time since the start of the experiment \[s\].
         time_s: f64,
-        /// Which.
+        /// The fault.
         fault: Fault,
     },
-    /// A joint that no ramp moved.
+    /// A joint that did not start to slide.
     #[error(
         "joint {joint} did not move at {torque_nm} N m: check its brake and its stops, or choose \
          another pose"
@@ -71,15 +70,15 @@ pub enum ExperimentError {
     Stuck {
         /// Joint index.
         joint: usize,
-        /// Greatest torque tried \[N m\].
+        /// Maximum torque applied \[N m\].
         torque_nm: f64,
     },
-    /// A fault before the experiment proper began.
-    #[error("{experiment}: fault on the way to the start: {fault}")]
+    /// A fault during the move to the start pose.
+    #[error("{experiment}: fault during the move to the start: {fault}")]
     FaultAtStart {
         /// Name of the experiment.
         experiment: String,
-        /// Which.
+        /// The fault.
         fault: Fault,
     },
 }

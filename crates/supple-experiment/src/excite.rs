@@ -1,6 +1,7 @@
-//! Excitation of the simulated arm: a stiff move to the start of a series, the series, rest.
+//! Excitation of the simulated arm: a position-controlled move to the start of a series, the series, and a
+//! rest.
 
-use crate::session::{Session, Step};
+use crate::request_sequence::{RequestSequence, Step};
 use supple_core::controller::Request;
 use supple_core::trajectory::Fourier;
 use supple_core::{Config, Vector};
@@ -12,21 +13,21 @@ use supple_plant::PlantConfig;
 const SETTLE_S: f64 = 0.1;
 /// Rest before a series \[s\].
 const REST_S: f64 = 0.4;
-/// Greatest joint speed \[rad/s\] and period \[s\] of slow motion.
+/// Maximum joint speed \[rad/s\] and period \[s\] of slow motion.
 const SLOW: (f64, f64) = (0.1, 60.0);
 /// Speeds of the runs at constant speed \[rad/s\], and the period of each \[s\].
 const RUNS: ([f64; 2], f64) = ([0.05, 0.1], 40.0);
 /// Mean joint speed of the moves between series \[rad/s\].
 const MOVE_RAD_PER_S: f64 = 0.4;
 
-/// Each series in turn, recorded, from a plant that stands at `home_rad`.
+/// Request sequence that moves to and records each series in turn; the plant starts at rest at `home_rad`.
 pub fn excitation<const N: usize>(
     name: &str,
     config: &Config<N>,
     plant: &PlantConfig<N>,
     home_rad: &Vector<N>,
     series: &[Fourier<N>],
-) -> Session<N> {
+) -> RequestSequence<N> {
     let mut steps = vec![Step::wait(Request::GravityHold, SETTLE_S)];
     let mut at = *home_rad;
     for series in series {
@@ -38,16 +39,16 @@ pub fn excitation<const N: usize>(
         });
         at = series.at(series.duration_s).position_rad;
     }
-    Session {
+    RequestSequence {
         name: name.to_owned(),
-        config: free_of_roles(config),
+        config: without_held_joints(config),
         plant: plant.clone(),
         start_rad: *home_rad,
         steps,
     }
 }
 
-/// A minute of every one of `joints` up to 0.1 rad/s: what dry friction does is seen there.
+/// One minute of motion of each of `joints` up to 0.1 rad/s, which shows dry friction.
 ///
 /// # Errors
 /// Options out of range.
@@ -60,7 +61,7 @@ pub fn slow_motion<const N: usize>(
     slow_series(config, home_rad, joints, speed_rad_per_s, period_s)
 }
 
-/// To and fro of every one of `joints` at constant speeds: torque ripple is identified from it.
+/// Back-and-forth motion of each of `joints` at constant speeds, for the identification of torque ripple.
 ///
 /// # Errors
 /// Options out of range.
@@ -74,7 +75,7 @@ pub fn constant_speed_runs<const N: usize>(
     speeds.into_iter().map(run).collect()
 }
 
-/// A move and a rest.
+/// A move followed by a rest.
 pub(crate) fn move_to<const N: usize>(target_rad: &Vector<N>, from_rad: &Vector<N>) -> Step<N> {
     let duration_s = ((target_rad - from_rad).amax() / MOVE_RAD_PER_S).max(0.5);
     let request = Request::Move {
@@ -84,8 +85,8 @@ pub(crate) fn move_to<const N: usize>(target_rad: &Vector<N>, from_rad: &Vector<
     Step::wait(request, duration_s + REST_S)
 }
 
-/// The same without held joints: to be identified they must go to where they are asked.
-pub(crate) fn free_of_roles<const N: usize>(config: &Config<N>) -> Config<N> {
+/// The configuration without held joints, so that all joints can be excited.
+pub(crate) fn without_held_joints<const N: usize>(config: &Config<N>) -> Config<N> {
     Config {
         roles: [supple_core::config::Role::Active; N],
         ..*config

@@ -1,6 +1,6 @@
-//! The runs of the demo: what each is and what it gives.
+//! The runs of the demo and their results.
 
-use crate::demo::DemoOptions;
+use crate::demo_options::DemoOptions;
 use crate::error::ExperimentError;
 use crate::metrics::Rms;
 use crate::mismatch::Mismatch;
@@ -16,11 +16,11 @@ use supple_core::trajectory::{Probe, ProbePhase};
 use supple_model::Description;
 use supple_plant::Scene;
 
-/// Perturbed models in the statistics of the sinusoid.
+/// Number of perturbed models in the statistics of the sinusoid.
 pub(crate) const SEEDS: u64 = 10;
-/// Paces of the sinusoid.
+/// Speed factors of the sinusoid.
 pub(crate) const SPEEDS: [f64; 3] = [0.5, 1.0, 2.0];
-/// The reference is this far above the block while the way down counts as free \[m\].
+/// Clearance of the reference above the block until which the descent counts as free motion \[m\].
 const CLEARANCE_M: f64 = 0.01;
 
 /// One run of the demo.
@@ -48,15 +48,15 @@ pub(crate) const QUADRANT_FAST: Job = Job::Quadrant {
     exact: true,
 };
 
-/// What a job gives.
-pub(crate) struct Done {
+/// Results of a job.
+pub(crate) struct JobResult {
     pub run: Run,
     pub strokes: Vec<Stroke>,
     pub edges: Vec<Edge>,
     pub free_rms_m: f64,
 }
 
-/// Every run, the longest first so that the cores end together.
+/// All runs, the longest first so that all cores finish at about the same time.
 pub(crate) fn jobs() -> Vec<Job> {
     let mut jobs = Vec::new();
     for fade in [true, false] {
@@ -175,7 +175,7 @@ impl Job {
         plan: &Plan<N>,
         description: &Description,
         options: &DemoOptions,
-    ) -> Result<Done, ExperimentError> {
+    ) -> Result<JobResult, ExperimentError> {
         let mut recorder = match &options.log_dir {
             Some(folder) => Some(Recorder::create(folder, description, plan, options.seed)?),
             None => None,
@@ -212,7 +212,7 @@ impl Job {
         if let Some(recorder) = recorder {
             recorder.finish()?;
         }
-        Ok(Done {
+        Ok(JobResult {
             run,
             strokes: contact.map_or_else(Vec::new, |(meter, _)| meter.finish()),
             edges: edges.map_or_else(Vec::new, EdgeMeter::finish),
@@ -221,7 +221,7 @@ impl Job {
     }
 }
 
-/// On the way down, not yet near the block.
+/// Whether the reference descends and is not yet near the block.
 fn is_free(probe: &Probe, time_s: f64, above_face_m: f64) -> bool {
     probe.phase_at(time_s).0 == ProbePhase::Down && above_face_m > CLEARANCE_M
 }

@@ -1,8 +1,8 @@
 //! Controller and plant in one process, in virtual time: the paper's experiments.
 //!
-//! A [`Setup`] is a description taken as the truth about the plant; a [`Variant`] says what the
-//! controller does not know of it. A [`Plan`] is a trajectory with both; [`run()`] brings the arm to its
-//! start and follows it. [`demo()`] runs everything that the paper shows.
+//! A [`Setup`] builds the plant from a description; a [`Variant`] defines how the controller's model differs
+//! from it. A [`Plan`] combines both with a trajectory; [`run()`] moves the arm to the start and tracks the
+//! trajectory. [`demo()`] runs all experiments of the paper.
 //!
 //! ```
 //! use supple_experiment::{Mismatch, Plan, Setup, Variant, run, scenario};
@@ -27,47 +27,50 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Nothing here reads a clock: the same plan gives the same bits.
+//! No function reads a clock: the same plan gives bit-identical results.
 
 #![forbid(unsafe_code)]
 
 mod breakaway;
 pub mod calibrate;
 mod demo;
+mod demo_options;
 mod error;
 mod excite;
-mod foretell;
 mod job;
 pub mod metrics;
 mod mismatch;
 pub mod probing;
 mod quadrant;
 mod record;
+mod recorded_logs;
+mod request_sequence;
 mod rig;
 mod ripple;
 mod run;
 pub mod scenario;
-mod session;
 mod setup;
 mod start;
 pub mod summary;
 mod trace;
 mod tracking;
+mod tracking_prediction;
 
 pub use breakaway::{JointBreakaway, RATE_NM_PER_S, STOP_RAD, breakaway};
-pub use calibrate::{Calibrated, Calibration, Truthfulness, calibrate};
-pub use demo::{Demo, DemoOptions, ProbingRun, Progress, demo};
+pub use calibrate::{Calibrated, Calibration, ModelAccuracy, calibrate};
+pub use demo::{Demo, ProbingRun, Progress, demo};
+pub use demo_options::DemoOptions;
 pub use error::ExperimentError;
 pub use excite::{constant_speed_runs, excitation, slow_motion};
-pub use foretell::{Foretold, foretell};
 pub use mismatch::Mismatch;
 pub use quadrant::{Edge, EdgeMeter};
 pub use record::Recorder;
+pub use request_sequence::{Recording, RequestSequence, Step, StepCallback};
 pub use rig::{Cycle, Rig};
-pub use ripple::ripple_on;
-pub use run::{Ended, Plan, Run, Watch, run};
-pub use session::{Onlooker, Recording, Session, Step};
+pub use ripple::identify_ripple;
+pub use run::{CycleCallback, FaultEnd, Plan, Run, run};
 pub use setup::{Setup, Variant};
 pub use start::{active_joints, start_pose};
 pub use trace::{JointTorque, Sample, Trace};
-pub use tracking::{Tracking, tracking};
+pub use tracking::{IdentifiedModelTracking, track_with_identified_model};
+pub use tracking_prediction::{TrackingPrediction, predict_tracking_error};

@@ -1,24 +1,24 @@
-//! Numbers that describe a run.
+//! Statistics of a run.
 
 use serde::Serialize;
 
-/// Root mean square and greatest value of a stream.
+/// Running root mean square and maximum absolute value.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Rms {
     sum_of_squares: f64,
     count: u64,
-    greatest: f64,
+    max_abs: f64,
 }
 
 impl Rms {
-    /// Takes in a value.
+    /// Adds a value.
     pub fn add(&mut self, value: f64) {
         self.sum_of_squares += value * value;
         self.count += 1;
-        self.greatest = self.greatest.max(value.abs());
+        self.max_abs = self.max_abs.max(value.abs());
     }
 
-    /// Root mean square; zero of nothing.
+    /// Root mean square; zero without values.
     pub fn rms(&self) -> f64 {
         if self.count == 0 {
             return 0.0;
@@ -26,9 +26,9 @@ impl Rms {
         (self.sum_of_squares / self.count as f64).sqrt()
     }
 
-    /// Greatest absolute value; zero of nothing.
-    pub fn greatest(&self) -> f64 {
-        self.greatest
+    /// Maximum absolute value; zero without values.
+    pub fn max_abs(&self) -> f64 {
+        self.max_abs
     }
 }
 
@@ -39,12 +39,12 @@ pub struct LineFit {
     pub slope: f64,
     /// y at x = 0.
     pub intercept: f64,
-    /// Share of the variance of y that the line explains.
+    /// Fraction of the variance of y that the line explains.
     pub r2: f64,
 }
 
 impl LineFit {
-    /// `None` where the points do not determine a line.
+    /// `None` if the points do not determine a line.
     pub fn new(points: &[(f64, f64)]) -> Option<LineFit> {
         let n = points.len() as f64;
         let mean_x = points.iter().map(|p| p.0).sum::<f64>() / n;
@@ -65,7 +65,7 @@ impl LineFit {
     }
 }
 
-/// Middle value; the mean of the two middle ones of an even number. `None` of nothing.
+/// Median; `None` without values.
 pub fn median(values: &[f64]) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -77,13 +77,13 @@ pub fn median(values: &[f64]) -> Option<f64> {
     }
 }
 
-/// (max - min) / median. `None` of nothing.
+/// (max - min) / median; `None` without values.
 pub fn spread(values: &[f64]) -> Option<f64> {
     let middle = median(values)?;
-    let (least, greatest) = values
+    let (min, max) = values
         .iter()
         .fold((f64::MAX, f64::MIN), |(l, g), v| (l.min(*v), g.max(*v)));
-    Some((greatest - least) / middle)
+    Some((max - min) / middle)
 }
 
 #[cfg(test)]
@@ -91,7 +91,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_line_is_found_again() {
+    fn a_line_fit_recovers_the_line() {
         let points: Vec<_> = (0..7)
             .map(|k| (f64::from(k), 2.0 - 0.5 * f64::from(k)))
             .collect();
@@ -114,7 +114,7 @@ mod tests {
         let mut rms = Rms::default();
         [3.0, -4.0].into_iter().for_each(|x| rms.add(x));
         assert!((rms.rms() - 12.5_f64.sqrt()).abs() < 1e-15);
-        assert_eq!(rms.greatest(), 4.0);
+        assert_eq!(rms.max_abs(), 4.0);
         assert_eq!(Rms::default().rms(), 0.0);
     }
 }

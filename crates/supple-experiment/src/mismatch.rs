@@ -1,4 +1,4 @@
-//! How a controller's model differs from the plant: by what an identification leaves.
+//! Model errors of a controller relative to the plant, as they remain after an identification.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -6,19 +6,19 @@ use serde::Serialize;
 use supple_core::nalgebra::Vector3;
 use supple_core::{Arm, ArmError, Body, Config, Friction, Joint};
 
-/// Relative errors of a model. Each parameter is off by the full amount, with a seeded sign.
+/// Relative errors of a model. Each parameter has the full error, with a seeded sign.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Mismatch {
-    /// Of every mass and of every component of every centre of mass: of the gravity parameters.
+    /// Error of the gravity parameters: every mass and every component of every centre of mass.
     pub gravity: f64,
-    /// Of the viscous, Coulomb and breakaway friction of every joint.
+    /// Error of the viscous, Coulomb and breakaway friction of every joint.
     pub friction: f64,
-    /// Which signs.
+    /// Seed of the signs.
     pub seed: u64,
 }
 
 impl Mismatch {
-    /// What a good identification leaves: 0.1 % of gravity, 3 % of friction.
+    /// Errors after a good identification: 0.1 % of gravity, 3 % of friction.
     pub fn identified(seed: u64) -> Mismatch {
         Mismatch {
             gravity: 1e-3,
@@ -27,10 +27,10 @@ impl Mismatch {
         }
     }
 
-    /// The configuration of a controller whose model is off by this.
+    /// Applies these errors to the model in a controller configuration.
     ///
     /// # Errors
-    /// Where the changed arm is no longer physical.
+    /// If the changed arm is physically inconsistent.
     pub fn apply<const N: usize>(&self, exact: &Config<N>) -> Result<Config<N>, ArmError> {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
         let mut off = |amount: f64| {

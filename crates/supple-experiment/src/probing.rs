@@ -1,13 +1,13 @@
-//! What a probing run says about contact: one record a stroke.
+//! Contact statistics of a probing run: one record for each stroke.
 
 use crate::metrics::median;
 use serde::Serialize;
 use supple_core::trajectory::{Probe, ProbePhase};
 use supple_plant::{StepRecord, Truth};
 
-/// Window of the first transient after the first touch \[s\].
+/// Duration of the first transient after the first touch \[s\].
 const TRANSIENT_S: f64 = 0.05;
-/// Window before the reference turns in which the resting force is averaged \[s\].
+/// Time before the reversal of the reference over which the resting force is averaged \[s\].
 const REST_S: f64 = 0.3;
 
 /// Contact in one stroke.
@@ -15,17 +15,17 @@ const REST_S: f64 = 0.3;
 pub struct Stroke {
     /// Speed of the tip towards the block just before the first touch \[m/s\].
     pub approach_m_per_s: f64,
-    /// Greatest force of the first transient through the 100 Hz filter \[N\].
+    /// Maximum force of the first transient after the 100 Hz filter \[N\].
     pub peak_filtered_n: f64,
     /// Time in contact over the whole cycle \[s\].
     pub contact_s: f64,
     /// Integral of the vertical force over the whole cycle \[N s\].
     pub impulse_newton_s: f64,
-    /// The same over the first 50 ms after the first touch \[N s\].
+    /// Integral of the vertical force over the first 50 ms after the first touch \[N s\].
     pub impulse_first_50ms_newton_s: f64,
-    /// Mean vertical force over the last 0.3 s before the reference turns \[N\].
+    /// Mean vertical force over the last 0.3 s before the reversal of the reference \[N\].
     pub rest_force_n: f64,
-    /// From the first touch until the latch closed \[s\], if it did.
+    /// Time from the first touch until contact was detected \[s\]; `None` if it was not.
     pub latched_after_s: Option<f64>,
 }
 
@@ -41,7 +41,7 @@ pub struct ContactMeter {
 }
 
 impl ContactMeter {
-    /// For a probing cycle.
+    /// Creates a meter for a probing cycle.
     pub fn new(probe: Probe) -> ContactMeter {
         ContactMeter {
             probe,
@@ -53,7 +53,8 @@ impl ContactMeter {
         }
     }
 
-    /// One cycle. `time_s` is the time since the trajectory began, `truth` the state at its start.
+    /// Adds one controller cycle. `time_s` is the time since the start of the trajectory, `truth` the plant's
+    /// state at the start of the cycle.
     pub fn cycle<const N: usize>(
         &mut self,
         time_s: f64,
@@ -112,14 +113,14 @@ impl ContactMeter {
         self.rest = (0.0, 0);
     }
 
-    /// All strokes. The last one is taken as it stands.
+    /// All strokes, the unfinished last one included.
     pub fn finish(mut self) -> Vec<Stroke> {
         self.close();
         self.done
     }
 }
 
-/// Middle value of every entry over the strokes.
+/// Median of every entry over the strokes.
 pub fn median_stroke(strokes: &[Stroke]) -> Stroke {
     let of = |entry: &dyn Fn(&Stroke) -> f64| {
         let values: Vec<f64> = strokes.iter().map(entry).collect();

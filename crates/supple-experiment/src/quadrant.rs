@@ -1,19 +1,19 @@
-//! Error on each piece of the quadrant.
+//! Tracking error on each piece of the quadrant.
 
 use crate::metrics::Rms;
 use serde::Serialize;
 use supple_core::trajectory::{Piece, Quadrant};
 
-/// One walk along one piece.
+/// One pass along one piece.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Edge {
     /// `out`, `ellipse` or `back`.
     pub piece: &'static str,
-    /// Rounds completed before.
+    /// Number of rounds completed before.
     pub round: u32,
-    /// The run begins here, from rest: no corner, no jump of the velocity.
+    /// Whether the run starts here from rest, without a jump of the velocity.
     pub from_rest: bool,
-    /// Greatest error \[m\].
+    /// Maximum error \[m\].
     pub peak_error_m: f64,
     /// Mean error over the last quarter of the piece \[m\].
     pub last_quarter_error_m: f64,
@@ -30,7 +30,7 @@ pub struct EdgeMeter {
 }
 
 impl EdgeMeter {
-    /// For a quadrant.
+    /// Creates a meter for a quadrant.
     pub fn new(quadrant: Quadrant) -> EdgeMeter {
         EdgeMeter {
             quadrant,
@@ -41,15 +41,15 @@ impl EdgeMeter {
         }
     }
 
-    /// One cycle: distance of the tip from its reference at `time_s`.
+    /// Adds one cycle: distance of the tip from its reference at `time_s`.
     pub fn cycle(&mut self, time_s: f64, error_m: f64) {
-        let (piece, share, round) = self.quadrant.piece_at(time_s);
+        let (piece, fraction, round) = self.quadrant.piece_at(time_s);
         if self.current != Some((piece, round)) {
             self.close();
             self.current = Some((piece, round));
         }
         self.all.add(error_m);
-        if share >= 0.75 {
+        if fraction >= 0.75 {
             self.last_quarter.0 += error_m;
             self.last_quarter.1 += 1;
         }
@@ -67,7 +67,7 @@ impl EdgeMeter {
                 },
                 round,
                 from_rest: piece == Piece::Out && round == 0,
-                peak_error_m: self.all.greatest(),
+                peak_error_m: self.all.max_abs(),
                 last_quarter_error_m: self.last_quarter.0 / f64::from(self.last_quarter.1),
             });
         }
@@ -75,7 +75,7 @@ impl EdgeMeter {
         self.last_quarter = (0.0, 0);
     }
 
-    /// All edges that were walked to their last quarter.
+    /// All edges of which the last quarter was reached.
     pub fn finish(mut self) -> Vec<Edge> {
         self.close();
         self.edges

@@ -1,4 +1,4 @@
-//! The log of a run in virtual time.
+//! Log writer for runs in virtual time.
 
 use crate::error::ExperimentError;
 use crate::rig::Cycle;
@@ -9,17 +9,17 @@ use supple_core::Config;
 use supple_log::{Extras, LogError, PlantTruth, RunInfo, Writer};
 use supple_model::Description;
 
-/// Writes every cycle of a run as `<folder>/<name of the plan>.mcap`. Virtual time begins at zero.
+/// Writes every cycle of a run to `<folder>/<name of the plan>.mcap`. Virtual time starts at zero.
 pub struct Recorder<const N: usize> {
     writer: Writer<N>,
     period_ns: u64,
 }
 
 impl<const N: usize> Recorder<N> {
-    /// Begins the log.
+    /// Creates the log of a plan.
     ///
     /// # Errors
-    /// Where it cannot be written.
+    /// If the log cannot be written.
     pub fn create(
         folder: &Path,
         description: &Description,
@@ -29,10 +29,10 @@ impl<const N: usize> Recorder<N> {
         Self::named(folder, description, &plan.name, &plan.config, seed)
     }
 
-    /// Begins the log of something else than a plan.
+    /// Creates a log with a given name.
     ///
     /// # Errors
-    /// Where it cannot be written.
+    /// If the log cannot be written.
     pub fn named(
         folder: &Path,
         description: &Description,
@@ -52,10 +52,10 @@ impl<const N: usize> Recorder<N> {
         })
     }
 
-    /// One cycle.
+    /// Writes one cycle.
     ///
     /// # Errors
-    /// Where it cannot be written.
+    /// If the log cannot be written.
     pub fn cycle(&mut self, cycle: &Cycle<'_, N>) -> Result<(), LogError> {
         let truth = &cycle.truth;
         let extras = Extras {
@@ -75,10 +75,10 @@ impl<const N: usize> Recorder<N> {
             .write(time_ns, &cycle.input, &cycle.output, &extras)
     }
 
-    /// Makes the log whole.
+    /// Completes the log.
     ///
     /// # Errors
-    /// Where it cannot be written.
+    /// If the log cannot be written.
     pub fn finish(self) -> Result<(), LogError> {
         self.writer.finish().map(|_| ())
     }

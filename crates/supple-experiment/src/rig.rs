@@ -1,38 +1,39 @@
-//! Controller and plant in one process, in virtual time: a cycle at a time, as fast as it goes.
+//! Controller and plant in one process, in virtual time, one cycle at a time.
 
 use crate::error::ExperimentError;
 use supple_core::controller::{Mode, Request};
 use supple_core::{Controller, Input, Output, State, Vector, step};
 use supple_plant::{Measurement, Plant, PlantConfig, StepRecord, Truth};
 
-/// A controller that drives a plant.
+/// A controller connected to a simulated plant.
 pub struct Rig<const N: usize> {
     controller: Controller<N>,
     state: State<N>,
     plant: Plant<N>,
-    /// The motors carry out torques: as in `supple-sim`, from gravity hold on until no torque is wanted.
+    /// Whether the drives are active: as in `supple-sim`, from gravity hold until the controller requests
+    /// torque off.
     active: bool,
 }
 
-/// One cycle, seen from outside.
+/// Data of one cycle.
 pub struct Cycle<'a, const N: usize> {
-    /// What the controller was given.
+    /// Input of the controller.
     pub input: Input<N>,
-    /// What it answered.
+    /// Output of the controller.
     pub output: Output<N>,
-    /// What the arm and the force sensor reported at the start of the cycle.
+    /// Measurements of the arm and the force sensor at the start of the cycle.
     pub measurement: Measurement<N>,
-    /// What was really so at the start of the cycle.
+    /// Ground truth at the start of the cycle.
     pub truth: Truth<N>,
-    /// Every step of the physics during the cycle, in order.
+    /// All physics steps during the cycle, in order.
     pub steps: &'a [StepRecord],
 }
 
 impl<const N: usize> Rig<N> {
-    /// The plant stands still at `start_rad`; the controller is idle.
+    /// Creates a plant at rest at `start_rad` with an idle controller.
     ///
     /// # Errors
-    /// Where the plant refuses its configuration.
+    /// If the plant rejects its configuration.
     pub fn new(
         controller: Controller<N>,
         plant: PlantConfig<N>,
@@ -46,17 +47,17 @@ impl<const N: usize> Rig<N> {
         })
     }
 
-    /// The controller's configuration.
+    /// The controller.
     pub fn controller(&self) -> &Controller<N> {
         &self.controller
     }
 
-    /// The plant as it stands.
+    /// The plant in its present state.
     pub fn plant(&self) -> &Plant<N> {
         &self.plant
     }
 
-    /// Measure, step, actuate.
+    /// Runs one cycle: measure, step the controller, actuate.
     pub fn cycle(&mut self, request: Option<Request<N>>) -> Cycle<'_, N> {
         let measurement = *self.plant.measurement();
         let truth = *self.plant.truth();
@@ -68,8 +69,8 @@ impl<const N: usize> Rig<N> {
             request,
         };
         let output = step(&self.controller, &mut self.state, &input);
-        self.active = !output.limp && (self.active || output.mode == Mode::GravityHold);
-        self.plant.short([!self.active; N]);
+        self.active = !output.torque_off && (self.active || output.mode == Mode::GravityHold);
+        self.plant.short_motors([!self.active; N]);
         let torque_nm = match self.active {
             true => output.torque_nm,
             false => Vector::zeros(),

@@ -1,12 +1,11 @@
-//! Torque ripple of a plant before anything else is known of it: from slow runs of all joints at constant
-//! speed.
+//! Identifies torque ripple before any other parameter, from slow runs at constant speed.
 //!
-//! Gravity and friction are fitted beside it, from a model that is off as a data sheet is, and thrown
-//! away; what is left turns with the motors' angles.
+//! Gravity and friction are fitted as nuisance parameters and discarded; the remaining residual is periodic in
+//! the motor angles.
 
-use crate::calibrate::{CUTOFF_HZ, log_of, preparation};
 use crate::error::ExperimentError;
 use crate::excite::{constant_speed_runs, excitation};
+use crate::recorded_logs::{CUTOFF_HZ, log_of, preparation};
 use supple_core::{Config, RippleTable, Vector};
 use supple_ident::{
     FrictionChoice, FrictionColumns, Log, Motion, Procedure, RippleSearch, fit_ripple,
@@ -14,20 +13,20 @@ use supple_ident::{
 };
 use supple_plant::PlantConfig;
 
-/// Tables of all motors, found by a controller that starts from `start` on a plant that stands at
-/// `home_rad`.
+/// Ripple tables of all motors, identified with a controller of configuration `start` on a plant that starts at
+/// rest at `home_rad`.
 ///
 /// # Errors
 /// [`ExperimentError`].
-pub fn ripple_on<const N: usize>(
+pub fn identify_ripple<const N: usize>(
     start: &Config<N>,
     plant: &PlantConfig<N>,
     home_rad: &Vector<N>,
 ) -> Result<[RippleTable; N], ExperimentError> {
     let joints: Vec<usize> = (0..N).collect();
     let runs = constant_speed_runs(start, home_rad, &joints)?;
-    let session = excitation("constant speed", start, plant, home_rad, &runs);
-    let recordings = session.perform(&mut |_, _| Ok(()))?;
+    let sequence = excitation("constant speed", start, plant, home_rad, &runs);
+    let recordings = sequence.perform(&mut |_, _| Ok(()))?;
     let logs: Vec<Log> = recordings.iter().map(log_of).collect();
     let prepare = |cutoff_hz| {
         let preparation = preparation(start.period_s, cutoff_hz);

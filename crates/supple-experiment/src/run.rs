@@ -1,4 +1,4 @@
-//! One run: gravity hold, a stiff move to the start, then the trajectory under the impedance law.
+//! One run: gravity hold, a position-controlled move to the start, then the trajectory under the impedance law.
 
 use crate::error::ExperimentError;
 use crate::metrics::Rms;
@@ -11,81 +11,80 @@ use supple_core::dynamics::tip_pose;
 use supple_core::{Config, Controller, Trajectory, Vector};
 use supple_plant::PlantConfig;
 
-/// Angle of the active joints from the start pose at which the plant begins \[rad\].
-const AWAY_RAD: f64 = 0.1;
-/// Gravity hold before the move \[s\].
+/// Initial offset of the active joints from the start pose \[rad\].
+const START_OFFSET_RAD: f64 = 0.1;
+/// Duration of gravity hold before the move \[s\].
 const SETTLE_S: f64 = 0.1;
-/// The move to the start \[s\].
+/// Duration of the move to the start \[s\].
 const MOVE_S: f64 = 1.0;
 /// Rest in the start pose before the trajectory \[s\].
 const REST_S: f64 = 0.4;
-/// What is still run after a fault, so that the safe action can be seen \[s\].
+/// Simulated time after a fault, to record the safe action \[s\].
 const AFTER_FAULT_S: f64 = 0.5;
-/// Cycles between samples of the trace in free motion. A probing run keeps every cycle: its first
-/// transient lasts a few of them.
+/// Cycles between samples of the trace in free motion. A probing run records every cycle, since its first
+/// transient lasts a few cycles only.
 const TRACE_EVERY: u64 = 10;
 
-/// What to run.
+/// An experiment: controller, plant and trajectory.
 #[derive(Clone, Debug)]
 pub struct Plan<const N: usize> {
-    /// Name of the experiment, and of its log.
+    /// Name of the experiment and of its log.
     pub name: String,
-    /// The controller's configuration: its model, its law, its gains.
+    /// Configuration of the controller: model, law and gains.
     pub config: Config<N>,
     /// The plant with its scene.
     pub plant: PlantConfig<N>,
-    /// What the tip is to follow.
+    /// Trajectory of the tip.
     pub trajectory: Trajectory,
-    /// For how long \[s\].
+    /// Duration of the trajectory \[s\].
     pub duration_s: f64,
 }
 
-/// A run that a fault ended.
+/// A fault that ended a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Ended {
-    /// Time since the trajectory began \[s\].
+pub struct FaultEnd {
+    /// Time since the start of the trajectory \[s\].
     pub ended_s: f64,
-    /// The fault, in words.
+    /// The fault as text.
     pub fault: String,
 }
 
-/// What a run gave.
+/// Results of a run.
 #[derive(Clone, Debug)]
 pub struct Run {
     /// Name of the experiment.
     pub name: String,
-    /// Distance of the true tip from its reference: root mean square and greatest \[m\].
+    /// Root mean square distance of the true tip from its reference \[m\].
     pub rms_error_m: f64,
-    /// Greatest of it \[m\].
+    /// Maximum distance of the true tip from its reference \[m\].
     pub max_error_m: f64,
     /// Root mean square of each torque term of shoulder pitch and elbow \[N m\].
     pub torque_rms: [JointTorque; 2],
-    /// The fault that ended it early.
-    pub ended: Option<Ended>,
+    /// The fault that ended the run early.
+    pub ended: Option<FaultEnd>,
     /// Samples for figures.
     pub trace: Trace,
-    /// Simulated time with the way to the start \[s\].
+    /// Simulated time, including the move to the start \[s\].
     pub simulated_s: f64,
 }
 
-/// Sees every cycle of a run, with the time since the trajectory began \[s\], `None` on the way to the
-/// start. An error ends the run.
-pub type Watch<'a, const N: usize> =
+/// Called after every cycle of a run with the time since the start of the trajectory \[s\], `None` before it.
+/// An error ends the run.
+pub type CycleCallback<'a, const N: usize> =
     dyn FnMut(&Cycle<'_, N>, Option<f64>) -> Result<(), ExperimentError> + 'a;
 
-/// Runs a plan. `watch` sees every cycle from the very first; its second argument is the time since the
-/// trajectory began \[s\], `None` on the way to the start.
+/// Runs a plan. `watch` is called after every cycle, see [`CycleCallback`].
 ///
 /// # Errors
-/// [`ExperimentError`]; a fault while the trajectory runs is a result, see [`Run::ended`].
+/// [`ExperimentError`]; a fault during the trajectory is a result, see [`Run::ended`].
 pub fn run<const N: usize>(
     plan: &Plan<N>,
-    watch: &mut Watch<'_, N>,
+    watch: &mut CycleCallback<'_, N>,
 ) -> Result<Run, ExperimentError> {
     let controller = Controller::new(plan.config)?;
     let config = &plan.config;
     let start = start_pose(config, &plan.name, &plan.trajectory, plan.duration_s)?;
-    let mut rig = Rig::new(controller, plan.plant.clone(), away_from(config, &start))?;
+    let mut rig = Rig::new(controller, plan.plant.clone(), offset_pose(config, &start))?;
     let cycles = |seconds: f64| (seconds / config.period_s).round() as u64;
     let move_at = cycles(SETTLE_S);
     let track_at = move_at + cycles(MOVE_S + REST_S);
@@ -100,7 +99,7 @@ pub fn run<const N: usize>(
         Trajectory::Probe(_) => 1,
         _ => TRACE_EVERY,
     };
-    let mut ended: Option<(Ended, u64)> = None;
+    let mut ended: Option<(FaultEnd, u64)> = None;
     let mut k = 0;
     while k < end && ended.as_ref().is_none_or(|(_, until)| k <= *until) {
         let request = match k {
@@ -132,7 +131,7 @@ pub fn run<const N: usize>(
             }
             let ended_s = (k - track_at) as f64 * config.period_s;
             let fault = fault.to_string();
-            ended = Some((Ended { ended_s, fault }, k + cycles(AFTER_FAULT_S)));
+            ended = Some((FaultEnd { ended_s, fault }, k + cycles(AFTER_FAULT_S)));
         }
         if let (Some(time_s), Some(reference)) = (time_s, output.reference) {
             error.add((reference.position - cycle.truth.tip_position_m).norm());
@@ -164,7 +163,7 @@ pub fn run<const N: usize>(
     Ok(Run {
         name: plan.name.clone(),
         rms_error_m: error.rms(),
-        max_error_m: error.greatest(),
+        max_error_m: error.max_abs(),
         torque_rms: torques.map(|[gravity, friction, inertial, feedback]| JointTorque {
             gravity: gravity.rms(),
             friction: friction.rms(),
@@ -177,9 +176,9 @@ pub fn run<const N: usize>(
     })
 }
 
-/// A pose a little away from `start`, so that the move has something to do: each active joint turned the
-/// way that lifts the tip, clear of whatever stands beneath; held joints in place.
-fn away_from<const N: usize>(config: &Config<N>, start: &Vector<N>) -> Vector<N> {
+/// A pose slightly off `start`, so that the initial move is not trivial: each active joint is rotated in the
+/// direction that lifts the tip away from obstacles below.
+fn offset_pose<const N: usize>(config: &Config<N>, start: &Vector<N>) -> Vector<N> {
     let limits = &config.limits;
     let height = |q: &Vector<N>| tip_pose(&config.arm, q).translation.z;
     let mut q = *start;
@@ -192,7 +191,7 @@ fn away_from<const N: usize>(config: &Config<N>, start: &Vector<N>) -> Vector<N>
             );
             turned
         };
-        let (up, down) = (turned(AWAY_RAD), turned(-AWAY_RAD));
+        let (up, down) = (turned(START_OFFSET_RAD), turned(-START_OFFSET_RAD));
         q = if height(&up) >= height(&down) {
             up
         } else {

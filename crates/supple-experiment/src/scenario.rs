@@ -7,36 +7,36 @@ use supple_plant::{FixedBlock, Scene};
 
 /// Stiffness of the free-motion experiments \[N/m\].
 pub const STIFFNESS_N_PER_M: f64 = 5.0;
-/// Damping that goes with it \[N s/m\].
+/// Damping of the free-motion experiments \[N s/m\].
 pub const DAMPING_N_S_PER_M: f64 = 1.5;
 /// Stiffnesses of the probing runs \[N/m\]; the fits of figure 6 start at the second.
 pub const PROBING_STIFFNESS_N_PER_M: [f64; 7] = [0.5, 5.0, 25.0, 50.0, 75.0, 100.0, 125.0];
 /// Speed of the quadrant in the headline run \[m/s\].
 pub const QUADRANT_SPEED_M_PER_S: f64 = 0.02 * core::f64::consts::PI;
-/// The greatest commanded speed in the paper \[m/s\].
+/// Maximum commanded speed in the paper \[m/s\].
 pub const QUADRANT_PAPER_SPEED_M_PER_S: f64 = 0.1 * core::f64::consts::PI;
 /// Height of the block's face above the base frame \[m\].
 pub const FACE_M: f64 = 0.0;
-/// Depth into the stroke at which the cap meets the face \[m\].
+/// Length of the stroke before the cap meets the face \[m\].
 const FACE_INTO_STROKE_M: f64 = 0.06;
-/// Columns of a probing run: the base advances between them.
+/// Number of columns of a probing run; the base rotates by one step between them.
 const COLUMNS: u32 = 2;
 
-/// Gains at a stiffness \[N/m\]: the damping grows with its square root, from 1.5 N s/m at 5 N/m, so
-/// that the damping ratio at the tip is the same for all.
+/// Gains for a given stiffness \[N/m\]. The damping grows with the square root of the stiffness, from 1.5 N s/m
+/// at 5 N/m, which keeps the damping ratio at the tip constant.
 pub fn gains(stiffness_n_per_m: f64) -> Gains {
     let damping = DAMPING_N_S_PER_M * (stiffness_n_per_m / STIFFNESS_N_PER_M).sqrt();
     Gains::isotropic(stiffness_n_per_m, damping)
 }
 
-/// The sinusoid of figure 3a at `speed` times its pace: two periods. Trajectory and duration \[s\].
+/// Two periods of the sinusoid of figure 3a, at `speed` times its speed. Returns trajectory and duration \[s\].
 pub fn sinusoid(speed: f64) -> (Trajectory, f64) {
     let sinusoid = Sinusoid::paper(speed);
     let duration_s = 2.0 * sinusoid.period_s() + 0.5 * sinusoid.ramp_s;
     (Trajectory::Sinusoid(sinusoid), duration_s)
 }
 
-/// An arc at 0.65 m from the base axis that swings the base by 0.4 rad to both sides: two periods.
+/// Two periods of an arc at 0.65 m from the base axis, which moves the base joint by 0.4 rad to both sides.
 pub fn arc() -> (Trajectory, f64) {
     let arc = Arc {
         radius_m: 0.65,
@@ -50,15 +50,15 @@ pub fn arc() -> (Trajectory, f64) {
     (Trajectory::Arc(arc), 2.0 * period_s + 0.5 * arc.ramp_s)
 }
 
-/// The quadrant of figure 3b in the vertical plane, two rounds. Trajectory, duration \[s\].
+/// Two rounds of the quadrant of figure 3b in the vertical plane. Returns quadrant and duration \[s\].
 pub fn quadrant(speed_m_per_s: f64) -> (Quadrant, f64) {
     let quadrant = Quadrant::vertical(speed_m_per_s);
     let duration_s = 2.0 * quadrant.period_s() + 0.25;
     (quadrant, duration_s)
 }
 
-/// The probing cycle over the block for a cap of this radius: two strokes a column, two columns.
-/// Probe, duration \[s\].
+/// The probing cycle over the block for a cap of this radius: two columns of two strokes each. Returns probe
+/// and duration \[s\].
 pub fn probe(tip_radius_m: f64) -> (Probe, f64) {
     let probe = Probe {
         radius_m: 0.70,

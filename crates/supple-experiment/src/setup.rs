@@ -1,4 +1,4 @@
-//! From a description to a controller and the plant it does not quite know.
+//! Builds plant and controller from a description; the controller's model may differ from the plant.
 
 use crate::error::ExperimentError;
 use crate::mismatch::Mismatch;
@@ -10,18 +10,18 @@ use supple_plant::{LuGre, PlantConfig, Scene};
 /// Noise of the force sensor, on each reported component \[N\].
 const FORCE_NOISE_N: f64 = 0.02;
 
-/// How the controller of a run differs from the plant, and from the default.
+/// Deviations of a run's controller and plant from the default.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Variant {
-    /// Errors of the model; `None` knows the plant's parameters.
+    /// Errors of the model; `None` uses the plant's parameters.
     pub mismatch: Option<Mismatch>,
-    /// The friction feed-forward has the plant's Stribeck dip; without, it is (3.2).
+    /// Whether the friction feed-forward includes the plant's Stribeck effect; otherwise it is (3.2).
     pub stribeck: bool,
-    /// The plant's friction has its part that depends on direction and load.
+    /// Whether the plant's friction depends on direction and load.
     pub load: bool,
-    /// The contact latch fades the friction feed-forward.
+    /// Whether the contact latch fades the friction feed-forward.
     pub fade: bool,
-    /// The law is (3.6) to the letter.
+    /// Whether the law is equation (3.6) exactly as printed.
     pub paper_letter: bool,
 }
 
@@ -37,20 +37,20 @@ impl Variant {
     };
 }
 
-/// The plant of a description and what a controller is told about it.
+/// The plant of a description and the model of its controller.
 #[derive(Clone, Debug)]
 pub struct Setup<const N: usize> {
     exact: Config<N>,
     plant: PlantConfig<N>,
-    /// `exact` is a model that was found, with a dip of its own or none.
+    /// Whether `exact` is an identified model, whose Stribeck effect is its own.
     identified: bool,
 }
 
 impl<const N: usize> Setup<N> {
-    /// The plant of one description, driven by a controller that knows another.
+    /// Plant of one description with a controller whose model is another.
     ///
     /// # Errors
-    /// Where one of the descriptions does not have `N` joints.
+    /// If one of the descriptions does not have `N` joints.
     pub fn with_model(
         description: &Description,
         model: &Description,
@@ -62,11 +62,11 @@ impl<const N: usize> Setup<N> {
         Ok(setup)
     }
 
-    /// Takes the description as the truth about the plant. Where its friction has no Stribeck dip, the
-    /// plant's breakaway is 10 % above Coulomb all the same.
+    /// Plant and controller of one description. If its friction has no Stribeck effect, the plant's breakaway
+    /// torque is still 10 % above Coulomb friction.
     ///
     /// # Errors
-    /// Where the description does not have `N` joints.
+    /// If the description does not have `N` joints.
     pub fn new(description: &Description, seed: u64) -> Result<Setup<N>, ExperimentError> {
         let exact = description.config::<N>()?;
         let mut plant = PlantConfig::from_description(description)?;
@@ -84,10 +84,10 @@ impl<const N: usize> Setup<N> {
         self.plant.tip_radius_m
     }
 
-    /// The controller's configuration in a variant.
+    /// The controller's configuration for a variant.
     ///
     /// # Errors
-    /// Where the mismatch leaves no physical arm.
+    /// If the mismatch makes the arm physically inconsistent.
     pub fn config(&self, variant: &Variant) -> Result<Config<N>, ExperimentError> {
         let mut config = self.exact;
         for (friction, truth) in config.friction.iter_mut().zip(&self.plant.friction) {
@@ -106,13 +106,13 @@ impl<const N: usize> Setup<N> {
         }
         config.latch.fade = variant.fade;
         if variant.paper_letter {
-            config.law = Law::paper_letter(config.law.gains);
+            config.law = Law::as_published(config.law.gains);
             config.latch.fade = false;
         }
         Ok(config)
     }
 
-    /// The plant in a variant, with a scene around it.
+    /// The plant for a variant, with a scene.
     pub fn plant(&self, variant: &Variant, scene: Scene) -> PlantConfig<N> {
         let mut plant = self.plant.clone();
         if !variant.load {

@@ -1,32 +1,32 @@
-//! The numbers of a demo, as `summary.json` gives them.
+//! Numerical results of a demo, as in `summary.json`.
 
 use crate::metrics::LineFit;
 use crate::probing::Stroke;
 use crate::quadrant::Edge;
-use crate::run::Ended;
+use crate::run::FaultEnd;
 use crate::trace::JointTorque;
 use serde::Serialize;
 
-/// Error of a run in free space.
+/// Tracking error of a run in free space.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Tracking {
+pub struct TrackingError {
     /// Root mean square distance of the tip from its reference \[m\].
     pub rms_error_m: f64,
-    /// Greatest distance \[m\].
+    /// Maximum distance \[m\].
     pub max_error_m: f64,
-    /// Set where a fault ended the run.
+    /// Set if a fault ended the run.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
-    pub ended: Option<Ended>,
+    pub ended: Option<FaultEnd>,
 }
 
-/// The same at a pace.
+/// Tracking error at one speed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct AtSpeed {
-    /// Times the paper's pace, or the speed of the quadrant over the paper's greatest.
+    /// Speed relative to the paper's; for the quadrant, relative to the paper's maximum.
     pub speed: f64,
     /// Error.
     #[serde(flatten)]
-    pub tracking: Tracking,
+    pub tracking: TrackingError,
 }
 
 /// Torque terms of the two joints of figure 4.
@@ -38,97 +38,97 @@ pub struct TorqueRms {
     pub elbow: JointTorque,
 }
 
-/// The quadrant.
+/// Results of the quadrant.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct QuadrantSummary {
     /// Speed on every piece \[m/s\].
     pub speed_m_per_s: f64,
     /// Error.
     #[serde(flatten)]
-    pub tracking: Tracking,
-    /// Piece by piece.
+    pub tracking: TrackingError,
+    /// Error on each piece.
     pub edges: Vec<Edge>,
 }
 
-/// Probing at one stiffness: middle values over the strokes.
+/// Probing at one stiffness: medians over the strokes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Exploration {
+pub struct ProbingSummary {
     /// `K` \[N/m\].
     pub stiffness_n_per_m: f64,
     /// `B` \[N s/m\].
     pub damping_n_s_per_m: f64,
-    /// Contact.
+    /// ContactStatistics.
     #[serde(flatten)]
     pub contact: Stroke,
-    /// Root mean square error on the way down, before contact \[m\].
+    /// Root mean square error during the descent, before contact \[m\].
     pub free_rms_m: f64,
-    /// Set where a fault ended the run.
+    /// Set if a fault ended the run.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
-    pub ended: Option<Ended>,
+    pub ended: Option<FaultEnd>,
 }
 
-/// What the probing runs say together, over K from 5 N/m on.
+/// Statistics over the probing runs with K of at least 5 N/m.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Contact {
-    /// Impulse over stiffness \[N s per N/m; N s\]; `None` where the runs do not determine a line.
+pub struct ContactStatistics {
+    /// Line of impulse against stiffness \[N s per N/m; N s\]; `None` if the runs do not determine a line.
     pub impulse_fit: Option<LineFit>,
-    /// (max - min) / median of the first transient.
+    /// (max - min) / median of the peak force of the first transient.
     pub peak_spread: Option<f64>,
-    /// The same of the transient over the approach speed.
+    /// (max - min) / median of that peak force divided by the approach speed.
     pub peak_over_speed_spread: Option<f64>,
 }
 
-/// Sinusoid with a model without error.
+/// Sinusoid with an exact model.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ExactModel {
-    /// Coulomb friction in the feed-forward, (3.2).
-    pub coulomb: Tracking,
-    /// With the Stribeck dip.
-    pub stribeck: Tracking,
+    /// With Coulomb friction in the feed-forward, (3.2).
+    pub coulomb: TrackingError,
+    /// With the Stribeck effect in the feed-forward.
+    pub stribeck: TrackingError,
 }
 
-/// All of it.
+/// All results of the demo.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Summary {
     /// Version of supple.
     pub version: &'static str,
-    /// The arm.
+    /// Name of the arm.
     pub arm: String,
     /// Seed of the demo.
     pub seed: u64,
-    /// Where the controllers' model comes from, if it is not the arm's own parameters: it is then
-    /// unperturbed in every run.
+    /// Source of the controllers' model if it is not the arm's own parameters; that model is unperturbed in
+    /// every run.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub model: Option<String>,
     /// Figure 3a.
-    pub sinusoid: Tracking,
-    /// At half, the same and twice the pace.
+    pub sinusoid: TrackingError,
+    /// Figure 3a at half, the same and twice the speed.
     pub sinusoid_by_speed: Vec<AtSpeed>,
     /// An arc that moves the base.
-    pub arc: Tracking,
+    pub arc: TrackingError,
     /// Figure 4.
     pub torque_rms: TorqueRms,
     /// Figure 3b, with the unperturbed model.
     pub quadrant: QuadrantSummary,
-    /// The same with the perturbed model.
+    /// Figure 3b with the perturbed model.
     pub quadrant_perturbed: QuadrantSummary,
-    /// The same at the paper's greatest speed.
+    /// Figure 3b at the paper's maximum speed.
     pub quadrant_at_paper_speed: QuadrantSummary,
     /// Figures 5 and 6.
-    pub exploration: Vec<Exploration>,
-    /// What they say together.
+    pub exploration: Vec<ProbingSummary>,
+    /// Statistics over these runs.
     #[serde(flatten)]
-    pub contact: Contact,
+    pub contact: ContactStatistics,
     /// Probing with the friction feed-forward left on in contact.
-    pub exploration_fade_off: Vec<Exploration>,
-    /// What they say together.
-    pub fade_off: Contact,
-    /// With the plant's own parameters in the model.
+    pub exploration_fade_off: Vec<ProbingSummary>,
+    /// Statistics over these runs.
+    pub fade_off: ContactStatistics,
+    /// Sinusoid with the plant's own parameters in the model.
     pub sinusoid_exact_model: ExactModel,
-    /// (3.6) to the letter.
-    pub paper_letter: Tracking,
+    /// Sinusoid with equation (3.6) exactly as printed.
+    pub paper_letter: TrackingError,
     /// Root mean square error of the sinusoid for ten perturbed models \[m\].
     pub seeds: Vec<f64>,
-    /// The same runs with their greatest error, and the fault where one ended a run.
-    pub seed_runs: Vec<Tracking>,
+    /// The same runs with their maximum errors and faults.
+    pub seed_runs: Vec<TrackingError>,
 }

@@ -1,5 +1,5 @@
-//! What a run leaves for figures: samples from the start of the trajectory, every cycle of a probing
-//! run, every tenth of the others.
+//! Samples of a run for figures, from the start of the trajectory: every cycle of a probing run, every tenth
+//! cycle of the others.
 
 use serde::Serialize;
 use supple_core::Output;
@@ -18,7 +18,7 @@ pub struct JointTorque {
 }
 
 impl JointTorque {
-    /// Of joint `i`.
+    /// Torque terms of joint `i`.
     pub fn of<const N: usize>(output: &Output<N>, i: usize) -> JointTorque {
         let t = &output.torques;
         JointTorque {
@@ -33,24 +33,24 @@ impl JointTorque {
 /// One sample.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Sample {
-    /// Time since the trajectory began \[s\].
+    /// Time since the start of the trajectory \[s\].
     pub time_s: f64,
-    /// Where the tip should be, base axes \[m\].
+    /// Reference position of the tip, base axes \[m\].
     pub reference_m: [f64; 3],
-    /// Where it really is \[m\].
+    /// True position of the tip, base axes \[m\].
     pub tip_m: [f64; 3],
     /// Torques of the second and third active joints: shoulder pitch and elbow.
     pub torques: [JointTorque; 2],
     /// Filtered force on the tip along base z \[N\].
     pub force_n: f64,
-    /// The contact latch is closed.
+    /// Whether contact is latched.
     pub in_contact: bool,
 }
 
 /// Samples of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Trace {
-    /// In order.
+    /// The samples, in order of time.
     pub samples: Vec<Sample>,
 }
 

@@ -1,4 +1,4 @@
-//! What a model that was found is worth: the sinusoid at 5 N/m, followed with it on the plant.
+//! Evaluates an identified model: tracks the sinusoid at 5 N/m on the plant.
 
 use crate::error::ExperimentError;
 use crate::run::{Plan, run};
@@ -7,27 +7,28 @@ use serde::Serialize;
 use supple_model::Description;
 use supple_plant::PlantConfig;
 
-/// RMS error of the tip \[m\], by what the friction feed-forward knows and what the plant does.
+/// RMS tip error \[m\] for two friction feed-forwards.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Tracking {
-    /// With viscous and Coulomb friction alone.
+pub struct IdentifiedModelTracking {
+    /// With viscous and Coulomb friction only.
     pub coulomb_m: f64,
-    /// With the Stribeck dip that was found.
+    /// With the identified Stribeck effect.
     pub stribeck_m: f64,
 }
 
-/// Follows the sinusoid with the controller of `identified`; `None` where the arm cannot reach it.
+/// Tracks the sinusoid with a controller configured from `identified`; `None` if the arm cannot reach the sinusoid. If a
+/// fault ends a run early, the tracking error is that of the part before it.
 ///
 /// # Errors
-/// [`ExperimentError`]; a fault ends a run early, with the error up to there.
-pub fn tracking<const N: usize>(
+/// [`ExperimentError`].
+pub fn track_with_identified_model<const N: usize>(
     identified: &Description,
     plant: &PlantConfig<N>,
-) -> Result<Option<Tracking>, ExperimentError> {
-    let error_m = |dip: bool| {
+) -> Result<Option<IdentifiedModelTracking>, ExperimentError> {
+    let error_m = |stribeck: bool| {
         let mut config = identified.config::<N>()?;
         config.law.gains = scenario::gains(scenario::STIFFNESS_N_PER_M);
-        if !dip {
+        if !stribeck {
             for friction in &mut config.friction {
                 friction.breakaway_nm = friction.coulomb_nm;
             }
@@ -43,10 +44,10 @@ pub fn tracking<const N: usize>(
         run(&plan, &mut |_, _| Ok(())).map(|run| run.rms_error_m)
     };
     let coulomb_m = match error_m(false) {
-        Err(ExperimentError::Unreachable { .. }) => return Ok(None),
+        Err(ExperimentError::BeyondJointStop { .. }) => return Ok(None),
         found => found?,
     };
-    Ok(Some(Tracking {
+    Ok(Some(IdentifiedModelTracking {
         coulomb_m,
         stribeck_m: error_m(true)?,
     }))

@@ -1,9 +1,9 @@
-//! Regular files: what a program reads and writes by a name that somebody gave it.
+//! Reads and writes user-named paths safely.
 //!
-//! A name can lead to a device, a FIFO, a socket or a folder. Opening one can block for ever, reading one can
-//! fill all memory, and renaming a finished file over one replaces it: `--log /dev/null` as root would leave a
-//! machine without `/dev/null`. Everything here refuses what is not a regular file, before anything is read
-//! or written. Whoever opens a file that a user has named does it through this crate.
+//! A path can be a device, a FIFO, a socket or a folder. Opening one can block forever, reading one can exhaust
+//! the memory, and renaming a finished file over one replaces it: `--log /dev/null` as root would remove
+//! `/dev/null`. All functions reject special files before they read or write anything. Every file that a user
+//! has named is opened through this crate.
 
 #![forbid(unsafe_code)]
 
@@ -11,12 +11,12 @@ use std::fs::{File, FileType, Metadata, OpenOptions};
 use std::io::{Error, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 
-/// Refuses a name at which something stands that a file must not replace: a device, a FIFO, a socket or a
-/// folder, also where a link leads to it. A name at which nothing stands is free.
+/// Rejects a path that exists and is not a regular file (device, FIFO, socket, folder), also behind a symbolic
+/// link. A path that does not exist is accepted.
 ///
 /// # Errors
 /// [`ErrorKind::IsADirectory`] for a folder, [`ErrorKind::InvalidInput`] for anything else that is not a
-/// regular file, with what it is; what the system says where it cannot be looked at.
+/// regular file, with its kind; the error of the operating system if the path cannot be examined.
 pub fn check_output(path: &Path) -> Result<(), Error> {
     match path.metadata() {
         Ok(found) => expect_regular(&found),
@@ -25,11 +25,11 @@ pub fn check_output(path: &Path) -> Result<(), Error> {
     }
 }
 
-/// Opens a file to write it, made if need be; what is in it stays until the caller truncates it. A link is
-/// not followed.
+/// Opens a file for writing and creates it if necessary; its content stays until the caller truncates it. Symbolic
+/// links are not followed.
 ///
 /// # Errors
-/// As [`check_output`]; what the system says.
+/// As [`check_output`]; errors of the operating system.
 pub fn open_output(path: &Path) -> Result<File, Error> {
     check_output(path)?;
     let mut options = OpenOptions::new();
@@ -44,7 +44,7 @@ pub fn open_output(path: &Path) -> Result<File, Error> {
     Ok(file)
 }
 
-/// Opens an empty file to write it, made if need be. A link is not followed.
+/// Opens an empty file for writing and creates it if necessary. Symbolic links are not followed.
 ///
 /// # Errors
 /// As [`open_output`].
@@ -54,11 +54,11 @@ pub fn create_output(path: &Path) -> Result<File, Error> {
     Ok(file)
 }
 
-/// Writes a whole file: beside its place first, as `<name>.part`, then on the disk, then under its name.
+/// Writes a file atomically: writes `<name>.part`, syncs it to disk, then renames it.
 ///
 /// # Errors
-/// As [`open_output`]; then nothing stands at the name that was not there before, and no `.part`.
-pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Error> {
+/// As [`open_output`]; the path is then unchanged, and no `.part` file is left.
+pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     check_output(path)?;
     let part = with_suffix(path, ".part");
     let mut file = create_output(&part)?;
@@ -67,18 +67,18 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Error> {
         .and_then(|()| file.sync_all())
         .and_then(|()| std::fs::rename(&part, path));
     if written.is_err() {
-        // The error that led here is the one to report.
+        // The earlier error is the one to report.
         let _ = std::fs::remove_file(&part);
     }
     written
 }
 
-/// Opens a regular file to read it, with its length in bytes. A FIFO without a writer does not block.
+/// Opens a regular file for reading; returns it with its length in bytes. A FIFO without a writer does not block.
 ///
 /// # Errors
-/// As [`check_output`]; what the system says, [`ErrorKind::NotFound`] where nothing is there.
+/// As [`check_output`]; errors of the operating system, [`ErrorKind::NotFound`] if the path does not exist.
 pub fn open_input(path: &Path) -> Result<(File, u64), Error> {
-    // Before it is opened: opening a device can act on it.
+    // Check before opening: opening a device can have side effects.
     expect_regular(&path.metadata()?)?;
     let mut options = OpenOptions::new();
     options.read(true);
@@ -90,30 +90,30 @@ pub fn open_input(path: &Path) -> Result<(File, u64), Error> {
     Ok((file, found.len()))
 }
 
-/// The text of a regular file of at most `most_bytes`.
+/// Reads the text of a regular file of at most `max_bytes`.
 ///
 /// # Errors
 /// As [`open_input`]; [`ErrorKind::FileTooLarge`] for a longer file, before it is read;
-/// [`ErrorKind::InvalidData`] where it is not UTF-8.
-pub fn read_text(path: &Path, most_bytes: u64) -> Result<String, Error> {
+/// [`ErrorKind::InvalidData`] if it is not UTF-8.
+pub fn read_text(path: &Path, max_bytes: u64) -> Result<String, Error> {
     let (file, bytes) = open_input(path)?;
     let too_large = |bytes: u64| {
-        let message = format!("it has {bytes} bytes, at most {most_bytes} are read");
+        let message = format!("it has {bytes} bytes, at most {max_bytes} are read");
         Error::new(ErrorKind::FileTooLarge, message)
     };
-    if bytes > most_bytes {
+    if bytes > max_bytes {
         return Err(too_large(bytes));
     }
     let mut text = String::new();
-    // It may grow while it is read.
-    let read = file.take(most_bytes + 1).read_to_string(&mut text)? as u64;
-    match read > most_bytes {
+    // The file may grow during reading.
+    let read = file.take(max_bytes + 1).read_to_string(&mut text)? as u64;
+    match read > max_bytes {
         true => Err(too_large(read)),
         false => Ok(text),
     }
 }
 
-/// `path` with `suffix` after its last name: `run.mcap.part`.
+/// `path` with `suffix` appended to its file name: `run.mcap.part`.
 pub fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(suffix);

@@ -1,44 +1,44 @@
-//! Which combinations of the columns the data can tell apart.
+//! Identifiable combinations of the regressor columns.
 //!
-//! Columns are scaled to unit length and taken in turn by QR with column pivoting. Where the diagonal
-//! drops below `tolerance` of its first entry, the rest depend on those taken:
+//! Columns are scaled to unit length and selected by QR with column pivoting. Once the diagonal drops below
+//! `tolerance` times its first entry, the remaining columns depend on those selected:
 //! `dependent = independent B`, so that `x_independent + B x_dependent` is what can be identified.
 
 use crate::error::IdentError;
 use crate::random::Random;
 use nalgebra::{DMatrix, DVector};
 
-/// Diagonal entries below this share of the first are rounding.
+/// Diagonal entries below this fraction of the first are rounding errors.
 pub const RANK_TOLERANCE: f64 = 1e-8;
-/// Remainders as long as the longest but for this share of it are as long: the first column of them is
-/// taken. All columns start out equally long, so that rounding would choose otherwise.
+/// Relative tolerance for ties in the pivot search: among columns of almost equal remaining norm the first is
+/// taken. All columns start with equal norm, so rounding would decide otherwise.
 const TIE: f64 = 1e-6;
 
 /// Base parameters of a regressor.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Base {
-    /// Positions of the independent columns, increasing.
+pub struct BaseParameters {
+    /// Indices of the independent columns, increasing.
     pub independent: Vec<usize>,
-    /// Positions of the others, increasing.
+    /// Indices of the dependent columns, increasing.
     pub dependent: Vec<usize>,
     /// `B`, (independent, dependent).
     pub combination: DMatrix<f64>,
-    /// Greatest by least singular value of the independent columns, each scaled to unit length.
+    /// Condition number of the independent columns, each scaled to unit length.
     pub condition: f64,
     gram_inverse: DMatrix<f64>,
 }
 
-impl Base {
-    /// Of the regressor `a`, or of its triangle.
+impl BaseParameters {
+    /// Computes the base parameters of the regressor `a`, or of its upper triangular factor.
     ///
     /// # Errors
     /// [`IdentError::Singular`] if every column is zero.
-    pub fn of(a: &DMatrix<f64>, tolerance: f64) -> Result<Base, IdentError> {
+    pub fn of(a: &DMatrix<f64>, tolerance: f64) -> Result<BaseParameters, IdentError> {
         let lengths: Vec<f64> = a.column_iter().map(|c| c.norm()).collect();
         let longest = lengths.iter().copied().fold(0.0, f64::max);
         if longest == 0.0 || !longest.is_finite() {
             return Err(IdentError::Singular {
-                problem: format!("the regressor has columns of length {longest} at most"),
+                problem: format!("the largest column norm of the regressor is {longest}"),
                 remedy: "give a log in which the joints move",
             });
         }
@@ -57,7 +57,7 @@ impl Base {
             .filter(|j| independent.binary_search(j).is_err())
             .collect();
         let singular = || IdentError::Singular {
-            problem: "the independent columns are not".to_owned(),
+            problem: "the selected columns are linearly dependent".to_owned(),
             remedy: "raise the tolerance of the rank",
         };
         let taken = scaled.select_columns(&independent);
@@ -77,7 +77,7 @@ impl Base {
             gram_inverse.column_mut(i).scale_mut(scale(p));
         }
         let singular_values = r.singular_values();
-        Ok(Base {
+        Ok(BaseParameters {
             independent,
             dependent,
             combination,
@@ -86,15 +86,15 @@ impl Base {
         })
     }
 
-    /// The same, of columns that were `positions` of a larger set.
-    pub fn renumbered(mut self, positions: &[usize]) -> Base {
+    /// Converts column indices to those of a larger set, of which these columns were `positions`.
+    pub fn renumbered(mut self, positions: &[usize]) -> BaseParameters {
         for list in [&mut self.independent, &mut self.dependent] {
             list.iter_mut().for_each(|i| *i = positions[*i]);
         }
         self
     }
 
-    /// Number of combinations that can be identified.
+    /// Number of identifiable combinations.
     pub fn rank(&self) -> usize {
         self.independent.len()
     }
@@ -110,15 +110,15 @@ impl Base {
         self.gram_inverse.diagonal().map(|v| noise * v.sqrt())
     }
 
-    /// A draw from the normal distribution of the base parameters about zero, for independent noise of
-    /// `noise` on each row; `None` where rounding has left no covariance.
+    /// A draw from the zero-mean normal distribution of the base parameters, for independent noise of `noise`
+    /// on each row; `None` if rounding makes the covariance singular.
     pub(crate) fn draw(&self, noise: f64, random: &mut Random) -> Option<DVector<f64>> {
         let root = nalgebra::Cholesky::new(self.gram_inverse.clone())?;
         let normal = DVector::from_fn(self.rank(), |_, _| random.normal());
         Some(root.l() * normal * noise)
     }
 
-    /// Each base parameter in words, such as `Izz1 + 1 Iyy2 - 0.55 mcx2`.
+    /// Each base parameter as text, such as `Izz1 + 1 Iyy2 - 0.55 mcx2`.
     pub fn text(&self, names: &[String]) -> Vec<String> {
         let sum = |i: usize| {
             let mut text = names[self.independent[i]].clone();
@@ -130,8 +130,8 @@ impl Base {
         (0..self.rank()).map(sum).collect()
     }
 
-    /// Directions in which the parameters may move without any change of torque, in words: one for
-    /// each dependent column.
+    /// Null space as text: one direction for each dependent column in which the parameters can change without a
+    /// change of torque.
     pub fn null_space_text(&self, names: &[String]) -> Vec<String> {
         let direction = |k: usize| {
             let mut text = names[self.dependent[k]].clone();
@@ -157,8 +157,8 @@ fn term(coefficient: f64, name: &str) -> String {
     }
 }
 
-/// Columns that pivoting takes before the rest are negligible. Each step takes the longest remainder, the
-/// first of those that tie, and removes its direction, twice, from the others.
+/// Columns in the order of pivoting, until the rest are negligible. Each step selects the column of largest
+/// remaining norm, the first of those that tie, and removes its direction twice from the others.
 pub(crate) fn pivot_order(columns: &DMatrix<f64>, tolerance: f64) -> Vec<usize> {
     let mut rest = columns.clone();
     let mut order: Vec<usize> = Vec::new();
@@ -184,8 +184,8 @@ pub(crate) fn pivot_order(columns: &DMatrix<f64>, tolerance: f64) -> Vec<usize> 
         }
         let direction = rest.column(pivot) / length;
         for _ in 0..2 {
-            let shares = rest.tr_mul(&direction);
-            rest.ger(-1.0, &direction, &shares, 1.0);
+            let projections = rest.tr_mul(&direction);
+            rest.ger(-1.0, &direction, &projections, 1.0);
         }
         order.push(pivot);
     }
@@ -194,7 +194,7 @@ pub(crate) fn pivot_order(columns: &DMatrix<f64>, tolerance: f64) -> Vec<usize> 
 
 #[cfg(test)]
 mod tests {
-    use super::{Base, RANK_TOLERANCE};
+    use super::{BaseParameters, RANK_TOLERANCE};
     use crate::random::Random;
     use nalgebra::DMatrix;
 
@@ -211,17 +211,17 @@ mod tests {
     }
 
     #[test]
-    fn rounding_does_not_choose_the_columns() {
+    fn rounding_does_not_affect_the_choice_of_columns() {
         let mut random = Random::new(4);
         let a = dependent(&mut random);
-        let chosen = Base::of(&a, RANK_TOLERANCE).unwrap();
+        let chosen = BaseParameters::of(&a, RANK_TOLERANCE).unwrap();
         assert_eq!(chosen.rank(), 5);
         assert!(chosen.independent.contains(&0), "the first of equals");
         for _ in 0..50 {
-            // The same columns in other coordinates: only rounding differs.
+            // The same columns in rotated coordinates, which changes only rounding.
             let turn = DMatrix::from_fn(60, 60, |_, _| random.normal()).qr().q();
             let turned = turn * &a * (0.1 + random.uniform());
-            let again = Base::of(&turned, RANK_TOLERANCE).unwrap();
+            let again = BaseParameters::of(&turned, RANK_TOLERANCE).unwrap();
             assert_eq!(again.independent, chosen.independent);
             assert!((again.combination - &chosen.combination).amax() < 1e-9);
         }

@@ -1,4 +1,4 @@
-//! Which columns the torques are explained by, in which order, and what each may be.
+//! Columns of the regressor: their order and their sign constraints.
 //!
 //! ```text
 //! tau_j = sum_k Y_jk p_k + I_rj qdd_j + V_j qd_j + S_j p(qd_j/delta) + o_j + A_j |qd_j|
@@ -7,9 +7,9 @@
 //!         + I_c (qdd_a + qdd_b) + V_c (qd_a + qd_b) + S_c p((qd_a + qd_b)/delta)
 //! ```
 //!
-//! `p` is the parabola of [`supple_core::friction`]. `g_j` is the torque that the gear of joint j passes on
-//! to the links, by the model that the fit starts from: gears rub harder under load. The rotor of a coupled
-//! motor turns with both joints: its torque acts on both.
+//! `p` is the parabola of [`supple_core::friction`]. `g_j` is the torque that the gear of joint j transmits to
+//! the links, by the nominal model (gear friction grows with load). A coupled motor turns with the sum of two
+//! joints; its torque acts on both.
 
 use crate::error::{IdentError, positive, shape_error};
 use supple_core::Friction;
@@ -30,7 +30,7 @@ pub struct FrictionColumns {
     pub offset: bool,
     /// `A`: viscous friction that differs by direction, `|A| <= V`.
     pub asymmetry: bool,
-    /// `L`: Coulomb friction that grows with the torque passed on to the links.
+    /// `L`: Coulomb friction that grows with the torque transmitted to the links.
     pub load: bool,
     /// `B`, with its `v_s` \[rad/s\].
     pub stribeck_rad_per_s: Option<f64>,
@@ -39,7 +39,7 @@ pub struct FrictionColumns {
 }
 
 impl FrictionColumns {
-    /// No friction at all.
+    /// No friction.
     pub const NONE: FrictionColumns = FrictionColumns {
         viscous: false,
         coulomb: false,
@@ -62,7 +62,7 @@ impl FrictionColumns {
     };
 }
 
-/// What one column is.
+/// Meaning of a column.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Column {
     /// Parameter 0 to 9 of a link.
@@ -88,15 +88,15 @@ pub enum Column {
     Load(usize),
     /// Rotor inertia of a motor that turns with the sum of two joints.
     CoupledRotor(usize, usize),
-    /// Its viscous friction.
+    /// Viscous friction of such a motor.
     CoupledViscous(usize, usize),
-    /// Its Coulomb friction.
+    /// Coulomb friction of such a motor.
     CoupledCoulomb(usize, usize),
 }
 
 impl Column {
-    /// Whether the column turns over at once with the direction of motion.
-    pub fn jumps(&self) -> bool {
+    /// Whether the column is discontinuous at a reversal of motion.
+    pub fn discontinuous_at_reversal(&self) -> bool {
         matches!(
             self,
             Column::Coulomb(_) | Column::Stribeck(_) | Column::Load(_) | Column::CoupledCoulomb(..)
@@ -118,7 +118,7 @@ impl Columns {
     /// then three for each pair of `couplings`.
     ///
     /// # Errors
-    /// Joints that do not exist or do not move; a band or Stribeck speed that is not positive.
+    /// Invalid joints; a band or Stribeck speed that is not positive.
     pub fn new(
         dof: usize,
         moving: &[usize],
@@ -136,13 +136,13 @@ impl Columns {
                 friction.asymmetry,
                 friction.viscous,
                 "asymmetry alone",
-                "viscous columns beside those of its asymmetry",
+                "viscous columns in addition to its asymmetry",
             ),
             (
                 friction.load,
                 friction.coulomb,
                 "load alone",
-                "Coulomb columns beside those of its load",
+                "Coulomb columns in addition to its load",
             ),
         ] {
             if part && !whole {
@@ -197,7 +197,7 @@ impl Columns {
         self.dof
     }
 
-    /// Joints whose torques are explained.
+    /// Joints whose torques are modelled.
     pub fn moving(&self) -> &[usize] {
         &self.moving
     }
@@ -217,12 +217,12 @@ impl Columns {
         self.columns.len()
     }
 
-    /// Never: an arm has links.
+    /// Always false: an arm has links.
     pub fn is_empty(&self) -> bool {
         self.columns.is_empty()
     }
 
-    /// Position of a column.
+    /// Index of a column.
     pub fn position(&self, column: Column) -> Option<usize> {
         self.columns.iter().position(|c| *c == column)
     }
@@ -245,8 +245,8 @@ impl Columns {
         self.columns.iter().map(name).collect()
     }
 
-    /// Linear forms `sum c_i x_i` that must not be negative: friction that takes energy, rotors that
-    /// have inertia. Each is a list of (position, coefficient).
+    /// Linear constraints `sum c_i x_i >= 0`: friction is dissipative, rotor inertias are not negative. Each is
+    /// a list of (index, coefficient).
     pub fn not_negative(&self) -> Vec<Vec<(usize, f64)>> {
         let mut forms = Vec::new();
         for (i, column) in self.columns.iter().enumerate() {

@@ -1,53 +1,52 @@
-//! Least squares over the parameters that an arm could have.
+//! Least squares with physical consistency constraints.
 //!
 //! ```text
 //! min 1/2 |A x - b|^2 + gamma sum_k [tr(P0_k^-1 P_k) - log det P_k]
 //! P_k(x) positive definite for every link,   g_i . x >= 0
 //! ```
 //!
-//! `P = [S h; h' m]`, `S = tr(I)/2 - I`, is the pseudo-inertia: positive definite if and only if some
-//! distribution of mass has it (Wensing, Kim and Slotine, 2018). The second term is the log-det
-//! divergence from the model `P0`, up to a constant; it also decides what the data leave open.
+//! `P = [S h; h' m]`, `S = tr(I)/2 - I`, is the pseudo-inertia: positive definite if and only if some mass
+//! distribution realises it (Wensing, Kim and Slotine, 2018). The second term is the log-det divergence from
+//! the model `P0`, up to a constant; it also determines the parameters that the data do not.
 //!
-//! Solved by Newton's method on `objective - mu (sum log det P_k + sum log g_i . x)`, with `mu` brought
-//! down in steps. At each centre the objective is within `mu nu` of the optimum, where `nu` is four for
-//! each link and one for each form: the certificate that the result carries.
+//! Solved by Newton's method on `objective - mu (sum log det P_k + sum log g_i . x)`, with `mu` reduced in
+//! steps. At each centre the objective is within `mu nu` of the optimum, where `nu` is four for each link and
+//! one for each form. This bound is returned with the result.
 
-use crate::compress::Block;
 use crate::error::{IdentError, positive};
+use crate::qr_reduction::ReducedSystem;
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix4, SVector};
 
 /// Factor from one `mu` to the next.
 const REDUCTION: f64 = 0.1;
-/// The barrier's share of the prior at the end.
-const FAINT: f64 = 1e-6;
-/// Newton steps at most for each `mu`.
+/// Ratio of the barrier to the prior at termination.
+const BARRIER_TO_PRIOR_RATIO: f64 = 1e-6;
+/// Maximum number of Newton steps for each `mu`.
 const STEPS: usize = 60;
 
 /// The constraints and the prior.
 #[derive(Clone, Debug)]
 pub struct Constraints {
-    /// Ten parameters of each link of the model that the prior draws towards; they are the first
-    /// unknowns.
+    /// Prior: ten parameters of each link of the nominal model. They are the first unknowns.
     pub links: Vec<SVector<f64, 10>>,
     /// Linear forms that must not be negative, as (unknown, coefficient).
     pub not_negative: Vec<Vec<(usize, f64)>>,
-    /// `gamma`, positive: how many observations of one standard deviation the model is worth.
+    /// `gamma`, positive: weight of the prior in equivalent observations.
     pub prior_weight: f64,
     /// Certified distance from the optimum, relative to the objective, at which to stop.
     pub tolerance: f64,
 }
 
-/// A solution that keeps every constraint strictly.
+/// A strictly feasible solution.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Solution {
     /// The unknowns.
     pub x: DVector<f64>,
     /// Objective, without the barrier.
     pub objective: f64,
-    /// Bound on the distance from the least objective.
-    pub gap: f64,
-    /// Newton steps taken.
+    /// Upper bound on the distance of the objective from its minimum.
+    pub optimality_gap: f64,
+    /// Number of Newton steps.
     pub steps: usize,
 }
 
@@ -82,12 +81,12 @@ impl Constraints {
     }
 }
 
-/// Solves for the unknowns of `block`, starting from the model.
+/// Solves for the unknowns of `block`, starting from the prior.
 ///
 /// # Errors
-/// [`IdentError::Option`] for a prior weight or tolerance that is not positive;
-/// [`IdentError::Singular`] if a link of the model is no body or the data are not finite.
-pub fn solve(block: &Block, constraints: &Constraints) -> Result<Solution, IdentError> {
+/// [`IdentError::Option`] for a prior weight or tolerance that is not positive; [`IdentError::Singular`] if a
+/// link of the prior is physically inconsistent or the data are not finite.
+pub fn solve(block: &ReducedSystem, constraints: &Constraints) -> Result<Solution, IdentError> {
     positive("prior_weight", constraints.prior_weight)?;
     positive("tolerance", constraints.tolerance)?;
     let problem = Problem::new(block, constraints)?;
@@ -98,13 +97,13 @@ pub fn solve(block: &Block, constraints: &Constraints) -> Result<Solution, Ident
     loop {
         steps += problem.centre(&mut x, mu)?;
         let objective = problem.objective(&x).ok_or_else(not_a_model)?;
-        // What the data leave open is the model's only once the barrier is far below the prior.
-        let faint = mu <= FAINT * constraints.prior_weight;
-        if faint && mu * nu <= constraints.tolerance * (1.0 + objective.abs()) {
+        // Undetermined parameters take the prior's values only if the barrier is negligible against the prior.
+        let barrier_negligible = mu <= BARRIER_TO_PRIOR_RATIO * constraints.prior_weight;
+        if barrier_negligible && mu * nu <= constraints.tolerance * (1.0 + objective.abs()) {
             return Ok(Solution {
                 x,
                 objective,
-                gap: mu * nu,
+                optimality_gap: mu * nu,
                 steps,
             });
         }
@@ -130,7 +129,7 @@ struct Problem<'a> {
 }
 
 impl<'a> Problem<'a> {
-    fn new(block: &Block, constraints: &'a Constraints) -> Result<Self, IdentError> {
+    fn new(block: &ReducedSystem, constraints: &'a Constraints) -> Result<Self, IdentError> {
         let a = block.a();
         let inverse = |p: &SVector<f64, 10>| {
             let inverse = Cholesky::new(pseudo_inertia(p)).map(|c| c.inverse());
@@ -155,7 +154,7 @@ impl<'a> Problem<'a> {
         })
     }
 
-    /// The model, with every other constrained unknown at one.
+    /// The prior, with every other constrained unknown at one.
     fn start(&self) -> DVector<f64> {
         let mut x = DVector::zeros(self.a.ncols());
         for (k, link) in self.constraints.links.iter().enumerate() {
@@ -227,7 +226,7 @@ impl<'a> Problem<'a> {
         Some((gradient, hessian))
     }
 
-    /// Newton's method with backtracking; the number of steps.
+    /// Newton's method with backtracking; returns the number of steps.
     fn centre(&self, x: &mut DVector<f64>, mu: f64) -> Result<usize, IdentError> {
         let mut value = self.value(x, mu).ok_or_else(not_a_model)?;
         for taken in 0..STEPS {
@@ -248,7 +247,7 @@ impl<'a> Problem<'a> {
                     break;
                 }
                 length *= 0.5;
-                // Below rounding of the value there is nothing left to gain.
+                // Stop: further decrease is below rounding.
                 if length < 1e-10 {
                     return Ok(taken);
                 }
@@ -264,10 +263,10 @@ fn newton_step(
     hessian: &DMatrix<f64>,
 ) -> Result<DVector<f64>, IdentError> {
     let n = gradient.len();
-    let greatest = hessian.diagonal().amax();
+    let max_diagonal = hessian.diagonal().amax();
     let scale = DVector::from_fn(n, |i, _| {
         1.0 / hessian[(i, i)]
-            .max(f64::EPSILON * f64::EPSILON * greatest)
+            .max(f64::EPSILON * f64::EPSILON * max_diagonal)
             .sqrt()
     });
     let scaled = DMatrix::from_fn(n, n, |i, j| hessian[(i, j)] * scale[i] * scale[j]);
@@ -282,7 +281,7 @@ fn newton_step(
         ridge = if ridge == 0.0 { 1e-14 } else { 10.0 * ridge };
     }
     Err(IdentError::Singular {
-        problem: "the data are not finite or leave a direction open".to_owned(),
-        remedy: "leave out columns, or raise the prior weight",
+        problem: "the data are not finite or do not determine a direction".to_owned(),
+        remedy: "remove columns, or raise the prior weight",
     })
 }

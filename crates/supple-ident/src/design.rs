@@ -1,12 +1,12 @@
-//! An excitation that tells the parameters of an arm apart, within what the arm may do.
+//! Design of exciting trajectories within the limits of the arm.
 //!
-//! A Fourier series a joint ([`Fourier`]) is changed at random and kept when the criterion of its base
-//! regressor has improved: an evolution strategy with one parent and one child, its step steered by the
-//! rate of success. Every candidate is first shrunk until angles, joint speeds, tip speed, torques and
-//! workspace are within their limits. The criterion is the condition number of the base regressor, columns
-//! scaled to unit length, or minus the logarithm of the determinant of its information.
+//! A (1+1) evolution strategy mutates one Fourier series for each joint ([`Fourier`]) and keeps a mutation that
+//! improves the criterion of the base regressor; the success rate controls its step size. The amplitudes of
+//! every candidate are scaled down until angles, joint speeds, tip speed, torques and workspace are within
+//! limits. The criterion is the condition number of the base regressor, columns scaled to unit length, or minus
+//! the logarithm of the determinant of its information matrix.
 
-use crate::base::{Base, RANK_TOLERANCE};
+use crate::base::{BaseParameters, RANK_TOLERANCE};
 use crate::columns::{Columns, FrictionColumns};
 use crate::error::{IdentError, positive};
 use crate::random::Random;
@@ -17,27 +17,27 @@ use supple_core::dynamics::{jacobian, rnea, tip_pose};
 use supple_core::trajectory::{Fourier, HARMONICS, JointReference};
 use supple_core::{Config, Vector};
 
-/// Share of the speed limits that a reference may use: the rest is the loop's.
-const SPEED_SHARE: f64 = 0.8;
-/// Share of the torque limits that model and friction may use.
-const TORQUE_SHARE: f64 = 0.7;
-/// Shrinkings tried before a candidate is given up.
-const SHRINKINGS: usize = 60;
-/// Points of a period at which a candidate is judged.
+/// Fraction of the speed limits available to the reference; the rest is margin for the control loop.
+const SPEED_FRACTION: f64 = 0.8;
+/// Fraction of the torque limits available to model and friction torques.
+const TORQUE_FRACTION: f64 = 0.7;
+/// Maximum number of scalings of a candidate before it is rejected.
+const MAX_SCALINGS: usize = 60;
+/// Points of a period at which a candidate is evaluated.
 const POINTS: usize = 150;
 
-/// Harmonics and shares of a speed that is nearly constant: they make it one at three Chebyshev nodes of
-/// (0, 0.9) of their phase, and so nearly one between.
-const STEADY: [(usize, f64); 3] = [(1, 1.218), (3, -0.279), (5, 0.072)];
-/// Greatest sum of their sines by their order: 1.218 + 0.279 / 3 + 0.072 / 5.
-const STEADY_WAY: f64 = 1.3254;
+/// Harmonics and amplitudes of a nearly constant speed: exactly one at three Chebyshev nodes of (0, 0.9) in
+/// phase.
+const CONSTANT_SPEED_HARMONICS: [(usize, f64); 3] = [(1, 1.218), (3, -0.279), (5, 0.072)];
+/// Maximum sum of their sines divided by their order: 1.218 + 0.279 / 3 + 0.072 / 5.
+const CONSTANT_SPEED_MAX_SUM: f64 = 1.3254;
 
-/// Candidates that are tried at most.
-pub const MOST_CANDIDATES: usize = 1_000_000;
-/// Longest motion \[s\].
-pub const LONGEST_S: f64 = 7200.0;
+/// Maximum number of candidates.
+pub const MAX_CANDIDATES: usize = 1_000_000;
+/// Maximum duration of a motion \[s\].
+pub const MAX_DURATION_S: f64 = 7200.0;
 
-/// What is to be small.
+/// Criterion to minimise.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Criterion {
     /// Condition number of the base regressor, columns scaled to unit length.
@@ -47,38 +47,38 @@ pub enum Criterion {
     DOptimality,
 }
 
-/// A box that the tip stays in, base axes \[m\].
+/// A box that the tip must not leave, base axes \[m\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Workspace {
-    /// Least coordinates.
+    /// Minimum coordinates.
     pub lower_m: [f64; 3],
-    /// Greatest coordinates.
+    /// Maximum coordinates.
     pub upper_m: [f64; 3],
 }
 
-/// What is asked for.
+/// Options of the design.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Design {
-    /// Joints to excite, increasing; the others rest where they are held, or at home.
+pub struct DesignOptions {
+    /// Joints to excite, increasing; the others rest at their held or home positions.
     pub moving: Vec<usize>,
     /// Length of a period \[s\].
     pub period_s: f64,
     /// Number of periods.
     pub periods: f64,
-    /// What is to be small.
+    /// Criterion to minimise.
     pub criterion: Criterion,
-    /// Where the tip must stay, if anywhere.
+    /// Workspace of the tip, if it is limited.
     pub workspace: Option<Workspace>,
-    /// Candidates tried, at most [`MOST_CANDIDATES`].
+    /// Number of candidates, at most [`MAX_CANDIDATES`].
     pub candidates: usize,
     /// Seed of the search.
     pub seed: u64,
 }
 
-impl Design {
-    /// Four periods of 15 s of these joints, condition number, 3,000 candidates.
-    pub fn of(moving: &[usize]) -> Design {
-        Design {
+impl DesignOptions {
+    /// Default options for these joints: four periods of 15 s, condition number, 3,000 candidates.
+    pub fn of(moving: &[usize]) -> DesignOptions {
+        DesignOptions {
             moving: moving.to_vec(),
             period_s: 15.0,
             periods: 4.0,
@@ -90,12 +90,12 @@ impl Design {
     }
 }
 
-/// A series and what it is worth.
+/// A designed series with its quality.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Designed<const N: usize> {
+pub struct ExcitationDesign<const N: usize> {
     /// The series.
     pub series: Fourier<N>,
-    /// Rank of its base regressor.
+    /// Rank of the regressor.
     pub rank: usize,
     /// Condition number of its base regressor, columns scaled to unit length.
     pub condition: f64,
@@ -103,20 +103,20 @@ pub struct Designed<const N: usize> {
     pub history: Vec<f64>,
 }
 
-/// Searches. `progress` hears the number of candidates tried and the best value so far.
+/// Runs the search; `progress` receives the number of candidates and the best value so far.
 ///
 /// # Errors
-/// Options out of range; limits so narrow that no candidate meets them.
+/// Options out of range; limits that no candidate meets.
 pub fn design<const N: usize>(
     config: &Config<N>,
     home_rad: &Vector<N>,
-    request: &Design,
+    request: &DesignOptions,
     progress: &mut dyn FnMut(usize, f64),
-) -> Result<Designed<N>, IdentError> {
+) -> Result<ExcitationDesign<N>, IdentError> {
     positive("period_s", request.period_s)?;
     positive("periods", request.periods)?;
     positive("candidates", request.candidates as f64)?;
-    if request.candidates > MOST_CANDIDATES {
+    if request.candidates > MAX_CANDIDATES {
         return Err(IdentError::Option {
             option: "candidates",
             value: request.candidates as f64,
@@ -124,7 +124,7 @@ pub fn design<const N: usize>(
         });
     }
     let duration_s = request.period_s * request.periods;
-    if duration_s > LONGEST_S {
+    if duration_s > MAX_DURATION_S {
         return Err(IdentError::Option {
             option: "period_s times periods",
             value: duration_s,
@@ -143,18 +143,18 @@ pub fn design<const N: usize>(
     let mut best: Option<(Fourier<N>, f64)> = None;
     let mut history = Vec::with_capacity(request.candidates);
     let mut step = 0.3;
-    // A few independent starts before the best is refined.
+    // Independent random starts precede the refinement of the best.
     let starts = (request.candidates / 10).max(1);
     for tried in 0..request.candidates {
         let candidate = match &best {
-            Some((parent, _)) if tried >= starts => search.changed(parent, step, &mut random),
-            _ => search.fresh(&mut random),
+            Some((parent, _)) if tried >= starts => search.mutated(parent, step, &mut random),
+            _ => search.random_candidate(&mut random),
         };
-        let judged = search
-            .shrunk(candidate)
+        let evaluated = search
+            .scaled_to_limits(candidate)
             .map(|series| (search.criterion(&series), series));
-        let improves = |value: f64| best.as_ref().is_none_or(|(_, least)| value < *least);
-        let success = match judged {
+        let improves = |value: f64| best.as_ref().is_none_or(|(_, lowest)| value < *lowest);
+        let success = match evaluated {
             Some((value, series)) if value.is_finite() && improves(value) => {
                 best = Some((series, value));
                 true
@@ -162,7 +162,7 @@ pub fn design<const N: usize>(
             _ => false,
         };
         if tried >= starts {
-            // Stationary where one in five succeeds.
+            // 1/5 success rule.
             step = (step * if success { 1.35 } else { 0.93 }).clamp(1e-3, 1.0);
         }
         let value = best.as_ref().map_or(f64::INFINITY, |(_, value)| *value);
@@ -175,8 +175,8 @@ pub fn design<const N: usize>(
             remedy: "widen the joint ranges, the workspace or the speeds",
         });
     };
-    let base = Base::of(&search.regressor(&series), RANK_TOLERANCE)?;
-    Ok(Designed {
+    let base = BaseParameters::of(&search.regressor(&series), RANK_TOLERANCE)?;
+    Ok(ExcitationDesign {
         series,
         rank: base.rank(),
         condition: base.condition,
@@ -184,8 +184,8 @@ pub fn design<const N: usize>(
     })
 }
 
-/// Slow motion of the same joints at constant low acceleration, for what friction does at low speed and
-/// for torque ripple: each joint on a harmonic of its own, up to `speed_rad_per_s`.
+/// Slow sinusoidal motion for friction at low speed and torque ripple: neighbouring joints use different
+/// harmonics, with speeds up to `speed_rad_per_s`.
 ///
 /// # Errors
 /// Options out of range.
@@ -213,9 +213,9 @@ pub fn slow_series<const N: usize>(
     Ok(series)
 }
 
-/// Runs at constant speed, to and fro once, for torque ripple: each joint's speed stays within 1.5 % of
-/// `speed_rad_per_s` over 57 % of a period and turns over smoothly in the rest. A joint whose range is too
-/// short for that goes slower. The joints turn round one after the other.
+/// One run in each direction at constant speed, for torque ripple: each joint's speed stays within 1.5 % of
+/// `speed_rad_per_s` over 57 % of a period and reverses smoothly in the rest. A joint whose range is too short
+/// for that moves more slowly. The joints reverse one after the other.
 ///
 /// # Errors
 /// Options out of range.
@@ -233,23 +233,23 @@ pub fn constant_speed_series<const N: usize>(
     for (order, &joint) in moving.iter().enumerate() {
         let (lower, upper) = range(config, joint);
         let reach = 0.45 * (upper - lower);
-        let amplitude = (speed_rad_per_s / omega).min(reach / STEADY_WAY);
+        let amplitude = (speed_rad_per_s / omega).min(reach / CONSTANT_SPEED_MAX_SUM);
         let phase = PI * order as f64 / moving.len() as f64;
-        for (k, share) in STEADY {
+        for (k, weight) in CONSTANT_SPEED_HARMONICS {
             let (sine, cosine) = (k as f64 * phase).sin_cos();
-            let size = amplitude * share / k as f64;
+            let size = amplitude * weight / k as f64;
             series.sine_rad[k - 1][joint] = size * cosine;
             series.cosine_rad[k - 1][joint] = size * sine;
         }
-        let way = STEADY_WAY * amplitude;
-        series.centre_rad[joint] = home_rad[joint].clamp(lower + way, upper - way);
+        let travel = CONSTANT_SPEED_MAX_SUM * amplitude;
+        series.centre_rad[joint] = home_rad[joint].clamp(lower + travel, upper - travel);
     }
     series.ramp_s = 0.05 * period_s;
     series.duration_s = period_s + series.ramp_s;
     Ok(series)
 }
 
-/// Range of a joint between its soft zones, a little inside.
+/// Range of a joint between its soft zones, with a margin.
 fn range<const N: usize>(config: &Config<N>, joint: usize) -> (f64, f64) {
     let limits = &config.limits;
     let zone = 1.1 * limits.soft_zone_rad;
@@ -259,7 +259,7 @@ fn range<const N: usize>(config: &Config<N>, joint: usize) -> (f64, f64) {
     )
 }
 
-/// Columns that random motion of the moving joints tells apart.
+/// Independent columns for random motion of the moving joints.
 fn structural_base<const N: usize>(
     config: &Config<N>,
     home_rad: &Vector<N>,
@@ -279,19 +279,19 @@ fn structural_base<const N: usize>(
         let block = rows(&config.arm, columns, &q, &qd, &qdd);
         all.rows_mut(i * moving, moving).copy_from(&block);
     }
-    Ok(Base::of(&all, RANK_TOLERANCE)?.independent)
+    Ok(BaseParameters::of(&all, RANK_TOLERANCE)?.independent)
 }
 
 struct Search<'a, const N: usize> {
     config: &'a Config<N>,
-    request: &'a Design,
+    request: &'a DesignOptions,
     home_rad: &'a Vector<N>,
     independent: Vec<usize>,
     columns: Columns,
 }
 
 impl<const N: usize> Search<'_, N> {
-    fn fresh(&self, random: &mut Random) -> Fourier<N> {
+    fn random_candidate(&self, random: &mut Random) -> Fourier<N> {
         let mut series = Fourier::at_rest(*self.home_rad, TAU / self.request.period_s);
         series.ramp_s = 0.1 * self.request.period_s;
         series.duration_s = self.request.periods * self.request.period_s + series.ramp_s;
@@ -307,7 +307,7 @@ impl<const N: usize> Search<'_, N> {
         series
     }
 
-    fn changed(&self, parent: &Fourier<N>, step: f64, random: &mut Random) -> Fourier<N> {
+    fn mutated(&self, parent: &Fourier<N>, step: f64, random: &mut Random) -> Fourier<N> {
         let mut series = *parent;
         for &joint in &self.request.moving {
             let (lower, upper) = range(self.config, joint);
@@ -323,7 +323,7 @@ impl<const N: usize> Search<'_, N> {
         series
     }
 
-    /// States at full pace over a period.
+    /// States over one period at full speed.
     fn states(&self, series: &Fourier<N>) -> impl Iterator<Item = JointReference<N>> {
         let (series, period_s) = (*series, series.period_s());
         let steady = Fourier {
@@ -336,36 +336,36 @@ impl<const N: usize> Search<'_, N> {
         })
     }
 
-    /// Shrunk until every limit holds; `None` where that takes too much.
-    fn shrunk(&self, mut series: Fourier<N>) -> Option<Fourier<N>> {
+    /// Scales the amplitudes down until every limit holds; `None` after too many scalings.
+    fn scaled_to_limits(&self, mut series: Fourier<N>) -> Option<Fourier<N>> {
         let scale = |series: &mut Fourier<N>, joint: usize, by: f64| {
             for k in 0..HARMONICS {
                 series.sine_rad[k][joint] *= by;
                 series.cosine_rad[k][joint] *= by;
             }
         };
-        // Each joint by itself: angle and speed are linear in its amplitudes.
+        // Joint by joint: angle and speed are linear in the joint's amplitudes.
         for &joint in &self.request.moving {
             let (lower, upper) = range(self.config, joint);
             let centre = series.centre_rad[joint];
-            let limit = SPEED_SHARE * self.config.limits.joint_speed_rad_per_s[joint];
+            let limit = SPEED_FRACTION * self.config.limits.joint_speed_rad_per_s[joint];
             let by = self.states(&series).fold(1.0_f64, |by, state| {
                 let off = state.position_rad[joint] - centre;
-                let room = if off > 0.0 {
+                let margin = if off > 0.0 {
                     upper - centre
                 } else {
                     centre - lower
                 };
                 let speed = state.velocity_rad_per_s[joint].abs();
-                by.min(room / off.abs().max(1e-12))
+                by.min(margin / off.abs().max(1e-12))
                     .min(limit / speed.max(1e-12))
             });
             scale(&mut series, joint, 0.999 * by);
         }
-        for _ in 0..SHRINKINGS {
+        for _ in 0..MAX_SCALINGS {
             let by = self
                 .states(&series)
-                .fold(1.0_f64, |by, state| by.min(self.room(&state)));
+                .fold(1.0_f64, |by, state| by.min(self.limit_scale(&state)));
             if by >= 1.0 {
                 return Some(series);
             }
@@ -376,16 +376,16 @@ impl<const N: usize> Search<'_, N> {
         None
     }
 
-    /// Factor by which motion must shrink for tip speed, torques and workspace; 1 where they hold.
-    fn room(&self, state: &JointReference<N>) -> f64 {
+    /// Scale factor that tip speed, torques and workspace require; 1 if their limits hold.
+    fn limit_scale(&self, state: &JointReference<N>) -> f64 {
         let (config, limits) = (self.config, &self.config.limits);
         let (q, qd) = (&state.position_rad, &state.velocity_rad_per_s);
         let tip = jacobian(&config.arm, q).fixed_rows::<3>(0) * qd;
-        let mut by = (SPEED_SHARE * limits.tip_speed_m_per_s / tip.norm().max(1e-12)).min(1.0);
+        let mut by = (SPEED_FRACTION * limits.tip_speed_m_per_s / tip.norm().max(1e-12)).min(1.0);
         let torque = rnea(&config.arm, q, qd, &state.acceleration_rad_per_s2);
         for j in 0..N {
             let all = torque[j] + config.friction[j].torque_nm(qd[j]);
-            if all.abs() > TORQUE_SHARE * limits.joint_torque_nm[j] {
+            if all.abs() > TORQUE_FRACTION * limits.joint_torque_nm[j] {
                 by = by.min(0.95);
             }
         }

@@ -1,8 +1,8 @@
-//! What is wrong with a log or a request, where, and what to do about it.
+//! Errors of identification: location, problem and remedy.
 
 use std::fmt;
 
-/// Why nothing was identified. Columns are named as in `q[2]`: quantity and joint, counted from 0.
+/// Error of identification. Columns are named as in `q[2]`: quantity and joint, counted from 0.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum IdentError {
     /// A column or the clock of a log cannot be used.
@@ -10,52 +10,52 @@ pub enum IdentError {
     Log {
         /// Column, such as `tau[3]` or `t`.
         column: String,
-        /// What is wrong, with the value and the sample.
+        /// Problem, with value and sample.
         problem: String,
-        /// What to do.
+        /// Remedy.
         remedy: &'static str,
     },
-    /// Two shapes that must agree do not.
+    /// Two shapes do not agree.
     #[error("{argument}: expected {expected}, got {found}")]
     Shape {
         /// Argument or column.
         argument: String,
-        /// What it must be.
+        /// Expected value.
         expected: String,
-        /// What it is.
+        /// Actual value.
         found: String,
     },
-    /// An option that makes no sense.
+    /// An option is out of range.
     #[error("{option} is {value}, it must be {must}")]
     Option {
         /// Name of the option.
         option: &'static str,
-        /// Value found.
+        /// Its value.
         value: f64,
-        /// What it must be.
+        /// Expected value.
         must: &'static str,
     },
-    /// The data do not determine what was asked.
+    /// The data are insufficient.
     #[error("{problem}; {remedy}")]
     Singular {
-        /// What is missing.
+        /// Problem.
         problem: String,
-        /// What to do.
+        /// Remedy.
         remedy: &'static str,
     },
-    /// The parameters found are no arm: only possible without the constraints of a body.
-    #[error("the estimate is not an arm ({0}); use the physically consistent method")]
+    /// The estimate is physically inconsistent; only unconstrained methods can give this.
+    #[error("the estimate is physically inconsistent ({0}); use the consistent method")]
     NotPhysical(supple_core::ArmError),
 }
 
-/// Something doubtful that was let pass.
+/// A warning about the data or the result.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Warning {
     /// Column, such as `q[2]`.
     pub column: String,
-    /// What is doubtful.
+    /// Problem.
     pub problem: String,
-    /// What to do.
+    /// Remedy.
     pub remedy: &'static str,
 }
 
@@ -89,7 +89,7 @@ pub(crate) fn shape_error(
     }
 }
 
-/// Refuses an option that is not a positive finite number.
+/// Rejects an option that is not a positive finite number.
 pub(crate) fn positive(option: &'static str, value: f64) -> Result<(), IdentError> {
     if value.is_finite() && value > 0.0 {
         return Ok(());

@@ -1,30 +1,31 @@
-//! Least squares without constraints: ordinary, weighted by joint, and robust (Huber).
+//! Unconstrained least squares: ordinary, weighted by joint, and robust (Huber).
 //!
-//! What the data leave open is filled from a prior: the solution nearest to it. Nothing here makes the
-//! result an arm; see [`crate::consistent`] for that.
+//! Undetermined parameters are taken from a prior: the solution nearest to it. The result may be physically
+//! inconsistent; [`crate::consistent`] has the constrained solver.
 
 use crate::base::pivot_order;
-use crate::compress::Block;
 use crate::error::IdentError;
+use crate::qr_reduction::ReducedSystem;
 use crate::regressor::JointRows;
 use nalgebra::{DMatrix, DVector};
 
-/// Residuals beyond so many standard deviations weigh less: 95 % efficiency for Gaussian noise.
+/// Residuals beyond this multiple of the standard deviation get less weight: 95 % efficiency for Gaussian
+/// noise.
 const HUBER: f64 = 1.345;
-/// Median absolute deviation to standard deviation of Gaussian noise.
+/// Ratio of standard deviation to median absolute deviation for Gaussian noise.
 const MAD: f64 = 1.4826;
-/// Rounds of weighting.
+/// Maximum number of reweighting iterations.
 const ROUNDS: usize = 20;
 
 /// Moore-Penrose inverse by a complete orthogonal decomposition: `A = Q W` by QR with column pivoting,
-/// `W' = Z T` by QR, so that the inverse is `Z T'^-1 Q'`. Columns whose remainder is below `tolerance` of
-/// the longest depend on the others, as in [`crate::base`].
+/// `W' = Z T` by QR, so that the inverse is `Z T'^-1 Q'`. Columns whose remaining norm is below `tolerance`
+/// times the largest count as dependent, as in [`crate::base`].
 ///
-/// Not by nalgebra's singular values: of singular matrices, one in a thousand comes back wrong in the
-/// third digit, and these are singular by nature.
+/// nalgebra's singular value decomposition is not used: for one in a thousand singular matrices its third digit
+/// is wrong, and these matrices are singular by construction.
 ///
 /// # Errors
-/// [`IdentError::Singular`] if there is none.
+/// [`IdentError::Singular`] if all columns are zero or a value is not finite.
 pub fn pseudo_inverse(a: &DMatrix<f64>, tolerance: f64) -> Result<DMatrix<f64>, IdentError> {
     let none = || IdentError::Singular {
         problem: "the columns are zero or not finite".to_owned(),
@@ -40,7 +41,7 @@ pub fn pseudo_inverse(a: &DMatrix<f64>, tolerance: f64) -> Result<DMatrix<f64>, 
     Ok(z * inverse.ok_or_else(none)?)
 }
 
-/// Solution of least norm of `min |a x - b|`.
+/// Minimum-norm solution of `min |a x - b|`.
 ///
 /// # Errors
 /// As [`pseudo_inverse`].
@@ -52,11 +53,11 @@ pub fn least_norm(
     Ok(pseudo_inverse(a, tolerance)? * b)
 }
 
-/// The solution of `min |a x - b|` nearest to `prior`, columns measured by their length.
+/// The solution of `min |a x - b|` nearest to `prior`, with columns scaled to unit length.
 ///
 /// # Errors
 /// As [`pseudo_inverse`].
-pub fn nearest(block: &Block, prior: &DVector<f64>) -> Result<DVector<f64>, IdentError> {
+pub fn nearest(block: &ReducedSystem, prior: &DVector<f64>) -> Result<DVector<f64>, IdentError> {
     let a = block.a();
     let lengths: Vec<f64> = a.column_iter().map(|c| c.norm()).collect();
     let longest = lengths.iter().copied().fold(0.0, f64::max);
@@ -76,35 +77,35 @@ pub fn nearest(block: &Block, prior: &DVector<f64>) -> Result<DVector<f64>, Iden
     Ok(prior + DVector::from_fn(prior.len(), |j, _| step[j] * scale(j)))
 }
 
-/// The joints' blocks, each divided by its noise, in one.
-pub fn weighted(blocks: &[Block], noise_nm: &[f64], columns: usize) -> Block {
-    let mut all = Block::empty(columns);
+/// Stacks the joints' systems, each divided by its noise.
+pub fn weighted(blocks: &[ReducedSystem], noise_nm: &[f64], columns: usize) -> ReducedSystem {
+    let mut all = ReducedSystem::empty(columns);
     for (block, noise) in blocks.iter().zip(noise_nm) {
         all.add(block, 1.0 / noise);
     }
     all
 }
 
-/// RMS residual of each joint \[N m\], no less than a millionth of the joint's torque: noise-free
-/// data must not divide by zero.
-pub fn noise_nm(blocks: &[Block], x: &DVector<f64>) -> Vec<f64> {
-    let rms = |block: &Block| {
+/// RMS residual of each joint \[N m\], at least 1e-6 of the joint's torque, to avoid a division by zero for
+/// noise-free data.
+pub fn noise_nm(blocks: &[ReducedSystem], x: &DVector<f64>) -> Vec<f64> {
+    let rms = |block: &ReducedSystem| {
         let rows = block.rows().max(1) as f64;
-        let least = 1e-6 * (block.torque_squared() / rows).sqrt();
+        let floor = 1e-6 * (block.torque_squared() / rows).sqrt();
         (block.error_squared(x) / rows)
             .sqrt()
-            .max(least)
+            .max(floor)
             .max(f64::MIN_POSITIVE.sqrt())
     };
     blocks.iter().map(rms).collect()
 }
 
-/// Noise of each joint found together with the solution that it weighs: weighted least squares.
+/// Weighted least squares: estimates the noise of each joint together with the solution.
 ///
 /// # Errors
 /// As [`pseudo_inverse`].
 pub fn weighted_least_squares(
-    blocks: &[Block],
+    blocks: &[ReducedSystem],
     prior: &DVector<f64>,
 ) -> Result<(DVector<f64>, Vec<f64>), IdentError> {
     let mut noise = vec![1.0; blocks.len()];
@@ -122,7 +123,7 @@ pub fn weighted_least_squares(
     Ok((x, noise))
 }
 
-/// Huber's weights of every sample by joint, from the residuals of `x`.
+/// Huber weights of every sample of each joint, from the residuals of `x`.
 pub fn huber_weights(joints: &[JointRows], x: &DVector<f64>) -> Vec<Vec<f64>> {
     let of_joint = |joint: &JointRows| {
         let residual = &joint.a * x - &joint.b;
@@ -144,9 +145,9 @@ mod tests {
     use crate::random::Random;
     use nalgebra::DMatrix;
 
-    /// The four identities that only the Moore-Penrose inverse fulfils, wide, square and tall, of every rank.
+    /// The four Moore-Penrose conditions, for wide, square and tall matrices of every rank.
     #[test]
-    fn the_inverse_of_singular_matrices_is_moore_and_penrose_s() {
+    fn the_pseudo_inverse_of_singular_matrices_is_the_moore_penrose_inverse() {
         let mut random = Random::new(7);
         for (rows, columns) in [(12, 20), (20, 20), (57, 56)] {
             for rank in 1..=rows.min(columns) {

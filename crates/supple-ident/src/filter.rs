@@ -1,15 +1,15 @@
-//! Fourth-order Butterworth low pass run forwards and backwards: no phase, the magnitude squared.
+//! Fourth-order Butterworth low pass, run forwards and backwards: zero phase, squared magnitude.
 //!
-//! Two second-order sections by the bilinear transform, prewarped. The ends are continued by odd
-//! reflection, `2 x_0 - x_k`, over 15 samples, and each pass starts from the steady state of its first
-//! value: the conventions of `scipy.signal.sosfiltfilt`, which the tests hold it against.
+//! Two second-order sections by the bilinear transform, prewarped. Both ends are extended by odd reflection,
+//! `2 x_0 - x_k`, over 15 samples, and each pass starts from the steady state of its first value, as in
+//! `scipy.signal.sosfiltfilt`, with which the tests compare it.
 
 use crate::error::{IdentError, positive};
 use nalgebra::DMatrix;
 use std::f64::consts::PI;
 use supple_core::math::{cos, sin_cos};
 
-/// Samples of the continuation at each end.
+/// Samples of the extension at each end.
 const PADDING: usize = 15;
 
 /// Zero-phase low pass.
@@ -26,7 +26,7 @@ struct Section {
 }
 
 impl LowPass {
-    /// Half power of one pass at `cutoff_hz`, for samples at `rate_hz`.
+    /// A filter for samples at `rate_hz` whose single pass has half power at `cutoff_hz`.
     ///
     /// # Errors
     /// [`IdentError::Option`] unless `0 < cutoff_hz < rate_hz / 2`.
@@ -60,7 +60,7 @@ impl LowPass {
         })
     }
 
-    /// The filtered signal, as long as `signal`.
+    /// The filtered signal, of the length of `signal`.
     ///
     /// # Errors
     /// [`IdentError::Shape`] if there are 15 samples or fewer.
@@ -83,7 +83,7 @@ impl LowPass {
         Ok(extended[PADDING..PADDING + n].to_vec())
     }
 
-    /// Every column of `signals`, (samples, joints).
+    /// Filters every column of `signals`, (samples, joints).
     ///
     /// # Errors
     /// As [`LowPass::zero_phase`].

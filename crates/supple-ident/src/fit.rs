@@ -1,113 +1,68 @@
-//! From prepared motions to a model: rows, weights, solution, what it is worth.
+//! From prepared motions to a model: rows, weights, solution, statistics.
 
-use crate::base::{Base, RANK_TOLERANCE};
-use crate::columns::{Column, Columns, FrictionColumns};
-use crate::compress::Block;
+use crate::base::{BaseParameters, RANK_TOLERANCE};
+use crate::choice::Choice;
+use crate::columns::{Column, Columns};
 use crate::consistent::{Constraints, solve};
 use crate::error::{IdentError, Warning, shape_error};
 use crate::estimate::{huber_weights, nearest, noise_nm, weighted, weighted_least_squares};
+use crate::joint_rows::JointRows;
 use crate::model;
 use crate::motion::{Motion, Preparation};
-use crate::procedure::Choice;
+pub use crate::options::{Options, Weights};
+use crate::qr_reduction::ReducedSystem;
 use crate::random::Random;
-use crate::regressor::{JointRows, joint_rows, rows};
+use crate::regressor::{joint_rows, rows};
 use nalgebra::DVector;
 use supple_core::dynamics::{regressor, regressor_times};
 use supple_core::{Arm, Friction, Vector};
 
-/// A joint slides steadily once it has gone this far since it turned round \[rad\]: the bristles of
-/// dry friction give by about a milliradian.
-pub const STEADY_RAD: f64 = 4e-3;
+/// Travel after a reversal from which friction is in steady sliding \[rad\]; bristle deflection is about 1
+/// mrad.
+pub const STEADY_SLIDING_RAD: f64 = 4e-3;
 
-/// Samples that a joint must have to be fitted.
-const LEAST_ROWS: usize = 20;
+/// Minimum number of samples of a joint.
+const MIN_ROWS: usize = 20;
 
-/// Rounds of robust or constrained weighting.
+/// Maximum number of reweighting iterations.
 const ROUNDS: usize = 5;
 
-/// What the joints' residuals weigh.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Weights {
-    /// All the same: ordinary least squares.
-    Equal,
-    /// Each joint by its own residual: weighted least squares.
-    Noise,
-    /// The same, and single samples far out count less (Huber).
-    Huber,
-    /// Stated noise of each moving joint \[N m\].
-    Given(Vec<f64>),
-}
-
-/// What to fit, and how.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Options {
-    /// A rotor inertia for each moving joint; without, the model's rotors are taken as known.
-    pub rotor: bool,
-    /// Friction columns.
-    pub friction: FrictionColumns,
-    /// Pairs of joints whose sum turns a motor.
-    pub couplings: Vec<(usize, usize)>,
-    /// Samples of a joint slower than this are left out of its rows \[rad/s\]. A Stribeck column is
-    /// then fitted in a second stage, from the slow samples.
-    pub slow_rad_per_s: f64,
-    /// Weights of joints and samples.
-    pub weights: Weights,
-    /// Bodies, rotors and friction as they can be; `None` for plain least squares. The number is the
-    /// weight of the prior, see [`Constraints::prior_weight`].
-    pub consistent: Option<f64>,
-}
-
-impl Default for Options {
-    /// Viscous and Coulomb friction with offset and rotors, slow samples left out below 0.15 rad/s,
-    /// weighted by joint, physically consistent.
-    fn default() -> Self {
-        Self {
-            rotor: true,
-            friction: FrictionColumns::OFFSET,
-            couplings: Vec::new(),
-            slow_rad_per_s: 0.15,
-            weights: Weights::Noise,
-            consistent: Some(1.0),
-        }
-    }
-}
-
-/// A model found.
+/// An identified model.
 #[derive(Clone, Debug)]
 pub struct Fit<const N: usize> {
-    /// The columns.
+    /// Regressor columns.
     pub columns: Columns,
-    /// Their values.
+    /// Parameter of each column.
     pub x: DVector<f64>,
     /// Combinations that the data determine, with rank and condition number.
-    pub base: Base,
+    pub base: BaseParameters,
     /// Standard deviation of each base parameter.
     pub base_std: DVector<f64>,
     /// RMS residual of each moving joint \[N m\].
     pub noise_nm: Vec<f64>,
-    /// Certified distance of the objective from its optimum, for a consistent fit.
-    pub gap: Option<f64>,
-    /// `|tau - tau_hat| / |tau|` over the samples that were fitted.
+    /// Upper bound on the distance of the objective from its optimum, for a consistent fit.
+    pub optimality_gap: Option<f64>,
+    /// `|tau - tau_hat| / |tau|` over the fitted samples.
     pub training_relative: f64,
-    /// How logs are prepared before they are held against the fit.
+    /// Preparation of validation logs.
     pub preparation: Preparation,
-    /// What was chosen by cross-validation, in order.
+    /// Choices made by cross-validation, in order.
     pub choices: Vec<Choice>,
-    /// What was let pass.
+    /// Warnings.
     pub warnings: Vec<Warning>,
-    /// Load of each moving joint \[N m\] at which friction that depends on it is, over the fitted samples,
-    /// nearest to friction that does not; zero without such columns.
+    /// Load \[N m\] of each moving joint at which load-dependent friction best matches load-independent
+    /// friction over the fitted samples; zero without load columns.
     pub load_nm: Vec<f64>,
-    /// Standard deviation of weighted residuals, for what the filter leaves independent.
+    /// Standard deviation of the weighted residuals, corrected for the correlation that the filter introduces.
     spread: f64,
     nominal: Arm<N>,
 }
 
-/// Fits `motions` of an arm of which `moving` joints are identified. What the data leave open is drawn
-/// to `nominal`.
+/// Fits `motions` of an arm of which `moving` joints are identified. Undetermined parameters are regularised
+/// towards `nominal`.
 ///
 /// # Errors
-/// What the columns, the shapes and the solver refuse.
+/// Invalid columns or shapes; errors of the solver.
 pub fn fit<const N: usize>(
     nominal: &Arm<N>,
     motions: &[Motion],
@@ -125,14 +80,14 @@ pub fn fit<const N: usize>(
         .iter()
         .map(|motion| joint_rows(nominal, &columns, motion));
     let parts = parts.collect::<Result<Vec<_>, _>>()?;
-    let share = motions
+    let independent_fraction = motions
         .iter()
-        .map(|m| m.independent_share)
+        .map(|m| m.independent_fraction)
         .fold(1.0, f64::min);
-    fit_rows(nominal, columns, &parts, share, options)
+    fit_rows(nominal, columns, &parts, independent_fraction, options)
 }
 
-/// As [`fit`], from rows that were made before: one list of joints for each part.
+/// As [`fit`], from given rows: one list of joints for each part.
 ///
 /// # Errors
 /// As [`fit`].
@@ -140,7 +95,7 @@ pub fn fit_rows<const N: usize>(
     nominal: &Arm<N>,
     columns: Columns,
     parts: &[Vec<JointRows>],
-    independent_share: f64,
+    independent_fraction: f64,
     options: &Options,
 ) -> Result<Fit<N>, IdentError> {
     let second_stage =
@@ -157,9 +112,9 @@ pub fn fit_rows<const N: usize>(
         links: model::link_parameters::<N>(&model::prior(nominal, &columns)).to_vec(),
     };
     let blocks = stage.blocks(None);
-    // Where a joint has no rows, nothing holds its friction and its rotor: they would run away.
+    // A joint with too few rows has undetermined friction and rotor inertia; reject it.
     for (block, joint) in blocks.iter().zip(columns.moving()) {
-        if block.rows() < LEAST_ROWS {
+        if block.rows() < MIN_ROWS {
             let slow = options.slow_rad_per_s;
             return Err(IdentError::Log {
                 column: format!("q[{joint}]"),
@@ -168,7 +123,7 @@ pub fn fit_rows<const N: usize>(
             });
         }
     }
-    let rows: usize = blocks.iter().map(Block::rows).sum();
+    let rows: usize = blocks.iter().map(ReducedSystem::rows).sum();
     if rows < used.len() {
         return Err(shape_error(
             "log",
@@ -177,10 +132,10 @@ pub fn fit_rows<const N: usize>(
         ));
     }
     let (solution, blocks, noise, gap) = stage.solve(blocks)?;
-    let whole = weighted(&blocks, &noise, used.len());
-    let base = Base::of(&whole.a(), RANK_TOLERANCE)?;
-    let freedom = (rows - base.rank().min(rows - 1)) as f64 * independent_share;
-    let spread = (whole.error_squared(&solution) / freedom.max(1.0)).sqrt();
+    let stacked = weighted(&blocks, &noise, used.len());
+    let base = BaseParameters::of(&stacked.a(), RANK_TOLERANCE)?;
+    let freedom = (rows - base.rank().min(rows - 1)) as f64 * independent_fraction;
+    let spread = (stacked.error_squared(&solution) / freedom.max(1.0)).sqrt();
     let base_std = base.standard_deviations(spread);
     let mut x = DVector::zeros(columns.len());
     used.iter()
@@ -190,7 +145,7 @@ pub fn fit_rows<const N: usize>(
         fit_stribeck(&columns, parts, &mut x);
     }
     let error: f64 = blocks.iter().map(|b| b.error_squared(&solution)).sum();
-    let torque: f64 = blocks.iter().map(Block::torque_squared).sum();
+    let torque: f64 = blocks.iter().map(ReducedSystem::torque_squared).sum();
     Ok(Fit {
         training_relative: (error / torque).sqrt(),
         preparation: Preparation::default(),
@@ -203,7 +158,7 @@ pub fn fit_rows<const N: usize>(
         load_nm: loads(&columns, parts),
         columns,
         x,
-        gap,
+        optimality_gap: gap,
         nominal: *nominal,
     })
 }
@@ -217,20 +172,20 @@ struct Stage<'a> {
     links: Vec<nalgebra::SVector<f64, 10>>,
 }
 
-type Solved = (DVector<f64>, Vec<Block>, Vec<f64>, Option<f64>);
+type Solved = (DVector<f64>, Vec<ReducedSystem>, Vec<f64>, Option<f64>);
 
 impl Stage<'_> {
-    /// One block a joint, over all parts.
-    fn blocks(&self, weights: Option<&[Vec<Vec<f64>>]>) -> Vec<Block> {
+    /// One reduced system for each joint, over all parts.
+    fn blocks(&self, weights: Option<&[Vec<Vec<f64>>]>) -> Vec<ReducedSystem> {
         let joints = self.columns.moving().len();
         let of_joint = |j: usize| {
-            let mut all = Block::empty(self.used.len());
+            let mut all = ReducedSystem::empty(self.used.len());
             for (p, part) in self.parts.iter().enumerate() {
                 let weights = weights.map(|w| &w[p][j][..]);
                 let slow = self.options.slow_rad_per_s;
                 let block = match weights {
                     None => part[j].block(slow),
-                    some => Block::of(&part[j], slow, some),
+                    some => part[j].reduced(slow, some),
                 };
                 all.add(&block.select(self.used), 1.0);
             }
@@ -239,7 +194,7 @@ impl Stage<'_> {
         (0..joints).map(of_joint).collect()
     }
 
-    fn solve(&self, mut blocks: Vec<Block>) -> Result<Solved, IdentError> {
+    fn solve(&self, mut blocks: Vec<ReducedSystem>) -> Result<Solved, IdentError> {
         let joints = blocks.len();
         let mut noise = match &self.options.weights {
             Weights::Equal => vec![1.0; joints],
@@ -248,10 +203,15 @@ impl Stage<'_> {
                 let expected = format!("{joints} values, one for each moving joint");
                 return Err(shape_error("weights", expected, format!("{}", noise.len())));
             }
-            Weights::Noise | Weights::Huber => weighted_least_squares(&blocks, &self.prior)?.1,
+            Weights::ByJointResidual | Weights::Huber => {
+                weighted_least_squares(&blocks, &self.prior)?.1
+            }
         };
         let (mut x, mut gap) = self.step(&blocks, &noise)?;
-        if matches!(self.options.weights, Weights::Noise | Weights::Huber) {
+        if matches!(
+            self.options.weights,
+            Weights::ByJointResidual | Weights::Huber
+        ) {
             for _ in 0..ROUNDS {
                 if self.options.weights == Weights::Huber {
                     let mut full = DVector::zeros(self.columns.len());
@@ -281,22 +241,22 @@ impl Stage<'_> {
 
     fn step(
         &self,
-        blocks: &[Block],
+        blocks: &[ReducedSystem],
         noise: &[f64],
     ) -> Result<(DVector<f64>, Option<f64>), IdentError> {
-        let whole = weighted(blocks, noise, self.used.len());
-        let Some(prior_weight) = self.options.consistent else {
-            return Ok((nearest(&whole, &self.prior)?, None));
+        let stacked = weighted(blocks, noise, self.used.len());
+        let Some(prior_weight) = self.options.consistent_prior_weight else {
+            return Ok((nearest(&stacked, &self.prior)?, None));
         };
-        let place = |i: &usize| self.used.binary_search(i).ok();
+        let index_of = |i: &usize| self.used.binary_search(i).ok();
         let forms = self.columns.not_negative().into_iter();
         let solution = solve(
-            &whole,
+            &stacked,
             &Constraints {
                 links: self.links.clone(),
                 not_negative: forms
                     .filter_map(|form| {
-                        let form = form.into_iter().map(|(i, c)| Some((place(&i)?, c)));
+                        let form = form.into_iter().map(|(i, c)| Some((index_of(&i)?, c)));
                         form.collect::<Option<Vec<_>>>()
                     })
                     .collect(),
@@ -304,15 +264,15 @@ impl Stage<'_> {
                 tolerance: 1e-9,
             },
         )?;
-        Ok((solution.x, Some(solution.gap)))
+        Ok((solution.x, Some(solution.optimality_gap)))
     }
 }
 
-/// The multiple of its Coulomb column that is nearest to each moving joint's load column.
+/// For each moving joint, the multiple of its Coulomb column that is nearest to its load column.
 fn loads(columns: &Columns, parts: &[Vec<JointRows>]) -> Vec<f64> {
     let of_joint = |(row, &joint): (usize, &usize)| {
-        let places = [Column::Load(joint), Column::Coulomb(joint)].map(|c| columns.position(c));
-        let [Some(load), Some(dry)] = places else {
+        let indices = [Column::Load(joint), Column::Coulomb(joint)].map(|c| columns.position(c));
+        let [Some(load), Some(dry)] = indices else {
             return 0.0;
         };
         let (mut product, mut square) = (0.0, 0.0);
@@ -326,15 +286,15 @@ fn loads(columns: &Columns, parts: &[Vec<JointRows>]) -> Vec<f64> {
     columns.moving().iter().enumerate().map(of_joint).collect()
 }
 
-/// The same noise for all joints, so that the prior weighs against residuals of about one.
-fn equal_noise(blocks: &[Block], x: &DVector<f64>) -> Vec<f64> {
+/// The same noise for all joints, so that the residuals against which the prior is weighted are about one.
+fn equal_noise(blocks: &[ReducedSystem], x: &DVector<f64>) -> Vec<f64> {
     let squares: f64 = noise_nm(blocks, x).iter().map(|n| n * n).sum();
     vec![(squares / blocks.len() as f64).sqrt(); blocks.len()]
 }
 
-/// Second stage: each joint's `B`, zero or more, from its samples within three Stribeck speeds that slide
-/// steadily, outside the band: there the law is a parabola through zero, whereas an arm that comes to rest
-/// keeps its friction to the end, which would pass for a dip that is deeper and narrower. Beside it a constant is fitted and thrown away: what gravity may be off there.
+/// Second stage: fits `B >= 0` of each joint to samples below three Stribeck speeds in steady sliding outside
+/// the band. Inside the band the law is a parabola through zero, but real friction persists until standstill,
+/// which would bias the estimate. A constant is fitted beside it and discarded: it absorbs gravity errors.
 fn fit_stribeck(columns: &Columns, parts: &[Vec<JointRows>], x: &mut DVector<f64>) {
     let reach = 3.0 * columns.friction().stribeck_rad_per_s.unwrap_or(0.0);
     let band = columns.friction().band_rad_per_s;
@@ -348,7 +308,7 @@ fn fit_stribeck(columns: &Columns, parts: &[Vec<JointRows>], x: &mut DVector<f64
             let shape = part[row].a.column(position);
             for (i, speed) in part[row].speed.iter().enumerate() {
                 let slow = (band..=reach).contains(speed);
-                if slow && part[row].slid_rad[i] >= STEADY_RAD {
+                if slow && part[row].travel_since_reversal_rad[i] >= STEADY_SLIDING_RAD {
                     let (s, r) = (shape[i], residual[i]);
                     for (sum, term) in sums.iter_mut().zip([1.0, s, r, s * s, s * r]) {
                         *sum += term;
@@ -367,37 +327,37 @@ fn fit_stribeck(columns: &Columns, parts: &[Vec<JointRows>], x: &mut DVector<f64
 }
 
 impl<const N: usize> Fit<N> {
-    /// The arm found.
+    /// The identified arm.
     ///
     /// # Errors
-    /// [`IdentError::NotPhysical`]: possible for plain least squares only.
+    /// [`IdentError::NotPhysical`], for plain least squares only.
     pub fn arm(&self) -> Result<Arm<N>, IdentError> {
         model::arm(&self.nominal, &self.columns, &self.x)
     }
 
-    /// Friction of every joint of the arm, in the controller's law; where it depends on load, at
+    /// Friction of every joint of the arm, in the controller's law; load-dependent friction is taken at
     /// [`Fit::load_nm`].
     pub fn friction(&self) -> Vec<Friction> {
         model::friction(&self.columns, &self.x, &self.load_nm)
     }
 
-    /// The arm that fixes the kinematics and the prior.
+    /// The nominal arm: kinematics and prior.
     pub fn nominal(&self) -> &Arm<N> {
         &self.nominal
     }
 
-    /// Number of combinations of the columns that the data determine.
+    /// Number of column combinations that the data determine.
     pub fn rank(&self) -> usize {
         self.base.rank()
     }
 
-    /// Greatest by least singular value of the independent columns, scaled to unit length.
+    /// Condition number of the independent columns, scaled to unit length.
     pub fn condition(&self) -> f64 {
         self.base.condition
     }
 
-    /// Torques of one state \[N m\]. Joints that were held have no velocity and no acceleration,
-    /// whatever `qd` and `qdd` say, and no friction.
+    /// Torques of one state \[N m\]. Held joints are taken at rest, whatever `qd` and `qdd` contain, and
+    /// without friction.
     pub fn predict(&self, q: &Vector<N>, qd: &Vector<N>, qdd: &Vector<N>) -> Vector<N> {
         let moving = self.columns.moving();
         let held = |v: &Vector<N>| {
@@ -417,11 +377,11 @@ impl<const N: usize> Fit<N> {
         torque
     }
 
-    /// An arm and friction that the logs could as well come from: the parameters with a draw from
-    /// their normal distribution added. Joints that were held have no friction.
+    /// A random model from the posterior: the estimate plus a draw of its normal distribution. Held joints have
+    /// no friction.
     ///
     /// # Errors
-    /// [`IdentError::NotPhysical`] where the fit itself is no arm.
+    /// [`IdentError::NotPhysical`] if the fit itself is physically inconsistent.
     pub fn draw(&self, seed: u64) -> Result<(Arm<N>, Vec<Friction>), IdentError> {
         let mut random = Random::new(seed);
         let mut change = self
@@ -438,14 +398,14 @@ impl<const N: usize> Fit<N> {
                 Ok(arm) if friction.iter().all(|f| f.validate().is_ok()) => {
                     return Ok((arm, friction));
                 }
-                // A body at the edge of what can be has no neighbours on one side.
+                // At the boundary of the feasible set, a draw may be infeasible; shorten it.
                 _ if change.amax() > 1e-12 => change *= 0.5,
                 _ => return Ok((self.arm()?, self.friction())),
             }
         }
     }
 
-    /// Values of the base parameters, in the order of [`Base::text`].
+    /// Values of the base parameters, in the order of [`BaseParameters::text`].
     pub fn base_parameters(&self) -> DVector<f64> {
         self.base.values(&self.x)
     }

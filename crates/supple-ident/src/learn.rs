@@ -1,9 +1,9 @@
-//! Friction and payload refitted from the prediction error of a motion that is repeated.
+//! Updates friction and payload from the prediction error of a repeated motion.
 //!
-//! What the model did not predict of the torque, in free motion and away from rest, is fitted by a change of
-//! each joint's viscous and dry friction and, if asked, by a body in the hand. The change is held to the
-//! model by a prior of stated size, so that joints which do not move keep what they had. The tracking error
-//! is never looked at: at low gain, adapting to it makes things worse.
+//! The torque residual in free motion away from rest is fitted by a change of each joint's viscous and dry
+//! friction and, if requested, by a payload. The change is regularised by a prior of given size, so that joints
+//! that did not move keep their values. The tracking error is not used: at low gain, adapting to it makes
+//! tracking worse.
 
 use crate::error::{IdentError, positive};
 use crate::filter::LowPass;
@@ -13,21 +13,21 @@ use supple_core::dynamics::{regressor, rnea};
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::{Arm, Friction, Vector};
 
-/// What may change, and by how much it is expected to.
+/// Options: parameters that may change, and their expected changes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Learning {
-    /// Slower samples of a joint are left out \[rad/s\].
+    /// Slower samples of a joint are excluded \[rad/s\].
     pub slow_rad_per_s: f64,
     /// Expected relative change of friction.
     pub friction_change: f64,
-    /// Expected payload \[kg\]; `None` takes the hand for empty.
+    /// Expected payload \[kg\]; `None`: no payload.
     pub payload_kg: Option<f64>,
     /// Noise of the torques \[N m\].
     pub noise_nm: f64,
 }
 
 impl Default for Learning {
-    /// Above 0.08 rad/s, friction by a fifth, no payload, 0.05 N m.
+    /// Samples above 0.08 rad/s, friction change of 20 %, no payload, noise of 0.05 N m.
     fn default() -> Self {
         Learning {
             slow_rad_per_s: 0.08,
@@ -38,24 +38,23 @@ impl Default for Learning {
     }
 }
 
-/// What was learnt.
+/// Result of [`learn`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Learned<const N: usize> {
     /// Friction of each joint.
     pub friction: [Friction; N],
-    /// Mass \[kg\] and first moment in the last link's frame \[kg m\] that the hand holds more than the
-    /// model has.
+    /// Mass \[kg\] and first moment \[kg m\] of the payload in the last link's frame, relative to the model.
     pub payload: Option<Vector4<f64>>,
-    /// RMS prediction error of each joint before \[N m\].
+    /// RMS prediction error of each joint before learning \[N m\].
     pub before_nm: [f64; N],
-    /// The same after.
+    /// RMS prediction error of each joint after learning \[N m\].
     pub after_nm: [f64; N],
 }
 
 /// Learns from `motions` of the joints `moving`; the others are at rest.
 ///
 /// # Errors
-/// Options out of range; no sample that moves.
+/// Options out of range; no sample fast enough.
 pub fn learn<const N: usize>(
     arm: &Arm<N>,
     friction: &[Friction; N],
@@ -74,8 +73,8 @@ pub fn learn<const N: usize>(
     let mut rows_of: Vec<(usize, DVector<f64>, f64)> = Vec::new();
     for motion in motions {
         for (joint, a, missing) in rows(arm, friction, motion, moving, learning, width)? {
-            // Filtered samples repeat each other.
-            let weight = motion.independent_share / learning.noise_nm.powi(2);
+            // Filtered samples are correlated.
+            let weight = motion.independent_fraction / learning.noise_nm.powi(2);
             gram.ger(weight, &a, &a, 1.0);
             side.axpy(weight * missing, &a, 1.0);
             rows_of.push((joint, a, missing));
@@ -84,10 +83,10 @@ pub fn learn<const N: usize>(
     if rows_of.is_empty() {
         return Err(IdentError::Singular {
             problem: format!(
-                "no joint turned faster than {} rad/s",
+                "no joint moved faster than {} rad/s",
                 learning.slow_rad_per_s
             ),
-            remedy: "record the motion that is to be learnt, at its pace",
+            remedy: "record the repeated motion at its normal speed",
         });
     }
     for i in 0..width {
@@ -96,7 +95,7 @@ pub fn learn<const N: usize>(
     let change = nalgebra::Cholesky::new(gram)
         .ok_or_else(|| IdentError::Singular {
             problem: "the torques are not finite".to_owned(),
-            remedy: "cut out the samples that are not numbers",
+            remedy: "remove the samples that are not finite",
         })?
         .solve(&side);
     let mut learned = Learned {
@@ -108,13 +107,13 @@ pub fn learn<const N: usize>(
         before_nm: [0.0; N],
         after_nm: [0.0; N],
     };
-    for (place, &joint) in moving.iter().enumerate() {
+    for (index, &joint) in moving.iter().enumerate() {
         let old = friction[joint];
-        let scale = |share: f64| (1.0 + share).max(0.0);
+        let scale = |relative_change: f64| (1.0 + relative_change).max(0.0);
         learned.friction[joint] = Friction {
-            viscous_nm_s_per_rad: old.viscous_nm_s_per_rad * scale(change[2 * place]),
-            coulomb_nm: old.coulomb_nm * scale(change[2 * place + 1]),
-            breakaway_nm: old.breakaway_nm * scale(change[2 * place + 1]),
+            viscous_nm_s_per_rad: old.viscous_nm_s_per_rad * scale(change[2 * index]),
+            coulomb_nm: old.coulomb_nm * scale(change[2 * index + 1]),
+            breakaway_nm: old.breakaway_nm * scale(change[2 * index + 1]),
             ..old
         };
     }
@@ -132,7 +131,7 @@ pub fn learn<const N: usize>(
     Ok(learned)
 }
 
-/// Expected size of unknown `i`: shares of friction, mass, first moments at a tenth of a metre.
+/// Expected size of unknown `i`: relative friction change, mass, or first moment at 0.1 m.
 fn expected(learning: &Learning, moving: usize, i: usize) -> f64 {
     let load = learning.payload_kg.unwrap_or(1.0);
     match i.checked_sub(2 * moving) {
@@ -144,7 +143,7 @@ fn expected(learning: &Learning, moving: usize, i: usize) -> f64 {
 
 type Row = (usize, DVector<f64>, f64);
 
-/// Joint, columns and missing torque of every sample that counts.
+/// Joint, columns and torque residual of every sample that is used.
 fn rows<const N: usize>(
     arm: &Arm<N>,
     friction: &[Friction; N],
@@ -158,7 +157,8 @@ fn rows<const N: usize>(
         .cutoff_hz
         .map(|cutoff_hz| LowPass::butterworth4(cutoff_hz, motion.rate_hz))
         .transpose()?;
-    // Dry friction turns over faster than the filter that the torques went through.
+    // Dry friction changes sign faster than the filter can follow, so its columns are filtered like the
+    // torques.
     let dry: Vec<Vec<f64>> = moving
         .iter()
         .map(|&j| {
@@ -177,15 +177,15 @@ fn rows<const N: usize>(
         let (q, qd, qdd) = (at(&motion.q), held(&motion.qd), held(&motion.qdd));
         let model = rnea(arm, &q, &qd, &qdd);
         let of_links = (width > 2 * moving.len()).then(|| regressor(arm, &q, &qd, &qdd));
-        for (place, &joint) in moving.iter().enumerate() {
+        for (index, &joint) in moving.iter().enumerate() {
             if qd[joint].abs() < learning.slow_rad_per_s {
                 continue;
             }
             let viscous = friction[joint].viscous_nm_s_per_rad * qd[joint];
-            let known = model[joint] + viscous + friction[joint].offset_nm + dry[place][i];
+            let known = model[joint] + viscous + friction[joint].offset_nm + dry[index][i];
             let mut a = DVector::zeros(width);
-            a[2 * place] = viscous;
-            a[2 * place + 1] = dry[place][i];
+            a[2 * index] = viscous;
+            a[2 * index + 1] = dry[index][i];
             if let Some(rows) = &of_links {
                 for k in 0..4 {
                     a[2 * moving.len() + k] = rows[joint][N - 1][k];
@@ -197,10 +197,10 @@ fn rows<const N: usize>(
     Ok(all)
 }
 
-/// `arm` with what the hand holds: mass and first moment in the last link's frame, taken for a point.
+/// `arm` with a payload of given mass and first moment in the last link's frame, as a point mass.
 ///
 /// # Errors
-/// [`IdentError::NotPhysical`] where that leaves no body.
+/// [`IdentError::NotPhysical`] if the result is physically inconsistent.
 pub fn with_payload<const N: usize>(
     arm: &Arm<N>,
     payload: Option<&Vector4<f64>>,

@@ -1,4 +1,4 @@
-//! From logs of a moving arm to a model that a body could have.
+//! Identification of physically consistent arm models from logs.
 //!
 //! ```
 //! use supple_ident::{DMatrix, Log, Procedure, identify};
@@ -13,26 +13,28 @@
 //! # }
 //! ```
 //!
-//! Nothing here runs while an arm moves: it allocates, iterates and takes its time.
+//! Offline only: allocates, iterates and has no time bound.
 #![forbid(unsafe_code)]
 
 pub mod base;
+mod choice;
 pub mod columns;
-pub mod compress;
 pub mod consistent;
 pub mod design;
-mod dip;
 mod error;
 pub mod estimate;
 pub mod filter;
 pub mod fit;
+mod joint_rows;
 pub mod learn;
 mod log;
 pub mod model;
 mod motion;
+mod options;
 pub mod paper;
 pub mod payload;
 mod procedure;
+pub mod qr_reduction;
 mod random;
 mod read;
 pub mod regressor;
@@ -40,20 +42,23 @@ pub mod ripple;
 mod save;
 pub mod select;
 mod series;
+mod stribeck;
 pub mod validate;
 
-pub use base::Base;
+pub use base::BaseParameters;
+pub use choice::Choice;
 pub use columns::{Columns, FrictionColumns};
-pub use dip::fit_with_dip;
 pub use error::{IdentError, Warning};
-pub use fit::{Fit, Options, Weights, fit};
+pub use fit::{Fit, fit};
 pub use learn::{Learned, Learning, learn};
 pub use log::Log;
 pub use motion::{Motion, Preparation, resample};
 pub use nalgebra::{DMatrix, DVector};
-pub use procedure::{Choice, FrictionChoice, Method, Procedure, identify, identify_motions};
+pub use options::{Options, Weights};
+pub use procedure::{FrictionChoice, Method, Procedure, identify, identify_motions};
 pub use read::{ReadError, read_csv, read_logs, read_mcap};
 pub use ripple::{RippleSearch, fit_ripple};
 pub use save::SaveError;
 pub use series::SeriesLists;
+pub use stribeck::fit_with_stribeck;
 pub use validate::Validation;

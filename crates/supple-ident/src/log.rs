@@ -1,17 +1,17 @@
-//! A log as plain columns, and what makes it unusable.
+//! A log as plain columns, with checks of its data.
 //!
-//! Not a file format: whoever reads files fills a [`Log`].
+//! [`Log`] is independent of file formats; [`crate::read_logs`] reads files.
 
 use crate::error::{IdentError, Warning, log_error, shape_error};
 use nalgebra::DMatrix;
 
-/// Angles beyond this are taken for degrees \[rad\].
-const LARGEST_ANGLE_RAD: f64 = 25.0;
-/// A joint must cover this much to say anything of its own inertia and friction \[rad\].
-const LEAST_RANGE_RAD: f64 = 0.02;
-/// Steps of the clock longer than so many medians are gaps.
+/// Larger angles are assumed to be degrees \[rad\].
+const MAX_ANGLE_RAD: f64 = 25.0;
+/// Minimum range of motion for identifying a joint \[rad\].
+const MIN_RANGE_RAD: f64 = 0.02;
+/// A time step longer than this multiple of the median is a gap.
 const GAP_MEDIANS: f64 = 5.0;
-/// Shorter logs are taken with a warning \[s\].
+/// Shorter logs give a warning \[s\].
 const SHORT_S: f64 = 5.0;
 
 /// Measurements of one run. Matrices are (samples, joints), all joints of the arm.
@@ -21,15 +21,15 @@ pub struct Log {
     pub t_s: Vec<f64>,
     /// Joint angles \[rad\].
     pub q_rad: DMatrix<f64>,
-    /// Joint velocities \[rad/s\], if they were measured; otherwise they are differentiated.
+    /// Measured joint velocities \[rad/s\]; `None` differentiates the angles.
     pub qd_rad_per_s: Option<DMatrix<f64>>,
-    /// Torques of the motors, at the joints \[N m\].
+    /// Motor torques at the joints \[N m\].
     pub tau_nm: DMatrix<f64>,
 }
 
 impl Log {
-    /// Checks shapes, values, clock, units and motion. `moving` lists the joints to identify; the
-    /// others may rest.
+    /// Checks shapes, values, clock, units and motion. `moving` lists the joints to identify; the other joints
+    /// may be at rest.
     ///
     /// # Errors
     /// [`IdentError`] with column, sample, value and remedy.
@@ -53,7 +53,7 @@ impl Log {
     fn check_shapes(&self, dof: usize) -> Result<(), IdentError> {
         let samples = self.t_s.len();
         if samples < 3 {
-            return Err(shape_error("t", "at least 3 samples", format!("{samples}")));
+            return Err(shape_error("t", "at min 3 samples", format!("{samples}")));
         }
         for (name, matrix) in self.matrices() {
             if matrix.shape() != (samples, dof) {
@@ -69,7 +69,7 @@ impl Log {
     }
 
     fn check_values(&self) -> Result<(), IdentError> {
-        let remedy = "cut these rows out, or fill in what the recorder lost";
+        let remedy = "remove these rows, or interpolate the missing samples";
         if let Some(i) = self.t_s.iter().position(|t| !t.is_finite()) {
             return Err(log_error("t", format!("not finite at sample {i}"), remedy));
         }
@@ -118,9 +118,9 @@ impl Log {
     fn check_motion(&self, moving: &[usize]) -> Result<Vec<Warning>, IdentError> {
         let mut warnings = Vec::new();
         for (joint, column) in self.q_rad.column_iter().enumerate() {
-            let (least, greatest) = (column.min(), column.max());
-            let extreme = greatest.abs().max(least.abs());
-            if extreme > LARGEST_ANGLE_RAD {
+            let (min, max) = (column.min(), column.max());
+            let extreme = max.abs().max(min.abs());
+            if extreme > MAX_ANGLE_RAD {
                 return Err(log_error(
                     format!("q[{joint}]"),
                     format!("reaches {extreme:.1}, which looks like degrees"),
@@ -130,15 +130,15 @@ impl Log {
             if !moving.contains(&joint) {
                 continue;
             }
-            let range = greatest - least;
-            if range < LEAST_RANGE_RAD {
+            let range = max - min;
+            if range < MIN_RANGE_RAD {
                 return Err(log_error(
                     format!("q[{joint}]"),
                     format!("moves by {range:.5} rad only: the joint is not excited"),
                     "leave it out of the moving joints, or record a log that moves it",
                 ));
             }
-            if range < 10.0 * LEAST_RANGE_RAD {
+            if range < 10.0 * MIN_RANGE_RAD {
                 warnings.push(Warning {
                     column: format!("q[{joint}]"),
                     problem: format!("moves by {range:.3} rad only"),
@@ -158,7 +158,7 @@ impl Log {
         Ok(warnings)
     }
 
-    /// Velocity against the difference quotient of the angle: a factor of 57 is a unit.
+    /// Compares velocity with the slope of the angle; a ratio of 57 indicates degrees.
     fn check_velocity_unit(&self, joint: usize) -> Result<(), IdentError> {
         let Some(qd) = &self.qd_rad_per_s else {
             return Ok(());
@@ -194,7 +194,7 @@ impl Log {
     }
 }
 
-/// Refuses joints that do not exist, or are listed twice.
+/// Rejects joints that do not exist or are listed twice.
 pub(crate) fn check_moving(dof: usize, moving: &[usize]) -> Result<(), IdentError> {
     let increasing = moving.windows(2).all(|w| w[0] < w[1]);
     if !moving.is_empty() && increasing && moving.iter().all(|joint| *joint < dof) {
@@ -202,7 +202,7 @@ pub(crate) fn check_moving(dof: usize, moving: &[usize]) -> Result<(), IdentErro
     }
     Err(shape_error(
         "moving",
-        format!("joint numbers below {dof}, increasing, at least one"),
+        format!("joint numbers below {dof}, increasing, at min one"),
         format!("{moving:?}"),
     ))
 }

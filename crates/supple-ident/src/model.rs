@@ -1,4 +1,4 @@
-//! Parameters of a fit as an arm, its friction, and back.
+//! Conversion between parameter vectors and an arm with its friction.
 
 use crate::columns::{Column, Columns};
 use crate::error::IdentError;
@@ -27,7 +27,7 @@ pub fn link_parameters<const N: usize>(x: &DVector<f64>) -> [SVector<f64, 10>; N
 /// `nominal` with the inertial parameters of `x`; joints without a rotor column keep their rotor.
 ///
 /// # Errors
-/// [`IdentError::NotPhysical`] if a link is no body or a rotor inertia is negative.
+/// [`IdentError::NotPhysical`] if a link is physically inconsistent or a rotor inertia is negative.
 pub fn arm<const N: usize>(
     nominal: &Arm<N>,
     columns: &Columns,
@@ -51,9 +51,9 @@ pub fn arm<const N: usize>(
         .map_err(IdentError::NotPhysical)
 }
 
-/// Friction of each joint of the arm, in the law of the controller; what that law has no word for
-/// (asymmetry, couplings) stays in the columns, and what depends on load is taken at `load_nm` of each
-/// moving joint. Joints that were held have none.
+/// Friction of each joint of the arm, in the controller's law. Effects that this law does not model (asymmetry,
+/// couplings) stay in the columns; load-dependent friction is taken at `load_nm` of each moving joint. Held
+/// joints have no friction.
 pub fn friction(columns: &Columns, x: &DVector<f64>, load_nm: &[f64]) -> Vec<Friction> {
     let value = |column: Column| columns.position(column).map_or(0.0, |i| x[i]);
     let load = |j: usize| {
@@ -77,7 +77,7 @@ pub fn friction(columns: &Columns, x: &DVector<f64>, load_nm: &[f64]) -> Vec<Fri
     (0..columns.dof()).map(of_joint).collect()
 }
 
-/// Mass matrix that `x` gives at `q`, physical or not, \[kg m^2\].
+/// Mass matrix of the parameters `x` at `q`, even if they are physically inconsistent \[kg m^2\].
 pub fn mass_matrix<const N: usize>(
     nominal: &Arm<N>,
     columns: &Columns,

@@ -1,37 +1,36 @@
-//! From an irregular, noisy log to angles, velocities, accelerations and torques on one clock.
+//! Resamples and filters a log into angles, velocities, accelerations and torques on a regular grid.
 //!
-//! Linear interpolation onto a regular grid, one zero-phase filter for angle, velocity and torque
-//! alike so that none lags or is damped more than another, central differences, then every n-th sample.
-//! What the filter makes up at the ends of a log, where it knows no motion beyond, is cut off.
+//! Steps: linear interpolation onto the grid, zero-phase filter, central differences, decimation. All signals
+//! pass the same filter, so that none has extra lag or attenuation. Filter transients at both ends are
+//! discarded.
 
 use crate::error::{IdentError, Warning, positive, shape_error};
 use crate::filter::{LowPass, differentiate};
 use crate::log::Log;
 use nalgebra::DMatrix;
 
-/// Length of the filter's transient at an end, in periods of its cutoff: its slowest pole pair has died
-/// out to 1 %.
+/// Length of the filter's transient at an end, in periods of its cutoff: its slowest pole pair decays to 1 %.
 const TRANSIENT_PERIODS: f64 = 2.0;
 
-/// Samples of a grid at most: three hours at 1 kHz.
-const MOST_SAMPLES: f64 = 1e7;
+/// Maximum number of samples of a grid: three hours at 1 kHz.
+const MAX_SAMPLES: f64 = 1e7;
 
-/// How a log is prepared.
+/// Options of the preparation of a log.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Preparation {
     /// Rate of the grid \[Hz\]; `None` takes the log's own mean rate.
     pub rate_hz: Option<f64>,
     /// Cutoff of the zero-phase filter \[Hz\]; `None` leaves the signals as they are.
     pub cutoff_hz: Option<f64>,
-    /// Every so many samples of the grid are kept, 1 or more.
+    /// Decimation factor, at least 1.
     pub keep_every: usize,
-    /// Time by which a logged torque acts later than the angle beside it was measured \[s\], zero or
-    /// more. Where the log has commands that act in the cycle after, it is one and a half periods.
+    /// Delay of the logged torque relative to the logged angle \[s\], zero or more: 1.5 periods if the log
+    /// contains commands that act during the next cycle.
     pub torque_delay_s: f64,
 }
 
 impl Default for Preparation {
-    /// The log's own rate, 8 Hz, every sample, torques as they are logged.
+    /// The log's own rate, cutoff at 8 Hz, every sample, no torque delay.
     fn default() -> Self {
         Self {
             rate_hz: None,
@@ -43,11 +42,11 @@ impl Default for Preparation {
 }
 
 impl Preparation {
-    /// Rows of a grid of `samples` at `rate_hz` that are kept: every so many, without the ends that the
-    /// filter has no neighbours for.
+    /// Indices of the kept samples of a grid of `samples` at `rate_hz`: decimated, without the filter
+    /// transients at both ends.
     ///
     /// # Errors
-    /// [`IdentError::Shape`] if the ends are all there is.
+    /// [`IdentError::Shape`] if the log is no longer than its transients.
     pub fn kept(&self, rate_hz: f64, samples: usize) -> Result<Vec<usize>, IdentError> {
         let ends = |cutoff_hz: f64| (TRANSIENT_PERIODS * rate_hz / cutoff_hz).ceil() as usize;
         let end = self.cutoff_hz.map_or(0, ends);
@@ -78,10 +77,10 @@ pub struct Motion {
     pub qdd: DMatrix<f64>,
     /// Torques \[N m\].
     pub tau: DMatrix<f64>,
-    /// Independent samples for each one kept, at most 1: filtered noise repeats itself.
-    pub independent_share: f64,
-    /// Cutoff of the zero-phase filter that the torques went through \[Hz\]: columns that jump with
-    /// the direction of motion are filtered alike.
+    /// Effective number of independent samples per kept sample, at most 1 (filtered noise is correlated).
+    pub independent_fraction: f64,
+    /// Cutoff of the zero-phase filter applied to the torques \[Hz\]; columns that are discontinuous at a
+    /// reversal are filtered likewise.
     pub cutoff_hz: Option<f64>,
 }
 
@@ -89,7 +88,7 @@ impl Motion {
     /// Checks `log` for an arm of `dof` joints of which `moving` are identified, and prepares it.
     ///
     /// # Errors
-    /// What [`Log::check`] refuses; an option out of range; too few samples to filter.
+    /// A log that [`Log::check`] rejects; an option out of range; too few samples to filter.
     pub fn prepare(
         log: &Log,
         dof: usize,
@@ -109,10 +108,10 @@ impl Motion {
         let rate_hz = preparation.rate_hz.unwrap_or(own_rate);
         positive("rate_hz", rate_hz)?;
         let samples = (log.t_s[log.t_s.len() - 1] - log.t_s[0]) * rate_hz;
-        if samples > MOST_SAMPLES {
+        if samples > MAX_SAMPLES {
             return Err(shape_error(
                 "log",
-                format!("at most {MOST_SAMPLES:e} samples at the rate of the grid, {rate_hz} Hz"),
+                format!("at most {MAX_SAMPLES:e} samples at the rate of the grid, {rate_hz} Hz"),
                 format!("{samples:e}: give a lower rate, or correct the column t (s)"),
             ));
         }
@@ -142,14 +141,14 @@ impl Motion {
         let every = preparation.keep_every;
         let rows = preparation.kept(rate_hz, q.nrows())?;
         let kept_hz = rate_hz / every as f64;
-        let share = preparation.cutoff_hz.map_or(1.0, |hz| 2.0 * hz / kept_hz);
+        let independent = preparation.cutoff_hz.map_or(1.0, |hz| 2.0 * hz / kept_hz);
         let motion = Motion {
             rate_hz: kept_hz,
             q: q.select_rows(&rows),
             qd: qd.select_rows(&rows),
             qdd: qdd.select_rows(&rows),
             tau: tau.select_rows(&rows),
-            independent_share: share.min(1.0),
+            independent_fraction: independent.min(1.0),
             cutoff_hz: preparation.cutoff_hz.filter(|hz| *hz < 0.45 * kept_hz),
         };
         Ok((motion, warnings))
@@ -173,9 +172,8 @@ impl Motion {
     }
 }
 
-/// Linear interpolation onto a grid that starts with the log and ends within it, of what the columns
-/// were `delay_s` before; before the log it is its first sample. The clock must increase:
-/// [`Log::check`].
+/// Interpolates the columns, delayed by `delay_s`, linearly onto a grid that starts with the log and ends
+/// within it; before the start of the log its first sample is used. Times must increase, see [`Log::check`].
 pub fn resample(t_s: &[f64], columns: &DMatrix<f64>, rate_hz: f64, delay_s: f64) -> DMatrix<f64> {
     let (Some(&start), Some(&end)) = (t_s.first(), t_s.last()) else {
         return columns.clone();
@@ -189,10 +187,10 @@ pub fn resample(t_s: &[f64], columns: &DMatrix<f64>, rate_hz: f64, delay_s: f64)
         while right + 1 < t_s.len() && t_s[right] < t {
             right += 1;
         }
-        let share = (t - t_s[right - 1]) / (t_s[right] - t_s[right - 1]);
+        let fraction = (t - t_s[right - 1]) / (t_s[right] - t_s[right - 1]);
         for j in 0..columns.ncols() {
             let (a, b) = (columns[(right - 1, j)], columns[(right, j)]);
-            resampled[(i, j)] = a + share * (b - a);
+            resampled[(i, j)] = a + fraction * (b - a);
         }
     }
     resampled

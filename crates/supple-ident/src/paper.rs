@@ -1,38 +1,37 @@
-//! The paper's estimate, Eq. (3.7) and (3.8): twelve columns, least squares through the
-//! pseudo-inverse, `m3` and `S` known beforehand.
+//! The paper's estimator, Eq. (3.7) and (3.8): twelve columns, least squares by the pseudo-inverse, with known
+//! `m3` and `S`.
 //!
 //! The twelve columns have rank ten for any data, so that `(Lambda^T Lambda)^-1` does not exist; the
-//! pseudo-inverse gives the member of least norm, and ten combinations are all that is known. Compare
-//! with other sets through [`Parameters::base`].
+//! pseudo-inverse gives the minimum-norm solution, of which ten combinations are determined. Compare parameter
+//! sets by [`Parameters::base`].
 
-use crate::base::{Base, RANK_TOLERANCE};
-use crate::compress::Block;
+use crate::base::{BaseParameters, RANK_TOLERANCE};
 use crate::error::{IdentError, shape_error};
+use crate::joint_rows::JointRows;
 use crate::motion::Motion;
-use crate::regressor::JointRows;
 use nalgebra::{DMatrix, DVector};
 use supple_core::Vector;
 use supple_model::paper::Parameters;
 
-/// Samples that the paper used: fewer are refused.
-pub const LEAST_SAMPLES: usize = 1600;
+/// Minimum number of samples: the number that the paper used.
+pub const MIN_SAMPLES: usize = 1600;
 
-/// What the paper's procedure finds.
+/// Result of the paper's estimator.
 #[derive(Clone, Debug)]
 pub struct Estimate {
-    /// Member of least norm, in the order of [`Parameters::PSI_NAMES`].
+    /// Minimum-norm solution, in the order of [`Parameters::PSI_NAMES`].
     pub psi: [f64; 12],
-    /// The ten combinations that are known, in the order of [`Parameters::BASE_NAMES`].
+    /// The ten determined combinations, in the order of [`Parameters::BASE_NAMES`].
     pub base: [f64; 10],
     /// Standard deviation of each entry of `base`.
     pub base_std: [f64; 10],
     /// Independent columns, rank and condition number.
-    pub columns: Base,
-    /// RMS of what is left of the torques \[N m\].
+    pub columns: BaseParameters,
+    /// RMS torque residual \[N m\].
     pub residual_nm: f64,
 }
 
-/// `psi` of `known` replaced.
+/// `known` with its `psi` replaced.
 pub fn with_psi(known: &Parameters, psi: &[f64; 12]) -> Parameters {
     let [ix1, ix2, iz2, iy2, m2r2, m3r3, ix3, iy3, iz3, v1, v2, v3] = *psi;
     Parameters {
@@ -50,7 +49,7 @@ pub fn with_psi(known: &Parameters, psi: &[f64; 12]) -> Parameters {
     }
 }
 
-/// Twelve-column regressor of one state and what `m3` and `S` contribute: `tau = lambda psi + rest`.
+/// Twelve-column regressor of one state and the contribution of `m3` and `S`: `tau = lambda psi + rest`.
 pub fn lambda(
     known: &Parameters,
     q: &Vector<3>,
@@ -75,13 +74,13 @@ pub fn lambda(
 /// Estimates `psi` from `motion`, with `m3`, `S`, lengths and gravity taken from `known`.
 ///
 /// # Errors
-/// [`IdentError::Shape`] for fewer than 1600 samples or another number of joints than three;
-/// [`IdentError::Singular`] if the motion leaves open more than any motion does.
+/// [`IdentError::Shape`] for fewer than 1600 samples or a number of joints other than three;
+/// [`IdentError::Singular`] if the motion determines fewer than ten combinations.
 pub fn estimate(known: &Parameters, motion: &Motion) -> Result<Estimate, IdentError> {
     let samples = motion.samples();
-    if samples < LEAST_SAMPLES || motion.q.ncols() != 3 {
+    if samples < MIN_SAMPLES || motion.q.ncols() != 3 {
         let found = format!("({samples}, {})", motion.q.ncols());
-        let expected = format!("({LEAST_SAMPLES} or more, 3)");
+        let expected = format!("({MIN_SAMPLES} or more, 3)");
         return Err(shape_error("motion", expected, found));
     }
     let mut stacked = JointRows::new(
@@ -98,8 +97,8 @@ pub fn estimate(known: &Parameters, motion: &Motion) -> Result<Estimate, IdentEr
             .rows_mut(3 * i, 3)
             .copy_from(&(at(&motion.tau) - rest));
     }
-    let block = Block::of(&stacked, 0.0, None);
-    let columns = Base::of(&block.a(), RANK_TOLERANCE)?;
+    let block = stacked.reduced(0.0, None);
+    let columns = BaseParameters::of(&block.a(), RANK_TOLERANCE)?;
     if columns.rank() < 10 {
         return Err(IdentError::Singular {
             problem: format!(
@@ -111,7 +110,7 @@ pub fn estimate(known: &Parameters, motion: &Motion) -> Result<Estimate, IdentEr
     }
     let solution = crate::estimate::least_norm(&block.a(), &block.b(), RANK_TOLERANCE)?;
     let psi: [f64; 12] = std::array::from_fn(|i| solution[i]);
-    let freedom = (3 * samples - columns.rank()) as f64 * motion.independent_share;
+    let freedom = (3 * samples - columns.rank()) as f64 * motion.independent_fraction;
     let error = block.error_squared(&solution);
     let noise = (error / freedom.max(1.0)).sqrt();
     Ok(Estimate {

@@ -1,26 +1,27 @@
-//! A body in the hand: found from the torques it adds, or, known, used to calibrate the torque scale.
+//! Payload at the hand: identified from the torques it adds, or, if known, used to calibrate the torque scale.
 //!
-//! Published torque constants of one arm differ by a fifth. A weight that is known tells: the torque it
-//! must add at each joint against the torque that was logged more than without it.
+//! Published torque constants of one arm differ by 20 %. A known weight resolves this: compare the torque it
+//! must add at each joint with the logged increase.
 
-use crate::base::{Base, RANK_TOLERANCE};
-use crate::compress::Block;
+use crate::base::{BaseParameters, RANK_TOLERANCE};
 use crate::consistent::{Constraints, solve};
 use crate::error::{IdentError, shape_error};
 use crate::estimate::nearest;
 use crate::fit::Fit;
+use crate::joint_rows::JointRows;
 use crate::motion::Motion;
-use crate::regressor::{JointRows, joint_rows};
+use crate::qr_reduction::ReducedSystem;
+use crate::regressor::joint_rows;
 use nalgebra::{DMatrix, DVector, SVector};
 use supple_core::dynamics::regressor;
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::{Body, Vector};
 
-/// Greatest standard deviation of a scale that is told, by the scale.
-const TOLD: f64 = 0.05;
+/// Maximum relative standard deviation of a returned scale.
+const MAX_RELATIVE_SCALE_STD: f64 = 0.05;
 
-/// Ten parameters of `body`, given in the last link's frame, as [`supple_core::dynamics::parameters`]
-/// orders them.
+/// Ten parameters of `body`, given in the last link's frame, in the order of
+/// [`supple_core::dynamics::parameters`].
 pub fn parameters_of(body: &Body) -> SVector<f64, 10> {
     let h = body.com_m * body.mass_kg;
     let c = &body.com_m;
@@ -40,21 +41,21 @@ pub fn parameters_of(body: &Body) -> SVector<f64, 10> {
     ])
 }
 
-/// The body in the last link's frame that explains what `empty`, a fit of the arm without it, leaves of
-/// `motions` with it. What they do not tell is drawn to `guess`.
+/// Identifies a payload in the last link's frame from the residual of `empty`, a fit of the arm without it,
+/// over `motions` with it. Undetermined parameters are regularised towards `guess`.
 ///
 /// # Errors
-/// Shapes that do not agree; a guess that is no body.
+/// Shapes that do not agree; a physically inconsistent guess.
 pub fn payload<const N: usize>(
     empty: &Fit<N>,
     motions: &[Motion],
     guess: &Body,
 ) -> Result<Body, IdentError> {
-    let mut all = Block::empty(10);
+    let mut all = ReducedSystem::empty(10);
     for motion in motions {
         let loads = added(empty, motion)?;
         for (row, load) in loads.iter().enumerate() {
-            let block = Block::of(load, 0.0, None);
+            let block = load.reduced(0.0, None);
             all.add(&block, 1.0 / empty.noise_nm[row].max(1e-9));
         }
     }
@@ -78,15 +79,15 @@ pub fn payload<const N: usize>(
     })
 }
 
-/// True by logged torque of each moving joint, from motions of the arm `without` the `known` body, which
-/// the fit was made from, and motions `with` it in the last link's frame, torques of the same scales.
+/// Ratio of true to logged torque of each moving joint, from the fitted motions `without` the `known` payload
+/// and motions `with` it in the last link's frame, with the same torque scales.
 ///
-/// Each joint is told by itself: `tau_j = Y_j x_j + k_j Y_hand p`, where only the last term is there with the
-/// body alone, and the scale is `1 / k_j`. Joints share links, so that parameters common to them all would
-/// carry the scale of one joint into another. `None` where the body adds too little to a joint to tell.
+/// Each joint is estimated separately: `tau_j = Y_j x_j + k_j Y_hand p`, where the last term is present only
+/// with the payload; the scale is `1 / k_j`. Since joints share links, common parameters would transfer the
+/// scale of one joint to another. `None` if the payload adds too little torque to a joint.
 ///
 /// # Errors
-/// Shapes that do not agree; a body that is none.
+/// Shapes that do not agree; a physically inconsistent payload.
 pub fn torque_scale<const N: usize>(
     empty: &Fit<N>,
     without: &[Motion],
@@ -97,16 +98,17 @@ pub fn torque_scale<const N: usize>(
         .validate()
         .map_err(|error| shape_error("known payload", "a physical body", error.to_string()))?;
     let p = parameters_of(known);
-    let mut blocks = vec![Block::empty(empty.columns.len() + 2); empty.columns.moving().len()];
-    let mut independent_share: f64 = 1.0;
+    let mut blocks =
+        vec![ReducedSystem::empty(empty.columns.len() + 2); empty.columns.moving().len()];
+    let mut independent_fraction: f64 = 1.0;
     for (motions, carries) in [(without, false), (with, true)] {
         for motion in motions {
-            independent_share = independent_share.min(motion.independent_share);
+            independent_fraction = independent_fraction.min(motion.independent_fraction);
             let arm = joint_rows(empty.nominal(), &empty.columns, motion)?;
             let hand = added(empty, motion)?;
             for (row, &joint) in empty.columns.moving().iter().enumerate() {
                 let load = &hand[row].a * p * f64::from(u8::from(carries));
-                // With the rotor as a column even where it is known: known, it is of another scale.
+                // Always include the rotor column: a known rotor inertia has the unscaled unit.
                 let mut a = arm[row]
                     .a
                     .clone()
@@ -115,31 +117,31 @@ pub fn torque_scale<const N: usize>(
                 a.set_column(empty.columns.len() + 1, &load);
                 let tau = motion.tau.column(joint).into_owned();
                 let rows = JointRows::new(a, tau, arm[row].speed.clone());
-                blocks[row].add(&Block::of(&rows, 0.0, None), 1.0);
+                blocks[row].add(&rows.reduced(0.0, None), 1.0);
             }
         }
     }
     blocks
         .iter()
-        .map(|block| scale_of(block, independent_share))
+        .map(|block| scale_of(block, independent_fraction))
         .collect()
 }
 
-/// One over the last unknown, where it is told.
-fn scale_of(block: &Block, independent_share: f64) -> Result<Option<f64>, IdentError> {
-    let base = Base::of(&block.a(), RANK_TOLERANCE)?;
-    let Ok(place) = base.independent.binary_search(&(block.unknowns() - 1)) else {
+/// One over the last unknown; `None` if the data do not determine it.
+fn scale_of(block: &ReducedSystem, independent_fraction: f64) -> Result<Option<f64>, IdentError> {
+    let base = BaseParameters::of(&block.a(), RANK_TOLERANCE)?;
+    let Ok(index) = base.independent.binary_search(&(block.unknowns() - 1)) else {
         return Ok(None);
     };
     let x = nearest(block, &DVector::zeros(block.unknowns()))?;
     let found = x[block.unknowns() - 1];
-    let freedom = block.rows().saturating_sub(base.rank()) as f64 * independent_share;
+    let freedom = block.rows().saturating_sub(base.rank()) as f64 * independent_fraction;
     let noise = (block.error_squared(&x) / freedom.max(1.0)).sqrt();
-    let deviation = base.standard_deviations(noise)[place];
-    Ok((found > 0.0 && deviation <= TOLD * found).then(|| 1.0 / found))
+    let deviation = base.standard_deviations(noise)[index];
+    Ok((found > 0.0 && deviation <= MAX_RELATIVE_SCALE_STD * found).then(|| 1.0 / found))
 }
 
-/// Rows of the body's ten parameters, and what the arm alone leaves, by moving joint.
+/// For each moving joint, the rows of the payload's ten parameters and the residual of the arm without it.
 fn added<const N: usize>(empty: &Fit<N>, motion: &Motion) -> Result<Vec<JointRows>, IdentError> {
     let mut joints = joint_rows(empty.nominal(), &empty.columns, motion)?;
     let moving = empty.columns.moving();

@@ -1,34 +1,35 @@
-//! From logs to a model in one call: check, prepare, choose, fit.
+//! Complete identification: checks, preparation, model selection, fit.
 //!
-//! What is left open in a [`Procedure`] is chosen by predicting parts of the logs from the others
-//! ([`crate::select`]); nothing but these logs decides.
+//! Unset options of a [`Procedure`] are chosen by cross-validation within the logs ([`crate::select`]).
 
+use crate::choice::Choice;
 use crate::columns::{Columns, FrictionColumns};
 use crate::error::{IdentError, Warning, shape_error};
-use crate::fit::{Fit, Options, Weights, fit};
+use crate::fit::{Fit, fit};
 use crate::log::{Log, check_moving};
 use crate::motion::{Motion, Preparation};
+use crate::options::{Options, Weights};
 use crate::select::{
-    Table, band_candidates, compare, friction_candidates, load_candidates, prior_candidates,
+    band_candidates, compare, friction_candidates, load_candidates, prior_candidates,
     weights_candidates,
 };
 use supple_core::{Arm, Friction};
 
-/// Parts of a log of which each is predicted from the others.
+/// Number of parts for cross-validation.
 const PARTS: usize = 4;
-/// Prior weight from which the choice starts.
+/// Initial prior weight of the model selection.
 const PRIOR: f64 = 100.0;
 
-/// How the columns are solved for.
+/// Estimation method.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Method {
     /// Ordinary least squares.
     Ols,
-    /// Weighted least squares: each joint by its own residual.
+    /// Weighted least squares: each joint is weighted by its residual.
     Wls,
-    /// Iteratively reweighted least squares: single samples far out count less (Huber).
+    /// Iteratively reweighted least squares: Huber weights against outliers.
     Irls,
-    /// Weighted, with every link a body that can be and friction that takes energy; weights by
+    /// Weighted least squares with physically consistent links and dissipative friction; weights by
     /// cross-validation.
     #[default]
     Consistent,
@@ -37,41 +38,41 @@ pub enum Method {
 /// Friction columns.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum FrictionChoice {
-    /// By cross-validation, with the table that shows why.
+    /// By cross-validation, with the table of its errors.
     #[default]
     Auto,
-    /// These.
+    /// The given columns.
     Columns(FrictionColumns),
 }
 
-/// What is asked for.
+/// Options of an identification.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Procedure {
-    /// Joints to identify, increasing; `None` for all. The others are held where the log has them.
+    /// Joints to identify, increasing; `None` for all. The others are held at their logged positions.
     pub moving: Option<Vec<usize>>,
     /// Pairs of joints whose sum turns a motor.
     pub couplings: Vec<(usize, usize)>,
     /// Grid, filter, decimation.
     pub preparation: Preparation,
-    /// Solver.
+    /// Estimation method.
     pub method: Method,
-    /// Friction.
+    /// Friction columns.
     pub friction: FrictionChoice,
-    /// A rotor inertia for each moving joint; without, the model's rotors are taken as known.
+    /// Whether to fit a rotor inertia for each moving joint; otherwise the nominal rotors are taken as known.
     pub rotor: bool,
-    /// Samples of a joint slower than this are left out of its rows \[rad/s\]; a Stribeck dip is then
-    /// fitted from them in a second stage.
+    /// Samples of a joint slower than this are excluded from its rows \[rad/s\]; a Stribeck effect is then
+    /// fitted to them in a second stage.
     pub slow_rad_per_s: f64,
     /// Weight of the prior of a consistent fit, see [`crate::consistent::Constraints::prior_weight`];
     /// `None` chooses by cross-validation.
     pub prior_weight: Option<f64>,
-    /// Stated noise of each moving joint \[N m\], in place of weights found from residuals.
+    /// Given noise of each moving joint \[N m\], instead of weights from residuals.
     pub joint_noise_nm: Option<Vec<f64>>,
 }
 
 impl Default for Procedure {
-    /// All joints, 8 Hz at the log's own rate, physically consistent, friction and prior by
-    /// cross-validation, rotors identified, no sample left out.
+    /// All joints, cutoff of 8 Hz at the log's own rate, physically consistent, friction and prior by
+    /// cross-validation, rotors identified, no sample excluded.
     fn default() -> Self {
         Procedure {
             moving: None,
@@ -87,20 +88,10 @@ impl Default for Procedure {
     }
 }
 
-/// What was chosen, and the table of held-out errors that decided it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Choice {
-    /// `friction`, `load`, `band`, `prior` or `weights`.
-    pub of: &'static str,
-    /// The candidates.
-    pub table: Table,
-}
-
-/// Identifies an arm from one log or several. Kinematics, and what the data leave open, are those of
-/// `nominal`.
+/// Identifies an arm from one or several logs. Kinematics and undetermined parameters are those of `nominal`.
 ///
 /// # Errors
-/// What [`Log::check`] refuses; too little data; options out of range; singular data.
+/// A log that [`Log::check`] rejects; too little data; options out of range; singular data.
 pub fn identify<const N: usize>(
     nominal: &Arm<N>,
     logs: &[Log],
@@ -109,9 +100,9 @@ pub fn identify<const N: usize>(
     let moving = procedure.moving_joints(N)?;
     let (mut motions, mut warnings) = (Vec::new(), Vec::new());
     for log in logs {
-        let (motion, doubts) = Motion::prepare(log, N, &moving, &procedure.preparation)?;
+        let (motion, result_warnings) = Motion::prepare(log, N, &moving, &procedure.preparation)?;
         motions.push(motion);
-        warnings.extend(doubts);
+        warnings.extend(result_warnings);
     }
     let mut found = identify_motions(nominal, &motions, &moving, procedure)?;
     warnings.append(&mut found.warnings);
@@ -119,7 +110,7 @@ pub fn identify<const N: usize>(
     Ok(found)
 }
 
-/// As [`identify`], from motions that were prepared before.
+/// As [`identify`], from prepared motions.
 ///
 /// # Errors
 /// As [`identify`].
@@ -136,7 +127,7 @@ pub fn identify_motions<const N: usize>(
     let mut found = fit(nominal, motions, moving, &options)?;
     found.preparation = procedure.preparation;
     found.choices = choices;
-    found.warnings = found.doubts();
+    found.warnings = found.result_warnings();
     Ok(found)
 }
 
@@ -154,7 +145,7 @@ impl Procedure {
         Ok(moving)
     }
 
-    /// Options with everything chosen, and how.
+    /// Complete options and the choices that led to them.
     pub(crate) fn options<const N: usize>(
         &self,
         nominal: &Arm<N>,
@@ -175,11 +166,11 @@ impl Procedure {
                 (Some(noise), _) => Weights::Given(noise.clone()),
                 (None, Method::Ols) => Weights::Equal,
                 (None, Method::Irls) => Weights::Huber,
-                (None, Method::Wls | Method::Consistent) => Weights::Noise,
+                (None, Method::Wls | Method::Consistent) => Weights::ByJointResidual,
             },
-            consistent: consistent.then(|| self.prior_weight.unwrap_or(PRIOR)),
+            consistent_prior_weight: consistent.then(|| self.prior_weight.unwrap_or(PRIOR)),
         };
-        // Refuses wrong columns before any table is made of them.
+        // Rejects invalid columns before the cross-validation.
         Columns::new(
             N,
             moving,
@@ -198,12 +189,12 @@ impl Procedure {
             ("weights", weights, weights_candidates),
         ];
         let mut choices = Vec::new();
-        for (of, wanted, candidates) in steps {
+        for (subject, wanted, candidates) in steps {
             let candidates = candidates(&options);
             if wanted && !candidates.is_empty() {
                 let table = compare(nominal, motions, moving, &candidates, PARTS)?;
                 options = table.options().clone();
-                choices.push(Choice { of, table });
+                choices.push(Choice { subject, table });
             }
         }
         Ok((options, choices))
@@ -211,11 +202,11 @@ impl Procedure {
 }
 
 impl<const N: usize> Fit<N> {
-    /// What is doubtful about the result itself.
-    fn doubts(&self) -> Vec<Warning> {
-        let mut doubts = Vec::new();
+    /// Warnings about the result itself.
+    fn result_warnings(&self) -> Vec<Warning> {
+        let mut warnings = Vec::new();
         if self.base.condition > 1e3 {
-            doubts.push(Warning {
+            warnings.push(Warning {
                 column: "q".to_owned(),
                 problem: format!(
                     "the condition number of the scaled regressor is {:.0}",
@@ -224,10 +215,10 @@ impl<const N: usize> Fit<N> {
                 remedy: "excite all joints at once: design a trajectory for this arm",
             });
         }
-        doubts
+        warnings
     }
 
-    /// Friction of every joint: the one found for moving joints, `known` for the others.
+    /// Friction of every joint: identified for moving joints, `known` for the others.
     pub fn friction_with(&self, known: &[Friction]) -> [Friction; N] {
         let found = self.friction();
         let moving = self.columns.moving();

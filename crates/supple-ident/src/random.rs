@@ -1,25 +1,23 @@
-//! Seeded random numbers for searches and draws: the same seed gives the same bits.
+//! Seeded random numbers for searches and draws; the same seed gives bit-identical numbers.
 
+use rand_xoshiro::SplitMix64;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use std::f64::consts::TAU;
 use supple_core::math::{cos, sqrt};
 
-/// A stream (splitmix64, Steele, Lea and Flood 2014).
+/// A random number generator.
 #[derive(Clone, Debug)]
-pub struct Random(u64);
+pub struct Random(SplitMix64);
 
 impl Random {
-    /// The stream of a seed.
+    /// Creates a generator from a seed.
     pub fn new(seed: u64) -> Random {
-        Random(seed)
+        Random(SplitMix64::seed_from_u64(seed))
     }
 
     /// Uniform in \[0, 1).
     pub fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+        (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
     /// Uniform in \[-1, 1).
@@ -39,7 +37,7 @@ mod tests {
     use super::Random;
 
     #[test]
-    fn normal_numbers_have_their_moments() {
+    fn normal_numbers_have_the_expected_moments() {
         let (mut random, n) = (Random::new(3), 100_000);
         let draws: Vec<f64> = (0..n).map(|_| random.normal()).collect();
         let moment = |p: i32| draws.iter().map(|x| x.powi(p)).sum::<f64>() / f64::from(n);

@@ -1,8 +1,8 @@
 //! Logs from files: the project's own MCAP, and comma-separated values.
 //!
-//! Of an MCAP the stretches are taken in which the arm moves freely under control: excitation, moves,
-//! tracking and probing without contact. A CSV has a line of names first: `t`, `q[0]`, `q[1]`, ...,
-//! `tau[0]`, ..., and `qd[0]`, ... if velocities were measured; SI units. `q0` is taken for `q[0]`.
+//! From an MCAP log, only intervals of controlled free motion are used: excitation, moves, tracking, and
+//! probing without contact. A CSV file has a header line with the names `t`, `q[0]`, `q[1]`, ..., `tau[0]`,
+//! ..., and `qd[0]`, ... if velocities were measured; SI units. `q0` is read as `q[0]`.
 
 use crate::log::Log;
 use nalgebra::DMatrix;
@@ -10,15 +10,15 @@ use std::path::Path;
 use supple_core::controller::Mode;
 use supple_log::{LogError, Reader};
 
-/// Stretches shorter than this are left out \[s\].
-const SHORTEST_S: f64 = 2.0;
-/// Time after contact, a fault or a change of mode that is left out \[s\].
+/// Shorter intervals are skipped \[s\].
+const MIN_STRETCH_S: f64 = 2.0;
+/// Time that is skipped after contact, a fault or a change of mode \[s\].
 const SETTLE_S: f64 = 0.3;
 
-/// Longest table that is read \[bytes\]: an hour at 1 kHz of seven joints with velocities.
-const MOST_BYTES: u64 = 1 << 30;
+/// Maximum size of a table \[bytes\]: an hour at 1 kHz of seven joints with velocities.
+const MAX_BYTES: u64 = 1 << 30;
 
-/// Why a file gives no log.
+/// Error of reading a log.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
     /// An MCAP that cannot be read.
@@ -29,25 +29,25 @@ pub enum ReadError {
     File {
         /// Path.
         file: String,
-        /// What the system says.
+        /// Error of the operating system.
         error: std::io::Error,
     },
-    /// A table that is not one.
+    /// An invalid table.
     #[error("{file}: {problem}; {remedy}")]
     Table {
         /// Path.
         file: String,
-        /// What is wrong, with line and column.
+        /// Problem, with line and column.
         problem: String,
-        /// What to do.
+        /// Remedy.
         remedy: &'static str,
     },
 }
 
-/// All usable stretches of a file, by its ending: `.mcap`, otherwise CSV.
+/// All usable intervals of a file: MCAP if its extension is `.mcap`, otherwise CSV.
 ///
 /// # Errors
-/// [`ReadError`]; an MCAP of an arm of another number of joints.
+/// [`ReadError`]; an MCAP of an arm with another number of joints.
 pub fn read_logs<const N: usize>(path: &Path) -> Result<Vec<Log>, ReadError> {
     if path.extension().is_some_and(|ending| ending == "mcap") {
         read_mcap::<N>(path)
@@ -56,7 +56,7 @@ pub fn read_logs<const N: usize>(path: &Path) -> Result<Vec<Log>, ReadError> {
     }
 }
 
-/// The stretches of free motion of an MCAP, torques without what was added against ripple.
+/// The intervals of free motion of an MCAP, with torques without ripple compensation.
 ///
 /// # Errors
 /// [`ReadError`].
@@ -81,13 +81,13 @@ pub fn read_mcap<const N: usize>(path: &Path) -> Result<Vec<Log>, ReadError> {
             continue;
         }
         let torque = core::array::from_fn(|j| value.torque_nm[j] - value.torques.ripple[j]);
-        stretch.push((t_s, value.position_rad, torque));
+        stretch.push((t_s, value.position_rad.into(), torque));
     }
     finish(&mut stretch, &mut logs);
     if logs.is_empty() {
         return Err(ReadError::Table {
             file: path.display().to_string(),
-            problem: format!("no stretch of {SHORTEST_S} s of free motion under control"),
+            problem: format!("no interval of {MIN_STRETCH_S} s of free motion under control"),
             remedy: "record the arm following the series that `supple excite design` gives",
         });
     }
@@ -99,7 +99,7 @@ fn finish<const N: usize>(stretch: &mut Vec<(f64, [f64; N], [f64; N])>, logs: &m
     let (Some(first), Some(last)) = (rows.first(), rows.last()) else {
         return;
     };
-    if last.0 - first.0 < SHORTEST_S {
+    if last.0 - first.0 < MIN_STRETCH_S {
         return;
     }
     logs.push(Log {
@@ -110,13 +110,13 @@ fn finish<const N: usize>(stretch: &mut Vec<(f64, [f64; N], [f64; N])>, logs: &m
     });
 }
 
-/// A table of numbers with a line of names.
+/// Reads a table of numbers with a header line.
 ///
 /// # Errors
 /// [`ReadError`] with line and column.
 pub fn read_csv(path: &Path, dof: usize) -> Result<Log, ReadError> {
     let file = path.display().to_string();
-    let text = supple_files::read_text(path, MOST_BYTES).map_err(|error| ReadError::File {
+    let text = supple_files::read_text(path, MAX_BYTES).map_err(|error| ReadError::File {
         file: file.clone(),
         error,
     })?;
@@ -140,10 +140,10 @@ fn parse_csv(text: &str, dof: usize) -> Result<Log, (String, &'static str)> {
         .split(',')
         .map(|name| name.trim().replace(['[', ']'], ""))
         .collect();
-    let place = |name: &str| names.iter().position(|n| n == name);
-    let time = place("t").ok_or_else(|| ("there is no column t".to_owned(), names_remedy))?;
+    let index_of = |name: &str| names.iter().position(|n| n == name);
+    let time = index_of("t").ok_or_else(|| ("there is no column t".to_owned(), names_remedy))?;
     let group = |name: &str| -> Result<Option<Vec<usize>>, (String, &'static str)> {
-        let found: Vec<Option<usize>> = (0..dof).map(|j| place(&format!("{name}{j}"))).collect();
+        let found: Vec<Option<usize>> = (0..dof).map(|j| index_of(&format!("{name}{j}"))).collect();
         if found.iter().all(Option::is_none) {
             return Ok(None);
         }
@@ -169,8 +169,11 @@ fn parse_csv(text: &str, dof: usize) -> Result<Log, (String, &'static str)> {
                 cell.trim().parse().map_err(|_| {
                     let name = names.get(column).map_or("?", String::as_str);
                     (
-                        format!("line {}, column {name}: `{cell}` is no number", number + 1),
-                        "correct the cell, or cut the line out",
+                        format!(
+                            "line {}, column {name}: `{cell}` is not a number",
+                            number + 1
+                        ),
+                        "correct the cell, or remove the line",
                     )
                 })
             })
@@ -179,16 +182,16 @@ fn parse_csv(text: &str, dof: usize) -> Result<Log, (String, &'static str)> {
             let (found, wanted) = (row.len(), names.len());
             return Err((
                 format!(
-                    "line {} has {found} cells, the names are {wanted}",
+                    "line {} has {found} cells, the header has {wanted}",
                     number + 1
                 ),
-                "give every line all its cells",
+                "give every line as many cells as the header",
             ));
         }
         values.push(row);
     }
     let columns =
-        |places: &[usize]| DMatrix::from_fn(values.len(), dof, |i, j| values[i][places[j]]);
+        |indices: &[usize]| DMatrix::from_fn(values.len(), dof, |i, j| values[i][indices[j]]);
     Ok(Log {
         t_s: values.iter().map(|row| row[time]).collect(),
         q_rad: columns(&q),
@@ -212,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_named() {
+    fn errors_name_the_problem() {
         let wrong = [
             ("", "empty"),
             ("q[0],tau[0]\n1,2\n", "no column t"),

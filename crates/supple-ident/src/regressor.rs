@@ -1,67 +1,17 @@
-//! Rows of the regressor: what each column contributes to each moving joint's torque.
+//! Rows of the regressor: the contribution of each column to each moving joint's torque.
 
 use crate::columns::{Column, Columns};
-use crate::compress::Block;
 use crate::error::{IdentError, shape_error};
 use crate::filter::LowPass;
+pub use crate::joint_rows::JointRows;
 use crate::motion::Motion;
-use nalgebra::{DMatrix, DVector};
-use std::sync::OnceLock;
+use nalgebra::DMatrix;
 use supple_core::dynamics::{parameters, regressor, regressor_times};
 use supple_core::math::exp;
 use supple_core::{Arm, Friction, Vector};
 
-/// The rows of one moving joint: `a x = b`, one row a sample.
-#[derive(Clone, Debug, PartialEq)]
-pub struct JointRows {
-    /// Regressor, (samples, columns).
-    pub a: DMatrix<f64>,
-    /// Torques, less that of rotors taken as known \[N m\].
-    pub b: DVector<f64>,
-    /// Speed of the joint \[rad/s\].
-    pub speed: Vec<f64>,
-    /// Way since the joint last turned round \[rad\].
-    pub slid_rad: Vec<f64>,
-    /// The rows above a speed, reduced once for all fits that use them.
-    reduced: OnceLock<(f64, Block)>,
-}
-
-impl JointRows {
-    /// Regressor, torques and speeds of one joint that slides steadily.
-    pub fn new(a: DMatrix<f64>, b: DVector<f64>, speed: Vec<f64>) -> JointRows {
-        JointRows {
-            slid_rad: vec![f64::INFINITY; speed.len()],
-            a,
-            b,
-            speed,
-            reduced: OnceLock::new(),
-        }
-    }
-
-    /// [`Block::of`] without weights, made once for a speed.
-    pub fn block(&self, slow_rad_per_s: f64) -> Block {
-        let make = || (slow_rad_per_s, Block::of(self, slow_rad_per_s, None));
-        let (speed, block) = self.reduced.get_or_init(make);
-        if *speed == slow_rad_per_s {
-            return block.clone();
-        }
-        make().1
-    }
-
-    /// Samples `range`.
-    pub fn part(&self, range: std::ops::Range<usize>) -> JointRows {
-        JointRows {
-            a: self.a.rows_range(range.clone()).into_owned(),
-            b: self.b.rows_range(range.clone()).into_owned(),
-            speed: self.speed[range.clone()].to_vec(),
-            slid_rad: self.slid_rad[range].to_vec(),
-            reduced: OnceLock::new(),
-        }
-    }
-}
-
-/// Regressor of one state, (moving joints, columns). Joints that do not move have no velocity and no
-/// acceleration, whatever `qd` and `qdd` say.
+/// Regressor of one state, (moving joints, columns). Held joints are taken at rest, whatever `qd` and `qdd`
+/// contain.
 pub fn rows<const N: usize>(
     arm: &Arm<N>,
     columns: &Columns,
@@ -126,26 +76,27 @@ pub fn rows<const N: usize>(
     rows
 }
 
-/// Way of joint `j` since it last turned round, sample by sample.
-fn slid(motion: &Motion, j: usize) -> Vec<f64> {
-    let (mut way, mut direction) = (0.0, 0.0_f64);
+/// Travel of joint `j` since its last reversal, for each sample.
+fn travel_since_reversal(motion: &Motion, j: usize) -> Vec<f64> {
+    let (mut travel, mut direction) = (0.0, 0.0_f64);
     let step_s = 1.0 / motion.rate_hz;
     let after = |v: &f64| {
         if v * direction < 0.0 {
-            way = 0.0;
+            travel = 0.0;
         }
         direction = v.signum();
-        way += v.abs() * step_s;
-        way
+        travel += v.abs() * step_s;
+        travel
     };
     motion.qd.column(j).iter().map(after).collect()
 }
 
-/// All rows of a motion, by moving joint. Dry friction turns over within a sample or two, faster than
-/// the filter that the torques went through: its columns go through the same one. Where there is no rotor column, the arm's rotor is known.
+/// All rows of a motion, for each moving joint. Dry friction changes sign within a sample or two, faster than
+/// the filter of the torques can follow, so its columns pass the same filter. Without a rotor column, the arm's
+/// rotor inertia is taken as known.
 ///
 /// # Errors
-/// [`IdentError::Shape`] if arm, columns and motion have not the same number of joints.
+/// [`IdentError::Shape`] if arm, columns and motion differ in their number of joints.
 pub fn joint_rows<const N: usize>(
     arm: &Arm<N>,
     columns: &Columns,
@@ -167,12 +118,13 @@ pub fn joint_rows<const N: usize>(
     };
     let mut joints: Vec<JointRows> = moving
         .iter()
-        .map(|&j| JointRows {
-            a: DMatrix::zeros(samples, columns.len()),
-            b: motion.tau.column(j) - motion.qdd.column(j) * known_rotor(j),
-            speed: motion.qd.column(j).iter().map(|v| v.abs()).collect(),
-            slid_rad: slid(motion, j),
-            reduced: OnceLock::new(),
+        .map(|&j| {
+            let rows = DMatrix::zeros(samples, columns.len());
+            let torques = motion.tau.column(j) - motion.qdd.column(j) * known_rotor(j);
+            let speed = motion.qd.column(j).iter().map(|v| v.abs()).collect();
+            let mut rows = JointRows::new(rows, torques, speed);
+            rows.travel_since_reversal_rad = travel_since_reversal(motion, j);
+            rows
         })
         .collect();
     for i in 0..samples {
@@ -190,7 +142,12 @@ pub fn joint_rows<const N: usize>(
     }
     if let Some(cutoff_hz) = motion.cutoff_hz {
         let filter = LowPass::butterworth4(cutoff_hz, motion.rate_hz)?;
-        for (c, _) in columns.list().iter().enumerate().filter(|(_, c)| c.jumps()) {
+        for (c, _) in columns
+            .list()
+            .iter()
+            .enumerate()
+            .filter(|(_, c)| c.discontinuous_at_reversal())
+        {
             for joint in &mut joints {
                 let smooth = filter.zero_phase(joint.a.column(c).clone_owned().as_slice())?;
                 joint.a.column_mut(c).copy_from_slice(&smooth);

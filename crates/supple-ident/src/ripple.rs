@@ -1,14 +1,14 @@
-//! Torque ripple of the motors from slow motion, best at constant speed: harmonics of the motor angle in what a model leaves.
+//! Torque ripple: harmonics of the motor angle in the residual of a model, best identified at constant low
+//! speed.
 //!
-//! The torque that the joints received but were not commanded, brought to the motors by `m2jp^T`, is
-//! fitted by sines and cosines of the motor angle. Beside them stand columns for what else a model may
-//! leave in slow motion (a constant, the direction, the speed, the angle), fitted and thrown away. Columns
-//! go through the filter that the torques went through. The harmonics with the largest amplitudes are kept
-//! where they stand out of the noise.
+//! The difference between received and commanded joint torque, transformed to the motors by `m2jp^T`, is fitted
+//! by sines and cosines of the motor angle. Nuisance columns (constant, direction, speed, angle) absorb other
+//! slow residuals and are discarded. All columns pass the filter of the torques. The largest significant
+//! harmonics are kept.
 
 use crate::error::{IdentError, positive};
 use crate::filter::LowPass;
-use crate::fit::{Fit, STEADY_RAD};
+use crate::fit::{Fit, STEADY_SLIDING_RAD};
 use crate::motion::Motion;
 use crate::regressor::joint_rows;
 use nalgebra::{DMatrix, DVector};
@@ -16,17 +16,17 @@ use supple_core::math::{cos, sin};
 use supple_core::ripple::{Harmonic, LINES};
 use supple_core::{Matrix, RippleTable, Vector};
 
-/// Amplitudes below so many standard deviations are noise.
+/// Minimum amplitude of a significant harmonic, in standard deviations.
 const SIGNIFICANT: f64 = 4.0;
-/// Columns for what else is left.
+/// Number of nuisance columns.
 const NUISANCE: usize = 5;
 
-/// What to look for.
+/// Options of the ripple fit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RippleSearch {
-    /// Harmonics of a motor turn, each 1 or more.
+    /// Harmonics of a motor revolution, each 1 or more.
     pub harmonics: Vec<u32>,
-    /// Faster samples are left out: the filter would have taken their ripple \[rad/s\].
+    /// Faster samples are excluded, since the filter removes their ripple \[rad/s\].
     pub fast_rad_per_s: f64,
 }
 
@@ -40,8 +40,8 @@ impl Default for RippleSearch {
     }
 }
 
-/// Ripple of every motor, from what `fit` leaves of `motions`. All joints must be among those that were
-/// identified: a motor may drive several.
+/// Ripple of every motor, from the residual of `fit` over `motions`. All joints must have been identified,
+/// since a motor may drive several.
 ///
 /// # Errors
 /// Options out of range; fewer slow samples than columns.
@@ -80,11 +80,11 @@ pub fn fit_ripple<const N: usize>(
             b.rows_mut(at, rows.nrows()).copy_from(torques);
             at += rows.nrows();
         }
-        let share = motions
+        let independent_fraction = motions
             .iter()
-            .map(|m| m.independent_share)
+            .map(|m| m.independent_fraction)
             .fold(1.0, f64::min);
-        *table = significant(&a, &b, search, share)?;
+        *table = significant(&a, &b, search, independent_fraction)?;
     }
     Ok(tables)
 }
@@ -102,7 +102,7 @@ fn motor_rows<const N: usize>(
         .try_inverse()
         .unwrap_or_else(Matrix::identity);
     let samples = motion.samples();
-    // Missing from the command: what the joints needed less what they were sent.
+    // Required torque minus commanded torque.
     let missing: Vec<DVector<f64>> = joints.iter().map(|j| &j.a * &fit.x - &j.b).collect();
     let torque = DVector::from_fn(samples, |i, _| {
         (0..N)
@@ -134,30 +134,31 @@ fn motor_rows<const N: usize>(
     if let Some(cutoff_hz) = motion.cutoff_hz {
         columns = LowPass::butterworth4(cutoff_hz, motion.rate_hz)?.zero_phase_columns(&columns)?;
     }
-    // Of the joints that the motor drives, all slide, and slowly.
+    // All joints that the motor drives are in slow, steady sliding.
     let slides = |i: usize| {
         (0..N)
             .filter(|j| joint_from_motor[(*j, motor)] != 0.0)
             .all(|j| {
-                joints[j].slid_rad[i] >= STEADY_RAD && joints[j].speed[i] <= search.fast_rad_per_s
+                joints[j].travel_since_reversal_rad[i] >= STEADY_SLIDING_RAD
+                    && joints[j].speed[i] <= search.fast_rad_per_s
             })
     };
     let kept: Vec<usize> = (0..samples).filter(|i| slides(*i)).collect();
     Ok((columns.select_rows(&kept), torque.select_rows(&kept)))
 }
 
-/// The largest harmonics that stand out of the noise.
+/// The largest significant harmonics.
 fn significant(
     a: &DMatrix<f64>,
     b: &DVector<f64>,
     search: &RippleSearch,
-    independent_share: f64,
+    independent_fraction: f64,
 ) -> Result<RippleTable, IdentError> {
     let singular = || IdentError::Singular {
-        problem: "the slow motion does not tell the harmonics apart".to_owned(),
+        problem: "the slow motion does not distinguish the harmonics".to_owned(),
         remedy: "move every joint over several turns of its motor",
     };
-    // Columns to unit length, so that angles squared do not drown the rest.
+    // Columns are scaled to unit length, so that squared angles do not dominate.
     let lengths: Vec<f64> = a
         .column_iter()
         .map(|c| c.norm().max(f64::MIN_POSITIVE))
@@ -169,7 +170,7 @@ fn significant(
     }
     let root = nalgebra::Cholesky::new(gram).ok_or_else(singular)?;
     let solution = root.solve(&scaled.tr_mul(b));
-    let freedom = (a.nrows() - a.ncols()) as f64 * independent_share;
+    let freedom = (a.nrows() - a.ncols()) as f64 * independent_fraction;
     let noise = (&scaled * &solution - b).norm() / freedom.max(1.0).sqrt();
     let inverse = root.inverse();
     let value = |j: usize| solution[j] / lengths[j];

@@ -1,25 +1,25 @@
-//! A fit as a description that the controller loads: TOML and URDF.
+//! Conversion of a fit to a description that the controller loads: TOML and URDF.
 
 use crate::error::IdentError;
 use crate::fit::Fit;
 use std::path::Path;
 use supple_core::RippleTable;
-use supple_model::{Description, ModelError, Replacement};
+use supple_model::{Description, IdentifiedModel, ModelError};
 
-/// Why a fit is not saved.
+/// Error of saving a fit.
 #[derive(Debug, thiserror::Error)]
 pub enum SaveError {
-    /// The fit is no arm.
+    /// The fit is physically inconsistent.
     #[error(transparent)]
     Fit(#[from] IdentError),
-    /// The description it would become is not sound, or cannot be written.
+    /// The resulting description is invalid or cannot be written.
     #[error(transparent)]
     Model(#[from] ModelError),
 }
 
 impl<const N: usize> Fit<N> {
-    /// `of` with the model found: inertias of all links, rotors and friction of the moving joints. The
-    /// text stays as it is otherwise. `ripple` replaces the motors' tables, if given.
+    /// `of` with the identified model: inertias of all links, rotors and friction of the moving joints. All
+    /// other text is unchanged. `ripple`, if given, replaces the motors' tables.
     ///
     /// # Errors
     /// [`SaveError`].
@@ -30,7 +30,7 @@ impl<const N: usize> Fit<N> {
     ) -> Result<Description, SaveError> {
         let error = 100.0 * self.training_relative;
         let source = format!("identified from logs; {error:.2} % of the torque left unexplained");
-        Ok(of.with_model(&Replacement {
+        Ok(of.with_model(&IdentifiedModel {
             arm: &self.arm()?,
             friction: &self.friction_with(of.friction()),
             ripple,

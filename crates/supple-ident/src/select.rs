@@ -1,71 +1,22 @@
-//! Which columns and options to use, decided by data that the fit has not seen.
+//! Model selection by cross-validation.
 //!
-//! The log is cut into consecutive parts; each is predicted from a fit to the others. Of the
-//! candidates within a small share of the least error, the one with the fewest columns is taken:
-//! columns that do not pay for themselves are left out.
+//! The log is divided into consecutive parts; each is predicted from a fit to the others. The candidate with
+//! the fewest columns among those within a tolerance of the smallest error is chosen.
 
+pub use crate::choice::{Candidate, Line, Table};
 use crate::columns::{Columns, FrictionColumns};
 use crate::error::IdentError;
-use crate::fit::{Options, Weights, fit_rows};
+use crate::fit::fit_rows;
+use crate::joint_rows::JointRows;
 use crate::motion::Motion;
-use crate::regressor::{JointRows, joint_rows};
-use std::fmt;
+use crate::options::{Options, Weights};
+use crate::regressor::joint_rows;
 use supple_core::Arm;
 
-/// Candidates that err by so much more than the best are as good.
+/// Relative tolerance within which candidates count as equally good.
 const TIE: f64 = 0.005;
 
-/// A set of options under a name.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Candidate {
-    /// Name in the table.
-    pub name: String,
-    /// What is tried.
-    pub options: Options,
-}
-
-/// One line of the table.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Line {
-    /// The candidate.
-    pub candidate: Candidate,
-    /// Its columns.
-    pub columns: usize,
-    /// `|tau - tau_hat| / |tau|` of each part, from a fit to the others; empty if none could be made.
-    pub parts: Vec<f64>,
-    /// The same over all parts, infinite if a fit could not be made.
-    pub total: f64,
-}
-
-/// All candidates, and which was chosen.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Table {
-    /// In the order given.
-    pub lines: Vec<Line>,
-    /// Position of the choice.
-    pub chosen: usize,
-}
-
-impl Table {
-    /// Options of the choice.
-    pub fn options(&self) -> &Options {
-        &self.lines[self.chosen].candidate.options
-    }
-}
-
-impl fmt::Display for Table {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "  columns  held-out error  candidate")?;
-        for (i, line) in self.lines.iter().enumerate() {
-            let mark = if i == self.chosen { '*' } else { ' ' };
-            let (total, name) = (100.0 * line.total, &line.candidate.name);
-            writeln!(f, "{mark} {:7}  {total:12.3} %  {name}", line.columns)?;
-        }
-        Ok(())
-    }
-}
-
-/// Friction from none to all of it, everything else as in `base`.
+/// Friction models from none to the richest, with all other options as in `base`.
 pub fn friction_candidates(base: &Options) -> Vec<Candidate> {
     let viscous = FrictionColumns {
         viscous: true,
@@ -105,7 +56,7 @@ pub fn friction_candidates(base: &Options) -> Vec<Candidate> {
     shapes.into_iter().map(candidate).collect()
 }
 
-/// Coulomb friction that does not depend on load, and that does; none where there is no such friction.
+/// Coulomb friction independent of load and load-dependent; empty without Coulomb friction.
 pub fn load_candidates(base: &Options) -> Vec<Candidate> {
     if !base.friction.coulomb {
         return Vec::new();
@@ -120,12 +71,12 @@ pub fn load_candidates(base: &Options) -> Vec<Candidate> {
             ..base.clone()
         },
     };
-    [("at any load the same", false), ("growing with load", true)]
+    [("independent of load", false), ("growing with load", true)]
         .map(candidate)
         .to_vec()
 }
 
-/// Widths of the band around rest, everything else as in `base`.
+/// Widths of the band around standstill, with all other options as in `base`.
 pub fn band_candidates(base: &Options) -> Vec<Candidate> {
     let candidate = |band_rad_per_s: f64| Candidate {
         name: format!("band {band_rad_per_s} rad/s"),
@@ -142,7 +93,7 @@ pub fn band_candidates(base: &Options) -> Vec<Candidate> {
         .to_vec()
 }
 
-/// Ways to weigh joints and samples, everything else as in `base`.
+/// Weightings of joints and samples, with all other options as in `base`.
 pub fn weights_candidates(base: &Options) -> Vec<Candidate> {
     let candidate = |(name, weights): (&str, Weights)| Candidate {
         name: name.to_owned(),
@@ -153,30 +104,30 @@ pub fn weights_candidates(base: &Options) -> Vec<Candidate> {
     };
     [
         ("equal weights", Weights::Equal),
-        ("weights by joint", Weights::Noise),
+        ("weights by joint", Weights::ByJointResidual),
         ("weights by joint, robust", Weights::Huber),
     ]
     .map(candidate)
     .to_vec()
 }
 
-/// Weights of the prior from heavy to light, everything else as in `base`.
+/// Weights of the prior from large to small, with all other options as in `base`.
 pub fn prior_candidates(base: &Options) -> Vec<Candidate> {
     let candidate = |weight: f64| Candidate {
         name: format!("prior {weight}"),
         options: Options {
-            consistent: Some(weight),
+            consistent_prior_weight: Some(weight),
             ..base.clone()
         },
     };
     [1e4, 1e3, 1e2, 1e1, 1.0, 0.1].map(candidate).to_vec()
 }
 
-/// Predicts every one of `parts` consecutive parts of each motion from the others.
+/// Cross-validates the candidates: predicts each of `parts` consecutive parts of every motion from the others.
 ///
 /// # Errors
-/// No candidates; fewer than two parts; columns that make no sense. A candidate that cannot be fitted
-/// is in the table with an infinite error, and only if that is all of them, the last reason is given.
+/// No candidates; fewer than two parts; invalid columns. A candidate whose fit fails has an infinite error in
+/// the table; if all fail, the last error is returned.
 pub fn compare<const N: usize>(
     nominal: &Arm<N>,
     motions: &[Motion],
@@ -188,7 +139,7 @@ pub fn compare<const N: usize>(
         return Err(IdentError::Option {
             option: "parts",
             value: parts as f64,
-            must: "2 or more, with at least one candidate",
+            must: "2 or more, with at lowest one candidate",
         });
     }
     let mut lines = Vec::new();
@@ -215,14 +166,14 @@ pub fn compare<const N: usize>(
             total,
         });
     }
-    let least = lines
+    let lowest = lines
         .iter()
         .map(|line| line.total)
         .fold(f64::INFINITY, f64::min);
-    if let (false, Some(reason)) = (least.is_finite(), reason) {
+    if let (false, Some(reason)) = (lowest.is_finite(), reason) {
         return Err(reason);
     }
-    let good = (0..lines.len()).filter(|i| lines[*i].total <= least * (1.0 + TIE));
+    let good = (0..lines.len()).filter(|i| lines[*i].total <= lowest * (1.0 + TIE));
     let chosen = good.min_by(|a, b| {
         let (a, b) = (&lines[*a], &lines[*b]);
         a.columns.cmp(&b.columns).then(a.total.total_cmp(&b.total))
@@ -235,7 +186,7 @@ pub fn compare<const N: usize>(
 
 type Fold = Vec<Vec<JointRows>>;
 
-/// For each part, the rows of every motion and joint.
+/// The rows of every motion and joint, for each part.
 fn folds<const N: usize>(
     nominal: &Arm<N>,
     columns: &Columns,
@@ -266,7 +217,7 @@ fn held_out<const N: usize>(
     options: &Options,
 ) -> Result<(Vec<f64>, f64), IdentError> {
     let (mut errors, mut error, mut torque) = (Vec::new(), 0.0, 0.0);
-    // Reduced here, before the folds are copied: each serves all fits but one.
+    // Reduce before the folds are copied: each is used by all fits but one.
     for rows in folds.iter().flatten().flatten() {
         rows.block(options.slow_rad_per_s);
     }
@@ -277,11 +228,11 @@ fn held_out<const N: usize>(
             .collect();
         let fit = fit_rows(nominal, columns.clone(), &others, 1.0, options)?;
         let rows = || fold.iter().flatten();
-        let wrong: f64 = rows().map(|r| (&r.a * &fit.x - &r.b).norm_squared()).sum();
-        let size: f64 = rows().map(|r| r.b.norm_squared()).sum();
-        errors.push((wrong / size).sqrt());
-        error += wrong;
-        torque += size;
+        let residual: f64 = rows().map(|r| (&r.a * &fit.x - &r.b).norm_squared()).sum();
+        let scale: f64 = rows().map(|r| r.b.norm_squared()).sum();
+        errors.push((residual / scale).sqrt());
+        error += residual;
+        torque += scale;
     }
     Ok((errors, (error / torque).sqrt()))
 }

@@ -1,13 +1,13 @@
-//! A Fourier series as plain lists, its number of joints no longer in its type: what files and other
-//! languages hold of [`Fourier`].
+//! A Fourier series ([`Fourier`]) as plain lists with a run-time number of joints, for files and other
+//! languages.
 
-use crate::design::LONGEST_S;
+use crate::design::MAX_DURATION_S;
 use crate::error::{IdentError, shape_error};
 use serde::{Deserialize, Serialize};
 use supple_core::Vector;
 use supple_core::trajectory::{Fourier, HARMONICS};
 
-/// The fields of [`Fourier`]; a list a harmonic, a number a joint.
+/// The fields of [`Fourier`]: one list for each harmonic, one number for each joint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SeriesLists {
     /// Constant term of each joint \[rad\].
@@ -20,7 +20,7 @@ pub struct SeriesLists {
     pub angular_frequency_rad_per_s: f64,
     /// Time from rest to rest \[s\].
     pub duration_s: f64,
-    /// Time over which the pace grows and falls \[s\].
+    /// Time over which the speed ramps up and down \[s\].
     pub ramp_s: f64,
 }
 
@@ -69,8 +69,8 @@ impl SeriesLists {
             Ok(found)
         };
         for (name, value) in [("duration_s", self.duration_s), ("ramp_s", self.ramp_s)] {
-            if !(0.0..=LONGEST_S).contains(&value) {
-                let expected = format!("0 to {LONGEST_S} s");
+            if !(0.0..=MAX_DURATION_S).contains(&value) {
+                let expected = format!("0 to {MAX_DURATION_S} s");
                 return Err(shape_error(name, expected, format!("{value} s")));
             }
         }
@@ -92,7 +92,7 @@ mod tests {
     use supple_core::trajectory::Fourier;
 
     #[test]
-    fn lists_are_the_series_and_wrong_ones_are_named() {
+    fn lists_convert_back_to_the_series_and_invalid_ones_are_rejected() {
         let mut series = Fourier::<3>::at_rest(Vector::repeat(0.2), 0.5);
         series.sine_rad[1][2] = 0.7;
         series.cosine_rad[4][0] = -0.1;

@@ -1,4 +1,4 @@
-//! A fit against data it has not seen.
+//! Validation of a fit on held-out data.
 
 use crate::error::IdentError;
 use crate::fit::Fit;
@@ -11,34 +11,34 @@ use nalgebra::{Cholesky, DMatrix};
 use std::f64::consts::PI;
 use supple_core::Vector;
 
-/// Random poses tried.
+/// Number of random poses.
 pub const POSES: usize = 2000;
 
-/// How well torques are predicted.
+/// Prediction errors of a fit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Validation {
     /// RMS error of each moving joint \[N m\].
     pub rms_nm: Vec<f64>,
     /// `|tau - tau_hat| / |tau|` of each moving joint.
     pub relative: Vec<f64>,
-    /// The same over all moving joints.
+    /// Relative error over all moving joints.
     pub total_relative: f64,
-    /// Share of random poses, all angles within half a turn, with a positive definite mass matrix.
+    /// Fraction of random poses, all angles within half a turn, with a positive definite mass matrix.
     pub positive_definite: f64,
 }
 
 impl<const N: usize> Fit<N> {
-    /// Prepares `log` as the fitted ones were, predicts its torques and compares.
+    /// Prepares `log` like the fitted logs, predicts its torques and compares.
     ///
     /// # Errors
-    /// What [`Log::check`] refuses.
+    /// A log that [`Log::check`] rejects.
     pub fn validate(&self, log: &Log) -> Result<Validation, IdentError> {
         let moving = self.columns.moving();
         let (motion, _) = Motion::prepare(log, N, moving, &self.preparation)?;
         self.validate_motion(&motion)
     }
 
-    /// Predicts the torques of `motion` and compares; nothing is left out.
+    /// Predicts the torques of `motion` and compares; uses every sample.
     ///
     /// # Errors
     /// [`IdentError::Shape`] if the motion has another number of joints.
@@ -59,12 +59,12 @@ impl<const N: usize> Fit<N> {
             rms_nm,
             relative,
             total_relative: (error / torque).sqrt(),
-            positive_definite: self.positive_definite_share()?,
+            positive_definite: self.positive_definite_fraction()?,
         })
     }
 
-    /// Torques of the moving joints over a motion, (samples, moving joints), dry friction filtered as the
-    /// measured torques were \[N m\].
+    /// Predicted torques of the moving joints, (samples, moving joints), with dry friction filtered like the
+    /// measured torques \[N m\].
     ///
     /// # Errors
     /// [`IdentError::Shape`] if the motion has another number of joints.
@@ -72,33 +72,33 @@ impl<const N: usize> Fit<N> {
         let joints = joint_rows(self.nominal(), &self.columns, motion)?;
         let mut predicted = DMatrix::zeros(motion.samples(), joints.len());
         for (row, (joint, measured)) in joints.iter().zip(self.columns.moving()).enumerate() {
-            // The rows leave out what rotors that are taken as known need.
+            // Add the torque of known rotors, which the rows do not include.
             let known = motion.tau.column(*measured) - &joint.b;
             predicted.set_column(row, &(&joint.a * &self.x + known));
         }
         Ok(predicted)
     }
 
-    fn positive_definite_share(&self) -> Result<f64, IdentError> {
+    fn positive_definite_fraction(&self) -> Result<f64, IdentError> {
         let mut random = Random::new(1);
-        let mut sound = 0;
+        let mut positive_definite = 0;
         for _ in 0..POSES {
             let q = Vector::<N>::from_fn(|_, _| PI * random.signed());
             let mass = mass_matrix(self.nominal(), &self.columns, &self.x, &q)?;
-            sound += usize::from(Cholesky::new(mass).is_some());
+            positive_definite += usize::from(Cholesky::new(mass).is_some());
         }
-        Ok(sound as f64 / POSES as f64)
+        Ok(positive_definite as f64 / POSES as f64)
     }
 }
 
 impl Validation {
-    /// In plain words whether a controller can use the model, and why not.
+    /// Verdict as text: whether a controller can use the model, and if not, why.
     pub fn verdict(&self) -> String {
-        let share = 100.0 * self.positive_definite;
+        let percent = 100.0 * self.positive_definite;
         let error = 100.0 * self.total_relative;
         if self.positive_definite < 1.0 {
             return format!(
-                "not usable: the mass matrix is positive definite in {share:.1} % of poses; \
+                "not usable: the mass matrix is positive definite in {percent:.1} % of poses; \
                  use the physically consistent method"
             );
         }
@@ -109,7 +109,7 @@ impl Validation {
             );
         }
         format!(
-            "sound: {error:.2} % torque error on held-out data, positive definite everywhere tried"
+            "good: {error:.2} % torque error on held-out data, positive definite in all poses tried"
         )
     }
 }

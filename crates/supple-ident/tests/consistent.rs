@@ -1,26 +1,27 @@
-//! The constrained solution against its optimality conditions, known solutions and random rivals.
+//! The constrained solution compared with its optimality conditions, known solutions and random feasible
+//! points.
 
 mod support;
 
 use supple_core::math::Vector;
-use supple_ident::compress::Block;
 use supple_ident::consistent::{Constraints, Solution, pseudo_inertia, solve};
+use supple_ident::qr_reduction::ReducedSystem;
 use supple_ident::regressor::JointRows;
 use supple_ident::{DMatrix, DVector};
 use support::Noise;
 
 type Link = Vector<10>;
 
-fn block(a: DMatrix<f64>, b: DVector<f64>) -> Block {
+fn block(a: DMatrix<f64>, b: DVector<f64>) -> ReducedSystem {
     let speed = vec![1.0; b.len()];
-    Block::of(&JointRows::new(a, b, speed), 0.0, None)
+    JointRows::new(a, b, speed).reduced(0.0, None)
 }
 
 fn ball() -> Link {
     Link::from_column_slice(&[2.0, 0.2, 0.0, -0.1, 0.05, 0.0, 0.06, 0.0, 0.0, 0.05])
 }
 
-fn objective(problem: &Block, c: &Constraints, x: &DVector<f64>) -> Option<f64> {
+fn objective(problem: &ReducedSystem, c: &Constraints, x: &DVector<f64>) -> Option<f64> {
     let mut value = 0.5 * problem.error_squared(x);
     for (k, prior) in c.links.iter().enumerate() {
         let p = pseudo_inertia(&x.fixed_rows::<10>(10 * k).into_owned());
@@ -36,8 +37,9 @@ fn objective(problem: &Block, c: &Constraints, x: &DVector<f64>) -> Option<f64> 
     (!c.not_negative.iter().any(broken)).then_some(value)
 }
 
-/// Noisy equations of two links and four friction columns, whose plain solution no arm has.
-fn hard(seed: u64, prior_weight: f64) -> (Block, Constraints) {
+/// Noisy equations of two links and four friction columns, whose unconstrained solution is physically
+/// inconsistent.
+fn hard(seed: u64, prior_weight: f64) -> (ReducedSystem, Constraints) {
     let mut noise = Noise(seed);
     let a = DMatrix::from_fn(60, 24, |_, _| noise.draw());
     let b = DVector::from_fn(60, |_, _| 2.0 * noise.draw());
@@ -56,7 +58,7 @@ fn hard(seed: u64, prior_weight: f64) -> (Block, Constraints) {
 }
 
 #[test]
-fn no_feasible_neighbour_is_better_than_the_certificate_allows() {
+fn no_feasible_neighbour_is_better_than_the_optimality_gap() {
     for seed in 1..20 {
         let (problem, constraints) = hard(seed, 1e-3);
         let found = solve(&problem, &constraints).unwrap();
@@ -67,7 +69,7 @@ fn no_feasible_neighbour_is_better_than_the_certificate_allows() {
         for round in 0..2000 {
             let size = 10.0_f64.powi(-(round % 6));
             let step = DVector::from_fn(24, |_, _| size * noise.draw());
-            // Towards the middle of the feasible set as well: most random steps leave it.
+            // Also step towards the middle of the feasible set, since most random steps leave it.
             let middle = DVector::from_fn(24, |i, _| match i {
                 0..20 => ball()[i % 10],
                 20 | 21 => 1.0,
@@ -78,9 +80,9 @@ fn no_feasible_neighbour_is_better_than_the_certificate_allows() {
             if let Some(other) = objective(&problem, &constraints, &rival) {
                 feasible += 1;
                 assert!(
-                    other >= value - found.gap - 1e-9,
+                    other >= value - found.optimality_gap - 1e-9,
                     "{other} {value} {}",
-                    found.gap
+                    found.optimality_gap
                 );
             }
         }
@@ -94,7 +96,11 @@ fn no_feasible_neighbour_is_better_than_the_certificate_allows() {
 fn multipliers_are_dual_feasible_and_complementary() {
     for seed in 1..20 {
         let (problem, c) = hard(seed, 1e-3);
-        let Solution { x, gap, .. } = solve(&problem, &c).unwrap();
+        let Solution {
+            x,
+            optimality_gap: gap,
+            ..
+        } = solve(&problem, &c).unwrap();
         let smooth = problem.a().tr_mul(&(problem.a() * &x - problem.b()));
         for (k, prior) in c.links.iter().enumerate() {
             let p = pseudo_inertia(&x.fixed_rows::<10>(10 * k).into_owned());
@@ -143,7 +149,7 @@ fn an_unconstrained_optimum_inside_the_set_is_found_exactly() {
 }
 
 #[test]
-fn without_data_the_model_comes_back() {
+fn without_data_the_solution_is_the_prior() {
     let constraints = Constraints {
         links: vec![ball()],
         not_negative: vec![],
@@ -157,10 +163,10 @@ fn without_data_the_model_comes_back() {
     }
 }
 
-/// One unknown, worked by hand: the mass that a torque pulls below zero stays above it, friction ends
+/// One unknown, solved by hand: a mass whose unconstrained estimate is negative stays positive, friction ends
 /// at its bound.
 #[test]
-fn a_pull_below_zero_ends_at_the_bound() {
+fn an_estimate_below_zero_stops_at_the_bound() {
     let mut a = DMatrix::zeros(1, 11);
     a[(0, 10)] = 1.0;
     let constraints = Constraints {
@@ -174,7 +180,7 @@ fn a_pull_below_zero_ends_at_the_bound() {
 }
 
 #[test]
-fn refuses_a_model_that_is_no_body_and_weights_that_are_none() {
+fn rejects_an_inconsistent_prior_and_invalid_weights() {
     let (problem, good) = hard(1, 1.0);
     let mut bad = good.clone();
     bad.links[1][4] = 1.0;

@@ -1,4 +1,4 @@
-//! A fit as a description: what is saved is what was found.
+//! A fit as a description: the saved model equals the fit.
 
 mod support;
 
@@ -19,7 +19,7 @@ fn state(noise: &mut Noise) -> [Vector<4>; 3] {
 fn options() -> Options {
     Options {
         friction: FrictionColumns::COULOMB,
-        consistent: Some(1e-3),
+        consistent_prior_weight: Some(1e-3),
         ..Options::default()
     }
 }
@@ -45,16 +45,16 @@ fn a_saved_fit_is_loaded_as_the_same_arm() {
     for j in [0, 1, 3] {
         assert_eq!(config.friction[j], found.friction()[j]);
     }
-    // What was held keeps what was known.
+    // Held joints keep their known parameters.
     assert_eq!(config.friction[2], description.friction()[2]);
     assert_eq!(loaded.settings().joints.len(), 4);
-    // Comments and limits stay.
+    // Comments and limits are unchanged.
     assert!(loaded.toml().contains("# 42 x 1.8"));
     assert_eq!(loaded.settings().limits, description.settings().limits);
 }
 
 #[test]
-fn a_prediction_is_the_torque_of_the_arm_found_and_its_friction() {
+fn a_prediction_is_the_torque_of_the_identified_arm_and_its_friction() {
     let description = Description::asset("wam4").unwrap();
     let arm = description.arm::<4>().unwrap();
     let joints = [0, 1, 2, 3];
@@ -71,7 +71,7 @@ fn a_prediction_is_the_torque_of_the_arm_found_and_its_friction() {
 }
 
 #[test]
-fn an_arm_without_motors_or_entries_of_its_joints_is_given_them() {
+fn missing_motor_and_joint_entries_are_added() {
     let urdf = Description::asset("wam3").unwrap().urdf().to_owned();
     let description = Description::from_text(
         "name = \"a\"\nurdf = \"b.urdf\"\ntip_frame = \"tip\"\n",

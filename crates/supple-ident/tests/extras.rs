@@ -1,4 +1,4 @@
-//! Design, ripple, learning and payload, each against an arm that is known.
+//! Design, ripple, learning and payload, each compared with a known arm.
 
 mod support;
 
@@ -7,7 +7,7 @@ use supple_core::math::{Matrix3, Vector3};
 use supple_core::ripple::Harmonic;
 use supple_core::{Body, Friction, Matrix, RippleTable, Vector};
 use supple_ident::design::{
-    Criterion, Design, Workspace, constant_speed_series, design, slow_series,
+    Criterion, DesignOptions, Workspace, constant_speed_series, design, slow_series,
 };
 use supple_ident::learn::with_payload;
 use supple_ident::payload::{parameters_of, payload, torque_scale};
@@ -26,7 +26,7 @@ fn wam4() -> supple_core::Config<4> {
 fn options() -> Options {
     Options {
         friction: FrictionColumns::COULOMB,
-        consistent: Some(1e-4),
+        consistent_prior_weight: Some(1e-4),
         ..Options::default()
     }
 }
@@ -40,11 +40,11 @@ fn a_design_improves_and_stays_within_every_limit() {
         upper_m: [1.0, 1.0, 1.0],
     };
     for criterion in [Criterion::Condition, Criterion::DOptimality] {
-        let request = Design {
+        let request = DesignOptions {
             candidates: 120,
             criterion,
             workspace: Some(workspace),
-            ..Design::of(&ALL)
+            ..DesignOptions::of(&ALL)
         };
         let mut calls = 0;
         let found = design(&config, &home, &request, &mut |_, _| calls += 1).unwrap();
@@ -64,7 +64,7 @@ fn a_design_improves_and_stays_within_every_limit() {
             let at = found.series.at(0.03 * f64::from(i));
             let tip = tip_pose(&config.arm, &at.position_rad).translation;
             for axis in 0..3 {
-                // Between the points that were judged it can be out by a little.
+                // Between the evaluated points the limits may be exceeded slightly.
                 assert!(tip[axis] > workspace.lower_m[axis] - 5e-3);
                 assert!(tip[axis] < workspace.upper_m[axis] + 5e-3);
             }
@@ -80,12 +80,12 @@ fn a_design_improves_and_stays_within_every_limit() {
 }
 
 #[test]
-fn a_subset_moves_alone() {
+fn only_the_given_joints_move() {
     let description = Description::asset("wam4").unwrap();
     let (config, home) = (wam4(), description.home::<4>().unwrap());
-    let request = Design {
+    let request = DesignOptions {
         candidates: 40,
-        ..Design::of(&[1, 3])
+        ..DesignOptions::of(&[1, 3])
     };
     let found = design(&config, &home, &request, &mut |_, _| {}).unwrap();
     let slow = slow_series(&config, &home, &[1, 3], 0.1, 30.0).unwrap();
@@ -100,7 +100,7 @@ fn a_subset_moves_alone() {
 }
 
 #[test]
-fn runs_at_constant_speed_are() {
+fn constant_speed_runs_have_constant_speed() {
     let description = Description::asset("wam4").unwrap();
     let (config, home) = (wam4(), description.home::<4>().unwrap());
     let (speed, period_s) = (0.05, 40.0);
@@ -110,7 +110,7 @@ fn runs_at_constant_speed_are() {
     for joint in ALL {
         let (mut there, mut back, mut fastest) = (0, 0, 0.0_f64);
         for i in 0..steady {
-            // One period at full pace.
+            // One period at full speed.
             let at =
                 run.at(run.ramp_s + (period_s - run.ramp_s) * f64::from(i) / f64::from(steady));
             let v = at.velocity_rad_per_s[joint];
@@ -133,15 +133,15 @@ fn runs_at_constant_speed_are() {
 }
 
 #[test]
-fn a_workspace_that_no_motion_meets_is_refused() {
+fn a_workspace_that_no_motion_meets_is_rejected() {
     let description = Description::asset("wam4").unwrap();
-    let request = Design {
+    let request = DesignOptions {
         candidates: 10,
         workspace: Some(Workspace {
             lower_m: [5.0; 3],
             upper_m: [6.0; 3],
         }),
-        ..Design::of(&ALL)
+        ..DesignOptions::of(&ALL)
     };
     let home = description.home::<4>().unwrap();
     let error = design(&wam4(), &home, &request, &mut |_, _| {}).unwrap_err();
@@ -149,7 +149,7 @@ fn a_workspace_that_no_motion_meets_is_refused() {
 }
 
 #[test]
-fn ripple_is_found_at_its_harmonics_and_nowhere_else() {
+fn ripple_is_identified_at_its_harmonics_only() {
     let config = wam4();
     let motor_from_joint = config.joint_from_motor.try_inverse().unwrap();
     let friction = [Friction::coulomb(1.0, 0.5); 4];
@@ -179,7 +179,7 @@ fn ripple_is_found_at_its_harmonics_and_nowhere_else() {
     assert!(got[2].harmonics().is_empty(), "{:?}", got[2]);
 }
 
-/// Slow motion of the joints with the torque that motors with ripple are sent.
+/// Slow motion of the joints with the torque commanded to motors with ripple.
 fn rippled(
     arm: &supple_core::Arm<4>,
     friction: &[Friction; 4],
@@ -217,13 +217,13 @@ fn rippled(
         qd,
         qdd,
         tau,
-        independent_share: 1.0,
+        independent_fraction: 1.0,
         cutoff_hz: None,
     }
 }
 
 #[test]
-fn friction_that_is_a_tenth_off_is_learnt_from_what_was_not_predicted() {
+fn a_friction_error_of_10_percent_is_learnt_from_the_residual() {
     let arm = wam4().arm;
     let truth: [Friction; 4] = std::array::from_fn(|j| Friction {
         breakaway_nm: 0.66,
@@ -245,7 +245,7 @@ fn friction_that_is_a_tenth_off_is_learnt_from_what_was_not_predicted() {
         assert!((viscous - 1.0).abs() < 2e-3, "{viscous}");
         assert!(learnt.after_nm[j] < 0.05 * learnt.before_nm[j]);
     }
-    // What did not move is left alone.
+    // Joints that did not move are unchanged.
     assert_eq!(
         (learnt.friction[0], learnt.friction[2]),
         (model[0], model[2])
@@ -253,7 +253,7 @@ fn friction_that_is_a_tenth_off_is_learnt_from_what_was_not_predicted() {
 }
 
 #[test]
-fn a_body_in_the_hand_is_learnt_beside_friction() {
+fn a_payload_is_learnt_together_with_friction() {
     let arm = wam4().arm;
     let friction = [Friction::coulomb(1.0, 0.5); 4];
     let held = nalgebra_vector([0.5, 0.02, -0.01, 0.03]);
@@ -300,7 +300,7 @@ fn carrying(arm: &supple_core::Arm<4>, body: &Body) -> supple_core::Arm<4> {
 }
 
 #[test]
-fn a_payload_is_found_and_a_known_one_gives_the_torque_scale() {
+fn a_payload_is_identified_and_a_known_one_gives_the_torque_scale() {
     let arm = wam4().arm;
     let friction = [Friction::coulomb(1.0, 0.5); 4];
     let empty = motion(&arm, &friction, &ALL, 1500, 5);
@@ -317,8 +317,8 @@ fn a_payload_is_found_and_a_known_one_gives_the_torque_scale() {
     assert!((got.mass_kg - 2.0).abs() < 0.02, "{}", got.mass_kg);
     assert!((got.com_m - weight().com_m).amax() < 5e-3, "{}", got.com_m);
 
-    // The same arm through amplifiers that report a share of the torque, another on each joint; the
-    // rotors are once to be found, once taken as known.
+    // The same arm with amplifiers that report a fraction of the torque, different for each joint; the rotors
+    // are once identified and once taken as known.
     let shares = [0.9, 0.8, 1.15, 0.7];
     let scaled = |mut data: Motion| {
         for (j, share) in shares.into_iter().enumerate() {
@@ -329,7 +329,7 @@ fn a_payload_is_found_and_a_known_one_gives_the_torque_scale() {
     let (empty, loaded) = ([scaled(empty)], [scaled(loaded)]);
     for rotor in [true, false] {
         let plain = Options {
-            consistent: None,
+            consistent_prior_weight: None,
             rotor,
             ..options()
         };
@@ -339,7 +339,7 @@ fn a_payload_is_found_and_a_known_one_gives_the_torque_scale() {
             let got = scale[joint].expect("the weight moves with every joint");
             assert!((got * share - 1.0).abs() < 0.01, "joint {joint}: {got}");
         }
-        // Nothing in the hand tells nothing.
+        // Without a payload no scale is determined.
         let none = torque_scale(&found, &empty, &empty, &weight()).unwrap();
         assert_eq!(none, [None; 4]);
     }

@@ -1,4 +1,4 @@
-//! Filter, derivative and grid against SciPy's numbers and against signals with a known answer.
+//! Filter, derivative and grid compared with SciPy's numbers and with analytic results.
 
 use std::f64::consts::TAU;
 use supple_ident::filter::{LowPass, differentiate};
@@ -84,7 +84,7 @@ fn passes_a_slow_wave_unshifted_and_halves_the_amplitude_at_the_cutoff() {
 }
 
 #[test]
-fn refuses_what_it_cannot_filter() {
+fn rejects_signals_that_it_cannot_filter() {
     assert!(LowPass::butterworth4(50.0, 100.0).is_err());
     assert!(LowPass::butterworth4(-1.0, 100.0).is_err());
     let filter = LowPass::butterworth4(8.0, 100.0).unwrap();
@@ -104,7 +104,7 @@ fn differences_are_exact_for_parabolas() {
 }
 
 #[test]
-fn a_line_on_an_irregular_clock_stays_a_line() {
+fn resampling_an_irregular_log_preserves_a_line() {
     let t: Vec<f64> = (0..100)
         .map(|i| f64::from(i) * 0.01 + 0.002 * f64::from(i).sin())
         .collect();
@@ -137,9 +137,9 @@ fn a_regular_log_keeps_its_samples() {
     assert!((motion.q - log(601).q_rad).amax() < 1e-12);
 }
 
-/// A log that starts and ends in full motion: no made-up acceleration is left at its ends.
+/// A log that starts and ends in full motion has no spurious acceleration at its ends.
 #[test]
-fn the_filters_transient_is_cut_off() {
+fn filter_transients_are_discarded() {
     let preparation = Preparation {
         keep_every: 2,
         ..Preparation::default()
@@ -165,7 +165,7 @@ fn the_filters_transient_is_cut_off() {
 }
 
 #[test]
-fn bad_logs_are_refused_by_column_with_a_remedy() {
+fn invalid_logs_are_rejected_with_column_and_remedy() {
     let refused = |change: fn(&mut Log), column: &str| {
         let mut bad = log(600);
         change(&mut bad);
@@ -200,7 +200,7 @@ fn bad_logs_are_refused_by_column_with_a_remedy() {
 }
 
 #[test]
-fn a_joint_that_rests_is_accepted_when_it_is_held() {
+fn a_resting_joint_is_accepted_if_it_is_held() {
     let mut held = log(600);
     held.q_rad.column_mut(1).fill(0.3);
     assert!(held.check(2, &[0]).unwrap().is_empty());

@@ -1,4 +1,4 @@
-//! The paper's estimate recovers the ten combinations of the published set, and only those.
+//! The paper's estimator recovers exactly the ten determined combinations of the published set.
 
 use supple_core::Vector;
 use supple_ident::paper::{estimate, with_psi};
@@ -36,7 +36,7 @@ fn motion(truth: &Parameters, samples: usize) -> Motion {
         qd,
         qdd,
         tau,
-        independent_share: 1.0,
+        independent_fraction: 1.0,
         cutoff_hz: None,
     }
 }
@@ -54,7 +54,7 @@ fn recovers_the_ten_published_combinations_from_noise_free_data() {
 }
 
 #[test]
-fn the_null_space_ties_the_moments_of_the_base_and_the_member_is_the_least() {
+fn the_null_space_couples_the_inertias_and_the_solution_has_minimum_norm() {
     let truth = Parameters::PUBLISHED;
     let found = estimate(&truth, &motion(&truth, 1600)).unwrap();
     let names = Parameters::PSI_NAMES.map(str::to_owned);
@@ -99,7 +99,7 @@ fn standard_deviations_cover_the_errors_of_noisy_data() {
 }
 
 #[test]
-fn refuses_few_samples_and_joints_that_rest() {
+fn rejects_too_few_samples_and_resting_joints() {
     let truth = Parameters::PUBLISHED;
     let short = estimate(&truth, &motion(&truth, 1599)).unwrap_err();
     assert!(short.to_string().contains("1600"));

@@ -1,4 +1,4 @@
-//! Random arms identified from what they did.
+//! Random arms are identified from their motion and torques.
 
 mod support;
 
@@ -16,7 +16,7 @@ fn friction<const N: usize>() -> [Friction; N] {
     })
 }
 
-/// Torques of two arms at random states, apart from what friction and rotors share.
+/// Torques of two arms at random states, without friction and rotors.
 fn furthest<const N: usize>(a: &Arm<N>, b: &Arm<N>, moving: &[usize]) -> f64 {
     let mut noise = Noise(99);
     let mut worst: f64 = 0.0;
@@ -68,10 +68,10 @@ fn arm_is_given_back(seed: u64) -> Result<(), TestCaseError> {
         motion(&truth, &friction(), &joints, 600, seed),
         motion(&truth, &friction(), &joints, 400, seed + 1),
     ];
-    for weights in [Weights::Equal, Weights::Noise, Weights::Huber] {
+    for weights in [Weights::Equal, Weights::ByJointResidual, Weights::Huber] {
         let options = Options {
             weights,
-            consistent: None,
+            consistent_prior_weight: None,
             ..Options::default()
         };
         let fit = fit(&model, &data, &joints, &options).unwrap();
@@ -108,15 +108,15 @@ proptest! {
         let mut data = exact.clone();
         let mut noise = Noise(seed);
         data.tau.iter_mut().for_each(|t| *t += amplitude_nm * noise.draw());
-        // Some of these arms hardly move: no sample may be left out.
+        // Some of these arms hardly move, so no sample may be excluded.
         let options = Options { slow_rad_per_s: 0.0, ..Options::default() };
         let fit = fit(&truth, &[data], &joints, &options).unwrap();
         prop_assert!(fit.arm().is_ok());
         prop_assert!(fit.friction().iter().all(|f| f.validate().is_ok()));
         let checked = fit.validate_motion(&motion(&truth, &friction(), &joints, 200, seed + 3)).unwrap();
         prop_assert_eq!(checked.positive_definite, 1.0);
-        // Of noise of `sigma`, least squares leave `sigma sqrt(p / n)` in the torques of the motion itself:
-        // its square is that of p independent draws. Half as much again is out of their reach.
+        // For noise of `sigma`, least squares leave an error of `sigma sqrt(p / n)` in the torques of the
+        // motion itself: its square is the sum over p independent draws. A margin of 50 % covers them.
         let sigma_nm = amplitude_nm / 3.0_f64.sqrt();
         let expected_nm = sigma_nm * (fit.rank() as f64 / samples as f64).sqrt();
         let itself = fit.validate_motion(&exact).unwrap();
@@ -125,30 +125,30 @@ proptest! {
     }
 }
 
-/// Singular regressors whose singular values an inexact solver has got wrong in the third digit.
+/// Singular regressors for which an inexact solver gave singular values wrong in the third digit.
 #[test]
-fn regressors_that_are_hard_to_decompose_give_the_arm_back() {
+fn ill_conditioned_regressors_recover_the_arm() {
     for seed in [634, 658] {
         arm_is_given_back(seed).unwrap();
     }
 }
 
 #[test]
-fn consistent_fits_of_good_data_are_the_arm() {
+fn consistent_fits_of_exact_data_recover_the_arm() {
     let truth = random_arm::<4>(11);
     let joints = [0, 1, 2, 3];
     let data = motion(&truth, &friction(), &joints, 1500, 3);
     let options = Options {
-        consistent: Some(1e-6),
+        consistent_prior_weight: Some(1e-6),
         ..Options::default()
     };
     let fit = fit(&truth, &[data], &joints, &options).unwrap();
     assert!(furthest(&truth, &fit.arm().unwrap(), &joints) < 1e-3);
-    assert!(fit.gap.unwrap() > 0.0);
+    assert!(fit.optimality_gap.unwrap() > 0.0);
 }
 
 #[test]
-fn a_joint_that_is_too_slow_throughout_is_refused() {
+fn a_joint_without_fast_samples_is_rejected() {
     let truth = random_arm::<4>(13);
     let joints = [0, 1, 2, 3];
     let data = motion(&truth, &friction(), &joints, 400, 3);
@@ -161,39 +161,39 @@ fn a_joint_that_is_too_slow_throughout_is_refused() {
 }
 
 #[test]
-fn held_joints_are_neither_needed_nor_touched() {
+fn held_joints_are_not_required_and_stay_unchanged() {
     let truth = random_arm::<4>(21);
     let moving = [1, 3];
     let mut data = motion(&truth, &friction(), &moving, 800, 5);
     data.tau.column_mut(0).fill(f64::NAN);
     let options = Options {
-        consistent: Some(1e-2),
+        consistent_prior_weight: Some(1e-2),
         ..Options::default()
     };
     let fit = fit(&truth, &[data], &moving, &options).unwrap();
     let arm = fit.arm().unwrap();
     assert!(furthest(&truth, &arm, &moving) < 1e-3);
-    // Nothing moved the first link: the model's own comes back.
+    // The first link was not moved: its parameters are those of the nominal model.
     let (before, after) = (parameters(&truth)[0], parameters(&arm)[0]);
     assert!((before - after).amax() < 1e-4);
     assert_eq!(fit.friction()[0].coulomb_nm, 0.0);
 }
 
 #[test]
-fn the_dip_is_found_in_the_second_stage_and_does_not_bias_the_first() {
+fn the_stribeck_effect_is_fitted_in_the_second_stage_without_bias_of_the_first() {
     let truth = random_arm::<3>(31);
-    let dip: [Friction; 3] = std::array::from_fn(|_| Friction {
+    let stribeck: [Friction; 3] = std::array::from_fn(|_| Friction {
         breakaway_nm: 1.4,
         stribeck_rad_per_s: 0.05,
         ..Friction::coulomb(1.0, 1.0)
     });
-    let data = motion(&truth, &dip, &[0, 1, 2], 3000, 4);
+    let data = motion(&truth, &stribeck, &[0, 1, 2], 3000, 4);
     let options = Options {
         friction: FrictionColumns {
             stribeck_rad_per_s: Some(0.05),
             ..FrictionColumns::COULOMB
         },
-        consistent: Some(1e-6),
+        consistent_prior_weight: Some(1e-6),
         slow_rad_per_s: 0.3,
         ..Options::default()
     };
@@ -213,7 +213,7 @@ fn the_dip_is_found_in_the_second_stage_and_does_not_bias_the_first() {
 }
 
 #[test]
-fn a_motor_that_turns_with_two_joints_is_told_apart() {
+fn a_motor_coupled_to_two_joints_is_identified() {
     let truth = random_arm::<3>(41);
     let none = [Friction::coulomb(0.5, 0.2); 3];
     let mut data = motion(&truth, &none, &[0, 1, 2], 1500, 6);
@@ -226,7 +226,7 @@ fn a_motor_that_turns_with_two_joints_is_told_apart() {
     }
     let options = Options {
         couplings: vec![(1, 2)],
-        consistent: Some(1e-6),
+        consistent_prior_weight: Some(1e-6),
         ..Options::default()
     };
     let fit = fit(&truth, &[data], &[0, 1, 2], &options).unwrap();
@@ -236,9 +236,9 @@ fn a_motor_that_turns_with_two_joints_is_told_apart() {
     assert!((value("S1+2") - 0.4).abs() < 1e-3, "{}", value("S1+2"));
 }
 
-/// Each joint's friction grows by a twentieth of what its gear passes on to the links.
+/// Each joint's friction grows by 5 % of the torque that its gear transmits to the links.
 #[test]
-fn friction_that_grows_with_load_is_told_apart() {
+fn load_dependent_friction_is_identified() {
     let truth = random_arm::<3>(43);
     let weightless_rotors = Arm::from_links(
         *truth.links(),
@@ -265,7 +265,7 @@ fn friction_that_grows_with_load_is_told_apart() {
             load: true,
             ..FrictionColumns::OFFSET
         },
-        consistent: Some(1e-6),
+        consistent_prior_weight: Some(1e-6),
         ..Options::default()
     };
     let fit = fit(&truth, &[loaded(9)], &[0, 1, 2], &options).unwrap();
@@ -273,7 +273,7 @@ fn friction_that_grows_with_load_is_told_apart() {
     for j in 0..3 {
         let value = fit.x[names.iter().position(|n| *n == format!("L{j}")).unwrap()];
         assert!((value - 0.05).abs() < 1e-4, "{value}");
-        // The controller, which knows no load, gets what the joint needed on average.
+        // The controller's friction law has no load term; it receives the friction at the mean load.
         let coulomb_nm = fit.friction()[j].coulomb_nm - friction::<3>()[j].coulomb_nm;
         let mean_nm = 0.05 * fit.load_nm[j];
         assert!(
@@ -297,7 +297,7 @@ fn the_rank_of_an_arm_does_not_depend_on_the_log() {
     let options = Options {
         rotor: false,
         friction: FrictionColumns::NONE,
-        consistent: None,
+        consistent_prior_weight: None,
         slow_rad_per_s: 0.0,
         ..Options::default()
     };

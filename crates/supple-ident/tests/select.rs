@@ -1,4 +1,4 @@
-//! Cross-validation finds the friction that was there, and does not pay for what was not.
+//! Cross-validation finds the true friction terms and rejects superfluous ones.
 
 mod support;
 
@@ -25,8 +25,8 @@ fn base() -> Options {
 }
 
 #[test]
-fn the_friction_that_was_there_is_chosen() {
-    let dip = Friction {
+fn the_true_friction_model_is_chosen() {
+    let stribeck = Friction {
         breakaway_nm: 3.0,
         stribeck_rad_per_s: 0.5,
         ..Friction::coulomb(0.6, 1.0)
@@ -40,7 +40,7 @@ fn the_friction_that_was_there_is_chosen() {
         (Friction::coulomb(2.0, 0.0), "viscous"),
         (Friction::coulomb(0.6, 1.0), "viscous, Coulomb"),
         (offset, "viscous, Coulomb, offset"),
-        (dip, "viscous, Coulomb, Stribeck 0.5 rad/s"),
+        (stribeck, "viscous, Coulomb, Stribeck 0.5 rad/s"),
     ];
     for (friction, expected) in cases {
         let model = random_arm::<3>(61);
@@ -54,7 +54,7 @@ fn the_friction_that_was_there_is_chosen() {
 }
 
 #[test]
-fn friction_that_does_not_grow_with_load_is_not_said_to() {
+fn load_independent_friction_is_not_reported_as_load_dependent() {
     let model = random_arm::<3>(61);
     let options = Options {
         friction: FrictionColumns::COULOMB,
@@ -86,12 +86,12 @@ fn friction_that_does_not_grow_with_load_is_not_said_to() {
 }
 
 #[test]
-fn a_prior_far_from_the_arm_is_not_trusted_and_the_right_one_is() {
+fn a_wrong_prior_gets_a_small_weight_and_a_right_one_a_large_weight() {
     let data = [noisy(Friction::coulomb(0.6, 1.0))];
     let weight = |model| {
         let table = compare(&model, &data, &JOINTS, &prior_candidates(&base()), 4).unwrap();
         assert!(table.to_string().lines().count() == 7);
-        table.options().consistent.unwrap()
+        table.options().consistent_prior_weight.unwrap()
     };
     let right = random_arm::<3>(61);
     let mut links = *right.links();
@@ -110,7 +110,7 @@ fn a_prior_far_from_the_arm_is_not_trusted_and_the_right_one_is() {
 }
 
 #[test]
-fn refuses_one_part_and_no_candidates() {
+fn rejects_a_single_part_and_an_empty_list() {
     let data = [noisy(Friction::NONE)];
     let model = random_arm::<3>(61);
     assert!(compare(&model, &data, &JOINTS, &friction_candidates(&base()), 1).is_err());

@@ -1,5 +1,5 @@
-//! A real Stäubli TX40, joints 5 and 6 coupled by a gear: fitted on the first half of its log, judged on
-//! the second. See `data/tx40/README.md`.
+//! A real Stäubli TX40, joints 5 and 6 coupled by a gear: fitted on the first half of its log, validated on the
+//! second. See `data/tx40/README.md`.
 
 use std::f64::consts::FRAC_PI_2;
 use supple_ident::{DMatrix, Log, Preparation, Procedure, identify};
@@ -77,11 +77,11 @@ fn the_second_half_is_predicted_from_the_first() {
     let second = part(&whole, half..whole.t_s.len());
     let fit = identify(&arm, &[first], &procedure).unwrap();
     for choice in &fit.choices {
-        println!("{}\n{}", choice.of, choice.table);
+        println!("{}\n{}", choice.subject, choice.table);
     }
     let checked = fit.validate(&second).unwrap();
     println!("{} {:.2?}", checked.verdict(), checked.relative);
-    fit.arm().expect("every link is a body");
+    fit.arm().expect("every link is physically consistent");
     assert_eq!(checked.positive_definite, 1.0);
     assert!(checked.total_relative < 0.117, "{}", checked.total_relative);
 }

@@ -1,9 +1,9 @@
-//! Why two processes cannot talk.
+//! Errors of the communication between processes.
 
 use crate::message::MessageError;
 use std::path::PathBuf;
 
-/// Why shared memory cannot be set up or used.
+/// Error of setting up or using shared memory.
 #[derive(Debug, thiserror::Error)]
 pub enum IpcError {
     /// A prefix that cannot be part of a file name.
@@ -12,23 +12,23 @@ pub enum IpcError {
          SUPPLE_PREFIX"
     )]
     Prefix {
-        /// What was given.
+        /// Prefix that was given.
         found: String,
     },
     /// The folder for sockets and service files.
     #[error("the folder {} cannot be used: {cause}; {remedy}", folder.display())]
     Folder {
-        /// Which.
+        /// The object or folder.
         folder: PathBuf,
-        /// Why.
+        /// Cause.
         cause: String,
-        /// What to do about it.
+        /// Remedy.
         remedy: &'static str,
     },
-    /// Another process writes already.
+    /// Another process is already the writer of this service.
     #[error(
-        "{service} has its writer already, under the prefix `{prefix}`: end the other process, or choose \
-         another --prefix"
+        "another process already writes {service} under the prefix `{prefix}`: end it, or choose another \
+         --prefix"
     )]
     SecondWriter {
         /// Name of the service.
@@ -36,71 +36,80 @@ pub enum IpcError {
         /// The prefix.
         prefix: String,
     },
-    /// As many readers as there may be.
-    #[error("{service} has all the readers that it may have: end one, such as a `supple status`")]
+    /// The maximum number of readers is connected.
+    #[error("{service} has the maximum number of readers: end one, such as a `supple status`")]
     TooManyReaders {
         /// Name of the service.
         service: String,
     },
-    /// As many of one kind as there may be.
+    /// All slots of one kind of client are in use.
     #[error(
-        "all {places} places of {kind} are taken, by processes {holders}: end one, also one that is stopped"
+        "all {slots} slots for {kind} are in use by processes {holders}: end one of them (a stopped process \
+         holds its slot too)"
     )]
-    NoPlace {
-        /// Who takes such places.
+    NoFreeSlot {
+        /// Kind of client.
         kind: &'static str,
-        /// How many there are.
-        places: usize,
-        /// Numbers of the processes that hold them.
+        /// Number of slots.
+        slots: usize,
+        /// Ids of the processes that hold them.
         holders: String,
     },
-    /// The other side is of another version.
+    /// The other process uses another version of the message type.
     #[error(
-        "{service} was set up by another version of this software: it carries {expected} here; end all \
-         processes under the prefix `{prefix}` and start them from one build"
+        "{service} was created by another version of this software (this version expects the type {expected}); \
+         end all processes under the prefix `{prefix}` and start them from one build"
     )]
     Version {
         /// Name of the service.
         service: String,
-        /// Type that this process knows.
+        /// Message type of this process.
         expected: &'static str,
         /// The prefix.
         prefix: String,
     },
-    /// No memory for the ports of a process.
+    /// Not enough shared memory for the ports of a process.
     #[error(
-        "/dev/shm has {} MB free, {} MB are wanted: remove what is not needed there, or make it larger \
+        "/dev/shm has {} MB free, {} MB are needed: delete unused files there, or enlarge it \
          (mount -o remount,size=256M /dev/shm; for a container --shm-size=256m)",
-        free_bytes / 1_000_000, wanted_bytes.div_ceil(1_000_000)
+        free_bytes / 1_000_000, needed_bytes.div_ceil(1_000_000)
     )]
-    NoRoom {
-        /// What the process reserves at its start \[bytes\].
-        wanted_bytes: u64,
-        /// What is there \[bytes\].
+    SharedMemoryFull {
+        /// Memory that the process allocates at its start \[bytes\].
+        needed_bytes: u64,
+        /// Free memory \[bytes\].
         free_bytes: u64,
     },
-    /// Somebody else's object under a name of this system.
+    /// An object of another user has a name of this system.
     #[error(
-        "{} belongs to user {owner} and is named as an object of the system `{prefix}`: have it removed, or choose \
-         another --prefix", object.display()
+        "{} belongs to user {owner} but has the name of an object of the system `{prefix}`: ask that user to \
+         remove it, or choose another --prefix", object.display()
     )]
     Foreign {
-        /// Which.
+        /// The object or folder.
         object: PathBuf,
-        /// Number of the user.
+        /// User id.
         owner: u32,
         /// The prefix.
         prefix: String,
     },
-    /// What the library reports besides.
+    /// Any other error of iceoryx2.
     #[error("{service}: {cause}; `ls /dev/shm` shows what is there, a reboot clears it")]
     Service {
-        /// Name of the service, or what was tried.
+        /// Name of the service or the operation.
         service: String,
-        /// What the library says.
+        /// Error of iceoryx2.
         cause: String,
     },
-    /// A message that does not fit.
+    /// A message for another arm, or an invalid one.
     #[error(transparent)]
     Message(#[from] MessageError),
+}
+
+/// A service that failed for a reason that iceoryx2 or the system states.
+pub(crate) fn failed(service: &str, cause: &dyn core::fmt::Display) -> IpcError {
+    IpcError::Service {
+        service: service.to_owned(),
+        cause: cause.to_string(),
+    }
 }

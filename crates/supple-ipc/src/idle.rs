@@ -1,14 +1,14 @@
-//! The request for idle, on a way of its own: one datagram to the controller, one back.
+//! Idle requests over a separate socket: one datagram to the controller, one datagram back.
 //!
-//! It takes no place of a reader or an operator, no shared memory and no lock, and waits in no queue: hung clients, a
-//! full `/dev/shm` and a process that is stopped while it joins do not hold it up. All that ask at the same time ask for
-//! the same, so that none has to be refused for want of room. The socket is in the system's folder, for its owner alone.
+//! An idle request uses no reader or operator slot, no shared memory, no lock and no queue, so hung clients, a full
+//! `/dev/shm` or a process stopped while it joins cannot block it. Simultaneous requests are identical and are merged,
+//! so none is ever refused for lack of space. Only the owner can open the socket, which is in the system's folder.
 
-use crate::bell::failed;
 use crate::domain::Domain;
 use crate::error::IpcError;
 use crate::message::{OperatorReply, Outcome, Text};
-use crate::writer_identity::drawn;
+use crate::wake::failed;
+use crate::writer_identity::random_id;
 use core::time::Duration;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
@@ -22,59 +22,60 @@ use std::time::Instant;
 use supple_core::codes;
 use supple_core::controller::Mode;
 
-/// What a request begins with.
+/// Header of a request.
 const REQUEST: &[u8; 8] = b"idle.v1\n";
-/// Length of a request: that, and the number of the question.
+/// Length of a request: the header and the request id \[bytes\].
 const REQUEST_BYTES: usize = 16;
-/// Length of an answer before its words: number of the question, cycle, outcome, mode.
+/// Length of a reply without its text: request id, cycle, outcome, mode \[bytes\].
 const ANSWER_BYTES: usize = 18;
-/// Askers that wait for an answer; of more, those that came first hear nothing, and what they asked for happens.
-const ASKERS: usize = 64;
-/// How long an asker waits before it asks again.
-const ASK_AGAIN: Duration = Duration::from_millis(100);
-/// How long it waits for room in the controller's socket.
-const ROOM_AGAIN: Duration = Duration::from_millis(1);
+/// Maximum number of clients waiting for a reply. Beyond it the oldest client gets no reply; its request is carried out
+/// all the same.
+const MAX_PENDING_CLIENTS: usize = 64;
+/// Time after which a client repeats its request.
+const RETRY_INTERVAL: Duration = Duration::from_millis(100);
+/// Time between attempts to send while the controller's receive buffer is full.
+const SEND_RETRY_INTERVAL: Duration = Duration::from_millis(1);
 
 fn path(domain: &Domain) -> PathBuf {
     let name = format!("{}.idle.socket", domain.prefix());
     domain.folder().join(name)
 }
 
-/// What became of a request for idle.
+/// Result of an idle request.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct IdleAnswer {
-    /// Cycle in which it was heard.
+    /// Cycle in which the controller received the request.
     pub cycle: u64,
-    /// What became of it.
+    /// Whether the controller accepted it.
     pub outcome: Outcome,
-    /// Mode after it, if this version knows it.
+    /// Mode after the request, if this version knows it.
     pub mode: Option<Mode>,
-    /// Why not, where refused.
-    pub words: String,
+    /// Reason for a refusal; empty otherwise.
+    pub text: String,
 }
 
-/// The controller's end.
+/// Receives the idle requests in the controller's process.
 #[derive(Debug)]
 pub struct IdleServer {
     socket: UnixDatagram,
     path: PathBuf,
-    askers: Vec<Asker>,
+    pending: Vec<PendingClient>,
 }
 
 #[derive(Debug)]
-struct Asker {
+struct PendingClient {
     address: SocketAddr,
-    question: [u8; 8],
-    /// In which look it came.
-    look: u64,
+    request_id: [u8; 8],
+    /// Number of the receive call that read this request.
+    batch: u64,
 }
 
 impl IdleServer {
-    /// Takes the controller's place. To be called by who has that of a [`ControllerLink`](crate::ControllerLink): the
-    /// socket of another is replaced.
+    /// Creates the controller's socket and replaces an existing one. Only the process that holds the
+    /// [`ControllerLink`](crate::ControllerLink) may call this.
     ///
     /// # Errors
-    /// [`IpcError::Folder`] where the socket cannot be made.
+    /// [`IpcError::Folder`] if the socket cannot be created.
     pub fn new(domain: &Domain) -> Result<IdleServer, IpcError> {
         let path = path(domain);
         let made = || -> io::Result<UnixDatagram> {
@@ -84,7 +85,7 @@ impl IdleServer {
             }
             let socket = UnixDatagram::bind(&path)?;
             fs::set_permissions(&path, Permissions::from_mode(0o600))?;
-            // Nobody who does not read his answer holds up the others.
+            // Non-blocking: a client that does not read its reply must not delay the others.
             socket.set_nonblocking(true)?;
             Ok(socket)
         };
@@ -96,16 +97,16 @@ impl IdleServer {
         Ok(IdleServer {
             socket,
             path,
-            askers: Vec::with_capacity(ASKERS),
+            pending: Vec::with_capacity(MAX_PENDING_CLIENTS),
         })
     }
 
-    /// Waits for requests at most for `timeout`, and takes in all that are there as those of look `look`. Gives whether
-    /// there are any.
+    /// Waits for requests for at most `timeout`, reads all pending ones, and labels them with the batch number `batch`.
+    /// Returns whether there were any.
     ///
     /// # Errors
     /// [`IpcError::Service`].
-    pub fn look(&mut self, look: u64, timeout: Duration) -> Result<bool, IpcError> {
+    pub fn receive_requests(&mut self, batch: u64, timeout: Duration) -> Result<bool, IpcError> {
         let timeout = Timespec::try_from(timeout).unwrap_or_default();
         let mut waited = [PollFd::new(&self.socket, PollFlags::IN)];
         match poll(&mut waited, Some(&timeout)) {
@@ -113,54 +114,54 @@ impl IdleServer {
             Ok(_) => {}
             Err(error) => return Err(failed("idle", &error.into())),
         }
-        let mut asked = false;
-        // More than wait at a time are not taken in one look.
-        for _ in 0..ASKERS {
+        let mut any = false;
+        // One call reads at most as many requests as may be pending.
+        for _ in 0..MAX_PENDING_CLIENTS {
             let mut request = [0; REQUEST_BYTES + 1];
             match self.socket.recv_from(&mut request) {
                 Ok((REQUEST_BYTES, address)) if request.starts_with(REQUEST) => {
-                    let mut question = [0; 8];
-                    question.copy_from_slice(&request[8..REQUEST_BYTES]);
-                    if self.askers.len() == ASKERS {
-                        self.askers.remove(0);
+                    let mut request_id = [0; 8];
+                    request_id.copy_from_slice(&request[8..REQUEST_BYTES]);
+                    if self.pending.len() == MAX_PENDING_CLIENTS {
+                        self.pending.remove(0);
                     }
-                    self.askers.push(Asker {
+                    self.pending.push(PendingClient {
                         address,
-                        question,
-                        look,
+                        request_id,
+                        batch,
                     });
-                    asked = true;
+                    any = true;
                 }
-                // Something else: nobody's request.
+                // Not a request: ignored.
                 Ok(_) => {}
                 Err(error) if error.kind() == ErrorKind::WouldBlock => break,
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
                 Err(error) => return Err(failed("idle", &error)),
             }
         }
-        Ok(asked)
+        Ok(any)
     }
 
-    /// Somebody waits for an answer.
-    pub fn is_asked(&self) -> bool {
-        !self.askers.is_empty()
+    /// Whether a client waits for a reply.
+    pub fn has_pending(&self) -> bool {
+        !self.pending.is_empty()
     }
 
-    /// Answers all who came in look `reply.sequence` or before.
+    /// Sends `reply` to all clients whose batch number is at most `reply.sequence`.
     pub fn answer(&mut self, reply: &OperatorReply) {
-        let words = reply.text.as_str().as_bytes();
-        let mut answer = Vec::with_capacity(ANSWER_BYTES + words.len());
-        self.askers.retain(|asker| {
-            if asker.look > reply.sequence {
+        let text = reply.text.as_str().as_bytes();
+        let mut answer = Vec::with_capacity(ANSWER_BYTES + text.len());
+        self.pending.retain(|client| {
+            if client.batch > reply.sequence {
                 return true;
             }
             answer.clear();
-            answer.extend(asker.question);
+            answer.extend(client.request_id);
             answer.extend(reply.cycle.to_le_bytes());
             answer.extend([reply.outcome, reply.mode]);
-            answer.extend(words);
-            // Who asked may have gone, or asks again.
-            let _ = self.socket.send_to_addr(&answer, &asker.address);
+            answer.extend(text);
+            // The client may have terminated; if it still waits, it repeats its request.
+            let _ = self.socket.send_to_addr(&answer, &client.address);
             false
         });
     }
@@ -168,39 +169,39 @@ impl IdleServer {
 
 impl Drop for IdleServer {
     fn drop(&mut self) {
-        // The next one removes what is left.
+        // If this fails, the next server removes the file.
         let _ = fs::remove_file(&self.path);
     }
 }
 
-/// Asks the controller of a system for idle, and waits for its answer at most for `timeout`; `None` where none came.
-/// Takes nothing that others may have used up.
+/// Requests idle from the controller and waits for the reply for at most `timeout`; returns `None` if no reply came.
+/// Uses no resource that other clients can exhaust.
 ///
 /// # Errors
-/// [`IpcError::Service`] where the system gives no socket.
-pub fn ask_for_idle(domain: &Domain, timeout: Duration) -> Result<Option<IdleAnswer>, IpcError> {
-    asked(&path(domain), timeout).map_err(|error| failed("idle", &error))
+/// [`IpcError::Service`] if no socket can be created.
+pub fn request_idle(domain: &Domain, timeout: Duration) -> Result<Option<IdleAnswer>, IpcError> {
+    request_idle_at(&path(domain), timeout).map_err(|error| failed("idle", &error))
 }
 
-fn asked(path: &std::path::Path, timeout: Duration) -> io::Result<Option<IdleAnswer>> {
+fn request_idle_at(path: &std::path::Path, timeout: Duration) -> io::Result<Option<IdleAnswer>> {
     let start = Instant::now();
-    let question = drawn()?;
-    // An address without a file: it needs no room on a disk, and nobody knows it before. A socket that is connected
-    // takes from its peer alone.
-    let address = SocketAddr::from_abstract_name(format!("supple-idle-{question:016x}"))?;
-    let question = question.to_le_bytes();
+    let request_id = random_id()?;
+    // An abstract address: it needs no disk space and cannot be guessed. A connected socket receives from its peer
+    // only.
+    let address = SocketAddr::from_abstract_name(format!("supple-idle-{request_id:016x}"))?;
+    let request_id = request_id.to_le_bytes();
     let socket = UnixDatagram::bind_addr(&address)?;
     socket.set_nonblocking(true)?;
     let mut request = [0; REQUEST_BYTES];
     request[..8].copy_from_slice(REQUEST);
-    request[8..].copy_from_slice(&question);
+    request[8..].copy_from_slice(&request_id);
     loop {
         let sent = socket.connect(path).and_then(|()| socket.send(&request));
         let wait = match sent {
-            Ok(_) => ASK_AGAIN,
+            Ok(_) => RETRY_INTERVAL,
             Err(error) => match error.kind() {
-                // Others ask too: what is wanted happens, but this one wants to hear of it.
-                ErrorKind::WouldBlock => ROOM_AGAIN,
+                // The receive buffer is full of identical requests, so idle will happen; retry to get a reply.
+                ErrorKind::WouldBlock => SEND_RETRY_INTERVAL,
                 ErrorKind::NotFound | ErrorKind::ConnectionRefused | ErrorKind::NotConnected => {
                     return Ok(None);
                 }
@@ -208,7 +209,7 @@ fn asked(path: &std::path::Path, timeout: Duration) -> io::Result<Option<IdleAns
             },
         };
         let left = timeout.saturating_sub(start.elapsed());
-        if let Some(answer) = heard(&socket, &question, wait.min(left))? {
+        if let Some(answer) = receive_answer(&socket, &request_id, wait.min(left))? {
             return Ok(Some(answer));
         }
         if start.elapsed() >= timeout {
@@ -217,10 +218,10 @@ fn asked(path: &std::path::Path, timeout: Duration) -> io::Result<Option<IdleAns
     }
 }
 
-/// The answer to a question, waited for.
-fn heard(
+/// Waits for the answer to a request.
+fn receive_answer(
     socket: &UnixDatagram,
-    question: &[u8; 8],
+    request_id: &[u8; 8],
     timeout: Duration,
 ) -> io::Result<Option<IdleAnswer>> {
     let timeout = Timespec::try_from(timeout).unwrap_or_default();
@@ -232,20 +233,20 @@ fn heard(
     loop {
         match socket.recv(&mut answer) {
             Ok(length) => {
-                if let Some(answer) = read(&answer[..length], question) {
+                if let Some(answer) = read(&answer[..length], request_id) {
                     return Ok(Some(answer));
                 }
             }
             Err(error) if error.kind() == ErrorKind::Interrupted => {}
-            // A controller that has gone meanwhile: the next attempt finds nobody.
+            // The controller has terminated; the next attempt to connect fails.
             Err(_) => return Ok(None),
         }
     }
 }
 
-fn read(answer: &[u8], question: &[u8; 8]) -> Option<IdleAnswer> {
-    let (head, words) = answer.split_at_checked(ANSWER_BYTES)?;
-    if !head.starts_with(question) {
+fn read(answer: &[u8], request_id: &[u8; 8]) -> Option<IdleAnswer> {
+    let (head, text) = answer.split_at_checked(ANSWER_BYTES)?;
+    if !head.starts_with(request_id) {
         return None;
     }
     let cycle = head[8..16].try_into().ok()?;
@@ -253,13 +254,13 @@ fn read(answer: &[u8], question: &[u8; 8]) -> Option<IdleAnswer> {
         cycle: u64::from_le_bytes(cycle),
         outcome: Outcome::from_code(head[16]),
         mode: codes::mode(head[17]),
-        words: String::from_utf8_lossy(words).into_owned(),
+        text: String::from_utf8_lossy(text).into_owned(),
     })
 }
 
-/// A reply to all who asked for idle in a look or before.
+/// Reply to all idle requests up to a batch number.
 pub fn idle_reply(
-    look: u64,
+    batch: u64,
     cycle: u64,
     mode: Mode,
     outcome: Outcome,
@@ -267,7 +268,7 @@ pub fn idle_reply(
 ) -> OperatorReply {
     OperatorReply {
         operator: 0,
-        sequence: look,
+        sequence: batch,
         cycle,
         text,
         outcome: outcome as u8,
@@ -284,46 +285,48 @@ mod tests {
 
     fn system() -> (tempfile::TempDir, Domain) {
         let folder = tempfile::tempdir().expect("a folder");
-        let domain = Domain::within(&folder.path().join("run"), "idle").expect("a domain");
+        let domain = Domain::in_folder(&folder.path().join("run"), "idle").expect("a domain");
         (folder, domain)
     }
 
     #[test]
-    fn many_who_ask_at_once_all_hear_the_answer() {
+    fn simultaneous_clients_all_get_the_reply() {
         let (_folder, domain) = system();
         let mut server = IdleServer::new(&domain).expect("a server");
         std::thread::scope(|scope| {
-            let askers: Vec<_> = (0..ASKERS)
-                .map(|_| scope.spawn(|| ask_for_idle(&domain, SOON)))
+            let clients: Vec<_> = (0..MAX_PENDING_CLIENTS)
+                .map(|_| scope.spawn(|| request_idle(&domain, SOON)))
                 .collect();
-            let mut look = 0;
-            while askers.iter().any(|asker| !asker.is_finished()) {
-                look += 1;
-                server.look(look, Duration::from_millis(1)).expect("read");
-                let words = Text::of(&"no");
-                server.answer(&idle_reply(look, 7, Mode::Idle, Outcome::Refused, words));
+            let mut batch = 0;
+            while clients.iter().any(|client| !client.is_finished()) {
+                batch += 1;
+                server
+                    .receive_requests(batch, Duration::from_millis(1))
+                    .expect("read");
+                let text = Text::of(&"no");
+                server.answer(&idle_reply(batch, 7, Mode::Idle, Outcome::Refused, text));
             }
-            for asker in askers {
-                let answer = asker.join().expect("no panic").expect("asked");
+            for client in clients {
+                let answer = client.join().expect("no panic").expect("requested");
                 let expected = IdleAnswer {
                     cycle: 7,
                     outcome: Outcome::Refused,
                     mode: Some(Mode::Idle),
-                    words: "no".to_owned(),
+                    text: "no".to_owned(),
                 };
                 assert_eq!(answer, Some(expected));
             }
         });
-        assert!(!server.is_asked());
+        assert!(!server.has_pending());
     }
 
     #[test]
-    fn who_came_after_the_look_that_was_answered_waits_on() {
+    fn clients_of_a_later_batch_keep_waiting() {
         let (_folder, domain) = system();
         let mut server = IdleServer::new(&domain).expect("a server");
-        let nobody_answers = ask_for_idle(&domain, Duration::from_millis(1));
-        assert_eq!(nobody_answers.expect("asked"), None);
-        assert!(server.look(5, SOON).expect("read"));
+        let without_server = request_idle(&domain, Duration::from_millis(1));
+        assert_eq!(without_server.expect("requested"), None);
+        assert!(server.receive_requests(5, SOON).expect("read"));
         server.answer(&idle_reply(
             4,
             1,
@@ -331,7 +334,7 @@ mod tests {
             Outcome::Accepted,
             Text::EMPTY,
         ));
-        assert!(server.is_asked());
+        assert!(server.has_pending());
         server.answer(&idle_reply(
             5,
             1,
@@ -339,31 +342,31 @@ mod tests {
             Outcome::Accepted,
             Text::EMPTY,
         ));
-        assert!(!server.is_asked());
+        assert!(!server.has_pending());
     }
 
     #[test]
-    fn what_is_no_request_asks_for_nothing() {
+    fn invalid_datagrams_are_ignored() {
         let (_folder, domain) = system();
         let mut server = IdleServer::new(&domain).expect("a server");
-        let stranger = UnixDatagram::unbound().expect("a socket");
+        let sender = UnixDatagram::unbound().expect("a socket");
         for bytes in [&b""[..], b"idle", &[0xff; 16], &[b'i'; 400]] {
-            stranger.send_to(bytes, path(&domain)).expect("sent");
+            sender.send_to(bytes, path(&domain)).expect("sent");
         }
-        assert!(!server.look(1, SOON).expect("read"));
-        assert!(!server.is_asked());
+        assert!(!server.receive_requests(1, SOON).expect("read"));
+        assert!(!server.has_pending());
     }
 
     #[test]
-    fn without_a_controller_there_is_no_answer_and_no_waiting() {
+    fn without_a_controller_the_idle_request_returns_at_once() {
         let (_folder, domain) = system();
-        assert_eq!(ask_for_idle(&domain, SOON).expect("asked"), None);
+        assert_eq!(request_idle(&domain, SOON).expect("requested"), None);
         drop(IdleServer::new(&domain).expect("a server"));
-        assert_eq!(ask_for_idle(&domain, SOON).expect("asked"), None);
+        assert_eq!(request_idle(&domain, SOON).expect("requested"), None);
     }
 
     #[test]
-    fn the_socket_is_the_owners_alone() {
+    fn only_the_owner_can_open_the_socket() {
         let (_folder, domain) = system();
         let _server = IdleServer::new(&domain).expect("a server");
         let about = fs::metadata(path(&domain)).expect("there");

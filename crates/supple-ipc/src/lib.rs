@@ -1,21 +1,21 @@
-//! What the processes of one system say to each other, in shared memory on one machine.
+//! Messages between the processes of one system, over shared memory on one machine.
 //!
 //! | service | message | writer | readers |
 //! |---|---|---|---|
 //! | `arm_state` | [`ArmState`](message::ArmState) | the plant: `supple-sim` or `supple-can` | the controller |
 //! | `torque_command` | [`TorqueCommand`](message::TorqueCommand) | the controller: `supple-rt` | the plant |
-//! | `plant_asleep` | [`PlantAsleep`](message::PlantAsleep) | the plant | the controller |
+//! | `wake_request` | [`WakeRequest`](message::WakeRequest) | the plant | the controller |
 //! | `telemetry` | [`Telemetry`](message::Telemetry) | the controller | up to 8 |
 //! | `operator_request` | [`OperatorRequest`](message::OperatorRequest) | up to 8 operators | the controller |
 //! | `operator_reply` | [`OperatorReply`](message::OperatorReply) | the controller | up to 8 |
 //!
-//! The services are iceoryx2's. Each has one writer, requests apart: they command nothing and are checked by the
-//! controller. A writer holds a lock, and its messages carry the number that it drew: readers of states and commands
-//! drop those of others. Of the readers and operators, 5 may be such as look or ask for something; 3 places are kept for
-//! what keeps a system running. A request for idle has a way of its own ([`ask_for_idle`]), which needs no place.
-//! Publishing and receiving allocate nothing; all memory is given at the start. Everything is for
-//! one user alone and apart from other systems by a prefix, see [`Domain`]; a peer of another version is
-//! refused ([`IpcError::Version`]).
+//! The services are iceoryx2 publish-subscribe services. Each has exactly one writer, except `operator_request`, whose
+//! messages the controller checks before it acts on them. A writer holds a file lock and puts a random id into each
+//! message; readers of states and commands discard messages with another id. Of the 8 telemetry readers and the 8
+//! operators, 5 are general clients and 3 slots are reserved for the programs that run the system. Idle requests use a
+//! separate socket ([`request_idle`]) and need no slot. Publishing and receiving allocate nothing; all memory is
+//! allocated at the start. Only one user can access a system, and a prefix separates it from other systems, see
+//! [`Domain`]; a peer of another version is refused ([`IpcError::Version`]).
 //!
 //! ```
 //! use core::time::Duration;
@@ -23,7 +23,7 @@
 //! use supple_ipc::{ControllerLink, Domain, PlantLink};
 //!
 //! let folder = tempfile::tempdir()?;
-//! let domain = Domain::within(&folder.path().join("run"), "example")?;
+//! let domain = Domain::in_folder(&folder.path().join("run"), "example")?;
 //! let (plant, controller) = (PlantLink::new(&domain)?, ControllerLink::new(&domain)?);
 //! let position_rad = [Some(0.0), Some(-1.8), Some(0.0), None];
 //! let report = PlantReport::default();
@@ -36,23 +36,26 @@
 
 #![forbid(unsafe_code)]
 
-mod bell;
+mod cleanup;
+mod client_slot;
 mod domain;
 mod error;
 mod idle;
-mod last_out;
+mod join;
 mod link;
+mod membership;
 pub mod message;
-mod outside;
-mod place;
+mod operator_link;
+mod pause;
 mod port;
 mod shared_memory;
-mod turn;
+mod wake;
 mod writer_identity;
 
 pub use domain::{DEFAULT_PREFIX, Domain, PREFIX_VARIABLE};
 pub use error::IpcError;
-pub use idle::{IdleAnswer, IdleServer, ask_for_idle, idle_reply};
-pub use link::{ControllerLink, Heard, PlantLink, Woken};
-pub use outside::{Operator, OutsideLink, TELEMETRY_DEPTH, TelemetryReader, pause};
-pub use port::Full;
+pub use idle::{IdleAnswer, IdleServer, idle_reply, request_idle};
+pub use link::{ControllerLink, PlantLink, ReceivedAnswer, WakeEvent};
+pub use operator_link::{OperatorClient, OperatorServer, TELEMETRY_DEPTH, TelemetryReader};
+pub use pause::pause;
+pub use port::Backpressure;

@@ -1,163 +1,167 @@
-//! The control path: arm states one way, torque commands the other, a bell for each.
+//! The control path: arm states from plant to controller, torque commands back, each with a wake-up socket.
 //!
-//! The plant owns the clock: it publishes a state and rings, the controller answers with the command of the
-//! same cycle. Neither waits for the other without a bound. Where both share a processor, whatever
-//! the controller does between its answer and its sleep keeps the plant waiting: so the plant rings before a state
-//! too, when there is time for everything else, and is rung back only where it said that it goes to sleep. It says so
-//! before it does, and looks once more: of the answer and the word, one always comes in time for the other.
+//! The plant owns the clock: it publishes a state and wakes the controller; the controller answers with the command of
+//! the same cycle. Every wait has a timeout. If both processes share a processor, any work that the controller does
+//! after its answer delays the plant. The plant therefore wakes the controller once more shortly before each state, and
+//! the controller does its other work then. The controller notifies the plant only if the plant is blocked: before it
+//! blocks, the plant publishes a [`WakeRequest`] and then checks for the answer once more. So either the plant sees the
+//! answer, or the controller sees the request.
 
-use crate::bell::{Awoken, Bell, Ring, Rope};
+use crate::cleanup::SharedMemoryCleanup;
 use crate::domain::Domain;
 use crate::error::IpcError;
-use crate::last_out::LastOut;
-use crate::message::{ArmState, PlantAsleep, TorqueCommand};
-use crate::port::{Full, Reader, Terms, Writer};
-use crate::writer_identity::KnownWriter;
+use crate::message::{ArmState, TorqueCommand, WakeRequest};
+use crate::port::{Backpressure, QualityOfService, Reader, Writer};
+use crate::wake::{WaitResult, WakeReason, WakeReceiver, WakeSender};
+use crate::writer_identity::WriterFilter;
 use core::cell::{Cell, LazyCell};
 use core::sync::atomic::{Ordering, fence};
 use core::time::Duration;
 use std::time::Instant;
 
-/// A controller that lags catches up state by state, without a hole in its velocity estimate.
-const STATES: Terms = Terms {
+/// The queue lets a late controller process every missed state, so that its velocity estimate has no gaps.
+const STATES: QualityOfService = QualityOfService {
     name: "arm_state",
     writers: 1,
     readers: 1,
     depth: 32,
-    oldest_goes: true,
+    overwrite_oldest: true,
 };
-const COMMANDS: Terms = Terms {
+const COMMANDS: QualityOfService = QualityOfService {
     name: "torque_command",
     writers: 1,
     readers: 1,
     depth: 2,
-    oldest_goes: true,
+    overwrite_oldest: true,
 };
-const ASLEEP: Terms = Terms {
-    name: "plant_asleep",
+const WAKE_REQUESTS: QualityOfService = QualityOfService {
+    name: "wake_request",
     writers: 1,
     readers: 1,
     depth: 1,
-    oldest_goes: true,
+    overwrite_oldest: true,
 };
-/// Messages of others that are passed over in one look: they may write as fast as they like.
-const MOST_FOREIGN: u32 = 64;
-const STATE_BELL: &str = "arm_state";
-const COMMAND_BELL: &str = "torque_command";
+/// Maximum number of messages of other writers that one call discards, so that a fast foreign writer cannot keep the
+/// call in its loop.
+const MAX_FOREIGN_PER_CALL: u32 = 64;
+const STATE_WAKE_SOCKET: &str = "arm_state";
+const COMMAND_WAKE_SOCKET: &str = "torque_command";
 
-/// The plant's end, of `supple-sim` or `supple-can`. It stays in the thread that made it.
+/// The plant's end of the control path, in `supple-sim` or `supple-can`. It stays in the thread that created it.
 #[derive(Debug)]
 pub struct PlantLink {
-    // Given up before the place is: the bell of the next is not to be taken away.
-    bell: Bell,
-    rope: Rope,
+    // Dropped before the writer lock; otherwise it would remove the socket of the next plant.
+    wake_receiver: WakeReceiver,
+    wake_sender: WakeSender,
     states: Writer<ArmState>,
     commands: Reader<TorqueCommand>,
-    asleep: Writer<PlantAsleep>,
-    controller: KnownWriter,
+    wake_requests: Writer<WakeRequest>,
+    controller: WriterFilter,
     spin: Duration,
-    /// A ring was asked for that was not waited for.
-    rung: Cell<bool>,
-    _last_out: LastOut,
+    /// A wake-up was requested and not consumed.
+    wakeup_pending: Cell<bool>,
+    _cleanup: SharedMemoryCleanup,
 }
 
-/// What a plant heard while it waited for the answer of a cycle.
+/// Commands that the plant received while it waited for the answer to a cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Heard {
-    /// The answer to the cycle, if it came in time.
+pub struct ReceivedAnswer {
+    /// The answer to the cycle, if it arrived in time.
     pub answer: Option<TorqueCommand>,
-    /// Answers to earlier cycles that came only now.
+    /// Number of answers to earlier cycles, which are discarded.
     pub late: u64,
+    /// A wait ended without a wake-up: by its timeout, or by a signal.
+    pub timed_out: bool,
 }
 
 impl PlantLink {
-    /// Takes the plant's place in a system.
+    /// Joins the system as its plant.
     ///
     /// # Errors
-    /// [`IpcError::SecondWriter`] where there is a plant already, and what else [`IpcError`] says.
+    /// [`IpcError::SecondWriter`] if a plant has already joined; other variants of [`IpcError`] if the ports cannot be
+    /// opened.
     pub fn new(domain: &Domain) -> Result<PlantLink, IpcError> {
         let bytes = STATES.bytes_of::<ArmState>()
-            + ASLEEP.bytes_of::<PlantAsleep>()
+            + WAKE_REQUESTS.bytes_of::<WakeRequest>()
             + COMMANDS.bytes_of_reader();
-        let (ports, last_out) = domain.join(bytes, |node| {
+        let (ports, cleanup) = domain.join(bytes, |node| {
             Ok((
-                Writer::new(domain, node, &STATES, Full::Lose)?,
+                Writer::new(domain, node, &STATES, Backpressure::Drop)?,
                 Reader::new(domain, node, &COMMANDS)?,
-                Writer::new(domain, node, &ASLEEP, Full::Lose)?,
-                Bell::new(domain, COMMAND_BELL)?,
+                Writer::new(domain, node, &WAKE_REQUESTS, Backpressure::Drop)?,
+                WakeReceiver::new(domain, COMMAND_WAKE_SOCKET)?,
             ))
         })?;
-        let (states, commands, asleep, bell) = ports;
+        let (states, commands, wake_requests, wake_receiver) = ports;
         Ok(PlantLink {
             states,
             commands,
-            asleep,
-            bell,
-            rope: Rope::new(domain, STATE_BELL)?,
-            controller: KnownWriter::of(domain, COMMANDS.name)?,
+            wake_requests,
+            wake_receiver,
+            wake_sender: WakeSender::new(domain, STATE_WAKE_SOCKET)?,
+            controller: WriterFilter::of(domain, COMMANDS.name)?,
             spin: Duration::ZERO,
-            rung: Cell::new(false),
-            _last_out: last_out,
+            wakeup_pending: Cell::new(false),
+            _cleanup: cleanup,
         })
     }
 
-    /// From now on an answer is looked for again and again, for so long after it begins to wait, before the
-    /// thread sleeps until the bell: to be woken takes longer than many an answer. It costs the processor that
-    /// time of each cycle.
+    /// Sets how long [`PlantLink::answer`] polls for the answer before it blocks. Many answers come sooner than a
+    /// blocked thread can be woken. Polling uses the processor for up to this time in each cycle.
     pub fn spin(&mut self, at_most: Duration) {
         self.spin = at_most;
     }
 
-    /// Publishes the state of a cycle and wakes the controller. Gives whether there is one to read it.
+    /// Publishes the state of a cycle and wakes the controller. Returns whether a controller is connected.
     ///
     /// # Errors
     /// [`IpcError::Service`].
     pub fn publish(&self, state: &ArmState) -> Result<bool, IpcError> {
-        self.silence()?;
+        self.discard_wakeups()?;
         let readers = self.states.send(&ArmState {
-            writer: self.states.number(),
+            writer: self.states.writer_id(),
             ..*state
         })?;
-        self.rope.ring(Ring::Sent);
+        self.wake_sender.notify(WakeReason::MessageSent);
         Ok(readers > 0)
     }
 
-    /// Commands that were dropped because this system's controller did not write them.
+    /// Number of commands discarded because this system's controller did not write them.
     pub fn foreign(&self) -> u64 {
         self.controller.dropped()
     }
 
-    /// Tells the controller that a state follows within some tens or hundreds of microseconds: what it has to do
-    /// besides it does best now, while nobody waits for it. It may be left out.
+    /// Tells the controller that a state follows within some tens or hundreds of microseconds, so that it can do its
+    /// other work before that. Optional.
     ///
     /// # Errors
     /// [`IpcError::Service`].
     pub fn announce(&self) -> Result<(), IpcError> {
-        self.silence()?;
+        self.discard_wakeups()?;
         self.states.connect()?;
-        self.asleep.connect()?;
-        self.rope.ring(Ring::Announced);
+        self.wake_requests.connect()?;
+        self.wake_sender.notify(WakeReason::Announced);
         Ok(())
     }
 
-    /// Forgets a ring that was not waited for.
-    fn silence(&self) -> Result<(), IpcError> {
-        match self.rung.replace(false) {
-            true => self.bell.silence(),
+    /// Discards a wake-up that was requested and not consumed.
+    fn discard_wakeups(&self) -> Result<(), IpcError> {
+        match self.wakeup_pending.replace(false) {
+            true => self.wake_receiver.discard_wakeups(),
             false => Ok(()),
         }
     }
 
-    /// Waits for the answer to a cycle, at most for `timeout`.
+    /// Waits for the answer to a cycle for at most `timeout`.
     ///
     /// # Errors
     /// [`IpcError::Service`].
-    pub fn answer(&self, cycle: u64, timeout: Duration) -> Result<Heard, IpcError> {
+    pub fn answer(&self, cycle: u64, timeout: Duration) -> Result<ReceivedAnswer, IpcError> {
         self.answer_within(cycle, || timeout)
     }
 
-    /// As [`PlantLink::answer`], but how long to wait is asked only where the answer is not there already: it is most
-    /// of the time where both share a processor, and no clock has to be read then.
+    /// As [`PlantLink::answer`], but evaluates `timeout` only if the answer has not arrived yet. If both processes
+    /// share a processor it usually has, and then no clock is read.
     ///
     /// # Errors
     /// [`IpcError::Service`].
@@ -165,199 +169,202 @@ impl PlantLink {
         &self,
         cycle: u64,
         timeout: impl FnOnce() -> Duration,
-    ) -> Result<Heard, IpcError> {
-        let mut heard = Heard::default();
+    ) -> Result<ReceivedAnswer, IpcError> {
+        let mut received = ReceivedAnswer::default();
         let begun = LazyCell::new(|| (Instant::now(), timeout()));
-        let mut told = false;
+        let mut wake_requested = false;
         loop {
-            for _ in 0..MOST_FOREIGN {
+            for _ in 0..MAX_FOREIGN_PER_CALL {
                 let Some(command) = self.commands.receive()? else {
                     break;
                 };
-                if !self.controller.wrote(command.writer) {
+                if !self.controller.accepts(command.writer) {
                     continue;
                 }
                 if command.cycle == cycle {
-                    heard.answer = Some(TorqueCommand {
+                    received.answer = Some(TorqueCommand {
                         writer: 0,
                         ..command
                     });
-                    return Ok(heard);
+                    return Ok(received);
                 }
-                heard.late += 1;
+                received.late += 1;
             }
             let (start, timeout) = *begun;
             let waited = start.elapsed();
             let left = timeout.saturating_sub(waited);
             if left.is_zero() {
-                return Ok(heard);
+                return Ok(received);
             }
             if waited < self.spin {
                 core::hint::spin_loop();
                 continue;
             }
-            if !told {
-                self.asleep.send(&PlantAsleep { cycle })?;
+            if !wake_requested {
+                self.wake_requests.send(&WakeRequest { cycle })?;
                 fence(Ordering::SeqCst);
-                told = true;
-                self.rung.set(true);
+                wake_requested = true;
+                self.wakeup_pending.set(true);
                 continue;
             }
-            if self.bell.wait(left)? {
-                told = false;
-                self.rung.set(false);
+            if self.wake_receiver.wait(left)? {
+                wake_requested = false;
+                self.wakeup_pending.set(false);
+            } else {
+                received.timed_out = true;
             }
         }
     }
 }
 
-/// What woke a controller.
+/// Event that ended the controller's wait.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Woken {
-    /// The oldest state that was not read yet.
+pub enum WakeEvent {
+    /// The oldest unread state.
     State(ArmState),
     /// A state follows soon, see [`PlantLink::announce`].
     Announced,
-    /// Nothing.
-    Silence,
+    /// Neither came within the timeout.
+    Timeout,
 }
 
-/// The controller's end, of `supple-rt`. It stays in the thread that made it.
+/// The controller's end of the control path, in `supple-rt`. It stays in the thread that created it.
 #[derive(Debug)]
 pub struct ControllerLink {
-    // As with the plant.
-    bell: Bell,
-    rope: Rope,
+    // Field order as in [`PlantLink`]: the socket is dropped before the writer lock.
+    wake_receiver: WakeReceiver,
+    wake_sender: WakeSender,
     states: Reader<ArmState>,
     commands: Writer<TorqueCommand>,
-    asleep: Reader<PlantAsleep>,
-    plant: KnownWriter,
-    /// There was no state left, so that the next one has its ring yet to come.
-    read_all: Cell<bool>,
-    _last_out: LastOut,
+    wake_requests: Reader<WakeRequest>,
+    plant: WriterFilter,
+    /// The last read found the queue empty, so the wake-up of the next state is still to come.
+    queue_empty: Cell<bool>,
+    _cleanup: SharedMemoryCleanup,
 }
 
 impl ControllerLink {
-    /// Takes the controller's place in a system.
+    /// Joins the system as its controller.
     ///
     /// # Errors
-    /// [`IpcError::SecondWriter`] where there is a controller already, and what else [`IpcError`] says.
+    /// [`IpcError::SecondWriter`] if a controller has already joined; other variants of [`IpcError`] if the ports
+    /// cannot be opened.
     pub fn new(domain: &Domain) -> Result<ControllerLink, IpcError> {
         let bytes = COMMANDS.bytes_of::<TorqueCommand>()
             + STATES.bytes_of_reader()
-            + ASLEEP.bytes_of_reader();
-        let (ports, last_out) = domain.join(bytes, |node| {
+            + WAKE_REQUESTS.bytes_of_reader();
+        let (ports, cleanup) = domain.join(bytes, |node| {
             Ok((
-                Writer::new(domain, node, &COMMANDS, Full::Lose)?,
-                // Before the states: who waits for the answer to one is heard.
-                Reader::new(domain, node, &ASLEEP)?,
+                Writer::new(domain, node, &COMMANDS, Backpressure::Drop)?,
+                // Opened before the states, so that no wake request for an answered state is missed.
+                Reader::new(domain, node, &WAKE_REQUESTS)?,
                 Reader::new(domain, node, &STATES)?,
-                Bell::new(domain, STATE_BELL)?,
+                WakeReceiver::new(domain, STATE_WAKE_SOCKET)?,
             ))
         })?;
-        let (commands, asleep, states, bell) = ports;
+        let (commands, wake_requests, states, wake_receiver) = ports;
         Ok(ControllerLink {
             commands,
-            asleep,
+            wake_requests,
             states,
-            bell,
-            rope: Rope::new(domain, COMMAND_BELL)?,
-            plant: KnownWriter::of(domain, STATES.name)?,
-            read_all: Cell::new(false),
-            _last_out: last_out,
+            wake_receiver,
+            wake_sender: WakeSender::new(domain, COMMAND_WAKE_SOCKET)?,
+            plant: WriterFilter::of(domain, STATES.name)?,
+            queue_empty: Cell::new(false),
+            _cleanup: cleanup,
         })
     }
 
-    /// The oldest state that was not read yet, without waiting.
+    /// The oldest unread state, without waiting.
     ///
     /// # Errors
     /// [`IpcError::Service`].
     pub fn receive(&self) -> Result<Option<ArmState>, IpcError> {
-        for _ in 0..MOST_FOREIGN {
+        for _ in 0..MAX_FOREIGN_PER_CALL {
             match self.states.receive()? {
-                Some(state) if self.plant.wrote(state.writer) => {
-                    self.read_all.set(false);
+                Some(state) if self.plant.accepts(state.writer) => {
+                    self.queue_empty.set(false);
                     return Ok(Some(ArmState { writer: 0, ..state }));
                 }
                 Some(_) => {}
                 None => {
-                    self.read_all.set(true);
+                    self.queue_empty.set(true);
                     return Ok(None);
                 }
             }
         }
-        self.read_all.set(false);
+        self.queue_empty.set(false);
         Ok(None)
     }
 
-    /// States that were dropped because this system's plant did not write them.
+    /// Number of states discarded because this system's plant did not write them.
     pub fn foreign(&self) -> u64 {
         self.plant.dropped()
     }
 
-    /// The oldest state that was not read yet; waits for one at most for `timeout`, which the kernel counts in
-    /// ticks of up to 10 ms.
+    /// The oldest unread state; waits for one for at most `timeout`, which the kernel rounds to ticks of up to 10 ms.
     ///
     /// # Errors
     /// [`IpcError::Service`].
     pub fn wait(&self, timeout: Duration) -> Result<Option<ArmState>, IpcError> {
         let start = Instant::now();
         loop {
-            match self.wake(timeout.saturating_sub(start.elapsed()))? {
-                Woken::State(state) => return Ok(Some(state)),
-                Woken::Announced => {}
-                Woken::Silence => return Ok(None),
+            match self.wait_for_event(timeout.saturating_sub(start.elapsed()))? {
+                WakeEvent::State(state) => return Ok(Some(state)),
+                WakeEvent::Announced => {}
+                WakeEvent::Timeout => return Ok(None),
             }
         }
     }
 
-    /// As [`ControllerLink::wait`], but wakes too when a state is announced. It reads no clock before it was woken in
-    /// vain, by a signal or the ring of a state that was read already: the time counts anew from the first of them.
+    /// As [`ControllerLink::wait`], but also returns when a state is announced. It reads no clock until the first
+    /// spurious wake-up (a signal, or the wake-up of a state that was already read); the timeout restarts once at that
+    /// point.
     ///
     /// # Errors
     /// [`IpcError::Service`].
-    pub fn wake(&self, timeout: Duration) -> Result<Woken, IpcError> {
+    pub fn wait_for_event(&self, timeout: Duration) -> Result<WakeEvent, IpcError> {
         let mut left = timeout;
-        let mut in_vain_since = None;
+        let mut first_spurious_wakeup = None;
         loop {
-            // Whoever has read all goes to sleep at once, and the plant on his processor goes on.
-            if !self.read_all.get() || left.is_zero() {
+            // If the queue was empty, block at once, so that a plant on the same processor can continue.
+            if !self.queue_empty.get() || left.is_zero() {
                 match self.receive()? {
-                    Some(state) => return Ok(Woken::State(state)),
-                    None if left.is_zero() => return Ok(Woken::Silence),
+                    Some(state) => return Ok(WakeEvent::State(state)),
+                    None if left.is_zero() => return Ok(WakeEvent::Timeout),
                     None => {}
                 }
             }
-            match self.bell.wait_in_ticks(left)? {
-                Awoken::By(Ring::Announced) => {
-                    // To look once more costs nobody anything now, and makes the next look quicker.
-                    self.read_all.set(false);
-                    return Ok(Woken::Announced);
+            match self.wake_receiver.wait_coarse(left)? {
+                WaitResult::Notified(WakeReason::Announced) => {
+                    // An extra read delays nobody at this point and warms the cache for the next one.
+                    self.queue_empty.set(false);
+                    return Ok(WakeEvent::Announced);
                 }
-                Awoken::By(Ring::Sent) | Awoken::BySignal => {
+                WaitResult::Notified(WakeReason::MessageSent) | WaitResult::SignalReceived => {
                     if let Some(state) = self.receive()? {
-                        return Ok(Woken::State(state));
+                        return Ok(WakeEvent::State(state));
                     }
-                    let since = *in_vain_since.get_or_insert_with(Instant::now);
+                    let since = *first_spurious_wakeup.get_or_insert_with(Instant::now);
                     left = timeout.saturating_sub(since.elapsed());
                 }
-                Awoken::InVain => left = Duration::ZERO,
+                WaitResult::TimedOut => left = Duration::ZERO,
             }
         }
     }
 
-    /// Publishes the answer to a state and wakes the plant where it sleeps.
+    /// Publishes the answer to a state, and wakes the plant if the plant is blocked.
     ///
     /// # Errors
     /// [`IpcError::Service`].
     pub fn answer(&self, command: &TorqueCommand) -> Result<(), IpcError> {
         self.commands.send(&TorqueCommand {
-            writer: self.commands.number(),
+            writer: self.commands.writer_id(),
             ..*command
         })?;
         fence(Ordering::SeqCst);
-        if self.asleep.receive()?.is_some() {
-            self.rope.ring(Ring::Sent);
+        if self.wake_requests.receive()?.is_some() {
+            self.wake_sender.notify(WakeReason::MessageSent);
         }
         Ok(())
     }
@@ -372,18 +379,18 @@ mod tests {
     const SOON: Duration = Duration::from_secs(5);
 
     #[test]
-    fn a_plant_is_rung_where_it_said_that_it_sleeps_and_only_there() {
+    fn plant_is_woken_only_while_blocked() {
         let folder = tempfile::tempdir().expect("a folder");
-        let domain = Domain::within(&folder.path().join("run"), "asleep").expect("a domain");
+        let domain = Domain::in_folder(&folder.path().join("run"), "asleep").expect("a domain");
         let plant = PlantLink::new(&domain).expect("a plant");
         let controller = ControllerLink::new(&domain).expect("a controller");
-        for (cycle, asleep) in [(0, false), (1, true), (2, false), (3, true), (4, true)] {
+        for (cycle, blocked) in [(0, false), (1, true), (2, false), (3, true), (4, true)] {
             let report = PlantReport::default();
             let state = ArmState::new(cycle, 0, &[Some(0.0); 4], None, Drives::Idle, report);
             plant.publish(&state).expect("published");
-            if asleep {
-                let in_vain = plant.answer(cycle, Duration::from_millis(1)).expect("read");
-                assert_eq!(in_vain, Heard::default());
+            if blocked {
+                let received = plant.answer(cycle, Duration::from_millis(1)).expect("read");
+                assert_eq!((received.answer, received.timed_out), (None, true));
             }
             assert_eq!(controller.wait(SOON).expect("read"), Some(state));
             let command = TorqueCommand {
@@ -400,32 +407,35 @@ mod tests {
             };
             controller.answer(&command).expect("answered");
             assert_eq!(
-                plant.bell.wait(Duration::ZERO).expect("heard"),
-                asleep,
+                plant.wake_receiver.wait(Duration::ZERO).expect("waited"),
+                blocked,
                 "cycle {cycle}"
             );
-            let heard = plant.answer(cycle, SOON).expect("read");
-            assert_eq!(heard.answer, Some(command));
+            let received = plant.answer(cycle, SOON).expect("read");
+            assert_eq!(received.answer, Some(command));
         }
     }
 
     #[test]
-    fn rings_without_a_state_hold_a_controller_no_longer_than_twice_its_patience() {
+    fn spurious_wakeups_at_most_double_the_timeout() {
         let folder = tempfile::tempdir().expect("a folder");
-        let domain = Domain::within(&folder.path().join("run"), "rings").expect("a domain");
+        let domain = Domain::in_folder(&folder.path().join("run"), "spurious").expect("a domain");
         let controller = ControllerLink::new(&domain).expect("a controller");
-        let heard = AtomicBool::new(false);
+        let received = AtomicBool::new(false);
         std::thread::scope(|scope| {
             scope.spawn(|| {
-                let rope = Rope::new(&domain, STATE_BELL).expect("a rope");
-                while !heard.load(Ordering::Relaxed) {
-                    rope.ring(Ring::Sent);
-                    crate::outside::pause(Duration::from_millis(2));
+                let wake_sender =
+                    WakeSender::new(&domain, STATE_WAKE_SOCKET).expect("a wake_sender");
+                while !received.load(Ordering::Relaxed) {
+                    wake_sender.notify(WakeReason::MessageSent);
+                    crate::pause::pause(Duration::from_millis(2));
                 }
             });
-            let woken = controller.wake(Duration::from_millis(50)).expect("read");
-            heard.store(true, Ordering::Relaxed);
-            assert_eq!(woken, Woken::Silence);
+            let woken = controller
+                .wait_for_event(Duration::from_millis(50))
+                .expect("read");
+            received.store(true, Ordering::Relaxed);
+            assert_eq!(woken, WakeEvent::Timeout);
         });
     }
 }

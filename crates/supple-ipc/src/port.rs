@@ -1,12 +1,11 @@
 //! One-way services in shared memory: a writer and readers.
 //!
-//! Writing and reading allocate nothing once both sides are connected. A side that joins or leaves costs the
-//! other a few system calls and allocations at its next call: a control loop has no port but those to its
-//! plant.
+//! Once both sides are connected, writing and reading allocate nothing. When a side joins or leaves, the other makes a
+//! few system calls and allocations at its next call; therefore the control loop has only the ports to its plant.
 
 use crate::domain::{Domain, Node};
-use crate::error::IpcError;
-use crate::outside::pause;
+use crate::error::{IpcError, failed};
+use crate::pause::pause;
 use crate::writer_identity::WriterLock;
 use core::fmt::Debug;
 use core::time::Duration;
@@ -20,49 +19,49 @@ use iceoryx2::service::builder::publish_subscribe::{
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use std::time::Instant;
 
-/// What there is to know of a service before it is opened.
+/// Quality of service: the parameters of a service.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Terms {
+pub(crate) struct QualityOfService {
     /// Name within the system.
     pub name: &'static str,
-    /// Writers that may be there at a time. One alone has the lock of that name.
+    /// Maximum number of writers. If it is 1, the writer holds the lock of the service.
     pub writers: usize,
-    /// Readers that may be there at a time.
+    /// Maximum number of readers.
     pub readers: usize,
-    /// Samples that a slow reader may lag behind.
+    /// Queue length of a reader.
     pub depth: usize,
-    /// What a full reader costs: the oldest sample it has not read, or else the newest.
-    pub oldest_goes: bool,
+    /// If a reader's queue is full: overwrite the oldest unread sample (true), or apply [`Backpressure`] (false).
+    pub overwrite_oldest: bool,
 }
 
-impl Terms {
-    /// Shared memory for the messages of one writer: as many as all readers may lag behind, with a header each, and
-    /// the connections' lists of them \[bytes\].
+impl QualityOfService {
+    /// Shared memory for one writer \[bytes\]: messages and headers for the full depth of all readers, and the index
+    /// queues of the connections.
     pub const fn bytes_of<T>(&self) -> u64 {
-        let messages = places(self.readers) * (self.depth + 2) + 2;
+        let messages = slots(self.readers) * (self.depth + 2) + 2;
         (messages * (size_of::<T>() + HEADER_BYTES)) as u64
     }
 
-    /// Shared memory for what one reader is connected by \[bytes\].
+    /// Shared memory for the connections of one reader \[bytes\].
     pub const fn bytes_of_reader(&self) -> u64 {
-        (places(self.writers) * (self.depth + 2) * HEADER_BYTES) as u64
+        (slots(self.writers) * (self.depth + 2) * HEADER_BYTES) as u64
     }
 }
 
-/// Header of a message and its places in lists, rounded up \[bytes\].
+/// Message header and its entries in the index queues, rounded up \[bytes\].
 const HEADER_BYTES: usize = 64;
 
-/// A type that is a message.
+/// Bounds of a message type.
 pub(crate) trait Message: Debug + Copy + ZeroCopySend + 'static {}
 impl<T: Debug + Copy + ZeroCopySend + 'static> Message for T {}
 
-/// What to do where a reader is full and the oldest does not go.
+/// What a writer does when a reader's queue is full and the oldest sample is not overwritten.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Full {
-    /// It loses this sample.
-    Lose,
-    /// Wait for it: for virtual time only.
-    Wait,
+pub enum Backpressure {
+    /// That reader does not get this sample.
+    Drop,
+    /// The writer blocks until the reader has space: for virtual time only.
+    Block,
 }
 
 /// The writer of a service.
@@ -70,23 +69,28 @@ pub enum Full {
 pub(crate) struct Writer<T: Message> {
     publisher: Publisher<ipc::Service, T, ()>,
     name: &'static str,
-    alone: Option<WriterLock>,
+    writer_lock: Option<WriterLock>,
 }
 
 impl<T: Message> Writer<T> {
-    pub fn new(domain: &Domain, node: &Node, terms: &Terms, full: Full) -> Result<Self, IpcError> {
+    pub fn new(
+        domain: &Domain,
+        node: &Node,
+        qos: &QualityOfService,
+        backpressure: Backpressure,
+    ) -> Result<Self, IpcError> {
         let taken = || IpcError::SecondWriter {
-            service: terms.name.to_owned(),
+            service: qos.name.to_owned(),
             prefix: domain.prefix().to_owned(),
         };
-        let alone = match terms.writers {
-            1 => Some(WriterLock::take(domain, terms.name)?.ok_or_else(taken)?),
+        let writer_lock = match qos.writers {
+            1 => Some(WriterLock::acquire(domain, qos.name)?.ok_or_else(taken)?),
             _ => None,
         };
-        let service = open::<T>(domain, node, terms)?;
-        let strategy = match full {
-            Full::Lose => BackpressureStrategy::DiscardData,
-            Full::Wait => BackpressureStrategy::RetryUntilDelivered,
+        let service = open::<T>(domain, node, qos)?;
+        let strategy = match backpressure {
+            Backpressure::Drop => BackpressureStrategy::DiscardData,
+            Backpressure::Block => BackpressureStrategy::RetryUntilDelivered,
         };
         let publisher = service
             .publisher_builder()
@@ -95,27 +99,27 @@ impl<T: Message> Writer<T> {
             .create();
         let publisher = publisher.map_err(|error| match error {
             PublisherCreateError::ExceedsMaxSupportedPublishers => taken(),
-            error => failed(terms.name, &error),
+            error => failed(qos.name, &error),
         })?;
         Ok(Writer {
             publisher,
-            name: terms.name,
-            alone,
+            name: qos.name,
+            writer_lock,
         })
     }
 
-    /// What tells the messages of a service's one writer from those of others; 0 where there may be several.
-    pub fn number(&self) -> u64 {
-        self.alone.as_ref().map_or(0, WriterLock::number)
+    /// Writer id that the messages of an exclusive writer carry; 0 if the service allows several writers.
+    pub fn writer_id(&self) -> u64 {
+        self.writer_lock.as_ref().map_or(0, WriterLock::writer_id)
     }
 
-    /// Meets readers that have come, as the next sending would, which then has the time.
+    /// Connects to new readers now, so that the next send does not have to.
     pub fn connect(&self) -> Result<(), IpcError> {
         let connected = self.publisher.update_connections();
         connected.map_err(|error| failed(self.name, &error))
     }
 
-    /// Sends a copy; gives the number of readers that it reached.
+    /// Sends a copy; returns the number of readers that it reached.
     pub fn send(&self, message: &T) -> Result<usize, IpcError> {
         let sample = self.publisher.loan_uninit();
         let sample = sample.map_err(|error| failed(self.name, &error))?;
@@ -132,22 +136,22 @@ pub(crate) struct Reader<T: Message> {
 }
 
 impl<T: Message> Reader<T> {
-    pub fn new(domain: &Domain, node: &Node, terms: &Terms) -> Result<Self, IpcError> {
-        let service = open::<T>(domain, node, terms)?;
+    pub fn new(domain: &Domain, node: &Node, qos: &QualityOfService) -> Result<Self, IpcError> {
+        let service = open::<T>(domain, node, qos)?;
         let subscriber = service.subscriber_builder().create();
         let subscriber = subscriber.map_err(|error| match error {
             SubscriberCreateError::ExceedsMaxSupportedSubscribers => IpcError::TooManyReaders {
-                service: terms.name.to_owned(),
+                service: qos.name.to_owned(),
             },
-            error => failed(terms.name, &error),
+            error => failed(qos.name, &error),
         })?;
         Ok(Reader {
             subscriber,
-            name: terms.name,
+            name: qos.name,
         })
     }
 
-    /// The oldest message that was not read yet.
+    /// The oldest unread message.
     pub fn receive(&self) -> Result<Option<T>, IpcError> {
         let sample = self.subscriber.receive();
         let sample = sample.map_err(|error| failed(self.name, &error))?;
@@ -158,21 +162,21 @@ impl<T: Message> Reader<T> {
 fn open<T: Message>(
     domain: &Domain,
     node: &Node,
-    terms: &Terms,
+    qos: &QualityOfService,
 ) -> Result<PortFactory<ipc::Service, T, ()>, IpcError> {
-    let name = service_name(terms.name)?;
-    let service = settled(
-        SETTLES_WITHIN,
+    let name = service_name(qos.name)?;
+    let service = open_with_retry(
+        OPEN_TIMEOUT,
         || {
             node.service_builder(&name)
                 .publish_subscribe::<T>()
-                .max_publishers(places(terms.writers))
-                .max_subscribers(places(terms.readers))
-                .max_nodes(NODES)
-                .subscriber_max_buffer_size(terms.depth)
+                .max_publishers(slots(qos.writers))
+                .max_subscribers(slots(qos.readers))
+                .max_nodes(MAX_NODES)
+                .subscriber_max_buffer_size(qos.depth)
                 .subscriber_max_borrowed_samples(1)
                 .history_size(0)
-                .enable_safe_overflow(terms.oldest_goes)
+                .enable_safe_overflow(qos.overwrite_oldest)
                 .open_or_create()
         },
         |error| {
@@ -200,7 +204,7 @@ fn open<T: Message>(
     service.map_err(|error| {
         use PublishSubscribeOpenError as Open;
         let PublishSubscribeOpenOrCreateError::PublishSubscribeOpenError(open) = error else {
-            return failed(terms.name, &error);
+            return failed(qos.name, &error);
         };
         match open {
             Open::IncompatibleTypes
@@ -213,42 +217,42 @@ fn open<T: Message>(
             | Open::DoesNotSupportRequestedAmountOfPublishers
             | Open::DoesNotSupportRequestedAmountOfSubscribers
             | Open::DoesNotSupportRequestedAmountOfNodes => IpcError::Version {
-                service: terms.name.to_owned(),
+                service: qos.name.to_owned(),
                 expected: core::any::type_name::<T>(),
                 prefix: domain.prefix().to_owned(),
             },
             Open::ExceedsMaxNumberOfNodes => IpcError::TooManyReaders {
-                service: terms.name.to_owned(),
+                service: qos.name.to_owned(),
             },
-            open => failed(terms.name, &open),
+            open => failed(qos.name, &open),
         }
     })
 }
 
-/// Processes that may have a service open: the writers, the readers, and some that are just leaving.
-const NODES: usize = 24 + LOST_PLACES;
+/// Maximum number of processes that have a service open: the writers, the readers, and some that are leaving.
+const MAX_NODES: usize = 24 + LEAKED_SLOTS;
 
-/// A process that is killed in the very milliseconds in which it joins may leave a place taken for good, of its
-/// services' writers or readers (iceoryx2 0.9.3 clears only what was finished). So many may be lost where there
-/// is one place, before whoever made the services has to be restarted; where there are many, some are not used.
-const LOST_PLACES: usize = 8;
+/// A process that is killed while it joins may leak a writer or reader slot (iceoryx2 0.9.3 releases only completed
+/// ports). Services with a single slot get this many spare slots; after as many leaks the process that created the
+/// service must be restarted. Services with many slots need no spares.
+const LEAKED_SLOTS: usize = 8;
 
-const fn places(wanted: usize) -> usize {
+const fn slots(wanted: usize) -> usize {
     match wanted {
-        1 => 1 + LOST_PLACES,
+        1 => 1 + LEAKED_SLOTS,
         several => several,
     }
 }
 
-/// How long a service may take to settle that others are just making or taking away.
-const SETTLES_WITHIN: Duration = Duration::from_secs(3);
-/// How long it is waited before it is asked for again.
-const ASK_AGAIN: Duration = Duration::from_millis(2);
+/// Timeout for opening a service that other processes are creating or removing at the same time.
+const OPEN_TIMEOUT: Duration = Duration::from_secs(3);
+/// Time between two attempts to open a service.
+const RETRY_INTERVAL: Duration = Duration::from_millis(2);
 
-/// Opens what others may be making and taking away at the same time: the library gives up on it after a few
-/// rounds of its own, or takes what is half there for broken.
-fn settled<T, E>(
-    within: Duration,
+/// Opens a service that other processes may be creating or removing. iceoryx2 gives up after a few internal retries, or
+/// reports a half-created service as corrupted; this function retries in both cases.
+fn open_with_retry<T, E>(
+    timeout: Duration,
     mut open: impl FnMut() -> Result<T, E>,
     in_flux: impl Fn(&E) -> bool,
 ) -> Result<T, E> {
@@ -256,7 +260,7 @@ fn settled<T, E>(
     loop {
         let opened = open();
         match &opened {
-            Err(error) if in_flux(error) && start.elapsed() < within => pause(ASK_AGAIN),
+            Err(error) if in_flux(error) && start.elapsed() < timeout => pause(RETRY_INTERVAL),
             _ => return opened,
         }
     }
@@ -266,21 +270,14 @@ fn service_name(name: &str) -> Result<ServiceName, IpcError> {
     ServiceName::new(name).map_err(|error| failed(name, &error))
 }
 
-pub(crate) fn failed(service: &str, cause: &dyn core::fmt::Display) -> IpcError {
-    IpcError::Service {
-        service: service.to_owned(),
-        cause: cause.to_string(),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Opens at the `at`th attempt, refused with `error` until then; the attempts that were made.
+    /// Succeeds at attempt number `at` and fails with `error` before it; returns the result and the number of attempts.
     fn attempts(at: u32, error: &'static str) -> (Result<(), &'static str>, u32) {
         let mut made = 0;
-        let opened = settled(
+        let opened = open_with_retry(
             Duration::from_millis(50),
             || {
                 made += 1;
@@ -292,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_in_flux_is_asked_for_again_but_not_for_ever() {
+    fn services_in_flux_are_retried_until_the_timeout() {
         assert_eq!(attempts(1, "in flux"), (Ok(()), 1));
         assert_eq!(attempts(3, "in flux"), (Ok(()), 3));
         let (opened, made) = attempts(u32::MAX, "in flux");

@@ -1,7 +1,7 @@
-//! The system's objects in shared memory: whose they are, and that there is room for them.
+//! Ownership and free space of the system's shared-memory objects.
 //!
-//! Linux gives memory to an object when it is written first, and ends a process by SIGBUS where there is none left. So
-//! whoever joins looks for room before, and has everything that is there given its memory after.
+//! Linux allocates the pages of a shared-memory object at the first write, and sends SIGBUS if no memory is left. A
+//! joining process therefore checks the free space first, and then preallocates all objects of the system.
 
 use crate::domain::Domain;
 use crate::error::IpcError;
@@ -12,27 +12,27 @@ use std::io;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
-/// Where Linux keeps shared memory by its name.
+/// Folder of the named shared-memory objects.
 const FOLDER: &str = "/dev/shm";
-/// What every port and every service takes besides its messages, rounded up \[bytes\].
-const BOOKS_BYTES: u64 = 512 * 1024;
+/// Management data of each port and service, rounded up \[bytes\].
+const MANAGEMENT_BYTES: u64 = 512 * 1024;
 
-/// Objects whose names begin as this system's do.
+/// Objects whose names have this system's prefix.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub(crate) struct Objects {
-    /// Those of this user.
-    pub ours: Vec<PathBuf>,
-    /// Those of others, with the user's number: never opened, never removed.
-    pub of_others: Vec<(PathBuf, u32)>,
+    /// Objects of this user.
+    pub owned: Vec<PathBuf>,
+    /// Objects of other users, with the user id: never opened, never removed.
+    pub owned_by_others: Vec<(PathBuf, u32)>,
 }
 
 /// The objects of a system.
 pub(crate) fn objects(domain: &Domain) -> io::Result<Objects> {
     let user = rustix::process::getuid().as_raw();
-    sorted(Path::new(FOLDER), &domain.objects(), user)
+    partition_by_owner(Path::new(FOLDER), &domain.object_prefix(), user)
 }
 
-fn sorted(folder: &Path, begin: &str, user: u32) -> io::Result<Objects> {
+fn partition_by_owner(folder: &Path, begin: &str, user: u32) -> io::Result<Objects> {
     let mut objects = Objects::default();
     for entry in fs::read_dir(folder)? {
         let entry = entry?;
@@ -47,18 +47,18 @@ fn sorted(folder: &Path, begin: &str, user: u32) -> io::Result<Objects> {
             Err(error) => return Err(error),
         };
         if about.uid() == user && about.is_file() {
-            objects.ours.push(entry.path());
+            objects.owned.push(entry.path());
         } else {
-            objects.of_others.push((entry.path(), about.uid()));
+            objects.owned_by_others.push((entry.path(), about.uid()));
         }
     }
     Ok(objects)
 }
 
-/// Refuses where another user's object has been taken for one of this system's.
+/// Fails if this process has mapped an object that belongs to another user.
 pub(crate) fn refuse_foreign(domain: &Domain) -> Result<(), IpcError> {
     let found = objects(domain).map_err(|error| unreadable(&error))?;
-    if found.of_others.is_empty() {
+    if found.owned_by_others.is_empty() {
         return Ok(());
     }
     let maps = fs::read_to_string("/proc/self/maps").map_err(|error| unreadable(&error))?;
@@ -67,7 +67,7 @@ pub(crate) fn refuse_foreign(domain: &Domain) -> Result<(), IpcError> {
             .any(|line| line.ends_with(&*object.to_string_lossy()))
     };
     match found
-        .of_others
+        .owned_by_others
         .into_iter()
         .find(|(object, _)| is_mapped(object))
     {
@@ -76,12 +76,12 @@ pub(crate) fn refuse_foreign(domain: &Domain) -> Result<(), IpcError> {
     }
 }
 
-/// Says that another user's object may be the cause, where there is one.
-pub(crate) fn explained(domain: &Domain, error: IpcError) -> IpcError {
+/// Replaces the error by [`IpcError::Foreign`] if another user's object with a name of this system exists.
+pub(crate) fn add_foreign_object_cause(domain: &Domain, error: IpcError) -> IpcError {
     let IpcError::Service { .. } = error else {
         return error;
     };
-    match objects(domain).map(|found| found.of_others.into_iter().next()) {
+    match objects(domain).map(|found| found.owned_by_others.into_iter().next()) {
         Ok(Some((object, owner))) => foreign(domain, object, owner),
         _ => error,
     }
@@ -95,36 +95,36 @@ fn foreign(domain: &Domain, object: PathBuf, owner: u32) -> IpcError {
     }
 }
 
-/// Refuses where there is no room for ports whose messages take so much \[bytes\].
-pub(crate) fn expect_room(messages_bytes: u64) -> Result<(), IpcError> {
+/// Fails if the free space is less than `messages_bytes` plus the management data.
+pub(crate) fn check_free_space(messages_bytes: u64) -> Result<(), IpcError> {
     let about = statvfs(FOLDER).map_err(|error| unreadable(&error.into()))?;
-    // A folder without a limit has no blocks.
+    // A file system without a size limit reports zero blocks.
     let free_bytes = match about.f_blocks {
         0 => u64::MAX,
         _ => about.f_bavail.saturating_mul(about.f_frsize),
     };
-    room(messages_bytes + BOOKS_BYTES, free_bytes)
+    require_bytes(messages_bytes + MANAGEMENT_BYTES, free_bytes)
 }
 
-fn room(wanted_bytes: u64, free_bytes: u64) -> Result<(), IpcError> {
-    if free_bytes >= wanted_bytes {
+fn require_bytes(needed_bytes: u64, free_bytes: u64) -> Result<(), IpcError> {
+    if free_bytes >= needed_bytes {
         return Ok(());
     }
-    Err(IpcError::NoRoom {
-        wanted_bytes,
+    Err(IpcError::SharedMemoryFull {
+        needed_bytes,
         free_bytes,
     })
 }
 
-/// Has every object of the system given all of its memory.
+/// Preallocates all pages of every object of the system.
 pub(crate) fn reserve(domain: &Domain) -> Result<(), IpcError> {
-    for object in objects(domain).map_err(|error| unreadable(&error))?.ours {
+    for object in objects(domain).map_err(|error| unreadable(&error))?.owned {
         let Ok(file) = open(
             &object,
             OFlags::RDWR | OFlags::CLOEXEC | OFlags::NOFOLLOW,
             Mode::empty(),
         ) else {
-            // Its maker has just removed it, or still makes it and reserves it then.
+            // Its creator has just removed it, or is still creating it and will preallocate it itself.
             continue;
         };
         let about = rustix::fs::fstat(&file).map_err(|error| unreadable(&error.into()))?;
@@ -134,9 +134,9 @@ pub(crate) fn reserve(domain: &Domain) -> Result<(), IpcError> {
             continue;
         }
         match fallocate(&file, FallocateFlags::empty(), 0, bytes) {
-            // What the folder's kind cannot reserve, it need not.
+            // A file system without fallocate needs no preallocation.
             Ok(()) | Err(Errno::OPNOTSUPP | Errno::NOSYS) => {}
-            Err(Errno::NOSPC | Errno::DQUOT) => room(bytes, given_bytes)?,
+            Err(Errno::NOSPC | Errno::DQUOT) => require_bytes(bytes, given_bytes)?,
             Err(error) => return Err(unreadable(&error.into())),
         }
     }
@@ -155,7 +155,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn objects_of_others_and_what_is_no_file_are_kept_apart() {
+    fn objects_are_partitioned_by_owner() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = |name: &str| folder.path().join(name);
         fs::write(path("mine_1"), b"").expect("written");
@@ -163,23 +163,23 @@ mod tests {
         fs::create_dir(path("mine_folder")).expect("made");
         std::os::unix::fs::symlink("/etc/hostname", path("mine_link")).expect("made");
         let me = rustix::process::getuid().as_raw();
-        let found = sorted(folder.path(), "mine_", me).expect("read");
-        assert_eq!(found.ours, [path("mine_1")]);
-        assert_eq!(found.of_others.len(), 2);
-        // Seen by another user, all of it is somebody else's.
-        let found = sorted(folder.path(), "mine_", me + 1).expect("read");
-        assert_eq!((found.ours.len(), found.of_others.len()), (0, 3));
-        assert!(found.of_others.contains(&(path("mine_1"), me)));
+        let found = partition_by_owner(folder.path(), "mine_", me).expect("read");
+        assert_eq!(found.owned, [path("mine_1")]);
+        assert_eq!(found.owned_by_others.len(), 2);
+        // For another user all three belong to others.
+        let found = partition_by_owner(folder.path(), "mine_", me + 1).expect("read");
+        assert_eq!((found.owned.len(), found.owned_by_others.len()), (0, 3));
+        assert!(found.owned_by_others.contains(&(path("mine_1"), me)));
     }
 
     #[test]
-    fn too_little_room_is_refused_with_the_sizes_and_the_remedy() {
-        assert!(room(1000, 1000).is_ok());
-        let words = room(44_000_001, 3_000_000)
+    fn insufficient_space_is_an_error_with_sizes_and_remedy() {
+        assert!(require_bytes(1000, 1000).is_ok());
+        let text = require_bytes(44_000_001, 3_000_000)
             .expect_err("too little")
             .to_string();
         for part in ["/dev/shm", "45 MB", "3 MB", "size="] {
-            assert!(words.contains(part), "{part}: {words}");
+            assert!(text.contains(part), "{part}: {text}");
         }
     }
 }

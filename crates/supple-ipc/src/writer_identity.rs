@@ -1,13 +1,14 @@
-//! Who writes a service: a number drawn by whoever holds the writer's lock, kept in the lock's file.
+//! Identity of a service's writer: a random id that the holder of the writer lock generates and stores in the lock
+//! file.
 //!
-//! The shared-memory library has places for several writers, so that one killed at the wrong moment blocks nobody; the
-//! lock alone keeps nobody from writing. So every message carries its writer's number, and a reader takes those of the
-//! lock's holder. The file is its owner's alone, as the folder is.
+//! iceoryx2 is configured with spare writer slots, so that a writer killed while it joins blocks nobody; the lock alone
+//! therefore does not keep others from writing. Each message carries its writer's id, and readers accept only the id of
+//! the lock holder. Only the owner can read the file, as with the folder.
 
 use crate::domain::Domain;
 use crate::error::IpcError;
-use crate::port::failed;
-use crate::turn;
+use crate::error::failed;
+use crate::membership;
 use core::cell::Cell;
 use rustix::rand::{GetRandomFlags, getrandom};
 use std::fs::File;
@@ -15,84 +16,86 @@ use std::io;
 use std::os::fd::OwnedFd;
 use std::os::unix::fs::FileExt;
 
-/// The lock of a service's one writer, with the number that its holder drew.
+/// The writer lock of a service, with the random id of its holder.
 #[derive(Debug)]
 pub(crate) struct WriterLock {
-    number: u64,
+    writer_id: u64,
     _lock: File,
 }
 
 impl WriterLock {
-    /// Takes it, where nobody has it.
-    pub fn take(domain: &Domain, service: &str) -> Result<Option<WriterLock>, IpcError> {
+    /// Acquires the lock, or returns `None` if another process holds it.
+    pub fn acquire(domain: &Domain, service: &str) -> Result<Option<WriterLock>, IpcError> {
         let taken = || -> io::Result<Option<WriterLock>> {
-            let Some(lock) = turn::lock(domain, service)? else {
+            let Some(lock) = membership::lock(domain, service)? else {
                 return Ok(None);
             };
             let lock = File::from(lock);
-            let number = drawn()?;
-            lock.write_all_at(&number.to_le_bytes(), 0)?;
+            let writer_id = random_id()?;
+            lock.write_all_at(&writer_id.to_le_bytes(), 0)?;
             Ok(Some(WriterLock {
-                number,
+                writer_id,
                 _lock: lock,
             }))
         };
         taken().map_err(|error| failed(service, &error))
     }
 
-    /// What its messages carry.
-    pub fn number(&self) -> u64 {
-        self.number
+    /// Writer id in all its messages.
+    pub fn writer_id(&self) -> u64 {
+        self.writer_id
     }
 }
 
-/// A number that nobody else has: 63 random bits, never zero.
-pub(crate) fn drawn() -> io::Result<u64> {
+/// A unique id: 63 random bits, never zero.
+pub(crate) fn random_id() -> io::Result<u64> {
     let mut bytes = [0; 8];
     getrandom(&mut bytes, GetRandomFlags::empty())?;
     Ok(u64::from_le_bytes(bytes) | 1)
 }
 
-/// What a reader knows of its writer.
+/// Decides which messages a reader accepts.
 #[derive(Debug)]
-pub(crate) struct KnownWriter {
+pub(crate) struct WriterFilter {
     file: File,
-    number: Cell<u64>,
+    writer_id: Cell<u64>,
     dropped: Cell<u64>,
 }
 
-impl KnownWriter {
-    /// Of a service whose writer may still have to come.
-    pub fn of(domain: &Domain, service: &str) -> Result<KnownWriter, IpcError> {
-        let file: io::Result<OwnedFd> = turn::lock_file(domain, service);
-        Ok(KnownWriter {
+impl WriterFilter {
+    /// Opens the lock file of a service; the writer need not have joined yet.
+    pub fn of(domain: &Domain, service: &str) -> Result<WriterFilter, IpcError> {
+        let file: io::Result<OwnedFd> = membership::lock_file(domain, service);
+        Ok(WriterFilter {
             file: file.map_err(|error| failed(service, &error))?.into(),
-            number: Cell::new(0),
+            writer_id: Cell::new(0),
             dropped: Cell::new(0),
         })
     }
 
-    /// A message with this number is the writer's; one that is not is counted. The file is read where the number is
-    /// another than the last: nothing is allocated.
-    pub fn wrote(&self, number: u64) -> bool {
-        if number == 0 || (number != self.number.get() && !self.is_the_holders(number)) {
+    /// Returns whether the id is that of the lock holder; counts the messages that are not. Reads the file only when
+    /// the id changes; allocates nothing.
+    pub fn accepts(&self, writer_id: u64) -> bool {
+        if writer_id == 0
+            || (writer_id != self.writer_id.get() && !self.matches_lock_holder(writer_id))
+        {
             self.dropped.set(self.dropped.get() + 1);
             return false;
         }
         true
     }
 
-    /// Messages of others.
+    /// Number of messages with another writer id.
     pub fn dropped(&self) -> u64 {
         self.dropped.get()
     }
 
-    fn is_the_holders(&self, number: u64) -> bool {
+    fn matches_lock_holder(&self, writer_id: u64) -> bool {
         let mut bytes = [0; 8];
         let read = self.file.read_exact_at(&mut bytes, 0);
-        let is = read.is_ok() && u64::from_le_bytes(bytes) == number;
+        let is = read.is_ok() && u64::from_le_bytes(bytes) == writer_id;
         if is {
-            self.number.set(number);
+            self.writer_id.set(writer_id);
         }
         is
     }

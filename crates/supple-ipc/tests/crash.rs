@@ -1,4 +1,4 @@
-//! A process that is killed leaves its place to the next one, without the other side being restarted.
+//! A killed process can be replaced without a restart of the other side.
 
 mod support;
 
@@ -10,13 +10,13 @@ use supple_ipc::{ControllerLink, Domain, PlantLink};
 const FOLDER: &str = "SUPPLE_IPC_TEST_FOLDER";
 const PREFIX: &str = "SUPPLE_IPC_TEST_PREFIX";
 
-/// Not a test of its own: the controller that [`a_killed_controller_is_replaced`] starts and kills.
+/// Not a test: the controller that [`a_killed_controller_is_replaced`] starts and kills.
 #[test]
 #[ignore = "started by another test"]
 fn controller_process() {
     let folder = std::env::var(FOLDER).expect("started by the test");
     let prefix = std::env::var(PREFIX).expect("started by the test");
-    let domain = Domain::within(folder.as_ref(), &prefix).expect("a domain");
+    let domain = Domain::in_folder(folder.as_ref(), &prefix).expect("a domain");
     let controller = ControllerLink::new(&domain).expect("a controller");
     loop {
         if let Some(state) = controller.wait(Duration::from_secs(1)).expect("read") {
@@ -37,7 +37,7 @@ fn start(system: &support::System) -> Child {
         .expect("it starts")
 }
 
-/// Cycles until an answer comes; panics after very many.
+/// Runs cycles until an answer arrives and returns its cycle; panics after 2000.
 fn until_answered(plant: &PlantLink, from: u64) -> u64 {
     for cycle in from..from + 2000 {
         let state = ArmState {
@@ -45,8 +45,8 @@ fn until_answered(plant: &PlantLink, from: u64) -> u64 {
             ..support::state(0)
         };
         plant.publish(&state).expect("published");
-        let heard = plant.answer(cycle, Duration::from_millis(10));
-        if heard.expect("read").answer.is_some() {
+        let received = plant.answer(cycle, Duration::from_millis(10));
+        if received.expect("read").answer.is_some() {
             return cycle;
         }
     }
@@ -68,16 +68,16 @@ fn a_killed_controller_is_replaced() {
             ..support::state(0)
         };
         plant.publish(&state).expect("a dead reader is no error");
-        let heard = plant.answer(cycle, Duration::from_millis(5));
-        assert_eq!(heard.expect("read").answer, None);
+        let received = plant.answer(cycle, Duration::from_millis(5));
+        assert_eq!(received.expect("read").answer, None);
         cycle += 1;
     }
-    // The last controller was killed too; what it left goes with the last who leaves.
+    // The last controller was killed too; the last process that leaves removes its objects.
     drop(plant);
     assert_eq!(support::objects(&system.domain), [""; 0]);
 }
 
-/// Wherever in its start a controller is killed, whoever comes next finds the system usable.
+/// A controller may be killed at any moment of its start; the next one finds the system usable.
 #[test]
 fn a_controller_killed_while_it_joins_is_replaced() {
     let system = support::system("joining");
@@ -98,9 +98,9 @@ fn a_controller_killed_while_it_joins_is_replaced() {
     assert_eq!(support::objects(&system.domain), [""; 0]);
 }
 
-/// What the kernel leaves of a process that is killed between making an object and giving it a size.
+/// A process that is killed between creating an object and setting its size leaves such objects.
 #[test]
-fn objects_without_a_size_hold_nobody_up() {
+fn unsized_objects_block_nobody() {
     let system = support::system("no-size");
     let plant = PlantLink::new(&system.domain).expect("a plant");
     let names = support::objects(&system.domain);

@@ -1,16 +1,16 @@
-//! Messages carry what they were made of, to the last bit, and refuse readers they are not for.
+//! Messages keep their contents bit for bit, and cannot be read for another arm.
 
 mod support;
 
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use std::mem::size_of;
-use supple_core::controller::{Mode, Request};
+use supple_core::controller::{CycleRecord, Mode, Request};
 use supple_core::{Trajectory, Vector, trajectory::Sinusoid};
 use supple_ipc::message::*;
 
 #[test]
-fn there_is_no_padding_to_share() {
+fn messages_have_no_padding() {
     let joints = MAX_DOF * 8;
     assert_eq!(size_of::<PlantReport>(), 9 * 8);
     assert_eq!(
@@ -21,21 +21,11 @@ fn there_is_no_padding_to_share() {
     assert_eq!(size_of::<Text>(), 256);
     assert_eq!(size_of::<OperatorRequest>(), 3 * 8 + 80 * 8 + 8);
     assert_eq!(size_of::<OperatorReply>(), 3 * 8 + size_of::<Text>() + 8);
-    assert_eq!(size_of::<TermTorques>(), 13 * joints);
     assert_eq!(size_of::<CycleTiming>(), 3 * 8);
+    let words = CycleRecord::<MAX_DOF>::words(MAX_DOF);
     assert_eq!(
         size_of::<Telemetry>(),
-        2 * 8
-            + size_of::<ArmState>()
-            + size_of::<OperatorRequest>()
-            + 8
-            + 5 * joints
-            + size_of::<TermTorques>()
-            + 8 * 3 * 8
-            + 6 * 8
-            + size_of::<CycleTiming>()
-            + 2 * size_of::<Text>()
-            + 8
+        size_of::<ArmState>() + 8 + size_of::<CycleTiming>() + 8 * words
     );
 }
 
@@ -47,7 +37,7 @@ proptest! {
     })]
 
     #[test]
-    fn an_arm_state_gives_the_input_it_was_made_of(
+    fn arm_state_round_trips_to_the_same_input(
         cycle in any::<u64>(),
         position in proptest::array::uniform7(proptest::option::of(any::<f64>())),
         force in proptest::option::of(proptest::array::uniform3(any::<f64>())),
@@ -68,20 +58,20 @@ proptest! {
     }
 
     #[test]
-    fn words_are_cut_at_a_character_and_never_lost(words in "\\PC{0,200}") {
-        let text = Text::of(&words);
-        prop_assert!(words.starts_with(text.as_str()));
-        prop_assert!(text.as_str().len() == words.len() || text.as_str().len() > 252 - 4);
+    fn long_text_is_truncated_at_a_character(long in "\\PC{0,200}") {
+        let text = Text::of(&long);
+        prop_assert!(long.starts_with(text.as_str()));
+        prop_assert!(text.as_str().len() == long.len() || text.as_str().len() > 252 - 4);
     }
 }
 
 #[test]
-fn another_arm_is_refused_by_name_and_number() {
+fn messages_for_another_arm_are_refused_with_both_joint_counts() {
     let state = support::state(0);
     let error = state.input::<7>(None).expect_err("four joints");
-    let words = error.to_string();
-    for word in ["arm state", "4 joints", "7 are expected", "--arm"] {
-        assert!(words.contains(word), "{words}");
+    let text = error.to_string();
+    for word in ["arm state", "4 joints", "expected 7", "--arm"] {
+        assert!(text.contains(word), "{text}");
     }
     let input = state.input::<4>(None).expect("four joints");
     let command = TorqueCommand::new(&support::answer(&input), false);
@@ -91,11 +81,11 @@ fn another_arm_is_refused_by_name_and_number() {
 }
 
 #[test]
-fn a_command_carries_torques_mode_and_what_the_drives_are_to_do() {
-    let hold = |request, leaving| {
+fn command_carries_torques_mode_and_requested_drive_state() {
+    let hold = |request, shutting_down| {
         let input = support::state(7).input::<4>(request).expect("four joints");
         let output = support::answer(&input);
-        (output, TorqueCommand::new(&output, leaving))
+        (output, TorqueCommand::new(&output, shutting_down))
     };
     let (output, command) = hold(Some(Request::GravityHold), false);
     assert_eq!(command.cycle, 7);
@@ -113,7 +103,7 @@ fn a_command_carries_torques_mode_and_what_the_drives_are_to_do() {
 }
 
 #[test]
-fn telemetry_says_what_was_asked_and_how_far_the_tip_is() {
+fn telemetry_contains_the_request_and_the_refusal() {
     let trajectory = Trajectory::Sinusoid(Sinusoid::paper(1.0));
     let state = support::state(3);
     let input = state
@@ -121,15 +111,26 @@ fn telemetry_says_what_was_asked_and_how_far_the_tip_is() {
         .expect("four joints");
     let output = support::answer(&input);
     let telemetry = Telemetry::new(9, &state, &input, &output, CycleTiming::default());
-    assert_eq!(telemetry.request().request::<4>(), Ok(input.request));
-    assert_eq!(telemetry.mode(), Some(Mode::Idle));
+    let record = telemetry.record_of::<4>();
+    assert_eq!(record, CycleRecord::new(9, &input, &output));
+    assert_eq!(record.input(), Ok(input));
+    assert_eq!(record.mode(), Some(Mode::Idle));
     assert!(
-        telemetry
+        record
             .refusal_text
             .as_str()
-            .contains("not from mode idle")
+            .contains("not possible in mode idle")
     );
-    assert_eq!(telemetry.tip_error_m(), None);
+    assert_eq!(record.tip_error_m(), None);
+    // For any arm the same, with nothing where there are no joints.
+    let wide = telemetry.record();
+    assert_eq!((telemetry.step(), telemetry.dof()), (9, 4));
+    assert_eq!(
+        wide.position_rad.as_slice()[..4],
+        *output.position_rad.as_slice()
+    );
+    assert_eq!(wide.position_rad.as_slice()[4..], [0.0; 3]);
+    assert_eq!(wide.fault_text, record.fault_text);
     assert_eq!(telemetry.state, state);
 }
 

@@ -5,15 +5,18 @@ mod counting;
 mod support;
 
 use core::time::Duration;
-use counting::counted;
+use counting::count_allocations;
 use supple_core::controller::{Mode, Request};
 use supple_ipc::message::*;
 use supple_ipc::*;
 
 #[test]
-fn the_counter_counts() {
-    assert_eq!(counted(|| drop(std::hint::black_box(Box::new(1)))), 2);
-    assert_eq!(counted(|| {}), 0);
+fn allocation_counter_counts() {
+    assert_eq!(
+        count_allocations(|| drop(std::hint::black_box(Box::new(1)))),
+        2
+    );
+    assert_eq!(count_allocations(|| {}), 0);
 }
 
 #[test]
@@ -21,9 +24,9 @@ fn a_thousand_cycles_allocate_nothing() {
     let system = support::system("no-alloc");
     let plant = PlantLink::new(&system.domain).expect("a plant");
     let controller = ControllerLink::new(&system.domain).expect("a controller");
-    let outside = OutsideLink::new(&system.domain, Full::Lose).expect("a controller");
+    let server = OperatorServer::new(&system.domain, Backpressure::Drop).expect("a controller");
     let mut reader = TelemetryReader::new(&system.domain).expect("a reader");
-    let mut operator = Operator::new(&system.domain).expect("an operator");
+    let mut operator = OperatorClient::new(&system.domain).expect("an operator");
     let input = support::state(0).input::<4>(None).expect("four joints");
     let output = support::answer(&input);
     let state = support::state(0);
@@ -32,28 +35,31 @@ fn a_thousand_cycles_allocate_nothing() {
         let mut state = state;
         state.cycle = k;
         plant.announce().expect("announced");
-        assert_eq!(controller.wake(soon).expect("read"), Woken::Announced);
+        assert_eq!(
+            controller.wait_for_event(soon).expect("read"),
+            WakeEvent::Announced
+        );
         plant.publish(&state).expect("published");
         let received = controller.wait(soon).expect("read").expect("a state");
         let mut command = TorqueCommand::new(&output, false);
         command.cycle = received.cycle;
         controller.answer(&command).expect("answered");
-        let heard = plant.answer(k, soon).expect("read");
-        assert!(heard.answer.is_some());
+        let received = plant.answer(k, soon).expect("read");
+        assert!(received.answer.is_some());
         let timing = CycleTiming::default();
         let telemetry = Telemetry::new(k, &state, &input, &output, timing);
-        outside.publish(&telemetry).expect("published");
+        server.publish(&telemetry).expect("published");
         assert!(reader.receive().expect("read").is_some());
         let sequence = operator
             .send::<4>(&Request::GravityHold, None)
             .expect("sent")
             .expect("there is a controller");
-        let request = outside.request().expect("read").expect("a request");
+        let request = server.request().expect("read").expect("a request");
         let reply = OperatorReply::new(&request, k, Mode::Idle, Outcome::Accepted, Text::EMPTY);
-        outside.reply(&reply).expect("replied");
+        server.reply(&reply).expect("replied");
         let reply = operator.receive().expect("read").expect("a reply");
         assert_eq!(reply.sequence, sequence);
-        // Waits in vain as well, with and without sleep.
+        // Waits without a message as well, polling and blocking.
         assert!(controller.wait(Duration::ZERO).expect("read").is_none());
         if k.is_multiple_of(100) {
             let moment = Duration::from_micros(200);
@@ -61,7 +67,7 @@ fn a_thousand_cycles_allocate_nothing() {
             assert!(plant.answer(k, moment).expect("read").answer.is_none());
         }
     };
-    // Both sides meet at the first.
+    // Both sides connect in the first cycles.
     (0..4).for_each(&mut cycle);
-    assert_eq!(counted(|| (4..1004).for_each(&mut cycle)), 0);
+    assert_eq!(count_allocations(|| (4..1004).for_each(&mut cycle)), 0);
 }

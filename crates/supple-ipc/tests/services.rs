@@ -1,5 +1,5 @@
-//! The services themselves: one writer each, nothing shared between prefixes, readers that count what they
-//! lose, peers of another version refused, and only the owner may look.
+//! The services: one writer each, prefixes are separate, readers count lost messages, peers of another version are
+//! refused, and only the owner has access.
 
 mod support;
 
@@ -26,9 +26,9 @@ fn a_state_is_answered_in_its_cycle() {
         let output = answer(&received.input(None).expect("four joints"));
         let command = TorqueCommand::new(&output, false);
         controller.answer(&command).expect("answered");
-        let heard = plant.answer(cycle, SOON).expect("read");
-        assert_eq!(heard.answer, Some(command));
-        assert_eq!(heard.late, 0);
+        let received = plant.answer(cycle, SOON).expect("read");
+        assert_eq!(received.answer, Some(command));
+        assert_eq!(received.late, 0);
     }
 }
 
@@ -40,27 +40,33 @@ fn a_state_may_be_announced() {
     for cycle in 0..200 {
         if cycle % 2 == 0 {
             plant.announce().expect("announced");
-            assert_eq!(controller.wake(SOON).expect("read"), Woken::Announced);
+            assert_eq!(
+                controller.wait_for_event(SOON).expect("read"),
+                WakeEvent::Announced
+            );
         }
         plant.publish(&state(cycle)).expect("published");
         if cycle % 5 == 0 {
-            // Its ring is still to come when the state has been read.
+            // The state is read before its wake-up is consumed.
             let received = controller.receive().expect("read");
             assert_eq!(received, Some(state(cycle)));
         } else {
-            let woken = controller.wake(SOON).expect("read");
-            assert_eq!(woken, Woken::State(state(cycle)));
+            let woken = controller.wait_for_event(SOON).expect("read");
+            assert_eq!(woken, WakeEvent::State(state(cycle)));
         }
         assert_eq!(controller.receive().expect("read"), None);
         let mut command = TorqueCommand::new(&answer(&state(0).input(None).expect("four")), false);
         command.cycle = cycle;
         controller.answer(&command).expect("answered");
-        let heard = plant.answer(cycle, SOON).expect("read");
-        assert_eq!(heard.answer.map(|command| command.cycle), Some(cycle));
+        let received = plant.answer(cycle, SOON).expect("read");
+        assert_eq!(received.answer.map(|command| command.cycle), Some(cycle));
     }
     let moment = Duration::from_millis(1);
-    assert_eq!(controller.wake(moment).expect("read"), Woken::Silence);
-    // Who waits for states alone is not woken by it.
+    assert_eq!(
+        controller.wait_for_event(moment).expect("read"),
+        WakeEvent::Timeout
+    );
+    // `wait` does not return on an announcement.
     plant.announce().expect("announced");
     assert_eq!(controller.wait(moment).expect("read"), None);
 }
@@ -76,21 +82,25 @@ fn an_answer_to_another_cycle_is_late_and_not_used() {
     controller
         .answer(&TorqueCommand::new(&output, false))
         .expect("answered");
-    let heard = plant.answer(2, Duration::from_millis(1)).expect("read");
-    assert_eq!((heard.answer, heard.late), (None, 1));
+    let received = plant.answer(2, Duration::from_millis(1)).expect("read");
+    assert_eq!((received.answer, received.late), (None, 1));
 }
 
 #[test]
-fn without_a_peer_a_wait_ends() {
+fn wait_without_a_peer_times_out() {
     let system = system("alone");
     let plant = PlantLink::new(&system.domain).expect("a plant");
     assert!(!plant.publish(&state(0)).expect("published"));
-    let heard = plant.answer(0, Duration::from_millis(2)).expect("read");
-    assert_eq!(heard, Heard::default());
+    let received = plant.answer(0, Duration::from_millis(2)).expect("read");
+    let expected = ReceivedAnswer {
+        timed_out: true,
+        ..ReceivedAnswer::default()
+    };
+    assert_eq!(received, expected);
 }
 
 #[test]
-fn a_controller_that_lags_sees_every_state() {
+fn late_controller_receives_every_state() {
     let system = system("lag");
     let plant = PlantLink::new(&system.domain).expect("a plant");
     let controller = ControllerLink::new(&system.domain).expect("a controller");
@@ -103,9 +113,9 @@ fn a_controller_that_lags_sees_every_state() {
     assert_eq!(controller.receive().expect("read"), None);
 }
 
-/// Several that come and go at once make and take away the same services under each other's hands.
+/// Several processes join and leave at the same time, and so create and remove the same services concurrently.
 #[test]
-fn who_comes_while_others_come_and_go_is_let_in() {
+fn join_succeeds_during_concurrent_joins_and_leaves() {
     let system = system("flux");
     std::thread::scope(|scope| {
         for _ in 0..3 {
@@ -123,9 +133,10 @@ fn who_comes_while_others_come_and_go_is_let_in() {
     });
 }
 
-/// A plant that looks for its answer before it sleeps gets the same, and is not woken by what it has had.
+/// A plant that polls before it blocks receives the same answers, and a wake-up for an earlier answer does not end its
+/// wait.
 #[test]
-fn a_plant_that_spins_gets_its_answers_and_sleeps_when_none_comes() {
+fn polling_plant_gets_its_answers_and_blocks_without_one() {
     let system = system("spin");
     let mut plant = PlantLink::new(&system.domain).expect("a plant");
     plant.spin(Duration::from_millis(1));
@@ -149,25 +160,25 @@ fn a_plant_that_spins_gets_its_answers_and_sleeps_when_none_comes() {
         }
         for cycle in 0..50 {
             plant.publish(&state(cycle)).expect("published");
-            let heard = plant.answer(cycle, SOON).expect("read");
-            assert_eq!(heard.answer.map(|command| command.cycle), Some(cycle));
+            let received = plant.answer(cycle, SOON).expect("read");
+            assert_eq!(received.answer.map(|command| command.cycle), Some(cycle));
         }
         plant.publish(&state(50)).expect("published");
-        let heard = plant.answer(50, Duration::from_millis(5)).expect("read");
-        assert_eq!(heard.answer, None);
+        let received = plant.answer(50, Duration::from_millis(5)).expect("read");
+        assert_eq!(received.answer, None);
     });
 }
 
 #[test]
-fn a_second_writer_is_refused_and_told_why() {
+fn second_writer_is_refused_with_the_reason() {
     let system = system("second");
     let _plant = PlantLink::new(&system.domain).expect("a plant");
     let _controller = ControllerLink::new(&system.domain).expect("a controller");
-    let _outside = OutsideLink::new(&system.domain, Full::Lose).expect("a controller");
+    let _server = OperatorServer::new(&system.domain, Backpressure::Drop).expect("a controller");
     let refused = [
         PlantLink::new(&system.domain).expect_err("there is one"),
         ControllerLink::new(&system.domain).expect_err("there is one"),
-        OutsideLink::new(&system.domain, Full::Lose).expect_err("there is one"),
+        OperatorServer::new(&system.domain, Backpressure::Drop).expect_err("there is one"),
     ];
     for error in refused {
         assert!(matches!(error, IpcError::SecondWriter { .. }), "{error}");
@@ -179,11 +190,11 @@ fn a_second_writer_is_refused_and_told_why() {
 }
 
 #[test]
-fn systems_under_another_prefix_or_in_another_folder_do_not_meet() {
+fn systems_with_another_prefix_or_folder_are_separate() {
     let (one, two) = (system("one"), system("two"));
     let plant = PlantLink::new(&one.domain).expect("a plant");
-    let same_folder = Domain::within(one.domain.folder(), "other").expect("a domain");
-    let same_prefix = Domain::within(two.domain.folder(), one.domain.prefix());
+    let same_folder = Domain::in_folder(one.domain.folder(), "other").expect("a domain");
+    let same_prefix = Domain::in_folder(two.domain.folder(), one.domain.prefix());
     let same_prefix = same_prefix.expect("a domain");
     for other in [&two.domain, &same_folder, &same_prefix] {
         let controller = ControllerLink::new(other).expect("a controller");
@@ -196,35 +207,35 @@ fn systems_under_another_prefix_or_in_another_folder_do_not_meet() {
 fn telemetry_counts_what_a_slow_reader_loses() {
     let system = system("slow");
     let mut reader = TelemetryReader::new(&system.domain).expect("a reader");
-    let outside = OutsideLink::new(&system.domain, Full::Lose).expect("a controller");
+    let server = OperatorServer::new(&system.domain, Backpressure::Drop).expect("a controller");
     let input = state(0).input::<4>(None).expect("four joints");
     let output = answer(&input);
     let publish = |step: u64| {
         let telemetry = Telemetry::new(step, &state(step), &input, &output, CycleTiming::default());
-        outside.publish(&telemetry).expect("published");
+        server.publish(&telemetry).expect("published");
     };
     let depth = TELEMETRY_DEPTH as u64;
     (0..depth + 10).for_each(publish);
     for step in 0..depth {
         let telemetry = reader.receive().expect("read").expect("it is there");
-        assert_eq!(telemetry.step, step);
+        assert_eq!(telemetry.step(), step);
     }
     assert_eq!((reader.receive().expect("read"), reader.lost()), (None, 0));
     publish(depth + 10);
     let next = reader.receive().expect("read").expect("it is there");
-    assert_eq!((next.step, reader.lost()), (depth + 10, 10));
+    assert_eq!((next.step(), reader.lost()), (depth + 10, 10));
 }
 
 #[test]
-fn operators_hear_the_replies_to_their_own_requests() {
+fn operators_receive_only_replies_to_their_own_requests() {
     let system = system("operators");
-    let outside = OutsideLink::new(&system.domain, Full::Lose).expect("a controller");
-    let mut one = Operator::new(&system.domain).expect("an operator");
-    let mut two = Operator::new(&system.domain).expect("an operator");
+    let server = OperatorServer::new(&system.domain, Backpressure::Drop).expect("a controller");
+    let mut one = OperatorClient::new(&system.domain).expect("an operator");
+    let mut two = OperatorClient::new(&system.domain).expect("an operator");
     let first = one.send::<4>(&Request::GravityHold, None).expect("sent");
     let second = two.send::<4>(&Request::Reset, Some(100)).expect("sent");
     let mut seen = Vec::new();
-    while let Some(request) = outside.request().expect("read") {
+    while let Some(request) = server.request().expect("read") {
         seen.push((
             request.request::<4>(),
             request.has_at_cycle,
@@ -235,14 +246,14 @@ fn operators_hear_the_replies_to_their_own_requests() {
             _ => (Outcome::Refused, Text::of(&"no")),
         };
         let reply = OperatorReply::new(&request, 7, Mode::GravityHold, outcome, text);
-        outside.reply(&reply).expect("replied");
+        server.reply(&reply).expect("replied");
     }
     let expected = [
         (Ok(Some(Request::GravityHold)), 0, 0),
         (Ok(Some(Request::Reset)), 1, 100),
     ];
     assert_eq!(seen, expected);
-    let reply = |operator: &Operator, sequence: Option<u64>| {
+    let reply = |operator: &OperatorClient, sequence: Option<u64>| {
         let reply = operator.receive().expect("read").expect("a reply");
         assert_eq!(Some(reply.sequence), sequence);
         assert_eq!(operator.receive().expect("read"), None);
@@ -262,14 +273,14 @@ fn operators_hear_the_replies_to_their_own_requests() {
 }
 
 #[test]
-fn a_request_without_a_controller_goes_nowhere() {
+fn request_without_a_controller_is_not_sent() {
     let system = system("nobody");
-    let mut operator = Operator::new(&system.domain).expect("an operator");
+    let mut operator = OperatorClient::new(&system.domain).expect("an operator");
     let sent = operator.send::<4>(&Request::Idle, None).expect("sent");
     assert_eq!(sent, None);
 }
 
-/// What another version of this software might call by the same name.
+/// A message type of another version with the same name.
 #[derive(Clone, Copy, Debug, ZeroCopySend)]
 #[repr(C)]
 #[type_name("supple.ArmState.v9")]
@@ -283,7 +294,7 @@ fn a_peer_of_another_version_is_refused() {
     let mut config = Config::default();
     let root = Path::new(system.folder.as_os_str().as_encoded_bytes()).expect("a path");
     config.global.set_root_path(&root);
-    let objects = system.domain.objects();
+    let objects = system.domain.object_prefix();
     config.global.prefix = FileName::new(objects.as_bytes()).expect("a name");
     let node = NodeBuilder::new().config(&config);
     let node = node.create::<ipc::Service>().expect("a node");
@@ -299,26 +310,26 @@ fn a_peer_of_another_version_is_refused() {
         assert!(error.to_string().contains(word), "{error}");
     }
     drop((publisher, service, node));
-    drop(ControllerLink::new(&system.domain).expect("the place is free"));
+    drop(ControllerLink::new(&system.domain).expect("no other version is left"));
 }
 
 #[test]
-fn prefixes_that_are_no_file_names_are_refused() {
+fn invalid_prefixes_are_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     let long = "x".repeat(33);
     for prefix in ["", "../up", "a b", "UPPER", "dot.dot", &long] {
-        let error = Domain::within(folder.path(), prefix).expect_err("no name");
+        let error = Domain::in_folder(folder.path(), prefix).expect_err("no name");
         assert!(error.to_string().contains("--prefix"), "{error}");
     }
 }
 
 #[test]
-fn a_folder_that_others_may_enter_is_refused() {
+fn folder_accessible_to_other_users_is_refused() {
     use std::os::unix::fs::PermissionsExt;
     let folder = tempfile::tempdir().expect("a folder");
     let open = std::fs::Permissions::from_mode(0o755);
     std::fs::set_permissions(folder.path(), open).expect("changed");
-    let error = Domain::within(folder.path(), "open").expect_err("open to others");
+    let error = Domain::in_folder(folder.path(), "open").expect_err("open to others");
     for word in ["755", "chmod 700"] {
         assert!(error.to_string().contains(word), "{error}");
     }
@@ -336,14 +347,13 @@ fn files(folder: &StdPath, found: &mut Vec<std::path::PathBuf>) {
     }
 }
 
-/// The library's one exception: an object of a few bytes a node, for its own bookkeeping and without data,
-/// that others of the machine may open.
+/// One exception: for each node iceoryx2 creates an object of a few bytes, without data, that other users can open.
 #[test]
-fn nobody_else_can_open_data() {
+fn other_users_cannot_open_data() {
     let system = system("permissions");
     let plant = PlantLink::new(&system.domain).expect("a plant");
     let _controller = ControllerLink::new(&system.domain).expect("a controller");
-    let _outside = OutsideLink::new(&system.domain, Full::Lose).expect("a controller");
+    let _server = OperatorServer::new(&system.domain, Backpressure::Drop).expect("a controller");
     let _reader = TelemetryReader::new(&system.domain).expect("a reader");
     plant.publish(&state(0)).expect("published");
     let mut found = Vec::new();
@@ -351,7 +361,7 @@ fn nobody_else_can_open_data() {
     let shared = std::fs::read_dir("/dev/shm")
         .expect("shared memory")
         .flatten();
-    let ours = |name: &str| name.starts_with(&system.domain.objects());
+    let ours = |name: &str| name.starts_with(&system.domain.object_prefix());
     found.extend(
         shared
             .filter(|entry| ours(&entry.file_name().to_string_lossy()))
@@ -361,7 +371,7 @@ fn nobody_else_can_open_data() {
     let in_shared_memory = found.iter().filter(|path| path.starts_with("/dev/shm"));
     assert!(in_shared_memory.count() > 3, "{found:?}");
     for path in found {
-        // A file that a peer has just finished with.
+        // A peer has just removed the file.
         let Ok(about) = path.symlink_metadata() else {
             continue;
         };

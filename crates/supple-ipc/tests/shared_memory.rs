@@ -1,4 +1,4 @@
-//! Shared memory is there before it is needed, and is this user's.
+//! Shared memory is allocated at the start, and belongs to this user.
 
 mod support;
 
@@ -7,19 +7,22 @@ use std::os::unix::fs::{MetadataExt, PermissionsExt, chown};
 use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
 use std::process::Command;
-use supple_ipc::{ControllerLink, Domain, Full, Operator, OutsideLink, PlantLink, TelemetryReader};
+use supple_ipc::{
+    Backpressure, ControllerLink, Domain, OperatorClient, OperatorServer, PlantLink,
+    TelemetryReader,
+};
 use support::{objects, state, system};
 use tempfile::TempDir;
 
-/// Of every object all pages are given: none is to be had for the first time in a control cycle.
+/// All pages of every object are allocated, so that no control cycle allocates one.
 #[test]
-fn all_of_it_is_given_at_the_start() {
+fn all_pages_are_allocated_at_the_start() {
     let system = system("reserved");
     let plant = PlantLink::new(&system.domain).expect("a plant");
     let _controller = ControllerLink::new(&system.domain).expect("a controller");
-    let _outside = OutsideLink::new(&system.domain, Full::Lose).expect("a controller");
+    let _server = OperatorServer::new(&system.domain, Backpressure::Drop).expect("a controller");
     let _reader = TelemetryReader::new(&system.domain).expect("a reader");
-    let _operator = Operator::new(&system.domain).expect("an operator");
+    let _operator = OperatorClient::new(&system.domain).expect("an operator");
     plant.publish(&state(0)).expect("published");
     let names = objects(&system.domain);
     assert!(names.len() > 10, "{names:?}");
@@ -29,7 +32,7 @@ fn all_of_it_is_given_at_the_start() {
     }
 }
 
-/// Removes a file that the test has made in the machine's one folder of shared memory.
+/// Removes a file that the test created in /dev/shm.
 struct Made(PathBuf);
 
 impl Drop for Made {
@@ -38,7 +41,7 @@ impl Drop for Made {
     }
 }
 
-/// A file as another user would make it; `None` where only the system's administrator may.
+/// Creates a file that belongs to another user; `None` without the permission to do so.
 fn of_another_user(name: &str, bytes: &[u8]) -> Option<Made> {
     let file = Made(PathBuf::from(format!("/dev/shm/{name}")));
     std::fs::write(&file.0, bytes).expect("written");
@@ -52,9 +55,9 @@ fn of_another_user(name: &str, bytes: &[u8]) -> Option<Made> {
 }
 
 #[test]
-fn files_of_another_user_named_like_ours_disturb_nobody_and_stay() {
+fn files_of_another_user_with_our_prefix_are_ignored_and_kept() {
     let system = system("squatted");
-    let begin = system.domain.objects();
+    let begin = system.domain.object_prefix();
     let Some(empty) = of_another_user(&format!("{begin}not_ours"), b"") else {
         return;
     };
@@ -67,23 +70,22 @@ fn files_of_another_user_named_like_ours_disturb_nobody_and_stay() {
     assert!(empty.0.exists() && full.is_some_and(|full| full.0.exists()));
 }
 
-/// Tells a process of this test which folder is its system's, and that it is one.
+/// Environment variable that gives a child process of this test its folder.
 const FOLDER: &str = "SUPPLE_TEST_SHARED_MEMORY_FOLDER";
 
-/// Not a test by itself: a plant of another user than the system's administrator. Prints what it has in shared memory,
-/// or why it has nothing.
+/// Not a test: a plant that runs as another user. Prints its shared-memory objects, or the error.
 #[test]
 #[ignore = "a process of the test below"]
 fn plant_process() {
     let folder = std::env::var(FOLDER).expect("a folder");
-    let domain = Domain::within(std::path::Path::new(&folder), "planted").expect("a domain");
+    let domain = Domain::in_folder(std::path::Path::new(&folder), "planted").expect("a domain");
     match PlantLink::new(&domain) {
         Ok(_plant) => println!("objects {}", objects(&domain).join(" ")),
         Err(error) => println!("refused {error}"),
     }
 }
 
-/// What a plant of user 65534 says; `None` where only the system's administrator may start one.
+/// Output of a plant of user 65534; `None` without the permission to start one.
 fn plant_of_another_user(folder: &TempDir) -> Option<String> {
     let output = Command::new(std::env::current_exe().expect("this test"))
         .args(["--ignored", "--nocapture", "--exact", "plant_process"])
@@ -99,9 +101,9 @@ fn plant_of_another_user(folder: &TempDir) -> Option<String> {
     line.map(str::to_owned)
 }
 
-/// The very objects that a service needs, made by somebody else before, and open to everybody.
+/// Another user has created the objects that a service needs, accessible to all.
 #[test]
-fn an_object_of_another_user_is_never_taken_for_ours() {
+fn object_of_another_user_is_never_used() {
     let folder = tempfile::tempdir().expect("a folder");
     let owned = chown(folder.path(), Some(65534), Some(65534));
     let first = owned.ok().and_then(|()| plant_of_another_user(&folder));

@@ -1,12 +1,12 @@
-//! Waits of less than a microsecond end.
+//! Timeouts below one microsecond expire.
 
 use core::time::Duration;
 use supple_ipc::{ControllerLink, Domain, PlantLink};
 
 #[test]
-fn a_wait_below_the_sockets_resolution_is_not_without_end() {
+fn timeouts_below_the_socket_resolution_expire() {
     let folder = tempfile::tempdir().unwrap();
-    let domain = Domain::within(&folder.path().join("system"), "short").unwrap();
+    let domain = Domain::in_folder(&folder.path().join("system"), "short").unwrap();
     let plant = PlantLink::new(&domain).unwrap();
     let controller = ControllerLink::new(&domain).unwrap();
     for nanoseconds in [1, 300, 999] {

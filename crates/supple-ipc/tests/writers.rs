@@ -1,4 +1,4 @@
-//! Who else writes a service is not heard: readers take the messages of whoever holds the writer's lock.
+//! Readers accept only messages of the process that holds the writer lock.
 
 mod support;
 
@@ -12,17 +12,17 @@ use support::{System, answer, state, system};
 const SOON: Duration = Duration::from_secs(5);
 const MOMENT: Duration = Duration::from_millis(1);
 
-/// A program that takes a free place of a service, as the library lets it, and knows nothing of locks.
-struct Stranger<T: core::fmt::Debug + ZeroCopySend + 'static> {
+/// A program that uses a free writer slot of a service, which iceoryx2 allows, and ignores the writer lock.
+struct ForeignWriter<T: core::fmt::Debug + ZeroCopySend + 'static> {
     publisher: Publisher<ipc::Service, T, ()>,
 }
 
-impl<T: core::fmt::Debug + Copy + ZeroCopySend + 'static> Stranger<T> {
+impl<T: core::fmt::Debug + Copy + ZeroCopySend + 'static> ForeignWriter<T> {
     fn new(system: &System, service: &str) -> Self {
         let mut config = Config::default();
         let root = Path::new(system.folder.as_os_str().as_encoded_bytes()).expect("a path");
         config.global.set_root_path(&root);
-        let objects = system.domain.objects();
+        let objects = system.domain.object_prefix();
         config.global.prefix = FileName::new(objects.as_bytes()).expect("a name");
         config
             .defaults
@@ -36,8 +36,8 @@ impl<T: core::fmt::Debug + Copy + ZeroCopySend + 'static> Stranger<T> {
             .open()
             .expect("it is there");
         let publisher = service.publisher_builder().create();
-        Stranger {
-            publisher: publisher.expect("there is a place"),
+        ForeignWriter {
+            publisher: publisher.expect("a free slot"),
         }
     }
 
@@ -57,44 +57,44 @@ fn command(cycle: u64) -> TorqueCommand {
 }
 
 #[test]
-fn torques_of_a_stranger_are_dropped_and_counted() {
+fn torques_of_a_foreign_writer_are_rejected_and_counted() {
     let system = system("strange-torque");
     let plant = PlantLink::new(&system.domain).expect("a plant");
     let controller = ControllerLink::new(&system.domain).expect("a controller");
-    let stranger = Stranger::new(&system, "torque_command");
+    let foreign = ForeignWriter::new(&system, "torque_command");
     for cycle in 0..50 {
         plant.publish(&state(cycle)).expect("published");
-        // Before the controller, with a torque of its own, as nobody, and with a guess.
+        // Sent before the controller's answer, with another torque, with writer id zero and with a guessed id.
         for writer in [0, 1 + cycle] {
-            stranger.send(TorqueCommand {
+            foreign.send(TorqueCommand {
                 writer,
                 torque_nm: [20.0; 7],
                 ..command(cycle)
             });
         }
         controller.answer(&command(cycle)).expect("answered");
-        let heard = plant.answer(cycle, SOON).expect("read");
-        assert_eq!(heard.answer, Some(command(cycle)));
-        assert_eq!(heard.late, 0);
+        let received = plant.answer(cycle, SOON).expect("read");
+        assert_eq!(received.answer, Some(command(cycle)));
+        assert_eq!(received.late, 0);
         let after = plant.answer(cycle, Duration::ZERO).expect("read");
         assert_eq!(after.answer, None);
     }
-    // Without the controller nobody answers.
+    // Without an answer of the controller there is none.
     plant.publish(&state(50)).expect("published");
-    stranger.send(command(50));
-    let heard = plant.answer(50, MOMENT).expect("read");
-    assert_eq!(heard.answer, None);
+    foreign.send(command(50));
+    let received = plant.answer(50, MOMENT).expect("read");
+    assert_eq!(received.answer, None);
     assert_eq!(plant.foreign(), 101);
 }
 
 #[test]
-fn states_of_a_stranger_are_dropped_and_counted() {
+fn states_of_a_foreign_writer_are_rejected_and_counted() {
     let system = system("strange-state");
     let plant = PlantLink::new(&system.domain).expect("a plant");
     let controller = ControllerLink::new(&system.domain).expect("a controller");
-    let stranger = Stranger::new(&system, "arm_state");
+    let foreign = ForeignWriter::new(&system, "arm_state");
     for cycle in 0..50 {
-        stranger.send(ArmState {
+        foreign.send(ArmState {
             writer: cycle,
             position_rad: [1.0; 7],
             ..state(cycle)
@@ -104,14 +104,14 @@ fn states_of_a_stranger_are_dropped_and_counted() {
         assert_eq!(received, Some(state(cycle)));
         assert_eq!(controller.receive().expect("read"), None);
     }
-    stranger.send(state(50));
+    foreign.send(state(50));
     assert_eq!(controller.wait(MOMENT).expect("read"), None);
     assert_eq!(controller.foreign(), 51);
 }
 
-/// What one of them has sent is not taken for the other's, in either order.
+/// Messages of the earlier controllers do not count as foreign, nor those of their successors.
 #[test]
-fn a_controller_in_the_place_of_another_is_heard() {
+fn a_replacement_controller_is_accepted() {
     let system = system("next-writer");
     let plant = PlantLink::new(&system.domain).expect("a plant");
     for cycle in 0..5 {
@@ -119,8 +119,8 @@ fn a_controller_in_the_place_of_another_is_heard() {
         plant.publish(&state(cycle)).expect("published");
         assert_eq!(controller.wait(SOON).expect("read"), Some(state(cycle)));
         controller.answer(&command(cycle)).expect("answered");
-        let heard = plant.answer(cycle, SOON).expect("read");
-        assert_eq!(heard.answer, Some(command(cycle)));
+        let received = plant.answer(cycle, SOON).expect("read");
+        assert_eq!(received.answer, Some(command(cycle)));
     }
     assert_eq!(plant.foreign(), 0);
 }
@@ -138,7 +138,7 @@ fn a_command_that_is_not_finite_or_of_another_arm_is_not_usable() {
             fallback.fallback_torque_nm[joint] = nonsense;
             assert!(!fallback.is_usable::<4>());
         }
-        // Beyond the arm's own joints nothing is meant.
+        // Entries beyond the arm's joints are ignored.
         let mut beyond = command(0);
         beyond.torque_nm[4] = nonsense;
         assert!(beyond.is_usable::<4>());

@@ -1,4 +1,4 @@
-//! Recovers a log: `cargo run -p supple-log --example recover_log -- cut.mcap whole.mcap`.
+//! Recovers a log: `cargo run -p supple-log --example recover_log -- truncated.mcap recovered.mcap`.
 
 use std::path::PathBuf;
 use std::process::ExitCode;

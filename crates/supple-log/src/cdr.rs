@@ -1,19 +1,19 @@
-//! CDR as ROS 2 puts it on the wire: four bytes that say "plain, little endian", then the values, each
-//! aligned to its size counted from after those four.
+//! CDR in the wire format of ROS 2: a four-byte header for "plain, little endian", then the values, each aligned
+//! to its size relative to the end of the header.
 
 use byteorder::LittleEndian;
 use serde::{Deserialize, Serialize};
 
 const ENCAPSULATION: [u8; 4] = [0, 1, 0, 0];
 
-/// Replaces what `into` holds.
+/// Encodes `value`, replacing the content of `into`.
 pub(crate) fn encode<T: Serialize>(value: &T, into: &mut Vec<u8>) -> cdr_encoding::Result<()> {
     into.clear();
     into.extend_from_slice(&ENCAPSULATION);
     cdr_encoding::to_writer::<T, LittleEndian, _>(into, value)
 }
 
-/// Refuses another byte order, missing bytes and bytes left over.
+/// Rejects another byte order, missing bytes and excess bytes.
 pub(crate) fn decode<'a, T: Deserialize<'a>>(data: &'a [u8]) -> Result<T, String> {
     let values = values(data)?;
     let (value, read) =
@@ -24,13 +24,13 @@ pub(crate) fn decode<'a, T: Deserialize<'a>>(data: &'a [u8]) -> Result<T, String
     Ok(value)
 }
 
-/// What follows the encapsulation.
+/// The values after the encapsulation header.
 pub(crate) fn values(data: &[u8]) -> Result<&[u8], String> {
     let values = data.strip_prefix(&ENCAPSULATION);
     values.ok_or_else(|| "not plain little-endian CDR".to_owned())
 }
 
-/// Arrays whose length is a const generic, which serde itself does not take.
+/// Arrays of const generic length, which serde does not support.
 pub(crate) mod array {
     use serde::de::{Error, SeqAccess, Visitor};
     use serde::ser::SerializeTuple;

@@ -1,16 +1,15 @@
-//! The configuration in force as TOML, and back without the loss of a bit: numbers are written with
-//! the digits that read back as the same number.
+//! The active configuration as TOML, bit-exact in both directions: numbers are printed with enough digits.
 //!
-//! It is not the TOML of an arm, from which it may differ: a model perturbed or identified, other
-//! gains, another law. Links are in joint frames, as [`Arm::links`] gives them.
+//! It may differ from the TOML of the arm: a perturbed or identified model, other gains, another law. Links are
+//! in joint frames, as in [`Arm::links`].
 
 use crate::toml_types::{
     CollisionDef, ContactLatchDef, FrictionDef, LawDef, LimitsDef, LinkDef, MoveGainsDef,
-    PlausibleDef, PoseDef, RippleDef, RoleDef, WorkspaceDef, column, rows,
+    PlausibilityDef, PoseDef, RippleDef, RoleDef, WorkspaceDef, column, rows,
 };
 use serde::{Deserialize, Serialize};
 use supple_core::config::{
-    Collision, ContactLatch, Law, Limits, MoveGains, Plausible, Role, Workspace,
+    Collision, ContactLatch, Law, Limits, MoveGains, PlausibilityLimits, Role, Workspace,
 };
 use supple_core::math::Vector3;
 use supple_core::{Arm, Config, Friction, Link, Matrix, Pose, Vector};
@@ -31,7 +30,7 @@ struct Stored<const N: usize> {
     last_joint_from_tip: Pose,
     #[serde(with = "LawDef")]
     law: Law,
-    /// Harmonics of the motors' torque.
+    /// Harmonics of the motors' torque ripple.
     #[serde(default)]
     ripple: Vec<RippleDef>,
     #[serde(with = "ContactLatchDef")]
@@ -40,11 +39,11 @@ struct Stored<const N: usize> {
     move_gains: MoveGains<N>,
     #[serde(with = "LimitsDef")]
     limits: Limits<N>,
-    /// Logs from before there were thresholds have none.
-    #[serde(with = "CollisionDef", default = "Collision::never")]
+    /// Older logs have no collision thresholds.
+    #[serde(with = "CollisionDef", default = "Collision::disabled")]
     collision: Collision<N>,
-    #[serde(with = "PlausibleDef", default = "Plausible::anything")]
-    plausible: Plausible,
+    #[serde(with = "PlausibilityDef", default = "PlausibilityLimits::disabled")]
+    plausible: PlausibilityLimits,
     #[serde(default)]
     workspace: Option<WorkspaceDef>,
     joints: Vec<Joint>,
@@ -109,7 +108,7 @@ pub(crate) fn to_toml<const N: usize>(config: &Config<N>) -> Result<String, toml
 }
 
 /// # Errors
-/// What is wrong, in words.
+/// Description of the problem.
 pub(crate) fn from_toml<const N: usize>(text: &str) -> Result<Config<N>, String> {
     let stored: Stored<N> = toml::from_str(text).map_err(|error| error.to_string())?;
     let joints: [Joint; N] = stored
@@ -157,19 +156,19 @@ mod tests {
     fn round_trip<const N: usize>(config: &Config<N>) {
         let text = to_toml(config).expect("writes");
         let again = from_toml::<N>(&text).expect("reads");
-        // Debug prints the shortest decimal of every number: one text, one set of bits.
+        // Debug format prints the shortest unique decimal of every number: equal texts mean equal bits.
         assert_eq!(format!("{again:?}"), format!("{config:?}"), "{text}");
     }
 
     #[test]
-    fn every_built_in_arm_comes_back_to_the_last_bit() {
+    fn every_built_in_arm_survives_the_round_trip_bit_exactly() {
         round_trip(&config::<3>("paper3"));
         round_trip(&config::<4>("wam4"));
         round_trip(&config::<7>("wam7"));
     }
 
     #[test]
-    fn every_choice_of_the_law_comes_back() {
+    fn every_option_of_the_law_survives_the_round_trip() {
         let mut config = config::<4>("wam4");
         config.law.inertia = ApparentInertia::Chosen(Matrix3::new(
             2.0,
@@ -218,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn another_number_of_joints_and_an_unknown_key_are_refused() {
+    fn a_wrong_number_of_joints_and_an_unknown_key_are_rejected() {
         let text = to_toml(&config::<4>("wam4")).expect("writes");
         assert!(from_toml::<3>(&text).is_err());
         assert!(from_toml::<4>(&format!("stiff = 1\n{text}")).is_err());

@@ -1,17 +1,20 @@
-//! Reading message definitions written in `ros2msg`.
+//! Parser of message definitions in `ros2msg` format.
 
 use std::collections::BTreeMap;
 
-/// Messages within each other at most; those of ROS have five.
-const MOST_DEPTH: usize = 32;
-/// Longest text that is read \[bytes\]: a hundred times that of any message.
-const MOST_BYTES: usize = 1 << 20;
+/// Maximum number of fields (array elements included) in a table; zero-size fields occupy no bytes, so the message
+/// length does not bound their number.
+pub(crate) const MAX_FIELDS: usize = 100_000;
+/// Maximum nesting depth of messages; ROS messages have five levels.
+const MAX_DEPTH: usize = 32;
+/// Maximum size of a definition \[bytes\]: a hundred times that of any message.
+const MAX_BYTES: usize = 1 << 20;
 
 /// Line between the definitions of a text.
 pub(crate) const SEPARATOR: &str =
     "================================================================================";
 
-/// What a field holds one or many of.
+/// Element type of a field.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     Bool,
@@ -30,13 +33,13 @@ pub(crate) enum Kind {
     Message(String),
 }
 
-/// How many.
+/// Number of elements of a field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Count {
     One,
     Array(usize),
     Sequence,
-    /// A sequence with a greatest length.
+    /// A sequence with a maximum length.
     Bounded,
 }
 
@@ -48,7 +51,7 @@ pub(crate) struct Field {
     pub count: Count,
 }
 
-/// A message and all that it uses.
+/// A message type and all types that it uses.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Definitions {
     root: String,
@@ -61,12 +64,12 @@ impl Definitions {
         self.fields(&self.root)
     }
 
-    /// Fields of a type; none of one that is not defined.
+    /// Fields of a type; empty for an undefined type.
     pub fn fields(&self, name: &str) -> &[Field] {
         self.types.get(name).map_or(&[], Vec::as_slice)
     }
 
-    /// Refuses a type that is used and not defined, one without fields, and one that holds itself.
+    /// Rejects undefined, empty and recursive types.
     pub fn check(&self) -> Result<(), String> {
         let used = self.types.values().flatten().filter_map(|f| match &f.kind {
             Kind::Message(name) => Some(name),
@@ -74,7 +77,7 @@ impl Definitions {
         });
         for name in used.chain([&self.root]) {
             if self.fields(name).is_empty() {
-                return Err(format!("{name} is used and not defined"));
+                return Err(format!("{name} is used but not defined"));
             }
         }
         let mut depths = BTreeMap::new();
@@ -84,7 +87,8 @@ impl Definitions {
         Ok(())
     }
 
-    /// Messages within each other from `name` on, itself included. `above` are around it; `depths` are known.
+    /// Nesting depth from `name` on, itself included. `above` is the number of enclosing messages; `depths` caches
+    /// results.
     fn depth<'a>(
         &'a self,
         name: &'a str,
@@ -93,17 +97,17 @@ impl Definitions {
     ) -> Result<usize, String> {
         let too_deep = || {
             format!(
-                "{name} holds itself, or messages are nested more than {MOST_DEPTH} deep: such a type has \
-                 no table"
+                "{name} is recursive, or messages are nested more than {MAX_DEPTH} levels deep: such a type \
+                 cannot be written as a table"
             )
         };
         if let Some(depth) = depths.get(name) {
-            return match above + depth > MOST_DEPTH {
+            return match above + depth > MAX_DEPTH {
                 true => Err(too_deep()),
                 false => Ok(*depth),
             };
         }
-        if above >= MOST_DEPTH {
+        if above >= MAX_DEPTH {
             return Err(too_deep());
         }
         let mut depth = 1;
@@ -119,10 +123,10 @@ impl Definitions {
 
 /// The definitions in `text`, whose first is that of `root`. `package/msg/Type` is `package/Type`.
 pub(crate) fn parse(root: &str, text: &str) -> Result<Definitions, String> {
-    if text.len() > MOST_BYTES {
+    if text.len() > MAX_BYTES {
         let bytes = text.len();
         return Err(format!(
-            "a definition of {bytes} bytes, at most {MOST_BYTES} are read"
+            "a definition of {bytes} bytes, at most {MAX_BYTES} are read"
         ));
     }
     let root = root.replace("/msg/", "/");
@@ -146,7 +150,7 @@ pub(crate) fn parse(root: &str, text: &str) -> Result<Definitions, String> {
     Ok(definitions)
 }
 
-/// Fields of one definition; constants and comments are left out.
+/// Fields of one definition, without constants and comments.
 pub(crate) fn fields(name: &str, body: &str) -> Result<Vec<Field>, String> {
     let package = name.split('/').next().unwrap_or(name);
     body.lines()
@@ -231,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn refuses_what_holds_itself_and_what_is_nested_too_deep() {
+    fn rejects_recursive_and_too_deeply_nested_types() {
         let own = |text: &str| parse("p/A", text).expect_err("no table has such a type");
         for text in [
             "A a\n".to_owned(),
@@ -239,7 +243,7 @@ mod tests {
             format!("B b\n{SEPARATOR}\nMSG: p/B\nA[2] a\n"),
         ] {
             let error = own(&text);
-            assert!(error.contains("holds itself"), "{error}");
+            assert!(error.contains("is recursive"), "{error}");
         }
         let chain = |length: usize| {
             let mut text = "M1 m\n".to_owned();
@@ -248,15 +252,15 @@ mod tests {
             }
             text + &format!("{SEPARATOR}\nMSG: p/M{length}\nint8 x\n")
         };
-        assert!(parse("p/A", &chain(MOST_DEPTH - 1)).is_ok());
-        for length in [MOST_DEPTH, 10_000] {
+        assert!(parse("p/A", &chain(MAX_DEPTH - 1)).is_ok());
+        for length in [MAX_DEPTH, 10_000] {
             let error = own(&chain(length));
-            assert!(error.contains("32 deep"), "{error}");
+            assert!(error.contains("32 levels deep"), "{error}");
         }
     }
 
     #[test]
-    fn refuses_what_is_not_defined_or_not_a_field() {
+    fn rejects_undefined_types_and_malformed_fields() {
         assert!(parse("p/A", "Missing m\n").is_err());
         assert!(parse("p/A", "float64\n").is_err());
         assert!(parse("p/A", "float64[x] a\n").is_err());

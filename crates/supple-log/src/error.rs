@@ -1,8 +1,8 @@
-//! Why a log could not be written or read.
+//! Errors of writing and reading logs.
 
 use std::io;
 
-/// Why a log could not be written or read. Every message names the file.
+/// Error of writing or reading a log. Every message names the file.
 #[derive(Debug, thiserror::Error)]
 pub enum LogError {
     /// The file could not be created.
@@ -21,10 +21,10 @@ pub enum LogError {
         /// File.
         file: String,
     },
-    /// The file could not be written to its end; what was written stays under this name.
+    /// The file could not be written completely; the written part stays under this name.
     #[error(
-        "cannot write {file}: {source}; make room and run again, the file is incomplete and `supple log \
-         recover` keeps what is whole in it"
+        "cannot write {file}: {source}; free disk space and run again; the file is incomplete, `supple log \
+         recover` keeps its complete part"
     )]
     Write {
         /// File.
@@ -40,39 +40,39 @@ pub enum LogError {
         /// Cause.
         source: io::Error,
     },
-    /// The file ends before its end, or is damaged.
+    /// The file is truncated or damaged.
     #[error(
-        "{file} is incomplete ({cause}, after {kept_bytes} whole bytes); `supple log recover` keeps \
-         what is whole"
+        "{file} is incomplete ({cause}, after {kept_bytes} valid bytes); `supple log recover` keeps \
+         the complete part"
     )]
     Incomplete {
         /// File.
         file: String,
-        /// What was wrong where it stopped.
+        /// Problem at which reading stopped.
         cause: String,
-        /// Bytes up to there.
+        /// Valid bytes before it.
         kept_bytes: u64,
     },
-    /// Not a log that this crate wrote, or one of another version.
+    /// Not a log of this crate, or a log of another version.
     #[error("{file}: {message}; it is not a log of supple, or one of another version")]
     Format {
         /// File.
         file: String,
-        /// What is wrong, with the element.
+        /// Problem, with the element.
         message: String,
     },
-    /// Not a single whole chunk.
+    /// The file contains no complete chunk.
     #[error(
-        "nothing to recover from {file}: not one chunk of its {bytes} bytes is whole; the run must be \
+        "nothing to recover from {file}: its {bytes} bytes contain no complete chunk; the run must be \
          repeated"
     )]
-    NothingWhole {
+    NoCompleteChunk {
         /// File.
         file: String,
-        /// Its length.
+        /// Length of the file.
         bytes: u64,
     },
-    /// The recovered file would replace the one that it comes from.
+    /// The recovered file would replace its source.
     #[error("{file} cannot be recovered onto itself; give the result another name")]
     SameFile {
         /// File.
@@ -83,38 +83,38 @@ pub enum LogError {
     JointCount {
         /// File.
         file: String,
-        /// Joints expected.
+        /// Expected number of joints.
         expected: usize,
-        /// Joints found.
+        /// Number of joints in the log.
         found: usize,
     },
     /// Steps of the controller are missing.
     #[error(
-        "{file}: expected step {expected}, the log goes on with step {found}; what the controller \
-         knew after the gap is not in the log, so only a log without gaps is replayed"
+        "{file}: expected step {expected}, the log continues with step {found}; the controller state \
+         after the gap is unknown, so only logs without gaps can be replayed"
     )]
     Gap {
         /// File.
         file: String,
-        /// First step that is missing.
+        /// First missing step.
         expected: u64,
-        /// Step found in its place.
+        /// Step found instead.
         found: u64,
     },
-    /// No such channel.
+    /// Unknown channel.
     #[error("{file} has no channel {channel:?}; it has {known}")]
     UnknownChannel {
         /// File.
         file: String,
-        /// Channel asked for.
+        /// Requested channel.
         channel: String,
-        /// Channels there are.
+        /// Existing channels.
         known: String,
     },
-    /// What was exported could not be written on.
+    /// The export could not be written.
     #[error("cannot write the export: {0}")]
     Output(#[source] io::Error),
-    /// What the log says of the arm is not sound.
+    /// The description of the arm in the log is invalid.
     #[error(transparent)]
     Model(#[from] supple_model::ModelError),
 }

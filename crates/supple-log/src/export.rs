@@ -1,9 +1,9 @@
-//! A channel of a log as a table of comma-separated values.
+//! Exports a channel of a log as comma-separated values.
 //!
 //! Columns follow the message definition inside the log, so that any channel can be exported:
-//! `torques.gravity.joint2`, `tip_position_m.x`. An entry per joint carries the joint's name. Numbers
-//! are written with the digits that read back as the same number, `true` and `false` as 1 and 0. The
-//! first column is the time in nanoseconds, so the message's header is left out.
+//! `torques.gravity.joint2`, `tip_position_m.x`. Entries per joint have the name of the joint. Numbers are
+//! printed with enough digits to read back the same number, `true` and `false` as 1 and 0. The first column is
+//! the time in nanoseconds; the header of the message is omitted.
 
 use crate::definition;
 use crate::error::LogError;
@@ -17,11 +17,11 @@ use std::path::Path;
 
 /// Writes every `every`-th message of `channel` to `out` and returns how many.
 ///
-/// A file that is cut gives what is whole in it and then [`LogError::Incomplete`].
+/// A truncated file gives its complete part and then [`LogError::Incomplete`].
 ///
 /// # Errors
-/// [`LogError::UnknownChannel`] with the channels there are; [`LogError::Format`] where its messages
-/// make no table; [`LogError::Output`]; whatever reading gives.
+/// [`LogError::UnknownChannel`] with the existing channels; [`LogError::Format`] if its messages cannot be written
+/// as a table; [`LogError::Output`]; errors of reading.
 pub fn export_csv(
     path: impl AsRef<Path>,
     channel: &str,

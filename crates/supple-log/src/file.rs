@@ -1,4 +1,4 @@
-//! A log on its way to disk: written under another name, given its own when it is whole.
+//! Log file writer: writes under a temporary name and renames the file when it is complete.
 
 use crate::error::LogError;
 use crate::scan::Channel;
@@ -12,22 +12,22 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use supple_files::{check_output, open_output, with_suffix};
 
-/// Data in one chunk: what a crash can lose \[ns\].
+/// Duration of one chunk: the most that a crash can lose \[ns\].
 const CHUNK_NS: u64 = 250_000_000;
 
-/// Name and version of the software, as files carry it.
+/// Name and version of the software, stored in the files.
 pub(crate) const SOFTWARE: &str = concat!("supple-log ", env!("CARGO_PKG_VERSION"));
 
-/// What a finished file holds.
+/// Summary of a finished file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Written {
     /// File.
     pub path: PathBuf,
-    /// Its length.
+    /// Length of the file.
     pub bytes: u64,
-    /// Messages on all channels.
+    /// Number of messages on all channels.
     pub messages: u64,
-    /// Chunks.
+    /// Number of chunks.
     pub chunks: u64,
 }
 
@@ -40,8 +40,8 @@ pub(crate) struct LogFile {
 }
 
 impl LogFile {
-    /// Creates `<target><suffix>`, replacing one that nobody writes any more. A device, FIFO, socket or folder
-    /// at either name is refused before anything is written.
+    /// Creates `<target><suffix>`, replacing an abandoned one. A device, FIFO, socket or folder at either name is
+    /// rejected before anything is written.
     pub fn create(target: &Path, suffix: &str) -> Result<Self, LogError> {
         let part = with_suffix(target, suffix);
         let cannot_create = |path: &Path, source| LogError::Create {
@@ -51,7 +51,7 @@ impl LogFile {
         let failed = |source| cannot_create(&part, source);
         check_output(target).map_err(|source| cannot_create(target, source))?;
         let file = open_output(&part).map_err(failed)?;
-        // A file system that has no locks is no reason not to write.
+        // Continue if the file system does not support locks.
         if let Err(TryLockError::WouldBlock) = file.try_lock() {
             return Err(LogError::Busy {
                 file: part.display().to_string(),
@@ -65,7 +65,7 @@ impl LogFile {
             .library(SOFTWARE)
             .compression(Some(Compression::Lz4))
             .chunk_size(None)
-            // A chunk is built in memory and goes to the file in one piece.
+            // A chunk is built in memory and written to the file at once.
             .disable_seeking(true)
             .create(NoSeek::new(BufWriter::new(file)))
             .map_err(|error| write_error(&part, error))?;
@@ -108,7 +108,7 @@ impl LogFile {
         written.map_err(|error| write_error(&self.part, error))
     }
 
-    /// Number of a channel, which is written down before its first message.
+    /// Number of a channel; the channel is written before its first message.
     pub fn channel(&mut self, channel: &Channel) -> Result<u16, LogError> {
         let schema = &channel.schema;
         let added = if schema.name.is_empty() {
@@ -125,7 +125,7 @@ impl LogFile {
         added.map_err(|error| write_error(&self.part, error))
     }
 
-    /// Closes the chunk if what it holds began long enough before `time_ns`.
+    /// Closes the chunk if it has covered its duration by `time_ns`.
     pub fn close_chunk_if_due(&mut self, time_ns: u64) -> Result<(), LogError> {
         let due = |start: u64| time_ns < start || time_ns - start >= CHUNK_NS;
         if self.chunk_start_ns.is_some_and(due) {
@@ -134,14 +134,14 @@ impl LogFile {
         Ok(())
     }
 
-    /// Closes the chunk. What was written before then survives the death of the process.
+    /// Closes the chunk. Everything written before survives a crash of the process.
     pub fn close_chunk(&mut self) -> Result<(), LogError> {
         self.chunk_start_ns = None;
         let flushed = self.mcap.flush();
         flushed.map_err(|error| write_error(&self.part, error))
     }
 
-    /// Of a value that has no place in the file.
+    /// Error for a value that cannot be encoded.
     pub fn unwritable(
         &self,
         error: impl Into<Box<dyn std::error::Error + Send + Sync>>,
@@ -158,14 +158,14 @@ impl LogFile {
         written.map_err(|error| write_error(&self.part, error))
     }
 
-    /// Gives up: what was written is removed.
+    /// Discards the log: removes the written part.
     pub fn discard(self) {
         drop(self.mcap);
-        // Removing is a courtesy; the error that led here is the one to report.
+        // An error of the removal is ignored; the earlier error is the one to report.
         let _ = std::fs::remove_file(&self.part);
     }
 
-    /// Writes the index, waits for the disk, and gives the file its name, replacing one of that name.
+    /// Writes the index, syncs the file to disk and renames it to its final name, replacing an existing file.
     pub fn finish(self) -> Result<Written, LogError> {
         let LogFile {
             target,
@@ -178,7 +178,7 @@ impl LogFile {
         let named = flush(mcap.into_inner().into_inner()).and_then(|file| {
             file.sync_all()?;
             let bytes = file.metadata()?.len();
-            // Something may have been put there while the log was written.
+            // Something else may have been created there while the log was written.
             check_output(&target)?;
             std::fs::rename(&part, &target)?;
             Ok(bytes)

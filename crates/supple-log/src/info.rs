@@ -1,10 +1,8 @@
 //! What is in a log, at a glance.
 
-use crate::cdr;
 use crate::error::LogError;
-use crate::messages::OwnedHeader;
 use crate::reader::{About, Reader};
-use crate::record::Record;
+use crate::record::{CONTROLLER_STATE, ChannelDecoder};
 use crate::scan::{Channel, Item, Scan};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -12,8 +10,6 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use supple_core::controller::Mode;
 use supple_model::with_dof;
-
-const CONTROLLER_STATE: &str = "/controller_state";
 
 /// What is in a log.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -97,8 +93,9 @@ pub fn info(path: impl AsRef<Path>) -> Result<Info, LogError> {
         file: path.display().to_string(),
         source,
     })?;
-    let mut survey = Survey {
-        glimpse: with_dof!(about.joints.len(), N => glimpse::<N> as Glimpsing)?,
+    let mut survey = InfoBuilder {
+        decode: with_dof!(about.joints.len(), N => summary::<N> as StepSummaryDecoder)?,
+        decoder: ChannelDecoder::default(),
         last: None,
         channels: BTreeMap::new(),
         info: Info {
@@ -127,34 +124,40 @@ pub fn info(path: impl AsRef<Path>) -> Result<Info, LogError> {
 
 /// What of a step an overview needs.
 #[derive(Clone, Copy, PartialEq)]
-struct Glimpse {
+struct StepSummary {
     step: u64,
     mode: &'static str,
     fault: u8,
 }
 
-/// The glimpse, and the fault in words.
-type Glimpsing = fn(&[u8]) -> Result<(Glimpse, String), String>;
+/// The summary, and the fault in words.
+type StepSummaryDecoder =
+    fn(&mut ChannelDecoder, &Channel, &[u8]) -> Result<(StepSummary, String), String>;
 
-fn glimpse<const N: usize>(data: &[u8]) -> Result<(Glimpse, String), String> {
-    let (_, record): (OwnedHeader, Record<N>) = cdr::decode(data)?;
-    let glimpse = Glimpse {
+fn summary<const N: usize>(
+    decoder: &mut ChannelDecoder,
+    channel: &Channel,
+    data: &[u8],
+) -> Result<(StepSummary, String), String> {
+    let record = decoder.decode::<N>(channel, data)?;
+    let summary = StepSummary {
         step: record.step,
         mode: record.mode().map_or("unknown", Mode::name),
         fault: record.fault,
     };
-    Ok((glimpse, record.fault_text))
+    Ok((summary, record.fault_text.to_string()))
 }
 
-struct Survey {
-    glimpse: Glimpsing,
-    last: Option<Glimpse>,
+struct InfoBuilder {
+    decode: StepSummaryDecoder,
+    decoder: ChannelDecoder,
+    last: Option<StepSummary>,
     /// Place in the list by name.
     channels: BTreeMap<String, usize>,
     info: Info,
 }
 
-impl Survey {
+impl InfoBuilder {
     fn items(&mut self, scan: &mut Scan) -> Result<(), LogError> {
         while let Some(item) = scan.next()? {
             match item {
@@ -174,7 +177,8 @@ impl Survey {
                     self.info.span_ns = Some((first.min(time_ns), last.max(time_ns)));
                     self.count(&channel);
                     if channel.topic == CONTROLLER_STATE {
-                        let seen = (self.glimpse)(&data).map_err(|message| LogError::Format {
+                        let decoded = (self.decode)(&mut self.decoder, &channel, &data);
+                        let seen = decoded.map_err(|message| LogError::Format {
                             file: scan.file().to_owned(),
                             message: format!("{CONTROLLER_STATE} at {time_ns} ns: {message}"),
                         })?;
@@ -203,11 +207,12 @@ impl Survey {
         list[place].messages += 1;
     }
 
-    fn step(&mut self, time_ns: u64, (now, fault_text): (Glimpse, String)) {
+    fn step(&mut self, time_ns: u64, (now, fault_text): (StepSummary, String)) {
         let info = &mut self.info;
         info.steps += 1;
-        let expected = self.last.map_or(0, |last| last.step + 1);
-        info.missing_steps += now.step.saturating_sub(expected);
+        let expected = self.last.map_or(0, |last| last.step.saturating_add(1));
+        let missing = now.step.saturating_sub(expected);
+        info.missing_steps = info.missing_steps.saturating_add(missing);
         if self.last.is_none_or(|last| last.mode != now.mode) {
             let mode = now.mode.to_owned();
             info.modes.push(ModeChange { time_ns, mode });

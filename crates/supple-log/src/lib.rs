@@ -42,6 +42,7 @@ mod scan;
 mod schema;
 mod table;
 mod toml_types;
+mod values;
 mod writer;
 
 pub use error::LogError;
@@ -50,7 +51,8 @@ pub use file::Written;
 pub use info::{AttachmentInfo, ChannelInfo, FaultInfo, Info, ModeChange, info};
 pub use messages::{CycleTiming, PlantTruth};
 pub use reader::{About, Messages, Reader, Timed};
-pub use record::{Record, TorqueTerms};
 pub use recover::{Recovery, recover};
 pub use replay::{Difference, Replay, replay};
 pub use writer::{Extras, RunInfo, Writer};
+
+pub use supple_core::controller::CycleRecord;

@@ -11,7 +11,7 @@ use std::io::{ErrorKind, Read};
 const CHUNK_LIMIT_BYTES: usize = 1 << 28;
 
 /// A record, and the records in it if it is a chunk.
-pub(crate) fn taken_apart(
+pub(crate) fn decode_record(
     opcode: u8,
     data: &[u8],
 ) -> Result<(Record<'static>, VecDeque<Record<'static>>), McapError> {

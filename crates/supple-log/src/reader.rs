@@ -4,13 +4,14 @@ use crate::cdr;
 use crate::config;
 use crate::error::LogError;
 use crate::messages::{CycleTiming, OwnedHeader, PlantTruth};
-use crate::record::Record;
-use crate::scan::{Item, Scan};
+use crate::record::{CONTROLLER_STATE, ChannelDecoder, Present};
+use crate::scan::{Channel, Item, Scan};
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
 use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 use supple_core::Config;
+use supple_core::controller::CycleRecord;
 use supple_model::Description;
 
 /// What a log says of itself.
@@ -125,8 +126,28 @@ impl Reader {
     ///
     /// # Errors
     /// [`LogError::JointCount`]; [`LogError::Read`].
-    pub fn records<const N: usize>(&self) -> Result<Messages<Record<N>>, LogError> {
-        self.messages::<N, _>("/controller_state", record)
+    pub fn records<const N: usize>(&self) -> Result<Messages<CycleRecord<N>>, LogError> {
+        self.expect_joints(N)?;
+        let mut decoder = ChannelDecoder::default();
+        Messages::open(&self.path, CONTROLLER_STATE, move |channel, data| {
+            decoder.decode(channel, data)
+        })
+    }
+
+    /// The words of a record that the log's definition has, of the first channel of records; `None` without records.
+    pub(crate) fn present(&self) -> Result<Option<Present>, LogError> {
+        let mut scan = Scan::open(&self.path)?;
+        while let Some(item) = scan.next()? {
+            if let Item::Message(channel, ..) = item
+                && channel.topic == CONTROLLER_STATE
+            {
+                let present = ChannelDecoder::present(&channel, self.about.joints.len());
+                return present
+                    .map(Some)
+                    .map_err(|message| format(&self.path, &message));
+            }
+        }
+        Ok(None)
     }
 
     /// Timing of the cycles that were timed, as [`Reader::records`].
@@ -134,7 +155,7 @@ impl Reader {
     /// # Errors
     /// [`LogError::Read`].
     pub fn timings(&self) -> Result<Messages<CycleTiming>, LogError> {
-        Messages::open(&self.path, "/cycle_timing", |data| {
+        Messages::open(&self.path, "/cycle_timing", |_, data| {
             let (_, _, timing): (OwnedHeader, u64, CycleTiming) = cdr::decode(data)?;
             Ok(timing)
         })
@@ -148,13 +169,13 @@ impl Reader {
         self.messages::<N, _>("/plant_truth", without_header)
     }
 
-    fn messages<const N: usize, T>(
+    fn messages<const N: usize, T: 'static>(
         &self,
         topic: &'static str,
         decode: fn(&[u8]) -> Result<T, String>,
     ) -> Result<Messages<T>, LogError> {
         self.expect_joints(N)?;
-        Messages::open(&self.path, topic, decode)
+        Messages::open(&self.path, topic, move |_, data| decode(data))
     }
 
     fn expect_joints(&self, expected: usize) -> Result<(), LogError> {
@@ -203,11 +224,14 @@ impl About {
     }
 }
 
+/// From the bytes of a message of a channel to its value.
+type Decode<T> = Box<dyn FnMut(&Channel, &[u8]) -> Result<T, String>>;
+
 /// Messages of one channel, in order.
 pub struct Messages<T> {
     scan: Scan,
     topic: &'static str,
-    decode: fn(&[u8]) -> Result<T, String>,
+    decode: Decode<T>,
     ended: bool,
     value: PhantomData<T>,
 }
@@ -216,12 +240,12 @@ impl<T> Messages<T> {
     fn open(
         path: &Path,
         topic: &'static str,
-        decode: fn(&[u8]) -> Result<T, String>,
+        decode: impl FnMut(&Channel, &[u8]) -> Result<T, String> + 'static,
     ) -> Result<Self, LogError> {
         Ok(Messages {
             scan: Scan::open(path)?,
             topic,
-            decode,
+            decode: Box::new(decode),
             ended: false,
             value: PhantomData,
         })
@@ -235,7 +259,7 @@ impl<T> Messages<T> {
             if channel.topic != self.topic {
                 continue;
             }
-            let value = (self.decode)(&data).map_err(|message| LogError::Format {
+            let value = (self.decode)(&channel, &data).map_err(|message| LogError::Format {
                 file: self.scan.file().to_owned(),
                 message: format!("{} at {} ns: {message}", self.topic, header.log_time),
             })?;
@@ -262,16 +286,6 @@ impl<T> Iterator for Messages<T> {
 fn without_header<T: DeserializeOwned>(data: &[u8]) -> Result<T, String> {
     let (_, value): (OwnedHeader, T) = cdr::decode(data)?;
     Ok(value)
-}
-
-/// A step. The last field, `drives_active`, is not in logs from before it was added: the drives were taken for
-/// active then.
-fn record<const N: usize>(data: &[u8]) -> Result<Record<N>, String> {
-    without_header(data).or_else(|error| {
-        let mut longer = data.to_vec();
-        longer.push(u8::from(true));
-        without_header(&longer).map_err(|_| error)
-    })
 }
 
 fn format(path: &Path, message: &str) -> LogError {

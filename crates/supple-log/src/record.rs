@@ -1,220 +1,429 @@
-//! One step of the controller as the log holds it: `msg/ControllerState.msg`, without its header.
-//!
-//! A [`Record`] is made from an input and an output and gives the input back to the last bit. Faults
-//! and refusals are a code with their numbers and words, so that a log of a later version with a fault
-//! that this one does not know can still be read.
+//! The record of a cycle as a message: its definition, its bytes, and the record from the bytes of this or an earlier
+//! version. Fields are found by their names in the definition inside the log; what an earlier version lacks gets its
+//! default, what a later one has beside is left out.
 
-use crate::cdr::array;
-use serde::{Deserialize, Serialize};
-use supple_core::codes::{self, FaultCode, RequestCode};
-use supple_core::controller::Mode;
-use supple_core::impedance::Torques;
-use supple_core::math::Vector3;
-use supple_core::{Input, Output};
+use crate::definition::{self, Count, Definitions, Field as Defined, Kind};
+use crate::scan::{Channel, Schema};
+use crate::values::Values;
+use serde::ser::SerializeTuple;
+use serde::{Serialize, Serializer};
+use std::collections::BTreeSet;
+use std::fmt::Write;
+use std::sync::Arc;
+use supple_core::codes;
+use supple_core::controller::CycleRecord;
+use supple_core::record::{Element, Field, Shape, Term};
+use supple_core::torques::TERMS;
 
-/// One step of the controller. Joints in order, vectors as x, y, z in base axes, SI units. Where a
-/// `has_x` is false there was no x and its entries are zero.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[allow(
-    missing_docs,
-    reason = "each field is that of Input or Output named alike"
-)]
-pub struct Record<const N: usize> {
-    /// Number of this step since the controller started; a gap means that the log has lost records.
-    pub step: u64,
-    pub input_cycle: u64,
-    #[serde(with = "array")]
-    pub has_measured_position: [bool; N],
-    #[serde(with = "array")]
-    pub measured_position_rad: [f64; N],
-    pub has_tip_force: bool,
-    pub tip_force_n: [f64; 3],
-    /// Kind of request, 0 for none; see [`Record::input`].
-    pub request: u8,
-    /// Kind of trajectory asked for, 0 for none.
-    pub trajectory: u8,
-    /// What the request carries.
-    pub request_values: Vec<f64>,
-    pub cycle: u64,
-    /// See [`Record::mode`].
-    pub mode: u8,
-    pub mode_time_s: f64,
-    #[serde(with = "array")]
-    pub torque_nm: [f64; N],
-    #[serde(with = "array")]
-    pub fallback_torque_nm: [f64; N],
-    pub torques: TorqueTerms<N>,
-    pub torque_limited: bool,
-    pub rate_limited: bool,
-    #[serde(with = "array")]
-    pub position_rad: [f64; N],
-    #[serde(with = "array")]
-    pub velocity_rad_per_s: [f64; N],
-    pub tip_position_m: [f64; 3],
-    pub tip_velocity_m_per_s: [f64; 3],
-    pub has_reference: bool,
-    pub reference_position_m: [f64; 3],
-    pub reference_velocity_m_per_s: [f64; 3],
-    pub reference_acceleration_m_per_s2: [f64; 3],
-    pub stiffness_n_per_m: [f64; 3],
-    pub damping_n_s_per_m: [f64; 3],
-    #[serde(with = "array")]
-    pub external_torque_nm: [f64; N],
-    pub external_force_n: [f64; 3],
-    pub force_against_n: f64,
-    pub contact_threshold_n: f64,
-    pub in_contact: bool,
-    pub friction_share: f64,
-    pub least_singular_value_m: f64,
-    /// Kind of the latched fault, 0 for none.
-    pub fault: u8,
-    /// Its joint, counted from 0, or -1.
-    pub fault_joint: i8,
-    /// The value that broke the limit.
-    pub fault_value: f64,
-    /// The limit.
-    pub fault_limit: f64,
-    /// The fault in words.
-    pub fault_text: String,
-    /// Kind of refusal of this cycle's request, 0 for none.
-    pub refusal: u8,
-    /// The refusal in words.
-    pub refusal_text: String,
-    /// The motors carried out torques; logs from before this was known say that they did.
-    pub drives_active: bool,
-}
+/// Channel of the records.
+pub(crate) const CONTROLLER_STATE: &str = "/controller_state";
+/// Type of the terms of the torque.
+const TERMS_TYPE: &str = "supple_msgs/TorqueTerms";
+/// Type of a vector.
+const VECTOR_TYPE: &str = "geometry_msgs/Vector3";
+/// Fields that earlier versions lack, whose value then is not zero.
+const DEFAULTS: &[(&str, u64)] = &[("drives_active", 1)];
+/// Before the fields of a record.
+const HEAD: &str = "\
+# One step of the controller: input, output, and every term of the torque.
+#
+# N is the number of joints, in the order of /joint_states. SI units, base axes. If a has_x is false there was no x
+# and its entries are zero. header.stamp is the time of the measurement, header.frame_id the base link.
 
-/// The terms of [`Torques`] \[N m\].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[allow(missing_docs, reason = "each field is that of Torques named alike")]
-pub struct TorqueTerms<const N: usize> {
-    #[serde(with = "array")]
-    pub gravity: [f64; N],
-    #[serde(with = "array")]
-    pub coriolis: [f64; N],
-    #[serde(with = "array")]
-    pub friction: [f64; N],
-    #[serde(with = "array")]
-    pub jacobian_rate: [f64; N],
-    #[serde(with = "array")]
-    pub inertial: [f64; N],
-    #[serde(with = "array")]
-    pub stiffness: [f64; N],
-    #[serde(with = "array")]
-    pub damping: [f64; N],
-    #[serde(with = "array")]
-    pub force: [f64; N],
-    #[serde(with = "array")]
-    pub nullspace: [f64; N],
-    #[serde(with = "array")]
-    pub joint_pd: [f64; N],
-    #[serde(with = "array")]
-    pub soft_stop: [f64; N],
-    #[serde(with = "array")]
-    pub ripple: [f64; N],
-    #[serde(with = "array")]
-    pub handover: [f64; N],
-}
+std_msgs/Header header
+";
 
-impl<const N: usize> Record<N> {
-    /// Of one step. `step` is its number since the controller started.
-    pub fn new(step: u64, input: &Input<N>, output: &Output<N>) -> Self {
-        let request = RequestCode::new(input.request.as_ref());
-        let fault = FaultCode::new(output.fault.as_ref());
-        let vector = |v: Vector3<f64>| -> [f64; 3] { v.into() };
-        let reference = |of: fn(&supple_core::Reference) -> Vector3<f64>| {
-            output
-                .reference
-                .as_ref()
-                .map_or([0.0; 3], |r| vector(of(r)))
+/// Every field of a record.
+const FIELDS: &[Field] = CycleRecord::<1>::FIELDS;
+
+/// Fields of `supple_msgs/ControllerState`; `[N]` stands for the number of joints.
+pub(crate) fn definition() -> String {
+    let mut text = HEAD.to_owned();
+    for field in FIELDS {
+        comment(&mut text, field.description);
+        for (name, number) in constants(field.name) {
+            let _ = writeln!(text, "uint8 {}_{name}={number}", field.name.to_uppercase());
+        }
+        let _ = match field.shape {
+            Shape::One(element) => writeln!(text, "{} {}", type_of(element), field.name),
+            Shape::PerJoint(element) => writeln!(text, "{}[N] {}", type_of(element), field.name),
+            Shape::Vector => writeln!(text, "{VECTOR_TYPE} {}", field.name),
+            Shape::Terms(_) => writeln!(text, "{TERMS_TYPE} {}", field.name),
+            Shape::List(max) => writeln!(text, "float64[<={max}] {}", field.name),
+            Shape::Text => writeln!(text, "string {}", field.name),
         };
-        Record {
-            step,
-            input_cycle: input.cycle,
-            has_measured_position: input.position_rad.map(|position| position.is_some()),
-            measured_position_rad: input.position_rad.map(Option::unwrap_or_default),
-            has_tip_force: input.tip_force_n.is_some(),
-            tip_force_n: input.tip_force_n.map_or([0.0; 3], vector),
-            request: request.kind,
-            trajectory: request.trajectory,
-            request_values: request.values().to_vec(),
-            cycle: output.cycle,
-            mode: output.mode as u8,
-            mode_time_s: output.mode_time_s,
-            torque_nm: output.torque_nm.into(),
-            fallback_torque_nm: output.fallback_torque_nm.into(),
-            torques: TorqueTerms::new(&output.torques),
-            torque_limited: output.torque_limited,
-            rate_limited: output.rate_limited,
-            position_rad: output.position_rad.into(),
-            velocity_rad_per_s: output.velocity_rad_per_s.into(),
-            tip_position_m: vector(output.tip_position_m),
-            tip_velocity_m_per_s: vector(output.tip_velocity_m_per_s),
-            has_reference: output.reference.is_some(),
-            reference_position_m: reference(|r| r.position),
-            reference_velocity_m_per_s: reference(|r| r.velocity),
-            reference_acceleration_m_per_s2: reference(|r| r.acceleration),
-            stiffness_n_per_m: vector(output.gains.stiffness_n_per_m),
-            damping_n_s_per_m: vector(output.gains.damping_n_s_per_m),
-            external_torque_nm: output.external_torque_nm.into(),
-            external_force_n: vector(output.external_force_n),
-            force_against_n: output.force_against_n,
-            contact_threshold_n: output.contact_threshold_n,
-            in_contact: output.in_contact,
-            friction_share: output.friction_share,
-            least_singular_value_m: output.least_singular_value_m,
-            fault: fault.kind,
-            fault_joint: fault.joint,
-            fault_value: fault.value,
-            fault_limit: fault.limit,
-            fault_text: output.fault.map_or_else(String::new, |f| f.to_string()),
-            refusal: codes::refusal(output.refusal.as_ref()),
-            refusal_text: output.refusal.map_or_else(String::new, |r| r.to_string()),
-            drives_active: input.drives_active,
+    }
+    text
+}
+
+/// Fields of `supple_msgs/TorqueTerms`.
+pub(crate) fn terms_definition() -> String {
+    let mut text =
+        "# The terms whose sum, once limited, is the joint torque (N m). N is the number of joints.\n"
+            .to_owned();
+    for term in TERMS {
+        comment(&mut text, term.description);
+        let _ = writeln!(text, "float64[N] {}", term.name);
+    }
+    text
+}
+
+/// Names of the numbers of a field that holds codes.
+fn constants(field: &str) -> Vec<(String, u8)> {
+    let named = |all: &[(&str, u8)]| {
+        let owned = |(name, number): &(&str, u8)| (name.to_uppercase(), *number);
+        all.iter().map(owned).collect()
+    };
+    match field {
+        "request" => named(codes::request_kind::ALL),
+        "trajectory" => named(codes::trajectory_kind::ALL),
+        "fault" => named(codes::fault_kind::ALL),
+        "refusal" => named(codes::refusal_kind::ALL),
+        "mode" => {
+            let modes = codes::MODES.iter();
+            modes
+                .map(|mode| (mode.name().to_uppercase(), *mode as u8))
+                .collect()
+        }
+        _ => Vec::new(),
+    }
+}
+
+/// A description from the source's documentation: without the escapes of its mark-up.
+fn comment(text: &mut String, description: &str) {
+    for line in description.lines() {
+        let line = line
+            .replace("\\[", "(")
+            .replace("\\]", ")")
+            .replace('`', "");
+        let _ = writeln!(text, "#{}", line.trim_end());
+    }
+}
+
+fn type_of(element: Element) -> &'static str {
+    match element {
+        Element::Bool => "bool",
+        Element::Int8 => "int8",
+        Element::Uint8 => "uint8",
+        Element::Uint64 => "uint64",
+        Element::Float64 => "float64",
+    }
+}
+
+fn kind_of(element: Element) -> Kind {
+    match element {
+        Element::Bool => Kind::Bool,
+        Element::Int8 => Kind::Int8,
+        Element::Uint8 => Kind::Uint8,
+        Element::Uint64 => Kind::Uint64,
+        Element::Float64 => Kind::Float64,
+    }
+}
+
+/// The words of a record, as they are serialized.
+pub(crate) struct RecordWords<'a> {
+    pub words: &'a [u64],
+    pub joints: usize,
+}
+
+impl Serialize for RecordWords<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut tuple = serializer.serialize_tuple(self.words.len())?;
+        let mut rest = self.words;
+        for field in FIELDS {
+            let (words, after) = rest.split_at(field.shape.words(self.joints));
+            rest = after;
+            match field.shape {
+                Shape::One(element) | Shape::PerJoint(element) => {
+                    for word in words {
+                        one(&mut tuple, element, *word)?;
+                    }
+                }
+                Shape::Vector | Shape::Terms(_) => {
+                    for word in words {
+                        one(&mut tuple, Element::Float64, *word)?;
+                    }
+                }
+                Shape::List(max) => {
+                    let count = usize::try_from(words[0]).map_or(max, |count| count.min(max));
+                    let values = words[1..=count].iter().map(|word| f64::from_bits(*word));
+                    tuple.serialize_element(&values.collect::<Vec<f64>>())?;
+                }
+                Shape::Text => {
+                    let max = 8 * (words.len() - 1);
+                    let length = usize::try_from(words[0]).map_or(max, |length| length.min(max));
+                    let bytes = words[1..].iter().flat_map(|word| word.to_le_bytes());
+                    let bytes: Vec<u8> = bytes.take(length).collect();
+                    tuple.serialize_element(&String::from_utf8_lossy(&bytes))?;
+                }
+            }
+        }
+        tuple.end()
+    }
+}
+
+fn one<T: SerializeTuple>(tuple: &mut T, element: Element, word: u64) -> Result<(), T::Error> {
+    match element {
+        Element::Bool => tuple.serialize_element(&(word != 0)),
+        Element::Int8 => tuple.serialize_element(&(word as i8)),
+        Element::Uint8 => tuple.serialize_element(&(word as u8)),
+        Element::Uint64 => tuple.serialize_element(&word),
+        Element::Float64 => tuple.serialize_element(&f64::from_bits(word)),
+    }
+}
+
+/// Reads records of one definition.
+struct RecordDecoder {
+    definitions: Definitions,
+    joints: usize,
+    steps: Vec<Step>,
+    defaults: Vec<u64>,
+}
+
+/// The words of a record that its definition has.
+#[derive(Clone, Debug)]
+pub(crate) struct Present(Vec<bool>);
+
+impl Present {
+    /// Sets the words of `again` that a log does not have to those of `logged`.
+    pub fn keep(&self, logged: &[u64], again: &mut [u64]) {
+        let words = again.iter_mut().zip(logged).zip(&self.0);
+        for ((again, logged), _) in words.filter(|(_, present)| !**present) {
+            *again = *logged;
         }
     }
+}
 
-    /// What the controller was given, to the last bit.
+enum Step {
+    /// Values of this type, to the words from here on.
+    Words(Kind, usize, usize),
+    /// A list of numbers.
+    List(usize, usize),
+    /// A text.
+    Text(usize),
+    /// Nothing of this field is wanted.
+    Skip(Defined),
+}
+
+impl RecordDecoder {
+    /// For the definition inside a log of an arm of `joints` joints.
     ///
     /// # Errors
-    /// A request that this version does not know, in words.
-    pub fn input(&self) -> Result<Input<N>, String> {
-        let position =
-            |i: usize| self.has_measured_position[i].then_some(self.measured_position_rad[i]);
-        let request = RequestCode::from_parts(self.request, self.trajectory, &self.request_values)
-            .and_then(|code| code.request())
-            .map_err(|error| error.to_string())?;
-        Ok(Input {
-            cycle: self.input_cycle,
-            position_rad: core::array::from_fn(position),
-            tip_force_n: self.has_tip_force.then(|| Vector3::from(self.tip_force_n)),
-            drives_active: self.drives_active,
-            request,
+    /// A field whose type is another one.
+    pub fn new(definitions: Definitions, joints: usize) -> Result<RecordDecoder, String> {
+        let mut defaults = vec![0; CycleRecord::<1>::words(joints)];
+        for (name, word) in DEFAULTS {
+            if let Some((_, at)) = find(name, joints) {
+                defaults[at] = *word;
+            }
+        }
+        check(&definitions)?;
+        let (mut steps, mut names) = (Vec::new(), BTreeSet::new());
+        for defined in definitions.root() {
+            if !names.insert(&defined.name) {
+                return Err(format!("field {} is there twice", defined.name));
+            }
+            match find(&defined.name, joints) {
+                None => steps.push(Step::Skip(defined.clone())),
+                Some((Shape::Terms(terms), at)) => {
+                    expect(defined, &Kind::Message(TERMS_TYPE.to_owned()), Count::One)?;
+                    for inner in definitions.fields(TERMS_TYPE) {
+                        steps.push(term(inner, terms, at, joints)?);
+                    }
+                }
+                Some((shape, at)) => steps.push(step(defined, shape, at, joints)?),
+            }
+        }
+        Ok(RecordDecoder {
+            definitions,
+            joints,
+            steps,
+            defaults,
         })
     }
 
-    /// Mode in force; `None` if this version does not know it.
-    pub fn mode(&self) -> Option<Mode> {
-        codes::mode(self.mode)
+    /// The words that the definition has.
+    fn present(&self) -> Present {
+        let mut present = vec![false; self.defaults.len()];
+        for step in &self.steps {
+            let (at, count) = match step {
+                Step::Words(_, at, count) => (*at, *count),
+                Step::List(at, max) => (*at, 1 + max),
+                Step::Text(at) => (*at, Shape::Text.words(0)),
+                Step::Skip(_) => continue,
+            };
+            present[at..at + count].fill(true);
+        }
+        Present(present)
+    }
+
+    /// The record in the bytes of a message.
+    ///
+    /// # Errors
+    /// Bytes that are not of the definition.
+    pub fn decode<const N: usize>(&self, data: &[u8]) -> Result<CycleRecord<N>, String> {
+        let mut values = Values::new(data)?;
+        let mut words = self.defaults.clone();
+        for step in &self.steps {
+            match step {
+                Step::Words(kind, at, count) => {
+                    for word in &mut words[*at..at + count] {
+                        *word = values.word(kind)?;
+                    }
+                }
+                Step::List(at, max) => {
+                    let count = values.length()? as usize;
+                    if count > *max {
+                        return Err(format!("a list of {count} values, at most {max} are read"));
+                    }
+                    words[*at] = count as u64;
+                    for word in &mut words[at + 1..=at + count] {
+                        *word = values.word(&Kind::Float64)?;
+                    }
+                }
+                Step::Text(at) => {
+                    let text = values.string()?;
+                    let places = &mut words[*at..at + Shape::Text.words(0)];
+                    let mut end = text.len().min(8 * (places.len() - 1));
+                    while !text.is_char_boundary(end) {
+                        end -= 1;
+                    }
+                    places[0] = end as u64;
+                    let chunks = text.as_bytes()[..end].chunks(8);
+                    for (word, chunk) in places[1..].iter_mut().zip(chunks) {
+                        let mut bytes = [0; 8];
+                        bytes[..chunk.len()].copy_from_slice(chunk);
+                        *word = u64::from_le_bytes(bytes);
+                    }
+                }
+                Step::Skip(field) => values.skip(&self.definitions, field)?,
+            }
+        }
+        values.end()?;
+        Ok(CycleRecord::unpack(&words, self.joints))
     }
 }
 
-impl<const N: usize> TorqueTerms<N> {
-    fn new(torques: &Torques<N>) -> Self {
-        TorqueTerms {
-            gravity: torques.gravity.into(),
-            coriolis: torques.coriolis.into(),
-            friction: torques.friction.into(),
-            jacobian_rate: torques.jacobian_rate.into(),
-            inertial: torques.inertial.into(),
-            stiffness: torques.stiffness.into(),
-            damping: torques.damping.into(),
-            force: torques.force.into(),
-            nullspace: torques.nullspace.into(),
-            joint_pd: torques.joint_pd.into(),
-            soft_stop: torques.soft_stop.into(),
-            ripple: torques.ripple.into(),
-            handover: torques.handover.into(),
+/// Reads the records of one channel, whatever its definition.
+#[derive(Default)]
+pub(crate) struct ChannelDecoder(Option<(Arc<Schema>, RecordDecoder)>);
+
+impl ChannelDecoder {
+    /// The words that the definition of a channel has.
+    ///
+    /// # Errors
+    /// As [`ChannelDecoder::decode`].
+    pub fn present(channel: &Channel, joints: usize) -> Result<Present, String> {
+        let text = String::from_utf8_lossy(&channel.schema.text);
+        let definitions = definition::parse(&channel.schema.name, &text)?;
+        Ok(RecordDecoder::new(definitions, joints)?.present())
+    }
+
+    /// The record in a message of the channel.
+    ///
+    /// # Errors
+    /// A definition that is none of a record; bytes that are not of it.
+    pub fn decode<const N: usize>(
+        &mut self,
+        channel: &Channel,
+        data: &[u8],
+    ) -> Result<CycleRecord<N>, String> {
+        // Several channels of one name may have definitions of their own.
+        let known = self.0.as_ref().is_some_and(|(schema, _)| {
+            Arc::ptr_eq(schema, &channel.schema) || *schema == channel.schema
+        });
+        if !known {
+            let text = String::from_utf8_lossy(&channel.schema.text);
+            let definitions = definition::parse(&channel.schema.name, &text)?;
+            self.0 = Some((channel.schema.clone(), RecordDecoder::new(definitions, N)?));
+        }
+        match &self.0 {
+            Some((_, decoder)) => decoder.decode(data),
+            None => Err("no definition".to_owned()),
         }
     }
+}
+
+/// Refuses a definition that is none of a record, which would be read as one of zeros.
+fn check(definitions: &Definitions) -> Result<(), String> {
+    for needed in [
+        "step",
+        "input_cycle",
+        "cycle",
+        "mode",
+        "position_rad",
+        "velocity_rad_per_s",
+        "torque_nm",
+    ] {
+        let mut fields = definitions.root().iter();
+        if !fields.any(|field| field.name == needed) {
+            return Err(format!("the definition has no field {needed}"));
+        }
+    }
+    let axes = definitions.fields(VECTOR_TYPE).iter();
+    let axes: Vec<_> = axes
+        .map(|axis| (axis.name.as_str(), &axis.kind, axis.count))
+        .collect();
+    let expected = ["x", "y", "z"].map(|name| (name, &Kind::Float64, Count::One));
+    match axes.is_empty() || axes == expected {
+        true => Ok(()),
+        false => Err(format!("{VECTOR_TYPE} is not three numbers")),
+    }
+}
+
+/// The field of this name, and its first word.
+fn find(name: &str, joints: usize) -> Option<(Shape, usize)> {
+    let mut at = 0;
+    for field in FIELDS {
+        if field.name == name {
+            return Some((field.shape, at));
+        }
+        at += field.shape.words(joints);
+    }
+    None
+}
+
+fn step(defined: &Defined, shape: Shape, at: usize, joints: usize) -> Result<Step, String> {
+    Ok(match shape {
+        Shape::One(element) => {
+            expect(defined, &kind_of(element), Count::One)?;
+            Step::Words(kind_of(element), at, 1)
+        }
+        Shape::PerJoint(element) => {
+            expect(defined, &kind_of(element), Count::Array(joints))?;
+            Step::Words(kind_of(element), at, joints)
+        }
+        Shape::Vector | Shape::Terms(_) => {
+            expect(defined, &Kind::Message(VECTOR_TYPE.to_owned()), Count::One)?;
+            Step::Words(Kind::Float64, at, 3)
+        }
+        Shape::List(max) => {
+            expect(defined, &Kind::Float64, Count::Bounded)?;
+            Step::List(at, max)
+        }
+        Shape::Text => {
+            expect(defined, &Kind::String, Count::One)?;
+            Step::Text(at)
+        }
+    })
+}
+
+fn term(defined: &Defined, terms: &[Term], at: usize, joints: usize) -> Result<Step, String> {
+    match terms.iter().position(|term| term.name == defined.name) {
+        None => Ok(Step::Skip(defined.clone())),
+        Some(row) => {
+            expect(defined, &Kind::Float64, Count::Array(joints))?;
+            Ok(Step::Words(Kind::Float64, at + row * joints, joints))
+        }
+    }
+}
+
+fn expect(defined: &Defined, kind: &Kind, count: Count) -> Result<(), String> {
+    if (&defined.kind, defined.count) == (kind, count) {
+        return Ok(());
+    }
+    Err(format!(
+        "field {} is {:?}, {:?}; expected {kind:?}, {count:?}",
+        defined.name, defined.kind, defined.count
+    ))
 }

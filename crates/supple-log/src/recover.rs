@@ -1,4 +1,4 @@
-//! Making whole what a crash left: every chunk that is whole goes into a new file with an index.
+//! Recovers a truncated log: copies every complete chunk into a new file with an index.
 
 use crate::error::LogError;
 use crate::file::LogFile;
@@ -10,11 +10,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use supple_files::with_suffix;
 
-/// Added to the name of a file that is being recovered: not that of a log being written, which may be
-/// the very file to recover.
+/// Suffix of the name during recovery. It differs from the suffix of a log that is being written, which may be the
+/// file to recover.
 const SUFFIX: &str = ".recovering";
 
-/// What was recovered.
+/// Result of a recovery.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct Recovery {
     /// File that was read.
@@ -23,15 +23,15 @@ pub struct Recovery {
     pub to: PathBuf,
     /// Length of the file that was read.
     pub source_bytes: u64,
-    /// Bytes of it that were whole.
+    /// Number of its bytes that were complete.
     pub kept_bytes: u64,
-    /// Messages kept, on all channels.
+    /// Number of messages kept, on all channels.
     pub messages: u64,
-    /// Chunks kept.
+    /// Number of chunks kept.
     pub chunks: u64,
     /// Times of the first and the last message kept \[ns\].
     pub span_ns: (u64, u64),
-    /// Why the file was read no further; `None` where it was complete.
+    /// Reason for which reading stopped; `None` if the file was complete.
     pub stopped: Option<String>,
 }
 
@@ -48,7 +48,7 @@ impl fmt::Display for Recovery {
             None => write!(f, "the file was complete"),
             Some(cause) => write!(
                 f,
-                "of {} bytes the last {} were not whole ({cause})",
+                "of {} bytes the last {} were incomplete ({cause})",
                 self.source_bytes,
                 self.source_bytes.saturating_sub(self.kept_bytes)
             ),
@@ -56,11 +56,11 @@ impl fmt::Display for Recovery {
     }
 }
 
-/// Writes what is whole in `from` to `to`. A complete file is copied to the last byte.
+/// Writes the complete part of `from` to `to`. A complete file is copied byte by byte.
 ///
 /// # Errors
-/// [`LogError::NothingWhole`], [`LogError::SameFile`]; [`LogError::Format`] where `from` is no MCAP;
-/// whatever reading and writing give.
+/// [`LogError::NoCompleteChunk`], [`LogError::SameFile`]; [`LogError::Format`] if `from` is not an MCAP file;
+/// errors of reading and writing.
 pub fn recover(from: impl AsRef<Path>, to: impl AsRef<Path>) -> Result<Recovery, LogError> {
     let (from, to) = (from.as_ref(), to.as_ref());
     let mut scan = Scan::open(from)?;
@@ -76,7 +76,7 @@ pub fn recover(from: impl AsRef<Path>, to: impl AsRef<Path>) -> Result<Recovery,
         messages: 0,
         span_ns: None,
     };
-    let stopped = match copy.everything(&mut scan, source_bytes) {
+    let stopped = match copy.copy_all(&mut scan, source_bytes) {
         Ok(stopped) => stopped,
         Err(error) => {
             copy.file.discard();
@@ -92,7 +92,7 @@ pub fn recover(from: impl AsRef<Path>, to: impl AsRef<Path>) -> Result<Recovery,
         kept_bytes: if stopped.is_none() {
             source_bytes
         } else {
-            scan.whole_bytes()
+            scan.complete_bytes()
         },
         messages: copy.messages,
         chunks: written.chunks,
@@ -101,7 +101,7 @@ pub fn recover(from: impl AsRef<Path>, to: impl AsRef<Path>) -> Result<Recovery,
     })
 }
 
-/// `to`, and the name it has until it is whole, must not be `from`.
+/// Returns an error if `to`, or its name during recovery, is `from`.
 fn refuse_same_file(from: &Path, to: &Path) -> Result<(), LogError> {
     let read_error = |source| LogError::Read {
         file: from.display().to_string(),
@@ -119,26 +119,22 @@ fn refuse_same_file(from: &Path, to: &Path) -> Result<(), LogError> {
 
 struct Copy {
     file: LogFile,
-    /// Channel of the new file by channel of the old one.
+    /// Maps channels of the old file to channels of the new one.
     ids: BTreeMap<u16, u16>,
     messages: u64,
     span_ns: Option<(u64, u64)>,
 }
 
 impl Copy {
-    /// Returns why it stopped before the end of the file, if it did.
-    fn everything(
-        &mut self,
-        scan: &mut Scan,
-        source_bytes: u64,
-    ) -> Result<Option<String>, LogError> {
+    /// Copies all complete chunks. Returns the reason if copying stopped before the end of the file.
+    fn copy_all(&mut self, scan: &mut Scan, source_bytes: u64) -> Result<Option<String>, LogError> {
         let stopped = match self.items(scan) {
             Ok(()) => None,
             Err(LogError::Incomplete { cause, .. }) => Some(cause),
             Err(error) => return Err(error),
         };
         if self.messages == 0 {
-            return Err(LogError::NothingWhole {
+            return Err(LogError::NoCompleteChunk {
                 file: scan.file().to_owned(),
                 bytes: source_bytes,
             });
@@ -146,7 +142,7 @@ impl Copy {
         if stopped.is_some() {
             let kept = BTreeMap::from([
                 ("source_bytes".to_owned(), source_bytes.to_string()),
-                ("kept_bytes".to_owned(), scan.whole_bytes().to_string()),
+                ("kept_bytes".to_owned(), scan.complete_bytes().to_string()),
             ]);
             self.file.metadata("recovery", kept)?;
         }

@@ -8,11 +8,12 @@ use crate::cdr;
 use crate::error::LogError;
 use crate::messages::{Header, Stamp};
 use crate::reader::Reader;
-use crate::record::Record;
+use crate::record::RecordWords;
 use crate::{definition, schema, table::Table};
 use serde::Serialize;
 use std::fmt;
 use std::path::{Path, PathBuf};
+use supple_core::controller::CycleRecord;
 use supple_core::{Controller, State, step};
 use supple_model::with_dof;
 
@@ -73,6 +74,7 @@ fn run<const N: usize>(reader: &Reader) -> Result<Replay, LogError> {
         different_steps: 0,
         first_difference: None,
     };
+    let present = reader.present()?;
     for read in reader.records::<N>()? {
         let read = read?;
         let (time_ns, logged) = (read.time_ns, read.value);
@@ -87,9 +89,21 @@ fn run<const N: usize>(reader: &Reader) -> Result<Replay, LogError> {
             .input()
             .map_err(|message| broken(format!("step {}: {message}", logged.step)))?;
         let output = step(&controller, &mut state, &input);
-        let again = Record::new(logged.step, &input, &output);
+        let mut again = CycleRecord::new(logged.step, &input, &output);
+        // Words may change between versions; the numbers that they are made of are compared.
+        if again.fault == logged.fault {
+            again.fault_text = logged.fault_text;
+        }
+        if again.refusal == logged.refusal {
+            again.refusal_text = logged.refusal_text;
+        }
+        let (logged_words, mut again_words) = (packed(&logged), packed(&again));
+        if let Some(present) = &present {
+            present.keep(&logged_words, &mut again_words);
+        }
         replay.steps += 1;
-        let (logged, again) = (encoded(time_ns, &logged), encoded(time_ns, &again));
+        let encoded = |words: &[u64]| encoded(time_ns, words, N);
+        let (logged, again) = (encoded(&logged_words), encoded(&again_words));
         let (logged, again) = (logged.map_err(broken)?, again.map_err(broken)?);
         if logged != again {
             replay.different_steps += 1;
@@ -109,14 +123,21 @@ fn run<const N: usize>(reader: &Reader) -> Result<Replay, LogError> {
     Ok(replay)
 }
 
+fn packed<const N: usize>(record: &CycleRecord<N>) -> Vec<u64> {
+    let mut words = vec![0; CycleRecord::<N>::words(N)];
+    record.pack(&mut words);
+    words
+}
+
 /// A record as a message, in which equal means equal to the last bit.
-fn encoded<const N: usize>(time_ns: u64, record: &Record<N>) -> Result<Vec<u8>, String> {
+fn encoded(time_ns: u64, words: &[u64], joints: usize) -> Result<Vec<u8>, String> {
     let header = Header {
         stamp: Stamp::from_ns(time_ns),
         frame_id: "",
     };
     let mut bytes = Vec::new();
-    cdr::encode(&(header, record), &mut bytes).map_err(|error| error.to_string())?;
+    let message = RecordWords { words, joints };
+    cdr::encode(&(header, message), &mut bytes).map_err(|error| error.to_string())?;
     Ok(bytes)
 }
 

@@ -1,10 +1,10 @@
-//! Reading an MCAP file from its beginning, chunk by whole chunk, for as long as it is sound.
+//! Reads an MCAP file chunk by chunk until the first damaged chunk.
 //!
-//! A chunk is taken apart and its checksum compared before anything of it is handed on, so what comes
-//! from a file cut anywhere is what was whole in it.
+//! A chunk is decoded and its checksum verified before any of it is returned; a truncated file therefore yields
+//! only intact data.
 
 use crate::error::LogError;
-use crate::parse::{read_some, taken_apart};
+use crate::parse::{decode_record, read_some};
 use mcap::McapError;
 use mcap::records::{AttachmentHeader, MessageHeader, Metadata, Record};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
@@ -14,9 +14,9 @@ use std::io::BufReader;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Opcode and length before every record.
+/// Size of opcode and length before every record.
 const RECORD_PREFIX_BYTES: u64 = 9;
-/// A longer record is damage, not data, and would ask for as much memory.
+/// Maximum size of a record; a larger one is treated as damage, so that it does not allocate that much memory.
 const RECORD_LIMIT_BYTES: u64 = 1 << 28;
 
 /// A channel with its message definition.
@@ -24,7 +24,7 @@ const RECORD_LIMIT_BYTES: u64 = 1 << 28;
 pub(crate) struct Channel {
     pub topic: String,
     pub message_encoding: String,
-    /// Name, encoding, text; empty where there is none.
+    /// Name, encoding, text; empty if there is none.
     pub schema: Arc<Schema>,
 }
 
@@ -35,11 +35,11 @@ pub(crate) struct Schema {
     pub text: Vec<u8>,
 }
 
-/// What a file is made of.
+/// Item of a file.
 pub(crate) enum Item {
     Metadata(Metadata),
     Attachment(AttachmentHeader, Vec<u8>),
-    /// A whole chunk begins.
+    /// Start of a complete chunk.
     Chunk,
     Message(Arc<Channel>, MessageHeader, Vec<u8>),
 }
@@ -48,8 +48,8 @@ pub(crate) struct Scan {
     file: String,
     source: BufReader<File>,
     reader: LinearReader,
-    /// Bytes of whole records so far.
-    whole_bytes: u64,
+    /// Bytes of complete records so far.
+    complete_bytes: u64,
     chunk: VecDeque<Record<'static>>,
     schemas: BTreeMap<u16, Arc<Schema>>,
     channels: BTreeMap<u16, Arc<Channel>>,
@@ -71,7 +71,7 @@ impl Scan {
             file,
             source,
             reader: LinearReader::new_with_options(options),
-            whole_bytes: mcap::MAGIC.len() as u64,
+            complete_bytes: mcap::MAGIC.len() as u64,
             chunk: VecDeque::new(),
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
@@ -80,21 +80,21 @@ impl Scan {
         })
     }
 
-    /// File, as messages name it.
+    /// Name of the file in messages.
     pub fn file(&self) -> &str {
         &self.file
     }
 
-    /// Bytes of whole records so far.
-    pub fn whole_bytes(&self) -> u64 {
-        self.whole_bytes
+    /// Bytes of complete records so far.
+    pub fn complete_bytes(&self) -> u64 {
+        self.complete_bytes
     }
 
     /// The next item; `None` at the end of a complete file.
     ///
     /// # Errors
-    /// [`LogError::Incomplete`] where a file stops short or is damaged, and nothing after it;
-    /// [`LogError::Format`] where it is no MCAP at all; [`LogError::Read`].
+    /// [`LogError::Incomplete`] if the file is truncated or damaged, then `None`; [`LogError::Format`] if it is not an
+    /// MCAP file; [`LogError::Read`].
     pub fn next(&mut self) -> Result<Option<Item>, LogError> {
         loop {
             while let Some(record) = self.chunk.pop_front() {
@@ -126,7 +126,7 @@ impl Scan {
         }
     }
 
-    /// The next record of the file itself. A chunk is taken apart on the way.
+    /// The next record at the top level of the file. Chunks are decoded on the way.
     fn record(&mut self) -> Result<Option<Record<'static>>, LogError> {
         loop {
             match self.reader.next_event() {
@@ -140,13 +140,13 @@ impl Scan {
                     self.reader.notify_read(read);
                 }
                 Some(Ok(LinearReadEvent::Record { opcode: 0, .. })) => {
-                    return Err(self.incomplete("a record of no kind"));
+                    return Err(self.incomplete("a record with an invalid opcode"));
                 }
                 Some(Ok(LinearReadEvent::Record { opcode, data })) => {
                     let bytes = RECORD_PREFIX_BYTES + data.len() as u64;
-                    match taken_apart(opcode, data) {
+                    match decode_record(opcode, data) {
                         Ok((record, chunk)) => {
-                            self.whole_bytes += bytes;
+                            self.complete_bytes += bytes;
                             self.chunk = chunk;
                             return Ok(Some(record));
                         }
@@ -156,7 +156,7 @@ impl Scan {
                 Some(Err(McapError::BadMagic)) if !self.past_data => {
                     return Err(LogError::Format {
                         file: self.file.clone(),
-                        message: "it does not begin as an MCAP file does".into(),
+                        message: "it does not start like an MCAP file".into(),
                     });
                 }
                 Some(Err(error)) => return Err(self.incomplete(&error.to_string())),
@@ -201,7 +201,7 @@ impl Scan {
         LogError::Incomplete {
             file: self.file.clone(),
             cause: cause.to_owned(),
-            kept_bytes: self.whole_bytes,
+            kept_bytes: self.complete_bytes,
         }
     }
 }

@@ -1,9 +1,11 @@
 //! Message definitions in `ros2msg`: the text of a type followed by that of every type it uses.
 
 use crate::definition::{self, Kind};
+use crate::record;
+use std::borrow::Cow;
 
-/// Name and fields of every type that the log uses; `[N]` stands for the number of joints.
-const TYPES: [(&str, &str); 15] = [
+/// Name and fields of every type that does not follow from the record; `[N]` stands for the number of joints.
+const TYPES: [(&str, &str); 13] = [
     ("builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n"),
     (
         "std_msgs/Header",
@@ -39,14 +41,6 @@ const TYPES: [(&str, &str); 15] = [
     (
         "tf2_msgs/TFMessage",
         "geometry_msgs/TransformStamped[] transforms\n",
-    ),
-    (
-        "supple_msgs/ControllerState",
-        include_str!("../msg/ControllerState.msg"),
-    ),
-    (
-        "supple_msgs/TorqueTerms",
-        include_str!("../msg/TorqueTerms.msg"),
     ),
     (
         "supple_msgs/CycleTiming",
@@ -85,8 +79,15 @@ pub(crate) fn text(name: &str, dof: usize) -> Result<String, String> {
 }
 
 fn fields(name: &str, dof: usize) -> Result<String, String> {
-    let found = TYPES.iter().find(|(known, _)| *known == name);
-    let (_, fields) = found.ok_or_else(|| format!("{name} is not defined"))?;
+    let fields: Cow<'_, str> = match name {
+        "supple_msgs/ControllerState" => record::definition().into(),
+        "supple_msgs/TorqueTerms" => record::terms_definition().into(),
+        _ => {
+            let found = TYPES.iter().find(|(known, _)| *known == name);
+            let (_, fields) = found.ok_or_else(|| format!("{name} is not defined"))?;
+            (*fields).into()
+        }
+    };
     Ok(fields.replace("[N]", &format!("[{dof}]")))
 }
 
@@ -96,7 +97,8 @@ mod tests {
 
     #[test]
     fn every_type_is_defined_with_all_that_it_uses() {
-        for (name, _) in TYPES {
+        let names = TYPES.map(|(name, _)| name);
+        for name in names.into_iter().chain(["supple_msgs/ControllerState"]) {
             let text = text(name, 4).expect(name);
             assert!(!text.contains("[N]"), "{name}");
             let definitions = definition::parse(name, &text).expect(name);

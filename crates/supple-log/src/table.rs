@@ -1,20 +1,12 @@
-//! A message as a row of a table, by its definition.
+//! Converts messages to table rows according to their definition.
 //!
-//! A table is laid out once, by the first message: its steps then read any other message of the same
-//! shape from front to back.
+//! The layout is determined once, from the first message: its steps then read any other message of the same
+//! shape sequentially.
 
-use crate::cdr;
-use crate::definition::{Count, Definitions, Field, Kind};
-use byteorder::LittleEndian;
-use cdr_encoding::CdrDeserializer;
-use serde::Deserialize;
-use std::fmt::Write;
+use crate::definition::{Count, Definitions, Field, Kind, MAX_FIELDS};
+use crate::values::Values;
 
-/// Fields, elements of arrays included, of which a table is laid out at most: those of no use take no bytes of
-/// a message, however many there are.
-const MOST_FIELDS: usize = 100_000;
-
-/// Steps that read a message, names of the columns that they fill.
+/// Steps that read a message, and names of the columns that they fill.
 pub(crate) struct Table {
     steps: Vec<Step>,
     columns: Vec<String>,
@@ -24,16 +16,16 @@ pub(crate) struct Table {
 enum Step {
     /// A value with a column of its own.
     Cell(Kind),
-    /// A value that is read past.
+    /// A value that is skipped.
     Skip(Kind),
-    /// The length of a sequence, as it was in the first message.
+    /// The length of a sequence, equal to that in the first message.
     Length(u32),
     /// A sequence of any length in one column, separated by spaces.
     List(Kind),
 }
 
 impl Table {
-    /// `first` is the first message; an array or sequence with an entry per joint gets their names.
+    /// `first` is the first message; arrays and sequences with one entry per joint get the joint names.
     pub fn new(
         definitions: &Definitions,
         first: &[u8],
@@ -87,7 +79,7 @@ impl Table {
             self.visit(data, |cell| cells.push(cell.to_owned()))?;
         }
         let [a, b] = cells;
-        // The first column is the time, which is no cell of the message.
+        // The first column is the time, which is not a cell of the message.
         let mut columns = self.columns.iter().skip(1).zip(a.into_iter().zip(b));
         let differs = columns.find(|(_, (a, b))| a != b);
         Ok(differs.map(|(column, (a, b))| [column.clone(), a, b]))
@@ -136,9 +128,9 @@ struct Layout<'a> {
 impl Layout<'_> {
     fn count(&mut self, name: &str) -> Result<(), String> {
         self.fields += 1;
-        match self.fields > MOST_FIELDS {
+        match self.fields > MAX_FIELDS {
             true => Err(format!(
-                "at {name}: a table has at most {MOST_FIELDS} fields, elements of arrays included; export \
+                "at {name}: a table has at most {MAX_FIELDS} fields, elements of arrays included; export \
                  another channel, or one with shorter arrays"
             )),
             false => Ok(()),
@@ -202,75 +194,7 @@ impl Layout<'_> {
     }
 }
 
-/// The values of a message, one after the other.
-struct Values<'a> {
-    reader: CdrDeserializer<'a, LittleEndian>,
-    bytes: usize,
-    text: String,
-}
-
-impl<'a> Values<'a> {
-    fn new(data: &'a [u8]) -> Result<Self, String> {
-        let values = cdr::values(data)?;
-        Ok(Values {
-            reader: CdrDeserializer::new(values),
-            bytes: values.len(),
-            text: String::new(),
-        })
-    }
-
-    /// The next value, as a cell has it.
-    fn next(&mut self, kind: &Kind) -> Result<&str, String> {
-        self.text.clear();
-        let written = match kind {
-            Kind::Bool => {
-                let value: bool = self.read()?;
-                write!(self.text, "{}", u8::from(value))
-            }
-            Kind::Int8 => self.print::<i8>()?,
-            Kind::Int16 => self.print::<i16>()?,
-            Kind::Int32 => self.print::<i32>()?,
-            Kind::Int64 => self.print::<i64>()?,
-            Kind::Uint8 => self.print::<u8>()?,
-            Kind::Uint16 => self.print::<u16>()?,
-            Kind::Uint32 => self.print::<u32>()?,
-            Kind::Uint64 => self.print::<u64>()?,
-            Kind::Float32 => self.print::<f32>()?,
-            Kind::Float64 => self.print::<f64>()?,
-            Kind::String => {
-                let text: String = self.read()?;
-                self.text.push_str(&text);
-                Ok(())
-            }
-            Kind::Message(name) => return Err(format!("a list of {name} makes no table")),
-        };
-        written.map_err(|error| error.to_string())?;
-        Ok(&self.text)
-    }
-
-    /// Debug prints a number with the digits that read back as the same number, and no more.
-    fn print<T: Deserialize<'a> + std::fmt::Debug>(&mut self) -> Result<std::fmt::Result, String> {
-        let value: T = self.read()?;
-        Ok(write!(self.text, "{value:?}"))
-    }
-
-    fn length(&mut self) -> Result<u32, String> {
-        self.read()
-    }
-
-    fn read<T: Deserialize<'a>>(&mut self) -> Result<T, String> {
-        T::deserialize(&mut self.reader).map_err(|error| error.to_string())
-    }
-
-    fn end(&self) -> Result<(), String> {
-        match self.bytes - self.reader.bytes_consumed() {
-            0 => Ok(()),
-            left => Err(format!("{left} bytes more than its definition has")),
-        }
-    }
-}
-
-/// A cell and the comma after it; quoted where its text would break the line apart.
+/// Appends a cell and a comma; text that would break the line is quoted.
 fn push_cell(line: &mut String, text: &str) {
     if text.contains([',', '"', '\n', '\r']) {
         line.push('"');
@@ -282,7 +206,7 @@ fn push_cell(line: &mut String, text: &str) {
     line.push(',');
 }
 
-/// The last comma becomes the end of the line.
+/// Replaces the last comma by a line end.
 fn end_line(line: &mut String) {
     line.pop();
     line.push('\n');

@@ -1,14 +1,14 @@
-//! The core's types as they stand in a TOML. The core itself knows no serde; serde's remote derive
-//! holds these against it field by field.
+//! serde mirror types of the core's types. The core does not depend on serde; the remote derive checks the fields
+//! against it.
 
 use serde::{Deserialize, Serialize};
 use supple_core::config::{
     ApparentInertia, Border, Collision, ContactLatch, FrictionVelocity, Gains, Law, Limits,
-    MoveGains, Plausible, Role, Workspace, Zone,
+    MoveGains, PlausibilityLimits, Role, Workspace, Zone,
 };
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::ripple::Harmonic;
-use supple_core::workspace::PLACES;
+use supple_core::workspace::MAX_BOUNDARIES;
 use supple_core::{Friction, Link, Pose, RippleTable, Vector};
 
 #[derive(Serialize, Deserialize)]
@@ -45,7 +45,7 @@ pub(crate) struct FrictionDef {
     band_rad_per_s: f64,
 }
 
-/// One line of the ripple tables, which stand one after the other.
+/// One line of the ripple tables, which are stored as one list.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RippleDef {
@@ -69,10 +69,13 @@ impl RippleDef {
     }
 
     /// # Errors
-    /// A motor that is not there, or a table that is not sound, in words.
+    /// Description of an unknown motor or an invalid table.
     pub fn tables<const N: usize>(list: &[RippleDef]) -> Result<[RippleTable; N], String> {
         if let Some(line) = list.iter().find(|line| line.motor >= N) {
-            return Err(format!("ripple of motor {}, there are {N}", line.motor));
+            return Err(format!(
+                "ripple of motor {}, the arm has {N} motors",
+                line.motor
+            ));
         }
         let mut tables = [RippleTable::NONE; N];
         for (motor, table) in tables.iter_mut().enumerate() {
@@ -85,7 +88,7 @@ impl RippleDef {
                 })
                 .collect();
             *table = RippleTable::new(&lines)
-                .ok_or_else(|| format!("the ripple of motor {motor} is not a table"))?;
+                .ok_or_else(|| format!("the ripple of motor {motor} is invalid"))?;
         }
         Ok(tables)
     }
@@ -175,11 +178,11 @@ pub(crate) struct LimitsDef<const N: usize> {
     #[serde(with = "column")]
     joint_speed_rad_per_s: Vector<N>,
     tip_speed_m_per_s: f64,
-    #[serde(default = "any")]
+    #[serde(default = "max_rate")]
     tip_acceleration_m_per_s2: f64,
-    #[serde(with = "column", default = "any_of_joints")]
+    #[serde(with = "column", default = "max_rate_per_joint")]
     joint_acceleration_rad_per_s2: Vector<N>,
-    #[serde(with = "column", default = "any_of_joints")]
+    #[serde(with = "column", default = "max_rate_per_joint")]
     joint_jerk_rad_per_s3: Vector<N>,
     tracking_error_m: f64,
     joint_tracking_error_rad: f64,
@@ -195,13 +198,13 @@ pub(crate) struct LimitsDef<const N: usize> {
     damping_n_s_per_m: f64,
 }
 
-/// Acceleration and jerk that logs from before they were limited were recorded with: the greatest that a
-/// controller takes.
-fn any() -> f64 {
+/// Acceleration and jerk limits of logs that were written before these limits existed: the maximum that the
+/// controller accepts.
+fn max_rate() -> f64 {
     1e3
 }
 
-fn any_of_joints<const N: usize>() -> Vector<N> {
+fn max_rate_per_joint<const N: usize>() -> Vector<N> {
     Vector::repeat(1e4)
 }
 
@@ -215,15 +218,15 @@ pub(crate) struct CollisionDef<const N: usize> {
 }
 
 #[derive(Serialize, Deserialize)]
-#[serde(remote = "Plausible", deny_unknown_fields)]
-pub(crate) struct PlausibleDef {
+#[serde(remote = "PlausibilityLimits", deny_unknown_fields)]
+pub(crate) struct PlausibilityDef {
     lost_replies: u32,
     stuck_rad: f64,
     against_share: f64,
     load_n: f64,
 }
 
-/// A wall or a box of the workspace, with the entries of the one it is.
+/// A wall or a box of the workspace; only the entries of its kind are present.
 #[derive(Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 enum BorderDef {
@@ -290,10 +293,10 @@ impl WorkspaceDef {
     }
 
     /// # Errors
-    /// More borders or zones than there is room for, in words.
+    /// Description of too many boundaries or zones.
     pub fn workspace(&self) -> Result<Workspace, String> {
-        if self.borders.len().max(self.zones.len()) > PLACES {
-            return Err(format!("more than {PLACES} borders or zones"));
+        if self.borders.len().max(self.zones.len()) > MAX_BOUNDARIES {
+            return Err(format!("more than {MAX_BOUNDARIES} boundaries or zones"));
         }
         let border = |border: &BorderDef| match border {
             BorderDef::Wall { normal, offset_m } => Border::Wall {
@@ -321,7 +324,7 @@ impl WorkspaceDef {
     }
 }
 
-/// A column as a list.
+/// A column vector as a list.
 pub(crate) mod column {
     use serde::de::Error;
     use serde::{Deserialize, Deserializer, Serializer};

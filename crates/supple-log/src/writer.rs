@@ -6,7 +6,7 @@ use crate::file::{LogFile, SOFTWARE, Written};
 use crate::messages::{
     CycleTiming, Header, JointState, PlantTruth, Stamp, TransformStamped, WrenchStamped,
 };
-use crate::record::Record;
+use crate::record::RecordWords;
 use crate::scan::{Channel, Schema};
 use crate::schema;
 use mcap::records::MessageHeader;
@@ -14,6 +14,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
+use supple_core::controller::CycleRecord;
 use supple_core::math::Vector3;
 use supple_core::{Config, Input, Output, Pose};
 use supple_model::Description;
@@ -130,6 +131,7 @@ impl<const N: usize> Writer<N> {
             ids: [None; Topic::COUNT],
             dof: N,
             buffer: Vec::new(),
+            words: Vec::new(),
         };
         channels.put(Topic::RobotDescription, 0, start_ns, &description.urdf())?;
         Ok(Writer {
@@ -155,7 +157,7 @@ impl<const N: usize> Writer<N> {
         extras: &Extras<N>,
     ) -> Result<(), LogError> {
         let step = extras.step.unwrap_or(self.next_step);
-        self.write_record(time_ns, &Record::new(step, input, output), extras)
+        self.write_record(time_ns, &CycleRecord::new(step, input, output), extras)
     }
 
     /// One step that is a record already, such as another process has sent; `extras.step` has no say.
@@ -165,24 +167,33 @@ impl<const N: usize> Writer<N> {
     pub fn write_record(
         &mut self,
         time_ns: u64,
-        record: &Record<N>,
+        record: &CycleRecord<N>,
         extras: &Extras<N>,
     ) -> Result<(), LogError> {
         let step = record.step;
-        self.next_step = step + 1;
+        self.next_step = step.saturating_add(1);
         let channels = &mut self.channels;
         channels.file.close_chunk_if_due(time_ns)?;
         let stamp = Stamp::from_ns(time_ns);
         let in_frame = |frame_id| Header { stamp, frame_id };
         let header = in_frame(&self.base);
 
-        channels.put(Topic::ControllerState, step, time_ns, &(header, record))?;
+        let mut words = std::mem::take(&mut channels.words);
+        words.resize(CycleRecord::<N>::words(N), 0);
+        record.pack(&mut words);
+        let message = RecordWords {
+            words: &words,
+            joints: N,
+        };
+        let written = channels.put(Topic::ControllerState, step, time_ns, &(header, message));
+        channels.words = words;
+        written?;
         let joints = JointState {
             header,
             name: self.description.joint_names(),
-            position: &record.position_rad,
-            velocity: &record.velocity_rad_per_s,
-            effort: &record.torque_nm,
+            position: record.position_rad.as_slice(),
+            velocity: record.velocity_rad_per_s.as_slice(),
+            effort: record.torque_nm.as_slice(),
         };
         channels.put(Topic::JointStates, step, time_ns, &joints)?;
         let wrench = |force: [f64; 3]| WrenchStamped {
@@ -205,7 +216,9 @@ impl<const N: usize> Writer<N> {
             channels.put(Topic::PlantTruth, step, time_ns, &(header, truth))?;
         }
         if self.written.is_multiple_of(TF_EVERY) {
-            let transforms = self.description.transforms(&record.position_rad)?;
+            let transforms = self
+                .description
+                .transforms(record.position_rad.as_slice())?;
             let transforms = transforms.iter().map(|t| {
                 let header = in_frame(t.parent);
                 TransformStamped::new(header, t.child, &t.parent_from_child)
@@ -246,6 +259,8 @@ struct Channels {
     ids: [Option<u16>; Topic::COUNT],
     dof: usize,
     buffer: Vec<u8>,
+    /// Words of a record, while it is written.
+    words: Vec<u64>,
 }
 
 impl Channels {

@@ -1,11 +1,12 @@
-//! The numbers of modes, faults and refusals are the constants of the message definition.
+//! The numbers of modes, faults, requests and refusals never change: they are those of the first message definition,
+//! which `data/ControllerState.msg` holds.
 
 use supple_core::codes::{self, FaultCode, MODES};
 use supple_core::controller::{Fault, Mode, Refusal};
 
 /// Value of a constant in the message definition.
 fn constant(name: &str) -> Option<u8> {
-    let definition = include_str!("../msg/ControllerState.msg");
+    let definition = include_str!("data/ControllerState.msg");
     let line = format!("uint8 {name}=");
     let value = definition.lines().find_map(|l| l.strip_prefix(&line))?;
     value.parse().ok()
@@ -119,7 +120,7 @@ fn refusals_are_numbered_as_the_definition_says() {
         ),
         (
             "UNREACHABLE",
-            Refusal::Unreachable {
+            Refusal::BeyondJointStop {
                 joint: 0,
                 value_rad: 9.0,
             },
@@ -128,5 +129,20 @@ fn refusals_are_numbered_as_the_definition_says() {
     for (name, refusal) in refusals {
         let code = constant(&format!("REFUSAL_{name}"));
         assert_eq!(code, Some(codes::refusal(Some(&refusal))), "{name}");
+    }
+}
+
+#[test]
+fn every_number_is_the_one_that_the_definition_gives_its_name() {
+    for (prefix, all) in [
+        ("REQUEST", codes::request_kind::ALL),
+        ("TRAJECTORY", codes::trajectory_kind::ALL),
+        ("FAULT", codes::fault_kind::ALL),
+        ("REFUSAL", codes::refusal_kind::ALL),
+    ] {
+        for (name, number) in all {
+            let name = format!("{prefix}_{}", name.to_uppercase());
+            assert_eq!(constant(&name), Some(*number), "{name}");
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! Tables and overviews: read by the definitions inside the log, held against what was written.
+//! Tables and overviews, read by the definitions inside the log, equal the written data.
 
 mod common;
 
@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::num::NonZeroU64;
 use std::path::Path;
 use supple_core::math::Vector3;
-use supple_log::{LogError, Reader, Record, export_csv, info};
+use supple_log::{CycleRecord, LogError, Reader, export_csv, info};
 
 const EACH: NonZeroU64 = NonZeroU64::MIN;
 
@@ -22,7 +22,7 @@ fn table(path: &Path, channel: &str, every: u64) -> Vec<Vec<String>> {
     lines
 }
 
-/// Cells of a line, quotes taken off.
+/// Cells of a line, without quotes.
 fn cells(line: &str) -> Vec<String> {
     let (mut cells, mut cell, mut quoted) = (Vec::new(), String::new(), false);
     for c in line.chars() {
@@ -49,9 +49,9 @@ fn run() -> (tempfile::TempDir, std::path::PathBuf) {
     (folder, path)
 }
 
-/// The definition in the log and the bytes agree, for every step and every kind of value.
+/// The definition in the log matches the bytes, for every step and every type of value.
 #[test]
-fn every_step_as_a_row() {
+fn every_step_is_exported_as_a_row() {
     let (_folder, path) = run();
     let lines = table(&path, "/controller_state", 1);
     let (heading, rows) = lines.split_first().expect("a heading");
@@ -64,7 +64,7 @@ fn every_step_as_a_row() {
     }
 }
 
-fn agrees(row: &BTreeMap<&str, &str>, time_ns: u64, r: &Record<N>) {
+fn agrees(row: &BTreeMap<&str, &str>, time_ns: u64, r: &CycleRecord<N>) {
     let number = |name: &str| -> f64 { row[name].parse().expect("a number") };
     let bits = |name: &str, value: f64| {
         assert_eq!(
@@ -80,12 +80,12 @@ fn agrees(row: &BTreeMap<&str, &str>, time_ns: u64, r: &Record<N>) {
     assert_eq!(row["request"], r.request.to_string());
     assert_eq!(row["fault"], r.fault.to_string());
     assert_eq!(row["fault_joint"], r.fault_joint.to_string());
-    assert_eq!(row["fault_text"], r.fault_text);
-    assert_eq!(row["refusal_text"], r.refusal_text);
+    assert_eq!(row["fault_text"], r.fault_text.as_str());
+    assert_eq!(row["refusal_text"], r.refusal_text.as_str());
     assert_eq!(row["in_contact"], u8::from(r.in_contact).to_string());
     let values = row["request_values"].split_whitespace();
     let values: Vec<f64> = values.map(|v| v.parse().expect("a number")).collect();
-    assert_eq!(values, r.request_values);
+    assert_eq!(values, r.request_values.values());
     let joints = ["joint1", "joint2", "joint3", "joint4"];
     for (i, joint) in joints.into_iter().enumerate() {
         let has = row[format!("has_measured_position.{joint}").as_str()];
@@ -95,8 +95,18 @@ fn agrees(row: &BTreeMap<&str, &str>, time_ns: u64, r: &Record<N>) {
             r.measured_position_rad[i],
         );
         bits(&format!("torque_nm.{joint}"), r.torque_nm[i]);
-        bits(&format!("torques.gravity.{joint}"), r.torques.gravity[i]);
-        bits(&format!("torques.handover.{joint}"), r.torques.handover[i]);
+        // Every term has its column: their sum is the torque, where nothing limits it.
+        let mut sum_nm = 0.0;
+        for (term, torque_nm) in r.torques.named() {
+            bits(&format!("torques.{term}.{joint}"), torque_nm[i]);
+            sum_nm += torque_nm[i];
+        }
+        if !(r.torque_limited || r.rate_limited) {
+            assert!(
+                (sum_nm - r.torque_nm[i]).abs() < 1e-12,
+                "{joint} at {time_ns} ns"
+            );
+        }
         bits(
             &format!("external_torque_nm.{joint}"),
             r.external_torque_nm[i],
@@ -118,7 +128,7 @@ fn agrees(row: &BTreeMap<&str, &str>, time_ns: u64, r: &Record<N>) {
 }
 
 #[test]
-fn other_channels_and_fewer_rows() {
+fn other_channels_and_every_nth_row_are_exported() {
     let (_folder, path) = run();
     let joints = table(&path, "/joint_states", 100);
     assert_eq!(joints.len() as u64, 1 + STEPS / 100);
@@ -164,7 +174,7 @@ fn text_is_quoted() {
 }
 
 #[test]
-fn an_unknown_channel_is_answered_with_those_there_are() {
+fn the_error_of_an_unknown_channel_lists_the_channels() {
     let (_folder, path) = run();
     let error = export_csv(&path, "/joints", EACH, &mut Vec::new()).expect_err("no such channel");
     assert!(matches!(error, LogError::UnknownChannel { .. }), "{error}");
@@ -180,7 +190,7 @@ fn an_unknown_channel_is_answered_with_those_there_are() {
 }
 
 #[test]
-fn an_output_that_cannot_be_written() {
+fn an_output_that_cannot_be_written_is_an_error() {
     struct Full;
     impl std::io::Write for Full {
         fn write(&mut self, _: &[u8]) -> std::io::Result<usize> {
@@ -196,7 +206,7 @@ fn an_output_that_cannot_be_written() {
 }
 
 #[test]
-fn an_overview() {
+fn the_overview_shows_the_content_of_the_log() {
     let (_folder, path) = run();
     let info = info(&path).expect("read");
     assert_eq!(info.incomplete, None);
@@ -262,7 +272,7 @@ fn an_overview() {
 }
 
 #[test]
-fn steps_that_were_lost_are_counted() {
+fn missing_steps_are_counted() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("run.mcap");
     let (description, config) = (common::description(), common::config());
@@ -287,7 +297,7 @@ fn steps_that_were_lost_are_counted() {
     assert_eq!((info.steps, info.missing_steps), (56, 4));
     assert!(info.to_string().contains("cannot be replayed"));
 
-    // What the sensor said, though the controller was not told.
+    // The force sensor reading, which the controller did not receive.
     let wrench = table(&path, "/wrench_ext", 1);
     assert_eq!(wrench.len(), 1 + 56);
     let row = named(&wrench[0], &wrench[1]);

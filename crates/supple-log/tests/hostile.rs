@@ -1,4 +1,4 @@
-//! Files made to hurt: an error that names file and element, soon, with the memory that there is.
+//! Malicious files give an error with file and element quickly and with bounded memory.
 
 use mcap::records::{MessageHeader, Metadata};
 use std::collections::BTreeMap;
@@ -7,8 +7,8 @@ use std::num::NonZeroU64;
 use std::path::Path;
 use supple_log::{LogError, Reader, export_csv, info, recover};
 
-/// A log with one message of `bytes` on the channel `/c`, of the type `p/A` that `definition` defines.
-fn log(path: &Path, definition: &str, bytes: &[u8]) {
+/// A log with one message of `bytes` on the channel `topic`, of the type `p/A` that `definition` defines.
+fn log(path: &Path, topic: &str, definition: &str, bytes: &[u8]) {
     let file = File::create(path).expect("created");
     let mut writer = mcap::Writer::new(file).expect("begun");
     let about = ["software", "arm", "experiment"].map(|key| (key.to_owned(), "x".to_owned()));
@@ -22,7 +22,7 @@ fn log(path: &Path, definition: &str, bytes: &[u8]) {
     writer.write_metadata(&metadata).expect("written");
     let schema = writer.add_schema("p/msg/A", "ros2msg", definition.as_bytes());
     let schema = schema.expect("written");
-    let channel = writer.add_channel(schema, "/c", "cdr", &BTreeMap::new());
+    let channel = writer.add_channel(schema, topic, "cdr", &BTreeMap::new());
     let header = MessageHeader {
         channel_id: channel.expect("written"),
         sequence: 0,
@@ -36,10 +36,10 @@ fn log(path: &Path, definition: &str, bytes: &[u8]) {
     writer.finish().expect("written");
 }
 
-fn refused(definition: &str, bytes: &[u8], words: &[&str]) {
+fn assert_rejected(definition: &str, bytes: &[u8], words: &[&str]) {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("run.mcap");
-    log(&path, definition, bytes);
+    log(&path, "/c", definition, bytes);
     let mut out = Vec::new();
     let error = export_csv(&path, "/c", NonZeroU64::MIN, &mut out).expect_err("no table");
     assert!(matches!(error, LogError::Format { .. }), "{error}");
@@ -47,18 +47,77 @@ fn refused(definition: &str, bytes: &[u8], words: &[&str]) {
     for word in [&["run.mcap", "/c"], words].concat() {
         assert!(message.contains(word), "{word} in {message}");
     }
-    assert!(info(&path).is_ok(), "the rest of the log is sound");
+    assert!(info(&path).is_ok(), "the rest of the log is valid");
+}
+
+/// The fields without which a definition is none of a record, and the bytes of a message of them.
+const RECORD: &str = "uint64 step\nuint64 input_cycle\nuint64 cycle\nuint8 mode\nfloat64[3] position_rad\n\
+                      float64[3] velocity_rad_per_s\nfloat64[3] torque_nm\n";
+const RECORD_BYTES: usize = 104;
+
+/// Records are decoded by the definition inside the file.
+fn assert_no_record(definition: &str, bytes: &[u8], words: &[&str]) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("run.mcap");
+    log(&path, "/controller_state", definition, bytes);
+    let reader = Reader::open(&path).expect("opened");
+    let mut records = reader.records::<3>().expect("three joints");
+    let errors = [
+        info(&path).expect_err("no record"),
+        records.next().expect("a message").expect_err("no record"),
+    ];
+    for error in errors {
+        let message = error.to_string();
+        for word in [&["run.mcap", "/controller_state"], words].concat() {
+            assert!(message.contains(word), "{word} in {message}");
+        }
+    }
+}
+
+#[test]
+fn a_definition_of_a_record_from_outside() {
+    let data = &[0; RECORD_BYTES];
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("run.mcap");
+    log(&path, "/controller_state", RECORD, data);
+    assert_eq!(info(&path).expect("a record").steps, 1);
+
+    let empty = "MSG: p/N\nint8[0] x\n";
+    let nothing = format!("{RECORD}N[9223372036854775808] n\n{LINE}\n{empty}");
+    assert_no_record(&nothing, data, &["more fields than a message of 104 bytes"]);
+    let mut doubling = format!("{RECORD}M0 a\nM0 b\n");
+    for i in 0..30 {
+        doubling += &format!("{LINE}\nMSG: p/M{i}\nM{0} a\nM{0} b\n", i + 1);
+    }
+    doubling += &format!("{LINE}\nMSG: p/M30\nint8[0] x\n");
+    assert_no_record(&doubling, data, &["more fields than"]);
+    assert_no_record(
+        &format!("{RECORD}bool a\nbool a\n"),
+        data,
+        &["field a is there twice"],
+    );
+    assert_no_record("string data\n", data, &["no field step"]);
+    let vector = format!(
+        "{RECORD}geometry_msgs/Vector3 tip_position_m\n{LINE}\nMSG: geometry_msgs/Vector3\nfloat32 x\n"
+    );
+    assert_no_record(
+        &vector,
+        data,
+        &["geometry_msgs/Vector3 is not three numbers"],
+    );
+    let shorter = RECORD.replace("float64[3] torque_nm", "float64[2] torque_nm");
+    assert_no_record(&shorter, data, &["torque_nm"]);
 }
 
 const LINE: &str =
     "================================================================================";
 
 #[test]
-fn a_message_that_holds_itself() {
-    refused("A a\n", &[0; 8], &["p/A", "holds itself"]);
-    refused("A[] a\n", &[255; 4096], &["p/A", "holds itself"]);
+fn a_recursive_message_type() {
+    assert_rejected("A a\n", &[0; 8], &["p/A", "is recursive"]);
+    assert_rejected("A[] a\n", &[255; 4096], &["p/A", "is recursive"]);
     let by_another = format!("B b\n{LINE}\nMSG: p/B\nint8 x\nA[] a\n");
-    refused(&by_another, &[255; 4096], &["holds itself"]);
+    assert_rejected(&by_another, &[255; 4096], &["is recursive"]);
 }
 
 #[test]
@@ -68,23 +127,23 @@ fn messages_that_double_with_every_level() {
         definition += &format!("{LINE}\nMSG: p/M{i}\nM{0} a\nM{0} b\n", i + 1);
     }
     definition += &format!("{LINE}\nMSG: p/M30\nint8[0] x\n");
-    refused(&definition, &[0; 8], &["at a.a.a", "at most 100000 fields"]);
+    assert_rejected(&definition, &[0; 8], &["at a.a.a", "at most 100000 fields"]);
 }
 
 #[test]
 fn more_elements_than_there_are_bytes() {
     let nothing = format!("N[9223372036854775808] n\n{LINE}\nMSG: p/N\nint8[0] x\n");
-    refused(&nothing, &[0; 8], &["at n", "at most 100000 fields"]);
-    refused(
+    assert_rejected(&nothing, &[0; 8], &["at n", "at most 100000 fields"]);
+    assert_rejected(
         "int8[0] z\nint8[99999999999999999999] n\n",
         &[0; 8],
         &["cannot read"],
     );
     let sequence = format!("N[] n\n{LINE}\nMSG: p/N\nint8[0] x\n");
-    refused(&sequence, &[255; 4], &["at n", "at most 100000 fields"]);
+    assert_rejected(&sequence, &[255; 4], &["at n", "at most 100000 fields"]);
 }
 
-/// A log that claims more than a machine's memory and has it, on a disk that stores no zeros.
+/// A record whose stated length exceeds the memory, in a sparse file of that length.
 #[test]
 fn a_record_as_long_as_the_file() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -100,7 +159,7 @@ fn a_record_as_long_as_the_file() {
 
 #[cfg(unix)]
 #[test]
-fn what_is_no_regular_file_is_not_read() {
+fn special_files_are_not_read() {
     let folder = tempfile::tempdir().expect("a folder");
     let fifo = folder.path().join("run.mcap");
     let made = std::process::Command::new("mkfifo").arg(&fifo).status();

@@ -1,4 +1,4 @@
-//! The log through Python's standard readers, as `tests/python` has them.
+//! Reads the log with the standard Python readers of `tests/python`.
 
 use std::path::Path;
 use std::process::Command;

@@ -1,4 +1,4 @@
-//! A file cut or damaged anywhere gives what was whole in it, and never more.
+//! A file that is truncated or damaged anywhere yields exactly its complete chunks.
 
 mod common;
 
@@ -7,14 +7,14 @@ use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 use std::fs;
 use std::path::Path;
-use supple_log::{LogError, Reader, Record, info, recover};
+use supple_log::{CycleRecord, LogError, Reader, info, recover};
 
 const STEPS: u64 = 1_100;
 
 struct Original {
     folder: tempfile::TempDir,
     bytes: Vec<u8>,
-    records: Vec<Record<N>>,
+    records: Vec<CycleRecord<N>>,
 }
 
 fn original() -> Original {
@@ -33,7 +33,7 @@ fn original() -> Original {
     }
 }
 
-/// Messages in a file by the strict reader of the format's own library, which wants the end to be there.
+/// Number of messages in a file, by the strict reader of the mcap library, which requires the end of the file.
 fn strictly_counted(bytes: &[u8]) -> u64 {
     let summary = mcap::Summary::read(bytes).expect("sound").expect("indexed");
     let counted = summary.stats.expect("statistics").message_count;
@@ -44,7 +44,7 @@ fn strictly_counted(bytes: &[u8]) -> u64 {
 }
 
 #[test]
-fn cut_anywhere() {
+fn truncation_anywhere_keeps_all_complete_chunks() {
     let original = original();
     let from = original.folder.path().join("cut.mcap");
     let to = original.folder.path().join("recovered.mcap");
@@ -54,7 +54,7 @@ fn cut_anywhere() {
         fs::write(&from, &original.bytes[..cut]).expect("cut");
         let recovery = match recover(&from, &to) {
             Ok(recovery) => recovery,
-            Err(LogError::NothingWhole { bytes, .. }) => {
+            Err(LogError::NoCompleteChunk { bytes, .. }) => {
                 assert!(
                     kept.is_empty(),
                     "cut at {cut}: less than an earlier cut gave"
@@ -102,7 +102,7 @@ fn cut_anywhere() {
 }
 
 #[test]
-fn a_cut_file_is_read_as_far_as_it_is_whole() {
+fn a_truncated_file_is_read_up_to_its_last_complete_chunk() {
     let original = original();
     let path = original.folder.path().join("cut.mcap");
     let two_thirds = original.bytes.len() * 2 / 3;
@@ -110,7 +110,7 @@ fn a_cut_file_is_read_as_far_as_it_is_whole() {
 
     let mut records: Vec<_> = Reader::open(&path)
         .and_then(|reader| reader.records::<N>())
-        .expect("its beginning is whole")
+        .expect("its beginning is complete")
         .collect();
     let error = records.pop().expect("something").expect_err("an end");
     assert!(matches!(error, LogError::Incomplete { .. }), "{error}");
@@ -122,14 +122,14 @@ fn a_cut_file_is_read_as_far_as_it_is_whole() {
     assert_eq!(records, original.records[..records.len()]);
     assert!(records.len() >= 500);
 
-    let info = info(&path).expect("its beginning is whole");
+    let info = info(&path).expect("its beginning is complete");
     assert!(info.incomplete.is_some());
     assert_eq!(info.steps, records.len() as u64);
     assert!(info.to_string().contains("supple log recover"));
 }
 
 #[test]
-fn a_complete_file_is_copied_to_the_last_byte() {
+fn a_complete_file_is_copied_byte_by_byte() {
     let original = original();
     let to = original.folder.path().join("copy.mcap");
     let recovery = recover(original.folder.path().join("run.mcap"), &to).expect("complete");
@@ -139,7 +139,7 @@ fn a_complete_file_is_copied_to_the_last_byte() {
 }
 
 #[test]
-fn a_damaged_chunk_ends_what_is_kept() {
+fn recovery_stops_at_a_damaged_chunk() {
     let original = original();
     let (from, to) = names(original.folder.path());
     let whole = strictly_counted(&original.bytes);
@@ -149,19 +149,18 @@ fn a_damaged_chunk_ends_what_is_kept() {
     bytes[(chunks[2].chunk_start_offset + chunks[2].chunk_length / 2) as usize] ^= 0x10;
     fs::write(&from, &bytes).expect("damaged");
 
-    let recovery = recover(&from, &to).expect("two chunks are whole");
+    let recovery = recover(&from, &to).expect("two chunks are complete");
     assert_eq!(recovery.chunks, 2);
     assert!(recovery.messages < whole);
     assert!(recovery.stopped.is_some());
     assert!(
-        recovery.to_string().contains("were not whole"),
+        recovery.to_string().contains("were incomplete"),
         "{recovery}"
     );
 }
 
-/// Lengths, checksums and kinds of records damaged at will, half of the time near the beginning, where
-/// they are dense: no memory is asked for that is not there, and no step is handed on that was not
-/// written.
+/// Random damage of lengths, checksums and record types, half of it near the beginning, where they are dense: memory
+/// stays bounded, and only steps that were written are returned.
 #[test]
 fn damage_anywhere_invents_nothing() {
     let original = original();
@@ -179,7 +178,7 @@ fn damage_anywhere_invents_nothing() {
         if recover(&from, &to).is_err() {
             return Ok(());
         }
-        // What the log says of itself has no checksum.
+        // The metadata of the log has no checksum.
         let Ok(records) = Reader::open(&to).and_then(|reader| reader.records::<N>()) else {
             return Ok(());
         };
@@ -192,7 +191,7 @@ fn damage_anywhere_invents_nothing() {
     result.expect("nothing invented");
 }
 
-/// What a file system may leave after a loss of power.
+/// A file system may leave zeros after a loss of power.
 #[test]
 fn zeros_after_the_last_chunk_are_not_data() {
     let original = original();
@@ -213,7 +212,7 @@ fn zeros_after_the_last_chunk_are_not_data() {
 }
 
 #[test]
-fn the_part_of_a_log_takes_the_logs_name() {
+fn a_part_file_can_be_recovered_to_the_name_of_its_log() {
     let original = original();
     let part = original.folder.path().join("lost.mcap.part");
     let to = original.folder.path().join("lost.mcap");
@@ -225,16 +224,16 @@ fn the_part_of_a_log_takes_the_logs_name() {
 }
 
 #[test]
-fn what_cannot_be_recovered_is_refused_and_leaves_nothing() {
+fn a_file_without_complete_chunks_is_rejected_and_no_output_is_left() {
     let original = original();
     let (from, to) = names(original.folder.path());
     let run = original.folder.path().join("run.mcap");
-    let error = recover(&run, &run).expect_err("onto itself");
+    let error = recover(&run, &run).expect_err("same file");
     assert!(matches!(error, LogError::SameFile { .. }), "{error}");
     assert!(fs::read(&run).expect("untouched") == original.bytes);
 
     fs::write(&from, "not an MCAP file, whatever its name").expect("written");
-    let error = recover(&from, &to).expect_err("no MCAP");
+    let error = recover(&from, &to).expect_err("not an MCAP file");
     assert!(matches!(error, LogError::Format { .. }), "{error}");
     let error = recover(original.folder.path().join("missing"), &to).expect_err("missing");
     assert!(matches!(error, LogError::Read { .. }), "{error}");
@@ -242,7 +241,7 @@ fn what_cannot_be_recovered_is_refused_and_leaves_nothing() {
     assert!(matches!(error, LogError::Read { .. }), "{error}");
 
     fs::write(&from, &original.bytes[..500]).expect("cut");
-    let error = recover(&from, &to).expect_err("nothing whole");
+    let error = recover(&from, &to).expect_err("no complete chunk");
     assert!(error.to_string().contains("cut.mcap") && error.to_string().contains("500"));
     assert!(!to.exists());
     assert!(!original.folder.path().join("to.mcap.recovering").exists());

@@ -1,5 +1,5 @@
-//! What a state costs in a plain loop over many: `state_loop ARM SAMPLES` prints nanoseconds by
-//! function, as JSON. `python/benchmarks/regressor.py` holds batched calls from Python against it.
+//! Cost per state in a plain loop: `state_loop ARM SAMPLES` prints nanoseconds by function, as JSON.
+//! `python/benchmarks/regressor.py` compares batched calls from Python with it.
 
 use std::hint::black_box;
 use std::process::ExitCode;
@@ -30,11 +30,11 @@ fn costs(arm: &str, samples: usize) -> Result<String, ModelError> {
     let description = Description::find(arm)?;
     with_dof!(description.dof(), N => {
         let arm = description.arm::<N>()?;
-        sized::<N>(&arm, samples)
+        for_dof::<N>(&arm, samples)
     })
 }
 
-fn sized<const N: usize>(arm: &Arm<N>, samples: usize) -> String {
+fn for_dof<const N: usize>(arm: &Arm<N>, samples: usize) -> String {
     let mut state = 1_u64;
     let [q, qd, qdd]: [Vec<Vector<N>>; 3] = core::array::from_fn(|_| {
         let random = |_, _| 1.5 * uniform(&mut state);
@@ -71,7 +71,7 @@ fn sized<const N: usize>(arm: &Arm<N>, samples: usize) -> String {
     format!("{{{}}}", entries.join(", "))
 }
 
-/// Nanoseconds a state, the least of three passes.
+/// Nanoseconds per state, the minimum of three passes.
 fn cost(samples: usize, width: usize, mut f: impl FnMut(usize, &mut [f64])) -> f64 {
     let mut out = vec![0.0; samples * width];
     let pass = |_| {

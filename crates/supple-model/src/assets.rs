@@ -32,8 +32,8 @@ const NAMES: [&str; ASSETS.len()] = {
 
 /// Names of the built-in arms.
 ///
-/// - `paper3`: a physical arm near the one that the paper identified, three joints.
-/// - `wam3`: the WAM with its roll joint welded at 0, three joints.
+/// - `paper3`: the physically consistent arm closest to the paper's identified parameters, three joints.
+/// - `wam3`: the WAM with its roll joint fixed at 0, three joints.
 /// - `wam4`: the 4-joint WAM, roll held.
 /// - `wam7`: the 7-joint WAM, roll and wrist held.
 pub fn assets() -> &'static [&'static str] {

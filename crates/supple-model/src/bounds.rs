@@ -1,14 +1,14 @@
-//! Greatest values of what a TOML may say: far above what any arm has, so that a slip of the unit or of a digit is
-//! found before an arm moves by it. The core itself takes any finite number.
+//! Upper limits of TOML values, far above any real arm: they catch wrong units and misplaced digits before the arm
+//! moves. The core itself accepts any finite number.
 
 use supple_core::Config;
 use supple_core::controller::ConfigError;
 
-/// The first entry that is beyond what any arm has.
-pub(crate) fn beyond<const N: usize>(config: &Config<N>) -> Option<ConfigError> {
+/// First entry above its upper limit, if any.
+pub(crate) fn first_out_of_range<const N: usize>(config: &Config<N>) -> Option<ConfigError> {
     let limits = &config.limits;
-    let one = |entry: &'static str, value: f64, most: f64, must: &'static str| {
-        (value > most).then_some(ConfigError {
+    let one = |entry: &'static str, value: f64, max: f64, must: &'static str| {
+        (value > max).then_some(ConfigError {
             entry,
             joint: None,
             value,
@@ -110,8 +110,8 @@ pub(crate) fn beyond<const N: usize>(config: &Config<N>) -> Option<ConfigError> 
             "at most 1,000",
         ),
     ];
-    let each = |entry, values: &supple_core::Vector<N>, most: f64, must| {
-        let joint = (0..N).find(|joint| values[*joint] > most)?;
+    let each = |entry, values: &supple_core::Vector<N>, max: f64, must| {
+        let joint = (0..N).find(|joint| values[*joint] > max)?;
         Some(ConfigError {
             entry,
             joint: Some(joint),

@@ -1,5 +1,5 @@
-//! An arm as it is described: read, checked, complete. Sizes are dynamic here; [`Description::arm`]
-//! and [`Description::config`] give the types of the core, whose size is in the type.
+//! A complete, validated arm description. The number of joints is dynamic here; [`Description::arm`] and
+//! [`Description::config`] return the types of the core, in which it is a const parameter.
 
 use crate::error::{Finding, ModelError, Reporter};
 use crate::resolve::{self, JointResolved, Motors, Tool};
@@ -11,7 +11,7 @@ use std::path::Path;
 use supple_core::Friction;
 use urdf_rs::Robot;
 
-/// An arm, read from a URDF and a TOML. It exists only if both are sound.
+/// An arm, read from a URDF and a TOML. It can be constructed only from valid files.
 #[derive(Clone, Debug)]
 pub struct Description {
     pub(crate) settings: Settings,
@@ -31,13 +31,13 @@ pub struct Description {
 }
 
 impl Description {
-    /// Longest URDF or TOML that is read \[bytes\]: a hundred times that of any arm.
-    pub const MOST_BYTES: u64 = 16 << 20;
+    /// Maximum size of a URDF or TOML \[bytes\]: a hundred times that of any arm.
+    pub const MAX_BYTES: u64 = 16 << 20;
 
-    /// Reads an arm from its TOML, or from the folder that holds it as `arm.toml`.
+    /// Reads an arm from its TOML, or from the folder that contains it as `arm.toml`.
     ///
     /// # Errors
-    /// Whatever is wrong with either file.
+    /// [`ModelError`] if either file cannot be read or is invalid.
     pub fn load(path: impl AsRef<Path>) -> Result<Self, ModelError> {
         let path = path.as_ref();
         let toml_path = if path.is_dir() {
@@ -48,7 +48,7 @@ impl Description {
         let toml_file = toml_path.display().to_string();
         let toml = read(
             &toml_path,
-            "give the TOML of an arm, or the folder that holds it as arm.toml",
+            "give the TOML of an arm, or the folder that contains it as arm.toml",
         )?;
         let settings = parse_toml(&toml_file, &toml)?;
         let folder = toml_path.parent().unwrap_or(Path::new(""));
@@ -66,10 +66,10 @@ impl Description {
         )
     }
 
-    /// A built-in arm by its name, or another by the path of its TOML or folder.
+    /// Reads a built-in arm by its name, or another arm by the path of its TOML or folder.
     ///
     /// # Errors
-    /// [`ModelError::UnknownAsset`] if it is neither, or whatever is wrong with the files.
+    /// [`ModelError::UnknownAsset`] if it is neither, or as [`Description::load`].
     pub fn find(name_or_path: &str) -> Result<Self, ModelError> {
         let is_path = name_or_path.contains(['/', '\\', '.']) || Path::new(name_or_path).exists();
         if is_path && !assets::assets().contains(&name_or_path) {
@@ -78,7 +78,7 @@ impl Description {
         Self::asset(name_or_path)
     }
 
-    /// As [`Description::find`]; controlled at another rate than its own where one is given \[Hz\].
+    /// As [`Description::find`]; `rate_hz`, if given, replaces the control rate of the TOML \[Hz\].
     ///
     /// # Errors
     /// As [`Description::find`] and [`Description::at_rate`].
@@ -90,10 +90,10 @@ impl Description {
         }
     }
 
-    /// A built-in arm, one of [`crate::assets`].
+    /// Reads a built-in arm, one of [`crate::assets`].
     ///
     /// # Errors
-    /// [`ModelError::UnknownAsset`] with the names there are.
+    /// [`ModelError::UnknownAsset`] with the known names.
     pub fn asset(name: &str) -> Result<Self, ModelError> {
         let (toml, urdf) = assets::text(name)?;
         let file = |end: &str| format!("assets/{name}/{end}");
@@ -107,11 +107,11 @@ impl Description {
         )
     }
 
-    /// An arm from the texts of its two files, such as a log carries. Messages call them `arm.toml`
-    /// and by the name the TOML gives its URDF.
+    /// Reads an arm from the texts of its two files, which a log contains, for example. Messages name them
+    /// `arm.toml` and the file name that the TOML gives for the URDF.
     ///
     /// # Errors
-    /// Whatever is wrong with either text.
+    /// [`ModelError`] if either text is invalid.
     pub fn from_text(toml: &str, urdf: &str) -> Result<Self, ModelError> {
         let settings = parse_toml("arm.toml", toml)?;
         let urdf_file = settings.urdf.clone();
@@ -143,7 +143,7 @@ impl Description {
         if let Some(radius_m) = settings.point_mass_radius_m {
             in_toml.positive("point_mass_radius_m", radius_m)?;
             in_toml.within("point_mass_radius_m", radius_m, 1e-6..=10.0, "m")?;
-            tree::inflate(&mut robot, radius_m);
+            tree::set_point_mass_inertia(&mut robot, radius_m);
         }
         resolve::check_names(in_toml, &settings, &robot)?;
         let chain = tree::chain(
@@ -175,14 +175,14 @@ impl Description {
         })
     }
 
-    /// What the URDF holds that is not read, each kind once with its first place: Gazebo's elements,
-    /// `mu_coulomb`, an `<origin>` of a link. Dynamics and limits do not depend on it; what they would depend on
-    /// is refused. Empty for the built-in arms.
+    /// Ignored content of the URDF, each kind once with its first occurrence: Gazebo's elements, `mu_coulomb`, an
+    /// `<origin>` of a link. Dynamics and limits do not depend on it; unknown content that could change them is
+    /// rejected. Empty for the built-in arms.
     pub fn warnings(&self) -> &[Finding] {
         &self.warnings
     }
 
-    /// The same arm, if nothing of its URDF was left out.
+    /// Returns the arm if no content of its URDF was ignored.
     ///
     /// # Errors
     /// [`ModelError::Strict`] with all [`Description::warnings`].
@@ -195,7 +195,7 @@ impl Description {
         }
     }
 
-    /// [`Description::strict`] where `strict` is set, otherwise as it is.
+    /// Applies [`Description::strict`] if `strict` is set.
     ///
     /// # Errors
     /// As [`Description::strict`].
@@ -206,15 +206,15 @@ impl Description {
         }
     }
 
-    /// The same arm, controlled at another rate \[Hz\]: its period is that of the rate in whole nanoseconds.
+    /// Returns the same arm with another control rate \[Hz\]; the period is rounded to whole nanoseconds.
     ///
     /// # Errors
-    /// [`ModelError::Invalid`] for a rate that is not from 10 Hz to 10 kHz.
+    /// [`ModelError::Invalid`] for a rate outside 10 Hz to 10 kHz.
     pub fn at_rate(mut self, rate_hz: f64) -> Result<Self, ModelError> {
         let file = &self.toml_file;
         let report = Reporter { file };
-        report.positive("the rate of control (Hz)", rate_hz)?;
-        report.within("the rate of control (Hz)", rate_hz, 10.0..=1e4, "Hz")?;
+        report.positive("the control rate (Hz)", rate_hz)?;
+        report.within("the control rate (Hz)", rate_hz, 10.0..=1e4, "Hz")?;
         self.settings.period_s = (1e9 / rate_hz).round() * 1e-9;
         Ok(self)
     }
@@ -234,17 +234,17 @@ impl Description {
         &self.names
     }
 
-    /// The URDF, to the last byte.
+    /// Text of the URDF, unchanged.
     pub fn urdf(&self) -> &str {
         &self.urdf
     }
 
-    /// The TOML, to the last byte.
+    /// Text of the TOML, unchanged.
     pub fn toml(&self) -> &str {
         &self.toml
     }
 
-    /// The TOML as it was read, defaults of whole sections filled in.
+    /// Parsed TOML, with the defaults of missing sections filled in.
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
@@ -264,7 +264,7 @@ impl Description {
         &self.motors
     }
 
-    /// What is mounted at the tip.
+    /// Tool at the tip.
     pub fn tool(&self) -> Option<Tool> {
         self.tool
     }
@@ -274,11 +274,11 @@ impl Description {
         &self.capsules
     }
 
-    /// Pose of every URDF link in its parent link, at joint angles `q_rad`, one per moving joint: what
-    /// a transform tree is fed with.
+    /// Pose of every URDF link in its parent link, at joint angles `q_rad`, one per moving joint: the data of
+    /// a transform tree.
     ///
     /// # Errors
-    /// [`ModelError::JointCount`] if `q_rad` has not one angle per moving joint.
+    /// [`ModelError::JointCount`] if `q_rad` does not have one angle per moving joint.
     pub fn transforms(&self, q_rad: &[f64]) -> Result<Vec<Transform<'_>>, ModelError> {
         self.expect_dof(q_rad.len())?;
         Ok(shapes::transforms(
@@ -293,7 +293,7 @@ impl Description {
         &self.robot
     }
 
-    /// Refuses a caller that expects another number of joints.
+    /// Returns an error if the caller expects another number of joints.
     pub(crate) fn expect_dof(&self, expected: usize) -> Result<(), ModelError> {
         if expected == self.dof() {
             return Ok(());
@@ -308,7 +308,7 @@ impl Description {
 }
 
 fn read(path: &Path, remedy: &'static str) -> Result<String, ModelError> {
-    supple_files::read_text(path, Description::MOST_BYTES).map_err(|error| ModelError::Read {
+    supple_files::read_text(path, Description::MAX_BYTES).map_err(|error| ModelError::Read {
         file: path.display().to_string(),
         error,
         remedy,
@@ -319,7 +319,7 @@ fn parse_toml(file: &str, text: &str) -> Result<Settings, ModelError> {
     if text.trim_start().starts_with('<') {
         return Err(ModelError::Syntax {
             file: file.to_owned(),
-            message: "this is XML where a TOML is expected".to_owned(),
+            message: "this is XML, but a TOML is expected".to_owned(),
             remedy: "give the TOML of the arm: name, urdf (the path of this file) and tip_frame suffice",
         });
     }

@@ -1,48 +1,48 @@
-//! Why a description is refused: one type, and every message names file, element, value and remedy.
+//! Errors of descriptions. Every message names file, element, value and remedy.
 
 use supple_core::ArmError;
 
-/// A description, or a use of one, that is refused.
+/// Error of reading, checking or using a description.
 #[derive(Debug, thiserror::Error)]
 pub enum ModelError {
     /// A file that cannot be read.
     #[error("{file}: cannot be read: {error}; {remedy}")]
     Read {
-        /// Path as it was asked for.
+        /// Path as the caller gave it.
         file: String,
-        /// What the system says.
+        /// Error of the operating system.
         error: std::io::Error,
-        /// What to do about it.
+        /// Suggested remedy.
         remedy: &'static str,
     },
     /// A file that cannot be written.
     #[error(
-        "{file}: cannot be written: {error}; name a folder in which it can be, as a regular file"
+        "{file}: cannot be written: {error}; name a folder in which a regular file can be written"
     )]
     Write {
         /// Path.
         file: String,
-        /// What the system says.
+        /// Error of the operating system.
         error: std::io::Error,
     },
-    /// A file that is not well formed, or has keys or types that are not in the schema. The message
-    /// of the parser carries line, column and what was expected.
+    /// A file that cannot be parsed, or that contains unknown keys or wrong types. The message of the parser
+    /// contains line, column and the expected token.
     #[error("{file}: {message}\n{remedy}")]
     Syntax {
         /// File name.
         file: String,
         /// Message of the parser.
         message: String,
-        /// What to do about it.
+        /// Suggested remedy.
         remedy: &'static str,
     },
-    /// An element that is read but cannot be true.
+    /// An element with an invalid value.
     #[error(transparent)]
     Invalid(Box<Finding>),
-    /// A URDF with what is not read, where nothing may be left out.
+    /// A URDF with ignored content, if strict reading was requested.
     #[error("{}; remove it, or load the arm without strict", lines(findings))]
     Strict {
-        /// What is left out, each kind once.
+        /// Ignored content, each kind once.
         findings: Vec<Finding>,
     },
     /// An arm that is not built in.
@@ -51,9 +51,9 @@ pub enum ModelError {
          arm is given by the path of its TOML"
     )]
     UnknownAsset {
-        /// Name asked for.
+        /// Requested name.
         found: String,
-        /// Names there are.
+        /// Known names.
         expected: String,
     },
     /// The description and the caller disagree about the number of joints.
@@ -63,9 +63,9 @@ pub enum ModelError {
         file: String,
         /// Name of the arm.
         arm: String,
-        /// Joints that the caller asked for.
+        /// Number of joints that the caller expects.
         expected: usize,
-        /// Joints that the arm has.
+        /// Number of joints of the arm.
         found: usize,
     },
     /// A number of joints that no controller is compiled for.
@@ -74,32 +74,32 @@ pub enum ModelError {
          angle under [fixed_joints_rad], or set tip_frame to another link"
     )]
     Dof {
-        /// Joints that the arm has.
+        /// Number of joints of the arm.
         found: usize,
     },
-    /// The parts are sound one by one, but do not make an arm.
+    /// Each part is valid, but together they do not form a valid arm.
     #[error("{file}: {error}; correct the named element in the URDF or the TOML")]
     Arm {
         /// File of the description.
         file: String,
-        /// What the constructor of the arm says; joints are counted from 0.
+        /// Error of the constructor of the arm; joints are counted from 0.
         error: ArmError,
     },
 }
 
-/// An element with a value that cannot be true.
+/// An element with an invalid or ignored value.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{file}: {element}: {problem}, found {value}; {remedy}")]
 pub struct Finding {
-    /// File that holds the element.
+    /// File that contains the element.
     pub file: String,
-    /// The element, as one would look for it in the file.
+    /// The element, in words that can be searched for in the file.
     pub element: String,
-    /// What is wrong.
+    /// The problem.
     pub problem: String,
     /// The value found.
     pub value: String,
-    /// What to do about it.
+    /// Suggested remedy.
     pub remedy: String,
 }
 
@@ -108,7 +108,7 @@ fn lines(findings: &[Finding]) -> String {
     lines.join("; ")
 }
 
-/// Speaks about one file.
+/// Creates the errors of one file.
 #[derive(Clone, Copy)]
 pub(crate) struct Reporter<'a> {
     pub file: &'a str,
@@ -131,24 +131,24 @@ impl Reporter<'_> {
         }))
     }
 
-    /// Refuses NaN and infinity.
+    /// Rejects NaN and infinity.
     pub fn finite(&self, element: &str, value: f64) -> Result<(), ModelError> {
         self.check(element, value, value.is_finite(), "finite")
     }
 
-    /// Refuses what is not above zero.
+    /// Rejects values that are not finite and above zero.
     pub fn positive(&self, element: &str, value: f64) -> Result<(), ModelError> {
-        let sound = value.is_finite() && value > 0.0;
-        self.check(element, value, sound, "finite and above zero")
+        let valid = value.is_finite() && value > 0.0;
+        self.check(element, value, valid, "finite and above zero")
     }
 
-    /// Refuses what is below zero.
+    /// Rejects values that are not finite or below zero.
     pub fn not_negative(&self, element: &str, value: f64) -> Result<(), ModelError> {
-        let sound = value.is_finite() && value >= 0.0;
-        self.check(element, value, sound, "finite and not negative")
+        let valid = value.is_finite() && value >= 0.0;
+        self.check(element, value, valid, "finite and not negative")
     }
 
-    /// Refuses what is not within a range, ends included.
+    /// Rejects values outside a range, ends included.
     pub fn within(
         &self,
         element: &str,
@@ -159,17 +159,17 @@ impl Reporter<'_> {
         if range.contains(&value) {
             return Ok(());
         }
-        let (least, greatest) = range.into_inner();
+        let (min, max) = range.into_inner();
         Err(self.invalid(
             element,
-            format!("must be from {least} to {greatest} {unit}"),
+            format!("must be from {min} to {max} {unit}"),
             value,
             "give a number in this range, in this unit",
         ))
     }
 
-    fn check(&self, element: &str, value: f64, sound: bool, must: &str) -> Result<(), ModelError> {
-        if sound {
+    fn check(&self, element: &str, value: f64, valid: bool, must: &str) -> Result<(), ModelError> {
+        if valid {
             return Ok(());
         }
         Err(self.invalid(

@@ -1,8 +1,8 @@
-//! A description with another model in it: what an identification found, as URDF and TOML.
+//! Writes an identified model into a description (URDF and TOML).
 //!
-//! The texts are edited, not written anew: shapes, limits, gains and comments stay. Masses and inertias
-//! of each moving link, with all that is lumped into it and with the tool, go into the `<inertial>` of
-//! the link itself; links that ride on it lose theirs.
+//! The texts are edited in place, so shapes, limits, gains and comments are kept. The inertia of each moving
+//! link, including all links fixed to it and the tool, goes into the `<inertial>` of that link; the fixed links
+//! lose theirs.
 
 use crate::description::Description;
 use crate::error::{ModelError, Reporter};
@@ -18,31 +18,31 @@ const URDF: &str = "arm.urdf";
 /// Name of the TOML.
 const TOML: &str = "arm.toml";
 
-/// What replaces the model of a description.
+/// The model that replaces the model of a description.
 #[derive(Clone, Copy, Debug)]
-pub struct Replacement<'a, const N: usize> {
-    /// Masses, inertias and rotors; kinematics must be the description's.
+pub struct IdentifiedModel<'a, const N: usize> {
+    /// Masses, inertias and rotors; the kinematics must equal those of the description.
     pub arm: &'a Arm<N>,
     /// Friction of each joint.
     pub friction: &'a [Friction; N],
-    /// Torque ripple of each motor; `None` keeps the description's.
+    /// Torque ripple of each motor; `None` keeps the ripple of the description.
     pub ripple: Option<&'a [RippleTable; N]>,
-    /// Where the numbers come from, for the `source` of the TOML.
+    /// Origin of the numbers, for `source` in the TOML.
     pub source: &'a str,
 }
 
 impl Description {
-    /// The same arm with another model.
+    /// Returns the same arm with another model.
     ///
     /// # Errors
-    /// [`ModelError::JointCount`]; whatever is wrong with the new texts.
+    /// [`ModelError::JointCount`]; any [`ModelError`] of the edited texts.
     pub fn with_model<const N: usize>(
         &self,
-        model: &Replacement<'_, N>,
+        model: &IdentifiedModel<'_, N>,
     ) -> Result<Description, ModelError> {
         self.expect_dof(N)?;
         let bodies: [Body; N] = core::array::from_fn(|i| {
-            model.arm.body(i).seen_from(&Pose {
+            model.arm.body(i).expressed_in(&Pose {
                 rotation: model.arm.link_from_joint(i),
                 ..Pose::IDENTITY
             })
@@ -50,34 +50,33 @@ impl Description {
         Description::from_text(&self.toml_with(model)?, &self.urdf_with(&bodies)?)
     }
 
-    /// Writes `arm.toml` and `arm.urdf` into a folder, made if need be; [`Description::load`] reads
-    /// them again. Older files of these names are replaced.
+    /// Writes `arm.toml` and `arm.urdf` into a folder, which it creates if necessary; [`Description::load`] reads
+    /// them. Existing files of these names are replaced.
     ///
     /// # Errors
-    /// [`ModelError::Write`], before anything is written where a device, FIFO, socket or folder has one of the
-    /// names.
+    /// [`ModelError::Write`]; nothing is written if a device, FIFO, socket or folder has one of the names.
     pub fn save(&self, folder: &Path) -> Result<(), ModelError> {
-        let refused = |path: &Path, error| ModelError::Write {
+        let write_error = |path: &Path, error| ModelError::Write {
             file: path.display().to_string(),
             error,
         };
         let files = [(URDF, self.urdf()), (TOML, &self.toml_named(URDF)?)];
         let files = files.map(|(name, text)| (folder.join(name), text));
-        // Both before either is written: half an arm is none.
+        // Check both files before writing either, so that no incomplete arm is left.
         for (path, _) in &files {
-            supple_files::check_output(path).map_err(|error| refused(path, error))?;
+            supple_files::check_output(path).map_err(|error| write_error(path, error))?;
         }
-        std::fs::create_dir_all(folder).map_err(|error| refused(folder, error))?;
+        std::fs::create_dir_all(folder).map_err(|error| write_error(folder, error))?;
         files.iter().try_for_each(|(path, text)| {
-            let written = supple_files::write_whole(path, text.as_bytes());
-            written.map_err(|error| refused(path, error))
+            let written = supple_files::write_atomic(path, text.as_bytes());
+            written.map_err(|error| write_error(path, error))
         })
     }
 
     fn urdf_with(&self, bodies: &[Body]) -> Result<String, ModelError> {
         let text = self.urdf();
         let document = Document::parse(text).map_err(|error| syntax(URDF, error.to_string()))?;
-        // What each link is to have: the lumped body, or none because it rides on another.
+        // New inertia of each link: the lumped body, or none if the link is fixed to another.
         let mut wanted: BTreeMap<&str, Option<&Body>> = BTreeMap::new();
         let mut seen = vec![false; bodies.len()];
         for placed in &self.chain.links {
@@ -106,7 +105,10 @@ impl Description {
         Ok(edited)
     }
 
-    fn toml_with<const N: usize>(&self, model: &Replacement<'_, N>) -> Result<String, ModelError> {
+    fn toml_with<const N: usize>(
+        &self,
+        model: &IdentifiedModel<'_, N>,
+    ) -> Result<String, ModelError> {
         let mut document = self.document()?;
         document["urdf"] = value(URDF);
         document["source"] = value(model.source);
@@ -202,7 +204,7 @@ fn syntax(file: &str, message: String) -> ModelError {
     }
 }
 
-/// Sets a key; a comment before it spoke of the value that goes.
+/// Sets a key and removes the comment before it, which described the old value.
 fn put(table: &mut Table, key: &str, new: Value) {
     table[key] = value(new);
     if let Some(mut key) = table.key_mut(key) {
@@ -248,7 +250,7 @@ fn edit(
     }
 }
 
-/// Debug prints numbers with the digits that read back as the same number.
+/// Debug format prints numbers with enough digits to read back the same number.
 fn inertial(body: &Body) -> String {
     let (c, i) = (&body.com_m, &body.inertia_kg_m2);
     format!(

@@ -1,16 +1,16 @@
-//! URDF and TOML into an arm that cannot be wrong.
+//! Reads URDF and TOML into a validated arm.
 //!
-//! A [`Description`] is read from two files: a URDF, which says where the joints are and what the
-//! links weigh, and a TOML, which says everything else a controller needs. What is not physical, not
-//! finite, not connected or not meant is refused with file, element, value and remedy
-//! ([`ModelError`]); what a URDF parser lets pass in silence is refused here.
+//! A [`Description`] is read from two files: a URDF with the joints and the inertial data of the links, and a
+//! TOML with all other data that a controller needs. Unphysical, non-finite, unconnected and misspelt data are
+//! rejected with file, element, value and remedy ([`ModelError`]), including errors that URDF parsers silently
+//! ignore.
 //!
-//! It knows no simulator and no controller: it gives [`supple_core::Arm`] and
-//! [`supple_core::Config`], and the few numbers that a plant and a drawing need besides.
+//! The crate depends on no simulator or controller: it provides [`supple_core::Arm`], [`supple_core::Config`]
+//! and the few extra numbers for simulation and drawing.
 
 mod assets;
-mod borders;
 mod bounds;
+mod const_generic;
 mod description;
 mod error;
 mod identified;
@@ -18,16 +18,16 @@ pub mod paper;
 mod resolve;
 pub mod settings;
 mod shapes;
-mod sized;
 mod tree;
 pub mod unlimited;
+mod workspace;
 mod xml;
 
 pub use assets::assets;
+pub use const_generic::Parts;
 pub use description::Description;
 pub use error::{Finding, ModelError};
-pub use identified::Replacement;
+pub use identified::IdentifiedModel;
 pub use resolve::{Motors, Tool};
 pub use settings::{Settings, schema_json};
 pub use shapes::{Capsule, Transform};
-pub use sized::Parts;

@@ -12,18 +12,17 @@
 //! tip = (r cos q1, r sin q1, l2 s2 + l3 s23),    r = l2 c2 + l3 c23
 //! ```
 //!
-//! Two arms go by the paper's name. [`Parameters::PUBLISHED`] is what the paper prints: good for the
-//! closed form, for tests, and to compare an identification with (through [`Parameters::base`] or
-//! through torques, never entry by entry). The asset `paper3` is a physical arm near it: it is what a
-//! simulator moves.
+//! There are two versions of the paper's arm. [`Parameters::PUBLISHED`] is the printed set: for the closed form,
+//! for tests, and for comparison with an identification (through [`Parameters::base`] or through torques,
+//! never entry by entry). The asset `paper3` is the physically consistent arm closest to it, for the simulator.
 //!
-//! Three observations on the printed set; they say nothing about how it came about.
+//! Three observations on the printed parameters:
 //! - `Iz1 = Ix2 - Iy2' = Ix3 - Iy3' = 0.0917` to the last digit: the mark of a least-norm solution, for
 //!   columns in which `Iy2'` and `Iy3'` enter with the opposite sign to the others. `sin^2 + cos^2 = 1`
 //!   ties the columns, so that ten combinations of the twelve can be identified.
-//! - Link 3 is not a body: about its centre of mass, `Ix3` exceeds `Iy3 + Iz3`, and nothing that the
-//!   torques leave open repairs that. Link 2 can be one.
-//! - The mass matrix is positive definite all the same, over the whole workspace.
+//! - Link 3 is physically inconsistent: about its centre of mass, `Ix3` exceeds `Iy3 + Iz3`, and no change of
+//!   the unidentifiable parameters can repair it. Link 2 can be consistent.
+//! - The mass matrix is nevertheless positive definite over the whole workspace.
 
 use supple_core::math::{Matrix3, Vector, Vector3, sin_cos};
 use supple_core::{Body, Friction, Joint, Pose};
@@ -109,7 +108,7 @@ impl Parameters {
         "Iz1", "Ix2", "Iz2'", "Iy2'", "m2r2", "m3r3", "Ix3", "Iy3'", "Iz3'", "V1", "V2", "V3",
     ];
 
-    /// The ten combinations that torques can tell apart, with `m3` and `S` known, in the order of
+    /// The ten combinations that torques can identify, with `m3` and `S` known, in the order of
     /// [`Parameters::BASE_NAMES`].
     pub fn base(&self) -> [f64; 10] {
         let [v1, v2, v3] = self.viscous_nm_s_per_rad;
@@ -141,7 +140,7 @@ impl Parameters {
         "V3",
     ];
 
-    /// Friction of each joint, the continuous (3.2) with the default band.
+    /// Friction of each joint, the continuous form (3.2) with the default band.
     pub fn friction(&self) -> [Friction; 3] {
         core::array::from_fn(|i| {
             Friction::coulomb(self.viscous_nm_s_per_rad[i], self.coulomb_nm[i])
@@ -201,9 +200,9 @@ impl Parameters {
     }
 
     /// Bodies that have these parameters, in the paper's frames, ready for [`supple_core::Arm::new`]
-    /// with the tip at `(l3, 0, 0)`. What the parameters leave open is filled in: link 1 is a ball of
-    /// `m1_kg` about the origin, and all centres of mass lie on x. They are not checked here: for the
-    /// printed set, `Arm::new` refuses link 3.
+    /// with the tip at `(l3, 0, 0)`. Data that the parameters do not determine are chosen: link 1 is a ball of
+    /// `m1_kg` about the origin, and all centres of mass lie on x. The bodies are not checked here: for the
+    /// printed set, `Arm::new` rejects link 3.
     pub fn joints(&self, m1_kg: f64, m2_kg: f64) -> [Joint; 3] {
         let upright = Pose::from_xyz_rpy([0.0; 3], [core::f64::consts::FRAC_PI_2, 0.0, 0.0]);
         let elbow = Pose::from_translation(Vector3::new(self.l2_m, 0.0, 0.0));

@@ -1,8 +1,7 @@
-//! The TOML beside a URDF, as it is written: everything an arm's controller needs that a URDF has no
-//! place for.
+//! The TOML beside a URDF: controller data that URDF cannot hold.
 //!
-//! Every key carries its unit; unknown keys are refused; what may be left out says its default. The
-//! JSON schema of these types is `assets/arm.schema.json`.
+//! Key names contain units; unknown keys are rejected; optional keys document their defaults. The JSON
+//! schema of these types is `assets/arm.schema.json`.
 
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -19,13 +18,13 @@ pub struct Settings {
     /// URDF link whose origin is the tip: the centre of the hemispherical cap. The arm is the chain of
     /// movable joints from the root link to this one.
     pub tip_frame: String,
-    /// Where the numbers of this file come from, unless a section says otherwise.
+    /// Source of the numbers of this file, unless a section states another.
     pub source: Option<String>,
-    /// Acceleration of free fall in root link axes (m/s^2). Default (0, 0, -9.81).
+    /// Gravitational acceleration in root link axes (m/s^2). Default (0, 0, -9.81).
     #[serde(default = "default::gravity_m_per_s2")]
     pub gravity_m_per_s2: [f64; 3],
-    /// Links that have mass but an inertia of zeros are taken for solid balls of this radius (m). Default:
-    /// they are refused.
+    /// Links with mass and zero inertia get the inertia of a solid ball of this radius (m). Default: such links
+    /// are rejected.
     pub point_mass_radius_m: Option<f64>,
     /// Cycle period (s). Default 0.001.
     #[serde(default = "default::period_s")]
@@ -33,14 +32,14 @@ pub struct Settings {
     /// Bandwidth of the velocity estimator (rad/s). Default 180.
     #[serde(default = "default::estimator_rad_per_s")]
     pub estimator_rad_per_s: f64,
-    /// Time over which a change of mode blends the torque (s). Default 0.2.
+    /// Duration of the torque blend after a change of mode (s). Default 0.2.
     #[serde(default = "default::handover_s")]
     pub handover_s: f64,
     /// Pose that the arm starts from, one angle per moving joint (rad). Default: the middle of each
     /// joint's range, held joints at the angle they are held at.
     pub home_rad: Option<Vec<f64>>,
-    /// Movable joints of the URDF that are frozen, each at an angle (rad); their links become part of
-    /// the link that carries them. Movable joints off the chain to the tip must be listed here.
+    /// Movable joints of the URDF that are fixed, each at an angle (rad); their child links become part of
+    /// the parent link. Movable joints outside the chain to the tip must be listed here.
     #[serde(default)]
     pub fixed_joints_rad: BTreeMap<String, f64>,
     /// Settings per moving joint, in any order. A joint without an entry has all defaults.
@@ -48,25 +47,25 @@ pub struct Settings {
     pub joints: Vec<JointSettings>,
     /// Motors and transmission. Default: one motor per joint, ratio 1, no quantisation.
     pub motors: Option<MotorSettings>,
-    /// Limits that are not one joint's.
+    /// Limits that apply to the whole arm.
     #[serde(default)]
     pub limits: LimitSettings,
-    /// External forces that end the motion.
+    /// Collision thresholds.
     #[serde(default)]
     pub collision: CollisionSettings,
-    /// What is believed of measurements and model.
+    /// Plausibility checks of measurements and model.
     #[serde(default)]
-    pub plausible: PlausibleSettings,
-    /// Where the tip may be. Default: anywhere.
+    pub plausible: PlausibilitySettings,
+    /// Allowed workspace of the tip. Default: unlimited.
     #[serde(default)]
     pub workspace: WorkspaceSettings,
     /// The impedance law.
     #[serde(default)]
     pub law: LawSettings,
-    /// The contact latch.
+    /// Contact detection (contact latch).
     #[serde(default)]
     pub latch: LatchSettings,
-    /// What is mounted at the tip. Default: nothing.
+    /// Tool at the tip. Default: none.
     pub tool: Option<ToolSettings>,
 }
 
@@ -76,27 +75,27 @@ pub struct Settings {
 pub struct JointSettings {
     /// Name of the joint in the URDF.
     pub name: String,
-    /// Where the numbers of this joint come from.
+    /// Source of the numbers of this joint.
     pub source: Option<String>,
-    /// Holds the joint at an angle while the impedance law acts on the others. Default: not held, the
-    /// law acts on this joint too.
+    /// Holds the joint at an angle while the impedance law controls the others. Default: not held, the
+    /// law controls this joint too.
     pub held: Option<HeldSettings>,
     /// Rotor inertia reflected to the joint (kg m^2). Default 0.
     #[serde(default)]
     pub armature_kg_m2: f64,
     /// Friction. Default: the URDF's `<dynamics>` (damping as viscous, friction as Coulomb), or none.
     pub friction: Option<FrictionSettings>,
-    /// Lower hard stop (rad); may narrow the URDF's. Default: the URDF's; -2 pi for a `continuous`
-    /// joint.
+    /// Lower hard stop (rad); may narrow the range of the URDF. Default: `lower` of the URDF; -2 pi for a
+    /// `continuous` joint.
     pub position_lower_rad: Option<f64>,
-    /// Upper hard stop (rad); may narrow the URDF's. Default: the URDF's; 2 pi for a `continuous`
-    /// joint.
+    /// Upper hard stop (rad); may narrow the range of the URDF. Default: `upper` of the URDF; 2 pi for a
+    /// `continuous` joint.
     pub position_upper_rad: Option<f64>,
-    /// Joint speed that faults (rad/s). Default: the URDF's `velocity`.
+    /// Joint speed above which the controller faults (rad/s). Default: `velocity` of the URDF.
     pub speed_rad_per_s: Option<f64>,
-    /// Joint torque limit (N m). Default: the URDF's `effort`.
+    /// Joint torque limit (N m). Default: `effort` of the URDF.
     pub torque_nm: Option<f64>,
-    /// Greatest change of joint torque (N m/s). Default 1000.
+    /// Maximum rate of change of the joint torque (N m/s). Default 1000.
     #[serde(default = "default::torque_rate_nm_per_s")]
     pub torque_rate_nm_per_s: f64,
     /// Stiffness in the soft zone before each hard stop (N m/rad). Default 100.
@@ -111,13 +110,14 @@ pub struct JointSettings {
     /// Derivative gain of the move mode (N m s/rad). Default 5.
     #[serde(default = "default::move_damping_nm_s_per_rad")]
     pub move_damping_nm_s_per_rad: f64,
-    /// Greatest acceleration of a move (rad/s^2). Default 20.
+    /// Maximum acceleration of a move (rad/s^2). Default 20.
     #[serde(default = "default::acceleration_rad_per_s2")]
     pub acceleration_rad_per_s2: f64,
-    /// Greatest jerk of a move (rad/s^3). Default 1000.
+    /// Maximum jerk of a move (rad/s^3). Default 1000.
     #[serde(default = "default::jerk_rad_per_s3")]
     pub jerk_rad_per_s3: f64,
-    /// Observed external torque that ends the motion (N m). Default: 0.3 of `torque_nm`.
+    /// Collision threshold: observed external torque of the joint at which the motion stops (N m). Default: 0.3
+    /// times `torque_nm`.
     pub collision_torque_nm: Option<f64>,
     /// Damping of gravity hold (N m s/rad). Default 1.
     #[serde(default = "default::hold_damping_nm_s_per_rad")]
@@ -136,8 +136,8 @@ pub struct HeldSettings {
     pub damping_nm_s_per_rad: f64,
 }
 
-/// Friction of one joint: viscous and Coulomb, made continuous over a band, with an optional Stribeck
-/// dip and offset.
+/// Friction of one joint: viscous and Coulomb, continuous over a velocity band, with an optional Stribeck
+/// effect and offset.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FrictionSettings {
@@ -147,10 +147,10 @@ pub struct FrictionSettings {
     /// Coulomb friction in steady sliding (N m), zero or more. Default 0.
     #[serde(default)]
     pub coulomb_nm: f64,
-    /// Torque that the Stribeck curve tends to at rest (N m), at least `coulomb_nm`. Default:
-    /// `coulomb_nm`, no dip.
+    /// Limit of the Stribeck curve at zero speed (N m), at least `coulomb_nm`. Default: `coulomb_nm`, no
+    /// Stribeck effect.
     pub breakaway_nm: Option<f64>,
-    /// Speed over which the dip fades (rad/s), positive. Default 0.05.
+    /// Stribeck speed, over which the breakaway torque decays (rad/s), positive. Default 0.05.
     #[serde(default = "default::stribeck_rad_per_s")]
     pub stribeck_rad_per_s: f64,
     /// Torque that does not depend on the velocity (N m). Default 0.
@@ -165,22 +165,22 @@ pub struct FrictionSettings {
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MotorSettings {
-    /// Where these numbers come from.
+    /// Source of these numbers.
     pub source: Option<String>,
     /// `m2jp`, row by row: joint angles from motor angles, `q = m2jp p`. Motor torques are
     /// `m2jp^T tau`. Default: identity.
     pub joint_from_motor: Option<Vec<Vec<f64>>>,
     /// Torque limit of each motor, at the motor (N m).
     pub torque_nm: Vec<f64>,
-    /// Least step of each motor's torque command, at the motor (N m), positive. Default: continuous.
+    /// Resolution of each motor's torque command, at the motor (N m), positive. Default: continuous.
     pub torque_quantum_nm: Option<Vec<f64>>,
-    /// Torque of each motor per its speed when its terminals are shorted, `Kt^2 / R` (N m s/rad), positive: what
-    /// brakes it in idle. Default: what stops the rotor alone with a time constant of 2 ms.
+    /// Damping of each motor with shorted terminals, `Kt^2 / R` (N m s/rad), positive: brakes the motor in idle.
+    /// Default: the value that stops the rotor alone with a time constant of 2 ms.
     pub braking_nm_s_per_rad: Option<Vec<f64>>,
     /// Encoder counts per motor revolution, positive. Default: continuous.
     pub counts_per_revolution: Option<u32>,
-    /// Torque ripple that the motors are known to have, fed forward so that it cancels; at most 6
-    /// harmonics a motor. Default: none.
+    /// Known torque ripple of the motors, cancelled by feed-forward; at most 6 harmonics per motor. Default:
+    /// none.
     #[serde(default)]
     pub ripple: Vec<RippleSettings>,
 }
@@ -191,7 +191,7 @@ pub struct MotorSettings {
 pub struct RippleSettings {
     /// Motor, counted from 0.
     pub motor: usize,
-    /// Periods in a revolution of the motor, 1 or more.
+    /// Periods per revolution of the motor, 1 or more.
     pub harmonic: u32,
     /// Amplitude of the sine, at the motor (N m).
     pub sine_nm: f64,
@@ -199,92 +199,96 @@ pub struct RippleSettings {
     pub cosine_nm: f64,
 }
 
-/// Limits that are not one joint's.
+/// Limits that apply to the whole arm.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct LimitSettings {
-    /// Where these numbers come from.
+    /// Source of these numbers.
     pub source: Option<String>,
-    /// Width of the zone before each hard stop in which a spring-damper pushes back (rad). Default 0.1.
+    /// Width of the zone before each hard stop in which a spring-damper pushes the joint back (rad). Default 0.1.
     pub soft_zone_rad: f64,
-    /// Tip speed that faults (m/s). Default 1.
+    /// Tip speed above which the controller faults (m/s). Default 1.
     pub tip_speed_m_per_s: f64,
-    /// Greatest acceleration of a tip trajectory (m/s^2). Default 10.
+    /// Maximum acceleration of a tip trajectory (m/s^2). Default 10.
     pub tip_acceleration_m_per_s2: f64,
-    /// Distance of the tip from its reference that faults while tracking or probing (m). Default 0.25.
+    /// Distance of the tip from its reference above which the controller faults while tracking or probing (m).
+    /// Default 0.25.
     pub tracking_error_m: f64,
-    /// Distance of a joint from where its own loop wants it that faults, on moves and where it is held
-    /// (rad). Default 0.2.
+    /// Joint position error above which the controller faults, during moves and for held joints (rad). Default
+    /// 0.2.
     pub joint_tracking_error_rad: f64,
-    /// Cycles without a new state that are tolerated. Default 1: a single lost encoder reply.
+    /// Maximum number of cycles without a new state. Default 1: a single lost encoder reply.
     pub stale_cycles: u32,
-    /// Greatest distance of the tip from the start of a trajectory that is asked for (m). Default 0.02.
+    /// Maximum distance of the tip from the start of a requested trajectory (m). Default 0.02.
     pub start_error_m: f64,
-    /// Greatest stiffness that may be asked for (N/m). Default 1000.
+    /// Maximum stiffness that a request may set (N/m). Default 1000.
     pub greatest_stiffness_n_per_m: f64,
-    /// Greatest damping that may be asked for (N s/m). Default 100.
+    /// Maximum damping that a request may set (N s/m). Default 100.
     pub greatest_damping_n_s_per_m: f64,
 }
 
-/// External forces that end the motion: observed from motion and torques, without a sensor. The joints' own
-/// thresholds are `collision_torque_nm` of each.
+/// Collision thresholds of external forces, observed from motion and torques without a sensor. The threshold of
+/// each joint is its `collision_torque_nm`.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct CollisionSettings {
-    /// Where these numbers come from.
+    /// Source of these numbers.
     pub source: Option<String>,
-    /// Observed force on the tip (N). Default 60.
+    /// Observed force on the tip at which the motion stops (N). Default 60.
     pub tip_force_n: f64,
-    /// Share of all thresholds that counts in the modes with stiff joint loops: move, excite, breakaway.
+    /// Factor on all collision thresholds in the modes with stiff joint loops: move, excite, breakaway.
     /// Default 0.5.
     pub move_share: f64,
 }
 
-/// How far measurements, commands and model may be apart before one of them is taken to be wrong.
+/// Limits of disagreement between measurements, commands and model; beyond them the controller faults.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-pub struct PlausibleSettings {
-    /// Where these numbers come from.
+pub struct PlausibilitySettings {
+    /// Source of these numbers.
     pub source: Option<String>,
-    /// Lost replies of an encoder that are tolerated, where each is made up for by eight that came. Default 3.
+    /// Maximum balance of lost encoder replies: each lost reply adds one, eight received replies remove one.
+    /// Default 3.
     pub lost_replies: u32,
-    /// Travel of a joint's reference in which its encoder may say the very same angle (rad). Default 0.05.
-    pub stuck_rad: f64,
-    /// Share of a joint's torque limit by which it may be driven one way while it gathers speed the other way.
+    /// Travel of the joint reference during which the encoder may stay constant before it counts as stuck (rad).
     /// Default 0.05.
+    pub stuck_rad: f64,
+    /// Torque that may oppose the joint's acceleration before the controller faults, as a fraction of the joint's
+    /// torque limit. Default 0.05.
     pub against_share: f64,
-    /// Force on the tip along gravity, in gravity hold and where a move has ended, that is a load which the model
-    /// does not have (N). Default 5.
+    /// Force along gravity at the tip, in gravity hold or at the end of a move, above which the controller reports
+    /// an unmodelled load (N). Default 5.
     pub load_n: f64,
 }
 
-/// Where the tip may be, base axes. Before every border is a margin in which the tip is pushed back.
+/// Allowed workspace of the tip, base axes. A spring-damper pushes the tip back within a margin before each
+/// boundary.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct WorkspaceSettings {
-    /// Where these numbers come from.
+    /// Source of these numbers.
     pub source: Option<String>,
     /// Width of the margin (m). Default 0.05.
     pub margin_m: f64,
     /// Stiffness in the margin (N/m). Default 400.
     pub stiffness_n_per_m: f64,
-    /// Damping in the margin, and of a tip that is too fast for its zone (N s/m). Default 20.
+    /// Damping in the margin, and of a tip that exceeds the speed limit of its zone (N s/m). Default 20.
     pub damping_n_s_per_m: f64,
-    /// Planes that the tip does not cross; at most 8 borders in all, a box to stay in counts six.
+    /// Planes that the tip must not cross. At most 8 boundaries in total; a `keep_in` box counts as six.
     pub wall: Vec<WallSettings>,
-    /// A box that the tip stays in.
+    /// Box that the tip must not leave.
     pub keep_in: Option<BoxSettings>,
-    /// Boxes that the tip stays out of.
+    /// Boxes that the tip must not enter.
     pub keep_out: Vec<BoxSettings>,
-    /// Boxes with limits of their own; at most 8.
+    /// Boxes with additional limits; at most 8.
     pub zone: Vec<ZoneSettings>,
 }
 
-/// A plane: the tip stays where `normal . x <= offset_m`.
+/// A plane: the tip must satisfy `normal . x <= offset_m`.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WallSettings {
-    /// Points out of the allowed side; any length but zero.
+    /// Normal that points away from the allowed side; any length but zero.
     pub normal: [f64; 3],
     /// Distance from the base's origin along the normal (m).
     pub offset_m: f64,
@@ -294,35 +298,35 @@ pub struct WallSettings {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BoxSettings {
-    /// Corner of the least coordinates (m).
+    /// Corner with the smallest coordinates (m).
     pub lower_m: [f64; 3],
-    /// Corner of the greatest coordinates (m).
+    /// Corner with the largest coordinates (m).
     pub upper_m: [f64; 3],
 }
 
-/// A box with limits of its own.
+/// A box with additional limits, edges parallel to the base axes.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ZoneSettings {
-    /// Corner of the least coordinates (m).
+    /// Corner with the smallest coordinates (m).
     pub lower_m: [f64; 3],
-    /// Corner of the greatest coordinates (m).
+    /// Corner with the largest coordinates (m).
     pub upper_m: [f64; 3],
-    /// Tip speed that faults (m/s). Default: no other than everywhere.
+    /// Tip speed in the box above which the controller faults (m/s). Default: no additional limit.
     pub tip_speed_m_per_s: Option<f64>,
-    /// Observed force on the tip that faults; the law's spring pushes with no more (N). Default: no other than
-    /// everywhere.
+    /// Maximum tip force in the box (N): the spring of the law is limited to it, and a larger observed force is a
+    /// fault. Default: no additional limit.
     pub tip_force_n: Option<f64>,
 }
 
-/// Velocity at which the friction feed-forward is taken.
+/// Velocity at which the friction feed-forward is evaluated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum FrictionVelocity {
-    /// Joint velocity of the reference: the error sees a dissipative difference.
+    /// Joint velocity of the reference; the friction mismatch then acts dissipatively on the error.
     #[default]
     Reference,
-    /// Estimated joint velocity: cancels the damping of the arm and runs away at low gains.
+    /// Estimated joint velocity; cancels the damping of the arm and is unstable at low gains.
     Measured,
 }
 
@@ -330,56 +334,55 @@ pub enum FrictionVelocity {
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct LawSettings {
-    /// Where these numbers come from.
+    /// Source of these numbers.
     pub source: Option<String>,
     /// `K` along the base axes (N/m), zero or more. Default 5 on each.
     pub stiffness_n_per_m: [f64; 3],
     /// `B` along the base axes (N s/m), zero or more. Default 1.5 on each.
     pub damping_n_s_per_m: [f64; 3],
-    /// `M`, chosen, base axes (kg), exactly symmetric, positive definite; needs a force sensor. Default: the
-    /// arm's own.
+    /// Desired inertia `M`, base axes (kg), exactly symmetric, positive definite; needs a force sensor. Default:
+    /// the inertia of the arm.
     pub apparent_inertia_kg: Option<[[f64; 3]; 3]>,
     /// Velocity in the friction feed-forward. Default `reference`.
     pub friction_velocity: FrictionVelocity,
     /// Adds `M Xo''`. Default true.
     pub inertial_feedforward: bool,
-    /// Damping of motions that do not move the tip, where more than three joints are active
-    /// (N m s/rad), zero or more. Default 2.
+    /// Damping of null-space motion if more than three joints are active (N m s/rad), zero or more. Default 2.
     pub nullspace_damping_nm_s_per_rad: f64,
 }
 
-/// The contact latch: takes the friction feed-forward away when the tip has met something.
+/// Contact detection (contact latch): fades out the friction feed-forward while the tip is in contact.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct LatchSettings {
-    /// Where these numbers come from.
+    /// Source of these numbers.
     pub source: Option<String>,
     /// Fades the friction feed-forward on contact. Default true.
     pub fade: bool,
     /// Bandwidth of the momentum observer (rad/s). Default 40.
     pub observer_rad_per_s: f64,
-    /// Force against the reference's motion that latches where friction is not in doubt (N). Default 3.
+    /// Contact threshold of the force that opposes the motion of the reference, without the allowance for friction
+    /// uncertainty (N). Default 3.
     pub threshold_n: f64,
     /// Relative error of the friction model in steady sliding. Default 0.05.
     pub friction_error: f64,
-    /// Time after a reversal or start of the reference in which the threshold is doubled (s).
-    /// Default 0.2.
+    /// Time after a reversal or start of the reference during which the threshold is doubled (s). Default 0.2.
     pub reversal_s: f64,
-    /// Share of the dry friction feed-forward that stays on in contact. Default 0.
+    /// Fraction of the dry-friction feed-forward that remains in contact. Default 0.
     pub contact_share: f64,
-    /// Time for the feed-forward to fade to nothing (s). Default 0.01.
+    /// Time for the feed-forward to fade out (s). Default 0.01.
     pub fade_s: f64,
-    /// Time for it to come back after release (s). Default 0.05.
+    /// Time for the feed-forward to return to full after release (s). Default 0.05.
     pub restore_s: f64,
 }
 
-/// What is mounted at the tip, in tip frame coordinates: force sensor and cap.
+/// Tool at the tip, in tip frame coordinates: force sensor and cap.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ToolSettings {
-    /// Where these numbers come from.
+    /// Source of these numbers.
     pub source: Option<String>,
-    /// Mass (kg), positive. Default: none, the URDF's last link has it.
+    /// Mass (kg), positive. Default: none; the last link of the URDF includes it.
     pub mass_kg: Option<f64>,
     /// Centre of mass in the tip frame (m). Default: the tip.
     pub com_m: Option<[f64; 3]>,
@@ -417,7 +420,7 @@ impl Default for CollisionSettings {
     }
 }
 
-impl Default for PlausibleSettings {
+impl Default for PlausibilitySettings {
     fn default() -> Self {
         Self {
             source: None,

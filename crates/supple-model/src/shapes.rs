@@ -1,9 +1,7 @@
-//! Where the links are and what they look like, for drawing and for transform trees. Physics takes
-//! nothing from here.
+//! Poses and shapes of the links, for drawing and for transform trees. Not used by the dynamics.
 //!
-//! Shapes are the `<visual>` primitives of the URDF: a cylinder or a capsule is a capsule of its axis,
-//! a sphere one of no length. Boxes and meshes have no capsule and are left to viewers that read the
-//! URDF themselves.
+//! Shapes are the `<visual>` primitives of the URDF: a cylinder or a capsule becomes a capsule along its axis,
+//! a sphere one of zero length. Boxes and meshes have no capsule; viewers read them from the URDF.
 
 use crate::tree::Chain;
 use std::collections::BTreeMap;
@@ -14,7 +12,7 @@ use urdf_rs::{Geometry, Robot};
 /// A capsule fixed to a link.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Capsule {
-    /// Moving joint whose link carries it, counted from the base; none for the base itself.
+    /// Moving joint of the link that carries it, counted from the base; `None` for the base itself.
     pub joint: Option<usize>,
     /// Ends of its axis in that link's frame \[m\].
     pub ends_m: [Vector3<f64>; 2],
@@ -22,7 +20,7 @@ pub struct Capsule {
     pub radius_m: f64,
 }
 
-/// Where a URDF link is.
+/// Pose of a URDF link.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Transform<'a> {
     /// Name of the parent link.

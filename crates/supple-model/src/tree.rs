@@ -1,9 +1,9 @@
 //! The links and joints of a URDF as a tree, and the tree as a chain of moving bodies.
 //!
-//! The arm is the chain of movable joints from the root link to the tip frame. Links that cannot move
-//! against the link they hang on, by a `fixed` joint or because the TOML fixes their joint at an
-//! angle, are lumped into it: masses, first moments and inertias add, frames are composed. A branch
-//! that moves and does not carry the tip is refused, for nothing would be known of its angle.
+//! The arm is the chain of movable joints from the root link to the tip frame. Links that are fixed to
+//! another link, by a `fixed` joint or because the TOML fixes their joint at an angle, are lumped into it:
+//! masses, first moments and inertias add, frames are composed. A movable branch that does not carry the tip
+//! is rejected, because its angle would be unknown.
 
 use crate::error::{ModelError, Reporter};
 use std::collections::BTreeMap;
@@ -13,23 +13,23 @@ use urdf_rs::{JointType, Robot};
 
 /// A movable joint of the chain, with the link it moves.
 #[derive(Clone, Debug)]
-pub(crate) struct Moving {
+pub(crate) struct MovingJoint {
     /// Index in the URDF's list of joints.
     pub joint: usize,
     /// Frame of the link in the frame of the link before, at zero angle.
     pub parent_from_link: Pose,
     /// Unit axis in the link frame.
     pub axis: Vector3<f64>,
-    /// The link with all that is lumped into it, in the link frame.
+    /// Inertia of the link and of all links lumped into it, in the link frame.
     pub body: Body,
 }
 
-/// A URDF link, and where it is.
+/// A URDF link with its frame.
 #[derive(Clone, Debug)]
-pub(crate) struct Placed {
+pub(crate) struct PlacedLink {
     /// Index in the URDF's list of links.
     pub link: usize,
-    /// Moving joint whose link it belongs to, counted along the chain; none for the base.
+    /// Moving joint whose link it belongs to, counted along the chain; `None` for the base.
     pub carrier: Option<usize>,
     /// Its frame in the carrier's link frame.
     pub carrier_from_link: Pose,
@@ -38,8 +38,8 @@ pub(crate) struct Placed {
 /// The chain from root to tip.
 #[derive(Clone, Debug)]
 pub(crate) struct Chain {
-    pub moving: Vec<Moving>,
-    pub links: Vec<Placed>,
+    pub moving: Vec<MovingJoint>,
+    pub links: Vec<PlacedLink>,
     pub last_link_from_tip: Pose,
 }
 
@@ -69,14 +69,14 @@ pub(crate) fn chain(
         next: None,
         links: Vec::new(),
     };
-    let mut moving: Vec<Moving> = Vec::new();
+    let mut moving: Vec<MovingJoint> = Vec::new();
     let (mut root, mut carrier) = (tree.root, None);
     loop {
         builder.body = None;
         builder.next = None;
         builder.lump(root, carrier)?;
         if let Some(index) = carrier {
-            let joint: &mut Moving = &mut moving[index];
+            let joint: &mut MovingJoint = &mut moving[index];
             let Some(body) = builder.body else {
                 return Err(report.invalid(
                     format!("link `{}`", robot.links[root].name),
@@ -94,7 +94,7 @@ pub(crate) fn chain(
         let Some((joint, parent_from_link)) = builder.next else {
             break;
         };
-        moving.push(Moving {
+        moving.push(MovingJoint {
             joint,
             parent_from_link,
             axis: tree.axis(joint)?,
@@ -115,8 +115,8 @@ pub(crate) fn chain(
     })
 }
 
-/// Gives links with mass and an inertia of zeros that of a solid ball of `radius_m`.
-pub(crate) fn inflate(robot: &mut Robot, radius_m: f64) {
+/// Replaces the zero inertia of links with mass by that of a solid ball of `radius_m`.
+pub(crate) fn set_point_mass_inertia(robot: &mut Robot, radius_m: f64) {
     for link in &mut robot.links {
         let mass_kg = link.inertial.mass.value;
         let i = &mut link.inertial.inertia;
@@ -135,10 +135,10 @@ struct Tree<'a> {
     parent: Vec<usize>,
     /// Link index of each joint's child.
     child: Vec<usize>,
-    /// Joints that hang on each link.
-    below: Vec<Vec<usize>>,
-    /// Joint that carries each link.
-    above: Vec<Option<usize>>,
+    /// Child joints of each link.
+    child_joints: Vec<Vec<usize>>,
+    /// Parent joint of each link.
+    parent_joint: Vec<Option<usize>>,
 }
 
 impl<'a> Tree<'a> {
@@ -150,8 +150,8 @@ impl<'a> Tree<'a> {
             .zip(0..)
             .collect();
         let (mut parents, mut child) = (Vec::new(), Vec::new());
-        let mut below = vec![Vec::new(); robot.links.len()];
-        let mut above: Vec<Option<usize>> = vec![None; robot.links.len()];
+        let mut child_joints = vec![Vec::new(); robot.links.len()];
+        let mut parent_joint: Vec<Option<usize>> = vec![None; robot.links.len()];
         for (j, joint) in robot.joints.iter().enumerate() {
             let find = |role: &str, link: &str| {
                 index.get(link).copied().ok_or_else(|| {
@@ -165,7 +165,7 @@ impl<'a> Tree<'a> {
             };
             let parent = find("parent", &joint.parent.link)?;
             let own = find("child", &joint.child.link)?;
-            if let Some(other) = above[own] {
+            if let Some(other) = parent_joint[own] {
                 return Err(report.invalid(
                     format!("joint `{}` <child>", joint.name),
                     "a link may be the child of one joint only",
@@ -176,13 +176,13 @@ impl<'a> Tree<'a> {
                     "remove one of the joints: closed loops are not supported",
                 ));
             }
-            above[own] = Some(j);
-            below[parent].push(j);
+            parent_joint[own] = Some(j);
+            child_joints[parent].push(j);
             parents.push(parent);
             child.push(own);
         }
         let roots: Vec<usize> = (0..robot.links.len())
-            .filter(|l| above[*l].is_none())
+            .filter(|l| parent_joint[*l].is_none())
             .collect();
         let names = |links: &[usize]| {
             let quoted = links.iter().map(|l| format!("`{}`", robot.links[*l].name));
@@ -205,7 +205,7 @@ impl<'a> Tree<'a> {
             several => {
                 return Err(report.invalid(
                     format!("link `{}`", robot.links[several[1]].name),
-                    "all links must hang on one root",
+                    "all links must be connected to one root",
                     format!("{} roots: {}", several.len(), names(several)),
                     "connect it with a joint or remove it",
                 ));
@@ -217,14 +217,14 @@ impl<'a> Tree<'a> {
             root,
             parent: parents,
             child,
-            below,
-            above,
+            child_joints,
+            parent_joint,
         };
         let mut reached = vec![false; robot.links.len()];
         let mut open = vec![root];
         while let Some(link) = open.pop() {
             reached[link] = true;
-            open.extend(tree.below[link].iter().map(|j| tree.child[*j]));
+            open.extend(tree.child_joints[link].iter().map(|j| tree.child[*j]));
         }
         let lost: Vec<usize> = (0..reached.len()).filter(|l| !reached[*l]).collect();
         if !lost.is_empty() {
@@ -246,7 +246,7 @@ impl<'a> Tree<'a> {
     fn path_to(&self, tip: usize) -> Vec<usize> {
         let mut path = Vec::new();
         let mut link = tip;
-        while let Some(joint) = self.above[link] {
+        while let Some(joint) = self.parent_joint[link] {
             path.push(joint);
             link = self.parent[joint];
         }
@@ -254,8 +254,8 @@ impl<'a> Tree<'a> {
         path
     }
 
-    /// The unit axis of a movable joint. A URDF says that axes are of unit length; printed ones are
-    /// rounded, so any finite length above 1e-6 is scaled to 1.
+    /// Unit axis of a movable joint. The URDF format requires axes of unit length; published ones are rounded,
+    /// so any finite length above 1e-6 is scaled to 1.
     fn axis(&self, joint: usize) -> Result<Vector3<f64>, ModelError> {
         let joint = &self.robot.joints[joint];
         let axis = Vector3::from(joint.axis.xyz.0);
@@ -267,7 +267,7 @@ impl<'a> Tree<'a> {
             format!("joint `{}` <axis>", joint.name),
             "must have a length above 1e-6",
             format!("{:?}", joint.axis.xyz.0),
-            "give the direction that the joint turns about, such as xyz=\"0 0 1\"",
+            "give the direction of the joint's rotation axis, such as xyz=\"0 0 1\"",
         ))
     }
 
@@ -279,7 +279,7 @@ impl<'a> Tree<'a> {
             inertia: i,
         } = &link.inertial;
         let entries = [i.ixx, i.iyy, i.izz, i.ixy, i.ixz, i.iyz];
-        // What urdf-rs makes of a missing <inertial>; one that is there and all zero says the same.
+        // urdf-rs returns zeros for a missing <inertial>; an explicit all-zero one means the same.
         if mass.value == 0.0 && entries == [0.0; 6] {
             return Ok(None);
         }
@@ -302,11 +302,11 @@ impl<'a> Tree<'a> {
                     mass.value
                 ),
                 "give inertia about the centre of mass in kg m^2 and mass in kg, or remove \
-                 <inertial> from a link that has no mass; point_mass_radius_m takes a mass without \
-                 inertia for a ball",
+                 <inertial> from a link that has no mass; point_mass_radius_m gives a mass without \
+                 inertia that of a ball",
             )
         })?;
-        Ok(Some(body.seen_from(&Pose::from_xyz_rpy(
+        Ok(Some(body.expressed_in(&Pose::from_xyz_rpy(
             origin.xyz.0,
             origin.rpy.0,
         ))))
@@ -317,28 +317,28 @@ struct Builder<'a, 'b> {
     tree: &'b Tree<'a>,
     fixed_rad: &'b BTreeMap<String, f64>,
     on_chain: &'b dyn Fn(usize) -> bool,
-    /// Everything lumped into the present link.
+    /// Sum of everything lumped into the current moving link.
     body: Option<Body>,
-    /// The chain's next joint, with its child's frame at zero angle.
+    /// Next joint of the chain, with the frame of its child link at zero angle.
     next: Option<(usize, Pose)>,
-    links: Vec<Placed>,
+    links: Vec<PlacedLink>,
 }
 
 impl Builder<'_, '_> {
-    /// The link `root` and all that cannot move against it, each before what hangs on it.
+    /// Lumps the link `root` and all links fixed to it, parents before children.
     fn lump(&mut self, root: usize, carrier: Option<usize>) -> Result<(), ModelError> {
-        // A list, not recursion: how deep fixed links hang on each other is up to the file.
+        // Iterative, because the file determines the nesting depth.
         let mut open = vec![(root, Pose::IDENTITY)];
         while let Some((link, carrier_from_link)) = open.pop() {
             let first = open.len();
             self.lump_one(link, carrier, carrier_from_link, &mut open)?;
-            // In the order of the file: sums of masses depend on it to the last bit.
+            // In file order: the rounding of the mass sums depends on it.
             open[first..].reverse();
         }
         Ok(())
     }
 
-    /// One link; those fixed to it are added to `open`.
+    /// Lumps one link and adds the links fixed to it to `open`.
     fn lump_one(
         &mut self,
         link: usize,
@@ -346,16 +346,16 @@ impl Builder<'_, '_> {
         carrier_from_link: Pose,
         open: &mut Vec<(usize, Pose)>,
     ) -> Result<(), ModelError> {
-        self.links.push(Placed {
+        self.links.push(PlacedLink {
             link,
             carrier,
             carrier_from_link,
         });
         if let Some(body) = self.tree.body(link)? {
-            let body = body.seen_from(&carrier_from_link);
+            let body = body.expressed_in(&carrier_from_link);
             self.body = Some(self.body.map_or(body, |sum| sum.merged(&body)));
         }
-        for joint in self.tree.below[link].iter().copied() {
+        for joint in self.tree.child_joints[link].iter().copied() {
             let urdf = &self.tree.robot.joints[joint];
             let link_from_child =
                 carrier_from_link * Pose::from_xyz_rpy(urdf.origin.xyz.0, urdf.origin.rpy.0);
@@ -365,7 +365,7 @@ impl Builder<'_, '_> {
             } else if matches!(urdf.joint_type, JointType::Fixed) {
                 open.push((self.tree.child[joint], link_from_child));
             } else if let Some(angle) = self.fixed_rad.get(&urdf.name) {
-                if !turns(&urdf.joint_type) {
+                if !is_revolute(&urdf.joint_type) {
                     return Err(unsupported(self.tree.report, urdf));
                 }
                 let turned = link_from_child * turn(&self.tree.axis(joint)?, *angle);
@@ -397,7 +397,7 @@ fn is_movable(kind: &JointType) -> bool {
     !matches!(kind, JointType::Fixed)
 }
 
-fn turns(kind: &JointType) -> bool {
+fn is_revolute(kind: &JointType) -> bool {
     matches!(kind, JointType::Revolute | JointType::Continuous)
 }
 
@@ -411,13 +411,13 @@ fn unsupported(report: Reporter<'_>, joint: &urdf_rs::Joint) -> ModelError {
 }
 
 fn check_chain_joint(report: Reporter<'_>, joint: &urdf_rs::Joint) -> Result<(), ModelError> {
-    if !turns(&joint.joint_type) {
+    if !is_revolute(&joint.joint_type) {
         return Err(unsupported(report, joint));
     }
     if let Some(mimic) = &joint.mimic {
         return Err(report.invalid(
             format!("joint `{}` <mimic>", joint.name),
-            "a joint that follows another is not supported on the way to the tip",
+            "a mimic joint is not supported between root and tip",
             format!("`{}`", mimic.joint),
             "remove <mimic>, or fix the joint at an angle under [fixed_joints_rad]",
         ));
@@ -425,7 +425,7 @@ fn check_chain_joint(report: Reporter<'_>, joint: &urdf_rs::Joint) -> Result<(),
     Ok(())
 }
 
-/// Turn about a unit axis.
+/// Rotation about a unit axis.
 pub(crate) fn turn(axis: &Vector3<f64>, angle_rad: f64) -> Pose {
     let onto = Pose::z_onto(axis);
     let (s, c) = sin_cos(angle_rad);

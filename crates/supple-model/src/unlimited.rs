@@ -1,7 +1,7 @@
-//! A URDF of which dynamics alone are wanted, with the limits that it does not state.
+//! Adds missing joint limits to a URDF that is used only for dynamics or identification.
 //!
-//! A controller must know where an arm ends and what it bears: [`crate::Description`] refuses joints
-//! without limits. Dynamics and identification ask for none, and many URDFs have none.
+//! A controller needs position, torque and speed limits: [`crate::Description`] rejects joints without limits.
+//! Dynamics and identification need none, and many URDFs have none.
 
 use crate::error::Reporter;
 use crate::xml;
@@ -9,15 +9,15 @@ use roxmltree::Node;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-/// Torque (N m) of a joint that has no limits: beyond any arm's.
+/// Torque limit (N m) of a joint without limits: larger than that of any arm.
 pub const UNLIMITED_NM: f64 = 1e5;
-/// Speed (rad/s) of a joint that has no limits: beyond any arm's.
+/// Speed limit (rad/s) of a joint without limits: larger than that of any arm.
 pub const UNLIMITED_RAD_PER_S: f64 = 100.0;
 
-/// `urdf` in which every movable joint has limits: where it states none, or zero, a range of a turn either
-/// way, [`UNLIMITED_NM`] as effort and [`UNLIMITED_RAD_PER_S`] as velocity. A text that is no XML, or out of all
-/// proportion, is given back as it is: whoever reads it says why.
-pub fn with_limits(urdf: &str) -> String {
+/// Returns `urdf` with limits for every movable joint. Missing or zero limits become a range of one turn in each
+/// direction, [`UNLIMITED_NM`] as effort and [`UNLIMITED_RAD_PER_S`] as velocity. Invalid or oversized XML is
+/// returned unchanged; the reader reports the error.
+pub fn with_default_limits(urdf: &str) -> String {
     let Ok(document) = xml::bounds::parse(Reporter { file: "" }, urdf) else {
         return urdf.to_owned();
     };
@@ -35,13 +35,13 @@ pub fn with_limits(urdf: &str) -> String {
     edited
 }
 
-/// The `<limit>` that a joint lacks, or with what it lacks.
+/// The edit that adds a missing `<limit>` to a joint, or missing attributes to its `<limit>`.
 fn edit(joint: &Node<'_, '_>) -> Option<(Range<usize>, String)> {
     let limit = joint.children().find(|child| child.has_tag_name("limit"));
     let stated = |name: &str| limit.and_then(|limit| limit.attribute(name));
     let mut added = String::new();
     let mut dropped = Vec::new();
-    // One end alone is a mistake, and refused as such.
+    // A limit with only one end is an error and stays, so that the reader rejects it.
     if stated("lower").is_none() && stated("upper").is_none() {
         added += &format!(" lower=\"{:?}\" upper=\"{TAU:?}\"", -TAU);
     }
@@ -73,10 +73,10 @@ fn edit(joint: &Node<'_, '_>) -> Option<(Range<usize>, String)> {
 
 #[cfg(test)]
 mod tests {
-    use super::with_limits;
+    use super::with_default_limits;
 
     #[test]
-    fn what_is_stated_stays_and_what_is_not_is_added() {
+    fn stated_limits_stay_and_missing_ones_are_added() {
         let joint = |kind: &str, limit: &str| {
             format!(
                 "<robot><joint name=\"j\" type=\"{kind}\"><parent link=\"a\"/>{limit}</joint></robot>"
@@ -88,9 +88,9 @@ mod tests {
             joint("fixed", ""),
             "<robot".to_owned(),
         ] {
-            assert_eq!(with_limits(&unchanged), unchanged);
+            assert_eq!(with_default_limits(&unchanged), unchanged);
         }
-        let bare = with_limits(&joint("revolute", ""));
+        let bare = with_default_limits(&joint("revolute", ""));
         for word in [
             "<limit",
             "lower=\"-6.28",
@@ -100,7 +100,7 @@ mod tests {
         ] {
             assert!(bare.contains(word), "{word} in {bare}");
         }
-        let weak = with_limits(&joint(
+        let weak = with_default_limits(&joint(
             "revolute",
             "<limit lower=\"-1\" upper=\"2\" effort=\"0\" velocity=\"4\"/>",
         ));
@@ -113,8 +113,8 @@ mod tests {
             assert!(weak.contains(word), "{word} in {weak}");
         }
         assert_eq!(weak.matches("effort").count(), 1);
-        // Half a range is a mistake that someone must see.
-        let half = with_limits(&joint("revolute", "<limit lower=\"-1\"/>"));
+        // A range with only one end is an error that the reader must report.
+        let half = with_default_limits(&joint("revolute", "<limit lower=\"-1\"/>"));
         assert!(!half.contains("upper"), "{half}");
     }
 }

@@ -1,24 +1,24 @@
-//! What a URDF must have for `urdf-rs` to read it as it was meant.
+//! Checks a URDF before `urdf-rs` parses it.
 //!
-//! `urdf-rs` drops elements and attributes that it does not know, drops words of a vector that are not
-//! numbers, and fills what is missing with zeros: a misspelt `<inertial>` becomes a weightless link, a
-//! missing `<limit>` a joint that may not move. Here the raw tree is held against the format before
-//! that happens. What other programs add is listed, see [`foreign`].
+//! `urdf-rs` drops unknown elements and attributes, drops words of a vector that are not numbers, and fills
+//! missing data with zeros: a misspelt `<inertial>` becomes a massless link, a missing `<limit>` a joint that
+//! must not move. This module checks the raw XML against the format first. Extensions of other programs are
+//! listed, see [`ignored`].
 
 pub(crate) mod bounds;
-mod cut;
-mod foreign;
+mod ignored;
+mod remove_unread;
 
 use crate::error::{Finding, ModelError, Reporter};
-use foreign::Foreign;
+use ignored::IgnoredElements;
 use roxmltree::Node;
 
-/// Greatest magnitude of a length, mass or inertia, SI units: no arm comes near, and no product of
-/// such numbers overflows.
-pub(crate) const GREATEST: f64 = 1e6;
+/// Maximum magnitude of a length, mass or inertia, SI units: far above any arm, and no product of such numbers
+/// overflows.
+pub(crate) const MAX_MAGNITUDE: f64 = 1e6;
 
-/// Attributes that hold numbers, with how many words each has: element, attribute, count, required.
-const NUMBERS: &[(&str, &str, usize, bool)] = &[
+/// Numeric attributes: element, attribute, count of numbers, required.
+const NUMERIC_ATTRIBUTES: &[(&str, &str, usize, bool)] = &[
     ("origin", "xyz", 3, false),
     ("origin", "rpy", 3, false),
     ("origin", "quat_xyzw", 4, false),
@@ -41,34 +41,34 @@ const NUMBERS: &[(&str, &str, usize, bool)] = &[
     ("dynamics", "friction", 1, false),
 ];
 
-/// Children that an element may have, those that it must have, and those that may stand more than once.
-struct Shape {
+/// Children that an element may have, those that it must have, and those that may occur more than once.
+struct ElementRule {
     element: &'static str,
     known: &'static [&'static str],
     required: &'static [&'static str],
-    many: &'static [&'static str],
+    repeatable: &'static [&'static str],
 }
 
-const SHAPES: &[Shape] = &[
-    Shape {
+const ELEMENT_RULES: &[ElementRule] = &[
+    ElementRule {
         element: "robot",
         known: &["link", "joint", "material"],
         required: &[],
-        many: &["link", "joint", "material"],
+        repeatable: &["link", "joint", "material"],
     },
-    Shape {
+    ElementRule {
         element: "link",
         known: &["inertial", "visual", "collision", "contact"],
         required: &[],
-        many: &["visual", "collision"],
+        repeatable: &["visual", "collision"],
     },
-    Shape {
+    ElementRule {
         element: "inertial",
         known: &["origin", "mass", "inertia"],
         required: &["mass", "inertia"],
-        many: &[],
+        repeatable: &[],
     },
-    Shape {
+    ElementRule {
         element: "joint",
         known: &[
             "origin",
@@ -82,12 +82,12 @@ const SHAPES: &[Shape] = &[
             "safety_controller",
         ],
         required: &["parent", "child"],
-        many: &[],
+        repeatable: &[],
     },
 ];
 
-/// Attributes that are no numbers; `xmlns` and the like are none of them.
-const WORDS: &[(&str, &[&str])] = &[
+/// Text attributes. Namespace declarations (`xmlns`) are not attributes here.
+const TEXT_ATTRIBUTES: &[(&str, &[&str])] = &[
     ("robot", &["name", "version"]),
     ("link", &["name"]),
     ("joint", &["name", "type"]),
@@ -99,22 +99,22 @@ const WORDS: &[(&str, &[&str])] = &[
     ("collision", &["name"]),
 ];
 
-/// A URDF that was held against the format.
+/// A URDF that was checked against the format.
 #[derive(Debug)]
 pub(crate) struct Checked {
-    /// What is left out, each kind once.
+    /// Ignored content, each kind once.
     pub warnings: Vec<Finding>,
-    /// The text without it, for `urdf-rs`.
+    /// The text without the ignored content, for `urdf-rs`.
     pub text: String,
 }
 
-/// Children of an element that are known.
-fn of(element: &str) -> &'static [&'static str] {
-    let shape = SHAPES.iter().find(|shape| shape.element == element);
-    shape.map_or(&[], |shape| shape.known)
+/// Names of the known children of an element.
+fn known_children(element: &str) -> &'static [&'static str] {
+    let rule = ELEMENT_RULES.iter().find(|rule| rule.element == element);
+    rule.map_or(&[], |rule| rule.known)
 }
 
-/// The element is of the format, not of another program: it is in the namespace of the whole, if there is one.
+/// Returns whether the element belongs to the format, not to another program: its namespace is that of the root.
 fn is_own(node: &Node<'_, '_>) -> bool {
     node.tag_name().namespace() == node.document().root_element().tag_name().namespace()
 }
@@ -123,10 +123,10 @@ fn is_known(node: &Node<'_, '_>, names: &[&str]) -> bool {
     is_own(node) && names.contains(&node.tag_name().name())
 }
 
-/// Holds the text against the format.
+/// Checks the text against the format.
 pub(crate) fn check(report: Reporter<'_>, text: &str) -> Result<Checked, ModelError> {
     let document = bounds::parse(report, text)?;
-    let mut foreign = Foreign::default();
+    let mut ignored = IgnoredElements::default();
     let robot = document.root_element();
     if robot.tag_name().name() != "robot" {
         return Err(report.invalid(
@@ -159,26 +159,26 @@ pub(crate) fn check(report: Reporter<'_>, text: &str) -> Result<Checked, ModelEr
             if kind == "joint" {
                 check_kind(report, &node)?;
             }
-            check_element(report, &node, &mut foreign)?;
+            check_element(report, &node, &mut ignored)?;
         }
     }
-    foreign.attributes(report, &robot, words("robot").unwrap_or_default())?;
-    for node in children(&robot).filter(|n| !is_known(n, of("robot"))) {
-        foreign.element(report, "robot", &node, of("robot"))?;
+    ignored.attributes(report, &robot, text_attributes("robot").unwrap_or_default())?;
+    for node in children(&robot).filter(|n| !is_known(n, known_children("robot"))) {
+        ignored.element(report, "robot", &node, known_children("robot"))?;
     }
     check_quaternions(report, &robot)?;
     Ok(Checked {
-        warnings: foreign.into_findings(),
-        text: cut::cut(&document),
+        warnings: ignored.into_findings(),
+        text: remove_unread::remove_unread(&document),
     })
 }
 
-fn words(element: &str) -> Option<&'static [&'static str]> {
-    let words = WORDS.iter().find(|(of, _)| *of == element);
+fn text_attributes(element: &str) -> Option<&'static [&'static str]> {
+    let words = TEXT_ATTRIBUTES.iter().find(|(of, _)| *of == element);
     words.map(|(_, names)| *names)
 }
 
-/// A quaternion is read from version 1.1 on; before, it would be lost and the frame left unturned.
+/// Rejects `quat_xyzw` before URDF version 1.1: older readers ignore it and leave the frame unrotated.
 fn check_quaternions(report: Reporter<'_>, robot: &Node<'_, '_>) -> Result<(), ModelError> {
     let version = robot.attribute("version").unwrap_or("1.0").trim();
     let number = |part: Option<&str>| part.and_then(|part| part.parse::<u32>().ok());
@@ -193,7 +193,7 @@ fn check_quaternions(report: Reporter<'_>, robot: &Node<'_, '_>) -> Result<(), M
         if let Some(given) = origin.attribute("quat_xyzw") {
             return Err(report.invalid(
                 place(&origin),
-                "attribute `quat_xyzw` is of version 1.1 of the format, it would be lost",
+                "attribute `quat_xyzw` requires version 1.1 of the format, it would be lost",
                 format!("\"{given}\" with <robot version=\"{version}\">"),
                 "give rpy=\"...\", or <robot version=\"1.1\"> if that is what the file is",
             ));
@@ -240,23 +240,23 @@ fn check_kind(report: Reporter<'_>, joint: &Node<'_, '_>) -> Result<(), ModelErr
 fn check_element(
     report: Reporter<'_>,
     node: &Node<'_, '_>,
-    foreign: &mut Foreign,
+    ignored: &mut IgnoredElements,
 ) -> Result<(), ModelError> {
     let element = node.tag_name().name();
-    if let Some(known) = words(element) {
-        foreign.attributes(report, node, known)?;
+    if let Some(known) = text_attributes(element) {
+        ignored.attributes(report, node, known)?;
     }
-    if let Some(shape) = SHAPES.iter().find(|shape| shape.element == element) {
+    if let Some(rule) = ELEMENT_RULES.iter().find(|rule| rule.element == element) {
         let (known, unknown): (Vec<_>, Vec<_>) =
-            children(node).partition(|child| is_known(child, shape.known));
+            children(node).partition(|child| is_known(child, rule.known));
         for child in &unknown {
-            foreign.element(report, element, child, shape.known)?;
+            ignored.element(report, element, child, rule.known)?;
         }
-        foreign::check_once(report, &known, shape.many)?;
+        ignored::check_once(report, &known, rule.repeatable)?;
         for child in &known {
-            check_element(report, child, foreign)?;
+            check_element(report, child, ignored)?;
         }
-        for required in shape.required {
+        for required in rule.required {
             if !known.iter().any(|child| child.has_tag_name(*required)) {
                 return Err(report.invalid(
                     place(node),
@@ -278,23 +278,26 @@ fn check_element(
     }
     if matches!(element, "visual" | "collision") {
         let mut origins = children(node).filter(|child| child.has_tag_name("origin"));
-        return origins.try_for_each(|origin| check_element(report, &origin, foreign));
+        return origins.try_for_each(|origin| check_element(report, &origin, ignored));
     }
-    check_numbers(report, node, foreign)
+    check_numbers(report, node, ignored)
 }
 
 fn check_numbers(
     report: Reporter<'_>,
     node: &Node<'_, '_>,
-    foreign: &mut Foreign,
+    ignored: &mut IgnoredElements,
 ) -> Result<(), ModelError> {
     let element = node.tag_name().name();
-    let mut known = NUMBERS.iter().filter(|(e, ..)| *e == element).peekable();
+    let mut known = NUMERIC_ATTRIBUTES
+        .iter()
+        .filter(|(e, ..)| *e == element)
+        .peekable();
     if known.peek().is_none() {
         return Ok(());
     }
     let names: Vec<&str> = known.clone().map(|(_, name, ..)| *name).collect();
-    foreign.attributes(report, node, &names)?;
+    ignored.attributes(report, node, &names)?;
     for (_, name, count, required) in known {
         let Some(text) = node.attribute(*name) else {
             if *required {
@@ -308,18 +311,18 @@ fn check_numbers(
             continue;
         };
         let words: Vec<&str> = text.split_whitespace().collect();
-        // Limits may be as large as one likes: some files mean "none" by it.
-        let greatest = match element {
+        // No upper bound for limits: some files use huge values for "unlimited".
+        let max = match element {
             "limit" => f64::MAX,
-            _ => GREATEST,
+            _ => MAX_MAGNITUDE,
         };
-        let sound = |word: &&str| word.parse::<f64>().is_ok_and(|x| x.abs() <= greatest);
-        if words.len() != *count || !words.iter().all(sound) {
+        let valid = |word: &&str| word.parse::<f64>().is_ok_and(|x| x.abs() <= max);
+        if words.len() != *count || !words.iter().all(valid) {
             return Err(report.invalid(
                 place(node),
-                format!("attribute `{name}` takes {count} number(s) of at most {greatest:e}"),
+                format!("attribute `{name}` takes {count} number(s) of at most {max:e}"),
                 format!("\"{text}\""),
-                "correct it (NaN, infinity and units are not numbers here; SI units)",
+                "correct it (SI units; NaN, infinity and unit names are not allowed)",
             ));
         }
     }

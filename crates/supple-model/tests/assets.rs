@@ -1,5 +1,5 @@
-//! The built-in arms: sound, driveable, the chain that reference values say, and numbers that agree
-//! with what they are derived from.
+//! The built-in arms are valid, can be controlled, match the reference kinematics, and their numbers match their
+//! sources.
 
 use nalgebra::{DMatrix, DVector};
 use serde_json::Value;
@@ -12,7 +12,7 @@ fn asset(name: &str) -> Description {
 }
 
 #[test]
-fn every_asset_makes_a_controller() {
+fn every_asset_gives_a_valid_controller() {
     for name in assets() {
         let description = asset(name);
         assert_eq!(description.name(), *name);
@@ -68,7 +68,7 @@ fn agrees_with_the_reference<const N: usize>(name: &str) {
 }
 
 #[test]
-fn arms_are_those_of_the_reference() {
+fn arms_match_the_reference() {
     agrees_with_the_reference::<3>("wam3");
     agrees_with_the_reference::<4>("wam4");
     agrees_with_the_reference::<7>("wam7");
@@ -97,7 +97,7 @@ fn motor_from_joint() -> DMatrix<f64> {
 }
 
 #[test]
-fn transmissions_are_the_inverse_of_the_printed_ones() {
+fn transmissions_are_the_inverse_of_the_published_ones() {
     let printed = motor_from_joint();
     for name in ["wam4", "wam7"] {
         let description = asset(name);
@@ -110,7 +110,7 @@ fn transmissions_are_the_inverse_of_the_printed_ones() {
 }
 
 #[test]
-fn rotor_inertias_are_those_of_the_motors_through_the_transmission() {
+fn rotor_inertias_match_the_motors_through_the_transmission() {
     let drive = [
         1.1631e-4, 1.1831e-4, 1.1831e-4, 1.0686e-4, 1.685e-5, 1.745e-5, 1.42e-6,
     ];
@@ -130,16 +130,16 @@ fn rotor_inertias_are_those_of_the_motors_through_the_transmission() {
 }
 
 #[test]
-fn joint_torque_limits_are_what_the_motors_give() {
+fn joint_torque_limits_match_the_motors() {
     for name in assets() {
         let description = asset(name);
         with_dof!(description.dof(), N => {
             let limits = description.config::<N>().unwrap().limits;
             let ratios = description.motors().motor_from_joint.transpose().abs();
-            let greatest = ratios * DVector::from_column_slice(limits.motor_torque_nm.as_slice());
+            let max_torque_nm = ratios * DVector::from_column_slice(limits.motor_torque_nm.as_slice());
             for i in 0..N {
-                let share = limits.joint_torque_nm[i] / greatest[i];
-                assert!((0.99..1.01).contains(&share), "{name} joint {i}: {share}");
+                let fraction = limits.joint_torque_nm[i] / max_torque_nm[i];
+                assert!((0.99..1.01).contains(&fraction), "{name} joint {i}: {fraction}");
             }
         })
         .unwrap();
@@ -172,7 +172,7 @@ fn the_tool_is_a_disc_and_a_cylinder() {
 }
 
 #[test]
-fn the_tip_looks_forward_along_the_forearm() {
+fn the_tip_axis_points_along_the_forearm() {
     for name in ["wam3", "wam4", "wam7", "paper3"] {
         let description = asset(name);
         with_dof!(description.dof(), N => {
@@ -181,7 +181,7 @@ fn the_tip_looks_forward_along_the_forearm() {
                 q[1] = core::f64::consts::FRAC_PI_2;
             }
             let tip = dynamics::tip_pose(&description.arm::<N>().unwrap(), &q);
-            // At these angles every arm stands straight up.
+            // At these angles every arm points straight up.
             assert!((tip.rotation.column(2) - Vector3::z()).amax() < 1e-12, "{name}");
             assert!((tip.translation.z - 0.9).abs() < 0.02, "{name}");
         })
@@ -190,7 +190,7 @@ fn the_tip_looks_forward_along_the_forearm() {
 }
 
 #[test]
-fn homes_are_clear_of_the_soft_zones() {
+fn home_poses_are_outside_the_soft_zones() {
     for name in assets() {
         let description = asset(name);
         with_dof!(description.dof(), N => {
@@ -205,7 +205,7 @@ fn homes_are_clear_of_the_soft_zones() {
 }
 
 #[test]
-fn three_joints_of_every_asset_are_left_to_the_law() {
+fn the_law_controls_three_joints_of_every_asset() {
     for (name, expected) in [
         ("paper3", vec![0, 1, 2]),
         ("wam3", vec![0, 1, 2]),
@@ -223,10 +223,10 @@ fn three_joints_of_every_asset_are_left_to_the_law() {
     }
 }
 
-/// Every number of an asset says where it comes from: by a comment on its line or above its block of
-/// lines, or by a `source` in its section or above all sections.
+/// Every number of an asset has a stated source: a comment on its line or above its block of lines, or a `source`
+/// in its section or above all sections.
 #[test]
-fn every_section_says_where_its_numbers_come_from() {
+fn every_number_has_a_stated_source() {
     for name in assets() {
         let description = asset(name);
         let settings = description.settings();
@@ -261,7 +261,7 @@ fn every_section_says_where_its_numbers_come_from() {
 }
 
 #[test]
-fn the_published_schema_is_that_of_the_code() {
+fn the_published_schema_matches_the_code() {
     let published: Value =
         serde_json::from_str(include_str!("../../../assets/arm.schema.json")).unwrap();
     let of_the_code: Value = serde_json::from_str(&schema_json()).unwrap();
@@ -272,7 +272,7 @@ fn the_published_schema_is_that_of_the_code() {
 }
 
 #[test]
-fn the_published_schema_refuses_unknown_keys_everywhere() {
+fn the_published_schema_rejects_unknown_keys_everywhere() {
     let schema: Value = serde_json::from_str(&schema_json()).unwrap();
     let definitions = schema["$defs"].as_object().expect("definitions");
     let sections = definitions
@@ -287,7 +287,7 @@ fn the_published_schema_refuses_unknown_keys_everywhere() {
 }
 
 #[test]
-fn texts_are_carried_to_the_last_byte() {
+fn texts_are_kept_unchanged() {
     for name in assets() {
         let description = asset(name);
         let again = Description::from_text(description.toml(), description.urdf()).unwrap();

@@ -1,4 +1,4 @@
-//! What a description makes of a sound URDF and TOML: chain, lumping, defaults, shapes, transforms.
+//! Result of reading a valid URDF and TOML: chain, lumping, defaults, shapes, transforms.
 
 mod common;
 
@@ -9,7 +9,7 @@ use supple_core::math::Vector3;
 use supple_core::{Friction, Vector, dynamics};
 use supple_model::Description;
 
-/// The TOML with the elbow left to the law, as three joints must be.
+/// The TOML with the elbow controlled by the law, which needs three joints.
 fn free() -> String {
     let start = TOML.find("held = ").unwrap();
     let end = start + TOML[start..].find('\n').unwrap();
@@ -21,7 +21,7 @@ fn small() -> Description {
 }
 
 #[test]
-fn a_mass_without_inertia_is_a_ball_where_that_is_said() {
+fn a_mass_without_inertia_becomes_a_ball_if_requested() {
     let start = URDF.find("<inertia ").unwrap();
     let end = start + URDF[start..].find("/>").unwrap() + 2;
     let zeros = r#"<inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/>"#;
@@ -53,7 +53,7 @@ fn a_mass_without_inertia_is_a_ball_where_that_is_said() {
 }
 
 #[test]
-fn the_chain_is_the_movable_joints_to_the_tip() {
+fn the_chain_consists_of_the_movable_joints_to_the_tip() {
     let description = small();
     assert_eq!(description.joint_names(), ["yaw", "shoulder", "elbow"]);
     assert_eq!(description.dof(), 3);
@@ -64,10 +64,10 @@ fn the_chain_is_the_movable_joints_to_the_tip() {
     assert!((tip - expected).amax() < 1e-12, "{tip}");
 }
 
-/// The finger is fixed at 0.3 rad in one description and moves as fourth joint in another: at that
-/// angle, what the first three joints feel must be the same.
+/// The finger is fixed at 0.3 rad in one description and is the fourth moving joint in another: at that angle, the
+/// torques of the first three joints must be the same.
 #[test]
-fn a_joint_fixed_at_an_angle_is_a_moving_one_that_stands_there() {
+fn a_joint_fixed_at_an_angle_equals_a_moving_joint_at_that_angle() {
     let bare = |text: &str| {
         let start = text.find("[tool]").unwrap();
         let end = text.find("[limits]").unwrap();
@@ -107,7 +107,7 @@ fn an_axis_is_scaled_to_unit_length() {
 #[test]
 fn limits_come_from_both_files() {
     let limits = small().config::<3>().unwrap().limits;
-    // A continuous joint has two turns; the rest are the URDF's.
+    // A continuous joint has two turns; the other limits come from the URDF.
     assert_eq!(
         limits.position_lower_rad,
         Vector::<3>::new(-TAU, -1.5, -2.5)
@@ -135,7 +135,7 @@ fn limits_come_from_both_files() {
 }
 
 #[test]
-fn a_continuous_joint_may_turn_as_far_as_the_toml_says() {
+fn the_toml_sets_the_range_of_a_continuous_joint() {
     let wide = with(
         &free(),
         "[motors]",
@@ -153,7 +153,7 @@ fn a_continuous_joint_may_turn_as_far_as_the_toml_says() {
 }
 
 #[test]
-fn friction_is_the_tomls_or_the_urdfs_or_none() {
+fn friction_comes_from_the_toml_or_the_urdf_or_is_zero() {
     let elbow = Friction::coulomb(0.5, 0.2);
     assert_eq!(
         small().friction(),
@@ -176,7 +176,7 @@ fn friction_is_the_tomls_or_the_urdfs_or_none() {
 }
 
 #[test]
-fn everything_of_the_toml_arrives() {
+fn all_settings_of_the_toml_are_used() {
     let config = small().config::<3>().unwrap();
     assert_eq!(config.roles, [Role::Active; 3]);
     assert_eq!(
@@ -206,7 +206,7 @@ fn everything_of_the_toml_arrives() {
 }
 
 #[test]
-fn choices_of_the_law_arrive() {
+fn all_settings_of_the_law_are_used() {
     let toml = with(
         &free(),
         "stiffness_n_per_m = [5.0, 6.0, 7.0]",
@@ -227,7 +227,7 @@ fn choices_of_the_law_arrive() {
 }
 
 #[test]
-fn a_held_joint_has_its_role_where_three_are_left() {
+fn a_held_joint_has_its_role_if_three_others_remain() {
     let toml = with(TOML, "tip_frame = \"tip\"", "tip_frame = \"finger\"");
     let toml = with(&toml, "home_rad = [0.0, 0.5, 0.2]\n", "");
     let toml = with(&toml, "finger_joint = 0.3\n", "");
@@ -269,7 +269,7 @@ fn everything_else_has_a_default() {
 }
 
 #[test]
-fn a_held_joint_starts_where_it_is_held() {
+fn a_held_joint_starts_at_its_held_angle() {
     let toml = with(TOML, "home_rad = [0.0, 0.5, 0.2]\n", "");
     let description = Description::from_text(&toml, URDF).unwrap();
     assert_eq!(description.home_rad(), [0.0, 0.0, 0.2]);
@@ -303,7 +303,7 @@ fn transforms_compose_to_the_tip() {
 }
 
 #[test]
-fn shapes_are_the_visuals_in_the_frame_of_the_link_that_moves_them() {
+fn shapes_are_the_visuals_in_the_frame_of_their_moving_link() {
     let urdf = with(
         URDF,
         "<link name=\"tip\"/>",
@@ -331,7 +331,7 @@ fn shapes_are_the_visuals_in_the_frame_of_the_link_that_moves_them() {
     assert_eq!(tip.ends_m, [at, at]);
 }
 
-/// What other programs put into a URDF does not get in the way.
+/// Extensions of other programs in a URDF are accepted.
 #[test]
 fn extensions_and_decoration_are_accepted() {
     let urdf = with(

@@ -1,4 +1,4 @@
-//! The closed form of the paper's arm against the general sweeps, and the printed set's own marks.
+//! The closed form of the paper's arm compared with the general dynamics, and properties of the printed set.
 
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -17,7 +17,7 @@ fn arm(parameters: &Parameters) -> Result<Arm<3>, ArmError> {
     Arm::new(&parameters.joints(M1_KG, M2_KG), tip, None, gravity)
 }
 
-/// Parameters of bodies: boxes with their mass on the x axis.
+/// Parameters of physically consistent links: boxes with their mass on the x axis.
 fn physical() -> impl Strategy<Value = Parameters> {
     let extent = || 0.02..0.4_f64;
     let link = || (extent(), extent(), extent(), 0.05..0.3_f64);
@@ -43,8 +43,8 @@ fn physical() -> impl Strategy<Value = Parameters> {
     })
 }
 
-fn joints(greatest: f64) -> impl Strategy<Value = Vector<3>> {
-    prop::array::uniform3(-greatest..greatest).prop_map(Vector::<3>::from)
+fn joints(max: f64) -> impl Strategy<Value = Vector<3>> {
+    prop::array::uniform3(-max..max).prop_map(Vector::<3>::from)
 }
 
 proptest! {
@@ -56,7 +56,7 @@ proptest! {
     })]
 
     #[test]
-    fn closed_form_is_the_general_arm(
+    fn closed_form_equals_the_general_dynamics(
         parameters in physical(),
         q in joints(PI),
         qd in joints(2.0),
@@ -84,7 +84,7 @@ proptest! {
     }
 
     #[test]
-    fn torques_tell_only_the_base_parameters_apart(
+    fn torques_depend_only_on_the_base_parameters(
         q in joints(PI),
         qd in joints(2.0),
         qdd in joints(5.0),
@@ -109,14 +109,14 @@ proptest! {
 }
 
 #[test]
-fn printed_set_has_the_mark_of_a_least_norm_solution() {
+fn printed_set_has_the_property_of_a_least_norm_solution() {
     let p = Parameters::PUBLISHED;
     assert!((p.ix2_kg_m2 - p.iy2_kg_m2 - p.iz1_kg_m2).abs() < 1e-12);
     assert!((p.ix3_kg_m2 - p.iy3_kg_m2 - p.iz1_kg_m2).abs() < 1e-12);
 }
 
 #[test]
-fn printed_link_3_is_no_body_and_link_2_can_be_one() {
+fn printed_link_3_is_inconsistent_and_link_2_can_be_consistent() {
     let p = Parameters::PUBLISHED;
     let shift = p.m3r3_kg_m * p.m3r3_kg_m / p.m3_kg;
     let others = p.iy3_kg_m2 + p.iz3_kg_m2 - 2.0 * shift;
@@ -128,10 +128,10 @@ fn printed_link_3_is_no_body_and_link_2_can_be_one() {
     joints[2].body.validate().unwrap_err();
 }
 
-/// Moving along what torques leave open does not make link 3 a body: its extent along the link,
+/// Changes of the unidentifiable parameters do not make link 3 consistent: its extent along the link,
 /// `(Iy' + Iz' - Ix) / 2 - m r^2`, is a combination of base parameters.
 #[test]
-fn no_redistribution_makes_printed_link_3_a_body() {
+fn no_redistribution_makes_printed_link_3_consistent() {
     for shift in (-50..=50).map(|i| 0.01 * f64::from(i)) {
         let p = Parameters::PUBLISHED;
         let shifted = Parameters {
@@ -149,30 +149,30 @@ fn no_redistribution_makes_printed_link_3_a_body() {
 #[test]
 fn printed_mass_matrix_is_positive_definite_over_the_workspace() {
     let range = |p: &Parameters| {
-        let (mut least, mut h11) = (f64::INFINITY, [f64::INFINITY, 0.0_f64]);
+        let (mut smallest, mut h11) = (f64::INFINITY, [f64::INFINITY, 0.0_f64]);
         for i in 0..=360 {
             for j in 0..=360 {
                 let angle = |k: i32| PI * (f64::from(k) / 180.0 - 1.0);
                 let mass: Matrix3<f64> = p.mass_matrix(&Vector::<3>::new(0.0, angle(i), angle(j)));
-                least = least.min(mass.symmetric_eigenvalues().min());
+                smallest = smallest.min(mass.symmetric_eigenvalues().min());
                 h11 = [h11[0].min(mass[(0, 0)]), h11[1].max(mass[(0, 0)])];
             }
         }
-        (least, h11)
+        (smallest, h11)
     };
-    let (least, [lowest, highest]) = range(&Parameters::PUBLISHED);
-    println!("least eigenvalue {least:.4}, H11 {lowest:.4} to {highest:.4}");
-    assert!((least - 0.048).abs() < 5e-4, "{least}");
+    let (smallest, [lowest, highest]) = range(&Parameters::PUBLISHED);
+    println!("smallest eigenvalue {smallest:.4}, H11 {lowest:.4} to {highest:.4}");
+    assert!((smallest - 0.048).abs() < 5e-4, "{smallest}");
     assert!(
         (lowest - 0.47).abs() < 5e-3 && (highest - 1.67).abs() < 5e-3,
         "{lowest} {highest}"
     );
 }
 
-/// Theta 2 is measured from the horizontal: level, the arm reaches out; at 90 degrees it stands, and
-/// the base feels the least inertia, as the paper says.
+/// Theta 2 is measured from the horizontal: at 0 the arm is stretched out horizontally; at 90 degrees it points up,
+/// and the inertia about the base axis is minimal, as the paper states.
 #[test]
-fn angles_are_the_papers() {
+fn angles_follow_the_definition_of_the_paper() {
     let description = Description::asset("paper3").unwrap();
     let arm = description.arm::<3>().unwrap();
     for (q, tip) in [
@@ -191,13 +191,13 @@ fn angles_are_the_papers() {
 }
 
 #[test]
-fn asset_has_the_papers_friction() {
+fn asset_has_the_friction_of_the_paper() {
     let description = Description::asset("paper3").unwrap();
     assert_eq!(description.friction(), Parameters::PUBLISHED.friction());
 }
 
 #[test]
-fn names_and_entries_of_the_linear_form_go_together() {
+fn names_and_entries_of_the_linear_form_match() {
     let p = Parameters::PUBLISHED;
     let entry = |name: &str| {
         let index = Parameters::PSI_NAMES

@@ -1,10 +1,10 @@
-//! The asset `paper3` is the physical arm nearest to what the paper published, recomputed here.
+//! The asset `paper3` is the physical arm closest to the published parameters, recomputed here.
 //!
-//! Nearest: least mean square torque error over the workspace (the asset's joint ranges, uniform) with
+//! Nearest: minimum mean square torque error over the workspace (the asset's joint ranges, uniform) with
 //! joint speeds of 0.5 rad/s and accelerations of 1 rad/s^2 (standard deviations, independent), in the
 //! seven inertial base parameters, `m3` as published. Physical: each link's mass has a standard
-//! deviation of at least 1 cm along its own axis. Only link 3 violates that as published, so the
-//! nearest arm lies on that bound: a quadratic form is minimised on one quadratic constraint.
+//! deviation of at least 1 cm along its own axis. Only the published link 3 violates this, so the nearest arm
+//! lies on the bound: a quadratic program with one quadratic constraint.
 
 use nalgebra::{SMatrix, SVector};
 use supple_core::Vector;
@@ -13,8 +13,8 @@ use supple_model::paper::Parameters;
 
 const SPEED_RAD_PER_S: f64 = 0.5;
 const ACCELERATION_RAD_PER_S2: f64 = 1.0;
-const LEAST_EXTENT_M: f64 = 0.01;
-/// Masses that the published set leaves open \[kg\].
+const MIN_EXTENT_M: f64 = 0.01;
+/// Masses that the published set does not determine \[kg\].
 const M1_KG: f64 = 10.7677;
 const M2_KG: f64 = 5.6772;
 
@@ -120,7 +120,7 @@ fn torque_metric(description: &Description) -> SMatrix<f64, 7, 7> {
 /// Mean square extent of link 3 along its axis, less the bound, times its mass \[kg m^2\].
 fn slack(base: &Base) -> f64 {
     let m3 = Parameters::PUBLISHED.m3_kg;
-    0.5 * (base[2] + base[4]) - base[6] * base[6] / m3 - m3 * LEAST_EXTENT_M * LEAST_EXTENT_M
+    0.5 * (base[2] + base[4]) - base[6] * base[6] / m3 - m3 * MIN_EXTENT_M * MIN_EXTENT_M
 }
 
 fn slack_gradient(base: &Base) -> Base {
@@ -128,7 +128,7 @@ fn slack_gradient(base: &Base) -> Base {
     Base::from_column_slice(&[0.0, 0.0, 0.5, 0.0, 0.5, 0.0, by_moment])
 }
 
-/// Least `(b - b0)^T metric (b - b0)` on `slack(b) = 0`, by repeated linearisation of the constraint.
+/// Minimises `(b - b0)^T metric (b - b0)` on `slack(b) = 0`, by repeated linearisation of the constraint.
 fn nearest(metric: &SMatrix<f64, 7, 7>, published: &Base) -> Base {
     let inverse = metric
         .try_inverse()
@@ -145,11 +145,14 @@ fn nearest(metric: &SMatrix<f64, 7, 7>, published: &Base) -> Base {
 }
 
 #[test]
-fn is_the_nearest_physical_arm_to_the_published_one() {
+fn asset_is_the_physical_arm_closest_to_the_published_one() {
     let description = Description::asset("paper3").unwrap();
     let metric = torque_metric(&description);
     let published = inertial_base(&Parameters::PUBLISHED);
-    assert!(slack(&published) < 0.0, "link 3 as published is no body");
+    assert!(
+        slack(&published) < 0.0,
+        "link 3 as published is inconsistent"
+    );
     let found = nearest(&metric, &published);
     assert!(slack(&found).abs() < 1e-12);
     let expected = with_base(&found);

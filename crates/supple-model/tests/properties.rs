@@ -1,4 +1,4 @@
-//! Whatever chain is written as a URDF is read back; whatever is done to the texts, no panic.
+//! Random chains survive a URDF round trip; mutated files never cause a panic.
 
 mod common;
 
@@ -17,7 +17,7 @@ struct RandomJoint {
     mass: f64,
     com: [f64; 3],
     com_rpy: [f64; 3],
-    /// Mean square extents: any three positive ones are a body.
+    /// Mean square extents: any three positive values are physically consistent.
     extents: [f64; 3],
 }
 
@@ -33,7 +33,7 @@ impl RandomJoint {
             com_m: Vector3::zeros(),
             inertia_kg_m2: Matrix3::from_diagonal(&Vector3::from(self.inertia())),
         }
-        .seen_from(&Pose::from_xyz_rpy(self.com, self.com_rpy))
+        .expressed_in(&Pose::from_xyz_rpy(self.com, self.com_rpy))
     }
 
     fn urdf(&self, i: usize) -> String {
@@ -117,9 +117,9 @@ proptest! {
         }
     }
 
-    /// A link cut in two, the parts welded by a fixed joint, is the same link.
+    /// A link that is split in two parts with a fixed joint between them is the same link.
     #[test]
-    fn welded_parts_are_one_body(joints in prop::collection::vec(joint(), 4), part in joint(), which in 0..4_usize) {
+    fn parts_with_a_fixed_joint_are_one_body(joints in prop::collection::vec(joint(), 4), part in joint(), which in 0..4_usize) {
         let whole = chain(&joints);
         let body = joints[which].body();
         let weld = part
@@ -128,7 +128,7 @@ proptest! {
             .replace("link=\"l9\"", &format!("link=\"l{}\"", which + 1))
             .replace("type=\"revolute\"", "type=\"fixed\"");
         let cut = whole.replace("</robot>", &format!("{weld}</robot>"));
-        let expected = body.merged(&part.body().seen_from(&Pose::from_xyz_rpy(part.xyz, part.rpy)));
+        let expected = body.merged(&part.body().expressed_in(&Pose::from_xyz_rpy(part.xyz, part.rpy)));
         let found = Description::from_text(MINIMAL, &cut).unwrap().parts::<4>().unwrap().joints[which].body;
         prop_assert!((found.mass_kg - expected.mass_kg).abs() < 1e-12);
         prop_assert!((found.com_m - expected.com_m).amax() < 1e-12);
@@ -136,7 +136,7 @@ proptest! {
     }
 }
 
-/// A piece of text replaced by something that such files hold, or by nothing.
+/// The text with one piece replaced by a typical fragment of such files, or removed.
 fn mutated(text: &'static str) -> impl Strategy<Value = String> {
     let words = prop::sample::select(vec![
         "", "0", "-1", "1e308", "nan", "inf", "\"", "<", ">", "/", "[", "]", "=", "<link/>",
@@ -156,7 +156,7 @@ proptest! {
         ..ProptestConfig::default()
     })]
 
-    /// Either the text is refused, or what is built from it can be used.
+    /// The text is either rejected, or gives a usable description.
     #[test]
     fn a_damaged_urdf_does_not_panic(urdf in mutated(URDF)) {
         if let Ok(description) = Description::from_text(TOML, &urdf) {

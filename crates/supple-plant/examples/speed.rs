@@ -9,7 +9,7 @@ use common::{block, tip_spring, wam4, wam4_at};
 use std::time::Instant;
 use supple_core::nalgebra::Vector3;
 use supple_core::{Friction, Vector};
-use supple_plant::{Drive, FreeBox, Ground, LuGre, Plant, PlantConfig, Scene};
+use supple_plant::{ActuatorModel, FreeBox, Ground, LuGre, Plant, PlantConfig, Scene};
 
 const DURATION_S: f64 = 10.0;
 
@@ -24,11 +24,11 @@ fn plant(scene: Scene) -> Plant<4> {
     .map(|(s, v)| LuGre::from_friction(&Friction::coulomb(v, s)));
     let config = PlantConfig {
         friction,
-        drive: Drive {
+        actuators: ActuatorModel {
             counts_per_motor_revolution: Vector::repeat(4096.0),
             motor_torque_quantum_nm: Vector::repeat(1.0 / 2700.0),
             torque_delay_cycles: 1,
-            ..Drive::direct()
+            ..ActuatorModel::direct()
         },
         scene,
         ..PlantConfig::ideal(arm)
@@ -40,7 +40,7 @@ fn plant(scene: Scene) -> Plant<4> {
     }
 }
 
-/// Up and down by 10 cm once a second about the block's face.
+/// Moves the tip up and down by 10 cm once per second about the block's face.
 fn probe(mut plant: Plant<4>) -> (f64, f64) {
     let (mut in_plant, mut touching) = (0.0, 0.0);
     let cycles = (DURATION_S / 1e-3) as u32;

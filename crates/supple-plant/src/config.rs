@@ -1,14 +1,14 @@
-//! What a plant is built from. Plain data: [`crate::Plant::new`] refuses what is not sound.
+//! Configuration of a plant; [`crate::Plant::new`] rejects invalid values.
 
-use crate::drive::Drive;
+use crate::actuators::ActuatorModel;
 use crate::error::{PlantError, entry};
 use crate::friction::LuGre;
 use crate::scene::Scene;
 use supple_core::{Arm, Vector};
 
-/// Hard stops of the joints: a spring and a damper that only push back.
+/// Joint hard stops: a unilateral spring-damper.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Stops<const N: usize> {
+pub struct HardStops<const N: usize> {
     /// Lower stops \[rad\].
     pub lower_rad: Vector<N>,
     /// Upper stops \[rad\], above the lower ones.
@@ -19,10 +19,10 @@ pub struct Stops<const N: usize> {
     pub damping_nm_s_per_rad: f64,
 }
 
-impl<const N: usize> Stops<N> {
+impl<const N: usize> HardStops<N> {
     /// Stops at these angles \[rad\] with the default stiffness and damping.
-    pub fn new(lower_rad: Vector<N>, upper_rad: Vector<N>) -> Stops<N> {
-        Stops {
+    pub fn new(lower_rad: Vector<N>, upper_rad: Vector<N>) -> HardStops<N> {
+        HardStops {
             lower_rad,
             upper_rad,
             stiffness_nm_per_rad: 1e4,
@@ -30,7 +30,7 @@ impl<const N: usize> Stops<N> {
         }
     }
 
-    /// Torque of the stop on joint `i` at `q` \[rad\], `qd` \[rad/s\], that is \[N m\].
+    /// Torque of the stop on joint `i` at `q` \[rad\], `qd` \[rad/s\] \[N m\].
     pub(crate) fn torque_nm(&self, i: usize, q: f64, qd: f64) -> f64 {
         let (below, above) = (self.lower_rad[i] - q, q - self.upper_rad[i]);
         let push = |depth: f64, rate: f64| {
@@ -46,8 +46,8 @@ impl<const N: usize> Stops<N> {
     }
 }
 
-/// The force sensor behind the tip. It reports the contact force alone: the weight and the inertia of
-/// the cap are part of the arm.
+/// Force sensor behind the tip. It reports only the contact force: weight and inertia of the cap are part of the
+/// arm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ForceSensor {
     /// Cutoff of its second-order Butterworth filter \[Hz\]; 100 by default.
@@ -65,7 +65,7 @@ impl Default for ForceSensor {
     }
 }
 
-/// Everything a plant is told before it starts.
+/// Plant configuration.
 #[derive(Clone, Debug)]
 pub struct PlantConfig<const N: usize> {
     /// The true arm, tool and rotors included.
@@ -73,34 +73,34 @@ pub struct PlantConfig<const N: usize> {
     /// True friction of each joint.
     pub friction: [LuGre; N],
     /// Motors, encoders, amplifiers.
-    pub drive: Drive<N>,
+    pub actuators: ActuatorModel<N>,
     /// Hard stops, if any.
-    pub stops: Option<Stops<N>>,
-    /// Radius of the tip's ball, its centre at the arm's tip frame \[m\], positive; 0.02 by default.
+    pub stops: Option<HardStops<N>>,
+    /// Radius of the spherical tip, its centre at the arm's tip frame \[m\], positive; 0.02 by default.
     pub tip_radius_m: f64,
     /// The force sensor.
     pub force_sensor: ForceSensor,
-    /// Step of the physics \[s\], positive; 0.2 ms by default, less for reference runs.
+    /// Step of the physics \[s\], positive; 0.2 ms by default, smaller for reference runs.
     ///
-    /// Errors are of first order. At 0.2 ms an impact of 1.3 kg on wood at 0.04 m/s, 4 ms long, has a
-    /// filtered peak 0.7 % and an unfiltered one 5 % above, and an impulse 0.3 % below, what it converges
-    /// to; so contact is not given shorter steps of its own.
+    /// Errors are of first order. At 0.2 ms, an impact of 1.3 kg on wood at 0.04 m/s, 4 ms long, differs from the
+    /// converged result by +0.7 % in the filtered peak, +5 % in the unfiltered peak and -0.3 % in the impulse;
+    /// therefore contact needs no smaller steps.
     pub step_s: f64,
     /// Control cycle \[s\], a whole number of steps; 1 ms by default.
     pub cycle_s: f64,
-    /// What stands around the arm.
+    /// Environment of the arm.
     pub scene: Scene,
-    /// Seed of every noise.
+    /// Seed of all noise.
     pub seed: u64,
 }
 
 impl<const N: usize> PlantConfig<N> {
-    /// The arm alone: no friction, no scene, no stops, exact encoders, torques exact and at once.
+    /// Ideal arm: no friction, scene or stops, exact encoders, exact torques without delay.
     pub fn ideal(arm: Arm<N>) -> PlantConfig<N> {
         PlantConfig {
             arm,
             friction: [LuGre::NONE; N],
-            drive: Drive::direct(),
+            actuators: ActuatorModel::direct(),
             stops: None,
             tip_radius_m: 0.02,
             force_sensor: ForceSensor::default(),
@@ -111,15 +111,15 @@ impl<const N: usize> PlantConfig<N> {
         }
     }
 
-    /// Steps in a cycle, once all that the other parts do not check themselves is sound.
+    /// Checks the values that no other part checks; returns the number of steps per cycle.
     pub(crate) fn validate(&self) -> Result<usize, PlantError> {
         let positive = |name, value: f64| {
-            let sound = value > 0.0 && value.is_finite();
-            entry(sound, name, value, "finite and positive")
+            let valid = value > 0.0 && value.is_finite();
+            entry(valid, name, value, "finite and positive")
         };
         let not_negative = |name, value: f64| {
-            let sound = value >= 0.0 && value.is_finite();
-            entry(sound, name, value, "finite and not negative")
+            let valid = value >= 0.0 && value.is_finite();
+            entry(valid, name, value, "finite and not negative")
         };
         for (joint, friction) in self.friction.iter().enumerate() {
             friction.validate(joint)?;
@@ -138,8 +138,8 @@ impl<const N: usize> PlantConfig<N> {
         positive("step_s", self.step_s)?;
         let steps = libm::rint(self.cycle_s / self.step_s);
         let whole = (self.cycle_s - steps * self.step_s).abs() <= 1e-9 * self.cycle_s;
-        let sound = whole && (1.0..=1e6).contains(&steps);
-        entry(sound, "cycle_s", self.cycle_s, "a whole number of step_s")?;
+        let valid = whole && (1.0..=1e6).contains(&steps);
+        entry(valid, "cycle_s", self.cycle_s, "a whole number of step_s")?;
         self.scene.validate()?;
         Ok(steps as usize)
     }

@@ -2,14 +2,14 @@
 //! surface.
 //!
 //! ```text
-//! F = k d^(3/2) (1 + c d')   held at zero or more
+//! F = k d^(3/2) (1 + c d')   limited to zero or more
 //! T = -k_t (s + t_t v)        |T| <= mu F, |s| <= mu F / k_t, s' = v while s is below that
 //! ```
 //!
 //! `d` is the penetration, `d'` its rate, `v` the velocity along the surface, `s` the bristle. Hunt and
 //! Crossley 1975, "Coefficient of restitution interpreted as damping in vibroimpact". Unlike an
-//! impulse solver's, the force has a stiffness that depends neither on the step nor on the masses. It
-//! is a law for a ball on a flat surface, not for edges.
+//! impulse solver's, the force has a stiffness that depends neither on the step nor on the masses. It is valid
+//! for a sphere on a flat surface, not for edges.
 
 use serde::{Deserialize, Serialize};
 use supple_core::nalgebra::Vector3;
@@ -19,7 +19,7 @@ pub const TANGENTIAL_STIFFNESS_N_PER_M: f64 = 2e4;
 /// Damping over stiffness of the tangential bristle \[s\].
 pub const TANGENTIAL_TIME_S: f64 = 1e-3;
 
-/// How a surface answers the tip.
+/// Contact properties of a surface.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Material {
@@ -55,7 +55,7 @@ impl Material {
         }
     }
 
-    /// `F` \[N\] at `depth_m`, growing at `depth_rate_m_per_s`; zero out of contact.
+    /// `F` \[N\] at penetration `depth_m` and rate `depth_rate_m_per_s`; zero without contact.
     pub fn normal_force_n(&self, depth_m: f64, depth_rate_m_per_s: f64) -> f64 {
         if depth_m <= 0.0 {
             return 0.0;
@@ -65,7 +65,7 @@ impl Material {
     }
 }
 
-/// Where and how fast the tip is in a surface.
+/// Contact state of the tip at a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
     /// Penetration \[m\], positive.
@@ -83,8 +83,8 @@ pub struct Contact {
 pub struct Bristle(Vector3<f64>);
 
 impl Bristle {
-    /// Advances the bristle over `dt_s` and gives the force on the tip \[N\], base axes. Out of
-    /// contact (`None`) the bristle forgets.
+    /// Advances the bristle over `dt_s` and returns the force on the tip \[N\], base axes. Without contact (`None`)
+    /// the deflection is reset.
     pub fn advance(
         &mut self,
         contact: Option<&Contact>,
@@ -109,7 +109,7 @@ impl Bristle {
     }
 }
 
-/// `v`, no longer than `limit`.
+/// `v`, scaled down to length `limit` if longer.
 fn clamped(v: &Vector3<f64>, limit: f64) -> Vector3<f64> {
     let length = libm::sqrt(v.dot(v));
     if length > limit {

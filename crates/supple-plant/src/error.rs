@@ -1,49 +1,49 @@
-//! What a plant cannot be built from.
+//! Errors of the plant configuration.
 
 use crate::scene::SceneError;
 
-/// Why a plant was not built.
+/// Error of building a plant or of changing its state.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PlantError {
-    /// An entry of the configuration is not sound.
+    /// An entry of the configuration is invalid.
     #[error("{entry} is {value}: it must be {must}")]
     Entry {
-        /// Name of the entry, with its joint where it has one.
+        /// Name of the entry, with its joint if it has one.
         entry: String,
         /// Value found.
         value: f64,
-        /// What it must be.
+        /// Requirement on the value.
         must: &'static str,
     },
     /// The motor-to-joint matrix has no inverse.
     #[error(
-        "joint_from_motor is singular or not finite: give the invertible matrix that takes motor \
+        "joint_from_motor is singular or not finite: give the invertible matrix that maps motor \
          angles to joint angles"
     )]
     Transmission,
-    /// The tip is put deep inside something.
+    /// The tip starts deep inside an object.
     #[error(
         "the tip starts {depth_m:.6} m inside {object:?}: move the object or choose another start pose"
     )]
-    Buried {
+    TipInsideObject {
         /// Name of the object.
         object: String,
-        /// Penetration of the tip's ball \[m\].
+        /// Penetration of the spherical tip \[m\].
         depth_m: f64,
     },
-    /// The scene is not sound.
+    /// The scene is invalid.
     #[error(transparent)]
     Scene(#[from] SceneError),
 }
 
-/// `Ok` when `sound` holds, the entry's error otherwise.
+/// `Ok` if `valid` holds, the entry's error otherwise.
 pub(crate) fn entry(
-    sound: bool,
+    valid: bool,
     name: impl Into<String>,
     value: f64,
     must: &'static str,
 ) -> Result<(), PlantError> {
-    if sound {
+    if valid {
         return Ok(());
     }
     Err(PlantError::Entry {

@@ -1,4 +1,4 @@
-//! Second-order Butterworth low-pass, the force sensor's filter.
+//! Second-order Butterworth low-pass filter of the force sensor.
 //!
 //! Bilinear transform of `H(s) = w^2 / (s^2 + sqrt(2) w s + w^2)` with the cutoff pre-warped, so that
 //! the gain is exactly `1/sqrt(2)` at the cutoff:
@@ -23,10 +23,10 @@ pub struct Butterworth {
 }
 
 impl Butterworth {
-    /// `cutoff_hz` where the gain is -3 dB, `sample_s` the sampling period.
+    /// Filter with a gain of -3 dB at `cutoff_hz`; `sample_s` is the sampling period.
     ///
     /// # Errors
-    /// A cutoff that is not positive and below half the sampling rate.
+    /// [`PlantError`] if the cutoff is not positive and below half the sampling rate.
     pub fn new(cutoff_hz: f64, sample_s: f64) -> Result<Butterworth, PlantError> {
         let ratio = cutoff_hz * sample_s;
         entry(
@@ -47,7 +47,7 @@ impl Butterworth {
         })
     }
 
-    /// Takes a sample, gives the filtered one.
+    /// Filters one sample.
     pub fn step(&mut self, sample: &Vector3<f64>) -> Vector3<f64> {
         let out = sample * self.b[0] + self.first;
         self.first = sample * self.b[1] - out * self.a[0] + self.second;
@@ -55,7 +55,7 @@ impl Butterworth {
         out
     }
 
-    /// Forgets the past.
+    /// Resets the filter state.
     pub fn reset(&mut self) {
         self.first = Vector3::zeros();
         self.second = Vector3::zeros();
@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn refuses_a_cutoff_beyond_half_the_sampling_rate() {
+    fn rejects_a_cutoff_above_half_the_sampling_rate() {
         let error = Butterworth::new(600.0, 1e-3).unwrap_err();
         assert!(error.to_string().contains("600"));
     }

@@ -1,4 +1,4 @@
-//! Joint friction by a bristle: the LuGre model with a Stribeck dip.
+//! Joint friction: the LuGre bristle model with Stribeck effect.
 //!
 //! ```text
 //! z' = v - s0 |v| z / g(v)      tau = s0 z + s1 z' + V v + offset
@@ -6,22 +6,21 @@
 //! ```
 //!
 //! `z` is the bristle's deflection, `l` in 0..1 the joint's load, `d` in -1..1 the direction of motion,
-//! `f` the load fraction. Sliding steadily, the torque is `V v + offset + sign(v) g(v)`. Canudas de
+//! `f` the load fraction. In steady sliding the torque is `V v + offset + sign(v) g(v)`. Canudas de
 //! Wit, Olsson, Astrom, Lischinsky 1995, "A new model for control of systems with friction". The
-//! bristle is advanced exactly for a velocity that stays the same over the step, so it cannot run past
-//! the deflection of steady sliding however long the step. Known flaw of the model: under a load that
-//! trembles below breakaway it creeps.
+//! bristle state is integrated exactly for constant velocity over the step, so it cannot exceed its steady-state
+//! deflection. Known limitation: under an oscillating load below breakaway the model drifts.
 
 use crate::error::{PlantError, entry};
 use supple_core::Friction;
 
-/// Breakaway torque over Coulomb torque where the friction it is built from has no dip of its own.
+/// Breakaway torque over Coulomb torque if the given friction has no Stribeck effect.
 pub const BREAKAWAY_FACTOR: f64 = 1.1;
 /// Deflection of a bristle about to slide at the Coulomb torque \[rad\].
 pub const BRISTLE_DEFLECTION_RAD: f64 = 5e-4;
 /// Bristle damping over bristle stiffness \[s\].
 pub const BRISTLE_TIME_S: f64 = 2e-3;
-/// Share of the dry friction that depends on load and direction.
+/// Fraction of the dry friction that depends on load and direction.
 pub const LOAD_FRACTION: f64 = 0.02;
 
 /// Friction of one joint.
@@ -31,17 +30,17 @@ pub struct LuGre {
     pub viscous_nm_s_per_rad: f64,
     /// `S`, dry torque in fast sliding \[N m\], zero or more.
     pub coulomb_nm: f64,
-    /// `S_0`, dry torque in the slowest sliding \[N m\], at least `coulomb_nm`.
+    /// `S_0`, limit of the dry torque at zero sliding speed \[N m\], at least `coulomb_nm`.
     pub breakaway_nm: f64,
-    /// `v_s`, speed over which the dip fades \[rad/s\], positive.
+    /// `v_s`, Stribeck speed \[rad/s\], positive.
     pub stribeck_rad_per_s: f64,
     /// Torque that does not depend on the velocity \[N m\].
     pub offset_nm: f64,
-    /// `s0` \[N m/rad\], positive where there is dry friction, zero where there is none.
+    /// `s0` \[N m/rad\], positive with dry friction, zero without.
     pub bristle_stiffness_nm_per_rad: f64,
     /// `s1` \[N m s/rad\], zero or more.
     pub bristle_damping_nm_s_per_rad: f64,
-    /// `f`, share of the dry friction that depends on load and direction, 0 to 0.5.
+    /// `f`, fraction of the dry friction that depends on load and direction, 0 to 0.5.
     pub load_fraction: f64,
 }
 
@@ -58,8 +57,8 @@ impl LuGre {
         load_fraction: 0.0,
     };
 
-    /// Friction whose steady sliding is `friction` outside its band: the same `V`, `S`, `v_s` and
-    /// offset. Its dip is kept; where it has none, breakaway is [`BREAKAWAY_FACTOR`] `S`. The load
+    /// Friction that equals `friction` in steady sliding outside its band: the same `V`, `S`, `v_s` and
+    /// offset. Its Stribeck effect is kept; without one, breakaway is [`BREAKAWAY_FACTOR`] `S`. The load
     /// fraction is [`LOAD_FRACTION`].
     pub fn from_friction(friction: &Friction) -> LuGre {
         let coulomb_nm = friction.coulomb_nm;
@@ -81,7 +80,7 @@ impl LuGre {
         }
     }
 
-    /// The same friction with the part that depends on load and direction switched off.
+    /// The same friction without the part that depends on load and direction.
     pub fn without_load(self) -> LuGre {
         LuGre {
             load_fraction: 0.0,
@@ -90,7 +89,7 @@ impl LuGre {
     }
 
     /// Torque of steady sliding at `velocity_rad_per_s` under `load` in 0..1 \[N m\], positive against
-    /// positive motion. At rest, the offset alone.
+    /// positive motion. At rest only the offset.
     pub fn steady_torque_nm(&self, velocity_rad_per_s: f64, load: f64) -> f64 {
         let v = velocity_rad_per_s;
         let sign = if v == 0.0 { 0.0 } else { 1.0_f64.copysign(v) };
@@ -106,8 +105,8 @@ impl LuGre {
         (self.coulomb_nm + dip) * (1.0 + share)
     }
 
-    /// Advances the bristle `deflection_rad` over `dt_s` at constant velocity and gives the friction
-    /// torque at the end of it \[N m\], positive against positive motion. `load` in 0..1, `dt_s` positive.
+    /// Advances the bristle `deflection_rad` over `dt_s` at constant velocity and returns the friction torque
+    /// at the end \[N m\], positive against positive motion. `load` in 0..1, `dt_s` positive.
     pub fn advance(
         &self,
         deflection_rad: &mut f64,
@@ -135,16 +134,16 @@ impl LuGre {
             + smooth
     }
 
-    /// Refuses what friction cannot be. `joint` names it in the error.
+    /// Rejects invalid friction parameters; errors name `joint`.
     pub(crate) fn validate(&self, joint: usize) -> Result<(), PlantError> {
         let name = |field: &str| format!("friction of joint {joint}: {field}");
-        let check = |field, value: f64, sound: bool, must| {
-            entry(sound && value.is_finite(), name(field), value, must)
+        let check = |field, value: f64, valid: bool, must| {
+            entry(valid && value.is_finite(), name(field), value, must)
         };
-        let none_less = "finite and not negative";
+        let must_not_be_negative = "finite and not negative";
         let (v, s) = (self.viscous_nm_s_per_rad, self.coulomb_nm);
-        check("viscous_nm_s_per_rad", v, v >= 0.0, none_less)?;
-        check("coulomb_nm", s, s >= 0.0, none_less)?;
+        check("viscous_nm_s_per_rad", v, v >= 0.0, must_not_be_negative)?;
+        check("coulomb_nm", s, s >= 0.0, must_not_be_negative)?;
         let s0 = self.breakaway_nm;
         check(
             "breakaway_nm",
@@ -156,11 +155,16 @@ impl LuGre {
         check("stribeck_rad_per_s", vs, vs > 0.0, "finite and positive")?;
         check("offset_nm", self.offset_nm, true, "finite")?;
         let k = self.bristle_stiffness_nm_per_rad;
-        let sound = if s0 > 0.0 { k > 0.0 } else { k == 0.0 };
-        let must = "positive where there is dry friction, 0 where there is none";
-        check("bristle_stiffness_nm_per_rad", k, sound, must)?;
+        let valid = if s0 > 0.0 { k > 0.0 } else { k == 0.0 };
+        let must = "positive with dry friction, 0 without";
+        check("bristle_stiffness_nm_per_rad", k, valid, must)?;
         let c = self.bristle_damping_nm_s_per_rad;
-        check("bristle_damping_nm_s_per_rad", c, c >= 0.0, none_less)?;
+        check(
+            "bristle_damping_nm_s_per_rad",
+            c,
+            c >= 0.0,
+            must_not_be_negative,
+        )?;
         let f = self.load_fraction;
         let must = "from 0 to 0.5";
         check("load_fraction", f, (0.0..=0.5).contains(&f), must)

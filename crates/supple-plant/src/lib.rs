@@ -1,13 +1,13 @@
-//! The arm and what it touches, as a simulated plant: torques in, measurements out.
+//! Simulated arm and environment: torques in, measurements out.
 //!
 //! The arm is a reduced-coordinate multibody of the rapier engine with the rotor inertias on its
-//! diagonal; the joints carry bristle friction, quantised encoders and quantised, delayed torques;
-//! the tip is a ball that meets the [`Scene`] with a Hunt-Crossley force of this crate, since the
-//! engine's own contact impulse has no stiffness of its own: its peak grows as the step shrinks. The
-//! engine solves contacts between scene objects only.
+//! diagonal; the joints have bristle friction, quantised encoders and quantised, delayed torques; the
+//! tip is a sphere with a Hunt-Crossley contact force implemented here, because the impulse-based contact of
+//! the engine has no defined stiffness: its peak grows as the step shrinks. The engine solves contacts between
+//! scene objects only.
 //!
-//! It is not a controller and knows none; arm links other than the tip touch nothing; a step is
-//! first-order accurate. The same configuration and torques give the same bits.
+//! The crate contains no controller; links other than the tip do not collide; integration is first-order
+//! accurate. The same configuration and torques give bit-identical results.
 //!
 //! ```
 //! use supple_core::{Arm, Body, Joint, Pose, Vector, nalgebra::Vector3};
@@ -29,9 +29,9 @@
 
 #![forbid(unsafe_code)]
 
+pub mod actuators;
 pub mod config;
 pub mod contact;
-pub mod drive;
 pub mod filter;
 pub mod friction;
 pub mod injection;
@@ -45,12 +45,12 @@ mod record;
 mod trace_file;
 mod world;
 
-pub use config::{ForceSensor, PlantConfig, Stops};
+pub use actuators::{ActuatorModel, Ripple};
+pub use config::{ForceSensor, HardStops, PlantConfig};
 pub use contact::{Contact, Material};
-pub use drive::{Drive, Ripple};
 pub use error::PlantError;
 pub use friction::LuGre;
-pub use injection::{Injection, InjectionError, InjectionKind, Injector, Sight, Trigger};
+pub use injection::{ControllerView, Injection, InjectionError, InjectionKind, Injector, Trigger};
 pub use plant::Plant;
 pub use record::{Measurement, StepRecord, Truth};
 pub use scene::{FixedBlock, FreeBox, Ground, Layer, Scene, SceneError};

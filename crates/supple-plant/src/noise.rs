@@ -1,8 +1,8 @@
-//! Seeded noise: the same seed gives the same bits on every machine.
+//! Seeded noise: the same seed gives bit-identical numbers on every machine.
 //!
-//! Uniform numbers are PCG-XSH-RR 64/32 (O'Neill 2014, "PCG: a family of simple fast space-efficient
-//! statistically good algorithms for random number generation"); normal ones are Marsaglia's polar
-//! method on `libm`. Not for cryptography.
+//! Uniform numbers come from PCG-XSH-RR 64/32 (O'Neill 2014, "PCG: a family of simple fast space-efficient
+//! statistically good algorithms for random number generation"); normal ones from Marsaglia's
+//! polar method on `libm`. Not for cryptography.
 
 const MULTIPLIER: u64 = 6_364_136_223_846_793_005;
 

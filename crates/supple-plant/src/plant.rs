@@ -1,7 +1,7 @@
 //! The plant: one control cycle of physics at a time.
 
+use crate::actuators::ActuatorState;
 use crate::config::PlantConfig;
-use crate::drive::DriveState;
 use crate::error::{PlantError, entry};
 use crate::filter::Butterworth;
 use crate::noise::Noise;
@@ -12,14 +12,14 @@ use supple_core::dynamics::{gravity, joint_poses, kinetic_energy};
 use supple_core::nalgebra::Vector3;
 use supple_core::{Arm, ArmError, Body, Pose, Vector};
 
-/// Penetration at which a tip may be put \[m\]; a tip at rest is in by hundredths of a millimetre.
-const GREATEST_START_DEPTH_M: f64 = 1e-3;
+/// Maximum initial penetration of the tip \[m\]; at rest the penetration is some 0.01 mm.
+const MAX_START_DEPTH_M: f64 = 1e-3;
 
 /// The simulated arm in its scene.
 pub struct Plant<const N: usize> {
     config: PlantConfig<N>,
     world: World<N>,
-    drive: DriveState<N>,
+    actuators: ActuatorState<N>,
     filter: Butterworth,
     encoder_noise: Noise,
     force_noise: Noise,
@@ -30,7 +30,7 @@ pub struct Plant<const N: usize> {
     measurement: Measurement<N>,
     truth: Truth<N>,
     poses: [Pose; N],
-    greatest_force_n: Vector3<f64>,
+    max_force_n: Vector3<f64>,
 }
 
 impl<const N: usize> Plant<N> {
@@ -38,8 +38,8 @@ impl<const N: usize> Plant<N> {
     /// acts, the motors hold the arm against gravity at `q0`.
     ///
     /// # Errors
-    /// [`PlantError`] names the entry that is not sound, its value and what it must be, or the object
-    /// that the tip starts more than a millimetre inside.
+    /// [`PlantError`] names the invalid entry, its value and the requirement, or the object that the tip penetrates
+    /// by more than a millimetre at the start.
     pub fn new(
         config: PlantConfig<N>,
         q0: Vector<N>,
@@ -50,11 +50,11 @@ impl<const N: usize> Plant<N> {
         finite("qd0", &qd0)?;
         let held = gravity(&config.arm, &q0);
         let world = World::new(&config, &q0, &qd0)?;
-        let drive = DriveState::new(config.drive.clone(), &held)?;
+        let actuators = ActuatorState::new(config.actuators.clone(), &held)?;
         let filter = Butterworth::new(config.force_sensor.cutoff_hz, config.step_s)?;
         let mut plant = Plant {
             world,
-            drive,
+            actuators,
             filter,
             encoder_noise: Noise::new(config.seed, 1),
             force_noise: Noise::new(config.seed, 2),
@@ -79,32 +79,31 @@ impl<const N: usize> Plant<N> {
                 motor_torque_nm: held,
             },
             poses: [Pose::IDENTITY; N],
-            greatest_force_n: Vector3::zeros(),
+            max_force_n: Vector3::zeros(),
             config,
         };
         plant.read_state();
-        plant.refuse_buried()?;
+        plant.check_start_penetration()?;
         plant.measure(Vector3::zeros());
         Ok(plant)
     }
 
-    /// Advances one control cycle. `torque_nm` is the joint torque commanded in it, positive along
-    /// positive motion; it acts after the drive's delay. A command that is not finite is not taken
-    /// over.
+    /// Advances one control cycle. `torque_nm` is the joint torque commanded in it, positive along positive motion;
+    /// it acts after the actuators' delay. A non-finite command is ignored.
     pub fn cycle(&mut self, torque_nm: &Vector<N>) -> Measurement<N> {
-        let applied = self.drive.command(torque_nm);
+        let applied = self.actuators.command(torque_nm);
         let start_s = self.measurement.cycle as f64 * self.config.cycle_s;
         self.steps.clear();
         let mut filtered = Vector3::zeros();
         for step in 1..=self.steps_per_cycle {
-            let touch = self.step(&applied);
-            filtered = self.filter.step(&touch.force_n);
+            let contact = self.step(&applied);
+            filtered = self.filter.step(&contact.force_n);
             self.truth.time_s = start_s + step as f64 * self.config.step_s;
             self.steps.push(StepRecord {
                 time_s: self.truth.time_s,
-                force_n: touch.force_n,
+                force_n: contact.force_n,
                 filtered_force_n: filtered,
-                depth_m: touch.depth_m,
+                depth_m: contact.depth_m,
             });
         }
         self.measurement.cycle += 1;
@@ -113,42 +112,42 @@ impl<const N: usize> Plant<N> {
         self.measurement
     }
 
-    /// Shorts these motors from now on and no others: they brake, beside whatever torque is commanded. None is
-    /// at the start.
-    pub fn short(&mut self, motors: [bool; N]) {
-        self.drive.short(motors);
+    /// Shorts exactly these motors from this call on: they brake in addition to any commanded torque. Initially none
+    /// is shorted.
+    pub fn short_motors(&mut self, motors: [bool; N]) {
+        self.actuators.short_motors(motors);
     }
 
-    /// Adds to the joint velocities \[rad/s\]: a blow that is over at once.
+    /// Adds a step to the joint velocities \[rad/s\], like an instantaneous impulse.
     ///
     /// # Errors
-    /// An entry that is not finite.
-    pub fn push(&mut self, change: &Vector<N>) -> Result<(), PlantError> {
+    /// [`PlantError`] if an entry is not finite.
+    pub fn apply_velocity_step(&mut self, change: &Vector<N>) -> Result<(), PlantError> {
         finite("velocity change", change)?;
-        self.world.push(change);
+        self.world.apply_velocity_step(change);
         self.read_state();
         Ok(())
     }
 
-    /// Gravity turns round, as if the arm were mounted upside down.
+    /// Reverses gravity, as if the arm were mounted upside down.
     pub fn reverse_gravity(&mut self) {
         let arm = &self.config.arm;
-        // The arm was sound, and is so with the opposite of a finite vector.
+        // The arm was valid and stays valid with the reversed gravity vector.
         if let Ok(arm) = with_load(arm, arm.body(N - 1), -arm.gravity()) {
             self.load_bound_nm = load_bound(&arm);
-            self.world.replace_load(&arm);
+            self.world.set_last_link_and_gravity(&arm);
             self.config.arm = arm;
         }
     }
 
-    /// Fixes a ball of this mass \[kg\] to the tip, as large as the tip's own; it touches nothing. It is part of
-    /// the arm from now on, and of [`Plant::config`].
+    /// Fixes a ball of this mass \[kg\] to the tip, as large as the tip; it does not collide. It becomes part of the
+    /// arm and of [`Plant::config`].
     ///
     /// # Errors
-    /// A mass that is not finite and positive.
+    /// [`PlantError`] if the mass is not finite and positive.
     pub fn add_payload(&mut self, mass_kg: f64) -> Result<(), PlantError> {
-        let sound = mass_kg > 0.0 && mass_kg.is_finite();
-        entry(sound, "payload mass_kg", mass_kg, "finite and positive")?;
+        let valid = mass_kg > 0.0 && mass_kg.is_finite();
+        entry(valid, "payload mass_kg", mass_kg, "finite and positive")?;
         let arm = &self.config.arm;
         let at_m = arm.joint_from_tip().translation;
         let payload = Body::ball(mass_kg, self.config.tip_radius_m, at_m);
@@ -160,7 +159,7 @@ impl<const N: usize> Plant<N> {
             must,
         }))?;
         self.load_bound_nm = load_bound(&arm);
-        self.world.replace_load(&arm);
+        self.world.set_last_link_and_gravity(&arm);
         self.config.arm = arm;
         Ok(())
     }
@@ -175,9 +174,9 @@ impl<const N: usize> Plant<N> {
         )
     }
 
-    /// The greatest contact force on the tip since this was last asked, over all steps, base axes \[N\].
-    pub fn take_greatest_force_n(&mut self) -> Vector3<f64> {
-        core::mem::take(&mut self.greatest_force_n)
+    /// Largest contact force on the tip in all steps since the last call, base axes \[N\].
+    pub fn take_max_force_n(&mut self) -> Vector3<f64> {
+        core::mem::take(&mut self.max_force_n)
     }
 
     /// The measurement at the end of the last cycle, or at the start.
@@ -185,33 +184,33 @@ impl<const N: usize> Plant<N> {
         &self.measurement
     }
 
-    /// What is really so at the end of the last cycle, or at the start.
+    /// Ground truth at the end of the last cycle, or at the start.
     pub fn truth(&self) -> &Truth<N> {
         &self.truth
     }
 
-    /// Every step of the last cycle.
+    /// Records of all steps of the last cycle.
     pub fn steps(&self) -> &[StepRecord] {
         &self.steps
     }
 
-    /// What it was built from, with the load that was added.
+    /// Configuration of the plant, with any added payload.
     pub fn config(&self) -> &PlantConfig<N> {
         &self.config
     }
 
-    /// Frames of the joints as they stand now, `base_from_joint`.
+    /// Current joint frames, `base_from_joint`.
     pub fn joint_poses(&self) -> &[Pose; N] {
         &self.poses
     }
 
-    /// Everything around the arm as it stands now.
+    /// Objects of the environment in their current state.
     pub fn objects(&self) -> impl Iterator<Item = Object> {
         self.world.objects()
     }
 
-    /// Load of each joint, 0 to 1: the moment that gravity puts on it, drive and bearing together,
-    /// over the moment of the arm stretched out level.
+    /// Load of each joint, 0 to 1: gravity moment on motor and bearings, relative to that of the horizontally
+    /// stretched arm.
     pub fn load(&self) -> Vector<N> {
         let mut load = Vector::zeros();
         let (mut mass, mut moment) = (0.0, Vector3::zeros());
@@ -228,17 +227,17 @@ impl<const N: usize> Plant<N> {
         load
     }
 
-    /// Puts the arm at `q` \[rad\], `qd` \[rad/s\], bristles relaxed, filter empty, motors holding it
-    /// against gravity. Time and scene go on.
+    /// Sets the arm to `q` \[rad\], `qd` \[rad/s\], with relaxed bristles, a reset filter and motors that hold it
+    /// against gravity. Time and scene are unchanged.
     ///
     /// # Errors
-    /// An entry that is not finite, or a tip more than a millimetre inside something; the arm is there
-    /// all the same.
+    /// [`PlantError`] if an entry is not finite, or if the tip is more than a millimetre inside an object; in the
+    /// latter case the arm is moved nevertheless.
     pub fn set_state(&mut self, q: Vector<N>, qd: Vector<N>) -> Result<(), PlantError> {
         finite("q", &q)?;
         finite("qd", &qd)?;
         self.world.set_state(&q, &qd);
-        self.drive.restart(&gravity(&self.config.arm, &q));
+        self.actuators.restart(&gravity(&self.config.arm, &q));
         self.filter.reset();
         self.bristles_rad = [0.0; N];
         self.steps.clear();
@@ -246,24 +245,24 @@ impl<const N: usize> Plant<N> {
         self.truth.friction_torque_nm = Vector::zeros();
         self.read_state();
         self.measure(Vector3::zeros());
-        self.refuse_buried()
+        self.check_start_penetration()
     }
 
-    /// A tip that starts deep in something would be shot out of it.
-    fn refuse_buried(&self) -> Result<(), PlantError> {
+    /// Rejects a tip that starts deep inside an object: contact would eject it.
+    fn check_start_penetration(&self) -> Result<(), PlantError> {
         match self.world.deepest(&self.tip_motion()) {
-            Some((object, depth_m)) if depth_m > GREATEST_START_DEPTH_M => {
-                Err(PlantError::Buried { object, depth_m })
+            Some((object, depth_m)) if depth_m > MAX_START_DEPTH_M => {
+                Err(PlantError::TipInsideObject { object, depth_m })
             }
             _ => Ok(()),
         }
     }
 
-    /// One step of the physics under the joint torque `applied`, ripple apart.
+    /// One step of the physics under the joint torque `applied`, which excludes ripple.
     fn step(&mut self, applied: &Vector<N>) -> TipForce {
         let dt_s = self.config.step_s;
         let (q, qd) = (self.truth.position_rad, self.truth.velocity_rad_per_s);
-        let motor = applied + self.drive.ripple(&q) + self.drive.braking(&qd);
+        let motor = applied + self.actuators.ripple(&q) + self.actuators.braking(&qd);
         let friction = self.friction(&qd, dt_s);
         let mut torque = motor - friction;
         if let Some(stops) = &self.config.stops {
@@ -272,22 +271,22 @@ impl<const N: usize> Plant<N> {
             }
         }
         let tip = self.tip_motion();
-        let touch = self.world.touch(&tip, dt_s);
+        let contact = self.world.compute_tip_contact(&tip, dt_s);
         let about_axis: [Vector3<f64>; N] =
             array::from_fn(|i| self.poses[i].rotation.column(2) * torque[i]);
         let link_torque = array::from_fn(|i| match about_axis.get(i + 1) {
             Some(reaction) => about_axis[i] - reaction,
             None => about_axis[i],
         });
-        self.world.step(&link_torque, &touch, &tip.center_m, dt_s);
-        if touch.force_n.norm_squared() > self.greatest_force_n.norm_squared() {
-            self.greatest_force_n = touch.force_n;
+        self.world.step(&link_torque, &contact, &tip.center_m, dt_s);
+        if contact.force_n.norm_squared() > self.max_force_n.norm_squared() {
+            self.max_force_n = contact.force_n;
         }
-        self.truth.contact_force_n = touch.force_n;
+        self.truth.contact_force_n = contact.force_n;
         self.truth.friction_torque_nm = friction;
         self.truth.motor_torque_nm = motor;
         self.read_state();
-        touch
+        contact
     }
 
     fn friction(&mut self, qd: &Vector<N>, dt_s: f64) -> Vector<N> {
@@ -317,7 +316,7 @@ impl<const N: usize> Plant<N> {
         self.truth.position_rad = q;
         self.truth.velocity_rad_per_s = qd;
         self.truth.tip_position_m = tip.translation;
-        // J qd: the engine's own link velocities are one step old.
+        // Use J qd: the link velocities of the engine lag by one step.
         let moved = |pose: &Pose, rate: f64| {
             let axis: Vector3<f64> = pose.rotation.column(2).into();
             axis.cross(&(tip.translation - pose.translation)) * rate
@@ -339,7 +338,7 @@ impl<const N: usize> Plant<N> {
         self.measurement = Measurement {
             cycle: self.measurement.cycle,
             time_s: self.truth.time_s,
-            position_rad: self.drive.measure(&q, &mut self.encoder_noise),
+            position_rad: self.actuators.measure(&q, &mut self.encoder_noise),
             force_n: filtered_n + noise,
         };
     }
@@ -372,8 +371,8 @@ fn with_load<const N: usize>(
     )
 }
 
-/// Moment on each joint if everything beyond it lay in a level line: mass times gravity times the
-/// length of the chain.
+/// Moment on each joint if all links beyond it formed a horizontal line: mass times gravity times the length of
+/// the chain.
 fn load_bound<const N: usize>(arm: &Arm<N>) -> Vector<N> {
     let gravity = libm::sqrt(arm.gravity().dot(&arm.gravity()));
     Vector::from_fn(|j, _| {

@@ -1,22 +1,22 @@
-//! What a plant says: measurements, the truth behind them, every step of the physics.
+//! Plant outputs: measurements, ground truth and every physics step.
 
 use supple_core::Vector;
 use supple_core::nalgebra::Vector3;
 
-/// What the arm reports at the end of a cycle.
+/// Measurements at the end of a cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measurement<const N: usize> {
     /// Cycles since the start.
     pub cycle: u64,
     /// Time since the start \[s\].
     pub time_s: f64,
-    /// Joint angles through the encoders \[rad\].
+    /// Joint angles measured by the encoders \[rad\].
     pub position_rad: Vector<N>,
-    /// Force on the tip through the sensor's filter and noise, base axes \[N\].
+    /// Force on the tip with the sensor's filter and noise, base axes \[N\].
     pub force_n: Vector3<f64>,
 }
 
-/// What is really so.
+/// Ground truth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Truth<const N: usize> {
     /// Time since the start \[s\].
@@ -25,9 +25,9 @@ pub struct Truth<const N: usize> {
     pub position_rad: Vector<N>,
     /// Joint velocities \[rad/s\].
     pub velocity_rad_per_s: Vector<N>,
-    /// Centre of the tip's ball, base axes \[m\].
+    /// Centre of the spherical tip, base axes \[m\].
     pub tip_position_m: Vector3<f64>,
-    /// Its velocity \[m/s\].
+    /// Velocity of the tip, base axes \[m/s\].
     pub tip_velocity_m_per_s: Vector3<f64>,
     /// Contact force on the tip over the last step, base axes \[N\].
     pub contact_force_n: Vector3<f64>,
@@ -44,8 +44,8 @@ pub struct StepRecord {
     pub time_s: f64,
     /// Contact force on the tip over the step, base axes \[N\].
     pub force_n: Vector3<f64>,
-    /// The same through the sensor's filter, without its noise \[N\].
+    /// Contact force after the sensor's filter, without its noise \[N\].
     pub filtered_force_n: Vector3<f64>,
-    /// Deepest penetration of the tip at the start of the step \[m\], zero out of contact.
+    /// Deepest penetration of the tip at the start of the step \[m\], zero without contact.
     pub depth_m: f64,
 }

@@ -1,7 +1,7 @@
-//! What acts at the motors and on the tip of a simulated arm, once a millisecond, as CSV.
+//! CSV trace of motor torques and tip forces of a simulated arm, one line per millisecond.
 //!
-//! Not a log of a controller: it goes on when the controller is gone. A disk that is full ends it and not the
-//! arm: what was in the way is said by [`TraceFile::finish`].
+//! Independent of the controller: it continues after the controller has exited. If the disk is full, the trace
+//! stops and the arm continues; [`TraceFile::finish`] returns the error.
 
 use crate::plant::Plant;
 use std::fs::File;
@@ -14,43 +14,43 @@ const EVERY_NS: u64 = 1_000_000;
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {source}; choose a file that can be written with --trace", file.display())]
 pub struct TraceError {
-    /// Which.
+    /// Path of the file.
     pub file: PathBuf,
-    /// What the system says.
+    /// Error of the operating system.
     pub source: std::io::Error,
 }
 
-/// What a line says beside what the plant knows itself.
+/// Data of a line that the plant does not have.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample<const N: usize> {
-    /// When \[ns\].
+    /// Time \[ns\].
     pub time_ns: u64,
-    /// How many motors take torques.
+    /// Number of motors in torque mode.
     pub active: usize,
-    /// What acts at each motor, braking included \[N m\].
+    /// Torque at each motor, braking included \[N m\].
     pub torque_nm: [f64; N],
-    /// Mode of the controller, a number of [`supple_core::codes::MODES`]; empty where it is not told.
+    /// Mode of the controller, a number of [`supple_core::codes::MODES`]; `None` if unknown.
     pub mode: Option<u8>,
-    /// Kind of its fault, see [`supple_core::codes::FaultCode`], 0 for none; empty where it is not told.
+    /// Kind of the controller's fault, see [`supple_core::codes::FaultCode`], 0 for no fault; `None` if unknown.
     pub fault: Option<u8>,
-    /// How many injections have begun.
+    /// Number of injections that have begun.
     pub injections: usize,
 }
 
-/// The file.
+/// Writer of the trace file.
 #[derive(Debug)]
 pub struct TraceFile {
     path: PathBuf,
     file: BufWriter<File>,
-    /// Why it ended before the run.
+    /// Error that ended the trace.
     failed: Option<std::io::Error>,
     next_ns: u64,
     active: usize,
 }
 
 impl TraceFile {
-    /// A new file with its head line, for an arm of `joints` motors. A device, FIFO, socket or folder of that
-    /// name is refused.
+    /// Creates the file with its header line, for an arm of `joints` motors. A device, FIFO, socket or folder of
+    /// that name is rejected.
     ///
     /// # Errors
     /// [`TraceError`].
@@ -74,10 +74,10 @@ impl TraceFile {
         Ok(trace)
     }
 
-    /// Writes a line if it is time for one, or if motors came to brake or ceased to. The force is the greatest
-    /// since the line before: an impact is over in less time than two lines are apart. Nothing is written any more
-    /// once a line could not be.
-    pub fn note<const N: usize>(&mut self, sample: &Sample<N>, plant: &mut Plant<N>) {
+    /// Writes a line every millisecond and whenever motors start or stop braking. The force is the maximum since the
+    /// previous line, since an impact may be shorter than the interval. After a write error nothing more is
+    /// written.
+    pub fn write_sample<const N: usize>(&mut self, sample: &Sample<N>, plant: &mut Plant<N>) {
         let Sample {
             time_ns, active, ..
         } = *sample;
@@ -87,10 +87,10 @@ impl TraceFile {
         self.active = active;
         self.next_ns = time_ns + EVERY_NS;
         let torques = sample.torque_nm.iter().map(|t| format!(",{t:.6}"));
-        let force = plant.take_greatest_force_n();
+        let force = plant.take_max_force_n();
         let truth = plant.truth();
         let tip = truth.tip_position_m;
-        let told = |code: Option<u8>| code.map_or_else(String::new, |code| code.to_string());
+        let code_text = |code: Option<u8>| code.map_or_else(String::new, |code| code.to_string());
         let line = format!(
             "{time_ns},{active}{},{:.4},{:.4},{:.4},{:.6},{:.6},{:.6},{:.6},{:.6},{:.6},{},{},{}",
             torques.collect::<String>(),
@@ -103,17 +103,17 @@ impl TraceFile {
             truth.tip_velocity_m_per_s.norm(),
             truth.velocity_rad_per_s.amax(),
             plant.kinetic_energy_j(),
-            told(sample.mode),
-            told(sample.fault),
+            code_text(sample.mode),
+            code_text(sample.fault),
             sample.injections
         );
         self.line(&line);
     }
 
-    /// The end of the run.
+    /// Closes the file at the end of the run.
     ///
     /// # Errors
-    /// [`TraceError`] where the file ends before it.
+    /// [`TraceError`] if a line could not be written.
     pub fn finish(mut self) -> Result<(), TraceError> {
         let flushed = self.file.flush();
         let failed = self.failed.map_or(flushed, Err);
@@ -137,13 +137,13 @@ mod tests {
     use supple_core::Vector;
     use supple_model::Description;
 
-    /// A system that ends is over within the millisecond in which its motors came to brake.
+    /// A system may end within the millisecond in which its motors start braking.
     #[test]
-    fn motors_that_come_to_brake_are_noted_between_two_lines() {
+    fn a_start_of_braking_is_written_between_two_regular_lines() {
         let wam = Description::asset("wam4").expect("built in");
-        let config = PlantConfig::<4>::from_description(&wam).expect("sound");
+        let config = PlantConfig::<4>::from_description(&wam).expect("valid");
         let home_rad = wam.home::<4>().expect("four joints");
-        let mut plant = Plant::new(config, home_rad, Vector::zeros()).expect("sound");
+        let mut plant = Plant::new(config, home_rad, Vector::zeros()).expect("valid");
         let file = tempfile::NamedTempFile::new().expect("a file");
         let mut trace = TraceFile::create(file.path(), 4).expect("created");
         for (time_ns, active) in [(0, 4), (600_000, 4), (700_000, 0), (800_000, 0)] {
@@ -155,7 +155,7 @@ mod tests {
                 fault: None,
                 injections: 1,
             };
-            trace.note(&sample, &mut plant);
+            trace.write_sample(&sample, &mut plant);
         }
         trace.finish().expect("written");
         let text = std::fs::read_to_string(file.path()).expect("readable");

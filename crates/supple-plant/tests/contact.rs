@@ -8,7 +8,7 @@ use supple_core::nalgebra::Vector3;
 use supple_core::{Arm, Vector};
 use supple_plant::{Layer, Material, Plant, PlantConfig, Scene};
 
-/// What an impact leaves behind.
+/// Results of an impact.
 #[derive(Clone, Copy, Debug, Default)]
 struct Impact {
     peak_n: f64,
@@ -37,7 +37,7 @@ fn impact(mut plant: Plant<4>) -> Impact {
     impact
 }
 
-/// A plant above a block of one material, coming straight down.
+/// A plant above a block of one material, with the tip moving straight down.
 fn above(material: Material, speed_m_per_s: f64, step_s: f64) -> Plant<4> {
     let arm = wam4();
     let config = PlantConfig {
@@ -59,7 +59,7 @@ fn slippery() -> Material {
     }
 }
 
-/// Mass that the tip opposes to a vertical force.
+/// Effective mass of the tip in the vertical direction.
 fn effective_mass(arm: &Arm<4>, q: &Vector<4>) -> f64 {
     let up = jacobian(arm, q).row(2).transpose();
     1.0 / up.dot(&(crba(arm, q).try_inverse().unwrap() * up))
@@ -151,7 +151,7 @@ fn rebound_speed_and_impulse_follow_the_closed_form_of_the_law() {
 }
 
 #[test]
-fn an_impact_converges_at_first_order_and_is_good_enough_at_the_default_step() {
+fn an_impact_converges_at_first_order_and_is_accurate_at_the_default_step() {
     let run = |step_s| impact(above_block(1e-4, 0.04, step_s));
     let (default, fine, finer) = (run(2e-4), run(5e-5), run(2.5e-5));
     let finest = run(1.25e-5);
@@ -166,14 +166,14 @@ fn an_impact_converges_at_first_order_and_is_good_enough_at_the_default_step() {
 }
 
 #[test]
-fn the_filtered_transient_at_the_default_speed_is_the_papers() {
+fn the_filtered_transient_at_the_default_speed_matches_the_paper() {
     let found = impact(above_block(1e-4, 0.04, 2e-4));
     assert!((15.0..22.0).contains(&found.filtered_n), "{found:?}");
     assert!((3e-3..5e-3).contains(&found.contact_s), "{found:?}");
 }
 
-/// A contact much shorter than the filter shows as the filter's impulse response: the reported peak
-/// goes with the momentum change and nothing else.
+/// A contact much shorter than the filter's time constant gives the filter's impulse response: the reported peak
+/// depends only on the momentum change.
 #[test]
 fn the_filtered_peak_scales_with_effective_mass_and_speed() {
     let arm = wam4();
@@ -193,7 +193,7 @@ fn the_filtered_peak_scales_with_effective_mass_and_speed() {
             ratios.push(found.filtered_n / momentum);
         }
     }
-    // The greatest value of the filter's impulse response, sqrt(2) w exp(-w t / sqrt(2))
+    // The maximum of the filter's impulse response, sqrt(2) w exp(-w t / sqrt(2))
     // sin(w t / sqrt(2)); a longer contact reaches less of it.
     let limit = core::f64::consts::TAU * 100.0 * (-core::f64::consts::FRAC_PI_4).exp();
     for ratio in &ratios {
@@ -219,9 +219,9 @@ fn at_rest_the_force_is_stiffness_times_error() {
     }
 }
 
-/// Without gravity and torque nothing but the contact acts, so the energy is kinetic.
+/// Without gravity and torque only the contact acts, so all energy is kinetic.
 #[test]
-fn no_bounce_adds_energy() {
+fn no_impact_adds_energy() {
     let arm = wam4_in(Vector3::zeros());
     for (dissipation, friction) in [(40.0, 0.3), (40.0, 0.0), (0.0, 0.3), (0.0, 0.0)] {
         for slide in [-0.3, 0.0, 0.2] {
@@ -258,7 +258,7 @@ fn no_bounce_adds_energy() {
             if dissipation > 0.0 {
                 assert!(share < 0.9, "{share}");
             } else {
-                // The elastic law gives back what it took, to the order of the step.
+                // The elastic law returns the absorbed energy, to the order of the step.
                 assert!(share < 1.0 + 2e-3, "{share}");
             }
             if dissipation == 0.0 && friction == 0.0 {
@@ -269,7 +269,7 @@ fn no_bounce_adds_energy() {
 }
 
 #[test]
-fn the_surface_holds_the_tip_up_to_the_friction_limit() {
+fn the_surface_holds_the_tip_up_to_the_coulomb_limit() {
     let run = |pull_n: f64| {
         let mut plant = above_block(1e-5, 0.0, 2e-4);
         let mut press = |pull_n: f64| {
@@ -277,7 +277,7 @@ fn the_surface_holds_the_tip_up_to_the_friction_limit() {
             let force = Vector3::new(0.0, pull_n, -10.0) - tip.tip_velocity_m_per_s * 10.0;
             let j = jacobian(&plant.config().arm, &q);
             let mut tau = weight(&plant) + j.fixed_rows::<3>(0).transpose() * force;
-            // With the roll free the ball would roll.
+            // With a free roll joint the tip would roll.
             tau[2] -= 2000.0 * q[2] + 20.0 * plant.truth().velocity_rad_per_s[2];
             plant.cycle(&tau);
             (
@@ -291,7 +291,7 @@ fn the_surface_holds_the_tip_up_to_the_friction_limit() {
         (y - settled.0, force)
     };
     let (held, force) = run(2.9);
-    // The bristle's own give: 2.9 N on 2e4 N/m.
+    // Deflection of the bristle: 2.9 N at 2e4 N/m.
     assert!((held - 1.45e-4).abs() < 1e-5, "{held}");
     assert!((force.y + 2.9).abs() < 1e-3, "{force}");
     let (slid, force) = run(4.0);
@@ -303,7 +303,7 @@ fn the_surface_holds_the_tip_up_to_the_friction_limit() {
 }
 
 #[test]
-fn rubber_is_softer_than_wood_until_it_is_pressed_through() {
+fn rubber_is_softer_than_wood_until_it_is_fully_compressed() {
     let layered = |thickness_m: f64| {
         let arm = wam4();
         let mut scene = block();

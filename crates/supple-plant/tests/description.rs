@@ -5,10 +5,10 @@ use supple_core::dynamics::gravity;
 use supple_model::{Description, ModelError, assets, with_dof};
 use supple_plant::{Plant, PlantConfig};
 
-/// Every built-in arm, real drive and friction, stays at home under its own gravity torque.
+/// Asserts that an arm with real actuators and friction stays at home under its gravity torque.
 fn stays_at_home<const N: usize>(description: &Description) {
     let config = PlantConfig::<N>::from_description(description).unwrap();
-    assert_eq!(config.drive.torque_delay_cycles, 1);
+    assert_eq!(config.actuators.torque_delay_cycles, 1);
     let arm = config.arm;
     let home = description.home::<N>().unwrap();
     let mut plant = Plant::new(config, home, Vector::zeros()).unwrap();
@@ -21,7 +21,7 @@ fn stays_at_home<const N: usize>(description: &Description) {
 }
 
 #[test]
-fn the_built_in_arms_stay_at_home_under_their_own_gravity_torque() {
+fn the_built_in_arms_stay_at_home_under_their_gravity_torque() {
     for name in assets() {
         let description = Description::asset(name).unwrap();
         with_dof!(description.dof(), N => stays_at_home::<N>(&description)).unwrap();
@@ -29,7 +29,7 @@ fn the_built_in_arms_stay_at_home_under_their_own_gravity_torque() {
 }
 
 #[test]
-fn the_wam_has_the_drive_and_friction_of_its_description() {
+fn the_wam_has_the_actuators_and_friction_of_its_description() {
     let description = Description::asset("wam4").unwrap();
     let config = PlantConfig::<4>::from_description(&description).unwrap();
     for (truth, told) in config.friction.iter().zip(description.friction()) {
@@ -39,14 +39,14 @@ fn the_wam_has_the_drive_and_friction_of_its_description() {
     let tool = description.tool().unwrap();
     assert_eq!(config.tip_radius_m, tool.cap_radius_m);
     // Shoulder pitch and roll share two motors.
-    assert!(config.drive.joint_from_motor[(1, 1)] != 0.0);
-    assert!(config.drive.joint_from_motor[(2, 1)] != 0.0);
-    assert!(config.drive.counts_per_motor_revolution[0] > 0.0);
-    assert!(config.drive.motor_torque_quantum_nm[0] > 0.0);
+    assert!(config.actuators.joint_from_motor[(1, 1)] != 0.0);
+    assert!(config.actuators.joint_from_motor[(2, 1)] != 0.0);
+    assert!(config.actuators.counts_per_motor_revolution[0] > 0.0);
+    assert!(config.actuators.motor_torque_quantum_nm[0] > 0.0);
 }
 
 #[test]
-fn another_number_of_joints_is_refused() {
+fn a_wrong_number_of_joints_is_rejected() {
     let description = Description::asset("wam4").unwrap();
     let refused = PlantConfig::<3>::from_description(&description);
     assert!(matches!(refused, Err(ModelError::JointCount { .. })));

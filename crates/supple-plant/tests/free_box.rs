@@ -10,7 +10,7 @@ use supple_plant::{FreeBox, Ground, Material, Object, ObjectKind, Plant, PlantCo
 const GROUND_M: f64 = -0.4;
 const MASS_KG: f64 = 2.0;
 const SIZE_M: [f64; 3] = [0.1, 0.1, 0.2];
-/// Height of the tip over the ground where it pushes.
+/// Height of the pushing tip above the ground.
 const LEVER_M: f64 = 0.18;
 
 /// The tip half a millimetre before the box's near face.
@@ -55,7 +55,7 @@ fn tilt_rad(plant: &Plant<4>) -> f64 {
     carton(plant).pose.rotation[(2, 2)].min(1.0).acos()
 }
 
-/// Pushes with a force that grows over two seconds and then stays, by a spring with its target ahead.
+/// Pushes with a force that grows over two seconds and then stays constant, by a spring with its target ahead.
 fn pushed(friction: f64, force_n: f64) -> Plant<4> {
     let mut plant = beside_box(friction, |_| Vector::zeros());
     let start = plant.truth().tip_position_m;
@@ -71,7 +71,7 @@ fn pushed(friction: f64, force_n: f64) -> Plant<4> {
 }
 
 #[test]
-fn a_box_left_alone_stays_where_it_is() {
+fn an_untouched_box_does_not_move() {
     let mut plant = beside_box(0.6, |_| Vector::zeros());
     for _ in 0..2_000 {
         let hold = weight(&plant);
@@ -83,7 +83,7 @@ fn a_box_left_alone_stays_where_it_is() {
 }
 
 #[test]
-fn a_box_stands_through_an_impact() {
+fn a_box_does_not_fall_in_an_impact() {
     let arm = wam4();
     let mut plant = beside_box(0.6, |q| {
         let j = jacobian(&arm, q);
@@ -103,7 +103,7 @@ fn a_box_stands_through_an_impact() {
     assert!(tilt_rad(&plant) < 2e-3, "{}", tilt_rad(&plant));
 }
 
-/// A box tips about its far edge where `F h > m g w / 2`.
+/// A box tips about its far edge if `F h > m g w / 2`.
 #[test]
 fn a_box_tips_at_the_analytic_threshold() {
     let threshold_n = MASS_KG * 9.81 * 0.5 * SIZE_M[0] / LEVER_M;
@@ -122,7 +122,7 @@ fn a_box_tips_at_the_analytic_threshold() {
     );
 }
 
-/// A box slides where `F > mu m g`.
+/// A box slides if `F > mu m g`.
 #[test]
 fn a_box_slides_at_the_friction_limit() {
     let limit_n = 0.2 * MASS_KG * 9.81;

@@ -1,4 +1,4 @@
-//! The plant without contact or friction against the core's articulated-body algorithm: two
+//! The plant without contact or friction compared with the core's articulated-body algorithm: two
 //! derivations of the same mechanics that share no code.
 
 mod common;
@@ -98,8 +98,8 @@ fn falling_random_arms_converge_to_the_articulated_body_algorithm() {
     }
 }
 
-/// The first step from rest is `dt` times the acceleration, so it shows torques, inertias and rotors
-/// to rounding.
+/// The velocity after the first step from rest is `dt` times the acceleration, so it checks torques, inertias and
+/// rotors to rounding accuracy.
 #[test]
 fn the_first_step_from_rest_is_exact() {
     let arm = wam4();
@@ -125,7 +125,7 @@ fn the_first_step_from_rest_is_exact() {
 }
 
 #[test]
-fn a_frictionless_fall_keeps_its_energy_to_the_order_of_the_step() {
+fn a_frictionless_fall_conserves_energy_to_the_order_of_the_step() {
     let arm = wam4();
     let start = (Vector::from([0.1, 0.5, 0.3, 1.0]), Vector::zeros());
     let energy = |plant: &Plant<4>| {
@@ -145,7 +145,7 @@ fn a_frictionless_fall_keeps_its_energy_to_the_order_of_the_step() {
 }
 
 #[test]
-fn gravity_along_any_axis_is_the_arms_own() {
+fn gravity_acts_along_the_axis_of_the_arm_configuration() {
     let q = Vector::from([0.4, 0.7, -0.3, 1.1]);
     let sideways = supple_core::nalgebra::Vector3::new(3.0, -9.0, 1.0);
     let arm = common::wam4_in(sideways);

@@ -1,4 +1,4 @@
-//! Joint friction: breakaway, slip, and what it must never do.
+//! Joint friction: breakaway, sliding, dissipation, load.
 
 mod common;
 
@@ -17,7 +17,7 @@ const LAW: Friction = Friction {
     band_rad_per_s: 0.01,
 };
 
-/// A wheel on a level axis through its centre of mass: nothing but inertia and friction.
+/// A wheel on a horizontal axis through its centre of mass: only inertia and friction.
 fn wheel(friction: LuGre) -> Plant<1> {
     let joint = Joint {
         parent_from_link: Pose::IDENTITY,
@@ -38,7 +38,7 @@ fn true_friction() -> LuGre {
 }
 
 #[test]
-fn built_from_a_law_it_slides_as_the_law_says() {
+fn friction_built_from_a_law_equals_the_law_in_steady_sliding() {
     let plain = true_friction();
     for v in [0.5, -0.5, 2.0] {
         assert!((plain.steady_torque_nm(v, 0.0) - LAW.torque_nm(v)).abs() < 1e-12);
@@ -61,7 +61,7 @@ fn built_from_a_law_it_slides_as_the_law_says() {
 }
 
 #[test]
-fn a_ramp_breaks_it_loose_at_the_breakaway_torque() {
+fn a_torque_ramp_starts_sliding_at_the_breakaway_torque() {
     for sign in [1.0, -1.0] {
         let mut plant = wheel(true_friction());
         let rate_nm_per_s = 0.1;
@@ -76,10 +76,10 @@ fn a_ramp_breaks_it_loose_at_the_breakaway_torque() {
     }
 }
 
-/// Loaded slowly the bristle gives `x = -(g / s0) ln(1 - tau / g)`, unloaded it comes back by
-/// `(g / s0) ln(1 + tau / g)`: the model's own presliding curve, `g` at rest being the breakaway torque.
+/// Under slow loading the bristle deflects by `x = -(g / s0) ln(1 - tau / g)`, on unloading it returns by
+/// `(g / s0) ln(1 + tau / g)`: the presliding curve of the model, with the breakaway torque as `g` at rest.
 #[test]
-fn below_breakaway_it_gives_a_little_holds_and_springs_back() {
+fn below_breakaway_the_joint_follows_the_presliding_curve_and_returns() {
     let (friction, torque_nm) = (true_friction(), 1.5);
     let mut plant = wheel(friction);
     let mut angle_after = |cycles: i32, torque_nm: &dyn Fn(f64) -> f64| {
@@ -114,7 +114,7 @@ fn below_breakaway_it_gives_a_little_holds_and_springs_back() {
 }
 
 #[test]
-fn sliding_steadily_it_follows_the_stribeck_curve() {
+fn steady_sliding_follows_the_stribeck_curve() {
     for speed in [-0.3, -0.05, 0.01, 0.03, 0.1, 1.0] {
         let mut plant = wheel(true_friction());
         for _ in 0..4_000 {
@@ -131,8 +131,8 @@ fn sliding_steadily_it_follows_the_stribeck_curve() {
 }
 
 #[test]
-fn it_takes_energy_and_never_gives_any() {
-    // From rest round a closed path in velocity, the work done on friction is positive, at any speed.
+fn friction_is_dissipative() {
+    // From rest around a closed path in velocity, the work done on friction is positive, at any speed.
     for amplitude in [1e-4, 1e-3, 1e-2, 0.1, 1.0] {
         for hertz in [0.5, 5.0, 50.0] {
             let friction = true_friction();
@@ -177,7 +177,7 @@ fn a_coasting_arm_stops_and_stays() {
 }
 
 #[test]
-fn the_loaded_part_depends_on_load_and_direction_and_stays_within_its_fraction() {
+fn the_load_dependent_part_depends_on_load_and_direction_and_stays_within_its_fraction() {
     let friction = LuGre::from_friction(&LAW);
     assert_eq!(friction.load_fraction, 0.02);
     let share = |v: f64, load: f64| {
@@ -191,7 +191,7 @@ fn the_loaded_part_depends_on_load_and_direction_and_stays_within_its_fraction()
 }
 
 #[test]
-fn load_is_the_static_moment_over_that_of_the_arm_stretched_out() {
+fn load_is_the_gravity_moment_relative_to_the_stretched_arm() {
     let arm = wam4();
     let load = |q: [f64; 4]| {
         let plant = Plant::new(PlantConfig::ideal(arm), Vector::from(q), Vector::zeros());
@@ -206,6 +206,6 @@ fn load_is_the_static_moment_over_that_of_the_arm_stretched_out() {
     let turned = load([1.0, half, 0.0, 0.0]);
     assert!(
         (turned - level).norm() < 1e-12,
-        "the same wherever the base looks"
+        "the same for every base angle"
     );
 }

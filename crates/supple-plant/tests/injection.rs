@@ -1,4 +1,4 @@
-//! Each injection does to a plant what it says, from when it says, and nothing before.
+//! Each injection has its documented effect on a plant from its start time on, and none before.
 
 mod common;
 
@@ -7,12 +7,12 @@ use supple_core::controller::Mode;
 use supple_core::dynamics::gravity;
 use supple_core::{Arm, Vector};
 use supple_model::Description;
-use supple_plant::{Injection, InjectionError, Injector, Plant, PlantConfig, Sight};
+use supple_plant::{ControllerView, Injection, InjectionError, Injector, Plant, PlantConfig};
 
 const HOME_RAD: [f64; 4] = [0.1, -1.8, 0.2, 2.6];
 const SPEED: [f64; 4] = [0.3, -0.2, 0.4, 0.25];
 const PERIOD_S: f64 = 2e-3;
-const TRACKS: Sight = Sight {
+const TRACKS: ControllerView = ControllerView {
     active: true,
     mode: Some(Mode::Track),
 };
@@ -34,14 +34,14 @@ impl Bench {
         Ok(Bench { plant, injector })
     }
 
-    /// An arm without friction and gravity, its cycle the control cycle: it coasts.
+    /// An arm without friction and gravity that coasts; its cycle is the control cycle.
     fn coasting(specs: &[&str]) -> Bench {
         let mut config = PlantConfig::ideal(wam4_in([0.0; 3].into()));
         config.cycle_s = PERIOD_S;
         Bench::of(config, SPEED, specs).expect("sound")
     }
 
-    fn cycle(&mut self, sight: Sight, torque_nm: [f64; 4]) -> [f64; 4] {
+    fn cycle(&mut self, sight: ControllerView, torque_nm: [f64; 4]) -> [f64; 4] {
         let torque_nm = torque_nm.into();
         self.injector
             .cycle(&mut self.plant, sight, &torque_nm, [false; 4]);
@@ -54,7 +54,7 @@ impl Bench {
 }
 
 #[test]
-fn without_injections_a_plant_is_the_same_to_the_bit() {
+fn without_injections_a_plant_is_bit_identical() {
     let description = Description::asset("wam4").expect("built in");
     let config = PlantConfig::<4>::from_description(&description).expect("sound");
     let mut bench = Bench::of(config.clone(), SPEED, &[]).expect("sound");
@@ -69,19 +69,19 @@ fn without_injections_a_plant_is_the_same_to_the_bit() {
 }
 
 #[test]
-fn a_stuck_encoder_keeps_its_angle_from_its_time_on() {
+fn a_stuck_encoder_keeps_its_angle_from_its_start_time_on() {
     let mut bench = Bench::coasting(&["encoder-stuck:joint=2,when=track,after-s=0.02"]);
     let (idle, held) = (
-        Sight {
+        ControllerView {
             active: false,
             mode: Some(Mode::Track),
         },
-        Sight {
+        ControllerView {
             active: true,
             mode: Some(Mode::GravityHold),
         },
     );
-    // Neither without drives nor in another mode.
+    // It does not start without active drives or in another mode.
     for sight in [[idle; 10], [held; 10]].concat() {
         assert_eq!(bench.cycle(sight, [0.0; 4]), bench.true_rad());
     }
@@ -101,11 +101,11 @@ fn a_stuck_encoder_keeps_its_angle_from_its_time_on() {
     assert!((bench.true_rad()[2] - before[2]).abs() > 0.01, "it moved");
 }
 
-/// From a mode that has begun on, even if it is over by then.
+/// The time counts from the first start of the mode, even if the mode has ended by then.
 #[test]
-fn a_mode_starts_the_clock_once() {
+fn only_the_first_start_of_a_mode_counts() {
     let mut bench = Bench::coasting(&["encoder-stuck:when=move,after-s=0.02"]);
-    let sight = |mode| Sight {
+    let sight = |mode| ControllerView {
         active: true,
         mode: Some(mode),
     };
@@ -119,7 +119,7 @@ fn a_mode_starts_the_clock_once() {
 }
 
 #[test]
-fn a_late_encoder_says_what_was_so_many_cycles_ago_and_does_not_jump() {
+fn a_late_encoder_lags_by_its_number_of_cycles_and_does_not_jump() {
     let mut bench = Bench::coasting(&["encoder-late:cycles=5,at-s=0.02"]);
     let mut history = vec![bench.true_rad()];
     for cycle in 1..=40 {
@@ -134,7 +134,7 @@ fn a_late_encoder_says_what_was_so_many_cycles_ago_and_does_not_jump() {
     }
 }
 
-/// Where the plant's cycle is shorter than the control cycle, a delay is still counted in the latter.
+/// Delays are counted in control cycles even if the cycle of the plant is shorter.
 #[test]
 fn a_delay_is_counted_in_control_cycles() {
     let mut config = PlantConfig::ideal(wam4_in([0.0; 3].into()));
@@ -166,7 +166,7 @@ fn an_encoder_of_the_wrong_sign_counts_backwards_from_where_it_was() {
 }
 
 #[test]
-fn an_offset_is_there_from_the_first_reading_and_nan_is_said() {
+fn offset_and_nan_affect_the_first_reading() {
     let mut bench = Bench::coasting(&[
         "encoder-offset:joint=3,offset-rad=0.25",
         "encoder-nan:joint=0,at-s=0",
@@ -197,20 +197,20 @@ fn described(specs: &[&str]) -> Bench {
     let description = Description::asset("wam4").expect("built in");
     let mut config = PlantConfig::<4>::from_description(&description).expect("sound");
     config.cycle_s = PERIOD_S;
-    config.drive.ripple.clear();
-    config.drive.motor_torque_quantum_nm = Vector::zeros();
-    config.drive.torque_delay_cycles = 0;
+    config.actuators.ripple.clear();
+    config.actuators.motor_torque_quantum_nm = Vector::zeros();
+    config.actuators.torque_delay_cycles = 0;
     Bench::of(config, SPEED, specs).expect("sound")
 }
 
 /// Motors 1 and 2 share joints 1 and 2.
 #[test]
-fn a_dead_motor_makes_no_torque_and_does_not_brake() {
+fn a_dead_motor_produces_no_torque_and_does_not_brake() {
     let mut bench = described(&["motor-dead:motor=1"]);
-    let to_joints = bench.plant.config().drive.joint_from_motor;
+    let to_joints = bench.plant.config().actuators.joint_from_motor;
     let torque_nm = Vector::from([3.0, -4.0, 1.0, 2.0]);
     let at_motors = |bench: &Bench| to_joints.transpose() * bench.plant.truth().motor_torque_nm;
-    let sight = |active| Sight { active, mode: None };
+    let sight = |active| ControllerView { active, mode: None };
     bench
         .injector
         .cycle(&mut bench.plant, sight(true), &torque_nm, [false; 4]);
@@ -229,7 +229,7 @@ fn a_dead_motor_makes_no_torque_and_does_not_brake() {
 }
 
 #[test]
-fn a_torque_of_the_wrong_sign_acts_on_its_joint_alone() {
+fn a_torque_of_the_wrong_sign_acts_only_on_its_joint() {
     let mut bench = described(&["torque-sign:joint=2"]);
     bench.cycle(TRACKS, [3.0, -4.0, 1.0, 2.0]);
     let acts = bench.plant.truth().motor_torque_nm;
@@ -240,7 +240,7 @@ fn a_torque_of_the_wrong_sign_acts_on_its_joint_alone() {
 }
 
 #[test]
-fn a_late_torque_acts_so_many_cycles_later() {
+fn a_late_torque_acts_after_its_number_of_cycles() {
     let mut bench = Bench::coasting(&["torque-late:cycles=3,at-s=0.01"]);
     for cycle in 0..20_i32 {
         let torque = f64::from(cycle);
@@ -254,7 +254,8 @@ fn a_late_torque_acts_so_many_cycles_later() {
     }
 }
 
-/// Held by the torque of a model, an arm stays; with the load that the model lacks, it moves as the true arm does.
+/// An arm that the torque of its model holds stays at rest; with a load that the model lacks, it moves like the true
+/// arm.
 fn held_by_the_model(specs: &[&str], truth: &Arm<4>) {
     let model = wam4_in([0.0, 0.0, -9.81].into());
     let config = PlantConfig::ideal(model);
@@ -280,7 +281,7 @@ fn held_by_the_model(specs: &[&str], truth: &Arm<4>) {
 }
 
 #[test]
-fn gravity_turns_round() {
+fn gravity_is_reversed() {
     held_by_the_model(
         &["gravity-reversed:at-s=0.02"],
         &wam4_in([0.0, 0.0, 9.81].into()),
@@ -288,7 +289,7 @@ fn gravity_turns_round() {
 }
 
 #[test]
-fn a_payload_is_carried() {
+fn a_payload_adds_its_weight_and_inertia() {
     let mut loaded = Plant::new(
         PlantConfig::ideal(wam4_in([0.0, 0.0, -9.81].into())),
         HOME_RAD.into(),
@@ -310,7 +311,7 @@ fn a_payload_is_carried() {
 }
 
 #[test]
-fn a_bump_changes_one_speed_at_once() {
+fn a_bump_changes_the_speed_of_one_joint_by_a_step() {
     let mut bench = Bench::coasting(&["bump:joint=2,speed-rad-per-s=2.5,at-s=0.02"]);
     let mut before = bench.plant.truth().velocity_rad_per_s;
     for cycle in 0..15 {
@@ -326,7 +327,7 @@ fn a_bump_changes_one_speed_at_once() {
 }
 
 #[test]
-fn drives_that_are_idle_brake_and_come_back() {
+fn idle_drives_brake_and_are_reenabled() {
     let mut bench = described(&["drives-idle:for-s=0.01,at-s=0.01"]);
     for cycle in 0..20 {
         bench.cycle(TRACKS, [5.0, 0.0, 0.0, 0.0]);
@@ -338,7 +339,7 @@ fn drives_that_are_idle_brake_and_come_back() {
 }
 
 #[test]
-fn a_joint_that_the_arm_has_not_is_refused() {
+fn an_unknown_joint_is_rejected() {
     let config = PlantConfig::ideal(wam4_in([0.0; 3].into()));
     let refused = Bench::of(config, [0.0; 4], &["encoder-stuck:joint=4"]).err();
     let words = refused.expect("refused").to_string();

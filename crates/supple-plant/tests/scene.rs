@@ -1,4 +1,4 @@
-//! Scenes from TOML, and what is refused.
+//! Scenes from TOML, and rejection of invalid scenes.
 
 mod common;
 
@@ -41,12 +41,12 @@ friction = 0.4
 "#;
 
 #[test]
-fn a_scene_reads_back_as_it_was_written() {
+fn a_scene_survives_the_round_trip() {
     let scene = Scene::from_toml(TABLE, "table.toml").unwrap();
     assert_eq!(
         scene.material("wood").unwrap().friction,
         0.4,
-        "the scene's own wins"
+        "the material of the scene takes precedence"
     );
     assert_eq!(scene.material("rubber").unwrap().stiffness_n_per_m_1_5, 4e6);
     let text = toml::to_string(&scene).unwrap();
@@ -55,7 +55,7 @@ fn a_scene_reads_back_as_it_was_written() {
 }
 
 #[test]
-fn objects_stand_where_the_scene_puts_them() {
+fn objects_have_the_poses_of_the_scene() {
     let config = PlantConfig {
         scene: Scene::from_toml(TABLE, "table.toml").unwrap(),
         ..PlantConfig::ideal(wam4())
@@ -76,58 +76,61 @@ fn objects_stand_where_the_scene_puts_them() {
 }
 
 #[test]
-fn bad_scenes_are_refused_with_element_field_value_and_remedy() {
-    let refused = |from: &str, to: &str| -> String {
+fn bad_scenes_are_rejected_with_element_field_value_and_remedy() {
+    let error_of = |from: &str, to: &str| -> String {
         assert!(TABLE.contains(from), "{from}");
         let text = TABLE.replacen(from, to, 1);
         Scene::from_toml(&text, "table.toml")
             .unwrap_err()
             .to_string()
     };
-    let says = |text: String, words: &[&str]| {
+    let assert_contains = |text: String, words: &[&str]| {
         assert!(words.iter().all(|w| text.contains(w)), "{text}");
     };
-    says(
-        refused("height_m", "hight_m"),
+    assert_contains(
+        error_of("height_m", "hight_m"),
         &["table.toml", "hight_m", "height_m"],
     );
-    says(
-        refused("mass_kg = 2.0", "mass_kg = -2.0"),
+    assert_contains(
+        error_of("mass_kg = 2.0", "mass_kg = -2.0"),
         &["free_box \"carton\"", "mass_kg", "-2", "positive"],
     );
-    says(
-        refused("0.60, 0.10]", "0.0, 0.10]"),
+    assert_contains(
+        error_of("0.60, 0.10]", "0.0, 0.10]"),
         &["fixed_block \"table\"", "size_m", "is 0", "positive"],
     );
-    says(
-        refused("0.0, 0.5]", "0.0, nan]"),
+    assert_contains(
+        error_of("0.0, 0.5]", "0.0, nan]"),
         &["fixed_block \"table\"", "rpy_rad", "NaN", "finite"],
     );
-    says(
-        refused("0.008", "0.0"),
+    assert_contains(
+        error_of("0.008", "0.0"),
         &["fixed_block \"table\"", "layer.thickness_m", "positive"],
     );
-    says(
-        refused("material = \"rubber\"", "material = \"jelly\""),
+    assert_contains(
+        error_of("material = \"rubber\"", "material = \"jelly\""),
         &["jelly", "use one of", "\"acrylic\"", "[[material]]"],
     );
-    says(
-        refused("friction = 0.25", "friction = -0.25"),
+    assert_contains(
+        error_of("friction = 0.25", "friction = -0.25"),
         &["material \"acrylic\"", "friction", "-0.25"],
     );
-    says(
-        refused("3e8", "inf"),
+    assert_contains(
+        error_of("3e8", "inf"),
         &["material \"acrylic\"", "stiffness_n_per_m_1_5", "inf"],
     );
-    says(refused("\"carton\"", "\"table\""), &["\"table\"", "rename"]);
-    says(
-        refused("[0.70, 0.0, -0.05]", "[0.70, 0.0]"),
+    assert_contains(
+        error_of("\"carton\"", "\"table\""),
+        &["\"table\"", "rename"],
+    );
+    assert_contains(
+        error_of("[0.70, 0.0, -0.05]", "[0.70, 0.0]"),
         &["table.toml", "center_m"],
     );
 }
 
 #[test]
-fn a_box_in_the_ground_and_a_tip_in_a_block_are_refused() {
+fn a_box_in_the_ground_and_a_tip_in_a_block_are_rejected() {
     let sunk = TABLE.replacen("-0.25]", "-0.26]", 1);
     let text = Scene::from_toml(&sunk, "table.toml")
         .unwrap_err()
@@ -157,7 +160,7 @@ fn a_box_in_the_ground_and_a_tip_in_a_block_are_refused() {
 }
 
 #[test]
-fn a_plant_refuses_a_bad_scene_built_in_code() {
+fn a_plant_rejects_a_bad_scene_built_in_code() {
     let mut scene = common::block();
     scene.fixed_blocks[0].material = "jelly".to_owned();
     let config = PlantConfig {

@@ -1,16 +1,16 @@
 //! The force/torque sensor: forces, torques and accelerations, each three 16-bit little-endian values.
 //!
-//! A request for [`Property::FT`] is answered by two frames, forces first. Setting it to 0 tares the
+//! The sensor answers a request for [`Property::FT`] with two frames, forces first. Setting it to 0 tares the
 //! sensor, which takes a little over a second, during which its outputs are zero and its status is
-//! [`SensorStatus::TARING`]. Source: libbarrett, OWD, btclient. libbarrett trusts neither role nor
-//! version of this puck; its list of properties is one.
+//! [`SensorStatus::TARING`]. Source: libbarrett, OWD, btclient. libbarrett relies on neither role nor version of
+//! this puck, which has a single property list.
 
 use crate::frame::{CanFrame, LengthError};
 use crate::id::{GroupId, MessageId, NodeId};
 use crate::property::{self, Property, PropertyId, PropertyTable, Value};
 use core::fmt;
 
-/// Which of the sensor's three frames, with unit and scale.
+/// Quantity of a sensor frame, with unit and scale.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// Force, 1/256 N.
@@ -31,7 +31,7 @@ impl Quantity {
         }
     }
 
-    /// Group that its frames go to.
+    /// Destination group of its frames.
     pub const fn group(self) -> GroupId {
         match self {
             Quantity::Force => GroupId::FORCE,
@@ -40,8 +40,8 @@ impl Quantity {
         }
     }
 
-    /// Counts of three components \[N, N m or m/s^2\], each rounded to the nearest with halves away
-    /// from zero, and saturated at what 16 bits hold: 128 N, 8 N m or 32 m/s^2.
+    /// Counts of three components \[N, N m or m/s^2\], each rounded to the nearest with halves away from zero,
+    /// and saturated at the range of 16 bits: 128 N, 8 N m or 32 m/s^2.
     ///
     /// # Errors
     /// A component that is not finite.
@@ -73,7 +73,7 @@ impl fmt::Display for NotFinite {
 
 impl core::error::Error for NotFinite {}
 
-/// The seventh byte, documented of torque frames: which axes have saturated.
+/// The seventh byte, documented for torque frames: the axes that have saturated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SensorStatus(pub u8);
 
@@ -81,12 +81,12 @@ impl SensorStatus {
     /// Sent while taring.
     pub const TARING: SensorStatus = SensorStatus(0x7f);
 
-    /// The data of this frame are bad: an axis is saturated now, or the sensor is taring.
-    pub const fn bad_now(self) -> bool {
+    /// Whether the data of this frame are bad: an axis is saturated, or the sensor is taring.
+    pub const fn is_bad(self) -> bool {
         self.0 & 0x40 != 0
     }
 
-    /// Whether axis 0 to 5 has saturated since the last tare; `None` beyond.
+    /// Whether axis 0 to 5 has saturated since the last tare; `None` for other axes.
     pub const fn saturated_since_tare(self, axis: u8) -> Option<bool> {
         if axis < 6 {
             Some(self.0 & (1 << axis) != 0)
@@ -99,11 +99,11 @@ impl SensorStatus {
 /// One frame of the sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SensorReading {
-    /// What was measured.
+    /// Measured quantity.
     pub quantity: Quantity,
     /// x, y and z \[[`Quantity::counts_per_unit`]\].
     pub counts: [i16; 3],
-    /// Status, where the frame carries it.
+    /// Status, if the frame contains it.
     pub status: Option<SensorStatus>,
 }
 
@@ -114,7 +114,7 @@ impl SensorReading {
         self.counts.map(|counts| f64::from(counts) / scale)
     }
 
-    /// Reads a frame of `quantity`, which its group tells; sender and group are not looked at.
+    /// Parses a frame of `quantity`, which its group determines; sender and group are not checked.
     ///
     /// # Errors
     /// A payload of neither six nor seven bytes.
@@ -144,27 +144,27 @@ impl SensorReading {
     }
 }
 
-const fn listed(property: Property) -> PropertyId {
+const fn property_id(property: Property) -> PropertyId {
     match PropertyTable::FORCE_TORQUE.id(property) {
         Some(id) => id,
         None => panic!("the sensor's list lacks the property"),
     }
 }
 
-const FORCE_AND_TORQUE: PropertyId = const { listed(Property::FT) };
-const ACCELERATION: PropertyId = const { listed(Property::A) };
+const FORCE_AND_TORQUE: PropertyId = const { property_id(Property::FT) };
+const ACCELERATION: PropertyId = const { property_id(Property::A) };
 
-/// The host asks for a force frame and a torque frame.
+/// Encodes the host's request for a force frame and a torque frame.
 pub fn request() -> CanFrame {
     property::get(NodeId::FORCE_TORQUE, FORCE_AND_TORQUE)
 }
 
-/// The host asks for an acceleration frame.
+/// Encodes the host's request for an acceleration frame.
 pub fn request_acceleration() -> CanFrame {
     property::get(NodeId::FORCE_TORQUE, ACCELERATION)
 }
 
-/// The host has the sensor take what it feels for zero, before its readings are used.
+/// Tares the sensor; send it before the readings are used.
 pub fn tare() -> CanFrame {
     property::set(NodeId::FORCE_TORQUE, FORCE_AND_TORQUE, Value::Wide(0))
 }

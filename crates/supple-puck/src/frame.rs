@@ -8,16 +8,16 @@ use core::fmt;
 pub struct CanFrame {
     id: MessageId,
     length: u8,
-    // Zero beyond `length`, so that equality is that of the frames.
+    // Zero after `length`, so that derived equality compares the frames.
     bytes: [u8; 8],
 }
 
-/// What is not a frame of this bus.
+/// Error: not a valid frame of this bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrameError {
     /// An id above 0x7FF.
     Id(IdError),
-    /// A payload of so many bytes; eight is the most.
+    /// A payload of this many bytes; the maximum is eight.
     TooLong(usize),
 }
 
@@ -40,12 +40,12 @@ impl From<IdError> for FrameError {
     }
 }
 
-/// A payload of a length that this kind of frame does not have.
+/// A payload of a wrong length for this kind of frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LengthError {
     /// Bytes found.
     pub found: u8,
-    /// Lengths that would do.
+    /// Valid lengths.
     pub expected: &'static [u8],
 }
 
@@ -79,7 +79,7 @@ impl CanFrame {
         })
     }
 
-    /// A frame from the id as a driver gives it, flags removed.
+    /// A frame from the id of a driver, with the flags removed.
     ///
     /// # Errors
     /// An id above 0x7FF, or a payload of more than eight bytes.
@@ -103,7 +103,7 @@ impl CanFrame {
         }
     }
 
-    /// Its id.
+    /// Message id.
     pub const fn id(&self) -> MessageId {
         self.id
     }
@@ -113,7 +113,7 @@ impl CanFrame {
         self.length
     }
 
-    /// Its bytes, `dlc` of them.
+    /// Payload, `dlc` bytes.
     pub fn payload(&self) -> &[u8] {
         self.bytes.get(..self.length as usize).unwrap_or(&[])
     }

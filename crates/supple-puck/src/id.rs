@@ -1,6 +1,6 @@
 //! Message ids: `G FFFFF TTTTT`, the group bit, the sender's node and the receiver's node or group.
 //!
-//! Every 11-bit number is such an id, so only numbers above 0x7FF are refused. Source: manual page 46,
+//! Every 11-bit number is a valid id, so only numbers above 0x7FF are rejected. Source: manual page 46,
 //! libbarrett's masks; the meaning of the groups from libbarrett.
 
 use core::fmt;
@@ -37,7 +37,7 @@ impl core::error::Error for IdError {}
 pub struct NodeId(u8);
 
 impl NodeId {
-    /// The computer.
+    /// The host computer.
     pub const HOST: NodeId = NodeId(0);
     /// Force/torque sensor at the wrist.
     pub const FORCE_TORQUE: NodeId = NodeId(8);
@@ -56,7 +56,7 @@ impl NodeId {
         }
     }
 
-    /// Motor puck of joint `number`, 1 to 7; `None` beyond.
+    /// Motor puck of joint `number`, 1 to 7; `None` for other numbers.
     pub const fn joint(number: u8) -> Option<NodeId> {
         if number >= 1 && number <= 7 {
             Some(NodeId(number))
@@ -65,7 +65,7 @@ impl NodeId {
         }
     }
 
-    /// Motor puck `number` of the hand, 1 to 4, at nodes 11 to 14; `None` beyond.
+    /// Motor puck `number` of the hand, 1 to 4, at nodes 11 to 14; `None` for other numbers.
     pub const fn hand(number: u8) -> Option<NodeId> {
         if number >= 1 && number <= 4 {
             Some(NodeId(10 + number))
@@ -74,32 +74,32 @@ impl NodeId {
         }
     }
 
-    /// Its number, 0 to 31.
+    /// Number, 0 to 31.
     pub const fn number(self) -> u8 {
         self.0
     }
 }
 
-/// A group of nodes, 0 to 31. A puck belongs to three at most.
+/// A group of nodes, 0 to 31. A puck belongs to at most three.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct GroupId(u8);
 
 impl GroupId {
-    /// All actuators; the safety module is not among them.
+    /// All actuators, without the safety module.
     pub const ACTUATORS: GroupId = GroupId(0);
     /// Packed torques of joints 1 to 4.
     pub const LOWER_TORQUES: GroupId = GroupId(1);
     /// Packed torques of joints 5 to 7.
     pub const UPPER_TORQUES: GroupId = GroupId(2);
-    /// Where motor pucks send their positions; the safety module listens.
+    /// Destination of the motor pucks' positions, which the safety module receives as well.
     pub const POSITION: GroupId = GroupId(3);
-    /// Motor pucks 1 to 7 (libbarrett, OWD). The 2008 manual has 1 to 4 here.
+    /// Motor pucks 1 to 7 (libbarrett, OWD). In the 2008 manual: 1 to 4.
     pub const ARM: GroupId = GroupId(4);
-    /// Pucks of the hand (libbarrett, OWD). The 2008 manual has pucks 5 to 7 here.
+    /// Pucks of the hand (libbarrett, OWD). In the 2008 manual: pucks 5 to 7.
     pub const HAND: GroupId = GroupId(5);
-    /// Where pucks send their replies to property requests.
+    /// Destination of replies to property requests.
     pub const REPLY: GroupId = GroupId(6);
-    /// Where secondary encoder positions go.
+    /// Destination of secondary encoder positions.
     pub const SECONDARY_POSITION: GroupId = GroupId(7);
     /// Tactile reports of the ten strongest cells.
     pub const TACTILE_TOP_TEN: GroupId = GroupId(8);
@@ -124,13 +124,13 @@ impl GroupId {
         }
     }
 
-    /// Its number, 0 to 31.
+    /// Number, 0 to 31.
     pub const fn number(self) -> u8 {
         self.0
     }
 }
 
-/// Whom a message is for.
+/// Destination of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Destination {
     /// One node.
@@ -151,22 +151,22 @@ impl From<GroupId> for Destination {
     }
 }
 
-/// The 11-bit id of a frame. The lower number wins the bus.
+/// The 11-bit id of a frame. The lower number wins arbitration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct MessageId(u16);
 
 impl MessageId {
-    /// From node to node.
+    /// Id of a message from node to node.
     pub const fn to_node(from: NodeId, to: NodeId) -> MessageId {
         MessageId(((from.0 as u16) << FROM_SHIFT) | to.0 as u16)
     }
 
-    /// From node to group.
+    /// Id of a message from node to group.
     pub const fn to_group(from: NodeId, to: GroupId) -> MessageId {
         MessageId(GROUP_BIT | ((from.0 as u16) << FROM_SHIFT) | to.0 as u16)
     }
 
-    /// From node to whatever `to` is.
+    /// Id of a message from a node to any destination.
     pub const fn new(from: NodeId, to: Destination) -> MessageId {
         match to {
             Destination::Node(node) => MessageId::to_node(from, node),
@@ -186,17 +186,17 @@ impl MessageId {
         }
     }
 
-    /// As it is on the bus, 0 to 0x7FF.
+    /// Number on the bus, 0 to 0x7FF.
     pub const fn raw(self) -> u16 {
         self.0
     }
 
-    /// Who sent it.
+    /// Sender.
     pub const fn from(self) -> NodeId {
         NodeId(((self.0 >> FROM_SHIFT) & FIVE_BITS) as u8)
     }
 
-    /// Whom it is for.
+    /// Destination.
     pub const fn to(self) -> Destination {
         let number = (self.0 & FIVE_BITS) as u8;
         if self.0 & GROUP_BIT == 0 {

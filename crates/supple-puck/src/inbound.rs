@@ -1,4 +1,4 @@
-//! Frames that reach the host, told apart by the group they are for.
+//! Frames that the host receives, distinguished by destination group.
 
 use crate::force_torque::{Quantity, SensorReading};
 use crate::frame::{CanFrame, LengthError};
@@ -7,7 +7,7 @@ use crate::position::PositionReply;
 use crate::property::{PropertyError, Reply};
 use core::fmt;
 
-/// What a node of the arm has sent.
+/// A parsed frame of a node of the arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Inbound {
     /// A motor puck's position.
@@ -16,19 +16,19 @@ pub enum Inbound {
     Reply(Reply),
     /// A reading of the force/torque sensor.
     Sensor(SensorReading),
-    /// To a group that the host does not read, such as the safety module's frames to the motors
-    /// (0x540) and tactile reports.
+    /// A frame to a group that the host does not read, such as the safety module's frames to the motors (0x540)
+    /// and tactile reports.
     Other,
 }
 
-/// Why a frame cannot be read.
+/// Errors of parsing a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InboundError {
-    /// It bears the host's own number; another host, or an echo.
+    /// The sender is node 0: another host, or an echo.
     FromHost,
     /// A position of the wrong length, from this node.
     Position(NodeId, LengthError),
-    /// A reply that is none, from this node.
+    /// A malformed reply from this node.
     Reply(NodeId, PropertyError),
     /// A sensor frame of the wrong length, from this node.
     Sensor(NodeId, LengthError),
@@ -54,8 +54,7 @@ impl fmt::Display for InboundError {
 impl core::error::Error for InboundError {}
 
 impl Inbound {
-    /// Reads a frame; the node it is from comes first. Replies may come in any order: match them by
-    /// node.
+    /// Parses a frame; returns the sender and the contents. Replies may arrive in any order: match them by node.
     ///
     /// # Errors
     /// See [`InboundError`].

@@ -1,13 +1,11 @@
-//! Barrett's puck protocol: CAN frames to typed values and back.
+//! Codec of Barrett's puck protocol, between CAN frames and typed values.
 //!
-//! Bytes in, values out. This crate opens no socket, reads no clock, allocates nothing and keeps no
-//! state; who polls whom, and when, is decided elsewhere. Reading a frame may fail, and the error
-//! names the value found and the one expected; writing one cannot fail, because the types hold only
-//! what the wire can carry.
+//! Pure conversions: this crate opens no socket, reads no clock, allocates nothing and keeps no state; the
+//! polling sequence is defined elsewhere. Parsing a frame may fail, and the error names the value found and the
+//! one expected; encoding cannot fail, because the types hold only encodable values.
 //!
-//! The bus is classical CAN 2.0A with 11-bit ids at 1 Mbit/s. Facts are from Barrett's libbarrett
-//! (2018) and btclient (2013), OWD (2015) and the WAM Arm User's Manual D1001 (2008); each module
-//! names the sources that its facts have.
+//! The bus is classical CAN 2.0A with 11-bit ids at 1 Mbit/s. The facts come from Barrett's libbarrett (2018)
+//! and btclient (2013), OWD (2015) and the WAM Arm User's Manual D1001 (2008); each module names its sources.
 //!
 //! ```
 //! use supple_puck::{CanFrame, Counts, GroupId, MessageId, NodeId, PositionReply};

@@ -1,25 +1,25 @@
 //! Position replies: 22-bit two's complement counts, most significant byte first, without a property
 //! byte, sent to [`GroupId::POSITION`].
 //!
-//! Three bytes are the motor's; six are the motor's and the joint encoder's. The two top bits of each
-//! triple are documented as zero; libbarrett's own check of them is disabled there as unsettled, and
-//! every public reader ignores them. So does this one. Source: libbarrett, btclient, OWD, manual.
+//! Three bytes contain the motor's position; six contain the motor's and the joint encoder's. The two top bits
+//! of each triple are documented as zero; libbarrett has disabled its check of them, and all public
+//! implementations ignore them, as does this one. Source: libbarrett, btclient, OWD, manual.
 
 use crate::frame::{CanFrame, LengthError};
 use crate::id::{GroupId, MessageId, NodeId};
 use core::f64::consts::TAU;
 use core::fmt;
 
-/// An encoder's position, -2 097 152 to 2 097 151 counts: what 22 bits hold.
+/// An encoder's position, -2 097 152 to 2 097 151 counts: the range of 22 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Counts(i32);
 
-/// A position that 22 bits do not hold.
+/// A position outside the range of 22 bits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CountsError {
-    /// Counts beyond the range.
-    Beyond(i32),
-    /// An angle that is not finite, or beyond the range once in counts; the counts.
+    /// Counts outside the range.
+    OutOfRange(i32),
+    /// An angle that is not finite, or outside the range in counts; the counts.
     Angle(f64),
 }
 
@@ -27,7 +27,7 @@ impl fmt::Display for CountsError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let range = "it must be -2097152 to 2097151";
         match self {
-            CountsError::Beyond(counts) => write!(f, "position is {counts} counts, {range}"),
+            CountsError::OutOfRange(counts) => write!(f, "position is {counts} counts, {range}"),
             CountsError::Angle(counts) => write!(f, "position is {counts:.1} counts, {range}"),
         }
     }
@@ -36,24 +36,24 @@ impl fmt::Display for CountsError {
 impl core::error::Error for CountsError {}
 
 impl Counts {
-    /// Least position: -512 revolutions at 4096 counts.
+    /// Minimum position: -512 revolutions at 4096 counts.
     pub const MIN: Counts = Counts(-(1 << 21));
-    /// Greatest position.
+    /// Maximum position.
     pub const MAX: Counts = Counts((1 << 21) - 1);
 
     /// A position in range.
     ///
     /// # Errors
-    /// Counts that 22 bits do not hold.
+    /// Counts outside the range of 22 bits.
     pub const fn new(counts: i32) -> Result<Counts, CountsError> {
         if counts >= Counts::MIN.0 && counts <= Counts::MAX.0 {
             Ok(Counts(counts))
         } else {
-            Err(CountsError::Beyond(counts))
+            Err(CountsError::OutOfRange(counts))
         }
     }
 
-    /// Its number of counts.
+    /// Number of counts.
     pub const fn get(self) -> i32 {
         self.0
     }
@@ -75,7 +75,7 @@ pub struct PositionScale {
     counts_per_rad: f64,
 }
 
-/// An encoder of no counts.
+/// Error: the number of counts is not positive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PositionScaleError(pub i32);
 
@@ -112,14 +112,14 @@ impl PositionScale {
         f64::from(counts.0) / self.counts_per_rad
     }
 
-    /// The nearest count to an angle of the encoder \[rad\], halves away from zero.
+    /// The nearest count to an angle of the encoder \[rad\], rounded half away from zero.
     ///
     /// # Errors
-    /// An angle that is not finite, or that 22 bits of counts do not hold.
+    /// An angle that is not finite, or outside the range of 22 bits.
     pub fn counts(&self, angle_rad: f64) -> Result<Counts, CountsError> {
         let counts = libm::round(angle_rad * self.counts_per_rad);
-        let (least, greatest) = (f64::from(Counts::MIN.0), f64::from(Counts::MAX.0));
-        if (least..=greatest).contains(&counts) {
+        let (lower, upper) = (f64::from(Counts::MIN.0), f64::from(Counts::MAX.0));
+        if (lower..=upper).contains(&counts) {
             Ok(Counts(counts as i32))
         } else {
             Err(CountsError::Angle(counts))
@@ -127,7 +127,7 @@ impl PositionScale {
     }
 }
 
-/// What a motor puck answers to a request for its position.
+/// A motor puck's reply to a position request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PositionReply {
     /// Motor encoder.
@@ -137,7 +137,7 @@ pub struct PositionReply {
 }
 
 impl PositionReply {
-    /// Reads a frame to [`GroupId::POSITION`]; whom it is for is not looked at.
+    /// Parses a frame to [`GroupId::POSITION`]; the destination is not checked.
     ///
     /// # Errors
     /// A payload of neither three nor six bytes.

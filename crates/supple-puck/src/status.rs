@@ -1,16 +1,16 @@
-//! Values of the properties that say what a puck is and does. Source: libbarrett, btclient.
+//! Values of the properties for the type and state of a puck. Source: libbarrett, btclient.
 
 use crate::property::PuckKind;
 use core::fmt;
 
-/// A value that a property of few values does not have.
+/// A value outside the allowed set of an enumerated property.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct UnknownValue {
     /// Property.
     pub property: &'static str,
     /// Value found.
     pub value: i32,
-    /// Values it has.
+    /// Allowed values.
     pub expected: &'static str,
 }
 
@@ -30,11 +30,11 @@ impl core::error::Error for UnknownValue {}
 /// [`Property::STAT`](crate::Property::STAT).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stat {
-    /// The monitor runs; the puck waits to be woken. Set, it restarts the puck.
+    /// The monitor runs; the puck waits for a wake-up. Setting it restarts the puck.
     Reset = 0,
-    /// Something is wrong.
+    /// An error.
     Error = 1,
-    /// The firmware runs. Set, it wakes the puck.
+    /// The firmware runs. Setting it wakes the puck.
     Ready = 2,
 }
 
@@ -72,7 +72,7 @@ pub enum MotorMode {
     Duty = 1,
     /// Torque.
     Torque = 2,
-    /// Position by the puck's own PID.
+    /// Position control by the puck's PID.
     Pid = 3,
     /// Velocity.
     Velocity = 4,
@@ -107,8 +107,8 @@ impl MotorMode {
     }
 }
 
-/// [`Property::ROLE`](crate::Property::ROLE): what the puck is for, and with which options. A view
-/// over the property's low 16 bits.
+/// [`Property::ROLE`](crate::Property::ROLE): type and options of the puck. A view of the property's low 16
+/// bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Role(pub u16);
 
@@ -142,7 +142,7 @@ impl Role {
     /// Force/torque sensor.
     pub const FORCE: Role = Role(0x0006);
 
-    /// From the property's value, whose sign means nothing.
+    /// From the property's value, whose sign has no meaning.
     pub const fn from_value(value: i32) -> Role {
         Role(value as u16)
     }
@@ -168,8 +168,8 @@ impl Role {
         }
     }
 
-    /// Family of property lists; `None` for types whose lists are not known. libbarrett takes the
-    /// motor's for taters, wraptors and hands.
+    /// Family of property lists; `None` for types with unknown lists. libbarrett uses the motor's lists for
+    /// taters, wraptors and hands.
     pub const fn kind(self) -> Option<PuckKind> {
         match self.role_type() {
             Ok(RoleType::Tater | RoleType::Wraptor | RoleType::BarrettHand) => {

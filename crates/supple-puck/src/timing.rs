@@ -1,8 +1,8 @@
-//! How long a frame occupies the bus.
+//! Duration of a frame on the bus.
 //!
-//! A data frame with an 11-bit id has 44 bits of its own around its payload, and 3 between frames. Of
-//! these, start bit, id, control field, payload and check sum are stuffed: after five equal bits comes
-//! an opposite one, which counts towards the next five.
+//! A data frame with an 11-bit id has 44 bits besides its payload, and 3 bits of interframe space. Start bit,
+//! id, control field, payload and checksum are stuffed: after five equal bits an opposite one is inserted, which
+//! counts towards the next five.
 
 use crate::frame::CanFrame;
 
@@ -15,17 +15,17 @@ const CHECK_BITS: u32 = 15;
 const CHECK_POLYNOMIAL: u16 = 0x4599;
 
 /// Bits of a frame of `dlc` bytes without any stuffing.
-pub const fn least_bits(dlc: u8) -> u32 {
+pub const fn min_bits(dlc: u8) -> u32 {
     UNSTUFFED_BITS + 8 * dlc as u32
 }
 
-/// Bits of a frame of `dlc` bytes with as much stuffing as there can be.
-pub const fn most_bits(dlc: u8) -> u32 {
+/// Bits of a frame of `dlc` bytes with maximum stuffing.
+pub const fn max_bits(dlc: u8) -> u32 {
     let stuffed = HEAD_BITS + 8 * dlc as u32 + CHECK_BITS;
-    least_bits(dlc) + (stuffed - 1) / 4
+    min_bits(dlc) + (stuffed - 1) / 4
 }
 
-/// Bits of this very frame, stuffing and the gap behind it included.
+/// Bits of this frame, including stuffing and the interframe space.
 pub fn bits(frame: &CanFrame) -> u32 {
     // Start bit, id, then remote, extended and reserved bits, all zero, then the length.
     let head = u32::from(frame.id().raw()) << 7 | u32::from(frame.dlc());
@@ -35,7 +35,7 @@ pub fn bits(frame: &CanFrame) -> u32 {
         stream.push(u32::from(byte), 8);
     }
     stream.push(u32::from(stream.check), CHECK_BITS);
-    least_bits(frame.dlc()) + stream.stuffing
+    min_bits(frame.dlc()) + stream.stuffing
 }
 
 #[derive(Default)]
@@ -80,7 +80,7 @@ mod tests {
 
     /// The published check value of CRC-15/CAN.
     #[test]
-    fn check_sum_is_that_of_can() {
+    fn checksum_matches_crc_15_can() {
         let mut stream = Stream::default();
         for &byte in b"123456789" {
             stream.push(u32::from(byte), 8);
@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn stuffing_bits_count_towards_the_next() {
+    fn stuff_bits_count_towards_the_next_five() {
         let stuffing = |value, bits| {
             let mut stream = Stream::default();
             stream.push(value, bits);
@@ -97,7 +97,7 @@ mod tests {
         };
         assert_eq!(stuffing(0b0000, 4), 0);
         assert_eq!(stuffing(0b00000, 5), 1);
-        // After 00000 comes a stuffed 1, which makes five of the four 1 that follow.
+        // After 00000 a 1 is stuffed, which makes five with the four 1 that follow.
         assert_eq!(stuffing(0b0_0000_1111, 9), 2);
         assert_eq!(stuffing(0b0_0000_0111, 9), 1);
     }

@@ -1,25 +1,25 @@
-//! Packed torques: four 14-bit two's complement values behind the property byte, most significant bit
-//! first. Each puck takes the slot that its [`Property::PIDX`](crate::Property::PIDX) names.
+//! Packed torques: four 14-bit two's complement values after the property byte, most significant bit first. Each
+//! puck uses the slot of its [`Property::PIDX`](crate::Property::PIDX).
 //!
-//! Torques are rounded to the nearest unit with halves away from zero: the rounding is odd, so that it
-//! has no bias either way. (libbarrett rounds down, a bias of half a unit.) Beyond +-8191 units they
-//! saturate, as in libbarrett. Source: libbarrett, manual.
+//! Torques are rounded to the nearest unit with halves away from zero: the rounding is odd, so that it has no
+//! bias. (libbarrett rounds down, a bias of half a unit.) They saturate at +-8191 units, as in libbarrett.
+//! Source: libbarrett, manual.
 
 use crate::frame::{CanFrame, LengthError};
 use crate::id::{GroupId, MessageId, NodeId};
 use crate::property::{PropertyId, SET_BIT};
 use core::fmt;
 
-/// A torque in a puck's units, -8192 to 8191; a host commands +-8191 at most. 1024 units are 1 A.
+/// A torque in a puck's units, -8192 to 8191; a host commands at most +-8191. 1024 units are 1 A.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct PuckTorque(i16);
 
 impl PuckTorque {
-    /// No torque.
+    /// Zero torque.
     pub const ZERO: PuckTorque = PuckTorque(0);
-    /// The most that a host commands.
+    /// Maximum that a host commands.
     pub const MAX: PuckTorque = PuckTorque(8191);
-    /// The least that a host commands.
+    /// Minimum that a host commands.
     pub const MIN: PuckTorque = PuckTorque(-8191);
 
     /// The nearest torque within +-8191 units.
@@ -33,7 +33,7 @@ impl PuckTorque {
         }
     }
 
-    /// Its number of units.
+    /// Number of units.
     pub const fn units(self) -> i16 {
         self.0
     }
@@ -47,13 +47,13 @@ impl PuckTorque {
     }
 }
 
-/// Units of torque per N m of one puck's motor: where newton metres become puck units.
+/// Torque units per N m of a puck's motor; converts newton metres to puck units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TorqueScale {
     units_per_nm: f64,
 }
 
-/// What cannot be turned into puck units.
+/// Errors of the conversion to puck units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum TorqueError {
     /// A scale that is not finite and positive \[1/(N m)\].
@@ -97,13 +97,13 @@ impl TorqueScale {
         self.units_per_nm
     }
 
-    /// Nearest torque of the motor to `torque_nm`, halves away from zero, within +-8191 units.
+    /// Nearest torque of the motor to `torque_nm`, rounded half away from zero, within +-8191 units.
     ///
     /// # Errors
-    /// A torque that is not finite: saturation would make a limit of it.
+    /// A torque that is not finite, which saturation would turn into a limit.
     pub fn puck_torque(&self, torque_nm: f64) -> Result<PuckTorque, TorqueError> {
         if torque_nm.is_finite() {
-            // A float beyond the integers saturates in the cast, then again here.
+            // A float outside the integer range saturates in the cast, then again here.
             let units = libm::round(torque_nm * self.units_per_nm) as i32;
             Ok(PuckTorque::saturating(units))
         } else {
@@ -122,11 +122,11 @@ impl TorqueScale {
 pub struct PackedTorques {
     /// Id of [`Property::T`](crate::Property::T) in the pucks' firmware: 42 from version 61.
     pub property: PropertyId,
-    /// By slot; zero where no puck is.
+    /// Torques by slot; zero for slots without a puck.
     pub slots: [PuckTorque; 4],
 }
 
-/// Why a frame is not one of packed torques.
+/// Errors of parsing a packed torque frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PackedTorquesError {
     /// Not eight bytes.
@@ -150,17 +150,17 @@ impl fmt::Display for PackedTorquesError {
 impl core::error::Error for PackedTorquesError {}
 
 impl PackedTorques {
-    /// Torque in slot `pidx`, 1 to 4 as the property counts them; `None` beyond.
+    /// Torque in slot `pidx`, 1 to 4 as in the property; `None` for other slots.
     pub fn slot(&self, pidx: u8) -> Option<PuckTorque> {
         let index = usize::from(pidx).checked_sub(1)?;
         self.slots.get(index).copied()
     }
 
-    /// Reads a frame to [`GroupId::LOWER_TORQUES`] or [`GroupId::UPPER_TORQUES`]; whom it is for is
-    /// not looked at.
+    /// Parses a frame to [`GroupId::LOWER_TORQUES`] or [`GroupId::UPPER_TORQUES`]; the destination is not
+    /// checked.
     ///
     /// # Errors
-    /// Not eight bytes, or a first byte that is a request.
+    /// A payload that is not eight bytes, or starts with a request byte.
     pub fn parse(frame: &CanFrame) -> Result<PackedTorques, PackedTorquesError> {
         let Ok([head, rest @ ..]) = <[u8; 8]>::try_from(frame.payload()) else {
             return Err(PackedTorquesError::Length(frame.wrong_length(&[8])));

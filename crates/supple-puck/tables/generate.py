@@ -12,13 +12,13 @@ FOLDER = CRATE / "src/property"
 
 ALIASES = {"TORQ": "T", "AP": "P", "B": "FET0", "TENSION": "FET1"}
 
-# 32 bits wide where the next id is left free for the upper half, and the pendant's word always.
+# 32 bits wide if the next id is unused (upper half); the pendant word always.
 WIDE = "P DP E OT CT M MECH CTS IOFF HALLH EN JP JOFST".split()
 WIDE_WITHOUT_PLACE_HOLDER = "PEN"
 
 MEANING = {
     "VERS": "Firmware version. Always valid.",
-    "ROLE": "What the puck is for, see [`Role`](crate::status::Role). Always valid.",
+    "ROLE": "Type and options of the puck, see [`Role`](crate::status::Role). Always valid.",
     "SN": "Serial number. Always valid.",
     "ID": "Node id. Always valid.",
     "ERROR": "Error; its codes are not published. Always valid.",
@@ -29,20 +29,20 @@ MEANING = {
     "TEMP": "Temperature \\\\[degrees Celsius\\\\].",
     "PTEMP": "Peak temperature \\\\[degrees Celsius\\\\].",
     "OTEMP": "Temperature limit \\\\[degrees Celsius\\\\], 60 by default.",
-    "LOCK": "Takes the sequence that unlocks a change of node id or role.",
+    "LOCK": "Accepts the sequence that unlocks a change of node id or role.",
     "FET1": "`FET1` of Barrett's lists; `TENSION` is another name.",
     "FET0": "`FET0` of Barrett's lists; `B` is another name.",
     "THERM": "Temperature of the thermistor \\[degrees Celsius\\].",
     "VBUS": "Bus voltage; 48 V nominal.",
-    "GRPA": "First group the puck listens to.",
-    "GRPB": "Second group the puck listens to.",
-    "GRPC": "Third group the puck listens to.",
-    "CMD": "Takes a command: 13 hand init, 18 close, 19 move, 20 open.",
+    "GRPA": "First group of the puck.",
+    "GRPB": "Second group of the puck.",
+    "GRPC": "Third group of the puck.",
+    "CMD": "Accepts a command: 13 hand init, 18 close, 19 move, 20 open.",
     "SAVE": "Set to a property id (or -1, all): writes it to the EEPROM.",
     "LOAD": "Set to a property id: reads it back from the EEPROM.",
     "DEF": "Set to a property id: restores its factory default.",
     "T": "Torque command \\\\[puck units\\\\], usually packed, see [`PackedTorques`](crate::torque::PackedTorques); `TORQ` is another name.",
-    "MT": "Greatest torque the puck applies \\\\[puck units\\\\].",
+    "MT": "Maximum torque that the puck applies \\\\[puck units\\\\].",
     "P": "Position \\\\[counts\\\\]; its reply is packed, see [`PositionReply`](crate::position::PositionReply); `AP` is another name.",
     "MECH": "Absolute magnetic angle \\\\[counts\\\\]; firmware 118 and later, with the magnetic encoder of [`Role`](crate::status::Role).",
     "CTS": "Encoder counts per revolution: 4096 magnetic, 40960 optical.",
@@ -60,7 +60,7 @@ MEANING = {
     "ECMIN": "See `ECMAX`.",
     "LFLAGS": "Loop flags; their bits are not published.",
     "TACT": "Kind of tactile report: 0 none, 1 top ten, 2 full, 3 tare.",
-    "ZERO": "1 once the safety module has been told that the arm's zero is right.",
+    "ZERO": "1 once the host has confirmed the arm's zero to the safety module.",
     "PEN": "The pendant, see [`PenWord`](crate::safety::PenWord).",
     "SAFE": "Service command of the safety module; 0, 4 and 5 are known, for the voltage calibration.",
     "VL1": "Speed warning, see [`SpeedLimit`](crate::safety::SpeedLimit).",
@@ -71,8 +71,8 @@ MEANING = {
     "VOLTL2": "Low voltage fault \\\\[V\\\\], 30 by default.",
     "VOLTH1": "High voltage warning \\\\[V\\\\], 54 by default.",
     "VOLTH2": "High voltage fault \\\\[V\\\\], 57 by default.",
-    "IFAULT": "How many of the next speed faults to ignore.",
-    "FT": "Force and torque, see [`force_torque`](crate::force_torque); set to 0 it tares.",
+    "IFAULT": "Number of the next speed faults to ignore.",
+    "FT": "Force and torque, see [`force_torque`](crate::force_torque); setting it to 0 tares.",
     "A": "Acceleration, see [`force_torque`](crate::force_torque).",
 }
 UNKNOWN = "`{}` of Barrett's lists."
@@ -142,7 +142,7 @@ def main():
         "/// Not in this list.",
         "pub(super) const NO: u8 = 0x7f;",
         "",
-        "/// Least motor firmware of each of the first columns.",
+        "/// Minimum motor firmware of each of the first columns.",
         f"pub(super) const MOTOR_VERSIONS: [u16; {len(motor)}] = [{', '.join(map(str, motor))}];",
     ]
     for index, (kind, version) in enumerate(columns[len(motor):], start=len(motor)):

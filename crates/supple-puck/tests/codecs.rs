@@ -1,4 +1,5 @@
-//! What is written is read back, and whatever is read is refused or written back as it was.
+//! Round trips: encoded values parse to themselves, and every input is either rejected or re-encoded
+//! identically.
 
 mod common;
 
@@ -8,11 +9,11 @@ use supple_puck::force_torque::{Quantity, SensorReading, SensorStatus};
 use supple_puck::property::Reply;
 use supple_puck::safety::{PenWord, Pendant, SafetyMode, SevenSegment, SpeedLimit};
 use supple_puck::status::{MotorMode, Role, Stat};
-use supple_puck::timing::{bits, least_bits, most_bits};
+use supple_puck::timing::{bits, max_bits, min_bits};
 use supple_puck::*;
 
 #[test]
-fn every_22_bit_position_survives() {
+fn every_22_bit_position_round_trips() {
     let node = NodeId::joint(1).unwrap();
     for counts in Counts::MIN.get()..=Counts::MAX.get() {
         let motor = Counts::new(counts).unwrap();
@@ -26,9 +27,9 @@ fn every_22_bit_position_survives() {
     assert!(Counts::new(Counts::MIN.get() - 1).is_err());
 }
 
-/// All 16384 patterns in all four slots, beside other values that must not leak.
+/// All 16384 patterns in all four slots, next to other values that must not leak.
 #[test]
-fn every_14_bit_torque_survives() {
+fn every_14_bit_torque_round_trips() {
     for pattern in 0..1u64 << 14 {
         let others = pattern.wrapping_mul(0x9e37) & 0x3fff;
         for slot in 0..4 {
@@ -45,7 +46,7 @@ fn every_14_bit_torque_survives() {
 }
 
 #[test]
-fn every_id_is_a_message() {
+fn every_11_bit_id_round_trips() {
     for raw in 0..0x800 {
         let id = MessageId::from_raw(raw).unwrap();
         assert_eq!(MessageId::new(id.from(), id.to()), id);
@@ -53,9 +54,9 @@ fn every_id_is_a_message() {
     }
 }
 
-/// The pendant's 15 level bits and its other 12, each set exhausted beside a fixed rest.
+/// All values of the pendant's 15 level bits, and of its other 12 bits, with the rest fixed.
 #[test]
-fn every_pendant_word_is_refused_or_written_back() {
+fn every_pendant_word_is_rejected_or_round_trips() {
     let safe = 0b001_001_001_001_001;
     let mut read = 0;
     for word in (0..1 << 15).chain((0..1 << 12).map(|upper| upper << 16 | safe)) {
@@ -71,7 +72,7 @@ fn every_pendant_word_is_refused_or_written_back() {
 }
 
 #[test]
-fn digits_lead_back() {
+fn seven_segment_digits_round_trip() {
     let shown = (0..=255).filter_map(|bits| Some((bits, SevenSegment(bits).character()?)));
     let shown: Vec<_> = shown.collect();
     assert_eq!(shown.len(), 12);
@@ -114,7 +115,7 @@ proptest! {
     #![proptest_config(config(20_260_301))]
 
     #[test]
-    fn property_messages_survive(
+    fn property_messages_round_trip(
         from in any_node(),
         to in any_destination(),
         id in 0..128u8,
@@ -135,7 +136,7 @@ proptest! {
     }
 
     #[test]
-    fn sensor_readings_survive(
+    fn sensor_readings_round_trip(
         from in any_node(),
         quantity in any_quantity(),
         counts in any::<[i16; 3]>(),
@@ -146,9 +147,9 @@ proptest! {
         prop_assert_eq!(quantity.counts(reading.components()), Ok(counts));
     }
 
-    /// Decoders refuse or accept any frame at all, and what they accept is written back the same.
+    /// Decoders accept or reject any frame, and re-encode an accepted one identically.
     #[test]
-    fn frames_are_refused_or_written_back(frame in any_frame()) {
+    fn frames_are_rejected_or_round_trip(frame in any_frame()) {
         let (from, to) = (frame.id().from(), frame.id().to());
         if let Ok(message) = PropertyMessage::parse(&frame) {
             prop_assert_eq!(message.emit(from, to), frame);
@@ -185,11 +186,11 @@ proptest! {
             prop_assert!(written.is_none_or(|written| written == frame));
         }
         let length = bits(&frame);
-        prop_assert!((least_bits(frame.dlc())..=most_bits(frame.dlc())).contains(&length));
+        prop_assert!((min_bits(frame.dlc())..=max_bits(frame.dlc())).contains(&length));
     }
 
     #[test]
-    fn values_are_refused_or_written_back(value in prop_oneof![-3..9i32, any::<i32>()]) {
+    fn values_are_rejected_or_round_trip(value in prop_oneof![-3..9i32, any::<i32>()]) {
         let kept = |found: Option<i16>| found.is_none_or(|found| i32::from(found) == value);
         prop_assert!(kept(Stat::from_value(value).ok().map(Stat::value)));
         prop_assert!(kept(MotorMode::from_value(value).ok().map(MotorMode::value)));

@@ -1,4 +1,4 @@
-//! The property tables against the lists they were made from, row by row and gap by gap.
+//! Compares the property tables with the lists from which they were generated, including the gaps.
 
 use std::collections::{BTreeMap, BTreeSet};
 use supple_puck::property::Slot;
@@ -41,16 +41,16 @@ fn assert_same(table: PropertyTable, list: &BTreeMap<String, u8>, context: &str)
         let found = table.id(property).map(PropertyId::number);
         assert_eq!(found, Some(id), "{context} {name}");
     }
-    let listed: BTreeSet<_> = list.keys().map(|n| Property::from_name(n)).collect();
-    for property in Property::all().filter(|p| !listed.contains(&Some(*p))) {
+    let in_list: BTreeSet<_> = list.keys().map(|n| Property::from_name(n)).collect();
+    for property in Property::all().filter(|p| !in_list.contains(&Some(*p))) {
         assert_eq!(table.id(property), None, "{context} {property}");
         assert_eq!(table.width(property), None, "{context} {property}");
     }
 }
 
-/// Every version from one list to the next, at both ends.
+/// Each list at the first and last version for which it is valid.
 #[test]
-fn every_list_is_as_published() {
+fn every_list_matches_the_published_one() {
     let lists = lists();
     for ((kind, version), list) in &lists {
         let of_kind = |other: &&(String, i32)| other.0 == *kind && other.1 > *version;
@@ -62,7 +62,7 @@ fn every_list_is_as_published() {
 }
 
 #[test]
-fn what_the_monitor_lists_first_is_valid_everywhere() {
+fn the_first_ids_of_the_monitor_are_valid_in_every_firmware() {
     let names = "VERS ROLE SN ID ERROR STAT ADDR VALUE";
     for ((kind, version), _) in lists() {
         for (number, name) in names.split(' ').enumerate() {
@@ -74,7 +74,7 @@ fn what_the_monitor_lists_first_is_valid_everywhere() {
 }
 
 #[test]
-fn ids_lead_back_to_their_properties() {
+fn ids_map_back_to_their_properties() {
     for ((kind, version), _) in lists() {
         let table = table(&kind, version);
         for property in Property::all() {
@@ -98,7 +98,7 @@ fn ids_lead_back_to_their_properties() {
 
 /// Widths of the newest firmware, as documented.
 #[test]
-fn thirty_two_bits_are_where_they_are_documented() {
+fn thirty_two_bit_properties_match_the_documentation() {
     let wide_in = |kind, version| -> BTreeSet<&str> {
         let table = table(kind, version);
         Property::all()
@@ -109,13 +109,13 @@ fn thirty_two_bits_are_where_they_are_documented() {
     let documented = "P DP E OT CT M MECH CTS IOFF HALLH EN JP JOFST";
     assert_eq!(wide_in("Motor", 175), documented.split(' ').collect());
     assert_eq!(wide_in("Safety", 61), BTreeSet::from(["PEN"]));
-    // IOFF and EN have no place-holder behind them in this one, JP and JOFST are not there yet.
+    // In this version IOFF and EN have no placeholder after them, and JP and JOFST do not exist yet.
     let older = "P DP E OT CT M MECH CTS HALLH";
     assert_eq!(wide_in("Motor", 61), older.split(' ').collect());
 }
 
 #[test]
-fn names_are_unique_and_lead_back() {
+fn names_are_unique_and_map_back() {
     for property in Property::all() {
         assert_eq!(Property::from_name(property.name()), Some(property));
     }
@@ -131,7 +131,7 @@ fn names_are_unique_and_lead_back() {
 }
 
 #[test]
-fn firmware_older_than_the_lists_is_refused() {
+fn firmware_older_than_the_lists_is_rejected() {
     for kind in [PuckKind::Motor, PuckKind::Safety] {
         let error = PropertyTable::of_firmware(kind, 31).unwrap_err();
         assert_eq!(

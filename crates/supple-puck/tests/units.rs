@@ -1,4 +1,4 @@
-//! Where SI units become counts and back: rounding, saturation, refusals.
+//! Conversions between SI units and counts: rounding, saturation, rejected values.
 
 mod common;
 
@@ -22,7 +22,7 @@ fn torques_round_to_nearest_with_halves_away_from_zero() {
 }
 
 #[test]
-fn what_is_not_finite_is_refused_and_not_saturated() {
+fn nonfinite_values_are_rejected_and_not_saturated() {
     let scale = TorqueScale::new(2700.0).unwrap();
     for torque_nm in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         assert!(scale.puck_torque(torque_nm).is_err());
@@ -35,9 +35,9 @@ fn what_is_not_finite_is_refused_and_not_saturated() {
     assert!(PositionScale::new(0).is_err());
 }
 
-/// Full torque of the arm's motors: about 20 % of what breaks the cable.
+/// Full torque of the arm's motors: about 20 % of the breaking load of the cable.
 #[test]
-fn torque_limits_are_those_published_in_newton_metres() {
+fn torque_limits_match_the_published_newton_metres() {
     for (units_per_nm, units, torque_nm) in [
         (2700.0, 4860, 1.8),
         (2700.0, 4320, 1.6),
@@ -62,7 +62,7 @@ fn a_revolution_is_4096_counts() {
 }
 
 #[test]
-fn speed_limits_are_never_rounded_up_nor_away() {
+fn speed_limits_are_rounded_down_but_never_to_zero() {
     let value = |speed| SpeedLimit::from_m_per_s(speed).map(SpeedLimit::value);
     assert_eq!(value(1.0), Ok(0x1000));
     assert_eq!(value(0.5), Ok(2048));
@@ -75,7 +75,7 @@ fn speed_limits_are_never_rounded_up_nor_away() {
 }
 
 #[test]
-fn safety_limits_are_the_modules_own_unless_told_otherwise() {
+fn safety_limits_default_to_those_of_the_module() {
     let limits = SafetyLimits::default();
     assert_eq!(limits.validate(), Ok(()));
     let settings = limits.settings().map(|(name, value)| (name, value.get()));
@@ -114,7 +114,7 @@ fn safety_limits_are_the_modules_own_unless_told_otherwise() {
 }
 
 #[test]
-fn the_host_only_lowers_the_safety_module() {
+fn the_host_can_only_lower_the_safety_module() {
     use SafetyMode::{Active, EStop, Idle};
     for (mode, requested, after) in [
         (EStop, Idle, EStop),
@@ -130,7 +130,7 @@ fn the_host_only_lowers_the_safety_module() {
 }
 
 #[test]
-fn statuses_and_modes_have_their_documented_numbers() {
+fn statuses_and_modes_have_the_documented_numbers() {
     assert_eq!(Stat::from_value(2), Ok(Stat::Ready));
     assert_eq!(MotorMode::from_value(2), Ok(MotorMode::Torque));
     assert_eq!(
@@ -141,7 +141,7 @@ fn statuses_and_modes_have_their_documented_numbers() {
 }
 
 #[test]
-fn roles_tell_type_and_options() {
+fn roles_contain_type_and_options() {
     assert_eq!(Role::ARM_MOTOR.role_type(), Ok(RoleType::Tater));
     assert!(Role::ARM_MOTOR.magnetic_encoder_serial());
     assert!(!Role::ARM_MOTOR.joint_encoder());
@@ -150,7 +150,7 @@ fn roles_tell_type_and_options() {
     assert_eq!(Role::FORCE.kind(), Some(PuckKind::ForceTorque));
     assert_eq!(Role(5).kind(), Some(PuckKind::Motor));
     assert_eq!([Role(1).kind(), Role(4).kind(), Role(7).kind()], [None; 3]);
-    // Each option bit answers to one question alone.
+    // Each option bit changes exactly one query.
     for bit in 6..15 {
         let role = Role(1 << bit);
         let answers = [
@@ -183,7 +183,7 @@ proptest! {
     }
 
     #[test]
-    fn counts_survive_the_way_through_radians(
+    fn counts_round_trip_through_radians(
         counts in Counts::MIN.get()..=Counts::MAX.get(),
         per_revolution in 1..1_600_000,
     ) {

@@ -1,10 +1,10 @@
-//! Frames written out by hand from the descriptions of the protocol, byte by byte.
+//! Frames encoded by hand from the protocol descriptions, byte by byte.
 
 use supple_puck::force_torque::{self, Quantity, SensorReading, SensorStatus};
 use supple_puck::inbound::InboundError;
 use supple_puck::property::{self, PropertyError, Reply};
 use supple_puck::safety::{Button, Level, PenWord, Pendant, PendantError, SevenSegment};
-use supple_puck::timing::{least_bits, most_bits};
+use supple_puck::timing::{max_bits, min_bits};
 use supple_puck::*;
 
 fn frame(id: u32, payload: &[u8]) -> CanFrame {
@@ -168,7 +168,7 @@ fn force_torque_frames() {
     assert_eq!(force_torque::request(), frame(0x008, &[54]));
     assert_eq!(force_torque::request_acceleration(), frame(0x008, &[64]));
     assert_eq!(force_torque::tare(), frame(0x008, &[0xb6, 0, 0, 0, 0, 0]));
-    // 1 N, -1 N, 0.5 N; then 1 N m, -0.25 N m, 0 with axis 2 saturated once and data bad now.
+    // 1 N, -1 N, 0.5 N; then 1 N m, -0.25 N m, 0 with axis 2 saturated since the tare and bad data.
     let force = frame(0x50a, &[0x00, 0x01, 0x00, 0xff, 0x80, 0x00]);
     let force = SensorReading::parse(Quantity::Force, &force).unwrap();
     assert_eq!(force.components(), [1.0, -1.0, 0.5]);
@@ -177,17 +177,17 @@ fn force_torque_frames() {
     let torque = SensorReading::parse(Quantity::Torque, &torque).unwrap();
     assert_eq!(torque.components(), [1.0, -0.25, 0.0]);
     let status = torque.status.unwrap();
-    assert!(status.bad_now());
+    assert!(status.is_bad());
     let saturated = [0, 1, 2, 3, 4, 5, 6].map(|axis| status.saturated_since_tare(axis));
     let [no, yes] = [Some(false), Some(true)];
     assert_eq!(saturated, [no, no, yes, no, no, no, None]);
-    assert!(SensorStatus::TARING.bad_now());
+    assert!(SensorStatus::TARING.is_bad());
     let acceleration = frame(0x50c, &[0x00, 0x04, 0, 0, 0, 0]);
     let acceleration = SensorReading::parse(Quantity::Acceleration, &acceleration).unwrap();
     assert_eq!(acceleration.components(), [1.0, 0.0, 0.0]);
 }
 
-/// Idle, all safe but the voltage, which warns: button 11, idle light, '1', fields 001 001 010 001 001.
+/// Idle, all levels safe except a voltage warning: button 11, idle light, '1', fields 001 001 010 001 001.
 #[test]
 fn pendant_word() {
     let word = PenWord(0x0d06_0000 | 0b001_001_010_001_001);
@@ -219,7 +219,7 @@ fn pendant_word() {
 }
 
 #[test]
-fn inbound_frames_are_told_apart_by_group() {
+fn inbound_frames_are_distinguished_by_group() {
     let kind = |id, payload: &[u8]| Inbound::parse(&frame(id, payload));
     assert!(matches!(kind(0x423, &[0; 3]), Ok((n, Inbound::Position(_))) if n == joint(1)));
     assert!(matches!(
@@ -248,7 +248,7 @@ fn inbound_frames_are_told_apart_by_group() {
 
 #[test]
 fn cycles_fit_as_computed_by_hand() {
-    for (dlc, least, most) in [
+    for (dlc, min, max) in [
         (1, 55, 65),
         (3, 71, 85),
         (4, 79, 95),
@@ -256,17 +256,11 @@ fn cycles_fit_as_computed_by_hand() {
         (7, 103, 125),
         (8, 111, 135),
     ] {
-        assert_eq!((least_bits(dlc), most_bits(dlc)), (least, most), "{dlc}");
+        assert_eq!((min_bits(dlc), max_bits(dlc)), (min, max), "{dlc}");
     }
     let cycle = |bits: fn(u8) -> u32, joints: u32, torque_frames: u32| {
         bits(1) + joints * bits(3) + torque_frames * bits(8)
     };
-    assert_eq!(
-        [cycle(least_bits, 4, 1), cycle(most_bits, 4, 1)],
-        [450, 540]
-    );
-    assert_eq!(
-        [cycle(least_bits, 7, 2), cycle(most_bits, 7, 2)],
-        [774, 930]
-    );
+    assert_eq!([cycle(min_bits, 4, 1), cycle(max_bits, 4, 1)], [450, 540]);
+    assert_eq!([cycle(min_bits, 7, 2), cycle(max_bits, 7, 2)], [774, 930]);
 }

@@ -1,6 +1,6 @@
-//! Work that may wait for a disk, a terminal or a reader, done by a thread of its own.
+//! A background thread for work that may block on a disk, a terminal or a reader.
 //!
-//! Whoever hands work over never waits: where the queue is full, the work is dropped and counted.
+//! Submitting work never blocks: if the queue is full, the work is dropped and counted.
 
 use core::time::Duration;
 use std::io;
@@ -12,14 +12,14 @@ use std::time::Instant;
 
 /// Stack of the thread \[bytes\]: under locked memory all of it is resident.
 const STACK_BYTES: usize = 256 * 1024;
-/// How often [`BackgroundWriter::flush`] looks for room in a full queue.
-const LOOK_EVERY: Duration = Duration::from_millis(1);
+/// Interval at which [`BackgroundWriter::flush`] retries on a full queue.
+const POLL_INTERVAL: Duration = Duration::from_millis(1);
 
 type Job = Box<dyn FnOnce() + Send>;
 
-/// A thread that does what it is handed, in order, with a queue of fixed length before it.
+/// A thread that runs submitted jobs in order from a queue of fixed length.
 ///
-/// Dropping it ends the thread once the queue is empty, and waits for nothing.
+/// Dropping it ends the thread once the queue is empty, without waiting for it.
 #[derive(Debug)]
 pub struct BackgroundWriter {
     sender: SyncSender<Job>,
@@ -27,11 +27,11 @@ pub struct BackgroundWriter {
 }
 
 impl BackgroundWriter {
-    /// Starts the thread; `capacity` jobs may wait. The thread takes over the scheduling of the caller, so it is to be
-    /// started before the caller asks for a realtime priority.
+    /// Starts the thread with a queue of `capacity` jobs. The thread inherits the scheduling of the caller, so start it
+    /// before the caller gets a realtime priority.
     ///
     /// # Errors
-    /// Where the system gives no thread.
+    /// If the thread cannot be started.
     pub fn start(name: &str, capacity: usize) -> io::Result<BackgroundWriter> {
         let (sender, jobs) = sync_channel::<Job>(capacity);
         Builder::new()
@@ -48,7 +48,7 @@ impl BackgroundWriter {
         })
     }
 
-    /// Hands a job over; false where it was dropped, because the queue is full or the thread is gone.
+    /// Queues a job; returns false if it was dropped because the queue is full or the thread has ended.
     pub fn submit(&self, job: impl FnOnce() + Send + 'static) -> bool {
         let accepted = self.sender.try_send(Box::new(job)).is_ok();
         if !accepted {
@@ -57,17 +57,17 @@ impl BackgroundWriter {
         accepted
     }
 
-    /// Jobs that were dropped.
+    /// Number of dropped jobs.
     pub fn dropped(&self) -> u64 {
         self.dropped.load(Ordering::Relaxed)
     }
 
-    /// Waits until everything handed over before is done, at most for `timeout`; false where it is not.
+    /// Waits for at most `timeout` until all jobs queued before are done; returns whether they are.
     pub fn flush(&self, timeout: Duration) -> bool {
         let start = Instant::now();
         let (sender, done) = sync_channel(1);
         let mut job: Job = Box::new(move || {
-            // Whoever waited may have given up.
+            // The caller of flush may have timed out.
             let _ = sender.try_send(());
         });
         loop {
@@ -77,7 +77,7 @@ impl BackgroundWriter {
                 Err(TrySendError::Full(back)) if start.elapsed() < timeout => job = back,
                 Err(TrySendError::Full(_)) => return false,
             }
-            std::thread::park_timeout(LOOK_EVERY);
+            std::thread::park_timeout(POLL_INTERVAL);
         }
         let left = timeout.saturating_sub(start.elapsed());
         done.recv_timeout(left).is_ok()
@@ -89,7 +89,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_job_that_blocks_holds_nobody_up_and_what_finds_no_room_is_counted() {
+    fn blocked_job_does_not_block_submit_and_dropped_jobs_are_counted() {
         let writer = BackgroundWriter::start("test", 2).expect("a thread");
         let (open, gate) = sync_channel::<()>(0);
         let (begun, has_begun) = sync_channel(1);
@@ -115,14 +115,14 @@ mod tests {
     }
 
     #[test]
-    fn a_thread_that_died_is_seen() {
+    fn flush_fails_when_the_thread_has_died() {
         let writer = BackgroundWriter::start("test", 1).expect("a thread");
-        // Its panic drops the other jobs' queue.
+        // Its panic drops the queue.
         writer.submit(|| std::panic::resume_unwind(Box::new(())));
         while writer.submit(|| {}) {
             std::thread::yield_now();
         }
-        // Full for a moment, or gone: in the end gone.
+        // The queue may be full at first; in the end the thread is gone.
         assert!(!writer.flush(Duration::from_secs(60)));
     }
 }

@@ -1,7 +1,7 @@
-//! Lines for standard error, which may be closed, full, or a terminal that somebody has paused.
+//! Lines for standard error, which may be closed, full, or a paused terminal.
 //!
-//! A process that controls an arm must not wait for whoever reads its words, nor end because nobody does: lines are
-//! written by a thread of their own. A line that finds no room is dropped, and the next one says how many were.
+//! A process that controls an arm must not block on the reader of its standard error, nor end if there is none: a
+//! background thread writes the lines. If the queue is full, lines are dropped, and the next line reports how many.
 
 use crate::background::BackgroundWriter;
 use core::fmt::Display;
@@ -10,29 +10,30 @@ use std::io::Write;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Lines that may wait.
+/// Queue length, in lines.
 const CAPACITY: usize = 256;
-/// How long the end of a process waits for its last lines.
-const FLUSH_WITHIN: Duration = Duration::from_millis(300);
+/// Maximum time that a process waits for its last lines at its end.
+const FLUSH_TIMEOUT: Duration = Duration::from_millis(300);
 
 static WRITER: OnceLock<Option<BackgroundWriter>> = OnceLock::new();
 /// Lines dropped since the last one that was written.
 static DROPPED: AtomicU64 = AtomicU64::new(0);
 
-/// Starts the writer, and sends the words of panics to it. To be called at the start of a program, before it asks for a
-/// realtime priority.
+/// Starts the writer thread and redirects panic messages to it. Call it at the start of a program, before realtime
+/// settings are applied.
 pub fn start() {
     if writer().is_some() {
         std::panic::set_hook(Box::new(|panic| post(format_args!("{panic}"))));
     }
 }
 
-/// Hands over a line, without its end; never waits. It allocates: not for a thread that must not.
+/// Queues a line, given without its line end; never blocks. It allocates, so threads that must not allocate cannot use
+/// it.
 pub fn post(line: impl Display) {
     post_part(format!("{line}\n"));
 }
 
-/// As [`post`], of text that is no whole line, such as one that is written over again and again.
+/// As [`post`], for text without a line end, such as a progress line that is overwritten.
 pub fn post_part(text: String) {
     let accepted = writer().is_some_and(|writer| {
         writer.submit(move || {
@@ -48,10 +49,10 @@ pub fn post_part(text: String) {
     }
 }
 
-/// Waits a moment for the lines that were handed over, as the last thing a program does; false where nobody takes
-/// them.
+/// Waits briefly until the queued lines are written; call it last in a program. Returns false if they could not be
+/// written in time.
 pub fn flush() -> bool {
-    writer().is_none_or(|writer| writer.flush(FLUSH_WITHIN))
+    writer().is_none_or(|writer| writer.flush(FLUSH_TIMEOUT))
 }
 
 fn writer() -> Option<&'static BackgroundWriter> {
@@ -59,11 +60,12 @@ fn writer() -> Option<&'static BackgroundWriter> {
     WRITER.get_or_init(start).as_ref()
 }
 
-/// One call for a line: lines of several processes do not mix. There is nobody to tell where it fails.
+/// One write per line, so that lines of several processes do not interleave. Errors are ignored: there is nowhere to
+/// report them.
 fn write(out: &mut impl Write, text: &str, dropped: u64) {
     let text = match dropped {
         0 => text.to_owned(),
-        n => format!("{n} lines were dropped here: nobody read them\n{text}"),
+        n => format!("{n} lines were dropped here: standard error was blocked\n{text}"),
     };
     let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
 }
@@ -73,19 +75,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_that_were_dropped_are_told() {
+    fn dropped_lines_are_reported() {
         let mut out = Vec::new();
         write(&mut out, "first\n", 0);
         write(&mut out, "second\n", 3);
-        let said = String::from_utf8(out).expect("text");
+        let written = String::from_utf8(out).expect("text");
         assert_eq!(
-            said,
-            "first\n3 lines were dropped here: nobody read them\nsecond\n"
+            written,
+            "first\n3 lines were dropped here: standard error was blocked\nsecond\n"
         );
     }
 
     #[test]
-    fn a_reader_that_is_gone_is_no_error() {
+    fn closed_reader_is_no_error() {
         struct Closed;
         impl Write for Closed {
             fn write(&mut self, _: &[u8]) -> std::io::Result<usize> {
@@ -95,6 +97,6 @@ mod tests {
                 Err(std::io::ErrorKind::BrokenPipe.into())
             }
         }
-        write(&mut Closed, "nobody hears\n", 0);
+        write(&mut Closed, "no reader\n", 0);
     }
 }

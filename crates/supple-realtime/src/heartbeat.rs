@@ -1,9 +1,8 @@
-//! Signs of life to the service manager, for as long as every thread that matters goes on.
+//! Watchdog messages to the service manager, sent while all monitored threads make progress.
 //!
-//! A thread with a period counts its turns in a [`Pulse`], which costs it one addition. A thread of its own
-//! ([`Heartbeat`]) looks at the counts twice in the manager's time and sends a sign of life only where every
-//! count has moved on: a thread that hangs ends the signs, and the manager ends the process. The plant then
-//! does what it does whenever its controller is gone.
+//! Each periodic thread increments its [`LivenessCounter`] once per iteration. The [`Heartbeat`] thread compares the
+//! counts twice per watchdog interval and sends `WATCHDOG=1` only if every count has advanced. If a thread hangs, the
+//! messages stop and the manager kills the process; the plant then reacts as to any lost controller.
 
 use crate::notify::{Notifier, NotifyError};
 use core::time::Duration;
@@ -12,47 +11,53 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
 use std::thread::{Builder, JoinHandle};
 
-/// Enough for a datagram; locked memory makes every page of a stack count.
+/// Stack size, enough for one datagram; under locked memory every page of the stack is resident.
 const STACK_BYTES: usize = 64 * 1024;
 
-/// Turns of one thread. Clones count the same.
+/// Iteration counter of one thread. Clones share the counter.
 #[derive(Clone, Debug, Default)]
-pub struct Pulse(Arc<AtomicU64>);
+pub struct LivenessCounter(Arc<AtomicU64>);
 
-impl Pulse {
-    /// One turn more. Neither waits nor allocates.
-    pub fn beat(&self) {
+impl LivenessCounter {
+    /// Counts one iteration. Neither blocks nor allocates.
+    pub fn increment(&self) {
         self.0.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Turns so far.
+    /// Number of iterations so far.
     pub fn count(&self) -> u64 {
         self.0.load(Ordering::Relaxed)
     }
 }
 
-/// Counts, and what they were at the last sign of life.
+/// The counters, with their values at the last watchdog message.
 #[derive(Clone, Debug)]
-pub struct Watch {
-    pulses: Vec<(Pulse, u64)>,
+pub struct LivenessMonitor {
+    counters: Vec<(LivenessCounter, u64)>,
 }
 
-impl Watch {
-    /// Of these threads, from their counts now.
-    pub fn new(pulses: &[Pulse]) -> Watch {
-        let counted = pulses.iter().map(|pulse| (pulse.clone(), pulse.count()));
-        Watch {
-            pulses: counted.collect(),
+impl LivenessMonitor {
+    /// Monitors these counters from their current values.
+    pub fn new(counters: &[LivenessCounter]) -> LivenessMonitor {
+        let counted = counters
+            .iter()
+            .map(|counter| (counter.clone(), counter.count()));
+        LivenessMonitor {
+            counters: counted.collect(),
         }
     }
 
-    /// Every thread has made a turn since this was last true.
-    pub fn moved_on(&mut self) -> bool {
-        let counts: Vec<u64> = self.pulses.iter().map(|(pulse, _)| pulse.count()).collect();
-        let moved = self.pulses.iter().zip(&counts);
+    /// Whether every thread has advanced since this last returned true.
+    pub fn all_advanced(&mut self) -> bool {
+        let counts: Vec<u64> = self
+            .counters
+            .iter()
+            .map(|(counter, _)| counter.count())
+            .collect();
+        let moved = self.counters.iter().zip(&counts);
         let all = moved.into_iter().all(|((_, last), count)| count != last);
         if all {
-            for ((_, last), count) in self.pulses.iter_mut().zip(counts) {
+            for ((_, last), count) in self.counters.iter_mut().zip(counts) {
                 *last = count;
             }
         }
@@ -60,7 +65,7 @@ impl Watch {
     }
 }
 
-/// The thread that sends signs of life; the manager hears `STOPPING=1` when it is dropped.
+/// The thread that sends watchdog messages; dropping it sends `STOPPING=1`.
 #[derive(Debug)]
 pub struct Heartbeat {
     thread: Option<JoinHandle<()>>,
@@ -69,13 +74,16 @@ pub struct Heartbeat {
 }
 
 impl Heartbeat {
-    /// Says that the start is complete, and goes on to say that the threads are alive where the manager
-    /// watches. To be called when their periods begin, before the calling thread becomes a realtime one: a
-    /// thread inherits the priority and the processor of the one that starts it.
+    /// Sends `READY=1`, and then watchdog messages if the manager has a watchdog. Call it when the periodic threads
+    /// start and before the calling thread gets its realtime settings, because a new thread inherits priority and
+    /// affinity.
     ///
     /// # Errors
-    /// [`NotifyError::Socket`] where the manager does not listen, [`NotifyError::Thread`].
-    pub fn start(notifier: Notifier, pulses: &[Pulse]) -> Result<Heartbeat, NotifyError> {
+    /// [`NotifyError::Socket`] if the manager does not listen, [`NotifyError::Thread`].
+    pub fn start(
+        notifier: Notifier,
+        counters: &[LivenessCounter],
+    ) -> Result<Heartbeat, NotifyError> {
         notifier.ready()?;
         let notifier = Arc::new(notifier);
         let mut heartbeat = Heartbeat {
@@ -85,13 +93,13 @@ impl Heartbeat {
         };
         if let Some(watchdog) = notifier.watchdog() {
             let (stop, stopped) = sync_channel::<()>(0);
-            let watch = Watch::new(pulses);
+            let monitor = LivenessMonitor::new(counters);
             let every = watchdog / 2;
             let thread = Builder::new()
                 .name("heartbeat".to_owned())
                 .stack_size(STACK_BYTES)
                 .spawn(move || {
-                    beat(&notifier, watch, every, &|every| {
+                    send_watchdog_messages(&notifier, monitor, every, &|every| {
                         stopped.recv_timeout(every) == Err(RecvTimeoutError::Timeout)
                     });
                 })
@@ -103,11 +111,16 @@ impl Heartbeat {
     }
 }
 
-/// Signs of life as long as `wait` says to go on.
-fn beat(notifier: &Notifier, mut watch: Watch, every: Duration, wait: &dyn Fn(Duration) -> bool) {
+/// Sends watchdog messages until `wait` returns false.
+fn send_watchdog_messages(
+    notifier: &Notifier,
+    mut monitor: LivenessMonitor,
+    every: Duration,
+    wait: &dyn Fn(Duration) -> bool,
+) {
     while wait(every) {
-        if watch.moved_on() {
-            // A manager that is gone watches nobody.
+        if monitor.all_advanced() {
+            // If the manager is gone, there is no watchdog.
             let _ = notifier.alive();
         }
     }
@@ -115,7 +128,7 @@ fn beat(notifier: &Notifier, mut watch: Watch, every: Duration, wait: &dyn Fn(Du
 
 impl Drop for Heartbeat {
     fn drop(&mut self) {
-        // First, so that the manager gives the way out its own time.
+        // Sent first, so that the manager applies its shutdown timeout instead of the watchdog.
         let _ = self.notifier.stopping();
         drop(self.stop.take());
         if let Some(thread) = self.thread.take() {
@@ -142,8 +155,8 @@ mod tests {
         (manager, notifier.unwrap().unwrap())
     }
 
-    /// What has come, without waiting.
-    fn heard(manager: &UnixDatagram) -> Vec<String> {
+    /// All messages received so far, without waiting.
+    fn received(manager: &UnixDatagram) -> Vec<String> {
         manager.set_nonblocking(true).unwrap();
         let mut buffer = [0; 256];
         core::iter::from_fn(|| manager.recv(&mut buffer).ok().map(|n| buffer[..n].to_vec()))
@@ -152,49 +165,52 @@ mod tests {
     }
 
     #[test]
-    fn every_thread_has_to_move_on() {
-        let (a, b) = (Pulse::default(), Pulse::default());
-        let mut watch = Watch::new(&[a.clone(), b.clone()]);
-        assert!(!watch.moved_on(), "nobody has begun");
-        a.beat();
-        assert!(!watch.moved_on(), "one has not begun");
-        b.beat();
-        assert!(watch.moved_on());
-        assert!(!watch.moved_on(), "nobody has moved since");
-        b.beat();
-        assert!(!watch.moved_on(), "one hangs");
-        a.beat();
-        assert!(watch.moved_on(), "what the other did meanwhile counts");
+    fn monitor_requires_progress_of_every_thread() {
+        let (a, b) = (LivenessCounter::default(), LivenessCounter::default());
+        let mut monitor = LivenessMonitor::new(&[a.clone(), b.clone()]);
+        assert!(!monitor.all_advanced(), "no thread has advanced");
+        a.increment();
+        assert!(!monitor.all_advanced(), "one thread has not advanced");
+        b.increment();
+        assert!(monitor.all_advanced());
+        assert!(!monitor.all_advanced(), "no thread has advanced since");
+        b.increment();
+        assert!(!monitor.all_advanced(), "one hangs");
+        a.increment();
+        assert!(
+            monitor.all_advanced(),
+            "earlier progress of the other thread counts"
+        );
     }
 
-    /// The thread's own loop with scripted time: the loop beats in three of five intervals.
+    /// The thread's own loop with scripted time: the counter advances in three of five intervals.
     #[test]
-    fn a_thread_that_hangs_ends_the_signs_of_life() {
+    fn hanging_thread_stops_the_watchdog_messages() {
         let folder = tempfile::tempdir().unwrap();
         let (manager, notifier) = manager(&folder);
-        let pulse = Pulse::default();
+        let counter = LivenessCounter::default();
         let interval = Cell::new(0);
-        beat(
+        send_watchdog_messages(
             &notifier,
-            Watch::new(core::slice::from_ref(&pulse)),
+            LivenessMonitor::new(core::slice::from_ref(&counter)),
             Duration::ZERO,
             &|_| {
                 interval.set(interval.get() + 1);
                 if interval.get() <= 3 {
-                    pulse.beat();
+                    counter.increment();
                 }
                 interval.get() <= 5
             },
         );
-        assert_eq!(heard(&manager), ["WATCHDOG=1\n"; 3]);
+        assert_eq!(received(&manager), ["WATCHDOG=1\n"; 3]);
     }
 
     #[test]
-    fn the_start_the_life_and_the_end_are_told() {
+    fn heartbeat_sends_ready_watchdog_and_stopping() {
         let folder = tempfile::tempdir().unwrap();
         let (manager, notifier) = manager(&folder);
-        let pulse = Pulse::default();
-        let heartbeat = Heartbeat::start(notifier, core::slice::from_ref(&pulse)).unwrap();
+        let counter = LivenessCounter::default();
+        let heartbeat = Heartbeat::start(notifier, core::slice::from_ref(&counter)).unwrap();
         let mut buffer = [0; 256];
         let mut next = || {
             let bytes = manager.recv(&mut buffer).unwrap();
@@ -202,16 +218,16 @@ mod tests {
         };
         assert_eq!(next(), "READY=1\n");
         for _ in 0..3 {
-            pulse.beat();
-            assert_eq!(next(), "WATCHDOG=1\n", "a turn is a sign of life");
+            counter.increment();
+            assert_eq!(next(), "WATCHDOG=1\n", "each iteration sends a message");
         }
-        // However long this takes, a count that stands still gives none.
+        // However long this takes, an unchanged counter sends none.
         drop(heartbeat);
-        assert_eq!(heard(&manager), ["STOPPING=1\n"]);
+        assert_eq!(received(&manager), ["STOPPING=1\n"]);
     }
 
     #[test]
-    fn a_manager_that_does_not_watch_hears_of_start_and_end_alone() {
+    fn manager_without_watchdog_gets_only_ready_and_stopping() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("notify");
         let manager = UnixDatagram::bind(&path).unwrap();
@@ -220,10 +236,10 @@ mod tests {
             ..ManagerVariables::default()
         };
         let notifier = Notifier::new(&variables).unwrap().unwrap();
-        let pulse = Pulse::default();
-        let heartbeat = Heartbeat::start(notifier, core::slice::from_ref(&pulse)).unwrap();
-        pulse.beat();
+        let counter = LivenessCounter::default();
+        let heartbeat = Heartbeat::start(notifier, core::slice::from_ref(&counter)).unwrap();
+        counter.increment();
         drop(heartbeat);
-        assert_eq!(heard(&manager), ["READY=1\n", "STOPPING=1\n"]);
+        assert_eq!(received(&manager), ["READY=1\n", "STOPPING=1\n"]);
     }
 }

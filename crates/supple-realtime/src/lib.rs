@@ -1,9 +1,8 @@
-//! What a thread needs from Linux to keep a period: memory that stays, a place before other threads, a
-//! processor of its own, a clock, a word when to end, somebody else who waits for disks and terminals, and signs of
-//! life for the service manager.
+//! What a periodic thread needs from Linux: locked memory, realtime priority, CPU affinity, a clock, shutdown signals,
+//! background threads for disk and terminal output, and watchdog messages to the service manager.
 //!
-//! Nothing here is needed for a right answer, only for a timely one: what the system does not grant is
-//! reported as a [`Shortfall`] and the process goes on. It knows no arm and no controller.
+//! These settings affect timing, never results: what the system refuses is reported as a [`RealtimeWarning`], and the
+//! process continues. This crate knows no arm and no controller.
 
 mod background;
 mod clock;
@@ -18,27 +17,27 @@ mod stop;
 
 pub use background::BackgroundWriter;
 pub use clock::{monotonic_ns, sleep_until_ns};
-pub use heartbeat::{Heartbeat, Pulse, Watch};
+pub use heartbeat::{Heartbeat, LivenessCounter, LivenessMonitor};
 pub use notify::{ManagerVariables, Notifier, NotifyError};
 pub use options::RealtimeOptions;
-pub use spin::spin_for;
-pub use stop::{Stop, StopError, die_with_parent, keep_running};
+pub use spin::spin_duration;
+pub use stop::{Stop, StopError, die_with_parent, ignore_file_size_and_tty_signals};
 
 use std::io::Error;
 
-/// What to ask of the system.
+/// Realtime settings of a thread.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
     /// Priority of the calling thread under SCHED_FIFO, 1 to 99; `None` leaves it as it is.
     pub priority: Option<u8>,
-    /// Processor for the calling thread alone; `None` leaves it to the scheduler.
+    /// Processor to bind the calling thread to; `None` leaves it to the scheduler.
     pub cpu: Option<usize>,
-    /// Keep all memory of the process, present and future, and fault the stack in.
+    /// Whether to lock all present and future memory of the process and prefault the stack.
     pub lock_memory: bool,
 }
 
 impl Settings {
-    /// Nothing: virtual time needs none of it.
+    /// No settings: virtual time needs none.
     pub const NONE: Settings = Settings {
         priority: None,
         cpu: None,
@@ -46,54 +45,54 @@ impl Settings {
     };
 }
 
-/// Something that the system does not grant: the thread runs, and may be late.
+/// A setting that the system refused: the thread runs, but may be late.
 #[derive(Debug, thiserror::Error)]
-pub enum Shortfall {
+pub enum RealtimeWarning {
     /// Memory may be paged out.
     #[error(
         "memory is not locked ({0}): give the user a memlock limit of unlimited in \
          /etc/security/limits.d, or LimitMEMLOCK=infinity to the service"
     )]
     Memory(Error),
-    /// Other threads may come first.
+    /// Other threads may preempt this one.
     #[error(
         "no realtime priority {priority} ({error}): give the user an rtprio limit of at least {priority} \
          in /etc/security/limits.d, or LimitRTPRIO={priority} to the service"
     )]
     Priority {
-        /// Asked for.
+        /// Requested value.
         priority: u8,
-        /// What the system says.
+        /// Error of the system.
         error: Error,
     },
-    /// The scheduler may move the thread about.
+    /// The scheduler may migrate the thread between processors.
     #[error("not bound to processor {cpu} ({error}): choose one that is there, see nproc")]
     Cpu {
-        /// Asked for.
+        /// Requested value.
         cpu: usize,
-        /// What the system says.
+        /// Error of the system.
         error: Error,
     },
 }
 
-/// Makes the calling thread a realtime one as far as the system lets it. To be called when everything is
-/// set up: what is mapped later is locked as it comes, and may be refused.
-pub fn enter(settings: &Settings) -> Vec<Shortfall> {
-    let mut shortfalls = Vec::new();
+/// Applies realtime settings to the calling thread, as far as the system allows. Call it after all allocation: memory
+/// mapped later is locked on allocation, which may fail.
+pub fn apply_realtime_settings(settings: &Settings) -> Vec<RealtimeWarning> {
+    let mut warnings = Vec::new();
     if settings.lock_memory
         && let Err(error) = memory::lock()
     {
-        shortfalls.push(Shortfall::Memory(error));
+        warnings.push(RealtimeWarning::Memory(error));
     }
     if let Some(cpu) = settings.cpu
         && let Err(error) = schedule::bind(cpu)
     {
-        shortfalls.push(Shortfall::Cpu { cpu, error });
+        warnings.push(RealtimeWarning::Cpu { cpu, error });
     }
     if let Some(priority) = settings.priority
-        && let Err(error) = schedule::first_in_first_out(priority)
+        && let Err(error) = schedule::set_sched_fifo(priority)
     {
-        shortfalls.push(Shortfall::Priority { priority, error });
+        warnings.push(RealtimeWarning::Priority { priority, error });
     }
-    shortfalls
+    warnings
 }

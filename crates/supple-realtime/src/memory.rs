@@ -1,23 +1,23 @@
-//! Memory that is there when it is needed.
+//! Locked and prefaulted memory.
 
 use rustix::mm::{MlockAllFlags, mlockall};
 use std::hint::black_box;
 use std::io::Error;
 
-/// Stack that a control cycle never exceeds, faulted in once.
+/// Stack size that a control cycle never exceeds; prefaulted once.
 const STACK_BYTES: usize = 256 * 1024;
 
-/// Keeps all present and future memory, lets the allocator give none back, and faults the stack in.
+/// Locks all present and future memory, disables heap trimming, and prefaults the stack.
 pub fn lock() -> Result<(), Error> {
-    keep_heap();
+    disable_heap_trim();
     mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE)?;
-    fault_stack_in();
+    prefault_stack();
     Ok(())
 }
 
-/// Freed memory stays with the process, and large blocks come from the heap: neither faults again.
+/// Disables heap trimming and mmap for large blocks, so that reused memory causes no page faults.
 #[cfg(target_env = "gnu")]
-fn keep_heap() {
+fn disable_heap_trim() {
     // SAFETY: sets two parameters of the allocator to values that its manual allows.
     unsafe {
         libc::mallopt(libc::M_TRIM_THRESHOLD, -1);
@@ -26,10 +26,10 @@ fn keep_heap() {
 }
 
 #[cfg(not(target_env = "gnu"))]
-fn keep_heap() {}
+fn disable_heap_trim() {}
 
 #[inline(never)]
-fn fault_stack_in() {
+fn prefault_stack() {
     let stack = [1_u8; STACK_BYTES];
     black_box(&stack);
 }

@@ -1,7 +1,7 @@
-//! Messages to the service manager, as `sd_notify(3)` has them: ready, alive, stopping.
+//! Messages to the service manager as in `sd_notify(3)`: ready, alive, stopping.
 //!
-//! Each is one datagram to the Unix socket that the manager names in `NOTIFY_SOCKET`. Nothing here waits:
-//! where the manager's queue is full, a message is dropped, and the next sign of life takes its place.
+//! Each is one datagram to the Unix socket that the manager names in `NOTIFY_SOCKET`. Sending never blocks: if the
+//! manager's queue is full, the message is dropped, and the next watchdog message replaces it.
 
 use core::time::Duration;
 use std::ffi::{OsStr, OsString};
@@ -21,13 +21,15 @@ pub enum NotifyError {
     Socket {
         /// Value of the variable.
         address: String,
-        /// What the system says.
+        /// Error of the system.
         error: Error,
     },
-    /// No thread for the signs of life.
-    #[error("no thread for signs of life can be started: {0}; raise the user's limit of processes")]
+    /// The thread for the watchdog messages cannot be started.
+    #[error(
+        "the thread for watchdog messages cannot be started: {0}; raise the user's limit of processes"
+    )]
     Thread(Error),
-    /// A time that is none.
+    /// An invalid watchdog time.
     #[error(
         "WATCHDOG_USEC is `{value}`, not a positive number of microseconds: correct WatchdogSec of the \
          service"
@@ -38,7 +40,7 @@ pub enum NotifyError {
     },
 }
 
-/// The way to the service manager.
+/// Connection to the service manager.
 #[derive(Debug)]
 pub struct Notifier {
     socket: UnixDatagram,
@@ -46,20 +48,20 @@ pub struct Notifier {
     watchdog: Option<Duration>,
 }
 
-/// What the service manager has put into the environment of this process.
+/// Environment variables that the service manager has set for this process.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ManagerVariables {
     /// `NOTIFY_SOCKET`: path of a socket, or `@` and an abstract name.
     pub notify_socket: Option<OsString>,
-    /// `WATCHDOG_USEC`: time without a sign of life after which the manager ends the process \[us\].
+    /// `WATCHDOG_USEC`: time without a watchdog message after which the manager ends the process \[us\].
     pub watchdog_usec: Option<OsString>,
-    /// `WATCHDOG_PID`: the process that the time is meant for; any if not given.
+    /// `WATCHDOG_PID`: process that the watchdog applies to; any if not given.
     pub watchdog_pid: Option<OsString>,
 }
 
 impl ManagerVariables {
-    /// Those of this process.
-    pub fn of_process() -> ManagerVariables {
+    /// Reads the variables of this process.
+    pub fn from_environment() -> ManagerVariables {
         let variable = |name| std::env::var_os(name).filter(|value| !value.is_empty());
         ManagerVariables {
             notify_socket: variable("NOTIFY_SOCKET"),
@@ -70,7 +72,7 @@ impl ManagerVariables {
 }
 
 impl Notifier {
-    /// The way to the manager that has started this process; `None` where none wants to hear of it.
+    /// Connects to the service manager that started this process; `None` if NOTIFY_SOCKET is not set.
     ///
     /// # Errors
     /// [`NotifyError`] with the variable and its value.
@@ -92,20 +94,20 @@ impl Notifier {
         }))
     }
 
-    /// Time without a sign of life after which the manager ends this process, if it watches.
+    /// Time without a watchdog message after which the manager ends this process, if it has a watchdog.
     pub fn watchdog(&self) -> Option<Duration> {
         self.watchdog
     }
 
-    /// The start is complete.
+    /// Reports that the start is complete.
     ///
     /// # Errors
-    /// [`NotifyError::Socket`] where nobody listens.
+    /// [`NotifyError::Socket`] if the manager does not listen.
     pub fn ready(&self) -> Result<(), NotifyError> {
         self.send("READY=1\n")
     }
 
-    /// A sign of life.
+    /// Sends a watchdog message.
     ///
     /// # Errors
     /// As [`Notifier::ready`].
@@ -113,7 +115,7 @@ impl Notifier {
         self.send("WATCHDOG=1\n")
     }
 
-    /// The process is about to end.
+    /// Reports that the process is about to end.
     ///
     /// # Errors
     /// As [`Notifier::ready`].
@@ -172,14 +174,14 @@ mod tests {
         }
     }
 
-    fn heard(socket: &UnixDatagram) -> String {
+    fn received(socket: &UnixDatagram) -> String {
         let mut buffer = [0; 256];
         let bytes = socket.recv(&mut buffer).unwrap();
         String::from_utf8(buffer[..bytes].to_vec()).unwrap()
     }
 
     #[test]
-    fn a_path_and_an_abstract_name_are_reached() {
+    fn path_and_abstract_addresses_work() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("notify");
         let name = format!("supple-notify-{}", std::process::id());
@@ -194,13 +196,13 @@ mod tests {
             notifier.alive().unwrap();
             notifier.stopping().unwrap();
             for expected in ["READY=1\n", "WATCHDOG=1\n", "STOPPING=1\n"] {
-                assert_eq!(heard(&manager), expected);
+                assert_eq!(received(&manager), expected);
             }
         }
     }
 
     #[test]
-    fn a_manager_that_does_not_read_holds_nobody_up() {
+    fn sending_never_blocks_when_the_manager_does_not_read() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("notify");
         let _manager = UnixDatagram::bind(&path).unwrap();
@@ -221,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn the_watchdogs_time_is_that_of_this_process_alone() {
+    fn watchdog_time_applies_only_to_its_process() {
         let of = |usec: &str, pid: Option<u32>| ManagerVariables {
             watchdog_usec: Some(usec.into()),
             watchdog_pid: pid.map(|pid| pid.to_string().into()),
@@ -239,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn an_address_that_is_none_is_named() {
+    fn invalid_address_is_named_in_the_error() {
         for wrong in ["relative", "/"] {
             let made = Notifier::new(&variables(wrong));
             let sent = made.and_then(|notifier| notifier.unwrap().ready());

@@ -1,12 +1,12 @@
-//! What every process with a period is told alike.
+//! Options shared by the periodic processes.
 
 use crate::Settings;
 use clap::Args;
 
-/// Options of a process with a period, beside the priority of its thread.
+/// Options of a periodic process, except the priority of its thread.
 #[derive(Args, Clone, Copy, Debug)]
 pub struct RealtimeOptions {
-    /// Processor for the thread that keeps the period alone; any if not given.
+    /// Processor to bind the periodic thread to; any if not given.
     #[arg(long, value_name = "N")]
     pub cpu: Option<usize>,
     /// Neither priority nor locked memory.
@@ -18,7 +18,7 @@ pub struct RealtimeOptions {
 }
 
 impl RealtimeOptions {
-    /// What to ask of the system for a thread of this priority: nothing in virtual time.
+    /// Realtime settings for a thread of this priority; none in virtual time.
     pub fn settings(&self, priority: u8, virtual_time: bool) -> Settings {
         if virtual_time || self.no_realtime {
             return Settings::NONE;

@@ -1,4 +1,4 @@
-//! Which thread runs where, and before whom.
+//! CPU affinity and scheduling priority of threads.
 
 use rustix::thread::{CpuSet, sched_setaffinity};
 use std::io::{Error, ErrorKind};
@@ -14,11 +14,11 @@ pub fn bind(cpu: usize) -> Result<(), Error> {
 }
 
 /// Puts the calling thread under SCHED_FIFO.
-pub fn first_in_first_out(priority: u8) -> Result<(), Error> {
+pub fn set_sched_fifo(priority: u8) -> Result<(), Error> {
     let parameters = libc::sched_param {
         sched_priority: i32::from(priority),
     };
-    // SAFETY: 0 is the calling thread, the parameters live through the call.
+    // SAFETY: 0 is the calling thread; the parameters outlive the call.
     let status = unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &parameters) };
     match status {
         0 => Ok(()),

@@ -1,4 +1,4 @@
-//! The word to end: SIGINT, SIGTERM or SIGHUP, or the parent's end.
+//! Shutdown request: SIGINT, SIGTERM or SIGHUP, or the end of the parent process.
 
 use rustix::process::{Signal, set_parent_process_death_signal};
 use std::sync::Arc;
@@ -9,46 +9,45 @@ use std::sync::atomic::{AtomicBool, Ordering};
 #[error("signals cannot be handled: {0}")]
 pub struct StopError(#[from] ctrlc::Error);
 
-/// Whether to end. Clones speak of the same.
+/// Shutdown flag. Clones share the same flag.
 #[derive(Clone, Debug, Default)]
 pub struct Stop(Arc<AtomicBool>);
 
 impl Stop {
-    /// Asked for by signals from now on. To be called once a process.
+    /// Installs signal handlers that request shutdown. Call it once per process.
     ///
     /// # Errors
-    /// [`StopError`] where it was called before or the system refuses.
+    /// [`StopError`] if it was called before or the system refuses.
     pub fn on_signals() -> Result<Stop, StopError> {
-        keep_running();
+        ignore_file_size_and_tty_signals();
         let stop = Stop::default();
-        let asked = stop.clone();
-        ctrlc::set_handler(move || asked.ask())?;
+        let flag = stop.clone();
+        ctrlc::set_handler(move || flag.request_shutdown())?;
         Ok(stop)
     }
 
-    /// Asks to end.
-    pub fn ask(&self) {
+    /// Requests shutdown.
+    pub fn request_shutdown(&self) {
         self.0.store(true, Ordering::Release);
     }
 
-    /// Somebody has asked to end.
-    pub fn asked(&self) -> bool {
+    /// Whether shutdown was requested.
+    pub fn shutdown_requested(&self) -> bool {
         self.0.load(Ordering::Acquire)
     }
 }
 
-/// From now on a file that may not grow any more is an error of its write, not the end of the process, and a
-/// terminal is written by a process in the background too, which would be stopped. Programs that are started
-/// have it so as well.
-pub fn keep_running() {
+/// Ignores SIGXFSZ, so that exceeding the file size limit is a write error and does not end the process, and SIGTTOU,
+/// so that a background process may write to its terminal. Child processes inherit both.
+pub fn ignore_file_size_and_tty_signals() {
     for signal in [libc::SIGXFSZ, libc::SIGTTOU] {
-        // SAFETY: to ignore a signal runs no code of ours.
+        // SAFETY: ignoring a signal runs none of our code.
         unsafe { libc::signal(signal, libc::SIG_IGN) };
     }
 }
 
-/// Asks the system for a SIGTERM when the process that started this one ends, however it ends.
+/// Requests a SIGTERM for this process when its parent process ends for any reason.
 pub fn die_with_parent() {
-    // Without it the process outlives a parent that was killed, and is found by the next start.
+    // If this fails, the process outlives a killed parent; the next start then reports a second writer.
     let _ = set_parent_process_death_signal(Some(Signal::TERM));
 }

@@ -1,18 +1,20 @@
-//! The loop: a state, a step, an answer.
+//! The control loop: receive an arm state, compute a step, publish the torque command.
 //!
-//! Nothing else is done before the answer, and nothing after it: when the plant announces its next state, the loop
-//! hands over what there is to tell of the last one, and rehearses the step.
+//! The loop does no other work between a state and its answer, nor directly after it. When the plant announces the next
+//! state, the loop passes the last cycle's telemetry to the helper and runs the step once with its result discarded, to
+//! warm the caches.
 //!
-//! A loop that lags takes the states that came meanwhile one by one, so that velocities stay right, and
-//! answers the newest. A plant that falls silent is stepped over with its last state, until the controller
-//! finds it stale. On the way out the loop goes to gravity hold and asks the plant to lower the drives to
-//! idle, in which the motors brake; it ends when they are there.
+//! If the loop is late, it steps over every pending state, so that the velocity estimate stays correct, and answers the
+//! newest. If the plant stops sending, the loop repeats the step with the last state until the controller reports a
+//! stale state. On shutdown the loop enters gravity hold and requests idle drives, in which the motors brake; it ends
+//! when the drives are idle.
 //!
-//! A request for idle goes before all others and waits in no queue. A state of another arm is dropped and counted.
+//! Idle requests take priority over all others and are never queued behind them. States of another arm are discarded
+//! and counted.
 
 use crate::error::RtError;
-use crate::queue::Queue;
-use crate::rings::{IdleInside, Inside};
+use crate::queues::{LoopIdleChannel, LoopQueues};
+use crate::request_queue::RequestQueue;
 use crate::timing::Timing;
 use core::hint::black_box;
 use core::sync::atomic::Ordering;
@@ -23,61 +25,61 @@ use supple_ipc::message::{
     ArmState, CycleTiming, Drives, OperatorReply, OperatorRequest, Outcome, Telemetry, Text,
     TorqueCommand,
 };
-use supple_ipc::{ControllerLink, Woken, idle_reply};
+use supple_ipc::{ControllerLink, WakeEvent, idle_reply};
 use supple_realtime::{Stop, monotonic_ns};
 
-/// Silence of the plant after which its last state counts as seen again.
-pub const PLANT_LOST_AFTER: Duration = Duration::from_millis(20);
-/// Cycles that the plant has to lower the drives when the controller leaves.
-const LEAVING_CYCLES: u32 = 250;
-/// Cycles of them that a wait in vain counts for.
-const SILENT_CYCLES: u32 = 20;
+/// Time without a state after which the loop repeats the step with the last state.
+pub const PLANT_TIMEOUT: Duration = Duration::from_millis(20);
+/// Cycles that the plant has to switch the drives to idle during shutdown.
+const SHUTDOWN_CYCLES: u32 = 250;
+/// Cycles that one timeout counts for.
+const CYCLES_PER_TIMEOUT: u32 = 20;
 
-/// States of another arm that are passed over in one turn.
-const MOST_OF_OTHERS: u32 = 64;
+/// Maximum number of states of another arm that one iteration discards.
+const MAX_FOREIGN_STATES: u32 = 64;
 
-/// The controller with everything that its loop needs.
+/// The controller and the state of its loop.
 #[derive(Debug)]
 pub struct ControlLoop<const N: usize> {
     controller: Controller<N>,
     state: State<N>,
-    inside: Inside,
-    queue: Queue,
+    queues: LoopQueues,
+    queued: RequestQueue,
     timing: Timing,
     virtual_time: bool,
     steps: u64,
     last_begin_ns: Option<u64>,
-    last: Option<Stepped<N>>,
-    /// Nobody was told of the last step yet.
-    untold: bool,
-    /// The way for requests for idle.
-    idle_path: Option<IdleInside>,
-    /// Requests for idle that came with the others.
-    idle: Queue,
-    /// Arm states that were dropped here, and before by the link.
+    last: Option<StepRecord<N>>,
+    /// The telemetry of the last step has not been sent to the helper yet.
+    telemetry_pending: bool,
+    /// Channel for idle requests.
+    idle_channel: Option<LoopIdleChannel>,
+    /// Idle requests from the request queue.
+    queued_idle: RequestQueue,
+    /// Number of arm states discarded here, and by the link.
     states_dropped: (u64, u64),
-    /// Cycles since the loop began to leave.
-    leaving: Option<u32>,
+    /// Cycles since the shutdown began.
+    shutting_down: Option<u32>,
 }
 
-/// Who asked for what a cycle hears.
+/// Source of the request that a cycle carries out.
 #[derive(Clone, Copy, Debug)]
 #[expect(
     clippy::large_enum_variant,
     reason = "the loop's thread allocates nothing: no request is boxed"
 )]
-enum Asker {
-    /// An operator.
+enum RequestSource {
+    /// An operator request.
     Operator(OperatorRequest),
-    /// All who asked for idle, up to this number on the way for idle.
+    /// All idle requests; the value is the last request number on the idle channel, if any came there.
     Idle(Option<u64>),
-    /// The loop itself, on its way out.
-    Loop,
+    /// The loop itself, during shutdown.
+    Shutdown,
 }
 
-/// A step with all that is told about it.
+/// A step with its telemetry data.
 #[derive(Debug)]
-struct Stepped<const N: usize> {
+struct StepRecord<const N: usize> {
     arm: ArmState,
     input: Input<N>,
     output: Output<N>,
@@ -85,106 +87,109 @@ struct Stepped<const N: usize> {
 }
 
 impl<const N: usize> ControlLoop<N> {
-    /// Idle, before the first state.
-    pub fn new(controller: Controller<N>, inside: Inside, virtual_time: bool) -> Self {
+    /// Creates the loop in idle, before the first state.
+    pub fn new(controller: Controller<N>, queues: LoopQueues, virtual_time: bool) -> Self {
         ControlLoop {
             state: State::new(&controller),
             controller,
-            inside,
-            queue: Queue::default(),
+            queues,
+            queued: RequestQueue::default(),
             timing: Timing::new(),
             virtual_time,
             steps: 0,
             last_begin_ns: None,
             last: None,
-            untold: false,
-            idle_path: None,
-            idle: Queue::default(),
+            telemetry_pending: false,
+            idle_channel: None,
+            queued_idle: RequestQueue::default(),
             states_dropped: (0, 0),
-            leaving: None,
+            shutting_down: None,
         }
     }
 
-    /// From now on requests for idle are heard on this way too, before all others.
-    pub fn hear_idle(&mut self, path: IdleInside) {
-        self.idle_path = Some(path);
+    /// Adds the channel for idle requests, which take priority over all others.
+    pub fn set_idle_channel(&mut self, channel: LoopIdleChannel) {
+        self.idle_channel = Some(channel);
     }
 
-    /// Answers states until it is asked to stop and the drives are idle, or nobody is there to lower them.
+    /// Answers states until shutdown is requested and the drives are idle, or the plant does not respond.
     ///
     /// # Errors
     /// [`RtError`]: shared memory, or a state of another arm.
     pub fn run(&mut self, link: &ControllerLink, stop: &Stop) -> Result<(), RtError> {
         let ended = loop {
-            match self.turn(link, stop) {
+            match self.run_iteration(link, stop) {
                 Ok(true) => {}
                 ended => break ended.map(|_| ()),
             }
         };
-        // Whatever ended it, nothing is announced any more.
-        self.tell_last();
+        // No announcement will follow, so send the last telemetry now.
+        self.flush_telemetry();
         ended
     }
 
-    /// One turn of the loop: what came is answered, or nothing came. False when the loop is to end.
+    /// One iteration: waits for a state and answers it, or times out. Returns false when the loop must end.
     ///
     /// # Errors
     /// As [`ControlLoop::run`].
-    pub fn turn(&mut self, link: &ControllerLink, stop: &Stop) -> Result<bool, RtError> {
-        self.inside.pulse.beat();
-        // Where nobody can be heard any more, an arm is not kept moving.
-        let alone =
-            self.inside.is_alone() || self.idle_path.as_ref().is_some_and(IdleInside::is_alone);
-        if stop.asked() || alone {
-            self.leaving.get_or_insert(0);
+    pub fn run_iteration(&mut self, link: &ControllerLink, stop: &Stop) -> Result<bool, RtError> {
+        self.queues.liveness.increment();
+        // If no request can be received any more, shut down: an arm that cannot be stopped must not keep moving.
+        let unreachable_by_operators = self.queues.peer_dropped()
+            || self
+                .idle_channel
+                .as_ref()
+                .is_some_and(LoopIdleChannel::peer_dropped);
+        if stop.shutdown_requested() || unreachable_by_operators {
+            self.shutting_down.get_or_insert(0);
         }
-        let mut arm = match link.wake(PLANT_LOST_AFTER)? {
-            Woken::State(arm) => match self.first_of_this_arm(link, arm)? {
+        let mut arm = match link.wait_for_event(PLANT_TIMEOUT)? {
+            WakeEvent::State(arm) => match self.first_matching_state(link, arm)? {
                 Some(arm) => arm,
-                None => return self.other_arm(),
+                None => return self.handle_foreign_state(),
             },
-            Woken::Announced => {
-                self.tell_last();
-                self.rehearse()?;
+            WakeEvent::Announced => {
+                self.flush_telemetry();
+                self.warm_up_caches()?;
                 return Ok(true);
             }
-            Woken::Silence => return self.silence(),
+            WakeEvent::Timeout => return self.handle_timeout(),
         };
         while let Some(newer) = link.receive()? {
-            if self.is_of_this_arm(link, &newer) {
+            if self.accepts_state(link, &newer) {
                 self.cycle(&arm)?;
                 arm = newer;
             }
         }
-        let leaving = self.leaving.is_some();
+        let shutting_down = self.shutting_down.is_some();
         let output = &self.step(&arm)?.output;
-        let limp = output.limp;
-        // The plant waits for this; whoever else wants to know hears of it when it announces the next state.
-        link.answer(&TorqueCommand::new(output, leaving))?;
+        let torque_off = output.torque_off;
+        // The plant waits for this answer; the telemetry is sent later, when the plant announces the next state.
+        link.answer(&TorqueCommand::new(output, shutting_down))?;
         if self.virtual_time {
-            self.tell_last();
+            self.flush_telemetry();
         }
-        let Some(cycles) = &mut self.leaving else {
+        let Some(cycles) = &mut self.shutting_down else {
             return Ok(true);
         };
         *cycles += 1;
-        let lowered = arm.drives() != Drives::Active || limp;
-        Ok(!lowered && *cycles < LEAVING_CYCLES)
+        let drives_idle = arm.drives() != Drives::Active || torque_off;
+        Ok(!drives_idle && *cycles < SHUTDOWN_CYCLES)
     }
 
-    /// How the loop kept its time.
+    /// Timing statistics of the loop.
     pub fn into_timing(self) -> Timing {
         self.timing
     }
 
-    /// Of a state and those that came after it the first that is of this arm.
-    fn first_of_this_arm(
+    /// The first of `arm` and the states after it that belongs to this arm.
+    fn first_matching_state(
         &mut self,
         link: &ControllerLink,
         mut arm: ArmState,
     ) -> Result<Option<ArmState>, RtError> {
-        for _ in 0..MOST_OF_OTHERS {
-            if self.is_of_this_arm(link, &arm) {
+        for _ in 0..MAX_FOREIGN_STATES {
+            if self.accepts_state(link, &arm) {
                 return Ok(Some(arm));
             }
             match link.receive()? {
@@ -195,37 +200,37 @@ impl<const N: usize> ControlLoop<N> {
         Ok(None)
     }
 
-    /// Counts a state that is of another arm, and those that the link has dropped.
-    fn is_of_this_arm(&mut self, link: &ControllerLink, arm: &ArmState) -> bool {
+    /// Whether the state is of this arm; counts the others, and those that the link has discarded.
+    fn accepts_state(&mut self, link: &ControllerLink, arm: &ArmState) -> bool {
         let before = self.states_dropped;
-        let is = arm.is_of::<N>();
+        let is = arm.matches_dof::<N>();
         self.states_dropped.0 += u64::from(!is);
         self.states_dropped.1 = link.foreign();
         if self.states_dropped != before {
             let all = self.states_dropped.0 + self.states_dropped.1;
-            self.inside.states_dropped.store(all, Ordering::Relaxed);
+            self.queues.states_dropped.store(all, Ordering::Relaxed);
         }
         is
     }
 
-    /// States of another arm are as good as none.
-    fn other_arm(&mut self) -> Result<bool, RtError> {
+    /// Only states of another arm arrived: handled as a timeout once PLANT_TIMEOUT has passed.
+    fn handle_foreign_state(&mut self) -> Result<bool, RtError> {
         let now_ns = monotonic_ns();
         let since_ns = self.last_begin_ns.get_or_insert(now_ns);
-        match now_ns.saturating_sub(*since_ns) >= PLANT_LOST_AFTER.as_nanos() as u64 {
+        match now_ns.saturating_sub(*since_ns) >= PLANT_TIMEOUT.as_nanos() as u64 {
             true => {
                 *since_ns = now_ns;
-                self.silence()
+                self.handle_timeout()
             }
             false => Ok(true),
         }
     }
 
-    /// A wait in vain.
-    fn silence(&mut self) -> Result<bool, RtError> {
-        if let Some(cycles) = &mut self.leaving {
-            *cycles += SILENT_CYCLES;
-            return Ok(*cycles < LEAVING_CYCLES);
+    /// No state arrived within the timeout.
+    fn handle_timeout(&mut self) -> Result<bool, RtError> {
+        if let Some(cycles) = &mut self.shutting_down {
+            *cycles += CYCLES_PER_TIMEOUT;
+            return Ok(*cycles < SHUTDOWN_CYCLES);
         }
         match &self.last {
             Some(last) if !self.virtual_time => {
@@ -233,19 +238,23 @@ impl<const N: usize> ControlLoop<N> {
                 self.cycle(&arm)?;
             }
             Some(_) => {}
-            // There was no cycle yet, in which the arm could have been held.
+            // No cycle has run yet, so the controller is idle already: confirm the idle request.
             None => {
-                if let Some(asked) = self.idle_path.as_ref().and_then(IdleInside::asked) {
-                    self.answer_idle(asked, 0, Outcome::Accepted, Text::EMPTY);
+                if let Some(number) = self
+                    .idle_channel
+                    .as_ref()
+                    .and_then(LoopIdleChannel::pending_request)
+                {
+                    self.answer_idle(number, 0, Outcome::Accepted, Text::EMPTY);
                 }
             }
         }
         Ok(true)
     }
 
-    /// Does what the next cycle will do, and forgets it: code and data that a whole period has driven out of the
-    /// processor's caches take longer than the step itself.
-    fn rehearse(&mut self) -> Result<(), RtError> {
+    /// Runs the step with its result discarded, to load code and data into the caches: after a period of other work the
+    /// cache misses would cost more than the step.
+    fn warm_up_caches(&mut self) -> Result<(), RtError> {
         if let Some(last) = &self.last {
             let mut input = last.arm.input::<N>(None)?;
             input.cycle += 1;
@@ -255,28 +264,28 @@ impl<const N: usize> ControlLoop<N> {
         Ok(())
     }
 
-    /// One step, which nobody waits for.
+    /// Runs a step without an answer to the plant.
     fn cycle(&mut self, arm: &ArmState) -> Result<(), RtError> {
         self.step(arm)?;
-        self.tell_last();
+        self.flush_telemetry();
         Ok(())
     }
 
-    /// One step, with what was asked for.
-    fn step(&mut self, arm: &ArmState) -> Result<&Stepped<N>, RtError> {
-        self.tell_last();
+    /// Runs a step with the request of this cycle.
+    fn step(&mut self, arm: &ArmState) -> Result<&StepRecord<N>, RtError> {
+        self.flush_telemetry();
         let begin_ns = monotonic_ns();
-        let heard = self.hear(arm.cycle);
-        let input = arm.input::<N>(heard.as_ref().map(|(_, request)| *request))?;
+        let received = self.next_request(arm.cycle);
+        let input = arm.input::<N>(received.as_ref().map(|(_, request)| *request))?;
         let had_fault = self.state.fault().is_some();
         let output = step(&self.controller, &mut self.state, &input);
         let step_ns = monotonic_ns() - begin_ns;
-        if let Some((asker, _)) = &heard {
-            self.answer(asker, &output);
+        if let Some((source, _)) = &received {
+            self.answer(source, &output);
         }
-        let let_go = input.request == Some(Request::Idle) && output.refusal.is_none();
-        if let_go || (output.fault.is_some() && !had_fault) {
-            self.drop_waiting(arm.cycle, output.mode);
+        let torque_released = input.request == Some(Request::Idle) && output.refusal.is_none();
+        if torque_released || (output.fault.is_some() && !had_fault) {
+            self.refuse_queued(arm.cycle, output.mode);
         }
         let timing = CycleTiming {
             period_ns: self.last_begin_ns.map_or(0, |last| begin_ns - last),
@@ -287,8 +296,8 @@ impl<const N: usize> ControlLoop<N> {
             step_ns,
         };
         self.last_begin_ns = Some(begin_ns);
-        self.untold = true;
-        Ok(self.last.insert(Stepped {
+        self.telemetry_pending = true;
+        Ok(self.last.insert(StepRecord {
             arm: *arm,
             input,
             output,
@@ -296,30 +305,34 @@ impl<const N: usize> ControlLoop<N> {
         }))
     }
 
-    /// The request of this cycle, if there is one; that for idle first.
-    fn hear(&mut self, cycle: u64) -> Option<(Asker, Request<N>)> {
-        let asked = self.idle_path.as_ref().and_then(IdleInside::asked);
-        while let Ok(&request) = self.inside.requests.peek() {
-            if request.is_for_idle_now() {
-                // What finds no place is heard in the next cycle; each of them asks for the same.
-                if self.idle.push(request).is_err() {
+    /// The request of this cycle, if there is one; idle requests come first.
+    fn next_request(&mut self, cycle: u64) -> Option<(RequestSource, Request<N>)> {
+        let number = self
+            .idle_channel
+            .as_ref()
+            .and_then(LoopIdleChannel::pending_request);
+        while let Ok(&request) = self.queues.requests.peek() {
+            if request.requests_idle_now() {
+                // If `queued_idle` is full, the request stays in the request queue until the next cycle; all idle
+                // requests are equivalent.
+                if self.queued_idle.push(request).is_err() {
                     break;
                 }
-            } else if let Err(no_place) = self.queue.push(request) {
-                let text = Text::of(&format_args!("refused: {no_place}"));
+            } else if let Err(full) = self.queued.push(request) {
+                let text = Text::of(&format_args!("refused: {full}"));
                 self.reply(&request, cycle, self.state.mode(), Outcome::Refused, text);
             }
-            let _ = self.inside.requests.pop();
+            let _ = self.queues.requests.pop();
         }
-        if asked.is_some() || !self.idle.is_empty() {
-            return Some((Asker::Idle(asked), Request::Idle));
+        if number.is_some() || !self.queued_idle.is_empty() {
+            return Some((RequestSource::Idle(number), Request::Idle));
         }
-        if self.leaving == Some(0) && !matches!(self.state.mode(), Mode::Idle | Mode::Fault) {
-            return Some((Asker::Loop, Request::GravityHold));
+        if self.shutting_down == Some(0) && !matches!(self.state.mode(), Mode::Idle | Mode::Fault) {
+            return Some((RequestSource::Shutdown, Request::GravityHold));
         }
-        let message = self.queue.due(cycle)?;
+        let message = self.queued.pop_due(cycle)?;
         match message.request::<N>() {
-            Ok(request) => request.map(|request| (Asker::Operator(message), request)),
+            Ok(request) => request.map(|request| (RequestSource::Operator(message), request)),
             Err(error) => {
                 let text = Text::of(&error);
                 self.reply(&message, cycle, self.state.mode(), Outcome::Refused, text);
@@ -328,46 +341,51 @@ impl<const N: usize> ControlLoop<N> {
         }
     }
 
-    /// Tells who asked what became of it.
-    fn answer(&mut self, asker: &Asker, output: &Output<N>) {
+    /// Sends the outcome to the source of the request.
+    fn answer(&mut self, source: &RequestSource, output: &Output<N>) {
         let (outcome, text) = match &output.refusal {
             None => (Outcome::Accepted, Text::EMPTY),
             Some(refusal) => (Outcome::Refused, Text::of(refusal)),
         };
-        match asker {
-            Asker::Operator(request) => {
+        match source {
+            RequestSource::Operator(request) => {
                 self.reply(request, output.cycle, output.mode, outcome, text);
             }
-            // Asked again in the next cycle, until the arm is let go of.
-            Asker::Idle(_) if outcome == Outcome::Accepted && !output.limp => {}
-            Asker::Idle(asked) => {
-                if let Some(asked) = asked {
-                    self.answer_idle(*asked, output.cycle, outcome, text);
+            // Repeated in the next cycle until the torque is off.
+            RequestSource::Idle(_) if outcome == Outcome::Accepted && !output.torque_off => {}
+            RequestSource::Idle(number) => {
+                if let Some(number) = number {
+                    self.answer_idle(*number, output.cycle, outcome, text);
                 }
-                while let Some(request) = self.idle.pop() {
+                while let Some(request) = self.queued_idle.pop() {
                     self.reply(&request, output.cycle, output.mode, outcome, text);
                 }
             }
-            Asker::Loop => {}
+            RequestSource::Shutdown => {}
         }
     }
 
-    fn answer_idle(&mut self, asked: u64, cycle: u64, outcome: Outcome, text: Text) {
-        let reply = idle_reply(asked, cycle, self.state.mode(), outcome, text);
-        if let Some(path) = &mut self.idle_path {
-            path.answer(reply);
+    fn answer_idle(&mut self, request_number: u64, cycle: u64, outcome: Outcome, text: Text) {
+        let reply = idle_reply(request_number, cycle, self.state.mode(), outcome, text);
+        if let Some(channel) = &mut self.idle_channel {
+            channel.answer(reply);
         }
     }
 
-    /// What still waits was asked of another situation.
-    fn drop_waiting(&mut self, cycle: u64, mode: Mode) {
-        while let Some(request) = self.queue.pop() {
+    /// Refuses the queued requests, which were sent under other conditions; idle requests stay valid and are kept.
+    fn refuse_queued(&mut self, cycle: u64, mode: Mode) {
+        let mut kept = RequestQueue::default();
+        while let Some(request) = self.queued.pop() {
+            if request.requests_idle() && kept.push(request).is_ok() {
+                continue;
+            }
             let text = Text::of(&format_args!(
-                "refused: it waited for its cycle when the controller went to mode {}",
+                "refused: it was queued when the controller changed to mode {}",
                 mode.name()
             ));
             self.reply(&request, cycle, mode, Outcome::Refused, text);
         }
+        self.queued = kept;
     }
 
     fn reply(
@@ -378,22 +396,22 @@ impl<const N: usize> ControlLoop<N> {
         outcome: Outcome,
         text: Text,
     ) {
-        // An operator whose reply finds no room hears nothing, and may ask again.
+        // If the reply queue is full, the reply is lost; the operator can repeat the request.
         let reply = OperatorReply::new(request, cycle, mode, outcome, text);
-        let _ = self.inside.replies.push(reply);
+        let _ = self.queues.replies.push(reply);
     }
 
-    /// Hands the last step to the helper, where that is still to be done. Where the helper is behind, the record
-    /// is lost and its number shows it; in virtual time the loop waits.
-    fn tell_last(&mut self) {
-        let (Some(last), true) = (&self.last, self.untold) else {
+    /// Sends the telemetry of the last step to the helper, if not sent yet. If the queue is full, the record is lost
+    /// and leaves a gap in the step numbers; in virtual time the loop waits instead.
+    fn flush_telemetry(&mut self) {
+        let (Some(last), true) = (&self.last, self.telemetry_pending) else {
             return;
         };
-        self.untold = false;
+        self.telemetry_pending = false;
         self.timing.record(&last.timing);
         while self.virtual_time
-            && self.inside.telemetry.is_full()
-            && !self.inside.telemetry.is_abandoned()
+            && self.queues.telemetry.is_full()
+            && !self.queues.telemetry.is_abandoned()
         {
             std::thread::yield_now();
         }
@@ -406,6 +424,6 @@ impl<const N: usize> ControlLoop<N> {
         );
         telemetry.states_dropped = self.states_dropped.0 + self.states_dropped.1;
         self.steps += 1;
-        let _ = self.inside.telemetry.push(telemetry);
+        let _ = self.queues.telemetry.push(telemetry);
     }
 }

@@ -1,4 +1,4 @@
-//! Why the controller's process ends.
+//! Errors of the controller's process.
 
 use supple_core::controller::ConfigError;
 use supple_ipc::IpcError;
@@ -6,7 +6,7 @@ use supple_ipc::message::MessageError;
 use supple_model::ModelError;
 use supple_realtime::{NotifyError, StopError};
 
-/// Why the process cannot start, or cannot go on.
+/// Why the process cannot start or continue.
 #[derive(Debug, thiserror::Error)]
 pub enum RtError {
     /// The description of the arm.
@@ -18,7 +18,7 @@ pub enum RtError {
     /// Shared memory.
     #[error(transparent)]
     Ipc(#[from] IpcError),
-    /// An arm state of another arm.
+    /// The arm state is of another arm.
     #[error(transparent)]
     Message(#[from] MessageError),
     /// Signals.
@@ -27,16 +27,16 @@ pub enum RtError {
     /// The service manager.
     #[error(transparent)]
     Notify(#[from] NotifyError),
-    /// The helper's thread.
-    #[error("no second thread can be started: {0}; raise the user's limit of processes")]
+    /// A thread could not be started.
+    #[error("the thread cannot be started: {0}; raise the user's limit of processes")]
     Thread(std::io::Error),
-    /// The helper ended by a defect.
-    #[error("the helper's thread ended by a defect: please report it")]
+    /// The helper thread panicked.
+    #[error("the helper thread panicked: please report this bug")]
     Helper,
 }
 
 impl RtError {
-    /// Exit code, as the command line has them: 3 a wrong arm, 10 shared memory, 1 a defect or the system.
+    /// Exit code, as documented for the command line: 3 invalid arm, 10 shared memory, 1 a bug or a system error.
     pub fn code(&self) -> u8 {
         match self {
             RtError::Model(_) | RtError::Config(_) => 3,

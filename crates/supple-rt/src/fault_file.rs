@@ -7,7 +7,9 @@ use std::io::{self, ErrorKind, Write as _};
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use supple_ipc::message::{MAX_DOF, Telemetry, Text};
+use supple_core::controller::CycleRecord;
+use supple_core::record::{Cell, for_each_column};
+use supple_ipc::message::{MAX_DOF, Telemetry};
 use supple_realtime::{BackgroundWriter, diagnostics};
 
 /// Cycles that are kept.
@@ -63,7 +65,7 @@ impl FaultFiles {
 
 /// The last [`KEPT_CYCLES`] cycles; a fault that latches sends them to the disk.
 #[derive(Debug)]
-pub struct LastCycles {
+pub struct FaultRecorder {
     cycles: Table,
     fault: u8,
     files: FaultFiles,
@@ -77,10 +79,10 @@ struct Table {
     next: usize,
 }
 
-impl LastCycles {
+impl FaultRecorder {
     /// None yet.
-    pub fn new(files: FaultFiles) -> LastCycles {
-        LastCycles {
+    pub fn new(files: FaultFiles) -> FaultRecorder {
+        FaultRecorder {
             cycles: Table {
                 kept: Vec::with_capacity(KEPT_CYCLES),
                 next: 0,
@@ -100,12 +102,12 @@ impl LastCycles {
             kept[*next] = *telemetry;
             *next = (*next + 1) % KEPT_CYCLES;
         }
-        let latched = telemetry.fault != 0 && self.fault == 0;
-        self.fault = telemetry.fault;
+        let record = telemetry.record();
+        let latched = record.fault != 0 && self.fault == 0;
+        self.fault = record.fault;
         if latched {
-            let fault: Text = telemetry.fault_text;
-            diagnostics::post(format_args!("supple-rt: fault: {fault}"));
-            self.files.write(self.cycles.clone(), telemetry.step);
+            diagnostics::post(format_args!("supple-rt: fault: {}", record.fault_text));
+            self.files.write(self.cycles.clone(), record.step);
         }
     }
 
@@ -186,9 +188,15 @@ impl Table {
         let mut options = OpenOptions::new();
         options.write(true).create_new(true).mode(0o600);
         let mut table = options.open(&part)?;
-        table.write_all(self.text().as_bytes())?;
-        table.sync_all()?;
-        fs::rename(&part, &file)?;
+        let written = table
+            .write_all(self.text().as_bytes())
+            .and_then(|()| table.sync_all())
+            .and_then(|()| fs::rename(&part, &file));
+        if let Err(error) = written {
+            // What is not whole is of no use, and takes room that others want.
+            let _ = fs::remove_file(&part);
+            return Err(error);
+        }
         prune(folder)?;
         Ok(file)
     }
@@ -197,92 +205,36 @@ impl Table {
     fn text(&self) -> String {
         let (newer, older) = self.kept.split_at(self.next);
         let cycles = older.iter().chain(newer);
-        let dof = self.kept.first().map_or(0, |t| usize::from(t.state.dof));
+        let dof = self.kept.first().map_or(0, Telemetry::dof);
         let mut table = String::new();
-        header(&mut table, dof.min(MAX_DOF));
+        header(&mut table, dof);
         for telemetry in cycles {
-            row(&mut table, telemetry, dof.min(MAX_DOF));
+            row(&mut table, telemetry, dof);
         }
         table
     }
 }
 
-/// A column a joint.
-type PerJoint = (&'static str, fn(&Telemetry) -> &[f64; MAX_DOF]);
-/// A column an axis.
-type PerAxis = (&'static str, fn(&Telemetry) -> &[f64; 3]);
+/// Columns that are not of the controller's record.
+const PLANT: &str =
+    "stamp_ns,drives,missed,late,tx_lost,wake_ns,round_trip_ns,period_ns,latency_ns,step_ns";
 
-const PER_JOINT: [PerJoint; 19] = [
-    ("measured_position_rad", |t| &t.state.position_rad),
-    ("position_rad", |t| &t.position_rad),
-    ("velocity_rad_per_s", |t| &t.velocity_rad_per_s),
-    ("torque_nm", |t| &t.torque_nm),
-    ("fallback_torque_nm", |t| &t.fallback_torque_nm),
-    ("external_torque_nm", |t| &t.external_torque_nm),
-    ("gravity_nm", |t| &t.terms.gravity),
-    ("coriolis_nm", |t| &t.terms.coriolis),
-    ("friction_nm", |t| &t.terms.friction),
-    ("jacobian_rate_nm", |t| &t.terms.jacobian_rate),
-    ("inertial_nm", |t| &t.terms.inertial),
-    ("stiffness_nm", |t| &t.terms.stiffness),
-    ("damping_nm", |t| &t.terms.damping),
-    ("force_nm", |t| &t.terms.force),
-    ("nullspace_nm", |t| &t.terms.nullspace),
-    ("joint_pd_nm", |t| &t.terms.joint_pd),
-    ("soft_stop_nm", |t| &t.terms.soft_stop),
-    ("handover_nm", |t| &t.terms.handover),
-    ("ripple_nm", |t| &t.terms.ripple),
-];
-
-const PER_AXIS: [PerAxis; 7] = [
-    ("tip_force_n", |t| &t.state.tip_force_n),
-    ("tip_position_m", |t| &t.tip_position_m),
-    ("tip_velocity_m_per_s", |t| &t.tip_velocity_m_per_s),
-    ("reference_position_m", |t| &t.reference_position_m),
-    ("stiffness_n_per_m", |t| &t.stiffness_n_per_m),
-    ("damping_n_s_per_m", |t| &t.damping_n_s_per_m),
-    ("external_force_n", |t| &t.external_force_n),
-];
-
+/// Column names, those of a record as `supple log export` has them, joints by their numbers from 0.
 fn header(table: &mut String, dof: usize) {
-    table.push_str(
-        "step,cycle,stamp_ns,mode,drives,fault,fault_text,position_present,has_tip_force,has_reference,\
-         in_contact,torque_limited,rate_limited,missed,late,tx_lost,wake_ns,round_trip_ns,period_ns,\
-         latency_ns,step_ns",
-    );
-    for (name, _) in PER_JOINT {
-        for joint in 0..dof {
-            let _ = write!(table, ",{name}_{joint}");
-        }
-    }
-    for (name, _) in PER_AXIS {
-        for axis in ["x", "y", "z"] {
-            let _ = write!(table, ",{name}_{axis}");
-        }
-    }
+    table.push_str(PLANT);
+    for_each_column(CycleRecord::<MAX_DOF>::FIELDS, &[], dof, |column, _| {
+        let _ = write!(table, ",{column}");
+    });
     table.push('\n');
 }
 
 fn row(table: &mut String, t: &Telemetry, dof: usize) {
-    let mode = t.mode().map_or("unknown", |mode| mode.name());
     let (plant, timing) = (&t.state.plant, &t.timing);
-    // No comma but between columns: a table that any reader takes apart.
-    let fault_text = t.fault_text.as_str().replace(',', ";");
     let _ = write!(
         table,
-        "{},{},{},{mode},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
-        t.step,
-        t.state.cycle,
+        "{},{},{},{},{},{},{},{},{},{}",
         t.state.stamp_ns,
         t.state.drives().name(),
-        t.fault,
-        fault_text,
-        t.state.position_present,
-        t.state.has_tip_force,
-        t.has_reference,
-        t.in_contact,
-        t.torque_limited,
-        t.rate_limited,
         plant.missed,
         plant.late,
         plant.tx_lost,
@@ -292,15 +244,12 @@ fn row(table: &mut String, t: &Telemetry, dof: usize) {
         timing.latency_ns,
         timing.step_ns,
     );
-    for (_, values) in PER_JOINT {
-        for value in &values(t)[..dof] {
-            let _ = write!(table, ",{value}");
-        }
-    }
-    for (_, values) in PER_AXIS {
-        for value in values(t) {
-            let _ = write!(table, ",{value}");
-        }
-    }
+    for_each_column(CycleRecord::<MAX_DOF>::FIELDS, t.words(), dof, |_, cell| {
+        let _ = match cell {
+            // No comma but between columns: a table that any reader takes apart.
+            Cell::Text(_) => write!(table, ",{}", cell.to_string().replace(',', ";")),
+            cell => write!(table, ",{cell}"),
+        };
+    });
     table.push('\n');
 }

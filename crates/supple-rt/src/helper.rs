@@ -1,86 +1,105 @@
-//! The helper's thread: the ports to the outside. It waits for nobody: disks and standard error have threads of their
-//! own.
+//! The helper thread: telemetry, requests and replies. It never blocks: separate threads write to the disk and to
+//! standard error.
 
 use crate::error::RtError;
-use crate::fault_file::{FaultFiles, LastCycles};
+use crate::fault_file::{FaultFiles, FaultRecorder};
 use crate::options::Options;
-use crate::rings::Outside;
+use crate::queues::HelperQueues;
 use core::fmt::Display;
 use core::time::Duration;
+use std::collections::VecDeque;
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::{Builder, JoinHandle};
 use supple_core::Vector;
-use supple_core::controller::{Controller, Mode, Refusal, plan};
+use supple_core::codes::request_kind;
+use supple_core::controller::{Controller, Mode, Refusal, Request, check_motion};
 use supple_ipc::message::{MAX_DOF, OperatorReply, OperatorRequest, Outcome, Text};
-use supple_ipc::{Domain, Full, IpcError, OutsideLink, pause};
+use supple_ipc::{Backpressure, Domain, IpcError, OperatorServer, pause};
 use supple_realtime::diagnostics;
 
-/// How often the helper looks.
-const LOOK_EVERY: Duration = Duration::from_millis(1);
-/// Most of one kind that is done before the others have their turn.
-const MOST: usize = 256;
+/// Poll interval of the helper.
+const POLL_INTERVAL: Duration = Duration::from_millis(1);
+/// Maximum number of messages of one kind per iteration.
+const MAX_PER_ITERATION: usize = 256;
 /// Folder for faults beside the system's sockets.
-const FAULTS: &str = "faults";
-/// How long the end waits for a disk.
-const DISK_WITHIN: Duration = Duration::from_secs(2);
+const FAULT_FOLDER: &str = "faults";
+/// Maximum time that the shutdown waits for the disk.
+const DISK_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Looks along a motion that is asked for, from the pose that the arm is in: whether it can be carried out over its
-/// whole length ([`supple_core::controller::plan()`]).
-pub type Planner = Box<dyn Fn(&OperatorRequest, &[f64; MAX_DOF]) -> Result<(), Refusal> + Send>;
+/// Joint angles, padded for any arm \[rad\].
+type Pose = [f64; MAX_DOF];
 
-/// A planner for an arm of `N` joints. What is no request is left to the loop, which says so.
-pub fn planner<const N: usize>(controller: Controller<N>) -> Planner {
-    Box::new(move |message, from_rad| match message.request::<N>() {
-        Ok(Some(request)) => {
-            let from_rad = Vector::from_fn(|i, _| from_rad[i]);
-            plan(&controller, &from_rad, &request)
+/// Checks whether a requested motion is feasible over its whole length, from its start pose if that is known
+/// ([`supple_core::controller::check_motion()`]). Returns the end pose of a move.
+pub type MotionCheck =
+    Box<dyn Fn(&OperatorRequest, Option<&Pose>) -> Result<Option<Pose>, Refusal> + Send>;
+
+/// Feasibility check for an arm of `N` joints. Invalid requests pass; the loop refuses them.
+pub fn motion_check<const N: usize>(controller: Controller<N>) -> MotionCheck {
+    Box::new(move |message, from_rad| {
+        let Ok(Some(request)) = message.request::<N>() else {
+            return Ok(None);
+        };
+        let from_rad = from_rad.map(|from_rad| Vector::from_fn(|i, _| from_rad[i]));
+        // An excitation starts near its own centre, so it is checked from there if the pose is unknown.
+        let from_rad = match &request {
+            Request::Excite(series) => from_rad.or(Some(series.centre_rad)),
+            _ => from_rad,
+        };
+        if let Some(from_rad) = from_rad {
+            check_motion(&controller, &from_rad, &request)?;
         }
-        _ => Ok(()),
+        Ok(match &request {
+            Request::Move { target_rad, .. } => Some(core::array::from_fn(|i| {
+                target_rad.get(i).copied().unwrap_or_default()
+            })),
+            _ => None,
+        })
     })
 }
 
-/// The helper at work.
+/// The running helper thread.
 #[derive(Debug)]
 pub struct Helper {
     thread: JoinHandle<Result<(), IpcError>>,
 }
 
 impl Helper {
-    /// Starts it and waits until it has its ports. `planner` looks along the motions that are asked for.
+    /// Starts the thread and waits until its ports are open. `motion_check` checks requested motions.
     ///
     /// # Errors
-    /// [`RtError::Ipc`] where the ports are not to be had, [`RtError::Thread`].
+    /// [`RtError::Ipc`] if the ports cannot be opened, [`RtError::Thread`].
     pub fn start(
         domain: &Domain,
-        outside: Outside,
+        queues: HelperQueues,
         options: &Options,
-        planner: Planner,
+        motion_check: MotionCheck,
     ) -> Result<Helper, RtError> {
-        let full = match options.virtual_time {
-            true => Full::Wait,
-            false => Full::Lose,
+        let backpressure = match options.virtual_time {
+            true => Backpressure::Block,
+            false => Backpressure::Drop,
         };
         let folder = options.fault_dir.clone();
-        let folder = folder.unwrap_or_else(|| domain.folder().join(FAULTS));
+        let folder = folder.unwrap_or_else(|| domain.folder().join(FAULT_FOLDER));
         let files = FaultFiles::start(folder).map_err(RtError::Thread)?;
         let domain = domain.clone();
         let (ready, is_ready) = sync_channel(1);
         let thread = Builder::new()
             .name("supple-rt-helper".to_owned())
-            .spawn(move || work(&domain, full, outside, files, planner, &ready))
+            .spawn(move || work(&domain, backpressure, queues, files, motion_check, &ready))
             .map_err(RtError::Thread)?;
         let helper = Helper { thread };
         match is_ready.recv() {
             Ok(()) => Ok(helper),
-            // It ended before it was ready, and says why.
+            // The thread ended before it was ready; return its error.
             Err(_) => helper.finish().and(Err(RtError::Helper)),
         }
     }
 
-    /// Waits until everything of a loop that has ended is told.
+    /// Waits until all telemetry and replies of a loop that has ended are published.
     ///
     /// # Errors
-    /// [`RtError::Ipc`] where it never had its ports, [`RtError::Helper`] where it ended by a defect.
+    /// [`RtError::Ipc`] if the ports could not be opened, [`RtError::Helper`] if the thread panicked.
     pub fn finish(self) -> Result<(), RtError> {
         match self.thread.join() {
             Ok(worked) => Ok(worked?),
@@ -91,102 +110,148 @@ impl Helper {
 
 fn work(
     domain: &Domain,
-    full: Full,
-    outside: Outside,
+    backpressure: Backpressure,
+    queues: HelperQueues,
     files: FaultFiles,
-    planner: Planner,
+    motion_check: MotionCheck,
     ready: &SyncSender<()>,
 ) -> Result<(), IpcError> {
-    let link = OutsideLink::new(domain, full)?;
-    // Nobody waits for it any more only where the start was given up.
+    let link = OperatorServer::new(domain, backpressure)?;
+    // The receiver is gone only if the start was aborted.
     let _ = ready.send(());
-    let mut desk = Desk {
+    let mut state = HelperState {
         link,
-        outside,
-        last_cycles: LastCycles::new(files),
-        planner,
+        queues,
+        fault_recorder: FaultRecorder::new(files),
+        motion_check,
         position_rad: None,
+        move_ends: None,
+        awaiting_check: VecDeque::with_capacity(MAX_PER_ITERATION),
         failed: false,
-        told_of_states: false,
+        dropped_states_reported: false,
     };
     loop {
-        desk.outside.pulse.beat();
-        let ended = desk.outside.ended();
-        desk.requests();
-        desk.telemetry();
-        desk.replies();
+        state.queues.liveness.increment();
+        let ended = state.queues.ended();
+        state.requests();
+        state.telemetry();
+        state.replies();
         if ended {
-            desk.last_cycles.finish(DISK_WITHIN);
+            state.fault_recorder.finish(DISK_TIMEOUT);
             return Ok(());
         }
-        pause(LOOK_EVERY);
+        pause(POLL_INTERVAL);
     }
 }
 
-/// The ports with what is handed over at them. A port that fails ends nothing: the next message tries it again.
-struct Desk {
-    link: OutsideLink,
-    outside: Outside,
-    last_cycles: LastCycles,
-    planner: Planner,
-    /// Where the arm was last.
-    position_rad: Option<[f64; MAX_DOF]>,
+/// State of the helper thread. A failing port does not end the thread; the next message tries the port again.
+struct HelperState {
+    link: OperatorServer,
+    queues: HelperQueues,
+    fault_recorder: FaultRecorder,
+    motion_check: MotionCheck,
+    /// Requests waiting for their motion check.
+    awaiting_check: VecDeque<OperatorRequest>,
+    /// Last known joint angles.
+    position_rad: Option<Pose>,
+    /// End pose of an operator's last move, kept until that operator's next motion request.
+    move_ends: Option<(u64, Pose)>,
     failed: bool,
-    told_of_states: bool,
+    dropped_states_reported: bool,
 }
 
-impl Desk {
+impl HelperState {
     fn requests(&mut self) {
-        for _ in 0..MOST {
-            let request = match self.link.request() {
-                Ok(Some(request)) => request,
+        // Idle requests are forwarded without a check; of the others one is checked per iteration, because the check
+        // takes milliseconds.
+        while self.awaiting_check.len() < MAX_PER_ITERATION {
+            match self.link.request() {
+                Ok(Some(request)) if request.requests_idle_now() => self.enqueue(request),
+                Ok(Some(request)) => self.awaiting_check.push_back(request),
                 Ok(None) => break,
-                Err(error) => return self.port_failed(&error),
-            };
-            // One that waits for its cycle begins from a pose that nobody knows yet.
-            if let (Some(from_rad), 0) = (&self.position_rad, request.has_at_cycle)
-                && let Err(refusal) = (self.planner)(&request, from_rad)
-            {
-                let text = refusal.to_string();
-                self.reply(&early(&request, Outcome::Refused, &text));
-                continue;
-            }
-            let handed_in = self.outside.request(request);
-            match (handed_in, request.has_at_cycle != 0) {
-                // The loop hears it before the step of its cycle, whenever that is.
-                (true, true) => self.reply(&early(&request, Outcome::Queued, "")),
-                (true, false) => {}
-                (false, _) => {
-                    let text = "refused: too many requests at once";
-                    self.reply(&early(&request, Outcome::Refused, text));
+                Err(error) => {
+                    self.port_failed(&error);
+                    break;
                 }
             }
+        }
+        let Some(request) = self.awaiting_check.pop_front() else {
+            return;
+        };
+        let from_rad = self.start_pose(&request);
+        match (self.motion_check)(&request, from_rad.as_ref()) {
+            Ok(end_rad) => {
+                if let Some(end_rad) = end_rad {
+                    self.move_ends = Some((request.operator, end_rad));
+                }
+                self.enqueue(request);
+            }
+            Err(refusal) => {
+                let text = refusal.to_string();
+                self.reply(&reply_before_step(&request, Outcome::Refused, &text));
+            }
+        }
+    }
+
+    fn enqueue(&mut self, request: OperatorRequest) {
+        let queued = self.queues.request(request);
+        match (queued, request.has_at_cycle != 0) {
+            // The loop reads the request before the step of its cycle.
+            (true, true) => self.reply(&reply_before_step(&request, Outcome::Queued, "")),
+            (true, false) => {}
+            (false, _) => {
+                let text = "refused: too many requests at once";
+                self.reply(&reply_before_step(&request, Outcome::Refused, text));
+            }
+        }
+    }
+
+    /// Start pose of a motion: the end pose of the operator's last move for a deferred motion after it, otherwise the
+    /// current pose. `None` if unknown, as for a deferred move.
+    fn start_pose(&mut self, request: &OperatorRequest) -> Option<Pose> {
+        let is_deferred = request.has_at_cycle != 0;
+        let is_move = request.kind == request_kind::MOVE;
+        let is_motion = matches!(
+            request.kind,
+            request_kind::TRACK | request_kind::EXCITE | request_kind::BREAKAWAY
+        );
+        match self.move_ends {
+            Some((operator, pose)) if is_motion && operator == request.operator => {
+                self.move_ends = None;
+                if is_deferred {
+                    Some(pose)
+                } else {
+                    self.position_rad
+                }
+            }
+            _ if is_deferred && is_move => None,
+            _ => self.position_rad,
         }
     }
 
     fn telemetry(&mut self) {
-        for _ in 0..MOST {
-            let Some(telemetry) = self.outside.telemetry() else {
+        for _ in 0..MAX_PER_ITERATION {
+            let Some(telemetry) = self.queues.telemetry() else {
                 break;
             };
             if let Err(error) = self.link.publish(&telemetry) {
                 self.port_failed(&error);
             }
-            self.last_cycles.add(&telemetry);
-            self.position_rad = Some(telemetry.position_rad);
+            self.fault_recorder.add(&telemetry);
+            self.position_rad = Some(telemetry.record().position_rad.into());
         }
-        if self.outside.states_dropped() > 0 && !self.told_of_states {
-            self.told_of_states = true;
+        if self.queues.states_dropped() > 0 && !self.dropped_states_reported {
+            self.dropped_states_reported = true;
             diagnostics::post(
-                "supple-rt: warning: arm states are dropped: they are of another arm, or another program than this \
-                 system's plant writes them; start every process with the same --arm, and one plant",
+                "supple-rt: warning: arm states are discarded: they are from another arm, or from a program that is not \
+                 this system's plant; start every process with the same --arm, and only one plant",
             );
         }
     }
 
     fn replies(&mut self) {
-        for _ in 0..MOST {
-            let Some(reply) = self.outside.reply() else {
+        for _ in 0..MAX_PER_ITERATION {
+            let Some(reply) = self.queues.reply() else {
                 break;
             };
             self.reply(&reply);
@@ -199,7 +264,7 @@ impl Desk {
         }
     }
 
-    /// Says so once.
+    /// Reports the first failure of a port.
     fn port_failed(&mut self, error: &dyn Display) {
         if !self.failed {
             self.failed = true;
@@ -208,7 +273,7 @@ impl Desk {
     }
 }
 
-/// A reply that the loop knows nothing of.
-fn early(request: &OperatorRequest, outcome: Outcome, text: &str) -> OperatorReply {
+/// A reply that the helper sends itself, before the loop sees the request.
+fn reply_before_step(request: &OperatorRequest, outcome: Outcome, text: &str) -> OperatorReply {
     OperatorReply::new(request, 0, Mode::Idle, outcome, Text::of(&text))
 }

@@ -1,35 +1,37 @@
 //! The controller as a realtime process: waits for an arm state, runs `step`, publishes torques.
 //!
 //! The loop's thread has only the ports to the plant; after its start it allocates nothing, locks nothing and logs
-//! nothing ([`ControlLoop`]). Its helper has the ports to the outside: telemetry, requests, replies ([`Helper`]). A third
-//! thread hears requests for idle and nothing else ([`IdleWatch`]). Disk and standard error have threads of their own,
-//! which the others never wait for. Between them are rings of fixed size. Where the helper or the watch is gone, nobody
-//! is heard any more: the loop leaves in order, and the process ends with an error. Where
-//! a service manager watches the process, one thread more tells it that loop and helper go on
-//! ([`supple_realtime::Heartbeat`]).
+//! nothing ([`ControlLoop`]). The helper thread has the ports to the clients: telemetry, requests, replies
+//! ([`Helper`]). A third thread receives only idle requests ([`IdleRequestThread`]). Separate threads write to the disk
+//! and to standard error; no other thread waits for them. The threads exchange data through lock-free queues of fixed
+//! size. If the helper or the idle-request thread ends, no request can be received any more: the loop shuts down in
+//! order, and the process exits with an error. If a service manager supervises the process, one more thread reports to
+//! it that the loop and the helper are alive ([`supple_realtime::Heartbeat`]).
 //!
-//! It knows no bus, no log format, no simulator. The plant owns the clock; in virtual time the loop waits for
-//! the plant however long it takes, and nothing it computes depends on a clock in either case.
+//! It does not depend on a bus, a log format or a simulator. The plant owns the clock; in virtual time the loop waits
+//! for the plant without a timeout. The computed torques never depend on a clock.
 
 mod control_loop;
 mod error;
 mod fault_file;
 mod helper;
-mod idle_watch;
+mod idle_thread;
 mod options;
-mod queue;
-mod rings;
+mod queues;
+mod request_queue;
 mod timing;
 
-pub use control_loop::{ControlLoop, PLANT_LOST_AFTER};
+pub use control_loop::{ControlLoop, PLANT_TIMEOUT};
 pub use error::RtError;
-pub use fault_file::{FaultFiles, KEPT_CYCLES, KEPT_FILES, LastCycles};
-pub use helper::{Helper, Planner, planner};
-pub use idle_watch::IdleWatch;
+pub use fault_file::{FaultFiles, FaultRecorder, KEPT_CYCLES, KEPT_FILES};
+pub use helper::{Helper, MotionCheck, motion_check};
+pub use idle_thread::IdleRequestThread;
 pub use options::Options;
-pub use queue::{NoPlace, Queue};
-pub use rings::{IdleInside, IdleOutside, Inside, Outside, idle_path, rings};
-pub use timing::{Spread, Timing};
+pub use queues::{
+    HelperQueues, IdleThreadChannel, LoopIdleChannel, LoopQueues, idle_channel, loop_queues,
+};
+pub use request_queue::{QueueFull, RequestQueue};
+pub use timing::{Percentiles, Timing};
 
 use clap::Parser;
 use std::process::ExitCode;
@@ -37,25 +39,26 @@ use supple_core::Controller;
 use supple_ipc::{ControllerLink, Domain};
 use supple_model::{Description, with_dof};
 use supple_realtime::{
-    Heartbeat, ManagerVariables, Notifier, Stop, diagnostics, die_with_parent, enter,
+    Heartbeat, ManagerVariables, Notifier, Stop, apply_realtime_settings, diagnostics,
+    die_with_parent,
 };
 
-/// The whole program, from its arguments to its exit code.
+/// Runs the program: parses the arguments and returns the exit code.
 pub fn main() -> ExitCode {
     let options = Options::parse();
     diagnostics::start();
     let stop = match Stop::on_signals() {
         Ok(stop) => stop,
-        Err(error) => return complain(&error.into()),
+        Err(error) => return report_error(&error.into()),
     };
     if options.supervised() {
         die_with_parent();
     }
     let description = match options.description() {
         Ok(description) => description,
-        Err(error) => return complain(&error.into()),
+        Err(error) => return report_error(&error.into()),
     };
-    // Who supervises has said them.
+    // The supervising process has already printed the warnings.
     for warning in description
         .warnings()
         .iter()
@@ -70,20 +73,20 @@ pub fn main() -> ExitCode {
             diagnostics::flush();
             ExitCode::SUCCESS
         }
-        Err(error) => complain(&error),
+        Err(error) => report_error(&error),
     }
 }
 
-fn complain(error: &RtError) -> ExitCode {
+fn report_error(error: &RtError) -> ExitCode {
     diagnostics::post(format_args!("supple-rt: error: {error}"));
     diagnostics::flush();
     ExitCode::from(error.code())
 }
 
-/// Runs until it is asked to end; gives how it kept its time.
+/// Runs until shutdown is requested; returns the timing statistics.
 ///
 /// # Errors
-/// [`RtError`]: an arm that is not sound, shared memory that cannot be used, an arm state of another arm.
+/// [`RtError`]: an invalid arm, shared memory that cannot be used, an arm state of another arm.
 pub fn run<const N: usize>(
     description: &Description,
     options: &Options,
@@ -91,24 +94,24 @@ pub fn run<const N: usize>(
 ) -> Result<Timing, RtError> {
     let controller = Controller::new(description.config::<N>()?)?;
     let domain = Domain::new(options.prefix.as_deref())?;
-    let notifier = Notifier::new(&ManagerVariables::of_process())?;
+    let notifier = Notifier::new(&ManagerVariables::from_environment())?;
     let link = ControllerLink::new(&domain)?;
-    let (inside, outside) = rings();
-    let pulses = [inside.pulse(), outside.pulse()];
-    let helper = Helper::start(&domain, outside, options, planner(controller))?;
-    let (idle_inside, idle_outside) = idle_path();
-    let watch = IdleWatch::start(&domain, idle_outside, options.realtime())?;
-    let mut control = ControlLoop::new(controller, inside, options.virtual_time);
-    let heartbeat = notifier.map(|notifier| Heartbeat::start(notifier, &pulses));
+    let (queues, helper_queues) = loop_queues();
+    let counters = [queues.liveness(), helper_queues.liveness()];
+    let helper = Helper::start(&domain, helper_queues, options, motion_check(controller))?;
+    let (loop_channel, thread_channel) = idle_channel();
+    let idle_thread = IdleRequestThread::start(&domain, thread_channel, options.realtime())?;
+    let mut control = ControlLoop::new(controller, queues, options.virtual_time);
+    let heartbeat = notifier.map(|notifier| Heartbeat::start(notifier, &counters));
     let heartbeat = heartbeat.transpose()?;
-    control.hear_idle(idle_inside);
-    for shortfall in enter(&options.realtime()) {
-        diagnostics::post(format_args!("supple-rt: warning: {shortfall}"));
+    control.set_idle_channel(loop_channel);
+    for realtime_warning in apply_realtime_settings(&options.realtime()) {
+        diagnostics::post(format_args!("supple-rt: warning: {realtime_warning}"));
     }
     let ended = control.run(&link, stop);
     drop(heartbeat);
     let timing = control.into_timing();
     helper.finish()?;
-    watch.finish()?;
+    idle_thread.finish()?;
     ended.map(|()| timing)
 }

@@ -1,4 +1,4 @@
-//! What the process is told.
+//! Command-line options.
 
 use clap::Parser;
 use std::path::PathBuf;
@@ -14,16 +14,16 @@ pub struct Options {
     /// A built-in arm (see `supple arms`), or the path of an arm's TOML or of its folder.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
-    /// Refuses an arm whose URDF holds what is not read, instead of a warning.
+    /// Treats URDF elements that are not supported as errors instead of warnings.
     #[arg(long)]
     pub strict: bool,
     /// Cycles per second; the arm's own if not given. All processes of a system need the same.
     #[arg(long, value_name = "HZ", value_parser = clap::value_parser!(u32).range(10..=10_000))]
     pub rate_hz: Option<u32>,
-    /// Which system this belongs to; SUPPLE_PREFIX or `supple` if not given.
+    /// Prefix of the system; SUPPLE_PREFIX or `supple` if not given.
     #[arg(long, value_name = "NAME")]
     pub prefix: Option<String>,
-    /// Waits for the plant however long it takes, and loses no telemetry.
+    /// Waits for the plant without a timeout, and loses no telemetry.
     #[arg(long)]
     pub virtual_time: bool,
     /// Priority under SCHED_FIFO.
@@ -37,20 +37,20 @@ pub struct Options {
 }
 
 impl Options {
-    /// The arm, at the rate asked for.
+    /// Loads the arm at the requested rate.
     ///
     /// # Errors
-    /// As [`Description::find_at_rate`]; what is left out of its URDF where nothing may be.
+    /// As [`Description::find_at_rate`]; with `--strict`, also an unsupported URDF element.
     pub fn description(&self) -> Result<Description, ModelError> {
         Description::find_at_rate(&self.arm, self.rate_hz)?.strict_if(self.strict)
     }
 
-    /// It is to end with the process that started it.
+    /// Whether the process must end when its parent ends.
     pub fn supervised(&self) -> bool {
         self.realtime.supervised
     }
 
-    /// What to ask of the system.
+    /// Realtime settings of the loop's thread.
     pub fn realtime(&self) -> Settings {
         self.realtime.settings(self.priority, self.virtual_time)
     }

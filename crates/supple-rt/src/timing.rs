@@ -1,15 +1,15 @@
-//! How the loop keeps its time: histograms that are always on and never grow.
+//! Timing statistics of the loop: histograms of fixed size.
 
 use hdrhistogram::Histogram;
 use std::fmt;
 use supple_ipc::message::CycleTiming;
 
-/// Longest time that is told apart \[ns\]; what is longer counts as this.
-const LONGEST_NS: u64 = 10_000_000_000;
+/// Upper bound of the histograms \[ns\]; longer times are clamped to it.
+const MAX_RECORDED_NS: u64 = 10_000_000_000;
 /// Significant decimal digits.
 const DIGITS: u8 = 3;
 
-/// Times of all cycles since the start.
+/// Statistics of all cycles since the start.
 #[derive(Clone, Debug)]
 pub struct Timing {
     cycles: u64,
@@ -17,23 +17,23 @@ pub struct Timing {
     step: Histogram<u64>,
 }
 
-/// A distribution in a few numbers \[ns\].
+/// Percentiles of a distribution \[ns\].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Spread {
+pub struct Percentiles {
     /// Median.
     pub p50_ns: u64,
-    /// 99 % are below.
+    /// 99th percentile.
     pub p99_ns: u64,
-    /// 99.9 % are below.
+    /// 99.9th percentile.
     pub p999_ns: u64,
-    /// Greatest.
+    /// Maximum.
     pub max_ns: u64,
 }
 
 impl Timing {
-    /// No cycles yet; all memory is there.
+    /// Empty histograms; all memory is allocated here.
     pub fn new() -> Timing {
-        let histogram = Histogram::new_with_bounds(1, LONGEST_NS, DIGITS);
+        let histogram = Histogram::new_with_bounds(1, MAX_RECORDED_NS, DIGITS);
         let histogram = histogram.expect("1 to 10^10 with 3 digits is a histogram");
         Timing {
             cycles: 0,
@@ -42,7 +42,7 @@ impl Timing {
         }
     }
 
-    /// A cycle.
+    /// Records a cycle.
     pub fn record(&mut self, timing: &CycleTiming) {
         self.cycles += 1;
         self.latency.saturating_record(timing.latency_ns);
@@ -54,14 +54,14 @@ impl Timing {
         self.cycles
     }
 
-    /// From the measurement to the beginning of the step.
-    pub fn latency(&self) -> Spread {
-        Spread::of(&self.latency)
+    /// Time from the measurement to the start of the step.
+    pub fn latency(&self) -> Percentiles {
+        Percentiles::of(&self.latency)
     }
 
-    /// From there until the torques are known, with a look for requests.
-    pub fn step(&self) -> Spread {
-        Spread::of(&self.step)
+    /// Duration of the step, including the check for requests.
+    pub fn step(&self) -> Percentiles {
+        Percentiles::of(&self.step)
     }
 }
 
@@ -71,9 +71,9 @@ impl Default for Timing {
     }
 }
 
-impl Spread {
-    fn of(histogram: &Histogram<u64>) -> Spread {
-        Spread {
+impl Percentiles {
+    fn of(histogram: &Histogram<u64>) -> Percentiles {
+        Percentiles {
             p50_ns: histogram.value_at_quantile(0.5),
             p99_ns: histogram.value_at_quantile(0.99),
             p999_ns: histogram.value_at_quantile(0.999),

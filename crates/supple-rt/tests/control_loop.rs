@@ -1,11 +1,11 @@
-//! The loop against a scripted plant, on the real services: its answers are those of `step`, it allocates
-//! nothing, requests are heard in their cycle, and it leaves in order.
+//! The loop against a scripted plant, on the real services: its answers equal those of `step`, it allocates nothing,
+//! requests take effect in their cycle, and it shuts down in order.
 
 #[path = "../../../tests/support/counting.rs"]
 mod counting;
 
 use core::time::Duration;
-use counting::counted;
+use counting::count_allocations;
 use supple_core::controller::{Mode, Request};
 use supple_core::math::Vector3;
 use supple_core::{Controller, Input, Output, State, Vector, step};
@@ -16,18 +16,18 @@ use supple_ipc::message::{
 use supple_ipc::{ControllerLink, Domain, PlantLink};
 use supple_model::Description;
 use supple_realtime::Stop;
-use supple_rt::{ControlLoop, IdleOutside, Outside, idle_path, rings};
+use supple_rt::{ControlLoop, HelperQueues, IdleThreadChannel, idle_channel, loop_queues};
 use tempfile::TempDir;
 
 const SOON: Duration = Duration::from_secs(5);
 
-/// A loop with everything around it in the test's hands.
+/// A loop with its ports and queues under the test's control.
 struct Bench {
     control: ControlLoop<4>,
     link: ControllerLink,
     plant: PlantLink,
-    outside: Outside,
-    idle: IdleOutside,
+    helper_queues: HelperQueues,
+    idle: IdleThreadChannel,
     stop: Stop,
     home_rad: Vector<4>,
     cycle: u64,
@@ -45,16 +45,16 @@ fn controller() -> Controller<4> {
 
 fn bench(virtual_time: bool) -> Bench {
     let folder = tempfile::tempdir().expect("a folder");
-    let domain = Domain::within(&folder.path().join("run"), "loop").expect("a domain");
-    let (inside, outside) = rings();
-    let (idle_inside, idle) = idle_path();
-    let mut control = ControlLoop::new(controller(), inside, virtual_time);
-    control.hear_idle(idle_inside);
+    let domain = Domain::in_folder(&folder.path().join("run"), "loop").expect("a domain");
+    let (queues, helper_queues) = loop_queues();
+    let (idle_channel_end, idle) = idle_channel();
+    let mut control = ControlLoop::new(controller(), queues, virtual_time);
+    control.set_idle_channel(idle_channel_end);
     Bench {
         control,
         link: ControllerLink::new(&domain).expect("a controller"),
         plant: PlantLink::new(&domain).expect("a plant"),
-        outside,
+        helper_queues,
         idle,
         stop: Stop::default(),
         home_rad: description().home().expect("four joints"),
@@ -80,38 +80,45 @@ impl Bench {
     /// The plant announces a state.
     fn announce(&mut self) {
         self.plant.announce().expect("announced");
-        assert!(self.control.turn(&self.link, &self.stop).expect("a turn"));
+        assert!(
+            self.control
+                .run_iteration(&self.link, &self.stop)
+                .expect("an iteration")
+        );
     }
 
-    /// One cycle from end to end; the loop's answer and whether it goes on.
+    /// Runs one cycle; returns the loop's answer and whether the loop continues.
     fn cycle(&mut self, drives: Drives) -> (TorqueCommand, bool) {
         self.plant.publish(&self.state(drives)).expect("published");
-        let goes_on = self.control.turn(&self.link, &self.stop).expect("a turn");
-        let heard = self.plant.answer(self.cycle, SOON).expect("read");
+        let goes_on = self
+            .control
+            .run_iteration(&self.link, &self.stop)
+            .expect("an iteration");
+        let received = self.plant.answer(self.cycle, SOON).expect("read");
         self.cycle += 1;
-        (heard.answer.expect("an answer"), goes_on)
+        (received.answer.expect("an answer"), goes_on)
     }
 
-    fn ask(&mut self, request: &Request<4>, at_cycle: Option<u64>) {
+    fn request(&mut self, request: &Request<4>, at_cycle: Option<u64>) {
         self.sequence += 1;
         let message = OperatorRequest::new(1, self.sequence, at_cycle, request);
-        assert!(self.outside.request(message));
+        assert!(self.helper_queues.request(message));
     }
 
     fn replies(&mut self) -> Vec<OperatorReply> {
-        core::iter::from_fn(|| self.outside.reply()).collect()
+        core::iter::from_fn(|| self.helper_queues.reply()).collect()
     }
 
     fn telemetry(&mut self) -> Vec<Telemetry> {
-        core::iter::from_fn(|| self.outside.telemetry()).collect()
+        core::iter::from_fn(|| self.helper_queues.telemetry()).collect()
     }
 }
 
 #[test]
-fn its_answers_are_those_of_step_to_the_last_bit() {
+fn answers_equal_those_of_step_bit_for_bit() {
     let mut bench = bench(true);
     let (controller, mut state) = (controller(), State::new(&controller()));
-    bench.ask(&Request::GravityHold, Some(3));
+    bench.request(&Request::GravityHold, Some(3));
     for cycle in 0..50 {
         let (answer, _) = bench.cycle(Drives::Active);
         let input = Input {
@@ -125,9 +132,9 @@ fn its_answers_are_those_of_step_to_the_last_bit() {
         assert_eq!(answer, TorqueCommand::new(&output, false));
     }
     let telemetry = bench.telemetry();
-    let steps: Vec<u64> = telemetry.iter().map(|t| t.step).collect();
+    let steps: Vec<u64> = telemetry.iter().map(|t| t.step()).collect();
     assert_eq!(steps, (0..50).collect::<Vec<_>>());
-    let mode = |k: usize| telemetry[k].mode();
+    let mode = |k: usize| telemetry[k].record().mode();
     assert_eq!(
         (mode(2), mode(3)),
         (Some(Mode::Idle), Some(Mode::GravityHold))
@@ -135,27 +142,27 @@ fn its_answers_are_those_of_step_to_the_last_bit() {
 }
 
 #[test]
-fn what_it_does_when_a_state_is_announced_changes_no_answer() {
+fn announcements_do_not_change_the_answers() {
     let (mut announced, mut plain) = (bench(false), bench(false));
     for cycle in 0..200 {
         for bench in [&mut announced, &mut plain] {
             if cycle == 3 {
-                bench.ask(&Request::GravityHold, None);
+                bench.request(&Request::GravityHold, None);
             }
-            // An arm that moves: a step that was not forgotten would be seen.
+            // The arm moves, so that a warm-up step that changed the state would show.
             bench.home_rad[1] += 1e-4;
         }
         if cycle % 3 > 0 {
             announced.announce();
-            // All is told then, and nothing twice: of the last step, and of one before which nobody announced.
-            let told = 1 + usize::from(cycle % 3 == 1 && cycle > 1);
-            assert_eq!(announced.telemetry().len(), told);
+            // All telemetry is sent then, and nothing twice: of the last step, and of one that was not announced.
+            let sent = 1 + usize::from(cycle % 3 == 1 && cycle > 1);
+            assert_eq!(announced.telemetry().len(), sent);
         }
         let (with, _) = announced.cycle(Drives::Active);
         let (without, _) = plain.cycle(Drives::Active);
         assert_eq!(with, without);
     }
-    // Whoever does not announce hears of a step one step later.
+    // Without announcements, telemetry is sent one step later.
     assert_eq!(plain.telemetry().len(), 199);
 }
 
@@ -165,15 +172,15 @@ fn a_thousand_cycles_with_requests_and_a_fault_allocate_nothing() {
     for _ in 0..4 {
         bench.cycle(Drives::Active);
     }
-    let allocations = counted(|| {
+    let allocations = count_allocations(|| {
         for k in 0..1000_u64 {
             match k {
-                100 => bench.ask(&Request::GravityHold, None),
-                200 => bench.ask(&Request::Idle, Some(bench.cycle + 50)),
-                // Refused in idle: words are made.
-                300 | 301 => bench.ask(&Request::Reset, None),
-                // On the way for idle, and states of another arm.
-                400 => bench.idle.ask(1),
+                100 => bench.request(&Request::GravityHold, None),
+                200 => bench.request(&Request::Idle, Some(bench.cycle + 50)),
+                // Refused in idle: a text is written.
+                300 | 301 => bench.request(&Request::Reset, None),
+                // The channel for idle requests, and a state of another arm.
+                400 => bench.idle.set_requested(1),
                 500 => {
                     let other = ArmState {
                         dof: 7,
@@ -181,7 +188,7 @@ fn a_thousand_cycles_with_requests_and_a_fault_allocate_nothing() {
                     };
                     bench.plant.publish(&other).expect("published");
                 }
-                // Two cycles are left out: a fault, with words.
+                // Missing cycles: a fault with its text.
                 900 => bench.cycle += 3,
                 _ => {}
             }
@@ -190,13 +197,13 @@ fn a_thousand_cycles_with_requests_and_a_fault_allocate_nothing() {
             }
             bench.cycle(Drives::Active);
             if k % 50 == 0 {
-                while bench.outside.telemetry().is_some() {}
+                while bench.helper_queues.telemetry().is_some() {}
             }
         }
     });
     assert_eq!(allocations, 0);
     bench.announce();
-    let last = bench.telemetry().pop().expect("some");
+    let last = bench.telemetry().pop().expect("some").record();
     assert!(
         last.fault_text.as_str().contains("no new arm state"),
         "{last:?}"
@@ -207,9 +214,9 @@ fn a_thousand_cycles_with_requests_and_a_fault_allocate_nothing() {
 }
 
 #[test]
-fn a_loop_that_lags_steps_over_every_state_and_answers_the_newest() {
+fn late_loop_steps_through_every_state_and_answers_the_newest() {
     let mut bench = bench(false);
-    bench.ask(&Request::GravityHold, None);
+    bench.request(&Request::GravityHold, None);
     bench.cycle(Drives::Active);
     for _ in 0..9 {
         bench
@@ -226,39 +233,39 @@ fn a_loop_that_lags_steps_over_every_state_and_answers_the_newest() {
 }
 
 #[test]
-fn a_plant_that_falls_silent_is_found_stale_and_torques_stay_gravity() {
+fn missing_states_fault_as_stale_and_torques_stay_gravity() {
     let mut bench = bench(false);
-    bench.ask(&Request::GravityHold, None);
+    bench.request(&Request::GravityHold, None);
     bench.cycle(Drives::Active);
     for _ in 0..3 {
         assert!(
             bench
                 .control
-                .turn(&bench.link, &bench.stop)
-                .expect("a turn")
+                .run_iteration(&bench.link, &bench.stop)
+                .expect("an iteration")
         );
     }
-    let last = bench.telemetry().pop().expect("some");
+    let last = bench.telemetry().pop().expect("some").record();
     assert_eq!(last.mode(), Some(Mode::Fault));
     assert!(
         last.fault_text.as_str().contains("no new arm state"),
         "{last:?}"
     );
-    assert_eq!(last.terms.damping, [0.0; 7]);
-    assert_eq!(last.terms.joint_pd, [0.0; 7]);
+    assert_eq!(last.torques.damping.as_slice(), [0.0; 7]);
+    assert_eq!(last.torques.joint_pd.as_slice(), [0.0; 7]);
 }
 
 #[test]
-fn in_virtual_time_silence_means_nothing() {
+fn in_virtual_time_missing_states_cause_no_step() {
     let mut bench = bench(true);
-    bench.ask(&Request::GravityHold, None);
+    bench.request(&Request::GravityHold, None);
     bench.cycle(Drives::Active);
     for _ in 0..3 {
         assert!(
             bench
                 .control
-                .turn(&bench.link, &bench.stop)
-                .expect("a turn")
+                .run_iteration(&bench.link, &bench.stop)
+                .expect("an iteration")
         );
     }
     assert_eq!(bench.telemetry().len(), 1);
@@ -267,27 +274,24 @@ fn in_virtual_time_silence_means_nothing() {
 }
 
 #[test]
-fn what_waits_is_dropped_when_the_arm_is_let_go_of_or_a_fault_comes() {
+fn queued_requests_are_refused_on_idle_or_fault() {
     for by_fault in [false, true] {
         let mut bench = bench(true);
-        bench.ask(&Request::GravityHold, None);
-        bench.ask(&Request::GravityHold, Some(100));
+        bench.request(&Request::GravityHold, None);
+        bench.request(&Request::GravityHold, Some(100));
         bench.cycle(Drives::Active);
         match by_fault {
             true => bench.cycle += 5,
-            false => bench.ask(&Request::Idle, None),
+            false => bench.request(&Request::Idle, None),
         }
         bench.cycle(Drives::Active);
         let replies = bench.replies();
         let dropped = replies
             .iter()
             .find(|r| r.sequence == 2 && r.outcome() == Outcome::Refused);
-        let words = dropped.expect("dropped").text;
+        let text = dropped.expect("dropped").text;
         let mode = if by_fault { "fault" } else { "idle" };
-        assert!(
-            words.as_str().contains(&format!("to mode {mode}")),
-            "{words}"
-        );
+        assert!(text.as_str().contains(&format!("to mode {mode}")), "{text}");
         bench.cycle = 100;
         bench.cycle(Drives::Active);
         assert!(bench.replies().iter().all(|r| r.sequence != 2));
@@ -295,10 +299,10 @@ fn what_waits_is_dropped_when_the_arm_is_let_go_of_or_a_fault_comes() {
 }
 
 #[test]
-fn a_request_for_another_arm_is_refused_in_words() {
+fn request_for_another_arm_is_refused_with_a_text() {
     let mut bench = bench(true);
     let message = OperatorRequest::new::<7>(1, 9, None, &Request::GravityHold);
-    assert!(bench.outside.request(message));
+    assert!(bench.helper_queues.request(message));
     let (answer, _) = bench.cycle(Drives::Active);
     assert_eq!(answer.mode(), Some(Mode::Idle));
     let reply = bench.replies().pop().expect("a reply");
@@ -307,12 +311,12 @@ fn a_request_for_another_arm_is_refused_in_words() {
 }
 
 #[test]
-fn it_leaves_from_gravity_hold_when_the_drives_are_idle() {
+fn shutdown_ends_when_the_drives_are_idle() {
     let mut bench = bench(false);
-    bench.ask(&Request::GravityHold, None);
+    bench.request(&Request::GravityHold, None);
     let (answer, goes_on) = bench.cycle(Drives::Active);
     assert!(answer.wants_torque() && goes_on);
-    bench.stop.ask();
+    bench.stop.request_shutdown();
     for _ in 0..3 {
         let (answer, goes_on) = bench.cycle(Drives::Active);
         assert_eq!(answer.mode(), Some(Mode::GravityHold));
@@ -327,16 +331,21 @@ fn it_leaves_from_gravity_hold_when_the_drives_are_idle() {
 }
 
 #[test]
-fn it_leaves_a_plant_that_does_not_lower_its_drives_and_one_that_is_gone() {
+fn shutdown_times_out_if_the_drives_stay_active_or_the_plant_is_gone() {
     let mut stubborn = bench(false);
-    stubborn.ask(&Request::GravityHold, None);
+    stubborn.request(&Request::GravityHold, None);
     stubborn.cycle(Drives::Active);
-    stubborn.stop.ask();
+    stubborn.stop.request_shutdown();
     let left = (0..1000).position(|_| !stubborn.cycle(Drives::Active).1);
     assert_eq!(left, Some(249));
     let mut gone = bench(false);
     gone.cycle(Drives::Active);
-    gone.stop.ask();
-    let left = (0..100).position(|_| !gone.control.turn(&gone.link, &gone.stop).expect("a turn"));
+    gone.stop.request_shutdown();
+    let left = (0..100).position(|_| {
+        !gone
+            .control
+            .run_iteration(&gone.link, &gone.stop)
+            .expect("an iteration")
+    });
     assert_eq!(left, Some(12));
 }

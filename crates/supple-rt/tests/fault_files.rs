@@ -1,15 +1,16 @@
-//! The last cycles before a fault: whoever tells of them waits for no disk, and old tables go.
+//! The last cycles before a fault: recording never waits for the disk, and old tables are deleted.
 
 use core::time::Duration;
 use std::fs;
 use std::sync::mpsc::sync_channel;
+use supple_core::controller::CycleRecord;
 use supple_core::math::Vector3;
 use supple_core::{Controller, Input, State, step};
 use supple_ipc::message::{ArmState, CycleTiming, Drives, PlantReport, Telemetry};
 use supple_model::Description;
-use supple_rt::{FaultFiles, KEPT_FILES, LastCycles};
+use supple_rt::{FaultFiles, FaultRecorder, KEPT_FILES};
 
-/// The telemetry of one cycle, in which a fault is latched or not.
+/// Telemetry of one cycle, with or without a latched fault.
 fn telemetry(step_number: u64, fault: u8) -> Telemetry {
     let description = Description::asset("wam4").expect("built in");
     let controller: Controller<4> =
@@ -31,15 +32,16 @@ fn telemetry(step_number: u64, fault: u8) -> Telemetry {
         Drives::Active,
         PlantReport::default(),
     );
-    Telemetry {
+    let record = CycleRecord {
         fault,
-        ..Telemetry::new(step_number, &state, &input, &output, CycleTiming::default())
-    }
+        ..CycleRecord::new(step_number, &input, &output)
+    };
+    Telemetry::of(&record, &state, CycleTiming::default())
 }
 
-/// A disk that does not come back for as long as the test likes.
+/// The disk is blocked for as long as the test needs.
 #[test]
-fn a_disk_that_hangs_holds_up_nobody_and_what_finds_no_room_is_counted() {
+fn hanging_disk_blocks_nothing_and_dropped_tables_are_counted() {
     let folder = tempfile::tempdir().expect("a folder");
     let faults = folder.path().join("faults");
     let files = FaultFiles::start(faults.clone()).expect("a thread");
@@ -50,13 +52,13 @@ fn a_disk_that_hangs_holds_up_nobody_and_what_finds_no_room_is_counted() {
         gate.recv().expect("the test opens");
     }));
     has_begun.recv().expect("it begins");
-    let mut last = LastCycles::new(files);
-    let (calm, fault) = (telemetry(0, 0), telemetry(0, 1));
+    let mut last = FaultRecorder::new(files);
+    let calm = telemetry(0, 0);
     for step in 0..5 {
-        last.add(&Telemetry { step, ..fault });
+        last.add(&telemetry(step, 1));
         last.add(&calm);
     }
-    // Five faults were told of; two tables wait for the disk.
+    // Five faults were recorded; two tables wait for the disk.
     assert_eq!(last.files().dropped(), 3);
     assert!(!faults.exists());
     open.send(()).expect("the disk hangs");
@@ -66,7 +68,7 @@ fn a_disk_that_hangs_holds_up_nobody_and_what_finds_no_room_is_counted() {
 }
 
 #[test]
-fn the_newest_tables_are_kept_and_nothing_else_is_touched() {
+fn only_the_newest_tables_and_other_files_are_kept() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path();
     for step in 0..30 {
@@ -77,7 +79,7 @@ fn the_newest_tables_are_kept_and_nothing_else_is_touched() {
         fs::write(path.join(other), "kept").expect("written");
     }
     let files = FaultFiles::start(path.to_owned()).expect("a thread");
-    let mut last = LastCycles::new(files);
+    let mut last = FaultRecorder::new(files);
     last.add(&telemetry(77, 1));
     last.finish(Duration::from_secs(60));
     let mut names: Vec<String> = fs::read_dir(path)

@@ -1,4 +1,4 @@
-//! The real program under a service manager that the test plays: a datagram socket.
+//! The real program under a simulated service manager: a datagram socket.
 
 use rustix::process::{Pid, Signal, kill_process};
 use std::os::unix::fs::PermissionsExt;
@@ -7,8 +7,8 @@ use std::process::{Child, Command, Stdio};
 use supple_core::Controller;
 use supple_ipc::{ControllerLink, Domain};
 use supple_model::Description;
-use supple_realtime::{Stop, Watch};
-use supple_rt::{ControlLoop, rings};
+use supple_realtime::{LivenessMonitor, Stop};
+use supple_rt::{ControlLoop, loop_queues};
 use tempfile::TempDir;
 
 struct Manager {
@@ -40,16 +40,16 @@ impl Manager {
     fn next(&self) -> String {
         let mut buffer = [0; 256];
         let bytes = self.socket.recv(&mut buffer).expect("a message");
-        String::from_utf8(buffer[..bytes].to_vec()).expect("words")
+        String::from_utf8(buffer[..bytes].to_vec()).expect("text")
     }
 }
 
 #[test]
-fn start_life_and_end_are_told_to_the_service_manager() {
+fn service_manager_gets_ready_watchdog_and_stopping() {
     let manager = manager();
     let mut child = manager.start("100000");
     assert_eq!(manager.next(), "READY=1\n");
-    // No plant is there: waiting for one is being alive.
+    // There is no plant: a loop that waits for one is alive.
     for _ in 0..3 {
         assert_eq!(manager.next(), "WATCHDOG=1\n");
     }
@@ -62,29 +62,31 @@ fn start_life_and_end_are_told_to_the_service_manager() {
 }
 
 #[test]
-fn a_wrong_time_of_the_watchdog_is_refused_before_anything_moves() {
+fn invalid_watchdog_time_is_refused_at_start() {
     let manager = manager();
     let output = manager.start("soon").wait_with_output().expect("it ends");
-    let words = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(1), "{words}");
-    assert!(words.contains("WATCHDOG_USEC is `soon`"), "{words}");
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{text}");
+    assert!(text.contains("WATCHDOG_USEC is `soon`"), "{text}");
 }
 
-/// What the watch looks at is what the loop does: one turn, one count, and none without a turn.
+/// The liveness counter follows the loop: one count per iteration, none without.
 #[test]
-fn a_loop_that_does_not_turn_gives_no_sign_of_life() {
+fn stalled_loop_sends_no_watchdog_message() {
     let folder = tempfile::tempdir().expect("a folder");
-    let domain = Domain::within(&folder.path().join("run"), "heartbeat").expect("a domain");
+    let domain = Domain::in_folder(&folder.path().join("run"), "heartbeat").expect("a domain");
     let link = ControllerLink::new(&domain).expect("a controller");
     let description = Description::asset("wam4").expect("built in");
     let config = description.config::<4>().expect("sound");
-    let (inside, _outside) = rings();
-    let pulse = inside.pulse();
-    let mut watch = Watch::new(&[pulse]);
+    let (queues, _helper_queues) = loop_queues();
+    let liveness = queues.liveness();
+    let mut monitor = LivenessMonitor::new(&[liveness]);
     let controller = Controller::new(config).expect("sound");
-    let mut control = ControlLoop::new(controller, inside, true);
-    assert!(!watch.moved_on());
-    control.turn(&link, &Stop::default()).expect("a turn");
-    assert!(watch.moved_on());
-    assert!(!watch.moved_on());
+    let mut control = ControlLoop::new(controller, queues, true);
+    assert!(!monitor.all_advanced());
+    control
+        .run_iteration(&link, &Stop::default())
+        .expect("an iteration");
+    assert!(monitor.all_advanced());
+    assert!(!monitor.all_advanced());
 }

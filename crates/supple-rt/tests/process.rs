@@ -8,7 +8,7 @@ use std::process::{Child, Command, Output, Stdio};
 use supple_core::controller::{Mode, Request};
 use supple_core::{Controller, Input, State, step};
 use supple_ipc::message::{ArmState, Drives, Outcome, PlantReport, TorqueCommand};
-use supple_ipc::{Domain, Operator, PlantLink, TelemetryReader, pause};
+use supple_ipc::{Domain, OperatorClient, PlantLink, TelemetryReader, pause};
 use supple_model::Description;
 use tempfile::TempDir;
 
@@ -23,7 +23,7 @@ fn system() -> System {
     let folder = tempfile::tempdir().expect("a folder");
     let owner = std::fs::Permissions::from_mode(0o700);
     std::fs::set_permissions(folder.path(), owner).expect("changed");
-    let domain = Domain::within(&folder.path().join("supple"), "process").expect("a domain");
+    let domain = Domain::in_folder(&folder.path().join("supple"), "process").expect("a domain");
     System { folder, domain }
 }
 
@@ -58,7 +58,7 @@ fn state(cycle: u64) -> ArmState {
     )
 }
 
-/// Publishes until somebody is there to read.
+/// Publishes until a controller is connected.
 fn publish(plant: &PlantLink, state: &ArmState) {
     for _ in 0..20_000 {
         if plant.publish(state).expect("published") {
@@ -75,15 +75,15 @@ fn terminate(child: &Child) {
     kill_process(process, Signal::TERM).expect("it runs");
 }
 
-fn words(output: &Output) -> String {
+fn text(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
 #[test]
-fn it_answers_as_step_does() {
+fn answers_equal_those_of_step() {
     let system = system();
     let mut telemetry = TelemetryReader::new(&system.domain).expect("a reader");
-    let mut operator = Operator::new(&system.domain).expect("an operator");
+    let mut operator = OperatorClient::new(&system.domain).expect("an operator");
     let plant = PlantLink::new(&system.domain).expect("a plant");
     let mut child = system.start(&["--virtual-time"]);
     let sequence = loop {
@@ -95,14 +95,14 @@ fn it_answers_as_step_does() {
         }
         pause(Duration::from_millis(1));
     };
-    // The request is in the helper's hands before the first state is there.
+    // Leaves the helper time to receive the request before the first state.
     pause(Duration::from_millis(50));
     let description = Description::asset("wam4").expect("built in");
     let controller = Controller::new(description.config::<4>().expect("sound")).expect("sound");
     let mut reference = State::new(&controller);
     for cycle in 0..20 {
         publish(&plant, &state(cycle));
-        let heard = plant.answer(cycle, SOON).expect("read");
+        let received = plant.answer(cycle, SOON).expect("read");
         let input = Input {
             cycle,
             position_rad: home(),
@@ -111,10 +111,10 @@ fn it_answers_as_step_does() {
             request: (cycle == 2).then_some(Request::GravityHold),
         };
         let output = step(&controller, &mut reference, &input);
-        assert_eq!(heard.answer, Some(TorqueCommand::new(&output, false)));
+        assert_eq!(received.answer, Some(TorqueCommand::new(&output, false)));
     }
-    let told = telemetry.wait(SOON).expect("read").expect("some");
-    assert_eq!((told.step, told.mode()), (0, Some(Mode::Idle)));
+    let first = telemetry.wait(SOON).expect("read").expect("some");
+    assert_eq!((first.step(), first.record().mode()), (0, Some(Mode::Idle)));
     let reply = || -> (u64, Outcome) {
         for _ in 0..5000 {
             if let Some(reply) = operator.receive().expect("read") {
@@ -131,23 +131,23 @@ fn it_answers_as_step_does() {
 }
 
 #[test]
-fn a_fault_leaves_the_last_cycles_on_the_disk_for_the_owner_alone() {
+fn fault_writes_last_cycles_to_a_file_that_only_the_owner_can_read() {
     let system = system();
     let plant = PlantLink::new(&system.domain).expect("a plant");
     let child = system.start(&["--virtual-time"]);
-    // From 5 to 9: states are missing.
+    // States 6 to 8 are missing.
     for cycle in [0, 1, 2, 3, 4, 5, 9, 10] {
         publish(&plant, &state(cycle));
         assert!(plant.answer(cycle, SOON).expect("read").answer.is_some());
     }
     terminate(&child);
     let output = child.wait_with_output().expect("it ends");
-    // A signal in the middle of a wait is the order to leave, not an error.
-    assert_eq!(output.status.code(), Some(0), "{}", words(&output));
+    // A signal during a wait requests shutdown and is not an error.
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output));
     assert!(
-        words(&output).contains("no new arm state for 3 cycles"),
+        text(&output).contains("no new arm state for 3 cycles"),
         "{}",
-        words(&output)
+        text(&output)
     );
     let folder = system.domain.folder().join("faults");
     let files: Vec<_> = std::fs::read_dir(&folder)
@@ -156,7 +156,7 @@ fn a_fault_leaves_the_last_cycles_on_the_disk_for_the_owner_alone() {
         .collect();
     assert_eq!(files.len(), 1);
     let path = files[0].path();
-    assert!(words(&output).contains(&path.display().to_string()));
+    assert!(text(&output).contains(&path.display().to_string()));
     let mode = |path: &Path| path.metadata().expect("it is there").permissions().mode() & 0o777;
     assert_eq!((mode(&folder), mode(&path)), (0o700, 0o600));
     let table = std::fs::read_to_string(&path).expect("readable");
@@ -177,9 +177,9 @@ fn a_fault_leaves_the_last_cycles_on_the_disk_for_the_owner_alone() {
             .expect("there")
     };
     assert_eq!(rows[7][column("cycle")], "9");
-    assert_eq!(rows[7][column("mode")], "fault");
+    assert_eq!(rows[7][column("mode")], (Mode::Fault as u8).to_string());
     let home = home()[1].expect("there").to_string();
-    assert_eq!(rows[1][column("measured_position_rad_1")], home);
+    assert_eq!(rows[1][column("measured_position_rad.1")], home);
 }
 
 #[test]
@@ -190,15 +190,15 @@ fn a_second_controller_is_refused_with_the_reason() {
     publish(&plant, &state(0));
     let second = system.start(&["--virtual-time"]);
     let output = second.wait_with_output().expect("it ends");
-    assert_eq!(output.status.code(), Some(10), "{}", words(&output));
+    assert_eq!(output.status.code(), Some(10), "{}", text(&output));
     assert!(
-        words(&output).contains("has its writer already"),
+        text(&output).contains("another process already writes"),
         "{}",
-        words(&output)
+        text(&output)
     );
     first.kill().expect("SIGKILL");
     first.wait().expect("it is gone");
-    // The next one takes the place of the killed one.
+    // A new controller replaces the killed one.
     let mut third = system.start(&["--virtual-time"]);
     let mut cycle = 1;
     while plant
@@ -216,9 +216,9 @@ fn a_second_controller_is_refused_with_the_reason() {
 }
 
 #[test]
-fn a_wrong_arm_is_code_3() {
+fn unknown_arm_exits_with_code_3() {
     let output = system().start(&["--arm", "wam9"]).wait_with_output();
     let output = output.expect("it ends");
     assert_eq!(output.status.code(), Some(3));
-    assert!(words(&output).contains("wam9"), "{}", words(&output));
+    assert!(text(&output).contains("wam9"), "{}", text(&output));
 }

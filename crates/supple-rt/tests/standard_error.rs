@@ -1,4 +1,4 @@
-//! The real program with a standard error that nobody reads: full, or closed.
+//! The real program with a standard error that has no reader: full, or closed.
 
 use core::time::Duration;
 use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
@@ -7,18 +7,19 @@ use std::io::{PipeReader, PipeWriter, Write, pipe};
 use std::process::{Child, Command, Stdio};
 use supple_core::controller::{Mode, Request};
 use supple_ipc::message::{ArmState, Drives, Outcome, PlantReport};
-use supple_ipc::{Domain, IdleAnswer, Operator, PlantLink, ask_for_idle, pause};
+use supple_ipc::{Domain, IdleAnswer, OperatorClient, PlantLink, pause, request_idle};
 use supple_model::Description;
 use tempfile::TempDir;
 
-/// Period of the scripted plant: longer than the arm's, so that cycles count and not the machine's load.
+/// Period of the scripted plant: longer than the arm's, so that the result depends on cycles and not on the load of the
+/// machine.
 const PERIOD: Duration = Duration::from_millis(2);
-/// Cycles in which idle is to be heard.
-const HEARD_WITHIN: u64 = 20;
-/// Whoever is held up is so each time; a machine that is busy is not.
+/// Maximum number of cycles until an idle request is answered.
+const MAX_CYCLES_TO_IDLE: u64 = 20;
+/// A blocked process fails every attempt, a busy machine does not.
 const ATTEMPTS: u32 = 5;
 
-/// A pipe with no room left.
+/// A full pipe.
 fn full() -> (PipeReader, PipeWriter) {
     let (reader, mut writer) = pipe().expect("a pipe");
     let flags = fcntl_getfl(&writer).expect("flags");
@@ -40,7 +41,7 @@ struct Bench {
 impl Bench {
     fn start(stderr: PipeWriter) -> Bench {
         let folder = tempfile::tempdir().expect("a folder");
-        let domain = Domain::within(&folder.path().join("supple"), "stderr").expect("a domain");
+        let domain = Domain::in_folder(&folder.path().join("supple"), "stderr").expect("a domain");
         let plant = PlantLink::new(&domain).expect("a plant");
         let child = Command::new(env!("CARGO_BIN_EXE_supple-rt"))
             .args(["--prefix", "stderr", "--no-realtime"])
@@ -58,7 +59,7 @@ impl Bench {
         }
     }
 
-    /// A cycle; the mode that the controller answers with.
+    /// Runs a cycle; returns the mode in the controller's answer.
     fn cycle(&mut self) -> Option<Mode> {
         let home = Description::asset("wam4").expect("built in").home::<4>();
         let home = home.expect("four joints");
@@ -66,10 +67,10 @@ impl Bench {
         let report = PlantReport::default();
         let state = ArmState::new(self.cycle, 0, &position, None, Drives::Active, report);
         self.plant.publish(&state).expect("published");
-        let heard = self.plant.answer(self.cycle, PERIOD).expect("read");
+        let received = self.plant.answer(self.cycle, PERIOD).expect("read");
         self.cycle += 1;
         pause(PERIOD);
-        heard.answer.and_then(|answer| answer.mode())
+        received.answer.and_then(|answer| answer.mode())
     }
 
     fn until(&mut self, mode: Mode) {
@@ -81,22 +82,22 @@ impl Bench {
         panic!("mode {} did not come", mode.name());
     }
 
-    /// Asks for idle while the plant goes on; the answer, and the cycles that it took.
+    /// Requests idle while the plant runs; returns the answer and the number of cycles until it.
     fn idle(&mut self) -> (IdleAnswer, u64) {
         let domain = self.domain.clone();
-        let asked = self.cycle;
-        let asker = std::thread::spawn(move || ask_for_idle(&domain, Duration::from_secs(30)));
-        while !asker.is_finished() {
+        let requested_at = self.cycle;
+        let client = std::thread::spawn(move || request_idle(&domain, Duration::from_secs(30)));
+        while !client.is_finished() {
             self.cycle();
         }
-        let answer = asker.join().expect("no panic").expect("asked");
+        let answer = client.join().expect("no panic").expect("requested");
         let answer = answer.expect("an answer");
-        let took = answer.cycle.saturating_sub(asked);
+        let took = answer.cycle.saturating_sub(requested_at);
         (answer, took)
     }
 
-    fn hold(&mut self, operator: &mut Operator) {
-        // Where there is no controller yet, there is nobody to send to.
+    fn hold(&mut self, operator: &mut OperatorClient) {
+        // Without a controller, `send` returns `None`.
         while operator
             .send::<4>(&Request::GravityHold, None)
             .expect("sent")
@@ -107,8 +108,8 @@ impl Bench {
         self.until(Mode::GravityHold);
     }
 
-    fn all_of_it(mut self) {
-        let mut operator = Operator::new(&self.domain).expect("an operator");
+    fn run(mut self) {
+        let mut operator = OperatorClient::new(&self.domain).expect("an operator");
         let mut quickest = u64::MAX;
         for _ in 0..ATTEMPTS {
             self.hold(&mut operator);
@@ -116,16 +117,16 @@ impl Bench {
             assert_eq!(answer.outcome, Outcome::Accepted);
             assert_eq!(answer.mode, Some(Mode::Idle));
             quickest = quickest.min(took);
-            if quickest <= HEARD_WITHIN {
+            if quickest <= MAX_CYCLES_TO_IDLE {
                 break;
             }
         }
-        assert!(quickest <= HEARD_WITHIN, "{quickest} cycles");
+        assert!(quickest <= MAX_CYCLES_TO_IDLE, "{quickest} cycles");
         self.hold(&mut operator);
-        // States are missing: a fault, with words for standard error.
+        // Missing states cause a fault, which writes to standard error.
         self.cycle += 10;
         self.until(Mode::Fault);
-        // Whoever writes them has had the time to be held up.
+        // Leaves the writing thread time to block.
         for _ in 0..50 {
             self.cycle();
         }
@@ -145,14 +146,14 @@ impl Bench {
 }
 
 #[test]
-fn a_standard_error_that_is_full_holds_up_neither_requests_nor_the_end() {
+fn full_standard_error_delays_neither_requests_nor_shutdown() {
     let (_reader, writer) = full();
-    Bench::start(writer).all_of_it();
+    Bench::start(writer).run();
 }
 
 #[test]
-fn a_standard_error_that_is_closed_ends_nobody() {
+fn closed_standard_error_does_not_end_the_process() {
     let (reader, writer) = pipe().expect("a pipe");
     drop(reader);
-    Bench::start(writer).all_of_it();
+    Bench::start(writer).run();
 }

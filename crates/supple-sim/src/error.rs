@@ -1,4 +1,4 @@
-//! Why the simulation's process ends.
+//! Errors of the simulation process.
 
 use supple_ipc::IpcError;
 use supple_ipc::message::MessageError;
@@ -6,7 +6,7 @@ use supple_model::ModelError;
 use supple_plant::{InjectionError, PlantError, TraceError};
 use supple_realtime::StopError;
 
-/// Why the process cannot start, or cannot go on.
+/// Why the process cannot start or continue.
 #[derive(Debug, thiserror::Error)]
 pub enum SimError {
     /// The description of the arm.
@@ -15,10 +15,10 @@ pub enum SimError {
     /// The plant.
     #[error("the plant: {0}")]
     Plant(#[from] PlantError),
-    /// A fault to be put into the arm.
+    /// An invalid fault injection.
     #[error("--inject: {0}")]
     Injection(#[from] InjectionError),
-    /// A file of the trace.
+    /// The trace file.
     #[error(transparent)]
     Trace(#[from] TraceError),
     /// Shared memory.
@@ -33,7 +33,8 @@ pub enum SimError {
 }
 
 impl SimError {
-    /// Exit code, as the command line has them: 2 wrong use, 3 a wrong arm, 6 a file, 10 shared memory, 1 the system.
+    /// Exit code, as documented for the command line: 2 wrong use, 3 invalid arm, 6 file error, 10 shared memory, 1
+    /// system error.
     pub fn code(&self) -> u8 {
         match self {
             SimError::Injection(_) => 2,

@@ -1,21 +1,21 @@
-//! The simulated arm in the place of a real one: same messages, same clock, no bus.
+//! The simulated arm as a process: same messages and clock as a real one, no bus.
 //!
-//! It owns the clock. By the wall clock each cycle begins at its time, whatever the controller does, and the
-//! arm's time stands still while the machine holds up this process; an answer that does not come is met as
-//! the arm's own side would ([`Motors`]). In virtual time each cycle waits for its answer, so that the same
-//! controller gives the same bits, as fast as both can.
+//! It owns the clock. In real time each cycle starts at its scheduled time, whatever the controller does; when the host
+//! stalls, simulated time pauses; a missing answer is handled as the drives of a real arm would ([`Motors`]). In
+//! virtual time each cycle waits for its answer, so results are reproducible bit for bit and the run is as fast as both
+//! processes allow.
 //!
-//! It knows no controller: what it sends is what an arm reports, what it takes is torques.
+//! It does not depend on the controller: it sends what an arm reports, and receives torques.
 
 mod error;
 mod motors;
 mod options;
-mod world;
+mod simulation_loop;
 
 pub use error::SimError;
 pub use motors::Motors;
 pub use options::Options;
-pub use world::{Summary, World};
+pub use simulation_loop::{SimulationLoop, Summary};
 
 use clap::Parser;
 use std::process::ExitCode;
@@ -23,24 +23,24 @@ use supple_core::drive_guard::DriveGuard;
 use supple_ipc::{Domain, PlantLink};
 use supple_model::{Description, with_dof};
 use supple_plant::{Plant, PlantConfig, Scene, TraceFile};
-use supple_realtime::{Stop, diagnostics, die_with_parent, enter, spin_for};
+use supple_realtime::{Stop, apply_realtime_settings, diagnostics, die_with_parent, spin_duration};
 
-/// The whole program, from its arguments to its exit code.
+/// Runs the program: parses the arguments and returns the exit code.
 pub fn main() -> ExitCode {
     let options = Options::parse();
     diagnostics::start();
     let stop = match Stop::on_signals() {
         Ok(stop) => stop,
-        Err(error) => return complain(&error.into()),
+        Err(error) => return report_error(&error.into()),
     };
     if options.supervised() {
         die_with_parent();
     }
     let description = match options.description() {
         Ok(description) => description,
-        Err(error) => return complain(&error.into()),
+        Err(error) => return report_error(&error.into()),
     };
-    // Who supervises has said them.
+    // The supervising process has already printed the warnings.
     for warning in description
         .warnings()
         .iter()
@@ -55,20 +55,20 @@ pub fn main() -> ExitCode {
             diagnostics::flush();
             ExitCode::SUCCESS
         }
-        Err(error) => complain(&error),
+        Err(error) => report_error(&error),
     }
 }
 
-fn complain(error: &SimError) -> ExitCode {
+fn report_error(error: &SimError) -> ExitCode {
     diagnostics::post(format_args!("supple-sim: error: {error}"));
     diagnostics::flush();
     ExitCode::from(error.code())
 }
 
-/// Runs until it is asked to end, or for as many cycles as the options say.
+/// Runs until shutdown is requested, or for the number of cycles in the options.
 ///
 /// # Errors
-/// [`SimError`]: an arm that is not sound, shared memory that cannot be used.
+/// [`SimError`]: an invalid arm, shared memory that cannot be used.
 pub fn run<const N: usize>(
     description: &Description,
     options: &Options,
@@ -76,26 +76,26 @@ pub fn run<const N: usize>(
 ) -> Result<Summary, SimError> {
     let mut config = PlantConfig::<N>::from_description(description)?;
     if let Some(face_m) = options.block_m {
-        config.scene = Scene::beneath(face_m);
+        config.scene = Scene::with_block_at(face_m);
     }
     let home_rad = description.home::<N>()?;
     let motors = Motors::new(config.cycle_s, DriveGuard::new(&description.config()?));
     let plant = Plant::new(config, home_rad, supple_core::Vector::zeros())?;
     let domain = Domain::new(options.prefix.as_deref())?;
     let link = PlantLink::new(&domain)?;
-    let mut world = World::new(plant, motors, link);
-    world.inject(&options.inject)?;
+    let mut simulation = SimulationLoop::new(plant, motors, link);
+    simulation.inject(&options.inject)?;
     if let Some(file) = &options.trace {
-        world.trace(TraceFile::create(file, N)?);
+        simulation.trace(TraceFile::create(file, N)?);
     }
-    for shortfall in enter(&options.realtime()) {
-        diagnostics::post(format_args!("supple-sim: warning: {shortfall}"));
+    for realtime_warning in apply_realtime_settings(&options.realtime()) {
+        diagnostics::post(format_args!("supple-sim: warning: {realtime_warning}"));
     }
-    world.spin(spin_for(options.spin_us));
+    simulation.spin(spin_duration(options.spin_us));
     let ran = match options.virtual_time {
-        true => world.run_in_virtual_time(options.cycles, stop),
-        false => world.run_by_the_clock(options.cycles, options.answer_share, stop),
+        true => simulation.run_in_virtual_time(options.cycles, stop),
+        false => simulation.run_in_real_time(options.cycles, options.answer_share, stop),
     };
     let summary = ran?;
-    world.end_trace().map(|()| summary)
+    simulation.end_trace().map(|()| summary)
 }

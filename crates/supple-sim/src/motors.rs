@@ -1,51 +1,51 @@
-//! What the motors' own side does with answers that come, and with those that do not.
+//! Behaviour of the drives with and without answers from the controller.
 //!
 //! ```text
 //! idle  --torque is wanted, in gravity hold-->  active  --no torque is wanted-->  idle
 //! active  --no answer for 100 ms, or the guard's judgement-->  idle, until an answer says that no torque is wanted
 //! ```
 //!
-//! While answers are missing, the fallback torque of the last one acts. In idle the motors are shorted and brake
-//! ([`supple_plant::Drive`]). Nobody has to press a button here: where a real arm waits for its operator, this one is
-//! active as soon as a controller in gravity hold wants torque, but after a loss only once a controller has been
-//! idle. Every torque passes [`DriveGuard`]: limits, rates, and an end where the arm does not stop in a fault.
+//! While answers are missing, the fallback torque of the last answer acts. In idle the motors are shorted and brake
+//! ([`supple_plant::ActuatorModel`]). No operator is needed: the simulated drives become active as soon as a controller
+//! in gravity hold requests torque; after a loss only once a controller has been idle. Every torque passes
+//! [`DriveGuard`], which limits torques and rates, and removes torque if the arm does not stop in a fault.
 
 use supple_core::Vector;
 use supple_core::controller::Mode;
 use supple_core::drive_guard::{DriveCommand, DriveGuard, GuardReason};
 use supple_ipc::message::{Drives, MessageError, TorqueCommand};
 
-/// Longest time that the fallback torque acts \[s\].
+/// Maximum time for which the fallback torque acts \[s\].
 const FALLBACK_S: f64 = 0.1;
 
-/// The motors of an arm.
+/// The simulated drives of an arm.
 #[derive(Clone, Debug)]
 pub struct Motors<const N: usize> {
     guard: DriveGuard<N>,
     fallback_cycles: u32,
     active: bool,
-    /// Idle after a loss: only an idle controller undoes it.
-    lost: bool,
+    /// Idle after a loss; latched until the controller requests no torque.
+    latched_idle: bool,
     missed_in_a_row: u32,
     fallback_nm: Vector<N>,
-    ended_by: Option<GuardReason>,
+    last_guard_reason: Option<GuardReason>,
 }
 
 impl<const N: usize> Motors<N> {
-    /// Idle.
+    /// Creates idle drives.
     pub fn new(cycle_s: f64, guard: DriveGuard<N>) -> Self {
         Motors {
             guard,
             fallback_cycles: (FALLBACK_S / cycle_s).floor() as u32,
             active: false,
-            lost: false,
+            latched_idle: false,
             missed_in_a_row: 0,
             fallback_nm: Vector::zeros(),
-            ended_by: None,
+            last_guard_reason: None,
         }
     }
 
-    /// What they do.
+    /// Drive state.
     pub fn drives(&self) -> Drives {
         if self.active {
             Drives::Active
@@ -54,18 +54,19 @@ impl<const N: usize> Motors<N> {
         }
     }
 
-    /// Somebody lowers them; they come back as from any rest, with a torque that is wanted in gravity hold.
-    pub fn lower(&mut self) {
+    /// Switches the drives to idle from outside. They become active again when a controller in gravity hold requests
+    /// torque.
+    pub fn switch_to_idle(&mut self) {
         self.active = false;
     }
 
-    /// Why the guard last ended torque.
-    pub fn ended_by(&self) -> Option<GuardReason> {
-        self.ended_by
+    /// Reason for which the guard last removed torque.
+    pub fn last_guard_reason(&self) -> Option<GuardReason> {
+        self.last_guard_reason
     }
 
-    /// The torque of a cycle \[N m\] at the angles that were measured in it \[rad\]: that of its answer, or what is
-    /// done without one; zero in idle. An answer that is not finite counts as none.
+    /// Returns the torque of a cycle \[N m\] for the angles measured in it \[rad\]: the torque of its answer, or the
+    /// fallback without one; zero in idle. An answer that is not finite counts as missing.
     ///
     /// # Errors
     /// [`MessageError::Dof`]: the answer is for another arm.
@@ -74,17 +75,17 @@ impl<const N: usize> Motors<N> {
         position_rad: &[Option<f64>; N],
         answer: Option<&TorqueCommand>,
     ) -> Result<Vector<N>, MessageError> {
-        self.guard.observe(position_rad);
+        self.guard.observe(position_rad, 1);
         let command = answer.map(Command::<N>::read).transpose()?.flatten();
         if let Some(command) = &command {
             self.missed_in_a_row = 0;
             self.fallback_nm = command.fallback_nm;
-            self.lost &= command.wanted;
+            self.latched_idle &= command.wanted;
             let resting = command.drive.mode == Some(Mode::GravityHold);
             let was_active = self.active;
-            self.active = command.wanted && !self.lost && (was_active || resting);
+            self.active = command.wanted && !self.latched_idle && (was_active || resting);
             if !was_active {
-                self.guard.rest(&command.drive.torque_nm);
+                self.guard.reset_rate_limit(&command.drive.torque_nm);
             }
         } else if self.active {
             self.missed_in_a_row += 1;
@@ -93,14 +94,15 @@ impl<const N: usize> Motors<N> {
             }
         }
         let drive = command.as_ref().map(|command| command.drive);
-        if let Err(reason) = self.guard.judge(drive.as_ref(), self.active) {
-            self.ended_by = Some(reason);
+        if let Err(reason) = self.guard.check_command(drive.as_ref(), self.active) {
+            self.last_guard_reason = Some(reason);
             self.end();
         }
         let wanted_nm = drive.map_or(self.fallback_nm, |drive| drive.torque_nm);
         if !self.active {
-            // Torques that are sent to motors at rest: they begin with the one of their return.
-            self.guard.rest(&wanted_nm);
+            // While the drives are idle, the rate limiter follows the command, so that no rate limit applies when they
+            // become active.
+            self.guard.reset_rate_limit(&wanted_nm);
             return Ok(Vector::zeros());
         }
         let stopping = drive.is_none_or(|drive| drive.fault);
@@ -109,11 +111,11 @@ impl<const N: usize> Motors<N> {
 
     fn end(&mut self) {
         self.active = false;
-        self.lost = true;
+        self.latched_idle = true;
     }
 }
 
-/// What an answer says, as far as motors are concerned.
+/// The part of an answer that concerns the motors.
 struct Command<const N: usize> {
     drive: DriveCommand<N>,
     fallback_nm: Vector<N>,
@@ -121,7 +123,7 @@ struct Command<const N: usize> {
 }
 
 impl<const N: usize> Command<N> {
-    /// None where a torque is not a finite number.
+    /// Reads an answer; `None` if a torque is not finite.
     fn read(answer: &TorqueCommand) -> Result<Option<Self>, MessageError> {
         let command = Command {
             drive: DriveCommand {

@@ -1,4 +1,4 @@
-//! What the process is told.
+//! Command-line options.
 
 use clap::Parser;
 use std::path::PathBuf;
@@ -6,7 +6,7 @@ use supple_model::{Description, ModelError};
 use supple_plant::Injection;
 use supple_realtime::{RealtimeOptions, Settings};
 
-/// A simulated arm on shared memory, in the place of `supple-can` and a real one.
+/// A simulated arm on shared memory; replaces `supple-can` and a real arm.
 ///
 /// `supple up --plant sim` starts it together with a controller; alone, it waits for one with its motors
 /// idle.
@@ -16,36 +16,36 @@ pub struct Options {
     /// A built-in arm (see `supple arms`), or the path of an arm's TOML or of its folder.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
-    /// Refuses an arm whose URDF holds what is not read, instead of a warning.
+    /// Treats URDF elements that are not supported as errors instead of warnings.
     #[arg(long)]
     pub strict: bool,
     /// Cycles per second; the arm's own if not given. All processes of a system need the same.
     #[arg(long, value_name = "HZ", value_parser = clap::value_parser!(u32).range(10..=10_000))]
     pub rate_hz: Option<u32>,
-    /// Which system this belongs to; SUPPLE_PREFIX or `supple` if not given.
+    /// Prefix of the system; SUPPLE_PREFIX or `supple` if not given.
     #[arg(long, value_name = "NAME")]
     pub prefix: Option<String>,
-    /// Each cycle waits for its answer, and begins when it has come.
+    /// Runs in lockstep: each cycle waits for its answer before the next one starts.
     #[arg(long)]
     pub virtual_time: bool,
-    /// A block of wood whose face is at this height above the base frame (m), beneath the whole reach.
+    /// Adds a wooden block below the workspace; its top face is at this height above the base frame (m).
     #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = height)]
     pub block_m: Option<f64>,
-    /// Writes what acts at the joints and on the tip, once a millisecond, as CSV.
+    /// Writes joint torques and tip forces to a CSV file every millisecond.
     #[arg(long, value_name = "FILE")]
     pub trace: Option<PathBuf>,
-    /// Puts a fault into the arm: KIND or KIND:key=value,... as in encoder-stuck:joint=1,at-s=2; see --help. May
-    /// be repeated.
+    /// Injects a fault: KIND or KIND:key=value,..., for example encoder-stuck:joint=1,at-s=2; see --help. May be
+    /// repeated.
     #[arg(long, value_name = "SPEC", long_help = supple_plant::injection::HELP)]
     pub inject: Vec<Injection>,
-    /// Ends after so many cycles.
+    /// Ends after this number of cycles.
     #[arg(long, value_name = "N")]
     pub cycles: Option<u64>,
-    /// Share of a cycle in which an answer is waited for.
+    /// Fraction of a cycle for which the simulation waits for the answer.
     #[arg(long, value_name = "0-1", default_value_t = 0.75, value_parser = share)]
     pub answer_share: f64,
-    /// Time in which an answer is looked for without sleeping (us), of this processor's time in each cycle; 50 if
-    /// not given where the thread may use several processors, else 0.
+    /// Time to poll for the answer before blocking (us); uses the processor for that time in each cycle. Default: 50 if
+    /// the thread may use several processors, else 0.
     #[arg(long, value_name = "US", value_parser = clap::value_parser!(u32).range(0..=1000))]
     pub spin_us: Option<u32>,
     /// Priority under SCHED_FIFO.
@@ -56,20 +56,20 @@ pub struct Options {
 }
 
 impl Options {
-    /// The arm, at the rate asked for.
+    /// Loads the arm at the requested rate.
     ///
     /// # Errors
-    /// As [`Description::find_at_rate`]; what is left out of its URDF where nothing may be.
+    /// As [`Description::find_at_rate`]; with `--strict`, also an unsupported URDF element.
     pub fn description(&self) -> Result<Description, ModelError> {
         Description::find_at_rate(&self.arm, self.rate_hz)?.strict_if(self.strict)
     }
 
-    /// It is to end with the process that started it.
+    /// Whether the process must end when its parent ends.
     pub fn supervised(&self) -> bool {
         self.realtime.supervised
     }
 
-    /// What to ask of the system.
+    /// Realtime settings of the loop's thread.
     pub fn realtime(&self) -> Settings {
         self.realtime.settings(self.priority, self.virtual_time)
     }

@@ -1,8 +1,8 @@
-//! What the motors do with answers, and without them: never longer on the fallback than 100 ms, then they
-//! brake, and braking only ever takes energy.
+//! Behaviour of the drives with and without answers: the fallback torque acts for at most 100 ms, then the motors
+//! brake, and braking only dissipates energy.
 
 use supple_core::controller::{Controller, Mode, Request, State};
-use supple_core::drive_guard::DriveGuard;
+use supple_core::drive_guard::{DriveCommand, DriveGuard};
 use supple_core::{Input, Vector, step};
 use supple_ipc::message::{Drives, TorqueCommand};
 use supple_model::Description;
@@ -36,7 +36,7 @@ fn home() -> [Option<f64>; 4] {
 }
 
 #[test]
-fn torque_is_made_as_soon_as_it_is_wanted_and_not_before() {
+fn drives_are_active_exactly_while_torque_is_requested() {
     let (hold, idle) = (answer(Some(Request::GravityHold)), answer(None));
     let mut motors = motors();
     assert_eq!(motors.drives(), Drives::Idle);
@@ -59,7 +59,7 @@ fn the_fallback_acts_for_100_ms_and_then_the_motors_brake() {
     }
     assert_eq!(motors.torque(&home(), None), Ok(Vector::zeros()));
     assert_eq!(motors.drives(), Drives::Idle);
-    // The one who was lost has to have been idle before it gets torque again.
+    // After a loss the controller must be idle before its torque is applied again.
     assert_eq!(motors.torque(&home(), Some(&hold)), Ok(Vector::zeros()));
     assert_eq!(motors.drives(), Drives::Idle);
     motors
@@ -69,7 +69,7 @@ fn the_fallback_acts_for_100_ms_and_then_the_motors_brake() {
 }
 
 #[test]
-fn an_answer_in_between_begins_the_100_ms_anew() {
+fn an_answer_restarts_the_100_ms_of_fallback() {
     let hold = answer(Some(Request::GravityHold));
     let mut motors = motors();
     for _ in 0..5 {
@@ -88,9 +88,9 @@ fn an_answer_for_another_arm_is_refused() {
     assert!(motors.torque(&[Some(0.0); 3], Some(&answer(None))).is_err());
 }
 
-/// Whatever mode a controller is in when the drives come to life, if it is not gravity hold they do not.
+/// The drives become active only if the controller is in gravity hold.
 #[test]
-fn drives_come_to_life_in_gravity_hold_alone() {
+fn drives_become_active_only_in_gravity_hold() {
     let hold = answer(Some(Request::GravityHold));
     for mode in [Mode::Move, Mode::Track, Mode::Excite, Mode::Fault] {
         let mut motors = motors();
@@ -105,9 +105,9 @@ fn drives_come_to_life_in_gravity_hold_alone() {
     }
 }
 
-/// Torques of somebody who is not the controller: not finite, beyond the limits, at once.
+/// Torques of a faulty controller: not finite, then far beyond the limits in one step.
 #[test]
-fn a_torque_is_limited_again_and_one_that_is_no_number_is_no_answer() {
+fn excessive_torque_is_limited_and_nan_counts_as_missing_answer() {
     let hold = answer(Some(Request::GravityHold));
     let mut motors = motors();
     motors.torque(&home(), Some(&hold)).expect("four joints");
@@ -127,8 +127,8 @@ fn a_torque_is_limited_again_and_one_that_is_no_number_is_no_answer() {
     }
 }
 
-/// The guard ends torque by its own eyes: where a joint moves on in a controller's fault, and where one is far too
-/// fast.
+/// The guard removes torque on its own measurements: if a joint keeps moving in a controller fault, and if a joint is
+/// far too fast.
 #[test]
 fn an_arm_that_does_not_stop_in_a_fault_is_braked() {
     let hold = answer(Some(Request::GravityHold));
@@ -152,6 +152,72 @@ fn an_arm_that_does_not_stop_in_a_fault_is_braked() {
             ended.is_some_and(|cycle| within.contains(&cycle)),
             "{ended:?}"
         );
-        assert!(motors.ended_by().is_some());
+        assert!(motors.last_guard_reason().is_some());
+    }
+}
+
+/// The first torque of a faulty controller: a command received while the drives were idle is limited as well.
+#[test]
+fn the_first_torque_is_limited_like_any_other() {
+    let mut wild = answer(Some(Request::GravityHold));
+    wild.torque_nm = [-1e6; 7];
+    wild.fallback_torque_nm = [1e6; 7];
+    let limits = Description::asset("wam4").expect("built in").config::<4>();
+    let limits = limits.expect("sound").limits.joint_torque_nm;
+    for answered in [true, false] {
+        let mut motors = motors();
+        for cycle in 0..50 {
+            let command = (answered || cycle == 0).then_some(&wild);
+            let sent = motors.torque(&home(), command).expect("four joints");
+            for (torque_nm, limit_nm) in sent.iter().zip(&limits) {
+                assert!(torque_nm.abs() <= limit_nm + 1e-9, "cycle {cycle}: {sent}");
+            }
+        }
+        assert_eq!(motors.drives(), Drives::Active);
+    }
+}
+
+/// If the answer at activation is missing, the guard checks the activation with the first answer that arrives.
+#[test]
+fn activation_without_an_answer_is_checked_with_the_next_answer() {
+    let config = Description::asset("wam4").expect("built in").config::<4>();
+    let command = |mode| DriveCommand {
+        torque_nm: Vector::zeros(),
+        mode: Some(mode),
+        fault: false,
+    };
+    for (mode, passes) in [(Mode::GravityHold, true), (Mode::Track, false)] {
+        let mut guard = DriveGuard::new(config.as_ref().expect("sound"));
+        guard.observe(&home(), 1);
+        assert_eq!(guard.check_command(None, true), Ok(()));
+        assert_eq!(
+            guard.check_command(Some(&command(mode)), true).is_ok(),
+            passes
+        );
+    }
+}
+
+/// The guard divides a motion over skipped periods by all of their time.
+#[test]
+fn skipped_periods_do_not_count_as_speed() {
+    let config = Description::asset("wam4").expect("built in").config::<4>();
+    let mut guard = DriveGuard::new(config.as_ref().expect("sound"));
+    let hold = DriveCommand {
+        torque_nm: Vector::zeros(),
+        mode: Some(Mode::GravityHold),
+        fault: false,
+    };
+    let mut angles = home();
+    let mut cycle = |guard: &mut DriveGuard<4>, periods: u64| {
+        angles[0] = angles[0].map(|angle| angle + 1.5e-3 * periods as f64);
+        guard.observe(&angles, periods);
+        guard.check_command(Some(&hold), true)
+    };
+    for _ in 0..200 {
+        assert_eq!(cycle(&mut guard, 1), Ok(()));
+    }
+    assert_eq!(cycle(&mut guard, 30), Ok(()));
+    for _ in 0..50 {
+        assert_eq!(cycle(&mut guard, 1), Ok(()));
     }
 }

@@ -24,7 +24,7 @@ fn system() -> System {
     let folder = tempfile::tempdir().expect("a folder");
     let owner = std::fs::Permissions::from_mode(0o700);
     std::fs::set_permissions(folder.path(), owner).expect("changed");
-    let domain = Domain::within(&folder.path().join("supple"), "process").expect("a domain");
+    let domain = Domain::in_folder(&folder.path().join("supple"), "process").expect("a domain");
     System { folder, domain }
 }
 
@@ -64,7 +64,7 @@ impl Holding {
 }
 
 #[test]
-fn in_virtual_time_it_is_the_plant_to_the_last_bit() {
+fn in_virtual_time_it_equals_the_plant_bit_for_bit() {
     let system = system();
     let link = ControllerLink::new(&system.domain).expect("a controller");
     let child = system.start(&["--virtual-time", "--cycles", "200"]);
@@ -97,13 +97,13 @@ fn in_virtual_time_it_is_the_plant_to_the_last_bit() {
         plant.cycle(&command.torque().expect("four joints"));
     }
     let output = child.wait_with_output().expect("it ends by itself");
-    let words = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "{words}");
-    assert!(words.contains("200 cycles, 0 missed"), "{words}");
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{text}");
+    assert!(text.contains("200 cycles, 0 missed"), "{text}");
 }
 
 #[test]
-fn by_the_clock_it_goes_on_without_answers_and_counts_them() {
+fn in_real_time_it_continues_without_answers_and_counts_them() {
     let system = system();
     let link = ControllerLink::new(&system.domain).expect("a controller");
     let child = system.start(&["--cycles", "600"]);
@@ -122,7 +122,7 @@ fn by_the_clock_it_goes_on_without_answers_and_counts_them() {
             link.answer(&controller.answer(&arm)).expect("answered");
         }
         if arm.cycle == 599 {
-            // The motors were let down long ago.
+            // The drives became idle long before.
             assert_eq!(arm.drives(), Drives::Idle);
             assert!(arm.plant.missed >= 100, "{arm:?}");
             break;
@@ -140,12 +140,12 @@ fn a_second_plant_is_refused_with_the_reason() {
     let link = ControllerLink::new(&system.domain).expect("a controller");
     assert!(link.wait(SOON).expect("read").is_some());
     let output = system.start(&[]).wait_with_output().expect("it ends");
-    let words = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(10), "{words}");
-    assert!(words.contains("has its writer already"), "{words}");
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(10), "{text}");
+    assert!(text.contains("another process already writes"), "{text}");
     first.kill().expect("SIGKILL");
     first.wait().expect("it is gone");
-    // The next one takes the place of the killed one, and the controller sees it.
+    // A new plant replaces the killed one, and the controller receives its states.
     while link.receive().expect("read").is_some() {}
     let mut third = system.start(&[]);
     assert!(link.wait(SOON).expect("read").is_some());
@@ -153,9 +153,9 @@ fn a_second_plant_is_refused_with_the_reason() {
     third.wait().expect("it is gone");
 }
 
-/// What was put into the arm is in what it reports, from the first state on.
+/// An injected fault shows in the reported states from the first one on.
 #[test]
-fn an_injection_is_in_the_states_that_the_process_sends() {
+fn injected_faults_show_in_the_published_states() {
     let system = system();
     let link = ControllerLink::new(&system.domain).expect("a controller");
     let arguments = [
@@ -182,10 +182,10 @@ fn an_injection_is_in_the_states_that_the_process_sends() {
     assert!(output.status.success());
 }
 
-/// A command for another arm, or with a torque that is none, counts as no answer: the last fallback acts, the count is
-/// told, and the next command is heard.
+/// A command for another arm, or with a torque that is not finite, counts as a missing answer: the last fallback torque
+/// acts, the command is counted and reported, and the next command is accepted.
 #[test]
-fn a_command_that_cannot_be_used_is_no_answer_and_ends_nobody() {
+fn invalid_command_counts_as_missing_answer() {
     let system = system();
     let link = ControllerLink::new(&system.domain).expect("a controller");
     let child = system.start(&["--virtual-time", "--cycles", "40"]);
@@ -224,14 +224,14 @@ fn a_command_that_cannot_be_used_is_no_answer_and_ends_nobody() {
         unusable += u64::from(answer.is_none());
         let torque_nm = motors.torque(&measured, answer).expect("four joints");
         if answer.is_none() {
-            // Not zero from one cycle to the next.
+            // The torque does not drop to zero at once.
             assert!(torque_nm.amax() > 0.1, "{torque_nm}");
         }
-        plant.short([motors.drives() != Drives::Active; 4]);
+        plant.short_motors([motors.drives() != Drives::Active; 4]);
         plant.cycle(&torque_nm);
     }
     let output = child.wait_with_output().expect("it ends by itself");
-    let words = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "{words}");
-    assert!(words.contains("40 cycles, 3 missed"), "{words}");
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{text}");
+    assert!(text.contains("40 cycles, 3 missed"), "{text}");
 }

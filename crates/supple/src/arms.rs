@@ -1,6 +1,6 @@
-//! Built-in arms and others.
+//! Loads arm descriptions, built in or from files.
 
-use crate::console::{remark, say, say_json};
+use crate::console::{print_json, print_line, print_status};
 use crate::exit::Failure;
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -8,11 +8,11 @@ use std::path::Path;
 use std::sync::Mutex;
 use supple_model::{Description, assets};
 
-/// Warnings that were said.
-static SAID: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
+/// Warnings that were already printed.
+static PRINTED_WARNINGS: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
 
-/// A built-in arm by its name, or one from a file. A built-in name wins; `./wam4` is a path. What its URDF
-/// holds and is not read is said on standard error, or refused where `strict` is set.
+/// Loads a built-in arm by name, or an arm from a file. A built-in name takes precedence; write `./wam4` for a path.
+/// Unread URDF content is reported on standard error, or is an error if `strict` is set.
 ///
 /// # Errors
 /// [`Failure::UnknownArm`] or [`Failure::Model`].
@@ -32,18 +32,20 @@ pub fn find(name_or_path: &str, strict: bool) -> Result<Description, Failure> {
     })
 }
 
-/// One from a file, as [`find`].
+/// Loads an arm from a file. Warnings as for [`find`].
 ///
 /// # Errors
 /// [`Failure::Model`].
 pub fn load(path: &Path, strict: bool) -> Result<Description, Failure> {
     let description = Description::load(path)?.strict_if(strict)?;
-    let mut said = SAID.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    let mut printed = PRINTED_WARNINGS
+        .lock()
+        .unwrap_or_else(|poisoned| poisoned.into_inner());
     for warning in description.warnings() {
         let line = format!("warning: {warning}");
         // A command may load an arm more than once.
-        if said.insert(line.clone()) {
-            remark(&line);
+        if printed.insert(line.clone()) {
+            print_status(&line);
         }
     }
     Ok(description)
@@ -59,7 +61,7 @@ struct Line {
 /// Lists the built-in arms.
 ///
 /// # Errors
-/// [`Failure`] where an arm is not sound or standard output cannot be written.
+/// [`Failure`] if an arm description is invalid or standard output cannot be written.
 pub fn list(as_json: bool) -> Result<(), Failure> {
     let lines = assets()
         .iter()
@@ -73,10 +75,10 @@ pub fn list(as_json: bool) -> Result<(), Failure> {
         })
         .collect::<Result<Vec<_>, Failure>>()?;
     if as_json {
-        return say_json(&lines);
+        return print_json(&lines);
     }
     for line in lines {
-        say(&format!(
+        print_line(&format!(
             "{:8} {} joints: {}",
             line.name,
             line.joints.len(),

@@ -1,5 +1,6 @@
-//! The command line: what can be asked for.
+//! Definition of the command-line arguments.
 
+use crate::demo::DemoArgs;
 use crate::exit::CODES;
 use crate::identification;
 use crate::range::between;
@@ -14,134 +15,105 @@ use supple_plant::Injection;
 #[derive(Debug, Parser)]
 #[command(version, after_help = CODES, arg_required_else_help = true)]
 pub struct Cli {
-    /// What to do.
+    /// Command to run.
     #[command(subcommand)]
     pub command: Command,
 }
 
-/// What to do.
+/// Command to run.
 #[derive(Clone, Debug, Subcommand)]
 pub enum Command {
-    /// Run the paper's experiments: figures, report, summary and one log a run.
+    /// Run the paper's experiments: figures, report, summary and one log per run.
     #[command(after_help = CODES)]
     Demo(DemoArgs),
     /// Run a system: controller and plant as processes, tracking the sinusoid at 5 N/m, with a log.
     #[command(after_help = CODES)]
     Up(UpArgs),
-    /// Say what a running system does.
-    Status(Place),
+    /// Show the state of a running system.
+    Status(SystemArgs),
     /// Put a running system into a mode.
     Mode {
-        /// Which.
+        /// The mode.
         mode: ModeName,
-        /// Which system.
+        /// System to use.
         #[command(flatten)]
-        place: Place,
+        system: SystemArgs,
     },
     /// Change stiffness and damping of a running system, along a ramp.
     Gains(GainsArgs),
-    /// Have a running system follow a trajectory; the arm moves to its start first.
+    /// Make a running system follow a trajectory; the arm moves to its start first.
     Track(TrackArgs),
-    /// Have a running system probe for contact; the arm moves to the start first.
+    /// Make a running system probe for contact; the arm moves to the start first.
     Probe {
-        /// The arm that runs.
+        /// The arm of the running system.
         #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
         arm: String,
-        /// Refuse an arm whose URDF holds what is not read, instead of warning.
+        /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
         #[arg(long)]
         strict: bool,
-        /// Which system.
+        /// System to use.
         #[command(flatten)]
-        place: Place,
+        system: SystemArgs,
     },
-    /// Press a button at the pendant of a running system's emulated arm, or ask what it shows.
+    /// Press a button on the pendant of a running system's emulated arm, or show its state.
     Pendant {
-        /// What to do at it.
+        /// Button or query.
         #[arg(value_enum)]
         action: PendantAction,
-        /// Which system.
+        /// System to use.
         #[arg(long, value_name = "NAME")]
         prefix: Option<String>,
     },
-    /// Put simulated arms through losses, faults, collisions and wrong requests, each with what is expected of it.
+    /// Test simulated arms against process failures, faults, collisions and invalid requests, and compare each result
+    /// with the expected one.
     #[command(after_help = CODES)]
     Drill(DrillArgs),
-    /// Take a running system out of its fault.
-    Reset(Place),
-    /// End a running system in order.
-    Stop(Place),
-    /// Look into logs.
+    /// Clear the latched fault of a running system.
+    Reset(SystemArgs),
+    /// Shut a running system down: the drives are set to idle first.
+    Stop(SystemArgs),
+    /// Inspect, export, replay and recover logs.
     #[command(subcommand)]
     Log(LogCommand),
     #[command(flatten)]
     Identification(identification::Command),
     /// List the built-in arms.
     Arms {
-        /// As JSON.
+        /// Print the result as JSON.
         #[arg(long)]
         json: bool,
     },
-    /// Look whether this machine can run an arm in real time.
+    /// Check whether this machine can run an arm in real time.
     #[command(after_help = CODES)]
     Doctor {
-        /// As JSON.
+        /// Print the result as JSON.
         #[arg(long)]
         json: bool,
     },
-    /// Print the completions of a shell.
+    /// Print the completion script of a shell.
     Completions {
-        /// Which.
+        /// The shell.
         shell: Shell,
     },
 }
 
-/// Arguments of `demo`.
-#[derive(Clone, Debug, clap::Args)]
-pub struct DemoArgs {
-    /// A built-in arm (see `supple arms`), or the path of an arm's TOML or of its folder.
-    #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
-    pub arm: String,
-    /// Refuse an arm whose URDF holds what is not read, instead of warning.
-    #[arg(long)]
-    pub strict: bool,
-    /// What the controller knows of it, such as `supple identify` wrote: the path of a TOML or of its folder.
-    /// Default: the arm's own parameters, perturbed where the experiments say so.
-    #[arg(long, value_name = "PATH")]
-    pub model: Option<PathBuf>,
-    /// Folder for all results. Files in it of the same names are replaced, others are left alone.
-    #[arg(long, value_name = "DIR", default_value = "out/demo")]
-    pub out: PathBuf,
-    /// Seed of the perturbed models and of every noise.
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    pub seed: u64,
-    /// Print the summary as JSON instead of a table; an error is then an object on standard output too.
-    #[arg(long)]
-    pub json: bool,
-    /// No progress, only the results.
-    #[arg(long)]
-    pub quiet: bool,
-    /// Write no logs; all of them take about half a gigabyte.
-    #[arg(long)]
-    pub no_logs: bool,
-}
-
-/// Which system is meant, and how it is answered.
+/// Selects the system (prefix) and the output format.
 #[derive(Clone, Debug, Args)]
-pub struct Place {
-    /// Which system; SUPPLE_PREFIX or `supple` if not given.
+pub struct SystemArgs {
+    /// Prefix of the system. Default: SUPPLE_PREFIX or `supple`.
     #[arg(long, value_name = "NAME")]
     pub prefix: Option<String>,
-    /// As JSON.
+    /// Print the result as JSON.
     #[arg(long)]
     pub json: bool,
 }
 
-/// What plays the arm.
+/// Plant to run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum PlantKind {
     /// A simulated arm on shared memory.
     Sim,
-    /// A simulated arm behind an emulated bus, with its pucks, safety module and pendant.
+    /// A simulated arm on an emulated CAN bus, with motor pucks, safety module and pendant.
     Emu,
     /// An arm on a CAN bus; its operator activates it at its pendant.
     Can,
@@ -150,29 +122,29 @@ pub enum PlantKind {
 /// Arguments of `drill`.
 #[derive(Clone, Debug, Args)]
 pub struct DrillArgs {
-    /// Only with this plant, `sim` or `emu`; with both if not given.
+    /// Plant of the test cases, `sim` or `emu`. Default: both.
     #[arg(long, value_enum)]
     pub plant: Option<PlantKind>,
-    /// Only rows whose name contains this, such as `track/`, `kill-supple-rt` or a whole name of --list. May be
-    /// repeated: rows with any of them.
+    /// Run only test cases whose name contains this text, for example `track/`, `kill-supple-rt` or a full name from
+    /// --list. May be repeated: a case runs if any text matches.
     #[arg(long, value_name = "PATTERN")]
     pub only: Vec<String>,
-    /// Say which rows there are and what is expected of each, and run none.
+    /// List the test cases with their expected results, without running them.
     #[arg(long)]
     pub list: bool,
-    /// Only rows in virtual time, which do not depend on how busy the machine is.
+    /// Run only the test cases in virtual time; their results do not depend on the load of the machine.
     #[arg(long)]
     pub virtual_time: bool,
-    /// Write the table as a page of Markdown too.
+    /// Also write the result table as Markdown.
     #[arg(long, value_name = "FILE")]
     pub markdown: Option<PathBuf>,
     /// A built-in arm (see `supple arms`), or the path of an arm's TOML or of its folder.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
-    /// Refuse an arm whose URDF holds what is not read, instead of warning.
+    /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
-    /// Ask for neither priority nor locked memory.
+    /// Run without real-time priority and without locked memory.
     #[arg(long)]
     pub no_realtime: bool,
     /// Print the table as JSON.
@@ -180,24 +152,24 @@ pub struct DrillArgs {
     pub json: bool,
 }
 
-/// What can be done at a pendant.
+/// Buttons and queries of the pendant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum PendantAction {
-    /// Shift and Idle: faults are cleared, the motors have power and brake.
+    /// Shift-Idle: clear the faults; the motors are powered and brake (terminals shorted).
     Idle,
-    /// Shift and Activate: the motors take torques, unless a fault is shown.
+    /// Shift-Activate: the motors follow torque commands, unless the pendant shows a fault.
     Activate,
-    /// Press the emergency stop; it stays in.
+    /// Press the emergency stop; it latches.
     EStop,
-    /// Pull the emergency stop out; power comes back with `idle`.
+    /// Release the emergency stop; `idle` restores the power.
     Release,
-    /// What the arm does.
+    /// Show the state of the arm.
     Status,
-    /// What has happened to it since its start.
+    /// List the events of the arm since it started.
     Record,
 }
 
-/// A mode that can be asked for by itself.
+/// Modes that need no further arguments.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum ModeName {
     /// No torque; the motors brake.
@@ -206,22 +178,22 @@ pub enum ModeName {
     GravityHold,
 }
 
-/// What a system follows from its start on.
+/// Trajectory that `supple up` starts with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Course {
+pub enum UpTrajectory {
     /// Back and forth along a line.
     Sinusoid,
     /// Back and forth on a circle about the base.
     Arc,
     /// Quarter ellipse and its edges, in the vertical plane.
     Quadrant,
-    /// The probing cycle; with --block-m 0 it meets what it probes for.
+    /// The probing cycle; --block-m 0 places the block that it probes.
     Probe,
 }
 
 /// A trajectory of the paper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Shape {
+pub enum TrackTrajectory {
     /// Back and forth along a line.
     Sinusoid,
     /// Back and forth on a circle about the base.
@@ -233,57 +205,58 @@ pub enum Shape {
 /// Arguments of `up`.
 #[derive(Clone, Debug, Args)]
 pub struct UpArgs {
-    /// What plays the arm.
+    /// Plant to run.
     #[arg(long, value_enum)]
     pub plant: PlantKind,
     /// A built-in arm (see `supple arms`), or the path of an arm's TOML or of its folder.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
-    /// Refuse an arm whose URDF holds what is not read, instead of warning.
+    /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
-    /// What the arm is brought to and follows.
+    /// Trajectory: the arm moves to its start and then follows it.
     #[arg(long, value_enum, default_value = "sinusoid")]
-    pub track: Course,
-    /// The arm's bus, can:NAME or unix:FOLDER; can:can0 for `can`, sockets of its own for `emu`.
+    pub track: UpTrajectory,
+    /// The arm's bus, can:NAME or unix:FOLDER. Default: can:can0 for `can`, private sockets for `emu`.
     #[arg(long, value_name = "BUS")]
     pub bus: Option<Address>,
-    /// The arm on the bus is in its home pose now: where its positions are lost, this is where it is. An
-    /// emulated arm always is.
+    /// Declare that the arm is in its home pose now; used if the motor pucks have lost their positions. An emulated
+    /// arm always starts there.
     #[arg(long)]
     pub zero_at_home: bool,
-    /// Take what the arm's force/torque sensor feels at the start for zero.
+    /// Tare the arm's force/torque sensor at start-up.
     #[arg(long)]
     pub tare: bool,
-    /// A block of wood beneath a simulated or emulated arm, its face at this height above the base frame (m).
+    /// Place a block of wood beneath a simulated or emulated arm, its top face at this height above the base frame
+    /// (m).
     #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = between(-10.0, 10.0))]
     pub block_m: Option<f64>,
-    /// Put a fault into the simulated or emulated arm: KIND or KIND:key=value,... as in
+    /// Inject a fault into the simulated or emulated arm: KIND or KIND:key=value,... as in
     /// encoder-stuck:joint=1,at-s=2; see --help. May be repeated.
     #[arg(long, value_name = "SPEC", long_help = supple_plant::injection::HELP)]
     pub inject: Vec<Injection>,
-    /// Write what acts at the motors and on the tip of a simulated or emulated arm, as CSV.
+    /// Write motor torques and tip forces of the simulated or emulated arm as CSV.
     #[arg(long, value_name = "FILE")]
     pub trace: Option<PathBuf>,
-    /// Cycles per second; the arm's own if not given.
+    /// Control rate in Hz. Default: the rate of the arm description.
     #[arg(long, value_name = "HZ", value_parser = clap::value_parser!(u32).range(10..=10_000))]
     pub rate_hz: Option<u32>,
-    /// Shut down after so many seconds of control; until an interrupt or `supple stop` if not given.
+    /// Shut down after this many seconds of control. Default: run until interrupted or `supple stop`.
     #[arg(long = "for", value_name = "SECONDS", value_parser = between(1e-6, 1e8))]
     pub for_s: Option<f64>,
-    /// As fast as the processes can, in lockstep. Needs --for.
+    /// Run in virtual time: all processes in lockstep, as fast as possible. Requires --for.
     #[arg(long, requires = "for_s")]
     pub virtual_time: bool,
-    /// The log; one of that name is replaced.
+    /// The log; an existing file is replaced.
     #[arg(long, value_name = "FILE", default_value = "out/up.mcap")]
     pub log: PathBuf,
     /// Write no log.
     #[arg(long, conflicts_with = "log")]
     pub no_log: bool,
-    /// Which system this is to be; SUPPLE_PREFIX or `supple` if not given.
+    /// Prefix of the new system. Default: SUPPLE_PREFIX or `supple`.
     #[arg(long, value_name = "NAME")]
     pub prefix: Option<String>,
-    /// Ask for neither priority nor locked memory.
+    /// Run without real-time priority and without locked memory.
     #[arg(long)]
     pub no_realtime: bool,
     /// Print the summary as JSON; an error is then an object on standard output too.
@@ -294,53 +267,53 @@ pub struct UpArgs {
 /// Arguments of `gains`.
 #[derive(Clone, Debug, Args)]
 pub struct GainsArgs {
-    /// Stiffness, for all axes or as X,Y,Z; as it is if not given.
+    /// Stiffness for all axes, or X,Y,Z. Default: unchanged.
     #[arg(long, value_name = "N/M", value_delimiter = ',', value_parser = between(0.0, 1e6))]
     pub stiffness: Vec<f64>,
-    /// Damping, for all axes or as X,Y,Z; as it is if not given.
+    /// Damping for all axes, or X,Y,Z. Default: unchanged.
     #[arg(long, value_name = "N S/M", value_delimiter = ',', value_parser = between(0.0, 1e6))]
     pub damping: Vec<f64>,
-    /// Time to reach them.
+    /// Duration of the ramp to the new gains.
     #[arg(long = "ramp", value_name = "SECONDS", default_value_t = 1.0, value_parser = between(0.0, 3600.0))]
     pub ramp_s: f64,
-    /// Which system.
+    /// System to use.
     #[command(flatten)]
-    pub place: Place,
+    pub system: SystemArgs,
 }
 
 /// Arguments of `track`.
 #[derive(Clone, Debug, Args)]
 pub struct TrackArgs {
-    /// Which trajectory.
-    pub shape: Shape,
-    /// Its pace, as a multiple of the paper's.
+    /// The trajectory.
+    pub trajectory: TrackTrajectory,
+    /// Speed factor relative to the paper.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = between(1e-6, 1e6))]
     pub speed: f64,
-    /// The arm that runs.
+    /// The arm of the running system.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
-    /// Refuse an arm whose URDF holds what is not read, instead of warning.
+    /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
-    /// Which system.
+    /// System to use.
     #[command(flatten)]
-    pub place: Place,
+    pub system: SystemArgs,
 }
 
-/// What to do with a log.
+/// Command of `supple log`.
 #[derive(Clone, Debug, Subcommand)]
 pub enum LogCommand {
-    /// What is in a log: arm, span, channels, modes, faults.
+    /// Show the contents of a log: arm, time span, channels, modes, faults.
     Info {
         /// The log.
         file: PathBuf,
-        /// As JSON.
+        /// Print the result as JSON.
         #[arg(long)]
         json: bool,
     },
-    /// A channel as comma-separated values.
+    /// Export a channel as comma-separated values.
     Export {
-        /// The log; one that was cut has to be recovered first.
+        /// The log. A truncated log must be recovered first.
         file: PathBuf,
         /// The channel.
         #[arg(long, value_name = "NAME", default_value = "/controller_state")]
@@ -348,50 +321,50 @@ pub enum LogCommand {
         /// Every N-th message.
         #[arg(long, value_name = "N", default_value = "1")]
         every: NonZeroU64,
-        /// The table's file; standard output if not given.
+        /// Output file. Default: standard output.
         #[arg(long, value_name = "FILE")]
         out: Option<PathBuf>,
     },
-    /// Run the controller over a log again and compare every answer to the last bit.
+    /// Run the controller over a log again and compare every output bit for bit.
     #[command(after_help = CODES)]
     Replay {
-        /// The log; one with missing steps is refused.
+        /// The log. A log with missing steps is rejected.
         file: PathBuf,
-        /// As JSON.
+        /// Print the result as JSON.
         #[arg(long)]
         json: bool,
     },
-    /// Save every whole chunk of a log that was cut or damaged.
+    /// Copy every intact chunk of a truncated or damaged log into a new file.
     Recover {
         /// The log.
         from: PathBuf,
-        /// Where to; `<name>.recovered.mcap` beside it if not given.
+        /// Output file. Default: `<name>.recovered.mcap` beside the log.
         to: Option<PathBuf>,
-        /// Replace what is there.
+        /// Replace an existing output file.
         #[arg(long)]
         force: bool,
-        /// Print what was saved as JSON.
+        /// Print the result as JSON.
         #[arg(long)]
         json: bool,
     },
 }
 
 impl Command {
-    /// JSON is expected on standard output.
+    /// Whether the command prints JSON on standard output.
     pub fn json(&self) -> bool {
         match self {
             Command::Demo(args) => args.json,
             Command::Identification(command) => command.json(),
             Command::Up(args) => args.json,
             Command::Drill(args) => args.json,
-            Command::Gains(GainsArgs { place, .. })
-            | Command::Track(TrackArgs { place, .. })
-            | Command::Mode { place, .. }
-            | Command::Probe { place, .. }
-            | Command::Status(place)
-            | Command::Reset(place)
-            | Command::Stop(place) => place.json,
-            // Its answers are JSON already, its failures are words.
+            Command::Gains(GainsArgs { system, .. })
+            | Command::Track(TrackArgs { system, .. })
+            | Command::Mode { system, .. }
+            | Command::Probe { system, .. }
+            | Command::Status(system)
+            | Command::Reset(system)
+            | Command::Stop(system) => system.json,
+            // Its output is already JSON; its errors are plain text.
             Command::Pendant { .. } => false,
             Command::Arms { json } | Command::Doctor { json } => *json,
             Command::Log(

@@ -1,4 +1,4 @@
-//! What is said on the terminal: results on standard output, everything else on standard error.
+//! Terminal output: results go to standard output, everything else to standard error.
 
 use crate::exit::Failure;
 use serde::Serialize;
@@ -7,11 +7,11 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use supple_realtime::diagnostics;
 
-/// Writes a line to standard output. A reader that has gone is no failure.
+/// Writes a line to standard output. A closed pipe is not an error.
 ///
 /// # Errors
-/// [`Failure::File`] where standard output cannot be written, such as a full disk behind it.
-pub fn say(text: &str) -> Result<(), Failure> {
+/// [`Failure::File`] if standard output cannot be written, for example because the disk is full.
+pub fn print_line(text: &str) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     let written = writeln!(out, "{text}").and_then(|()| out.flush());
     match written {
@@ -25,42 +25,44 @@ pub fn say(text: &str) -> Result<(), Failure> {
 /// Writes a value as JSON to standard output.
 ///
 /// # Errors
-/// As [`say`].
-pub fn say_json(value: &impl Serialize) -> Result<(), Failure> {
-    say(&json(value)?)
+/// As [`print_line`].
+pub fn print_json(value: &impl Serialize) -> Result<(), Failure> {
+    print_line(&json(value)?)
 }
 
 /// A value as JSON.
 ///
 /// # Errors
-/// [`Failure::Compose`] where the value has no JSON.
+/// [`Failure::ReportGeneration`] if the value cannot be represented as JSON.
 pub fn json(value: &impl Serialize) -> Result<String, Failure> {
-    serde_json::to_string_pretty(value).map_err(|error| Failure::Compose(error.to_string()))
+    serde_json::to_string_pretty(value)
+        .map_err(|error| Failure::ReportGeneration(error.to_string()))
 }
 
-/// Standard error is written by a thread of its own.
+/// Whether a background thread writes standard error.
 static IN_BACKGROUND: AtomicBool = AtomicBool::new(false);
 
-/// From now on nothing that is written to standard error is waited for: this process looks after an arm.
-pub fn wait_for_no_reader() {
+/// From this call on a background thread writes standard error, so that a process that supervises an arm never blocks
+/// on it.
+pub fn write_stderr_in_background() {
     diagnostics::start();
     IN_BACKGROUND.store(true, Ordering::Relaxed);
 }
 
-/// Waits a moment for what is still to be written to standard error.
+/// Waits briefly until pending output to standard error is written.
 pub fn flush() {
     if IN_BACKGROUND.load(Ordering::Relaxed) {
         diagnostics::flush();
     }
 }
 
-/// Writes a line to standard error; there is nobody to tell where that fails.
-pub fn remark(text: &str) {
-    remark_part(format!("{text}\n"));
+/// Writes a line to standard error. Errors are ignored: they cannot be reported anywhere else.
+pub fn print_status(text: &str) {
+    print_status_part(format!("{text}\n"));
 }
 
-/// As [`remark`], of text that is no whole line.
-pub fn remark_part(text: String) {
+/// As [`print_status`], for text that is not a complete line.
+pub fn print_status_part(text: String) {
     match IN_BACKGROUND.load(Ordering::Relaxed) {
         true => diagnostics::post_part(text),
         false => {
@@ -69,7 +71,7 @@ pub fn remark_part(text: String) {
     }
 }
 
-/// A failure as `--json` gives it.
+/// A failure as `--json` prints it.
 #[derive(Serialize)]
 struct JsonFailure {
     error: JsonError,
@@ -82,16 +84,15 @@ struct JsonError {
     message: String,
 }
 
-/// Says why it failed: one line on standard error, and an object on standard output where JSON is
-/// expected there.
-pub fn complain(failure: &Failure, as_json: bool) {
-    remark(&format!("error: {failure}"));
+/// Reports a failure: one line on standard error and, in JSON mode, an object on standard output.
+pub fn report_error(failure: &Failure, as_json: bool) {
+    print_status(&format!("error: {failure}"));
     if as_json && !failure.comes_with_results() {
         let error = JsonError {
             kind: failure.kind(),
             exit_code: failure.code(),
             message: failure.to_string(),
         };
-        let _ = say_json(&JsonFailure { error });
+        let _ = print_json(&JsonFailure { error });
     }
 }

@@ -1,18 +1,48 @@
-//! `supple demo`: runs the experiments and leaves figures, report, summary and logs.
+//! `supple demo`: runs the experiments and writes figures, report, summary and logs.
 
-use crate::cli::DemoArgs;
-use crate::console::{json, remark, say};
+use crate::console::{json, print_line, print_status};
 use crate::exit::Failure;
 use crate::out::Staging;
-use crate::progress::Meter;
+use crate::progress::ProgressReporter;
 use crate::{arms, figures, report, table};
+use std::path::PathBuf;
 use supple_experiment::{Demo, DemoOptions};
 use supple_model::Description;
 
-/// Runs it.
+/// Arguments of `demo`.
+#[derive(Clone, Debug, clap::Args)]
+pub struct DemoArgs {
+    /// A built-in arm (see `supple arms`), or the path of an arm's TOML or of its folder.
+    #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
+    pub arm: String,
+    /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
+    #[arg(long)]
+    pub strict: bool,
+    /// The controller's model of the arm, for example the output of `supple identify`: path of its TOML or folder.
+    /// Default: the plant's own parameters, with the perturbations that each experiment defines.
+    #[arg(long, value_name = "PATH")]
+    pub model: Option<PathBuf>,
+    /// Folder for all results. Files in it of the same names are replaced, others are left alone.
+    #[arg(long, value_name = "DIR", default_value = "out/demo")]
+    pub out: PathBuf,
+    /// Seed of the perturbed models and of all noise.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Print the summary as JSON instead of a table; an error is then an object on standard output too.
+    #[arg(long)]
+    pub json: bool,
+    /// Print results only, no progress.
+    #[arg(long)]
+    pub quiet: bool,
+    /// Write no logs; all of them take about half a gigabyte.
+    #[arg(long)]
+    pub no_logs: bool,
+}
+
+/// Runs `supple demo`.
 ///
 /// # Errors
-/// [`Failure`]; [`Failure::Fault`] once everything is written.
+/// [`Failure`]; [`Failure::Fault`] after all results are written.
 pub fn run(args: &DemoArgs) -> Result<(), Failure> {
     let arm = arms::find(&args.arm, args.strict)?;
     let model = args
@@ -29,7 +59,7 @@ pub fn run(args: &DemoArgs) -> Result<(), Failure> {
             false => Some(staging.folder("logs")?),
         },
     };
-    let meter = Meter::new(args.quiet);
+    let meter = ProgressReporter::new(args.quiet);
     let demo = supple_experiment::demo(&arm, &options, &|progress| meter.show(progress));
     meter.finish();
     let demo = demo?;
@@ -39,13 +69,13 @@ pub fn run(args: &DemoArgs) -> Result<(), Failure> {
     staging.publish()?;
 
     if args.json {
-        say(&summary)?;
+        print_line(&summary)?;
     } else {
-        say(&format!("{}\n", table::table(&demo.summary)))?;
+        print_line(&format!("{}\n", table::table(&demo.summary)))?;
     }
     let report = args.out.join("report.html");
     if !args.quiet {
-        remark(&format!("report: {}", report.display()));
+        print_status(&format!("report: {}", report.display()));
     }
     let faults = report::fault_lines(&demo.summary);
     if faults.is_empty() {
@@ -57,7 +87,7 @@ pub fn run(args: &DemoArgs) -> Result<(), Failure> {
     })
 }
 
-/// Writes everything that is made from a demo.
+/// Writes figures, report and summary of a demo.
 fn write(
     staging: &Staging,
     demo: &Demo,

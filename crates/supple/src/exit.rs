@@ -1,20 +1,20 @@
-//! How the program ends when it does not end well: one type, one code, one line.
+//! Error type and exit codes of the program. Every error prints one line.
 //!
 //! | code | meaning |
 //! |---|---|
-//! | 0 | done |
-//! | 1 | a defect of the program: please report it |
-//! | 2 | wrong use of the command line |
-//! | 3 | the description of the arm is wrong, or there is no such arm |
-//! | 4 | the arm cannot do the experiment |
-//! | 5 | a fault ended a run, or is latched in the system that was asked; all results are written |
+//! | 0 | success |
+//! | 1 | a bug in supple: please report it |
+//! | 2 | invalid command line |
+//! | 3 | invalid arm description, or unknown arm |
+//! | 4 | the arm cannot perform the experiment |
+//! | 5 | a fault ended a run, or is latched in the running system; all results are written |
 //! | 6 | a file cannot be read or written |
-//! | 7 | a replay does not give the logged answers |
-//! | 8 | the machine cannot run an arm in real time as it should |
-//! | 9 | the logs do not give a model |
-//! | 10 | no system runs, or a process of it cannot start or has ended |
+//! | 7 | a replay differs from the logged outputs |
+//! | 8 | the machine does not meet the real-time requirements |
+//! | 9 | no model can be identified from the logs |
+//! | 10 | no system is running, or one of its processes cannot start or has exited |
 //! | 11 | the controller refused a request |
-//! | 12 | a drill did not end as it should |
+//! | 12 | a test case of `supple drill` failed |
 //! | 130 | interrupted |
 
 use crate::figures::FigureError;
@@ -28,163 +28,161 @@ use supple_log::LogError;
 use supple_model::ModelError;
 use supple_plant::InjectionError;
 
-/// The codes in words, as `--help` ends.
+/// Table of the exit codes, printed at the end of `--help`.
 pub const CODES: &str = "Exit codes:
-  0    done
-  1    a defect of the program: please report it
-  2    wrong use of the command line
-  3    the description of the arm is wrong, or there is no such arm
-  4    the arm cannot do the experiment
-  5    a fault ended a run, or is latched in the system that was asked; all results are written
+  0    success
+  1    a bug in supple: please report it
+  2    invalid command line
+  3    invalid arm description, or unknown arm
+  4    the arm cannot perform the experiment
+  5    a fault ended a run, or is latched in the running system; all results are written
   6    a file cannot be read or written
-  7    a replay does not give the logged answers
-  8    the machine cannot run an arm in real time as it should
-  9    the logs do not give a model
-  10   no system runs, or a process of it cannot start or has ended
+  7    a replay differs from the logged outputs
+  8    the machine does not meet the real-time requirements
+  9    no model can be identified from the logs
+  10   no system is running, or one of its processes cannot start or has exited
   11   the controller refused a request
-  12   a drill did not end as it should
+  12   a test case of `supple drill` failed
   130  interrupted";
 
-/// Why the program did not do what it was asked for. One line that names the cause and the remedy.
+/// Why a command failed. Each message is one line that names the cause and the remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum Failure {
     /// Neither a built-in arm nor a file.
     #[error(
-        "no arm named `{found}` is built in and there is no such file; give one of {known}, or the \
-         path of an arm's TOML or of its folder"
+        "`{found}` is neither a built-in arm nor an existing file; give one of {known}, or the path of an \
+         arm's TOML or of its folder"
     )]
     UnknownArm {
-        /// What was asked for.
+        /// Name or path given by the user.
         found: String,
-        /// Built-in arms.
+        /// Names of the built-in arms.
         known: String,
     },
-    /// The description of the arm.
+    /// An invalid arm description.
     #[error(transparent)]
     Model(#[from] ModelError),
     /// An experiment that could not be run.
     #[error(transparent)]
     Experiment(#[from] ExperimentError),
-    /// Runs ended by a fault, with all results written.
+    /// A fault ended one or more runs; all results are written.
     #[error("a fault ended {runs}; the results are in {}, with the fault in the report", out.display())]
     Fault {
         /// Runs and their faults.
         runs: String,
-        /// Where the results are.
+        /// Folder of the results.
         out: PathBuf,
     },
-    /// A run of a whole system ended by a fault, its log written.
-    #[error("a fault ended the run: {faults}; `supple log info` shows where in the log")]
+    /// A fault ended the run of a complete system; its log is written.
+    #[error("a fault ended the run: {faults}; `supple log info` shows its time in the log")]
     RunFault {
-        /// The faults in words.
+        /// Descriptions of the faults.
         faults: String,
     },
-    /// A request was accepted by a system that is in a fault.
+    /// The request was accepted, but the system has a latched fault.
     #[error(
-        "the system is in a fault: `supple status` says in which, `supple reset` takes it out once the \
-         cause is gone"
+        "the system is in a fault: `supple status` shows it; remove the cause, then clear it with \
+         `supple reset`"
     )]
-    InFault,
-    /// A log that ended before its run, the run being over.
-    #[error("the log ends before the run: {cause}")]
+    SystemInFault,
+    /// The log ended before the end of the run.
+    #[error("the log ends before the end of the run: {cause}")]
     LogEnded {
-        /// Why, with the file and the remedy.
+        /// The cause, with the file and the remedy.
         cause: Box<Failure>,
     },
-    /// The trace of a simulated arm ended before its run.
-    #[error("the trace ends before the run, as {name} says above; all else is whole")]
+    /// The trace of a simulated arm ended before the end of the run.
+    #[error(
+        "the trace is incomplete, see the message of {name} above; all other output is complete"
+    )]
     TraceEnded {
-        /// The process that wrote it.
+        /// The process that writes the trace.
         name: &'static str,
     },
     /// Shared memory.
     #[error(transparent)]
     Ipc(#[from] IpcError),
-    /// Where the arm's bus is.
+    /// The address of the arm's bus.
     #[error(transparent)]
     Bus(#[from] BusError),
-    /// An emulated arm's pendant that does not answer.
+    /// The pendant of an emulated arm does not answer.
     #[error(
-        "the pendant at {} does not answer: {cause}; an emulated arm has one, start it with `supple up \
-         --plant emu`", socket.display()
+        "the pendant at {} does not answer: {cause}; only an emulated arm has this pendant, start one with \
+         `supple up --plant emu`", socket.display()
     )]
     Pendant {
-        /// Its socket.
+        /// Socket of the pendant.
         socket: PathBuf,
-        /// What the system says, or what came back.
+        /// Error of the operating system, or the reply.
         cause: String,
     },
-    /// A clock that an arm cannot have.
+    /// Virtual time was requested for a real CAN bus.
+    #[error("--virtual-time is not possible with a CAN interface: omit it, or use --plant emu")]
+    VirtualTimeOnRealBus,
+    /// A system with this prefix is already running.
     #[error(
-        "an arm on a CAN interface keeps its own time: leave out --virtual-time, or use --plant emu"
-    )]
-    RealClock,
-    /// A system of that name is there.
-    #[error(
-        "a system runs already under the prefix `{prefix}`, by process {process}: `supple stop` ends it, \
-         or choose another --prefix"
+        "a system is already running under the prefix `{prefix}` (process {process}): end it with \
+         `supple stop`, or choose another --prefix"
     )]
     AlreadyRunning {
         /// The prefix.
         prefix: String,
-        /// Its `supple up`.
+        /// PID of its `supple up`.
         process: i32,
     },
-    /// A program that belongs beside this one.
+    /// A program that must be installed beside this one is missing.
     #[error(
         "{} is missing: build it with `cargo build --release -p {name}`, or install it beside this \
          program", program.display()
     )]
-    NoSibling {
-        /// Its package and name.
+    MissingProgram {
+        /// Name of the package and of the program.
         name: &'static str,
-        /// Where it should be.
+        /// Expected path.
         program: PathBuf,
     },
-    /// A process that the system has not.
-    #[error("no process {name} belongs to this system: see `supple drill` for those there are")]
+    /// The named process is not part of this system.
+    #[error("the system has no process {name}: see `supple drill --list`")]
     NoSuchProcess {
-        /// Which.
+        /// Name of the process.
         name: &'static str,
     },
-    /// A process of the system ended when it should not have.
-    #[error("{name} has ended ({status}); its own words are above")]
+    /// A process of the system exited unexpectedly.
+    #[error("{name} exited ({status}); see its output above")]
     ProcessEnded {
-        /// Which.
+        /// Name of the process.
         name: &'static str,
-        /// How.
+        /// Exit status of the process.
         status: String,
     },
-    /// A drill with people's limbs within reach.
-    #[error(
-        "a drill drops the arm on what is beneath it: only --plant sim and --plant emu have one"
-    )]
-    RealArm,
-    /// No row of the drill has such a name.
-    #[error("no row of the drill contains {patterns}: see `supple drill --list`")]
-    NoSuchRow {
-        /// What was asked for.
+    /// A fault test was requested for a real arm.
+    #[error("the fault test lets the arm fall: use --plant sim or --plant emu")]
+    FaultTestOnRealArm,
+    /// No test case matches the given patterns.
+    #[error("no test case matches {patterns}: see `supple drill --list`")]
+    NoSuchTestCase {
+        /// Patterns given by the user.
         patterns: String,
     },
-    /// A fault to be put into an arm, that it cannot have.
+    /// An injected fault that this plant does not support.
     #[error("--inject: {0}")]
     Injection(#[from] InjectionError),
-    /// A fault to be put into a real arm.
-    #[error("--inject puts faults into a simulated arm: use --plant sim or --plant emu")]
+    /// Fault injection was requested for a real arm.
+    #[error("--inject works only with a simulated arm: use --plant sim or --plant emu")]
     InjectionIntoRealArm,
-    /// A system that is to be drilled and does not work.
+    /// The system under test did not reach tracking mode.
     #[error(
-        "the system did not come to track within 20 s, three times: its processes say why above; \
-         `supple doctor` looks at the machine"
+        "the system did not reach tracking mode within 20 s in three attempts: see the messages of its \
+         processes above, or run `supple doctor`"
     )]
-    NotTracking,
-    /// A loss that was not met as it should have been.
-    #[error("the drill did not end as it should: {rows}; the table above says what was expected")]
+    DidNotReachTracking,
+    /// Test cases whose result differs from the expected one.
+    #[error("unexpected results: {rows}; see the table above")]
     Drill {
-        /// The losses.
+        /// Names of the test cases.
         rows: String,
     },
-    /// No answer.
+    /// No system answers.
     #[error(
         "no system answers under the prefix `{prefix}`: start one with `supple up`, or choose another \
          with --prefix"
@@ -193,22 +191,22 @@ pub enum Failure {
         /// The prefix.
         prefix: String,
     },
-    /// The controller says no.
-    #[error("the controller says: {words}")]
+    /// The controller refused the request.
+    #[error("the controller refused the request: {reason}")]
     Refused {
-        /// Its words.
-        words: String,
+        /// Reason given by the controller.
+        reason: String,
     },
-    /// A log.
+    /// A log cannot be read or written.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// A replay that is not the run.
+    /// A replay differs from the logged run.
     #[error(
-        "{different} of {steps} steps of {} do not give the logged answers; the log is of another \
-         version of the controller, or was changed",
+        "{different} of {steps} steps of {} differ from the logged outputs; the log was written by \
+         another version of the controller, or was modified",
         path.display()
     )]
-    Different {
+    ReplayMismatch {
         /// The log.
         path: PathBuf,
         /// Steps that differ.
@@ -216,49 +214,49 @@ pub enum Failure {
         /// All steps.
         steps: u64,
     },
-    /// A machine that is not ready for real time.
-    #[error("this machine is not ready for real time: {failed}; each line above says what to do")]
+    /// The machine does not meet the real-time requirements.
+    #[error("this machine is not ready for real time: {failed}; see the remedies above")]
     NotReady {
         /// Names of the checks that failed.
         failed: String,
     },
-    /// Logs that give no model.
+    /// No model can be identified from the logs.
     #[error(transparent)]
     Ident(#[from] IdentError),
-    /// A log that cannot be taken for identification.
+    /// A log cannot be used for identification.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// A model that cannot be described or saved.
+    /// A model cannot be described or saved.
     #[error(transparent)]
     Save(#[from] SaveError),
-    /// A file.
+    /// A file cannot be read or written.
     #[error("cannot {action} {}: {error}; {remedy}", path.display())]
     File {
-        /// What was tried: `create`, `write`, `rename` ...
+        /// The failed action: `create`, `write`, `rename` ...
         action: &'static str,
-        /// Which.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the operating system.
         error: std::io::Error,
-        /// What to do about it.
+        /// The remedy.
         remedy: &'static str,
     },
-    /// A file that would be replaced.
+    /// The output file exists.
     #[error("{} exists; give another name, or --force to replace it", path.display())]
     Exists {
-        /// Which.
+        /// Path of the file.
         path: PathBuf,
     },
-    /// A figure.
-    #[error("{0}; this is a defect, please report it")]
+    /// A figure cannot be drawn.
+    #[error("{0}; this is a bug, please report it")]
     Figure(#[from] FigureError),
-    /// The report or the summary.
-    #[error("the report cannot be composed: {0}; this is a defect, please report it")]
-    Compose(String),
+    /// The report or the summary cannot be generated.
+    #[error("cannot generate the report: {0}; this is a bug, please report it")]
+    ReportGeneration(String),
 }
 
 impl Failure {
-    /// A file that could not be written.
+    /// Creates the failure of a file operation, with a remedy for its error.
     pub fn file(action: &'static str, path: &Path, error: std::io::Error) -> Failure {
         use std::io::ErrorKind;
         let remedy = match error.kind() {
@@ -266,9 +264,9 @@ impl Failure {
                 "make room, or choose another folder with --out"
             }
             ErrorKind::InvalidInput | ErrorKind::IsADirectory => {
-                "name a regular file, or one that is not there yet, in a folder"
+                "name a regular file or a new file in an existing folder"
             }
-            _ => "choose a folder that can be written with --out",
+            _ => "choose a writable folder with --out",
         };
         Failure::File {
             action,
@@ -278,7 +276,7 @@ impl Failure {
         }
     }
 
-    /// Short name, as `--json` gives it.
+    /// Short name of the error, as `--json` prints it.
     pub fn kind(&self) -> &'static str {
         match self.code() {
             2 => "usage",
@@ -296,13 +294,13 @@ impl Failure {
         }
     }
 
-    /// Its results are already on standard output, and say what went wrong.
+    /// Whether the results, which include the error, are already on standard output.
     pub fn comes_with_results(&self) -> bool {
         matches!(
             self,
             Failure::Fault { .. }
-                | Failure::InFault
-                | Failure::Different { .. }
+                | Failure::SystemInFault
+                | Failure::ReplayMismatch { .. }
                 | Failure::NotReady { .. }
                 | Failure::Drill { .. }
                 | Failure::RunFault { .. }
@@ -311,47 +309,47 @@ impl Failure {
         )
     }
 
-    /// Exit code, see the module.
+    /// Exit code, see the table of the module.
     pub fn code(&self) -> u8 {
         match self {
             Failure::UnknownArm { .. } | Failure::Model(_) => 3,
             Failure::Experiment(error) => experiment_code(error),
-            Failure::Fault { .. } | Failure::RunFault { .. } | Failure::InFault => 5,
+            Failure::Fault { .. } | Failure::RunFault { .. } | Failure::SystemInFault => 5,
             Failure::Log(error) => log_code(error),
             Failure::File { .. }
             | Failure::Exists { .. }
             | Failure::LogEnded { .. }
             | Failure::TraceEnded { .. } => 6,
-            Failure::Different { .. } => 7,
+            Failure::ReplayMismatch { .. } => 7,
             Failure::NotReady { .. } => 8,
             Failure::Ident(_) => 9,
             Failure::Read(error) => read_code(error),
             Failure::Save(error) => save_code(error),
-            Failure::RealClock | Failure::RealArm => 2,
+            Failure::VirtualTimeOnRealBus | Failure::FaultTestOnRealArm => 2,
             Failure::Injection(_) | Failure::InjectionIntoRealArm => 2,
-            Failure::NoSuchProcess { .. } | Failure::NoSuchRow { .. } => 2,
-            Failure::Drill { .. } | Failure::NotTracking => 12,
+            Failure::NoSuchProcess { .. } | Failure::NoSuchTestCase { .. } => 2,
+            Failure::Drill { .. } | Failure::DidNotReachTracking => 12,
             Failure::Ipc(_)
             | Failure::Bus(_)
             | Failure::Pendant { .. }
             | Failure::AlreadyRunning { .. }
-            | Failure::NoSibling { .. }
+            | Failure::MissingProgram { .. }
             | Failure::ProcessEnded { .. }
             | Failure::NotRunning { .. } => 10,
             Failure::Refused { .. } => 11,
-            Failure::Figure(_) | Failure::Compose(_) => 1,
+            Failure::Figure(_) | Failure::ReportGeneration(_) => 1,
         }
     }
 }
 
-/// What the description of the arm brings about is an error of the description.
+/// Errors caused by the arm description get the code of the description.
 fn experiment_code(error: &ExperimentError) -> u8 {
     match error {
         ExperimentError::Model(_)
         | ExperimentError::Arm(_)
         | ExperimentError::Config(_)
         | ExperimentError::Plant(_) => 3,
-        ExperimentError::Unreachable { .. }
+        ExperimentError::BeyondJointStop { .. }
         | ExperimentError::Refused { .. }
         | ExperimentError::FaultAtStart { .. }
         | ExperimentError::Fault { .. }
@@ -397,10 +395,10 @@ mod tests {
     use std::collections::BTreeSet;
     use std::io::ErrorKind;
 
-    /// Rows of the table that are no [`Failure`]: done, wrong use as clap has it, interrupted.
+    /// Rows of the table without a [`Failure`]: success, wrong use as clap has it, interrupted.
     const ELSEWHERE: [u8; 3] = [0, 2, 130];
 
-    /// The rows of `--help`: code and meaning.
+    /// Rows of the table in `--help`: code and meaning.
     fn rows() -> Vec<(u8, &'static str)> {
         let rows = CODES.lines().skip(1).map(|line| {
             let (code, meaning) = line.trim().split_once(' ').expect("a code and its meaning");
@@ -413,31 +411,31 @@ mod tests {
         ErrorKind::StorageFull.into()
     }
 
-    /// A failure of each kind, with words of the row that it belongs to.
+    /// A failure of each kind, with a part of the meaning of its row.
     fn failures() -> Vec<(Failure, &'static str)> {
-        let words = String::new;
+        let text = String::new;
         let path = || PathBuf::from("file");
         let model = || ModelError::Dof { found: 2 };
-        let mcap = || LogError::Busy { file: words() };
+        let mcap = || LogError::Busy { file: text() };
         let ident = || IdentError::Shape {
-            argument: words(),
-            expected: words(),
-            found: words(),
+            argument: text(),
+            expected: text(),
+            found: text(),
         };
         let file = || Failure::file("write", Path::new("file"), io());
-        let arm = "the description of the arm";
-        let (fault, disk, system) = ("a fault", "a file cannot be", "no system runs");
-        let runs = words();
+        let arm = "invalid arm description";
+        let (fault, disk, system) = ("a fault", "a file cannot be", "no system is running");
+        let runs = text();
         vec![
-            (Failure::Compose(words()), "a defect"),
-            (Failure::RealClock, "wrong use"),
-            (Failure::RealArm, "wrong use"),
-            (Failure::NoSuchProcess { name: "" }, "wrong use"),
+            (Failure::ReportGeneration(text()), "a bug"),
+            (Failure::VirtualTimeOnRealBus, "invalid command line"),
+            (Failure::FaultTestOnRealArm, "invalid command line"),
+            (Failure::NoSuchProcess { name: "" }, "invalid command line"),
             (Failure::Model(model()), arm),
             (
                 Failure::UnknownArm {
-                    found: words(),
-                    known: words(),
+                    found: text(),
+                    known: text(),
                 },
                 arm,
             ),
@@ -445,8 +443,8 @@ mod tests {
             (Failure::Save(SaveError::Model(model())), arm),
             (Failure::Experiment(ExperimentError::Model(model())), arm),
             (Failure::Fault { runs, out: path() }, fault),
-            (Failure::RunFault { faults: words() }, fault),
-            (Failure::InFault, fault),
+            (Failure::RunFault { faults: text() }, fault),
+            (Failure::SystemInFault, fault),
             (file(), disk),
             (Failure::Exists { path: path() }, disk),
             (Failure::Log(mcap()), disk),
@@ -460,46 +458,46 @@ mod tests {
             (Failure::TraceEnded { name: "supple-sim" }, disk),
             (
                 Failure::Save(SaveError::Model(ModelError::Write {
-                    file: words(),
+                    file: text(),
                     error: io(),
                 })),
                 disk,
             ),
             (
-                Failure::Different {
+                Failure::ReplayMismatch {
                     path: path(),
                     different: 1,
                     steps: 2,
                 },
                 "a replay",
             ),
-            (Failure::NotReady { failed: words() }, "the machine"),
-            (Failure::Ident(ident()), "the logs do not give"),
+            (Failure::NotReady { failed: text() }, "the machine"),
+            (Failure::Ident(ident()), "no model can be identified"),
             (
                 Failure::Save(SaveError::Fit(ident())),
-                "the logs do not give",
+                "no model can be identified",
             ),
             (
                 Failure::Experiment(ExperimentError::Ident(ident())),
-                "the logs do not give",
+                "no model can be identified",
             ),
-            (Failure::NotRunning { prefix: words() }, system),
+            (Failure::NotRunning { prefix: text() }, system),
             (
                 Failure::ProcessEnded {
                     name: "",
-                    status: words(),
+                    status: text(),
                 },
                 system,
             ),
             (
                 Failure::AlreadyRunning {
-                    prefix: words(),
+                    prefix: text(),
                     process: 1,
                 },
                 system,
             ),
             (
-                Failure::NoSibling {
+                Failure::MissingProgram {
                     name: "",
                     program: path(),
                 },
@@ -508,32 +506,35 @@ mod tests {
             (
                 Failure::Pendant {
                     socket: path(),
-                    cause: words(),
+                    cause: text(),
                 },
                 system,
             ),
-            (Failure::Refused { words: words() }, "refused a request"),
-            (Failure::NotTracking, "a drill"),
-            (Failure::Drill { rows: words() }, "a drill"),
+            (Failure::Refused { reason: text() }, "refused a request"),
+            (Failure::DidNotReachTracking, "supple drill"),
+            (Failure::Drill { rows: text() }, "supple drill"),
             (
                 Failure::Experiment(ExperimentError::Stuck {
                     joint: 0,
                     torque_nm: 1.0,
                 }),
-                "the arm cannot do",
+                "the arm cannot perform",
             ),
         ]
     }
 
     #[test]
-    fn every_failure_has_the_code_of_its_row_and_every_row_its_failure() {
+    fn every_failure_has_a_documented_code_and_every_code_a_failure() {
         let rows = rows();
         let mut seen = BTreeSet::from(ELSEWHERE);
-        for (failure, words) in failures() {
+        for (failure, meaning_part) in failures() {
             let code = failure.code();
             let row = rows.iter().find(|(of, _)| *of == code);
             let (_, meaning) = row.unwrap_or_else(|| panic!("{code} of {failure} is in no row"));
-            assert!(meaning.contains(words), "{failure}: {code} is `{meaning}`");
+            assert!(
+                meaning.contains(meaning_part),
+                "{failure}: {code} is `{meaning}`"
+            );
             assert_ne!(failure.kind(), "", "{failure}");
             assert_eq!(failure.kind() == "internal", code == 1, "{failure}");
             seen.insert(code);
@@ -543,9 +544,9 @@ mod tests {
         assert_eq!(stated.len(), rows.len(), "a code has one row");
     }
 
-    /// The table of the module is that of `--help`.
+    /// Compares the table of the module documentation with that of `--help`.
     #[test]
-    fn both_tables_say_the_same() {
+    fn the_module_documents_the_same_codes_as_help() {
         let source = include_str!("exit.rs");
         let documented: Vec<(u8, &str)> = source
             .lines()

@@ -1,4 +1,4 @@
-//! An interrupted run leaves no half-written folder.
+//! Signal handling: removes partial output when a run is interrupted.
 
 use rustix::process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal};
 use std::os::fd::OwnedFd;
@@ -7,63 +7,63 @@ use std::process::Child;
 use std::sync::{Mutex, OnceLock};
 use supple_realtime::Stop;
 
-/// Exit code after an interrupt, as shells give it.
+/// Exit code after an interrupt, as shells define it.
 const INTERRUPTED: i32 = 130;
 
 /// The folder that is being written.
 static PARTIAL: Mutex<Option<PathBuf>> = Mutex::new(None);
 
-/// Somebody ends in order when asked to.
-static CAUGHT: OnceLock<Stop> = OnceLock::new();
+/// Shutdown request, if a caller handles interrupts itself.
+static SHUTDOWN_REQUEST: OnceLock<Stop> = OnceLock::new();
 
-/// The process that is asked to end at once, whatever this one waits for just then.
-static FIRST: Mutex<Option<OwnedFd>> = Mutex::new(None);
+/// Child process to which interrupts are forwarded immediately.
+static FORWARD_SIGNAL_TO: Mutex<Option<OwnedFd>> = Mutex::new(None);
 
-/// From now on an interrupt that is caught asks this child to end as well, before whoever ends in order comes to it.
-pub fn pass_on_to(child: &Child) {
+/// From this call on an interrupt is also forwarded to this child, before the ordered shutdown reaches it.
+pub fn forward_interrupts_to(child: &Child) {
     let process = i32::try_from(child.id()).ok().and_then(Pid::from_raw);
-    // A descriptor means this very process, even when its number is somebody else's. Without one the child is asked to
-    // end in its turn.
+    // A pidfd refers to this exact process even if its PID is reused. Without a pidfd, the child is terminated during
+    // the ordered shutdown.
     let process = process.and_then(|pid| pidfd_open(pid, PidfdFlags::empty()).ok());
-    *FIRST
+    *FORWARD_SIGNAL_TO
         .lock()
         .unwrap_or_else(|poisoned| poisoned.into_inner()) = process;
 }
 
-fn pass_on() {
-    let first = FIRST
+fn forward_interrupt() {
+    let first = FORWARD_SIGNAL_TO
         .lock()
         .unwrap_or_else(|poisoned| poisoned.into_inner());
     if let Some(process) = first.as_ref() {
-        // One that has ended needs no signal.
+        // Ignore errors: the process may have exited already.
         let _ = pidfd_send_signal(process, Signal::TERM);
     }
 }
 
-/// From now on an interrupt ends nothing by itself: it is asked for, and whoever called this ends in order.
-pub fn catch() -> Stop {
-    CAUGHT.get_or_init(Stop::default).clone()
+/// From this call on an interrupt only sets the returned shutdown request; the caller shuts down.
+pub fn shutdown_on_interrupt() -> Stop {
+    SHUTDOWN_REQUEST.get_or_init(Stop::default).clone()
 }
 
-/// Removes `partial` if the program is interrupted from now on; `None` removes nothing.
-pub fn guard(partial: Option<PathBuf>) {
+/// Sets the folder that is removed if the program is interrupted; `None` removes nothing.
+pub fn set_partial_folder(partial: Option<PathBuf>) {
     *PARTIAL
         .lock()
         .unwrap_or_else(|poisoned| poisoned.into_inner()) = partial;
 }
 
-/// Ends the program on interrupt and on termination, without what is half written. To be called once.
+/// Installs the signal handler: on SIGINT or SIGTERM it removes the partial folder and exits. Call once.
 #[expect(
     clippy::disallowed_methods,
-    reason = "an interrupt ends the program at once; what it would leave is removed first"
+    reason = "an interrupt ends the program immediately, after removing the partial folder"
 )]
 pub fn install() {
-    supple_realtime::keep_running();
-    // Without the handler the system ends the program as well, only the folder stays.
+    supple_realtime::ignore_file_size_and_tty_signals();
+    // If the handler cannot be installed, the signal still ends the program, but the folder remains.
     let _ = ctrlc::set_handler(|| {
-        if let Some(stop) = CAUGHT.get() {
-            stop.ask();
-            return pass_on();
+        if let Some(stop) = SHUTDOWN_REQUEST.get() {
+            stop.request_shutdown();
+            return forward_interrupt();
         }
         let partial = PARTIAL
             .lock()

@@ -1,7 +1,7 @@
-//! The command line of supple: the demo with its figures and report, whole systems as processes, talking to
-//! them, and what is done with logs.
+//! The supple command line: demo with figures and report, complete systems as processes, operator commands, log
+//! tools.
 //!
-//! A library only so that its parts can be tested; the program is `supple`.
+//! It is a library only so that tests can reach its parts; the program is `supple`.
 
 #![forbid(unsafe_code)]
 
@@ -31,14 +31,14 @@ use cli::{Cli, Command};
 use exit::Failure;
 use std::process::ExitCode;
 
-/// The whole program, from its arguments to its exit code.
+/// Runs the program: parses its arguments and returns its exit code.
 pub fn run() -> ExitCode {
     let cli = Cli::parse();
     interrupt::install();
     let code = match dispatch(&cli.command) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            console::complain(&failure, cli.command.json());
+            console::report_error(&failure, cli.command.json());
             ExitCode::from(&failure)
         }
     };
@@ -51,14 +51,18 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
         Command::Demo(args) => demo::run(args),
         Command::Up(args) => up::run(args),
         Command::Drill(args) => drill::run(args),
-        Command::Status(place) => operate::status(place),
-        Command::Mode { mode, place } => operate::mode(*mode, place),
+        Command::Status(system) => operate::status(system),
+        Command::Mode { mode, system } => operate::mode(*mode, system),
         Command::Gains(args) => operate::gains(args),
         Command::Track(args) => operate::track(args),
-        Command::Probe { arm, strict, place } => operate::probe(arm, *strict, place),
+        Command::Probe {
+            arm,
+            strict,
+            system,
+        } => operate::probe(arm, *strict, system),
         Command::Pendant { action, prefix } => operate::pendant(*action, prefix.as_deref()),
-        Command::Reset(place) => operate::reset(place),
-        Command::Stop(place) => operate::stop(place),
+        Command::Reset(system) => operate::reset(system),
+        Command::Stop(system) => operate::stop(system),
         Command::Log(command) => log::run(command),
         Command::Identification(command) => identification::run(command),
         Command::Arms { json } => arms::list(*json),
@@ -66,7 +70,7 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(*shell, &mut Cli::command(), "supple", &mut script);
-            console::say(String::from_utf8_lossy(&script).trim_end())
+            console::print_line(String::from_utf8_lossy(&script).trim_end())
         }
     }
 }

@@ -1,8 +1,7 @@
-//! `supple log`: what is in a log, a channel as a table, the run again, and what can be saved of a log
-//! that was cut.
+//! `supple log`: info, export, replay, recover.
 
 use crate::cli::LogCommand;
-use crate::console::{say, say_json};
+use crate::console::{print_json, print_line};
 use crate::exit::Failure;
 use std::fs;
 use std::io::{BufWriter, ErrorKind, Write};
@@ -11,19 +10,19 @@ use std::path::{Path, PathBuf};
 use supple_files::{check_output, create_output, with_suffix};
 use supple_log::{LogError, export_csv, info, recover, replay};
 
-/// Ending of a log that is still being written, or was when its writer died.
+/// File extension of a log that is being written, or whose writer died.
 const PART: &str = "part";
-/// The same with its dot.
+/// The same with the dot.
 const PART_SUFFIX: &str = ".part";
 
-/// Does it.
+/// Runs `supple log`.
 ///
 /// # Errors
 /// [`Failure`].
 pub fn run(command: &LogCommand) -> Result<(), Failure> {
     match command {
-        LogCommand::Info { file, json: false } => say(info(file)?.to_string().trim_end()),
-        LogCommand::Info { file, json: true } => say_json(&info(file)?),
+        LogCommand::Info { file, json: false } => print_line(info(file)?.to_string().trim_end()),
+        LogCommand::Info { file, json: true } => print_json(&info(file)?),
         LogCommand::Export {
             file,
             channel,
@@ -39,12 +38,12 @@ pub fn run(command: &LogCommand) -> Result<(), Failure> {
         LogCommand::Replay { file, json } => {
             let replay = replay(file)?;
             match json {
-                true => say_json(&replay)?,
-                false => say(&replay.to_string())?,
+                true => print_json(&replay)?,
+                false => print_line(&replay.to_string())?,
             }
             match replay.different_steps {
                 0 => Ok(()),
-                different => Err(Failure::Different {
+                different => Err(Failure::ReplayMismatch {
                     path: file.clone(),
                     different,
                     steps: replay.steps,
@@ -63,8 +62,8 @@ pub fn run(command: &LogCommand) -> Result<(), Failure> {
             }
             let recovery = recover(from, &to)?;
             match json {
-                true => say_json(&recovery),
-                false => say(&recovery.to_string()),
+                true => print_json(&recovery),
+                false => print_line(&recovery.to_string()),
             }
         }
     }
@@ -73,14 +72,14 @@ pub fn run(command: &LogCommand) -> Result<(), Failure> {
 fn export_to_stdout(file: &Path, channel: &str, every: NonZeroU64) -> Result<(), Failure> {
     let mut out = BufWriter::new(std::io::stdout().lock());
     match export_csv(file, channel, every, &mut out) {
-        // A reader that has seen enough is no failure.
+        // A closed pipe is not an error.
         Err(LogError::Output(error)) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
         Err(error) => Err(error.into()),
         Ok(_) => Ok(()),
     }
 }
 
-/// The table takes its name when it is whole.
+/// Writes the table to a temporary file and renames it when it is complete.
 fn export_to_file(
     file: &Path,
     channel: &str,
@@ -104,7 +103,7 @@ fn export_to_file(
             whole.map(|()| rows).map_err(|error| failed("write", error))
         });
     match written {
-        Ok(rows) => say(&format!("{}: {rows} rows", out.display())),
+        Ok(rows) => print_line(&format!("{}: {rows} rows", out.display())),
         Err(failure) => {
             let _ = fs::remove_file(&part);
             Err(failure)
@@ -112,7 +111,7 @@ fn export_to_file(
     }
 }
 
-/// `run.mcap` and `run.mcap.part` become `run.recovered.mcap`.
+/// Name of the recovered log: `run.mcap` and `run.mcap.part` become `run.recovered.mcap`.
 fn recovered_name(from: &Path) -> PathBuf {
     let named = match from.extension() {
         Some(ending) if ending == PART => from.with_extension(""),
@@ -127,7 +126,7 @@ mod tests {
     use std::path::Path;
 
     #[test]
-    fn recovered_logs_are_told_from_what_they_come_from() {
+    fn a_recovered_log_gets_another_name() {
         for from in ["a/run.mcap", "a/run.mcap.part"] {
             let to = recovered_name(Path::new(from));
             assert_eq!(to, Path::new("a/run.recovered.mcap"));

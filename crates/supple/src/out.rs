@@ -1,10 +1,10 @@
-//! A folder of results that is never half of anything.
+//! Writes a folder of results atomically.
 //!
-//! Files are written to a hidden folder beside their place, on the same file system. When all are
-//! whole they are waited for until they are on the disk, and moved: the folder as one where there was
-//! none, otherwise file by file, each replacing one of its name at once. What else is in the folder
-//! stays. A run that fails or is interrupted leaves no file. Where a device, a FIFO, a socket or a folder has
-//! the name of a result, nothing is run and nothing is written.
+//! Files are written to a hidden folder beside the target, on the same file system. When all files are complete, they
+//! are synced to disk and moved: the whole folder if the target does not exist, otherwise file by file, each
+//! atomically replacing a file of the same name. Other files in the folder are kept. A run that fails or is
+//! interrupted leaves no file. If a device, a FIFO, a socket or a folder has the name of a result, nothing is run and
+//! nothing is written.
 
 use crate::exit::Failure;
 use crate::interrupt;
@@ -13,10 +13,10 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use supple_files::{check_output, create_output};
 
-/// The file whose presence says that the results are whole: it is moved last.
+/// Moved last: its presence marks the results as complete.
 const LAST: &str = "summary.json";
 
-/// Results on their way.
+/// Results that are not published yet.
 #[derive(Debug)]
 pub struct Staging {
     target: PathBuf,
@@ -24,10 +24,10 @@ pub struct Staging {
 }
 
 impl Staging {
-    /// For results that are to end up in `target`, `names` among them.
+    /// Prepares results for the folder `target`; `names` are files that will be written.
     ///
     /// # Errors
-    /// [`Failure::File`] where nothing can be written there, or what has one of the names is no file.
+    /// [`Failure::File`] if the folder is not writable, or one of the names is not a regular file.
     pub fn new(target: &Path, names: &[&str]) -> Result<Staging, Failure> {
         let process = std::process::id();
         let partial = if target.is_dir() {
@@ -40,18 +40,18 @@ impl Staging {
             let error = std::io::ErrorKind::NotADirectory.into();
             return Err(Failure::file("write into", target, error));
         }
-        for place in names.iter().map(|name| target.join(name)) {
-            refuse_special(&place)?;
+        for target in names.iter().map(|name| target.join(name)) {
+            reject_special_file(&target)?;
         }
         fs::create_dir_all(&partial).map_err(|error| Failure::file("create", target, error))?;
-        interrupt::guard(Some(partial.clone()));
+        interrupt::set_partial_folder(Some(partial.clone()));
         Ok(Staging {
             target: target.to_owned(),
             partial,
         })
     }
 
-    /// A folder among the results.
+    /// Creates a folder among the results.
     ///
     /// # Errors
     /// [`Failure::File`].
@@ -62,7 +62,7 @@ impl Staging {
         Ok(folder)
     }
 
-    /// A file among the results, all of it.
+    /// Writes a complete file among the results.
     ///
     /// # Errors
     /// [`Failure::File`].
@@ -72,11 +72,11 @@ impl Staging {
         written.map_err(|error| Failure::file("write", &self.target.join(name), error))
     }
 
-    /// Moves everything to its place.
+    /// Moves all results to the target folder.
     ///
     /// # Errors
-    /// [`Failure::File`]; every file that is in its place is whole then too. None is moved where what has the
-    /// name of one is no file.
+    /// [`Failure::File`]; files that have been moved are complete even then. No file is moved if the target of one is
+    /// not a regular file.
     pub fn publish(self) -> Result<(), Failure> {
         let files =
             files_in(&self.partial).map_err(|error| Failure::file("read", &self.partial, error))?;
@@ -87,29 +87,29 @@ impl Staging {
         if !self.target.exists() && fs::rename(&self.partial, &self.target).is_ok() {
             return Ok(());
         }
-        for place in files.iter().map(|file| self.target.join(file)) {
-            refuse_special(&place)?;
+        for target in files.iter().map(|file| self.target.join(file)) {
+            reject_special_file(&target)?;
         }
         let (last, others): (Vec<_>, Vec<_>) = files
             .iter()
             .partition(|file| file.as_path() == Path::new(LAST));
         for file in others.into_iter().chain(last) {
-            let place = self.target.join(file);
-            let moved = place
+            let target = self.target.join(file);
+            let moved = target
                 .parent()
                 .map_or(Ok(()), fs::create_dir_all)
-                .and_then(|()| fs::rename(self.partial.join(file), &place));
-            moved.map_err(|error| Failure::file("replace", &place, error))?;
+                .and_then(|()| fs::rename(self.partial.join(file), &target));
+            moved.map_err(|error| Failure::file("replace", &target, error))?;
         }
         Ok(())
     }
 }
 
-fn refuse_special(place: &Path) -> Result<(), Failure> {
-    match check_output(place) {
-        // A file where a folder is wanted is found when the folder is made.
+fn reject_special_file(target: &Path) -> Result<(), Failure> {
+    match check_output(target) {
+        // A file in the place of a folder is reported when the folder is created.
         Err(error) if error.kind() != std::io::ErrorKind::NotADirectory => {
-            Err(Failure::file("replace", place, error))
+            Err(Failure::file("replace", target, error))
         }
         _ => Ok(()),
     }
@@ -117,9 +117,9 @@ fn refuse_special(place: &Path) -> Result<(), Failure> {
 
 impl Drop for Staging {
     fn drop(&mut self) {
-        // Gone already where it was moved as one; what is left otherwise is of no use.
+        // Already gone if the folder was moved as a whole; otherwise remove the leftovers.
         let _ = fs::remove_dir_all(&self.partial);
-        interrupt::guard(None);
+        interrupt::set_partial_folder(None);
     }
 }
 
@@ -156,13 +156,13 @@ mod tests {
         let staging = Staging::new(target, &[]).expect("it can be written");
         staging.folder("figures").expect("a folder");
         for name in ["figures/a.svg", "report.html", LAST] {
-            staging.write(name, b"whole").expect("written");
+            staging.write(name, b"complete").expect("written");
         }
         staging
     }
 
     #[test]
-    fn a_new_folder_appears_as_one() {
+    fn a_new_folder_is_published_at_once() {
         let folder = tempfile::tempdir().expect("a folder");
         let target = folder.path().join("deep/down");
         let staging = staged(&target);
@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_dropped_leaves_no_file() {
+    fn dropped_results_leave_no_file() {
         let folder = tempfile::tempdir().expect("a folder");
         fs::write(folder.path().join("other"), "kept").expect("written");
         drop(staged(folder.path()));
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_in_the_place_of_a_file_is_refused_and_nothing_is_moved() {
+    fn a_folder_with_the_name_of_a_result_is_rejected_and_nothing_is_moved() {
         let folder = tempfile::tempdir().expect("a folder");
         let target = folder.path();
         fs::create_dir_all(target.join("report.html/in the way")).expect("a folder");
@@ -192,13 +192,14 @@ mod tests {
         assert_eq!(failure.code(), 6);
         assert!(failure.to_string().contains("report.html"), "{failure}");
         assert!(names(target).is_empty(), "{:?}", names(target));
-        Staging::new(target, &["report.html"]).expect_err("before anything is run, if told");
+        Staging::new(target, &["report.html"])
+            .expect_err("rejected before the run if the name is given");
         assert!(names(target).is_empty() && target.join("report.html").is_dir());
     }
 
     #[cfg(unix)]
     #[test]
-    fn a_fifo_in_the_place_of_a_file_stays() {
+    fn a_fifo_with_the_name_of_a_result_is_not_replaced() {
         use std::os::unix::fs::FileTypeExt;
         let folder = tempfile::tempdir().expect("a folder");
         let fifo = folder.path().join(LAST);

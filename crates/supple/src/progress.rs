@@ -1,35 +1,35 @@
-//! How far the demo is: a bar on a terminal, a line now and then elsewhere, nothing if asked so.
+//! Progress of the demo: a bar on a terminal, a line every 20 % otherwise, nothing in quiet mode.
 
-use crate::console::remark;
+use crate::console::print_status;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::sync::Mutex;
 use std::time::Duration;
 use supple_experiment::Progress;
 
-/// Share of the work between two lines.
+/// Fraction of the work between two lines.
 const LINE_EVERY: f64 = 0.2;
 /// Steps of the bar.
 const STEPS: u64 = 1000;
 
-/// Shows progress.
-pub enum Meter {
-    /// On a terminal.
+/// Reports progress on standard error.
+pub enum ProgressReporter {
+    /// Progress bar, on a terminal.
     Bar(ProgressBar),
-    /// Elsewhere: the share at which the next line is due.
+    /// Lines of text, otherwise: the fraction at which the next line is due.
     Lines(Mutex<f64>),
-    /// Not at all.
+    /// No output.
     Quiet,
 }
 
-impl Meter {
-    /// The one for this standard error.
-    pub fn new(quiet: bool) -> Meter {
+impl ProgressReporter {
+    /// Selects the reporter for this standard error.
+    pub fn new(quiet: bool) -> ProgressReporter {
         if quiet {
-            return Meter::Quiet;
+            return ProgressReporter::Quiet;
         }
         if !std::io::stderr().is_terminal() {
-            return Meter::Lines(Mutex::new(LINE_EVERY));
+            return ProgressReporter::Lines(Mutex::new(LINE_EVERY));
         }
         let bar = ProgressBar::new(STEPS);
         if let Ok(style) = ProgressStyle::with_template("{bar:32} {percent:>3} %  {elapsed}  {msg}")
@@ -37,37 +37,37 @@ impl Meter {
             bar.set_style(style);
         }
         bar.enable_steady_tick(Duration::from_millis(200));
-        Meter::Bar(bar)
+        ProgressReporter::Bar(bar)
     }
 
-    /// Takes note of a run that has ended.
+    /// Updates the progress after a finished run.
     pub fn show(&self, progress: &Progress) {
-        let share = progress.done_s / progress.total_s;
+        let fraction = progress.done_s / progress.total_s;
         match self {
-            Meter::Bar(bar) => {
-                bar.set_position((share * STEPS as f64) as u64);
+            ProgressReporter::Bar(bar) => {
+                bar.set_position((fraction * STEPS as f64) as u64);
                 bar.set_message(progress.finished.clone());
             }
-            Meter::Lines(next) => {
+            ProgressReporter::Lines(next) => {
                 let mut next = next.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-                if share >= *next - 1e-9 {
-                    *next = (share / LINE_EVERY).floor() * LINE_EVERY + LINE_EVERY;
+                if fraction >= *next - 1e-9 {
+                    *next = (fraction / LINE_EVERY).floor() * LINE_EVERY + LINE_EVERY;
                     let Progress {
                         done_s, total_s, ..
                     } = progress;
-                    remark(&format!(
+                    print_status(&format!(
                         "{:3.0} %  {done_s:.0} of {total_s:.0} s of simulated time",
-                        100.0 * share
+                        100.0 * fraction
                     ));
                 }
             }
-            Meter::Quiet => {}
+            ProgressReporter::Quiet => {}
         }
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub fn finish(&self) {
-        if let Meter::Bar(bar) = self {
+        if let ProgressReporter::Bar(bar) = self {
             bar.finish_and_clear();
         }
     }

@@ -1,14 +1,13 @@
-//! Numbers on the command line, each within the range in which it makes sense: `1e300` would fill the memory
-//! or never end.
+//! Range checks for numeric arguments: a value such as `1e300` would exhaust memory or never terminate.
 
-/// A parser of finite numbers from `least` to `greatest`, both included.
+/// Returns a parser for finite numbers from `min` to `max`, both included.
 pub fn between(
-    least: f64,
-    greatest: f64,
+    min: f64,
+    max: f64,
 ) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync + 'static {
     move |text| match text.trim().parse::<f64>() {
-        Ok(value) if (least..=greatest).contains(&value) => Ok(value),
-        _ => Err(format!("give a number from {least} to {greatest}")),
+        Ok(value) if (min..=max).contains(&value) => Ok(value),
+        _ => Err(format!("give a number from {min} to {max}")),
     }
 }
 
@@ -17,7 +16,7 @@ mod tests {
     use super::between;
 
     #[test]
-    fn only_what_is_within_passes() {
+    fn only_numbers_within_the_range_are_accepted() {
         let parse = between(-1.0, 1e3);
         for (text, value) in [("-1", -1.0), ("0.5", 0.5), ("1e3", 1e3)] {
             assert_eq!(parse(text), Ok(value));

@@ -1,11 +1,11 @@
-//! `report.html`: one file that needs no other and no network.
+//! `report.html`: one self-contained file that needs no network.
 
 use crate::exit::Failure;
 use crate::figures::Figure;
 use crate::sections::{Section, faults, sections};
 use crate::units::{figures, percent, plain, seconds};
 use askama::Template;
-use supple_experiment::summary::{Exploration, Summary};
+use supple_experiment::summary::{ProbingSummary, Summary};
 use supple_experiment::{Demo, Mismatch};
 use supple_model::Description;
 use supple_plant::Material;
@@ -40,10 +40,10 @@ struct StiffnessTable {
     rows: Vec<[String; 9]>,
 }
 
-/// The report of a demo.
+/// Renders the report of a demo.
 ///
 /// # Errors
-/// [`Failure::Compose`].
+/// [`Failure::ReportGeneration`].
 pub fn html(
     demo: &Demo,
     arm: &Description,
@@ -75,7 +75,7 @@ pub fn html(
                 &summary.exploration,
             ),
             stiffness_table(
-                "Friction feed-forward left on",
+                "Friction feed-forward stays on",
                 &summary.exploration_fade_off,
             ),
         ],
@@ -87,10 +87,10 @@ pub fn html(
     };
     report
         .render()
-        .map_err(|error| Failure::Compose(error.to_string()))
+        .map_err(|error| Failure::ReportGeneration(error.to_string()))
 }
 
-/// Each fault with its run.
+/// One line per fault, with its run.
 pub fn fault_lines(summary: &Summary) -> Vec<String> {
     let lines = faults(summary).into_iter();
     lines
@@ -115,7 +115,7 @@ fn superscript(digit: char) -> char {
     }
 }
 
-fn stiffness_table(title: &'static str, lines: &[Exploration]) -> StiffnessTable {
+fn stiffness_table(title: &'static str, lines: &[ProbingSummary]) -> StiffnessTable {
     let rows = lines.iter().map(|e| {
         [
             e.stiffness_n_per_m.to_string(),

@@ -1,12 +1,12 @@
-//! The table that the demo prints: what was measured beside what the paper says in words.
+//! The table that the demo prints: measured results beside the statements of the paper.
 
 use crate::units::{figures, newton_seconds, newtons, percent, plain, seconds};
 use comfy_table::{ContentArrangement, Table, presets};
 use supple_experiment::JointTorque;
 use supple_experiment::metrics::median;
-use supple_experiment::summary::{Contact, Summary, Tracking};
+use supple_experiment::summary::{ContactStatistics, Summary, TrackingError};
 
-/// A line a quantity.
+/// Formats the summary, one line per quantity.
 pub fn table(summary: &Summary) -> String {
     let mut table = Table::new();
     table
@@ -19,7 +19,7 @@ pub fn table(summary: &Summary) -> String {
     table.trim_fmt()
 }
 
-/// Quantity, measured, paper.
+/// Quantity, measured value, statement of the paper.
 type Line = [String; 3];
 
 fn line(quantity: &str, measured: String, paper: &str) -> Line {
@@ -27,12 +27,12 @@ fn line(quantity: &str, measured: String, paper: &str) -> Line {
 }
 
 fn free_motion(summary: &Summary) -> Vec<Line> {
-    let paces: Vec<_> = summary
+    let speeds: Vec<_> = summary
         .sinusoid_by_speed
         .iter()
         .filter(|at| at.speed != 1.0)
         .collect();
-    let names: Vec<_> = paces
+    let names: Vec<_> = speeds
         .iter()
         .map(|at| format!("{} \u{d7}", at.speed))
         .collect();
@@ -49,8 +49,8 @@ fn free_motion(summary: &Summary) -> Vec<Line> {
             "follows closely (fig. 3a)",
         ),
         line(
-            &format!("  at {} the pace", names.join(", ")),
-            rms(&paces.iter().map(|at| &at.tracking).collect::<Vec<_>>()),
+            &format!("  at {} the speed", names.join(", ")),
+            rms(&speeds.iter().map(|at| &at.tracking).collect::<Vec<_>>()),
             "essentially unchanged",
         ),
         line(
@@ -64,14 +64,14 @@ fn free_motion(summary: &Summary) -> Vec<Line> {
             "",
         ),
         line(
-            "  (3.6) to the letter",
-            letter(&summary.paper_letter),
-            "the law it gives",
+            "  (3.6) exactly as printed",
+            paper_law(&summary.paper_letter),
+            "the law of the paper",
         ),
         line(
             "quadrant, RMS error, exact model",
             rms(&[&summary.quadrant.tracking]),
-            "errors at corners die out (fig. 3b)",
+            "errors at corners decay (fig. 3b)",
         ),
         line(
             &format!(
@@ -107,7 +107,7 @@ fn contact(summary: &Summary) -> Vec<Line> {
         .map(|e| e.contact.impulse_first_50ms_newton_s)
         .collect();
     let or_none = |value: Option<String>| value.unwrap_or_else(|| "none".to_owned());
-    let fit = |contact: &Contact| {
+    let fit = |contact: &ContactStatistics| {
         let fit = contact.impulse_fit.as_ref();
         or_none(fit.map(|fit| {
             let [intercept, slope] = [fit.intercept, fit.slope].map(figures);
@@ -139,12 +139,12 @@ fn contact(summary: &Summary) -> Vec<Line> {
         line(
             "  first 50 ms, median, fade on",
             or_none(median(&first).map(newton_seconds)),
-            "the impact's share",
+            "contribution of the impact",
         ),
     ]
 }
 
-fn rms(runs: &[&Tracking]) -> String {
+fn rms(runs: &[&TrackingError]) -> String {
     let errors: Vec<_> = runs.iter().map(|run| run.rms_error_m).collect();
     let ended = runs.iter().filter_map(|run| run.ended.as_ref()).count();
     let errors = millimetres(&errors);
@@ -159,7 +159,7 @@ fn millimetres(metres: &[f64]) -> String {
     format!("{} mm", each.join(", "))
 }
 
-fn letter(run: &Tracking) -> String {
+fn paper_law(run: &TrackingError) -> String {
     match &run.ended {
         Some(ended) => format!("ended by a fault at {}", seconds(ended.ended_s)),
         None => rms(&[run]),

@@ -1,4 +1,4 @@
-//! Numbers as people read them: three figures, a unit, a true minus sign.
+//! Formats numbers for people: three significant figures, a unit, a typographic minus sign.
 
 /// Three significant figures.
 pub fn figures(value: f64) -> String {
@@ -9,7 +9,7 @@ pub fn figures(value: f64) -> String {
     plain(value, usize::try_from(2 - magnitude).unwrap_or(0))
 }
 
-/// So many decimals.
+/// Fixed number of decimals.
 pub fn plain(value: f64, decimals: usize) -> String {
     format!("{value:.decimals$}").replace('-', "\u{2212}")
 }
@@ -34,9 +34,9 @@ pub fn newton_metres(value: f64) -> String {
     format!("{} N m", figures(value))
 }
 
-/// A share, in percent.
-pub fn percent(share: f64) -> String {
-    format!("{} %", figures(100.0 * share))
+/// A fraction, in percent.
+pub fn percent(fraction: f64) -> String {
+    format!("{} %", figures(100.0 * fraction))
 }
 
 /// Seconds.

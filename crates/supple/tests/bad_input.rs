@@ -1,5 +1,5 @@
-//! Wrong descriptions, experiments that an arm cannot do, folders that cannot be written, a full disk:
-//! a clear line, a documented code, and nothing left behind.
+//! Invalid descriptions, infeasible experiments, read-only folders, a full disk: each gives one error line, the
+//! documented exit code and no output files.
 
 mod support;
 
@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use supple_model::Description;
 use support::{Answer, arg, assert_one_clear_line, run, supple, tree};
 
-/// The 4-joint arm in a folder of its own, both files changed.
+/// Writes the 4-joint arm with both files changed into a new folder.
 fn arm_in(
     folder: &Path,
     toml: impl Fn(String) -> String,
@@ -34,7 +34,7 @@ fn demo_of(arm: &Path, out: &Path) -> Answer {
     ])
 }
 
-/// Replaces what is there at least once.
+/// Replaces the first occurrence; there must be one.
 fn replaced(text: String, from: &str, to: &str) -> String {
     assert!(text.contains(from), "{from} is in the file");
     text.replacen(from, to, 1)
@@ -45,7 +45,7 @@ fn same(text: String) -> String {
 }
 
 #[test]
-fn a_number_that_is_none_in_a_urdf_is_code_3() {
+fn a_nan_in_a_urdf_is_code_3() {
     let folder = tempfile::tempdir().expect("a folder");
     let mass = |urdf: String| {
         let at = urdf.find("<mass value=\"").expect("a mass") + "<mass value=\"".len();
@@ -73,7 +73,7 @@ fn a_wrong_number_of_joints_is_code_3() {
 }
 
 #[test]
-fn a_file_that_is_not_there_is_code_3() {
+fn a_missing_file_is_code_3() {
     let answer = run(&["demo", "--arm", "no/such/arm.toml"]);
     assert_eq!(answer.code, Some(3));
     assert_one_clear_line(&answer, &["no/such/arm.toml"]);
@@ -82,7 +82,7 @@ fn a_file_that_is_not_there_is_code_3() {
 #[test]
 fn a_trajectory_out_of_reach_is_code_4() {
     let folder = tempfile::tempdir().expect("a folder");
-    // The elbow's origin is the length of the upper arm: half of it is not enough.
+    // The elbow's origin is the length of the upper arm: the shortened arm cannot reach the trajectory.
     let shorter = |urdf: String| replaced(urdf, "0.55", "0.15");
     let arm = arm_in(folder.path(), same, shorter);
     let out = folder.path().join("out");
@@ -93,7 +93,7 @@ fn a_trajectory_out_of_reach_is_code_4() {
 }
 
 #[test]
-fn a_folder_that_cannot_be_written_is_code_6_before_anything_is_run() {
+fn an_unwritable_folder_is_code_6_before_the_run() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("file");
     fs::write(&file, "someone else's").expect("written");
@@ -117,10 +117,10 @@ fn a_folder_that_cannot_be_written_is_code_6_before_anything_is_run() {
 
 #[cfg(unix)]
 #[test]
-fn a_disk_that_fills_up_is_code_6_and_leaves_nothing() {
+fn a_full_disk_is_code_6_and_leaves_no_files() {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("out");
-    // A file may grow to 64 blocks: the first log does not fit.
+    // The file size limit is 64 blocks: the first log does not fit.
     let script = "trap '' XFSZ; ulimit -f 64; exec \"$0\" \"$@\"";
     let output = std::process::Command::new("sh")
         .args([
@@ -142,7 +142,7 @@ fn a_disk_that_fills_up_is_code_6_and_leaves_nothing() {
 #[cfg(unix)]
 #[test]
 #[expect(clippy::disallowed_methods, reason = "another process is waited for")]
-fn an_interrupt_is_code_130_and_leaves_nothing() {
+fn an_interrupt_is_code_130_and_leaves_no_files() {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("out");
     let mut child = supple(&["demo", "--quiet", "--out", arg(&out)])
@@ -169,7 +169,7 @@ fn an_interrupt_is_code_130_and_leaves_nothing() {
     assert!(tree(folder.path()).is_empty(), "{:?}", tree(folder.path()));
 }
 
-/// Runs it in a folder of its own.
+/// Runs `supple` in a folder.
 fn run_in(folder: &Path, args: &[&str]) -> Answer {
     let output = supple(args)
         .current_dir(folder)
@@ -184,10 +184,10 @@ fn fifo(path: &Path) {
     assert!(made.expect("mkfifo is there").success());
 }
 
-/// Nothing is written to a device here: it is asserted that it is refused, and still one.
+/// Writes nothing to a device: asserts that the device is rejected and unchanged.
 #[cfg(unix)]
 #[test]
-fn outputs_that_are_no_regular_files_are_code_6_before_anything_is_written() {
+fn outputs_that_are_not_regular_files_are_code_6_before_anything_is_written() {
     use std::os::unix::fs::FileTypeExt;
     let folder = tempfile::tempdir().expect("a folder");
     let at = |name: &str| folder.path().join(name);
@@ -231,7 +231,7 @@ fn outputs_that_are_no_regular_files_are_code_6_before_anything_is_written() {
     let answer = run_in(folder.path(), &["demo", "--quiet", "--out", "/dev/null"]);
     assert_eq!(answer.code, Some(6), "{}", answer.stderr);
     assert_one_clear_line(&answer, &["/dev/null: not a directory", "--out"]);
-    assert_eq!(tree(folder.path()), before, "nothing beside what was there");
+    assert_eq!(tree(folder.path()), before, "no additional files");
     for device in ["/dev/null", "/dev/full"] {
         let kind = fs::metadata(device).expect("still there").file_type();
         assert!(kind.is_char_device(), "{device}");
@@ -242,7 +242,7 @@ fn outputs_that_are_no_regular_files_are_code_6_before_anything_is_written() {
 
 #[cfg(unix)]
 #[test]
-fn inputs_that_are_no_regular_files_are_refused() {
+fn inputs_that_are_not_regular_files_are_rejected() {
     let folder = tempfile::tempdir().expect("a folder");
     fifo(&folder.path().join("fifo"));
     fifo(&folder.path().join("fifo.mcap"));
@@ -265,7 +265,7 @@ fn inputs_that_are_no_regular_files_are_refused() {
 }
 
 #[test]
-fn numbers_out_of_all_proportion_are_code_2_with_their_range() {
+fn numbers_out_of_range_are_code_2_with_their_range() {
     let design = ["excite", "design", "--arm", "wam4"];
     let identify = ["identify", "--arm", "wam4", "log.csv"];
     let up = ["up", "--plant", "sim"];
@@ -311,9 +311,9 @@ fn numbers_out_of_all_proportion_are_code_2_with_their_range() {
     assert!(tree(folder.path()).is_empty());
 }
 
-/// Long in one piece, though each number is within its range.
+/// The product is too long although each number is in range.
 #[test]
-fn an_excitation_of_days_is_refused() {
+fn an_excitation_of_days_is_rejected() {
     let folder = tempfile::tempdir().expect("a folder");
     let long = ["--period", "3600", "--periods", "1000", "--quiet"];
     let answer = run_in(
@@ -324,9 +324,9 @@ fn an_excitation_of_days_is_refused() {
     assert_one_clear_line(&answer, &["period_s times periods", "3600000", "7200 s"]);
 }
 
-/// Half an hour, sampled once a second, on a grid of 100 kHz asks for gigabytes.
+/// Half an hour, sampled once a second, on a grid of 100 kHz would need gigabytes.
 #[test]
-fn a_grid_of_more_samples_than_there_is_memory_is_refused() {
+fn a_grid_that_exceeds_memory_is_rejected() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut table = "t,q0,q1,q2,q3,tau0,tau1,tau2,tau3\n".to_owned();
     for i in 0..2000 {
@@ -340,9 +340,9 @@ fn a_grid_of_more_samples_than_there_is_memory_is_refused() {
     assert_one_clear_line(&answer, &["samples at the rate of the grid", "1.999e8"]);
 }
 
-/// Said once on standard error, or refused; no system runs, so that nothing else happens.
+/// The warning is printed once, or the file is rejected; no system runs, so the command fails afterwards.
 #[test]
-fn what_other_programs_add_to_a_urdf_is_a_warning_and_strict_refuses_it() {
+fn unread_urdf_elements_are_a_warning_or_an_error_with_strict() {
     let folder = tempfile::tempdir().expect("a folder");
     let gazebo = |urdf: String| replaced(urdf, "</robot>", "<gazebo/><gazebo/></robot>");
     let arm = arm_in(folder.path(), same, gazebo);

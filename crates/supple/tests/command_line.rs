@@ -1,4 +1,4 @@
-//! The contract of the command line: help, names, codes.
+//! The interface of the command line: help, names, exit codes.
 
 mod support;
 
@@ -34,7 +34,7 @@ fn help_lists_the_commands_and_the_exit_codes() {
 }
 
 #[test]
-fn wrong_use_is_code_2_and_does_nothing() {
+fn an_invalid_command_line_is_code_2_and_does_nothing() {
     for args in [
         &[][..],
         &["dem"],
@@ -100,7 +100,7 @@ fn completions_name_the_commands() {
 }
 
 #[test]
-fn a_reader_that_leaves_is_no_failure() {
+fn a_closed_pipe_is_not_an_error() {
     use std::process::Stdio;
     let mut child = support::supple(&["completions", "bash"])
         .stdout(Stdio::piped())
@@ -129,7 +129,7 @@ fn standard_output_on_a_full_disk_is_code_6() {
 }
 
 #[test]
-fn the_doctor_names_every_check_and_agrees_with_its_exit_code() {
+fn the_doctor_lists_every_check_and_its_exit_code_matches() {
     let answer = run(&["doctor", "--json"]);
     let report: serde_json::Value = serde_json::from_str(&answer.stdout).expect("JSON");
     let ready = report["ready"].as_bool().expect("a verdict");

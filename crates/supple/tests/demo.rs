@@ -1,5 +1,5 @@
-//! The whole demo, run once into a folder that already holds an older run and something else, and what
-//! is in the folder then.
+//! Runs the complete demo once into a folder with an older run and another file, and checks the contents of the
+//! folder.
 
 mod support;
 
@@ -22,17 +22,17 @@ const FIGURES: [&str; 9] = [
     "trade_off",
 ];
 
-/// The log that the tests look into; the others are half a gigabyte and not kept.
+/// The log that the tests read; the other logs have half a gigabyte and are not kept.
 const LOG: &str = "logs/sinusoid_paper_letter.mcap";
 
 struct Ran {
     out: PathBuf,
     answer: Answer,
-    /// All that was written.
+    /// All files that were written.
     files: Vec<PathBuf>,
 }
 
-/// The demo, run by the first test that asks.
+/// The demo, run by the first test that needs it.
 fn ran() -> &'static Ran {
     static RAN: OnceLock<Ran> = OnceLock::new();
     RAN.get_or_init(|| {
@@ -64,22 +64,22 @@ fn summary() -> Value {
 }
 
 #[test]
-fn it_succeeds_and_prints_the_summary_and_says_where_the_report_is() {
+fn it_succeeds_and_prints_the_summary_and_the_path_of_the_report() {
     let Ran { out, answer, .. } = ran();
     assert_eq!(answer.code, Some(0), "{}", answer.stderr);
     assert_eq!(answer.stdout, read("summary.json"));
     let report = out.join("report.html");
     assert!(answer.stderr.contains(arg(&report)), "{}", answer.stderr);
-    let shares = answer.stderr.lines().filter(|line| line.contains('%'));
+    let progress_lines = answer.stderr.lines().filter(|line| line.contains('%'));
     assert!(
-        (1..=10).contains(&shares.count()),
-        "now and then: {}",
+        (1..=10).contains(&progress_lines.count()),
+        "a few progress lines: {}",
         answer.stderr
     );
 }
 
 #[test]
-fn everything_is_there_and_nothing_half() {
+fn all_results_are_complete() {
     let files = &ran().files;
     let has = |name: &str| files.iter().any(|file| file == Path::new(name));
     for name in [
@@ -105,7 +105,7 @@ fn everything_is_there_and_nothing_half() {
 }
 
 #[test]
-fn what_else_was_in_the_folder_stays_and_the_older_run_is_replaced() {
+fn other_files_are_kept_and_the_older_run_is_replaced() {
     assert_eq!(read("notes.txt"), "someone else's");
     for replaced in ["report.html", "figures/figure_6.svg"] {
         assert!(read(replaced).len() > 1000, "{replaced}");
@@ -176,7 +176,7 @@ fn the_summary_has_every_promised_number() {
     assert_eq!(stiffnesses, [0.5, 5.0, 25.0, 50.0, 75.0, 100.0, 125.0]);
 }
 
-/// What a page would fetch, or run.
+/// Asserts that the page neither loads nor runs anything.
 fn assert_self_contained(page: &str) {
     for outside in [
         "<script", "<link", "<img", "<iframe", "<object", "<use", "url(", "@import", "src=",
@@ -186,7 +186,7 @@ fn assert_self_contained(page: &str) {
     }
     let addresses = page.matches("://").count();
     let names = page.matches("xmlns=\"http://www.w3.org/2000/svg\"").count();
-    assert_eq!(addresses, names, "no address but the name of SVG");
+    assert_eq!(addresses, names, "no address except the SVG namespace");
 }
 
 #[test]
@@ -199,7 +199,7 @@ fn the_report_needs_no_other_file_and_no_network() {
 }
 
 #[test]
-fn the_report_says_what_was_measured_and_where_it_comes_from() {
+fn the_report_contains_the_measured_values_and_their_source() {
     let (report, summary) = (read("report.html"), summary());
     let mm = |value: &Value| format!("{:.1} mm", 1e3 * value.as_f64().expect("a number"));
     for error in ["sinusoid", "arc", "quadrant", "quadrant_perturbed"] {
@@ -213,7 +213,7 @@ fn the_report_says_what_was_measured_and_where_it_comes_from() {
             "{impulse}"
         );
     }
-    for said in [
+    for part in [
         "simulation",
         "wam4",
         "0.1",
@@ -221,12 +221,12 @@ fn the_report_says_what_was_measured_and_where_it_comes_from() {
         "1.4 \u{d7} 10\u{2078}",
         "figure 3a",
     ] {
-        assert!(report.contains(said), "{said}");
+        assert!(report.contains(part), "{part}");
     }
 }
 
 #[test]
-fn every_figure_is_whole_as_drawing_and_as_bitmap() {
+fn every_figure_is_complete_as_svg_and_png() {
     for figure in FIGURES {
         let svg = read(&format!("figures/{figure}.svg"));
         let document = roxmltree::Document::parse(&svg).expect(figure);
@@ -258,13 +258,13 @@ fn every_figure_is_whole_as_drawing_and_as_bitmap() {
                 .filter(|p| (p.red(), p.green(), p.blue()) == (red, green, blue))
                 .count()
         };
-        assert!(ink(0x1F, 0x24, 0x30) > 500, "{figure} has axes and words");
+        assert!(ink(0x1F, 0x24, 0x30) > 500, "{figure} has axes and text");
         assert!(ink(0x00, 0x72, 0xB2) > 200, "{figure} has a blue series");
     }
 }
 
 #[test]
-fn a_log_is_looked_into_and_exported() {
+fn a_log_is_inspected_and_exported() {
     let log = ran().out.join(LOG);
     let info = run(&["log", "info", arg(&log)]);
     assert_eq!(info.code, Some(0), "{}", info.stderr);
@@ -311,7 +311,7 @@ fn a_log_is_looked_into_and_exported() {
 }
 
 #[test]
-fn a_log_is_replayed_to_the_last_bit() {
+fn a_replayed_log_is_bit_identical() {
     let log = ran().out.join(LOG);
     let replay = run(&["log", "replay", arg(&log), "--json"]);
     assert_eq!(replay.code, Some(0), "{}", replay.stderr);
@@ -322,7 +322,7 @@ fn a_log_is_replayed_to_the_last_bit() {
 }
 
 #[test]
-fn a_log_that_was_cut_gives_no_table_and_is_recovered() {
+fn a_truncated_log_gives_no_table_and_is_recovered() {
     let folder = tempfile::tempdir().expect("a folder");
     let log = fs::read(ran().out.join(LOG)).expect("the log");
     let cut = folder.path().join("run.mcap.part");
@@ -335,7 +335,7 @@ fn a_log_that_was_cut_gives_no_table_and_is_recovered() {
     assert_eq!(
         tree(folder.path()),
         [Path::new("run.mcap.part")],
-        "no half table"
+        "no partial table"
     );
 
     let recovered = run(&["log", "recover", arg(&cut)]);

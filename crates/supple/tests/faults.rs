@@ -1,4 +1,4 @@
-//! A demo whose runs end by a fault: everything is written all the same, and every fault is said.
+//! A demo whose runs end with a fault: all results are still written, and every fault is reported.
 
 mod support;
 
@@ -6,10 +6,10 @@ use std::fs;
 use supple_model::Description;
 use support::{arg, assert_one_clear_line, run};
 
-/// A name that would be markup if a page took it as it is.
+/// An arm name that must be escaped in HTML.
 const NAME: &str = "timid <b>&";
 
-/// The 4-joint arm with a limit that the first millimetres of error pass: all runs end before contact.
+/// The 4-joint arm with a limit that the first millimetres of error exceed: all runs end before contact.
 fn timid_arm(folder: &std::path::Path) -> std::path::PathBuf {
     let arm = Description::asset("wam4").expect("built in");
     let mut names = 0;

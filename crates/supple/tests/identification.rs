@@ -1,4 +1,4 @@
-//! Identification on the command line: results that are whole, and bad input refused with its column.
+//! Identification commands: complete results, and invalid input that is rejected with its column.
 
 mod support;
 
@@ -22,7 +22,7 @@ fn table(folder: &Path, name: &str, change: impl Fn(usize, &mut Vec<f64>)) -> St
 }
 
 #[test]
-fn a_bad_log_is_refused_with_its_column_and_a_remedy() {
+fn an_invalid_log_is_rejected_with_its_column_and_a_remedy() {
     let folder = tempfile::tempdir().expect("a folder");
     let nan = table(folder.path(), "nan.csv", |i, row| {
         if i == 7 {
@@ -57,7 +57,7 @@ fn a_bad_log_is_refused_with_its_column_and_a_remedy() {
 }
 
 #[test]
-fn a_design_leaves_a_table_a_figure_and_its_numbers() {
+fn a_design_writes_table_figure_and_summary() {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("design");
     let answer = run(&[
@@ -83,9 +83,9 @@ fn a_design_leaves_a_table_a_figure_and_its_numbers() {
     assert_eq!(table.lines().count(), (100.0 * duration_s) as usize + 2);
 }
 
-/// Design, log, model, correction: each command takes what the one before has left.
+/// Design, log, model, correction: each command uses the output of the previous one.
 #[test]
-fn a_designed_motion_becomes_a_model_that_loads() {
+fn a_model_identified_from_a_designed_motion_loads() {
     let folder = tempfile::tempdir().expect("a folder");
     let at = |name: &str| folder.path().join(name).display().to_string();
     let (design, excited, identified, learnt) =
@@ -165,7 +165,7 @@ fn a_designed_motion_becomes_a_model_that_loads() {
 }
 
 #[test]
-fn a_calibration_says_what_it_is_worth_and_that_it_is_simulation() {
+fn a_calibration_prints_its_verdict_and_that_it_is_a_simulation() {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("calibrated");
     let answer = run(&[
@@ -183,7 +183,7 @@ fn a_calibration_says_what_it_is_worth_and_that_it_is_simulation() {
         "ripple of motor 3: harmonic 6",
         "good for 5 N/m",
         "sinusoid at 5 N/m with this model",
-        "this is simulation",
+        "this is a simulation",
     ] {
         assert!(
             answer.stdout.contains(words),
@@ -204,7 +204,7 @@ fn a_calibration_says_what_it_is_worth_and_that_it_is_simulation() {
 }
 
 #[test]
-fn help_lists_what_identification_offers() {
+fn help_lists_the_identification_commands() {
     let help = run(&["--help"]).stdout;
     for word in ["identify", "excite", "breakaway", "calibrate", "learn"] {
         assert!(help.contains(word), "{word} in {help}");

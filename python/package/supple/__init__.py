@@ -1,8 +1,8 @@
 """Dynamics, identification and minimum-impedance control of backdrivable arms.
 
-Arrays are NumPy arrays of float64, SI units, with the unit in the name where there is no standard
-symbol: ``q`` (rad), ``qd`` (rad/s), ``qdd`` (rad/s^2), ``tau`` (N m). Logs are ``(samples, joints)``.
-Wrong input is refused by an exception that names argument, expected and given shape or value.
+Arrays are NumPy arrays of float64 in SI units. Names carry the unit unless there is a standard symbol:
+``q`` (rad), ``qd`` (rad/s), ``qdd`` (rad/s^2), ``tau`` (N m). Logs are ``(samples, joints)``. Invalid
+input raises an exception that names argument, expected and actual shape or value.
 
 >>> import numpy as np, supple
 >>> arm = supple.Arm.load("wam4")

@@ -1,4 +1,4 @@
-"""What motion can tell of an arm."""
+"""Base parameters: the combinations that motion can identify."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ __all__ = ["BaseParameters", "base_parameters"]
 
 @dataclass(frozen=True, eq=False)
 class BaseParameters:
-    """What motion can tell of an arm: combinations of the columns, see :func:`base_parameters`.
+    """Base parameters of an arm: identifiable combinations of the columns, see :func:`base_parameters`.
 
     ``values = x[independent] + combination @ x[dependent]`` for parameters ``x`` of the columns.
     """
 
     names: tuple[str, ...]
-    """Each base parameter in words, such as ``"Izz1 + Iyy2 - 0.55 mcx2"``, (rank,)."""
+    """Each base parameter as text, such as ``"Izz1 + Iyy2 - 0.55 mcx2"``, (rank,)."""
     values: Array
     """Their values for this arm, (rank,), SI units."""
     null_space: tuple[str, ...]
-    """Directions in which the parameters may move without any change of torque, in words."""
+    """Null space as text: directions in which the parameters can change without a change of torque."""
     columns: tuple[str, ...]
-    """Names of the columns: ten a link, then the rotors; links and joints are counted from 0."""
+    """Names of the columns: ten for each link, then the rotors; links and joints are counted from 0."""
     independent: NDArray[np.intp]
-    """Positions of the independent columns, (rank,)."""
+    """Indices of the independent columns, (rank,)."""
     dependent: NDArray[np.intp]
-    """Positions of the others."""
+    """Indices of the dependent columns."""
     combination: Array
-    """(rank, dependent)."""
+    """Coefficients of the dependent columns, (rank, dependent)."""
     condition: float
-    """Greatest by least singular value of the independent columns, each scaled to unit length."""
+    """Condition number of the independent columns, each scaled to unit length."""
 
     @property
     def rank(self) -> int:
@@ -53,9 +53,9 @@ def base_parameters(
     samples: int = 500,
     seed: int = 0,
 ) -> BaseParameters:
-    """Which combinations of an arm's inertial parameters any motion can tell apart.
+    """Find the combinations of an arm's inertial parameters that any motion can identify.
 
-    The regressor of random states, all angles within half a turn, is taken apart by QR with column
+    The regressor of random states, all angles within half a turn, is decomposed by QR with column
     pivoting.
 
     Parameters
@@ -63,7 +63,7 @@ def base_parameters(
     arm : Arm
         The arm.
     rotor : bool
-        With a rotor inertia for each moving joint.
+        Whether to include a rotor inertia for each moving joint.
     moving : sequence of int, optional
         Joints that move, increasing from 0; the others are held. Default: all.
     samples : int
@@ -79,7 +79,7 @@ def base_parameters(
     Raises
     ------
     ValueError
-        For joints that do not exist, or too few samples.
+        If a joint does not exist, or there are too few samples.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Excitation: its design for any arm, and the simulated arm that follows it."""
+"""Excitation: its design for any arm, and a simulated arm that tracks it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = ["Excitation", "Recording", "design_excitation", "excite"]
 
 @dataclass(frozen=True, eq=False)
 class Excitation:
-    """A motion that tells an arm's parameters apart: a Fourier series a joint, from rest to rest."""
+    """An exciting trajectory: one Fourier series per joint, from rest to rest."""
 
     t: Array
     """Time, (samples,) (s)."""
@@ -41,18 +41,18 @@ class Excitation:
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """What an arm would have logged in an excitation: what :func:`identify` takes."""
+    """Recorded data of an excitation, as a real arm would log it and :func:`identify` accepts it."""
 
     t: Array
     """Time, (samples,) (s)."""
     q: Array
-    """Angles through the encoders, (samples, N) (rad)."""
+    """Encoder angles, (samples, N) (rad)."""
     tau: Array
-    """Joint torques commanded, (samples, N) (N m)."""
+    """Commanded joint torques, (samples, N) (N m)."""
     torque_delay_s: float
-    """Time by which they act later than the angles beside them were measured (s)."""
+    """Delay of the torques relative to the angles (s)."""
     log: Path | None
-    """The log, if one was asked for."""
+    """Path of the log, if ``log_dir`` was given."""
 
 
 def design_excitation(
@@ -68,7 +68,7 @@ def design_excitation(
     rate_hz: float = 100.0,
     progress: Callable[[int, float], object] | None = None,
 ) -> Excitation:
-    """Search for an excitation within the arm's limits of angle, speed, torque and workspace.
+    """Design an exciting trajectory within the arm's limits of angle, speed, torque and workspace.
 
     Parameters
     ----------
@@ -81,28 +81,28 @@ def design_excitation(
     periods : float
         Number of periods.
     criterion : {"condition", "d-optimality"}
-        What is to be small: the condition number of the base regressor, columns scaled to unit
-        length, or ``-log det(Y' Y) / rank``.
+        Criterion to minimise: the condition number of the base regressor, columns scaled to unit length,
+        or ``-log det(Y' Y) / rank``.
     workspace : array_like, (2, 3), optional
-        Least and greatest coordinates of the tip, base axes (m).
+        Minimum and maximum coordinates of the tip, base axes (m).
     candidates : int
-        Candidates tried.
+        Number of candidates.
     seed : int
         Seed of the search, zero or more.
     rate_hz : float
         Rate of the arrays of the result (Hz).
     progress : callable, optional
-        Called as ``progress(tried, best)``; what it raises ends the search.
+        Called as ``progress(tried, best)``; an exception stops the search.
 
     Returns
     -------
     Excitation
-        The motion, its rank and condition number.
+        The trajectory, its rank and condition number.
 
     Raises
     ------
     ValueError
-        For options out of range, or limits that no candidate meets.
+        If an option is out of range, or no candidate meets the limits.
 
     Examples
     --------
@@ -151,22 +151,22 @@ def excite(
     seed: int = 0,
     log_dir: str | os.PathLike[str] | None = None,
 ) -> Recording:
-    """Let the simulated arm follow an excitation, and record what it would have logged.
+    """Let the simulated arm track an excitation and return its recorded data.
 
     Parameters
     ----------
     arm : Arm
-        The truth about the plant.
+        The plant.
     excitation : Excitation
-        What to follow.
+        The trajectory to track.
     model : Arm, optional
-        What the controller takes the arm for. Default: ``arm``.
+        The controller's model of the arm. Default: ``arm``.
     encoder_noise_rad : float
-        Standard deviation of encoder noise, beside quantisation (rad).
+        Standard deviation of the encoder noise, in addition to quantisation (rad).
     load : bool
-        The plant's friction has its part that depends on direction and load.
+        Whether the plant's friction depends on direction and load.
     seed : int
-        Seed of every noise, zero or more.
+        Seed of all noise, zero or more.
     log_dir : str or os.PathLike, optional
         Folder for ``excitation.mcap``; see :func:`read_log`.
 
@@ -178,7 +178,7 @@ def excite(
     Raises
     ------
     ValueError
-        For a motion that the controller refuses, or that ends in a fault.
+        If the controller rejects the motion, or the motion ends in a fault.
 
     Examples
     --------

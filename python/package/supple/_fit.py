@@ -1,4 +1,4 @@
-"""A model that was found, and what is asked of it: predictions, validation, payload, ripple, files."""
+"""Identified models: prediction, validation, payload, ripple, saving."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple import _native
-from supple._given import given_log, given_logs
+from supple._log_input import log_input, log_inputs
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,7 +27,7 @@ Ripple = tuple[tuple[tuple[int, float, float], ...], ...]
 
 @dataclass(frozen=True, eq=False)
 class Payload:
-    """A body in the last link's frame."""
+    """A payload in the last link's frame."""
 
     mass_kg: float
     """Mass (kg)."""
@@ -55,52 +55,53 @@ class Payload:
 
 @dataclass(frozen=True, eq=False)
 class Validation:
-    """How well a fit predicts a log that it has not seen. N is the number of joints."""
+    """Prediction errors of a fit on a held-out log. N is the number of joints."""
 
     rms: Array
-    """RMS error of each joint, (N,) (N m); NaN for joints that were held."""
+    """RMS error of each joint, (N,) (N m); NaN for held joints."""
     relative: Array
-    """``|tau - tau_hat| / |tau|`` of each joint, (N,); NaN for joints that were held."""
+    """``|tau - tau_hat| / |tau|`` of each joint, (N,); NaN for held joints."""
     total_relative: float
-    """The same over all moving joints."""
+    """Relative error over all moving joints."""
     positive_definite: float
-    """Share of 2,000 random poses with a positive definite mass matrix."""
+    """Fraction of 2,000 random poses with a positive definite mass matrix."""
     verdict: str
-    """In plain words whether a controller can use the model."""
+    """Verdict as text: whether a controller can use the model."""
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A model found by :func:`identify`. N is the number of joints, M of those that moved."""
+    """A model identified by :func:`identify`. N is the number of joints, M the number of moving
+    joints."""
 
     _fit: _native.Fit = field(repr=False)
     columns: Mapping[str, float]
     """Every column by name with its value: ``"Izz2"``, rotor ``"Ir0"``, viscous ``"V0"``, Coulomb
     ``"S0"``, ``"offset0"``, asymmetry ``"A0"``, Stribeck ``"B0"``, load ``"L0"``; joints are counted from 0. SI units."""
     base_names: tuple[str, ...]
-    """Each base parameter in words, (rank,)."""
+    """Each base parameter as text, (rank,)."""
     base_parameters: Array
     """Values of the combinations that the data determine, (rank,), SI units."""
     std: Array
     """Standard deviation of each, (rank,)."""
     null_space: tuple[str, ...]
-    """Directions that the data leave open, in words: there the arm given decides."""
+    """Undetermined directions, as text; there the nominal arm determines the values."""
     condition: float
-    """Greatest by least singular value of the independent columns, each scaled to unit length."""
+    """Condition number of the independent columns, each scaled to unit length."""
     moving: tuple[int, ...]
     """Joints that were identified, from 0."""
     friction: tuple[_native.Friction, ...]
-    """Friction of every joint, (N,); of joints that were held, that of the arm given."""
+    """Friction of every joint, (N,); held joints keep the friction of the nominal arm."""
     noise_nm: Array
     """RMS residual of each moving joint, (M,) (N m)."""
     training_relative: float
-    """``|tau - tau_hat| / |tau|`` over the samples that were fitted."""
+    """``|tau - tau_hat| / |tau|`` over the fitted samples."""
     gap: float | None
-    """Certified distance of the objective from its optimum, for ``method="consistent"``."""
+    """Upper bound on the distance of the objective from its optimum, for ``method="consistent"``."""
     choices: tuple[tuple[str, str], ...]
-    """What was chosen by cross-validation, each with the table of held-out errors that decided it."""
+    """Choices made by cross-validation, each with its table of held-out errors."""
     warnings: tuple[str, ...]
-    """What was let pass."""
+    """Warnings."""
 
     @property
     def rank(self) -> int:
@@ -109,12 +110,12 @@ class Fit:
 
     @property
     def arm(self) -> _native.Arm:
-        """The arm found, with its friction.
+        """The identified arm, with its friction.
 
         Raises
         ------
         ValueError
-            If the parameters are no arm: possible for the methods without constraints.
+            If the parameters are physically inconsistent, which only unconstrained methods can give.
         """
         return self._fit.arm()
 
@@ -124,8 +125,8 @@ class Fit:
         Parameters
         ----------
         q, qd, qdd : array_like, (..., N)
-            Angles (rad), velocities (rad/s), accelerations (rad/s^2). Joints that were held are
-            predicted at rest and without friction.
+            Angles (rad), velocities (rad/s), accelerations (rad/s^2). Held joints are predicted at rest
+            and without friction.
         """
         return self._fit.predict(q, qd, qdd)
 
@@ -137,7 +138,7 @@ class Fit:
         qd: ArrayLike | None = None,
         qdd: ArrayLike | None = None,
     ) -> Validation:
-        """Predict the torques of another log, prepared by the same filter as the fit's, and compare.
+        """Predict the torques of another log, prepared like the fitted ones, and compare.
 
         Parameters
         ----------
@@ -153,7 +154,7 @@ class Fit:
         ValueError
             As :func:`identify`.
         """
-        found = self._fit.validate(given_log(t, q, tau, qd, qdd))
+        found = self._fit.validate(log_input(t, q, tau, qd, qdd))
         joints = len(self.friction)
         for name in ("rms", "relative"):
             whole = np.full(joints, np.nan)
@@ -171,21 +172,21 @@ class Fit:
         *,
         guess: Payload,
     ) -> Payload:
-        """The body in the hand that explains what this fit, of the arm without it, leaves of logs with it.
+        """Identify a payload from logs with it, given this fit of the arm without it.
 
         Parameters
         ----------
         t, q, tau, qd, qdd
-            The log or logs, as in :func:`identify`; prepared as the fitted ones were.
+            The log or logs, as in :func:`identify`; prepared like the fitted ones.
         guess : Payload
-            What it is drawn to where the logs do not tell.
+            Prior for parameters that the logs do not determine.
 
         Raises
         ------
         ValueError
-            As :func:`identify`; for a guess that is no body.
+            As :func:`identify`; if the guess is physically inconsistent.
         """
-        found = _native.payload(self._fit, given_logs(t, q, tau, qd, qdd), guess._dict())
+        found = _native.payload(self._fit, log_inputs(t, q, tau, qd, qdd), guess._dict())
         return Payload(**found)
 
     def torque_scale(
@@ -198,27 +199,27 @@ class Fit:
         *,
         known: Payload,
     ) -> tuple[float | None, ...]:
-        """True by logged torque of each moving joint, (M,), from logs with a known body in the hand.
+        """Ratio of true to logged torque of each moving joint, (M,), from logs with a known payload.
 
-        Published torque constants of one arm differ by a fifth; a weight tells. Every joint is told by
-        itself, from the logs of this fit and those with the body: the scales may differ. ``None`` where
-        the body adds too little to a joint's torque. Multiply ``tau`` by them and identify again: with
-        different scales on joints that share links, this fit is off.
+        Published torque constants of one arm differ by 20 %; a known weight resolves this. Every joint
+        is estimated separately, from the logs of this fit and those with the payload: the scales may
+        differ. ``None`` if the payload adds too little torque to a joint. Multiply ``tau`` by the scales
+        and identify again: with different scales on joints that share links, this fit is inaccurate.
 
         Parameters
         ----------
         t, q, tau, qd, qdd
-            The log or logs, as in :func:`identify`; prepared as the fitted ones were, torques of the same
-            scale as theirs.
+            The log or logs, as in :func:`identify`; prepared like the fitted ones, with the same torque
+            scales.
         known : Payload
-            The body.
+            The payload.
 
         Raises
         ------
         ValueError
-            As :func:`identify`; for a body that is none.
+            As :func:`identify`; if the payload is physically inconsistent.
         """
-        return tuple(_native.torque_scale(self._fit, given_logs(t, q, tau, qd, qdd), known._dict()))
+        return tuple(_native.torque_scale(self._fit, log_inputs(t, q, tau, qd, qdd), known._dict()))
 
     def ripple(
         self,
@@ -230,32 +231,33 @@ class Fit:
         fast_rad_per_s: float = 0.2,
         cutoff_hz: float = 40.0,
     ) -> Ripple:
-        """Torque ripple of every motor, from slow motion of all joints, best at constant speed.
+        """Identify the torque ripple of every motor from slow motion of all joints, best at constant
+        speed.
 
         Parameters
         ----------
         t, q, tau
             The log or logs, as in :func:`identify`.
         harmonics : sequence of int
-            Periods in a revolution of the motor to look for.
+            Harmonics of a motor revolution to fit.
         fast_rad_per_s : float
-            Faster samples are left out (rad/s).
+            Faster samples are excluded (rad/s).
         cutoff_hz : float
-            Cutoff of the filter (Hz): ripple is faster than what the model is fitted to.
+            Cutoff of the filter (Hz), higher than that of the model fit since ripple is faster.
 
         Returns
         -------
         tuple of tuples of (int, float, float)
-            Motor by motor, the harmonics that stand out of the noise, the largest first: harmonic, sine
-            and cosine amplitude at the motor (N m). :meth:`save` takes it.
+            For each motor, the significant harmonics, the largest first: harmonic, sine and cosine
+            amplitude at the motor (N m). :meth:`save` accepts it.
 
         Raises
         ------
         ValueError
-            As :func:`identify`; where not all joints were identified, or there is too little slow motion.
+            As :func:`identify`; if not all joints were identified, or there is too little slow motion.
         """
         orders = [int(harmonic) for harmonic in harmonics]
-        logs = given_logs(t, q, tau, None, None)
+        logs = log_inputs(t, q, tau, None, None)
         found = _native.ripple(self._fit, logs, orders, fast_rad_per_s, cutoff_hz)
         return tuple(tuple(lines) for lines in found)
 
@@ -263,14 +265,14 @@ class Fit:
         """Write the model as ``arm.toml`` and ``arm.urdf`` into the folder ``path``.
 
         The controller loads it (``supple demo --arm path``), and so does :meth:`Arm.load`. The folder is
-        made if need be; files in it are replaced.
+        created if necessary; existing files are replaced.
 
         Parameters
         ----------
         path : str or os.PathLike
             The folder.
         ripple : optional
-            Torque ripple of the motors, as :meth:`ripple` gives it. Default: that of the arm given.
+            Torque ripple of the motors, as returned by :meth:`ripple`. Default: that of the nominal arm.
 
         Returns
         -------
@@ -282,7 +284,7 @@ class Fit:
         ValueError
             As :attr:`arm`.
         OSError
-            Where it cannot be written, or a device, FIFO, socket or folder has the name of a file.
+            If it cannot be written, or the path of a file is a device, FIFO, socket or folder.
         """
         arm = self._fit.arm(ripple)
         folder = Path(path)
@@ -290,21 +292,21 @@ class Fit:
         return folder / "arm.toml"
 
     def plot(self, log: int = 0) -> Figure:
-        """Measured and predicted torque of each moving joint, with the residual, over a fitted log.
+        """Plot measured and predicted torque of each moving joint, with the residual, over a fitted log.
 
         Needs matplotlib: ``pip install supple[viz]``.
 
         Parameters
         ----------
         log : int
-            Which of the logs that were fitted.
+            Index of the fitted log.
 
         Raises
         ------
         ImportError
             Without matplotlib.
         IndexError
-            For a log that is none.
+            If there is no such log.
         """
         try:
             from matplotlib.figure import Figure
@@ -328,7 +330,7 @@ class Fit:
 
     @property
     def arm_given(self) -> _native.Arm:
-        """The arm that fixed the kinematics, and what the data leave open."""
+        """The nominal arm, which gives kinematics and undetermined parameters."""
         return self._fit.arm_given()
 
     def __str__(self) -> str:
@@ -347,6 +349,6 @@ class Fit:
                 f"  {joints[joint]}: residual {noise:.3g} N m"
                 for joint, noise in zip(self.moving, self.noise_nm, strict=True)
             ),
-            *(f"  doubtful: {warning}" for warning in self.warnings),
+            *(f"  warning: {warning}" for warning in self.warnings),
         ]
         return "\n".join(lines)

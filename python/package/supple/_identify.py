@@ -1,4 +1,4 @@
-"""Identification: from logs to a model that a body could have."""
+"""Identification of physically consistent models from logs."""
 
 from __future__ import annotations
 
@@ -13,32 +13,32 @@ from numpy.typing import ArrayLike
 
 from supple import _native
 from supple._fit import Fit
-from supple._given import given_logs
+from supple._log_input import log_inputs
 
 __all__ = ["DataWarning", "FrictionColumns", "identify"]
 
 
 class DataWarning(UserWarning):
-    """Something doubtful about a log or a fit that was let pass: column, problem, remedy."""
+    """A warning about a log or a fit: column, problem, remedy."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class FrictionColumns:
-    """Friction that is fitted to every moving joint."""
+    """Friction columns of every moving joint."""
 
     viscous: bool = True
     """``V qd``."""
     coulomb: bool = True
     """``S p(qd / band)``, ``p`` the parabola of :class:`Friction`."""
     offset: bool = False
-    """Constant: with it, Coulomb friction may differ by direction."""
+    """Constant torque: Coulomb friction may then differ by direction."""
     asymmetry: bool = False
     """``A |qd|``: viscous friction that differs by direction. Needs ``viscous``."""
     load: bool = False
     """``L |g| p(qd / band)``: Coulomb friction that grows with the torque ``g`` which the joint's gear
-    passes on to the links, by the arm that the fit starts from. Needs ``coulomb``."""
+    transmits to the links, computed with the nominal arm. Needs ``coulomb``."""
     stribeck_rad_per_s: float | None = None
-    """Speed over which a Stribeck dip fades (rad/s); ``None`` for no dip."""
+    """Stribeck speed (rad/s); ``None`` for no Stribeck effect."""
     band_rad_per_s: float = 0.01
     """Half-width of the parabola (rad/s)."""
 
@@ -52,7 +52,7 @@ _FRICTION = {
     "load": FrictionColumns(load=True),
     "stribeck": FrictionColumns(offset=True),
 }
-# Of the fit with a dip, where nothing is said (rad/s).
+# Default of slow_rad_per_s with friction="stribeck" (rad/s).
 _SLOW_RAD_PER_S = 0.15
 
 
@@ -77,81 +77,80 @@ def identify(
     prior_weight: float | None = None,
     joint_noise_nm: ArrayLike | None = None,
 ) -> Fit:
-    """Identify an arm from a log, or from several.
+    """Identify an arm from one or several logs.
 
-    Kinematics are those of ``arm``, and so is what the data leave open. What is left open here
-    (``friction``, ``prior_weight``, weights) is chosen by predicting parts of the logs from the others;
-    nothing but these logs decides.
+    Kinematics and undetermined parameters are those of ``arm``. Options that are not set (``friction``,
+    ``prior_weight``, weights) are chosen by cross-validation within the logs.
 
     Parameters
     ----------
     arm : Arm
-        Kinematics and a first model, from a datasheet or CAD.
+        Kinematics and nominal model, from a data sheet or CAD.
     t : array_like, (samples,), or a list of them
         Time (s), strictly increasing, without gaps. Several logs are given as lists of equal length.
     q : array_like, (samples, N)
         Angles (rad).
     tau : array_like, (samples, N)
-        Torques of the motors, at the joints (N m).
+        Motor torques at the joints (N m).
     qd : array_like, (samples, N), optional
         Velocities (rad/s). Default: differentiated.
     qdd : array_like, (samples, N), optional
         Accelerations (rad/s^2), only with ``qd``. Default: differentiated. With them and without a
-        filter, rows are taken as they are and need not follow each other in time.
+        filter, rows are used unchanged and need not be in temporal order.
     moving : sequence of int, optional
-        Joints to identify, increasing from 0; the others are held where the log has them. Default: all.
+        Joints to identify, increasing from 0; the others are held at their logged positions. Default:
+        all.
     coupling : (int, int) or a sequence of pairs, optional
         Joints whose sum turns a motor: rotor inertia and friction of ``qd_a + qd_b`` act on both.
     cutoff_hz : float, optional
-        Cutoff of the fourth-order zero-phase filter that ``q``, ``qd``, ``qdd`` and ``tau`` go through
-        alike (Hz); ``math.inf`` for none. Default: 8, none where ``qdd`` is given.
+        Cutoff of the fourth-order zero-phase filter for ``q``, ``qd``, ``qdd`` and ``tau`` (Hz);
+        ``math.inf`` for none. Default: 8, or none if ``qdd`` is given.
     method : {"consistent", "wls", "irls", "ols"}
-        Weighted with every link a body that can be and friction that takes energy; weighted least
-        squares; robust (Huber); ordinary least squares.
+        Physically consistent weighted least squares; weighted least squares; robust (Huber); ordinary
+        least squares.
     friction : "auto", {"none", "viscous", "coulomb", "offset", "asymmetric", "load", "stribeck"} or FrictionColumns
-        Friction columns of every moving joint. ``"auto"`` chooses by cross-validation. ``"load"`` is
-        viscous and Coulomb, which grows with the load; the controller's friction, which knows none, has
-        it at the mean load. ``"stribeck"`` is
-        viscous and Coulomb with offset, and a dip, its speed included, from slow motion in a second
-        stage.
+        Friction columns of every moving joint. ``"auto"`` chooses by cross-validation. ``"load"``:
+        viscous and load-dependent Coulomb friction; the controller, whose law has no load term, uses the
+        value at the mean load. ``"stribeck"``: viscous and Coulomb friction with offset, and a Stribeck
+        effect whose parameters are fitted to slow motion in a second stage.
     rate_hz : float, optional
-        Rate of the regular grid that the log is brought to (Hz). Default: the log's own mean rate.
+        Rate of the regular grid to which the log is resampled (Hz). Default: the log's own mean rate.
     keep_every : int
-        Every so many samples of the grid are fitted.
+        Decimation factor: every n-th sample of the grid is used.
     torque_delay_s : float
-        Time by which a logged torque acts later than the angle beside it was measured (s). A command
-        that acts in the cycle after, for a cycle, does so by one and a half periods.
+        Delay of the logged torque relative to the angle (s); 1.5 periods for commands that act during
+        the next cycle.
     rotor : bool
-        A rotor inertia for each moving joint; without, those of ``arm`` are taken as known.
+        Whether to fit a rotor inertia for each moving joint; otherwise those of ``arm`` are taken as
+        known.
     slow_rad_per_s : float
-        Samples of a joint slower than this are left out of its rows (rad/s); a Stribeck dip is then
-        fitted from them in a second stage. Default: none, 0.15 with ``friction="stribeck"``.
+        Samples of a joint slower than this are excluded from its rows (rad/s); a Stribeck effect is then
+        fitted to them in a second stage. Default: none, 0.15 with ``friction="stribeck"``.
     prior_weight : float, optional
-        How many observations of one standard deviation the first model is worth. Default: by
-        cross-validation.
+        Weight of the nominal model, in equivalent observations. Default: by cross-validation.
     joint_noise_nm : array_like, (M,), optional
-        Noise of each moving joint's torque (N m), in place of weights found from residuals.
+        Noise of each moving joint's torque (N m), instead of weights from residuals.
 
     Returns
     -------
     Fit
-        The model, what it is worth, and how it was chosen.
+        The model, its statistics, and the choices made.
 
     Raises
     ------
     ValueError
-        For columns that cannot be used (not finite, gaps in time, degrees, joints that hardly move),
-        shapes that do not fit, options out of range, data that determine nothing: column or argument,
-        problem and remedy are named.
+        For unusable columns (not finite, gaps in time, degrees, joints that hardly move), shapes that do
+        not agree, options out of range, or insufficient data; the message names column or argument,
+        problem and remedy.
 
     Warns
     -----
     DataWarning
-        For what is doubtful and let pass.
+        For doubtful data or results.
 
     Examples
     --------
-    Sums of sinusoids, torques of a known arm, no noise: the base parameters come back.
+    Sums of sinusoids, torques of a known arm, no noise: the base parameters are recovered.
 
     >>> import numpy as np, supple
     >>> arm = supple.Arm.load("wam4")
@@ -168,19 +167,19 @@ def identify(
     True
     """
     if qdd is not None and qd is None:
-        raise ValueError("qd: expected velocities beside the accelerations qdd, got None")
+        raise ValueError("qd: expected velocities together with the accelerations qdd, got None")
     if isinstance(friction, str) and friction not in ("auto", *_FRICTION):
         known = ", ".join(("auto", *_FRICTION))
         raise ValueError(f"friction: expected one of {known} or FrictionColumns, got {friction!r}")
     columns = _FRICTION.get(friction) if isinstance(friction, str) else friction
-    dip = friction == "stribeck"
+    find_stribeck = friction == "stribeck"
     if slow_rad_per_s is None:
-        slow_rad_per_s = _SLOW_RAD_PER_S if dip else 0.0
+        slow_rad_per_s = _SLOW_RAD_PER_S if find_stribeck else 0.0
     if cutoff_hz is None:
         cutoff_hz = inf if qdd is not None else 8.0
-    native, doubts = _native.identify(
+    native, result_warnings = _native.identify(
         arm,
-        given_logs(t, q, tau, qd, qdd),
+        log_inputs(t, q, tau, qd, qdd),
         {
             "moving": None if moving is None else [int(joint) for joint in moving],
             "couplings": _pairs(coupling),
@@ -188,7 +187,7 @@ def identify(
             "cutoff_hz": None if cutoff_hz == inf else cutoff_hz,
             "keep_every": keep_every,
             "torque_delay_s": torque_delay_s,
-            "dip": dip,
+            "find_stribeck": find_stribeck,
             "method": method,
             "friction": columns,
             "rotor": rotor,
@@ -197,8 +196,8 @@ def identify(
             "joint_noise_nm": _optional_list(joint_noise_nm),
         },
     )
-    for doubt in doubts:
-        warnings.warn(doubt, DataWarning, stacklevel=2)
+    for warning in result_warnings:
+        warnings.warn(warning, DataWarning, stacklevel=2)
     report = native.report()
     return Fit(
         _fit=native,
@@ -214,7 +213,7 @@ def identify(
         training_relative=report["training_relative"],
         gap=report["gap"],
         choices=tuple(report["choices"]),
-        warnings=tuple(doubts),
+        warnings=tuple(result_warnings),
     )
 
 

@@ -1,4 +1,4 @@
-"""Learning from the prediction error of a motion that is repeated."""
+"""Learning from the prediction error of a repeated motion."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple import _native
-from supple._given import given_logs
+from supple._log_input import log_inputs
 
 Array = NDArray[np.float64]
 
@@ -18,18 +18,19 @@ __all__ = ["Learned", "learn"]
 
 @dataclass(frozen=True, eq=False)
 class Learned:
-    """An arm with what repeated motion has taught."""
+    """Result of :func:`learn`."""
 
     arm: _native.Arm
-    """The arm with its new friction, and with what the hand holds where that was looked for."""
+    """The arm with its updated friction and, if it was fitted, its payload."""
     before_nm: Array
-    """RMS prediction error of each joint before, (N,) (N m); zero for joints that did not move."""
+    """RMS prediction error of each joint before learning, (N,) (N m); zero for joints that did not
+    move."""
     after_nm: Array
-    """The same after, (N,) (N m)."""
+    """RMS prediction error of each joint after learning, (N,) (N m)."""
     payload_kg: float | None
-    """Mass that the hand holds more than the arm given (kg); ``None`` where it was not looked for."""
+    """Mass of the payload relative to ``arm`` (kg); ``None`` if it was not fitted."""
     payload_first_moment_kg_m: Array | None
-    """Its first moment in the last link's frame, (3,) (kg m)."""
+    """First moment of the payload in the last link's frame, (3,) (kg m)."""
 
 
 def learn(
@@ -48,15 +49,16 @@ def learn(
     payload_kg: float | None = None,
     noise_nm: float = 0.05,
 ) -> Learned:
-    """Refit friction, and a body in the hand, from what the model did not predict of the torques.
+    """Update friction and, optionally, a payload from the prediction error of the torques.
 
-    For a few periods of a motion in free space: too little to identify an arm, enough to correct what
-    changes from day to day. Friction scales by joint, held to the model by a prior; masses stay.
+    For a few periods of a motion in free space: too few to identify an arm, but enough to correct
+    day-to-day changes. Friction is scaled for each joint, regularised by a prior; link masses are
+    unchanged.
 
     Parameters
     ----------
     arm : Arm
-        The model that was in use.
+        The present model.
     t, q, tau, qd
         The log or logs, as in :func:`identify`.
     moving : sequence of int, optional
@@ -64,22 +66,22 @@ def learn(
     cutoff_hz, keep_every, torque_delay_s
         Preparation, as in :func:`identify`.
     slow_rad_per_s : float
-        Slower samples of a joint are left out (rad/s).
+        Slower samples of a joint are excluded (rad/s).
     friction_change : float
         Expected relative change of friction.
     payload_kg : float, optional
-        Expected mass of a body in the hand (kg). Default: the hand is empty.
+        Expected mass of a payload (kg). Default: no payload.
     noise_nm : float
         Noise of the torques (N m).
 
     Raises
     ------
     ValueError
-        As :func:`identify`, and where no joint turned faster than ``slow_rad_per_s``.
+        As :func:`identify`; if no joint moved faster than ``slow_rad_per_s``.
 
     Examples
     --------
-    Viscous and dry friction a tenth above the model's, no noise:
+    Viscous and dry friction 10 % above the model's, no noise:
 
     >>> import numpy as np, supple
     >>> arm = supple.Arm.load("wam4")
@@ -95,7 +97,7 @@ def learn(
     """
     found = _native.learn(
         arm,
-        given_logs(t, q, tau, qd, None),
+        log_inputs(t, q, tau, qd, None),
         {
             "moving": list(range(arm.dof)) if moving is None else [int(joint) for joint in moving],
             "cutoff_hz": cutoff_hz,

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from os import PathLike, fspath
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ __all__ = ["Log", "Truth", "read_log"]
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """What was really so in a simulated plant, a row at the start of each cycle."""
+    """Ground truth of a simulated plant, one row at the start of each cycle."""
 
     t: Array
     """Time since the log began, (samples,) (s)."""
@@ -27,9 +28,9 @@ class Truth:
     qd: Array
     """Joint velocities, (samples, N) (rad/s)."""
     tau: Array
-    """Torques of the motors, at the joints, (samples, N) (N m)."""
+    """Motor torques at the joints, (samples, N) (N m)."""
     friction_nm: Array
-    """Friction torques, positive against positive motion, (samples, N) (N m)."""
+    """Friction torques, positive if they oppose positive motion, (samples, N) (N m)."""
     tip_position_m: Array
     """Tip, base axes, (samples, 3) (m)."""
     tip_velocity_m_per_s: Array
@@ -40,40 +41,40 @@ class Truth:
 
 @dataclass(frozen=True, eq=False)
 class Log:
-    """A log of a controlled arm: a row for each step of the controller."""
+    """A log of a controlled arm, one row for each step of the controller."""
 
     arm: _native.Arm
     """The arm, from the description inside the log."""
     experiment: str
     """Name of the experiment."""
     software: str
-    """Name and version of what wrote it."""
+    """Name and version of the program that wrote the log."""
     seed: int | None
-    """Seed of everything random in it."""
+    """Seed of all random numbers of the run."""
     notes: Mapping[str, str]
-    """Whatever else belongs to it."""
+    """Further metadata."""
     t: Array
     """Time since the log began, (samples,) (s)."""
     q: Array
     """Joint angles that the controller used, (samples, N) (rad)."""
     qd: Array
-    """Joint velocities that it estimated, (samples, N) (rad/s)."""
+    """Joint velocities that the controller estimated, (samples, N) (rad/s)."""
     tau: Array
-    """Joint torques that it commanded in answer, (samples, N) (N m)."""
+    """Joint torques that the controller commanded, (samples, N) (N m)."""
     mode: NDArray[np.str_]
-    """Mode in force, (samples,): ``"track"``, ``"gravity_hold"`` .."""
+    """Mode of the controller, (samples,): ``"track"``, ``"gravity_hold"`` .."""
     tip_position_m: Array
     """Tip by the model, base axes, (samples, 3) (m)."""
     tip_velocity_m_per_s: Array
     """Its velocity, base axes, (samples, 3) (m/s)."""
     has_reference: NDArray[np.bool_]
-    """Where a tip trajectory runs, (samples,)."""
+    """Whether a tip trajectory runs, (samples,)."""
     reference_position_m: Array
-    """Where the tip should be, base axes, (samples, 3) (m); zero without a reference."""
+    """Reference position of the tip, base axes, (samples, 3) (m); zero without a reference."""
     reference_velocity_m_per_s: Array
     """Its velocity, base axes, (samples, 3) (m/s); zero without a reference."""
     has_tip_force: NDArray[np.bool_]
-    """Where a force sensor reported, (samples,)."""
+    """Whether a force sensor reported, (samples,)."""
     tip_force_n: Array
     """Measured force on the tip, base axes, (samples, 3) (N); zero without a sensor."""
     external_torque_nm: Array
@@ -81,21 +82,23 @@ class Log:
     external_force_n: Array
     """Observed force on the tip, base axes, (samples, 3) (N)."""
     stiffness_n_per_m: Array
-    """Stiffness in force along base axes, (samples, 3) (N/m)."""
+    """Present stiffness along base axes, (samples, 3) (N/m)."""
     damping_n_s_per_m: Array
-    """Damping in force along base axes, (samples, 3) (N s/m)."""
+    """Present damping along base axes, (samples, 3) (N s/m)."""
     in_contact: NDArray[np.bool_]
-    """Where contact is latched, (samples,)."""
+    """Whether contact is latched, (samples,)."""
     friction_share: Array
-    """Share of the friction feed-forward applied, (samples,), 0 to 1."""
+    """Applied fraction of the friction feed-forward, (samples,), 0 to 1."""
     torques: Mapping[str, Array]
-    """Terms of the law by name, (samples, N) each (N m); their sum, once limited, is ``tau``."""
+    """Torque terms by name, (samples, N) each (N m); their sum, once limited, is ``tau``."""
+    columns: Mapping[str, Array]
+    """Every number of a row by its name in the log, (samples,) or (samples, N or 3); codes and flags as numbers."""
     faults: tuple[tuple[float, str], ...]
-    """Time (s) and words of every fault, as it latched."""
+    """Time (s) and text of every latched fault."""
     timing: Mapping[str, Array]
     """``t``, ``period_s``, ``latency_s``, ``step_s`` of timed cycles, (cycles,) each (s)."""
     truth: Truth | None
-    """What was really so, if the log is of a simulated plant."""
+    """Ground truth, if the log is of a simulated plant."""
 
     @property
     def samples(self) -> int:
@@ -117,14 +120,15 @@ def read_log(path: str | PathLike[str]) -> Log:
     Returns
     -------
     Log
-        Arm, columns, faults, and the truth of a simulated plant.
+        Arm, columns, faults, and the ground truth of a simulated plant.
 
     Raises
     ------
     FileNotFoundError
-        For a path that leads nowhere.
+        If the path does not exist.
     ValueError
-        For a file that is no log of supple, or is cut: ``supple log recover`` keeps what is whole.
+        If the file is not a log of supple, or is truncated: ``supple log recover`` keeps its complete
+        records.
 
     Examples
     --------
@@ -139,24 +143,28 @@ def read_log(path: str | PathLike[str]) -> Log:
     content = _native.read_log(fspath(path))
     steps, truth = content["steps"], content["truth"]
     flags = {
-        name: steps.pop(name).astype(bool) for name in ("has_reference", "has_tip_force", "in_contact")
+        name: steps[name].astype(bool) for name in ("has_reference", "has_tip_force", "in_contact")
     }
+    prefix = "torques."
     terms = {
-        name.removesuffix("_nm"): steps.pop(name)
-        for name in list(steps)
-        if name.endswith("_nm") and name != "external_torque_nm"
+        name.removeprefix(prefix): column for name, column in steps.items() if name.startswith(prefix)
     }
+    names = {"q": "position_rad", "qd": "velocity_rad_per_s", "tau": "torque_nm"}
+    own = {field.name for field in fields(Log)} & steps.keys()
+    columns: dict[str, Any] = {name: steps[name] for name in own}
+    columns |= {name: steps[of] for name, of in names.items()} | flags
+    # In the log a number, here its name.
+    columns["mode"] = np.array(content["modes"], dtype=np.str_)
     return Log(
         arm=content["arm"],
         experiment=content["experiment"],
         software=content["software"],
         seed=content["seed"],
         notes=content["notes"],
-        mode=np.array(content["modes"], dtype=np.str_),
         faults=tuple(content["faults"]),
         torques=terms,
+        columns=steps,
         timing=content["timing"],
         truth=Truth(**truth) if truth else None,
-        **flags,
-        **steps,
+        **columns,
     )

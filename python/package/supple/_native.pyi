@@ -1,4 +1,4 @@
-"""Private: what the package is built on. Docstrings are in the module itself."""
+"""Private native module of the package. Docstrings are in the module itself."""
 
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
@@ -139,7 +139,7 @@ def design_excitation(
     arm: Arm, request: dict[str, Any], progress: Callable[[int, float], object] | None
 ) -> dict[str, Any]: ...
 def excite(
-    arm: Arm, model: Arm, series: dict[str, Any], drive: dict[str, Any]
+    arm: Arm, model: Arm, series: dict[str, Any], options: dict[str, Any]
 ) -> dict[str, Any]: ...
 def learn(arm: Arm, logs: list[dict[str, Any]], options: dict[str, Any]) -> dict[str, Any]: ...
 def payload(fit: Fit, logs: list[dict[str, Any]], guess: dict[str, Any]) -> dict[str, Any]: ...

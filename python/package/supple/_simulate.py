@@ -22,37 +22,37 @@ __all__ = ["Run", "simulate"]
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A run of :func:`simulate`: a row for each cycle, from the start of the trajectory."""
+    """Result of :func:`simulate`: one row for each cycle, from the start of the trajectory."""
 
     experiment: str
     """Name of the experiment."""
     rms_error_m: float
     """Root mean square distance of the true tip from its reference (m)."""
     max_error_m: float
-    """Greatest of it (m)."""
+    """Maximum distance of the true tip from its reference (m)."""
     ended: tuple[float, str] | None
-    """Time (s) and words of the fault that ended the run early, if one did."""
+    """Time (s) and text of the fault that ended the run early, if one did."""
     t: Array
-    """Time since the trajectory began, (cycles,) (s)."""
+    """Time since the start of the trajectory, (cycles,) (s)."""
     q: Array
     """Joint angles that the controller used, (cycles, N) (rad)."""
     qd: Array
-    """Joint velocities that it estimated, (cycles, N) (rad/s)."""
+    """Joint velocities that the controller estimated, (cycles, N) (rad/s)."""
     tau: Array
-    """Joint torques that it commanded, (cycles, N) (N m)."""
+    """Joint torques that the controller commanded, (cycles, N) (N m)."""
     reference_position_m: Array
-    """Where the tip should be, base axes, (cycles, 3) (m)."""
+    """Reference position of the tip, base axes, (cycles, 3) (m)."""
     tip_position_m: Array
-    """Where it really is, base axes, (cycles, 3) (m)."""
+    """True position of the tip, base axes, (cycles, 3) (m)."""
     tip_force_n: Array
     """Force sensor, filtered, base axes, (cycles, 3) (N)."""
     in_contact: NDArray[np.bool_]
-    """Where contact is latched, (cycles,)."""
+    """Whether contact is latched, (cycles,)."""
     strokes: Mapping[str, Array]
     """Probing only, by name, (strokes,) each: ``approach_m_per_s``, ``peak_filtered_n``,
     ``contact_s``, ``impulse_newton_s``, ``rest_force_n``."""
     log: Path | None
-    """The log, if one was asked for."""
+    """Path of the log, if ``log_dir`` was given."""
 
     def __repr__(self) -> str:
         return f"<Run {self.experiment!r}, {1e3 * self.rms_error_m:.2f} mm RMS>"
@@ -76,51 +76,52 @@ def simulate(
 ) -> Run:
     """Run one of the paper's experiments on the simulated arm, in virtual time.
 
-    ``arm`` is the truth about the plant; what the controller knows of it is set here. The plant is
-    another engine than the controller's model, with bristle friction, quantised encoders and torques
-    and a cycle of delay. The interpreter lock is released while it runs; the same arguments give the
-    same numbers.
+    ``arm`` defines the plant; ``model`` or the error options set the controller's model of it. The plant uses a different
+    dynamics engine than the controller's model, with bristle friction, quantised encoders and torques,
+    and a delay of one cycle. The interpreter lock is released during the run; the same arguments give
+    the same numbers.
 
     Parameters
     ----------
     arm : Arm
         The arm, with its friction, limits and gains: :meth:`Arm.load` reads them.
     experiment : {"sinusoid", "arc", "quadrant", "probing"}
-        Figures 3a, an arc about the base, 3b, and 5 and 6 of the paper.
+        Figure 3a of the paper, an arc about the base, figure 3b, figures 5 and 6.
     stiffness_n_per_m : float
-        Stiffness of the tip on each axis (N/m), zero or more. The damping goes with its square root.
+        Stiffness of the tip on each axis (N/m), zero or more. The damping is proportional to its square
+        root.
     speed : float
-        Pace of the sinusoid and the quadrant, 1 for the paper's.
+        Speed of the sinusoid and the quadrant, relative to the paper's.
     duration_s : float, optional
         Duration of the trajectory (s). Default: the paper's.
     model : Arm, optional
-        What the controller takes the arm for, such as :attr:`Fit.arm`: its inertias, friction, limits
-        and gains. Default: the arm itself, but for the errors below.
+        The controller's model of the arm, such as :attr:`Fit.arm`: its inertias, friction, limits and
+        gains. Default: the arm itself with the errors below.
     gravity_error, friction_error : float
-        Relative errors of the controller's model, each parameter off by the full amount with a sign
-        drawn from ``seed``. 1e-3 and 0.03 are those of a good identification. Default 0: exact.
+        Relative errors of the controller's model. Each parameter has the full error, with a sign drawn
+        from ``seed``. 1e-3 and 0.03 are typical of a good identification. Default 0: exact.
     stribeck : bool
-        The friction feed-forward has the plant's Stribeck dip.
+        Whether the friction feed-forward includes the plant's Stribeck effect.
     load : bool
-        The plant's friction has its part that depends on direction and load.
+        Whether the plant's friction depends on direction and load.
     fade : bool
-        The contact latch fades the friction feed-forward.
+        Whether the contact latch fades the friction feed-forward.
     seed : int
-        Seed of every noise and of the signs above, zero or more.
+        Seed of all noise and of the signs above, zero or more.
     log_dir : str or os.PathLike, optional
-        Folder for ``<experiment>.mcap``, made if it is not there; see :func:`read_log`.
+        Folder for ``<experiment>.mcap``, created if necessary; see :func:`read_log`.
 
     Returns
     -------
     Run
-        Every cycle, and the error. A fault of the controller is a result: ``run.ended``.
+        Every cycle, and the tracking error. A fault of the controller is a result: ``run.ended``.
 
     Raises
     ------
     ValueError
-        For an unknown experiment, a wrong value, an arm that cannot reach the trajectory.
+        For an unknown experiment, an invalid value, or an arm that cannot reach the trajectory.
     RuntimeError
-        For a fault on the way to the start.
+        For a fault during the move to the start pose.
 
     Examples
     --------
@@ -139,11 +140,11 @@ def simulate(
     for name, value in (("gravity_error", gravity_error), ("friction_error", friction_error)):
         _check(name, value, positive=False)
         if value >= 1.0:
-            raise ValueError(f"{name}: expected a share below 1, got {value}")
+            raise ValueError(f"{name}: expected a fraction below 1, got {value}")
     if seed < 0:
         raise ValueError(f"seed: expected zero or more, got {seed}")
     if model is not None and (gravity_error or friction_error):
-        raise ValueError("gravity_error, friction_error: expected none beside a model of its own")
+        raise ValueError("gravity_error, friction_error: expected 0 if model is given")
     if log_dir is not None:
         Path(log_dir).mkdir(parents=True, exist_ok=True)
     result = _native.simulate(

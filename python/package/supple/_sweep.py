@@ -1,4 +1,4 @@
-"""Many runs of one function, each with a seed of its own, on any executor."""
+"""Repeated calls of one function with different seeds, on any executor."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ __all__ = ["Sweep", "sweep"]
 class Sweep(Sequence[R], Generic[P, R]):
     """Results of :func:`sweep`, in the order of the parameters.
 
-    A sequence of the results; ``parameters`` and ``seeds`` say what each came from.
+    A sequence of the results; ``parameters`` and ``seeds`` hold the inputs of each.
     """
 
     parameters: tuple[P, ...]
-    """What each task was given."""
+    """Parameter of each task."""
     seeds: tuple[int, ...]
-    """Seed of each task, all different: ``function(parameters[i], seeds[i])`` gives ``results[i]``."""
+    """Seed of each task, all distinct: ``function(parameters[i], seeds[i])`` gives ``results[i]``."""
     results: tuple[R, ...]
-    """What each task returned."""
+    """Result of each task."""
 
     @overload
     def __getitem__(self, index: int) -> R: ...
@@ -53,9 +53,9 @@ def sweep(
 ) -> Sweep[P, R]:
     """Call ``function(parameter, seed)`` for every parameter, with a seed spawned for each.
 
-    Seeds are 63-bit numbers from ``numpy.random.SeedSequence(seed).spawn``: they differ from task to
-    task, so that an executor which runs identical calls once (Dask does) runs every one, and the same
-    sweep gives the same results on any executor.
+    Seeds are 63-bit numbers from ``numpy.random.SeedSequence(seed).spawn``: they differ between tasks,
+    so that an executor which merges identical calls (such as Dask) runs every one. The same sweep gives
+    the same results on any executor.
 
     Parameters
     ----------
@@ -64,9 +64,10 @@ def sweep(
     parameters : iterable
         One task each. ``range(100)`` is a Monte-Carlo run of 100.
     seed : int
-        Seed of the whole sweep, zero or more.
+        Seed of the sweep, zero or more.
     executor : concurrent.futures.Executor, optional
-        Where the tasks run; ``distributed.Client.get_executor()`` is one. Default: here, in order.
+        Executor of the tasks, such as ``distributed.Client.get_executor()``. Default: run in this
+        thread, in order.
     progress : callable, optional
         Called as ``progress(done, total)`` after each task.
 
@@ -78,11 +79,11 @@ def sweep(
     Raises
     ------
     TypeError
-        For a ``function`` that cannot be called.
+        If ``function`` is not callable.
     ValueError
-        For a negative seed.
+        If the seed is negative.
     Exception
-        What a task raises first; tasks that have not begun are cancelled.
+        The first exception of a task; tasks that have not started are cancelled.
 
     Examples
     --------

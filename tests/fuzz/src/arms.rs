@@ -1,11 +1,11 @@
-//! Descriptions of arms: a URDF with a sound TOML, a TOML with a sound URDF.
+//! Arm descriptions: a fuzzed URDF with a valid TOML, and a fuzzed TOML with a valid URDF.
 
 use supple_core::Controller;
 use supple_model::Description;
 
 /// TOML of the built-in arm with three joints.
 pub const TOML: &str = include_str!("../../../assets/wam3/arm.toml");
-/// Its URDF.
+/// URDF of the built-in arm with three joints.
 pub const URDF: &str = include_str!("../../../assets/wam3/arm.urdf");
 
 /// Bytes as a URDF.
@@ -22,7 +22,7 @@ pub fn toml(data: &[u8]) {
     }
 }
 
-/// What is not refused can be controlled, or is refused by the controller; either says why.
+/// An accepted description can be controlled, or the controller rejects it; every rejection has a reason.
 fn describe(toml: &str, urdf: &str) {
     match Description::from_text(toml, urdf) {
         Err(error) => assert!(!error.to_string().is_empty()),

@@ -1,4 +1,4 @@
-//! What an emulated arm is told: lines at its pendant's socket, and frames on its bus.
+//! Inputs of an emulated arm: lines at its pendant's socket, and frames on its bus.
 
 use std::sync::OnceLock;
 use supple_bus::virtual_time::Peer;
@@ -11,7 +11,7 @@ use supple_plant::PlantConfig;
 /// Time between two frames, and after each line \[ns\].
 const FRAME_NS: u64 = 100_000;
 const LINE_NS: u64 = 1_000_000;
-/// Most lines and frames of one input.
+/// Maximum number of lines and frames per input.
 const LINES: usize = 8;
 const FRAMES: usize = 64;
 
@@ -26,10 +26,10 @@ fn emulator() -> Emulator<4> {
         zeroed: true,
         ..EmulatorConfig::wam(4)
     };
-    Emulator::new(config, plant.clone(), *home_rad, 0).expect("a sound arm")
+    Emulator::new(config, plant.clone(), *home_rad, 0).expect("a valid arm")
 }
 
-/// Lines at the pendant's socket, each with the time that passes after it.
+/// Lines at the pendant's socket, each followed by an interval of time.
 pub fn pendant_line(data: &[u8]) {
     let Ok(text) = core::str::from_utf8(data) else {
         return;
@@ -62,7 +62,7 @@ pub fn arm_bus(data: &[u8]) {
                     WireFrame::Fault(fault)
                 );
             }
-            WireFrame::Foreign => {}
+            WireFrame::Unsupported => {}
         }
         run(&mut emulator, FRAME_NS);
         let torque_nm = emulator.motor_torque_nm();
@@ -70,7 +70,7 @@ pub fn arm_bus(data: &[u8]) {
     }
 }
 
-/// Lets time pass, whatever happens in it.
+/// Advances the emulator by a time.
 fn run(emulator: &mut Emulator<4>, ns: u64) {
     let until_ns = emulator.now_ns() + ns;
     while emulator.run_until(until_ns).is_some() {}

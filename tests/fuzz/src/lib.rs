@@ -1,13 +1,12 @@
-//! What the programs do with bytes that come from outside, as functions of bytes.
+//! Fuzz targets: everything that parses external bytes, as functions of a byte slice.
 //!
-//! A [`Target`] must survive whatever bytes it is given: it returns, in bounded time and memory, and what it
-//! asserts holds. cargo-fuzz runs the targets with coverage (`libfuzzer/`, one program each); a test on the
-//! stable compiler runs them over the committed inputs in `corpus/` and over a seeded stream of their mutations
-//! (`tests/corpus.rs`).
+//! A [`Target`] must accept any bytes: it returns in bounded time and memory, and its assertions hold. cargo-fuzz
+//! runs the targets with coverage (`libfuzzer/`, one program each); a test on the stable compiler runs them over the
+//! committed inputs in `corpus/` and over a seeded stream of their mutations (`tests/corpus.rs`).
 //!
-//! `./ci.sh fuzz` does the first where a nightly compiler and cargo-fuzz can be had, and the second elsewhere.
-//! An input that made a target fail is committed in `corpus/<target>/` once the defect is mended, under a name
-//! that says what it was; the `seed-` files there are written by [`seeds`], see `tests/corpus.rs`.
+//! `./ci.sh fuzz` runs cargo-fuzz if a nightly compiler and cargo-fuzz are installed, and the test otherwise. An
+//! input that made a target fail is committed in `corpus/<target>/` after the bug is fixed, under a descriptive name;
+//! [`seeds`] writes the `seed-` files there, see `tests/corpus.rs`.
 
 pub mod arms;
 pub mod bytes;
@@ -22,18 +21,18 @@ pub mod tables;
 
 use std::path::PathBuf;
 
-/// Somewhere that bytes come in.
+/// A fuzz target: a parser of external bytes.
 #[derive(Clone, Copy, Debug)]
 pub struct Target {
-    /// Its name: that of its program, and of its folder in `corpus`.
+    /// Name of the target, of its program and of its folder in `corpus`.
     pub name: &'static str,
-    /// What is done with the bytes.
+    /// Function that processes the bytes.
     pub body: fn(&[u8]),
-    /// Mutations that the test on the stable compiler tries: so many that each target takes about a second.
+    /// Number of mutations in the test on the stable compiler, chosen so that each target takes about a second.
     pub mutations: u32,
 }
 
-/// Every target.
+/// All targets.
 pub const TARGETS: [Target; 18] = [
     target("inbound", pucks::inbound, 100_000),
     target("property", pucks::property, 100_000),
@@ -64,7 +63,7 @@ const fn target(name: &'static str, body: fn(&[u8]), mutations: u32) -> Target {
 }
 
 impl Target {
-    /// Folder of its committed inputs.
+    /// Folder of the committed inputs.
     pub fn corpus(&self) -> PathBuf {
         let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
         root.join("corpus").join(self.name)

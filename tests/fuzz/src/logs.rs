@@ -1,4 +1,4 @@
-//! Logs: whatever a file holds, it is read, exported, recovered and replayed, or refused.
+//! Logs: a file with any content is read, exported, recovered and replayed, or rejected.
 
 use crate::bytes::with_file;
 use core::num::NonZeroU64;
@@ -10,7 +10,7 @@ use supple_core::{Controller, State, step};
 use supple_log::{Extras, LogError, Reader, RunInfo, Writer, export_csv, info, recover, replay};
 use supple_model::Description;
 
-/// A file as it is.
+/// The bytes as a log file.
 pub fn log(data: &[u8]) {
     with_file("input.mcap", data, |path| {
         let _ = info(path).map(|info| format!("{info:?}"));
@@ -21,9 +21,9 @@ pub fn log(data: &[u8]) {
         read(path);
         let to = path.with_extension("recovered");
         if recover(path, &to).is_ok() {
-            // What was recovered is complete.
+            // A recovered log is complete.
             let again = path.with_extension("again");
-            let recovery = recover(&to, &again).expect("it was written whole");
+            let recovery = recover(&to, &again).expect("a complete log");
             assert_eq!(recovery.stopped, None);
         }
     });
@@ -47,19 +47,19 @@ fn read(path: &Path) {
 /// Opcode and length before every record of a file.
 const RECORD_PREFIX_BYTES: usize = 9;
 
-/// A message definition, a zero byte and a message, in a log that is sound otherwise.
+/// A message definition, a zero byte and a message, in an otherwise valid log.
 pub fn log_schema(data: &[u8]) {
     if let Ok(table) = exported(data) {
         let lines = table.split(|byte| *byte == b'\n').count();
-        // A line of names, one message, and nothing after the last line.
+        // One line of column names and one message, without further text.
         assert_eq!(lines, 3, "{}", String::from_utf8_lossy(&table));
     }
 }
 
-/// The table of such a log.
+/// Table of a log with this definition and message.
 ///
 /// # Errors
-/// Why there is none.
+/// Why the log cannot be exported.
 pub fn exported(data: &[u8]) -> Result<Vec<u8>, LogError> {
     let end = data.iter().position(|byte| *byte == 0);
     let end = end.unwrap_or(data.len());
@@ -71,7 +71,7 @@ pub fn exported(data: &[u8]) -> Result<Vec<u8>, LogError> {
     })
 }
 
-/// A log with one channel and one message, nothing compressed and no checksum.
+/// A log with one channel and one message, without compression and checksums.
 fn file_with(schema: &[u8], message: &[u8]) -> Vec<u8> {
     let written = || -> Result<Vec<u8>, mcap::McapError> {
         let options = mcap::WriteOptions::new()
@@ -99,7 +99,7 @@ fn file_with(schema: &[u8], message: &[u8]) -> Vec<u8> {
     file
 }
 
-/// What a log has to say of itself.
+/// Metadata that a log must contain.
 fn about() -> BTreeMap<String, String> {
     let entries = [
         ("software", "supple"),
@@ -112,7 +112,7 @@ fn about() -> BTreeMap<String, String> {
     BTreeMap::from(entries)
 }
 
-/// A log of the built-in arm with three joints, as it is written, cut, and without compression.
+/// A log of the built-in arm with three joints: complete, truncated, and without compression.
 pub fn seeds() -> Vec<crate::seeds::Seed> {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("seed.mcap");
@@ -132,7 +132,7 @@ fn write(path: &Path) {
     let description = Description::asset("wam3").expect("built in");
     let config = description.config::<3>().expect("three joints");
     let home = description.home::<3>().expect("three joints");
-    let controller = Controller::new(config).expect("sound");
+    let controller = Controller::new(config).expect("valid");
     let mut state = State::new(&controller);
     let run = RunInfo::default();
     let mut writer = Writer::create(path, &description, &config, &run).expect("a new file");
@@ -147,7 +147,7 @@ fn write(path: &Path) {
             .expect("room");
     }
     writer.event(6_000_000, "a button").expect("room");
-    writer.finish().expect("whole");
+    writer.finish().expect("complete");
 }
 
 /// The same metadata, attachments, channels and messages without compression and checksums.

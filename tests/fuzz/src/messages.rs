@@ -1,14 +1,18 @@
-//! Messages between the processes, as a peer may have left them in shared memory, and what is done with them.
+//! Messages between the processes with arbitrary content, as a peer may leave them in shared memory, and their
+//! consumers.
 
 use crate::bytes::{value_of, values_of};
-use crate::requests::{assert_sound, controller};
+use crate::requests::{assert_valid_output, controller};
+use supple_core::codes::VALUES;
+use supple_core::controller::CycleRecord;
+use supple_core::record;
 use supple_core::{State, step};
 use supple_ipc::message::{ArmState, CycleTiming, OperatorReply, Telemetry, Text, TorqueCommand};
 
-/// Most states of one input.
+/// Maximum number of states per input.
 const STATES: usize = 32;
 
-/// States of an arm with four joints, one after the other, into the controller and out as telemetry.
+/// Passes successive states of a 4-joint arm through the controller to telemetry.
 pub fn arm_state(data: &[u8]) {
     let controller = controller();
     let mut state = State::new(controller);
@@ -20,18 +24,19 @@ pub fn arm_state(data: &[u8]) {
             continue;
         };
         let output = step(controller, &mut state, &input);
-        assert_sound(controller, last.as_ref(), &output);
+        assert_valid_output(controller, last.as_ref(), &output);
         last = Some(output);
         let command = TorqueCommand::new(&output, false);
         assert_eq!(command.torque::<4>(), Ok(output.torque_nm));
-        assert_eq!(command.wants_torque(), !output.limp);
+        assert_eq!(command.wants_torque(), !output.torque_off);
         let told = Telemetry::new(0, &arm, &input, &output, CycleTiming::default());
+        let told = told.record_of::<4>();
         assert_eq!(told.mode(), Some(output.mode));
         assert!(told.fault_text.as_str().is_empty() == output.fault.is_none());
     }
 }
 
-/// The answer to a state, as the process that owns the motors reads it.
+/// Torque commands, as the process that owns the motors reads them.
 pub fn torque_command(data: &[u8]) {
     let command: TorqueCommand = value_of(data);
     let (torque, fallback) = (command.torque::<4>(), command.fallback_torque::<4>());
@@ -42,27 +47,35 @@ pub fn torque_command(data: &[u8]) {
     let _ = command.wants_torque();
 }
 
-/// Telemetry and replies, as a status line, a log and an operator read them.
+/// Telemetry and replies, as the status line, the log and an operator read them.
 pub fn telemetry(data: &[u8]) {
     let told: Telemetry = value_of(data);
-    let _ = told.mode().map(|mode| mode.name());
-    let _ = told.tip_error_m();
     let _ = told.state.drives();
-    let request = told.request();
-    assert!(request.values().len() <= usize::from(request.count));
-    let _ = request.request::<4>().is_ok();
     let _ = told.state.input::<4>(None);
-    text(&told.fault_text);
-    text(&told.refusal_text);
+    let record = told.record();
+    let _ = record.mode().map(|mode| mode.name());
+    let _ = record.tip_error_m();
+    assert!(record.request_values.values().len() <= VALUES);
+    let _ = told.record_of::<4>().input().is_ok();
+    for text in [&record.fault_text, &record.refusal_text] {
+        assert_eq!(record::Text::from_display(text).as_str(), text.as_str());
+    }
+    let fields = CycleRecord::<7>::FIELDS;
+    let mut columns = 0;
+    record::for_each_column(fields, told.words(), told.dof(), |column, cell| {
+        columns += 1;
+        assert!(format!("{column}={cell}").len() > 1);
+    });
+    assert!(columns >= fields.len() - 3);
     let reply: OperatorReply = value_of(data);
     let _ = (reply.outcome(), reply.mode());
     text(&reply.text);
 }
 
-/// Words are whole characters, whatever the bytes, and can be said again.
+/// A text is valid UTF-8 for any bytes, and survives a round trip.
 fn text(text: &Text) {
-    let words = text.as_str();
-    assert!(words.len() <= size_of::<Text>());
-    assert_eq!(Text::of(&words).as_str(), words);
-    assert_eq!(format!("{text}"), words);
+    let string = text.as_str();
+    assert!(string.len() <= size_of::<Text>());
+    assert_eq!(Text::of(&string).as_str(), string);
+    assert_eq!(format!("{text}"), string);
 }

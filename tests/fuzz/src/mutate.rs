@@ -1,10 +1,10 @@
-//! Seeded mutations of inputs: what the test on the stable compiler tries in the place of a fuzzer.
+//! Seeded mutations of inputs; the test on the stable compiler uses them instead of a fuzzer.
 
-/// Bytes that programs go wrong on.
+/// Byte values that often trigger bugs.
 const BYTES: [u8; 12] = [
     0, 1, 2, 0x7f, 0x80, 0xfe, 0xff, b'-', b'9', b'e', b'<', b'\n',
 ];
-/// The same, longer: whole numbers and floats, little-endian, and texts.
+/// Byte sequences that often trigger bugs: little-endian integers and floats, and texts.
 const RUNS: [&[u8]; 16] = [
     &u64::MAX.to_le_bytes(),
     &i64::MAX.to_le_bytes(),
@@ -23,15 +23,15 @@ const RUNS: [&[u8]; 16] = [
     b"[[",
     "\u{1d4d0}".as_bytes(),
 ];
-/// Longest input that is made.
-const LONGEST: usize = 1 << 16;
+/// Maximum size of a mutated input.
+const MAX_INPUT_BYTES: usize = 1 << 16;
 
-/// Numbers without a pattern, the same ones for the same seed (splitmix64).
+/// Pseudo-random numbers, reproducible for a seed (splitmix64).
 #[derive(Clone, Debug)]
 pub struct Random(pub u64);
 
 impl Random {
-    /// The next one.
+    /// The next number.
     pub fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
@@ -40,56 +40,56 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// Below `end`, which is not zero.
+    /// A number below `end`, which must not be zero.
     pub fn below(&mut self, end: usize) -> usize {
         (self.bits() % end.max(1) as u64) as usize
     }
 }
 
-/// One of the inputs, changed in one to four places.
+/// One of the inputs with one to four changes.
 pub fn mutated(random: &mut Random, inputs: &[Vec<u8>]) -> Vec<u8> {
     let mut input = inputs[random.below(inputs.len())].clone();
     for _ in 0..=random.below(4) {
         change(random, &mut input, inputs);
     }
-    input.truncate(LONGEST);
+    input.truncate(MAX_INPUT_BYTES);
     input
 }
 
 fn change(random: &mut Random, input: &mut Vec<u8>, inputs: &[Vec<u8>]) {
-    let place = random.below(input.len() + 1);
-    let rest = input.len() - place;
+    let index = random.below(input.len() + 1);
+    let rest = input.len() - index;
     match random.below(9) {
-        0 if rest > 0 => input[place] ^= 1 << random.below(8),
-        1 if rest > 0 => input[place] = BYTES[random.below(BYTES.len())],
-        2 if rest > 0 => input[place] = random.bits() as u8,
+        0 if rest > 0 => input[index] ^= 1 << random.below(8),
+        1 if rest > 0 => input[index] = BYTES[random.below(BYTES.len())],
+        2 if rest > 0 => input[index] = random.bits() as u8,
         3 => {
             let run = RUNS[random.below(RUNS.len())];
             let covered = run.len().min(rest);
-            input.splice(place..place + covered, run.iter().copied());
+            input.splice(index..index + covered, run.iter().copied());
         }
         4 => {
             let run = RUNS[random.below(RUNS.len())];
-            input.splice(place..place, run.iter().copied());
+            input.splice(index..index, run.iter().copied());
         }
-        5 => input.truncate(place),
+        5 => input.truncate(index),
         6 => {
             let gone = random.below(rest.min(64) + 1);
-            input.drain(place..place + gone);
+            input.drain(index..index + gone);
         }
         7 => {
-            // A part of any input, in the place of what is here or between.
+            // Insert a part of any input here, or replace bytes by it.
             let other = &inputs[random.below(inputs.len())];
             let from = random.below(other.len() + 1);
             let length = random.below((other.len() - from).min(512) + 1);
             let covered = random.below(rest.min(length) + 1);
             let part = other[from..from + length].iter().copied();
-            input.splice(place..place + covered, part);
+            input.splice(index..index + covered, part);
         }
         _ => {
             let length = random.below(rest.min(64) + 1);
-            let part = input[place..place + length].repeat(1 + random.below(3));
-            input.splice(place..place, part);
+            let part = input[index..index + length].repeat(1 + random.below(3));
+            input.splice(index..index, part);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Frames of the arm's bus, decoder by decoder.
+//! Frames of the arm's bus, one target per decoder.
 
 use supple_puck::force_torque::{Quantity, SensorReading};
 use supple_puck::property::Reply;
@@ -9,7 +9,7 @@ use supple_puck::{
     PuckKind, timing,
 };
 
-/// Two bytes of id, the rest payload.
+/// Builds a frame: two bytes of id, then the payload.
 fn frame(data: &[u8]) -> Option<CanFrame> {
     let (id, payload) = data.split_first_chunk()?;
     let id = u32::from(u16::from_le_bytes(*id));
@@ -27,10 +27,10 @@ pub fn inbound(data: &[u8]) {
         assert_eq!(node, frame.id().from());
     }
     let bits = timing::bits(&frame);
-    assert!(bits >= timing::least_bits(frame.dlc()) && bits <= timing::most_bits(frame.dlc()));
+    assert!(bits >= timing::min_bits(frame.dlc()) && bits <= timing::max_bits(frame.dlc()));
 }
 
-/// Property messages and replies, and what their ids stand for.
+/// Property messages and replies, and the meaning of their ids.
 pub fn property(data: &[u8]) {
     let Some(frame) = frame(data) else {
         return;
@@ -85,7 +85,7 @@ pub fn force_torque(data: &[u8]) {
     }
 }
 
-/// The pendant's word, four bytes.
+/// The state word of the pendant, four bytes.
 pub fn pendant(data: &[u8]) {
     let Some(data) = data.first_chunk() else {
         return;
@@ -97,7 +97,7 @@ pub fn pendant(data: &[u8]) {
     }
 }
 
-/// Property values that stand for modes, roles and limits, four bytes.
+/// Property values of modes, roles and limits, four bytes.
 pub fn values(data: &[u8]) {
     let Some(data) = data.first_chunk() else {
         return;

@@ -1,4 +1,4 @@
-//! Requests of an operator: from bytes to numbers, to a request, to the controller's own checks.
+//! Requests of an operator: from bytes to a request, through the checks of the controller.
 
 use crate::bytes::values_of;
 use std::sync::OnceLock;
@@ -7,14 +7,14 @@ use supple_core::{Controller, Input, Output, State, Vector, step};
 use supple_ipc::message::{OperatorRequest, Text};
 use supple_model::Description;
 
-/// Most requests of one input.
+/// Maximum number of requests per input.
 const REQUESTS: usize = 4;
-/// Cycles after each of them.
+/// Number of cycles after each request.
 const CYCLES: u64 = 25;
-/// Cycles that the controller holds the arm before the first.
+/// Number of cycles in gravity hold before the first request.
 const HOLDING: u64 = 300;
 
-/// The safe action may take a joint's whole torque away in this time \[s\].
+/// Time in which the safe action may remove the complete torque of a joint \[s\].
 const STOP_TORQUE_S: f64 = 0.005;
 
 /// The controller of the built-in arm with four joints.
@@ -22,7 +22,7 @@ pub fn controller() -> &'static Controller<4> {
     static CONTROLLER: OnceLock<Controller<4>> = OnceLock::new();
     CONTROLLER.get_or_init(|| {
         let config = description().config().expect("four joints");
-        Controller::new(config).expect("sound")
+        Controller::new(config).expect("valid")
     })
 }
 
@@ -35,14 +35,14 @@ fn home() -> &'static Vector<4> {
     HOME.get_or_init(|| description().home().expect("four joints"))
 }
 
-/// The arm at rest at home in this cycle: by way of a message, which knows what an input holds.
+/// Input of a cycle with the arm at rest in its home pose, converted from a message.
 pub fn at_rest(cycle: u64, request: Option<Request<4>>) -> Input<4> {
     crate::seeds::state_at_rest(cycle, home())
         .input(request)
         .expect("four joints")
 }
 
-/// In gravity hold, with the torques settled.
+/// State and output in gravity hold with settled torques.
 fn holding() -> &'static (State<4>, Output<4>) {
     static HELD: OnceLock<(State<4>, Output<4>)> = OnceLock::new();
     HELD.get_or_init(|| {
@@ -58,7 +58,7 @@ fn holding() -> &'static (State<4>, Output<4>) {
     })
 }
 
-/// Requests to an arm that stands still in gravity hold, each followed by some cycles.
+/// Sends requests to a stationary arm in gravity hold, each followed by some cycles.
 pub fn operator_request(data: &[u8]) {
     let (mut state, held) = *holding();
     let mut last = held;
@@ -75,13 +75,13 @@ pub fn operator_request(data: &[u8]) {
         if let Some(request) = &request {
             let again = OperatorRequest::new(message.operator, message.sequence, None, request);
             let again = again.request::<4>().expect("it was a request");
-            // Compared as words: a request may hold what is not a number.
+            // Compared as text: a request may contain NaN.
             assert_eq!(format!("{again:?}"), format!("{:?}", Some(request)));
         }
         for k in 0..CYCLES {
             let input = at_rest(cycle, request.filter(|_| k == 0));
             let output = step(controller(), &mut state, &input);
-            assert_sound(controller(), Some(&last), &output);
+            assert_valid_output(controller(), Some(&last), &output);
             if let Some(refusal) = &output.refusal {
                 assert!(Text::of(refusal).as_str().starts_with("refused"));
             }
@@ -91,8 +91,8 @@ pub fn operator_request(data: &[u8]) {
     }
 }
 
-/// What holds of every output of a step: finite, within the limits of joints, motors and rate.
-pub fn assert_sound<const N: usize>(
+/// Asserts that the output of a step is finite and within the limits of joints, motors and rate.
+pub fn assert_valid_output<const N: usize>(
     controller: &Controller<N>,
     last: Option<&Output<N>>,
     output: &Output<N>,

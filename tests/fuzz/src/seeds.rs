@@ -1,7 +1,7 @@
-//! Small valid inputs of every target: where a fuzzer begins.
+//! Small valid inputs of every target, from which a fuzzer starts.
 //!
-//! `cargo test -p supple-fuzz --test corpus -- --ignored write_seeds` writes them into the committed corpus, as `seed-*`
-//! files; that is to be done after a message or a log has changed its layout.
+//! `cargo test -p supple-fuzz --test corpus -- --ignored write_seeds` writes them into the committed corpus, as
+//! `seed-*` files; run it after the layout of a message or a log has changed.
 
 use crate::arms;
 use crate::bytes::bytes_of;
@@ -22,13 +22,13 @@ use supple_ipc::message::{
 use supple_model::Description;
 use supple_puck::CanFrame;
 
-/// A name and the bytes.
+/// Name and bytes of an input.
 pub type Seed = (String, Vec<u8>);
 
-/// Those of a target.
+/// Seeds of a target.
 ///
 /// # Panics
-/// Where there is no target of this name.
+/// If there is no target of this name.
 pub fn of(target: &str) -> Vec<Seed> {
     match target {
         "inbound" => frames(&[POSITION, JOINT_POSITION, REPLY, FORCE]),
@@ -79,11 +79,11 @@ fn text(name: &str, text: &str) -> Seed {
     (name.to_owned(), text.as_bytes().to_vec())
 }
 
-fn named<T: crate::bytes::AnyBits>(name: &str, value: &T) -> Seed {
+fn named<T: crate::bytes::AnyBitPattern>(name: &str, value: &T) -> Seed {
     (name.to_owned(), bytes_of(value))
 }
 
-/// The arm at rest in a cycle.
+/// State of an arm at rest in a cycle.
 pub fn state_at_rest<const N: usize>(cycle: u64, position_rad: &Vector<N>) -> ArmState {
     ArmState::new::<N>(
         cycle,
@@ -118,7 +118,7 @@ fn arm_states() -> Vec<Seed> {
     ]
 }
 
-/// A step in gravity hold.
+/// State and output of a step in gravity hold.
 fn held() -> (ArmState, Output<4>) {
     let mut state = State::new(controller());
     step(controller(), &mut state, &at_rest(0, None));
@@ -133,11 +133,11 @@ fn held() -> (ArmState, Output<4>) {
 fn telemetry() -> Vec<Seed> {
     let (arm, output) = held();
     let input = at_rest(1, Some(Request::GravityHold));
-    let told = Telemetry::new(1, &arm, &input, &output, CycleTiming::default());
+    let telemetry = Telemetry::new(1, &arm, &input, &output, CycleTiming::default());
     let request = OperatorRequest::new(1, 1, None, &Request::<4>::Idle);
-    let words = Text::of(&"refused: not from mode idle");
-    let reply = OperatorReply::new(&request, 1, output.mode, Outcome::Refused, words);
-    vec![named("hold", &told), named("reply", &reply)]
+    let text = Text::of(&"refused: not from mode idle");
+    let reply = OperatorReply::new(&request, 1, output.mode, Outcome::Refused, text);
+    vec![named("hold", &telemetry), named("reply", &reply)]
 }
 
 fn requests() -> Vec<Seed> {
@@ -233,7 +233,7 @@ fn requests() -> Vec<Seed> {
     all.map(coded).to_vec()
 }
 
-/// Line between the definitions of a text.
+/// Separator line between message definitions.
 const SEPARATOR: &str =
     "================================================================================";
 
@@ -245,7 +245,7 @@ fn definitions() -> Vec<Seed> {
         (name.to_owned(), bytes)
     };
     let numbers = [&[0, 1, 0, 0][..], &[0; 10]].concat();
-    // Three of five bytes each, the second and third aligned to four, and a word of no letters.
+    // Three structures of five bytes each, the second and third aligned to four bytes, and an empty string.
     let nested = [&[0, 1, 0, 0][..], &[0; 24], &[1, 0, 0, 0, 0]].concat();
     vec![
         with("numbers", "float64 x\nint8[2] y\n", &numbers),

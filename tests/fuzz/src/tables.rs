@@ -1,10 +1,10 @@
-//! Tables of measurements, and the motion that a design leaves.
+//! Tables of measurements, and the motion of a design file.
 
 use crate::bytes::with_file;
 use supple_core::trajectory::Fourier;
 use supple_ident::{SeriesLists, read_csv};
 
-/// Where it begins with a brace a motion of three joints, JSON; otherwise a table for three joints.
+/// Input that begins with a brace is a JSON motion of three joints; other input is a table for three joints.
 pub fn csv(data: &[u8]) {
     if data.starts_with(b"{") {
         return series(data);

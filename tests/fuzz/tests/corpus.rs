@@ -1,5 +1,5 @@
-//! Every target over its committed inputs and a seeded stream of their mutations; and the programs for cargo-fuzz
-//! are those of the targets.
+//! Runs every target over its committed inputs and a seeded stream of their mutations, and checks that every target
+//! has a cargo-fuzz program.
 
 use std::path::{Path, PathBuf};
 use supple_fuzz::arms;
@@ -10,10 +10,10 @@ use supple_ipc::message::OperatorRequest;
 use supple_log::{LogError, Reader};
 use supple_model::Description;
 
-/// Times the usual number of mutations, for a longer run.
+/// Factor for the number of mutations, for a longer run.
 const FACTOR: &str = "SUPPLE_FUZZ_FACTOR";
 
-/// Where `write_seeds` writes; the committed corpus if not given.
+/// Output folder of `write_seeds`. Default: the committed corpus.
 const WRITE: &str = "SUPPLE_FUZZ_WRITE";
 
 fn committed(target: &Target) -> Vec<(PathBuf, Vec<u8>)> {
@@ -29,7 +29,7 @@ fn committed(target: &Target) -> Vec<(PathBuf, Vec<u8>)> {
     files.into_iter().map(read).collect()
 }
 
-/// Runs the body; says which input it was where it fails.
+/// Runs the target; names and saves an input that makes it fail.
 fn survives(target: &Target, input: &[u8], what: &dyn Fn() -> String) {
     let body = target.body;
     if let Err(panic) = std::panic::catch_unwind(|| body(input)) {
@@ -77,7 +77,7 @@ macro_rules! targets {
         )*
 
         #[test]
-        fn every_target_is_run() {
+        fn every_target_has_a_test() {
             let run = [$(stringify!($name)),*];
             assert_eq!(run, TARGETS.map(|target| target.name));
         }
@@ -90,7 +90,7 @@ targets! {
     log log_schema urdf toml csv pendant_line arm_bus
 }
 
-/// Writes the valid inputs of every target into a folder, a folder a target.
+/// Writes the valid inputs of every target, one folder per target.
 #[test]
 #[ignore = "writes: see supple_fuzz::seeds"]
 fn write_seeds() {
@@ -121,9 +121,9 @@ fn every_target_has_valid_inputs_committed() {
     }
 }
 
-/// A fuzzer that begins with inputs which are refused at once finds nothing behind the refusal.
+/// The targets must accept the seeds; a fuzzer that starts from rejected inputs never gets past the validation.
 #[test]
-fn valid_inputs_are_valid() {
+fn the_targets_accept_their_seeds() {
     for (name, bytes) in seeds::of("log_schema") {
         let table = supple_fuzz::logs::exported(&bytes);
         assert!(table.is_ok(), "{name}: {table:?}");
@@ -148,7 +148,7 @@ fn valid_inputs_are_valid() {
 }
 
 #[test]
-fn every_target_has_its_program_for_cargo_fuzz() {
+fn every_target_has_a_cargo_fuzz_program() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("libfuzzer");
     let manifest = std::fs::read_to_string(folder.join("Cargo.toml")).expect("a manifest");
     for target in TARGETS {

@@ -1,9 +1,10 @@
-//! Every backend with a mirror on its other side; the first of the pair keeps the mirror alive.
+//! Every backend with a mirror on its other side; the first element of the pair keeps the mirror alive.
 
 use crate::mirror::{Mirror, Worker};
-use supple_bus::virtual_time::{Direct, Lockstep, Responder};
+use supple_bus::virtual_time::{DirectBus, LockstepBus, LockstepResponder};
 use supple_bus::{
-    Bus, BusError, DatagramBus, FaultInjector, OwnerFolder, Paced, Pacer, Side, SocketCan,
+    Bus, BusError, DatagramBus, FaultInjector, OwnerFolder, PacedBus, PacedResponder, Side,
+    SocketCan,
 };
 use tempfile::TempDir;
 
@@ -22,20 +23,20 @@ fn folder() -> (TempDir, OwnerFolder) {
 }
 
 pub fn direct() -> Opened {
-    Some(((None, None), Box::new(Direct(Mirror::default()))))
+    Some(((None, None), Box::new(DirectBus(Mirror::default()))))
 }
 
 pub fn lockstep() -> Opened {
     let (temporary, folder) = folder();
-    let worker = Worker::responder(Responder::open(&folder).unwrap());
-    let bus = Lockstep::open(&folder).unwrap();
+    let worker = Worker::responder(LockstepResponder::open(&folder).unwrap());
+    let bus = LockstepBus::open(&folder).unwrap();
     Some(((Some(worker), Some(temporary)), Box::new(bus)))
 }
 
 pub fn paced() -> Opened {
     let (temporary, folder) = folder();
-    let worker = Worker::pacer(Pacer::open(&folder, 0).unwrap());
-    let bus = Paced::open(&folder).unwrap();
+    let worker = Worker::paced(PacedResponder::open(&folder, 0).unwrap());
+    let bus = PacedBus::open(&folder).unwrap();
     Some(((Some(worker), Some(temporary)), Box::new(bus)))
 }
 
@@ -51,8 +52,8 @@ pub fn datagram() -> Opened {
     Some((arm, Box::new(bus)))
 }
 
-/// `None`, with the reason said, where the kernel has no such interface. Tests of one interface run one
-/// after another: everyone on it sees every frame.
+/// `None`, with the reason printed, if the kernel has no such interface. Tests of one interface run one after
+/// another, because every socket on it receives every frame.
 pub fn socket_can() -> Opened {
     let name = interface();
     let bus = match SocketCan::open(&name) {
@@ -72,7 +73,7 @@ pub fn socket_can() -> Opened {
 }
 
 pub fn injected_direct() -> Opened {
-    let bus = FaultInjector::new(Direct(Mirror::default()), 1);
+    let bus = FaultInjector::new(DirectBus(Mirror::default()), 1);
     Some(((None, None), Box::new(bus)))
 }
 

@@ -1,6 +1,6 @@
-//! One suite, run on every backend and through the fault injector: what a host may rely on.
+//! One suite of the guarantees to a host, run on every backend and through the fault injector.
 //!
-//! The other side is a mirror: it answers each frame of the host by one of node 1 with the same payload.
+//! The other side is a mirror: it answers each frame of the host with a frame of node 1 with the same payload.
 
 mod backends;
 mod mirror;

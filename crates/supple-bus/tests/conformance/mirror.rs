@@ -4,11 +4,11 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
-use supple_bus::virtual_time::{Peer, Responder};
-use supple_bus::{Bus, Event, Pacer};
+use supple_bus::virtual_time::{LockstepResponder, Peer};
+use supple_bus::{Bus, Event, PacedResponder};
 use supple_puck::{CanFrame, GroupId, MessageId, NodeId};
 
-/// Time that a frame takes in virtual time \[ns\].
+/// Transmission time of a frame in virtual time \[ns\].
 const FRAME_NS: u64 = 100_000;
 
 /// Node 1's answer to a frame of the host.
@@ -51,7 +51,7 @@ impl Peer for Mirror {
     }
 }
 
-/// A mirror at work in a thread; it ends when dropped.
+/// A mirror in a thread, which ends when dropped.
 pub struct Worker {
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
@@ -80,7 +80,7 @@ impl Worker {
         })
     }
 
-    pub fn responder(responder: Responder) -> Worker {
+    pub fn responder(responder: LockstepResponder) -> Worker {
         let responder = std::sync::Mutex::new((responder, Mirror::default()));
         Worker::run(move |stop| {
             let (responder, mirror) = &mut *responder.lock().unwrap();
@@ -92,12 +92,12 @@ impl Worker {
 }
 
 impl Worker {
-    pub fn pacer(pacer: Pacer) -> Worker {
-        let pacer = std::sync::Mutex::new((pacer, Mirror::default()));
+    pub fn paced(responder: PacedResponder) -> Worker {
+        let shared = std::sync::Mutex::new((responder, Mirror::default()));
         Worker::run(move |stop| {
-            let (pacer, mirror) = &mut *pacer.lock().unwrap();
+            let (responder, mirror) = &mut *shared.lock().unwrap();
             while !stop.load(Ordering::Relaxed) {
-                pacer.turn(mirror).unwrap();
+                responder.serve(mirror).unwrap();
             }
         })
     }

@@ -4,9 +4,9 @@ use crate::mirror::reflected;
 use supple_bus::{Bus, Event};
 use supple_puck::{CanFrame, MessageId};
 
-/// Long enough for a thread to be scheduled on a busy machine; only a failure waits so long.
-const PATIENCE_NS: u64 = 10_000_000_000;
-/// What a wait is tried with.
+/// Long enough for a thread to be scheduled on a busy machine; reached only on failure.
+const ANSWER_TIMEOUT_NS: u64 = 10_000_000_000;
+/// Wait time of the tests of waiting.
 const WAIT_NS: u64 = 3_000_000;
 
 type Subject = Box<dyn Bus>;
@@ -16,16 +16,16 @@ fn frame(id: u32, payload: &[u8]) -> CanFrame {
 }
 
 fn next(bus: &mut Subject) -> Event {
-    let until_ns = bus.now_ns() + PATIENCE_NS;
+    let until_ns = bus.now_ns() + ANSWER_TIMEOUT_NS;
     loop {
         if let Some(event) = bus.receive_until(until_ns).unwrap() {
             return event;
         }
-        assert!(bus.now_ns() < until_ns, "nothing came");
+        assert!(bus.now_ns() < until_ns, "no event arrived");
     }
 }
 
-/// Own frames confirmed and answers, each in its order.
+/// Confirmations and answers, each in order.
 fn collect(bus: &mut Subject, frames: usize) -> (Vec<CanFrame>, Vec<CanFrame>) {
     let (mut sent, mut answers) = (Vec::new(), Vec::new());
     while sent.len() < frames || answers.len() < frames {
@@ -75,7 +75,7 @@ pub fn frames_keep_their_order(mut bus: Subject) {
     assert_eq!(answers, expected);
 }
 
-/// A cycle of a seven-joint arm, over and over.
+/// Repeats a cycle of a seven-joint arm.
 pub fn a_cycle_of_frames_is_not_lost(mut bus: Subject) {
     for cycle in 0..200u8 {
         let sent: Vec<_> = (0..8)
@@ -90,34 +90,34 @@ pub fn a_cycle_of_frames_is_not_lost(mut bus: Subject) {
     }
 }
 
-/// A host that says it will be silent hears the same, in the same order, up to the same time.
+/// With lookahead a host receives the same events in the same order, up to the same time.
 pub fn a_silent_host_hears_what_one_hears_that_asks_each_time(mut bus: Subject) {
     let sent: Vec<_> = (0..4).map(|i| frame(0x404, &[i])).collect();
     for frame in &sent {
         bus.send(frame).unwrap();
     }
-    let until_ns = bus.now_ns() + PATIENCE_NS;
+    let until_ns = bus.now_ns() + ANSWER_TIMEOUT_NS;
     let (mut confirmed, mut answers) = (Vec::new(), Vec::new());
     while answers.len() < sent.len() {
         let missing = (sent.len() - answers.len()) as u32;
-        match bus.receive_ahead(until_ns, missing).unwrap() {
+        match bus.receive_with_lookahead(until_ns, missing).unwrap() {
             Some(Event::Sent(frame)) => confirmed.push(frame),
             Some(Event::Frame(frame)) => answers.push(frame),
             other => panic!("{other:?}"),
         }
     }
-    // The time is that of the last answer, not the one that was waited for at the most.
+    // The time is that of the last answer, not the end of the wait.
     assert!(bus.now_ns() < until_ns);
     assert_eq!(confirmed, sent);
     assert_eq!(answers, sent.iter().map(reflected).collect::<Vec<_>>());
     let until_ns = bus.now_ns() + WAIT_NS;
-    assert_eq!(bus.receive_ahead(until_ns, 1).unwrap(), None);
+    assert_eq!(bus.receive_with_lookahead(until_ns, 1).unwrap(), None);
     assert!(bus.now_ns() >= until_ns);
 }
 
 pub fn waiting_ends_at_its_time(mut bus: Subject) {
     let until_ns = bus.now_ns() + WAIT_NS;
-    // A signal may end a wait of the kernel early, never the bus's.
+    // A signal may end a wait of the kernel early, but not that of the bus.
     assert_eq!(bus.receive_until(until_ns).unwrap(), None);
     assert!(bus.now_ns() >= until_ns);
 }

@@ -1,13 +1,13 @@
-//! From power-up to an arm that may be polled: whom there is, what they are, whether they fit the
-//! description, where the arm stands.
+//! Start-up: enumerates the nodes, identifies them, compares them with the description, and sets the arm's
+//! positions.
 //!
 //! ```text
 //! safety module -> (operator: Shift-Idle) -> enumerate -> roles, versions -> wake -> motors idle
 //!   -> groups, slots, limits -> limits of the safety module -> positions by the home pose -> sensor
 //! ```
 //!
-//! The host puts the motors to idle and never to torque: the operator does, at the pendant. Order and
-//! times are libbarrett's.
+//! The host sets the motors to idle and never activates them: the operator does, at the pendant. Order and times
+//! follow libbarrett.
 
 mod module;
 mod motors;
@@ -23,42 +23,43 @@ use supple_puck::safety::{SafetyLimits, SafetyMode};
 use supple_puck::status::Stat;
 use supple_puck::{NodeId, Property, PropertyId, PropertyTable, Value, force_torque, property};
 
-/// Silence after the wake-up: transceivers drop off the bus and return.
+/// Silence after the wake-up, in which transceivers leave the bus and return.
 const WAKE_QUIET_NS: u64 = 1_000 * MS;
 /// Time that taring the sensor takes, with a margin.
 const TARE_NS: u64 = 1_200 * MS;
-/// How often the operator's mode is asked for while it is waited for.
+/// Poll interval of the module's mode while waiting for the operator.
 const OPERATOR_NS: u64 = 100 * MS;
-/// Velocity faults that the safety module ignores once positions are redefined: more than its history.
+/// Number of velocity faults that the safety module ignores after positions are redefined: more than its
+/// history.
 const IGNORED_FAULTS: i32 = 8;
 
-/// What the operator decides before the start.
+/// Start-up configuration from the command line.
 #[derive(Clone, Debug, PartialEq)]
-pub struct StartUp<const N: usize> {
-    /// The arm stands in this pose now \[rad\]; `None` where it is not known to.
+pub struct StartupConfig<const N: usize> {
+    /// Current pose of the arm \[rad\]; `None` if unknown.
     pub zero_at_rad: Option<Vector<N>>,
     /// Limits of the safety module.
     pub limits: SafetyLimits,
-    /// Tare the force/torque sensor, where there is one. Without, it reads what it last had.
+    /// Tare the force/torque sensor, if there is one. Otherwise it keeps its last tare.
     pub tare: bool,
 }
 
-/// How far the start-up has come, for the operator to see.
+/// Progress of the start-up, for display.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Progress {
-    /// The operator has to act.
+    /// Waiting for the operator to select idle.
     WaitingForIdle,
-    /// Looking for nodes.
+    /// Searching for nodes.
     Enumerating,
     /// Waking this many pucks.
     Waking(usize),
     /// Comparing pucks with the description.
     Checking,
-    /// Defining positions by the home pose.
+    /// Setting the positions to the home pose.
     Zeroing,
     /// Taring the sensor.
     Taring,
-    /// Done.
+    /// The arm may be polled.
     Ready,
 }
 
@@ -67,22 +68,22 @@ pub enum Progress {
 pub struct Ready<const N: usize> {
     /// Motor pucks, in the order of the joints.
     pub pucks: [MotorPuck; N],
-    /// Between motors and joints.
+    /// Transmission between motors and joints.
     pub transmission: Transmission<N>,
-    /// Id lists of the safety module.
+    /// Property ids of the safety module.
     pub module: PropertyTable,
-    /// There is a force/torque sensor.
+    /// Whether there is a force/torque sensor.
     pub sensor: bool,
 }
 
-/// Brings an arm from power-up to where it may be polled. The safety module is in idle at the end.
+/// Prepares an arm for polling after power-up. The safety module is in idle at the end.
 ///
 /// # Errors
-/// [`CanError`] says what does not fit and what to do.
+/// [`CanError`] with the mismatch and the remedy.
 pub fn start_up<const N: usize, B: Bus>(
     bus: &mut B,
     description: &Description,
-    wishes: &StartUp<N>,
+    startup_config: &StartupConfig<N>,
     stop: &dyn Fn() -> bool,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<Ready<N>, CanError> {
@@ -92,7 +93,7 @@ pub fn start_up<const N: usize, B: Bus>(
             found: description.dof(),
         });
     }
-    wishes.limits.validate()?;
+    startup_config.limits.validate()?;
     let mut host = Host { bus, stop };
     let module = module::find(&mut host)?;
     wait_for_idle(&mut host, &module, progress)?;
@@ -108,16 +109,16 @@ pub fn start_up<const N: usize, B: Bus>(
     wake(&mut host, &pucks, &stats, progress)?;
 
     progress(Progress::Checking);
-    let mode = motors::listed(&pucks[0], Property::MODE)?;
+    let mode = motors::property_id(&pucks[0], Property::MODE)?;
     for puck in &pucks {
-        host.tell(puck.node, mode, 0)?;
+        host.set_property(puck.node, mode, 0)?;
     }
     let mut scales = Vec::with_capacity(N);
     for (index, puck) in pucks.iter().enumerate() {
         motors::configure(&mut host, puck, index)?;
         scales.push(motors::compare(&mut host, puck, index, description)?);
     }
-    module::set_limits(&mut host, &module, &wishes.limits)?;
+    module::set_limits(&mut host, &module, &startup_config.limits)?;
     let joints = || CanError::Joints {
         arm: description.name().to_owned(),
         found: description.dof(),
@@ -134,14 +135,14 @@ pub fn start_up<const N: usize, B: Bus>(
         &pucks,
         &transmission,
         description,
-        wishes,
+        startup_config,
         progress,
     )?;
     let sensor = stats[usize::from(NodeId::FORCE_TORQUE.number())].is_some();
-    if sensor && wishes.tare {
+    if sensor && startup_config.tare {
         progress(Progress::Taring);
         host.bus.send(&force_torque::tare())?;
-        host.quiet(TARE_NS)?;
+        host.wait_silently(TARE_NS)?;
     }
     let pucks: [MotorPuck; N] = pucks.try_into().map_err(|_| joints())?;
     progress(Progress::Ready);
@@ -153,13 +154,13 @@ pub fn start_up<const N: usize, B: Bus>(
     })
 }
 
-/// STAT by node number; `None` where nobody answers.
+/// STAT by node number; `None` if the node does not answer.
 fn enumerate<B: Bus>(host: &mut Host<'_, B>) -> Result<[Option<i32>; 32], CanError> {
-    let stat = always(Property::STAT)?;
+    let stat = common_property_id(Property::STAT)?;
     let mut stats = [None; 32];
     for number in 1..32u8 {
         if let Ok(node) = NodeId::new(number) {
-            stats[usize::from(number)] = host.ask(node, stat)?;
+            stats[usize::from(number)] = host.get_property(node, stat)?;
         }
     }
     Ok(stats)
@@ -170,17 +171,17 @@ fn wait_for_idle<B: Bus>(
     module: &PropertyTable,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<(), CanError> {
-    let mut told = false;
+    let mut reported = false;
     loop {
         match module::mode(host, module)? {
             SafetyMode::Idle => return Ok(()),
             SafetyMode::Active => module::lower(host, module)?,
             SafetyMode::EStop => {
-                if !told {
+                if !reported {
                     progress(Progress::WaitingForIdle);
-                    told = true;
+                    reported = true;
                 }
-                host.quiet(OPERATOR_NS)?;
+                host.wait_silently(OPERATOR_NS)?;
             }
         }
     }
@@ -193,7 +194,7 @@ fn wake<B: Bus>(
     progress: &mut dyn FnMut(Progress),
 ) -> Result<(), CanError> {
     let ready = i32::from(Stat::Ready.value());
-    let stat = always(Property::STAT)?;
+    let stat = common_property_id(Property::STAT)?;
     let asleep = |puck: &&MotorPuck| stats[usize::from(puck.node.number())] != Some(ready);
     let asleep: Vec<&MotorPuck> = pucks.iter().filter(asleep).collect();
     if asleep.is_empty() {
@@ -201,13 +202,13 @@ fn wake<B: Bus>(
     }
     progress(Progress::Waking(asleep.len()));
     for puck in &asleep {
-        host.tell(puck.node, stat, ready)?;
+        host.set_property(puck.node, stat, ready)?;
     }
-    host.quiet(WAKE_QUIET_NS)?;
+    host.wait_silently(WAKE_QUIET_NS)?;
     for puck in &asleep {
-        let found = motors::must(host, puck.node, stat)?;
+        let found = motors::get_required(host, puck.node, stat)?;
         if found != ready {
-            return Err(CanError::Asleep {
+            return Err(CanError::NotAwake {
                 node: puck.node.number(),
                 stat: found,
             });
@@ -216,22 +217,22 @@ fn wake<B: Bus>(
     Ok(())
 }
 
-/// Gives the positions their meaning, unless the safety module says that they have it.
+/// Sets the motor positions from the home pose, unless the safety module reports that they are already set.
 fn zero<const N: usize, B: Bus>(
     host: &mut Host<'_, B>,
     module: &PropertyTable,
     pucks: &[MotorPuck],
     transmission: &Transmission<N>,
     description: &Description,
-    wishes: &StartUp<N>,
+    startup_config: &StartupConfig<N>,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<(), CanError> {
-    let zero = module::listed(module, Property::ZERO)?;
-    let found = motors::must(host, NodeId::SAFETY, zero)?;
+    let zero = module::property_id(module, Property::ZERO)?;
+    let found = motors::get_required(host, NodeId::SAFETY, zero)?;
     if found == 1 {
         return Ok(());
     }
-    let Some(home) = wishes.zero_at_rad else {
+    let Some(home) = startup_config.zero_at_rad else {
         return Err(CanError::NotZeroed {
             zero: found,
             home: format!("{:?}", description.home_rad()),
@@ -239,14 +240,14 @@ fn zero<const N: usize, B: Bus>(
     };
     progress(Progress::Zeroing);
     let counts = transmission.counts(&home)?;
-    let ignore = module::listed(module, Property::IFAULT)?;
-    host.tell(NodeId::SAFETY, ignore, IGNORED_FAULTS)?;
+    let ignore = module::property_id(module, Property::IFAULT)?;
+    host.set_property(NodeId::SAFETY, ignore, IGNORED_FAULTS)?;
     for (puck, counts) in pucks.iter().zip(counts) {
         let set = property::set(puck.node, puck.position, Value::Wide(counts.get()));
         host.bus.send(&set)?;
-        host.quiet(MS)?;
+        host.wait_silently(MS)?;
     }
-    // The safety module sees them on the bus too.
+    // The safety module receives these positions on the bus as well.
     let replies = host.positions(pucks[0].position, N)?;
     for (puck, expected) in pucks.iter().zip(counts) {
         let node = puck.node.number();
@@ -256,9 +257,9 @@ fn zero<const N: usize, B: Bus>(
             node,
             remedy: "check its cable, then switch the arm off and on",
         })?;
-        // The arm may sag a little in between; a puck that ignored the setting is far off.
+        // The arm may sag a little in the meantime; a puck that ignored the setting differs by far more.
         if (found - expected.get()).abs() > puck.counts_per_revolution / 8 {
-            return Err(CanError::NotTaken {
+            return Err(CanError::SettingIgnored {
                 property: Property::P,
                 node,
                 found,
@@ -266,12 +267,12 @@ fn zero<const N: usize, B: Bus>(
             });
         }
     }
-    host.tell(NodeId::SAFETY, zero, 1)?;
-    motors::expect(host, NodeId::SAFETY, Property::ZERO, zero, 1)
+    host.set_property(NodeId::SAFETY, zero, 1)?;
+    motors::verify_setting(host, NodeId::SAFETY, Property::ZERO, zero, 1)
 }
 
-/// Id of a property that every firmware has in the same place.
-fn always(property: Property) -> Result<PropertyId, CanError> {
+/// Id of a property that is the same in every firmware.
+fn common_property_id(property: Property) -> Result<PropertyId, CanError> {
     PropertyTable::MONITOR
         .id(property)
         .ok_or(CanError::Property {

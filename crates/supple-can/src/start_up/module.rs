@@ -1,6 +1,6 @@
-//! The safety module during start-up: found, read, limited. Its mode is only ever lowered.
+//! The safety module during start-up: identification, mode and limits. Its mode is only lowered, never raised.
 
-use super::{always, motors};
+use super::{common_property_id, motors};
 use crate::error::CanError;
 use crate::host::Host;
 use supple_bus::Bus;
@@ -8,7 +8,7 @@ use supple_puck::safety::{SafetyLimits, SafetyMode};
 use supple_puck::status::{Role, RoleType};
 use supple_puck::{NodeId, Property, PropertyId, PropertyTable, PuckKind};
 
-/// Finds the module and its list of ids.
+/// Identifies the module and returns its list of ids.
 pub fn find<B: Bus>(host: &mut Host<'_, B>) -> Result<PropertyTable, CanError> {
     let node = NodeId::SAFETY;
     let missing = CanError::Missing {
@@ -16,8 +16,14 @@ pub fn find<B: Bus>(host: &mut Host<'_, B>) -> Result<PropertyTable, CanError> {
         node: node.number(),
         remedy: "switch the arm on, check the CAN cable and that the interface is up at 1 Mbit/s",
     };
-    let version = host.ask(node, always(Property::VERS)?)?.ok_or(missing)?;
-    let role = Role::from_value(motors::must(host, node, always(Property::ROLE)?)?);
+    let version = host
+        .get_property(node, common_property_id(Property::VERS)?)?
+        .ok_or(missing)?;
+    let role = Role::from_value(motors::get_required(
+        host,
+        node,
+        common_property_id(Property::ROLE)?,
+    )?);
     if role.role_type() != Ok(RoleType::Safety) {
         return Err(CanError::Role {
             node: node.number(),
@@ -32,7 +38,7 @@ pub fn find<B: Bus>(host: &mut Host<'_, B>) -> Result<PropertyTable, CanError> {
 }
 
 /// Id of a property of the module.
-pub fn listed(module: &PropertyTable, property: Property) -> Result<PropertyId, CanError> {
+pub fn property_id(module: &PropertyTable, property: Property) -> Result<PropertyId, CanError> {
     module.id(property).ok_or(CanError::Property {
         node: NodeId::SAFETY.number(),
         version: 0,
@@ -45,8 +51,8 @@ pub fn mode<B: Bus>(
     host: &mut Host<'_, B>,
     module: &PropertyTable,
 ) -> Result<SafetyMode, CanError> {
-    let id = listed(module, Property::MODE)?;
-    let found = motors::must(host, NodeId::SAFETY, id)?;
+    let id = property_id(module, Property::MODE)?;
+    let found = motors::get_required(host, NodeId::SAFETY, id)?;
     SafetyMode::from_value(found).map_err(|_| CanError::Value {
         property: Property::MODE,
         node: NodeId::SAFETY.number(),
@@ -54,11 +60,11 @@ pub fn mode<B: Bus>(
     })
 }
 
-/// Takes an active module to idle.
+/// Switches an active module to idle.
 pub fn lower<B: Bus>(host: &mut Host<'_, B>, module: &PropertyTable) -> Result<(), CanError> {
-    let id = listed(module, Property::MODE)?;
+    let id = property_id(module, Property::MODE)?;
     let idle = i32::from(SafetyMode::Idle.value());
-    host.tell(NodeId::SAFETY, id, idle)?;
+    host.set_property(NodeId::SAFETY, id, idle)?;
     match mode(host, module)? {
         SafetyMode::Active => Err(CanError::Mode {
             found: SafetyMode::Active,
@@ -68,16 +74,16 @@ pub fn lower<B: Bus>(host: &mut Host<'_, B>, module: &PropertyTable) -> Result<(
     }
 }
 
-/// Sets the limits and reads them back. The module forgets them at power-up.
+/// Sets the limits and reads them back. The module resets them at power-up.
 pub fn set_limits<B: Bus>(
     host: &mut Host<'_, B>,
     module: &PropertyTable,
     limits: &SafetyLimits,
 ) -> Result<(), CanError> {
     for (property, value) in limits.settings() {
-        let id = listed(module, property)?;
-        host.tell(NodeId::SAFETY, id, value.get())?;
-        motors::expect(host, NodeId::SAFETY, property, id, value.get())?;
+        let id = property_id(module, property)?;
+        host.set_property(NodeId::SAFETY, id, value.get())?;
+        motors::verify_setting(host, NodeId::SAFETY, property, id, value.get())?;
     }
     Ok(())
 }

@@ -1,6 +1,6 @@
-//! Motor pucks: what they are, whether they fit the description, and the few settings they need.
+//! Motor pucks: identification, comparison with the description, and settings.
 
-use super::always;
+use super::common_property_id;
 use crate::error::CanError;
 use crate::host::Host;
 use supple_bus::Bus;
@@ -10,37 +10,36 @@ use supple_puck::{
     GroupId, NodeId, PositionScale, Property, PropertyId, PropertyTable, PuckKind, TorqueScale,
 };
 
-/// Groups of the pucks of joints 1 to 4, and of 5 to 7, as libbarrett and OWD have them.
+/// Groups of the pucks of joints 1 to 4, and of 5 to 7, as in libbarrett and OWD.
 pub const ARM_GROUPS: [[GroupId; 3]; 2] = [
     [GroupId::ACTUATORS, GroupId::LOWER_TORQUES, GroupId::ARM],
     [GroupId::ACTUATORS, GroupId::UPPER_TORQUES, GroupId::ARM],
 ];
-/// How often a node that answered before is asked as one that may not be there is. An emulated one is held up
-/// with the machine that it runs on.
+/// Rounds of requests to a node that answered before. An emulated node may be delayed by its host.
 const ROUNDS: u32 = 4;
-/// By how much a puck's torque units may differ from the description's: the rounding of its quantum.
+/// Relative tolerance of a puck's torque units: the rounding of the torque quantum in the description.
 const UNITS_TOLERANCE: f64 = 1e-3;
 
-/// A motor puck as it was found.
+/// An identified motor puck.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotorPuck {
-    /// Its node.
+    /// Node id.
     pub node: NodeId,
     /// Firmware version.
     pub version: i32,
-    /// Its list of ids.
+    /// List of property ids.
     pub table: PropertyTable,
-    /// Id of its position.
+    /// Id of the position.
     pub position: PropertyId,
-    /// Id of its torque.
+    /// Id of the torque.
     pub torque: PropertyId,
-    /// Its replies carry a joint encoder's position too.
+    /// Its replies also contain a joint encoder's position.
     pub joint_encoder: bool,
-    /// Encoder counts per revolution; known after the start-up has compared roles, 4096 before.
+    /// Encoder counts per revolution; set when start-up has compared the pucks, 4096 before.
     pub counts_per_revolution: i32,
 }
 
-/// Refuses an arm of which a motor puck is missing, or that has more.
+/// Rejects an arm with a missing or an additional motor puck.
 pub fn all_present(stats: &[Option<i32>; 32], description: &Description) -> Result<(), CanError> {
     let joints = description.dof();
     for (number, stat) in stats.iter().enumerate().take(8).skip(1) {
@@ -54,7 +53,7 @@ pub fn all_present(stats: &[Option<i32>; 32], description: &Description) -> Resu
                 });
             }
             Some(_) if number > joints => {
-                return Err(CanError::Surplus {
+                return Err(CanError::UnexpectedMotor {
                     node,
                     arm: description.name().to_owned(),
                     joints,
@@ -66,9 +65,13 @@ pub fn all_present(stats: &[Option<i32>; 32], description: &Description) -> Resu
     Ok(())
 }
 
-/// Reads role and version, which a sleeping puck tells too.
+/// Reads role and version, which a puck also reports before it is woken.
 pub fn identify<B: Bus>(host: &mut Host<'_, B>, node: NodeId) -> Result<MotorPuck, CanError> {
-    let role = Role::from_value(must(host, node, always(Property::ROLE)?)?);
+    let role = Role::from_value(get_required(
+        host,
+        node,
+        common_property_id(Property::ROLE)?,
+    )?);
     let number = node.number();
     if role.role_type() != Ok(RoleType::Tater) {
         return Err(CanError::Role {
@@ -77,14 +80,14 @@ pub fn identify<B: Bus>(host: &mut Host<'_, B>, node: NodeId) -> Result<MotorPuc
             expected: "a motor of the arm (type 0 in the low five bits)",
         });
     }
-    let version = must(host, node, always(Property::VERS)?)?;
+    let version = get_required(host, node, common_property_id(Property::VERS)?)?;
     let table = PropertyTable::of_firmware(PuckKind::Motor, version).map_err(|source| {
         CanError::Firmware {
             node: number,
             source,
         }
     })?;
-    let listed = |property| {
+    let property_id = |property| {
         table.id(property).ok_or(CanError::Property {
             node: number,
             version,
@@ -95,20 +98,20 @@ pub fn identify<B: Bus>(host: &mut Host<'_, B>, node: NodeId) -> Result<MotorPuc
         node,
         version,
         table,
-        position: listed(Property::P)?,
-        torque: listed(Property::T)?,
+        position: property_id(Property::P)?,
+        torque: property_id(Property::T)?,
         joint_encoder: role.joint_encoder(),
         counts_per_revolution: 4096,
     })
 }
 
-/// One byte names the torque for all pucks of a group, and one id the position for all pucks.
+/// Checks that all pucks use the same ids: a group frame has one torque id, and one request reads all positions.
 pub fn share_torque_ids(pucks: &[MotorPuck]) -> Result<(), CanError> {
     for puck in pucks {
         let first = pucks[0];
         for (found, expected) in [(puck.torque, first.torque), (puck.position, first.position)] {
             if found != expected {
-                return Err(CanError::Mixed {
+                return Err(CanError::MixedTorqueIds {
                     node: puck.node.number(),
                     found: found.number(),
                     expected: expected.number(),
@@ -120,7 +123,7 @@ pub fn share_torque_ids(pucks: &[MotorPuck]) -> Result<(), CanError> {
 }
 
 /// Id of a property of this puck.
-pub fn listed(puck: &MotorPuck, property: Property) -> Result<PropertyId, CanError> {
+pub fn property_id(puck: &MotorPuck, property: Property) -> Result<PropertyId, CanError> {
     puck.table.id(property).ok_or(CanError::Property {
         node: puck.node.number(),
         version: puck.version,
@@ -128,14 +131,14 @@ pub fn listed(puck: &MotorPuck, property: Property) -> Result<PropertyId, CanErr
     })
 }
 
-/// The value of a property of a node that has to be there.
-pub fn must<B: Bus>(
+/// Reads a property of a node; fails if the node does not answer.
+pub fn get_required<B: Bus>(
     host: &mut Host<'_, B>,
     node: NodeId,
     property: PropertyId,
 ) -> Result<i32, CanError> {
     for _ in 0..ROUNDS {
-        if let Some(value) = host.ask(node, property)? {
+        if let Some(value) = host.get_property(node, property)? {
             return Ok(value);
         }
     }
@@ -146,19 +149,19 @@ pub fn must<B: Bus>(
     })
 }
 
-/// Refuses another value than the one that was set.
-pub fn expect<B: Bus>(
+/// Reads a setting back; fails if it differs from the value set.
+pub fn verify_setting<B: Bus>(
     host: &mut Host<'_, B>,
     node: NodeId,
     property: Property,
     id: PropertyId,
     expected: i32,
 ) -> Result<(), CanError> {
-    let found = must(host, node, id)?;
+    let found = get_required(host, node, id)?;
     if found == expected {
         return Ok(());
     }
-    Err(CanError::NotTaken {
+    Err(CanError::SettingIgnored {
         property,
         node: node.number(),
         found,
@@ -166,7 +169,7 @@ pub fn expect<B: Bus>(
     })
 }
 
-/// Groups and slot of the puck at `index`, set where they differ.
+/// Sets groups and slot of the puck at `index` if they differ.
 pub fn configure<B: Bus>(
     host: &mut Host<'_, B>,
     puck: &MotorPuck,
@@ -179,10 +182,10 @@ pub fn configure<B: Bus>(
         (Property::GRPC, i32::from(c.number())),
         (Property::PIDX, index as i32 % 4 + 1),
     ] {
-        let id = listed(puck, property)?;
-        if must(host, puck.node, id)? != value {
-            host.tell(puck.node, id, value)?;
-            expect(host, puck.node, property, id, value)?;
+        let id = property_id(puck, property)?;
+        if get_required(host, puck.node, id)? != value {
+            host.set_property(puck.node, id, value)?;
+            verify_setting(host, puck.node, property, id, value)?;
         }
     }
     Ok(())
@@ -198,11 +201,11 @@ pub fn compare<B: Bus>(
 ) -> Result<(PositionScale, TorqueScale), CanError> {
     let node = puck.node.number();
     let motors = description.motors();
-    let described = |key| CanError::Described {
+    let described = |key| CanError::MissingKey {
         arm: description.name().to_owned(),
         key,
     };
-    let counts_per_revolution = must(host, puck.node, listed(puck, Property::CTS)?)?;
+    let counts_per_revolution = get_required(host, puck.node, property_id(puck, Property::CTS)?)?;
     let expected = motors.counts_per_revolution;
     let expected = expected.ok_or_else(|| described("counts_per_revolution"))?;
     if i64::from(counts_per_revolution) != i64::from(expected) {
@@ -214,7 +217,7 @@ pub fn compare<B: Bus>(
             expected: f64::from(expected),
         });
     }
-    let units_per_nm = must(host, puck.node, listed(puck, Property::IPNM)?)?;
+    let units_per_nm = get_required(host, puck.node, property_id(puck, Property::IPNM)?)?;
     let quanta = motors.torque_quantum_nm.as_ref();
     let quanta = quanta.ok_or_else(|| described("torque_quantum_nm"))?;
     let expected = 1.0 / quanta[index];
@@ -231,26 +234,26 @@ pub fn compare<B: Bus>(
         .map_err(|source| CanError::Counts { node, source })?;
     let torque = TorqueScale::new(f64::from(units_per_nm))
         .map_err(|source| CanError::Units { node, source })?;
-    let most = torque
+    let max_torque = torque
         .puck_torque(motors.torque_nm[index])
         .map_err(|source| CanError::Units { node, source })?;
-    let limit = listed(puck, Property::MT)?;
-    let wanted = i32::from(most.units());
-    if must(host, puck.node, limit)? != wanted {
-        host.tell(puck.node, limit, wanted)?;
-        expect(host, puck.node, Property::MT, limit, wanted)?;
+    let limit = property_id(puck, Property::MT)?;
+    let max_units = i32::from(max_torque.units());
+    if get_required(host, puck.node, limit)? != max_units {
+        host.set_property(puck.node, limit, max_units)?;
+        verify_setting(host, puck.node, Property::MT, limit, max_units)?;
     }
-    cool(host, puck)?;
+    check_temperature(host, puck)?;
     Ok((position, torque))
 }
 
-fn cool<B: Bus>(host: &mut Host<'_, B>, puck: &MotorPuck) -> Result<(), CanError> {
-    let found = must(host, puck.node, listed(puck, Property::TEMP)?)?;
-    let limit = must(host, puck.node, listed(puck, Property::OTEMP)?)?;
+fn check_temperature<B: Bus>(host: &mut Host<'_, B>, puck: &MotorPuck) -> Result<(), CanError> {
+    let found = get_required(host, puck.node, property_id(puck, Property::TEMP)?)?;
+    let limit = get_required(host, puck.node, property_id(puck, Property::OTEMP)?)?;
     if found < limit {
         return Ok(());
     }
-    Err(CanError::Hot {
+    Err(CanError::OverTemperature {
         node: puck.node.number(),
         found,
         limit,

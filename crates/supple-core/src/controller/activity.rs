@@ -1,11 +1,11 @@
-//! What the controller is busy with.
+//! The current activity of the controller: a mode with its data.
 
 use super::fault::SafeAction;
 use super::mode::{Breakaway, Mode};
 use crate::math::Vector;
 use crate::trajectory::{Fourier, Trajectory};
 
-/// A mode with what it needs.
+/// A mode with its data.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Activity<const N: usize> {
     Idle,
@@ -38,16 +38,16 @@ impl<const N: usize> Activity<N> {
         }
     }
 
-    /// All joints, held ones too, have a stiff loop of this activity.
-    pub fn has_own_loops(&self) -> bool {
+    /// Whether this activity has a stiff position loop for every joint, held ones included.
+    pub fn has_joint_loops(&self) -> bool {
         matches!(
             self,
             Activity::Move { .. } | Activity::Excite(_) | Activity::Breakaway { .. }
         )
     }
 
-    /// No torque at all.
-    pub fn is_limp(&self) -> bool {
+    /// Whether the activity commands no torque at all.
+    pub fn is_torque_off(&self) -> bool {
         matches!(self, Activity::Idle | Activity::Fault(SafeAction::Idle))
     }
 }

@@ -1,16 +1,18 @@
-//! What the supervisor checks each cycle, before any torque is limited. A value that is not a number is
-//! beyond every limit.
+//! Checks of the supervisor in each cycle, before the torque is limited. NaN exceeds every limit.
 
 use super::fault::Fault;
 use crate::config::Limits;
-use crate::impedance::Torques;
+use crate::law::impedance::Torques;
 use crate::math::{Vector, Vector3, abs, all_finite, sqrt};
 
-fn beyond(value: f64, limit: f64) -> bool {
+/// Fraction of a speed limit above which a joint or the tip counts as moving.
+pub(super) const MOVING_SHARE: f64 = 0.2;
+
+fn exceeds(value: f64, limit: f64) -> bool {
     value > limit || value.is_nan()
 }
 
-/// Joint positions, joint speeds, tip speed.
+/// Checks joint positions, joint speeds and tip speed.
 pub(super) fn motion<const N: usize>(
     limits: &Limits<N>,
     position_rad: &Vector<N>,
@@ -19,7 +21,7 @@ pub(super) fn motion<const N: usize>(
 ) -> Result<(), Fault> {
     for joint in 0..N {
         let value_rad = position_rad[joint];
-        for (limit_rad, beyond) in [
+        for (limit_rad, outside) in [
             (
                 limits.position_lower_rad[joint],
                 value_rad < limits.position_lower_rad[joint],
@@ -29,7 +31,7 @@ pub(super) fn motion<const N: usize>(
                 value_rad > limits.position_upper_rad[joint],
             ),
         ] {
-            if beyond {
+            if outside {
                 return Err(Fault::JointPosition {
                     joint,
                     value_rad,
@@ -39,7 +41,7 @@ pub(super) fn motion<const N: usize>(
         }
         let value_rad_per_s = abs(velocity_rad_per_s[joint]);
         let limit_rad_per_s = limits.joint_speed_rad_per_s[joint];
-        if beyond(value_rad_per_s, limit_rad_per_s) {
+        if exceeds(value_rad_per_s, limit_rad_per_s) {
             return Err(Fault::JointSpeed {
                 joint,
                 value_rad_per_s,
@@ -49,7 +51,7 @@ pub(super) fn motion<const N: usize>(
     }
     let value_m_per_s = sqrt(tip_velocity.dot(tip_velocity));
     let limit_m_per_s = limits.tip_speed_m_per_s;
-    if beyond(value_m_per_s, limit_m_per_s) {
+    if exceeds(value_m_per_s, limit_m_per_s) {
         return Err(Fault::TipSpeed {
             value_m_per_s,
             limit_m_per_s,
@@ -58,16 +60,16 @@ pub(super) fn motion<const N: usize>(
     Ok(())
 }
 
-/// Distance of the tip from its reference.
+/// Checks the tracking error of the tip.
 pub(super) fn tracking(limit_m: f64, error: &Vector3<f64>) -> Result<(), Fault> {
     let value_m = sqrt(error.dot(error));
-    if beyond(value_m, limit_m) {
+    if exceeds(value_m, limit_m) {
         return Err(Fault::TrackingError { value_m, limit_m });
     }
     Ok(())
 }
 
-/// Distance of each joint from where its own stiff loop wants it.
+/// Checks the tracking error of each joint with a position loop.
 pub(super) fn joint_tracking<const N: usize>(
     limits: &Limits<N>,
     wanted_rad: &[Option<f64>; N],
@@ -76,7 +78,7 @@ pub(super) fn joint_tracking<const N: usize>(
     let limit_rad = limits.joint_tracking_error_rad;
     for (joint, wanted) in wanted_rad.iter().enumerate() {
         let value_rad = wanted.map_or(0.0, |wanted| abs(wanted - position_rad[joint]));
-        if beyond(value_rad, limit_rad) {
+        if exceeds(value_rad, limit_rad) {
             return Err(Fault::JointTrackingError {
                 joint,
                 value_rad,
@@ -87,7 +89,7 @@ pub(super) fn joint_tracking<const N: usize>(
     Ok(())
 }
 
-/// The sum of all terms, where it is finite: no sum is that has a term which is not.
+/// The sum of all terms; an error if a term or the sum is not finite.
 pub(super) fn total<const N: usize>(torques: &Torques<N>) -> Result<Vector<N>, Fault> {
     let total = torques.total();
     if all_finite(&total) {

@@ -1,30 +1,30 @@
-//! Why the controller stopped: every fault named, with the value and the limit it broke.
+//! Faults: why the controller stopped, with the measured value and the violated limit.
 
 use core::fmt;
 
 /// A latched fault. Joints are counted from 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fault {
-    /// A measurement that is not a finite number; `joint` is `None` for the tip force.
+    /// A measurement is not finite; `joint` is `None` for the tip force.
     MeasurementNotFinite {
         /// Joint index.
         joint: Option<usize>,
     },
-    /// Encoder replies of a joint missing for more than the one cycle that is tolerated.
+    /// Encoder replies of a joint are missing for more than the one tolerated cycle.
     EncoderLost {
         /// Joint index.
         joint: usize,
     },
-    /// An angle that the joint cannot have reached since the last one.
+    /// The encoder angle jumped further than the joint can have moved.
     EncoderJump {
         /// Joint index.
         joint: usize,
         /// Distance from the angle expected \[rad\].
         value_rad: f64,
-        /// Greatest distance that is believed \[rad\].
+        /// Maximum plausible distance \[rad\].
         limit_rad: f64,
     },
-    /// No new state for too long.
+    /// No new arm state for more cycles than tolerated.
     StateStale {
         /// Cycles without a new state.
         cycles: u64,
@@ -38,7 +38,7 @@ pub enum Fault {
         /// Cycle number received.
         received: u64,
     },
-    /// A joint beyond its hard stop.
+    /// A joint is beyond its hard stop.
     JointPosition {
         /// Joint index.
         joint: usize,
@@ -47,7 +47,7 @@ pub enum Fault {
         /// Stop \[rad\].
         limit_rad: f64,
     },
-    /// A joint too fast.
+    /// A joint exceeds its speed limit.
     JointSpeed {
         /// Joint index.
         joint: usize,
@@ -56,21 +56,21 @@ pub enum Fault {
         /// Limit \[rad/s\].
         limit_rad_per_s: f64,
     },
-    /// The tip too fast.
+    /// The tip exceeds its speed limit.
     TipSpeed {
         /// Speed \[m/s\].
         value_m_per_s: f64,
         /// Limit \[m/s\].
         limit_m_per_s: f64,
     },
-    /// The tip too far from its reference.
+    /// The tracking error of the tip exceeds its limit.
     TrackingError {
         /// Distance \[m\].
         value_m: f64,
         /// Limit \[m\].
         limit_m: f64,
     },
-    /// A joint too far from where its own stiff loop wants it: blocked on a move, or pushed away.
+    /// Joint tracking error beyond its limit: the joint is blocked in a move, or pushed away.
     JointTrackingError {
         /// Joint index.
         joint: usize,
@@ -79,7 +79,7 @@ pub enum Fault {
         /// Limit \[rad\].
         limit_rad: f64,
     },
-    /// Something outside turns a joint harder than is allowed in this mode.
+    /// The external torque on a joint exceeds the limit of this mode.
     JointCollision {
         /// Joint index.
         joint: usize,
@@ -88,59 +88,59 @@ pub enum Fault {
         /// Limit \[N m\].
         limit_nm: f64,
     },
-    /// Something outside pushes the tip harder than is allowed in this mode.
+    /// The external force on the tip exceeds the limit of this mode.
     TipCollision {
         /// Observed force \[N\].
         value_n: f64,
         /// Limit \[N\].
         limit_n: f64,
     },
-    /// An encoder says the same angle again and again while the joint's reference has moved on.
+    /// An encoder value stays unchanged while the joint's reference moves.
     EncoderStuck {
         /// Joint index.
         joint: usize,
-        /// How far the reference has moved meanwhile \[rad\].
+        /// Travel of the reference meanwhile \[rad\].
         value_rad: f64,
         /// Limit \[rad\].
         limit_rad: f64,
     },
-    /// Encoder replies of a joint that are lost too often, if never twice in a row.
+    /// Encoder replies of a joint are lost too often, though never twice in a row.
     EncoderUnreliable {
         /// Joint index.
         joint: usize,
     },
-    /// A joint gathers speed against the torque that drives it: the sign of its encoder or motor is wrong, or
-    /// something outside is stronger.
-    AgainstTorque {
+    /// A joint accelerates against its net torque: the sign of its encoder or motor is wrong, or an
+    /// external torque is larger.
+    MotionAgainstTorque {
         /// Joint index.
         joint: usize,
-        /// Torque that drives it, gravity and friction taken off \[N m\].
+        /// Net torque on the joint, without gravity and friction \[N m\].
         value_nm: f64,
         /// Torque above which this is a fault \[N m\].
         limit_nm: f64,
     },
-    /// The tip is pulled along gravity by a load that the model does not have, or the model's gravity is wrong.
+    /// A force along gravity acts on the tip: the model lacks a load, or its gravity is wrong.
     UnmodelledLoad {
         /// Observed force along gravity \[N\].
         value_n: f64,
         /// Limit \[N\].
         limit_n: f64,
     },
-    /// The tip is beyond a border of its workspace and moves on.
+    /// The tip is beyond a border of its workspace and still moves outwards.
     Workspace {
         /// Distance beyond it \[m\].
         value_m: f64,
-        /// Border, counted from 0.
+        /// Index of the border, from 0.
         border: usize,
     },
-    /// The tip is too fast for a zone of its workspace.
+    /// The tip exceeds the speed limit of a workspace zone.
     ZoneSpeed {
         /// Speed \[m/s\].
         value_m_per_s: f64,
         /// Limit \[m/s\].
         limit_m_per_s: f64,
     },
-    /// The tip is pushed harder than a zone of its workspace allows.
+    /// The external force on the tip exceeds the limit of a workspace zone.
     ZoneForce {
         /// Observed force \[N\].
         value_n: f64,
@@ -151,61 +151,35 @@ pub enum Fault {
     MassMatrix,
     /// A term of the law, or the torque itself, is not finite.
     TorqueNotFinite {
-        /// Name of the term, as in [`Torques`](crate::impedance::Torques); `"total"` for the sum.
+        /// Name of the term, as in [`Torques`](crate::law::impedance::Torques); `"total"` for the sum.
         term: &'static str,
     },
 }
 
-/// What the controller does in a fault.
+/// Safe action of the controller in a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SafeAction {
-    /// The model holds the arm's weight and takes its momentum away, without any stiff loop
-    /// (see `stop.rs`). It gives way to [`SafeAction::Idle`] where the arm does not come to rest.
+    /// Gravity compensation and damping of the momentum, without any position loop (see `stop.rs`).
+    /// Replaced by [`SafeAction::Idle`] if the arm does not come to rest.
     GravityHold,
-    /// No torque, and drives that brake: the angles or the model cannot be trusted, so neither can gravity
-    /// computed from them.
+    /// No torque, braking drives: the angles or the model cannot be trusted, so the gravity torque
+    /// computed from them cannot be either.
     Idle,
 }
 
 impl Fault {
-    /// What to do about it; in idle, nothing: no fault energises an arm.
+    /// Safe action for the fault. A fault in idle stays in idle: no fault energises an arm.
     pub fn safe_action(&self) -> SafeAction {
         match self {
             Fault::EncoderLost { .. }
             | Fault::EncoderJump { .. }
             | Fault::EncoderStuck { .. }
             | Fault::EncoderUnreliable { .. }
-            | Fault::AgainstTorque { .. }
+            | Fault::MotionAgainstTorque { .. }
             | Fault::UnmodelledLoad { .. }
+            | Fault::MassMatrix
             | Fault::MeasurementNotFinite { joint: Some(_) } => SafeAction::Idle,
             _ => SafeAction::GravityHold,
-        }
-    }
-
-    /// Short name for logs and status lines.
-    pub fn name(&self) -> &'static str {
-        match self {
-            Fault::MeasurementNotFinite { .. } => "measurement_not_finite",
-            Fault::EncoderLost { .. } => "encoder_lost",
-            Fault::EncoderJump { .. } => "encoder_jump",
-            Fault::StateStale { .. } => "state_stale",
-            Fault::StateOutOfOrder { .. } => "state_out_of_order",
-            Fault::JointPosition { .. } => "joint_position",
-            Fault::JointSpeed { .. } => "joint_speed",
-            Fault::TipSpeed { .. } => "tip_speed",
-            Fault::TrackingError { .. } => "tracking_error",
-            Fault::JointTrackingError { .. } => "joint_tracking_error",
-            Fault::JointCollision { .. } => "joint_collision",
-            Fault::TipCollision { .. } => "tip_collision",
-            Fault::EncoderStuck { .. } => "encoder_stuck",
-            Fault::EncoderUnreliable { .. } => "encoder_unreliable",
-            Fault::AgainstTorque { .. } => "moves_against_torque",
-            Fault::UnmodelledLoad { .. } => "unmodelled_load",
-            Fault::Workspace { .. } => "workspace",
-            Fault::ZoneSpeed { .. } => "zone_speed",
-            Fault::ZoneForce { .. } => "zone_force",
-            Fault::MassMatrix => "mass_matrix",
-            Fault::TorqueNotFinite { .. } => "torque_not_finite",
         }
     }
 }
@@ -228,8 +202,8 @@ impl fmt::Display for Fault {
                 limit_rad,
             } => write!(
                 f,
-                "encoder of joint {joint} is {value_rad:.4} rad from where the joint can be, \
-                 {limit_rad:.4} rad are believed"
+                "encoder of joint {joint} jumped by {value_rad:.4} rad from the expected angle, limit \
+                 {limit_rad:.4} rad"
             ),
             Fault::StateStale { cycles, limit } => write!(
                 f,
@@ -271,8 +245,7 @@ impl fmt::Display for Fault {
                 limit_rad,
             } => write!(
                 f,
-                "joint {joint} is {value_rad:.4} rad from where its loop wants it, limit \
-                 {limit_rad:.4} rad"
+                "tracking error of joint {joint} is {value_rad:.4} rad, limit {limit_rad:.4} rad"
             ),
             Fault::JointCollision {
                 joint,
@@ -280,11 +253,11 @@ impl fmt::Display for Fault {
                 limit_nm,
             } => write!(
                 f,
-                "joint {joint} is turned from outside with {value_nm:.2} N m, limit {limit_nm:.2} N m"
+                "external torque on joint {joint} is {value_nm:.2} N m, limit {limit_nm:.2} N m"
             ),
             Fault::TipCollision { value_n, limit_n } => write!(
                 f,
-                "tip is pushed from outside with {value_n:.1} N, limit {limit_n:.1} N"
+                "external force on the tip is {value_n:.1} N, limit {limit_n:.1} N"
             ),
             Fault::EncoderStuck {
                 joint,
@@ -292,41 +265,41 @@ impl fmt::Display for Fault {
                 limit_rad,
             } => write!(
                 f,
-                "encoder of joint {joint} stands still while its reference has moved {value_rad:.4} rad, \
+                "encoder of joint {joint} is unchanged while its reference has moved {value_rad:.4} rad, \
                  limit {limit_rad:.4} rad"
             ),
             Fault::EncoderUnreliable { joint } => write!(
                 f,
                 "encoder replies of joint {joint} are lost too often, more than one in nine"
             ),
-            Fault::AgainstTorque {
+            Fault::MotionAgainstTorque {
                 joint,
                 value_nm,
                 limit_nm,
             } => write!(
                 f,
-                "joint {joint} gathers speed against {value_nm:.2} N m that drive it, {limit_nm:.2} N m are \
-                 tolerated: check the signs of encoder and motor"
+                "joint {joint} accelerates against a net torque of {value_nm:.2} N m, limit {limit_nm:.2} N m: \
+                 check the signs of encoder and motor"
             ),
             Fault::UnmodelledLoad { value_n, limit_n } => write!(
                 f,
-                "tip is pulled along gravity with {value_n:.1} N that the model does not have, limit \
-                 {limit_n:.1} N: add the load to the model, or calibrate"
+                "unmodelled force of {value_n:.1} N on the tip along gravity, limit {limit_n:.1} N: \
+                 add the load to the model, or calibrate"
             ),
             Fault::Workspace { value_m, border } => write!(
                 f,
-                "tip is {value_m:.4} m beyond border {border} of its workspace and moves on"
+                "tip is {value_m:.4} m beyond border {border} of its workspace and still moves outwards"
             ),
             Fault::ZoneSpeed {
                 value_m_per_s,
                 limit_m_per_s,
             } => write!(
                 f,
-                "tip moves at {value_m_per_s:.3} m/s in a zone for {limit_m_per_s:.3} m/s"
+                "tip moves at {value_m_per_s:.3} m/s, limit of this zone {limit_m_per_s:.3} m/s"
             ),
             Fault::ZoneForce { value_n, limit_n } => write!(
                 f,
-                "tip is pushed with {value_n:.1} N in a zone for {limit_n:.1} N"
+                "external force on the tip is {value_n:.1} N, limit of this zone {limit_n:.1} N"
             ),
             Fault::MassMatrix => write!(f, "mass matrix is not positive definite"),
             Fault::TorqueNotFinite { term } => {

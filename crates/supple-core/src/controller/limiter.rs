@@ -1,8 +1,8 @@
-//! The last three things done to a torque: the limit, the rate limit, the finite check.
+//! The final three steps on a torque: torque limit, rate limit, finite check.
 //!
-//! Both limits scale towards a torque that is allowed, along a straight line, so that what satisfies
-//! the joint limits goes on to satisfy the motor limits. Motors that share joints (the differential of
-//! shoulder pitch and roll) are scaled together, others are left alone.
+//! Both limits scale along a straight line towards an allowed torque, so that each step preserves
+//! the limits that the steps before it have satisfied. Motors that share joints (the differential
+//! of shoulder pitch and roll) are scaled together; other motors are unaffected.
 
 use crate::config::Limits;
 use crate::math::{Matrix, Vector, abs, all_finite};
@@ -11,25 +11,25 @@ use crate::math::{Matrix, Vector, abs, all_finite};
 #[derive(Clone, Copy, Debug)]
 pub struct MotorGroups<const N: usize> {
     motor_from_joint_torque: Matrix<N, N>,
-    /// Least joint index of the group of each joint.
+    /// Smallest joint index of the group of each joint.
     joint_group: [usize; N],
-    /// The same for each motor.
+    /// Smallest joint index of the group of each motor.
     motor_group: [usize; N],
 }
 
 impl<const N: usize> MotorGroups<N> {
-    /// From `m2jp`, joint angles from motor angles.
+    /// Groups of the transmission `m2jp` (joint angles from motor angles).
     pub fn new(joint_from_motor: &Matrix<N, N>) -> Self {
         let mut joint_group: [usize; N] = core::array::from_fn(|i| i);
         let mut motor_group = [usize::MAX; N];
-        // N passes spread the least index through any chain of couplings.
+        // N passes propagate the smallest index through any chain of coupled joints.
         for _ in 0..N {
             for motor in 0..N {
                 for joint in 0..N {
                     if joint_from_motor[(joint, motor)] != 0.0 {
-                        let least = motor_group[motor].min(joint_group[joint]);
-                        motor_group[motor] = least;
-                        joint_group[joint] = least;
+                        let min_index = motor_group[motor].min(joint_group[joint]);
+                        motor_group[motor] = min_index;
+                        joint_group[joint] = min_index;
                     }
                 }
             }
@@ -41,27 +41,27 @@ impl<const N: usize> MotorGroups<N> {
         }
     }
 
-    /// Motor torques that make the joint torques, `m2jp^T tau` \[N m\].
+    /// Motor torques equivalent to the joint torques, `m2jp^T tau` \[N m\].
     pub fn motor_torque_nm(&self, torque_nm: &Vector<N>) -> Vector<N> {
         self.motor_from_joint_torque * torque_nm
     }
 }
 
-/// A torque that may be sent, and what it took.
+/// The limited torque, and which limits acted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limited<const N: usize> {
     /// The torque \[N m\].
     pub torque_nm: Vector<N>,
-    /// A joint or motor limit cut it.
+    /// A joint or motor limit acted.
     pub torque_limited: bool,
-    /// The rate limit cut it.
+    /// The rate limit acted.
     pub rate_limited: bool,
-    /// It was finite.
+    /// The torque was finite.
     pub finite: bool,
 }
 
-/// Limit, rate limit, finite check, in this order. The torque changes by at most `step_nm` since the last one.
-/// A torque that is not finite becomes zero here, and `finite` says so.
+/// Applies torque limit, rate limit and finite check, in this order. The torque changes by at most
+/// `step_nm` from the last one. A torque that is not finite becomes zero and clears `finite`.
 pub fn limit<const N: usize>(
     limits: &Limits<N>,
     groups: &MotorGroups<N>,
@@ -80,7 +80,7 @@ pub fn limit<const N: usize>(
     }
 }
 
-/// Joint limits one by one, then motor limits by scaling whole groups.
+/// Applies the joint limits individually, then the motor limits by scaling whole groups.
 pub fn limit_torque<const N: usize>(
     limits: &Limits<N>,
     groups: &MotorGroups<N>,
@@ -90,11 +90,11 @@ pub fn limit_torque<const N: usize>(
         demand_nm[i].clamp(-limits.joint_torque_nm[i], limits.joint_torque_nm[i])
     });
     let motors = groups.motor_torque_nm(&torque);
-    let beyond = |motor: usize| abs(motors[motor]) > limits.motor_torque_nm[motor];
-    // Mostly none is, and there is nothing to divide.
-    if (0..N).fold(false, |any, motor| any | beyond(motor)) {
+    let exceeds = |motor: usize| abs(motors[motor]) > limits.motor_torque_nm[motor];
+    // Common case: no motor exceeds its limit, and no division is needed.
+    if (0..N).fold(false, |any, motor| any | exceeds(motor)) {
         let mut scale = [1.0_f64; N];
-        for motor in (0..N).filter(|motor| beyond(*motor)) {
+        for motor in (0..N).filter(|motor| exceeds(*motor)) {
             let group = groups.motor_group[motor];
             scale[group] = scale[group].min(limits.motor_torque_nm[motor] / abs(motors[motor]));
         }
@@ -109,17 +109,17 @@ fn limit_rate<const N: usize>(
     groups: &MotorGroups<N>,
     last_nm: &Vector<N>,
     torque_nm: &Vector<N>,
-    greatest: &Vector<N>,
+    max_step_nm: &Vector<N>,
 ) -> (Vector<N>, bool) {
     let step = torque_nm - last_nm;
-    let beyond = |joint: usize| abs(step[joint]) > greatest[joint];
-    if !(0..N).fold(false, |any, joint| any | beyond(joint)) {
+    let exceeds = |joint: usize| abs(step[joint]) > max_step_nm[joint];
+    if !(0..N).fold(false, |any, joint| any | exceeds(joint)) {
         return (*torque_nm, false);
     }
     let mut share = [1.0_f64; N];
-    for joint in (0..N).filter(|joint| beyond(*joint)) {
+    for joint in (0..N).filter(|joint| exceeds(*joint)) {
         let group = groups.joint_group[joint];
-        share[group] = share[group].min(greatest[joint] / abs(step[joint]));
+        share[group] = share[group].min(max_step_nm[joint] / abs(step[joint]));
     }
     let limited = share.iter().any(|share| *share < 1.0);
     let torque = Vector::from_fn(|joint, _| match share[groups.joint_group[joint]] {

@@ -1,34 +1,41 @@
-//! The controller: an immutable [`Controller`], a [`State`] that it advances, and [`step`], which does
-//! so once a cycle.
+//! The controller: an immutable [`Controller`], its [`State`], and [`step`], which advances the
+//! state by one cycle.
 
 mod activity;
+mod activity_torques;
 mod checks;
+pub mod codes;
+pub mod drive_guard;
+pub mod estimator;
 mod fault;
+pub mod latch;
 mod limiter;
 mod mode;
+mod motion_check;
+pub mod observer;
 mod output;
-mod plan;
 mod plausibility;
 mod requests;
 mod state;
 mod step;
 mod stop;
+mod supervision;
 mod validate;
 
 pub use fault::{Fault, SafeAction};
 pub use limiter::{Limited, MotorGroups, limit, limit_torque};
 pub use mode::{Breakaway, Mode, Refusal, Request};
-pub use output::{Input, Output};
-pub use plan::plan;
+pub use motion_check::check_motion;
+pub use output::{CycleRecord, Input, Output};
 pub use state::State;
 pub use step::step;
 pub use validate::ConfigError;
 
 use crate::config::Config;
-use crate::linalg::Cholesky;
+use crate::math::linalg::Cholesky;
 use crate::math::{Matrix, Vector};
 
-/// A configuration that was found sound, and what follows from it.
+/// A validated configuration and the constants derived from it.
 #[derive(Clone, Copy, Debug)]
 pub struct Controller<const N: usize> {
     config: Config<N>,
@@ -40,21 +47,21 @@ pub struct Controller<const N: usize> {
     stop_step_nm: Vector<N>,
 }
 
-/// Cycles between a measurement and the torque that answers it, at most, with half a cycle for the torque that
-/// is held meanwhile.
+/// Maximum delay from a measurement to the resulting torque in cycles, with half a cycle for the
+/// zero-order hold of the torque.
 const DELAY_CYCLES: f64 = 3.5;
-/// Time in which the safe action may take a joint's whole torque away \[s\].
+/// Time in which the safe action may ramp a joint from full torque to zero \[s\].
 const STOP_TORQUE_S: f64 = 0.005;
 
 impl<const N: usize> Controller<N> {
-    /// Checks every entry.
+    /// Validates a configuration and builds its controller.
     ///
     /// # Errors
     /// [`ConfigError`] names the entry, the joint and the value.
     pub fn new(config: Config<N>) -> Result<Self, ConfigError> {
         validate::validate(&config)?;
         let to_joint = &config.joint_from_motor;
-        // Validation has found the square positive definite.
+        // Validation guarantees that the product is positive definite.
         let motor_from_joint = Cholesky::new(&(to_joint.transpose() * to_joint))
             .map_or_else(Matrix::identity, |square| {
                 square.solve(&to_joint.transpose())
@@ -73,14 +80,14 @@ impl<const N: usize> Controller<N> {
         })
     }
 
-    /// From a motion to the torque that answers it, at most \[s\]: three and a half cycles, and the lag of the
+    /// Maximum delay from a motion to the resulting torque \[s\]: 3.5 cycles plus the lag of the
     /// velocity estimate.
     pub fn delay_s(&self) -> f64 {
         self.delay_s
     }
 
-    /// Greatest change of joint torque in a cycle \[N m\]: by the rate limit, or what the safe action needs to take
-    /// a torque away.
+    /// Maximum change of joint torque per cycle \[N m\]: by the rate limit, or with `stopping` the
+    /// larger of it and the rate of the safe action.
     pub fn torque_step_nm(&self, stopping: bool) -> &Vector<N> {
         if stopping {
             &self.stop_step_nm
@@ -89,7 +96,7 @@ impl<const N: usize> Controller<N> {
         }
     }
 
-    /// What it was built from.
+    /// The configuration.
     pub fn config(&self) -> &Config<N> {
         &self.config
     }
@@ -99,7 +106,7 @@ impl<const N: usize> Controller<N> {
         &self.motor_from_joint
     }
 
-    /// Motors behind the joints.
+    /// Coupling between motors and joints.
     pub fn motors(&self) -> &MotorGroups<N> {
         &self.groups
     }

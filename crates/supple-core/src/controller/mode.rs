@@ -5,7 +5,7 @@ use crate::math::Vector;
 use crate::trajectory::{Fourier, Trajectory, TrajectoryError};
 use core::fmt;
 
-/// What the controller is doing.
+/// Mode of the controller.
 ///
 /// ```text
 /// idle <-> gravity hold <-> work (move, track, probe, excite, breakaway)      any -> fault
@@ -13,20 +13,20 @@ use core::fmt;
 ///          fault -> gravity hold | idle  (reset)
 /// ```
 ///
-/// Idle is reached from anywhere; asked for in a fault it takes the torque away and leaves the fault
-/// latched. From idle only gravity hold is reached. While the drives are idle, every mode with torque gives way
-/// to gravity hold at the pose that the arm is in, and work is refused: drives come to life in gravity hold
-/// alone. A reset leaves the fault for
-/// the mode that its safe action was: gravity hold, or idle where the angles could not be trusted or the
-/// fault came in idle. It is refused in a cycle that would raise a fault again. Every entry but those to
-/// idle and fault starts from the torque that was there and blends it out.
+/// Idle can be entered from every mode; in a fault it removes the torque and keeps the fault
+/// latched. From idle only gravity hold can be entered. While the drives are idle, every mode with
+/// torque changes to gravity hold at the current pose, and requests for motion are refused: drives
+/// become active only in gravity hold. A reset leaves the fault for the mode of its safe action:
+/// gravity hold, or idle if the angles could not be trusted or the fault occurred in idle. A reset
+/// is refused in a cycle that would raise a fault again. Every transition except to idle and fault
+/// is bumpless: it starts from the previous torque and blends it out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
     /// No torque.
     Idle,
-    /// The model holds the arm's weight, joints are damped, held joints keep their loop.
+    /// Gravity compensation with joint damping; held joints keep their position loop.
     GravityHold,
-    /// Stiff joint-space motion to a pose, with model feed-forward; holds it at the end.
+    /// Stiff joint-space motion to a pose, with model feed-forward; holds the pose at the end.
     Move,
     /// The impedance law follows a trajectory.
     Track,
@@ -34,8 +34,8 @@ pub enum Mode {
     Probe,
     /// A fault is latched; the safe action runs until a reset.
     Fault,
-    /// Stiff joint-space motion along a Fourier series, with model feed-forward, for identification;
-    /// joints that the law holds move too. Holds its end.
+    /// Stiff joint-space motion along a Fourier series, with model feed-forward, for
+    /// identification; held joints move too. Holds the end pose.
     Excite,
     /// The torque of one joint is ramped until it moves, the others are held; then gravity hold.
     Breakaway,
@@ -57,40 +57,40 @@ impl Mode {
     }
 }
 
-/// What an operator or a programme asks for. Checked in the controller, never trusted.
+/// A request of an operator or a program. The controller validates every request.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Request<const N: usize> {
-    /// To idle.
+    /// Enters idle.
     Idle,
-    /// To gravity hold.
+    /// Enters gravity hold.
     GravityHold,
-    /// To a pose, along the minimum-jerk line in joint space. Held joints must be asked to go to their
-    /// own angle.
+    /// Moves to a pose along a minimum-jerk line in joint space. The target of a held joint must be
+    /// its own angle.
     Move {
         /// Pose \[rad\].
         target_rad: Vector<N>,
         /// Duration \[s\].
         duration_s: f64,
     },
-    /// Along a trajectory that starts near the tip; the mode is [`Mode::Probe`] for the probing cycle
-    /// and [`Mode::Track`] otherwise.
+    /// Follows a trajectory that starts near the tip; the mode is [`Mode::Probe`] for the probing
+    /// cycle and [`Mode::Track`] otherwise.
     Track(Trajectory),
-    /// Along a Fourier series of all joints, from near its start.
+    /// Follows a Fourier series of all joints, from near its start.
     Excite(Fourier<N>),
-    /// Finds where dry friction gives way.
+    /// Measures the breakaway torque of a joint.
     Breakaway(Breakaway),
-    /// Other gains, reached along a straight line in `ramp_s`.
+    /// Changes the gains linearly over `ramp_s`.
     Gains {
-        /// Gains to reach.
+        /// Final gains.
         gains: Gains,
-        /// Time to reach them \[s\], zero or more.
+        /// Ramp time \[s\], zero or more.
         ramp_s: f64,
     },
-    /// Out of the fault.
+    /// Leaves the fault.
     Reset,
 }
 
-/// A ramp of torque on one joint, beside gravity, until the joint has moved.
+/// A torque ramp on one joint, added to gravity compensation, until the joint has moved.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Breakaway {
     /// Joint index.
@@ -103,31 +103,31 @@ pub struct Breakaway {
     pub limit_nm: f64,
 }
 
-/// Why a request changed nothing.
+/// Why a request was refused. A refused request changes nothing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Refusal {
-    /// Not from this mode.
+    /// Not possible in this mode.
     Mode {
-        /// Mode in force.
+        /// Current mode.
         mode: Mode,
     },
-    /// An entry out of its range.
+    /// An entry is out of its range.
     Value {
         /// Name of the entry.
         entry: &'static str,
-        /// Value asked for.
+        /// Requested value.
         value: f64,
-        /// What it must be at most, or equal for a held joint.
+        /// Maximum value; for a held joint the required value.
         limit: f64,
     },
     /// The move would take a joint beyond its stops.
-    Unreachable {
+    BeyondJointStop {
         /// Joint index.
         joint: usize,
-        /// Angle asked for \[rad\].
+        /// Requested angle \[rad\].
         value_rad: f64,
     },
-    /// The move would turn a joint faster than its limit.
+    /// The move would exceed the speed limit of a joint.
     TooFast {
         /// Joint index.
         joint: usize,
@@ -143,22 +143,22 @@ pub enum Refusal {
         /// Limit \[m\].
         limit_m: f64,
     },
-    /// The trajectory itself is wrong.
+    /// The trajectory itself is invalid.
     Trajectory(TrajectoryError),
-    /// Motion was asked for while the drives are idle.
+    /// Motion was requested while the drives are idle.
     DrivesIdle,
-    /// The tip cannot come to a point of the trajectory.
+    /// The tip cannot reach a point of the trajectory.
     OutOfReach {
         /// Time of the point since the start \[s\].
         time_s: f64,
-        /// Distance that remains \[m\].
+        /// Remaining distance \[m\].
         distance_m: f64,
     },
-    /// The motion would take more torque than a joint has.
+    /// The motion would need more torque than a joint has.
     TooMuchTorque {
         /// Joint index.
         joint: usize,
-        /// Torque that the model asks for \[N m\].
+        /// Torque that the model needs \[N m\].
         value_nm: f64,
         /// Limit \[N m\].
         limit_nm: f64,
@@ -167,7 +167,7 @@ pub enum Refusal {
     Workspace {
         /// Border, counted from 0.
         border: usize,
-        /// Greatest distance beyond it \[m\].
+        /// Maximum distance beyond it \[m\].
         value_m: f64,
     },
 }
@@ -175,13 +175,13 @@ pub enum Refusal {
 impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
-            Refusal::Mode { mode } => write!(f, "refused: not from mode {}", mode.name()),
+            Refusal::Mode { mode } => write!(f, "refused: not possible in mode {}", mode.name()),
             Refusal::Value {
                 entry,
                 value,
                 limit,
             } => write!(f, "refused: {entry} is {value}, the limit is {limit}"),
-            Refusal::Unreachable { joint, value_rad } => write!(
+            Refusal::BeyondJointStop { joint, value_rad } => write!(
                 f,
                 "refused: joint {joint} would go to {value_rad:.4} rad, beyond its stop"
             ),
@@ -208,8 +208,8 @@ impl fmt::Display for Refusal {
             }
             Refusal::OutOfReach { time_s, distance_m } => write!(
                 f,
-                "refused: {time_s:.2} s after its start the trajectory is {distance_m:.3} m out of reach; \
-                 move it nearer to the arm or make it smaller"
+                "refused: {time_s:.2} s after its start the trajectory is {distance_m:.3} m beyond the arm's \
+                 reach; move it closer to the arm or make it smaller"
             ),
             Refusal::TooMuchTorque {
                 joint,
@@ -217,7 +217,7 @@ impl fmt::Display for Refusal {
                 limit_nm,
             } => write!(
                 f,
-                "refused: joint {joint} would need {value_nm:.2} N m, limit {limit_nm:.2} N m; ask for a \
+                "refused: joint {joint} would need {value_nm:.2} N m, limit {limit_nm:.2} N m; request a \
                  slower motion"
             ),
             Refusal::Workspace { border, value_m } => write!(

@@ -1,80 +1,306 @@
-//! What goes into a step and what comes out.
+//! The input and the output of a step, and the record of both. The list below declares every quantity once: telemetry,
+//! the log and its message definition, fault files and Python columns are derived from it (see [`crate::record`]).
 
 use super::fault::{Fault, SafeAction};
 use super::mode::{Mode, Refusal, Request};
 use crate::config::Gains;
-use crate::impedance::Torques;
+use crate::controller::codes::{self, FaultCode, RequestCode, RequestCodeError, VALUES};
+use crate::law::torques::Torques;
 use crate::math::{Vector, Vector3};
+use crate::record::{Field, List, Pack, Recorded, Text, Unpack, words_of};
 use crate::trajectory::Reference;
 
-/// Measurements and wishes of one cycle.
+/// Measurements and requests of one cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Input<const N: usize> {
     /// Number of the cycle in which the state was measured; one more each period.
     pub cycle: u64,
-    /// Joint angles \[rad\]; `None` where the encoder did not answer.
+    /// Joint angles \[rad\]; `None` if the encoder did not answer.
     pub position_rad: [Option<f64>; N],
     /// Measured force on the tip, base axes \[N\]; used only with a chosen apparent inertia.
     pub tip_force_n: Option<Vector3<f64>>,
-    /// The motors carry out the torques that they are sent. Where they do not, the controller holds gravity at the
-    /// pose that the arm is in, ready for their return.
+    /// The motors apply the torques that they are sent. If they do not, the controller holds gravity at the
+    /// present pose.
     pub drives_active: bool,
-    /// What is asked for, if anything.
+    /// The operator's request, if there is one.
     pub request: Option<Request<N>>,
 }
 
-/// Torques of one cycle and everything that led to them.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Output<const N: usize> {
-    /// Cycle of the state that this answers.
-    pub cycle: u64,
-    /// Joint torques to send \[N m\].
-    pub torque_nm: Vector<N>,
-    /// Joint torques to send if the next answer does not come: gravity at the last trusted pose, zero
-    /// in idle \[N m\].
-    pub fallback_torque_nm: Vector<N>,
-    /// Mode in force.
-    pub mode: Mode,
-    /// Time since the mode was entered \[s\].
-    pub mode_time_s: f64,
-    /// No torque is wanted: idle, or a fault in which there must be none.
-    pub limp: bool,
-    /// Latched fault.
-    pub fault: Option<Fault>,
-    /// What is done about it now; braking, where the arm did not come to rest otherwise.
-    pub safe_action: Option<SafeAction>,
-    /// Why this cycle's request was refused.
-    pub refusal: Option<Refusal>,
-    /// Terms whose sum was limited to `torque_nm`.
-    pub torques: Torques<N>,
-    /// A joint or motor torque limit cut the sum.
-    pub torque_limited: bool,
-    /// The torque-rate limit cut the sum.
-    pub rate_limited: bool,
-    /// Angles used: measured, or coasted over a lost reply \[rad\].
-    pub position_rad: Vector<N>,
-    /// Estimated joint velocities \[rad/s\].
-    pub velocity_rad_per_s: Vector<N>,
-    /// Tip, base axes \[m\].
-    pub tip_position_m: Vector3<f64>,
-    /// Tip, base axes \[m/s\].
-    pub tip_velocity_m_per_s: Vector3<f64>,
-    /// Where the tip should be; `None` where no tip trajectory runs.
-    pub reference: Option<Reference>,
-    /// Gains in force.
-    pub gains: Gains,
-    /// Observed external torque \[N m\].
-    pub external_torque_nm: Vector<N>,
-    /// Observed force on the tip, base axes \[N\].
-    pub external_force_n: Vector3<f64>,
-    /// Observed force against the reference's motion \[N\].
-    pub force_against_n: f64,
-    /// Force against the reference's motion that latches contact now \[N\].
-    pub contact_threshold_n: f64,
-    /// Contact is latched.
-    pub in_contact: bool,
-    /// Share of the friction feed-forward applied, 0 to 1.
-    pub friction_share: f64,
-    /// Least singular value of the active joints' linear Jacobian \[m\].
-    pub least_singular_value_m: f64,
+/// Type of a quantity in [`Output`].
+macro_rules! in_output {
+    (number, $n:ident) => { f64 };
+    (flag, $n:ident) => { bool };
+    (joints, $n:ident) => { Vector<$n> };
+    (vector, $n:ident) => { Vector3<f64> };
+}
+
+/// Type of a quantity in [`CycleRecord`].
+macro_rules! in_record {
+    (number, $n:ident) => { f64 };
+    (flag, $n:ident) => { bool };
+    (joints, $n:ident) => { Vector<$n> };
+    (vector, $n:ident) => { [f64; 3] };
+    (counter, $n:ident) => { u64 };
+    (code, $n:ident) => { u8 };
+    (index, $n:ident) => { i8 };
+    (joint_flags, $n:ident) => { [bool; $n] };
+    (numbers, $n:ident) => { List<VALUES> };
+    (text, $n:ident) => { Text };
+    (terms, $n:ident) => { Torques<$n> };
+}
+
+/// Three lists: what is in the record alone, with its value; what is in both; what is in the output alone.
+macro_rules! cycle {
+    (
+        record($step:ident, $input:ident, $output:ident; $($code:ident = $of:expr),+) {
+            $($(#[doc = $record_doc:literal])+ $record_kind:ident $record:ident = $value:expr;)*
+        }
+        both {
+            $($(#[doc = $both_doc:literal])+ $both_kind:ident $both:ident;)*
+        }
+        output {
+            $($(#[doc = $output_doc:literal])+ $only:ident: $type:ty;)*
+        }
+    ) => {
+        /// Torques of one cycle and the quantities that led to them.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub struct Output<const N: usize> {
+            $($(#[doc = $output_doc])+ pub $only: $type,)*
+            $($(#[doc = $both_doc])+ pub $both: in_output!($both_kind, N),)*
+        }
+
+        /// One cycle of the controller as plain numbers: input, output, and every term of the torque. Joints in order,
+        /// vectors as x, y, z in base axes, SI units. If a `has_x` is false there was no x and its entries are zero.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub struct CycleRecord<const N: usize> {
+            $($(#[doc = $record_doc])+ pub $record: in_record!($record_kind, N),)*
+            $($(#[doc = $both_doc])+ pub $both: in_record!($both_kind, N),)*
+        }
+
+        impl<const N: usize> CycleRecord<N> {
+            /// Every field, in order.
+            pub const FIELDS: &'static [Field] = &[
+                $(Field {
+                    name: stringify!($record),
+                    shape: <in_record!($record_kind, N) as Recorded<N>>::SHAPE,
+                    description: concat!($($record_doc, "\n"),+),
+                },)*
+                $(Field {
+                    name: stringify!($both),
+                    shape: <in_record!($both_kind, N) as Recorded<N>>::SHAPE,
+                    description: concat!($($both_doc, "\n"),+),
+                },)*
+            ];
+
+            /// Records a step; `step` is its number since the controller started.
+            pub fn new($step: u64, $input: &Input<N>, $output: &Output<N>) -> Self {
+                $(let $code = $of;)+
+                CycleRecord {
+                    $($record: $value,)*
+                    $($both: $output.$both.into(),)*
+                }
+            }
+
+            /// Writes the words of every field, [`CycleRecord::words`] of them.
+            ///
+            /// # Panics
+            /// If there is room for fewer.
+            pub fn pack(&self, words: &mut [u64]) {
+                let mut to = Pack::new(words);
+                $(Recorded::<N>::pack(&self.$record, &mut to);)*
+                $(Recorded::<N>::pack(&self.$both, &mut to);)*
+            }
+
+            /// Reads what [`CycleRecord::pack`] wrote for an arm of `joints` joints: the first `N` of them; the values
+            /// of joints that are not there are zero.
+            pub fn unpack(words: &[u64], joints: usize) -> Self {
+                let mut from = Unpack::new(words, joints);
+                CycleRecord {
+                    $($record: Recorded::<N>::unpack(&mut from),)*
+                    $($both: Recorded::<N>::unpack(&mut from),)*
+                }
+            }
+        }
+    };
+}
+
+cycle! {
+    record(
+        step, input, output;
+        request_code = RequestCode::new(input.request.as_ref()),
+        fault_code = FaultCode::new(output.fault.as_ref())
+    ) {
+        /// Number of this step since the controller started. A gap means that the log has lost records.
+        counter step = step;
+        /// Input: cycle in which the state was measured.
+        counter input_cycle = input.cycle;
+        /// Encoders that answered.
+        joint_flags has_measured_position = input.position_rad.map(|position| position.is_some());
+        /// Measured joint angles \[rad\].
+        joints measured_position_rad = Vector::from(input.position_rad.map(Option::unwrap_or_default));
+        /// The force sensor answered.
+        flag has_tip_force = input.tip_force_n.is_some();
+        /// Measured force on the tip \[N\].
+        vector tip_force_n = input.tip_force_n.unwrap_or_default().into();
+        /// The motors applied torques. Logs without this field are read as if they did.
+        flag drives_active = input.drives_active;
+        /// Kind of the request.
+        code request = request_code.kind;
+        /// Kind of the trajectory of a track request.
+        code trajectory = request_code.trajectory;
+        /// Values of the request, vectors as x, y, z:
+        /// move      target_rad (N), duration_s
+        /// excite    centre_rad (N), sine_rad (5 harmonics of N), cosine_rad (5 of N),
+        ///           angular_frequency_rad_per_s, duration_s, ramp_s
+        /// breakaway joint, rate_nm_per_s, stop_rad, limit_nm
+        /// gains     stiffness_n_per_m, damping_n_s_per_m, ramp_s
+        /// hold      position_m
+        /// line      from_m, to_m, duration_s
+        /// sinusoid  centre_m, amplitude_m, angular_frequency_rad_per_s, ramp_s
+        /// arc       radius_m, height_m, centre_rad, amplitude_rad, angular_frequency_rad_per_s, ramp_s
+        /// quadrant  centre_m, first_m, second_m, speed_m_per_s, ramp_s
+        /// probe     radius_m, strokes, radial_step_m, top_m, stroke_m, azimuth_rad, azimuth_step_rad,
+        ///           speed_m_per_s, ramp_s
+        numbers request_values = List::new(request_code.values());
+        /// Output: cycle of the state that this step answers.
+        counter cycle = output.cycle;
+        /// Mode in force.
+        code mode = output.mode as u8;
+        /// Terms whose sum, once limited, is `torque_nm` \[N m\].
+        terms torques = output.torques;
+        /// A tip trajectory runs.
+        flag has_reference = output.reference.is_some();
+        /// Reference of the tip's position \[m\].
+        vector reference_position_m = of_reference(output, |reference| reference.position);
+        /// Reference of the tip's velocity \[m/s\].
+        vector reference_velocity_m_per_s = of_reference(output, |reference| reference.velocity);
+        /// Reference of the tip's acceleration \[m/s^2\].
+        vector reference_acceleration_m_per_s2 = of_reference(output, |reference| reference.acceleration);
+        /// Stiffness `K` in force \[N/m\].
+        vector stiffness_n_per_m = output.gains.stiffness_n_per_m.into();
+        /// Damping `B` in force \[N s/m\].
+        vector damping_n_s_per_m = output.gains.damping_n_s_per_m.into();
+        /// Kind of the latched fault.
+        code fault = fault_code.kind;
+        /// Joint of the fault, counted from 0, or -1.
+        index fault_joint = fault_code.joint;
+        /// Value that broke the limit.
+        number fault_value = fault_code.value;
+        /// The limit.
+        number fault_limit = fault_code.limit;
+        /// The fault in words.
+        text fault_text = output.fault.map_or(Text::EMPTY, |fault| Text::from_display(&fault));
+        /// Kind of the refusal of this cycle's request.
+        code refusal = codes::refusal(output.refusal.as_ref());
+        /// The refusal in words.
+        text refusal_text = output.refusal.map_or(Text::EMPTY, |refusal| Text::from_display(&refusal));
+    }
+    both {
+        /// Time since the mode was entered \[s\].
+        number mode_time_s;
+        /// Joint torques to send \[N m\].
+        joints torque_nm;
+        /// Joint torques to apply if the next answer does not come: gravity at the last trusted pose, zero in
+        /// idle \[N m\].
+        joints fallback_torque_nm;
+        /// A joint or motor torque limit cut the sum.
+        flag torque_limited;
+        /// The torque-rate limit cut the sum.
+        flag rate_limited;
+        /// Joint angles used: measured, or extrapolated over a lost reply \[rad\].
+        joints position_rad;
+        /// Estimated joint velocities \[rad/s\].
+        joints velocity_rad_per_s;
+        /// Tip position \[m\].
+        vector tip_position_m;
+        /// Tip velocity \[m/s\].
+        vector tip_velocity_m_per_s;
+        /// Observed external torque \[N m\].
+        joints external_torque_nm;
+        /// Observed force on the tip \[N\].
+        vector external_force_n;
+        /// Observed force against the reference's motion \[N\].
+        number force_against_n;
+        /// Force against the reference's motion at which contact latches now \[N\].
+        number contact_threshold_n;
+        /// Contact is latched.
+        flag in_contact;
+        /// Share of the dry friction feed-forward applied, 0 to 1.
+        number friction_share;
+        /// Least singular value of the active joints' linear Jacobian \[m\].
+        number least_singular_value_m;
+    }
+    output {
+        /// Cycle of the state that this answers.
+        cycle: u64;
+        /// Mode in force.
+        mode: Mode;
+        /// No torque is wanted: idle, or a fault in which there must be none.
+        torque_off: bool;
+        /// Latched fault.
+        fault: Option<Fault>;
+        /// Safe action in force in a fault; braking if the arm did not come to rest.
+        safe_action: Option<SafeAction>;
+        /// Why this cycle's request was refused.
+        refusal: Option<Refusal>;
+        /// Terms whose sum, once limited, is `torque_nm`.
+        torques: Torques<N>;
+        /// Reference of the tip; `None` if no tip trajectory runs.
+        reference: Option<Reference>;
+        /// Gains in force.
+        gains: Gains;
+    }
+}
+
+fn of_reference<const N: usize>(
+    output: &Output<N>,
+    part: fn(&Reference) -> Vector3<f64>,
+) -> [f64; 3] {
+    output
+        .reference
+        .as_ref()
+        .map_or([0.0; 3], |reference| part(reference).into())
+}
+
+impl<const N: usize> CycleRecord<N> {
+    /// Words of the record of an arm with `joints` joints.
+    pub const fn words(joints: usize) -> usize {
+        words_of(Self::FIELDS, joints)
+    }
+
+    /// The input of the step, to the last bit.
+    ///
+    /// # Errors
+    /// A request that this version does not know.
+    pub fn input(&self) -> Result<Input<N>, RequestCodeError> {
+        let position =
+            |i: usize| self.has_measured_position[i].then_some(self.measured_position_rad[i]);
+        Ok(Input {
+            cycle: self.input_cycle,
+            position_rad: core::array::from_fn(position),
+            tip_force_n: self.has_tip_force.then(|| Vector3::from(self.tip_force_n)),
+            drives_active: self.drives_active,
+            request: self.request_code()?.request()?,
+        })
+    }
+
+    /// The request as numbers.
+    ///
+    /// # Errors
+    /// More values than a request has.
+    pub fn request_code(&self) -> Result<RequestCode, RequestCodeError> {
+        RequestCode::from_parts(self.request, self.trajectory, self.request_values.values())
+    }
+
+    /// Mode in force; `None` if this version does not know it.
+    pub fn mode(&self) -> Option<Mode> {
+        codes::mode(self.mode)
+    }
+
+    /// Distance of the tip from its reference \[m\]; `None` if there is no reference.
+    pub fn tip_error_m(&self) -> Option<f64> {
+        let error = Vector3::from(self.reference_position_m) - Vector3::from(self.tip_position_m);
+        self.has_reference
+            .then(|| crate::math::sqrt(error.dot(&error)))
+    }
 }

@@ -1,7 +1,7 @@
-//! How a request changes what the controller is busy with, and why it may not.
+//! Carries out requests, or refuses them.
 //!
-//! What is looked at here takes no longer than a cycle allows; the whole length of a motion is looked at by
-//! [`super::plan()`], before it is asked for.
+//! Only checks that fit into one cycle are done here; [`super::check_motion()`] checks a motion over its
+//! whole length before it is requested.
 
 use super::Controller;
 use super::activity::Activity;
@@ -10,25 +10,26 @@ use super::mode::{Breakaway, Mode, Refusal, Request};
 use super::state::{GainRamp, State};
 use super::validate;
 use crate::config::{Config, Gains, Role};
-use crate::impedance::Task;
-use crate::linalg::Cholesky;
+use crate::law::impedance::Task;
+use crate::math::linalg::Cholesky;
 use crate::math::{Matrix3, Vector, abs, sqrt};
 use crate::trajectory::{
-    Beyond, Fourier, MINIMUM_JERK_ACCELERATION, MINIMUM_JERK_JERK, MINIMUM_JERK_SPEED, Trajectory,
+    Fourier, LimitViolation, MINIMUM_JERK_ACCELERATION, MINIMUM_JERK_JERK, MINIMUM_JERK_SPEED,
+    Trajectory,
 };
 
 /// Angle by which the target of a held joint may differ from its own \[rad\].
 const HELD_TOLERANCE_RAD: f64 = 1e-6;
-/// Greatest distance of a joint from the start of an excitation \[rad\].
+/// Maximum distance of a joint from the start of an excitation \[rad\].
 const EXCITE_START_RAD: f64 = 0.02;
 /// Longest ramp of gains \[s\].
-const LONGEST_RAMP_S: f64 = 3600.0;
-/// A damping acts on what is a delay old: with `B delay / mass` at most this, half of what would make it ring up,
-/// it takes energy.
+const MAX_RAMP_S: f64 = 3600.0;
+/// Stability margin for damping with a delayed velocity: `B delay / mass` must not exceed this,
+/// half of the stability limit pi/2.
 const DAMPING_MARGIN: f64 = core::f64::consts::FRAC_PI_4;
 
 impl<const N: usize> State<N> {
-    /// Carries out a request, or says why not.
+    /// Carries out a request, or returns why it is refused.
     pub(super) fn request(
         &mut self,
         controller: &Controller<N>,
@@ -37,7 +38,7 @@ impl<const N: usize> State<N> {
     ) -> Result<(), Refusal> {
         let config = controller.config();
         let mode = self.mode();
-        let working = !matches!(mode, Mode::Idle | Mode::Fault);
+        let has_torque = !matches!(mode, Mode::Idle | Mode::Fault);
         match *request {
             Request::Reset => {
                 let Activity::Fault(action) = self.activity else {
@@ -54,12 +55,12 @@ impl<const N: usize> State<N> {
                 self.check_damping(controller, task, &gains)?;
                 self.set_gains(gains, ramp_s);
             }
-            // The fault stays latched, but nobody has to reset it to let go of the arm.
+            // Idle is allowed in a fault without a reset; the fault stays latched.
             Request::Idle if mode == Mode::Fault => self.enter(Activity::Fault(SafeAction::Idle)),
             _ if mode == Mode::Fault => return Err(Refusal::Mode { mode }),
             Request::Idle => self.enter(Activity::Idle),
             Request::GravityHold => self.enter(Activity::GravityHold),
-            _ if !working => return Err(Refusal::Mode { mode }),
+            _ if !has_torque => return Err(Refusal::Mode { mode }),
             _ if !self.drives_active => return Err(Refusal::DrivesIdle),
             Request::Move {
                 target_rad,
@@ -76,8 +77,12 @@ impl<const N: usize> State<N> {
                 trajectory.validate().map_err(Refusal::Trajectory)?;
                 check_peak(config, &trajectory)?;
                 self.check_damping(controller, task, &self.gains.to)?;
-                let way = trajectory.at(0.0).position - self.terms.base_from_tip.translation;
-                let (distance_m, limit_m) = (sqrt(way.dot(&way)), config.limits.start_error_m);
+                let displacement =
+                    trajectory.at(0.0).position - self.terms.base_from_tip.translation;
+                let (distance_m, limit_m) = (
+                    sqrt(displacement.dot(&displacement)),
+                    config.limits.start_error_m,
+                );
                 if distance_m > limit_m || distance_m.is_nan() {
                     return Err(Refusal::FarFromStart {
                         distance_m,
@@ -101,14 +106,14 @@ impl<const N: usize> State<N> {
 
     fn set_gains(&mut self, gains: Gains, ramp_s: f64) {
         self.gains = GainRamp {
-            from: self.gains.now(),
+            from: self.gains.current(),
             to: gains,
             elapsed_s: 0.0,
             ramp_s,
         };
     }
 
-    /// Refuses damping that would excite the arm through the delay of the loop, at the pose that it is in.
+    /// Refuses damping that would excite the arm at its current pose because of the loop delay.
     fn check_damping(
         &self,
         controller: &Controller<N>,
@@ -123,13 +128,13 @@ impl<const N: usize> State<N> {
         };
         let mobility = task.jacobian * mass.solve(&task.jacobian.transpose());
         let root = Matrix3::from_diagonal(&gains.damping_n_s_per_m.map(sqrt));
-        // No less than the fastest rate at which the damping takes velocity away, and no more than sqrt(3) of it.
+        // Upper bound of the fastest damping rate, at most sqrt(3) times too large.
         let rate_per_s = sqrt((root * mobility * root).norm_squared());
         let share = rate_per_s * controller.delay_s() / DAMPING_MARGIN;
         if share > 1.0 {
             let value = gains.damping_n_s_per_m.max();
             let limit = value / share;
-            let entry = "damping_n_s_per_m with the delay of this loop";
+            let entry = "damping_n_s_per_m at the delay of this loop";
             return Err(Refusal::Value {
                 entry,
                 value,
@@ -157,13 +162,13 @@ fn check_gains<const N: usize>(
             },
         },
     )?;
-    if (0.0..=LONGEST_RAMP_S).contains(&ramp_s) {
+    if (0.0..=MAX_RAMP_S).contains(&ramp_s) {
         return Ok(());
     }
     Err(Refusal::Value {
         entry: "ramp_s",
         value: ramp_s,
-        limit: if ramp_s > 0.0 { LONGEST_RAMP_S } else { 0.0 },
+        limit: if ramp_s > 0.0 { MAX_RAMP_S } else { 0.0 },
     })
 }
 
@@ -171,12 +176,12 @@ fn check_peak<const N: usize>(config: &Config<N>, trajectory: &Trajectory) -> Re
     let (speed, acceleration) = trajectory.peaks();
     for (entry, value, limit) in [
         (
-            "greatest speed of the trajectory [m/s]",
+            "peak speed of the trajectory [m/s]",
             speed,
             config.limits.tip_speed_m_per_s,
         ),
         (
-            "greatest acceleration of the trajectory [m/s^2]",
+            "peak acceleration of the trajectory [m/s^2]",
             acceleration,
             config.limits.tip_acceleration_m_per_s2,
         ),
@@ -200,9 +205,11 @@ fn check_excitation<const N: usize>(
     series.validate().map_err(Refusal::Trajectory)?;
     series
         .within(&config.limits)
-        .map_err(|beyond| match beyond {
-            Beyond::Position(joint, value_rad) => Refusal::Unreachable { joint, value_rad },
-            Beyond::Speed(joint, value_rad_per_s, limit_rad_per_s) => Refusal::TooFast {
+        .map_err(|violation| match violation {
+            LimitViolation::Position(joint, value_rad) => {
+                Refusal::BeyondJointStop { joint, value_rad }
+            }
+            LimitViolation::Speed(joint, value_rad_per_s, limit_rad_per_s) => Refusal::TooFast {
                 joint,
                 value_rad_per_s,
                 limit_rad_per_s,
@@ -268,7 +275,7 @@ fn check_move<const N: usize>(
             limits.position_upper_rad[joint],
         );
         if !(lower..=upper).contains(&value_rad) {
-            return Err(Refusal::Unreachable { joint, value_rad });
+            return Err(Refusal::BeyondJointStop { joint, value_rad });
         }
         if let Role::Held { position_rad, .. } = config.roles[joint]
             && abs(value_rad - position_rad) > HELD_TOLERANCE_RAD
@@ -288,16 +295,16 @@ fn check_move<const N: usize>(
                 limit_rad_per_s,
             });
         }
-        let way_rad = abs(value_rad - from_rad[joint]);
-        let per_s2 = way_rad / (duration_s * duration_s);
+        let displacement_rad = abs(value_rad - from_rad[joint]);
+        let per_s2 = displacement_rad / (duration_s * duration_s);
         for (entry, value, limit) in [
             (
-                "greatest joint acceleration of the move [rad/s^2]",
+                "peak joint acceleration of the move [rad/s^2]",
                 MINIMUM_JERK_ACCELERATION * per_s2,
                 limits.joint_acceleration_rad_per_s2[joint],
             ),
             (
-                "greatest joint jerk of the move [rad/s^3]",
+                "peak joint jerk of the move [rad/s^3]",
                 MINIMUM_JERK_JERK * per_s2 / duration_s,
                 limits.joint_jerk_rad_per_s3[joint],
             ),

@@ -1,4 +1,4 @@
-//! What a controller remembers from cycle to cycle.
+//! State of a controller between cycles.
 
 use super::Controller;
 use super::activity::Activity;
@@ -7,20 +7,20 @@ use super::mode::Mode;
 use super::output::Input;
 use super::plausibility::Plausibility;
 use crate::config::{Config, Gains, Role};
+use crate::controller::estimator::Estimator;
+use crate::controller::latch::Latch;
+use crate::controller::observer::MomentumObserver;
 use crate::dynamics::Terms;
-use crate::estimator::Estimator;
-use crate::latch::Latch;
 use crate::math::{Vector, abs, all_finite};
-use crate::observer::MomentumObserver;
 
 /// Speed at which the set-point of a held joint approaches its angle \[rad/s\].
 const HELD_APPROACH_RAD_PER_S: f64 = 0.25;
 
-/// An angle is believed within this many times the joint's speed limit of where it is expected: far beyond
-/// what a joint can do in a cycle, far below what a corrupted reply shows.
+/// Plausible deviation of an angle from its prediction, as a multiple of the joint's speed limit:
+/// far above what a joint can move in a cycle, far below the error of a corrupted reply.
 const JUMP_OVER_SPEED_LIMIT: f64 = 20.0;
 
-/// Gains on their way from one value to another.
+/// Linear transition between two sets of gains.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct GainRamp {
     pub from: Gains,
@@ -30,7 +30,7 @@ pub(super) struct GainRamp {
 }
 
 impl GainRamp {
-    pub fn now(&self) -> Gains {
+    pub fn current(&self) -> Gains {
         if self.elapsed_s >= self.ramp_s {
             return self.to;
         }
@@ -48,14 +48,15 @@ impl GainRamp {
     }
 }
 
-/// Everything that changes. [`State::new`] is idle and has seen nothing.
+/// The complete variable state of a controller. [`State::new`] is idle and has received no arm
+/// state.
 #[derive(Clone, Copy, Debug)]
 pub struct State<const N: usize> {
     pub(super) activity: Activity<N>,
     pub(super) activity_start: u64,
-    /// Number of the last state seen, once there was one.
+    /// Cycle number of the last arm state; `None` before the first.
     pub(super) cycle: Option<u64>,
-    /// Cycles since then without a new one.
+    /// Cycles since then without a new state.
     pub(super) stale: u32,
     /// Consecutive lost replies of each encoder.
     pub(super) missing: [u32; N],
@@ -65,8 +66,8 @@ pub struct State<const N: usize> {
     pub(super) latch: Latch,
     pub(super) gains: GainRamp,
     /// Set-points of held joints.
-    pub(super) held: Vector<N>,
-    /// Last torque and fallback that went out.
+    pub(super) held_setpoint_rad: Vector<N>,
+    /// Last torque and fallback torque sent.
     pub(super) torque: Vector<N>,
     pub(super) fallback: Vector<N>,
     /// Torque to blend out after a change of activity; `pending` until it is known.
@@ -74,17 +75,17 @@ pub struct State<const N: usize> {
     pub(super) handover_pending: bool,
     pub(super) fault: Option<Fault>,
     pub(super) terms: Terms<N>,
-    /// The motors carry out torques.
+    /// The motors apply torques.
     pub(super) drives_active: bool,
     pub(super) plausibility: Plausibility<N>,
-    /// Greatest kinetic energy of late; in a fault, before it \[J\].
-    pub(super) energy_j: f64,
-    /// How long, in a fault, a torque has acted that nothing explains \[s\].
+    /// Recent peak of the kinetic energy, with decay; in a fault the peak before it \[J\].
+    pub(super) peak_energy_j: f64,
+    /// Time for which an unexplained torque has acted in a fault \[s\].
     pub(super) unexplained_s: f64,
 }
 
 impl<const N: usize> State<N> {
-    /// Idle, before the first cycle.
+    /// Idle state before the first cycle.
     pub fn new(controller: &Controller<N>) -> Self {
         let gains = controller.config().law.gains;
         State {
@@ -103,7 +104,7 @@ impl<const N: usize> State<N> {
                 elapsed_s: 0.0,
                 ramp_s: 0.0,
             },
-            held: Vector::zeros(),
+            held_setpoint_rad: Vector::zeros(),
             torque: Vector::zeros(),
             fallback: Vector::zeros(),
             handover: Vector::zeros(),
@@ -112,12 +113,12 @@ impl<const N: usize> State<N> {
             terms: Terms::default(),
             drives_active: false,
             plausibility: Plausibility::default(),
-            energy_j: 0.0,
+            peak_energy_j: 0.0,
             unexplained_s: 0.0,
         }
     }
 
-    /// Mode in force.
+    /// Current mode.
     pub fn mode(&self) -> Mode {
         self.activity.mode()
     }
@@ -127,7 +128,7 @@ impl<const N: usize> State<N> {
         self.fault
     }
 
-    /// What is done about a fault now.
+    /// Current safe action, if in a fault.
     pub fn safe_action(&self) -> Option<SafeAction> {
         match self.activity {
             Activity::Fault(action) => Some(action),
@@ -135,12 +136,12 @@ impl<const N: usize> State<N> {
         }
     }
 
-    /// Takes in a state. Returns the time since the last one \[s\]; zero when it is the same again.
+    /// Receives a state. Returns the time since the last one \[s\]; zero if it is a repetition.
     pub(super) fn receive(&mut self, config: &Config<N>, input: &Input<N>) -> Result<f64, Fault> {
         let limit = config.limits.stale_cycles;
         let out_of_order = match self.cycle {
             Some(last) if input.cycle < last => {
-                // A peer that began again: start afresh from what it says, but not unnoticed.
+                // The plant was restarted: reinitialise from its state, but report a fault.
                 self.cycle = None;
                 let received = input.cycle;
                 Some(Fault::StateOutOfOrder { last, received })
@@ -174,7 +175,8 @@ impl<const N: usize> State<N> {
         force.map(|()| elapsed_s)
     }
 
-    /// Positions into the estimator. A single lost reply is coasted over, once there was a state.
+    /// Updates the estimator with the positions. After the first state, a single lost reply is
+    /// bridged by prediction.
     fn receive_positions(
         &mut self,
         config: &Config<N>,
@@ -222,10 +224,10 @@ impl<const N: usize> State<N> {
         Ok(())
     }
 
-    /// Latches a fault. The first one stays, but a worse safe action replaces a milder one, and an arm
-    /// without torque is not given any.
+    /// Latches a fault. The first fault is kept; the safe action can only change from gravity hold
+    /// to idle, and an arm without torque stays without torque.
     pub(super) fn latch_fault(&mut self, fault: Fault) {
-        let action = if self.activity.is_limp() {
+        let action = if self.activity.is_torque_off() {
             SafeAction::Idle
         } else {
             fault.safe_action()
@@ -243,12 +245,12 @@ impl<const N: usize> State<N> {
         }
     }
 
-    /// Starts an activity; the torque that is there will be blended out, unless there was none.
+    /// Starts an activity; the present torque, if any, will be blended out.
     pub(super) fn enter(&mut self, activity: Activity<N>) {
-        if self.holds_nothing() {
-            self.held = self.position;
+        if self.held_loops_inactive() {
+            self.held_setpoint_rad = self.position;
         }
-        self.handover_pending = !self.activity.is_limp() && !activity.is_limp();
+        self.handover_pending = !self.activity.is_torque_off() && !activity.is_torque_off();
         self.handover = Vector::zeros();
         self.activity = activity;
         self.activity_start = self.cycle.unwrap_or(0);
@@ -257,9 +259,9 @@ impl<const N: usize> State<N> {
         self.unexplained_s = 0.0;
     }
 
-    /// Where the drives take no torque, whatever was at work gives way to gravity hold; when they come back, it
-    /// begins anew, from the weight of the arm alone.
-    pub(super) fn follow_drives(&mut self, active: bool) {
+    /// While the drives are idle, every activity with torque is replaced by gravity hold; when they
+    /// become active again, gravity hold restarts from the gravity torque alone.
+    pub(super) fn update_drives(&mut self, active: bool) {
         let came_back = active && !self.drives_active;
         self.drives_active = active;
         match self.activity {
@@ -273,7 +275,8 @@ impl<const N: usize> State<N> {
             _ => {}
         }
         if !active {
-            // What is left of another activity's torque would be there at their return.
+            // Otherwise the remainder of another activity's torque would act when the drives become
+            // active again.
             self.handover = Vector::zeros();
         }
     }
@@ -284,26 +287,31 @@ impl<const N: usize> State<N> {
         cycles as f64 * config.period_s
     }
 
-    /// The state in hand is older than is tolerated: only gravity may still be computed from it.
+    /// Whether the last state is older than tolerated: then only gravity may still be computed from
+    /// it.
     pub(super) fn is_stale(&self, config: &Config<N>) -> bool {
         self.stale > config.limits.stale_cycles
     }
 
-    /// The loops of held joints do not act.
-    fn holds_nothing(&self) -> bool {
-        !self.drives_active || self.activity.is_limp() || self.activity.has_own_loops()
+    /// Whether the position loops of held joints are off.
+    fn held_loops_inactive(&self) -> bool {
+        let in_fault = matches!(self.activity, Activity::Fault(_));
+        let has_own = self.activity.has_joint_loops();
+        !self.drives_active || self.activity.is_torque_off() || has_own || in_fault
     }
 
-    /// Lets the set-points of held joints approach their angles; while nothing holds them they follow
-    /// the joints, so that taking hold is gentle wherever they are.
-    pub(super) fn advance_held(&mut self, config: &Config<N>, elapsed_s: f64) {
-        let free = self.holds_nothing();
+    /// Moves the set-points of held joints towards their configured angles at a limited speed.
+    /// While the loops are off, the set-points follow the joints, so that the loops engage without
+    /// a jump.
+    pub(super) fn update_held_setpoints(&mut self, config: &Config<N>, elapsed_s: f64) {
+        let free = self.held_loops_inactive();
         let step = HELD_APPROACH_RAD_PER_S * elapsed_s;
         for (joint, role) in config.roles.iter().enumerate() {
             if free {
-                self.held[joint] = self.position[joint];
+                self.held_setpoint_rad[joint] = self.position[joint];
             } else if let Role::Held { position_rad, .. } = role {
-                self.held[joint] += (position_rad - self.held[joint]).clamp(-step, step);
+                self.held_setpoint_rad[joint] +=
+                    (position_rad - self.held_setpoint_rad[joint]).clamp(-step, step);
             }
         }
     }

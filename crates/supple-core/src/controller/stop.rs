@@ -1,65 +1,68 @@
-//! The safe action: how motion is ended in a fault, and when that gives way to braking.
+//! The safe action: how a fault stops the motion, and when the drives brake instead.
 //!
 //! ```text
 //! tau = G - s p / t_s        p = H qd        0 <= s <= 1        t_s = 4 delay
 //! ```
 //!
-//! **It cannot excite the arm.** Its power `-s qd^T H qd / t_s` takes energy from any motion, as Coriolis torques
-//! have none; `s` scales all joints alike where a limit of joints or motors would cut, so that it stays so.
-//! Without delay every motion decays with the one time constant `t_s`, whatever the arm, its pose and its
-//! inertia. What is `d` old at the motors gives, for each of the arm's independent motions, `v' = -v(t - d) / t_s`,
-//! which decays without overshoot up to `d / t_s = 1/e` and is stable up to `pi/2`. With `delay` for `d`
-//! ([`super::Controller::delay_s`]: 3.5 cycles and the estimator's lag) it is at 1/4, so that the inertia may be
-//! wrong by half, or the delay, before there is overshoot, and by six before it rings up. A rate limit lags
-//! behind a torque that changes faster: this one changes by no more than the joint's limit in `t_s`, which is
-//! slower than what the safe action is allowed (the joint's limit in 5 ms), whatever the speed.
+//! **It cannot excite the arm.** Its power `-s qd^T H qd / t_s` takes energy from any motion, as
+//! Coriolis torques have zero power; if a joint or motor limit applies, `s` scales all joints
+//! alike, so that this remains true. Without delay every motion decays with the single time
+//! constant `t_s`, independent of the arm, its pose and its inertia. With a delay `d`, each of the
+//! arm's independent motions obeys `v' = -v(t - d) / t_s`, which decays without overshoot up to `d
+//! / t_s = 1/e` and is stable up to `pi/2`. With `delay` for `d` ([`super::Controller::delay_s`]:
+//! 3.5 cycles and the estimator's lag) the ratio is 1/4, so that an error of the inertia or of the
+//! delay by half is tolerated before there is overshoot, and by a factor of six before it is
+//! unstable. A rate limit lags behind a torque that changes faster: this one changes by no more
+//! than the joint's limit in `t_s`, which is slower than the rate limit of the safe action (the
+//! joint's limit in 5 ms) at any speed.
 //!
-//! **It gives way to braking** (no torque, drives that short their motors) where the arm does not come to rest:
-//! because an encoder, a motor or the model is not what it is taken for. Moving is faster than a fifth of a joint's
-//! or of the tip's speed limit. An arm that moves with more kinetic energy than it had before the fault, by a
-//! quarter, brakes from then on; an arm that still moves 0.2 s after the fault brakes too. So does one that bears,
-//! for 50 ms, an external torque of a tenth of a joint's limit, 0.15 s after the fault or at a joint whose encoder says
-//! the same angle again and again: it may be stuck.
+//! **Braking replaces it** (no torque, drives that short their motors) if the arm does not come to
+//! rest because of a defective encoder, a defective motor or a wrong model. "Moving" means faster
+//! than a fifth of the speed limit of a joint or of the tip. The drives brake if (1) the arm moves
+//! with over 1.25 times its kinetic energy before the fault; (2) the arm still moves 0.2 s after
+//! the fault; (3) an external torque above a tenth of a joint's limit acts for 50 ms, either later
+//! than 0.15 s after the fault or at a joint whose encoder is unchanged and may be stuck.
 
 use super::Controller;
 use super::activity::Activity;
+use super::checks::MOVING_SHARE;
 use super::fault::SafeAction;
 use super::state::State;
 use crate::config::Config;
-use crate::impedance::Torques;
+use crate::law::impedance::Torques;
 use crate::math::{Vector, Vector3, abs};
 
-/// `t_s` over the delay.
-const STOP_OVER_DELAY: f64 = 4.0;
-/// Time in which the velocity estimate arrives at a speed that came at once, over the delay.
-const SETTLES_OVER_DELAY: f64 = 2.0;
-/// Share of a speed limit above which a joint or the tip moves.
-pub(crate) const MOVING_SHARE: f64 = 0.2;
-/// Time after which nothing moves any more \[s\].
-pub(crate) const STOPPED_AFTER_S: f64 = 0.2;
-/// Kinetic energy over that before the fault from which the arm gathers speed.
-pub(crate) const GATHERS: f64 = 1.25;
-/// Share of a joint's torque limit that does not go unnoticed by a joint that stands still.
+/// Time constant `t_s` as a multiple of the delay.
+const STOP_TIME_CONSTANT_DELAYS: f64 = 4.0;
+/// Settling time of the velocity estimate after a step in speed, as a multiple of the delay.
+const ESTIMATOR_SETTLING_DELAYS: f64 = 2.0;
+/// Time within which the arm must come to rest \[s\].
+pub(crate) const STOP_TIMEOUT_S: f64 = 0.2;
+/// Ratio to the kinetic energy before the fault above which the arm counts as accelerating.
+pub(crate) const ENERGY_GROWTH_LIMIT: f64 = 1.25;
+/// Fraction of a joint's torque limit above which an external torque would move a joint at rest.
 const UNEXPLAINED_SHARE: f64 = 0.1;
-/// Time for which such a torque may act, or such a joint be still \[s\].
+/// Time for which such a torque may act \[s\].
 const UNEXPLAINED_S: f64 = 0.05;
-/// Time after which an impact, and what the observer makes of it, is over \[s\].
+/// Time after which an impact and the observer's response to it have decayed \[s\].
 const IMPACT_S: f64 = 0.15;
-/// Time in which the motion that the arm had is forgotten \[s\].
-const MEMORY_S: f64 = 0.2;
+/// Decay time of the peak kinetic energy \[s\].
+const ENERGY_PEAK_DECAY_S: f64 = 0.2;
 
 impl<const N: usize> State<N> {
-    /// Gravity, and what takes the momentum away within the limits.
+    /// Gravity compensation and damping of the momentum within the limits.
     pub(super) fn stopping(&self, controller: &Controller<N>) -> Torques<N> {
         let limits = &controller.config().limits;
         let gravity = self.terms.gravity;
-        let damping = self.terms.momentum / (-STOP_OVER_DELAY * controller.delay_s());
+        let damping = self.terms.momentum / (-STOP_TIME_CONSTANT_DELAYS * controller.delay_s());
         let motors = controller.motors();
-        let share = within(&limits.joint_torque_nm, &gravity, &damping).min(within(
-            &limits.motor_torque_nm,
-            &motors.motor_torque_nm(&gravity),
-            &motors.motor_torque_nm(&damping),
-        ));
+        let share = fraction_within_limit(&limits.joint_torque_nm, &gravity, &damping).min(
+            fraction_within_limit(
+                &limits.motor_torque_nm,
+                &motors.motor_torque_nm(&gravity),
+                &motors.motor_torque_nm(&damping),
+            ),
+        );
         Torques {
             gravity,
             damping: damping * share,
@@ -67,8 +70,9 @@ impl<const N: usize> State<N> {
         }
     }
 
-    /// Remembers how much the arm moved of late, and in a fault goes on to braking where it does not stop.
-    pub(super) fn watch_the_stop(
+    /// Tracks the recent peak of kinetic energy; in a fault switches to braking if the arm does not
+    /// stop.
+    pub(super) fn supervise_stop(
         &mut self,
         controller: &Controller<N>,
         tip_velocity: &Vector3<f64>,
@@ -78,13 +82,13 @@ impl<const N: usize> State<N> {
         let energy_j = 0.5 * self.terms.momentum.dot(velocity);
         let config = controller.config();
         if !matches!(self.activity, Activity::Fault(SafeAction::GravityHold)) {
-            let kept = (1.0 - elapsed_s / MEMORY_S).max(0.0);
-            self.energy_j = energy_j.max(self.energy_j * kept);
+            let kept = (1.0 - elapsed_s / ENERGY_PEAK_DECAY_S).max(0.0);
+            self.peak_energy_j = energy_j.max(self.peak_energy_j * kept);
             return;
         }
-        if self.activity_s(config) <= SETTLES_OVER_DELAY * controller.delay_s() {
-            // The estimate has yet to arrive at the speed at which the fault came.
-            self.energy_j = energy_j.max(self.energy_j);
+        if self.activity_s(config) <= ESTIMATOR_SETTLING_DELAYS * controller.delay_s() {
+            // The velocity estimate has not yet settled to the speed at the time of the fault.
+            self.peak_energy_j = energy_j.max(self.peak_energy_j);
             return;
         }
         let limits = &config.limits;
@@ -94,42 +98,48 @@ impl<const N: usize> State<N> {
             moving |= abs(velocity[joint]) > MOVING_SHARE * limits.joint_speed_rad_per_s[joint];
         }
         let time_s = self.activity_s(config);
-        let late = time_s > STOPPED_AFTER_S;
-        let gathers = energy_j > GATHERS * self.energy_j;
-        self.unexplained_s = if self.is_unexplained(config) {
+        let late = time_s > STOP_TIMEOUT_S;
+        let accelerates = energy_j > ENERGY_GROWTH_LIMIT * self.peak_energy_j;
+        self.unexplained_s = if self.has_unexplained_torque(config) {
             self.unexplained_s + elapsed_s
         } else {
             0.0
         };
-        if moving && (late || gathers) || self.unexplained_s > UNEXPLAINED_S {
+        if moving && (late || accelerates) || self.unexplained_s > UNEXPLAINED_S {
             self.activity = Activity::Fault(SafeAction::Idle);
         }
     }
 
-    /// A joint whose encoder says the same angle again bears a torque that would move it; or any joint bears such a
-    /// torque when an impact is long over.
-    fn is_unexplained(&self, config: &Config<N>) -> bool {
+    /// Whether an external torque acts that should move the arm: on a joint with an unchanged
+    /// encoder, or on any joint after an impact has decayed.
+    fn has_unexplained_torque(&self, config: &Config<N>) -> bool {
         let external_nm = self.observer.external_torque_nm();
         let limits = &config.limits;
         let settled = self.activity_s(config) > IMPACT_S;
         (0..N).any(|joint| {
             let torque_nm = abs(external_nm[joint]);
             let strong = UNEXPLAINED_SHARE * limits.joint_torque_nm[joint];
-            torque_nm > strong && (settled || self.plausibility.stands_still(joint))
+            torque_nm > strong && (settled || self.plausibility.encoder_unchanged(joint))
         })
     }
 }
 
-/// Greatest share of `more` that stays within `limit` on top of `base`, 0 to 1.
-fn within<const N: usize>(limit: &Vector<N>, base: &Vector<N>, more: &Vector<N>) -> f64 {
+/// Largest fraction of `more`, 0 to 1, that keeps `base` plus this fraction within `limit`.
+fn fraction_within_limit<const N: usize>(
+    limit: &Vector<N>,
+    base: &Vector<N>,
+    more: &Vector<N>,
+) -> f64 {
     (0..N).fold(1.0_f64, |share, i| {
-        let room = if more[i] > 0.0 {
+        let margin = if more[i] > 0.0 {
             limit[i] - base[i]
         } else {
             limit[i] + base[i]
         };
-        if abs(more[i]) > room {
-            share.min((room / abs(more[i])).max(0.0))
+        // If `base` alone exceeds the limit of a joint, skip it here: the limiter reduces that
+        // joint, and the other joints keep their full damping.
+        if margin > 0.0 && abs(more[i]) > margin {
+            share.min(margin / abs(more[i]))
         } else {
             share
         }

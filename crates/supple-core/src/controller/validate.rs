@@ -1,21 +1,21 @@
-//! What a configuration must satisfy.
+//! Validation of a configuration.
 
 use crate::config::{ApparentInertia, Config, Gains, Role};
-use crate::friction::FrictionError;
-use crate::linalg::Cholesky;
+use crate::math::linalg::Cholesky;
 use crate::math::{Matrix, Vector};
+use crate::model::friction::FrictionError;
 use core::fmt;
 
-/// Which entry of a configuration is wrong. Joints are counted from 0.
+/// The invalid entry of a configuration. Joints are counted from 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConfigError {
     /// Name of the entry.
     pub entry: &'static str,
-    /// Joint index, where the entry has one value a joint.
+    /// Joint index, if the entry has one value per joint.
     pub joint: Option<usize>,
     /// Value found.
     pub value: f64,
-    /// What it must be.
+    /// Requirement.
     pub must: &'static str,
 }
 
@@ -78,10 +78,10 @@ fn check(
 fn each<const N: usize>(
     entry: &'static str,
     values: &Vector<N>,
-    least_is_zero: bool,
+    zero_allowed: bool,
 ) -> Result<(), ConfigError> {
     for (joint, value) in values.iter().enumerate() {
-        let result = if least_is_zero {
+        let result = if zero_allowed {
             not_negative(entry, *value)
         } else {
             positive(entry, *value)
@@ -135,7 +135,7 @@ pub(super) fn validate<const N: usize>(config: &Config<N>) -> Result<(), ConfigE
     roles(config)?;
     let square = config.joint_from_motor * config.joint_from_motor.transpose();
     let scale = square.trace() / N as f64;
-    // Where rounding leaves a matrix without an inverse with one.
+    // The shift rejects a matrix that is singular but for rounding.
     let shift = Matrix::from_diagonal_element(1e-12);
     check(
         scale.is_finite() && Cholesky::new(&(square / scale - shift)).is_some(),
@@ -245,7 +245,7 @@ pub(super) fn validate<const N: usize>(config: &Config<N>) -> Result<(), ConfigE
         collision.move_share,
         "above 0, at most 1",
     )?;
-    if let Some((entry, value, must)) = config.workspace.unsound() {
+    if let Some((entry, value, must)) = config.workspace.first_invalid() {
         return check(false, entry, None, value, must);
     }
     positive("tracking_error_m", limits.tracking_error_m)?;

@@ -1,16 +1,16 @@
-//! Articulated bodies: forward dynamics.
+//! Forward dynamics by the articulated-body algorithm.
 #![allow(
     clippy::needless_range_loop,
     reason = "joints, groups and lanes are counted: each index goes into several arrays"
 )]
 
 use super::chain::parent_rotations;
-use crate::arm::Arm;
-use crate::lanes::{Number, in_groups, of_joint};
 use crate::math::Vector;
-use crate::vec3::{
+use crate::math::lanes::{Number, in_groups, joint_values};
+use crate::math::vec3::{
     V3, add, add_cross, add_rotated, add_scaled, cross, dot, rotate, rotate_back, scale,
 };
+use crate::model::arm::Arm;
 
 /// Symmetric 3 x 3 matrix `xx, xy, yy, xz, yz, zz`.
 type Symmetric = [f64; 6];
@@ -26,26 +26,26 @@ struct Articulated {
     force: V3,
 }
 
-/// What is left of a joint for the way out.
+/// Per-joint results of the inward sweep that the outward sweep needs.
 #[derive(Clone, Copy)]
-struct Hinge {
-    /// Velocity-dependent part of the acceleration, beside what the parent passes on.
+struct AbaJoint {
+    /// Velocity-dependent acceleration added to that of the parent.
     bias_alpha: V3,
     bias_accel: V3,
     u_moment: V3,
     u_force: V3,
     inverse_d: f64,
-    drive: f64,
+    net_torque: f64,
 }
 
-impl Hinge {
-    const NONE: Hinge = Hinge {
+impl AbaJoint {
+    const NONE: AbaJoint = AbaJoint {
         bias_alpha: [0.0; 3],
         bias_accel: [0.0; 3],
         u_moment: [0.0; 3],
         u_force: [0.0; 3],
         inverse_d: 0.0,
-        drive: 0.0,
+        net_torque: 0.0,
     };
 }
 
@@ -71,22 +71,29 @@ fn forward_dynamics<const N: usize, const G: usize>(
 ) -> Vector<N> {
     let rotations = parent_rotations::<N, G>(arm, q);
     let origin = |i: usize| arm.links[i].parent_from_joint.translation.data.0[0];
-    let mut hinges = [Hinge::NONE; N];
-    let mut spins = [[0.0; 3]; N];
-    let mut spin = [0.0; 3];
+    let mut hinges = [AbaJoint::NONE; N];
+    let mut angular_velocities = [[0.0; 3]; N];
+    let mut angular_velocity = [0.0; 3];
     for i in 0..N {
-        let r = of_joint(&rotations, i);
+        let r = joint_values(&rotations, i);
         if i > 0 {
-            hinges[i].bias_accel = rotate_back(&r, cross(spin, cross(spin, origin(i))));
-            spin = rotate_back(&r, spin);
-            hinges[i].bias_alpha = [spin[1] * qd[i], -spin[0] * qd[i], 0.0];
+            hinges[i].bias_accel = rotate_back(
+                &r,
+                cross(angular_velocity, cross(angular_velocity, origin(i))),
+            );
+            angular_velocity = rotate_back(&r, angular_velocity);
+            hinges[i].bias_alpha = [
+                angular_velocity[1] * qd[i],
+                -angular_velocity[0] * qd[i],
+                0.0,
+            ];
         }
-        spin[2] += qd[i];
-        spins[i] = spin;
+        angular_velocity[2] += qd[i];
+        angular_velocities[i] = angular_velocity;
     }
     let mut carried: Option<Articulated> = None;
     for i in (0..N).rev() {
-        let mut body = link(arm, i, spins[i]);
+        let mut body = link(arm, i, angular_velocities[i]);
         if let Some(carried) = &carried {
             body.add(carried);
         }
@@ -94,32 +101,32 @@ fn forward_dynamics<const N: usize, const G: usize>(
         hinge.u_moment = [body.a[3], body.a[4], body.a[5]];
         hinge.u_force = [body.b[2], body.b[5], body.b[8]];
         hinge.inverse_d = 1.0 / (hinge.u_moment[2] + arm.armature[i]);
-        hinge.drive = tau[i] - body.moment[2];
+        hinge.net_torque = tau[i] - body.moment[2];
         if i > 0 {
-            body.release(hinge);
-            carried = Some(body.in_parent(&of_joint(&rotations, i), origin(i)));
+            body.project(hinge);
+            carried = Some(body.in_parent(&joint_values(&rotations, i), origin(i)));
         }
     }
     let mut qdd = Vector::zeros();
     let mut alpha = [0.0; 3];
     let mut accel = arm.gravity.map(|g| -g).data.0[0];
     for i in 0..N {
-        let (hinge, r) = (&hinges[i], of_joint(&rotations, i));
+        let (hinge, r) = (&hinges[i], joint_values(&rotations, i));
         if i > 0 {
             accel = add_cross(accel, alpha, origin(i));
         }
         accel = add(rotate_back(&r, accel), hinge.bias_accel);
         alpha = add(rotate_back(&r, alpha), hinge.bias_alpha);
-        qdd[i] = (hinge.drive - dot(hinge.u_moment, alpha) - dot(hinge.u_force, accel))
+        qdd[i] = (hinge.net_torque - dot(hinge.u_moment, alpha) - dot(hinge.u_force, accel))
             * hinge.inverse_d;
         alpha[2] += qdd[i];
     }
     qdd
 }
 
-/// Link `i` alone.
+/// Articulated body of link `i` alone.
 #[inline(always)]
-fn link<const N: usize>(arm: &Arm<N>, i: usize, spin: V3) -> Articulated {
+fn link<const N: usize>(arm: &Arm<N>, i: usize, angular_velocity: V3) -> Articulated {
     let body = |k: usize| arm.rows.body(k, i);
     let (mass, h) = (body(0), [body(1), body(2), body(3)]);
     let a = core::array::from_fn(|k| body(4 + k));
@@ -127,8 +134,8 @@ fn link<const N: usize>(arm: &Arm<N>, i: usize, spin: V3) -> Articulated {
         a,
         b: [0.0, h[2], -h[1], -h[2], 0.0, h[0], h[1], -h[0], 0.0],
         c: [mass, 0.0, mass, 0.0, 0.0, mass],
-        moment: cross(spin, times(&a, spin)),
-        force: cross(spin, cross(spin, h)),
+        moment: cross(angular_velocity, times(&a, angular_velocity)),
+        force: cross(angular_velocity, cross(angular_velocity, h)),
     }
 }
 
@@ -143,7 +150,7 @@ fn times(m: &Symmetric, v: V3) -> V3 {
 
 /// `R M R^T`.
 #[inline(always)]
-fn turned(r: &[f64; 9], m: &Symmetric) -> Symmetric {
+fn rotated(r: &[f64; 9], m: &Symmetric) -> Symmetric {
     let (x, y, z) = (
         rotate(r, [m[0], m[1], m[3]]),
         rotate(r, [m[1], m[2], m[4]]),
@@ -177,33 +184,35 @@ impl Articulated {
         self.force = add(self.force, other.force);
     }
 
-    /// What the joint's parent feels: the joint itself gives way.
+    /// Articulated inertia and bias force as seen by the parent: projects out the joint's free
+    /// direction.
     #[inline(always)]
-    fn release(&mut self, hinge: &Hinge) {
+    fn project(&mut self, hinge: &AbaJoint) {
         let (um, uf) = (hinge.u_moment, hinge.u_force);
         let (dm, df) = (scale(um, hinge.inverse_d), scale(uf, hinge.inverse_d));
         for (k, (i, j)) in ENTRIES.into_iter().enumerate() {
-            self.a[k] = (-um[i]).times_plus(dm[j], self.a[k]);
-            self.c[k] = (-uf[i]).times_plus(df[j], self.c[k]);
+            self.a[k] = (-um[i]).multiply_add(dm[j], self.a[k]);
+            self.c[k] = (-uf[i]).multiply_add(df[j], self.c[k]);
         }
         for k in 0..9 {
-            self.b[k] = (-um[k % 3]).times_plus(df[k / 3], self.b[k]);
+            self.b[k] = (-um[k % 3]).multiply_add(df[k / 3], self.b[k]);
         }
         let (alpha, accel) = (hinge.bias_alpha, hinge.bias_accel);
         let moment = add_rotated(times(&self.a, alpha), &self.b, accel);
         let force = add(rotate_back(&self.b, alpha), times(&self.c, accel));
-        self.moment = add(self.moment, add_scaled(moment, dm, hinge.drive));
-        self.force = add(self.force, add_scaled(force, df, hinge.drive));
+        self.moment = add(self.moment, add_scaled(moment, dm, hinge.net_torque));
+        self.force = add(self.force, add_scaled(force, df, hinge.net_torque));
     }
 
-    /// Seen from the parent's joint frame, in which this one stands at `p`, turned by `r`.
+    /// Expressed in the parent's joint frame; `p` and `r` are this frame's position and rotation in
+    /// it.
     #[inline(always)]
     fn in_parent(&self, r: &[f64; 9], p: V3) -> Articulated {
-        let (a, c) = (turned(r, &self.a), turned(r, &self.c));
-        let half = crate::vec3::product(r, &self.b);
-        let b = crate::vec3::product(&half, &crate::vec3::transposed(r));
+        let (a, c) = (rotated(r, &self.a), rotated(r, &self.c));
+        let half = crate::math::vec3::product(r, &self.b);
+        let b = crate::math::vec3::product(&half, &crate::math::vec3::transposed(r));
         // With P = [p x]: B' = B + P C and A' = A - B' P - (B P)^T.
-        let shifted = crate::vec3::join3(
+        let shifted = crate::math::vec3::join3(
             add_cross([b[0], b[1], b[2]], p, [c[0], c[1], c[3]]),
             add_cross([b[3], b[4], b[5]], p, [c[1], c[2], c[4]]),
             add_cross([b[6], b[7], b[8]], p, [c[3], c[4], c[5]]),

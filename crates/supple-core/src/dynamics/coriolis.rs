@@ -6,8 +6,8 @@
 //! here are angular first.
 
 use super::{parent_rotations, rnea};
-use crate::arm::Arm;
 use crate::math::{Matrix, Matrix3, Vector, Vector3, skew};
+use crate::model::arm::Arm;
 
 /// `C(q, qd) qd` \[N m\]: inverse dynamics at `qdd = 0` without gravity.
 pub fn coriolis<const N: usize>(arm: &Arm<N>, q: &Vector<N>, qd: &Vector<N>) -> Vector<N> {

@@ -1,5 +1,5 @@
-//! The mass matrix by composite rigid bodies, `H_ij = S_i . I_j S_j` with `I_j` all that joint `j` carries; of up to
-//! three joints link by link.
+//! Mass matrix by the composite-rigid-body algorithm, `H_ij = S_i . I_j S_j` with `I_j` the inertia
+//! of all that joint `j` carries; for up to three joints link by link.
 #![allow(
     clippy::needless_range_loop,
     reason = "joints, groups and lanes are counted: each index goes into several arrays"
@@ -7,14 +7,14 @@
 
 use super::chain::Chain;
 use super::frames::{bodies, joint_motions};
-use super::inertia::{spun, times};
-use crate::arm::Arm;
-use crate::lanes::{
-    Columns, LANES, Lanes, Rows, entry, for_each_joint, in_groups, of_group, of_joint,
-    of_joint_for_all, splat, sums_inward,
+use super::inertia::{inertia_times, times};
+use crate::math::lanes::{
+    Columns, LANES, Lanes, Rows, broadcast_joint, entry, for_each_joint, in_groups, joint_values,
+    load_group, splat, suffix_sums,
 };
+use crate::math::vec3::{add, cross, dot, dot6, rotate, rotate_back, scale, sub};
 use crate::math::{Matrix, Vector};
-use crate::vec3::{add, cross, dot, dot6, rotate, rotate_back, scale, sub};
+use crate::model::arm::Arm;
 
 /// Mass matrix `H(q)`, symmetric, rotor inertias on the diagonal \[kg m^2\]. `q` \[rad\].
 #[inline]
@@ -28,54 +28,58 @@ pub fn crba<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> Matrix<N, N> {
 #[inline]
 fn of_position<const N: usize, const G: usize>(arm: &Arm<N>, q: &Vector<N>) -> Matrix<N, N> {
     let chain = Chain::<G>::new(arm, q);
-    let last = of_joint(&chain.origins, N - 1);
-    let carried = sums_inward(bodies(arm, &chain, last));
+    let last = joint_values(&chain.origins, N - 1);
+    let carried = suffix_sums(bodies(arm, &chain, last));
     symmetric(&mass_columns(arm, &joint_motions(&chain, last), &carried))
 }
 
-/// Of so few joints that each link's share of every entry is found at once,
-/// `H_ij = sum over k of m_k v_ik . v_jk + w_ik . I_k w_jk`: joint `i` alone, at unit rate, moves the centre of mass
-/// of link `k` at `v_ik` and turns the link at `w_ik`. `v` is in the axes of the first joint, `w` in the link's own.
+/// Mass matrix of up to three joints, with each link's contribution to every entry computed at
+/// once: `H_ij = sum over k of m_k v_ik . v_jk + w_ik . I_k w_jk`, with `v_ik` and `w_ik` the
+/// velocity of the centre of mass and the angular velocity of link `k` for unit speed of joint `i`
+/// alone. `v` is in the axes of the first joint, `w` in the link's own.
 #[inline]
 fn link_by_link<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> Matrix<N, N> {
     let chain = Chain::<1>::from_first_joint(arm, q);
-    let (r, origin) = (of_group(&chain.rotations, 0), of_group(&chain.origins, 0));
-    let [mass] = of_group(&arm.rows.masses::<1>(), 0);
-    let [cx, cy, cz, xx, xy, yy, xz, yz, zz] = of_group(&arm.rows.central::<1>(), 0);
+    let (r, origin) = (
+        load_group(&chain.rotations, 0),
+        load_group(&chain.origins, 0),
+    );
+    let [mass] = load_group(&arm.rows.masses::<1>(), 0);
+    let [cx, cy, cz, xx, xy, yy, xz, yz, zz] = load_group(&arm.rows.central::<1>(), 0);
     let lever = rotate(&r, [cx, cy, cz]);
     let com = add(origin, lever);
     let (mut v, mut w) = ([[Lanes::ZERO; 3]; N], [[Lanes::ZERO; 3]; N]);
     for joint in 0..N {
         let axis = match joint {
             0 => {
-                // About the z of these axes.
+                // The first joint rotates about the z axis of these axes.
                 (v[0], w[0]) = ([-com[1], com[0], Lanes::ZERO], [r[2], r[5], r[8]]);
                 continue;
             }
-            // It moves the last link alone, about that link's own z.
+            // The last joint moves the last link alone, about that link's z axis.
             last if last == N - 1 => {
                 v[last] = cross([r[6], r[7], r[8]], lever);
                 continue;
             }
             _ => splat(chain.frame(joint).axis()),
         };
-        v[joint] = cross(axis, sub(com, splat(of_joint(&chain.origins, joint))));
+        v[joint] = cross(axis, sub(com, splat(joint_values(&chain.origins, joint))));
         w[joint] = rotate_back(&r, axis);
     }
     let mut whole = Matrix::<N, N>::zeros();
     for j in 0..N {
         let momentum = scale(v[j], mass);
-        let spin = match j {
+        let angular_velocity = match j {
             last if last > 0 && last == N - 1 => [xz, yz, zz],
-            _ => spun([xx, xy, yy, xz, yz, zz], w[j]),
+            _ => inertia_times([xx, xy, yy, xz, yz, zz], w[j]),
         };
         for i in 0..=j {
             let turning = match i {
                 last if last > 0 && last == N - 1 => zz,
-                _ => dot(w[i], spin),
+                _ => dot(w[i], angular_velocity),
             };
             let shares = (dot(v[i], momentum) + turning).to_array();
-            // Joint `j` moves the links from its own on.
+            // Joint `j` moves its own link and those after it.
             let mut sum = shares[j];
             for link in j + 1..N {
                 sum += shares[link];
@@ -88,20 +92,22 @@ fn link_by_link<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> Matrix<N, N> {
     whole
 }
 
-/// From the joints' motions and what they carry, right from the diagonal downwards.
+/// Columns of the mass matrix from the joint motions and the carried bodies; valid from the
+/// diagonal downwards.
 #[inline(always)]
 pub(super) fn mass_columns<const N: usize, const G: usize>(
     arm: &Arm<N>,
     motions: &Rows<6, G>,
     carried: &Rows<10, G>,
 ) -> Columns<N, G> {
-    // The force is that of all a joint carries: right for itself and for the joints before it.
+    // The force is that of all the bodies that a joint carries: valid for this joint and those
+    // before it.
     let forces = for_each_joint!(axis in motions, body in carried => times(body, axis));
     let mut columns = [[Lanes::ZERO; G]; N];
     for j in 0..N {
-        let motion = of_joint_for_all(motions, j);
+        let motion = broadcast_joint(motions, j);
         for group in j / LANES..G {
-            columns[j][group] = dot6(motion, of_group(&forces, group));
+            columns[j][group] = dot6(motion, load_group(&forces, group));
         }
         let rotor = core::array::from_fn(|lane| {
             if lane == j % LANES {
@@ -115,7 +121,7 @@ pub(super) fn mass_columns<const N: usize, const G: usize>(
     columns
 }
 
-/// The whole of a symmetric matrix of which the lower triangle is known.
+/// Full symmetric matrix from its lower triangle.
 #[inline(always)]
 pub(super) fn symmetric<const N: usize, const G: usize>(columns: &Columns<N, G>) -> Matrix<N, N> {
     let mut whole = Matrix::<N, N>::zeros();

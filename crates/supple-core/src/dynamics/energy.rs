@@ -1,8 +1,8 @@
 //! Kinetic and potential energy.
 
 use super::{joint_poses, parent_rotations};
-use crate::arm::Arm;
 use crate::math::{Vector, Vector3};
+use crate::model::arm::Arm;
 
 /// Kinetic energy with the rotors, `qd^T H qd / 2` \[J\].
 pub fn kinetic_energy<const N: usize>(arm: &Arm<N>, q: &Vector<N>, qd: &Vector<N>) -> f64 {

@@ -1,17 +1,19 @@
-//! Joints and links in base axes about one point.
+//! Joint motions and links in base axes about one point.
 //!
-//! There neither velocities nor forces have to be turned on their way along the arm: they are sums. The point
-//! is the tip or the last joint, not the base, because the light bodies of the wrist are near it: about the base
-//! their inertias would vanish in their own distance.
+//! In base axes about one point, velocities and forces need no transformation along the chain: they
+//! are plain sums. The point is the tip or the last joint, not the base, because the light bodies
+//! of the wrist are near it: about the base their inertias would lose precision to the `m r^2` of
+//! their distance.
 
 use super::chain::Chain;
 use super::inertia::in_base;
-use crate::arm::Arm;
-use crate::lanes::{Rows, for_each_joint, of_joint, splat};
 use crate::math::Matrix;
-use crate::vec3::{V3, cross, join, sub};
+use crate::math::lanes::{Rows, for_each_joint, joint_values, splat};
+use crate::math::vec3::{V3, cross, join, sub};
+use crate::model::arm::Arm;
 
-/// What each joint's unit speed gives a point, linear then angular: of the tip, the Jacobian's columns.
+/// Velocity of a point for unit speed of each joint, linear then angular: for the tip, the columns
+/// of the Jacobian.
 #[inline(always)]
 pub(super) fn joint_motions<const G: usize>(chain: &Chain<G>, point: V3) -> Rows<6, G> {
     let point = splat(point);
@@ -42,7 +44,7 @@ pub(super) fn matrix<const K: usize, const N: usize, const G: usize>(
 ) -> Matrix<K, N> {
     let mut m = Matrix::zeros();
     for (i, column) in m.data.0.iter_mut().enumerate() {
-        *column = of_joint(rows, i);
+        *column = joint_values(rows, i);
     }
     m
 }

@@ -1,11 +1,11 @@
-//! Rigid bodies in base axes about one point, the same for all of them: adding two is adding their numbers.
+//! Rigid bodies in base axes about one common point: adding bodies is adding their parameters.
 //!
-//! Ten numbers: mass, first moment `h`, inertia about the point `xx, xy, yy, xz, yz, zz`. Motions and
-//! forces are pairs of vectors, linear before angular, of the body's point that is at the reference
-//! point now.
+//! Ten numbers: mass, first moment `h`, inertia about the point `xx, xy, yy, xz, yz, zz`. Motions
+//! and forces are pairs of vectors, linear before angular, of the body's point that coincides with
+//! the reference point.
 
-use crate::lanes::Number;
-use crate::vec3::{V3, add_cross, add_scaled, cross, dot, halves, join, rotate, scale};
+use crate::math::lanes::Number;
+use crate::math::vec3::{V3, add_cross, add_scaled, cross, dot, halves, join, rotate, scale};
 
 /// A body of a joint frame `rotation` (by columns), whose origin is at `r` from the reference point.
 #[inline(always)]
@@ -31,22 +31,22 @@ pub(super) fn in_base<T: Number>(body: [T; 10], rotation: &[T; 9], r: V3<T>) -> 
     let shifted = add_scaled(moment, r, mass);
     let two = T::splat(2.0);
     let product =
-        |i: usize, j: usize| (-r[i]).times_plus(s[j], (-r[j]).times_plus(s[i], row(i, j)));
+        |i: usize, j: usize| (-r[i]).multiply_add(s[j], (-r[j]).multiply_add(s[i], row(i, j)));
     [
         mass,
         shifted[0],
         shifted[1],
         shifted[2],
-        two.times_plus(y + z, row(0, 0)),
+        two.multiply_add(y + z, row(0, 0)),
         product(1, 0),
-        two.times_plus(x + z, row(1, 1)),
+        two.multiply_add(x + z, row(1, 1)),
         product(2, 0),
         product(2, 1),
-        two.times_plus(x + y, row(2, 2)),
+        two.multiply_add(x + y, row(2, 2)),
     ]
 }
 
-/// Momentum of the body under a velocity; force on it under an acceleration.
+/// Momentum of the body for a velocity, or force on it for an acceleration.
 #[inline(always)]
 pub(super) fn times<T: Number>(body: [T; 10], motion: [T; 6]) -> [T; 6] {
     let (linear, angular) = halves(motion);
@@ -54,13 +54,13 @@ pub(super) fn times<T: Number>(body: [T; 10], motion: [T; 6]) -> [T; 6] {
     let inertia = [body[4], body[5], body[6], body[7], body[8], body[9]];
     join(
         add_cross(scale(linear, body[0]), angular, moment),
-        add_cross(spun(inertia, angular), moment, linear),
+        add_cross(inertia_times(inertia, angular), moment, linear),
     )
 }
 
 /// `I w`, with `I` as `xx, xy, yy, xz, yz, zz`.
 #[inline(always)]
-pub(super) fn spun<T: Number>([xx, xy, yy, xz, yz, zz]: [T; 6], w: V3<T>) -> V3<T> {
+pub(super) fn inertia_times<T: Number>([xx, xy, yy, xz, yz, zz]: [T; 6], w: V3<T>) -> V3<T> {
     [
         dot([xx, xy, xz], w),
         dot([xy, yy, yz], w),
@@ -68,23 +68,23 @@ pub(super) fn spun<T: Number>([xx, xy, yy, xz, yz, zz]: [T; 6], w: V3<T>) -> V3<
     ]
 }
 
-/// Rate of a motion that is fixed in a body of velocity `twist`.
+/// Rate of change of a motion that is fixed in a body of velocity `twist`.
 #[inline(always)]
 pub(super) fn cross_motion<T: Number>(twist: [T; 6], motion: [T; 6]) -> [T; 6] {
     let ((v, w), (linear, angular)) = (halves(twist), halves(motion));
     join(add_cross(cross(w, linear), v, angular), cross(w, angular))
 }
 
-/// Rate of a momentum that is fixed in a body of velocity `twist`.
+/// Rate of change of a momentum that is fixed in a body of velocity `twist`.
 #[inline(always)]
 pub(super) fn cross_force<T: Number>(twist: [T; 6], force: [T; 6]) -> [T; 6] {
     let ((v, w), (linear, angular)) = (halves(twist), halves(force));
     join(cross(w, linear), add_cross(cross(w, angular), v, linear))
 }
 
-/// Torque about an axis through which the body falls: what holds it, `-S . (m g, h x g)`.
+/// Torque about an axis that holds the body against gravity, `-S . (m g, h x g)`.
 #[inline(always)]
-pub(super) fn weight_on<T: Number>(axis: [T; 6], body: [T; 10], gravity: V3<T>) -> T {
+pub(super) fn gravity_torque_about<T: Number>(axis: [T; 6], body: [T; 10], gravity: V3<T>) -> T {
     let (linear, angular) = halves(axis);
     let moment = cross([body[1], body[2], body[3]], gravity);
     -(dot(linear, scale(gravity, body[0])) + dot(angular, moment))

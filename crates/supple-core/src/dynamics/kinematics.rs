@@ -1,4 +1,4 @@
-//! Where the arm is and how it moves: poses, Jacobian, velocity-product acceleration.
+//! Kinematics: poses, Jacobian, velocity-product acceleration.
 #![allow(
     clippy::needless_range_loop,
     reason = "joints, groups and lanes are counted: each index goes into several arrays"
@@ -6,11 +6,11 @@
 
 use super::chain::Chain;
 use super::frames::{joint_motions, matrix};
-use crate::arm::Arm;
-use crate::lanes::in_groups;
+use crate::math::lanes::in_groups;
+use crate::math::vec3::{add, add_cross, cross, scale, sub};
 use crate::math::{Matrix, Vector};
-use crate::pose::Pose;
-use crate::vec3::{add, add_cross, cross, scale, sub};
+use crate::model::arm::Arm;
+use crate::model::pose::Pose;
 
 /// Pose of every joint frame in the base, `base_from_joint`. `q` \[rad\].
 #[inline]
@@ -50,25 +50,41 @@ fn columns<const N: usize, const G: usize>(arm: &Arm<N>, q: &Vector<N>) -> Matri
 /// `J' qd`: classical acceleration of the tip at `qdd = 0` \[m/s^2, rad/s^2\], base axes.
 #[inline]
 pub fn jacobian_dot_qd<const N: usize>(arm: &Arm<N>, q: &Vector<N>, qd: &Vector<N>) -> Vector<6> {
-    in_groups!(N, drift(arm, q, qd))
+    in_groups!(N, bias_acceleration(arm, q, qd))
 }
 
 #[inline]
-fn drift<const N: usize, const G: usize>(arm: &Arm<N>, q: &Vector<N>, qd: &Vector<N>) -> Vector<6> {
+fn bias_acceleration<const N: usize, const G: usize>(
+    arm: &Arm<N>,
+    q: &Vector<N>,
+    qd: &Vector<N>,
+) -> Vector<6> {
     let chain = Chain::<G>::new(arm, q);
-    let (mut spin, mut rate, mut accel) = ([0.0; 3], [0.0; 3], [0.0; 3]);
+    let (mut angular_velocity, mut angular_acceleration, mut accel) =
+        ([0.0; 3], [0.0; 3], [0.0; 3]);
     for i in 0..N {
         let frame = chain.frame(i);
         let axis = scale(frame.axis(), qd[i]);
-        rate = add_cross(rate, spin, axis);
-        spin = add(spin, axis);
+        angular_acceleration = add_cross(angular_acceleration, angular_velocity, axis);
+        angular_velocity = add(angular_velocity, axis);
         let next = if i + 1 < N {
             chain.frame(i + 1)
         } else {
             chain.tip
         };
-        let way = sub(next.origin, frame.origin);
-        accel = add_cross(add_cross(accel, rate, way), spin, cross(spin, way));
+        let offset = sub(next.origin, frame.origin);
+        accel = add_cross(
+            add_cross(accel, angular_acceleration, offset),
+            angular_velocity,
+            cross(angular_velocity, offset),
+        );
     }
-    Vector::<6>::new(accel[0], accel[1], accel[2], rate[0], rate[1], rate[2])
+    Vector::<6>::new(
+        accel[0],
+        accel[1],
+        accel[2],
+        angular_acceleration[0],
+        angular_acceleration[1],
+        angular_acceleration[2],
+    )
 }

@@ -1,8 +1,8 @@
 //! Rigid-body dynamics of a serial arm: free functions over an immutable [`Arm`].
 //!
-//! Sweeps run in joint frames, so that each joint turns about z and precision does not depend on how
-//! far the wrist is from the base. Accelerations are classical (of the frame's origin), and gravity
-//! enters as an upward acceleration of the base.
+//! Sweeps run in joint frames, so that each joint rotates about z and precision does not depend on
+//! how far the wrist is from the base. Accelerations are classical (of the frame's origin), and
+//! gravity enters as an upward acceleration of the base.
 
 mod aba;
 mod body_motion;
@@ -12,6 +12,7 @@ mod crba;
 mod energy;
 mod frames;
 mod inertia;
+pub mod inverse_kinematics;
 mod kinematics;
 mod momentum;
 mod motion;
@@ -31,18 +32,18 @@ pub use rnea::{gravity, rnea};
 pub(crate) use sweep::Sweep;
 pub use terms::{Terms, terms};
 
-use crate::arm::Arm;
-use crate::lanes::{in_groups, of_joint};
+use crate::math::lanes::{in_groups, joint_values};
 use crate::math::{Matrix3, Vector};
+use crate::model::arm::Arm;
 
 /// Rotation of joint frame `i` in its parent's joint frame, for every joint.
 #[inline]
 fn parent_rotations<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> [Matrix3<f64>; N] {
-    in_groups!(N, turned(arm, q))
+    in_groups!(N, rotations(arm, q))
 }
 
 #[inline]
-fn turned<const N: usize, const G: usize>(arm: &Arm<N>, q: &Vector<N>) -> [Matrix3<f64>; N] {
+fn rotations<const N: usize, const G: usize>(arm: &Arm<N>, q: &Vector<N>) -> [Matrix3<f64>; N] {
     let rows = chain::parent_rotations::<N, G>(arm, q);
-    core::array::from_fn(|i| Matrix3::from_column_slice(&of_joint(&rows, i)))
+    core::array::from_fn(|i| Matrix3::from_column_slice(&joint_values(&rows, i)))
 }

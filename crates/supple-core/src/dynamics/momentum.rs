@@ -1,14 +1,14 @@
-//! Generalised momentum and its drift, for the external-torque observer.
+//! Generalised momentum and the terms of its rate of change, for the external-torque observer.
 //!
-//! `p = H qd` obeys `p' = tau + tau_ext - D - G + dT/dq`, with `dT/dq = C^T qd`. Turning joint `i`
-//! turns everything beyond it against the velocity that arrives from the base, so
-//! `dT/dq_i = -h_i . (S_i x v_i)` with `h_i` the momentum of all that joint `i` carries: one sweep out
-//! and one back, no matrix.
+//! `p = H qd` obeys `p' = tau + tau_ext - D - G + dT/dq`, with `dT/dq = C^T qd`. Rotating joint `i`
+//! rotates everything beyond it relative to the velocity of its parent, so `dT/dq_i = -h_i . (S_i x
+//! v_i)` with `h_i` the momentum of all that joint `i` carries: one sweep out and one back, no
+//! matrix.
 
 use super::sweep::Sweep;
-use crate::arm::Arm;
-use crate::lanes::{in_groups, per_joint};
 use crate::math::Vector;
+use crate::math::lanes::{in_groups, per_joint};
+use crate::model::arm::Arm;
 
 /// Generalised momentum and kinetic gradient.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,9 +31,9 @@ fn of_state<const N: usize, const G: usize>(
     q: &Vector<N>,
     qd: &Vector<N>,
 ) -> Momentum<N> {
-    let held = Sweep::<G>::new(arm, q, qd).held();
+    let projection = Sweep::<G>::new(arm, q, qd).projection();
     Momentum {
-        momentum: Vector::from(per_joint(&held.momentum)) + arm.armature.component_mul(qd),
-        kinetic_gradient: Vector::from(per_joint(&held.kinetic_gradient)),
+        momentum: Vector::from(per_joint(&projection.momentum)) + arm.armature.component_mul(qd),
+        kinetic_gradient: Vector::from(per_joint(&projection.kinetic_gradient)),
     }
 }

@@ -1,86 +1,90 @@
-//! Velocities and accelerations of all links, and the forces that they take, in base axes about the tip.
+//! Velocities and accelerations of all links, and the forces that they need, in base axes about the
+//! tip.
 
 use super::chain::Chain;
-use super::inertia::{cross_force, cross_motion, spun, times};
-use crate::arm::Arm;
-use crate::lanes::{
-    Lanes, NOTHING, Number, Rows, column, for_each_joint, of_joint, scaled, splat, sums_outward,
-    total,
-};
+use super::inertia::{cross_force, cross_motion, inertia_times, times};
 use crate::math::Vector;
-use crate::vec3::{V3, add, add_cross, add_rotated, cross, halves, join, rotate_back, scale, sub};
+use crate::math::lanes::{
+    Lanes, NEGATIVE_ZERO, Number, Rows, column, for_each_joint, joint_values, prefix_sums, scaled,
+    splat, total,
+};
+use crate::math::vec3::{
+    V3, add, add_cross, add_rotated, cross, halves, join, rotate_back, scale, sub,
+};
+use crate::model::arm::Arm;
 
-/// How every link moves.
+/// Motion of every link.
 pub(crate) struct Motion<const G: usize> {
     pub twists: Rows<6, G>,
-    /// Of each joint's motion: `v x S`.
+    /// Rate of change of each joint's motion: `v x S`.
     pub rates: Rows<6, G>,
-    /// With the base accelerated upwards, of the link's point that is at the reference point: spatial.
+    /// Spatial acceleration of the link's point that coincides with the reference point, with the
+    /// base accelerated upwards.
     pub accelerations: Rows<6, G>,
-    /// What each joint adds to the velocity of the one before.
+    /// Velocity that each joint adds to that of its parent.
     steps: Rows<6, G>,
-    /// What each joint adds to the acceleration of the one before.
+    /// Acceleration that each joint adds to that of its parent.
     added: Rows<6, G>,
     /// Acceleration of the base.
     base: [f64; 6],
 }
 
 impl<const G: usize> Motion<G> {
-    /// Under the joint speeds `qd` alone.
+    /// Motion for the joint velocities `qd` without joint accelerations.
     #[inline(always)]
     pub fn new<const N: usize>(motions: &Rows<6, G>, qd: &Vector<N>, gravity: V3) -> Self {
         let speeds = [column::<N, G>(&qd.data.0[0])];
         let steps = for_each_joint!([speed] in &speeds, motion in motions => scaled(motion, speed));
-        let twists = sums_outward([NOTHING; 6], steps);
+        let twists = prefix_sums([NEGATIVE_ZERO; 6], steps);
         let rates =
             for_each_joint!(twist in &twists, motion in motions => cross_motion(twist, motion));
-        let base = join(gravity.map(|g| -g), [NOTHING; 3]);
+        let base = join(gravity.map(|g| -g), [NEGATIVE_ZERO; 3]);
         let added = for_each_joint!([speed] in &speeds, rate in &rates => scaled(rate, speed));
         Motion {
             twists,
             rates,
-            accelerations: sums_outward(base, added),
+            accelerations: prefix_sums(base, added),
             steps,
             added,
             base,
         }
     }
 
-    /// The same with the joint accelerations `qdd`.
+    /// Adds the joint accelerations `qdd`.
     #[inline(always)]
     pub fn accelerated<const N: usize>(mut self, motions: &Rows<6, G>, qdd: &[f64; N]) -> Self {
         let qdd = column::<N, G>(qdd);
         for (added, motion) in self.added.iter_mut().zip(motions) {
             for group in 0..G {
-                added[group] = motion[group].times_plus(qdd[group], added[group]);
+                added[group] = motion[group].multiply_add(qdd[group], added[group]);
             }
         }
-        self.accelerations = sums_outward(self.base, self.added);
+        self.accelerations = prefix_sums(self.base, self.added);
         self
     }
 
     /// Velocity of the tip, `J qd`.
     #[inline(always)]
     pub fn tip_rate<const N: usize>(&self) -> [f64; 6] {
-        of_joint(&self.twists, N - 1)
+        joint_values(&self.twists, N - 1)
     }
 
-    /// Classical acceleration of the tip at `qdd = 0`, `J' qd`: joint `i` turns what the joints before it give
-    /// the tip, and they what it gives.
+    /// Classical acceleration of the tip at `qdd = 0`, `J' qd`: products of the velocities that the
+    /// joints give the tip.
     #[inline(always)]
-    pub fn tip_drift<const N: usize>(&self) -> [f64; 6] {
+    pub fn tip_bias_acceleration<const N: usize>(&self) -> [f64; 6] {
         let linear: Rows<3, G> = for_each_joint!(twist in &self.twists, step in &self.steps => {
-            let ((_, spin), (linear, angular)) = (halves(twist), halves(step));
-            cross(sub(add(spin, spin), angular), linear)
+            let ((_, angular_velocity), (linear, angular)) = (halves(twist), halves(step));
+            cross(sub(add(angular_velocity, angular_velocity), angular), linear)
         });
-        let (_, angular) = halves(of_joint(&self.accelerations, N - 1));
+        let (_, angular) = halves(joint_values(&self.accelerations, N - 1));
         join(
             [total(&linear[0]), total(&linear[1]), total(&linear[2])],
             angular,
         )
     }
 
-    /// Force on each link, and its momentum.
+    /// Force on each link, and momentum of each link.
     #[inline(always)]
     pub fn forces(&self, bodies: &Rows<10, G>) -> Rows<12, G> {
         for_each_joint!(
@@ -97,7 +101,8 @@ impl<const G: usize> Motion<G> {
         )
     }
 
-    /// The force alone, by Newton and Euler about the centre of mass: no inertia has to be brought to the base.
+    /// Force on each link, by the Newton-Euler equations about the centre of mass, so that no
+    /// inertia has to be transformed to the base.
     #[inline(always)]
     pub fn forces_of_links<const N: usize>(
         &self,
@@ -116,14 +121,14 @@ impl<const G: usize> Motion<G> {
                 let com_accel = add_cross(add_cross(a, rate, com), w, add_cross(v, w, com));
                 let force = scale(com_accel, mass);
                 let (w, rate) = (rotate_back(&r, w), rotate_back(&r, rate));
-                let moment = add_cross(spun(inertia, rate), w, spun(inertia, w));
+                let moment = add_cross(inertia_times(inertia, rate), w, inertia_times(inertia, w));
                 join(force, add_rotated(cross(com, force), &r, moment))
             }
         )
     }
 }
 
-/// Force and momentum.
+/// Splits into force and momentum.
 #[inline(always)]
 pub(super) fn split(x: [Lanes; 12]) -> ([Lanes; 6], [Lanes; 6]) {
     (

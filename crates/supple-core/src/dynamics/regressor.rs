@@ -3,9 +3,9 @@
 //! Ten numbers a link, in its *link frame* (the one of the description): mass, first moments
 //! `m cx, m cy, m cz`, and inertia about the frame's origin `Ixx, Ixy, Iyy, Ixz, Iyz, Izz`.
 //!
-//! A link's force is linear in its ten numbers: each has a wrench of its own, here in base axes about the
-//! last joint. With `a` the acceleration of the link frame's origin, which is at `p`, with `r_i` the frame's
-//! axes and `W = [alpha x] + [w x][w x]`, these are
+//! A link's force is linear in its ten numbers: each number has its own wrench, here in base axes
+//! about the last joint. With `a` the acceleration of the link frame's origin, which is at `p`,
+//! with `r_i` the frame's axes and `W = [alpha x] + [w x][w x]`, these are
 //!
 //! ```text
 //!               force    moment
@@ -15,27 +15,29 @@
 //! I_ij          0        r_i alpha_j + r_j alpha_i + w x (r_i w_j + r_j w_i)
 //! ```
 //!
-//! The row of a joint is the power that they take where it turns at unit rate. Wrenches are found for four
-//! links at once, then rows for four numbers at once.
+//! The row of a joint is the power of these wrenches for unit speed of the joint. Wrenches are
+//! computed for four links at once, then rows for four numbers at once.
 #![allow(
     clippy::needless_range_loop,
     reason = "joints, groups and lanes are counted: each index goes into several arrays"
 )]
 
-use super::body_motion::gradient;
+use super::body_motion::acceleration_gradient;
 use super::chain::Chain;
 use super::frames::joint_motions;
 use super::motion::Motion;
-use crate::arm::Arm;
-use crate::lanes::{LANES, Lanes, by_joint, in_groups, of_group, of_joint, splat};
 use crate::math::Vector;
-use crate::vec3::{
+use crate::math::lanes::{
+    LANES, Lanes, in_groups, joint_values, load_group, splat, to_joint_arrays,
+};
+use crate::math::vec3::{
     V3, add_cross, add_scaled, cross, dot, halves, product, rotate, rotate_back, scale, sub,
     transposed,
 };
+use crate::model::arm::Arm;
 
-/// `[i][k]` is what the torque of joint `i` has of each of the ten numbers of link `k`; zero where the link
-/// comes before the joint.
+/// `[i][k]` is the contribution of each of the ten numbers of link `k` to the torque of joint `i`;
+/// zero if the link comes before the joint.
 pub type Regressor<const N: usize> = [[Vector<10>; N]; N];
 
 /// Joint-torque regressor: `rnea = Y p + armature qdd`, with [`parameters`] `p` and [`regressor_times`] for
@@ -53,7 +55,8 @@ pub fn regressor<const N: usize>(
     whole
 }
 
-/// As [`regressor`], piece by piece: `put(joint, link, row)` for every joint and every link that it moves.
+/// As [`regressor`], row by row: calls `put(joint, link, row)` for every joint and every link that
+/// it moves.
 #[inline]
 pub fn regressor_rows<const N: usize>(
     arm: &Arm<N>,
@@ -74,21 +77,21 @@ fn rows<const N: usize, const G: usize>(
     mut put: impl FnMut(usize, usize, [f64; 10]),
 ) {
     let chain = Chain::<G>::new(arm, q);
-    let point = of_joint(&chain.origins, N - 1);
+    let point = joint_values(&chain.origins, N - 1);
     let motions = joint_motions(&chain, point);
     let motion = Motion::new(&motions, qd, arm.gravity.data.0[0]);
     let motion = motion.accelerated(&motions, &qdd.data.0[0]);
     let links_from_joints = arm.rows.links_from_joints::<G>();
-    let motions = by_joint::<6, N, G>(&motions);
+    let motions = to_joint_arrays::<6, N, G>(&motions);
     for group in 0..G {
         let links = wrenches(&Links {
             axes: product(
-                &of_group(&chain.rotations, group),
-                &transposed(&of_group(&links_from_joints, group)),
+                &load_group(&chain.rotations, group),
+                &transposed(&load_group(&links_from_joints, group)),
             ),
-            origin: sub(of_group(&chain.origins, group), splat(point)),
-            twist: of_group(&motion.twists, group),
-            acceleration: of_group(&motion.accelerations, group),
+            origin: sub(load_group(&chain.origins, group), splat(point)),
+            twist: load_group(&motion.twists, group),
+            acceleration: load_group(&motion.accelerations, group),
         });
         for link in group * LANES..N.min(group * LANES + LANES) {
             let lane = link - group * LANES;
@@ -109,30 +112,31 @@ fn rows<const N: usize, const G: usize>(
     }
 }
 
-/// Four links.
+/// Motion of four links.
 struct Links {
     axes: [Lanes; 9],
     origin: V3<Lanes>,
     twist: [Lanes; 6],
-    /// Of the point of the link that is at the reference point, not of the link's points one after another.
+    /// Spatial acceleration: of the link's point that coincides with the reference point.
     acceleration: [Lanes; 6],
 }
 
-/// Wrenches of the ten numbers of four links: forces of the mass and the first moments, their moments, then
-/// moments of the inertia, the last two with two numbers that nobody reads. Each by components, then links.
+/// Wrenches of the ten numbers of four links: forces of the mass and the first moments, their
+/// moments, then moments of the inertia, the last two padded with two unused values. Each by
+/// components, then links.
 type Wrenches = [V3<[Lanes; LANES]>; 4];
 
-/// Link by link.
+/// Wrenches of four links.
 #[inline(always)]
 fn wrenches(links: &Links) -> Wrenches {
     let ((velocity, w), (linear, alpha)) = (halves(links.twist), halves(links.acceleration));
     let p = links.origin;
     let accel = add_cross(linear, alpha, p);
     let accel = add_cross(accel, w, add_cross(velocity, w, p));
-    let gradient = gradient(w, alpha);
+    let acceleration_gradient = acceleration_gradient(w, alpha);
     let a = &links.axes;
     let axis = [[a[0], a[1], a[2]], [a[3], a[4], a[5]], [a[6], a[7], a[8]]];
-    let push = |r: V3<Lanes>| rotate(&gradient, r);
+    let push = |r: V3<Lanes>| rotate(&acceleration_gradient, r);
     let pushed = [push(axis[0]), push(axis[1]), push(axis[2])];
     let lever = |i: usize| add_cross(cross(p, pushed[i]), axis[i], accel);
     let levers = [lever(0), lever(1), lever(2)];
@@ -142,22 +146,23 @@ fn wrenches(links: &Links) -> Wrenches {
     let spun = [cross(w, axis[0]), cross(w, axis[1]), cross(w, axis[2])];
     let single = |i: usize| add_scaled(scale(axis[i], own_alpha[i]), spun[i], own_w[i]);
     let mixed = |i: usize, j: usize| {
-        let turned = add_scaled(scale(axis[i], own_alpha[j]), axis[j], own_alpha[i]);
-        add_scaled(add_scaled(turned, spun[i], own_w[j]), spun[j], own_w[i])
+        let mixed = add_scaled(scale(axis[i], own_alpha[j]), axis[j], own_alpha[i]);
+        add_scaled(add_scaled(mixed, spun[i], own_w[j]), spun[j], own_w[i])
     };
     let (xx, xy, yy, xz) = (single(0), mixed(0, 1), single(1), mixed(0, 2));
     let (yz, zz) = (mixed(1, 2), single(2));
     [
-        turned([accel, pushed[0], pushed[1], pushed[2]]),
-        turned([moment, levers[0], levers[1], levers[2]]),
-        turned([xx, xy, yy, xz]),
-        turned([yz, zz, zz, zz]),
+        transposed_lanes([accel, pushed[0], pushed[1], pushed[2]]),
+        transposed_lanes([moment, levers[0], levers[1], levers[2]]),
+        transposed_lanes([xx, xy, yy, xz]),
+        transposed_lanes([yz, zz, zz, zz]),
     ]
 }
 
-/// Of four vectors for each of four links the components: the links apart, the vectors in the lanes.
+/// Transposes four vectors of four links each: per component one row per link, with the vectors in
+/// the lanes.
 #[inline(always)]
-fn turned([a, b, c, d]: [V3<Lanes>; 4]) -> V3<[Lanes; LANES]> {
+fn transposed_lanes([a, b, c, d]: [V3<Lanes>; 4]) -> V3<[Lanes; LANES]> {
     [
         Lanes::transpose([a[0], b[0], c[0], d[0]]),
         Lanes::transpose([a[1], b[1], c[1], d[1]]),

@@ -1,6 +1,7 @@
-//! Recursive Newton-Euler: inverse dynamics, and gravity alone.
+//! Inverse dynamics and gravity torque by the recursive Newton-Euler algorithm.
 //!
-//! In joint frames, where precision does not depend on how far the wrist is from the base.
+//! The sweeps run in joint frames, so that precision does not depend on the distance of the wrist
+//! from the base.
 #![allow(
     clippy::needless_range_loop,
     reason = "joints, groups and lanes are counted: each index goes into several arrays"
@@ -8,10 +9,10 @@
 
 use super::body_motion::body_motions;
 use super::chain::parent_rotations;
-use crate::arm::Arm;
-use crate::lanes::{Number, in_groups, of_joint};
 use crate::math::Vector;
-use crate::vec3::{V3, add, add_cross, add_rotated, add_scaled, dot, rotate, rotate_back};
+use crate::math::lanes::{Number, in_groups, joint_values};
+use crate::math::vec3::{V3, add, add_cross, add_rotated, add_scaled, dot, rotate, rotate_back};
+use crate::model::arm::Arm;
 
 /// Joint torques that give the accelerations `qdd`: `H qdd + C qd + G` \[N m\], without friction.
 ///
@@ -48,14 +49,18 @@ fn inverse_dynamics<const N: usize, const G: usize>(
                 dot([body(7), body(8), body(9)], v),
             ]
         };
-        moment = add(moment, inertia(motion.rate));
+        moment = add(moment, inertia(motion.angular_acceleration));
         moment = add_cross(moment, h, motion.accel);
-        moment = add_cross(moment, motion.spin, inertia(motion.spin));
-        tau[i] = arm.armature[i].times_plus(qdd[i], moment[2]);
+        moment = add_cross(
+            moment,
+            motion.angular_velocity,
+            inertia(motion.angular_velocity),
+        );
+        tau[i] = arm.armature[i].multiply_add(qdd[i], moment[2]);
         if i > 0 {
             force = add_scaled(force, motion.accel, body(0));
-            force = add_rotated(force, &motion.gradient, h);
-            let r = of_joint(&rotations, i);
+            force = add_rotated(force, &motion.acceleration_gradient, h);
+            let r = joint_values(&rotations, i);
             let origin = arm.links[i].parent_from_joint.translation.data.0[0];
             force = rotate(&r, force);
             moment = add_cross(rotate(&r, moment), origin, force);
@@ -76,7 +81,7 @@ fn weights<const N: usize, const G: usize>(arm: &Arm<N>, q: &Vector<N>) -> Vecto
     let mut falls = [[0.0; 3]; N];
     let mut fall = arm.gravity.data.0[0];
     for i in 0..N {
-        fall = rotate_back(&of_joint(&rotations, i), fall);
+        fall = rotate_back(&joint_values(&rotations, i), fall);
         falls[i] = fall;
     }
     let (mut mass, mut moment) = (0.0, [0.0; 3]);
@@ -85,10 +90,10 @@ fn weights<const N: usize, const G: usize>(arm: &Arm<N>, q: &Vector<N>) -> Vecto
         let body = |k: usize| arm.rows.body(k, i);
         mass += body(0);
         moment = add(moment, [body(1), body(2), body(3)]);
-        tau[i] = moment[1].times_plus(falls[i][0], -(moment[0] * falls[i][1]));
+        tau[i] = moment[1].multiply_add(falls[i][0], -(moment[0] * falls[i][1]));
         if i > 0 {
             let origin = arm.links[i].parent_from_joint.translation.data.0[0];
-            moment = add_scaled(rotate(&of_joint(&rotations, i), moment), origin, mass);
+            moment = add_scaled(rotate(&joint_values(&rotations, i), moment), origin, mass);
         }
     }
     tau

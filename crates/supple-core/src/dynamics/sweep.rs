@@ -1,29 +1,30 @@
-//! The one sweep out and back that gives every term of the law, in groups of joints: [`super::terms`] puts
-//! it into matrices, [`crate::operational`] goes on with it as it is.
+//! One outward and one inward sweep that give every term of the law, in groups of joints:
+//! [`super::terms`] stores the result in matrices, [`crate::law::operational`] uses it directly.
 
 use super::chain::Chain;
 use super::crba::mass_columns;
 use super::frames::{bodies, joint_motions};
-use super::inertia::weight_on;
+use super::inertia::gravity_torque_about;
 use super::motion::{Motion, split};
-use crate::arm::Arm;
-use crate::lanes::{Column, Columns, Rows, column, for_each_joint, splat, sums_inward};
 use crate::math::Vector;
-use crate::vec3::dot6;
+use crate::math::lanes::{Column, Columns, Rows, column, for_each_joint, splat, suffix_sums};
+use crate::math::vec3::dot6;
+use crate::model::arm::Arm;
 
-/// An arm in a state. What nobody asks for is not computed: everything here is inlined.
+/// Kinematic quantities of an arm in one state. All functions are inlined, so unused results cost
+/// nothing.
 pub(crate) struct Sweep<const G: usize> {
-    /// Where the joints and the tip are.
+    /// Poses of the joints and the tip.
     pub chain: Chain<G>,
     /// The Jacobian's rows.
     pub motions: Rows<6, G>,
-    /// Velocities, and accelerations without those of the joints.
+    /// Velocities, and accelerations at zero joint acceleration.
     pub motion: Motion<G>,
     bodies: Rows<10, G>,
 }
 
-/// What the links' forces and momenta ask of the joints.
-pub(crate) struct Held<const G: usize> {
+/// Link forces and momenta projected onto the joint axes.
+pub(crate) struct JointProjection<const G: usize> {
     /// `H qdd + C qd + G` \[N m\], without rotors.
     pub torque: Column<G>,
     /// `H qd` \[kg m^2/s\], without rotors.
@@ -33,7 +34,7 @@ pub(crate) struct Held<const G: usize> {
 }
 
 impl<const G: usize> Sweep<G> {
-    /// At `q` \[rad\], `qd` \[rad/s\].
+    /// Sweeps an arm at `q` \[rad\], `qd` \[rad/s\].
     #[inline(always)]
     pub fn new<const N: usize>(arm: &Arm<N>, q: &Vector<N>, qd: &Vector<N>) -> Self {
         let chain = Chain::<G>::new(arm, q);
@@ -48,38 +49,38 @@ impl<const G: usize> Sweep<G> {
 
     /// `J' qd` of the tip.
     #[inline(always)]
-    pub fn tip_drift<const N: usize>(&self) -> [f64; 6] {
-        self.motion.tip_drift::<N>()
+    pub fn tip_bias_acceleration<const N: usize>(&self) -> [f64; 6] {
+        self.motion.tip_bias_acceleration::<N>()
     }
 
-    /// The mass matrix, right from the diagonal downwards, with rotor inertias.
+    /// The mass matrix with rotor inertias; valid from the diagonal downwards.
     #[inline(always)]
     pub fn mass<const N: usize>(&self, arm: &Arm<N>) -> Columns<N, G> {
-        mass_columns(arm, &self.motions, &sums_inward(self.bodies))
+        mass_columns(arm, &self.motions, &suffix_sums(self.bodies))
     }
 
     /// `G`.
     #[inline(always)]
     pub fn gravity<const N: usize>(&self, arm: &Arm<N>) -> Column<G> {
-        let (carried, falls) = (sums_inward(self.bodies), splat(arm.gravity.data.0[0]));
-        let [weight] = for_each_joint!(axis in &self.motions, body in &carried => [weight_on(axis, body, falls)]);
+        let (carried, falls) = (suffix_sums(self.bodies), splat(arm.gravity.data.0[0]));
+        let [weight] = for_each_joint!(axis in &self.motions, body in &carried => [gravity_torque_about(axis, body, falls)]);
         weight
     }
 
-    /// Of this motion.
+    /// Joint torques, momenta and kinetic gradient of this motion.
     #[inline(always)]
-    pub fn held(&self) -> Held<G> {
-        let held = sums_inward(self.motion.forces(&self.bodies));
+    pub fn projection(&self) -> JointProjection<G> {
+        let carried = suffix_sums(self.motion.forces(&self.bodies));
         let rates = &self.motion.rates;
-        let [torque, momentum, kinetic_gradient] = for_each_joint!(axis in &self.motions, rate in rates, held in &held => {
-            let (force, momentum) = split(held);
+        let [torque, momentum, kinetic_gradient] = for_each_joint!(axis in &self.motions, rate in rates, carried in &carried => {
+            let (force, momentum) = split(carried);
             [
                 dot6(axis, force),
                 dot6(axis, momentum),
                 dot6(rate, momentum),
             ]
         });
-        Held {
+        JointProjection {
             torque,
             momentum,
             kinetic_gradient,
@@ -91,9 +92,9 @@ impl<const G: usize> Sweep<G> {
     pub fn inverse_dynamics<const N: usize>(self, arm: &Arm<N>, qdd: &[f64; N]) -> Column<G> {
         let motion = self.motion.accelerated(&self.motions, qdd);
         let forces = motion.forces_of_links(arm, &self.chain, self.chain.tip.origin);
-        let held = sums_inward(forces);
+        let carried = suffix_sums(forces);
         let [mut torque] =
-            for_each_joint!(axis in &self.motions, force in &held => [dot6(axis, force)]);
+            for_each_joint!(axis in &self.motions, force in &carried => [dot6(axis, force)]);
         let (armature, qdd) = (column::<N, G>(&arm.armature.data.0[0]), column::<N, G>(qdd));
         for group in 0..G {
             torque[group] += armature[group] * qdd[group];

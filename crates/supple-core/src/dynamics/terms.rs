@@ -1,14 +1,14 @@
-//! Everything that the impedance law needs, in one sweep out and one back.
+//! All dynamic terms of the impedance law, from one outward and one inward sweep.
 
 use super::crba::symmetric;
 use super::frames::matrix;
 use super::sweep::Sweep;
-use crate::arm::Arm;
-use crate::lanes::{in_groups, per_joint};
+use crate::math::lanes::{in_groups, per_joint};
 use crate::math::{Matrix, Vector};
-use crate::pose::Pose;
+use crate::model::arm::Arm;
+use crate::model::pose::Pose;
 
-/// What [`terms`] fills.
+/// Dynamic terms in one state, computed by [`terms`].
 #[derive(Clone, Copy, Debug)]
 pub struct Terms<const N: usize> {
     // Depends on position.
@@ -60,13 +60,13 @@ fn fill<const N: usize, const G: usize>(
     out: &mut Terms<N>,
 ) {
     let sweep = Sweep::<G>::new(arm, q, qd);
-    let held = sweep.held();
+    let projection = sweep.projection();
     out.base_from_tip = sweep.chain.tip.pose();
     out.jacobian = matrix(&sweep.motions);
-    out.jacobian_dot_qd = Vector::from(sweep.tip_drift::<N>());
+    out.jacobian_dot_qd = Vector::from(sweep.tip_bias_acceleration::<N>());
     out.gravity = Vector::from(per_joint(&sweep.gravity(arm)));
-    out.coriolis_gravity = Vector::from(per_joint(&held.torque));
-    out.momentum = Vector::from(per_joint(&held.momentum)) + arm.armature.component_mul(qd);
-    out.kinetic_gradient = Vector::from(per_joint(&held.kinetic_gradient));
+    out.coriolis_gravity = Vector::from(per_joint(&projection.torque));
+    out.momentum = Vector::from(per_joint(&projection.momentum)) + arm.armature.component_mul(qd);
+    out.kinetic_gradient = Vector::from(per_joint(&projection.kinetic_gradient));
     out.mass_matrix = symmetric(&sweep.mass(arm));
 }

@@ -1,6 +1,7 @@
-//! Back and forth on a horizontal circle about the base axis: what the sinusoid never moves.
+//! Oscillation on a horizontal circle about the base axis; it moves the base joint, which the
+//! sinusoid does not.
 
-use super::{MINIMUM_JERK_SPEED, Reference, TrajectoryError, positive, ramped};
+use super::{MINIMUM_JERK_SPEED, Reference, TrajectoryError, positive, time_scaling};
 use crate::math::{Vector3, abs, sin_cos};
 
 /// Azimuth `centre + amplitude sin(omega s(t))` at constant radius and height.
@@ -16,18 +17,19 @@ pub struct Arc {
     pub amplitude_rad: f64,
     /// `omega` \[rad/s\], positive.
     pub angular_frequency_rad_per_s: f64,
-    /// Time over which the pace grows from nothing to one \[s\], positive.
+    /// Ramp time of the time scaling from zero to one \[s\], positive.
     pub ramp_s: f64,
 }
 
 impl Arc {
     pub(super) fn at(&self, time_s: f64) -> Reference {
-        let (s, pace, pace_rate) = ramped(time_s, self.ramp_s);
+        let (s, time_scale, time_scale_rate) = time_scaling(time_s, self.ramp_s);
         let w = self.angular_frequency_rad_per_s;
         let (sin, cos) = sin_cos(w * s);
         let azimuth = self.centre_rad + self.amplitude_rad * sin;
-        let rate = self.amplitude_rad * w * cos * pace;
-        let rate_rate = self.amplitude_rad * (w * cos * pace_rate - w * w * sin * pace * pace);
+        let rate = self.amplitude_rad * w * cos * time_scale;
+        let rate_rate = self.amplitude_rad
+            * (w * cos * time_scale_rate - w * w * sin * time_scale * time_scale);
         let (sin, cos) = sin_cos(azimuth);
         let radial = Vector3::new(cos, sin, 0.0) * self.radius_m;
         let tangent = Vector3::new(-sin, cos, 0.0) * self.radius_m;

@@ -1,21 +1,22 @@
-//! Excitation in joint space: a Fourier series a joint, all of one base frequency.
+//! Excitation in joint space: one Fourier series per joint, all with the same fundamental
+//! frequency.
 //!
 //! ```text
 //! q(s) = centre + sum_k sine_k sin(k omega s) + cosine_k cos(k omega s),   k = 1..5
 //! ```
 //!
-//! `s` is time at a pace that is ramped from rest at the start and back to rest at the end
-//! (Swevers et al. 1997, "Optimal robot excitation and identification", for the series). After its end it
-//! stays where it is.
+//! `s` is the scaled time, whose rate is ramped from 0 to 1 at the start and back to 0 at the end
+//! (series from Swevers et al. 1997, "Optimal robot excitation and identification"). After the end
+//! the reference is constant.
 
-use super::{TrajectoryError, positive, ramped};
+use super::{TrajectoryError, positive, time_scaling};
 use crate::config::Limits;
 use crate::math::{Vector, abs, all_finite, sin_cos};
 use core::f64::consts::TAU;
 
-/// Terms of the series.
+/// Number of terms of the series.
 pub const HARMONICS: usize = 5;
-/// Points a period of the highest harmonic at which a series is held against limits.
+/// Sample points per period of the highest harmonic at which a series is checked against limits.
 const POINTS: usize = 32;
 
 /// Series of all joints.
@@ -23,7 +24,7 @@ const POINTS: usize = 32;
 pub struct Fourier<const N: usize> {
     /// Constant term \[rad\].
     pub centre_rad: Vector<N>,
-    /// Amplitudes of the sines, one column of joints a harmonic \[rad\].
+    /// Amplitudes of the sines, one vector of joints per harmonic \[rad\].
     pub sine_rad: [Vector<N>; HARMONICS],
     /// Amplitudes of the cosines \[rad\].
     pub cosine_rad: [Vector<N>; HARMONICS],
@@ -31,11 +32,11 @@ pub struct Fourier<const N: usize> {
     pub angular_frequency_rad_per_s: f64,
     /// Time from rest to rest \[s\], at least twice `ramp_s`.
     pub duration_s: f64,
-    /// Time over which the pace grows and falls \[s\], positive.
+    /// Ramp time of the time scaling, at the start and at the end \[s\], positive.
     pub ramp_s: f64,
 }
 
-/// Where every joint should be.
+/// Reference of all joints.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointReference<const N: usize> {
     /// Angles \[rad\].
@@ -46,9 +47,9 @@ pub struct JointReference<const N: usize> {
     pub acceleration_rad_per_s2: Vector<N>,
 }
 
-/// Which limit of a joint a series breaks.
+/// Limit of a joint that a series violates.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Beyond {
+pub enum LimitViolation {
     /// Beyond a stop: joint and angle \[rad\].
     Position(usize, f64),
     /// Too fast: joint, speed and limit \[rad/s\].
@@ -56,7 +57,7 @@ pub enum Beyond {
 }
 
 impl<const N: usize> Fourier<N> {
-    /// At rest at `centre_rad` for `duration_s`, to be filled with amplitudes.
+    /// A series with zero amplitudes: rest at `centre_rad` for `duration_s`.
     pub fn at_rest(centre_rad: Vector<N>, angular_frequency_rad_per_s: f64) -> Fourier<N> {
         let period_s = TAU / angular_frequency_rad_per_s;
         Fourier {
@@ -69,7 +70,7 @@ impl<const N: usize> Fourier<N> {
         }
     }
 
-    /// One period at full pace \[s\].
+    /// Period at full speed \[s\].
     pub fn period_s(&self) -> f64 {
         TAU / self.angular_frequency_rad_per_s
     }
@@ -77,17 +78,17 @@ impl<const N: usize> Fourier<N> {
     /// Reference at `time_s` since the start.
     pub fn at(&self, time_s: f64) -> JointReference<N> {
         let left_s = self.duration_s - time_s.max(0.0);
-        let (s, pace, pace_rate) = if time_s <= 0.5 * self.duration_s {
-            ramped(time_s.max(0.0), self.ramp_s)
+        let (s, time_scale, time_scale_rate) = if time_s <= 0.5 * self.duration_s {
+            time_scaling(time_s.max(0.0), self.ramp_s)
         } else {
-            let (to_go, pace, rate) = ramped(left_s.max(0.0), self.ramp_s);
-            (self.duration_s - self.ramp_s - to_go, pace, -rate)
+            let (to_go, time_scale, rate) = time_scaling(left_s.max(0.0), self.ramp_s);
+            (self.duration_s - self.ramp_s - to_go, time_scale, -rate)
         };
         let (position_rad, slope, curve) = self.series(s);
         JointReference {
             position_rad,
-            velocity_rad_per_s: slope * pace,
-            acceleration_rad_per_s2: curve * (pace * pace) + slope * pace_rate,
+            velocity_rad_per_s: slope * time_scale,
+            acceleration_rad_per_s2: curve * (time_scale * time_scale) + slope * time_scale_rate,
         }
     }
 
@@ -107,10 +108,10 @@ impl<const N: usize> Fourier<N> {
         (value, slope, curve)
     }
 
-    /// Refuses what cannot be followed.
+    /// Rejects a series that cannot be followed.
     ///
     /// # Errors
-    /// The first entry that is wrong.
+    /// The first invalid entry.
     pub fn validate(&self) -> Result<(), TrajectoryError> {
         let columns = self.sine_rad.iter().chain(&self.cosine_rad);
         for column in columns.chain([&self.centre_rad]) {
@@ -138,13 +139,13 @@ impl<const N: usize> Fourier<N> {
         Ok(())
     }
 
-    /// Holds the series against the stops, without their soft zones, and the joint speeds, at points
-    /// over a period. Between them it can be beyond by a two-hundredth of an amplitude: the supervisor
-    /// watches the arm itself.
+    /// Checks the series against the joint limits (without the soft zones) and the speed limits at
+    /// sample points over one period. Between the points it may exceed a limit by 0.5 % of an
+    /// amplitude; the supervisor checks the arm itself.
     ///
     /// # Errors
-    /// The first limit that it breaks.
-    pub fn within(&self, limits: &Limits<N>) -> Result<(), Beyond> {
+    /// The first violated limit.
+    pub fn within(&self, limits: &Limits<N>) -> Result<(), LimitViolation> {
         let points = POINTS * HARMONICS;
         for i in 0..points {
             let s = self.period_s() * i as f64 / points as f64;
@@ -153,12 +154,12 @@ impl<const N: usize> Fourier<N> {
                 let lower = limits.position_lower_rad[joint] + limits.soft_zone_rad;
                 let upper = limits.position_upper_rad[joint] - limits.soft_zone_rad;
                 if !(lower..=upper).contains(&q[joint]) {
-                    return Err(Beyond::Position(joint, q[joint]));
+                    return Err(LimitViolation::Position(joint, q[joint]));
                 }
                 let speed = abs(qd[joint]);
                 let limit = limits.joint_speed_rad_per_s[joint];
                 if speed > limit || speed.is_nan() {
-                    return Err(Beyond::Speed(joint, speed, limit));
+                    return Err(LimitViolation::Speed(joint, speed, limit));
                 }
             }
         }

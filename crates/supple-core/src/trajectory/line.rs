@@ -5,7 +5,7 @@ use super::{
 };
 use crate::math::{Vector3, smooth_step, sqrt};
 
-/// From one point to another in a given time; it stays at the end.
+/// Line from one point to another in a given time; afterwards the reference stays at the end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Line {
     /// Start \[m\], base axes.
@@ -19,18 +19,18 @@ pub struct Line {
 impl Line {
     pub(super) fn at(&self, time_s: f64) -> Reference {
         let (x, rate, rate_rate) = smooth_step(time_s / self.duration_s);
-        let way = self.to_m - self.from_m;
+        let displacement = self.to_m - self.from_m;
         Reference {
-            position: self.from_m + way * x,
-            velocity: way * (rate / self.duration_s),
-            acceleration: way * (rate_rate / (self.duration_s * self.duration_s)),
+            position: self.from_m + displacement * x,
+            velocity: displacement * (rate / self.duration_s),
+            acceleration: displacement * (rate_rate / (self.duration_s * self.duration_s)),
         }
     }
 
     /// As [`super::Trajectory::peaks`].
     pub(super) fn peaks(&self) -> (f64, f64) {
-        let way = self.to_m - self.from_m;
-        let mean = sqrt(way.dot(&way)) / self.duration_s;
+        let displacement = self.to_m - self.from_m;
+        let mean = sqrt(displacement.dot(&displacement)) / self.duration_s;
         (
             MINIMUM_JERK_SPEED * mean,
             MINIMUM_JERK_ACCELERATION * mean / self.duration_s,

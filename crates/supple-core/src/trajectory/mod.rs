@@ -1,8 +1,8 @@
-//! Where the tip should be: position, velocity and acceleration as pure functions of time.
+//! References of the tip: position, velocity and acceleration as pure functions of time.
 //!
-//! Every trajectory starts from rest. Where its path does not, time itself is ramped: the path is
-//! walked at a pace that grows smoothly from nothing to one. Where a velocity jumps by design (the
-//! corners of the quadrant) the acceleration is that of the piece, never the jump.
+//! Every trajectory starts from rest. If its path does not, time scaling is applied: the path speed
+//! rises smoothly from zero to its nominal value. If the velocity jumps by design (at the corners
+//! of the quadrant), the acceleration is that of the piece, without the jump.
 
 mod arc;
 mod fourier;
@@ -12,7 +12,7 @@ mod quadrant;
 mod sinusoid;
 
 pub use arc::Arc;
-pub use fourier::{Beyond, Fourier, HARMONICS, JointReference};
+pub use fourier::{Fourier, HARMONICS, JointReference, LimitViolation};
 pub use line::Line;
 pub use probe::{Probe, ProbePhase};
 pub use quadrant::{Piece, Quadrant};
@@ -23,9 +23,10 @@ use core::fmt;
 
 /// Peak speed of a minimum-jerk motion over its mean speed.
 pub const MINIMUM_JERK_SPEED: f64 = 1.875;
-/// Peak acceleration of a minimum-jerk motion over its way by its duration squared: 10 / sqrt(3).
+/// Peak acceleration of a minimum-jerk motion over its distance by its duration squared: 10 /
+/// sqrt(3).
 pub const MINIMUM_JERK_ACCELERATION: f64 = 5.773_502_691_896_258;
-/// Peak jerk of a minimum-jerk motion over its way by its duration cubed.
+/// Peak jerk of a minimum-jerk motion over its distance by its duration cubed.
 pub const MINIMUM_JERK_JERK: f64 = 60.0;
 
 /// Reference of the tip in base coordinates: `Xo`, `Xo'`, `Xo''`.
@@ -40,7 +41,7 @@ pub struct Reference {
 }
 
 impl Reference {
-    /// At rest at `position` \[m\].
+    /// A reference at rest at `position` \[m\].
     pub fn at_rest(position: Vector3<f64>) -> Reference {
         Reference {
             position,
@@ -50,14 +51,14 @@ impl Reference {
     }
 }
 
-/// Which entry of a trajectory is wrong, with its value.
+/// The invalid entry of a trajectory, with its value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrajectoryError {
     /// Name of the entry.
     pub entry: &'static str,
     /// Value found.
     pub value: f64,
-    /// What it must be.
+    /// Requirement.
     pub must: &'static str,
 }
 
@@ -73,16 +74,16 @@ impl fmt::Display for TrajectoryError {
 
 impl core::error::Error for TrajectoryError {}
 
-/// A reference for the tip.
+/// A trajectory of the tip.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Trajectory {
     /// Stays at a point \[m\].
     Hold(Vector3<f64>),
     /// Straight line from rest to rest.
     Line(Line),
-    /// Back and forth along a line, figure 3a.
+    /// Oscillation along a line, figure 3a.
     Sinusoid(Sinusoid),
-    /// Back and forth on a circle about the base axis.
+    /// Oscillation on a circle about the base axis.
     Arc(Arc),
     /// Quarter ellipse and its two straight edges, figure 3b.
     Quadrant(Quadrant),
@@ -104,8 +105,8 @@ impl Trajectory {
         }
     }
 
-    /// Bounds on its speed \[m/s\] and acceleration \[m/s^2\] over its whole length; velocities that jump by design
-    /// apart.
+    /// Upper bounds of speed \[m/s\] and acceleration \[m/s^2\] over the whole length, without
+    /// velocity jumps by design.
     pub fn peaks(&self) -> (f64, f64) {
         match self {
             Trajectory::Hold(_) => (0.0, 0.0),
@@ -117,7 +118,8 @@ impl Trajectory {
         }
     }
 
-    /// Time after which it rests, or repeats itself \[s\].
+    /// Time after which the trajectory rests or repeats itself \[s\]; for a probe the time of its
+    /// first column.
     pub fn length_s(&self) -> f64 {
         match self {
             Trajectory::Hold(_) => 0.0,
@@ -133,10 +135,11 @@ impl Trajectory {
         }
     }
 
-    /// Refuses what cannot be followed: entries that are not finite or have the wrong sign.
+    /// Rejects a trajectory that cannot be followed: entries that are not finite or have the wrong
+    /// sign.
     ///
     /// # Errors
-    /// The first entry that is wrong.
+    /// The first invalid entry.
     pub fn validate(&self) -> Result<(), TrajectoryError> {
         match self {
             Trajectory::Hold(position) => finite("position_m", position),
@@ -149,16 +152,20 @@ impl Trajectory {
     }
 }
 
-/// Time along the path when its pace is ramped from rest over `ramp_s`: value, first and second
-/// derivative. The path lags by half the ramp.
-fn ramped(time_s: f64, ramp_s: f64) -> (f64, f64, f64) {
+/// Path time for a time scaling that is ramped from rest over `ramp_s`: value, first and second
+/// derivative. The path time lags by half the ramp time.
+fn time_scaling(time_s: f64, ramp_s: f64) -> (f64, f64, f64) {
     if time_s >= ramp_s {
         return (time_s - 0.5 * ramp_s, 1.0, 0.0);
     }
     let x = time_s / ramp_s;
-    let (pace, slope, _) = smooth_step(x);
+    let (time_scale, slope, _) = smooth_step(x);
     let x4 = x * x * x * x;
-    (ramp_s * x4 * (2.5 + x * (x - 3.0)), pace, slope / ramp_s)
+    (
+        ramp_s * x4 * (2.5 + x * (x - 3.0)),
+        time_scale,
+        slope / ramp_s,
+    )
 }
 
 fn finite(entry: &'static str, v: &Vector3<f64>) -> Result<(), TrajectoryError> {

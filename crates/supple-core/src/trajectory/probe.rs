@@ -1,19 +1,20 @@
-//! The probing cycle of the paper: down, up, out; at the radial limit the base advances.
+//! The probing cycle of the paper: down, up, out; at the end of a column the base advances.
 //!
 //! The stroke goes vertically down and up again at a constant speed with smooth ramps at its ends;
-//! then the tip steps out along the radius, from rest to rest. After the last stroke of a column the
-//! base turns by one step while the tip returns to the first radius, and the next column begins.
+//! then the tip steps out along the radius, from rest to rest. After the last stroke of a column
+//! the base rotates by one step while the tip returns to the first radius, and the next column
+//! begins.
 
 use super::{
     MINIMUM_JERK_ACCELERATION, MINIMUM_JERK_SPEED, Reference, TrajectoryError, finite, positive,
-    ramped,
+    time_scaling,
 };
 use crate::math::{Vector3, sin_cos, smooth_step};
 
 /// Peak speed of a minimum-jerk move is this times its mean speed.
 const MINIMUM_JERK_PEAK: f64 = 1.875;
 
-/// Where in the cycle the reference is.
+/// Phase of the probing cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ProbePhase {
     /// Moving down.
@@ -22,7 +23,7 @@ pub enum ProbePhase {
     Up,
     /// Stepping out along the radius.
     Out,
-    /// Turning the base and returning to the first radius.
+    /// Rotating the base and returning to the first radius.
     Advance,
 }
 
@@ -43,9 +44,9 @@ pub struct Probe {
     pub azimuth_rad: f64,
     /// Azimuth step between columns \[rad\].
     pub azimuth_step_rad: f64,
-    /// Speed of the stroke and greatest speed of the steps \[m/s\], positive.
+    /// Speed of the stroke and peak speed of the steps \[m/s\], positive.
     pub speed_m_per_s: f64,
-    /// Time to reach and to leave that speed \[s\], positive.
+    /// Ramp time of the stroke's speed \[s\], positive.
     pub ramp_s: f64,
 }
 
@@ -135,18 +136,19 @@ impl Probe {
         let v = self.speed_m_per_s;
         let stroke_s = self.stroke_s();
         if t <= 0.5 * stroke_s {
-            let (s, pace, rate) = ramped(t, self.ramp_s);
-            (-v * s, -v * pace, -v * rate)
+            let (s, time_scale, rate) = time_scaling(t, self.ramp_s);
+            (-v * s, -v * time_scale, -v * rate)
         } else {
-            let (s, pace, rate) = ramped((stroke_s - t).max(0.0), self.ramp_s);
-            (-self.stroke_m + v * s, -v * pace, v * rate)
+            let (s, time_scale, rate) = time_scaling((stroke_s - t).max(0.0), self.ramp_s);
+            (-self.stroke_m + v * s, -v * time_scale, v * rate)
         }
     }
 
     /// As [`super::Trajectory::peaks`].
     pub(super) fn peaks(&self) -> (f64, f64) {
         let speed = self.speed_m_per_s;
-        // A step of length L is as long as its peak speed asks for: L / T^2 is speed^2 / L but for a factor.
+        // The peak speed fixes the duration T of a step of length L, so L / T^2 is proportional to
+        // speed^2 / L.
         let shortest = self.radial_step_m;
         let steps = speed * MINIMUM_JERK_ACCELERATION / (MINIMUM_JERK_SPEED * MINIMUM_JERK_SPEED);
         let turning = if self.azimuth_step_rad == 0.0 {
@@ -179,12 +181,12 @@ impl Probe {
     }
 }
 
-fn step(t: f64, duration: f64, way: f64) -> (f64, f64, f64) {
+fn step(t: f64, duration: f64, displacement: f64) -> (f64, f64, f64) {
     let (x, rate, rate_rate) = smooth_step(t / duration);
     (
-        way * x,
-        way * rate / duration,
-        way * rate_rate / (duration * duration),
+        displacement * x,
+        displacement * rate / duration,
+        displacement * rate_rate / (duration * duration),
     )
 }
 

@@ -1,10 +1,10 @@
 //! Quarter ellipse with unequal semi-axes and the two straight edges that close it, figure 3b.
 //!
-//! The path starts at the centre, runs out along the first semi-axis, round the quarter ellipse, and
-//! back along the second semi-axis; then again. Speed is constant on each piece, so the velocity jumps
-//! at the three corners, where the acceleration stays that of the piece.
+//! The path starts at the centre, runs out along the first semi-axis, along the quarter ellipse,
+//! and back along the second semi-axis; then it repeats. Speed is constant on each piece, so the
+//! velocity jumps at the three corners, where the acceleration stays that of the piece.
 
-use super::{MINIMUM_JERK_SPEED, Reference, TrajectoryError, finite, positive, ramped};
+use super::{MINIMUM_JERK_SPEED, Reference, TrajectoryError, finite, positive, time_scaling};
 use crate::math::{Vector3, abs, sin_cos, sqrt};
 
 /// Knots of the arc-length table.
@@ -18,7 +18,7 @@ const GAUSS: [(f64, f64); 5] = [
     (0.906_179_845_938_664, 0.236_926_885_056_189_1),
 ];
 
-/// Which piece of the path the reference is on.
+/// Piece of the path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Piece {
     /// From the centre out along the first semi-axis.
@@ -29,7 +29,7 @@ pub enum Piece {
     Back,
 }
 
-/// Quarter ellipse and edges, walked at constant speed.
+/// Quarter ellipse and edges, followed at constant speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quadrant {
     centre_m: Vector3<f64>,
@@ -42,9 +42,9 @@ pub struct Quadrant {
 }
 
 impl Quadrant {
-    /// `centre_m` is the corner between the edges, `first_m` and `second_m` the semi-axes (orthogonal
-    /// vectors in base axes, they span the plane), `speed_m_per_s` the speed on every piece, `ramp_s`
-    /// the time over which the pace grows from nothing to one at the start.
+    /// `centre_m` is the corner between the edges, `first_m` and `second_m` the semi-axes
+    /// (orthogonal vectors in base axes, they span the plane), `speed_m_per_s` the speed on every
+    /// piece, `ramp_s` the ramp time of the time scaling from zero to one at the start.
     pub fn new(
         centre_m: Vector3<f64>,
         first_m: Vector3<f64>,
@@ -98,7 +98,7 @@ impl Quadrant {
         self.speed_m_per_s
     }
 
-    /// Time over which the pace grows from nothing to one \[s\].
+    /// Ramp time of the time scaling from zero to one \[s\].
     pub fn ramp_s(&self) -> f64 {
         self.ramp_s
     }
@@ -112,14 +112,14 @@ impl Quadrant {
         ]
     }
 
-    /// Time of one round at full pace \[s\].
+    /// Time of one round at full speed \[s\].
     pub fn period_s(&self) -> f64 {
         self.lengths_m().iter().sum::<f64>() / self.speed_m_per_s
     }
 
-    /// Piece, share of it covered in 0..1, and rounds completed at `time_s`.
+    /// Piece, covered fraction of it (0 to 1), and completed rounds at `time_s`.
     pub fn piece_at(&self, time_s: f64) -> (Piece, f64, u32) {
-        let (s, _, _) = ramped(time_s.max(0.0), self.ramp_s);
+        let (s, _, _) = time_scaling(time_s.max(0.0), self.ramp_s);
         let (piece, along, round) = self.locate(s);
         let lengths = self.lengths_m();
         (piece, along / lengths[piece as usize], round)
@@ -142,7 +142,7 @@ impl Quadrant {
     }
 
     pub(super) fn at(&self, time_s: f64) -> Reference {
-        let (s, pace, pace_rate) = ramped(time_s, self.ramp_s);
+        let (s, time_scale, time_scale_rate) = time_scaling(time_s, self.ramp_s);
         let (piece, along, _) = self.locate(s);
         let (position, tangent, curvature) = match piece {
             Piece::Out => {
@@ -156,11 +156,12 @@ impl Quadrant {
                 (position, tangent, Vector3::zeros())
             }
         };
-        let speed = self.speed_m_per_s * pace;
+        let speed = self.speed_m_per_s * time_scale;
         Reference {
             position,
             velocity: tangent * speed,
-            acceleration: curvature * (speed * speed) + tangent * (self.speed_m_per_s * pace_rate),
+            acceleration: curvature * (speed * speed)
+                + tangent * (self.speed_m_per_s * time_scale_rate),
         }
     }
 
@@ -173,7 +174,7 @@ impl Quadrant {
         let mut u = knot(k);
         for _ in 0..6 {
             let error = self.arc_length_m[k] + self.arc_between(knot(k), u) - along;
-            let step = error / self.stretch(u);
+            let step = error / self.arc_length_rate(u);
             u -= step;
             if abs(step) < 1e-15 {
                 break;
@@ -182,14 +183,14 @@ impl Quadrant {
         let (sin, cos) = sin_cos(u);
         let rate = self.second_m * cos - self.first_m * sin;
         let rate_rate = -(self.first_m * cos + self.second_m * sin);
-        let stretch2 = rate.dot(&rate);
-        let tangent = rate / sqrt(stretch2);
-        let curvature = (rate_rate - tangent * tangent.dot(&rate_rate)) / stretch2;
+        let arc_length_rate2 = rate.dot(&rate);
+        let tangent = rate / sqrt(arc_length_rate2);
+        let curvature = (rate_rate - tangent * tangent.dot(&rate_rate)) / arc_length_rate2;
         let position = self.centre_m + self.first_m * cos + self.second_m * sin;
         (position, tangent, curvature)
     }
 
-    fn stretch(&self, u: f64) -> f64 {
+    fn arc_length_rate(&self, u: f64) -> f64 {
         let (sin, cos) = sin_cos(u);
         norm(&(self.second_m * cos - self.first_m * sin))
     }
@@ -198,12 +199,13 @@ impl Quadrant {
         let (mid, half) = (0.5 * (from + to), 0.5 * (to - from));
         let sum: f64 = GAUSS
             .iter()
-            .map(|(x, weight)| weight * self.stretch(mid + half * x))
+            .map(|(x, weight)| weight * self.arc_length_rate(mid + half * x))
             .sum();
         sum * half
     }
 
-    /// As [`super::Trajectory::peaks`]; the ellipse is bent most at the end of its longer semi-axis.
+    /// As [`super::Trajectory::peaks`]; the curvature of the ellipse is largest at the end of its
+    /// longer semi-axis.
     pub(super) fn peaks(&self) -> (f64, f64) {
         let (first, second) = (norm(&self.first_m), norm(&self.second_m));
         let (long, short) = (first.max(second), first.min(second));
@@ -212,7 +214,7 @@ impl Quadrant {
         (speed, speed * (MINIMUM_JERK_SPEED / self.ramp_s + bend))
     }
 
-    /// The ramp and a round \[s\].
+    /// Time of the ramp and one round \[s\].
     pub(super) fn length_s(&self) -> f64 {
         self.ramp_s + self.period_s()
     }

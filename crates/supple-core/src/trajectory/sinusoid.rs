@@ -1,9 +1,9 @@
 //! Sinusoid along a line: the paper's `x(t) = 0.6 + 0.2 sin(pi t / 4)`.
 
-use super::{MINIMUM_JERK_SPEED, Reference, TrajectoryError, finite, positive, ramped};
+use super::{MINIMUM_JERK_SPEED, Reference, TrajectoryError, finite, positive, time_scaling};
 use crate::math::{Vector3, sin_cos, sqrt};
 
-/// `Xo = centre + amplitude sin(omega s(t))`, with the pace of `s` ramped from rest.
+/// `Xo = centre + amplitude sin(omega s(t))`, with the rate of `s` ramped from rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sinusoid {
     /// Centre, where it starts \[m\], base axes.
@@ -12,12 +12,12 @@ pub struct Sinusoid {
     pub amplitude_m: Vector3<f64>,
     /// `omega` \[rad/s\], positive.
     pub angular_frequency_rad_per_s: f64,
-    /// Time over which the pace grows from nothing to one \[s\], positive.
+    /// Ramp time of the time scaling from zero to one \[s\], positive.
     pub ramp_s: f64,
 }
 
 impl Sinusoid {
-    /// The paper's trajectory in the plane `y = z = 0`, at `speed` times its pace.
+    /// The paper's trajectory in the plane `y = z = 0`, at `speed` times its speed.
     pub fn paper(speed: f64) -> Sinusoid {
         Sinusoid {
             centre_m: Vector3::new(0.6, 0.0, 0.0),
@@ -27,19 +27,20 @@ impl Sinusoid {
         }
     }
 
-    /// One period at full pace \[s\].
+    /// Period at full speed \[s\].
     pub fn period_s(&self) -> f64 {
         core::f64::consts::TAU / self.angular_frequency_rad_per_s
     }
 
     pub(super) fn at(&self, time_s: f64) -> Reference {
-        let (s, pace, pace_rate) = ramped(time_s, self.ramp_s);
+        let (s, time_scale, time_scale_rate) = time_scaling(time_s, self.ramp_s);
         let w = self.angular_frequency_rad_per_s;
         let (sin, cos) = sin_cos(w * s);
         Reference {
             position: self.centre_m + self.amplitude_m * sin,
-            velocity: self.amplitude_m * (w * cos * pace),
-            acceleration: self.amplitude_m * (w * cos * pace_rate - w * w * sin * pace * pace),
+            velocity: self.amplitude_m * (w * cos * time_scale),
+            acceleration: self.amplitude_m
+                * (w * cos * time_scale_rate - w * w * sin * time_scale * time_scale),
         }
     }
 

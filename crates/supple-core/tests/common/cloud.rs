@@ -1,5 +1,5 @@
-//! Bodies as clouds of point masses, and an arm as the clouds its joints carry: mechanics from first
-//! principles, in link frames, without any formula of the library.
+//! Bodies and arms as clouds of point masses: mechanics from first principles, in link frames,
+//! without any formula of the library.
 
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::nalgebra::{Rotation3, Unit};
@@ -45,8 +45,8 @@ impl Cloud {
         }
     }
 
-    /// The same cloud seen from frame `a`, given in frame `b`.
-    pub fn seen_from(&self, a_from_b: &Pose) -> Cloud {
+    /// The same cloud expressed in frame `a`; `self` is given in frame `b`.
+    pub fn expressed_in(&self, a_from_b: &Pose) -> Cloud {
         let seen = |p: &Point| Point {
             position_m: a_from_b.transform_point(&p.position_m),
             ..*p
@@ -60,7 +60,7 @@ impl Cloud {
     }
 }
 
-/// Turn by `angle_rad` about a unit `axis` through the origin.
+/// Rotation by `angle_rad` about a unit `axis` through the origin.
 pub fn turn(axis: &Vector3<f64>, angle_rad: f64) -> Pose {
     Pose {
         rotation: Rotation3::from_axis_angle(&Unit::new_unchecked(*axis), angle_rad).into_inner(),
@@ -77,7 +77,7 @@ pub fn link_poses<const N: usize>(joints: &[Joint; N], q: &Vector<N>) -> [Pose; 
     })
 }
 
-/// Columns: velocity of a point of link `link`, now at `position` in the base, for unit speed of each
+/// Columns: velocity of a point of link `link`, at `position` in the base, for unit speed of each
 /// joint.
 pub fn point_jacobian<const N: usize>(
     joints: &[Joint; N],
@@ -94,8 +94,9 @@ pub fn point_jacobian<const N: usize>(
     jacobian
 }
 
-/// Mass matrix without rotors and potential energy, point by point. `clouds` in link frames.
-pub fn swarm<const N: usize>(
+/// Mass matrix without rotors, and potential energy, summed over the points. `clouds` in link
+/// frames.
+pub fn point_mass_reference<const N: usize>(
     joints: &[Joint; N],
     clouds: &[Cloud; N],
     gravity: &Vector3<f64>,
@@ -105,7 +106,7 @@ pub fn swarm<const N: usize>(
     let mut mass_matrix = Matrix::<N, N>::zeros();
     let mut potential_energy = 0.0;
     for (link, cloud) in clouds.iter().enumerate() {
-        for point in &cloud.seen_from(&poses[link]).0 {
+        for point in &cloud.expressed_in(&poses[link]).0 {
             let j = point_jacobian(joints, &poses, link, &point.position_m);
             mass_matrix += j.transpose() * j * point.mass_kg;
             potential_energy -= point.mass_kg * gravity.dot(&point.position_m);

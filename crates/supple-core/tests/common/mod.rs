@@ -1,8 +1,8 @@
-//! What the tests of the dynamics share: reference arms, random arms, comparisons, derivatives.
+//! Shared by the dynamics tests: reference arms, random arms, comparisons, derivatives.
 #![allow(dead_code, reason = "each test binary takes its own part of this")]
 #![allow(
     clippy::disallowed_methods,
-    reason = "references take their mathematics elsewhere"
+    reason = "reference values use other mathematical functions"
 )]
 
 pub mod cloud;

@@ -1,4 +1,4 @@
-//! Comparisons that no NaN can pass, and fourth-order central differences.
+//! Comparisons that reject NaN, and fourth-order central differences.
 
 use std::ops::{Add, Mul, Sub};
 use supple_core::{Matrix, Vector};
@@ -6,7 +6,7 @@ use supple_core::{Matrix, Vector};
 /// Step of [`derivative`]: truncation and rounding are both near 1e-10 for the random arms here.
 pub const STEP: f64 = 2e-4;
 
-/// Greatest entry of `|found - expected| / (scale + |expected|)`; infinite where an entry is NaN.
+/// Largest entry of `|found - expected| / (scale + |expected|)`; infinite if an entry is NaN.
 pub fn error_at_scale<const R: usize, const C: usize>(
     found: &Matrix<R, C>,
     expected: &Matrix<R, C>,
@@ -22,7 +22,7 @@ pub fn error_at_scale<const R: usize, const C: usize>(
     })
 }
 
-/// Greatest entry of `|found - expected| / (1 + |expected|)`; infinite where an entry is NaN.
+/// Largest entry of `|found - expected| / (1 + |expected|)`; infinite if an entry is NaN.
 pub fn mixed_error<const R: usize, const C: usize>(
     found: &Matrix<R, C>,
     expected: &Matrix<R, C>,
@@ -30,12 +30,12 @@ pub fn mixed_error<const R: usize, const C: usize>(
     error_at_scale(found, expected, 1.0)
 }
 
-/// Greatest absolute entry.
+/// Largest absolute entry.
 pub fn size<const R: usize, const C: usize>(m: &Matrix<R, C>) -> f64 {
     m.iter().fold(0.0, |worst: f64, x| worst.max(x.abs()))
 }
 
-/// A number as a 1 x 1 matrix, to be compared like the others.
+/// A number as a 1 x 1 matrix, for comparison with the functions above.
 pub fn scalar(x: f64) -> Vector<1> {
     Vector::<1>::new(x)
 }
@@ -57,7 +57,7 @@ pub fn unit<const N: usize>(i: usize) -> Vector<N> {
     e
 }
 
-/// Fails the surrounding property where `found` and `expected` differ by more than `tolerance`
+/// Fails the surrounding property if `found` and `expected` differ by more than `tolerance`
 /// relative to `scale + |expected|`, entry by entry.
 #[macro_export]
 macro_rules! prop_close {

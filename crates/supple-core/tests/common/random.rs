@@ -1,4 +1,5 @@
-//! Random physical arms: bodies are clouds of point masses, axes and frames point anywhere.
+//! Random physical arms: bodies are clouds of point masses, axes and frames have random
+//! orientations.
 
 use super::cloud::{Cloud, Point};
 use proptest::collection::vec;
@@ -7,7 +8,7 @@ use proptest::test_runner::{Config, RngSeed, TestCaseError, TestRunner};
 use supple_core::math::Vector3;
 use supple_core::{Arm, Joint, Pose, Vector};
 
-/// A random arm, its parts, and a random state.
+/// A random arm, its components, and a random state.
 #[derive(Clone, Debug)]
 pub struct Case<const N: usize> {
     pub joints: [Joint; N],
@@ -29,12 +30,12 @@ impl<const N: usize> Case<N> {
             .expect("random arms are physical")
     }
 
-    /// The links' bodies in their link frames, the last one with the tool.
+    /// The links' bodies in their link frames; the last one includes the tool.
     pub fn carried(&self) -> [Cloud; N] {
         let mut clouds = self.clouds.clone();
         if let Some(tool) = &self.tool {
             let last = clouds[N - 1].clone();
-            clouds[N - 1] = last.joined(tool.seen_from(&self.last_link_from_tip));
+            clouds[N - 1] = last.joined(tool.expressed_in(&self.last_link_from_tip));
         }
         clouds
     }
@@ -46,7 +47,7 @@ impl<const N: usize> Case<N> {
 
 /// Runs `property` on 200 random arms of `N` joints, the same ones each time.
 ///
-/// `PROPTEST_CASES` and `PROPTEST_RNG_SEED` ask for others.
+/// `PROPTEST_CASES` and `PROPTEST_RNG_SEED` override number and seed.
 pub fn check<const N: usize>(property: fn(&Case<N>) -> Result<(), TestCaseError>) {
     let mut config = Config {
         failure_persistence: None,
@@ -64,7 +65,7 @@ pub fn check<const N: usize>(property: fn(&Case<N>) -> Result<(), TestCaseError>
     }
 }
 
-/// One test for each property named and each arm size of interest.
+/// Defines one test per property and arm size.
 #[macro_export]
 macro_rules! for_arms_of_3_4_and_7_joints {
     ($($property:ident),* $(,)?) => {$(
@@ -83,7 +84,8 @@ fn vector3(reach: f64) -> impl Strategy<Value = Vector3<f64>> {
     [-reach..reach, -reach..reach, -reach..reach].prop_map(Vector3::from)
 }
 
-/// Unit vectors: any, in a coordinate plane, beside a coordinate axis, and along one either way.
+/// Unit vectors: arbitrary, in a coordinate plane, close to a coordinate axis, and along one in
+/// either direction.
 pub fn direction() -> impl Strategy<Value = Vector3<f64>> {
     let oblique = vector3(1.0)
         .prop_filter("long enough to have a direction", |v| v.norm() > 0.1)

@@ -1,4 +1,4 @@
-//! The reference arms and the states recorded for them; see `data/README.md`.
+//! The reference arms and their recorded states; see `data/README.md`.
 
 use serde_json::Value;
 use std::array::from_fn;
@@ -15,7 +15,7 @@ pub struct Reference<const N: usize> {
     pub samples: Vec<Sample<N>>,
 }
 
-/// One state and what the independent libraries say of it.
+/// One state and its dynamic quantities from independent libraries.
 pub struct Sample<const N: usize> {
     pub q: Vector<N>,
     pub qd: Vector<N>,
@@ -32,7 +32,7 @@ pub struct Sample<const N: usize> {
     pub coriolis_matrix: Matrix<N, N>,
     pub kinetic_energy: f64,
     pub potential_energy: f64,
-    /// Blocks of ten columns a link; for the first states only.
+    /// Blocks of ten columns per link; for the first states only.
     pub regressor: Option<Regressor<N>>,
 }
 

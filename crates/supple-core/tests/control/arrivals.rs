@@ -1,17 +1,17 @@
-//! How states arrive: replies lost, states repeated, missing, out of order.
+//! Arrival of states: lost replies, repeated and missing states, states out of order.
 
 use crate::support::configs::four;
 use crate::support::rig::{Rig, bent};
 use supple_core::controller::{Fault, Mode};
 use supple_core::{Input, Output, Vector};
 
-/// Steadily turning, in gravity hold.
-fn turning() -> (Rig<4>, Vector<4>) {
-    turning_with(four().plausible.lost_replies)
+/// An arm rotating at constant speed in gravity hold.
+fn rotating() -> (Rig<4>, Vector<4>) {
+    rotating_with(four().plausible.lost_replies)
 }
 
-/// The same with so many lost replies tolerated.
-fn turning_with(lost_replies: u32) -> (Rig<4>, Vector<4>) {
+/// The same with `lost_replies` tolerated.
+fn rotating_with(lost_replies: u32) -> (Rig<4>, Vector<4>) {
     let speed = Vector::<4>::new(0.3, 0.2, 0.0, -0.4);
     let mut config = four();
     config.plausible.lost_replies = lost_replies;
@@ -35,7 +35,7 @@ fn without(rig: &Rig<4>, joints: &[usize]) -> Input<4> {
 #[test]
 fn a_single_lost_reply_is_coasted_over() {
     for lost in [&[0][..], &[3], &[0, 1, 2, 3]] {
-        let (mut rig, speed) = turning();
+        let (mut rig, speed) = rotating();
         rig.q += speed * 1e-3;
         let trusted = rig.cycle().fallback_torque_nm;
         rig.q += speed * 1e-3;
@@ -44,7 +44,7 @@ fn a_single_lost_reply_is_coasted_over() {
         let error = output.position_rad - rig.q;
         assert!(error.norm() < 1e-9, "coasted {error} away");
         assert!((output.velocity_rad_per_s - speed).norm() < 1e-6);
-        // The fallback is gravity at the last pose that was measured whole.
+        // The fallback is gravity at the last completely measured pose.
         assert_eq!(output.fallback_torque_nm, trusted);
         rig.q += speed * 1e-3;
         let output = rig.cycle();
@@ -54,9 +54,9 @@ fn a_single_lost_reply_is_coasted_over() {
 }
 
 #[test]
-fn every_other_reply_lost_is_a_fault_and_one_in_ten_is_not() {
+fn losing_every_other_reply_faults_and_one_in_ten_does_not() {
     let losing = |every: u64| {
-        let (mut rig, speed) = turning_with(3);
+        let (mut rig, speed) = rotating_with(3);
         for k in 0..400 {
             rig.q += speed * 1e-3;
             let lost: &[usize] = if k % every == 0 { &[1] } else { &[] };
@@ -87,7 +87,7 @@ fn two_lost_replies_in_a_row_are_a_fault() {
 }
 
 #[test]
-fn the_first_state_must_be_whole() {
+fn the_first_state_must_be_complete() {
     for joint in 0..4 {
         let mut rig = Rig::new(four(), bent());
         let output = rig.step(&without(&rig, &[joint]));
@@ -105,7 +105,7 @@ fn repeat(rig: &mut Rig<4>) -> Output<4> {
 }
 
 #[test]
-fn the_same_state_again_is_tolerated_for_a_while() {
+fn a_repeated_state_is_tolerated_for_some_cycles() {
     let limit = four().limits.stale_cycles;
     let mut rig = Rig::holding(four(), bent());
     rig.accept(rig.stay());
@@ -113,7 +113,7 @@ fn the_same_state_again_is_tolerated_for_a_while() {
     for _ in 0..limit {
         let output = repeat(&mut rig);
         assert_eq!((output.fault, output.mode), (None, Mode::Track));
-        // Time stands still, and so does the reference.
+        // Controller time pauses, and so does the reference.
         assert_eq!(output.mode_time_s, last.mode_time_s);
         assert_eq!(output.reference, last.reference);
         assert!((output.torque_nm - last.torque_nm).norm() < 1e-9);
@@ -129,7 +129,7 @@ fn the_same_state_again_is_tolerated_for_a_while() {
 }
 
 #[test]
-fn a_new_state_ends_the_count() {
+fn a_new_state_resets_the_stale_count() {
     let limit = four().limits.stale_cycles;
     let mut rig = Rig::holding(four(), bent());
     for _ in 0..20 {
@@ -141,9 +141,9 @@ fn a_new_state_ends_the_count() {
 }
 
 #[test]
-fn missing_states_are_tolerated_for_as_long() {
+fn missing_states_are_tolerated_as_long_as_repeated_ones() {
     let limit = four().limits.stale_cycles;
-    let (rig, speed) = turning();
+    let (rig, speed) = rotating();
     for missing in 0..=limit + 3 {
         let mut rig = rig.clone();
         rig.cycle += u64::from(missing);
@@ -160,7 +160,7 @@ fn missing_states_are_tolerated_for_as_long() {
 }
 
 #[test]
-fn a_state_from_the_past_is_a_fault_and_then_the_new_count_holds() {
+fn a_lower_cycle_number_faults_and_becomes_the_new_reference() {
     let mut rig = Rig::holding(four(), bent());
     let last = rig.cycle - 1;
     let received = last - 7;
@@ -182,7 +182,7 @@ fn a_state_from_the_past_is_a_fault_and_then_the_new_count_holds() {
 }
 
 #[test]
-fn the_ends_of_the_count() {
+fn cycle_numbers_at_the_limits_of_u64() {
     let mut rig = Rig::holding(four(), bent());
     let last = rig.cycle - 1;
     let output = rig.step(&Input {
@@ -205,9 +205,9 @@ fn the_ends_of_the_count() {
     );
 }
 
-/// A state that is seen again is still looked at where it may have changed: the force.
+/// The tip force of a repeated state is still checked, as it may have changed.
 #[test]
-fn a_repeated_state_with_a_force_that_is_no_number() {
+fn a_repeated_state_with_a_nan_force_faults() {
     let mut rig = Rig::holding(four(), bent());
     rig.cycle();
     rig.force_n = Some(supple_core::math::Vector3::repeat(f64::NAN));

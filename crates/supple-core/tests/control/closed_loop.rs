@@ -5,26 +5,26 @@ use crate::support::plant::{Plant, nothing, push};
 use crate::support::rig::Rig;
 use supple_core::config::Gains;
 use supple_core::controller::{Mode, Request};
+use supple_core::inverse_kinematics::inverse_kinematics;
 use supple_core::math::Vector3;
-use supple_core::reach::reach;
 use supple_core::trajectory::Sinusoid;
 use supple_core::{Config, Trajectory, Vector};
 
 fn start<const N: usize>(config: &Config<N>, seed: Vector<N>) -> Vector<N> {
     let point = Vector3::new(0.6, 0.0, 0.0);
-    let place = reach(&config.arm, &config.roles, &config.limits, &seed, &point);
+    let place = inverse_kinematics(&config.arm, &config.roles, &config.limits, &seed, &point);
     assert!(place.reached());
     place.position_rad
 }
 
-/// Idle, hold, move to the start, track, hold: the errors on the way.
+/// Idle, hold, move to the start, track, hold: returns the errors.
 fn mission<const N: usize>(mut config: Config<N>, seed: Vector<N>) -> (f64, f64) {
     config.law.gains = Gains::isotropic(5.0, 1.5);
     let target = start(&config, seed);
     let mut plant = Plant::at_rest(config.arm, seed);
     let mut rig = Rig::new(config, seed);
     rig.drive(&mut plant, None, nothing);
-    // The arm falls while the torque comes up from nothing; the hold's damping catches it.
+    // The arm falls while the torque rises from zero; the damping of gravity hold stops it.
     rig.drive(&mut plant, Some(Request::GravityHold), nothing);
     for _ in 0..1000 {
         assert_eq!(rig.run(&mut plant).fault, None);
@@ -78,9 +78,9 @@ fn the_papers_sinusoid_with_a_held_roll() {
     );
 }
 
-/// Pushed with a steady force the tip gives way by `F / K`, and the observer says how hard.
+/// Under a constant force the tip is displaced by `F / K`, and the observer estimates the force.
 #[test]
-fn a_steady_push_is_felt_and_given_way_to() {
+fn a_constant_force_is_observed_and_displaces_the_tip() {
     let mut config = three();
     config.law.gains = Gains::isotropic(100.0, 40.0);
     let q = start(&config, Vector::<3>::new(0.0, 0.4, 1.4));
@@ -105,7 +105,7 @@ fn a_steady_push_is_felt_and_given_way_to() {
     assert!((output.external_torque_nm - at_joints).norm() < 1e-3);
 }
 
-/// A frictionless arm in gravity hold coasts and is slowed by the damping, never driven.
+/// A frictionless arm in gravity hold is slowed by the damping and never accelerated.
 #[test]
 fn gravity_hold_takes_energy() {
     let config = three();
@@ -120,7 +120,7 @@ fn gravity_hold_takes_energy() {
     let mut last = begun;
     for k in 0..3000 {
         assert_eq!(rig.run(&mut plant).fault, None);
-        // The estimator is 10 ms late.
+        // The estimator lags by 10 ms.
         if k % 50 == 49 {
             let now = energy(&plant);
             assert!(now < last + 1e-6 * begun, "{now} J after {last} J");

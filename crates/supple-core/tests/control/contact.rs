@@ -1,12 +1,12 @@
-//! The contact latch in the loop: when it closes, what it takes away, when it opens.
+//! The contact latch in the loop: when it closes, what it fades, when it opens.
 
 use crate::support::configs::{friction, three, unlimited};
 use crate::support::plant::{Plant, nothing, push};
 use crate::support::rig::Rig;
 use supple_core::config::{ContactLatch, Gains};
 use supple_core::controller::Request;
+use supple_core::inverse_kinematics::inverse_kinematics;
 use supple_core::math::Vector3;
-use supple_core::reach::reach;
 use supple_core::trajectory::Line;
 use supple_core::{Config, Friction, Output, Trajectory, Vector};
 
@@ -41,7 +41,7 @@ const DOWN: Vector3<f64> = Vector3::new(0.0, 0.0, -0.1);
 impl Bench {
     fn new(config: Config<3>) -> Bench {
         let seed = Vector::<3>::new(0.0, 0.4, 1.4);
-        let place = reach(&config.arm, &config.roles, &config.limits, &seed, &CENTRE);
+        let place = inverse_kinematics(&config.arm, &config.roles, &config.limits, &seed, &CENTRE);
         let plant = Plant::at_rest(config.arm, place.position_rad);
         let mut rig = Rig::holding(config, place.position_rad);
         let mut bench = Bench {
@@ -54,8 +54,8 @@ impl Bench {
         bench
     }
 
-    /// One cycle; the arm has the friction that the controller expects, at the reference's velocity,
-    /// so that what is observed is the force alone; `force` pushes on the tip.
+    /// One cycle with `force` on the tip. The arm has the friction that the controller expects at
+    /// the reference's velocity, so that only the force is observed.
     fn cycle(&mut self, request: Option<Request<3>>, force: Vector3<f64>) -> Output<3> {
         let output = self
             .rig
@@ -73,9 +73,9 @@ fn up(newtons: f64) -> Vector3<f64> {
     Vector3::new(0.0, 0.0, newtons)
 }
 
-/// Latched exactly from the cycle in which the force passes the threshold that is reported.
+/// Contact is latched exactly from the cycle in which the force exceeds the reported threshold.
 #[test]
-fn it_closes_where_the_force_passes_the_threshold() {
+fn the_latch_closes_when_the_force_exceeds_the_threshold() {
     let mut bench = Bench::new(config(|_| {}));
     bench.cycles(600, up(0.0));
     let mut closed = 0;
@@ -95,7 +95,7 @@ fn it_closes_where_the_force_passes_the_threshold() {
 }
 
 #[test]
-fn a_force_that_helps_or_crosses_is_no_contact() {
+fn assisting_and_lateral_forces_do_not_latch() {
     for force in [
         up(-20.0),
         Vector3::new(8.0, 0.0, 0.0),
@@ -109,7 +109,8 @@ fn a_force_that_helps_or_crosses_is_no_contact() {
     }
 }
 
-/// After a start or a reversal the observer is still wrong: twice the threshold, for the time stated.
+/// After a start or a reversal the observer has not settled: the threshold is doubled for the
+/// configured time.
 #[test]
 fn the_threshold_is_doubled_after_a_start_and_a_reversal() {
     let mut bench = Bench::new(config(|_| {}));
@@ -126,14 +127,14 @@ fn the_threshold_is_doubled_after_a_start_and_a_reversal() {
     let doubled = seen.iter().filter(|threshold| **threshold == 6.0).count();
     let single = seen.iter().filter(|threshold| **threshold == 3.0).count();
     assert_eq!(doubled + single, seen.len());
-    // 0.2 s from where the reference moves at all, which it does a little after each request.
+    // 0.2 s from the start of the reference's motion, which is a little after each request.
     assert!((400..600).contains(&doubled), "{doubled} ms doubled");
     assert_eq!(seen[999], 3.0);
     assert_eq!(seen[1100], 6.0);
     assert_eq!(seen[1999], 3.0);
 }
 
-/// Held against the arm after contact, then the reference turns back.
+/// Contact with the arm, then a reversal of the reference.
 fn touch_and_retreat(latch: impl FnOnce(&mut ContactLatch)) -> (Vec<Output<3>>, Vec<Output<3>>) {
     let mut config = config(latch);
     config.friction = friction().map(|friction: Friction| Friction {
@@ -157,7 +158,7 @@ fn first_contact(outputs: &[Output<3>]) -> usize {
 }
 
 #[test]
-fn the_friction_is_gone_10_ms_after_contact_and_back_after_the_retreat() {
+fn friction_fades_in_10_ms_and_is_restored_after_the_retreat() {
     let (touching, leaving) = touch_and_retreat(|_| {});
     let at = first_contact(&touching);
     assert!(at < 60, "noticed after {at} ms");
@@ -169,19 +170,19 @@ fn the_friction_is_gone_10_ms_after_contact_and_back_after_the_retreat() {
         );
         assert!(
             output.in_contact,
-            "it stays closed while the reference goes on"
+            "contact stays latched while the reference continues"
         );
     }
     assert!(touching[at + 9].friction_share < 1e-12, "gone in 10 ms");
-    // The reference turns: released, and nothing latches on the way back.
+    // The reference reverses: contact is released, and the latch stays open on the way back.
     let share = |k: usize| leaving[k].friction_share;
     assert!(leaving.iter().all(|output| !output.in_contact));
     assert!((share(600) - 1.0).abs() < 1e-12 && share(0) <= share(30) && share(30) <= share(60));
 }
 
-/// Some of it can be left on in contact: it fades as fast, but no further.
+/// A configured fraction stays on in contact: the fade has the same rate, but stops there.
 #[test]
-fn a_stated_share_of_the_friction_stays_in_contact() {
+fn the_configured_friction_fraction_stays_in_contact() {
     let (touching, leaving) = touch_and_retreat(|latch| latch.contact_share = 0.35);
     let at = first_contact(&touching);
     for (k, output) in touching[at..].iter().enumerate() {
@@ -194,14 +195,14 @@ fn a_stated_share_of_the_friction_stays_in_contact() {
     assert!((leaving[600].friction_share - 1.0).abs() < 1e-12);
 }
 
-/// What comes back comes back over the time stated.
+/// The feed-forward is restored over the configured time.
 #[test]
-fn the_share_is_restored_within_its_time() {
+fn the_friction_fraction_is_restored_within_its_time() {
     let mut bench = Bench::new(config(|latch| latch.restore_s = 0.1));
     bench.cycles(700, up(0.0));
     let touched = bench.cycles(300, up(12.0));
     assert!(touched[299].in_contact && touched[299].friction_share == 0.0);
-    // A trajectory asked for anew begins with a clean latch: the reversal must come in the same one.
+    // A new trajectory resets the latch, so the reversal must be in the same trajectory.
     let mut probing = Bench::new(config(|latch| latch.restore_s = 0.1));
     let probe = crate::support::rig::probe_at(&probing.rig.tip());
     probing.cycle(Some(Request::Track(probe)), up(0.0));
@@ -224,9 +225,9 @@ fn the_share_is_restored_within_its_time() {
     }
 }
 
-/// The force leaves but the reference does not turn: contact is remembered.
+/// The force ends but the reference does not reverse: contact stays latched.
 #[test]
-fn it_stays_closed_until_the_reference_retreats() {
+fn contact_stays_latched_until_the_reference_retreats() {
     let mut bench = Bench::new(config(|_| {}));
     bench.cycles(700, up(0.0));
     assert!(bench.cycles(200, up(12.0))[199].in_contact);
@@ -240,7 +241,7 @@ fn it_stays_closed_until_the_reference_retreats() {
 }
 
 #[test]
-fn without_the_fade_it_only_reports() {
+fn without_the_fade_the_latch_only_reports() {
     let (touching, leaving) = touch_and_retreat(|latch| latch.fade = false);
     first_contact(&touching);
     for output in touching.iter().chain(&leaving) {
@@ -249,9 +250,9 @@ fn without_the_fade_it_only_reports() {
     assert!(touching[599].in_contact && !leaving[600].in_contact);
 }
 
-/// Less friction fed forward is less force pushed with: the purpose of it all.
+/// A faded friction feed-forward reduces the contact force, which is the purpose of the latch.
 #[test]
-fn the_torque_loses_the_dry_friction() {
+fn contact_removes_the_dry_friction_torque() {
     let (fading, _) = touch_and_retreat(|_| {});
     let (pushing, _) = touch_and_retreat(|latch| latch.fade = false);
     let at = first_contact(&fading) + 30;
@@ -264,9 +265,9 @@ fn the_torque_loses_the_dry_friction() {
     assert!(norm(&fading) < 0.5 * norm(&pushing));
 }
 
-/// What friction may hide raises the threshold: more of it, or a worse model of it.
+/// Larger friction, or a less accurate friction model, raises the threshold.
 #[test]
-fn doubt_about_friction_raises_the_threshold() {
+fn friction_uncertainty_raises_the_threshold() {
     let threshold = |coulomb_nm: f64, error: f64| {
         let mut config = config(|latch| latch.friction_error = error);
         config.friction = [Friction::coulomb(0.0, coulomb_nm); 3];
@@ -281,7 +282,7 @@ fn doubt_about_friction_raises_the_threshold() {
     assert!(threshold(1.0, 0.3) > threshold(1.0, 0.1));
 }
 
-/// A reference that never moved has no direction to be blocked in.
+/// A reference that has not moved has no direction.
 #[test]
 fn a_reference_at_rest_never_latches() {
     let config = config(|_| {});

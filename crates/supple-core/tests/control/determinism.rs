@@ -1,4 +1,5 @@
-//! The step is a pure function: the same inputs give the same bits, and a copied state the same future.
+//! The step is a pure function: equal inputs give bit-identical outputs, and a copied state
+//! continues identically.
 
 use crate::support::configs::{four, friction, seven};
 use crate::support::rig::{Rig, bent, probe_at};
@@ -7,7 +8,7 @@ use supple_core::controller::Request;
 use supple_core::math::Vector3;
 use supple_core::{Config, Input, Output, State, Vector, step};
 
-/// A run through the modes with a bad moment in it.
+/// Inputs of a run through the modes, with a fault.
 fn script<const N: usize>(config: Config<N>) -> Vec<Input<N>> {
     let mut rig = Rig::new(config, bent());
     let mut inputs = Vec::new();
@@ -43,8 +44,7 @@ fn script<const N: usize>(config: Config<N>) -> Vec<Input<N>> {
     inputs
 }
 
-/// Every number of an output with its sign and its last digit: Rust prints floats so that they read
-/// back to the same bits.
+/// Every number of an output, bit for bit: Debug prints floats so that they parse to the same bits.
 fn written<const N: usize>(output: &Output<N>) -> String {
     format!("{output:?}")
 }
@@ -68,7 +68,7 @@ fn same_bits<const N: usize>(mut config: Config<N>) {
         assert!(entered, "the script reaches {mode}");
     }
 
-    // Forked anywhere, the copy and the original have the same future.
+    // Copied at any cycle, the copy and the original continue identically.
     let mut rig = Rig::new(config, bent());
     for (k, input) in inputs.iter().enumerate() {
         if k % 151 == 0 {
@@ -92,9 +92,10 @@ fn of_7_joints() {
     same_bits(seven());
 }
 
-/// What a controller does is a function of its own state alone: two in turn do not disturb each other.
+/// A controller depends on its own state alone: two alternating controllers do not affect each
+/// other.
 #[test]
-fn two_controllers_side_by_side() {
+fn alternating_controllers_are_independent() {
     let inputs = script(four());
     let (mut a, mut b) = (Rig::new(four(), bent()), Rig::new(four(), bent()));
     let alone: Vec<_> = inputs.iter().map(|input| a.step(input)).collect();

@@ -31,7 +31,7 @@ fn open() -> Config<4> {
 }
 
 #[test]
-fn an_excitation_is_the_model_along_its_series_and_a_stiff_loop_about_it() {
+fn excitation_torque_is_model_feedforward_plus_stiff_loop() {
     let config = open();
     let mut rig = Rig::holding(config, bent());
     let mut output = rig.accept(Request::Excite(series()));
@@ -50,7 +50,7 @@ fn an_excitation_is_the_model_along_its_series_and_a_stiff_loop_about_it() {
         let inertial = crba(&config.arm, q) * wanted.acceleration_rad_per_s2;
         assert_close(&output.torques.inertial, &inertial, 1e-9);
         assert_close(&output.torque_nm, &output.torques.total(), 1e-9);
-        // The held roll moves with the others.
+        // The held roll joint moves as well.
         let late = series().at(1e-3 * f64::from(k.saturating_sub(3)));
         rig.q = late.position_rad;
         output = rig.cycle();
@@ -58,7 +58,7 @@ fn an_excitation_is_the_model_along_its_series_and_a_stiff_loop_about_it() {
 }
 
 #[test]
-fn an_arm_without_friction_follows_it_and_rests_at_its_end() {
+fn a_frictionless_arm_follows_the_series_and_holds_its_end() {
     let config = four();
     let mut rig = Rig::holding(config, bent());
     let mut plant = Plant::at_rest(config.arm, bent());
@@ -73,7 +73,7 @@ fn an_arm_without_friction_follows_it_and_rests_at_its_end() {
 }
 
 #[test]
-fn what_no_limit_allows_is_refused() {
+fn a_series_beyond_limits_is_refused() {
     let mut rig = Rig::holding(four(), bent());
     let refused = |rig: &mut Rig<4>, series: Fourier<4>| {
         let output = rig.ask(Request::Excite(series));
@@ -92,7 +92,7 @@ fn what_no_limit_allows_is_refused() {
     wide.centre_rad += bent::<4>() - wide.at(0.0).position_rad;
     let refusal = refused(&mut rig, wide);
     assert!(
-        matches!(refusal, Refusal::Unreachable { joint: 1, .. }),
+        matches!(refusal, Refusal::BeyondJointStop { joint: 1, .. }),
         "{refusal}"
     );
     let mut fast = series();
@@ -129,7 +129,7 @@ fn a_ramp_grows_beside_gravity_while_the_other_joints_are_held() {
 }
 
 #[test]
-fn it_ends_in_gravity_hold_when_the_joint_has_moved_or_will_not() {
+fn breakaway_ends_in_gravity_hold_after_motion_or_at_the_torque_limit() {
     let mut rig = Rig::holding(four(), bent());
     rig.accept(Request::Breakaway(ramp()));
     rig.rest();
@@ -151,7 +151,7 @@ fn it_ends_in_gravity_hold_when_the_joint_has_moved_or_will_not() {
 }
 
 #[test]
-fn a_ramp_that_makes_no_sense_is_refused() {
+fn an_invalid_ramp_is_refused() {
     let wrong = [
         Breakaway { joint: 4, ..ramp() },
         Breakaway {
@@ -183,7 +183,7 @@ fn a_ramp_that_makes_no_sense_is_refused() {
 }
 
 #[test]
-fn ripple_is_fed_forward_against_the_motors_own_at_their_angle() {
+fn ripple_feedforward_cancels_the_motors_ripple() {
     let mut config = four();
     let line = Harmonic {
         harmonic: 3,
@@ -199,7 +199,7 @@ fn ripple_is_fed_forward_against_the_motors_own_at_their_angle() {
     motor[1] = 0.01 * (3.0 * angle[1]).sin() - 0.004 * (3.0 * angle[1]).cos();
     let joint = motor_from_joint.transpose() * motor;
     assert_close(&output.torques.ripple, &-joint, 1e-9);
-    // The motors then give the gravity torque that is wanted.
+    // With their ripple the motors then give the commanded gravity torque.
     assert_close(&(output.torque_nm + joint), &output.torques.gravity, 1e-9);
     rig.ask(Request::Idle);
     assert_eq!(rig.rest().torque_nm.norm(), 0.0);

@@ -1,5 +1,5 @@
-//! Every fault: it comes exactly at its limit, says what broke it, stays until a reset, and the arm
-//! does what is safe.
+//! Every fault: it occurs exactly at its limit, reports its cause, stays until a reset, and starts
+//! the safe action.
 
 use crate::support::configs::{four, stop_limited, three, unlimited};
 use crate::support::rig::{Rig, bent};
@@ -9,7 +9,8 @@ use supple_core::dynamics::gravity;
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::{Arm, Body, Config, Input, Joint, Output, Pose, Trajectory, Vector};
 
-/// The fault is latched with its cause, the safe action runs, a reset leaves it.
+/// Checks that the fault is latched with its cause, that the safe action runs, and that a reset
+/// leaves it.
 #[track_caller]
 pub fn latched(mut rig: Rig<4>, first: &Output<4>, action: SafeAction) {
     let fault = first.fault.expect("a fault");
@@ -20,7 +21,7 @@ pub fn latched(mut rig: Rig<4>, first: &Output<4>, action: SafeAction) {
         "a fault is not blended in"
     );
     assert!(!fault.to_string().is_empty() && !fault.name().is_empty());
-    // Back in good order, at rest: nothing changes by itself.
+    // With valid states at rest the fault stays latched.
     let output = rig.rest();
     assert_eq!((output.mode, output.fault), (Mode::Fault, Some(fault)));
     match action {
@@ -39,7 +40,7 @@ pub fn latched(mut rig: Rig<4>, first: &Output<4>, action: SafeAction) {
             assert!((output.torque_nm - allowed).norm() < 1e-9);
         }
     }
-    // Another fault does not hide the first cause.
+    // A second fault does not replace the first cause.
     let cycle = rig.cycle - 2;
     let output = rig.clone().step(&Input {
         cycle,
@@ -57,7 +58,7 @@ pub fn latched(mut rig: Rig<4>, first: &Output<4>, action: SafeAction) {
 }
 
 #[test]
-fn measurements_that_are_no_numbers() {
+fn measurements_that_are_not_finite_fault() {
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         for joint in 0..4 {
             let mut rig = Rig::holding(four(), bent());
@@ -82,7 +83,7 @@ fn measurements_that_are_no_numbers() {
     }
 }
 
-/// A configuration in which nothing but arithmetic is a limit.
+/// A configuration without effective limits.
 fn boundless() -> Config<4> {
     let mut config = four();
     unlimited(&mut config);
@@ -94,7 +95,7 @@ fn boundless() -> Config<4> {
     config
 }
 
-/// A clamp would have made a limit of it.
+/// A clamp would turn infinity into the limit.
 #[test]
 fn an_infinite_term_is_a_fault_and_not_a_clamp() {
     let mut rig = Rig::holding(boundless(), bent());
@@ -115,7 +116,7 @@ fn an_infinite_term_is_a_fault_and_not_a_clamp() {
     latched(rig, &output, SafeAction::GravityHold);
 }
 
-/// Finite terms whose sum is not: the safe action has none of them.
+/// Finite terms with an infinite sum: the safe action contains none of them.
 #[test]
 fn an_infinite_sum_of_finite_terms_is_a_fault() {
     let mut config = boundless();
@@ -142,9 +143,9 @@ fn an_infinite_sum_of_finite_terms_is_a_fault() {
     panic!("no fault");
 }
 
-/// Two joints about the same line with next to nothing between them: no torque, and no way out.
+/// Two coaxial joints with almost no inertia between them: no torque, and a reset is refused.
 #[test]
-fn a_mass_matrix_that_is_none() {
+fn a_mass_matrix_that_is_not_positive_definite_faults() {
     let ball = |mass_kg: f64| Body {
         mass_kg,
         com_m: Vector3::new(0.0, 0.0, 0.25),
@@ -173,9 +174,9 @@ fn a_mass_matrix_that_is_none() {
     assert!(output.refusal.is_some());
 }
 
-/// Where gravity hold was safe until the encoder went, it no longer is.
+/// Gravity hold is no longer safe after the loss of an encoder.
 #[test]
-fn a_worse_fault_takes_the_torque_away_but_keeps_the_first_cause() {
+fn a_worse_fault_removes_torque_but_keeps_the_first_cause() {
     let mut rig = Rig::new(four(), bent());
     rig.bring_to(Mode::Fault);
     let first = rig.state.fault();
@@ -189,15 +190,15 @@ fn a_worse_fault_takes_the_torque_away_but_keeps_the_first_cause() {
     assert_eq!(rig.ask(Request::Reset).mode, Mode::Idle);
 }
 
-/// Where the angle is not trusted the torque falls to zero in 5 ms, and the fallback is zero at once.
+/// If the angle is not trusted, the torque falls to zero in 5 ms, and the fallback is zero at once.
 #[test]
-fn a_lost_encoder_lets_go() {
+fn lost_encoder_removes_torque() {
     let mut rig = Rig::holding(four(), bent());
     let mut last = rig.rest().torque_nm;
     let mut input = rig.input();
     input.position_rad[3] = Some(f64::NAN);
     let mut output = rig.step(&input);
-    // In 5 ms it may all be gone.
+    // The full torque may be removed in 5 ms.
     for _ in 0..5 {
         assert_eq!(output.torques.total(), Vector::<4>::zeros());
         assert_eq!(output.fallback_torque_nm, Vector::<4>::zeros());
@@ -209,9 +210,9 @@ fn a_lost_encoder_lets_go() {
     assert_eq!(output.torque_nm, Vector::<4>::zeros());
 }
 
-/// A reset in the very cycle of a fault does not clear what nobody has seen yet.
+/// A reset in the cycle of a fault does not clear this fault.
 #[test]
-fn a_reset_does_not_outrun_its_fault() {
+fn a_reset_in_the_cycle_of_the_fault_is_refused() {
     let bad_force = |input: &mut Input<4>| input.tip_force_n = Some(Vector3::repeat(f64::NAN));
     let bad_angle = |input: &mut Input<4>| input.position_rad[1] = Some(f64::NAN);
     let backwards = |input: &mut Input<4>| input.cycle -= 5;
@@ -228,7 +229,7 @@ fn a_reset_does_not_outrun_its_fault() {
         assert!(output.fault.is_some() && output.refusal.is_some());
         assert_eq!(rig.cycle().mode, Mode::Fault);
     }
-    // Nor while its cause lasts.
+    // A reset is also refused while the cause lasts.
     let mut rig = Rig::holding(four(), bent());
     for _ in 0..5 {
         let mut input = Input {
@@ -240,12 +241,12 @@ fn a_reset_does_not_outrun_its_fault() {
         assert_eq!(output.mode, Mode::Fault);
         assert!(output.fault.is_some());
     }
-    // The states that could not be used count as missing: the first good one ends that.
+    // The rejected states count as missing until the first valid one.
     assert_eq!(rig.cycle().mode, Mode::Fault);
     assert_eq!(rig.ask(Request::Reset).mode, Mode::Idle);
 }
 
-/// No stiff loop acts in the safe action, that of a held joint neither; nor do soft stops.
+/// The safe action has no stiff loop, not even that of a held joint, and no soft stops.
 #[test]
 fn the_safe_action_has_no_stiff_loop() {
     let mut rig = Rig::holding(four(), bent());
@@ -259,7 +260,7 @@ fn the_safe_action_has_no_stiff_loop() {
 }
 
 #[test]
-fn a_stale_state_leaves_gravity_alone() {
+fn a_stale_state_leaves_only_gravity() {
     let config = four();
     let mut rig = Rig::holding(config, bent());
     for _ in 0..200 {

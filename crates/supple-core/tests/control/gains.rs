@@ -11,7 +11,7 @@ fn ask(gains: Gains, ramp_s: f64) -> Request<4> {
 }
 
 #[test]
-fn a_straight_ramp_per_axis() {
+fn gains_change_linearly_per_axis() {
     for mode in [Mode::Idle, Mode::GravityHold, Mode::Track, Mode::Fault] {
         let mut rig = Rig::new(four(), bent());
         rig.bring_to(mode);
@@ -36,14 +36,14 @@ fn a_straight_ramp_per_axis() {
 }
 
 #[test]
-fn at_once_where_no_ramp_is_asked_for() {
+fn gains_change_at_once_without_a_ramp() {
     let mut rig = Rig::holding(four(), bent());
     let to = Gains::isotropic(7.0, 3.0);
     assert_eq!(rig.accept(ask(to, 0.0)).gains, to);
 }
 
 #[test]
-fn a_new_ramp_starts_where_the_last_one_was() {
+fn a_new_ramp_starts_at_the_current_gains() {
     let mut rig = Rig::holding(four(), bent());
     rig.accept(ask(Gains::isotropic(200.0, 20.0), 0.1));
     let halfway = rig.cycles(50).gains;
@@ -59,9 +59,10 @@ fn a_new_ramp_starts_where_the_last_one_was() {
     assert_eq!(output.gains, Gains::isotropic(100.0, 20.0));
 }
 
-/// The ramp counts the arm's time: it stands still while the state does, and catches up over a gap.
+/// The ramp runs on the arm's time: it pauses while the state is repeated, and catches up over a
+/// gap.
 #[test]
-fn a_ramp_runs_on_the_states_time() {
+fn a_ramp_runs_on_state_time() {
     let mut rig = Rig::holding(four(), bent());
     rig.accept(ask(Gains::isotropic(200.0, 20.0), 0.1));
     let before = rig.cycle().gains;
@@ -75,7 +76,7 @@ fn a_ramp_runs_on_the_states_time() {
     assert!((gained - 3.0).abs() < 1e-9, "{gained}");
 }
 
-/// The gains in force are those the torque is made with.
+/// The reported gains are those used for the torque.
 #[test]
 fn the_torque_follows_the_gains() {
     let mut rig = Rig::new(four(), bent());

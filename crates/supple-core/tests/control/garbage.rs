@@ -1,5 +1,5 @@
-//! Whatever comes in, for thousands of cycles: what goes out is finite, within every limit, and says
-//! so when something is wrong.
+//! Random inputs for thousands of cycles: the output is finite, within every limit, and reports
+//! every fault.
 
 use crate::support::configs::{four, seven, three};
 use crate::support::property::{check, per_joint};
@@ -11,7 +11,7 @@ use supple_core::math::{Matrix3, Vector3};
 use supple_core::trajectory::{Arc, Line, Quadrant, Sinusoid};
 use supple_core::{Config, Trajectory, Vector};
 
-/// Numbers that programs go wrong on, and ordinary ones.
+/// Ordinary numbers and numerical edge cases.
 fn number() -> impl Strategy<Value = f64> {
     prop_oneof![
         4 => -1.0..1.0,
@@ -61,9 +61,9 @@ fn trajectory() -> impl Strategy<Value = Trajectory> {
     ]
 }
 
-/// A request, or a seed for one that depends on where the arm is.
+/// A request, or the kind of a request that depends on the arm's pose.
 #[derive(Clone, Debug)]
-enum Wish<const N: usize> {
+enum RequestKind<const N: usize> {
     None,
     Any(Request<N>),
     Stay,
@@ -71,7 +71,7 @@ enum Wish<const N: usize> {
     MoveHere(f64),
 }
 
-fn wish<const N: usize>() -> impl Strategy<Value = Wish<N>> {
+fn request_kind<const N: usize>() -> impl Strategy<Value = RequestKind<N>> {
     let any_of = prop_oneof![
         Just(Request::Idle),
         Just(Request::GravityHold),
@@ -92,19 +92,19 @@ fn wish<const N: usize>() -> impl Strategy<Value = Wish<N>> {
         }),
     ];
     prop_oneof![
-        12 => Just(Wish::None),
-        3 => any_of.prop_map(Wish::Any),
-        2 => prop::sample::select(vec![Request::Reset, Request::GravityHold]).prop_map(Wish::Any),
-        1 => Just(Wish::Stay),
-        1 => Just(Wish::Probe),
-        1 => (0.01..2.0).prop_map(Wish::MoveHere),
+        12 => Just(RequestKind::None),
+        3 => any_of.prop_map(RequestKind::Any),
+        2 => prop::sample::select(vec![Request::Reset, Request::GravityHold]).prop_map(RequestKind::Any),
+        1 => Just(RequestKind::Stay),
+        1 => Just(RequestKind::Probe),
+        1 => (0.01..2.0).prop_map(RequestKind::MoveHere),
     ]
 }
 
-/// One cycle's input before it is known where the arm is.
+/// Input of one cycle, independent of the arm's pose.
 #[derive(Clone, Debug)]
 struct Noise<const N: usize> {
-    wish: Wish<N>,
+    requested: RequestKind<N>,
     drift: Vector<N>,
     angles: Vec<Option<Option<f64>>>,
     force: Option<Vector3<f64>>,
@@ -124,14 +124,14 @@ fn noise<const N: usize>() -> impl Strategy<Value = Noise<N>> {
     ];
     let cycle = prop_oneof![20 => Just(1_i64), 1 => -3_i64..6, 1 => any::<i64>()];
     (
-        wish(),
+        request_kind(),
         per_joint::<N>(2e-3),
         prop::collection::vec(angle, N),
         force,
         cycle,
     )
-        .prop_map(|(wish, drift, angles, force, cycle)| Noise {
-            wish,
+        .prop_map(|(requested, drift, angles, force, cycle)| Noise {
+            requested,
             drift,
             angles,
             force,
@@ -139,7 +139,7 @@ fn noise<const N: usize>() -> impl Strategy<Value = Noise<N>> {
         })
 }
 
-/// Runs 300 cycles of noise; counts the modes that were reached.
+/// Runs 300 cycles of noise and counts the modes reached.
 fn survive<const N: usize>(config: Config<N>) {
     let seen = std::cell::RefCell::new(std::collections::BTreeMap::<&str, u32>::new());
     check(60, prop::collection::vec(noise::<N>(), 300), |cycles| {
@@ -155,12 +155,12 @@ fn survive<const N: usize>(config: Config<N>) {
             }
             input.tip_force_n = noise.force;
             input.cycle = last.cycle.wrapping_add_signed(noise.cycle);
-            input.request = match noise.wish {
-                Wish::None => None,
-                Wish::Any(request) => Some(request),
-                Wish::Stay => Some(rig.stay()),
-                Wish::Probe => Some(Request::Track(probe_at(&rig.tip()))),
-                Wish::MoveHere(duration_s) => Some(Request::Move {
+            input.request = match noise.requested {
+                RequestKind::None => None,
+                RequestKind::Any(request) => Some(request),
+                RequestKind::Stay => Some(rig.stay()),
+                RequestKind::Probe => Some(Request::Track(probe_at(&rig.tip()))),
+                RequestKind::MoveHere(duration_s) => Some(Request::Move {
                     target_rad: bent(),
                     duration_s,
                 }),
@@ -175,9 +175,9 @@ fn survive<const N: usize>(config: Config<N>) {
                 prop_assert!(motors[i].abs() <= limits.motor_torque_nm[i] * (1.0 + 1e-12));
                 let step = (torque - last.torque_nm[i]).abs();
                 let in_fault = output.mode == Mode::Fault;
-                let greatest = rig.controller.torque_step_nm(in_fault)[i];
+                let max_step_nm = rig.controller.torque_step_nm(in_fault)[i];
                 // The one exception: a torque that is not finite is dropped, not ramped.
-                prop_assert!(step <= greatest * (1.0 + 1e-9) || torque == 0.0);
+                prop_assert!(step <= max_step_nm * (1.0 + 1e-9) || torque == 0.0);
             }
             let bad = input.position_rad.iter().flatten().any(|x| !x.is_finite());
             let fresh = input.cycle != last.cycle;
@@ -204,7 +204,7 @@ fn survive<const N: usize>(config: Config<N>) {
     }
 }
 
-fn loose<const N: usize>(mut config: Config<N>) -> Config<N> {
+fn with_relaxed_limits<const N: usize>(mut config: Config<N>) -> Config<N> {
     config.limits.stale_cycles = 6;
     config.limits.start_error_m = 2.0;
     config.limits.tracking_error_m = 2.0;
@@ -214,26 +214,26 @@ fn loose<const N: usize>(mut config: Config<N>) -> Config<N> {
 
 #[test]
 fn of_3_joints_with_a_force_sensor() {
-    let mut config = loose(three());
+    let mut config = with_relaxed_limits(three());
     config.law.inertia = ApparentInertia::Chosen(Matrix3::from_diagonal_element(2.0));
     survive(config);
 }
 
 #[test]
 fn of_4_joints() {
-    survive(loose(four()));
+    survive(with_relaxed_limits(four()));
 }
 
 #[test]
 fn of_7_joints() {
-    survive(loose(seven()));
+    survive(with_relaxed_limits(seven()));
 }
 
-/// Once it is in good order again, a reset and a while at rest bring back a sound gravity hold,
-/// whatever came before.
+/// With valid inputs again, a reset and a time at rest restore gravity hold, whatever the previous
+/// inputs were.
 #[test]
-fn garbage_leaves_no_trace() {
-    let config = loose(four());
+fn a_reset_after_random_input_restores_gravity_hold() {
+    let config = with_relaxed_limits(four());
     check(60, prop::collection::vec(noise::<4>(), 100), |cycles| {
         let mut rig = Rig::new(config, bent());
         rig.cycle();
@@ -245,12 +245,12 @@ fn garbage_leaves_no_trace() {
                 }
             }
             input.tip_force_n = noise.force;
-            if let Wish::Any(request) = noise.wish {
+            if let RequestKind::Any(request) = noise.requested {
                 input.request = Some(request);
             }
             rig.step(&input);
         }
-        // Wild readings of up to 1e308 rad take the estimator seconds to forget.
+        // After readings of up to 1e308 rad the estimator needs seconds to settle.
         rig.cycles(8000);
         rig.ask(Request::Reset);
         rig.ask(Request::GravityHold);

@@ -10,8 +10,8 @@ use supple_core::controller::{Mode, Request, limit_torque};
 use supple_core::dynamics::gravity;
 use supple_core::{Config, Output, Vector};
 
-/// What the soft stop is: a spring from the zone's edge, and a damper against going further in that
-/// grows with the depth.
+/// Expected soft stop: a spring from the zone's edge, and a damper against motion further into the
+/// zone that grows with the depth.
 fn soft_stop<const N: usize>(limits: &Limits<N>, q: &Vector<N>, qd: &Vector<N>) -> Vector<N> {
     Vector::from_fn(|i, _| {
         let edges = [
@@ -32,7 +32,8 @@ fn soft_stop<const N: usize>(limits: &Limits<N>, q: &Vector<N>, qd: &Vector<N>) 
     })
 }
 
-/// Gravity, joint damping, loops of held joints, soft stops, and nothing else.
+/// Checks that the torque consists of gravity, joint damping, loops of held joints and soft stops
+/// only.
 #[track_caller]
 fn is_gravity_hold<const N: usize>(config: &Config<N>, output: &Output<N>) {
     let (q, qd) = (&output.position_rad, &output.velocity_rad_per_s);
@@ -50,7 +51,7 @@ fn is_gravity_hold<const N: usize>(config: &Config<N>, output: &Output<N>) {
                 stiffness_nm_per_rad,
                 damping_nm_s_per_rad,
             } => {
-                // The set-point has arrived.
+                // The set-point has reached the held angle.
                 let pd =
                     stiffness_nm_per_rad * (position_rad - q[i]) - damping_nm_s_per_rad * qd[i];
                 assert!((torques.joint_pd[i] - pd).abs() < 1e-9);
@@ -68,7 +69,7 @@ fn is_gravity_hold<const N: usize>(config: &Config<N>, output: &Output<N>) {
 
 fn gravity_hold<const N: usize>(mut config: Config<N>) {
     unlimited(&mut config);
-    // Friction is not fed forward: there is no motion to help.
+    // Without a reference motion there is no friction feed-forward.
     config.friction = friction();
     let reach = config.limits.position_upper_rad;
     let speeds = per_joint::<N>(0.5);
@@ -109,7 +110,7 @@ fn gravity_hold_of_7_joints() {
 }
 
 #[test]
-fn idle_is_no_torque_and_no_fallback() {
+fn idle_has_no_torque_and_no_fallback() {
     let mut rig = Rig::new(four(), bent());
     for _ in 0..20 {
         let output = rig.cycle();
@@ -117,7 +118,7 @@ fn idle_is_no_torque_and_no_fallback() {
         assert_eq!(output.torques.total(), Vector::<4>::zeros());
         assert_eq!(output.fallback_torque_nm, Vector::<4>::zeros());
     }
-    // Whoever moves the arm is not opposed and not judged: speed and stops are nobody's business.
+    // Idle does not oppose external motion and does not check speeds and stops.
     for _ in 0..100 {
         rig.q[0] += 0.03;
         let output = rig.cycle();
@@ -128,9 +129,9 @@ fn idle_is_no_torque_and_no_fallback() {
     }
 }
 
-/// From idle gravity comes as fast as the rate limit lets it and no slower; nothing is blended.
+/// From idle the gravity torque rises at the rate limit, without blending.
 #[test]
-fn idle_to_gravity_at_the_rate_limit() {
+fn gravity_torque_rises_at_the_rate_limit() {
     let mut rig = Rig::new(four(), bent());
     let mut last = rig.cycle().torque_nm;
     let mut output = rig.accept(Request::GravityHold);
@@ -148,9 +149,9 @@ fn idle_to_gravity_at_the_rate_limit() {
     assert_close(&output.torque_nm, &wanted, 1e-12);
 }
 
-/// To idle there is no torque to hold on to: it falls at the rate limit.
+/// On a change to idle the torque falls at the rate limit.
 #[test]
-fn to_idle_at_the_rate_limit() {
+fn torque_falls_to_idle_at_the_rate_limit() {
     let mut rig = Rig::holding(four(), bent());
     let before = rig.cycle().torque_nm;
     let output = rig.ask(Request::Idle);
@@ -176,7 +177,8 @@ fn the_fallback_is_gravity_within_the_limits() {
     assert_close(&output.fallback_torque_nm, &allowed, 1e-12);
 }
 
-/// Continuous at the zone's edge, away from the stop, and no brake on the way out.
+/// The soft stop is continuous at the zone's edge, pushes away from the stop, and does not damp
+/// motion out of the zone.
 #[test]
 fn soft_stops_push_away() {
     let config = four();
@@ -211,38 +213,38 @@ fn soft_stops_push_away() {
     }
 }
 
-/// Beyond the stop itself the spring grows no further: an angle that far off may be no angle.
+/// Beyond the stop itself the spring grows no further: such an angle may be invalid.
 #[test]
 fn a_soft_stop_pushes_no_harder_beyond_the_stop() {
     let mut rig = Rig::holding(four(), bent());
-    let greatest = 300.0 * 0.1;
+    let max = 300.0 * 0.1;
     for k in 0..4000 {
         rig.q[0] += 1e-3;
         let output = rig.cycle();
         let pushed = output.torques.soft_stop[0].abs();
         let damped = 10.0 * output.velocity_rad_per_s[0].abs();
-        assert!(pushed <= greatest + damped + 1e-9, "{pushed} N m after {k}");
+        assert!(pushed <= max + damped + 1e-9, "{pushed} N m after {k}");
     }
     let output = rig.rest();
     assert_eq!(output.torques.soft_stop[0], 0.0, "no stiff loop in a fault");
     assert!(output.position_rad[0] > 4.0 && output.mode == Mode::Fault);
 }
 
-/// Set-point of the roll at this output, told from its loop's torque.
+/// Set-point of the roll joint, computed from the torque of its loop.
 fn set_point(output: &Output<4>) -> f64 {
     let pd = output.torques.joint_pd[2] + 10.0 * output.velocity_rad_per_s[2];
     output.position_rad[2] + pd / 600.0
 }
 
-/// Wherever a held joint is, taking hold of it is gentle: its set-point starts there and goes to the
-/// held angle at 0.25 rad/s.
+/// The loop of a held joint engages without a jump: its set-point starts at the current angle and
+/// moves to the held angle at 0.25 rad/s.
 #[test]
-fn held_set_point_approaches_slowly_from_wherever_the_joint_is() {
+fn held_set_point_approaches_slowly_from_the_current_angle() {
     for start in [0.7, -0.4, 1e-4, 0.0] {
         for entering_at in [0, 1, 20] {
             let mut q = bent::<4>();
             q[2] = start;
-            // The arm of this rig stays where it is.
+            // The arm of this rig does not move.
             let mut config = four();
             config.limits.joint_tracking_error_rad = 1.0;
             let mut rig = Rig::new(config, q);
@@ -264,9 +266,9 @@ fn held_set_point_approaches_slowly_from_wherever_the_joint_is() {
     }
 }
 
-/// While nothing holds it, the set-point follows the joint.
+/// While the loop is off, the set-point follows the joint.
 #[test]
-fn a_roll_turned_by_hand_in_idle_is_taken_up_where_it_was_left() {
+fn a_joint_moved_in_idle_is_held_from_its_new_angle() {
     let mut rig = Rig::holding(four(), bent());
     rig.ask(Request::Idle);
     rig.rest();

@@ -8,10 +8,10 @@ use supple_core::config::Limits;
 use supple_core::controller::{MotorGroups, Request, limit_torque};
 use supple_core::{Config, Output, Vector};
 
-/// Rounding of a product or two.
-const ULPS: f64 = 1.0 + 1e-12;
+/// Factor for the rounding errors of one or two products.
+const ROUNDING: f64 = 1.0 + 1e-12;
 
-/// Within the joint limits and the motor limits.
+/// Checks the joint limits and the motor limits.
 fn allowed<const N: usize>(
     limits: &Limits<N>,
     motors: &MotorGroups<N>,
@@ -20,9 +20,13 @@ fn allowed<const N: usize>(
     let at_motors = motors.motor_torque_nm(torque);
     for i in 0..N {
         let (joint, motor) = (limits.joint_torque_nm[i], limits.motor_torque_nm[i]);
-        prop_assert!(torque[i].abs() <= joint * ULPS, "joint {i}: {}", torque[i]);
         prop_assert!(
-            at_motors[i].abs() <= motor * ULPS,
+            torque[i].abs() <= joint * ROUNDING,
+            "joint {i}: {}",
+            torque[i]
+        );
+        prop_assert!(
+            at_motors[i].abs() <= motor * ROUNDING,
             "motor {i}: {}",
             at_motors[i]
         );
@@ -45,7 +49,7 @@ fn torque_limit<const N: usize>(config: Config<N>) {
         let (again, _) = limit_torque(&limits, &motors, &torque);
         prop_assert!((again - torque).norm() <= 1e-12 * torque.norm());
         for i in 0..N {
-            // Smaller, and never the other way.
+            // The limit reduces the magnitude and keeps the sign.
             prop_assert!(torque[i].abs() <= demand[i].abs());
             prop_assert!(torque[i] * demand[i] >= 0.0);
         }
@@ -63,8 +67,8 @@ fn torque_limit_of_7_joints() {
     torque_limit(seven());
 }
 
-/// Pitch and roll share two motors and are scaled together, in their own direction; base and elbow do
-/// not notice.
+/// Pitch and roll share two motors and are scaled together, keeping their ratio; base and elbow are
+/// unaffected.
 #[test]
 fn the_differential_is_scaled_as_one() {
     let config = four();
@@ -74,7 +78,7 @@ fn the_differential_is_scaled_as_one() {
     assert!(cut);
     assert_eq!((torque[0], torque[3]), (10.0, 5.0));
     assert!((torque[1] / torque[2] - 70.0 / 40.0).abs() < 1e-12);
-    // 28.25 (m2 - m3) = 70, -16.8155 (m2 + m3) = 40: the third motor is the busier one.
+    // 28.25 (m2 - m3) = 70, -16.8155 (m2 + m3) = 40: the third motor has the larger torque.
     let at_motors = motors.motor_torque_nm(&torque);
     assert!((at_motors[2].abs() - 1.8).abs() < 1e-12, "{at_motors}");
     assert!(at_motors[1].abs() < 1.8);
@@ -85,7 +89,7 @@ fn the_differential_is_scaled_as_one() {
 
 /// Every motor torque is `m2jp^T tau`.
 #[test]
-fn motor_torques_do_the_joints_work() {
+fn motor_torques_give_the_same_power_as_joint_torques() {
     let config = seven();
     let motors = MotorGroups::new(&config.joint_from_motor);
     check(
@@ -103,8 +107,8 @@ fn motor_torques_do_the_joints_work() {
     );
 }
 
-/// Tight limits of every kind, and an arm that is thrown about.
-fn thrown_about<const N: usize>(
+/// Tight joint, motor and rate limits, supervision limits out of the way, and an arm with large random motion.
+fn check_limits_under_random_motion<const N: usize>(
     mut config: Config<N>,
     joint_torque: f64,
     motor_torque: f64,
@@ -148,7 +152,8 @@ fn thrown_about<const N: usize>(
     });
 }
 
-/// One cycle's torque follows from the last one and the sum of the terms, by the limits in order.
+/// Checks that one cycle's torque follows from the last one and the sum of the terms by the limits
+/// in order.
 fn sound<const N: usize>(rig: &Rig<N>, last: &Output<N>, output: &Output<N>) -> Outcome {
     let config = rig.controller.config();
     let (limits, motors) = (&config.limits, rig.controller.motors());
@@ -161,24 +166,24 @@ fn sound<const N: usize>(rig: &Rig<N>, last: &Output<N>, output: &Output<N>) -> 
     prop_assert!((output.torque_nm - expected).norm() <= 1e-9 * scale);
     prop_assert_eq!(output.rate_limited, output.torque_nm != wanted);
     for i in 0..N {
-        let greatest = limits.torque_rate_nm_per_s[i] * config.period_s;
+        let max = limits.torque_rate_nm_per_s[i] * config.period_s;
         let step = (output.torque_nm[i] - last.torque_nm[i]).abs();
-        prop_assert!(step <= greatest * ULPS + 1e-13, "joint {i}: {step}");
+        prop_assert!(step <= max * ROUNDING + 1e-13, "joint {i}: {step}");
     }
     Ok(())
 }
 
 #[test]
 fn every_cycle_obeys_limit_then_rate() {
-    thrown_about(four(), 12.0, 1.8, 3000.0);
-    thrown_about(four(), 80.0, 0.3, 2000.0);
-    thrown_about(four(), 80.0, 1.8, 100.0);
-    thrown_about(seven(), 10.0, 0.4, 1000.0);
+    check_limits_under_random_motion(four(), 12.0, 1.8, 3000.0);
+    check_limits_under_random_motion(four(), 80.0, 0.3, 2000.0);
+    check_limits_under_random_motion(four(), 80.0, 1.8, 100.0);
+    check_limits_under_random_motion(seven(), 10.0, 0.4, 1000.0);
 }
 
-/// Repeats and gaps do not buy a greater step.
+/// Repeated or missing states do not allow a larger torque step.
 #[test]
-fn the_rate_is_per_answer() {
+fn the_rate_limit_applies_once_per_step_whatever_the_cycle_number() {
     let mut config = four();
     config.limits.torque_rate_nm_per_s.fill(500.0);
     let mut rig = Rig::new(config, bent());
@@ -194,7 +199,7 @@ fn the_rate_is_per_answer() {
         let output = rig.step(&input);
         assert_eq!(output.fault, None);
         let step = (output.torque_nm - last.torque_nm).amax();
-        assert!(step <= 0.5 * ULPS, "{step}");
+        assert!(step <= 0.5 * ROUNDING, "{step}");
         last = output;
     }
 }

@@ -1,7 +1,7 @@
-//! The control step as a whole: modes, faults, limits, and what never happens whatever comes in.
+//! The complete control step: modes, faults, limits, and invariants under arbitrary input.
 #![allow(
     clippy::disallowed_methods,
-    reason = "references take their mathematics elsewhere"
+    reason = "reference values use other mathematical functions"
 )]
 
 #[path = "../support/mod.rs"]

@@ -1,9 +1,9 @@
-//! What a fault says of itself: its joint, its value, its limit, and what is done about it.
+//! Messages of the faults (joint, value, limit) and their safe actions.
 
 use std::collections::BTreeSet;
 use supple_core::controller::{Fault, SafeAction};
 
-/// Every fault, the words its message must have, and its safe action.
+/// Faults, the fragments that their messages must contain, and their safe actions.
 fn faults() -> [(Fault, &'static [&'static str], SafeAction); 13] {
     use SafeAction::{GravityHold, Idle};
     [
@@ -90,7 +90,7 @@ fn faults() -> [(Fault, &'static [&'static str], SafeAction); 13] {
             &["joint 2", "0.2500 rad", "0.1250 rad"],
             GravityHold,
         ),
-        (Fault::MassMatrix, &["mass matrix"], GravityHold),
+        (Fault::MassMatrix, &["mass matrix"], Idle),
         (
             Fault::TorqueNotFinite { term: "damping" },
             &["damping", "not a finite number"],
@@ -110,15 +110,15 @@ fn messages_name_joint_value_and_limit() {
 }
 
 #[test]
-fn only_what_leaves_the_angles_in_doubt_takes_gravity_away() {
+fn only_faults_of_angles_or_model_remove_gravity() {
     for (fault, _, action) in faults() {
         assert_eq!(fault.safe_action(), action, "{fault}");
     }
 }
 
 #[test]
-fn names_tell_the_kinds_apart() {
+fn fault_names_are_distinct() {
     let names: BTreeSet<_> = faults().iter().map(|(fault, ..)| fault.name()).collect();
-    // The two measurements share theirs.
+    // The two faults of measurements share one name.
     assert_eq!(names.len(), faults().len() - 1);
 }

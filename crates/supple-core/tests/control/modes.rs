@@ -1,4 +1,4 @@
-//! Every mode asked for everything: the table of transitions.
+//! Every request in every mode: the table of transitions.
 
 use crate::support::configs::{four, seven, three};
 use crate::support::rig::{Rig, bent, probe_at, ramp};
@@ -19,9 +19,9 @@ const MODES: [Mode; 8] = [
     Mode::Breakaway,
 ];
 
-/// What is asked for, before it is known where the arm is.
+/// Kind of a request, independent of the arm's pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Wish {
+enum RequestKind {
     Idle,
     GravityHold,
     Move,
@@ -33,55 +33,55 @@ enum Wish {
     Reset,
 }
 
-const WISHES: [Wish; 9] = [
-    Wish::Idle,
-    Wish::GravityHold,
-    Wish::Move,
-    Wish::Track,
-    Wish::Probe,
-    Wish::Excite,
-    Wish::Breakaway,
-    Wish::Gains,
-    Wish::Reset,
+const REQUEST_KINDS: [RequestKind; 9] = [
+    RequestKind::Idle,
+    RequestKind::GravityHold,
+    RequestKind::Move,
+    RequestKind::Track,
+    RequestKind::Probe,
+    RequestKind::Excite,
+    RequestKind::Breakaway,
+    RequestKind::Gains,
+    RequestKind::Reset,
 ];
 
-fn request<const N: usize>(rig: &Rig<N>, wish: Wish) -> Request<N> {
-    match wish {
-        Wish::Idle => Request::Idle,
-        Wish::GravityHold => Request::GravityHold,
-        Wish::Move => Request::Move {
+fn request<const N: usize>(rig: &Rig<N>, requested: RequestKind) -> Request<N> {
+    match requested {
+        RequestKind::Idle => Request::Idle,
+        RequestKind::GravityHold => Request::GravityHold,
+        RequestKind::Move => Request::Move {
             target_rad: rig.q,
             duration_s: 1.0,
         },
-        Wish::Track => rig.stay(),
-        Wish::Probe => Request::Track(probe_at(&rig.tip())),
-        Wish::Excite => Request::Excite(Fourier::at_rest(rig.q, 1.0)),
-        Wish::Breakaway => Request::Breakaway(ramp()),
-        Wish::Gains => Request::Gains {
+        RequestKind::Track => rig.stay(),
+        RequestKind::Probe => Request::Track(probe_at(&rig.tip())),
+        RequestKind::Excite => Request::Excite(Fourier::at_rest(rig.q, 1.0)),
+        RequestKind::Breakaway => Request::Breakaway(ramp()),
+        RequestKind::Gains => Request::Gains {
             gains: Gains::isotropic(10.0, 2.0),
             ramp_s: 0.1,
         },
-        Wish::Reset => Request::Reset,
+        RequestKind::Reset => Request::Reset,
     }
 }
 
-/// Mode after `wish` in `mode`; `None` where it is refused.
-fn table(mode: Mode, wish: Wish) -> Option<Mode> {
-    match (mode, wish) {
-        (_, Wish::Gains) => Some(mode),
-        // A fault is left by a reset alone; this one leaves for gravity hold.
-        (Mode::Fault, Wish::Reset) => Some(Mode::GravityHold),
-        // Letting go of the arm needs no reset; the fault stays.
-        (Mode::Fault, Wish::Idle) => Some(Mode::Fault),
-        (Mode::Fault, _) | (_, Wish::Reset) => None,
-        (_, Wish::Idle) => Some(Mode::Idle),
-        (_, Wish::GravityHold) => Some(Mode::GravityHold),
+/// Mode after `requested` in `mode`; `None` if refused.
+fn table(mode: Mode, requested: RequestKind) -> Option<Mode> {
+    match (mode, requested) {
+        (_, RequestKind::Gains) => Some(mode),
+        // Only a reset leaves a fault; this one leads to gravity hold.
+        (Mode::Fault, RequestKind::Reset) => Some(Mode::GravityHold),
+        // Idle needs no reset; the fault stays latched.
+        (Mode::Fault, RequestKind::Idle) => Some(Mode::Fault),
+        (Mode::Fault, _) | (_, RequestKind::Reset) => None,
+        (_, RequestKind::Idle) => Some(Mode::Idle),
+        (_, RequestKind::GravityHold) => Some(Mode::GravityHold),
         (Mode::Idle, _) => None,
-        (_, Wish::Move) => Some(Mode::Move),
-        (_, Wish::Track) => Some(Mode::Track),
-        (_, Wish::Probe) => Some(Mode::Probe),
-        (_, Wish::Excite) => Some(Mode::Excite),
-        (_, Wish::Breakaway) => Some(Mode::Breakaway),
+        (_, RequestKind::Move) => Some(Mode::Move),
+        (_, RequestKind::Track) => Some(Mode::Track),
+        (_, RequestKind::Probe) => Some(Mode::Probe),
+        (_, RequestKind::Excite) => Some(Mode::Excite),
+        (_, RequestKind::Breakaway) => Some(Mode::Breakaway),
     }
 }
 
@@ -89,29 +89,29 @@ fn every_mode_asked_for_everything<const N: usize>(config: Config<N>) {
     for mode in MODES {
         let mut there = Rig::new(config, bent());
         there.bring_to(mode);
-        for wish in WISHES {
+        for requested in REQUEST_KINDS {
             let mut rig = there.clone();
             let before = rig.state.fault();
-            let output = rig.ask(request(&rig, wish));
-            match table(mode, wish) {
+            let output = rig.ask(request(&rig, requested));
+            match table(mode, requested) {
                 Some(expected) => {
-                    assert_eq!(output.refusal, None, "{wish:?} in {mode:?}");
-                    assert_eq!(output.mode, expected, "{wish:?} in {mode:?}");
-                    if wish != Wish::Gains {
-                        assert_eq!(output.mode_time_s, 0.0, "{wish:?} in {mode:?}");
+                    assert_eq!(output.refusal, None, "{requested:?} in {mode:?}");
+                    assert_eq!(output.mode, expected, "{requested:?} in {mode:?}");
+                    if requested != RequestKind::Gains {
+                        assert_eq!(output.mode_time_s, 0.0, "{requested:?} in {mode:?}");
                     }
                 }
                 None => {
                     let refused = Some(Refusal::Mode { mode });
-                    assert_eq!(output.refusal, refused, "{wish:?} in {mode:?}");
-                    assert_eq!(output.mode, mode, "{wish:?} in {mode:?}");
-                    assert_eq!(output.fault, before, "{wish:?} in {mode:?}");
+                    assert_eq!(output.refusal, refused, "{requested:?} in {mode:?}");
+                    assert_eq!(output.mode, mode, "{requested:?} in {mode:?}");
+                    assert_eq!(output.fault, before, "{requested:?} in {mode:?}");
                 }
             }
-            // It stays there on its own.
+            // The mode does not change without a request.
             let later = rig.cycles(50);
-            assert_eq!(later.mode, output.mode, "{wish:?} in {mode:?}");
-            assert_eq!(later.fault, output.fault, "{wish:?} in {mode:?}");
+            assert_eq!(later.mode, output.mode, "{requested:?} in {mode:?}");
+            assert_eq!(later.fault, output.fault, "{requested:?} in {mode:?}");
         }
     }
 }
@@ -132,7 +132,7 @@ fn of_7_joints() {
 }
 
 #[test]
-fn any_mode_faults_and_idle_stays_limp() {
+fn any_mode_faults_and_idle_stays_without_torque() {
     for mode in MODES {
         let mut rig = Rig::new(four(), bent());
         rig.bring_to(mode);
@@ -170,7 +170,7 @@ fn any_mode_faults_and_idle_stays_limp() {
 }
 
 #[test]
-fn an_operator_can_let_go_in_a_fault() {
+fn idle_can_be_requested_in_a_fault() {
     let mut rig = Rig::new(four(), bent());
     rig.bring_to(Mode::Fault);
     let fault = rig.state.fault();
@@ -200,7 +200,7 @@ fn time_in_a_mode_is_counted_from_its_entry() {
         assert!((output.mode_time_s - expected).abs() < 1e-12);
         output = rig.cycle();
     }
-    // The same request again starts the trajectory again.
+    // The same request restarts the trajectory.
     assert_eq!(rig.accept(rig.stay()).mode_time_s, 0.0);
 }
 

@@ -1,4 +1,4 @@
-//! Faults of motion: each comes exactly where its limit is passed.
+//! Motion faults: each occurs exactly when its limit is exceeded.
 
 use super::faults::latched;
 use crate::support::configs::four;
@@ -140,7 +140,7 @@ fn tracking_error() {
     }
 }
 
-/// Held where it should be the roll is left alone; pushed further than the limit it is a fault.
+/// No fault with the held roll joint at its set-point; a fault if it is pushed beyond the limit.
 #[test]
 fn joint_tracking_error_of_a_held_joint() {
     let mut config = four();
@@ -166,7 +166,7 @@ fn joint_tracking_error_of_a_held_joint() {
     }
 }
 
-/// Blocked on a move, each joint is a fault once the plan is too far ahead.
+/// A joint that is blocked in a move faults when its reference is too far ahead.
 #[test]
 fn joint_tracking_error_on_a_move() {
     let mut config = four();
@@ -205,7 +205,7 @@ fn joint_tracking_error_on_a_move() {
     }
 }
 
-/// Back to where the arm was, no faster than it can.
+/// Moves the arm back to its pose within its speed limit.
 fn go_back(rig: &mut Rig<4>) {
     let from = rig.q;
     for k in 1..=400 {
@@ -214,8 +214,8 @@ fn go_back(rig: &mut Rig<4>) {
     }
 }
 
-/// Twenty times the speed limit, over the time since the last state: beyond that an angle is as good as
-/// no encoder.
+/// An angle beyond twenty times the speed limit times the time since the last state counts as a
+/// lost encoder.
 #[test]
 fn encoder_jump() {
     for joint in 0..4 {
@@ -252,7 +252,7 @@ fn encoder_jump() {
 }
 
 #[test]
-fn an_angle_that_cannot_be_lets_go() {
+fn impossible_angle_removes_torque() {
     for joint in 0..4 {
         for wild in [-40.0, -0.5, 0.1, 3.0, 1e300] {
             let mut rig = Rig::holding(four(), bent());
@@ -271,7 +271,7 @@ fn an_angle_that_cannot_be_lets_go() {
             assert_eq!(found, joint);
             assert!(limit_rad < 0.1 * speed_limit, "{limit_rad}");
             assert_eq!(output.fallback_torque_nm.norm(), 0.0);
-            // Stuck there, or back again: nothing is computed from it.
+            // Whether the angle stays there or returns: no torque is computed from it.
             for q in [rig.q[joint], before] {
                 rig.q[joint] = q;
                 let later = rig.rest();
@@ -282,15 +282,15 @@ fn an_angle_that_cannot_be_lets_go() {
     }
 }
 
-/// In motion it is where the joint was going that counts.
+/// In motion the jump is measured from the predicted angle.
 #[test]
-fn an_encoder_jump_is_from_where_the_joint_was_going() {
+fn an_encoder_jump_is_measured_from_the_predicted_angle() {
     let mut rig = Rig::holding(four(), bent());
     for _ in 0..200 {
         rig.q[0] -= 1.5e-3;
         assert_eq!(rig.cycle().fault, None);
     }
-    // 0.04 rad are believed, about an angle 0.0015 rad further on.
+    // 0.04 rad are accepted, about an angle 0.0015 rad further on.
     for (jump, believed) in [
         (-0.041, true),
         (-0.042, false),
@@ -305,9 +305,9 @@ fn an_encoder_jump_is_from_where_the_joint_was_going() {
     }
 }
 
-/// What a joint does in a cycle at its greatest speed is a twentieth of what is believed.
+/// A joint at its maximum speed moves a twentieth of the accepted jump per cycle.
 #[test]
-fn no_jump_is_seen_in_motion_at_the_speed_limit() {
+fn motion_at_the_speed_limit_is_no_encoder_jump() {
     let mut rig = Rig::holding(four(), bent());
     for k in 0..600 {
         let speed = (4.0 * 1e-3 * f64::from(k)).min(1.95);

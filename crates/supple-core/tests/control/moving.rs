@@ -27,7 +27,8 @@ fn planned<const N: usize>(way: &Vector<N>, time_s: f64) -> [Vector<N>; 3] {
     [bent::<N>() + way * value, way * rate, way * rate_rate]
 }
 
-/// Model feed-forward along the plan and a stiff loop about it; no loop of held joints beside it.
+/// Checks for model feed-forward along the reference and a stiff loop about it, without the loops
+/// of held joints.
 fn is_the_move<const N: usize>(config: &Config<N>, output: &Output<N>) {
     let way = target(config) - bent::<N>();
     let [position, velocity, acceleration] = planned(&way, output.mode_time_s);
@@ -73,7 +74,7 @@ fn moves<const N: usize>(mut config: Config<N>) {
     for k in 0..1000_u32 {
         assert_eq!((output.mode, output.fault), (Mode::Move, None));
         is_the_move(&config, &output);
-        // The arm comes along a little behind, and trembles, held joints too.
+        // The arm follows with a small lag and noise, held joints too.
         let [position, ..] = planned(&way, 1e-3 * f64::from(k.saturating_sub(4)));
         rig.q = position.add_scalar(2e-3 * (0.02 * f64::from(k)).sin());
         output = rig.cycle();
@@ -96,9 +97,9 @@ fn of_7_joints() {
     moves(seven());
 }
 
-/// With the arm in the loop and an exact model it arrives, and stays.
+/// With the arm in the loop and an exact model the move reaches its target and holds it.
 #[test]
-fn it_ends_at_its_target_and_holds_it() {
+fn a_move_ends_at_its_target_and_holds_it() {
     let config = four();
     let mut rig = Rig::holding(config, bent());
     let mut plant = Plant::at_rest(config.arm, bent());
@@ -117,7 +118,7 @@ fn it_ends_at_its_target_and_holds_it() {
     }
 }
 
-/// The roll is driven as the others are: whatever turns it is answered once, not twice.
+/// The held roll joint has only the loop of the move, not a second one of its own.
 #[test]
 fn a_held_joint_has_one_loop_in_a_move() {
     let mut config = four();

@@ -1,4 +1,4 @@
-//! The momentum observer inside the step: the model it leans on, and when it says nothing.
+//! The momentum observer inside the step: its model, and when it is inactive.
 
 use crate::support::configs::{friction, three, unlimited};
 use crate::support::plant::{Plant, push};
@@ -9,7 +9,7 @@ use supple_core::controller::Request;
 use supple_core::math::Vector3;
 use supple_core::{Config, Vector};
 
-/// Brisk, with friction, and with nothing in the estimator's way.
+/// Configuration for fast motion with friction and a fast estimator.
 fn brisk() -> Config<3> {
     let mut config = three();
     unlimited(&mut config);
@@ -24,8 +24,8 @@ fn brisk() -> Config<3> {
     config
 }
 
-/// Greatest external torque seen on a brisk move that nothing disturbs, on an arm with the friction
-/// that the model has.
+/// Maximum external torque observed in a fast undisturbed move of an arm with the friction of the
+/// model.
 fn seen_on_a_move(config: Config<3>) -> f64 {
     let model = config.friction;
     let mut rig = Rig::holding(config, bent());
@@ -45,16 +45,17 @@ fn seen_on_a_move(config: Config<3>) -> f64 {
     worst
 }
 
-/// Speeds of 3 rad/s and friction of 5 N m, and hardly anything of it is taken for a contact.
+/// Speeds of 3 rad/s and friction of 5 N m cause almost no observed external torque.
 #[test]
-fn motion_and_friction_are_not_taken_for_contact() {
+fn motion_and_friction_cause_no_contact() {
     let worst = seen_on_a_move(brisk());
     assert!(worst < 0.35, "{worst} N m seen where there is nothing");
 }
 
-/// Idle, it says nothing: whoever holds the arm up is no contact, before or after.
+/// In idle the observer is inactive: forces that hold the arm up do not count as contact, then or
+/// afterwards.
 #[test]
-fn idle_is_silent_and_forgets() {
+fn idle_resets_the_observer() {
     let config = three();
     let mut rig = Rig::holding(config, bent());
     let mut plant = Plant::at_rest(config.arm, bent());
@@ -71,7 +72,7 @@ fn idle_is_silent_and_forgets() {
         assert_eq!(output.external_force_n, Vector3::zeros());
         output = rig.cycle();
     }
-    // The arm has lain still: when it is held again the first word is silence.
+    // After idle the observer starts from zero.
     output = rig.accept(Request::GravityHold);
     assert_eq!(output.external_torque_nm, Vector::<3>::zeros());
 }

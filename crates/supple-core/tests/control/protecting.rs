@@ -1,12 +1,12 @@
-//! What keeps people and the arm from harm before and while it moves: idle drives, collisions, loads, borders, and
-//! requests that are looked at before they are granted.
+//! Protection of people and the arm before and during motion: idle drives, collisions, loads,
+//! borders, and checks of requests.
 
 use crate::support::configs::{four, three};
 use crate::support::plant::{Plant, push};
 use crate::support::rig::{Rig, bent};
 use supple_core::Vector;
-use supple_core::config::{Border, Collision, Config, Gains, Plausible, Workspace, Zone};
-use supple_core::controller::{Fault, Mode, Refusal, Request, plan};
+use supple_core::config::{Border, Collision, Config, Gains, PlausibilityLimits, Workspace, Zone};
+use supple_core::controller::{Fault, Mode, Refusal, Request, check_motion};
 use supple_core::dynamics::gravity;
 use supple_core::math::Vector3;
 use supple_core::trajectory::{Sinusoid, Trajectory};
@@ -18,16 +18,16 @@ fn guarded() -> Config<4> {
         tip_force_n: 60.0,
         move_share: 0.5,
     };
-    config.plausible = Plausible {
+    config.plausible = PlausibilityLimits {
         load_n: 8.0,
         ..config.plausible
     };
     config
 }
 
-/// Whatever was at work, and however stiff its gains: when the drives come back, they get the arm's weight.
+/// In every activity and with any gains: re-enabled drives get the gravity torque only.
 #[test]
-fn drives_that_come_back_get_the_weight_of_the_arm_and_nothing_more() {
+fn reenabled_drives_get_the_gravity_torque_only() {
     for mode in [Mode::GravityHold, Mode::Move, Mode::Track, Mode::Excite] {
         let mut rig = Rig::new(four(), bent());
         rig.bring_to(mode);
@@ -38,7 +38,7 @@ fn drives_that_come_back_get_the_weight_of_the_arm_and_nothing_more() {
             });
         }
         rig.drives_active = false;
-        // The braked arm sinks, a joint into its soft stop.
+        // The braked arm descends, a joint into its soft stop.
         let stop_rad = four().limits.position_upper_rad[0];
         for k in 0..800 {
             rig.q += Vector::<4>::new(0.0, 2e-4, 1e-4, 2e-4);
@@ -64,9 +64,9 @@ fn drives_that_come_back_get_the_weight_of_the_arm_and_nothing_more() {
     }
 }
 
-/// An arm that is blocked on a move: fault and float within 20 ms of the force.
+/// An arm that is blocked in a move faults and is gravity-compensated within 20 ms of the force.
 #[test]
-fn a_move_that_meets_something_ends_within_20_ms() {
+fn a_blocked_move_faults_within_20_ms() {
     let config = guarded();
     let mut plant = Plant::at_rest(config.arm, bent());
     let mut rig = Rig::holding(config, bent());
@@ -93,9 +93,9 @@ fn a_move_that_meets_something_ends_within_20_ms() {
     assert_eq!(output.torques.joint_pd, Vector::<4>::zeros());
 }
 
-/// A kilogram that the model does not have, in gravity hold.
+/// An unmodelled kilogram in gravity hold.
 #[test]
-fn a_load_that_the_model_lacks_is_found_within_100_ms() {
+fn an_unmodelled_load_faults_within_100_ms() {
     let config = guarded();
     let mut plant = Plant::at_rest(config.arm, bent());
     let mut rig = Rig::holding(config, bent());
@@ -104,7 +104,8 @@ fn a_load_that_the_model_lacks_is_found_within_100_ms() {
         let output = rig.drive(&mut plant, None, |arm, q, _| push(arm, q, &weight));
         output.fault.is_some()
     });
-    // The observer of this configuration shows 8 of 9.81 N after some time, and 50 ms have to pass from then.
+    // The observer of this configuration needs some time to reach 8 of 9.81 N, and the load must
+    // last 50 ms longer.
     let observer_s = -(1.0_f64 - 8.0 / 9.81).ln() / config.latch.observer_rad_per_s;
     let limit = (observer_s * 1e3) as usize + 100;
     assert!(
@@ -119,7 +120,7 @@ fn a_load_that_the_model_lacks_is_found_within_100_ms() {
 }
 
 fn floor_below(rig: &Rig<4>, by_m: f64) -> Workspace {
-    let mut borders = [None; supple_core::workspace::PLACES];
+    let mut borders = [None; supple_core::workspace::MAX_BOUNDARIES];
     borders[0] = Some(Border::Wall {
         normal: Vector3::new(0.0, 0.0, -1.0),
         offset_m: by_m - rig.tip().z,
@@ -133,9 +134,9 @@ fn floor_below(rig: &Rig<4>, by_m: f64) -> Workspace {
     }
 }
 
-/// Soft before hard: the margin pushes back, and beyond the border whoever moves on is stopped.
+/// The margin pushes the tip back; beyond the border, motion further outwards faults.
 #[test]
-fn a_border_pushes_back_and_then_stops() {
+fn a_border_pushes_back_and_then_faults() {
     let mut config = guarded();
     config.workspace = floor_below(&Rig::new(four(), bent()), 0.08);
     config.plausible.load_n = 1e3;
@@ -171,10 +172,10 @@ fn a_border_pushes_back_and_then_stops() {
 }
 
 #[test]
-fn a_zone_has_its_own_speed() {
+fn a_zone_has_its_own_speed_limit() {
     let mut config = guarded();
     let tip = Rig::new(four(), bent()).tip();
-    let mut zones = [None; supple_core::workspace::PLACES];
+    let mut zones = [None; supple_core::workspace::MAX_BOUNDARIES];
     zones[0] = Some(Zone {
         lower_m: tip - Vector3::repeat(0.5),
         upper_m: tip + Vector3::repeat(0.5),
@@ -202,9 +203,10 @@ fn sinusoid(amplitude_m: Vector3<f64>, angular_frequency_rad_per_s: f64) -> Traj
     })
 }
 
-/// Too fast, too abrupt: refused in the cycle of the request. Out of reach, too strong: by the look along the way.
+/// Excessive speed and acceleration are refused in the cycle of the request; points out of reach
+/// and excessive torques by the check along the path.
 #[test]
-fn a_trajectory_is_looked_at_before_it_begins() {
+fn a_trajectory_is_checked_before_it_starts() {
     let along = Vector3::new(0.05, 0.05, 0.0);
     let mut rig = Rig::holding(guarded(), bent());
     let refusal = rig.ask(Request::Track(sinusoid(along, 1000.0))).refusal;
@@ -219,14 +221,14 @@ fn a_trajectory_is_looked_at_before_it_begins() {
         matches!(refusal, Some(Refusal::Value { .. })),
         "{refusal:?}"
     );
-    let look = |trajectory| plan(&rig.controller, &bent(), &Request::Track(trajectory));
+    let look = |trajectory| check_motion(&rig.controller, &bent(), &Request::Track(trajectory));
     assert_eq!(look(sinusoid(along, 1.0)), Ok(()));
     let far = look(sinusoid(Vector3::new(2.0, 0.0, 0.0), 0.1));
     assert!(matches!(far, Err(Refusal::OutOfReach { .. })), "{far:?}");
     let mut weak = guarded();
     weak.limits.joint_torque_nm[1] = gravity(&weak.arm, &bent())[1].abs();
     let rig = Rig::holding(weak, bent());
-    let strong = plan(
+    let strong = check_motion(
         &rig.controller,
         &bent(),
         &Request::Track(sinusoid(along, 1.0)),
@@ -239,7 +241,7 @@ fn a_trajectory_is_looked_at_before_it_begins() {
     fenced.workspace = floor_below(&rig, 0.02);
     let rig = Rig::holding(fenced, bent());
     let down = sinusoid(Vector3::new(0.0, 0.0, 0.1), 0.5);
-    let out = plan(&rig.controller, &bent(), &Request::Track(down));
+    let out = check_motion(&rig.controller, &bent(), &Request::Track(down));
     assert!(
         matches!(out, Err(Refusal::Workspace { border: 0, .. })),
         "{out:?}"
@@ -247,7 +249,7 @@ fn a_trajectory_is_looked_at_before_it_begins() {
 }
 
 #[test]
-fn a_move_is_neither_abrupt_nor_jerky() {
+fn a_move_beyond_acceleration_or_jerk_limits_is_refused() {
     let mut rig = Rig::holding(guarded(), bent());
     let target_rad = bent::<4>() + Vector::<4>::new(0.02, 0.0, 0.0, 0.0);
     let refusal = rig.ask(Request::Move {
@@ -257,9 +259,9 @@ fn a_move_is_neither_abrupt_nor_jerky() {
     assert!(refusal.refusal.is_some(), "128 rad/s^2");
 }
 
-/// Damping that the delay would turn into its opposite is refused, and says what would do.
+/// Damping that the delay would make unstable is refused; the refusal gives the allowed value.
 #[test]
-fn damping_is_no_greater_than_the_delay_allows() {
+fn damping_beyond_the_delay_margin_is_refused() {
     let mut config = three();
     config.estimator_rad_per_s = 40.0;
     let mut rig = Rig::holding(config, bent());
@@ -275,9 +277,9 @@ fn damping_is_no_greater_than_the_delay_allows() {
     assert_eq!(rig.ask(ask(0.99 * limit)).refusal, None);
 }
 
-/// An encoder that stops from one cycle to the next while its joint moves, and one whose reference moves on.
+/// A stuck encoder of a moving joint, and one whose reference moves.
 #[test]
-fn an_encoder_that_stands_still_is_found() {
+fn a_stuck_encoder_faults() {
     let mut config = guarded();
     config.plausible.stuck_rad = 0.1;
     let mut rig = Rig::holding(config, bent());
@@ -293,9 +295,10 @@ fn an_encoder_that_stands_still_is_found() {
     );
 }
 
-/// A joint that moved when the drives went idle, and rests when they come back, has a sound encoder.
+/// A joint that moved when the drives became idle and is at rest when they are re-enabled does not
+/// count as a stuck encoder.
 #[test]
-fn an_arm_that_came_to_rest_on_its_brakes_is_taken_up_again() {
+fn an_arm_stopped_by_braking_can_be_reenabled() {
     let mut config = guarded();
     config.plausible.stuck_rad = 0.1;
     let mut rig = Rig::holding(config, bent());

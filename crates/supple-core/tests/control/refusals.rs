@@ -1,4 +1,4 @@
-//! Requests out of range change nothing and say what is wrong.
+//! Requests out of range change nothing; the refusal names the entry.
 
 use crate::support::configs::four;
 use crate::support::rig::{Rig, bent};
@@ -8,7 +8,8 @@ use supple_core::math::Vector3;
 use supple_core::trajectory::{Line, Probe, Quadrant, Sinusoid};
 use supple_core::{Trajectory, Vector};
 
-/// Asks for what must be refused, while tracking; nothing but the refusal tells it from not asking.
+/// Sends a request that must be refused while tracking; apart from the refusal the output equals
+/// that without a request.
 #[track_caller]
 fn refused(request: Request<4>) -> Refusal {
     let mut rig = Rig::new(four(), bent());
@@ -28,7 +29,7 @@ fn refused(request: Request<4>) -> Refusal {
     refusal
 }
 
-/// Written as in messages.
+/// Checks that the refusal's message contains `words`.
 #[track_caller]
 fn says(refusal: Refusal, words: &[&str]) {
     let message = refusal.to_string();
@@ -45,7 +46,7 @@ fn go(target_rad: Vector<4>, duration_s: f64) -> Request<4> {
 }
 
 #[test]
-fn moves_beyond_a_stop() {
+fn moves_beyond_a_stop_are_refused() {
     let limits = four().limits;
     for joint in 0..4 {
         for value_rad in [
@@ -58,7 +59,7 @@ fn moves_beyond_a_stop() {
             let mut target = bent::<4>();
             target[joint] = value_rad;
             let refusal = refused(go(target, 100.0));
-            let Refusal::Unreachable {
+            let Refusal::BeyondJointStop {
                 joint: named,
                 value_rad: value,
             } = refusal
@@ -73,7 +74,7 @@ fn moves_beyond_a_stop() {
 }
 
 #[test]
-fn moves_of_a_held_joint() {
+fn moves_of_a_held_joint_are_refused() {
     let mut target = bent::<4>();
     target[2] = 0.01;
     let refusal = refused(go(target, 10.0));
@@ -85,7 +86,7 @@ fn moves_of_a_held_joint() {
 }
 
 #[test]
-fn moves_in_no_time() {
+fn moves_with_an_invalid_duration_are_refused() {
     for duration_s in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let refusal = refused(go(bent(), duration_s));
         assert!(
@@ -103,7 +104,7 @@ fn moves_in_no_time() {
 
 /// The peak of a minimum-jerk move is 1.875 times its mean speed.
 #[test]
-fn moves_that_are_too_fast() {
+fn moves_that_are_too_fast_are_refused() {
     for joint in [0, 1, 3] {
         let mut target = bent::<4>();
         target[joint] += 0.4;
@@ -129,7 +130,7 @@ fn moves_that_are_too_fast() {
 }
 
 #[test]
-fn trajectories_that_start_too_far_away() {
+fn trajectories_that_start_too_far_away_are_refused() {
     let rig = Rig::holding(four(), bent());
     let limit_m = four().limits.start_error_m;
     for direction in [Vector3::x(), -Vector3::y(), Vector3::z()] {
@@ -150,7 +151,7 @@ fn trajectories_that_start_too_far_away() {
 }
 
 #[test]
-fn trajectories_that_are_wrong() {
+fn invalid_trajectories_are_refused() {
     let mut endless = Sinusoid::paper(1.0);
     endless.ramp_s = 0.0;
     let x = Vector3::x();
@@ -179,9 +180,10 @@ fn trajectories_that_are_wrong() {
     }
 }
 
-/// Valid numbers whose products are none: where it starts is no number, and that is not near.
+/// Valid numbers with products that are not finite: the start of the trajectory is NaN, which is
+/// not near the tip.
 #[test]
-fn trajectories_that_overflow() {
+fn trajectories_that_overflow_are_refused() {
     let probe = Probe {
         radius_m: 0.5,
         strokes: u32::MAX,
@@ -198,7 +200,7 @@ fn trajectories_that_overflow() {
 }
 
 #[test]
-fn gains_out_of_range() {
+fn gains_out_of_range_are_refused() {
     let within = Gains::isotropic(10.0, 1.0);
     for axis in 0..3 {
         for (bad, limit) in [

@@ -1,4 +1,4 @@
-//! Every entry of a configuration that can be wrong, refused by its name with its value.
+//! Every configuration entry that can be invalid is rejected with its name and value.
 
 use crate::support::configs::{four, held, seven, three};
 use crate::support::property::{check, per_joint};
@@ -10,7 +10,7 @@ use supple_core::{Config, Controller, Matrix};
 const NOT_POSITIVE: [f64; 5] = [0.0, -1.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
 const NEGATIVE: [f64; 4] = [-1e-9, f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
 
-/// `change` makes a sound configuration unsound; the error names entry, joint and value.
+/// `change` makes a valid configuration invalid; the error names entry, joint and value.
 #[track_caller]
 fn refused(entry: &str, joint: Option<usize>, value: f64, change: impl FnOnce(&mut Config<4>)) {
     let mut config = four();
@@ -40,7 +40,7 @@ macro_rules! refuses {
     )*};
 }
 
-/// Entries with one value a joint.
+/// Entries with one value per joint.
 macro_rules! refuses_per_joint {
     ($values:expr, $($name:literal => $($field:ident).+),* $(,)?) => {$(
         for value in $values {
@@ -52,7 +52,7 @@ macro_rules! refuses_per_joint {
 }
 
 #[test]
-fn sound_ones_are_taken() {
+fn valid_configurations_are_accepted() {
     assert!(Controller::new(three()).is_ok());
     assert!(Controller::new(four()).is_ok());
     let controller = Controller::new(seven()).expect("sound");
@@ -60,7 +60,7 @@ fn sound_ones_are_taken() {
 }
 
 #[test]
-fn numbers_that_must_be_positive() {
+fn entries_must_be_positive() {
     refuses!(NOT_POSITIVE,
         "period_s" => period_s,
         "estimator_rad_per_s" => estimator_rad_per_s,
@@ -87,7 +87,7 @@ fn numbers_that_must_be_positive() {
 }
 
 #[test]
-fn numbers_that_must_not_be_negative() {
+fn entries_must_not_be_negative() {
     refuses!(NEGATIVE,
         "nullspace_damping_nm_s_per_rad" => law.nullspace_damping_nm_s_per_rad,
         "reversal_s" => latch.reversal_s,
@@ -102,7 +102,7 @@ fn numbers_that_must_not_be_negative() {
 }
 
 #[test]
-fn a_share_is_from_0_to_1() {
+fn fractions_must_be_from_0_to_1() {
     for value in [-1e-9, 1.000_000_1, f64::NAN, f64::INFINITY] {
         refused("contact_share", None, value, |config| {
             config.latch.contact_share = value;
@@ -116,7 +116,7 @@ fn a_share_is_from_0_to_1() {
 }
 
 #[test]
-fn gains_beyond_their_limits() {
+fn gains_must_be_within_their_limits() {
     for axis in 0..3 {
         for value in [-1e-9, 1000.1, f64::NAN, f64::INFINITY] {
             refused("stiffness_n_per_m", None, value, |config| {
@@ -132,7 +132,7 @@ fn gains_beyond_their_limits() {
 }
 
 #[test]
-fn friction_that_is_none() {
+fn invalid_friction_is_rejected() {
     for joint in 0..4 {
         for value in NEGATIVE {
             refused("viscous_nm_s_per_rad", Some(joint), value, |config| {
@@ -161,7 +161,7 @@ fn friction_that_is_none() {
 }
 
 #[test]
-fn held_joints() {
+fn held_joints_are_validated() {
     let with = |position_rad, stiffness_nm_per_rad, damping_nm_s_per_rad| {
         move |config: &mut Config<4>| {
             config.roles[2] = Role::Held {
@@ -190,7 +190,7 @@ fn held_joints() {
 }
 
 #[test]
-fn ranges_without_room_for_their_soft_zones() {
+fn ranges_must_be_wider_than_their_soft_zones() {
     for joint in 0..4 {
         refused("position range", Some(joint), 0.1875, |config| {
             config.limits.position_lower_rad[joint] = 1.0;
@@ -206,14 +206,14 @@ fn ranges_without_room_for_their_soft_zones() {
 }
 
 #[test]
-fn fewer_than_three_active_joints() {
+fn fewer_than_three_active_joints_are_rejected() {
     refused("number of active joints", None, 2.0, |config| {
         config.roles[0] = held(0.0);
     });
 }
 
 #[test]
-fn an_apparent_inertia_that_is_none() {
+fn an_invalid_apparent_inertia_is_rejected() {
     let refuse = |mass: Matrix3<f64>| {
         let mut config = four();
         config.law.inertia = ApparentInertia::Chosen(mass);
@@ -233,7 +233,7 @@ fn an_apparent_inertia_that_is_none() {
 }
 
 #[test]
-fn transmissions_that_cannot_be_inverted() {
+fn singular_transmissions_are_rejected() {
     let refuse = |matrix: Matrix<4, 4>| {
         let mut config = four();
         config.joint_from_motor = matrix;
@@ -244,7 +244,7 @@ fn transmissions_that_cannot_be_inverted() {
     refuse(Matrix::from_diagonal_element(f64::NAN));
     refuse(Matrix::from_diagonal_element(f64::INFINITY));
     refuse(Matrix::from_element(1.0));
-    // Any three motors for four joints.
+    // Three motors for four joints.
     check(
         300,
         (per_joint::<4>(1.0), 0..4_usize, -3.0..3.0),
@@ -259,7 +259,7 @@ fn transmissions_that_cannot_be_inverted() {
                 .map(|_| ())
                 .map_err(|error| error.entry);
             prop_assert_eq!(error, Err("joint_from_motor"));
-            // And an honest one of any size.
+            // An invertible matrix of any magnitude is accepted.
             config.joint_from_motor = four().joint_from_motor * 10.0_f64.powf(power);
             prop_assert!(Controller::new(config).is_ok());
             Ok(())
@@ -267,9 +267,9 @@ fn transmissions_that_cannot_be_inverted() {
     );
 }
 
-/// Where several entries are wrong the first one is named, and a limit before what it limits.
+/// With several invalid entries the first is named, a limit before the entries that it limits.
 #[test]
-fn a_wrong_limit_is_not_blamed_on_what_it_limits() {
+fn an_invalid_limit_is_named_before_the_limited_entries() {
     refused("soft_zone_rad", None, f64::NAN, |config| {
         config.limits.soft_zone_rad = f64::NAN;
     });

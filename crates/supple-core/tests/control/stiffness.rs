@@ -1,5 +1,5 @@
-//! Losing a sensor or a peer never makes the arm stiffer: the torque's slope over the angles, before
-//! and after each loss.
+//! The loss of a sensor or a connection never makes the arm stiffer: compares the slope of the
+//! torque over the angles before and after each loss.
 
 use crate::support::configs::{four, held, three, unlimited};
 use crate::support::plant::{Plant, push};
@@ -12,11 +12,11 @@ use supple_core::linalg::symmetric_eigenvalues;
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::{Config, Input, Matrix, Vector};
 
-/// Small beside the arm, large beside rounding \[rad\].
+/// Small compared with the arm's motion, large compared with rounding \[rad\].
 const STEP_RAD: f64 = 1e-4;
 
-/// `-d(tau - G)/dq` at rest: what the controller resists a displacement with. The gravity torque that it
-/// sends balances the weight, whatever slope that has, and counts for nothing.
+/// `-d(tau - G)/dq` at rest: the stiffness of the controller. The gravity torque balances the
+/// weight and does not count.
 fn stiffness<const N: usize>(rig: &Rig<N>) -> Matrix<N, N> {
     let settled = |q: Vector<N>| {
         let mut rig = rig.clone();
@@ -34,9 +34,9 @@ fn stiffness<const N: usize>(rig: &Rig<N>) -> Matrix<N, N> {
     (slope + slope.transpose()) * 0.5
 }
 
-/// By how much `after` resists more than `before`, in the worst of many directions: of the active joints
-/// together, and of each held joint. (Held joints turn the tip, but the law leaves them alone: that
-/// coupling is lopsided, and symmetric it would say nothing.)
+/// Maximum increase in stiffness from `before` to `after` over many directions of the active
+/// joints, and for each held joint. (Held joints move the tip, but the law does not actuate them:
+/// this coupling is not symmetric, and its symmetric part has no meaning.)
 fn stiffer_by(roles: &[Role; 4], before: &Matrix<4, 4>, after: &Matrix<4, 4>) -> f64 {
     let gained = after - before;
     let held = |i: usize| roles[i] != Role::Active;
@@ -57,7 +57,7 @@ fn stiffer_by(roles: &[Role; 4], before: &Matrix<4, 4>, after: &Matrix<4, 4>) ->
     worst
 }
 
-/// What can be lost, each as the input of one cycle and of all that follow.
+/// Losses, each as a change of the inputs of one cycle and all that follow.
 type Loss = (&'static str, fn(&mut Rig<4>));
 
 fn cycle_with(rig: &mut Rig<4>, change: impl Fn(&mut Input<4>)) {
@@ -75,7 +75,7 @@ const LOSSES: [Loss; 8] = [
             cycle_with(rig, |input| input.position_rad[1] = None);
         }
     }),
-    ("an encoder that says nonsense", |rig| {
+    ("an invalid encoder value", |rig| {
         cycle_with(rig, |input| input.position_rad[0] = Some(f64::NAN));
     }),
     ("all encoders", |rig| {
@@ -100,7 +100,7 @@ const LOSSES: [Loss; 8] = [
 ];
 
 #[test]
-fn in_every_mode_whatever_is_lost() {
+fn no_loss_increases_the_stiffness_in_any_mode() {
     let mut config = four();
     unlimited(&mut config);
     for mode in [Mode::Idle, Mode::GravityHold, Mode::Move, Mode::Track] {
@@ -120,9 +120,9 @@ fn in_every_mode_whatever_is_lost() {
     }
 }
 
-/// Track: `J^T K J` and the roll's loop, and nothing hidden; hold: the roll's loop alone.
+/// Track: `J^T K J` and the roll's loop only; hold: the roll's loop alone.
 #[test]
-fn what_the_stiffness_is_in_each_mode() {
+fn stiffness_in_each_mode_is_as_documented() {
     let mut config = four();
     unlimited(&mut config);
     config.friction = crate::support::configs::friction();
@@ -141,7 +141,8 @@ fn what_the_stiffness_is_in_each_mode() {
     j.column_mut(2).fill(0.0);
     let spring = j.transpose() * j * 100.0;
     let found = in_mode(Mode::Track);
-    // The roll turns the tip as well: seen from the others that is a coupling, not a stiffness.
+    // The roll joint moves the tip as well: for the other joints this is a coupling, not a
+    // stiffness.
     for (a, b) in [(0, 0), (0, 1), (1, 1), (1, 3), (3, 3), (0, 3)] {
         let error = (found - spring - roll)[(a, b)].abs();
         assert!(error < 1e-3, "entry {a}, {b} is {error} off");
@@ -150,9 +151,9 @@ fn what_the_stiffness_is_in_each_mode() {
     assert!(size(&(moving - Matrix::<4, 4>::from_diagonal_element(600.0))) < 1e-3);
 }
 
-/// A lost reply cuts the loop of its joint for a cycle: the torque no longer depends on the angle.
+/// A lost reply opens the loop of its joint for a cycle: the torque does not depend on the angle.
 #[test]
-fn a_lost_reply_is_no_stiffness_at_all() {
+fn a_lost_reply_opens_the_loop_of_its_joint() {
     let mut config = four();
     unlimited(&mut config);
     let mut rig = Rig::new(config, bent());
@@ -167,8 +168,7 @@ fn a_lost_reply_is_no_stiffness_at_all() {
     assert_eq!(torque(bent::<4>()[1]), torque(bent::<4>()[1] + 0.1));
 }
 
-/// Force at the tip that keeps it displaced at rest, by what the controller does about it: the
-/// apparent stiffness.
+/// Apparent stiffness: the force that keeps the tip displaced at rest, per displacement.
 fn apparent_stiffness(config: Config<3>, sensor: bool) -> Matrix3<f64> {
     let settle = |push_n: Vector3<f64>| -> Vector3<f64> {
         let mut rig = Rig::holding(config, bent());
@@ -193,10 +193,10 @@ fn apparent_stiffness(config: Config<3>, sensor: bool) -> Matrix3<f64> {
     crate::support::inverse(&compliance)
 }
 
-/// The force sensor shapes how the arm is felt in motion, never how stiff it is: without it, `K` is
-/// still `K`, for a chosen inertia below the arm's own and for one above it.
+/// The force sensor affects the apparent inertia only, not the stiffness: without it the stiffness
+/// is still `K`, for a chosen inertia below the arm's own and for one above it.
 #[test]
-fn without_the_force_sensor_the_arm_is_as_stiff_as_before() {
+fn losing_the_force_sensor_keeps_the_stiffness() {
     for mass_kg in [1.5, 10.0] {
         let mut config = three();
         unlimited(&mut config);
@@ -214,9 +214,9 @@ fn without_the_force_sensor_the_arm_is_as_stiff_as_before() {
     }
 }
 
-/// A fault during a move takes the stiff loop away; a held joint keeps the loop it has when held.
+/// A fault during a move removes the stiff loops.
 #[test]
-fn a_move_that_faults_lets_go_of_the_active_joints() {
+fn a_fault_in_a_move_removes_the_stiff_loops() {
     let mut config = four();
     unlimited(&mut config);
     assert_eq!(config.roles[2], held(0.0));

@@ -1,16 +1,18 @@
-//! The safe action ends motion: on random arms, in random poses and modes, at any speed, with torques that are late,
-//! and with encoders, motors, a load or a gravity that are not what the controller takes them for.
+//! The safe action stops motion: on random arms, in random poses and modes, at any speed, with
+//! delayed torques, and with defects of encoders, motors, load or gravity that the controller does
+//! not know.
 //!
-//! Expected, before anything was run: once a fault is latched, the arm either brakes (the drives get no torque) or has
-//! a kinetic energy that falls from 0.2 s on and a tip slower than 0.25 m/s after 0.5 s; and until then it never moves
-//! with more energy than it had, but for what its weight and a torque that was under way have put in meanwhile.
+//! Criteria, fixed before the first run: once a fault is latched, the arm either brakes (the drives
+//! get no torque) or has a kinetic energy that falls from 0.2 s on and a tip slower than 0.25 m/s
+//! after 0.5 s; until then its energy never exceeds the initial energy plus the work of gravity and
+//! of torques already on the way.
 
 use crate::support::property::{Outcome, check};
 use proptest::prelude::*;
 use std::collections::VecDeque;
 use supple_core::config::{
-    ApparentInertia, Collision, FrictionVelocity, Gains, Law, Limits, MoveGains, Plausible, Role,
-    Workspace,
+    ApparentInertia, Collision, FrictionVelocity, Gains, Law, Limits, MoveGains,
+    PlausibilityLimits, Role, Workspace,
 };
 use supple_core::controller::{Fault, Mode, Request, SafeAction, State, step};
 use supple_core::dynamics::{aba, gravity, jacobian, kinetic_energy, tip_pose};
@@ -23,20 +25,20 @@ use supple_core::{
 
 const PERIOD_S: f64 = 1e-3;
 
-/// What goes wrong.
+/// Defect of the arm.
 #[derive(Clone, Copy, Debug)]
-enum Wrong {
-    /// Nothing: the fault is a measurement that is no number.
+enum Defect {
+    /// No defect: the fault is a measurement that is not finite.
     Nothing,
-    /// The encoder of a joint stands still.
+    /// The encoder value of a joint does not change.
     Stuck(usize),
-    /// The encoder of a joint counts the other way.
+    /// The encoder of a joint has the wrong sign.
     Sign(usize),
-    /// All encoders are 20 cycles late.
+    /// All encoders are delayed by 20 cycles.
     Late,
-    /// The motor of a joint gives nothing.
+    /// The motor of a joint produces no torque.
     Dead(usize),
-    /// The world is upside down.
+    /// Gravity has the opposite sign.
     UpsideDown,
     /// A mass at the tip \[kg\].
     Load(f64),
@@ -50,20 +52,20 @@ struct Case {
     pose: Vec<f64>,
     bump_rad_per_s: Vec<f64>,
     mode: u8,
-    wrong: Wrong,
+    defect: Defect,
     delay: usize,
 }
 
 fn case(joints: usize) -> impl Strategy<Value = Case> {
     let link = (0.1..0.5, 0.5..5.0, 0..3_u8);
-    let wrong = prop_oneof![
-        2 => Just(Wrong::Nothing),
-        1 => (0..joints).prop_map(Wrong::Stuck),
-        1 => (0..joints).prop_map(Wrong::Sign),
-        1 => Just(Wrong::Late),
-        1 => (0..joints).prop_map(Wrong::Dead),
-        1 => Just(Wrong::UpsideDown),
-        1 => (0.2..2.0).prop_map(Wrong::Load),
+    let defect = prop_oneof![
+        2 => Just(Defect::Nothing),
+        1 => (0..joints).prop_map(Defect::Stuck),
+        1 => (0..joints).prop_map(Defect::Sign),
+        1 => Just(Defect::Late),
+        1 => (0..joints).prop_map(Defect::Dead),
+        1 => Just(Defect::UpsideDown),
+        1 => (0.2..2.0).prop_map(Defect::Load),
     ];
     (
         prop::collection::vec(link, joints),
@@ -71,17 +73,17 @@ fn case(joints: usize) -> impl Strategy<Value = Case> {
         prop::collection::vec(-1.8..1.8, joints),
         prop::collection::vec(-4.0..4.0, joints),
         1..5_u8,
-        wrong,
+        defect,
         0..3_usize,
     )
         .prop_map(
-            |(links, armature_kg_m2, pose, bump_rad_per_s, mode, wrong, delay)| Case {
+            |(links, armature_kg_m2, pose, bump_rad_per_s, mode, defect, delay)| Case {
                 links,
                 armature_kg_m2,
                 pose,
                 bump_rad_per_s,
                 mode,
-                wrong,
+                defect,
                 delay,
             },
         )
@@ -91,7 +93,7 @@ fn arm<const N: usize>(case: &Case, gravity_z: f64) -> Arm<N> {
     let joints: [Joint; N] = core::array::from_fn(|i| {
         let (length, mass_kg, axis) = case.links[i];
         let before = if i == 0 { 0.0 } else { case.links[i - 1].0 };
-        // The first joint turns about the vertical, the others about what the case says.
+        // The first joint rotates about the vertical, the others about the axes of the case.
         let axis = if i == 0 { 2 } else { usize::from(axis) };
         let (thin, long) = (2e-3 * mass_kg, mass_kg * length * length / 12.0 + 1e-3);
         Joint {
@@ -111,7 +113,7 @@ fn arm<const N: usize>(case: &Case, gravity_z: f64) -> Arm<N> {
     Arm::new(&joints, tip, None, Vector3::new(0.0, 0.0, gravity_z)).expect("a physical arm")
 }
 
-/// Limits as a maker of such an arm would choose them: motors that carry three times its weight.
+/// Realistic limits for such an arm: motors that carry three times its weight.
 fn config<const N: usize>(case: &Case) -> Config<N> {
     let arm = arm::<N>(case, -9.81);
     let all = Vector::<N>::repeat;
@@ -170,7 +172,7 @@ fn config<const N: usize>(case: &Case) -> Config<N> {
             tip_force_n: 60.0,
             move_share: 0.5,
         },
-        plausible: Plausible {
+        plausible: PlausibilityLimits {
             lost_replies: 3,
             stuck_rad: 0.1,
             against_share: 0.05,
@@ -180,37 +182,37 @@ fn config<const N: usize>(case: &Case) -> Config<N> {
     }
 }
 
-/// The arm itself and the wires to it.
-struct World<const N: usize> {
+/// The simulated arm with its delays and defects.
+struct SimulatedArm<const N: usize> {
     arm: Arm<N>,
-    /// Dry friction, and viscous friction at 1 rad/s, of which the controller knows nothing: a hundredth of the torque
-    /// limit each, half of the WAM's \[N m\].
+    /// Dry friction, and viscous friction at 1 rad/s, that the controller does not model: 1 % of
+    /// the torque limit each, half of the WAM's \[N m\].
     friction_nm: Vector<N>,
     q: Vector<N>,
     qd: Vector<N>,
-    /// Angles as the encoders had them, the newest last.
+    /// Past encoder angles, the newest last.
     measured: VecDeque<Vector<N>>,
-    /// Torques under way.
+    /// Delayed torques.
     late: VecDeque<Vector<N>>,
-    wrong: Option<Wrong>,
-    /// Angles when it went wrong.
+    defect: Option<Defect>,
+    /// Angles at the onset of the defect.
     at_rad: Vector<N>,
 }
 
-impl<const N: usize> World<N> {
+impl<const N: usize> SimulatedArm<N> {
     fn encoders(&mut self) -> Vector<N> {
         let mut angles = self.q;
-        match self.wrong {
-            Some(Wrong::Stuck(joint)) => angles[joint] = self.at_rad[joint],
-            Some(Wrong::Sign(joint)) => angles[joint] = 2.0 * self.at_rad[joint] - angles[joint],
+        match self.defect {
+            Some(Defect::Stuck(joint)) => angles[joint] = self.at_rad[joint],
+            Some(Defect::Sign(joint)) => angles[joint] = 2.0 * self.at_rad[joint] - angles[joint],
             _ => {}
         }
         self.measured.push_back(angles);
         if self.measured.len() > 21 {
             self.measured.pop_front();
         }
-        match self.wrong {
-            Some(Wrong::Late) => self.measured[0],
+        match self.defect {
+            Some(Defect::Late) => self.measured[0],
             _ => angles,
         }
     }
@@ -218,11 +220,11 @@ impl<const N: usize> World<N> {
     fn advance(&mut self, torque_nm: &Vector<N>) {
         self.late.push_back(*torque_nm);
         let mut torque = self.late.pop_front().expect("one a cycle");
-        if let Some(Wrong::Dead(joint)) = self.wrong {
+        if let Some(Defect::Dead(joint)) = self.defect {
             torque[joint] = 0.0;
         }
-        let load = match self.wrong {
-            Some(Wrong::Load(mass_kg)) => Vector3::new(0.0, 0.0, -9.81 * mass_kg),
+        let load = match self.defect {
+            Some(Defect::Load(mass_kg)) => Vector3::new(0.0, 0.0, -9.81 * mass_kg),
             _ => Vector3::zeros(),
         };
         let slope = |q: &Vector<N>, qd: &Vector<N>| {
@@ -231,7 +233,7 @@ impl<const N: usize> World<N> {
                 Vector::from_fn(|i, _| self.friction_nm[i] * ((qd[i] / 0.02).tanh() + qd[i]));
             aba(&self.arm, q, qd, &(torque + outside - friction))
         };
-        // The midpoint rule, a quarter of a cycle at a time.
+        // Midpoint rule with a step of a quarter of a cycle.
         for _ in 0..4 {
             let h = 0.25 * PERIOD_S;
             let (q, qd) = (self.q, self.qd);
@@ -264,22 +266,22 @@ fn request<const N: usize>(case: &Case, config: &Config<N>, q: &Vector<N>) -> Re
 
 fn stops<const N: usize>(case: &Case) -> Outcome {
     let config = config::<N>(case);
-    let controller = Controller::new(config).expect("a sound configuration");
+    let controller = Controller::new(config).expect("a valid configuration");
     let mut state = State::new(&controller);
     let start = Vector::<N>::from_column_slice(&case.pose);
-    let mut world = World {
+    let mut simulated = SimulatedArm {
         arm: config.arm,
         friction_nm: config.limits.joint_torque_nm * 0.01,
         q: start,
         qd: Vector::zeros(),
         measured: VecDeque::new(),
         late: VecDeque::from(vec![Vector::zeros(); case.delay]),
-        wrong: None,
+        defect: None,
         at_rad: start,
     };
     let bump = Vector::<N>::from_column_slice(&case.bump_rad_per_s);
-    let mut cycle = |world: &mut World<N>, cycle: u64, request, force| -> Output<N> {
-        let angles = world.encoders();
+    let mut cycle = |simulated: &mut SimulatedArm<N>, cycle: u64, request, force| -> Output<N> {
+        let angles = simulated.encoders();
         let input = Input {
             cycle,
             position_rad: core::array::from_fn(|i| Some(angles[i])),
@@ -290,50 +292,50 @@ fn stops<const N: usize>(case: &Case) -> Outcome {
         step(&controller, &mut state, &input)
     };
     let mut k = 0;
-    // A brake holds the arm until its weight is carried.
+    // A brake holds the arm until its weight is compensated.
     while k < 150 {
         let ask = (k == 1).then_some(Request::GravityHold);
-        let output = cycle(&mut world, k, ask, None);
-        world.late.push_back(output.torque_nm);
-        world.late.pop_front();
+        let output = cycle(&mut simulated, k, ask, None);
+        simulated.late.push_back(output.torque_nm);
+        simulated.late.pop_front();
         k += 1;
     }
     while k < 300 {
         let ask = (k == 150).then(|| request(case, &config, &start));
-        let output = cycle(&mut world, k, ask, None);
-        world.advance(&output.torque_nm);
+        let output = cycle(&mut simulated, k, ask, None);
+        simulated.advance(&output.torque_nm);
         k += 1;
     }
-    world.qd += bump;
+    simulated.qd += bump;
     let mut fault: Option<(u64, f64)> = None;
     let mut last_j = f64::MAX;
-    // An encoder that sticks on a joint that was hardly seen to move (below two fifths of its limit)
-    // is no other than that of a joint at rest.
+    // A stuck encoder of a joint with a low measured speed (below two fifths of its limit) cannot
+    // be distinguished from that of a joint at rest.
     let mut seen = Vector::<N>::zeros();
     for since in 0..1200_u64 {
-        // It goes wrong while the arm moves.
+        // The defect occurs while the arm moves.
         if since == u64::from(case.mode) * 10 {
-            world.wrong = Some(case.wrong);
-            world.at_rad = world.q;
-            if let Wrong::UpsideDown = case.wrong {
-                world.arm = arm::<N>(case, 9.81);
+            simulated.defect = Some(case.defect);
+            simulated.at_rad = simulated.q;
+            if let Defect::UpsideDown = case.defect {
+                simulated.arm = arm::<N>(case, 9.81);
             }
         }
-        let bad = (matches!(case.wrong, Wrong::Nothing) && since == 30)
+        let bad = (matches!(case.defect, Defect::Nothing) && since == 30)
             .then(|| Vector3::repeat(f64::NAN));
-        let output = cycle(&mut world, k, None, bad);
-        world.advance(&output.torque_nm);
+        let output = cycle(&mut simulated, k, None, bad);
+        simulated.advance(&output.torque_nm);
         k += 1;
-        if world.wrong.is_none() {
+        if simulated.defect.is_none() {
             seen = seen.sup(&output.velocity_rad_per_s.abs());
         }
-        let hidden = matches!(case.wrong, Wrong::Stuck(joint) if seen[joint] < 0.8);
-        prop_assert!(world.qd.iter().all(|v| v.is_finite()));
-        if output.limp {
+        let hidden = matches!(case.defect, Defect::Stuck(joint) if seen[joint] < 0.8);
+        prop_assert!(simulated.qd.iter().all(|v| v.is_finite()));
+        if output.torque_off {
             prop_assert_eq!(output.safe_action, Some(SafeAction::Idle));
             return Ok(());
         }
-        let energy_j = world.energy_j();
+        let energy_j = simulated.energy_j();
         let Some((begun, at_j)) = &mut fault else {
             if output.fault.is_some() {
                 fault = Some((since, energy_j));
@@ -346,22 +348,22 @@ fn stops<const N: usize>(case: &Case) -> Outcome {
             *at_j = at_j.max(energy_j);
         }
         prop_assert!(
-            energy_j <= 2.5 * *at_j + slack_j(&world, &config, case.wrong),
+            energy_j <= 2.5 * *at_j + slack_j(&simulated, &config, case.defect),
             "{energy_j} J {after} ms after a fault at {at_j} J: {:?}, {:?}",
             output.fault,
-            case.wrong
+            case.defect
         );
         if after >= 200 && after % 50 == 0 && !hidden {
             prop_assert!(
-                energy_j <= (1.01 * last_j + 2e-3).max(slack_j(&world, &config, case.wrong)),
+                energy_j <= (1.01 * last_j + 2e-3).max(slack_j(&simulated, &config, case.defect)),
                 "{energy_j} J after {last_j} J, {after} ms after {:?}, {:?}",
                 output.fault,
-                case.wrong
+                case.defect
             );
             last_j = energy_j;
         }
         if after == 500 {
-            let tip = world.tip_m_per_s();
+            let tip = simulated.tip_m_per_s();
             prop_assert!(
                 hidden || tip < 0.25,
                 "tip at {tip} m/s after {:?}",
@@ -370,22 +372,23 @@ fn stops<const N: usize>(case: &Case) -> Outcome {
             return Ok(());
         }
     }
-    // A wrong that shows in nothing is none yet.
+    // A defect without any visible effect need not be detected.
     Ok(())
 }
 
-/// Energy with which nothing moves yet: each joint at its moving speed of 0.4 rad/s, half as much again. A joint that
-/// nobody sees falls until what its weight lacks is a tenth of its torque limit, and for 0.1 s more.
-fn slack_j<const N: usize>(world: &World<N>, config: &Config<N>, wrong: Wrong) -> f64 {
+/// Energy below which the arm does not count as moving: 1.5 times that of all joints at their
+/// moving speed of 0.4 rad/s. A joint without a working encoder falls until its missing gravity
+/// torque is a tenth of its torque limit, and for 0.1 s more.
+fn slack_j<const N: usize>(simulated: &SimulatedArm<N>, config: &Config<N>, defect: Defect) -> f64 {
     let slow = Vector::<N>::repeat(0.4 * 1.5);
-    let unseen_j = match wrong {
-        Wrong::Stuck(joint) => 0.1 * config.limits.joint_torque_nm[joint],
+    let unseen_j = match defect {
+        Defect::Stuck(joint) => 0.1 * config.limits.joint_torque_nm[joint],
         _ => 0.0,
     };
-    kinetic_energy(&world.arm, &world.q, &slow) + unseen_j
+    kinetic_energy(&simulated.arm, &simulated.q, &slow) + unseen_j
 }
 
-/// How many arms of each size; 10,000 in all.
+/// Number of arms of each size; 10,000 in total.
 const CASES: u32 = 3334;
 
 #[test]
@@ -403,35 +406,35 @@ fn arms_of_7_joints_stop() {
     check(CASES, case(7), |case| stops::<7>(&case));
 }
 
-/// A fault at the greatest speeds of which motors are capable, with nothing else wrong: the energy falls in every
-/// 10 ms, with torques up to three cycles late, and no drive brakes.
+/// A fault at the maximum speeds of the motors without any defect: the energy falls in every 10 ms,
+/// with torques delayed by up to three cycles, and the drives do not brake.
 #[test]
-fn sound_arms_stop_without_braking() {
+fn arms_without_defects_stop_without_braking() {
     check(300, case(4), |mut case| {
-        case.wrong = Wrong::Nothing;
+        case.defect = Defect::Nothing;
         case.mode = 0;
         let config = config::<4>(&case);
-        let controller = Controller::new(config).expect("a sound configuration");
+        let controller = Controller::new(config).expect("a valid configuration");
         let mut state = State::new(&controller);
         let start = Vector::<4>::from_column_slice(&case.pose);
-        // As fast as the motors can stop within 0.1 s.
+        // Speeds that the motors can stop within 0.1 s.
         let speed = Vector::<4>::from_column_slice(&case.bump_rad_per_s);
         let momentum = supple_core::dynamics::crba(&config.arm, &start) * speed;
         let room = config.limits.joint_torque_nm - gravity(&config.arm, &start).abs();
         let time_s = momentum.abs().component_div(&room).max();
-        let mut world = World {
+        let mut simulated = SimulatedArm {
             arm: config.arm,
             friction_nm: Vector::zeros(),
             q: start,
             qd: speed * (0.1 / time_s).min(2.5),
             measured: VecDeque::new(),
             late: VecDeque::from(vec![gravity(&config.arm, &start); case.delay]),
-            wrong: None,
+            defect: None,
             at_rad: start,
         };
         let mut energies = Vec::new();
         for k in 0..700 {
-            let angles = world.encoders();
+            let angles = simulated.encoders();
             let output = step(
                 &controller,
                 &mut state,
@@ -443,20 +446,20 @@ fn sound_arms_stop_without_braking() {
                     request: (k == 0).then_some(Request::GravityHold),
                 },
             );
-            world.advance(&output.torque_nm);
+            simulated.advance(&output.torque_nm);
             if matches!(
                 output.fault,
                 Some(Fault::JointSpeed { .. } | Fault::TipSpeed { .. })
             ) {
                 prop_assert!(
-                    !output.limp,
+                    !output.torque_off,
                     "braked after {k} ms at {} J, {} rad/s, external {} of {} N m",
-                    world.energy_j(),
-                    world.qd,
+                    simulated.energy_j(),
+                    simulated.qd,
                     output.external_torque_nm,
                     config.collision.joint_torque_nm
                 );
-                energies.push(world.energy_j());
+                energies.push(simulated.energy_j());
             }
         }
         for pair in energies.chunks(10).skip(5).collect::<Vec<_>>().windows(2) {

@@ -1,32 +1,33 @@
-//! Whatever is asked for and whatever is measured, for as many cycles as one has time for: `SUPPLE_CYCLES` of them
-//! (150,000 by default; 10 million in `./ci.sh cycles`), on an arm that moves as the torques and the bumps have it.
+//! Invariants under random requests and measurements for `SUPPLE_CYCLES` cycles (default 150,000;
+//! 10 million in `./ci.sh cycles`), on a simulated arm that is pushed at random.
 //!
-//! Every cycle: torques finite, within the limits of joints, motors and rate; a fault is there exactly in mode
-//! fault, and stays until a reset; in it no term is stiff or fed forward; modes change only as `Mode` says.
+//! Every cycle: torques finite, within the limits of joints, motors and rate; a fault is reported
+//! exactly in mode fault, and stays until a reset; in a fault no term is stiff or fed forward;
+//! modes change only as documented in `Mode`.
 #![allow(
     clippy::disallowed_methods,
-    reason = "references take their mathematics elsewhere"
+    reason = "reference values use other mathematical functions"
 )]
 
 #[path = "../support/mod.rs"]
 mod support;
 
-mod world;
+mod simulated_arm;
 
+use simulated_arm::{Random, SimulatedArm};
 use std::collections::BTreeMap;
 use supple_core::config::ApparentInertia;
 use supple_core::controller::{Mode, Request};
 use supple_core::math::Matrix3;
 use supple_core::{Config, Input, Output, Vector};
 use support::configs::{four, seven, three};
-use world::{Random, World};
 
-/// Cycles after which the arm begins anew elsewhere.
+/// Cycles after which the arm restarts in another pose.
 const EPISODE: u64 = 2_000;
-/// The safe action may take a joint's whole torque away in this time \[s\].
+/// Time in which the safe action may ramp a joint from full torque to zero \[s\].
 const STOP_TORQUE_S: f64 = 0.005;
-/// Terms of the law that are springs, or motion that somebody wants: none of them acts in a fault.
-const WANTED: [&str; 7] = [
+/// Stiffness and feed-forward terms: none of them acts in a fault.
+const STIFF_TERMS: [&str; 7] = [
     "friction",
     "jacobian_rate",
     "inertial",
@@ -36,7 +37,7 @@ const WANTED: [&str; 7] = [
     "joint_pd",
 ];
 
-/// Cycles of each of the three arms.
+/// Number of cycles for each of the three arms.
 fn cycles() -> u64 {
     let all = std::env::var("SUPPLE_CYCLES").ok();
     let all = all.map(|all| all.parse().expect("SUPPLE_CYCLES is a whole number"));
@@ -46,24 +47,24 @@ fn cycles() -> u64 {
 fn survive<const N: usize>(mut config: Config<N>, seed: u64) {
     config.limits.stale_cycles = 6;
     config.limits.start_error_m = 2.0;
-    let mut random = Random(seed);
+    let mut random = Random::new(seed);
     let mut seen = BTreeMap::<&str, u64>::new();
     let mut faults = BTreeMap::<&str, u64>::new();
     let mut left = cycles();
     while left > 0 {
-        let mut world = World::new(config, &mut random);
-        let mut last = world.begin();
+        let mut simulated = SimulatedArm::new(config, &mut random);
+        let mut last = simulated.begin();
         for _ in 0..left.min(EPISODE) {
-            let input = world.input(&mut random, &last);
-            let output = world.step(&input);
+            let input = simulated.input(&mut random, &last);
+            let output = simulated.step(&input);
             let torque = Sums::of(&output);
-            assert_limits(&world, &last, &output);
+            assert_limits(&simulated, &last, &output);
             assert_modes(&last, &input, &output, &torque);
             if let (Some(fault), None) = (&output.fault, &last.fault) {
                 *faults.entry(fault.name()).or_default() += 1;
             }
             *seen.entry(output.mode.name()).or_default() += 1;
-            world.advance(&output, &mut random);
+            simulated.advance(&output, &mut random);
             last = output;
         }
         left -= left.min(EPISODE);
@@ -78,7 +79,7 @@ fn survive<const N: usize>(mut config: Config<N>, seed: u64) {
     assert!(faults.len() >= 6, "few faults came: {faults:?}");
 }
 
-/// Greatest entry of each term.
+/// Largest entry of each term.
 struct Sums(Vec<(&'static str, f64)>);
 
 impl Sums {
@@ -98,8 +99,12 @@ impl Sums {
     }
 }
 
-fn assert_limits<const N: usize>(world: &World<N>, last: &Output<N>, output: &Output<N>) {
-    let controller = &world.rig.controller;
+fn assert_limits<const N: usize>(
+    simulated: &SimulatedArm<N>,
+    last: &Output<N>,
+    output: &Output<N>,
+) {
+    let controller = &simulated.rig.controller;
     let config = controller.config();
     let limits = &config.limits;
     let motors = controller.motors().motor_torque_nm(&output.torque_nm);
@@ -136,7 +141,7 @@ fn assert_modes<const N: usize>(
     output: &Output<N>,
     torque: &Sums,
 ) {
-    let say = || {
+    let describe = || {
         format!(
             "{:?} to {:?} by {input:?}: {output:?}",
             last.mode, output.mode
@@ -146,19 +151,28 @@ fn assert_modes<const N: usize>(
         output.mode == Mode::Fault,
         output.fault.is_some(),
         "{}",
-        say()
+        describe()
     );
     let fresh = input.cycle != last.cycle;
     let bad = input.position_rad.iter().flatten().any(|x| !x.is_finite());
-    assert!(!(bad && fresh) || output.mode == Mode::Fault, "{}", say());
+    assert!(
+        !(bad && fresh) || output.mode == Mode::Fault,
+        "{}",
+        describe()
+    );
     assert!(
         output.refusal.is_none() || input.request.is_some(),
         "{}",
-        say()
+        describe()
     );
     if output.fault.is_some() {
-        for term in WANTED {
-            assert_eq!(torque.get(term), 0.0, "{term} acts in a fault: {}", say());
+        for term in STIFF_TERMS {
+            assert_eq!(
+                torque.get(term),
+                0.0,
+                "{term} acts in a fault: {}",
+                describe()
+            );
         }
     }
     let request = input.request.as_ref().filter(|_| output.refusal.is_none());
@@ -168,10 +182,13 @@ fn assert_modes<const N: usize>(
         (Mode::Fault, _) => false,
         (from, to) if from == to => true,
         (_, Mode::Idle) => matches!(request, Some(Request::Idle)),
-        // A breakaway that is done ends in gravity hold; so does all work while the drives are idle.
+        // A completed breakaway ends in gravity hold; so does every activity while the drives are
+        // idle.
         (from, Mode::GravityHold) => {
-            let let_go = from != Mode::Idle && world::drives_are_idle(input);
-            matches!(request, Some(Request::GravityHold)) || from == Mode::Breakaway || let_go
+            let torque_released = from != Mode::Idle && simulated_arm::drives_are_idle(input);
+            matches!(request, Some(Request::GravityHold))
+                || from == Mode::Breakaway
+                || torque_released
         }
         (Mode::Idle, _) => false,
         (_, Mode::Move) => matches!(request, Some(Request::Move { .. })),
@@ -179,7 +196,7 @@ fn assert_modes<const N: usize>(
         (_, Mode::Excite) => matches!(request, Some(Request::Excite(_))),
         (_, Mode::Breakaway) => matches!(request, Some(Request::Breakaway(_))),
     };
-    assert!(documented, "{}", say());
+    assert!(documented, "{}", describe());
 }
 
 #[test]
@@ -202,19 +219,19 @@ fn seven_joints_three_of_them_held() {
     survive(config, 7);
 }
 
-/// What the properties are worth: each of them is broken by an output that breaks it.
+/// Checks the properties themselves: each fails for an output that violates it.
 #[test]
-fn the_properties_can_be_broken() {
-    let mut random = Random(1);
-    let mut world = World::new(four(), &mut random);
-    let last = world.begin();
-    let input = world.rig.input();
-    let good = world.step(&input);
+fn the_invariants_detect_violations() {
+    let mut random = Random::new(1);
+    let mut simulated = SimulatedArm::new(four(), &mut random);
+    let last = simulated.begin();
+    let input = simulated.rig.input();
+    let good = simulated.step(&input);
     let breaks = |change: &dyn Fn(&mut Output<4>)| {
         let mut output = good;
         change(&mut output);
         let checked = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
-            assert_limits(&world, &last, &output);
+            assert_limits(&simulated, &last, &output);
             assert_modes(&last, &input, &output, &Sums::of(&output));
         }));
         checked.is_err()

@@ -1,4 +1,4 @@
-//! Derivatives by central differences: what is the rate of what.
+//! Relations between functions and their time derivatives, by central differences.
 
 use crate::common::numeric::{derivative, scalar, size, unit};
 use crate::common::random::Case;
@@ -54,7 +54,7 @@ fn kinetic_gradient_is_the_gradient_of_kinetic_energy<const N: usize>(case: &Cas
     Ok(())
 }
 
-/// Linear and angular velocity of the tip as `q` moves along `qd`.
+/// Linear and angular velocity of the tip for `q` moving along `qd`.
 fn twist_by_differences<const N: usize>(case: &Case<N>) -> Vector<6> {
     let arm = case.arm();
     let along = |t: f64| tip_pose(&arm, &(case.q + case.qd * t));
@@ -82,7 +82,7 @@ fn jacobian_dot_qd_is_the_rate_of_the_twist<const N: usize>(case: &Case<N>) -> O
     Ok(())
 }
 
-/// `p' = tau - G + dT/dq` along the motion that `tau` gives.
+/// `p' = tau - G + dT/dq` along the motion under `tau`.
 fn momentum_obeys_its_balance<const N: usize>(case: &Case<N>) -> Outcome {
     let (arm, q, qd) = (case.arm(), &case.q, &case.qd);
     let tau = case.qdd * 3.0;
@@ -93,7 +93,7 @@ fn momentum_obeys_its_balance<const N: usize>(case: &Case<N>) -> Outcome {
     let rate = derivative(|t| momentum(&arm, &(q + qd * t), &(qd + qdd * t)).momentum);
     let scale = 10.0 + size(&expected) + size(&crba(&arm, q)) * qdd.norm();
     prop_close!(rate, expected, scale, 1e-9);
-    // And the energy follows: power is torque times velocity.
+    // Energy balance: power is torque times velocity.
     let energy = |t: f64| {
         let (q, qd) = (q + qd * t, qd + qdd * t);
         kinetic_energy(&arm, &q, &qd) + potential_energy(&arm, &q)

@@ -4,7 +4,7 @@ use crate::common::reference::{Reference, wam3, wam4, wam7};
 use supple_core::dynamics::{aba, kinetic_energy, potential_energy};
 use supple_core::{Arm, Vector};
 
-/// What rounding leaves of energies of some 10 J after ten thousand steps.
+/// Accumulated rounding error of energies of some 10 J after ten thousand steps.
 const ROUNDING_J: f64 = 1e-11;
 
 /// A state, and the work done on the arm up to it \[J\].
@@ -62,7 +62,8 @@ fn imbalance<const N: usize>(
     energy(&s) - first - s.work
 }
 
-/// The imbalance is the integrator's alone: it falls with the fourth power of the step, to nothing.
+/// The imbalance is due to the integrator alone: it falls with the fourth power of the step, down
+/// to rounding.
 fn energy_is_accounted_for<const N: usize>(
     reference: &Reference<N>,
     torque: impl Fn(&State<N>) -> Vector<N> + Copy,
@@ -80,14 +81,14 @@ fn energy_is_accounted_for<const N: usize>(
 }
 
 #[test]
-fn a_free_swing_keeps_its_energy() {
+fn a_free_motion_conserves_energy() {
     energy_is_accounted_for(&wam3(), |_| Vector::zeros(), 100);
     energy_is_accounted_for(&wam4(), |_| Vector::zeros(), 100);
     energy_is_accounted_for(&wam7(), |_| Vector::zeros(), 800);
 }
 
 #[test]
-fn dampers_take_what_the_arm_loses() {
+fn dampers_dissipate_the_lost_energy() {
     energy_is_accounted_for(&wam3(), |s| -s.qd, 100);
     energy_is_accounted_for(&wam4(), |s| -s.qd, 100);
     energy_is_accounted_for(&wam7(), |s| s.qd * -1e-3, 800);

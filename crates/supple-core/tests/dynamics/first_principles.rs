@@ -1,7 +1,7 @@
-//! Random arms against the same arms as swarms of point masses, with axes and frames as given: what
-//! the turned joint frames, the sweeps and the lumped tool must reproduce.
+//! Random arms compared with the same arms as point masses, with axes and frames as described:
+//! tests the rotated joint frames, the sweeps and the merged tool.
 
-use crate::common::cloud::{link_poses, point_jacobian, swarm};
+use crate::common::cloud::{link_poses, point_jacobian, point_mass_reference};
 use crate::common::numeric::{derivative, scalar, size, unit};
 use crate::common::random::Case;
 use crate::{for_arms_of_3_4_and_7_joints, prop_close};
@@ -23,25 +23,25 @@ for_arms_of_3_4_and_7_joints!(
 );
 
 fn mass_matrix_is_that_of_the_points<const N: usize>(case: &Case<N>) -> Outcome {
-    let (links, _) = swarm(&case.joints, &case.carried(), &case.gravity, &case.q);
+    let (links, _) = point_mass_reference(&case.joints, &case.carried(), &case.gravity, &case.q);
     let expected = links + Matrix::from_diagonal(&case.armature());
     prop_close!(crba(&case.arm(), &case.q), expected, size(&expected), 1e-13);
     Ok(())
 }
 
 fn potential_energy_is_that_of_the_points<const N: usize>(case: &Case<N>) -> Outcome {
-    let (_, expected) = swarm(&case.joints, &case.carried(), &case.gravity, &case.q);
+    let (_, expected) = point_mass_reference(&case.joints, &case.carried(), &case.gravity, &case.q);
     let found = potential_energy(&case.arm(), &case.q);
     prop_close!(scalar(found), scalar(expected), 100.0, 1e-13);
     Ok(())
 }
 
-/// `C_ij = sum_k (dM_ij/dq_k + dM_ik/dq_j - dM_jk/dq_i) qd_k / 2`, `M` from the points.
+/// `C_ij = sum_k (dM_ij/dq_k + dM_ik/dq_j - dM_jk/dq_i) qd_k / 2`, with `M` from the points.
 fn coriolis_matrix_is_made_of_christoffel_symbols<const N: usize>(case: &Case<N>) -> Outcome {
     let clouds = case.carried();
     let slope = |k: usize| {
         derivative(|h| {
-            swarm(
+            point_mass_reference(
                 &case.joints,
                 &clouds,
                 &case.gravity,

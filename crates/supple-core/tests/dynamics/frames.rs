@@ -1,5 +1,5 @@
-//! What must not change: the same arm described in other frames, from another base, with its tool
-//! as part of the last link.
+//! Invariance: the same arm described in other frames, from another base, and with its tool as part
+//! of the last link.
 
 use crate::common::cloud::turn;
 use crate::common::numeric::size;
@@ -26,7 +26,7 @@ for_arms_of_3_4_and_7_joints!(
     accessors_tell_what_was_built,
 );
 
-/// Both arms take the same torques to the same motions.
+/// Both arms need the same torques for the same motions.
 fn same_dynamics<const N: usize>(case: &Case<N>, a: &Arm<N>, b: &Arm<N>) -> Outcome {
     let (q, qd, qdd) = (&case.q, &case.qd, &case.qdd);
     let scale = torque_scale(case, a);
@@ -62,7 +62,7 @@ fn same_tip<const N: usize>(case: &Case<N>, a: &Arm<N>, b: &Arm<N>) -> Outcome {
     Ok(())
 }
 
-/// Each link frame turned any way about its origin, and slid along its joint's axis.
+/// Each link frame is rotated about its origin and shifted along its joint's axis.
 fn link_frames_are_free<const N: usize>(case: &Case<N>) -> Outcome {
     let mut other = case.clone();
     let mut old_from_new = Pose::IDENTITY;
@@ -73,14 +73,14 @@ fn link_frames_are_free<const N: usize>(case: &Case<N>) -> Outcome {
         old_from_new.translation = joint.axis * (0.03 * case.qdd[i]);
         joint.parent_from_link = parent.inverse() * joint.parent_from_link * old_from_new;
         joint.axis = old_from_new.rotation.tr_mul(&joint.axis);
-        joint.body = joint.body.seen_from(&old_from_new.inverse());
+        joint.body = joint.body.expressed_in(&old_from_new.inverse());
     }
     other.last_link_from_tip = old_from_new.inverse() * case.last_link_from_tip;
     same_dynamics(case, &case.arm(), &other.arm())?;
     same_tip(case, &case.arm(), &other.arm())
 }
 
-/// The whole arm, and gravity with it, turned in the base frame.
+/// The whole arm, and gravity with it, is rotated in the base frame.
 fn base_frame_is_free<const N: usize>(case: &Case<N>) -> Outcome {
     let new_from_old = Pose::from_xyz_rpy([0.0; 3], [case.qdd[0], case.qdd[1], case.qdd[2]]);
     let mut other = case.clone();
@@ -95,7 +95,7 @@ fn base_frame_is_free<const N: usize>(case: &Case<N>) -> Outcome {
     Ok(())
 }
 
-/// Gravity torques do not see the base turned about the vertical.
+/// Gravity torques do not depend on the rotation of the base about the vertical.
 fn gravity_is_blind_to_turns_about_it<const N: usize>(case: &Case<N>) -> Outcome {
     let down = case.gravity.normalize();
     let mut other = case.clone();
@@ -118,7 +118,7 @@ fn a_tool_is_a_heavier_last_link<const N: usize>(case: &Case<N>) -> Outcome {
     same_tip(case, &case.arm(), &merged.arm())
 }
 
-/// As far from symmetric as validation lets pass: all functions still speak of one arm.
+/// An inertia with the largest accepted asymmetry: all functions still describe the same arm.
 fn an_inertia_symmetric_but_for_noise_is_made_so<const N: usize>(case: &Case<N>) -> Outcome {
     let mut noisy = case.clone();
     for joint in &mut noisy.joints {
@@ -165,7 +165,7 @@ fn accessors_tell_what_was_built<const N: usize>(case: &Case<N>) -> Outcome {
             rotation: link_from_joint,
             ..Pose::IDENTITY
         };
-        let found = arm.body(i).seen_from(&link_from_joint);
+        let found = arm.body(i).expressed_in(&link_from_joint);
         prop_close!(found.com_m, expected.com_m, 1.0, 1e-13);
         prop_close!(found.inertia_kg_m2, expected.inertia_kg_m2, 1.0, 1e-13);
     }

@@ -14,7 +14,7 @@ use supple_core::{Arm, Vector};
 
 type Outcome = Result<(), TestCaseError>;
 
-/// Size of the torques in play \[N m\], beside which rounding is counted.
+/// Magnitude of the torques \[N m\], the scale of rounding errors.
 pub fn torque_scale<const N: usize>(case: &Case<N>, arm: &Arm<N>) -> f64 {
     let speeds = case.qd.norm_squared() + case.qdd.norm();
     1.0 + size(&crba(arm, &case.q)) * (1.0 + speeds) + size(&gravity(arm, &case.q))
@@ -71,8 +71,8 @@ fn inverse_dynamics_specialises<const N: usize>(case: &Case<N>) -> Outcome {
     Ok(())
 }
 
-/// Backward error: the torque that the answer stands for is the torque asked. Forward, the answer is
-/// that of the mass matrix, as far as its condition allows.
+/// Backward error: inverse dynamics of the result gives the input torque. Forward error: the result
+/// agrees with the mass matrix as far as its condition allows.
 fn forward_dynamics_inverts_inverse_dynamics<const N: usize>(case: &Case<N>) -> Outcome {
     let (arm, q, qd) = (case.arm(), &case.q, &case.qd);
     let tau = case.qdd;
@@ -141,11 +141,11 @@ fn regressor_is_linear_in_the_parameters<const N: usize>(case: &Case<N>) -> Outc
         1e-13
     );
     for (i, row) in rows.iter().enumerate() {
-        // A link loads no joint beyond it.
+        // A link loads no joint after it.
         prop_assert!(row[..i].iter().all(|y| *y == Vector::<10>::zeros()));
     }
 
-    // The columns know nothing of the bodies: other bodies, same regressor.
+    // The regressor does not depend on the bodies.
     let mut others = case.clone();
     others.tool = None;
     for joint in &mut others.joints {

@@ -1,5 +1,5 @@
-//! The dynamics, held against independent libraries, against point masses, and against the
-//! identities of mechanics on random arms.
+//! The dynamics compared with independent libraries, with point masses, and with the identities of
+//! mechanics on random arms.
 
 #[path = "../common/mod.rs"]
 mod common;

@@ -1,4 +1,4 @@
-//! Every function against Pinocchio's values on the reference arms, 40 states each, to 1e-10.
+//! Every function compared with Pinocchio's values on the reference arms, 40 states each, to 1e-10.
 
 use crate::common::numeric::{error_at_scale, mixed_error, scalar, size};
 use crate::common::reference::{Sample, wam3, wam4, wam7};
@@ -62,7 +62,8 @@ on_the_reference_arms! {
             &(s.coriolis_matrix.transpose() * s.qd),
         ))
     };
-    // Random torques on the light wrist give accelerations of 1e5 rad/s^2: relative to their norm.
+    // Random torques on the light wrist give accelerations of 1e5 rad/s^2, so the error is relative
+    // to their norm.
     aba_agrees: |arm, s| {
         size(&(aba(arm, &s.q, &s.qd, &s.tau) - s.aba)) / size(&s.aba).max(1.0)
     };
@@ -100,7 +101,7 @@ fn pose_error(found: &Pose, expected: &Pose) -> f64 {
 }
 
 #[test]
-fn regressors_are_there() {
+fn recorded_regressors_are_present() {
     let recorded = |has: Vec<bool>| has.iter().filter(|h| **h).count();
     assert_eq!(
         recorded(
@@ -135,7 +136,7 @@ fn regressors_are_there() {
 }
 
 #[test]
-fn nothing_passes_the_comparison_as_nan() {
+fn the_comparison_rejects_nan() {
     let nan = scalar(f64::NAN);
     assert_eq!(mixed_error(&nan, &scalar(1.0)), f64::INFINITY);
     assert_eq!(error_at_scale(&scalar(1.0), &nan, 1.0), f64::INFINITY);

@@ -1,5 +1,5 @@
-//! With an exact model and no friction, the tip obeys (3.3) to rounding: accelerations by `aba`, with
-//! held joints kept still by whatever torque that takes.
+//! With an exact model and no friction, the tip obeys (3.3) to rounding: accelerations by `aba`,
+//! with held joints kept at rest by ideal torques.
 
 use crate::support::arms::{wam3, wam4, wam7};
 use crate::support::configs::{four, seven};
@@ -18,7 +18,7 @@ fn law(inertia: ApparentInertia) -> Law {
     Law {
         inertia,
         inertial_feedforward: true,
-        ..Law::paper_letter(Gains::isotropic(0.0, 0.0))
+        ..Law::as_published(Gains::isotropic(0.0, 0.0))
     }
 }
 
@@ -43,7 +43,7 @@ fn task_inertia<const N: usize>(arm: &Arm<N>, roles: &[Role; N], q: &Vector<N>) 
     inverse(&(j * inverse(&h) * j.transpose()))
 }
 
-/// What the tip does: acceleration under `torque`, pushed by `force`.
+/// Acceleration of the tip under `torque` and the external `force`.
 fn tip_acceleration<const N: usize>(
     scene: &Scene<N>,
     arm: &Arm<N>,
@@ -66,12 +66,12 @@ fn feedback<const N: usize>(scene: &Scene<N>, arm: &Arm<N>) -> Vector3<f64> {
         + b.component_mul(&(scene.reference.velocity - tip_velocity))
 }
 
-/// Whether the inverse is exact here.
+/// Whether the inverse is undamped in this pose.
 fn regular<const N: usize>(scene: &Scene<N>, arm: &Arm<N>, roles: &[Role; N]) -> bool {
     scene.task(arm, roles).least_singular_value_m > SINGULAR_BELOW_M
 }
 
-/// `inertia (X'' - Xo'') = force + feedback`, for what `law` is said to make of the arm.
+/// Checks `inertia (X'' - Xo'') = force + feedback` for the apparent inertia of `law`.
 fn obeys<const N: usize>(
     scene: &Scene<N>,
     arm: &Arm<N>,
@@ -115,10 +115,10 @@ fn own_inertia<const N: usize>(arm: Arm<N>, roles: [Role; N]) {
 }
 
 fn mass() -> impl Strategy<Value = Matrix3<f64>> {
-    (vector3(1.0), vector3(1.0), vector3(1.0), 0.2..5.0).prop_map(|(a, b, c, least)| {
+    (vector3(1.0), vector3(1.0), vector3(1.0), 0.2..5.0).prop_map(|(a, b, c, min)| {
         let root = Matrix3::from_columns(&[a, b, c]);
         let square = root * root.transpose();
-        (square + square.transpose()) * 0.5 + Matrix3::from_diagonal_element(least)
+        (square + square.transpose()) * 0.5 + Matrix3::from_diagonal_element(min)
     })
 }
 
@@ -129,7 +129,7 @@ fn chosen_inertia<const N: usize>(arm: Arm<N>, roles: [Role; N]) {
         }
         let chosen = ApparentInertia::Chosen(mass);
         obeys(&scene, &arm, &roles, chosen, Some(scene.force_n), &mass)?;
-        // Without a measurement it is the arm's own inertia that is felt.
+        // Without a force measurement the apparent inertia is the arm's own.
         let own = task_inertia(&arm, &roles, &scene.q);
         obeys(&scene, &arm, &roles, chosen, None, &own)
     });
@@ -170,8 +170,7 @@ fn chosen_inertia_of_4_active_joints() {
     chosen_inertia(wam4(), [Role::Active; 4]);
 }
 
-/// The arm's own inertia, entry for entry: measuring the force and choosing `M = Lambda` is not to
-/// measure it.
+/// A measured force with the choice `M = Lambda` gives the same torque as no measurement.
 #[test]
 fn choosing_the_arms_own_inertia_changes_nothing() {
     let (arm, roles) = (wam3(), [Role::Active; 3]);
@@ -209,7 +208,7 @@ fn the_inverse_of_3_active_joints_is_the_jacobians() {
     });
 }
 
-/// `Jb` beside held joints is a right inverse that never moves them.
+/// With held joints `Jb` is a right inverse of the Jacobian that does not move them.
 #[test]
 fn the_inverse_leaves_held_joints_alone() {
     let (arm, roles) = (wam7(), seven().roles);

@@ -1,4 +1,4 @@
-//! The friction feed-forward: no stiffness in it, and what fades and what stays.
+//! The friction feed-forward: it has no stiffness; its dry part fades, the rest stays.
 
 use crate::support::arms::{wam3, wam4};
 use crate::support::configs::{four, friction};
@@ -12,7 +12,7 @@ use supple_core::{Friction, Vector};
 fn law(friction_velocity: FrictionVelocity) -> Law {
     Law {
         friction_velocity,
-        ..Law::paper_letter(Gains::isotropic(5.0, 1.5))
+        ..Law::as_published(Gains::isotropic(5.0, 1.5))
     }
 }
 
@@ -29,9 +29,9 @@ fn feedforward(scene: &Scene<4>, velocity: FrictionVelocity) -> Vector<4> {
         .friction
 }
 
-/// To the bit: a spring hidden in the friction would show here.
+/// Bit-identical: this would reveal any stiffness in the friction term.
 #[test]
-fn it_does_not_depend_on_the_position_error() {
+fn friction_feedforward_is_independent_of_the_position_error() {
     check(300, (scene::<4>(), vector3(2.0)), |(scene, position)| {
         for velocity in [FrictionVelocity::Reference, FrictionVelocity::Measured] {
             let mut elsewhere = scene.clone();
@@ -46,7 +46,7 @@ fn it_does_not_depend_on_the_position_error() {
 }
 
 #[test]
-fn at_the_references_velocity_it_does_not_depend_on_the_measured_one() {
+fn friction_at_the_reference_velocity_ignores_the_measured_one() {
     check(300, (scene::<4>(), vector3(2.0)), |(scene, other)| {
         let mut moving = scene.clone();
         moving.qd = Vector::<4>::new(other.x, other.y, 0.3, other.z);
@@ -65,7 +65,7 @@ fn at_the_references_velocity_it_does_not_depend_on_the_measured_one() {
 }
 
 #[test]
-fn it_is_the_model_at_its_velocity() {
+fn friction_feedforward_equals_the_model() {
     let (arm, roles) = (wam3(), [Role::Active; 3]);
     check(300, scene::<3>(), |mut scene| {
         scene.friction_share = 1.0;
@@ -88,9 +88,9 @@ fn it_is_the_model_at_its_velocity() {
     });
 }
 
-/// Fading takes the dry part away, evenly; what does not come from dry friction stays.
+/// Fading scales the dry part of all joints equally; the other parts stay.
 #[test]
-fn offset_and_viscous_part_stay_when_the_dry_part_is_faded() {
+fn fading_keeps_offset_and_viscous_friction() {
     let config = four();
     let wet: [Friction; 4] = friction().map(|friction| Friction {
         coulomb_nm: 0.0,
@@ -117,7 +117,7 @@ fn offset_and_viscous_part_stay_when_the_dry_part_is_faded() {
     });
 }
 
-/// A held joint has no reference that moves: its offset is all it gets.
+/// A held joint has no moving reference: its feed-forward is the offset only.
 #[test]
 fn held_joints_get_their_offset_alone() {
     check(200, scene::<4>(), |scene| {
@@ -129,10 +129,10 @@ fn held_joints_get_their_offset_alone() {
     });
 }
 
-/// Why the reference's velocity: with an exact monotone model, what is left of the arm's friction
-/// takes energy from the error's motion, however the arm moves.
+/// Reason for using the reference's velocity: with an exact monotone model, the remaining friction
+/// takes energy from the motion of the error for any motion of the arm.
 #[test]
-fn what_is_left_of_friction_damps_the_error() {
+fn the_residual_friction_damps_the_error() {
     let (arm, roles) = (
         wam4(),
         [Role::Active, Role::Active, four().roles[2], Role::Active],

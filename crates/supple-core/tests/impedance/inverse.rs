@@ -1,4 +1,4 @@
-//! The dynamically consistent inverse is what the law's head says, whichever way it is computed.
+//! The dynamically consistent inverse equals its definition for every way of computing it.
 
 use crate::support::arms::{wam3, wam4, wam7};
 use crate::support::configs::{four, seven};
@@ -69,7 +69,7 @@ fn of_seven_joints_some_of_them_held() {
 }
 
 #[test]
-fn an_arm_without_positive_definite_mass_matrix_has_none() {
+fn an_indefinite_mass_matrix_has_no_inverse() {
     let (arm, roles) = (wam3(), [Role::Active; 3]);
     check(100, scene::<3>(), |scene| {
         for entry in [0.0, -1.0, f64::NAN, f64::INFINITY] {

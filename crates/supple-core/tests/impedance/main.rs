@@ -1,7 +1,7 @@
-//! The impedance law: what the arm does under it, by its own forward dynamics, and what each term is.
+//! The impedance law: the motion of the arm under it, by forward dynamics, and each of its terms.
 #![allow(
     clippy::disallowed_methods,
-    reason = "references take their mathematics elsewhere"
+    reason = "reference values use other mathematical functions"
 )]
 
 #[path = "../support/mod.rs"]

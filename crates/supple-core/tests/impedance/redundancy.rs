@@ -1,4 +1,4 @@
-//! A fourth active joint: its motion is damped without the tip noticing.
+//! A fourth active joint: null-space motion is damped without an effect on the tip.
 
 use crate::support::arms::{wam4, wam7};
 use crate::support::configs::seven;
@@ -17,7 +17,7 @@ const DAMPING: f64 = 2.0;
 fn law() -> Law {
     Law {
         nullspace_damping_nm_s_per_rad: DAMPING,
-        ..Law::paper_letter(Gains::isotropic(0.0, 0.0))
+        ..Law::as_published(Gains::isotropic(0.0, 0.0))
     }
 }
 
@@ -50,18 +50,18 @@ fn tip_feels_nothing<const N: usize>(arm: Arm<N>, roles: [Role; N]) {
 }
 
 #[test]
-fn the_tip_of_4_joints_feels_nothing() {
+fn nullspace_damping_of_4_joints_leaves_the_tip_alone() {
     tip_feels_nothing(wam4(), [Role::Active; 4]);
 }
 
 #[test]
-fn the_tip_of_4_joints_before_a_held_wrist_feels_nothing() {
+fn nullspace_damping_before_a_held_wrist_leaves_the_tip_alone() {
     tip_feels_nothing(wam7(), seven().roles);
 }
 
-/// In the words of the law: `J H^-1 tau = 0`.
+/// In terms of the law: `J H^-1 tau = 0`.
 #[test]
-fn no_acceleration_of_the_tip_through_the_inverse_mass_matrix() {
+fn nullspace_torque_does_not_accelerate_the_tip() {
     let (arm, roles) = (wam4(), [Role::Active; 4]);
     check(300, scene::<4>(), |scene| {
         let task = scene.task(&arm, &roles);
@@ -75,11 +75,11 @@ fn no_acceleration_of_the_tip_through_the_inverse_mass_matrix() {
     });
 }
 
-/// However the arm moves, near singular poses as elsewhere, the damping only takes energy.
+/// For any motion, also near singular poses, the damping only takes energy.
 fn only_takes_energy<const N: usize>(arm: Arm<N>, roles: [Role; N]) {
     check(1000, scene::<N>(), |scene| -> Outcome {
         let power = nullspace(&scene, &arm, &roles).dot(&scene.qd);
-        prop_assert!(power <= 1e-12, "{power} W put in");
+        prop_assert!(power <= 1e-12, "{power} W added");
         Ok(())
     });
 }
@@ -94,9 +94,9 @@ fn damping_of_4_joints_before_a_held_wrist_only_takes_energy() {
     only_takes_energy(wam7(), seven().roles);
 }
 
-/// Motion that leaves the tip alone meets the full damping.
+/// Pure null-space motion is subject to the full damping.
 #[test]
-fn pure_null_motion_is_damped_as_stated() {
+fn pure_nullspace_motion_is_fully_damped() {
     let (arm, roles) = (wam4(), [Role::Active; 4]);
     check(300, scene::<4>(), |mut scene| {
         let task = scene.task(&arm, &roles);
@@ -112,7 +112,7 @@ fn pure_null_motion_is_damped_as_stated() {
 }
 
 #[test]
-fn three_active_joints_have_no_null_motion() {
+fn three_active_joints_have_no_nullspace_motion() {
     let config = crate::support::configs::four();
     check(100, scene::<4>(), |scene| {
         let torque = nullspace(&scene, &config.arm, &config.roles);
@@ -121,9 +121,9 @@ fn three_active_joints_have_no_null_motion() {
     });
 }
 
-/// Null motion dies out in simulation while the law keeps the tip where it is.
+/// In simulation null-space motion decays while the law keeps the tip in place.
 #[test]
-fn null_motion_dies_out() {
+fn nullspace_motion_decays() {
     let (arm, roles) = (wam4(), [Role::Active; 4]);
     let q = Vector::<4>::new(0.3, 0.7, 0.4, 1.4);
     let mut scene = Scene {

@@ -1,4 +1,5 @@
-//! Near singular poses: the inverse is damped by a stated amount, and no torque grows without bound.
+//! Near singular poses the inverse is damped by the documented amount, and no torque grows without
+//! bound.
 
 use crate::support::arms::{wam3, wam4};
 use crate::support::configs::{four, friction};
@@ -8,19 +9,19 @@ use crate::support::{assert_close, inverse};
 use proptest::prelude::*;
 use supple_core::config::{ApparentInertia, Gains, Law, Role};
 use supple_core::dynamics::crba;
-use supple_core::impedance::{GREATEST_TASK_MASS_KG, SINGULAR_BELOW_M, singularity_damping_per_kg};
+use supple_core::impedance::{MAX_TASK_MASS_KG, SINGULAR_BELOW_M, singularity_damping_per_kg};
 use supple_core::linalg::symmetric_eigenvalues;
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::{Arm, Vector};
 
 #[test]
-fn damping_is_a_smooth_function_of_the_least_singular_value() {
+fn damping_is_a_smooth_function_of_the_min_singular_value() {
     let f = singularity_damping_per_kg;
     assert_eq!(SINGULAR_BELOW_M, 0.18);
     for sigma in [0.18, 0.180_001, 0.3, 1.0, 1e9] {
         assert_eq!(f(sigma), 0.0, "at {sigma}");
     }
-    assert_eq!(f(0.0), 1.0 / GREATEST_TASK_MASS_KG);
+    assert_eq!(f(0.0), 1.0 / MAX_TASK_MASS_KG);
     let h = 1e-6;
     let mut last = f(0.0);
     for k in 1..180_000 {
@@ -30,7 +31,7 @@ fn damping_is_a_smooth_function_of_the_least_singular_value() {
         last = value;
     }
     assert!(last < 1e-10, "it arrives at zero, {last}");
-    // With a slope of zero at both ends.
+    // The slope is zero at both ends.
     assert!((f(0.0) - f(h)) / h < 1e-5);
     assert!((f(SINGULAR_BELOW_M - h) - f(SINGULAR_BELOW_M)) / h < 1e-4);
 }
@@ -41,7 +42,7 @@ fn no_damping_on_the_papers_sinusoid() {
     for k in 0..=100 {
         let x = 0.4 + 0.4 * f64::from(k) / 100.0;
         let seed = Vector::<4>::new(0.0, 0.5, 0.0, 1.8);
-        let place = supple_core::reach::reach(
+        let place = supple_core::inverse_kinematics::inverse_kinematics(
             &config.arm,
             &config.roles,
             &config.limits,
@@ -62,8 +63,8 @@ fn no_damping_on_the_papers_sinusoid() {
     }
 }
 
-/// Every term is finite, and no acceleration of the tip asks for more force than the greatest task
-/// mass would.
+/// Every term is finite, and no acceleration of the tip needs more force than with the maximum task
+/// mass.
 fn bounded<const N: usize>(scene: &Scene<N>, arm: &Arm<N>, roles: &[Role; N]) {
     let mass = Matrix3::from_diagonal_element(2.0);
     for inertia in [ApparentInertia::Own, ApparentInertia::Chosen(mass)] {
@@ -71,7 +72,7 @@ fn bounded<const N: usize>(scene: &Scene<N>, arm: &Arm<N>, roles: &[Role; N]) {
             inertia,
             inertial_feedforward: true,
             nullspace_damping_nm_s_per_rad: 2.0,
-            ..Law::paper_letter(Gains::isotropic(0.0, 0.0))
+            ..Law::as_published(Gains::isotropic(0.0, 0.0))
         };
         let torques = scene.torques(&law, &friction(), arm, roles, Some(scene.force_n));
         for (name, torque) in torques.named() {
@@ -83,9 +84,9 @@ fn bounded<const N: usize>(scene: &Scene<N>, arm: &Arm<N>, roles: &[Role; N]) {
     assert!(task.inverse.iter().all(|x| x.is_finite()));
 }
 
-/// Straight out, straight up (where yaw does nothing either), and folded back.
+/// Straight out, straight up (where yaw does not move the tip either), and folded back.
 #[test]
-fn exactly_singular_poses() {
+fn terms_are_bounded_in_singular_poses() {
     let still = Scene {
         q: Vector::<3>::zeros(),
         qd: Vector::<3>::new(0.5, -0.4, 0.3),
@@ -125,7 +126,7 @@ fn exactly_singular_poses() {
 }
 
 #[test]
-fn near_singular_poses() {
+fn terms_are_bounded_near_singular_poses() {
     check(500, (scene::<3>(), -7.0..-1.0), |(mut scene, power)| {
         scene.q[2] = 10.0_f64.powf(power);
         bounded(&scene, &wam3(), &[Role::Active; 3]);
@@ -133,14 +134,14 @@ fn near_singular_poses() {
     });
 }
 
-/// Torques do not jump where the damping sets in: a step of the elbow across the threshold, a
-/// thousandth as long, changes them a thousandth as much.
+/// Torques are continuous at the onset of the damping: a step of the elbow across the threshold
+/// that is a thousandth as long changes them by a thousandth.
 #[test]
-fn torques_are_continuous_where_the_damping_sets_in() {
+fn torques_are_continuous_at_the_onset_of_damping() {
     let (arm, roles) = (wam3(), [Role::Active; 3]);
     let law = Law {
         inertial_feedforward: true,
-        ..Law::paper_letter(Gains::isotropic(0.0, 0.0))
+        ..Law::as_published(Gains::isotropic(0.0, 0.0))
     };
     check(100, scene::<3>(), |mut scene| {
         scene.q[1] = 0.8;
@@ -195,30 +196,28 @@ fn still(q: Vector<3>) -> Scene<3> {
 }
 
 #[test]
-fn a_lost_direction_is_given_the_greatest_mass() {
+fn a_lost_direction_gets_the_max_task_mass() {
     let arm = wam3();
     for pitch in [-1.0, 0.3, 0.8, 1.4] {
         let mass = commanded_mass(&still(Vector::<3>::new(0.4, pitch, 0.0)), &arm);
-        let [.., greatest] = symmetric_eigenvalues(&mass);
-        assert!(
-            (greatest - GREATEST_TASK_MASS_KG).abs() < 1e-6,
-            "{greatest} kg"
-        );
+        let [.., max] = symmetric_eigenvalues(&mass);
+        assert!((max - MAX_TASK_MASS_KG).abs() < 1e-6, "{max} kg");
     }
 }
 
-/// On the way to a singular pose it may pass that, but not without bound: about twice for the WAM.
+/// On the way to a singular pose the mass may exceed the maximum, but is bounded: about twice for
+/// the WAM.
 #[test]
-fn no_direction_is_given_more_than_about_twice_as_much() {
+fn no_direction_gets_more_than_about_twice_the_max_task_mass() {
     let arm = wam3();
     let mut heaviest: f64 = 0.0;
     for i in 0..60 {
         for k in 0..400 {
             let q = Vector::<3>::new(0.0, 0.05 * f64::from(i) - 1.5, 0.01 * f64::from(k) - 0.9);
-            let [.., greatest] = symmetric_eigenvalues(&commanded_mass(&still(q), &arm));
-            heaviest = heaviest.max(greatest);
+            let [.., max] = symmetric_eigenvalues(&commanded_mass(&still(q), &arm));
+            heaviest = heaviest.max(max);
         }
     }
-    let times = heaviest / GREATEST_TASK_MASS_KG;
+    let times = heaviest / MAX_TASK_MASS_KG;
     assert!((1.0..2.5).contains(&times), "{times} times");
 }

@@ -1,4 +1,4 @@
-//! Each term apart, their sum, and the letter of (3.6).
+//! Each term, their sum, and (3.6) as printed.
 
 use crate::support::arms::{wam3, wam7};
 use crate::support::configs::{four, friction, seven};
@@ -11,6 +11,8 @@ use supple_core::config::{ApparentInertia, FrictionVelocity, Gains, Law, Role};
 use supple_core::dynamics::{coriolis, crba, gravity, jacobian, jacobian_dot_qd, tip_pose};
 use supple_core::impedance::{SINGULAR_BELOW_M, Torques};
 use supple_core::math::{Matrix3, Vector3};
+use supple_core::record::{Recorded, Unpack};
+use supple_core::torques::TERMS;
 use supple_core::{Friction, Vector};
 
 fn whole_law() -> Law {
@@ -26,25 +28,14 @@ fn whole_law() -> Law {
 #[test]
 fn every_term_is_named_once_and_counted_once() {
     let one = Vector::<3>::repeat;
-    let torques = Torques {
-        gravity: one(1.0),
-        coriolis: one(2.0),
-        friction: one(4.0),
-        jacobian_rate: one(8.0),
-        inertial: one(16.0),
-        stiffness: one(32.0),
-        damping: one(64.0),
-        force: one(128.0),
-        nullspace: one(256.0),
-        joint_pd: one(512.0),
-        soft_stop: one(1024.0),
-        ripple: one(2048.0),
-        handover: one(4096.0),
-    };
-    assert_eq!(torques.total(), one(8191.0));
-    assert_eq!(torques.feedback(), one(96.0));
+    let words = |k: usize| [f64::from(1 << k).to_bits(); 3];
+    let words: Vec<u64> = (0..TERMS.len()).flat_map(words).collect();
+    let torques: Torques<3> = Recorded::<3>::unpack(&mut Unpack::new(&words, 3));
+    let all = f64::from((1 << TERMS.len()) - 1);
+    assert_eq!(torques.total(), one(all));
+    assert_eq!(torques.feedback(), torques.stiffness + torques.damping);
     let names: BTreeSet<_> = torques.named().iter().map(|(name, _)| *name).collect();
-    assert_eq!(names.len(), 13);
+    assert_eq!(names.len(), TERMS.len());
     // The names are those of the fields, in their order.
     let written = format!("{torques:?}");
     let mut last = 0;
@@ -57,9 +48,9 @@ fn every_term_is_named_once_and_counted_once() {
     assert_eq!(Torques::<3>::zeros().total(), one(0.0));
 }
 
-/// The law leaves to others what is theirs.
+/// The law leaves the terms of other modules at zero.
 #[test]
-fn the_law_fills_no_term_that_is_not_its_own() {
+fn the_law_leaves_terms_of_other_modules_zero() {
     let config = seven();
     check(100, scene::<7>(), |scene| {
         let torques = scene.torques(
@@ -77,7 +68,7 @@ fn the_law_fills_no_term_that_is_not_its_own() {
 }
 
 #[test]
-fn the_models_terms_are_the_models() {
+fn model_terms_equal_the_dynamics() {
     let arm = wam7();
     check(100, scene::<7>(), |scene| {
         let (q, qd) = (&scene.q, &scene.qd);
@@ -107,8 +98,8 @@ fn held_joints_get_no_force_of_the_task() {
         ] {
             prop_assert_eq!(term[2], 0.0, "{}", name);
         }
-        // With a chosen inertia it is given what the others' acceleration does to it, `H Jb a`, so
-        // that it stays: no torque of its own loop is needed.
+        // With a chosen inertia the held joint gets the coupling torque of the others'
+        // acceleration, `H Jb a`, so that it stays at rest without a torque of its own loop.
         let law = whole_law();
         let torques = scene.torques(&law, &none, arm, roles, Some(scene.force_n));
         let task = scene.task(arm, roles);
@@ -134,9 +125,9 @@ fn a_measured_force_is_not_used_with_the_arms_own_inertia() {
     });
 }
 
-/// A chosen inertia without a measurement is the arm's own, to the bit.
+/// A chosen inertia without a force measurement gives bit-identical torques to the arm's own.
 #[test]
-fn without_a_force_the_inertia_is_the_arms_own() {
+fn a_chosen_inertia_without_force_equals_the_arms_own() {
     let config = four();
     check(100, scene::<4>(), |scene| {
         let torques = |inertia| {
@@ -154,7 +145,7 @@ fn without_a_force_the_inertia_is_the_arms_own() {
 #[test]
 fn stiffness_and_damping_are_per_axis_and_linear() {
     let (arm, roles) = (wam3(), [Role::Active; 3]);
-    let law = Law::paper_letter(Gains::isotropic(0.0, 0.0));
+    let law = Law::as_published(Gains::isotropic(0.0, 0.0));
     let none = [Friction::NONE; 3];
     check(100, scene::<3>(), |scene| {
         let at = |k: Vector3<f64>, b: Vector3<f64>| {
@@ -184,9 +175,9 @@ fn stiffness_and_damping_are_per_axis_and_linear() {
     });
 }
 
-/// `G + C qd + D(qd) - H J^-1 J' qd + J^T [K (Xo - X) + B (Xo' - X')]`, and nothing else.
+/// The torque is `G + C qd + D(qd) - H J^-1 J' qd + J^T [K (Xo - X) + B (Xo' - X')]`.
 #[test]
-fn the_letter_of_the_paper() {
+fn as_published_matches_the_printed_equation() {
     let (arm, roles) = (wam3(), [Role::Active; 3]);
     let model: [Friction; 3] = friction();
     check(300, scene::<3>(), |mut scene| {
@@ -205,7 +196,7 @@ fn the_letter_of_the_paper() {
             + Vector::<3>::from_fn(|i, _| model[i].torque_nm(qd[i]))
             - crba(&arm, q) * (inverse(&j) * jdot_qd.fixed_rows::<3>(0))
             + j.transpose() * (k.component_mul(&error) + b.component_mul(&error_rate));
-        let law = Law::paper_letter(scene.gains);
+        let law = Law::as_published(scene.gains);
         prop_assert_eq!(law.gains, scene.gains);
         let found = scene.torques(&law, &model, &arm, &roles, Some(scene.force_n));
         let off = (found.total() - expected).norm();

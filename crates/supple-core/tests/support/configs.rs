@@ -1,13 +1,13 @@
-//! Sound configurations of the WAM's size. No friction unless a test adds it.
+//! Valid configurations of the WAM's size. No friction unless a test adds it.
 
 use super::arms::{wam3, wam4, wam7};
 use supple_core::config::{
     ApparentInertia, Collision, ContactLatch, FrictionVelocity, Gains, Law, Limits, MoveGains,
-    Plausible, Role, Workspace,
+    PlausibilityLimits, Role, Workspace,
 };
 use supple_core::{Arm, Config, Friction, Matrix, RippleTable, Vector};
 
-/// Held as the shoulder roll is.
+/// Held with the gains of the shoulder roll.
 pub fn held(position_rad: f64) -> Role {
     Role::Held {
         position_rad,
@@ -112,20 +112,20 @@ fn config<const N: usize>(
             stiffness_n_per_m: 1000.0,
             damping_n_s_per_m: 100.0,
         },
-        collision: Collision::never(),
-        plausible: Plausible::anything(),
+        collision: Collision::disabled(),
+        plausible: PlausibilityLimits::disabled(),
         workspace: Workspace::UNBOUNDED,
     }
 }
 
-/// Least joint index of those that share motors, for each joint of the configurations here.
+/// Smallest index of the joints that share motors, for each joint of these configurations.
 pub fn motor_groups<const N: usize>() -> [usize; N] {
     let differential_and_wrist = [0, 1, 1, 3, 4, 4, 6];
     std::array::from_fn(|i| if N == 3 { i } else { differential_and_wrist[i] })
 }
 
-/// The torque that follows `last_nm` on the way to `wanted_nm`: joints that share motors together, as
-/// far as the slowest of them may go.
+/// The rate-limited torque after `last_nm` towards `wanted_nm`: joints that share motors are scaled
+/// together, to the slowest of them.
 pub fn rate_limited<const N: usize>(
     config: &Config<N>,
     last_nm: &Vector<N>,
@@ -138,7 +138,7 @@ pub fn rate_limited<const N: usize>(
     )
 }
 
-/// The same in a fault, where a joint's whole torque may go in 5 ms.
+/// The same in a fault, where a joint's full torque may be removed in 5 ms.
 pub fn stop_limited<const N: usize>(
     config: &Config<N>,
     last_nm: &Vector<N>,
@@ -150,7 +150,7 @@ pub fn stop_limited<const N: usize>(
 }
 
 fn reached<const N: usize>(
-    greatest_nm: &Vector<N>,
+    max_nm: &Vector<N>,
     last_nm: &Vector<N>,
     wanted_nm: &Vector<N>,
 ) -> Vector<N> {
@@ -159,9 +159,7 @@ fn reached<const N: usize>(
     Vector::from_fn(|i, _| {
         let share = (0..N)
             .filter(|j| groups[*j] == groups[i])
-            .fold(1.0, |share: f64, j| {
-                share.min(greatest_nm[j] / way[j].abs())
-            });
+            .fold(1.0, |share: f64, j| share.min(max_nm[j] / way[j].abs()));
         last_nm[i] + way[i] * share
     })
 }
@@ -180,7 +178,7 @@ pub fn latch() -> ContactLatch {
     }
 }
 
-/// Friction of the WAM's size, with a dip and an offset.
+/// Friction of the WAM's size, with Stribeck effect and offset.
 pub fn friction<const N: usize>() -> [Friction; N] {
     std::array::from_fn(|i| Friction {
         viscous_nm_s_per_rad: 1.6 / (1.0 + i as f64),
@@ -192,7 +190,7 @@ pub fn friction<const N: usize>() -> [Friction; N] {
     })
 }
 
-/// No joint or motor limit, no rate limit that a test could meet.
+/// Sets joint, motor and rate limits that no test reaches.
 pub fn unlimited<const N: usize>(config: &mut Config<N>) {
     config.limits.joint_torque_nm.fill(1e6);
     config.limits.motor_torque_nm.fill(1e6);

@@ -1,9 +1,9 @@
-//! What the tests of the control side share: arms and configurations of the WAM's size, a controller
-//! with its state, an arm to control, comparisons, and seeded properties.
+//! Shared by the control tests: arms and configurations of the WAM's size, a controller with its
+//! state, a simulated arm, comparisons, and seeded properties.
 #![allow(dead_code, reason = "each test binary takes its own part of this")]
 #![allow(
     clippy::disallowed_methods,
-    reason = "references take their mathematics elsewhere"
+    reason = "reference values use other mathematical functions"
 )]
 
 pub mod arms;
@@ -15,7 +15,7 @@ pub mod states;
 
 use supple_core::Matrix;
 
-/// Greatest absolute entry; infinite where an entry is NaN.
+/// Largest absolute entry; infinite if an entry is NaN.
 pub fn size<const R: usize, const C: usize>(m: &Matrix<R, C>) -> f64 {
     m.iter().fold(0.0, |worst: f64, x| {
         if x.is_nan() {
@@ -26,7 +26,7 @@ pub fn size<const R: usize, const C: usize>(m: &Matrix<R, C>) -> f64 {
     })
 }
 
-/// Fails where two matrices are further apart than `tolerance`, entry by entry; NaN is always too far.
+/// Fails if two matrices differ by more than `tolerance` in any entry, or contain NaN.
 #[track_caller]
 pub fn assert_close<const R: usize, const C: usize>(
     found: &Matrix<R, C>,

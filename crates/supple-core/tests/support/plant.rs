@@ -1,4 +1,4 @@
-//! The arm itself, as exactly as it can be had: forward dynamics and small Runge-Kutta steps.
+//! Accurate simulation of the arm: forward dynamics and small Runge-Kutta steps.
 
 use supple_core::config::Role;
 use supple_core::dynamics::{aba, jacobian};
@@ -19,7 +19,7 @@ impl<const N: usize> Plant<N> {
         Plant { arm, q, qd }
     }
 
-    /// `duration_s` under constant torques and whatever `external` adds at `(q, qd)`.
+    /// Advances by `duration_s` under constant torques plus `external` at `(q, qd)`.
     pub fn advance(
         &mut self,
         torque_nm: &Vector<N>,
@@ -51,12 +51,12 @@ pub fn push<const N: usize>(arm: &Arm<N>, q: &Vector<N>, force_n: &Vector3<f64>)
     jacobian(arm, q).fixed_rows::<3>(0).tr_mul(force_n)
 }
 
-/// No torque but the given one.
+/// No external torque.
 pub fn nothing<const N: usize>(_: &Arm<N>, _: &Vector<N>, _: &Vector<N>) -> Vector<N> {
     Vector::zeros()
 }
 
-/// Accelerations where held joints are kept from accelerating by whatever torque that takes.
+/// Accelerations with ideal torques that keep held joints from accelerating.
 pub fn held_acceleration<const N: usize>(
     arm: &Arm<N>,
     roles: &[Role; N],

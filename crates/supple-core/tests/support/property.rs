@@ -1,4 +1,4 @@
-//! Properties over random cases, the same ones each time.
+//! Properties over random cases with a fixed seed.
 
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed, TestCaseError, TestRunner};
@@ -7,7 +7,8 @@ use supple_core::math::Vector3;
 
 pub type Outcome = Result<(), TestCaseError>;
 
-/// Runs `property` on `cases` cases; `PROPTEST_CASES` and `PROPTEST_RNG_SEED` ask for others.
+/// Runs `property` on `cases` cases; `PROPTEST_CASES` and `PROPTEST_RNG_SEED` override number and
+/// seed.
 #[track_caller]
 pub fn check<S: Strategy>(cases: u32, strategy: S, property: impl Fn(S::Value) -> Outcome) {
     let mut config = Config {

@@ -1,4 +1,4 @@
-//! A controller with its state, fed one cycle after another.
+//! A controller with its state and the inputs of the next cycle.
 
 use super::plant::{Plant, nothing};
 use supple_core::controller::{Breakaway, Fault, Mode, Request};
@@ -6,25 +6,25 @@ use supple_core::math::Vector3;
 use supple_core::trajectory::{Fourier, Trajectory};
 use supple_core::{Arm, Config, Controller, Input, Output, State, Vector, step};
 
-/// Copying it forks the future.
+/// A copy continues independently of the original.
 #[derive(Clone)]
 pub struct Rig<const N: usize> {
     pub controller: Controller<N>,
     pub state: State<N>,
     /// Cycle number of the next input.
     pub cycle: u64,
-    /// What the encoders say.
+    /// Encoder angles \[rad\].
     pub q: Vector<N>,
-    /// What the force sensor says.
+    /// Reading of the force sensor, if any \[N\].
     pub force_n: Option<Vector3<f64>>,
-    /// The drives take torques.
+    /// Whether the drives apply torques.
     pub drives_active: bool,
 }
 
 impl<const N: usize> Rig<N> {
-    /// Idle, before its first cycle.
+    /// A rig in idle, before its first cycle.
     pub fn new(config: Config<N>, q: Vector<N>) -> Self {
-        let controller = Controller::new(config).expect("a sound configuration");
+        let controller = Controller::new(config).expect("a valid configuration");
         Rig {
             state: State::new(&controller),
             controller,
@@ -35,7 +35,7 @@ impl<const N: usize> Rig<N> {
         }
     }
 
-    /// In gravity hold, at rest, with the torques settled.
+    /// A rig in gravity hold, at rest, with the torques settled.
     pub fn holding(config: Config<N>, q: Vector<N>) -> Self {
         let mut rig = Rig::new(config, q);
         rig.cycle();
@@ -54,13 +54,13 @@ impl<const N: usize> Rig<N> {
         }
     }
 
-    /// Any input at all; the next cycle's number follows from it.
+    /// Steps with an arbitrary input; the next cycle number follows from it.
     pub fn step(&mut self, input: &Input<N>) -> Output<N> {
         self.cycle = input.cycle.saturating_add(1);
         step(&self.controller, &mut self.state, input)
     }
 
-    /// One ordinary cycle.
+    /// Runs one cycle.
     pub fn cycle(&mut self) -> Output<N> {
         self.step(&self.input())
     }
@@ -73,7 +73,7 @@ impl<const N: usize> Rig<N> {
         output
     }
 
-    /// Half a second at the same place.
+    /// Runs half a second without motion of the arm.
     pub fn rest(&mut self) -> Output<N> {
         self.cycles(500)
     }
@@ -85,7 +85,7 @@ impl<const N: usize> Rig<N> {
         })
     }
 
-    /// Asks for what must be granted.
+    /// Sends a request that must be accepted.
     #[track_caller]
     pub fn accept(&mut self, request: Request<N>) -> Output<N> {
         let output = self.ask(request);
@@ -94,7 +94,7 @@ impl<const N: usize> Rig<N> {
         output
     }
 
-    /// Where the tip is.
+    /// Position of the tip.
     pub fn tip(&self) -> Vector3<f64> {
         supple_core::dynamics::tip_pose(&self.controller.config().arm, &self.q).translation
     }
@@ -165,7 +165,7 @@ impl<const N: usize> Rig<N> {
         output
     }
 
-    /// One cycle with `plant` in the loop and nothing in its way.
+    /// One cycle with `plant` in the loop and no external torque.
     pub fn run(&mut self, plant: &mut Plant<N>) -> Output<N> {
         self.drive(plant, None, nothing)
     }
@@ -181,7 +181,7 @@ pub fn ramp() -> Breakaway {
     }
 }
 
-/// The paper's probing cycle from where the tip is.
+/// The paper's probing cycle, starting at the tip.
 pub fn probe_at(tip: &Vector3<f64>) -> Trajectory {
     Trajectory::Probe(supple_core::trajectory::Probe {
         radius_m: tip.x.hypot(tip.y),

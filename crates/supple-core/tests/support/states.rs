@@ -1,10 +1,10 @@
-//! A random situation for the impedance law, on one of the arms.
+//! Random inputs of the impedance law, on one of the arms.
 
 use super::property::{per_joint, vector3};
 use proptest::prelude::*;
 use supple_core::config::{Gains, Law, Role};
 use supple_core::dynamics::{Terms, terms};
-use supple_core::impedance::{Situation, Task, Torques, impedance};
+use supple_core::impedance::{LawInput, Task, Torques, impedance};
 use supple_core::math::Vector3;
 use supple_core::{Arm, Friction, Reference, Vector};
 
@@ -19,7 +19,7 @@ pub struct Scene<const N: usize> {
     pub friction_share: f64,
 }
 
-/// Anywhere within the stops.
+/// Random scenes with joint angles within the stops.
 pub fn scene<const N: usize>() -> impl Strategy<Value = Scene<N>> {
     let axis = |reach: f64| [0.0..reach, 0.0..reach, 0.0..reach].prop_map(Vector3::from);
     (
@@ -69,7 +69,7 @@ impl<const N: usize> Scene<N> {
         roles: &[Role; N],
         tip_force_n: Option<Vector3<f64>>,
     ) -> Torques<N> {
-        let now = Situation {
+        let now = LawInput {
             spring_limit_n: f64::MAX,
             reference: &self.reference,
             velocity_rad_per_s: &self.qd,

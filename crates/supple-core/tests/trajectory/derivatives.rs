@@ -1,4 +1,5 @@
-//! Velocity is the derivative of position, acceleration that of velocity, and all start from rest.
+//! Velocity is the derivative of position, acceleration that of velocity, and all trajectories
+//! start from rest.
 
 use crate::support::property::{Outcome, check, vector3};
 use proptest::prelude::*;
@@ -6,14 +7,14 @@ use supple_core::Trajectory;
 use supple_core::math::Vector3;
 use supple_core::trajectory::{Arc, Line, Piece, Probe, Quadrant, Sinusoid};
 
-/// A trajectory, a time on it, and the sizes that its derivatives are measured by.
+/// A trajectory, a time on it, and the scales of its derivatives.
 #[derive(Clone, Debug)]
 pub struct Walk {
     pub trajectory: Trajectory,
     pub time_s: f64,
     /// Shortest time in which anything changes \[s\].
     pub tau_s: f64,
-    /// Greatest speed \[m/s\].
+    /// Maximum speed \[m/s\].
     pub speed_m_per_s: f64,
 }
 
@@ -89,7 +90,8 @@ fn quadrant_walk() -> impl Strategy<Value = Walk> {
         let speed_m_per_s = reference.velocity.norm();
         let shortest = quadrant.lengths_m().into_iter().fold(f64::MAX, f64::min);
         let tau_s = 0.1 * shortest / speed_m_per_s;
-        // The ramp ends within a second: its time is short beside the pieces, or they beside it.
+        // The ramp ends within a second: it is short compared with the pieces, or they are short
+        // compared with it.
         Walk {
             trajectory: Trajectory::Quadrant(quadrant),
             time_s: rounds * period_s,
@@ -174,13 +176,13 @@ fn rest_at_the_start(walk: Walk) -> Outcome {
     prop_assert_eq!(walk.trajectory.at(-1.0), start);
     prop_assert_eq!(walk.trajectory.at(f64::NAN), start);
     prop_assert!(walk.trajectory.validate().is_ok());
-    // The pace itself grows smoothly: a thousandth into it there is hardly any speed.
+    // The time scaling rises smoothly: after a thousandth of the ramp there is almost no speed.
     let soon = walk.trajectory.at(1e-3 * walk.tau_s);
     prop_assert!(soon.velocity.norm() <= 1e-3 * walk.speed_m_per_s);
     Ok(())
 }
 
-/// No jump of the position, corner or not: the tip never goes faster than its greatest speed.
+/// The position does not jump, also at corners: the tip never exceeds its maximum speed.
 fn continuity(walk: Walk) -> Outcome {
     let dt = 1e-3 * walk.tau_s;
     let mut last = walk.trajectory.at(walk.time_s).position;

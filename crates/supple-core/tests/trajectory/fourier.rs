@@ -29,9 +29,9 @@ fn velocity_and_acceleration_are_the_derivatives_of_position() {
 }
 
 #[test]
-fn it_is_the_series_at_full_pace() {
+fn the_reference_equals_the_series_at_full_speed() {
     let series = series();
-    // The pace's ramp costs half its length.
+    // The ramp of the time scaling delays by half its length.
     let (t, lag) = (6.0, 0.5 * series.ramp_s);
     let mut expected = series.centre_rad;
     for k in 0..5 {
@@ -42,7 +42,7 @@ fn it_is_the_series_at_full_pace() {
 }
 
 #[test]
-fn it_rests_at_both_ends_and_beyond() {
+fn the_series_rests_at_both_ends_and_beyond() {
     let series = series();
     for t in [-1.0, 0.0, 12.0, 20.0] {
         let at = series.at(t);

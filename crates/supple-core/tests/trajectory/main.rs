@@ -1,7 +1,7 @@
-//! Trajectories: what each one promises, and that its velocity and acceleration are derivatives.
+//! Trajectories: documented properties, and consistency of position, velocity and acceleration.
 #![allow(
     clippy::disallowed_methods,
-    reason = "references take their mathematics elsewhere"
+    reason = "reference values use other mathematical functions"
 )]
 
 #[path = "../support/mod.rs"]

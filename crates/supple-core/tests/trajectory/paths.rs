@@ -64,7 +64,7 @@ fn arc_keeps_radius_and_height_and_swings_about_its_centre() {
         angular_frequency_rad_per_s: 0.8,
         ramp_s: 1.0,
     };
-    let (mut least, mut greatest) = (f64::MAX, f64::MIN);
+    let (mut min, mut max) = (f64::MAX, f64::MIN);
     for k in 0..4000 {
         let time_s = 0.01 * f64::from(k);
         let reference = Trajectory::Arc(arc).at(time_s);
@@ -77,7 +77,7 @@ fn arc_keeps_radius_and_height_and_swings_about_its_centre() {
             let expected = 0.4 + 0.5 * (0.8 * (time_s - 0.5)).sin();
             assert!((azimuth - expected).abs() < 1e-13);
         }
-        (least, greatest) = (least.min(azimuth), greatest.max(azimuth));
+        (min, max) = (min.min(azimuth), max.max(azimuth));
     }
-    assert!((least + 0.1).abs() < 1e-4 && (greatest - 0.9).abs() < 1e-4);
+    assert!((min + 0.1).abs() < 1e-4 && (max - 0.9).abs() < 1e-4);
 }

@@ -26,7 +26,7 @@ fn cylindrical(reference: &Reference) -> (f64, f64, f64) {
     (p.xy().norm(), p.y.atan2(p.x), p.z)
 }
 
-/// Times at which the phase changes during the first two columns, with what begins there.
+/// Times of the phase changes in the first two columns, with the phase that begins.
 fn changes(probe: &Probe) -> Vec<(f64, ProbePhase, u32, u32)> {
     let mut found = Vec::new();
     let end = 2.0 * probe.column_s();
@@ -144,7 +144,7 @@ fn never_faster_than_the_speed(probe: Probe) -> Outcome {
     Ok(())
 }
 
-/// Position, velocity and even acceleration meet wherever a phase ends.
+/// Position, velocity and acceleration are continuous at every change of phase.
 fn continuous_where_phases_meet(probe: Probe) -> Outcome {
     let trajectory = Trajectory::Probe(probe);
     let dt = 1e-7 * probe.ramp_s;

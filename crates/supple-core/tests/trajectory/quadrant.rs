@@ -7,7 +7,7 @@ use supple_core::Trajectory;
 use supple_core::math::Vector3;
 use supple_core::trajectory::{Piece, Quadrant};
 
-/// The ramp of any quadrant here is over.
+/// Time after which the ramp of every quadrant here has ended.
 const AFTER_RAMP_S: f64 = 1.0;
 
 /// A quarter of an ellipse's perimeter by a fine midpoint rule, which converges exponentially on a
@@ -49,7 +49,7 @@ fn case() -> impl Strategy<Value = Case> {
     })
 }
 
-/// First time at which `piece` has begun, to the last bit, in the second round.
+/// First representable time at which `piece` has begun in the second round.
 fn start_of(quadrant: &Quadrant, piece: Piece) -> f64 {
     let period_s = quadrant.period_s();
     let begun = |t: f64| {
@@ -69,7 +69,7 @@ fn start_of(quadrant: &Quadrant, piece: Piece) -> f64 {
     after
 }
 
-/// A round that the ramp does not reach into.
+/// The first round after the ramp.
 fn round_of(quadrant: &Quadrant) -> u8 {
     let (_, _, round) = quadrant.piece_at(AFTER_RAMP_S);
     u8::try_from(round + 1).expect("few rounds in a second")
@@ -80,7 +80,7 @@ fn speed_is_constant(case: Case) -> Outcome {
     let period_s = case.quadrant.period_s();
     let length: f64 = case.quadrant.lengths_m().iter().sum();
     prop_assert!((case.speed - length / period_s).abs() <= 1e-12 * case.speed);
-    // Nothing of the acceleration lies along the velocity.
+    // The acceleration has no component along the velocity.
     let along = reference.acceleration.dot(&reference.velocity) / case.speed;
     prop_assert!(along.abs() <= 1e-12 * (1.0 + reference.acceleration.norm()));
     Ok(())
@@ -134,7 +134,7 @@ fn lengths(case: Case) -> Outcome {
 fn closes_on_itself(case: Case) -> Outcome {
     let trajectory = Trajectory::Quadrant(case.quadrant);
     let now = trajectory.at(case.time_s);
-    // Off the corners, where a rounding error of time decides the piece.
+    // Away from the corners, where a rounding error of time decides the piece.
     let (_, share, _) = case.quadrant.piece_at(case.time_s);
     let later = trajectory.at(case.time_s + case.quadrant.period_s());
     prop_assert!((later.position - now.position).norm() < 1e-11);
@@ -159,11 +159,11 @@ fn corners_jump_in_velocity_alone(case: Case) -> Outcome {
         prop_assert!((right.velocity - after * case.speed).norm() < 1e-6 * case.speed);
         let jump = (right.velocity - left.velocity).norm();
         prop_assert!((jump - case.speed * 2.0_f64.sqrt()).abs() < 1e-6 * case.speed);
-        // The greatest centripetal acceleration of the ellipse, and nothing of the jump.
+        // The maximum centripetal acceleration of the ellipse, without the velocity jump.
         let (a, b) = (case.first.norm(), case.second.norm());
-        let greatest = a.max(b) / a.min(b).powi(2) * case.speed.powi(2);
+        let max = a.max(b) / a.min(b).powi(2) * case.speed.powi(2);
         for side in [left, right] {
-            prop_assert!(side.acceleration.norm() <= greatest * (1.0 + 1e-9));
+            prop_assert!(side.acceleration.norm() <= max * (1.0 + 1e-9));
         }
     }
     Ok(())
@@ -195,7 +195,7 @@ fn the_ramp_reaches_the_speed_and_adds_half_its_time() {
     let mut last = 0.0;
     for k in 0..=500 {
         let speed = at(1e-3 * f64::from(k)).velocity.norm();
-        assert!(speed >= last - 1e-15, "the pace only grows");
+        assert!(speed >= last - 1e-15, "the speed only grows");
         last = speed;
     }
     assert!((last - 0.1).abs() < 1e-15);
@@ -205,7 +205,8 @@ fn the_ramp_reaches_the_speed_and_adds_half_its_time() {
     assert!((round.position - at(0.0).position).norm() < 1e-12);
 }
 
-/// Of the arc length, 12 digits up to an axis ratio of 2, as in the paper's figure, and 8 up to 8.
+/// The arc length is accurate to 12 digits up to an axis ratio of 2, as in the paper's figure, and
+/// to 8 digits up to 8.
 #[test]
 fn arc_length_of_round_and_slender_quadrants() {
     check(300, 1.0..8.0, |ratio: f64| {

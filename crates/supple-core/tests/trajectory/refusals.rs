@@ -1,4 +1,4 @@
-//! What cannot be followed is refused, with the entry and its value.
+//! Invalid trajectories are rejected with the entry and its value.
 
 use std::f64::consts::PI;
 use supple_core::Trajectory;
@@ -8,7 +8,7 @@ use supple_core::trajectory::{Arc, Line, Probe, Quadrant, Sinusoid};
 const NOT_POSITIVE: [f64; 5] = [0.0, -0.1, f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
 const NOT_FINITE: [f64; 3] = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
 
-/// `value` in `entry` is refused by that name.
+/// Checks that `value` in `entry` is rejected with that name.
 #[track_caller]
 fn refused(trajectory: Trajectory, entry: &str, value: f64) {
     let error = trajectory.validate().expect_err(entry);
@@ -56,7 +56,7 @@ fn probe() -> Probe {
     }
 }
 
-/// `base` with `field` set to each of `values` is refused by the field's name.
+/// Checks that `base` with `field` set to each of `values` is rejected with the field's name.
 macro_rules! refuses {
     ($kind:ident, $base:expr, $values:expr, $($field:ident),*) => {$(
         for value in $values {
@@ -68,7 +68,7 @@ macro_rules! refuses {
 }
 
 #[test]
-fn numbers_that_must_be_positive() {
+fn entries_must_be_positive() {
     let line = Line {
         from_m: Vector3::zeros(),
         to_m: Vector3::x(),
@@ -109,7 +109,7 @@ fn numbers_that_must_be_positive() {
 }
 
 #[test]
-fn numbers_that_must_be_finite() {
+fn entries_must_be_finite() {
     refuses!(Arc, arc(), NOT_FINITE, height_m, centre_rad);
     refuses!(
         Probe,
@@ -150,7 +150,7 @@ fn numbers_that_must_be_finite() {
 }
 
 #[test]
-fn quadrants_that_are_none() {
+fn degenerate_quadrants_are_rejected() {
     let zero = Vector3::zeros();
     let quadrant = |first, second, speed, ramp_s| {
         Trajectory::Quadrant(Quadrant::new(zero, first, second, speed, ramp_s))
@@ -171,7 +171,7 @@ fn quadrants_that_are_none() {
 }
 
 #[test]
-fn a_ramp_longer_than_the_stroke_allows() {
+fn a_ramp_longer_than_the_stroke_allows_is_rejected() {
     let longest = Probe {
         ramp_s: 2.5,
         ..probe()
@@ -184,9 +184,9 @@ fn a_ramp_longer_than_the_stroke_allows() {
     refused(Trajectory::Probe(too_long), "ramp_s", 2.6);
 }
 
-/// Asking an invalid trajectory where it is must not stop the program that is about to refuse it.
+/// Evaluating an invalid trajectory must not panic before it is rejected.
 #[test]
-fn no_stroke_is_no_panic() {
+fn a_probe_without_strokes_does_not_panic() {
     let none = Probe {
         strokes: 0,
         ..probe()

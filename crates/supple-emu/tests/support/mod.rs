@@ -1,11 +1,11 @@
-//! A host that speaks to the emulated arm in raw frames, as the protocol's note has them.
+//! A host that exchanges raw frames with the emulated arm, as in the protocol note.
 
-// Each test uses its part of it.
+// Each test uses only a part of this module.
 #![allow(dead_code)]
 
-use supple_bus::virtual_time::{Direct, Peer};
+use supple_bus::virtual_time::{DirectBus, Peer};
 use supple_bus::{Bus, Event};
-use supple_emu::{Emulator, EmulatorConfig, Press};
+use supple_emu::{ButtonPress, Emulator, EmulatorConfig};
 use supple_model::Description;
 use supple_plant::PlantConfig;
 use supple_puck::CanFrame;
@@ -18,7 +18,7 @@ pub const STAT: u8 = 5;
 pub const MODE: u8 = 8;
 pub const MT: u8 = 43;
 pub const P: u8 = 48;
-/// Of the safety module.
+/// Property ids of the safety module.
 pub const ZERO: u8 = 42;
 pub const PEN: u8 = 43;
 pub const VL1: u8 = 45;
@@ -35,7 +35,7 @@ pub fn frame(id: u32, payload: &[u8]) -> CanFrame {
     CanFrame::from_raw(id, payload).unwrap()
 }
 
-pub struct Host(Direct<Emulator<4>>);
+pub struct Host(DirectBus<Emulator<4>>);
 
 impl Host {
     /// An arm in its home pose, in the emergency stop.
@@ -43,10 +43,12 @@ impl Host {
         let description = Description::asset("wam4").unwrap();
         let plant = PlantConfig::<4>::from_description(&description).unwrap();
         let home_rad = description.home::<4>().unwrap();
-        Host(Direct(Emulator::new(config, plant, home_rad, 0).unwrap()))
+        Host(DirectBus(
+            Emulator::new(config, plant, home_rad, 0).unwrap(),
+        ))
     }
 
-    /// One that is awake, knows its positions, and whose operator has pressed Shift-Idle.
+    /// An arm that is awake and zeroed, in idle.
     pub fn awake() -> Host {
         Host::new(EmulatorConfig {
             zeroed: true,
@@ -54,10 +56,10 @@ impl Host {
         })
     }
 
-    /// The same, taking torques.
+    /// An active arm, in torque mode.
     pub fn active() -> Host {
         let mut host = Host::awake();
-        host.press(Press::Activate);
+        host.press(ButtonPress::Activate);
         host.cycles(5);
         assert_eq!(host.module_mode(), ACTIVE);
         host
@@ -75,7 +77,7 @@ impl Host {
         self.arm().now_ns()
     }
 
-    pub fn press(&mut self, press: Press) {
+    pub fn press(&mut self, press: ButtonPress) {
         self.arm_mut().press(press);
     }
 
@@ -83,7 +85,7 @@ impl Host {
         self.0.send(&frame(id, payload)).unwrap();
     }
 
-    /// Everything that happens in a time.
+    /// All events within a time.
     pub fn listen(&mut self, duration_ns: u64) -> Vec<(u64, Event)> {
         let until_ns = self.now_ns() + duration_ns;
         let mut events = Vec::new();
@@ -93,8 +95,8 @@ impl Host {
         events
     }
 
-    /// Frames of other nodes in a time, as id and payload.
-    pub fn hear(&mut self, duration_ns: u64) -> Vec<(u16, Vec<u8>)> {
+    /// Frames of other nodes within a time, as id and payload.
+    pub fn receive_frames(&mut self, duration_ns: u64) -> Vec<(u16, Vec<u8>)> {
         let events = self.listen(duration_ns).into_iter();
         events
             .filter_map(|(_, event)| match event {
@@ -104,20 +106,20 @@ impl Host {
             .collect()
     }
 
-    /// What a node says to a request, in a millisecond.
-    pub fn ask(&mut self, node: u8, property: u8) -> Option<Vec<u8>> {
+    /// Reply of a node to a request within a millisecond.
+    pub fn get(&mut self, node: u8, property: u8) -> Option<Vec<u8>> {
         self.send(u32::from(node), &[property]);
         let from = |id: u16| id & 0x3e0 == u16::from(node) << 5;
-        let heard = self.hear(MS).into_iter();
-        heard
+        let received = self.receive_frames(MS).into_iter();
+        received
             .filter(|(id, _)| from(*id))
             .map(|(_, payload)| payload)
             .next()
     }
 
-    /// The value in a reply, of either width.
+    /// Value of a property, of either width.
     pub fn value(&mut self, node: u8, property: u8) -> i32 {
-        let reply = self.ask(node, property).expect("a reply");
+        let reply = self.get(node, property).expect("a reply");
         assert_eq!(reply[..2], [property | 0x80, 0]);
         match reply.len() {
             4 => i32::from(i16::from_le_bytes([reply[2], reply[3]])),
@@ -144,19 +146,19 @@ impl Host {
         self.value(MODULE, MODE)
     }
 
-    /// The pendant's five three-bit fields: velocity, torque, voltage, heartbeat, other.
+    /// The five three-bit fields of the pendant word: velocity, torque, voltage, heartbeat, other.
     pub fn lamps(&mut self) -> [i32; 5] {
         let word = self.value(MODULE, PEN);
         core::array::from_fn(|field| word >> (3 * field) & 0b111)
     }
 }
 
-/// Of a field of the pendant's word.
+/// Values of a field of the pendant word.
 pub const SAFE: i32 = 0b001;
 pub const WARNING: i32 = 0b010;
 pub const FAULT: i32 = 0b100;
 
-/// Packs four torques as the note does: 14 bits each, the most significant bit first, behind the property.
+/// Packs four torques as in the protocol note: 14 bits each, the most significant bit first, after the property.
 pub fn packed(torques: [i32; 4]) -> [u8; 8] {
     let word = torques
         .iter()

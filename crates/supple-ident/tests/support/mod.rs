@@ -19,7 +19,7 @@ impl Noise {
     }
 }
 
-/// A physical arm with axes and offsets anywhere, and rotors.
+/// A physically consistent arm with random axes, offsets and rotors.
 pub fn random_arm<const N: usize>(seed: u64) -> Arm<N> {
     let mut noise = Noise(seed);
     let joints: [Joint; N] = std::array::from_fn(|_| {
@@ -44,7 +44,7 @@ pub fn random_arm<const N: usize>(seed: u64) -> Arm<N> {
     Arm::new(&joints, Pose::IDENTITY, None, gravity).unwrap()
 }
 
-/// Sums of sinusoids for the `moving` joints; the others rest at an angle of their own.
+/// Sums of sinusoids for the `moving` joints; the other joints rest at distinct angles.
 pub fn motion<const N: usize>(
     truth: &Arm<N>,
     friction: &[Friction; N],
@@ -90,7 +90,7 @@ pub fn motion<const N: usize>(
         qd,
         qdd,
         tau,
-        independent_share: 1.0,
+        independent_fraction: 1.0,
         cutoff_hz: None,
     }
 }

@@ -1,4 +1,4 @@
-//! From the plant to the controller, once a cycle.
+//! Sent by the plant to the controller once per cycle.
 
 use super::{Drives, MAX_DOF, MessageError, expect_dof, widened};
 use iceoryx2::prelude::ZeroCopySend;
@@ -6,31 +6,30 @@ use supple_core::Input;
 use supple_core::controller::Request;
 use supple_core::math::Vector3;
 
-/// What the arm was at the start of a cycle, and how the plant's own side fares.
+/// Measurements of the arm at the start of a cycle, and the plant's status report.
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
 #[repr(C)]
 #[type_name("supple.ArmState.v3")]
 pub struct ArmState {
-    /// Who wrote it: the number that the holder of the writer's lock drew. Zero outside of shared memory; a reader
-    /// takes no state of another writer.
+    /// Writer id, see `writer_identity`; zero outside shared memory. Readers discard states with another id.
     pub writer: u64,
-    /// Number of the cycle, one more each period.
+    /// Cycle number, incremented every period.
     pub cycle: u64,
-    /// When it was measured \[ns\]: the system's monotonic clock, or since the start in virtual time.
+    /// Time of the measurement \[ns\]: on the system's monotonic clock, or since the start in virtual time.
     pub stamp_ns: u64,
-    /// Joint angles \[rad\]; zero where the encoder did not answer.
+    /// Joint angles \[rad\]; zero if the encoder did not answer.
     pub position_rad: [f64; MAX_DOF],
-    /// Force on the tip, base axes \[N\]; zero where there is none.
+    /// Force on the tip, base axes \[N\]; zero without a force sensor.
     pub tip_force_n: [f64; 3],
-    /// How the plant's side fares.
+    /// Status report of the plant.
     pub plant: PlantReport,
     /// Joints of the arm.
     pub dof: u8,
-    /// Bit `i` is set where the encoder of joint `i` answered.
+    /// Bit `i` is set if the encoder of joint `i` answered.
     pub position_present: u8,
-    /// 1 where `tip_force_n` was measured.
+    /// 1 if `tip_force_n` was measured.
     pub has_tip_force: u8,
-    /// What the motors do, a number of [`Drives`].
+    /// Drive state, a code of [`Drives`].
     pub drives: u8,
     /// Zero.
     pub reserved: [u8; 4],
@@ -41,29 +40,30 @@ pub struct ArmState {
 #[repr(C)]
 #[type_name("supple.PlantReport.v3")]
 pub struct PlantReport {
-    /// Cycles whose answer did not come in time.
+    /// Cycles whose answer did not arrive in time.
     pub missed: u64,
-    /// Answers that came after their cycle.
+    /// Answers that arrived after their cycle.
     pub late: u64,
-    /// Torque commands that were dropped because the controller of this system did not write them.
+    /// Torque commands discarded because this system's controller did not write them.
     pub foreign: u64,
-    /// Torque commands that counted as no answer: of another number of joints, or not finite.
+    /// Torque commands treated as missing answers: for another number of joints, or not finite.
     pub unusable: u64,
-    /// Frames that were not seen to leave; 0 without a bus.
+    /// Frames whose transmission was not confirmed; 0 without a bus.
     pub tx_lost: u64,
-    /// By how much this cycle began late \[ns\]; 0 in virtual time.
+    /// Delay of the start of this cycle \[ns\]; 0 in virtual time.
     pub wake_ns: u64,
-    /// From publishing the state of the previous cycle to its answer \[ns\]; 0 where none came in time.
+    /// Time from publishing the state of the previous cycle to its answer \[ns\]; 0 if no answer arrived in time.
     pub round_trip_ns: u64,
-    /// Share of the previous cycle in which the bus was busy, 0 to 1; 0 without a bus.
+    /// Fraction of the previous cycle in which the bus was busy, 0 to 1; 0 without a bus.
     pub bus_load: f64,
-    /// How long the simulated or emulated arm's time has stood still because the machine held it up \[ns\]; 0 on
-    /// a real arm, and in virtual time.
-    pub stood_still_ns: u64,
+    /// Total time for which the clock of the simulated or emulated arm was paused because the host stalled \[ns\]; 0 on
+    /// a real arm and in virtual time.
+    pub clock_stall_ns: u64,
 }
 
 impl ArmState {
-    /// Of an arm with `N` joints; `None` where an encoder did not answer or there is no force sensor.
+    /// Creates the state of an arm with `N` joints. A position is `None` if its encoder did not answer, the force if
+    /// there is no force sensor.
     pub fn new<const N: usize>(
         cycle: u64,
         stamp_ns: u64,
@@ -91,10 +91,10 @@ impl ArmState {
         }
     }
 
-    /// What a controller is given.
+    /// Input of the controller's step.
     ///
     /// # Errors
-    /// [`MessageError::Dof`] where the arm has not `N` joints.
+    /// [`MessageError::Dof`] if the arm does not have `N` joints.
     pub fn input<const N: usize>(
         &self,
         request: Option<Request<N>>,
@@ -110,12 +110,12 @@ impl ArmState {
         })
     }
 
-    /// It is of an arm with `N` joints.
-    pub fn is_of<const N: usize>(&self) -> bool {
+    /// Whether the state is of an arm with `N` joints.
+    pub fn matches_dof<const N: usize>(&self) -> bool {
         usize::from(self.dof) == N
     }
 
-    /// What the motors do; a number that is not known is taken as [`Drives::Off`].
+    /// Drive state; an unknown code counts as [`Drives::Off`].
     pub fn drives(&self) -> Drives {
         Drives::from_code(self.drives).unwrap_or(Drives::Off)
     }

@@ -1,28 +1,27 @@
-//! What the processes say to each other: plain old data of fixed size and layout.
+//! The messages between the processes: plain old data of fixed size and layout.
 //!
-//! Numbers are SI, arrays have room for [`MAX_DOF`] joints and are zero beyond the arm's own, flags are
-//! bytes, kinds are the numbers of [`supple_core::codes`]. There is no padding, so every byte that is shared
-//! was written. The name of a type carries its version: a change of meaning or layout is a new version, and
-//! a peer of another version is refused.
+//! Values are in SI units, arrays have [`MAX_DOF`] entries and are zero beyond the arm's joints, flags are bytes, kinds
+//! are the codes of [`supple_core::codes`]. There is no padding, so no uninitialised byte is shared. The name of a type
+//! carries its version: a change of meaning or layout is a new version, and a peer of another version is refused.
 
 mod arm_state;
 mod operator;
-mod plant_asleep;
 mod telemetry;
 mod text;
 mod torque_command;
+mod wake_request;
 
 pub use arm_state::{ArmState, PlantReport};
 pub use operator::{OperatorReply, OperatorRequest, Outcome};
-pub use plant_asleep::PlantAsleep;
-pub use telemetry::{CycleTiming, Telemetry, TermTorques};
+pub use telemetry::{CycleTiming, Telemetry};
 pub use text::Text;
 pub use torque_command::TorqueCommand;
+pub use wake_request::WakeRequest;
 
-/// Most joints of an arm.
+/// Maximum number of joints of an arm.
 pub const MAX_DOF: usize = 7;
 
-/// What the motors do, as the safety module has it.
+/// Drive state, as the safety module defines it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Drives {
@@ -30,12 +29,12 @@ pub enum Drives {
     Off = 0,
     /// Motors brake, torques are ignored.
     Idle = 1,
-    /// Motors make the torques they are told.
+    /// The motors produce the commanded torques.
     Active = 2,
 }
 
 impl Drives {
-    /// By its number.
+    /// Converts a code.
     pub fn from_code(code: u8) -> Option<Drives> {
         [Drives::Off, Drives::Idle, Drives::Active]
             .into_iter()
@@ -52,13 +51,13 @@ impl Drives {
     }
 }
 
-/// A message that does not fit its reader.
+/// A message that its reader cannot use.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum MessageError {
-    /// Another number of joints.
+    /// The message is for another number of joints.
     #[error(
-        "{message} is of an arm with {found} joints, {expected} are expected: start every process with \
-         the same --arm"
+        "{message} is for an arm with {found} joints, expected {expected}: start every process with the same \
+         --arm"
     )]
     Dof {
         /// Name of the message.
@@ -68,12 +67,12 @@ pub enum MessageError {
         /// Joints of the reader.
         expected: usize,
     },
-    /// Numbers that are no request.
+    /// The values are not a valid request.
     #[error("the request cannot be read: {0}")]
     Request(supple_core::codes::RequestCodeError),
 }
 
-/// Refuses a message of another arm.
+/// Checks that the message is for this arm.
 fn expect_dof(message: &'static str, found: u8, expected: usize) -> Result<(), MessageError> {
     if usize::from(found) == expected {
         return Ok(());
@@ -85,7 +84,7 @@ fn expect_dof(message: &'static str, found: u8, expected: usize) -> Result<(), M
     })
 }
 
-/// Values of `N` joints with zeros behind them.
+/// Values of `N` joints, padded with zeros.
 fn widened<const N: usize>(values: &[f64]) -> [f64; MAX_DOF] {
     const { assert!(N <= MAX_DOF) };
     let mut wide = [0.0; MAX_DOF];
@@ -93,7 +92,7 @@ fn widened<const N: usize>(values: &[f64]) -> [f64; MAX_DOF] {
     wide
 }
 
-/// The first `N` of them.
+/// The first `N` values.
 fn narrowed<const N: usize>(wide: &[f64; MAX_DOF]) -> [f64; N] {
     const { assert!(N <= MAX_DOF) };
     core::array::from_fn(|i| wide[i])

@@ -1,42 +1,39 @@
-//! What an operator asks of the controller, and what it answers.
+//! Operator requests and the controller's replies.
 
 use super::{MessageError, Text, expect_dof};
 use iceoryx2::prelude::ZeroCopySend;
-use supple_core::codes::{self, RequestCode, VALUES};
+use supple_core::codes::{self, RequestCode, VALUES, request_kind};
 use supple_core::controller::{Mode, Request};
 
-/// Kind of a request for idle, see [`RequestCode`].
-const IDLE: u8 = 1;
-
-/// A request, checked in the controller and never trusted.
+/// A request. The controller checks every field before it uses it.
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
 #[repr(C)]
 #[type_name("supple.OperatorRequest.v1")]
 pub struct OperatorRequest {
-    /// Who asks: a number of its own for each operator.
+    /// Unique id of the operator.
     pub operator: u64,
-    /// Which of its requests, from 1.
+    /// Sequence number of the operator's request, from 1.
     pub sequence: u64,
-    /// The first cycle in which it may be heard, where `has_at_cycle`.
+    /// Earliest cycle in which the request takes effect, if `has_at_cycle` is 1.
     pub at_cycle: u64,
-    /// What the request carries, see [`RequestCode`].
+    /// Values of the request, see [`RequestCode`].
     pub values: [f64; VALUES],
-    /// Joints of the arm that the operator has in mind.
+    /// Number of joints of the arm that the request is for.
     pub dof: u8,
     /// Kind of request.
     pub kind: u8,
-    /// Kind of trajectory, of a track request.
+    /// Kind of trajectory of a track request.
     pub trajectory: u8,
-    /// How many of `values` count.
+    /// Number of valid entries in `values`.
     pub count: u8,
-    /// 1 where the request waits for `at_cycle`, 0 where it is heard in the next cycle.
+    /// 1 if the request waits for `at_cycle`, 0 if it takes effect in the next cycle.
     pub has_at_cycle: u8,
     /// Zero.
     pub reserved: [u8; 3],
 }
 
 impl OperatorRequest {
-    /// A request to an arm with `N` joints.
+    /// Encodes a request to an arm with `N` joints.
     pub fn new<const N: usize>(
         operator: u64,
         sequence: u64,
@@ -58,10 +55,10 @@ impl OperatorRequest {
         }
     }
 
-    /// What is asked; `None` where nothing is.
+    /// Decodes the request; `None` if the kind is "none".
     ///
     /// # Errors
-    /// [`MessageError`] where it is meant for another arm or is no request at all.
+    /// [`MessageError`] if the request is for another arm or invalid.
     pub fn request<const N: usize>(&self) -> Result<Option<Request<N>>, MessageError> {
         expect_dof("the request", self.dof, N)?;
         let code = RequestCode {
@@ -73,36 +70,36 @@ impl OperatorRequest {
         code.request().map_err(MessageError::Request)
     }
 
-    /// It asks for idle in the next cycle, and goes before all that does not.
-    pub fn is_for_idle_now(&self) -> bool {
-        self.has_at_cycle == 0 && self.asks_for_idle()
+    /// Requests idle in the next cycle; such requests take priority over all others.
+    pub fn requests_idle_now(&self) -> bool {
+        self.has_at_cycle == 0 && self.requests_idle()
     }
 
-    /// It asks for idle, now or in its cycle.
-    pub fn asks_for_idle(&self) -> bool {
-        self.kind == IDLE
+    /// Whether it requests idle, now or in a given cycle.
+    pub fn requests_idle(&self) -> bool {
+        self.kind == request_kind::IDLE
     }
 
-    /// It may be heard in this cycle.
+    /// Whether it may take effect in this cycle.
     pub fn is_due(&self, cycle: u64) -> bool {
         self.has_at_cycle == 0 || cycle >= self.at_cycle
     }
 }
 
-/// What became of a request.
+/// Result of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Outcome {
-    /// The controller has it and it waits for its cycle; another reply will follow.
+    /// Queued until its cycle; a second reply will follow.
     Queued = 1,
-    /// The controller does it.
+    /// The controller carries it out.
     Accepted = 2,
-    /// The controller does not, and says why.
+    /// Refused; the text gives the reason.
     Refused = 3,
 }
 
 impl Outcome {
-    /// By its number; what is not known counts as refused.
+    /// Converts a code; an unknown code counts as refused.
     pub fn from_code(code: u8) -> Outcome {
         [Outcome::Queued, Outcome::Accepted]
             .into_iter()
@@ -116,24 +113,24 @@ impl Outcome {
 #[repr(C)]
 #[type_name("supple.OperatorReply.v1")]
 pub struct OperatorReply {
-    /// Whose request it was.
+    /// Id of the operator.
     pub operator: u64,
-    /// Which of them.
+    /// Sequence number of the request.
     pub sequence: u64,
-    /// Cycle in which it was heard.
+    /// Cycle in which the controller received the request.
     pub cycle: u64,
-    /// Why not, where refused.
+    /// Reason for a refusal; empty otherwise.
     pub text: Text,
-    /// A number of [`Outcome`].
+    /// A code of [`Outcome`].
     pub outcome: u8,
-    /// Mode after it, a number of [`codes::MODES`].
+    /// Mode after the request, a code of [`codes::MODES`].
     pub mode: u8,
     /// Zero.
     pub reserved: [u8; 6],
 }
 
 impl OperatorReply {
-    /// To a request.
+    /// Creates the reply to a request.
     pub fn new(
         request: &OperatorRequest,
         cycle: u64,
@@ -152,12 +149,12 @@ impl OperatorReply {
         }
     }
 
-    /// What became of it; what is not known counts as refused.
+    /// Result; an unknown code counts as refused.
     pub fn outcome(&self) -> Outcome {
         Outcome::from_code(self.outcome)
     }
 
-    /// Mode after it, if this version knows it.
+    /// Mode after the request, if this version knows it.
     pub fn mode(&self) -> Option<Mode> {
         codes::mode(self.mode)
     }
@@ -168,11 +165,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn idle_is_known_by_its_number() {
-        let asks = |request: Request<4>| OperatorRequest::new(1, 1, None, &request).asks_for_idle();
-        assert!(asks(Request::Idle));
-        assert!(!asks(Request::GravityHold) && !asks(Request::Reset));
+    fn idle_is_recognised_by_its_code() {
+        let requests =
+            |request: Request<4>| OperatorRequest::new(1, 1, None, &request).requests_idle();
+        assert!(requests(Request::Idle));
+        assert!(!requests(Request::GravityHold) && !requests(Request::Reset));
         let later = OperatorRequest::new(1, 1, Some(5), &Request::<4>::Idle);
-        assert!(later.asks_for_idle() && !later.is_for_idle_now());
+        assert!(later.requests_idle() && !later.requests_idle_now());
     }
 }

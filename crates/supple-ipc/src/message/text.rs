@@ -1,12 +1,13 @@
-//! Words of bounded length, written without an allocation.
+//! Text of a message: [`supple_core::record::Text`] with a layout for shared memory.
 
-use core::fmt::{self, Write};
+use core::fmt;
 use iceoryx2::prelude::ZeroCopySend;
+use supple_core::record::{self, valid_utf8};
 
-/// Most bytes of a text.
+/// Maximum length of a text \[bytes\].
 const BYTES: usize = 252;
 
-/// UTF-8 of at most 252 bytes; longer words are cut at a character.
+/// UTF-8 text of at most 252 bytes; a longer text is truncated at a character boundary.
 #[derive(Clone, Copy, PartialEq, ZeroCopySend)]
 #[repr(C)]
 #[type_name("supple.Text.v1")]
@@ -16,42 +17,27 @@ pub struct Text {
 }
 
 impl Text {
-    /// No words.
+    /// The empty text.
     pub const EMPTY: Text = Text {
         length: 0,
         bytes: [0; BYTES],
     };
 
-    /// What a value displays.
+    /// Formats a value.
     pub fn of(value: &dyn fmt::Display) -> Text {
+        let formatted = record::Text::from_display(value);
+        let bytes = formatted.as_str().as_bytes();
+        let whole = valid_utf8(&bytes[..bytes.len().min(BYTES)]);
         let mut text = Text::EMPTY;
-        // Writing stops at the last byte and never fails.
-        let _ = write!(text, "{value}");
+        text.bytes[..whole.len()].copy_from_slice(whole.as_bytes());
+        text.length = whole.len() as u32;
         text
     }
 
-    /// The words.
+    /// The text as a string.
     pub fn as_str(&self) -> &str {
         let length = usize::try_from(self.length).map_or(BYTES, |length| length.min(BYTES));
-        match core::str::from_utf8(&self.bytes[..length]) {
-            Ok(words) => words,
-            Err(error) => {
-                core::str::from_utf8(&self.bytes[..error.valid_up_to()]).unwrap_or_default()
-            }
-        }
-    }
-}
-
-impl Write for Text {
-    fn write_str(&mut self, words: &str) -> fmt::Result {
-        let start = self.as_str().len();
-        let mut take = words.len().min(BYTES - start);
-        while !words.is_char_boundary(take) {
-            take -= 1;
-        }
-        self.bytes[start..start + take].copy_from_slice(&words.as_bytes()[..take]);
-        self.length = (start + take) as u32;
-        Ok(())
+        valid_utf8(&self.bytes[..length])
     }
 }
 

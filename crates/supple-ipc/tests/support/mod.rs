@@ -1,4 +1,4 @@
-//! A system of its own for each test.
+//! A separate system for each test.
 
 #![allow(dead_code, reason = "each test binary uses its part")]
 
@@ -17,7 +17,7 @@ pub struct System {
     _guard: TempDir,
 }
 
-/// A fresh system under a prefix that no other test uses at the same time.
+/// A new system under a prefix that no other test uses at the same time.
 pub fn system(prefix: &str) -> System {
     let guard = tempfile::Builder::new()
         .permissions(std::os::unix::fs::PermissionsExt::from_mode(0o700))
@@ -25,7 +25,7 @@ pub fn system(prefix: &str) -> System {
         .expect("a folder");
     let prefix = format!("{prefix}-{}", std::process::id());
     System {
-        domain: Domain::within(guard.path(), &prefix).expect("a domain"),
+        domain: Domain::in_folder(guard.path(), &prefix).expect("a domain"),
         folder: guard.path().to_owned(),
         _guard: guard,
     }
@@ -52,19 +52,19 @@ pub fn state(cycle: u64) -> ArmState {
     )
 }
 
-/// What a controller of the 4-joint arm answers first.
+/// The first output of a controller of the 4-joint arm.
 pub fn answer(input: &Input<4>) -> Output<4> {
     let description = Description::asset("wam4").expect("built in");
     let controller = Controller::new(description.config().expect("sound")).expect("sound");
     step(&controller, &mut State::new(&controller), input)
 }
 
-/// What is in shared memory of a system.
+/// The shared-memory objects of a system.
 pub fn objects(domain: &Domain) -> Vec<String> {
     let names = std::fs::read_dir("/dev/shm").expect("shared memory");
     let names = names.map(|entry| entry.expect("an entry").file_name());
     let names = names.map(|name| name.to_string_lossy().into_owned());
     names
-        .filter(|name| name.starts_with(&domain.objects()))
+        .filter(|name| name.starts_with(&domain.object_prefix()))
         .collect()
 }

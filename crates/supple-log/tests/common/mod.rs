@@ -1,5 +1,5 @@
-//! A run to log: a controller that moves the four-joint arm, integrated without friction, through
-//! every mode, with a request of every outcome, a lost encoder reply and a fault.
+//! A run to log: a controller moves the four-joint arm, integrated without friction, through every mode, with
+//! requests of every outcome, a lost encoder reply and a fault.
 
 #![allow(dead_code, reason = "each test uses its part")]
 
@@ -15,16 +15,16 @@ use supple_model::Description;
 
 pub const N: usize = 4;
 pub const CYCLE_NS: u64 = 1_000_000;
-/// Two encoder replies are lost from here: a fault.
+/// First cycle of two lost encoder replies, which cause a fault.
 pub const FAULT_AT: u64 = 1_500;
-/// Steps of a whole run.
+/// Number of steps of a complete run.
 pub const STEPS: u64 = 1_800;
 
 pub fn description() -> Description {
     Description::asset("wam4").expect("a built-in arm")
 }
 
-/// The arm's own configuration but for friction, which the plant has none of.
+/// Configuration of the arm without friction, since the plant has none.
 pub fn config() -> Config<N> {
     let config = description().config::<N>().expect("four joints");
     Config {
@@ -51,10 +51,10 @@ pub struct Cycle {
     pub extras: Extras<N>,
 }
 
-/// Runs `steps` steps and shows each.
+/// Runs `steps` steps and passes each to the caller.
 pub fn run(steps: u64, mut watch: impl FnMut(&Cycle)) {
     let config = config();
-    let controller = Controller::new(config).expect("a sound configuration");
+    let controller = Controller::new(config).expect("a valid configuration");
     let mut state = State::new(&controller);
     let home = description().home::<N>().expect("four joints");
     let (mut q, mut qd) = (home, Vector::<N>::zeros());
@@ -98,7 +98,7 @@ pub fn run(steps: u64, mut watch: impl FnMut(&Cycle)) {
     }
 }
 
-/// Whether encoder `joint` answers in cycle `k`.
+/// Returns whether encoder `joint` replies in cycle `k`.
 fn answers(k: u64, joint: usize) -> bool {
     let lost = (k == 1_300 && joint == 1) || ((FAULT_AT..FAULT_AT + 2).contains(&k) && joint == 2);
     !lost

@@ -1,10 +1,10 @@
-//! What the arm is driven by and what it carries.
+//! Motors, transmission and tool.
 
 use super::joints::JointResolved;
 use super::wrong_count;
 use crate::error::{ModelError, Reporter};
 use crate::settings::{MotorSettings, Settings};
-use crate::xml::GREATEST;
+use crate::xml::MAX_MAGNITUDE;
 use nalgebra::DMatrix;
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::ripple::{Harmonic, LINES};
@@ -19,11 +19,11 @@ pub struct Motors {
     pub motor_from_joint: DMatrix<f64>,
     /// Torque limits at the motors \[N m\].
     pub torque_nm: Vec<f64>,
-    /// Least step of each motor's torque command \[N m\]; none where it is continuous.
+    /// Resolution of each motor's torque command \[N m\]; `None` if it is continuous.
     pub torque_quantum_nm: Option<Vec<f64>>,
-    /// Torque of each shorted motor per its speed \[N m s/rad\]; none where it is not known.
+    /// Damping of each motor with shorted terminals \[N m s/rad\]; `None` if unknown.
     pub braking_nm_s_per_rad: Option<Vec<f64>>,
-    /// Encoder counts per motor revolution; none where it is continuous.
+    /// Encoder counts per motor revolution; `None` if the position is continuous.
     pub counts_per_revolution: Option<u32>,
     /// Torque ripple of each motor.
     pub ripple: Vec<RippleTable>,
@@ -32,13 +32,13 @@ pub struct Motors {
 /// Force sensor and cap, mounted at the tip.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tool {
-    /// The body in the tip frame; none where the last link's own mass includes it.
+    /// Inertia in the tip frame; `None` if the last link includes it.
     pub body: Option<Body>,
     /// Radius of the hemispherical cap, whose centre is the tip \[m\].
     pub cap_radius_m: f64,
 }
 
-/// Motors, or one per joint at ratio 1 with the joints' torque limits.
+/// Motors of the TOML, or one per joint at ratio 1 with the joints' torque limits.
 pub(crate) fn motors(
     report: Reporter<'_>,
     settings: &Settings,
@@ -94,7 +94,7 @@ pub(crate) fn motors(
             "[motors] joint_from_motor",
             "must be invertible",
             format!("{:?}", motors.joint_from_motor),
-            "correct it: every joint must be moved by the motors, each in its own way",
+            "correct it: the motors must move every joint independently",
         ));
     };
     Ok(Motors {
@@ -108,7 +108,7 @@ pub(crate) fn motors(
     })
 }
 
-/// The harmonics by motor.
+/// Harmonics of each motor.
 fn ripple(
     report: Reporter<'_>,
     motors: &MotorSettings,
@@ -132,7 +132,7 @@ fn ripple(
                 element("harmonic"),
                 "must be 1 or more",
                 0,
-                "a constant torque is no ripple: put it into the joint's offset_nm",
+                "a constant torque is not ripple: put it into offset_nm of the joint",
             ));
         }
         lines[entry.motor].push(Harmonic {
@@ -179,7 +179,7 @@ fn matrix(
     Ok(DMatrix::from_fn(n, n, |i, j| rows[i][j]))
 }
 
-/// The tool, with the inertia of a ball where none is given.
+/// The tool; its default inertia is that of a ball.
 pub(crate) fn tool(report: Reporter<'_>, settings: &Settings) -> Result<Option<Tool>, ModelError> {
     let Some(tool) = &settings.tool else {
         return Ok(None);
@@ -210,10 +210,10 @@ pub(crate) fn tool(report: Reporter<'_>, settings: &Settings) -> Result<Option<T
         },
     };
     let mut entries = body.com_m.iter().chain(body.inertia_kg_m2.iter());
-    if mass_kg > GREATEST || entries.any(|x| x.abs() > GREATEST) {
+    if mass_kg > MAX_MAGNITUDE || entries.any(|x| x.abs() > MAX_MAGNITUDE) {
         return Err(report.invalid(
             "[tool]",
-            format!("must have no number above {GREATEST:e}"),
+            format!("must have no number above {MAX_MAGNITUDE:e}"),
             format!(
                 "mass {mass_kg} kg, com {:?} m, inertia {:?}",
                 tool.com_m, tool.inertia_kg_m2

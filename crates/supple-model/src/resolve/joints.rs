@@ -93,7 +93,7 @@ fn joint(
     let home = home.unwrap_or(0.5 * (lower + upper));
     let element = || format!("home_rad of joint `{}`", entry.name);
     within(element(), home)?;
-    // In a soft stop the arm would be pushed away from where it is to rest.
+    // The soft stop would push the arm away from a home pose inside its zone.
     let (inner_lower, inner_upper) = (lower + soft_zone_rad, upper - soft_zone_rad);
     if home_rad.is_some() && !(inner_lower..=inner_upper).contains(&home) {
         return Err(toml.invalid(
@@ -149,7 +149,7 @@ fn joint(
     })
 }
 
-/// Hard stops of a joint: the URDF's, which the TOML may narrow.
+/// Hard stops of a joint: those of the URDF, which the TOML may narrow.
 fn position(
     urdf: Reporter<'_>,
     toml: Reporter<'_>,
@@ -158,16 +158,16 @@ fn position(
     soft_zone_rad: f64,
 ) -> Result<(f64, f64), ModelError> {
     let continuous = joint.joint_type == JointType::Continuous;
-    let (least, greatest) = if continuous {
+    let (lower, upper) = if continuous {
         (f64::NEG_INFINITY, f64::INFINITY)
     } else {
         (joint.limit.lower, joint.limit.upper)
     };
-    if !(continuous || least < greatest) {
+    if !(continuous || lower < upper) {
         return Err(urdf.invalid(
             format!("joint `{}` <limit>", joint.name),
             "a revolute joint must have lower below upper",
-            format!("lower {least}, upper {greatest} rad"),
+            format!("lower {lower}, upper {upper} rad"),
             "swap or correct them, or make the joint continuous",
         ));
     }
@@ -177,25 +177,25 @@ fn position(
         };
         let element = format!("[[joints]] `{}` {key}", entry.name);
         toml.finite(&element, value)?;
-        if (least..=greatest).contains(&value) {
+        if (lower..=upper).contains(&value) {
             return Ok(value);
         }
         Err(toml.invalid(
             element,
             "may narrow the URDF's limits, not widen them",
             format!("{value} rad"),
-            format!("give an angle from {least} to {greatest} rad"),
+            format!("give an angle from {lower} to {upper} rad"),
         ))
     };
     let lower = bound(
         "position_lower_rad",
         entry.position_lower_rad,
-        least.max(-TAU),
+        lower.max(-TAU),
     )?;
     let upper = bound(
         "position_upper_rad",
         entry.position_upper_rad,
-        greatest.min(TAU),
+        upper.min(TAU),
     )?;
     if lower + 2.0 * soft_zone_rad < upper {
         return Ok((lower, upper));
@@ -232,7 +232,7 @@ fn friction(
             format!("{element} {}", error.entry),
             format!("must be {}", error.must),
             error.value,
-            "correct it: friction that is not would feed energy into the joint",
+            "correct it: invalid friction would add energy to the joint",
         )
     })?;
     Ok(friction)

@@ -1,5 +1,5 @@
-//! The TOML held against the chain: every number checked, every default filled in, everything in the
-//! chain's order.
+//! Checks the TOML against the kinematic chain: all numbers validated, all defaults filled in, everything in
+//! chain order.
 
 mod hardware;
 mod joints;
@@ -14,15 +14,15 @@ use std::collections::BTreeSet;
 use supple_core::math::Matrix3;
 use urdf_rs::{JointType, Robot};
 
-/// Free fall on any planet that has a ground to stand on, along each axis \[m/s^2\].
-const MOST_GRAVITY: f64 = 30.0;
-/// Cycle periods, 10 kHz to 10 Hz \[s\].
+/// Maximum magnitude of gravity along each axis, above that of any solid planet \[m/s^2\].
+const MAX_GRAVITY_M_PER_S2: f64 = 30.0;
+/// Allowed cycle periods, 10 kHz to 10 Hz \[s\].
 const PERIODS_S: core::ops::RangeInclusive<f64> = 1e-4..=0.1;
-/// Ten turns either way \[rad\].
-const TURNS_RAD: f64 = 63.0;
+/// Maximum magnitude of a given angle: ten turns \[rad\].
+const MAX_GIVEN_ANGLE_RAD: f64 = 63.0;
 
-/// Refuses names under `[fixed_joints_rad]` and `[[joints]]` that mean nothing. Comes before the chain
-/// is read, so that a misspelt name is not reported as a branch that moves.
+/// Rejects unknown joint names under `[fixed_joints_rad]` and `[[joints]]`. Runs before the chain is read, so that
+/// a misspelt name is not reported as a movable branch.
 pub(crate) fn check_names(
     report: Reporter<'_>,
     settings: &Settings,
@@ -47,7 +47,12 @@ pub(crate) fn check_names(
         let joint = movable.iter().find(|joint| joint.name == *name);
         let joint = joint.ok_or_else(|| unknown(element.clone(), name))?;
         report.finite(&element, *angle_rad)?;
-        report.within(&element, *angle_rad, -TURNS_RAD..=TURNS_RAD, "rad")?;
+        report.within(
+            &element,
+            *angle_rad,
+            -MAX_GIVEN_ANGLE_RAD..=MAX_GIVEN_ANGLE_RAD,
+            "rad",
+        )?;
         let limited = matches!(joint.joint_type, JointType::Revolute);
         let (lower, upper) = (joint.limit.lower, joint.limit.upper);
         if limited && lower < upper && !(lower..=upper).contains(angle_rad) {
@@ -68,7 +73,7 @@ pub(crate) fn check_names(
         if settings.fixed_joints_rad.contains_key(&joint.name) {
             return Err(report.invalid(
                 element,
-                "a joint is fixed or it moves",
+                "a joint must be either fixed or moving",
                 "an entry under [fixed_joints_rad] too",
                 "remove one of the two",
             ));
@@ -80,13 +85,18 @@ pub(crate) fn check_names(
     Ok(())
 }
 
-/// Numbers that are not one joint's.
+/// Checks the numbers that apply to the whole arm.
 pub(crate) fn check_rest(report: Reporter<'_>, settings: &Settings) -> Result<(), ModelError> {
     let (law, latch, limits) = (&settings.law, &settings.latch, &settings.limits);
     for (axis, g) in settings.gravity_m_per_s2.iter().enumerate() {
         let element = format!("gravity_m_per_s2[{axis}]");
         report.finite(&element, *g)?;
-        report.within(&element, *g, -MOST_GRAVITY..=MOST_GRAVITY, "m/s^2")?;
+        report.within(
+            &element,
+            *g,
+            -MAX_GRAVITY_M_PER_S2..=MAX_GRAVITY_M_PER_S2,
+            "m/s^2",
+        )?;
     }
     report.positive("period_s", settings.period_s)?;
     report.within("period_s", settings.period_s, PERIODS_S, "s")?;
@@ -160,9 +170,9 @@ pub(crate) fn check_rest(report: Reporter<'_>, settings: &Settings) -> Result<()
     if !(0.0..=1.0).contains(&latch.contact_share) {
         return Err(report.invalid(
             "[latch] contact_share",
-            "must be a share, 0 to 1",
+            "must be a fraction, 0 to 1",
             latch.contact_share,
-            "give the part of the dry friction feed-forward that stays on in contact",
+            "give the part of the dry-friction feed-forward that remains in contact",
         ));
     }
     if let Some(rows) = law.apparent_inertia_kg {

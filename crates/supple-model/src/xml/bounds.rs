@@ -1,33 +1,33 @@
-//! How large a URDF may be, so that whatever follows ends soon: a text of a few megabytes can hold elements
-//! that are nested deeper than a stack, or links by the ten thousand.
+//! Size limits of a URDF, which bound the processing time: a few megabytes can contain nesting deeper than the
+//! stack allows, or tens of thousands of links.
 
 use super::{children, place};
 use crate::error::{ModelError, Reporter};
 use roxmltree::{Document, Node, ParsingOptions};
 
-/// Nodes of the document, text between elements included: a hundred times those of a humanoid.
-const MOST_NODES: u32 = 500_000;
-/// Elements in each other; a URDF as published has ten.
-const MOST_DEPTH: usize = 64;
-/// Attributes of one element: the parser compares each with each.
-const MOST_ATTRIBUTES: usize = 256;
-/// Links, and joints.
-const MOST_LINKS: usize = 1000;
+/// Maximum number of nodes, text between elements included: a hundred times that of a humanoid.
+const MAX_NODES: u32 = 500_000;
+/// Maximum nesting depth; published URDFs have about ten levels.
+const MAX_DEPTH: usize = 64;
+/// Maximum number of attributes of one element: the parser compares all pairs.
+const MAX_ATTRIBUTES: usize = 256;
+/// Maximum number of links, and of joints.
+const MAX_LINKS: usize = 1000;
 
-const REMEDY: &str = "give the URDF of an arm, without what belongs to other programs";
+const REMEDY: &str = "give the URDF of an arm, without extensions of other programs";
 
-/// The document of a text that is not out of all proportion.
+/// Parses a text within the size limits.
 pub(crate) fn parse<'a>(report: Reporter<'_>, text: &'a str) -> Result<Document<'a>, ModelError> {
     check_attributes(report, text)?;
     let options = ParsingOptions {
-        nodes_limit: MOST_NODES,
+        nodes_limit: MAX_NODES,
         ..ParsingOptions::default()
     };
     let document = Document::parse_with_options(text, options);
     let document = document.map_err(|error| match error {
         roxmltree::Error::NodesLimitReached => report.invalid(
             "<robot>",
-            format!("may have at most {MOST_NODES} elements and texts"),
+            format!("may have at most {MAX_NODES} elements and texts"),
             "more",
             REMEDY,
         ),
@@ -41,10 +41,10 @@ pub(crate) fn parse<'a>(report: Reporter<'_>, text: &'a str) -> Result<Document<
     let robot = document.root_element();
     for kind in ["link", "joint"] {
         let count = children(&robot).filter(|n| n.has_tag_name(kind)).count();
-        if count > MOST_LINKS {
+        if count > MAX_LINKS {
             return Err(report.invalid(
                 place(&robot),
-                format!("may have at most {MOST_LINKS} of <{kind}>"),
+                format!("may have at most {MAX_LINKS} of <{kind}>"),
                 count,
                 REMEDY,
             ));
@@ -53,7 +53,7 @@ pub(crate) fn parse<'a>(report: Reporter<'_>, text: &'a str) -> Result<Document<
     Ok(document)
 }
 
-/// Values that are given between one `<` and the next are those of at most one element.
+/// Limits the number of attributes; between two `<` there are the attributes of at most one element.
 fn check_attributes(report: Reporter<'_>, text: &str) -> Result<(), ModelError> {
     let values = |tag: &str| {
         let mut before = 0_u8;
@@ -66,11 +66,11 @@ fn check_attributes(report: Reporter<'_>, text: &str) -> Result<(), ModelError> 
     };
     for tag in text.split('<') {
         let count = values(tag);
-        if count > MOST_ATTRIBUTES {
+        if count > MAX_ATTRIBUTES {
             let name: String = tag.chars().take_while(|c| c.is_alphanumeric()).collect();
             return Err(report.invalid(
                 format!("<{name}>"),
-                format!("may have at most {MOST_ATTRIBUTES} attributes"),
+                format!("may have at most {MAX_ATTRIBUTES} attributes"),
                 count,
                 REMEDY,
             ));
@@ -93,10 +93,10 @@ fn check_depth(report: Reporter<'_>, document: &Document<'_>) -> Result<(), Mode
                 None => return Ok(()),
             },
         };
-        if depth > MOST_DEPTH {
+        if depth > MAX_DEPTH {
             return Err(report.invalid(
                 place(&node),
-                format!("elements may be nested at most {MOST_DEPTH} deep"),
+                format!("elements may be nested at most {MAX_DEPTH} levels deep"),
                 "more",
                 REMEDY,
             ));
@@ -104,7 +104,7 @@ fn check_depth(report: Reporter<'_>, document: &Document<'_>) -> Result<(), Mode
     }
 }
 
-/// The next node that is not inside `node`, in the order of the text.
+/// The next node after `node` and its descendants, in document order.
 fn next_beside<'a, 'input>(
     mut node: Node<'a, 'input>,
     depth: &mut usize,

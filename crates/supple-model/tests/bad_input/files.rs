@@ -1,11 +1,11 @@
-//! What is no file, and files out of all proportion: an error soon, whatever is in them.
+//! Special files and oversized files are rejected quickly.
 
 use crate::common::{TOML, URDF, with};
 use std::fs;
 use std::path::Path;
-use supple_model::{Description, Replacement};
+use supple_model::{Description, IdentifiedModel};
 
-fn refused(toml: &str, urdf: &str, words: &[&str]) {
+fn assert_rejected(toml: &str, urdf: &str, words: &[&str]) {
     let message = Description::from_text(toml, urdf)
         .expect_err("accepted")
         .to_string();
@@ -15,26 +15,31 @@ fn refused(toml: &str, urdf: &str, words: &[&str]) {
     }
 }
 
-/// The arm of the tests with more in its URDF.
+/// The test arm with additional content in its URDF.
 fn more(text: &str) -> String {
     with(URDF, "</robot>", &format!("{text}</robot>"))
 }
 
 #[test]
-fn elements_nested_deeper_than_a_stack() {
+fn elements_nested_deeper_than_the_stack_are_rejected() {
     let deep = |element: &str, depth: usize| {
         let open = format!("<{element}>").repeat(depth);
         more(&(open + &format!("</{element}>").repeat(depth)))
     };
     for depth in [64, 100_000] {
         let text = deep("gazebo", depth);
-        refused(
+        assert_rejected(
             TOML,
             &text,
-            &["small.urdf", "<gazebo>", "at most 64 deep", "without what"],
+            &[
+                "small.urdf",
+                "<gazebo>",
+                "at most 64 levels deep",
+                "without extensions",
+            ],
         );
     }
-    Description::from_text(TOML, &deep("gazebo", 60)).expect("as deep as may be");
+    Description::from_text(TOML, &deep("gazebo", 60)).expect("maximum allowed depth");
     let in_link = with(
         URDF,
         "<link name=\"base\"/>",
@@ -44,11 +49,15 @@ fn elements_nested_deeper_than_a_stack() {
             "</visual>".repeat(100_000)
         ),
     );
-    refused(TOML, &in_link, &["link `base` <visual>", "at most 64 deep"]);
+    assert_rejected(
+        TOML,
+        &in_link,
+        &["link `base` <visual>", "at most 64 levels deep"],
+    );
 }
 
 #[test]
-fn more_links_than_any_arm_has() {
+fn too_many_links_are_rejected() {
     let fixed = |count: usize| {
         let mut text = String::new();
         let mut parent = "base".to_owned();
@@ -62,7 +71,7 @@ fn more_links_than_any_arm_has() {
         }
         more(&text)
     };
-    refused(
+    assert_rejected(
         TOML,
         &fixed(20_000),
         &["small.urdf", "<robot>", "at most 1000 of <link>", "20007"],
@@ -73,23 +82,23 @@ fn more_links_than_any_arm_has() {
 }
 
 #[test]
-fn more_attributes_and_elements_than_any_arm_has() {
+fn too_many_attributes_and_elements_are_rejected() {
     let attributes: String = (0..100_000).map(|i| format!(" a{i}=\"\"")).collect();
-    refused(
+    assert_rejected(
         TOML,
         &more(&format!("<gazebo{attributes}/>")),
         &["<gazebo>", "at most 256 attributes", "100000"],
     );
     let elements = more(&"<gazebo/>".repeat(600_000));
-    refused(TOML, &elements, &["<robot>", "at most 500000 elements"]);
+    assert_rejected(TOML, &elements, &["<robot>", "at most 500000 elements"]);
     let visuals = format!("<link name=\"base\">{}</link>", "<visual/>".repeat(100_000));
     let visuals = with(URDF, "<link name=\"base\"/>", &visuals);
-    Description::from_text(TOML, &visuals).expect("shapes of no kind are not drawn");
+    Description::from_text(TOML, &visuals).expect("visuals without shape are ignored");
 }
 
 #[cfg(unix)]
 #[test]
-fn what_is_no_regular_file_is_neither_read_nor_replaced() {
+fn special_files_are_neither_read_nor_replaced() {
     use std::os::unix::fs::FileTypeExt;
     let folder = tempfile::tempdir().expect("a folder");
     let at = |name: &str| folder.path().join(name);
@@ -107,39 +116,39 @@ fn what_is_no_regular_file_is_neither_read_nor_replaced() {
         (at("zero.toml"), "/dev/zero", "a character device"),
         ("/dev/zero".into(), "/dev/zero", "a character device"),
     ] {
-        let message = Description::load(path).expect_err("refused").to_string();
+        let message = Description::load(path).expect_err("rejected").to_string();
         for word in [file, word, "cannot be read"] {
             assert!(message.contains(word), "no `{word}` in: {message}");
         }
     }
     let long = fs::File::create(at("long.toml")).expect("made");
     long.set_len(1 << 40).expect("a sparse file");
-    let message = Description::load(at("long.toml")).expect_err("refused");
+    let message = Description::load(at("long.toml")).expect_err("rejected");
     let message = message.to_string();
     assert!(message.contains("at most 16777216 are read"), "{message}");
 
-    // A model is not written over one, and not half.
+    // A model neither replaces a special file nor is written partially.
     let out = at("out");
     fs::create_dir(&out).expect("made");
     fifo(&out.join("arm.toml"));
     let arm = Description::from_text(TOML, URDF).expect("sound");
-    let message = arm.save(&out).expect_err("refused").to_string();
+    let message = arm.save(&out).expect_err("rejected").to_string();
     assert!(message.contains("a FIFO"), "{message}");
-    assert!(!out.join("arm.urdf").exists(), "half an arm");
+    assert!(!out.join("arm.urdf").exists(), "incomplete arm");
     let kind = fs::metadata(out.join("arm.toml"))
         .expect("there")
         .file_type();
     assert!(kind.is_fifo());
 }
 
-/// What an identified model replaces is found in a URDF with what other programs add, too.
+/// An identified model can also be written into a URDF with extensions of other programs.
 #[test]
-fn an_identified_model_keeps_what_other_programs_add() {
+fn an_identified_model_keeps_extensions_of_other_programs() {
     let urdf = more("<gazebo reference=\"link1\"><mu1>0.2</mu1></gazebo>");
     let arm = Description::from_text(TOML, &urdf).expect("sound");
     let friction: [supple_core::Friction; 3] = arm.friction().try_into().expect("three");
     let replaced = arm
-        .with_model(&Replacement {
+        .with_model(&IdentifiedModel {
             arm: &arm.arm::<3>().expect("three"),
             friction: &friction,
             ripple: None,

@@ -1,4 +1,4 @@
-//! What is refused, and that each message names file, element, value and remedy.
+//! Invalid input is rejected, and each message names file, element, value and remedy.
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -10,7 +10,7 @@ mod urdf;
 use common::{TOML, URDF, with_toml, with_urdf};
 use supple_model::{Description, ModelError};
 
-/// What is changed, to what, and what the message must hold: element, value, remedy.
+/// Text to replace, its replacement, and fragments that the message must contain: element, value, remedy.
 type Case = (&'static str, &'static str, [&'static str; 3]);
 
 fn check(file: &str, cases: &[Case], load: fn(&str, &str) -> Result<Description, ModelError>) {
@@ -32,7 +32,7 @@ fn the_unchanged_texts_are_accepted() {
 }
 
 #[test]
-fn numbers_that_would_overflow() {
+fn numbers_that_would_overflow_are_rejected() {
     check(
         "small.urdf",
         &[
@@ -68,7 +68,7 @@ fn numbers_that_would_overflow() {
 }
 
 #[test]
-fn files_that_are_not_there() {
+fn missing_files_are_errors() {
     let message = Description::find("nowhere/arm.toml")
         .unwrap_err()
         .to_string();
@@ -95,7 +95,7 @@ fn files_that_are_not_there() {
 }
 
 #[test]
-fn an_unknown_asset_names_the_known_ones() {
+fn the_error_of_an_unknown_asset_lists_the_assets() {
     assert_eq!(Description::find("wam3").unwrap().name(), "wam3");
     let message = Description::find("wam5").unwrap_err().to_string();
     assert!(
@@ -105,7 +105,7 @@ fn an_unknown_asset_names_the_known_ones() {
 }
 
 #[test]
-fn the_wrong_number_of_joints_names_both() {
+fn the_error_of_a_wrong_joint_count_names_both_numbers() {
     let message = Description::asset("wam4")
         .unwrap()
         .config::<7>()
@@ -129,7 +129,7 @@ fn the_wrong_number_of_joints_names_both() {
 }
 
 #[test]
-fn what_a_controller_would_refuse_names_the_file() {
+fn errors_of_the_controller_name_the_file() {
     let description = Description::from_text(TOML, URDF).unwrap();
     let message = description.config::<3>().unwrap_err().to_string();
     for fragment in [

@@ -1,10 +1,10 @@
-//! A URDF in the style in which robots are published: what other programs add is listed, what would change
-//! the dynamics is refused.
+//! A URDF in the style of published robots: extensions of other programs are listed, unknown content that would
+//! change the dynamics is rejected.
 
 use crate::common::{TOML, URDF, with};
 use supple_model::{Description, ModelError};
 
-/// The arm of the tests as a vendor's repository might have it.
+/// The test arm in the style of a vendor's repository.
 fn published() -> String {
     let changes = [
         (
@@ -48,13 +48,13 @@ fn published() -> String {
     let changed = changes
         .iter()
         .fold(URDF.to_owned(), |text, (from, to)| with(&text, from, to));
-    // Of the elbow: its friction is in the TOML.
+    // The friction of the elbow is in the TOML.
     assert!(changed.contains("K=\"700\""));
     changed
 }
 
 #[test]
-fn a_published_urdf_is_the_same_arm_with_each_kind_listed_once() {
+fn extensions_do_not_change_the_arm_and_each_kind_is_listed_once() {
     let plain = Description::from_text(TOML, URDF).expect("sound");
     assert!(plain.warnings().is_empty());
     assert!(plain.clone().strict().is_ok());
@@ -95,16 +95,16 @@ fn a_published_urdf_is_the_same_arm_with_each_kind_listed_once() {
     }
     assert_eq!(lines.len(), 13, "{lines:#?}");
     assert!(lines.iter().all(|line| line.starts_with("small.urdf: ")));
-    let refused = arm.strict().expect_err("something was left out");
-    assert!(matches!(&refused, ModelError::Strict { findings } if findings.len() == 13));
+    let error = arm.strict().expect_err("strict rejects ignored content");
+    assert!(matches!(&error, ModelError::Strict { findings } if findings.len() == 13));
     for line in &lines {
-        assert!(refused.to_string().contains(line), "{line} in {refused}");
+        assert!(error.to_string().contains(line), "{line} in {error}");
     }
 }
 
-/// What would change the dynamics without a word, each in a file that is sound otherwise.
+/// Content that would silently change the dynamics, each in an otherwise valid file.
 #[test]
-fn what_would_change_the_dynamics_is_refused() {
+fn unknown_content_that_would_change_the_dynamics_is_rejected() {
     let cases = [
         ("<axis xyz=\"0 0 2\"/>", "<axes xyz=\"0 1 0\"/>", "<axes>"),
         ("<axis xyz=\"0 0 2\"/>", "<Axis xyz=\"0 1 0\"/>", "<Axis>"),

@@ -1,11 +1,11 @@
-//! What is wrong in a TOML, by itself or beside its URDF.
+//! Errors in a TOML, by itself or in combination with its URDF.
 
 use crate::check;
 use crate::common::{TOML, URDF, with, with_toml};
 use supple_model::Description;
 
 #[test]
-fn broken_toml() {
+fn errors_in_a_toml_are_rejected() {
     check(
         "arm.toml",
         &[
@@ -346,7 +346,7 @@ fn broken_toml() {
 }
 
 #[test]
-fn a_branch_that_moves_must_be_fixed() {
+fn a_movable_branch_must_be_fixed() {
     let message = with_toml("finger_joint = 0.3", "").unwrap_err().to_string();
     for fragment in [
         "small.urdf",
@@ -375,7 +375,7 @@ fn a_branch_that_moves_must_be_fixed() {
 }
 
 #[test]
-fn a_urdf_in_the_place_of_a_toml() {
+fn a_urdf_instead_of_a_toml_is_rejected() {
     let message = Description::from_text(URDF, URDF).unwrap_err().to_string();
     for fragment in ["arm.toml", "XML", "name, urdf"] {
         assert!(message.contains(fragment), "{message}");

@@ -1,11 +1,11 @@
-//! What is wrong in a URDF.
+//! Errors in a URDF.
 
 use crate::check;
 use crate::common::{TOML, with_urdf};
 use supple_model::Description;
 
 #[test]
-fn broken_structure_of_a_urdf() {
+fn errors_in_the_structure_are_rejected() {
     check(
         "small.urdf",
         &[
@@ -94,7 +94,7 @@ fn broken_structure_of_a_urdf() {
 }
 
 #[test]
-fn broken_joints_of_a_urdf() {
+fn errors_in_joints_are_rejected() {
     let shoulder = "<limit lower=\"-1.5\" upper=\"1.5\" effort=\"40\" velocity=\"2\"/>";
     check(
         "small.urdf",
@@ -228,7 +228,7 @@ fn broken_joints_of_a_urdf() {
 }
 
 #[test]
-fn broken_links_of_a_urdf() {
+fn errors_in_links_are_rejected() {
     let link2 = "<mass value=\"1.5\"/>\n      <inertia ixx=\"0.002\" ixy=\"0\" ixz=\"0\" iyy=\"0.02\" iyz=\"0\" izz=\"0.02\"/>";
     check(
         "small.urdf",
@@ -288,7 +288,7 @@ fn broken_links_of_a_urdf() {
                 "<mass value=\"0\"/><inertia ixx=\"0\" ixy=\"0\" ixz=\"0\" iyy=\"0\" iyz=\"0\" izz=\"0\"/>",
                 ["link `link2`", "found none", "fix joint `shoulder`"],
             ),
-            // A branch that does not move is no less physical.
+            // A fixed branch must be physically consistent as well.
             (
                 "<mass value=\"0.3\"/>",
                 "<mass value=\"-0.3\"/>",
@@ -300,7 +300,7 @@ fn broken_links_of_a_urdf() {
 }
 
 #[test]
-fn a_root_that_is_not_a_robot() {
+fn a_root_element_other_than_robot_is_rejected() {
     let message = Description::from_text(TOML, "<sdf/>")
         .unwrap_err()
         .to_string();

@@ -1,5 +1,5 @@
-//! A small arm whose texts tests change: three joints, a fixed flange, a gripper finger that moves
-//! off the chain and is fixed by the TOML.
+//! A small arm whose texts the tests modify: three joints, a fixed flange, a gripper finger outside the chain whose
+//! joint the TOML fixes.
 #![allow(dead_code, reason = "each test binary uses a part")]
 
 use supple_model::{Description, ModelError};
@@ -115,7 +115,7 @@ stiffness_n_per_m = [5.0, 6.0, 7.0]
 threshold_n = 2.0
 "#;
 
-/// The text with one part of it changed, which must be there exactly once.
+/// The text with one fragment replaced, which must occur exactly once.
 pub fn with(text: &str, from: &str, to: &str) -> String {
     assert_eq!(text.matches(from).count(), 1, "`{from}` is not there once");
     text.replace(from, to)

@@ -1,4 +1,4 @@
-//! Carries injections out on a plant.
+//! Applies injected faults to a plant.
 
 use super::{Injection, InjectionError, InjectionKind, Trigger};
 use crate::error::PlantError;
@@ -8,55 +8,55 @@ use std::collections::VecDeque;
 use supple_core::controller::Mode;
 use supple_core::{Matrix, Vector};
 
-/// What the arm's side sees of its controller in a cycle.
+/// State of the controller as the plant sees it in one cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sight {
-    /// The drives take torques.
+pub struct ControllerView {
+    /// The drives are active.
     pub active: bool,
-    /// Mode of the torque command of this cycle; `None` where there is none, or where it is not told.
+    /// Mode of the torque command of this cycle; `None` if there is no command or the mode is unknown.
     pub mode: Option<Mode>,
 }
 
-/// Stands between a plant and whoever reads its encoders and commands its torques. Without injections it passes
-/// everything on, to the bit.
+/// Wraps a plant and modifies its encoder readings and torque commands. Without injections it passes everything
+/// through bit-exactly.
 #[derive(Clone, Debug)]
 pub struct Injector<const N: usize> {
     running: Vec<Running<N>>,
-    /// Cycles of the plant so far.
+    /// Number of plant cycles so far.
     cycle: u64,
     cycle_s: f64,
     joint_from_motor: Matrix<N, N>,
     motor_from_joint: Matrix<N, N>,
-    /// What the encoders say.
+    /// Encoder readings.
     position_rad: Vector<N>,
 }
 
 #[derive(Clone, Debug)]
 struct Running<const N: usize> {
     injection: Injection,
-    /// When it begins, once its trigger has come.
+    /// Cycle at which it begins, once the trigger has occurred.
     due: Option<u64>,
     begun: bool,
     /// Angles reported when it began.
     start_rad: Vector<N>,
-    /// Angles or torques on their way, for delays.
+    /// Delayed angles or torques.
     pending: VecDeque<Vector<N>>,
-    /// How many cycles of the plant they are on their way.
+    /// Length of the delay in plant cycles.
     delay: usize,
-    /// Replies of each joint since it began.
+    /// Number of replies of each joint since the injection began.
     replies: [u32; N],
 }
 
 impl<const N: usize> Injector<N> {
-    /// Passes everything on.
+    /// Injector without injections.
     pub fn none(plant: &Plant<N>) -> Self {
         let config = plant.config();
-        let joint_from_motor = config.drive.joint_from_motor;
+        let joint_from_motor = config.actuators.joint_from_motor;
         Injector {
             running: Vec::new(),
             cycle: 0,
             cycle_s: config.cycle_s,
-            // A plant has found its transmission regular.
+            // The plant has checked that its transmission is regular.
             motor_from_joint: joint_from_motor
                 .try_inverse()
                 .unwrap_or_else(Matrix::identity),
@@ -65,19 +65,19 @@ impl<const N: usize> Injector<N> {
         }
     }
 
-    /// For a plant that has not moved yet: what begins at once begins here. `period_s` is the control cycle, in
-    /// which delays are counted; the plant's own may be shorter.
+    /// The plant must not have moved yet: injections with [`Trigger::AtStart`] begin here. `period_s` is the control
+    /// cycle, in which delays are counted; the cycle of the plant may be shorter.
     ///
     /// # Errors
-    /// [`InjectionError::Index`]: a joint or motor that the arm has not; [`InjectionError::Value`]: a value out of
-    /// its range.
+    /// [`InjectionError::Index`]: a joint or motor that the arm does not have; [`InjectionError::Value`]: a value out
+    /// of its range.
     pub fn new(
         injections: &[Injection],
         plant: &mut Plant<N>,
         period_s: f64,
     ) -> Result<Self, InjectionError> {
         for injection in injections {
-            // What was built by hand is held to the same ranges as what was read.
+            // Check the ranges again, for injections that were not parsed from text.
             injection.to_string().parse::<Injection>()?;
             if let Some((key, value)) = injection.kind.index()
                 && value >= N
@@ -102,7 +102,7 @@ impl<const N: usize> Injector<N> {
             let delay = delay_of(injection);
             Running {
                 injection: *injection,
-                due: (injection.trigger == Trigger::AtOnce).then_some(0),
+                due: (injection.trigger == Trigger::AtStart).then_some(0),
                 begun: false,
                 start_rad: Vector::zeros(),
                 pending: VecDeque::with_capacity(delay + 2),
@@ -116,16 +116,16 @@ impl<const N: usize> Injector<N> {
         Ok(injector)
     }
 
-    /// A cycle of the plant under `torque_nm` with these motors shorted, in the place of [`Plant::short`] and
+    /// Runs one plant cycle under `torque_nm` with these motors shorted, instead of [`Plant::short_motors`] and
     /// [`Plant::cycle`].
     pub fn cycle(
         &mut self,
         plant: &mut Plant<N>,
-        sight: Sight,
+        view: ControllerView,
         torque_nm: &Vector<N>,
         shorted: [bool; N],
     ) {
-        self.trigger(sight);
+        self.trigger(view);
         self.begin_due(plant);
         let (mut torque_nm, mut shorted) = (*torque_nm, shorted);
         if self.drives_idle() {
@@ -141,31 +141,31 @@ impl<const N: usize> Injector<N> {
                     shorted[motor] = false;
                 }
                 InjectionKind::TorqueSign { joint } => torque_nm[joint] = -torque_nm[joint],
-                InjectionKind::TorqueLate { .. } => torque_nm = running.later(torque_nm),
+                InjectionKind::TorqueLate { .. } => torque_nm = running.delay_line(torque_nm),
                 _ => {}
             }
         }
-        plant.short(shorted);
+        plant.short_motors(shorted);
         plant.cycle(&torque_nm);
         self.cycle += 1;
         self.read(plant);
     }
 
-    /// Joint angles as the encoders give them at the end of the last cycle \[rad\].
+    /// Encoder readings of the joint angles at the end of the last cycle \[rad\].
     pub fn position_rad(&self) -> &Vector<N> {
         &self.position_rad
     }
 
-    /// The same as the replies of a cycle, `None` for one that is lost. To be asked once a control cycle.
+    /// Encoder replies of a cycle, `None` for a lost reply. Call once per control cycle.
     pub fn replies(&mut self) -> [Option<f64>; N] {
         array::from_fn(|joint| {
-            let lost = self.loses_reply(joint);
+            let lost = self.drops_reply(joint);
             (!lost).then_some(self.position_rad[joint])
         })
     }
 
-    /// Counts a reply of a joint, or on a bus of a motor; it is not to be sent.
-    pub fn loses_reply(&mut self, joint: usize) -> bool {
+    /// Counts one reply of a joint (on a bus: of a motor) and returns whether to drop it.
+    pub fn drops_reply(&mut self, joint: usize) -> bool {
         let mut lost = false;
         for running in self.running.iter_mut().filter(|running| running.begun) {
             if let InjectionKind::ReplyLost { joint: of, every } = running.injection.kind
@@ -181,7 +181,7 @@ impl<const N: usize> Injector<N> {
         lost
     }
 
-    /// The drives are idle against their controller's will.
+    /// Returns whether an injection forces the drives to idle.
     pub fn drives_idle(&self) -> bool {
         self.running.iter().any(|running| {
             let InjectionKind::DrivesIdle { for_s } = running.injection.kind else {
@@ -195,24 +195,24 @@ impl<const N: usize> Injector<N> {
         })
     }
 
-    /// This motor makes no torque and does not brake.
+    /// Returns whether this motor produces no torque and does not brake.
     pub fn is_dead(&self, motor: usize) -> bool {
         let mut running = self.running.iter().filter(|running| running.begun);
         running.any(|running| running.injection.kind == InjectionKind::MotorDead { motor })
     }
 
-    /// How many injections have begun.
+    /// Number of injections that have begun.
     pub fn begun(&self) -> usize {
         self.running.iter().filter(|running| running.begun).count()
     }
 
-    fn trigger(&mut self, sight: Sight) {
+    fn trigger(&mut self, view: ControllerView) {
         for running in self.running.iter_mut().filter(|r| r.due.is_none()) {
             let after_s = match running.injection.trigger {
-                Trigger::AtOnce => Some(0.0),
-                Trigger::Active { at_s } => sight.active.then_some(at_s),
+                Trigger::AtStart => Some(0.0),
+                Trigger::Active { at_s } => view.active.then_some(at_s),
                 Trigger::Mode { mode, after_s } => {
-                    (sight.active && sight.mode == Some(mode)).then_some(after_s)
+                    (view.active && view.mode == Some(mode)).then_some(after_s)
                 }
             };
             running.due = after_s.map(|after_s| self.cycle + cycles_of(after_s, self.cycle_s));
@@ -237,12 +237,12 @@ impl<const N: usize> Injector<N> {
                 } => {
                     let mut change = Vector::zeros();
                     change[joint] = speed_rad_per_s;
-                    plant.push(&change)
+                    plant.apply_velocity_step(&change)
                 }
                 InjectionKind::Payload { mass_kg } => plant.add_payload(mass_kg),
                 _ => Ok(()),
             };
-            // Masses and speeds are bounded by their ranges.
+            // Masses and speeds are within their checked ranges.
             debug_assert!(done.is_ok(), "{done:?}");
         }
     }
@@ -250,15 +250,15 @@ impl<const N: usize> Injector<N> {
     fn read(&mut self, plant: &Plant<N>) {
         let mut position_rad = plant.measurement().position_rad;
         for running in self.running.iter_mut().filter(|running| running.begun) {
-            running.falsify(&mut position_rad);
+            running.corrupt_positions(&mut position_rad);
         }
         self.position_rad = position_rad;
     }
 }
 
 impl<const N: usize> Running<N> {
-    /// Puts a value in and takes out the one that was put in `delay` cycles ago, or the first one.
-    fn later(&mut self, value: Vector<N>) -> Vector<N> {
+    /// Delay line: stores a value and returns the one stored `delay` cycles ago, or the first one.
+    fn delay_line(&mut self, value: Vector<N>) -> Vector<N> {
         self.pending.push_back(value);
         if self.pending.len() > self.delay + 1 {
             self.pending.pop_front();
@@ -266,7 +266,7 @@ impl<const N: usize> Running<N> {
         self.pending.front().copied().unwrap_or(value)
     }
 
-    fn falsify(&mut self, position_rad: &mut Vector<N>) {
+    fn corrupt_positions(&mut self, position_rad: &mut Vector<N>) {
         let start_rad = self.start_rad;
         let mut each = |joint: Option<usize>, value: &dyn Fn(usize, f64) -> f64| {
             for i in (0..N).filter(|i| joint.is_none_or(|joint| joint == *i)) {
@@ -283,7 +283,7 @@ impl<const N: usize> Running<N> {
             }
             InjectionKind::EncoderNan { joint } => each(joint, &|_, _| f64::NAN),
             InjectionKind::EncoderLate { joint, .. } => {
-                let late_rad = self.later(*position_rad);
+                let late_rad = self.delay_line(*position_rad);
                 for i in (0..N).filter(|i| joint.is_none_or(|joint| joint == *i)) {
                     position_rad[i] = late_rad[i];
                 }

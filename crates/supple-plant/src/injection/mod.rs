@@ -1,110 +1,110 @@
-//! Faults put into a simulated arm on purpose, at its boundary: encoder angles out, torques in, and the load.
+//! Fault injection at the interface of a simulated arm: encoder angles, torques and load.
 //!
-//! An [`Injection`] is data, read from a text such as `encoder-stuck:joint=1,when=track,after-s=0.5`
-//! ([`HELP`]); an [`Injector`] carries a list of them out on a [`Plant`](crate::Plant). It counts the plant's
-//! own cycles, so that a run in virtual time is the same to the bit each time.
+//! An [`Injection`] is data, parsed from a text such as `encoder-stuck:joint=1,when=track,after-s=0.5`
+//! ([`HELP`]); an [`Injector`] applies a list of them to a [`Plant`](crate::Plant). It counts plant cycles, so
+//! that runs in virtual time are bit-identical.
 //!
 //! Joints and motors are counted from 0, as in the names of faults and in logs.
 
 mod injector;
 mod parse;
 
-pub use injector::{Injector, Sight};
+pub use injector::{ControllerView, Injector};
 pub use parse::{HELP, InjectionError};
 
 use supple_core::controller::Mode;
 
-/// What is done to the arm, and when.
+/// A fault and its trigger.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Injection {
-    /// What.
+    /// Kind of the fault.
     pub kind: InjectionKind,
-    /// When it begins. It lasts from then on, unless its kind says otherwise.
+    /// Start of the fault. It lasts until the end, unless its kind states otherwise.
     pub trigger: Trigger,
 }
 
-/// When an injection begins.
+/// Start of an injection.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Trigger {
     /// Before the first cycle.
-    AtOnce,
-    /// This long after the drives were first active \[s\], zero or more.
+    AtStart,
+    /// A time after the drives were first active.
     Active {
-        /// After the first cycle with active drives \[s\].
+        /// Time after the first cycle with active drives \[s\], zero or more.
         at_s: f64,
     },
-    /// This long after a mode first began with active drives \[s\], zero or more. The mode is that which each
-    /// torque command carries; an arm on a bus is not told.
+    /// A time after a mode first began with active drives. The mode comes from the torque commands; an arm on a bus
+    /// does not receive it.
     Mode {
-        /// Which.
+        /// Mode of the controller.
         mode: Mode,
-        /// After its first cycle \[s\].
+        /// Time after its first cycle \[s\], zero or more.
         after_s: f64,
     },
 }
 
-/// What is done. `joint: None` means every joint.
+/// Kind of an injected fault. `joint: None` means every joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum InjectionKind {
-    /// The encoder keeps the angle that it reported last.
+    /// The encoder repeats its last angle.
     EncoderStuck {
-        /// Which.
+        /// Index of the joint.
         joint: Option<usize>,
     },
-    /// The encoder reports angles of so many control cycles ago. The reading stands still until the delay is
-    /// reached: it does not jump.
+    /// The encoder readings lag by this many control cycles. The reading is frozen until the delay has built up, so
+    /// it does not jump.
     EncoderLate {
-        /// Which.
+        /// Index of the joint.
         joint: Option<usize>,
         /// Control cycles, 1 to 1000.
         cycles: u32,
     },
-    /// The encoder counts backwards from where it is.
+    /// The encoder counts backwards from its current angle.
     EncoderSign {
-        /// Which.
+        /// Index of the joint.
         joint: Option<usize>,
     },
-    /// The encoder's angle jumps once and stays beside the true one.
+    /// The encoder reading jumps once and keeps this offset.
     EncoderOffset {
-        /// Which.
+        /// Index of the joint.
         joint: Option<usize>,
-        /// By how much \[rad\], not zero.
+        /// Offset \[rad\], not zero.
         offset_rad: f64,
     },
     /// The reported angle is not a number.
     EncoderNan {
-        /// Which.
+        /// Index of the joint.
         joint: Option<usize>,
     },
     /// One reply in `every` is not sent.
     ReplyLost {
-        /// Which; on a bus, which motor's.
+        /// Index of the joint; on a bus, of the motor.
         joint: Option<usize>,
-        /// 1 for all of them, 2 for every second one, up to 1000.
+        /// 1 for every reply, 2 for every second one, up to 1000.
         every: u32,
     },
-    /// A motor makes no torque and does not brake: its circuit is open.
+    /// A motor produces no torque and does not brake: its circuit is open.
     MotorDead {
-        /// Which.
+        /// Index of the motor.
         motor: usize,
     },
     /// The torque on a joint is the opposite of the commanded one.
     TorqueSign {
-        /// Which.
+        /// Index of the joint.
         joint: usize,
     },
-    /// Torques act so many control cycles later than they do by themselves.
+    /// Torques are delayed by this many additional control cycles.
     TorqueLate {
         /// Control cycles, 1 to 1000.
         cycles: u32,
     },
-    /// Gravity turns round: an arm that is mounted upside down.
+    /// Gravity is reversed, as for an arm that is mounted upside down.
     GravityReversed,
-    /// A joint's velocity changes at once.
+    /// The velocity of a joint changes by a step.
     Bump {
-        /// Which.
+        /// Index of the joint.
         joint: usize,
-        /// By how much \[rad/s\], not zero.
+        /// Change \[rad/s\], not zero.
         speed_rad_per_s: f64,
     },
     /// A ball is fixed to the tip.
@@ -112,28 +112,28 @@ pub enum InjectionKind {
         /// Its mass \[kg\], positive.
         mass_kg: f64,
     },
-    /// The drives go to idle and brake by themselves, as when an operator lowers them; afterwards they are
-    /// ready again. Only where there is no pendant: not on a bus.
+    /// The drives go to idle (braking) as if an operator had disabled them, and can be enabled again afterwards. Not
+    /// available on a bus, which has a pendant.
     DrivesIdle {
-        /// For how long \[s\]; for good if not given.
+        /// Duration \[s\]; permanent if not given.
         for_s: Option<f64>,
     },
 }
 
 impl Injection {
-    /// Refuses what an arm on a bus cannot do.
+    /// Checks that an arm on a bus supports this injection.
     ///
     /// # Errors
-    /// [`InjectionError::NotOnBus`] with what to do in its place.
-    pub fn on_bus(&self) -> Result<(), InjectionError> {
+    /// [`InjectionError::NotOnBus`] with an alternative.
+    pub fn check_bus_support(&self) -> Result<(), InjectionError> {
         let remedy = match (self.kind, self.trigger) {
             (_, Trigger::Mode { .. }) => {
-                "the arm on a bus is not told the mode: give at-s=SECONDS, counted from active drives"
+                "an arm on a bus does not know the controller mode: use at-s=SECONDS, counted from active drives"
             }
             (InjectionKind::EncoderNan { .. }, _) => {
                 "encoder counts are always numbers: use reply-lost:every=1"
             }
-            (InjectionKind::DrivesIdle { .. }, _) => "lower the drives at the pendant",
+            (InjectionKind::DrivesIdle { .. }, _) => "set the drives to idle at the pendant",
             _ => return Ok(()),
         };
         Err(InjectionError::NotOnBus {
@@ -144,7 +144,7 @@ impl Injection {
 }
 
 impl InjectionKind {
-    /// Its name in texts.
+    /// Name of the kind in text form.
     pub fn name(&self) -> &'static str {
         match self {
             InjectionKind::EncoderStuck { .. } => "encoder-stuck",
@@ -163,7 +163,7 @@ impl InjectionKind {
         }
     }
 
-    /// The joint or motor that it names, with the key that names it.
+    /// The joint or motor that it affects, with its key in text form.
     fn index(&self) -> Option<(&'static str, usize)> {
         match *self {
             InjectionKind::EncoderStuck { joint }

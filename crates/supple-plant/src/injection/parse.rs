@@ -6,33 +6,33 @@ use core::str::FromStr;
 use supple_core::codes::MODES;
 use supple_core::controller::Mode;
 
-/// Every kind with its keys, for a program's help.
+/// Every kind with its keys, for the help text of a program.
 pub const HELP: &str = "\
-A fault put into the simulated arm, KIND or KIND:key=value,key=value. May be repeated.
+A fault to inject into the simulated arm, KIND or KIND:key=value,key=value. May be repeated.
 
 Kinds, joints and motors counted from 0 (no joint: all of them):
   encoder-stuck[:joint=I]                the encoder keeps its last angle
-  encoder-late:cycles=K[,joint=I]        angles of K control cycles ago
-  encoder-sign[:joint=I]                 counts backwards from where it is
+  encoder-late:cycles=K[,joint=I]        the angles lag by K control cycles
+  encoder-sign[:joint=I]                 the encoder counts backwards from its current angle
   encoder-offset:offset-rad=X[,joint=I]  the angle jumps once by X
   encoder-nan[:joint=I]                  the angle is not a number (not on a bus)
   reply-lost:every=K[,joint=I]           one reply in K is not sent
   motor-dead:motor=I                     no torque, and no braking
   torque-sign:joint=I                    the opposite of the commanded torque
   torque-late:cycles=K                   torques act K control cycles later
-  gravity-reversed                       the arm hangs upside down
-  bump:joint=I,speed-rad-per-s=X         the joint's velocity changes at once by X
+  gravity-reversed                       gravity is reversed: the arm is mounted upside down
+  bump:joint=I,speed-rad-per-s=X         the joint's velocity changes by a step of X
   payload:mass-kg=X                      a ball of X kg at the tip
-  drives-idle[:for-s=X]                  the drives brake by themselves (not on a bus)
+  drives-idle[:for-s=X]                  the drives go to idle and brake (not on a bus)
 
-When, as further keys; before the first cycle if none is given:
+Additional keys for the start time; default: before the first cycle:
   at-s=X                  X s after the drives were first active
   when=MODE[,after-s=X]   X s after MODE first began with active drives (not on a bus)
 Modes: idle, gravity_hold, move, track, probe, fault, excite, breakaway.
 
 Example: encoder-stuck:joint=1,when=track,after-s=0.5";
 
-/// Names of all kinds with the keys that each takes beside those of its trigger.
+/// Names of all kinds with their keys, without those of the trigger.
 const KINDS: [(&str, &[&str]); 13] = [
     ("encoder-stuck", &["joint"]),
     ("encoder-late", &["joint", "cycles"]),
@@ -49,36 +49,36 @@ const KINDS: [(&str, &[&str]); 13] = [
     ("drives-idle", &["for-s"]),
 ];
 const TRIGGER_KEYS: [&str; 3] = ["at-s", "when", "after-s"];
-/// Most cycles of a delay, and of a count of replies.
+/// Maximum number of cycles of a delay, and maximum reply interval.
 const MAX_CYCLES: u32 = 1000;
 
-/// Why an injection cannot be carried out.
+/// Error of reading an injection or applying it to an arm.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum InjectionError {
-    /// No such kind.
+    /// Unknown kind.
     #[error("injection `{found}`: no such kind; give one of {}", known())]
     Kind {
-        /// What was given.
+        /// Given kind.
         found: String,
     },
-    /// A key that the kind does not take, or that was given twice, or in a form other than `key=value`.
+    /// A key that the kind does not have, that was given twice, or that has a form other than `key=value`.
     #[error("injection {kind}: key `{key}` {problem}; it takes {}", keys_of(kind))]
     Key {
         /// Kind.
         kind: &'static str,
         /// Key found.
         key: String,
-        /// What is wrong with it.
+        /// The problem.
         problem: &'static str,
     },
-    /// A key that must be there.
+    /// A required key is missing.
     #[error("injection {kind}: key `{key}` is missing; give {key}={must}")]
     Missing {
         /// Kind.
         kind: &'static str,
         /// Key.
         key: &'static str,
-        /// What its value is.
+        /// Requirement on its value.
         must: &'static str,
     },
     /// A value out of range.
@@ -90,10 +90,10 @@ pub enum InjectionError {
         key: &'static str,
         /// Value found.
         value: String,
-        /// What it must be.
+        /// Requirement on the value.
         must: &'static str,
     },
-    /// A joint or motor that the arm has not.
+    /// A joint or motor that the arm does not have.
     #[error("injection {kind}: {key} is {value}, the arm has {joints}; count from 0 to {}", joints - 1)]
     Index {
         /// Kind.
@@ -102,15 +102,15 @@ pub enum InjectionError {
         key: &'static str,
         /// Value found.
         value: usize,
-        /// Joints of the arm.
+        /// Number of joints of the arm.
         joints: usize,
     },
-    /// An arm on a bus cannot do it.
+    /// An arm on a bus does not support it.
     #[error("injection {kind} on an emulated bus: {remedy}")]
     NotOnBus {
         /// Kind.
         kind: &'static str,
-        /// What to do in its place.
+        /// Alternative.
         remedy: &'static str,
     },
 }
@@ -167,13 +167,13 @@ impl<'a> Keys<'a> {
         &self,
         key: &'static str,
         must: &'static str,
-        sound: impl Fn(&T) -> bool,
+        valid: impl Fn(&T) -> bool,
     ) -> Result<Option<T>, InjectionError> {
         let Some(text) = self.text(key) else {
             return Ok(None);
         };
         match text.parse() {
-            Ok(value) if sound(&value) => Ok(Some(value)),
+            Ok(value) if valid(&value) => Ok(Some(value)),
             _ => Err(InjectionError::Value {
                 kind: self.kind,
                 key,
@@ -187,9 +187,9 @@ impl<'a> Keys<'a> {
         &self,
         key: &'static str,
         must: &'static str,
-        sound: impl Fn(&T) -> bool,
+        valid: impl Fn(&T) -> bool,
     ) -> Result<T, InjectionError> {
-        self.value(key, must, sound)?
+        self.value(key, must, valid)?
             .ok_or(InjectionError::Missing {
                 kind: self.kind,
                 key,
@@ -230,7 +230,7 @@ impl<'a> Keys<'a> {
         let at_s = self.seconds("at-s")?;
         let after_s = self.seconds("after-s")?;
         match (self.text("when"), at_s, after_s) {
-            (None, None, None) => Ok(Trigger::AtOnce),
+            (None, None, None) => Ok(Trigger::AtStart),
             (None, Some(at_s), None) => Ok(Trigger::Active { at_s }),
             (None, _, Some(_)) => Err(wrong("after-s", "needs when=MODE")),
             (Some(_), Some(_), _) => Err(wrong("at-s", "does not go with when: use after-s")),
@@ -315,7 +315,7 @@ impl FromStr for Injection {
     }
 }
 
-/// The text that [`Injection::from_str`] reads as the same.
+/// The text form, which [`Injection::from_str`] parses to the same injection.
 impl fmt::Display for Injection {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut keys: Vec<String> = Vec::new();
@@ -338,7 +338,7 @@ impl fmt::Display for Injection {
             _ => {}
         }
         match self.trigger {
-            Trigger::AtOnce => {}
+            Trigger::AtStart => {}
             Trigger::Active { at_s } => keys.push(format!("at-s={at_s}")),
             Trigger::Mode { mode, after_s } => {
                 keys.push(format!("when={},after-s={after_s}", mode.name()));
@@ -362,7 +362,7 @@ mod tests {
     }
 
     #[test]
-    fn every_kind_survives_being_written_and_read() {
+    fn every_kind_survives_the_round_trip() {
         for text in [
             "encoder-stuck",
             "encoder-stuck:joint=1,when=track,after-s=0.5",
@@ -384,7 +384,7 @@ mod tests {
     }
 
     #[test]
-    fn help_names_every_kind_and_key_and_its_example_is_one() {
+    fn help_names_every_kind_and_key_and_its_example_is_valid() {
         for (name, keys) in KINDS {
             assert!(HELP.contains(&format!("\n  {name}")), "{name}");
             assert!(keys.iter().all(|key| HELP.contains(key)), "{name}");
@@ -394,7 +394,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_read_is_named_with_a_remedy() {
+    fn errors_name_the_problem_and_a_remedy() {
         for (text, words) in [
             ("encoder-stick", "no such kind; give one of encoder-stuck"),
             (
@@ -449,12 +449,12 @@ mod tests {
     }
 
     #[test]
-    fn a_bus_refuses_what_it_cannot_do() {
+    fn injections_that_a_bus_does_not_support_are_rejected() {
         for text in ["encoder-nan", "drives-idle", "encoder-stuck:when=track"] {
             let injection = read(text).expect(text);
-            assert!(injection.on_bus().is_err(), "{text}");
+            assert!(injection.check_bus_support().is_err(), "{text}");
         }
-        let injection = read("encoder-stuck:joint=1,at-s=2").expect("sound");
-        assert_eq!(injection.on_bus(), Ok(()));
+        let injection = read("encoder-stuck:joint=1,at-s=2").expect("valid");
+        assert_eq!(injection.check_bus_support(), Ok(()));
     }
 }

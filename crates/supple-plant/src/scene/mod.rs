@@ -1,4 +1,4 @@
-//! What stands around the arm: ground, fixed blocks, free boxes, rubber layers.
+//! Environment of the arm: ground, fixed blocks, free boxes, rubber layers.
 //!
 //! Plain data, from code or from TOML:
 //!
@@ -11,9 +11,9 @@
 //! name = "table"
 //! center_m = [0.70, 0.0, -0.05]
 //! size_m = [0.30, 0.60, 0.10]
-//! rpy_rad = [0.0, 0.0, 0.0]         # may be left out
+//! rpy_rad = [0.0, 0.0, 0.0]         # optional
 //! material = "wood"
-//! layer = { thickness_m = 0.008, material = "rubber" }   # may be left out
+//! layer = { thickness_m = 0.008, material = "rubber" }   # optional
 //!
 //! [[free_box]]
 //! name = "carton"
@@ -29,8 +29,8 @@
 //! friction = 0.3
 //! ```
 //!
-//! Coordinates are the arm's base axes. A layer lies on the top face (+z of the block); once the tip
-//! has pressed it through its thickness, it meets the block beneath as well. Unknown keys are refused.
+//! Coordinates are in the arm's base axes. A layer lies on the top face (+z of the block); when the tip has
+//! compressed it fully, it also contacts the block below. Unknown keys are rejected.
 
 mod validate;
 
@@ -41,7 +41,7 @@ use serde::{Deserialize, Serialize};
 use supple_core::Pose;
 use supple_core::nalgebra::Vector3;
 
-/// Everything around the arm. The default is empty space.
+/// Environment of the arm. The default is empty space.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Scene {
@@ -51,15 +51,15 @@ pub struct Scene {
     /// Blocks that do not move.
     #[serde(rename = "fixed_block", skip_serializing_if = "Vec::is_empty")]
     pub fixed_blocks: Vec<FixedBlock>,
-    /// Boxes that do.
+    /// Boxes that move.
     #[serde(rename = "free_box", skip_serializing_if = "Vec::is_empty")]
     pub free_boxes: Vec<FreeBox>,
-    /// Materials beside the built-in ones, or in their place.
+    /// Materials in addition to the built-in ones, or instead of them.
     #[serde(rename = "material", skip_serializing_if = "Vec::is_empty")]
     pub materials: Vec<Material>,
 }
 
-/// The half-space below a height.
+/// Ground plane.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Ground {
@@ -73,7 +73,7 @@ pub struct Ground {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FixedBlock {
-    /// Its own name, unique in the scene.
+    /// Name, unique in the scene.
     pub name: String,
     /// Centre, base axes \[m\].
     pub center_m: [f64; 3],
@@ -84,7 +84,7 @@ pub struct FixedBlock {
     pub rpy_rad: [f64; 3],
     /// Name of its material.
     pub material: String,
-    /// What lies on its top face.
+    /// Layer on its top face.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub layer: Option<Layer>,
 }
@@ -93,7 +93,7 @@ pub struct FixedBlock {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FreeBox {
-    /// Its own name, unique in the scene.
+    /// Name, unique in the scene.
     pub name: String,
     /// Mass \[kg\], positive.
     pub mass_kg: f64,
@@ -106,7 +106,7 @@ pub struct FreeBox {
     pub rpy_rad: [f64; 3],
     /// Name of its material.
     pub material: String,
-    /// What lies on its top face; weightless.
+    /// Layer on its top face, massless.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub layer: Option<Layer>,
 }
@@ -122,12 +122,12 @@ pub struct Layer {
 }
 
 impl FixedBlock {
-    /// Its frame, origin at the centre: `base_from_block`.
+    /// Frame of the block, origin at the centre: `base_from_block`.
     pub fn pose(&self) -> Pose {
         Pose::from_xyz_rpy(self.center_m, self.rpy_rad)
     }
 
-    /// A level wooden block whose top face has its middle at `top_m`.
+    /// A horizontal wooden block with the centre of its top face at `top_m`.
     pub fn wooden(name: &str, top_m: Vector3<f64>, size_m: [f64; 3]) -> FixedBlock {
         FixedBlock {
             name: name.to_owned(),
@@ -141,17 +141,17 @@ impl FixedBlock {
 }
 
 impl FreeBox {
-    /// Its frame at the start, origin at the centre: `base_from_box`.
+    /// Frame of the box at the start, origin at the centre: `base_from_box`.
     pub fn pose(&self) -> Pose {
         Pose::from_xyz_rpy(self.center_m, self.rpy_rad)
     }
 }
 
 impl Scene {
-    /// Reads and validates; `file` names the text in errors.
+    /// Reads and validates a scene; `file` names the text in errors.
     ///
     /// # Errors
-    /// [`SceneError`] with the element, the field, its value and what to do.
+    /// [`SceneError`] with element, field, value and remedy.
     pub fn from_toml(text: &str, file: &str) -> Result<Scene, SceneError> {
         let scene: Scene = toml::from_str(text).map_err(|error| SceneError::Toml {
             file: file.to_owned(),
@@ -161,8 +161,8 @@ impl Scene {
         Ok(scene)
     }
 
-    /// A block of wood beneath the whole reach of an arm, its face at this height \[m\].
-    pub fn beneath(face_m: f64) -> Scene {
+    /// A wooden block below the whole reach of the arm, with its top face at this height \[m\].
+    pub fn with_block_at(face_m: f64) -> Scene {
         let (side_m, height_m) = (2.4, 0.1);
         Scene {
             fixed_blocks: vec![FixedBlock {
@@ -177,7 +177,7 @@ impl Scene {
         }
     }
 
-    /// The material of that name: the scene's own, else the built-in one.
+    /// Material of this name: that of the scene, otherwise the built-in one.
     pub fn material(&self, name: &str) -> Option<Material> {
         let built_in = [Material::wood(), Material::rubber()];
         let mut all = self.materials.iter().chain(&built_in);

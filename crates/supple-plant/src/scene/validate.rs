@@ -1,48 +1,48 @@
-//! What a scene must be.
+//! Validation of a scene.
 
 use super::{FreeBox, Layer, Scene};
 use crate::contact::Material;
 use supple_core::nalgebra::Vector3;
 
-/// Overlap of a box with the ground that is taken for contact \[m\].
-const GREATEST_OVERLAP_M: f64 = 1e-3;
+/// Maximum initial overlap of a box with the ground \[m\].
+const MAX_OVERLAP_M: f64 = 1e-3;
 
-/// Why a scene is refused.
+/// Error of a scene.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SceneError {
-    /// The text is not TOML of this form.
+    /// The text is not TOML, or has unknown keys or wrong types.
     #[error("{file}: {message}")]
     Toml {
-        /// Where the text came from.
+        /// Source of the text.
         file: String,
-        /// Position, key and what was expected.
+        /// Position, key and expected value.
         message: String,
     },
-    /// A number that cannot be.
+    /// An invalid number.
     #[error("scene: {element}: {field} is {value}: it must be {must}")]
     Value {
         /// The object or material.
         element: String,
-        /// Its field.
+        /// Field of the element.
         field: &'static str,
         /// Value found.
         value: f64,
-        /// What it must be.
+        /// Requirement on the value.
         must: &'static str,
     },
-    /// A material that is not there.
+    /// An unknown material.
     #[error(
         "scene: {element}: material is {material:?}: use one of {known}, or add a [[material]]"
     )]
     UnknownMaterial {
         /// The object.
         element: String,
-        /// The name it asks for.
+        /// Name of the requested material.
         material: String,
-        /// The names there are.
+        /// Known names.
         known: String,
     },
-    /// Two objects or two materials of one name.
+    /// Two objects or two materials have the same name.
     #[error("scene: two elements are named {name:?}: rename one")]
     Duplicate {
         /// The name.
@@ -51,7 +51,7 @@ pub enum SceneError {
 }
 
 impl Scene {
-    /// Refuses what cannot be.
+    /// Rejects an invalid scene.
     ///
     /// # Errors
     /// The first [`SceneError`] found.
@@ -104,7 +104,7 @@ impl Scene {
         let height = [block.center_m[2]];
         let must = "high enough for the box to clear the ground";
         check(element, "center_m", &height, must, |z| {
-            z - half > ground.height_m - GREATEST_OVERLAP_M
+            z - half > ground.height_m - MAX_OVERLAP_M
         })
     }
 
@@ -114,7 +114,7 @@ impl Scene {
         self.resolve(element, &layer.material).map(drop)
     }
 
-    /// The material that `element` asks for.
+    /// The material of `element`.
     pub(crate) fn resolve(&self, element: &str, material: &str) -> Result<Material, SceneError> {
         self.material(material).ok_or_else(|| {
             let mut known = vec!["\"wood\"".to_owned(), "\"rubber\"".to_owned()];
@@ -142,12 +142,12 @@ fn check(
     field: &'static str,
     values: &[f64],
     must: &'static str,
-    sound: impl Fn(f64) -> bool,
+    valid: impl Fn(f64) -> bool,
 ) -> Result<(), SceneError> {
     match values
         .iter()
         .copied()
-        .find(|v| !(v.is_finite() && sound(*v)))
+        .find(|v| !(v.is_finite() && valid(*v)))
     {
         None => Ok(()),
         Some(value) => Err(SceneError::Value {

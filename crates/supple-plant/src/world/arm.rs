@@ -1,6 +1,6 @@
 //! The arm as a multibody of the engine.
 
-use super::convert::{matrix, pose_of, vector};
+use super::convert::{to_glam_matrix, to_glam_pose, to_glam_vector};
 use core::array;
 use rapier3d_f64::dynamics::{
     GenericJointBuilder, JointAxesMask, MassProperties, MultibodyJointHandle, RigidBodyBuilder,
@@ -10,7 +10,7 @@ use rapier3d_f64::pipeline::PhysicsWorld;
 use supple_core::nalgebra::{Matrix3, Vector3};
 use supple_core::{Arm, Body, Pose};
 
-/// Chain of links on a fixed base; each body's frame is the joint frame, whose z is the joint's axis.
+/// Inserts a chain of links on a fixed base; each body's frame is the joint frame, whose z is the joint's axis.
 pub fn insert_arm<const N: usize>(
     physics: &mut PhysicsWorld,
     arm: &Arm<N>,
@@ -22,7 +22,7 @@ pub fn insert_arm<const N: usize>(
             .additional_mass_properties(mass_properties(&arm.body(i)));
         physics.insert_body(builder)
     });
-    // The engine's revolute joint turns about x.
+    // The engine's revolute joint rotates about x.
     let joint_from_turning = Pose {
         rotation: Matrix3::new(0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0),
         translation: Vector3::zeros(),
@@ -31,8 +31,10 @@ pub fn insert_arm<const N: usize>(
     for (i, link) in links.iter().enumerate() {
         let parent = if i == 0 { base } else { links[i - 1] };
         let joint = GenericJointBuilder::new(JointAxesMask::LOCKED_REVOLUTE_AXES)
-            .local_frame1(pose_of(&(arm.parent_from_joint(i) * joint_from_turning)))
-            .local_frame2(pose_of(&joint_from_turning));
+            .local_frame1(to_glam_pose(
+                &(arm.parent_from_joint(i) * joint_from_turning),
+            ))
+            .local_frame2(to_glam_pose(&joint_from_turning));
         if let Some(handle) = physics.insert_multibody_joint(parent, *link, joint) {
             last = handle;
         }
@@ -40,11 +42,11 @@ pub fn insert_arm<const N: usize>(
     (links, last)
 }
 
-/// A body as the engine has it.
+/// Mass properties of a body in the engine's type.
 pub fn mass_properties(body: &Body) -> MassProperties {
     MassProperties::with_inertia_matrix(
-        vector(&body.com_m),
+        to_glam_vector(&body.com_m),
         body.mass_kg,
-        matrix(&body.inertia_kg_m2),
+        to_glam_matrix(&body.inertia_kg_m2),
     )
 }

@@ -1,4 +1,4 @@
-//! The rapier world, kept behind types of this crate and of nalgebra.
+//! The rapier world behind types of this crate and of nalgebra.
 
 mod arm;
 mod convert;
@@ -10,7 +10,7 @@ use crate::config::PlantConfig;
 use crate::contact::Bristle;
 use crate::error::PlantError;
 use arm::{insert_arm, mass_properties};
-use convert::vector;
+use convert::to_glam_vector;
 use rapier3d_f64::dynamics::{MultibodyJointHandle, RigidBodyHandle};
 use rapier3d_f64::geometry::Ball;
 use rapier3d_f64::pipeline::PhysicsWorld;
@@ -18,10 +18,10 @@ use supple_core::nalgebra::Vector3;
 use supple_core::{Arm, Vector};
 use surface::{Surface, insert_scene};
 
-/// Index of the angular x coordinate, the one a revolute joint leaves free.
+/// Index of the angular x coordinate, the free coordinate of a revolute joint.
 const ANGULAR_X: usize = 3;
 
-/// Motion of the tip's ball.
+/// Motion of the spherical tip.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct TipMotion {
     pub center_m: Vector3<f64>,
@@ -49,22 +49,22 @@ impl<const N: usize> World<N> {
     /// The configuration has been validated.
     pub fn new(config: &PlantConfig<N>, q: &Vector<N>, qd: &Vector<N>) -> Result<Self, PlantError> {
         let mut physics = PhysicsWorld::new();
-        physics.gravity = vector(&config.arm.gravity());
+        physics.gravity = to_glam_vector(&config.arm.gravity());
         let parameters = &mut physics.integration_parameters;
-        // One solver iteration is one substep: the step is the caller's.
+        // One solver iteration equals one substep; the caller chooses the step.
         parameters.num_solver_iterations = 1;
-        // Fewer let a box on the ground creep.
+        // With fewer iterations a box on the ground would drift.
         parameters.num_internal_pgs_iterations = 8;
-        // Recycled contacts are millimetres out of date.
+        // Recycled contacts would be wrong by millimetres.
         parameters.contact_recycling = false;
         parameters.max_ccd_substeps = 0;
         let (links, last_joint) = insert_arm(&mut physics, &config.arm);
         let surfaces = insert_scene(&mut physics, &config.scene)?;
-        // A step of no duration resolves masses and degrees of freedom.
+        // A step of zero duration initialises masses and degrees of freedom.
         physics.integration_parameters.dt = 0.0;
         physics.step();
         if let Some((arm, _)) = physics.multibody_joints.get_mut(last_joint) {
-            // The engine damps joints unless told otherwise.
+            // The engine damps joints by default.
             arm.damping_mut().fill(0.0);
             let armature = config.arm.armature();
             arm.armature_mut().copy_from_slice(armature.as_slice());
@@ -111,7 +111,7 @@ impl<const N: usize> World<N> {
     }
 
     /// Adds to the joint velocities \[rad/s\], as an impulse does.
-    pub fn push(&mut self, change: &Vector<N>) {
+    pub fn apply_velocity_step(&mut self, change: &Vector<N>) {
         let PhysicsWorld {
             multibody_joints,
             bodies,
@@ -126,15 +126,16 @@ impl<const N: usize> World<N> {
         }
     }
 
-    /// From now on gravity and the last link are those of `arm`, otherwise the same one.
-    pub fn replace_load(&mut self, arm: &Arm<N>) {
-        self.physics.gravity = vector(&arm.gravity());
+    /// Sets gravity and the last link to those of `arm`, which is otherwise the same arm.
+    pub fn set_last_link_and_gravity(&mut self, arm: &Arm<N>) {
+        self.physics.gravity = to_glam_vector(&arm.gravity());
         let last = &mut self.physics.bodies[self.links[N - 1]];
         last.set_additional_mass_properties(mass_properties(&arm.body(N - 1)), true);
     }
 
-    /// Meets the tip with every surface, pushes what is free, and gives the force on the tip.
-    pub fn touch(&mut self, tip: &TipMotion, dt_s: f64) -> TipForce {
+    /// Computes the contact of the tip with every surface, applies the reaction to free objects, and returns the
+    /// force on the tip.
+    pub fn compute_tip_contact(&mut self, tip: &TipMotion, dt_s: f64) -> TipForce {
         let mut total = TipForce::default();
         for surface in &mut self.surfaces {
             let body = &self.physics.bodies[surface.body];
@@ -147,14 +148,14 @@ impl<const N: usize> World<N> {
             total.moment_nm += (contact.point_m - tip.center_m).cross(&force_n);
             total.depth_m = total.depth_m.max(contact.depth_m);
             if body.is_dynamic() {
-                let (force, point) = (vector(&-force_n), vector(&contact.point_m));
+                let (force, point) = (to_glam_vector(&-force_n), to_glam_vector(&contact.point_m));
                 self.physics.bodies[surface.body].add_force_at_point(force, point, true);
             }
         }
         total
     }
 
-    /// The object that the tip is deepest inside, and how deep \[m\].
+    /// The object with the deepest penetration of the tip, and the depth \[m\].
     pub fn deepest(&self, tip: &TipMotion) -> Option<(String, f64)> {
         let met = self.surfaces.iter().filter_map(|surface| {
             let body = &self.physics.bodies[surface.body];
@@ -177,16 +178,20 @@ impl<const N: usize> World<N> {
             let link = &mut self.physics.bodies[*handle];
             link.reset_forces(false);
             link.reset_torques(false);
-            link.add_torque(vector(&link_torque_nm[i]), true);
+            link.add_torque(to_glam_vector(&link_torque_nm[i]), true);
             if i + 1 == N {
-                link.add_torque(vector(&tip.moment_nm), true);
-                link.add_force_at_point(vector(&tip.force_n), vector(tip_center_m), true);
+                link.add_torque(to_glam_vector(&tip.moment_nm), true);
+                link.add_force_at_point(
+                    to_glam_vector(&tip.force_n),
+                    to_glam_vector(tip_center_m),
+                    true,
+                );
             }
         }
         self.physics.integration_parameters.dt = dt_s;
         self.physics.step();
         for surface in &self.surfaces {
-            // Asking for a body mutably has the engine look it over again.
+            // Mutable access to a body makes the engine re-check it.
             if self.physics.bodies[surface.body].is_dynamic() {
                 let body = &mut self.physics.bodies[surface.body];
                 body.reset_forces(false);
@@ -195,7 +200,7 @@ impl<const N: usize> World<N> {
         }
     }
 
-    /// Everything around the arm as it stands now.
+    /// Objects of the environment in their current state.
     pub fn objects(&self) -> impl Iterator<Item = Object> {
         let bodies = &self.physics.bodies;
         let surfaces = self.surfaces.iter();

@@ -1,7 +1,7 @@
-//! What the tip can touch: the scene as bodies of the engine and surfaces of ours.
+//! Contact surfaces of the scene: bodies of the engine with surface shapes of this crate.
 
 use super::TipMotion;
-use super::convert::{back, pose_back, pose_of, vector};
+use super::convert::{from_glam, from_glam_pose, to_glam_pose, to_glam_vector};
 use crate::contact::{Bristle, Contact, Material};
 use crate::scene::{Layer, Scene, SceneError};
 use rapier3d_f64::dynamics::{MassProperties, RigidBody, RigidBodyBuilder, RigidBodyHandle};
@@ -12,25 +12,25 @@ use rapier3d_f64::pipeline::PhysicsWorld;
 use supple_core::Pose;
 use supple_core::nalgebra::Vector3;
 
-/// What an object is.
+/// Kind of an object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ObjectKind {
-    /// The half-space below its origin.
+    /// Ground: the half-space below its origin.
     Ground,
     /// A cuboid that does not move.
     FixedBlock,
-    /// A cuboid that does.
+    /// A cuboid that moves.
     FreeBox,
     /// A cuboid that lies on one of the others.
     Layer,
 }
 
-/// Something around the arm, as it stands now; for drawing.
+/// An object of the environment in its current state; for drawing.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Object {
-    /// The name in the scene; a layer has that of what it lies on, the ground is "ground".
+    /// Name in the scene; a layer has the name of its carrier, the ground is "ground".
     pub name: String,
-    /// What it is.
+    /// Kind of the object.
     pub kind: ObjectKind,
     /// Edge lengths \[m\]; zero for the ground.
     pub size_m: Vector3<f64>,
@@ -40,7 +40,7 @@ pub struct Object {
     pub material: String,
 }
 
-/// A shape on a body, with what the tip needs to know of it.
+/// A shape on a body, with its contact data.
 pub struct Surface {
     object: Object,
     shape: SharedShape,
@@ -51,28 +51,28 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// The object as it stands, its body being `body`.
+    /// The object at the current pose of `body`, its body.
     pub fn object(&self, body: &RigidBody) -> Object {
         Object {
-            pose: pose_back(body.position()) * self.body_from_surface,
+            pose: from_glam_pose(body.position()) * self.body_from_surface,
             ..self.object.clone()
         }
     }
 
-    /// Where the tip's ball is in the surface, if it is.
+    /// Contact state of the spherical tip, if it penetrates the surface.
     pub fn contact(&self, body: &RigidBody, ball: &Ball, tip: &TipMotion) -> Option<Contact> {
-        let tip_pose = glam::Pose::from_translation(vector(&tip.center_m));
-        let surface_pose = *body.position() * pose_of(&self.body_from_surface);
-        // The surface goes first: parry mirrors a half-space that comes second.
+        let tip_pose = glam::Pose::from_translation(to_glam_vector(&tip.center_m));
+        let surface_pose = *body.position() * to_glam_pose(&self.body_from_surface);
+        // The surface must be the first argument: parry mirrors a half-space in second place.
         let found = query::contact(&surface_pose, &*self.shape, &tip_pose, ball, 0.0);
         let found = found.ok().flatten()?;
         let depth_m = -found.dist;
-        let normal = back(&found.normal1);
+        let normal = from_glam(&found.normal1);
         // Halfway between the two surfaces.
-        let point_m = back(&found.point2) + normal * (0.5 * depth_m);
+        let point_m = from_glam(&found.point2) + normal * (0.5 * depth_m);
         let lever = point_m - tip.center_m;
         let own = tip.linear_m_per_s + tip.angular_rad_per_s.cross(&lever);
-        let other = back(&body.velocity_at_point(vector(&point_m)));
+        let other = from_glam(&body.velocity_at_point(to_glam_vector(&point_m)));
         (depth_m > 0.0).then_some(Contact {
             depth_m,
             normal,
@@ -82,7 +82,7 @@ impl Surface {
     }
 }
 
-/// Puts the scene into the world and lists its surfaces.
+/// Inserts the scene into the world and returns its surfaces.
 pub fn insert_scene(physics: &mut PhysicsWorld, scene: &Scene) -> Result<Vec<Surface>, SceneError> {
     let mut surfaces = Surfaces {
         scene,
@@ -90,13 +90,13 @@ pub fn insert_scene(physics: &mut PhysicsWorld, scene: &Scene) -> Result<Vec<Sur
     };
     if let Some(ground) = &scene.ground {
         let pose = Pose::from_translation(Vector3::new(0.0, 0.0, ground.height_m));
-        let body = physics.insert_body(RigidBodyBuilder::fixed().pose(pose_of(&pose)));
+        let body = physics.insert_body(RigidBodyBuilder::fixed().pose(to_glam_pose(&pose)));
         let shape = SharedShape::halfspace(glam::Vector::Z);
         let what = ("ground", ObjectKind::Ground, Vector3::zeros());
         surfaces.add(what, shape, body, Pose::IDENTITY, &ground.material)?;
     }
     for block in &scene.fixed_blocks {
-        let body = physics.insert_body(RigidBodyBuilder::fixed().pose(pose_of(&block.pose())));
+        let body = physics.insert_body(RigidBodyBuilder::fixed().pose(to_glam_pose(&block.pose())));
         let size = Vector3::from(block.size_m);
         let what = (block.name.as_str(), ObjectKind::FixedBlock, size);
         surfaces.add_cuboid(what, body, &block.material, block.layer.as_ref())?;
@@ -106,20 +106,20 @@ pub fn insert_scene(physics: &mut PhysicsWorld, scene: &Scene) -> Result<Vec<Sur
         let square = size.component_mul(&size);
         let inertia = (Vector3::repeat(square.sum()) - square) * (block.mass_kg / 12.0);
         let zero = glam::Vector::ZERO;
-        let properties = MassProperties::new(zero, block.mass_kg, vector(&inertia));
+        let properties = MassProperties::new(zero, block.mass_kg, to_glam_vector(&inertia));
         let builder = RigidBodyBuilder::dynamic()
-            .pose(pose_of(&block.pose()))
+            .pose(to_glam_pose(&block.pose()))
             .can_sleep(false)
             .additional_mass_properties(properties);
         let body = physics.insert_body(builder);
         let what = (block.name.as_str(), ObjectKind::FreeBox, size);
         surfaces.add_cuboid(what, body, &block.material, block.layer.as_ref())?;
     }
-    // The engine's own contacts are between scene objects only, and some of these must move.
+    // The engine's contacts act between scene objects only, and some of these must move.
     if !scene.free_boxes.is_empty() {
         for surface in &surfaces.list {
             let collider = ColliderBuilder::new(surface.shape.clone())
-                .position(pose_of(&surface.body_from_surface))
+                .position(to_glam_pose(&surface.body_from_surface))
                 .density(0.0)
                 .friction(surface.material.friction);
             physics.insert_collider(collider, Some(surface.body));

@@ -1,4 +1,4 @@
-//! Arms and small controllers that the tests share.
+//! Arms and small controllers for several tests.
 #![allow(dead_code)]
 
 use supple_core::dynamics::{gravity, jacobian, rnea, tip_pose};
@@ -28,12 +28,12 @@ pub fn wam4() -> Arm<4> {
     wam4_from(ROTORS, DOWN)
 }
 
-/// The same with other rotor inertias \[kg m^2\].
+/// [`wam4`] with other rotor inertias \[kg m^2\].
 pub fn wam4_with(armature: [f64; 4]) -> Arm<4> {
     wam4_from(armature, DOWN)
 }
 
-/// The same under another gravity \[m/s^2\].
+/// [`wam4`] under another gravity \[m/s^2\].
 pub fn wam4_in(gravity: Vector3<f64>) -> Arm<4> {
     wam4_from(ROTORS, gravity)
 }
@@ -81,7 +81,7 @@ fn wam4_from(armature: [f64; 4], gravity: Vector3<f64>) -> Arm<4> {
             frames[i - 1]
         },
         axis: Vector3::z(),
-        body: bodies[i].seen_from(&frames[i]),
+        body: bodies[i].expressed_in(&frames[i]),
         armature_kg_m2: armature[i],
     });
     let tip = frames[3] * Pose::from_translation(Vector3::new(0.0, 0.0, 0.41));
@@ -89,7 +89,7 @@ fn wam4_from(armature: [f64; 4], gravity: Vector3<f64>) -> Arm<4> {
     Arm::new(&joints, tip, Some(tool), gravity).unwrap()
 }
 
-/// A chain of random bodies on random axes, all of it physical.
+/// A chain of random, physically consistent bodies on random axes.
 pub fn random_arm<const N: usize>(seed: u64) -> Arm<N> {
     let mut noise = Noise::new(seed, 77);
     let joints = core::array::from_fn(|i| {
@@ -99,7 +99,7 @@ pub fn random_arm<const N: usize>(seed: u64) -> Arm<N> {
         let (offset, spin, half) = (draw(0.2), draw(1.0), draw(0.08));
         let mass_kg = 1.0 + 2.0 * noise.uniform();
         let rotation = UnitQuaternion::from_scaled_axis(spin).to_rotation_matrix();
-        // A solid cuboid, turned.
+        // A rotated solid cuboid.
         let h = half.map(|x| x.abs() + 0.02);
         let (x, y, z) = (h.x * h.x, h.y * h.y, h.z * h.z);
         let principal = Vector3::new(y + z, z + x, x + y) * (mass_kg / 3.0);
@@ -141,7 +141,8 @@ pub fn wam4_at(arm: &Arm<4>, x: f64, z: f64) -> Vector<4> {
     q
 }
 
-/// `J^T (K (x - tip) - B v)` on the model's gravity, with joint damping on the roll.
+/// Joint torques of a spring and a damper that pull the tip to `target`, `J^T (k (target - x) - b x')`, plus the
+/// model's gravity and Coriolis torques; a spring and a damper hold joint 3 at zero.
 pub fn tip_spring(plant: &Plant<4>, target: &Vector3<f64>, k: f64, b: f64) -> Vector<4> {
     let (arm, truth) = (&plant.config().arm, plant.truth());
     let (q, qd) = (truth.position_rad, truth.velocity_rad_per_s);
@@ -152,12 +153,13 @@ pub fn tip_spring(plant: &Plant<4>, target: &Vector3<f64>, k: f64, b: f64) -> Ve
     tau
 }
 
-/// `G` alone.
+/// Gravity torque `G`.
 pub fn weight(plant: &Plant<4>) -> Vector<4> {
     gravity(&plant.config().arm, &plant.truth().position_rad)
 }
 
-/// A wooden block whose top is level with the base, under the tip of a stretched arm.
+/// A wooden block, the centre of its top at the height of the base frame, under the tip of an arm that reaches
+/// forwards.
 pub fn block() -> Scene {
     Scene {
         fixed_blocks: vec![FixedBlock::wooden(
@@ -169,7 +171,7 @@ pub fn block() -> Scene {
     }
 }
 
-/// The tip a height above the block's face, coming down at a speed, nothing but gravity compensated.
+/// A plant with the tip above the face of the block, moving down. The caller commands the torques.
 pub fn above_block(height_m: f64, speed_m_per_s: f64, step_s: f64) -> Plant<4> {
     let arm = wam4();
     let config = PlantConfig {
@@ -181,7 +183,7 @@ pub fn above_block(height_m: f64, speed_m_per_s: f64, step_s: f64) -> Plant<4> {
     Plant::new(config, q, descent(&arm, &q, speed_m_per_s)).unwrap()
 }
 
-/// Joint velocities of shoulder pitch and elbow that bring the tip straight down.
+/// Joint velocities of shoulder pitch and elbow that move the tip straight down.
 pub fn descent(arm: &Arm<4>, q: &Vector<4>, speed_m_per_s: f64) -> Vector<4> {
     let j = jacobian(arm, q);
     let a = SMatrix::<f64, 2, 2>::new(j[(0, 1)], j[(0, 3)], j[(2, 1)], j[(2, 3)]);

@@ -7,7 +7,7 @@ pub(super) const W: u8 = 0x80;
 /// Not in this list.
 pub(super) const NO: u8 = 0x7f;
 
-/// Least motor firmware of each of the first columns.
+/// Minimum motor firmware of each of the first columns.
 pub(super) const MOTOR_VERSIONS: [u16; 21] = [
     32, 33, 36, 44, 45, 47, 50, 51, 61, 63, 64, 65, 68, 114, 119, 125, 132, 142, 145, 168, 175,
 ];

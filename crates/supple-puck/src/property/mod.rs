@@ -1,14 +1,14 @@
-//! Properties: the named values of a puck, asked for and set by id.
+//! Properties: the named values of a puck, read and set by id.
 //!
 //! ```text
 //! get    A=0 PPPPPPP                          1 byte
 //! set    A=1 PPPPPPP   00   value             4 bytes (16-bit value) or 6 (32-bit value)
 //! ```
 //!
-//! The value is little-endian two's complement. A puck's reply is a set frame to [`GroupId::REPLY`].
-//! Exceptions to this form have modules of their own: [`position`](crate::position),
-//! [`torque`](crate::torque), [`force_torque`](crate::force_torque). Which id a property has depends
-//! on the firmware: [`PropertyTable`]. Source: libbarrett, btclient, manual.
+//! The value is little-endian two's complement. A puck's reply is a set frame to [`GroupId::REPLY`]. Exceptions
+//! to this form have separate modules: [`position`](crate::position), [`torque`](crate::torque),
+//! [`force_torque`](crate::force_torque). The id of a property depends on the firmware: [`PropertyTable`].
+//! Source: libbarrett, btclient, manual.
 
 mod ids;
 mod names;
@@ -27,17 +27,17 @@ pub(crate) const SET_BIT: u8 = 0x80;
 pub struct Property(u8);
 
 impl Property {
-    /// All of them.
+    /// All properties.
     pub fn all() -> impl Iterator<Item = Property> {
         (0..ids::NAMES.len() as u8).map(Property)
     }
 
-    /// Its name; of two names the more usual.
+    /// Name of the property; the more common one of two.
     pub fn name(self) -> &'static str {
         ids::NAMES[usize::from(self.0)]
     }
 
-    /// The property that has this name, in capitals; `None` where Barrett's lists have none.
+    /// The property with this name, in capitals; `None` if Barrett's lists do not contain it.
     pub fn from_name(name: &str) -> Option<Property> {
         let alias = ids::ALIASES.iter().find(|(alias, _)| *alias == name);
         let named = || Property::all().find(|property| property.name() == name);
@@ -71,7 +71,7 @@ impl PropertyId {
         }
     }
 
-    /// Its number, 0 to 127.
+    /// Number, 0 to 127.
     pub const fn number(self) -> u8 {
         self.0
     }
@@ -86,7 +86,7 @@ impl PropertyId {
 pub enum Width {
     /// 16 bits, a frame of four bytes.
     Narrow,
-    /// 32 bits, a frame of six bytes. The id after such a property's is left free.
+    /// 32 bits, a frame of six bytes. The next id is unused.
     Wide,
 }
 
@@ -95,12 +95,12 @@ pub enum Width {
 pub enum Value {
     /// 16 bits.
     Narrow(i16),
-    /// 32 bits. A host may send this whatever the property's width.
+    /// 32 bits. A host may send this for properties of either width.
     Wide(i32),
 }
 
 impl Value {
-    /// Its number, the sign extended.
+    /// The value, sign-extended.
     pub const fn get(self) -> i32 {
         match self {
             Value::Narrow(value) => value as i32,
@@ -108,7 +108,7 @@ impl Value {
         }
     }
 
-    /// `value` in `width`; `None` where 16 bits do not hold it.
+    /// `value` in `width`; `None` if it does not fit 16 bits.
     pub fn of_width(value: i32, width: Width) -> Option<Value> {
         match width {
             Width::Narrow => i16::try_from(value).ok().map(Value::Narrow),
@@ -120,20 +120,20 @@ impl Value {
 /// A request or an assignment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PropertyMessage {
-    /// Asks for a value.
+    /// Requests a value.
     Get(PropertyId),
     /// Sets a value, or replies with it.
     Set(PropertyId, Value),
 }
 
-/// Why a frame is not a property message.
+/// Errors of parsing a property message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PropertyError {
     /// A payload of neither one, four nor six bytes.
     Length(LengthError),
-    /// One byte, but with the set bit.
+    /// A single byte with the set bit.
     SetWithoutValue(u8),
-    /// A value, but behind a byte without the set bit.
+    /// A value after a byte without the set bit.
     GetWithValue(u8),
     /// A second byte that is not zero.
     Padding(u8),
@@ -147,7 +147,7 @@ impl fmt::Display for PropertyError {
             PropertyError::Length(error) => write!(f, "property message: {error}"),
             PropertyError::SetWithoutValue(byte) => write!(
                 f,
-                "property message is the single byte {byte:#04x}, expected a value behind its set bit"
+                "property message is the single byte {byte:#04x}, expected a value after its set bit"
             ),
             PropertyError::GetWithValue(byte) => write!(
                 f,
@@ -167,7 +167,7 @@ impl fmt::Display for PropertyError {
 impl core::error::Error for PropertyError {}
 
 impl PropertyMessage {
-    /// Reads a property message; sender and destination are not looked at.
+    /// Parses a property message; sender and destination are not checked.
     ///
     /// # Errors
     /// See [`PropertyError`].
@@ -191,7 +191,7 @@ impl PropertyMessage {
         Ok(PropertyMessage::Set(PropertyId::from_byte(head), value))
     }
 
-    /// The frame from node to node or group.
+    /// Encodes the frame from a node to a node or group.
     pub const fn emit(&self, from: NodeId, to: Destination) -> CanFrame {
         let id = MessageId::new(from, to);
         match *self {
@@ -208,12 +208,13 @@ impl PropertyMessage {
     }
 }
 
-/// The host asks for a property.
+/// Encodes the host's request for a property.
 pub fn get(to: impl Into<Destination>, property: PropertyId) -> CanFrame {
     PropertyMessage::Get(property).emit(NodeId::HOST, to.into())
 }
 
-/// The host sets a property. Pucks do not answer; read [`Property::STAT`] to know that it was taken.
+/// Encodes the host's setting of a property. Pucks do not answer; read [`Property::STAT`] to check that it was
+/// processed.
 pub fn set(to: impl Into<Destination>, property: PropertyId, value: Value) -> CanFrame {
     PropertyMessage::Set(property, value).emit(NodeId::HOST, to.into())
 }
@@ -221,17 +222,17 @@ pub fn set(to: impl Into<Destination>, property: PropertyId, value: Value) -> Ca
 /// A puck's answer to a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reply {
-    /// Which property.
+    /// Property id.
     pub property: PropertyId,
     /// Its value.
     pub value: Value,
 }
 
 impl Reply {
-    /// Reads a frame to [`GroupId::REPLY`]; sender and destination are not looked at.
+    /// Parses a frame to [`GroupId::REPLY`]; sender and destination are not checked.
     ///
     /// # Errors
-    /// See [`PropertyError`]; a request is refused too.
+    /// See [`PropertyError`]; a request is also an error.
     pub fn parse(frame: &CanFrame) -> Result<Reply, PropertyError> {
         match PropertyMessage::parse(frame)? {
             PropertyMessage::Set(property, value) => Ok(Reply { property, value }),

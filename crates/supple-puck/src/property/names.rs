@@ -5,7 +5,7 @@ use super::Property;
 impl Property {
     /// Firmware version. Always valid.
     pub const VERS: Property = Property(0);
-    /// What the puck is for, see [`Role`](crate::status::Role). Always valid.
+    /// Type and options of the puck, see [`Role`](crate::status::Role). Always valid.
     pub const ROLE: Property = Property(1);
     /// Serial number. Always valid.
     pub const SN: Property = Property(2);
@@ -29,7 +29,7 @@ impl Property {
     pub const OTEMP: Property = Property(11);
     /// `BAUD` of Barrett's lists.
     pub const BAUD: Property = Property(12);
-    /// Takes the sequence that unlocks a change of node id or role.
+    /// Accepts the sequence that unlocks a change of node id or role.
     pub const LOCK: Property = Property(13);
     /// `DIG0` of Barrett's lists.
     pub const DIG0: Property = Property(14);
@@ -55,13 +55,13 @@ impl Property {
     pub const ILOGIC: Property = Property(24);
     /// `SG` of Barrett's lists.
     pub const SG: Property = Property(25);
-    /// First group the puck listens to.
+    /// First group of the puck.
     pub const GRPA: Property = Property(26);
-    /// Second group the puck listens to.
+    /// Second group of the puck.
     pub const GRPB: Property = Property(27);
-    /// Third group the puck listens to.
+    /// Third group of the puck.
     pub const GRPC: Property = Property(28);
-    /// Takes a command: 13 hand init, 18 close, 19 move, 20 open.
+    /// Accepts a command: 13 hand init, 18 close, 19 move, 20 open.
     pub const CMD: Property = Property(29);
     /// Set to a property id (or -1, all): writes it to the EEPROM.
     pub const SAVE: Property = Property(30);
@@ -89,7 +89,7 @@ impl Property {
     pub const X7: Property = Property(41);
     /// Torque command \[puck units\], usually packed, see [`PackedTorques`](crate::torque::PackedTorques); `TORQ` is another name.
     pub const T: Property = Property(42);
-    /// Greatest torque the puck applies \[puck units\].
+    /// Maximum torque that the puck applies \[puck units\].
     pub const MT: Property = Property(43);
     /// `V` of Barrett's lists.
     pub const V: Property = Property(44);
@@ -195,7 +195,7 @@ impl Property {
     pub const TACTID: Property = Property(94);
     /// `IHIT` of Barrett's lists.
     pub const IHIT: Property = Property(95);
-    /// 1 once the safety module has been told that the arm's zero is right.
+    /// 1 once the host has confirmed the arm's zero to the safety module.
     pub const ZERO: Property = Property(96);
     /// The pendant, see [`PenWord`](crate::safety::PenWord).
     pub const PEN: Property = Property(97);
@@ -221,7 +221,7 @@ impl Property {
     pub const PWR: Property = Property(107);
     /// `MAXPWR` of Barrett's lists.
     pub const MAXPWR: Property = Property(108);
-    /// How many of the next speed faults to ignore.
+    /// Number of the next speed faults to ignore.
     pub const IFAULT: Property = Property(109);
     /// `VNOM` of Barrett's lists.
     pub const VNOM: Property = Property(110);
@@ -249,7 +249,7 @@ impl Property {
     pub const TY: Property = Property(121);
     /// `TZ` of Barrett's lists.
     pub const TZ: Property = Property(122);
-    /// Force and torque, see [`force_torque`](crate::force_torque); set to 0 it tares.
+    /// Force and torque, see [`force_torque`](crate::force_torque); setting it to 0 tares.
     pub const FT: Property = Property(123);
     /// `AX` of Barrett's lists.
     pub const AX: Property = Property(124);

@@ -1,28 +1,28 @@
-//! Which id a property has in which firmware.
+//! Property ids by firmware version.
 //!
-//! The lists are those of libbarrett (2018), made there from the headers of the firmware; a list holds
-//! from its version up to the next. Read [`Property::VERS`] first: from 58 upwards the motor's ids
-//! moved between versions.
+//! The lists come from libbarrett (2018), where they were generated from the firmware headers; a list is valid
+//! from its version up to the next listed version. Read [`Property::VERS`] first: from version 58 on, the
+//! motor's ids changed between versions.
 
 use super::ids::{FORCE_TORQUE_COLUMN, IDS, MONITOR_COLUMN, MOTOR_VERSIONS, NO, SAFETY_COLUMN, W};
 use super::{Property, PropertyId, Width};
 use core::fmt;
 
-/// From this version the safety module has a list of its own; before, it is the motor's.
+/// First version with a separate list for the safety module; older versions use the motor's list.
 const SAFETY_VERSION: i32 = 61;
 
-/// Which family of lists a puck has.
+/// Family of property lists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PuckKind {
     /// Motor pucks, of the arm or the hand.
     Motor,
     /// Safety module.
     Safety,
-    /// Force/torque sensor: one list, whatever its version, which it is known to report wrongly.
+    /// Force/torque sensor: a single list, because the sensor reports a wrong version.
     ForceTorque,
 }
 
-/// A firmware older than every list.
+/// Error: the firmware is older than all lists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FirmwareTooOld {
     /// Version found.
@@ -30,7 +30,7 @@ pub struct FirmwareTooOld {
 }
 
 impl FirmwareTooOld {
-    /// Least version that has a list.
+    /// Minimum version that has a list.
     pub const OLDEST: u16 = MOTOR_VERSIONS[0];
 }
 
@@ -47,14 +47,14 @@ impl fmt::Display for FirmwareTooOld {
 
 impl core::error::Error for FirmwareTooOld {}
 
-/// What an id stands for.
+/// Meaning of an id.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Slot {
     /// A property.
     Property(Property),
     /// The upper half of the 32-bit property before it.
     PlaceHolder(Property),
-    /// Nothing.
+    /// No property.
     Unused,
 }
 
@@ -65,19 +65,18 @@ pub struct PropertyTable {
 }
 
 impl PropertyTable {
-    /// Of the monitor, which runs while [`Property::STAT`] is 0, in pucks of every kind. What it lists
-    /// up to id 7 is valid in every firmware.
+    /// Ids of the monitor, which runs while [`Property::STAT`] is 0, in pucks of every kind. Its ids up to 7 are
+    /// valid in every firmware.
     pub const MONITOR: PropertyTable = PropertyTable {
         column: MONITOR_COLUMN,
     };
 
-    /// Of the force/torque sensor.
+    /// Ids of the force/torque sensor.
     pub const FORCE_TORQUE: PropertyTable = PropertyTable {
         column: FORCE_TORQUE_COLUMN,
     };
 
-    /// Of a puck whose [`Property::VERS`] is `version`. A version newer than the newest list has that
-    /// list.
+    /// Ids of a puck whose [`Property::VERS`] is `version`. Newer versions use the newest list.
     ///
     /// # Errors
     /// A motor puck or safety module older than version 32.
@@ -87,7 +86,7 @@ impl PropertyTable {
             PuckKind::Safety if version >= SAFETY_VERSION => SAFETY_COLUMN,
             PuckKind::Safety | PuckKind::Motor => MOTOR_VERSIONS
                 .iter()
-                .rposition(|&least| i32::from(least) <= version)
+                .rposition(|&min_version| i32::from(min_version) <= version)
                 .ok_or(FirmwareTooOld { version })?
                 as u8,
         };
@@ -101,7 +100,7 @@ impl PropertyTable {
         }
     }
 
-    /// Id of a property, `None` where this firmware does not have it.
+    /// Id of a property; `None` if this firmware does not have it.
     pub const fn id(&self, property: Property) -> Option<PropertyId> {
         match self.cell(property) {
             None => None,
@@ -109,8 +108,8 @@ impl PropertyTable {
         }
     }
 
-    /// Width of a property's value, `None` where this firmware does not have it. 32 bits where Barrett
-    /// documents them and the next id is left free, and for [`Property::PEN`]; else 16.
+    /// Width of a property's value; `None` if this firmware does not have it. 32 bits if documented by Barrett
+    /// and the next id is unused, and for [`Property::PEN`]; otherwise 16.
     pub fn width(&self, property: Property) -> Option<Width> {
         let cell = self.cell(property)?;
         Some(if cell & W == 0 {
@@ -120,7 +119,7 @@ impl PropertyTable {
         })
     }
 
-    /// What an id stands for.
+    /// Meaning of an id.
     pub fn slot(&self, id: PropertyId) -> Slot {
         let holder = |number| {
             Property::all().find(|&property| self.id(property).map(PropertyId::number) == number)

@@ -1,4 +1,4 @@
-//! Limits that the safety module holds the arm to. It forgets them at power-up.
+//! Limits that the safety module monitors. It resets them at power-up.
 
 use crate::property::{Property, Value};
 use crate::torque::PuckTorque;
@@ -9,7 +9,7 @@ use core::fmt;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct SpeedLimit(i16);
 
-/// A speed that the safety module cannot be given \[m/s\].
+/// A speed that is not a valid limit of the safety module \[m/s\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpeedLimitError(pub f64);
 
@@ -28,11 +28,11 @@ impl core::error::Error for SpeedLimitError {}
 impl SpeedLimit {
     const PER_M_PER_S: f64 = 4096.0;
 
-    /// The greatest limit that is not above `speed_m_per_s`. One below 1/4096 m/s is refused rather
-    /// than rounded down, because 0 means that there is no limit.
+    /// The largest representable limit not above `speed_m_per_s`. Values below 1/4096 m/s are an error instead
+    /// of being rounded to 0, because 0 means "no limit".
     ///
     /// # Errors
-    /// Not a number from 1/4096 to just below 8.
+    /// A value outside the range from 1/4096 to just below 8.
     pub fn from_m_per_s(speed_m_per_s: f64) -> Result<SpeedLimit, SpeedLimitError> {
         let raw = libm::floor(speed_m_per_s * SpeedLimit::PER_M_PER_S);
         if (1.0..=f64::from(i16::MAX)).contains(&raw) {
@@ -42,10 +42,10 @@ impl SpeedLimit {
         }
     }
 
-    /// From the value of [`Property::VL1`] or [`Property::VL2`]; `Ok(None)` is no limit.
+    /// From the value of [`Property::VL1`] or [`Property::VL2`]; `Ok(None)` means no limit.
     ///
     /// # Errors
-    /// A value that is negative or beyond 16 bits; the speed it would be.
+    /// A value that is negative or outside 16 bits; the error contains the corresponding speed.
     pub fn from_value(value: i32) -> Result<Option<SpeedLimit>, SpeedLimitError> {
         match i16::try_from(value) {
             Ok(0) => Ok(None),
@@ -65,8 +65,8 @@ impl SpeedLimit {
     }
 }
 
-/// The four limits. The default is what libbarrett names as the module's own: 0.5 and 1 m/s, 4731 and
-/// 5204 units.
+/// The four limits. The defaults are those of the module according to libbarrett: 0.5 and 1 m/s, 4731 and 5204
+/// units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SafetyLimits {
     /// VL1: above it the pendant warns. `None`: no warning.
@@ -79,12 +79,12 @@ pub struct SafetyLimits {
     pub torque_fault: PuckTorque,
 }
 
-/// Limits that contradict themselves.
+/// Inconsistent limits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SafetyLimitsError {
-    /// The speed's warning is above its fault.
+    /// The speed warning limit is above the fault limit.
     Speed(SpeedLimit, SpeedLimit),
-    /// The torque's warning is above its fault.
+    /// The torque warning limit is above the fault limit.
     Torque(PuckTorque, PuckTorque),
     /// A torque limit is negative.
     Negative(PuckTorque),
@@ -130,10 +130,10 @@ impl Default for SafetyLimits {
 }
 
 impl SafetyLimits {
-    /// Refuses limits that contradict themselves.
+    /// Rejects inconsistent limits.
     ///
     /// # Errors
-    /// A warning above its fault, or a negative torque.
+    /// A warning limit above its fault limit, or a negative torque.
     pub fn validate(&self) -> Result<(), SafetyLimitsError> {
         for torque in [self.torque_warning, self.torque_fault] {
             if torque < PuckTorque::ZERO {
@@ -154,7 +154,7 @@ impl SafetyLimits {
         }
     }
 
-    /// What to set, at least 10 ms apart.
+    /// Properties and values to set, at least 10 ms apart.
     pub fn settings(&self) -> [(Property, Value); 4] {
         let speed = |limit: Option<SpeedLimit>| limit.map_or(0, SpeedLimit::value);
         [

@@ -1,8 +1,8 @@
 //! The safety module: its mode, its limits, and the pendant's lights and buttons.
 //!
-//! It listens to torque commands and position replies and takes the motors out of torque mode on
-//! excess torque, speed or voltage and when positions stop. The host may lower its mode and never
-//! raise it: that takes a person at the pendant. Source: libbarrett, btclient, OWD, manual page 48.
+//! It monitors torque commands and position replies, and ends torque mode on excess torque, speed or voltage or
+//! when positions stop. The host may lower its mode but never raise it: that requires a person at the pendant.
+//! Source: libbarrett, btclient, OWD, manual page 48.
 
 mod limits;
 mod pendant;
@@ -15,11 +15,11 @@ use crate::status::UnknownValue;
 /// [`Property::MODE`](crate::Property::MODE) of the safety module, lowest first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum SafetyMode {
-    /// Emergency stop: the motor pucks have no power and forget their positions.
+    /// Emergency stop: the motor pucks have no power and lose their positions.
     EStop = 0,
     /// The motors brake.
     Idle = 1,
-    /// The motors take torques.
+    /// The motors apply torques.
     Active = 2,
 }
 
@@ -46,7 +46,7 @@ impl SafetyMode {
         self as i16
     }
 
-    /// The mode after the host asks for `requested`: lower modes are taken, higher ones ignored.
+    /// The mode after the host requests `requested`: lower modes are accepted, higher ones ignored.
     pub fn after_request(self, requested: SafetyMode) -> SafetyMode {
         self.min(requested)
     }

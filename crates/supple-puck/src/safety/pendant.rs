@@ -1,4 +1,4 @@
-//! The pendant's word, [`Property::PEN`](crate::Property::PEN).
+//! The pendant word, [`Property::PEN`](crate::Property::PEN).
 //!
 //! ```text
 //! 27..26 button   25 activate light   24 idle light   23..16 seven segments
@@ -9,7 +9,7 @@
 
 use core::fmt;
 
-/// The word as it comes: a view that names the fields.
+/// The raw word: a view that names the fields.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PenWord(pub u32);
 
@@ -23,7 +23,7 @@ impl PenWord {
     /// The bits that have a meaning.
     pub const MASK: u32 = 0x0fff_7fff;
 
-    /// From the property's value, whose sign means nothing.
+    /// From the property's value, whose sign has no meaning.
     pub const fn from_value(value: i32) -> PenWord {
         PenWord(value as u32)
     }
@@ -38,7 +38,7 @@ impl PenWord {
     }
 }
 
-/// What the operator is pressing.
+/// Button that the operator is pressing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Button {
     /// The emergency stop is latched.
@@ -51,7 +51,7 @@ pub enum Button {
     None = 0b11,
 }
 
-/// How one watched quantity stands.
+/// Level of a monitored quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Level {
     /// Below its limits.
@@ -97,7 +97,7 @@ impl SevenSegment {
     }
 }
 
-/// The pendant: buttons, lights, and how each watched quantity stands.
+/// State of the pendant: buttons, lights, and the level of each monitored quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pendant {
     /// Button pressed.
@@ -108,22 +108,22 @@ pub struct Pendant {
     pub idle_light: bool,
     /// Digit shown.
     pub segments: SevenSegment,
-    /// Speed of the arm against VL1 and VL2.
+    /// Speed of the arm relative to VL1 and VL2.
     pub velocity: Level,
-    /// Commanded torques against TL1 and TL2.
+    /// Commanded torques relative to TL1 and TL2.
     pub torque: Level,
-    /// Bus voltage against its limits.
+    /// Bus voltage relative to its limits.
     pub voltage: Level,
-    /// Whether positions are being reported.
+    /// Whether positions arrive in time.
     pub heartbeat: Level,
-    /// Marks an emergency stop.
+    /// Indicates an emergency stop.
     pub other: Level,
 }
 
-/// A field in which not exactly one bit is set.
+/// Error: a field does not have exactly one bit set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PendantError {
-    /// Which field.
+    /// Name of the field.
     pub field: &'static str,
     /// Its three bits.
     pub bits: u8,
@@ -142,7 +142,7 @@ impl fmt::Display for PendantError {
 impl core::error::Error for PendantError {}
 
 impl Pendant {
-    /// Reads a word; bits without a meaning are ignored.
+    /// Parses a word; bits without a meaning are ignored.
     ///
     /// # Errors
     /// The first field, from velocity on, that is not one-hot.
@@ -174,7 +174,7 @@ impl Pendant {
         })
     }
 
-    /// The word that the safety module replies with.
+    /// Encodes the word of the safety module's reply.
     pub fn emit(&self) -> PenWord {
         let levels = self.levels().into_iter().enumerate();
         let fields = levels.map(|(index, (_, level))| (level as u32) << (3 * index));
@@ -188,7 +188,7 @@ impl Pendant {
         )
     }
 
-    /// Every watched quantity by name.
+    /// Level of every monitored quantity, by name.
     pub fn levels(&self) -> [(&'static str, Level); 5] {
         let levels = [
             self.velocity,
@@ -200,7 +200,7 @@ impl Pendant {
         core::array::from_fn(|index| (FIELD_NAMES[index], levels[index]))
     }
 
-    /// The worst of them.
+    /// Most severe level.
     pub fn worst(&self) -> Level {
         let levels = self.levels().into_iter().map(|(_, level)| level);
         levels.fold(Level::Safe, Level::max)

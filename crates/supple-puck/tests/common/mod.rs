@@ -1,9 +1,9 @@
-//! What every property test shares.
+//! Configuration of the property tests.
 
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
-/// So many cases, the same in every run.
+/// Fixed number of cases, the same in every run.
 pub fn config(seed: u64) -> ProptestConfig {
     ProptestConfig {
         failure_persistence: None,

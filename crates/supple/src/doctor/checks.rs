@@ -1,4 +1,4 @@
-//! The checks, each a function of the machine's files.
+//! The checks; each is a function of the machine's files.
 
 use super::machine::Machine;
 use serde::Serialize;
@@ -6,7 +6,7 @@ use std::fmt;
 
 /// Priority of the control thread under SCHED_FIFO.
 const PRIORITY: u64 = 80;
-/// What the controller and the bus process lock, with room to spare \[byte\].
+/// Memory that the controller and the bus process lock, with a margin \[byte\].
 const MEMORY_TO_LOCK: u64 = 256 << 20;
 /// `CAP_IPC_LOCK` of `linux/capability.h`.
 const CAP_IPC_LOCK: u32 = 14;
@@ -15,28 +15,28 @@ const CAP_SYS_NICE: u32 = 23;
 /// `ARPHRD_CAN` of `linux/if_arp.h`.
 const ARPHRD_CAN: i64 = 280;
 
-/// How a check ended.
+/// Verdict of a check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
-    /// As it should be.
+    /// Requirement met.
     Pass,
     /// Cycles may be late; the arm stays safe.
     Warn,
-    /// The realtime system cannot run as it should.
+    /// The real-time requirements are not met.
     Fail,
 }
 
-/// One thing that was looked at.
+/// Result of a check.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Check {
     /// Short name, stable.
     pub name: &'static str,
-    /// How it ended.
+    /// Verdict.
     pub verdict: Verdict,
-    /// What was found.
+    /// The finding.
     pub found: String,
-    /// What to do where it did not pass.
+    /// Remedy if the check did not pass.
     pub remedy: Option<&'static str>,
 }
 
@@ -82,7 +82,7 @@ impl fmt::Display for Check {
     }
 }
 
-/// All of them.
+/// Runs all checks.
 pub fn all(machine: &Machine) -> Vec<Check> {
     vec![
         kernel(machine),
@@ -253,7 +253,7 @@ fn can(machine: &Machine) -> Check {
         let state = machine.read(&format!("{NET}/{name}/operstate"));
         state.unwrap_or_else(|| "unknown".to_owned())
     };
-    // A virtual interface has no carrier to report: its state is unknown while it is up.
+    // A virtual interface reports no carrier: its state is unknown while it is up.
     let up = |name: &String| matches!(state(name).as_str(), "up" | "unknown");
     let found: Vec<_> = interfaces
         .iter()
@@ -294,8 +294,8 @@ mod tests {
     fn verdicts(machine: &Machine) -> Vec<(&'static str, Verdict)> {
         let checks = all(machine);
         for check in &checks {
-            let silent = check.verdict == Verdict::Pass;
-            assert_eq!(check.remedy.is_none(), silent, "{check}");
+            let passed = check.verdict == Verdict::Pass;
+            assert_eq!(check.remedy.is_none(), passed, "{check}");
         }
         checks.iter().map(|c| (c.name, c.verdict)).collect()
     }
@@ -307,7 +307,7 @@ Max realtime priority     90                   90
 ";
 
     #[test]
-    fn a_prepared_machine_passes_everything() {
+    fn a_prepared_machine_passes_all_checks() {
         let (_root, machine) = machine(&[
             ("proc/sys/kernel/osrelease", "6.12.1-rt\n"),
             ("sys/kernel/realtime", "1\n"),
@@ -334,7 +334,7 @@ Max realtime priority     90                   90
     }
 
     #[test]
-    fn a_plain_machine_is_told_what_to_do() {
+    fn an_unprepared_machine_gets_a_remedy_for_each_failed_check() {
         let (_root, machine) = machine(&[
             ("proc/sys/kernel/osrelease", "6.12.1\n"),
             (
@@ -372,7 +372,7 @@ Max realtime priority     90                   90
     }
 
     #[test]
-    fn capabilities_stand_in_for_limits() {
+    fn capabilities_replace_limits() {
         let mask = (1_u64 << CAP_IPC_LOCK) | (1 << CAP_SYS_NICE);
         let status = format!("Name:\tsupple\nCapEff:\t{mask:016x}\n");
         let (_root, machine) = machine(&[("proc/self/status", &status)]);
@@ -382,7 +382,7 @@ Max realtime priority     90                   90
     }
 
     #[test]
-    fn a_machine_that_says_nothing_is_not_ready() {
+    fn a_machine_without_readable_files_is_not_ready() {
         let machine = Machine::new(Path::new("/no/such/machine"));
         let verdicts = verdicts(&machine);
         assert!(

@@ -1,4 +1,4 @@
-//! What the kernel tells of a machine, under a root that tests can choose.
+//! Reads machine properties from the kernel's files, below a root directory that tests can replace.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,19 +9,19 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// The machine whose files are under `root`.
+    /// Machine whose files are below `root`.
     pub fn new(root: &Path) -> Machine {
         Machine {
             root: root.to_owned(),
         }
     }
 
-    /// Where a file of it is.
+    /// Path of a file.
     pub fn path(&self, file: &str) -> PathBuf {
         self.root.join(file)
     }
 
-    /// Content of a file without surrounding white space; `None` where it cannot be read.
+    /// Content of a file without surrounding white space; `None` if it cannot be read.
     pub fn read(&self, file: &str) -> Option<String> {
         let text = fs::read_to_string(self.path(file)).ok()?;
         Some(text.trim().to_owned())
@@ -32,7 +32,7 @@ impl Machine {
         self.read(file)?.parse().ok()
     }
 
-    /// Names in a folder, sorted; none where there is no such folder.
+    /// Sorted names in a folder; empty if the folder does not exist.
     pub fn list(&self, folder: &str) -> Vec<String> {
         let entries = fs::read_dir(self.path(folder)).into_iter().flatten();
         let mut names: Vec<_> = entries

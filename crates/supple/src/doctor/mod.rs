@@ -1,29 +1,30 @@
-//! `supple doctor`: whether this machine can run the arm in real time, and what to do where it cannot.
+//! `supple doctor`: checks whether this machine can run the arm in real time, and prints a remedy for each failed
+//! check.
 //!
-//! It only looks: nothing is changed, opened for writing or sent.
+//! Read-only: it changes, writes and sends nothing.
 
 mod checks;
 mod machine;
 
-use crate::console::{say, say_json};
+use crate::console::{print_json, print_line};
 use crate::exit::Failure;
 use checks::{Check, Verdict};
 use machine::Machine;
 use serde::Serialize;
 use std::path::Path;
 
-/// What was found.
+/// Results of all checks.
 #[derive(Debug, Serialize)]
 struct Report {
-    /// No check failed.
+    /// Whether no check failed.
     ready: bool,
     checks: Vec<Check>,
 }
 
-/// Looks at this machine and says what it found.
+/// Runs all checks and prints the report.
 ///
 /// # Errors
-/// [`Failure::NotReady`] where a check failed; warnings are no failure.
+/// [`Failure::NotReady`] if a check failed; warnings do not count.
 pub fn run(as_json: bool) -> Result<(), Failure> {
     let checks = checks::all(&Machine::new(Path::new("/")));
     let failed: Vec<_> = checks
@@ -37,10 +38,10 @@ pub fn run(as_json: bool) -> Result<(), Failure> {
         checks,
     };
     if as_json {
-        say_json(&report)?;
+        print_json(&report)?;
     } else {
         for check in &report.checks {
-            say(&check.to_string())?;
+            print_line(&check.to_string())?;
         }
     }
     match report.ready {

@@ -1,12 +1,12 @@
-//! A row in virtual time: everything is asked for before the first cycle, so that each run is the same to the bit.
+//! Runs a test case in virtual time. All requests are queued before the first cycle, so every run is bit-identical.
 
-use super::judge::judge;
-use super::measure::{Measures, Said};
+use super::evaluation::evaluate;
+use super::metrics::{ControllerSample, RowMetrics};
 use super::row::Row;
-use super::spec::{Event, Lowered, Spec, Work, Wrong};
+use super::spec::{DriveShutdown, Event, InvalidRequest, Spec, TestTask};
+use super::task::Script;
 use super::trace;
-use super::work::Script;
-use crate::cli::{Course, DrillArgs, PlantKind, UpArgs};
+use crate::cli::{DrillArgs, PlantKind, UpArgs, UpTrajectory};
 use crate::exit::Failure;
 use crate::up::{START_S, System};
 use core::time::Duration;
@@ -17,25 +17,27 @@ use supple_ipc::Domain;
 use supple_model::Description;
 use supple_plant::{Injection, InjectionKind, Trigger};
 
-/// Height of a block's face beneath the start of the trajectory, whose height is 0, less the cap \[m\].
-const BENEATH_M: f64 = 0.05;
-/// The same where the arm is only pushed: it does not come far.
-const CLOSE_M: f64 = 0.01;
-/// Cap of an arm without a tool \[m\].
+/// Vertical clearance between the start of the trajectory (height 0) and the top face of the block, without the cap
+/// radius \[m\].
+const BLOCK_CLEARANCE_M: f64 = 0.05;
+/// The same for an arm that is only pushed and does not travel far \[m\].
+const PUSHED_BLOCK_CLEARANCE_M: f64 = 0.01;
+/// Cap radius of an arm without a tool \[m\].
 const CAP_M: f64 = 0.02;
-/// What is watched after it happened \[s\].
-const WATCHED_S: f64 = 1.5;
-/// From drives that are lowered to the button that activates them, and with an emergency stop in between \[s\].
-const BACK_S: (f64, f64) = (1.0, 3.0);
-/// Longest run by the wall clock; the longest takes seconds.
-const WITHIN: Duration = Duration::from_secs(120);
-/// Speed at which a tip that is pushed meets a block \[m/s\].
+/// Observation time after the event \[s\].
+const OBSERVED_S: f64 = 1.5;
+/// Time from disabling the drives until the operator activates them again; second value: with an emergency stop in
+/// between \[s\].
+const REENABLE_S: (f64, f64) = (1.0, 3.0);
+/// Timeout of a run in wall-clock time; the longest run takes seconds.
+const TIMEOUT: Duration = Duration::from_secs(120);
+/// Speed at which a pushed tip hits a block \[m/s\].
 const PUSHED_M_PER_S: f64 = 0.25;
 
-/// Performs a row.
+/// Runs a test case in virtual time.
 ///
 /// # Errors
-/// A system that cannot be started, or a process of it that ends.
+/// If the system cannot be started, or one of its processes exits.
 pub fn perform<const N: usize>(
     spec: &Spec,
     args: &DrillArgs,
@@ -49,31 +51,31 @@ pub fn perform<const N: usize>(
     let file = domain.folder().join(format!("{prefix}.csv"));
     let cap_m = description.tool().map_or(CAP_M, |tool| tool.cap_radius_m);
     let start_s = START_S[usize::from(spec.plant == PlantKind::Emu)];
-    let event_s = start_s + script.event_at as f64 * config.period_s;
+    let event_s = start_s + script.event_cycle as f64 * config.period_s;
     let back_s = match spec.event {
-        Event::Drives(Lowered::EStop) => BACK_S.1,
-        Event::Drives(_) => BACK_S.0,
+        Event::Drives(DriveShutdown::EStop) => REENABLE_S.1,
+        Event::Drives(_) => REENABLE_S.0,
         _ => 0.0,
     };
-    let pushed = (spec.event, spec.work) == (Event::Obstacle, Work::GravityHold);
+    let pushed = (spec.event, spec.task) == (Event::Obstacle, TestTask::GravityHold);
     let push_rad_per_s = -PUSHED_M_PER_S / jacobian(&config.arm, &script.start_rad)[(2, 1)];
     let up = UpArgs {
         plant: spec.plant,
         arm: args.arm.clone(),
         strict: args.strict,
-        track: Course::Sinusoid,
+        track: UpTrajectory::Sinusoid,
         bus: None,
         zero_at_home: false,
         tare: false,
-        block_m: (spec.event == Event::Obstacle).then_some(match spec.work {
-            Work::Probe => 0.0,
-            Work::GravityHold => -(CLOSE_M + cap_m),
-            _ => -(BENEATH_M + cap_m),
+        block_m: (spec.event == Event::Obstacle).then_some(match spec.task {
+            TestTask::Probe => 0.0,
+            TestTask::GravityHold => -(PUSHED_BLOCK_CLEARANCE_M + cap_m),
+            _ => -(BLOCK_CLEARANCE_M + cap_m),
         }),
         inject: injections(spec, event_s, back_s, pushed.then_some(push_rad_per_s)),
         trace: Some(file.clone()),
         rate_hz: None,
-        for_s: Some(event_s + back_s + WATCHED_S),
+        for_s: Some(event_s + back_s + OBSERVED_S),
         virtual_time: true,
         log: PathBuf::new(),
         no_log: true,
@@ -82,17 +84,17 @@ pub fn perform<const N: usize>(
         json: true,
     };
     let performed = run::<N>(spec, &up, &script, description, &domain, event_s, back_s);
-    let row = performed.and_then(|(said, refusals)| {
-        // What acts once the run is over is the way in which a system ends.
-        let end_ns = said.last().map_or(0, |said| said.time_ns);
+    let row = performed.and_then(|(samples, refusals)| {
+        // Samples after the end of the run belong to the shutdown.
+        let end_ns = samples.last().map_or(0, |sample| sample.time_ns);
         let mut lines = trace::read(&file)?;
         lines.retain(|line| line.time_ns <= end_ns);
         let at = |cycles: u64| {
             let cycle = (start_s / config.period_s).round() as u64 + cycles;
-            let found = said.iter().find(|said| said.cycle >= cycle);
-            found.map_or(u64::MAX, |said| said.time_ns)
+            let found = samples.iter().find(|sample| sample.cycle >= cycle);
+            found.map_or(u64::MAX, |sample| sample.time_ns)
         };
-        let work_ns = at(script.work_at);
+        let task_start_ns = at(script.task_start_cycle);
         let event_ns = match spec.event {
             Event::Injected { at_once: true, .. } => {
                 let active = lines.iter().find(|line| line.active);
@@ -102,22 +104,22 @@ pub fn perform<const N: usize>(
                 let begun = lines.iter().find(|line| line.injections > 0);
                 begun.map_or(u64::MAX, |line| line.time_ns)
             }
-            Event::Obstacle => work_ns,
-            _ => at(script.event_at),
+            Event::Obstacle => task_start_ns,
+            _ => at(script.event_cycle),
         };
-        let seen = Measures::new(&lines, &said, work_ns, event_ns);
-        let (outcome, wrong) = judge(spec, &seen, &refusals);
-        Ok(Row::lockstep(spec, seen, outcome, wrong))
+        let metrics = RowMetrics::new(&lines, &samples, task_start_ns, event_ns);
+        let (outcome, deviations) = evaluate(spec, &metrics, &refusals);
+        Ok(Row::lockstep(spec, metrics, outcome, deviations))
     });
-    // It was this drill's alone; a next one writes its own.
+    // The trace file belongs to this test case only.
     let _ = std::fs::remove_file(&file);
     row
 }
 
-/// What is put into the arm, and when: counted from active drives.
+/// Faults to inject, with their times counted from active drives.
 fn injections(spec: &Spec, event_s: f64, back_s: f64, push: Option<f64>) -> Vec<Injection> {
     let active_s = match spec.plant {
-        PlantKind::Emu => crate::up::HELD_S,
+        PlantKind::Emu => crate::up::GRAVITY_HOLD_S,
         _ => 0.0,
     };
     let at = |kind| Injection {
@@ -128,7 +130,7 @@ fn injections(spec: &Spec, event_s: f64, back_s: f64, push: Option<f64>) -> Vec<
     };
     let at_once = |kind| Injection {
         kind,
-        trigger: Trigger::AtOnce,
+        trigger: Trigger::AtStart,
     };
     let on_sim = spec.plant == PlantKind::Sim;
     match spec.event {
@@ -140,7 +142,7 @@ fn injections(spec: &Spec, event_s: f64, back_s: f64, push: Option<f64>) -> Vec<
         Event::Drives(_) if on_sim => vec![at(InjectionKind::DrivesIdle {
             for_s: Some(back_s),
         })],
-        Event::Request(Wrong::WhileIdle) if on_sim => {
+        Event::Request(InvalidRequest::WhileIdle) if on_sim => {
             vec![at_once(InjectionKind::DrivesIdle { for_s: None })]
         }
         _ => push
@@ -155,14 +157,14 @@ fn injections(spec: &Spec, event_s: f64, back_s: f64, push: Option<f64>) -> Vec<
     }
 }
 
-/// What an operator does at the pendant of an emulated arm.
+/// Buttons that an operator presses on the pendant of an emulated arm.
 fn presses(spec: &Spec, event_s: f64, back_s: f64) -> Vec<String> {
     let at = |button: &str, after_s: f64| format!("{button}@held+{:.4}", event_s + after_s);
     match spec.event {
-        Event::Drives(Lowered::Idle | Lowered::IdleWhenStiff) => {
+        Event::Drives(DriveShutdown::Idle | DriveShutdown::IdleWhenStiff) => {
             vec![at("idle", 0.0), at("activate", back_s)]
         }
-        Event::Drives(Lowered::EStop) => vec![
+        Event::Drives(DriveShutdown::EStop) => vec![
             at("e-stop", 0.0),
             at("release", 0.5),
             at("idle", 0.6),
@@ -180,23 +182,23 @@ fn run<const N: usize>(
     domain: &Domain,
     event_s: f64,
     back_s: f64,
-) -> Result<(Vec<Said>, Vec<String>), Failure> {
+) -> Result<(Vec<ControllerSample>, Vec<String>), Failure> {
     let mut system = System::<N>::new(up, description, domain)?;
-    let activate = spec.event != Event::Request(Wrong::WhileIdle);
+    let activate = spec.event != Event::Request(InvalidRequest::WhileIdle);
     let presses = presses(spec, event_s, back_s);
-    system.start_scripted(&script.requests, activate, &presses)?;
-    let (mut said, mut refusals, begin) = (Vec::new(), Vec::new(), Instant::now());
+    let mut refusals = system.start_scripted(&script.requests, activate, &presses)?;
+    let (mut samples, begin) = (Vec::new(), Instant::now());
     loop {
-        let heard = system.hear()?;
-        said.extend(heard.as_ref().map(Said::of));
+        let telemetry = system.poll_telemetry()?;
+        samples.extend(telemetry.as_ref().map(ControllerSample::of));
         refusals.extend(system.refusals()?);
-        if heard.is_none() && system.clock_has_ended()? {
+        if telemetry.is_none() && system.clock_has_ended()? {
             break;
         }
-        if begin.elapsed() > WITHIN {
-            return Err(Failure::NotTracking);
+        if begin.elapsed() > TIMEOUT {
+            return Err(Failure::DidNotReachTracking);
         }
     }
     system.end()?;
-    Ok((said, refusals))
+    Ok((samples, refusals))
 }

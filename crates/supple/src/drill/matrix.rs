@@ -1,34 +1,37 @@
-//! All rows, each with what is expected of it: written before any of them was run.
+//! All test cases with their expected results. The expectations were written before the first run.
 
-use super::spec::{Event, Expected, Loss, Lowered, Spec, UP, Work, Wrong};
+use super::spec::{
+    DriveShutdown, Event, Expected, InvalidRequest, ProcessFailure, Spec, TestTask, UP,
+};
 use crate::cli::PlantKind;
 use crate::up::CONTROLLER;
 use supple_plant::InjectionKind;
 
-/// Time in which the motors of an arm on a bus brake once its host has noticed a loss \[ms\]: 10 ms without
-/// an answer, a frame to the safety module, its frame to the motors.
-const LOWERED_MS: (f64, f64) = (8.0, 25.0);
-/// Silence of the host after which the safety module ends torque by itself \[ms\].
+/// Time from a process loss until the motors of an arm on the bus brake \[ms\]: 10 ms without an answer, then one
+/// frame to the safety module and one to the motors.
+const DRIVE_SHUTDOWN_MS: (f64, f64) = (8.0, 25.0);
+/// Time without frames from the host after which the safety module disables torque \[ms\].
 const HEARTBEAT_MS: (f64, f64) = (90.0, 120.0);
 /// Time for which the simulated arm's motors apply the fallback torque \[ms\].
 const FALLBACK_MS: (f64, f64) = (95.0, 120.0);
-/// A controller that is asked to end has the drives lowered within this time \[ms\].
-const LEAVING_MS: (f64, f64) = (0.0, 50.0);
+/// Maximum time from the termination signal until the controller has set the drives to idle \[ms\].
+const CONTROLLER_EXIT_MS: (f64, f64) = (0.0, 50.0);
 
-/// A fault is found within 100 ms of being observable, and 500 ms later the tip is slow or the motors brake \[ms\].
-const FOUND_MS: f64 = 600.0;
-/// What is observable only once the arm has moved for a while \[ms\].
-const FOUND_LATE_MS: f64 = 1100.0;
+/// Limit from the event to rest or braking \[ms\]: the fault is detected within 100 ms of becoming observable; 500 ms
+/// later the tip is slow or the motors brake.
+const FAULT_AND_STOP_MS: f64 = 600.0;
+/// The same for faults that become observable only after some motion \[ms\].
+const LATE_FAULT_AND_STOP_MS: f64 = 1100.0;
 
-/// The arm meets something.
-const MET: &[&str] = &[
+/// Valid faults when the arm hits an obstacle.
+const CONTACT_FAULTS: &[&str] = &[
     "joint_collision",
     "tip_collision",
     "workspace",
     "joint_tracking_error",
 ];
-/// The arm is thrown off its way, or too fast.
-const THROWN: &[&str] = &[
+/// Valid faults after a disturbance: the arm leaves its path or exceeds a speed limit.
+const DISTURBANCE_FAULTS: &[&str] = &[
     "joint_collision",
     "tip_collision",
     "joint_speed",
@@ -37,8 +40,8 @@ const THROWN: &[&str] = &[
     "tracking_error",
     "workspace",
 ];
-/// An encoder does not say where the joint is.
-const STUCK: &[&str] = &[
+/// Valid faults for a stuck encoder.
+const STUCK_ENCODER_FAULTS: &[&str] = &[
     "encoder_stuck",
     "encoder_unreliable",
     "moves_against_torque",
@@ -47,8 +50,8 @@ const STUCK: &[&str] = &[
     "joint_collision",
     "tip_collision",
 ];
-/// An encoder, a motor or gravity is not what the model says: the joint moves the wrong way.
-const AGAINST: &[&str] = &[
+/// Valid faults when a joint moves in the wrong direction: reversed encoder, motor or gravity.
+const WRONG_DIRECTION_FAULTS: &[&str] = &[
     "moves_against_torque",
     "encoder_unreliable",
     "joint_collision",
@@ -60,25 +63,25 @@ const AGAINST: &[&str] = &[
     "tip_speed",
     "workspace",
 ];
-/// An angle that cannot be.
-const LOST: &[&str] = &[
+/// Valid faults for lost, jumping or non-finite joint angles.
+const ENCODER_LOSS_FAULTS: &[&str] = &[
     "encoder_lost",
     "encoder_unreliable",
     "encoder_jump",
     "measurement_not_finite",
 ];
-/// Pucks that do not answer any more.
-const POWERLESS: &[&str] = &["encoder_lost", "encoder_unreliable", "state_stale"];
-/// A load that the model does not have.
-const LOAD: &[&str] = &[
+/// Valid faults when the motor pucks are unpowered.
+const POWER_LOSS_FAULTS: &[&str] = &["encoder_lost", "encoder_unreliable", "state_stale"];
+/// Valid faults for an unmodelled load.
+const UNMODELLED_LOAD_FAULTS: &[&str] = &[
     "moves_against_torque",
     "unmodelled_load",
     "joint_collision",
     "tip_collision",
 ];
 
-/// The same while the arm tracks: it may fall too far behind first.
-const LADEN: &[&str] = &[
+/// The same during tracking, where the tracking error may trip first.
+const UNMODELLED_LOAD_TRACKING_FAULTS: &[&str] = &[
     "moves_against_torque",
     "unmodelled_load",
     "joint_collision",
@@ -86,22 +89,22 @@ const LADEN: &[&str] = &[
     "tracking_error",
 ];
 
-/// Every row of a plant.
+/// All test cases of a plant.
 pub fn all(plant: PlantKind) -> Vec<Spec> {
-    let mut rows = by_the_wall(plant);
-    rows.extend(in_virtual_time(plant));
-    rows
+    let mut cases = wall_clock_cases(plant);
+    cases.extend(virtual_time_cases(plant));
+    cases
 }
 
-const EVERY: [Work; 5] = [
-    Work::GravityHold,
-    Work::Move,
-    Work::Track,
-    Work::Probe,
-    Work::Excite,
+const ALL_TASKS: [TestTask; 5] = [
+    TestTask::GravityHold,
+    TestTask::Move,
+    TestTask::Track,
+    TestTask::Probe,
+    TestTask::Excite,
 ];
 
-fn by_the_wall(plant: PlantKind) -> Vec<Spec> {
+fn wall_clock_cases(plant: PlantKind) -> Vec<Spec> {
     let brakes = |(from, to)| Expected::Brakes(from, to);
     let mut processes = match plant {
         PlantKind::Sim => vec![
@@ -109,47 +112,47 @@ fn by_the_wall(plant: PlantKind) -> Vec<Spec> {
             ("supple-sim", Expected::ControllerFault),
         ],
         PlantKind::Emu | PlantKind::Can => vec![
-            (CONTROLLER, brakes(LOWERED_MS)),
+            (CONTROLLER, brakes(DRIVE_SHUTDOWN_MS)),
             ("supple-can", brakes(HEARTBEAT_MS)),
             ("supple-emu", Expected::ControllerFault),
         ],
     };
-    processes.push((UP, brakes(LEAVING_MS)));
-    let row = |work, event, expected| Spec {
+    processes.push((UP, brakes(CONTROLLER_EXIT_MS)));
+    let row = |task, event, expected| Spec {
         plant,
-        work,
+        task,
         event,
         expected,
-        within_ms: FOUND_MS,
+        within_ms: FAULT_AND_STOP_MS,
     };
     let nothing = Event::Nothing { wall: true };
-    let mut rows = vec![row(Work::Track, nothing, Expected::Unharmed)];
-    for work in EVERY {
+    let mut cases = vec![row(TestTask::Track, nothing, Expected::KeepsRunning)];
+    for task in ALL_TASKS {
         for (name, expected) in &processes {
-            for loss in [Loss::Kill, Loss::Stop] {
+            for loss in [ProcessFailure::Kill, ProcessFailure::Stop] {
                 let expected = match (*name, loss) {
-                    // Who watches over the others may stand still.
-                    (UP, Loss::Stop) => Expected::Unharmed,
+                    // `supple up` only supervises; stopping it does not affect the arm.
+                    (UP, ProcessFailure::Stop) => Expected::KeepsRunning,
                     _ => *expected,
                 };
-                rows.push(row(work, Event::Process { name, loss }, expected));
+                cases.push(row(task, Event::Process { name, loss }, expected));
             }
         }
     }
-    for work in [Work::GravityHold, Work::Track] {
-        rows.push(row(work, Event::Flood, Expected::Heard));
+    for task in [TestTask::GravityHold, TestTask::Track] {
+        cases.push(row(task, Event::RequestQueueFull, Expected::IdleAccepted));
     }
-    rows
+    cases
 }
 
-fn in_virtual_time(plant: PlantKind) -> Vec<Spec> {
+fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
     use InjectionKind as Kind;
-    use Work::{Excite, GravityHold, Move, Probe, Track};
-    let mut rows = Vec::new();
-    let mut add = |works: &[Work], event, expected, within_ms| {
-        rows.extend(works.iter().map(|work| Spec {
+    use TestTask::{Excite, GravityHold, Move, Probe, Track};
+    let mut cases = Vec::new();
+    let mut add = |tasks: &[TestTask], event, expected, within_ms| {
+        cases.extend(tasks.iter().map(|task| Spec {
             plant,
-            work: *work,
+            task: *task,
             event,
             expected,
             within_ms,
@@ -163,21 +166,26 @@ fn in_virtual_time(plant: PlantKind) -> Vec<Spec> {
         kind,
         at_once: true,
     };
-    let (stops, bears) = (Expected::Stops, Expected::Bears);
+    let (stops, runs_or_faults) = (Expected::FaultAndRest, Expected::KeepsRunningOrFault);
     let one = Some(1);
     add(
-        &EVERY,
+        &ALL_TASKS,
         Event::Nothing { wall: false },
-        Expected::Unharmed,
+        Expected::KeepsRunning,
         0.0,
     );
 
-    // What meets the arm.
+    // External disturbances and obstacles.
     let bump = injected(Kind::Bump {
         joint: 3,
         speed_rad_per_s: 2.5,
     });
-    add(&EVERY, bump, bears(THROWN), FOUND_MS);
+    add(
+        &ALL_TASKS,
+        bump,
+        runs_or_faults(DISTURBANCE_FAULTS),
+        FAULT_AND_STOP_MS,
+    );
     let bump_back = injected(Kind::Bump {
         joint: 1,
         speed_rad_per_s: -1.5,
@@ -185,29 +193,64 @@ fn in_virtual_time(plant: PlantKind) -> Vec<Spec> {
     add(
         &[GravityHold, Move, Track],
         bump_back,
-        bears(THROWN),
-        FOUND_MS,
+        runs_or_faults(DISTURBANCE_FAULTS),
+        FAULT_AND_STOP_MS,
     );
-    // Soft modes may bear it; a stiff one may not.
+    // Compliant modes may continue; stiff modes must fault.
     add(
         &[GravityHold, Track, Probe],
         Event::Obstacle,
-        bears(MET),
-        FOUND_MS,
+        runs_or_faults(CONTACT_FAULTS),
+        FAULT_AND_STOP_MS,
     );
-    add(&[Move, Excite], Event::Obstacle, stops(MET), FOUND_LATE_MS);
+    add(
+        &[Move, Excite],
+        Event::Obstacle,
+        stops(CONTACT_FAULTS),
+        LATE_FAULT_AND_STOP_MS,
+    );
 
     // Encoders.
     let stuck = injected(Kind::EncoderStuck { joint: one });
     let all_stuck = injected(Kind::EncoderStuck { joint: None });
-    // An arm that stands still has encoders that stand still.
-    add(&[GravityHold], stuck, bears(STUCK), FOUND_MS);
-    add(&[Move, Excite], stuck, stops(STUCK), FOUND_MS);
-    add(&[Track], stuck, stops(STUCK), FOUND_LATE_MS);
-    // At 40 mm/s the joint's reference has not moved by what counts in the time that is watched.
-    add(&[Probe], stuck, bears(STUCK), FOUND_LATE_MS);
-    add(&[GravityHold], all_stuck, bears(STUCK), FOUND_MS);
-    add(&[Move, Track], all_stuck, stops(STUCK), FOUND_LATE_MS);
+    // A stuck encoder is not observable while the arm is stationary.
+    add(
+        &[GravityHold],
+        stuck,
+        runs_or_faults(STUCK_ENCODER_FAULTS),
+        FAULT_AND_STOP_MS,
+    );
+    add(
+        &[Move, Excite],
+        stuck,
+        stops(STUCK_ENCODER_FAULTS),
+        FAULT_AND_STOP_MS,
+    );
+    add(
+        &[Track],
+        stuck,
+        stops(STUCK_ENCODER_FAULTS),
+        LATE_FAULT_AND_STOP_MS,
+    );
+    // At 40 mm/s the reference does not travel far enough in the observation time for the check to trip.
+    add(
+        &[Probe],
+        stuck,
+        runs_or_faults(STUCK_ENCODER_FAULTS),
+        LATE_FAULT_AND_STOP_MS,
+    );
+    add(
+        &[GravityHold],
+        all_stuck,
+        runs_or_faults(STUCK_ENCODER_FAULTS),
+        FAULT_AND_STOP_MS,
+    );
+    add(
+        &[Move, Track],
+        all_stuck,
+        stops(STUCK_ENCODER_FAULTS),
+        LATE_FAULT_AND_STOP_MS,
+    );
     let late = injected(Kind::EncoderLate {
         joint: None,
         cycles: 20,
@@ -215,100 +258,155 @@ fn in_virtual_time(plant: PlantKind) -> Vec<Spec> {
     add(
         &[GravityHold, Move, Track, Excite],
         late,
-        bears(AGAINST),
-        FOUND_LATE_MS,
+        runs_or_faults(WRONG_DIRECTION_FAULTS),
+        LATE_FAULT_AND_STOP_MS,
     );
     let sign = injected(Kind::EncoderSign { joint: one });
-    add(&[GravityHold], sign, bears(AGAINST), FOUND_LATE_MS);
-    add(&[Move, Track], sign, stops(AGAINST), FOUND_LATE_MS);
+    add(
+        &[GravityHold],
+        sign,
+        runs_or_faults(WRONG_DIRECTION_FAULTS),
+        LATE_FAULT_AND_STOP_MS,
+    );
+    add(
+        &[Move, Track],
+        sign,
+        stops(WRONG_DIRECTION_FAULTS),
+        LATE_FAULT_AND_STOP_MS,
+    );
     let second = injected(Kind::ReplyLost {
         joint: one,
         every: 2,
     });
-    add(&[GravityHold, Track], second, stops(LOST), FOUND_MS);
+    add(
+        &[GravityHold, Track],
+        second,
+        stops(ENCODER_LOSS_FAULTS),
+        FAULT_AND_STOP_MS,
+    );
     let jump = injected(Kind::EncoderOffset {
         joint: one,
         offset_rad: 0.2,
     });
-    add(&[GravityHold, Track], jump, stops(LOST), FOUND_MS);
+    add(
+        &[GravityHold, Track],
+        jump,
+        stops(ENCODER_LOSS_FAULTS),
+        FAULT_AND_STOP_MS,
+    );
     if plant == PlantKind::Sim {
         let nan = injected(Kind::EncoderNan { joint: one });
-        add(&[Track], nan, stops(LOST), FOUND_MS);
+        add(&[Track], nan, stops(ENCODER_LOSS_FAULTS), FAULT_AND_STOP_MS);
     }
 
     // Motors.
     let dead = injected(Kind::MotorDead { motor: 1 });
-    add(&[GravityHold, Move, Track], dead, stops(AGAINST), FOUND_MS);
+    add(
+        &[GravityHold, Move, Track],
+        dead,
+        stops(WRONG_DIRECTION_FAULTS),
+        FAULT_AND_STOP_MS,
+    );
     let reversed = injected(Kind::TorqueSign { joint: 1 });
-    add(&[GravityHold, Track], reversed, stops(AGAINST), FOUND_MS);
+    add(
+        &[GravityHold, Track],
+        reversed,
+        stops(WRONG_DIRECTION_FAULTS),
+        FAULT_AND_STOP_MS,
+    );
     let later = injected(Kind::TorqueLate { cycles: 3 });
     add(
         &[GravityHold, Move, Track],
         later,
-        bears(THROWN),
-        FOUND_LATE_MS,
+        runs_or_faults(DISTURBANCE_FAULTS),
+        LATE_FAULT_AND_STOP_MS,
     );
 
-    // What the model does not know.
+    // Unmodelled effects.
     let gravity = Kind::GravityReversed;
     add(
         &[GravityHold, Move, Track],
         injected(gravity),
-        stops(AGAINST),
-        FOUND_MS,
+        stops(WRONG_DIRECTION_FAULTS),
+        FAULT_AND_STOP_MS,
     );
     add(
         &[GravityHold],
         from_the_start(gravity),
-        stops(AGAINST),
-        FOUND_MS,
+        stops(WRONG_DIRECTION_FAULTS),
+        FAULT_AND_STOP_MS,
     );
     let payload = Kind::Payload { mass_kg: 1.0 };
-    add(&[GravityHold], injected(payload), stops(LOAD), FOUND_MS);
-    // On its way an arm of unknown load is off its path, no more; it shows where the arm holds still.
-    add(&[Move], injected(payload), stops(LOAD), FOUND_LATE_MS);
-    add(&[Track], injected(payload), stops(LADEN), FOUND_LATE_MS);
+    add(
+        &[GravityHold],
+        injected(payload),
+        stops(UNMODELLED_LOAD_FAULTS),
+        FAULT_AND_STOP_MS,
+    );
+    // During motion an unknown load only causes a path error; it is detected when the arm holds still.
+    add(
+        &[Move],
+        injected(payload),
+        stops(UNMODELLED_LOAD_FAULTS),
+        LATE_FAULT_AND_STOP_MS,
+    );
+    add(
+        &[Track],
+        injected(payload),
+        stops(UNMODELLED_LOAD_TRACKING_FAULTS),
+        LATE_FAULT_AND_STOP_MS,
+    );
     add(
         &[GravityHold],
         from_the_start(payload),
-        stops(LOAD),
-        FOUND_MS,
+        stops(UNMODELLED_LOAD_FAULTS),
+        FAULT_AND_STOP_MS,
     );
 
     // Drives and requests.
-    let idle = Event::Drives(Lowered::Idle);
+    let idle = Event::Drives(DriveShutdown::Idle);
     add(
         &[GravityHold, Move, Track],
         idle,
-        Expected::ComesBack,
-        FOUND_MS,
+        Expected::ReturnsToGravityHold,
+        FAULT_AND_STOP_MS,
     );
-    let stiff = Event::Drives(Lowered::IdleWhenStiff);
-    add(&[Track], stiff, Expected::ComesBack, FOUND_MS);
+    let stiff = Event::Drives(DriveShutdown::IdleWhenStiff);
+    add(
+        &[Track],
+        stiff,
+        Expected::ReturnsToGravityHold,
+        FAULT_AND_STOP_MS,
+    );
     if plant == PlantKind::Emu {
-        // Without power the pucks forget their positions: the drives do not come back by themselves.
-        let e_stop = Event::Drives(Lowered::EStop);
-        add(&[Move, Track], e_stop, stops(POWERLESS), FOUND_MS);
+        // Without power the motor pucks lose their positions, so the drives cannot be re-enabled automatically.
+        let e_stop = Event::Drives(DriveShutdown::EStop);
+        add(
+            &[Move, Track],
+            e_stop,
+            stops(POWER_LOSS_FAULTS),
+            FAULT_AND_STOP_MS,
+        );
     }
     add(
         &[Track],
-        Event::Request(Wrong::TooFast),
+        Event::Request(InvalidRequest::TooFast),
         Expected::Refused,
         0.0,
     );
     add(
         &[Track],
-        Event::Request(Wrong::TooStiff),
+        Event::Request(InvalidRequest::TooStiff),
         Expected::Refused,
         0.0,
     );
     add(
         &[Move],
-        Event::Request(Wrong::WhileIdle),
+        Event::Request(InvalidRequest::WhileIdle),
         Expected::Refused,
         0.0,
     );
-    rows
+    cases
 }
 
 #[cfg(test)]
@@ -317,12 +415,12 @@ mod tests {
     use std::collections::BTreeSet;
 
     #[test]
-    fn there_are_sixty_rows_and_more_for_each_plant_and_no_two_have_one_name() {
+    fn each_plant_has_at_least_sixty_test_cases_with_unique_names() {
         for plant in [PlantKind::Sim, PlantKind::Emu] {
-            let rows = all(plant);
-            let names: BTreeSet<String> = rows.iter().map(Spec::name).collect();
-            assert_eq!(names.len(), rows.len());
-            assert!(rows.len() >= 60, "{} of {plant:?}", rows.len());
+            let cases = all(plant);
+            let names: BTreeSet<String> = cases.iter().map(Spec::name).collect();
+            assert_eq!(names.len(), cases.len());
+            assert!(cases.len() >= 60, "{} of {plant:?}", cases.len());
         }
     }
 }

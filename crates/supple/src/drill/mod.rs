@@ -1,41 +1,40 @@
-//! `supple drill`: whole systems with simulated arms are put through losses, faults, collisions and wrong requests,
-//! and what the arm really did is held against what was expected before ([`matrix`]).
+//! `supple drill`: injects process failures, faults, collisions and invalid requests into complete systems with
+//! simulated arms, and compares what the arm did with the expected results in [`matrix`].
 //!
-//! | what happens | how |
+//! | event | test method |
 //! |---|---|
-//! | a process is killed or stopped; sixteen requests wait | by the wall clock ([`perform`]), above a block |
-//! | everything else | in virtual time ([`lockstep`]): each run is the same to the bit, and faster than real time |
+//! | a process is killed or stopped; the request queue is full | in wall-clock time ([`perform`]), above a block |
+//! | everything else | in virtual time ([`lockstep`]): runs are bit-identical and faster than real time |
 //!
-//! What is measured comes from the arm's own process, which goes on when a controller does not.
+//! Measurements come from the plant process, which keeps running when the controller fails.
 //!
-//! An arm that brakes sinks, at the speed at which shorted motors and friction take what gravity gives: the
-//! 4-joint arm at 0.09 m/s, so that it meets the block with about 200 N for a millisecond or two and then rests on it.
-//! That is the price of braking, alike in both plants (`supple-plant/tests/braking.rs`).
+//! A braking arm descends at the speed at which shorted motors and friction dissipate the power of gravity: the
+//! 4-joint arm descends at 0.09 m/s, so that it hits the block with about 200 N for one or two milliseconds and then
+//! rests on it. This impact is inherent in braking and is the same in both plants (`supple-plant/tests/braking.rs`).
 
-mod fault_name;
-mod judge;
+mod evaluation;
 mod lockstep;
 mod matrix;
-mod measure;
+mod metrics;
 mod perform;
 mod row;
 mod spec;
+mod task;
 mod trace;
-mod work;
 
 use crate::arms;
 use crate::cli::{DrillArgs, PlantKind};
-use crate::console::{remark, say, say_json};
+use crate::console::{print_json, print_line, print_status};
 use crate::exit::Failure;
 use crate::interrupt;
 use row::Row;
 use spec::Spec;
 use supple_model::{Description, with_dof};
 
-/// Runs it.
+/// Runs `supple drill`.
 ///
 /// # Errors
-/// [`Failure::Drill`] where an outcome is not the expected one; [`Failure::NoSuchRow`].
+/// [`Failure::Drill`] if a result differs from the expected one; [`Failure::NoSuchTestCase`].
 pub fn run(args: &DrillArgs) -> Result<(), Failure> {
     let description = arms::find(&args.arm, args.strict)?;
     let specs = chosen(args)?;
@@ -44,23 +43,23 @@ pub fn run(args: &DrillArgs) -> Result<(), Failure> {
             .iter()
             .map(|spec| format!("{}  ({})", spec.name(), spec.expected))
             .collect();
-        return say(&lines.join("\n"));
+        return print_line(&lines.join("\n"));
     }
-    let stop = interrupt::catch();
+    let stop = interrupt::shutdown_on_interrupt();
     let mut rows: Vec<Row> = Vec::new();
     for (index, spec) in specs.iter().enumerate() {
-        if stop.asked() {
+        if stop.shutdown_requested() {
             break;
         }
-        remark(&format!("{}/{}: {}", index + 1, specs.len(), spec.name()));
+        print_status(&format!("{}/{}: {}", index + 1, specs.len(), spec.name()));
         rows.push(perform(spec, args, &description)?);
     }
     match args.json {
-        true => say_json(&rows)?,
-        false => say(&row::table(&rows))?,
+        true => print_json(&rows)?,
+        false => print_line(&row::table(&rows))?,
     }
     if let Some(file) = &args.markdown {
-        supple_files::write_whole(file, row::page(&rows, &command(args)).as_bytes())
+        supple_files::write_atomic(file, row::page(&rows, &command(args)).as_bytes())
             .map_err(|error| Failure::file("write", file, error))?;
     }
     let failed = rows.iter().filter(|row| !row.as_expected);
@@ -73,49 +72,49 @@ pub fn run(args: &DrillArgs) -> Result<(), Failure> {
     }
 }
 
-/// The words that chose the rows.
+/// The command line that selects these test cases.
 fn command(args: &DrillArgs) -> String {
-    let mut words = vec!["supple drill".to_owned()];
+    let mut parts = vec!["supple drill".to_owned()];
     if let Some(plant) = args.plant {
-        words.push(format!("--plant {plant:?}").to_lowercase());
+        parts.push(format!("--plant {plant:?}").to_lowercase());
     }
-    words.extend(args.only.iter().map(|part| format!("--only {part}")));
-    words.extend(args.virtual_time.then(|| "--virtual-time".to_owned()));
-    words.push("--markdown docs/drill.md".to_owned());
-    words.join(" ")
+    parts.extend(args.only.iter().map(|part| format!("--only {part}")));
+    parts.extend(args.virtual_time.then(|| "--virtual-time".to_owned()));
+    parts.push("--markdown docs/drill.md".to_owned());
+    parts.join(" ")
 }
 
 fn chosen(args: &DrillArgs) -> Result<Vec<Spec>, Failure> {
     let plants = match args.plant {
-        Some(PlantKind::Can) => return Err(Failure::RealArm),
+        Some(PlantKind::Can) => return Err(Failure::FaultTestOnRealArm),
         Some(plant) => vec![plant],
         None => vec![PlantKind::Sim, PlantKind::Emu],
     };
-    let wanted = |spec: &Spec| {
+    let selected = |spec: &Spec| {
         let name = spec.name();
         let named = args.only.is_empty() || args.only.iter().any(|part| name.contains(part));
-        named && !(args.virtual_time && spec.by_the_wall())
+        named && !(args.virtual_time && spec.runs_in_wall_clock_time())
     };
-    let specs = plants.into_iter().flat_map(matrix::all).filter(wanted);
+    let specs = plants.into_iter().flat_map(matrix::all).filter(selected);
     let specs: Vec<Spec> = specs.collect();
     match specs.is_empty() {
-        true => Err(Failure::NoSuchRow {
+        true => Err(Failure::NoSuchTestCase {
             patterns: args.only.join(", "),
         }),
         false => Ok(specs),
     }
 }
 
-/// A row that cannot be performed is one that is not as expected: the others go on.
+/// Runs a test case. A case that cannot be run counts as failed; the others continue.
 fn perform(spec: &Spec, args: &DrillArgs, description: &Description) -> Result<Row, Failure> {
-    let performed = with_dof!(description.dof(), N => match spec.by_the_wall() {
+    let result = with_dof!(description.dof(), N => match spec.runs_in_wall_clock_time() {
         true => perform::perform::<N>(spec, args, description),
         false => lockstep::perform::<N>(spec, args, description),
     })?;
-    match performed {
+    match result {
         Ok(row) => Ok(row),
-        // A program that is missing is missing in every row.
-        Err(failure @ Failure::NoSibling { .. }) => Err(failure),
+        // A missing program would fail every test case, so stop here.
+        Err(failure @ Failure::MissingProgram { .. }) => Err(failure),
         Err(failure) => Ok(Row::failed(spec, &failure.to_string())),
     }
 }

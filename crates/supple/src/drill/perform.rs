@@ -1,13 +1,13 @@
-//! A row by the wall clock, from a system at work to one that works again.
+//! Runs a test case in wall-clock time, from normal operation through the failure to recovery.
 
-use super::row::{Row, Seen};
-use super::spec::{Event, Loss, Spec, UP, Work};
-use super::trace::After;
-use super::work;
-use crate::cli::{Course, DrillArgs, PlantKind, UpArgs};
-use crate::console::remark;
+use super::row::{ProcessTestResult, Row};
+use super::spec::{Event, ProcessFailure, Spec, TestTask, UP};
+use super::task;
+use super::trace::TraceAfterLoss;
+use crate::cli::{DrillArgs, PlantKind, UpArgs, UpTrajectory};
+use crate::console::print_status;
 use crate::exit::Failure;
-use crate::operate::Session;
+use crate::operate::OperatorSession;
 use crate::up::System;
 use core::time::Duration;
 use rustix::process::{Pid, Signal, kill_process};
@@ -21,31 +21,31 @@ use supple_ipc::{Domain, TelemetryReader};
 use supple_model::Description;
 use supple_realtime::monotonic_ns;
 
-/// Height of the block's face beneath the trajectory, whose height is 0, less the cap \[m\].
-const BENEATH_M: f64 = 0.05;
-/// Work before the loss \[s\].
-const WORKED_S: f64 = 0.5;
-/// What is watched after it, where the process comes back, and where it does not.
-const WATCHED: [Duration; 2] = [Duration::from_secs(2), Duration::from_millis(1200)];
-/// Longest way to tracking.
-const WITHIN: Duration = Duration::from_secs(20);
-/// How often a system that does not come to work is started before there is nothing to lose.
+/// Vertical clearance between the trajectory (height 0) and the top face of the block, without the cap radius \[m\].
+const BLOCK_CLEARANCE_M: f64 = 0.05;
+/// Duration of the task before the loss \[s\].
+const BEFORE_LOSS_S: f64 = 0.5;
+/// Observation time after the loss: if the process is restarted, and if it is not.
+const OBSERVED: [Duration; 2] = [Duration::from_secs(2), Duration::from_millis(1200)];
+/// Timeout for reaching tracking mode.
+const TIMEOUT: Duration = Duration::from_secs(20);
+/// Number of start attempts before the test case is given up.
 const ATTEMPTS: u32 = 3;
-/// How long the controller and the drives may take to come to idle: a braked arm sinks.
-const RESTED_WITHIN: Duration = Duration::from_millis(200);
-/// Cap of an arm without a tool \[m\].
+/// Time limit for controller and drives to reach idle; a braked arm descends meanwhile.
+const REST_TIMEOUT: Duration = Duration::from_millis(200);
+/// Cap radius of an arm without a tool \[m\].
 const CAP_M: f64 = 0.02;
-/// Requests that wait for their cycle: as many as there is room for.
-const WAITING: u64 = 16;
-/// How far ahead those cycles are.
-const FAR: u64 = 1_000_000_000;
+/// Number of queued requests that fills the request queue.
+const QUEUE_CAPACITY: u64 = 16;
+/// Distance of the cycles of those requests from the current cycle.
+const FAR_FUTURE_CYCLES: u64 = 1_000_000_000;
 /// Time of the move to the start of an excitation \[s\].
-const BACK_S: f64 = 1.0;
+const MOVE_TO_START_S: f64 = 1.0;
 
-/// Performs a row.
+/// Runs a test case in wall-clock time.
 ///
 /// # Errors
-/// A system that cannot be started, or that does not come to work in the first place.
+/// If the system cannot be started or does not reach its task.
 pub fn perform<const N: usize>(
     spec: &Spec,
     args: &DrillArgs,
@@ -59,17 +59,17 @@ pub fn perform<const N: usize>(
         plant: spec.plant,
         arm: args.arm.clone(),
         strict: args.strict,
-        track: match spec.work {
-            Work::Probe => Course::Probe,
-            _ => Course::Sinusoid,
+        track: match spec.task {
+            TestTask::Probe => UpTrajectory::Probe,
+            _ => UpTrajectory::Sinusoid,
         },
         bus: None,
         zero_at_home: false,
         tare: false,
-        // What moves the arm downwards would meet it.
-        block_m: match spec.work {
-            Work::Move | Work::Excite => None,
-            _ => Some(-(BENEATH_M + cap_m)),
+        // Tasks that move the arm down would hit the block.
+        block_m: match spec.task {
+            TestTask::Move | TestTask::Excite => None,
+            _ => Some(-(BLOCK_CLEARANCE_M + cap_m)),
         },
         inject: Vec::new(),
         trace: Some(trace.clone()),
@@ -83,173 +83,191 @@ pub fn perform<const N: usize>(
         json: true,
     };
     let lose = || match spec.event {
-        Event::Process { name: UP, .. } => of_up::<N>(spec, &up, description, &domain),
-        _ => of_a_process::<N>(spec, &up, description, &domain),
+        Event::Process { name: UP, .. } => lose_up_process::<N>(spec, &up, description, &domain),
+        _ => lose_process::<N>(spec, &up, description, &domain),
     };
     let mut lost = lose();
     for _ in 1..ATTEMPTS {
-        if !matches!(lost, Err(Failure::NotTracking)) {
+        if !matches!(lost, Err(Failure::DidNotReachTracking)) {
             break;
         }
-        remark("the system did not come to work: once more");
+        print_status("the system did not reach its task; retrying");
         lost = lose();
     }
-    let row = lost.and_then(|(begin_ns, seen)| {
-        let after = After::read(&trace, begin_ns, watched(spec).as_nanos() as u64)?;
-        Ok(Row::wall(spec, &after, &seen))
+    let row = lost.and_then(|(begin_ns, result)| {
+        let after =
+            TraceAfterLoss::read(&trace, begin_ns, observation_time(spec).as_nanos() as u64)?;
+        Ok(Row::wall_clock(spec, &after, &result))
     });
-    // It was this drill's alone; a next one writes its own.
+    // The trace file belongs to this test case only.
     let _ = std::fs::remove_file(&trace);
     row
 }
 
-/// A process that was lost while the arm tracked comes back.
-fn rejoins_after(spec: &Spec) -> bool {
-    spec.work == Work::Track && !matches!(spec.event, Event::Flood)
+/// Whether the lost process is restarted: only if the arm was tracking.
+fn should_recover(spec: &Spec) -> bool {
+    spec.task == TestTask::Track && !matches!(spec.event, Event::RequestQueueFull)
 }
 
-fn watched(spec: &Spec) -> Duration {
-    WATCHED[usize::from(!rejoins_after(spec))]
+fn observation_time(spec: &Spec) -> Duration {
+    OBSERVED[usize::from(!should_recover(spec))]
 }
 
-fn mode_of(work: Work) -> Mode {
-    match work {
-        Work::GravityHold => Mode::GravityHold,
-        Work::Move => Mode::Move,
-        Work::Track => Mode::Track,
-        Work::Probe => Mode::Probe,
-        Work::Excite => Mode::Excite,
+fn mode_of(task: TestTask) -> Mode {
+    match task {
+        TestTask::GravityHold => Mode::GravityHold,
+        TestTask::Move => Mode::Move,
+        TestTask::Track => Mode::Track,
+        TestTask::Probe => Mode::Probe,
+        TestTask::Excite => Mode::Excite,
     }
 }
 
-fn is_in(mode: Mode, telemetry: &Telemetry, for_s: f64) -> bool {
-    telemetry.mode() == Some(mode)
+fn has_been_in_mode(mode: Mode, telemetry: &Telemetry, for_s: f64) -> bool {
+    telemetry.record().mode() == Some(mode)
         && telemetry.state.drives() == Drives::Active
-        && telemetry.mode_time_s >= for_s
+        && telemetry.record().mode_time_s >= for_s
 }
 
-/// From a system that comes to track by itself to one at the row's work.
-fn go_to_work<const N: usize>(
+/// Brings the system from automatic tracking to the task of the test case.
+fn start_task<const N: usize>(
     spec: &Spec,
     description: &Description,
     domain: &Domain,
     mut next: impl FnMut() -> Result<Option<Telemetry>, Failure>,
 ) -> Result<(), Failure> {
-    let first = match spec.work {
-        Work::Probe => Mode::Probe,
+    let first = match spec.task {
+        TestTask::Probe => Mode::Probe,
         _ => Mode::Track,
     };
-    let mode = mode_of(spec.work);
-    let worked_s = if first == mode { WORKED_S } else { 0.0 };
-    let there = until(&mut next, WITHIN, |t| is_in(first, t, worked_s))?;
-    there.ok_or(Failure::NotTracking)?;
+    let mode = mode_of(spec.task);
+    let held_s = if first == mode { BEFORE_LOSS_S } else { 0.0 };
+    let there = poll_until(&mut next, TIMEOUT, |t| has_been_in_mode(first, t, held_s))?;
+    there.ok_or(Failure::DidNotReachTracking)?;
     if first == mode {
         return Ok(());
     }
     let config = description.config::<N>()?;
-    let mut session = Session::<N>::new(domain)?;
-    let request = work::request(spec, &config, description)?;
+    let mut session = OperatorSession::<N>::new(domain)?;
+    let request = task::request(spec, &config, description)?;
     if let Request::Excite(series) = &request {
         let back = Request::Move {
             target_rad: series.at(0.0).position_rad,
-            duration_s: BACK_S,
+            duration_s: MOVE_TO_START_S,
         };
-        session.ask(&back, None)?;
-        until(&mut next, WITHIN, |t| is_in(Mode::Move, t, BACK_S + 0.2))?
-            .ok_or(Failure::NotTracking)?;
+        session.send_request(&back, None)?;
+        poll_until(&mut next, TIMEOUT, |t| {
+            has_been_in_mode(Mode::Move, t, MOVE_TO_START_S + 0.2)
+        })?
+        .ok_or(Failure::DidNotReachTracking)?;
     }
-    session.ask(&request, None)?;
-    until(&mut next, WITHIN, |t| is_in(mode, t, WORKED_S))?.ok_or(Failure::NotTracking)?;
+    session.send_request(&request, None)?;
+    poll_until(&mut next, TIMEOUT, |t| {
+        has_been_in_mode(mode, t, BEFORE_LOSS_S)
+    })?
+    .ok_or(Failure::DidNotReachTracking)?;
     Ok(())
 }
 
-/// A process that this program has started itself.
-fn of_a_process<const N: usize>(
+/// Causes the failure of a process that this program has started itself.
+fn lose_process<const N: usize>(
     spec: &Spec,
     up: &UpArgs,
     description: &Description,
     domain: &Domain,
-) -> Result<(u64, Seen), Failure> {
+) -> Result<(u64, ProcessTestResult), Failure> {
     let mut system = System::<N>::new(up, description, domain)?;
     system.start(description)?;
-    go_to_work::<N>(spec, description, domain, || system.turn())?;
+    start_task::<N>(spec, description, domain, || system.poll_and_advance())?;
     let begin_ns = monotonic_ns();
     let mut idle_after_ms = None;
     match spec.event {
         Event::Process { name, loss } => system.signal(name, signal(loss))?,
-        Event::Flood => idle_after_ms = Some(idle_past_a_full_queue::<N>(&mut system, domain)?),
+        Event::RequestQueueFull => {
+            idle_after_ms = Some(idle_past_a_full_queue::<N>(&mut system, domain)?)
+        }
         _ => {}
     }
     let mut last = None;
     let start = Instant::now();
-    while start.elapsed() < watched(spec) {
-        last = system.hear()?.or(last);
+    while start.elapsed() < observation_time(spec) {
+        last = system.poll_telemetry()?.or(last);
     }
-    let mode = mode_of(spec.work);
-    let fault = |t: &Telemetry| (t.fault != 0).then(|| t.fault_text.to_string());
-    let mut seen = Seen {
+    let mode = mode_of(spec.task);
+    let fault = |t: &Telemetry| {
+        let record = t.record();
+        (record.fault != 0).then(|| record.fault_text.to_string())
+    };
+    let mut result = ProcessTestResult {
         fault: last.as_ref().and_then(fault),
-        worked_on: last.as_ref().is_some_and(|t| is_in(mode, t, WORKED_S)),
-        to_rejoin: rejoins_after(spec),
+        kept_running: last
+            .as_ref()
+            .is_some_and(|t| has_been_in_mode(mode, t, BEFORE_LOSS_S)),
+        recovery_expected: should_recover(spec),
         rejoined_after_s: None,
         idle_after_ms,
     };
     let back = Instant::now();
     if let Event::Process { name, loss } = spec.event {
         match loss {
-            Loss::Kill => system.restart(name)?,
-            Loss::Stop => system.signal(name, Signal::CONT)?,
+            ProcessFailure::Kill => system.restart(name)?,
+            ProcessFailure::Stop => system.signal(name, Signal::CONT)?,
         }
     }
-    if seen.to_rejoin {
+    if result.recovery_expected {
         let lost = matches!(spec.event, Event::Process { .. });
-        let again = !lost || rejoins(&mut system, spec.plant)?;
-        seen.rejoined_after_s = again.then(|| back.elapsed().as_secs_f64());
+        let again = !lost || recover_after_restart(&mut system, spec.plant)?;
+        result.rejoined_after_s = again.then(|| back.elapsed().as_secs_f64());
     }
     system.end()?;
-    Ok((begin_ns, seen))
+    Ok((begin_ns, result))
 }
 
-fn signal(loss: Loss) -> Signal {
+fn signal(loss: ProcessFailure) -> Signal {
     match loss {
-        Loss::Kill => Signal::KILL,
-        Loss::Stop => Signal::STOP,
+        ProcessFailure::Kill => Signal::KILL,
+        ProcessFailure::Stop => Signal::STOP,
     }
 }
 
-/// From the request to idle to its answer \[ms\], where all places of the queue are taken; or why it was refused.
+/// Time from an idle request to its reply while the request queue is full \[ms\], or the reason of a refusal.
 fn idle_past_a_full_queue<const N: usize>(
     system: &mut System<'_, N>,
     domain: &Domain,
 ) -> Result<Result<f64, String>, Failure> {
-    let cycle = until(|| system.hear(), WITHIN, |_| true)?.ok_or(Failure::NotTracking)?;
-    let far = cycle.state.cycle + FAR;
-    let mut others = Session::<N>::new(domain)?;
+    let cycle = poll_until(|| system.poll_telemetry(), TIMEOUT, |_| true)?
+        .ok_or(Failure::DidNotReachTracking)?;
+    let far = cycle.state.cycle + FAR_FUTURE_CYCLES;
+    // One operator may fill at most half of the queue.
+    let mut others = [
+        OperatorSession::<N>::new(domain)?,
+        OperatorSession::<N>::new(domain)?,
+    ];
     let gains = Request::Gains {
         gains: Gains::isotropic(5.0, 1.5),
         ramp_s: 1.0,
     };
-    for request in 0..WAITING {
-        others.queue(&gains, far + request)?;
+    for request in 0..QUEUE_CAPACITY {
+        others[request as usize % 2].queue(&gains, far + request)?;
     }
     let begin = Instant::now();
-    match Session::<N>::new(domain)?.ask(&Request::Idle, None) {
+    match OperatorSession::<N>::new(domain)?.send_request(&Request::Idle, None) {
         Ok(_) => Ok(Ok(begin.elapsed().as_secs_f64() * 1e3)),
-        Err(Failure::Refused { words }) => Ok(Err(words)),
+        Err(Failure::Refused { reason }) => Ok(Err(reason)),
         Err(failure) => Err(failure),
     }
 }
 
-/// Takes in what `next` gives until it is as it should be; the telemetry that was so.
-fn until(
+/// Reads telemetry with `next` until `condition` holds; returns that telemetry, or `None` after a timeout.
+fn poll_until(
     mut next: impl FnMut() -> Result<Option<Telemetry>, Failure>,
     within: Duration,
-    is_so: impl Fn(&Telemetry) -> bool,
+    condition: impl Fn(&Telemetry) -> bool,
 ) -> Result<Option<Telemetry>, Failure> {
     let start = Instant::now();
     while start.elapsed() < within {
         if let Some(telemetry) = next()?
-            && is_so(&telemetry)
+            && condition(&telemetry)
         {
             return Ok(Some(telemetry));
         }
@@ -257,50 +275,59 @@ fn until(
     Ok(None)
 }
 
-/// What an operator does when a process is back: clears the pendant's faults, resets the controller, lets the
-/// arm rest in idle, and goes to work again.
-fn rejoins<const N: usize>(system: &mut System<'_, N>, plant: PlantKind) -> Result<bool, Failure> {
-    // States that were queued before it came back say nothing of now.
-    system.begin_again();
+/// Does what an operator does after a process restart: clears the pendant's faults, resets the controller, waits in
+/// idle and restarts the task.
+fn recover_after_restart<const N: usize>(
+    system: &mut System<'_, N>,
+    plant: PlantKind,
+) -> Result<bool, Failure> {
+    // Discard states that were queued before the restart.
+    system.restart_stages();
     let start = Instant::now();
-    while start.elapsed() < WITHIN {
+    while start.elapsed() < TIMEOUT {
         if let Some(pendant) = system.pendant()
             && pendant.press("idle").is_err()
         {
             continue;
         }
-        if rests(system)? {
+        if comes_to_rest(system)? {
             break;
         }
     }
     if plant == PlantKind::Emu {
-        // The arm may have had to be woken: its bus is looked after by its own process.
+        // The arm may need a wake-up, which supple-can performs.
         let alive = |t: &Telemetry| t.state.position_present.count_ones() as usize == N;
-        if until(|| system.hear(), WITHIN, alive)?.is_none() {
+        if poll_until(|| system.poll_telemetry(), TIMEOUT, alive)?.is_none() {
             return Ok(false);
         }
     }
-    system.begin_again();
-    Ok(until(|| system.turn(), WITHIN, |t| is_in(Mode::Track, t, 0.2))?.is_some())
+    system.restart_stages();
+    Ok(poll_until(
+        || system.poll_and_advance(),
+        TIMEOUT,
+        |t| has_been_in_mode(Mode::Track, t, 0.2),
+    )?
+    .is_some())
 }
 
-/// The controller is idle and without a fault, and so are the drives.
-fn rests<const N: usize>(system: &mut System<'_, N>) -> Result<bool, Failure> {
+/// Resets the controller, requests idle and waits until controller and drives are idle without a fault.
+fn comes_to_rest<const N: usize>(system: &mut System<'_, N>) -> Result<bool, Failure> {
     for request in [Request::Reset, Request::Idle] {
-        match system.ask(&request) {
-            // Nothing to reset, or nobody there yet.
+        match system.send_request(&request) {
+            // Nothing to reset, or the controller is not running yet.
             Ok(()) | Err(Failure::Refused { .. }) => {}
             Err(Failure::NotRunning { .. }) => return Ok(false),
             Err(failure) => return Err(failure),
         }
     }
-    let rests = |t: &Telemetry| {
-        t.mode() == Some(Mode::Idle) && t.fault == 0 && t.state.drives() == Drives::Idle
+    let comes_to_rest = |t: &Telemetry| {
+        let record = t.record();
+        record.mode() == Some(Mode::Idle) && record.fault == 0 && t.state.drives() == Drives::Idle
     };
-    Ok(until(|| system.hear(), RESTED_WITHIN, rests)?.is_some())
+    Ok(poll_until(|| system.poll_telemetry(), REST_TIMEOUT, comes_to_rest)?.is_some())
 }
 
-/// `supple up` itself, as a process of its own.
+/// `supple up` as a child process.
 struct Up(Child);
 
 impl Up {
@@ -308,7 +335,7 @@ impl Up {
         let this = std::env::current_exe()
             .map_err(|error| Failure::file("find", Path::new("this program"), error))?;
         let child = Command::new(&this)
-            .args(up.words())
+            .args(up.to_arguments())
             .stdin(Stdio::null())
             .stdout(Stdio::null())
             .spawn();
@@ -319,12 +346,12 @@ impl Up {
 
     fn signal(&self, signal: Signal) {
         if let Some(pid) = i32::try_from(self.0.id()).ok().and_then(Pid::from_raw) {
-            // A process that has just ended needs no signal.
+            // Ignore errors: the process may have exited already.
             let _ = kill_process(pid, signal);
         }
     }
 
-    /// Ends it in order.
+    /// Terminates the process and waits for it.
     fn end(mut self) {
         self.signal(Signal::CONT);
         self.signal(Signal::TERM);
@@ -334,45 +361,47 @@ impl Up {
 
 impl Drop for Up {
     fn drop(&mut self) {
-        // The processes that it started end with it.
+        // The processes that it started terminate with it.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
 }
 
-fn of_up<const N: usize>(
+fn lose_up_process<const N: usize>(
     spec: &Spec,
     up: &UpArgs,
     description: &Description,
     domain: &Domain,
-) -> Result<(u64, Seen), Failure> {
+) -> Result<(u64, ProcessTestResult), Failure> {
     let mut reader = TelemetryReader::new(domain)?;
     let mut running = Up::start(up)?;
-    go_to_work::<N>(spec, description, domain, || hear(&mut reader))?;
+    start_task::<N>(spec, description, domain, || next_telemetry(&mut reader))?;
     let begin_ns = monotonic_ns();
     let stopped = matches!(
         spec.event,
         Event::Process {
-            loss: Loss::Stop,
+            loss: ProcessFailure::Stop,
             ..
         }
     );
     running.signal(if stopped { Signal::STOP } else { Signal::KILL });
     let (mut last, start) = (None, Instant::now());
-    while start.elapsed() < watched(spec) {
-        last = hear(&mut reader)?.or(last);
+    while start.elapsed() < observation_time(spec) {
+        last = next_telemetry(&mut reader)?.or(last);
     }
-    let mode = mode_of(spec.work);
-    let mut seen = Seen {
-        worked_on: last.as_ref().is_some_and(|t| is_in(mode, t, WORKED_S)),
-        to_rejoin: rejoins_after(spec),
-        ..Seen::default()
+    let mode = mode_of(spec.task);
+    let mut result = ProcessTestResult {
+        kept_running: last
+            .as_ref()
+            .is_some_and(|t| has_been_in_mode(mode, t, BEFORE_LOSS_S)),
+        recovery_expected: should_recover(spec),
+        ..ProcessTestResult::default()
     };
     let back = Instant::now();
     match stopped {
         true => running.signal(Signal::CONT),
-        false if seen.to_rejoin => {
-            // The trace of the next system is not that of this one.
+        false if result.recovery_expected => {
+            // The restarted system must not overwrite the trace.
             let again = UpArgs {
                 trace: None,
                 ..up.clone()
@@ -382,15 +411,19 @@ fn of_up<const N: usize>(
         }
         false => {}
     }
-    if seen.to_rejoin {
-        let again = until(|| hear(&mut reader), WITHIN, |t| is_in(Mode::Track, t, 0.2))?;
-        seen.rejoined_after_s = again.map(|_| back.elapsed().as_secs_f64());
+    if result.recovery_expected {
+        let again = poll_until(
+            || next_telemetry(&mut reader),
+            TIMEOUT,
+            |t| has_been_in_mode(Mode::Track, t, 0.2),
+        )?;
+        result.rejoined_after_s = again.map(|_| back.elapsed().as_secs_f64());
     }
     running.end();
-    Ok((begin_ns, seen))
+    Ok((begin_ns, result))
 }
 
-/// The next telemetry, waited for a little.
-fn hear(reader: &mut TelemetryReader) -> Result<Option<Telemetry>, Failure> {
+/// Waits briefly for the next telemetry.
+fn next_telemetry(reader: &mut TelemetryReader) -> Result<Option<Telemetry>, Failure> {
     Ok(reader.wait(Duration::from_millis(20))?)
 }

@@ -1,77 +1,79 @@
-//! A row that was performed, and the table of all.
+//! Results of test cases and their table.
 
-use super::measure::Measures;
-use super::spec::{Event, Expected, Loss, Spec, Work};
-use super::trace::After;
+use super::metrics::RowMetrics;
+use super::spec::{Event, Expected, ProcessFailure, Spec, TestTask};
+use super::trace::TraceAfterLoss;
 use comfy_table::{ContentArrangement, Table, presets};
 use serde::Serialize;
 use std::fmt::Write;
 
-/// By how much a motor's torque may rise while nobody commands it \[N m\]: the fallback is gravity alone, and
-/// the last command may have been less.
-const RISE_NM: f64 = 1.0;
-/// The same in a stiff move, whose last command may have been less than the weight by what it takes to go down.
-const STIFF_RISE_NM: f64 = 10.0;
+/// Maximum rise of a motor torque after the commands stop \[N m\]: the fallback torque is gravity compensation, which
+/// may exceed the last command.
+const MAX_TORQUE_RISE_NM: f64 = 1.0;
+/// The same in a stiff downward move, whose last command is below the weight.
+const MAX_STIFF_TORQUE_RISE_NM: f64 = 10.0;
 
-/// What came of a row.
+/// Result of a test case.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
-    /// Its name.
+    /// Name of the test case.
     pub name: String,
-    /// What played the arm.
+    /// Plant.
     pub plant: String,
-    /// What the arm did.
-    pub mode: Work,
-    /// Which process was lost, if one was.
+    /// Task of the arm.
+    pub mode: TestTask,
+    /// Name of the failed process, if the event is a process failure.
     pub process: Option<&'static str>,
-    /// How.
-    pub loss: Option<Loss>,
-    /// What should have come of it.
+    /// How the process failed.
+    pub loss: Option<ProcessFailure>,
+    /// Expected result.
     pub expected: String,
-    /// What did.
+    /// Actual result.
     pub outcome: String,
-    /// It is what should have.
+    /// Whether the result matches the expectation.
     pub as_expected: bool,
-    /// Everything that is not.
-    pub wrong: Vec<String>,
-    /// In numbers, of a row in virtual time.
+    /// Deviations from the expectation.
+    #[serde(rename = "wrong")]
+    pub deviations: Vec<String>,
+    /// Metrics of a test case in virtual time.
     #[serde(flatten)]
-    pub seen: Measures,
-    /// In numbers, of a row by the wall clock.
+    pub metrics: RowMetrics,
+    /// Metrics of a test case in wall-clock time.
     #[serde(flatten)]
-    pub by_the_wall: Option<ByTheWall>,
+    pub wall_clock: Option<WallClockMetrics>,
 }
 
-/// A loss of a process in numbers.
+/// Metrics of a process failure.
 #[derive(Clone, Debug, Serialize)]
-pub struct ByTheWall {
-    /// By how much a motor's torque rose in magnitude before the motors braked \[N m\].
+pub struct WallClockMetrics {
+    /// Maximum rise of the magnitude of a motor torque before the motors braked \[N m\].
     pub torque_rise_nm: f64,
-    /// Greatest force on the block beneath the arm \[N\].
+    /// Maximum force on the block beneath the arm \[N\].
     pub peak_force_n: f64,
-    /// How far the tip sank \[m\].
+    /// Distance by which the tip descended \[m\].
     pub sank_m: f64,
-    /// From the process's return to work, the others having gone on \[s\]; none where it was not asked for.
+    /// Time from restarting the process until the task runs again, without restarting the others \[s\]; none if not
+    /// required.
     pub rejoined_after_s: Option<f64>,
 }
 
-/// What was seen beside the trace.
+/// Observations from telemetry during a test case in wall-clock time.
 #[derive(Clone, Debug, Default)]
-pub struct Seen {
-    /// A fault latched, in words.
+pub struct ProcessTestResult {
+    /// Description of the latched fault.
     pub fault: Option<String>,
-    /// It was still at work at the end.
-    pub worked_on: bool,
-    /// It was to come back to work.
-    pub to_rejoin: bool,
-    /// From the process's return to tracking \[s\].
+    /// Whether the task was still running at the end.
+    pub kept_running: bool,
+    /// Whether the task must run again after the restart.
+    pub recovery_expected: bool,
+    /// Time from restarting the process until tracking \[s\].
     pub rejoined_after_s: Option<f64>,
-    /// From the request to idle \[ms\], where idle was asked for; the words of a refusal.
+    /// Time from the idle request to its reply \[ms\], if idle was requested; the reason if it was refused.
     pub idle_after_ms: Option<Result<f64, String>>,
 }
 
 impl Row {
-    fn new(spec: &Spec, outcome: String, wrong: Vec<String>) -> Row {
+    fn new(spec: &Spec, outcome: String, deviations: Vec<String>) -> Row {
         let (process, loss) = match spec.event {
             Event::Process { name, loss } => (Some(name), Some(loss)),
             _ => (None, None),
@@ -79,174 +81,182 @@ impl Row {
         Row {
             name: spec.name(),
             plant: format!("{:?}", spec.plant).to_lowercase(),
-            mode: spec.work,
+            mode: spec.task,
             process,
             loss,
             expected: spec.expected.to_string(),
             outcome,
-            as_expected: wrong.is_empty(),
-            wrong,
-            seen: Measures::default(),
-            by_the_wall: None,
+            as_expected: deviations.is_empty(),
+            deviations,
+            metrics: RowMetrics::default(),
+            wall_clock: None,
         }
     }
 
-    /// Of a row in virtual time.
-    pub fn lockstep(spec: &Spec, seen: Measures, outcome: String, wrong: Vec<String>) -> Row {
+    /// Result of a test case in virtual time.
+    pub fn lockstep(
+        spec: &Spec,
+        metrics: RowMetrics,
+        outcome: String,
+        deviations: Vec<String>,
+    ) -> Row {
         Row {
-            seen,
-            ..Row::new(spec, outcome, wrong)
+            metrics,
+            ..Row::new(spec, outcome, deviations)
         }
     }
 
-    /// Of a row that could not be performed.
-    pub fn failed(spec: &Spec, words: &str) -> Row {
-        let wrong = vec![format!("could not be performed: {words}")];
-        Row::new(spec, "-".to_owned(), wrong)
+    /// Result of a test case that could not be run.
+    pub fn failed(spec: &Spec, message: &str) -> Row {
+        let deviations = vec![format!("could not be run: {message}")];
+        Row::new(spec, "-".to_owned(), deviations)
     }
 
-    /// Of a loss by the wall clock.
-    pub fn wall(spec: &Spec, after: &After, seen: &Seen) -> Row {
-        const HEARD_MS: f64 = 20.0;
+    /// Result of a test case in wall-clock time.
+    pub fn wall_clock(spec: &Spec, after: &TraceAfterLoss, result: &ProcessTestResult) -> Row {
+        const IDLE_RESPONSE_MS: f64 = 20.0;
         let braked_after_ms = after.braked_after_ms();
         let torque_rise_nm = after.torque_rise_nm();
-        let outcome = match (&seen.idle_after_ms, braked_after_ms, &seen.fault) {
+        let outcome = match (&result.idle_after_ms, braked_after_ms, &result.fault) {
             (Some(Ok(ms)), ..) => format!("idle after {ms:.1} ms"),
-            (Some(Err(words)), ..) => format!("idle refused: {words}"),
+            (Some(Err(message)), ..) => format!("idle refused: {message}"),
             (_, Some(ms), _) if spec.expected != Expected::ControllerFault => {
                 format!("braked after {ms:.1} ms")
             }
             (.., Some(fault)) => format!("fault: {fault}"),
-            _ if seen.worked_on => "worked on".to_owned(),
-            _ => "neither braked nor worked".to_owned(),
+            _ if result.kept_running => "kept running".to_owned(),
+            _ => "neither braked nor kept running".to_owned(),
         };
-        let mut wrong = Vec::new();
-        let mut must = |held: bool, words: &str| {
-            if !held {
-                wrong.push(words.to_owned());
+        let mut deviations = Vec::new();
+        let mut expect = |met: bool, message: &str| {
+            if !met {
+                deviations.push(message.to_owned());
             }
         };
         match spec.expected {
             Expected::Brakes(from_ms, to_ms) => {
                 let in_time = |ms| (from_ms..=to_ms).contains(&ms);
-                must(
+                expect(
                     braked_after_ms.is_some_and(in_time),
-                    "not braked in that time",
+                    "the motors did not brake in this interval",
                 );
-                let most_nm = match spec.work {
-                    Work::Move | Work::Excite => STIFF_RISE_NM,
-                    _ => RISE_NM,
+                let max_nm = match spec.task {
+                    TestTask::Move | TestTask::Excite => MAX_STIFF_TORQUE_RISE_NM,
+                    _ => MAX_TORQUE_RISE_NM,
                 };
-                must(torque_rise_nm < most_nm, "a motor's torque rose");
+                expect(torque_rise_nm < max_nm, "a motor torque rose");
             }
-            Expected::ControllerFault => must(seen.fault.is_some(), "no fault"),
-            Expected::Heard => must(
-                matches!(seen.idle_after_ms, Some(Ok(ms)) if ms <= HEARD_MS),
-                "idle was not heard in that time",
+            Expected::ControllerFault => expect(result.fault.is_some(), "no fault"),
+            Expected::IdleAccepted => expect(
+                matches!(result.idle_after_ms, Some(Ok(ms)) if ms <= IDLE_RESPONSE_MS),
+                "idle was not accepted in time",
             ),
-            _ => must(
-                braked_after_ms.is_none() && seen.fault.is_none() && seen.worked_on,
-                "it did not work on",
+            _ => expect(
+                braked_after_ms.is_none() && result.fault.is_none() && result.kept_running,
+                "it did not keep running",
             ),
         }
-        must(
-            !seen.to_rejoin || seen.rejoined_after_s.is_some(),
-            "it did not come back to tracking",
+        expect(
+            !result.recovery_expected || result.rejoined_after_s.is_some(),
+            "it did not return to tracking",
         );
         Row {
-            seen: Measures {
+            metrics: RowMetrics {
                 braked_after_ms,
-                ..Measures::default()
+                ..RowMetrics::default()
             },
-            by_the_wall: Some(ByTheWall {
+            wall_clock: Some(WallClockMetrics {
                 torque_rise_nm,
                 peak_force_n: after.peak_force_n(),
                 sank_m: after.sank_m(),
-                rejoined_after_s: seen.rejoined_after_s,
+                rejoined_after_s: result.rejoined_after_s,
             }),
-            ..Row::new(spec, outcome, wrong)
+            ..Row::new(spec, outcome, deviations)
         }
     }
 
     fn cells(&self) -> [String; 9] {
-        let seen = &self.seen;
+        let metrics = &self.metrics;
         let or_dash = |value: Option<f64>, places: usize| {
             value.map_or_else(|| "-".to_owned(), |value| format!("{value:.places$}"))
         };
-        let stops = seen.fault_after_ms.is_some() || seen.braked_after_ms.is_some();
-        let lockstep = self.by_the_wall.is_none();
-        let force_n = match &self.by_the_wall {
+        let stops = metrics.fault_after_ms.is_some() || metrics.braked_after_ms.is_some();
+        let lockstep = self.wall_clock.is_none();
+        let force_n = match &self.wall_clock {
             Some(wall) => Some(wall.peak_force_n),
-            None => (seen.impact_n > 0.0).then_some(seen.force_n),
+            None => (metrics.impact_n > 0.0).then_some(metrics.force_n),
         };
         [
             self.name.clone(),
             self.expected.clone(),
             self.outcome.clone(),
-            or_dash((stops && lockstep).then_some(seen.moving_until_ms), 0),
-            match (seen.energy_at_fault_j, seen.energy_later_j) {
+            or_dash((stops && lockstep).then_some(metrics.moving_until_ms), 0),
+            match (metrics.energy_at_fault_j, metrics.energy_later_j) {
                 (Some(at), Some(later)) => format!("{at:.2} / {later:.2}"),
                 _ => "-".to_owned(),
             },
-            or_dash(seen.tip_later_m_per_s, 2),
+            or_dash(metrics.tip_later_m_per_s, 2),
             or_dash(force_n, 0),
-            or_dash(seen.pressed_n, 1),
+            or_dash(metrics.pressed_n, 1),
             match self.as_expected {
                 true => "ok".to_owned(),
-                false => format!("NOT: {}", self.wrong.join("; ")),
+                false => format!("FAILED: {}", self.deviations.join("; ")),
             },
         ]
     }
 }
 
-const HEADS: [&str; 9] = [
-    "row",
+const COLUMN_TITLES: [&str; 9] = [
+    "test case",
     "expected",
     "outcome",
-    "moving until ms",
-    "J at fault / 0.2 s later",
-    "tip m/s 0.5 s later",
-    "force N",
-    "pressed N",
+    "moving until [ms]",
+    "energy at fault / 0.2 s later [J]",
+    "tip 0.5 s later [m/s]",
+    "force [N]",
+    "pressing force [N]",
     "",
 ];
 
-/// All rows, for a terminal.
+/// Formats the results for a terminal.
 pub fn table(rows: &[Row]) -> String {
     let mut table = Table::new();
     table
         .load_style(presets::NOTHING)
         .set_content_arrangement(ContentArrangement::Disabled)
-        .set_header(HEADS);
+        .set_header(COLUMN_TITLES);
     for row in rows {
         table.add_row(row.cells());
     }
     table.trim_fmt()
 }
 
-/// What stands above the table of a page, with a place for the command.
+/// Text above the table of the page; `{command}` is replaced by the command line.
 const PAGE: &str = "\
 # What stops the arm, and how
 
-Written by `{command}`: each row is a system of processes with a simulated (`sim`) or
-emulated (`emu`) arm, at work in a mode, to which something happens. What is expected was written before
-(`crates/supple/src/drill/matrix.rs`); the rest is measured on the plant itself, not by the controller.
+Written by `{command}`. Each row is one test case: a system of processes with a simulated (`sim`)
+or emulated (`emu`) arm that performs a task, and one event. The expected results were written before the first run
+(`crates/supple/src/drill/matrix.rs`); the metrics are measured on the plant, not by the controller.
 
-- **moving until**: when the tip was last faster than 0.25 m/s with motors that do not brake, from what happened on.
-- **J at fault / 0.2 s later**: kinetic energy at the fault, or when the motors came to brake, and its greatest value from
-  0.2 s after on. An arm that sinks on shorted motors has up to 0.05 J.
-- **tip 0.5 s later**: its greatest speed from 0.5 s after the fault on, while motors do not brake.
-- **force**: the greatest on the block after the first 20 ms of contact; by the wall clock, the greatest of all.
-- **pressed**: the mean force from 0.5 s to 0.7 s after the contact began.
+- **moving until**: last time after the event at which the tip was faster than 0.25 m/s while the motors did not brake.
+- **energy at fault / 0.2 s later**: kinetic energy at the fault, or when braking began, and its maximum from 0.2 s
+  later. An arm that descends on shorted motors has up to 0.05 J.
+- **tip 0.5 s later**: maximum tip speed from 0.5 s after the fault, while the motors do not brake.
+- **force**: maximum force on the block after the first 20 ms of contact; in wall-clock time, the overall maximum.
+- **pressing force**: mean force from 0.5 s to 0.7 s after the contact began.
 ";
 
-/// All rows, as a page that names the command that wrote it.
+/// Formats the results as a Markdown page that states its command line.
 pub fn page(rows: &[Row], command: &str) -> String {
-    let met = rows.iter().filter(|row| row.as_expected).count();
-    let above = PAGE.replace("{command}", command);
-    let mut page = format!("{above}\n{met} of {} rows are as expected.\n\n", rows.len());
-    let _ = writeln!(page, "| {} |", HEADS.join(" | "));
-    let _ = writeln!(page, "|{}", "---|".repeat(HEADS.len()));
+    let passed = rows.iter().filter(|row| row.as_expected).count();
+    let introduction = PAGE.replace("{command}", command);
+    let mut page = format!(
+        "{introduction}\n{passed} of {} test cases gave the expected result.\n\n",
+        rows.len()
+    );
+    let _ = writeln!(page, "| {} |", COLUMN_TITLES.join(" | "));
+    let _ = writeln!(page, "|{}", "---|".repeat(COLUMN_TITLES.len()));
     for row in rows {
         let cells = row.cells().map(|cell| cell.replace('|', "\\|"));
         let _ = writeln!(page, "| {} |", cells.join(" | "));

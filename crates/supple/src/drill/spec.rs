@@ -1,155 +1,153 @@
-//! A row of the drill before it is performed: what plays the arm, what the arm does, what happens to it, and what
-//! should come of it.
+//! Specification of a test case: plant, task of the arm, event and expected result.
 
 use crate::cli::PlantKind;
 use core::fmt;
 use serde::Serialize;
 use supple_plant::InjectionKind;
 
-/// What the arm does when it happens.
+/// Task of the arm when the event occurs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Work {
-    /// Gravity hold, stretched out.
+pub enum TestTask {
+    /// Gravity hold in the stretched-out pose.
     GravityHold,
-    /// A stiff move downwards at up to 0.25 m/s.
+    /// A stiff downward move at up to 0.25 m/s.
     Move,
-    /// The sinusoid of the paper; along a line downwards where a block is in the way.
+    /// The sinusoid of the paper; a downward line if a block is in the way.
     Track,
     /// The probing cycle.
     Probe,
-    /// A stiff swing of the shoulder, the tip at up to 0.25 m/s.
+    /// A stiff oscillation of the shoulder, with the tip at up to 0.25 m/s.
     Excite,
 }
 
-/// How a process is lost.
+/// How a process fails.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Loss {
+pub enum ProcessFailure {
     /// By `kill -9`.
     Kill,
     /// By SIGSTOP; SIGCONT follows.
     Stop,
 }
 
-/// How drives are lowered.
+/// How the drives are disabled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Lowered {
+pub enum DriveShutdown {
     /// To idle.
     Idle,
-    /// To idle, once the operator has asked for gains of 1000 N/m.
+    /// To idle, after the operator has requested gains of 1000 N/m.
     IdleWhenStiff,
     /// By the emergency stop.
     EStop,
 }
 
-/// A request that must be refused.
+/// A request that the controller must refuse.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Wrong {
-    /// The sinusoid at a thousand times its pace.
+pub enum InvalidRequest {
+    /// The sinusoid at 1000 times its speed.
     TooFast,
-    /// Damping that the delay of the drives does not allow.
+    /// Damping above the bound that the delay of the drives sets.
     TooStiff,
     /// A move while the drives are idle.
     WhileIdle,
 }
 
-/// What happens.
+/// Event of the test case.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event {
-    /// Nothing: what the others are compared with. By the wall clock where `wall` is set.
+    /// No event: the baseline of the other cases. In wall-clock time if `wall` is set.
     Nothing {
-        /// By the wall clock.
+        /// Whether the case runs in wall-clock time.
         wall: bool,
     },
-    /// A process is lost, by the wall clock.
+    /// A process fails; in wall-clock time.
     Process {
-        /// Its name.
+        /// Name of the process.
         name: &'static str,
-        /// How.
-        loss: Loss,
+        /// How the process fails.
+        loss: ProcessFailure,
     },
-    /// Sixteen requests wait when idle is asked for, by the wall clock.
-    Flood,
-    /// A fault in the arm, while it works or, `at_once`, from the start.
+    /// Idle is requested while sixteen requests fill the queue; in wall-clock time.
+    RequestQueueFull,
+    /// A fault in the arm, during the task or, with `at_once`, from the start.
     Injected {
-        /// Which.
+        /// The injected fault.
         kind: InjectionKind,
-        /// Before the first cycle.
+        /// Whether it acts from before the first cycle.
         at_once: bool,
     },
     /// A block of wood is in the way.
     Obstacle,
-    /// The drives are lowered, and activated again a second later.
-    Drives(Lowered),
-    /// An operator asks for what cannot be.
-    Request(Wrong),
+    /// The drives are disabled, and activated again later.
+    Drives(DriveShutdown),
+    /// An operator sends an invalid request.
+    Request(InvalidRequest),
 }
 
-/// What should come of it.
+/// Expected result.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Expected {
-    /// It works on: no fault, drives active.
-    Unharmed,
-    /// A fault of one of these names, and then rest or braking.
-    Stops(&'static [&'static str]),
-    /// Either of the two; in neither the arm gets faster.
-    Bears(&'static [&'static str]),
-    /// The motors keep the last or the fallback torque, and brake after this time at the earliest and at the
-    /// latest \[ms\].
+    /// The system keeps running: no fault, drives active.
+    KeepsRunning,
+    /// One of these faults occurs, and then the arm rests or brakes.
+    FaultAndRest(&'static [&'static str]),
+    /// Either the system keeps running or one of these faults occurs; in both cases the arm does not accelerate.
+    KeepsRunningOrFault(&'static [&'static str]),
+    /// The motors keep the last or the fallback torque, and brake between these two times \[ms\].
     Brakes(f64, f64),
-    /// There are no motors any more: the controller latches a fault.
+    /// The plant process is gone: the controller latches a fault.
     ControllerFault,
-    /// The request is refused with words, and nothing moves.
+    /// The request is refused with a reason, and the arm does not move.
     Refused,
-    /// The drives come back in gravity hold, and nothing jumps.
-    ComesBack,
-    /// Idle is heard within 20 ms.
-    Heard,
+    /// The re-enabled drives are in gravity hold, and the arm does not jump.
+    ReturnsToGravityHold,
+    /// Idle is accepted within 20 ms.
+    IdleAccepted,
 }
 
-/// A row to be performed.
+/// A test case.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spec {
-    /// What plays the arm.
+    /// Plant.
     pub plant: PlantKind,
-    /// What it does.
-    pub work: Work,
-    /// What happens.
+    /// Task of the arm.
+    pub task: TestTask,
+    /// Event of the test case.
     pub event: Event,
-    /// What should come of it.
+    /// Expected result.
     pub expected: Expected,
-    /// From what happens to rest or braking, where it stops \[ms\].
+    /// Time limit from the event to rest or braking \[ms\].
     pub within_ms: f64,
 }
 
-/// The program itself, as `supple up`.
+/// Name of this program, which runs `supple up`.
 pub const UP: &str = "supple";
 
 impl Spec {
-    /// By the wall clock, not in virtual time.
-    pub fn by_the_wall(&self) -> bool {
+    /// Whether the case runs in wall-clock time instead of virtual time.
+    pub fn runs_in_wall_clock_time(&self) -> bool {
         matches!(
             self.event,
-            Event::Nothing { wall: true } | Event::Process { .. } | Event::Flood
+            Event::Nothing { wall: true } | Event::Process { .. } | Event::RequestQueueFull
         )
     }
 
-    /// Its name, as `--only` and `--list` have it.
+    /// Name of the test case, as used by `--only` and `--list`.
     pub fn name(&self) -> String {
         let plant = format!("{:?}", self.plant).to_lowercase();
-        format!("{plant}/{}/{}", self.work, self.event)
+        format!("{plant}/{}/{}", self.task, self.event)
     }
 }
 
-impl fmt::Display for Work {
+impl fmt::Display for TestTask {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Work::GravityHold => "gravity_hold",
-            Work::Move => "move",
-            Work::Track => "track",
-            Work::Probe => "probe",
-            Work::Excite => "excite",
+            TestTask::GravityHold => "gravity_hold",
+            TestTask::Move => "move",
+            TestTask::Track => "track",
+            TestTask::Probe => "probe",
+            TestTask::Excite => "excite",
         })
     }
 }
@@ -161,27 +159,29 @@ impl fmt::Display for Event {
             Event::Nothing { wall: true } => f.write_str("nothing-by-the-clock"),
             Event::Process { name, loss } => {
                 let how = match loss {
-                    Loss::Kill => "kill",
-                    Loss::Stop => "stop",
+                    ProcessFailure::Kill => "kill",
+                    ProcessFailure::Stop => "stop",
                 };
                 write!(f, "{how}-{name}")
             }
-            Event::Flood => f.write_str("sixteen-requests-wait"),
+            Event::RequestQueueFull => f.write_str("sixteen-requests-wait"),
             Event::Injected { kind, at_once } => {
                 let injection = supple_plant::Injection {
                     kind: *kind,
-                    trigger: supple_plant::Trigger::AtOnce,
+                    trigger: supple_plant::Trigger::AtStart,
                 };
                 let from = if *at_once { "-from-the-start" } else { "" };
                 write!(f, "{injection}{from}")
             }
             Event::Obstacle => f.write_str("block-in-the-way"),
-            Event::Drives(Lowered::Idle) => f.write_str("drives-idle-and-back"),
-            Event::Drives(Lowered::IdleWhenStiff) => f.write_str("stiff-drives-idle-and-back"),
-            Event::Drives(Lowered::EStop) => f.write_str("e-stop-and-back"),
-            Event::Request(Wrong::TooFast) => f.write_str("too-fast-request"),
-            Event::Request(Wrong::TooStiff) => f.write_str("too-much-damping"),
-            Event::Request(Wrong::WhileIdle) => f.write_str("work-while-drives-idle"),
+            Event::Drives(DriveShutdown::Idle) => f.write_str("drives-idle-and-back"),
+            Event::Drives(DriveShutdown::IdleWhenStiff) => {
+                f.write_str("stiff-drives-idle-and-back")
+            }
+            Event::Drives(DriveShutdown::EStop) => f.write_str("e-stop-and-back"),
+            Event::Request(InvalidRequest::TooFast) => f.write_str("too-fast-request"),
+            Event::Request(InvalidRequest::TooStiff) => f.write_str("too-much-damping"),
+            Event::Request(InvalidRequest::WhileIdle) => f.write_str("work-while-drives-idle"),
         }
     }
 }
@@ -190,16 +190,18 @@ impl fmt::Display for Expected {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let any = |names: &[&str]| names.join(" or ");
         match self {
-            Expected::Unharmed => f.write_str("works on"),
-            Expected::Stops(names) => write!(f, "stops: {}", any(names)),
-            Expected::Bears(names) => write!(f, "works on, or stops: {}", any(names)),
-            Expected::Brakes(from_ms, to_ms) => {
-                write!(f, "brakes within {from_ms:.0} to {to_ms:.0} ms")
+            Expected::KeepsRunning => f.write_str("keeps running"),
+            Expected::FaultAndRest(names) => write!(f, "faults and stops: {}", any(names)),
+            Expected::KeepsRunningOrFault(names) => {
+                write!(f, "keeps running, or faults and stops: {}", any(names))
             }
-            Expected::ControllerFault => f.write_str("controller in fault"),
-            Expected::Refused => f.write_str("refused, nothing moves"),
-            Expected::ComesBack => f.write_str("gravity hold again, no jump"),
-            Expected::Heard => f.write_str("idle within 20 ms"),
+            Expected::Brakes(from_ms, to_ms) => {
+                write!(f, "brakes after {from_ms:.0} to {to_ms:.0} ms")
+            }
+            Expected::ControllerFault => f.write_str("controller latches a fault"),
+            Expected::Refused => f.write_str("refused, arm does not move"),
+            Expected::ReturnsToGravityHold => f.write_str("gravity hold again, no jump"),
+            Expected::IdleAccepted => f.write_str("idle within 20 ms"),
         }
     }
 }

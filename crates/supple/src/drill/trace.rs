@@ -1,63 +1,62 @@
-//! What acted at the motors, from the trace of a simulated arm.
+//! Reads the trace of a simulated arm: torques at the motors, forces and motion of the tip.
 
 use crate::exit::Failure;
 use std::path::Path;
 
-/// Longest trace that is read \[bytes\].
-const MOST_BYTES: u64 = 1 << 30;
+/// Maximum size of a trace file \[bytes\].
+const MAX_BYTES: u64 = 1 << 30;
 
-/// One line.
+/// One row of a trace.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Line {
-    /// When \[ns\].
+pub struct TraceRow {
+    /// Time \[ns\].
     pub time_ns: u64,
-    /// Some motor takes torques.
+    /// Whether a motor is in torque mode.
     pub active: bool,
-    /// What acts at each motor \[N m\].
+    /// Torque of each motor \[N m\].
     pub torque_nm: Vec<f64>,
-    /// Greatest contact force on the tip since the line before \[N\].
+    /// Maximum contact force on the tip since the previous row \[N\].
     pub force_n: f64,
-    /// Where the tip is, base axes \[m\].
+    /// Tip position, base axes \[m\].
     pub tip_m: [f64; 3],
-    /// Its speed \[m/s\].
+    /// Tip speed \[m/s\].
     pub tip_speed_m_per_s: f64,
     /// Speed of the fastest joint \[rad/s\].
     pub joint_speed_rad_per_s: f64,
     /// Kinetic energy \[J\].
     pub kinetic_energy_j: f64,
-    /// How many injections have begun.
+    /// Number of injections that have begun.
     pub injections: u64,
 }
 
-/// The lines after a loss.
+/// Trace rows after a process loss.
 #[derive(Clone, Debug, PartialEq)]
-pub struct After {
-    lines: Vec<Line>,
+pub struct TraceAfterLoss {
+    lines: Vec<TraceRow>,
     begin_ns: u64,
 }
 
-impl After {
-    /// The lines of a file from `begin_ns` on, for so long \[ns\]. What a killed process left half written
-    /// is passed over.
+impl TraceAfterLoss {
+    /// Reads the rows of a file from `begin_ns` for the duration `for_ns` \[ns\]. An incomplete last line (killed
+    /// writer) is skipped.
     ///
     /// # Errors
     /// [`Failure::File`].
-    pub fn read(file: &Path, begin_ns: u64, for_ns: u64) -> Result<After, Failure> {
-        let within = |line: &Line| (begin_ns..begin_ns + for_ns).contains(&line.time_ns);
-        Ok(After {
+    pub fn read(file: &Path, begin_ns: u64, for_ns: u64) -> Result<TraceAfterLoss, Failure> {
+        let within = |line: &TraceRow| (begin_ns..begin_ns + for_ns).contains(&line.time_ns);
+        Ok(TraceAfterLoss {
             lines: read(file)?.into_iter().filter(within).collect(),
             begin_ns,
         })
     }
 
-    /// When the motors came to brake \[ms\].
+    /// Time from the loss until the motors brake \[ms\].
     pub fn braked_after_ms(&self) -> Option<f64> {
         let braked = self.lines.iter().find(|line| !line.active)?;
         Some((braked.time_ns - self.begin_ns) as f64 * 1e-6)
     }
 
-    /// By how much a motor's torque rose in magnitude above what it was at the loss, while it was still
-    /// active \[N m\].
+    /// Maximum rise of the magnitude of a motor torque above its value at the loss, while active \[N m\].
     pub fn torque_rise_nm(&self) -> f64 {
         let Some(first) = self.lines.first() else {
             return 0.0;
@@ -70,7 +69,7 @@ impl After {
         rises.fold(0.0, f64::max)
     }
 
-    /// Greatest force on the tip \[N\].
+    /// Maximum force on the tip \[N\].
     pub fn peak_force_n(&self) -> f64 {
         self.lines
             .iter()
@@ -78,7 +77,7 @@ impl After {
             .fold(0.0, f64::max)
     }
 
-    /// How far the tip sank \[m\].
+    /// Distance by which the tip descended \[m\].
     pub fn sank_m(&self) -> f64 {
         let first = self.lines.first().map_or(0.0, |line| line.tip_m[2]);
         let lowest = self.lines.iter().map(|line| line.tip_m[2]);
@@ -86,21 +85,23 @@ impl After {
     }
 }
 
-/// Every whole line of a file. What a killed process left half written is passed over.
+/// Reads the complete rows of a file. An incomplete last line (killed writer) is skipped.
 ///
 /// # Errors
 /// [`Failure::File`].
-pub fn read(file: &Path) -> Result<Vec<Line>, Failure> {
-    let text = supple_files::read_text(file, MOST_BYTES)
+pub fn read(file: &Path) -> Result<Vec<TraceRow>, Failure> {
+    let text = supple_files::read_text(file, MAX_BYTES)
         .map_err(|error| Failure::file("read", file, error))?;
     let mut lines = text.lines();
     let head: Vec<&str> = lines.next().unwrap_or("").split(',').collect();
-    Ok(lines.filter_map(|line| Line::parse(&head, line)).collect())
+    Ok(lines
+        .filter_map(|line| TraceRow::parse(&head, line))
+        .collect())
 }
 
-impl Line {
-    /// Columns by the names of the head.
-    fn parse(head: &[&str], text: &str) -> Option<Line> {
+impl TraceRow {
+    /// Parses a row; `head` contains the column names.
+    fn parse(head: &[&str], text: &str) -> Option<TraceRow> {
         let values: Vec<&str> = text.split(',').collect();
         if values.len() != head.len() {
             return None;
@@ -118,7 +119,7 @@ impl Line {
             .iter()
             .filter(|name| name.starts_with("motor") && name.ends_with("_nm"));
         let [x, y, z] = three(["force_x_n", "force_y_n", "force_z_n"])?;
-        Some(Line {
+        Some(TraceRow {
             time_ns: text("time_ns")?.parse().ok()?,
             active: number("motors_in_torque_mode")? > 0.0,
             torque_nm: motors.map(|name| number(name)).collect::<Option<_>>()?,
@@ -137,7 +138,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_trace_says_when_the_motors_braked_and_what_was_hit() {
+    fn braking_time_force_torque_rise_and_descent_are_read_from_a_trace() {
         let file = tempfile::NamedTempFile::new().expect("a file");
         let text = "time_ns,motors_in_torque_mode,motor1_nm,force_x_n,force_y_n,force_z_n,\
                     tip_x_m,tip_y_m,tip_z_m,tip_speed_m_per_s,joint_speed_rad_per_s,\
@@ -150,7 +151,7 @@ mod tests {
                     9004000000,0,0.0,0,0,80,0,0,0.10,0,0,0,,,1\n\
                     10040000";
         std::fs::write(file.path(), text).expect("written");
-        let after = After::read(file.path(), 1_000_000_000, 2_000_000_000).expect("read");
+        let after = TraceAfterLoss::read(file.path(), 1_000_000_000, 2_000_000_000).expect("read");
         assert_eq!(after.braked_after_ms(), Some(3.0));
         assert_eq!(after.peak_force_n(), 5.0);
         assert!((after.torque_rise_nm() - 0.5).abs() < 1e-12);

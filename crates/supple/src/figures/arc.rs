@@ -1,16 +1,16 @@
-//! The arc that moves the base: path from above and error.
+//! Figure of the arc about the base: top view of the path, and tracking error.
 
 use super::axis::Axis;
-use super::panel::{Key, Panel, Room, legend};
+use super::panel::{LegendSymbol, Margins, Panel, legend};
 use super::style::{BLUE, REFERENCE, px};
 use super::ticks::{Ticks, extent};
-use super::{FigureError, distance, mm, sheet};
+use super::{FigureError, distance, draw_canvas, mm};
 use supple_experiment::Sample;
 
-/// The SVG.
+/// Draws the figure as SVG.
 pub fn draw(samples: &[Sample]) -> Result<String, FigureError> {
-    let words = "Path of the tip along the arc seen from above, and its error over time";
-    sheet((760, 270), words, |area| {
+    let alt_text = "Path of the tip along the arc seen from above, and its error over time";
+    draw_canvas((760, 270), alt_text, |area| {
         let (path, error) = area.split_horizontally(px(300.0));
         let coordinate = |axis: usize| {
             extent(
@@ -22,7 +22,7 @@ pub fn draw(samples: &[Sample]) -> Result<String, FigureError> {
         let mut panel = Panel::new(
             &path,
             "path from above, x enlarged",
-            Room::default(),
+            Margins::default(),
             &Axis::new("y [m]", Ticks::around(coordinate(1), 4)),
             &Axis::new("x [m]", Ticks::around(coordinate(0), 4)),
         )?;
@@ -34,21 +34,21 @@ pub fn draw(samples: &[Sample]) -> Result<String, FigureError> {
         panel.line(samples.iter().map(|s| (s.tip_m[1], s.tip_m[0])), BLUE, 1.4)?;
         let off = |s: &Sample| mm(distance(&s.tip_m, &s.reference_m));
         let end = samples.last().map_or(1.0, |s| s.time_s.floor());
-        let greatest = extent(samples.iter().map(off)).end;
+        let max = extent(samples.iter().map(off)).end;
         let mut panel = Panel::new(
             &error,
             "distance from the reference",
-            Room::default(),
+            Margins::default(),
             &Axis::new("time [s]", Ticks::stepped(0.0..end, 2.0)),
-            &Axis::new("distance [mm]", Ticks::around(0.0..1.05 * greatest, 5)),
+            &Axis::new("distance [mm]", Ticks::around(0.0..1.05 * max, 5)),
         )?;
         panel.line(samples.iter().map(|s| (s.time_s, off(s))), BLUE, 1.4)?;
         legend(
             &error,
             (240.0, 14.0),
             &[
-                ("reference", Key::Line(5.0), REFERENCE),
-                ("actual", Key::Line(1.4), BLUE),
+                ("reference", LegendSymbol::Line(5.0), REFERENCE),
+                ("actual", LegendSymbol::Line(1.4), BLUE),
             ],
         )
     })

@@ -1,4 +1,4 @@
-//! An axis: quantity with unit, range and round ticks, in the drawing library's terms.
+//! An axis: quantity with unit, range and round ticks, for the drawing library.
 
 use super::ticks::{Ticks, number};
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
@@ -9,18 +9,18 @@ use std::ops::Range;
 pub struct Axis<'a> {
     /// Quantity and unit.
     pub label: &'a str,
-    /// Where it is labelled and how far it goes.
+    /// Tick positions and range.
     pub scale: Scale,
 }
 
 impl<'a> Axis<'a> {
-    /// From the first tick to the last.
+    /// Axis from the first tick to the last.
     pub fn new(label: &'a str, ticks: Ticks) -> Axis<'a> {
         let range = ticks.range();
         Axis::bounded(label, ticks, range)
     }
 
-    /// Over a range of its own; ticks outside it are left out.
+    /// Axis over a given range; ticks outside it are omitted.
     pub fn bounded(label: &'a str, ticks: Ticks, range: Range<f64>) -> Axis<'a> {
         let inside = |at: &f64| range.start <= *at && *at <= range.end;
         let ticks = Ticks {
@@ -37,7 +37,7 @@ impl<'a> Axis<'a> {
         }
     }
 
-    /// Evenly spaced decades over a range above zero; ticks at 1, 2 and 5.
+    /// Logarithmic axis over a range above zero; ticks at 1, 2 and 5.
     pub fn logarithmic(label: &'a str, range: Range<f64>) -> Axis<'a> {
         let first = range.start.log10().floor() as i32;
         let last = range.end.log10().ceil() as i32;

@@ -1,89 +1,86 @@
-//! Figure 3a: the tip along x over time, its error, and the error at other paces.
+//! Figure 3a: the tip along x over time, its error, and the error at other speeds.
 
 use super::axis::Axis;
-use super::panel::{Key, Panel, Room, legend};
+use super::panel::{LegendSymbol, Margins, Panel, legend};
 use super::style::{BLUE, GREEN, PURPLE, REFERENCE, VERMILION};
 use super::ticks::{Ticks, extent};
-use super::{FigureError, distance, mm, sheet};
+use super::{FigureError, distance, draw_canvas, mm};
 use plotters::style::RGBColor;
 use supple_core::trajectory::Sinusoid;
 use supple_experiment::{Demo, Sample};
 
 /// Runs of the sinusoid.
-pub struct Paces<'a> {
-    /// At the paper's pace.
+pub struct SinusoidRuns<'a> {
+    /// Run at the paper's speed.
     pub paper: &'a [Sample],
-    /// Pace and run, all of them.
+    /// All runs, with their speed factors.
     pub all: Vec<(f64, &'a [Sample])>,
 }
 
-impl<'a> Paces<'a> {
-    /// Of a demo.
-    pub fn of(demo: &'a Demo) -> Paces<'a> {
+impl<'a> SinusoidRuns<'a> {
+    /// Collects the runs of a demo.
+    pub fn of(demo: &'a Demo) -> SinusoidRuns<'a> {
         let all: Vec<_> = demo
             .sinusoids
             .iter()
-            .map(|(pace, run)| (*pace, run.trace.samples.as_slice()))
+            .map(|(speed, run)| (*speed, run.trace.samples.as_slice()))
             .collect();
-        let paper = all.iter().find(|(pace, _)| *pace == 1.0);
-        Paces {
+        let paper = all.iter().find(|(speed, _)| *speed == 1.0);
+        SinusoidRuns {
             paper: paper.map_or(&[], |(_, samples)| samples),
             all,
         }
     }
 }
 
-/// The SVG.
-pub fn draw(paces: &Paces<'_>) -> Result<String, FigureError> {
-    let words = "Tip along x over time for the sinusoid, its error, and the error at three paces";
-    sheet((760, 640), words, |area| {
+/// Draws the figure as SVG.
+pub fn draw(runs: &SinusoidRuns<'_>) -> Result<String, FigureError> {
+    let alt_text =
+        "Tip along x over time for the sinusoid, its error, and the error at three speeds";
+    draw_canvas((760, 640), alt_text, |area| {
         let (position, rest) = area.split_vertically(super::style::px(235.0));
-        let (components, by_pace) = rest.split_vertically(super::style::px(195.0));
-        let time = time_ticks(paces.paper);
+        let (components, by_speed) = rest.split_vertically(super::style::px(195.0));
+        let time = time_ticks(runs.paper);
 
         let x = |s: &Sample| [s.reference_m[0], s.tip_m[0]];
-        let y_ticks = Ticks::around(extent(paces.paper.iter().flat_map(x)), 5);
+        let y_ticks = Ticks::around(extent(runs.paper.iter().flat_map(x)), 5);
         let mut panel = Panel::new(
             &position,
             "(i)  reference and actual tip, K = 5 N/m, B = 1.5 N s/m",
-            Room::default(),
+            Margins::default(),
             &Axis::new("time [s]", time.clone()),
             &Axis::new("x [m]", y_ticks),
         )?;
         panel.line(
-            paces.paper.iter().map(|s| (s.time_s, s.reference_m[0])),
+            runs.paper.iter().map(|s| (s.time_s, s.reference_m[0])),
             REFERENCE,
             5.0,
         )?;
-        panel.line(
-            paces.paper.iter().map(|s| (s.time_s, s.tip_m[0])),
-            BLUE,
-            1.6,
-        )?;
+        panel.line(runs.paper.iter().map(|s| (s.time_s, s.tip_m[0])), BLUE, 1.6)?;
         legend(
             &position,
             (560.0, 14.0),
             &[
-                ("reference", Key::Line(5.0), REFERENCE),
-                ("actual", Key::Line(1.6), BLUE),
+                ("reference", LegendSymbol::Line(5.0), REFERENCE),
+                ("actual", LegendSymbol::Line(1.6), BLUE),
             ],
         )?;
 
         let error = |s: &Sample, axis: usize| mm(s.tip_m[axis] - s.reference_m[axis]);
-        let all = paces
+        let all = runs
             .paper
             .iter()
             .flat_map(|s| [0, 1, 2].map(|axis| error(s, axis)));
         let mut panel = Panel::new(
             &components,
             "(ii)  its error, by component",
-            Room::default(),
+            Margins::default(),
             &Axis::new("time [s]", time),
             &Axis::new("error [mm]", Ticks::around(extent(all), 4)),
         )?;
         for (axis, colour) in [(1, GREEN), (2, VERMILION), (0, BLUE)] {
             panel.line(
-                paces.paper.iter().map(|s| (s.time_s, error(s, axis))),
+                runs.paper.iter().map(|s| (s.time_s, error(s, axis))),
                 colour,
                 1.4,
             )?;
@@ -92,44 +89,44 @@ pub fn draw(paces: &Paces<'_>) -> Result<String, FigureError> {
             &components,
             (590.0, 14.0),
             &[
-                ("x", Key::Line(1.6), BLUE),
-                ("y", Key::Line(1.6), GREEN),
-                ("z", Key::Line(1.6), VERMILION),
+                ("x", LegendSymbol::Line(1.6), BLUE),
+                ("y", LegendSymbol::Line(1.6), GREEN),
+                ("z", LegendSymbol::Line(1.6), VERMILION),
             ],
         )?;
 
         let off = |s: &Sample| mm(distance(&s.tip_m, &s.reference_m));
-        let all = paces
+        let all = runs
             .all
             .iter()
             .flat_map(|(_, samples)| samples.iter().map(off));
-        let greatest = extent(all).end;
-        let periods = |pace: f64, s: &Sample| s.time_s / Sinusoid::paper(pace).period_s();
+        let max = extent(all).end;
+        let periods = |speed: f64, s: &Sample| s.time_s / Sinusoid::paper(speed).period_s();
         let mut panel = Panel::new(
-            &by_pace,
-            "(iii)  distance from the reference at three paces",
-            Room::default(),
+            &by_speed,
+            "(iii)  distance from the reference at three speeds",
+            Margins::default(),
             &Axis::new(
                 "time [periods]",
-                Ticks::stepped(0.0..last(paces, periods), 0.25),
+                Ticks::stepped(0.0..last(runs, periods), 0.25),
             ),
-            &Axis::new("distance [mm]", Ticks::around(0.0..1.05 * greatest, 4)),
+            &Axis::new("distance [mm]", Ticks::around(0.0..1.05 * max, 4)),
         )?;
         let colours: [RGBColor; 3] = [GREEN, BLUE, PURPLE];
         let mut entries = Vec::new();
-        for ((pace, samples), colour) in paces.all.iter().zip(colours.into_iter().cycle()) {
+        for ((speed, samples), colour) in runs.all.iter().zip(colours.into_iter().cycle()) {
             panel.line(
-                samples.iter().map(|s| (periods(*pace, s), off(s))),
+                samples.iter().map(|s| (periods(*speed, s), off(s))),
                 colour,
                 1.4,
             )?;
-            entries.push((format!("{pace} \u{d7}"), colour));
+            entries.push((format!("{speed} \u{d7}"), colour));
         }
         let entries: Vec<_> = entries
             .iter()
-            .map(|(label, colour)| (label.as_str(), Key::Line(1.6), *colour))
+            .map(|(label, colour)| (label.as_str(), LegendSymbol::Line(1.6), *colour))
             .collect();
-        legend(&by_pace, (520.0, 14.0), &entries)
+        legend(&by_speed, (520.0, 14.0), &entries)
     })
 }
 
@@ -137,10 +134,10 @@ fn time_ticks(samples: &[Sample]) -> Ticks {
     Ticks::stepped(0.0..samples.last().map_or(1.0, |s| s.time_s.floor()), 2.0)
 }
 
-fn last(paces: &Paces<'_>, periods: impl Fn(f64, &Sample) -> f64) -> f64 {
-    let ends = paces
+fn last(runs: &SinusoidRuns<'_>, periods: impl Fn(f64, &Sample) -> f64) -> f64 {
+    let ends = runs
         .all
         .iter()
-        .filter_map(|(pace, samples)| samples.last().map(|s| periods(*pace, s)));
+        .filter_map(|(speed, samples)| samples.last().map(|s| periods(*speed, s)));
     ends.fold(0.25, f64::max).floor().max(0.25)
 }

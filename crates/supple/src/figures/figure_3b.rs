@@ -1,41 +1,41 @@
 //! Figure 3b: the path through the quadrant and the error along it, at each speed.
 
 use super::axis::Axis;
-use super::panel::{Key, Panel, Room, legend};
+use super::panel::{LegendSymbol, Margins, Panel, legend};
 use super::style::{BLUE, MUTED, REFERENCE, px};
 use super::ticks::{Ticks, extent};
-use super::{FigureError, distance, mm, sheet};
+use super::{FigureError, distance, draw_canvas, mm};
 use crate::sections::kinds_of_quadrant;
 use plotters::style::text_anchor::HPos;
 use std::ops::Range;
 use supple_core::trajectory::{Piece, Quadrant};
 use supple_experiment::{Demo, Sample, scenario};
 
-/// Height of the keys above all rows \[px\].
+/// Height of the legend above all rows \[px\].
 const HEAD_PX: f64 = 24.0;
 /// Height of a row \[px\].
 const HEIGHT_PX: f64 = 270.0;
 /// Width of the path \[px\].
 const PATH_WIDTH_PX: f64 = 370.0;
-/// Free space around the path, as a share of its size.
+/// Free space around the path, as a fraction of its size.
 const MARGIN: f64 = 0.08;
 
 /// One run of the quadrant.
-pub struct Walk<'a> {
-    /// Its trajectory.
+pub struct QuadrantRun<'a> {
+    /// Trajectory of the run.
     pub quadrant: Quadrant,
     /// Speed and model.
     pub title: String,
-    /// The run.
+    /// Samples of the run.
     pub samples: &'a [Sample],
 }
 
 /// The runs of a demo.
-pub fn walks(demo: &Demo) -> Vec<Walk<'_>> {
+pub fn quadrant_runs(demo: &Demo) -> Vec<QuadrantRun<'_>> {
     let runs = kinds_of_quadrant(&demo.summary)
         .into_iter()
         .zip(&demo.quadrants);
-    runs.map(|((summary, model), run)| Walk {
+    runs.map(|((summary, model), run)| QuadrantRun {
         quadrant: scenario::quadrant(summary.speed_m_per_s).0,
         title: format!("{:.3} m/s, {model}", summary.speed_m_per_s),
         samples: &run.trace.samples,
@@ -43,60 +43,61 @@ pub fn walks(demo: &Demo) -> Vec<Walk<'_>> {
     .collect()
 }
 
-/// The SVG.
-pub fn draw(walks: &[Walk<'_>]) -> Result<String, FigureError> {
-    let words = "Path of the tip through the quadrant in the x-z plane, and its error over time";
-    let height = HEAD_PX as u32 + HEIGHT_PX as u32 * u32::try_from(walks.len()).unwrap_or(0);
-    sheet((760, height), words, |area| {
+/// Draws the figure as SVG.
+pub fn draw(quadrant_runs: &[QuadrantRun<'_>]) -> Result<String, FigureError> {
+    let alt_text = "Path of the tip through the quadrant in the x-z plane, and its error over time";
+    let height =
+        HEAD_PX as u32 + HEIGHT_PX as u32 * u32::try_from(quadrant_runs.len()).unwrap_or(0);
+    draw_canvas((760, height), alt_text, |area| {
         let (head, rows) = area.split_vertically(px(HEAD_PX));
         let keys = [
-            ("reference", Key::Line(5.0), REFERENCE),
-            ("actual", Key::Line(1.4), BLUE),
+            ("reference", LegendSymbol::Line(5.0), REFERENCE),
+            ("actual", LegendSymbol::Line(1.4), BLUE),
         ];
         legend(&head, (58.0, 14.0), &keys)?;
-        let rows = rows.split_evenly((walks.len().max(1), 1));
-        for (row, walk) in rows.iter().zip(walks) {
+        let rows = rows.split_evenly((quadrant_runs.len().max(1), 1));
+        for (row, run) in rows.iter().zip(quadrant_runs) {
             let (path, error) = row.split_horizontally(px(PATH_WIDTH_PX));
-            draw_path(&path, walk)?;
-            draw_error(&error, walk)?;
+            draw_path(&path, run)?;
+            draw_error(&error, run)?;
         }
         Ok(())
     })
 }
 
-fn draw_path(area: &super::panel::Area<'_>, walk: &Walk<'_>) -> Result<(), FigureError> {
+fn draw_path(area: &super::panel::Area<'_>, run: &QuadrantRun<'_>) -> Result<(), FigureError> {
     let all = |axis: usize| {
         extent(
-            walk.samples
+            run.samples
                 .iter()
                 .flat_map(move |s| [s.reference_m[axis], s.tip_m[axis]]),
         )
     };
-    let room = Room::default();
-    let axes_px = room.axes_px(PATH_WIDTH_PX, HEIGHT_PX);
+    let margins = Margins::default();
+    let axes_px = margins.axes_px(PATH_WIDTH_PX, HEIGHT_PX);
     let (x_range, z_range) = same_scale(all(0), all(2), axes_px);
     let mut panel = Panel::new(
         area,
-        &walk.title,
-        room,
+        &run.title,
+        margins,
         &Axis::bounded("x [m]", Ticks::stepped(x_range.clone(), 0.1), x_range),
         &Axis::bounded("z [m]", Ticks::stepped(z_range.clone(), 0.1), z_range),
     )?;
     panel.line(
-        walk.samples
+        run.samples
             .iter()
             .map(|s| (s.reference_m[0], s.reference_m[2])),
         REFERENCE,
         5.0,
     )?;
     panel.line(
-        walk.samples.iter().map(|s| (s.tip_m[0], s.tip_m[2])),
+        run.samples.iter().map(|s| (s.tip_m[0], s.tip_m[2])),
         BLUE,
         1.4,
     )
 }
 
-/// Ranges around both with the same metres a pixel.
+/// Axis ranges around both values with the same scale (metres per pixel).
 fn same_scale(x: Range<f64>, z: Range<f64>, axes_px: (f64, f64)) -> (Range<f64>, Range<f64>) {
     let size = |r: &Range<f64>| (1.0 + 2.0 * MARGIN) * (r.end - r.start);
     let m_per_px = (size(&x) / axes_px.0).max(size(&z) / axes_px.1);
@@ -107,19 +108,19 @@ fn same_scale(x: Range<f64>, z: Range<f64>, axes_px: (f64, f64)) -> (Range<f64>,
     (around(x, axes_px.0), around(z, axes_px.1))
 }
 
-fn draw_error(area: &super::panel::Area<'_>, walk: &Walk<'_>) -> Result<(), FigureError> {
+fn draw_error(area: &super::panel::Area<'_>, run: &QuadrantRun<'_>) -> Result<(), FigureError> {
     let off = |s: &Sample| mm(distance(&s.tip_m, &s.reference_m));
-    let end = walk.samples.last().map_or(1.0, |s| s.time_s);
-    let greatest = extent(walk.samples.iter().map(off)).end;
+    let end = run.samples.last().map_or(1.0, |s| s.time_s);
+    let max = extent(run.samples.iter().map(off)).end;
     let mut panel = Panel::new(
         area,
-        "distance from the reference, piece by piece",
-        Room::default(),
+        "distance from the reference, per piece",
+        Margins::default(),
         &Axis::bounded("time [s]", Ticks::around(0.0..end, 5), 0.0..end),
-        &Axis::new("distance [mm]", Ticks::around(0.0..1.12 * greatest, 5)),
+        &Axis::new("distance [mm]", Ticks::around(0.0..1.12 * max, 5)),
     )?;
     let top = panel.y().end;
-    for (piece, from, to) in pieces(walk) {
+    for (piece, from, to) in pieces(run) {
         if piece == Piece::Ellipse {
             panel.band(from, to)?;
         }
@@ -138,14 +139,14 @@ fn draw_error(area: &super::panel::Area<'_>, walk: &Walk<'_>) -> Result<(), Figu
             )?;
         }
     }
-    panel.line(walk.samples.iter().map(|s| (s.time_s, off(s))), BLUE, 1.4)
+    panel.line(run.samples.iter().map(|s| (s.time_s, off(s))), BLUE, 1.4)
 }
 
-/// Pieces in the order walked, with their times \[s\].
-fn pieces(walk: &Walk<'_>) -> Vec<(Piece, f64, f64)> {
+/// Segments in order of travel, with their time intervals \[s\].
+fn pieces(run: &QuadrantRun<'_>) -> Vec<(Piece, f64, f64)> {
     let mut pieces: Vec<(Piece, f64, f64)> = Vec::new();
-    for s in walk.samples {
-        let (piece, _, _) = walk.quadrant.piece_at(s.time_s);
+    for s in run.samples {
+        let (piece, _, _) = run.quadrant.piece_at(s.time_s);
         match pieces.last_mut() {
             Some((last, _, to)) if *last == piece => *to = s.time_s,
             _ => pieces.push((piece, s.time_s, s.time_s)),

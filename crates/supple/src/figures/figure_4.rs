@@ -1,10 +1,10 @@
-//! Figure 4: what the torque of shoulder pitch and elbow is made of during the sinusoid.
+//! Figure 4: torque components of shoulder pitch and elbow during the sinusoid.
 
 use super::axis::Axis;
-use super::panel::{Area, Key, Panel, Room, legend};
+use super::panel::{Area, LegendSymbol, Margins, Panel, legend};
 use super::style::{BLUE, GREEN, PURPLE, VERMILION, px};
 use super::ticks::{Ticks, extent};
-use super::{FigureError, sheet};
+use super::{FigureError, draw_canvas};
 use plotters::style::RGBColor;
 use supple_experiment::{Demo, JointTorque, Sample};
 
@@ -18,19 +18,19 @@ const TERMS: [Term; 4] = [
     ("friction", VERMILION, |t| t.friction),
 ];
 
-/// The sinusoid at the paper's pace.
+/// The sinusoid at the paper's speed.
 pub fn samples(demo: &Demo) -> &[Sample] {
-    let paper = demo.sinusoids.iter().find(|(pace, _)| *pace == 1.0);
+    let paper = demo.sinusoids.iter().find(|(speed, _)| *speed == 1.0);
     paper.map_or(&[], |(_, run)| &run.trace.samples)
 }
 
-/// The SVG.
+/// Draws the figure as SVG.
 pub fn draw(samples: &[Sample]) -> Result<String, FigureError> {
-    let words = "Torque components of shoulder pitch and elbow over time: gravity, friction, \
+    let alt_text = "Torque components of shoulder pitch and elbow over time: gravity, friction, \
                  inertial, feedback; below the same without gravity";
-    sheet((760, 470), words, |area| {
+    draw_canvas((760, 470), alt_text, |area| {
         let (head, body) = area.split_vertically(px(24.0));
-        let keys = TERMS.map(|(name, colour, _)| (name, Key::Line(2.0), colour));
+        let keys = TERMS.map(|(name, colour, _)| (name, LegendSymbol::Line(2.0), colour));
         legend(&head, (170.0, 13.0), &keys)?;
         let (all, small) = body.split_vertically(px(235.0));
         let names = ["(a)  shoulder pitch, joint 2", "(b)  elbow, joint 3"];
@@ -70,7 +70,7 @@ fn panel(
     let mut panel = Panel::new(
         area,
         title,
-        Room::default(),
+        Margins::default(),
         &Axis::new("time [s]", Ticks::stepped(0.0..end, 4.0)),
         &Axis::new("torque [N m]", Ticks::around(range, 5)),
     )?;

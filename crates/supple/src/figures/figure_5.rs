@@ -1,18 +1,18 @@
 //! Figure 5: force on the tip at a low and a high stiffness, aligned at the first touch.
 
 use super::axis::Axis;
-use super::panel::{Area, Key, Panel, Room, legend};
+use super::panel::{Area, LegendSymbol, Margins, Panel, legend};
 use super::style::{BLUE, REFERENCE, VERMILION, px};
 use super::ticks::{Ticks, extent};
-use super::{FigureError, sheet};
+use super::{FigureError, draw_canvas};
 use plotters::style::RGBColor;
 use supple_experiment::{Demo, Sample};
 
 /// Force that counts as touch, well above the noise of the sensor \[N\].
 const TOUCH_N: f64 = 0.5;
-/// What is shown before the first touch \[s\].
+/// Time shown before the first touch \[s\].
 const BEFORE_S: f64 = 0.25;
-/// What the close-up shows after it \[s\].
+/// Time after the first touch that the close-up shows \[s\].
 const CLOSE_UP_S: f64 = 0.1;
 /// The stiffnesses of the paper's figure, 25 times apart \[N/m\].
 const SHOWN_N_PER_M: [f64; 2] = [5.0, 125.0];
@@ -24,12 +24,12 @@ type Contact = Vec<(f64, f64)>;
 pub struct Probing {
     /// `K` \[N/m\].
     pub stiffness_n_per_m: f64,
-    /// One series a stroke that touched.
+    /// One series per stroke with contact.
     pub contacts: Vec<Contact>,
 }
 
 impl Probing {
-    /// Cuts a run into strokes, each at the moment its reference turns downwards.
+    /// Splits a run into strokes at the times at which the reference starts to move down.
     pub fn new(stiffness_n_per_m: f64, samples: &[Sample]) -> Probing {
         let descends = |pair: &[Sample]| pair[1].reference_m[2] < pair[0].reference_m[2] - 1e-9;
         let down: Vec<bool> = samples.windows(2).map(descends).collect();
@@ -48,7 +48,7 @@ impl Probing {
     }
 }
 
-/// Those of the paper's figure.
+/// The probing runs at the stiffnesses of the paper's figure.
 pub fn probings(demo: &Demo) -> Vec<Probing> {
     let shown = demo
         .probing
@@ -69,11 +69,11 @@ fn contact(stroke: &[Sample]) -> Option<Contact> {
     )
 }
 
-/// The SVG.
+/// Draws the figure as SVG.
 pub fn draw(probings: &[Probing]) -> Result<String, FigureError> {
-    let words = "Force on the tip over time at a low and at a high stiffness, aligned at the first \
+    let alt_text = "Force on the tip over time at a low and at a high stiffness, aligned at the first \
                  touch, and the first transient close up";
-    sheet((760, 480), words, |area| {
+    draw_canvas((760, 480), alt_text, |area| {
         let (whole, close) = area.split_vertically(px(250.0));
         let (left, right) = whole.split_horizontally(px(380.0));
         let force = force_ticks(probings, f64::INFINITY);
@@ -112,7 +112,7 @@ fn whole_contact(
     let mut panel = Panel::new(
         area,
         title,
-        Room::default(),
+        Margins::default(),
         &Axis::bounded(
             "time since the first touch [s]",
             Ticks::around(0.0..end, 5),
@@ -130,8 +130,8 @@ fn whole_contact(
         area,
         (182.0, 40.0),
         &[
-            ("first stroke", Key::Line(1.6), colour),
-            ("others", Key::Line(1.2), REFERENCE),
+            ("first stroke", LegendSymbol::Line(1.6), colour),
+            ("others", LegendSymbol::Line(1.2), REFERENCE),
         ],
     )
 }
@@ -144,7 +144,7 @@ fn close_up(
     let mut panel = Panel::new(
         area,
         "(c)  the first transient of both, close up",
-        Room::default(),
+        Margins::default(),
         &Axis::new(
             "time since the first touch [ms]",
             Ticks::stepped(-10.0..1e3 * CLOSE_UP_S, 10.0),
@@ -160,7 +160,7 @@ fn close_up(
     }
     let entries: Vec<_> = entries
         .iter()
-        .map(|(label, colour)| (label.as_str(), Key::Line(1.8), *colour))
+        .map(|(label, colour)| (label.as_str(), LegendSymbol::Line(1.8), *colour))
         .collect();
     legend(area, (520.0, 42.0), &entries)
 }
@@ -170,7 +170,7 @@ mod tests {
     use super::*;
     use supple_experiment::JointTorque;
 
-    /// Two strokes of 2 s down and up; the first touches at 0.5 s, the second not at all.
+    /// Two strokes of 2 s down and up; the first touches at 0.5 s, the second does not touch.
     fn samples() -> Vec<Sample> {
         let sample = |k: u32| {
             let time_s = f64::from(k) * 1e-3;

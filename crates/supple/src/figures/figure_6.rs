@@ -1,17 +1,17 @@
 //! Figure 6: impulse of one contact over stiffness, with the line through it.
 
 use super::axis::Axis;
-use super::panel::{Area, Key, Mark, Panel, Room, legend};
-use super::style::{BLUE, GREEN, INK, VERMILION, px};
+use super::panel::{Area, LegendSymbol, Margins, Mark, Panel, legend};
+use super::style::{BLUE, GREEN, TEXT_COLOUR, VERMILION, px};
 use super::ticks::{Ticks, extent, number};
-use super::{FigureError, sheet};
+use super::{FigureError, draw_canvas};
 use plotters::style::RGBColor;
 use std::ops::Range;
 use supple_experiment::Demo;
 use supple_experiment::metrics::LineFit;
-use supple_experiment::summary::Exploration;
+use supple_experiment::summary::ProbingSummary;
 
-/// What the second panel shows \[N/m\].
+/// Range of stiffness of the second panel \[N/m\].
 const NEAR_ZERO_N_PER_M: f64 = 25.0;
 
 /// Impulses of runs that differ in stiffness only.
@@ -20,11 +20,11 @@ pub struct Series {
     pub whole: Vec<(f64, f64)>,
     /// `K` \[N/m\], impulse over the first 50 ms \[N s\].
     pub first_50ms: Vec<(f64, f64)>,
-    /// Line through `whole`.
+    /// Line fitted to `whole`.
     pub fit: Option<LineFit>,
 }
 
-/// With the fade of the friction feed-forward on and off.
+/// Impulses with the fade of the friction feed-forward on and off.
 pub struct Impulses {
     /// On.
     pub fade_on: Series,
@@ -33,10 +33,10 @@ pub struct Impulses {
 }
 
 impl Impulses {
-    /// Of a demo.
+    /// Collects the impulses of a demo.
     pub fn of(demo: &Demo) -> Impulses {
         let summary = &demo.summary;
-        let series = |lines: &[Exploration], fit: Option<LineFit>| Series {
+        let series = |lines: &[ProbingSummary], fit: Option<LineFit>| Series {
             whole: column(lines, |e| e.contact.impulse_newton_s),
             first_50ms: column(lines, |e| e.contact.impulse_first_50ms_newton_s),
             fit,
@@ -48,18 +48,18 @@ impl Impulses {
     }
 }
 
-fn column(lines: &[Exploration], value: fn(&Exploration) -> f64) -> Vec<(f64, f64)> {
+fn column(lines: &[ProbingSummary], value: fn(&ProbingSummary) -> f64) -> Vec<(f64, f64)> {
     lines
         .iter()
         .map(|e| (e.stiffness_n_per_m, value(e)))
         .collect()
 }
 
-/// The SVG.
+/// Draws the figure as SVG.
 pub fn draw(impulses: &Impulses) -> Result<String, FigureError> {
-    let words = "Impulse of one contact over stiffness with a straight line through it, friction \
+    let alt_text = "Impulse of one contact over stiffness with a straight line through it, friction \
                  feed-forward faded in contact and left on";
-    sheet((760, 400), words, |area| {
+    draw_canvas((760, 400), alt_text, |area| {
         let (head, body) = area.split_vertically(px(46.0));
         keys(&head, impulses)?;
         let (whole, near_zero) = body.split_horizontally(px(470.0));
@@ -94,7 +94,7 @@ fn panel(
     let mut panel = Panel::new(
         area,
         title,
-        Room::default(),
+        Margins::default(),
         &Axis::bounded(
             "stiffness K [N/m]",
             Ticks::stepped(stiffness.clone(), step),
@@ -111,25 +111,33 @@ fn panel(
 }
 
 fn keys(area: &Area<'_>, impulses: &Impulses) -> Result<(), FigureError> {
-    let formula = |words: &str, series: &Series| match series.fit {
+    let formula = |label: &str, series: &Series| match series.fit {
         Some(fit) => format!(
-            "{words}: {} + {} K, R\u{b2} = {}",
+            "{label}: {} + {} K, R\u{b2} = {}",
             number(fit.intercept, 2),
             number(fit.slope, 4),
             number(fit.r2, 3)
         ),
-        None => words.to_owned(),
+        None => label.to_owned(),
     };
     let on = formula("fade on", &impulses.fade_on);
     let off = formula("fade off", &impulses.fade_off);
     let rows = [
         [
-            (on.as_str(), Key::Mark(Mark::Dot), BLUE),
-            ("first 50 ms, fade on", Key::Mark(Mark::Triangle), GREEN),
+            (on.as_str(), LegendSymbol::Mark(Mark::Dot), BLUE),
+            (
+                "first 50 ms, fade on",
+                LegendSymbol::Mark(Mark::Triangle),
+                GREEN,
+            ),
         ],
         [
-            (off.as_str(), Key::Mark(Mark::Square), VERMILION),
-            ("intercept of a line", Key::Mark(Mark::Ring), INK),
+            (off.as_str(), LegendSymbol::Mark(Mark::Square), VERMILION),
+            (
+                "intercept of a line",
+                LegendSymbol::Mark(Mark::Ring),
+                TEXT_COLOUR,
+            ),
         ],
     ];
     for (row, y) in rows.iter().zip([14.0, 34.0]) {
@@ -150,7 +158,7 @@ fn line_and_marks(
     }) = series.fit
     {
         let end = extent(series.whole.iter().map(|p| p.0)).end;
-        // In short steps: a panel leaves out what is beyond its range.
+        // Short steps, because a panel omits points beyond its range.
         let steps = (0..=100).map(|k| end * f64::from(k) / 100.0);
         panel.line(steps.map(|k| (k, intercept + slope * k)), colour, 1.4)?;
         panel.marks(&[(0.0, intercept)], Mark::Ring, colour)?;
@@ -162,7 +170,7 @@ fn line_and_marks(
 mod tests {
     use super::*;
 
-    /// Centres of the filled discs of a colour, legend left out.
+    /// Centres of the filled discs of a colour, without the legend.
     fn discs(svg: &str, colour: &str) -> Vec<(f64, f64)> {
         let document = roxmltree::Document::parse(svg).expect("XML");
         let number = |node: &roxmltree::Node<'_, '_>, name| -> f64 {
@@ -215,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn no_line_is_no_failure() {
+    fn a_figure_without_a_fitted_line_is_drawn() {
         let none = || Series {
             whole: vec![(5.0, f64::NAN)],
             first_50ms: Vec::new(),

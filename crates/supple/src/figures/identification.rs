@@ -1,54 +1,54 @@
-//! Curves of an identification: two quantities over time, a panel a joint.
+//! Curves of an identification: two quantities over time, one panel per joint.
 
 use super::axis::Axis;
-use super::panel::{Key, Panel, Room, legend};
+use super::panel::{LegendSymbol, Margins, Panel, legend};
 use super::style::{BLUE, REFERENCE};
 use super::ticks::{Ticks, extent};
-use super::{FigureError, sheet};
+use super::{FigureError, draw_canvas};
 
-/// Width of the sheet and height of a panel \[px\].
+/// Width of the canvas and height of a panel \[px\].
 const SIZE_PX: (u32, u32) = (760, 190);
 
 /// One panel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curves {
-    /// Its title.
+    /// Title of the panel.
     pub title: String,
     /// Unit of the vertical axis.
     pub unit: &'static str,
-    /// Name and points, drawn broad.
+    /// Name and points of the wide line.
     pub first: (&'static str, Vec<(f64, f64)>),
-    /// Name and points, drawn above.
+    /// Name and points of the line on top.
     pub second: (&'static str, Vec<(f64, f64)>),
 }
 
-/// The SVG.
+/// Draws the figure as SVG.
 ///
 /// # Errors
 /// [`FigureError::Draw`].
-pub fn curves(words: &str, panels: &[Curves]) -> Result<String, FigureError> {
+pub fn curves(alt_text: &str, panels: &[Curves]) -> Result<String, FigureError> {
     let (width, height) = SIZE_PX;
     let count = panels.len().max(1) as u32;
-    sheet((width, height * count), words, |area| {
-        for (curves, place) in panels.iter().zip(area.split_evenly((panels.len(), 1))) {
+    draw_canvas((width, height * count), alt_text, |area| {
+        for (curves, area) in panels.iter().zip(area.split_evenly((panels.len(), 1))) {
             let all = || curves.first.1.iter().chain(&curves.second.1);
             let time = extent(all().map(|point| point.0));
             let value = extent(all().map(|point| point.1));
             let mut panel = Panel::new(
-                &place,
+                &area,
                 &curves.title,
-                Room::default(),
+                Margins::default(),
                 &Axis::new("time [s]", Ticks::around(time, 8)),
                 &Axis::new(curves.unit, Ticks::around(value, 4)),
             )?;
             panel.line(curves.first.1.iter().copied(), REFERENCE, 3.0)?;
             panel.line(curves.second.1.iter().copied(), BLUE, 1.2)?;
             legend(
-                &place,
+                &area,
                 (520.0, 14.0),
                 &[
-                    (curves.first.0, Key::Line(3.0), REFERENCE),
-                    (curves.second.0, Key::Line(1.2), BLUE),
+                    (curves.first.0, LegendSymbol::Line(3.0), REFERENCE),
+                    (curves.second.0, LegendSymbol::Line(1.2), BLUE),
                 ],
             )?;
         }

@@ -1,5 +1,5 @@
-//! The figures of a demo: each module takes plain series and gives an SVG; the PNG is that SVG drawn
-//! with an embedded face, so that it does not depend on what is installed.
+//! The figures of a demo. Each module draws an SVG from plain series; the PNG is rendered from that SVG with an
+//! embedded font, so that it does not depend on installed fonts.
 
 mod arc;
 mod axis;
@@ -21,18 +21,18 @@ use plotters::drawing::DrawingAreaErrorKind;
 use plotters::prelude::*;
 use supple_experiment::Demo;
 
-/// Why there is no figure.
+/// Why a figure cannot be drawn.
 #[derive(Debug, thiserror::Error)]
 pub enum FigureError {
-    /// The drawing library refused.
+    /// The drawing library reported an error.
     #[error("a figure cannot be drawn: {0}")]
     Draw(String),
-    /// The SVG is not one that can be drawn.
+    /// The SVG cannot be rendered.
     #[error("figure {name} cannot be rendered: {reason}")]
     Render {
         /// Name of the figure.
         name: String,
-        /// What the renderer says.
+        /// Error of the renderer.
         reason: String,
     },
 }
@@ -46,14 +46,14 @@ impl<E: std::error::Error + Send + Sync> From<DrawingAreaErrorKind<E>> for Figur
 /// A figure.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Figure {
-    /// Name of its files, without ending.
+    /// Name of the files, without extension.
     pub name: &'static str,
     /// The drawing.
     pub svg: String,
 }
 
 impl Figure {
-    /// The same as a bitmap, two dots a pixel.
+    /// Renders the figure to a PNG with two pixels per displayed pixel.
     ///
     /// # Errors
     /// [`FigureError::Render`].
@@ -69,15 +69,21 @@ impl Figure {
 pub fn all(demo: &Demo) -> Result<Vec<Figure>, FigureError> {
     let figure = |name, svg: Result<String, FigureError>| svg.map(|svg| Figure { name, svg });
     [
-        figure("figure_3a", figure_3a::draw(&figure_3a::Paces::of(demo))),
-        figure("figure_3b", figure_3b::draw(&figure_3b::walks(demo))),
+        figure(
+            "figure_3a",
+            figure_3a::draw(&figure_3a::SinusoidRuns::of(demo)),
+        ),
+        figure(
+            "figure_3b",
+            figure_3b::draw(&figure_3b::quadrant_runs(demo)),
+        ),
         figure("figure_4", figure_4::draw(figure_4::samples(demo))),
         figure("figure_5", figure_5::draw(&figure_5::probings(demo))),
         figure("figure_6", figure_6::draw(&figure_6::Impulses::of(demo))),
         figure("trade_off", trade_off::draw(&trade_off::points(demo))),
         figure(
             "paper_letter",
-            paper_letter::draw(&paper_letter::Letter::of(demo)),
+            paper_letter::draw(&paper_letter::PaperLawRuns::of(demo)),
         ),
         figure("seeds", seeds::draw(&seeds::Seeds::of(demo))),
         figure("arc", arc::draw(&demo.arc.trace.samples)),
@@ -86,10 +92,10 @@ pub fn all(demo: &Demo) -> Result<Vec<Figure>, FigureError> {
     .collect()
 }
 
-/// Draws on a sheet of a size in shown pixels; `words` say what is on it.
-fn sheet(
+/// Draws on a canvas of the given display size \[px\]; `alt_text` is the alternative text.
+fn draw_canvas(
     size_px: (u32, u32),
-    words: &str,
+    alt_text: &str,
     draw: impl FnOnce(&panel::Area<'_>) -> Result<(), FigureError>,
 ) -> Result<String, FigureError> {
     let (width, height) = size_px;
@@ -98,16 +104,16 @@ fn sheet(
     let mut svg = String::new();
     {
         let area = SVGBackend::with_string(&mut svg, drawn).into_drawing_area();
-        area.fill(&style::PAPER)?;
+        area.fill(&style::BACKGROUND)?;
         draw(&area)?;
         area.present()?;
     }
-    // Shown smaller than drawn, and with words for those who cannot see it.
+    // Scaled down for display, with a text alternative for accessibility.
     let (_, rest) = svg.split_once("viewBox=").unwrap_or(("", &svg));
     let (tag, rest) = rest.split_once('>').unwrap_or((rest, ""));
-    let words = escape(words);
+    let alt_text = escape(alt_text);
     Ok(format!(
-        "<svg width=\"{width}\" height=\"{height}\" role=\"img\" viewBox={tag}>\n<title>{words}</title>{rest}"
+        "<svg width=\"{width}\" height=\"{height}\" role=\"img\" viewBox={tag}>\n<title>{alt_text}</title>{rest}"
     ))
 }
 

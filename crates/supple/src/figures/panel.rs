@@ -1,9 +1,8 @@
-//! A panel: one pair of axes and what is drawn in it. The only place that speaks the drawing library's
-//! language of charts; figures say what is in them.
+//! A panel: one pair of axes and its contents. Only this module uses the chart API of the drawing library.
 
 use super::FigureError;
 use super::axis::{Axis, Scale};
-use super::style::{self, GRID, INK, TEXT_PX, px, stroke, text};
+use super::style::{self, GRID, TEXT_COLOUR, TEXT_PX, px, stroke, text};
 use plotters::chart::ChartContext;
 use plotters::coord::Shift;
 use plotters::prelude::*;
@@ -14,12 +13,12 @@ use std::ops::Range;
 pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Axes = Cartesian2d<Scale, Scale>;
 
-/// Between the edge and the name of the y axis \[px\].
+/// Distance between the edge and the label of the y axis \[px\].
 const EDGE_PX: f64 = 4.0;
 
-/// Room around the axes \[px\].
+/// Margins around the axes \[px\].
 #[derive(Clone, Copy, Debug)]
-pub struct Room {
+pub struct Margins {
     /// Above.
     pub top: f64,
     /// To the right.
@@ -30,8 +29,8 @@ pub struct Room {
     pub left: f64,
 }
 
-impl Room {
-    /// Size of the axes on an area of a size \[px\].
+impl Margins {
+    /// Size of the axes on an area of the given size \[px\].
     pub fn axes_px(&self, width_px: f64, height_px: f64) -> (f64, f64) {
         (
             width_px - EDGE_PX - self.left - self.right,
@@ -40,9 +39,9 @@ impl Room {
     }
 }
 
-impl Default for Room {
-    fn default() -> Room {
-        Room {
+impl Default for Margins {
+    fn default() -> Margins {
+        Margins {
             top: 26.0,
             right: 16.0,
             bottom: 38.0,
@@ -51,7 +50,7 @@ impl Default for Room {
     }
 }
 
-/// Axes on an area, ready to be drawn in.
+/// Axes on an area, with drawing functions.
 pub struct Panel<'a, 'b> {
     chart: ChartContext<'a, SVGBackend<'b>, Axes>,
     x: Range<f64>,
@@ -63,34 +62,34 @@ impl<'a, 'b> Panel<'a, 'b> {
     pub fn new(
         area: &'a Area<'b>,
         title: &str,
-        room: Room,
+        margins: Margins,
         x: &Axis<'_>,
         y: &Axis<'_>,
     ) -> Result<Self, FigureError> {
         let (x_range, y_range) = (x.scale.range(), y.scale.range());
         let mut chart = ChartBuilder::on(area)
-            .margin_top(px(room.top))
+            .margin_top(px(margins.top))
             .margin_left(px(EDGE_PX))
-            .margin_right(px(room.right))
-            .x_label_area_size(px(room.bottom))
-            .y_label_area_size(px(room.left))
+            .margin_right(px(margins.right))
+            .x_label_area_size(px(margins.bottom))
+            .y_label_area_size(px(margins.left))
             .build_cartesian_2d(x.scale.clone(), y.scale.clone())?;
-        let label = text(TEXT_PX - 1.0, INK, HPos::Center, VPos::Center);
+        let label = text(TEXT_PX - 1.0, TEXT_COLOUR, HPos::Center, VPos::Center);
         chart
             .configure_mesh()
             .light_line_style(TRANSPARENT)
             .bold_line_style(stroke(GRID, 0.8))
-            .axis_style(stroke(INK, 0.9))
+            .axis_style(stroke(TEXT_COLOUR, 0.9))
             .set_all_tick_mark_size(px(3.5))
             .label_style(label)
-            .axis_desc_style(text(TEXT_PX, INK, HPos::Center, VPos::Center))
+            .axis_desc_style(text(TEXT_PX, TEXT_COLOUR, HPos::Center, VPos::Center))
             .x_desc(x.label)
             .y_desc(y.label)
             .draw()?;
-        let at = (px(room.left + EDGE_PX), px(room.top - 8.0));
+        let at = (px(margins.left + EDGE_PX), px(margins.top - 8.0));
         area.draw_text(
             title,
-            &text(TEXT_PX + 0.5, INK, HPos::Left, VPos::Bottom),
+            &text(TEXT_PX + 0.5, TEXT_COLOUR, HPos::Left, VPos::Bottom),
             at,
         )?;
         Ok(Panel {
@@ -100,7 +99,7 @@ impl<'a, 'b> Panel<'a, 'b> {
         })
     }
 
-    /// A curve; points out of the panel's range of x are left out.
+    /// Draws a curve; points outside the panel's range of x are omitted.
     pub fn line(
         &mut self,
         points: impl IntoIterator<Item = (f64, f64)>,
@@ -116,7 +115,7 @@ impl<'a, 'b> Panel<'a, 'b> {
         Ok(())
     }
 
-    /// Marks; points out of the panel's range of x are left out.
+    /// Draws marks; points outside the panel's range of x are omitted.
     pub fn marks(
         &mut self,
         points: &[(f64, f64)],
@@ -125,19 +124,19 @@ impl<'a, 'b> Panel<'a, 'b> {
     ) -> Result<(), FigureError> {
         let inside = |(x, _): &&(f64, f64)| self.x.start <= *x && *x <= self.x.end;
         for point in points.iter().filter(inside) {
-            let (area, at) = self.place(*point);
+            let (area, at) = self.pixel_of(*point);
             mark.draw_at(&area, at, colour)?;
         }
         Ok(())
     }
 
-    /// A vertical line through the panel.
+    /// Draws a vertical line through the panel.
     pub fn vertical(&mut self, at: f64, colour: RGBColor) -> Result<(), FigureError> {
         let y = self.y.clone();
         self.line([(at, y.start), (at, y.end)], colour, 1.0)
     }
 
-    /// A horizontal line through the panel.
+    /// Draws a horizontal line through the panel.
     pub fn horizontal(
         &mut self,
         at: f64,
@@ -148,14 +147,14 @@ impl<'a, 'b> Panel<'a, 'b> {
         self.line([(x.start, at), (x.end, at)], colour, width_px)
     }
 
-    /// A bar from zero.
+    /// Draws a bar from zero.
     pub fn bar(&mut self, x: Range<f64>, to: f64, colour: RGBColor) -> Result<(), FigureError> {
         let bar = Rectangle::new([(x.start, to), (x.end, 0.0)], style::fill(colour, 1.0));
         self.chart.plotting_area().draw(&bar)?;
         Ok(())
     }
 
-    /// A shaded stretch of x.
+    /// Shades an interval of x.
     pub fn band(&mut self, from: f64, to: f64) -> Result<(), FigureError> {
         let (from, to) = (from.max(self.x.start), to.min(self.x.end));
         if from < to {
@@ -166,27 +165,27 @@ impl<'a, 'b> Panel<'a, 'b> {
         Ok(())
     }
 
-    /// Words at a point, moved by whole shown pixels.
+    /// Draws a label at a point, moved by an offset in displayed pixels.
     pub fn note(
         &mut self,
-        words: &str,
+        label: &str,
         at: (f64, f64),
         offset_px: (f64, f64),
         h: HPos,
         colour: RGBColor,
     ) -> Result<(), FigureError> {
         let style = text(TEXT_PX - 1.0, colour, h, VPos::Center);
-        let (area, (x, y)) = self.place(at);
-        area.draw_text(words, &style, (x + px(offset_px.0), y + px(offset_px.1)))?;
+        let (area, (x, y)) = self.pixel_of(at);
+        area.draw_text(label, &style, (x + px(offset_px.0), y + px(offset_px.1)))?;
         Ok(())
     }
 
-    /// A point of the axes as a place on the area of the axes.
-    fn place(&self, point: (f64, f64)) -> (Area<'b>, (i32, i32)) {
-        let place = self.chart.plotting_area();
-        let (x, y) = place.map_coordinate(&point);
-        let (x0, y0) = place.get_base_pixel();
-        (place.strip_coord_spec(), (x - x0, y - y0))
+    /// Converts a point in axis coordinates to a pixel of the plotting area.
+    fn pixel_of(&self, point: (f64, f64)) -> (Area<'b>, (i32, i32)) {
+        let area = self.chart.plotting_area();
+        let (x, y) = area.map_coordinate(&point);
+        let (x0, y0) = area.get_base_pixel();
+        (area.strip_coord_spec(), (x - x0, y - y0))
     }
 
     /// Range of y.
@@ -231,34 +230,34 @@ impl Mark {
     }
 }
 
-/// How an entry of a legend looks.
+/// Symbol of a legend entry.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Key {
+pub enum LegendSymbol {
     /// Line of a width \[px\].
     Line(f64),
     /// Mark.
     Mark(Mark),
 }
 
-/// A row of legend entries that starts at a point of the area \[px\].
+/// Draws a row of legend entries that starts at a point of the area \[px\].
 pub fn legend(
     area: &Area<'_>,
     start_px: (f64, f64),
-    entries: &[(&str, Key, RGBColor)],
+    entries: &[(&str, LegendSymbol, RGBColor)],
 ) -> Result<(), FigureError> {
     let (mut x, y) = start_px;
     for (label, key, colour) in entries {
         match key {
-            Key::Line(width_px) => {
+            LegendSymbol::Line(width_px) => {
                 let ends = vec![(px(x), px(y)), (px(x + 20.0), px(y))];
                 area.draw(&PathElement::new(ends, stroke(*colour, *width_px)))?;
             }
-            Key::Mark(mark) => mark.draw_at(area, (px(x + 12.0), px(y)), *colour)?,
+            LegendSymbol::Mark(mark) => mark.draw_at(area, (px(x + 12.0), px(y)), *colour)?,
         }
         let at = (px(x + 26.0), px(y));
         area.draw_text(
             label,
-            &text(TEXT_PX - 0.5, INK, HPos::Left, VPos::Center),
+            &text(TEXT_PX - 0.5, TEXT_COLOUR, HPos::Left, VPos::Center),
             at,
         )?;
         x += 26.0 + width_px(label, TEXT_PX - 0.5) + 18.0;
@@ -266,7 +265,7 @@ pub fn legend(
     Ok(())
 }
 
-/// Width of words, from the mean width of the letters of the embedded face.
-fn width_px(words: &str, size_px: f64) -> f64 {
-    0.53 * size_px * words.chars().count() as f64
+/// Width of a label, estimated from the mean letter width of the embedded font.
+fn width_px(label: &str, size_px: f64) -> f64 {
+    0.53 * size_px * label.chars().count() as f64
 }

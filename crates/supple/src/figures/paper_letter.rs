@@ -1,78 +1,89 @@
-//! The law to the letter of (3.6): its error until the supervisor ends the run.
+//! Tracking error under equation (3.6) exactly as printed, until the supervisor ends the run.
 
 use super::axis::Axis;
-use super::panel::{Key, Panel, Room, legend};
-use super::style::{BLUE, INK, MUTED, REFERENCE, VERMILION};
+use super::panel::{LegendSymbol, Margins, Panel, legend};
+use super::style::{BLUE, MUTED, REFERENCE, TEXT_COLOUR, VERMILION};
 use super::ticks::{Ticks, extent};
-use super::{FigureError, distance, mm, sheet};
+use super::{FigureError, distance, draw_canvas, mm};
 use plotters::style::text_anchor::HPos;
-use supple_experiment::{Demo, Ended, Sample};
+use supple_experiment::{Demo, FaultEnd, Sample};
 
-/// What is shown after the end \[s\].
+/// Time shown after the end of the run \[s\].
 const AFTER_S: f64 = 0.5;
 
-/// The run and what it is compared with.
-pub struct Letter<'a> {
-    /// (3.6) to the letter.
-    pub letter: &'a [Sample],
-    /// How it ended, if early.
-    pub ended: Option<&'a Ended>,
-    /// The same sinusoid and the same model under the law that is used.
-    pub used: &'a [Sample],
+/// The run, and a run with the used law for comparison.
+pub struct PaperLawRuns<'a> {
+    /// Run under (3.6) exactly as printed.
+    pub paper_law: &'a [Sample],
+    /// Fault that ended the run, if any.
+    pub ended: Option<&'a FaultEnd>,
+    /// The same sinusoid and model under the law that supple uses.
+    pub used_law: &'a [Sample],
 }
 
-impl<'a> Letter<'a> {
-    /// Of a demo.
-    pub fn of(demo: &'a Demo) -> Letter<'a> {
-        Letter {
-            letter: &demo.paper_letter.trace.samples,
+impl<'a> PaperLawRuns<'a> {
+    /// Collects the runs of a demo.
+    pub fn of(demo: &'a Demo) -> PaperLawRuns<'a> {
+        PaperLawRuns {
+            paper_law: &demo.paper_letter.trace.samples,
             ended: demo.paper_letter.ended.as_ref(),
-            used: super::figure_4::samples(demo),
+            used_law: super::figure_4::samples(demo),
         }
     }
 }
 
-/// The SVG.
-pub fn draw(runs: &Letter<'_>) -> Result<String, FigureError> {
-    let words = "Distance from the reference over time under the law to the letter of (3.6), until \
-                 the supervisor ends it, and under the law that is used";
-    sheet((760, 330), words, |area| {
+/// Draws the figure as SVG.
+pub fn draw(runs: &PaperLawRuns<'_>) -> Result<String, FigureError> {
+    let alt_text = "Distance from the reference over time under (3.6) exactly as printed, until \
+                 the supervisor ends it, and under the law used by supple";
+    draw_canvas((760, 330), alt_text, |area| {
         let off = |s: &Sample| (s.time_s, mm(distance(&s.tip_m, &s.reference_m)));
-        let whole_s = runs.letter.last().map_or(1.0, |s| s.time_s);
+        let whole_s = runs.paper_law.last().map_or(1.0, |s| s.time_s);
         let end_s = runs.ended.map_or(whole_s, |ended| ended.ended_s + AFTER_S);
         let shown = |s: &&Sample| s.time_s <= end_s;
-        let all = runs.letter.iter().chain(runs.used.iter().filter(shown));
-        let greatest = extent(all.map(|s| off(s).1)).end;
+        let all = runs
+            .paper_law
+            .iter()
+            .chain(runs.used_law.iter().filter(shown));
+        let max = extent(all.map(|s| off(s).1)).end;
         let mut panel = Panel::new(
             area,
             "",
-            Room::default(),
+            Margins::default(),
             &Axis::bounded("time [s]", Ticks::around(0.0..end_s, 8), 0.0..end_s),
             &Axis::bounded(
                 "distance from the reference [mm]",
-                Ticks::around(0.0..greatest, 5),
-                0.0..1.25 * greatest,
+                Ticks::around(0.0..max, 5),
+                0.0..1.25 * max,
             ),
         )?;
-        panel.line(runs.used.iter().map(off), BLUE, 1.6)?;
-        panel.line(runs.letter.iter().map(off), VERMILION, 1.8)?;
+        panel.line(runs.used_law.iter().map(off), BLUE, 1.6)?;
+        panel.line(runs.paper_law.iter().map(off), VERMILION, 1.8)?;
         if let Some(ended) = runs.ended {
             panel.vertical(ended.ended_s, REFERENCE)?;
             let at = (ended.ended_s, panel.y().end);
-            let words = format!("ended by the supervisor at {:.2} s", ended.ended_s);
+            let label = format!("ended by the supervisor at {:.2} s", ended.ended_s);
             let (side, dx) = match ended.ended_s < 0.5 * end_s {
                 true => (HPos::Left, 8.0),
                 false => (HPos::Right, -8.0),
             };
-            panel.note(&words, at, (dx, 12.0), side, INK)?;
+            panel.note(&label, at, (dx, 12.0), side, TEXT_COLOUR)?;
             panel.note(&ended.fault, at, (dx, 28.0), side, MUTED)?;
         }
         legend(
             area,
             (60.0, 13.0),
             &[
-                ("(3.6) to the letter", Key::Line(1.8), VERMILION),
-                ("the law that is used, same model", Key::Line(1.6), BLUE),
+                (
+                    "(3.6) exactly as printed",
+                    LegendSymbol::Line(1.8),
+                    VERMILION,
+                ),
+                (
+                    "the law used by supple, same model",
+                    LegendSymbol::Line(1.6),
+                    BLUE,
+                ),
             ],
         )
     })

@@ -1,14 +1,14 @@
-//! SVG to PNG with embedded faces, so that the bits do not depend on the machine's.
+//! Renders SVG to PNG with embedded fonts, so that the result does not depend on installed fonts.
 
 use super::FigureError;
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{Options, Tree};
 use std::sync::Arc;
 
-/// Dots a shown pixel.
-const DENSITY: f32 = 2.0;
+/// Bitmap pixels per displayed pixel.
+const PIXEL_RATIO: f32 = 2.0;
 
-/// A bitmap of an SVG.
+/// Renders an SVG to a PNG bitmap.
 pub fn render(name: &str, svg: &str) -> Result<Vec<u8>, FigureError> {
     let failed = |reason: String| FigureError::Render {
         name: name.to_owned(),
@@ -22,13 +22,13 @@ pub fn render(name: &str, svg: &str) -> Result<Vec<u8>, FigureError> {
     let size = tree
         .size()
         .to_int_size()
-        .scale_by(DENSITY)
+        .scale_by(PIXEL_RATIO)
         .ok_or_else(|| failed("it has no size".to_owned()))?;
     let mut pixmap = Pixmap::new(size.width(), size.height())
         .ok_or_else(|| failed("it is too large".to_owned()))?;
     resvg::render(
         &tree,
-        Transform::from_scale(DENSITY, DENSITY),
+        Transform::from_scale(PIXEL_RATIO, PIXEL_RATIO),
         &mut pixmap.as_mut(),
     );
     pixmap

@@ -5,9 +5,9 @@ use std::ops::Range;
 /// Ticks of an axis: first and last bound it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ticks {
-    /// In order, evenly spaced, round.
+    /// Tick positions: sorted, evenly spaced round numbers.
     pub at: Vec<f64>,
-    /// Decimals that tell them apart.
+    /// Number of decimals of the labels.
     pub decimals: usize,
 }
 
@@ -24,7 +24,7 @@ impl Ticks {
 
     /// Multiples of `step` that enclose the values.
     pub fn stepped(range: Range<f64>, step: f64) -> Ticks {
-        // A bound that is a tick but for rounding is that tick.
+        // Treat a bound that differs from a tick only by rounding as that tick.
         const SLACK: f64 = 1e-9;
         let first = (range.start / step + SLACK).floor();
         let last = (range.end / step - SLACK).ceil().max(first + 1.0);
@@ -35,20 +35,20 @@ impl Ticks {
         }
     }
 
-    /// From the first to the last.
+    /// Range from the first tick to the last.
     pub fn range(&self) -> Range<f64> {
         let first = self.at.first().copied().unwrap_or(0.0);
         let last = self.at.last().copied().unwrap_or(1.0);
         first..last
     }
 
-    /// A tick as it is written.
+    /// Label of a tick.
     pub fn label(&self, value: f64) -> String {
         number(value, self.decimals)
     }
 }
 
-/// A number with so many decimals, a true minus sign, and no sign at zero.
+/// Formats a number with the given decimals, a typographic minus sign, and no sign at zero.
 pub fn number(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     let zero = text.chars().all(|c| matches!(c, '-' | '0' | '.'));
@@ -59,7 +59,7 @@ pub fn number(value: f64, decimals: usize) -> String {
     }
 }
 
-/// Least number of the form 1, 2, 2.5 or 5 times a power of ten that is not below.
+/// Smallest number of the form 1, 2, 2.5 or 5 times a power of ten that is not below the argument.
 fn round_up(value: f64) -> f64 {
     let power = 10.0_f64.powf(value.log10().floor());
     let lead = value / power;
@@ -80,7 +80,7 @@ fn decimals(step: f64) -> usize {
         .unwrap_or(9)
 }
 
-/// Least and greatest of the finite values; 0..1 of nothing.
+/// Minimum and maximum of the finite values; 0..1 if there are none.
 pub fn extent(values: impl IntoIterator<Item = f64>) -> Range<f64> {
     let mut range: Option<Range<f64>> = None;
     for value in values.into_iter().filter(|value| value.is_finite()) {
@@ -106,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn a_single_value_has_an_axis_all_the_same() {
+    fn a_single_value_still_gives_an_axis() {
         let ticks = Ticks::around(3.0..3.0, 5);
         assert!(
             ticks.at.len() >= 2 && ticks.range().contains(&3.0),

@@ -1,10 +1,10 @@
 //! The paper's trade-off: error in free motion against impulse in contact, over stiffness.
 
 use super::axis::Axis;
-use super::panel::{Mark, Panel, Room};
-use super::style::{BLUE, INK, REFERENCE};
+use super::panel::{Margins, Mark, Panel};
+use super::style::{BLUE, REFERENCE, TEXT_COLOUR};
 use super::ticks::{Ticks, extent};
-use super::{FigureError, mm, sheet};
+use super::{FigureError, draw_canvas, mm};
 use plotters::style::text_anchor::HPos;
 use supple_experiment::Demo;
 
@@ -18,7 +18,7 @@ pub struct Point {
     pub impulse_newton_s: f64,
 }
 
-/// Of a demo, fade on.
+/// Collects the points of a demo, with the fade on.
 pub fn points(demo: &Demo) -> Vec<Point> {
     let lines = demo.summary.exploration.iter();
     lines
@@ -30,20 +30,20 @@ pub fn points(demo: &Demo) -> Vec<Point> {
         .collect()
 }
 
-/// The SVG.
+/// Draws the figure as SVG.
 pub fn draw(points: &[Point]) -> Result<String, FigureError> {
-    let words = "Error in free motion against impulse in contact, one point a stiffness";
-    sheet((760, 400), words, |area| {
-        let places: Vec<_> = points
+    let alt_text = "Error in free motion against impulse in contact, one point per stiffness";
+    draw_canvas((760, 400), alt_text, |area| {
+        let values: Vec<_> = points
             .iter()
             .map(|p| (mm(p.free_rms_m), p.impulse_newton_s))
             .collect();
-        let error = extent(places.iter().map(|p| p.0));
-        let impulse = extent(places.iter().map(|p| p.1)).end;
+        let error = extent(values.iter().map(|p| p.0));
+        let impulse = extent(values.iter().map(|p| p.1)).end;
         let mut panel = Panel::new(
             area,
             "",
-            Room::default(),
+            Margins::default(),
             &Axis::logarithmic(
                 "error in free motion, RMS [mm]",
                 0.8 * error.start..1.4 * error.end,
@@ -53,11 +53,11 @@ pub fn draw(points: &[Point]) -> Result<String, FigureError> {
                 Ticks::around(0.0..1.1 * impulse, 6),
             ),
         )?;
-        panel.line(places.iter().copied(), REFERENCE, 1.6)?;
-        panel.marks(&places, Mark::Dot, BLUE)?;
-        for (point, place) in points.iter().zip(&places) {
-            let words = format!("{} N/m", point.stiffness_n_per_m);
-            panel.note(&words, *place, (9.0, -9.0), HPos::Left, INK)?;
+        panel.line(values.iter().copied(), REFERENCE, 1.6)?;
+        panel.marks(&values, Mark::Dot, BLUE)?;
+        for (point, value) in points.iter().zip(&values) {
+            let label = format!("{} N/m", point.stiffness_n_per_m);
+            panel.note(&label, *value, (9.0, -9.0), HPos::Left, TEXT_COLOUR)?;
         }
         Ok(())
     })

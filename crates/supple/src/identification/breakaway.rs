@@ -1,29 +1,29 @@
-//! `supple breakaway`: the torque at which each joint of the simulated arm gives way.
+//! `supple breakaway`: measures the breakaway torque of each joint of the simulated arm.
 
 use super::{BreakawayArgs, joints};
 use crate::arms;
-use crate::console::{say, say_json};
+use crate::console::{print_json, print_line};
 use crate::exit::Failure;
 use serde::Serialize;
 use supple_core::Vector;
 use supple_experiment::calibrate::plant_of;
-use supple_experiment::{Calibration, ExperimentError, breakaway, ripple_on};
+use supple_experiment::{Calibration, ExperimentError, breakaway, identify_ripple};
 use supple_model::with_dof;
 
-/// One joint.
+/// Result of one joint.
 #[derive(Serialize)]
 pub struct Line {
-    /// Joint.
+    /// Name of the joint.
     pub joint: String,
-    /// Half the sum of both directions \[N m\].
+    /// Breakaway torque: half the sum of both directions \[N m\].
     pub breakaway_nm: f64,
-    /// Half their difference: what gravity or an offset adds \[N m\].
+    /// Offset: half the difference of both directions, caused by gravity or a torque offset \[N m\].
     pub offset_nm: f64,
-    /// The plant's own \[N m\].
+    /// Breakaway torque of the plant \[N m\].
     pub truth_nm: f64,
 }
 
-/// Does it.
+/// Runs `supple breakaway`.
 ///
 /// # Errors
 /// [`Failure`].
@@ -39,7 +39,7 @@ pub fn run(args: &BreakawayArgs) -> Result<(), Failure> {
             let mut config = calibration.start.apply(&arm.config::<N>()?)?;
             let plant = plant_of::<N>(&arm, &calibration)?;
             if args.ripple > 0.0 {
-                config.ripple = ripple_on(&config, &plant, &arm.home::<N>()?)?;
+                config.ripple = identify_ripple(&config, &plant, &arm.home::<N>()?)?;
             }
             let pose = Vector::<N>::from_fn(|i, _| {
                 let zone = 2.0 * config.limits.soft_zone_rad;
@@ -58,12 +58,14 @@ pub fn run(args: &BreakawayArgs) -> Result<(), Failure> {
         measure()
     })??;
     if args.json {
-        return say_json(&lines);
+        return print_json(&lines);
     }
-    say("simulated arm; torque ramped by 0.1 N m/s until two degrees, both ways")?;
+    print_line(
+        "simulated arm: torque ramp of 0.1 N m/s until the joint has moved 2 degrees, in both directions",
+    )?;
     for line in &lines {
-        say(&format!(
-            "{:10} {:.3} N m, the plant's {:.3} N m; one-sided {:+.3} N m",
+        print_line(&format!(
+            "{:10} measured {:.3} N m, plant {:.3} N m; offset {:+.3} N m",
             line.joint, line.breakaway_nm, line.truth_nm, line.offset_nm
         ))?;
     }

@@ -1,42 +1,44 @@
-//! `supple calibrate`: everything from breakaway to the demo on the simulated arm, in one command.
+//! `supple calibrate`: runs all steps from breakaway to the demo on the simulated arm.
 
 use super::CalibrateArgs;
 use super::identify::{FILES, print, write};
 use super::report::{Found, summary};
 use crate::arms;
-use crate::cli::DemoArgs;
-use crate::console::{json, remark, say};
+use crate::console::{json, print_line, print_status};
 use crate::demo;
 use crate::exit::Failure;
 use crate::out::Staging;
 use serde::Serialize;
 use supple_experiment::calibrate::{described_plant, plant_of};
-use supple_experiment::{Calibration, Tracking, Truthfulness, calibrate, foretell, tracking};
+use supple_experiment::{
+    Calibration, IdentifiedModelTracking, ModelAccuracy, calibrate, predict_tracking_error,
+    track_with_identified_model,
+};
 use supple_model::{Description, with_dof};
 
-/// Models drawn to foretell the tracking error.
+/// Number of models drawn to predict the tracking error.
 const DRAWS: u64 = 5;
 
-/// Folder of the plant's own description, where it is not that of `--arm`.
+/// Folder of the plant's description, if it differs from that of `--arm`.
 const PLANT: &str = "plant";
 
 #[derive(Serialize)]
 struct Summary {
     arm: String,
     seed: u64,
-    /// Joint, measured and the plant's own \[N m\].
+    /// Joint, measured and true breakaway torque \[N m\].
     breakaway: Vec<(String, f64, f64)>,
     identification: super::report::Summary,
     /// Motor, harmonic, amplitude at the motor \[N m\].
     ripple: Vec<(usize, u32, f64)>,
-    truth: Truthfulness,
-    /// The sinusoid with this model; `None` where the arm cannot reach it.
-    tracking: Option<Tracking>,
-    /// The same where calibration and plant are without friction that depends on direction and load.
-    tracking_without_load: Option<Tracking>,
+    truth: ModelAccuracy,
+    /// Tracking of the sinusoid with this model; `None` if the arm cannot reach it.
+    tracking: Option<IdentifiedModelTracking>,
+    /// The same, with calibration and plant without direction- and load-dependent friction.
+    tracking_without_load: Option<IdentifiedModelTracking>,
 }
 
-/// Does it.
+/// Runs `supple calibrate`.
 ///
 /// # Errors
 /// [`Failure`].
@@ -47,7 +49,7 @@ pub fn run(args: &CalibrateArgs) -> Result<(), Failure> {
         return Ok(());
     }
     let plant = args.out.join(PLANT);
-    demo::run(&DemoArgs {
+    demo::run(&demo::DemoArgs {
         arm: match args.ripple > 0.0 {
             true => plant.display().to_string(),
             false => args.arm.clone(),
@@ -73,17 +75,20 @@ fn sized<const N: usize>(arm: &Description, args: &CalibrateArgs) -> Result<(), 
     };
     let found = calibrate::<N>(arm, &calibration, &mut |step| {
         if !args.quiet {
-            remark(step);
+            print_status(step);
         }
     })?;
     let follow = |calibration: &Calibration, found: &Description| -> Result<_, Failure> {
-        Ok(tracking(found, &plant_of::<N>(arm, calibration)?)?)
+        Ok(track_with_identified_model(
+            found,
+            &plant_of::<N>(arm, calibration)?,
+        )?)
     };
     let followed = follow(&calibration, &found.description)?;
     let mut without_load = None;
     if args.load {
         if !args.quiet {
-            remark("the same without friction that depends on direction and load");
+            print_status("the same without direction- and load-dependent friction");
         }
         let other = Calibration {
             load: false,
@@ -94,7 +99,7 @@ fn sized<const N: usize>(arm: &Description, args: &CalibrateArgs) -> Result<(), 
         let found = calibrate::<N>(arm, &other, &mut |_| {})?;
         without_load = follow(&other, &found.description)?;
     }
-    let foretold = foretell(&found.description, &found.fit, DRAWS)?;
+    let foretold = predict_tracking_error(&found.description, &found.fit, DRAWS)?;
     let report = Found {
         arm: &found.description,
         fit: &found.fit,
@@ -107,7 +112,7 @@ fn sized<const N: usize>(arm: &Description, args: &CalibrateArgs) -> Result<(), 
         foretold,
     };
     if args.ripple > 0.0 {
-        // The demo that follows runs on the plant as it is.
+        // The demo that follows uses the plant including its ripple.
         let plant = plant_of::<N>(arm, &calibration)?;
         described_plant(arm, &plant)?.save(&staging.folder(PLANT)?)?;
     }
@@ -142,15 +147,15 @@ fn sized<const N: usize>(arm: &Description, args: &CalibrateArgs) -> Result<(), 
     staging.write("calibration.json", format!("{text}\n").as_bytes())?;
     staging.publish()?;
     if args.json {
-        return say(&text);
+        return print_line(&text);
     }
     for (name, measured, truth) in &numbers.breakaway {
-        say(&format!(
-            "breakaway of {name}: {measured:.3} N m, the plant's {truth:.3} N m"
+        print_line(&format!(
+            "breakaway of {name}: measured {measured:.3} N m, plant {truth:.3} N m"
         ))?;
     }
     for (motor, harmonic, amplitude) in &numbers.ripple {
-        say(&format!(
+        print_line(&format!(
             "ripple of motor {motor}: harmonic {harmonic}, {amplitude:.5} N m"
         ))?;
     }
@@ -161,29 +166,31 @@ fn sized<const N: usize>(arm: &Description, args: &CalibrateArgs) -> Result<(), 
         .iter()
         .map(|x| format!("{:.2} %", 100.0 * x))
         .collect();
-    say(&format!(
-        "against the simulated plant: gravity off by {:.3} %, friction curves by {}",
+    print_line(&format!(
+        "error relative to the simulated plant: gravity {:.3} %, friction curves {}",
         100.0 * numbers.truth.gravity_relative,
         friction.join(", ")
     ))?;
     if let Some(tracking) = &numbers.tracking {
-        say(&format!(
+        print_line(&format!(
             "sinusoid at 5 N/m with this model: {}",
             both(tracking)
         ))?;
     }
     if let Some(tracking) = &numbers.tracking_without_load {
-        say(&format!(
-            "without friction that depends on direction and load: {}; the rest is its share",
+        print_line(&format!(
+            "without direction- and load-dependent friction: {}; the difference is due to that friction",
             both(tracking)
         ))?;
     }
-    say("this is simulation: real fits of such arms leave 6.7 to 8.4 % of the torque")
+    print_line(
+        "this is a simulation: fits of real arms of this kind leave a residual of 6.7 to 8.4 % of the torque",
+    )
 }
 
-fn both(tracking: &Tracking) -> String {
+fn both(tracking: &IdentifiedModelTracking) -> String {
     format!(
-        "{:.2} mm RMS with Coulomb friction, {:.2} mm with the dip",
+        "{:.2} mm RMS with Coulomb friction, {:.2} mm with Stribeck friction",
         1e3 * tracking.coulomb_m,
         1e3 * tracking.stribeck_m
     )

@@ -1,8 +1,8 @@
-//! `supple excite design`: a motion for identification, as a table, a figure and a summary.
+//! `supple excite design`: designs an excitation trajectory; writes table, figure and summary.
 
 use super::{Criterion, DesignArgs, joints};
 use crate::arms;
-use crate::console::{json, remark, say};
+use crate::console::{json, print_line, print_status};
 use crate::exit::Failure;
 use crate::figures::identification::{Curves, curves};
 use crate::out::Staging;
@@ -10,10 +10,10 @@ use serde::Serialize;
 use std::fmt::Write;
 use supple_core::trajectory::Fourier;
 use supple_ident::SeriesLists;
-use supple_ident::design::{self, Design, Designed, Workspace, design};
+use supple_ident::design::{self, DesignOptions, ExcitationDesign, Workspace, design};
 use supple_model::{Description, with_dof};
 
-/// Lines of the table per second.
+/// Rows of the table per second.
 const TABLE_HZ: f64 = 100.0;
 
 #[derive(Serialize)]
@@ -29,7 +29,7 @@ struct Summary<'a> {
     series: SeriesLists,
 }
 
-/// Does it.
+/// Runs `supple excite design`.
 ///
 /// # Errors
 /// [`Failure`].
@@ -43,7 +43,7 @@ pub fn run(args: &DesignArgs) -> Result<(), Failure> {
         }),
         _ => None,
     };
-    let request = Design {
+    let request = DesignOptions {
         period_s: args.period,
         periods: args.periods,
         criterion: match args.criterion {
@@ -53,14 +53,14 @@ pub fn run(args: &DesignArgs) -> Result<(), Failure> {
         workspace,
         candidates: args.candidates,
         seed: args.seed,
-        ..Design::of(&moving)
+        ..DesignOptions::of(&moving)
     };
     with_dof!(arm.dof(), N => sized::<N>(&arm, &request, args))?
 }
 
 fn sized<const N: usize>(
     arm: &Description,
-    request: &Design,
+    request: &DesignOptions,
     args: &DesignArgs,
 ) -> Result<(), Failure> {
     let staging = Staging::new(
@@ -71,7 +71,7 @@ fn sized<const N: usize>(
     let every = (request.candidates / 10).max(1);
     let found = design(&config, &home, request, &mut |tried, best| {
         if !args.quiet && tried % every == 0 {
-            remark(&format!(
+            print_status(&format!(
                 "{tried} of {} candidates: {best:.4}",
                 request.candidates
             ));
@@ -102,9 +102,9 @@ fn sized<const N: usize>(
     staging.write("summary.json", format!("{text}\n").as_bytes())?;
     staging.publish()?;
     if args.json {
-        return say(&text);
+        return print_line(&text);
     }
-    say(&format!(
+    print_line(&format!(
         "{}: {:.1} s, rank {}, condition number {:.1}; {}",
         arm.name(),
         series.duration_s,
@@ -140,7 +140,10 @@ fn table<const N: usize>(series: &Fourier<N>) -> String {
     text
 }
 
-fn figure<const N: usize>(arm: &Description, found: &Designed<N>) -> Result<String, Failure> {
+fn figure<const N: usize>(
+    arm: &Description,
+    found: &ExcitationDesign<N>,
+) -> Result<String, Failure> {
     let times: Vec<f64> = (0..600)
         .map(|i| found.series.duration_s * f64::from(i) / 599.0)
         .collect();

@@ -1,8 +1,8 @@
-//! `supple excite run`: the simulated arm follows a motion that was designed, and logs it.
+//! `supple excite run`: runs a designed motion on the simulated arm and logs it.
 
 use super::RunArgs;
 use crate::arms;
-use crate::console::{say, say_json};
+use crate::console::{print_json, print_line};
 use crate::exit::Failure;
 use crate::out::Staging;
 use serde::{Deserialize, Serialize};
@@ -12,12 +12,12 @@ use supple_experiment::{Calibration, excitation, slow_motion};
 use supple_ident::{ReadError, SeriesLists};
 use supple_model::{Description, with_dof};
 
-/// Longest design that is read \[bytes\].
-const MOST_BYTES: u64 = 1 << 20;
+/// Maximum size of a design file \[bytes\].
+const MAX_BYTES: u64 = 1 << 20;
 
-/// What a design leaves in `summary.json`, as far as it is needed.
+/// The fields of a design's `summary.json` that are needed here.
 #[derive(Deserialize)]
-struct Designed {
+struct ExcitationDesign {
     moving: Vec<usize>,
     #[serde(flatten)]
     series: SeriesLists,
@@ -29,11 +29,11 @@ struct Summary<'a> {
     design: &'a Path,
     log: std::path::PathBuf,
     seed: u64,
-    /// Recorded time of the design's motion, and of the slow one after it \[s\].
+    /// Durations of the designed motion and of the slow motion after it \[s\].
     recorded_s: Vec<f64>,
 }
 
-/// Does it.
+/// Runs `supple excite run`.
 ///
 /// # Errors
 /// [`Failure`].
@@ -43,20 +43,20 @@ pub fn run(args: &RunArgs) -> Result<(), Failure> {
     with_dof!(arm.dof(), N => sized::<N>(&arm, &design, args))?
 }
 
-fn read(path: &Path) -> Result<Designed, Failure> {
+fn read(path: &Path) -> Result<ExcitationDesign, Failure> {
     let path = match path.is_dir() {
         true => path.join("summary.json"),
         false => path.to_owned(),
     };
     let file = path.display().to_string();
-    let text = supple_files::read_text(&path, MOST_BYTES).map_err(|error| ReadError::File {
+    let text = supple_files::read_text(&path, MAX_BYTES).map_err(|error| ReadError::File {
         file: file.clone(),
         error,
     })?;
     Ok(
         serde_json::from_str(&text).map_err(|error| ReadError::Table {
             file,
-            problem: format!("no design: {error}"),
+            problem: format!("not a design: {error}"),
             remedy: "give the folder that `supple excite design` wrote",
         })?,
     )
@@ -64,7 +64,7 @@ fn read(path: &Path) -> Result<Designed, Failure> {
 
 fn sized<const N: usize>(
     arm: &Description,
-    design: &Designed,
+    design: &ExcitationDesign,
     args: &RunArgs,
 ) -> Result<(), Failure> {
     let calibration = Calibration {
@@ -92,10 +92,10 @@ fn sized<const N: usize>(
     staging.write("summary.json", format!("{text}\n").as_bytes())?;
     staging.publish()?;
     if args.json {
-        return say_json(&summary);
+        return print_json(&summary);
     }
     let total_s: f64 = summary.recorded_s.iter().sum();
-    say(&format!(
+    print_line(&format!(
         "simulated {}: {total_s:.1} s of motion; {}",
         arm.name(),
         summary.log.display()

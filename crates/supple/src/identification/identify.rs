@@ -1,30 +1,31 @@
-//! `supple identify`: from logs to a model that the controller loads.
+//! `supple identify`: identifies a model from logs; the controller can load it.
 
 use super::IdentifyArgs;
 use super::report::{Found, Summary, html, summary};
 use crate::arms;
-use crate::console::{json, say};
+use crate::console::{json, print_line};
 use crate::exit::Failure;
 use crate::out::Staging;
 use std::path::Path;
-use supple_experiment::foretell;
+use supple_experiment::predict_tracking_error;
 use supple_ident::{
-    Fit, FrictionChoice, Log, Motion, Preparation, Procedure, Validation, fit_with_dip,
+    Fit, FrictionChoice, Log, Motion, Preparation, Procedure, Validation, fit_with_stribeck,
     identify_motions, read_logs,
 };
 use supple_model::{Description, with_dof};
 
-/// Part of the first log that is kept back where none is given to validate.
-const KEPT_BACK: f64 = 0.2;
-/// Slow samples of the project's own logs, which have the rate to tell them.
+/// Fraction of the first log that is held out for validation if no validation log is given.
+const HELD_OUT_FRACTION: f64 = 0.2;
+/// Speed below which samples of supple's own logs count as slow; their sampling rate is high enough for this
+/// \[rad/s\].
 const SLOW_RAD_PER_S: f64 = 0.15;
-/// Models drawn to foretell the tracking error.
+/// Number of models drawn to predict the tracking error.
 const DRAWS: u64 = 5;
 
-/// What it leaves.
+/// Output files.
 pub const FILES: [&str; 4] = ["arm.urdf", "arm.toml", "report.html", "summary.json"];
 
-/// Does it.
+/// Runs `supple identify`.
 ///
 /// # Errors
 /// [`Failure`].
@@ -43,7 +44,8 @@ fn procedure(args: &IdentifyArgs, period_s: f64) -> Procedure {
             rate_hz: args.rate,
             cutoff_hz: Some(args.cutoff),
             keep_every: if ours { 10 } else { 1 },
-            // The project's own logs hold commands, which act in the cycle after, for a cycle.
+            // supple's own logs contain commanded torques; a command acts one cycle later and for one cycle, hence
+            // the delay of 1.5 periods.
             torque_delay_s: if ours { 1.5 * period_s } else { 0.0 },
         },
         method: args.method.into(),
@@ -54,20 +56,20 @@ fn procedure(args: &IdentifyArgs, period_s: f64) -> Procedure {
     }
 }
 
-/// All logs are the project's own.
+/// Whether all logs are supple's own.
 fn ours(args: &IdentifyArgs) -> bool {
     let is_mcap = |path: &std::path::PathBuf| path.extension().is_some_and(|end| end == "mcap");
     args.logs.iter().all(is_mcap)
 }
 
-/// Speed below which samples are left out, if any are.
+/// Speed below which samples are excluded; `None` if none are.
 fn slow(args: &IdentifyArgs) -> Option<f64> {
     args.slow
         .or(ours(args).then_some(SLOW_RAD_PER_S))
         .filter(|speed| *speed > 0.0)
 }
 
-/// Motions of files, each with the name of its file.
+/// Motions with the names of their files.
 type Named = Vec<(String, Motion)>;
 
 fn motions<const N: usize>(
@@ -80,8 +82,8 @@ fn motions<const N: usize>(
     for path in paths {
         let logs: Vec<Log> = read_logs::<N>(path)?;
         for log in &logs {
-            let (motion, doubts) = Motion::prepare(log, N, moving, preparation)?;
-            warnings.extend(doubts);
+            let (motion, result_warnings) = Motion::prepare(log, N, moving, preparation)?;
+            warnings.extend(result_warnings);
             all.push((path.display().to_string(), motion));
         }
     }
@@ -101,9 +103,9 @@ fn sized<const N: usize>(arm: &Description, args: &IdentifyArgs) -> Result<(), F
         && let Some((name, motion)) = fitted.first_mut()
     {
         let samples = motion.samples();
-        let cut = ((1.0 - KEPT_BACK) * samples as f64) as usize;
+        let cut = ((1.0 - HELD_OUT_FRACTION) * samples as f64) as usize;
         held_out.push((
-            format!("{name}, its last {:.0} %", 100.0 * KEPT_BACK),
+            format!("{name}, its last {:.0} %", 100.0 * HELD_OUT_FRACTION),
             motion.part(cut..samples),
         ));
         *motion = motion.part(0..cut);
@@ -114,7 +116,7 @@ fn sized<const N: usize>(arm: &Description, args: &IdentifyArgs) -> Result<(), F
             prior_weight: Some(1.0),
             ..procedure.clone()
         };
-        fit_with_dip(&nominal, &data, &moving, &given)?
+        fit_with_stribeck(&nominal, &data, &moving, &given)?
     } else {
         identify_motions(&nominal, &data, &moving, &procedure)?
     };
@@ -134,18 +136,18 @@ fn sized<const N: usize>(arm: &Description, args: &IdentifyArgs) -> Result<(), F
             .map(|path| path.display().to_string())
             .collect(),
         held_out: checked,
-        foretold: foretell(&described, &fit, DRAWS)?,
+        foretold: predict_tracking_error(&described, &fit, DRAWS)?,
     };
     let numbers = summary(&found);
     write(&staging, &found, &numbers)?;
     staging.publish()?;
     if args.json {
-        return say(&json(&numbers)?);
+        return print_line(&json(&numbers)?);
     }
     print(&numbers, &args.out)
 }
 
-/// Writes model, report and numbers.
+/// Writes model, report and summary.
 ///
 /// # Errors
 /// [`Failure`].
@@ -160,32 +162,32 @@ pub fn write<const N: usize>(
     staging.write("summary.json", format!("{}\n", json(numbers)?).as_bytes())
 }
 
-/// Says what was found.
+/// Prints the summary.
 ///
 /// # Errors
 /// [`Failure::File`].
 pub fn print(numbers: &Summary, out: &Path) -> Result<(), Failure> {
     for (of, table) in &numbers.choices {
-        say(&format!("{of}\n{}", table.trim_end()))?;
+        print_line(&format!("{of}\n{}", table.trim_end()))?;
     }
-    say(&format!(
-        "rank {} of {} columns, condition number {:.1}, {:.2} % of the torque left unexplained",
+    print_line(&format!(
+        "rank {} of {} columns, condition number {:.1}, residual {:.2} % of the torque",
         numbers.rank,
         numbers.columns,
         numbers.condition,
         100.0 * numbers.training_relative
     ))?;
     for line in &numbers.held_out {
-        say(&format!(
-            "held out: {}: {:.2} %",
+        print_line(&format!(
+            "held out: {}: residual {:.2} %",
             line.log,
             100.0 * line.total_relative
         ))?;
     }
     for warning in &numbers.warnings {
-        say(&format!("warning: {warning}"))?;
+        print_line(&format!("warning: {warning}"))?;
     }
-    say(&numbers.verdict)?;
-    say(&numbers.verdict_at_5_n_per_m)?;
-    say(&format!("model and report: {}", out.display()))
+    print_line(&numbers.verdict)?;
+    print_line(&numbers.verdict_at_5_n_per_m)?;
+    print_line(&format!("model and report: {}", out.display()))
 }

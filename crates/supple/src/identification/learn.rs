@@ -1,17 +1,17 @@
-//! `supple learn`: friction and payload refitted from logs of a motion that was repeated.
+//! `supple learn`: refits friction and payload from logs of a repeated motion.
 
 use super::LearnArgs;
 use crate::arms;
-use crate::console::{say, say_json};
+use crate::console::{print_json, print_line};
 use crate::exit::Failure;
 use serde::Serialize;
 use supple_experiment::calibrate::preparation;
 use supple_ident::{Learned, Learning, Log, Motion, learn, read_logs};
-use supple_model::{Description, Replacement, with_dof};
+use supple_model::{Description, IdentifiedModel, with_dof};
 
-/// Cutoff of the filter \[Hz\].
+/// Cutoff frequency of the filter \[Hz\].
 const CUTOFF_HZ: f64 = 8.0;
-/// A joint that covers less than this has not moved \[rad\].
+/// A joint with a smaller range of motion counts as not moving \[rad\].
 const MOVED_RAD: f64 = 0.02;
 
 #[derive(Serialize)]
@@ -28,7 +28,7 @@ struct Summary<'a> {
     payload_kg: Option<f64>,
 }
 
-/// Does it.
+/// Runs `supple learn`.
 ///
 /// # Errors
 /// [`Failure`].
@@ -64,7 +64,7 @@ fn sized<const N: usize>(arm: &Description, args: &LearnArgs) -> Result<(), Fail
     let learnt = learn(&config.arm, &config.friction, &motions, &moving, &learning)?;
     let source = "friction learnt from repeated motion";
     let changed = supple_ident::learn::with_payload(&config.arm, learnt.payload.as_ref())?;
-    let described = arm.with_model(&Replacement {
+    let described = arm.with_model(&IdentifiedModel {
         arm: &changed,
         friction: &learnt.friction,
         ripple: None,
@@ -73,10 +73,10 @@ fn sized<const N: usize>(arm: &Description, args: &LearnArgs) -> Result<(), Fail
     described.save(&args.out)?;
     let summary = summary(arm, &config.friction, &learnt);
     if args.json {
-        return say_json(&summary);
+        return print_json(&summary);
     }
     for joint in &summary.joints {
-        say(&format!(
+        print_line(&format!(
             "{:10} viscous {:.3} -> {:.3} N m s/rad, Coulomb {:.3} -> {:.3} N m, torque error {:.4} -> {:.4} N m",
             joint.joint,
             joint.viscous_nm_s_per_rad[0],
@@ -88,9 +88,9 @@ fn sized<const N: usize>(arm: &Description, args: &LearnArgs) -> Result<(), Fail
         ))?;
     }
     if let Some(payload_kg) = summary.payload_kg {
-        say(&format!("payload    {payload_kg:.3} kg"))?;
+        print_line(&format!("payload    {payload_kg:.3} kg"))?;
     }
-    say(&format!("model: {}", args.out.display()))
+    print_line(&format!("model: {}", args.out.display()))
 }
 
 /// The last `seconds` of a log, or all of it.

@@ -1,5 +1,5 @@
-//! Identification on the command line: design an excitation, measure breakaway, identify from logs, learn
-//! from repeated motion, or all of it on the simulated arm.
+//! Identification commands: design an excitation, measure breakaway, identify from logs, learn from repeated motion,
+//! or do all of it on the simulated arm.
 
 mod breakaway;
 mod calibrate;
@@ -14,36 +14,36 @@ use crate::range::between;
 use clap::builder::RangedU64ValueParser;
 use clap::{Args, Subcommand, ValueEnum};
 use std::path::PathBuf;
-use supple_ident::design::MOST_CANDIDATES;
+use supple_ident::design::MAX_CANDIDATES;
 use supple_ident::{IdentError, Method};
 
-/// What to do.
+/// Identification command.
 #[derive(Clone, Debug, Subcommand)]
 pub enum Command {
     /// Identify an arm from logs: model, report, verdict.
     #[command(after_help = CODES)]
     Identify(IdentifyArgs),
-    /// Excitation for identification.
+    /// Design and run an excitation for identification.
     #[command(subcommand)]
     Excite(ExciteCommand),
-    /// Breakaway torque of each joint of the simulated arm.
+    /// Measure the breakaway torque of each joint of the simulated arm.
     #[command(after_help = CODES)]
     Breakaway(BreakawayArgs),
-    /// Breakaway, excitation, identification, validation and demo of the simulated arm.
+    /// Run breakaway, excitation, identification, validation and demo on the simulated arm.
     #[command(after_help = CODES)]
     Calibrate(CalibrateArgs),
-    /// Refit friction and payload from logs of a motion that was repeated.
+    /// Refit friction and payload from logs of a repeated motion.
     #[command(after_help = CODES)]
     Learn(LearnArgs),
 }
 
-/// What to do for an excitation.
+/// Command of `supple excite`.
 #[derive(Clone, Debug, Subcommand)]
 pub enum ExciteCommand {
-    /// Design a motion that tells the parameters of an arm apart, within its limits.
+    /// Design an excitation trajectory that makes the parameters identifiable, within the limits of the arm.
     #[command(after_help = CODES)]
     Design(DesignArgs),
-    /// Let the simulated arm follow a designed motion, then a slow one, and log both.
+    /// Run a designed motion and then a slow one on the simulated arm, and log both.
     #[command(after_help = CODES)]
     Run(RunArgs),
 }
@@ -53,7 +53,7 @@ pub enum ExciteCommand {
 pub enum Criterion {
     /// Condition number of the base regressor.
     Condition,
-    /// Determinant of its information.
+    /// Determinant of the information matrix.
     DOptimality,
 }
 
@@ -62,11 +62,11 @@ pub enum Criterion {
 pub enum Solver {
     /// Ordinary least squares.
     Ols,
-    /// Weighted by joint.
+    /// Weighted least squares, weighted per joint.
     Wls,
-    /// Weighted by joint, robust.
+    /// Iteratively reweighted least squares (robust), weighted per joint.
     Irls,
-    /// Weighted, physically consistent.
+    /// Weighted least squares with physically consistent inertias.
     Consistent,
 }
 
@@ -84,41 +84,41 @@ impl From<Solver> for Method {
 /// Arguments of `identify`.
 #[derive(Clone, Debug, Args)]
 pub struct IdentifyArgs {
-    /// Logs: the project's MCAP, or CSV with the columns t, q[0].., tau[0].. and, if measured, qd[0]..
+    /// Logs: supple's MCAP, or CSV with the columns t, q[0].., tau[0].. and, if measured, qd[0]..
     #[arg(required = true, value_name = "LOG")]
     pub logs: Vec<PathBuf>,
-    /// A built-in arm, or the path of an arm's TOML or of its folder: kinematics, and the prior.
+    /// A built-in arm, or the path of an arm's TOML or of its folder: kinematics and prior.
     #[arg(long, value_name = "NAME|PATH")]
     pub arm: String,
-    /// Refuse an arm whose URDF holds what is not read, instead of warning.
+    /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
     /// Folder for arm.toml, arm.urdf, report.html and summary.json.
     #[arg(long, value_name = "DIR", default_value = "out/identified")]
     pub out: PathBuf,
-    /// Logs to predict, not fitted; without, the last fifth of the first log is kept back for it.
+    /// Logs for validation only. Default: the last fifth of the first log is held out.
     #[arg(long, value_name = "LOG")]
     pub validate: Vec<PathBuf>,
-    /// Joints to identify, from 0; the others were held. Default: all.
+    /// Joints to identify, counted from 0; the other joints were held during the log. Default: all.
     #[arg(long, value_name = "J,J..", value_delimiter = ',')]
     pub moving: Vec<usize>,
-    /// Two joints whose sum turns a motor, such as 4+5.
+    /// Two joints coupled by a gear: the motor turns with the sum of their angles, for example 4+5.
     #[arg(long, value_name = "J+J", value_parser = pair)]
     pub coupling: Vec<(usize, usize)>,
     /// Cutoff of the zero-phase filter [Hz].
     #[arg(long, value_name = "HZ", default_value_t = 8.0, value_parser = between(1e-3, 1e5))]
     pub cutoff: f64,
-    /// Rate of the grid [Hz]. Default: the log's own.
+    /// Rate of the resampling grid [Hz]. Default: the rate of the log.
     #[arg(long, value_name = "HZ", value_parser = between(1e-1, 1e5))]
     pub rate: Option<f64>,
     /// Solver.
     #[arg(long, value_enum, default_value = "consistent")]
     pub method: Solver,
-    /// Leave out samples of a joint slower than this, and fit a Stribeck dip from them [rad/s]. Default:
-    /// 0.15 for MCAP, 0 (none) for CSV, where friction columns are chosen by cross-validation.
+    /// Exclude samples of a joint below this speed from the fit, and fit the Stribeck effect from them [rad/s].
+    /// Default: 0.15 for MCAP, 0 (none) for CSV, where friction columns are chosen by cross-validation.
     #[arg(long, value_name = "RAD/S", value_parser = between(0.0, 100.0))]
     pub slow: Option<f64>,
-    /// Standard deviation of the torque noise of each moving joint [N m]. Default: from residuals.
+    /// Standard deviation of the torque noise of each moving joint [N m]. Default: estimated from the residuals.
     #[arg(long, value_name = "NM,NM..", value_delimiter = ',', value_parser = between(1e-9, 1e6))]
     pub noise: Vec<f64>,
     /// Print the summary as JSON.
@@ -132,16 +132,16 @@ pub struct DesignArgs {
     /// A built-in arm, or the path of an arm's TOML or of its folder.
     #[arg(long, value_name = "NAME|PATH")]
     pub arm: String,
-    /// Refuse an arm whose URDF holds what is not read, instead of warning.
+    /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
     /// Folder for excitation.csv, excitation.svg and summary.json.
     #[arg(long, value_name = "DIR", default_value = "out/excitation")]
     pub out: PathBuf,
-    /// Joints to move, from 0. Default: all.
+    /// Joints to move, counted from 0. Default: all.
     #[arg(long, value_name = "J,J..", value_delimiter = ',')]
     pub moving: Vec<usize>,
-    /// What is to be small.
+    /// Criterion to minimise.
     #[arg(long, value_enum, default_value = "condition")]
     pub criterion: Criterion,
     /// Length of a period [s].
@@ -150,15 +150,15 @@ pub struct DesignArgs {
     /// Number of periods.
     #[arg(long, value_name = "N", default_value_t = 4.0, value_parser = between(0.1, 1000.0))]
     pub periods: f64,
-    /// Candidates tried.
+    /// Number of candidates.
     #[arg(
         long,
         value_name = "N",
         default_value_t = 3000,
-        value_parser = RangedU64ValueParser::<usize>::new().range(1..=MOST_CANDIDATES as u64)
+        value_parser = RangedU64ValueParser::<usize>::new().range(1..=MAX_CANDIDATES as u64)
     )]
     pub candidates: usize,
-    /// Box that the tip stays in, base axes: least x, y, z, greatest x, y, z [m].
+    /// Box that the tip stays in, base axes: minimum x, y, z, maximum x, y, z [m].
     #[arg(
         long,
         value_name = "M",
@@ -174,7 +174,7 @@ pub struct DesignArgs {
     /// Print the summary as JSON.
     #[arg(long)]
     pub json: bool,
-    /// No progress.
+    /// Print no progress.
     #[arg(long)]
     pub quiet: bool,
 }
@@ -185,7 +185,7 @@ pub struct RunArgs {
     /// A built-in arm, or the path of an arm's TOML or of its folder: plant and controller.
     #[arg(long, value_name = "NAME|PATH")]
     pub arm: String,
-    /// Refuse an arm whose URDF holds what is not read, instead of warning.
+    /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
     /// Folder that `excite design` wrote, or its summary.json.
@@ -194,16 +194,16 @@ pub struct RunArgs {
     /// Folder for logs/excitation.mcap and summary.json.
     #[arg(long, value_name = "DIR", default_value = "out/excited")]
     pub out: PathBuf,
-    /// Seed of every noise.
+    /// Seed of all noise.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
     /// Torque ripple of the plant's motors, seen at the joints [N m].
     #[arg(long, value_name = "NM", default_value_t = 0.0, value_parser = between(0.0, 100.0))]
     pub ripple: f64,
-    /// The plant's friction depends on direction and load too.
+    /// Make the plant's friction depend on direction and load.
     #[arg(long)]
     pub load: bool,
-    /// Leave out the slow motion, from which dry friction at low speed is told.
+    /// Skip the slow motion, which is needed to identify dry friction at low speed.
     #[arg(long)]
     pub no_slow: bool,
     /// Print the summary as JSON.
@@ -217,16 +217,16 @@ pub struct BreakawayArgs {
     /// A built-in arm, or the path of an arm's TOML or of its folder.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
-    /// Refuse an arm whose URDF holds what is not read, instead of warning.
+    /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
-    /// Joints, from 0. Default: all.
+    /// Joints, counted from 0. Default: all.
     #[arg(long, value_name = "J,J..", value_delimiter = ',')]
     pub joints: Vec<usize>,
-    /// Seed of the starting model and of every noise.
+    /// Seed of the initial model and of all noise.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
-    /// Torque ripple of the plant's motors, seen at the joints [N m]; found from slow runs first, and
+    /// Torque ripple of the plant's motors, seen at the joints [N m]. It is identified first from slow runs, then
     /// compensated.
     #[arg(long, value_name = "NM", default_value_t = 0.0, value_parser = between(0.0, 100.0))]
     pub ripple: f64,
@@ -241,28 +241,28 @@ pub struct CalibrateArgs {
     /// A built-in arm, or the path of an arm's TOML or of its folder: the simulated plant.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
-    /// Refuse an arm whose URDF holds what is not read, instead of warning.
+    /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
     /// Folder for the identified arm, the reports and the logs.
     #[arg(long, value_name = "DIR", default_value = "out/calibrate")]
     pub out: PathBuf,
-    /// Seed of the starting model and of every noise.
+    /// Seed of the initial model and of all noise.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
     /// Torque ripple of the plant's motors, seen at the joints [N m].
     #[arg(long, value_name = "NM", default_value_t = 0.0, value_parser = between(0.0, 100.0))]
     pub ripple: f64,
-    /// The plant's friction depends on direction and load too.
+    /// Make the plant's friction depend on direction and load.
     #[arg(long)]
     pub load: bool,
-    /// End with the model: no demo.
+    /// Stop after identification; do not run the demo.
     #[arg(long)]
     pub no_demo: bool,
     /// Print the summary as JSON.
     #[arg(long)]
     pub json: bool,
-    /// No progress.
+    /// Print no progress.
     #[arg(long)]
     pub quiet: bool,
 }
@@ -270,22 +270,22 @@ pub struct CalibrateArgs {
 /// Arguments of `learn`.
 #[derive(Clone, Debug, Args)]
 pub struct LearnArgs {
-    /// Logs of the motion, the project's MCAP or CSV; the last periods are enough.
+    /// Logs of the motion, supple's MCAP or CSV; the last periods are enough.
     #[arg(required = true, value_name = "LOG")]
     pub logs: Vec<PathBuf>,
-    /// The model that was in use: a built-in arm, or the path of a TOML or of its folder.
+    /// The model that the controller used: a built-in arm, or the path of a TOML or of its folder.
     #[arg(long, value_name = "NAME|PATH")]
     pub arm: String,
-    /// Refuse an arm whose URDF holds what is not read, instead of warning.
+    /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
-    /// Folder for the model with what was learnt.
+    /// Folder for the refitted model.
     #[arg(long, value_name = "DIR", default_value = "out/learnt")]
     pub out: PathBuf,
-    /// Only so much of the end of each log counts [s]. Default: all.
+    /// Use only the last part of each log, of this length [s]. Default: all.
     #[arg(long, value_name = "S", value_parser = between(1e-3, 1e9))]
     pub last: Option<f64>,
-    /// Look for a body in the hand of about this mass too [kg].
+    /// Also identify a payload of about this mass [kg].
     #[arg(long, value_name = "KG", value_parser = between(1e-6, 1e3))]
     pub payload: Option<f64>,
     /// Print the result as JSON.
@@ -294,7 +294,7 @@ pub struct LearnArgs {
 }
 
 impl Command {
-    /// JSON is expected on standard output.
+    /// Whether the command prints JSON on standard output.
     pub fn json(&self) -> bool {
         match self {
             Command::Identify(args) => args.json,
@@ -307,7 +307,7 @@ impl Command {
     }
 }
 
-/// Does it.
+/// Runs an identification command.
 ///
 /// # Errors
 /// [`Failure`].
@@ -331,18 +331,18 @@ fn pair(text: &str) -> Result<(usize, usize), String> {
     }
 }
 
-/// Joints asked for, or all of `dof`.
-fn joints(asked: &[usize], dof: usize) -> Result<Vec<usize>, Failure> {
-    if asked.is_empty() {
+/// The requested joints, or all joints below `dof`.
+fn joints(requested: &[usize], dof: usize) -> Result<Vec<usize>, Failure> {
+    if requested.is_empty() {
         return Ok((0..dof).collect());
     }
-    let increasing = asked.windows(2).all(|w| w[0] < w[1]);
-    if increasing && asked.iter().all(|joint| *joint < dof) {
-        return Ok(asked.to_vec());
+    let increasing = requested.windows(2).all(|w| w[0] < w[1]);
+    if increasing && requested.iter().all(|joint| *joint < dof) {
+        return Ok(requested.to_vec());
     }
     Err(Failure::Ident(IdentError::Shape {
         argument: "joints".to_owned(),
         expected: format!("numbers below {dof}, increasing"),
-        found: format!("{asked:?}"),
+        found: format!("{requested:?}"),
     }))
 }

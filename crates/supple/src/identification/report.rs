@@ -1,59 +1,59 @@
-//! The report of an identification: one HTML file that needs no other, and its numbers.
+//! Report of an identification: one self-contained HTML file, and its summary.
 
 use crate::exit::Failure;
 use crate::figures::identification::{Curves, curves};
 use askama::Template;
 use serde::Serialize;
-use supple_experiment::Foretold;
+use supple_experiment::TrackingPrediction;
 use supple_ident::{DMatrix, Fit, Motion, Validation};
 use supple_model::Description;
 
-/// Points of a curve at most.
+/// Maximum number of points of a curve.
 const POINTS: usize = 900;
 /// Half-width of a 95 % confidence interval in standard deviations.
 const CONFIDENCE: f64 = 1.96;
 
-/// The numbers.
+/// Summary of an identification.
 #[derive(Clone, Debug, Serialize)]
 pub struct Summary {
-    /// The arm.
+    /// Name of the arm.
     pub arm: String,
     /// Logs that were fitted.
     pub logs: Vec<String>,
-    /// Combinations that the data determine, of how many columns.
+    /// Rank: number of identifiable parameter combinations.
     pub rank: usize,
-    /// Columns.
+    /// Number of columns of the regressor.
     pub columns: usize,
     /// Condition number of the base regressor, columns scaled to unit length.
     pub condition: f64,
-    /// `|tau - tau_hat| / |tau|` on what was fitted.
+    /// `|tau - tau_hat| / |tau|` on the training data.
     pub training_relative: f64,
-    /// Held-out data, log by log.
+    /// Prediction of the held-out data, per log.
     pub held_out: Vec<HeldOut>,
-    /// Share of random poses with a positive definite mass matrix.
+    /// Fraction of random poses with a positive definite mass matrix.
     pub positive_definite: f64,
-    /// Friction, joint by joint.
+    /// Friction of each joint.
     pub friction: Vec<JointFriction>,
     /// Base parameters with 95 % confidence intervals.
     pub base: Vec<BaseParameter>,
-    /// Directions that change no torque.
+    /// Parameter directions that do not affect the torque.
     pub null_space: Vec<String>,
-    /// What was chosen by cross-validation, as tables.
+    /// Choices made by cross-validation, as tables.
     pub choices: Vec<(String, String)>,
-    /// What was let pass.
+    /// Warnings.
     pub warnings: Vec<String>,
-    /// In plain words, from held-out data.
+    /// Verdict from the held-out data, as text.
     pub verdict: String,
-    /// In plain words, for 5 N/m.
+    /// Verdict for 5 N/m, as text.
     pub verdict_at_5_n_per_m: String,
-    /// The tracking error behind it.
-    pub foretold: Option<Foretold>,
+    /// The predicted tracking error on which that verdict is based.
+    pub foretold: Option<TrackingPrediction>,
 }
 
 /// Prediction of one log.
 #[derive(Clone, Debug, Serialize)]
 pub struct HeldOut {
-    /// Which.
+    /// Name of the log.
     pub log: String,
     /// RMS error of each moving joint \[N m\].
     pub rms_nm: Vec<f64>,
@@ -66,7 +66,7 @@ pub struct HeldOut {
 /// Friction of one joint.
 #[derive(Clone, Debug, Serialize)]
 pub struct JointFriction {
-    /// Joint.
+    /// Name of the joint.
     pub joint: String,
     /// `V`.
     pub viscous_nm_s_per_rad: f64,
@@ -81,17 +81,17 @@ pub struct JointFriction {
 /// One base parameter.
 #[derive(Clone, Debug, Serialize)]
 pub struct BaseParameter {
-    /// The combination in words.
+    /// The combination as text.
     pub combination: String,
-    /// Its value.
+    /// Value of the combination.
     pub value: f64,
     /// Half the width of its 95 % confidence interval.
     pub interval: f64,
 }
 
-/// What the report is made of.
+/// Input of the report.
 pub struct Found<'a, const N: usize> {
-    /// The arm that was found.
+    /// The identified arm.
     pub arm: &'a Description,
     /// The fit.
     pub fit: &'a Fit<N>,
@@ -99,16 +99,16 @@ pub struct Found<'a, const N: usize> {
     pub logs: Vec<String>,
     /// Held-out logs: name, motion, prediction.
     pub held_out: Vec<(String, Motion, Validation)>,
-    /// Tracking error to expect.
-    pub foretold: Option<Foretold>,
+    /// Predicted tracking error.
+    pub foretold: Option<TrackingPrediction>,
 }
 
-/// The numbers of a fit.
+/// Summarises a fit.
 pub fn summary<const N: usize>(found: &Found<'_, N>) -> Summary {
     let fit = found.fit;
     let values = fit.base_parameters();
-    let words = fit.base.text(&fit.columns.names());
-    let base = words
+    let combinations = fit.base.text(&fit.columns.names());
+    let base = combinations
         .into_iter()
         .enumerate()
         .map(|(i, combination)| BaseParameter {
@@ -154,7 +154,7 @@ pub fn summary<const N: usize>(found: &Found<'_, N>) -> Summary {
         choices: fit
             .choices
             .iter()
-            .map(|choice| (choice.of.to_owned(), choice.table.to_string()))
+            .map(|choice| (choice.subject.to_owned(), choice.table.to_string()))
             .collect(),
         warnings: fit.warnings.iter().map(ToString::to_string).collect(),
         verdict: found
@@ -162,8 +162,8 @@ pub fn summary<const N: usize>(found: &Found<'_, N>) -> Summary {
             .first()
             .map_or_else(|| "not validated".to_owned(), |(_, _, v)| v.verdict()),
         verdict_at_5_n_per_m: found.foretold.as_ref().map_or_else(
-            || "not foretold: the arm cannot follow the paper's sinusoid".to_owned(),
-            Foretold::verdict,
+            || "no prediction: the arm cannot reach the paper's sinusoid".to_owned(),
+            TrackingPrediction::verdict,
         ),
         foretold: found.foretold.clone(),
     }
@@ -177,10 +177,10 @@ struct Page<'a> {
     figures: Vec<(String, String, String)>,
 }
 
-/// The report.
+/// Renders the HTML report.
 ///
 /// # Errors
-/// [`Failure::Compose`], [`Failure::Figure`].
+/// [`Failure::ReportGeneration`], [`Failure::Figure`].
 pub fn html<const N: usize>(found: &Found<'_, N>, summary: &Summary) -> Result<String, Failure> {
     let mut figures = Vec::new();
     for (name, motion, _) in &found.held_out {
@@ -193,10 +193,10 @@ pub fn html<const N: usize>(found: &Found<'_, N>, summary: &Summary) -> Result<S
         figures,
     };
     page.render()
-        .map_err(|error| Failure::Compose(error.to_string()))
+        .map_err(|error| Failure::ReportGeneration(error.to_string()))
 }
 
-/// Measured against predicted, and what is left.
+/// Curves of measured and predicted torques, and of residuals.
 fn drawn<const N: usize>(
     found: &Found<'_, N>,
     motion: &Motion,

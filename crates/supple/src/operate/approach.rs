@@ -1,4 +1,4 @@
-//! The way to the start of a trajectory: a move in joint space, slow enough, then a rest.
+//! Moves the arm to the start of a trajectory: a slow joint-space move and a rest.
 
 use crate::exit::Failure;
 use core::time::Duration;
@@ -6,16 +6,16 @@ use supple_core::controller::Request;
 use supple_core::{Config, Trajectory, Vector};
 use supple_experiment::start_pose;
 
-/// Shortest move \[s\].
+/// Minimum duration of the move \[s\].
 const MOVE_S: f64 = 1.0;
 /// Rest in the start pose before the trajectory \[s\].
 const REST_S: f64 = 0.4;
-/// Share of each joint's speed limit that the move reaches.
-const SPEED_SHARE: f64 = 0.5;
-/// Peak speed of a minimum-jerk move is this times its mean speed.
+/// Fraction of each joint's speed limit that the move may reach.
+const SPEED_FRACTION: f64 = 0.5;
+/// Ratio of peak to mean speed of a minimum-jerk move.
 const MINIMUM_JERK_PEAK: f64 = 1.875;
 
-/// A trajectory with the pose that it starts from.
+/// A trajectory with its start pose.
 #[derive(Clone, Debug)]
 pub struct Approach<const N: usize> {
     trajectory: Trajectory,
@@ -25,10 +25,10 @@ pub struct Approach<const N: usize> {
 }
 
 impl<const N: usize> Approach<N> {
-    /// The way to a trajectory of this duration.
+    /// Plans the approach to a trajectory of this duration.
     ///
     /// # Errors
-    /// [`Failure::Experiment`] where the arm cannot follow it.
+    /// [`Failure::Experiment`] if the arm cannot follow the trajectory.
     pub fn new(
         config: &Config<N>,
         trajectory: Trajectory,
@@ -42,7 +42,7 @@ impl<const N: usize> Approach<N> {
         })
     }
 
-    /// What to ask for, from a pose: the move, the trajectory, and the cycles between the two.
+    /// Requests from a given pose: the move, the number of cycles to wait, and the trajectory.
     pub fn requests(&self, from_rad: &Vector<N>) -> (Request<N>, u64, Request<N>) {
         let duration_s = self.duration_s(from_rad);
         let between = ((duration_s + REST_S) / self.period_s).round() as u64;
@@ -57,17 +57,17 @@ impl<const N: usize> Approach<N> {
         )
     }
 
-    /// When the trajectory has begun at the latest, if all goes well.
+    /// Upper bound of the time until the trajectory starts.
     pub fn longest_wait(&self, from_rad: &Vector<N>) -> Duration {
         Duration::from_secs_f64(self.duration_s(from_rad) + REST_S + 2.0)
     }
 
     fn duration_s(&self, from_rad: &Vector<N>) -> f64 {
         let needed = (0..N).map(|i| {
-            let way_rad = (self.start_rad[i] - from_rad[i]).abs();
-            MINIMUM_JERK_PEAK * way_rad / (SPEED_SHARE * self.speed_rad_per_s[i])
+            let distance_rad = (self.start_rad[i] - from_rad[i]).abs();
+            MINIMUM_JERK_PEAK * distance_rad / (SPEED_FRACTION * self.speed_rad_per_s[i])
         });
-        // Whole hundredths: the same words in every log of the same way.
+        // Rounded up to 0.01 s, so that equal approaches give equal logs.
         let needed = needed.fold(MOVE_S, f64::max);
         (needed * 100.0).ceil() / 100.0
     }

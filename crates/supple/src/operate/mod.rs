@@ -1,20 +1,20 @@
-//! Talking to a running system: what it does, and asking for something else.
+//! Operator commands: shows the state of a running system and sends requests to it.
 //!
-//! Every request is checked by the controller; what is printed is its answer.
+//! The controller checks every request; the command prints its reply.
 
 mod approach;
-mod pendant;
+pub mod pendant;
 mod session;
 mod status;
 
 pub use approach::Approach;
 pub use pendant::{Pendant, pendant};
-pub use session::Session;
+pub use session::OperatorSession;
 pub use status::status;
 
 use crate::arms;
-use crate::cli::{Course, GainsArgs, ModeName, Place, Shape, TrackArgs};
-use crate::console::{say, say_json};
+use crate::cli::{GainsArgs, ModeName, SystemArgs, TrackArgs, TrackTrajectory, UpTrajectory};
+use crate::console::{print_json, print_line};
 use crate::exit::Failure;
 use crate::up::stop_running;
 use core::time::Duration;
@@ -25,15 +25,15 @@ use supple_core::controller::{Mode, Request};
 use supple_core::math::Vector3;
 use supple_experiment::scenario;
 use supple_ipc::message::{OperatorReply, Outcome, Telemetry};
-use supple_ipc::{Domain, TelemetryReader, ask_for_idle};
+use supple_ipc::{Domain, TelemetryReader, request_idle};
 use supple_model::{Description, with_dof};
 
-/// Cap of an arm without a tool \[m\].
+/// Cap radius of an arm without a tool \[m\].
 const CAP_M: f64 = 0.02;
-/// Longest wait for a sign of life.
-const ALIVE_WITHIN: Duration = Duration::from_secs(2);
+/// Timeout for the first telemetry.
+const TELEMETRY_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// The answer to a request, as `--json` gives it.
+/// Reply to a request, as `--json` prints it.
 #[derive(Serialize)]
 struct Answer {
     accepted: bool,
@@ -41,14 +41,14 @@ struct Answer {
     cycle: u64,
 }
 
-/// The system of a place, with its latest telemetry.
+/// Connects to the system and waits for its telemetry.
 ///
 /// # Errors
-/// [`Failure::NotRunning`] where there is none.
-fn running(place: &Place) -> Result<(Domain, TelemetryReader, Telemetry), Failure> {
-    let domain = Domain::new(place.prefix.as_deref())?;
+/// [`Failure::NotRunning`] if no telemetry arrives.
+fn running(system: &SystemArgs) -> Result<(Domain, TelemetryReader, Telemetry), Failure> {
+    let domain = Domain::new(system.prefix.as_deref())?;
     let mut reader = TelemetryReader::new(&domain)?;
-    match reader.wait(ALIVE_WITHIN)? {
+    match reader.wait(TELEMETRY_TIMEOUT)? {
         Some(telemetry) => Ok((domain, reader, telemetry)),
         None => Err(Failure::NotRunning {
             prefix: domain.prefix().to_owned(),
@@ -56,67 +56,70 @@ fn running(place: &Place) -> Result<(Domain, TelemetryReader, Telemetry), Failur
     }
 }
 
-/// To idle or to gravity hold.
+/// Runs `supple mode`: requests idle or gravity hold.
 ///
 /// # Errors
 /// [`Failure`].
-pub fn mode(mode: ModeName, place: &Place) -> Result<(), Failure> {
+pub fn mode(mode: ModeName, system: &SystemArgs) -> Result<(), Failure> {
     match mode {
-        ModeName::Idle => idle(place),
-        ModeName::GravityHold => simple(place, Simple::GravityHold),
+        ModeName::Idle => idle(system),
+        ModeName::GravityHold => send_simple_request(system, SimpleRequest::GravityHold),
     }
 }
 
-/// To idle, on a way that takes no reader's or operator's place, no shared memory and no lock.
-fn idle(place: &Place) -> Result<(), Failure> {
-    let domain = Domain::new(place.prefix.as_deref())?;
-    match ask_for_idle(&domain, ALIVE_WITHIN)? {
+/// Requests idle over a separate socket that needs no reader or operator slot, no shared memory and no lock.
+fn idle(system: &SystemArgs) -> Result<(), Failure> {
+    let domain = Domain::new(system.prefix.as_deref())?;
+    match request_idle(&domain, TELEMETRY_TIMEOUT)? {
         Some(answer) if answer.outcome == Outcome::Refused => Err(Failure::Refused {
-            words: answer.words,
+            reason: answer.text,
         }),
-        Some(answer) => told(place, answer.mode, answer.cycle),
+        Some(answer) => print_mode(system, answer.mode, answer.cycle),
         None => Err(Failure::NotRunning {
             prefix: domain.prefix().to_owned(),
         }),
     }
 }
 
-/// Out of a fault.
+/// Runs `supple reset`: clears the latched fault.
 ///
 /// # Errors
 /// [`Failure`].
-pub fn reset(place: &Place) -> Result<(), Failure> {
-    simple(place, Simple::Reset)
+pub fn reset(system: &SystemArgs) -> Result<(), Failure> {
+    send_simple_request(system, SimpleRequest::Reset)
 }
 
 #[derive(Clone, Copy)]
-enum Simple {
+enum SimpleRequest {
     GravityHold,
     Reset,
     Gains(Gains, f64),
 }
 
-fn simple(place: &Place, wish: Simple) -> Result<(), Failure> {
-    fn ask<const N: usize>(domain: &Domain, wish: Simple) -> Result<OperatorReply, Failure> {
-        let request: Request<N> = match wish {
-            Simple::GravityHold => Request::GravityHold,
-            Simple::Reset => Request::Reset,
-            Simple::Gains(gains, ramp_s) => Request::Gains { gains, ramp_s },
+fn send_simple_request(system: &SystemArgs, request_kind: SimpleRequest) -> Result<(), Failure> {
+    fn send<const N: usize>(
+        domain: &Domain,
+        request_kind: SimpleRequest,
+    ) -> Result<OperatorReply, Failure> {
+        let request: Request<N> = match request_kind {
+            SimpleRequest::GravityHold => Request::GravityHold,
+            SimpleRequest::Reset => Request::Reset,
+            SimpleRequest::Gains(gains, ramp_s) => Request::Gains { gains, ramp_s },
         };
-        Session::<N>::new(domain)?.ask(&request, None)
+        OperatorSession::<N>::new(domain)?.send_request(&request, None)
     }
-    let (domain, _reader, telemetry) = running(place)?;
+    let (domain, _reader, telemetry) = running(system)?;
     let dof = usize::from(telemetry.state.dof);
-    let reply = with_dof!(dof, N => ask::<N>(&domain, wish))??;
-    answered(place, &reply)
+    let reply = with_dof!(dof, N => send::<N>(&domain, request_kind))??;
+    print_reply(system, &reply)
 }
 
-/// Other stiffness and damping, reached along a ramp. What is not given stays.
+/// Runs `supple gains`: changes stiffness and damping along a ramp. Gains that are not given are unchanged.
 ///
 /// # Errors
 /// [`Failure`].
 pub fn gains(args: &GainsArgs) -> Result<(), Failure> {
-    let (_, _, telemetry) = running(&args.place)?;
+    let (_, _, telemetry) = running(&args.system)?;
     let axes = |given: &[f64], now: [f64; 3]| match given {
         [] => Vector3::from(now),
         [all] => Vector3::repeat(*all),
@@ -124,22 +127,22 @@ pub fn gains(args: &GainsArgs) -> Result<(), Failure> {
         [x, y] => Vector3::new(*x, *y, now[2]),
     };
     let gains = Gains {
-        stiffness_n_per_m: axes(&args.stiffness, telemetry.stiffness_n_per_m),
-        damping_n_s_per_m: axes(&args.damping, telemetry.damping_n_s_per_m),
+        stiffness_n_per_m: axes(&args.stiffness, telemetry.record().stiffness_n_per_m),
+        damping_n_s_per_m: axes(&args.damping, telemetry.record().damping_n_s_per_m),
     };
-    simple(&args.place, Simple::Gains(gains, args.ramp_s))
+    send_simple_request(&args.system, SimpleRequest::Gains(gains, args.ramp_s))
 }
 
-/// What a system follows, with its duration \[s\].
-pub fn course(course: Course, description: &Description) -> (Trajectory, f64) {
-    match course {
-        Course::Sinusoid => scenario::sinusoid(1.0),
-        Course::Arc => scenario::arc(),
-        Course::Quadrant => {
+/// Returns the trajectory and its duration \[s\].
+pub fn trajectory_for(trajectory: UpTrajectory, description: &Description) -> (Trajectory, f64) {
+    match trajectory {
+        UpTrajectory::Sinusoid => scenario::sinusoid(1.0),
+        UpTrajectory::Arc => scenario::arc(),
+        UpTrajectory::Quadrant => {
             let (quadrant, duration_s) = scenario::quadrant(scenario::QUADRANT_SPEED_M_PER_S);
             (Trajectory::Quadrant(quadrant), duration_s)
         }
-        Course::Probe => {
+        UpTrajectory::Probe => {
             let radius_m = description.tool().map_or(CAP_M, |tool| tool.cap_radius_m);
             let (probe, duration_s) = scenario::probe(radius_m);
             (Trajectory::Probe(probe), duration_s)
@@ -147,36 +150,36 @@ pub fn course(course: Course, description: &Description) -> (Trajectory, f64) {
     }
 }
 
-/// To the start of a trajectory, and along it.
+/// Runs `supple track`: moves the arm to the start of a trajectory and tracks it.
 ///
 /// # Errors
 /// [`Failure`].
 pub fn track(args: &TrackArgs) -> Result<(), Failure> {
-    let (trajectory, duration_s) = match args.shape {
-        Shape::Sinusoid => scenario::sinusoid(args.speed),
-        Shape::Arc => scenario::arc(),
-        Shape::Quadrant => {
+    let (trajectory, duration_s) = match args.trajectory {
+        TrackTrajectory::Sinusoid => scenario::sinusoid(args.speed),
+        TrackTrajectory::Arc => scenario::arc(),
+        TrackTrajectory::Quadrant => {
             let speed_m_per_s = args.speed * scenario::QUADRANT_SPEED_M_PER_S;
             let (quadrant, duration_s) = scenario::quadrant(speed_m_per_s);
             (Trajectory::Quadrant(quadrant), duration_s)
         }
     };
     let description = arms::find(&args.arm, args.strict)?;
-    follow(&args.place, &description, trajectory, duration_s)
+    follow(&args.system, &description, trajectory, duration_s)
 }
 
-/// To the start of the probing cycle, and along it.
+/// Runs `supple probe`: moves the arm to the start of the probing cycle and runs it.
 ///
 /// # Errors
 /// [`Failure`].
-pub fn probe(arm: &str, strict: bool, place: &Place) -> Result<(), Failure> {
+pub fn probe(arm: &str, strict: bool, system: &SystemArgs) -> Result<(), Failure> {
     let description = arms::find(arm, strict)?;
-    let (trajectory, duration_s) = course(Course::Probe, &description);
-    follow(place, &description, trajectory, duration_s)
+    let (trajectory, duration_s) = trajectory_for(UpTrajectory::Probe, &description);
+    follow(system, &description, trajectory, duration_s)
 }
 
 fn follow(
-    place: &Place,
+    system: &SystemArgs,
     description: &Description,
     trajectory: Trajectory,
     duration_s: f64,
@@ -189,24 +192,24 @@ fn follow(
         duration_s: f64,
     ) -> Result<OperatorReply, Failure> {
         let approach = Approach::<N>::new(&description.config()?, trajectory, duration_s)?;
-        let position = core::array::from_fn(|i| telemetry.position_rad[i]);
-        let mut session = Session::<N>::new(domain)?;
+        let position = core::array::from_fn(|i| telemetry.record().position_rad[i]);
+        let mut session = OperatorSession::<N>::new(domain)?;
         session.follow(&approach, &position.into(), None)?;
         session.wait_for_all(approach.longest_wait(&position.into()))
     }
-    let (domain, _reader, telemetry) = running(place)?;
+    let (domain, _reader, telemetry) = running(system)?;
     let reply = with_dof!(description.dof(), N => sized::<N>(
         &domain, &telemetry, description, trajectory, duration_s
     ))??;
-    answered(place, &reply)
+    print_reply(system, &reply)
 }
 
-/// Ends the `supple up` of a system.
+/// Runs `supple stop`: terminates the `supple up` of a system.
 ///
 /// # Errors
 /// [`Failure::NotRunning`].
-pub fn stop(place: &Place) -> Result<(), Failure> {
-    let domain = Domain::new(place.prefix.as_deref())?;
+pub fn stop(system: &SystemArgs) -> Result<(), Failure> {
+    let domain = Domain::new(system.prefix.as_deref())?;
     if stop_running(&domain)? {
         return Ok(());
     }
@@ -215,23 +218,23 @@ pub fn stop(place: &Place) -> Result<(), Failure> {
     })
 }
 
-fn answered(place: &Place, reply: &OperatorReply) -> Result<(), Failure> {
-    told(place, reply.mode(), reply.cycle)
+fn print_reply(system: &SystemArgs, reply: &OperatorReply) -> Result<(), Failure> {
+    print_mode(system, reply.mode(), reply.cycle)
 }
 
-/// Says what a request that was accepted has led to; a fault is no success.
-fn told(place: &Place, mode: Option<Mode>, cycle: u64) -> Result<(), Failure> {
+/// Prints the mode after an accepted request; returns an error if the system is in a fault.
+fn print_mode(system: &SystemArgs, mode: Option<Mode>, cycle: u64) -> Result<(), Failure> {
     let name = mode.map_or("unknown", |mode| mode.name());
-    match place.json {
-        true => say_json(&Answer {
+    match system.json {
+        true => print_json(&Answer {
             accepted: true,
             mode: name,
             cycle,
         })?,
-        false => say(&format!("mode {name} since cycle {cycle}"))?,
+        false => print_line(&format!("mode {name} since cycle {cycle}"))?,
     }
     match mode {
-        Some(Mode::Fault) => Err(Failure::InFault),
+        Some(Mode::Fault) => Err(Failure::SystemInFault),
         _ => Ok(()),
     }
 }

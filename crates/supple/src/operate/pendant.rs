@@ -1,7 +1,7 @@
-//! The pendant of an emulated arm: a socket in the folder of its bus, a line of JSON for each line.
+//! The pendant of an emulated arm: a socket in the folder of its bus; each text line is answered by one line of JSON.
 
 use crate::cli::PendantAction;
-use crate::console::say;
+use crate::console::print_line;
 use crate::exit::Failure;
 use core::time::Duration;
 use serde::Deserialize;
@@ -13,25 +13,25 @@ use std::time::Instant;
 use supple_bus::Address;
 use supple_ipc::{Domain, pause};
 
-/// Name of the socket in the bus's folder.
+/// Name of the socket in the folder of the bus.
 const SOCKET: &str = "pendant";
-/// Longest wait for an answer.
-const ANSWER_WITHIN: Duration = Duration::from_secs(2);
-/// How often an arm that is starting is looked for.
-const LOOK_EVERY: Duration = Duration::from_millis(5);
+/// Timeout for a reply.
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(2);
+/// Poll interval while waiting for an arm to start.
+const POLL_INTERVAL: Duration = Duration::from_millis(5);
 
-/// A pendant.
+/// Connection to the pendant of an emulated arm.
 #[derive(Clone, Debug)]
 pub struct Pendant {
     socket: PathBuf,
 }
 
-/// Something that happened to the arm.
+/// An event of the arm.
 #[derive(Clone, Debug, Deserialize)]
-pub struct Happening {
-    /// When, by the clock of the arm's states \[ns\].
+pub struct ArmEvent {
+    /// Time of the event on the clock of the arm's states \[ns\].
     pub time_ns: u64,
-    /// In words.
+    /// Description.
     pub what: String,
 }
 
@@ -41,7 +41,7 @@ struct Refusal {
 }
 
 impl Pendant {
-    /// Of the arm on this bus; a CAN interface's is a real one.
+    /// Pendant of the emulated arm on this bus; `None` for a CAN interface, whose pendant is real hardware.
     pub fn of(bus: &Address) -> Option<Pendant> {
         match bus {
             Address::Folder(folder) => Some(Pendant {
@@ -51,10 +51,10 @@ impl Pendant {
         }
     }
 
-    /// Waits until the arm is there; `check` says whether it still may come.
+    /// Waits until the arm answers; `check` fails if it can no longer start.
     ///
     /// # Errors
-    /// [`Failure::Pendant`] where it does not come, and what `check` says.
+    /// [`Failure::Pendant`] after the timeout, and the errors of `check`.
     pub fn wait(
         &self,
         within: Duration,
@@ -62,49 +62,49 @@ impl Pendant {
     ) -> Result<(), Failure> {
         let start = Instant::now();
         loop {
-            match self.say("status") {
+            match self.send_line("status") {
                 Ok(_) => return Ok(()),
                 Err(error) if start.elapsed() > within => return Err(error),
                 Err(_) => check()?,
             }
-            pause(LOOK_EVERY);
+            pause(POLL_INTERVAL);
         }
     }
 
-    /// Presses a button now, or later as in `activate@held+0.2`.
+    /// Presses a button immediately, or later as in `activate@held+0.2`.
     ///
     /// # Errors
     /// [`Failure::Pendant`].
     pub fn press(&self, button: &str) -> Result<(), Failure> {
-        self.say(button).map(|_| ())
+        self.send_line(button).map(|_| ())
     }
 
-    /// Everything that has happened to the arm.
+    /// All events of the arm since it started.
     ///
     /// # Errors
     /// [`Failure::Pendant`].
-    pub fn record(&self) -> Result<Vec<Happening>, Failure> {
-        self.parsed(&self.say("record")?)
+    pub fn record(&self) -> Result<Vec<ArmEvent>, Failure> {
+        self.parsed(&self.send_line("record")?)
     }
 
-    /// Says a line; gives the answer.
+    /// Sends a line and returns the reply.
     ///
     /// # Errors
     /// [`Failure::Pendant`].
-    pub fn say(&self, line: &str) -> Result<String, Failure> {
-        let answer = self.exchange(line).map_err(|error| self.silent(error))?;
+    pub fn send_line(&self, line: &str) -> Result<String, Failure> {
+        let answer = self.exchange(line).map_err(|error| self.no_answer(error))?;
         if answer.trim().is_empty() {
-            return Err(self.silent("it hung up"));
+            return Err(self.no_answer("the connection was closed"));
         }
         match serde_json::from_str::<Refusal>(&answer) {
-            Ok(refusal) => Err(self.silent(refusal.error)),
+            Ok(refusal) => Err(self.no_answer(refusal.error)),
             Err(_) => Ok(answer),
         }
     }
 
     fn exchange(&self, line: &str) -> std::io::Result<String> {
         let mut stream = UnixStream::connect(&self.socket)?;
-        stream.set_read_timeout(Some(ANSWER_WITHIN))?;
+        stream.set_read_timeout(Some(ANSWER_TIMEOUT))?;
         writeln!(stream, "{line}")?;
         let mut answer = String::new();
         stream.read_to_string(&mut answer)?;
@@ -112,10 +112,10 @@ impl Pendant {
     }
 
     fn parsed<T: DeserializeOwned>(&self, answer: &str) -> Result<T, Failure> {
-        serde_json::from_str(answer).map_err(|error| self.silent(error))
+        serde_json::from_str(answer).map_err(|error| self.no_answer(error))
     }
 
-    fn silent(&self, cause: impl ToString) -> Failure {
+    fn no_answer(&self, cause: impl ToString) -> Failure {
         Failure::Pendant {
             socket: self.socket.clone(),
             cause: cause.to_string(),
@@ -123,7 +123,7 @@ impl Pendant {
     }
 }
 
-/// Does something at the pendant of a system's emulated arm; prints its answer.
+/// Runs `supple pendant`: sends a button press or query to the emulated pendant and prints its reply.
 ///
 /// # Errors
 /// [`Failure::Pendant`].
@@ -139,7 +139,7 @@ pub fn pendant(action: PendantAction, prefix: Option<&str>) -> Result<(), Failur
         PendantAction::Record => "record",
     };
     match Pendant::of(&bus) {
-        Some(pendant) => say(pendant.say(line)?.trim_end()),
+        Some(pendant) => print_line(pendant.send_line(line)?.trim_end()),
         None => Ok(()),
     }
 }

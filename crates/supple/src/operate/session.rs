@@ -1,4 +1,4 @@
-//! Requests to a controller, and its answers to them.
+//! Sends requests to a controller and receives its replies.
 
 use super::Approach;
 use crate::exit::Failure;
@@ -7,64 +7,65 @@ use std::time::Instant;
 use supple_core::Vector;
 use supple_core::controller::Request;
 use supple_ipc::message::{OperatorReply, Outcome};
-use supple_ipc::{Domain, Operator, pause};
+use supple_ipc::{Domain, OperatorClient, pause};
 
-/// Longest wait for an answer to something that is due.
-const ANSWER_WITHIN: Duration = Duration::from_secs(5);
-/// How often a waiting operator looks.
-const LOOK_EVERY: Duration = Duration::from_millis(1);
+/// Timeout for a reply.
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(5);
+/// Poll interval while waiting for a reply.
+const POLL_INTERVAL: Duration = Duration::from_millis(1);
 
-/// An operator with the requests that were not done yet.
+/// An operator connection with its pending requests.
 #[derive(Debug)]
-pub struct Session<const N: usize> {
-    operator: Operator,
+pub struct OperatorSession<const N: usize> {
+    operator: OperatorClient,
     prefix: String,
-    waiting: Vec<u64>,
+    pending_requests: Vec<u64>,
 }
 
-impl<const N: usize> Session<N> {
+impl<const N: usize> OperatorSession<N> {
     /// Joins a system.
     ///
     /// # Errors
     /// [`Failure::Ipc`].
     pub fn new(domain: &Domain) -> Result<Self, Failure> {
-        Session::of(domain, Operator::new(domain)?)
+        OperatorSession::of(domain, OperatorClient::new(domain)?)
     }
 
-    /// As [`Session::new`], for a program that runs the system.
+    /// As [`OperatorSession::new`], for a program that runs the system.
     ///
     /// # Errors
     /// [`Failure::Ipc`].
     pub fn for_system(domain: &Domain) -> Result<Self, Failure> {
-        Session::of(domain, Operator::for_system(domain)?)
+        OperatorSession::of(domain, OperatorClient::for_system(domain)?)
     }
 
-    fn of(domain: &Domain, operator: Operator) -> Result<Self, Failure> {
-        Ok(Session {
+    fn of(domain: &Domain, operator: OperatorClient) -> Result<Self, Failure> {
+        Ok(OperatorSession {
             operator,
             prefix: domain.prefix().to_owned(),
-            waiting: Vec::new(),
+            pending_requests: Vec::new(),
         })
     }
 
-    /// Asks, and waits until the controller does it, or has it wait for its cycle.
+    /// Sends a request and waits until the controller executes it or queues it for its cycle.
     ///
     /// # Errors
-    /// [`Failure::Refused`] with the controller's words; [`Failure::NotRunning`] where nobody answers.
-    pub fn ask(
+    /// [`Failure::Refused`] with the controller's reason; [`Failure::NotRunning`] if no system answers.
+    pub fn send_request(
         &mut self,
         request: &Request<N>,
         at_cycle: Option<u64>,
     ) -> Result<OperatorReply, Failure> {
         let sequence = self.operator.send(request, at_cycle)?;
-        self.heard(sequence.ok_or_else(|| self.nobody())?)
+        self.wait_for_reply(sequence.ok_or_else(|| self.not_running())?)
     }
 
-    /// As [`Session::ask`], of a controller that may still be starting. `check` says whether it still may.
+    /// As [`OperatorSession::send_request`], but waits for a controller that may still be starting; `check` fails if
+    /// it cannot start any more.
     ///
     /// # Errors
-    /// As [`Session::ask`], and what `check` says.
-    pub fn ask_when_there(
+    /// As [`OperatorSession::send_request`], and the errors of `check`.
+    pub fn send_request_when_ready(
         &mut self,
         request: &Request<N>,
         at_cycle: Option<u64>,
@@ -74,20 +75,20 @@ impl<const N: usize> Session<N> {
         let start = Instant::now();
         loop {
             if let Some(sequence) = self.operator.send(request, at_cycle)? {
-                return self.wait_for_place(sequence);
+                return self.wait_until_queued(sequence);
             }
             check()?;
             if start.elapsed() > Duration::from_secs(within_s) {
-                return Err(self.nobody());
+                return Err(self.not_running());
             }
-            pause(LOOK_EVERY);
+            pause(POLL_INTERVAL);
         }
     }
 
-    /// Asks for the way to a trajectory and for the trajectory after it, from `start_cycle` on or now.
+    /// Requests the approach and then the trajectory, from `start_cycle` or immediately.
     ///
     /// # Errors
-    /// As [`Session::ask`].
+    /// As [`OperatorSession::send_request`].
     pub fn follow(
         &mut self,
         approach: &Approach<N>,
@@ -100,22 +101,23 @@ impl<const N: usize> Session<N> {
                 self.queue(&to_start, cycle)?;
                 cycle
             }
-            None => self.ask(&to_start, None)?.cycle,
+            None => self.send_request(&to_start, None)?.cycle,
         };
         self.queue(&along, start_cycle + between)
     }
 
-    /// Hears what became of the requests that wait.
+    /// Collects the replies to pending requests.
     ///
     /// # Errors
-    /// [`Failure::Refused`] where one was refused.
+    /// [`Failure::Refused`] if a request was refused.
     pub fn check(&mut self) -> Result<Option<OperatorReply>, Failure> {
         let mut done = None;
         while let Some(reply) = self.operator.receive()? {
             match reply.outcome() {
                 Outcome::Queued => {}
                 Outcome::Accepted => {
-                    self.waiting.retain(|waits| *waits != reply.sequence);
+                    self.pending_requests
+                        .retain(|pending| *pending != reply.sequence);
                     done = Some(reply);
                 }
                 Outcome::Refused => return Err(refused(&reply)),
@@ -124,46 +126,46 @@ impl<const N: usize> Session<N> {
         Ok(done)
     }
 
-    /// Waits until every request is done; gives the answer to the last.
+    /// Waits until every request is executed; returns the reply to the last.
     ///
     /// # Errors
-    /// As [`Session::ask`].
+    /// As [`OperatorSession::send_request`].
     pub fn wait_for_all(&mut self, within: Duration) -> Result<OperatorReply, Failure> {
         let start = Instant::now();
         loop {
             let done = self.check()?;
-            if let (Some(reply), true) = (done, self.waiting.is_empty()) {
+            if let (Some(reply), true) = (done, self.pending_requests.is_empty()) {
                 return Ok(reply);
             }
             if start.elapsed() > within {
-                return Err(self.nobody());
+                return Err(self.not_running());
             }
-            pause(LOOK_EVERY);
+            pause(POLL_INTERVAL);
         }
     }
 
-    /// Asks for something in a cycle to come, and waits until the controller has it in its queue.
+    /// Sends a request for a future cycle and waits until the controller has queued it.
     ///
     /// # Errors
-    /// As [`Session::ask`].
+    /// As [`OperatorSession::send_request`].
     pub fn queue(&mut self, request: &Request<N>, at_cycle: u64) -> Result<(), Failure> {
         match self.operator.send(request, Some(at_cycle))? {
-            Some(sequence) => self.wait_for_place(sequence),
-            None => Err(self.nobody()),
+            Some(sequence) => self.wait_until_queued(sequence),
+            None => Err(self.not_running()),
         }
     }
 
-    /// The controller has it, and hears it in its cycle.
-    fn wait_for_place(&mut self, sequence: u64) -> Result<(), Failure> {
-        if self.heard(sequence)?.outcome() == Outcome::Queued {
-            self.waiting.push(sequence);
+    /// Waits until the controller has queued the request.
+    fn wait_until_queued(&mut self, sequence: u64) -> Result<(), Failure> {
+        if self.wait_for_reply(sequence)?.outcome() == Outcome::Queued {
+            self.pending_requests.push(sequence);
         }
         Ok(())
     }
 
-    fn heard(&mut self, sequence: u64) -> Result<OperatorReply, Failure> {
+    fn wait_for_reply(&mut self, sequence: u64) -> Result<OperatorReply, Failure> {
         let start = Instant::now();
-        while start.elapsed() < ANSWER_WITHIN {
+        while start.elapsed() < ANSWER_TIMEOUT {
             while let Some(reply) = self.operator.receive()? {
                 if reply.outcome() == Outcome::Refused {
                     return Err(refused(&reply));
@@ -171,15 +173,16 @@ impl<const N: usize> Session<N> {
                 if reply.sequence == sequence {
                     return Ok(reply);
                 }
-                self.waiting
-                    .retain(|waits| reply.outcome() == Outcome::Queued || *waits != reply.sequence);
+                self.pending_requests.retain(|pending| {
+                    reply.outcome() == Outcome::Queued || *pending != reply.sequence
+                });
             }
-            pause(LOOK_EVERY);
+            pause(POLL_INTERVAL);
         }
-        Err(self.nobody())
+        Err(self.not_running())
     }
 
-    fn nobody(&self) -> Failure {
+    fn not_running(&self) -> Failure {
         Failure::NotRunning {
             prefix: self.prefix.clone(),
         }
@@ -188,6 +191,6 @@ impl<const N: usize> Session<N> {
 
 fn refused(reply: &OperatorReply) -> Failure {
     Failure::Refused {
-        words: reply.text.to_string(),
+        reason: reply.text.to_string(),
     }
 }

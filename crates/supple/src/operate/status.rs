@@ -1,39 +1,40 @@
-//! `supple status`: what a running system does now.
+//! `supple status`: shows the state of a running system.
 
 use super::running;
-use crate::cli::Place;
-use crate::console::{say, say_json};
+use crate::cli::SystemArgs;
+use crate::console::{print_json, print_line};
 use crate::exit::Failure;
-use crate::up::{Meter, Spread};
+use crate::up::{Percentiles, RunStatistics};
 use core::fmt;
 use core::time::Duration;
 use serde::Serialize;
 use std::time::Instant;
 use supple_ipc::message::Telemetry;
 
-/// How long it looks.
-const LOOK_FOR: Duration = Duration::from_millis(500);
+/// Duration of the telemetry sample.
+const SAMPLE_WINDOW: Duration = Duration::from_millis(500);
 
-/// A system at one moment, and over the last half second.
+/// State of a system, and its statistics over the last half second.
 #[derive(Serialize)]
 struct Status {
     mode: &'static str,
     mode_time_s: f64,
     drives: &'static str,
     cycle: u64,
-    /// Cycles looked at.
+    /// Number of sampled cycles.
     cycles: u64,
     missed: u64,
     late: u64,
-    /// Torque commands that counted as no answer: of another arm, or not finite.
+    /// Torque commands that were discarded: wrong number of joints, or not finite.
     unusable: u64,
-    /// Messages dropped because another program than this system's controller or plant wrote them, or of another arm.
+    /// Messages that were discarded because their writer is not this system's controller or plant, or because they
+    /// belong to another arm.
     foreign: u64,
     tx_lost: u64,
     bus_load: f64,
-    wake_us: Spread,
-    step_ns: Spread,
-    round_trip_us: Spread,
+    wake_us: Percentiles,
+    step_ns: Percentiles,
+    round_trip_us: Percentiles,
     tip_position_m: [f64; 3],
     tip_error_m: Option<f64>,
     stiffness_n_per_m: [f64; 3],
@@ -42,33 +43,33 @@ struct Status {
     fault: Option<String>,
 }
 
-/// Looks, and says what it saw.
+/// Reads telemetry for half a second and prints the status.
 ///
 /// # Errors
-/// [`Failure::NotRunning`] where there is no system.
-pub fn status(place: &Place) -> Result<(), Failure> {
-    let (_, mut reader, mut last) = running(place)?;
-    let mut meter = Meter::default();
+/// [`Failure::NotRunning`] if no system is running.
+pub fn status(system: &SystemArgs) -> Result<(), Failure> {
+    let (_, mut reader, mut last) = running(system)?;
+    let mut statistics = RunStatistics::default();
     let start = Instant::now();
-    while start.elapsed() < LOOK_FOR {
-        if let Some(telemetry) = reader.wait(LOOK_FOR)? {
-            meter.add(&telemetry);
+    while start.elapsed() < SAMPLE_WINDOW {
+        if let Some(telemetry) = reader.wait(SAMPLE_WINDOW)? {
+            statistics.add(&telemetry);
             last = telemetry;
         }
     }
-    let status = Status::new(&last, &meter);
-    match place.json {
-        true => say_json(&status),
-        false => say(&status.to_string()),
+    let status = Status::new(&last, &statistics);
+    match system.json {
+        true => print_json(&status),
+        false => print_line(&status.to_string()),
     }
 }
 
 impl Status {
-    fn new(last: &Telemetry, meter: &Meter) -> Status {
-        let seen = meter.summary(0);
+    fn new(last: &Telemetry, statistics: &RunStatistics) -> Status {
+        let (seen, record) = (statistics.summary(0), last.record());
         Status {
-            mode: last.mode().map_or("unknown", |mode| mode.name()),
-            mode_time_s: last.mode_time_s,
+            mode: record.mode().map_or("unknown", |mode| mode.name()),
+            mode_time_s: record.mode_time_s,
             drives: last.state.drives().name(),
             cycle: last.state.cycle,
             cycles: seen.cycles,
@@ -81,12 +82,12 @@ impl Status {
             wake_us: seen.wake_us,
             step_ns: seen.step_ns,
             round_trip_us: seen.round_trip_us,
-            tip_position_m: last.tip_position_m,
-            tip_error_m: last.tip_error_m(),
-            stiffness_n_per_m: last.stiffness_n_per_m,
-            damping_n_s_per_m: last.damping_n_s_per_m,
-            in_contact: last.in_contact != 0,
-            fault: (last.fault != 0).then(|| last.fault_text.to_string()),
+            tip_position_m: record.tip_position_m,
+            tip_error_m: record.tip_error_m(),
+            stiffness_n_per_m: record.stiffness_n_per_m,
+            damping_n_s_per_m: record.damping_n_s_per_m,
+            in_contact: record.in_contact,
+            fault: (record.fault != 0).then(|| record.fault_text.to_string()),
         }
     }
 }
@@ -114,7 +115,7 @@ impl fmt::Display for Status {
         )?;
         writeln!(
             f,
-            "answer    p50 {:.0} p99 {:.0} max {:.0} us, over {} cycles",
+            "round trip  p50 {:.0} p99 {:.0} max {:.0} us, over {} cycles",
             self.round_trip_us.p50, self.round_trip_us.p99, self.round_trip_us.max, self.cycles
         )?;
         write!(
@@ -128,7 +129,7 @@ impl fmt::Display for Status {
         if self.unusable + self.foreign > 0 {
             write!(
                 f,
-                "\ndropped   {} unusable commands, {} messages of other writers: look for a second controller or plant",
+                "\ndropped   {} invalid commands, {} messages from other processes: check for a second controller or plant",
                 self.unusable, self.foreign
             )?;
         }

@@ -1,9 +1,9 @@
-//! Contact: figures 5 and 6, the trade-off.
+//! Contact: figures 5 and 6, and the trade-off.
 
 use super::{Section, row};
 use crate::units::{figures, mm, newton_seconds, newtons, percent, seconds};
 use supple_experiment::metrics::{LineFit, median};
-use supple_experiment::summary::{Contact, Exploration, Summary};
+use supple_experiment::summary::{ContactStatistics, ProbingSummary, Summary};
 
 pub(super) fn force(summary: &Summary) -> Section {
     let lines = &summary.exploration;
@@ -12,7 +12,7 @@ pub(super) fn force(summary: &Summary) -> Section {
         .filter(|line| line.stiffness_n_per_m >= 5.0)
         .map(|line| line.contact.peak_filtered_n)
         .collect();
-    let share = |share: Option<f64>| share.map_or("none".to_owned(), percent);
+    let fraction = |fraction: Option<f64>| fraction.map_or("none".to_owned(), percent);
     let rows = vec![
         row(
             "first transient, median over K from 5 N/m",
@@ -20,11 +20,11 @@ pub(super) fn force(summary: &Summary) -> Section {
         ),
         row(
             "its spread, (max \u{2212} min) / median",
-            share(summary.contact.peak_spread),
+            fraction(summary.contact.peak_spread),
         ),
         row(
-            "the same over the approach speed",
-            share(summary.contact.peak_over_speed_spread),
+            "the same for the ratio of peak to approach speed",
+            fraction(summary.contact.peak_over_speed_spread),
         ),
         row(
             "resting force at 5 and 125 N/m",
@@ -38,28 +38,28 @@ pub(super) fn force(summary: &Summary) -> Section {
     Section {
         figure: "figure_5",
         title: "Force of an unexpected contact",
-        place: "Section 4.2, figure 5",
+        paper_reference: "Section 4.2, figure 5",
         paper: "Filtered at 100 Hz, each contact begins with a fast transient of about 20 N, from the \
                 collision itself and largely independent of a stiffness that differs by a factor of 25. \
                 What follows, in size and in duration, depends on the stiffness.",
-        here: "The vertical force that the sensor behind the tip reports, filtered alike, at 5 and 125 N/m, \
+        measured_here: "The vertical force of the sensor behind the tip, filtered in the same way, at 5 and 125 N/m, \
                aligned at the first touch; the friction feed-forward fades in contact. The controller \
-               knows the plant's parameters.",
+               uses the plant's parameters.",
         rows,
     }
 }
 
-fn at(lines: &[Exploration], stiffness_n_per_m: f64) -> Option<&Exploration> {
+fn at(lines: &[ProbingSummary], stiffness_n_per_m: f64) -> Option<&ProbingSummary> {
     lines
         .iter()
         .find(|line| line.stiffness_n_per_m == stiffness_n_per_m)
 }
 
-/// Values at these stiffnesses, those that were run.
+/// Values at those of these stiffnesses that were run.
 fn values(
-    lines: &[Exploration],
+    lines: &[ProbingSummary],
     stiffnesses: &[f64],
-    value: impl Fn(&Exploration) -> String,
+    value: impl Fn(&ProbingSummary) -> String,
 ) -> String {
     let found = stiffnesses.iter().filter_map(|k| at(lines, *k));
     found.map(value).collect::<Vec<_>>().join(", ")
@@ -74,14 +74,14 @@ pub(super) fn impulse(summary: &Summary) -> Section {
     Section {
         figure: "figure_6",
         title: "Impulse over stiffness",
-        place: "Section 4.2, figure 6",
+        paper_reference: "Section 4.2, figure 6",
         paper: "The integral of the force over one cycle of the probing motion grows linearly with the \
-                stiffness, as for a linear spring. Extrapolated to no stiffness it is not zero, which the \
-                paper ascribes to the impact: to the kinetic energy of the arm, not to the stiffness.",
-        here: "The same integral, median over the strokes, with a line through the points from 5 N/m on. \
-               Left on, the friction feed-forward goes on pushing with nearly the Coulomb torque when the \
-               block stops the tip: the intercept is then mostly friction. Faded once contact is \
-               noticed, what remains is near the impact itself: the first 50 ms.",
+                stiffness, as for a linear spring. Extrapolated to zero stiffness it is not zero, which the \
+                paper attributes to the impact: to the kinetic energy of the arm, not to the stiffness.",
+        measured_here: "The same integral, median over the strokes, with a line through the points from 5 N/m on. \
+               If it stays on, the friction feed-forward keeps pushing with nearly the Coulomb torque when the \
+               block stops the tip: the intercept is then mostly friction. If it fades once contact is \
+               detected, the intercept is close to the impact itself, the first 50 ms.",
         rows: vec![
             row("line, fade on", line(&summary.contact)),
             row("line, fade off", line(&summary.fade_off)),
@@ -93,7 +93,7 @@ pub(super) fn impulse(summary: &Summary) -> Section {
     }
 }
 
-fn line(contact: &Contact) -> String {
+fn line(contact: &ContactStatistics) -> String {
     match contact.impulse_fit {
         Some(LineFit {
             slope,
@@ -123,12 +123,12 @@ pub(super) fn trade_off(summary: &Summary) -> Section {
     Section {
         figure: "trade_off",
         title: "The trade-off",
-        place: "Section 5",
+        paper_reference: "Section 5",
         paper: "Position error against contact force is the central trade-off: as the stiffness rises, \
-                the error falls and the impulse grows, and the task decides. Where places are uncertain \
-                anyway there may be no reason for high gains.",
-        here: "Error of the tip on the way down, before contact, against the impulse of the contact, one \
-               point a stiffness.",
+                the error falls and the impulse grows, and the task decides. If positions are uncertain \
+                anyway, there may be no reason for high gains.",
+        measured_here: "Tip error during the descent, before contact, against the impulse of the contact, one \
+               point per stiffness.",
         rows: rows.collect(),
     }
 }

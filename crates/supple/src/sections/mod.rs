@@ -1,9 +1,9 @@
-//! What the paper reports beside what was measured, figure by figure, as the report says it.
+//! Text of the report: results of the paper and measured results, figure by figure.
 
 mod contact;
 mod free_motion;
 
-use supple_experiment::Ended;
+use supple_experiment::FaultEnd;
 use supple_experiment::summary::{QuadrantSummary, Summary};
 
 /// One subject of the paper.
@@ -13,26 +13,26 @@ pub struct Section {
     pub figure: &'static str,
     /// Headline.
     pub title: &'static str,
-    /// Where the paper speaks of it.
-    pub place: &'static str,
-    /// What the paper reports.
+    /// Section, figure or equation of the paper.
+    pub paper_reference: &'static str,
+    /// Results of the paper.
     pub paper: &'static str,
-    /// What is shown, and what differs from the paper.
-    pub here: &'static str,
-    /// What was measured.
+    /// What the figure shows, and how it differs from the paper.
+    pub measured_here: &'static str,
+    /// Measured quantities.
     pub rows: Vec<Row>,
 }
 
 /// One measured quantity.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Row {
-    /// What.
+    /// Name of the quantity.
     pub quantity: String,
-    /// How much, with its unit.
+    /// Value with its unit.
     pub measured: String,
 }
 
-/// All of them, in the order of the report.
+/// All sections, in the order of the report.
 pub fn sections(summary: &Summary) -> Vec<Section> {
     vec![
         free_motion::sinusoid(summary),
@@ -47,13 +47,12 @@ pub fn sections(summary: &Summary) -> Vec<Section> {
     ]
 }
 
-/// Runs that a fault ended though they should have gone through. (3.6) to the letter is not among them:
-/// that it runs away is a result.
-pub fn faults(summary: &Summary) -> Vec<(String, &Ended)> {
-    let mut runs: Vec<(String, &Option<Ended>)> = Vec::new();
+/// Runs that ended with an unexpected fault. Equation (3.6) as printed is excluded: its instability is a result.
+pub fn faults(summary: &Summary) -> Vec<(String, &FaultEnd)> {
+    let mut runs: Vec<(String, &Option<FaultEnd>)> = Vec::new();
     for at in &summary.sinusoid_by_speed {
         runs.push((
-            format!("sinusoid at {} times the pace", at.speed),
+            format!("sinusoid at {} times the speed", at.speed),
             &at.tracking.ended,
         ));
     }

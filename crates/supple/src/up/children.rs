@@ -1,7 +1,7 @@
-//! The processes of a system: started from beside this program, watched over, ended in order.
+//! Child processes of a system: starts, supervises and terminates the programs that are installed beside this one.
 
 use super::plan::{CONTROLLER, Program};
-use crate::console::remark;
+use crate::console::print_status;
 use crate::exit::Failure;
 use crate::interrupt;
 use core::time::Duration;
@@ -17,30 +17,30 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::Instant;
 use supple_ipc::{Domain, pause};
 
-/// Exit code of a program that could not write a file.
+/// Exit code of a program that cannot write a file.
 const FILE_CODE: i32 = 6;
-/// How long another process's lock may be one that it has just given back.
-const HELD_BY_A_FORK: Duration = Duration::from_millis(200);
-/// How often an ending process is looked at.
-const LOOK_EVERY: Duration = Duration::from_millis(5);
+/// Time to wait for a lock that a forked child may still hold briefly.
+const FORK_LOCK_GRACE: Duration = Duration::from_millis(200);
+/// Poll interval while waiting for a process to exit.
+const POLL_INTERVAL: Duration = Duration::from_millis(5);
 
-/// The processes; what still runs when this is dropped is killed.
+/// The child processes; those that still run when this is dropped are killed.
 #[derive(Debug, Default)]
-pub struct Children {
+pub struct ChildProcesses {
     running: Vec<(&'static str, Child)>,
-    /// Programs that have ended, each with how.
+    /// Programs that have exited, with their exit status.
     ended: Vec<(&'static str, ExitStatus)>,
 }
 
-impl Children {
-    /// Starts a program that is beside this one. It hears no interrupt of a terminal: it is ended in order,
-    /// after what it knows has been asked of it.
+impl ChildProcesses {
+    /// Starts a program that is installed beside this one. The child ignores terminal interrupts: the parent
+    /// terminates it in order, after it has collected its data.
     ///
     /// # Errors
-    /// [`Failure::NoSibling`] says how to build what is missing.
+    /// [`Failure::MissingProgram`], which says how to build the program.
     pub fn start(&mut self, program: &Program) -> Result<(), Failure> {
         let Program { name, arguments } = program;
-        let program = sibling(name)?;
+        let program = program_beside(name)?;
         let child = Command::new(&program)
             .args(arguments)
             .stdin(Stdio::null())
@@ -49,13 +49,13 @@ impl Children {
             .spawn()
             .map_err(|error| Failure::file("start", &program, error))?;
         if *name == CONTROLLER {
-            interrupt::pass_on_to(&child);
+            interrupt::forward_interrupts_to(&child);
         }
         self.running.push((name, child));
         Ok(())
     }
 
-    /// All of them run.
+    /// Checks that all processes are running.
     ///
     /// # Errors
     /// [`Failure::ProcessEnded`].
@@ -68,18 +68,14 @@ impl Children {
         Ok(())
     }
 
-    /// All of them run, or `may_end` has ended well where it may.
+    /// Checks that all processes are running. If `may_exit` is set, `may_end` may have exited successfully.
     ///
     /// # Errors
     /// [`Failure::ProcessEnded`].
-    pub fn check_running(
-        &mut self,
-        one_may_end: bool,
-        may_end: &'static str,
-    ) -> Result<(), Failure> {
+    pub fn check_running(&mut self, may_exit: bool, may_end: &'static str) -> Result<(), Failure> {
         for (name, child) in &mut self.running {
             if let Some(status) = status(child)? {
-                let expected = one_may_end && *name == may_end && status.success();
+                let expected = may_exit && *name == may_end && status.success();
                 if !expected {
                     return Err(ended(name, status));
                 }
@@ -88,11 +84,11 @@ impl Children {
         Ok(())
     }
 
-    /// A program has done all it had to.
+    /// Whether the program has exited successfully.
     ///
     /// # Errors
-    /// [`Failure::ProcessEnded`] where it ended otherwise.
-    pub fn all_ended_well(&mut self, name: &'static str) -> Result<bool, Failure> {
+    /// [`Failure::ProcessEnded`] if it exited with an error.
+    pub fn exited_successfully(&mut self, name: &'static str) -> Result<bool, Failure> {
         let Some((_, child)) = self.running.iter_mut().find(|(n, _)| *n == name) else {
             return Ok(self.ended.iter().any(|(n, _)| *n == name));
         };
@@ -103,54 +99,54 @@ impl Children {
         }
     }
 
-    /// Sends a program a signal.
+    /// Sends a signal to a program.
     ///
     /// # Errors
-    /// [`Failure::NoSuchProcess`] where it is none of these.
+    /// [`Failure::NoSuchProcess`] if the program is not a child.
     pub fn signal(&self, name: &'static str, signal: Signal) -> Result<(), Failure> {
         let Some((_, child)) = self.running.iter().find(|(n, _)| *n == name) else {
             return Err(Failure::NoSuchProcess { name });
         };
         if let Some(pid) = i32::try_from(child.id()).ok().and_then(Pid::from_raw) {
-            // A process that has just ended needs no signal.
+            // Ignore errors: the process may have exited already.
             let _ = kill_process(pid, signal);
         }
         Ok(())
     }
 
-    /// Starts a program again that was killed.
+    /// Restarts a program that was killed.
     ///
     /// # Errors
-    /// As [`Children::start`].
+    /// As [`ChildProcesses::start`].
     pub fn restart(&mut self, program: &Program) -> Result<(), Failure> {
-        if let Some(place) = self.running.iter().position(|(n, _)| *n == program.name) {
-            kill(&mut self.running.remove(place).1);
+        if let Some(index) = self.running.iter().position(|(n, _)| *n == program.name) {
+            kill(&mut self.running.remove(index).1);
         }
         self.start(program)
     }
 
-    /// A program whose trace ended before its run.
+    /// Name of the program whose trace is incomplete, if any.
     pub fn trace_ended(&self) -> Option<&'static str> {
         let mut ended = self.ended.iter();
         let found = ended.find(|(_, status)| status.code() == Some(FILE_CODE));
         found.map(|(name, _)| *name)
     }
 
-    /// Asks a program to end and waits for it, with `meanwhile` done again and again until it fails; kills it
-    /// where it does not end in time.
+    /// Terminates a program and waits for it while calling `poll` repeatedly, until `poll` fails; kills the program
+    /// after the timeout `within`.
     ///
     /// # Errors
-    /// What `meanwhile` says, once the program has ended.
+    /// The error of `poll`, after the program has exited.
     pub fn end(
         &mut self,
         name: &'static str,
         within: Duration,
-        meanwhile: &mut dyn FnMut() -> Result<(), Failure>,
+        poll: &mut dyn FnMut() -> Result<(), Failure>,
     ) -> Result<(), Failure> {
-        let Some(place) = self.running.iter().position(|(n, _)| *n == name) else {
+        let Some(index) = self.running.iter().position(|(n, _)| *n == name) else {
             return Ok(());
         };
-        let (name, mut child) = self.running.remove(place);
+        let (name, mut child) = self.running.remove(index);
         if status(&mut child)?.is_none() {
             terminate(&child);
         }
@@ -161,24 +157,22 @@ impl Children {
                 break status;
             }
             if done.is_ok() {
-                done = meanwhile();
+                done = poll();
             }
             if start.elapsed() > within {
                 kill(&mut child);
             }
-            pause(LOOK_EVERY);
+            pause(POLL_INTERVAL);
         };
         if !status.success() {
-            remark(&format!(
-                "{name} has ended ({status}); its own words are above"
-            ));
+            print_status(&format!("{name} exited ({status}); see its output above"));
         }
         self.ended.push((name, status));
         done
     }
 }
 
-impl Drop for Children {
+impl Drop for ChildProcesses {
     fn drop(&mut self) {
         for (_, child) in &mut self.running {
             kill(child);
@@ -188,7 +182,7 @@ impl Drop for Children {
 
 fn terminate(child: &Child) {
     if let Some(pid) = i32::try_from(child.id()).ok().and_then(Pid::from_raw) {
-        // A process that has just ended needs no signal.
+        // Ignore errors: the process may have exited already.
         let _ = kill_process(pid, Signal::TERM);
     }
 }
@@ -211,17 +205,17 @@ fn ended(name: &'static str, status: ExitStatus) -> Failure {
     }
 }
 
-fn sibling(name: &'static str) -> Result<PathBuf, Failure> {
+fn program_beside(name: &'static str) -> Result<PathBuf, Failure> {
     let this = std::env::current_exe()
         .map_err(|error| Failure::file("find", Path::new("this program"), error))?;
     let program = this.with_file_name(name);
     match program.is_file() {
         true => Ok(program),
-        false => Err(Failure::NoSibling { name, program }),
+        false => Err(Failure::MissingProgram { name, program }),
     }
 }
 
-/// Says which process runs the system, for `supple stop`; a lock on it keeps a second one out.
+/// File with the PID of the process that runs the system, for `supple stop`; a lock on it excludes a second process.
 #[derive(Debug)]
 pub struct Pidfile {
     path: PathBuf,
@@ -229,12 +223,12 @@ pub struct Pidfile {
 }
 
 impl Pidfile {
-    /// Of a system that this process runs.
+    /// Creates and locks the file for a system that this process runs.
     ///
     /// # Errors
     /// [`Failure::AlreadyRunning`], [`Failure::File`].
     pub fn create(domain: &Domain) -> Result<Pidfile, Failure> {
-        let path = place(domain);
+        let path = pidfile_path(domain);
         let failed = |error: io::Error| Failure::file("write", &path, error);
         let start = Instant::now();
         loop {
@@ -242,9 +236,9 @@ impl Pidfile {
             options.read(true).write(true).create(true).mode(0o600);
             let mut file = options.open(&path).map_err(failed)?;
             match flock(&file, FlockOperation::NonBlockingLockExclusive) {
-                // A process that starts another shares its locks with it for a moment.
-                Err(Errno::WOULDBLOCK) if start.elapsed() < HELD_BY_A_FORK => {
-                    pause(LOOK_EVERY);
+                // Between fork and exec, a child shares the locks of its parent.
+                Err(Errno::WOULDBLOCK) if start.elapsed() < FORK_LOCK_GRACE => {
+                    pause(POLL_INTERVAL);
                     continue;
                 }
                 Err(Errno::WOULDBLOCK) => {
@@ -258,7 +252,7 @@ impl Pidfile {
                 }
                 locked => locked.map_err(|error| failed(error.into()))?,
             }
-            // One that was removed meanwhile is not the one that others find.
+            // The file may have been removed and recreated meanwhile; then the lock is on the wrong file.
             let is_there = fs::metadata(&path)
                 .is_ok_and(|there| file.metadata().is_ok_and(|mine| mine.ino() == there.ino()));
             if !is_there {
@@ -277,21 +271,21 @@ impl Pidfile {
 
 impl Drop for Pidfile {
     fn drop(&mut self) {
-        // What is left over is found stale by whoever reads it. Removed before it is unlocked.
+        // Readers detect a leftover file as stale. Remove it before releasing the lock.
         let _ = fs::remove_file(&self.path);
     }
 }
 
-fn place(domain: &Domain) -> PathBuf {
+fn pidfile_path(domain: &Domain) -> PathBuf {
     domain.folder().join(format!("{}.pid", domain.prefix()))
 }
 
-/// Asks the `supple up` of a system to end. False where there is none.
+/// Terminates the `supple up` of a system. Returns false if there is none.
 ///
 /// # Errors
 /// [`Failure::File`].
 pub fn stop_running(domain: &Domain) -> Result<bool, Failure> {
-    let path = place(domain);
+    let path = pidfile_path(domain);
     let Some(process) = running(&path) else {
         return Ok(false);
     };
@@ -300,7 +294,7 @@ pub fn stop_running(domain: &Domain) -> Result<bool, Failure> {
         .map_err(|error| Failure::file("end the process of", &path, error.into()))
 }
 
-/// The `supple up` of a file, if it runs. A number that another program has by now is not meant.
+/// PID of the running `supple up` named by the file; `None` if the PID now belongs to another program.
 fn running(path: &Path) -> Option<Pid> {
     let text = fs::read_to_string(path).ok()?;
     let process = Pid::from_raw(text.trim().parse().ok()?)?;

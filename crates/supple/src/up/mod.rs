@@ -1,53 +1,53 @@
-//! `supple up`: a whole system, from its processes to its log.
+//! `supple up`: runs a complete system.
 //!
-//! Starts the controller and a plant, brings the arm to the start of the sinusoid and lets it follow, watches
-//! over the processes, shows how it goes, records everything, and shuts down in order: first the controller,
-//! which has the drives lowered to idle, then the plant.
+//! Starts controller and plant, moves the arm to the start of the sinusoid, tracks it, supervises the processes,
+//! shows progress, writes the log and shuts down in order: first the controller, which sets the drives to idle, then
+//! the plant.
 //!
-//! An arm on a bus is activated at its pendant, once the controller holds it: at an emulated one by this
-//! program, at a real one by its operator.
+//! An arm on a bus is activated at its pendant after the controller has entered gravity hold: this program presses
+//! the emulated pendant; an operator presses a real one.
 
 mod children;
-mod meter;
 mod plan;
 mod recorder;
 mod stages;
+mod statistics;
 mod status_line;
 mod system;
 
 pub use children::stop_running;
-pub use meter::{Meter, Spread};
 pub use plan::CONTROLLER;
-pub use stages::{HELD_S, START_S};
+pub use stages::{GRAVITY_HOLD_S, START_S};
+pub use statistics::{Percentiles, RunStatistics};
 pub use system::System;
 
 use crate::arms;
 use crate::cli::UpArgs;
-use crate::console::{remark, say, say_json, wait_for_no_reader};
+use crate::console::{print_json, print_line, print_status, write_stderr_in_background};
 use crate::exit::Failure;
 use crate::interrupt;
 use children::Pidfile;
 use supple_ipc::Domain;
 use supple_model::{Description, with_dof};
 
-/// Runs it.
+/// Runs `supple up`.
 ///
 /// # Errors
-/// [`Failure`]; [`Failure::RunFault`] once everything is shut down and written.
+/// [`Failure`]; [`Failure::RunFault`] after the system is shut down and everything is written.
 pub fn run(args: &UpArgs) -> Result<(), Failure> {
     let description = args.at_rate(arms::find(&args.arm, args.strict)?)?;
     with_dof!(description.dof(), N => sized::<N>(args, &description))?
 }
 
 fn sized<const N: usize>(args: &UpArgs, description: &Description) -> Result<(), Failure> {
-    // Before there is a process or a file.
+    // Check the outputs before any process or file is created.
     for output in args.log_file().iter().chain(&args.trace) {
         let checked = supple_files::check_output(output);
         checked.map_err(|error| Failure::file("write", output, error))?;
     }
     let domain = Domain::new(args.prefix.as_deref())?;
-    wait_for_no_reader();
-    let stop = interrupt::catch();
+    write_stderr_in_background();
+    let stop = interrupt::shutdown_on_interrupt();
     let _pidfile = Pidfile::create(&domain)?;
     let mut system = System::<N>::new(args, description, &domain)?;
     let started = system.start(description);
@@ -61,21 +61,21 @@ fn sized<const N: usize>(args: &UpArgs, description: &Description) -> Result<(),
     });
     match (ended.and(shut_down), &fault) {
         (Ok(()), _) => {}
-        // What was asked for was refused because of the fault.
-        (Err(Failure::Refused { words }), Some(_)) => remark(&words),
+        // The request was refused because of the fault; report the fault.
+        (Err(Failure::Refused { reason }), Some(_)) => print_status(&reason),
         (Err(failure), fault) => {
             if let Some(fault) = fault {
-                remark(&fault.to_string());
+                print_status(&fault.to_string());
             }
             return Err(failure);
         }
     }
     if args.json {
-        say_json(&summary)?;
+        print_json(&summary)?;
     } else {
-        say(&summary.to_string())?;
+        print_line(&summary.to_string())?;
         if let (Some(log), None) = (args.log_file(), &cut_short) {
-            remark(&format!("log: {}", log.display()));
+            print_status(&format!("log: {}", log.display()));
         }
     }
     fault.or(cut_short).map_or(Ok(()), Err)

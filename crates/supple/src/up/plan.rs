@@ -1,58 +1,59 @@
-//! Which processes a system has, and what each is told.
+//! Processes of a system and their command-line arguments.
 
-use crate::cli::{Course, PlantKind, UpArgs};
+use crate::cli::{PlantKind, UpArgs, UpTrajectory};
 use crate::exit::Failure;
-use crate::operate::Pendant;
+use crate::operate::pendant::Pendant;
 use std::path::PathBuf;
 use supple_bus::Address;
 use supple_ipc::Domain;
 use supple_model::{Description, ModelError};
 use supple_plant::Injection;
 
-/// The controller.
+/// Program name of the controller.
 pub const CONTROLLER: &str = "supple-rt";
-/// The bus of a real arm where none is given.
+/// Default bus of a real arm.
 const INTERFACE: &str = "can0";
 
 /// A program with its arguments.
 #[derive(Clone, Debug)]
 pub struct Program {
-    /// Its name.
+    /// Name of the program.
     pub name: &'static str,
-    /// What it is told.
+    /// Command-line arguments.
     pub arguments: Vec<String>,
 }
 
 /// The processes of a system.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// The controller.
+    /// The controller process.
     pub controller: Program,
-    /// The one that owns the clock: the simulated arm, or the arm's bus.
-    pub clock: Program,
+    /// The process that owns the clock: the simulated arm, or the arm's bus.
+    pub clock_owner: Program,
     /// The emulated arm on the bus.
     pub arm: Option<Program>,
-    /// Its pendant.
+    /// Pendant of the emulated arm.
     pub pendant: Option<Pendant>,
 }
 
 impl Plan {
-    /// For these arguments; in virtual time the clock ends after `cycles`.
+    /// Plans the processes; in virtual time the clock owner exits after `cycles`.
     ///
     /// # Errors
-    /// [`Failure::Injection`]: what this plant cannot do; [`Failure::Bus`] where the folder of an emulated bus is not this user's; [`Failure::RealClock`].
+    /// [`Failure::Injection`] if this plant does not support an injected fault; [`Failure::Bus`] if the folder of an
+    /// emulated bus does not belong to this user; [`Failure::VirtualTimeOnRealBus`].
     pub fn new(args: &UpArgs, domain: &Domain, cycles: Option<u64>) -> Result<Plan, Failure> {
         args.check_injections()?;
         let controller = Program {
             name: CONTROLLER,
             arguments: args.timed_arguments(domain),
         };
-        let mut clock = Program {
-            name: args.plant.clock(),
+        let mut clock_owner = Program {
+            name: args.plant.clock_owner(),
             arguments: args.timed_arguments(domain),
         };
         if let (Some(cycles), true) = (cycles, args.virtual_time) {
-            clock
+            clock_owner
                 .arguments
                 .extend(["--cycles".to_owned(), cycles.to_string()]);
         }
@@ -63,20 +64,20 @@ impl Plan {
             (PlantKind::Can, None) => Some(Address::Interface(INTERFACE.to_owned())),
         };
         if args.virtual_time && matches!(bus, Some(Address::Interface(_))) {
-            return Err(Failure::RealClock);
+            return Err(Failure::VirtualTimeOnRealBus);
         }
         if args.plant == PlantKind::Sim {
-            clock.arguments.extend(args.surroundings());
+            clock_owner.arguments.extend(args.simulation_arguments());
         }
         let mut plan = Plan {
             controller,
-            clock,
+            clock_owner,
             arm: None,
             pendant: None,
         };
         if let Some(bus) = bus {
             let emulated = args.plant == PlantKind::Emu;
-            let of_bus = &mut plan.clock.arguments;
+            let of_bus = &mut plan.clock_owner.arguments;
             of_bus.extend(["--bus".to_owned(), bus.to_string()]);
             for (flag, given) in [
                 ("--zero-at-home", emulated || args.zero_at_home),
@@ -87,7 +88,7 @@ impl Plan {
             if emulated {
                 let mut arguments = args.common_arguments(domain);
                 arguments.extend(["--bus".to_owned(), bus.to_string()]);
-                arguments.extend(args.surroundings());
+                arguments.extend(args.simulation_arguments());
                 plan.arm = Some(Program {
                     name: "supple-emu",
                     arguments,
@@ -103,8 +104,8 @@ impl Plan {
 }
 
 impl PlantKind {
-    /// The program that owns the clock.
-    fn clock(self) -> &'static str {
+    /// Program that owns the clock.
+    fn clock_owner(self) -> &'static str {
         match self {
             PlantKind::Sim => "supple-sim",
             PlantKind::Emu | PlantKind::Can => "supple-can",
@@ -113,12 +114,12 @@ impl PlantKind {
 }
 
 impl UpArgs {
-    /// Where the log goes, if anywhere.
+    /// Path of the log; `None` without a log.
     pub fn log_file(&self) -> Option<PathBuf> {
         (!self.no_log).then(|| self.log.clone())
     }
 
-    /// The arm, at the rate asked for.
+    /// The arm at the requested rate.
     ///
     /// # Errors
     /// As [`Description::at_rate`].
@@ -129,33 +130,33 @@ impl UpArgs {
         }
     }
 
-    /// The same system as words for the command line, without a log.
-    pub fn words(&self) -> Vec<String> {
-        let mut words = vec!["up", "--no-log", "--json", "--arm", &self.arm, "--plant"];
-        words.push(match self.plant {
+    /// Command-line arguments that start the same system without a log.
+    pub fn to_arguments(&self) -> Vec<String> {
+        let mut arguments = vec!["up", "--no-log", "--json", "--arm", &self.arm, "--plant"];
+        arguments.push(match self.plant {
             PlantKind::Sim => "sim",
             PlantKind::Emu => "emu",
             PlantKind::Can => "can",
         });
-        words.push("--track");
-        words.push(match self.track {
-            Course::Sinusoid => "sinusoid",
-            Course::Arc => "arc",
-            Course::Quadrant => "quadrant",
-            Course::Probe => "probe",
+        arguments.push("--track");
+        arguments.push(match self.track {
+            UpTrajectory::Sinusoid => "sinusoid",
+            UpTrajectory::Arc => "arc",
+            UpTrajectory::Quadrant => "quadrant",
+            UpTrajectory::Probe => "probe",
         });
-        words.extend(self.no_realtime.then_some("--no-realtime"));
-        words.extend(self.strict.then_some("--strict"));
-        let mut words: Vec<String> = words.into_iter().map(str::to_owned).collect();
+        arguments.extend(self.no_realtime.then_some("--no-realtime"));
+        arguments.extend(self.strict.then_some("--strict"));
+        let mut arguments: Vec<String> = arguments.into_iter().map(str::to_owned).collect();
         if let Some(prefix) = &self.prefix {
-            words.extend(["--prefix".to_owned(), prefix.clone()]);
+            arguments.extend(["--prefix".to_owned(), prefix.clone()]);
         }
-        words.extend(self.surroundings());
-        words
+        arguments.extend(self.simulation_arguments());
+        arguments
     }
 
-    /// What a simulated arm stands in, what is put into it, and where it is written what acts on it.
-    fn surroundings(&self) -> Vec<String> {
+    /// Arguments of a simulated plant: block, injected faults and trace file.
+    fn simulation_arguments(&self) -> Vec<String> {
         let mut arguments = Vec::new();
         if let Some(face_m) = self.block_m {
             arguments.extend(["--block-m".to_owned(), face_m.to_string()]);
@@ -172,13 +173,16 @@ impl UpArgs {
     fn check_injections(&self) -> Result<(), Failure> {
         match self.plant {
             PlantKind::Sim => Ok(()),
-            PlantKind::Emu => Ok(self.inject.iter().try_for_each(Injection::on_bus)?),
+            PlantKind::Emu => Ok(self
+                .inject
+                .iter()
+                .try_for_each(Injection::check_bus_support)?),
             PlantKind::Can if self.inject.is_empty() => Ok(()),
             PlantKind::Can => Err(Failure::InjectionIntoRealArm),
         }
     }
 
-    /// What every process is told.
+    /// Arguments common to all processes.
     fn common_arguments(&self, domain: &Domain) -> Vec<String> {
         let mut arguments = vec![
             "--arm".to_owned(),
@@ -199,7 +203,7 @@ impl UpArgs {
         arguments
     }
 
-    /// What every process with a period is told.
+    /// Arguments common to the periodic processes.
     fn timed_arguments(&self, domain: &Domain) -> Vec<String> {
         let mut arguments = self.common_arguments(domain);
         if let Some(rate_hz) = self.rate_hz {

@@ -1,15 +1,15 @@
-//! A system that runs: its processes, its telemetry, its log.
+//! A running system: its processes, telemetry and log.
 
-use super::children::Children;
-use super::meter::{Meter, UpSummary};
+use super::children::ChildProcesses;
 use super::plan::Plan;
-use super::recorder::{Journal, Recorder};
-use super::stages::{HELD_S, START_S, Stages, cycles_of};
+use super::recorder::{Recorder, RunLog};
+use super::stages::{GRAVITY_HOLD_S, START_S, Stages, cycles_of};
+use super::statistics::{RunStatistics, UpSummary};
 use super::status_line::StatusLine;
 use crate::cli::UpArgs;
-use crate::console::remark;
+use crate::console::print_status;
 use crate::exit::Failure;
-use crate::operate::{Approach, Pendant, Session, course};
+use crate::operate::{Approach, OperatorSession, Pendant, trajectory_for};
 use core::time::Duration;
 use rustix::process::Signal;
 use std::time::Instant;
@@ -19,37 +19,37 @@ use supple_ipc::{Domain, TelemetryReader};
 use supple_model::Description;
 use supple_realtime::Stop;
 
-/// Longest wait for a process to take its place \[s\].
-const JOIN_S: u64 = 20;
-/// How long the shutdown waits for a process before it is killed.
-const END_WITHIN: Duration = Duration::from_secs(5);
-/// One wait for telemetry.
-const LOOK_EVERY: Duration = Duration::from_millis(20);
+/// Timeout for a process to join the system \[s\].
+const JOIN_TIMEOUT_S: u64 = 20;
+/// Time after which the shutdown kills a process that has not exited.
+const SHUTDOWN_TIMEOUT: Duration = Duration::from_secs(5);
+/// Maximum duration of one wait for telemetry.
+const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
-/// A system that runs.
+/// A running system.
 pub struct System<'a, const N: usize> {
     args: &'a UpArgs,
     plan: Plan,
     period_s: f64,
-    /// Cycles after which it ends.
+    /// Number of cycles after which the run ends.
     limit: Option<u64>,
     approach: Approach<N>,
     stages: Stages,
-    journal: Journal<N>,
+    run_log: RunLog<N>,
     reader: TelemetryReader,
-    session: Session<N>,
-    children: Children,
-    meter: Meter,
+    session: OperatorSession<N>,
+    children: ChildProcesses,
+    statistics: RunStatistics,
     line: StatusLine,
-    /// When the first cycle came, and the last.
+    /// Time of the first and of the last received cycle.
     seen: Option<(Instant, Instant)>,
 }
 
 impl<'a, const N: usize> System<'a, N> {
-    /// Everything but its processes.
+    /// Creates a system without starting its processes.
     ///
     /// # Errors
-    /// What the arm, the log or shared memory refuses.
+    /// If the arm description is invalid, or the log or shared memory cannot be created.
     pub fn new(
         args: &'a UpArgs,
         description: &Description,
@@ -58,7 +58,7 @@ impl<'a, const N: usize> System<'a, N> {
         let config = description.config::<N>()?;
         let period_s = config.period_s;
         let limit = args.for_s.map(|for_s| cycles_of(for_s, period_s));
-        let (trajectory, duration_s) = course(args.track, description);
+        let (trajectory, duration_s) = trajectory_for(args.track, description);
         let plan = Plan::new(args, domain, limit)?;
         let recorder = args
             .log_file()
@@ -66,12 +66,12 @@ impl<'a, const N: usize> System<'a, N> {
         Ok(System {
             stages: Stages::new(plan.pendant.clone(), args.plant, period_s),
             approach: Approach::new(&config, trajectory, duration_s)?,
-            journal: Journal::new(recorder.transpose()?),
-            // Readers before writers, so that nothing is missed.
+            run_log: RunLog::new(recorder.transpose()?),
+            // Create readers before writers, so that no message is missed.
             reader: TelemetryReader::for_log(domain)?,
-            session: Session::for_system(domain)?,
-            children: Children::default(),
-            meter: Meter::default(),
+            session: OperatorSession::for_system(domain)?,
+            children: ChildProcesses::default(),
+            statistics: RunStatistics::default(),
             line: StatusLine::new(args.json),
             seen: None,
             args,
@@ -81,11 +81,11 @@ impl<'a, const N: usize> System<'a, N> {
         })
     }
 
-    /// Starts the processes. In virtual time all requests wait for their cycles before there is a first one,
-    /// so that two runs hear them alike.
+    /// Starts the processes. In virtual time all requests are queued before the first cycle, so that runs are
+    /// identical.
     ///
     /// # Errors
-    /// A process that cannot start or does not come.
+    /// If a process cannot start or does not join.
     pub fn start(&mut self, description: &Description) -> Result<(), Failure> {
         self.launch()?;
         if self.args.virtual_time {
@@ -94,11 +94,12 @@ impl<'a, const N: usize> System<'a, N> {
             let start = self.stages.plan()?;
             self.session.follow(&self.approach, &home, Some(start))?;
         }
-        self.children.start(&self.plan.clock)
+        self.children.start(&self.plan.clock_owner)
     }
 
-    /// As [`System::start`] in virtual time, with requests of another's choice, each with its cycle from when the way
-    /// to the start may begin, and presses of an emulated arm's pendant.
+    /// As [`System::start`] in virtual time, with the caller's requests (cycles relative to the first cycle in which
+    /// the approach may begin) and presses of the emulated pendant. Returns the reasons of requests that were refused before
+    /// their cycle.
     ///
     /// # Errors
     /// As [`System::start`].
@@ -107,78 +108,88 @@ impl<'a, const N: usize> System<'a, N> {
         requests: &[(u64, Request<N>)],
         activate: bool,
         presses: &[String],
-    ) -> Result<(), Failure> {
+    ) -> Result<Vec<String>, Failure> {
         self.launch()?;
         self.hold_first()?;
         let start_s = START_S[usize::from(self.plan.pendant.is_some())];
         if let Some(pendant) = &self.plan.pendant {
             if activate {
-                pendant.press(&format!("activate@held+{HELD_S}"))?;
+                pendant.press(&format!("activate@held+{GRAVITY_HOLD_S}"))?;
             }
             for press in presses {
                 pendant.press(press)?;
             }
         }
         let start = cycles_of(start_s, self.period_s);
+        let mut refusals = Vec::new();
         for (cycle, request) in requests {
-            self.session.queue(request, start + cycle)?;
+            match self.session.queue(request, start + cycle) {
+                Err(Failure::Refused { reason }) => refusals.push(reason),
+                queued => queued?,
+            }
         }
-        self.children.start(&self.plan.clock)
+        self.children.start(&self.plan.clock_owner)?;
+        Ok(refusals)
     }
 
-    /// Starts all but the process that owns the clock.
+    /// Starts all processes except the clock owner.
     fn launch(&mut self) -> Result<(), Failure> {
         let children = &mut self.children;
         if let Some(arm) = &self.plan.arm {
             children.start(arm)?;
         }
         if let Some(pendant) = &self.plan.pendant {
-            pendant.wait(Duration::from_secs(JOIN_S), &mut || children.check())?;
+            pendant.wait(Duration::from_secs(JOIN_TIMEOUT_S), &mut || {
+                children.check()
+            })?;
             pendant.press("idle")?;
         }
         children.start(&self.plan.controller)?;
         Ok(())
     }
 
-    /// Gravity hold in the first cycle.
+    /// Requests gravity hold for the first cycle.
     fn hold_first(&mut self) -> Result<(), Failure> {
         let (children, hold) = (&mut self.children, Request::GravityHold);
         let mut check = || children.check();
         self.session
-            .ask_when_there(&hold, Some(0), JOIN_S, &mut check)
+            .send_request_when_ready(&hold, Some(0), JOIN_TIMEOUT_S, &mut check)
     }
 
-    /// In virtual time: the process that owns the clock has run all its cycles.
+    /// In virtual time: whether the clock owner has run all its cycles.
     ///
     /// # Errors
-    /// [`Failure::ProcessEnded`]: it ended otherwise.
+    /// [`Failure::ProcessEnded`] if it exited with an error.
     pub fn clock_has_ended(&mut self) -> Result<bool, Failure> {
-        self.children.all_ended_well(self.plan.clock.name)
+        self.children
+            .exited_successfully(self.plan.clock_owner.name)
     }
 
-    /// What was refused since this was last asked, in the controller's words.
+    /// Reasons of the refusals since the last call.
     ///
     /// # Errors
-    /// Shared memory.
+    /// If shared memory cannot be accessed.
     pub fn refusals(&mut self) -> Result<Vec<String>, Failure> {
         let mut refusals = Vec::new();
         loop {
             match self.session.check() {
                 Ok(_) => return Ok(refusals),
-                Err(Failure::Refused { words }) => refusals.push(words),
+                Err(Failure::Refused { reason }) => refusals.push(reason),
                 Err(failure) => return Err(failure),
             }
         }
     }
 
-    /// Until it is over, is asked to end, or something fails.
+    /// Runs until the end of the run, a shutdown request or an error.
     ///
     /// # Errors
-    /// A process that ended, a request that was refused. A log that cannot be written is said, and no error.
+    /// If a process exits or a request is refused. A log that cannot be written is only reported.
     pub fn watch(&mut self, stop: &Stop) -> Result<(), Failure> {
         match self.watch_on(stop) {
-            // The controller is asked to end by the same word, and may be the first.
-            Err(Failure::ProcessEnded { .. } | Failure::NotRunning { .. }) if stop.asked() => {
+            // The same signal also ends the controller, which may exit first.
+            Err(Failure::ProcessEnded { .. } | Failure::NotRunning { .. })
+                if stop.shutdown_requested() =>
+            {
                 Ok(())
             }
             ended => ended,
@@ -187,43 +198,45 @@ impl<'a, const N: usize> System<'a, N> {
 
     fn watch_on(&mut self, stop: &Stop) -> Result<(), Failure> {
         let mut fault_seen = false;
-        while !stop.asked() {
-            match self.turn()? {
-                Some(telemetry) => fault_seen |= telemetry.fault != 0,
+        while !stop.shutdown_requested() {
+            match self.poll_and_advance()? {
+                Some(telemetry) => fault_seen |= telemetry.record().fault != 0,
                 None if self.args.virtual_time
-                    && self.children.all_ended_well(self.plan.clock.name)? =>
+                    && self
+                        .children
+                        .exited_successfully(self.plan.clock_owner.name)? =>
                 {
                     return Ok(());
                 }
                 None => {}
             }
             match self.session.check() {
-                // Somebody has other plans for the arm than this program had.
-                Err(Failure::Refused { words }) if self.limit.is_none() => remark(&words),
+                // An operator has sent other requests; that is not an error.
+                Err(Failure::Refused { reason }) if self.limit.is_none() => print_status(&reason),
                 checked => {
                     checked?;
                 }
             }
-            let over = |limit| !self.args.virtual_time && self.meter.cycles() >= limit;
+            let over = |limit| !self.args.virtual_time && self.statistics.cycles() >= limit;
             if self.limit.is_some_and(over) || (fault_seen && self.limit.is_some()) {
                 return Ok(());
             }
             self.children
-                .check_running(self.args.virtual_time, self.plan.clock.name)?;
+                .check_running(self.args.virtual_time, self.plan.clock_owner.name)?;
         }
         Ok(())
     }
 
-    /// Waits a little for the next cycle, takes it in, and asks for what is due then.
+    /// Waits briefly for the next cycle, processes it and sends the requests that are due.
     ///
     /// # Errors
     /// As [`System::watch`].
-    pub fn turn(&mut self) -> Result<Option<Telemetry>, Failure> {
-        let Some(telemetry) = self.reader.wait(LOOK_EVERY)? else {
+    pub fn poll_and_advance(&mut self) -> Result<Option<Telemetry>, Failure> {
+        let Some(telemetry) = self.reader.wait(POLL_INTERVAL)? else {
             return Ok(None);
         };
         self.add(&telemetry);
-        self.line.show(&telemetry, &self.meter);
+        self.line.show(&telemetry, &self.statistics);
         if !self.args.virtual_time {
             let session = &mut self.session;
             self.stages.advance(&telemetry, session, &self.approach)?;
@@ -231,12 +244,12 @@ impl<'a, const N: usize> System<'a, N> {
         Ok(Some(telemetry))
     }
 
-    /// As [`System::turn`], asking for nothing.
+    /// As [`System::poll_and_advance`], but sends no requests.
     ///
     /// # Errors
-    /// Shared memory.
-    pub fn hear(&mut self) -> Result<Option<Telemetry>, Failure> {
-        let telemetry = self.reader.wait(LOOK_EVERY)?;
+    /// If shared memory cannot be accessed.
+    pub fn poll_telemetry(&mut self) -> Result<Option<Telemetry>, Failure> {
+        let telemetry = self.reader.wait(POLL_INTERVAL)?;
         if let Some(telemetry) = &telemetry {
             self.add(telemetry);
         }
@@ -246,67 +259,68 @@ impl<'a, const N: usize> System<'a, N> {
     fn add(&mut self, telemetry: &Telemetry) {
         let now = Instant::now();
         self.seen = Some((self.seen.map_or(now, |(first, _)| first), now));
-        self.meter.add(telemetry);
-        self.journal.add(telemetry);
+        self.statistics.add(telemetry);
+        self.run_log.add(telemetry);
     }
 
-    /// Ends the processes in order, whatever fails on the way, and hears what they still say.
+    /// Terminates the processes in order, even after errors, and collects their last telemetry.
     ///
     /// # Errors
-    /// The first that failed: shared memory, or a process that cannot be waited for.
+    /// The first error: shared memory, or a process that cannot be waited for.
     pub fn end(&mut self) -> Result<(), Failure> {
         self.line.end();
-        let (reader, journal, meter) = (&mut self.reader, &mut self.journal, &mut self.meter);
+        let (reader, run_log, statistics) =
+            (&mut self.reader, &mut self.run_log, &mut self.statistics);
         let virtual_time = self.args.virtual_time;
         let mut drain = || -> Result<(), Failure> {
             while let Some(telemetry) = reader.receive()? {
                 match virtual_time {
-                    true => meter.add(&telemetry),
-                    false => meter.note_fault(&telemetry),
+                    true => statistics.add(&telemetry),
+                    false => statistics.note_fault(&telemetry),
                 }
-                journal.add(&telemetry);
+                run_log.add(&telemetry);
             }
             Ok(())
         };
         let children = &mut self.children;
-        let controller = children.end(self.plan.controller.name, END_WITHIN, &mut drain);
-        let clock = children.end(self.plan.clock.name, END_WITHIN, &mut drain);
-        let heard = drain();
+        let controller = children.end(self.plan.controller.name, SHUTDOWN_TIMEOUT, &mut drain);
+        let clock_owner = children.end(self.plan.clock_owner.name, SHUTDOWN_TIMEOUT, &mut drain);
+        let drained = drain();
         if let Some(pendant) = &self.plan.pendant {
             match pendant.record() {
-                Ok(happenings) => {
-                    for happening in happenings {
-                        journal.event(happening.time_ns, &happening.what);
+                Ok(arm_events) => {
+                    for arm_event in arm_events {
+                        run_log.event(arm_event.time_ns, &arm_event.what);
                     }
                 }
-                // An arm that was lost tells no more; the log is whole without.
-                Err(failure) => remark(&format!("no events of the arm in the log: {failure}")),
+                // A plant that has crashed cannot report events; the log is complete without them.
+                Err(failure) => print_status(&format!("the log contains no arm events: {failure}")),
             }
         }
         let arm = match &self.plan.arm {
-            Some(arm) => children.end(arm.name, END_WITHIN, &mut || Ok(())),
+            Some(arm) => children.end(arm.name, SHUTDOWN_TIMEOUT, &mut || Ok(())),
             None => Ok(()),
         };
-        controller.and(clock).and(heard).and(arm)
+        controller.and(clock_owner).and(drained).and(arm)
     }
 
-    /// Closes the log; what the run was in numbers.
+    /// Closes the log and returns the summary of the run.
     pub fn finish(&mut self) -> UpSummary {
-        self.journal.finish();
-        let mut summary = self.meter.summary(self.reader.lost());
+        self.run_log.finish();
+        let mut summary = self.statistics.summary(self.reader.lost());
         summary.times_real_time = self.times_real_time();
         summary
     }
 
-    /// What was to be written and is not whole, once all is over.
+    /// The error of an incomplete output file, if any.
     pub fn cut_short(&mut self) -> Option<Failure> {
-        let cause = self.journal.ended().map(Box::new);
+        let cause = self.run_log.ended().map(Box::new);
         let log = cause.map(|cause| Failure::LogEnded { cause });
         let trace = || self.children.trace_ended();
         log.or_else(|| trace().map(|name| Failure::TraceEnded { name }))
     }
 
-    /// Sends a process a signal.
+    /// Sends a signal to a process.
     ///
     /// # Errors
     /// [`Failure::NoSuchProcess`].
@@ -314,14 +328,14 @@ impl<'a, const N: usize> System<'a, N> {
         self.children.signal(name, signal)
     }
 
-    /// Starts a process again that was killed. The others go on.
+    /// Restarts a process that was killed. The others keep running.
     ///
     /// # Errors
-    /// [`Failure::NoSuchProcess`], [`Failure::NoSibling`].
+    /// [`Failure::NoSuchProcess`], [`Failure::MissingProgram`].
     pub fn restart(&mut self, name: &'static str) -> Result<(), Failure> {
         let programs = [
             Some(&self.plan.controller),
-            Some(&self.plan.clock),
+            Some(&self.plan.clock_owner),
             self.plan.arm.as_ref(),
         ];
         let program = programs.into_iter().flatten().find(|p| p.name == name);
@@ -329,18 +343,18 @@ impl<'a, const N: usize> System<'a, N> {
             .restart(program.ok_or(Failure::NoSuchProcess { name })?)
     }
 
-    /// The way to tracking begins anew.
-    pub fn begin_again(&mut self) {
+    /// Restarts the start-up sequence.
+    pub fn restart_stages(&mut self) {
         let pendant = self.plan.pendant.clone();
         self.stages = Stages::new(pendant, self.args.plant, self.period_s);
     }
 
-    /// Asks the controller for something.
+    /// Sends a request to the controller.
     ///
     /// # Errors
-    /// [`Failure::Refused`] with its words, [`Failure::NotRunning`].
-    pub fn ask(&mut self, request: &Request<N>) -> Result<(), Failure> {
-        self.session.ask(request, None).map(|_| ())
+    /// [`Failure::Refused`] with its reason, [`Failure::NotRunning`].
+    pub fn send_request(&mut self, request: &Request<N>) -> Result<(), Failure> {
+        self.session.send_request(request, None).map(|_| ())
     }
 
     /// The pendant of an emulated arm.
@@ -348,10 +362,10 @@ impl<'a, const N: usize> System<'a, N> {
         self.plan.pendant.as_ref()
     }
 
-    /// How much faster than the wall the arm's time went.
+    /// Real-time factor, in virtual time.
     fn times_real_time(&self) -> Option<f64> {
         let (first, last) = self.seen.filter(|_| self.args.virtual_time)?;
         let wall_s = last.duration_since(first).as_secs_f64();
-        (wall_s > 0.0).then(|| self.meter.cycles() as f64 * self.period_s / wall_s)
+        (wall_s > 0.0).then(|| self.statistics.cycles() as f64 * self.period_s / wall_s)
     }
 }

@@ -1,17 +1,17 @@
-//! Running the real binary.
+//! Runs the `supple` binary.
 #![allow(dead_code)]
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// The binary with these arguments, not yet started.
+/// Returns the command with these arguments, not yet started.
 pub fn supple(args: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_supple"));
     command.args(args);
     command
 }
 
-/// What it gave.
+/// Exit code and output of a run.
 pub struct Answer {
     pub code: Option<i32>,
     pub stdout: String,
@@ -28,7 +28,7 @@ impl From<Output> for Answer {
     }
 }
 
-/// Runs it to its end.
+/// Runs `supple` until it exits.
 pub fn run(args: &[&str]) -> Answer {
     supple(args).output().expect("the binary starts").into()
 }
@@ -55,7 +55,8 @@ pub fn tree(folder: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// One clear line that begins with `error:`, no panic and no backtrace, with every one of `words`.
+/// Asserts that there is one line that begins with `error:`, without panic and backtrace, and that it contains all
+/// `words`.
 pub fn assert_one_clear_line(answer: &Answer, words: &[&str]) {
     let lines: Vec<_> = answer.stderr.lines().collect();
     let errors: Vec<_> = lines

@@ -1,0 +1,68 @@
+//! Server side of the lockstep protocol: one request of the host in progress.
+
+use crate::bus::Event;
+use crate::message::{Kind, Message};
+use crate::peer::Peer;
+
+/// A request in progress, with its partial answer.
+#[derive(Debug)]
+pub(crate) struct LockstepServer {
+    request: Message,
+    /// Number of the host's frames that have been delivered.
+    delivered: usize,
+    answer: Message,
+    /// Number of frames of other nodes in the answer.
+    frames: u32,
+}
+
+impl LockstepServer {
+    /// A request that has not been started.
+    pub fn new(request: Message) -> LockstepServer {
+        LockstepServer {
+            answer: Message::new(Kind::Stopped, 0, request.sequence),
+            request,
+            delivered: 0,
+            frames: 0,
+        }
+    }
+
+    /// Advances the arm by at most `max_ns` of its time; returns the answer once it is complete.
+    pub fn run(&mut self, peer: &mut impl Peer, max_ns: u64) -> Option<&mut Message> {
+        let end_ns = peer.now_ns().saturating_add(max_ns);
+        loop {
+            // All frames of the request are delivered before the answer.
+            let frame = self.request.host_frame(self.delivered);
+            if frame.is_none() && self.is_complete() {
+                return Some(self.ended(Kind::Stopped, peer.now_ns()));
+            }
+            let until_ns = frame.map_or(self.request.time_ns, |(time_ns, _)| time_ns);
+            let until_ns = until_ns.max(peer.now_ns());
+            match (peer.run_until(until_ns.min(end_ns)), frame) {
+                (Some(event), _) => {
+                    self.answer.push(peer.now_ns(), event);
+                    self.frames += u32::from(matches!(event, Event::Frame(_)));
+                }
+                (None, _) if peer.now_ns() < until_ns => return None,
+                (None, Some((_, frame))) => {
+                    peer.host_sends(&frame);
+                    self.delivered += 1;
+                }
+                (None, None) => return Some(self.ended(Kind::Reached, peer.now_ns())),
+            }
+        }
+    }
+
+    /// Whether the answer contains enough events to be sent.
+    fn is_complete(&self) -> bool {
+        match self.request.frames {
+            0 => !self.answer.is_empty(),
+            frames => self.frames >= frames || self.answer.is_full(),
+        }
+    }
+
+    fn ended(&mut self, kind: Kind, time_ns: u64) -> &mut Message {
+        self.answer.kind = kind;
+        self.answer.time_ns = time_ns;
+        &mut self.answer
+    }
+}

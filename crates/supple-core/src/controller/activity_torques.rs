@@ -1,0 +1,220 @@
+//! The torque of each activity, term by term.
+
+use super::activity::Activity;
+use super::state::State;
+use super::{Controller, checks, limiter};
+use crate::config::{Config, Role};
+use crate::law::impedance::{LawInput, Task, Torques, impedance};
+use crate::math::{Vector, Vector3, abs, smooth_step};
+use crate::trajectory::{JointReference, Reference};
+
+impl<const N: usize> State<N> {
+    pub(super) fn reference(&self, config: &Config<N>) -> Option<Reference> {
+        match &self.activity {
+            Activity::Track(trajectory) => Some(trajectory.at(self.activity_s(config))),
+            _ => None,
+        }
+    }
+
+    /// Set-point of each joint's position loop, if one is active \[rad\].
+    pub(super) fn joint_setpoints(&self, config: &Config<N>) -> [Option<f64>; N] {
+        if let Activity::Breakaway { ramp, from_rad } = &self.activity {
+            return core::array::from_fn(|i| (i != ramp.joint).then_some(from_rad[i]));
+        }
+        if let Some(reference) = self.joint_reference(config) {
+            return core::array::from_fn(|i| Some(reference.position_rad[i]));
+        }
+        core::array::from_fn(|i| {
+            (config.roles[i] != Role::Active).then_some(self.held_setpoint_rad[i])
+        })
+    }
+
+    /// Torque terms of the activity.
+    pub(super) fn activity_torques(
+        &self,
+        controller: &Controller<N>,
+        task: Option<&Task<N>>,
+        reference: Option<&Reference>,
+        tip_force_n: Option<Vector3<f64>>,
+    ) -> Torques<N> {
+        let config = controller.config();
+        match (&self.activity, task, reference) {
+            (Activity::Track(_), Some(task), Some(reference)) => {
+                let tip = self.terms.base_from_tip.translation;
+                let law_input = LawInput {
+                    reference,
+                    spring_limit_n: config.workspace.spring_limit_n(&tip),
+                    velocity_rad_per_s: &self.estimator.velocity_rad_per_s,
+                    gains: &self.gains.current(),
+                    tip_force_n,
+                    friction_share: self.latch.friction_share(),
+                };
+                let (law, terms) = (&config.law, &self.terms);
+                let mut torques = impedance(
+                    law,
+                    &config.friction,
+                    &config.roles,
+                    terms,
+                    task,
+                    &law_input,
+                );
+                self.add_joint_loops_and_stops(config, &mut torques);
+                torques
+            }
+            (activity, ..) if activity.has_joint_loops() => self.joint_motion_torques(controller),
+            _ => self.safe_torques(controller),
+        }
+    }
+
+    /// Gravity hold with joint damping, the safe action, or nothing.
+    pub(super) fn safe_torques(&self, controller: &Controller<N>) -> Torques<N> {
+        let config = controller.config();
+        if self.activity.is_torque_off() {
+            return Torques::zeros();
+        }
+        if self.is_stale(config) || !self.drives_active {
+            // With a stale state neither velocity nor position error is known; with idle drives
+            // only gravity is wanted at their return.
+            return Torques {
+                gravity: self.terms.gravity,
+                ..Torques::zeros()
+            };
+        }
+        if self.fault.is_some() {
+            return self.stopping(controller);
+        }
+        let velocity = &self.estimator.velocity_rad_per_s;
+        let mut torques = Torques {
+            gravity: self.terms.gravity,
+            damping: -config.hold_damping_nm_s_per_rad.component_mul(velocity),
+            ..Torques::zeros()
+        };
+        self.add_joint_loops_and_stops(config, &mut torques);
+        torques
+    }
+
+    /// Joint reference in the modes that move joints.
+    pub(super) fn joint_reference(&self, config: &Config<N>) -> Option<JointReference<N>> {
+        let time_s = self.activity_s(config);
+        match &self.activity {
+            Activity::Move {
+                from_rad,
+                to_rad,
+                duration_s,
+            } => {
+                let (x, rate, rate_rate) = smooth_step(time_s / duration_s);
+                let displacement = to_rad - from_rad;
+                Some(JointReference {
+                    position_rad: from_rad + displacement * x,
+                    velocity_rad_per_s: displacement * (rate / duration_s),
+                    acceleration_rad_per_s2: displacement * (rate_rate / (duration_s * duration_s)),
+                })
+            }
+            Activity::Excite(series) => Some(series.at(time_s)),
+            Activity::Breakaway { from_rad, .. } => Some(JointReference {
+                position_rad: *from_rad,
+                velocity_rad_per_s: Vector::zeros(),
+                acceleration_rad_per_s2: Vector::zeros(),
+            }),
+            _ => None,
+        }
+    }
+
+    /// Model feed-forward and stiff position loops along the joint reference; the joint of a
+    /// breakaway ramp has the ramp instead of loop and friction.
+    pub(super) fn joint_motion_torques(&self, controller: &Controller<N>) -> Torques<N> {
+        let config = controller.config();
+        let Some(reference) = self.joint_reference(config) else {
+            return self.safe_torques(controller);
+        };
+        let gains = &config.move_gains;
+        let position_error = reference.position_rad - self.position;
+        let velocity = reference.velocity_rad_per_s;
+        let velocity_error = velocity - self.estimator.velocity_rad_per_s;
+        let mut torques = Torques {
+            gravity: self.terms.gravity,
+            coriolis: self.terms.coriolis_gravity - self.terms.gravity,
+            friction: Vector::from_fn(|i, _| config.friction[i].torque_nm(velocity[i])),
+            inertial: self.terms.mass_matrix * reference.acceleration_rad_per_s2,
+            joint_pd: gains.stiffness_nm_per_rad.component_mul(&position_error)
+                + gains.damping_nm_s_per_rad.component_mul(&velocity_error),
+            ..Torques::zeros()
+        };
+        if let Activity::Breakaway { ramp, .. } = &self.activity {
+            torques.friction[ramp.joint] = ramp.rate_nm_per_s * self.activity_s(config);
+            torques.joint_pd[ramp.joint] = 0.0;
+        }
+        self.add_joint_loops_and_stops(config, &mut torques);
+        torques
+    }
+
+    /// Leaves the breakaway mode for gravity hold once its joint has moved or the ramp has reached its
+    /// limit.
+    pub(super) fn end_breakaway(&mut self, config: &Config<N>) {
+        let Activity::Breakaway { ramp, from_rad } = self.activity else {
+            return;
+        };
+        let moved = abs(self.position[ramp.joint] - from_rad[ramp.joint]);
+        let torque = abs(ramp.rate_nm_per_s) * self.activity_s(config);
+        if moved >= ramp.stop_rad || torque >= ramp.limit_nm {
+            self.enter(Activity::GravityHold);
+        }
+    }
+
+    /// Adds the terms that are active in every activity: held-joint loops, soft stops and the
+    /// workspace margin.
+    pub(super) fn add_joint_loops_and_stops(&self, config: &Config<N>, torques: &mut Torques<N>) {
+        let velocity = &self.estimator.velocity_rad_per_s;
+        if !self.activity.has_joint_loops() {
+            for (joint, role) in config.roles.iter().enumerate() {
+                if let Role::Held {
+                    stiffness_nm_per_rad,
+                    damping_nm_s_per_rad,
+                    ..
+                } = role
+                {
+                    torques.joint_pd[joint] += stiffness_nm_per_rad
+                        * (self.held_setpoint_rad[joint] - self.position[joint])
+                        - damping_nm_s_per_rad * velocity[joint];
+                    torques.damping[joint] = 0.0;
+                }
+            }
+        }
+        torques.soft_stop = checks::soft_stop(&config.limits, &self.position, velocity);
+        if !config.workspace.is_unbounded() {
+            let jacobian = self.terms.jacobian.fixed_rows::<3>(0);
+            let tip = self.terms.base_from_tip.translation;
+            let force = config.workspace.soft_force(&tip, &(jacobian * velocity));
+            torques.soft_stop += jacobian.tr_mul(&force);
+        }
+    }
+
+    /// Bumpless transfer: blends out, over `handover_s`, the torque difference at the start of the
+    /// activity.
+    pub(super) fn blend_torque(&mut self, config: &Config<N>, torques: &mut Torques<N>) {
+        if self.handover_pending {
+            self.handover_pending = false;
+            self.handover = self.torque - torques.total();
+        }
+        if self.fault.is_some() {
+            self.handover = Vector::zeros();
+        }
+        let (blended, ..) = smooth_step(self.activity_s(config) / config.handover_s);
+        torques.handover = self.handover * (1.0 - blended);
+    }
+
+    /// Updates the fallback torque: gravity at the last trusted pose, within the torque limits;
+    /// zero if poses are not trusted.
+    pub(super) fn update_fallback(&mut self, controller: &Controller<N>) {
+        if self.activity.is_torque_off() {
+            self.fallback = Vector::zeros();
+        } else if self.missing.iter().all(|missed| *missed == 0) {
+            let limits = &controller.config().limits;
+            let (gravity, _) =
+                limiter::limit_torque(limits, controller.motors(), &self.terms.gravity);
+            if crate::math::all_finite(&gravity) {
+                self.fallback = gravity;
+            }
+        }
+    }
+}

@@ -1,0 +1,65 @@
+//! Joint velocity from quantised positions: a critically damped tracking loop.
+//!
+//! ```text
+//! innovation = y - (q + v T);   q += v T + (1 - r^2) innovation;   v += (1 - r)^2 / T innovation
+//! r = exp(-omega T)
+//! ```
+//!
+//! **Delay.** The velocity follows a slow ramp of the velocity with a lag of `2 / omega`: 10 ms at
+//! 200 rad/s. **Noise.** Positions quantised to a step `d` and moving (error variance `d^2 / 12`,
+//! white) give a velocity of standard deviation `d sqrt(omega^3 T / 48)` for `omega T` small: 1.1
+//! mrad/s for 85 urad, 200 rad/s and 1 ms. A difference over one cycle would give 35 mrad/s.
+
+use crate::math::{Vector, abs, exp};
+
+/// Smaller speeds are set to zero \[rad/s\]. Otherwise the velocity of a joint at rest would decay
+/// to a subnormal number, which many processors handle a hundred times slower.
+const MIN_SPEED_RAD_PER_S: f64 = 1e-12;
+
+/// State of the estimator.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimator<const N: usize> {
+    /// Filtered positions \[rad\].
+    pub position_rad: Vector<N>,
+    /// Velocities \[rad/s\].
+    pub velocity_rad_per_s: Vector<N>,
+}
+
+impl<const N: usize> Estimator<N> {
+    /// An estimator at rest at `position_rad`.
+    pub fn at_rest(position_rad: Vector<N>) -> Self {
+        Estimator {
+            position_rad,
+            velocity_rad_per_s: Vector::zeros(),
+        }
+    }
+
+    /// Updates the estimate with the positions measured `elapsed_s` after the last ones; `None` is
+    /// bridged by prediction. If finite positions are so far apart that the estimate overflows, it
+    /// restarts at rest.
+    ///
+    /// `bandwidth_rad_per_s` is `omega`.
+    pub fn update(
+        &mut self,
+        measured_rad: &[Option<f64>; N],
+        elapsed_s: f64,
+        bandwidth_rad_per_s: f64,
+    ) {
+        let r = exp(-bandwidth_rad_per_s * elapsed_s);
+        let (position_gain, velocity_gain) = (1.0 - r * r, (1.0 - r) * (1.0 - r) / elapsed_s);
+        for (i, measured) in measured_rad.iter().enumerate() {
+            self.position_rad[i] += self.velocity_rad_per_s[i] * elapsed_s;
+            if let Some(y) = measured {
+                let innovation = y - self.position_rad[i];
+                self.position_rad[i] += position_gain * innovation;
+                self.velocity_rad_per_s[i] += velocity_gain * innovation;
+                if abs(self.velocity_rad_per_s[i]) < MIN_SPEED_RAD_PER_S {
+                    self.velocity_rad_per_s[i] = 0.0;
+                }
+                if !(self.position_rad[i].is_finite() && self.velocity_rad_per_s[i].is_finite()) {
+                    (self.position_rad[i], self.velocity_rad_per_s[i]) = (*y, 0.0);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,220 @@
+//! Checks of a cycle: motion against its limits, external torque and force against what is plausible and allowed.
+
+use super::activity::Activity;
+use super::checks;
+use super::checks::MOVING_SHARE;
+use super::fault::Fault;
+use super::plausibility::{
+    OTHER_JOINT_MOVING_RAD_PER_S, PlausibilityInput, SUDDEN_STOP_SHARE, joint_collision,
+    tip_collision,
+};
+use super::state::State;
+use crate::config::Config;
+use crate::law::impedance::{SINGULAR_BELOW_M, Task};
+use crate::math::{Vector, Vector3, abs};
+use crate::model::workspace::WorkspaceViolation;
+use crate::trajectory::Reference;
+
+/// Whether the pose is regular, so that the tip force can be estimated from the joint torques.
+fn is_regular<const N: usize>(task: &Task<N>) -> bool {
+    task.least_singular_value_m >= SINGULAR_BELOW_M
+}
+
+impl<const N: usize> State<N> {
+    pub(super) fn check(
+        &self,
+        config: &Config<N>,
+        tip_velocity: &Vector3<f64>,
+        reference: Option<&Reference>,
+    ) -> Result<(), Fault> {
+        if self.activity.is_torque_off() || !self.drives_active {
+            return Ok(());
+        }
+        let velocity = &self.estimator.velocity_rad_per_s;
+        checks::motion(&config.limits, &self.position, velocity, tip_velocity)?;
+        let joint_setpoints = self.joint_setpoints(config);
+        checks::joint_tracking(&config.limits, &joint_setpoints, &self.position)?;
+        match reference {
+            Some(reference) => {
+                let error = reference.position - self.terms.base_from_tip.translation;
+                checks::tracking(config.limits.tracking_error_m, &error)
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Estimates the external torque and tip force, updates the contact latch, and runs the
+    /// plausibility and collision checks. Returns the force also with a fault.
+    pub(super) fn observe(
+        &mut self,
+        config: &Config<N>,
+        task: Option<&Task<N>>,
+        reference: Option<&Reference>,
+        elapsed_s: f64,
+    ) -> Result<Vector3<f64>, (Vector3<f64>, Fault)> {
+        if self.activity.is_torque_off() || !self.drives_active {
+            // Braking motors produce torques that the model does not contain, so the observer is
+            // reset.
+            self.observer.reset();
+            self.plausibility.reset_history(&self.terms.momentum);
+            return Ok(Vector3::zeros());
+        }
+        let mut net_torque = Vector::zeros();
+        if elapsed_s > 0.0 {
+            let velocity = &self.estimator.velocity_rad_per_s;
+            let friction: Vector<N> =
+                Vector::from_fn(|i, _| config.friction[i].torque_nm(velocity[i]));
+            net_torque = self.torque + self.terms.kinetic_gradient - self.terms.gravity - friction;
+            let bandwidth = config.latch.observer_rad_per_s;
+            self.observer
+                .update(&self.terms.momentum, &net_torque, elapsed_s, bandwidth);
+        }
+        let external = self.observer.external_torque_nm();
+        let Some(task) = task else {
+            return Ok(Vector3::zeros());
+        };
+        let force = task.inverse.tr_mul(&external);
+        let mut reference_rad_per_s = Vector::zeros();
+        if let Some(reference) = self.joint_reference(config) {
+            reference_rad_per_s = reference.velocity_rad_per_s;
+        }
+        if let Some(reference) = reference {
+            self.latch.update_direction(&reference.velocity, elapsed_s);
+            let along = task.inverse * self.latch.direction();
+            let velocity = task.inverse * reference.velocity;
+            let friction_uncertainty_n = (0..N)
+                .map(|i| {
+                    let friction = &config.friction[i];
+                    abs(along[i])
+                        * friction.uncertainty_nm(velocity[i], config.latch.friction_error)
+                })
+                .sum();
+            self.latch
+                .update_contact(&config.latch, &force, friction_uncertainty_n, elapsed_s);
+            reference_rad_per_s = velocity;
+        }
+        let evidence = PlausibilityInput {
+            reference_rad_per_s: &reference_rad_per_s,
+            net_torque_nm: &net_torque,
+            force_n: &force,
+            regular: is_regular(task),
+            elapsed_s,
+        };
+        match self.check_plausibility(config, &evidence) {
+            Ok(()) => Ok(force),
+            Err(fault) => Err((force, fault)),
+        }
+    }
+
+    /// Checks the borders and zones of the workspace.
+    pub(super) fn check_workspace(
+        &self,
+        config: &Config<N>,
+        task: Option<&Task<N>>,
+        tip_velocity: &Vector3<f64>,
+        force_n: &Vector3<f64>,
+    ) -> Result<(), Fault> {
+        let workspace = &config.workspace;
+        if workspace.is_unbounded() || self.activity.is_torque_off() || !self.drives_active {
+            return Ok(());
+        }
+        let tip = self.terms.base_from_tip.translation;
+        // Near a singular pose a small external torque maps to a large apparent tip force, so the
+        // force is not used.
+        let force_n = task
+            .filter(|task| is_regular(task))
+            .map_or_else(Vector3::zeros, |_| *force_n);
+        match workspace.violation(&tip, tip_velocity, &force_n) {
+            None => Ok(()),
+            Some(violation) => Err(match violation {
+                WorkspaceViolation::Border {
+                    index,
+                    penetration_m,
+                } => Fault::Workspace {
+                    value_m: penetration_m,
+                    border: index,
+                },
+                WorkspaceViolation::Speed {
+                    value_m_per_s,
+                    limit_m_per_s,
+                } => Fault::ZoneSpeed {
+                    value_m_per_s,
+                    limit_m_per_s,
+                },
+                WorkspaceViolation::Force { value_n, limit_n } => {
+                    Fault::ZoneForce { value_n, limit_n }
+                }
+            }),
+        }
+    }
+
+    /// Runs the plausibility and collision checks of one cycle.
+    fn check_plausibility(
+        &mut self,
+        config: &Config<N>,
+        evidence: &PlausibilityInput<'_, N>,
+    ) -> Result<(), Fault> {
+        let resting = match &self.activity {
+            Activity::GravityHold => true,
+            Activity::Move { duration_s, .. } => self.activity_s(config) > *duration_s,
+            _ => false,
+        };
+        let plausibility = &mut self.plausibility;
+        if evidence.elapsed_s > 0.0 {
+            let sudden_stop_rad = SUDDEN_STOP_SHARE * config.plausible.stuck_rad;
+            let moving = config.limits.joint_speed_rad_per_s * MOVING_SHARE;
+            let velocity = &self.estimator.velocity_rad_per_s;
+            plausibility.check_sudden_stop(
+                sudden_stop_rad,
+                velocity,
+                &moving,
+                evidence.elapsed_s,
+            )?;
+            let limits = config.limits.joint_torque_nm * config.plausible.against_share;
+            let against = plausibility.check_against_torque(
+                &self.terms.momentum,
+                evidence.net_torque_nm,
+                &limits,
+            );
+            // Not checked in a fault: a stopping arm may be pushed back, and `stop.rs` supervises
+            // the stop.
+            if !matches!(self.activity, Activity::Fault(_)) {
+                against?;
+            }
+            // In contact the joints may stand still while their references move; but if other
+            // joints move, a single unchanged encoder is stuck.
+            let others_move =
+                (0..N).any(|joint| abs(velocity[joint]) > OTHER_JOINT_MOVING_RAD_PER_S);
+            if others_move || !self.latch.in_contact() {
+                let limit_rad = config.plausible.stuck_rad;
+                plausibility.check_stuck_encoder(
+                    limit_rad,
+                    evidence.reference_rad_per_s,
+                    evidence.elapsed_s,
+                )?;
+            }
+        }
+        let external = self.observer.external_torque_nm();
+        let share = if self.activity.has_joint_loops() {
+            config.collision.move_share
+        } else {
+            1.0
+        };
+        joint_collision(&config.collision, share, &external)
+            .map_err(|fault| self.plausibility.as_stuck_encoder(&config.plausible, fault))?;
+        if !evidence.regular {
+            return Ok(());
+        }
+        tip_collision(&config.collision, share, evidence.force_n)?;
+        if resting {
+            let (gravity, limit_n) = (config.arm.gravity(), config.plausible.load_n);
+            self.plausibility.check_unmodelled_load(
+                evidence.force_n,
+                &gravity,
+                limit_n,
+                evidence.elapsed_s,
+            )?;
+        }
+        Ok(())
+    }
+}

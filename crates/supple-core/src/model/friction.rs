@@ -1,0 +1,156 @@
+//! Joint friction, Eq. (3.2) made continuous, with the Stribeck effect and an offset.
+//!
+//! ```text
+//! D(v) = V v + offset + [S + (S_0 - S) exp(-(v / v_s)^2)] p(v / delta)
+//! p(x) = 2 x - sign(x) x^2  for |x| <= 1,   sign(x) beyond
+//! ```
+//!
+//! As printed, the inner branch of (3.2) reads `S/delta (sign(v) v^2/delta + 2 v)`; at `|v| =
+//! delta` that is `3 S` where the outer branch is `S`. With the opposite sign of the parabola,
+//! value and slope are continuous: `D` is continuously differentiable in `v`.
+
+use crate::math::{abs, exp};
+use core::fmt;
+
+/// Friction of one joint. [`Friction::NONE`] is a frictionless joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Friction {
+    /// `V` \[N m s/rad\], zero or more.
+    pub viscous_nm_s_per_rad: f64,
+    /// `S`, Coulomb torque in steady sliding \[N m\], zero or more.
+    pub coulomb_nm: f64,
+    /// `S_0`, the torque the Stribeck curve tends to at rest \[N m\], at least `coulomb_nm`; if
+    /// equal, there is no Stribeck effect and the law is (3.2).
+    pub breakaway_nm: f64,
+    /// `v_s`, the speed over which the Stribeck effect decays \[rad/s\], positive.
+    pub stribeck_rad_per_s: f64,
+    /// Torque that does not depend on the velocity \[N m\].
+    pub offset_nm: f64,
+    /// `delta`, half-width of the band of (3.2) in which friction is a parabola \[rad/s\], positive.
+    pub band_rad_per_s: f64,
+}
+
+/// The entry of a [`Friction`] that is not physical, with its value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FrictionError {
+    /// Name of the entry, as in [`Friction`].
+    pub entry: &'static str,
+    /// Value found.
+    pub value: f64,
+    /// Requirement.
+    pub must: &'static str,
+}
+
+impl fmt::Display for FrictionError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{} is {}, it must be {}",
+            self.entry, self.value, self.must
+        )
+    }
+}
+
+impl core::error::Error for FrictionError {}
+
+impl Friction {
+    /// No friction at all.
+    pub const NONE: Friction = Friction {
+        viscous_nm_s_per_rad: 0.0,
+        coulomb_nm: 0.0,
+        breakaway_nm: 0.0,
+        stribeck_rad_per_s: 0.05,
+        offset_nm: 0.0,
+        band_rad_per_s: 0.01,
+    };
+
+    /// Viscous and Coulomb friction, the paper's `V` and `S`, with the default band and no Stribeck
+    /// effect.
+    pub const fn coulomb(viscous_nm_s_per_rad: f64, coulomb_nm: f64) -> Friction {
+        Friction {
+            viscous_nm_s_per_rad,
+            coulomb_nm,
+            breakaway_nm: coulomb_nm,
+            ..Friction::NONE
+        }
+    }
+
+    /// Rejects friction that would feed energy into the joint.
+    ///
+    /// # Errors
+    /// The first invalid entry.
+    pub fn validate(&self) -> Result<(), FrictionError> {
+        let at_least = |entry, value: f64, min: f64, must| {
+            if value.is_finite() && value >= min {
+                Ok(())
+            } else {
+                Err(FrictionError { entry, value, must })
+            }
+        };
+        let not_negative = "finite and not negative";
+        at_least(
+            "viscous_nm_s_per_rad",
+            self.viscous_nm_s_per_rad,
+            0.0,
+            not_negative,
+        )?;
+        at_least("coulomb_nm", self.coulomb_nm, 0.0, not_negative)?;
+        at_least(
+            "breakaway_nm",
+            self.breakaway_nm,
+            self.coulomb_nm,
+            "finite and at least coulomb_nm",
+        )?;
+        at_least(
+            "stribeck_rad_per_s",
+            self.stribeck_rad_per_s,
+            f64::MIN_POSITIVE,
+            "finite and positive",
+        )?;
+        at_least("offset_nm", self.offset_nm, f64::MIN, "finite")?;
+        at_least(
+            "band_rad_per_s",
+            self.band_rad_per_s,
+            f64::MIN_POSITIVE,
+            "finite and positive",
+        )
+    }
+
+    /// Uncertainty of the dry friction at `velocity_rad_per_s` \[N m\]: all of it at rest, where
+    /// stiction may act in either direction, and `relative_error` of it in fast sliding.
+    #[inline]
+    pub fn uncertainty_nm(&self, velocity_rad_per_s: f64, relative_error: f64) -> f64 {
+        let s = velocity_rad_per_s / self.stribeck_rad_per_s;
+        self.coulomb_nm * relative_error + self.breakaway_nm * exp(-s * s)
+    }
+
+    /// `D(v)`, the torque that overcomes friction at joint velocity `velocity_rad_per_s` \[N m\].
+    #[inline]
+    pub fn torque_nm(&self, velocity_rad_per_s: f64) -> f64 {
+        self.torque_with_dry_share_nm(velocity_rad_per_s, 1.0)
+    }
+
+    /// `D(v)` with a fraction `share` of its dry part, 0 to 1 \[N m\].
+    #[inline]
+    pub fn torque_with_dry_share_nm(&self, velocity_rad_per_s: f64, share: f64) -> f64 {
+        self.viscous_nm_s_per_rad * velocity_rad_per_s
+            + self.offset_nm
+            + self.dry_torque_nm(velocity_rad_per_s) * share
+    }
+
+    /// The dry part of `D(v)`: Coulomb torque with the Stribeck effect, parabolic in the band \[N
+    /// m\].
+    #[inline]
+    pub fn dry_torque_nm(&self, velocity_rad_per_s: f64) -> f64 {
+        let x = velocity_rad_per_s / self.band_rad_per_s;
+        let parabola = if abs(x) <= 1.0 {
+            x * (2.0 - abs(x))
+        } else {
+            1.0_f64.copysign(x)
+        };
+        let s = velocity_rad_per_s / self.stribeck_rad_per_s;
+        let dip = self.breakaway_nm - self.coulomb_nm;
+        let dry = self.coulomb_nm + if dip > 0.0 { dip * exp(-s * s) } else { 0.0 };
+        dry * parabola
+    }
+}

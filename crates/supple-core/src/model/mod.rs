@@ -1,0 +1,10 @@
+//! The arm and its surroundings as the controller knows them: links, friction, torque ripple, workspace.
+
+pub mod arm;
+pub mod body;
+pub mod friction;
+mod link;
+mod link_rows;
+pub mod pose;
+pub mod ripple;
+pub mod workspace;

@@ -1,0 +1,86 @@
+//! Torque ripple of the motors: harmonics of the motor angle, compensated by feed-forward.
+//!
+//! ```text
+//! r_m(p) = sum_h a_h sin(h p_m) + b_h cos(h p_m)      joint torque to feed forward: -j2mp^T r(j2mp q)
+//! ```
+//!
+//! A table depends on the measured angle alone: its compensation is the torque of a potential, so
+//! it adds no energy over a revolution and cannot become unstable.
+
+use crate::math::{Matrix, Vector, sin_cos};
+
+/// Maximum number of harmonics in a table.
+pub const LINES: usize = 6;
+
+/// One harmonic of a motor's torque over its angle.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Harmonic {
+    /// Periods in a revolution of the motor, 1 or more.
+    pub harmonic: u32,
+    /// `a` at the motor \[N m\].
+    pub sine_nm: f64,
+    /// `b` at the motor \[N m\].
+    pub cosine_nm: f64,
+}
+
+/// The ripple of one motor.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RippleTable {
+    lines: [Harmonic; LINES],
+    count: usize,
+}
+
+impl RippleTable {
+    /// No ripple.
+    pub const NONE: RippleTable = RippleTable {
+        lines: [Harmonic {
+            harmonic: 0,
+            sine_nm: 0.0,
+            cosine_nm: 0.0,
+        }; LINES],
+        count: 0,
+    };
+
+    /// A table of these harmonics; `None` for more than [`LINES`], a harmonic of 0, or an amplitude that
+    /// is not finite.
+    pub fn new(harmonics: &[Harmonic]) -> Option<RippleTable> {
+        let sound =
+            |h: &Harmonic| h.harmonic > 0 && h.sine_nm.is_finite() && h.cosine_nm.is_finite();
+        if harmonics.len() > LINES || !harmonics.iter().all(sound) {
+            return None;
+        }
+        let mut table = RippleTable::NONE;
+        table.lines[..harmonics.len()].copy_from_slice(harmonics);
+        table.count = harmonics.len();
+        Some(table)
+    }
+
+    /// The harmonics.
+    pub fn harmonics(&self) -> &[Harmonic] {
+        &self.lines[..self.count]
+    }
+
+    /// Torque that the motor adds at its angle, at the motor \[N m\].
+    pub fn torque_nm(&self, motor_rad: f64) -> f64 {
+        let mut torque = 0.0;
+        for line in self.harmonics() {
+            let (s, c) = sin_cos(f64::from(line.harmonic) * motor_rad);
+            torque += line.sine_nm * s + line.cosine_nm * c;
+        }
+        torque
+    }
+}
+
+/// Joint torque that cancels the ripple of all motors at joint angles `q` \[N m\].
+pub fn compensation_nm<const N: usize>(
+    tables: &[RippleTable; N],
+    motor_from_joint: &Matrix<N, N>,
+    q: &Vector<N>,
+) -> Vector<N> {
+    if tables.iter().all(|table| table.harmonics().is_empty()) {
+        return Vector::zeros();
+    }
+    let angle = motor_from_joint * q;
+    let motor = Vector::<N>::from_fn(|m, _| -tables[m].torque_nm(angle[m]));
+    motor_from_joint.tr_mul(&motor)
+}

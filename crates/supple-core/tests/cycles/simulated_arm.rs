@@ -1,0 +1,261 @@
+//! A simulated arm with external pushes, and random measurements and requests.
+
+use crate::support::rig::{Rig, probe_at, ramp};
+use rand_xoshiro::SplitMix64;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
+use supple_core::config::{Gains, Role};
+use supple_core::controller::{Breakaway, Mode, Request};
+use supple_core::dynamics::aba;
+use supple_core::math::Vector3;
+use supple_core::trajectory::{Arc, Fourier, Line, Quadrant, Sinusoid};
+use supple_core::{Config, Input, Output, Trajectory, Vector};
+
+/// Pseudo-random numbers.
+pub struct Random(SplitMix64);
+
+impl Random {
+    pub fn new(seed: u64) -> Random {
+        Random(SplitMix64::seed_from_u64(seed))
+    }
+
+    pub fn bits(&mut self) -> u64 {
+        self.0.next_u64()
+    }
+
+    /// Uniform in -1 to 1.
+    pub fn unit(&mut self) -> f64 {
+        (self.bits() >> 11) as f64 * (2.0 / (1_u64 << 53) as f64) - 1.0
+    }
+
+    pub fn below(&mut self, end: u64) -> u64 {
+        self.bits() % end
+    }
+
+    /// True with probability 1 / `times`.
+    pub fn once_in(&mut self, times: u64) -> bool {
+        self.below(times) == 0
+    }
+
+    /// Ordinary numbers and numerical edge cases.
+    pub fn number(&mut self) -> f64 {
+        const AWKWARD: [f64; 12] = [
+            f64::NAN,
+            f64::INFINITY,
+            f64::NEG_INFINITY,
+            f64::MAX,
+            f64::MIN,
+            f64::MIN_POSITIVE,
+            5e-324,
+            -5e-324,
+            0.0,
+            -0.0,
+            1e300,
+            -1e-300,
+        ];
+        match self.below(8) {
+            0 => AWKWARD[self.below(12) as usize],
+            1 => f64::from_bits(self.bits()),
+            2 => 1e3 * self.unit(),
+            _ => self.unit(),
+        }
+    }
+
+    fn point(&mut self) -> Vector3<f64> {
+        Vector3::new(self.number(), self.number(), self.number())
+    }
+
+    fn joints<const N: usize>(&mut self, reach: f64) -> Vector<N> {
+        Vector::from_fn(|_, _| reach * self.unit())
+    }
+}
+
+/// Whether the input of this cycle reports idle drives.
+pub fn drives_are_idle<const N: usize>(_: &Input<N>) -> bool {
+    false
+}
+
+/// A controller and its simulated arm.
+pub struct SimulatedArm<const N: usize> {
+    pub rig: Rig<N>,
+    q: Vector<N>,
+    qd: Vector<N>,
+}
+
+impl<const N: usize> SimulatedArm<N> {
+    /// An arm at rest at a random pose within the stops.
+    pub fn new(config: Config<N>, random: &mut Random) -> SimulatedArm<N> {
+        let limits = &config.limits;
+        let middle = (limits.position_lower_rad + limits.position_upper_rad) * 0.5;
+        let half = (limits.position_upper_rad - limits.position_lower_rad) * 0.5;
+        let mut q = middle + random.joints::<N>(0.8).component_mul(&half);
+        for i in 0..N {
+            q[i] = held_at(&config, i).unwrap_or(q[i]);
+        }
+        SimulatedArm {
+            rig: Rig::new(config, q),
+            q,
+            qd: Vector::zeros(),
+        }
+    }
+
+    /// Enters gravity hold.
+    pub fn begin(&mut self) -> Output<N> {
+        self.rig.cycle();
+        self.rig.ask(Request::GravityHold)
+    }
+
+    pub fn step(&mut self, input: &Input<N>) -> Output<N> {
+        self.rig.step(input)
+    }
+
+    /// Measurements and request of this cycle.
+    pub fn input(&mut self, random: &mut Random, last: &Output<N>) -> Input<N> {
+        self.rig.q = self.q;
+        let mut input = self.rig.input();
+        if random.once_in(300) {
+            let joint = random.below(N as u64) as usize;
+            input.position_rad[joint] = match random.below(3) {
+                0 => Some(random.number()),
+                _ => None,
+            };
+        }
+        input.tip_force_n = match random.below(400) {
+            0 => Some(random.point()),
+            1..200 => Some(Vector3::from(random.joints::<3>(20.0))),
+            _ => None,
+        };
+        if random.once_in(500) {
+            input.cycle = match random.below(10) {
+                0 => random.bits(),
+                _ => last.cycle.wrapping_add_signed(random.below(8) as i64 - 2),
+            };
+        }
+        let often = if last.mode == Mode::Fault { 40 } else { 60 };
+        input.request = random.once_in(often).then(|| self.request(random, last));
+        input
+    }
+
+    fn request(&self, random: &mut Random, last: &Output<N>) -> Request<N> {
+        // Mostly requests that leave a fault and resume motion.
+        match (last.mode, random.below(4)) {
+            (Mode::Fault, 0..3) => return Request::Reset,
+            (Mode::Idle, 0..3) => return Request::GravityHold,
+            _ => {}
+        }
+        let tip = last.tip_position_m;
+        match random.below(16) {
+            0 => Request::Idle,
+            1 => Request::GravityHold,
+            2 => Request::Reset,
+            3 => self.rig.stay(),
+            4 => Request::Track(probe_at(&tip)),
+            5 => Request::Track(Trajectory::Line(Line {
+                from_m: tip,
+                to_m: tip + Vector3::from(random.joints::<3>(0.1)),
+                duration_s: 1.0 + random.unit(),
+            })),
+            6 => Request::Move {
+                target_rad: Vector::from_fn(|i, _| {
+                    held_at(self.rig.controller.config(), i).unwrap_or(self.rig.q[i])
+                }),
+                duration_s: 1.0 + random.unit(),
+            },
+            7 => Request::Excite(Fourier::at_rest(self.rig.q, 1.0)),
+            8 => Request::Breakaway(ramp()),
+            9 => Request::Breakaway(Breakaway {
+                joint: random.below(9) as usize,
+                rate_nm_per_s: random.number(),
+                stop_rad: random.number(),
+                limit_nm: random.number(),
+            }),
+            10 => Request::Move {
+                target_rad: Vector::from_fn(|_, _| random.number()),
+                duration_s: random.number(),
+            },
+            11 => Request::Gains {
+                gains: Gains {
+                    stiffness_n_per_m: random.point().abs(),
+                    damping_n_s_per_m: random.point().abs(),
+                },
+                ramp_s: random.number(),
+            },
+            12 => Request::Gains {
+                gains: Gains::isotropic(150.0 + 150.0 * random.unit(), 30.0 + 20.0 * random.unit()),
+                ramp_s: 0.1,
+            },
+            13 => {
+                let mut series = Fourier::at_rest(self.rig.q, random.number());
+                series.sine_rad[random.below(5) as usize] = random.joints(0.1);
+                series.duration_s = random.number();
+                Request::Excite(series)
+            }
+            _ => Request::Track(any_trajectory(random)),
+        }
+    }
+
+    /// Advances the arm by one period under these torques and random external pushes; motors
+    /// without torque brake.
+    pub fn advance(&mut self, output: &Output<N>, random: &mut Random) {
+        let config = self.rig.controller.config();
+        let torque = match output.torque_off {
+            true => self.qd * -3.0,
+            false => output.torque_nm,
+        };
+        let qdd = aba(&config.arm, &self.q, &self.qd, &torque);
+        self.qd += qdd * config.period_s;
+        if random.once_in(800) {
+            self.qd += random.joints::<N>(3.0);
+        }
+        // Hard stops, without rebound.
+        let limits = &config.limits;
+        for i in 0..N {
+            self.qd[i] = self.qd[i].clamp(-20.0, 20.0);
+            self.q[i] += self.qd[i] * config.period_s;
+            let (lower, upper) = (limits.position_lower_rad[i], limits.position_upper_rad[i]);
+            if !(lower..=upper).contains(&self.q[i]) {
+                self.q[i] = self.q[i].clamp(lower, upper);
+                self.qd[i] = 0.0;
+            }
+        }
+    }
+}
+
+/// Angle of a held joint; `None` for an active one.
+fn held_at<const N: usize>(config: &Config<N>, joint: usize) -> Option<f64> {
+    match config.roles[joint] {
+        Role::Held { position_rad, .. } => Some(position_rad),
+        Role::Active => None,
+    }
+}
+
+fn any_trajectory(random: &mut Random) -> Trajectory {
+    match random.below(5) {
+        0 => Trajectory::Hold(random.point()),
+        1 => Trajectory::Line(Line {
+            from_m: random.point(),
+            to_m: random.point(),
+            duration_s: random.number(),
+        }),
+        2 => Trajectory::Sinusoid(Sinusoid {
+            centre_m: random.point(),
+            amplitude_m: random.point(),
+            angular_frequency_rad_per_s: random.number(),
+            ramp_s: random.number(),
+        }),
+        3 => Trajectory::Arc(Arc {
+            radius_m: random.number(),
+            height_m: random.number(),
+            centre_rad: random.number(),
+            amplitude_rad: random.number(),
+            angular_frequency_rad_per_s: random.number(),
+            ramp_s: random.number(),
+        }),
+        _ => Trajectory::Quadrant(Quadrant::new(
+            random.point(),
+            random.point(),
+            random.point(),
+            random.number(),
+            random.number(),
+        )),
+    }
+}

@@ -1,0 +1,16 @@
+//! Options of the demo.
+
+use std::path::PathBuf;
+use supple_model::Description;
+
+/// Options of the demo.
+#[derive(Clone, Debug)]
+pub struct DemoOptions {
+    /// Seed of the perturbed models and of all noise.
+    pub seed: u64,
+    /// Existing folder for one MCAP for each run; `None` writes no logs.
+    pub log_dir: Option<PathBuf>,
+    /// Model of every controller, unperturbed; `None` uses the arm's own parameters, perturbed if the run
+    /// requires it.
+    pub model: Option<Description>,
+}

@@ -1,0 +1,92 @@
+//! Predicts the tracking error of an identified model at 5 N/m: simulates the identified arm with controllers
+//! whose models are drawn from the uncertainty of the fit.
+//!
+//! The prediction includes log noise but no unmodelled effects; expect larger errors on a real arm.
+
+use crate::error::ExperimentError;
+use crate::metrics::median;
+use crate::run::{Plan, run};
+use crate::scenario;
+use serde::Serialize;
+use supple_ident::Fit;
+use supple_model::Description;
+use supple_plant::{LuGre, PlantConfig};
+
+/// Maximum error that counts as good at 5 N/m \[m\].
+pub const GOOD_M: f64 = 0.010;
+
+/// Predicted tracking error \[m\].
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TrackingPrediction {
+    /// Median over the draws.
+    pub median_m: f64,
+    /// Maximum over the draws.
+    pub worst_m: f64,
+    /// Number of draws that ended in a fault.
+    pub faults: usize,
+}
+
+/// Draws `draws` models and tracks the sinusoid with each; `None` if the arm cannot reach it.
+///
+/// # Errors
+/// [`ExperimentError`].
+pub fn predict_tracking_error<const N: usize>(
+    identified: &Description,
+    fit: &Fit<N>,
+    draws: u64,
+) -> Result<Option<TrackingPrediction>, ExperimentError> {
+    let mut plant = PlantConfig::<N>::from_description(identified)?;
+    plant.friction = plant.friction.map(LuGre::without_load);
+    let (trajectory, duration_s) = scenario::sinusoid(1.0);
+    let (mut errors, mut faults) = (Vec::new(), 0);
+    for seed in 0..draws {
+        let (arm, friction) = fit.draw(seed)?;
+        let mut config = identified.config::<N>()?;
+        config.arm = arm;
+        for joint in fit.columns.moving() {
+            config.friction[*joint] = friction[*joint];
+        }
+        config.law.gains = scenario::gains(scenario::STIFFNESS_N_PER_M);
+        let plan = Plan {
+            name: "sinusoid".to_owned(),
+            config,
+            plant: plant.clone(),
+            trajectory,
+            duration_s,
+        };
+        match run(&plan, &mut |_, _| Ok(())) {
+            Ok(run) => {
+                faults += usize::from(run.ended.is_some());
+                errors.push(run.rms_error_m);
+            }
+            Err(ExperimentError::BeyondJointStop { .. }) => return Ok(None),
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(median(&errors).map(|median_m| TrackingPrediction {
+        median_m,
+        worst_m: errors.iter().copied().fold(0.0, f64::max),
+        faults,
+    }))
+}
+
+impl TrackingPrediction {
+    /// Verdict as text.
+    pub fn verdict(&self) -> String {
+        let mm = |m: f64| format!("{:.1} mm", 1e3 * m);
+        let (median, worst) = (mm(self.median_m), mm(self.worst_m));
+        if self.faults > 0 {
+            format!(
+                "not good for 5 N/m: {} of the draws ended by a fault",
+                self.faults
+            )
+        } else if self.worst_m <= GOOD_M {
+            format!("good for 5 N/m: predicted tracking error {median}, worst {worst}")
+        } else {
+            format!(
+                "not good for 5 N/m: predicted tracking error {median}, worst {worst}; excite longer, \
+                 or work at a higher stiffness"
+            )
+        }
+    }
+}

@@ -1,0 +1,50 @@
+//! Options of a fit.
+
+use crate::columns::FrictionColumns;
+
+/// Weights of the joints' residuals.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Weights {
+    /// Equal weights: ordinary least squares.
+    Equal,
+    /// Inverse variance of each joint's residual: weighted least squares.
+    ByJointResidual,
+    /// As `ByJointResidual`, with Huber weights against outliers.
+    Huber,
+    /// Given noise of each moving joint \[N m\].
+    Given(Vec<f64>),
+}
+
+/// Options of a fit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// Whether to fit a rotor inertia for each moving joint; otherwise the nominal rotors are taken as known.
+    pub rotor: bool,
+    /// Friction columns.
+    pub friction: FrictionColumns,
+    /// Pairs of joints whose sum turns a motor.
+    pub couplings: Vec<(usize, usize)>,
+    /// Samples of a joint slower than this are excluded from its rows \[rad/s\]. A Stribeck column is then
+    /// fitted to the slow samples in a second stage.
+    pub slow_rad_per_s: f64,
+    /// Weights of joints and samples.
+    pub weights: Weights,
+    /// `Some(weight of the prior)`: physically consistent estimate, see [`crate::consistent::Constraints::prior_weight`]; `None`:
+    /// plain least squares.
+    pub consistent_prior_weight: Option<f64>,
+}
+
+impl Default for Options {
+    /// Viscous and Coulomb friction with offset, rotors, samples below 0.15 rad/s excluded, weighted by joint,
+    /// physically consistent.
+    fn default() -> Self {
+        Self {
+            rotor: true,
+            friction: FrictionColumns::OFFSET,
+            couplings: Vec::new(),
+            slow_rad_per_s: 0.15,
+            weights: Weights::ByJointResidual,
+            consistent_prior_weight: Some(1.0),
+        }
+    }
+}

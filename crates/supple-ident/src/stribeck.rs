@@ -1,0 +1,71 @@
+//! Finds the Stribeck speed whose second-stage fit leaves the smallest residual in slow motion.
+
+use crate::columns::FrictionColumns;
+use crate::error::IdentError;
+use crate::fit::{Fit, STEADY_SLIDING_RAD, fit};
+use crate::motion::Motion;
+use crate::procedure::{FrictionChoice, Procedure};
+use crate::regressor::joint_rows;
+use supple_core::Arm;
+
+/// Candidate Stribeck speeds \[rad/s\].
+const SPEEDS_RAD_PER_S: [f64; 7] = [0.02, 0.03, 0.04, 0.05, 0.07, 0.1, 0.15];
+/// Samples below this speed are used to compare them \[rad/s\].
+const SLOW_RAD_PER_S: f64 = 0.15;
+
+/// Fits viscous and Coulomb friction with offset to the fast samples and the Stribeck effect to the slow ones,
+/// with one Stribeck speed for all joints. `procedure` sets all other options.
+///
+/// # Errors
+/// As [`crate::identify_motions`].
+pub fn fit_with_stribeck<const N: usize>(
+    nominal: &Arm<N>,
+    motions: &[Motion],
+    moving: &[usize],
+    procedure: &Procedure,
+) -> Result<Fit<N>, IdentError> {
+    let mut best: Option<(Fit<N>, f64)> = None;
+    for speed in SPEEDS_RAD_PER_S {
+        let columns = match procedure.friction {
+            FrictionChoice::Auto => FrictionColumns::OFFSET,
+            FrictionChoice::Columns(columns) => columns,
+        };
+        let candidate = Procedure {
+            friction: FrictionChoice::Columns(FrictionColumns {
+                stribeck_rad_per_s: Some(speed),
+                ..columns
+            }),
+            ..procedure.clone()
+        };
+        let options = candidate.options(nominal, motions, moving)?.0;
+        let mut found = fit(nominal, motions, moving, &options)?;
+        found.preparation = procedure.preparation;
+        let residual = slow_error(&found, motions)?;
+        if best.as_ref().is_none_or(|(_, lowest)| residual < *lowest) {
+            best = Some((found, residual));
+        }
+    }
+    best.map(|(found, _)| found)
+        .ok_or_else(|| crate::error::shape_error("motions", "at least one", "none"))
+}
+
+/// Sum of squared residuals of slow, steady sliding outside the band, after subtraction of each joint's mean.
+fn slow_error<const N: usize>(found: &Fit<N>, motions: &[Motion]) -> Result<f64, IdentError> {
+    let slow = found.columns.friction().band_rad_per_s..=SLOW_RAD_PER_S;
+    let mut total = 0.0;
+    for motion in motions {
+        for joint in joint_rows(found.nominal(), &found.columns, motion)? {
+            let residual = &joint.a * &found.x - &joint.b;
+            let kept: Vec<f64> = (0..residual.len())
+                .filter(|i| {
+                    slow.contains(&joint.speed[*i])
+                        && joint.travel_since_reversal_rad[*i] >= STEADY_SLIDING_RAD
+                })
+                .map(|i| residual[i])
+                .collect();
+            let mean = kept.iter().sum::<f64>() / kept.len().max(1) as f64;
+            total += kept.iter().map(|r| (r - mean).powi(2)).sum::<f64>();
+        }
+    }
+    Ok(total)
+}

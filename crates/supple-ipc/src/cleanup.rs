@@ -1,0 +1,58 @@
+//! The last process that leaves a system removes all remaining shared-memory objects.
+//!
+//! iceoryx2 removes the objects of closed ports and of killed processes, but not its own management files. When no
+//! process of the system is left, this module removes all of the system's objects. The membership lock keeps processes
+//! from joining meanwhile.
+
+use crate::domain::{Domain, Node};
+use crate::membership;
+use crate::shared_memory;
+use iceoryx2::node::NodeState;
+use iceoryx2::prelude::CallbackProgression;
+use std::fs;
+use std::io;
+
+/// Guard stored as the last field of every struct with ports, so that it is dropped after them.
+#[derive(Debug)]
+pub(crate) struct SharedMemoryCleanup(Domain);
+
+impl SharedMemoryCleanup {
+    pub fn of(domain: &Domain) -> SharedMemoryCleanup {
+        SharedMemoryCleanup(domain.clone())
+    }
+}
+
+impl Drop for SharedMemoryCleanup {
+    fn drop(&mut self) {
+        // An error leaves the remaining objects in place; the next process that leaves tries again.
+        let _ = clear(&self.0);
+    }
+}
+
+fn clear(domain: &Domain) -> io::Result<()> {
+    // If other processes keep the lock busy, the last of them cleans up.
+    let Some(_membership_lock) = membership::try_lock_to_leave(domain)? else {
+        return Ok(());
+    };
+    membership::remove_unsized_objects(domain)?;
+    let mut has_live_node = false;
+    let listed = Node::list(domain.config(), |state| {
+        match state {
+            NodeState::Dead(node) => {
+                // Objects that this call misses are removed below.
+                let _ = node.try_remove_stale_resources();
+            }
+            // We hold the membership lock, so this process is not joining; it was killed while it joined.
+            NodeState::Undefined(_) => {}
+            NodeState::Alive(_) | NodeState::Inaccessible(_) => has_live_node = true,
+        }
+        CallbackProgression::Continue
+    });
+    if has_live_node || listed.is_err() {
+        return Ok(());
+    }
+    for object in shared_memory::objects(domain)?.owned {
+        fs::remove_file(object)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,212 @@
+//! Transmission, motors, encoders and amplifiers between controller and plant.
+//!
+//! Joint angles are `q = m2jp p` with the motor angles `p`; motor torques are `m2jp^T tau` with the joint
+//! torques `tau`. A commanded torque is rounded to the amplifier's resolution and acts a whole number of cycles
+//! later; a measured angle is rounded to the encoder's counts. A motor with shorted terminals (amplifier in idle)
+//! brakes by its own current: `tau = -(Kt^2 / R) p'` at the motor; the electrical time constant (inductance over
+//! resistance) is neglected. Cables are rigid.
+
+use crate::error::{PlantError, entry};
+use crate::noise::Noise;
+use core::f64::consts::TAU;
+use std::collections::VecDeque;
+use supple_core::linalg;
+use supple_core::{Matrix, Vector};
+
+/// A harmonic of a motor's torque over its angle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ripple {
+    /// Index of the motor, from 0.
+    pub motor: usize,
+    /// Periods per revolution of the motor.
+    pub harmonic: u32,
+    /// Amplitude at the motor \[N m\].
+    pub amplitude_nm: f64,
+    /// Phase \[rad\]: the torque is `amplitude sin(harmonic p + phase)`.
+    pub phase_rad: f64,
+}
+
+/// Transmission, encoders and amplifiers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ActuatorModel<const N: usize> {
+    /// `m2jp`: joint angles from motor angles, regular.
+    pub joint_from_motor: Matrix<N, N>,
+    /// Encoder counts per revolution of each motor, zero or more; zero measures without rounding.
+    pub counts_per_motor_revolution: Vector<N>,
+    /// Standard deviation of the noise on each motor angle before it is rounded \[rad\], zero or more.
+    pub encoder_noise_rad: Vector<N>,
+    /// Resolution of each motor's torque \[N m\], zero or more; zero commands without rounding.
+    pub motor_torque_quantum_nm: Vector<N>,
+    /// Damping of each motor with shorted terminals, `Kt^2 / R` \[N m s/rad\], zero or more.
+    pub braking_nm_s_per_rad: Vector<N>,
+    /// Cycles after which a commanded torque acts; 1 on an arm whose drives apply it in the next cycle.
+    pub torque_delay_cycles: usize,
+    /// Torque ripple of the motors; empty for none.
+    pub ripple: Vec<Ripple>,
+}
+
+impl<const N: usize> ActuatorModel<N> {
+    /// Ideal direct drive: ratio 1, no quantisation, no delay.
+    pub fn direct() -> ActuatorModel<N> {
+        ActuatorModel {
+            joint_from_motor: Matrix::identity(),
+            counts_per_motor_revolution: Vector::zeros(),
+            encoder_noise_rad: Vector::zeros(),
+            motor_torque_quantum_nm: Vector::zeros(),
+            braking_nm_s_per_rad: Vector::zeros(),
+            torque_delay_cycles: 0,
+            ripple: Vec::new(),
+        }
+    }
+}
+
+/// Run-time state of the actuators.
+#[derive(Clone, Debug)]
+pub(crate) struct ActuatorState<const N: usize> {
+    model: ActuatorModel<N>,
+    motor_from_joint: Matrix<N, N>,
+    pending: VecDeque<Vector<N>>,
+    last_command: Vector<N>,
+    /// Shorted motors.
+    shorted: [bool; N],
+    /// Resulting joint-space damping matrix \[N m s/rad\].
+    braking: Matrix<N, N>,
+}
+
+impl<const N: usize> ActuatorState<N> {
+    /// `held` is the joint torque that acts until the first command takes effect.
+    pub fn new(model: ActuatorModel<N>, held: &Vector<N>) -> Result<Self, PlantError> {
+        let motor_from_joint = inverse(&model.joint_from_motor).ok_or(PlantError::Transmission)?;
+        for i in 0..N {
+            for (field, value) in [
+                (
+                    "counts_per_motor_revolution",
+                    model.counts_per_motor_revolution[i],
+                ),
+                ("encoder_noise_rad", model.encoder_noise_rad[i]),
+                ("motor_torque_quantum_nm", model.motor_torque_quantum_nm[i]),
+                ("braking_nm_s_per_rad", model.braking_nm_s_per_rad[i]),
+            ] {
+                let valid = value >= 0.0 && value.is_finite();
+                let name = format!("{field} of motor {i}");
+                entry(valid, name, value, "finite and not negative")?;
+            }
+        }
+        for ripple in &model.ripple {
+            let (motor, amplitude) = (ripple.motor, ripple.amplitude_nm);
+            let must = "the index of a motor, from 0";
+            entry(motor < N, "motor of a ripple", motor as f64, must)?;
+            let valid = amplitude.is_finite() && ripple.phase_rad.is_finite();
+            let name = format!("amplitude_nm or phase_rad of a ripple of motor {motor}");
+            entry(valid, name, amplitude, "finite")?;
+        }
+        let mut state = ActuatorState {
+            model,
+            motor_from_joint,
+            pending: VecDeque::new(),
+            last_command: Vector::zeros(),
+            shorted: [false; N],
+            braking: Matrix::zeros(),
+        };
+        state.restart(held);
+        Ok(state)
+    }
+
+    /// Resets the command queue; `held` acts until the first new command takes effect.
+    pub fn restart(&mut self, held: &Vector<N>) {
+        self.last_command = *held;
+        self.pending.clear();
+        for _ in 0..self.model.torque_delay_cycles {
+            self.pending.push_back(*held);
+        }
+    }
+
+    /// Queues the command of this cycle and returns the joint torque that acts in it, without ripple. A non-finite
+    /// command is ignored; the previous one remains in effect.
+    pub fn command(&mut self, torque_nm: &Vector<N>) -> Vector<N> {
+        if torque_nm.iter().all(|t| t.is_finite()) {
+            self.last_command = self.rounded(torque_nm);
+        }
+        self.pending.push_back(self.last_command);
+        self.pending.pop_front().unwrap_or(self.last_command)
+    }
+
+    fn rounded(&self, torque_nm: &Vector<N>) -> Vector<N> {
+        let quantum = &self.model.motor_torque_quantum_nm;
+        if quantum.iter().all(|q| *q == 0.0) {
+            return *torque_nm;
+        }
+        let mut motor = self.model.joint_from_motor.transpose() * torque_nm;
+        for i in 0..N {
+            if quantum[i] > 0.0 {
+                motor[i] = libm::rint(motor[i] / quantum[i]) * quantum[i];
+            }
+        }
+        self.motor_from_joint.transpose() * motor
+    }
+
+    /// Shorts exactly these motors.
+    pub fn short_motors(&mut self, motors: [bool; N]) {
+        if motors == self.shorted {
+            return;
+        }
+        self.shorted = motors;
+        let at_motors = Vector::from_fn(|i, _| match motors[i] {
+            true => self.model.braking_nm_s_per_rad[i],
+            false => 0.0,
+        });
+        self.braking = self.motor_from_joint.transpose()
+            * Matrix::from_diagonal(&at_motors)
+            * self.motor_from_joint;
+    }
+
+    /// Joint torque of the shorted motors at joint velocities `qd`.
+    pub fn braking(&self, qd: &Vector<N>) -> Vector<N> {
+        if self.shorted.contains(&true) {
+            -(self.braking * qd)
+        } else {
+            Vector::zeros()
+        }
+    }
+
+    /// Joint torque of the motors' ripple at joint angles `q`.
+    pub fn ripple(&self, q: &Vector<N>) -> Vector<N> {
+        if self.model.ripple.is_empty() {
+            return Vector::zeros();
+        }
+        let angle = self.motor_from_joint * q;
+        let mut motor = Vector::<N>::zeros();
+        for ripple in &self.model.ripple {
+            let phase = f64::from(ripple.harmonic) * angle[ripple.motor] + ripple.phase_rad;
+            motor[ripple.motor] += ripple.amplitude_nm * libm::sin(phase);
+        }
+        self.motor_from_joint.transpose() * motor
+    }
+
+    /// Joint angles as measured by the encoders.
+    pub fn measure(&self, q: &Vector<N>, noise: &mut Noise) -> Vector<N> {
+        let counts = &self.model.counts_per_motor_revolution;
+        let deviation = &self.model.encoder_noise_rad;
+        if counts.iter().chain(deviation.iter()).all(|x| *x == 0.0) {
+            return *q;
+        }
+        let mut angle = self.motor_from_joint * q;
+        for i in 0..N {
+            if deviation[i] > 0.0 {
+                angle[i] += deviation[i] * noise.normal();
+            }
+            if counts[i] > 0.0 {
+                angle[i] = libm::rint(angle[i] / TAU * counts[i]) / counts[i] * TAU;
+            }
+        }
+        self.model.joint_from_motor * angle
+    }
+}
+
+/// Inverse by the normal equations, `(A^T A)^-1 A^T`; `None` for a singular matrix.
+fn inverse<const N: usize>(a: &Matrix<N, N>) -> Option<Matrix<N, N>> {
+    let factor = linalg::Cholesky::new(&(a.transpose() * a))?;
+    let inverse = factor.solve(&a.transpose());
+    let error = (a * inverse - Matrix::<N, N>::identity()).abs().max();
+    (error < 1e-9).then_some(inverse)
+}

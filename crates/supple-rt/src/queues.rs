@@ -1,0 +1,180 @@
+//! Queues between the control loop and the non-realtime threads: ring buffers of fixed size with one producer and one
+//! consumer each.
+//!
+//! Idle requests have reserved entries in the request queue, and a separate channel: an atomic counter that the loop
+//! reads first in each cycle ([`idle_channel`]).
+
+use rtrb::{Consumer, Producer, RingBuffer};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use supple_ipc::message::{OperatorReply, OperatorRequest, Telemetry};
+use supple_realtime::LivenessCounter;
+
+/// Telemetry queue length, in cycles.
+const TELEMETRY: usize = 1024;
+/// Capacity for requests between two cycles, and additional entries reserved for idle requests.
+const REQUESTS: usize = 16;
+const IDLE_REQUESTS: usize = 8;
+const REPLIES: usize = 64;
+/// At most one per cycle.
+const IDLE_REPLIES: usize = 64;
+
+/// The loop's ends of the queues.
+#[derive(Debug)]
+pub struct LoopQueues {
+    pub(crate) telemetry: Producer<Telemetry>,
+    pub(crate) requests: Consumer<OperatorRequest>,
+    pub(crate) replies: Producer<OperatorReply>,
+    pub(crate) liveness: LivenessCounter,
+    pub(crate) states_dropped: Arc<AtomicU64>,
+}
+
+/// The helper's ends of the queues.
+#[derive(Debug)]
+pub struct HelperQueues {
+    pub(crate) telemetry: Consumer<Telemetry>,
+    pub(crate) requests: Producer<OperatorRequest>,
+    pub(crate) replies: Consumer<OperatorReply>,
+    pub(crate) liveness: LivenessCounter,
+    pub(crate) states_dropped: Arc<AtomicU64>,
+}
+
+/// Creates all queues, empty.
+pub fn loop_queues() -> (LoopQueues, HelperQueues) {
+    let (telemetry_in, telemetry_out) = RingBuffer::new(TELEMETRY);
+    let (requests_in, requests_out) = RingBuffer::new(REQUESTS + IDLE_REQUESTS);
+    let (replies_in, replies_out) = RingBuffer::new(REPLIES);
+    let states_dropped = Arc::new(AtomicU64::new(0));
+    let loop_end = LoopQueues {
+        telemetry: telemetry_in,
+        requests: requests_out,
+        replies: replies_in,
+        liveness: LivenessCounter::default(),
+        states_dropped: states_dropped.clone(),
+    };
+    let helper_end = HelperQueues {
+        telemetry: telemetry_out,
+        requests: requests_in,
+        replies: replies_out,
+        liveness: LivenessCounter::default(),
+        states_dropped,
+    };
+    (loop_end, helper_end)
+}
+
+impl LoopQueues {
+    /// Liveness counter of the loop.
+    pub fn liveness(&self) -> LivenessCounter {
+        self.liveness.clone()
+    }
+
+    /// The helper thread has ended: no requests can arrive any more.
+    pub(crate) fn peer_dropped(&self) -> bool {
+        self.telemetry.is_abandoned()
+    }
+}
+
+impl HelperQueues {
+    /// Liveness counter of the helper.
+    pub fn liveness(&self) -> LivenessCounter {
+        self.liveness.clone()
+    }
+
+    /// Takes the oldest telemetry in the queue.
+    pub fn telemetry(&mut self) -> Option<Telemetry> {
+        self.telemetry.pop().ok()
+    }
+
+    /// Takes the oldest reply in the queue.
+    pub fn reply(&mut self) -> Option<OperatorReply> {
+        self.replies.pop().ok()
+    }
+
+    /// Queues a request; returns false if the queue is full.
+    pub fn request(&mut self, request: OperatorRequest) -> bool {
+        let reserved = match request.requests_idle_now() {
+            true => 0,
+            false => IDLE_REQUESTS,
+        };
+        self.requests.slots() > reserved && self.requests.push(request).is_ok()
+    }
+
+    /// Number of arm states that the loop has discarded.
+    pub fn states_dropped(&self) -> u64 {
+        self.states_dropped.load(Ordering::Relaxed)
+    }
+
+    /// The loop has ended and its queues are empty.
+    pub fn ended(&self) -> bool {
+        self.telemetry.is_abandoned() && self.telemetry.is_empty() && self.replies.is_empty()
+    }
+}
+
+/// The loop's end of the channel for idle requests.
+#[derive(Debug)]
+pub struct LoopIdleChannel {
+    last_request: Arc<AtomicU64>,
+    answered: u64,
+    replies: Producer<OperatorReply>,
+}
+
+/// The idle-request thread's end of the channel.
+#[derive(Debug)]
+pub struct IdleThreadChannel {
+    last_request: Arc<AtomicU64>,
+    replies: Consumer<OperatorReply>,
+}
+
+/// Creates the channel for idle requests: a counter that each request increments, so it can never be full.
+pub fn idle_channel() -> (LoopIdleChannel, IdleThreadChannel) {
+    let last_request = Arc::new(AtomicU64::new(0));
+    let (replies_in, replies_out) = RingBuffer::new(IDLE_REPLIES);
+    let loop_end = LoopIdleChannel {
+        last_request: last_request.clone(),
+        answered: 0,
+        replies: replies_in,
+    };
+    let thread_end = IdleThreadChannel {
+        last_request,
+        replies: replies_out,
+    };
+    (loop_end, thread_end)
+}
+
+impl LoopIdleChannel {
+    /// Number of the last request, if it was not answered yet.
+    pub(crate) fn pending_request(&self) -> Option<u64> {
+        let last_request = self.last_request.load(Ordering::Acquire);
+        (last_request != self.answered).then_some(last_request)
+    }
+
+    /// Replies to all requests up to the reply's number. If the reply queue is full, the requests stay pending until
+    /// the next cycle.
+    pub(crate) fn answer(&mut self, reply: OperatorReply) {
+        if self.replies.push(reply).is_ok() {
+            self.answered = reply.sequence;
+        }
+    }
+
+    /// The idle-request thread has ended.
+    pub(crate) fn peer_dropped(&self) -> bool {
+        self.replies.is_abandoned()
+    }
+}
+
+impl IdleThreadChannel {
+    /// Requests idle, with a request number one above the last.
+    pub fn set_requested(&self, number: u64) {
+        self.last_request.store(number, Ordering::Release);
+    }
+
+    /// Takes the oldest reply in the queue.
+    pub fn reply(&mut self) -> Option<OperatorReply> {
+        self.replies.pop().ok()
+    }
+
+    /// The loop has ended.
+    pub fn ended(&self) -> bool {
+        self.replies.is_abandoned()
+    }
+}

@@ -1,0 +1,85 @@
+//! Queue of requests that wait for their cycle.
+//!
+//! Due requests are carried out in order of arrival, one per cycle; idle requests come first. When the arm goes to idle
+//! or a fault latches, all queued requests are refused, because they were sent under other conditions. One operator can
+//! use at most half of the queue, so it cannot block the others.
+
+use core::fmt;
+use supple_ipc::message::OperatorRequest;
+
+/// Maximum number of queued requests.
+pub const CAPACITY: usize = 16;
+/// Maximum number of queued requests of one operator.
+pub const CAPACITY_PER_OPERATOR: usize = 8;
+
+/// Why a request cannot be queued.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum QueueFull {
+    /// The queue is full.
+    Full,
+    /// This operator has reached its quota.
+    OperatorQuota,
+}
+
+impl fmt::Display for QueueFull {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            QueueFull::Full => f.write_str("too many requests are queued"),
+            QueueFull::OperatorQuota => write!(
+                f,
+                "this operator has {CAPACITY_PER_OPERATOR} queued requests, the maximum"
+            ),
+        }
+    }
+}
+
+/// Requests in order of arrival.
+#[derive(Clone, Debug, Default)]
+pub struct RequestQueue {
+    entries: [Option<OperatorRequest>; CAPACITY],
+    length: usize,
+}
+
+impl RequestQueue {
+    /// Appends a request.
+    ///
+    /// # Errors
+    /// [`QueueFull`].
+    pub fn push(&mut self, request: OperatorRequest) -> Result<(), QueueFull> {
+        let queued = self.entries.iter().flatten();
+        let same_operator = queued.filter(|queued| queued.operator == request.operator);
+        if same_operator.count() >= CAPACITY_PER_OPERATOR {
+            return Err(QueueFull::OperatorQuota);
+        }
+        let entry = self.entries.get_mut(self.length).ok_or(QueueFull::Full)?;
+        *entry = Some(request);
+        self.length += 1;
+        Ok(())
+    }
+
+    /// Removes and returns the first due request; idle requests come first.
+    pub fn pop_due(&mut self, cycle: u64) -> Option<OperatorRequest> {
+        let queued = self.entries[..self.length].iter().flatten();
+        let mut due = queued.enumerate().filter(|(_, r)| r.is_due(cycle));
+        let idle = due.clone().find(|(_, r)| r.requests_idle());
+        let (index, _) = idle.or_else(|| due.next())?;
+        self.take(index)
+    }
+
+    /// Whether the queue is empty.
+    pub fn is_empty(&self) -> bool {
+        self.length == 0
+    }
+
+    /// Removes and returns the first request, due or not.
+    pub fn pop(&mut self) -> Option<OperatorRequest> {
+        self.take(0)
+    }
+
+    fn take(&mut self, index: usize) -> Option<OperatorRequest> {
+        let taken = self.entries[index].take()?;
+        self.entries[index..self.length].rotate_left(1);
+        self.length -= 1;
+        Some(taken)
+    }
+}

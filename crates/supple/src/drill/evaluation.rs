@@ -1,0 +1,405 @@
+//! Compares the result of a test case with its expected result.
+
+use super::metrics::{RowMetrics, SLOW_M_PER_S};
+use super::spec::{Event, Expected, Spec, TestTask};
+use supple_plant::InjectionKind;
+
+/// Maximum kinetic energy of an arm that descends on shorted motors \[J\]: 0.1 m/s at the tip of the 4-joint arm.
+const MAX_BRAKED_SINK_J: f64 = 0.05;
+/// Maximum contact force after the first impact, for an approach at 0.25 m/s \[N\].
+const MAX_FORCE_AFTER_IMPACT_N: f64 = 65.0;
+/// Maximum time from contact to collision fault and gravity compensation \[ms\].
+const MAX_COLLISION_DETECTION_MS: f64 = 20.0;
+/// Maximum steady pressing force \[N\].
+const MAX_PRESSING_FORCE_N: f64 = 5.0;
+/// Ratio of tip speeds above which the arm counts as accelerated.
+const SPEED_INCREASE_RATIO: f64 = 1.1;
+/// Tip speed below which an increase is ignored: noise and the descent on shorted motors \[m/s\].
+const MAX_BRAKED_SINK_M_PER_S: f64 = 0.12;
+/// Tip speed that can build up before detection if encoders lag by 20 ms or gravity is reversed: 20 to 40 ms of motor
+/// torque or of twice the weight \[m/s\].
+const MAX_UNDETECTED_M_PER_S: f64 = 0.6;
+/// Maximum speed at which an arm with 1 kg of unmodelled payload descends on shorted motors \[m/s\].
+const MAX_LOADED_SINK_M_PER_S: f64 = 0.35;
+/// Maximum tip travel and tip speed after the drives are re-enabled \[m\], \[m/s\].
+const MAX_REENABLE_JUMP: (f64, f64) = (0.02, MAX_BRAKED_SINK_M_PER_S);
+/// Maximum tip drop caused by an unmodelled load in the observed 1.5 s, with braking motors \[m\].
+const MAX_SINK_M: f64 = 0.2;
+/// Tip displacement below which the tip counts as stationary \[m\].
+const STATIONARY_M: f64 = 0.005;
+
+/// Returns the outcome as text and a list of all deviations from the expectation.
+pub fn evaluate(spec: &Spec, metrics: &RowMetrics, refusals: &[String]) -> (String, Vec<String>) {
+    let mut deviations = Vec::new();
+    let mut expect = |met: bool, message: String| {
+        if !met {
+            deviations.push(message);
+        }
+    };
+    if let Some(fault) = metrics.fault_before {
+        expect(false, format!("fault {fault} before the event"));
+    }
+    let keeps_running =
+        metrics.fault.is_none() && metrics.end_active && metrics.braked_after_ms.is_none();
+    match spec.expected {
+        Expected::KeepsRunning => {
+            expect(keeps_running, "it does not keep running".to_owned());
+        }
+        Expected::FaultAndRest(names) => {
+            expect(
+                stopped_by(metrics, names) && metrics.fault_after_ms <= Some(spec.within_ms),
+                format!("no expected fault within {:.0} ms", spec.within_ms),
+            );
+            check_safe_stop(spec, metrics, &mut expect);
+        }
+        Expected::KeepsRunningOrFault(names) => {
+            expect(
+                keeps_running || stopped_by(metrics, names),
+                "it neither keeps running nor stops with an expected fault".to_owned(),
+            );
+            if metrics.fault.is_some() || metrics.braked_after_ms.is_some() {
+                check_safe_stop(spec, metrics, &mut expect);
+            } else {
+                let bound = SLOW_M_PER_S.max(1.5 * metrics.tip_before_m_per_s);
+                expect(
+                    metrics.tip_after_m_per_s <= bound,
+                    format!("tip at {:.2} m/s", metrics.tip_after_m_per_s),
+                );
+                let resting = spec.task == TestTask::GravityHold;
+                expect(
+                    !resting || metrics.moving_until_ms <= spec.within_ms,
+                    format!(
+                        "still above 0.25 m/s after {:.0} ms",
+                        metrics.moving_until_ms
+                    ),
+                );
+            }
+        }
+        Expected::Refused => {
+            expect(!refusals.is_empty(), "accepted".to_owned());
+            expect(
+                metrics.tip_moved_m < STATIONARY_M && metrics.fault.is_none(),
+                format!("the tip moved {:.0} mm", metrics.tip_moved_m * 1e3),
+            );
+        }
+        Expected::ReturnsToGravityHold => {
+            expect(metrics.fault.is_none(), "a fault".to_owned());
+            expect(
+                metrics.end_active && metrics.end_mode == "gravity_hold",
+                format!(
+                    "mode {} at the end, drives {}",
+                    metrics.end_mode,
+                    active(metrics)
+                ),
+            );
+            let (moved_m, speed) = (metrics.back_moved_m, metrics.back_tip_m_per_s);
+            expect(
+                moved_m.is_some_and(|m| m < MAX_REENABLE_JUMP.0)
+                    && speed.is_some_and(|s| s < MAX_REENABLE_JUMP.1),
+                format!(
+                    "after activation the tip moved {:.0} mm at up to {:.2} m/s",
+                    moved_m.unwrap_or(f64::NAN) * 1e3,
+                    speed.unwrap_or(f64::NAN)
+                ),
+            );
+        }
+        // Evaluated from wall-clock metrics elsewhere.
+        Expected::Brakes(..) | Expected::ControllerFault | Expected::IdleAccepted => {}
+    }
+    if spec.event == Event::Obstacle {
+        expect(metrics.impact_n > 0.0, "no contact occurred".to_owned());
+        expect(
+            metrics.force_n <= MAX_FORCE_AFTER_IMPACT_N,
+            format!("{:.0} N after the impact", metrics.force_n),
+        );
+        if let (Expected::FaultAndRest(_), ms) = (spec.expected, metrics.fault_after_contact_ms) {
+            expect(
+                ms.is_some_and(|ms| ms <= MAX_COLLISION_DETECTION_MS),
+                format!("fault {:.0} ms after the contact", ms.unwrap_or(f64::NAN)),
+            );
+        }
+        // While probing or tracking, the impedance law itself presses on the block.
+        if spec.task != TestTask::Probe && spec.task != TestTask::Track {
+            let pressed_n = metrics.pressed_n.unwrap_or(0.0);
+            expect(
+                pressed_n < MAX_PRESSING_FORCE_N,
+                format!("pressed with {pressed_n:.0} N after 0.5 s"),
+            );
+        }
+    }
+    (outcome(metrics, keeps_running, refusals), deviations)
+}
+
+fn stopped_by(metrics: &RowMetrics, names: &[&str]) -> bool {
+    metrics.fault.is_some_and(|fault| names.contains(&fault))
+}
+
+/// Checks that the arm came to rest or braked in time and did not move faster than before.
+fn check_safe_stop(spec: &Spec, metrics: &RowMetrics, expect: &mut impl FnMut(bool, String)) {
+    expect(
+        metrics.moving_until_ms <= spec.within_ms,
+        format!(
+            "above 0.25 m/s until {:.0} ms, {:.0} allowed",
+            metrics.moving_until_ms, spec.within_ms
+        ),
+    );
+    if let Some(tip) = metrics.tip_later_m_per_s {
+        expect(
+            tip < SLOW_M_PER_S,
+            format!("tip at {tip:.2} m/s 0.5 s after the fault"),
+        );
+    }
+    if let Event::Injected {
+        kind: InjectionKind::MotorDead { .. },
+        ..
+    } = spec.event
+        && metrics.braked_after_ms.is_some()
+    {
+        // An open-circuit motor does not brake; the arm descends on the other motors alone.
+        return;
+    }
+    if let (Some(at_j), Some(later_j)) = (metrics.energy_at_fault_j, metrics.energy_later_j) {
+        expect(
+            later_j <= at_j.max(MAX_BRAKED_SINK_J),
+            format!("{later_j:.2} J 0.2 s after the fault, {at_j:.2} J at the fault"),
+        );
+    }
+    if let Some(at_fault) = metrics.tip_at_fault_m_per_s {
+        let slow = match spec.event {
+            Event::Injected { kind, .. } => match kind {
+                InjectionKind::EncoderLate { .. } | InjectionKind::GravityReversed => {
+                    MAX_UNDETECTED_M_PER_S
+                }
+                InjectionKind::Payload { .. } => MAX_LOADED_SINK_M_PER_S,
+                _ => SLOW_M_PER_S,
+            },
+            _ => SLOW_M_PER_S,
+        };
+        let bound = slow.max(SPEED_INCREASE_RATIO * at_fault.max(metrics.tip_before_m_per_s));
+        expect(
+            metrics.tip_after_m_per_s <= bound,
+            format!(
+                "tip at up to {:.2} m/s, {bound:.2} allowed",
+                metrics.tip_after_m_per_s
+            ),
+        );
+    }
+    if let Event::Injected {
+        kind: InjectionKind::Payload { .. },
+        ..
+    } = spec.event
+    {
+        expect(
+            metrics.tip_moved_m < MAX_SINK_M || spec.task != TestTask::GravityHold,
+            format!("the tip descended {:.0} mm", metrics.tip_moved_m * 1e3),
+        );
+    }
+}
+
+fn active(metrics: &RowMetrics) -> &'static str {
+    if metrics.end_active { "active" } else { "idle" }
+}
+
+fn outcome(metrics: &RowMetrics, keeps_running: bool, refusals: &[String]) -> String {
+    let mut parts = Vec::new();
+    if let (Some(fault), Some(ms)) = (metrics.fault, metrics.fault_after_ms) {
+        parts.push(format!("{fault} after {ms:.0} ms"));
+    }
+    if let Some(ms) = metrics.braked_after_ms {
+        parts.push(format!("braked after {ms:.0} ms"));
+    }
+    if !refusals.is_empty() && metrics.fault.is_none() {
+        parts.push("refused".to_owned());
+    }
+    if parts.is_empty() && keeps_running {
+        parts.push(format!("keeps running in {}", metrics.end_mode));
+    }
+    if parts.is_empty() {
+        parts.push(format!(
+            "mode {}, drives {}",
+            metrics.end_mode,
+            active(metrics)
+        ));
+    }
+    parts.join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::metrics::{ControllerSample, RowMetrics};
+    use super::super::trace::TraceRow;
+    use super::*;
+    use crate::cli::PlantKind;
+    use supple_core::controller::Mode;
+
+    const MS: u64 = 1_000_000;
+
+    /// Metrics of 3 s with one trace row and one cycle per millisecond, the event after 1 s and this fault 50 ms
+    /// later.
+    fn run(fault: u8, change: impl Fn(u64, &mut TraceRow)) -> RowMetrics {
+        let lines = (0..3000).map(|ms| {
+            let mut line = TraceRow {
+                time_ns: ms * MS,
+                active: true,
+                torque_nm: vec![0.0],
+                force_n: 0.0,
+                tip_m: [0.0; 3],
+                tip_speed_m_per_s: 0.1,
+                joint_speed_rad_per_s: 0.0,
+                kinetic_energy_j: 0.01,
+                injections: u64::from(ms >= 1000),
+            };
+            change(ms, &mut line);
+            line
+        });
+        let samples = (0..3000).map(|ms| ControllerSample {
+            time_ns: ms * MS,
+            cycle: ms,
+            mode: Some(Mode::Track),
+            fault: if ms >= 1050 { fault } else { 0 },
+            active: true,
+        });
+        let (lines, samples): (Vec<TraceRow>, Vec<ControllerSample>) =
+            (lines.collect(), samples.collect());
+        RowMetrics::new(&lines, &samples, 500 * MS, 1000 * MS)
+    }
+
+    fn spec(event: Event, expected: Expected) -> Spec {
+        Spec {
+            plant: PlantKind::Sim,
+            task: TestTask::Track,
+            event,
+            expected,
+            within_ms: 600.0,
+        }
+    }
+
+    fn stuck(expected: Expected) -> Spec {
+        let kind = InjectionKind::EncoderStuck { joint: None };
+        let at_once = false;
+        spec(Event::Injected { kind, at_once }, expected)
+    }
+
+    const NAMED: Expected = Expected::FaultAndRest(&["encoder_stuck"]);
+
+    #[test]
+    fn only_the_expected_fault_followed_by_rest_passes() {
+        let metrics = run(15, |_, _| {});
+        assert_eq!(metrics.fault_after_ms, Some(50.0));
+        let (outcome, deviations) = evaluate(&stuck(NAMED), &metrics, &[]);
+        assert_eq!(
+            (outcome.as_str(), deviations.len()),
+            ("encoder_stuck after 50 ms", 0)
+        );
+        assert!(
+            !evaluate(&stuck(NAMED), &run(7, |_, _| {}), &[])
+                .1
+                .is_empty()
+        );
+        assert!(
+            !evaluate(&stuck(NAMED), &run(0, |_, _| {}), &[])
+                .1
+                .is_empty()
+        );
+        assert!(
+            evaluate(&stuck(Expected::KeepsRunning), &run(0, |_, _| {}), &[])
+                .1
+                .is_empty()
+        );
+        assert!(
+            !evaluate(&stuck(Expected::KeepsRunning), &metrics, &[])
+                .1
+                .is_empty()
+        );
+    }
+
+    #[test]
+    fn an_arm_that_keeps_oscillating_after_its_fault_fails_unless_it_brakes() {
+        let swing = |braked: bool| {
+            run(15, move |ms, line| {
+                if ms >= 1000 {
+                    line.tip_speed_m_per_s = 2.0;
+                }
+                line.active = !(braked && ms >= 1060);
+            })
+        };
+        let deviations = evaluate(&stuck(NAMED), &swing(false), &[]).1;
+        assert_eq!(deviations.len(), 2, "{deviations:?}");
+        assert!(evaluate(&stuck(NAMED), &swing(true), &[]).1.is_empty());
+    }
+
+    #[test]
+    fn energy_that_grows_after_a_fault_fails() {
+        let metrics = run(15, |ms, line| {
+            if ms > 1300 {
+                line.kinetic_energy_j = 0.2;
+            }
+        });
+        let deviations = evaluate(&stuck(NAMED), &metrics, &[]).1;
+        assert_eq!(
+            deviations,
+            ["0.20 J 0.2 s after the fault, 0.01 J at the fault"]
+        );
+    }
+
+    #[test]
+    fn pressing_on_a_block_after_the_impact_fails() {
+        let met = |later_n: f64| {
+            run(14, move |ms, line| match ms {
+                1040..1044 => line.force_n = 700.0,
+                1044.. => line.force_n = later_n,
+                _ => {}
+            })
+        };
+        let mut obstacle = spec(Event::Obstacle, Expected::FaultAndRest(&["tip_collision"]));
+        obstacle.task = TestTask::Move;
+        assert!(evaluate(&obstacle, &met(2.0), &[]).1.is_empty());
+        assert_eq!(
+            evaluate(&obstacle, &met(60.0), &[]).1,
+            ["pressed with 60 N after 0.5 s"]
+        );
+        assert_eq!(evaluate(&obstacle, &met(90.0), &[]).1.len(), 2);
+    }
+
+    #[test]
+    fn an_accepted_invalid_request_or_a_moving_tip_fails() {
+        let deviations = spec(
+            Event::Request(super::super::spec::InvalidRequest::TooFast),
+            Expected::Refused,
+        );
+        let metrics = run(0, |_, _| {});
+        assert!(
+            evaluate(&deviations, &metrics, &["too fast".to_owned()])
+                .1
+                .is_empty()
+        );
+        assert_eq!(evaluate(&deviations, &metrics, &[]).1, ["accepted"]);
+        let moved = run(0, |ms, line| {
+            line.tip_m[0] = if ms > 1500 { 0.1 } else { 0.0 }
+        });
+        assert_eq!(
+            evaluate(&deviations, &moved, &["too fast".to_owned()])
+                .1
+                .len(),
+            1
+        );
+    }
+
+    #[test]
+    fn a_jump_of_reenabled_drives_fails() {
+        let back = |speed: f64| {
+            let mut metrics = run(0, move |ms, line| {
+                line.active = !(1000..2000).contains(&ms);
+                if ms >= 2000 {
+                    line.tip_speed_m_per_s = speed;
+                }
+            });
+            metrics.end_mode = "gravity_hold";
+            metrics
+        };
+        let lowered = super::super::spec::DriveShutdown::Idle;
+        let spec = spec(Event::Drives(lowered), Expected::ReturnsToGravityHold);
+        assert!(evaluate(&spec, &back(0.05), &[]).1.is_empty());
+        assert_eq!(evaluate(&spec, &back(1.5), &[]).1.len(), 1);
+    }
+}

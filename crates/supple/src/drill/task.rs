@@ -1,0 +1,140 @@
+//! Requests that bring the arm to its task, with their cycle relative to the first free cycle.
+
+use super::spec::{DriveShutdown, Event, InvalidRequest, Spec, TestTask};
+use crate::cli::UpTrajectory;
+use crate::exit::Failure;
+use crate::operate::{Approach, trajectory_for};
+use supple_core::config::Gains;
+use supple_core::controller::Request;
+use supple_core::math::Vector3;
+use supple_core::trajectory::{Fourier, Line};
+use supple_core::{Config, Trajectory, Vector};
+use supple_experiment::{scenario, start_pose};
+use supple_model::Description;
+
+/// Distance and duration of the downward move: minimum jerk, peak speed 0.25 m/s.
+const DESCENT_M: f64 = 0.2;
+const DESCENT_S: f64 = 1.5;
+/// Amplitude and angular frequency of the shoulder's oscillation: 0.25 m/s at the tip, which is 0.6 m away.
+const SWING_RAD: f64 = 0.15;
+const SWING_RAD_PER_S: f64 = 2.8;
+/// Joint that oscillates.
+const SHOULDER: usize = 1;
+
+/// Requests with their cycles, and the cycle of the event.
+pub struct Script<const N: usize> {
+    /// Requests, each with its cycle from the start.
+    pub requests: Vec<(u64, Request<N>)>,
+    /// Cycle in which the task begins, counted from the start.
+    pub task_start_cycle: u64,
+    /// Cycle of the event, counted from the start.
+    pub event_cycle: u64,
+    /// Pose in which the task begins \[rad\].
+    pub start_rad: Vector<N>,
+}
+
+/// Request of the task, for an arm in its start pose.
+///
+/// # Errors
+/// [`Failure::Experiment`] if the arm cannot perform the task.
+pub fn request<const N: usize>(
+    spec: &Spec,
+    config: &Config<N>,
+    description: &Description,
+) -> Result<Request<N>, Failure> {
+    let (sinusoid, duration_s) = scenario::sinusoid(1.0);
+    let start_m = sinusoid.at(0.0).position;
+    let start_rad = start_pose(config, "drill", &sinusoid, duration_s)?;
+    let down_m = start_m - Vector3::new(0.0, 0.0, DESCENT_M);
+    Ok(match spec.task {
+        TestTask::GravityHold => Request::GravityHold,
+        TestTask::Move => Request::Move {
+            target_rad: start_pose(config, "drill", &Trajectory::Hold(down_m), 1.0)?,
+            duration_s: DESCENT_S,
+        },
+        TestTask::Track if spec.event == Event::Obstacle => {
+            Request::Track(Trajectory::Line(Line {
+                from_m: start_m,
+                to_m: down_m,
+                duration_s: DESCENT_S,
+            }))
+        }
+        TestTask::Track => Request::Track(sinusoid),
+        TestTask::Probe => Request::Track(trajectory_for(UpTrajectory::Probe, description).0),
+        TestTask::Excite => {
+            let mut series = Fourier::at_rest(start_rad, SWING_RAD_PER_S);
+            series.sine_rad[0][SHOULDER.min(N - 1)] = SWING_RAD;
+            series.duration_s = 3.0;
+            series.ramp_s = 0.3;
+            Request::Excite(series)
+        }
+    })
+}
+
+impl<const N: usize> Script<N> {
+    /// Requests from the home pose to the start pose, the task and the event.
+    ///
+    /// # Errors
+    /// [`Failure::Experiment`] if the arm cannot perform the task.
+    pub fn new(
+        spec: &Spec,
+        config: &Config<N>,
+        description: &Description,
+        home_rad: &Vector<N>,
+    ) -> Result<Script<N>, Failure> {
+        let (trajectory, duration_s) = match spec.task {
+            TestTask::Probe => trajectory_for(UpTrajectory::Probe, description),
+            _ => scenario::sinusoid(1.0),
+        };
+        let approach = Approach::new(config, trajectory, duration_s)?;
+        let (to_start, task_start_cycle, _) = approach.requests(home_rad);
+        let cycles = |time_s: f64| (time_s / config.period_s).round() as u64;
+        let mut script = Script {
+            requests: vec![(0, to_start)],
+            task_start_cycle,
+            event_cycle: task_start_cycle
+                + cycles(match spec.task {
+                    TestTask::GravityHold => 0.3,
+                    // The event comes at the highest speed of the motion.
+                    TestTask::Move => 0.6,
+                    TestTask::Track | TestTask::Probe => 0.8,
+                    TestTask::Excite => 0.7,
+                }),
+            start_rad: start_pose(config, "drill", &trajectory, duration_s)?,
+        };
+        if let Event::Request(wrong) = spec.event {
+            let request = match wrong {
+                InvalidRequest::TooFast => Request::Track(scenario::sinusoid(1000.0).0),
+                InvalidRequest::TooStiff => Request::Gains {
+                    gains: Gains::isotropic(1000.0, 1e4),
+                    ramp_s: 0.0,
+                },
+                InvalidRequest::WhileIdle => {
+                    // The arm is never activated, or its drives are idle from the start.
+                    script.requests.clear();
+                    to_start
+                }
+            };
+            if wrong != InvalidRequest::WhileIdle {
+                script
+                    .requests
+                    .push((task_start_cycle, Request::GravityHold));
+            }
+            script.requests.push((script.event_cycle, request));
+            return Ok(script);
+        }
+        script
+            .requests
+            .push((task_start_cycle, request(spec, config, description)?));
+        if spec.event == Event::Drives(DriveShutdown::IdleWhenStiff) {
+            let gains = Request::Gains {
+                gains: Gains::isotropic(1000.0, 60.0),
+                ramp_s: 0.0,
+            };
+            script
+                .requests
+                .push((task_start_cycle + cycles(0.4), gains));
+        }
+        Ok(script)
+    }
+}

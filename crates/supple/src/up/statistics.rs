@@ -1,0 +1,214 @@
+//! Statistics of a run: counts, times, tracking error.
+
+use core::fmt;
+use hdrhistogram::Histogram;
+use serde::Serialize;
+use supple_core::controller::Mode;
+use supple_ipc::message::{PlantReport, Telemetry};
+
+/// Upper end of the histogram range \[ns\].
+const MAX_LATENCY_NS: u64 = 10_000_000_000;
+/// Significant decimal digits of the histograms.
+const DIGITS: u8 = 3;
+
+/// Statistics since the first cycle.
+#[derive(Debug)]
+pub struct RunStatistics {
+    cycles: u64,
+    plant: PlantReport,
+    states_dropped: u64,
+    wake: Histogram<u64>,
+    step: Histogram<u64>,
+    round_trip: Histogram<u64>,
+    bus_load: f64,
+    squared_error_m2: f64,
+    tracked: u64,
+    fault: u8,
+    faults: Vec<String>,
+}
+
+/// Percentiles of a distribution.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Percentiles {
+    /// Median.
+    pub p50: f64,
+    /// 99th percentile.
+    pub p99: f64,
+    /// 99.9th percentile.
+    pub p999: f64,
+    /// Maximum.
+    pub max: f64,
+}
+
+/// Summary of a run.
+#[derive(Clone, Debug, Serialize)]
+pub struct UpSummary {
+    /// Cycles of the controller.
+    pub cycles: u64,
+    /// Cycles with active drives whose torque command did not arrive in time.
+    pub missed: u64,
+    /// Torque commands that arrived after their cycle.
+    pub late: u64,
+    /// Torque commands that were discarded: wrong number of joints, or not finite.
+    pub unusable: u64,
+    /// Messages that were discarded because their writer is not this system's controller or plant, or because they
+    /// belong to another arm.
+    pub foreign: u64,
+    /// Wake-up latency of a cycle.
+    pub wake_us: Percentiles,
+    /// Computing time of the controller's step.
+    pub step_ns: Percentiles,
+    /// Time from publishing the state until the torque command arrives.
+    pub round_trip_us: Percentiles,
+    /// Mean fraction of a cycle in which the bus is busy; 0 without a bus.
+    pub bus_load: f64,
+    /// CAN frames whose transmission was not confirmed.
+    pub tx_lost: u64,
+    /// Time for which simulated time was paused because the host stalled the plant process.
+    pub stood_still_ms: f64,
+    /// Cycles whose telemetry was lost; they are missing in the log.
+    pub telemetry_lost: u64,
+    /// RMS distance of the tip from its reference while tracking, from the encoders; none if nothing was tracked.
+    pub rms_error_m: Option<f64>,
+    /// Number of tracked cycles.
+    pub tracked_cycles: u64,
+    /// Descriptions of the faults that latched.
+    pub faults: Vec<String>,
+    /// Why the log or the trace is incomplete; none if both are complete.
+    pub cut_short: Option<String>,
+    /// Real-time factor: simulated time over wall-clock time; none in real time.
+    pub times_real_time: Option<f64>,
+}
+
+impl Default for RunStatistics {
+    fn default() -> Self {
+        let histogram = Histogram::new_with_bounds(1, MAX_LATENCY_NS, DIGITS);
+        let histogram = histogram.expect("1 to 10^10 with 3 digits is a histogram");
+        RunStatistics {
+            cycles: 0,
+            plant: PlantReport::default(),
+            states_dropped: 0,
+            wake: histogram.clone(),
+            step: histogram.clone(),
+            round_trip: histogram,
+            bus_load: 0.0,
+            squared_error_m2: 0.0,
+            tracked: 0,
+            fault: 0,
+            faults: Vec::new(),
+        }
+    }
+}
+
+impl RunStatistics {
+    /// Adds a cycle.
+    pub fn add(&mut self, telemetry: &Telemetry) {
+        self.cycles += 1;
+        self.plant = telemetry.state.plant;
+        self.states_dropped = telemetry.states_dropped;
+        self.wake.saturating_record(self.plant.wake_ns);
+        self.step.saturating_record(telemetry.timing.step_ns);
+        if self.plant.round_trip_ns > 0 {
+            self.round_trip.saturating_record(self.plant.round_trip_ns);
+        }
+        self.bus_load += self.plant.bus_load;
+        let tracking = matches!(telemetry.record().mode(), Some(Mode::Track | Mode::Probe));
+        if let (true, Some(error_m)) = (tracking, telemetry.record().tip_error_m()) {
+            self.squared_error_m2 += error_m * error_m;
+            self.tracked += 1;
+        }
+        self.note_fault(telemetry);
+    }
+
+    /// Records a latched fault of a cycle that is not otherwise counted.
+    pub fn note_fault(&mut self, telemetry: &Telemetry) {
+        if telemetry.record().fault != self.fault && telemetry.record().fault != 0 {
+            self.faults.push(telemetry.record().fault_text.to_string());
+        }
+        self.fault = telemetry.record().fault;
+    }
+
+    /// Number of cycles so far.
+    pub fn cycles(&self) -> u64 {
+        self.cycles
+    }
+
+    /// The last report of the plant.
+    pub fn plant(&self) -> &PlantReport {
+        &self.plant
+    }
+
+    /// Time from publishing the state until the torque command arrives \[us\].
+    pub fn round_trip_us(&self) -> Percentiles {
+        percentiles(&self.round_trip, 1e-3)
+    }
+
+    /// Summary of the run so far.
+    pub fn summary(&self, telemetry_lost: u64) -> UpSummary {
+        let mean = |sum: f64, count: u64| (count > 0).then(|| sum / count as f64);
+        UpSummary {
+            cycles: self.cycles,
+            missed: self.plant.missed,
+            late: self.plant.late,
+            unusable: self.plant.unusable,
+            foreign: self.plant.foreign + self.states_dropped,
+            wake_us: percentiles(&self.wake, 1e-3),
+            step_ns: percentiles(&self.step, 1.0),
+            round_trip_us: self.round_trip_us(),
+            bus_load: mean(self.bus_load, self.cycles).unwrap_or_default(),
+            tx_lost: self.plant.tx_lost,
+            stood_still_ms: self.plant.clock_stall_ns as f64 * 1e-6,
+            telemetry_lost,
+            rms_error_m: mean(self.squared_error_m2, self.tracked).map(f64::sqrt),
+            tracked_cycles: self.tracked,
+            faults: self.faults.clone(),
+            cut_short: None,
+            times_real_time: None,
+        }
+    }
+}
+
+fn percentiles(histogram: &Histogram<u64>, scale: f64) -> Percentiles {
+    let at = |quantile| histogram.value_at_quantile(quantile) as f64 * scale;
+    Percentiles {
+        p50: at(0.5),
+        p99: at(0.99),
+        p999: at(0.999),
+        max: histogram.max() as f64 * scale,
+    }
+}
+
+impl fmt::Display for UpSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "{} cycles, {} missed, {} late, {} frames lost",
+            self.cycles, self.missed, self.late, self.tx_lost
+        )?;
+        for (name, unit, s) in [
+            ("wake-up latency", "us", &self.wake_us),
+            ("step", "ns", &self.step_ns),
+            ("state to command", "us", &self.round_trip_us),
+        ] {
+            writeln!(
+                f,
+                "{name}: p50 {:.1}, p99 {:.1}, p99.9 {:.1}, max {:.1} {unit}",
+                s.p50, s.p99, s.p999, s.max
+            )?;
+        }
+        if self.stood_still_ms > 0.0 {
+            writeln!(
+                f,
+                "simulated time was paused for {:.1} ms (host stalls)",
+                self.stood_still_ms
+            )?;
+        }
+        if let Some(times) = self.times_real_time {
+            writeln!(f, "{times:.1} times real time")?;
+        }
+        match self.rms_error_m {
+            Some(error_m) => write!(f, "tip error while tracking: {:.2} mm RMS", error_m * 1e3),
+            None => write!(f, "nothing was tracked"),
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! A quantity is declared in one place: in a copy of the tree, a scalar and a torque term are added by two edits each,
+//! and logs, tables and telemetry have them.
+
+#[path = "support/table.rs"]
+mod table;
+
+use core::num::NonZeroU64;
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+use supple_log::{Reader, export_csv};
+use table::cells;
+
+/// A file, a text in it, and the lines that go behind it.
+type Edit = (&'static str, &'static str, &'static str);
+
+const SCALAR: [Edit; 2] = [
+    (
+        "crates/supple-core/src/controller/output.rs",
+        "        number least_singular_value_m;\n",
+        "        /// A quantity of this test.\n        number added_scalar_m;\n",
+    ),
+    (
+        "crates/supple-core/src/controller/step.rs",
+        "    Output {\n        cycle: input.cycle,\n",
+        "        added_scalar_m: 0.5,\n",
+    ),
+];
+
+const TERM: [Edit; 2] = [
+    (
+        "crates/supple-core/src/law/torques.rs",
+        "    handover,\n",
+        "    /// A term of this test.\n    added_term,\n",
+    ),
+    (
+        "crates/supple-core/src/controller/step.rs",
+        "    state.blend_torque(config, &mut torques);\n",
+        "    torques.added_term[0] = 0.25;\n",
+    ),
+];
+
+fn copy_of_the_tree(to: &Path) {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let listed = Command::new("git")
+        .args(["ls-files", "-z"])
+        .current_dir(root)
+        .output()
+        .expect("git runs");
+    let names = String::from_utf8(listed.stdout).expect("names");
+    for name in names.split('\0').filter(|name| !name.is_empty()) {
+        let (from, to) = (root.join(name), to.join(name));
+        fs::create_dir_all(to.parent().expect("a folder")).expect("made");
+        fs::copy(&from, &to).unwrap_or_else(|error| panic!("{}: {error}", from.display()));
+    }
+}
+
+fn edit(tree: &Path, (file, behind, lines): &Edit) {
+    let path = tree.join(file);
+    let text = fs::read_to_string(&path).expect("readable");
+    assert_eq!(text.matches(behind).count(), 1, "{file}: {behind}");
+    fs::write(&path, text.replace(behind, &format!("{behind}{lines}"))).expect("written");
+}
+
+#[test]
+#[ignore = "builds a copy of the tree: `./ci.sh edits`"]
+fn a_scalar_and_a_term_are_two_edits_each() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let tree = folder.path().join("tree");
+    copy_of_the_tree(&tree);
+    for change in SCALAR.iter().chain(&TERM) {
+        edit(&tree, change);
+    }
+    let log = folder.path().join("run.mcap");
+    let cargo = |arguments: &[&str]| {
+        let status = Command::new(env!("CARGO"))
+            .args(arguments)
+            .current_dir(&tree)
+            .env(
+                "CARGO_TARGET_DIR",
+                Path::new(env!("CARGO_TARGET_TMPDIR")).join("edits"),
+            )
+            .status();
+        assert!(status.expect("cargo runs").success(), "{arguments:?}");
+    };
+    let name = log.to_str().expect("a name");
+    let sample = [
+        "run",
+        "--locked",
+        "-p",
+        "supple-log",
+        "--example",
+        "sample_log",
+        "--",
+        name,
+    ];
+    cargo(&sample);
+    // What publishes telemetry builds with them.
+    cargo(&["check", "--locked", "-p", "supple-rt"]);
+
+    let table = folder.path().join("table.csv");
+    let mut out = fs::File::create(&table).expect("made");
+    export_csv(&log, "/controller_state", NonZeroU64::MIN, &mut out).expect("exported");
+    let text = fs::read_to_string(&table).expect("readable");
+    let mut lines = text.lines().map(cells);
+    let heading = lines.next().expect("a heading");
+    let at = |column: &str| {
+        let found = heading.iter().position(|name| *name == column);
+        found.unwrap_or_else(|| panic!("no {column} in {heading:?}"))
+    };
+    let (scalar, term) = (at("added_scalar_m"), at("torques.added_term.joint1"));
+    let mut rows = 0;
+    for row in lines {
+        assert_eq!((row[scalar], row[term]), ("0.5", "0.25"));
+        rows += 1;
+    }
+    // This version reads the log of that one, and leaves out what it does not know.
+    let steps = Reader::open(&log).and_then(|reader| reader.records::<4>());
+    assert_eq!(steps.expect("a log").count(), rows);
+    assert!(rows > 1000);
+}

@@ -1,0 +1,11 @@
+//! Tables of `supple log export`.
+
+/// Cells of a line of a table; a quoted cell may contain commas.
+pub fn cells(line: &str) -> Vec<&str> {
+    let mut quoted = false;
+    let at_comma = move |c: char| {
+        quoted ^= c == '"';
+        c == ',' && !quoted
+    };
+    line.split(at_comma).collect()
+}

@@ -1,0 +1,13 @@
+//! Complete systems with the real programs: `supple up` with its processes, and the operator commands.
+
+#[path = "../support/mod.rs"]
+mod support;
+#[path = "../support/table.rs"]
+mod table;
+
+mod drill;
+mod ends;
+mod operator;
+mod regressions;
+mod running;
+mod up;

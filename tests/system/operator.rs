@@ -1,0 +1,261 @@
+//! Complete systems with all client resources exhausted: the operator is still served, and a second operator gets an
+//! orderly error.
+
+use crate::running::{PREFIX, Up, stderr_of, supple, temporary_folder};
+use crate::support::programs;
+use core::time::Duration;
+use rustix::fs::{FlockOperation, flock};
+use rustix::process::{Signal, kill_process};
+use std::path::Path;
+use std::process::{Child, Command, Output};
+use supple_core::controller::{Mode, Request};
+use supple_ipc::message::Outcome;
+use supple_ipc::{Domain, OperatorClient, TelemetryReader, request_idle};
+
+/// Maximum number of cycles until idle is accepted, at 1 kHz.
+const IDLE_WITHIN_CYCLES: u64 = 20;
+/// A real blockage shows in every attempt, a busy machine does not: take the best of several.
+const ATTEMPTS: u32 = 5;
+const TIMEOUT: Duration = Duration::from_secs(30);
+
+/// Starts a simulated arm that tracks; returns the system, its domain and a reader of its telemetry.
+fn tracking() -> (Up, Domain, TelemetryReader) {
+    let up = Up::start(&["--plant", "sim", "--no-log"]);
+    let domain = Domain::in_folder(&up.folder.path().join("supple"), PREFIX).expect("a domain");
+    let mut reader = TelemetryReader::new(&domain).expect("a reader");
+    wait_for_mode(&mut reader, Mode::Track);
+    (up, domain, reader)
+}
+
+/// Reads telemetry until the controller is in a mode; returns the cycle.
+fn wait_for_mode(reader: &mut TelemetryReader, mode: Mode) -> u64 {
+    for _ in 0..60_000 {
+        let Some(telemetry) = reader.wait(TIMEOUT).expect("read") else {
+            break;
+        };
+        if telemetry.record().mode() == Some(mode) {
+            return telemetry.state.cycle;
+        }
+        assert_eq!(
+            telemetry.record().fault,
+            0,
+            "{}",
+            telemetry.record().fault_text
+        );
+    }
+    panic!("mode {} did not come", mode.name());
+}
+
+/// The newest cycle.
+fn now(reader: &mut TelemetryReader) -> u64 {
+    let mut cycle = reader
+        .wait(TIMEOUT)
+        .expect("read")
+        .expect("some")
+        .state
+        .cycle;
+    while let Some(telemetry) = reader.receive().expect("read") {
+        cycle = telemetry.state.cycle;
+    }
+    cycle
+}
+
+#[test]
+fn idle_is_accepted_while_all_slots_the_queue_and_the_lock_are_taken() {
+    let (up, domain, mut reader) = tracking();
+    // Hung clients that occupy all slots, and requests that fill the queue.
+    let readers: Vec<_> = (0..20)
+        .map_while(|_| TelemetryReader::new(&domain).ok())
+        .collect();
+    let mut operators: Vec<_> = (0..20)
+        .map_while(|_| OperatorClient::new(&domain).ok())
+        .collect();
+    assert!(readers.len() < 20 && operators.len() < 20);
+    let busy = &mut operators[0];
+    for _ in 0..16 {
+        busy.send::<4>(&Request::GravityHold, Some(u64::MAX))
+            .expect("sent");
+    }
+    let refused = up.run(&["status"]);
+    assert_eq!(refused.status.code(), Some(10), "all slots are in use");
+    let holder = std::process::id().to_string();
+    assert!(
+        stderr_of(&refused).contains(&holder),
+        "{}",
+        stderr_of(&refused)
+    );
+    // A process that was stopped while it held the membership lock.
+    let lock = domain.folder().join(format!("{PREFIX}.membership.lock"));
+    let lock = std::fs::File::open(lock).expect("a lock");
+    flock(&lock, FlockOperation::LockExclusive).expect("locked");
+
+    let mut quickest = u64::MAX;
+    for _ in 0..ATTEMPTS {
+        let requested_cycle = now(&mut reader);
+        let answer = request_idle(&domain, TIMEOUT)
+            .expect("requested")
+            .expect("an answer");
+        assert_eq!(
+            (answer.outcome, answer.mode),
+            (Outcome::Accepted, Some(Mode::Idle))
+        );
+        quickest = quickest.min(answer.cycle - requested_cycle);
+        wait_for_mode(&mut reader, Mode::Idle);
+        busy.send::<4>(&Request::GravityHold, None)
+            .expect("sent")
+            .expect("there is room");
+        wait_for_mode(&mut reader, Mode::GravityHold);
+    }
+    assert!(quickest <= IDLE_WITHIN_CYCLES, "{quickest} cycles");
+    let output = up.run(&["mode", "idle"]);
+    assert!(output.status.success(), "{}", stderr_of(&output));
+    assert!(String::from_utf8_lossy(&output.stdout).contains("mode idle since cycle"));
+    wait_for_mode(&mut reader, Mode::Idle);
+    flock(&lock, FlockOperation::Unlock).expect("unlocked");
+    drop((reader, readers, operators));
+    let output = up.end();
+    assert!(output.status.success(), "{}", stderr_of(&output));
+}
+
+#[test]
+fn a_system_in_a_fault_is_code_5() {
+    let (up, _domain, mut reader) = tracking();
+    // No arm states arrive: the controller faults.
+    let sim = up.child("supple-sim");
+    kill_process(sim, Signal::STOP).expect("it runs");
+    wait_for_mode(&mut reader, Mode::Fault);
+    kill_process(sim, Signal::CONT).expect("it runs");
+    let output = up.run(&["mode", "idle"]);
+    assert_eq!(output.status.code(), Some(5), "{}", stderr_of(&output));
+    assert!(String::from_utf8_lossy(&output.stdout).contains("mode fault"));
+    assert!(
+        stderr_of(&output).contains("supple reset"),
+        "{}",
+        stderr_of(&output)
+    );
+    let output = up.end();
+    assert_eq!(output.status.code(), Some(5), "{}", stderr_of(&output));
+}
+
+#[test]
+fn a_killed_controller_ends_the_system_with_code_10() {
+    let (mut up, ..) = tracking();
+    kill_process(up.child("supple-rt"), Signal::KILL).expect("it runs");
+    let output = up.ended();
+    assert_eq!(output.status.code(), Some(10), "{}", stderr_of(&output));
+    assert!(
+        stderr_of(&output).contains("supple-rt exited"),
+        "{}",
+        stderr_of(&output)
+    );
+}
+
+#[test]
+fn concurrent_starts_leave_exactly_one_system_running() {
+    let folder = temporary_folder();
+    let start = || {
+        supple(
+            folder.path(),
+            &["up", "--plant", "sim", "--no-log", "--for", "3"],
+        )
+        .spawn()
+        .expect("it starts")
+    };
+    let children: Vec<Child> = (0..3).map(|_| start()).collect();
+    let outputs: Vec<Output> = children
+        .into_iter()
+        .map(|child| child.wait_with_output().expect("it ends"))
+        .collect();
+    let (ran, refused): (Vec<_>, Vec<_>) =
+        outputs.iter().partition(|output| output.status.success());
+    let all: Vec<String> = outputs.iter().map(stderr_of).collect();
+    assert_eq!((ran.len(), refused.len()), (1, 2), "{all:?}");
+    for output in refused {
+        assert_eq!(output.status.code(), Some(10));
+        assert!(
+            stderr_of(output).contains("a system is already running"),
+            "{}",
+            stderr_of(output)
+        );
+    }
+}
+
+/// Runs a script in its own mount namespace with a small /dev/shm; `None` if the system does not permit namespaces.
+fn with_shared_memory(size: &str, script: &str, folder: &Path) -> Option<Output> {
+    let mount = format!("mount -t tmpfs -o size={size} tmpfs /dev/shm");
+    let in_namespace = |script: &str| {
+        Command::new("unshare")
+            .args(["-rm", "sh", "-c", script])
+            .env("XDG_RUNTIME_DIR", folder)
+            .env("SUPPLE_PREFIX", PREFIX)
+            .env("BIN", programs())
+            .output()
+    };
+    let possible = in_namespace(&mount).is_ok_and(|output| output.status.success());
+    if !possible {
+        println!("skipped: mount namespaces are not permitted");
+        return None;
+    }
+    Some(in_namespace(&format!("{mount}\n{script}")).expect("it runs"))
+}
+
+#[test]
+fn too_little_shared_memory_is_reported_at_the_start() {
+    let folder = temporary_folder();
+    let script = "exec \"$BIN/supple-rt\" --virtual-time";
+    let Some(output) = with_shared_memory("8m", script, folder.path()) else {
+        return;
+    };
+    assert_eq!(output.status.code(), Some(10), "{}", stderr_of(&output));
+    for part in ["/dev/shm has", "MB are needed", "size="] {
+        assert!(
+            stderr_of(&output).contains(part),
+            "{part}: {}",
+            stderr_of(&output)
+        );
+    }
+}
+
+/// Other processes fill shared memory completely: the system keeps running, idle is accepted, a command that needs
+/// memory reports an error, and the shutdown is orderly.
+#[test]
+fn a_system_keeps_running_when_shared_memory_is_full() {
+    let folder = temporary_folder();
+    let script = r#"
+        "$BIN/supple" up --plant sim --no-log --no-realtime >/dev/null 2>up.txt &
+        up=$!
+        tries=0
+        until "$BIN/supple" status >/dev/null 2>&1; do
+            tries=$((tries + 1))
+            [ $tries -lt 60 ] || { cat up.txt; exit 99; }
+        done
+        head -c 100M /dev/zero > /dev/shm/fill 2>/dev/null
+        "$BIN/supple" mode idle; echo "idle: $?"
+        "$BIN/supple" status; echo "status: $?"
+        "$BIN/supple" stop; echo "stop: $?"
+        wait $up; echo "up: $?"
+    "#;
+    let script = format!("cd '{}'\n{script}", folder.path().display());
+    let Some(output) = with_shared_memory("60m", &script, folder.path()) else {
+        return;
+    };
+    let stdout = String::from_utf8_lossy(&output.stdout).into_owned();
+    for part in [
+        "mode idle since cycle",
+        "idle: 0",
+        "status: 10",
+        "stop: 0",
+        "up: 0",
+    ] {
+        assert!(
+            stdout.contains(part),
+            "{part}: {stdout}{}",
+            stderr_of(&output)
+        );
+    }
+    assert!(
+        stderr_of(&output).contains("MB are needed"),
+        "{}",
+        stderr_of(&output)
+    );
+}

@@ -1,0 +1,124 @@
+//! Runs `supple up` in the background in a temporary folder and collects its output.
+
+use crate::support::programs;
+use rustix::process::{Pid, Signal, kill_process};
+use serde_json::Value;
+use std::os::unix::fs::PermissionsExt;
+use std::os::unix::process::CommandExt;
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use tempfile::TempDir;
+
+/// Every test has its own folder for sockets and shared memory, so all systems can use the same prefix.
+pub const PREFIX: &str = "test";
+
+/// Creates a folder that only the owner can access, as a system requires.
+pub fn temporary_folder() -> TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    let owner = std::fs::Permissions::from_mode(0o700);
+    std::fs::set_permissions(folder.path(), owner).expect("changed");
+    folder
+}
+
+pub fn supple(folder: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(programs().join("supple"));
+    command
+        .args(arguments)
+        .current_dir(folder)
+        .env("XDG_RUNTIME_DIR", folder)
+        .env("SUPPLE_PREFIX", PREFIX)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    command
+}
+
+pub fn run(folder: &Path, arguments: &[&str]) -> Output {
+    supple(folder, arguments).output().expect("it runs")
+}
+
+pub fn json(output: &Output) -> Value {
+    let text = String::from_utf8_lossy(&output.stdout);
+    serde_json::from_str(&text)
+        .unwrap_or_else(|error| panic!("{error}: {text}{}", stderr_of(output)))
+}
+
+pub fn stderr_of(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// A system in the background, in its own process group as in a shell.
+pub struct Up {
+    pub folder: TempDir,
+    child: Option<Child>,
+}
+
+impl Up {
+    /// Starts `supple up` with these arguments.
+    pub fn start(arguments: &[&str]) -> Up {
+        let folder = temporary_folder();
+        let child = supple(folder.path(), &[&["up"], arguments].concat())
+            .process_group(0)
+            .spawn();
+        let child = Some(child.expect("it starts"));
+        Up { folder, child }
+    }
+
+    pub fn run(&self, arguments: &[&str]) -> Output {
+        run(self.folder.path(), arguments)
+    }
+
+    /// PID of `supple up`.
+    pub fn process(&self) -> Pid {
+        Pid::from_child(self.child.as_ref().expect("running"))
+    }
+
+    /// PID of the child process of this name.
+    pub fn child(&self, name: &str) -> Pid {
+        let up = self.child.as_ref().expect("it runs").id();
+        let children = std::fs::read_to_string(format!("/proc/{up}/task/{up}/children"));
+        let children = children.expect("readable");
+        let of_name = |pid: &&str| {
+            std::fs::read_to_string(format!("/proc/{pid}/comm"))
+                .is_ok_and(|comm| comm.trim() == name)
+        };
+        let pid = children.split_whitespace().find(of_name).expect("it runs");
+        Pid::from_raw(pid.parse().expect("a number")).expect("not zero")
+    }
+
+    /// Polls the status until the condition holds; fails after many polls.
+    pub fn wait_until(&self, what: &str, condition: impl Fn(&Value) -> bool) -> Value {
+        let mut last = String::new();
+        for _ in 0..400 {
+            let output = self.run(&["status", "--json"]);
+            if output.status.success() {
+                let status = json(&output);
+                if condition(&status) {
+                    return status;
+                }
+                last = status.to_string();
+            }
+        }
+        panic!("{what} was not reached: {last}");
+    }
+
+    /// Waits until `supple up` exits by itself; returns its output.
+    pub fn ended(&mut self) -> Output {
+        let child = self.child.take().expect("running");
+        child.wait_with_output().expect("it ends")
+    }
+
+    /// Terminates `supple up`; returns its output.
+    pub fn end(mut self) -> Output {
+        kill_process(self.process(), Signal::TERM).expect("it runs");
+        self.ended()
+    }
+}
+
+impl Drop for Up {
+    fn drop(&mut self) {
+        if let Some(child) = &mut self.child {
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+}

@@ -1,0 +1,205 @@
+//! Complete systems as processes: `supple up` with a simulated arm, and the operator commands.
+
+use crate::running::{Up, json, run, stderr_of, temporary_folder};
+use crate::support::programs;
+use serde_json::Value;
+use std::process::Command;
+use tempfile::TempDir;
+
+/// Runs twice in virtual time: the logs are identical and replay. Returns the summary and the folder with the log.
+fn in_virtual_time(arguments: &[&str], seconds: &str, cycles: u64) -> (Value, TempDir) {
+    let up = |name: &str| {
+        let folder = temporary_folder();
+        let log = format!("{name}.mcap");
+        let how = ["--for", seconds, "--json", "--virtual-time", "--log", &log];
+        let output = run(folder.path(), &[&["up"], arguments, &how[..]].concat());
+        assert!(output.status.success(), "{}", stderr_of(&output));
+        let summary = json(&output);
+        let counted = summary["cycles"].as_u64();
+        // At the end the drives of an arm on a bus are set to idle, which takes some cycles.
+        let idle_cycles = if arguments.contains(&"emu") { 20 } else { 0 };
+        assert!(
+            counted.is_some_and(|n| (cycles..=cycles + idle_cycles).contains(&n)),
+            "{summary}"
+        );
+        for counter in ["missed", "late", "tx_lost", "telemetry_lost"] {
+            assert_eq!(summary[counter], 0, "{counter} in {summary}");
+        }
+        assert_eq!(summary["faults"], Value::Array(Vec::new()));
+        let replayed = run(folder.path(), &["log", "replay", &log]);
+        assert!(replayed.status.success(), "{}", stderr_of(&replayed));
+        let bytes = std::fs::read(folder.path().join(&log)).expect("the log");
+        (summary, bytes, folder)
+    };
+    let (summary, one, folder) = up("one");
+    let (_, two, _folder) = up("two");
+    assert!(one.len() > 100_000);
+    assert!(one == two, "two runs wrote different logs");
+    (summary, folder)
+}
+
+fn rms_error_m(summary: &Value) -> f64 {
+    let error_m = summary["rms_error_m"].as_f64();
+    error_m.unwrap_or_else(|| panic!("counter was tracked: {summary}"))
+}
+
+#[test]
+fn two_runs_in_virtual_time_give_identical_logs_that_replay() {
+    let (summary, _folder) = in_virtual_time(&["--plant", "sim"], "6", 6000);
+    assert!(rms_error_m(&summary) < 0.02, "{summary}");
+    assert_eq!(summary["bus_load"], 0.0);
+}
+
+/// From power-up through the pendant to tracking, with all processes.
+#[test]
+fn the_emulated_arm_starts_up_is_activated_and_tracks() {
+    let (summary, folder) = in_virtual_time(&["--plant", "emu"], "7", 7000);
+    assert!(rms_error_m(&summary) < 0.02, "{summary}");
+    let bus_load = summary["bus_load"].as_f64().expect("a fraction");
+    assert!((0.45..0.64).contains(&bus_load), "{bus_load}");
+    let events = ["log", "export", "one.mcap", "--channel", "/arm_events"];
+    let output = run(folder.path(), &events);
+    let events = String::from_utf8_lossy(&output.stdout).into_owned();
+    let at = |what: &str| {
+        let found = events.find(what);
+        found.unwrap_or_else(|| panic!("{what}: {events}{}", stderr_of(&output)))
+    };
+    assert!(at("Pressed(Idle)") < at("Pressed(Activate)"));
+    assert!(at("Pressed(Activate)") < at("motor 1 Torque"));
+}
+
+/// Seven joints: at 1 kHz on shared memory; on the bus at the rate that it can carry, and an error above that rate.
+#[test]
+fn seven_joints_run_as_processes() {
+    let seven = ["--arm", "wam7"];
+    let of = |plant: &'static str, rest: &[&'static str]| {
+        [&["--plant", plant], &seven[..], rest].concat()
+    };
+    let (summary, _folder) = in_virtual_time(&of("sim", &[]), "6", 6000);
+    assert!(rms_error_m(&summary) < 0.02, "{summary}");
+    let (summary, _folder) = in_virtual_time(&of("emu", &["--rate-hz", "700"]), "8", 5600);
+    assert!(rms_error_m(&summary) < 0.02, "{summary}");
+
+    let folder = temporary_folder();
+    let too_fast = ["--virtual-time", "--for", "1", "--no-log"];
+    let output = run(
+        folder.path(),
+        &[&["up"], &of("emu", &too_fast)[..]].concat(),
+    );
+    assert_eq!(output.status.code(), Some(10));
+    for part in ["positions 660 us", "1335 us", "749 Hz", "--rate-hz"] {
+        assert!(
+            stderr_of(&output).contains(part),
+            "{part}: {}",
+            stderr_of(&output)
+        );
+    }
+}
+
+#[test]
+fn a_running_system_executes_or_refuses_requests() {
+    let mut up = Up::start(&["--plant", "sim", "--json"]);
+    up.wait_until("tracking", |status| {
+        status["mode"] == "track" && status["drives"] == "active"
+    });
+
+    let output = up.run(&[
+        "gains",
+        "--stiffness",
+        "25",
+        "--damping",
+        "3,3,4",
+        "--ramp",
+        "0.1",
+        "--json",
+    ]);
+    assert!(output.status.success(), "{}", stderr_of(&output));
+    assert_eq!(json(&output)["accepted"], true);
+    up.wait_until("other gains", |status| {
+        status["stiffness_n_per_m"] == serde_json::json!([25.0, 25.0, 25.0])
+            && status["damping_n_s_per_m"] == serde_json::json!([3.0, 3.0, 4.0])
+    });
+
+    let refused = up.run(&["gains", "--stiffness", "5000", "--json"]);
+    assert_eq!(refused.status.code(), Some(11));
+    let message = json(&refused)["error"]["message"].to_string();
+    assert!(message.contains("stiffness_n_per_m is 5000"), "{message}");
+
+    let refused = up.run(&["reset"]);
+    assert_eq!(
+        refused.status.code(),
+        Some(11),
+        "there is no fault to reset"
+    );
+
+    for (mode, drives) in [
+        ("gravity-hold", "active"),
+        ("idle", "idle"),
+        ("gravity-hold", "active"),
+    ] {
+        let output = up.run(&["mode", mode]);
+        assert!(output.status.success(), "{}", stderr_of(&output));
+        let name = mode.replace('-', "_");
+        up.wait_until(mode, |status| {
+            status["mode"] == name && status["drives"] == drives
+        });
+    }
+    let second = up.run(&["up", "--plant", "sim", "--no-log"]);
+    assert_eq!(second.status.code(), Some(10), "{}", stderr_of(&second));
+
+    let output = up.run(&["track", "arc"]);
+    assert!(output.status.success(), "{}", stderr_of(&output));
+    up.wait_until("the arc", |status| status["mode"] == "track");
+
+    let output = up.run(&["stop"]);
+    assert!(output.status.success(), "{}", stderr_of(&output));
+    let output = up.ended();
+    assert!(output.status.success(), "{}", stderr_of(&output));
+    let replayed = up.run(&["log", "replay", "out/up.mcap"]);
+    assert!(replayed.status.success(), "{}", stderr_of(&replayed));
+}
+
+#[test]
+fn without_a_system_every_command_is_code_10() {
+    let folder = temporary_folder();
+    for command in [
+        &["status"][..],
+        &["mode", "idle"],
+        &["reset"],
+        &["stop"],
+        &["gains", "--stiffness", "5"],
+    ] {
+        let output = run(folder.path(), command);
+        assert_eq!(
+            output.status.code(),
+            Some(10),
+            "{command:?}: {}",
+            stderr_of(&output)
+        );
+        assert!(
+            stderr_of(&output).contains("supple up"),
+            "{}",
+            stderr_of(&output)
+        );
+    }
+}
+
+#[test]
+fn a_missing_program_is_named_with_its_build_command() {
+    let folder = temporary_folder();
+    let alone = folder.path().join("alone");
+    std::fs::create_dir(&alone).expect("a folder");
+    let alone = alone.join("supple");
+    std::fs::copy(programs().join("supple"), &alone).expect("copied");
+    let output = Command::new(&alone)
+        .args(["up", "--plant", "sim", "--no-log"])
+        .env("XDG_RUNTIME_DIR", folder.path())
+        .output()
+        .expect("it runs");
+    assert_eq!(output.status.code(), Some(10));
+    assert!(
+        stderr_of(&output).contains("cargo build --release -p supple-rt"),
+        "{}",
+        stderr_of(&output)
+    );
+}
