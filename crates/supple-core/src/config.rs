@@ -172,13 +172,23 @@ impl PlausibilityLimits {
     }
 }
 
-/// Joint gains of the stiffer `move` mode.
+/// Stiffness and damping of each joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MoveGains<const N: usize> {
-    /// Proportional gains \[N m/rad\], positive.
+pub struct JointGains<const N: usize> {
+    /// Stiffness \[N m/rad\], zero or more; in the move mode positive.
     pub stiffness_nm_per_rad: Vector<N>,
-    /// Derivative gains \[N m s/rad\], zero or more.
+    /// Damping \[N m s/rad\], zero or more.
     pub damping_nm_s_per_rad: Vector<N>,
+}
+
+impl<const N: usize> JointGains<N> {
+    /// No stiffness and no damping.
+    pub fn zero() -> JointGains<N> {
+        JointGains {
+            stiffness_nm_per_rad: Vector::zeros(),
+            damping_nm_s_per_rad: Vector::zeros(),
+        }
+    }
 }
 
 /// Limits that the supervisor enforces.
@@ -247,8 +257,13 @@ pub struct Config<const N: usize> {
     pub law: Law,
     /// The contact latch.
     pub latch: ContactLatch,
-    /// Gains of the move mode.
-    pub move_gains: MoveGains<N>,
+    /// Gains of the move mode; their stiffness is also the maximum of the joint impedance mode.
+    pub move_gains: JointGains<N>,
+    /// Initial gains of the joint impedance mode; requests can change them, by ramps.
+    pub joint_gains: JointGains<N>,
+    /// Share of the friction torque at the measured joint velocity that the float mode compensates, 0 to 1. The
+    /// rest, `1 - share`, damps the arm.
+    pub float_friction_share: f64,
     /// Joint damping of gravity hold \[N m s/rad\], zero or more.
     pub hold_damping_nm_s_per_rad: Vector<N>,
     /// Time over which the torque is blended after a change of mode \[s\], positive.

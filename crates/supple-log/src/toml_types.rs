@@ -3,8 +3,8 @@
 
 use serde::{Deserialize, Serialize};
 use supple_core::config::{
-    ApparentInertia, Border, Collision, ContactLatch, FrictionVelocity, Gains, Law, Limits,
-    MoveGains, PlausibilityLimits, Role, Workspace, Zone,
+    ApparentInertia, Border, Collision, ContactLatch, FrictionVelocity, Gains, JointGains, Law,
+    Limits, PlausibilityLimits, Role, Workspace, Zone,
 };
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::ripple::Harmonic;
@@ -155,8 +155,8 @@ pub(crate) struct ContactLatchDef {
 }
 
 #[derive(Serialize, Deserialize)]
-#[serde(remote = "MoveGains", deny_unknown_fields)]
-pub(crate) struct MoveGainsDef<const N: usize> {
+#[serde(remote = "JointGains", deny_unknown_fields)]
+pub(crate) struct JointGainsDef<const N: usize> {
     #[serde(with = "column")]
     stiffness_nm_per_rad: Vector<N>,
     #[serde(with = "column")]

@@ -5,13 +5,17 @@ use crate::description::Description;
 use crate::error::{ModelError, Reporter};
 use crate::settings::FrictionVelocity;
 use supple_core::config::{
-    self, ApparentInertia, Collision, ContactLatch, Gains, Law, Limits, MoveGains,
+    self, ApparentInertia, Collision, ContactLatch, Gains, JointGains, Law, Limits,
     PlausibilityLimits, Role,
 };
 use supple_core::controller::ConfigError;
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::{Arm, Body, Config, Controller, Friction, Joint, Matrix, Pose, Vector};
 
+/// Default stiffness of the joint impedance mode as a fraction of the move mode's.
+const DEFAULT_IMPEDANCE_STIFFNESS: f64 = 0.02;
+/// Default damping of the joint impedance mode as a fraction of the move mode's.
+const DEFAULT_IMPEDANCE_DAMPING: f64 = 0.1;
 /// Default collision threshold as a fraction of the joint's torque limit.
 const DEFAULT_COLLISION_FRACTION: f64 = 0.3;
 
@@ -117,10 +121,21 @@ impl Description {
             estimator_rad_per_s: settings.estimator_rad_per_s,
             law: self.law(),
             latch: self.latch(),
-            move_gains: MoveGains {
+            move_gains: JointGains {
                 stiffness_nm_per_rad: gain(|joint| joint.move_stiffness_nm_per_rad),
                 damping_nm_s_per_rad: gain(|joint| joint.move_damping_nm_s_per_rad),
             },
+            joint_gains: JointGains {
+                stiffness_nm_per_rad: gain(|joint| {
+                    let default = DEFAULT_IMPEDANCE_STIFFNESS * joint.move_stiffness_nm_per_rad;
+                    joint.impedance_stiffness_nm_per_rad.unwrap_or(default)
+                }),
+                damping_nm_s_per_rad: gain(|joint| {
+                    let default = DEFAULT_IMPEDANCE_DAMPING * joint.move_damping_nm_s_per_rad;
+                    joint.impedance_damping_nm_s_per_rad.unwrap_or(default)
+                }),
+            },
+            float_friction_share: settings.float.friction_share,
             hold_damping_nm_s_per_rad: gain(|joint| joint.hold_damping_nm_s_per_rad),
             handover_s: settings.handover_s,
             limits: Limits {
