@@ -128,9 +128,11 @@ pub struct Collision<const N: usize> {
     pub joint_torque_nm: Vector<N>,
     /// Force on the tip \[N\], positive; away from singular poses.
     pub tip_force_n: f64,
-    /// Fraction of both thresholds that applies in the modes with stiff joint loops (move, excite,
-    /// breakaway), above 0, at most 1.
-    pub move_share: f64,
+    /// The thresholds in the modes with stiff joint loops (move, excite, breakaway), in which no contact is wanted:
+    /// external torque of a joint \[N m\], positive.
+    pub move_joint_torque_nm: Vector<N>,
+    /// Force on the tip in these modes \[N\], positive.
+    pub move_tip_force_n: f64,
 }
 
 impl<const N: usize> Collision<N> {
@@ -139,7 +141,8 @@ impl<const N: usize> Collision<N> {
         Collision {
             joint_torque_nm: Vector::repeat(f64::MAX),
             tip_force_n: f64::MAX,
-            move_share: 1.0,
+            move_joint_torque_nm: Vector::repeat(f64::MAX),
+            move_tip_force_n: f64::MAX,
         }
     }
 }

@@ -45,8 +45,8 @@ struct Stored<const N: usize> {
     #[serde(with = "LimitsDef")]
     limits: Limits<N>,
     /// Older logs have no collision thresholds.
-    #[serde(with = "CollisionDef", default = "Collision::disabled")]
-    collision: Collision<N>,
+    #[serde(default)]
+    collision: Option<CollisionDef<N>>,
     #[serde(with = "PlausibilityDef", default = "PlausibilityLimits::disabled")]
     plausible: PlausibilityLimits,
     #[serde(default)]
@@ -102,7 +102,7 @@ pub(crate) fn to_toml<const N: usize>(config: &Config<N>) -> Result<String, toml
         joint_gains,
         float_friction_share,
         limits,
-        collision,
+        collision: Some(CollisionDef::new(&collision)),
         plausible,
         workspace: Some(WorkspaceDef::new(&workspace)),
         joints: (0..N)
@@ -146,7 +146,10 @@ pub(crate) fn from_toml<const N: usize>(text: &str) -> Result<Config<N>, String>
         hold_damping_nm_s_per_rad: stored.hold_damping_nm_s_per_rad,
         handover_s: stored.handover_s,
         limits: stored.limits,
-        collision: stored.collision,
+        collision: match &stored.collision {
+            Some(collision) => collision.collision(),
+            None => Collision::disabled(),
+        },
         plausible: stored.plausible,
         workspace: match &stored.workspace {
             Some(workspace) => workspace.workspace()?,

@@ -160,13 +160,13 @@ impl Description {
                 damping_n_s_per_m: settings.limits.greatest_damping_n_s_per_m,
             },
             collision: Collision {
-                joint_torque_nm: Vector::from_fn(|i, _| {
-                    let joint = &self.joints[i];
-                    let given = joint.gains.collision_torque_nm;
-                    given.unwrap_or(DEFAULT_COLLISION_FRACTION * joint.torque_nm)
-                }),
+                joint_torque_nm: Vector::from_fn(|i, _| self.collision_torque_nm(i)),
                 tip_force_n: settings.collision.tip_force_n,
-                move_share: settings.collision.move_share,
+                move_joint_torque_nm: Vector::from_fn(|i, _| {
+                    let given = self.joints[i].gains.move_collision_torque_nm;
+                    given.unwrap_or(settings.collision.move_share * self.collision_torque_nm(i))
+                }),
+                move_tip_force_n: settings.collision.move_share * settings.collision.tip_force_n,
             },
             plausible: PlausibilityLimits {
                 lost_replies: settings.plausible.lost_replies,
@@ -181,6 +181,12 @@ impl Description {
             return Err(self.rejected(&error));
         }
         Ok(config)
+    }
+
+    fn collision_torque_nm(&self, joint: usize) -> f64 {
+        let joint = &self.joints[joint];
+        let given = joint.gains.collision_torque_nm;
+        given.unwrap_or(DEFAULT_COLLISION_FRACTION * joint.torque_nm)
     }
 
     fn rejected(&self, error: &ConfigError) -> ModelError {

@@ -127,6 +127,9 @@ pub struct JointSettings {
     /// Collision threshold: observed external torque of the joint at which the motion stops (N m). Default: 0.3
     /// times `torque_nm`.
     pub collision_torque_nm: Option<f64>,
+    /// The same in the modes with stiff joint loops (move, excite, breakaway) (N m). `supple identify` writes it
+    /// from the residual of the model. Default: `[collision] move_share` times `collision_torque_nm`.
+    pub move_collision_torque_nm: Option<f64>,
     /// Damping of gravity hold (N m s/rad). Default 1.
     #[serde(default = "default::hold_damping_nm_s_per_rad")]
     pub hold_damping_nm_s_per_rad: f64,
@@ -525,6 +528,7 @@ impl JointSettings {
             acceleration_rad_per_s2: default::acceleration_rad_per_s2(),
             jerk_rad_per_s3: default::jerk_rad_per_s3(),
             collision_torque_nm: None,
+            move_collision_torque_nm: None,
             hold_damping_nm_s_per_rad: default::hold_damping_nm_s_per_rad(),
         }
     }

@@ -266,13 +266,12 @@ pub(super) fn validate<const N: usize>(config: &Config<N>) -> Result<(), ConfigE
     positive("plausible stuck_rad", plausible.stuck_rad)?;
     positive("plausible against_share", plausible.against_share)?;
     positive("plausible load_n", plausible.load_n)?;
-    check(
-        collision.move_share > 0.0 && collision.move_share <= 1.0,
-        "collision move_share",
-        None,
-        collision.move_share,
-        "above 0, at most 1",
+    each(
+        "collision move_joint_torque_nm",
+        &collision.move_joint_torque_nm,
+        false,
     )?;
+    positive("collision move_tip_force_n", collision.move_tip_force_n)?;
     if let Some((entry, value, must)) = config.workspace.first_invalid() {
         return check(false, entry, None, value, must);
     }

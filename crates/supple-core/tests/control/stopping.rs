@@ -175,7 +175,8 @@ fn config<const N: usize>(case: &Case) -> Config<N> {
         collision: Collision {
             joint_torque_nm: torque_nm * 0.3,
             tip_force_n: 60.0,
-            move_share: 0.5,
+            move_joint_torque_nm: torque_nm * 0.15,
+            move_tip_force_n: 30.0,
         },
         plausible: PlausibilityLimits {
             lost_replies: 3,
