@@ -5,7 +5,7 @@ use crate::digest::Digest;
 use crate::{PERIOD_S, print, refused};
 use core::fmt::{self, Write};
 use supple_core::config::{
-    ApparentInertia, Collision, ContactLatch, FrictionVelocity, Gains, Law, Limits, MoveGains,
+    ApparentInertia, Collision, ContactLatch, FrictionVelocity, Gains, JointGains, Law, Limits,
     PlausibilityLimits, Role, Workspace,
 };
 use supple_core::controller::{Controller, Input, Output, Request, State, step};
@@ -129,10 +129,15 @@ fn config<const N: usize>(arm: Arm<N>) -> Config<N> {
             fade_s: 0.01,
             restore_s: 0.2,
         },
-        move_gains: MoveGains {
+        move_gains: JointGains {
             stiffness_nm_per_rad: all(100.0),
             damping_nm_s_per_rad: all(5.0),
         },
+        joint_gains: JointGains {
+            stiffness_nm_per_rad: all(5.0),
+            damping_nm_s_per_rad: all(0.5),
+        },
+        float_friction_share: 0.5,
         hold_damping_nm_s_per_rad: all(1.0),
         handover_s: 0.05,
         limits: Limits {

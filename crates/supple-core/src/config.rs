@@ -128,9 +128,11 @@ pub struct Collision<const N: usize> {
     pub joint_torque_nm: Vector<N>,
     /// Force on the tip \[N\], positive; away from singular poses.
     pub tip_force_n: f64,
-    /// Fraction of both thresholds that applies in the modes with stiff joint loops (move, excite,
-    /// breakaway), above 0, at most 1.
-    pub move_share: f64,
+    /// The thresholds in the modes with stiff joint loops (move, excite, breakaway), in which no contact is wanted:
+    /// external torque of a joint \[N m\], positive.
+    pub move_joint_torque_nm: Vector<N>,
+    /// Force on the tip in these modes \[N\], positive.
+    pub move_tip_force_n: f64,
 }
 
 impl<const N: usize> Collision<N> {
@@ -139,7 +141,8 @@ impl<const N: usize> Collision<N> {
         Collision {
             joint_torque_nm: Vector::repeat(f64::MAX),
             tip_force_n: f64::MAX,
-            move_share: 1.0,
+            move_joint_torque_nm: Vector::repeat(f64::MAX),
+            move_tip_force_n: f64::MAX,
         }
     }
 }
@@ -172,13 +175,23 @@ impl PlausibilityLimits {
     }
 }
 
-/// Joint gains of the stiffer `move` mode.
+/// Stiffness and damping of each joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MoveGains<const N: usize> {
-    /// Proportional gains \[N m/rad\], positive.
+pub struct JointGains<const N: usize> {
+    /// Stiffness \[N m/rad\], zero or more; in the move mode positive.
     pub stiffness_nm_per_rad: Vector<N>,
-    /// Derivative gains \[N m s/rad\], zero or more.
+    /// Damping \[N m s/rad\], zero or more.
     pub damping_nm_s_per_rad: Vector<N>,
+}
+
+impl<const N: usize> JointGains<N> {
+    /// No stiffness and no damping.
+    pub fn zero() -> JointGains<N> {
+        JointGains {
+            stiffness_nm_per_rad: Vector::zeros(),
+            damping_nm_s_per_rad: Vector::zeros(),
+        }
+    }
 }
 
 /// Limits that the supervisor enforces.
@@ -247,8 +260,13 @@ pub struct Config<const N: usize> {
     pub law: Law,
     /// The contact latch.
     pub latch: ContactLatch,
-    /// Gains of the move mode.
-    pub move_gains: MoveGains<N>,
+    /// Gains of the move mode; their stiffness is also the maximum of the joint impedance mode.
+    pub move_gains: JointGains<N>,
+    /// Initial gains of the joint impedance mode; requests can change them, by ramps.
+    pub joint_gains: JointGains<N>,
+    /// Share of the friction torque at the measured joint velocity that the float mode compensates, 0 to 1. The
+    /// rest, `1 - share`, damps the arm.
+    pub float_friction_share: f64,
     /// Joint damping of gravity hold \[N m s/rad\], zero or more.
     pub hold_damping_nm_s_per_rad: Vector<N>,
     /// Time over which the torque is blended after a change of mode \[s\], positive.

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use proptest::strategy::Union;
 use proptest::test_runner::RngSeed;
 use supple_core::codes::{RequestCode, RequestCodeError, VALUES};
-use supple_core::config::Gains;
+use supple_core::config::{Gains, JointGains};
 use supple_core::controller::{Breakaway, Request};
 use supple_core::math::Vector3;
 use supple_core::trajectory::{Arc, Fourier, Line, Probe, Quadrant, Sinusoid};
@@ -110,6 +110,26 @@ fn request() -> impl Strategy<Value = Numbered> {
                 ((8, 0), Some(Request::Breakaway(ramp)))
             })
             .boxed(),
+        Just(((9, 0), Some(Request::Float))).boxed(),
+        ([number(), number(), number(), number()], number())
+            .prop_map(|(target, duration_s)| {
+                let target_rad = Vector::from(target);
+                let request = Request::JointImpedance {
+                    target_rad,
+                    duration_s,
+                };
+                ((10, 0), Some(request))
+            })
+            .boxed(),
+        (proptest::collection::vec(number(), 8), number())
+            .prop_map(|(x, ramp_s)| {
+                let gains = JointGains {
+                    stiffness_nm_per_rad: Vector::from_column_slice(&x[..4]),
+                    damping_nm_s_per_rad: Vector::from_column_slice(&x[4..]),
+                };
+                ((11, 0), Some(Request::JointGains { gains, ramp_s }))
+            })
+            .boxed(),
         gains
             .prop_map(|(stiffness_n_per_m, damping_n_s_per_m, ramp_s)| {
                 let gains = Gains {
@@ -152,7 +172,7 @@ fn decode(
 
 #[test]
 fn unknown_and_incomplete_codes_are_rejected() {
-    assert_eq!(decode(9, 0, &[]), Err(RequestCodeError::Kind(9)));
+    assert_eq!(decode(12, 0, &[]), Err(RequestCodeError::Kind(12)));
     assert_eq!(decode(4, 0, &[]), Err(RequestCodeError::Trajectory(0)));
     assert_eq!(
         decode(4, 7, &[0.0; 16]),

@@ -230,6 +230,8 @@ pub fn calibrate<const N: usize>(
     let (held_out, _) = Motion::prepare(&unrippled, N, &joints, &fit.preparation)?;
     let validation = fit.validate_motion(&held_out)?;
     let described = fit.description(description, Some(&ripple))?;
+    let thresholds = fit.move_collision_nm(core::slice::from_ref(&validation), &nominal);
+    let described = described.with_move_collision(&thresholds)?;
     let truth = model_accuracy(&described.config::<N>()?, &plant, calibration.seed);
     Ok(Calibrated {
         breakaway: breakaway_results,

@@ -19,6 +19,8 @@ pub const POSES: usize = 2000;
 pub struct Validation {
     /// RMS error of each moving joint \[N m\].
     pub rms_nm: Vec<f64>,
+    /// Greatest error of each moving joint \[N m\].
+    pub peak_nm: Vec<f64>,
     /// `|tau - tau_hat| / |tau|` of each moving joint.
     pub relative: Vec<f64>,
     /// Relative error over all moving joints.
@@ -45,10 +47,12 @@ impl<const N: usize> Fit<N> {
     pub fn validate_motion(&self, motion: &Motion) -> Result<Validation, IdentError> {
         let joints = joint_rows(self.nominal(), &self.columns, motion)?;
         let samples = motion.samples() as f64;
-        let (mut rms_nm, mut relative) = (Vec::new(), Vec::new());
+        let (mut rms_nm, mut peak_nm, mut relative) = (Vec::new(), Vec::new(), Vec::new());
         let (mut error, mut torque) = (0.0, 0.0);
         for joint in &joints {
-            let wrong = (&joint.a * &self.x - &joint.b).norm_squared();
+            let errors = &joint.a * &self.x - &joint.b;
+            let wrong = errors.norm_squared();
+            peak_nm.push(errors.amax());
             let size = joint.b.norm_squared();
             rms_nm.push((wrong / samples).sqrt());
             relative.push((wrong / size).sqrt());
@@ -57,6 +61,7 @@ impl<const N: usize> Fit<N> {
         }
         Ok(Validation {
             rms_nm,
+            peak_nm,
             relative,
             total_relative: (error / torque).sqrt(),
             positive_definite: self.positive_definite_fraction()?,

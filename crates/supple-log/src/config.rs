@@ -4,12 +4,12 @@
 //! in joint frames, as in [`Arm::links`].
 
 use crate::toml_types::{
-    CollisionDef, ContactLatchDef, FrictionDef, LawDef, LimitsDef, LinkDef, MoveGainsDef,
+    CollisionDef, ContactLatchDef, FrictionDef, JointGainsDef, LawDef, LimitsDef, LinkDef,
     PlausibilityDef, PoseDef, RippleDef, RoleDef, WorkspaceDef, column, rows,
 };
 use serde::{Deserialize, Serialize};
 use supple_core::config::{
-    Collision, ContactLatch, Law, Limits, MoveGains, PlausibilityLimits, Role, Workspace,
+    Collision, ContactLatch, JointGains, Law, Limits, PlausibilityLimits, Role, Workspace,
 };
 use supple_core::math::Vector3;
 use supple_core::{Arm, Config, Friction, Link, Matrix, Pose, Vector};
@@ -35,13 +35,18 @@ struct Stored<const N: usize> {
     ripple: Vec<RippleDef>,
     #[serde(with = "ContactLatchDef")]
     latch: ContactLatch,
-    #[serde(with = "MoveGainsDef")]
-    move_gains: MoveGains<N>,
+    #[serde(with = "JointGainsDef")]
+    move_gains: JointGains<N>,
+    /// Older logs have neither joint impedance nor float.
+    #[serde(with = "JointGainsDef", default = "JointGains::zero")]
+    joint_gains: JointGains<N>,
+    #[serde(default)]
+    float_friction_share: f64,
     #[serde(with = "LimitsDef")]
     limits: Limits<N>,
     /// Older logs have no collision thresholds.
-    #[serde(with = "CollisionDef", default = "Collision::disabled")]
-    collision: Collision<N>,
+    #[serde(default)]
+    collision: Option<CollisionDef<N>>,
     #[serde(with = "PlausibilityDef", default = "PlausibilityLimits::disabled")]
     plausible: PlausibilityLimits,
     #[serde(default)]
@@ -73,6 +78,8 @@ pub(crate) fn to_toml<const N: usize>(config: &Config<N>) -> Result<String, toml
         law,
         latch,
         move_gains,
+        joint_gains,
+        float_friction_share,
         hold_damping_nm_s_per_rad,
         handover_s,
         limits,
@@ -92,8 +99,10 @@ pub(crate) fn to_toml<const N: usize>(config: &Config<N>) -> Result<String, toml
         ripple: RippleDef::list(&ripple),
         latch,
         move_gains,
+        joint_gains,
+        float_friction_share,
         limits,
-        collision,
+        collision: Some(CollisionDef::new(&collision)),
         plausible,
         workspace: Some(WorkspaceDef::new(&workspace)),
         joints: (0..N)
@@ -132,10 +141,15 @@ pub(crate) fn from_toml<const N: usize>(text: &str) -> Result<Config<N>, String>
         law: stored.law,
         latch: stored.latch,
         move_gains: stored.move_gains,
+        joint_gains: stored.joint_gains,
+        float_friction_share: stored.float_friction_share,
         hold_damping_nm_s_per_rad: stored.hold_damping_nm_s_per_rad,
         handover_s: stored.handover_s,
         limits: stored.limits,
-        collision: stored.collision,
+        collision: match &stored.collision {
+            Some(collision) => collision.collision(),
+            None => Collision::disabled(),
+        },
         plausible: stored.plausible,
         workspace: match &stored.workspace {
             Some(workspace) => workspace.workspace()?,

@@ -3,8 +3,8 @@
 
 use serde::{Deserialize, Serialize};
 use supple_core::config::{
-    ApparentInertia, Border, Collision, ContactLatch, FrictionVelocity, Gains, Law, Limits,
-    MoveGains, PlausibilityLimits, Role, Workspace, Zone,
+    ApparentInertia, Border, Collision, ContactLatch, FrictionVelocity, Gains, JointGains, Law,
+    Limits, PlausibilityLimits, Role, Workspace, Zone,
 };
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::ripple::Harmonic;
@@ -155,8 +155,8 @@ pub(crate) struct ContactLatchDef {
 }
 
 #[derive(Serialize, Deserialize)]
-#[serde(remote = "MoveGains", deny_unknown_fields)]
-pub(crate) struct MoveGainsDef<const N: usize> {
+#[serde(remote = "JointGains", deny_unknown_fields)]
+pub(crate) struct JointGainsDef<const N: usize> {
     #[serde(with = "column")]
     stiffness_nm_per_rad: Vector<N>,
     #[serde(with = "column")]
@@ -208,13 +208,44 @@ fn max_rate_per_joint<const N: usize>() -> Vector<N> {
     Vector::repeat(1e4)
 }
 
+/// Older logs have a share of both thresholds instead of those of the move mode.
 #[derive(Serialize, Deserialize)]
-#[serde(remote = "Collision", deny_unknown_fields)]
+#[serde(deny_unknown_fields)]
 pub(crate) struct CollisionDef<const N: usize> {
     #[serde(with = "column")]
     joint_torque_nm: Vector<N>,
     tip_force_n: f64,
-    move_share: f64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    move_share: Option<f64>,
+    #[serde(default = "Vector::zeros", with = "column")]
+    move_joint_torque_nm: Vector<N>,
+    #[serde(default)]
+    move_tip_force_n: f64,
+}
+
+impl<const N: usize> CollisionDef<N> {
+    pub fn new(collision: &Collision<N>) -> CollisionDef<N> {
+        CollisionDef {
+            joint_torque_nm: collision.joint_torque_nm,
+            tip_force_n: collision.tip_force_n,
+            move_share: None,
+            move_joint_torque_nm: collision.move_joint_torque_nm,
+            move_tip_force_n: collision.move_tip_force_n,
+        }
+    }
+
+    pub fn collision(&self) -> Collision<N> {
+        let (move_joint_torque_nm, move_tip_force_n) = match self.move_share {
+            Some(share) => (share * self.joint_torque_nm, share * self.tip_force_n),
+            None => (self.move_joint_torque_nm, self.move_tip_force_n),
+        };
+        Collision {
+            joint_torque_nm: self.joint_torque_nm,
+            tip_force_n: self.tip_force_n,
+            move_joint_torque_nm,
+            move_tip_force_n,
+        }
+    }
 }
 
 #[derive(Serialize, Deserialize)]

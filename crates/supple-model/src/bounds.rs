@@ -172,6 +172,18 @@ pub(crate) fn first_out_of_range<const N: usize>(config: &Config<N>) -> Option<C
             hundred_k,
         ),
         each(
+            "impedance_stiffness_nm_per_rad",
+            &config.joint_gains.stiffness_nm_per_rad,
+            1e6,
+            million,
+        ),
+        each(
+            "impedance_damping_nm_s_per_rad",
+            &config.joint_gains.damping_nm_s_per_rad,
+            1e5,
+            hundred_k,
+        ),
+        each(
             "hold_damping_nm_s_per_rad",
             &config.hold_damping_nm_s_per_rad,
             1e5,

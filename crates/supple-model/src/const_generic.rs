@@ -5,13 +5,17 @@ use crate::description::Description;
 use crate::error::{ModelError, Reporter};
 use crate::settings::FrictionVelocity;
 use supple_core::config::{
-    self, ApparentInertia, Collision, ContactLatch, Gains, Law, Limits, MoveGains,
+    self, ApparentInertia, Collision, ContactLatch, Gains, JointGains, Law, Limits,
     PlausibilityLimits, Role,
 };
 use supple_core::controller::ConfigError;
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::{Arm, Body, Config, Controller, Friction, Joint, Matrix, Pose, Vector};
 
+/// Default stiffness of the joint impedance mode as a fraction of the move mode's.
+const DEFAULT_IMPEDANCE_STIFFNESS: f64 = 0.02;
+/// Default damping of the joint impedance mode as a fraction of the move mode's.
+const DEFAULT_IMPEDANCE_DAMPING: f64 = 0.1;
 /// Default collision threshold as a fraction of the joint's torque limit.
 const DEFAULT_COLLISION_FRACTION: f64 = 0.3;
 
@@ -117,10 +121,21 @@ impl Description {
             estimator_rad_per_s: settings.estimator_rad_per_s,
             law: self.law(),
             latch: self.latch(),
-            move_gains: MoveGains {
+            move_gains: JointGains {
                 stiffness_nm_per_rad: gain(|joint| joint.move_stiffness_nm_per_rad),
                 damping_nm_s_per_rad: gain(|joint| joint.move_damping_nm_s_per_rad),
             },
+            joint_gains: JointGains {
+                stiffness_nm_per_rad: gain(|joint| {
+                    let default = DEFAULT_IMPEDANCE_STIFFNESS * joint.move_stiffness_nm_per_rad;
+                    joint.impedance_stiffness_nm_per_rad.unwrap_or(default)
+                }),
+                damping_nm_s_per_rad: gain(|joint| {
+                    let default = DEFAULT_IMPEDANCE_DAMPING * joint.move_damping_nm_s_per_rad;
+                    joint.impedance_damping_nm_s_per_rad.unwrap_or(default)
+                }),
+            },
+            float_friction_share: settings.float.friction_share,
             hold_damping_nm_s_per_rad: gain(|joint| joint.hold_damping_nm_s_per_rad),
             handover_s: settings.handover_s,
             limits: Limits {
@@ -145,13 +160,13 @@ impl Description {
                 damping_n_s_per_m: settings.limits.greatest_damping_n_s_per_m,
             },
             collision: Collision {
-                joint_torque_nm: Vector::from_fn(|i, _| {
-                    let joint = &self.joints[i];
-                    let given = joint.gains.collision_torque_nm;
-                    given.unwrap_or(DEFAULT_COLLISION_FRACTION * joint.torque_nm)
-                }),
+                joint_torque_nm: Vector::from_fn(|i, _| self.collision_torque_nm(i)),
                 tip_force_n: settings.collision.tip_force_n,
-                move_share: settings.collision.move_share,
+                move_joint_torque_nm: Vector::from_fn(|i, _| {
+                    let given = self.joints[i].gains.move_collision_torque_nm;
+                    given.unwrap_or(settings.collision.move_share * self.collision_torque_nm(i))
+                }),
+                move_tip_force_n: settings.collision.move_share * settings.collision.tip_force_n,
             },
             plausible: PlausibilityLimits {
                 lost_replies: settings.plausible.lost_replies,
@@ -166,6 +181,12 @@ impl Description {
             return Err(self.rejected(&error));
         }
         Ok(config)
+    }
+
+    fn collision_torque_nm(&self, joint: usize) -> f64 {
+        let joint = &self.joints[joint];
+        let given = joint.gains.collision_torque_nm;
+        given.unwrap_or(DEFAULT_COLLISION_FRACTION * joint.torque_nm)
     }
 
     fn rejected(&self, error: &ConfigError) -> ModelError {

@@ -50,6 +50,26 @@ impl Description {
         Description::from_text(&self.toml_with(model)?, &self.urdf_with(&bodies)?)
     }
 
+    /// Returns the same arm with other collision thresholds for the modes with stiff joint loops \[N m\], one per
+    /// joint; `None` keeps that of the description.
+    ///
+    /// # Errors
+    /// [`ModelError::JointCount`]; any [`ModelError`] of the edited text.
+    pub fn with_move_collision(
+        &self,
+        threshold_nm: &[Option<f64>],
+    ) -> Result<Description, ModelError> {
+        self.expect_dof(threshold_nm.len())?;
+        let mut document = self.document()?;
+        for (joint, threshold_nm) in threshold_nm.iter().enumerate() {
+            if let Some(threshold_nm) = threshold_nm {
+                let joint = self.joint_table(&mut document, joint)?;
+                put(joint, "move_collision_torque_nm", (*threshold_nm).into());
+            }
+        }
+        Description::from_text(&document.to_string(), self.urdf())
+    }
+
     /// Writes `arm.toml` and `arm.urdf` into a folder, which it creates if necessary; [`Description::load`] reads
     /// them. Existing files of these names are replaced.
     ///
@@ -112,22 +132,8 @@ impl Description {
         let mut document = self.document()?;
         document["urdf"] = value(URDF);
         document["source"] = value(model.source);
-        if !document.contains_key("joints") {
-            document["joints"] = Item::ArrayOfTables(ArrayOfTables::new());
-        }
-        let Some(joints) = document["joints"].as_array_of_tables_mut() else {
-            return Err(self.not_tables("joints"));
-        };
-        for (i, name) in self.joint_names().iter().enumerate() {
-            let named = |table: &Table| table.get("name").and_then(Item::as_str) == Some(name);
-            if !joints.iter().any(named) {
-                let mut table = Table::new();
-                table["name"] = value(name);
-                joints.push(table);
-            }
-            let Some(joint) = joints.iter_mut().find(|table| named(table)) else {
-                continue;
-            };
+        for i in 0..N {
+            let joint = self.joint_table(&mut document, i)?;
             put(joint, "source", model.source.into());
             put(joint, "armature_kg_m2", model.arm.armature()[i].into());
             put(joint, "friction", friction(&model.friction[i]).into());
@@ -141,6 +147,29 @@ impl Description {
             self.put_ripple(&mut document, tables)?;
         }
         Ok(document.to_string())
+    }
+
+    /// The table of a joint in the TOML, added if there is none.
+    fn joint_table<'a>(
+        &self,
+        document: &'a mut DocumentMut,
+        joint: usize,
+    ) -> Result<&'a mut Table, ModelError> {
+        let name = self.joint_names()[joint].as_str();
+        if !document.contains_key("joints") {
+            document["joints"] = Item::ArrayOfTables(ArrayOfTables::new());
+        }
+        let Some(joints) = document["joints"].as_array_of_tables_mut() else {
+            return Err(self.not_tables("joints"));
+        };
+        let named = |table: &Table| table.get("name").and_then(Item::as_str) == Some(name);
+        let at = joints.iter().position(named).unwrap_or(joints.len());
+        if at == joints.len() {
+            let mut table = Table::new();
+            table["name"] = value(name);
+            joints.push(table);
+        }
+        joints.get_mut(at).ok_or_else(|| self.not_tables("joints"))
     }
 
     fn put_ripple(

@@ -65,6 +65,9 @@ pub struct Settings {
     /// Contact detection (contact latch).
     #[serde(default)]
     pub latch: LatchSettings,
+    /// The float mode, for guiding by hand.
+    #[serde(default)]
+    pub float: FloatSettings,
     /// Tool at the tip. Default: none.
     pub tool: Option<ToolSettings>,
 }
@@ -110,6 +113,11 @@ pub struct JointSettings {
     /// Derivative gain of the move mode (N m s/rad). Default 5.
     #[serde(default = "default::move_damping_nm_s_per_rad")]
     pub move_damping_nm_s_per_rad: f64,
+    /// Stiffness of the joint impedance mode (N m/rad), at most `move_stiffness_nm_per_rad`. Default: a fiftieth of
+    /// it.
+    pub impedance_stiffness_nm_per_rad: Option<f64>,
+    /// Damping of the joint impedance mode (N m s/rad). Default: a tenth of `move_damping_nm_s_per_rad`.
+    pub impedance_damping_nm_s_per_rad: Option<f64>,
     /// Maximum acceleration of a move (rad/s^2). Default 20.
     #[serde(default = "default::acceleration_rad_per_s2")]
     pub acceleration_rad_per_s2: f64,
@@ -119,6 +127,9 @@ pub struct JointSettings {
     /// Collision threshold: observed external torque of the joint at which the motion stops (N m). Default: 0.3
     /// times `torque_nm`.
     pub collision_torque_nm: Option<f64>,
+    /// The same in the modes with stiff joint loops (move, excite, breakaway) (N m). `supple identify` writes it
+    /// from the residual of the model. Default: `[collision] move_share` times `collision_torque_nm`.
+    pub move_collision_torque_nm: Option<f64>,
     /// Damping of gravity hold (N m s/rad). Default 1.
     #[serde(default = "default::hold_damping_nm_s_per_rad")]
     pub hold_damping_nm_s_per_rad: f64,
@@ -477,6 +488,23 @@ impl Default for LatchSettings {
     }
 }
 
+/// The float mode: the model alone, without stiffness.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct FloatSettings {
+    /// Share of the friction at the measured joint velocity that is compensated, 0 to 1: the rest damps the arm.
+    /// Default 0.5.
+    pub friction_share: f64,
+}
+
+impl Default for FloatSettings {
+    fn default() -> Self {
+        Self {
+            friction_share: 0.5,
+        }
+    }
+}
+
 impl JointSettings {
     /// All defaults.
     pub fn named(name: &str) -> Self {
@@ -495,9 +523,12 @@ impl JointSettings {
             soft_damping_nm_s_per_rad: default::soft_damping_nm_s_per_rad(),
             move_stiffness_nm_per_rad: default::move_stiffness_nm_per_rad(),
             move_damping_nm_s_per_rad: default::move_damping_nm_s_per_rad(),
+            impedance_stiffness_nm_per_rad: None,
+            impedance_damping_nm_s_per_rad: None,
             acceleration_rad_per_s2: default::acceleration_rad_per_s2(),
             jerk_rad_per_s3: default::jerk_rad_per_s3(),
             collision_torque_nm: None,
+            move_collision_torque_nm: None,
             hold_damping_nm_s_per_rad: default::hold_damping_nm_s_per_rad(),
         }
     }

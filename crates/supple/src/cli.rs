@@ -32,13 +32,7 @@ pub enum Command {
     /// Show the state of a running system.
     Status(SystemArgs),
     /// Put a running system into a mode.
-    Mode {
-        /// The mode.
-        mode: ModeName,
-        /// System to use.
-        #[command(flatten)]
-        system: SystemArgs,
-    },
+    Mode(ModeArgs),
     /// Change stiffness and damping of a running system, along a ramp.
     Gains(GainsArgs),
     /// Make a running system follow a trajectory; the arm moves to its start first.
@@ -169,13 +163,34 @@ pub enum PendantAction {
     Record,
 }
 
-/// Modes that need no further arguments.
+/// Modes that can be requested by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum ModeName {
     /// No torque; the motors brake.
     Idle,
     /// The model holds the arm's weight.
     GravityHold,
+    /// The model alone, for guiding the arm by hand.
+    Float,
+    /// Compliant joints: holds the pose softly, or moves to --target.
+    JointImpedance,
+}
+
+/// Arguments of `mode`.
+#[derive(Clone, Debug, Args)]
+pub struct ModeArgs {
+    /// The mode.
+    pub mode: ModeName,
+    /// Angles to move to in the joint-impedance mode, one per joint; those of held joints are not used. Default: the
+    /// present pose.
+    #[arg(long, value_name = "RAD,...", value_delimiter = ',', allow_hyphen_values = true, value_parser = between(-100.0, 100.0))]
+    pub target: Vec<f64>,
+    /// Duration of the motion to --target.
+    #[arg(long = "duration", value_name = "SECONDS", requires = "target", default_value_t = 3.0, value_parser = between(1e-3, 3600.0))]
+    pub duration_s: f64,
+    /// System to use.
+    #[command(flatten)]
+    pub system: SystemArgs,
 }
 
 /// Trajectory that `supple up` starts with.
@@ -273,6 +288,12 @@ pub struct GainsArgs {
     /// Damping for all axes, or X,Y,Z. Default: unchanged.
     #[arg(long, value_name = "N S/M", value_delimiter = ',', value_parser = between(0.0, 1e6))]
     pub damping: Vec<f64>,
+    /// Stiffness of the joint-impedance mode for all joints, or one value per joint. Default: unchanged.
+    #[arg(long, conflicts_with_all = ["stiffness", "damping"], value_name = "N M/RAD", value_delimiter = ',', value_parser = between(0.0, 1e6))]
+    pub joint_stiffness: Vec<f64>,
+    /// Damping of the joint-impedance mode for all joints, or one value per joint. Default: unchanged.
+    #[arg(long, conflicts_with_all = ["stiffness", "damping"], value_name = "N M S/RAD", value_delimiter = ',', value_parser = between(0.0, 1e5))]
+    pub joint_damping: Vec<f64>,
     /// Duration of the ramp to the new gains.
     #[arg(long = "ramp", value_name = "SECONDS", default_value_t = 1.0, value_parser = between(0.0, 3600.0))]
     pub ramp_s: f64,
@@ -357,9 +378,9 @@ impl Command {
             Command::Identification(command) => command.json(),
             Command::Up(args) => args.json,
             Command::Drill(args) => args.json,
-            Command::Gains(GainsArgs { system, .. })
+            Command::Mode(ModeArgs { system, .. })
+            | Command::Gains(GainsArgs { system, .. })
             | Command::Track(TrackArgs { system, .. })
-            | Command::Mode { system, .. }
             | Command::Probe { system, .. }
             | Command::Status(system)
             | Command::Reset(system)

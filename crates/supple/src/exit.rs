@@ -191,6 +191,16 @@ pub enum Failure {
         /// The prefix.
         prefix: String,
     },
+    /// An option with the wrong number of values.
+    #[error("{option} has {found} values: give {expected}")]
+    ValueCount {
+        /// The option.
+        option: &'static str,
+        /// Values given by the user.
+        found: usize,
+        /// Counts that it takes, in words.
+        expected: String,
+    },
     /// The controller refused the request.
     #[error("the controller refused the request: {reason}")]
     Refused {
@@ -325,7 +335,9 @@ impl Failure {
             Failure::Ident(_) => 9,
             Failure::Read(error) => read_code(error),
             Failure::Save(error) => save_code(error),
-            Failure::VirtualTimeOnRealBus | Failure::FaultTestOnRealArm => 2,
+            Failure::VirtualTimeOnRealBus
+            | Failure::FaultTestOnRealArm
+            | Failure::ValueCount { .. } => 2,
             Failure::Injection(_) | Failure::InjectionIntoRealArm => 2,
             Failure::NoSuchProcess { .. } | Failure::NoSuchTestCase { .. } => 2,
             Failure::Drill { .. } | Failure::DidNotReachTracking => 12,

@@ -52,7 +52,7 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
         Command::Up(args) => up::run(args),
         Command::Drill(args) => drill::run(args),
         Command::Status(system) => operate::status(system),
-        Command::Mode { mode, system } => operate::mode(*mode, system),
+        Command::Mode(args) => operate::mode(args),
         Command::Gains(args) => operate::gains(args),
         Command::Track(args) => operate::track(args),
         Command::Probe {

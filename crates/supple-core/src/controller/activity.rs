@@ -21,6 +21,12 @@ pub(super) enum Activity<const N: usize> {
         ramp: Breakaway,
         from_rad: Vector<N>,
     },
+    Float,
+    JointImpedance {
+        from_rad: Vector<N>,
+        to_rad: Vector<N>,
+        duration_s: f64,
+    },
     Fault(SafeAction),
 }
 
@@ -34,6 +40,8 @@ impl<const N: usize> Activity<N> {
             Activity::Track(_) => Mode::Track,
             Activity::Excite(_) => Mode::Excite,
             Activity::Breakaway { .. } => Mode::Breakaway,
+            Activity::Float => Mode::Float,
+            Activity::JointImpedance { .. } => Mode::JointImpedance,
             Activity::Fault(_) => Mode::Fault,
         }
     }

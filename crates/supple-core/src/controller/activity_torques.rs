@@ -8,6 +8,9 @@ use crate::law::impedance::{LawInput, Task, Torques, impedance};
 use crate::math::{Vector, Vector3, abs, smooth_step};
 use crate::trajectory::{JointReference, Reference};
 
+/// Share of a joint's torque limit that the spring of the joint impedance mode may use.
+const JOINT_SPRING_SHARE: f64 = 0.25;
+
 impl<const N: usize> State<N> {
     pub(super) fn reference(&self, config: &Config<N>) -> Option<Reference> {
         match &self.activity {
@@ -21,7 +24,9 @@ impl<const N: usize> State<N> {
         if let Activity::Breakaway { ramp, from_rad } = &self.activity {
             return core::array::from_fn(|i| (i != ramp.joint).then_some(from_rad[i]));
         }
-        if let Some(reference) = self.joint_reference(config) {
+        if self.activity.has_joint_loops()
+            && let Some(reference) = self.joint_reference(config)
+        {
             return core::array::from_fn(|i| Some(reference.position_rad[i]));
         }
         core::array::from_fn(|i| {
@@ -62,6 +67,8 @@ impl<const N: usize> State<N> {
                 torques
             }
             (activity, ..) if activity.has_joint_loops() => self.joint_motion_torques(controller),
+            (Activity::JointImpedance { .. }, ..) => self.joint_impedance_torques(controller),
+            (Activity::Float, ..) => self.float_torques(controller),
             _ => self.safe_torques(controller),
         }
     }
@@ -101,6 +108,11 @@ impl<const N: usize> State<N> {
                 from_rad,
                 to_rad,
                 duration_s,
+            }
+            | Activity::JointImpedance {
+                from_rad,
+                to_rad,
+                duration_s,
             } => {
                 let (x, rate, rate_rate) = smooth_step(time_s / duration_s);
                 let displacement = to_rad - from_rad;
@@ -120,6 +132,61 @@ impl<const N: usize> State<N> {
         }
     }
 
+    /// Model feed-forward along a joint reference.
+    fn joint_feedforward(&self, config: &Config<N>, reference: &JointReference<N>) -> Torques<N> {
+        let velocity = &reference.velocity_rad_per_s;
+        Torques {
+            gravity: self.terms.gravity,
+            coriolis: self.terms.coriolis_gravity - self.terms.gravity,
+            friction: Vector::from_fn(|i, _| config.friction[i].torque_nm(velocity[i])),
+            inertial: self.terms.mass_matrix * reference.acceleration_rad_per_s2,
+            ..Torques::zeros()
+        }
+    }
+
+    /// Model feed-forward and a compliant spring and damper on each active joint. The spring's torque is at most
+    /// [`JOINT_SPRING_SHARE`] of the joint's limit.
+    fn joint_impedance_torques(&self, controller: &Controller<N>) -> Torques<N> {
+        let config = controller.config();
+        let Some(reference) = self.joint_reference(config) else {
+            return self.safe_torques(controller);
+        };
+        let gains = self.joint_gains.current();
+        let velocity_error = reference.velocity_rad_per_s - self.estimator.velocity_rad_per_s;
+        let mut torques = self.joint_feedforward(config, &reference);
+        for joint in 0..N {
+            if config.roles[joint] != Role::Active {
+                continue;
+            }
+            let limit = JOINT_SPRING_SHARE * config.limits.joint_torque_nm[joint];
+            let error = reference.position_rad[joint] - self.position[joint];
+            torques.stiffness[joint] =
+                (gains.stiffness_nm_per_rad[joint] * error).clamp(-limit, limit);
+            torques.damping[joint] = gains.damping_nm_s_per_rad[joint] * velocity_error[joint];
+        }
+        self.add_joint_loops_and_stops(config, &mut torques);
+        torques
+    }
+
+    /// The model alone: gravity, Coriolis and a share of the friction at the measured velocity.
+    fn float_torques(&self, controller: &Controller<N>) -> Torques<N> {
+        let config = controller.config();
+        let velocity = &self.estimator.velocity_rad_per_s;
+        let mut torques = Torques {
+            gravity: self.terms.gravity,
+            coriolis: self.terms.coriolis_gravity - self.terms.gravity,
+            ..Torques::zeros()
+        };
+        for joint in 0..N {
+            if config.roles[joint] == Role::Active {
+                torques.friction[joint] =
+                    config.float_friction_share * config.friction[joint].torque_nm(velocity[joint]);
+            }
+        }
+        self.add_joint_loops_and_stops(config, &mut torques);
+        torques
+    }
+
     /// Model feed-forward and stiff position loops along the joint reference; the joint of a
     /// breakaway ramp has the ramp instead of loop and friction.
     pub(super) fn joint_motion_torques(&self, controller: &Controller<N>) -> Torques<N> {
@@ -129,16 +196,11 @@ impl<const N: usize> State<N> {
         };
         let gains = &config.move_gains;
         let position_error = reference.position_rad - self.position;
-        let velocity = reference.velocity_rad_per_s;
-        let velocity_error = velocity - self.estimator.velocity_rad_per_s;
+        let velocity_error = reference.velocity_rad_per_s - self.estimator.velocity_rad_per_s;
         let mut torques = Torques {
-            gravity: self.terms.gravity,
-            coriolis: self.terms.coriolis_gravity - self.terms.gravity,
-            friction: Vector::from_fn(|i, _| config.friction[i].torque_nm(velocity[i])),
-            inertial: self.terms.mass_matrix * reference.acceleration_rad_per_s2,
             joint_pd: gains.stiffness_nm_per_rad.component_mul(&position_error)
                 + gains.damping_nm_s_per_rad.component_mul(&velocity_error),
-            ..Torques::zeros()
+            ..self.joint_feedforward(config, &reference)
         };
         if let Activity::Breakaway { ramp, .. } = &self.activity {
             torques.friction[ramp.joint] = ramp.rate_nm_per_s * self.activity_s(config);

@@ -1,6 +1,6 @@
 //! Modes, the requests that change them, and why a request is refused.
 
-use crate::config::Gains;
+use crate::config::{Gains, JointGains};
 use crate::math::Vector;
 use crate::trajectory::{Fourier, Trajectory, TrajectoryError};
 use core::fmt;
@@ -8,7 +8,8 @@ use core::fmt;
 /// Mode of the controller.
 ///
 /// ```text
-/// idle <-> gravity hold <-> work (move, track, probe, excite, breakaway)      any -> fault
+/// idle <-> gravity hold <-> work (move, track, probe, excite, breakaway,      any -> fault
+///                                 float, joint impedance)
 ///          work -> work      breakaway -> gravity hold (done)
 ///          fault -> gravity hold | idle  (reset)
 /// ```
@@ -39,6 +40,12 @@ pub enum Mode {
     Excite,
     /// The torque of one joint is ramped until it moves, the others are held; then gravity hold.
     Breakaway,
+    /// The model alone, without stiffness and without damping beyond the arm's own friction, part of which is
+    /// compensated: for guiding by hand. Held joints keep their position loop.
+    Float,
+    /// Compliant joint-space motion to a pose, with the feed-forward of the move mode; holds the pose at the end
+    /// with the same gains. Contact is allowed. Held joints keep their own stiff loop.
+    JointImpedance,
 }
 
 impl Mode {
@@ -53,6 +60,8 @@ impl Mode {
             Mode::Fault => "fault",
             Mode::Excite => "excite",
             Mode::Breakaway => "breakaway",
+            Mode::Float => "float",
+            Mode::JointImpedance => "joint_impedance",
         }
     }
 }
@@ -88,6 +97,23 @@ pub enum Request<const N: usize> {
     },
     /// Leaves the fault.
     Reset,
+    /// Enters float.
+    Float,
+    /// Moves to a pose along a minimum-jerk line in joint space with the gains of the joint impedance mode, and
+    /// stays there. Held joints stay where they are.
+    JointImpedance {
+        /// Pose \[rad\]; the angles of held joints are not used.
+        target_rad: Vector<N>,
+        /// Duration \[s\].
+        duration_s: f64,
+    },
+    /// Changes the gains of the joint impedance mode linearly over `ramp_s`.
+    JointGains {
+        /// Final gains; the stiffness is at most that of the move mode.
+        gains: JointGains<N>,
+        /// Ramp time \[s\], zero or more.
+        ramp_s: f64,
+    },
 }
 
 /// A torque ramp on one joint, added to gravity compensation, until the joint has moved.

@@ -3,6 +3,7 @@
 
 use super::Controller;
 use super::mode::{Refusal, Request};
+use super::requests::active_target;
 use crate::config::{Config, Role};
 use crate::dynamics::inverse_kinematics::inverse_kinematics;
 use crate::dynamics::{Terms, terms};
@@ -36,20 +37,34 @@ pub fn check_motion<const N: usize>(
         Request::Move {
             target_rad,
             duration_s,
+        } => along_line(config, position_rad, target_rad, *duration_s),
+        Request::JointImpedance {
+            target_rad,
+            duration_s,
         } => {
-            let displacement = target_rad - position_rad;
-            along(config, *duration_s, |time_s| {
-                let (x, rate, rate_rate) = smooth_step(time_s / duration_s);
-                JointReference {
-                    position_rad: position_rad + displacement * x,
-                    velocity_rad_per_s: displacement * (rate / duration_s),
-                    acceleration_rad_per_s2: displacement * (rate_rate / (duration_s * duration_s)),
-                }
-            })
+            let target_rad = active_target(config, position_rad, target_rad);
+            along_line(config, position_rad, &target_rad, *duration_s)
         }
         Request::Excite(series) => along(config, series.duration_s, |time_s| series.at(time_s)),
         _ => Ok(()),
     }
+}
+
+fn along_line<const N: usize>(
+    config: &Config<N>,
+    from_rad: &Vector<N>,
+    to_rad: &Vector<N>,
+    duration_s: f64,
+) -> Result<(), Refusal> {
+    let displacement = to_rad - from_rad;
+    along(config, duration_s, |time_s| {
+        let (x, rate, rate_rate) = smooth_step(time_s / duration_s);
+        JointReference {
+            position_rad: from_rad + displacement * x,
+            velocity_rad_per_s: displacement * (rate / duration_s),
+            acceleration_rad_per_s2: displacement * (rate_rate / (duration_s * duration_s)),
+        }
+    })
 }
 
 fn along_trajectory<const N: usize>(

@@ -3,7 +3,7 @@
 
 use super::fault::{Fault, SafeAction};
 use super::mode::{Mode, Refusal, Request};
-use crate::config::Gains;
+use crate::config::{Gains, JointGains};
 use crate::controller::codes::{self, FaultCode, RequestCode, RequestCodeError, VALUES};
 use crate::law::torques::Torques;
 use crate::math::{Vector, Vector3};
@@ -149,7 +149,8 @@ cycle! {
         /// Kind of the trajectory of a track request.
         code trajectory = request_code.trajectory;
         /// Values of the request, vectors as x, y, z:
-        /// move      target_rad (N), duration_s
+        /// move, joint_impedance  target_rad (N), duration_s
+        /// joint_gains  stiffness_nm_per_rad (N), damping_nm_s_per_rad (N), ramp_s
         /// excite    centre_rad (N), sine_rad (5 harmonics of N), cosine_rad (5 of N),
         ///           angular_frequency_rad_per_s, duration_s, ramp_s
         /// breakaway joint, rate_nm_per_s, stop_rad, limit_nm
@@ -180,6 +181,10 @@ cycle! {
         vector stiffness_n_per_m = output.gains.stiffness_n_per_m.into();
         /// Damping `B` in force \[N s/m\].
         vector damping_n_s_per_m = output.gains.damping_n_s_per_m.into();
+        /// Stiffness of the joint impedance mode in force \[N m/rad\].
+        joints joint_stiffness_nm_per_rad = output.joint_gains.stiffness_nm_per_rad;
+        /// Damping of the joint impedance mode in force \[N m s/rad\].
+        joints joint_damping_nm_s_per_rad = output.joint_gains.damping_nm_s_per_rad;
         /// Kind of the latched fault.
         code fault = fault_code.kind;
         /// Joint of the fault, counted from 0, or -1.
@@ -249,6 +254,8 @@ cycle! {
         reference: Option<Reference>;
         /// Gains in force.
         gains: Gains;
+        /// Gains of the joint impedance mode in force.
+        joint_gains: JointGains<N>;
     }
 }
 

@@ -9,7 +9,7 @@
 //! | collision | the observed external torque or force exceeds its threshold |
 
 use super::fault::Fault;
-use crate::config::{Collision, PlausibilityLimits};
+use crate::config::PlausibilityLimits;
 use crate::math::{Vector, Vector3, abs, sqrt};
 
 const LOSS_WEIGHT: u32 = 8;
@@ -243,15 +243,11 @@ pub(super) struct PlausibilityInput<'a, const N: usize> {
 }
 
 pub(super) fn joint_collision<const N: usize>(
-    thresholds: &Collision<N>,
-    share: f64,
+    threshold_nm: &Vector<N>,
     external_nm: &Vector<N>,
 ) -> Result<(), Fault> {
     for joint in 0..N {
-        let (value_nm, limit_nm) = (
-            abs(external_nm[joint]),
-            share * thresholds.joint_torque_nm[joint],
-        );
+        let (value_nm, limit_nm) = (abs(external_nm[joint]), threshold_nm[joint]);
         if value_nm > limit_nm {
             return Err(Fault::JointCollision {
                 joint,
@@ -263,12 +259,7 @@ pub(super) fn joint_collision<const N: usize>(
     Ok(())
 }
 
-pub(super) fn tip_collision<const N: usize>(
-    thresholds: &Collision<N>,
-    share: f64,
-    force_n: &Vector3<f64>,
-) -> Result<(), Fault> {
-    let limit_n = share * thresholds.tip_force_n;
+pub(super) fn tip_collision(limit_n: f64, force_n: &Vector3<f64>) -> Result<(), Fault> {
     if force_n.dot(force_n) > limit_n * limit_n {
         return Err(Fault::TipCollision {
             value_n: sqrt(force_n.dot(force_n)),

@@ -7,12 +7,12 @@ use super::Controller;
 use super::activity::Activity;
 use super::fault::SafeAction;
 use super::mode::{Breakaway, Mode, Refusal, Request};
-use super::state::{GainRamp, State};
+use super::state::State;
 use super::validate;
-use crate::config::{Config, Gains, Role};
+use crate::config::{Config, Gains, JointGains, Role};
 use crate::law::impedance::Task;
 use crate::math::linalg::Cholesky;
-use crate::math::{Matrix3, Vector, abs, sqrt};
+use crate::math::{Matrix, Matrix3, Vector, abs, sqrt};
 use crate::trajectory::{
     Fourier, LimitViolation, MINIMUM_JERK_ACCELERATION, MINIMUM_JERK_JERK, MINIMUM_JERK_SPEED,
     Trajectory,
@@ -24,6 +24,8 @@ const HELD_TOLERANCE_RAD: f64 = 1e-6;
 const EXCITE_START_RAD: f64 = 0.02;
 /// Longest ramp of gains \[s\].
 const MAX_RAMP_S: f64 = 3600.0;
+/// Maximum joint damping that may be requested, whatever the delay allows \[N m s/rad\].
+const MAX_JOINT_DAMPING_NM_S_PER_RAD: f64 = 1e5;
 /// Stability margin for damping with a delayed velocity: `B delay / mass` must not exceed this,
 /// half of the stability limit pi/2.
 const DAMPING_MARGIN: f64 = core::f64::consts::FRAC_PI_4;
@@ -53,7 +55,12 @@ impl<const N: usize> State<N> {
             Request::Gains { gains, ramp_s } => {
                 check_gains(config, &gains, ramp_s)?;
                 self.check_damping(controller, task, &gains)?;
-                self.set_gains(gains, ramp_s);
+                self.gains.change(gains, ramp_s);
+            }
+            Request::JointGains { gains, ramp_s } => {
+                check_joint_gains(config, &gains, ramp_s)?;
+                self.check_joint_damping(controller, &gains)?;
+                self.joint_gains.change(gains, ramp_s);
             }
             // Idle is allowed in a fault without a reset; the fault stays latched.
             Request::Idle if mode == Mode::Fault => self.enter(Activity::Fault(SafeAction::Idle)),
@@ -66,7 +73,9 @@ impl<const N: usize> State<N> {
                 target_rad,
                 duration_s,
             } => {
-                check_move(config, &self.position, &target_rad, duration_s)?;
+                check_stops(config, &target_rad)?;
+                check_held_targets(config, &target_rad)?;
+                check_line(config, &self.position, &target_rad, duration_s)?;
                 self.enter(Activity::Move {
                     from_rad: self.position,
                     to_rad: target_rad,
@@ -91,6 +100,21 @@ impl<const N: usize> State<N> {
                 }
                 self.enter(Activity::Track(trajectory));
             }
+            Request::Float => self.enter(Activity::Float),
+            Request::JointImpedance {
+                target_rad,
+                duration_s,
+            } => {
+                let target_rad = active_target(config, &self.position, &target_rad);
+                check_stops(config, &target_rad)?;
+                check_line(config, &self.position, &target_rad, duration_s)?;
+                self.check_joint_damping(controller, &self.joint_gains.to)?;
+                self.enter(Activity::JointImpedance {
+                    from_rad: self.position,
+                    to_rad: target_rad,
+                    duration_s,
+                });
+            }
             Request::Excite(series) => {
                 check_excitation(config, &self.position, &series)?;
                 self.enter(Activity::Excite(series));
@@ -102,15 +126,6 @@ impl<const N: usize> State<N> {
             }
         }
         Ok(())
-    }
-
-    fn set_gains(&mut self, gains: Gains, ramp_s: f64) {
-        self.gains = GainRamp {
-            from: self.gains.current(),
-            to: gains,
-            elapsed_s: 0.0,
-            ramp_s,
-        };
     }
 
     /// Refuses damping that would excite the arm at its current pose because of the loop delay.
@@ -130,19 +145,49 @@ impl<const N: usize> State<N> {
         let root = Matrix3::from_diagonal(&gains.damping_n_s_per_m.map(sqrt));
         // Upper bound of the fastest damping rate, at most sqrt(3) times too large.
         let rate_per_s = sqrt((root * mobility * root).norm_squared());
-        let share = rate_per_s * controller.delay_s() / DAMPING_MARGIN;
-        if share > 1.0 {
-            let value = gains.damping_n_s_per_m.max();
-            let limit = value / share;
-            let entry = "damping_n_s_per_m at the delay of this loop";
-            return Err(Refusal::Value {
-                entry,
-                value,
-                limit,
-            });
-        }
-        Ok(())
+        within_delay(
+            "damping_n_s_per_m at the delay of this loop",
+            gains.damping_n_s_per_m.max(),
+            rate_per_s * controller.delay_s(),
+        )
     }
+
+    /// The same for damping at the active joints.
+    fn check_joint_damping(
+        &self,
+        controller: &Controller<N>,
+        gains: &JointGains<N>,
+    ) -> Result<(), Refusal> {
+        let Some(mass) = Cholesky::new(&self.terms.mass_matrix) else {
+            return Ok(());
+        };
+        let damping = &gains.damping_nm_s_per_rad;
+        let root = Vector::from_fn(|joint, _| match controller.config().roles[joint] {
+            Role::Active => sqrt(damping[joint]),
+            Role::Held { .. } => 0.0,
+        });
+        let root = Matrix::<N, N>::from_diagonal(&root);
+        // Upper bound of the fastest damping rate, at most sqrt(N) times too large.
+        let rate_per_s = sqrt((root * mass.solve(&root)).norm_squared());
+        within_delay(
+            "impedance_damping_nm_s_per_rad at the delay of this loop",
+            damping.max(),
+            rate_per_s * controller.delay_s(),
+        )
+    }
+}
+
+/// Refuses damping whose rate times the delay of the loop exceeds [`DAMPING_MARGIN`].
+fn within_delay(entry: &'static str, value: f64, rate_times_delay: f64) -> Result<(), Refusal> {
+    let share = rate_times_delay / DAMPING_MARGIN;
+    if share > 1.0 {
+        return Err(Refusal::Value {
+            entry,
+            value,
+            limit: value / share,
+        });
+    }
+    Ok(())
 }
 
 fn check_gains<const N: usize>(
@@ -162,6 +207,41 @@ fn check_gains<const N: usize>(
             },
         },
     )?;
+    check_ramp(ramp_s)
+}
+
+fn check_joint_gains<const N: usize>(
+    config: &Config<N>,
+    gains: &JointGains<N>,
+    ramp_s: f64,
+) -> Result<(), Refusal> {
+    let stiffest = &config.move_gains.stiffness_nm_per_rad;
+    for joint in 0..N {
+        for (entry, value, limit) in [
+            (
+                "impedance_stiffness_nm_per_rad",
+                gains.stiffness_nm_per_rad[joint],
+                stiffest[joint],
+            ),
+            (
+                "impedance_damping_nm_s_per_rad",
+                gains.damping_nm_s_per_rad[joint],
+                MAX_JOINT_DAMPING_NM_S_PER_RAD,
+            ),
+        ] {
+            if !(0.0..=limit).contains(&value) {
+                return Err(Refusal::Value {
+                    entry,
+                    value,
+                    limit: if value < 0.0 { 0.0 } else { limit },
+                });
+            }
+        }
+    }
+    check_ramp(ramp_s)
+}
+
+fn check_ramp(ramp_s: f64) -> Result<(), Refusal> {
     if (0.0..=MAX_RAMP_S).contains(&ramp_s) {
         return Ok(());
     }
@@ -254,7 +334,52 @@ fn check_breakaway<const N: usize>(config: &Config<N>, ramp: &Breakaway) -> Resu
     Ok(())
 }
 
-fn check_move<const N: usize>(
+/// The target with the held joints where they are.
+pub(super) fn active_target<const N: usize>(
+    config: &Config<N>,
+    from_rad: &Vector<N>,
+    target_rad: &Vector<N>,
+) -> Vector<N> {
+    Vector::from_fn(|joint, _| match config.roles[joint] {
+        Role::Active => target_rad[joint],
+        Role::Held { .. } => from_rad[joint],
+    })
+}
+
+fn check_held_targets<const N: usize>(
+    config: &Config<N>,
+    target_rad: &Vector<N>,
+) -> Result<(), Refusal> {
+    for (role, value) in config.roles.iter().zip(target_rad) {
+        if let Role::Held { position_rad, .. } = role
+            && !(abs(value - position_rad) <= HELD_TOLERANCE_RAD)
+        {
+            return Err(Refusal::Value {
+                entry: "target_rad of a held joint",
+                value: *value,
+                limit: *position_rad,
+            });
+        }
+    }
+    Ok(())
+}
+
+fn check_stops<const N: usize>(config: &Config<N>, target_rad: &Vector<N>) -> Result<(), Refusal> {
+    let limits = &config.limits;
+    for joint in 0..N {
+        let value_rad = target_rad[joint];
+        let (lower, upper) = (
+            limits.position_lower_rad[joint],
+            limits.position_upper_rad[joint],
+        );
+        if !(lower..=upper).contains(&value_rad) {
+            return Err(Refusal::BeyondJointStop { joint, value_rad });
+        }
+    }
+    Ok(())
+}
+
+fn check_line<const N: usize>(
     config: &Config<N>,
     from_rad: &Vector<N>,
     to_rad: &Vector<N>,
@@ -269,24 +394,8 @@ fn check_move<const N: usize>(
         });
     }
     for joint in 0..N {
-        let value_rad = to_rad[joint];
-        let (lower, upper) = (
-            limits.position_lower_rad[joint],
-            limits.position_upper_rad[joint],
-        );
-        if !(lower..=upper).contains(&value_rad) {
-            return Err(Refusal::BeyondJointStop { joint, value_rad });
-        }
-        if let Role::Held { position_rad, .. } = config.roles[joint]
-            && abs(value_rad - position_rad) > HELD_TOLERANCE_RAD
-        {
-            return Err(Refusal::Value {
-                entry: "target_rad of a held joint",
-                value: value_rad,
-                limit: position_rad,
-            });
-        }
-        let value_rad_per_s = MINIMUM_JERK_SPEED * abs(value_rad - from_rad[joint]) / duration_s;
+        let displacement_rad = abs(to_rad[joint] - from_rad[joint]);
+        let value_rad_per_s = MINIMUM_JERK_SPEED * displacement_rad / duration_s;
         let limit_rad_per_s = limits.joint_speed_rad_per_s[joint];
         if value_rad_per_s > limit_rad_per_s || value_rad_per_s.is_nan() {
             return Err(Refusal::TooFast {
@@ -295,7 +404,6 @@ fn check_move<const N: usize>(
                 limit_rad_per_s,
             });
         }
-        let displacement_rad = abs(value_rad - from_rad[joint]);
         let per_s2 = displacement_rad / (duration_s * duration_s);
         for (entry, value, limit) in [
             (

@@ -6,7 +6,7 @@ use super::fault::{Fault, SafeAction};
 use super::mode::Mode;
 use super::output::Input;
 use super::plausibility::Plausibility;
-use crate::config::{Config, Gains, Role};
+use crate::config::{Config, Gains, JointGains, Role};
 use crate::controller::estimator::Estimator;
 use crate::controller::latch::Latch;
 use crate::controller::observer::MomentumObserver;
@@ -22,29 +22,63 @@ const JUMP_OVER_SPEED_LIMIT: f64 = 20.0;
 
 /// Linear transition between two sets of gains.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct GainRamp {
-    pub from: Gains,
-    pub to: Gains,
+pub(super) struct GainRamp<G> {
+    from: G,
+    pub to: G,
     pub elapsed_s: f64,
-    pub ramp_s: f64,
+    ramp_s: f64,
 }
 
-impl GainRamp {
-    pub fn current(&self) -> Gains {
+/// Gains between which a ramp interpolates.
+pub(super) trait Interpolate: Copy {
+    /// `self` at 0, `to` at 1.
+    fn between(&self, to: &Self, x: f64) -> Self;
+}
+
+impl Interpolate for Gains {
+    fn between(&self, to: &Self, x: f64) -> Self {
+        Gains {
+            stiffness_n_per_m: self.stiffness_n_per_m.lerp(&to.stiffness_n_per_m, x),
+            damping_n_s_per_m: self.damping_n_s_per_m.lerp(&to.damping_n_s_per_m, x),
+        }
+    }
+}
+
+impl<const N: usize> Interpolate for JointGains<N> {
+    fn between(&self, to: &Self, x: f64) -> Self {
+        JointGains {
+            stiffness_nm_per_rad: self.stiffness_nm_per_rad.lerp(&to.stiffness_nm_per_rad, x),
+            damping_nm_s_per_rad: self.damping_nm_s_per_rad.lerp(&to.damping_nm_s_per_rad, x),
+        }
+    }
+}
+
+impl<G: Interpolate> GainRamp<G> {
+    fn at_rest(gains: G) -> GainRamp<G> {
+        GainRamp {
+            from: gains,
+            to: gains,
+            elapsed_s: 0.0,
+            ramp_s: 0.0,
+        }
+    }
+
+    /// Starts a ramp from the gains in force.
+    pub fn change(&mut self, to: G, ramp_s: f64) {
+        *self = GainRamp {
+            from: self.current(),
+            to,
+            elapsed_s: 0.0,
+            ramp_s,
+        };
+    }
+
+    /// The gains in force.
+    pub fn current(&self) -> G {
         if self.elapsed_s >= self.ramp_s {
             return self.to;
         }
-        let x = self.elapsed_s / self.ramp_s;
-        Gains {
-            stiffness_n_per_m: self
-                .from
-                .stiffness_n_per_m
-                .lerp(&self.to.stiffness_n_per_m, x),
-            damping_n_s_per_m: self
-                .from
-                .damping_n_s_per_m
-                .lerp(&self.to.damping_n_s_per_m, x),
-        }
+        self.from.between(&self.to, self.elapsed_s / self.ramp_s)
     }
 }
 
@@ -64,7 +98,8 @@ pub struct State<const N: usize> {
     pub(super) estimator: Estimator<N>,
     pub(super) observer: MomentumObserver<N>,
     pub(super) latch: Latch,
-    pub(super) gains: GainRamp,
+    pub(super) gains: GainRamp<Gains>,
+    pub(super) joint_gains: GainRamp<JointGains<N>>,
     /// Set-points of held joints.
     pub(super) held_setpoint_rad: Vector<N>,
     /// Last torque and fallback torque sent.
@@ -87,7 +122,7 @@ pub struct State<const N: usize> {
 impl<const N: usize> State<N> {
     /// Idle state before the first cycle.
     pub fn new(controller: &Controller<N>) -> Self {
-        let gains = controller.config().law.gains;
+        let config = controller.config();
         State {
             activity: Activity::Idle,
             activity_start: 0,
@@ -98,12 +133,8 @@ impl<const N: usize> State<N> {
             estimator: Estimator::at_rest(Vector::zeros()),
             observer: MomentumObserver::default(),
             latch: Latch::default(),
-            gains: GainRamp {
-                from: gains,
-                to: gains,
-                elapsed_s: 0.0,
-                ramp_s: 0.0,
-            },
+            gains: GainRamp::at_rest(config.law.gains),
+            joint_gains: GainRamp::at_rest(config.joint_gains),
             held_setpoint_rad: Vector::zeros(),
             torque: Vector::zeros(),
             fallback: Vector::zeros(),

@@ -45,6 +45,7 @@ pub fn step<const N: usize>(
         _ => state.request(controller, task.as_ref(), request).err(),
     });
     state.gains.elapsed_s += elapsed_s;
+    state.joint_gains.elapsed_s += elapsed_s;
     state.update_held_setpoints(config, elapsed_s);
     state.end_breakaway(config);
 
@@ -129,6 +130,7 @@ pub fn step<const N: usize>(
         tip_velocity_m_per_s: tip_velocity,
         reference,
         gains: state.gains.current(),
+        joint_gains: state.joint_gains.current(),
         external_torque_nm: state.observer.external_torque_nm(),
         external_force_n: external_force,
         force_against_n: state.latch.force_against_n(),

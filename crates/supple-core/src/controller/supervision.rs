@@ -195,17 +195,18 @@ impl<const N: usize> State<N> {
             }
         }
         let external = self.observer.external_torque_nm();
-        let share = if self.activity.has_joint_loops() {
-            config.collision.move_share
+        let collision = &config.collision;
+        let (joint_torque_nm, tip_force_n) = if self.activity.has_joint_loops() {
+            (&collision.move_joint_torque_nm, collision.move_tip_force_n)
         } else {
-            1.0
+            (&collision.joint_torque_nm, collision.tip_force_n)
         };
-        joint_collision(&config.collision, share, &external)
+        joint_collision(joint_torque_nm, &external)
             .map_err(|fault| self.plausibility.as_stuck_encoder(&config.plausible, fault))?;
         if !evidence.regular {
             return Ok(());
         }
-        tip_collision(&config.collision, share, evidence.force_n)?;
+        tip_collision(tip_force_n, evidence.force_n)?;
         if resting {
             let (gravity, limit_n) = (config.arm.gravity(), config.plausible.load_n);
             self.plausibility.check_unmodelled_load(

@@ -190,6 +190,34 @@ pub(super) fn validate<const N: usize>(config: &Config<N>) -> Result<(), ConfigE
         true,
     )?;
     each(
+        "impedance_stiffness_nm_per_rad",
+        &config.joint_gains.stiffness_nm_per_rad,
+        true,
+    )?;
+    each(
+        "impedance_damping_nm_s_per_rad",
+        &config.joint_gains.damping_nm_s_per_rad,
+        true,
+    )?;
+    let stiffest = &config.move_gains.stiffness_nm_per_rad;
+    for joint in 0..N {
+        let value = config.joint_gains.stiffness_nm_per_rad[joint];
+        check(
+            value <= stiffest[joint],
+            "impedance_stiffness_nm_per_rad",
+            Some(joint),
+            value,
+            "at most that of the move mode",
+        )?;
+    }
+    check(
+        (0.0..=1.0).contains(&config.float_friction_share),
+        "float friction_share",
+        None,
+        config.float_friction_share,
+        "from 0 to 1",
+    )?;
+    each(
         "hold_damping_nm_s_per_rad",
         &config.hold_damping_nm_s_per_rad,
         true,
@@ -238,13 +266,12 @@ pub(super) fn validate<const N: usize>(config: &Config<N>) -> Result<(), ConfigE
     positive("plausible stuck_rad", plausible.stuck_rad)?;
     positive("plausible against_share", plausible.against_share)?;
     positive("plausible load_n", plausible.load_n)?;
-    check(
-        collision.move_share > 0.0 && collision.move_share <= 1.0,
-        "collision move_share",
-        None,
-        collision.move_share,
-        "above 0, at most 1",
+    each(
+        "collision move_joint_torque_nm",
+        &collision.move_joint_torque_nm,
+        false,
     )?;
+    positive("collision move_tip_force_n", collision.move_tip_force_n)?;
     if let Some((entry, value, must)) = config.workspace.first_invalid() {
         return check(false, entry, None, value, must);
     }

@@ -113,6 +113,18 @@ fn through_all_modes<const N: usize>(config: Config<N>) {
         handover_s,
     );
     run.change(Request::GravityHold, handover_s);
+    // A spring that is loaded from the start: the target is 0.1 rad away within 0.5 s.
+    target[1] -= 0.1;
+    let comply = Request::JointImpedance {
+        target_rad: target,
+        duration_s: 0.5,
+    };
+    run.change(comply, handover_s);
+    run.change(near(&run), handover_s);
+    run.change(Request::Float, handover_s);
+    run.change(comply, handover_s);
+    run.change(Request::Float, handover_s);
+    run.change(Request::GravityHold, handover_s);
     assert_eq!(run.rig.state.mode(), Mode::GravityHold);
 }
 

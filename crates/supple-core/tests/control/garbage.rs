@@ -5,7 +5,7 @@ use crate::support::configs::{four, seven, three};
 use crate::support::property::{check, per_joint};
 use crate::support::rig::{Rig, bent, probe_at};
 use proptest::prelude::*;
-use supple_core::config::{ApparentInertia, Gains};
+use supple_core::config::{ApparentInertia, Gains, JointGains};
 use supple_core::controller::{Mode, Request};
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::trajectory::{Arc, Line, Quadrant, Sinusoid};
@@ -76,6 +76,22 @@ fn request_kind<const N: usize>() -> impl Strategy<Value = RequestKind<N>> {
         Just(Request::Idle),
         Just(Request::GravityHold),
         Just(Request::Reset),
+        Just(Request::Float),
+        (prop::collection::vec(number(), N), number()).prop_map(|(target, duration_s)| {
+            Request::JointImpedance {
+                target_rad: Vector::from_column_slice(&target),
+                duration_s,
+            }
+        }),
+        (prop::collection::vec(number(), 2 * N), number()).prop_map(|(x, ramp_s)| {
+            Request::JointGains {
+                gains: JointGains {
+                    stiffness_nm_per_rad: Vector::from_column_slice(&x[..N]),
+                    damping_nm_s_per_rad: Vector::from_column_slice(&x[N..]),
+                },
+                ramp_s,
+            }
+        }),
         trajectory().prop_map(Request::Track),
         (prop::collection::vec(number(), N), number()).prop_map(|(target, duration_s)| {
             Request::Move {

@@ -10,6 +10,7 @@ mod support;
 mod arrivals;
 mod bumpless;
 mod closed_loop;
+mod compliant;
 mod contact;
 mod determinism;
 mod exciting;

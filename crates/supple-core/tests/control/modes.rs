@@ -3,12 +3,12 @@
 use crate::support::configs::{four, seven, three};
 use crate::support::rig::{Rig, bent, probe_at, ramp};
 use std::collections::BTreeSet;
-use supple_core::config::Gains;
+use supple_core::config::{Gains, JointGains};
 use supple_core::controller::{Fault, Mode, Refusal, Request};
 use supple_core::trajectory::Fourier;
-use supple_core::{Config, Input};
+use supple_core::{Config, Input, Vector};
 
-const MODES: [Mode; 8] = [
+const MODES: [Mode; 10] = [
     Mode::Idle,
     Mode::GravityHold,
     Mode::Move,
@@ -17,6 +17,8 @@ const MODES: [Mode; 8] = [
     Mode::Fault,
     Mode::Excite,
     Mode::Breakaway,
+    Mode::Float,
+    Mode::JointImpedance,
 ];
 
 /// Kind of a request, independent of the arm's pose.
@@ -29,11 +31,14 @@ enum RequestKind {
     Probe,
     Excite,
     Breakaway,
+    Float,
+    JointImpedance,
     Gains,
+    JointGains,
     Reset,
 }
 
-const REQUEST_KINDS: [RequestKind; 9] = [
+const REQUEST_KINDS: [RequestKind; 12] = [
     RequestKind::Idle,
     RequestKind::GravityHold,
     RequestKind::Move,
@@ -41,7 +46,10 @@ const REQUEST_KINDS: [RequestKind; 9] = [
     RequestKind::Probe,
     RequestKind::Excite,
     RequestKind::Breakaway,
+    RequestKind::Float,
+    RequestKind::JointImpedance,
     RequestKind::Gains,
+    RequestKind::JointGains,
     RequestKind::Reset,
 ];
 
@@ -57,6 +65,15 @@ fn request<const N: usize>(rig: &Rig<N>, requested: RequestKind) -> Request<N> {
         RequestKind::Probe => Request::Track(probe_at(&rig.tip())),
         RequestKind::Excite => Request::Excite(Fourier::at_rest(rig.q, 1.0)),
         RequestKind::Breakaway => Request::Breakaway(ramp()),
+        RequestKind::Float => Request::Float,
+        RequestKind::JointImpedance => rig.comply(),
+        RequestKind::JointGains => Request::JointGains {
+            gains: JointGains {
+                stiffness_nm_per_rad: Vector::repeat(7.0),
+                damping_nm_s_per_rad: Vector::repeat(0.02),
+            },
+            ramp_s: 0.1,
+        },
         RequestKind::Gains => Request::Gains {
             gains: Gains::isotropic(10.0, 2.0),
             ramp_s: 0.1,
@@ -68,7 +85,7 @@ fn request<const N: usize>(rig: &Rig<N>, requested: RequestKind) -> Request<N> {
 /// Mode after `requested` in `mode`; `None` if refused.
 fn table(mode: Mode, requested: RequestKind) -> Option<Mode> {
     match (mode, requested) {
-        (_, RequestKind::Gains) => Some(mode),
+        (_, RequestKind::Gains | RequestKind::JointGains) => Some(mode),
         // Only a reset leaves a fault; this one leads to gravity hold.
         (Mode::Fault, RequestKind::Reset) => Some(Mode::GravityHold),
         // Idle needs no reset; the fault stays latched.
@@ -82,6 +99,8 @@ fn table(mode: Mode, requested: RequestKind) -> Option<Mode> {
         (_, RequestKind::Probe) => Some(Mode::Probe),
         (_, RequestKind::Excite) => Some(Mode::Excite),
         (_, RequestKind::Breakaway) => Some(Mode::Breakaway),
+        (_, RequestKind::Float) => Some(Mode::Float),
+        (_, RequestKind::JointImpedance) => Some(Mode::JointImpedance),
     }
 }
 
@@ -97,7 +116,7 @@ fn every_mode_asked_for_everything<const N: usize>(config: Config<N>) {
                 Some(expected) => {
                     assert_eq!(output.refusal, None, "{requested:?} in {mode:?}");
                     assert_eq!(output.mode, expected, "{requested:?} in {mode:?}");
-                    if requested != RequestKind::Gains {
+                    if !matches!(requested, RequestKind::Gains | RequestKind::JointGains) {
                         assert_eq!(output.mode_time_s, 0.0, "{requested:?} in {mode:?}");
                     }
                 }

@@ -4,7 +4,7 @@ use crate::support::configs::{friction, three, unlimited};
 use crate::support::plant::{Plant, push};
 use crate::support::rig::{Rig, bent};
 use crate::support::size;
-use supple_core::config::MoveGains;
+use supple_core::config::JointGains;
 use supple_core::controller::Request;
 use supple_core::math::Vector3;
 use supple_core::{Config, Vector};
@@ -17,7 +17,7 @@ fn brisk() -> Config<3> {
     config.estimator_rad_per_s = 2000.0;
     config.limits.joint_speed_rad_per_s.fill(10.0);
     config.limits.tip_speed_m_per_s = 10.0;
-    config.move_gains = MoveGains {
+    config.move_gains = JointGains {
         stiffness_nm_per_rad: Vector::<3>::repeat(400.0),
         damping_nm_s_per_rad: Vector::<3>::repeat(20.0),
     };

@@ -16,7 +16,8 @@ fn guarded() -> Config<4> {
     config.collision = Collision {
         joint_torque_nm: config.limits.joint_torque_nm * 0.3,
         tip_force_n: 60.0,
-        move_share: 0.5,
+        move_joint_torque_nm: config.limits.joint_torque_nm * 0.15,
+        move_tip_force_n: 30.0,
     };
     config.plausible = PlausibilityLimits {
         load_n: 8.0,

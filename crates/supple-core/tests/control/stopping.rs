@@ -11,7 +11,7 @@ use crate::support::property::{Outcome, check};
 use proptest::prelude::*;
 use std::collections::VecDeque;
 use supple_core::config::{
-    ApparentInertia, Collision, FrictionVelocity, Gains, Law, Limits, MoveGains,
+    ApparentInertia, Collision, FrictionVelocity, Gains, JointGains, Law, Limits,
     PlausibilityLimits, Role, Workspace,
 };
 use supple_core::controller::{Fault, Mode, Request, SafeAction, State, step};
@@ -72,7 +72,7 @@ fn case(joints: usize) -> impl Strategy<Value = Case> {
         0.02..0.3,
         prop::collection::vec(-1.8..1.8, joints),
         prop::collection::vec(-4.0..4.0, joints),
-        1..5_u8,
+        1..7_u8,
         defect,
         0..3_usize,
     )
@@ -140,10 +140,15 @@ fn config<const N: usize>(case: &Case) -> Config<N> {
             nullspace_damping_nm_s_per_rad: 1.0,
         },
         latch: crate::support::configs::latch(),
-        move_gains: MoveGains {
+        move_gains: JointGains {
             stiffness_nm_per_rad: all(100.0),
             damping_nm_s_per_rad: all(3.0),
         },
+        joint_gains: JointGains {
+            stiffness_nm_per_rad: all(5.0),
+            damping_nm_s_per_rad: all(0.5),
+        },
+        float_friction_share: 0.5,
         hold_damping_nm_s_per_rad: all(0.5),
         handover_s: 0.1,
         limits: Limits {
@@ -170,7 +175,8 @@ fn config<const N: usize>(case: &Case) -> Config<N> {
         collision: Collision {
             joint_torque_nm: torque_nm * 0.3,
             tip_force_n: 60.0,
-            move_share: 0.5,
+            move_joint_torque_nm: torque_nm * 0.15,
+            move_tip_force_n: 30.0,
         },
         plausible: PlausibilityLimits {
             lost_replies: 3,
@@ -257,6 +263,11 @@ fn request<const N: usize>(case: &Case, config: &Config<N>, q: &Vector<N>) -> Re
     match case.mode {
         1 => Request::GravityHold,
         2 => Request::Track(Trajectory::Hold(tip_pose(&config.arm, q).translation)),
+        5 => Request::Float,
+        6 => Request::JointImpedance {
+            target_rad: q.map(|angle| angle + 0.2),
+            duration_s: 1.0,
+        },
         _ => Request::Move {
             target_rad: q.map(|angle| angle + 0.2),
             duration_s: 1.0,

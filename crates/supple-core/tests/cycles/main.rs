@@ -195,6 +195,8 @@ fn assert_modes<const N: usize>(
         (_, Mode::Track | Mode::Probe) => matches!(request, Some(Request::Track(_))),
         (_, Mode::Excite) => matches!(request, Some(Request::Excite(_))),
         (_, Mode::Breakaway) => matches!(request, Some(Request::Breakaway(_))),
+        (_, Mode::Float) => matches!(request, Some(Request::Float)),
+        (_, Mode::JointImpedance) => matches!(request, Some(Request::JointImpedance { .. })),
     };
     assert!(documented, "{}", describe());
 }

@@ -3,7 +3,7 @@
 use crate::support::rig::{Rig, probe_at, ramp};
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
-use supple_core::config::{Gains, Role};
+use supple_core::config::{Gains, JointGains, Role};
 use supple_core::controller::{Breakaway, Mode, Request};
 use supple_core::dynamics::aba;
 use supple_core::math::Vector3;
@@ -143,7 +143,7 @@ impl<const N: usize> SimulatedArm<N> {
             _ => {}
         }
         let tip = last.tip_position_m;
-        match random.below(16) {
+        match random.below(20) {
             0 => Request::Idle,
             1 => Request::GravityHold,
             2 => Request::Reset,
@@ -182,6 +182,22 @@ impl<const N: usize> SimulatedArm<N> {
             12 => Request::Gains {
                 gains: Gains::isotropic(150.0 + 150.0 * random.unit(), 30.0 + 20.0 * random.unit()),
                 ramp_s: 0.1,
+            },
+            14 => Request::Float,
+            15 => Request::JointImpedance {
+                target_rad: self.rig.q + random.joints::<N>(0.2),
+                duration_s: 1.0 + random.unit(),
+            },
+            16 => Request::JointImpedance {
+                target_rad: Vector::from_fn(|_, _| random.number()),
+                duration_s: random.number(),
+            },
+            17 => Request::JointGains {
+                gains: JointGains {
+                    stiffness_nm_per_rad: Vector::from_fn(|_, _| random.number().abs()),
+                    damping_nm_s_per_rad: Vector::from_fn(|_, _| random.number().abs()),
+                },
+                ramp_s: random.number(),
             },
             13 => {
                 let mut series = Fourier::at_rest(self.rig.q, random.number());

@@ -2,7 +2,7 @@
 
 use super::arms::{wam3, wam4, wam7};
 use supple_core::config::{
-    ApparentInertia, Collision, ContactLatch, FrictionVelocity, Gains, Law, Limits, MoveGains,
+    ApparentInertia, Collision, ContactLatch, FrictionVelocity, Gains, JointGains, Law, Limits,
     PlausibilityLimits, Role, Workspace,
 };
 use supple_core::{Arm, Config, Friction, Matrix, RippleTable, Vector};
@@ -58,7 +58,13 @@ pub fn seven() -> Config<7> {
         &(Matrix::<2, 2>::new(1.0, 1.0, -1.0, 1.0) / (2.0 * 9.7)),
     );
     let reach = [2.6, 2.0, 2.8, 3.1, 1.2, 1.5, 3.0];
-    config(wam7(), roles, joint_from_motor, reach)
+    Config {
+        joint_gains: JointGains {
+            stiffness_nm_per_rad: Vector::from([20.0, 20.0, 20.0, 20.0, 1.0, 1.0, 0.2]),
+            damping_nm_s_per_rad: Vector::from([1.0, 1.0, 1.0, 1.0, 0.02, 0.02, 0.005]),
+        },
+        ..config(wam7(), roles, joint_from_motor, reach)
+    }
 }
 
 fn config<const N: usize>(
@@ -85,10 +91,15 @@ fn config<const N: usize>(
             nullspace_damping_nm_s_per_rad: 2.0,
         },
         latch: latch(),
-        move_gains: MoveGains {
+        move_gains: JointGains {
             stiffness_nm_per_rad: all(600.0),
             damping_nm_s_per_rad: all(10.0),
         },
+        joint_gains: JointGains {
+            stiffness_nm_per_rad: all(10.0),
+            damping_nm_s_per_rad: all(1.0),
+        },
+        float_friction_share: 0.5,
         hold_damping_nm_s_per_rad: all(2.0),
         handover_s: 0.1,
         limits: Limits {

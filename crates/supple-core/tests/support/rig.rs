@@ -99,6 +99,14 @@ impl<const N: usize> Rig<N> {
         supple_core::dynamics::tip_pose(&self.controller.config().arm, &self.q).translation
     }
 
+    /// Joint impedance at the present pose.
+    pub fn comply(&self) -> Request<N> {
+        Request::JointImpedance {
+            target_rad: self.q,
+            duration_s: 0.1,
+        }
+    }
+
     /// A reference that stays at the tip.
     pub fn stay(&self) -> Request<N> {
         Request::Track(Trajectory::Hold(self.tip()))
@@ -132,6 +140,12 @@ impl<const N: usize> Rig<N> {
             }
             Mode::Breakaway => {
                 self.accept(Request::Breakaway(ramp()));
+            }
+            Mode::Float => {
+                self.accept(Request::Float);
+            }
+            Mode::JointImpedance => {
+                self.accept(self.comply());
             }
             Mode::Fault => {
                 let output = self.step(&Input {

@@ -118,8 +118,12 @@ pub fn evaluate(spec: &Spec, metrics: &RowMetrics, refusals: &[String]) -> (Stri
                 format!("fault {:.0} ms after the contact", ms.unwrap_or(f64::NAN)),
             );
         }
-        // While probing or tracking, the impedance law itself presses on the block.
-        if spec.task != TestTask::Probe && spec.task != TestTask::Track {
+        // While probing or tracking, and with compliant joints, the law itself presses on the block.
+        let presses = matches!(
+            spec.task,
+            TestTask::Probe | TestTask::Track | TestTask::JointImpedance
+        );
+        if !presses {
             let pressed_n = metrics.pressed_n.unwrap_or(0.0);
             expect(
                 pressed_n < MAX_PRESSING_FORCE_N,

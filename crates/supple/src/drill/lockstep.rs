@@ -57,7 +57,8 @@ pub fn perform<const N: usize>(
         Event::Drives(_) => REENABLE_S.0,
         _ => 0.0,
     };
-    let pushed = (spec.event, spec.task) == (Event::Obstacle, TestTask::GravityHold);
+    let at_rest = matches!(spec.task, TestTask::GravityHold | TestTask::Float);
+    let pushed = spec.event == Event::Obstacle && at_rest;
     let push_rad_per_s = -PUSHED_M_PER_S / jacobian(&config.arm, &script.start_rad)[(2, 1)];
     let up = UpArgs {
         plant: spec.plant,
@@ -69,7 +70,7 @@ pub fn perform<const N: usize>(
         tare: false,
         block_m: (spec.event == Event::Obstacle).then_some(match spec.task {
             TestTask::Probe => 0.0,
-            TestTask::GravityHold => -(PUSHED_BLOCK_CLEARANCE_M + cap_m),
+            TestTask::GravityHold | TestTask::Float => -(PUSHED_BLOCK_CLEARANCE_M + cap_m),
             _ => -(BLOCK_CLEARANCE_M + cap_m),
         }),
         inject: injections(spec, event_s, back_s, pushed.then_some(push_rad_per_s)),

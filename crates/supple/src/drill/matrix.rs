@@ -96,12 +96,14 @@ pub fn all(plant: PlantKind) -> Vec<Spec> {
     cases
 }
 
-const ALL_TASKS: [TestTask; 5] = [
+const ALL_TASKS: [TestTask; 7] = [
     TestTask::GravityHold,
     TestTask::Move,
     TestTask::Track,
     TestTask::Probe,
     TestTask::Excite,
+    TestTask::Float,
+    TestTask::JointImpedance,
 ];
 
 fn wall_clock_cases(plant: PlantKind) -> Vec<Spec> {
@@ -147,7 +149,7 @@ fn wall_clock_cases(plant: PlantKind) -> Vec<Spec> {
 
 fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
     use InjectionKind as Kind;
-    use TestTask::{Excite, GravityHold, Move, Probe, Track};
+    use TestTask::{Excite, Float, GravityHold, JointImpedance, Move, Probe, Track};
     let mut cases = Vec::new();
     let mut add = |tasks: &[TestTask], event, expected, within_ms| {
         cases.extend(tasks.iter().map(|task| Spec {
@@ -198,7 +200,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
     );
     // Compliant modes may continue; stiff modes must fault.
     add(
-        &[GravityHold, Track, Probe],
+        &[GravityHold, Track, Probe, Float, JointImpedance],
         Event::Obstacle,
         runs_or_faults(CONTACT_FAULTS),
         FAULT_AND_STOP_MS,
@@ -215,7 +217,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
     let all_stuck = injected(Kind::EncoderStuck { joint: None });
     // A stuck encoder is not observable while the arm is stationary.
     add(
-        &[GravityHold],
+        &[GravityHold, Float],
         stuck,
         runs_or_faults(STUCK_ENCODER_FAULTS),
         FAULT_AND_STOP_MS,
@@ -227,7 +229,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         FAULT_AND_STOP_MS,
     );
     add(
-        &[Track],
+        &[Track, JointImpedance],
         stuck,
         stops(STUCK_ENCODER_FAULTS),
         LATE_FAULT_AND_STOP_MS,
@@ -246,7 +248,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         FAULT_AND_STOP_MS,
     );
     add(
-        &[Move, Track],
+        &[Move, Track, JointImpedance],
         all_stuck,
         stops(STUCK_ENCODER_FAULTS),
         LATE_FAULT_AND_STOP_MS,
@@ -256,20 +258,20 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         cycles: 20,
     });
     add(
-        &[GravityHold, Move, Track, Excite],
+        &[GravityHold, Move, Track, Excite, Float, JointImpedance],
         late,
         runs_or_faults(WRONG_DIRECTION_FAULTS),
         LATE_FAULT_AND_STOP_MS,
     );
     let sign = injected(Kind::EncoderSign { joint: one });
     add(
-        &[GravityHold],
+        &[GravityHold, Float],
         sign,
         runs_or_faults(WRONG_DIRECTION_FAULTS),
         LATE_FAULT_AND_STOP_MS,
     );
     add(
-        &[Move, Track],
+        &[Move, Track, JointImpedance],
         sign,
         stops(WRONG_DIRECTION_FAULTS),
         LATE_FAULT_AND_STOP_MS,
@@ -279,7 +281,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         every: 2,
     });
     add(
-        &[GravityHold, Track],
+        &[GravityHold, Track, Float, JointImpedance],
         second,
         stops(ENCODER_LOSS_FAULTS),
         FAULT_AND_STOP_MS,
@@ -289,7 +291,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         offset_rad: 0.2,
     });
     add(
-        &[GravityHold, Track],
+        &[GravityHold, Track, Float, JointImpedance],
         jump,
         stops(ENCODER_LOSS_FAULTS),
         FAULT_AND_STOP_MS,
@@ -302,21 +304,21 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
     // Motors.
     let dead = injected(Kind::MotorDead { motor: 1 });
     add(
-        &[GravityHold, Move, Track],
+        &[GravityHold, Move, Track, Float, JointImpedance],
         dead,
         stops(WRONG_DIRECTION_FAULTS),
         FAULT_AND_STOP_MS,
     );
     let reversed = injected(Kind::TorqueSign { joint: 1 });
     add(
-        &[GravityHold, Track],
+        &[GravityHold, Track, Float, JointImpedance],
         reversed,
         stops(WRONG_DIRECTION_FAULTS),
         FAULT_AND_STOP_MS,
     );
     let later = injected(Kind::TorqueLate { cycles: 3 });
     add(
-        &[GravityHold, Move, Track],
+        &[GravityHold, Move, Track, Float, JointImpedance],
         later,
         runs_or_faults(DISTURBANCE_FAULTS),
         LATE_FAULT_AND_STOP_MS,
@@ -325,7 +327,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
     // Unmodelled effects.
     let gravity = Kind::GravityReversed;
     add(
-        &[GravityHold, Move, Track],
+        &[GravityHold, Move, Track, Float, JointImpedance],
         injected(gravity),
         stops(WRONG_DIRECTION_FAULTS),
         FAULT_AND_STOP_MS,
@@ -363,10 +365,18 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         FAULT_AND_STOP_MS,
     );
 
+    // Float and compliant joints yield to a load as to a hand; the speed limits end the fall.
+    add(
+        &[Float, JointImpedance],
+        injected(payload),
+        runs_or_faults(DISTURBANCE_FAULTS),
+        LATE_FAULT_AND_STOP_MS,
+    );
+
     // Drives and requests.
     let idle = Event::Drives(DriveShutdown::Idle);
     add(
-        &[GravityHold, Move, Track],
+        &[GravityHold, Move, Track, Float, JointImpedance],
         idle,
         Expected::ReturnsToGravityHold,
         FAULT_AND_STOP_MS,

@@ -120,6 +120,8 @@ fn mode_of(task: TestTask) -> Mode {
         TestTask::Track => Mode::Track,
         TestTask::Probe => Mode::Probe,
         TestTask::Excite => Mode::Excite,
+        TestTask::Float => Mode::Float,
+        TestTask::JointImpedance => Mode::JointImpedance,
     }
 }
 

@@ -19,6 +19,10 @@ pub enum TestTask {
     Probe,
     /// A stiff oscillation of the shoulder, with the tip at up to 0.25 m/s.
     Excite,
+    /// Float in the stretched-out pose.
+    Float,
+    /// The downward motion of the move, with compliant joints.
+    JointImpedance,
 }
 
 /// How a process fails.
@@ -148,6 +152,8 @@ impl fmt::Display for TestTask {
             TestTask::Track => "track",
             TestTask::Probe => "probe",
             TestTask::Excite => "excite",
+            TestTask::Float => "float",
+            TestTask::JointImpedance => "joint_impedance",
         })
     }
 }

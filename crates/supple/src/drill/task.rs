@@ -48,6 +48,11 @@ pub fn request<const N: usize>(
     let down_m = start_m - Vector3::new(0.0, 0.0, DESCENT_M);
     Ok(match spec.task {
         TestTask::GravityHold => Request::GravityHold,
+        TestTask::Float => Request::Float,
+        TestTask::JointImpedance => Request::JointImpedance {
+            target_rad: start_pose(config, "drill", &Trajectory::Hold(down_m), 1.0)?,
+            duration_s: DESCENT_S,
+        },
         TestTask::Move => Request::Move {
             target_rad: start_pose(config, "drill", &Trajectory::Hold(down_m), 1.0)?,
             duration_s: DESCENT_S,
@@ -94,9 +99,9 @@ impl<const N: usize> Script<N> {
             task_start_cycle,
             event_cycle: task_start_cycle
                 + cycles(match spec.task {
-                    TestTask::GravityHold => 0.3,
+                    TestTask::GravityHold | TestTask::Float => 0.3,
                     // The event comes at the highest speed of the motion.
-                    TestTask::Move => 0.6,
+                    TestTask::Move | TestTask::JointImpedance => 0.6,
                     TestTask::Track | TestTask::Probe => 0.8,
                     TestTask::Excite => 0.7,
                 }),

@@ -126,7 +126,11 @@ fn sized<const N: usize>(arm: &Description, args: &IdentifyArgs) -> Result<(), F
         let validation = fit.validate_motion(&motion)?;
         checked.push((name, motion, validation));
     }
-    let described = fit.description(arm, None)?;
+    let validations: Vec<Validation> = checked.iter().map(|(.., found)| found.clone()).collect();
+    let thresholds = fit.move_collision_nm(&validations, &arm.config::<N>()?);
+    let described = fit
+        .description(arm, None)?
+        .with_move_collision(&thresholds)?;
     let found = Found {
         arm: &described,
         fit: &fit,

@@ -13,16 +13,18 @@ pub use session::OperatorSession;
 pub use status::status;
 
 use crate::arms;
-use crate::cli::{GainsArgs, ModeName, SystemArgs, TrackArgs, TrackTrajectory, UpTrajectory};
+use crate::cli::{
+    GainsArgs, ModeArgs, ModeName, SystemArgs, TrackArgs, TrackTrajectory, UpTrajectory,
+};
 use crate::console::{print_json, print_line};
 use crate::exit::Failure;
 use crate::up::stop_running;
 use core::time::Duration;
 use serde::Serialize;
-use supple_core::Trajectory;
-use supple_core::config::Gains;
+use supple_core::config::{Gains, JointGains};
 use supple_core::controller::{Mode, Request};
 use supple_core::math::Vector3;
+use supple_core::{Trajectory, Vector};
 use supple_experiment::scenario;
 use supple_ipc::message::{OperatorReply, Outcome, Telemetry};
 use supple_ipc::{Domain, TelemetryReader, request_idle};
@@ -56,14 +58,20 @@ fn running(system: &SystemArgs) -> Result<(Domain, TelemetryReader, Telemetry), 
     }
 }
 
-/// Runs `supple mode`: requests idle or gravity hold.
+/// Time for which the compliant joints come to rest where they are \[s\].
+const COMPLY_S: f64 = 0.5;
+
+/// Runs `supple mode`.
 ///
 /// # Errors
 /// [`Failure`].
-pub fn mode(mode: ModeName, system: &SystemArgs) -> Result<(), Failure> {
-    match mode {
+pub fn mode(args: &ModeArgs) -> Result<(), Failure> {
+    let system = &args.system;
+    match args.mode {
         ModeName::Idle => idle(system),
-        ModeName::GravityHold => send_simple_request(system, SimpleRequest::GravityHold),
+        ModeName::GravityHold => ask(system, &Asked::GravityHold),
+        ModeName::Float => ask(system, &Asked::Float),
+        ModeName::JointImpedance => ask(system, &Asked::JointImpedance(args)),
     }
 }
 
@@ -86,51 +94,141 @@ fn idle(system: &SystemArgs) -> Result<(), Failure> {
 /// # Errors
 /// [`Failure`].
 pub fn reset(system: &SystemArgs) -> Result<(), Failure> {
-    send_simple_request(system, SimpleRequest::Reset)
+    ask(system, &Asked::Reset)
 }
 
-#[derive(Clone, Copy)]
-enum SimpleRequest {
+/// What a command asks of a running system, for an arm of any size.
+enum Asked<'a> {
     GravityHold,
+    Float,
+    JointImpedance(&'a ModeArgs),
     Reset,
-    Gains(Gains, f64),
+    Gains(&'a GainsArgs),
+    JointGains(&'a GainsArgs),
 }
 
-fn send_simple_request(system: &SystemArgs, request_kind: SimpleRequest) -> Result<(), Failure> {
+impl Asked<'_> {
+    fn request<const N: usize>(&self, telemetry: &Telemetry) -> Result<Request<N>, Failure> {
+        let now = telemetry.record();
+        Ok(match self {
+            Asked::GravityHold => Request::GravityHold,
+            Asked::Float => Request::Float,
+            Asked::Reset => Request::Reset,
+            Asked::JointImpedance(args) => match args.target.len() {
+                0 => Request::JointImpedance {
+                    target_rad: first(&now.position_rad),
+                    duration_s: COMPLY_S,
+                },
+                found if found == N => Request::JointImpedance {
+                    target_rad: Vector::from_column_slice(&args.target),
+                    duration_s: args.duration_s,
+                },
+                found => {
+                    return Err(value_count(
+                        "--target",
+                        found,
+                        format!("{N}, one per joint"),
+                    ));
+                }
+            },
+            Asked::Gains(args) => Request::Gains {
+                gains: Gains {
+                    stiffness_n_per_m: axes("--stiffness", &args.stiffness, now.stiffness_n_per_m)?,
+                    damping_n_s_per_m: axes("--damping", &args.damping, now.damping_n_s_per_m)?,
+                },
+                ramp_s: args.ramp_s,
+            },
+            Asked::JointGains(args) => {
+                let stiffness = first(&now.joint_stiffness_nm_per_rad);
+                let damping = first(&now.joint_damping_nm_s_per_rad);
+                Request::JointGains {
+                    gains: JointGains {
+                        stiffness_nm_per_rad: joints(
+                            "--joint-stiffness",
+                            &args.joint_stiffness,
+                            stiffness,
+                        )?,
+                        damping_nm_s_per_rad: joints(
+                            "--joint-damping",
+                            &args.joint_damping,
+                            damping,
+                        )?,
+                    },
+                    ramp_s: args.ramp_s,
+                }
+            }
+        })
+    }
+}
+
+/// The first `N` joints of a record.
+fn first<const N: usize, const M: usize>(joints: &Vector<M>) -> Vector<N> {
+    Vector::from_fn(|i, _| joints[i])
+}
+
+fn value_count(option: &'static str, found: usize, expected: String) -> Failure {
+    Failure::ValueCount {
+        option,
+        found,
+        expected,
+    }
+}
+
+/// One value for all axes, or X,Y,Z; without any what is in force.
+fn axes(option: &'static str, given: &[f64], now: [f64; 3]) -> Result<Vector3<f64>, Failure> {
+    match *given {
+        [] => Ok(Vector3::from(now)),
+        [all] => Ok(Vector3::repeat(all)),
+        [x, y, z] => Ok(Vector3::new(x, y, z)),
+        _ => Err(value_count(option, given.len(), "1 or 3, X,Y,Z".to_owned())),
+    }
+}
+
+/// One value for all joints, or one per joint; without any what is in force.
+fn joints<const N: usize>(
+    option: &'static str,
+    given: &[f64],
+    now: Vector<N>,
+) -> Result<Vector<N>, Failure> {
+    match given.len() {
+        0 => Ok(now),
+        1 => Ok(Vector::repeat(given[0])),
+        found if found == N => Ok(Vector::from_column_slice(given)),
+        found => Err(value_count(
+            option,
+            found,
+            format!("1, or {N}, one per joint"),
+        )),
+    }
+}
+
+fn ask(system: &SystemArgs, asked: &Asked<'_>) -> Result<(), Failure> {
     fn send<const N: usize>(
         domain: &Domain,
-        request_kind: SimpleRequest,
+        telemetry: &Telemetry,
+        asked: &Asked<'_>,
     ) -> Result<OperatorReply, Failure> {
-        let request: Request<N> = match request_kind {
-            SimpleRequest::GravityHold => Request::GravityHold,
-            SimpleRequest::Reset => Request::Reset,
-            SimpleRequest::Gains(gains, ramp_s) => Request::Gains { gains, ramp_s },
-        };
+        let request = asked.request::<N>(telemetry)?;
         OperatorSession::<N>::new(domain)?.send_request(&request, None)
     }
     let (domain, _reader, telemetry) = running(system)?;
     let dof = usize::from(telemetry.state.dof);
-    let reply = with_dof!(dof, N => send::<N>(&domain, request_kind))??;
+    let reply = with_dof!(dof, N => send::<N>(&domain, &telemetry, asked))??;
     print_reply(system, &reply)
 }
 
-/// Runs `supple gains`: changes stiffness and damping along a ramp. Gains that are not given are unchanged.
+/// Runs `supple gains`: changes stiffness and damping along a ramp, of the tip, or of the joints where their gains are
+/// given. Gains that are not given are unchanged.
 ///
 /// # Errors
 /// [`Failure`].
 pub fn gains(args: &GainsArgs) -> Result<(), Failure> {
-    let (_, _, telemetry) = running(&args.system)?;
-    let axes = |given: &[f64], now: [f64; 3]| match given {
-        [] => Vector3::from(now),
-        [all] => Vector3::repeat(*all),
-        [x, y, z, ..] => Vector3::new(*x, *y, *z),
-        [x, y] => Vector3::new(*x, *y, now[2]),
+    let of_joints = !(args.joint_stiffness.is_empty() && args.joint_damping.is_empty());
+    let asked = match of_joints {
+        true => Asked::JointGains(args),
+        false => Asked::Gains(args),
     };
-    let gains = Gains {
-        stiffness_n_per_m: axes(&args.stiffness, telemetry.record().stiffness_n_per_m),
-        damping_n_s_per_m: axes(&args.damping, telemetry.record().damping_n_s_per_m),
-    };
-    send_simple_request(&args.system, SimpleRequest::Gains(gains, args.ramp_s))
+    ask(&args.system, &asked)
 }
 
 /// Returns the trajectory and its duration \[s\].

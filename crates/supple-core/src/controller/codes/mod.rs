@@ -10,7 +10,7 @@ pub use request::{RequestCode, RequestCodeError, VALUES};
 use crate::controller::{Fault, Mode, Refusal, SafeAction};
 
 /// Every mode, at the place of its number.
-pub const MODES: [Mode; 8] = [
+pub const MODES: [Mode; 10] = [
     Mode::Idle,
     Mode::GravityHold,
     Mode::Move,
@@ -19,6 +19,8 @@ pub const MODES: [Mode; 8] = [
     Mode::Fault,
     Mode::Excite,
     Mode::Breakaway,
+    Mode::Float,
+    Mode::JointImpedance,
 ];
 
 /// Named numbers. A number once given keeps its meaning.
@@ -47,6 +49,9 @@ numbered! {
         RESET = 6 "reset",
         EXCITE = 7 "excite",
         BREAKAWAY = 8 "breakaway",
+        FLOAT = 9 "float",
+        JOINT_IMPEDANCE = 10 "joint_impedance",
+        JOINT_GAINS = 11 "joint_gains",
     }
 }
 

@@ -8,6 +8,8 @@
 //! | gains | `stiffness_n_per_m`, `damping_n_s_per_m`, `ramp_s` |
 //! | excite | `centre_rad` (N), `sine_rad` (5 harmonics of N), `cosine_rad` (5 of N), `angular_frequency_rad_per_s`, `duration_s`, `ramp_s` |
 //! | breakaway | `joint`, `rate_nm_per_s`, `stop_rad`, `limit_nm` |
+//! | joint_impedance | `target_rad` (N), `duration_s` |
+//! | joint_gains | `stiffness_nm_per_rad` (N), `damping_nm_s_per_rad` (N), `ramp_s` |
 //! | hold | `position_m` |
 //! | line | `from_m`, `to_m`, `duration_s` |
 //! | sinusoid | `centre_m`, `amplitude_m`, `angular_frequency_rad_per_s`, `ramp_s` |
@@ -18,7 +20,7 @@
 //! Decoding says whether numbers are a request, not whether the request is sound: the controller does.
 
 use super::{request_kind, trajectory_kind};
-use crate::config::Gains;
+use crate::config::{Gains, JointGains};
 use crate::controller::{Breakaway, Request};
 use crate::math::{Vector, Vector3};
 use crate::trajectory::{Arc, Fourier, HARMONICS, Line, Probe, Quadrant, Sinusoid, Trajectory};
@@ -64,7 +66,7 @@ impl fmt::Display for RequestCodeError {
             RequestCodeError::Kind(kind) => write!(
                 f,
                 "request is {kind}, known are 0 to {}",
-                request_kind::BREAKAWAY
+                request_kind::JOINT_GAINS
             ),
             RequestCodeError::Trajectory(kind) => {
                 write!(
@@ -117,6 +119,21 @@ impl RequestCode {
                 code.kind = request_kind::GAINS;
                 code.vector(&gains.stiffness_n_per_m);
                 code.vector(&gains.damping_n_s_per_m);
+                code.numbers(&[*ramp_s]);
+            }
+            Some(Request::Float) => code.kind = request_kind::FLOAT,
+            Some(Request::JointImpedance {
+                target_rad,
+                duration_s,
+            }) => {
+                code.kind = request_kind::JOINT_IMPEDANCE;
+                code.numbers(target_rad.as_slice());
+                code.numbers(&[*duration_s]);
+            }
+            Some(Request::JointGains { gains, ramp_s }) => {
+                code.kind = request_kind::JOINT_GAINS;
+                code.numbers(gains.stiffness_nm_per_rad.as_slice());
+                code.numbers(gains.damping_nm_s_per_rad.as_slice());
                 code.numbers(&[*ramp_s]);
             }
             Some(Request::Reset) => code.kind = request_kind::RESET,
@@ -207,6 +224,18 @@ impl RequestCode {
                 stop_rad: rest.number(),
                 limit_nm: rest.number(),
             })),
+            request_kind::FLOAT => Some(Request::Float),
+            request_kind::JOINT_IMPEDANCE => Some(Request::JointImpedance {
+                target_rad: Vector::from(rest.take::<N>()),
+                duration_s: rest.number(),
+            }),
+            request_kind::JOINT_GAINS => Some(Request::JointGains {
+                gains: JointGains {
+                    stiffness_nm_per_rad: Vector::from(rest.take::<N>()),
+                    damping_nm_s_per_rad: Vector::from(rest.take::<N>()),
+                },
+                ramp_s: rest.number(),
+            }),
             unknown => return Err(RequestCodeError::Kind(unknown)),
         };
         let (found, expected) = (rest.values.len(), rest.taken);
