@@ -12,9 +12,10 @@ fn exceeds(value: f64, limit: f64) -> bool {
     value > limit || value.is_nan()
 }
 
-/// Checks joint positions, joint speeds and tip speed.
+/// Checks joint positions, joint speeds and tip speed; `speed_share` of the speed limits applies.
 pub(super) fn motion<const N: usize>(
     limits: &Limits<N>,
+    speed_share: f64,
     position_rad: &Vector<N>,
     velocity_rad_per_s: &Vector<N>,
     tip_velocity: &Vector3<f64>,
@@ -40,7 +41,7 @@ pub(super) fn motion<const N: usize>(
             }
         }
         let value_rad_per_s = abs(velocity_rad_per_s[joint]);
-        let limit_rad_per_s = limits.joint_speed_rad_per_s[joint];
+        let limit_rad_per_s = speed_share * limits.joint_speed_rad_per_s[joint];
         if exceeds(value_rad_per_s, limit_rad_per_s) {
             return Err(Fault::JointSpeed {
                 joint,
@@ -50,7 +51,7 @@ pub(super) fn motion<const N: usize>(
         }
     }
     let value_m_per_s = sqrt(tip_velocity.dot(tip_velocity));
-    let limit_m_per_s = limits.tip_speed_m_per_s;
+    let limit_m_per_s = speed_share * limits.tip_speed_m_per_s;
     if exceeds(value_m_per_s, limit_m_per_s) {
         return Err(Fault::TipSpeed {
             value_m_per_s,

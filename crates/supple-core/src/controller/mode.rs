@@ -41,7 +41,8 @@ pub enum Mode {
     /// The torque of one joint is ramped until it moves, the others are held; then gravity hold.
     Breakaway,
     /// The model alone, without stiffness and without damping beyond the arm's own friction, part of which is
-    /// compensated: for guiding by hand. Held joints keep their position loop.
+    /// compensated: for guiding by hand, at up to half of the speed limits. Held joints keep their position
+    /// loop.
     Float,
     /// Compliant joint-space motion to a pose, with the feed-forward of the move mode; holds the pose at the end
     /// with the same gains. Contact is allowed. Held joints keep their own stiff loop.

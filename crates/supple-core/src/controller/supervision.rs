@@ -15,6 +15,10 @@ use crate::math::{Vector, Vector3, abs};
 use crate::model::workspace::WorkspaceViolation;
 use crate::trajectory::Reference;
 
+/// Share of the speed limits that applies in float: nothing but the model resists a fall there, and a hand guides
+/// slowly.
+const FLOAT_SPEED_SHARE: f64 = 0.5;
+
 /// Whether the pose is regular, so that the tip force can be estimated from the joint torques.
 fn is_regular<const N: usize>(task: &Task<N>) -> bool {
     task.least_singular_value_m >= SINGULAR_BELOW_M
@@ -31,7 +35,17 @@ impl<const N: usize> State<N> {
             return Ok(());
         }
         let velocity = &self.estimator.velocity_rad_per_s;
-        checks::motion(&config.limits, &self.position, velocity, tip_velocity)?;
+        let speed_share = match self.activity {
+            Activity::Float => FLOAT_SPEED_SHARE,
+            _ => 1.0,
+        };
+        checks::motion(
+            &config.limits,
+            speed_share,
+            &self.position,
+            velocity,
+            tip_velocity,
+        )?;
         let joint_setpoints = self.joint_setpoints(config);
         checks::joint_tracking(&config.limits, &joint_setpoints, &self.position)?;
         match reference {

@@ -15,6 +15,8 @@ use supple_model::Description;
 /// Distance and duration of the downward move: minimum jerk, peak speed 0.25 m/s.
 const DESCENT_M: f64 = 0.2;
 const DESCENT_S: f64 = 1.5;
+/// Duration of the same motion with compliant joints, which lag and catch up: peak speed 0.19 m/s.
+const COMPLIANT_DESCENT_S: f64 = 2.0;
 /// Amplitude and angular frequency of the shoulder's oscillation: 0.25 m/s at the tip, which is 0.6 m away.
 const SWING_RAD: f64 = 0.15;
 const SWING_RAD_PER_S: f64 = 2.8;
@@ -51,7 +53,7 @@ pub fn request<const N: usize>(
         TestTask::Float => Request::Float,
         TestTask::JointImpedance => Request::JointImpedance {
             target_rad: start_pose(config, "drill", &Trajectory::Hold(down_m), 1.0)?,
-            duration_s: DESCENT_S,
+            duration_s: COMPLIANT_DESCENT_S,
         },
         TestTask::Move => Request::Move {
             target_rad: start_pose(config, "drill", &Trajectory::Hold(down_m), 1.0)?,
@@ -101,7 +103,8 @@ impl<const N: usize> Script<N> {
                 + cycles(match spec.task {
                     TestTask::GravityHold | TestTask::Float => 0.3,
                     // The event comes at the highest speed of the motion.
-                    TestTask::Move | TestTask::JointImpedance => 0.6,
+                    TestTask::Move => 0.6,
+                    TestTask::JointImpedance => 0.8,
                     TestTask::Track | TestTask::Probe => 0.8,
                     TestTask::Excite => 0.7,
                 }),
