@@ -1,12 +1,10 @@
 //! A fit as a description: the saved model equals the fit.
 
-mod support;
-
+use crate::support::{Noise, motion};
 use supple_core::dynamics::rnea;
 use supple_core::{Friction, Vector};
 use supple_ident::{FrictionColumns, Options, fit};
 use supple_model::Description;
-use support::{Noise, motion};
 
 fn friction() -> [Friction; 4] {
     std::array::from_fn(|j| Friction::coulomb(1.0 + j as f64, 0.5))
@@ -36,7 +34,7 @@ fn a_saved_fit_is_loaded_as_the_same_arm() {
     let config = loaded.config::<4>().unwrap();
     std::fs::remove_dir_all(&folder).unwrap();
     let wanted = found.arm().unwrap();
-    let mut noise = Noise(5);
+    let mut noise = Noise::new(5);
     for _ in 0..20 {
         let [q, qd, qdd] = state(&mut noise);
         let difference = rnea(&config.arm, &q, &qd, &qdd) - rnea(&wanted, &q, &qd, &qdd);
@@ -61,7 +59,7 @@ fn a_prediction_is_the_torque_of_the_identified_arm_and_its_friction() {
     let data = motion(&arm, &friction(), &joints, 900, 9);
     let found = fit(&arm, &[data], &joints, &options()).unwrap();
     let (model, rubbing) = (found.arm().unwrap(), found.friction());
-    let mut noise = Noise(6);
+    let mut noise = Noise::new(6);
     for _ in 0..20 {
         let [q, qd, qdd] = state(&mut noise);
         let mut expected = rnea(&model, &q, &qd, &qdd);

@@ -1,6 +1,5 @@
 //! A small arm whose texts the tests modify: three joints, a fixed flange, a gripper finger outside the chain whose
 //! joint the TOML fixes.
-#![allow(dead_code, reason = "each test binary uses a part")]
 
 use supple_model::{Description, ModelError};
 

@@ -1,6 +1,6 @@
 //! Errors in a URDF.
 
-use crate::check;
+use super::check;
 use crate::common::{TOML, with_urdf};
 use supple_model::Description;
 

@@ -1,8 +1,6 @@
 //! Conversions between SI units and counts: rounding, saturation, rejected values.
 
-mod common;
-
-use common::config;
+use crate::property::config;
 use proptest::prelude::*;
 use supple_puck::force_torque::Quantity;
 use supple_puck::safety::{SafetyLimits, SafetyMode, SpeedLimit};
@@ -169,7 +167,7 @@ fn roles_contain_type_and_options() {
 }
 
 proptest! {
-    #![proptest_config(config(20_260_302))]
+    #![proptest_config(config(1000, 20_260_302))]
 
     #[test]
     fn torques_are_within_half_a_unit_and_odd(scale in 500.0..25_000.0, share in -1.0..1.0f64) {

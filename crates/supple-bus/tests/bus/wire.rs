@@ -1,16 +1,12 @@
 //! `struct can_frame`: every frame round-trips, and the parser accepts any sixteen bytes without a panic.
 
+use crate::property::config;
 use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
 use supple_bus::{BusFault, WireFrame};
 use supple_puck::CanFrame;
 
 proptest! {
-    #![proptest_config(ProptestConfig {
-        failure_persistence: None,
-        rng_seed: RngSeed::Fixed(20_260_303),
-        ..ProptestConfig::default()
-    })]
+    #![proptest_config(config(256, 20_260_303))]
 
     #[test]
     fn data_frames_round_trip(id in 0u32..0x800, payload in proptest::collection::vec(any::<u8>(), 0..=8)) {

@@ -1,7 +1,6 @@
 //! Design, ripple, learning and payload, each compared with a known arm.
 
-mod support;
-
+use crate::support::{Noise, motion};
 use supple_core::dynamics::{gravity, rnea, tip_pose};
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::ripple::Harmonic;
@@ -15,7 +14,6 @@ use supple_ident::{
     DMatrix, FrictionColumns, Learning, Motion, Options, RippleSearch, fit, fit_ripple, learn,
 };
 use supple_model::Description;
-use support::{Noise, motion};
 
 const ALL: [usize; 4] = [0, 1, 2, 3];
 
@@ -187,7 +185,7 @@ fn rippled(
     motor_from_joint: &Matrix<4, 4>,
 ) -> Motion {
     let (rate_hz, samples) = (100.0, 6000);
-    let mut noise = Noise(17);
+    let mut noise = Noise::new(17);
     let angle = |t: f64, j: usize, derivative: usize| -> f64 {
         let (a, w) = (0.6, 0.12 + 0.02 * j as f64);
         match derivative {
@@ -265,7 +263,7 @@ fn a_payload_is_learnt_together_with_friction() {
     };
     let learnt = learn(&arm, &friction, &[data], &ALL, &learning).unwrap();
     let got = with_payload(&arm, learnt.payload.as_ref()).unwrap();
-    let mut noise = Noise(2);
+    let mut noise = Noise::new(2);
     for _ in 0..30 {
         let q = Vector::from_fn(|_, _| 2.0 * noise.draw());
         let (a, b) = (gravity(&got, &q), gravity(&loaded, &q));
@@ -306,7 +304,7 @@ fn a_payload_is_identified_and_a_known_one_gives_the_torque_scale() {
     let empty = motion(&arm, &friction, &ALL, 1500, 5);
     let loaded = motion(&carrying(&arm, &weight()), &friction, &ALL, 1500, 6);
     let noisy = |mut data: Motion, seed: u64| {
-        let mut noise = Noise(seed);
+        let mut noise = Noise::new(seed);
         data.tau.iter_mut().for_each(|t| *t += 0.02 * noise.draw());
         data
     };

@@ -52,7 +52,7 @@ fn largest_difference<'a>(found: impl IntoIterator<Item = &'a f64>, expected: &V
 }
 
 fn agrees_with_the_reference<const N: usize>(name: &str) {
-    let reference: Value = serde_json::from_str(include_str!("data/reference.json")).unwrap();
+    let reference: Value = serde_json::from_str(include_str!("../data/reference.json")).unwrap();
     let samples = reference["arms"][name].as_array().expect("samples");
     assert!(!samples.is_empty());
     let arm = bare::<N>(&asset(name)).build().unwrap();
@@ -263,7 +263,7 @@ fn every_number_has_a_stated_source() {
 #[test]
 fn the_published_schema_matches_the_code() {
     let published: Value =
-        serde_json::from_str(include_str!("../../../assets/arm.schema.json")).unwrap();
+        serde_json::from_str(include_str!("../../../../assets/arm.schema.json")).unwrap();
     let of_the_code: Value = serde_json::from_str(&schema_json()).unwrap();
     assert!(
         published == of_the_code,

@@ -1,6 +1,6 @@
 //! Errors in a TOML, by itself or in combination with its URDF.
 
-use crate::check;
+use super::check;
 use crate::common::{TOML, URDF, with, with_toml};
 use supple_model::Description;
 

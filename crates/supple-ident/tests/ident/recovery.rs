@@ -1,13 +1,12 @@
 //! Random arms are identified from their motion and torques.
 
-mod support;
-
+use crate::property::config;
+use crate::support::{Noise, motion, random_arm};
 use proptest::prelude::*;
-use proptest::test_runner::{RngSeed, TestCaseError};
+use proptest::test_runner::TestCaseError;
 use supple_core::dynamics::{parameters, rnea};
 use supple_core::{Arm, Friction, Vector};
 use supple_ident::{Columns, DMatrix, FrictionColumns, Options, Weights, fit};
-use support::{Noise, motion, random_arm};
 
 fn friction<const N: usize>() -> [Friction; N] {
     std::array::from_fn(|j| Friction {
@@ -18,7 +17,7 @@ fn friction<const N: usize>() -> [Friction; N] {
 
 /// Torques of two arms at random states, without friction and rotors.
 fn furthest<const N: usize>(a: &Arm<N>, b: &Arm<N>, moving: &[usize]) -> f64 {
-    let mut noise = Noise(99);
+    let mut noise = Noise::new(99);
     let mut worst: f64 = 0.0;
     for _ in 0..50 {
         let q = Vector::<N>::from_fn(|j, _| {
@@ -87,12 +86,7 @@ fn arm_is_given_back(seed: u64) -> Result<(), TestCaseError> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig {
-        cases: 12,
-        failure_persistence: None,
-        rng_seed: RngSeed::Fixed(20_260_501),
-        ..ProptestConfig::default()
-    })]
+    #![proptest_config(config(12, 20_260_501))]
 
     #[test]
     fn noise_free_data_give_the_arm_back_in_every_torque(seed in 1_u64..1000) {
@@ -106,7 +100,7 @@ proptest! {
         let (samples, amplitude_nm) = (300, 5.0);
         let exact = motion(&truth, &friction(), &joints, samples, seed);
         let mut data = exact.clone();
-        let mut noise = Noise(seed);
+        let mut noise = Noise::new(seed);
         data.tau.iter_mut().for_each(|t| *t += amplitude_nm * noise.draw());
         // Some of these arms hardly move, so no sample may be excluded.
         let options = Options { slow_rad_per_s: 0.0, ..Options::default() };

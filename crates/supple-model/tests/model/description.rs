@@ -1,8 +1,6 @@
 //! Result of reading a valid URDF and TOML: chain, lumping, defaults, shapes, transforms.
 
-mod common;
-
-use common::{TOML, URDF, with, with_urdf};
+use crate::common::{TOML, URDF, with, with_urdf};
 use std::f64::consts::TAU;
 use supple_core::config::{ApparentInertia, FrictionVelocity, Role};
 use supple_core::math::Vector3;

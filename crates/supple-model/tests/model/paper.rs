@@ -1,7 +1,7 @@
 //! The closed form of the paper's arm compared with the general dynamics, and properties of the printed set.
 
+use crate::property::config;
 use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
 use std::f64::consts::PI;
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::{Arm, ArmError, Pose, Vector, dynamics};
@@ -48,12 +48,7 @@ fn joints(max: f64) -> impl Strategy<Value = Vector<3>> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig {
-        cases: 200,
-        failure_persistence: None,
-        rng_seed: RngSeed::Fixed(20_260_201),
-        ..ProptestConfig::default()
-    })]
+    #![proptest_config(config(200, 20_260_201))]
 
     #[test]
     fn closed_form_equals_the_general_dynamics(

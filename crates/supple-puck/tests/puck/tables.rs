@@ -8,7 +8,7 @@ type Lists = BTreeMap<(String, i32), BTreeMap<String, u8>>;
 
 fn lists() -> Lists {
     let mut lists = Lists::new();
-    let mut rows = include_str!("data/property_ids.csv").lines();
+    let mut rows = include_str!("../data/property_ids.csv").lines();
     assert_eq!(rows.next(), Some("puck_type,min_firmware,property,id"));
     for row in rows {
         let [kind, version, property, id] = row.split(',').collect::<Vec<_>>()[..] else {

@@ -1,27 +1,28 @@
 //! Motions with exact derivatives, torques of a known arm, and noise with a seed.
-#![allow(dead_code)]
 
+use rand_xoshiro::SplitMix64;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use supple_core::dynamics::rnea;
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::{Arm, Body, Friction, Joint, Pose, Vector};
 use supple_ident::{DMatrix, Motion};
 
-pub struct Noise(pub u64);
+pub struct Noise(SplitMix64);
 
 impl Noise {
-    /// Uniform in (-1, 1).
+    pub fn new(seed: u64) -> Noise {
+        Noise(SplitMix64::seed_from_u64(seed))
+    }
+
+    /// Uniform in [-1, 1).
     pub fn draw(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
-        (self.0 >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+        (self.0.next_u64() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
     }
 }
 
 /// A physically consistent arm with random axes, offsets and rotors.
 pub fn random_arm<const N: usize>(seed: u64) -> Arm<N> {
-    let mut noise = Noise(seed);
+    let mut noise = Noise::new(seed);
     let joints: [Joint; N] = std::array::from_fn(|_| {
         let mut three = |s: f64| [s * noise.draw(), s * noise.draw(), s * noise.draw()];
         let (xyz, rpy, axis) = (three(0.4), three(3.0), three(1.0));
@@ -53,7 +54,7 @@ pub fn motion<const N: usize>(
     seed: u64,
 ) -> Motion {
     let rate_hz = 50.0;
-    let mut noise = Noise(seed);
+    let mut noise = Noise::new(seed);
     let waves: Vec<[f64; 3]> = (0..5 * N)
         .map(|_| {
             [

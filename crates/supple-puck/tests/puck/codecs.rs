@@ -1,9 +1,7 @@
 //! Round trips: encoded values parse to themselves, and every input is either rejected or re-encoded
 //! identically.
 
-mod common;
-
-use common::config;
+use crate::property::config;
 use proptest::prelude::*;
 use supple_puck::force_torque::{Quantity, SensorReading, SensorStatus};
 use supple_puck::property::Reply;
@@ -112,7 +110,7 @@ fn any_destination() -> impl Strategy<Value = Destination> {
 }
 
 proptest! {
-    #![proptest_config(config(20_260_301))]
+    #![proptest_config(config(1000, 20_260_301))]
 
     #[test]
     fn property_messages_round_trip(

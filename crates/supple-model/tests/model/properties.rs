@@ -1,10 +1,8 @@
 //! Random chains survive a URDF round trip; mutated files never cause a panic.
 
-mod common;
-
-use common::{TOML, URDF};
+use crate::common::{TOML, URDF};
+use crate::property::config;
 use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::{Body, Pose};
 use supple_model::Description;
@@ -96,12 +94,7 @@ fn chain(joints: &[RandomJoint]) -> String {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig {
-        cases: 200,
-        failure_persistence: None,
-        rng_seed: RngSeed::Fixed(20_260_202),
-        ..ProptestConfig::default()
-    })]
+    #![proptest_config(config(200, 20_260_202))]
 
     #[test]
     fn a_written_chain_is_read_back(joints in prop::collection::vec(joint(), 4)) {
@@ -149,12 +142,7 @@ fn mutated(text: &'static str) -> impl Strategy<Value = String> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig {
-        cases: 2000,
-        failure_persistence: None,
-        rng_seed: RngSeed::Fixed(20_260_203),
-        ..ProptestConfig::default()
-    })]
+    #![proptest_config(config(2000, 20_260_203))]
 
     /// The text is either rejected, or gives a usable description.
     #[test]

@@ -1,14 +1,12 @@
 //! The constrained solution compared with its optimality conditions, known solutions and random feasible
 //! points.
 
-mod support;
-
+use crate::support::Noise;
 use supple_core::math::Vector;
 use supple_ident::consistent::{Constraints, Solution, pseudo_inertia, solve};
 use supple_ident::qr_reduction::ReducedSystem;
 use supple_ident::regressor::JointRows;
 use supple_ident::{DMatrix, DVector};
-use support::Noise;
 
 type Link = Vector<10>;
 
@@ -40,7 +38,7 @@ fn objective(problem: &ReducedSystem, c: &Constraints, x: &DVector<f64>) -> Opti
 /// Noisy equations of two links and four friction columns, whose unconstrained solution is physically
 /// inconsistent.
 fn hard(seed: u64, prior_weight: f64) -> (ReducedSystem, Constraints) {
-    let mut noise = Noise(seed);
+    let mut noise = Noise::new(seed);
     let a = DMatrix::from_fn(60, 24, |_, _| noise.draw());
     let b = DVector::from_fn(60, |_, _| 2.0 * noise.draw());
     let constraints = Constraints {
@@ -64,7 +62,7 @@ fn no_feasible_neighbour_is_better_than_the_optimality_gap() {
         let found = solve(&problem, &constraints).unwrap();
         let value = objective(&problem, &constraints, &found.x).expect("feasible");
         assert!((value - found.objective).abs() < 1e-8 * value.abs().max(1.0));
-        let mut noise = Noise(seed + 100);
+        let mut noise = Noise::new(seed + 100);
         let mut feasible = 0;
         for round in 0..2000 {
             let size = 10.0_f64.powi(-(round % 6));
@@ -132,7 +130,7 @@ fn multipliers_are_dual_feasible_and_complementary() {
 
 #[test]
 fn an_unconstrained_optimum_inside_the_set_is_found_exactly() {
-    let mut noise = Noise(5);
+    let mut noise = Noise::new(5);
     let truth = DVector::from_iterator(11, ball().iter().copied().chain([0.7]));
     let a = DMatrix::from_fn(400, 11, |_, _| 100.0 * noise.draw());
     let b = &a * &truth;

@@ -1,13 +1,11 @@
 //! Invalid input is rejected, and each message names file, element, value and remedy.
 
-#[path = "../common/mod.rs"]
-mod common;
 mod files;
 mod published;
 mod toml;
 mod urdf;
 
-use common::{TOML, URDF, with_toml, with_urdf};
+use crate::common::{TOML, URDF, with_toml, with_urdf};
 use supple_model::{Description, ModelError};
 
 /// Text to replace, its replacement, and fragments that the message must contain: element, value, remedy.
