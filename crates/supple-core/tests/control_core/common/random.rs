@@ -2,9 +2,10 @@
 //! orientations.
 
 use super::cloud::{Cloud, Point};
+use crate::support::property::{Outcome, run};
+use crate::support::settings::config;
 use proptest::collection::vec;
 use proptest::prelude::*;
-use proptest::test_runner::{Config, RngSeed, TestCaseError, TestRunner};
 use supple_core::math::Vector3;
 use supple_core::{Arm, Joint, Pose, Vector};
 
@@ -48,21 +49,8 @@ impl<const N: usize> Case<N> {
 /// Runs `property` on 200 random arms of `N` joints, the same ones each time.
 ///
 /// `PROPTEST_CASES` and `PROPTEST_RNG_SEED` override number and seed.
-pub fn check<const N: usize>(property: fn(&Case<N>) -> Result<(), TestCaseError>) {
-    let mut config = Config {
-        failure_persistence: None,
-        ..Config::default()
-    };
-    if std::env::var_os("PROPTEST_CASES").is_none() {
-        config.cases = 200;
-    }
-    if config.rng_seed == RngSeed::Random {
-        config.rng_seed = RngSeed::Fixed(20_260_101);
-    }
-    let outcome = TestRunner::new(config).run(&case::<N>(), |case| property(&case));
-    if let Err(failure) = outcome {
-        panic!("{failure}");
-    }
+pub fn check<const N: usize>(property: fn(&Case<N>) -> Outcome) {
+    run(config(200, 20_260_101), case::<N>(), |case| property(&case));
 }
 
 /// Defines one test per property and arm size.

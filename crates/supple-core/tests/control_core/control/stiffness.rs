@@ -3,6 +3,7 @@
 
 use crate::support::configs::{four, held, three, unlimited};
 use crate::support::plant::{Plant, push};
+use crate::support::random::Random;
 use crate::support::rig::{Rig, bent};
 use crate::support::size;
 use supple_core::config::{ApparentInertia, Gains, Role};
@@ -44,13 +45,10 @@ fn stiffer_by(roles: &[Role; 4], before: &Matrix<4, 4>, after: &Matrix<4, 4>) ->
     for i in (0..4).filter(|i| held(*i)) {
         worst = worst.max(gained[(i, i)]);
     }
-    let mut seed = 1_u64;
+    let mut random = Random::new(1);
     for _ in 0..2000 {
-        let direction = Vector::<4>::from_fn(|i, _| {
-            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-            let random = (seed >> 33) as f64 / f64::from(1_u32 << 31) - 0.5;
-            if held(i) { 0.0 } else { random }
-        });
+        let direction = random.joints::<4>(1.0);
+        let direction = Vector::<4>::from_fn(|i, _| if held(i) { 0.0 } else { direction[i] });
         let direction = direction / direction.norm();
         worst = worst.max(direction.dot(&(gained * direction)));
     }

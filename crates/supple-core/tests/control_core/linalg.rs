@@ -1,16 +1,10 @@
 //! The small linear algebra compared with nalgebra and with its definitions.
-#![allow(
-    clippy::disallowed_methods,
-    reason = "reference values use other mathematical functions"
-)]
 
-mod common;
-
-use common::numeric::{error_at_scale, mixed_error, size};
-use common::random::pose;
+use crate::common::numeric::{error_at_scale, mixed_error, size};
+use crate::common::random::pose;
+use crate::support::settings::config;
 use proptest::collection::vec;
 use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
 use supple_core::linalg::{
     Cholesky, min_singular_value, singular_values_exceed, symmetric_eigenvalues,
 };
@@ -63,12 +57,7 @@ fn cholesky_solves<const N: usize>(b: &Matrix<N, N>, x: &Vector<N>) -> Result<()
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig {
-        failure_persistence: None,
-        rng_seed: RngSeed::Fixed(20_260_104),
-        cases: 1000,
-        ..ProptestConfig::default()
-    })]
+    #![proptest_config(config(1000, 20_260_104))]
 
     #[test]
     fn cholesky_3(b in matrix::<3, 3>(), x in matrix::<3, 1>()) {

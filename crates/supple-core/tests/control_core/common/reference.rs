@@ -6,8 +6,8 @@ use supple_core::dynamics::Regressor;
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::{Arm, Body, Joint, Matrix, Pose, Vector};
 
-const ARMS: &str = include_str!("../data/arms.json");
-const REGRESSORS: &str = include_str!("../data/regressors.json");
+const ARMS: &str = include_str!("../../data/arms.json");
+const REGRESSORS: &str = include_str!("../../data/regressors.json");
 
 /// A recorded arm with its samples.
 pub struct Reference<const N: usize> {
@@ -37,15 +37,15 @@ pub struct Sample<const N: usize> {
 }
 
 pub fn wam3() -> Reference<3> {
-    read("wam3", include_str!("../data/wam3.json"))
+    read("wam3", include_str!("../../data/wam3.json"))
 }
 
 pub fn wam4() -> Reference<4> {
-    read("wam4", include_str!("../data/wam4.json"))
+    read("wam4", include_str!("../../data/wam4.json"))
 }
 
 pub fn wam7() -> Reference<7> {
-    read("wam7", include_str!("../data/wam7.json"))
+    read("wam7", include_str!("../../data/wam7.json"))
 }
 
 fn read<const N: usize>(name: &str, states: &str) -> Reference<N> {

@@ -1,16 +1,11 @@
 //! Unit tests of the contact latch: direction, threshold, memory. Tests in the control loop:
 //! `control/contact.rs`.
-#![allow(
-    clippy::disallowed_methods,
-    reason = "reference values use other mathematical functions"
-)]
 
 use supple_core::config::ContactLatch;
 use supple_core::latch::Latch;
 use supple_core::math::Vector3;
 
-mod support;
-use support::configs::latch;
+use crate::support::configs::latch;
 
 const PERIOD_S: f64 = 1e-3;
 

@@ -1,11 +1,4 @@
 //! The complete control step: modes, faults, limits, and invariants under arbitrary input.
-#![allow(
-    clippy::disallowed_methods,
-    reason = "reference values use other mathematical functions"
-)]
-
-#[path = "../support/mod.rs"]
-mod support;
 
 mod arrivals;
 mod bumpless;

@@ -1,12 +1,8 @@
 //! Friction, Eq. (3.2): continuity, slopes, symmetry, passivity, and the discontinuity of the
 //! printed form.
-#![allow(
-    clippy::disallowed_methods,
-    reason = "reference values use other mathematical functions"
-)]
 
+use crate::support::settings::config;
 use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
 use supple_core::Friction;
 
 /// Parameters of the paper's shoulder pitch.
@@ -126,11 +122,7 @@ fn no_friction_has_zero_torque() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig {
-        failure_persistence: None,
-        rng_seed: RngSeed::Fixed(20_260_103),
-        ..ProptestConfig::default()
-    })]
+    #![proptest_config(config(256, 20_260_103))]
 
     #[test]
     fn is_odd_about_its_offset(friction in any_friction(), v in -3.0..3.0) {

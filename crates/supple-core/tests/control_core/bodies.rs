@@ -1,25 +1,16 @@
 //! Poses and bodies: URDF angles, composition, merging of bodies; compared with nalgebra and point
 //! masses.
-#![allow(
-    clippy::disallowed_methods,
-    reason = "reference values use other mathematical functions"
-)]
 
-mod common;
-
-use common::numeric::mixed_error;
-use common::random::{cloud, direction, pose};
+use crate::common::numeric::mixed_error;
+use crate::common::random::{cloud, direction, pose};
+use crate::support::settings::config;
 use proptest::prelude::*;
 use supple_core::math::{Matrix3, Vector3, skew};
 use supple_core::nalgebra::Rotation3;
 use supple_core::{Body, Pose};
 
 proptest! {
-    #![proptest_config(ProptestConfig {
-        failure_persistence: None,
-        rng_seed: proptest::test_runner::RngSeed::Fixed(20_260_102),
-        ..ProptestConfig::default()
-    })]
+    #![proptest_config(config(256, 20_260_102))]
 
     #[test]
     fn urdf_angles_are_roll_pitch_yaw_about_fixed_axes(rpy in [-3.2..3.2, -3.2..3.2, -3.2..3.2]) {

@@ -1,9 +1,6 @@
 //! The momentum observer on an exactly simulated arm: a first-order lag of the stated bandwidth.
-#![allow(
-    clippy::disallowed_methods,
-    reason = "reference values use other mathematical functions"
-)]
 
+use crate::support;
 use supple_core::config::Role;
 use supple_core::dynamics::{Terms, terms};
 use supple_core::impedance::Task;
@@ -11,10 +8,9 @@ use supple_core::math::Vector3;
 use supple_core::observer::MomentumObserver;
 use supple_core::{Arm, Vector};
 
-mod support;
-use support::arms::{wam3, wam4};
-use support::configs::four;
-use support::plant::{Plant, push};
+use crate::support::arms::{wam3, wam4};
+use crate::support::configs::four;
+use crate::support::plant::{Plant, push};
 
 /// Runs the observer on an oscillating arm with the torque `external` on it. Returns the residual
 /// and the arm's angles after each cycle, and the maximum rate of `C^T qd - G`.

@@ -1,10 +1,10 @@
 //! Invariance: the same arm described in other frames, from another base, and with its tool as part
 //! of the last link.
 
+use super::identities::torque_scale;
 use crate::common::cloud::turn;
 use crate::common::numeric::size;
 use crate::common::random::Case;
-use crate::identities::torque_scale;
 use crate::{for_arms_of_3_4_and_7_joints, prop_close};
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;

@@ -1,16 +1,9 @@
 //! The law as a single sum: the resulting accelerations of the tip, and agreement with the law term
 //! by term.
 
-#![allow(
-    clippy::disallowed_methods,
-    reason = "reference values use other mathematical functions"
-)]
-
-mod common;
-mod support;
-
-use common::numeric::mixed_error;
-use common::random::{Case, check};
+use crate::common::numeric::mixed_error;
+use crate::common::random::{Case, check};
+use crate::support::{self, inverse};
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
 use supple_core::config::{Gains, Law, Role};
@@ -23,7 +16,6 @@ use supple_core::operational::{
     position_torque,
 };
 use supple_core::{Arm, Friction, Matrix, Pose, Reference, Vector};
-use support::inverse;
 
 type Outcome = Result<(), TestCaseError>;
 

@@ -1,11 +1,4 @@
 //! Trajectories: documented properties, and consistency of position, velocity and acceleration.
-#![allow(
-    clippy::disallowed_methods,
-    reason = "reference values use other mathematical functions"
-)]
-
-#[path = "../support/mod.rs"]
-mod support;
 
 mod derivatives;
 mod fourier;

@@ -1,12 +1,8 @@
 //! Sines and cosines of all joints compared with `libm`, and with their series in double-double
 //! arithmetic.
-#![allow(
-    clippy::disallowed_methods,
-    reason = "reference values use other mathematical functions"
-)]
 
+use crate::support::settings::config;
 use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
 use std::f64::consts::{FRAC_PI_2, PI};
 use supple_core::sincos::{MAX_ANGLE_RAD, sin_cos_all};
 
@@ -71,12 +67,7 @@ fn ulps(found: f64, expected: Double) -> f64 {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig {
-        failure_persistence: None,
-        rng_seed: RngSeed::Fixed(20_261_121),
-        cases: 20_000,
-        ..ProptestConfig::default()
-    })]
+    #![proptest_config(config(20_000, 20_261_121))]
 
     #[test]
     fn within_one_unit_on_the_range_of_joints(x in -10.0..10.0_f64) {

@@ -1,15 +1,10 @@
 //! The velocity estimator: ramps, delay, noise and lost readings.
-#![allow(
-    clippy::disallowed_methods,
-    reason = "reference values use other mathematical functions"
-)]
 
 use proptest::prelude::*;
 use supple_core::Vector;
 use supple_core::estimator::Estimator;
 
-mod support;
-use support::property::check;
+use crate::support::property::check;
 
 fn one(x: f64) -> Vector<1> {
     Vector::<1>::new(x)

@@ -1,9 +1,9 @@
 //! Requests encoded as numbers: encoding and decoding is lossless, and invalid numbers are
 //! rejected.
 
+use crate::support::settings::config;
 use proptest::prelude::*;
 use proptest::strategy::Union;
-use proptest::test_runner::RngSeed;
 use supple_core::codes::{RequestCode, RequestCodeError, VALUES};
 use supple_core::config::Gains;
 use supple_core::controller::{Breakaway, Request};
@@ -123,11 +123,7 @@ fn request() -> impl Strategy<Value = Numbered> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig {
-        failure_persistence: None,
-        rng_seed: RngSeed::Fixed(20_260_106),
-        ..ProptestConfig::default()
-    })]
+    #![proptest_config(config(256, 20_260_106))]
 
     #[test]
     fn every_request_round_trips_bit_exact((numbers, request) in request()) {
