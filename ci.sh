@@ -72,7 +72,7 @@ step_advisories() {
 step_python() {
     virtual_environment python tests/python/requirements.txt
     SUPPLE_PYTHON=$PWD/$WORK/python/bin/python \
-        cargo test --locked --workspace --exclude supple-python --test python_readers -- --ignored
+        cargo test --locked --workspace --exclude supple-python --test log -- --ignored python_readers
 }
 
 # package: the Python package: lints, installation, stubs, tests beside its peers; installs those
@@ -131,7 +131,7 @@ step_ur10e() {
     local folder=${SUPPLE_UR10E_DIR:-}
     [[ -n $folder && -f $folder/ur10e.urdf ]] || skip "SUPPLE_UR10E_DIR names no folder with ur10e.urdf and the logs"
     SUPPLE_UR10E_DIR=$(realpath "$folder") \
-        cargo test --locked --workspace --exclude supple-python --test ur10e -- --ignored
+        cargo test --locked --workspace --exclude supple-python --test ident -- --ignored ur10e
 }
 
 # edits: a scalar and a torque term are added to a copy of the tree by two edits each; its logs have them

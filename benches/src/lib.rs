@@ -3,6 +3,8 @@
 //! `dynamics.rs` measures wall-clock time, `instructions` counts instructions, and `peers` compares with other
 //! libraries.
 
+use rand_xoshiro::SplitMix64;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use supple_core::config::Gains;
 use supple_core::config::Role;
 use supple_core::controller::{self, Mode, Request};
@@ -60,14 +62,14 @@ pub fn config<const N: usize>(name: &str) -> Config<N> {
 
 /// A pool of states of `arm`, the same in every run.
 pub fn pool<const N: usize>(arm: &Arm<N>) -> Vec<State<N>> {
-    let mut random = Random(20_261_121);
+    let mut random = Random::new(20_261_121);
     (0..STATES).map(|_| random.state(arm)).collect()
 }
 
 /// As [`pool`], without poses near singular ones of the active joints, where the law takes a different code
 /// path.
 pub fn regular_pool<const N: usize>(arm: &Arm<N>, roles: &[Role; N]) -> Vec<State<N>> {
-    let mut random = Random(20_261_122);
+    let mut random = Random::new(20_261_122);
     let regular = |state: &State<N>| {
         let mut jacobian = dynamics::jacobian(arm, &state.q)
             .fixed_rows::<3>(0)
@@ -154,20 +156,15 @@ impl<const N: usize> Rig<N> {
     }
 }
 
-/// Sequence of Steele and Vigna's splitmix64.
-struct Random(u64);
+struct Random(SplitMix64);
 
 impl Random {
-    fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+    fn new(seed: u64) -> Random {
+        Random(SplitMix64::seed_from_u64(seed))
     }
 
     fn within(&mut self, reach: f64) -> f64 {
-        ((self.bits() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0) * reach
+        ((self.0.next_u64() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0) * reach
     }
 
     fn vector<const R: usize>(&mut self, reach: f64) -> Vector<R> {

@@ -6,7 +6,7 @@ use serde_json::Value;
 use std::path::Path;
 
 /// Impact force of a braked arm that has descended onto a block; the converged value is in
-/// `supple-plant/tests/braking.rs`. The arm falls for another 0.1 s if the fallback torque differs slightly from
+/// `supple-plant/tests/plant/braking.rs`. The arm falls for another 0.1 s if the fallback torque differs slightly from
 /// gravity.
 const IMPACT_N: core::ops::Range<f64> = 50.0..400.0;
 /// Distance of the block beneath the tip, whose path is level \[m\].

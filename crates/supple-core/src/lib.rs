@@ -19,6 +19,10 @@ mod model;
 pub mod record;
 pub mod trajectory;
 
+#[cfg(test)]
+#[path = "../../../tests/support/property.rs"]
+mod property;
+
 pub use controller::{codes, drive_guard, estimator, latch, observer};
 pub use dynamics::inverse_kinematics;
 pub use law::{impedance, operational, torques};

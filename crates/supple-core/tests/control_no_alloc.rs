@@ -4,10 +4,11 @@
     reason = "reference values use other mathematical functions"
 )]
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
-
+#[path = "../../../tests/support/counting.rs"]
+mod counting;
 mod support;
+
+use counting::count_allocations;
 use supple_core::Config;
 use supple_core::config::Gains;
 use supple_core::controller::{Mode, Request};
@@ -15,42 +16,12 @@ use supple_core::math::Vector3;
 use support::configs::{four, friction, seven};
 use support::rig::{Rig, bent, probe_at};
 
-struct Counting;
-
-thread_local! {
-    /// Allocations of this thread; the test harness has its own threads.
-    static COUNT: Cell<u64> = const { Cell::new(0) };
-}
-
-// SAFETY: every call is passed on to the system's allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        COUNT.with(|count| count.set(count.get() + 1));
-        // SAFETY: the caller upholds the contract.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller upholds the contract.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
-
-fn allocations(work: impl FnOnce()) -> u64 {
-    let before = COUNT.with(Cell::get);
-    work();
-    COUNT.with(Cell::get) - before
-}
-
 /// Runs through every mode, a refusal, two kinds of fault and random input.
 fn step_allocates_nothing<const N: usize>(mut config: Config<N>) {
     config.friction = friction();
     let mut rig = Rig::new(config, bent());
     let mut modes = [false; 6];
-    let count = allocations(|| {
+    let count = count_allocations(|| {
         for k in 0..2000 {
             let mut input = rig.input();
             input.request = request(&rig, k);
@@ -96,9 +67,9 @@ fn of_7_joints() {
     step_allocates_nothing(seven());
 }
 
-/// Checks that the counter itself works.
+/// Checks that the counter itself works: it also counts the release.
 #[test]
 fn an_allocation_is_counted() {
-    let count = allocations(|| drop(std::hint::black_box(Box::new(Mode::Idle))));
-    assert_eq!(count, 1);
+    let count = count_allocations(|| drop(std::hint::black_box(Box::new(Mode::Idle))));
+    assert_eq!(count, 2);
 }

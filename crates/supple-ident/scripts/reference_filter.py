@@ -1,4 +1,4 @@
-"""Prints the constants of tests/filter.rs. Needs scipy."""
+"""Prints the constants of tests/ident/filter.rs. Needs scipy."""
 import numpy as np
 from scipy import signal
 

@@ -3,120 +3,20 @@
 
 #[path = "../../../tests/support/counting.rs"]
 mod counting;
+mod support;
 
-use core::time::Duration;
 use counting::count_allocations;
 use supple_core::controller::{Mode, Request};
 use supple_core::math::Vector3;
-use supple_core::{Controller, Input, Output, State, Vector, step};
+use supple_core::{Input, Output, State, step};
 use supple_ipc::message::{
-    ArmState, Drives, OperatorReply, OperatorRequest, Outcome, PlantReport, Telemetry,
-    TorqueCommand,
+    ArmState, Drives, OperatorReply, OperatorRequest, Outcome, TorqueCommand,
 };
-use supple_ipc::{ControllerLink, Domain, PlantLink};
-use supple_model::Description;
-use supple_realtime::Stop;
-use supple_rt::{ControlLoop, HelperQueues, IdleThreadChannel, idle_channel, loop_queues};
-use tempfile::TempDir;
-
-const SOON: Duration = Duration::from_secs(5);
-
-/// A loop with its ports and queues under the test's control.
-struct Bench {
-    control: ControlLoop<4>,
-    link: ControllerLink,
-    plant: PlantLink,
-    helper_queues: HelperQueues,
-    idle: IdleThreadChannel,
-    stop: Stop,
-    home_rad: Vector<4>,
-    cycle: u64,
-    sequence: u64,
-    _folder: TempDir,
-}
-
-fn description() -> Description {
-    Description::asset("wam4").expect("built in")
-}
-
-fn controller() -> Controller<4> {
-    Controller::new(description().config().expect("sound")).expect("sound")
-}
-
-fn bench(virtual_time: bool) -> Bench {
-    let folder = tempfile::tempdir().expect("a folder");
-    let domain = Domain::in_folder(&folder.path().join("run"), "loop").expect("a domain");
-    let (queues, helper_queues) = loop_queues();
-    let (idle_channel_end, idle) = idle_channel();
-    let mut control = ControlLoop::new(controller(), queues, virtual_time);
-    control.set_idle_channel(idle_channel_end);
-    Bench {
-        control,
-        link: ControllerLink::new(&domain).expect("a controller"),
-        plant: PlantLink::new(&domain).expect("a plant"),
-        helper_queues,
-        idle,
-        stop: Stop::default(),
-        home_rad: description().home().expect("four joints"),
-        cycle: 0,
-        sequence: 0,
-        _folder: folder,
-    }
-}
-
-impl Bench {
-    /// The arm at rest at home.
-    fn state(&self, drives: Drives) -> ArmState {
-        ArmState::new::<4>(
-            self.cycle,
-            self.cycle * 1_000_000,
-            &core::array::from_fn(|i| Some(self.home_rad[i])),
-            Some(Vector3::zeros()),
-            drives,
-            PlantReport::default(),
-        )
-    }
-
-    /// The plant announces a state.
-    fn announce(&mut self) {
-        self.plant.announce().expect("announced");
-        assert!(
-            self.control
-                .run_iteration(&self.link, &self.stop)
-                .expect("an iteration")
-        );
-    }
-
-    /// Runs one cycle; returns the loop's answer and whether the loop continues.
-    fn cycle(&mut self, drives: Drives) -> (TorqueCommand, bool) {
-        self.plant.publish(&self.state(drives)).expect("published");
-        let goes_on = self
-            .control
-            .run_iteration(&self.link, &self.stop)
-            .expect("an iteration");
-        let received = self.plant.answer(self.cycle, SOON).expect("read");
-        self.cycle += 1;
-        (received.answer.expect("an answer"), goes_on)
-    }
-
-    fn request(&mut self, request: &Request<4>, at_cycle: Option<u64>) {
-        self.sequence += 1;
-        let message = OperatorRequest::new(1, self.sequence, at_cycle, request);
-        assert!(self.helper_queues.request(message));
-    }
-
-    fn replies(&mut self) -> Vec<OperatorReply> {
-        core::iter::from_fn(|| self.helper_queues.reply()).collect()
-    }
-
-    fn telemetry(&mut self) -> Vec<Telemetry> {
-        core::iter::from_fn(|| self.helper_queues.telemetry()).collect()
-    }
-}
+use support::{Bench, controller};
 
 #[test]
 fn answers_equal_those_of_step_bit_for_bit() {
-    let mut bench = bench(true);
+    let mut bench = Bench::new(true);
     let (controller, mut state) = (controller(), State::new(&controller()));
     bench.request(&Request::GravityHold, Some(3));
     for cycle in 0..50 {
@@ -143,7 +43,7 @@ fn answers_equal_those_of_step_bit_for_bit() {
 
 #[test]
 fn announcements_do_not_change_the_answers() {
-    let (mut announced, mut plain) = (bench(false), bench(false));
+    let (mut announced, mut plain) = (Bench::new(false), Bench::new(false));
     for cycle in 0..200 {
         for bench in [&mut announced, &mut plain] {
             if cycle == 3 {
@@ -168,7 +68,7 @@ fn announcements_do_not_change_the_answers() {
 
 #[test]
 fn a_thousand_cycles_with_requests_and_a_fault_allocate_nothing() {
-    let mut bench = bench(false);
+    let mut bench = Bench::new(false);
     for _ in 0..4 {
         bench.cycle(Drives::Active);
     }
@@ -180,7 +80,7 @@ fn a_thousand_cycles_with_requests_and_a_fault_allocate_nothing() {
                 // Refused in idle: a text is written.
                 300 | 301 => bench.request(&Request::Reset, None),
                 // The channel for idle requests, and a state of another arm.
-                400 => bench.idle.set_requested(1),
+                400 => bench.idle().set_requested(1),
                 500 => {
                     let other = ArmState {
                         dof: 7,
@@ -197,7 +97,7 @@ fn a_thousand_cycles_with_requests_and_a_fault_allocate_nothing() {
             }
             bench.cycle(Drives::Active);
             if k % 50 == 0 {
-                while bench.helper_queues.telemetry().is_some() {}
+                while bench.helper_queues().telemetry().is_some() {}
             }
         }
     });
@@ -215,7 +115,7 @@ fn a_thousand_cycles_with_requests_and_a_fault_allocate_nothing() {
 
 #[test]
 fn late_loop_steps_through_every_state_and_answers_the_newest() {
-    let mut bench = bench(false);
+    let mut bench = Bench::new(false);
     bench.request(&Request::GravityHold, None);
     bench.cycle(Drives::Active);
     for _ in 0..9 {
@@ -234,16 +134,11 @@ fn late_loop_steps_through_every_state_and_answers_the_newest() {
 
 #[test]
 fn missing_states_fault_as_stale_and_torques_stay_gravity() {
-    let mut bench = bench(false);
+    let mut bench = Bench::new(false);
     bench.request(&Request::GravityHold, None);
     bench.cycle(Drives::Active);
     for _ in 0..3 {
-        assert!(
-            bench
-                .control
-                .run_iteration(&bench.link, &bench.stop)
-                .expect("an iteration")
-        );
+        assert!(bench.run_iteration());
     }
     let last = bench.telemetry().pop().expect("some").record();
     assert_eq!(last.mode(), Some(Mode::Fault));
@@ -257,16 +152,11 @@ fn missing_states_fault_as_stale_and_torques_stay_gravity() {
 
 #[test]
 fn in_virtual_time_missing_states_cause_no_step() {
-    let mut bench = bench(true);
+    let mut bench = Bench::new(true);
     bench.request(&Request::GravityHold, None);
     bench.cycle(Drives::Active);
     for _ in 0..3 {
-        assert!(
-            bench
-                .control
-                .run_iteration(&bench.link, &bench.stop)
-                .expect("an iteration")
-        );
+        assert!(bench.run_iteration());
     }
     assert_eq!(bench.telemetry().len(), 1);
     let (answer, _) = bench.cycle(Drives::Active);
@@ -276,7 +166,7 @@ fn in_virtual_time_missing_states_cause_no_step() {
 #[test]
 fn queued_requests_are_refused_on_idle_or_fault() {
     for by_fault in [false, true] {
-        let mut bench = bench(true);
+        let mut bench = Bench::new(true);
         bench.request(&Request::GravityHold, None);
         bench.request(&Request::GravityHold, Some(100));
         bench.cycle(Drives::Active);
@@ -300,9 +190,9 @@ fn queued_requests_are_refused_on_idle_or_fault() {
 
 #[test]
 fn request_for_another_arm_is_refused_with_a_text() {
-    let mut bench = bench(true);
+    let mut bench = Bench::new(true);
     let message = OperatorRequest::new::<7>(1, 9, None, &Request::GravityHold);
-    assert!(bench.helper_queues.request(message));
+    assert!(bench.helper_queues().request(message));
     let (answer, _) = bench.cycle(Drives::Active);
     assert_eq!(answer.mode(), Some(Mode::Idle));
     let reply = bench.replies().pop().expect("a reply");
@@ -312,7 +202,7 @@ fn request_for_another_arm_is_refused_with_a_text() {
 
 #[test]
 fn shutdown_ends_when_the_drives_are_idle() {
-    let mut bench = bench(false);
+    let mut bench = Bench::new(false);
     bench.request(&Request::GravityHold, None);
     let (answer, goes_on) = bench.cycle(Drives::Active);
     assert!(answer.wants_torque() && goes_on);
@@ -332,20 +222,15 @@ fn shutdown_ends_when_the_drives_are_idle() {
 
 #[test]
 fn shutdown_times_out_if_the_drives_stay_active_or_the_plant_is_gone() {
-    let mut stubborn = bench(false);
+    let mut stubborn = Bench::new(false);
     stubborn.request(&Request::GravityHold, None);
     stubborn.cycle(Drives::Active);
     stubborn.stop.request_shutdown();
     let left = (0..1000).position(|_| !stubborn.cycle(Drives::Active).1);
     assert_eq!(left, Some(249));
-    let mut gone = bench(false);
+    let mut gone = Bench::new(false);
     gone.cycle(Drives::Active);
     gone.stop.request_shutdown();
-    let left = (0..100).position(|_| {
-        !gone
-            .control
-            .run_iteration(&gone.link, &gone.stop)
-            .expect("an iteration")
-    });
+    let left = (0..100).position(|_| !gone.run_iteration());
     assert_eq!(left, Some(12));
 }

@@ -1,5 +1,8 @@
 //! Seeded mutations of inputs; the test on the stable compiler uses them instead of a fuzzer.
 
+use rand_xoshiro::SplitMix64;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
+
 /// Byte values that often trigger bugs.
 const BYTES: [u8; 12] = [
     0, 1, 2, 0x7f, 0x80, 0xfe, 0xff, b'-', b'9', b'e', b'<', b'\n',
@@ -26,18 +29,19 @@ const RUNS: [&[u8]; 16] = [
 /// Maximum size of a mutated input.
 const MAX_INPUT_BYTES: usize = 1 << 16;
 
-/// Pseudo-random numbers, reproducible for a seed (splitmix64).
+/// Pseudo-random numbers, reproducible for a seed.
 #[derive(Clone, Debug)]
-pub struct Random(pub u64);
+pub struct Random(SplitMix64);
 
 impl Random {
+    /// Creates a generator from a seed.
+    pub fn new(seed: u64) -> Random {
+        Random(SplitMix64::seed_from_u64(seed))
+    }
+
     /// The next number.
     pub fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+        self.0.next_u64()
     }
 
     /// A number below `end`, which must not be zero.

@@ -60,7 +60,7 @@ fn run(name: &str) {
     let factor = std::env::var(FACTOR)
         .ok()
         .and_then(|factor| factor.parse().ok());
-    let mut random = Random(20_261_122);
+    let mut random = Random::new(20_261_122);
     for k in 0..target.mutations.saturating_mul(factor.unwrap_or(1)) {
         let input = mutated(&mut random, &inputs);
         survives(target, &input, &|| format!("mutation {k}"));

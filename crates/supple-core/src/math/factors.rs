@@ -99,10 +99,10 @@ mod tests {
     use crate::math::lanes::{Columns, column, entry};
     use crate::math::linalg::Cholesky;
     use crate::math::{Matrix, Vector};
+    use crate::property::config;
     use core::array::from_fn;
     use proptest::array::uniform;
     use proptest::prelude::*;
-    use proptest::test_runner::RngSeed;
 
     fn columns<const D: usize, const N: usize, const G: usize>(m: &Matrix<D, N>) -> Columns<N, G> {
         from_fn(|k| column::<D, G>(&m.data.0[k]))
@@ -145,11 +145,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig {
-            failure_persistence: None,
-            rng_seed: RngSeed::Fixed(20_260_105),
-            ..ProptestConfig::default()
-        })]
+        #![proptest_config(config(256, 20_260_105))]
 
         #[test]
         fn factors_match_cholesky_for_four_joints_three_directions(a in entries::<4, 4>(), b in entries::<3, 4>(), e in 0.0..0.5) {

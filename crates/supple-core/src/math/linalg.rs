@@ -265,16 +265,12 @@ pub fn min_singular_value<const N: usize>(j: &Matrix<3, N>) -> f64 {
 mod tests {
     use super::{Inverse3, min_root, singular_values_exceed};
     use crate::math::{Matrix3, Vector3, acos, cos};
+    use crate::property::config;
     use proptest::array::uniform3;
     use proptest::prelude::*;
-    use proptest::test_runner::RngSeed;
 
     proptest! {
-        #![proptest_config(ProptestConfig {
-            failure_persistence: None,
-            rng_seed: RngSeed::Fixed(20_261_122),
-            ..ProptestConfig::default()
-        })]
+        #![proptest_config(config(256, 20_261_122))]
 
         #[test]
         fn inverse3_inverts_a_3x3_matrix(

@@ -4,8 +4,8 @@
 //! Waite): two with fused multiply-add, otherwise three, of which two are short. `r` is stored as a
 //! double-double. On `|r| <= pi/4` sine and cosine are polynomials in `r^2`, interpolated at
 //! Chebyshev points so that they are off by less than 0.06 units in the last place; with rounding
-//! both results are within 1 unit (`tests/sincos.rs`). Beyond [`MAX_ANGLE_RAD`], and for values
-//! that are not finite, `libm` is used.
+//! both results are within 1 unit (`tests/control_core/sincos.rs`). Beyond [`MAX_ANGLE_RAD`], and
+//! for values that are not finite, `libm` is used.
 #![allow(
     clippy::needless_range_loop,
     reason = "joints, groups and lanes are counted: each index goes into several arrays"

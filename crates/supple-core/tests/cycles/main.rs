@@ -14,13 +14,14 @@ mod support;
 
 mod simulated_arm;
 
-use simulated_arm::{Random, SimulatedArm};
+use simulated_arm::SimulatedArm;
 use std::collections::BTreeMap;
 use supple_core::config::ApparentInertia;
 use supple_core::controller::{Mode, Request};
 use supple_core::math::Matrix3;
 use supple_core::{Config, Input, Output, Vector};
 use support::configs::{four, seven, three};
+use support::random::Random;
 
 /// Cycles after which the arm restarts in another pose.
 const EPISODE: u64 = 2_000;

@@ -10,7 +10,10 @@ pub mod arms;
 pub mod configs;
 pub mod plant;
 pub mod property;
+pub mod random;
 pub mod rig;
+#[path = "../../../../tests/support/property.rs"]
+pub mod settings;
 pub mod states;
 
 use supple_core::Matrix;

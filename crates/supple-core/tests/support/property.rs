@@ -1,7 +1,8 @@
 //! Properties over random cases with a fixed seed.
 
+use super::settings::config;
 use proptest::prelude::*;
-use proptest::test_runner::{Config, RngSeed, TestCaseError, TestRunner};
+use proptest::test_runner::{Config, TestCaseError, TestRunner};
 use supple_core::Vector;
 use supple_core::math::Vector3;
 
@@ -11,16 +12,11 @@ pub type Outcome = Result<(), TestCaseError>;
 /// seed.
 #[track_caller]
 pub fn check<S: Strategy>(cases: u32, strategy: S, property: impl Fn(S::Value) -> Outcome) {
-    let mut config = Config {
-        failure_persistence: None,
-        ..Config::default()
-    };
-    if std::env::var_os("PROPTEST_CASES").is_none() {
-        config.cases = cases;
-    }
-    if config.rng_seed == RngSeed::Random {
-        config.rng_seed = RngSeed::Fixed(20_260_102);
-    }
+    run(config(cases, 20_260_102), strategy, property);
+}
+
+#[track_caller]
+pub fn run<S: Strategy>(config: Config, strategy: S, property: impl Fn(S::Value) -> Outcome) {
     if let Err(failure) = TestRunner::new(config).run(&strategy, property) {
         panic!("{failure}");
     }

@@ -10,7 +10,8 @@
 //!
 //! A braking arm descends at the speed at which shorted motors and friction dissipate the power of gravity: the
 //! 4-joint arm descends at 0.09 m/s, so that it hits the block with about 200 N for one or two milliseconds and then
-//! rests on it. This impact is inherent in braking and is the same in both plants (`supple-plant/tests/braking.rs`).
+//! rests on it. This impact is inherent in braking and is the same in both plants
+//! (`supple-plant/tests/plant/braking.rs`).
 
 mod evaluation;
 mod lockstep;

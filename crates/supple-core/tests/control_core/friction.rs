@@ -1,0 +1,218 @@
+//! Friction, Eq. (3.2): continuity, slopes, symmetry, passivity, and the discontinuity of the
+//! printed form.
+
+use crate::support::settings::config;
+use proptest::prelude::*;
+use supple_core::Friction;
+
+/// Parameters of the paper's shoulder pitch.
+const SHOULDER: Friction = Friction::coulomb(1.9823, 1.4985);
+const BAND: f64 = SHOULDER.band_rad_per_s;
+
+const WITH_DIP: Friction = Friction {
+    breakaway_nm: 2.1,
+    stribeck_rad_per_s: 0.05,
+    ..SHOULDER
+};
+
+fn any_friction() -> impl Strategy<Value = Friction> {
+    (
+        0.0..3.0,
+        0.0..3.0,
+        0.0..2.0,
+        0.005..0.5,
+        -1.0..1.0,
+        0.001..0.1,
+    )
+        .prop_map(|(viscous, coulomb, dip, stribeck, offset, band)| Friction {
+            viscous_nm_s_per_rad: viscous,
+            coulomb_nm: coulomb,
+            breakaway_nm: coulomb + dip,
+            stribeck_rad_per_s: stribeck,
+            offset_nm: offset,
+            band_rad_per_s: band,
+        })
+}
+
+/// One-sided difference quotient: towards larger speeds if `h > 0`.
+fn one_sided_slope(friction: &Friction, v: f64, h: f64) -> f64 {
+    let d = |k: f64| friction.torque_nm(v + k * h);
+    (-3.0 * d(0.0) + 4.0 * d(1.0) - d(2.0)) / (2.0 * h)
+}
+
+#[track_caller]
+fn close(found: f64, expected: f64, tolerance: f64) {
+    assert!(
+        (found - expected).abs() <= tolerance,
+        "{found}, expected {expected}"
+    );
+}
+
+#[test]
+fn equals_coulomb_and_viscous_friction_at_the_edge_of_the_band() {
+    let Friction {
+        viscous_nm_s_per_rad: v,
+        coulomb_nm: s,
+        ..
+    } = SHOULDER;
+    let h = 1e-6 * BAND;
+    for sign in [1.0, -1.0] {
+        let edge = sign * BAND;
+        close(SHOULDER.torque_nm(edge) - v * edge, sign * s, 1e-15);
+        close(one_sided_slope(&SHOULDER, edge, h), v, 1e-6);
+        close(one_sided_slope(&SHOULDER, edge, -h), v, 1e-6);
+    }
+    close(SHOULDER.torque_nm(0.0), 0.0, 0.0);
+    close(
+        one_sided_slope(&SHOULDER, 0.0, h),
+        v + 2.0 * s / BAND,
+        1e-6 * s / BAND,
+    );
+    close(
+        one_sided_slope(&SHOULDER, 0.0, -h),
+        v + 2.0 * s / BAND,
+        1e-6 * s / BAND,
+    );
+    close(SHOULDER.torque_nm(1.5), v * 1.5 + s, 1e-15);
+    close(SHOULDER.torque_nm(-1.5), -v * 1.5 - s, 1e-15);
+}
+
+/// The inner branch of (3.2) as printed gives `3 S` at the edge of the band, where the outer branch
+/// gives `S`: therefore the sign of the parabola is reversed here.
+#[test]
+fn the_printed_parabola_jumps_by_twice_the_coulomb_torque() {
+    let Friction {
+        viscous_nm_s_per_rad: v,
+        coulomb_nm: s,
+        ..
+    } = SHOULDER;
+    let printed = |qd: f64| v * qd + s / BAND * (qd.signum() * qd * qd / BAND + 2.0 * qd);
+    let outside = SHOULDER.torque_nm(BAND * (1.0 + 1e-9));
+    close(printed(BAND) - outside, 2.0 * s, 1e-8);
+    close(SHOULDER.torque_nm(BAND) - outside, 0.0, 1e-8);
+    // Both have the same slope at rest: they differ only in the square.
+    let h = 1e-9 * BAND;
+    close(printed(h) / h, SHOULDER.torque_nm(h) / h, 1e-6 * s / BAND);
+}
+
+#[test]
+fn stribeck_friction_falls_from_breakaway_to_coulomb() {
+    let without_viscous = Friction {
+        viscous_nm_s_per_rad: 0.0,
+        ..WITH_DIP
+    };
+    let narrow = Friction {
+        band_rad_per_s: 1e-6,
+        ..without_viscous
+    };
+    close(narrow.torque_nm(1e-6), WITH_DIP.breakaway_nm, 1e-8);
+    close(narrow.torque_nm(10.0 * 0.05), WITH_DIP.coulomb_nm, 1e-12);
+    let at_stribeck = WITH_DIP.coulomb_nm + 0.6015 * (-1.0_f64).exp();
+    close(without_viscous.torque_nm(0.05), at_stribeck, 1e-12);
+    // Stribeck effect: the torque falls with speed between the two.
+    assert!(without_viscous.torque_nm(0.03) > without_viscous.torque_nm(0.06));
+}
+
+#[test]
+fn no_friction_has_zero_torque() {
+    for v in [-3.0, -0.005, 0.0, 0.005, 3.0] {
+        assert_eq!(Friction::NONE.torque_nm(v), 0.0);
+    }
+    assert_eq!(Friction::NONE.validate(), Ok(()));
+}
+
+proptest! {
+    #![proptest_config(config(256, 20_260_103))]
+
+    #[test]
+    fn is_odd_about_its_offset(friction in any_friction(), v in -3.0..3.0) {
+        let centred = |v| friction.torque_nm(v) - friction.offset_nm;
+        prop_assert!((centred(v) + centred(-v)).abs() <= 1e-14);
+        let inside = v * friction.band_rad_per_s / 3.0;
+        prop_assert!((centred(inside) + centred(-inside)).abs() <= 1e-14);
+    }
+
+    #[test]
+    fn friction_is_dissipative(friction in any_friction(), v in -3.0..3.0) {
+        for v in [v, v * friction.band_rad_per_s, 0.0] {
+            let dissipated_w = v * (friction.torque_nm(v) - friction.offset_nm);
+            prop_assert!(dissipated_w >= -1e-15, "{dissipated_w} W at {v} rad/s");
+        }
+    }
+
+    #[test]
+    fn grows_with_speed_without_stribeck_effect(
+        friction in any_friction(),
+        slow in -3.0..3.0,
+        more in 0.0..1.0,
+    ) {
+        let friction = Friction { breakaway_nm: friction.coulomb_nm, ..friction };
+        for (slow, more) in [(slow, more), (slow * friction.band_rad_per_s, more * 1e-3)] {
+            let gain = friction.torque_nm(slow + more) - friction.torque_nm(slow);
+            prop_assert!(gain >= -1e-14, "{gain} N m");
+        }
+    }
+
+    /// The slopes from both sides are equal at the edges of the band, at rest and anywhere else.
+    #[test]
+    fn is_smooth_across_the_band(friction in any_friction(), elsewhere in -2.0..2.0) {
+        let band = friction.band_rad_per_s;
+        for v in [-band, 0.0, band, elsewhere * band, elsewhere] {
+            // Second-order one-sided slopes: their error is the third derivative times h^2, plus
+            // the jump of the second derivative, 2 S_0 / band^2, times h.
+            let h = 1e-6 * band.min(friction.stribeck_rad_per_s);
+            let left = one_sided_slope(&friction, v, -h);
+            let right = one_sided_slope(&friction, v, h);
+            let steepest = 2.0 * friction.breakaway_nm / band + friction.breakaway_nm / friction.stribeck_rad_per_s;
+            let allowed = 1e-5 * (1.0 + steepest) + 4e-15 / h;
+            prop_assert!((left - right).abs() <= allowed, "{left} and {right} at {v} rad/s");
+        }
+    }
+
+    #[test]
+    fn valid_friction_is_accepted(friction in any_friction()) {
+        prop_assert_eq!(friction.validate(), Ok(()));
+    }
+}
+
+#[test]
+fn invalid_friction_is_rejected() {
+    type Entry = (&'static str, fn(&mut Friction, f64), &'static [f64]);
+    const NAN: f64 = f64::NAN;
+    const INF: f64 = f64::INFINITY;
+    let entries: [Entry; 6] = [
+        (
+            "viscous_nm_s_per_rad",
+            |f, x| f.viscous_nm_s_per_rad = x,
+            &[-0.1, NAN, INF],
+        ),
+        ("coulomb_nm", |f, x| f.coulomb_nm = x, &[-0.1, NAN, INF]),
+        (
+            "breakaway_nm",
+            |f, x| f.breakaway_nm = x,
+            &[1.4, -0.1, NAN, INF],
+        ),
+        (
+            "stribeck_rad_per_s",
+            |f, x| f.stribeck_rad_per_s = x,
+            &[0.0, -0.1, NAN, INF],
+        ),
+        ("offset_nm", |f, x| f.offset_nm = x, &[NAN, INF, -INF]),
+        (
+            "band_rad_per_s",
+            |f, x| f.band_rad_per_s = x,
+            &[0.0, -0.1, NAN, INF],
+        ),
+    ];
+    for (entry, spoil, values) in entries {
+        for &value in values {
+            let mut friction = WITH_DIP;
+            spoil(&mut friction, value);
+            let error = friction.validate().expect_err(entry);
+            assert_eq!(error.entry, entry);
+            let text = error.to_string();
+            let start = format!("{entry} is {value}, it must be finite");
+            assert!(text.starts_with(&start), "{text:?} against {start:?}");
+        }
+    }
+}

@@ -1,0 +1,156 @@
+//! Unit tests of the contact latch: direction, threshold, memory. Tests in the control loop:
+//! `control/contact.rs`.
+
+use supple_core::config::ContactLatch;
+use supple_core::latch::Latch;
+use supple_core::math::Vector3;
+
+use crate::support::configs::latch;
+
+const PERIOD_S: f64 = 1e-3;
+
+/// A latch after one second of reference motion along x.
+fn moving(config: &ContactLatch) -> Latch {
+    let mut latch = Latch::default();
+    for _ in 0..1000 {
+        cycle(&mut latch, config, Vector3::x() * 0.04, 0.0);
+    }
+    assert!(!latch.in_contact());
+    latch
+}
+
+/// One cycle with a force of `against_n` opposite to x.
+fn cycle(latch: &mut Latch, config: &ContactLatch, velocity: Vector3<f64>, against_n: f64) {
+    latch.update_direction(&velocity, PERIOD_S);
+    latch.update_contact(config, &(-Vector3::x() * against_n), 0.0, PERIOD_S);
+}
+
+/// Whether `newtons` against a continued motion along x latch contact.
+fn closes(config: &ContactLatch, newtons: f64, friction_uncertainty_n: f64) -> bool {
+    let mut latch = moving(config);
+    latch.update_direction(&(Vector3::x() * 0.04), PERIOD_S);
+    latch.update_contact(
+        config,
+        &(-Vector3::x() * newtons),
+        friction_uncertainty_n,
+        PERIOD_S,
+    );
+    assert_eq!(latch.force_against_n(), newtons);
+    latch.in_contact()
+}
+
+#[test]
+fn the_latch_closes_above_its_threshold_and_not_at_it() {
+    let config = latch();
+    assert!(!closes(&config, config.threshold_n, 0.0));
+    assert!(closes(&config, config.threshold_n.next_up(), 0.0));
+    assert!(!closes(&config, config.threshold_n + 1.0, 1.0));
+    assert!(closes(&config, config.threshold_n + 1.01, 1.0));
+    assert!(!closes(&config, -100.0, 0.0), "a push along the way");
+}
+
+#[test]
+fn the_threshold_is_doubled_after_a_start_and_a_reversal() {
+    let config = latch();
+    let mut latch = Latch::default();
+    let mut doubled = [0, 0];
+    for (k, direction) in [1.0, -1.0].into_iter().enumerate() {
+        for _ in 0..1000 {
+            cycle(&mut latch, &config, Vector3::x() * (0.04 * direction), 0.0);
+            if latch.threshold_n() == 2.0 * config.threshold_n {
+                doubled[k] += 1;
+            } else {
+                assert_eq!(latch.threshold_n(), config.threshold_n);
+            }
+        }
+    }
+    // 0.2 s in cycles of 1 ms, to within one cycle.
+    for count in doubled {
+        assert!((199..=201).contains(&count), "{count} cycles");
+    }
+}
+
+/// A curved path is no reversal until its direction differs by more than a right angle from that at
+/// contact, however gradually.
+#[test]
+fn contact_is_remembered_by_its_direction() {
+    let config = latch();
+    let mut latch = moving(&config);
+    cycle(&mut latch, &config, Vector3::x() * 0.04, 10.0);
+    assert!(latch.in_contact());
+    for degrees in 0..180 {
+        let angle = (f64::from(degrees) + 0.5) * std::f64::consts::PI / 180.0;
+        let direction = Vector3::new(angle.cos(), angle.sin(), 0.0);
+        cycle(&mut latch, &config, direction * 0.04, 0.0);
+        assert_eq!(latch.in_contact(), degrees < 90, "at {degrees} degrees");
+    }
+}
+
+/// The same curve without contact: the direction follows, and the threshold is not doubled.
+#[test]
+fn without_contact_the_direction_follows_the_reference() {
+    let config = latch();
+    let mut latch = moving(&config);
+    for degrees in 0..360 {
+        let angle = f64::from(degrees) * std::f64::consts::PI / 180.0;
+        let direction = Vector3::new(angle.cos(), 0.0, angle.sin());
+        cycle(&mut latch, &config, direction * 0.04, 0.0);
+        assert!((latch.direction() - direction).norm() < 1e-12);
+        assert_eq!(latch.threshold_n(), config.threshold_n);
+    }
+}
+
+/// A reference slower than the minimum speed has no direction: it neither releases contact nor
+/// starts a new direction.
+#[test]
+fn a_creeping_reference_is_at_rest() {
+    let config = latch();
+    let mut latch = moving(&config);
+    cycle(&mut latch, &config, Vector3::x() * 0.04, 10.0);
+    for speed in [0.0, -1e-9, -5e-4] {
+        cycle(&mut latch, &config, Vector3::x() * speed, 0.0);
+        assert!(latch.in_contact(), "released at {speed} m/s");
+    }
+    cycle(&mut latch, &config, Vector3::x() * -2e-3, 0.0);
+    assert!(!latch.in_contact(), "the retreat releases");
+    // Before the reference has moved there is no direction.
+    let mut new = Latch::default();
+    cycle(&mut new, &config, Vector3::x() * 5e-4, 50.0);
+    assert_eq!(new.direction(), Vector3::zeros());
+    assert!(!new.in_contact());
+}
+
+/// The fraction stays between its bounds for any fade time and any pauses.
+#[test]
+fn the_friction_fraction_stays_within_its_bounds() {
+    for contact_share in [0.0, 0.4, 1.0] {
+        let config = ContactLatch {
+            contact_share,
+            ..latch()
+        };
+        let mut latch = moving(&config);
+        for k in 0..5000_u32 {
+            let direction = if (k / 700) % 2 == 0 { 1.0 } else { -1.0 };
+            let against = if k % 350 > 300 { 20.0 * direction } else { 0.0 };
+            cycle(
+                &mut latch,
+                &config,
+                Vector3::x() * (0.04 * direction),
+                against,
+            );
+            let share = latch.friction_share();
+            assert!((contact_share..=1.0).contains(&share), "{share}");
+        }
+    }
+}
+
+/// A repeated state takes no time: nothing fades.
+#[test]
+fn zero_elapsed_time_updates_contact_without_fading() {
+    let config = latch();
+    let mut latch = moving(&config);
+    latch.update_direction(&(Vector3::x() * 0.04), 0.0);
+    latch.update_contact(&config, &(-Vector3::x() * 10.0), 0.0, 0.0);
+    assert!(latch.in_contact());
+    assert_eq!(latch.friction_share(), 1.0);
+}

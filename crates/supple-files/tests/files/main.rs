@@ -1,0 +1,3 @@
+//! Files that a user names.
+
+mod special_files;

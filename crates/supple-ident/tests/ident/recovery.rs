@@ -1,0 +1,309 @@
+//! Random arms are identified from their motion and torques.
+
+use crate::property::config;
+use crate::support::{Noise, motion, random_arm};
+use proptest::prelude::*;
+use proptest::test_runner::TestCaseError;
+use supple_core::dynamics::{parameters, rnea};
+use supple_core::{Arm, Friction, Vector};
+use supple_ident::{Columns, DMatrix, FrictionColumns, Options, Weights, fit};
+
+fn friction<const N: usize>() -> [Friction; N] {
+    std::array::from_fn(|j| Friction {
+        offset_nm: 0.1 * j as f64,
+        ..Friction::coulomb(1.0 + 0.2 * j as f64, 0.8)
+    })
+}
+
+/// Torques of two arms at random states, without friction and rotors.
+fn furthest<const N: usize>(a: &Arm<N>, b: &Arm<N>, moving: &[usize]) -> f64 {
+    let mut noise = Noise::new(99);
+    let mut worst: f64 = 0.0;
+    for _ in 0..50 {
+        let q = Vector::<N>::from_fn(|j, _| {
+            if moving.contains(&j) {
+                3.0 * noise.draw()
+            } else {
+                0.3 + j as f64
+            }
+        });
+        let mut rate = || {
+            Vector::<N>::from_fn(|j, _| {
+                if moving.contains(&j) {
+                    2.0 * noise.draw()
+                } else {
+                    0.0
+                }
+            })
+        };
+        let (qd, qdd) = (rate(), rate());
+        let difference = rnea(a, &q, &qd, &qdd) - rnea(b, &q, &qd, &qdd);
+        worst = moving
+            .iter()
+            .fold(worst, |w, j| w.max(difference[*j].abs()));
+    }
+    worst
+}
+
+/// Fits `random_arm(seed)` from a model with other masses, without noise.
+fn arm_is_given_back(seed: u64) -> Result<(), TestCaseError> {
+    let (truth, model) = (random_arm::<4>(seed), random_arm::<4>(seed));
+    // Same kinematics, other masses: the model is the truth with 1.3 times its inertia.
+    let mut links = *model.links();
+    for link in &mut links {
+        link.mass *= 1.3;
+        link.first_moment *= 1.3;
+        link.inertia *= 1.3;
+    }
+    let model = Arm::from_links(
+        links,
+        model.armature(),
+        model.joint_from_tip(),
+        model.gravity(),
+    )
+    .unwrap();
+    let joints = [0, 1, 2, 3];
+    let data = [
+        motion(&truth, &friction(), &joints, 600, seed),
+        motion(&truth, &friction(), &joints, 400, seed + 1),
+    ];
+    for weights in [Weights::Equal, Weights::ByJointResidual, Weights::Huber] {
+        let options = Options {
+            weights,
+            consistent_prior_weight: None,
+            ..Options::default()
+        };
+        let fit = fit(&model, &data, &joints, &options).unwrap();
+        let held_out = motion(&truth, &friction(), &joints, 300, seed + 7);
+        let checked = fit.validate_motion(&held_out).unwrap();
+        prop_assert!(checked.total_relative < 1e-11, "{}", checked.total_relative);
+        for (found, true_one) in fit.friction().iter().zip(friction::<4>()) {
+            prop_assert!((found.coulomb_nm - true_one.coulomb_nm).abs() < 1e-9);
+            prop_assert!((found.viscous_nm_s_per_rad - true_one.viscous_nm_s_per_rad).abs() < 1e-9);
+        }
+    }
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(config(12, 20_260_501))]
+
+    #[test]
+    fn noise_free_data_give_the_arm_back_in_every_torque(seed in 1_u64..1000) {
+        arm_is_given_back(seed)?;
+    }
+
+    #[test]
+    fn consistent_fits_are_arms_whatever_the_noise(seed in 1_u64..1000) {
+        let truth = random_arm::<4>(seed);
+        let joints = [0, 1, 2, 3];
+        let (samples, amplitude_nm) = (300, 5.0);
+        let exact = motion(&truth, &friction(), &joints, samples, seed);
+        let mut data = exact.clone();
+        let mut noise = Noise::new(seed);
+        data.tau.iter_mut().for_each(|t| *t += amplitude_nm * noise.draw());
+        // Some of these arms hardly move, so no sample may be excluded.
+        let options = Options { slow_rad_per_s: 0.0, ..Options::default() };
+        let fit = fit(&truth, &[data], &joints, &options).unwrap();
+        prop_assert!(fit.arm().is_ok());
+        prop_assert!(fit.friction().iter().all(|f| f.validate().is_ok()));
+        let checked = fit.validate_motion(&motion(&truth, &friction(), &joints, 200, seed + 3)).unwrap();
+        prop_assert_eq!(checked.positive_definite, 1.0);
+        // For noise of `sigma`, least squares leave an error of `sigma sqrt(p / n)` in the torques of the
+        // motion itself: its square is the sum over p independent draws. A margin of 50 % covers them.
+        let sigma_nm = amplitude_nm / 3.0_f64.sqrt();
+        let expected_nm = sigma_nm * (fit.rank() as f64 / samples as f64).sqrt();
+        let itself = fit.validate_motion(&exact).unwrap();
+        let found_nm = itself.rms_nm.iter().map(|rms| rms * rms).sum::<f64>().sqrt();
+        prop_assert!(found_nm < 1.5 * expected_nm, "{found_nm} N m, {expected_nm} N m expected");
+    }
+}
+
+/// Singular regressors for which an inexact solver gave singular values wrong in the third digit.
+#[test]
+fn ill_conditioned_regressors_recover_the_arm() {
+    for seed in [634, 658] {
+        arm_is_given_back(seed).unwrap();
+    }
+}
+
+#[test]
+fn consistent_fits_of_exact_data_recover_the_arm() {
+    let truth = random_arm::<4>(11);
+    let joints = [0, 1, 2, 3];
+    let data = motion(&truth, &friction(), &joints, 1500, 3);
+    let options = Options {
+        consistent_prior_weight: Some(1e-6),
+        ..Options::default()
+    };
+    let fit = fit(&truth, &[data], &joints, &options).unwrap();
+    assert!(furthest(&truth, &fit.arm().unwrap(), &joints) < 1e-3);
+    assert!(fit.optimality_gap.unwrap() > 0.0);
+}
+
+#[test]
+fn a_joint_without_fast_samples_is_rejected() {
+    let truth = random_arm::<4>(13);
+    let joints = [0, 1, 2, 3];
+    let data = motion(&truth, &friction(), &joints, 400, 3);
+    let options = Options {
+        slow_rad_per_s: 50.0,
+        ..Options::default()
+    };
+    let error = fit(&truth, &[data], &joints, &options).unwrap_err();
+    assert!(error.to_string().contains("q[0]"), "{error}");
+}
+
+#[test]
+fn held_joints_are_not_required_and_stay_unchanged() {
+    let truth = random_arm::<4>(21);
+    let moving = [1, 3];
+    let mut data = motion(&truth, &friction(), &moving, 800, 5);
+    data.tau.column_mut(0).fill(f64::NAN);
+    let options = Options {
+        consistent_prior_weight: Some(1e-2),
+        ..Options::default()
+    };
+    let fit = fit(&truth, &[data], &moving, &options).unwrap();
+    let arm = fit.arm().unwrap();
+    assert!(furthest(&truth, &arm, &moving) < 1e-3);
+    // The first link was not moved: its parameters are those of the nominal model.
+    let (before, after) = (parameters(&truth)[0], parameters(&arm)[0]);
+    assert!((before - after).amax() < 1e-4);
+    assert_eq!(fit.friction()[0].coulomb_nm, 0.0);
+}
+
+#[test]
+fn the_stribeck_effect_is_fitted_in_the_second_stage_without_bias_of_the_first() {
+    let truth = random_arm::<3>(31);
+    let stribeck: [Friction; 3] = std::array::from_fn(|_| Friction {
+        breakaway_nm: 1.4,
+        stribeck_rad_per_s: 0.05,
+        ..Friction::coulomb(1.0, 1.0)
+    });
+    let data = motion(&truth, &stribeck, &[0, 1, 2], 3000, 4);
+    let options = Options {
+        friction: FrictionColumns {
+            stribeck_rad_per_s: Some(0.05),
+            ..FrictionColumns::COULOMB
+        },
+        consistent_prior_weight: Some(1e-6),
+        slow_rad_per_s: 0.3,
+        ..Options::default()
+    };
+    let fit = fit(&truth, &[data], &[0, 1, 2], &options).unwrap();
+    for found in fit.friction() {
+        assert!(
+            (found.coulomb_nm - 1.0).abs() < 1e-4,
+            "{}",
+            found.coulomb_nm
+        );
+        assert!(
+            (found.breakaway_nm - 1.4).abs() < 1e-3,
+            "{}",
+            found.breakaway_nm
+        );
+    }
+}
+
+#[test]
+fn a_motor_coupled_to_two_joints_is_identified() {
+    let truth = random_arm::<3>(41);
+    let none = [Friction::coulomb(0.5, 0.2); 3];
+    let mut data = motion(&truth, &none, &[0, 1, 2], 1500, 6);
+    let band = Friction::coulomb(0.7, 0.4);
+    for i in 0..1500 {
+        let extra = 0.3 * (data.qdd[(i, 1)] + data.qdd[(i, 2)])
+            + band.torque_nm(data.qd[(i, 1)] + data.qd[(i, 2)]);
+        data.tau[(i, 1)] += extra;
+        data.tau[(i, 2)] += extra;
+    }
+    let options = Options {
+        couplings: vec![(1, 2)],
+        consistent_prior_weight: Some(1e-6),
+        ..Options::default()
+    };
+    let fit = fit(&truth, &[data], &[0, 1, 2], &options).unwrap();
+    let names = fit.columns.names();
+    let value = |name: &str| fit.x[names.iter().position(|n| n == name).unwrap()];
+    assert!((value("V1+2") - 0.7).abs() < 1e-3, "{}", value("V1+2"));
+    assert!((value("S1+2") - 0.4).abs() < 1e-3, "{}", value("S1+2"));
+}
+
+/// Each joint's friction grows by 5 % of the torque that its gear transmits to the links.
+#[test]
+fn load_dependent_friction_is_identified() {
+    let truth = random_arm::<3>(43);
+    let weightless_rotors = Arm::from_links(
+        *truth.links(),
+        Vector::zeros(),
+        truth.joint_from_tip(),
+        truth.gravity(),
+    )
+    .unwrap();
+    let dry = Friction::coulomb(0.0, 1.0);
+    let loaded = |seed| {
+        let mut data = motion(&truth, &friction(), &[0, 1, 2], 1500, seed);
+        for i in 0..data.samples() {
+            let at = |m: &DMatrix<f64>| Vector::<3>::from_fn(|j, _| m[(i, j)]);
+            let (q, qd, qdd) = (at(&data.q), at(&data.qd), at(&data.qdd));
+            let passed_on = rnea(&weightless_rotors, &q, &qd, &qdd);
+            for j in 0..3 {
+                data.tau[(i, j)] += 0.05 * passed_on[j].abs() * dry.dry_torque_nm(qd[j]);
+            }
+        }
+        data
+    };
+    let options = Options {
+        friction: FrictionColumns {
+            load: true,
+            ..FrictionColumns::OFFSET
+        },
+        consistent_prior_weight: Some(1e-6),
+        ..Options::default()
+    };
+    let fit = fit(&truth, &[loaded(9)], &[0, 1, 2], &options).unwrap();
+    let names = fit.columns.names();
+    for j in 0..3 {
+        let value = fit.x[names.iter().position(|n| *n == format!("L{j}")).unwrap()];
+        assert!((value - 0.05).abs() < 1e-4, "{value}");
+        // The controller's friction law has no load term; it receives the friction at the mean load.
+        let coulomb_nm = fit.friction()[j].coulomb_nm - friction::<3>()[j].coulomb_nm;
+        let mean_nm = 0.05 * fit.load_nm[j];
+        assert!(
+            (coulomb_nm - mean_nm).abs() < 1e-3,
+            "{coulomb_nm} {mean_nm}"
+        );
+        assert!(fit.load_nm[j] > 0.0);
+    }
+    assert!(fit.validate_motion(&loaded(10)).unwrap().total_relative < 1e-4);
+    let alone = FrictionColumns {
+        coulomb: false,
+        ..options.friction
+    };
+    let error = Columns::new(3, &[0], true, alone, &[]).unwrap_err();
+    assert!(error.to_string().contains("load alone"), "{error}");
+}
+
+#[test]
+fn the_rank_of_an_arm_does_not_depend_on_the_log() {
+    let truth = random_arm::<4>(51);
+    let options = Options {
+        rotor: false,
+        friction: FrictionColumns::NONE,
+        consistent_prior_weight: None,
+        slow_rad_per_s: 0.0,
+        ..Options::default()
+    };
+    let ranks: Vec<usize> = (1..4)
+        .map(|seed| {
+            let data = motion(&truth, &[Friction::NONE; 4], &[0, 1, 2, 3], 800, seed);
+            fit(&truth, &[data], &[0, 1, 2, 3], &options)
+                .unwrap()
+                .base
+                .rank()
+        })
+        .collect();
+    // Seven a link in general position, three for the first, whose axis never turns.
+    assert_eq!(ranks, [24, 24, 24]);
+}

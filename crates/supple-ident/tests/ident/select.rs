@@ -1,0 +1,116 @@
+//! Cross-validation finds the true friction terms and rejects superfluous ones.
+
+use crate::support::{Noise, motion, random_arm};
+use supple_core::dynamics::gravity;
+use supple_core::{Friction, Vector};
+use supple_ident::select::{compare, friction_candidates, load_candidates, prior_candidates};
+use supple_ident::{DMatrix, FrictionColumns, Motion, Options};
+
+const JOINTS: [usize; 3] = [0, 1, 2];
+
+fn noisy(friction: Friction) -> Motion {
+    let mut data = motion(&random_arm::<3>(61), &[friction; 3], &JOINTS, 1200, 8);
+    let mut noise = Noise::new(8);
+    data.tau.iter_mut().for_each(|t| *t += 0.3 * noise.draw());
+    data
+}
+
+fn base() -> Options {
+    Options {
+        slow_rad_per_s: 0.0,
+        ..Options::default()
+    }
+}
+
+#[test]
+fn the_true_friction_model_is_chosen() {
+    let stribeck = Friction {
+        breakaway_nm: 3.0,
+        stribeck_rad_per_s: 0.5,
+        ..Friction::coulomb(0.6, 1.0)
+    };
+    let offset = Friction {
+        offset_nm: 2.0,
+        ..Friction::coulomb(0.6, 1.0)
+    };
+    let cases = [
+        (Friction::NONE, "no friction"),
+        (Friction::coulomb(2.0, 0.0), "viscous"),
+        (Friction::coulomb(0.6, 1.0), "viscous, Coulomb"),
+        (offset, "viscous, Coulomb, offset"),
+        (stribeck, "viscous, Coulomb, Stribeck 0.5 rad/s"),
+    ];
+    for (friction, expected) in cases {
+        let model = random_arm::<3>(61);
+        let candidates = friction_candidates(&base());
+        let table = compare(&model, &[noisy(friction)], &JOINTS, &candidates, 4).unwrap();
+        assert_eq!(
+            table.lines[table.chosen].candidate.name, expected,
+            "\n{table}"
+        );
+    }
+}
+
+#[test]
+fn load_independent_friction_is_not_reported_as_load_dependent() {
+    let model = random_arm::<3>(61);
+    let options = Options {
+        friction: FrictionColumns::COULOMB,
+        ..base()
+    };
+    let choose = |data: Motion| {
+        let table = compare(&model, &[data], &JOINTS, &load_candidates(&options), 4).unwrap();
+        table.options().friction.load
+    };
+    let steady = noisy(Friction::coulomb(0.6, 1.0));
+    let mut loaded = steady.clone();
+    let dry = Friction::coulomb(0.0, 1.0);
+    for i in 0..loaded.samples() {
+        let at = |m: &DMatrix<f64>| Vector::<3>::from_fn(|j, _| m[(i, j)]);
+        let passed_on = gravity(&model, &at(&loaded.q));
+        for j in JOINTS {
+            loaded.tau[(i, j)] += 0.1 * passed_on[j].abs() * dry.dry_torque_nm(loaded.qd[(i, j)]);
+        }
+    }
+    assert!(!choose(steady));
+    assert!(choose(loaded));
+    assert!(
+        load_candidates(&Options {
+            friction: FrictionColumns::NONE,
+            ..base()
+        })
+        .is_empty()
+    );
+}
+
+#[test]
+fn a_wrong_prior_gets_a_small_weight_and_a_right_one_a_large_weight() {
+    let data = [noisy(Friction::coulomb(0.6, 1.0))];
+    let weight = |model| {
+        let table = compare(&model, &data, &JOINTS, &prior_candidates(&base()), 4).unwrap();
+        assert!(table.to_string().lines().count() == 7);
+        table.options().consistent_prior_weight.unwrap()
+    };
+    let right = random_arm::<3>(61);
+    let mut links = *right.links();
+    for link in &mut links {
+        link.mass *= 3.0;
+        link.first_moment *= -3.0;
+        link.inertia *= 3.0;
+    }
+    let wrong = supple_core::Arm::from_links(
+        links,
+        right.armature(),
+        right.joint_from_tip(),
+        right.gravity(),
+    );
+    assert!(weight(right) > weight(wrong.unwrap()));
+}
+
+#[test]
+fn rejects_a_single_part_and_an_empty_list() {
+    let data = [noisy(Friction::NONE)];
+    let model = random_arm::<3>(61);
+    assert!(compare(&model, &data, &JOINTS, &friction_candidates(&base()), 1).is_err());
+    assert!(compare(&model, &data, &JOINTS, &[], 4).is_err());
+}

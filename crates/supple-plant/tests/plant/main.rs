@@ -1,0 +1,14 @@
+//! The simulated arm and its environment.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod actuators;
+mod braking;
+mod contact;
+mod description;
+mod free_box;
+mod free_motion;
+mod friction;
+mod injection;
+mod scene;

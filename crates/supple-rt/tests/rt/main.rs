@@ -1,0 +1,10 @@
+//! The controller's process and its parts. `control_loop.rs` counts allocations in a program of its own.
+
+#[path = "../support/mod.rs"]
+mod support;
+
+mod fault_files;
+mod heartbeat;
+mod operator_requests;
+mod process;
+mod standard_error;

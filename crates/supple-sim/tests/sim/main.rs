@@ -1,0 +1,4 @@
+//! The simulated arm's process and its drives.
+
+mod motors;
+mod process;

@@ -1,0 +1,155 @@
+//! The interface of the command line: help, names, exit codes.
+
+use crate::support::{self, assert_one_clear_line, run};
+
+#[test]
+fn help_lists_the_commands_and_the_exit_codes() {
+    let help = run(&["--help"]);
+    assert_eq!(help.code, Some(0));
+    for word in [
+        "demo",
+        "log",
+        "arms",
+        "completions",
+        "Exit codes",
+        "a file cannot be read",
+    ] {
+        assert!(help.stdout.contains(word), "{word} in {}", help.stdout);
+    }
+    let demo = run(&["demo", "--help"]);
+    assert_eq!(demo.code, Some(0));
+    for word in [
+        "--arm",
+        "--out",
+        "--seed",
+        "--json",
+        "--quiet",
+        "--no-logs",
+        "Exit codes",
+    ] {
+        assert!(demo.stdout.contains(word), "{word} in {}", demo.stdout);
+    }
+}
+
+#[test]
+fn an_invalid_command_line_is_code_2_and_does_nothing() {
+    for args in [
+        &[][..],
+        &["dem"],
+        &["demo", "--seed", "minus one"],
+        &["demo", "--seed", "-1"],
+        &["demo", "extra"],
+        &["log"],
+        &["log", "export", "a.mcap", "--every", "0"],
+        &["completions", "no-such-shell"],
+    ] {
+        let answer = run(args);
+        assert_eq!(answer.code, Some(2), "{args:?}: {}", answer.stderr);
+        assert!(answer.stdout.is_empty(), "{args:?}: {}", answer.stdout);
+    }
+}
+
+#[test]
+fn an_unknown_arm_is_code_3_and_the_arms_are_listed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("out");
+    let answer = run(&["demo", "--arm", "wam5", "--out", support::arg(&out)]);
+    assert_eq!(answer.code, Some(3));
+    assert_one_clear_line(&answer, &["wam5", "paper3", "wam3", "wam4", "wam7", "TOML"]);
+    assert!(answer.stdout.is_empty());
+    assert!(support::tree(folder.path()).is_empty(), "nothing is left");
+}
+
+#[test]
+fn with_json_an_error_is_an_object_on_standard_output() {
+    let answer = run(&["demo", "--arm", "wam5", "--json"]);
+    assert_eq!(answer.code, Some(3));
+    let object: serde_json::Value = serde_json::from_str(&answer.stdout).expect("JSON");
+    let error = &object["error"];
+    assert_eq!(error["kind"], "description");
+    assert_eq!(error["exit_code"], 3);
+    assert!(error["message"].as_str().expect("text").contains("wam5"));
+    assert_one_clear_line(&answer, &["wam5"]);
+}
+
+#[test]
+fn the_built_in_arms_are_listed() {
+    let answer = run(&["arms"]);
+    assert_eq!(answer.code, Some(0));
+    for arm in supple_model::assets() {
+        assert!(answer.stdout.contains(arm), "{arm} in {}", answer.stdout);
+    }
+    let json = run(&["arms", "--json"]);
+    let arms: serde_json::Value = serde_json::from_str(&json.stdout).expect("JSON");
+    let joints = |k: usize| arms[k]["joints"].as_array().map(Vec::len);
+    assert_eq!(
+        [joints(0), joints(1), joints(2), joints(3)],
+        [3, 3, 4, 7].map(Some)
+    );
+}
+
+#[test]
+fn completions_name_the_commands() {
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        let answer = run(&["completions", shell]);
+        assert_eq!(answer.code, Some(0), "{shell}");
+        assert!(answer.stdout.contains("no-logs"), "{shell}");
+    }
+}
+
+#[test]
+fn a_closed_pipe_is_not_an_error() {
+    use std::process::Stdio;
+    let mut child = support::supple(&["completions", "bash"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the binary starts");
+    drop(child.stdout.take());
+    let output = child.wait_with_output().expect("it ends");
+    assert_eq!(output.status.code(), Some(0));
+    assert!(output.stderr.is_empty());
+}
+
+#[test]
+fn standard_output_on_a_full_disk_is_code_6() {
+    let full = std::fs::File::options()
+        .write(true)
+        .open("/dev/full")
+        .expect("/dev/full");
+    let output = support::supple(&["arms"])
+        .stdout(full)
+        .output()
+        .expect("it starts");
+    let answer = support::Answer::from(output);
+    assert_eq!(answer.code, Some(6));
+    assert_one_clear_line(&answer, &["standard output", "No space left"]);
+}
+
+#[test]
+fn the_doctor_lists_every_check_and_its_exit_code_matches() {
+    let answer = run(&["doctor", "--json"]);
+    let report: serde_json::Value = serde_json::from_str(&answer.stdout).expect("JSON");
+    let ready = report["ready"].as_bool().expect("a verdict");
+    assert_eq!(answer.code, Some(if ready { 0 } else { 8 }));
+    let names: Vec<_> = report["checks"]
+        .as_array()
+        .expect("a list")
+        .iter()
+        .filter_map(|check| check["name"].as_str())
+        .collect();
+    for name in [
+        "kernel",
+        "priority",
+        "memlock",
+        "governor",
+        "isolation",
+        "can",
+    ] {
+        assert!(names.contains(&name), "{name} in {names:?}");
+    }
+    let text = run(&["doctor"]).stdout;
+    for name in names {
+        assert!(text.contains(name), "{name} in {text}");
+    }
+}

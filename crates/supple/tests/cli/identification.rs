@@ -1,0 +1,211 @@
+//! Identification commands: complete results, and invalid input that is rejected with its column.
+
+use crate::support::{arg, assert_one_clear_line, run};
+use std::path::Path;
+
+fn table(folder: &Path, name: &str, change: impl Fn(usize, &mut Vec<f64>)) -> String {
+    let mut text = "t,q[0],q[1],q[2],tau[0],tau[1],tau[2]\n".to_owned();
+    for i in 0..800 {
+        let t = 0.01 * i as f64;
+        let mut row = vec![t];
+        row.extend((0..3).map(|j| (t * (1.0 + 0.3 * f64::from(j))).sin()));
+        row.extend((0..3).map(|j| 3.0 * (t + f64::from(j)).cos()));
+        change(i, &mut row);
+        let cells: Vec<String> = row.iter().map(ToString::to_string).collect();
+        text += &(cells.join(",") + "\n");
+    }
+    let path = folder.join(name);
+    std::fs::write(&path, text).expect("written");
+    path.display().to_string()
+}
+
+#[test]
+fn an_invalid_log_is_rejected_with_its_column_and_a_remedy() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let nan = table(folder.path(), "nan.csv", |i, row| {
+        if i == 7 {
+            row[5] = f64::NAN;
+        }
+    });
+    let gap = table(folder.path(), "gap.csv", |i, row| {
+        if i >= 100 {
+            row[0] += 1.0;
+        }
+    });
+    let degrees = table(folder.path(), "degrees.csv", |_, row| {
+        row[2] = row[2].to_degrees();
+    });
+    let still = table(folder.path(), "still.csv", |_, row| row[3] = 0.5);
+    let out = folder.path().join("out");
+    for (log, words) in [
+        (&nan, ["tau[1]", "sample 7"]),
+        (&gap, ["t: a gap", "split the log"]),
+        (&degrees, ["q[1]", "degrees"]),
+        (&still, ["q[2]", "not excited"]),
+    ] {
+        let answer = run(&["identify", log, "--arm", "wam3", "--out", arg(&out)]);
+        assert_eq!(answer.code, Some(9), "{}", answer.stderr);
+        assert_one_clear_line(&answer, &words);
+        assert!(!out.exists());
+    }
+    let absent = run(&["identify", "nowhere.csv", "--arm", "wam3"]);
+    assert_eq!(absent.code, Some(6), "{}", absent.stderr);
+    let joints = run(&["identify", &still, "--arm", "wam3", "--moving", "0,7"]);
+    assert_eq!(joints.code, Some(9), "{}", joints.stderr);
+}
+
+#[test]
+fn a_design_writes_table_figure_and_summary() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("design");
+    let answer = run(&[
+        "excite",
+        "design",
+        "--arm",
+        "wam3",
+        "--candidates",
+        "30",
+        "--quiet",
+        "--json",
+        "--out",
+        arg(&out),
+    ]);
+    assert_eq!(answer.code, Some(0), "{}", answer.stderr);
+    let summary: serde_json::Value = serde_json::from_str(&answer.stdout).expect("JSON");
+    assert!(summary["condition"].as_f64().expect("a number") >= 1.0);
+    let figure = std::fs::read_to_string(out.join("excitation.svg")).expect("a figure");
+    roxmltree::Document::parse(&figure).expect("an SVG");
+    let table = std::fs::read_to_string(out.join("excitation.csv")).expect("a table");
+    assert!(table.starts_with("t,q[0],q[1],q[2],qd[0]"));
+    let duration_s = summary["duration_s"].as_f64().expect("a number");
+    assert_eq!(table.lines().count(), (100.0 * duration_s) as usize + 2);
+}
+
+/// Design, log, model, correction: each command uses the output of the previous one.
+#[test]
+fn a_model_identified_from_a_designed_motion_loads() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    let (design, excited, identified, learnt) =
+        (at("design"), at("excited"), at("identified"), at("learnt"));
+    let done = |arguments: &[&str]| -> serde_json::Value {
+        let answer = run(arguments);
+        assert_eq!(answer.code, Some(0), "{arguments:?}: {}", answer.stderr);
+        serde_json::from_str(&answer.stdout).expect("JSON")
+    };
+    let short = [
+        "--candidates",
+        "40",
+        "--period",
+        "8",
+        "--periods",
+        "2",
+        "--quiet",
+        "--json",
+    ];
+    done(
+        &[
+            &["excite", "design", "--arm", "wam3", "--out", &design],
+            &short[..],
+        ]
+        .concat(),
+    );
+    let followed = done(&[
+        "excite", "run", "--arm", "wam3", "--design", &design, "--out", &excited, "--json",
+    ]);
+    let log = followed["log"].as_str().expect("a path");
+    let found = done(&[
+        "identify",
+        log,
+        "--arm",
+        "wam3",
+        "--out",
+        &identified,
+        "--json",
+    ]);
+    assert_eq!(found["positive_definite"], 1.0);
+    let error = found["held_out"][0]["total_relative"]
+        .as_f64()
+        .expect("a number");
+    assert!(error < 0.15, "{error}");
+    let report = std::fs::read_to_string(folder.path().join("identified/report.html"));
+    let report = report.expect("a report");
+    assert!(report.contains("<svg"));
+    let corrected = done(&[
+        "learn",
+        log,
+        "--arm",
+        &identified,
+        "--out",
+        &learnt,
+        "--last",
+        "10",
+        "--json",
+    ]);
+    let joints = corrected["joints"].as_array().expect("a list");
+    assert_eq!(joints.len(), 3);
+    let empty = run(&[
+        "excite",
+        "run",
+        "--arm",
+        "wam4",
+        "--design",
+        &design,
+        "--out",
+        &at("no"),
+    ]);
+    assert_eq!(empty.code, Some(9), "{}", empty.stderr);
+    assert_one_clear_line(&empty, &["centre_rad", "4 joints"]);
+    let absent = run(&["excite", "run", "--arm", "wam3", "--design", &at("nowhere")]);
+    assert_eq!(absent.code, Some(6), "{}", absent.stderr);
+    let log = run(&["learn", "nowhere.mcap", "--arm", "wam3"]);
+    assert_eq!(log.code, Some(6), "{}", log.stderr);
+}
+
+#[test]
+fn a_calibration_prints_its_verdict_and_that_it_is_a_simulation() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("calibrated");
+    let answer = run(&[
+        "calibrate",
+        "--ripple",
+        "0.3",
+        "--no-demo",
+        "--quiet",
+        "--out",
+        arg(&out),
+    ]);
+    assert_eq!(answer.code, Some(0), "{}", answer.stderr);
+    for words in [
+        "breakaway of joint1",
+        "ripple of motor 3: harmonic 6",
+        "good for 5 N/m",
+        "sinusoid at 5 N/m with this model",
+        "this is a simulation",
+    ] {
+        assert!(
+            answer.stdout.contains(words),
+            "{words} in {}",
+            answer.stdout
+        );
+    }
+    for file in [
+        "arm.toml",
+        "arm.urdf",
+        "report.html",
+        "calibration.json",
+        "logs",
+        "plant/arm.toml",
+    ] {
+        assert!(out.join(file).exists(), "{file}");
+    }
+}
+
+#[test]
+fn help_lists_the_identification_commands() {
+    let help = run(&["--help"]).stdout;
+    for word in ["identify", "excite", "breakaway", "calibrate", "learn"] {
+        assert!(help.contains(word), "{word} in {help}");
+    }
+    assert!(run(&["demo", "--help"]).stdout.contains("--model"));
+}

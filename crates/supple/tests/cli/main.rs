@@ -1,0 +1,9 @@
+//! The program `supple`: arguments, results, errors and exit codes.
+
+mod support;
+
+mod bad_input;
+mod command_line;
+mod demo;
+mod faults;
+mod identification;
