@@ -12,13 +12,13 @@ pub use pendant::{Pendant, pendant};
 pub use session::OperatorSession;
 pub use status::status;
 
-use crate::arms;
 use crate::cli::{GainsArgs, ModeName, SystemArgs, TrackArgs, TrackTrajectory, UpTrajectory};
-use crate::console::{print_json, print_line};
-use crate::exit::Failure;
 use crate::up::stop_running;
 use core::time::Duration;
 use serde::Serialize;
+use supple_cli::arms;
+use supple_cli::console::{print_json, print_line};
+use supple_cli::exit::Failure;
 use supple_core::Trajectory;
 use supple_core::config::Gains;
 use supple_core::controller::{Mode, Request};
@@ -46,9 +46,9 @@ struct Answer {
 /// # Errors
 /// [`Failure::NotRunning`] if no telemetry arrives.
 fn running(system: &SystemArgs) -> Result<(Domain, TelemetryReader, Telemetry), Failure> {
-    let domain = Domain::new(system.prefix.as_deref())?;
-    let mut reader = TelemetryReader::new(&domain)?;
-    match reader.wait(TELEMETRY_TIMEOUT)? {
+    let domain = Domain::new(system.prefix.as_deref()).map_err(Failure::system)?;
+    let mut reader = TelemetryReader::new(&domain).map_err(Failure::system)?;
+    match reader.wait(TELEMETRY_TIMEOUT).map_err(Failure::system)? {
         Some(telemetry) => Ok((domain, reader, telemetry)),
         None => Err(Failure::NotRunning {
             prefix: domain.prefix().to_owned(),
@@ -69,8 +69,8 @@ pub fn mode(mode: ModeName, system: &SystemArgs) -> Result<(), Failure> {
 
 /// Requests idle over a separate socket that needs no reader or operator slot, no shared memory and no lock.
 fn idle(system: &SystemArgs) -> Result<(), Failure> {
-    let domain = Domain::new(system.prefix.as_deref())?;
-    match request_idle(&domain, TELEMETRY_TIMEOUT)? {
+    let domain = Domain::new(system.prefix.as_deref()).map_err(Failure::system)?;
+    match request_idle(&domain, TELEMETRY_TIMEOUT).map_err(Failure::system)? {
         Some(answer) if answer.outcome == Outcome::Refused => Err(Failure::Refused {
             reason: answer.text,
         }),
@@ -209,7 +209,7 @@ fn follow(
 /// # Errors
 /// [`Failure::NotRunning`].
 pub fn stop(system: &SystemArgs) -> Result<(), Failure> {
-    let domain = Domain::new(system.prefix.as_deref())?;
+    let domain = Domain::new(system.prefix.as_deref()).map_err(Failure::system)?;
     if stop_running(&domain)? {
         return Ok(());
     }

@@ -1,8 +1,6 @@
 //! The pendant of an emulated arm: a socket in the folder of its bus; each text line is answered by one line of JSON.
 
 use crate::cli::PendantAction;
-use crate::console::print_line;
-use crate::exit::Failure;
 use core::time::Duration;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
@@ -11,6 +9,8 @@ use std::os::unix::net::UnixStream;
 use std::path::PathBuf;
 use std::time::Instant;
 use supple_bus::Address;
+use supple_cli::console::print_line;
+use supple_cli::exit::Failure;
 use supple_ipc::{Domain, pause};
 
 /// Name of the socket in the folder of the bus.
@@ -128,8 +128,8 @@ impl Pendant {
 /// # Errors
 /// [`Failure::Pendant`].
 pub fn pendant(action: PendantAction, prefix: Option<&str>) -> Result<(), Failure> {
-    let domain = Domain::new(prefix)?;
-    let bus = Address::of_system(domain.prefix())?;
+    let domain = Domain::new(prefix).map_err(Failure::system)?;
+    let bus = Address::of_system(domain.prefix()).map_err(Failure::system)?;
     let line = match action {
         PendantAction::Idle => "idle",
         PendantAction::Activate => "activate",

@@ -1,5 +1,6 @@
 //! A demo whose runs end with a fault: all results are still written, and every fault is reported.
 
+#[path = "../../supple/tests/support/mod.rs"]
 mod support;
 
 use std::fs;

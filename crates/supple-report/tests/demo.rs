@@ -1,6 +1,7 @@
 //! Runs the complete demo once into a folder with an older run and another file, and checks the contents of the
 //! folder.
 
+#[path = "../../supple/tests/support/mod.rs"]
 mod support;
 
 use resvg::tiny_skia::Pixmap;

@@ -1,5 +1,6 @@
 //! Identification commands: complete results, and invalid input that is rejected with its column.
 
+#[path = "../../supple/tests/support/mod.rs"]
 mod support;
 
 use std::path::Path;
