@@ -5,7 +5,8 @@ mod support;
 use core::hint::{black_box, spin_loop};
 use core::time::Duration;
 use supple_ipc::message::TorqueCommand;
-use supple_ipc::{ControllerLink, PlantLink, pause};
+use supple_ipc::{ControllerLink, PlantLink};
+use supple_realtime::pause;
 use support::{answer, state, system};
 
 /// Timeout that only a lost wake-up exceeds.

@@ -11,7 +11,8 @@ use std::time::Instant;
 use supple_bus::Address;
 use supple_cli::console::print_line;
 use supple_cli::exit::Failure;
-use supple_ipc::{Domain, pause};
+use supple_ipc::Domain;
+use supple_realtime::pause;
 
 /// Name of the socket in the folder of the bus.
 const SOCKET: &str = "pendant";

@@ -7,7 +7,8 @@ use supple_cli::exit::Failure;
 use supple_core::Vector;
 use supple_core::controller::Request;
 use supple_ipc::message::{OperatorReply, Outcome};
-use supple_ipc::{Domain, IpcError, OperatorClient, pause};
+use supple_ipc::{Domain, IpcError, OperatorClient};
+use supple_realtime::pause;
 
 /// Timeout for a reply.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(5);

@@ -16,7 +16,8 @@ use supple_cli::console::print_status;
 use supple_cli::exit::Failure;
 use supple_cli::interrupt;
 use supple_cli::sibling::program_beside;
-use supple_ipc::{Domain, pause};
+use supple_ipc::Domain;
+use supple_realtime::pause;
 
 /// Exit code of a program that cannot write a file.
 const FILE_CODE: i32 = 6;
