@@ -225,6 +225,42 @@ fn core_depends_only_on_mathematical_crates() {
     );
 }
 
+/// Dependencies of a crate on other projects, its own and those of the crates of the workspace that it needs.
+fn foreign_dependencies(of: &str) -> BTreeSet<String> {
+    let metadata = metadata();
+    let packages = metadata["packages"].as_array().expect("packages");
+    let (mut open, mut found) = (vec![of.to_owned()], BTreeSet::new());
+    while let Some(name) = open.pop() {
+        let Some(package) = packages.iter().find(|p| p["name"] == *name) else {
+            continue;
+        };
+        let dependencies = package["dependencies"].as_array().expect("dependencies");
+        let normal = dependencies.iter().filter(|d| d["kind"].is_null());
+        for name in normal.filter_map(|d| d["name"].as_str()) {
+            if found.insert(name.to_owned()) {
+                open.push(name.to_owned());
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn the_operator_links_no_plotter_and_the_reports_no_running_system() {
+    let (operator, report) = (
+        foreign_dependencies("supple"),
+        foreign_dependencies("supple-report"),
+    );
+    for (crates, drawing, system) in [(&operator, false, true), (&report, true, false)] {
+        for name in ["plotters", "resvg", "askama"] {
+            assert_eq!(crates.contains(name), drawing, "{name}");
+        }
+        for name in ["iceoryx2", "socketcan", "supple-bus", "supple-ipc"] {
+            assert_eq!(crates.contains(name), system, "{name}");
+        }
+    }
+}
+
 /// If the default build contained the freestanding program, plain `cargo build` would fail or, worse, abort on panic
 /// everywhere; if it contained the Python package, it would need an interpreter.
 #[test]

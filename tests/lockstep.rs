@@ -8,10 +8,10 @@ use supple_core::controller::{Mode, Request};
 use supple_core::{Controller, Vector};
 use supple_experiment::{Rig, scenario, start_pose};
 use supple_ipc::message::{OperatorRequest, Telemetry};
-use supple_ipc::{ControllerLink, Domain, PlantLink, pause};
+use supple_ipc::{ControllerLink, Domain, PlantLink};
 use supple_model::Description;
 use supple_plant::{Plant, PlantConfig};
-use supple_realtime::Stop;
+use supple_realtime::{Stop, pause};
 use supple_rt::{ControlLoop, loop_queues};
 use supple_sim::{Motors, SimulationLoop};
 

@@ -191,15 +191,34 @@ fn a_missing_program_is_named_with_its_build_command() {
     std::fs::create_dir(&alone).expect("a folder");
     let alone = alone.join("supple");
     std::fs::copy(programs().join("supple"), &alone).expect("copied");
-    let output = Command::new(&alone)
-        .args(["up", "--plant", "sim", "--no-log"])
-        .env("XDG_RUNTIME_DIR", folder.path())
+    for (arguments, missing) in [
+        (&["up", "--plant", "sim", "--no-log"][..], "supple-rt"),
+        (&["demo"], "supple-report"),
+    ] {
+        let output = Command::new(&alone)
+            .args(arguments)
+            .current_dir(folder.path())
+            .env("XDG_RUNTIME_DIR", folder.path())
+            .output()
+            .expect("it runs");
+        assert_eq!(output.status.code(), Some(10));
+        let remedy = format!("cargo build --release -p {missing}`");
+        let message = stderr_of(&output);
+        assert!(message.contains(&remedy), "{message}");
+    }
+}
+
+/// The exit code, the messages and the results are those of the program that draws.
+#[test]
+fn demo_is_run_by_the_program_that_draws() {
+    let folder = temporary_folder();
+    let output = Command::new(programs().join("supple"))
+        .args(["demo", "--arm", "wam5", "--json"])
+        .current_dir(folder.path())
         .output()
         .expect("it runs");
-    assert_eq!(output.status.code(), Some(10));
-    assert!(
-        stderr_of(&output).contains("cargo build --release -p supple-rt"),
-        "{}",
-        stderr_of(&output)
-    );
+    assert_eq!(output.status.code(), Some(3));
+    assert!(stderr_of(&output).contains("wam5"));
+    let object: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert_eq!(object["error"]["kind"], "description");
 }

@@ -5,7 +5,8 @@ use crate::{
 };
 use core::time::Duration;
 use supple_ipc::message::{ArmState, Drives, PlantReport, TorqueCommand};
-use supple_ipc::{ControllerLink, Domain, PlantLink, pause};
+use supple_ipc::{ControllerLink, Domain, PlantLink};
+use supple_realtime::pause;
 
 const PREFIX: &str = "latency";
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(5);

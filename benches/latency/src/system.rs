@@ -7,7 +7,8 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use supple_core::controller::{Mode, Request};
 use supple_ipc::message::{Drives, Telemetry};
-use supple_ipc::{Domain, OperatorClient, TelemetryReader, pause};
+use supple_ipc::{Domain, OperatorClient, TelemetryReader};
+use supple_realtime::pause;
 
 const PREFIX: &str = "latency";
 /// Number of cycles in gravity hold before the measurement.

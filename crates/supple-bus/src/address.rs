@@ -5,6 +5,7 @@ use crate::folder::OwnerFolder;
 use core::fmt;
 use core::str::FromStr;
 use std::path::PathBuf;
+use supple_realtime::runtime_folder;
 
 /// Address of a bus.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -48,12 +49,7 @@ impl Address {
     /// # Errors
     /// If the parent folder is not accessible only to its owner.
     pub fn of_system(prefix: &str) -> Result<Address, BusError> {
-        let user = rustix::process::geteuid().as_raw();
-        let above = match std::env::var_os("XDG_RUNTIME_DIR") {
-            Some(runtime) if !runtime.is_empty() => PathBuf::from(runtime).join("supple-bus"),
-            _ => PathBuf::from(format!("/tmp/supple-bus-{user}")),
-        };
-        let above = OwnerFolder::open(above)?;
+        let above = OwnerFolder::open(runtime_folder("supple-bus"))?;
         Ok(Address::Folder(above.path().join(prefix)))
     }
 }

@@ -6,13 +6,14 @@
 
 use crate::bus::{Bus, BusFault, Event};
 use crate::can_frame::{CAN_FRAME_BYTES, WireFrame};
-use crate::clock::{monotonic_ns, wait_readable_until};
 use crate::endpoint::{Delivery, Endpoint};
 use crate::error::BusError;
 use crate::folder::OwnerFolder;
+use crate::wait::wait_readable_until;
 use rustix::fd::{AsFd, BorrowedFd};
 use std::collections::VecDeque;
 use supple_puck::CanFrame;
+use supple_realtime::monotonic_ns;
 
 /// Maximum number of unread confirmations; a transmit queue of the kernel has at least ten entries.
 const CONFIRMATIONS: usize = 64;

@@ -2,9 +2,9 @@
 
 use crate::error::BusError;
 use rustix::fs::{Mode, chmod};
-use std::os::unix::fs::{DirBuilderExt, MetadataExt};
 use std::os::unix::net::UnixDatagram;
 use std::path::{Path, PathBuf};
+use supple_realtime::{PrivateFolderError, open_private_folder};
 
 /// The longest path that fits a Unix address.
 const MAX_PATH_BYTES: usize = 107;
@@ -20,47 +20,23 @@ impl OwnerFolder {
     /// [`BusError::Folder`] if it cannot be created, belongs to another user, is a link, or is open to others.
     pub fn open(path: impl Into<PathBuf>) -> Result<OwnerFolder, BusError> {
         let path = path.into();
-        let made = std::fs::DirBuilder::new()
-            .recursive(true)
-            .mode(0o700)
-            .create(&path);
-        let refused = |problem: String, remedy| BusError::Folder {
-            path: path.clone(),
-            problem,
-            remedy,
-        };
-        made.map_err(|error| {
-            refused(
-                format!("cannot be created: {error}"),
-                "choose a folder that you may write to",
-            )
-        })?;
-        let metadata = std::fs::symlink_metadata(&path).map_err(|error| {
-            refused(
-                format!("cannot be read: {error}"),
-                "choose a folder of your own",
-            )
-        })?;
-        let user = rustix::process::geteuid().as_raw();
-        if !metadata.is_dir() {
-            return Err(refused(
-                "is a link or no folder".into(),
-                "name the folder itself, links are not followed",
-            ));
+        match open_private_folder(&path) {
+            Ok(()) => Ok(OwnerFolder(path)),
+            Err(error) => Err(BusError::Folder {
+                path,
+                remedy: match error {
+                    PrivateFolderError::Create(_) => "choose a folder that you may write to",
+                    PrivateFolderError::Read(_) | PrivateFolderError::OtherUser { .. } => {
+                        "choose a folder of your own"
+                    }
+                    PrivateFolderError::NoFolder => {
+                        "name the folder itself, links are not followed"
+                    }
+                    PrivateFolderError::OpenToOthers { .. } => "close it with chmod 700",
+                },
+                problem: error.to_string(),
+            }),
         }
-        if metadata.uid() != user {
-            return Err(refused(
-                format!("belongs to user {}, you are {user}", metadata.uid()),
-                "choose a folder of your own",
-            ));
-        }
-        if metadata.mode() & 0o077 != 0 {
-            return Err(refused(
-                format!("has mode {:o}, open to others", metadata.mode() & 0o777),
-                "close it with chmod 700",
-            ));
-        }
-        Ok(OwnerFolder(path))
     }
 
     /// Path of the folder.

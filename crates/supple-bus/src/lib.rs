@@ -23,7 +23,6 @@
 mod address;
 mod bus;
 mod can_frame;
-mod clock;
 mod datagram;
 mod endpoint;
 mod error;
@@ -36,14 +35,15 @@ mod paced;
 mod peer;
 mod socket_can;
 pub mod virtual_time;
+mod wait;
 
 pub use address::{Address, AddressError};
 pub use bus::{Bus, BusFault, Event};
 pub use can_frame::{CAN_FRAME_BYTES, WireFrame};
-pub use clock::{monotonic_ns, wait_readable_until};
 pub use datagram::{DatagramBus, Side};
 pub use error::BusError;
 pub use fault::{FaultInjector, FaultKind, FaultRule, Traffic};
 pub use folder::OwnerFolder;
 pub use paced::{PacedBus, PacedResponder};
 pub use socket_can::SocketCan;
+pub use wait::wait_readable_until;

@@ -10,7 +10,6 @@
 //! off.
 
 use crate::bus::{Bus, Event};
-use crate::clock::{monotonic_ns, sleep_until_ns, wait_readable_until};
 use crate::datagram::Side;
 use crate::endpoint::{Delivery, Endpoint};
 use crate::error::BusError;
@@ -19,7 +18,9 @@ use crate::lockstep_client::{LockstepClient, Next};
 use crate::lockstep_server::LockstepServer;
 use crate::message::{Kind, MAX_BYTES, Message};
 use crate::peer::Peer;
+use crate::wait::wait_readable_until;
 use supple_puck::CanFrame;
+use supple_realtime::{monotonic_ns, sleep_until_ns};
 
 /// Maximum lateness that a host sees after a stall \[ns\].
 pub const MAX_HOST_LATENESS_NS: u64 = 250_000;

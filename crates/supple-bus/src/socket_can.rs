@@ -8,8 +8,8 @@
 
 use crate::bus::{Bus, BusFault, Event};
 use crate::can_frame::{CAN_FRAME_BYTES, WireFrame};
-use crate::clock::{monotonic_ns, wait_readable_until};
 use crate::error::BusError;
+use crate::wait::wait_readable_until;
 use nix::sys::socket::{self as kernel, ControlMessageOwned, MsgFlags, setsockopt};
 use rustix::fd::{AsFd, AsRawFd, BorrowedFd};
 use rustix::io::{Errno, IoSliceMut};
@@ -17,6 +17,7 @@ use rustix::net::{RecvAncillaryBuffer, RecvFlags, ReturnFlags, recvmsg, sockopt}
 use socketcan::{CanSocket, Socket, SocketOptions};
 use std::io;
 use supple_puck::CanFrame;
+use supple_realtime::monotonic_ns;
 
 /// Flag of the kernel for an echo of a frame that the reading socket itself sent (`MSG_CONFIRM`).
 const CONFIRM: u32 = 0x800;

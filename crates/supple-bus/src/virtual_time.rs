@@ -9,7 +9,6 @@
 //! that point. The same inputs therefore give the same order of events at any speed.
 
 use crate::bus::{Bus, Event};
-use crate::clock::{monotonic_ns, wait_readable_until};
 use crate::datagram::Side;
 use crate::endpoint::{Delivery, Endpoint};
 use crate::error::BusError;
@@ -18,8 +17,10 @@ use crate::lockstep_client::{LockstepClient, Next};
 use crate::lockstep_server::LockstepServer;
 use crate::message::{Kind, MAX_BYTES, Message};
 pub use crate::peer::Peer;
+use crate::wait::wait_readable_until;
 use rustix::fd::{AsFd, BorrowedFd};
 use supple_puck::CanFrame;
+use supple_realtime::monotonic_ns;
 
 /// The host's bus, with the peer in the same process.
 #[derive(Debug)]

@@ -11,11 +11,13 @@ use crate::start_up::{Progress, StartupConfig, start_up};
 use clap::Parser;
 use std::process::ExitCode;
 use supple_bus::virtual_time::LockstepBus;
-use supple_bus::{Address, Bus, BusError, OwnerFolder, PacedBus, SocketCan, monotonic_ns};
-use supple_ipc::{Domain, PlantLink, pause};
+use supple_bus::{Address, Bus, BusError, OwnerFolder, PacedBus, SocketCan};
+use supple_ipc::{Domain, PlantLink};
 use supple_model::{Description, with_dof};
 use supple_puck::safety::{SafetyLimits, SpeedLimit};
-use supple_realtime::{Stop, apply_realtime_settings, diagnostics, die_with_parent, spin_duration};
+use supple_realtime::{
+    Stop, apply_realtime_settings, diagnostics, die_with_parent, monotonic_ns, pause, spin_duration,
+};
 
 /// Timeout for an emulated arm to appear \[ns\].
 const EMULATOR_TIMEOUT_NS: u64 = 5_000_000_000;

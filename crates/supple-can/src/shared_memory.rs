@@ -4,8 +4,8 @@ use crate::error::CanError;
 use crate::link::{Answer, ArmReport, Command, Drives, Link};
 use core::time::Duration;
 use supple_ipc::message::{self, ArmState, PlantReport, TorqueCommand};
-use supple_ipc::{IpcError, PlantLink, pause};
-use supple_realtime::Stop;
+use supple_ipc::{IpcError, PlantLink};
+use supple_realtime::{Stop, pause};
 
 /// Poll intervals in virtual time for an answer (and shutdown), and for a controller to join.
 const ANSWER_POLL_INTERVAL: Duration = Duration::from_millis(50);

@@ -11,13 +11,12 @@ use std::process::ExitCode;
 use supple_bus::virtual_time::{LockstepResponder, Peer};
 use supple_bus::{
     Address, Bus, BusError, BusFault, DatagramBus, Event, OwnerFolder, PacedResponder, SocketCan,
-    monotonic_ns,
 };
 use supple_model::{Description, with_dof};
 use supple_plant::{PlantConfig, Sample, Scene, TraceFile};
 use supple_puck::NodeId;
 use supple_puck::status::MotorMode;
-use supple_realtime::{Stop, apply_realtime_settings, diagnostics, die_with_parent};
+use supple_realtime::{Stop, apply_realtime_settings, diagnostics, die_with_parent, monotonic_ns};
 
 /// Delay above which this process counts as stalled; the arm's clock pauses for it \[ns\].
 const STALL_THRESHOLD_NS: u64 = 50_000_000;

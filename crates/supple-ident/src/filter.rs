@@ -3,6 +3,9 @@
 //! Two second-order sections by the bilinear transform, prewarped. Both ends are extended by odd reflection,
 //! `2 x_0 - x_k`, over 15 samples, and each pass starts from the steady state of its first value, as in
 //! `scipy.signal.sosfiltfilt`, with which the tests compare it.
+//!
+//! It is not the filter of the simulated force sensor (`supple_plant`), which runs forwards in time. The two stay apart:
+//! what prepares the controller's model and what measures how well that model does share no formula.
 
 use crate::error::{IdentError, positive};
 use nalgebra::DMatrix;

@@ -9,13 +9,13 @@ use crate::domain::Domain;
 use crate::error::IpcError;
 use crate::error::failed;
 use crate::membership;
-use crate::pause::pause;
 use core::time::Duration;
 use rustix::fs::{FlockOperation, flock};
 use rustix::io::Errno;
 use std::fs::File;
 use std::io;
 use std::os::unix::fs::FileExt;
+use supple_realtime::pause;
 
 /// Between fork and exec a child process shares the parent's locks, so a released lock may stay held for a moment.
 const FORK_LOCK_GRACE: Duration = Duration::from_millis(100);

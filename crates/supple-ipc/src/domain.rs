@@ -6,10 +6,8 @@
 
 use crate::error::IpcError;
 use iceoryx2::prelude::*;
-use rustix::fs::Mode;
-use std::fs::{self, DirBuilder, Metadata};
-use std::os::unix::fs::{DirBuilderExt, MetadataExt};
 use std::path::{Path as StdPath, PathBuf};
+use supple_realtime::{PrivateFolderError, open_private_folder, runtime_folder};
 
 /// Number of terminated writers whose unread messages a reader keeps. The reader polls all of these slots in every
 /// call; iceoryx2's default of 128 costs about 70 ns per call.
@@ -20,8 +18,8 @@ pub const PREFIX_VARIABLE: &str = "SUPPLE_PREFIX";
 /// Default prefix.
 pub const DEFAULT_PREFIX: &str = "supple";
 
-/// Permissions of the folder: accessible to its owner only.
-const OWNER_ONLY: u32 = 0o700;
+/// Folder of all systems of a user.
+const FOLDER: &str = "supple";
 
 /// An iceoryx2 node; its ports stay in the thread that created them.
 pub(crate) type Node = iceoryx2::node::Node<ipc::Service>;
@@ -45,12 +43,7 @@ impl Domain {
         let prefix = prefix
             .or(from_environment.as_deref())
             .unwrap_or(DEFAULT_PREFIX);
-        let user = rustix::process::getuid().as_raw();
-        let folder = match std::env::var_os("XDG_RUNTIME_DIR") {
-            Some(runtime) if !runtime.is_empty() => PathBuf::from(runtime).join("supple"),
-            _ => PathBuf::from(format!("/tmp/supple-{user}")),
-        };
-        Domain::in_folder(&folder, prefix)
+        Domain::in_folder(&runtime_folder(FOLDER), prefix)
     }
 
     /// Opens the system with this prefix in the given folder.
@@ -64,7 +57,7 @@ impl Domain {
                 found: prefix.to_owned(),
             });
         }
-        create_private_folder(folder)?;
+        open_folder(folder)?;
         let mut config = Config::default();
         let unusable = |cause: String| IpcError::Folder {
             folder: folder.to_owned(),
@@ -117,37 +110,17 @@ fn object_prefix(folder: &StdPath, prefix: &str) -> String {
 }
 
 /// Creates the folder, or checks that this user owns it and that no other user can access it.
-fn create_private_folder(folder: &StdPath) -> Result<(), IpcError> {
-    let failed = |cause: String, remedy| IpcError::Folder {
+fn open_folder(folder: &StdPath) -> Result<(), IpcError> {
+    open_private_folder(folder).map_err(|error| IpcError::Folder {
         folder: folder.to_owned(),
-        cause,
-        remedy,
-    };
-    let made = DirBuilder::new()
-        .recursive(true)
-        .mode(OWNER_ONLY)
-        .create(folder);
-    made.map_err(|error| {
-        failed(
-            error.to_string(),
-            "set XDG_RUNTIME_DIR to a folder that can be written",
-        )
-    })?;
-    let found: Metadata = fs::symlink_metadata(folder)
-        .map_err(|error| failed(error.to_string(), "set XDG_RUNTIME_DIR to another folder"))?;
-    let ours = found.is_dir() && found.uid() == rustix::process::getuid().as_raw();
-    let others = Mode::from_raw_mode(found.mode()).bits() & 0o077;
-    if !ours {
-        return Err(failed(
-            "it belongs to another user".to_owned(),
-            "remove it, or set XDG_RUNTIME_DIR to a folder of your own",
-        ));
-    }
-    if others != 0 {
-        return Err(failed(
-            format!("other users may enter it (mode {:o})", found.mode() & 0o777),
-            "chmod 700 it",
-        ));
-    }
-    Ok(())
+        remedy: match error {
+            PrivateFolderError::Create(_) => "set XDG_RUNTIME_DIR to a folder that can be written",
+            PrivateFolderError::Read(_) => "set XDG_RUNTIME_DIR to another folder",
+            PrivateFolderError::NoFolder | PrivateFolderError::OtherUser { .. } => {
+                "remove it, or set XDG_RUNTIME_DIR to a folder of your own"
+            }
+            PrivateFolderError::OpenToOthers { .. } => "chmod 700 it",
+        },
+        cause: format!("it {error}"),
+    })
 }

@@ -428,7 +428,7 @@ mod tests {
                     WakeSender::new(&domain, STATE_WAKE_SOCKET).expect("a wake_sender");
                 while !received.load(Ordering::Relaxed) {
                     wake_sender.notify(WakeReason::MessageSent);
-                    crate::pause::pause(Duration::from_millis(2));
+                    supple_realtime::pause(Duration::from_millis(2));
                 }
             });
             let woken = controller

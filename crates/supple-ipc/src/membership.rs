@@ -5,7 +5,6 @@
 //! removes such objects first.
 
 use crate::domain::Domain;
-use crate::pause::pause;
 use crate::shared_memory;
 use core::time::Duration;
 use rustix::fs::{FlockOperation, Mode, OFlags, flock, open};
@@ -15,6 +14,7 @@ use std::io;
 use std::os::fd::OwnedFd;
 use std::path::PathBuf;
 use std::time::Instant;
+use supple_realtime::pause;
 
 /// Name of the lock file.
 const MEMBERSHIP_LOCK: &str = "membership";

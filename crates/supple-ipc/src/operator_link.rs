@@ -10,12 +10,12 @@ use crate::client_slot::{ClientSlot, SlotKind};
 use crate::domain::Domain;
 use crate::error::IpcError;
 use crate::message::{OperatorReply, OperatorRequest, Telemetry};
-use crate::pause::pause;
 use crate::port::{Backpressure, QualityOfService, Reader, Writer};
 use core::time::Duration;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 use supple_core::controller::Request;
+use supple_realtime::pause;
 
 /// Telemetry that a reader may lag behind, in cycles.
 pub const TELEMETRY_DEPTH: usize = 2048;

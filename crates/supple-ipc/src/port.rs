@@ -5,7 +5,6 @@
 
 use crate::domain::{Domain, Node};
 use crate::error::{IpcError, failed};
-use crate::pause::pause;
 use crate::writer_identity::WriterLock;
 use core::fmt::Debug;
 use core::time::Duration;
@@ -18,6 +17,7 @@ use iceoryx2::service::builder::publish_subscribe::{
 };
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 use std::time::Instant;
+use supple_realtime::pause;
 
 /// Quality of service: the parameters of a service.
 #[derive(Clone, Copy, Debug)]

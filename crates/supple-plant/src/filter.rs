@@ -9,6 +9,9 @@
 //! ```
 //!
 //! It delays by about `sqrt(2) / (2 pi f_c)`, 2.25 ms at 100 Hz.
+//!
+//! It belongs to the sensor, and so to the plant: it shares no code with the zero-phase filter of identification
+//! (`supple_ident::filter`), or one wrong formula could spoil a model and hide that it does. Both are compared with scipy.
 
 use crate::error::{PlantError, entry};
 use supple_core::nalgebra::Vector3;

@@ -1,7 +1,8 @@
-//! What a periodic thread needs from Linux: locked memory, realtime priority, CPU affinity, a clock, shutdown signals,
-//! background threads for disk and terminal output, and watchdog messages to the service manager.
+//! What a periodic process needs from Linux: locked memory, realtime priority, CPU affinity, clock and sleeps, folders
+//! of its owner alone, shutdown signals, background threads for disk and terminal output, and watchdog messages to the
+//! service manager.
 //!
-//! These settings affect timing, never results: what the system refuses is reported as a [`RealtimeWarning`], and the
+//! Its settings affect timing, never results: what the system refuses is reported as a [`RealtimeWarning`], and the
 //! process continues. This crate knows no arm and no controller.
 
 mod background;
@@ -11,6 +12,8 @@ mod heartbeat;
 mod memory;
 mod notify;
 mod options;
+mod pause;
+mod private_folder;
 mod schedule;
 mod spin;
 mod stop;
@@ -20,6 +23,10 @@ pub use clock::{monotonic_ns, sleep_until_ns};
 pub use heartbeat::{Heartbeat, LivenessCounter, LivenessMonitor};
 pub use notify::{ManagerVariables, Notifier, NotifyError};
 pub use options::RealtimeOptions;
+pub use pause::pause;
+pub use private_folder::{
+    PrivateFolderError, create_private_folder, open_private_folder, runtime_folder,
+};
 pub use spin::spin_duration;
 pub use stop::{Stop, StopError, die_with_parent, ignore_file_size_and_tty_signals};
 

@@ -2,15 +2,15 @@
 
 use core::time::Duration;
 use std::fmt::Write as _;
-use std::fs::{self, DirBuilder, OpenOptions};
+use std::fs::{self, OpenOptions};
 use std::io::{self, ErrorKind, Write as _};
-use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt};
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use supple_core::controller::CycleRecord;
 use supple_core::record::{Cell, for_each_column};
 use supple_ipc::message::{MAX_DOF, Telemetry};
-use supple_realtime::{BackgroundWriter, diagnostics};
+use supple_realtime::{BackgroundWriter, create_private_folder, diagnostics};
 
 /// Cycles that are kept.
 pub const KEPT_CYCLES: usize = 1000;
@@ -174,10 +174,7 @@ impl Table {
     }
 
     fn write(&self, folder: &Path, step: u64) -> io::Result<PathBuf> {
-        DirBuilder::new()
-            .recursive(true)
-            .mode(0o700)
-            .create(folder)?;
+        create_private_folder(folder)?;
         let process = std::process::id();
         let file = folder.join(format!("fault-{process}-{step}.csv"));
         let part = file.with_extension("csv.part");

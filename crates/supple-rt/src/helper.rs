@@ -14,8 +14,8 @@ use supple_core::Vector;
 use supple_core::codes::request_kind;
 use supple_core::controller::{Controller, Mode, Refusal, Request, check_motion};
 use supple_ipc::message::{MAX_DOF, OperatorReply, OperatorRequest, Outcome, Text};
-use supple_ipc::{Backpressure, Domain, IpcError, OperatorServer, pause};
-use supple_realtime::diagnostics;
+use supple_ipc::{Backpressure, Domain, IpcError, OperatorServer};
+use supple_realtime::{diagnostics, pause};
 
 /// Poll interval of the helper.
 const POLL_INTERVAL: Duration = Duration::from_millis(1);

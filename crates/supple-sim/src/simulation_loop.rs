@@ -5,9 +5,9 @@ use crate::motors::Motors;
 use core::fmt;
 use core::time::Duration;
 use supple_ipc::message::{ArmState, Drives, PlantReport, TorqueCommand};
-use supple_ipc::{PlantLink, ReceivedAnswer, pause};
+use supple_ipc::{PlantLink, ReceivedAnswer};
 use supple_plant::{ControllerView, Injection, Injector, Plant, Sample, TraceFile};
-use supple_realtime::{Stop, monotonic_ns, sleep_until_ns};
+use supple_realtime::{Stop, monotonic_ns, pause, sleep_until_ns};
 
 /// Maximum lead with which the thread wakes before its cycle \[ns\]; most wake-ups take less.
 const WAKE_AHEAD_NS: u64 = 50_000;

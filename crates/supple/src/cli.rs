@@ -1,14 +1,12 @@
 //! Definition of the command-line arguments.
 
-use crate::demo::DemoArgs;
-use crate::exit::CODES;
-use crate::identification;
-use crate::range::between;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
-use std::num::NonZeroU64;
 use std::path::PathBuf;
 use supple_bus::Address;
+use supple_cli::arguments::OfflineCommand;
+use supple_cli::exit::CODES;
+use supple_cli::range::between;
 use supple_plant::Injection;
 
 /// Minimum-impedance control of a backdrivable arm.
@@ -23,9 +21,9 @@ pub struct Cli {
 /// Command to run.
 #[derive(Clone, Debug, Subcommand)]
 pub enum Command {
-    /// Run the paper's experiments: figures, report, summary and one log per run.
-    #[command(after_help = CODES)]
-    Demo(DemoArgs),
+    /// Commands that need no running system.
+    #[command(flatten)]
+    Offline(OfflineCommand),
     /// Run a system: controller and plant as processes, tracking the sinusoid at 5 N/m, with a log.
     #[command(after_help = CODES)]
     Up(UpArgs),
@@ -66,17 +64,6 @@ pub enum Command {
     Reset(SystemArgs),
     /// Shut a running system down: the drives are set to idle first.
     Stop(SystemArgs),
-    /// Inspect, export, replay and recover logs.
-    #[command(subcommand)]
-    Log(LogCommand),
-    #[command(flatten)]
-    Identification(identification::Command),
-    /// List the built-in arms.
-    Arms {
-        /// Print the result as JSON.
-        #[arg(long)]
-        json: bool,
-    },
     /// Check whether this machine can run an arm in real time.
     #[command(after_help = CODES)]
     Doctor {
@@ -321,61 +308,11 @@ pub struct TrackArgs {
     pub system: SystemArgs,
 }
 
-/// Command of `supple log`.
-#[derive(Clone, Debug, Subcommand)]
-pub enum LogCommand {
-    /// Show the contents of a log: arm, time span, channels, modes, faults.
-    Info {
-        /// The log.
-        file: PathBuf,
-        /// Print the result as JSON.
-        #[arg(long)]
-        json: bool,
-    },
-    /// Export a channel as comma-separated values.
-    Export {
-        /// The log. A truncated log must be recovered first.
-        file: PathBuf,
-        /// The channel.
-        #[arg(long, value_name = "NAME", default_value = "/controller_state")]
-        channel: String,
-        /// Every N-th message.
-        #[arg(long, value_name = "N", default_value = "1")]
-        every: NonZeroU64,
-        /// Output file. Default: standard output.
-        #[arg(long, value_name = "FILE")]
-        out: Option<PathBuf>,
-    },
-    /// Run the controller over a log again and compare every output bit for bit.
-    #[command(after_help = CODES)]
-    Replay {
-        /// The log. A log with missing steps is rejected.
-        file: PathBuf,
-        /// Print the result as JSON.
-        #[arg(long)]
-        json: bool,
-    },
-    /// Copy every intact chunk of a truncated or damaged log into a new file.
-    Recover {
-        /// The log.
-        from: PathBuf,
-        /// Output file. Default: `<name>.recovered.mcap` beside the log.
-        to: Option<PathBuf>,
-        /// Replace an existing output file.
-        #[arg(long)]
-        force: bool,
-        /// Print the result as JSON.
-        #[arg(long)]
-        json: bool,
-    },
-}
-
 impl Command {
     /// Whether the command prints JSON on standard output.
     pub fn json(&self) -> bool {
         match self {
-            Command::Demo(args) => args.json,
-            Command::Identification(command) => command.json(),
+            Command::Offline(command) => command.json(),
             Command::Up(args) => args.json,
             Command::Drill(args) => args.json,
             Command::Mode(ModeArgs { system, .. })
@@ -387,13 +324,8 @@ impl Command {
             | Command::Stop(system) => system.json,
             // Its output is already JSON; its errors are plain text.
             Command::Pendant { .. } => false,
-            Command::Arms { json } | Command::Doctor { json } => *json,
-            Command::Log(
-                LogCommand::Info { json, .. }
-                | LogCommand::Recover { json, .. }
-                | LogCommand::Replay { json, .. },
-            ) => *json,
-            Command::Log(LogCommand::Export { .. }) | Command::Completions { .. } => false,
+            Command::Doctor { json } => *json,
+            Command::Completions { .. } => false,
         }
     }
 }

@@ -1,54 +1,40 @@
-//! The supple command line: demo with figures and report, complete systems as processes, operator commands, log
-//! tools.
+//! The operator's command line: complete systems as processes, commands to running systems, fault tests, logs.
 //!
-//! It is a library only so that tests can reach its parts; the program is `supple`.
+//! Commands that draw are those of `supple-report`, which it starts in its place: nothing here links a plotter.
 
 #![forbid(unsafe_code)]
 
-mod arms;
 mod cli;
-mod console;
-mod demo;
 mod doctor;
 mod drill;
-pub mod exit;
-pub mod figures;
-mod identification;
-mod interrupt;
-mod log;
 mod operate;
-mod out;
-mod progress;
-mod range;
-pub mod report;
-pub mod sections;
-mod table;
-mod units;
 mod up;
 
 use clap::{CommandFactory, Parser};
 use cli::{Cli, Command};
-use exit::Failure;
+use std::os::unix::process::CommandExt;
 use std::process::ExitCode;
+use supple_cli::arguments::OfflineCommand;
+use supple_cli::exit::Failure;
+use supple_cli::sibling::program_beside;
+use supple_cli::{arms, console, interrupt, log};
+
+/// The program of the commands that draw.
+const REPORT: &str = "supple-report";
 
 /// Runs the program: parses its arguments and returns its exit code.
 pub fn run() -> ExitCode {
     let cli = Cli::parse();
     interrupt::install();
-    let code = match dispatch(&cli.command) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => {
-            console::report_error(&failure, cli.command.json());
-            ExitCode::from(&failure)
-        }
-    };
-    console::flush();
-    code
+    let done = dispatch(&cli.command);
+    console::exit_code(done, cli.command.json())
 }
 
 fn dispatch(command: &Command) -> Result<(), Failure> {
     match command {
-        Command::Demo(args) => demo::run(args),
+        Command::Offline(OfflineCommand::Demo(_) | OfflineCommand::Identification(_)) => {
+            Err(become_report())
+        }
         Command::Up(args) => up::run(args),
         Command::Drill(args) => drill::run(args),
         Command::Status(system) => operate::status(system),
@@ -63,9 +49,8 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
         Command::Pendant { action, prefix } => operate::pendant(*action, prefix.as_deref()),
         Command::Reset(system) => operate::reset(system),
         Command::Stop(system) => operate::stop(system),
-        Command::Log(command) => log::run(command),
-        Command::Identification(command) => identification::run(command),
-        Command::Arms { json } => arms::list(*json),
+        Command::Offline(OfflineCommand::Log(command)) => log::run(command),
+        Command::Offline(OfflineCommand::Arms { json }) => arms::list(*json),
         Command::Doctor { json } => doctor::run(*json),
         Command::Completions { shell } => {
             let mut script = Vec::new();
@@ -73,4 +58,16 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
             console::print_line(String::from_utf8_lossy(&script).trim_end())
         }
     }
+}
+
+/// Replaces this process by `supple-report` with the same arguments. Returns only if that fails.
+fn become_report() -> Failure {
+    let program = match program_beside(REPORT) {
+        Ok(program) => program,
+        Err(failure) => return failure,
+    };
+    let error = std::process::Command::new(&program)
+        .args(std::env::args_os().skip(1))
+        .exec();
+    Failure::file("start", &program, error)
 }

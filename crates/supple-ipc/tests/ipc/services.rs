@@ -9,6 +9,7 @@ use std::path::Path as StdPath;
 use supple_core::controller::{Mode, Request};
 use supple_ipc::message::*;
 use supple_ipc::*;
+use supple_realtime::pause;
 
 const SOON: Duration = Duration::from_secs(5);
 

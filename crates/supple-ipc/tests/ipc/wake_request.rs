@@ -4,7 +4,8 @@ use crate::support::{answer, state, system};
 use core::hint::{black_box, spin_loop};
 use core::time::Duration;
 use supple_ipc::message::TorqueCommand;
-use supple_ipc::{ControllerLink, PlantLink, pause};
+use supple_ipc::{ControllerLink, PlantLink};
+use supple_realtime::pause;
 
 /// Timeout that only a lost wake-up exceeds.
 const LOST_AFTER: Duration = Duration::from_secs(20);

@@ -88,7 +88,7 @@ fn a_controller_killed_while_it_joins_is_replaced() {
     let plant = PlantLink::new(&system.domain).expect("a plant");
     for tenths_ms in 0..120 {
         let mut child = start(&system);
-        supple_ipc::pause(Duration::from_micros(100 * tenths_ms));
+        supple_realtime::pause(Duration::from_micros(100 * tenths_ms));
         child.kill().expect("SIGKILL");
         child.wait().expect("it is gone");
         plant.publish(&support::state(0)).expect("published");

@@ -8,8 +8,9 @@ use std::process::{Child, Command, Output, Stdio};
 use supple_core::controller::{Mode, Request};
 use supple_core::{Controller, Input, State, step};
 use supple_ipc::message::{ArmState, Drives, Outcome, PlantReport, TorqueCommand};
-use supple_ipc::{Domain, OperatorClient, PlantLink, TelemetryReader, pause};
+use supple_ipc::{Domain, OperatorClient, PlantLink, TelemetryReader};
 use supple_model::Description;
+use supple_realtime::pause;
 use tempfile::TempDir;
 
 const SOON: Duration = Duration::from_secs(20);

@@ -7,8 +7,9 @@ use std::io::{PipeReader, PipeWriter, Write, pipe};
 use std::process::{Child, Command, Stdio};
 use supple_core::controller::{Mode, Request};
 use supple_ipc::message::{ArmState, Drives, Outcome, PlantReport};
-use supple_ipc::{Domain, IdleAnswer, OperatorClient, PlantLink, pause, request_idle};
+use supple_ipc::{Domain, IdleAnswer, OperatorClient, PlantLink, request_idle};
 use supple_model::Description;
+use supple_realtime::pause;
 use tempfile::TempDir;
 
 /// Period of the scripted plant: longer than the arm's, so that the result depends on cycles and not on the load of the

@@ -6,12 +6,12 @@
 mod checks;
 mod machine;
 
-use crate::console::{print_json, print_line};
-use crate::exit::Failure;
 use checks::{Check, Verdict};
 use machine::Machine;
 use serde::Serialize;
 use std::path::Path;
+use supple_cli::console::{print_json, print_line};
+use supple_cli::exit::Failure;
 
 /// Results of all checks.
 #[derive(Debug, Serialize)]

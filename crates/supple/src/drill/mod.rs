@@ -23,13 +23,13 @@ mod spec;
 mod task;
 mod trace;
 
-use crate::arms;
 use crate::cli::{DrillArgs, PlantKind};
-use crate::console::{print_json, print_line, print_status};
-use crate::exit::Failure;
-use crate::interrupt;
 use row::Row;
 use spec::Spec;
+use supple_cli::arms;
+use supple_cli::console::{print_json, print_line, print_status};
+use supple_cli::exit::Failure;
+use supple_cli::interrupt;
 use supple_model::{Description, with_dof};
 
 /// Runs `supple drill`.

@@ -5,8 +5,6 @@ use super::spec::{Event, ProcessFailure, Spec, TestTask, UP};
 use super::task;
 use super::trace::TraceAfterLoss;
 use crate::cli::{DrillArgs, PlantKind, UpArgs, UpTrajectory};
-use crate::console::print_status;
-use crate::exit::Failure;
 use crate::operate::OperatorSession;
 use crate::up::System;
 use core::time::Duration;
@@ -14,6 +12,8 @@ use rustix::process::{Pid, Signal, kill_process};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Instant;
+use supple_cli::console::print_status;
+use supple_cli::exit::Failure;
 use supple_core::config::Gains;
 use supple_core::controller::{Mode, Request};
 use supple_ipc::message::{Drives, Telemetry};
@@ -52,7 +52,7 @@ pub fn perform<const N: usize>(
     description: &Description,
 ) -> Result<Row, Failure> {
     let prefix = format!("drill-{}", std::process::id());
-    let domain = Domain::new(Some(&prefix))?;
+    let domain = Domain::new(Some(&prefix)).map_err(Failure::system)?;
     let trace = domain.folder().join(format!("{prefix}.csv"));
     let cap_m = description.tool().map_or(CAP_M, |tool| tool.cap_radius_m);
     let up = UpArgs {
@@ -375,7 +375,7 @@ fn lose_up_process<const N: usize>(
     description: &Description,
     domain: &Domain,
 ) -> Result<(u64, ProcessTestResult), Failure> {
-    let mut reader = TelemetryReader::new(domain)?;
+    let mut reader = TelemetryReader::new(domain).map_err(Failure::system)?;
     let mut running = Up::start(up)?;
     start_task::<N>(spec, description, domain, || next_telemetry(&mut reader))?;
     let begin_ns = monotonic_ns();
@@ -427,5 +427,7 @@ fn lose_up_process<const N: usize>(
 
 /// Waits briefly for the next telemetry.
 fn next_telemetry(reader: &mut TelemetryReader) -> Result<Option<Telemetry>, Failure> {
-    Ok(reader.wait(Duration::from_millis(20))?)
+    reader
+        .wait(Duration::from_millis(20))
+        .map_err(Failure::system)
 }

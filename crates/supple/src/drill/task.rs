@@ -2,8 +2,8 @@
 
 use super::spec::{DriveShutdown, Event, InvalidRequest, Spec, TestTask};
 use crate::cli::UpTrajectory;
-use crate::exit::Failure;
 use crate::operate::{Approach, trajectory_for};
+use supple_cli::exit::Failure;
 use supple_core::config::Gains;
 use supple_core::controller::Request;
 use supple_core::math::Vector3;

@@ -1,7 +1,7 @@
 //! Reads the trace of a simulated arm: torques at the motors, forces and motion of the tip.
 
-use crate::exit::Failure;
 use std::path::Path;
+use supple_cli::exit::Failure;
 
 /// Maximum size of a trace file \[bytes\].
 const MAX_BYTES: u64 = 1 << 30;

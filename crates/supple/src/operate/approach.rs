@@ -1,7 +1,7 @@
 //! Moves the arm to the start of a trajectory: a slow joint-space move and a rest.
 
-use crate::exit::Failure;
 use core::time::Duration;
+use supple_cli::exit::Failure;
 use supple_core::controller::Request;
 use supple_core::{Config, Trajectory, Vector};
 use supple_experiment::start_pose;

@@ -12,15 +12,15 @@ pub use pendant::{Pendant, pendant};
 pub use session::OperatorSession;
 pub use status::status;
 
-use crate::arms;
 use crate::cli::{
     GainsArgs, ModeArgs, ModeName, SystemArgs, TrackArgs, TrackTrajectory, UpTrajectory,
 };
-use crate::console::{print_json, print_line};
-use crate::exit::Failure;
 use crate::up::stop_running;
 use core::time::Duration;
 use serde::Serialize;
+use supple_cli::arms;
+use supple_cli::console::{print_json, print_line};
+use supple_cli::exit::Failure;
 use supple_core::config::{Gains, JointGains};
 use supple_core::controller::{Mode, Request};
 use supple_core::math::Vector3;
@@ -48,9 +48,9 @@ struct Answer {
 /// # Errors
 /// [`Failure::NotRunning`] if no telemetry arrives.
 fn running(system: &SystemArgs) -> Result<(Domain, TelemetryReader, Telemetry), Failure> {
-    let domain = Domain::new(system.prefix.as_deref())?;
-    let mut reader = TelemetryReader::new(&domain)?;
-    match reader.wait(TELEMETRY_TIMEOUT)? {
+    let domain = Domain::new(system.prefix.as_deref()).map_err(Failure::system)?;
+    let mut reader = TelemetryReader::new(&domain).map_err(Failure::system)?;
+    match reader.wait(TELEMETRY_TIMEOUT).map_err(Failure::system)? {
         Some(telemetry) => Ok((domain, reader, telemetry)),
         None => Err(Failure::NotRunning {
             prefix: domain.prefix().to_owned(),
@@ -77,8 +77,8 @@ pub fn mode(args: &ModeArgs) -> Result<(), Failure> {
 
 /// Requests idle over a separate socket that needs no reader or operator slot, no shared memory and no lock.
 fn idle(system: &SystemArgs) -> Result<(), Failure> {
-    let domain = Domain::new(system.prefix.as_deref())?;
-    match request_idle(&domain, TELEMETRY_TIMEOUT)? {
+    let domain = Domain::new(system.prefix.as_deref()).map_err(Failure::system)?;
+    match request_idle(&domain, TELEMETRY_TIMEOUT).map_err(Failure::system)? {
         Some(answer) if answer.outcome == Outcome::Refused => Err(Failure::Refused {
             reason: answer.text,
         }),
@@ -307,7 +307,7 @@ fn follow(
 /// # Errors
 /// [`Failure::NotRunning`].
 pub fn stop(system: &SystemArgs) -> Result<(), Failure> {
-    let domain = Domain::new(system.prefix.as_deref())?;
+    let domain = Domain::new(system.prefix.as_deref()).map_err(Failure::system)?;
     if stop_running(&domain)? {
         return Ok(());
     }

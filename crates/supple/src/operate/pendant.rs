@@ -1,8 +1,6 @@
 //! The pendant of an emulated arm: a socket in the folder of its bus; each text line is answered by one line of JSON.
 
 use crate::cli::PendantAction;
-use crate::console::print_line;
-use crate::exit::Failure;
 use core::time::Duration;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
@@ -11,7 +9,10 @@ use std::os::unix::net::UnixStream;
 use std::path::PathBuf;
 use std::time::Instant;
 use supple_bus::Address;
-use supple_ipc::{Domain, pause};
+use supple_cli::console::print_line;
+use supple_cli::exit::Failure;
+use supple_ipc::Domain;
+use supple_realtime::pause;
 
 /// Name of the socket in the folder of the bus.
 const SOCKET: &str = "pendant";
@@ -128,8 +129,8 @@ impl Pendant {
 /// # Errors
 /// [`Failure::Pendant`].
 pub fn pendant(action: PendantAction, prefix: Option<&str>) -> Result<(), Failure> {
-    let domain = Domain::new(prefix)?;
-    let bus = Address::of_system(domain.prefix())?;
+    let domain = Domain::new(prefix).map_err(Failure::system)?;
+    let bus = Address::of_system(domain.prefix()).map_err(Failure::system)?;
     let line = match action {
         PendantAction::Idle => "idle",
         PendantAction::Activate => "activate",

@@ -1,13 +1,14 @@
 //! Sends requests to a controller and receives its replies.
 
 use super::Approach;
-use crate::exit::Failure;
 use core::time::Duration;
 use std::time::Instant;
+use supple_cli::exit::Failure;
 use supple_core::Vector;
 use supple_core::controller::Request;
 use supple_ipc::message::{OperatorReply, Outcome};
-use supple_ipc::{Domain, OperatorClient, pause};
+use supple_ipc::{Domain, IpcError, OperatorClient};
+use supple_realtime::pause;
 
 /// Timeout for a reply.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(5);
@@ -26,22 +27,22 @@ impl<const N: usize> OperatorSession<N> {
     /// Joins a system.
     ///
     /// # Errors
-    /// [`Failure::Ipc`].
+    /// [`Failure::System`].
     pub fn new(domain: &Domain) -> Result<Self, Failure> {
-        OperatorSession::of(domain, OperatorClient::new(domain)?)
+        OperatorSession::of(domain, OperatorClient::new(domain))
     }
 
     /// As [`OperatorSession::new`], for a program that runs the system.
     ///
     /// # Errors
-    /// [`Failure::Ipc`].
+    /// [`Failure::System`].
     pub fn for_system(domain: &Domain) -> Result<Self, Failure> {
-        OperatorSession::of(domain, OperatorClient::for_system(domain)?)
+        OperatorSession::of(domain, OperatorClient::for_system(domain))
     }
 
-    fn of(domain: &Domain, operator: OperatorClient) -> Result<Self, Failure> {
+    fn of(domain: &Domain, operator: Result<OperatorClient, IpcError>) -> Result<Self, Failure> {
         Ok(OperatorSession {
-            operator,
+            operator: operator.map_err(Failure::system)?,
             prefix: domain.prefix().to_owned(),
             pending_requests: Vec::new(),
         })
@@ -56,7 +57,10 @@ impl<const N: usize> OperatorSession<N> {
         request: &Request<N>,
         at_cycle: Option<u64>,
     ) -> Result<OperatorReply, Failure> {
-        let sequence = self.operator.send(request, at_cycle)?;
+        let sequence = self
+            .operator
+            .send(request, at_cycle)
+            .map_err(Failure::system)?;
         self.wait_for_reply(sequence.ok_or_else(|| self.not_running())?)
     }
 
@@ -74,7 +78,11 @@ impl<const N: usize> OperatorSession<N> {
     ) -> Result<(), Failure> {
         let start = Instant::now();
         loop {
-            if let Some(sequence) = self.operator.send(request, at_cycle)? {
+            if let Some(sequence) = self
+                .operator
+                .send(request, at_cycle)
+                .map_err(Failure::system)?
+            {
                 return self.wait_until_queued(sequence);
             }
             check()?;
@@ -112,7 +120,7 @@ impl<const N: usize> OperatorSession<N> {
     /// [`Failure::Refused`] if a request was refused.
     pub fn check(&mut self) -> Result<Option<OperatorReply>, Failure> {
         let mut done = None;
-        while let Some(reply) = self.operator.receive()? {
+        while let Some(reply) = self.operator.receive().map_err(Failure::system)? {
             match reply.outcome() {
                 Outcome::Queued => {}
                 Outcome::Accepted => {
@@ -149,7 +157,11 @@ impl<const N: usize> OperatorSession<N> {
     /// # Errors
     /// As [`OperatorSession::send_request`].
     pub fn queue(&mut self, request: &Request<N>, at_cycle: u64) -> Result<(), Failure> {
-        match self.operator.send(request, Some(at_cycle))? {
+        match self
+            .operator
+            .send(request, Some(at_cycle))
+            .map_err(Failure::system)?
+        {
             Some(sequence) => self.wait_until_queued(sequence),
             None => Err(self.not_running()),
         }
@@ -166,7 +178,7 @@ impl<const N: usize> OperatorSession<N> {
     fn wait_for_reply(&mut self, sequence: u64) -> Result<OperatorReply, Failure> {
         let start = Instant::now();
         while start.elapsed() < ANSWER_TIMEOUT {
-            while let Some(reply) = self.operator.receive()? {
+            while let Some(reply) = self.operator.receive().map_err(Failure::system)? {
                 if reply.outcome() == Outcome::Refused {
                     return Err(refused(&reply));
                 }

@@ -2,13 +2,13 @@
 
 use super::running;
 use crate::cli::SystemArgs;
-use crate::console::{print_json, print_line};
-use crate::exit::Failure;
 use crate::up::{Percentiles, RunStatistics};
 use core::fmt;
 use core::time::Duration;
 use serde::Serialize;
 use std::time::Instant;
+use supple_cli::console::{print_json, print_line};
+use supple_cli::exit::Failure;
 use supple_ipc::message::Telemetry;
 
 /// Duration of the telemetry sample.
@@ -52,7 +52,7 @@ pub fn status(system: &SystemArgs) -> Result<(), Failure> {
     let mut statistics = RunStatistics::default();
     let start = Instant::now();
     while start.elapsed() < SAMPLE_WINDOW {
-        if let Some(telemetry) = reader.wait(SAMPLE_WINDOW)? {
+        if let Some(telemetry) = reader.wait(SAMPLE_WINDOW).map_err(Failure::system)? {
             statistics.add(&telemetry);
             last = telemetry;
         }

@@ -1,9 +1,6 @@
 //! Child processes of a system: starts, supervises and terminates the programs that are installed beside this one.
 
 use super::plan::{CONTROLLER, Program};
-use crate::console::print_status;
-use crate::exit::Failure;
-use crate::interrupt;
 use core::time::Duration;
 use rustix::fs::{FlockOperation, flock};
 use rustix::io::Errno;
@@ -15,7 +12,12 @@ use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::Instant;
-use supple_ipc::{Domain, pause};
+use supple_cli::console::print_status;
+use supple_cli::exit::Failure;
+use supple_cli::interrupt;
+use supple_cli::sibling::program_beside;
+use supple_ipc::Domain;
+use supple_realtime::pause;
 
 /// Exit code of a program that cannot write a file.
 const FILE_CODE: i32 = 6;
@@ -202,16 +204,6 @@ fn ended(name: &'static str, status: ExitStatus) -> Failure {
     Failure::ProcessEnded {
         name,
         status: status.to_string(),
-    }
-}
-
-fn program_beside(name: &'static str) -> Result<PathBuf, Failure> {
-    let this = std::env::current_exe()
-        .map_err(|error| Failure::file("find", Path::new("this program"), error))?;
-    let program = this.with_file_name(name);
-    match program.is_file() {
-        true => Ok(program),
-        false => Err(Failure::MissingProgram { name, program }),
     }
 }
 

@@ -21,12 +21,12 @@ pub use stages::{GRAVITY_HOLD_S, START_S};
 pub use statistics::{Percentiles, RunStatistics};
 pub use system::System;
 
-use crate::arms;
 use crate::cli::UpArgs;
-use crate::console::{print_json, print_line, print_status, write_stderr_in_background};
-use crate::exit::Failure;
-use crate::interrupt;
 use children::Pidfile;
+use supple_cli::arms;
+use supple_cli::console::{print_json, print_line, print_status, write_stderr_in_background};
+use supple_cli::exit::Failure;
+use supple_cli::interrupt;
 use supple_ipc::Domain;
 use supple_model::{Description, with_dof};
 
@@ -45,7 +45,7 @@ fn sized<const N: usize>(args: &UpArgs, description: &Description) -> Result<(),
         let checked = supple_files::check_output(output);
         checked.map_err(|error| Failure::file("write", output, error))?;
     }
-    let domain = Domain::new(args.prefix.as_deref())?;
+    let domain = Domain::new(args.prefix.as_deref()).map_err(Failure::system)?;
     write_stderr_in_background();
     let stop = interrupt::shutdown_on_interrupt();
     let _pidfile = Pidfile::create(&domain)?;

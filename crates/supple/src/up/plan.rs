@@ -1,10 +1,10 @@
 //! Processes of a system and their command-line arguments.
 
 use crate::cli::{PlantKind, UpArgs, UpTrajectory};
-use crate::exit::Failure;
 use crate::operate::pendant::Pendant;
 use std::path::PathBuf;
 use supple_bus::Address;
+use supple_cli::exit::Failure;
 use supple_ipc::Domain;
 use supple_model::{Description, ModelError};
 use supple_plant::Injection;
@@ -40,7 +40,7 @@ impl Plan {
     /// Plans the processes; in virtual time the clock owner exits after `cycles`.
     ///
     /// # Errors
-    /// [`Failure::Injection`] if this plant does not support an injected fault; [`Failure::Bus`] if the folder of an
+    /// [`Failure::Injection`] if this plant does not support an injected fault; [`Failure::System`] if the folder of an
     /// emulated bus does not belong to this user; [`Failure::VirtualTimeOnRealBus`].
     pub fn new(args: &UpArgs, domain: &Domain, cycles: Option<u64>) -> Result<Plan, Failure> {
         args.check_injections()?;
@@ -60,7 +60,9 @@ impl Plan {
         let bus = match (args.plant, &args.bus) {
             (PlantKind::Sim, _) => None,
             (_, Some(bus)) => Some(bus.clone()),
-            (PlantKind::Emu, None) => Some(Address::of_system(domain.prefix())?),
+            (PlantKind::Emu, None) => {
+                Some(Address::of_system(domain.prefix()).map_err(Failure::system)?)
+            }
             (PlantKind::Can, None) => Some(Address::Interface(INTERFACE.to_owned())),
         };
         if args.virtual_time && matches!(bus, Some(Address::Interface(_))) {
@@ -95,7 +97,9 @@ impl Plan {
                 });
                 plan.pendant = match bus {
                     Address::Folder(_) => Pendant::of(&bus),
-                    Address::Interface(_) => Pendant::of(&Address::of_system(domain.prefix())?),
+                    Address::Interface(_) => {
+                        Pendant::of(&Address::of_system(domain.prefix()).map_err(Failure::system)?)
+                    }
                 };
             }
         }

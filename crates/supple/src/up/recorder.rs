@@ -1,10 +1,10 @@
 //! Telemetry into a log, for as long as it can be written: a full disk ends the log, not the arm.
 
-use crate::console::print_status;
-use crate::exit::Failure;
 use std::fs;
 use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
+use supple_cli::console::print_status;
+use supple_cli::exit::Failure;
 use supple_core::Config;
 use supple_ipc::message::Telemetry;
 use supple_log::{CycleTiming, Extras, RunInfo, Writer};

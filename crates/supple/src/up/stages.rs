@@ -7,9 +7,9 @@
 //! ```
 
 use crate::cli::PlantKind;
-use crate::console::print_status;
-use crate::exit::Failure;
 use crate::operate::{Approach, OperatorSession, Pendant};
+use supple_cli::console::print_status;
+use supple_cli::exit::Failure;
 use supple_core::controller::Request;
 use supple_ipc::message::{Drives, Telemetry};
 

@@ -1,8 +1,8 @@
 //! Status line on the terminal.
 
 use super::RunStatistics;
-use crate::console::print_status_part;
 use std::io::IsTerminal;
+use supple_cli::console::print_status_part;
 use supple_core::controller::Mode;
 use supple_ipc::message::{Drives, Telemetry};
 

@@ -7,12 +7,12 @@ use super::stages::{GRAVITY_HOLD_S, START_S, Stages, cycles_of};
 use super::statistics::{RunStatistics, UpSummary};
 use super::status_line::StatusLine;
 use crate::cli::UpArgs;
-use crate::console::print_status;
-use crate::exit::Failure;
 use crate::operate::{Approach, OperatorSession, Pendant, trajectory_for};
 use core::time::Duration;
 use rustix::process::Signal;
 use std::time::Instant;
+use supple_cli::console::print_status;
+use supple_cli::exit::Failure;
 use supple_core::controller::Request;
 use supple_ipc::message::Telemetry;
 use supple_ipc::{Domain, TelemetryReader};
@@ -68,7 +68,7 @@ impl<'a, const N: usize> System<'a, N> {
             approach: Approach::new(&config, trajectory, duration_s)?,
             run_log: RunLog::new(recorder.transpose()?),
             // Create readers before writers, so that no message is missed.
-            reader: TelemetryReader::for_log(domain)?,
+            reader: TelemetryReader::for_log(domain).map_err(Failure::system)?,
             session: OperatorSession::for_system(domain)?,
             children: ChildProcesses::default(),
             statistics: RunStatistics::default(),
@@ -232,7 +232,7 @@ impl<'a, const N: usize> System<'a, N> {
     /// # Errors
     /// As [`System::watch`].
     pub fn poll_and_advance(&mut self) -> Result<Option<Telemetry>, Failure> {
-        let Some(telemetry) = self.reader.wait(POLL_INTERVAL)? else {
+        let Some(telemetry) = self.reader.wait(POLL_INTERVAL).map_err(Failure::system)? else {
             return Ok(None);
         };
         self.add(&telemetry);
@@ -249,7 +249,7 @@ impl<'a, const N: usize> System<'a, N> {
     /// # Errors
     /// If shared memory cannot be accessed.
     pub fn poll_telemetry(&mut self) -> Result<Option<Telemetry>, Failure> {
-        let telemetry = self.reader.wait(POLL_INTERVAL)?;
+        let telemetry = self.reader.wait(POLL_INTERVAL).map_err(Failure::system)?;
         if let Some(telemetry) = &telemetry {
             self.add(telemetry);
         }
@@ -273,7 +273,7 @@ impl<'a, const N: usize> System<'a, N> {
             (&mut self.reader, &mut self.run_log, &mut self.statistics);
         let virtual_time = self.args.virtual_time;
         let mut drain = || -> Result<(), Failure> {
-            while let Some(telemetry) = reader.receive()? {
+            while let Some(telemetry) = reader.receive().map_err(Failure::system)? {
                 match virtual_time {
                     true => statistics.add(&telemetry),
                     false => statistics.note_fault(&telemetry),

@@ -50,29 +50,6 @@ fn an_invalid_command_line_is_code_2_and_does_nothing() {
 }
 
 #[test]
-fn an_unknown_arm_is_code_3_and_the_arms_are_listed() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let out = folder.path().join("out");
-    let answer = run(&["demo", "--arm", "wam5", "--out", support::arg(&out)]);
-    assert_eq!(answer.code, Some(3));
-    assert_one_clear_line(&answer, &["wam5", "paper3", "wam3", "wam4", "wam7", "TOML"]);
-    assert!(answer.stdout.is_empty());
-    assert!(support::tree(folder.path()).is_empty(), "nothing is left");
-}
-
-#[test]
-fn with_json_an_error_is_an_object_on_standard_output() {
-    let answer = run(&["demo", "--arm", "wam5", "--json"]);
-    assert_eq!(answer.code, Some(3));
-    let object: serde_json::Value = serde_json::from_str(&answer.stdout).expect("JSON");
-    let error = &object["error"];
-    assert_eq!(error["kind"], "description");
-    assert_eq!(error["exit_code"], 3);
-    assert!(error["message"].as_str().expect("text").contains("wam5"));
-    assert_one_clear_line(&answer, &["wam5"]);
-}
-
-#[test]
 fn the_built_in_arms_are_listed() {
     let answer = run(&["arms"]);
     assert_eq!(answer.code, Some(0));
@@ -100,7 +77,7 @@ fn completions_name_the_commands() {
 #[test]
 fn a_closed_pipe_is_not_an_error() {
     use std::process::Stdio;
-    let mut child = support::supple(&["completions", "bash"])
+    let mut child = support::program(&["completions", "bash"])
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
@@ -117,7 +94,7 @@ fn standard_output_on_a_full_disk_is_code_6() {
         .write(true)
         .open("/dev/full")
         .expect("/dev/full");
-    let output = support::supple(&["arms"])
+    let output = support::program(&["arms"])
         .stdout(full)
         .output()
         .expect("it starts");

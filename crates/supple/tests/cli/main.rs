@@ -4,6 +4,3 @@ mod support;
 
 mod bad_input;
 mod command_line;
-mod demo;
-mod faults;
-mod identification;

@@ -1,11 +1,21 @@
-//! Runs the `supple` binary.
+//! Runs the program of the crate that is tested, `supple` or `supple-report`.
+#![allow(dead_code)]
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+/// The program.
+pub const PROGRAM: &str = match option_env!("CARGO_BIN_EXE_supple") {
+    Some(operator) => operator,
+    None => match option_env!("CARGO_BIN_EXE_supple-report") {
+        Some(report) => report,
+        None => panic!("neither of the programs"),
+    },
+};
+
 /// Returns the command with these arguments, not yet started.
-pub fn supple(args: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_supple"));
+pub fn program(args: &[&str]) -> Command {
+    let mut command = Command::new(PROGRAM);
     command.args(args);
     command
 }
@@ -27,9 +37,9 @@ impl From<Output> for Answer {
     }
 }
 
-/// Runs `supple` until it exits.
+/// Runs the program until it exits.
 pub fn run(args: &[&str]) -> Answer {
-    supple(args).output().expect("the binary starts").into()
+    program(args).output().expect("the binary starts").into()
 }
 
 /// A path as an argument.

@@ -1,12 +1,12 @@
 //! `supple identify`: identifies a model from logs; the controller can load it.
 
-use super::IdentifyArgs;
 use super::report::{Found, Summary, html, summary};
-use crate::arms;
-use crate::console::{json, print_line};
-use crate::exit::Failure;
-use crate::out::Staging;
 use std::path::Path;
+use supple_cli::arguments::IdentifyArgs;
+use supple_cli::arms;
+use supple_cli::console::{json, print_line};
+use supple_cli::exit::Failure;
+use supple_cli::out::Staging;
 use supple_experiment::predict_tracking_error;
 use supple_ident::{
     Fit, FrictionChoice, Log, Motion, Preparation, Procedure, Validation, fit_with_stribeck,

@@ -1,4 +1,4 @@
-//! Error type and exit codes of the program. Every error prints one line.
+//! Error type and exit codes of both programs. Every error prints one line.
 //!
 //! | code | meaning |
 //! |---|---|
@@ -17,13 +17,10 @@
 //! | 12 | a test case of `supple drill` failed |
 //! | 130 | interrupted |
 
-use crate::figures::FigureError;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use supple_bus::BusError;
 use supple_experiment::ExperimentError;
 use supple_ident::{IdentError, ReadError, SaveError};
-use supple_ipc::IpcError;
 use supple_log::LogError;
 use supple_model::ModelError;
 use supple_plant::InjectionError;
@@ -99,12 +96,10 @@ pub enum Failure {
         /// The process that writes the trace.
         name: &'static str,
     },
-    /// Shared memory.
+    /// Shared memory of a running system, or the address of its bus. Boxed: a program that runs no system links
+    /// neither.
     #[error(transparent)]
-    Ipc(#[from] IpcError),
-    /// The address of the arm's bus.
-    #[error(transparent)]
-    Bus(#[from] BusError),
+    System(Box<dyn std::error::Error + Send + Sync>),
     /// The pendant of an emulated arm does not answer.
     #[error(
         "the pendant at {} does not answer: {cause}; only an emulated arm has this pendant, start one with \
@@ -259,7 +254,7 @@ pub enum Failure {
     },
     /// A figure cannot be drawn.
     #[error("{0}; this is a bug, please report it")]
-    Figure(#[from] FigureError),
+    Figure(String),
     /// The report or the summary cannot be generated.
     #[error("cannot generate the report: {0}; this is a bug, please report it")]
     ReportGeneration(String),
@@ -284,6 +279,11 @@ impl Failure {
             error,
             remedy,
         }
+    }
+
+    /// Creates the failure of a running system's shared memory or bus.
+    pub fn system(error: impl std::error::Error + Send + Sync + 'static) -> Failure {
+        Failure::System(Box::new(error))
     }
 
     /// Short name of the error, as `--json` prints it.
@@ -341,8 +341,7 @@ impl Failure {
             Failure::Injection(_) | Failure::InjectionIntoRealArm => 2,
             Failure::NoSuchProcess { .. } | Failure::NoSuchTestCase { .. } => 2,
             Failure::Drill { .. } | Failure::DidNotReachTracking => 12,
-            Failure::Ipc(_)
-            | Failure::Bus(_)
+            Failure::System(_)
             | Failure::Pendant { .. }
             | Failure::AlreadyRunning { .. }
             | Failure::MissingProgram { .. }

@@ -1,12 +1,12 @@
 //! `supple excite run`: runs a designed motion on the simulated arm and logs it.
 
-use super::RunArgs;
-use crate::arms;
-use crate::console::{print_json, print_line};
-use crate::exit::Failure;
-use crate::out::Staging;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+use supple_cli::arguments::RunArgs;
+use supple_cli::arms;
+use supple_cli::console::{print_json, print_line};
+use supple_cli::exit::Failure;
+use supple_cli::out::Staging;
 use supple_experiment::calibrate::plant_of;
 use supple_experiment::{Calibration, excitation, slow_motion};
 use supple_ident::{ReadError, SeriesLists};
@@ -88,7 +88,7 @@ fn sized<const N: usize>(
         seed: args.seed,
         recorded_s: series.iter().map(|series| series.duration_s).collect(),
     };
-    let text = crate::console::json(&summary)?;
+    let text = supple_cli::console::json(&summary)?;
     staging.write("summary.json", format!("{text}\n").as_bytes())?;
     staging.publish()?;
     if args.json {

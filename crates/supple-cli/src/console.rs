@@ -4,6 +4,7 @@ use crate::exit::Failure;
 use serde::Serialize;
 use std::io::{ErrorKind, Write};
 use std::path::Path;
+use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 use supple_realtime::diagnostics;
 
@@ -50,7 +51,7 @@ pub fn write_stderr_in_background() {
 }
 
 /// Waits briefly until pending output to standard error is written.
-pub fn flush() {
+fn flush() {
     if IN_BACKGROUND.load(Ordering::Relaxed) {
         diagnostics::flush();
     }
@@ -85,7 +86,7 @@ struct JsonError {
 }
 
 /// Reports a failure: one line on standard error and, in JSON mode, an object on standard output.
-pub fn report_error(failure: &Failure, as_json: bool) {
+fn report_error(failure: &Failure, as_json: bool) {
     print_status(&format!("error: {failure}"));
     if as_json && !failure.comes_with_results() {
         let error = JsonError {
@@ -95,4 +96,17 @@ pub fn report_error(failure: &Failure, as_json: bool) {
         };
         let _ = print_json(&JsonFailure { error });
     }
+}
+
+/// Reports the result of a command, waits for pending output and returns the exit code.
+pub fn exit_code(result: Result<(), Failure>, as_json: bool) -> ExitCode {
+    let code = match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            report_error(&failure, as_json);
+            ExitCode::from(&failure)
+        }
+    };
+    flush();
+    code
 }

@@ -1,10 +1,11 @@
 //! `supple breakaway`: measures the breakaway torque of each joint of the simulated arm.
 
-use super::{BreakawayArgs, joints};
-use crate::arms;
-use crate::console::{print_json, print_line};
-use crate::exit::Failure;
+use super::joints;
 use serde::Serialize;
+use supple_cli::arguments::BreakawayArgs;
+use supple_cli::arms;
+use supple_cli::console::{print_json, print_line};
+use supple_cli::exit::Failure;
 use supple_core::Vector;
 use supple_experiment::calibrate::plant_of;
 use supple_experiment::{Calibration, ExperimentError, breakaway, identify_ripple};

@@ -1,9 +1,9 @@
 //! Report of an identification: one self-contained HTML file, and its summary.
 
-use crate::exit::Failure;
 use crate::figures::identification::{Curves, curves};
 use askama::Template;
 use serde::Serialize;
+use supple_cli::exit::Failure;
 use supple_experiment::TrackingPrediction;
 use supple_ident::{DMatrix, Fit, Motion, Validation};
 use supple_model::Description;

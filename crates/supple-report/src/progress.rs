@@ -1,10 +1,10 @@
 //! Progress of the demo: a bar on a terminal, a line every 20 % otherwise, nothing in quiet mode.
 
-use crate::console::print_status;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::sync::Mutex;
 use std::time::Duration;
+use supple_cli::console::print_status;
 use supple_experiment::Progress;
 
 /// Fraction of the work between two lines.

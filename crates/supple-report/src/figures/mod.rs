@@ -19,6 +19,7 @@ mod trade_off;
 
 use plotters::drawing::DrawingAreaErrorKind;
 use plotters::prelude::*;
+use supple_cli::exit::Failure;
 use supple_experiment::Demo;
 
 /// Why a figure cannot be drawn.
@@ -40,6 +41,12 @@ pub enum FigureError {
 impl<E: std::error::Error + Send + Sync> From<DrawingAreaErrorKind<E>> for FigureError {
     fn from(error: DrawingAreaErrorKind<E>) -> FigureError {
         FigureError::Draw(error.to_string())
+    }
+}
+
+impl From<FigureError> for Failure {
+    fn from(error: FigureError) -> Failure {
+        Failure::Figure(error.to_string())
     }
 }
 

@@ -1,6 +1,6 @@
 //! `supple log`: info, export, replay, recover.
 
-use crate::cli::LogCommand;
+use crate::arguments::LogCommand;
 use crate::console::{print_json, print_line};
 use crate::exit::Failure;
 use std::fs;

@@ -1,25 +1,16 @@
-//! Identification commands: design an excitation, measure breakaway, identify from logs, learn from repeated motion,
-//! or do all of it on the simulated arm.
+//! Arguments of the identification commands.
 
-mod breakaway;
-mod calibrate;
-mod excite;
-mod follow;
-mod identify;
-mod learn;
-mod report;
-
-use crate::exit::{CODES, Failure};
+use crate::exit::CODES;
 use crate::range::between;
 use clap::builder::RangedU64ValueParser;
 use clap::{Args, Subcommand, ValueEnum};
 use std::path::PathBuf;
+use supple_ident::Method;
 use supple_ident::design::MAX_CANDIDATES;
-use supple_ident::{IdentError, Method};
 
 /// Identification command.
 #[derive(Clone, Debug, Subcommand)]
-pub enum Command {
+pub enum IdentificationCommand {
     /// Identify an arm from logs: model, report, verdict.
     #[command(after_help = CODES)]
     Identify(IdentifyArgs),
@@ -293,32 +284,17 @@ pub struct LearnArgs {
     pub json: bool,
 }
 
-impl Command {
+impl IdentificationCommand {
     /// Whether the command prints JSON on standard output.
     pub fn json(&self) -> bool {
         match self {
-            Command::Identify(args) => args.json,
-            Command::Excite(ExciteCommand::Design(args)) => args.json,
-            Command::Excite(ExciteCommand::Run(args)) => args.json,
-            Command::Breakaway(args) => args.json,
-            Command::Calibrate(args) => args.json,
-            Command::Learn(args) => args.json,
+            IdentificationCommand::Identify(args) => args.json,
+            IdentificationCommand::Excite(ExciteCommand::Design(args)) => args.json,
+            IdentificationCommand::Excite(ExciteCommand::Run(args)) => args.json,
+            IdentificationCommand::Breakaway(args) => args.json,
+            IdentificationCommand::Calibrate(args) => args.json,
+            IdentificationCommand::Learn(args) => args.json,
         }
-    }
-}
-
-/// Runs an identification command.
-///
-/// # Errors
-/// [`Failure`].
-pub fn run(command: &Command) -> Result<(), Failure> {
-    match command {
-        Command::Identify(args) => identify::run(args),
-        Command::Excite(ExciteCommand::Design(args)) => excite::run(args),
-        Command::Excite(ExciteCommand::Run(args)) => follow::run(args),
-        Command::Breakaway(args) => breakaway::run(args),
-        Command::Calibrate(args) => calibrate::run(args),
-        Command::Learn(args) => learn::run(args),
     }
 }
 
@@ -329,20 +305,4 @@ fn pair(text: &str) -> Result<(usize, usize), String> {
         Some((Ok(a), Ok(b))) => Ok((a, b)),
         _ => Err("give two joints as 4+5".to_owned()),
     }
-}
-
-/// The requested joints, or all joints below `dof`.
-fn joints(requested: &[usize], dof: usize) -> Result<Vec<usize>, Failure> {
-    if requested.is_empty() {
-        return Ok((0..dof).collect());
-    }
-    let increasing = requested.windows(2).all(|w| w[0] < w[1]);
-    if increasing && requested.iter().all(|joint| *joint < dof) {
-        return Ok(requested.to_vec());
-    }
-    Err(Failure::Ident(IdentError::Shape {
-        argument: "joints".to_owned(),
-        expected: format!("numbers below {dof}, increasing"),
-        found: format!("{requested:?}"),
-    }))
 }

@@ -1,13 +1,14 @@
 //! `supple excite design`: designs an excitation trajectory; writes table, figure and summary.
 
-use super::{Criterion, DesignArgs, joints};
-use crate::arms;
-use crate::console::{json, print_line, print_status};
-use crate::exit::Failure;
+use super::joints;
 use crate::figures::identification::{Curves, curves};
-use crate::out::Staging;
 use serde::Serialize;
 use std::fmt::Write;
+use supple_cli::arguments::{Criterion, DesignArgs};
+use supple_cli::arms;
+use supple_cli::console::{json, print_line, print_status};
+use supple_cli::exit::Failure;
+use supple_cli::out::Staging;
 use supple_core::trajectory::Fourier;
 use supple_ident::SeriesLists;
 use supple_ident::design::{self, DesignOptions, ExcitationDesign, Workspace, design};

@@ -1,10 +1,10 @@
 //! `report.html`: one self-contained file that needs no network.
 
-use crate::exit::Failure;
 use crate::figures::Figure;
 use crate::sections::{Section, faults, sections};
 use crate::units::{figures, percent, plain, seconds};
 use askama::Template;
+use supple_cli::exit::Failure;
 use supple_experiment::summary::{ProbingSummary, Summary};
 use supple_experiment::{Demo, Mismatch};
 use supple_model::Description;

@@ -1,10 +1,10 @@
 //! `supple learn`: refits friction and payload from logs of a repeated motion.
 
-use super::LearnArgs;
-use crate::arms;
-use crate::console::{print_json, print_line};
-use crate::exit::Failure;
 use serde::Serialize;
+use supple_cli::arguments::LearnArgs;
+use supple_cli::arms;
+use supple_cli::console::{print_json, print_line};
+use supple_cli::exit::Failure;
 use supple_experiment::calibrate::preparation;
 use supple_ident::{Learned, Learning, Log, Motion, learn, read_logs};
 use supple_model::{Description, IdentifiedModel, with_dof};

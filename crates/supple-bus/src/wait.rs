@@ -1,29 +1,12 @@
-//! The monotonic clock, and waiting for a descriptor until a time on it.
+//! Waiting for a descriptor until a time on the monotonic clock.
 
 use crate::error::BusError;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fd::AsFd;
 use rustix::io::Errno;
-use rustix::thread::clock_nanosleep_absolute;
-use rustix::time::{ClockId, clock_gettime};
+use supple_realtime::monotonic_ns;
 
 const NS_PER_S: u64 = 1_000_000_000;
-
-/// The machine's monotonic clock \[ns\].
-pub fn monotonic_ns() -> u64 {
-    let now = clock_gettime(ClockId::Monotonic);
-    now.tv_sec as u64 * NS_PER_S + now.tv_nsec as u64
-}
-
-/// Sleeps until the monotonic clock reaches `time_ns` or a signal arrives.
-pub(crate) fn sleep_until_ns(time_ns: u64) {
-    let until = Timespec {
-        tv_sec: (time_ns / NS_PER_S) as i64,
-        tv_nsec: (time_ns % NS_PER_S) as _,
-    };
-    // A signal ends the sleep early; the caller checks the clock.
-    let _ = clock_nanosleep_absolute(ClockId::Monotonic, &until);
-}
 
 /// Whether `fd` can be read before the monotonic clock reaches `until_ns`. A signal ends the wait early
 /// with `false`.

@@ -1,14 +1,14 @@
 //! `supple calibrate`: runs all steps from breakaway to the demo on the simulated arm.
 
-use super::CalibrateArgs;
 use super::identify::{FILES, print, write};
 use super::report::{Found, summary};
-use crate::arms;
-use crate::console::{json, print_line, print_status};
 use crate::demo;
-use crate::exit::Failure;
-use crate::out::Staging;
 use serde::Serialize;
+use supple_cli::arguments::{CalibrateArgs, DemoArgs};
+use supple_cli::arms;
+use supple_cli::console::{json, print_line, print_status};
+use supple_cli::exit::Failure;
+use supple_cli::out::Staging;
 use supple_experiment::calibrate::{described_plant, plant_of};
 use supple_experiment::{
     Calibration, IdentifiedModelTracking, ModelAccuracy, calibrate, predict_tracking_error,
@@ -49,7 +49,7 @@ pub fn run(args: &CalibrateArgs) -> Result<(), Failure> {
         return Ok(());
     }
     let plant = args.out.join(PLANT);
-    demo::run(&demo::DemoArgs {
+    demo::run(&DemoArgs {
         arm: match args.ripple > 0.0 {
             true => plant.display().to_string(),
             false => args.arm.clone(),

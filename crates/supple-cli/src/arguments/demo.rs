@@ -1,0 +1,33 @@
+//! Arguments of `supple demo`.
+
+use std::path::PathBuf;
+
+/// Arguments of `demo`.
+#[derive(Clone, Debug, clap::Args)]
+pub struct DemoArgs {
+    /// A built-in arm (see `supple arms`), or the path of an arm's TOML or of its folder.
+    #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
+    pub arm: String,
+    /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
+    #[arg(long)]
+    pub strict: bool,
+    /// The controller's model of the arm, for example the output of `supple identify`: path of its TOML or folder.
+    /// Default: the plant's own parameters, with the perturbations that each experiment defines.
+    #[arg(long, value_name = "PATH")]
+    pub model: Option<PathBuf>,
+    /// Folder for all results. Files in it of the same names are replaced, others are left alone.
+    #[arg(long, value_name = "DIR", default_value = "out/demo")]
+    pub out: PathBuf,
+    /// Seed of the perturbed models and of all noise.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Print the summary as JSON instead of a table; an error is then an object on standard output too.
+    #[arg(long)]
+    pub json: bool,
+    /// Print results only, no progress.
+    #[arg(long)]
+    pub quiet: bool,
+    /// Write no logs; all of them take about half a gigabyte.
+    #[arg(long)]
+    pub no_logs: bool,
+}

@@ -1,0 +1,18 @@
+//! Other programs of supple, which are installed in the same folder.
+
+use crate::exit::Failure;
+use std::path::{Path, PathBuf};
+
+/// Path of a program beside this one.
+///
+/// # Errors
+/// [`Failure::MissingProgram`]; [`Failure::File`] if the path of this program is unknown.
+pub fn program_beside(name: &'static str) -> Result<PathBuf, Failure> {
+    let this = std::env::current_exe()
+        .map_err(|error| Failure::file("find", Path::new("this program"), error))?;
+    let program = this.with_file_name(name);
+    match program.is_file() {
+        true => Ok(program),
+        false => Err(Failure::MissingProgram { name, program }),
+    }
+}

@@ -1,0 +1,5 @@
+//! The commands that need no running system.
+
+fn main() -> std::process::ExitCode {
+    supple_report::run()
+}
