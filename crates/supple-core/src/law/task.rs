@@ -18,6 +18,7 @@
 
 use crate::config::Role;
 use crate::dynamics::Terms;
+use crate::math::lanes::NEGATIVE_ZERO;
 use crate::math::linalg::{
     Cholesky, Inverse3, is_positive_definite_3, min_singular_value, singular_values_exceed,
 };
@@ -131,7 +132,7 @@ impl<const N: usize, const D: usize> Task<N, D> {
             }
             _ => {
                 let mobile = Cholesky::new(&mass_matrix)?.solve(&jacobian.transpose());
-                let mobility = jacobian * mobile + Matrix::from_diagonal_element(damping);
+                let mobility = lower_product(&jacobian, &mobile, damping);
                 let factor = if D == 3 {
                     Cholesky::new(&mobility)?
                 } else {
@@ -164,6 +165,26 @@ pub(crate) fn square_task<const N: usize, const D: usize>(
     })
 }
 
+/// `J X + damping`, from the diagonal downwards.
+#[inline(always)]
+fn lower_product<const N: usize, const D: usize>(
+    jacobian: &Matrix<D, N>,
+    mobile: &Matrix<N, D>,
+    damping: f64,
+) -> Matrix<D, D> {
+    let mut product = Matrix::zeros();
+    for j in 0..D {
+        for i in j..D {
+            let mut sum = NEGATIVE_ZERO;
+            for k in 0..N {
+                sum += jacobian.data.0[k][i] * mobile.data.0[j][k];
+            }
+            product.data.0[j][i] = sum + if i == j { damping } else { 0.0 };
+        }
+    }
+    product
+}
+
 /// The first `D` rows of the Jacobian, with the columns of held joints zero.
 #[inline(always)]
 fn active_jacobian<const N: usize, const D: usize>(
@@ -171,6 +192,9 @@ fn active_jacobian<const N: usize, const D: usize>(
     roles: &[Role; N],
 ) -> Matrix<D, N> {
     let mut jacobian: Matrix<D, N> = terms.jacobian.fixed_rows::<D>(0).into_owned();
+    if count_active(roles) == N {
+        return jacobian;
+    }
     for (i, role) in roles.iter().enumerate() {
         if *role != Role::Active {
             jacobian.column_mut(i).fill(0.0);
@@ -183,6 +207,9 @@ fn active_jacobian<const N: usize, const D: usize>(
 #[inline(always)]
 fn active_mass_matrix<const N: usize>(terms: &Terms<N>, roles: &[Role; N]) -> Matrix<N, N> {
     let mut mass_matrix = terms.mass_matrix;
+    if count_active(roles) == N {
+        return mass_matrix;
+    }
     for (i, role) in roles.iter().enumerate() {
         if *role != Role::Active {
             mass_matrix.row_mut(i).fill(0.0);

@@ -18,14 +18,14 @@ pub struct Cholesky<const N: usize> {
 
 impl<const N: usize> Cholesky<N> {
     /// Reads the lower triangle of `a`. `None` if `a` is not positive definite.
-    #[inline]
+    #[inline(always)]
     pub fn new(a: &Matrix<N, N>) -> Option<Self> {
         Self::with_pivots(a, |_, pivot| pivot)
     }
 
     /// Factors `A + E` with `E` diagonal: `adjust_pivot(i, pivot)` gives pivot `i` during the
     /// factorisation. Reads the lower triangle of `a`. `None` if `A + E` is not positive definite.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn with_pivots(
         a: &Matrix<N, N>,
         adjust_pivot: impl Fn(usize, f64) -> f64,
@@ -37,13 +37,13 @@ impl<const N: usize> Cholesky<N> {
             let column = rest[k];
             let pivot = adjust_pivot(k, column[k]);
             definite &= pivot > 0.0 && pivot < f64::INFINITY;
-            let inverse = 1.0 / pivot;
-            inverse_pivots[k] = inverse;
-            let scaled = column.map(|x| x * inverse);
-            rest[k] = scaled;
+            inverse_pivots[k] = 1.0 / pivot;
+            for i in k + 1..N {
+                rest[k][i] *= inverse_pivots[k];
+            }
             for j in k + 1..N {
-                for i in 0..N {
-                    rest[j][i] = (-scaled[j]).multiply_add(column[i], rest[j][i]);
+                for i in j..N {
+                    rest[j][i] = (-rest[k][j]).multiply_add(column[i], rest[j][i]);
                 }
             }
         }
@@ -54,7 +54,7 @@ impl<const N: usize> Cholesky<N> {
     }
 
     /// `A^-1 B`, four columns at a time.
-    #[inline]
+    #[inline(always)]
     pub fn solve<const C: usize>(&self, b: &Matrix<N, C>) -> Matrix<N, C> {
         let mut x = *b;
         if C == 1 {

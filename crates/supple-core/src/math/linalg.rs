@@ -28,7 +28,7 @@ pub fn symmetric_eigenvalues(a: &Matrix3<f64>) -> [f64; 3] {
 
 /// Returns `mean`, `spread` and `x`: the eigenvalues are `mean + 2 spread y` for the roots of `4
 /// y^3 - 3 y = x`.
-#[inline]
+#[inline(always)]
 fn cubic(a: &Matrix3<f64>) -> (f64, f64, f64) {
     let mean = (a[(0, 0)] + a[(1, 1)] + a[(2, 2)]) / 3.0;
     let off = a[(0, 1)] * a[(0, 1)] + a[(0, 2)] * a[(0, 2)] + a[(1, 2)] * a[(1, 2)];
@@ -48,7 +48,7 @@ fn cubic(a: &Matrix3<f64>) -> (f64, f64, f64) {
 ///
 /// The root is analytic in `sqrt(1 - x)` and interpolated at Chebyshev points of it; without
 /// rounding the error is 3e-17.
-#[inline]
+#[inline(always)]
 fn min_root(x: f64) -> f64 {
     let t = SQRT_2 * sqrt(1.0 - x) - 1.0;
     let (z, c) = (t * t, &MIN_ROOT_COEFFICIENTS);
@@ -166,6 +166,8 @@ fn gram_3<const N: usize>(j: &[[f64; 3]; N]) -> [f64; 6] {
 ///
 /// Near zero the error is about 1e-8 times the largest singular value, and up to 3e-4 times it if
 /// two vanish together: sufficient to schedule damping, not to determine the rank.
+/// Inlined: a value that nobody reads costs nothing.
+#[inline(always)]
 pub fn min_singular_value<const N: usize>(j: &Matrix<3, N>) -> f64 {
     let [xx, xy, yy, xz, yz, zz] = gram_3(&j.data.0);
     let gram = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
