@@ -7,7 +7,6 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
 use supple_benches::{LawBench, Rig, State, config, gains, pool, pose_gains, regular_pool};
 use supple_core::Matrix;
-use supple_core::config::Role;
 use supple_core::dynamics::{self, Terms};
 
 /// Measures `function` over the pool, with independent and with dependent calls.
