@@ -19,7 +19,7 @@ objdump --disassemble --demangle --no-show-raw-insn "$program" | awk '
         name = $0
         sub(/^[0-9a-f]+ </, "", name)
         sub(/>:$/, "", name)
-        ours = name ~ /supple_core::(dynamics|operational|factors|linalg|lanes|sincos)|^(peers|instructions)::/
+        ours = name ~ /supple_core::(dynamics|law|math)::|^(peers|instructions)::/
         if (ours) { functions++; seen[name] = 1 }
         next
     }

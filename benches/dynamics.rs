@@ -5,12 +5,9 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
-use supple_benches::{NULLSPACE_DAMPING, Rig, State, config, gains, pool, regular_pool};
+use supple_benches::{LawBench, Rig, State, config, gains, pool, pose_gains, regular_pool};
 use supple_core::Matrix;
-use supple_core::config::Role;
 use supple_core::dynamics::{self, Terms};
-use supple_core::impedance::{LawInput, Task, impedance};
-use supple_core::operational::{pose_torque, position_torque};
 
 /// Measures `function` over the pool, with independent and with dependent calls.
 fn bench<const N: usize, T>(
@@ -105,55 +102,43 @@ fn functions<const N: usize>(criterion: &mut Criterion, asset: &str) {
     );
 }
 
+/// Both forms of the law: as one sum, and with every term apart as in the controller.
 fn position_law<const N: usize>(criterion: &mut Criterion, asset: &str) {
-    let arm = config::<N>(asset).arm;
-    let (states, gains) = (regular_pool(&arm, &[Role::Active; N]), gains());
-    let law = |s: &State<N>| {
-        position_torque(
-            &arm,
-            &s.q,
-            &s.qd,
-            &s.position,
-            &gains.linear,
-            NULLSPACE_DAMPING,
-        )
-    };
-    bench(criterion, "law", &states, law, |tau| {
-        tau.map_or(0.0, |tau| tau[0])
-    });
+    let law = LawBench::<N, _>::new(config::<N>(asset).arm, gains());
+    let states = regular_pool(&law.arm, &law.roles);
+    bench(
+        criterion,
+        "law",
+        &states,
+        |s| law.sum(s),
+        |tau| tau.map_or(0.0, |tau| tau[0]),
+    );
+    bench(
+        criterion,
+        "law_apart",
+        &states,
+        |s| law.apart(s),
+        |tau| tau.map_or(0.0, |tau| tau.stiffness[0]),
+    );
 }
 
 fn pose_law<const N: usize>(criterion: &mut Criterion, asset: &str) {
-    let arm = config::<N>(asset).arm;
-    let (states, gains) = (regular_pool(&arm, &[Role::Active; N]), gains());
-    let law = |s: &State<N>| pose_torque(&arm, &s.q, &s.qd, &s.pose, &gains, NULLSPACE_DAMPING);
-    bench(criterion, "law", &states, law, |tau| {
-        tau.map_or(0.0, |tau| tau[0])
-    });
-}
-
-/// The law as the controller computes it: term by term and without torques on held joints.
-fn law_by_terms<const N: usize>(criterion: &mut Criterion, asset: &str) {
-    let config = config::<N>(asset);
-    let (states, gains) = (regular_pool(&config.arm, &config.roles), gains());
-    let mut filled = Terms::default();
-    let law = |s: &State<N>| {
-        dynamics::terms(&config.arm, &s.q, &s.qd, &mut filled);
-        let now = LawInput {
-            spring_limit_n: f64::MAX,
-            reference: &s.position,
-            velocity_rad_per_s: &s.qd,
-            gains: &gains.linear,
-            tip_force_n: None,
-            friction_share: 1.0,
-        };
-        let (law, friction, roles) = (&config.law, &config.friction, &config.roles);
-        Task::new(&filled, roles)
-            .map(|task| impedance(law, friction, roles, &filled, &task, &now).total())
-    };
-    bench(criterion, "law_by_terms", &states, law, |tau| {
-        tau.map_or(0.0, |tau| tau[0])
-    });
+    let law = LawBench::<N, _>::new(config::<N>(asset).arm, pose_gains());
+    let states = regular_pool(&law.arm, &law.roles);
+    bench(
+        criterion,
+        "law",
+        &states,
+        |s| law.sum(s),
+        |tau| tau.map_or(0.0, |tau| tau[0]),
+    );
+    bench(
+        criterion,
+        "law_apart",
+        &states,
+        |s| law.apart(s),
+        |tau| tau.map_or(0.0, |tau| tau.stiffness[0]),
+    );
 }
 
 /// The complete cycle while the law holds the tip and the arm moves within 0.1 mrad.
@@ -169,9 +154,6 @@ fn all(criterion: &mut Criterion) {
     position_law::<3>(criterion, "wam3");
     position_law::<4>(criterion, "wam4");
     pose_law::<7>(criterion, "wam7");
-    law_by_terms::<3>(criterion, "wam3");
-    law_by_terms::<4>(criterion, "wam4");
-    law_by_terms::<7>(criterion, "wam7");
     step::<3>(criterion, "wam3");
     step::<4>(criterion, "wam4");
     step::<7>(criterion, "wam7");

@@ -12,11 +12,10 @@
 use gungraun::prelude::*;
 use gungraun::{Callgrind, EventKind};
 use std::hint::black_box;
-use supple_benches::{NULLSPACE_DAMPING, Rig, State, config, gains, pool, regular_pool};
+use supple_benches::{LawBench, Rig, State, config, gains, pool, pose_gains, regular_pool};
+use supple_core::Arm;
 use supple_core::config::Role;
 use supple_core::dynamics::{self, Terms};
-use supple_core::operational::{pose_torque, position_torque};
-use supple_core::{Arm, Vector};
 
 /// One call, with inputs and outputs hidden from the compiler.
 type Call = Box<dyn FnMut()>;
@@ -26,14 +25,7 @@ fn call<const N: usize, T>(
     function: impl Fn(&Arm<N>, &State<N>) -> T + 'static,
 ) -> Call {
     let arm = config::<N>(asset).arm;
-    call_in(arm, pool(&arm)[0], function)
-}
-
-fn call_in<const N: usize, T>(
-    arm: Arm<N>,
-    state: State<N>,
-    function: impl Fn(&Arm<N>, &State<N>) -> T + 'static,
-) -> Call {
+    let state = pool(&arm)[0];
     Box::new(move || {
         black_box(function(black_box(&arm), black_box(&state)));
     })
@@ -77,24 +69,45 @@ fn terms<const N: usize>(asset: &str) -> Call {
     })
 }
 
-fn torque<const N: usize>(arm: &Arm<N>, s: &State<N>) -> Option<Vector<N>> {
-    let gains = gains().linear;
-    position_torque(arm, &s.q, &s.qd, &s.position, &gains, NULLSPACE_DAMPING)
-}
-
-fn position_law<const N: usize>(asset: &str) -> Call {
-    call::<N, _>(asset, torque)
-}
-
-fn regular_law<const N: usize>(asset: &str) -> Call {
-    let arm = config::<N>(asset).arm;
-    call_in(arm, regular_pool(&arm, &[Role::Active; N])[0], torque)
-}
-
-fn pose_law<const N: usize>(asset: &str) -> Call {
-    call::<N, _>(asset, |arm, s| {
-        pose_torque(arm, &s.q, &s.qd, &s.pose, &gains(), NULLSPACE_DAMPING)
+fn law_call<const N: usize, G: 'static, T>(
+    asset: &str,
+    gains: G,
+    state: impl Fn(&Arm<N>) -> State<N>,
+    function: impl Fn(&LawBench<N, G>, &State<N>) -> T + 'static,
+) -> Call {
+    let bench = LawBench::new(config::<N>(asset).arm, gains);
+    let state = state(&bench.arm);
+    Box::new(move || {
+        black_box(function(black_box(&bench), black_box(&state)));
     })
+}
+
+fn regular<const N: usize>(arm: &Arm<N>) -> State<N> {
+    regular_pool(arm, &[Role::Active; N])[0]
+}
+
+fn any<const N: usize>(arm: &Arm<N>) -> State<N> {
+    pool(arm)[0]
+}
+
+fn position_sum<const N: usize>(asset: &str) -> Call {
+    law_call(asset, gains(), any::<N>, |law, s| law.sum(s))
+}
+
+fn regular_sum<const N: usize>(asset: &str) -> Call {
+    law_call(asset, gains(), regular::<N>, |law, s| law.sum(s))
+}
+
+fn pose_sum<const N: usize>(asset: &str) -> Call {
+    law_call(asset, pose_gains(), any::<N>, |law, s| law.sum(s))
+}
+
+fn position_apart<const N: usize>(asset: &str) -> Call {
+    law_call(asset, gains(), regular::<N>, |law, s| law.apart(s))
+}
+
+fn pose_apart<const N: usize>(asset: &str) -> Call {
+    law_call(asset, pose_gains(), any::<N>, |law, s| law.apart(s))
 }
 
 fn controller_step<const N: usize>(asset: &str) -> Call {
@@ -138,11 +151,14 @@ fn limit(instructions: u64) -> LibraryBenchmarkConfig {
 #[bench::terms_3(args = (terms::<3>("wam3")), config = limit(3_800))]
 #[bench::terms_4(args = (terms::<4>("wam4")), config = limit(3_950))]
 #[bench::terms_7(args = (terms::<7>("wam7")), config = limit(9_950))]
-#[bench::law_3_regular(args = (regular_law::<3>("wam3")), config = limit(2_750))]
+#[bench::law_3_regular(args = (regular_sum::<3>("wam3")), config = limit(2_750))]
 // Near a singular pose, where the law for three joints takes the longer code path.
-#[bench::law_3(args = (position_law::<3>("wam3")), config = limit(5_200))]
-#[bench::law_4(args = (position_law::<4>("wam4")), config = limit(4_450))]
-#[bench::law_7(args = (pose_law::<7>("wam7")), config = limit(14_150))]
+#[bench::law_3(args = (position_sum::<3>("wam3")), config = limit(5_200))]
+#[bench::law_4(args = (position_sum::<4>("wam4")), config = limit(4_450))]
+#[bench::law_7(args = (pose_sum::<7>("wam7")), config = limit(14_150))]
+#[bench::law_apart_3(args = (position_apart::<3>("wam3")), config = limit(4_850))]
+#[bench::law_apart_4(args = (position_apart::<4>("wam4")), config = limit(5_550))]
+#[bench::law_apart_7(args = (pose_apart::<7>("wam7")), config = limit(17_500))]
 #[bench::step_3(args = (controller_step::<3>("wam3")), config = limit(6_900))]
 #[bench::step_4(args = (controller_step::<4>("wam4")), config = limit(7_650))]
 #[bench::step_7(args = (controller_step::<7>("wam7")), config = limit(16_700))]

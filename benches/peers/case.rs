@@ -1,8 +1,9 @@
 //! An arm and a pool of states as plain numbers, in the order in which `harness.hpp` reads them.
 
+use supple_benches::State;
 use supple_core::config::Gains;
 use supple_core::math::{Matrix3, Vector3};
-use supple_core::operational::{PoseGains, PoseReference};
+use supple_core::target::{PoseGains, PoseReference};
 use supple_core::{Arm, Body, Joint, Pose, Reference, Vector};
 
 /// Error of reading a case.
@@ -36,20 +37,10 @@ impl From<std::io::Error> for CaseError {
 /// An arm, its task and its states.
 pub struct Case<const N: usize> {
     pub arm: Arm<N>,
-    pub gains: PoseGains,
+    pub gains: Gains,
+    pub pose_gains: PoseGains,
     pub nullspace_damping: f64,
     pub states: Vec<State<N>>,
-}
-
-/// One state and the references of the law in it.
-#[derive(Clone, Copy)]
-pub struct State<const N: usize> {
-    pub q: Vector<N>,
-    pub qd: Vector<N>,
-    pub qdd: Vector<N>,
-    pub tau: Vector<N>,
-    pub position: Reference,
-    pub pose: PoseReference,
 }
 
 pub fn numbers(path: &str) -> Result<Vec<f64>, CaseError> {
@@ -148,19 +139,17 @@ impl<const N: usize> Case<N> {
         let arm = Arm::new(&joints, tip, None, gravity).map_err(CaseError::Arm)?;
         let (stiffness_n_per_m, stiffness_nm_per_rad) = r.pair()?;
         let (damping_n_s_per_m, damping_nm_s_per_rad) = r.pair()?;
-        let gains = PoseGains {
-            linear: Gains {
-                stiffness_n_per_m,
-                damping_n_s_per_m,
-            },
-            stiffness_nm_per_rad,
-            damping_nm_s_per_rad,
+        let gains = Gains {
+            stiffness_n_per_m,
+            damping_n_s_per_m,
         };
+        let pose_gains = PoseGains::diagonal(&gains, &stiffness_nm_per_rad, &damping_nm_s_per_rad);
         let nullspace_damping = r.number()?;
         let states: Result<_, _> = (0..states as usize).map(|_| r.state()).collect();
         Ok(Case {
             arm,
             gains,
+            pose_gains,
             nullspace_damping,
             states: states?,
         })

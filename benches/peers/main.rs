@@ -4,14 +4,16 @@
 
 mod case;
 
-use case::{Case, State};
+use case::Case;
 use std::fs::File;
 use std::hint::black_box;
 use std::io::{self, BufWriter, Write};
 use std::process::ExitCode;
 use std::time::Instant;
+use supple_benches::{LawBench, Rig, State};
+use supple_core::config::Role;
 use supple_core::dynamics::{self, Regressor};
-use supple_core::operational::{pose_torque, position_torque};
+use supple_core::torques::Torques;
 use supple_core::{Matrix, Vector};
 
 const BATCHES: usize = 101;
@@ -44,9 +46,9 @@ fn run(case: &str, outputs: &str) -> Result<(), case::CaseError> {
     }
     of_joints!(2 3 4 5 6 7 8 9 10 11 12);
     match numbers[..] {
-        [3.0, 3.0, ..] => position_law::<3>(&numbers, &mut out)?,
-        [4.0, 3.0, ..] => position_law::<4>(&numbers, &mut out)?,
-        [7.0, 6.0, ..] => pose_law::<7>(&numbers, &mut out)?,
+        [3.0, 3.0, ..] => position_law::<3>("wam3", &numbers, &mut out)?,
+        [4.0, 3.0, ..] => position_law::<4>("wam4", &numbers, &mut out)?,
+        [7.0, 6.0, ..] => pose_law::<7>("wam7", &numbers, &mut out)?,
         _ => {}
     }
     out.flush()?;
@@ -71,26 +73,53 @@ fn all<const N: usize>(numbers: &[f64], out: &mut impl Write) -> Result<(), case
     Ok(())
 }
 
+/// The law of the position: as one sum, with every term apart, and within a step of the controller.
 fn position_law<const N: usize>(
+    asset: &str,
     numbers: &[f64],
     out: &mut impl Write,
 ) -> Result<(), case::CaseError> {
     let mut case = Case::<N>::new(numbers)?;
-    let (arm, gains, damping) = (case.arm, case.gains.linear, case.nullspace_damping);
+    let law = LawBench {
+        arm: case.arm,
+        roles: [Role::Active; N],
+        gains: case.gains,
+        nullspace_damping: case.nullspace_damping,
+    };
     let states = &mut case.states;
-    Bench { states, out }.run("law", |s| {
-        position_torque(&arm, &s.q, &s.qd, &s.position, &gains, damping).unwrap_or(Vector::zeros())
-    })?;
-    Ok(())
+    let mut bench = Bench { states, out };
+    bench.run("law", |s| law.sum(s).unwrap_or(Vector::zeros()))?;
+    bench.run("law_apart", |s| law.apart(s).unwrap_or(Torques::zeros()))?;
+    step(asset, bench)
 }
 
-fn pose_law<const N: usize>(numbers: &[f64], out: &mut impl Write) -> Result<(), case::CaseError> {
+/// The same of the pose; the controller's law is that of the position.
+fn pose_law<const N: usize>(
+    asset: &str,
+    numbers: &[f64],
+    out: &mut impl Write,
+) -> Result<(), case::CaseError> {
     let mut case = Case::<N>::new(numbers)?;
-    let (arm, gains, damping) = (case.arm, case.gains, case.nullspace_damping);
+    let law = LawBench {
+        arm: case.arm,
+        roles: [Role::Active; N],
+        gains: case.pose_gains,
+        nullspace_damping: case.nullspace_damping,
+    };
     let states = &mut case.states;
-    Bench { states, out }.run("law", |s| {
-        pose_torque(&arm, &s.q, &s.qd, &s.pose, &gains, damping).unwrap_or(Vector::zeros())
-    })?;
+    let mut bench = Bench { states, out };
+    bench.run("law", |s| law.sum(s).unwrap_or(Vector::zeros()))?;
+    bench.run("law_apart", |s| law.apart(s).unwrap_or(Torques::zeros()))?;
+    step(asset, bench)
+}
+
+/// `controller::step` whole, which measures one of the states after the other.
+fn step<const N: usize, W: Write>(
+    asset: &str,
+    mut bench: Bench<'_, N, W>,
+) -> Result<(), case::CaseError> {
+    let mut rig = Rig::<N>::anywhere(asset);
+    bench.run("step", |s| rig.step_at(&s.q).torque_nm)?;
     Ok(())
 }
 
@@ -109,6 +138,18 @@ impl<const R: usize, const C: usize> Numbers for Matrix<R, C> {
     fn write(&self, out: &mut impl Write) -> io::Result<()> {
         self.iter()
             .try_for_each(|x| out.write_all(&x.to_le_bytes()))
+    }
+}
+
+/// Their total is written.
+impl<const N: usize> Numbers for Torques<N> {
+    #[inline]
+    fn first(&self) -> f64 {
+        self.stiffness[0]
+    }
+
+    fn write(&self, out: &mut impl Write) -> io::Result<()> {
+        self.total().write(out)
     }
 }
 

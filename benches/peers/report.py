@@ -10,6 +10,8 @@ matplotlib.use("svg")
 import matplotlib.pyplot as plt
 
 FUNCTIONS = ("rnea", "crba", "aba", "jacobian", "jdot_qd", "regressor", "law")
+# Ours alone: the law with every term apart, and the controller's whole cycle.
+OWN = ("law_apart", "step")
 GROWING = ("rnea", "crba", "aba", "jacobian", "jdot_qd", "regressor")
 # Maximum ratios (targets): to Pinocchio, to generated code.
 TARGETS = {
@@ -38,21 +40,30 @@ def ratio(ours, peer, mode="independent"):
     return statistics.median(mine / theirs for (mine, _), (theirs, _) in pairs)
 
 
+def spread(times, mode="independent"):
+    """Range of the rounds' medians, as a share of their median."""
+    medians = [middle for middle, _ in times[mode]]
+    return (max(medians) - min(medians)) / statistics.median(medians)
+
+
 def write(folder, machine, arms, differences, growth, rounds):
     results = {
         name: {
             arm: {
                 f"{label}_ns": round(median(times[label][name]), 1)
                 for label in ("ours", *PEERS)
+                if name in times[label]
             }
             for arm, times in arms.items()
         }
-        for name in FUNCTIONS
+        for name in (*FUNCTIONS, *OWN)
     }
+    results["machine"] = machine
     (folder / "results.json").write_text(json.dumps(results, indent=2) + "\n")
     lines = [*head(machine, differences, rounds)]
     for mode in ("independent", "dependent"):
         lines += ["", f"## {mode.capitalize()} calls", "", *table(arms, mode)]
+    lines += ["", "## The law as one sum, apart, and in the controller", "", *own(arms)]
     lines += ["", "## Growth with the number of joints", "", *slopes(growth), ""]
     (folder / "RESULTS.md").write_text("\n".join(lines))
     plot(folder / "growth.svg", growth)
@@ -61,8 +72,8 @@ def write(folder, machine, arms, differences, growth, rounds):
 def head(machine, differences, rounds):
     yield "# Comparison with other libraries"
     yield ""
-    yield "Written by `benches/peers/run.sh`; do not edit. ns per call, one pinned core: median of "
-    yield f"{rounds} rounds (minimum in brackets); each round runs ours, Pinocchio and the generated code"
+    yield "Written by `benches/peers/run.sh`; do not edit. ns per call, one pinned core: median of"
+    yield f"{rounds} rounds (minimum and spread in brackets: range of the rounds' medians); each round runs ours, Pinocchio and the generated code"
     yield "alternately on the same 256 random states of each arm. A ratio is the median over the rounds of our time divided by"
     yield "the peer's; **bold** if it exceeds its target (in brackets)."
     yield ""
@@ -79,15 +90,30 @@ def head(machine, differences, rounds):
     yield "generated law is one symbolic expression of one arm. If Pinocchio has two functions, the faster one is used."
 
 
+def cell(times, mode="independent"):
+    return f"{median(times, mode):.0f} ({minimum(times, mode):.0f}, {spread(times, mode):.0%})"
+
+
+def own(arms):
+    yield "Ours alone, independent calls on the same states: `law` as above; `law_apart`, the same law with every term"
+    yield "apart, as the controller records it; `step`, `controller::step` whole (estimator, all checks, the law of the"
+    yield "position with the configured held joints, limits that nothing reaches), measured at one state after the other."
+    yield ""
+    yield "| arm | law | law_apart | law_apart / law | step |"
+    yield "|---|---|---|---|---|"
+    for arm, times in arms.items():
+        ours = times["ours"]
+        cells = [cell(ours["law"]), cell(ours["law_apart"])]
+        cells += [f"{ratio(ours['law_apart'], ours['law']):.2f}", cell(ours["step"])]
+        yield f"| {arm} | " + " | ".join(cells) + " |"
+
+
 def table(arms, mode):
     yield "| function | arm | ours | Pinocchio | generated | ours / Pinocchio (target) | ours / generated (target) |"
     yield "|---|---|---|---|---|---|---|"
     for name in FUNCTIONS:
         for arm, times in arms.items():
-            cells = [
-                f"{median(times[label][name], mode):.0f} ({minimum(times[label][name], mode):.0f})"
-                for label in ("ours", *PEERS)
-            ]
+            cells = [cell(times[label][name], mode) for label in ("ours", *PEERS)]
             for peer, target in zip(PEERS, TARGETS[name]):
                 found = ratio(times["ours"][name], times[peer][name], mode)
                 text = f"{found:.2f}"

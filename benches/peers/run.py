@@ -3,12 +3,13 @@ results.json and growth.svg. `run.sh` calls it."""
 
 import argparse
 import importlib.metadata
-import json
+import os
 import pathlib
 import platform
 import statistics
 import subprocess
 import sys
+import time
 
 import cases
 import numpy as np
@@ -18,6 +19,10 @@ HERE = pathlib.Path(__file__).parent
 ARMS = {"wam3": 3, "wam4": 3, "wam7": 6}
 GROWTH = range(2, 13)
 TOLERANCE = 1e-9
+# Maximum load average, of one minute, of everything but this benchmark; and how long to wait for it, since
+# compiling has raised it.
+QUIET_LOAD = 0.3
+QUIET_WAIT_S = 300
 CLANG = ["clang++", "-std=c++17", "-O3", "-march=native", "-DNDEBUG"]
 # Options that Pinocchio's own build sets for Boost.
 BOOST = [
@@ -80,6 +85,8 @@ def split(found, outputs, joints):
         "jdot_qd": 6,
         "regressor": 10 * joints**2,
         "law": joints,
+        "law_apart": joints,
+        "step": joints,
     }
     at, out = 0, []
     for name, _ in found:
@@ -107,6 +114,8 @@ def worst_difference(name, found, expected, joints):
 def compare(arm, joints, ours, peer, label):
     mine = dict(split(*ours, joints))
     worst = {}
+    if "law" in mine:
+        worst["law_apart"] = worst_difference("law", mine["law_apart"], mine["law"], joints)
     for name, values in split(*peer, joints):
         worst[name] = max(
             worst.get(name, 0.0), worst_difference(name, mine[name], values, joints)
@@ -146,6 +155,28 @@ def measure(run, programs, case, arm, joints, rounds):
     return {label: collect(rounds) for label, rounds in found.items()}, differences
 
 
+def load():
+    """Load average of one minute."""
+    return os.getloadavg()[0]
+
+
+def require_quiet(load_of_others, anyway):
+    """Ends the program if the machine is not quiet."""
+    if load_of_others > QUIET_LOAD and not anyway:
+        sys.exit(
+            f"the load average of other programs is {load_of_others:.2f}, above {QUIET_LOAD}: nothing is written. "
+            "Stop them, or accept their disturbance by --anyway."
+        )
+
+
+def wait_until_quiet(anyway):
+    """Waits for a quiet machine, which compiling has disturbed."""
+    until = time.monotonic() + QUIET_WAIT_S
+    while load() > QUIET_LOAD and not anyway and time.monotonic() < until:
+        time.sleep(5.0)
+    require_quiet(load(), anyway)
+
+
 def first_line(*command):
     return subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()[0]
 
@@ -174,19 +205,23 @@ def main():
     parser.add_argument("--folder", type=pathlib.Path, required=True)
     parser.add_argument("--rounds", type=int, default=11)
     parser.add_argument("--core", type=int, default=0)
+    parser.add_argument("--anyway", action="store_true", help="write results on a busy machine too")
     options = parser.parse_args()
     folder = options.folder
     run = Runner(folder, options.core)
     random = np.random.default_rng(20261121)
     ours, peer = folder / "cargo/release/peers", pinocchio(folder)
-    for stale in ("RESULTS.md", "results.json", "growth.svg"):
-        (HERE / stale).unlink(missing_ok=True)
+    descriptions, generated = {}, {}
+    for arm, task in ARMS.items():
+        descriptions[arm] = cases.reference_arm(arm, task)
+        cases.write(folder / f"{arm}.txt", descriptions[arm], random)
+        generated[arm] = symbolic(folder, arm)
+    wait_until_quiet(options.anyway)
+    before = load()
 
     arms, differences = {}, {}
-    for arm, task in ARMS.items():
-        description = cases.reference_arm(arm, task)
-        cases.write(folder / f"{arm}.txt", description, random)
-        programs = {"ours": ours, "pinocchio": peer, "codegen": symbolic(folder, arm)}
+    for arm, description in descriptions.items():
+        programs = {"ours": ours, "pinocchio": peer, "codegen": generated[arm]}
         joints = len(description.joints)
         arms[arm], differences[arm] = measure(
             run, programs, f"{arm}.txt", arm, joints, options.rounds
@@ -201,7 +236,12 @@ def main():
         growth[joints], _ = measure(run, programs, f"{name}.txt", name, joints, 3)
     print("random arms of 2 to 12 joints: measured, outputs agree")
 
-    report.write(HERE, machine(), arms, differences, growth, options.rounds)
+    # This benchmark is one of the programs that run.
+    after = load()
+    require_quiet(after - 1.0, options.anyway)
+    loads = f"{before:.2f} before, {after:.2f} after, which counts this benchmark as 1"
+    described = {**machine(), "load average": loads}
+    report.write(HERE, described, arms, differences, growth, options.rounds)
     print(f"written: {HERE / 'RESULTS.md'}, results.json, growth.svg")
 
 

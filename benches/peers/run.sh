@@ -3,8 +3,9 @@
 # law, alternating on one core. Rewrites RESULTS.md, results.json and growth.svg in this folder; fails if the
 # outputs differ.
 #
-#     benches/peers/run.sh [--rounds N] [--core N]
+#     benches/peers/run.sh [--rounds N] [--core N] [--anyway]
 #
+# Writes nothing if other programs load the machine (run.py states the bound); `--anyway` writes all the same.
 # Installs its dependencies: Python packages in target/peers, clang from the system's packages (as root).
 set -euo pipefail
 cd "$(dirname "$0")/../.."

@@ -5,13 +5,15 @@
 
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
-use supple_core::config::Gains;
-use supple_core::config::Role;
+use supple_core::config::{Collision, Gains, PlausibilityLimits, Role, Workspace};
 use supple_core::controller::{self, Mode, Request};
-use supple_core::impedance::SINGULAR_BELOW_M;
+use supple_core::dynamics::{Terms, terms};
+use supple_core::impedance::{
+    LawInput, PositionTarget, SINGULAR_BELOW_M, Task, Torques, impedance, impedance_torque,
+};
 use supple_core::linalg::min_singular_value;
 use supple_core::math::Vector3;
-use supple_core::operational::{PoseGains, PoseReference};
+use supple_core::target::{PoseGains, PoseReference, PoseTarget};
 use supple_core::{Arm, Config, Controller, Input, Output, Reference, Trajectory, Vector};
 use supple_core::{dynamics, step};
 use supple_model::Description;
@@ -36,20 +38,106 @@ pub struct State<const N: usize> {
     pub pose: PoseReference,
 }
 
-/// Impedance of all benchmarks.
-pub fn gains() -> PoseGains {
-    PoseGains {
-        linear: Gains {
-            stiffness_n_per_m: Vector3::new(50.0, 60.0, 70.0),
-            damping_n_s_per_m: Vector3::new(15.0, 16.0, 17.0),
-        },
-        stiffness_nm_per_rad: Vector3::new(5.0, 6.0, 7.0),
-        damping_nm_s_per_rad: Vector3::new(0.5, 0.6, 0.7),
+/// Position gains of all benchmarks.
+pub fn gains() -> Gains {
+    Gains {
+        stiffness_n_per_m: Vector3::new(50.0, 60.0, 70.0),
+        damping_n_s_per_m: Vector3::new(15.0, 16.0, 17.0),
     }
+}
+
+/// Pose gains of all benchmarks.
+pub fn pose_gains() -> PoseGains {
+    let (stiffness, damping) = (Vector3::new(5.0, 6.0, 7.0), Vector3::new(0.5, 0.6, 0.7));
+    PoseGains::diagonal(&gains(), &stiffness, &damping)
 }
 
 /// Damping of the null space in all benchmarks \[N m s/rad\].
 pub const NULLSPACE_DAMPING: f64 = 2.0;
+
+/// The law of an arm in both its forms.
+#[derive(Clone, Copy, Debug)]
+pub struct LawBench<const N: usize, G> {
+    /// The arm.
+    pub arm: Arm<N>,
+    /// Role of each joint.
+    pub roles: [Role; N],
+    /// Gains of the tip's position, or of its pose.
+    pub gains: G,
+    /// Damping of the null space \[N m s/rad\].
+    pub nullspace_damping: f64,
+}
+
+impl<const N: usize, G> LawBench<N, G> {
+    /// All joints active.
+    pub fn new(arm: Arm<N>, gains: G) -> Self {
+        LawBench {
+            arm,
+            roles: [Role::Active; N],
+            gains,
+            nullspace_damping: NULLSPACE_DAMPING,
+        }
+    }
+}
+
+/// The law of the tip's position.
+impl<const N: usize> LawBench<N, Gains> {
+    fn input<'a>(&'a self, s: &'a State<N>) -> LawInput<'a, PositionTarget<'a>, N> {
+        let target = PositionTarget {
+            reference: &s.position,
+            gains: &self.gains,
+            spring_limit_n: f64::MAX,
+        };
+        LawInput {
+            nullspace_damping_nm_s_per_rad: self.nullspace_damping,
+            ..LawInput::new(target, &s.qd)
+        }
+    }
+
+    /// As one sum; `None` if the arm is not physical.
+    #[inline]
+    pub fn sum(&self, s: &State<N>) -> Option<Vector<N>> {
+        impedance_torque(&self.arm, &self.roles, &s.q, &self.input(s))
+    }
+
+    /// Every term apart; `None` if the arm is not physical.
+    #[inline]
+    pub fn apart(&self, s: &State<N>) -> Option<Torques<N>> {
+        let mut filled = Terms::default();
+        terms(&self.arm, &s.q, &s.qd, &mut filled);
+        let task = Task::new(&filled, &self.roles)?;
+        Some(impedance(&self.roles, &filled, &task, &self.input(s)))
+    }
+}
+
+/// The law of the tip's pose.
+impl<const N: usize> LawBench<N, PoseGains> {
+    fn input<'a>(&'a self, s: &'a State<N>) -> LawInput<'a, PoseTarget<'a>, N, 6> {
+        let target = PoseTarget {
+            reference: &s.pose,
+            gains: &self.gains,
+        };
+        LawInput {
+            nullspace_damping_nm_s_per_rad: self.nullspace_damping,
+            ..LawInput::new(target, &s.qd)
+        }
+    }
+
+    /// As one sum; `None` if the arm is not physical.
+    #[inline]
+    pub fn sum(&self, s: &State<N>) -> Option<Vector<N>> {
+        impedance_torque(&self.arm, &self.roles, &s.q, &self.input(s))
+    }
+
+    /// Every term apart; `None` if the arm is not physical.
+    #[inline]
+    pub fn apart(&self, s: &State<N>) -> Option<Torques<N>> {
+        let mut filled = Terms::default();
+        terms(&self.arm, &s.q, &s.qd, &mut filled);
+        let task = Task::of_pose(&filled, &self.roles)?;
+        Some(impedance(&self.roles, &filled, &task, &self.input(s)))
+    }
+}
 
 /// The configuration of a built-in arm.
 ///
@@ -100,7 +188,26 @@ impl<const N: usize> Rig<N> {
     /// # Panics
     /// If the controller does not reach the mode, or the pose is near a singular one.
     pub fn tracking(asset: &str) -> Self {
-        let config = config::<N>(asset);
+        Rig::of_config(config(asset))
+    }
+
+    /// As [`Rig::tracking`], with limits that nothing reaches: the arm may be measured anywhere, at any speed.
+    pub fn anywhere(asset: &str) -> Self {
+        let mut config = config::<N>(asset);
+        let limits = &mut config.limits;
+        limits.position_lower_rad.fill(-FAR);
+        limits.position_upper_rad.fill(FAR);
+        limits.joint_speed_rad_per_s.fill(FAR);
+        limits.tip_speed_m_per_s = FAR;
+        limits.tracking_error_m = FAR;
+        limits.joint_tracking_error_rad = FAR;
+        config.collision = Collision::disabled();
+        config.plausible = PlausibilityLimits::disabled();
+        config.workspace = Workspace::UNBOUNDED;
+        Rig::of_config(config)
+    }
+
+    fn of_config(config: Config<N>) -> Self {
         let bent = match N {
             3 => [0.2, 0.8, 1.6, 0.0],
             _ => [0.2, 0.8, 0.0, 1.6],
@@ -142,6 +249,18 @@ impl<const N: usize> Rig<N> {
         self.cycle(None)
     }
 
+    /// Runs one cycle with the arm at `position_rad` \[rad\].
+    ///
+    /// # Panics
+    /// If the controller no longer follows the law.
+    #[inline]
+    pub fn step_at(&mut self, position_rad: &Vector<N>) -> Output<N> {
+        self.position_rad = *position_rad;
+        let output = self.cycle(None);
+        assert_eq!(output.mode, Mode::Track, "{:?}", output.fault);
+        output
+    }
+
     fn cycle(&mut self, request: Option<Request<N>>) -> Output<N> {
         let jitter_rad = 1e-5 * (self.cycle % 11) as f64;
         let input = Input {
@@ -155,6 +274,9 @@ impl<const N: usize> Rig<N> {
         step(&self.controller, &mut self.state, &input)
     }
 }
+
+/// A limit that nothing reaches, in any unit.
+const FAR: f64 = 1e9;
 
 struct Random(SplitMix64);
 

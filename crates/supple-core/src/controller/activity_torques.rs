@@ -4,7 +4,7 @@ use super::activity::Activity;
 use super::state::State;
 use super::{Controller, checks, limiter};
 use crate::config::{Config, Role};
-use crate::law::impedance::{LawInput, Task, Torques, impedance};
+use crate::law::impedance::{LawInput, PositionTarget, Task, Torques, impedance};
 use crate::math::{Vector, Vector3, abs, smooth_step};
 use crate::trajectory::{JointReference, Reference};
 
@@ -46,23 +46,18 @@ impl<const N: usize> State<N> {
         match (&self.activity, task, reference) {
             (Activity::Track(_), Some(task), Some(reference)) => {
                 let tip = self.terms.base_from_tip.translation;
-                let law_input = LawInput {
+                let target = PositionTarget {
                     reference,
-                    spring_limit_n: config.workspace.spring_limit_n(&tip),
-                    velocity_rad_per_s: &self.estimator.velocity_rad_per_s,
                     gains: &self.gains.current(),
-                    tip_force_n,
-                    friction_share: self.latch.friction_share(),
+                    spring_limit_n: config.workspace.spring_limit_n(&tip),
                 };
-                let (law, terms) = (&config.law, &self.terms);
-                let mut torques = impedance(
-                    law,
-                    &config.friction,
-                    &config.roles,
-                    terms,
-                    task,
-                    &law_input,
-                );
+                let velocity = &self.estimator.velocity_rad_per_s;
+                let (law, friction) = (&config.law, &config.friction);
+                let law_input = LawInput {
+                    friction_share: self.latch.friction_share(),
+                    ..LawInput::of_law(law, friction, target, velocity, tip_force_n)
+                };
+                let mut torques = impedance(&config.roles, &self.terms, task, &law_input);
                 self.add_joint_loops_and_stops(config, &mut torques);
                 torques
             }

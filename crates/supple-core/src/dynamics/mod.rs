@@ -30,6 +30,7 @@ pub use momentum::{Momentum, momentum};
 pub use regressor::{Regressor, parameters, regressor, regressor_rows, regressor_times};
 pub use rnea::{gravity, rnea};
 pub(crate) use sweep::Sweep;
+pub(crate) use terms::fill;
 pub use terms::{Terms, terms};
 
 use crate::math::lanes::{in_groups, joint_values};

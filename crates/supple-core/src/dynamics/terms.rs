@@ -49,17 +49,27 @@ impl<const N: usize> Default for Terms<N> {
 /// Fills `out` for the state `q` \[rad\], `qd` \[rad/s\].
 #[inline]
 pub fn terms<const N: usize>(arm: &Arm<N>, q: &Vector<N>, qd: &Vector<N>, out: &mut Terms<N>) {
-    in_groups!(N, fill(arm, q, qd, out));
+    in_groups!(N, swept(arm, q, qd, out));
 }
 
 #[inline(always)]
-fn fill<const N: usize, const G: usize>(
+fn swept<const N: usize, const G: usize>(
     arm: &Arm<N>,
     q: &Vector<N>,
     qd: &Vector<N>,
     out: &mut Terms<N>,
 ) {
-    let sweep = Sweep::<G>::new(arm, q, qd);
+    fill(&Sweep::<G>::new(arm, q, qd), arm, qd, out);
+}
+
+/// Fills `out` from a sweep. Inlined: terms that nobody reads cost nothing.
+#[inline(always)]
+pub(crate) fn fill<const N: usize, const G: usize>(
+    sweep: &Sweep<G>,
+    arm: &Arm<N>,
+    qd: &Vector<N>,
+    out: &mut Terms<N>,
+) {
     let projection = sweep.projection();
     out.base_from_tip = sweep.chain.tip.pose();
     out.jacobian = matrix(&sweep.motions);

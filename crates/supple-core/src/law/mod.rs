@@ -1,5 +1,7 @@
-//! The impedance law: term by term for the controller, and in one piece.
+//! The impedance law for the tip's position or pose, and what it works on.
 
 pub mod impedance;
-pub mod operational;
+mod sum;
+pub mod target;
+pub mod task;
 pub mod torques;

@@ -90,20 +90,27 @@ pub(crate) fn splat<const K: usize>(x: [f64; K]) -> [Lanes; K] {
     out
 }
 
-/// Calls a function of `<N, G>` with the number of groups that `N` joints need.
+/// Calls a function of `<N, G>`, after other parameters `[..]` of its own, with the number of groups
+/// that `N` joints need.
 ///
 /// An array's length cannot be computed from `N` in stable Rust. The number of groups is a constant
 /// for each `N`: the other arms are never instantiated. Beyond sixteen joints there are more groups
 /// than needed.
 macro_rules! in_groups {
-    ($n:ident, $function:ident($($argument:expr),* $(,)?)) => {
+    ($n:ident, $function:ident $([$($other:ident),*])? ($($argument:expr),* $(,)?)) => {
+        $crate::math::lanes::in_groups!(@ $n, $function, [$($($other,)*)?], ($($argument),*))
+    };
+    (@ $n:ident, $function:ident, $other:tt, $arguments:tt) => {
         match const { $n.div_ceil($crate::math::lanes::LANES) } {
-            1 => $function::<$n, 1>($($argument),*),
-            2 => $function::<$n, 2>($($argument),*),
-            3 => $function::<$n, 3>($($argument),*),
-            4 => $function::<$n, 4>($($argument),*),
-            _ => $function::<$n, $n>($($argument),*),
+            1 => $crate::math::lanes::in_groups!(@call $function, $other, $n, 1, $arguments),
+            2 => $crate::math::lanes::in_groups!(@call $function, $other, $n, 2, $arguments),
+            3 => $crate::math::lanes::in_groups!(@call $function, $other, $n, 3, $arguments),
+            4 => $crate::math::lanes::in_groups!(@call $function, $other, $n, 4, $arguments),
+            _ => $crate::math::lanes::in_groups!(@call $function, $other, $n, $n, $arguments),
         }
+    };
+    (@call $function:ident, [$($other:ident,)*], $n:ident, $groups:tt, ($($argument:expr),*)) => {
+        $function::<$($other,)* $n, $groups>($($argument),*)
     };
 }
 pub(crate) use in_groups;

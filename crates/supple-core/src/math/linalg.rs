@@ -9,88 +9,7 @@ use crate::math::vec3::{V3, cross, dot};
 use crate::math::{Matrix, Matrix3, abs, sqrt};
 use core::f64::consts::SQRT_2;
 
-/// Cholesky factors without square roots of a symmetric positive definite matrix: `A = L D L^T`,
-/// `L` unit lower, `D` diagonal. Square roots would take half of the time of a small solve.
-#[derive(Clone, Copy, Debug)]
-pub struct Cholesky<const N: usize> {
-    /// Columns of `L`; entries on and above the diagonal are unused.
-    lower: [[f64; N]; N],
-    inverse_pivots: [f64; N],
-}
-
-impl<const N: usize> Cholesky<N> {
-    /// Reads the lower triangle of `a`. `None` if `a` is not positive definite.
-    #[inline]
-    pub fn new(a: &Matrix<N, N>) -> Option<Self> {
-        let mut rest = a.data.0;
-        let mut inverse_pivots = [0.0; N];
-        let mut definite = true;
-        for k in 0..N {
-            let column = rest[k];
-            let pivot = column[k];
-            definite &= pivot > 0.0 && pivot < f64::INFINITY;
-            let inverse = 1.0 / pivot;
-            inverse_pivots[k] = inverse;
-            let scaled = column.map(|x| x * inverse);
-            rest[k] = scaled;
-            for j in k + 1..N {
-                for i in 0..N {
-                    rest[j][i] = (-scaled[j]).multiply_add(column[i], rest[j][i]);
-                }
-            }
-        }
-        definite.then_some(Self {
-            lower: rest,
-            inverse_pivots,
-        })
-    }
-
-    /// `L^-1 B`.
-    #[inline]
-    pub fn solve_lower<const C: usize>(&self, b: &Matrix<N, C>) -> Matrix<N, C> {
-        let mut x = *b;
-        for column in &mut x.data.0 {
-            for k in 0..N {
-                for i in k + 1..N {
-                    column[i] = (-self.lower[k][i]).multiply_add(column[k], column[i]);
-                }
-            }
-        }
-        x
-    }
-
-    /// `D^-1 B`.
-    #[inline]
-    pub fn divide<const C: usize>(&self, b: &Matrix<N, C>) -> Matrix<N, C> {
-        let mut x = *b;
-        for column in &mut x.data.0 {
-            for (entry, inverse_pivot) in column.iter_mut().zip(&self.inverse_pivots) {
-                *entry *= inverse_pivot;
-            }
-        }
-        x
-    }
-
-    /// `L^-T B`.
-    #[inline]
-    pub fn solve_upper<const C: usize>(&self, b: &Matrix<N, C>) -> Matrix<N, C> {
-        let mut x = *b;
-        for column in &mut x.data.0 {
-            for k in (0..N).rev() {
-                for i in 0..k {
-                    column[i] = (-self.lower[i][k]).multiply_add(column[k], column[i]);
-                }
-            }
-        }
-        x
-    }
-
-    /// `A^-1 B`.
-    #[inline]
-    pub fn solve<const C: usize>(&self, b: &Matrix<N, C>) -> Matrix<N, C> {
-        self.solve_upper(&self.divide(&self.solve_lower(b)))
-    }
-}
+pub use crate::math::cholesky::Cholesky;
 
 /// Eigenvalues of a symmetric 3 x 3 matrix in ascending order; the upper triangle is read.
 ///
@@ -109,7 +28,7 @@ pub fn symmetric_eigenvalues(a: &Matrix3<f64>) -> [f64; 3] {
 
 /// Returns `mean`, `spread` and `x`: the eigenvalues are `mean + 2 spread y` for the roots of `4
 /// y^3 - 3 y = x`.
-#[inline]
+#[inline(always)]
 fn cubic(a: &Matrix3<f64>) -> (f64, f64, f64) {
     let mean = (a[(0, 0)] + a[(1, 1)] + a[(2, 2)]) / 3.0;
     let off = a[(0, 1)] * a[(0, 1)] + a[(0, 2)] * a[(0, 2)] + a[(1, 2)] * a[(1, 2)];
@@ -129,7 +48,7 @@ fn cubic(a: &Matrix3<f64>) -> (f64, f64, f64) {
 ///
 /// The root is analytic in `sqrt(1 - x)` and interpolated at Chebyshev points of it; without
 /// rounding the error is 3e-17.
-#[inline]
+#[inline(always)]
 fn min_root(x: f64) -> f64 {
     let t = SQRT_2 * sqrt(1.0 - x) - 1.0;
     let (z, c) = (t * t, &MIN_ROOT_COEFFICIENTS);
@@ -228,13 +147,6 @@ impl Inverse3 {
         let scale = 1.0 / self.determinant;
         self.rows.map(|row| row.map(|entry| entry * scale))
     }
-
-    /// The inverse times `x`.
-    #[inline(always)]
-    pub fn times(&self, x: V3) -> V3 {
-        let scale = 1.0 / self.determinant;
-        self.rows.map(|row| dot(row, x) * scale)
-    }
 }
 
 /// `J J^T`: `xx, xy, yy, xz, yz, zz`.
@@ -254,6 +166,8 @@ fn gram_3<const N: usize>(j: &[[f64; 3]; N]) -> [f64; 6] {
 ///
 /// Near zero the error is about 1e-8 times the largest singular value, and up to 3e-4 times it if
 /// two vanish together: sufficient to schedule damping, not to determine the rank.
+/// Inlined: a value that nobody reads costs nothing.
+#[inline(always)]
 pub fn min_singular_value<const N: usize>(j: &Matrix<3, N>) -> f64 {
     let [xx, xy, yy, xz, yz, zz] = gram_3(&j.data.0);
     let gram = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
@@ -279,8 +193,8 @@ mod tests {
             bound in 1e-3..2.0,
         ) {
             let (inverse, matrix) = (Inverse3::new(columns), Matrix3::from(columns));
-            let again = inverse.times((matrix * Vector3::from(x)).data.0[0]);
-            let error = Vector3::from(again) - Vector3::from(x);
+            let x = Vector3::from(x);
+            let error = Matrix3::from(inverse.rows()).tr_mul(&(matrix * x)) - x;
             // Relative to the entries of the matrix, the smallest singular value is a measure of
             // its condition.
             let min = matrix.singular_values().min();

@@ -4,7 +4,7 @@
 //! `libm` ([`crate::math::sincos`] for the joint angles). `std` and nalgebra are not used for them: cargo
 //! unifies features across the workspace, and a step must give identical bits in every binary.
 
-pub(crate) mod factors;
+mod cholesky;
 pub(crate) mod lanes;
 pub mod linalg;
 pub mod sincos;

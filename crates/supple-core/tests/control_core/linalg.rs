@@ -39,15 +39,6 @@ fn cholesky_solves<const N: usize>(b: &Matrix<N, N>, x: &Vector<N>) -> Result<()
     let factor = Cholesky::new(&a).expect("positive definite");
     prop_assert!(mixed_error(&factor.solve(&(a * x)), x) < 1e-10);
     prop_assert!(mixed_error(&factor.solve(&a), &identity) < 1e-10);
-    // D^-1 L^-1 A L^-T is the identity and L^-1 is unit lower: A = L D L^T.
-    let half = factor.solve_lower(&a);
-    let whole = factor.divide(&factor.solve_lower(&half.transpose()));
-    prop_assert!(mixed_error(&whole, &identity) < 1e-10);
-    let inverse = factor.solve_lower(&identity);
-    prop_assert_eq!(inverse.diagonal(), Vector::<N>::repeat(1.0));
-    for (row, column) in (0..N).flat_map(|j| (0..j).map(move |i| (i, j))) {
-        prop_assert_eq!(inverse[(row, column)], 0.0);
-    }
     // Only the lower triangle is read.
     let mut lower_only = a;
     lower_only.fill_upper_triangle(f64::NAN, 1);

@@ -1,21 +1,23 @@
-//! The law as a single sum: the resulting accelerations of the tip, and agreement with the law term
-//! by term.
+//! Both forms of the law, for position and pose: the resulting accelerations of the tip, and the sum
+//! beside the total of the terms.
 
 use crate::common::numeric::mixed_error;
 use crate::common::random::{Case, check};
+use crate::support::configs::{friction, held};
+use crate::support::plant::held_acceleration;
 use crate::support::{self, inverse};
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
-use supple_core::config::{Gains, Law, Role};
-use supple_core::dynamics::{Terms, aba, crba, terms};
-use supple_core::impedance::{LawInput, MAX_TASK_MASS_KG, SINGULAR_BELOW_M, Task, impedance};
+use supple_core::config::{FrictionVelocity, Gains, Role};
+use supple_core::dynamics::{Terms, crba, terms};
+use supple_core::impedance::{
+    Apparent, LawInput, MAX_TASK_INERTIA_KG_M2, MAX_TASK_MASS_KG, PositionTarget, Posture,
+    SINGULAR_BELOW_M, Target, Task, Torques, impedance, impedance_torque,
+};
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::nalgebra::{Rotation3, Unit};
-use supple_core::operational::{
-    MAX_TASK_INERTIA_KG_M2, PoseGains, PoseReference, orientation_error, pose_torque,
-    position_torque,
-};
-use supple_core::{Arm, Friction, Matrix, Pose, Reference, Vector};
+use supple_core::target::{PoseGains, PoseReference, PoseTarget, orientation_error};
+use supple_core::{Arm, Matrix, Pose, Reference, Vector};
 
 type Outcome = Result<(), TestCaseError>;
 
@@ -27,14 +29,46 @@ fn filled<const N: usize>(arm: &Arm<N>, q: &Vector<N>, qd: &Vector<N>) -> Terms<
     filled
 }
 
+/// With coupled axes.
 fn gains() -> PoseGains {
-    PoseGains {
-        linear: Gains {
-            stiffness_n_per_m: Vector3::new(40.0, 90.0, 20.0),
-            damping_n_s_per_m: Vector3::new(8.0, 3.0, 12.0),
-        },
-        stiffness_nm_per_rad: Vector3::new(4.0, 2.0, 6.0),
-        damping_nm_s_per_rad: Vector3::new(0.4, 0.7, 0.2),
+    let coupled = |diagonal: [f64; 3], by: f64| {
+        let axes = Pose::from_xyz_rpy([0.0; 3], [0.3 * by, -0.5, by]).rotation;
+        let gain = axes * Matrix3::from_diagonal(&Vector3::from(diagonal)) * axes.transpose();
+        (gain + gain.transpose()) * 0.5
+    };
+    let gains = PoseGains {
+        stiffness_n_per_m: coupled([40.0, 90.0, 20.0], 0.4),
+        damping_n_s_per_m: coupled([8.0, 3.0, 12.0], 1.1),
+        stiffness_nm_per_rad: coupled([4.0, 0.0, 6.0], -0.7),
+        damping_nm_s_per_rad: coupled([0.4, 0.7, 0.2], 0.2),
+    };
+    assert!(gains.is_passive());
+    gains
+}
+
+fn position_gains() -> Gains {
+    Gains {
+        stiffness_n_per_m: Vector3::new(40.0, 90.0, 20.0),
+        damping_n_s_per_m: Vector3::new(8.0, 3.0, 12.0),
+    }
+}
+
+/// All active; or the last joint held, or joints of which `active` are left.
+fn roles<const N: usize>(active: usize) -> [Role; N] {
+    std::array::from_fn(|i| match i < active {
+        true => Role::Active,
+        false => held(0.0),
+    })
+}
+
+fn damped<T, const N: usize, const D: usize>(
+    target: T,
+    qd: &Vector<N>,
+    damping: f64,
+) -> LawInput<'_, T, N, D> {
+    LawInput {
+        nullspace_damping_nm_s_per_rad: damping,
+        ..LawInput::new(target, qd)
     }
 }
 
@@ -59,25 +93,37 @@ fn pair(linear: &Vector3<f64>, angular: &Vector3<f64>) -> Vector<6> {
 }
 
 /// Whether the inverse of the pose's mobility is undamped.
-fn regular<const N: usize>(mobility: &Matrix<6, 6>) -> bool {
+fn regular(mobility: &Matrix<6, 6>) -> bool {
     let felt = inverse(mobility).diagonal();
     felt.fixed_rows::<3>(0).max() < MAX_TASK_MASS_KG
         && felt.fixed_rows::<3>(3).max() < MAX_TASK_INERTIA_KG_M2
 }
 
 /// The tip accelerates with the reference, plus the force of spring and damper through its own
-/// mobility.
-fn tip_moves_as_stated<const N: usize>(case: &Case<N>) -> Outcome {
+/// mobility: in both forms, and beside held joints.
+fn tip_moves_as_stated<const N: usize>(case: &Case<N>, active: usize) -> Outcome {
     let (arm, q, qd) = (case.arm(), &case.q, &case.qd);
+    let roles = roles::<N>(active);
     let terms = filled(&arm, q, qd);
-    let j = terms.jacobian;
-    let mobility = j * inverse(&crba(&arm, q)) * j.transpose();
-    if mobility.symmetric_eigenvalues().min() < 1e-3 || !regular::<N>(&mobility) {
+    let task = Task::of_pose(&terms, &roles).expect("positive definite");
+    let mut mass_matrix = crba(&arm, q);
+    for i in active..N {
+        mass_matrix.row_mut(i).fill(0.0);
+        mass_matrix.column_mut(i).fill(0.0);
+        mass_matrix[(i, i)] = 1.0;
+    }
+    let mobility = task.jacobian * inverse(&mass_matrix) * task.jacobian.transpose();
+    if mobility.symmetric_eigenvalues().min() < 1e-3 || !regular(&mobility) {
         return Ok(());
     }
     let (reference, gains) = (reference(case, &terms), gains());
-    let tau = pose_torque(&arm, q, qd, &reference, &gains, DAMPING).expect("positive definite");
-    let found = j * aba(&arm, q, qd, &tau) + terms.jacobian_dot_qd;
+    let target = PoseTarget {
+        reference: &reference,
+        gains: &gains,
+    };
+    let law = damped(target, qd, DAMPING);
+    let sum = impedance_torque(&arm, &roles, q, &law).expect("positive definite");
+    let apart = impedance(&roles, &terms, &task, &law);
 
     let now = &terms.base_from_tip;
     let relative = Rotation3::from_matrix_unchecked(
@@ -87,37 +133,66 @@ fn tip_moves_as_stated<const N: usize>(case: &Case<N>) -> Outcome {
         .axis()
         .map_or(Vector3::zeros(), |axis| axis.into_inner())
         * relative.angle().sin();
-    let error = pair(
-        &(reference.base_from_tip.translation - now.translation),
-        &turn,
+    let error = reference.base_from_tip.translation - now.translation;
+    let velocity = terms.jacobian * qd;
+    let linear = reference.velocity_m_per_s - velocity.fixed_rows::<3>(0);
+    let angular = reference.angular_velocity_rad_per_s - velocity.fixed_rows::<3>(3);
+    let spring = pair(
+        &(gains.stiffness_n_per_m * error),
+        &(gains.stiffness_nm_per_rad * turn),
     );
-    let wanted = pair(
-        &reference.velocity_m_per_s,
-        &reference.angular_velocity_rad_per_s,
+    let damper = pair(
+        &(gains.damping_n_s_per_m * linear),
+        &(gains.damping_nm_s_per_rad * angular),
     );
-    let stiffness = pair(&gains.linear.stiffness_n_per_m, &gains.stiffness_nm_per_rad);
-    let damping = pair(&gains.linear.damping_n_s_per_m, &gains.damping_nm_s_per_rad);
-    let force = stiffness.component_mul(&error) + damping.component_mul(&(wanted - j * qd));
+    prop_assert!(mixed_error(&apart.stiffness, &task.jacobian.tr_mul(&spring)) < 1e-12);
+    prop_assert!(mixed_error(&apart.damping, &task.jacobian.tr_mul(&damper)) < 1e-12);
     let expected = pair(
         &reference.acceleration_m_per_s2,
         &reference.angular_acceleration_rad_per_s2,
-    ) + mobility * force;
+    ) + mobility * (spring + damper);
     let scale = 1.0 + expected.norm() + mobility.norm();
-    prop_assert!(
-        (found - expected).norm() < 1e-8 * scale,
-        "{found} {expected}"
-    );
+    for tau in [sum, apart.total()] {
+        let found =
+            terms.jacobian * held_acceleration(&arm, &roles, q, qd, &tau) + terms.jacobian_dot_qd;
+        prop_assert!(
+            (found - expected).norm() < 1e-8 * scale,
+            "{found} {expected}"
+        );
+    }
     Ok(())
 }
 
 #[test]
 fn tip_of_6_joints_moves_as_stated() {
-    check(tip_moves_as_stated::<6>);
+    check::<6>(|case| tip_moves_as_stated(case, 6));
 }
 
 #[test]
 fn tip_of_7_joints_moves_as_stated() {
-    check(tip_moves_as_stated::<7>);
+    check::<7>(|case| tip_moves_as_stated(case, 7));
+}
+
+#[test]
+fn tip_of_7_joints_moves_as_stated_beside_one_that_is_held() {
+    check::<7>(|case| tip_moves_as_stated(case, 6));
+}
+
+#[test]
+fn a_pose_takes_six_active_joints() {
+    check::<7>(|case| {
+        let (arm, roles) = (case.arm(), roles::<7>(5));
+        let terms = filled(&arm, &case.q, &case.qd);
+        let (reference, gains) = (reference(case, &terms), gains());
+        let target = PoseTarget {
+            reference: &reference,
+            gains: &gains,
+        };
+        let law = LawInput::new(target, &case.qd);
+        prop_assert!(Task::of_pose(&terms, &roles).is_none());
+        prop_assert!(impedance_torque(&arm, &roles, &case.q, &law).is_none());
+        Ok(())
+    });
 }
 
 /// Motion that does not change the pose is damped; the damping never adds energy, also in singular
@@ -127,8 +202,13 @@ fn null_space_damping_of_the_pose_only_takes_energy() {
     fn takes(case: &Case<7>) -> Outcome {
         let (arm, qd) = (case.arm(), &case.qd);
         let terms = filled(&arm, &case.q, qd);
-        let reference = reference(case, &terms);
-        let torque = |damping| pose_torque(&arm, &case.q, qd, &reference, &gains(), damping);
+        let (reference, gains, roles) = (reference(case, &terms), gains(), roles::<7>(7));
+        let target = PoseTarget {
+            reference: &reference,
+            gains: &gains,
+        };
+        let torque =
+            |damping| impedance_torque(&arm, &roles, &case.q, &damped(target, qd, damping));
         let (with, without) = (torque(DAMPING), torque(0.0));
         let damping = with.expect("definite") - without.expect("definite");
         let power = damping.dot(qd);
@@ -139,57 +219,205 @@ fn null_space_damping_of_the_pose_only_takes_energy() {
     check(takes);
 }
 
-/// Equal to the law computed term by term, also near singular poses.
-fn is_the_law_in_terms<const N: usize>(case: &Case<N>) -> Outcome {
-    let (arm, qd) = (case.arm(), &case.qd);
-    let terms = filled(&arm, &case.q, qd);
-    let pose = reference(case, &terms);
-    let reference = Reference {
-        position: pose.base_from_tip.translation,
-        velocity: pose.velocity_m_per_s,
-        acceleration: pose.acceleration_m_per_s2,
-    };
-    let gains = gains().linear;
-    let law = Law {
-        inertial_feedforward: true,
-        nullspace_damping_nm_s_per_rad: DAMPING,
-        ..Law::as_published(gains)
-    };
-    let roles = [Role::Active; N];
-    let task = Task::new(&terms, &roles).expect("positive definite");
-    let now = LawInput {
-        spring_limit_n: f64::MAX,
-        reference: &reference,
-        velocity_rad_per_s: qd,
-        gains: &gains,
-        tip_force_n: None,
-        friction_share: 1.0,
-    };
-    let apart = impedance(&law, &[Friction::NONE; N], &roles, &terms, &task, &now).total();
-    let found = position_torque(&arm, &case.q, qd, &reference, &gains, DAMPING).expect("definite");
-    // Both invert a mobility whose condition grows towards singular poses.
-    let sigma = task.least_singular_value_m.max(0.02);
-    let tolerance = 1e-10 / (sigma / SINGULAR_BELOW_M).min(1.0).powi(4);
+/// The sum beside the total of the terms.
+fn agree<const N: usize, const D: usize>(
+    sum: &Vector<N>,
+    apart: &Torques<N>,
+    task: &Task<N, D>,
+    terms: &Terms<N>,
+) -> Outcome {
+    let total = apart.total();
+    // The sum adds up what the inverse multiplies, before the terms of opposite signs cancel.
+    let gain = 1.0 + task.inverse.norm() * (task.jacobian.norm() + terms.mass_matrix.norm());
+    let size: f64 = apart.named().iter().map(|(_, term)| term.norm()).sum();
+    let error = (sum - total).norm();
     prop_assert!(
-        mixed_error(&found, &apart) < tolerance * (1.0 + apart.norm()),
-        "{found} {apart}, {sigma} m"
+        error < 1e-12 * gain * (1.0 + size),
+        "{error:e}, {gain} {size}"
     );
     Ok(())
 }
 
+/// The law with everything that it can add: friction, a posture, a chosen inertia.
+fn compare<T: Target<D> + Copy, const N: usize, const D: usize>(
+    case: &Case<N>,
+    roles: &[Role; N],
+    target: T,
+    terms: &Terms<N>,
+    task: &Task<N, D>,
+) -> Outcome {
+    let arm = case.arm();
+    let (friction, plain) = (friction::<N>(), damped(target, &case.qd, DAMPING));
+    let posture = Posture {
+        position_rad: Vector::zeros(),
+        stiffness_nm_per_rad: Vector::repeat(3.0),
+        max_torque_nm: Vector::repeat(2.0),
+    }
+    .torque_nm(&case.q);
+    let inertia = Matrix::<D, D>::from_fn(|i, j| if i == j { 3.0 + i as f64 } else { 0.2 });
+    let force = Vector::from_fn(|i, _| 4.0 - 2.0 * i as f64);
+    let apparent = Apparent::new(&inertia, force);
+    assert!(apparent.is_some());
+    let at = |velocity| Some((&friction, velocity));
+    let laws = [
+        plain,
+        LawInput {
+            friction: at(FrictionVelocity::Measured),
+            friction_share: 0.4,
+            inertial_feedforward: false,
+            ..plain
+        },
+        LawInput {
+            apparent,
+            friction: at(FrictionVelocity::Reference),
+            nullspace_torque_nm: Some(&posture),
+            ..plain
+        },
+    ];
+    for law in laws {
+        let sum = impedance_torque(&arm, roles, &case.q, &law).expect("positive definite");
+        agree(&sum, &impedance(roles, terms, task, &law), task, terms)?;
+    }
+    Ok(())
+}
+
+/// At random states, and at states near singular poses.
+fn near_and_away<const N: usize>(case: &Case<N>, of: impl Fn(&Case<N>) -> Outcome) -> Outcome {
+    let mut near = case.clone();
+    near.q *= 1e-3;
+    of(case)?;
+    of(&near)
+}
+
+fn position_sum_is_the_total<const N: usize>(case: &Case<N>, active: usize) -> Outcome {
+    near_and_away(case, |case| {
+        let terms = filled(&case.arm(), &case.q, &case.qd);
+        let pose = reference(case, &terms);
+        let reference = Reference {
+            position: pose.base_from_tip.translation,
+            velocity: pose.velocity_m_per_s,
+            acceleration: pose.acceleration_m_per_s2,
+        };
+        let (gains, roles) = (position_gains(), roles::<N>(active));
+        let target = PositionTarget {
+            reference: &reference,
+            gains: &gains,
+            spring_limit_n: 2.0,
+        };
+        let task = Task::new(&terms, &roles).expect("positive definite");
+        compare(case, &roles, target, &terms, &task)?;
+        let law = damped(target, &case.qd, DAMPING);
+        let apart = impedance(&roles, &terms, &task, &law).total();
+        let sum = impedance_torque(&case.arm(), &roles, &case.q, &law).expect("definite");
+        // Both invert a mobility whose condition grows towards singular poses.
+        let sigma = task.least_singular_value_m.max(0.02);
+        let tolerance = 1e-10 / (sigma / SINGULAR_BELOW_M).min(1.0).powi(4);
+        prop_assert!(
+            mixed_error(&sum, &apart) < tolerance * (1.0 + apart.norm()),
+            "{sum} {apart}, {sigma} m"
+        );
+        Ok(())
+    })
+}
+
+fn pose_sum_is_the_total<const N: usize>(case: &Case<N>, active: usize) -> Outcome {
+    near_and_away(case, |case| {
+        let terms = filled(&case.arm(), &case.q, &case.qd);
+        let (reference, gains) = (reference(case, &terms), gains());
+        let roles = roles::<N>(active);
+        let target = PoseTarget {
+            reference: &reference,
+            gains: &gains,
+        };
+        let task = Task::of_pose(&terms, &roles).expect("positive definite");
+        compare(case, &roles, target, &terms, &task)
+    })
+}
+
 #[test]
 fn position_of_3_joints_is_the_law_in_terms() {
-    check(is_the_law_in_terms::<3>);
+    check::<3>(|case| position_sum_is_the_total(case, 3));
 }
 
 #[test]
 fn position_of_4_joints_is_the_law_in_terms() {
-    check(is_the_law_in_terms::<4>);
+    check::<4>(|case| position_sum_is_the_total(case, 4));
 }
 
 #[test]
 fn position_of_7_joints_is_the_law_in_terms() {
-    check(is_the_law_in_terms::<7>);
+    check::<7>(|case| position_sum_is_the_total(case, 7));
+}
+
+#[test]
+fn position_beside_held_joints_is_the_law_in_terms() {
+    check::<3>(|case| position_sum_is_the_total(case, 2));
+    check::<4>(|case| position_sum_is_the_total(case, 3));
+    check::<7>(|case| position_sum_is_the_total(case, 4));
+}
+
+#[test]
+fn pose_of_7_joints_is_the_law_in_terms() {
+    check::<7>(|case| pose_sum_is_the_total(case, 7));
+}
+
+#[test]
+fn pose_beside_a_held_joint_is_the_law_in_terms() {
+    check::<7>(|case| pose_sum_is_the_total(case, 6));
+}
+
+/// A posture pulls with bounded torque, and the tip feels nothing of it.
+#[test]
+fn a_posture_does_no_work_at_the_tip() {
+    check::<7>(|case| {
+        let (arm, qd) = (case.arm(), Vector::zeros());
+        let terms = filled(&arm, &case.q, &qd);
+        let roles = roles::<7>(7);
+        let task = Task::of_pose(&terms, &roles).expect("positive definite");
+        let mobile = inverse(&terms.mass_matrix);
+        let mobility = task.jacobian * mobile * task.jacobian.transpose();
+        if mobility.symmetric_eigenvalues().min() < 1e-3 || !regular(&mobility) {
+            return Ok(());
+        }
+        let posture = Posture {
+            position_rad: case.q.map(|q| 0.5 * q),
+            stiffness_nm_per_rad: Vector::repeat(3.0),
+            max_torque_nm: Vector::repeat(1.5),
+        };
+        let pull = posture.torque_nm(&case.q);
+        for i in 0..7 {
+            prop_assert_eq!(pull[i], (-1.5 * case.q[i]).clamp(-1.5, 1.5));
+        }
+        let (reference, gains) = (PoseReference::at_rest(terms.base_from_tip), gains());
+        let target = PoseTarget {
+            reference: &reference,
+            gains: &gains,
+        };
+        let law = LawInput {
+            nullspace_torque_nm: Some(&pull),
+            ..LawInput::new(target, &qd)
+        };
+        let torque = impedance(&roles, &terms, &task, &law).nullspace;
+        let tip = task.jacobian * mobile * torque;
+        let scale = (task.jacobian * mobile * pull).norm() + mobility.norm() * pull.norm();
+        prop_assert!(tip.norm() < 1e-9 * (1.0 + scale), "{tip}");
+        // It moves the joints towards the posture, if at all.
+        prop_assert!((mobile * torque).dot(&pull) > -1e-9 * (1.0 + scale));
+        Ok(())
+    });
+}
+
+#[test]
+fn gains_that_could_add_energy_are_not_passive() {
+    let mut asymmetric = gains();
+    asymmetric.damping_n_s_per_m[(0, 1)] += 0.1;
+    let mut negative = gains();
+    negative.stiffness_nm_per_rad -= Matrix3::identity() * 0.01;
+    let mut unknown = gains();
+    unknown.stiffness_n_per_m[(2, 2)] = f64::NAN;
+    for gains in [asymmetric, negative, unknown] {
+        assert!(!gains.is_passive());
+    }
 }
 
 #[test]
@@ -222,7 +450,13 @@ fn singular_poses_have_a_finite_torque() {
             angular_acceleration_rad_per_s2: Vector3::repeat(1.0),
             ..PoseReference::at_rest(terms.base_from_tip)
         };
-        let tau = pose_torque(&arm, &q, &qd, &reference, &gains(), DAMPING).expect("definite");
+        let gains = gains();
+        let target = PoseTarget {
+            reference: &reference,
+            gains: &gains,
+        };
+        let law = damped(target, &qd, DAMPING);
+        let tau = impedance_torque(&arm, &[Role::Active; 7], &q, &law).expect("definite");
         // Bound: gravity, the motion, and accelerating 20 kg at 1 m.
         assert!(tau.norm() < 300.0, "{tau}");
     }

@@ -4,7 +4,7 @@ use super::property::{per_joint, vector3};
 use proptest::prelude::*;
 use supple_core::config::{Gains, Law, Role};
 use supple_core::dynamics::{Terms, terms};
-use supple_core::impedance::{LawInput, Task, Torques, impedance};
+use supple_core::impedance::{LawInput, PositionTarget, Task, Torques, impedance};
 use supple_core::math::Vector3;
 use supple_core::{Arm, Friction, Reference, Vector};
 
@@ -69,15 +69,16 @@ impl<const N: usize> Scene<N> {
         roles: &[Role; N],
         tip_force_n: Option<Vector3<f64>>,
     ) -> Torques<N> {
-        let now = LawInput {
-            spring_limit_n: f64::MAX,
+        let target = PositionTarget {
             reference: &self.reference,
-            velocity_rad_per_s: &self.qd,
             gains: &self.gains,
-            tip_force_n,
+            spring_limit_n: f64::MAX,
+        };
+        let now = LawInput {
             friction_share: self.friction_share,
+            ..LawInput::of_law(law, friction, target, &self.qd, tip_force_n)
         };
         let (terms, task) = (self.terms(arm), self.task(arm, roles));
-        impedance(law, friction, roles, &terms, &task, &now)
+        impedance(roles, &terms, &task, &now)
     }
 }

@@ -1,0 +1,263 @@
+//! The tip's task on the active joints: `D` = 3 directions for its position, 6 for its pose.
+//!
+//! [`Task`] holds the task's Jacobian and the dynamically consistent inverse `Jb = H^-1 J^T A^-1`,
+//! `A = J H^-1 J^T`. Joints that are held take no part: their columns of `J` are zero and their rows
+//! of `H` are the identity in `Jb`. With as many active joints as directions `Jb` is `J^-1`; for three
+//! it is computed so, independent of the mass matrix.
+//!
+//! **Near singular poses** the position's `A` is damped: `A + f(sigma) / m_max I`, with `sigma` the
+//! least singular value of the active Jacobian, `f = (1 - (sigma / 0.18)^2)^2` below 0.18 and zero
+//! above (the paper's sinusoid stays above), `m_max` = 20 kg. At a singular pose the mass that the
+//! inertial terms command along the lost direction is thus `m_max` instead of infinite; on the way
+//! there it may be greater, about twice that for an arm like the WAM.
+//!
+//! The pose's `A` is damped in its Cholesky pivots: pivot `p` is the inverse of the apparent mass or
+//! inertia along its direction with the preceding directions free of force, and becomes `p + f(p m)
+//! / m` with `f(x) = (1 - x^2)^2` below 1 and zero above, so that at most about `m` is commanded:
+//! [`MAX_TASK_MASS_KG`] along the axes and [`MAX_TASK_INERTIA_KG_M2`] about them.
+
+use crate::config::Role;
+use crate::dynamics::Terms;
+use crate::math::lanes::NEGATIVE_ZERO;
+use crate::math::linalg::{
+    Cholesky, Inverse3, is_positive_definite_3, min_singular_value, singular_values_exceed,
+};
+use crate::math::{Matrix, Matrix3};
+
+/// Least singular value of the active Jacobian below which the position's inverse is damped \[m\].
+pub const SINGULAR_BELOW_M: f64 = 0.18;
+/// Greatest mass that the damped inverse commands along a lost direction \[kg\].
+pub const MAX_TASK_MASS_KG: f64 = 20.0;
+/// Greatest moment of inertia that the damped inverse commands about a lost direction \[kg m^2\].
+pub const MAX_TASK_INERTIA_KG_M2: f64 = 2.0;
+
+/// Damping of the position's inverse at the least singular value `sigma_m` \[1/kg\]: zero from
+/// [`SINGULAR_BELOW_M`] on, `1 / MAX_TASK_MASS_KG` at zero.
+pub fn singularity_damping_per_kg(sigma_m: f64) -> f64 {
+    if sigma_m >= SINGULAR_BELOW_M {
+        return 0.0;
+    }
+    let x = sigma_m / SINGULAR_BELOW_M;
+    let f = 1.0 - x * x;
+    f * f / MAX_TASK_MASS_KG
+}
+
+/// Pivot `i` of the pose's mobility, damped.
+#[inline]
+fn damped_pivot(i: usize, pivot: f64) -> f64 {
+    let max_inertia = if i < 3 {
+        MAX_TASK_MASS_KG
+    } else {
+        MAX_TASK_INERTIA_KG_M2
+    };
+    let x = pivot * max_inertia;
+    if x < 1.0 {
+        let f = 1.0 - x * x;
+        pivot + f * f / max_inertia
+    } else {
+        pivot
+    }
+}
+
+/// The task in the first `D` directions of the tip's motion, base axes.
+#[derive(Clone, Copy, Debug)]
+pub struct Task<const N: usize, const D: usize = 3> {
+    /// Jacobian with the columns of held joints zero.
+    pub jacobian: Matrix<D, N>,
+    /// `Jb`, joint motion per tip motion; rows of held joints zero.
+    pub inverse: Matrix<N, D>,
+    /// Least singular value of the position's rows of `jacobian` \[m\].
+    pub least_singular_value_m: f64,
+}
+
+impl<const N: usize> Task<N, 3> {
+    /// The task of the tip's position. `None` where the mass matrix of the active joints is not
+    /// positive definite.
+    pub fn new(terms: &Terms<N>, roles: &[Role; N]) -> Option<Task<N, 3>> {
+        let jacobian = active_jacobian(terms, roles);
+        let sigma = min_singular_value(&jacobian);
+        Task::damped(
+            jacobian,
+            terms,
+            roles,
+            sigma,
+            singularity_damping_per_kg(sigma),
+        )
+    }
+}
+
+impl<const N: usize> Task<N, 6> {
+    /// The task of the tip's pose. `None` where the mass matrix of the active joints is not positive
+    /// definite, or where fewer than six joints are active.
+    pub fn of_pose(terms: &Terms<N>, roles: &[Role; N]) -> Option<Task<N, 6>> {
+        Task::of_state(terms, roles)
+    }
+}
+
+impl<const N: usize, const D: usize> Task<N, D> {
+    /// The task of a state, for the sum: whoever does not read the least singular value does not
+    /// wait for it, which takes as long as the rest of the law, where it is surely great enough.
+    #[inline(always)]
+    pub(crate) fn of_state(terms: &Terms<N>, roles: &[Role; N]) -> Option<Task<N, D>> {
+        let position = active_jacobian::<N, 3>(terms, roles);
+        let sigma = min_singular_value(&position);
+        let damping = if D == 3 && !singular_values_exceed(&position.data.0, SINGULAR_BELOW_M) {
+            singularity_damping_per_kg(sigma)
+        } else {
+            0.0
+        };
+        Task::damped(active_jacobian(terms, roles), terms, roles, sigma, damping)
+    }
+
+    #[inline(always)]
+    fn damped(
+        jacobian: Matrix<D, N>,
+        terms: &Terms<N>,
+        roles: &[Role; N],
+        sigma: f64,
+        damping: f64,
+    ) -> Option<Task<N, D>> {
+        const { assert!(D == 3 || D == 6, "a task is a position or a pose") };
+        if D == 6 && count_active(roles) < D {
+            return None;
+        }
+        let mass_matrix = active_mass_matrix(terms, roles);
+        let inverse = match three_active(roles) {
+            Some(joints) if D == 3 && damping == 0.0 => {
+                // What the inverse does not ask for, but the arm has to be.
+                if !is_positive_definite_3(&mass_matrix, joints) {
+                    return None;
+                }
+                inverse_of_three(&jacobian, joints)
+            }
+            _ => {
+                let mobile = Cholesky::new(&mass_matrix)?.solve(&jacobian.transpose());
+                let mobility = lower_product(&jacobian, &mobile, damping);
+                let factor = if D == 3 {
+                    Cholesky::new(&mobility)?
+                } else {
+                    Cholesky::with_pivots(&mobility, damped_pivot)?
+                };
+                factor.solve(&mobile.transpose()).transpose()
+            }
+        };
+        Some(Task {
+            jacobian,
+            inverse,
+            least_singular_value_m: sigma,
+        })
+    }
+}
+
+/// The tip's position on three active joints, independent of the mass matrix; `None` near singular
+/// poses. `columns` are those of the Jacobian.
+#[inline(always)]
+pub(crate) fn square_task<const N: usize, const D: usize>(
+    columns: [[f64; 3]; 3],
+) -> Option<Task<N, D>> {
+    let inverse = Inverse3::new(columns);
+    let regular = inverse.exceeds_conservatively(SINGULAR_BELOW_M)
+        || singular_values_exceed(&columns, SINGULAR_BELOW_M);
+    regular.then(|| Task {
+        jacobian: Matrix::from_fn(|direction, joint| columns[joint][direction]),
+        inverse: spread(inverse.rows(), [0, 1, 2]),
+        least_singular_value_m: min_singular_value(&Matrix3::from(columns)),
+    })
+}
+
+/// `J X + damping`, from the diagonal downwards.
+#[inline(always)]
+fn lower_product<const N: usize, const D: usize>(
+    jacobian: &Matrix<D, N>,
+    mobile: &Matrix<N, D>,
+    damping: f64,
+) -> Matrix<D, D> {
+    let mut product = Matrix::zeros();
+    for j in 0..D {
+        for i in j..D {
+            let mut sum = NEGATIVE_ZERO;
+            for k in 0..N {
+                sum += jacobian.data.0[k][i] * mobile.data.0[j][k];
+            }
+            product.data.0[j][i] = sum + if i == j { damping } else { 0.0 };
+        }
+    }
+    product
+}
+
+/// The first `D` rows of the Jacobian, with the columns of held joints zero.
+#[inline(always)]
+fn active_jacobian<const N: usize, const D: usize>(
+    terms: &Terms<N>,
+    roles: &[Role; N],
+) -> Matrix<D, N> {
+    let mut jacobian: Matrix<D, N> = terms.jacobian.fixed_rows::<D>(0).into_owned();
+    if count_active(roles) == N {
+        return jacobian;
+    }
+    for (i, role) in roles.iter().enumerate() {
+        if *role != Role::Active {
+            jacobian.column_mut(i).fill(0.0);
+        }
+    }
+    jacobian
+}
+
+/// The mass matrix, with the rows and columns of held joints as those of the identity.
+#[inline(always)]
+fn active_mass_matrix<const N: usize>(terms: &Terms<N>, roles: &[Role; N]) -> Matrix<N, N> {
+    let mut mass_matrix = terms.mass_matrix;
+    if count_active(roles) == N {
+        return mass_matrix;
+    }
+    for (i, role) in roles.iter().enumerate() {
+        if *role != Role::Active {
+            mass_matrix.row_mut(i).fill(0.0);
+            mass_matrix.column_mut(i).fill(0.0);
+            mass_matrix[(i, i)] = 1.0;
+        }
+    }
+    mass_matrix
+}
+
+/// Number of active joints.
+#[inline]
+pub(crate) fn count_active<const N: usize>(roles: &[Role; N]) -> usize {
+    roles.iter().filter(|role| **role == Role::Active).count()
+}
+
+/// The active joints, where they are three: as many as the position has directions.
+#[inline]
+fn three_active<const N: usize>(roles: &[Role; N]) -> Option<[usize; 3]> {
+    let mut joints = [0; 3];
+    let mut active = 0;
+    for (joint, role) in roles.iter().enumerate() {
+        if *role == Role::Active {
+            *joints.get_mut(active)? = joint;
+            active += 1;
+        }
+    }
+    (active == 3).then_some(joints)
+}
+
+/// `J^-1` on three joints.
+#[inline]
+fn inverse_of_three<const N: usize, const D: usize>(
+    jacobian: &Matrix<D, N>,
+    joints: [usize; 3],
+) -> Matrix<N, D> {
+    let column = |joint: usize| core::array::from_fn(|k| jacobian.data.0[joint][k]);
+    spread(Inverse3::new(joints.map(column)).rows(), joints)
+}
+
+/// A matrix with `rows` for the joints `joints`, and zeros for all others.
+#[inline(always)]
+fn spread<const N: usize, const D: usize>(rows: [[f64; 3]; 3], joints: [usize; 3]) -> Matrix<N, D> {
+    let mut inverse = Matrix::zeros();
+    for (joint, row) in joints.into_iter().zip(rows) {
+        for (direction, entry) in row.into_iter().enumerate() {
+            inverse[(joint, direction)] = entry;
+        }
+    }
+    inverse
+}
