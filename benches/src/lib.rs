@@ -9,13 +9,13 @@ use supple_core::config::{Collision, Gains, PlausibilityLimits, Role, Workspace}
 use supple_core::controller::{self, Mode, Request};
 use supple_core::dynamics::{Terms, terms};
 use supple_core::impedance::{
-    LawInput, PositionTarget, SINGULAR_BELOW_M, Task, Torques, impedance, impedance_torque,
+    LawInput, PositionTarget, SINGULAR_BELOW_M, Task, Torques, impedance,
 };
 use supple_core::linalg::min_singular_value;
 use supple_core::math::Vector3;
 use supple_core::target::{PoseGains, PoseReference, PoseTarget};
 use supple_core::{Arm, Config, Controller, Input, Output, Reference, Trajectory, Vector};
-use supple_core::{dynamics, step};
+use supple_core::{dynamics, impedance_torque, step};
 use supple_model::Description;
 
 /// Number of states in a pool: more than a branch predictor can memorise.

@@ -25,7 +25,7 @@ mod property;
 
 pub use controller::{codes, drive_guard, estimator, latch, observer};
 pub use dynamics::inverse_kinematics;
-pub use law::{impedance, target, task, torques};
+pub use law::{impedance, impedance_torque, target, task, torques};
 pub use math::{linalg, sincos};
 pub use model::{arm, body, friction, pose, ripple, workspace};
 

@@ -19,7 +19,7 @@
 //! feels a part of both.
 //!
 //! **Two forms of one law.** A `Form` receives each term as an acceleration of the tip, a force on it or
-//! joint torques. [`impedance`] maps each to the joints and keeps it; [`impedance_torque`] adds up the
+//! joint torques. [`impedance`] maps each to the joints and keeps it; [`crate::impedance_torque`] adds up the
 //! accelerations and the forces and maps their sums, once.
 
 use crate::config::{ApparentInertia, FrictionVelocity, Law, Role};
@@ -31,7 +31,6 @@ use crate::model::friction::Friction;
 use crate::model::pose::Pose;
 use Effect::{Acceleration, Force, Reaction, Torque};
 
-pub use crate::law::sum::impedance_torque;
 pub use crate::law::target::{PositionTarget, Posture, Target};
 pub use crate::law::task::{
     MAX_TASK_INERTIA_KG_M2, MAX_TASK_MASS_KG, SINGULAR_BELOW_M, Task, singularity_damping_per_kg,

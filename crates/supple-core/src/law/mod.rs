@@ -5,3 +5,5 @@ mod sum;
 pub mod target;
 pub mod task;
 pub mod torques;
+
+pub use sum::impedance_torque;

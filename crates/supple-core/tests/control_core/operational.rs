@@ -12,12 +12,12 @@ use supple_core::config::{FrictionVelocity, Gains, Role};
 use supple_core::dynamics::{Terms, crba, terms};
 use supple_core::impedance::{
     Apparent, LawInput, MAX_TASK_INERTIA_KG_M2, MAX_TASK_MASS_KG, PositionTarget, Posture,
-    SINGULAR_BELOW_M, Target, Task, Torques, impedance, impedance_torque,
+    SINGULAR_BELOW_M, Target, Task, Torques, impedance,
 };
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::nalgebra::{Rotation3, Unit};
 use supple_core::target::{PoseGains, PoseReference, PoseTarget, orientation_error};
-use supple_core::{Arm, Matrix, Pose, Reference, Vector};
+use supple_core::{Arm, Matrix, Pose, Reference, Vector, impedance_torque};
 
 type Outcome = Result<(), TestCaseError>;
 
