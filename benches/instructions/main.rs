@@ -153,9 +153,9 @@ fn limit(instructions: u64) -> LibraryBenchmarkConfig {
 #[bench::terms_7(args = (terms::<7>("wam7")), config = limit(9_950))]
 #[bench::law_3_regular(args = (regular_sum::<3>("wam3")), config = limit(2_750))]
 // Near a singular pose, where the law for three joints takes the longer code path.
-#[bench::law_3(args = (position_sum::<3>("wam3")), config = limit(5_200))]
-#[bench::law_4(args = (position_sum::<4>("wam4")), config = limit(4_450))]
-#[bench::law_7(args = (pose_sum::<7>("wam7")), config = limit(14_150))]
+#[bench::law_3(args = (position_sum::<3>("wam3")), config = limit(5_950))]
+#[bench::law_4(args = (position_sum::<4>("wam4")), config = limit(4_900))]
+#[bench::law_7(args = (pose_sum::<7>("wam7")), config = limit(15_400))]
 #[bench::law_apart_3(args = (position_apart::<3>("wam3")), config = limit(4_850))]
 #[bench::law_apart_4(args = (position_apart::<4>("wam4")), config = limit(5_550))]
 #[bench::law_apart_7(args = (pose_apart::<7>("wam7")), config = limit(17_500))]
