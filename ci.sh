@@ -144,9 +144,9 @@ step_cycles() {
     SUPPLE_CYCLES=${SUPPLE_CYCLES:-10000000} cargo test --locked --release -p supple-core --test cycles
 }
 
-# fuzz: each target of tests/fuzz for 10 s, SUPPLE_FUZZ_S for another time; without a nightly compiler, seeded mutations
+# fuzz: each target of tests/fuzz for a minute, SUPPLE_FUZZ_S for another time; without a nightly compiler, seeded mutations
 step_fuzz() {
-    local seconds=${SUPPLE_FUZZ_S:-10}
+    local seconds=${SUPPLE_FUZZ_S:-60}
     [[ $seconds != 0 ]] || skip "SUPPLE_FUZZ_S=0: seeded mutations of every target are part of \`test\`"
     if ! nightly_fuzz; then
         echo "no nightly compiler or no cargo-fuzz: seeded mutations on the stable compiler"

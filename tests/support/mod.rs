@@ -5,9 +5,13 @@ use std::process::Command;
 use std::sync::OnceLock;
 
 /// Folder of the programs; built once with the same selection as the test run, so that nothing is rebuilt.
+/// `SUPPLE_PROGRAMS` names another folder, for example with the programs of an older version.
 pub fn programs() -> &'static Path {
     static PROGRAMS: OnceLock<PathBuf> = OnceLock::new();
     PROGRAMS.get_or_init(|| {
+        if let Some(folder) = std::env::var_os("SUPPLE_PROGRAMS") {
+            return folder.into();
+        }
         let selection =
             "test --no-run --locked --workspace --exclude supple-python --lib --bins --tests";
         let built = Command::new(env!("CARGO"))

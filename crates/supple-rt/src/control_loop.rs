@@ -283,8 +283,18 @@ impl<const N: usize> ControlLoop<N> {
         if let Some((source, _)) = &received {
             self.answer(source, &output);
         }
-        let torque_released = input.request == Some(Request::Idle) && output.refusal.is_none();
-        if torque_released || (output.fault.is_some() && !had_fault) {
+        let at_once = match &received {
+            Some((RequestSource::Operator(message), _)) => !message.is_scheduled(),
+            _ => true,
+        };
+        let ends_motion = match input.request {
+            _ if output.refusal.is_some() => false,
+            Some(Request::Idle) => true,
+            // Somebody wants the arm to rest now: what others have scheduled must not move it later.
+            Some(Request::GravityHold | Request::Float) => at_once,
+            _ => false,
+        };
+        if ends_motion || (output.fault.is_some() && !had_fault) {
             self.refuse_queued(arm.cycle, output.mode);
         }
         let timing = CycleTiming {

@@ -1,8 +1,8 @@
 //! Queue of requests that wait for their cycle.
 //!
-//! Due requests are carried out in order of arrival, one per cycle; idle requests come first. When the arm goes to idle
-//! or a fault latches, all queued requests are refused, because they were sent under other conditions. One operator can
-//! use at most half of the queue, so it cannot block the others.
+//! Due requests are carried out in order of arrival, one per cycle; idle requests come first. When the arm goes to idle,
+//! a fault latches, or an operator asks for gravity hold or float at once, all queued requests are refused, because they
+//! were sent under other conditions. One operator can use at most half of the queue, so it cannot block the others.
 
 use core::fmt;
 use supple_ipc::message::OperatorRequest;

@@ -72,7 +72,12 @@ impl OperatorRequest {
 
     /// Requests idle in the next cycle; such requests take priority over all others.
     pub fn requests_idle_now(&self) -> bool {
-        self.has_at_cycle == 0 && self.requests_idle()
+        !self.is_scheduled() && self.requests_idle()
+    }
+
+    /// Whether it waits for a given cycle.
+    pub fn is_scheduled(&self) -> bool {
+        self.has_at_cycle != 0
     }
 
     /// Whether it requests idle, now or in a given cycle.
@@ -82,7 +87,7 @@ impl OperatorRequest {
 
     /// Whether it may take effect in this cycle.
     pub fn is_due(&self, cycle: u64) -> bool {
-        self.has_at_cycle == 0 || cycle >= self.at_cycle
+        !self.is_scheduled() || cycle >= self.at_cycle
     }
 }
 

@@ -93,6 +93,30 @@ fn deferred_idle_precedes_earlier_requests_for_the_same_cycle() {
     assert_eq!(bench.active_cycle().mode(), Some(Mode::Idle));
 }
 
+/// Somebody who takes hold of the arm is not surprised by a motion that was scheduled before.
+#[test]
+fn gravity_hold_and_float_at_once_refuse_what_is_scheduled() {
+    for rest in [Request::GravityHold, Request::Float] {
+        let mut bench = Bench::new(false);
+        assert!(bench.enqueue(1, 1, &Request::GravityHold, None));
+        bench.active_cycle();
+        assert!(bench.enqueue(1, 2, &Request::Reset, Some(20)));
+        // A scheduled gravity hold is part of a schedule, and ends none.
+        assert!(bench.enqueue(1, 3, &Request::GravityHold, Some(bench.cycle + 2)));
+        for _ in 0..4 {
+            bench.active_cycle();
+        }
+        let refused = |replies: Vec<OperatorReply>| -> Vec<u64> {
+            let refused = replies.iter().filter(|r| r.outcome() == Outcome::Refused);
+            refused.map(|reply| reply.sequence).collect()
+        };
+        assert_eq!(refused(bench.replies()), [0; 0]);
+        assert!(bench.enqueue(2, 4, &rest, None));
+        bench.active_cycle();
+        assert_eq!(refused(bench.replies()), [2]);
+    }
+}
+
 #[test]
 fn one_operator_can_use_at_most_half_of_the_queue() {
     let mut bench = Bench::new(false);
