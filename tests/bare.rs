@@ -44,7 +44,7 @@ fn text(bytes: &[u8]) -> String {
 
 fn hosted() -> String {
     let mut report = String::new();
-    supple_bare::report(&mut report).expect("the arms are physical");
+    supple_bare::report(&mut report).expect("the arms are physically consistent");
     for wrong in ["NaN", "inf"] {
         assert!(!report.contains(wrong), "{report}");
     }

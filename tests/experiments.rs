@@ -95,9 +95,9 @@ fn perturbed_models_track_the_sinusoid_at_5_n_per_m() {
 #[test]
 fn a_perturbed_model_has_the_stated_error() {
     let setup = wam4();
-    let exact = setup.config(&Variant::EXACT).expect("sound").arm;
+    let exact = setup.config(&Variant::EXACT).expect("valid").arm;
     for seed in 0..10 {
-        let off = setup.config(&perturbed(seed)).expect("sound").arm;
+        let off = setup.config(&perturbed(seed)).expect("valid").arm;
         let (mut difference, mut whole) = (0.0, 0.0);
         for k in 0..50 {
             let x = f64::from(k);

@@ -100,7 +100,7 @@ fn ripple_is_identified_and_compensated() {
                 .toml()
                 .replace("ripple = ", "# ripple = ");
             without.description =
-                Description::from_text(&model, without.description.urdf()).expect("sound");
+                Description::from_text(&model, without.description.urdf()).expect("valid");
             sinusoid(&without, &calibration).coulomb_m
         });
         (with, without)

@@ -19,7 +19,7 @@ use supple_puck::safety::SafetyMode;
 
 /// Time for which answers or transmissions may fail before the module is lowered \[ns\].
 pub const ANSWER_TIMEOUT_NS: u64 = 10_000_000;
-/// Maximum time of the fallback torque after a loss \[ns\].
+/// Maximum time of the fallback torque while answers are missing \[ns\].
 pub const FALLBACK_NS: u64 = 100_000_000;
 /// Consecutive cycles in which a motor may miss its reply; in the next one its encoder counts as lost.
 const TOLERATED_MISSED_REPLIES: u32 = 1;

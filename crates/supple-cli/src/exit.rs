@@ -1,4 +1,4 @@
-//! Error type and exit codes of both programs. Every error prints one line.
+//! Error type and exit codes of `supple` and `supple-report`. Every error prints one line.
 //!
 //! | code | meaning |
 //! |---|---|

@@ -111,7 +111,7 @@ fn run<const N: usize>(
         deadline_ns: None,
         at_rest: false,
     };
-    let ran = match (&address, options.virtual_time) {
+    let result = match (&address, options.virtual_time) {
         (Address::Folder(_), true) => arm.run_in_lockstep(LockstepResponder::open(&folder)?, stop),
         (Address::Folder(_), false) => {
             let now_ns = arm.emulator.now_ns();
@@ -120,7 +120,7 @@ fn run<const N: usize>(
         (Address::Interface(name), false) => arm.run_on_can(SocketCan::open(name)?, stop),
         (Address::Interface(_), true) => Err(EmulatorError::VirtualInterface),
     };
-    ran?;
+    result?;
     match arm.trace.take() {
         Some(trace) => Ok(trace.finish()?),
         None => Ok(()),

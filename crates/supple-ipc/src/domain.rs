@@ -51,8 +51,8 @@ impl Domain {
     /// # Errors
     /// [`IpcError::Prefix`], [`IpcError::Folder`].
     pub fn in_folder(folder: &StdPath, prefix: &str) -> Result<Domain, IpcError> {
-        let sound = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || "-_".contains(c);
-        if prefix.is_empty() || prefix.len() > 32 || !prefix.chars().all(sound) {
+        let allowed = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || "-_".contains(c);
+        if prefix.is_empty() || prefix.len() > 32 || !prefix.chars().all(allowed) {
             return Err(IpcError::Prefix {
                 found: prefix.to_owned(),
             });

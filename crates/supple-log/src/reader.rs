@@ -105,7 +105,7 @@ impl Reader {
     /// The arm, from the URDF and the TOML inside.
     ///
     /// # Errors
-    /// [`LogError::Format`] where one is missing, [`LogError::Model`] where one is not sound.
+    /// [`LogError::Format`] if one is missing, [`LogError::Model`] if one is invalid.
     pub fn description(&self) -> Result<Description, LogError> {
         let (toml, urdf) = (self.text("arm.toml")?, self.text("arm.urdf")?);
         Ok(Description::from_text(toml, urdf)?)
@@ -114,7 +114,7 @@ impl Reader {
     /// The configuration that was in force, to the last bit.
     ///
     /// # Errors
-    /// [`LogError::JointCount`]; [`LogError::Format`] where it is missing or not sound.
+    /// [`LogError::JointCount`]; [`LogError::Format`] if it is missing or invalid.
     pub fn config<const N: usize>(&self) -> Result<Config<N>, LogError> {
         self.expect_joints(N)?;
         let config = config::from_toml(self.text("controller.toml")?);

@@ -221,7 +221,7 @@ impl RecordDecoder {
         let (mut steps, mut names) = (Vec::new(), BTreeSet::new());
         for defined in definitions.root() {
             if !names.insert(&defined.name) {
-                return Err(format!("field {} is there twice", defined.name));
+                return Err(format!("field {} is defined twice", defined.name));
             }
             match find(&defined.name, joints) {
                 None => steps.push(Step::Skip(defined.clone())),

@@ -10,9 +10,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use supple_files::with_suffix;
 
-/// Suffix of the name during recovery. It differs from the suffix of a log that is being written, which may be the
-/// file to recover.
-const SUFFIX: &str = ".recovering";
+/// Suffix of the output file until it is complete. It differs from the suffix of a log that is being written, which may
+/// be the file to recover.
+const PARTIAL_SUFFIX: &str = ".recovering";
 
 /// Result of a recovery.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
@@ -56,7 +56,7 @@ impl fmt::Display for Recovery {
     }
 }
 
-/// Writes the complete part of `from` to `to`. A complete file is copied byte by byte.
+/// Writes the complete part of `from` to `to`. The copy of a complete file is identical, byte for byte.
 ///
 /// # Errors
 /// [`LogError::NoCompleteChunk`], [`LogError::SameFile`]; [`LogError::Format`] if `from` is not an MCAP file;
@@ -70,21 +70,21 @@ pub fn recover(from: impl AsRef<Path>, to: impl AsRef<Path>) -> Result<Recovery,
     };
     let source_bytes = std::fs::metadata(from).map_err(read_error)?.len();
     refuse_same_file(from, to)?;
-    let mut copy = Copy {
-        file: LogFile::create(to, SUFFIX)?,
-        ids: BTreeMap::new(),
+    let mut writer = RecoveryWriter {
+        file: LogFile::create(to, PARTIAL_SUFFIX)?,
+        channel_ids: BTreeMap::new(),
         messages: 0,
         span_ns: None,
     };
-    let stopped = match copy.copy_all(&mut scan, source_bytes) {
+    let stopped = match writer.copy_all(&mut scan, source_bytes) {
         Ok(stopped) => stopped,
         Err(error) => {
-            copy.file.discard();
+            writer.file.discard();
             return Err(error);
         }
     };
-    let span_ns = copy.span_ns.unwrap_or_default();
-    let written = copy.file.finish()?;
+    let span_ns = writer.span_ns.unwrap_or_default();
+    let written = writer.file.finish()?;
     Ok(Recovery {
         from: from.to_owned(),
         to: to.to_owned(),
@@ -94,14 +94,14 @@ pub fn recover(from: impl AsRef<Path>, to: impl AsRef<Path>) -> Result<Recovery,
         } else {
             scan.complete_bytes()
         },
-        messages: copy.messages,
+        messages: writer.messages,
         chunks: written.chunks,
         span_ns,
         stopped,
     })
 }
 
-/// Returns an error if `to`, or its name during recovery, is `from`.
+/// Returns an error if `to`, or the temporary name it is written under, is the file `from`.
 fn refuse_same_file(from: &Path, to: &Path) -> Result<(), LogError> {
     let read_error = |source| LogError::Read {
         file: from.display().to_string(),
@@ -109,7 +109,7 @@ fn refuse_same_file(from: &Path, to: &Path) -> Result<(), LogError> {
     };
     let source = from.canonicalize().map_err(read_error)?;
     let is_source = |path: &Path| path.canonicalize().is_ok_and(|path| path == source);
-    if is_source(to) || is_source(&with_suffix(to, SUFFIX)) {
+    if is_source(to) || is_source(&with_suffix(to, PARTIAL_SUFFIX)) {
         return Err(LogError::SameFile {
             file: from.display().to_string(),
         });
@@ -117,18 +117,19 @@ fn refuse_same_file(from: &Path, to: &Path) -> Result<(), LogError> {
     Ok(())
 }
 
-struct Copy {
+/// Writes the recovered log.
+struct RecoveryWriter {
     file: LogFile,
     /// Maps channels of the old file to channels of the new one.
-    ids: BTreeMap<u16, u16>,
+    channel_ids: BTreeMap<u16, u16>,
     messages: u64,
     span_ns: Option<(u64, u64)>,
 }
 
-impl Copy {
+impl RecoveryWriter {
     /// Copies all complete chunks. Returns the reason if copying stopped before the end of the file.
     fn copy_all(&mut self, scan: &mut Scan, source_bytes: u64) -> Result<Option<String>, LogError> {
-        let stopped = match self.items(scan) {
+        let stopped = match self.copy_items(scan) {
             Ok(()) => None,
             Err(LogError::Incomplete { cause, .. }) => Some(cause),
             Err(error) => return Err(error),
@@ -149,7 +150,7 @@ impl Copy {
         Ok(stopped)
     }
 
-    fn items(&mut self, scan: &mut Scan) -> Result<(), LogError> {
+    fn copy_items(&mut self, scan: &mut Scan) -> Result<(), LogError> {
         while let Some(item) = scan.next()? {
             match item {
                 Item::Metadata(metadata) => {
@@ -160,23 +161,25 @@ impl Copy {
                         .attach(&header.name, &header.media_type, header.log_time, &data)?
                 }
                 Item::Chunk => self.file.close_chunk()?,
-                Item::Message(channel, header, data) => self.message(&channel, header, &data)?,
+                Item::Message(channel, header, data) => {
+                    self.copy_message(&channel, header, &data)?
+                }
             }
         }
         Ok(())
     }
 
-    fn message(
+    fn copy_message(
         &mut self,
         channel: &Arc<Channel>,
         header: MessageHeader,
         data: &[u8],
     ) -> Result<(), LogError> {
-        let channel_id = match self.ids.get(&header.channel_id) {
+        let channel_id = match self.channel_ids.get(&header.channel_id) {
             Some(id) => *id,
             None => {
                 let id = self.file.channel(channel)?;
-                self.ids.insert(header.channel_id, id);
+                self.channel_ids.insert(header.channel_id, id);
                 id
             }
         };

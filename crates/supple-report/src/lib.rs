@@ -34,8 +34,8 @@ struct Cli {
 pub fn run() -> ExitCode {
     let cli = Cli::parse();
     interrupt::install();
-    let done = dispatch(&cli.command);
-    console::exit_code(done, cli.command.json())
+    let result = dispatch(&cli.command);
+    console::exit_code(result, cli.command.json())
 }
 
 fn dispatch(command: &OfflineCommand) -> Result<(), Failure> {

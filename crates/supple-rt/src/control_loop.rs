@@ -117,15 +117,15 @@ impl<const N: usize> ControlLoop<N> {
     /// # Errors
     /// [`RtError`]: shared memory, or a state of another arm.
     pub fn run(&mut self, link: &ControllerLink, stop: &Stop) -> Result<(), RtError> {
-        let ended = loop {
+        let result = loop {
             match self.run_iteration(link, stop) {
                 Ok(true) => {}
-                ended => break ended.map(|_| ()),
+                result => break result.map(|_| ()),
             }
         };
         // No announcement will follow, so send the last telemetry now.
         self.flush_telemetry();
-        ended
+        result
     }
 
     /// One iteration: waits for a state and answers it, or times out. Returns false when the loop must end.

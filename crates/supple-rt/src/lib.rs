@@ -1,12 +1,12 @@
 //! The controller as a realtime process: waits for an arm state, runs `step`, publishes torques.
 //!
-//! The loop's thread has only the ports to the plant; after its start it allocates nothing, locks nothing and logs
+//! The loop thread has only the ports to the plant; after its start it allocates nothing, locks nothing and logs
 //! nothing ([`ControlLoop`]). The helper thread has the ports to the clients: telemetry, requests, replies
 //! ([`Helper`]). A third thread receives only idle requests ([`IdleRequestThread`]). Separate threads write to the disk
 //! and to standard error; no other thread waits for them. The threads exchange data through lock-free queues of fixed
-//! size. If the helper or the idle-request thread ends, no request can be received any more: the loop shuts down in
-//! order, and the process exits with an error. If a service manager supervises the process, one more thread reports to
-//! it that the loop and the helper are alive ([`supple_realtime::Heartbeat`]).
+//! size. If the helper or the idle-request thread ends, no request can be received any more: the loop sets the drives
+//! to idle and ends, and the process exits with an error. If a service manager supervises the process, one more thread
+//! reports to it that the loop and the helper are alive ([`supple_realtime::Heartbeat`]).
 //!
 //! It does not depend on a bus, a log format or a simulator. The plant owns the clock; in virtual time the loop waits
 //! for the plant without a timeout. The computed torques never depend on a clock.
@@ -66,8 +66,8 @@ pub fn main() -> ExitCode {
     {
         eprintln!("supple-rt: warning: {warning}");
     }
-    let ran = with_dof!(description.dof(), N => run::<N>(&description, &options, &stop));
-    match ran.map_err(RtError::from).and_then(|ran| ran) {
+    let result = with_dof!(description.dof(), N => run::<N>(&description, &options, &stop));
+    match result.map_err(RtError::from).flatten() {
         Ok(timing) => {
             diagnostics::post(format_args!("supple-rt: {timing}"));
             diagnostics::flush();
@@ -108,10 +108,10 @@ pub fn run<const N: usize>(
     for realtime_warning in apply_realtime_settings(&options.realtime()) {
         diagnostics::post(format_args!("supple-rt: warning: {realtime_warning}"));
     }
-    let ended = control.run(&link, stop);
+    let result = control.run(&link, stop);
     drop(heartbeat);
     let timing = control.into_timing();
     helper.finish()?;
     idle_thread.finish()?;
-    ended.map(|()| timing)
+    result.map(|()| timing)
 }

@@ -1,5 +1,5 @@
 //! The loop against a scripted plant, on the real services: its answers equal those of `step`, it allocates nothing,
-//! requests take effect in their cycle, and it shuts down in order.
+//! requests take effect in their cycle, and on shutdown it sets the drives to idle.
 
 #[path = "../../../tests/support/counting.rs"]
 mod counting;

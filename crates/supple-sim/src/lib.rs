@@ -48,8 +48,8 @@ pub fn main() -> ExitCode {
     {
         eprintln!("supple-sim: warning: {warning}");
     }
-    let ran = with_dof!(description.dof(), N => run::<N>(&description, &options, &stop));
-    match ran.map_err(SimError::from).and_then(|ran| ran) {
+    let result = with_dof!(description.dof(), N => run::<N>(&description, &options, &stop));
+    match result.map_err(SimError::from).flatten() {
         Ok(summary) => {
             diagnostics::post(format_args!("supple-sim: {summary}"));
             diagnostics::flush();
@@ -92,10 +92,10 @@ pub fn run<const N: usize>(
         diagnostics::post(format_args!("supple-sim: warning: {realtime_warning}"));
     }
     simulation.spin(spin_duration(options.spin_us));
-    let ran = match options.virtual_time {
+    let result = match options.virtual_time {
         true => simulation.run_in_virtual_time(options.cycles, stop),
         false => simulation.run_in_real_time(options.cycles, options.answer_share, stop),
     };
-    let summary = ran?;
+    let summary = result?;
     simulation.end_trace().map(|()| summary)
 }

@@ -7,7 +7,7 @@
 //!
 //! While answers are missing, the fallback torque of the last answer acts. In idle the motors are shorted and brake
 //! ([`supple_plant::ActuatorModel`]). No operator is needed: the simulated drives become active as soon as a controller
-//! in gravity hold requests torque; after a loss only once a controller has been idle. Every torque passes
+//! in gravity hold requests torque; after a loss of answers only once a controller has been idle. Every torque passes
 //! [`DriveGuard`], which limits torques and rates, and removes torque if the arm does not stop in a fault.
 
 use supple_core::Vector;
@@ -24,7 +24,7 @@ pub struct Motors<const N: usize> {
     guard: DriveGuard<N>,
     fallback_cycles: u32,
     active: bool,
-    /// Idle after a loss; latched until the controller requests no torque.
+    /// Idle after a loss of answers or by the guard; latched until the controller requests no torque.
     latched_idle: bool,
     missed_in_a_row: u32,
     fallback_nm: Vector<N>,

@@ -1,6 +1,7 @@
 //! The operator's command line: complete systems as processes, commands to running systems, fault tests, logs.
 //!
-//! Commands that draw are those of `supple-report`, which it starts in its place: nothing here links a plotter.
+//! For a command that draws figures the process replaces itself with `supple-report` (exec), so that `supple` needs no
+//! plotting library.
 
 #![forbid(unsafe_code)]
 
@@ -19,21 +20,21 @@ use supple_cli::exit::Failure;
 use supple_cli::sibling::program_beside;
 use supple_cli::{arms, console, interrupt, log};
 
-/// The program of the commands that draw.
+/// Program that runs the commands that draw figures.
 const REPORT: &str = "supple-report";
 
 /// Runs the program: parses its arguments and returns its exit code.
 pub fn run() -> ExitCode {
     let cli = Cli::parse();
     interrupt::install();
-    let done = dispatch(&cli.command);
-    console::exit_code(done, cli.command.json())
+    let result = dispatch(&cli.command);
+    console::exit_code(result, cli.command.json())
 }
 
 fn dispatch(command: &Command) -> Result<(), Failure> {
     match command {
         Command::Offline(OfflineCommand::Demo(_) | OfflineCommand::Identification(_)) => {
-            Err(become_report())
+            Err(exec_report())
         }
         Command::Up(args) => up::run(args),
         Command::Drill(args) => drill::run(args),
@@ -60,8 +61,8 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
     }
 }
 
-/// Replaces this process by `supple-report` with the same arguments. Returns only if that fails.
-fn become_report() -> Failure {
+/// Replaces this process with `supple-report`, with the same arguments. Returns only if that fails.
+fn exec_report() -> Failure {
     let program = match program_beside(REPORT) {
         Ok(program) => program,
         Err(failure) => return failure,

@@ -1,4 +1,4 @@
-//! Arguments of the commands that need no running system; both programs accept them.
+//! Arguments of the commands that need no running system; `supple` and `supple-report` both accept them.
 
 mod demo;
 mod identification;
@@ -20,7 +20,7 @@ pub enum OfflineCommand {
     /// Run the paper's experiments: figures, report, summary and one log per run.
     #[command(after_help = CODES)]
     Demo(DemoArgs),
-    /// Identify an arm, or prepare it.
+    /// Identify an arm, and measure what the identification needs.
     #[command(flatten)]
     Identification(IdentificationCommand),
     /// Inspect, export, replay and recover logs.

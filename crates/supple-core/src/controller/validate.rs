@@ -57,13 +57,13 @@ fn not_negative(entry: &'static str, value: f64) -> Result<(), ConfigError> {
 }
 
 fn check(
-    sound: bool,
+    valid: bool,
     entry: &'static str,
     joint: Option<usize>,
     value: f64,
     must: &'static str,
 ) -> Result<(), ConfigError> {
-    if sound {
+    if valid {
         Ok(())
     } else {
         Err(ConfigError {
@@ -304,7 +304,7 @@ fn roles<const N: usize>(config: &Config<N>) -> Result<(), ConfigError> {
             active += 1;
             continue;
         };
-        let at = |entry, sound, value, must| check(sound, entry, Some(joint), value, must);
+        let at = |entry, valid, value, must| check(valid, entry, Some(joint), value, must);
         at(
             "held position_rad",
             (lower..=upper).contains(&position_rad),

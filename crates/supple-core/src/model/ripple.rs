@@ -44,9 +44,9 @@ impl RippleTable {
     /// A table of these harmonics; `None` for more than [`LINES`], a harmonic of 0, or an amplitude that
     /// is not finite.
     pub fn new(harmonics: &[Harmonic]) -> Option<RippleTable> {
-        let sound =
+        let valid =
             |h: &Harmonic| h.harmonic > 0 && h.sine_nm.is_finite() && h.cosine_nm.is_finite();
-        if harmonics.len() > LINES || !harmonics.iter().all(sound) {
+        if harmonics.len() > LINES || !harmonics.iter().all(valid) {
             return None;
         }
         let mut table = RippleTable::NONE;

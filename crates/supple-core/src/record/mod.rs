@@ -2,7 +2,7 @@
 //! sequence of 64-bit words.
 //!
 //! [`crate::controller::CycleRecord`] declares the record of a control cycle once. Telemetry carries its words; the
-//! message definition of the log, tables, fault files and Python columns are derived from its [`Field`]s.
+//! message definition of the log, exported tables, fault files and Python columns are derived from its [`Field`]s.
 
 mod columns;
 mod text;
@@ -19,7 +19,7 @@ pub enum Element {
     Bool,
     /// A small signed integer.
     Int8,
-    /// A code.
+    /// A numeric code, such as a mode.
     Uint8,
     /// A counter.
     Uint64,
@@ -32,7 +32,7 @@ pub enum Element {
 pub struct Term {
     /// Name.
     pub name: &'static str,
-    /// Description, one sentence a line.
+    /// Description, one sentence per line.
     pub description: &'static str,
 }
 
@@ -47,14 +47,14 @@ pub enum Shape {
     Vector,
     /// One number per joint for each term.
     Terms(&'static [Term]),
-    /// A list of numbers, at most this many, after their count.
+    /// The count, then this many numbers, of which the first `count` are valid.
     List(usize),
-    /// UTF-8 of at most [`Text::MAX_BYTES`] bytes, after its length.
+    /// The length in bytes, then UTF-8 in [`Text::MAX_BYTES`] bytes.
     Text,
 }
 
 impl Shape {
-    /// Words that a field of this shape takes for an arm of `joints` joints.
+    /// Number of 64-bit words of a field of this shape, for an arm of `joints` joints.
     pub const fn words(self, joints: usize) -> usize {
         match self {
             Shape::One(_) => 1,
@@ -74,11 +74,11 @@ pub struct Field {
     pub name: &'static str,
     /// Its values.
     pub shape: Shape,
-    /// Description, one sentence a line.
+    /// Description, one sentence per line.
     pub description: &'static str,
 }
 
-/// Words of a record for an arm of `joints` joints.
+/// Number of 64-bit words of a record, for an arm of `joints` joints.
 pub const fn words_of(fields: &[Field], joints: usize) -> usize {
     let (mut sum, mut i) = (0, 0);
     while i < fields.len() {
@@ -88,7 +88,7 @@ pub const fn words_of(fields: &[Field], joints: usize) -> usize {
     sum
 }
 
-/// Words that are written one after another.
+/// Writes 64-bit words one after another.
 #[derive(Debug)]
 pub struct Pack<'a> {
     words: &'a mut [u64],
@@ -96,7 +96,7 @@ pub struct Pack<'a> {
 }
 
 impl<'a> Pack<'a> {
-    /// From the first of `words` on.
+    /// Starts at the first of `words`.
     pub fn new(words: &'a mut [u64]) -> Self {
         Pack { words, next: 0 }
     }
@@ -111,7 +111,7 @@ impl<'a> Pack<'a> {
     }
 }
 
-/// Words that are read one after another; zeros beyond the last one.
+/// Reads 64-bit words one after another; beyond the last word it returns zeros.
 #[derive(Debug)]
 pub struct Unpack<'a> {
     words: &'a [u64],
@@ -120,7 +120,7 @@ pub struct Unpack<'a> {
 }
 
 impl<'a> Unpack<'a> {
-    /// From the first of `words` on, which hold the values of `joints` joints.
+    /// Starts at the first of `words`, the record of an arm of `joints` joints.
     pub fn new(words: &'a [u64], joints: usize) -> Self {
         Unpack {
             words,
@@ -136,7 +136,7 @@ impl<'a> Unpack<'a> {
         word
     }
 
-    /// Reads a value per joint: into the first entries of the array, whose others keep the default.
+    /// Reads one value per joint into the first entries of an array of `N`; the other entries keep the default.
     pub fn per_joint<T: Copy + Default, const N: usize>(
         &mut self,
         mut read: impl FnMut(&mut Self) -> T,
@@ -144,8 +144,8 @@ impl<'a> Unpack<'a> {
         let mut values = [T::default(); N];
         for joint in 0..self.joints {
             let value = read(self);
-            if let Some(place) = values.get_mut(joint) {
-                *place = value;
+            if let Some(entry) = values.get_mut(joint) {
+                *entry = value;
             }
         }
         values
@@ -164,25 +164,26 @@ pub trait Recorded<const N: usize>: Sized {
     fn unpack(from: &mut Unpack<'_>) -> Self;
 }
 
-macro_rules! one {
-    ($($type:ty, $element:ident, $to:expr, $from:expr;)*) => {$(
+/// Implements [`Recorded`] for types that take one word, with the functions from value to word and back.
+macro_rules! single_word {
+    ($($type:ty, $element:ident, $encode:expr, $decode:expr;)*) => {$(
         impl<const N: usize> Recorded<N> for $type {
             const SHAPE: Shape = Shape::One(Element::$element);
 
             fn pack(&self, to: &mut Pack<'_>) {
-                let word: fn($type) -> u64 = $to;
-                to.word(word(*self));
+                let encode: fn($type) -> u64 = $encode;
+                to.word(encode(*self));
             }
 
             fn unpack(from: &mut Unpack<'_>) -> Self {
-                let value: fn(u64) -> $type = $from;
-                value(from.word())
+                let decode: fn(u64) -> $type = $decode;
+                decode(from.word())
             }
         }
     )*};
 }
 
-one! {
+single_word! {
     bool, Bool, u64::from, |word| word != 0;
     u8, Uint8, u64::from, |word| word as u8;
     i8, Int8, |value| value as u64, |word| word as i8;
@@ -240,7 +241,7 @@ pub struct List<const MAX: usize> {
 }
 
 impl<const MAX: usize> List<MAX> {
-    /// Of these numbers; those beyond `MAX` are left out.
+    /// A list of the first `MAX` of these numbers.
     pub fn new(values: &[f64]) -> Self {
         let count = values.len().min(MAX);
         let mut list = List {
@@ -290,8 +291,8 @@ impl<const N: usize> Recorded<N> for Text {
         to.word(bytes.len() as u64);
         for i in 0..Text::MAX_BYTES / 8 {
             let mut word = [0; 8];
-            for (byte, from) in word.iter_mut().zip(bytes.iter().skip(8 * i)) {
-                *byte = *from;
+            for (byte, source) in word.iter_mut().zip(bytes.iter().skip(8 * i)) {
+                *byte = *source;
             }
             to.word(u64::from_le_bytes(word));
         }

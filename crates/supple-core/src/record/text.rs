@@ -36,7 +36,7 @@ impl Text {
         text
     }
 
-    /// Of bytes from elsewhere: cut at the first that is not UTF-8.
+    /// Text from untrusted bytes: cut before the first byte that is not UTF-8.
     pub(super) fn from_utf8_lossy(bytes: &[u8; Text::MAX_BYTES], length: u64) -> Text {
         let length = usize::try_from(length).map_or(Text::MAX_BYTES, |n| n.min(Text::MAX_BYTES));
         let mut text = Text::EMPTY;

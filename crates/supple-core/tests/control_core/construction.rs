@@ -26,7 +26,7 @@ fn joints() -> [Joint; 3] {
 fn refusal(spoil: impl Fn(&mut Joint)) -> ArmError {
     let mut joints = joints();
     spoil(&mut joints[1]);
-    Arm::new(&joints, Pose::IDENTITY, None, DOWN).expect_err("joint 1 is not physical")
+    Arm::new(&joints, Pose::IDENTITY, None, DOWN).expect_err("joint 1 is physically inconsistent")
 }
 
 /// The error for an arm with link 1 changed by `spoil`; the same change of the tool gives the same
@@ -150,11 +150,11 @@ fn inertia_is_checked_at_any_magnitude() {
             matches!(negative, BodyError::NotPositive(_)),
             "{negative:?}"
         );
-        let sound = Body {
+        let valid = Body {
             inertia_kg_m2: Matrix3::from_diagonal(&(Vector3::new(1.0, 1.0, 1.5) * size)),
             ..rod()
         };
-        assert_eq!(sound.validate(), Ok(()));
+        assert_eq!(valid.validate(), Ok(()));
     }
 }
 

@@ -55,7 +55,7 @@ pub fn state(cycle: u64) -> ArmState {
 /// The first output of a controller of the 4-joint arm.
 pub fn answer(input: &Input<4>) -> Output<4> {
     let description = Description::asset("wam4").expect("built in");
-    let controller = Controller::new(description.config().expect("sound")).expect("sound");
+    let controller = Controller::new(description.config().expect("valid")).expect("valid");
     step(&controller, &mut State::new(&controller), input)
 }
 

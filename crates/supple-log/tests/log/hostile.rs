@@ -1,4 +1,4 @@
-//! Malicious files give an error with file and element quickly and with bounded memory.
+//! Reading a malicious file fails quickly and with bounded memory; the error names the file and the element.
 
 use mcap::records::{MessageHeader, Metadata};
 use std::collections::BTreeMap;
@@ -7,17 +7,17 @@ use std::num::NonZeroU64;
 use std::path::Path;
 use supple_log::{LogError, Reader, export_csv, info, recover};
 
-/// A log with one message of `bytes` on the channel `topic`, of the type `p/A` that `definition` defines.
-fn log(path: &Path, topic: &str, definition: &str, bytes: &[u8]) {
+/// Writes a log with one message of `bytes` on the channel `topic`, of the type `p/A` that `definition` defines.
+fn write_log(path: &Path, topic: &str, definition: &str, bytes: &[u8]) {
     let file = File::create(path).expect("created");
     let mut writer = mcap::Writer::new(file).expect("begun");
-    let about = ["software", "arm", "experiment"].map(|key| (key.to_owned(), "x".to_owned()));
-    let mut about = BTreeMap::from(about);
-    about.insert("start_ns".to_owned(), "0".to_owned());
-    about.insert("joints".to_owned(), "a b c".to_owned());
+    let entries = ["software", "arm", "experiment"].map(|key| (key.to_owned(), "x".to_owned()));
+    let mut entries = BTreeMap::from(entries);
+    entries.insert("start_ns".to_owned(), "0".to_owned());
+    entries.insert("joints".to_owned(), "a b c".to_owned());
     let metadata = Metadata {
         name: "supple".to_owned(),
-        metadata: about,
+        metadata: entries,
     };
     writer.write_metadata(&metadata).expect("written");
     let schema = writer.add_schema("p/msg/A", "ros2msg", definition.as_bytes());
@@ -29,37 +29,38 @@ fn log(path: &Path, topic: &str, definition: &str, bytes: &[u8]) {
         log_time: 1,
         publish_time: 1,
     };
-    let data = [&[0, 1, 0, 0], bytes].concat();
+    let cdr_header: [u8; 4] = [0, 1, 0, 0];
+    let data = [&cdr_header[..], bytes].concat();
     writer
         .write_to_known_channel(&header, &data)
         .expect("written");
     writer.finish().expect("written");
 }
 
-fn assert_rejected(definition: &str, bytes: &[u8], words: &[&str]) {
+fn assert_rejected(definition: &str, bytes: &[u8], expected: &[&str]) {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("run.mcap");
-    log(&path, "/c", definition, bytes);
+    write_log(&path, "/c", definition, bytes);
     let mut out = Vec::new();
     let error = export_csv(&path, "/c", NonZeroU64::MIN, &mut out).expect_err("no table");
     assert!(matches!(error, LogError::Format { .. }), "{error}");
     let message = error.to_string();
-    for word in [&["run.mcap", "/c"], words].concat() {
-        assert!(message.contains(word), "{word} in {message}");
+    for text in [&["run.mcap", "/c"], expected].concat() {
+        assert!(message.contains(text), "{text} in {message}");
     }
     assert!(info(&path).is_ok(), "the rest of the log is valid");
 }
 
-/// The fields without which a definition is none of a record, and the bytes of a message of them.
+/// The fields that the definition of a record must have, and the size of a message with only these fields.
 const RECORD: &str = "uint64 step\nuint64 input_cycle\nuint64 cycle\nuint8 mode\nfloat64[3] position_rad\n\
                       float64[3] velocity_rad_per_s\nfloat64[3] torque_nm\n";
 const RECORD_BYTES: usize = 104;
 
-/// Records are decoded by the definition inside the file.
-fn assert_no_record(definition: &str, bytes: &[u8], words: &[&str]) {
+/// Checks that reading records fails: they are decoded with the definition inside the file, which may be malicious.
+fn assert_record_rejected(definition: &str, bytes: &[u8], expected: &[&str]) {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("run.mcap");
-    log(&path, "/controller_state", definition, bytes);
+    write_log(&path, "/controller_state", definition, bytes);
     let reader = Reader::open(&path).expect("opened");
     let mut records = reader.records::<3>().expect("three joints");
     let errors = [
@@ -68,84 +69,89 @@ fn assert_no_record(definition: &str, bytes: &[u8], words: &[&str]) {
     ];
     for error in errors {
         let message = error.to_string();
-        for word in [&["run.mcap", "/controller_state"], words].concat() {
-            assert!(message.contains(word), "{word} in {message}");
+        for text in [&["run.mcap", "/controller_state"], expected].concat() {
+            assert!(message.contains(text), "{text} in {message}");
         }
     }
 }
 
 #[test]
-fn a_definition_of_a_record_from_outside() {
+fn a_malicious_definition_of_a_record() {
     let data = &[0; RECORD_BYTES];
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("run.mcap");
-    log(&path, "/controller_state", RECORD, data);
+    write_log(&path, "/controller_state", RECORD, data);
     assert_eq!(info(&path).expect("a record").steps, 1);
 
-    let empty = "MSG: p/N\nint8[0] x\n";
-    let nothing = format!("{RECORD}N[9223372036854775808] n\n{LINE}\n{empty}");
-    assert_no_record(&nothing, data, &["more fields than a message of 104 bytes"]);
-    let mut doubling = format!("{RECORD}M0 a\nM0 b\n");
+    let empty_type = "MSG: p/N\nint8[0] x\n";
+    let empty_elements = format!("{RECORD}N[9223372036854775808] n\n{SEPARATOR}\n{empty_type}");
+    assert_record_rejected(
+        &empty_elements,
+        data,
+        &["more fields than a message of 104 bytes"],
+    );
+    let mut doubled_per_level = format!("{RECORD}M0 a\nM0 b\n");
     for i in 0..30 {
-        doubling += &format!("{LINE}\nMSG: p/M{i}\nM{0} a\nM{0} b\n", i + 1);
+        doubled_per_level += &format!("{SEPARATOR}\nMSG: p/M{i}\nM{0} a\nM{0} b\n", i + 1);
     }
-    doubling += &format!("{LINE}\nMSG: p/M30\nint8[0] x\n");
-    assert_no_record(&doubling, data, &["more fields than"]);
-    assert_no_record(
+    doubled_per_level += &format!("{SEPARATOR}\nMSG: p/M30\nint8[0] x\n");
+    assert_record_rejected(&doubled_per_level, data, &["more fields than"]);
+    assert_record_rejected(
         &format!("{RECORD}bool a\nbool a\n"),
         data,
-        &["field a is there twice"],
+        &["field a is defined twice"],
     );
-    assert_no_record("string data\n", data, &["no field step"]);
+    assert_record_rejected("string data\n", data, &["no field step"]);
     let vector = format!(
-        "{RECORD}geometry_msgs/Vector3 tip_position_m\n{LINE}\nMSG: geometry_msgs/Vector3\nfloat32 x\n"
+        "{RECORD}geometry_msgs/Vector3 tip_position_m\n{SEPARATOR}\nMSG: geometry_msgs/Vector3\nfloat32 x\n"
     );
-    assert_no_record(
+    assert_record_rejected(
         &vector,
         data,
         &["geometry_msgs/Vector3 is not three numbers"],
     );
     let shorter = RECORD.replace("float64[3] torque_nm", "float64[2] torque_nm");
-    assert_no_record(&shorter, data, &["torque_nm"]);
+    assert_record_rejected(&shorter, data, &["torque_nm"]);
 }
 
-const LINE: &str =
+/// Line between the message definitions of a schema.
+const SEPARATOR: &str =
     "================================================================================";
 
 #[test]
 fn a_recursive_message_type() {
     assert_rejected("A a\n", &[0; 8], &["p/A", "is recursive"]);
     assert_rejected("A[] a\n", &[255; 4096], &["p/A", "is recursive"]);
-    let by_another = format!("B b\n{LINE}\nMSG: p/B\nint8 x\nA[] a\n");
-    assert_rejected(&by_another, &[255; 4096], &["is recursive"]);
+    let indirect = format!("B b\n{SEPARATOR}\nMSG: p/B\nint8 x\nA[] a\n");
+    assert_rejected(&indirect, &[255; 4096], &["is recursive"]);
 }
 
 #[test]
 fn messages_that_double_with_every_level() {
     let mut definition = "M0 a\nM0 b\n".to_owned();
     for i in 0..30 {
-        definition += &format!("{LINE}\nMSG: p/M{i}\nM{0} a\nM{0} b\n", i + 1);
+        definition += &format!("{SEPARATOR}\nMSG: p/M{i}\nM{0} a\nM{0} b\n", i + 1);
     }
-    definition += &format!("{LINE}\nMSG: p/M30\nint8[0] x\n");
+    definition += &format!("{SEPARATOR}\nMSG: p/M30\nint8[0] x\n");
     assert_rejected(&definition, &[0; 8], &["at a.a.a", "at most 100000 fields"]);
 }
 
 #[test]
 fn more_elements_than_there_are_bytes() {
-    let nothing = format!("N[9223372036854775808] n\n{LINE}\nMSG: p/N\nint8[0] x\n");
-    assert_rejected(&nothing, &[0; 8], &["at n", "at most 100000 fields"]);
+    let empty_elements = format!("N[9223372036854775808] n\n{SEPARATOR}\nMSG: p/N\nint8[0] x\n");
+    assert_rejected(&empty_elements, &[0; 8], &["at n", "at most 100000 fields"]);
     assert_rejected(
         "int8[0] z\nint8[99999999999999999999] n\n",
         &[0; 8],
         &["cannot read"],
     );
-    let sequence = format!("N[] n\n{LINE}\nMSG: p/N\nint8[0] x\n");
+    let sequence = format!("N[] n\n{SEPARATOR}\nMSG: p/N\nint8[0] x\n");
     assert_rejected(&sequence, &[255; 4], &["at n", "at most 100000 fields"]);
 }
 
-/// A record whose stated length exceeds the memory, in a sparse file of that length.
+/// An MCAP record whose declared length exceeds the memory, in a sparse file of that length.
 #[test]
-fn a_record_as_long_as_the_file() {
+fn an_mcap_record_as_long_as_the_file() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("run.mcap");
     let length: u64 = 1 << 40;

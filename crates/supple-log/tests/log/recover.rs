@@ -33,9 +33,9 @@ fn original() -> Original {
 
 /// Number of messages in a file, by the strict reader of the mcap library, which requires the end of the file.
 fn strictly_counted(bytes: &[u8]) -> u64 {
-    let summary = mcap::Summary::read(bytes).expect("sound").expect("indexed");
+    let summary = mcap::Summary::read(bytes).expect("valid").expect("indexed");
     let counted = summary.stats.expect("statistics").message_count;
-    let messages = mcap::MessageStream::new(bytes).expect("sound");
+    let messages = mcap::MessageStream::new(bytes).expect("valid");
     let read = messages.inspect(|message| assert!(message.is_ok())).count() as u64;
     assert_eq!(read, counted);
     read
@@ -127,7 +127,7 @@ fn a_truncated_file_is_read_up_to_its_last_complete_chunk() {
 }
 
 #[test]
-fn a_complete_file_is_copied_byte_by_byte() {
+fn a_complete_file_is_copied_byte_for_byte() {
     let original = original();
     let to = original.folder.path().join("copy.mcap");
     let recovery = recover(original.folder.path().join("run.mcap"), &to).expect("complete");
@@ -141,7 +141,7 @@ fn recovery_stops_at_a_damaged_chunk() {
     let original = original();
     let (from, to) = names(original.folder.path());
     let whole = strictly_counted(&original.bytes);
-    let summary = mcap::Summary::read(&original.bytes).expect("sound");
+    let summary = mcap::Summary::read(&original.bytes).expect("valid");
     let chunks = summary.expect("indexed").chunk_indexes;
     let mut bytes = original.bytes.clone();
     bytes[(chunks[2].chunk_start_offset + chunks[2].chunk_length / 2) as usize] ^= 0x10;

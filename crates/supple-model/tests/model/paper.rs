@@ -57,7 +57,7 @@ proptest! {
         qd in joints(2.0),
         qdd in joints(5.0),
     ) {
-        let arm = arm(&parameters).expect("physical");
+        let arm = arm(&parameters).expect("physically consistent");
         let close = |difference: f64| difference < 1e-12;
         let mass = parameters.mass_matrix(&q);
         prop_assert!(close((mass - dynamics::crba(&arm, &q)).amax()));

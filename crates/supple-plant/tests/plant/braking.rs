@@ -26,12 +26,12 @@ fn a_shorted_motor_stops_its_rotor_with_its_time_constant() {
         body: Body::ball(1e-6, 1e-3, Vector3::zeros()),
         armature_kg_m2: inertia_kg_m2,
     };
-    let arm = Arm::new(&[joint], Pose::IDENTITY, None, Vector3::zeros()).expect("sound");
+    let arm = Arm::new(&[joint], Pose::IDENTITY, None, Vector3::zeros()).expect("valid");
     let mut config = PlantConfig::ideal(arm);
     config.step_s = 2e-5;
     config.actuators.joint_from_motor[(0, 0)] = 1.0 / gear;
     config.actuators.braking_nm_s_per_rad = Vector::from([braking]);
-    let mut plant = Plant::new(config, Vector::zeros(), Vector::from([1.0])).expect("sound");
+    let mut plant = Plant::new(config, Vector::zeros(), Vector::from([1.0])).expect("valid");
     for cycle in 1..=5 {
         plant.short_motors([cycle > 2]);
         plant.cycle(&Vector::zeros());
@@ -52,7 +52,7 @@ fn energy_lost_by_the_arm_equals_energy_dissipated_by_the_motors() {
     let to_motors = config.actuators.joint_from_motor.try_inverse();
     let motor_speed = to_motors.expect("regular") * speed;
     let torque = |shorted| {
-        let mut plant = Plant::new(config.clone(), home, speed).expect("sound");
+        let mut plant = Plant::new(config.clone(), home, speed).expect("valid");
         plant.short_motors(shorted);
         plant.cycle(&Vector::zeros());
         plant.truth().motor_torque_nm
@@ -88,7 +88,7 @@ fn fall(step_s: f64) -> Fall {
     config.scene = Scene::with_block_at(-HEIGHT_M - config.tip_radius_m);
     let (arm, actuators) = (config.arm, config.actuators.clone());
     let to_motors = actuators.joint_from_motor.try_inverse().expect("regular");
-    let mut plant = Plant::new(config, wam4_at(&arm, 0.65, 0.0), Vector::zeros()).expect("sound");
+    let mut plant = Plant::new(config, wam4_at(&arm, 0.65, 0.0), Vector::zeros()).expect("valid");
     plant.short_motors([true; 4]);
     let mut fall = Fall {
         speed_m_per_s: 0.0,

@@ -27,7 +27,7 @@ impl Bench {
         specs: &[&str],
     ) -> Result<Bench, InjectionError> {
         let injections: Result<Vec<Injection>, _> = specs.iter().map(|spec| spec.parse()).collect();
-        let mut plant = Plant::new(config, HOME_RAD.into(), speed.into()).expect("sound");
+        let mut plant = Plant::new(config, HOME_RAD.into(), speed.into()).expect("valid");
         let injector = Injector::new(&injections?, &mut plant, PERIOD_S)?;
         Ok(Bench { plant, injector })
     }
@@ -36,7 +36,7 @@ impl Bench {
     fn coasting(specs: &[&str]) -> Bench {
         let mut config = PlantConfig::ideal(wam4_in([0.0; 3].into()));
         config.cycle_s = PERIOD_S;
-        Bench::of(config, SPEED, specs).expect("sound")
+        Bench::of(config, SPEED, specs).expect("valid")
     }
 
     fn cycle(&mut self, sight: ControllerView, torque_nm: [f64; 4]) -> [f64; 4] {
@@ -54,9 +54,9 @@ impl Bench {
 #[test]
 fn without_injections_a_plant_is_bit_identical() {
     let description = Description::asset("wam4").expect("built in");
-    let config = PlantConfig::<4>::from_description(&description).expect("sound");
-    let mut bench = Bench::of(config.clone(), SPEED, &[]).expect("sound");
-    let mut plain = Plant::new(config, HOME_RAD.into(), SPEED.into()).expect("sound");
+    let config = PlantConfig::<4>::from_description(&description).expect("valid");
+    let mut bench = Bench::of(config.clone(), SPEED, &[]).expect("valid");
+    let mut plain = Plant::new(config, HOME_RAD.into(), SPEED.into()).expect("valid");
     for cycle in 0..50 {
         let torque_nm = [1.0, -2.0, 0.5, f64::from(cycle) * 0.01];
         plain.cycle(&torque_nm.into());
@@ -137,7 +137,7 @@ fn a_late_encoder_lags_by_its_number_of_cycles_and_does_not_jump() {
 fn a_delay_is_counted_in_control_cycles() {
     let mut config = PlantConfig::ideal(wam4_in([0.0; 3].into()));
     config.cycle_s = 2e-4;
-    let mut bench = Bench::of(config, SPEED, &["encoder-late:cycles=2"]).expect("sound");
+    let mut bench = Bench::of(config, SPEED, &["encoder-late:cycles=2"]).expect("valid");
     let mut history = vec![bench.true_rad()];
     for cycle in 1..=60 {
         let said = bench.cycle(TRACKS, [0.0; 4]);
@@ -193,12 +193,12 @@ fn every_second_reply_is_lost() {
 
 fn described(specs: &[&str]) -> Bench {
     let description = Description::asset("wam4").expect("built in");
-    let mut config = PlantConfig::<4>::from_description(&description).expect("sound");
+    let mut config = PlantConfig::<4>::from_description(&description).expect("valid");
     config.cycle_s = PERIOD_S;
     config.actuators.ripple.clear();
     config.actuators.motor_torque_quantum_nm = Vector::zeros();
     config.actuators.torque_delay_cycles = 0;
-    Bench::of(config, SPEED, specs).expect("sound")
+    Bench::of(config, SPEED, specs).expect("valid")
 }
 
 /// Motors 1 and 2 share joints 1 and 2.
@@ -257,14 +257,14 @@ fn a_late_torque_acts_after_its_number_of_cycles() {
 fn held_by_the_model(specs: &[&str], truth: &Arm<4>) {
     let model = wam4_in([0.0, 0.0, -9.81].into());
     let config = PlantConfig::ideal(model);
-    let mut bench = Bench::of(config, [0.0; 4], specs).expect("sound");
+    let mut bench = Bench::of(config, [0.0; 4], specs).expect("valid");
     let hold = |q: [f64; 4]| gravity(&model, &q.into());
     for _ in 0..20 {
         bench.cycle(TRACKS, hold(bench.true_rad()).into());
         assert!(bench.plant.kinetic_energy_j() < 1e-9, "it is held before");
     }
     let mut alone =
-        Plant::new(PlantConfig::ideal(*truth), HOME_RAD.into(), Vector::zeros()).expect("sound");
+        Plant::new(PlantConfig::ideal(*truth), HOME_RAD.into(), Vector::zeros()).expect("valid");
     for _ in 0..200 {
         let torque_nm = hold(bench.true_rad());
         bench.cycle(TRACKS, torque_nm.into());
@@ -293,9 +293,9 @@ fn a_payload_adds_its_weight_and_inertia() {
         HOME_RAD.into(),
         Vector::zeros(),
     )
-    .expect("sound");
+    .expect("valid");
     let before_kg = loaded.config().arm.body(3).mass_kg;
-    loaded.add_payload(1.5).expect("sound");
+    loaded.add_payload(1.5).expect("valid");
     let arm = loaded.config().arm;
     assert!((arm.body(3).mass_kg - before_kg - 1.5).abs() < 1e-12);
     // The gravity torque grows by that of a point mass at the tip.

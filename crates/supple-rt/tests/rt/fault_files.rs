@@ -14,7 +14,7 @@ use supple_rt::{FaultFiles, FaultRecorder, KEPT_FILES};
 fn telemetry(step_number: u64, fault: u8) -> Telemetry {
     let description = Description::asset("wam4").expect("built in");
     let controller: Controller<4> =
-        Controller::new(description.config().expect("sound")).expect("sound");
+        Controller::new(description.config().expect("valid")).expect("valid");
     let home = description.home::<4>().expect("four joints");
     let input = Input {
         cycle: 0,

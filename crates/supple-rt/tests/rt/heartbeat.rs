@@ -75,11 +75,11 @@ fn stalled_loop_sends_no_watchdog_message() {
     let domain = Domain::in_folder(&folder.path().join("run"), "heartbeat").expect("a domain");
     let link = ControllerLink::new(&domain).expect("a controller");
     let description = Description::asset("wam4").expect("built in");
-    let config = description.config::<4>().expect("sound");
+    let config = description.config::<4>().expect("valid");
     let (queues, _helper_queues) = loop_queues();
     let liveness = queues.liveness();
     let mut monitor = LivenessMonitor::new(&[liveness]);
-    let controller = Controller::new(config).expect("sound");
+    let controller = Controller::new(config).expect("valid");
     let mut control = ControlLoop::new(controller, queues, true);
     assert!(!monitor.all_advanced());
     control

@@ -93,7 +93,7 @@ fn answers_equal_those_of_step() {
     // Leaves the helper time to receive the request before the first state.
     pause(Duration::from_millis(50));
     let description = Description::asset("wam4").expect("built in");
-    let controller = Controller::new(description.config::<4>().expect("sound")).expect("sound");
+    let controller = Controller::new(description.config::<4>().expect("valid")).expect("valid");
     let mut reference = State::new(&controller);
     for cycle in 0..20 {
         publish(&plant, &state(cycle));

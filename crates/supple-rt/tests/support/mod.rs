@@ -23,7 +23,7 @@ pub fn description() -> Description {
 }
 
 pub fn controller() -> Controller<4> {
-    Controller::new(description().config().expect("sound")).expect("sound")
+    Controller::new(description().config().expect("valid")).expect("valid")
 }
 
 pub struct Bench {

@@ -1,6 +1,7 @@
 //! Behaviour of the drives with and without answers: the fallback torque acts for at most 100 ms, then the motors
 //! brake, and braking only dissipates energy.
 
+use supple_core::controller::codes::fault_kind;
 use supple_core::controller::{Controller, Mode, Request, State};
 use supple_core::drive_guard::{DriveCommand, DriveGuard};
 use supple_core::{Input, Vector, step};
@@ -12,7 +13,7 @@ const FALLBACK_CYCLES: usize = 100;
 
 fn answer(request: Option<Request<4>>) -> TorqueCommand {
     let description = Description::asset("wam4").expect("built in");
-    let controller = Controller::new(description.config().expect("sound")).expect("sound");
+    let controller = Controller::new(description.config().expect("valid")).expect("valid");
     let home = description.home::<4>().expect("four joints");
     let input = Input {
         cycle: 0,
@@ -27,7 +28,7 @@ fn answer(request: Option<Request<4>>) -> TorqueCommand {
 
 fn motors() -> Motors<4> {
     let config = Description::asset("wam4").expect("built in").config();
-    Motors::new(1e-3, DriveGuard::new(&config.expect("sound")))
+    Motors::new(1e-3, DriveGuard::new(&config.expect("valid")))
 }
 
 fn home() -> [Option<f64>; 4] {
@@ -59,7 +60,7 @@ fn the_fallback_acts_for_100_ms_and_then_the_motors_brake() {
     }
     assert_eq!(motors.torque(&home(), None), Ok(Vector::zeros()));
     assert_eq!(motors.drives(), Drives::Idle);
-    // After a loss the controller must be idle before its torque is applied again.
+    // After a loss of answers the controller must be idle before its torque is applied again.
     assert_eq!(motors.torque(&home(), Some(&hold)), Ok(Vector::zeros()));
     assert_eq!(motors.drives(), Drives::Idle);
     motors
@@ -84,90 +85,100 @@ fn an_answer_restarts_the_100_ms_of_fallback() {
 #[test]
 fn an_answer_for_another_arm_is_refused() {
     let config = Description::asset("wam3").expect("built in").config();
-    let mut motors = Motors::<3>::new(1e-3, DriveGuard::new(&config.expect("sound")));
+    let mut motors = Motors::<3>::new(1e-3, DriveGuard::new(&config.expect("valid")));
     assert!(motors.torque(&[Some(0.0); 3], Some(&answer(None))).is_err());
 }
 
-/// The drives become active only if the controller is in gravity hold.
 #[test]
 fn drives_become_active_only_in_gravity_hold() {
     let hold = answer(Some(Request::GravityHold));
     for mode in [Mode::Move, Mode::Track, Mode::Excite, Mode::Fault] {
         let mut motors = motors();
-        let at_work = TorqueCommand {
+        let command = TorqueCommand {
             mode: mode as u8,
             ..hold
         };
-        assert_eq!(motors.torque(&home(), Some(&at_work)), Ok(Vector::zeros()));
+        assert_eq!(motors.torque(&home(), Some(&command)), Ok(Vector::zeros()));
         assert_eq!(motors.drives(), Drives::Idle, "{mode:?}");
         motors.torque(&home(), Some(&hold)).expect("four joints");
         assert_eq!(motors.drives(), Drives::Active, "{mode:?}");
     }
 }
 
-/// Torques of a faulty controller: not finite, then far beyond the limits in one step.
+/// A faulty controller sends a torque that is not finite, then torques far beyond the limits.
 #[test]
 fn excessive_torque_is_limited_and_nan_counts_as_missing_answer() {
     let hold = answer(Some(Request::GravityHold));
     let mut motors = motors();
     motors.torque(&home(), Some(&hold)).expect("four joints");
-    let mut wild = hold;
-    wild.torque_nm[3] = f64::NAN;
-    assert_eq!(motors.torque(&home(), Some(&wild)), hold.fallback_torque());
-    wild.torque_nm = [-1e6; 7];
+    let mut excessive = hold;
+    excessive.torque_nm[3] = f64::NAN;
+    assert_eq!(
+        motors.torque(&home(), Some(&excessive)),
+        hold.fallback_torque()
+    );
+    excessive.torque_nm = [-1e6; 7];
     let before = hold.fallback_torque::<4>().expect("four joints");
-    let sent = motors.torque(&home(), Some(&wild)).expect("four joints");
+    let sent = motors
+        .torque(&home(), Some(&excessive))
+        .expect("four joints");
     assert!(
         (sent - before).amax() <= 1.0 + 1e-9,
-        "the rate limit: 1 N m a cycle"
+        "the rate limit: 1 N m per cycle"
     );
     for _ in 0..500 {
-        let sent = motors.torque(&home(), Some(&wild)).expect("four joints");
+        let sent = motors
+            .torque(&home(), Some(&excessive))
+            .expect("four joints");
+        // The largest torque limit of the arm's joints.
         assert!(sent.amax() <= 101.7 + 1e-9, "{sent}");
     }
 }
 
-/// The guard removes torque on its own measurements: if a joint keeps moving in a controller fault, and if a joint is
-/// far too fast.
+/// The guard ends the torque from the encoders alone: if a joint still moves 250 ms after a fault of the controller, or
+/// if a joint exceeds twice its speed limit.
 #[test]
-fn an_arm_that_does_not_stop_in_a_fault_is_braked() {
+fn an_arm_that_does_not_stop_in_a_fault_or_is_too_fast_is_braked() {
     let hold = answer(Some(Request::GravityHold));
     let fault = TorqueCommand {
         mode: Mode::Fault as u8,
-        fault: 6,
+        fault: fault_kind::JOINT_SPEED,
         ..hold
     };
-    for (speed_rad_per_s, command, within) in [(1.0, fault, 251..=300), (9.0, hold, 1..=40)] {
+    for (speed_rad_per_s, command, expected_cycles) in
+        [(1.0, fault, 251..=300), (9.0, hold, 1..=40)]
+    {
         let mut motors = motors();
         let mut angles = home();
         for _ in 0..100 {
             motors.torque(&angles, Some(&hold)).expect("four joints");
         }
-        let ended = (1..1000).find(|_| {
+        let braked_in = (1..1000).find(|_| {
             angles[0] = angles[0].map(|angle| angle + speed_rad_per_s * 1e-3);
             motors.torque(&angles, Some(&command)).expect("four joints");
             motors.drives() == Drives::Idle
         });
         assert!(
-            ended.is_some_and(|cycle| within.contains(&cycle)),
-            "{ended:?}"
+            braked_in.is_some_and(|cycle| expected_cycles.contains(&cycle)),
+            "{braked_in:?}"
         );
         assert!(motors.last_guard_reason().is_some());
     }
 }
 
-/// The first torque of a faulty controller: a command received while the drives were idle is limited as well.
+/// The torque at activation is limited too, if the controller is faulty: that of its answer, and the fallback torque if
+/// no further answer follows.
 #[test]
 fn the_first_torque_is_limited_like_any_other() {
-    let mut wild = answer(Some(Request::GravityHold));
-    wild.torque_nm = [-1e6; 7];
-    wild.fallback_torque_nm = [1e6; 7];
+    let mut excessive = answer(Some(Request::GravityHold));
+    excessive.torque_nm = [-1e6; 7];
+    excessive.fallback_torque_nm = [1e6; 7];
     let limits = Description::asset("wam4").expect("built in").config::<4>();
-    let limits = limits.expect("sound").limits.joint_torque_nm;
+    let limits = limits.expect("valid").limits.joint_torque_nm;
     for answered in [true, false] {
         let mut motors = motors();
         for cycle in 0..50 {
-            let command = (answered || cycle == 0).then_some(&wild);
+            let command = (answered || cycle == 0).then_some(&excessive);
             let sent = motors.torque(&home(), command).expect("four joints");
             for (torque_nm, limit_nm) in sent.iter().zip(&limits) {
                 assert!(torque_nm.abs() <= limit_nm + 1e-9, "cycle {cycle}: {sent}");
@@ -186,22 +197,22 @@ fn activation_without_an_answer_is_checked_with_the_next_answer() {
         mode: Some(mode),
         fault: false,
     };
-    for (mode, passes) in [(Mode::GravityHold, true), (Mode::Track, false)] {
-        let mut guard = DriveGuard::new(config.as_ref().expect("sound"));
+    for (mode, accepted) in [(Mode::GravityHold, true), (Mode::Track, false)] {
+        let mut guard = DriveGuard::new(config.as_ref().expect("valid"));
         guard.observe(&home(), 1);
         assert_eq!(guard.check_command(None, true), Ok(()));
         assert_eq!(
             guard.check_command(Some(&command(mode)), true).is_ok(),
-            passes
+            accepted
         );
     }
 }
 
-/// The guard divides a motion over skipped periods by all of their time.
+/// After skipped periods the guard divides the motion since the last angles by the whole time since then.
 #[test]
 fn skipped_periods_do_not_count_as_speed() {
     let config = Description::asset("wam4").expect("built in").config::<4>();
-    let mut guard = DriveGuard::new(config.as_ref().expect("sound"));
+    let mut guard = DriveGuard::new(config.as_ref().expect("valid"));
     let hold = DriveCommand {
         torque_nm: Vector::zeros(),
         mode: Some(Mode::GravityHold),

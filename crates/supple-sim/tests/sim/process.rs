@@ -50,7 +50,7 @@ struct Holding {
 impl Holding {
     fn new() -> Holding {
         let description = Description::asset("wam4").expect("built in");
-        let controller = Controller::new(description.config().expect("sound")).expect("sound");
+        let controller = Controller::new(description.config().expect("valid")).expect("valid");
         Holding {
             state: State::new(&controller),
             controller,
@@ -69,9 +69,9 @@ fn in_virtual_time_it_equals_the_plant_bit_for_bit() {
     let link = ControllerLink::new(&system.domain).expect("a controller");
     let child = system.start(&["--virtual-time", "--cycles", "200"]);
     let description = Description::asset("wam4").expect("built in");
-    let config = PlantConfig::<4>::from_description(&description).expect("sound");
+    let config = PlantConfig::<4>::from_description(&description).expect("valid");
     let home = description.home().expect("four joints");
-    let mut plant = Plant::new(config, home, Vector::zeros()).expect("sound");
+    let mut plant = Plant::new(config, home, Vector::zeros()).expect("valid");
     let mut controller = Holding::new();
     for cycle in 0..200 {
         let arm = link.wait(SOON).expect("read").expect("a state");
@@ -190,11 +190,11 @@ fn invalid_command_counts_as_missing_answer() {
     let link = ControllerLink::new(&system.domain).expect("a controller");
     let child = system.start(&["--virtual-time", "--cycles", "40"]);
     let description = Description::asset("wam4").expect("built in");
-    let config = PlantConfig::<4>::from_description(&description).expect("sound");
+    let config = PlantConfig::<4>::from_description(&description).expect("valid");
     let home = description.home().expect("four joints");
-    let mut plant = Plant::new(config, home, Vector::zeros()).expect("sound");
+    let mut plant = Plant::new(config, home, Vector::zeros()).expect("valid");
     let mut controller = Holding::new();
-    let guard = DriveGuard::new(&description.config().expect("sound"));
+    let guard = DriveGuard::new(&description.config().expect("valid"));
     let mut motors = Motors::<4>::new(1e-3, guard);
     let mut unusable = 0;
     for cycle in 0..40 {

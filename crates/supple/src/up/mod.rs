@@ -51,7 +51,7 @@ fn sized<const N: usize>(args: &UpArgs, description: &Description) -> Result<(),
     let _pidfile = Pidfile::create(&domain)?;
     let mut system = System::<N>::new(args, description, &domain)?;
     let started = system.start(description);
-    let ended = started.and_then(|()| system.watch(&stop));
+    let result = started.and_then(|()| system.watch(&stop));
     let shut_down = system.end();
     let mut summary = system.finish();
     let cut_short = system.cut_short();
@@ -59,7 +59,7 @@ fn sized<const N: usize>(args: &UpArgs, description: &Description) -> Result<(),
     let fault = (!summary.faults.is_empty()).then(|| Failure::RunFault {
         faults: summary.faults.join("; "),
     });
-    match (ended.and(shut_down), &fault) {
+    match (result.and(shut_down), &fault) {
         (Ok(()), _) => {}
         // The request was refused because of the fault; report the fault.
         (Err(Failure::Refused { reason }), Some(_)) => print_status(&reason),

@@ -17,7 +17,7 @@
 //! | quadrant | `centre_m`, `first_m`, `second_m`, `speed_m_per_s`, `ramp_s` |
 //! | probe | `radius_m`, `strokes`, `radial_step_m`, `top_m`, `stroke_m`, `azimuth_rad`, `azimuth_step_rad`, `speed_m_per_s`, `ramp_s` |
 //!
-//! Decoding says whether numbers are a request, not whether the request is sound: the controller does.
+//! Decoding rejects numbers that encode no request; whether a request is valid, the controller checks.
 
 use super::{request_kind, trajectory_kind};
 use crate::config::{Gains, JointGains};

@@ -28,7 +28,7 @@ impl<const N: usize> Case<N> {
     pub fn arm(&self) -> Arm<N> {
         let tool = self.tool.as_ref().map(Cloud::body);
         Arm::new(&self.joints, self.last_link_from_tip, tool, self.gravity)
-            .expect("random arms are physical")
+            .expect("random arms are physically consistent")
     }
 
     /// The links' bodies in their link frames; the last one includes the tool.

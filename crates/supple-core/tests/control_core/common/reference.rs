@@ -91,21 +91,24 @@ fn arm<const N: usize>(description: &Value, gravity: Vector3<f64>) -> Arm<N> {
         }
     };
     let tip = description["tip"].as_array().expect("a chain of frames");
-    let last_link_from_tip = tip.iter().fold(Pose::IDENTITY, |p, o| p * pose(o));
+    let last_link_from_tip = tip.iter().fold(Pose::IDENTITY, |pose_so_far, origin| {
+        pose_so_far * pose(origin)
+    });
     let joints = std::array::from_fn(joint);
-    Arm::new(&joints, last_link_from_tip, None, gravity).expect("the reference arms are physical")
+    Arm::new(&joints, last_link_from_tip, None, gravity)
+        .expect("the reference arms are physically consistent")
 }
 
 fn body(description: &Value) -> Body {
-    let i = |name: &str| number(&description["inertia"][name]);
+    let inertia = |name: &str| number(&description["inertia"][name]);
     Body {
         mass_kg: number(&description["mass"]),
         com_m: vector(&description["com"]),
         #[rustfmt::skip]
         inertia_kg_m2: Matrix3::new(
-            i("ixx"), i("ixy"), i("ixz"),
-            i("ixy"), i("iyy"), i("iyz"),
-            i("ixz"), i("iyz"), i("izz"),
+            inertia("ixx"), inertia("ixy"), inertia("ixz"),
+            inertia("ixy"), inertia("iyy"), inertia("iyz"),
+            inertia("ixz"), inertia("iyz"), inertia("izz"),
         ),
     }
 }

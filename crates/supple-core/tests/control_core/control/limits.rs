@@ -139,7 +139,7 @@ fn check_limits_under_random_motion<const N: usize>(
                 _ => rig.cycle(),
             };
             prop_assert_eq!(output.fault, None);
-            sound(&rig, &last, &output)?;
+            check_limited_torque(&rig, &last, &output)?;
             torque_cuts += u32::from(output.torque_limited);
             rate_cuts += u32::from(output.rate_limited);
             last = output;
@@ -152,9 +152,13 @@ fn check_limits_under_random_motion<const N: usize>(
     });
 }
 
-/// Checks that one cycle's torque follows from the last one and the sum of the terms by the limits
-/// in order.
-fn sound<const N: usize>(rig: &Rig<N>, last: &Output<N>, output: &Output<N>) -> Outcome {
+/// Checks that one cycle's torque is the sum of the terms after the torque limit and then the rate limit against the
+/// last torque.
+fn check_limited_torque<const N: usize>(
+    rig: &Rig<N>,
+    last: &Output<N>,
+    output: &Output<N>,
+) -> Outcome {
     let config = rig.controller.config();
     let (limits, motors) = (&config.limits, rig.controller.motors());
     allowed(limits, motors, &output.torque_nm)?;

@@ -55,7 +55,7 @@ macro_rules! refuses_per_joint {
 fn valid_configurations_are_accepted() {
     assert!(Controller::new(three()).is_ok());
     assert!(Controller::new(four()).is_ok());
-    let controller = Controller::new(seven()).expect("sound");
+    let controller = Controller::new(seven()).expect("valid");
     assert_eq!(controller.config().period_s, 1e-3);
 }
 

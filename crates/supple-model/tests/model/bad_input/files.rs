@@ -77,7 +77,7 @@ fn too_many_links_are_rejected() {
         &["small.urdf", "<robot>", "at most 1000 of <link>", "20007"],
     );
     let many = Description::from_text(TOML, &fixed(900)).expect("900 frames in a row");
-    let few = Description::from_text(TOML, URDF).expect("sound");
+    let few = Description::from_text(TOML, URDF).expect("valid");
     assert_eq!(many.parts::<3>().unwrap(), few.parts::<3>().unwrap());
 }
 
@@ -131,7 +131,7 @@ fn special_files_are_neither_read_nor_replaced() {
     let out = at("out");
     fs::create_dir(&out).expect("made");
     fifo(&out.join("arm.toml"));
-    let arm = Description::from_text(TOML, URDF).expect("sound");
+    let arm = Description::from_text(TOML, URDF).expect("valid");
     let message = arm.save(&out).expect_err("rejected").to_string();
     assert!(message.contains("a FIFO"), "{message}");
     assert!(!out.join("arm.urdf").exists(), "incomplete arm");
@@ -145,7 +145,7 @@ fn special_files_are_neither_read_nor_replaced() {
 #[test]
 fn an_identified_model_keeps_extensions_of_other_programs() {
     let urdf = more("<gazebo reference=\"link1\"><mu1>0.2</mu1></gazebo>");
-    let arm = Description::from_text(TOML, &urdf).expect("sound");
+    let arm = Description::from_text(TOML, &urdf).expect("valid");
     let friction: [supple_core::Friction; 3] = arm.friction().try_into().expect("three");
     let replaced = arm
         .with_model(&IdentifiedModel {
@@ -154,7 +154,7 @@ fn an_identified_model_keeps_extensions_of_other_programs() {
             ripple: None,
             source: "test",
         })
-        .expect("sound");
+        .expect("valid");
     assert!(replaced.urdf().contains("<mu1>0.2</mu1>"));
     assert_eq!(replaced.warnings().len(), 1);
 }

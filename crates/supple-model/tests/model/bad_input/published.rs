@@ -55,7 +55,7 @@ fn published() -> String {
 
 #[test]
 fn extensions_do_not_change_the_arm_and_each_kind_is_listed_once() {
-    let plain = Description::from_text(TOML, URDF).expect("sound");
+    let plain = Description::from_text(TOML, URDF).expect("valid");
     assert!(plain.warnings().is_empty());
     assert!(plain.clone().strict().is_ok());
     let arm = Description::from_text(TOML, &published()).expect("as published");
