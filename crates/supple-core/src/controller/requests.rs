@@ -352,7 +352,7 @@ fn check_held_targets<const N: usize>(
 ) -> Result<(), Refusal> {
     for (role, value) in config.roles.iter().zip(target_rad) {
         if let Role::Held { position_rad, .. } = role
-            && !(abs(value - position_rad) <= HELD_TOLERANCE_RAD)
+            && !(0.0..=HELD_TOLERANCE_RAD).contains(&abs(value - position_rad))
         {
             return Err(Refusal::Value {
                 entry: "target_rad of a held joint",
