@@ -1,4 +1,4 @@
-"""Random serial arms as URDF text: random axes and origins, full inertias."""
+"""Random serial arms as URDF text: random axes and origins, full inertia tensors."""
 
 from __future__ import annotations
 

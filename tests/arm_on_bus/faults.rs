@@ -121,7 +121,7 @@ fn the_arm_is_reenabled_only_from_the_pendant() {
     rig.cycle.link_mut().dead = false;
     rig.run(5);
     // Only the operator can re-enable the safety module.
-    rig.ask(Request::Reset);
+    rig.request(Request::Reset);
     rig.run(300);
     assert!(rig.motors_in(MotorMode::Idle));
     rig.emulator_mut().press(ButtonPress::Activate);

@@ -108,7 +108,7 @@ impl<const N: usize> Rig<N> {
     }
 
     pub fn activate(&mut self) {
-        self.ask(Request::GravityHold);
+        self.request(Request::GravityHold);
         self.run(50);
         self.emulator_mut().press(ButtonPress::Activate);
         self.run(50);
@@ -128,7 +128,8 @@ impl<const N: usize> Rig<N> {
         self.emulator().now_ns()
     }
 
-    pub fn ask(&mut self, request: Request<N>) {
+    /// Sends a request with the next arm state.
+    pub fn request(&mut self, request: Request<N>) {
         self.cycle.link_mut().request = Some(request);
     }
 

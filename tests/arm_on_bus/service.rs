@@ -14,7 +14,7 @@ use supple_puck::status::MotorMode;
 #[test]
 fn torque_mode_is_entered_only_from_the_pendant() {
     let mut rig = Rig::<4>::new();
-    rig.ask(Request::GravityHold);
+    rig.request(Request::GravityHold);
     rig.run(500);
     assert!(rig.motors_in(MotorMode::Idle));
     assert_eq!(rig.cycle.drives(), Drives::Idle);
@@ -28,7 +28,7 @@ fn torque_mode_is_entered_only_from_the_pendant() {
 #[test]
 fn activation_is_bumpless() {
     let mut rig = Rig::<4>::new();
-    rig.ask(Request::GravityHold);
+    rig.request(Request::GravityHold);
     rig.run(100);
     let before = rig.emulator().truth().position_rad;
     rig.emulator_mut().press(ButtonPress::Activate);
@@ -161,12 +161,12 @@ fn tracks<const N: usize>(period_ns: u64) -> f64 {
     let mut rig = Rig::<N>::at(start, period_ns);
     rig.activate();
     let cycles = |seconds: f64| (seconds * 1e9 / period_ns as f64) as usize;
-    rig.ask(Request::Move {
+    rig.request(Request::Move {
         target_rad: start,
         duration_s: 0.5,
     });
     rig.run(cycles(0.8));
-    rig.ask(Request::Track(trajectory));
+    rig.request(Request::Track(trajectory));
     let (mut sum, count) = (0.0, cycles(4.0));
     for _ in 0..count {
         rig.step();
@@ -198,7 +198,7 @@ fn seven_joints_track_at_700_hz() {
 fn identical_runs_are_bit_identical() {
     let run = || {
         let mut rig = Rig::<4>::holding();
-        rig.ask(Request::Move {
+        rig.request(Request::Move {
             target_rad: Vector::from([0.2, -1.6, 0.0, 2.7]),
             duration_s: 0.6,
         });

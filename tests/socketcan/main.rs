@@ -90,7 +90,7 @@ fn activate(cycle: &mut Service, arm: &Arm) {
 }
 
 #[test]
-fn an_arm_on_a_kernel_can_interface_runs_and_is_lowered_after_every_loss() {
+fn an_arm_on_a_kernel_can_interface_runs_and_is_set_to_idle_after_every_loss() {
     let Ok(interface) = std::env::var("SUPPLE_CAN_INTERFACE") else {
         eprintln!("skipped: SUPPLE_CAN_INTERFACE is not set; ./ci.sh socketcan provides one");
         return;

@@ -1,9 +1,9 @@
-//! An arm with N joints, skew axes and full inertias.
+//! An arm with N joints, oblique axes and full inertia tensors.
 
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::{Arm, ArmError, Body, Friction, Joint, Pose};
 
-/// Joints about z, y and a skew axis in turn; full inertias; a tool.
+/// The joint axes repeat z, y and an oblique axis; full inertia tensors; a tool.
 pub fn arm<const N: usize>() -> Result<Arm<N>, ArmError> {
     let axes = [
         Vector3::new(0.0, 0.0, 1.0),
@@ -30,7 +30,7 @@ pub fn arm<const N: usize>() -> Result<Arm<N>, ArmError> {
     Arm::new(&joints, tip, Some(tool), Vector3::new(0.0, 0.0, -9.81))
 }
 
-/// Friction of each joint, with a Stribeck dip.
+/// Friction of each joint, with the Stribeck effect.
 pub fn friction() -> Friction {
     Friction {
         breakaway_nm: 0.6,

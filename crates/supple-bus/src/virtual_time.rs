@@ -5,8 +5,9 @@
 //! [`DatagramBus`](crate::DatagramBus).
 //!
 //! The host sends any number of frames, then "run until", and waits. The arm answers with the first event for
-//! the host, or "reached"; with lookahead ([`Bus::receive_with_lookahead`]) it answers with all events up to
-//! that point. The same inputs therefore give the same order of events at any speed.
+//! the host, or "reached"; with lookahead ([`Bus::receive_with_lookahead`]) it answers with several events at
+//! once, up to the number of frames that the host expects. The same inputs therefore give the same order of events
+//! at any speed.
 
 use crate::bus::{Bus, Event};
 use crate::datagram::Side;
@@ -56,7 +57,8 @@ impl LockstepBus {
     /// Opens the host's side and adopts the time of the arm's process, which must be running.
     ///
     /// # Errors
-    /// If the folder is not accessible only to its owner, another process is the host, or no arm answers.
+    /// If the folder is not accessible only to its owner, another process has already opened the host's
+    /// side, or no arm answers.
     pub fn open(folder: &OwnerFolder) -> Result<LockstepBus, BusError> {
         let (own, peer) = Side::Host.sockets();
         let mut bus = LockstepBus {
@@ -64,6 +66,7 @@ impl LockstepBus {
             client: LockstepClient::new(),
             now_ns: 0,
         };
+        // The answer "reached" carries the arm's time.
         while bus.receive_until(0)?.is_some() {}
         Ok(bus)
     }
@@ -142,7 +145,7 @@ impl LockstepResponder {
     /// Opens the arm's side in a folder.
     ///
     /// # Errors
-    /// If the folder is not accessible only to its owner, or another process is the arm.
+    /// If the folder is not accessible only to its owner, or another process has already opened the arm's side.
     pub fn open(folder: &OwnerFolder) -> Result<LockstepResponder, BusError> {
         let (own, peer) = Side::Arm.sockets();
         Ok(LockstepResponder {
@@ -150,16 +153,17 @@ impl LockstepResponder {
         })
     }
 
-    /// Serves one request of the host; `false` if none arrived within `idle_ns` of real time.
+    /// Serves one request of the host; `false` if none arrived within `timeout_ns` of real time.
     ///
     /// # Errors
-    /// If the socket fails. A missing host is not an error; another may connect.
-    pub fn serve(&mut self, peer: &mut impl Peer, idle_ns: u64) -> Result<bool, BusError> {
+    /// If the socket fails. A host that has ended is not an error; another may connect.
+    pub fn serve(&mut self, peer: &mut impl Peer, timeout_ns: u64) -> Result<bool, BusError> {
         let mut bytes = [0; MAX_BYTES];
-        let Some(length) = self.next(&mut bytes, idle_ns)? else {
+        let Some(length) = self.next(&mut bytes, timeout_ns)? else {
             return Ok(false);
         };
         let message = Message::parse(&bytes[..length]);
+        // Without a time limit the request runs to its end.
         if let Some(request) = message.filter(|m| m.kind == Kind::RunUntil)
             && let Some(answer) = LockstepServer::new(request).run(peer, u64::MAX)
         {
@@ -168,11 +172,11 @@ impl LockstepResponder {
         Ok(true)
     }
 
-    fn next(&self, bytes: &mut [u8], idle_ns: u64) -> Result<Option<usize>, BusError> {
+    fn next(&self, bytes: &mut [u8], timeout_ns: u64) -> Result<Option<usize>, BusError> {
         if let Some(read) = self.endpoint.receive_into(bytes)? {
             return Ok(Some(read.len()));
         }
-        wait_readable_until(&self.endpoint, monotonic_ns() + idle_ns)?;
+        wait_readable_until(&self.endpoint, monotonic_ns() + timeout_ns)?;
         Ok(self.endpoint.receive_into(bytes)?.map(<[u8]>::len))
     }
 }

@@ -8,16 +8,16 @@
 //!
 //! Torques are sent in the active stage and also in the resting stage, in which idle motors ignore them, so that
 //! the weight of the arm is compensated from the moment the operator activates it. While the answer is missing,
-//! the fallback torque is sent from the first cycle on. After [`ANSWER_TIMEOUT_NS`] the safety module is lowered
+//! the fallback torque is sent from the first cycle on. After [`ANSWER_TIMEOUT_NS`] the safety module is set
 //! to idle, in which the motors brake; the fallback continues until they do, for at most [`FALLBACK_NS`],
 //! because the arm would drop without torque before the motors brake. A lost encoder ends torque at once,
-//! because gravity computed from it would be wrong. The module is only lowered, never raised. The machine has no
+//! because gravity computed from it would be wrong. The machine never activates the arm. It has no
 //! access to bus or clock: time is an argument.
 
 use supple_core::drive_guard::GuardReason;
 use supple_puck::safety::SafetyMode;
 
-/// Time for which answers or transmissions may fail before the module is lowered \[ns\].
+/// Time for which answers or transmissions may fail before the module is set to idle \[ns\].
 pub const ANSWER_TIMEOUT_NS: u64 = 10_000_000;
 /// Maximum time of the fallback torque while answers are missing \[ns\].
 pub const FALLBACK_NS: u64 = 100_000_000;

@@ -3,7 +3,7 @@
 //! [`start_up()`] prepares an arm for polling after power-up and rejects one that does not match its
 //! description. [`Cycle`] then polls positions, publishes the arm's state, waits a bounded time for the
 //! controller's torques, sends them and checks that they were sent. [`guard`] defines the safe action after a
-//! loss. The host lowers the arm's safety module to idle and never activates it: that requires a person at the
+//! loss. The host sets the arm's safety module to idle and never activates it: that requires a person at the
 //! pendant.
 //!
 //! It computes no torques and does not depend on the controller, which it reaches through a [`Link`]. Time is

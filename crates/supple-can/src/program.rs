@@ -25,7 +25,7 @@ const EMULATOR_TIMEOUT_NS: u64 = 5_000_000_000;
 const ARM_LOST_AFTER_NS: u64 = 500_000_000;
 /// Maximum time for switching to idle at shutdown \[ns\].
 const SHUTDOWN_TIMEOUT_NS: u64 = 250_000_000;
-/// Interval at which a lost arm is searched for.
+/// Interval between attempts to reach a lost arm, or an emulator that has not started yet.
 const SEARCH_INTERVAL: core::time::Duration = core::time::Duration::from_millis(200);
 
 /// The whole program, from its arguments to its exit code.
@@ -36,7 +36,8 @@ pub fn main() -> ExitCode {
         Ok(None) => ExitCode::SUCCESS,
         Ok(Some(counters)) => {
             diagnostics::post(format_args!(
-                "supple-can: {} cycles, {} missed, {} unusable, {} skipped, {} frames lost, {} replies lost, {} overruns",
+                "supple-can: {} cycles, {} answers missed, {} answers unusable, {} periods skipped, {} frames lost, \
+                 {} replies lost, {} receive overruns",
                 counters.cycles,
                 counters.missed,
                 counters.unusable,
@@ -142,10 +143,10 @@ fn run<const N: usize>(
         }
         first = false;
         let mut cycle = Cycle::new(bus, link, ready, &config, cycle_config)?;
-        let ended = serve(&mut cycle, options, stop)?;
+        let shut_down = serve(&mut cycle, options, stop)?;
         counters = sum_counters(&counters, cycle.counters());
         (bus, link, _) = cycle.into_parts();
-        if ended {
+        if shut_down {
             return Ok(Some(counters));
         }
         diagnostics::post(format_args!(
@@ -174,11 +175,11 @@ fn serve<const N: usize, B: Bus>(
             return Ok(false);
         }
         let guard = cycle.guard();
-        // Messages only when the drives become active or idle, never during operation.
+        // Posts a message only when the drives become active or idle, so not in a cycle of steady operation.
         if guard.last_loss() != loss {
             loss = guard.last_loss();
-            if let Some((loss, _)) = loss {
-                diagnostics::post(format_args!("supple-can: lowered to idle: {loss}"));
+            if let Some((reason, _)) = loss {
+                diagnostics::post(format_args!("supple-can: set to idle: {reason}"));
             }
         }
         if guard.stage() != stage {
@@ -253,6 +254,7 @@ fn report_progress(progress: Progress) {
     }
 }
 
+/// Adds the counts of two runs; timing and load are those of the later run `b`.
 fn sum_counters(a: &Counters, b: &Counters) -> Counters {
     Counters {
         cycles: a.cycles + b.cycles,

@@ -51,7 +51,7 @@ fn request<const N: usize>(rig: &Rig<N>, cycle: u32) -> Option<Request<N>> {
             ramp_s: 0.0,
         }),
         600 => Some(Request::Track(probe_at(&rig.tip()))),
-        900 => Some(rig.stay()),
+        900 => Some(rig.hold_tip_request()),
         1400 | 1700 => Some(Request::Reset),
         _ => None,
     }

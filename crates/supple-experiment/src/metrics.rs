@@ -39,7 +39,7 @@ pub struct LineFit {
     pub slope: f64,
     /// y at x = 0.
     pub intercept: f64,
-    /// Fraction of the variance of y that the line explains.
+    /// Coefficient of determination: fraction of the variance of y that the line explains.
     pub r2: f64,
 }
 
@@ -77,13 +77,13 @@ pub fn median(values: &[f64]) -> Option<f64> {
     }
 }
 
-/// (max - min) / median; `None` without values.
+/// Range relative to the median, (max - min) / median; `None` without values.
 pub fn spread(values: &[f64]) -> Option<f64> {
-    let middle = median(values)?;
-    let (min, max) = values
-        .iter()
-        .fold((f64::MAX, f64::MIN), |(l, g), v| (l.min(*v), g.max(*v)));
-    Some((max - min) / middle)
+    let median = median(values)?;
+    let (min, max) = values.iter().fold((f64::MAX, f64::MIN), |(min, max), v| {
+        (min.min(*v), max.max(*v))
+    });
+    Some((max - min) / median)
 }
 
 #[cfg(test)]

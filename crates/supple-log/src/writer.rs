@@ -43,8 +43,8 @@ pub struct Extras<const N: usize> {
     /// Number of the step since the controller started, where steps may be lost between the
     /// controller and the log. Default: every step is written, the writer counts.
     pub step: Option<u64>,
-    /// What the force sensor reported, base axes \[N\], where the controller is not told.
-    /// Default: the input's.
+    /// What the force sensor measured, base axes \[N\], if the controller does not receive it.
+    /// Default: the force in the controller's input.
     pub tip_force_n: Option<Vector3<f64>>,
     /// When the cycle began and how long it took.
     pub timing: Option<CycleTiming>,
@@ -201,8 +201,8 @@ impl<const N: usize> Writer<N> {
             force,
             torque: [0.0; 3],
         };
-        let told = record.has_tip_force.then_some(record.tip_force_n);
-        if let Some(force) = extras.tip_force_n.map(Into::into).or(told) {
+        let input_force = record.has_tip_force.then_some(record.tip_force_n);
+        if let Some(force) = extras.tip_force_n.map(Into::into).or(input_force) {
             channels.put(Topic::WrenchExt, step, time_ns, &wrench(force))?;
         }
         if record.has_reference {
@@ -233,7 +233,7 @@ impl<const N: usize> Writer<N> {
     }
 
     /// What happened to the arm besides, such as a button of its pendant, with its time as in
-    /// [`Writer::write`]. It may be told of late: its place in the file is here, its time is its own.
+    /// [`Writer::write`]. It may be written late: the file has it at this place, with its own time.
     ///
     /// # Errors
     /// [`LogError::Write`].

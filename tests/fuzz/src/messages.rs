@@ -1,5 +1,5 @@
-//! Messages between the processes with arbitrary content, as a peer may leave them in shared memory, and their
-//! consumers.
+//! Messages between the processes with arbitrary content, as a faulty process may write them to shared memory, and the
+//! code that reads them.
 
 use crate::bytes::{value_of, values_of};
 use crate::requests::{assert_valid_output, controller};
@@ -17,10 +17,10 @@ pub fn arm_state(data: &[u8]) {
     let controller = controller();
     let mut state = State::new(controller);
     let mut last = None;
-    for arm in values_of::<ArmState>(data).take(STATES) {
-        let _ = arm.drives().name();
-        let Ok(input) = arm.input::<4>(None) else {
-            assert_ne!(arm.dof, 4);
+    for arm_state in values_of::<ArmState>(data).take(STATES) {
+        let _ = arm_state.drives().name();
+        let Ok(input) = arm_state.input::<4>(None) else {
+            assert_ne!(arm_state.dof, 4);
             continue;
         };
         let output = step(controller, &mut state, &input);
@@ -29,10 +29,10 @@ pub fn arm_state(data: &[u8]) {
         let command = TorqueCommand::new(&output, false);
         assert_eq!(command.torque::<4>(), Ok(output.torque_nm));
         assert_eq!(command.wants_torque(), !output.torque_off);
-        let told = Telemetry::new(0, &arm, &input, &output, CycleTiming::default());
-        let told = told.record_of::<4>();
-        assert_eq!(told.mode(), Some(output.mode));
-        assert!(told.fault_text.as_str().is_empty() == output.fault.is_none());
+        let telemetry = Telemetry::new(0, &arm_state, &input, &output, CycleTiming::default());
+        let record = telemetry.record_of::<4>();
+        assert_eq!(record.mode(), Some(output.mode));
+        assert!(record.fault_text.as_str().is_empty() == output.fault.is_none());
     }
 }
 
@@ -49,31 +49,37 @@ pub fn torque_command(data: &[u8]) {
 
 /// Telemetry and replies, as the status line, the log and an operator read them.
 pub fn telemetry(data: &[u8]) {
-    let told: Telemetry = value_of(data);
-    let _ = told.state.drives();
-    let _ = told.state.input::<4>(None);
-    let record = told.record();
+    let telemetry: Telemetry = value_of(data);
+    let _ = telemetry.state.drives();
+    let _ = telemetry.state.input::<4>(None);
+    let record = telemetry.record();
     let _ = record.mode().map(|mode| mode.name());
     let _ = record.tip_error_m();
     assert!(record.request_values.values().len() <= VALUES);
-    let _ = told.record_of::<4>().input().is_ok();
+    let _ = telemetry.record_of::<4>().input().is_ok();
     for text in [&record.fault_text, &record.refusal_text] {
         assert_eq!(record::Text::from_display(text).as_str(), text.as_str());
     }
     let fields = CycleRecord::<7>::FIELDS;
     let mut columns = 0;
-    record::for_each_column(fields, told.words(), told.dof(), |column, cell| {
-        columns += 1;
-        assert!(format!("{column}={cell}").len() > 1);
-    });
+    record::for_each_column(
+        fields,
+        telemetry.words(),
+        telemetry.dof(),
+        |column, cell| {
+            columns += 1;
+            assert!(format!("{column}={cell}").len() > 1);
+        },
+    );
+    // `dof` may be 0: fields per joint then have no column, but vectors have three.
     assert!(columns >= fields.len() - 3);
     let reply: OperatorReply = value_of(data);
     let _ = (reply.outcome(), reply.mode());
-    text(&reply.text);
+    check_text(&reply.text);
 }
 
-/// A text is valid UTF-8 for any bytes, and survives a round trip.
-fn text(text: &Text) {
+/// Checks that a text is valid UTF-8 for any bytes and survives a round trip.
+fn check_text(text: &Text) {
     let string = text.as_str();
     assert!(string.len() <= size_of::<Text>());
     assert_eq!(Text::of(&string).as_str(), string);

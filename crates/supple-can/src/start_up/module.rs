@@ -1,4 +1,4 @@
-//! The safety module during start-up: identification, mode and limits. Its mode is only lowered, never raised.
+//! The safety module during start-up: identification, mode and limits. The host never activates it.
 
 use super::{common_property_id, motors};
 use crate::error::CanError;

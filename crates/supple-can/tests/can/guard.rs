@@ -59,7 +59,7 @@ fn overspeed_ends_the_fallback_torque_during_any_other_loss() {
 }
 
 #[test]
-fn activation_outside_gravity_hold_is_lowered_with_the_fallback_torque() {
+fn activation_outside_gravity_hold_is_set_to_idle_with_the_fallback_torque() {
     let mut guard = SafeActionMachine::new();
     let mut input = without_loss(0);
     input.drive_guard_loss = Some(LossReason::Activated);

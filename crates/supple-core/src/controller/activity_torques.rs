@@ -109,12 +109,13 @@ impl<const N: usize> State<N> {
                 to_rad,
                 duration_s,
             } => {
-                let (x, rate, rate_rate) = smooth_step(time_s / duration_s);
+                let (share, first_derivative, second_derivative) = smooth_step(time_s / duration_s);
                 let displacement = to_rad - from_rad;
                 Some(JointReference {
-                    position_rad: from_rad + displacement * x,
-                    velocity_rad_per_s: displacement * (rate / duration_s),
-                    acceleration_rad_per_s2: displacement * (rate_rate / (duration_s * duration_s)),
+                    position_rad: from_rad + displacement * share,
+                    velocity_rad_per_s: displacement * (first_derivative / duration_s),
+                    acceleration_rad_per_s2: displacement
+                        * (second_derivative / (duration_s * duration_s)),
                 })
             }
             Activity::Excite(series) => Some(series.at(time_s)),

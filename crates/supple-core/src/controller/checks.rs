@@ -1,4 +1,5 @@
-//! Checks of the supervisor in each cycle, before the torque is limited. NaN exceeds every limit.
+//! Checks of the supervision in each cycle, before the torque is limited, and the soft stops of the joints. A NaN
+//! counts as exceeding a speed limit or a tracking limit.
 
 use super::fault::Fault;
 use crate::config::Limits;
@@ -73,12 +74,12 @@ pub(super) fn tracking(limit_m: f64, error: &Vector3<f64>) -> Result<(), Fault> 
 /// Checks the tracking error of each joint with a position loop.
 pub(super) fn joint_tracking<const N: usize>(
     limits: &Limits<N>,
-    wanted_rad: &[Option<f64>; N],
+    setpoint_rad: &[Option<f64>; N],
     position_rad: &Vector<N>,
 ) -> Result<(), Fault> {
     let limit_rad = limits.joint_tracking_error_rad;
-    for (joint, wanted) in wanted_rad.iter().enumerate() {
-        let value_rad = wanted.map_or(0.0, |wanted| abs(wanted - position_rad[joint]));
+    for (joint, setpoint) in setpoint_rad.iter().enumerate() {
+        let value_rad = setpoint.map_or(0.0, |setpoint| abs(setpoint - position_rad[joint]));
         if exceeds(value_rad, limit_rad) {
             return Err(Fault::JointTrackingError {
                 joint,
@@ -102,18 +103,18 @@ pub(super) fn total<const N: usize>(torques: &Torques<N>) -> Result<Vector<N>, F
     Err(Fault::TorqueNotFinite { term })
 }
 
-/// Spring-dampers in the zones before the hard stops. The damper grows with the depth into the zone and
-/// resists only motion towards the stop, so that the torque is continuous and never pulls towards it. The
-/// spring does not grow beyond the stop itself.
+/// Spring-dampers over the last `soft_zone_rad` before each hard stop. The damping coefficient grows from zero with the
+/// depth into this range, and only motion towards the stop is damped, so that the torque is continuous and never
+/// pulls towards the stop. Beyond the hard stop the spring torque stays constant.
 pub(super) fn soft_stop<const N: usize>(
     limits: &Limits<N>,
     position_rad: &Vector<N>,
     velocity_rad_per_s: &Vector<N>,
 ) -> Vector<N> {
-    let push = |joint: usize, depth: f64, rate: f64| {
-        let share = (depth / limits.soft_zone_rad).min(1.0);
+    let push = |joint: usize, depth_rad: f64, approach_rad_per_s: f64| {
+        let share = (depth_rad / limits.soft_zone_rad).min(1.0);
         limits.soft_stiffness_nm_per_rad[joint] * share * limits.soft_zone_rad
-            + limits.soft_damping_nm_s_per_rad[joint] * share * rate.max(0.0)
+            + limits.soft_damping_nm_s_per_rad[joint] * share * approach_rad_per_s.max(0.0)
     };
     Vector::from_fn(|joint, _| {
         let (q, v) = (position_rad[joint], velocity_rad_per_s[joint]);

@@ -1,5 +1,5 @@
-//! Checks of a requested motion over its whole length: reach, joint stops, joint speeds, torques
-//! and workspace borders. They take some milliseconds and do not run in the control loop.
+//! Checks of a requested motion from start to end: reach between the soft stops, joint and tip speeds, torques and
+//! workspace borders. They take some milliseconds and do not run in the control loop.
 
 use super::Controller;
 use super::mode::{Refusal, Request};
@@ -11,8 +11,8 @@ use crate::law::impedance::Task;
 use crate::math::{Vector, abs, smooth_step};
 use crate::trajectory::{JointReference, Trajectory};
 
-/// Number of sample intervals at which a motion is checked.
-const POINTS: u32 = 128;
+/// Number of equal time intervals of a motion; it is checked at their ends.
+const INTERVALS: u32 = 128;
 /// Maximum distance at which a point of a trajectory counts as reached \[m\].
 const REACHED_M: f64 = 1e-3;
 /// Fraction of the torque limits available to the feed-forward of a motion; the rest is for
@@ -32,50 +32,54 @@ pub fn check_motion<const N: usize>(
     match request {
         Request::Track(trajectory) => {
             trajectory.validate().map_err(Refusal::Trajectory)?;
-            along_trajectory(config, position_rad, trajectory)
+            check_trajectory(config, position_rad, trajectory)
         }
         Request::Move {
             target_rad,
             duration_s,
-        } => along_line(config, position_rad, target_rad, *duration_s),
+        } => check_joint_line(config, position_rad, target_rad, *duration_s),
         Request::JointImpedance {
             target_rad,
             duration_s,
         } => {
             let target_rad = active_target(config, position_rad, target_rad);
-            along_line(config, position_rad, &target_rad, *duration_s)
+            check_joint_line(config, position_rad, &target_rad, *duration_s)
         }
-        Request::Excite(series) => along(config, series.duration_s, |time_s| series.at(time_s)),
+        Request::Excite(series) => {
+            check_joint_motion(config, series.duration_s, |time_s| series.at(time_s))
+        }
         _ => Ok(()),
     }
 }
 
-fn along_line<const N: usize>(
+/// Checks a minimum-jerk motion on a straight line in joint space.
+fn check_joint_line<const N: usize>(
     config: &Config<N>,
     from_rad: &Vector<N>,
     to_rad: &Vector<N>,
     duration_s: f64,
 ) -> Result<(), Refusal> {
     let displacement = to_rad - from_rad;
-    along(config, duration_s, |time_s| {
-        let (x, rate, rate_rate) = smooth_step(time_s / duration_s);
+    check_joint_motion(config, duration_s, |time_s| {
+        let (share, first_derivative, second_derivative) = smooth_step(time_s / duration_s);
         JointReference {
-            position_rad: from_rad + displacement * x,
-            velocity_rad_per_s: displacement * (rate / duration_s),
-            acceleration_rad_per_s2: displacement * (rate_rate / (duration_s * duration_s)),
+            position_rad: from_rad + displacement * share,
+            velocity_rad_per_s: displacement * (first_derivative / duration_s),
+            acceleration_rad_per_s2: displacement * (second_derivative / (duration_s * duration_s)),
         }
     })
 }
 
-fn along_trajectory<const N: usize>(
+fn check_trajectory<const N: usize>(
     config: &Config<N>,
     from_rad: &Vector<N>,
     trajectory: &Trajectory,
 ) -> Result<(), Refusal> {
-    let mut seed = *from_rad;
-    let length_s = trajectory.length_s();
-    for k in 0..=POINTS {
-        let time_s = length_s * f64::from(k) / f64::from(POINTS);
+    // The solution of each sample is the first guess of the next.
+    let mut q = *from_rad;
+    let duration_s = trajectory.length_s();
+    for k in 0..=INTERVALS {
+        let time_s = duration_s * f64::from(k) / f64::from(INTERVALS);
         let reference = trajectory.at(time_s);
         if let Some((border, value_m)) = config.workspace.violated_border(&reference.position) {
             return Err(Refusal::Workspace { border, value_m });
@@ -84,7 +88,7 @@ fn along_trajectory<const N: usize>(
             &config.arm,
             &config.roles,
             &config.limits,
-            &seed,
+            &q,
             &reference.position,
         );
         if found.distance_m > REACHED_M {
@@ -93,38 +97,40 @@ fn along_trajectory<const N: usize>(
                 distance_m: found.distance_m,
             });
         }
-        seed = found.position_rad;
-        let mut state = Terms::default();
-        terms(&config.arm, &seed, &Vector::zeros(), &mut state);
-        let Some(task) = Task::new(&state, &config.roles) else {
+        q = found.position_rad;
+        let mut dynamics = Terms::default();
+        terms(&config.arm, &q, &Vector::zeros(), &mut dynamics);
+        let Some(task) = Task::new(&dynamics, &config.roles) else {
+            // The mass matrix is not positive definite: only reach and borders are checked.
             continue;
         };
-        let velocity = task.inverse * reference.velocity;
-        terms(&config.arm, &seed, &velocity, &mut state);
-        let bias = state.jacobian_dot_qd.fixed_rows::<3>(0);
-        let acceleration = task.inverse * (reference.acceleration - bias);
-        joints(config, &state, &velocity, &acceleration)?;
+        let qd = task.inverse * reference.velocity;
+        terms(&config.arm, &q, &qd, &mut dynamics);
+        let bias_acceleration = dynamics.jacobian_dot_qd.fixed_rows::<3>(0);
+        let qdd = task.inverse * (reference.acceleration - bias_acceleration);
+        check_joints(config, &dynamics, &qd, &qdd)?;
     }
     Ok(())
 }
 
-fn along<const N: usize>(
+fn check_joint_motion<const N: usize>(
     config: &Config<N>,
-    length_s: f64,
-    at: impl Fn(f64) -> JointReference<N>,
+    duration_s: f64,
+    reference_at: impl Fn(f64) -> JointReference<N>,
 ) -> Result<(), Refusal> {
-    let mut state = Terms::default();
-    for k in 0..=POINTS {
-        let reference = at(length_s * f64::from(k) / f64::from(POINTS));
+    let mut dynamics = Terms::default();
+    for k in 0..=INTERVALS {
+        let reference = reference_at(duration_s * f64::from(k) / f64::from(INTERVALS));
         let (q, qd) = (reference.position_rad, reference.velocity_rad_per_s);
-        terms(&config.arm, &q, &qd, &mut state);
-        let tip = state.base_from_tip.translation;
+        terms(&config.arm, &q, &qd, &mut dynamics);
+        let tip = dynamics.base_from_tip.translation;
+        // The first sample is the current pose, which a request cannot change.
         if k > 0
             && let Some((border, value_m)) = config.workspace.violated_border(&tip)
         {
             return Err(Refusal::Workspace { border, value_m });
         }
-        let tip_velocity = state.jacobian.fixed_rows::<3>(0) * qd;
+        let tip_velocity = dynamics.jacobian.fixed_rows::<3>(0) * qd;
         let (value, limit) = (tip_velocity.norm(), config.limits.tip_speed_m_per_s);
         if value > limit {
             return Err(Refusal::Value {
@@ -133,22 +139,22 @@ fn along<const N: usize>(
                 limit,
             });
         }
-        joints(config, &state, &qd, &reference.acceleration_rad_per_s2)?;
+        check_joints(config, &dynamics, &qd, &reference.acceleration_rad_per_s2)?;
     }
     Ok(())
 }
 
 /// Checks joint speeds and torques at one point of the motion.
-fn joints<const N: usize>(
+fn check_joints<const N: usize>(
     config: &Config<N>,
-    state: &Terms<N>,
-    velocity: &Vector<N>,
-    acceleration: &Vector<N>,
+    dynamics: &Terms<N>,
+    qd: &Vector<N>,
+    qdd: &Vector<N>,
 ) -> Result<(), Refusal> {
-    let torque = state.coriolis_gravity + state.mass_matrix * acceleration;
+    let torque = dynamics.coriolis_gravity + dynamics.mass_matrix * qdd;
     for joint in 0..N {
         let limit_rad_per_s = config.limits.joint_speed_rad_per_s[joint];
-        let value_rad_per_s = abs(velocity[joint]);
+        let value_rad_per_s = abs(qd[joint]);
         if value_rad_per_s > limit_rad_per_s {
             return Err(Refusal::TooFast {
                 joint,
@@ -156,10 +162,11 @@ fn joints<const N: usize>(
                 limit_rad_per_s,
             });
         }
-        if config.roles[joint] != Role::Active && velocity[joint] == 0.0 {
+        // A held joint at rest is carried by its position loop.
+        if config.roles[joint] != Role::Active && qd[joint] == 0.0 {
             continue;
         }
-        let friction = config.friction[joint].torque_nm(velocity[joint]);
+        let friction = config.friction[joint].torque_nm(qd[joint]);
         let limit_nm = TORQUE_SHARE * config.limits.joint_torque_nm[joint];
         let value_nm = abs(torque[joint] + friction);
         if value_nm > limit_nm {

@@ -27,16 +27,17 @@ impl Arc {
         let w = self.angular_frequency_rad_per_s;
         let (sin, cos) = sin_cos(w * s);
         let azimuth = self.centre_rad + self.amplitude_rad * sin;
-        let rate = self.amplitude_rad * w * cos * time_scale;
-        let rate_rate = self.amplitude_rad
+        let angular_velocity = self.amplitude_rad * w * cos * time_scale;
+        let angular_acceleration = self.amplitude_rad
             * (w * cos * time_scale_rate - w * w * sin * time_scale * time_scale);
         let (sin, cos) = sin_cos(azimuth);
         let radial = Vector3::new(cos, sin, 0.0) * self.radius_m;
         let tangent = Vector3::new(-sin, cos, 0.0) * self.radius_m;
         Reference {
             position: radial + Vector3::new(0.0, 0.0, self.height_m),
-            velocity: tangent * rate,
-            acceleration: tangent * rate_rate - radial * (rate * rate),
+            velocity: tangent * angular_velocity,
+            acceleration: tangent * angular_acceleration
+                - radial * (angular_velocity * angular_velocity),
         }
     }
 

@@ -18,12 +18,12 @@ pub struct Line {
 
 impl Line {
     pub(super) fn at(&self, time_s: f64) -> Reference {
-        let (x, rate, rate_rate) = smooth_step(time_s / self.duration_s);
+        let (share, first_derivative, second_derivative) = smooth_step(time_s / self.duration_s);
         let displacement = self.to_m - self.from_m;
         Reference {
-            position: self.from_m + displacement * x,
-            velocity: displacement * (rate / self.duration_s),
-            acceleration: displacement * (rate_rate / (self.duration_s * self.duration_s)),
+            position: self.from_m + displacement * share,
+            velocity: displacement * (first_derivative / self.duration_s),
+            acceleration: displacement * (second_derivative / (self.duration_s * self.duration_s)),
         }
     }
 

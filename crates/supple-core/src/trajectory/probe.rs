@@ -110,8 +110,8 @@ impl Probe {
         let (r, phi, z) = match phase {
             ProbePhase::Down => (still, still, self.stroke(t)),
             ProbePhase::Up => {
-                let (z, rate, rate_rate) = self.stroke(t);
-                (still, still, (-self.stroke_m - z, -rate, -rate_rate))
+                let (z, velocity, acceleration) = self.stroke(t);
+                (still, still, (-self.stroke_m - z, -velocity, -acceleration))
             }
             ProbePhase::Out => (
                 step(t, self.step_s(self.radial_step_m), self.radial_step_m),
@@ -182,11 +182,11 @@ impl Probe {
 }
 
 fn step(t: f64, duration: f64, displacement: f64) -> (f64, f64, f64) {
-    let (x, rate, rate_rate) = smooth_step(t / duration);
+    let (share, first_derivative, second_derivative) = smooth_step(t / duration);
     (
-        displacement * x,
-        displacement * rate / duration,
-        displacement * rate_rate / (duration * duration),
+        displacement * share,
+        displacement * first_derivative / duration,
+        displacement * second_derivative / (duration * duration),
     )
 }
 

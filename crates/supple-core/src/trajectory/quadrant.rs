@@ -181,11 +181,12 @@ impl Quadrant {
             }
         }
         let (sin, cos) = sin_cos(u);
-        let rate = self.second_m * cos - self.first_m * sin;
-        let rate_rate = -(self.first_m * cos + self.second_m * sin);
-        let arc_length_rate2 = rate.dot(&rate);
-        let tangent = rate / sqrt(arc_length_rate2);
-        let curvature = (rate_rate - tangent * tangent.dot(&rate_rate)) / arc_length_rate2;
+        let first_derivative = self.second_m * cos - self.first_m * sin;
+        let second_derivative = -(self.first_m * cos + self.second_m * sin);
+        let arc_length_rate2 = first_derivative.dot(&first_derivative);
+        let tangent = first_derivative / sqrt(arc_length_rate2);
+        let curvature =
+            (second_derivative - tangent * tangent.dot(&second_derivative)) / arc_length_rate2;
         let position = self.centre_m + self.first_m * cos + self.second_m * sin;
         (position, tangent, curvature)
     }

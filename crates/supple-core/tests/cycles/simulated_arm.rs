@@ -41,7 +41,7 @@ impl<const N: usize> SimulatedArm<N> {
     /// Enters gravity hold.
     pub fn begin(&mut self) -> Output<N> {
         self.rig.cycle();
-        self.rig.ask(Request::GravityHold)
+        self.rig.request(Request::GravityHold)
     }
 
     pub fn step(&mut self, input: &Input<N>) -> Output<N> {
@@ -87,7 +87,7 @@ impl<const N: usize> SimulatedArm<N> {
             0 => Request::Idle,
             1 => Request::GravityHold,
             2 => Request::Reset,
-            3 => self.rig.stay(),
+            3 => self.rig.hold_tip_request(),
             4 => Request::Track(probe_at(&tip)),
             5 => Request::Track(Trajectory::Line(Line {
                 from_m: tip,

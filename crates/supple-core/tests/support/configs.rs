@@ -135,17 +135,17 @@ pub fn motor_groups<const N: usize>() -> [usize; N] {
     std::array::from_fn(|i| if N == 3 { i } else { differential_and_wrist[i] })
 }
 
-/// The rate-limited torque after `last_nm` towards `wanted_nm`: joints that share motors are scaled
-/// together, to the slowest of them.
+/// The rate-limited torque after `last_nm` towards `target_nm`: the steps of joints that share motors are
+/// scaled together, so that none exceeds its limit.
 pub fn rate_limited<const N: usize>(
     config: &Config<N>,
     last_nm: &Vector<N>,
-    wanted_nm: &Vector<N>,
+    target_nm: &Vector<N>,
 ) -> Vector<N> {
-    reached(
+    limited_step(
         &(config.limits.torque_rate_nm_per_s * config.period_s),
         last_nm,
-        wanted_nm,
+        target_nm,
     )
 }
 
@@ -153,25 +153,26 @@ pub fn rate_limited<const N: usize>(
 pub fn stop_limited<const N: usize>(
     config: &Config<N>,
     last_nm: &Vector<N>,
-    wanted_nm: &Vector<N>,
+    target_nm: &Vector<N>,
 ) -> Vector<N> {
     let fast = config.limits.joint_torque_nm / 5e-3;
     let rate = fast.sup(&config.limits.torque_rate_nm_per_s);
-    reached(&(rate * config.period_s), last_nm, wanted_nm)
+    limited_step(&(rate * config.period_s), last_nm, target_nm)
 }
 
-fn reached<const N: usize>(
+/// The torque after one step of at most `max_nm` in each joint.
+fn limited_step<const N: usize>(
     max_nm: &Vector<N>,
     last_nm: &Vector<N>,
-    wanted_nm: &Vector<N>,
+    target_nm: &Vector<N>,
 ) -> Vector<N> {
-    let way = wanted_nm - last_nm;
+    let step = target_nm - last_nm;
     let groups = motor_groups::<N>();
     Vector::from_fn(|i, _| {
         let share = (0..N)
             .filter(|j| groups[*j] == groups[i])
-            .fold(1.0, |share: f64, j| share.min(max_nm[j] / way[j].abs()));
-        last_nm[i] + way[i] * share
+            .fold(1.0, |share: f64, j| share.min(max_nm[j] / step[j].abs()));
+        last_nm[i] + step[i] * share
     })
 }
 

@@ -78,17 +78,18 @@ impl<const N: usize> Rig<N> {
         self.cycles(500)
     }
 
-    pub fn ask(&mut self, request: Request<N>) -> Output<N> {
+    /// Runs one cycle with a request, which may be refused.
+    pub fn request(&mut self, request: Request<N>) -> Output<N> {
         self.step(&Input {
             request: Some(request),
             ..self.input()
         })
     }
 
-    /// Sends a request that must be accepted.
+    /// Runs one cycle with a request that must be accepted.
     #[track_caller]
     pub fn accept(&mut self, request: Request<N>) -> Output<N> {
-        let output = self.ask(request);
+        let output = self.request(request);
         assert_eq!(output.refusal, None, "{request:?}");
         assert_eq!(output.fault, None, "{request:?}");
         output
@@ -99,16 +100,16 @@ impl<const N: usize> Rig<N> {
         supple_core::dynamics::tip_pose(&self.controller.config().arm, &self.q).translation
     }
 
-    /// Joint impedance at the present pose.
-    pub fn comply(&self) -> Request<N> {
+    /// Joint impedance about the current pose.
+    pub fn joint_impedance_request(&self) -> Request<N> {
         Request::JointImpedance {
             target_rad: self.q,
             duration_s: 0.1,
         }
     }
 
-    /// A reference that stays at the tip.
-    pub fn stay(&self) -> Request<N> {
+    /// Tracking of a reference that stays at the current tip position.
+    pub fn hold_tip_request(&self) -> Request<N> {
         Request::Track(Trajectory::Hold(self.tip()))
     }
 
@@ -130,7 +131,7 @@ impl<const N: usize> Rig<N> {
                 });
             }
             Mode::Track => {
-                self.accept(self.stay());
+                self.accept(self.hold_tip_request());
             }
             Mode::Probe => {
                 self.accept(Request::Track(probe_at(&self.tip())));
@@ -145,7 +146,7 @@ impl<const N: usize> Rig<N> {
                 self.accept(Request::Float);
             }
             Mode::JointImpedance => {
-                self.accept(self.comply());
+                self.accept(self.joint_impedance_request());
             }
             Mode::Fault => {
                 let output = self.step(&Input {

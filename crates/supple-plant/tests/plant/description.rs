@@ -32,8 +32,8 @@ fn the_built_in_arms_stay_at_home_under_their_gravity_torque() {
 fn the_wam_has_the_actuators_and_friction_of_its_description() {
     let description = Description::asset("wam4").unwrap();
     let config = PlantConfig::<4>::from_description(&description).unwrap();
-    for (truth, told) in config.friction.iter().zip(description.friction()) {
-        assert_eq!(truth.coulomb_nm, told.coulomb_nm);
+    for (truth, described) in config.friction.iter().zip(description.friction()) {
+        assert_eq!(truth.coulomb_nm, described.coulomb_nm);
         assert!(truth.breakaway_nm > truth.coulomb_nm);
     }
     let tool = description.tool().unwrap();

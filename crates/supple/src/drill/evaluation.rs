@@ -401,8 +401,8 @@ mod tests {
             metrics.end_mode = "gravity_hold";
             metrics
         };
-        let lowered = super::super::spec::DriveShutdown::Idle;
-        let spec = spec(Event::Drives(lowered), Expected::ReturnsToGravityHold);
+        let idle = super::super::spec::DriveShutdown::Idle;
+        let spec = spec(Event::Drives(idle), Expected::ReturnsToGravityHold);
         assert!(evaluate(&spec, &back(0.05), &[]).1.is_empty());
         assert_eq!(evaluate(&spec, &back(1.5), &[]).1.len(), 1);
     }

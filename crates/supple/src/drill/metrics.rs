@@ -180,8 +180,8 @@ impl RowMetrics {
         });
         if let Some(back) = back {
             metrics.back_tip_m_per_s = Some(max(from(back.time_ns).map(|l| l.tip_speed_m_per_s)));
-            let way = from(back.time_ns).map(|line| distance(&line.tip_m, &back.tip_m));
-            metrics.back_moved_m = Some(max(way));
+            let distances_m = from(back.time_ns).map(|line| distance(&line.tip_m, &back.tip_m));
+            metrics.back_moved_m = Some(max(distances_m));
         }
         metrics
     }

@@ -108,7 +108,7 @@ fn repeat(rig: &mut Rig<4>) -> Output<4> {
 fn a_repeated_state_is_tolerated_for_some_cycles() {
     let limit = four().limits.stale_cycles;
     let mut rig = Rig::holding(four(), bent());
-    rig.accept(rig.stay());
+    rig.accept(rig.hold_tip_request());
     let last = rig.cycles(100);
     for _ in 0..limit {
         let output = repeat(&mut rig);
@@ -177,7 +177,10 @@ fn a_lower_cycle_number_faults_and_becomes_the_new_reference() {
         output.fault,
         Some(Fault::StateOutOfOrder { last, received })
     );
-    assert_eq!(rig.ask(supple_core::controller::Request::Reset).fault, None);
+    assert_eq!(
+        rig.request(supple_core::controller::Request::Reset).fault,
+        None
+    );
     assert_eq!(rig.rest().fault, None);
 }
 

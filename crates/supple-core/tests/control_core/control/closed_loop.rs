@@ -86,7 +86,7 @@ fn a_constant_force_is_observed_and_displaces_the_tip() {
     let q = start(&config, Vector::<3>::new(0.0, 0.4, 1.4));
     let mut plant = Plant::at_rest(config.arm, q);
     let mut rig = Rig::holding(config, q);
-    rig.drive(&mut plant, Some(rig.stay()), nothing);
+    rig.drive(&mut plant, Some(rig.hold_tip_request()), nothing);
     let force = Vector3::new(1.0, -2.0, 1.5);
     let mut output = rig.run(&mut plant);
     for _ in 0..6000 {

@@ -142,7 +142,11 @@ fn float_does_not_resist_a_push() {
 #[test]
 fn joint_impedance_yields_as_a_spring() {
     let config = free(four());
-    let (mut rig, mut plant) = in_mode(config, bent(), Rig::holding(config, bent()).comply());
+    let (mut rig, mut plant) = in_mode(
+        config,
+        bent(),
+        Rig::holding(config, bent()).joint_impedance_request(),
+    );
     let load = Vector3::new(2.0, 1.0, -3.0);
     // Long enough for the softest joint to come to rest.
     let hand = move |arm: &Arm<4>, q: &Vector<4>, qd: &Vector<4>| push(arm, q, &load) - qd * 5.0;
@@ -192,7 +196,7 @@ fn the_spring_has_a_bound() {
     config.joint_gains.stiffness_nm_per_rad.fill(100.0);
     config.move_gains.stiffness_nm_per_rad.fill(100.0);
     let mut rig = Rig::holding(config, bent());
-    rig.accept(rig.comply());
+    rig.accept(rig.joint_impedance_request());
     rig.rest();
     for _ in 0..900 {
         rig.q[1] += 1e-3;
@@ -207,9 +211,9 @@ fn the_spring_has_a_bound() {
 fn gains_are_limited_and_ramped() {
     let config = four();
     let mut rig = Rig::holding(config, bent());
-    rig.accept(rig.comply());
+    rig.accept(rig.joint_impedance_request());
     let stiffest = config.move_gains.stiffness_nm_per_rad;
-    let ask = |stiffness: Vector<4>, damping: f64| Request::JointGains {
+    let gains_request = |stiffness: Vector<4>, damping: f64| Request::JointGains {
         gains: JointGains {
             stiffness_nm_per_rad: stiffness,
             damping_nm_s_per_rad: Vector::repeat(damping),
@@ -217,19 +221,19 @@ fn gains_are_limited_and_ramped() {
         ramp_s: 0.1,
     };
     for (request, name) in [
-        (ask(stiffest * 1.01, 1.0), "stiffness"),
-        (ask(-stiffest * 0.01, 1.0), "stiffness"),
-        (ask(stiffest * f64::NAN, 1.0), "stiffness"),
-        (ask(stiffest * 0.01, -1.0), "damping"),
-        (ask(stiffest * 0.01, 1e4), "at the delay"),
+        (gains_request(stiffest * 1.01, 1.0), "stiffness"),
+        (gains_request(-stiffest * 0.01, 1.0), "stiffness"),
+        (gains_request(stiffest * f64::NAN, 1.0), "stiffness"),
+        (gains_request(stiffest * 0.01, -1.0), "damping"),
+        (gains_request(stiffest * 0.01, 1e4), "at the delay"),
     ] {
-        match rig.ask(request).refusal {
+        match rig.request(request).refusal {
             Some(Refusal::Value { entry, .. }) => assert!(entry.contains(name), "{entry}"),
             other => panic!("{other:?}"),
         }
     }
     let before = rig.cycle().joint_gains;
-    rig.accept(ask(stiffest * 0.05, 0.6));
+    rig.accept(gains_request(stiffest * 0.05, 0.6));
     let half = rig.cycles(50).joint_gains;
     let end = rig.cycles(60).joint_gains;
     assert_eq!(end.stiffness_nm_per_rad, stiffest * 0.05);

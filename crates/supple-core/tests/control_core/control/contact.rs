@@ -287,7 +287,7 @@ fn friction_uncertainty_raises_the_threshold() {
 fn a_reference_at_rest_never_latches() {
     let config = config(|_| {});
     let mut bench = Bench::new(config);
-    let hold = bench.rig.stay();
+    let hold = bench.rig.hold_tip_request();
     bench.cycle(Some(hold), up(0.0));
     for output in bench.cycles(1000, up(12.0)) {
         assert!(!output.in_contact);

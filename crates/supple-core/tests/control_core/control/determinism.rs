@@ -29,7 +29,7 @@ fn script<const N: usize>(config: Config<N>) -> Vec<Input<N>> {
                 ramp_s: 0.1,
             }),
             1000 => Some(Request::Reset),
-            1001 => Some(rig.stay()),
+            1001 => Some(rig.hold_tip_request()),
             _ => None,
         };
         if k % 97 == 3 {

@@ -76,7 +76,7 @@ fn a_frictionless_arm_follows_the_series_and_holds_its_end() {
 fn a_series_beyond_limits_is_refused() {
     let mut rig = Rig::holding(four(), bent());
     let refused = |rig: &mut Rig<4>, series: Fourier<4>| {
-        let output = rig.ask(Request::Excite(series));
+        let output = rig.request(Request::Excite(series));
         assert_eq!(output.mode, Mode::GravityHold);
         output.refusal.expect("a refusal")
     };
@@ -173,7 +173,7 @@ fn an_invalid_ramp_is_refused() {
     ];
     for ramp in wrong {
         let mut rig = Rig::holding(four(), bent());
-        let output = rig.ask(Request::Breakaway(ramp));
+        let output = rig.request(Request::Breakaway(ramp));
         assert!(
             matches!(output.refusal, Some(Refusal::Value { .. })),
             "{ramp:?}"
@@ -201,6 +201,6 @@ fn ripple_feedforward_cancels_the_motors_ripple() {
     assert_close(&output.torques.ripple, &-joint, 1e-9);
     // With their ripple the motors then give the commanded gravity torque.
     assert_close(&(output.torque_nm + joint), &output.torques.gravity, 1e-9);
-    rig.ask(Request::Idle);
+    rig.request(Request::Idle);
     assert_eq!(rig.rest().torque_nm.norm(), 0.0);
 }

@@ -51,7 +51,7 @@ pub fn latched(mut rig: Rig<4>, first: &Output<4>, action: SafeAction) {
         SafeAction::GravityHold => Mode::GravityHold,
         SafeAction::Idle => Mode::Idle,
     };
-    let output = rig.ask(Request::Reset);
+    let output = rig.request(Request::Reset);
     assert_eq!((output.mode, output.fault), (expected, None));
     assert_eq!(output.refusal, None);
     assert_eq!(rig.rest().mode, expected);
@@ -103,7 +103,7 @@ fn an_infinite_term_is_a_fault_and_not_a_clamp() {
     rig.accept(Request::Track(Trajectory::Hold(far)));
     let before = rig.rest();
     assert!(before.fault.is_none());
-    let output = rig.ask(Request::Gains {
+    let output = rig.request(Request::Gains {
         gains: Gains::isotropic(f64::MAX, 0.0),
         ramp_s: 0.0,
     });
@@ -169,7 +169,7 @@ fn a_mass_matrix_that_is_not_positive_definite_faults() {
     let output = rig.cycle();
     assert_eq!(output.fault, Some(Fault::MassMatrix));
     assert_eq!(output.torque_nm, Vector::<3>::zeros());
-    let output = rig.ask(Request::Reset);
+    let output = rig.request(Request::Reset);
     assert_eq!(output.fault, Some(Fault::MassMatrix));
     assert!(output.refusal.is_some());
 }
@@ -187,7 +187,7 @@ fn a_worse_fault_removes_torque_but_keeps_the_first_cause() {
     assert_eq!(output.fault, first);
     assert_eq!(output.fallback_torque_nm, Vector::<4>::zeros());
     assert_eq!(rig.rest().torque_nm, Vector::<4>::zeros());
-    assert_eq!(rig.ask(Request::Reset).mode, Mode::Idle);
+    assert_eq!(rig.request(Request::Reset).mode, Mode::Idle);
 }
 
 /// If the angle is not trusted, the torque falls to zero in 5 ms, and the fallback is zero at once.
@@ -243,7 +243,7 @@ fn a_reset_in_the_cycle_of_the_fault_is_refused() {
     }
     // The rejected states count as missing until the first valid one.
     assert_eq!(rig.cycle().mode, Mode::Fault);
-    assert_eq!(rig.ask(Request::Reset).mode, Mode::Idle);
+    assert_eq!(rig.request(Request::Reset).mode, Mode::Idle);
 }
 
 /// The safe action has no stiff loop, not even that of a held joint, and no soft stops.

@@ -6,7 +6,7 @@ use supple_core::config::Gains;
 use supple_core::controller::{Mode, Request};
 use supple_core::math::Vector3;
 
-fn ask(gains: Gains, ramp_s: f64) -> Request<4> {
+fn gains_request(gains: Gains, ramp_s: f64) -> Request<4> {
     Request::Gains { gains, ramp_s }
 }
 
@@ -21,7 +21,7 @@ fn gains_change_linearly_per_axis() {
             damping_n_s_per_m: Vector3::new(1.5, 0.0, 25.0),
         };
         assert_eq!(rig.cycle().gains, from);
-        let mut output = rig.ask(ask(to, 0.2));
+        let mut output = rig.request(gains_request(to, 0.2));
         for k in 1..=300 {
             let x = (f64::from(k) * 1e-3 / 0.2).min(1.0);
             let expected = from.stiffness_n_per_m * (1.0 - x) + to.stiffness_n_per_m * x;
@@ -39,17 +39,17 @@ fn gains_change_linearly_per_axis() {
 fn gains_change_at_once_without_a_ramp() {
     let mut rig = Rig::holding(four(), bent());
     let to = Gains::isotropic(7.0, 3.0);
-    assert_eq!(rig.accept(ask(to, 0.0)).gains, to);
+    assert_eq!(rig.accept(gains_request(to, 0.0)).gains, to);
 }
 
 #[test]
 fn a_new_ramp_starts_at_the_current_gains() {
     let mut rig = Rig::holding(four(), bent());
-    rig.accept(ask(Gains::isotropic(200.0, 20.0), 0.1));
+    rig.accept(gains_request(Gains::isotropic(200.0, 20.0), 0.1));
     let halfway = rig.cycles(50).gains;
     assert!((halfway.stiffness_n_per_m.x - 150.0).abs() < 2.1);
     let mut last = halfway.stiffness_n_per_m.x;
-    let mut output = rig.accept(ask(Gains::isotropic(100.0, 20.0), 0.1));
+    let mut output = rig.accept(gains_request(Gains::isotropic(100.0, 20.0), 0.1));
     for _ in 0..150 {
         let now = output.gains.stiffness_n_per_m.x;
         assert!((now - last).abs() <= 0.6, "a jump from {last} to {now}");
@@ -64,7 +64,7 @@ fn a_new_ramp_starts_at_the_current_gains() {
 #[test]
 fn a_ramp_runs_on_state_time() {
     let mut rig = Rig::holding(four(), bent());
-    rig.accept(ask(Gains::isotropic(200.0, 20.0), 0.1));
+    rig.accept(gains_request(Gains::isotropic(200.0, 20.0), 0.1));
     let before = rig.cycle().gains;
     let mut input = rig.input();
     input.cycle -= 1;
@@ -83,7 +83,7 @@ fn the_torque_follows_the_gains() {
     rig.bring_to(Mode::Track);
     rig.q[0] += 0.01;
     let soft = rig.rest().torques;
-    rig.ask(ask(Gains::isotropic(300.0, 20.0), 0.0));
+    rig.request(gains_request(Gains::isotropic(300.0, 20.0), 0.0));
     let stiff = rig.rest().torques;
     assert!((stiff.stiffness - soft.stiffness * 3.0).norm() < 1e-9);
     assert!(soft.stiffness.norm() > 0.01);

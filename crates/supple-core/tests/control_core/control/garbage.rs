@@ -66,7 +66,7 @@ fn trajectory() -> impl Strategy<Value = Trajectory> {
 enum RequestKind<const N: usize> {
     None,
     Any(Request<N>),
-    Stay,
+    HoldTip,
     Probe,
     MoveHere(f64),
 }
@@ -111,7 +111,7 @@ fn request_kind<const N: usize>() -> impl Strategy<Value = RequestKind<N>> {
         12 => Just(RequestKind::None),
         3 => any_of.prop_map(RequestKind::Any),
         2 => prop::sample::select(vec![Request::Reset, Request::GravityHold]).prop_map(RequestKind::Any),
-        1 => Just(RequestKind::Stay),
+        1 => Just(RequestKind::HoldTip),
         1 => Just(RequestKind::Probe),
         1 => (0.01..2.0).prop_map(RequestKind::MoveHere),
     ]
@@ -174,7 +174,7 @@ fn survive<const N: usize>(config: Config<N>) {
             input.request = match noise.requested {
                 RequestKind::None => None,
                 RequestKind::Any(request) => Some(request),
-                RequestKind::Stay => Some(rig.stay()),
+                RequestKind::HoldTip => Some(rig.hold_tip_request()),
                 RequestKind::Probe => Some(Request::Track(probe_at(&rig.tip()))),
                 RequestKind::MoveHere(duration_s) => Some(Request::Move {
                     target_rad: bent(),
@@ -268,8 +268,8 @@ fn a_reset_after_random_input_restores_gravity_hold() {
         }
         // After readings of up to 1e308 rad the estimator needs seconds to settle.
         rig.cycles(8000);
-        rig.ask(Request::Reset);
-        rig.ask(Request::GravityHold);
+        rig.request(Request::Reset);
+        rig.request(Request::GravityHold);
         let output = rig.cycles(1000);
         prop_assert_eq!((output.mode, output.fault), (Mode::GravityHold, None));
         let weight = supple_core::dynamics::gravity(&config.arm, &rig.q);

@@ -135,18 +135,18 @@ fn gravity_torque_rises_at_the_rate_limit() {
     let mut rig = Rig::new(four(), bent());
     let mut last = rig.cycle().torque_nm;
     let mut output = rig.accept(Request::GravityHold);
-    let wanted = output.torques.gravity;
-    let cycles = (wanted.amax() / 1000.0 / 1e-3).ceil() as usize;
+    let target = output.torques.gravity;
+    let cycles = (target.amax() / 1000.0 / 1e-3).ceil() as usize;
     assert!(cycles > 5);
     for _ in 0..cycles {
         assert_eq!(output.torques.handover, Vector::<4>::zeros());
-        let expected = rate_limited(&four(), &last, &wanted);
+        let expected = rate_limited(&four(), &last, &target);
         assert_close(&output.torque_nm, &expected, 1e-9);
-        assert_eq!(output.rate_limited, size(&(expected - wanted)) > 1e-9);
+        assert_eq!(output.rate_limited, size(&(expected - target)) > 1e-9);
         last = output.torque_nm;
         output = rig.cycle();
     }
-    assert_close(&output.torque_nm, &wanted, 1e-12);
+    assert_close(&output.torque_nm, &target, 1e-12);
 }
 
 /// On a change to idle the torque falls at the rate limit.
@@ -154,7 +154,7 @@ fn gravity_torque_rises_at_the_rate_limit() {
 fn torque_falls_to_idle_at_the_rate_limit() {
     let mut rig = Rig::holding(four(), bent());
     let before = rig.cycle().torque_nm;
-    let output = rig.ask(Request::Idle);
+    let output = rig.request(Request::Idle);
     assert_eq!(output.fallback_torque_nm, Vector::<4>::zeros());
     let expected = rate_limited(&four(), &before, &Vector::zeros());
     assert_close(&output.torque_nm, &expected, 1e-9);
@@ -168,12 +168,12 @@ fn the_fallback_is_gravity_within_the_limits() {
     config.limits.joint_torque_nm[1] = 9.0;
     let mut rig = Rig::holding(config, bent());
     let output = rig.cycle();
-    let (allowed, cut) = limit_torque(
+    let (allowed, limited) = limit_torque(
         &config.limits,
         rig.controller.motors(),
         &gravity(&config.arm, &rig.q),
     );
-    assert!(cut, "the limit is below the weight");
+    assert!(limited, "the limit is below the weight");
     assert_close(&output.fallback_torque_nm, &allowed, 1e-12);
 }
 
@@ -253,8 +253,8 @@ fn held_set_point_approaches_slowly_from_the_current_angle() {
             }
             let mut output = rig.accept(Request::GravityHold);
             for k in 0..4000 {
-                let way = 0.25e-3 * f64::from(k + u32::from(entering_at > 0));
-                let expected = start.signum() * (start.abs() - way).max(0.0);
+                let travel = 0.25e-3 * f64::from(k + u32::from(entering_at > 0));
+                let expected = start.signum() * (start.abs() - travel).max(0.0);
                 let found = set_point(&output);
                 assert!(
                     (found - expected).abs() < 1e-9,
@@ -270,7 +270,7 @@ fn held_set_point_approaches_slowly_from_the_current_angle() {
 #[test]
 fn a_joint_moved_in_idle_is_held_from_its_new_angle() {
     let mut rig = Rig::holding(four(), bent());
-    rig.ask(Request::Idle);
+    rig.request(Request::Idle);
     rig.rest();
     for _ in 0..500 {
         rig.q[2] += 1e-3;

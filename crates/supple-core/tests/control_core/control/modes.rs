@@ -61,12 +61,12 @@ fn request<const N: usize>(rig: &Rig<N>, requested: RequestKind) -> Request<N> {
             target_rad: rig.q,
             duration_s: 1.0,
         },
-        RequestKind::Track => rig.stay(),
+        RequestKind::Track => rig.hold_tip_request(),
         RequestKind::Probe => Request::Track(probe_at(&rig.tip())),
         RequestKind::Excite => Request::Excite(Fourier::at_rest(rig.q, 1.0)),
         RequestKind::Breakaway => Request::Breakaway(ramp()),
         RequestKind::Float => Request::Float,
-        RequestKind::JointImpedance => rig.comply(),
+        RequestKind::JointImpedance => rig.joint_impedance_request(),
         RequestKind::JointGains => Request::JointGains {
             gains: JointGains {
                 stiffness_nm_per_rad: Vector::repeat(7.0),
@@ -111,7 +111,7 @@ fn every_mode_asked_for_everything<const N: usize>(config: Config<N>) {
         for requested in REQUEST_KINDS {
             let mut rig = there.clone();
             let before = rig.state.fault();
-            let output = rig.ask(request(&rig, requested));
+            let output = rig.request(request(&rig, requested));
             match table(mode, requested) {
                 Some(expected) => {
                     assert_eq!(output.refusal, None, "{requested:?} in {mode:?}");
@@ -177,7 +177,7 @@ fn any_mode_faults_and_idle_stays_without_torque() {
                 "the arm is held after {mode:?}"
             );
         }
-        let reset = rig.ask(Request::Reset);
+        let reset = rig.request(Request::Reset);
         assert_eq!((reset.refusal, reset.fault), (None, None));
         let expected = if mode == Mode::Idle {
             Mode::Idle
@@ -193,12 +193,12 @@ fn idle_can_be_requested_in_a_fault() {
     let mut rig = Rig::new(four(), bent());
     rig.bring_to(Mode::Fault);
     let fault = rig.state.fault();
-    rig.ask(Request::Idle);
+    rig.request(Request::Idle);
     let output = rig.rest();
     assert_eq!((output.mode, output.fault), (Mode::Fault, fault));
     assert_eq!(output.torque_nm.norm(), 0.0);
     assert_eq!(output.fallback_torque_nm.norm(), 0.0);
-    assert_eq!(rig.ask(Request::Reset).mode, Mode::Idle);
+    assert_eq!(rig.request(Request::Reset).mode, Mode::Idle);
 }
 
 #[test]
@@ -206,21 +206,21 @@ fn a_probing_cycle_is_probe_and_any_other_trajectory_is_track() {
     let mut rig = Rig::holding(four(), bent());
     let output = rig.accept(Request::Track(probe_at(&rig.tip())));
     assert_eq!(output.mode, Mode::Probe);
-    let output = rig.accept(rig.stay());
+    let output = rig.accept(rig.hold_tip_request());
     assert_eq!(output.mode, Mode::Track);
 }
 
 #[test]
 fn time_in_a_mode_is_counted_from_its_entry() {
     let mut rig = Rig::holding(four(), bent());
-    let mut output = rig.accept(rig.stay());
+    let mut output = rig.accept(rig.hold_tip_request());
     for k in 0..100 {
         let expected = f64::from(k) * 1e-3;
         assert!((output.mode_time_s - expected).abs() < 1e-12);
         output = rig.cycle();
     }
     // The same request restarts the trajectory.
-    assert_eq!(rig.accept(rig.stay()).mode_time_s, 0.0);
+    assert_eq!(rig.accept(rig.hold_tip_request()).mode_time_s, 0.0);
 }
 
 #[test]

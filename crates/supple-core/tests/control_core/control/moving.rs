@@ -19,19 +19,24 @@ fn target<const N: usize>(config: &Config<N>) -> Vector<N> {
 }
 
 /// Minimum jerk in joint space, by its polynomial: angles, speeds, accelerations at `time_s`.
-fn planned<const N: usize>(way: &Vector<N>, time_s: f64) -> [Vector<N>; 3] {
+fn planned<const N: usize>(displacement: &Vector<N>, time_s: f64) -> [Vector<N>; 3] {
     let x = (time_s / DURATION_S).min(1.0);
-    let value = 10.0 * x.powi(3) - 15.0 * x.powi(4) + 6.0 * x.powi(5);
-    let rate = (30.0 * x.powi(2) - 60.0 * x.powi(3) + 30.0 * x.powi(4)) / DURATION_S;
-    let rate_rate = (60.0 * x - 180.0 * x.powi(2) + 120.0 * x.powi(3)) / DURATION_S.powi(2);
-    [bent::<N>() + way * value, way * rate, way * rate_rate]
+    let share = 10.0 * x.powi(3) - 15.0 * x.powi(4) + 6.0 * x.powi(5);
+    let rate_per_s = (30.0 * x.powi(2) - 60.0 * x.powi(3) + 30.0 * x.powi(4)) / DURATION_S;
+    let acceleration_per_s2 =
+        (60.0 * x - 180.0 * x.powi(2) + 120.0 * x.powi(3)) / DURATION_S.powi(2);
+    [
+        bent::<N>() + displacement * share,
+        displacement * rate_per_s,
+        displacement * acceleration_per_s2,
+    ]
 }
 
 /// Checks for model feed-forward along the reference and a stiff loop about it, without the loops
 /// of held joints.
 fn is_the_move<const N: usize>(config: &Config<N>, output: &Output<N>) {
-    let way = target(config) - bent::<N>();
-    let [position, velocity, acceleration] = planned(&way, output.mode_time_s);
+    let displacement = target(config) - bent::<N>();
+    let [position, velocity, acceleration] = planned(&displacement, output.mode_time_s);
     let (q, qd, torques) = (
         &output.position_rad,
         &output.velocity_rad_per_s,
@@ -70,12 +75,12 @@ fn moves<const N: usize>(mut config: Config<N>) {
         target_rad: target(&config),
         duration_s: DURATION_S,
     });
-    let way = target(&config) - bent::<N>();
+    let displacement = target(&config) - bent::<N>();
     for k in 0..1000_u32 {
         assert_eq!((output.mode, output.fault), (Mode::Move, None));
         is_the_move(&config, &output);
         // The arm follows with a small lag and noise, held joints too.
-        let [position, ..] = planned(&way, 1e-3 * f64::from(k.saturating_sub(4)));
+        let [position, ..] = planned(&displacement, 1e-3 * f64::from(k.saturating_sub(4)));
         rig.q = position.add_scalar(2e-3 * (0.02 * f64::from(k)).sin());
         output = rig.cycle();
     }

@@ -66,7 +66,7 @@ fn idle_resets_the_observer() {
     }
     assert!(size(&output.external_torque_nm) > 0.5, "a push is seen");
     rig.q = plant.q;
-    output = rig.ask(Request::Idle);
+    output = rig.request(Request::Idle);
     for _ in 0..50 {
         assert_eq!(output.external_torque_nm, Vector::<3>::zeros());
         assert_eq!(output.external_force_n, Vector3::zeros());

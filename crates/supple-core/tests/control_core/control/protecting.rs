@@ -50,7 +50,7 @@ fn reenabled_drives_get_the_gravity_torque_only() {
             let torques = &output.torques;
             assert_eq!(torques.total(), torques.gravity);
         }
-        let refused = rig.ask(rig.stay()).refusal;
+        let refused = rig.request(rig.hold_tip_request()).refusal;
         assert_eq!(refused, Some(Refusal::DrivesIdle));
         let before = rig.rest().torque_nm;
         rig.drives_active = true;
@@ -210,13 +210,13 @@ fn sinusoid(amplitude_m: Vector3<f64>, angular_frequency_rad_per_s: f64) -> Traj
 fn a_trajectory_is_checked_before_it_starts() {
     let along = Vector3::new(0.05, 0.05, 0.0);
     let mut rig = Rig::holding(guarded(), bent());
-    let refusal = rig.ask(Request::Track(sinusoid(along, 1000.0))).refusal;
+    let refusal = rig.request(Request::Track(sinusoid(along, 1000.0))).refusal;
     assert!(
         matches!(refusal, Some(Refusal::Value { .. })),
         "{refusal:?}"
     );
     let refusal = rig
-        .ask(Request::Track(sinusoid(along * 0.01, 250.0)))
+        .request(Request::Track(sinusoid(along * 0.01, 250.0)))
         .refusal;
     assert!(
         matches!(refusal, Some(Refusal::Value { .. })),
@@ -253,7 +253,7 @@ fn a_trajectory_is_checked_before_it_starts() {
 fn a_move_beyond_acceleration_or_jerk_limits_is_refused() {
     let mut rig = Rig::holding(guarded(), bent());
     let target_rad = bent::<4>() + Vector::<4>::new(0.02, 0.0, 0.0, 0.0);
-    let refusal = rig.ask(Request::Move {
+    let refusal = rig.request(Request::Move {
         target_rad,
         duration_s: 0.03,
     });
@@ -266,16 +266,17 @@ fn damping_beyond_the_delay_margin_is_refused() {
     let mut config = three();
     config.estimator_rad_per_s = 40.0;
     let mut rig = Rig::holding(config, bent());
-    let ask = |damping: f64| Request::Gains {
+    let damping_request = |damping: f64| Request::Gains {
         gains: Gains::isotropic(5.0, damping),
         ramp_s: 0.0,
     };
-    assert_eq!(rig.ask(ask(1.5)).refusal, None);
-    let Some(Refusal::Value { value, limit, .. }) = rig.ask(ask(90.0)).refusal else {
+    assert_eq!(rig.request(damping_request(1.5)).refusal, None);
+    let Some(Refusal::Value { value, limit, .. }) = rig.request(damping_request(90.0)).refusal
+    else {
         panic!("90 N s/m with 54 ms of delay");
     };
     assert!(value == 90.0 && limit > 1.5 && limit < 60.0, "{limit}");
-    assert_eq!(rig.ask(ask(0.99 * limit)).refusal, None);
+    assert_eq!(rig.request(damping_request(0.99 * limit)).refusal, None);
 }
 
 /// A stuck encoder of a moving joint, and one whose reference moves.

@@ -15,7 +15,7 @@ fn refused(request: Request<4>) -> Refusal {
     let mut rig = Rig::new(four(), bent());
     rig.bring_to(Mode::Track);
     let mut other = rig.clone();
-    let (asked, silent) = (rig.ask(request), other.cycle());
+    let (asked, silent) = (rig.request(request), other.cycle());
     let refusal = asked.refusal.expect("a refusal");
     assert_eq!(
         supple_core::Output {

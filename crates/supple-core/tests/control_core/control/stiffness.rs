@@ -27,9 +27,9 @@ fn stiffness<const N: usize>(rig: &Rig<N>) -> Matrix<N, N> {
     };
     let mut slope = Matrix::<N, N>::zeros();
     for i in 0..N {
-        let mut way = Vector::zeros();
-        way[i] = STEP_RAD;
-        let difference = settled(rig.q + way) - settled(rig.q - way);
+        let mut step = Vector::zeros();
+        step[i] = STEP_RAD;
+        let difference = settled(rig.q + step) - settled(rig.q - step);
         slope.set_column(i, &(-difference / (2.0 * STEP_RAD)));
     }
     (slope + slope.transpose()) * 0.5
@@ -171,7 +171,7 @@ fn apparent_stiffness(config: Config<3>, sensor: bool) -> Matrix3<f64> {
     let settle = |push_n: Vector3<f64>| -> Vector3<f64> {
         let mut rig = Rig::holding(config, bent());
         rig.force_n = sensor.then_some(Vector3::zeros());
-        rig.accept(rig.stay());
+        rig.accept(rig.hold_tip_request());
         let mut plant = Plant::at_rest(config.arm, bent());
         for k in 0..6000 {
             let grown = push_n * (f64::from(k) / 1000.0).min(1.0);
@@ -185,8 +185,8 @@ fn apparent_stiffness(config: Config<3>, sensor: bool) -> Matrix3<f64> {
     for axis in 0..3 {
         let mut force = Vector3::zeros();
         force[axis] = 0.5;
-        let way = settle(force) - settle(-force);
-        compliance.set_column(axis, &way);
+        let displacement = settle(force) - settle(-force);
+        compliance.set_column(axis, &displacement);
     }
     crate::support::inverse(&compliance)
 }
@@ -229,5 +229,5 @@ fn a_fault_in_a_move_removes_the_stiff_loops() {
             assert!(before[(i, i)] > 500.0 && after[(i, i)].abs() < 1e-3);
         }
     }
-    assert_eq!(rig.ask(Request::Reset).mode, Mode::GravityHold);
+    assert_eq!(rig.request(Request::Reset).mode, Mode::GravityHold);
 }
