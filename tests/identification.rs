@@ -3,11 +3,12 @@
 
 use nalgebra::DMatrix;
 use supple_core::Vector;
+use supple_core::controller::Request;
 use supple_core::dynamics::gravity;
 use supple_experiment::calibrate::{plant_of, preparation};
 use supple_experiment::{
-    Calibrated, Calibration, IdentifiedModelTracking, Plan, breakaway, calibrate, identify_ripple,
-    predict_tracking_error, run, scenario, track_with_identified_model,
+    Calibrated, Calibration, IdentifiedModelTracking, Plan, RequestSequence, Step, breakaway,
+    calibrate, identify_ripple, predict_tracking_error, run, scenario, track_with_identified_model,
 };
 use supple_ident::{Learning, Log, Motion, learn};
 use supple_model::Description;
@@ -207,6 +208,60 @@ fn predicted_tracking_error_bounds_the_measured_one() {
         measured <= 2.0 * predicted.worst_m,
         "{measured} m against {predicted:?}"
     );
+}
+
+/// Fast moves through the workspace, each followed by a rest, do not reach the collision thresholds that the calibration
+/// has set from the model's residual, and these are tighter than the default.
+#[test]
+fn identified_collision_thresholds_are_tight_and_not_reached_by_moves() {
+    let calibration = Calibration::new(3);
+    let found = found(&calibration);
+    let config = found.description.config::<4>().expect("four joints");
+    let default_nm = wam4().config::<4>().expect("four joints").collision;
+    let threshold_nm = config.collision.move_joint_torque_nm;
+    let home = wam4().home::<4>().expect("four joints");
+    let poses = [
+        [0.8, -1.2, 0.0, 2.4],
+        [-0.9, -0.7, 0.0, 1.6],
+        [0.3, -1.7, 0.0, 2.8],
+        [1.4, -0.4, 0.0, 1.9],
+        [0.0, -1.8, 0.0, 2.9],
+    ];
+    let mut from = home;
+    let mut steps = vec![Step::wait(Request::GravityHold, 0.5)];
+    for pose in poses.into_iter().cycle().take(2 * poses.len()) {
+        let target_rad = Vector::from(pose);
+        // Mean speed of a minimum-jerk move with a peak of half of the joints' speed limit.
+        let mean_rad_per_s = 0.5 * config.limits.joint_speed_rad_per_s[1] / 1.875;
+        let duration_s = (target_rad - from).amax() / mean_rad_per_s;
+        let request = Request::Move {
+            target_rad,
+            duration_s,
+        };
+        steps.push(Step::wait(request, duration_s + 0.5));
+        from = target_rad;
+    }
+    let sequence = RequestSequence {
+        name: "moves".to_owned(),
+        config,
+        plant: plant_of::<4>(&wam4(), &calibration).expect("four joints"),
+        start_rad: home,
+        steps,
+    };
+    let mut share = Vector::<4>::zeros();
+    // A fault is an error.
+    let done = sequence.perform(&mut |cycle, step| {
+        if step > 0 {
+            let external_nm = cycle.output.external_torque_nm.abs();
+            share = share.sup(&external_nm.component_div(&threshold_nm));
+        }
+        Ok(())
+    });
+    let tighter = threshold_nm.component_div(&default_nm.move_joint_torque_nm);
+    println!("thresholds {threshold_nm} N m, {tighter} of the default; reached {share}");
+    done.expect("no move faults");
+    assert!(tighter.max() <= 1.0 && tighter.min() < 0.5, "{tighter}");
+    assert!(share.max() < 0.8, "{share}");
 }
 
 /// Friction is 10 % too small in every joint and is learnt from each period's prediction error only.

@@ -96,20 +96,20 @@ pub struct IdentifyArgs {
     /// Two joints coupled by a gear: the motor turns with the sum of their angles, for example 4+5.
     #[arg(long, value_name = "J+J", value_parser = pair)]
     pub coupling: Vec<(usize, usize)>,
-    /// Cutoff of the zero-phase filter [Hz].
+    /// Cutoff of the zero-phase filter (Hz).
     #[arg(long, value_name = "HZ", default_value_t = 8.0, value_parser = between(1e-3, 1e5))]
     pub cutoff: f64,
-    /// Rate of the resampling grid [Hz]. Default: the rate of the log.
+    /// Rate of the resampling grid (Hz). Default: the rate of the log.
     #[arg(long, value_name = "HZ", value_parser = between(1e-1, 1e5))]
     pub rate: Option<f64>,
     /// Solver.
     #[arg(long, value_enum, default_value = "consistent")]
     pub method: Solver,
-    /// Exclude samples of a joint below this speed from the fit, and fit the Stribeck effect from them [rad/s].
+    /// Exclude samples of a joint below this speed from the fit, and fit the Stribeck effect from them (rad/s).
     /// Default: 0.15 for MCAP, 0 (none) for CSV, where friction columns are chosen by cross-validation.
     #[arg(long, value_name = "RAD/S", value_parser = between(0.0, 100.0))]
     pub slow: Option<f64>,
-    /// Standard deviation of the torque noise of each moving joint [N m]. Default: estimated from the residuals.
+    /// Standard deviation of the torque noise of each moving joint (N m). Default: estimated from the residuals.
     #[arg(long, value_name = "NM,NM..", value_delimiter = ',', value_parser = between(1e-9, 1e6))]
     pub noise: Vec<f64>,
     /// Print the summary as JSON.
@@ -135,7 +135,7 @@ pub struct DesignArgs {
     /// Criterion to minimise.
     #[arg(long, value_enum, default_value = "condition")]
     pub criterion: Criterion,
-    /// Length of a period [s].
+    /// Length of a period (s).
     #[arg(long, value_name = "S", default_value_t = 15.0, value_parser = between(0.1, 3600.0))]
     pub period: f64,
     /// Number of periods.
@@ -149,7 +149,7 @@ pub struct DesignArgs {
         value_parser = RangedU64ValueParser::<usize>::new().range(1..=MAX_CANDIDATES as u64)
     )]
     pub candidates: usize,
-    /// Box that the tip stays in, base axes: minimum x, y, z, maximum x, y, z [m].
+    /// Box that the tip stays in, base axes: minimum x, y, z, maximum x, y, z (m).
     #[arg(
         long,
         value_name = "M",
@@ -188,7 +188,7 @@ pub struct RunArgs {
     /// Seed of all noise.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
-    /// Torque ripple of the plant's motors, seen at the joints [N m].
+    /// Torque ripple of the plant's motors, seen at the joints (N m).
     #[arg(long, value_name = "NM", default_value_t = 0.0, value_parser = between(0.0, 100.0))]
     pub ripple: f64,
     /// Make the plant's friction depend on direction and load.
@@ -217,7 +217,7 @@ pub struct BreakawayArgs {
     /// Seed of the initial model and of all noise.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
-    /// Torque ripple of the plant's motors, seen at the joints [N m]. It is identified first from slow runs, then
+    /// Torque ripple of the plant's motors, seen at the joints (N m). It is identified first from slow runs, then
     /// compensated.
     #[arg(long, value_name = "NM", default_value_t = 0.0, value_parser = between(0.0, 100.0))]
     pub ripple: f64,
@@ -241,7 +241,7 @@ pub struct CalibrateArgs {
     /// Seed of the initial model and of all noise.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
-    /// Torque ripple of the plant's motors, seen at the joints [N m].
+    /// Torque ripple of the plant's motors, seen at the joints (N m).
     #[arg(long, value_name = "NM", default_value_t = 0.0, value_parser = between(0.0, 100.0))]
     pub ripple: f64,
     /// Make the plant's friction depend on direction and load.
@@ -273,10 +273,10 @@ pub struct LearnArgs {
     /// Folder for the refitted model.
     #[arg(long, value_name = "DIR", default_value = "out/learnt")]
     pub out: PathBuf,
-    /// Use only the last part of each log, of this length [s]. Default: all.
+    /// Use only the last part of each log, of this length (s). Default: all.
     #[arg(long, value_name = "S", value_parser = between(1e-3, 1e9))]
     pub last: Option<f64>,
-    /// Also identify a payload of about this mass [kg].
+    /// Also identify a payload of about this mass (kg).
     #[arg(long, value_name = "KG", value_parser = between(1e-6, 1e3))]
     pub payload: Option<f64>,
     /// Print the result as JSON.
