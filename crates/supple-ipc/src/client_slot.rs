@@ -17,7 +17,8 @@ use std::io;
 use std::os::unix::fs::FileExt;
 use supple_realtime::pause;
 
-/// Between fork and exec a child process shares the parent's locks, so a released lock may stay held for a moment.
+/// Delay before busy slots are tried again: between fork and exec a child process shares its parent's locks, so a lock
+/// may stay held for a moment after its release.
 const FORK_LOCK_GRACE: Duration = Duration::from_millis(100);
 /// Maximum number of digits of a process id.
 const DIGITS: usize = 10;

@@ -15,14 +15,14 @@ pub enum IpcError {
         /// Prefix that was given.
         found: String,
     },
-    /// The folder for sockets and service files.
+    /// The folder for sockets and service files, or an object in it, cannot be used.
     #[error("the folder {} cannot be used: {cause}; {remedy}", folder.display())]
     Folder {
-        /// The object or folder.
+        /// The folder.
         folder: PathBuf,
         /// Cause.
         cause: String,
-        /// Remedy.
+        /// What the user can do.
         remedy: &'static str,
     },
     /// Another process is already the writer of this service.
@@ -80,13 +80,13 @@ pub enum IpcError {
         /// Free memory \[bytes\].
         free_bytes: u64,
     },
-    /// An object of another user has a name of this system.
+    /// A shared-memory object with this system's prefix in its name belongs to another user.
     #[error(
         "{} belongs to user {owner} but has the name of an object of the system `{prefix}`: ask that user to \
          remove it, or choose another --prefix", object.display()
     )]
     Foreign {
-        /// The object or folder.
+        /// The object.
         object: PathBuf,
         /// User id.
         owner: u32,
@@ -106,7 +106,7 @@ pub enum IpcError {
     Message(#[from] MessageError),
 }
 
-/// A service that failed for a reason that iceoryx2 or the system states.
+/// Creates the error of a service from an error of iceoryx2 or of the operating system.
 pub(crate) fn failed(service: &str, cause: &dyn core::fmt::Display) -> IpcError {
     IpcError::Service {
         service: service.to_owned(),

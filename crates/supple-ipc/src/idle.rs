@@ -23,11 +23,11 @@ use supple_core::codes;
 use supple_core::controller::Mode;
 
 /// Header of a request.
-const REQUEST: &[u8; 8] = b"idle.v1\n";
+const REQUEST_HEADER: &[u8; 8] = b"idle.v1\n";
 /// Length of a request: the header and the request id \[bytes\].
 const REQUEST_BYTES: usize = 16;
 /// Length of a reply without its text: request id, cycle, outcome, mode \[bytes\].
-const ANSWER_BYTES: usize = 18;
+const REPLY_HEADER_BYTES: usize = 18;
 /// Maximum number of clients waiting for a reply. Beyond it the oldest client gets no reply; its request is carried out
 /// all the same.
 const MAX_PENDING_CLIENTS: usize = 64;
@@ -78,7 +78,7 @@ impl IdleServer {
     /// [`IpcError::Folder`] if the socket cannot be created.
     pub fn new(domain: &Domain) -> Result<IdleServer, IpcError> {
         let path = path(domain);
-        let made = || -> io::Result<UnixDatagram> {
+        let bind = || -> io::Result<UnixDatagram> {
             match fs::remove_file(&path) {
                 Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
                 _ => {}
@@ -89,7 +89,7 @@ impl IdleServer {
             socket.set_nonblocking(true)?;
             Ok(socket)
         };
-        let socket = made().map_err(|error| IpcError::Folder {
+        let socket = bind().map_err(|error| IpcError::Folder {
             folder: domain.folder().to_owned(),
             cause: format!("{}: {error}", path.display()),
             remedy: "set XDG_RUNTIME_DIR to a folder with a short path that can be written",
@@ -108,18 +108,18 @@ impl IdleServer {
     /// [`IpcError::Service`].
     pub fn receive_requests(&mut self, batch: u64, timeout: Duration) -> Result<bool, IpcError> {
         let timeout = Timespec::try_from(timeout).unwrap_or_default();
-        let mut waited = [PollFd::new(&self.socket, PollFlags::IN)];
-        match poll(&mut waited, Some(&timeout)) {
+        let mut sockets = [PollFd::new(&self.socket, PollFlags::IN)];
+        match poll(&mut sockets, Some(&timeout)) {
             Ok(0) | Err(Errno::INTR) => return Ok(false),
             Ok(_) => {}
             Err(error) => return Err(failed("idle", &error.into())),
         }
         let mut any = false;
-        // One call reads at most as many requests as may be pending.
+        // At most as many as fit into `pending`; the next call reads the rest.
         for _ in 0..MAX_PENDING_CLIENTS {
             let mut request = [0; REQUEST_BYTES + 1];
             match self.socket.recv_from(&mut request) {
-                Ok((REQUEST_BYTES, address)) if request.starts_with(REQUEST) => {
+                Ok((REQUEST_BYTES, address)) if request.starts_with(REQUEST_HEADER) => {
                     let mut request_id = [0; 8];
                     request_id.copy_from_slice(&request[8..REQUEST_BYTES]);
                     if self.pending.len() == MAX_PENDING_CLIENTS {
@@ -150,18 +150,18 @@ impl IdleServer {
     /// Sends `reply` to all clients whose batch number is at most `reply.sequence`.
     pub fn answer(&mut self, reply: &OperatorReply) {
         let text = reply.text.as_str().as_bytes();
-        let mut answer = Vec::with_capacity(ANSWER_BYTES + text.len());
+        let mut datagram = Vec::with_capacity(REPLY_HEADER_BYTES + text.len());
         self.pending.retain(|client| {
             if client.batch > reply.sequence {
                 return true;
             }
-            answer.clear();
-            answer.extend(client.request_id);
-            answer.extend(reply.cycle.to_le_bytes());
-            answer.extend([reply.outcome, reply.mode]);
-            answer.extend(text);
+            datagram.clear();
+            datagram.extend(client.request_id);
+            datagram.extend(reply.cycle.to_le_bytes());
+            datagram.extend([reply.outcome, reply.mode]);
+            datagram.extend(text);
             // The client may have terminated; if it still waits, it repeats its request.
-            let _ = self.socket.send_to_addr(&answer, &client.address);
+            let _ = self.socket.send_to_addr(&datagram, &client.address);
             false
         });
     }
@@ -174,7 +174,7 @@ impl Drop for IdleServer {
     }
 }
 
-/// Requests idle from the controller and waits for the reply for at most `timeout`; returns `None` if no reply came.
+/// Requests idle from the controller and waits for the reply for at most `timeout`; returns `None` if no reply arrived.
 /// Uses no resource that other clients can exhaust.
 ///
 /// # Errors
@@ -193,7 +193,7 @@ fn request_idle_at(path: &std::path::Path, timeout: Duration) -> io::Result<Opti
     let socket = UnixDatagram::bind_addr(&address)?;
     socket.set_nonblocking(true)?;
     let mut request = [0; REQUEST_BYTES];
-    request[..8].copy_from_slice(REQUEST);
+    request[..8].copy_from_slice(REQUEST_HEADER);
     request[8..].copy_from_slice(&request_id);
     loop {
         let sent = socket.connect(path).and_then(|()| socket.send(&request));
@@ -208,9 +208,9 @@ fn request_idle_at(path: &std::path::Path, timeout: Duration) -> io::Result<Opti
                 _ => return Err(error),
             },
         };
-        let left = timeout.saturating_sub(start.elapsed());
-        if let Some(answer) = receive_answer(&socket, &request_id, wait.min(left))? {
-            return Ok(Some(answer));
+        let remaining = timeout.saturating_sub(start.elapsed());
+        if let Some(reply) = receive_reply(&socket, &request_id, wait.min(remaining))? {
+            return Ok(Some(reply));
         }
         if start.elapsed() >= timeout {
             return Ok(None);
@@ -218,8 +218,8 @@ fn request_idle_at(path: &std::path::Path, timeout: Duration) -> io::Result<Opti
     }
 }
 
-/// Waits for the answer to a request.
-fn receive_answer(
+/// Waits for the reply to a request.
+fn receive_reply(
     socket: &UnixDatagram,
     request_id: &[u8; 8],
     timeout: Duration,
@@ -229,31 +229,31 @@ fn receive_answer(
         Err(error) if error != Errno::INTR => return Err(error.into()),
         _ => {}
     }
-    let mut answer = [0; 512];
+    let mut datagram = [0; 512];
     loop {
-        match socket.recv(&mut answer) {
+        match socket.recv(&mut datagram) {
             Ok(length) => {
-                if let Some(answer) = read(&answer[..length], request_id) {
-                    return Ok(Some(answer));
+                if let Some(reply) = decode_reply(&datagram[..length], request_id) {
+                    return Ok(Some(reply));
                 }
             }
             Err(error) if error.kind() == ErrorKind::Interrupted => {}
-            // The controller has terminated; the next attempt to connect fails.
+            // No reply yet; or the controller has terminated, and the next attempt to connect fails.
             Err(_) => return Ok(None),
         }
     }
 }
 
-fn read(answer: &[u8], request_id: &[u8; 8]) -> Option<IdleAnswer> {
-    let (head, text) = answer.split_at_checked(ANSWER_BYTES)?;
-    if !head.starts_with(request_id) {
+fn decode_reply(datagram: &[u8], request_id: &[u8; 8]) -> Option<IdleAnswer> {
+    let (header, text) = datagram.split_at_checked(REPLY_HEADER_BYTES)?;
+    if !header.starts_with(request_id) {
         return None;
     }
-    let cycle = head[8..16].try_into().ok()?;
+    let cycle = header[8..16].try_into().ok()?;
     Some(IdleAnswer {
         cycle: u64::from_le_bytes(cycle),
-        outcome: Outcome::from_code(head[16]),
-        mode: codes::mode(head[17]),
+        outcome: Outcome::from_code(header[16]),
+        mode: codes::mode(header[17]),
         text: String::from_utf8_lossy(text).into_owned(),
     })
 }
@@ -281,7 +281,7 @@ pub fn idle_reply(
 mod tests {
     use super::*;
 
-    const SOON: Duration = Duration::from_secs(60);
+    const TIMEOUT: Duration = Duration::from_secs(60);
 
     fn system() -> (tempfile::TempDir, Domain) {
         let folder = tempfile::tempdir().expect("a folder");
@@ -295,7 +295,7 @@ mod tests {
         let mut server = IdleServer::new(&domain).expect("a server");
         std::thread::scope(|scope| {
             let clients: Vec<_> = (0..MAX_PENDING_CLIENTS)
-                .map(|_| scope.spawn(|| request_idle(&domain, SOON)))
+                .map(|_| scope.spawn(|| request_idle(&domain, TIMEOUT)))
                 .collect();
             let mut batch = 0;
             while clients.iter().any(|client| !client.is_finished()) {
@@ -326,7 +326,7 @@ mod tests {
         let mut server = IdleServer::new(&domain).expect("a server");
         let without_server = request_idle(&domain, Duration::from_millis(1));
         assert_eq!(without_server.expect("requested"), None);
-        assert!(server.receive_requests(5, SOON).expect("read"));
+        assert!(server.receive_requests(5, TIMEOUT).expect("read"));
         server.answer(&idle_reply(
             4,
             1,
@@ -353,23 +353,23 @@ mod tests {
         for bytes in [&b""[..], b"idle", &[0xff; 16], &[b'i'; 400]] {
             sender.send_to(bytes, path(&domain)).expect("sent");
         }
-        assert!(!server.receive_requests(1, SOON).expect("read"));
+        assert!(!server.receive_requests(1, TIMEOUT).expect("read"));
         assert!(!server.has_pending());
     }
 
     #[test]
     fn without_a_controller_the_idle_request_returns_at_once() {
         let (_folder, domain) = system();
-        assert_eq!(request_idle(&domain, SOON).expect("requested"), None);
+        assert_eq!(request_idle(&domain, TIMEOUT).expect("requested"), None);
         drop(IdleServer::new(&domain).expect("a server"));
-        assert_eq!(request_idle(&domain, SOON).expect("requested"), None);
+        assert_eq!(request_idle(&domain, TIMEOUT).expect("requested"), None);
     }
 
     #[test]
     fn only_the_owner_can_open_the_socket() {
         let (_folder, domain) = system();
         let _server = IdleServer::new(&domain).expect("a server");
-        let about = fs::metadata(path(&domain)).expect("there");
-        assert_eq!(about.permissions().mode() & 0o777, 0o600);
+        let metadata = fs::metadata(path(&domain)).expect("there");
+        assert_eq!(metadata.permissions().mode() & 0o777, 0o600);
     }
 }

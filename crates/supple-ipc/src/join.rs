@@ -28,7 +28,7 @@ impl Domain {
                 _ => "set XDG_RUNTIME_DIR to a folder that can be written",
             },
         })?;
-        // The lock is dropped before the cleanup guard, which takes the lock itself.
+        // The lock is released below, before the guard can be dropped: its drop takes the lock itself.
         let cleanup = SharedMemoryCleanup::of(self);
         let opened = self.open(messages_bytes, open);
         drop(membership_lock);

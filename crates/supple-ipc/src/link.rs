@@ -376,7 +376,7 @@ mod tests {
     use crate::message::{Drives, PlantReport};
     use core::sync::atomic::AtomicBool;
 
-    const SOON: Duration = Duration::from_secs(5);
+    const TIMEOUT: Duration = Duration::from_secs(5);
 
     #[test]
     fn plant_is_woken_only_while_blocked() {
@@ -392,7 +392,7 @@ mod tests {
                 let received = plant.answer(cycle, Duration::from_millis(1)).expect("read");
                 assert_eq!((received.answer, received.timed_out), (None, true));
             }
-            assert_eq!(controller.wait(SOON).expect("read"), Some(state));
+            assert_eq!(controller.wait(TIMEOUT).expect("read"), Some(state));
             let command = TorqueCommand {
                 writer: 0,
                 cycle,
@@ -411,7 +411,7 @@ mod tests {
                 blocked,
                 "cycle {cycle}"
             );
-            let received = plant.answer(cycle, SOON).expect("read");
+            let received = plant.answer(cycle, TIMEOUT).expect("read");
             assert_eq!(received.answer, Some(command));
         }
     }

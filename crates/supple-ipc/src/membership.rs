@@ -18,11 +18,12 @@ use supple_realtime::pause;
 
 /// Name of the lock file.
 const MEMBERSHIP_LOCK: &str = "membership";
-/// Timeout for the lock. It is normally held for milliseconds, unless the holding process was stopped (SIGSTOP).
+/// Timeout for the lock on joining. Others hold it for milliseconds, unless one of them was stopped (SIGSTOP).
 const MEMBERSHIP_LOCK_TIMEOUT: Duration = Duration::from_secs(10);
 /// Timeout for the lock on leaving.
 const LEAVE_LOCK_TIMEOUT: Duration = Duration::from_secs(1);
-/// Between fork and exec a child process shares the parent's locks, so a released lock may stay held for a moment.
+/// Time for which a busy lock is retried: between fork and exec a child process shares its parent's locks, so a lock
+/// may stay held for a moment after its release.
 const FORK_LOCK_GRACE: Duration = Duration::from_millis(200);
 /// Poll interval for the lock and for the size of an object.
 const POLL_INTERVAL: Duration = Duration::from_millis(1);
@@ -77,8 +78,9 @@ fn path(domain: &Domain, lock: &str) -> PathBuf {
     domain.folder().join(name)
 }
 
-/// Removes the objects whose creators died before they set the size. Call it with the membership lock held. Connecting
-/// to existing ports needs no lock, so new objects get some time to reach their size.
+/// Removes the objects whose creators died before they set the size. Call it with the membership lock held. A process
+/// that connects to an existing port creates objects without the lock, so every object gets
+/// [`UNSIZED_OBJECT_TIMEOUT`] to reach its size.
 pub(crate) fn remove_unsized_objects(domain: &Domain) -> io::Result<()> {
     for object in shared_memory::objects(domain)?.owned {
         let first_seen = Instant::now();

@@ -17,7 +17,7 @@ use std::time::Instant;
 use supple_core::controller::Request;
 use supple_realtime::pause;
 
-/// Telemetry that a reader may lag behind, in cycles.
+/// Number of cycles by which a reader may lag before it loses telemetry.
 pub const TELEMETRY_DEPTH: usize = 2048;
 
 const TELEMETRY: QualityOfService = QualityOfService {
@@ -42,8 +42,8 @@ const REPLIES: QualityOfService = QualityOfService {
     overwrite_oldest: true,
 };
 
-/// General clients may hang, so some slots are reserved for other programs. The slots of both kinds add up to the
-/// limits of the services.
+// General clients (viewers and operators) may hang, so some slots of each service are reserved for the programs that
+// run the system (recorders and supervisors). The slots of both kinds add up to the limit of the service.
 const VIEWER_SLOTS: SlotKind = SlotKind {
     name: "reader",
     description: "viewers of telemetry",
@@ -274,8 +274,8 @@ impl OperatorClient {
     ) -> Result<Option<u64>, IpcError> {
         self.sequence += 1;
         let message = OperatorRequest::new(self.operator_id, self.sequence, at_cycle, request);
-        let reached = self.requests.send(&message)?;
-        Ok((reached > 0).then_some(self.sequence))
+        let readers = self.requests.send(&message)?;
+        Ok((readers > 0).then_some(self.sequence))
     }
 
     /// The oldest unread reply to a request of this operator. A request that is queued until its cycle has two replies:

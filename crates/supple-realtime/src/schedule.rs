@@ -13,7 +13,7 @@ pub fn bind(cpu: usize) -> Result<(), Error> {
     Ok(sched_setaffinity(None, &set)?)
 }
 
-/// Puts the calling thread under SCHED_FIFO.
+/// Schedules the calling thread with SCHED_FIFO at this priority.
 pub fn set_sched_fifo(priority: u8) -> Result<(), Error> {
     let parameters = libc::sched_param {
         sched_priority: i32::from(priority),

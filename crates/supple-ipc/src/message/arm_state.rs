@@ -1,6 +1,6 @@
 //! Sent by the plant to the controller once per cycle.
 
-use super::{Drives, MAX_DOF, MessageError, expect_dof, widened};
+use super::{Drives, MAX_DOF, MessageError, expect_dof, padded};
 use iceoryx2::prelude::ZeroCopySend;
 use supple_core::Input;
 use supple_core::controller::Request;
@@ -62,8 +62,8 @@ pub struct PlantReport {
 }
 
 impl ArmState {
-    /// Creates the state of an arm with `N` joints. A position is `None` if its encoder did not answer, the force if
-    /// there is no force sensor.
+    /// Creates the state of an arm with `N` joints. A position is `None` if its encoder did not answer; the force is
+    /// `None` if there is no force sensor.
     pub fn new<const N: usize>(
         cycle: u64,
         stamp_ns: u64,
@@ -75,12 +75,14 @@ impl ArmState {
         let present = position_rad
             .iter()
             .enumerate()
-            .fold(0, |bits, (i, p)| bits | (u8::from(p.is_some()) << i));
+            .fold(0, |bits, (i, position)| {
+                bits | (u8::from(position.is_some()) << i)
+            });
         ArmState {
             writer: 0,
             cycle,
             stamp_ns,
-            position_rad: widened::<N>(&position_rad.map(Option::unwrap_or_default)),
+            position_rad: padded::<N>(&position_rad.map(Option::unwrap_or_default)),
             tip_force_n: tip_force_n.map_or([0.0; 3], Into::into),
             plant,
             dof: N as u8,

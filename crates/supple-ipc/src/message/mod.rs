@@ -85,15 +85,15 @@ fn expect_dof(message: &'static str, found: u8, expected: usize) -> Result<(), M
 }
 
 /// Values of `N` joints, padded with zeros.
-fn widened<const N: usize>(values: &[f64]) -> [f64; MAX_DOF] {
+fn padded<const N: usize>(values: &[f64]) -> [f64; MAX_DOF] {
     const { assert!(N <= MAX_DOF) };
-    let mut wide = [0.0; MAX_DOF];
-    wide[..N].copy_from_slice(values);
-    wide
+    let mut all = [0.0; MAX_DOF];
+    all[..N].copy_from_slice(values);
+    all
 }
 
 /// The first `N` values.
-fn narrowed<const N: usize>(wide: &[f64; MAX_DOF]) -> [f64; N] {
+fn first_values<const N: usize>(all: &[f64; MAX_DOF]) -> [f64; N] {
     const { assert!(N <= MAX_DOF) };
-    core::array::from_fn(|i| wide[i])
+    core::array::from_fn(|i| all[i])
 }

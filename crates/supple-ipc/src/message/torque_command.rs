@@ -1,6 +1,6 @@
 //! Sent by the controller to the plant: the answer to one arm state.
 
-use super::{Drives, MAX_DOF, MessageError, expect_dof, narrowed, widened};
+use super::{Drives, MAX_DOF, MessageError, expect_dof, first_values, padded};
 use iceoryx2::prelude::ZeroCopySend;
 use supple_core::codes;
 use supple_core::controller::Mode;
@@ -47,8 +47,8 @@ impl TorqueCommand {
         TorqueCommand {
             writer: 0,
             cycle: output.cycle,
-            torque_nm: widened::<N>(output.torque_nm.as_slice()),
-            fallback_torque_nm: widened::<N>(output.fallback_torque_nm.as_slice()),
+            torque_nm: padded::<N>(output.torque_nm.as_slice()),
+            fallback_torque_nm: padded::<N>(output.fallback_torque_nm.as_slice()),
             dof: N as u8,
             mode: output.mode as u8,
             fault: codes::FaultCode::new(output.fault.as_ref()).kind,
@@ -73,7 +73,7 @@ impl TorqueCommand {
     /// [`MessageError::Dof`] if the arm does not have `N` joints.
     pub fn torque<const N: usize>(&self) -> Result<Vector<N>, MessageError> {
         expect_dof("the torque command", self.dof, N)?;
-        Ok(Vector::from(narrowed::<N>(&self.torque_nm)))
+        Ok(Vector::from(first_values::<N>(&self.torque_nm)))
     }
 
     /// Joint torques while answers are missing \[N m\].
@@ -82,7 +82,7 @@ impl TorqueCommand {
     /// [`MessageError::Dof`] if the arm does not have `N` joints.
     pub fn fallback_torque<const N: usize>(&self) -> Result<Vector<N>, MessageError> {
         expect_dof("the torque command", self.dof, N)?;
-        Ok(Vector::from(narrowed::<N>(&self.fallback_torque_nm)))
+        Ok(Vector::from(first_values::<N>(&self.fallback_torque_nm)))
     }
 
     /// Mode of the controller, if this version knows it.

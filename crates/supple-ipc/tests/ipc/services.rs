@@ -6,12 +6,13 @@ use core::time::Duration;
 use iceoryx2::prelude::*;
 use std::os::unix::fs::MetadataExt;
 use std::path::Path as StdPath;
+use supple_core::codes::request_kind;
 use supple_core::controller::{Mode, Request};
 use supple_ipc::message::*;
 use supple_ipc::*;
 use supple_realtime::pause;
 
-const SOON: Duration = Duration::from_secs(5);
+const TIMEOUT: Duration = Duration::from_secs(5);
 
 #[test]
 fn a_state_is_answered_in_its_cycle() {
@@ -20,12 +21,12 @@ fn a_state_is_answered_in_its_cycle() {
     let controller = ControllerLink::new(&system.domain).expect("a controller");
     for cycle in 0..3 {
         assert!(plant.publish(&state(cycle)).expect("published"));
-        let received = controller.wait(SOON).expect("read").expect("a state");
+        let received = controller.wait(TIMEOUT).expect("read").expect("a state");
         assert_eq!(received, state(cycle));
         let output = answer(&received.input(None).expect("four joints"));
         let command = TorqueCommand::new(&output, false);
         controller.answer(&command).expect("answered");
-        let received = plant.answer(cycle, SOON).expect("read");
+        let received = plant.answer(cycle, TIMEOUT).expect("read");
         assert_eq!(received.answer, Some(command));
         assert_eq!(received.late, 0);
     }
@@ -40,7 +41,7 @@ fn a_state_may_be_announced() {
         if cycle % 2 == 0 {
             plant.announce().expect("announced");
             assert_eq!(
-                controller.wait_for_event(SOON).expect("read"),
+                controller.wait_for_event(TIMEOUT).expect("read"),
                 WakeEvent::Announced
             );
         }
@@ -50,24 +51,24 @@ fn a_state_may_be_announced() {
             let received = controller.receive().expect("read");
             assert_eq!(received, Some(state(cycle)));
         } else {
-            let woken = controller.wait_for_event(SOON).expect("read");
+            let woken = controller.wait_for_event(TIMEOUT).expect("read");
             assert_eq!(woken, WakeEvent::State(state(cycle)));
         }
         assert_eq!(controller.receive().expect("read"), None);
         let mut command = TorqueCommand::new(&answer(&state(0).input(None).expect("four")), false);
         command.cycle = cycle;
         controller.answer(&command).expect("answered");
-        let received = plant.answer(cycle, SOON).expect("read");
+        let received = plant.answer(cycle, TIMEOUT).expect("read");
         assert_eq!(received.answer.map(|command| command.cycle), Some(cycle));
     }
-    let moment = Duration::from_millis(1);
+    let short_timeout = Duration::from_millis(1);
     assert_eq!(
-        controller.wait_for_event(moment).expect("read"),
+        controller.wait_for_event(short_timeout).expect("read"),
         WakeEvent::Timeout
     );
     // `wait` does not return on an announcement.
     plant.announce().expect("announced");
-    assert_eq!(controller.wait(moment).expect("read"), None);
+    assert_eq!(controller.wait(short_timeout).expect("read"), None);
 }
 
 #[test]
@@ -76,7 +77,7 @@ fn an_answer_to_another_cycle_is_late_and_not_used() {
     let plant = PlantLink::new(&system.domain).expect("a plant");
     let controller = ControllerLink::new(&system.domain).expect("a controller");
     plant.publish(&state(1)).expect("published");
-    let received = controller.wait(SOON).expect("read").expect("a state");
+    let received = controller.wait(TIMEOUT).expect("read").expect("a state");
     let output = answer(&received.input(None).expect("four joints"));
     controller
         .answer(&TorqueCommand::new(&output, false))
@@ -143,7 +144,7 @@ fn polling_plant_gets_its_answers_and_blocks_without_one() {
     std::thread::scope(|scope| {
         scope.spawn(move || {
             let controller = ControllerLink::new(domain).expect("a controller");
-            while let Some(state) = controller.wait(SOON).expect("read") {
+            while let Some(state) = controller.wait(TIMEOUT).expect("read") {
                 let output = answer(&state.input(None).expect("four joints"));
                 let mut command = TorqueCommand::new(&output, false);
                 command.cycle = state.cycle;
@@ -159,7 +160,7 @@ fn polling_plant_gets_its_answers_and_blocks_without_one() {
         }
         for cycle in 0..50 {
             plant.publish(&state(cycle)).expect("published");
-            let received = plant.answer(cycle, SOON).expect("read");
+            let received = plant.answer(cycle, TIMEOUT).expect("read");
             assert_eq!(received.answer.map(|command| command.cycle), Some(cycle));
         }
         plant.publish(&state(50)).expect("published");
@@ -241,7 +242,7 @@ fn operators_receive_only_replies_to_their_own_requests() {
             request.at_cycle,
         ));
         let (outcome, text) = match request.kind {
-            2 => (Outcome::Accepted, Text::EMPTY),
+            request_kind::GRAVITY_HOLD => (Outcome::Accepted, Text::EMPTY),
             _ => (Outcome::Refused, Text::of(&"no")),
         };
         let reply = OperatorReply::new(&request, 7, Mode::GravityHold, outcome, text);
@@ -370,18 +371,18 @@ fn other_users_cannot_open_data() {
     let in_shared_memory = found.iter().filter(|path| path.starts_with("/dev/shm"));
     assert!(in_shared_memory.count() > 3, "{found:?}");
     for path in found {
-        // A peer has just removed the file.
-        let Ok(about) = path.symlink_metadata() else {
+        // Without metadata, a peer has just removed the file.
+        let Ok(metadata) = path.symlink_metadata() else {
             continue;
         };
-        let open_to_others = about.mode() & 0o077 != 0;
-        let bookkeeping = path.starts_with("/dev/shm") && about.len() <= 16;
+        let open_to_others = metadata.mode() & 0o077 != 0;
+        let without_data = path.starts_with("/dev/shm") && metadata.len() <= 16;
         assert!(
-            !open_to_others || bookkeeping,
+            !open_to_others || without_data,
             "{} of {} bytes has mode {:o}",
             path.display(),
-            about.len(),
-            about.mode() & 0o777
+            metadata.len(),
+            metadata.mode() & 0o777
         );
     }
     let folder = system.folder.metadata().expect("it is there");

@@ -7,8 +7,8 @@ use iceoryx2::prelude::*;
 use supple_ipc::message::{ArmState, TorqueCommand};
 use supple_ipc::{ControllerLink, PlantLink};
 
-const SOON: Duration = Duration::from_secs(5);
-const MOMENT: Duration = Duration::from_millis(1);
+const TIMEOUT: Duration = Duration::from_secs(5);
+const SHORT_TIMEOUT: Duration = Duration::from_millis(1);
 
 /// A program that uses a free writer slot of a service, which iceoryx2 allows, and ignores the writer lock.
 struct ForeignWriter<T: core::fmt::Debug + ZeroCopySend + 'static> {
@@ -42,7 +42,7 @@ impl<T: core::fmt::Debug + Copy + ZeroCopySend + 'static> ForeignWriter<T> {
     fn send(&self, message: T) {
         let sample = self.publisher.loan_uninit().expect("memory");
         let reached = sample.write_payload(message).send().expect("sent");
-        assert_eq!(reached, 1, "it would be read");
+        assert_eq!(reached, 1, "its reader is connected");
     }
 }
 
@@ -56,7 +56,7 @@ fn command(cycle: u64) -> TorqueCommand {
 
 #[test]
 fn torques_of_a_foreign_writer_are_rejected_and_counted() {
-    let system = system("strange-torque");
+    let system = system("foreign-torque");
     let plant = PlantLink::new(&system.domain).expect("a plant");
     let controller = ControllerLink::new(&system.domain).expect("a controller");
     let foreign = ForeignWriter::new(&system, "torque_command");
@@ -71,23 +71,23 @@ fn torques_of_a_foreign_writer_are_rejected_and_counted() {
             });
         }
         controller.answer(&command(cycle)).expect("answered");
-        let received = plant.answer(cycle, SOON).expect("read");
+        let received = plant.answer(cycle, TIMEOUT).expect("read");
         assert_eq!(received.answer, Some(command(cycle)));
         assert_eq!(received.late, 0);
         let after = plant.answer(cycle, Duration::ZERO).expect("read");
         assert_eq!(after.answer, None);
     }
-    // Without an answer of the controller there is none.
+    // A foreign command does not replace a missing answer of the controller.
     plant.publish(&state(50)).expect("published");
     foreign.send(command(50));
-    let received = plant.answer(50, MOMENT).expect("read");
+    let received = plant.answer(50, SHORT_TIMEOUT).expect("read");
     assert_eq!(received.answer, None);
     assert_eq!(plant.foreign(), 101);
 }
 
 #[test]
 fn states_of_a_foreign_writer_are_rejected_and_counted() {
-    let system = system("strange-state");
+    let system = system("foreign-state");
     let plant = PlantLink::new(&system.domain).expect("a plant");
     let controller = ControllerLink::new(&system.domain).expect("a controller");
     let foreign = ForeignWriter::new(&system, "arm_state");
@@ -98,12 +98,12 @@ fn states_of_a_foreign_writer_are_rejected_and_counted() {
             ..state(cycle)
         });
         plant.publish(&state(cycle)).expect("published");
-        let received = controller.wait(SOON).expect("read");
+        let received = controller.wait(TIMEOUT).expect("read");
         assert_eq!(received, Some(state(cycle)));
         assert_eq!(controller.receive().expect("read"), None);
     }
     foreign.send(state(50));
-    assert_eq!(controller.wait(MOMENT).expect("read"), None);
+    assert_eq!(controller.wait(SHORT_TIMEOUT).expect("read"), None);
     assert_eq!(controller.foreign(), 51);
 }
 
@@ -115,9 +115,9 @@ fn a_replacement_controller_is_accepted() {
     for cycle in 0..5 {
         let controller = ControllerLink::new(&system.domain).expect("the only controller");
         plant.publish(&state(cycle)).expect("published");
-        assert_eq!(controller.wait(SOON).expect("read"), Some(state(cycle)));
+        assert_eq!(controller.wait(TIMEOUT).expect("read"), Some(state(cycle)));
         controller.answer(&command(cycle)).expect("answered");
-        let received = plant.answer(cycle, SOON).expect("read");
+        let received = plant.answer(cycle, TIMEOUT).expect("read");
         assert_eq!(received.answer, Some(command(cycle)));
     }
     assert_eq!(plant.foreign(), 0);

@@ -11,7 +11,7 @@ use supple_experiment::Sample;
 pub fn draw(samples: &[Sample]) -> Result<String, FigureError> {
     let alt_text = "Path of the tip along the arc seen from above, and its error over time";
     draw_canvas((760, 270), alt_text, |area| {
-        let (path, error) = area.split_horizontally(px(300.0));
+        let (path_area, distance_area) = area.split_horizontally(px(300.0));
         let coordinate = |axis: usize| {
             extent(
                 samples
@@ -20,7 +20,7 @@ pub fn draw(samples: &[Sample]) -> Result<String, FigureError> {
             )
         };
         let mut panel = Panel::new(
-            &path,
+            &path_area,
             "path from above, x enlarged",
             Margins::default(),
             &Axis::new("y [m]", Ticks::around(coordinate(1), 4)),
@@ -32,19 +32,23 @@ pub fn draw(samples: &[Sample]) -> Result<String, FigureError> {
             5.0,
         )?;
         panel.line(samples.iter().map(|s| (s.tip_m[1], s.tip_m[0])), BLUE, 1.4)?;
-        let off = |s: &Sample| mm(distance(&s.tip_m, &s.reference_m));
+        let distance_mm = |s: &Sample| mm(distance(&s.tip_m, &s.reference_m));
         let end = samples.last().map_or(1.0, |s| s.time_s.floor());
-        let max = extent(samples.iter().map(off)).end;
+        let max = extent(samples.iter().map(distance_mm)).end;
         let mut panel = Panel::new(
-            &error,
+            &distance_area,
             "distance from the reference",
             Margins::default(),
             &Axis::new("time [s]", Ticks::stepped(0.0..end, 2.0)),
             &Axis::new("distance [mm]", Ticks::around(0.0..1.05 * max, 5)),
         )?;
-        panel.line(samples.iter().map(|s| (s.time_s, off(s))), BLUE, 1.4)?;
+        panel.line(
+            samples.iter().map(|s| (s.time_s, distance_mm(s))),
+            BLUE,
+            1.4,
+        )?;
         legend(
-            &error,
+            &distance_area,
             (240.0, 14.0),
             &[
                 ("reference", LegendSymbol::Line(5.0), REFERENCE),

@@ -41,8 +41,8 @@ impl<'a> Axis<'a> {
     pub fn logarithmic(label: &'a str, range: Range<f64>) -> Axis<'a> {
         let first = range.start.log10().floor() as i32;
         let last = range.end.log10().ceil() as i32;
-        let decades =
-            (first..=last).flat_map(|d| [1.0, 2.0, 5.0].map(|lead| lead * 10.0_f64.powi(d)));
+        let decades = (first..=last)
+            .flat_map(|d| [1.0, 2.0, 5.0].map(|mantissa| mantissa * 10.0_f64.powi(d)));
         let ticks = Ticks {
             at: decades.collect(),
             decimals: 0,

@@ -95,11 +95,11 @@ pub fn draw(runs: &SinusoidRuns<'_>) -> Result<String, FigureError> {
             ],
         )?;
 
-        let off = |s: &Sample| mm(distance(&s.tip_m, &s.reference_m));
+        let distance_mm = |s: &Sample| mm(distance(&s.tip_m, &s.reference_m));
         let all = runs
             .all
             .iter()
-            .flat_map(|(_, samples)| samples.iter().map(off));
+            .flat_map(|(_, samples)| samples.iter().map(distance_mm));
         let max = extent(all).end;
         let periods = |speed: f64, s: &Sample| s.time_s / Sinusoid::paper(speed).period_s();
         let mut panel = Panel::new(
@@ -116,7 +116,7 @@ pub fn draw(runs: &SinusoidRuns<'_>) -> Result<String, FigureError> {
         let mut entries = Vec::new();
         for ((speed, samples), colour) in runs.all.iter().zip(colours.into_iter().cycle()) {
             panel.line(
-                samples.iter().map(|s| (periods(*speed, s), off(s))),
+                samples.iter().map(|s| (periods(*speed, s), distance_mm(s))),
                 colour,
                 1.4,
             )?;

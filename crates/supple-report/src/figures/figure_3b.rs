@@ -5,7 +5,7 @@ use super::panel::{LegendSymbol, Margins, Panel, legend};
 use super::style::{BLUE, MUTED, REFERENCE, px};
 use super::ticks::{Ticks, extent};
 use super::{FigureError, distance, draw_canvas, mm};
-use crate::sections::kinds_of_quadrant;
+use crate::sections::quadrants_with_models;
 use plotters::style::text_anchor::HPos;
 use std::ops::Range;
 use supple_core::trajectory::{Piece, Quadrant};
@@ -32,7 +32,7 @@ pub struct QuadrantRun<'a> {
 
 /// The runs of a demo.
 pub fn quadrant_runs(demo: &Demo) -> Vec<QuadrantRun<'_>> {
-    let runs = kinds_of_quadrant(&demo.summary)
+    let runs = quadrants_with_models(&demo.summary)
         .into_iter()
         .zip(&demo.quadrants);
     runs.map(|((summary, model), run)| QuadrantRun {
@@ -50,11 +50,11 @@ pub fn draw(quadrant_runs: &[QuadrantRun<'_>]) -> Result<String, FigureError> {
         HEAD_PX as u32 + HEIGHT_PX as u32 * u32::try_from(quadrant_runs.len()).unwrap_or(0);
     draw_canvas((760, height), alt_text, |area| {
         let (head, rows) = area.split_vertically(px(HEAD_PX));
-        let keys = [
+        let entries = [
             ("reference", LegendSymbol::Line(5.0), REFERENCE),
             ("actual", LegendSymbol::Line(1.4), BLUE),
         ];
-        legend(&head, (58.0, 14.0), &keys)?;
+        legend(&head, (58.0, 14.0), &entries)?;
         let rows = rows.split_evenly((quadrant_runs.len().max(1), 1));
         for (row, run) in rows.iter().zip(quadrant_runs) {
             let (path, error) = row.split_horizontally(px(PATH_WIDTH_PX));
@@ -66,7 +66,7 @@ pub fn draw(quadrant_runs: &[QuadrantRun<'_>]) -> Result<String, FigureError> {
 }
 
 fn draw_path(area: &super::panel::Area<'_>, run: &QuadrantRun<'_>) -> Result<(), FigureError> {
-    let all = |axis: usize| {
+    let coordinate = |axis: usize| {
         extent(
             run.samples
                 .iter()
@@ -75,7 +75,7 @@ fn draw_path(area: &super::panel::Area<'_>, run: &QuadrantRun<'_>) -> Result<(),
     };
     let margins = Margins::default();
     let axes_px = margins.axes_px(PATH_WIDTH_PX, HEIGHT_PX);
-    let (x_range, z_range) = same_scale(all(0), all(2), axes_px);
+    let (x_range, z_range) = same_scale(coordinate(0), coordinate(2), axes_px);
     let mut panel = Panel::new(
         area,
         &run.title,
@@ -97,7 +97,7 @@ fn draw_path(area: &super::panel::Area<'_>, run: &QuadrantRun<'_>) -> Result<(),
     )
 }
 
-/// Axis ranges around both values with the same scale (metres per pixel).
+/// Widens both ranges to axis ranges that have the same scale (metres per pixel).
 fn same_scale(x: Range<f64>, z: Range<f64>, axes_px: (f64, f64)) -> (Range<f64>, Range<f64>) {
     let size = |r: &Range<f64>| (1.0 + 2.0 * MARGIN) * (r.end - r.start);
     let m_per_px = (size(&x) / axes_px.0).max(size(&z) / axes_px.1);
@@ -109,9 +109,9 @@ fn same_scale(x: Range<f64>, z: Range<f64>, axes_px: (f64, f64)) -> (Range<f64>,
 }
 
 fn draw_error(area: &super::panel::Area<'_>, run: &QuadrantRun<'_>) -> Result<(), FigureError> {
-    let off = |s: &Sample| mm(distance(&s.tip_m, &s.reference_m));
+    let distance_mm = |s: &Sample| mm(distance(&s.tip_m, &s.reference_m));
     let end = run.samples.last().map_or(1.0, |s| s.time_s);
-    let max = extent(run.samples.iter().map(off)).end;
+    let max = extent(run.samples.iter().map(distance_mm)).end;
     let mut panel = Panel::new(
         area,
         "distance from the reference, per piece",
@@ -139,10 +139,14 @@ fn draw_error(area: &super::panel::Area<'_>, run: &QuadrantRun<'_>) -> Result<()
             )?;
         }
     }
-    panel.line(run.samples.iter().map(|s| (s.time_s, off(s))), BLUE, 1.4)
+    panel.line(
+        run.samples.iter().map(|s| (s.time_s, distance_mm(s))),
+        BLUE,
+        1.4,
+    )
 }
 
-/// Segments in order of travel, with their time intervals \[s\].
+/// Pieces of the trajectory in order of travel, with their start and end times \[s\].
 fn pieces(run: &QuadrantRun<'_>) -> Vec<(Piece, f64, f64)> {
     let mut pieces: Vec<(Piece, f64, f64)> = Vec::new();
     for s in run.samples {

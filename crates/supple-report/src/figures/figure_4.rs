@@ -8,7 +8,7 @@ use super::{FigureError, draw_canvas};
 use plotters::style::RGBColor;
 use supple_experiment::{Demo, JointTorque, Sample};
 
-/// Term, its colour, its value.
+/// Name of a torque term, its colour, its value.
 type Term = (&'static str, RGBColor, fn(&JointTorque) -> f64);
 
 const TERMS: [Term; 4] = [
@@ -18,7 +18,7 @@ const TERMS: [Term; 4] = [
     ("friction", VERMILION, |t| t.friction),
 ];
 
-/// The sinusoid at the paper's speed.
+/// Samples of the sinusoid at the paper's speed (speed factor 1).
 pub fn samples(demo: &Demo) -> &[Sample] {
     let paper = demo.sinusoids.iter().find(|(speed, _)| *speed == 1.0);
     paper.map_or(&[], |(_, run)| &run.trace.samples)
@@ -30,14 +30,18 @@ pub fn draw(samples: &[Sample]) -> Result<String, FigureError> {
                  inertial, feedback; below the same without gravity";
     draw_canvas((760, 470), alt_text, |area| {
         let (head, body) = area.split_vertically(px(24.0));
-        let keys = TERMS.map(|(name, colour, _)| (name, LegendSymbol::Line(2.0), colour));
-        legend(&head, (170.0, 13.0), &keys)?;
-        let (all, small) = body.split_vertically(px(235.0));
+        let entries = TERMS.map(|(name, colour, _)| (name, LegendSymbol::Line(2.0), colour));
+        legend(&head, (170.0, 13.0), &entries)?;
+        let (with_gravity, without_gravity) = body.split_vertically(px(235.0));
         let names = ["(a)  shoulder pitch, joint 2", "(b)  elbow, joint 3"];
-        for (joint, (whole, part)) in halves(&all).iter().zip(&halves(&small)).enumerate() {
-            panel(whole, names[joint], samples, joint, &TERMS)?;
+        for (joint, (upper, lower)) in halves(&with_gravity)
+            .iter()
+            .zip(&halves(&without_gravity))
+            .enumerate()
+        {
+            panel(upper, names[joint], samples, joint, &TERMS)?;
             panel(
-                part,
+                lower,
                 "the same without gravity",
                 samples,
                 joint,

@@ -14,17 +14,17 @@ const TOUCH_N: f64 = 0.5;
 const BEFORE_S: f64 = 0.25;
 /// Time after the first touch that the close-up shows \[s\].
 const CLOSE_UP_S: f64 = 0.1;
-/// The stiffnesses of the paper's figure, 25 times apart \[N/m\].
+/// The two stiffnesses of the paper's figure, which differ by a factor of 25 \[N/m\].
 const SHOWN_N_PER_M: [f64; 2] = [5.0, 125.0];
 
-/// Force over time, zero at the first touch \[s, N\].
+/// Time since the first touch \[s\] and force \[N\] of each sample.
 type Contact = Vec<(f64, f64)>;
 
 /// One probing run.
 pub struct Probing {
     /// `K` \[N/m\].
     pub stiffness_n_per_m: f64,
-    /// One series per stroke with contact.
+    /// One series per stroke (descent and return of the reference) with contact.
     pub contacts: Vec<Contact>,
 }
 
@@ -174,9 +174,13 @@ mod tests {
     fn samples() -> Vec<Sample> {
         let sample = |k: u32| {
             let time_s = f64::from(k) * 1e-3;
-            let into_s = time_s % 2.0;
-            let depth = if into_s < 1.0 { into_s } else { 2.0 - into_s };
-            let touches = time_s < 2.0 && (0.5..0.6).contains(&into_s);
+            let stroke_time_s = time_s % 2.0;
+            let depth = if stroke_time_s < 1.0 {
+                stroke_time_s
+            } else {
+                2.0 - stroke_time_s
+            };
+            let touches = time_s < 2.0 && (0.5..0.6).contains(&stroke_time_s);
             Sample {
                 time_s,
                 reference_m: [0.7, 0.0, -0.1 * depth],
@@ -205,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn runs_without_contact_are_drawn_as_such() {
+    fn runs_without_contact_can_be_drawn() {
         let untouched = |k| Probing::new(k, &samples()[2000..]);
         assert!(draw(&[untouched(5.0), untouched(125.0)]).is_ok());
         assert!(draw(&[]).is_ok());

@@ -37,7 +37,7 @@ pub fn draw(runs: &PaperLawRuns<'_>) -> Result<String, FigureError> {
     let alt_text = "Distance from the reference over time under (3.6) exactly as printed, until \
                  the supervisor ends it, and under the law used by supple";
     draw_canvas((760, 330), alt_text, |area| {
-        let off = |s: &Sample| (s.time_s, mm(distance(&s.tip_m, &s.reference_m)));
+        let point = |s: &Sample| (s.time_s, mm(distance(&s.tip_m, &s.reference_m)));
         let whole_s = runs.paper_law.last().map_or(1.0, |s| s.time_s);
         let end_s = runs.ended.map_or(whole_s, |ended| ended.ended_s + AFTER_S);
         let shown = |s: &&Sample| s.time_s <= end_s;
@@ -45,7 +45,7 @@ pub fn draw(runs: &PaperLawRuns<'_>) -> Result<String, FigureError> {
             .paper_law
             .iter()
             .chain(runs.used_law.iter().filter(shown));
-        let max = extent(all.map(|s| off(s).1)).end;
+        let max = extent(all.map(|s| point(s).1)).end;
         let mut panel = Panel::new(
             area,
             "",
@@ -57,8 +57,8 @@ pub fn draw(runs: &PaperLawRuns<'_>) -> Result<String, FigureError> {
                 0.0..1.25 * max,
             ),
         )?;
-        panel.line(runs.used_law.iter().map(off), BLUE, 1.6)?;
-        panel.line(runs.paper_law.iter().map(off), VERMILION, 1.8)?;
+        panel.line(runs.used_law.iter().map(point), BLUE, 1.6)?;
+        panel.line(runs.paper_law.iter().map(point), VERMILION, 1.8)?;
         if let Some(ended) = runs.ended {
             panel.vertical(ended.ended_s, REFERENCE)?;
             let at = (ended.ended_s, panel.y().end);

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-/// Ticks of an axis: first and last bound it.
+/// Ticks of an axis, normally from one end of the axis to the other.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ticks {
     /// Tick positions: sorted, evenly spaced round numbers.
@@ -48,7 +48,7 @@ impl Ticks {
     }
 }
 
-/// Formats a number with the given decimals, a typographic minus sign, and no sign at zero.
+/// Formats a number with the given decimals and a typographic minus sign. A number that rounds to zero becomes "0".
 pub fn number(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     let zero = text.chars().all(|c| matches!(c, '-' | '0' | '.'));
@@ -62,12 +62,12 @@ pub fn number(value: f64, decimals: usize) -> String {
 /// Smallest number of the form 1, 2, 2.5 or 5 times a power of ten that is not below the argument.
 fn round_up(value: f64) -> f64 {
     let power = 10.0_f64.powf(value.log10().floor());
-    let lead = value / power;
+    let mantissa = value / power;
     let round = [1.0, 2.0, 2.5, 5.0, 10.0];
     power
         * round
             .into_iter()
-            .find(|r| lead <= r * (1.0 + 1e-9))
+            .find(|r| mantissa <= r * (1.0 + 1e-9))
             .unwrap_or(10.0)
 }
 

@@ -1,7 +1,7 @@
 //! `supple calibrate`: runs all steps from breakaway to the demo on the simulated arm.
 
 use super::identify::{FILES, print, write};
-use super::report::{Found, summary};
+use super::report::{ReportInput, summary};
 use crate::demo;
 use serde::Serialize;
 use supple_cli::arguments::{CalibrateArgs, DemoArgs};
@@ -16,7 +16,7 @@ use supple_experiment::{
 };
 use supple_model::{Description, with_dof};
 
-/// Number of models drawn to predict the tracking error.
+/// Number of models drawn from the uncertainty of the fit to predict the tracking error.
 const DRAWS: u64 = 5;
 
 /// Folder of the plant's description, if it differs from that of `--arm`.
@@ -44,7 +44,7 @@ struct Summary {
 /// [`Failure`].
 pub fn run(args: &CalibrateArgs) -> Result<(), Failure> {
     let arm = arms::find(&args.arm, args.strict)?;
-    with_dof!(arm.dof(), N => sized::<N>(&arm, args))??;
+    with_dof!(arm.dof(), N => run_with_dof::<N>(&arm, args))??;
     if args.no_demo {
         return Ok(());
     }
@@ -64,7 +64,7 @@ pub fn run(args: &CalibrateArgs) -> Result<(), Failure> {
     })
 }
 
-fn sized<const N: usize>(arm: &Description, args: &CalibrateArgs) -> Result<(), Failure> {
+fn run_with_dof<const N: usize>(arm: &Description, args: &CalibrateArgs) -> Result<(), Failure> {
     let staging = Staging::new(&args.out, &[&FILES[..], &["calibration.json"]].concat())?;
     let calibration = Calibration {
         ripple_nm: args.ripple,
@@ -99,8 +99,8 @@ fn sized<const N: usize>(arm: &Description, args: &CalibrateArgs) -> Result<(), 
         let found = calibrate::<N>(arm, &other, &mut |_| {})?;
         without_load = follow(&other, &found.description)?;
     }
-    let foretold = predict_tracking_error(&found.description, &found.fit, DRAWS)?;
-    let report = Found {
+    let predicted_tracking = predict_tracking_error(&found.description, &found.fit, DRAWS)?;
+    let report = ReportInput {
         arm: &found.description,
         fit: &found.fit,
         logs: vec!["excitation".to_owned()],
@@ -109,7 +109,7 @@ fn sized<const N: usize>(arm: &Description, args: &CalibrateArgs) -> Result<(), 
             found.held_out.clone(),
             found.validation.clone(),
         )],
-        foretold,
+        predicted_tracking,
     };
     if args.ripple > 0.0 {
         // The demo that follows uses the plant including its ripple.

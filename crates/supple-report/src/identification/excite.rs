@@ -24,7 +24,9 @@ struct Summary<'a> {
     criterion: &'static str,
     rank: usize,
     condition: f64,
+    /// Value of the criterion for the first candidate that meets the limits.
     first_value: f64,
+    /// Value of the criterion for the result.
     last_value: f64,
     #[serde(flatten)]
     series: SeriesLists,
@@ -44,7 +46,7 @@ pub fn run(args: &DesignArgs) -> Result<(), Failure> {
         }),
         _ => None,
     };
-    let request = DesignOptions {
+    let options = DesignOptions {
         period_s: args.period,
         periods: args.periods,
         criterion: match args.criterion {
@@ -56,12 +58,12 @@ pub fn run(args: &DesignArgs) -> Result<(), Failure> {
         seed: args.seed,
         ..DesignOptions::of(&moving)
     };
-    with_dof!(arm.dof(), N => sized::<N>(&arm, &request, args))?
+    with_dof!(arm.dof(), N => run_with_dof::<N>(&arm, &options, args))?
 }
 
-fn sized<const N: usize>(
+fn run_with_dof<const N: usize>(
     arm: &Description,
-    request: &DesignOptions,
+    options: &DesignOptions,
     args: &DesignArgs,
 ) -> Result<(), Failure> {
     let staging = Staging::new(
@@ -69,12 +71,12 @@ fn sized<const N: usize>(
         &["excitation.csv", "excitation.svg", "summary.json"],
     )?;
     let (config, home) = (arm.config::<N>()?, arm.home::<N>()?);
-    let every = (request.candidates / 10).max(1);
-    let found = design(&config, &home, request, &mut |tried, best| {
-        if !args.quiet && tried % every == 0 {
+    let progress_interval = (options.candidates / 10).max(1);
+    let found = design(&config, &home, options, &mut |tried, best| {
+        if !args.quiet && tried % progress_interval == 0 {
             print_status(&format!(
                 "{tried} of {} candidates: {best:.4}",
-                request.candidates
+                options.candidates
             ));
         }
     })?;
@@ -83,8 +85,8 @@ fn sized<const N: usize>(
     let series = &found.series;
     let summary = Summary {
         arm: arm.name(),
-        moving: request.moving.clone(),
-        criterion: match request.criterion {
+        moving: options.moving.clone(),
+        criterion: match options.criterion {
             design::Criterion::Condition => "condition",
             design::Criterion::DOptimality => "d-optimality",
         },

@@ -40,7 +40,7 @@ struct Summary<'a> {
 pub fn run(args: &RunArgs) -> Result<(), Failure> {
     let arm = arms::find(&args.arm, args.strict)?;
     let design = read(&args.design)?;
-    with_dof!(arm.dof(), N => sized::<N>(&arm, &design, args))?
+    with_dof!(arm.dof(), N => run_with_dof::<N>(&arm, &design, args))?
 }
 
 fn read(path: &Path) -> Result<ExcitationDesign, Failure> {
@@ -62,7 +62,7 @@ fn read(path: &Path) -> Result<ExcitationDesign, Failure> {
     )
 }
 
-fn sized<const N: usize>(
+fn run_with_dof<const N: usize>(
     arm: &Description,
     design: &ExcitationDesign,
     args: &RunArgs,

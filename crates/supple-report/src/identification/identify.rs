@@ -1,6 +1,6 @@
 //! `supple identify`: identifies a model from logs; the controller can load it.
 
-use super::report::{Found, Summary, html, summary};
+use super::report::{ReportInput, Summary, html, summary};
 use std::path::Path;
 use supple_cli::arguments::IdentifyArgs;
 use supple_cli::arms;
@@ -16,10 +16,10 @@ use supple_model::{Description, with_dof};
 
 /// Fraction of the first log that is held out for validation if no validation log is given.
 const HELD_OUT_FRACTION: f64 = 0.2;
-/// Speed below which samples of supple's own logs count as slow; their sampling rate is high enough for this
+/// Default of `--slow` for MCAP logs, which are supple's own and sampled fast enough to fit the Stribeck effect
 /// \[rad/s\].
 const SLOW_RAD_PER_S: f64 = 0.15;
-/// Number of models drawn to predict the tracking error.
+/// Number of models drawn from the uncertainty of the fit to predict the tracking error.
 const DRAWS: u64 = 5;
 
 /// Output files.
@@ -31,66 +31,69 @@ pub const FILES: [&str; 4] = ["arm.urdf", "arm.toml", "report.html", "summary.js
 /// [`Failure`].
 pub fn run(args: &IdentifyArgs) -> Result<(), Failure> {
     let arm = arms::find(&args.arm, args.strict)?;
-    with_dof!(arm.dof(), N => sized::<N>(&arm, args))?
+    with_dof!(arm.dof(), N => run_with_dof::<N>(&arm, args))?
 }
 
 fn procedure(args: &IdentifyArgs, period_s: f64) -> Procedure {
-    let given = |list: &Vec<usize>| (!list.is_empty()).then(|| list.clone());
-    let ours = ours(args);
+    let all_mcap = all_mcap(args);
     Procedure {
-        moving: given(&args.moving),
+        moving: (!args.moving.is_empty()).then(|| args.moving.clone()),
         couplings: args.coupling.clone(),
         preparation: Preparation {
             rate_hz: args.rate,
             cutoff_hz: Some(args.cutoff),
-            keep_every: if ours { 10 } else { 1 },
+            keep_every: if all_mcap { 10 } else { 1 },
             // supple's own logs contain commanded torques; a command acts one cycle later and for one cycle, hence
             // the delay of 1.5 periods.
-            torque_delay_s: if ours { 1.5 * period_s } else { 0.0 },
+            torque_delay_s: if all_mcap { 1.5 * period_s } else { 0.0 },
         },
         method: args.method.into(),
         friction: FrictionChoice::Auto,
-        slow_rad_per_s: slow(args).unwrap_or(0.0),
+        slow_rad_per_s: slow_limit_rad_per_s(args).unwrap_or(0.0),
         joint_noise_nm: (!args.noise.is_empty()).then(|| args.noise.clone()),
         ..Procedure::default()
     }
 }
 
-/// Whether all logs are supple's own.
-fn ours(args: &IdentifyArgs) -> bool {
-    let is_mcap = |path: &std::path::PathBuf| path.extension().is_some_and(|end| end == "mcap");
+/// Whether all logs are MCAP, the format of supple's own logs.
+fn all_mcap(args: &IdentifyArgs) -> bool {
+    let is_mcap = |path: &std::path::PathBuf| {
+        path.extension()
+            .is_some_and(|extension| extension == "mcap")
+    };
     args.logs.iter().all(is_mcap)
 }
 
-/// Speed below which samples are excluded; `None` if none are.
-fn slow(args: &IdentifyArgs) -> Option<f64> {
+/// Speed below which samples of a joint are excluded from the fit, and used to fit the Stribeck effect; `None` if none
+/// are.
+fn slow_limit_rad_per_s(args: &IdentifyArgs) -> Option<f64> {
     args.slow
-        .or(ours(args).then_some(SLOW_RAD_PER_S))
+        .or(all_mcap(args).then_some(SLOW_RAD_PER_S))
         .filter(|speed| *speed > 0.0)
 }
 
 /// Motions with the names of their files.
-type Named = Vec<(String, Motion)>;
+type NamedMotions = Vec<(String, Motion)>;
 
 fn motions<const N: usize>(
     paths: &[std::path::PathBuf],
     moving: &[usize],
     preparation: &Preparation,
     warnings: &mut Vec<supple_ident::Warning>,
-) -> Result<Named, Failure> {
+) -> Result<NamedMotions, Failure> {
     let mut all = Vec::new();
     for path in paths {
         let logs: Vec<Log> = read_logs::<N>(path)?;
         for log in &logs {
-            let (motion, result_warnings) = Motion::prepare(log, N, moving, preparation)?;
-            warnings.extend(result_warnings);
+            let (motion, motion_warnings) = Motion::prepare(log, N, moving, preparation)?;
+            warnings.extend(motion_warnings);
             all.push((path.display().to_string(), motion));
         }
     }
     Ok(all)
 }
 
-fn sized<const N: usize>(arm: &Description, args: &IdentifyArgs) -> Result<(), Failure> {
+fn run_with_dof<const N: usize>(arm: &Description, args: &IdentifyArgs) -> Result<(), Failure> {
     let staging = Staging::new(&args.out, &FILES)?;
     let nominal = arm.arm::<N>()?;
     let procedure = procedure(args, arm.settings().period_s);
@@ -111,44 +114,47 @@ fn sized<const N: usize>(arm: &Description, args: &IdentifyArgs) -> Result<(), F
         *motion = motion.part(0..cut);
     }
     let data: Vec<Motion> = fitted.iter().map(|(_, motion)| motion.clone()).collect();
-    let mut fit: Fit<N> = if slow(args).is_some() {
-        let given = Procedure {
+    let mut fit: Fit<N> = if slow_limit_rad_per_s(args).is_some() {
+        let with_fixed_prior = Procedure {
             prior_weight: Some(1.0),
             ..procedure.clone()
         };
-        fit_with_stribeck(&nominal, &data, &moving, &given)?
+        fit_with_stribeck(&nominal, &data, &moving, &with_fixed_prior)?
     } else {
         identify_motions(&nominal, &data, &moving, &procedure)?
     };
     fit.warnings.extend(warnings);
-    let mut checked: Vec<(String, Motion, Validation)> = Vec::new();
+    let mut validated: Vec<(String, Motion, Validation)> = Vec::new();
     for (name, motion) in held_out {
         let validation = fit.validate_motion(&motion)?;
-        checked.push((name, motion, validation));
+        validated.push((name, motion, validation));
     }
-    let validations: Vec<Validation> = checked.iter().map(|(.., found)| found.clone()).collect();
+    let validations: Vec<Validation> = validated
+        .iter()
+        .map(|(.., validation)| validation.clone())
+        .collect();
     let thresholds = fit.move_collision_nm(&validations, &arm.config::<N>()?);
-    let described = fit
+    let identified = fit
         .description(arm, None)?
         .with_move_collision(&thresholds)?;
-    let found = Found {
-        arm: &described,
+    let input = ReportInput {
+        arm: &identified,
         fit: &fit,
         logs: args
             .logs
             .iter()
             .map(|path| path.display().to_string())
             .collect(),
-        held_out: checked,
-        foretold: predict_tracking_error(&described, &fit, DRAWS)?,
+        held_out: validated,
+        predicted_tracking: predict_tracking_error(&identified, &fit, DRAWS)?,
     };
-    let numbers = summary(&found);
-    write(&staging, &found, &numbers)?;
+    let summary = summary(&input);
+    write(&staging, &input, &summary)?;
     staging.publish()?;
     if args.json {
-        return print_line(&json(&numbers)?);
+        return print_line(&json(&summary)?);
     }
-    print(&numbers, &args.out)
+    print(&summary, &args.out)
 }
 
 /// Writes model, report and summary.
@@ -157,41 +163,41 @@ fn sized<const N: usize>(arm: &Description, args: &IdentifyArgs) -> Result<(), F
 /// [`Failure`].
 pub fn write<const N: usize>(
     staging: &Staging,
-    found: &Found<'_, N>,
-    numbers: &Summary,
+    input: &ReportInput<'_, N>,
+    summary: &Summary,
 ) -> Result<(), Failure> {
-    staging.write("arm.urdf", found.arm.urdf().as_bytes())?;
-    staging.write("arm.toml", found.arm.toml().as_bytes())?;
-    staging.write("report.html", html(found, numbers)?.as_bytes())?;
-    staging.write("summary.json", format!("{}\n", json(numbers)?).as_bytes())
+    staging.write("arm.urdf", input.arm.urdf().as_bytes())?;
+    staging.write("arm.toml", input.arm.toml().as_bytes())?;
+    staging.write("report.html", html(input, summary)?.as_bytes())?;
+    staging.write("summary.json", format!("{}\n", json(summary)?).as_bytes())
 }
 
 /// Prints the summary.
 ///
 /// # Errors
 /// [`Failure::File`].
-pub fn print(numbers: &Summary, out: &Path) -> Result<(), Failure> {
-    for (of, table) in &numbers.choices {
-        print_line(&format!("{of}\n{}", table.trim_end()))?;
+pub fn print(summary: &Summary, out: &Path) -> Result<(), Failure> {
+    for (subject, table) in &summary.choices {
+        print_line(&format!("{subject}\n{}", table.trim_end()))?;
     }
     print_line(&format!(
         "rank {} of {} columns, condition number {:.1}, residual {:.2} % of the torque",
-        numbers.rank,
-        numbers.columns,
-        numbers.condition,
-        100.0 * numbers.training_relative
+        summary.rank,
+        summary.columns,
+        summary.condition,
+        100.0 * summary.training_relative
     ))?;
-    for line in &numbers.held_out {
+    for line in &summary.held_out {
         print_line(&format!(
             "held out: {}: residual {:.2} %",
             line.log,
             100.0 * line.total_relative
         ))?;
     }
-    for warning in &numbers.warnings {
+    for warning in &summary.warnings {
         print_line(&format!("warning: {warning}"))?;
     }
-    print_line(&numbers.verdict)?;
-    print_line(&numbers.verdict_at_5_n_per_m)?;
+    print_line(&summary.verdict)?;
+    print_line(&summary.verdict_at_5_n_per_m)?;
     print_line(&format!("model and report: {}", out.display()))
 }

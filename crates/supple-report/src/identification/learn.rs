@@ -34,10 +34,10 @@ struct Summary<'a> {
 /// [`Failure`].
 pub fn run(args: &LearnArgs) -> Result<(), Failure> {
     let arm = arms::find(&args.arm, args.strict)?;
-    with_dof!(arm.dof(), N => sized::<N>(&arm, args))?
+    with_dof!(arm.dof(), N => run_with_dof::<N>(&arm, args))?
 }
 
-fn sized<const N: usize>(arm: &Description, args: &LearnArgs) -> Result<(), Failure> {
+fn run_with_dof<const N: usize>(arm: &Description, args: &LearnArgs) -> Result<(), Failure> {
     let config = arm.config::<N>()?;
     let mut logs = Vec::new();
     for path in &args.logs {

@@ -90,7 +90,7 @@ pub struct BaseParameter {
 }
 
 /// Input of the report.
-pub struct Found<'a, const N: usize> {
+pub struct ReportInput<'a, const N: usize> {
     /// The identified arm.
     pub arm: &'a Description,
     /// The fit.
@@ -99,13 +99,13 @@ pub struct Found<'a, const N: usize> {
     pub logs: Vec<String>,
     /// Held-out logs: name, motion, prediction.
     pub held_out: Vec<(String, Motion, Validation)>,
-    /// Predicted tracking error.
-    pub foretold: Option<TrackingPrediction>,
+    /// Predicted tracking error; `None` if the arm cannot reach the sinusoid.
+    pub predicted_tracking: Option<TrackingPrediction>,
 }
 
 /// Summarises a fit.
-pub fn summary<const N: usize>(found: &Found<'_, N>) -> Summary {
-    let fit = found.fit;
+pub fn summary<const N: usize>(input: &ReportInput<'_, N>) -> Summary {
+    let fit = input.fit;
     let values = fit.base_parameters();
     let combinations = fit.base.text(&fit.columns.names());
     let base = combinations
@@ -116,16 +116,16 @@ pub fn summary<const N: usize>(found: &Found<'_, N>) -> Summary {
             value: values[i],
             interval: CONFIDENCE * fit.base_std[i],
         });
-    let friction = fit.friction_with(found.arm.friction());
-    let names = found.arm.joint_names();
+    let friction = fit.friction_with(input.arm.friction());
+    let names = input.arm.joint_names();
     Summary {
-        arm: found.arm.name().to_owned(),
-        logs: found.logs.clone(),
+        arm: input.arm.name().to_owned(),
+        logs: input.logs.clone(),
         rank: fit.rank(),
         columns: fit.columns.len(),
         condition: fit.condition(),
         training_relative: fit.training_relative,
-        held_out: found
+        held_out: input
             .held_out
             .iter()
             .map(|(log, _, v)| HeldOut {
@@ -135,7 +135,7 @@ pub fn summary<const N: usize>(found: &Found<'_, N>) -> Summary {
                 total_relative: v.total_relative,
             })
             .collect(),
-        positive_definite: found
+        positive_definite: input
             .held_out
             .iter()
             .map(|(_, _, v)| v.positive_definite)
@@ -157,15 +157,15 @@ pub fn summary<const N: usize>(found: &Found<'_, N>) -> Summary {
             .map(|choice| (choice.subject.to_owned(), choice.table.to_string()))
             .collect(),
         warnings: fit.warnings.iter().map(ToString::to_string).collect(),
-        verdict: found
+        verdict: input
             .held_out
             .first()
             .map_or_else(|| "not validated".to_owned(), |(_, _, v)| v.verdict()),
-        verdict_at_5_n_per_m: found.foretold.as_ref().map_or_else(
+        verdict_at_5_n_per_m: input.predicted_tracking.as_ref().map_or_else(
             || "no prediction: the arm cannot reach the paper's sinusoid".to_owned(),
             TrackingPrediction::verdict,
         ),
-        foretold: found.foretold.clone(),
+        foretold: input.predicted_tracking.clone(),
     }
 }
 
@@ -181,10 +181,13 @@ struct Page<'a> {
 ///
 /// # Errors
 /// [`Failure::ReportGeneration`], [`Failure::Figure`].
-pub fn html<const N: usize>(found: &Found<'_, N>, summary: &Summary) -> Result<String, Failure> {
+pub fn html<const N: usize>(
+    input: &ReportInput<'_, N>,
+    summary: &Summary,
+) -> Result<String, Failure> {
     let mut figures = Vec::new();
-    for (name, motion, _) in &found.held_out {
-        let (torques, residuals) = drawn(found, motion)?;
+    for (name, motion, _) in &input.held_out {
+        let (torques, residuals) = drawn(input, motion)?;
         figures.push((name.clone(), torques, residuals));
     }
     let page = Page {
@@ -198,10 +201,10 @@ pub fn html<const N: usize>(found: &Found<'_, N>, summary: &Summary) -> Result<S
 
 /// Curves of measured and predicted torques, and of residuals.
 fn drawn<const N: usize>(
-    found: &Found<'_, N>,
+    input: &ReportInput<'_, N>,
     motion: &Motion,
 ) -> Result<(String, String), Failure> {
-    let fit = found.fit;
+    let fit = input.fit;
     let predicted: DMatrix<f64> = fit.predict_motion(motion)?;
     let every = motion.samples().div_ceil(POINTS).max(1);
     let (mut torques, mut residuals) = (Vec::new(), Vec::new());
@@ -212,7 +215,7 @@ fn drawn<const N: usize>(
                 .map(|i| (i as f64 / motion.rate_hz, value(i)))
                 .collect()
         };
-        let title = found.arm.joint_names()[joint].clone();
+        let title = input.arm.joint_names()[joint].clone();
         torques.push(Curves {
             title: title.clone(),
             unit: "torque [N m]",

@@ -1,6 +1,6 @@
 //! Free motion: figures 3 and 4, the arc, the perturbed models, and equation (3.6) exactly as printed.
 
-use super::{Row, Section, kinds_of_quadrant, row};
+use super::{Row, Section, quadrants_with_models, row};
 use crate::units::{mm, newton_metres, seconds};
 use supple_experiment::JointTorque;
 use supple_experiment::metrics::median;
@@ -38,7 +38,7 @@ pub(super) fn sinusoid(summary: &Summary) -> Section {
 
 pub(super) fn quadrant(summary: &Summary) -> Section {
     let mut rows = Vec::new();
-    for (quadrant, model) in kinds_of_quadrant(summary) {
+    for (quadrant, model) in quadrants_with_models(summary) {
         let name = format!("{:.3} m/s, {model}", quadrant.speed_m_per_s);
         rows.push(row(
             format!("{name}: error, RMS, maximum"),

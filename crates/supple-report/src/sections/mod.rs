@@ -60,7 +60,7 @@ pub fn faults(summary: &Summary) -> Vec<(String, &FaultEnd)> {
         runs.push((format!("sinusoid, perturbed model {k}"), &run.ended));
     }
     runs.push(("arc".to_owned(), &summary.arc.ended));
-    for (quadrant, model) in kinds_of_quadrant(summary) {
+    for (quadrant, model) in quadrants_with_models(summary) {
         let name = format!("quadrant at {:.3} m/s, {model}", quadrant.speed_m_per_s);
         runs.push((name, &quadrant.tracking.ended));
     }
@@ -83,7 +83,7 @@ pub fn faults(summary: &Summary) -> Vec<(String, &FaultEnd)> {
 }
 
 /// Runs of the quadrant, each with the model of its controller.
-pub fn kinds_of_quadrant(summary: &Summary) -> [(&QuadrantSummary, &'static str); 3] {
+pub fn quadrants_with_models(summary: &Summary) -> [(&QuadrantSummary, &'static str); 3] {
     [
         (&summary.quadrant, "exact model"),
         (&summary.quadrant_perturbed, "perturbed model"),

@@ -6,18 +6,18 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use supple_model::Description;
 
-/// Writes the 4-joint arm with both files changed into a new folder.
+/// Writes the built-in 4-joint arm into a new folder, with its TOML and its URDF changed by these functions.
 fn arm_in(
     folder: &Path,
     toml: impl Fn(String) -> String,
     urdf: impl Fn(String) -> String,
 ) -> PathBuf {
     let arm = Description::asset("wam4").expect("built in");
-    let place = folder.join("arm");
-    fs::create_dir(&place).expect("a folder");
-    fs::write(place.join("arm.toml"), toml(arm.toml().to_owned())).expect("written");
-    fs::write(place.join("arm.urdf"), urdf(arm.urdf().to_owned())).expect("written");
-    place
+    let arm_folder = folder.join("arm");
+    fs::create_dir(&arm_folder).expect("a folder");
+    fs::write(arm_folder.join("arm.toml"), toml(arm.toml().to_owned())).expect("written");
+    fs::write(arm_folder.join("arm.urdf"), urdf(arm.urdf().to_owned())).expect("written");
+    arm_folder
 }
 
 fn demo_of(arm: &Path, out: &Path) -> Answer {
@@ -38,7 +38,7 @@ fn replaced(text: String, from: &str, to: &str) -> String {
     text.replacen(from, to, 1)
 }
 
-fn same(text: String) -> String {
+fn unchanged(text: String) -> String {
     text
 }
 
@@ -50,7 +50,7 @@ fn a_nan_in_a_urdf_is_code_3() {
         let end = at + urdf[at..].find('"').expect("its end");
         format!("{}NaN{}", &urdf[..at], &urdf[end..])
     };
-    let arm = arm_in(folder.path(), same, mass);
+    let arm = arm_in(folder.path(), unchanged, mass);
     let out = folder.path().join("out");
     let answer = demo_of(&arm, &out);
     assert_eq!(answer.code, Some(3), "{}", answer.stderr);
@@ -62,7 +62,7 @@ fn a_nan_in_a_urdf_is_code_3() {
 fn a_wrong_number_of_joints_is_code_3() {
     let folder = tempfile::tempdir().expect("a folder");
     let one_more = |toml: String| replaced(toml, "home_rad = [0.0,", "home_rad = [0.0, 0.0,");
-    let arm = arm_in(folder.path(), one_more, same);
+    let arm = arm_in(folder.path(), one_more, unchanged);
     let out = folder.path().join("out");
     let answer = demo_of(&arm, &out);
     assert_eq!(answer.code, Some(3), "{}", answer.stderr);
@@ -82,7 +82,7 @@ fn a_trajectory_out_of_reach_is_code_4() {
     let folder = tempfile::tempdir().expect("a folder");
     // The elbow's origin is the length of the upper arm: the shortened arm cannot reach the trajectory.
     let shorter = |urdf: String| replaced(urdf, "0.55", "0.15");
-    let arm = arm_in(folder.path(), same, shorter);
+    let arm = arm_in(folder.path(), unchanged, shorter);
     let out = folder.path().join("out");
     let answer = demo_of(&arm, &out);
     assert_eq!(answer.code, Some(4), "{}", answer.stderr);
@@ -95,8 +95,8 @@ fn an_unwritable_folder_is_code_6_before_the_run() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("file");
     fs::write(&file, "someone else's").expect("written");
-    let beneath = file.join("out");
-    for out in [beneath.as_path(), &file, Path::new("/proc/supple-out")] {
+    let below_a_file = file.join("out");
+    for out in [below_a_file.as_path(), &file, Path::new("/proc/supple-out")] {
         let answer = run(&["demo", "--out", arg(out)]);
         assert_eq!(answer.code, Some(6), "{}: {}", out.display(), answer.stderr);
         assert_one_clear_line(&answer, &[arg(out), "--out"]);
@@ -176,7 +176,7 @@ fn fifo(path: &Path) {
     assert!(made.expect("mkfifo is there").success());
 }
 
-/// Writes nothing to a device: asserts that the device is rejected and unchanged.
+/// Devices and FIFOs are rejected and stay what they were.
 #[cfg(unix)]
 #[test]
 fn outputs_that_are_not_regular_files_are_code_6_before_anything_is_written() {
@@ -280,7 +280,7 @@ fn numbers_out_of_range_are_code_2_with_their_range() {
     assert!(tree(folder.path()).is_empty());
 }
 
-/// The product is too long although each number is in range.
+/// The duration, periods times period, is too long although each number is in range.
 #[test]
 fn an_excitation_of_days_is_rejected() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -295,7 +295,7 @@ fn an_excitation_of_days_is_rejected() {
 
 /// Half an hour, sampled once a second, on a grid of 100 kHz would need gigabytes.
 #[test]
-fn a_grid_that_exceeds_memory_is_rejected() {
+fn a_resampling_grid_that_exceeds_memory_is_rejected() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut table = "t,q0,q1,q2,q3,tau0,tau1,tau2,tau3\n".to_owned();
     for i in 0..2000 {
@@ -309,12 +309,12 @@ fn a_grid_that_exceeds_memory_is_rejected() {
     assert_one_clear_line(&answer, &["samples at the rate of the grid", "1.999e8"]);
 }
 
-/// The warning is printed once, or the file is rejected.
+/// One warning is printed; with `--strict` the file is rejected.
 #[test]
 fn unread_urdf_elements_are_a_warning_or_an_error_with_strict() {
     let folder = tempfile::tempdir().expect("a folder");
     let gazebo = |urdf: String| replaced(urdf, "</robot>", "<gazebo/><gazebo/></robot>");
-    let arm = arm_in(folder.path(), same, gazebo);
+    let arm = arm_in(folder.path(), unchanged, gazebo);
     let identify = ["identify", "--arm", arg(&arm), "log.csv"];
     let answer = run_in(folder.path(), &identify);
     assert_eq!(answer.code, Some(6), "{}", answer.stderr);

@@ -39,30 +39,30 @@ fn telemetry(step_number: u64, fault: u8) -> Telemetry {
     Telemetry::of(&record, &state, CycleTiming::default())
 }
 
-/// The disk is blocked for as long as the test needs.
+/// A task that blocks the thread that writes stands for a hanging disk.
 #[test]
 fn hanging_disk_blocks_nothing_and_dropped_tables_are_counted() {
     let folder = tempfile::tempdir().expect("a folder");
     let faults = folder.path().join("faults");
     let files = FaultFiles::start(faults.clone()).expect("a thread");
-    let (open, gate) = sync_channel::<()>(0);
-    let (begun, has_begun) = sync_channel(1);
+    let (unblock, blocked) = sync_channel::<()>(0);
+    let (started, has_started) = sync_channel(1);
     assert!(files.writer().submit(move || {
-        begun.send(()).expect("the test waits");
-        gate.recv().expect("the test opens");
+        started.send(()).expect("the test waits");
+        blocked.recv().expect("the test unblocks it");
     }));
-    has_begun.recv().expect("it begins");
-    let mut last = FaultRecorder::new(files);
-    let calm = telemetry(0, 0);
+    has_started.recv().expect("it starts");
+    let mut recorder = FaultRecorder::new(files);
+    let without_fault = telemetry(0, 0);
     for step in 0..5 {
-        last.add(&telemetry(step, 1));
-        last.add(&calm);
+        recorder.add(&telemetry(step, 1));
+        recorder.add(&without_fault);
     }
     // Five faults were recorded; two tables wait for the disk.
-    assert_eq!(last.files().dropped(), 3);
+    assert_eq!(recorder.files().dropped(), 3);
     assert!(!faults.exists());
-    open.send(()).expect("the disk hangs");
-    last.finish(Duration::from_secs(60));
+    unblock.send(()).expect("the disk is still blocked");
+    recorder.finish(Duration::from_secs(60));
     let names = fs::read_dir(&faults).expect("there").count();
     assert_eq!(names, 2);
 }
@@ -79,9 +79,9 @@ fn only_the_newest_tables_and_other_files_are_kept() {
         fs::write(path.join(other), "kept").expect("written");
     }
     let files = FaultFiles::start(path.to_owned()).expect("a thread");
-    let mut last = FaultRecorder::new(files);
-    last.add(&telemetry(77, 1));
-    last.finish(Duration::from_secs(60));
+    let mut recorder = FaultRecorder::new(files);
+    recorder.add(&telemetry(77, 1));
+    recorder.finish(Duration::from_secs(60));
     let mut names: Vec<String> = fs::read_dir(path)
         .expect("readable")
         .map(|entry| entry.expect("an entry").file_name())

@@ -13,7 +13,7 @@ use supple_model::Description;
 use supple_realtime::pause;
 use tempfile::TempDir;
 
-const SOON: Duration = Duration::from_secs(20);
+const TIMEOUT: Duration = Duration::from_secs(20);
 
 struct System {
     folder: TempDir,
@@ -22,8 +22,8 @@ struct System {
 
 fn system() -> System {
     let folder = tempfile::tempdir().expect("a folder");
-    let owner = std::fs::Permissions::from_mode(0o700);
-    std::fs::set_permissions(folder.path(), owner).expect("changed");
+    let owner_only = std::fs::Permissions::from_mode(0o700);
+    std::fs::set_permissions(folder.path(), owner_only).expect("changed");
     let domain = Domain::in_folder(&folder.path().join("supple"), "process").expect("a domain");
     System { folder, domain }
 }
@@ -67,10 +67,10 @@ fn publish(plant: &PlantLink, state: &ArmState) {
         }
         pause(Duration::from_millis(1));
     }
-    panic!("no controller came");
+    panic!("no controller connected");
 }
 
-fn text(output: &Output) -> String {
+fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
@@ -97,7 +97,7 @@ fn answers_equal_those_of_step() {
     let mut reference = State::new(&controller);
     for cycle in 0..20 {
         publish(&plant, &state(cycle));
-        let received = plant.answer(cycle, SOON).expect("read");
+        let received = plant.answer(cycle, TIMEOUT).expect("read");
         let input = Input {
             cycle,
             position_rad: home(),
@@ -108,7 +108,7 @@ fn answers_equal_those_of_step() {
         let output = step(&controller, &mut reference, &input);
         assert_eq!(received.answer, Some(TorqueCommand::new(&output, false)));
     }
-    let first = telemetry.wait(SOON).expect("read").expect("some");
+    let first = telemetry.wait(TIMEOUT).expect("read").expect("some");
     assert_eq!((first.step(), first.record().mode()), (0, Some(Mode::Idle)));
     let reply = || -> (u64, Outcome) {
         for _ in 0..5000 {
@@ -117,7 +117,7 @@ fn answers_equal_those_of_step() {
             }
             pause(Duration::from_millis(1));
         }
-        panic!("no reply came");
+        panic!("no reply arrived");
     };
     assert_eq!(reply(), (sequence, Outcome::Queued));
     assert_eq!(reply(), (sequence, Outcome::Accepted));
@@ -133,16 +133,16 @@ fn fault_writes_last_cycles_to_a_file_that_only_the_owner_can_read() {
     // States 6 to 8 are missing.
     for cycle in [0, 1, 2, 3, 4, 5, 9, 10] {
         publish(&plant, &state(cycle));
-        assert!(plant.answer(cycle, SOON).expect("read").answer.is_some());
+        assert!(plant.answer(cycle, TIMEOUT).expect("read").answer.is_some());
     }
     terminate(&child);
     let output = child.wait_with_output().expect("it ends");
     // A signal during a wait requests shutdown and is not an error.
-    assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     assert!(
-        text(&output).contains("no new arm state for 3 cycles"),
+        stderr(&output).contains("no new arm state for 3 cycles"),
         "{}",
-        text(&output)
+        stderr(&output)
     );
     let folder = system.domain.folder().join("faults");
     let files: Vec<_> = std::fs::read_dir(&folder)
@@ -151,7 +151,7 @@ fn fault_writes_last_cycles_to_a_file_that_only_the_owner_can_read() {
         .collect();
     assert_eq!(files.len(), 1);
     let path = files[0].path();
-    assert!(text(&output).contains(&path.display().to_string()));
+    assert!(stderr(&output).contains(&path.display().to_string()));
     let mode = |path: &Path| path.metadata().expect("it is there").permissions().mode() & 0o777;
     assert_eq!((mode(&folder), mode(&path)), (0o700, 0o600));
     let table = std::fs::read_to_string(&path).expect("readable");
@@ -185,11 +185,11 @@ fn a_second_controller_is_refused_with_the_reason() {
     publish(&plant, &state(0));
     let second = system.start(&["--virtual-time"]);
     let output = second.wait_with_output().expect("it ends");
-    assert_eq!(output.status.code(), Some(10), "{}", text(&output));
+    assert_eq!(output.status.code(), Some(10), "{}", stderr(&output));
     assert!(
-        text(&output).contains("another process already writes"),
+        stderr(&output).contains("another process already writes"),
         "{}",
-        text(&output)
+        stderr(&output)
     );
     first.kill().expect("SIGKILL");
     first.wait().expect("it is gone");
@@ -215,5 +215,5 @@ fn unknown_arm_exits_with_code_3() {
     let output = system().start(&["--arm", "wam9"]).wait_with_output();
     let output = output.expect("it ends");
     assert_eq!(output.status.code(), Some(3));
-    assert!(text(&output).contains("wam9"), "{}", text(&output));
+    assert!(stderr(&output).contains("wam9"), "{}", stderr(&output));
 }

@@ -16,7 +16,7 @@ use supple_realtime::Stop;
 use supple_rt::{ControlLoop, HelperQueues, IdleThreadChannel, idle_channel, loop_queues};
 use tempfile::TempDir;
 
-const SOON: Duration = Duration::from_secs(5);
+const TIMEOUT: Duration = Duration::from_secs(5);
 
 pub fn description() -> Description {
     Description::asset("wam4").expect("built in")
@@ -92,7 +92,7 @@ impl Bench {
     pub fn cycle(&mut self, drives: Drives) -> (TorqueCommand, bool) {
         self.plant.publish(&self.state(drives)).expect("published");
         let goes_on = self.run_iteration();
-        let received = self.plant.answer(self.cycle, SOON).expect("read");
+        let received = self.plant.answer(self.cycle, TIMEOUT).expect("read");
         self.cycle += 1;
         (received.answer.expect("an answer"), goes_on)
     }

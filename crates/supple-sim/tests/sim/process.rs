@@ -13,7 +13,7 @@ use supple_plant::{Plant, PlantConfig};
 use supple_sim::Motors;
 use tempfile::TempDir;
 
-const SOON: Duration = Duration::from_secs(20);
+const TIMEOUT: Duration = Duration::from_secs(20);
 
 struct System {
     folder: TempDir,
@@ -74,7 +74,7 @@ fn in_virtual_time_it_equals_the_plant_bit_for_bit() {
     let mut plant = Plant::new(config, home, Vector::zeros()).expect("valid");
     let mut controller = Holding::new();
     for cycle in 0..200 {
-        let arm = link.wait(SOON).expect("read").expect("a state");
+        let arm = link.wait(TIMEOUT).expect("read").expect("a state");
         let measured = plant.measurement();
         let input = arm.input::<4>(None).expect("four joints");
         assert_eq!((arm.cycle, arm.stamp_ns), (cycle, cycle * 1_000_000));
@@ -138,7 +138,7 @@ fn a_second_plant_is_refused_with_the_reason() {
     let system = system();
     let mut first = system.start(&[]);
     let link = ControllerLink::new(&system.domain).expect("a controller");
-    assert!(link.wait(SOON).expect("read").is_some());
+    assert!(link.wait(TIMEOUT).expect("read").is_some());
     let output = system.start(&[]).wait_with_output().expect("it ends");
     let text = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(10), "{text}");
@@ -148,7 +148,7 @@ fn a_second_plant_is_refused_with_the_reason() {
     // A new plant replaces the killed one, and the controller receives its states.
     while link.receive().expect("read").is_some() {}
     let mut third = system.start(&[]);
-    assert!(link.wait(SOON).expect("read").is_some());
+    assert!(link.wait(TIMEOUT).expect("read").is_some());
     third.kill().expect("SIGKILL");
     third.wait().expect("it is gone");
 }
@@ -172,7 +172,7 @@ fn injected_faults_show_in_the_published_states() {
     let home_rad = description.home::<4>().expect("four joints");
     let mut holding = Holding::new();
     for cycle in 0..30 {
-        let state = link.wait(SOON).expect("read").expect("a state");
+        let state = link.wait(TIMEOUT).expect("read").expect("a state");
         assert!((state.position_rad[3] - home_rad[3] - 0.25).abs() < 0.01);
         let present = state.position_present & 1 != 0;
         assert_eq!(present, cycle % 2 == 0, "cycle {cycle}");
@@ -198,7 +198,7 @@ fn invalid_command_counts_as_missing_answer() {
     let mut motors = Motors::<4>::new(1e-3, guard);
     let mut unusable = 0;
     for cycle in 0..40 {
-        let arm = link.wait(SOON).expect("read").expect("a state");
+        let arm = link.wait(TIMEOUT).expect("read").expect("a state");
         let measured = arm.input::<4>(None).expect("four joints").position_rad;
         let expected = plant.measurement().position_rad;
         assert_eq!(
