@@ -75,7 +75,7 @@ impl From<Solver> for Method {
 /// Arguments of `identify`.
 #[derive(Clone, Debug, Args)]
 pub struct IdentifyArgs {
-    /// Logs: supple's MCAP, or CSV with the columns t, q[0].., tau[0].. and, if measured, qd[0]..
+    /// Logs: supple's MCAP, or CSV with the columns `t`, `q[0]` .., `tau[0]` .. and, if measured, `qd[0]` ..
     #[arg(required = true, value_name = "LOG")]
     pub logs: Vec<PathBuf>,
     /// A built-in arm, or the path of an arm's TOML or of its folder: kinematics and prior.
