@@ -47,7 +47,7 @@ impl JointBreakaway {
 /// Ramps each of `joints` in both directions at `pose_rad`; results are in the order of `joints`.
 ///
 /// # Errors
-/// [`ExperimentError`]; a joint that does not start to slide.
+/// [`ExperimentError`]; a joint that does not break away.
 pub fn breakaway<const N: usize>(
     config: &Config<N>,
     plant: &PlantConfig<N>,

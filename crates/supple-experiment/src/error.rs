@@ -62,7 +62,7 @@ pub enum ExperimentError {
         /// The fault.
         fault: Fault,
     },
-    /// A joint that did not start to slide.
+    /// A joint did not break away.
     #[error(
         "joint {joint} did not move at {torque_nm} N m: check its brake and its stops, or choose \
          another pose"

@@ -1,5 +1,5 @@
-//! Excitation of the simulated arm: a position-controlled move to the start of a series, the series, and a
-//! rest.
+//! Excitation of the simulated arm: a position-controlled move to the start of each Fourier series, a rest, then
+//! the series.
 
 use crate::request_sequence::{RequestSequence, Step};
 use supple_core::controller::Request;
@@ -48,7 +48,7 @@ pub fn excitation<const N: usize>(
     }
 }
 
-/// One minute of motion of each of `joints` up to 0.1 rad/s, which shows dry friction.
+/// One minute of motion of each of `joints` up to 0.1 rad/s, in which dry friction dominates.
 ///
 /// # Errors
 /// Options out of range.

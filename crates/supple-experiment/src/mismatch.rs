@@ -6,7 +6,7 @@ use serde::Serialize;
 use supple_core::nalgebra::Vector3;
 use supple_core::{Arm, ArmError, Body, Config, Friction, Joint};
 
-/// Relative errors of a model. Each parameter has the full error, with a seeded sign.
+/// Relative errors of a model. Each parameter has the full error, with a random sign that `seed` determines.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Mismatch {
     /// Error of the gravity parameters: every mass and every component of every centre of mass.
@@ -33,7 +33,7 @@ impl Mismatch {
     /// If the changed arm is physically inconsistent.
     pub fn apply<const N: usize>(&self, exact: &Config<N>) -> Result<Config<N>, ArmError> {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
-        let mut off = |amount: f64| {
+        let mut factor = |amount: f64| {
             1.0 + if random.random::<bool>() {
                 amount
             } else {
@@ -43,8 +43,8 @@ impl Mismatch {
         let arm = &exact.arm;
         let joints: [Joint; N] = core::array::from_fn(|i| {
             let body = arm.body(i);
-            let mass_kg = body.mass_kg * off(self.gravity);
-            let com_m = Vector3::from_fn(|axis, _| body.com_m[axis] * off(self.gravity));
+            let mass_kg = body.mass_kg * factor(self.gravity);
+            let com_m = Vector3::from_fn(|axis, _| body.com_m[axis] * factor(self.gravity));
             Joint {
                 parent_from_link: arm.parent_from_joint(i),
                 axis: Vector3::z(),
@@ -57,12 +57,12 @@ impl Mismatch {
             }
         });
         let friction = exact.friction.map(|friction| {
-            let viscous = off(self.friction);
-            let dry = off(self.friction);
+            let viscous_factor = factor(self.friction);
+            let dry_factor = factor(self.friction);
             Friction {
-                viscous_nm_s_per_rad: friction.viscous_nm_s_per_rad * viscous,
-                coulomb_nm: friction.coulomb_nm * dry,
-                breakaway_nm: friction.breakaway_nm * dry,
+                viscous_nm_s_per_rad: friction.viscous_nm_s_per_rad * viscous_factor,
+                coulomb_nm: friction.coulomb_nm * dry_factor,
+                breakaway_nm: friction.breakaway_nm * dry_factor,
                 ..friction
             }
         });

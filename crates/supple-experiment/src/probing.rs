@@ -1,11 +1,11 @@
-//! Contact statistics of a probing run: one record for each stroke.
+//! Contact quantities of a probing run: one [`Stroke`] for each stroke.
 
 use crate::metrics::median;
 use serde::Serialize;
 use supple_core::trajectory::{Probe, ProbePhase};
 use supple_plant::{StepRecord, Truth};
 
-/// Duration of the first transient after the first touch \[s\].
+/// Duration of the first transient, from the first touch on \[s\].
 const TRANSIENT_S: f64 = 0.05;
 /// Time before the reversal of the reference over which the resting force is averaged \[s\].
 const REST_S: f64 = 0.3;
@@ -15,11 +15,11 @@ const REST_S: f64 = 0.3;
 pub struct Stroke {
     /// Speed of the tip towards the block just before the first touch \[m/s\].
     pub approach_m_per_s: f64,
-    /// Maximum force of the first transient after the 100 Hz filter \[N\].
+    /// Maximum vertical force of the first transient, as the 100 Hz filter of the sensor reports it \[N\].
     pub peak_filtered_n: f64,
-    /// Time in contact over the whole cycle \[s\].
+    /// Time in contact from the start of this stroke to the start of the next \[s\].
     pub contact_s: f64,
-    /// Integral of the vertical force over the whole cycle \[N s\].
+    /// Integral of the vertical force over the same time \[N s\].
     pub impulse_newton_s: f64,
     /// Integral of the vertical force over the first 50 ms after the first touch \[N s\].
     pub impulse_first_50ms_newton_s: f64,
@@ -36,8 +36,9 @@ pub struct ContactMeter {
     current: Option<((u32, u32), Stroke)>,
     first_touch_s: Option<f64>,
     last_speed_m_per_s: f64,
-    rest: (f64, u32),
-    done: Vec<Stroke>,
+    rest_force_sum_n: f64,
+    rest_cycles: u32,
+    finished: Vec<Stroke>,
 }
 
 impl ContactMeter {
@@ -48,8 +49,9 @@ impl ContactMeter {
             current: None,
             first_touch_s: None,
             last_speed_m_per_s: 0.0,
-            rest: (0.0, 0),
-            done: Vec::new(),
+            rest_force_sum_n: 0.0,
+            rest_cycles: 0,
+            finished: Vec::new(),
         }
     }
 
@@ -62,11 +64,11 @@ impl ContactMeter {
         steps: &[StepRecord],
         in_contact: bool,
     ) {
-        let (phase, into_s, stroke, column) = self.probe.phase_at(time_s);
-        let number = (column, stroke);
-        if self.current.is_none_or(|(current, _)| current != number) {
-            self.close();
-            self.current = Some((number, Stroke::default()));
+        let (phase, phase_time_s, stroke, column) = self.probe.phase_at(time_s);
+        let id = (column, stroke);
+        if self.current.is_none_or(|(current, _)| current != id) {
+            self.finish_stroke();
+            self.current = Some((id, Stroke::default()));
         }
         let Some((_, record)) = &mut self.current else {
             return;
@@ -96,44 +98,44 @@ impl ContactMeter {
             record.latched_after_s = self.first_touch_s.map(|touch_s| truth.time_s - touch_s);
         }
         let stroke_s = self.probe.stroke_m / self.probe.speed_m_per_s + self.probe.ramp_s;
-        if phase == ProbePhase::Down && into_s > stroke_s - REST_S {
-            self.rest.0 += truth.contact_force_n.z;
-            self.rest.1 += 1;
+        if phase == ProbePhase::Down && phase_time_s > stroke_s - REST_S {
+            self.rest_force_sum_n += truth.contact_force_n.z;
+            self.rest_cycles += 1;
         }
     }
 
-    fn close(&mut self) {
+    fn finish_stroke(&mut self) {
         if let Some((_, mut stroke)) = self.current.take() {
-            if self.rest.1 > 0 {
-                stroke.rest_force_n = self.rest.0 / f64::from(self.rest.1);
+            if self.rest_cycles > 0 {
+                stroke.rest_force_n = self.rest_force_sum_n / f64::from(self.rest_cycles);
             }
-            self.done.push(stroke);
+            self.finished.push(stroke);
         }
         self.first_touch_s = None;
-        self.rest = (0.0, 0);
+        (self.rest_force_sum_n, self.rest_cycles) = (0.0, 0);
     }
 
     /// All strokes, the unfinished last one included.
     pub fn finish(mut self) -> Vec<Stroke> {
-        self.close();
-        self.done
+        self.finish_stroke();
+        self.finished
     }
 }
 
-/// Median of every entry over the strokes.
+/// Median of each quantity over the strokes.
 pub fn median_stroke(strokes: &[Stroke]) -> Stroke {
-    let of = |entry: &dyn Fn(&Stroke) -> f64| {
+    let median_of = |entry: &dyn Fn(&Stroke) -> f64| {
         let values: Vec<f64> = strokes.iter().map(entry).collect();
         median(&values).unwrap_or_default()
     };
     let latched: Vec<f64> = strokes.iter().filter_map(|s| s.latched_after_s).collect();
     Stroke {
-        approach_m_per_s: of(&|s| s.approach_m_per_s),
-        peak_filtered_n: of(&|s| s.peak_filtered_n),
-        contact_s: of(&|s| s.contact_s),
-        impulse_newton_s: of(&|s| s.impulse_newton_s),
-        impulse_first_50ms_newton_s: of(&|s| s.impulse_first_50ms_newton_s),
-        rest_force_n: of(&|s| s.rest_force_n),
+        approach_m_per_s: median_of(&|s| s.approach_m_per_s),
+        peak_filtered_n: median_of(&|s| s.peak_filtered_n),
+        contact_s: median_of(&|s| s.contact_s),
+        impulse_newton_s: median_of(&|s| s.impulse_newton_s),
+        impulse_first_50ms_newton_s: median_of(&|s| s.impulse_first_50ms_newton_s),
+        rest_force_n: median_of(&|s| s.rest_force_n),
         latched_after_s: median(&latched),
     }
 }

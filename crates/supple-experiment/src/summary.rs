@@ -22,14 +22,14 @@ pub struct TrackingError {
 /// Tracking error at one speed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct AtSpeed {
-    /// Speed relative to the paper's; for the quadrant, relative to the paper's maximum.
+    /// Speed relative to the paper's.
     pub speed: f64,
-    /// Error.
+    /// Tracking error at this speed.
     #[serde(flatten)]
     pub tracking: TrackingError,
 }
 
-/// Torque terms of the two joints of figure 4.
+/// RMS torque of each term on the two joints of figure 4.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct TorqueRms {
     /// The paper's joint 2 \[N m\].
@@ -43,10 +43,10 @@ pub struct TorqueRms {
 pub struct QuadrantSummary {
     /// Speed on every piece \[m/s\].
     pub speed_m_per_s: f64,
-    /// Error.
+    /// Tracking error of the whole run.
     #[serde(flatten)]
     pub tracking: TrackingError,
-    /// Error on each piece.
+    /// Tracking error on each piece.
     pub edges: Vec<Edge>,
 }
 
@@ -57,7 +57,7 @@ pub struct ProbingSummary {
     pub stiffness_n_per_m: f64,
     /// `B` \[N s/m\].
     pub damping_n_s_per_m: f64,
-    /// ContactStatistics.
+    /// Contact: each value is the median over the strokes.
     #[serde(flatten)]
     pub contact: Stroke,
     /// Root mean square error during the descent, before contact \[m\].
@@ -102,9 +102,9 @@ pub struct Summary {
     pub model: Option<String>,
     /// Figure 3a.
     pub sinusoid: TrackingError,
-    /// Figure 3a at half, the same and twice the speed.
+    /// Figure 3a at half, once and twice the paper's speed.
     pub sinusoid_by_speed: Vec<AtSpeed>,
-    /// An arc that moves the base.
+    /// An arc about the base axis, which moves the base joint.
     pub arc: TrackingError,
     /// Figure 4.
     pub torque_rms: TorqueRms,

@@ -1,4 +1,4 @@
-//! Evaluates an identified model: tracks the sinusoid at 5 N/m on the plant.
+//! Evaluates an identified model: tracks the sinusoid on the plant with a tip stiffness of 5 N/m.
 
 use crate::error::ExperimentError;
 use crate::run::{Plan, run};
@@ -16,8 +16,8 @@ pub struct IdentifiedModelTracking {
     pub stribeck_m: f64,
 }
 
-/// Tracks the sinusoid with a controller configured from `identified`; `None` if the arm cannot reach the sinusoid. If a
-/// fault ends a run early, the tracking error is that of the part before it.
+/// Tracks the sinusoid with a controller configured from `identified`; `None` if the arm cannot reach the sinusoid.
+/// If a fault ends a run early, the tracking error is that of the part before it.
 ///
 /// # Errors
 /// [`ExperimentError`].

@@ -10,8 +10,8 @@
 //! the model `P0`, up to a constant; it also determines the parameters that the data do not.
 //!
 //! Solved by Newton's method on `objective - mu (sum log det P_k + sum log g_i . x)`, with `mu` reduced in
-//! steps. At each centre the objective is within `mu nu` of the optimum, where `nu` is four for each link and
-//! one for each form. This bound is returned with the result.
+//! steps. At the minimum for one `mu`, a centre, the objective is within `mu nu` of its own minimum, where `nu` is
+//! four for each link and one for each `g_i`. This bound is returned with the result.
 
 use crate::error::{IdentError, positive};
 use crate::qr_reduction::ReducedSystem;
@@ -29,11 +29,11 @@ const STEPS: usize = 60;
 pub struct Constraints {
     /// Prior: ten parameters of each link of the nominal model. They are the first unknowns.
     pub links: Vec<SVector<f64, 10>>,
-    /// Linear forms that must not be negative, as (unknown, coefficient).
+    /// `g_i`: linear forms that must not be negative, each as a list of (index of the unknown, coefficient).
     pub not_negative: Vec<Vec<(usize, f64)>>,
     /// `gamma`, positive: weight of the prior in equivalent observations.
     pub prior_weight: f64,
-    /// Certified distance from the optimum, relative to the objective, at which to stop.
+    /// Stop when the optimality gap is at most this, relative to `1 + |objective|`.
     pub tolerance: f64,
 }
 
@@ -81,22 +81,22 @@ impl Constraints {
     }
 }
 
-/// Solves for the unknowns of `block`, starting from the prior.
+/// Solves for the unknowns of `system`, starting from the prior.
 ///
 /// # Errors
 /// [`IdentError::Option`] for a prior weight or tolerance that is not positive; [`IdentError::Singular`] if a
 /// link of the prior is physically inconsistent or the data are not finite.
-pub fn solve(block: &ReducedSystem, constraints: &Constraints) -> Result<Solution, IdentError> {
+pub fn solve(system: &ReducedSystem, constraints: &Constraints) -> Result<Solution, IdentError> {
     positive("prior_weight", constraints.prior_weight)?;
     positive("tolerance", constraints.tolerance)?;
-    let problem = Problem::new(block, constraints)?;
+    let problem = Problem::new(system, constraints)?;
     let mut x = problem.start();
     let mut steps = 0;
     let nu = constraints.nu();
-    let mut mu = problem.objective(&x).ok_or_else(not_a_model)?.abs() / nu;
+    let mut mu = problem.objective(&x).ok_or_else(inconsistent_link)?.abs() / nu;
     loop {
         steps += problem.centre(&mut x, mu)?;
-        let objective = problem.objective(&x).ok_or_else(not_a_model)?;
+        let objective = problem.objective(&x).ok_or_else(inconsistent_link)?;
         // Undetermined parameters take the prior's values only if the barrier is negligible against the prior.
         let barrier_negligible = mu <= BARRIER_TO_PRIOR_RATIO * constraints.prior_weight;
         if barrier_negligible && mu * nu <= constraints.tolerance * (1.0 + objective.abs()) {
@@ -111,7 +111,7 @@ pub fn solve(block: &ReducedSystem, constraints: &Constraints) -> Result<Solutio
     }
 }
 
-fn not_a_model() -> IdentError {
+fn inconsistent_link() -> IdentError {
     IdentError::Singular {
         problem: "a link of the model has no positive definite pseudo-inertia".to_owned(),
         remedy: "correct its mass, centre of mass and inertia",
@@ -129,11 +129,11 @@ struct Problem<'a> {
 }
 
 impl<'a> Problem<'a> {
-    fn new(block: &ReducedSystem, constraints: &'a Constraints) -> Result<Self, IdentError> {
-        let a = block.a();
+    fn new(system: &ReducedSystem, constraints: &'a Constraints) -> Result<Self, IdentError> {
+        let a = system.a();
         let inverse = |p: &SVector<f64, 10>| {
             let inverse = Cholesky::new(pseudo_inertia(p)).map(|c| c.inverse());
-            inverse.ok_or_else(not_a_model)
+            inverse.ok_or_else(inconsistent_link)
         };
         let basis = std::array::from_fn(|i| {
             let mut unit = SVector::<f64, 10>::zeros();
@@ -143,7 +143,7 @@ impl<'a> Problem<'a> {
         Ok(Self {
             constraints,
             gram: a.tr_mul(&a),
-            b: block.b(),
+            b: system.b(),
             a,
             prior_inverse: constraints
                 .links
@@ -154,7 +154,7 @@ impl<'a> Problem<'a> {
         })
     }
 
-    /// The prior, with every other constrained unknown at one.
+    /// The prior for the links, one for each other unknown that must not be negative, zero for the rest.
     fn start(&self) -> DVector<f64> {
         let mut x = DVector::zeros(self.a.ncols());
         for (k, link) in self.constraints.links.iter().enumerate() {
@@ -176,18 +176,19 @@ impl<'a> Problem<'a> {
         form.iter().map(|(i, c)| c * x[*i]).sum()
     }
 
-    /// `None` outside the constraints.
+    /// Objective without the barrier; `None` outside the constraints.
     fn objective(&self, x: &DVector<f64>) -> Option<f64> {
         self.value(x, 0.0)
     }
 
+    /// Objective with the barrier of weight `mu`; `None` outside the constraints.
     fn value(&self, x: &DVector<f64>, mu: f64) -> Option<f64> {
         let gamma = self.constraints.prior_weight;
         let mut value = 0.5 * (&self.a * x - &self.b).norm_squared();
         for (k, inverse) in self.prior_inverse.iter().enumerate() {
-            let root = self.link(x, k)?;
+            let cholesky = self.link(x, k)?;
             let p = pseudo_inertia(&x.fixed_rows::<10>(10 * k).into_owned());
-            value += gamma * inverse.dot(&p) - (gamma + mu) * root.ln_determinant();
+            value += gamma * inverse.dot(&p) - (gamma + mu) * cholesky.ln_determinant();
         }
         for form in &self.constraints.not_negative {
             let slack = Self::form(form, x);
@@ -199,18 +200,20 @@ impl<'a> Problem<'a> {
         value.is_finite().then_some(value)
     }
 
-    fn slopes(&self, x: &DVector<f64>, mu: f64) -> Option<(DVector<f64>, DMatrix<f64>)> {
+    /// Gradient and Hessian of [`Problem::value`].
+    fn derivatives(&self, x: &DVector<f64>, mu: f64) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let gamma = self.constraints.prior_weight;
         let mut gradient = self.a.tr_mul(&(&self.a * x - &self.b));
         let mut hessian = self.gram.clone();
         for (k, prior) in self.prior_inverse.iter().enumerate() {
             let inverse = self.link(x, k)?.inverse();
-            let turned = self.basis.map(|e| inverse * e);
+            let inverse_times_basis = self.basis.map(|e| inverse * e);
             for (i, basis) in self.basis.iter().enumerate() {
-                gradient[10 * k + i] += gamma * prior.dot(basis) - (gamma + mu) * turned[i].trace();
+                gradient[10 * k + i] +=
+                    gamma * prior.dot(basis) - (gamma + mu) * inverse_times_basis[i].trace();
                 for j in 0..10 {
-                    hessian[(10 * k + i, 10 * k + j)] +=
-                        (gamma + mu) * turned[i].dot(&turned[j].transpose());
+                    hessian[(10 * k + i, 10 * k + j)] += (gamma + mu)
+                        * inverse_times_basis[i].dot(&inverse_times_basis[j].transpose());
                 }
             }
         }
@@ -226,11 +229,12 @@ impl<'a> Problem<'a> {
         Some((gradient, hessian))
     }
 
-    /// Newton's method with backtracking; returns the number of steps.
+    /// Moves `x` to the minimum of [`Problem::value`] by Newton's method with backtracking; returns the number
+    /// of steps.
     fn centre(&self, x: &mut DVector<f64>, mu: f64) -> Result<usize, IdentError> {
-        let mut value = self.value(x, mu).ok_or_else(not_a_model)?;
+        let mut value = self.value(x, mu).ok_or_else(inconsistent_link)?;
         for taken in 0..STEPS {
-            let (gradient, hessian) = self.slopes(x, mu).ok_or_else(not_a_model)?;
+            let (gradient, hessian) = self.derivatives(x, mu).ok_or_else(inconsistent_link)?;
             let step = newton_step(&gradient, &hessian)?;
             let decrement = -gradient.dot(&step);
             if decrement <= 1e-6 * mu {
@@ -273,15 +277,16 @@ fn newton_step(
     let mut ridge = 0.0;
     while ridge < 1e-3 {
         let shifted = &scaled + DMatrix::identity(n, n) * ridge;
-        if let Some(root) = Cholesky::new(shifted) {
-            return Ok(-root
+        if let Some(cholesky) = Cholesky::new(shifted) {
+            return Ok(-cholesky
                 .solve(&gradient.component_mul(&scale))
                 .component_mul(&scale));
         }
         ridge = if ridge == 0.0 { 1e-14 } else { 10.0 * ridge };
     }
     Err(IdentError::Singular {
-        problem: "the data are not finite or do not determine a direction".to_owned(),
-        remedy: "remove columns, or raise the prior weight",
+        problem: "the data are not finite or leave a combination of parameters undetermined"
+            .to_owned(),
+        remedy: "remove columns of the regressor, or raise the prior weight",
     })
 }

@@ -360,12 +360,12 @@ impl<const N: usize> Fit<N> {
     /// without friction.
     pub fn predict(&self, q: &Vector<N>, qd: &Vector<N>, qdd: &Vector<N>) -> Vector<N> {
         let moving = self.columns.moving();
-        let held = |v: &Vector<N>| {
+        let moving_only = |v: &Vector<N>| {
             Vector::<N>::from_fn(|j, _| if moving.contains(&j) { v[j] } else { 0.0 })
         };
-        let of_links = regressor(&self.nominal, q, &held(qd), &held(qdd));
+        let link_regressor = regressor(&self.nominal, q, &moving_only(qd), &moving_only(qdd));
         let links = model::link_parameters::<N>(&self.x);
-        let mut torque = regressor_times(&of_links, &links);
+        let mut torque = regressor_times(&link_regressor, &links);
         let explained = rows(&self.nominal, &self.columns, q, qd, qdd) * &self.x;
         for (row, &joint) in moving.iter().enumerate() {
             let rotor = match self.columns.position(Column::Rotor(joint)) {

@@ -1,9 +1,9 @@
 //! Updates friction and payload from the prediction error of a repeated motion.
 //!
 //! The torque residual in free motion away from rest is fitted by a change of each joint's viscous and dry
-//! friction and, if requested, by a payload. The change is regularised by a prior of given size, so that joints
-//! that did not move keep their values. The tracking error is not used: at low gain, adapting to it makes
-//! tracking worse.
+//! friction and, if requested, by a payload. The change is regularised by a zero-mean Gaussian prior with
+//! the expected changes as standard deviations, so that joints that did not move keep their values. The tracking error
+//! is not used: at low gain, adapting to it makes tracking worse.
 
 use crate::error::{IdentError, positive};
 use crate::filter::LowPass;
@@ -16,13 +16,13 @@ use supple_core::{Arm, Friction, Vector};
 /// Options: parameters that may change, and their expected changes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Learning {
-    /// Slower samples of a joint are excluded \[rad/s\].
+    /// Samples at which a joint is slower than this are excluded from its rows \[rad/s\].
     pub slow_rad_per_s: f64,
     /// Expected relative change of friction.
     pub friction_change: f64,
     /// Expected payload \[kg\]; `None`: no payload.
     pub payload_kg: Option<f64>,
-    /// Noise of the torques \[N m\].
+    /// Standard deviation of the torque noise \[N m\].
     pub noise_nm: f64,
 }
 
@@ -66,21 +66,21 @@ pub fn learn<const N: usize>(
     positive("friction_change", learning.friction_change)?;
     positive("noise_nm", learning.noise_nm)?;
     crate::log::check_moving(N, moving)?;
-    let loads = if learning.payload_kg.is_some() { 4 } else { 0 };
-    let width = 2 * moving.len() + loads;
-    let mut gram = DMatrix::zeros(width, width);
-    let mut side = DVector::zeros(width);
-    let mut rows_of: Vec<(usize, DVector<f64>, f64)> = Vec::new();
+    let payload_unknowns = if learning.payload_kg.is_some() { 4 } else { 0 };
+    let unknowns = 2 * moving.len() + payload_unknowns;
+    let mut gram = DMatrix::zeros(unknowns, unknowns);
+    let mut right_hand_side = DVector::zeros(unknowns);
+    let mut all_rows: Vec<Row> = Vec::new();
     for motion in motions {
-        for (joint, a, missing) in rows(arm, friction, motion, moving, learning, width)? {
+        for (joint, a, residual_nm) in rows(arm, friction, motion, moving, learning, unknowns)? {
             // Filtered samples are correlated.
             let weight = motion.independent_fraction / learning.noise_nm.powi(2);
             gram.ger(weight, &a, &a, 1.0);
-            side.axpy(weight * missing, &a, 1.0);
-            rows_of.push((joint, a, missing));
+            right_hand_side.axpy(weight * residual_nm, &a, 1.0);
+            all_rows.push((joint, a, residual_nm));
         }
     }
-    if rows_of.is_empty() {
+    if all_rows.is_empty() {
         return Err(IdentError::Singular {
             problem: format!(
                 "no joint moved faster than {} rad/s",
@@ -89,7 +89,7 @@ pub fn learn<const N: usize>(
             remedy: "record the repeated motion at its normal speed",
         });
     }
-    for i in 0..width {
+    for i in 0..unknowns {
         gram[(i, i)] += expected(learning, moving.len(), i).powi(-2);
     }
     let change = nalgebra::Cholesky::new(gram)
@@ -97,12 +97,12 @@ pub fn learn<const N: usize>(
             problem: "the torques are not finite".to_owned(),
             remedy: "remove the samples that are not finite",
         })?
-        .solve(&side);
+        .solve(&right_hand_side);
     let mut learned = Learned {
         friction: *friction,
         payload: learning.payload_kg.map(|_| {
-            let first = 2 * moving.len();
-            Vector4::from_fn(|i, _| change[first + i])
+            let payload_start = 2 * moving.len();
+            Vector4::from_fn(|i, _| change[payload_start + i])
         }),
         before_nm: [0.0; N],
         after_nm: [0.0; N],
@@ -118,10 +118,10 @@ pub fn learn<const N: usize>(
         };
     }
     let mut counts = [0_u32; N];
-    for (joint, a, missing) in &rows_of {
+    for (joint, a, residual_nm) in &all_rows {
         counts[*joint] += 1;
-        learned.before_nm[*joint] += missing.powi(2);
-        learned.after_nm[*joint] += (missing - a.dot(&change)).powi(2);
+        learned.before_nm[*joint] += residual_nm.powi(2);
+        learned.after_nm[*joint] += (residual_nm - a.dot(&change)).powi(2);
     }
     for (j, count) in counts.iter().enumerate() {
         for sum in [&mut learned.before_nm[j], &mut learned.after_nm[j]] {
@@ -131,13 +131,13 @@ pub fn learn<const N: usize>(
     Ok(learned)
 }
 
-/// Expected size of unknown `i`: relative friction change, mass, or first moment at 0.1 m.
+/// Expected size of unknown `i`: relative friction change, payload mass, or first moment of that mass at 0.1 m.
 fn expected(learning: &Learning, moving: usize, i: usize) -> f64 {
-    let load = learning.payload_kg.unwrap_or(1.0);
+    let payload_kg = learning.payload_kg.unwrap_or(1.0);
     match i.checked_sub(2 * moving) {
         None => learning.friction_change,
-        Some(0) => load,
-        Some(_) => 0.1 * load,
+        Some(0) => payload_kg,
+        Some(_) => 0.1 * payload_kg,
     }
 }
 
@@ -150,7 +150,7 @@ fn rows<const N: usize>(
     motion: &Motion,
     moving: &[usize],
     learning: &Learning,
-    width: usize,
+    unknowns: usize,
 ) -> Result<Vec<Row>, IdentError> {
     let samples = motion.samples();
     let low_pass = motion
@@ -171,24 +171,28 @@ fn rows<const N: usize>(
     let mut all = Vec::new();
     for i in 0..samples {
         let at = |m: &DMatrix<f64>| Vector::<N>::from_fn(|j, _| m[(i, j)]);
-        let held = |m: &DMatrix<f64>| {
+        let moving_only = |m: &DMatrix<f64>| {
             Vector::<N>::from_fn(|j, _| if moving.contains(&j) { m[(i, j)] } else { 0.0 })
         };
-        let (q, qd, qdd) = (at(&motion.q), held(&motion.qd), held(&motion.qdd));
+        let (q, qd, qdd) = (
+            at(&motion.q),
+            moving_only(&motion.qd),
+            moving_only(&motion.qdd),
+        );
         let model = rnea(arm, &q, &qd, &qdd);
-        let of_links = (width > 2 * moving.len()).then(|| regressor(arm, &q, &qd, &qdd));
+        let link_regressor = (unknowns > 2 * moving.len()).then(|| regressor(arm, &q, &qd, &qdd));
         for (index, &joint) in moving.iter().enumerate() {
             if qd[joint].abs() < learning.slow_rad_per_s {
                 continue;
             }
             let viscous = friction[joint].viscous_nm_s_per_rad * qd[joint];
             let known = model[joint] + viscous + friction[joint].offset_nm + dry[index][i];
-            let mut a = DVector::zeros(width);
+            let mut a = DVector::zeros(unknowns);
             a[2 * index] = viscous;
             a[2 * index + 1] = dry[index][i];
-            if let Some(rows) = &of_links {
+            if let Some(link_regressor) = &link_regressor {
                 for k in 0..4 {
-                    a[2 * moving.len() + k] = rows[joint][N - 1][k];
+                    a[2 * moving.len() + k] = link_regressor[joint][N - 1][k];
                 }
             }
             all.push((joint, a, motion.tau[(i, joint)] - known));

@@ -5,13 +5,13 @@
 use crate::error::{IdentError, Warning, log_error, shape_error};
 use nalgebra::DMatrix;
 
-/// Larger angles are assumed to be degrees \[rad\].
+/// Angles larger than this are assumed to be in degrees \[rad\].
 const MAX_ANGLE_RAD: f64 = 25.0;
 /// Minimum range of motion for identifying a joint \[rad\].
 const MIN_RANGE_RAD: f64 = 0.02;
 /// A time step longer than this multiple of the median is a gap.
 const GAP_MEDIANS: f64 = 5.0;
-/// Shorter logs give a warning \[s\].
+/// Logs shorter than this cause a warning \[s\].
 const SHORT_S: f64 = 5.0;
 
 /// Measurements of one run. Matrices are (samples, joints), all joints of the arm.
@@ -21,7 +21,7 @@ pub struct Log {
     pub t_s: Vec<f64>,
     /// Joint angles \[rad\].
     pub q_rad: DMatrix<f64>,
-    /// Measured joint velocities \[rad/s\]; `None` differentiates the angles.
+    /// Measured joint velocities \[rad/s\]; `None`: the angles are differentiated.
     pub qd_rad_per_s: Option<DMatrix<f64>>,
     /// Motor torques at the joints \[N m\].
     pub tau_nm: DMatrix<f64>,
@@ -53,14 +53,14 @@ impl Log {
     fn check_shapes(&self, dof: usize) -> Result<(), IdentError> {
         let samples = self.t_s.len();
         if samples < 3 {
-            return Err(shape_error("t", "at min 3 samples", format!("{samples}")));
+            return Err(shape_error("t", "at least 3 samples", format!("{samples}")));
         }
         for (name, matrix) in self.matrices() {
             if matrix.shape() != (samples, dof) {
                 let (rows, columns) = matrix.shape();
                 return Err(shape_error(
                     name,
-                    format!("({samples}, {dof}): one row a sample, one column a joint"),
+                    format!("({samples}, {dof}): one row per sample, one column per joint"),
                     format!("({rows}, {columns})"),
                 ));
             }
@@ -119,11 +119,11 @@ impl Log {
         let mut warnings = Vec::new();
         for (joint, column) in self.q_rad.column_iter().enumerate() {
             let (min, max) = (column.min(), column.max());
-            let extreme = max.abs().max(min.abs());
-            if extreme > MAX_ANGLE_RAD {
+            let max_angle = max.abs().max(min.abs());
+            if max_angle > MAX_ANGLE_RAD {
                 return Err(log_error(
                     format!("q[{joint}]"),
-                    format!("reaches {extreme:.1}, which looks like degrees"),
+                    format!("reaches {max_angle:.1}, which looks like degrees"),
                     "give radians: multiply by pi / 180",
                 ));
             }
@@ -167,10 +167,10 @@ impl Log {
         let (mut product, mut square) = (0.0, 0.0);
         for i in 1..samples {
             let dt = self.t_s[i] - self.t_s[i - 1];
-            let quotient = (self.q_rad[(i, joint)] - self.q_rad[(i - 1, joint)]) / dt;
+            let slope = (self.q_rad[(i, joint)] - self.q_rad[(i - 1, joint)]) / dt;
             let mean = 0.5 * (qd[(i, joint)] + qd[(i - 1, joint)]);
-            product += quotient * mean;
-            square += quotient * quotient;
+            product += slope * mean;
+            square += slope * slope;
         }
         let ratio = product / square;
         if (0.5..2.0).contains(&ratio) {
@@ -194,7 +194,7 @@ impl Log {
     }
 }
 
-/// Rejects joints that do not exist or are listed twice.
+/// Rejects an empty list, joints that do not exist, and joints that are not in increasing order.
 pub(crate) fn check_moving(dof: usize, moving: &[usize]) -> Result<(), IdentError> {
     let increasing = moving.windows(2).all(|w| w[0] < w[1]);
     if !moving.is_empty() && increasing && moving.iter().all(|joint| *joint < dof) {
@@ -202,7 +202,7 @@ pub(crate) fn check_moving(dof: usize, moving: &[usize]) -> Result<(), IdentErro
     }
     Err(shape_error(
         "moving",
-        format!("joint numbers below {dof}, increasing, at min one"),
+        format!("joint numbers below {dof}, increasing, at least one"),
         format!("{moving:?}"),
     ))
 }

@@ -96,8 +96,8 @@ pub fn mass_matrix<const N: usize>(
     for j in 0..N {
         let mut unit = Vector::<N>::zeros();
         unit[j] = 1.0;
-        let of_links = regressor(&weightless, q, &Vector::zeros(), &unit);
-        let torque = regressor_times(&of_links, &found);
+        let link_regressor = regressor(&weightless, q, &Vector::zeros(), &unit);
+        let torque = regressor_times(&link_regressor, &found);
         (0..N).for_each(|i| mass[(i, j)] = torque[i]);
         mass[(j, j)] += rotor(nominal, columns, x, j);
     }

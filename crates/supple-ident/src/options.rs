@@ -11,7 +11,7 @@ pub enum Weights {
     ByJointResidual,
     /// As `ByJointResidual`, with Huber weights against outliers.
     Huber,
-    /// Given noise of each moving joint \[N m\].
+    /// Given standard deviation of the torque noise of each moving joint \[N m\].
     Given(Vec<f64>),
 }
 
@@ -22,15 +22,15 @@ pub struct Options {
     pub rotor: bool,
     /// Friction columns.
     pub friction: FrictionColumns,
-    /// Pairs of joints whose sum turns a motor.
+    /// Pairs of joints coupled by a gear: one motor turns with the sum of their angles.
     pub couplings: Vec<(usize, usize)>,
     /// Samples of a joint slower than this are excluded from its rows \[rad/s\]. A Stribeck column is then
     /// fitted to the slow samples in a second stage.
     pub slow_rad_per_s: f64,
     /// Weights of joints and samples.
     pub weights: Weights,
-    /// `Some(weight of the prior)`: physically consistent estimate, see [`crate::consistent::Constraints::prior_weight`]; `None`:
-    /// plain least squares.
+    /// `Some(weight of the prior)`: physically consistent estimate, see
+    /// [`crate::consistent::Constraints::prior_weight`]; `None`: plain least squares.
     pub consistent_prior_weight: Option<f64>,
 }
 

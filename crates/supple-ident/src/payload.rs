@@ -151,10 +151,14 @@ fn added<const N: usize>(empty: &Fit<N>, motion: &Motion) -> Result<Vec<JointRow
     }
     for i in 0..motion.samples() {
         let at = |m: &DMatrix<f64>| Vector::<N>::from_fn(|j, _| m[(i, j)]);
-        let held = |m: &DMatrix<f64>| {
+        let moving_only = |m: &DMatrix<f64>| {
             Vector::<N>::from_fn(|j, _| if moving.contains(&j) { m[(i, j)] } else { 0.0 })
         };
-        let (q, qd, qdd) = (at(&motion.q), held(&motion.qd), held(&motion.qdd));
+        let (q, qd, qdd) = (
+            at(&motion.q),
+            moving_only(&motion.qd),
+            moving_only(&motion.qdd),
+        );
         let rows = regressor(empty.nominal(), &q, &qd, &qdd);
         for (joint, row) in moving.iter().zip(&mut joints) {
             for (k, value) in rows[*joint][N - 1].iter().enumerate() {

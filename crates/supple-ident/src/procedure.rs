@@ -15,8 +15,8 @@ use crate::select::{
 };
 use supple_core::{Arm, Friction};
 
-/// Number of parts for cross-validation.
-const PARTS: usize = 4;
+/// Number of folds of the cross-validation.
+const FOLDS: usize = 4;
 /// Initial prior weight of the model selection.
 const PRIOR: f64 = 100.0;
 
@@ -35,7 +35,7 @@ pub enum Method {
     Consistent,
 }
 
-/// Friction columns.
+/// Choice of the regressor's friction columns.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum FrictionChoice {
     /// By cross-validation, with the table of its errors.
@@ -50,13 +50,13 @@ pub enum FrictionChoice {
 pub struct Procedure {
     /// Joints to identify, increasing; `None` for all. The others are held at their logged positions.
     pub moving: Option<Vec<usize>>,
-    /// Pairs of joints whose sum turns a motor.
+    /// Pairs of joints coupled by a gear: one motor turns with the sum of their angles.
     pub couplings: Vec<(usize, usize)>,
-    /// Grid, filter, decimation.
+    /// Resampling, filter and decimation of the logs.
     pub preparation: Preparation,
     /// Estimation method.
     pub method: Method,
-    /// Friction columns.
+    /// Choice of the regressor's friction columns.
     pub friction: FrictionChoice,
     /// Whether to fit a rotor inertia for each moving joint; otherwise the nominal rotors are taken as known.
     pub rotor: bool,
@@ -66,7 +66,8 @@ pub struct Procedure {
     /// Weight of the prior of a consistent fit, see [`crate::consistent::Constraints::prior_weight`];
     /// `None` chooses by cross-validation.
     pub prior_weight: Option<f64>,
-    /// Given noise of each moving joint \[N m\], instead of weights from residuals.
+    /// Known standard deviation of the torque noise of each moving joint \[N m\]; it replaces the weights that the
+    /// method would use.
     pub joint_noise_nm: Option<Vec<f64>>,
 }
 
@@ -100,9 +101,9 @@ pub fn identify<const N: usize>(
     let moving = procedure.moving_joints(N)?;
     let (mut motions, mut warnings) = (Vec::new(), Vec::new());
     for log in logs {
-        let (motion, result_warnings) = Motion::prepare(log, N, &moving, &procedure.preparation)?;
+        let (motion, motion_warnings) = Motion::prepare(log, N, &moving, &procedure.preparation)?;
         motions.push(motion);
-        warnings.extend(result_warnings);
+        warnings.extend(motion_warnings);
     }
     let mut found = identify_motions(nominal, &motions, &moving, procedure)?;
     warnings.append(&mut found.warnings);
@@ -189,10 +190,10 @@ impl Procedure {
             ("weights", weights, weights_candidates),
         ];
         let mut choices = Vec::new();
-        for (subject, wanted, candidates) in steps {
+        for (subject, enabled, candidates) in steps {
             let candidates = candidates(&options);
-            if wanted && !candidates.is_empty() {
-                let table = compare(nominal, motions, moving, &candidates, PARTS)?;
+            if enabled && !candidates.is_empty() {
+                let table = compare(nominal, motions, moving, &candidates, FOLDS)?;
                 options = table.options().clone();
                 choices.push(Choice { subject, table });
             }

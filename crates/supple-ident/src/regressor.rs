@@ -19,7 +19,7 @@ pub fn rows<const N: usize>(
     qd: &Vector<N>,
     qdd: &Vector<N>,
 ) -> DMatrix<f64> {
-    let held = |v: &Vector<N>| {
+    let moving_only = |v: &Vector<N>| {
         Vector::<N>::from_fn(|j, _| {
             if columns.moving().contains(&j) {
                 v[j]
@@ -28,12 +28,12 @@ pub fn rows<const N: usize>(
             }
         })
     };
-    let (qd, qdd) = (held(qd), held(qdd));
-    let of_links = regressor(arm, q, &qd, &qdd);
+    let (qd, qdd) = (moving_only(qd), moving_only(qdd));
+    let link_regressor = regressor(arm, q, &qd, &qdd);
     let friction = columns.friction();
     let load = friction
         .load
-        .then(|| regressor_times(&of_links, &parameters(arm)));
+        .then(|| regressor_times(&link_regressor, &parameters(arm)));
     let dry = Friction {
         band_rad_per_s: friction.band_rad_per_s,
         ..Friction::coulomb(0.0, 1.0)
@@ -49,7 +49,7 @@ pub fn rows<const N: usize>(
         match *column {
             Column::Link { link, entry } => {
                 for &joint in moving {
-                    put(joint, of_links[joint][link][entry]);
+                    put(joint, link_regressor[joint][link][entry]);
                 }
             }
             Column::Rotor(j) => put(j, qdd[j]),

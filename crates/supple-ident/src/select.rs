@@ -1,6 +1,6 @@
 //! Model selection by cross-validation.
 //!
-//! The log is divided into consecutive parts; each is predicted from a fit to the others. The candidate with
+//! The log is divided into consecutive parts, the folds; each is predicted from a fit to the others. The candidate with
 //! the fewest columns among those within a tolerance of the smallest error is chosen.
 
 pub use crate::choice::{Candidate, Line, Table};

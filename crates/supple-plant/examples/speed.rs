@@ -21,7 +21,7 @@ fn plant(scene: Scene) -> Plant<4> {
         (0.372, 0.811),
         (0.642, 0.601),
     ]
-    .map(|(s, v)| LuGre::from_friction(&Friction::coulomb(v, s)));
+    .map(|(coulomb, viscous)| LuGre::from_friction(&Friction::coulomb(viscous, coulomb)));
     let config = PlantConfig {
         friction,
         actuators: ActuatorModel {
@@ -40,9 +40,10 @@ fn plant(scene: Scene) -> Plant<4> {
     }
 }
 
-/// Moves the tip up and down by 10 cm once per second about the block's face.
+/// Moves the tip up and down by 10 cm once per second about the block's face. Returns the speed relative to real time
+/// and the fraction of the time in contact.
 fn probe(mut plant: Plant<4>) -> (f64, f64) {
-    let (mut in_plant, mut touching) = (0.0, 0.0);
+    let (mut plant_wall_s, mut contact_fraction) = (0.0, 0.0);
     let cycles = (DURATION_S / 1e-3) as u32;
     for cycle in 0..cycles {
         let phase = core::f64::consts::TAU * f64::from(cycle) * 1e-3;
@@ -50,10 +51,10 @@ fn probe(mut plant: Plant<4>) -> (f64, f64) {
         let tau = tip_spring(&plant, &target, 300.0, 20.0);
         let start = Instant::now();
         let measured = plant.cycle(&tau);
-        in_plant += start.elapsed().as_secs_f64();
-        touching += f64::from(u8::from(measured.force_n.z > 0.1)) / f64::from(cycles);
+        plant_wall_s += start.elapsed().as_secs_f64();
+        contact_fraction += f64::from(u8::from(measured.force_n.z > 0.1)) / f64::from(cycles);
     }
-    (DURATION_S / in_plant, touching)
+    (DURATION_S / plant_wall_s, contact_fraction)
 }
 
 fn main() {
@@ -78,10 +79,10 @@ fn main() {
         ("fixed block", block()),
         ("fixed block and free box", with_box),
     ] {
-        let (speed, touching) = probe(plant(scene));
+        let (speed, contact_fraction) = probe(plant(scene));
         println!(
-            "{name}: {speed:.1} times real time, in contact {:.0} % of it",
-            100.0 * touching
+            "{name}: {speed:.1} times real time, in contact {:.0} % of the time",
+            100.0 * contact_fraction
         );
     }
 }

@@ -46,8 +46,8 @@ impl<const N: usize> HardStops<N> {
     }
 }
 
-/// Force sensor behind the tip. It reports only the contact force: weight and inertia of the cap are part of the
-/// arm.
+/// Force sensor behind the tip. It reports only the contact force: weight and inertia of the cap, the hemisphere
+/// around the tip, are part of the arm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ForceSensor {
     /// Cutoff of its second-order Butterworth filter \[Hz\]; 100 by default.
@@ -82,9 +82,9 @@ pub struct PlantConfig<const N: usize> {
     pub force_sensor: ForceSensor,
     /// Step of the physics \[s\], positive; 0.2 ms by default, smaller for reference runs.
     ///
-    /// Errors are of first order. At 0.2 ms, an impact of 1.3 kg on wood at 0.04 m/s, 4 ms long, differs from the
-    /// converged result by +0.7 % in the filtered peak, +5 % in the unfiltered peak and -0.3 % in the impulse;
-    /// therefore contact needs no smaller steps.
+    /// Integration errors are of first order in the step. At 0.2 ms, an impact of 1.3 kg on wood at 0.04 m/s, 4 ms
+    /// long, differs from the converged result by +0.7 % in the filtered peak, +5 % in the unfiltered peak and
+    /// -0.3 % in the impulse; therefore contact needs no smaller steps.
     pub step_s: f64,
     /// Control cycle \[s\], a whole number of steps; 1 ms by default.
     pub cycle_s: f64,
@@ -111,7 +111,7 @@ impl<const N: usize> PlantConfig<N> {
         }
     }
 
-    /// Checks the values that no other part checks; returns the number of steps per cycle.
+    /// Checks the values that no other constructor checks; returns the number of steps per cycle.
     pub(crate) fn validate(&self) -> Result<usize, PlantError> {
         let positive = |name, value: f64| {
             let valid = value > 0.0 && value.is_finite();
@@ -139,7 +139,12 @@ impl<const N: usize> PlantConfig<N> {
         let steps = libm::rint(self.cycle_s / self.step_s);
         let whole = (self.cycle_s - steps * self.step_s).abs() <= 1e-9 * self.cycle_s;
         let valid = whole && (1.0..=1e6).contains(&steps);
-        entry(valid, "cycle_s", self.cycle_s, "a whole number of step_s")?;
+        entry(
+            valid,
+            "cycle_s",
+            self.cycle_s,
+            "a whole number of steps of step_s",
+        )?;
         self.scene.validate()?;
         Ok(steps as usize)
     }

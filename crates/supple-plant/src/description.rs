@@ -13,7 +13,7 @@ const SHORTED_TIME_CONSTANT_S: f64 = 2e-3;
 impl<const N: usize> PlantConfig<N> {
     /// Plant of a description, in empty space: arm and tool, friction (with Stribeck effect and a load-dependent
     /// part, see [`LuGre::from_friction`]), motors with ripple, encoders, a torque delay of one cycle, hard stops
-    /// and cap. The force sensor is noiseless.
+    /// and the radius of the tip. The force sensor is noiseless.
     ///
     /// # Errors
     /// [`ModelError::JointCount`] if the arm does not have `N` moving joints.
@@ -32,11 +32,11 @@ impl<const N: usize> PlantConfig<N> {
             .iter()
             .enumerate()
             .flat_map(|(motor, table)| {
-                table.harmonics().iter().map(move |line| Ripple {
+                table.harmonics().iter().map(move |harmonic| Ripple {
                     motor,
-                    harmonic: line.harmonic,
-                    amplitude_nm: libm::hypot(line.sine_nm, line.cosine_nm),
-                    phase_rad: libm::atan2(line.cosine_nm, line.sine_nm),
+                    harmonic: harmonic.harmonic,
+                    amplitude_nm: libm::hypot(harmonic.sine_nm, harmonic.cosine_nm),
+                    phase_rad: libm::atan2(harmonic.cosine_nm, harmonic.sine_nm),
                 })
             });
         Ok(PlantConfig {

@@ -10,8 +10,9 @@
 //!
 //! It delays by about `sqrt(2) / (2 pi f_c)`, 2.25 ms at 100 Hz.
 //!
-//! It belongs to the sensor, and so to the plant: it shares no code with the zero-phase filter of identification
-//! (`supple_ident::filter`), or one wrong formula could spoil a model and hide that it does. Both are compared with scipy.
+//! As part of the simulated sensor it shares no code with the zero-phase filter of identification
+//! (`supple_ident::filter`): the same wrong formula in both would falsify a model without showing in a comparison of
+//! model and plant. Both are compared with scipy.
 
 use crate::error::{PlantError, entry};
 use supple_core::nalgebra::Vector3;
@@ -103,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn gain_is_three_decibels_down_at_the_cutoff_and_falls_by_forty_a_decade() {
+    fn gain_is_minus_3_db_at_the_cutoff_and_falls_by_40_db_per_decade() {
         assert!((gain(100.0) - 0.5_f64.sqrt()).abs() < 1e-6);
         assert!((gain(5.0) - 1.0).abs() < 1e-4);
         let decade = gain(1000.0) / gain(100.0) * 0.5_f64.sqrt();
@@ -111,14 +112,14 @@ mod tests {
     }
 
     #[test]
-    fn passes_a_constant_and_keeps_its_impulse() {
+    fn the_integral_of_a_pulse_is_preserved() {
         let mut filter = Butterworth::new(100.0, 2e-4).unwrap();
         let pulse = Vector3::new(3.0, -2.0, 1.0);
-        let mut area = filter.step(&pulse);
+        let mut sum = filter.step(&pulse);
         for _ in 0..1000 {
-            area += filter.step(&Vector3::zeros());
+            sum += filter.step(&Vector3::zeros());
         }
-        assert!((area - pulse).norm() < 1e-12);
+        assert!((sum - pulse).norm() < 1e-12);
     }
 
     #[test]

@@ -48,9 +48,9 @@ impl<const N: usize> Plant<N> {
         let steps_per_cycle = config.validate()?;
         finite("q0", &q0)?;
         finite("qd0", &qd0)?;
-        let held = gravity(&config.arm, &q0);
+        let gravity_nm = gravity(&config.arm, &q0);
         let world = World::new(&config, &q0, &qd0)?;
-        let actuators = ActuatorState::new(config.actuators.clone(), &held)?;
+        let actuators = ActuatorState::new(config.actuators.clone(), &gravity_nm)?;
         let filter = Butterworth::new(config.force_sensor.cutoff_hz, config.step_s)?;
         let mut plant = Plant {
             world,
@@ -76,7 +76,7 @@ impl<const N: usize> Plant<N> {
                 tip_velocity_m_per_s: Vector3::zeros(),
                 contact_force_n: Vector3::zeros(),
                 friction_torque_nm: Vector::zeros(),
-                motor_torque_nm: held,
+                motor_torque_nm: gravity_nm,
             },
             poses: [Pose::IDENTITY; N],
             max_force_n: Vector3::zeros(),
@@ -133,7 +133,7 @@ impl<const N: usize> Plant<N> {
     pub fn reverse_gravity(&mut self) {
         let arm = &self.config.arm;
         // The arm was valid and stays valid with the reversed gravity vector.
-        if let Ok(arm) = with_load(arm, arm.body(N - 1), -arm.gravity()) {
+        if let Ok(arm) = with_last_link(arm, arm.body(N - 1), -arm.gravity()) {
             self.load_bound_nm = load_bound(&arm);
             self.world.set_last_link_and_gravity(&arm);
             self.config.arm = arm;
@@ -151,7 +151,7 @@ impl<const N: usize> Plant<N> {
         let arm = &self.config.arm;
         let at_m = arm.joint_from_tip().translation;
         let payload = Body::ball(mass_kg, self.config.tip_radius_m, at_m);
-        let loaded = with_load(arm, arm.body(N - 1).merged(&payload), arm.gravity());
+        let loaded = with_last_link(arm, arm.body(N - 1).merged(&payload), arm.gravity());
         let must = "such that the last link stays a physical body";
         let arm = loaded.or(Err(PlantError::Entry {
             entry: "payload mass_kg".to_owned(),
@@ -218,10 +218,10 @@ impl<const N: usize> Plant<N> {
             let body = self.config.arm.body(j);
             mass += body.mass_kg;
             moment += self.poses[j].transform_point(&body.com_m) * body.mass_kg;
-            let carried = moment - self.poses[j].translation * mass;
-            let carried = carried.cross(&self.config.arm.gravity());
+            let first_moment = moment - self.poses[j].translation * mass;
+            let gravity_moment = first_moment.cross(&self.config.arm.gravity());
             if self.load_bound_nm[j] > 0.0 {
-                load[j] = libm::sqrt(carried.dot(&carried)) / self.load_bound_nm[j];
+                load[j] = libm::sqrt(gravity_moment.dot(&gravity_moment)) / self.load_bound_nm[j];
             }
         }
         load
@@ -317,12 +317,12 @@ impl<const N: usize> Plant<N> {
         self.truth.velocity_rad_per_s = qd;
         self.truth.tip_position_m = tip.translation;
         // Use J qd: the link velocities of the engine lag by one step.
-        let moved = |pose: &Pose, rate: f64| {
+        let tip_velocity = |pose: &Pose, rate: f64| {
             let axis: Vector3<f64> = pose.rotation.column(2).into();
             axis.cross(&(tip.translation - pose.translation)) * rate
         };
         let rates = self.poses.iter().zip(qd.iter());
-        self.truth.tip_velocity_m_per_s = rates.map(|(pose, rate)| moved(pose, *rate)).sum();
+        self.truth.tip_velocity_m_per_s = rates.map(|(pose, rate)| tip_velocity(pose, *rate)).sum();
     }
 
     fn measure(&mut self, filtered_n: Vector3<f64>) {
@@ -353,7 +353,7 @@ fn finite<const N: usize>(name: &str, values: &Vector<N>) -> Result<(), PlantErr
 }
 
 /// The same arm with another last link and another gravity.
-fn with_load<const N: usize>(
+fn with_last_link<const N: usize>(
     arm: &Arm<N>,
     last: Body,
     gravity_m_per_s2: Vector3<f64>,

@@ -33,17 +33,17 @@ fn a_saved_fit_is_loaded_as_the_same_arm() {
     let loaded = Description::load(&folder).unwrap();
     let config = loaded.config::<4>().unwrap();
     std::fs::remove_dir_all(&folder).unwrap();
-    let wanted = found.arm().unwrap();
+    let expected = found.arm().unwrap();
     let mut noise = Noise::new(5);
     for _ in 0..20 {
         let [q, qd, qdd] = state(&mut noise);
-        let difference = rnea(&config.arm, &q, &qd, &qdd) - rnea(&wanted, &q, &qd, &qdd);
+        let difference = rnea(&config.arm, &q, &qd, &qdd) - rnea(&expected, &q, &qd, &qdd);
         assert!(difference.amax() < 1e-9, "{difference}");
     }
     for j in [0, 1, 3] {
         assert_eq!(config.friction[j], found.friction()[j]);
     }
-    // Held joints keep their known parameters.
+    // The joint that did not move keeps its known parameters.
     assert_eq!(config.friction[2], description.friction()[2]);
     assert_eq!(loaded.settings().joints.len(), 4);
     // Comments and limits are unchanged.
@@ -58,12 +58,12 @@ fn a_prediction_is_the_torque_of_the_identified_arm_and_its_friction() {
     let joints = [0, 1, 2, 3];
     let data = motion(&arm, &friction(), &joints, 900, 9);
     let found = fit(&arm, &[data], &joints, &options()).unwrap();
-    let (model, rubbing) = (found.arm().unwrap(), found.friction());
+    let (model, joint_friction) = (found.arm().unwrap(), found.friction());
     let mut noise = Noise::new(6);
     for _ in 0..20 {
         let [q, qd, qdd] = state(&mut noise);
         let mut expected = rnea(&model, &q, &qd, &qdd);
-        (0..4).for_each(|j| expected[j] += rubbing[j].torque_nm(qd[j]));
+        (0..4).for_each(|j| expected[j] += joint_friction[j].torque_nm(qd[j]));
         assert!((found.predict(&q, &qd, &qdd) - expected).amax() < 1e-8);
     }
 }

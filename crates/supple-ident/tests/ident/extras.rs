@@ -1,4 +1,4 @@
-//! Design, ripple, learning and payload, each compared with a known arm.
+//! Excitation design, ripple, learning and payload, each compared with a known arm.
 
 use crate::support::{Noise, motion};
 use supple_core::dynamics::{gravity, rnea, tip_pose};
@@ -55,7 +55,7 @@ fn a_design_improves_and_stays_within_every_limit() {
             .find(|value| value.is_finite())
             .unwrap();
         assert!(found.history[119] < *first);
-        // 24 of the links, one of them with each of three rotors, and two of friction a joint.
+        // 24 parameters of links and rotors, and two of friction for each joint.
         assert!(found.rank >= 24 + 8, "{}", found.rank);
         found.series.within(&config.limits).unwrap();
         for i in 0..2000 {
@@ -104,34 +104,34 @@ fn constant_speed_runs_have_constant_speed() {
     let (speed, period_s) = (0.05, 40.0);
     let run = constant_speed_series(&config, &home, &ALL, speed, period_s).unwrap();
     run.within(&config.limits).unwrap();
-    let steady = 4000;
+    let samples = 4000;
     for joint in ALL {
-        let (mut there, mut back, mut fastest) = (0, 0, 0.0_f64);
-        for i in 0..steady {
+        let (mut forward, mut backward, mut fastest) = (0, 0, 0.0_f64);
+        for i in 0..samples {
             // One period at full speed.
             let at =
-                run.at(run.ramp_s + (period_s - run.ramp_s) * f64::from(i) / f64::from(steady));
+                run.at(run.ramp_s + (period_s - run.ramp_s) * f64::from(i) / f64::from(samples));
             let v = at.velocity_rad_per_s[joint];
-            there += i32::from((v / speed - 1.0).abs() < 0.015);
-            back += i32::from((-v / speed - 1.0).abs() < 0.015);
+            forward += i32::from((v / speed - 1.0).abs() < 0.015);
+            backward += i32::from((-v / speed - 1.0).abs() < 0.015);
             fastest = fastest.max(v.abs());
         }
-        let share = |count| f64::from(count) / f64::from(steady);
+        let fraction = |count| f64::from(count) / f64::from(samples);
         assert!(
-            share(there + back) > 0.55,
+            fraction(forward + backward) > 0.55,
             "joint {joint}: {}",
-            share(there + back)
+            fraction(forward + backward)
         );
         assert!(
-            share(there) > 0.2 && share(back) > 0.2,
-            "joint {joint}: both ways"
+            fraction(forward) > 0.2 && fraction(backward) > 0.2,
+            "joint {joint}: in both directions"
         );
         assert!(fastest < 1.015 * speed, "{fastest}");
     }
 }
 
 #[test]
-fn a_workspace_that_no_motion_meets_is_rejected() {
+fn a_workspace_that_no_motion_stays_in_is_rejected() {
     let description = Description::asset("wam4").unwrap();
     let request = DesignOptions {
         candidates: 10,
@@ -147,24 +147,24 @@ fn a_workspace_that_no_motion_meets_is_rejected() {
 }
 
 #[test]
-fn ripple_is_identified_at_its_harmonics_only() {
+fn ripple_is_identified_at_its_harmonics_and_nowhere_else() {
     let config = wam4();
     let motor_from_joint = config.joint_from_motor.try_inverse().unwrap();
     let friction = [Friction::coulomb(1.0, 0.5); 4];
     let clean = motion(&config.arm, &friction, &ALL, 1200, 3);
     let found = fit(&config.arm, &[clean], &ALL, &options()).unwrap();
-    let line = |harmonic, sine_nm, cosine_nm| Harmonic {
+    let harmonic = |harmonic, sine_nm, cosine_nm| Harmonic {
         harmonic,
         sine_nm,
         cosine_nm,
     };
     let tables = [
-        RippleTable::new(&[line(2, 4e-3, -3e-3)]).unwrap(),
-        RippleTable::new(&[line(3, 5e-3, 0.0), line(6, 0.0, 2e-3)]).unwrap(),
+        RippleTable::new(&[harmonic(2, 4e-3, -3e-3)]).unwrap(),
+        RippleTable::new(&[harmonic(3, 5e-3, 0.0), harmonic(6, 0.0, 2e-3)]).unwrap(),
         RippleTable::NONE,
-        RippleTable::new(&[line(1, -2e-3, 6e-3)]).unwrap(),
+        RippleTable::new(&[harmonic(1, -2e-3, 6e-3)]).unwrap(),
     ];
-    let slow = rippled(&config.arm, &friction, &tables, &motor_from_joint);
+    let slow = motion_with_ripple(&config.arm, &friction, &tables, &motor_from_joint);
     let search = RippleSearch::default();
     let got = fit_ripple(&found, &[slow], &motor_from_joint, &search).unwrap();
     for (motor, (got, wanted)) in got.iter().zip(&tables).enumerate() {
@@ -177,8 +177,8 @@ fn ripple_is_identified_at_its_harmonics_only() {
     assert!(got[2].harmonics().is_empty(), "{:?}", got[2]);
 }
 
-/// Slow motion of the joints with the torque commanded to motors with ripple.
-fn rippled(
+/// Slow motion of the joints; the torque is what motors with ripple must be commanded to produce it.
+fn motion_with_ripple(
     arm: &supple_core::Arm<4>,
     friction: &[Friction; 4],
     tables: &[RippleTable; 4],
@@ -200,13 +200,13 @@ fn rippled(
     let mut tau = DMatrix::zeros(samples, 4);
     for i in 0..samples {
         let at = |m: &DMatrix<f64>| Vector::<4>::from_fn(|j, _| m[(i, j)]);
-        let needed = rnea(arm, &at(&q), &at(&qd), &at(&qdd));
+        let arm_nm = rnea(arm, &at(&q), &at(&qd), &at(&qdd));
         let motor = motor_from_joint * at(&q);
-        let extra = Vector::<4>::from_fn(|m, _| tables[m].torque_nm(motor[m]));
-        let extra = motor_from_joint.transpose() * extra;
+        let ripple = Vector::<4>::from_fn(|m, _| tables[m].torque_nm(motor[m]));
+        let ripple_nm = motor_from_joint.transpose() * ripple;
         for j in 0..4 {
-            let rubs = friction[j].torque_nm(qd[(i, j)]);
-            tau[(i, j)] = needed[j] + rubs - extra[j] + 0.01 * noise.draw();
+            let friction_nm = friction[j].torque_nm(qd[(i, j)]);
+            tau[(i, j)] = arm_nm[j] + friction_nm - ripple_nm[j] + 0.01 * noise.draw();
         }
     }
     Motion {
@@ -254,8 +254,8 @@ fn a_friction_error_of_10_percent_is_learnt_from_the_residual() {
 fn a_payload_is_learnt_together_with_friction() {
     let arm = wam4().arm;
     let friction = [Friction::coulomb(1.0, 0.5); 4];
-    let held = nalgebra_vector([0.5, 0.02, -0.01, 0.03]);
-    let loaded = with_payload(&arm, Some(&held)).unwrap();
+    let truth = nalgebra_vector([0.5, 0.02, -0.01, 0.03]);
+    let loaded = with_payload(&arm, Some(&truth)).unwrap();
     let data = motion(&loaded, &friction, &ALL, 1500, 4);
     let learning = Learning {
         payload_kg: Some(0.5),
@@ -275,7 +275,8 @@ fn nalgebra_vector(values: [f64; 4]) -> supple_core::nalgebra::Vector4<f64> {
     values.into()
 }
 
-fn weight() -> Body {
+/// Payload of known mass.
+fn known_payload() -> Body {
     Body {
         mass_kg: 2.0,
         com_m: Vector3::new(-0.05, -0.36, 0.01),
@@ -290,9 +291,9 @@ fn carrying(arm: &supple_core::Arm<4>, body: &Body) -> supple_core::Arm<4> {
     let mut links = *arm.links();
     links[3].mass += p[0];
     links[3].first_moment += rotation.tr_mul(&Vector3::new(p[1], p[2], p[3]));
-    let about = Matrix3::new(p[4], p[5], p[7], p[5], p[6], p[8], p[7], p[8], p[9]);
-    let turned = rotation.tr_mul(&(about * rotation));
-    links[3].inertia += (turned + turned.transpose()) * 0.5;
+    let inertia = Matrix3::new(p[4], p[5], p[7], p[5], p[6], p[8], p[7], p[8], p[9]);
+    let rotated = rotation.tr_mul(&(inertia * rotation));
+    links[3].inertia += (rotated + rotated.transpose()) * 0.5;
     supple_core::Arm::from_links(links, arm.armature(), arm.joint_from_tip(), arm.gravity())
         .unwrap()
 }
@@ -302,7 +303,7 @@ fn a_payload_is_identified_and_a_known_one_gives_the_torque_scale() {
     let arm = wam4().arm;
     let friction = [Friction::coulomb(1.0, 0.5); 4];
     let empty = motion(&arm, &friction, &ALL, 1500, 5);
-    let loaded = motion(&carrying(&arm, &weight()), &friction, &ALL, 1500, 6);
+    let loaded = motion(&carrying(&arm, &known_payload()), &friction, &ALL, 1500, 6);
     let noisy = |mut data: Motion, seed: u64| {
         let mut noise = Noise::new(seed);
         data.tau.iter_mut().for_each(|t| *t += 0.02 * noise.draw());
@@ -313,14 +314,18 @@ fn a_payload_is_identified_and_a_known_one_gives_the_torque_scale() {
     let guess = Body::ball(1.0, 0.05, Vector3::new(0.0, -0.3, 0.0));
     let got = payload(&found, std::slice::from_ref(&loaded), &guess).unwrap();
     assert!((got.mass_kg - 2.0).abs() < 0.02, "{}", got.mass_kg);
-    assert!((got.com_m - weight().com_m).amax() < 5e-3, "{}", got.com_m);
+    assert!(
+        (got.com_m - known_payload().com_m).amax() < 5e-3,
+        "{}",
+        got.com_m
+    );
 
-    // The same arm with amplifiers that report a fraction of the torque, different for each joint; the rotors
+    // The same arm with amplifiers that report the torque with a gain error, different for each joint; the rotors
     // are once identified and once taken as known.
-    let shares = [0.9, 0.8, 1.15, 0.7];
+    let gains = [0.9, 0.8, 1.15, 0.7];
     let scaled = |mut data: Motion| {
-        for (j, share) in shares.into_iter().enumerate() {
-            data.tau.column_mut(j).scale_mut(share);
+        for (j, gain) in gains.into_iter().enumerate() {
+            data.tau.column_mut(j).scale_mut(gain);
         }
         data
     };
@@ -332,13 +337,13 @@ fn a_payload_is_identified_and_a_known_one_gives_the_torque_scale() {
             ..options()
         };
         let found = fit(&arm, &empty, &ALL, &plain).unwrap();
-        let scale = torque_scale(&found, &empty, &loaded, &weight()).unwrap();
-        for (joint, share) in shares.into_iter().enumerate() {
-            let got = scale[joint].expect("the weight moves with every joint");
-            assert!((got * share - 1.0).abs() < 0.01, "joint {joint}: {got}");
+        let scale = torque_scale(&found, &empty, &loaded, &known_payload()).unwrap();
+        for (joint, gain) in gains.into_iter().enumerate() {
+            let got = scale[joint].expect("every joint moves the payload");
+            assert!((got * gain - 1.0).abs() < 0.01, "joint {joint}: {got}");
         }
         // Without a payload no scale is determined.
-        let none = torque_scale(&found, &empty, &empty, &weight()).unwrap();
+        let none = torque_scale(&found, &empty, &empty, &known_payload()).unwrap();
         assert_eq!(none, [None; 4]);
     }
 }

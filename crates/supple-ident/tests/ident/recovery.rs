@@ -15,8 +15,8 @@ fn friction<const N: usize>() -> [Friction; N] {
     })
 }
 
-/// Torques of two arms at random states, without friction and rotors.
-fn furthest<const N: usize>(a: &Arm<N>, b: &Arm<N>, moving: &[usize]) -> f64 {
+/// Maximum difference of the joint torques of two arms at random states, without friction.
+fn max_torque_difference<const N: usize>(a: &Arm<N>, b: &Arm<N>, moving: &[usize]) -> f64 {
     let mut noise = Noise::new(99);
     let mut worst: f64 = 0.0;
     for _ in 0..50 {
@@ -46,7 +46,7 @@ fn furthest<const N: usize>(a: &Arm<N>, b: &Arm<N>, moving: &[usize]) -> f64 {
 }
 
 /// Fits `random_arm(seed)` from a model with other masses, without noise.
-fn arm_is_given_back(seed: u64) -> Result<(), TestCaseError> {
+fn check_recovery(seed: u64) -> Result<(), TestCaseError> {
     let (truth, model) = (random_arm::<4>(seed), random_arm::<4>(seed));
     // Same kinematics, other masses: the model is the truth with 1.3 times its inertia.
     let mut links = *model.links();
@@ -77,9 +77,9 @@ fn arm_is_given_back(seed: u64) -> Result<(), TestCaseError> {
         let held_out = motion(&truth, &friction(), &joints, 300, seed + 7);
         let checked = fit.validate_motion(&held_out).unwrap();
         prop_assert!(checked.total_relative < 1e-11, "{}", checked.total_relative);
-        for (found, true_one) in fit.friction().iter().zip(friction::<4>()) {
-            prop_assert!((found.coulomb_nm - true_one.coulomb_nm).abs() < 1e-9);
-            prop_assert!((found.viscous_nm_s_per_rad - true_one.viscous_nm_s_per_rad).abs() < 1e-9);
+        for (found, expected) in fit.friction().iter().zip(friction::<4>()) {
+            prop_assert!((found.coulomb_nm - expected.coulomb_nm).abs() < 1e-9);
+            prop_assert!((found.viscous_nm_s_per_rad - expected.viscous_nm_s_per_rad).abs() < 1e-9);
         }
     }
     Ok(())
@@ -89,12 +89,12 @@ proptest! {
     #![proptest_config(config(12, 20_260_501))]
 
     #[test]
-    fn noise_free_data_give_the_arm_back_in_every_torque(seed in 1_u64..1000) {
-        arm_is_given_back(seed)?;
+    fn noise_free_data_recover_every_torque_of_the_arm(seed in 1_u64..1000) {
+        check_recovery(seed)?;
     }
 
     #[test]
-    fn consistent_fits_are_arms_whatever_the_noise(seed in 1_u64..1000) {
+    fn consistent_fits_are_valid_arms_for_any_noise(seed in 1_u64..1000) {
         let truth = random_arm::<4>(seed);
         let joints = [0, 1, 2, 3];
         let (samples, amplitude_nm) = (300, 5.0);
@@ -109,21 +109,22 @@ proptest! {
         prop_assert!(fit.friction().iter().all(|f| f.validate().is_ok()));
         let checked = fit.validate_motion(&motion(&truth, &friction(), &joints, 200, seed + 3)).unwrap();
         prop_assert_eq!(checked.positive_definite, 1.0);
-        // For noise of `sigma`, least squares leave an error of `sigma sqrt(p / n)` in the torques of the
-        // motion itself: its square is the sum over p independent draws. A margin of 50 % covers them.
+        // With p parameters, n samples and noise of standard deviation `sigma`, the torques that a least-squares
+        // fit predicts for the same motion have an expected RMS error of `sigma sqrt(p / n)`. A margin of 50 %
+        // covers its scatter.
         let sigma_nm = amplitude_nm / 3.0_f64.sqrt();
         let expected_nm = sigma_nm * (fit.rank() as f64 / samples as f64).sqrt();
-        let itself = fit.validate_motion(&exact).unwrap();
-        let found_nm = itself.rms_nm.iter().map(|rms| rms * rms).sum::<f64>().sqrt();
+        let same_motion = fit.validate_motion(&exact).unwrap();
+        let found_nm = same_motion.rms_nm.iter().map(|rms| rms * rms).sum::<f64>().sqrt();
         prop_assert!(found_nm < 1.5 * expected_nm, "{found_nm} N m, {expected_nm} N m expected");
     }
 }
 
-/// Singular regressors for which an inexact solver gave singular values wrong in the third digit.
+/// Regressors whose singular values an inexact solver computed with errors in the third digit.
 #[test]
 fn ill_conditioned_regressors_recover_the_arm() {
     for seed in [634, 658] {
-        arm_is_given_back(seed).unwrap();
+        check_recovery(seed).unwrap();
     }
 }
 
@@ -137,7 +138,7 @@ fn consistent_fits_of_exact_data_recover_the_arm() {
         ..Options::default()
     };
     let fit = fit(&truth, &[data], &joints, &options).unwrap();
-    assert!(furthest(&truth, &fit.arm().unwrap(), &joints) < 1e-3);
+    assert!(max_torque_difference(&truth, &fit.arm().unwrap(), &joints) < 1e-3);
     assert!(fit.optimality_gap.unwrap() > 0.0);
 }
 
@@ -155,7 +156,7 @@ fn a_joint_without_fast_samples_is_rejected() {
 }
 
 #[test]
-fn held_joints_are_not_required_and_stay_unchanged() {
+fn joints_that_do_not_move_need_no_torques_and_keep_their_parameters() {
     let truth = random_arm::<4>(21);
     let moving = [1, 3];
     let mut data = motion(&truth, &friction(), &moving, 800, 5);
@@ -166,7 +167,7 @@ fn held_joints_are_not_required_and_stay_unchanged() {
     };
     let fit = fit(&truth, &[data], &moving, &options).unwrap();
     let arm = fit.arm().unwrap();
-    assert!(furthest(&truth, &arm, &moving) < 1e-3);
+    assert!(max_torque_difference(&truth, &arm, &moving) < 1e-3);
     // The first link was not moved: its parameters are those of the nominal model.
     let (before, after) = (parameters(&truth)[0], parameters(&arm)[0]);
     assert!((before - after).amax() < 1e-4);
@@ -209,14 +210,14 @@ fn the_stribeck_effect_is_fitted_in_the_second_stage_without_bias_of_the_first()
 #[test]
 fn a_motor_coupled_to_two_joints_is_identified() {
     let truth = random_arm::<3>(41);
-    let none = [Friction::coulomb(0.5, 0.2); 3];
-    let mut data = motion(&truth, &none, &[0, 1, 2], 1500, 6);
-    let band = Friction::coulomb(0.7, 0.4);
+    let of_joints = [Friction::coulomb(0.5, 0.2); 3];
+    let mut data = motion(&truth, &of_joints, &[0, 1, 2], 1500, 6);
+    let of_coupled_motor = Friction::coulomb(0.7, 0.4);
     for i in 0..1500 {
-        let extra = 0.3 * (data.qdd[(i, 1)] + data.qdd[(i, 2)])
-            + band.torque_nm(data.qd[(i, 1)] + data.qd[(i, 2)]);
-        data.tau[(i, 1)] += extra;
-        data.tau[(i, 2)] += extra;
+        let coupled_nm = 0.3 * (data.qdd[(i, 1)] + data.qdd[(i, 2)])
+            + of_coupled_motor.torque_nm(data.qd[(i, 1)] + data.qd[(i, 2)]);
+        data.tau[(i, 1)] += coupled_nm;
+        data.tau[(i, 2)] += coupled_nm;
     }
     let options = Options {
         couplings: vec![(1, 2)],
@@ -247,9 +248,9 @@ fn load_dependent_friction_is_identified() {
         for i in 0..data.samples() {
             let at = |m: &DMatrix<f64>| Vector::<3>::from_fn(|j, _| m[(i, j)]);
             let (q, qd, qdd) = (at(&data.q), at(&data.qd), at(&data.qdd));
-            let passed_on = rnea(&weightless_rotors, &q, &qd, &qdd);
+            let transmitted = rnea(&weightless_rotors, &q, &qd, &qdd);
             for j in 0..3 {
-                data.tau[(i, j)] += 0.05 * passed_on[j].abs() * dry.dry_torque_nm(qd[j]);
+                data.tau[(i, j)] += 0.05 * transmitted[j].abs() * dry.dry_torque_nm(qd[j]);
             }
         }
         data
@@ -277,11 +278,11 @@ fn load_dependent_friction_is_identified() {
         assert!(fit.load_nm[j] > 0.0);
     }
     assert!(fit.validate_motion(&loaded(10)).unwrap().total_relative < 1e-4);
-    let alone = FrictionColumns {
+    let load_only = FrictionColumns {
         coulomb: false,
         ..options.friction
     };
-    let error = Columns::new(3, &[0], true, alone, &[]).unwrap_err();
+    let error = Columns::new(3, &[0], true, load_only, &[]).unwrap_err();
     assert!(error.to_string().contains("load alone"), "{error}");
 }
 
@@ -304,6 +305,6 @@ fn the_rank_of_an_arm_does_not_depend_on_the_log() {
                 .rank()
         })
         .collect();
-    // Seven a link in general position, three for the first, whose axis never turns.
+    // Base parameters: seven for each link in general position, three for the first, whose axis is fixed.
     assert_eq!(ranks, [24, 24, 24]);
 }

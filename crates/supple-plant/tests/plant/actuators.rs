@@ -12,10 +12,10 @@ use supple_plant::{
 /// `joint_from_motor` of the four-joint arm with its differential shoulder.
 fn transmission() -> Matrix<4, 4> {
     let (n2, n3) = (28.25, 28.25 / 1.68);
-    let joint_to_motor = Matrix::<4, 4>::from_row_slice(&[
+    let motor_from_joint = Matrix::<4, 4>::from_row_slice(&[
         -42.0, 0.0, 0.0, 0.0, 0.0, n2, -n3, 0.0, 0.0, -n2, -n3, 0.0, 0.0, 0.0, 0.0, -18.0,
     ]);
-    joint_to_motor.try_inverse().unwrap()
+    motor_from_joint.try_inverse().unwrap()
 }
 
 fn real_actuators() -> ActuatorModel<4> {
@@ -53,7 +53,7 @@ fn measured_angles_are_quantised_to_motor_counts_within_half_a_count() {
     }
     assert!(
         plant.truth().position_rad[1].abs() > 0.01,
-        "it moved over many counts"
+        "the joint moved over many counts"
     );
 }
 
@@ -87,11 +87,11 @@ fn a_torque_acts_after_exactly_its_delay_and_gravity_is_compensated_until_then()
         let start = plant.truth().position_rad;
         for cycle in 0..6 {
             let command = Vector::from([1.0 + cycle as f64, 0.0, 0.0, 0.0]);
-            let hold = weight(&plant);
+            let gravity_nm = weight(&plant);
             plant.cycle(&command);
             let acted = plant.truth().motor_torque_nm;
             if cycle < delay {
-                assert!((acted - hold).norm() < 1e-9);
+                assert!((acted - gravity_nm).norm() < 1e-9);
                 assert!((plant.truth().position_rad - start).norm() < 1e-12);
             } else {
                 assert_eq!(acted[0], 1.0 + (cycle - delay) as f64);
@@ -131,7 +131,7 @@ fn ripple_adds_its_harmonic_of_the_motor_angle() {
     plant.cycle(&command);
     let motor_angle = -18.0 * q[3];
     let expected = -18.0 * 0.02 * (6.0 * motor_angle + 0.4).sin();
-    // The first step starts at q; its torque follows from the resulting velocity.
+    // The velocity after a single step from rest at q shows the torque of that step.
     let one_step = PlantConfig {
         cycle_s: 2e-4,
         ..config
@@ -139,11 +139,11 @@ fn ripple_adds_its_harmonic_of_the_motor_angle() {
     let mut single = Plant::new(one_step, q, Vector::zeros()).unwrap();
     single.cycle(&command);
     let total = command + Vector::from([0.0, 0.0, 0.0, expected]);
-    let moved = aba(&wam4(), &q, &Vector::zeros(), &total) * 2e-4;
+    let expected_velocity = aba(&wam4(), &q, &Vector::zeros(), &total) * 2e-4;
     let found = single.truth().velocity_rad_per_s;
     assert!(
-        (found - moved).norm() < 1e-9 * moved.norm().max(1e-3),
-        "{found} {moved}"
+        (found - expected_velocity).norm() < 1e-9 * expected_velocity.norm().max(1e-3),
+        "{found} {expected_velocity}"
     );
     assert!(expected.abs() > 0.05);
 }
@@ -161,21 +161,21 @@ fn hard_stops_hold_the_arm_and_dissipate_its_energy() {
         let mut plant =
             Plant::new(config, Vector::from([0.0, 0.0, 0.0, 1.0]), Vector::zeros()).unwrap();
         let push = Vector::from([20.0, 15.0, 3.0, 5.0]) * direction;
-        let mut beyond = 0.0_f64;
+        let mut penetration = 0.0_f64;
         for _ in 0..6_000 {
             let qd = plant.truth().velocity_rad_per_s;
             let tau = weight(&plant) + push - qd.component_mul(&Vector::from([4.0, 4.0, 1.0, 1.0]));
             plant.cycle(&tau);
             let q = plant.truth().position_rad;
-            beyond = beyond.max((q - upper).max()).max((lower - q).max());
+            penetration = penetration.max((q - upper).max()).max((lower - q).max());
         }
         let truth = plant.truth();
-        assert!(beyond > 0.0 && beyond < 0.06, "{beyond}");
+        assert!(penetration > 0.0 && penetration < 0.06, "{penetration}");
         assert!(truth.velocity_rad_per_s.norm() < 1e-6, "{truth:?}");
         let stop = if direction > 0.0 { upper } else { lower };
         // At rest the spring of each stop balances the applied torque.
-        let give = truth.position_rad - stop - push / 1e4;
-        assert!(give.norm() < 1e-6, "{give}");
+        let deviation = truth.position_rad - stop - push / 1e4;
+        assert!(deviation.norm() < 1e-6, "{deviation}");
     }
 }
 
@@ -196,22 +196,22 @@ fn sensor_noise_has_the_stated_size_and_no_bias() {
     let q = wam4_at(&arm, 0.6, 0.0);
     let mut plant = Plant::new(config, q, Vector::zeros()).unwrap();
     let n = 20_000;
-    let (mut sum, mut square, mut angle) = (Vector3::zeros(), 0.0, 0.0);
+    let (mut force_sum, mut force_squares, mut angle_squares) = (Vector3::zeros(), 0.0, 0.0);
     for _ in 0..n {
-        let hold = weight(&plant);
-        let measured = plant.cycle(&hold);
-        sum += measured.force_n;
-        square += measured.force_n.norm_squared() / 3.0;
-        angle += (measured.position_rad - plant.truth().position_rad).norm_squared() / 4.0;
+        let gravity_nm = weight(&plant);
+        let measured = plant.cycle(&gravity_nm);
+        force_sum += measured.force_n;
+        force_squares += measured.force_n.norm_squared() / 3.0;
+        angle_squares += (measured.position_rad - plant.truth().position_rad).norm_squared() / 4.0;
     }
     let n = f64::from(n);
-    assert!((sum / n).norm() < 5.0 * 0.05 * (3.0 / n).sqrt());
-    assert!(((square / n).sqrt() / 0.05 - 1.0).abs() < 0.02);
-    assert!(((angle / n).sqrt() / 1e-4 - 1.0).abs() < 0.02);
+    assert!((force_sum / n).norm() < 5.0 * 0.05 * (3.0 / n).sqrt());
+    assert!(((force_squares / n).sqrt() / 0.05 - 1.0).abs() < 0.02);
+    assert!(((angle_squares / n).sqrt() / 1e-4 - 1.0).abs() < 0.02);
 }
 
 /// A run of one second in contact with all effects enabled.
-fn busy_run(seed: u64) -> Vec<u64> {
+fn run_with_all_effects(seed: u64) -> Vec<u64> {
     let arm = wam4();
     let friction = [
         (1.605, 1.648),
@@ -219,7 +219,7 @@ fn busy_run(seed: u64) -> Vec<u64> {
         (0.372, 0.811),
         (0.642, 0.601),
     ]
-    .map(|(s, v)| LuGre::from_friction(&Friction::coulomb(v, s)));
+    .map(|(coulomb, viscous)| LuGre::from_friction(&Friction::coulomb(viscous, coulomb)));
     let config = PlantConfig {
         friction,
         actuators: ActuatorModel {
@@ -252,16 +252,16 @@ fn busy_run(seed: u64) -> Vec<u64> {
     }
     assert!(
         plant.truth().contact_force_n.z > 0.5,
-        "it rests on the block"
+        "the tip rests on the block"
     );
     bits
 }
 
 #[test]
 fn a_rerun_is_bit_identical_and_another_seed_gives_other_results() {
-    let first = busy_run(5);
-    assert!(first == busy_run(5));
-    assert!(first != busy_run(6));
+    let first = run_with_all_effects(5);
+    assert!(first == run_with_all_effects(5));
+    assert!(first != run_with_all_effects(6));
 }
 
 #[test]
@@ -282,16 +282,16 @@ fn setting_the_state_is_equivalent_to_starting_there() {
     }
     let difference = moved.truth().position_rad - started.truth().position_rad;
     assert!(difference.norm() < 1e-12, "{difference}");
-    let bad = moved.set_state(Vector::repeat(f64::NAN), qd).unwrap_err();
-    assert!(bad.to_string().contains("q of joint 0"));
+    let error = moved.set_state(Vector::repeat(f64::NAN), qd).unwrap_err();
+    assert!(error.to_string().contains("q of joint 0"));
 }
 
 #[test]
 fn invalid_entries_are_rejected_with_name_value_and_requirement() {
     let arm = wam4();
-    let error_of = |spoil: &dyn Fn(&mut PlantConfig<4>)| -> PlantError {
+    let error_of = |edit: &dyn Fn(&mut PlantConfig<4>)| -> PlantError {
         let mut config = PlantConfig::ideal(arm);
-        spoil(&mut config);
+        edit(&mut config);
         Plant::new(config, Vector::zeros(), Vector::zeros())
             .err()
             .unwrap()

@@ -153,7 +153,7 @@ fn a_coasting_arm_stops_and_stays() {
         (0.372, 0.811),
         (0.642, 0.601),
     ]
-    .map(|(s, v)| LuGre::from_friction(&Friction::coulomb(v, s)));
+    .map(|(coulomb, viscous)| LuGre::from_friction(&Friction::coulomb(viscous, coulomb)));
     let config = PlantConfig {
         friction,
         ..PlantConfig::ideal(arm)
