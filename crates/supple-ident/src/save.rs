@@ -44,7 +44,7 @@ impl<const N: usize> Fit<N> {
     }
 
     /// Collision thresholds for the modes with stiff joint loops, from the residual of the model on held-out motions
-    /// \[N m\]: [`RESIDUAL_MARGIN`] times the greatest residual of the joint, and the breakaway torque, which may act
+    /// \[N m\]: three times the greatest residual of the joint, and the breakaway torque, which may act
     /// either way while the joint stands still. At most the joint's present threshold; `None` for a joint that did not
     /// move.
     pub fn move_collision_nm(&self, held_out: &[Validation], of: &Config<N>) -> [Option<f64>; N] {
