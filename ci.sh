@@ -34,13 +34,13 @@ step_test() {
 
 # arrows: dependencies between the crates, as ARCHITECTURE.md draws them (part of `test`)
 step_arrows() {
-    cargo test --locked --test architecture
+    cargo test --locked --workspace --exclude supple-python --test architecture
 }
 
 # bare: the freestanding program links, prints the right bits, and refuses to allocate (part of `test`)
 step_bare() {
     [[ $(uname -sm) == "Linux x86_64" ]] || skip "written for Linux on x86-64, this is $(uname -sm)"
-    cargo test --locked --test bare
+    cargo test --locked --workspace --exclude supple-python --test bare
 }
 
 # doctest: examples in the documentation
@@ -197,7 +197,7 @@ step_cortex-m() {
             skip "neither the $THUMB target nor the core library's source can be had"
         export SUPPLE_BUILD_STD=1
     fi
-    cargo test --locked --test bare -- --ignored cortex_m
+    cargo test --locked --workspace --exclude supple-python --test bare -- --ignored cortex_m
 }
 
 # socketcan: the arm's bus on a CAN interface of Debian's kernel in a virtual machine; installs QEMU, fetches the kernel
