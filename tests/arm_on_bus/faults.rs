@@ -1,5 +1,5 @@
-//! Follows every injected fault to the emulated motors: which torque acts, how soon, and that the arm never
-//! becomes stiffer.
+//! Effect of every injected fault on the emulated motors: which torque acts and how soon. The arm never becomes
+//! stiffer.
 
 use crate::rig::{MS, Rig, TestBus};
 use supple_bus::virtual_time::Peer;
@@ -15,30 +15,31 @@ use supple_puck::safety::SafetyMode;
 use supple_puck::status::MotorMode;
 
 /// Time limit of every safe action.
-const SAFE_NS: u64 = 20 * MS;
+const MAX_SAFE_ACTION_NS: u64 = 20 * MS;
 /// Torque resolution of a motor puck \[N m\].
 const QUANTUM_NM: f64 = 1.0 / 2700.0;
 
-fn torques(id: MessageId) -> bool {
+fn is_torque_frame(id: MessageId) -> bool {
     id.raw() == 0x401
 }
 
-fn of_puck_2(id: MessageId) -> bool {
+fn is_reply_of_puck_2(id: MessageId) -> bool {
     id.raw() == 0x443
 }
 
-fn to_module(id: MessageId) -> bool {
+fn is_request_to_module(id: MessageId) -> bool {
     id.raw() == 0x00a
 }
 
-fn injector(rig: &mut Rig<4>) -> &mut TestBus<4> {
+fn fault_injector(rig: &mut Rig<4>) -> &mut TestBus<4> {
     rig.cycle.bus_mut()
 }
 
 /// Time from `begin_ns` until the motors became idle \[ns\].
 fn idle_after_ns(rig: &Rig<4>, begin_ns: u64) -> Option<u64> {
     let arm_events = rig.emulator().arm_events().iter();
-    let mut idle = arm_events.filter(|(_, h)| matches!(h, ArmEvent::Motor(_, MotorMode::Idle)));
+    let mut idle =
+        arm_events.filter(|(_, event)| matches!(event, ArmEvent::Motor(_, MotorMode::Idle)));
     let first = idle.find(|(time_ns, _)| *time_ns >= begin_ns);
     first.map(|(time_ns, _)| time_ns - begin_ns)
 }
@@ -46,17 +47,20 @@ fn idle_after_ns(rig: &Rig<4>, begin_ns: u64) -> Option<u64> {
 fn assert_idle_in_time(rig: &Rig<4>, begin_ns: u64) {
     assert!(rig.motors_in(MotorMode::Idle));
     let after_ns = idle_after_ns(rig, begin_ns);
-    assert!(after_ns.is_some_and(|ns| ns <= SAFE_NS), "{after_ns:?}");
+    assert!(
+        after_ns.is_some_and(|ns| ns <= MAX_SAFE_ACTION_NS),
+        "{after_ns:?}"
+    );
 }
 
 /// Motor torques that hold the arm's weight in its current pose.
 fn weight_nm(rig: &Rig<4>) -> Vector<4> {
-    let arm = crate::rig::arm(4).config::<4>().unwrap();
+    let config = crate::rig::description(4).config::<4>().unwrap();
     let q = rig.emulator().truth().position_rad;
-    arm.joint_from_motor.transpose() * gravity(&arm.arm, &q)
+    config.joint_from_motor.transpose() * gravity(&config.arm, &q)
 }
 
-/// Treated like a missing answer: the torque never drops to zero within one cycle.
+/// An answer that is not finite is treated like a missing one: the torque does not drop to zero in one cycle.
 #[test]
 fn nonfinite_torques_lead_to_the_fallback_torque_and_then_to_braking() {
     let mut rig = Rig::<4>::holding();
@@ -64,8 +68,8 @@ fn nonfinite_torques_lead_to_the_fallback_torque_and_then_to_braking() {
     rig.cycle.link_mut().not_finite = true;
     let begin_ns = rig.now_ns();
     assert_eq!(rig.step().torque, Torque::Fallback);
-    let held = rig.history.last().unwrap().1;
-    assert!((held - weight_nm(&rig)).amax() < 2.0 * QUANTUM_NM);
+    let held_nm = rig.history.last().unwrap().1;
+    assert!((held_nm - weight_nm(&rig)).amax() < 2.0 * QUANTUM_NM);
     rig.run(30);
     assert_idle_in_time(&rig, begin_ns);
     assert_eq!(
@@ -81,13 +85,13 @@ fn a_dead_controller_leads_to_the_fallback_torque_and_then_to_braking() {
     rig.run(500);
     rig.cycle.link_mut().dead = true;
     let begin_ns = rig.now_ns();
-    // From the first cycle without an answer on.
+    // The fallback torque acts from the first cycle without an answer on.
     assert_eq!(rig.step().torque, Torque::Fallback);
-    let held = rig.history.last().unwrap().1;
-    assert!((held - weight_nm(&rig)).amax() < 2.0 * QUANTUM_NM);
+    let held_nm = rig.history.last().unwrap().1;
+    assert!((held_nm - weight_nm(&rig)).amax() < 2.0 * QUANTUM_NM);
     // The fallback torque does not depend on the position: it is not a spring.
     while rig.motors_in(MotorMode::Torque) {
-        assert_eq!(rig.history.last().unwrap().1, held);
+        assert_eq!(rig.history.last().unwrap().1, held_nm);
         rig.step();
     }
     assert_idle_in_time(&rig, begin_ns);
@@ -136,8 +140,8 @@ fn the_arm_is_reenabled_only_from_the_pendant() {
 fn one_lost_reply_is_tolerated() {
     let mut rig = Rig::<4>::holding();
     let now_ns = rig.now_ns();
-    let rule = FaultRule::always(Traffic::Received, FaultKind::Loss).only(of_puck_2);
-    injector(&mut rig).add(rule.within(now_ns, now_ns + MS));
+    let rule = FaultRule::always(Traffic::Received, FaultKind::Loss).only(is_reply_of_puck_2);
+    fault_injector(&mut rig).add(rule.within(now_ns, now_ns + MS));
     rig.run(100);
     assert_eq!(rig.cycle.counters().replies_lost, 1);
     assert_eq!(rig.cycle.guard().stage(), Stage::Active);
@@ -148,8 +152,8 @@ fn one_lost_reply_is_tolerated() {
 fn a_lost_encoder_ends_torque_at_once() {
     let mut rig = Rig::<4>::holding();
     let now_ns = rig.now_ns();
-    let rule = FaultRule::always(Traffic::Received, FaultKind::Loss).only(of_puck_2);
-    injector(&mut rig).add(rule.within(now_ns, u64::MAX));
+    let rule = FaultRule::always(Traffic::Received, FaultKind::Loss).only(is_reply_of_puck_2);
+    fault_injector(&mut rig).add(rule.within(now_ns, u64::MAX));
     rig.step();
     let action = rig.step();
     assert_eq!(action.torque, Torque::None);
@@ -169,8 +173,8 @@ fn a_lost_encoder_ends_torque_at_once() {
 fn one_lost_torque_frame_is_detected_in_its_cycle_and_does_not_end_torque() {
     let mut rig = Rig::<4>::holding();
     let now_ns = rig.now_ns();
-    let rule = FaultRule::always(Traffic::Sent, FaultKind::SilentLoss).only(torques);
-    injector(&mut rig).add(rule.within(now_ns, now_ns + MS));
+    let rule = FaultRule::always(Traffic::Sent, FaultKind::SilentLoss).only(is_torque_frame);
+    fault_injector(&mut rig).add(rule.within(now_ns, now_ns + MS));
     rig.step();
     assert_eq!(rig.cycle.counters().tx_lost, 1);
     rig.run(100);
@@ -179,11 +183,11 @@ fn one_lost_torque_frame_is_detected_in_its_cycle_and_does_not_end_torque() {
 }
 
 #[test]
-fn torque_frames_that_are_never_sent_lower_the_module() {
+fn unsent_torque_frames_set_the_module_to_idle() {
     let mut rig = Rig::<4>::holding();
     let now_ns = rig.now_ns();
-    let rule = FaultRule::always(Traffic::Sent, FaultKind::SilentLoss).only(torques);
-    injector(&mut rig).add(rule.within(now_ns, u64::MAX));
+    let rule = FaultRule::always(Traffic::Sent, FaultKind::SilentLoss).only(is_torque_frame);
+    fault_injector(&mut rig).add(rule.within(now_ns, u64::MAX));
     rig.step();
     assert_eq!(rig.cycle.counters().tx_lost, 1);
     rig.run(30);
@@ -200,7 +204,7 @@ fn the_safety_module_detects_a_host_that_cannot_transmit() {
     let mut rig = Rig::<4>::holding();
     let now_ns = rig.now_ns();
     let rule = FaultRule::always(Traffic::Sent, FaultKind::SilentLoss);
-    injector(&mut rig).add(rule.within(now_ns, u64::MAX));
+    fault_injector(&mut rig).add(rule.within(now_ns, u64::MAX));
     rig.step();
     assert!(rig.cycle.counters().tx_lost >= 2);
     let before = rig.history.last().unwrap().1;
@@ -213,11 +217,11 @@ fn the_safety_module_detects_a_host_that_cannot_transmit() {
 }
 
 #[test]
-fn after_bus_off_the_host_lowers_the_module() {
+fn after_bus_off_the_host_sets_the_module_to_idle() {
     let mut rig = Rig::<4>::holding();
     let now_ns = rig.now_ns();
     let off = FaultRule::always(Traffic::Sent, FaultKind::BusOff);
-    injector(&mut rig).add(off.within(now_ns + 300_000, now_ns + 30 * MS));
+    fault_injector(&mut rig).add(off.within(now_ns + 300_000, now_ns + 30 * MS));
     rig.run(30);
     assert!(rig.motors_in(MotorMode::Torque));
     rig.run(30);
@@ -225,9 +229,9 @@ fn after_bus_off_the_host_lowers_the_module() {
     assert_eq!(rig.cycle.guard().last_loss().unwrap().0, LossReason::BusOff);
 }
 
-/// Flips one bit of one reply. Either the error is small and accepted, or the controller rejects it and the arm
-/// goes to idle. Torque grows at most at its rate limit, except during the stop of an apparent motion, which may
-/// use a fifth of the joint's limit per cycle.
+/// Inverts one bit of one reply. Either the error is small and accepted, or it causes a fault and the motors are set to
+/// idle. In each cycle the torque grows at most by its rate limit. If the error looks like fast motion, which the
+/// controller then stops, it grows at most by a fifth of the joint's torque limit.
 #[test]
 fn a_corrupted_reply_is_accepted_or_ends_torque() {
     let (mut accepted, mut ended) = (0, 0);
@@ -235,19 +239,19 @@ fn a_corrupted_reply_is_accepted_or_ends_torque() {
         let mut rig = Rig::<4>::seeded(seed);
         rig.activate();
         let now_ns = rig.now_ns();
-        let bits: [fn(MessageId) -> bool; 4] = [
+        let is_reply_of_puck: [fn(MessageId) -> bool; 4] = [
             |id| id.raw() == 0x423,
-            of_puck_2,
+            is_reply_of_puck_2,
             |id| id.raw() == 0x463,
             |id| id.raw() == 0x483,
         ];
         let rule = FaultRule::always(Traffic::Received, FaultKind::Corrupt);
-        let rule = rule.only(bits[seed as usize % 4]);
-        injector(&mut rig).add(rule.within(now_ns, now_ns + MS));
+        let rule = rule.only(is_reply_of_puck[seed as usize % 4]);
+        fault_injector(&mut rig).add(rule.within(now_ns, now_ns + MS));
         let from = rig.history.len() - 1;
         rig.run(40);
-        let limit_nm = 1.0;
-        let config = crate::rig::arm(4).config::<4>().unwrap();
+        let rate_limit_nm = 1.0;
+        let config = crate::rig::description(4).config::<4>().unwrap();
         let joint_from_motor = config.joint_from_motor;
         for pair in rig.history[from..].windows(2) {
             let to_joints = joint_from_motor.transpose().try_inverse().unwrap();
@@ -260,7 +264,7 @@ fn a_corrupted_reply_is_accepted_or_ends_torque() {
                 .is_some_and(|o| o.fault.is_some());
             if rig.motors_in(MotorMode::Torque) {
                 assert!(
-                    growth.max() < limit_nm + 0.1
+                    growth.max() < rate_limit_nm + 0.1
                         || stopping && (growth - config.limits.joint_torque_nm * 0.2).max() <= 0.1,
                     "{growth} in seed {seed}, from {before} to {after}, {:?}, {:?}",
                     rig.cycle.guard().last_loss(),
@@ -298,7 +302,7 @@ fn a_corrupted_reply_is_accepted_or_ends_torque() {
 fn duplicated_and_reordered_frames_have_no_effect() {
     for kind in [FaultKind::Duplicate, FaultKind::Reorder(20_000)] {
         let mut rig = Rig::<4>::holding();
-        injector(&mut rig).add(FaultRule::always(Traffic::Received, kind));
+        fault_injector(&mut rig).add(FaultRule::always(Traffic::Received, kind));
         rig.run(300);
         assert_eq!(rig.cycle.guard().stage(), Stage::Active, "{kind:?}");
         assert_eq!(rig.cycle.counters().replies_lost, 0, "{kind:?}");
@@ -310,8 +314,9 @@ fn duplicated_and_reordered_frames_have_no_effect() {
 fn late_replies_count_as_lost() {
     let mut rig = Rig::<4>::holding();
     let now_ns = rig.now_ns();
-    let rule = FaultRule::always(Traffic::Received, FaultKind::Delay(900_000)).only(of_puck_2);
-    injector(&mut rig).add(rule.within(now_ns, now_ns + MS));
+    let rule =
+        FaultRule::always(Traffic::Received, FaultKind::Delay(900_000)).only(is_reply_of_puck_2);
+    fault_injector(&mut rig).add(rule.within(now_ns, now_ns + MS));
     rig.run(50);
     assert_eq!(rig.cycle.counters().replies_lost, 1);
     assert_eq!(rig.cycle.guard().stage(), Stage::Active);
@@ -329,14 +334,14 @@ fn the_emergency_stop_is_reported_to_the_controller() {
 }
 
 #[test]
-fn a_mode_change_of_the_module_is_known_within_the_time_limit() {
+fn a_mode_change_of_the_module_is_reported_within_the_time_limit() {
     let mut rig = Rig::<4>::holding();
     let begin_ns = rig.now_ns();
     rig.emulator_mut().press(ButtonPress::Idle);
     while rig.cycle.link_mut().report.unwrap().drives == Drives::Active {
         rig.step();
     }
-    assert!(rig.now_ns() - begin_ns <= SAFE_NS);
+    assert!(rig.now_ns() - begin_ns <= MAX_SAFE_ACTION_NS);
     assert_eq!(rig.cycle.guard().stage(), Stage::Resting);
 }
 
@@ -360,7 +365,7 @@ fn the_safety_module_detects_a_dead_host() {
 }
 
 #[test]
-fn shutdown_lowers_the_module_first() {
+fn shutdown_sets_the_module_to_idle_first() {
     let mut rig = Rig::<4>::holding();
     let begin_ns = rig.now_ns();
     rig.cycle.begin_shutdown();
@@ -376,8 +381,8 @@ fn shutdown_lowers_the_module_first() {
 fn without_the_module_the_motors_are_set_to_idle_directly() {
     let mut rig = Rig::<4>::holding();
     let begin_ns = rig.now_ns();
-    let rule = FaultRule::always(Traffic::Sent, FaultKind::Loss).only(to_module);
-    injector(&mut rig).add(rule.within(begin_ns, u64::MAX));
+    let rule = FaultRule::always(Traffic::Sent, FaultKind::Loss).only(is_request_to_module);
+    fault_injector(&mut rig).add(rule.within(begin_ns, u64::MAX));
     rig.cycle.link_mut().dead = true;
     rig.run(105);
     assert!(rig.motors_in(MotorMode::Torque));
@@ -393,9 +398,9 @@ fn without_the_module_the_motors_are_set_to_idle_directly() {
 fn a_silent_module_ends_torque() {
     let mut rig = Rig::<4>::holding();
     let begin_ns = rig.now_ns();
-    let silent = |id: MessageId| id.raw() == 0x546;
-    let rule = FaultRule::always(Traffic::Received, FaultKind::Loss).only(silent);
-    injector(&mut rig).add(rule.within(begin_ns, u64::MAX));
+    let is_reply_of_module = |id: MessageId| id.raw() == 0x546;
+    let rule = FaultRule::always(Traffic::Received, FaultKind::Loss).only(is_reply_of_module);
+    fault_injector(&mut rig).add(rule.within(begin_ns, u64::MAX));
     rig.run(150);
     assert_eq!(rig.cycle.guard().last_loss().unwrap().0, LossReason::Module);
     assert_eq!(rig.emulator().safety().mode(), SafetyMode::Idle);

@@ -3,6 +3,6 @@
 
 mod faults;
 mod link;
+mod normal_operation;
 mod rig;
-mod service;
 mod start_up;

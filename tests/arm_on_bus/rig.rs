@@ -1,4 +1,4 @@
-//! Test rig: an emulated arm, the host, and the controller.
+//! Test rig in one process: the emulated arm, the cycle of `supple-can` and the controller.
 
 use crate::link::InProcessLink;
 use supple_bus::FaultInjector;
@@ -19,12 +19,12 @@ pub const ANSWER_NS: u64 = MS / 20;
 
 pub type TestBus<const N: usize> = FaultInjector<DirectBus<Emulator<N>>>;
 
-pub fn arm(joints: usize) -> Description {
+pub fn description(joints: usize) -> Description {
     Description::asset(if joints == 4 { "wam4" } else { "wam7" }).unwrap()
 }
 
 pub fn emulator<const N: usize>(config: EmulatorConfig, pose: Vector<N>) -> Emulator<N> {
-    let plant = PlantConfig::from_description(&arm(N)).unwrap();
+    let plant = PlantConfig::from_description(&description(N)).unwrap();
     Emulator::new(config, plant, pose, 0).unwrap()
 }
 
@@ -39,7 +39,7 @@ fn seeded_bus<const N: usize>(emulator: Emulator<N>, seed: u64) -> TestBus<N> {
 /// Start-up configuration of an arm in its home pose (`--zero-at-home`).
 pub fn startup_config<const N: usize>() -> StartupConfig<N> {
     StartupConfig {
-        zero_at_rad: Some(arm(N).home::<N>().unwrap()),
+        zero_at_rad: Some(description(N).home::<N>().unwrap()),
         limits: SafetyLimits {
             speed_fault: SpeedLimit::from_m_per_s(2.0).ok(),
             ..SafetyLimits::default()
@@ -52,7 +52,7 @@ pub fn try_start<const N: usize>(
     bus: &mut TestBus<N>,
     startup_config: &StartupConfig<N>,
 ) -> Result<Ready<N>, CanError> {
-    start_up(bus, &arm(N), startup_config, &|| false, &mut |_| ())
+    start_up(bus, &description(N), startup_config, &|| false, &mut |_| ())
 }
 
 pub struct Rig<const N: usize> {
@@ -62,14 +62,14 @@ pub struct Rig<const N: usize> {
 }
 
 impl<const N: usize> Rig<N> {
-    /// Started up, with idle motors.
+    /// An arm after start-up, with idle motors.
     pub fn new() -> Rig<N> {
         Rig::seeded(1)
     }
 
-    /// As [`Rig::new`], with a seed for the injector.
+    /// As [`Rig::new`], with a seed for the fault injector.
     pub fn seeded(seed: u64) -> Rig<N> {
-        Rig::set_up(arm(N).home::<N>().unwrap(), PERIOD_NS, seed)
+        Rig::set_up(description(N).home::<N>().unwrap(), PERIOD_NS, seed)
     }
 
     /// As [`Rig::new`], from another pose and at another period.
@@ -86,7 +86,7 @@ impl<const N: usize> Rig<N> {
             ..startup_config()
         };
         let ready = try_start(&mut bus, &startup_config).unwrap();
-        let mut config = arm(N).config::<N>().unwrap();
+        let mut config = description(N).config::<N>().unwrap();
         config.period_s = period_ns as f64 * 1e-9;
         let link = InProcessLink::new(Controller::new(config).unwrap());
         let cycle_config = CycleConfig {
@@ -100,7 +100,7 @@ impl<const N: usize> Rig<N> {
         }
     }
 
-    /// In gravity hold with the motors in torque mode.
+    /// An arm in gravity hold with the motors in torque mode.
     pub fn holding() -> Rig<N> {
         let mut rig = Rig::new();
         rig.activate();

@@ -11,7 +11,7 @@ use supple_puck::status::{MotorMode, Role};
 use supple_puck::{Property, PropertyTable};
 
 fn home<const N: usize>() -> Vector<N> {
-    rig::arm(N).home::<N>().unwrap()
+    rig::description(N).home::<N>().unwrap()
 }
 
 /// An arm in its home pose whose operator has pressed Shift-Idle.
@@ -88,7 +88,7 @@ fn start_up_waits_for_the_operator() {
     let progress = &mut |progress| reported.push(progress);
     start_up(
         &mut bus,
-        &rig::arm(4),
+        &rig::description(4),
         &startup_config::<4>(),
         &|| false,
         progress,
@@ -112,7 +112,7 @@ fn start_up_can_be_stopped_while_it_waits() {
     let mut bus = rig::bus(emulator(EmulatorConfig::wam(4), home::<4>()));
     let ended = start_up(
         &mut bus,
-        &rig::arm(4),
+        &rig::description(4),
         &startup_config::<4>(),
         &|| true,
         &mut |_| (),
@@ -217,7 +217,7 @@ fn an_arm_with_more_pucks_is_rejected() {
     let mut bus = idle_arm::<7>(EmulatorConfig::wam(7));
     let error = start_up(
         &mut bus,
-        &rig::arm(4),
+        &rig::description(4),
         &startup_config::<4>(),
         &|| false,
         &mut |_| (),

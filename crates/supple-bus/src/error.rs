@@ -8,7 +8,7 @@ use std::path::PathBuf;
 pub enum BusError {
     /// The transmit queue is full.
     #[error(
-        "the transmit queue is full: frames are queued faster than the bus sends them, or it sends none"
+        "the transmit queue is full: frames are queued faster than the bus sends them, or the bus sends nothing"
     )]
     Full,
     /// A CAN interface that cannot be opened.
@@ -21,7 +21,7 @@ pub enum BusError {
         /// Remedy.
         remedy: &'static str,
     },
-    /// A folder or socket that is not accessible only to its owner.
+    /// A folder or socket that cannot be created or used, or that other users can access.
     #[error("{} {problem}; {remedy}", path.display())]
     Folder {
         /// The folder or socket.
@@ -31,14 +31,18 @@ pub enum BusError {
         /// Remedy.
         remedy: &'static str,
     },
-    /// Another process already uses this node.
-    #[error("{} belongs to a process that is running: end it, or choose another folder", path.display())]
+    /// Another process already has this socket open.
+    #[error("{} is in use by a running process: end that process, or choose another folder", path.display())]
     SocketInUse {
         /// The socket.
         path: PathBuf,
     },
     /// The other side of an emulated bus does not answer.
-    #[error("{} does not answer: start the emulator first (with --virtual-time if the host has it), or check whether it has ended", path.display())]
+    #[error(
+        "{} does not answer: start the emulator first (with --virtual-time if the host runs with it), or check \
+         whether it has ended",
+        path.display()
+    )]
     NoPeer {
         /// The socket.
         path: PathBuf,

@@ -23,7 +23,7 @@ pub enum Traffic {
 /// Kind of fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FaultKind {
-    /// The frame is lost. A sent frame is still confirmed, as if it were lost after the controller.
+    /// The frame is lost. A sent frame is still confirmed, as if it were lost after the CAN controller sent it.
     Loss,
     /// A sent frame is neither transmitted nor confirmed, and no error is reported: a silent failure of the
     /// transmit buffer. Received frames are lost.
@@ -36,8 +36,8 @@ pub enum FaultKind {
     Reorder(u64),
     /// One bit of the payload is inverted, without a checksum error.
     Corrupt,
-    /// The controller goes bus-off: the fault is reported once, and nothing is sent, received or confirmed until
-    /// the rule ends; then the controller restarts.
+    /// The CAN controller goes bus-off: the fault is reported once, and nothing is sent, received or confirmed
+    /// until the rule ends; then the CAN controller restarts.
     BusOff,
 }
 
@@ -107,12 +107,13 @@ pub struct FaultInjector<B> {
     bus: B,
     rules: Vec<FaultRule>,
     random: SplitMix64,
-    /// Delayed events with their due times, in that order; likewise the frames.
+    /// Delayed events for the host, each with its due time \[ns\]; sorted by it.
     events: VecDeque<(u64, Event)>,
+    /// Delayed frames of the host, each with its due time \[ns\]; sorted by it.
     frames: VecDeque<(u64, CanFrame)>,
-    /// A received frame that the next one is to overtake.
+    /// A received frame that is held back until the next one has been delivered, at the latest until this time \[ns\].
     overtaken: Option<(u64, Event)>,
-    off: bool,
+    bus_off: bool,
 }
 
 impl<B: Bus> FaultInjector<B> {
@@ -125,7 +126,7 @@ impl<B: Bus> FaultInjector<B> {
             events: VecDeque::with_capacity(256),
             frames: VecDeque::with_capacity(256),
             overtaken: None,
-            off: false,
+            bus_off: false,
         }
     }
 
@@ -149,7 +150,7 @@ impl<B: Bus> FaultInjector<B> {
         &mut self.bus
     }
 
-    fn chance(&mut self, probability: f64) -> bool {
+    fn happens(&mut self, probability: f64) -> bool {
         let unit = (self.random.next_u64() >> 11) as f64 / (1u64 << 53) as f64;
         unit < probability
     }
@@ -158,11 +159,11 @@ impl<B: Bus> FaultInjector<B> {
         let now = self.bus.now_ns();
         for i in 0..self.rules.len() {
             let rule = self.rules[i];
-            let touches = rule.kind != FaultKind::BusOff
+            let matches = rule.kind != FaultKind::BusOff
                 && rule.traffic == traffic
                 && rule.covers(now)
                 && rule.only.is_none_or(|ids| ids(id));
-            if touches && self.chance(rule.probability) {
+            if matches && self.happens(rule.probability) {
                 return Some(rule.kind);
             }
         }
@@ -182,46 +183,47 @@ impl<B: Bus> FaultInjector<B> {
         CanFrame::new(frame.id(), &payload[..length]).unwrap_or(*frame)
     }
 
-    fn hold_event(&mut self, due_ns: u64, event: Event) {
+    fn delay_event(&mut self, due_ns: u64, event: Event) {
         let at = self.events.partition_point(|(due, _)| *due <= due_ns);
         self.events.insert(at, (due_ns, event));
     }
 
-    fn hold_frame(&mut self, due_ns: u64, frame: CanFrame) {
+    fn delay_frame(&mut self, due_ns: u64, frame: CanFrame) {
         let at = self.frames.partition_point(|(due, _)| *due <= due_ns);
         self.frames.insert(at, (due_ns, frame));
     }
 
     /// Updates the bus-off state from the rules; returns the event if the state has changed.
-    fn update_off(&mut self) -> Option<Event> {
+    fn update_bus_off(&mut self) -> Option<Event> {
         let now = self.bus.now_ns();
         let mut rules = self.rules.iter();
-        let off = rules.any(|rule| rule.kind == FaultKind::BusOff && rule.covers(now));
-        let changed = off != self.off;
-        self.off = off;
-        changed.then_some(Event::Fault(if off {
+        let bus_off = rules.any(|rule| rule.kind == FaultKind::BusOff && rule.covers(now));
+        let changed = bus_off != self.bus_off;
+        self.bus_off = bus_off;
+        changed.then_some(Event::Fault(if bus_off {
             BusFault::BusOff
         } else {
             BusFault::Restarted
         }))
     }
 
-    /// Time of the injector's next own action.
+    /// Time of the next delayed event or frame, or of the next start or end of a bus-off window \[ns\].
     fn next_due_ns(&self) -> u64 {
         let now = self.bus.now_ns();
         let windows = self.rules.iter().filter(|r| r.kind == FaultKind::BusOff);
-        let edges = windows.flat_map(|rule| [rule.from_ns, rule.until_ns]);
+        let window_bounds = windows.flat_map(|rule| [rule.from_ns, rule.until_ns]);
         let events = self.events.front().map(|(due, _)| *due);
         let frames = self.frames.front().map(|(due, _)| *due);
         let overtaken = self.overtaken.map(|(due, _)| due);
-        let held = [events, frames, overtaken].into_iter().flatten();
-        let edge = edges.filter(|edge| *edge > now).min();
-        held.chain(edge).min().unwrap_or(u64::MAX)
+        let delayed = [events, frames, overtaken].into_iter().flatten();
+        let window_bound = window_bounds.filter(|bound| *bound > now).min();
+        delayed.chain(window_bound).min().unwrap_or(u64::MAX)
     }
 
-    /// Sends the frames that are due and returns an event that is due.
-    fn due(&mut self) -> Result<Option<Event>, BusError> {
-        if let Some(event) = self.update_off() {
+    /// Sends the delayed frames that are due. Returns a change of the bus-off state, or else a delayed event that is
+    /// due.
+    fn release_due(&mut self) -> Result<Option<Event>, BusError> {
+        if let Some(event) = self.update_bus_off() {
             return Ok(Some(event));
         }
         let now = self.bus.now_ns();
@@ -248,33 +250,33 @@ impl<B: Bus> FaultInjector<B> {
     }
 
     /// Applies the rules to a received frame.
-    fn received(&mut self, frame: CanFrame) -> Option<Event> {
+    fn apply_to_received(&mut self, frame: CanFrame) -> Option<Event> {
         let now = self.bus.now_ns();
         let event = Event::Frame(frame);
         let kind = self.fault_for(Traffic::Received, frame.id());
-        if let (Some((_, first)), None) = (self.overtaken, kind) {
+        if let (Some((_, earlier)), None) = (self.overtaken, kind) {
             self.overtaken = None;
-            self.hold_event(now, first);
+            self.delay_event(now, earlier);
             return Some(event);
         }
         match kind {
             None | Some(FaultKind::BusOff) => Some(event),
             Some(FaultKind::Loss | FaultKind::SilentLoss) => None,
-            Some(FaultKind::Delay(late_ns)) => {
-                self.hold_event(now + late_ns, event);
+            Some(FaultKind::Delay(delay_ns)) => {
+                self.delay_event(now + delay_ns, event);
                 None
             }
             Some(FaultKind::Duplicate) => {
-                self.hold_event(now, event);
+                self.delay_event(now, event);
                 Some(event)
             }
-            Some(FaultKind::Reorder(late_ns)) => match self.overtaken.take() {
-                Some((_, first)) => {
-                    self.hold_event(now, first);
+            Some(FaultKind::Reorder(delay_ns)) => match self.overtaken.take() {
+                Some((_, earlier)) => {
+                    self.delay_event(now, earlier);
                     Some(event)
                 }
                 None => {
-                    self.overtaken = Some((now + late_ns, event));
+                    self.overtaken = Some((now + delay_ns, event));
                     None
                 }
             },
@@ -298,21 +300,21 @@ impl<B: Bus> Bus for FaultInjector<B> {
 
     fn send(&mut self, frame: &CanFrame) -> Result<(), BusError> {
         let now = self.bus.now_ns();
-        if let Some(event) = self.update_off() {
-            self.hold_event(now, event);
+        if let Some(event) = self.update_bus_off() {
+            self.delay_event(now, event);
         }
-        if self.off {
+        if self.bus_off {
             return Ok(());
         }
         match self.fault_for(Traffic::Sent, frame.id()) {
             None | Some(FaultKind::BusOff) => self.bus.send(frame),
             Some(FaultKind::Loss) => {
-                self.hold_event(now, Event::Sent(*frame));
+                self.delay_event(now, Event::Sent(*frame));
                 Ok(())
             }
             Some(FaultKind::SilentLoss) => Ok(()),
-            Some(FaultKind::Delay(late_ns) | FaultKind::Reorder(late_ns)) => {
-                self.hold_frame(now + late_ns, *frame);
+            Some(FaultKind::Delay(delay_ns) | FaultKind::Reorder(delay_ns)) => {
+                self.delay_frame(now + delay_ns, *frame);
                 Ok(())
             }
             Some(FaultKind::Duplicate) => {
@@ -328,20 +330,20 @@ impl<B: Bus> Bus for FaultInjector<B> {
 
     fn receive_until(&mut self, until_ns: u64) -> Result<Option<Event>, BusError> {
         loop {
-            if let Some(event) = self.due()? {
+            if let Some(event) = self.release_due()? {
                 return Ok(Some(event));
             }
             let target = until_ns.min(self.next_due_ns());
             match self.bus.receive_until(target)? {
-                Some(_) if self.off => {}
+                Some(_) if self.bus_off => {}
                 Some(Event::Frame(frame)) => {
-                    if let Some(event) = self.received(frame) {
+                    if let Some(event) = self.apply_to_received(frame) {
                         return Ok(Some(event));
                     }
                 }
                 Some(event) => return Ok(Some(event)),
                 None if self.bus.now_ns() >= until_ns && self.next_due_ns() > until_ns => {
-                    return self.due();
+                    return self.release_due();
                 }
                 None => {}
             }

@@ -66,7 +66,7 @@ impl LockstepBus {
             client: LockstepClient::new(),
             now_ns: 0,
         };
-        // The answer "reached" carries the arm's time.
+        // Discards events until the arm answers "reached", which carries the arm's time.
         while bus.receive_until(0)?.is_some() {}
         Ok(bus)
     }
@@ -76,7 +76,7 @@ impl LockstepBus {
         loop {
             match self.client.send_request(&self.endpoint)? {
                 Delivery::Delivered => break,
-                // Bus time does not advance while the peer reads its queue.
+                // The peer has yet to read its queue. Bus time does not advance while this process retries.
                 Delivery::Full if monotonic_ns() < deadline_ns => std::thread::yield_now(),
                 Delivery::Full | Delivery::NoPeer => return Err(self.no_peer()),
             }
@@ -159,11 +159,11 @@ impl LockstepResponder {
     /// If the socket fails. A host that has ended is not an error; another may connect.
     pub fn serve(&mut self, peer: &mut impl Peer, timeout_ns: u64) -> Result<bool, BusError> {
         let mut bytes = [0; MAX_BYTES];
-        let Some(length) = self.next(&mut bytes, timeout_ns)? else {
+        let Some(length) = self.receive_message(&mut bytes, timeout_ns)? else {
             return Ok(false);
         };
         let message = Message::parse(&bytes[..length]);
-        // Without a time limit the request runs to its end.
+        // With no limit on the arm's time, one call completes the request.
         if let Some(request) = message.filter(|m| m.kind == Kind::RunUntil)
             && let Some(answer) = LockstepServer::new(request).run(peer, u64::MAX)
         {
@@ -172,7 +172,12 @@ impl LockstepResponder {
         Ok(true)
     }
 
-    fn next(&self, bytes: &mut [u8], timeout_ns: u64) -> Result<Option<usize>, BusError> {
+    /// Waits for a datagram of the host and reads it into `bytes`; returns its length, `None` after the timeout.
+    fn receive_message(
+        &self,
+        bytes: &mut [u8],
+        timeout_ns: u64,
+    ) -> Result<Option<usize>, BusError> {
         if let Some(read) = self.endpoint.receive_into(bytes)? {
             return Ok(Some(read.len()));
         }

@@ -2,11 +2,11 @@
 //!
 //! ```text
 //! 0  request positions -> collect replies -> motors to joints -> publish -> wait for the answer
-//!    -> guard -> joints to motors -> torque frames -> an auxiliary poll, if it fits -> drain until the
+//!    -> safe action -> joints to motors -> torque frames -> an auxiliary poll, if it fits -> drain until the
 //!    next period: every frame of the cycle must be sent by then
 //! ```
 //!
-//! It computes no torques. A cycle allocates no memory, takes no lock and writes no log.
+//! `supple-can` computes no torques. A cycle allocates no memory, takes no lock and writes no log.
 
 use crate::bus_time::BusTime;
 use crate::error::CanError;
@@ -29,7 +29,7 @@ use supple_puck::{
     Value,
 };
 
-/// Period in which every auxiliary poll is sent once, in bus time \[ns\].
+/// Period of each auxiliary poll, in bus time \[ns\].
 const AUXILIARY_POLL_PERIOD_NS: u64 = 10_000_000;
 
 /// Configuration of the cycle.
@@ -51,7 +51,7 @@ struct Ids {
     pendant: PropertyId,
 }
 
-/// An auxiliary poll.
+/// What an auxiliary poll requests: the mode of the safety module, the pendant or the force/torque sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum AuxiliaryPoll {
     Mode,
@@ -67,36 +67,42 @@ pub struct Cycle<const N: usize, B, L> {
     arm: Arm<N>,
     ids: Ids,
     cycle_config: CycleConfig,
-    time: BusTime,
+    bus_time: BusTime,
     guard: SafeActionMachine,
     drive_guard: DriveGuard<N>,
     cycle: u64,
     /// Cycle of the last angles that the drive guard observed.
     observed_cycle: Option<u64>,
-    next_ns: u64,
+    next_period_ns: u64,
+    /// Position replies of this cycle.
     counts: [Option<Counts>; N],
     /// Last joint angles for which all encoders replied \[rad\].
     last_pose_rad: Vector<N>,
     readings: Readings,
+    /// Last known mode of the safety module, and when it was received \[ns\].
     module: Option<(SafetyMode, u64)>,
     pendant: Option<Pendant>,
     unconfirmed: UnconfirmedFrames,
+    /// The next auxiliary poll, and the time from which it may be sent \[ns\].
     auxiliary_poll: AuxiliaryPoll,
     auxiliary_due_ns: u64,
-    sent_request: bool,
-    unsent: bool,
+    /// The interface has confirmed that this cycle's position request was sent.
+    request_confirmed: bool,
+    /// Some frames of the previous cycle were not sent.
+    frames_lost: bool,
     bus_off: bool,
-    bits: u64,
+    /// Bits on the bus in this period.
+    bus_bits: u64,
     fallback_nm: Vector<N>,
     counters: Counters,
-    leaving: bool,
+    shutting_down: bool,
 }
 
 impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
     /// Starts the cycle of an arm that has completed start-up.
     ///
     /// # Errors
-    /// [`CanError::Overload`] if the period exceeds the bus bandwidth; an error if a firmware lacks a property.
+    /// [`CanError::Overload`] if the period exceeds the bus bandwidth; an error if a puck's firmware lacks a property.
     pub fn new(
         bus: B,
         link: L,
@@ -105,8 +111,8 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
         cycle_config: CycleConfig,
     ) -> Result<Cycle<N, B, L>, CanError> {
         let joint_encoders = ready.pucks.iter().filter(|p| p.joint_encoder).count();
-        let time = BusTime::new(N, joint_encoders, ready.sensor, cycle_config.answer_ns);
-        time.check(cycle_config.period_ns)?;
+        let bus_time = BusTime::new(N, joint_encoders, ready.sensor, cycle_config.answer_ns);
+        bus_time.check(cycle_config.period_ns)?;
         let motor = ready.pucks[0];
         let property_id = |table: supple_puck::PropertyTable, node: NodeId, property: Property| {
             table.id(property).ok_or(CanError::Property {
@@ -122,7 +128,7 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
             module_mode: property_id(ready.module, NodeId::SAFETY, Property::MODE)?,
             pendant: property_id(ready.module, NodeId::SAFETY, Property::PEN)?,
         };
-        let next_ns = bus.now_ns();
+        let next_period_ns = bus.now_ns();
         Ok(Cycle {
             bus,
             link,
@@ -131,11 +137,11 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
             drive_guard: DriveGuard::new(config),
             ids,
             cycle_config,
-            time,
+            bus_time,
             guard: SafeActionMachine::new(),
             cycle: 0,
             observed_cycle: None,
-            next_ns,
+            next_period_ns,
             counts: [None; N],
             last_pose_rad: Vector::zeros(),
             readings: Readings::default(),
@@ -143,20 +149,20 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
             pendant: None,
             unconfirmed: UnconfirmedFrames::default(),
             auxiliary_poll: AuxiliaryPoll::Mode,
-            auxiliary_due_ns: next_ns,
-            sent_request: false,
-            unsent: false,
+            auxiliary_due_ns: next_period_ns,
+            request_confirmed: false,
+            frames_lost: false,
             bus_off: false,
-            bits: 0,
+            bus_bits: 0,
             fallback_nm: Vector::zeros(),
             counters: Counters::default(),
-            leaving: false,
+            shutting_down: false,
         })
     }
 
-    /// Requests idle motors from this call on, because the program is about to end.
+    /// Sets the motors to idle from the next cycle on, because the program is about to end.
     pub fn begin_shutdown(&mut self) {
-        self.leaving = true;
+        self.shutting_down = true;
     }
 
     /// Counters of the cycle.
@@ -219,27 +225,27 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
     /// If the bus or the link to the controller fails. Faults on the bus are handled.
     pub fn run(&mut self) -> Result<Action, CanError> {
         let start_ns = self.start_period()?;
-        let missing = self.collect_positions(start_ns)?;
-        let report = self.report(start_ns);
+        let missing_motors = self.collect_positions(start_ns)?;
+        let report = self.arm_report(start_ns);
         let published_ns = self.bus.now_ns();
         self.link.publish(&report)?;
-        let command = self.answer(start_ns, published_ns)?;
+        let command = self.wait_for_answer(start_ns, published_ns)?;
         let periods = report.cycle - self.observed_cycle.unwrap_or(report.cycle);
         self.observed_cycle = Some(report.cycle);
         self.drive_guard.observe(&report.position_rad, periods);
         let active = self.drives() == Drives::Active;
-        let drive_guard_loss = self
+        let drive_guard_check = self
             .drive_guard
             .check_command(command.as_ref().map(Command::drive).as_ref(), active);
         let input = GuardInput {
             now_ns: self.bus.now_ns(),
             answer: command.map(|command| command.wants_torque),
-            drive_guard_loss: drive_guard_loss.err().map(LossReason::from),
-            missing,
-            unsent: self.unsent,
+            drive_guard_loss: drive_guard_check.err().map(LossReason::from),
+            missing: missing_motors,
+            unsent: self.frames_lost,
             bus_off: self.bus_off,
             module: self.module,
-            leaving: self.leaving,
+            leaving: self.shutting_down,
         };
         let action = self.guard.cycle(&input);
         self.send_torques(&action, command.as_ref())?;
@@ -248,42 +254,42 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
         Ok(action)
     }
 
-    /// Starts the next period. Skips periods that are over, and one whose remaining time is too short for
-    /// replies, answer and torques; a skipped period does not count as missing replies.
+    /// Starts the next period; returns its start \[ns\]. Skips periods that are over, and one whose remaining time is
+    /// too short for replies, answer and torques; the replies of a skipped period do not count as missing.
     fn start_period(&mut self) -> Result<u64, CanError> {
         let now_ns = self.bus.now_ns();
         let period_ns = self.cycle_config.period_ns;
-        let late_ns = now_ns.saturating_sub(self.next_ns);
+        let late_ns = now_ns.saturating_sub(self.next_period_ns);
         self.skip_periods(late_ns / period_ns);
-        if late_ns % period_ns > self.time.slack_ns(period_ns) {
+        if late_ns % period_ns > self.bus_time.slack_ns(period_ns) {
             self.skip_periods(1);
             self.receive_until_next_period()?;
         }
         self.counters.wake_ns = late_ns;
         self.counters.cycles += 1;
-        self.counters.bus_load = self.bits as f64 * 1e3 / period_ns as f64;
-        self.bits = 0;
+        self.counters.bus_load = self.bus_bits as f64 * 1e3 / period_ns as f64;
+        self.bus_bits = 0;
         self.counters.clock_stall_ns = self.bus.clock_stall_ns();
-        let start_ns = self.next_ns;
-        self.next_ns += period_ns;
+        let start_ns = self.next_period_ns;
+        self.next_period_ns += period_ns;
         Ok(start_ns)
     }
 
     fn skip_periods(&mut self, periods: u64) {
         self.cycle += periods;
-        self.next_ns += periods * self.cycle_config.period_ns;
+        self.next_period_ns += periods * self.cycle_config.period_ns;
         self.counters.skipped += periods;
     }
 
-    /// Requests the positions and collects the replies. Returns a bit mask of the motors that did not reply, if
-    /// the request was sent.
+    /// Requests the positions and collects the replies. Returns a bit mask of the motors that did not reply; zero if
+    /// the request itself was not sent.
     fn collect_positions(&mut self, start_ns: u64) -> Result<u8, CanError> {
         self.counts = [None; N];
         let request = get(GroupId::ARM, self.ids.position);
         self.send(&request)?;
         self.link.announce()?;
-        // After this time the answer and the torques would not fit the period.
-        let reserved_ns = self.time.torques_ns + self.cycle_config.answer_ns;
+        // Replies after this time would leave too little of the period for the answer and the torques.
+        let reserved_ns = self.bus_time.torques_ns + self.cycle_config.answer_ns;
         let until_ns = start_ns + self.cycle_config.period_ns - reserved_ns;
         loop {
             let missing_replies =
@@ -296,18 +302,18 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
             };
             self.handle_event(&event);
         }
-        self.sent_request = !self.unconfirmed.holds(&request);
+        self.request_confirmed = !self.unconfirmed.contains(&request);
         let mut missing = 0;
         for (index, counts) in self.counts.iter().enumerate() {
             if counts.is_none() {
                 self.counters.replies_lost += 1;
-                missing |= u8::from(self.sent_request) << index;
+                missing |= u8::from(self.request_confirmed) << index;
             }
         }
         Ok(missing)
     }
 
-    fn report(&mut self, start_ns: u64) -> ArmReport<N> {
+    fn arm_report(&mut self, start_ns: u64) -> ArmReport<N> {
         let position_rad = self.ready.transmission.joint_rad(&self.counts);
         if position_rad.iter().all(Option::is_some) {
             self.last_pose_rad = Vector::from(position_rad.map(Option::unwrap_or_default));
@@ -324,8 +330,12 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
         }
     }
 
-    fn answer(&mut self, start_ns: u64, published_ns: u64) -> Result<Option<Command<N>>, CanError> {
-        let until_ns = start_ns + self.cycle_config.period_ns - self.time.torques_ns;
+    fn wait_for_answer(
+        &mut self,
+        start_ns: u64,
+        published_ns: u64,
+    ) -> Result<Option<Command<N>>, CanError> {
+        let until_ns = start_ns + self.cycle_config.period_ns - self.bus_time.torques_ns;
         let wait_ns = until_ns.saturating_sub(self.bus.now_ns());
         let answer = self.link.answer(self.cycle, wait_ns)?;
         self.cycle += 1;
@@ -364,11 +374,16 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
         let torque_nm = if self.drives() == Drives::Active && action.torque != Torque::None {
             self.drive_guard.limited_nm(&wanted_nm, stopping)
         } else {
-            // The motors become active some cycles before this program learns of it; until then send gravity
-            // compensation only, within the limits.
-            let holds = command.is_some_and(|command| command.mode == Some(Mode::GravityHold));
-            let ready_nm = if holds { wanted_nm } else { Vector::zeros() };
-            self.drive_guard.reset_rate_limit(&ready_nm)
+            // The motors become active some cycles before this program learns of it. Until then it sends gravity
+            // compensation only, within the limits, and zero in all other modes.
+            let in_gravity_hold =
+                command.is_some_and(|command| command.mode == Some(Mode::GravityHold));
+            let activation_nm = if in_gravity_hold {
+                wanted_nm
+            } else {
+                Vector::zeros()
+            };
+            self.drive_guard.reset_rate_limit(&activation_nm)
         };
         let torques = self.ready.transmission.puck_torques(&torque_nm);
         let torques = torques.unwrap_or([PuckTorque::ZERO; N]);
@@ -398,15 +413,16 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
     /// is being switched to idle, polls only its mode.
     fn poll_auxiliary(&mut self, action: &Action) -> Result<(), CanError> {
         let now_ns = self.bus.now_ns();
-        let lowering = action.lower_module;
-        let fits = now_ns + self.time.torques_ns + self.time.auxiliary_poll_ns <= self.next_ns;
-        // Missing replies use up the time of every cycle; an overdue poll is sent anyway.
+        let setting_idle = action.lower_module;
+        let fits = now_ns + self.bus_time.torques_ns + self.bus_time.auxiliary_poll_ns
+            <= self.next_period_ns;
+        // While replies are missing, waiting for them takes the time of the polls; an overdue poll is sent anyway.
         let overdue = now_ns >= self.auxiliary_due_ns + AUXILIARY_POLL_PERIOD_NS;
         let due = fits && now_ns >= self.auxiliary_due_ns;
-        if !due && !overdue && !lowering {
+        if !due && !overdue && !setting_idle {
             return Ok(());
         }
-        let poll = if lowering {
+        let poll = if setting_idle {
             AuxiliaryPoll::Mode
         } else {
             self.auxiliary_poll
@@ -417,7 +433,7 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
             AuxiliaryPoll::Sensor => force_torque::request(),
         };
         self.send(&request)?;
-        if !lowering {
+        if !setting_idle {
             self.auxiliary_poll = match (self.auxiliary_poll, self.ready.sensor) {
                 (AuxiliaryPoll::Mode, true) => AuxiliaryPoll::Sensor,
                 (AuxiliaryPoll::Mode, false) | (AuxiliaryPoll::Sensor, _) => AuxiliaryPoll::Pendant,
@@ -429,18 +445,21 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
         Ok(())
     }
 
-    /// Receives events until the next period; frames not sent by then count as lost.
+    /// Receives events until the next period; frames that are not confirmed as sent by then count as lost.
     fn drain(&mut self) -> Result<(), CanError> {
         self.receive_until_next_period()?;
         let lost = self.unconfirmed.take_count();
         self.counters.tx_lost += lost;
-        self.unsent = lost > 0;
+        self.frames_lost = lost > 0;
         Ok(())
     }
 
     /// Receives events until the next period without sending.
     fn receive_until_next_period(&mut self) -> Result<(), CanError> {
-        while let Some(event) = self.bus.receive_with_lookahead(self.next_ns, u32::MAX)? {
+        while let Some(event) = self
+            .bus
+            .receive_with_lookahead(self.next_period_ns, u32::MAX)?
+        {
             self.handle_event(&event);
         }
         Ok(())
@@ -460,14 +479,14 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
         match event {
             Event::Sent(frame) => {
                 self.unconfirmed.confirm(frame);
-                self.bits += u64::from(bits(frame));
+                self.bus_bits += u64::from(bits(frame));
             }
             Event::Fault(BusFault::BusOff) => self.bus_off = true,
             Event::Fault(BusFault::Restarted) => self.bus_off = false,
             Event::Fault(BusFault::Overrun) => self.counters.overruns += 1,
             Event::Fault(_) => {}
             Event::Frame(frame) => {
-                self.bits += u64::from(bits(frame));
+                self.bus_bits += u64::from(bits(frame));
                 // A malformed frame counts as missing.
                 if let Ok((from, inbound)) = Inbound::parse(frame) {
                     self.handle_frame(from, &inbound, now_ns);
@@ -497,7 +516,7 @@ impl<const N: usize, B: Bus, L: Link<N>> Cycle<N, B, L> {
             Inbound::Sensor(reading) if from == NodeId::FORCE_TORQUE => {
                 self.readings.update(reading, now_ns);
             }
-            // The safety module sends the motors a mode change, so poll its mode next.
+            // A frame of the safety module to the motors announces a change of mode: its mode is polled next.
             Inbound::Other if from == NodeId::SAFETY => {
                 self.auxiliary_poll = AuxiliaryPoll::Mode;
                 self.auxiliary_due_ns = now_ns;

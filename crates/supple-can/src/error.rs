@@ -76,7 +76,7 @@ pub enum CanError {
         /// Expected role.
         expected: &'static str,
     },
-    /// A firmware without a known list of ids.
+    /// A firmware whose property ids are not known.
     #[error("node {node}: {source}; update it")]
     Firmware {
         /// Number of the node.

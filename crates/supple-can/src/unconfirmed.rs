@@ -19,14 +19,14 @@ impl UnconfirmedFrames {
         }
     }
 
-    /// Removes a confirmed frame; returns whether it was one of these.
+    /// Removes a confirmed frame; returns whether it was unconfirmed until now.
     pub fn confirm(&mut self, frame: &CanFrame) -> bool {
         let slot = self.frames.iter_mut().find(|f| f.as_ref() == Some(frame));
         slot.is_some_and(|slot| slot.take().is_some())
     }
 
     /// Whether this frame is still unconfirmed.
-    pub fn holds(&self, frame: &CanFrame) -> bool {
+    pub fn contains(&self, frame: &CanFrame) -> bool {
         self.frames.iter().flatten().any(|f| f == frame)
     }
 

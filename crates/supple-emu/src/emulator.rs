@@ -24,7 +24,7 @@ use supple_puck::{CanFrame, Destination, GroupId, NodeId, PackedTorques};
 /// An event of the emulated arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ArmEvent {
-    /// An operator pressed a button.
+    /// The operator pressed a button.
     Pressed(ButtonPress),
     /// The safety module entered this mode, for this cause.
     Safety(SafetyMode, crate::safety::Cause),
@@ -46,19 +46,22 @@ pub struct Emulator<const N: usize> {
     pucks: Vec<Puck>,
     safety: SafetyModule,
     sensor: Option<ForceSensor>,
-    /// Until this time the host is bus-off \[ns\].
-    host_off_until_ns: Option<u64>,
-    report: Option<BusFault>,
+    /// Time until which the host's CAN controller is bus-off \[ns\].
+    host_bus_off_until_ns: Option<u64>,
+    /// Fault that the host has yet to receive.
+    pending_fault: Option<BusFault>,
     random: SplitMix64,
     arm_events: Vec<(u64, ArmEvent)>,
-    /// Offset of the monotonic clock from the arm's time \[ns\]: now, and at each event.
+    /// Current offset of the machine's monotonic clock from the arm's time \[ns\].
     offset_ns: u64,
-    offsets_ns: Vec<u64>,
+    /// That offset at each event \[ns\].
+    event_offsets_ns: Vec<u64>,
     /// Scheduled button presses in order of time.
     presses: VecDeque<(u64, ButtonPress)>,
     /// Button presses scheduled relative to the host's first torque, with their delay after it \[ns\].
     after_first_torque: Vec<(u64, ButtonPress)>,
     powered: bool,
+    /// A cradle still holds the arm in its start pose: until the motors first enter torque mode.
     in_cradle: bool,
 }
 
@@ -67,8 +70,8 @@ impl<const N: usize> Emulator<N> {
     /// and braking come from the plant's actuator model; counts and torque units from the pucks.
     ///
     /// # Errors
-    /// If the arm does not have 4 or 7 joints, a puck has no list of ids, or the plant rejects its
-    /// configuration.
+    /// If the arm does not have 4 or 7 joints, no property ids are known for a puck's firmware, or the plant
+    /// rejects its configuration.
     pub fn new(
         config: EmulatorConfig,
         mut plant: PlantConfig<N>,
@@ -129,12 +132,12 @@ impl<const N: usize> Emulator<N> {
             pucks,
             safety,
             sensor: config.force_sensor.then(ForceSensor::new),
-            host_off_until_ns: None,
-            report: None,
+            host_bus_off_until_ns: None,
+            pending_fault: None,
             random: SplitMix64::seed_from_u64(config.seed),
             arm_events: Vec::new(),
             offset_ns: 0,
-            offsets_ns: Vec::new(),
+            event_offsets_ns: Vec::new(),
             presses: VecDeque::new(),
             after_first_torque: Vec::new(),
             powered: false,
@@ -252,7 +255,7 @@ impl<const N: usize> Emulator<N> {
 
     /// All events so far, with their times by the machine's monotonic clock \[ns\].
     pub fn events_in_wall_time(&self) -> impl Iterator<Item = (u64, ArmEvent)> {
-        let timed = self.arm_events.iter().zip(&self.offsets_ns);
+        let timed = self.arm_events.iter().zip(&self.event_offsets_ns);
         timed.map(|((time_ns, arm_event), offset_ns)| (time_ns + offset_ns, *arm_event))
     }
 
@@ -268,7 +271,7 @@ impl<const N: usize> Emulator<N> {
 
     fn record(&mut self, arm_event: ArmEvent) {
         self.arm_events.push((self.now_ns, arm_event));
-        self.offsets_ns.push(self.offset_ns);
+        self.event_offsets_ns.push(self.offset_ns);
     }
 
     /// Time that frames have occupied the bus \[ns\].
@@ -282,7 +285,8 @@ impl<const N: usize> Emulator<N> {
         wire.min(self.next_tick_ns)
     }
 
-    /// Pauses the arm for `gap_ns`: shifts its clock and all pending times by that much.
+    /// Pauses the arm for `gap_ns`: advances its clock and the time of its next physics step by that much, without
+    /// motion, and discards all frames that wait for the bus.
     pub fn shift_clock(&mut self, gap_ns: u64) {
         let now = self.now_ns + gap_ns;
         self.wire.clear();
@@ -310,13 +314,13 @@ impl<const N: usize> Emulator<N> {
     /// One physics step, and the time-driven behaviour of the nodes.
     fn tick(&mut self) {
         if !self.in_cradle {
-            let motor = self.commanded_nm();
+            let motor_torque_nm = self.commanded_nm();
             let shorted = core::array::from_fn(|i| self.pucks[i].brakes());
             let view = ControllerView {
                 active: !shorted.contains(&true),
                 mode: None,
             };
-            let torque_nm = self.motor_from_joint.transpose() * motor;
+            let torque_nm = self.motor_from_joint.transpose() * motor_torque_nm;
             self.injector
                 .cycle(&mut self.plant, view, &torque_nm, shorted);
             self.update_motor_angles();
@@ -341,16 +345,17 @@ impl<const N: usize> Emulator<N> {
         let safety_frame = self.safety.tick(self.now_ns);
         self.apply_safety_mode(safety_frame);
         if self
-            .host_off_until_ns
+            .host_bus_off_until_ns
             .is_some_and(|until| self.now_ns >= until)
         {
-            self.host_off_until_ns = None;
-            self.report = Some(BusFault::Restarted);
+            self.host_bus_off_until_ns = None;
+            self.pending_fault = Some(BusFault::Restarted);
         }
         self.next_tick_ns += self.config.step_ns;
     }
 
-    /// Sends the safety module's frame, and switches the pucks' power according to its mode.
+    /// After a change of the safety module's mode, sends its frame to the motors and switches the pucks' power; without
+    /// a frame, nothing has changed.
     fn apply_safety_mode(&mut self, frame: Option<CanFrame>) {
         let Some(frame) = frame else {
             return;
@@ -374,6 +379,7 @@ impl<const N: usize> Emulator<N> {
         self.wire.queue(self.now_ns, frame);
     }
 
+    /// Records the motor pucks whose mode differs from `before`.
     fn record_modes(&mut self, before: &[MotorMode]) {
         for (index, before) in before.iter().enumerate() {
             let mode = self.pucks[index].mode();
@@ -384,7 +390,8 @@ impl<const N: usize> Emulator<N> {
         }
     }
 
-    fn any_waking(&self) -> bool {
+    /// Whether a puck's transceiver is switching off and on, so that the host must not send.
+    fn any_transceiver_off(&self) -> bool {
         self.pucks.iter().any(|puck| match puck.power() {
             Power::Waking(since_ns) => self.now_ns >= since_ns + self.config.wake_quiet_from_ns,
             _ => false,
@@ -394,9 +401,9 @@ impl<const N: usize> Emulator<N> {
     /// A frame transmission is complete: delivers it to all other nodes. Returns the event for the host.
     fn deliver(&mut self, frame: CanFrame) -> Option<Event> {
         let from_host = frame.id().from() == NodeId::HOST;
-        if from_host && self.any_waking() {
+        if from_host && self.any_transceiver_off() {
             self.record(ArmEvent::HostSentDuringWakeUp);
-            self.host_off_until_ns = Some(self.now_ns + self.config.restart_ns);
+            self.host_bus_off_until_ns = Some(self.now_ns + self.config.restart_ns);
             return Some(Event::Fault(BusFault::BusOff));
         }
         if !self.after_first_torque.is_empty() && from_host && commands_torque(&frame) {
@@ -417,7 +424,7 @@ impl<const N: usize> Emulator<N> {
         self.record_modes(&modes);
         if let Some(sensor) = &mut self.sensor {
             let readings = sensor.handle_frame(self.now_ns, &frame);
-            // Both have the same time: a node keeps the order of its frames.
+            // Both frames become ready at the same time, so that they keep their order.
             let ready_ns = self.ready_ns();
             for reading in readings.into_iter().flatten() {
                 self.wire.queue(ready_ns, reading);
@@ -433,7 +440,7 @@ impl<const N: usize> Emulator<N> {
         } else {
             self.apply_safety_mode(safety_frame);
         }
-        if self.host_off_until_ns.is_some() {
+        if self.host_bus_off_until_ns.is_some() {
             return None;
         }
         Some(if from_host {
@@ -475,7 +482,7 @@ impl<const N: usize> Peer for Emulator<N> {
     }
 
     fn host_sends(&mut self, frame: &CanFrame) {
-        if self.host_off_until_ns.is_none() {
+        if self.host_bus_off_until_ns.is_none() {
             self.wire.queue(self.now_ns, *frame);
         }
     }
@@ -483,13 +490,13 @@ impl<const N: usize> Peer for Emulator<N> {
     fn run_until(&mut self, until_ns: u64) -> Option<Event> {
         let until_ns = until_ns.max(self.now_ns);
         loop {
-            if let Some(fault) = self.report.take() {
+            if let Some(fault) = self.pending_fault.take() {
                 return Some(Event::Fault(fault));
             }
             let end_ns = self.wire.next_end_ns().unwrap_or(u64::MAX);
             let next_ns = end_ns.min(self.next_tick_ns);
             if next_ns > until_ns {
-                // Frames that start before the host's next frame go first.
+                // A frame that is ready by now starts before the host sends its next one.
                 self.wire.advance(until_ns);
                 self.now_ns = until_ns;
                 return None;

@@ -48,7 +48,8 @@ pub struct Puck {
 }
 
 impl Puck {
-    /// Puck of joint `number`, from 1, in its monitor. `None` if its firmware has no list of ids.
+    /// Puck of joint `number`, from 1, in its monitor. `None` if the property ids of its firmware are not
+    /// known.
     pub fn new(number: usize, config: PuckConfig) -> Option<Puck> {
         let node = NodeId::new(number as u8).ok()?;
         let table = PropertyTable::of_firmware(PuckKind::Motor, config.version).ok()?;

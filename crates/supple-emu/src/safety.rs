@@ -24,7 +24,7 @@ use supple_puck::{
 
 /// Time for which the pendant word shows a pressed button \[ns\].
 const PRESS_NS: u64 = 200_000_000;
-/// Number of position sets from which the speed is computed.
+/// Number of position sets (one reply of each of motors 1 to 4) from which the speed is computed.
 const HISTORY: usize = 5;
 /// Limits of the bus voltage \[V\]: VOLTL1, VOLTL2, VOLTH1, VOLTH2.
 const VOLTAGE_V: [i32; 4] = [36, 30, 54, 57];
@@ -86,7 +86,7 @@ pub struct SafetyModule {
 
 impl SafetyModule {
     /// A module in the emergency stop, for an arm of `joints` pucks, with the transmission of joints 1 to 4.
-    /// `None` if its firmware has no list of ids.
+    /// `None` if the property ids of its firmware are not known.
     pub fn new(
         config: SafetyConfig,
         joints: usize,

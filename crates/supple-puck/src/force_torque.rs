@@ -10,7 +10,7 @@ use crate::id::{GroupId, MessageId, NodeId};
 use crate::property::{self, Property, PropertyId, PropertyTable, Value};
 use core::fmt;
 
-/// Quantity of a sensor frame, with unit and scale.
+/// Quantity of a sensor frame, with the value of one count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// Force, 1/256 N.
@@ -40,7 +40,7 @@ impl Quantity {
         }
     }
 
-    /// Counts of three components \[N, N m or m/s^2\], each rounded to the nearest with halves away from zero,
+    /// Converts three components \[N, N m or m/s^2\] to counts, each rounded to the nearest with halves away from zero,
     /// and saturated at the range of 16 bits: 128 N, 8 N m or 32 m/s^2.
     ///
     /// # Errors
@@ -73,7 +73,7 @@ impl fmt::Display for NotFinite {
 
 impl core::error::Error for NotFinite {}
 
-/// The seventh byte, documented for torque frames: the axes that have saturated.
+/// Status, the seventh byte, documented for torque frames: which axes have saturated, and whether the data are bad.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SensorStatus(pub u8);
 
@@ -101,7 +101,7 @@ impl SensorStatus {
 pub struct SensorReading {
     /// Measured quantity.
     pub quantity: Quantity,
-    /// x, y and z \[[`Quantity::counts_per_unit`]\].
+    /// x, y and z in counts, see [`Quantity::counts_per_unit`].
     pub counts: [i16; 3],
     /// Status, if the frame contains it.
     pub status: Option<SensorStatus>,

@@ -8,7 +8,7 @@ use core::fmt;
 pub struct CanFrame {
     id: MessageId,
     length: u8,
-    // Zero after `length`, so that derived equality compares the frames.
+    // Bytes from `length` on are zero, so that the derived equality ignores them.
     bytes: [u8; 8],
 }
 
@@ -69,8 +69,9 @@ impl CanFrame {
     /// A longer payload.
     pub fn new(id: MessageId, payload: &[u8]) -> Result<CanFrame, FrameError> {
         let mut bytes = [0; 8];
-        let room = bytes.get_mut(..payload.len());
-        room.ok_or(FrameError::TooLong(payload.len()))?
+        let target = bytes.get_mut(..payload.len());
+        target
+            .ok_or(FrameError::TooLong(payload.len()))?
             .copy_from_slice(payload);
         Ok(CanFrame {
             id,
@@ -79,7 +80,7 @@ impl CanFrame {
         })
     }
 
-    /// A frame from the id of a driver, with the flags removed.
+    /// A frame from the id that a CAN driver reports; the caller has removed the driver's flags.
     ///
     /// # Errors
     /// An id above 0x7FF, or a payload of more than eight bytes.
@@ -87,7 +88,7 @@ impl CanFrame {
         CanFrame::new(MessageId::from_raw(id)?, payload)
     }
 
-    /// A payload whose length the compiler has checked.
+    /// A frame whose payload length is checked at compile time.
     pub(crate) const fn of<const N: usize>(id: MessageId, payload: [u8; N]) -> CanFrame {
         const { assert!(N <= 8) };
         let mut bytes = [0; 8];

@@ -1,7 +1,7 @@
 //! Message ids: `G FFFFF TTTTT`, the group bit, the sender's node and the receiver's node or group.
 //!
-//! Every 11-bit number is a valid id, so only numbers above 0x7FF are rejected. Source: manual page 46,
-//! libbarrett's masks; the meaning of the groups from libbarrett.
+//! Every 11-bit number is a valid id, so only numbers above 0x7FF are rejected. Source: manual page 46
+//! and libbarrett's masks; libbarrett for the meaning of the groups.
 
 use core::fmt;
 
@@ -12,11 +12,11 @@ const FIVE_BITS: u16 = 0x1f;
 /// A number that does not fit its field of the id.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum IdError {
-    /// Not a node: 0 to 31.
+    /// A node number above 31.
     Node(u8),
-    /// Not a group: 0 to 31.
+    /// A group number above 31.
     Group(u8),
-    /// Not an 11-bit id.
+    /// A message id above 0x7FF.
     Message(u32),
 }
 
@@ -87,9 +87,9 @@ pub struct GroupId(u8);
 impl GroupId {
     /// All actuators, without the safety module.
     pub const ACTUATORS: GroupId = GroupId(0);
-    /// Packed torques of joints 1 to 4.
+    /// Motor pucks 1 to 4, which receive packed torques.
     pub const LOWER_TORQUES: GroupId = GroupId(1);
-    /// Packed torques of joints 5 to 7.
+    /// Motor pucks 5 to 7, which receive packed torques.
     pub const UPPER_TORQUES: GroupId = GroupId(2);
     /// Destination of the motor pucks' positions, which the safety module receives as well.
     pub const POSITION: GroupId = GroupId(3);
@@ -151,7 +151,7 @@ impl From<GroupId> for Destination {
     }
 }
 
-/// The 11-bit id of a frame. The lower number wins arbitration.
+/// The 11-bit id of a frame. The lowest id wins the bus arbitration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct MessageId(u16);
 

@@ -1,4 +1,5 @@
-//! Values of the properties for the type and state of a puck. Source: libbarrett, btclient.
+//! Values of the properties STAT, MODE and ROLE: the state, the mode and the type of a puck. Source: libbarrett,
+//! btclient.
 
 use crate::property::PuckKind;
 use core::fmt;
@@ -27,14 +28,14 @@ impl fmt::Display for UnknownValue {
 
 impl core::error::Error for UnknownValue {}
 
-/// [`Property::STAT`](crate::Property::STAT).
+/// State of a puck: [`Property::STAT`](crate::Property::STAT).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stat {
-    /// The monitor runs; the puck waits for a wake-up. Setting it restarts the puck.
+    /// Only the monitor (boot program) runs; the puck waits for a wake-up. Writing this value restarts the puck.
     Reset = 0,
     /// An error.
     Error = 1,
-    /// The firmware runs. Setting it wakes the puck.
+    /// The firmware runs. Writing this value wakes the puck.
     Ready = 2,
 }
 
@@ -66,17 +67,17 @@ impl Stat {
 /// set by the safety module when the operator activates the arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MotorMode {
-    /// Windings shorted: the motor brakes, torque commands are ignored, the encoder lives.
+    /// Windings shorted: the motor brakes, torque commands are ignored, the encoder still works.
     Idle = 0,
-    /// Duty cycle.
+    /// Control of the duty cycle.
     Duty = 1,
-    /// Torque.
+    /// Control of the torque.
     Torque = 2,
     /// Position control by the puck's PID.
     Pid = 3,
-    /// Velocity.
+    /// Control of the velocity.
     Velocity = 4,
-    /// Trapezoidal profile.
+    /// Motion with a trapezoidal velocity profile.
     Trapezoidal = 5,
 }
 
@@ -107,15 +108,14 @@ impl MotorMode {
     }
 }
 
-/// [`Property::ROLE`](crate::Property::ROLE): type and options of the puck. A view of the property's low 16
-/// bits.
+/// Type and options of a puck: the low 16 bits of [`Property::ROLE`](crate::Property::ROLE).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Role(pub u16);
 
 /// The low five bits of a [`Role`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RoleType {
-    /// Motor of the arm.
+    /// Motor of the arm; `Tater` is Barrett's name.
     Tater,
     /// Gimbals.
     Gimbals,
@@ -142,7 +142,7 @@ impl Role {
     /// Force/torque sensor.
     pub const FORCE: Role = Role(0x0006);
 
-    /// From the property's value, whose sign has no meaning.
+    /// From the property's value, whose sign is ignored.
     pub const fn from_value(value: i32) -> Role {
         Role(value as u16)
     }
@@ -168,8 +168,8 @@ impl Role {
         }
     }
 
-    /// Family of property lists; `None` for types with unknown lists. libbarrett uses the motor's lists for
-    /// taters, wraptors and hands.
+    /// Which property lists the puck uses; `None` if they are unknown. libbarrett uses the motor's lists for taters,
+    /// wraptors and hands.
     pub const fn kind(self) -> Option<PuckKind> {
         match self.role_type() {
             Ok(RoleType::Tater | RoleType::Wraptor | RoleType::BarrettHand) => {
@@ -185,7 +185,7 @@ impl Role {
         self.0 & bit != 0
     }
 
-    /// Temperature sensor select.
+    /// Temperature sensor select bit.
     pub const fn temperature_select(self) -> bool {
         self.has(0x0040)
     }

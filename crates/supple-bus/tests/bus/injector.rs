@@ -5,15 +5,15 @@ use supple_bus::virtual_time::{DirectBus, Peer};
 use supple_bus::{Bus, BusFault, Event, FaultInjector, FaultKind, FaultRule, Traffic};
 use supple_puck::{CanFrame, MessageId};
 
-/// Records the frames of the host; frames for the host are scripted.
+/// Records the frames that the host sends, and gives the host its scripted events.
 #[derive(Default)]
-struct Script {
+struct ScriptedPeer {
     now_ns: u64,
     received: Vec<(u64, CanFrame)>,
     events: VecDeque<(u64, Event)>,
 }
 
-impl Peer for Script {
+impl Peer for ScriptedPeer {
     fn now_ns(&self) -> u64 {
         self.now_ns
     }
@@ -42,12 +42,12 @@ fn frame(id: u32, payload: &[u8]) -> CanFrame {
     CanFrame::from_raw(id, payload).unwrap()
 }
 
-/// Frames for the host at 10, 20, 30 and 40 ns.
-fn scripted(rule: FaultRule) -> FaultInjector<DirectBus<Script>> {
+/// A bus with this rule and with frames for the host at 10, 20, 30 and 40 ns, numbered 1 to 4.
+fn bus_with_four_frames(rule: FaultRule) -> FaultInjector<DirectBus<ScriptedPeer>> {
     let events = (1..=4u8).map(|i| (u64::from(i) * 10, Event::Frame(frame(0x423, &[0, 0, i]))));
-    let script = Script {
+    let script = ScriptedPeer {
         events: events.collect(),
-        ..Script::default()
+        ..ScriptedPeer::default()
     };
     let mut bus = FaultInjector::new(DirectBus(script), 7);
     bus.add(rule);
@@ -66,13 +66,13 @@ fn received(bus: &mut impl Bus) -> Vec<(u8, u64)> {
     frames
 }
 
-fn third_only(kind: FaultKind) -> FaultRule {
+fn on_third_frame(kind: FaultKind) -> FaultRule {
     FaultRule::always(Traffic::Received, kind).within(30, 31)
 }
 
 #[test]
 fn received_frames_are_lost_delayed_duplicated_or_reordered() {
-    let outcomes = [
+    let cases = [
         (FaultKind::Loss, vec![(1, 10), (2, 20), (4, 40)]),
         (FaultKind::SilentLoss, vec![(1, 10), (2, 20), (4, 40)]),
         (
@@ -87,15 +87,15 @@ fn received_frames_are_lost_delayed_duplicated_or_reordered() {
             FaultKind::Reorder(50),
             vec![(1, 10), (2, 20), (4, 40), (3, 40)],
         ),
-        // No frame follows in time: it is delayed, not lost.
+        // No frame follows within 5 ns: the frame is delayed, not lost.
         (
             FaultKind::Reorder(5),
             vec![(1, 10), (2, 20), (3, 35), (4, 40)],
         ),
     ];
-    for (kind, expected) in outcomes {
+    for (kind, expected) in cases {
         assert_eq!(
-            received(&mut scripted(third_only(kind))),
+            received(&mut bus_with_four_frames(on_third_frame(kind))),
             expected,
             "{kind:?}"
         );
@@ -104,7 +104,7 @@ fn received_frames_are_lost_delayed_duplicated_or_reordered() {
 
 #[test]
 fn corruption_inverts_one_bit() {
-    let mut bus = scripted(third_only(FaultKind::Corrupt));
+    let mut bus = bus_with_four_frames(on_third_frame(FaultKind::Corrupt));
     let mut frames = Vec::new();
     while let Some(Event::Frame(frame)) = bus.receive_until(100).unwrap() {
         frames.push(frame);
@@ -122,7 +122,7 @@ fn corruption_inverts_one_bit() {
 #[test]
 fn a_lost_frame_is_confirmed_and_a_silently_lost_one_is_not() {
     for (kind, confirmed) in [(FaultKind::Loss, true), (FaultKind::SilentLoss, false)] {
-        let mut bus = FaultInjector::new(DirectBus(Script::default()), 1);
+        let mut bus = FaultInjector::new(DirectBus(ScriptedPeer::default()), 1);
         bus.add(FaultRule::always(Traffic::Sent, kind));
         let sent = frame(0x401, &[0xaa; 8]);
         bus.send(&sent).unwrap();
@@ -134,7 +134,7 @@ fn a_lost_frame_is_confirmed_and_a_silently_lost_one_is_not() {
 
 #[test]
 fn a_delayed_frame_is_confirmed_when_it_is_sent() {
-    let mut bus = FaultInjector::new(DirectBus(Script::default()), 1);
+    let mut bus = FaultInjector::new(DirectBus(ScriptedPeer::default()), 1);
     bus.add(FaultRule::always(Traffic::Sent, FaultKind::Delay(30)));
     let sent = frame(0x401, &[0xaa; 8]);
     bus.send(&sent).unwrap();
@@ -145,7 +145,8 @@ fn a_delayed_frame_is_confirmed_when_it_is_sent() {
 
 #[test]
 fn bus_off_blocks_all_frames_and_reports_start_and_end() {
-    let mut bus = scripted(FaultRule::always(Traffic::Sent, FaultKind::BusOff).within(15, 35));
+    let mut bus =
+        bus_with_four_frames(FaultRule::always(Traffic::Sent, FaultKind::BusOff).within(15, 35));
     let mut events = Vec::new();
     while let Some(event) = bus.receive_until(100).unwrap() {
         events.push((bus.now_ns(), event));
@@ -168,7 +169,7 @@ fn bus_off_blocks_all_frames_and_reports_start_and_end() {
 
 #[test]
 fn rules_affect_only_their_frames() {
-    let mut bus = FaultInjector::new(DirectBus(Script::default()), 1);
+    let mut bus = FaultInjector::new(DirectBus(ScriptedPeer::default()), 1);
     let torques = |id: MessageId| id.raw() == 0x401;
     bus.add(FaultRule::always(Traffic::Sent, FaultKind::SilentLoss).only(torques));
     bus.send(&frame(0x401, &[0xaa; 8])).unwrap();
@@ -185,8 +186,8 @@ fn rules_affect_only_their_frames() {
 
 #[test]
 fn losses_follow_the_probability_and_repeat_with_the_seed() {
-    let lost = |seed| {
-        let mut bus = FaultInjector::new(DirectBus(Script::default()), seed);
+    let received_with_seed = |seed| {
+        let mut bus = FaultInjector::new(DirectBus(ScriptedPeer::default()), seed);
         let rule = FaultRule::always(Traffic::Sent, FaultKind::SilentLoss);
         bus.add(rule.with_probability(0.25));
         for i in 0..4000u32 {
@@ -195,13 +196,13 @@ fn losses_follow_the_probability_and_repeat_with_the_seed() {
         let received: Vec<_> = bus.inner().0.received.iter().map(|(_, f)| *f).collect();
         received
     };
-    let received = lost(3);
+    let received = received_with_seed(3);
     // Four standard deviations of the binomial: 4 sqrt(4000 0.25 0.75) = 110.
     assert!(
         (2890..=3110).contains(&received.len()),
         "{}",
         received.len()
     );
-    assert_eq!(received, lost(3));
-    assert_ne!(received, lost(4));
+    assert_eq!(received, received_with_seed(3));
+    assert_ne!(received, received_with_seed(4));
 }

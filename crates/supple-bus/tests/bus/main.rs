@@ -1,4 +1,5 @@
-//! Injected faults, sockets and frames. What needs a CAN interface or counts allocations is a program of its own.
+//! Injected faults, sockets and frames. Tests that need a CAN interface or count allocations are separate test
+//! programs.
 
 #[path = "../../../../tests/support/property.rs"]
 mod property;

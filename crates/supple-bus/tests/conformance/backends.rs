@@ -1,6 +1,6 @@
-//! Every backend with a mirror on its other side; the first element of the pair keeps the mirror alive.
+//! Every backend with an echo node on the arm's side; the first element of the pair keeps that node running.
 
-use crate::mirror::{Mirror, Worker};
+use crate::echo::{EchoPeer, EchoThread};
 use supple_bus::virtual_time::{DirectBus, LockstepBus, LockstepResponder};
 use supple_bus::{
     Bus, BusError, DatagramBus, FaultInjector, OwnerFolder, PacedBus, PacedResponder, Side,
@@ -8,7 +8,7 @@ use supple_bus::{
 };
 use tempfile::TempDir;
 
-type Arm = (Option<Worker>, Option<TempDir>);
+type Arm = (Option<EchoThread>, Option<TempDir>);
 type Opened = Option<(Arm, Box<dyn Bus>)>;
 
 /// A `vcan` interface for the tests; another name may be given in the environment.
@@ -23,28 +23,28 @@ fn folder() -> (TempDir, OwnerFolder) {
 }
 
 pub fn direct() -> Opened {
-    Some(((None, None), Box::new(DirectBus(Mirror::default()))))
+    Some(((None, None), Box::new(DirectBus(EchoPeer::default()))))
 }
 
 pub fn lockstep() -> Opened {
     let (temporary, folder) = folder();
-    let worker = Worker::responder(LockstepResponder::open(&folder).unwrap());
+    let echo_thread = EchoThread::responder(LockstepResponder::open(&folder).unwrap());
     let bus = LockstepBus::open(&folder).unwrap();
-    Some(((Some(worker), Some(temporary)), Box::new(bus)))
+    Some(((Some(echo_thread), Some(temporary)), Box::new(bus)))
 }
 
 pub fn paced() -> Opened {
     let (temporary, folder) = folder();
-    let worker = Worker::paced(PacedResponder::open(&folder, 0).unwrap());
+    let echo_thread = EchoThread::paced(PacedResponder::open(&folder, 0).unwrap());
     let bus = PacedBus::open(&folder).unwrap();
-    Some(((Some(worker), Some(temporary)), Box::new(bus)))
+    Some(((Some(echo_thread), Some(temporary)), Box::new(bus)))
 }
 
 fn datagram_pair() -> (Arm, DatagramBus) {
     let (temporary, folder) = folder();
-    let worker = Worker::on_bus(DatagramBus::open(&folder, Side::Arm).unwrap());
+    let echo_thread = EchoThread::on_bus(DatagramBus::open(&folder, Side::Arm).unwrap());
     let bus = DatagramBus::open(&folder, Side::Host).unwrap();
-    ((Some(worker), Some(temporary)), bus)
+    ((Some(echo_thread), Some(temporary)), bus)
 }
 
 pub fn datagram() -> Opened {
@@ -68,12 +68,12 @@ pub fn socket_can() -> Opened {
         }
         Err(error) => panic!("{error}"),
     };
-    let worker = Worker::on_bus(SocketCan::open(&name).unwrap());
-    Some(((Some(worker), None), Box::new(bus)))
+    let echo_thread = EchoThread::on_bus(SocketCan::open(&name).unwrap());
+    Some(((Some(echo_thread), None), Box::new(bus)))
 }
 
 pub fn injected_direct() -> Opened {
-    let bus = FaultInjector::new(DirectBus(Mirror::default()), 1);
+    let bus = FaultInjector::new(DirectBus(EchoPeer::default()), 1);
     Some(((None, None), Box::new(bus)))
 }
 

@@ -1,9 +1,9 @@
 //! One suite of the guarantees to a host, run on every backend and through the fault injector.
 //!
-//! The other side is a mirror: it answers each frame of the host with a frame of node 1 with the same payload.
+//! The arm's side echoes: node 1 answers each frame of the host with a frame of the same payload.
 
 mod backends;
-mod mirror;
+mod echo;
 mod suite;
 
 macro_rules! conformance {
@@ -28,9 +28,9 @@ macro_rules! on_every_backend {
             every_length_and_id_crosses_unchanged,
             frames_keep_their_order,
             a_cycle_of_frames_is_not_lost,
-            a_silent_host_hears_what_one_hears_that_asks_each_time,
-            waiting_ends_at_its_time,
-            a_time_past_gives_what_is_there,
+            lookahead_gives_the_same_events_in_the_same_order,
+            waiting_ends_at_the_deadline,
+            a_deadline_in_the_past_returns_without_waiting,
             time_never_goes_back,
         );)*
     };

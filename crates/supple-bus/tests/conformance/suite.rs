@@ -1,6 +1,6 @@
 //! The cases. Each gets the host's bus.
 
-use crate::mirror::reflected;
+use crate::echo::echo_of;
 use supple_bus::{Bus, Event};
 use supple_puck::{CanFrame, MessageId};
 
@@ -42,7 +42,7 @@ pub fn a_frame_is_confirmed_once_and_then_answered(mut bus: Subject) {
     let poll = frame(0x404, &[0x30]);
     bus.send(&poll).unwrap();
     assert_eq!(next(&mut bus), Event::Sent(poll));
-    assert_eq!(next(&mut bus), Event::Frame(reflected(&poll)));
+    assert_eq!(next(&mut bus), Event::Frame(echo_of(&poll)));
     let until_ns = bus.now_ns() + WAIT_NS;
     assert_eq!(bus.receive_until(until_ns).unwrap(), None);
 }
@@ -71,7 +71,7 @@ pub fn frames_keep_their_order(mut bus: Subject) {
     }
     let (confirmed, answers) = collect(&mut bus, sent.len());
     assert_eq!(confirmed, sent);
-    let expected: Vec<_> = sent.iter().map(reflected).collect();
+    let expected: Vec<_> = sent.iter().map(echo_of).collect();
     assert_eq!(answers, expected);
 }
 
@@ -91,7 +91,7 @@ pub fn a_cycle_of_frames_is_not_lost(mut bus: Subject) {
 }
 
 /// With lookahead a host receives the same events in the same order, up to the same time.
-pub fn a_silent_host_hears_what_one_hears_that_asks_each_time(mut bus: Subject) {
+pub fn lookahead_gives_the_same_events_in_the_same_order(mut bus: Subject) {
     let sent: Vec<_> = (0..4).map(|i| frame(0x404, &[i])).collect();
     for frame in &sent {
         bus.send(frame).unwrap();
@@ -109,20 +109,20 @@ pub fn a_silent_host_hears_what_one_hears_that_asks_each_time(mut bus: Subject) 
     // The time is that of the last answer, not the end of the wait.
     assert!(bus.now_ns() < until_ns);
     assert_eq!(confirmed, sent);
-    assert_eq!(answers, sent.iter().map(reflected).collect::<Vec<_>>());
+    assert_eq!(answers, sent.iter().map(echo_of).collect::<Vec<_>>());
     let until_ns = bus.now_ns() + WAIT_NS;
     assert_eq!(bus.receive_with_lookahead(until_ns, 1).unwrap(), None);
     assert!(bus.now_ns() >= until_ns);
 }
 
-pub fn waiting_ends_at_its_time(mut bus: Subject) {
+pub fn waiting_ends_at_the_deadline(mut bus: Subject) {
     let until_ns = bus.now_ns() + WAIT_NS;
     // A signal may end a wait of the kernel early, but not that of the bus.
     assert_eq!(bus.receive_until(until_ns).unwrap(), None);
     assert!(bus.now_ns() >= until_ns);
 }
 
-pub fn a_time_past_gives_what_is_there(mut bus: Subject) {
+pub fn a_deadline_in_the_past_returns_without_waiting(mut bus: Subject) {
     assert_eq!(bus.receive_until(0).unwrap(), None);
     let poll = frame(0x404, &[0x30]);
     bus.send(&poll).unwrap();

@@ -1,9 +1,10 @@
-//! Start-up: enumerates the nodes, identifies them, compares them with the description, and sets the arm's
-//! positions.
+//! Start-up: enumerates the nodes, identifies them, compares them with the description, and sets their
+//! encoder positions.
 //!
 //! ```text
 //! safety module -> (operator: Shift-Idle) -> enumerate -> roles, versions -> wake -> motors idle
-//!   -> groups, slots, limits -> limits of the safety module -> positions by the home pose -> sensor
+//!   -> bus groups, torque slots, torque limits -> limits of the safety module
+//!   -> encoder positions from the home pose -> tare the sensor
 //! ```
 //!
 //! The host sets the motors to idle and never activates them: the operator does, at the pendant. Order and times
@@ -23,14 +24,14 @@ use supple_puck::safety::{SafetyLimits, SafetyMode};
 use supple_puck::status::Stat;
 use supple_puck::{NodeId, Property, PropertyId, PropertyTable, Value, force_torque, property};
 
-/// Silence after the wake-up, in which transceivers leave the bus and return.
+/// Time after the wake-up in which the host sends nothing, because the pucks' transceivers leave the bus and return.
 const WAKE_QUIET_NS: u64 = 1_000 * MS;
 /// Time that taring the sensor takes, with a margin.
 const TARE_NS: u64 = 1_200 * MS;
 /// Poll interval of the module's mode while waiting for the operator.
-const OPERATOR_NS: u64 = 100 * MS;
-/// Number of velocity faults that the safety module ignores after positions are redefined: more than its
-/// history.
+const OPERATOR_POLL_NS: u64 = 100 * MS;
+/// Number of velocity faults that the safety module ignores after positions are redefined: more than the cycles of
+/// positions from which it computes the speed.
 const IGNORED_FAULTS: i32 = 8;
 
 /// Start-up configuration from the command line.
@@ -40,7 +41,7 @@ pub struct StartupConfig<const N: usize> {
     pub zero_at_rad: Option<Vector<N>>,
     /// Limits of the safety module.
     pub limits: SafetyLimits,
-    /// Tare the force/torque sensor, if there is one. Otherwise it keeps its last tare.
+    /// Tare the force/torque sensor, if there is one. If false, the sensor keeps its last tare.
     pub tare: bool,
 }
 
@@ -59,11 +60,11 @@ pub enum Progress {
     Zeroing,
     /// Taring the sensor.
     Taring,
-    /// The arm may be polled.
+    /// The arm is ready for the polling cycle.
     Ready,
 }
 
-/// An arm that may be polled.
+/// An arm that is ready for the polling cycle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ready<const N: usize> {
     /// Motor pucks, in the order of the joints.
@@ -100,12 +101,12 @@ pub fn start_up<const N: usize, B: Bus>(
 
     progress(Progress::Enumerating);
     let stats = enumerate(&mut host)?;
-    motors::all_present(&stats, description)?;
+    motors::check_nodes(&stats, description)?;
     let mut pucks = Vec::with_capacity(N);
     for node in (1..=N as u8).filter_map(NodeId::joint) {
         pucks.push(motors::identify(&mut host, node)?);
     }
-    motors::share_torque_ids(&pucks)?;
+    motors::check_same_ids(&pucks)?;
     wake(&mut host, &pucks, &stats, progress)?;
 
     progress(Progress::Checking);
@@ -116,10 +117,15 @@ pub fn start_up<const N: usize, B: Bus>(
     let mut scales = Vec::with_capacity(N);
     for (index, puck) in pucks.iter().enumerate() {
         motors::configure(&mut host, puck, index)?;
-        scales.push(motors::compare(&mut host, puck, index, description)?);
+        scales.push(motors::check_and_limit(
+            &mut host,
+            puck,
+            index,
+            description,
+        )?);
     }
     module::set_limits(&mut host, &module, &startup_config.limits)?;
-    let joints = || CanError::Joints {
+    let joints_error = || CanError::Joints {
         arm: description.name().to_owned(),
         found: description.dof(),
     };
@@ -128,8 +134,8 @@ pub fn start_up<const N: usize, B: Bus>(
         core::array::from_fn(|i| scales[i].0),
         core::array::from_fn(|i| scales[i].1),
     );
-    let transmission = transmission.ok_or_else(joints)?;
-    zero(
+    let transmission = transmission.ok_or_else(joints_error)?;
+    set_home_positions(
         &mut host,
         &module,
         &pucks,
@@ -144,7 +150,7 @@ pub fn start_up<const N: usize, B: Bus>(
         host.bus.send(&force_torque::tare())?;
         host.wait_silently(TARE_NS)?;
     }
-    let pucks: [MotorPuck; N] = pucks.try_into().map_err(|_| joints())?;
+    let pucks: [MotorPuck; N] = pucks.try_into().map_err(|_| joints_error())?;
     progress(Progress::Ready);
     Ok(Ready {
         pucks,
@@ -154,7 +160,7 @@ pub fn start_up<const N: usize, B: Bus>(
     })
 }
 
-/// STAT by node number; `None` if the node does not answer.
+/// Status ([`Property::STAT`]) by node number; `None` if the node does not answer.
 fn enumerate<B: Bus>(host: &mut Host<'_, B>) -> Result<[Option<i32>; 32], CanError> {
     let stat = common_property_id(Property::STAT)?;
     let mut stats = [None; 32];
@@ -171,17 +177,17 @@ fn wait_for_idle<B: Bus>(
     module: &PropertyTable,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<(), CanError> {
-    let mut reported = false;
+    let mut prompted = false;
     loop {
         match module::mode(host, module)? {
             SafetyMode::Idle => return Ok(()),
-            SafetyMode::Active => module::lower(host, module)?,
+            SafetyMode::Active => module::set_idle(host, module)?,
             SafetyMode::EStop => {
-                if !reported {
+                if !prompted {
                     progress(Progress::WaitingForIdle);
-                    reported = true;
+                    prompted = true;
                 }
-                host.wait_silently(OPERATOR_NS)?;
+                host.wait_silently(OPERATOR_POLL_NS)?;
             }
         }
     }
@@ -195,8 +201,8 @@ fn wake<B: Bus>(
 ) -> Result<(), CanError> {
     let ready = i32::from(Stat::Ready.value());
     let stat = common_property_id(Property::STAT)?;
-    let asleep = |puck: &&MotorPuck| stats[usize::from(puck.node.number())] != Some(ready);
-    let asleep: Vec<&MotorPuck> = pucks.iter().filter(asleep).collect();
+    let is_asleep = |puck: &&MotorPuck| stats[usize::from(puck.node.number())] != Some(ready);
+    let asleep: Vec<&MotorPuck> = pucks.iter().filter(is_asleep).collect();
     if asleep.is_empty() {
         return Ok(());
     }
@@ -218,7 +224,7 @@ fn wake<B: Bus>(
 }
 
 /// Sets the motor positions from the home pose, unless the safety module reports that they are already set.
-fn zero<const N: usize, B: Bus>(
+fn set_home_positions<const N: usize, B: Bus>(
     host: &mut Host<'_, B>,
     module: &PropertyTable,
     pucks: &[MotorPuck],
@@ -227,8 +233,8 @@ fn zero<const N: usize, B: Bus>(
     startup_config: &StartupConfig<N>,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<(), CanError> {
-    let zero = module::property_id(module, Property::ZERO)?;
-    let found = motors::get_required(host, NodeId::SAFETY, zero)?;
+    let zero_id = module::property_id(module, Property::ZERO)?;
+    let found = motors::get_required(host, NodeId::SAFETY, zero_id)?;
     if found == 1 {
         return Ok(());
     }
@@ -240,14 +246,14 @@ fn zero<const N: usize, B: Bus>(
     };
     progress(Progress::Zeroing);
     let counts = transmission.counts(&home)?;
-    let ignore = module::property_id(module, Property::IFAULT)?;
-    host.set_property(NodeId::SAFETY, ignore, IGNORED_FAULTS)?;
+    let ifault_id = module::property_id(module, Property::IFAULT)?;
+    host.set_property(NodeId::SAFETY, ifault_id, IGNORED_FAULTS)?;
     for (puck, counts) in pucks.iter().zip(counts) {
-        let set = property::set(puck.node, puck.position, Value::Wide(counts.get()));
-        host.bus.send(&set)?;
+        let set_position = property::set(puck.node, puck.position, Value::Wide(counts.get()));
+        host.bus.send(&set_position)?;
         host.wait_silently(MS)?;
     }
-    // The safety module receives these positions on the bus as well.
+    // The safety module receives these replies as well, and with them the new positions.
     let replies = host.positions(pucks[0].position, N)?;
     for (puck, expected) in pucks.iter().zip(counts) {
         let node = puck.node.number();
@@ -267,8 +273,8 @@ fn zero<const N: usize, B: Bus>(
             });
         }
     }
-    host.set_property(NodeId::SAFETY, zero, 1)?;
-    motors::verify_setting(host, NodeId::SAFETY, Property::ZERO, zero, 1)
+    host.set_property(NodeId::SAFETY, zero_id, 1)?;
+    motors::verify_setting(host, NodeId::SAFETY, Property::ZERO, zero_id, 1)
 }
 
 /// Id of a property that is the same in every firmware.

@@ -8,7 +8,7 @@ use supple_puck::safety::{SafetyLimits, SafetyMode};
 use supple_puck::status::{Role, RoleType};
 use supple_puck::{NodeId, Property, PropertyId, PropertyTable, PuckKind};
 
-/// Identifies the module and returns its list of ids.
+/// Identifies the module and returns its property ids.
 pub fn find<B: Bus>(host: &mut Host<'_, B>) -> Result<PropertyTable, CanError> {
     let node = NodeId::SAFETY;
     let missing = CanError::Missing {
@@ -61,7 +61,7 @@ pub fn mode<B: Bus>(
 }
 
 /// Switches an active module to idle.
-pub fn lower<B: Bus>(host: &mut Host<'_, B>, module: &PropertyTable) -> Result<(), CanError> {
+pub fn set_idle<B: Bus>(host: &mut Host<'_, B>, module: &PropertyTable) -> Result<(), CanError> {
     let id = property_id(module, Property::MODE)?;
     let idle = i32::from(SafetyMode::Idle.value());
     host.set_property(NodeId::SAFETY, id, idle)?;

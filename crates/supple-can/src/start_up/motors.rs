@@ -40,7 +40,7 @@ pub struct MotorPuck {
 }
 
 /// Rejects an arm with a missing or an additional motor puck.
-pub fn all_present(stats: &[Option<i32>; 32], description: &Description) -> Result<(), CanError> {
+pub fn check_nodes(stats: &[Option<i32>; 32], description: &Description) -> Result<(), CanError> {
     let joints = description.dof();
     for (number, stat) in stats.iter().enumerate().take(8).skip(1) {
         let node = number as u8;
@@ -106,7 +106,7 @@ pub fn identify<B: Bus>(host: &mut Host<'_, B>, node: NodeId) -> Result<MotorPuc
 }
 
 /// Checks that all pucks use the same ids: a group frame has one torque id, and one request reads all positions.
-pub fn share_torque_ids(pucks: &[MotorPuck]) -> Result<(), CanError> {
+pub fn check_same_ids(pucks: &[MotorPuck]) -> Result<(), CanError> {
     for puck in pucks {
         let first = pucks[0];
         for (found, expected) in [(puck.torque, first.torque), (puck.position, first.position)] {
@@ -192,8 +192,8 @@ pub fn configure<B: Bus>(
 }
 
 /// Compares counts, torque units, motor and temperature with the description, and sets the torque limit to
-/// the description's.
-pub fn compare<B: Bus>(
+/// the description's. Returns the scales of its counts and torque units.
+pub fn check_and_limit<B: Bus>(
     host: &mut Host<'_, B>,
     puck: &MotorPuck,
     index: usize,

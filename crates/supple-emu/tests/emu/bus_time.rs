@@ -34,7 +34,7 @@ fn a_frame_lasts_its_bits() {
         (0x01f, &[][..], 51),
         (0x01f, &[0x55; 8], 113),
         (0x01f, &[0x00; 8], 127),
-        // The packed torques [1, 2, 3, 4] of the protocol note, to a group without members.
+        // The packed torques [1, 2, 3, 4], to a group without members.
         (
             0x41e,
             &[0xaa, 0x00, 0x04, 0x00, 0x20, 0x00, 0xc0, 0x04],

@@ -1,4 +1,4 @@
-//! Motor pucks as in the tables of the protocol note: states, ids by firmware, torques.
+//! Motor pucks: states, ids by firmware, torques.
 
 use crate::support::{E_STOP, Host, IDLE, MODE, MODULE, MS, MT, P, STAT, VERS, ZERO, packed};
 use supple_bus::{BusFault, Event};
@@ -16,7 +16,7 @@ fn with_firmware(version: i32) -> Host {
     Host::new(config)
 }
 
-/// Counts per revolution, torque units per N m and poles, at the ids of Barrett's lists for 51, 61, 65 and 175.
+/// Counts per revolution, torque units per N m and poles, at the property ids of firmware 51, 61, 65 and 175.
 #[test]
 fn ids_depend_on_the_firmware() {
     for (version, counts, units, poles) in [

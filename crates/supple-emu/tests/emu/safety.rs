@@ -1,5 +1,4 @@
-//! The safety module as in the tables of the protocol note: causes of idle and of the emergency stop, rejected
-//! requests, and the state of the pendant.
+//! The safety module: causes of idle and of the emergency stop, rejected requests, and the state of the pendant.
 
 use crate::support::*;
 use supple_core::dynamics::{joint_poses, tip_pose};
@@ -16,7 +15,8 @@ fn motors_in(host: &Host, mode: MotorMode) -> bool {
     host.arm().pucks().iter().all(|puck| puck.mode() == mode)
 }
 
-/// The default limits are 4731 and 5204: a larger torque is a warning, or switches the arm to idle.
+/// The default limits are 4731 and 5204: a torque above the first is a warning, one above the second switches the arm
+/// to idle.
 #[test]
 fn torque_faults_follow_the_commanded_torque() {
     for (torque, lamp, mode) in [
@@ -88,7 +88,7 @@ fn heartbeat_fault_when_polling_stops() {
     }
 }
 
-/// Limits 30, 36, 54 and 57 V.
+/// Faults are below 30 V and above 57 V, warnings below 36 V and above 54 V.
 #[test]
 fn the_bus_voltage_is_monitored() {
     for (volts, lamp, mode) in [
@@ -125,8 +125,8 @@ fn a_fault_is_cleared_only_at_the_pendant() {
     assert_eq!(host.module_mode(), ACTIVE);
 }
 
-/// Larger speed of the elbow and of the point 350 mm beyond it, 10 mm behind the tip, by the described arm's
-/// kinematics \[m/s\].
+/// Speed that the module monitors, from the kinematics of the arm's description \[m/s\]: the larger one of the elbow
+/// and of the point 350 mm beyond it, 10 mm behind the tip.
 fn monitored_speed(before: &[f64; 4], after: &[f64; 4], elapsed_s: f64) -> f64 {
     let config = Description::asset("wam4").unwrap().config::<4>().unwrap();
     let points = |q: &[f64; 4]| {
@@ -139,7 +139,7 @@ fn monitored_speed(before: &[f64; 4], after: &[f64; 4], elapsed_s: f64) -> f64 {
     moved.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max) / elapsed_s
 }
 
-/// A falling arm is switched to idle as soon as its speed over five position sets exceeds VL2.
+/// A falling arm is switched to idle as soon as its speed, computed over five cycles of positions, exceeds VL2.
 #[test]
 fn a_falling_arm_is_stopped_at_the_limit() {
     let mut host = Host::active();
@@ -159,7 +159,7 @@ fn a_falling_arm_is_stopped_at_the_limit() {
         warned |= host.arm().safety().pendant().velocity == supple_puck::safety::Level::Warning;
     }
     assert_eq!(cause(&host), Cause::Velocity);
-    // An arm in free fall gains 5 cm/s during the module's history.
+    // An arm in free fall becomes 5 cm/s faster during the five milliseconds from which the module computes the speed.
     assert!((0.5..0.56).contains(&speed), "{speed} m/s");
     assert!(warned);
     assert_eq!(host.lamps()[0], FAULT);
@@ -176,7 +176,7 @@ fn a_limit_of_zero_disables_the_limit() {
 }
 
 /// Changes the reported position of motor 1 by `step` counts in each of `cycles` milliseconds.
-fn count_up(host: &mut Host, step: i32, cycles: usize) {
+fn shift_position(host: &mut Host, step: i32, cycles: usize) {
     for _ in 0..cycles {
         let counts = host.arm().pucks()[0].counts();
         host.set(1, P, counts + step);
@@ -184,13 +184,13 @@ fn count_up(host: &mut Host, step: i32, cycles: usize) {
     }
 }
 
-/// A counter jump is a velocity fault, unless IFAULT says to ignore it: once for each position set whose history
-/// contains the jump.
+/// A jump of the counts is a velocity fault unless IFAULT makes the module ignore it. IFAULT counts down in each cycle
+/// whose history contains the jump.
 #[test]
 fn redefined_positions_are_faults_unless_ignored() {
     let mut host = Host::active();
     host.set(MODULE, VL2, 4096);
-    count_up(&mut host, 5000, 1);
+    shift_position(&mut host, 5000, 1);
     host.cycles(5);
     assert_eq!(host.module_mode(), IDLE);
     assert_eq!(cause(&host), Cause::Velocity);
@@ -198,7 +198,7 @@ fn redefined_positions_are_faults_unless_ignored() {
     let mut host = Host::active();
     host.set(MODULE, VL2, 4096);
     host.set(MODULE, IFAULT, 5);
-    count_up(&mut host, 5000, 1);
+    shift_position(&mut host, 5000, 1);
     host.cycles(10);
     assert_eq!(host.module_mode(), ACTIVE);
     assert_eq!(host.value(MODULE, IFAULT), 0);
@@ -207,14 +207,14 @@ fn redefined_positions_are_faults_unless_ignored() {
 /// Half a second after a velocity fault the arm must be slower than VL2.
 #[test]
 fn an_arm_that_does_not_slow_down_enters_the_emergency_stop() {
-    for (goes_on, mode) in [(true, E_STOP), (false, IDLE)] {
+    for (keeps_moving, mode) in [(true, E_STOP), (false, IDLE)] {
         let mut host = Host::active();
         host.set(MODULE, VL2, 4096);
-        count_up(&mut host, 500, 20);
+        shift_position(&mut host, 500, 20);
         assert_eq!(host.module_mode(), IDLE);
-        count_up(&mut host, 500, 350);
+        shift_position(&mut host, 500, 350);
         assert_eq!(host.module_mode(), IDLE, "not yet half a second");
-        count_up(&mut host, if goes_on { 500 } else { 0 }, 100);
+        shift_position(&mut host, if keeps_moving { 500 } else { 0 }, 100);
         assert_eq!(host.module_mode(), mode);
     }
 }

@@ -1,5 +1,4 @@
-//! The force/torque sensor as in the protocol note: two little-endian frames, and a tare time of a little over a
-//! second.
+//! The force/torque sensor: two little-endian frames, and a tare time of a little over a second.
 
 use crate::support::{Host, MS};
 

@@ -22,7 +22,7 @@ use core::fmt;
 
 pub(crate) const SET_BIT: u8 = 0x80;
 
-/// A property by its name in Barrett's lists. Its id is found in a [`PropertyTable`].
+/// A property, named as in the property lists of Barrett's libbarrett. A [`PropertyTable`] gives its id.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Property(u8);
 
@@ -37,7 +37,7 @@ impl Property {
         ids::NAMES[usize::from(self.0)]
     }
 
-    /// The property with this name, in capitals; `None` if Barrett's lists do not contain it.
+    /// The property with this name, in capitals; `None` if libbarrett's property lists do not contain it.
     pub fn from_name(name: &str) -> Option<Property> {
         let alias = ids::ALIASES.iter().find(|(alias, _)| *alias == name);
         let named = || Property::all().find(|property| property.name() == name);

@@ -3,21 +3,21 @@
 use super::Property;
 
 impl Property {
-    /// Firmware version. Always valid.
+    /// Firmware version. Same id in every firmware.
     pub const VERS: Property = Property(0);
-    /// Type and options of the puck, see [`Role`](crate::status::Role). Always valid.
+    /// Type and options of the puck, see [`Role`](crate::status::Role). Same id in every firmware.
     pub const ROLE: Property = Property(1);
-    /// Serial number. Always valid.
+    /// Serial number. Same id in every firmware.
     pub const SN: Property = Property(2);
-    /// Node id. Always valid.
+    /// Node id. Same id in every firmware.
     pub const ID: Property = Property(3);
-    /// Error; its codes are not published. Always valid.
+    /// Error; its codes are not published. Same id in every firmware.
     pub const ERROR: Property = Property(4);
-    /// Monitor or firmware, see [`Stat`](crate::status::Stat). Always valid.
+    /// Monitor (boot program) or firmware, see [`Stat`](crate::status::Stat). Same id in every firmware.
     pub const STAT: Property = Property(5);
-    /// `ADDR` of Barrett's lists. Always valid.
+    /// `ADDR` in libbarrett's property lists; its meaning is not recorded here. Same id in every firmware.
     pub const ADDR: Property = Property(6);
-    /// `VALUE` of Barrett's lists. Always valid.
+    /// `VALUE` in libbarrett's property lists; its meaning is not recorded here. Same id in every firmware.
     pub const VALUE: Property = Property(7);
     /// [`MotorMode`](crate::status::MotorMode) or [`SafetyMode`](crate::safety::SafetyMode).
     pub const MODE: Property = Property(8);
@@ -27,33 +27,33 @@ impl Property {
     pub const PTEMP: Property = Property(10);
     /// Temperature limit \[degrees Celsius\], 60 by default.
     pub const OTEMP: Property = Property(11);
-    /// `BAUD` of Barrett's lists.
+    /// `BAUD` in libbarrett's property lists; its meaning is not recorded here.
     pub const BAUD: Property = Property(12);
-    /// Accepts the sequence that unlocks a change of node id or role.
+    /// Command: accepts the sequence that unlocks a change of node id or role.
     pub const LOCK: Property = Property(13);
-    /// `DIG0` of Barrett's lists.
+    /// `DIG0` in libbarrett's property lists; its meaning is not recorded here.
     pub const DIG0: Property = Property(14);
-    /// `DIG1` of Barrett's lists.
+    /// `DIG1` in libbarrett's property lists; its meaning is not recorded here.
     pub const DIG1: Property = Property(15);
-    /// `FET0` of Barrett's lists; `B` is another name.
+    /// `FET0` or `B` in libbarrett's property lists; its meaning is not recorded here.
     pub const FET0: Property = Property(16);
-    /// `FET1` of Barrett's lists; `TENSION` is another name.
+    /// `FET1` or `TENSION` in libbarrett's property lists; its meaning is not recorded here.
     pub const FET1: Property = Property(17);
-    /// `ANA0` of Barrett's lists.
+    /// `ANA0` in libbarrett's property lists; its meaning is not recorded here.
     pub const ANA0: Property = Property(18);
-    /// `ANA1` of Barrett's lists.
+    /// `ANA1` in libbarrett's property lists; its meaning is not recorded here.
     pub const ANA1: Property = Property(19);
     /// Temperature of the thermistor \[degrees Celsius\].
     pub const THERM: Property = Property(20);
     /// Bus voltage; 48 V nominal.
     pub const VBUS: Property = Property(21);
-    /// `IMOTOR` of Barrett's lists.
+    /// `IMOTOR` in libbarrett's property lists; its meaning is not recorded here.
     pub const IMOTOR: Property = Property(22);
-    /// `VLOGIC` of Barrett's lists.
+    /// `VLOGIC` in libbarrett's property lists; its meaning is not recorded here.
     pub const VLOGIC: Property = Property(23);
-    /// `ILOGIC` of Barrett's lists.
+    /// `ILOGIC` in libbarrett's property lists; its meaning is not recorded here.
     pub const ILOGIC: Property = Property(24);
-    /// `SG` of Barrett's lists.
+    /// `SG` in libbarrett's property lists; its meaning is not recorded here.
     pub const SG: Property = Property(25);
     /// First group of the puck.
     pub const GRPA: Property = Property(26);
@@ -61,87 +61,87 @@ impl Property {
     pub const GRPB: Property = Property(27);
     /// Third group of the puck.
     pub const GRPC: Property = Property(28);
-    /// Accepts a command: 13 hand init, 18 close, 19 move, 20 open.
+    /// Command: 13 initialises the hand, 18 closes it, 19 moves it, 20 opens it.
     pub const CMD: Property = Property(29);
-    /// Set to a property id (or -1, all): writes it to the EEPROM.
+    /// Command: saves the property of the given id to the EEPROM, or all for -1.
     pub const SAVE: Property = Property(30);
-    /// Set to a property id: reads it back from the EEPROM.
+    /// Command: loads the property of the given id from the EEPROM.
     pub const LOAD: Property = Property(31);
-    /// Set to a property id: restores its factory default.
+    /// Command: restores the factory default of the property of the given id.
     pub const DEF: Property = Property(32);
-    /// `FIND` of Barrett's lists.
+    /// `FIND` in libbarrett's property lists; its meaning is not recorded here.
     pub const FIND: Property = Property(33);
-    /// `X0` of Barrett's lists.
+    /// `X0` in libbarrett's property lists; its meaning is not recorded here.
     pub const X0: Property = Property(34);
-    /// `X1` of Barrett's lists.
+    /// `X1` in libbarrett's property lists; its meaning is not recorded here.
     pub const X1: Property = Property(35);
-    /// `X2` of Barrett's lists.
+    /// `X2` in libbarrett's property lists; its meaning is not recorded here.
     pub const X2: Property = Property(36);
-    /// `X3` of Barrett's lists.
+    /// `X3` in libbarrett's property lists; its meaning is not recorded here.
     pub const X3: Property = Property(37);
-    /// `X4` of Barrett's lists.
+    /// `X4` in libbarrett's property lists; its meaning is not recorded here.
     pub const X4: Property = Property(38);
-    /// `X5` of Barrett's lists.
+    /// `X5` in libbarrett's property lists; its meaning is not recorded here.
     pub const X5: Property = Property(39);
-    /// `X6` of Barrett's lists.
+    /// `X6` in libbarrett's property lists; its meaning is not recorded here.
     pub const X6: Property = Property(40);
-    /// `X7` of Barrett's lists.
+    /// `X7` in libbarrett's property lists; its meaning is not recorded here.
     pub const X7: Property = Property(41);
     /// Torque command \[puck units\], usually packed, see [`PackedTorques`](crate::torque::PackedTorques); `TORQ` is another name.
     pub const T: Property = Property(42);
     /// Maximum torque that the puck applies \[puck units\].
     pub const MT: Property = Property(43);
-    /// `V` of Barrett's lists.
+    /// `V` in libbarrett's property lists; its meaning is not recorded here.
     pub const V: Property = Property(44);
-    /// `MV` of Barrett's lists.
+    /// `MV` in libbarrett's property lists; its meaning is not recorded here.
     pub const MV: Property = Property(45);
-    /// `MCV` of Barrett's lists.
+    /// `MCV` in libbarrett's property lists; its meaning is not recorded here.
     pub const MCV: Property = Property(46);
-    /// `MOV` of Barrett's lists.
+    /// `MOV` in libbarrett's property lists; its meaning is not recorded here.
     pub const MOV: Property = Property(47);
     /// Position \[counts\]; its reply is packed, see [`PositionReply`](crate::position::PositionReply); `AP` is another name.
     pub const P: Property = Property(48);
-    /// `DP` of Barrett's lists.
+    /// `DP` in libbarrett's property lists; its meaning is not recorded here.
     pub const DP: Property = Property(49);
-    /// `E` of Barrett's lists.
+    /// `E` in libbarrett's property lists; its meaning is not recorded here.
     pub const E: Property = Property(50);
-    /// `OT` of Barrett's lists.
+    /// `OT` in libbarrett's property lists; its meaning is not recorded here.
     pub const OT: Property = Property(51);
-    /// `CT` of Barrett's lists.
+    /// `CT` in libbarrett's property lists; its meaning is not recorded here.
     pub const CT: Property = Property(52);
-    /// `M` of Barrett's lists.
+    /// `M` in libbarrett's property lists; its meaning is not recorded here.
     pub const M: Property = Property(53);
-    /// `DS` of Barrett's lists.
+    /// `DS` in libbarrett's property lists; its meaning is not recorded here.
     pub const DS: Property = Property(54);
-    /// `MOFST` of Barrett's lists.
+    /// `MOFST` in libbarrett's property lists; its meaning is not recorded here.
     pub const MOFST: Property = Property(55);
-    /// `IOFST` of Barrett's lists.
+    /// `IOFST` in libbarrett's property lists; its meaning is not recorded here.
     pub const IOFST: Property = Property(56);
-    /// `UPSECS` of Barrett's lists.
+    /// `UPSECS` in libbarrett's property lists; its meaning is not recorded here.
     pub const UPSECS: Property = Property(57);
-    /// `OD` of Barrett's lists.
+    /// `OD` in libbarrett's property lists; its meaning is not recorded here.
     pub const OD: Property = Property(58);
-    /// `MDS` of Barrett's lists.
+    /// `MDS` in libbarrett's property lists; its meaning is not recorded here.
     pub const MDS: Property = Property(59);
     /// Absolute magnetic angle \[counts\]; firmware 118 and later, with the magnetic encoder of [`Role`](crate::status::Role).
     pub const MECH: Property = Property(60);
     /// Encoder counts per revolution: 4096 magnetic, 40960 optical.
     pub const CTS: Property = Property(61);
-    /// Slot of a packed torque frame, 1 to 4.
+    /// The puck's slot in the packed torque frame, 1 to 4.
     pub const PIDX: Property = Property(62);
-    /// `HSG` of Barrett's lists.
+    /// `HSG` in libbarrett's property lists; its meaning is not recorded here.
     pub const HSG: Property = Property(63);
-    /// `LSG` of Barrett's lists.
+    /// `LSG` in libbarrett's property lists; its meaning is not recorded here.
     pub const LSG: Property = Property(64);
-    /// `IVEL` of Barrett's lists.
+    /// `IVEL` in libbarrett's property lists; its meaning is not recorded here.
     pub const IVEL: Property = Property(65);
-    /// `IOFF` of Barrett's lists.
+    /// `IOFF` in libbarrett's property lists; its meaning is not recorded here.
     pub const IOFF: Property = Property(66);
-    /// `MPE` of Barrett's lists.
+    /// `MPE` in libbarrett's property lists; its meaning is not recorded here.
     pub const MPE: Property = Property(67);
-    /// `HOLD` of Barrett's lists.
+    /// `HOLD` in libbarrett's property lists; its meaning is not recorded here.
     pub const HOLD: Property = Property(68);
-    /// `TSTOP` of Barrett's lists.
+    /// `TSTOP` in libbarrett's property lists; its meaning is not recorded here.
     pub const TSTOP: Property = Property(69);
     /// Proportional gain of the PID mode; 2000 by default.
     pub const KP: Property = Property(70);
@@ -151,53 +151,53 @@ impl Property {
     pub const KI: Property = Property(72);
     /// Acceleration of the trapezoidal mode; 100 by default.
     pub const ACCEL: Property = Property(73);
-    /// `TENST` of Barrett's lists.
+    /// `TENST` in libbarrett's property lists; its meaning is not recorded here.
     pub const TENST: Property = Property(74);
-    /// `TENSO` of Barrett's lists.
+    /// `TENSO` in libbarrett's property lists; its meaning is not recorded here.
     pub const TENSO: Property = Property(75);
     /// Number of the joint.
     pub const JIDX: Property = Property(76);
     /// Puck torque units per N m, see [`TorqueScale`](crate::torque::TorqueScale).
     pub const IPNM: Property = Property(77);
-    /// `HALLS` of Barrett's lists.
+    /// `HALLS` in libbarrett's property lists; its meaning is not recorded here.
     pub const HALLS: Property = Property(78);
-    /// `HALLH` of Barrett's lists.
+    /// `HALLH` in libbarrett's property lists; its meaning is not recorded here.
     pub const HALLH: Property = Property(79);
-    /// Poles of the motor: 12, 8 or 6.
+    /// Number of poles of the motor: 12, 8 or 6.
     pub const POLES: Property = Property(80);
-    /// `IKP` of Barrett's lists.
+    /// `IKP` in libbarrett's property lists; its meaning is not recorded here.
     pub const IKP: Property = Property(81);
-    /// `IKI` of Barrett's lists.
+    /// `IKI` in libbarrett's property lists; its meaning is not recorded here.
     pub const IKI: Property = Property(82);
-    /// `IKCOR` of Barrett's lists.
+    /// `IKCOR` in libbarrett's property lists; its meaning is not recorded here.
     pub const IKCOR: Property = Property(83);
-    /// `EN` of Barrett's lists.
+    /// `EN` in libbarrett's property lists; its meaning is not recorded here.
     pub const EN: Property = Property(84);
-    /// `JP` of Barrett's lists \[counts\].
+    /// `JP` in libbarrett's property lists \[counts\].
     pub const JP: Property = Property(85);
-    /// `JOFST` of Barrett's lists \[counts\].
+    /// `JOFST` in libbarrett's property lists \[counts\].
     pub const JOFST: Property = Property(86);
-    /// `TIE` of Barrett's lists.
+    /// `TIE` in libbarrett's property lists; its meaning is not recorded here.
     pub const TIE: Property = Property(87);
-    /// Not 0, or `ECMIN` not 0, once the joint encoder's index is found.
+    /// This or `ECMIN` is not 0 after the joint encoder has passed its index.
     pub const ECMAX: Property = Property(88);
     /// See `ECMAX`.
     pub const ECMIN: Property = Property(89);
     /// Loop flags; their bits are not published.
     pub const LFLAGS: Property = Property(90);
-    /// `LCTC` of Barrett's lists.
+    /// `LCTC` in libbarrett's property lists; its meaning is not recorded here.
     pub const LCTC: Property = Property(91);
-    /// `LCVC` of Barrett's lists.
+    /// `LCVC` in libbarrett's property lists; its meaning is not recorded here.
     pub const LCVC: Property = Property(92);
     /// Kind of tactile report: 0 none, 1 top ten, 2 full, 3 tare.
     pub const TACT: Property = Property(93);
-    /// `TACTID` of Barrett's lists.
+    /// `TACTID` in libbarrett's property lists; its meaning is not recorded here.
     pub const TACTID: Property = Property(94);
-    /// `IHIT` of Barrett's lists.
+    /// `IHIT` in libbarrett's property lists; its meaning is not recorded here.
     pub const IHIT: Property = Property(95);
-    /// 1 once the host has confirmed the arm's zero to the safety module.
+    /// 1 after the host has told the safety module that the encoder positions are set.
     pub const ZERO: Property = Property(96);
-    /// The pendant, see [`PenWord`](crate::safety::PenWord).
+    /// State of the pendant, see [`PenWord`](crate::safety::PenWord).
     pub const PEN: Property = Property(97);
     /// Service command of the safety module; 0, 4 and 5 are known, for the voltage calibration.
     pub const SAFE: Property = Property(98);
@@ -217,118 +217,118 @@ impl Property {
     pub const VOLTH1: Property = Property(105);
     /// High voltage fault \[V\], 57 by default.
     pub const VOLTH2: Property = Property(106);
-    /// `PWR` of Barrett's lists.
+    /// `PWR` in libbarrett's property lists; its meaning is not recorded here.
     pub const PWR: Property = Property(107);
-    /// `MAXPWR` of Barrett's lists.
+    /// `MAXPWR` in libbarrett's property lists; its meaning is not recorded here.
     pub const MAXPWR: Property = Property(108);
-    /// Number of the next speed faults to ignore.
+    /// Number of speed faults that the safety module still ignores; it counts down.
     pub const IFAULT: Property = Property(109);
-    /// `VNOM` of Barrett's lists.
+    /// `VNOM` in libbarrett's property lists; its meaning is not recorded here.
     pub const VNOM: Property = Property(110);
-    /// `SG1` of Barrett's lists.
+    /// `SG1` in libbarrett's property lists; its meaning is not recorded here.
     pub const SG1: Property = Property(111);
-    /// `SG2` of Barrett's lists.
+    /// `SG2` in libbarrett's property lists; its meaning is not recorded here.
     pub const SG2: Property = Property(112);
-    /// `SG3` of Barrett's lists.
+    /// `SG3` in libbarrett's property lists; its meaning is not recorded here.
     pub const SG3: Property = Property(113);
-    /// `SG4` of Barrett's lists.
+    /// `SG4` in libbarrett's property lists; its meaning is not recorded here.
     pub const SG4: Property = Property(114);
-    /// `SG5` of Barrett's lists.
+    /// `SG5` in libbarrett's property lists; its meaning is not recorded here.
     pub const SG5: Property = Property(115);
-    /// `SG6` of Barrett's lists.
+    /// `SG6` in libbarrett's property lists; its meaning is not recorded here.
     pub const SG6: Property = Property(116);
-    /// `FX` of Barrett's lists.
+    /// `FX` in libbarrett's property lists; its meaning is not recorded here.
     pub const FX: Property = Property(117);
-    /// `FY` of Barrett's lists.
+    /// `FY` in libbarrett's property lists; its meaning is not recorded here.
     pub const FY: Property = Property(118);
-    /// `FZ` of Barrett's lists.
+    /// `FZ` in libbarrett's property lists; its meaning is not recorded here.
     pub const FZ: Property = Property(119);
-    /// `TX` of Barrett's lists.
+    /// `TX` in libbarrett's property lists; its meaning is not recorded here.
     pub const TX: Property = Property(120);
-    /// `TY` of Barrett's lists.
+    /// `TY` in libbarrett's property lists; its meaning is not recorded here.
     pub const TY: Property = Property(121);
-    /// `TZ` of Barrett's lists.
+    /// `TZ` in libbarrett's property lists; its meaning is not recorded here.
     pub const TZ: Property = Property(122);
     /// Force and torque, see [`force_torque`](crate::force_torque); setting it to 0 tares.
     pub const FT: Property = Property(123);
-    /// `AX` of Barrett's lists.
+    /// `AX` in libbarrett's property lists; its meaning is not recorded here.
     pub const AX: Property = Property(124);
-    /// `AY` of Barrett's lists.
+    /// `AY` in libbarrett's property lists; its meaning is not recorded here.
     pub const AY: Property = Property(125);
-    /// `AZ` of Barrett's lists.
+    /// `AZ` in libbarrett's property lists; its meaning is not recorded here.
     pub const AZ: Property = Property(126);
-    /// `GM` of Barrett's lists.
+    /// `GM` in libbarrett's property lists; its meaning is not recorded here.
     pub const GM: Property = Property(127);
-    /// `OV` of Barrett's lists.
+    /// `OV` in libbarrett's property lists; its meaning is not recorded here.
     pub const OV: Property = Property(128);
-    /// `LED` of Barrett's lists.
+    /// `LED` in libbarrett's property lists; its meaning is not recorded here.
     pub const LED: Property = Property(129);
-    /// `T1` of Barrett's lists.
+    /// `T1` in libbarrett's property lists; its meaning is not recorded here.
     pub const T1: Property = Property(130);
-    /// `T2` of Barrett's lists.
+    /// `T2` in libbarrett's property lists; its meaning is not recorded here.
     pub const T2: Property = Property(131);
-    /// `T3` of Barrett's lists.
+    /// `T3` in libbarrett's property lists; its meaning is not recorded here.
     pub const T3: Property = Property(132);
     /// Acceleration, see [`force_torque`](crate::force_torque).
     pub const A: Property = Property(133);
-    /// `D` of Barrett's lists.
+    /// `D` in libbarrett's property lists; its meaning is not recorded here.
     pub const D: Property = Property(134);
-    /// `DUMP` of Barrett's lists.
+    /// `DUMP` in libbarrett's property lists; its meaning is not recorded here.
     pub const DUMP: Property = Property(135);
-    /// `GAIN1` of Barrett's lists.
+    /// `GAIN1` in libbarrett's property lists; its meaning is not recorded here.
     pub const GAIN1: Property = Property(136);
-    /// `GAIN2` of Barrett's lists.
+    /// `GAIN2` in libbarrett's property lists; its meaning is not recorded here.
     pub const GAIN2: Property = Property(137);
-    /// `GAIN3` of Barrett's lists.
+    /// `GAIN3` in libbarrett's property lists; its meaning is not recorded here.
     pub const GAIN3: Property = Property(138);
-    /// `ISQ` of Barrett's lists.
+    /// `ISQ` in libbarrett's property lists; its meaning is not recorded here.
     pub const ISQ: Property = Property(139);
-    /// `ITOR` of Barrett's lists.
+    /// `ITOR` in libbarrett's property lists; its meaning is not recorded here.
     pub const ITOR: Property = Property(140);
-    /// `LCV` of Barrett's lists.
+    /// `LCV` in libbarrett's property lists; its meaning is not recorded here.
     pub const LCV: Property = Property(141);
-    /// `LFAP` of Barrett's lists.
+    /// `LFAP` in libbarrett's property lists; its meaning is not recorded here.
     pub const LFAP: Property = Property(142);
-    /// `LFDP` of Barrett's lists.
+    /// `LFDP` in libbarrett's property lists; its meaning is not recorded here.
     pub const LFDP: Property = Property(143);
-    /// `LFS` of Barrett's lists.
+    /// `LFS` in libbarrett's property lists; its meaning is not recorded here.
     pub const LFS: Property = Property(144);
-    /// `LFT` of Barrett's lists.
+    /// `LFT` in libbarrett's property lists; its meaning is not recorded here.
     pub const LFT: Property = Property(145);
-    /// `LFV` of Barrett's lists.
+    /// `LFV` in libbarrett's property lists; its meaning is not recorded here.
     pub const LFV: Property = Property(146);
-    /// `LOG` of Barrett's lists.
+    /// `LOG` in libbarrett's property lists; its meaning is not recorded here.
     pub const LOG: Property = Property(147);
-    /// `LOG1` of Barrett's lists.
+    /// `LOG1` in libbarrett's property lists; its meaning is not recorded here.
     pub const LOG1: Property = Property(148);
-    /// `LOG2` of Barrett's lists.
+    /// `LOG2` in libbarrett's property lists; its meaning is not recorded here.
     pub const LOG2: Property = Property(149);
-    /// `LOG3` of Barrett's lists.
+    /// `LOG3` in libbarrett's property lists; its meaning is not recorded here.
     pub const LOG3: Property = Property(150);
-    /// `LOG4` of Barrett's lists.
+    /// `LOG4` in libbarrett's property lists; its meaning is not recorded here.
     pub const LOG4: Property = Property(151);
-    /// `MD` of Barrett's lists.
+    /// `MD` in libbarrett's property lists; its meaning is not recorded here.
     pub const MD: Property = Property(152);
-    /// `OFFSET1` of Barrett's lists.
+    /// `OFFSET1` in libbarrett's property lists; its meaning is not recorded here.
     pub const OFFSET1: Property = Property(153);
-    /// `OFFSET2` of Barrett's lists.
+    /// `OFFSET2` in libbarrett's property lists; its meaning is not recorded here.
     pub const OFFSET2: Property = Property(154);
-    /// `OFFSET3` of Barrett's lists.
+    /// `OFFSET3` in libbarrett's property lists; its meaning is not recorded here.
     pub const OFFSET3: Property = Property(155);
-    /// `PDATA` of Barrett's lists.
+    /// `PDATA` in libbarrett's property lists; its meaning is not recorded here.
     pub const PDATA: Property = Property(156);
-    /// `PLOG` of Barrett's lists.
+    /// `PLOG` in libbarrett's property lists; its meaning is not recorded here.
     pub const PLOG: Property = Property(157);
-    /// `RATIO` of Barrett's lists.
+    /// `RATIO` in libbarrett's property lists; its meaning is not recorded here.
     pub const RATIO: Property = Property(158);
-    /// `SAMPLE` of Barrett's lists.
+    /// `SAMPLE` in libbarrett's property lists; its meaning is not recorded here.
     pub const SAMPLE: Property = Property(159);
-    /// `TETAE` of Barrett's lists.
+    /// `TETAE` in libbarrett's property lists; its meaning is not recorded here.
     pub const TETAE: Property = Property(160);
-    /// `UNITS` of Barrett's lists.
+    /// `UNITS` in libbarrett's property lists; its meaning is not recorded here.
     pub const UNITS: Property = Property(161);
-    /// `VALUE32` of Barrett's lists.
+    /// `VALUE32` in libbarrett's property lists; its meaning is not recorded here.
     pub const VALUE32: Property = Property(162);
-    /// `VCMD` of Barrett's lists.
+    /// `VCMD` in libbarrett's property lists; its meaning is not recorded here.
     pub const VCMD: Property = Property(163);
 }

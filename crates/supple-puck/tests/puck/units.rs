@@ -33,9 +33,9 @@ fn nonfinite_values_are_rejected_and_not_saturated() {
     assert!(PositionScale::new(0).is_err());
 }
 
-/// Full torque of the arm's motors: about 20 % of the breaking load of the cable.
+/// Maximum torques of the arm's motors, at about 20 % of the breaking load of their cables.
 #[test]
-fn torque_limits_match_the_published_newton_metres() {
+fn puck_units_convert_to_the_published_torque_limits() {
     for (units_per_nm, units, torque_nm) in [
         (2700.0, 4860, 1.8),
         (2700.0, 4320, 1.6),
@@ -50,8 +50,8 @@ fn torque_limits_match_the_published_newton_metres() {
 #[test]
 fn a_revolution_is_4096_counts() {
     let scale = PositionScale::new(4096).unwrap();
-    let turn = Counts::new(4096).unwrap();
-    assert!((scale.rad(turn) - std::f64::consts::TAU).abs() < 1e-12);
+    let revolution = Counts::new(4096).unwrap();
+    assert!((scale.rad(revolution) - std::f64::consts::TAU).abs() < 1e-12);
     assert!(scale.counts(std::f64::consts::TAU * 512.0).is_err());
     assert_eq!(
         scale.counts(-std::f64::consts::TAU * 512.0),
@@ -66,8 +66,8 @@ fn speed_limits_are_rounded_down_but_never_to_zero() {
     assert_eq!(value(0.5), Ok(2048));
     assert_eq!(value(1.0 - 1e-9), Ok(0x0fff));
     assert_eq!(value(1.0 / 4096.0), Ok(1));
-    for refused in [0.0, 1e-4, -1.0, 8.0] {
-        assert!(value(refused).is_err(), "{refused}");
+    for rejected in [0.0, 1e-4, -1.0, 8.0] {
+        assert!(value(rejected).is_err(), "{rejected}");
     }
     assert_eq!(SpeedLimit::from_value(0), Ok(None));
 }
@@ -86,12 +86,15 @@ fn safety_limits_default_to_those_of_the_module() {
             (Property::TL2, 5204),
         ]
     );
-    let never = SafetyLimits {
+    let no_speed_fault = SafetyLimits {
         speed_fault: None,
         ..limits
     };
-    assert_eq!(never.validate(), Ok(()));
-    assert_eq!(never.settings()[1], (Property::VL2, Value::Wide(0)));
+    assert_eq!(no_speed_fault.validate(), Ok(()));
+    assert_eq!(
+        no_speed_fault.settings()[1],
+        (Property::VL2, Value::Wide(0))
+    );
     let swapped = SafetyLimits {
         speed_warning: limits.speed_fault,
         speed_fault: limits.speed_warning,
@@ -112,7 +115,7 @@ fn safety_limits_default_to_those_of_the_module() {
 }
 
 #[test]
-fn the_host_can_only_lower_the_safety_module() {
+fn the_host_can_only_lower_the_mode_of_the_safety_module() {
     use SafetyMode::{Active, EStop, Idle};
     for (mode, requested, after) in [
         (EStop, Idle, EStop),
@@ -170,8 +173,11 @@ proptest! {
     #![proptest_config(config(1000, 20_260_302))]
 
     #[test]
-    fn torques_are_within_half_a_unit_and_odd(scale in 500.0..25_000.0, share in -1.0..1.0f64) {
-        let torque_nm = share * 8191.0 / scale;
+    fn torques_are_within_half_a_unit_and_symmetric_about_zero(
+        scale in 500.0..25_000.0,
+        fraction in -1.0..1.0f64,
+    ) {
+        let torque_nm = fraction * 8191.0 / scale;
         let scale = TorqueScale::new(scale).unwrap();
         let found = scale.puck_torque(torque_nm).unwrap();
         let error = (scale.torque_nm(found) - torque_nm) * scale.units_per_nm();
@@ -191,7 +197,7 @@ proptest! {
     }
 
     #[test]
-    fn sensor_counts_are_within_half_and_saturate(value in -300.0..300.0f64) {
+    fn sensor_counts_are_within_half_a_count_and_saturate(value in -300.0..300.0f64) {
         for quantity in [Quantity::Force, Quantity::Torque, Quantity::Acceleration] {
             let exact = value * quantity.counts_per_unit();
             let [found, ..] = quantity.counts([value; 3]).unwrap();

@@ -1,4 +1,4 @@
-//! A host that exchanges raw frames with the emulated arm, as in the protocol note.
+//! A host that exchanges frames with the emulated arm as raw ids and bytes, without the codec of `supple-puck`.
 
 use supple_bus::virtual_time::{DirectBus, Peer};
 use supple_bus::{Bus, Event};
@@ -103,7 +103,7 @@ impl Host {
             .collect()
     }
 
-    /// Reply of a node to a request within a millisecond.
+    /// Payload of a node's reply to a request, `None` after a millisecond.
     pub fn get(&mut self, node: u8, property: u8) -> Option<Vec<u8>> {
         self.send(u32::from(node), &[property]);
         let from = |id: u16| id & 0x3e0 == u16::from(node) << 5;
@@ -114,7 +114,7 @@ impl Host {
             .next()
     }
 
-    /// Value of a property, of either width.
+    /// Value of a property of 16 or 32 bits.
     pub fn value(&mut self, node: u8, property: u8) -> i32 {
         let reply = self.get(node, property).expect("a reply");
         assert_eq!(reply[..2], [property | 0x80, 0]);
@@ -155,7 +155,7 @@ pub const SAFE: i32 = 0b001;
 pub const WARNING: i32 = 0b010;
 pub const FAULT: i32 = 0b100;
 
-/// Packs four torques as in the protocol note: 14 bits each, the most significant bit first, after the property.
+/// Packs four torques after the property: 14 bits each, the most significant bit first.
 pub fn packed(torques: [i32; 4]) -> [u8; 8] {
     let word = torques
         .iter()

@@ -24,7 +24,7 @@ fn torque_mode_is_entered_only_from_the_pendant() {
     assert_eq!(rig.cycle.drives(), Drives::Active);
 }
 
-/// The weight is compensated from the moment of activation: no joint moves away.
+/// The weight is compensated from the moment of activation on: no joint moves.
 #[test]
 fn activation_is_bumpless() {
     let mut rig = Rig::<4>::new();
@@ -63,8 +63,8 @@ fn reported_positions_and_force_match_the_arm() {
     assert!(force_n.norm() < 0.1, "nothing touches the tip: {force_n}");
 }
 
-/// The protocol note specifies 450 to 540 us for poll, four replies and torques; the auxiliary polls add a few
-/// per cent.
+/// Request, four replies and torques take 450 us without bit stuffing and 540 us with the maximum; the auxiliary polls
+/// add a few per cent of the period.
 #[test]
 fn bus_load_is_the_sum_of_the_frames() {
     let mut rig = Rig::<4>::holding();
@@ -75,12 +75,12 @@ fn bus_load_is_the_sum_of_the_frames() {
         reported += rig.cycle.counters().bus_load / 400.0;
     }
     let busy = (rig.emulator().bus_busy_ns() - busy_ns) as f64;
-    let true_load = busy / (rig.now_ns() - begin_ns) as f64;
+    let actual_load = busy / (rig.now_ns() - begin_ns) as f64;
     assert!(
-        (reported - true_load).abs() < 0.01,
-        "{reported} {true_load}"
+        (reported - actual_load).abs() < 0.01,
+        "{reported} {actual_load}"
     );
-    assert!((0.45..0.64).contains(&true_load), "{true_load}");
+    assert!((0.45..0.64).contains(&actual_load), "{actual_load}");
     assert_eq!(rig.cycle.counters().tx_lost, 0);
     assert_eq!(rig.cycle.counters().missed, 0);
     assert_eq!(rig.cycle.counters().replies_lost, 0);
@@ -92,7 +92,7 @@ fn a_period_beyond_the_bus_bandwidth_is_rejected_with_the_frame_times() {
     assert!(BusTime::new(4, 0, true, answer_ns).check(MS).is_ok());
     let seven = BusTime::new(7, 0, true, answer_ns);
     let error = seven.check(MS).unwrap_err().to_string();
-    // 65 + 7 x 85, 2 x 135, 65 + 115 + 125.
+    // Positions 65 + 7 x 85, torques 2 x 135, sensor 65 + 115 + 125, the answer, their sum and its inverse.
     for part in ["660 us", "270 us", "305 us", "100 us", "1335 us", "749 Hz"] {
         assert!(error.contains(part), "{part} in: {error}");
     }
@@ -100,9 +100,9 @@ fn a_period_beyond_the_bus_bandwidth_is_rejected_with_the_frame_times() {
     assert!(BusTime::new(4, 4, true, answer_ns).check(MS).is_err());
 }
 
-/// Checks every cycle; the cycles poll the module's mode, the pendant and the sensor in rotation.
-fn keeps_its_budget<const N: usize>(period_ns: u64) {
-    let mut rig = Rig::<N>::at(crate::rig::arm(N).home::<N>().unwrap(), period_ns);
+/// Checks the bus time of every cycle, whether it polls the module's mode, the pendant or the sensor.
+fn assert_within_budget<const N: usize>(period_ns: u64) {
+    let mut rig = Rig::<N>::at(crate::rig::description(N).home::<N>().unwrap(), period_ns);
     rig.activate();
     let budget = BusTime::new(N, 0, true, crate::rig::ANSWER_NS);
     assert!(budget.min_period_ns() <= period_ns);
@@ -114,23 +114,23 @@ fn keeps_its_budget<const N: usize>(period_ns: u64) {
     }
     let allowed_ns = budget.min_period_ns() - budget.answer_ns;
     assert!(max_ns <= allowed_ns, "{max_ns} {allowed_ns}");
-    // The sensor was polled: more than positions, torques and the pendant.
+    // The cycles polled the sensor, too.
     assert!(rig.cycle.link_mut().report.unwrap().tip_force_n.is_some());
     assert_eq!(rig.cycle.counters().tx_lost, 0);
 }
 
 #[test]
 fn four_joints_keep_the_budget_at_1_khz() {
-    keeps_its_budget::<4>(PERIOD_NS);
+    assert_within_budget::<4>(PERIOD_NS);
 }
 
 #[test]
 fn seven_joints_keep_the_budget_at_700_hz() {
-    keeps_its_budget::<7>(1_428_000);
+    assert_within_budget::<7>(1_428_000);
 }
 
-/// Durations of the protocol note: 65 us for a request, 85 for a reply, 135 for torques, 65 + 115 + 125 for the
-/// sensor.
+/// Frame durations with maximum bit stuffing: 65 us for a request, 85 for a reply, 135 for torques, 65 + 115 + 125 for
+/// the sensor.
 #[test]
 fn the_budget_is_printed_frame_by_frame() {
     let four = BusTime::new(4, 0, true, 100_000).budget(MS).to_string();
@@ -154,9 +154,10 @@ fn the_budget_is_printed_frame_by_frame() {
     }
 }
 
-fn tracks<const N: usize>(period_ns: u64) -> f64 {
+/// Tracks the sinusoid over the bus; returns the root mean square of the tip's position error \[m\].
+fn tracking_error_m<const N: usize>(period_ns: u64) -> f64 {
     let (trajectory, _) = scenario::sinusoid(1.0);
-    let config = crate::rig::arm(N).config::<N>().unwrap();
+    let config = crate::rig::description(N).config::<N>().unwrap();
     let start = start_pose(&config, "sinusoid", &trajectory, 1.0).unwrap();
     let mut rig = Rig::<N>::at(start, period_ns);
     rig.activate();
@@ -180,17 +181,17 @@ fn tracks<const N: usize>(period_ns: u64) -> f64 {
     (sum / count as f64).sqrt()
 }
 
-/// In one process the exact model tracks within millimetres; the bus adds half a cycle of delay, and the arm
-/// adds its own.
+/// Without a bus and with an exact model the tip tracks within millimetres. Here the bus delays the torques by half a
+/// cycle, and the emulated arm delays them further.
 #[test]
 fn four_joints_track_at_1_khz() {
-    let rms_m = tracks::<4>(PERIOD_NS);
+    let rms_m = tracking_error_m::<4>(PERIOD_NS);
     assert!(rms_m < 4e-3, "{rms_m}");
 }
 
 #[test]
 fn seven_joints_track_at_700_hz() {
-    let rms_m = tracks::<7>(1_428_000);
+    let rms_m = tracking_error_m::<7>(1_428_000);
     assert!(rms_m < 8e-3, "{rms_m}");
 }
 

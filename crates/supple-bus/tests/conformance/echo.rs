@@ -1,4 +1,4 @@
-//! The other side of the bus: a mirror, as a peer in virtual time and as a thread on a real bus.
+//! The arm's side of the bus: a node that echoes every frame of the host, as a peer in virtual time and as a thread.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -11,26 +11,26 @@ use supple_puck::{CanFrame, GroupId, MessageId, NodeId};
 /// Transmission time of a frame in virtual time \[ns\].
 const FRAME_NS: u64 = 100_000;
 
-/// Node 1's answer to a frame of the host.
-pub fn reflected(frame: &CanFrame) -> CanFrame {
+/// Node 1's answer to a frame of the host: the same payload.
+pub fn echo_of(frame: &CanFrame) -> CanFrame {
     let node = NodeId::new(1).unwrap();
     CanFrame::new(MessageId::to_group(node, GroupId::REPLY), frame.payload()).unwrap()
 }
 
 #[derive(Default)]
-pub struct Mirror {
+pub struct EchoPeer {
     now_ns: u64,
     busy_until_ns: u64,
     events: VecDeque<(u64, Event)>,
 }
 
-impl Peer for Mirror {
+impl Peer for EchoPeer {
     fn now_ns(&self) -> u64 {
         self.now_ns
     }
 
     fn host_sends(&mut self, frame: &CanFrame) {
-        for event in [Event::Sent(*frame), Event::Frame(reflected(frame))] {
+        for event in [Event::Sent(*frame), Event::Frame(echo_of(frame))] {
             self.busy_until_ns = self.busy_until_ns.max(self.now_ns) + FRAME_NS;
             self.events.push_back((self.busy_until_ns, event));
         }
@@ -51,66 +51,64 @@ impl Peer for Mirror {
     }
 }
 
-/// A mirror in a thread, which ends when dropped.
-pub struct Worker {
+/// Echoes frames in a thread, which ends when this is dropped.
+pub struct EchoThread {
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
-impl Worker {
-    fn run(work: impl Fn(&AtomicBool) + Send + 'static) -> Worker {
+impl EchoThread {
+    fn run(work: impl Fn(&AtomicBool) + Send + 'static) -> EchoThread {
         let stop = Arc::new(AtomicBool::new(false));
-        let seen = stop.clone();
-        Worker {
+        let stop_flag = stop.clone();
+        EchoThread {
             stop,
-            thread: Some(std::thread::spawn(move || work(&seen))),
+            thread: Some(std::thread::spawn(move || work(&stop_flag))),
         }
     }
 
-    pub fn on_bus<B: Bus + Send + 'static>(bus: B) -> Worker {
+    pub fn on_bus<B: Bus + Send + 'static>(bus: B) -> EchoThread {
         let bus = std::sync::Mutex::new(bus);
-        Worker::run(move |stop| {
+        EchoThread::run(move |stop| {
             let mut bus = bus.lock().unwrap();
             while !stop.load(Ordering::Relaxed) {
                 let until_ns = bus.now_ns() + 5_000_000;
                 if let Some(Event::Frame(frame)) = bus.receive_until(until_ns).unwrap() {
-                    bus.send(&reflected(&frame)).unwrap();
+                    bus.send(&echo_of(&frame)).unwrap();
                 }
             }
         })
     }
 
-    pub fn responder(responder: LockstepResponder) -> Worker {
-        let responder = std::sync::Mutex::new((responder, Mirror::default()));
-        Worker::run(move |stop| {
-            let (responder, mirror) = &mut *responder.lock().unwrap();
+    pub fn responder(responder: LockstepResponder) -> EchoThread {
+        let responder = std::sync::Mutex::new((responder, EchoPeer::default()));
+        EchoThread::run(move |stop| {
+            let (responder, peer) = &mut *responder.lock().unwrap();
             while !stop.load(Ordering::Relaxed) {
-                responder.serve(mirror, 5_000_000).unwrap();
+                responder.serve(peer, 5_000_000).unwrap();
+            }
+        })
+    }
+
+    pub fn paced(responder: PacedResponder) -> EchoThread {
+        let shared = std::sync::Mutex::new((responder, EchoPeer::default()));
+        EchoThread::run(move |stop| {
+            let (responder, peer) = &mut *shared.lock().unwrap();
+            while !stop.load(Ordering::Relaxed) {
+                responder.serve(peer).unwrap();
             }
         })
     }
 }
 
-impl Worker {
-    pub fn paced(responder: PacedResponder) -> Worker {
-        let shared = std::sync::Mutex::new((responder, Mirror::default()));
-        Worker::run(move |stop| {
-            let (responder, mirror) = &mut *shared.lock().unwrap();
-            while !stop.load(Ordering::Relaxed) {
-                responder.serve(mirror).unwrap();
-            }
-        })
-    }
-}
-
-impl Drop for Worker {
+impl Drop for EchoThread {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
             let ended = thread.join();
             assert!(
                 ended.is_ok() || std::thread::panicking(),
-                "the mirror failed"
+                "the echo thread panicked"
             );
         }
     }
