@@ -55,6 +55,31 @@ fn copy_of_the_tree(to: &Path) {
     }
 }
 
+/// Gives the packages of the copy a version of their own, so that in the shared target folder none of them is taken for
+/// a package of this tree: cargo tells members of a workspace apart by their path within it, not by its folder.
+fn set_version(tree: &Path) {
+    const OURS: &str = "version = \"0.1.0\"";
+    const COPY: &str = "version = \"0.1.0-copy\"";
+    let path = tree.join("Cargo.toml");
+    let manifest = fs::read_to_string(&path).expect("readable");
+    assert_eq!(
+        manifest.matches(OURS).count(),
+        1,
+        "the version of the workspace"
+    );
+    fs::write(&path, manifest.replace(OURS, COPY)).expect("written");
+    let path = tree.join("Cargo.lock");
+    let lock = fs::read_to_string(&path).expect("readable");
+    let packages: Vec<String> = lock
+        .split("[[package]]\n")
+        .map(|package| match package.starts_with("name = \"supple") {
+            true => package.replacen(OURS, COPY, 1),
+            false => package.to_owned(),
+        })
+        .collect();
+    fs::write(&path, packages.join("[[package]]\n")).expect("written");
+}
+
 fn edit(tree: &Path, (file, behind, lines): &Edit) {
     let path = tree.join(file);
     let text = fs::read_to_string(&path).expect("readable");
@@ -68,11 +93,12 @@ fn a_scalar_and_a_term_are_two_edits_each() {
     let folder = tempfile::tempdir().expect("a folder");
     let tree = folder.path().join("tree");
     copy_of_the_tree(&tree);
+    set_version(&tree);
     for change in SCALAR.iter().chain(&TERM) {
         edit(&tree, change);
     }
     let log = folder.path().join("run.mcap");
-    // Beside the tests' own build: the dependencies are the same.
+    // Beside the tests' own build: the dependencies of other projects are the same.
     let target = Path::new(env!("CARGO_TARGET_TMPDIR"))
         .parent()
         .expect("the target folder");
