@@ -101,8 +101,7 @@ fn of_7_active_joints() {
     };
     run.change(pose(&run), handover_s);
     run.change(pose(&run), handover_s);
-    let tip = supple_core::dynamics::tip_pose(&run.plant.arm, &run.plant.q).translation;
-    run.change(Request::Track(Trajectory::Hold(tip)), handover_s);
+    run.change(Request::GravityHold, handover_s);
     run.change(pose(&run), handover_s);
     run.change(Request::Float, handover_s);
     run.change(pose(&run), handover_s);
