@@ -6,7 +6,7 @@ use crate::{PERIOD_S, print, refused};
 use core::fmt::{self, Write};
 use supple_core::config::{
     ApparentInertia, Collision, ContactLatch, FrictionVelocity, Gains, JointGains, Law, Limits,
-    PlausibilityLimits, Role, Workspace,
+    PlausibilityLimits, PoseLaw, Role, Workspace,
 };
 use supple_core::controller::{Controller, Input, Output, Request, State, step};
 use supple_core::math::{Matrix3, Vector3, sqrt};
@@ -137,6 +137,7 @@ fn config<const N: usize>(arm: Arm<N>) -> Config<N> {
             stiffness_nm_per_rad: all(5.0),
             damping_nm_s_per_rad: all(0.5),
         },
+        pose: PoseLaw::default(),
         float_friction_share: 0.5,
         hold_damping_nm_s_per_rad: all(1.0),
         handover_s: 0.05,

@@ -42,6 +42,59 @@ impl Gains {
     }
 }
 
+/// Stiffness and damping of the tip's orientation, diagonal in base axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RotationalGains {
+    /// Stiffness about each base axis \[N m/rad\], zero or more.
+    pub stiffness_nm_per_rad: Vector3<f64>,
+    /// Damping about each base axis \[N m s/rad\], zero or more.
+    pub damping_nm_s_per_rad: Vector3<f64>,
+}
+
+impl RotationalGains {
+    /// The same stiffness \[N m/rad\] and damping \[N m s/rad\] about every axis.
+    pub fn isotropic(stiffness_nm_per_rad: f64, damping_nm_s_per_rad: f64) -> RotationalGains {
+        RotationalGains {
+            stiffness_nm_per_rad: Vector3::repeat(stiffness_nm_per_rad),
+            damping_nm_s_per_rad: Vector3::repeat(damping_nm_s_per_rad),
+        }
+    }
+}
+
+/// Parameters of the pose mode, beside those of the [`Law`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PoseLaw<const N: usize> {
+    /// Initial gains of the orientation; requests can change them, by ramps.
+    pub gains: RotationalGains,
+    /// Maximum rotational stiffness that may be requested \[N m/rad\], positive.
+    pub max_stiffness_nm_per_rad: f64,
+    /// Maximum rotational damping that may be requested \[N m s/rad\], positive.
+    pub max_damping_nm_s_per_rad: f64,
+    /// Maximum angular speed of a requested rotation \[rad/s\], positive.
+    pub angular_speed_rad_per_s: f64,
+    /// Angle between the tip and its reference that faults \[rad\], positive.
+    pub rotation_error_rad: f64,
+    /// Stiffness in the null space towards the joints' angles at the entry \[N m/rad\], zero or more.
+    pub posture_stiffness_nm_per_rad: Vector<N>,
+    /// Maximum torque of that stiffness, before its projection \[N m\], zero or more.
+    pub posture_torque_nm: Vector<N>,
+}
+
+impl<const N: usize> Default for PoseLaw<N> {
+    /// For the wrist of the WAM: 0.5 N m/rad and 0.02 N m s/rad, at most 0.5 rad/s, 0.5 rad of error; no posture.
+    fn default() -> PoseLaw<N> {
+        PoseLaw {
+            gains: RotationalGains::isotropic(0.5, 0.02),
+            max_stiffness_nm_per_rad: 20.0,
+            max_damping_nm_s_per_rad: 2.0,
+            angular_speed_rad_per_s: 0.5,
+            rotation_error_rad: 0.5,
+            posture_stiffness_nm_per_rad: Vector::zeros(),
+            posture_torque_nm: Vector::zeros(),
+        }
+    }
+}
+
 /// `M` of Eq. (3.3).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ApparentInertia {
@@ -264,6 +317,8 @@ pub struct Config<const N: usize> {
     pub move_gains: JointGains<N>,
     /// Initial gains of the joint impedance mode; requests can change them, by ramps.
     pub joint_gains: JointGains<N>,
+    /// The pose mode.
+    pub pose: PoseLaw<N>,
     /// Share of the friction torque at the measured joint velocity that the float mode compensates, 0 to 1. The
     /// rest, `1 - share`, damps the arm.
     pub float_friction_share: f64,

@@ -5,11 +5,11 @@
 
 use crate::toml_types::{
     CollisionDef, ContactLatchDef, FrictionDef, JointGainsDef, LawDef, LimitsDef, LinkDef,
-    PlausibilityDef, PoseDef, RippleDef, RoleDef, WorkspaceDef, column, rows,
+    PlausibilityDef, PoseDef, PoseLawDef, RippleDef, RoleDef, WorkspaceDef, column, rows,
 };
 use serde::{Deserialize, Serialize};
 use supple_core::config::{
-    Collision, ContactLatch, JointGains, Law, Limits, PlausibilityLimits, Role, Workspace,
+    Collision, ContactLatch, JointGains, Law, Limits, PlausibilityLimits, PoseLaw, Role, Workspace,
 };
 use supple_core::math::Vector3;
 use supple_core::{Arm, Config, Friction, Link, Matrix, Pose, Vector};
@@ -42,6 +42,9 @@ struct Stored<const N: usize> {
     joint_gains: JointGains<N>,
     #[serde(default)]
     float_friction_share: f64,
+    /// Older logs have no pose mode.
+    #[serde(with = "PoseLawDef", default)]
+    pose: PoseLaw<N>,
     #[serde(with = "LimitsDef")]
     limits: Limits<N>,
     /// Older logs have no collision thresholds.
@@ -79,6 +82,7 @@ pub(crate) fn to_toml<const N: usize>(config: &Config<N>) -> Result<String, toml
         latch,
         move_gains,
         joint_gains,
+        pose,
         float_friction_share,
         hold_damping_nm_s_per_rad,
         handover_s,
@@ -101,6 +105,7 @@ pub(crate) fn to_toml<const N: usize>(config: &Config<N>) -> Result<String, toml
         move_gains,
         joint_gains,
         float_friction_share,
+        pose,
         limits,
         collision: Some(CollisionDef::new(&collision)),
         plausible,
@@ -142,6 +147,7 @@ pub(crate) fn from_toml<const N: usize>(text: &str) -> Result<Config<N>, String>
         latch: stored.latch,
         move_gains: stored.move_gains,
         joint_gains: stored.joint_gains,
+        pose: stored.pose,
         float_friction_share: stored.float_friction_share,
         hold_damping_nm_s_per_rad: stored.hold_damping_nm_s_per_rad,
         handover_s: stored.handover_s,

@@ -4,7 +4,7 @@
 use serde::{Deserialize, Serialize};
 use supple_core::config::{
     ApparentInertia, Border, Collision, ContactLatch, FrictionVelocity, Gains, JointGains, Law,
-    Limits, PlausibilityLimits, Role, Workspace, Zone,
+    Limits, PlausibilityLimits, PoseLaw, Role, RotationalGains, Workspace, Zone,
 };
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::ripple::Harmonic;
@@ -161,6 +161,30 @@ pub(crate) struct JointGainsDef<const N: usize> {
     stiffness_nm_per_rad: Vector<N>,
     #[serde(with = "column")]
     damping_nm_s_per_rad: Vector<N>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "RotationalGains", deny_unknown_fields)]
+pub(crate) struct RotationalGainsDef {
+    #[serde(with = "column")]
+    stiffness_nm_per_rad: Vector3<f64>,
+    #[serde(with = "column")]
+    damping_nm_s_per_rad: Vector3<f64>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "PoseLaw", deny_unknown_fields)]
+pub(crate) struct PoseLawDef<const N: usize> {
+    max_stiffness_nm_per_rad: f64,
+    max_damping_nm_s_per_rad: f64,
+    angular_speed_rad_per_s: f64,
+    rotation_error_rad: f64,
+    #[serde(with = "column")]
+    posture_stiffness_nm_per_rad: Vector<N>,
+    #[serde(with = "column")]
+    posture_torque_nm: Vector<N>,
+    #[serde(with = "RotationalGainsDef")]
+    gains: RotationalGains,
 }
 
 #[derive(Serialize, Deserialize)]

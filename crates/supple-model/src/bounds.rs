@@ -32,6 +32,30 @@ pub(crate) fn first_out_of_range<const N: usize>(config: &Config<N>) -> Option<C
         ),
         one("handover_s", config.handover_s, 60.0, "at most 60"),
         one(
+            "[pose] greatest_stiffness_nm_per_rad",
+            config.pose.max_stiffness_nm_per_rad,
+            1e4,
+            "at most 10,000",
+        ),
+        one(
+            "[pose] greatest_damping_nm_s_per_rad",
+            config.pose.max_damping_nm_s_per_rad,
+            1e3,
+            "at most 1000",
+        ),
+        one(
+            "[pose] angular_speed_rad_per_s",
+            config.pose.angular_speed_rad_per_s,
+            100.0,
+            "at most 100",
+        ),
+        one(
+            "[pose] rotation_error_rad",
+            config.pose.rotation_error_rad,
+            6.3,
+            "at most 6.3",
+        ),
+        one(
             "[limits] soft_zone_rad",
             limits.soft_zone_rad,
             6.3,
@@ -180,6 +204,18 @@ pub(crate) fn first_out_of_range<const N: usize>(config: &Config<N>) -> Option<C
         each(
             "impedance_damping_nm_s_per_rad",
             &config.joint_gains.damping_nm_s_per_rad,
+            1e5,
+            hundred_k,
+        ),
+        each(
+            "posture_stiffness_nm_per_rad",
+            &config.pose.posture_stiffness_nm_per_rad,
+            1e6,
+            million,
+        ),
+        each(
+            "posture_torque_nm",
+            &config.pose.posture_torque_nm,
             1e5,
             hundred_k,
         ),

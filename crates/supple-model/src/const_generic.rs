@@ -6,7 +6,7 @@ use crate::error::{ModelError, Reporter};
 use crate::settings::FrictionVelocity;
 use supple_core::config::{
     self, ApparentInertia, Collision, ContactLatch, Gains, JointGains, Law, Limits,
-    PlausibilityLimits, Role,
+    PlausibilityLimits, PoseLaw, Role, RotationalGains,
 };
 use supple_core::controller::ConfigError;
 use supple_core::math::{Matrix3, Vector3};
@@ -134,6 +134,18 @@ impl Description {
                     let default = DEFAULT_IMPEDANCE_DAMPING * joint.move_damping_nm_s_per_rad;
                     joint.impedance_damping_nm_s_per_rad.unwrap_or(default)
                 }),
+            },
+            pose: PoseLaw {
+                gains: RotationalGains {
+                    stiffness_nm_per_rad: Vector3::from(settings.pose.stiffness_nm_per_rad),
+                    damping_nm_s_per_rad: Vector3::from(settings.pose.damping_nm_s_per_rad),
+                },
+                max_stiffness_nm_per_rad: settings.pose.greatest_stiffness_nm_per_rad,
+                max_damping_nm_s_per_rad: settings.pose.greatest_damping_nm_s_per_rad,
+                angular_speed_rad_per_s: settings.pose.angular_speed_rad_per_s,
+                rotation_error_rad: settings.pose.rotation_error_rad,
+                posture_stiffness_nm_per_rad: gain(|joint| joint.posture_stiffness_nm_per_rad),
+                posture_torque_nm: gain(|joint| joint.posture_torque_nm),
             },
             float_friction_share: settings.float.friction_share,
             hold_damping_nm_s_per_rad: gain(|joint| joint.hold_damping_nm_s_per_rad),

@@ -68,6 +68,9 @@ pub struct Settings {
     /// The float mode, for guiding by hand.
     #[serde(default)]
     pub float: FloatSettings,
+    /// The pose mode, which also controls the orientation of the tip; it needs at least six joints that are not held.
+    #[serde(default)]
+    pub pose: PoseSettings,
     /// Tool at the tip. Default: none.
     pub tool: Option<ToolSettings>,
 }
@@ -118,6 +121,13 @@ pub struct JointSettings {
     pub impedance_stiffness_nm_per_rad: Option<f64>,
     /// Damping of the joint impedance mode (N m s/rad). Default: a tenth of `move_damping_nm_s_per_rad`.
     pub impedance_damping_nm_s_per_rad: Option<f64>,
+    /// Stiffness towards the angle that the joint had when the pose mode was entered (N m/rad); it acts only in the null
+    /// space of the tip's pose. Default 0.
+    #[serde(default)]
+    pub posture_stiffness_nm_per_rad: f64,
+    /// Maximum torque of that stiffness (N m). Default 0.
+    #[serde(default)]
+    pub posture_torque_nm: f64,
     /// Maximum acceleration of a move (rad/s^2). Default 20.
     #[serde(default = "default::acceleration_rad_per_s2")]
     pub acceleration_rad_per_s2: f64,
@@ -505,6 +515,41 @@ impl Default for FloatSettings {
     }
 }
 
+/// The pose mode: the impedance law of position and orientation of the tip.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct PoseSettings {
+    /// Source of these numbers.
+    pub source: Option<String>,
+    /// Stiffness about the base axes (N m/rad), zero or more. Default 0.5 about each.
+    pub stiffness_nm_per_rad: [f64; 3],
+    /// Damping about the base axes (N m s/rad), zero or more. Default 0.02 about each.
+    pub damping_nm_s_per_rad: [f64; 3],
+    /// Maximum rotational stiffness that a request may set (N m/rad). Default 20.
+    pub greatest_stiffness_nm_per_rad: f64,
+    /// Maximum rotational damping that a request may set (N m s/rad). Default 2.
+    pub greatest_damping_nm_s_per_rad: f64,
+    /// Maximum angular speed of a requested rotation (rad/s). Default 0.5.
+    pub angular_speed_rad_per_s: f64,
+    /// Angle between the tip and the reference of its orientation above which the controller faults (rad). Default
+    /// 0.5.
+    pub rotation_error_rad: f64,
+}
+
+impl Default for PoseSettings {
+    fn default() -> Self {
+        Self {
+            source: None,
+            stiffness_nm_per_rad: [0.5; 3],
+            damping_nm_s_per_rad: [0.02; 3],
+            greatest_stiffness_nm_per_rad: 20.0,
+            greatest_damping_nm_s_per_rad: 2.0,
+            angular_speed_rad_per_s: 0.5,
+            rotation_error_rad: 0.5,
+        }
+    }
+}
+
 impl JointSettings {
     /// All defaults.
     pub fn named(name: &str) -> Self {
@@ -525,6 +570,8 @@ impl JointSettings {
             move_damping_nm_s_per_rad: default::move_damping_nm_s_per_rad(),
             impedance_stiffness_nm_per_rad: None,
             impedance_damping_nm_s_per_rad: None,
+            posture_stiffness_nm_per_rad: 0.0,
+            posture_torque_nm: 0.0,
             acceleration_rad_per_s2: default::acceleration_rad_per_s2(),
             jerk_rad_per_s3: default::jerk_rad_per_s3(),
             collision_torque_nm: None,

@@ -193,9 +193,12 @@ pub enum UpTrajectory {
     Probe,
 }
 
-/// A trajectory of the paper.
+/// A trajectory of the paper, or a turn of the tip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum TrackTrajectory {
+    /// Keep the position of the tip and turn it: --rotate, --angle-rad, --duration. Needs at least six joints that are
+    /// not held.
+    Pose,
     /// Back and forth along a line.
     Sinusoid,
     /// Back and forth on a circle about the base.
@@ -281,6 +284,12 @@ pub struct GainsArgs {
     /// Damping of the joint-impedance mode for all joints, or one value per joint. Default: unchanged.
     #[arg(long, conflicts_with_all = ["stiffness", "damping"], value_name = "N M S/RAD", value_delimiter = ',', value_parser = between(0.0, 1e5))]
     pub joint_damping: Vec<f64>,
+    /// Stiffness of the tip's orientation in the pose mode about all axes, or X,Y,Z. Default: unchanged.
+    #[arg(long, conflicts_with_all = ["stiffness", "damping", "joint_stiffness", "joint_damping"], value_name = "N M/RAD", value_delimiter = ',', value_parser = between(0.0, 1e4))]
+    pub rotational: Vec<f64>,
+    /// Damping of the tip's orientation in the pose mode about all axes, or X,Y,Z. Default: unchanged.
+    #[arg(long, conflicts_with_all = ["stiffness", "damping", "joint_stiffness", "joint_damping"], value_name = "N M S/RAD", value_delimiter = ',', value_parser = between(0.0, 1e3))]
+    pub rotational_damping: Vec<f64>,
     /// Duration of the ramp to the new gains.
     #[arg(long = "ramp", value_name = "SECONDS", default_value_t = 1.0, value_parser = between(0.0, 3600.0))]
     pub ramp_s: f64,
@@ -294,6 +303,15 @@ pub struct GainsArgs {
 pub struct TrackArgs {
     /// The trajectory.
     pub trajectory: TrackTrajectory,
+    /// Axis of a pose's turn in base coordinates, of any length but zero.
+    #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', allow_hyphen_values = true, required_if_eq("trajectory", "pose"), value_parser = between(-1e3, 1e3))]
+    pub rotate: Vec<f64>,
+    /// Angle of the turn, at most half a turn.
+    #[arg(long, value_name = "RAD", requires = "rotate", default_value_t = 0.0, allow_negative_numbers = true, value_parser = between(-core::f64::consts::PI, core::f64::consts::PI))]
+    pub angle_rad: f64,
+    /// Duration of the turn.
+    #[arg(long = "duration", value_name = "SECONDS", requires = "rotate", default_value_t = 3.0, value_parser = between(1e-3, 3600.0))]
+    pub duration_s: f64,
     /// Speed factor relative to the paper.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = between(1e-6, 1e6))]
     pub speed: f64,

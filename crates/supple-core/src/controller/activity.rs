@@ -2,8 +2,8 @@
 
 use super::fault::SafeAction;
 use super::mode::{Breakaway, Mode};
-use crate::math::Vector;
-use crate::trajectory::{Fourier, Trajectory};
+use crate::math::{Matrix3, Vector};
+use crate::trajectory::{Fourier, Rotation, Trajectory};
 
 /// A mode with its data.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,6 +27,14 @@ pub(super) enum Activity<const N: usize> {
         to_rad: Vector<N>,
         duration_s: f64,
     },
+    TrackPose {
+        trajectory: Trajectory,
+        rotation: Rotation,
+        /// Orientation of the tip at the entry.
+        from_base_from_tip: Matrix3<f64>,
+        /// Joint angles at the entry.
+        posture_rad: Vector<N>,
+    },
     Fault(SafeAction),
 }
 
@@ -42,6 +50,7 @@ impl<const N: usize> Activity<N> {
             Activity::Breakaway { .. } => Mode::Breakaway,
             Activity::Float => Mode::Float,
             Activity::JointImpedance { .. } => Mode::JointImpedance,
+            Activity::TrackPose { .. } => Mode::TrackPose,
             Activity::Fault(_) => Mode::Fault,
         }
     }

@@ -1,6 +1,7 @@
 //! The torque of each activity, term by term.
 
 use super::activity::Activity;
+use super::pose_task::{DIRECTIONS, PoseCycle};
 use super::state::State;
 use super::{Controller, checks, limiter};
 use crate::config::{Config, Role};
@@ -14,7 +15,9 @@ const JOINT_SPRING_SHARE: f64 = 0.25;
 impl<const N: usize> State<N> {
     pub(super) fn reference(&self, config: &Config<N>) -> Option<Reference> {
         match &self.activity {
-            Activity::Track(trajectory) => Some(trajectory.at(self.activity_s(config))),
+            Activity::Track(trajectory) | Activity::TrackPose { trajectory, .. } => {
+                Some(trajectory.at(self.activity_s(config)))
+            }
             _ => None,
         }
     }
@@ -40,9 +43,15 @@ impl<const N: usize> State<N> {
         controller: &Controller<N>,
         task: Option<&Task<N>>,
         reference: Option<&Reference>,
+        pose: Option<&PoseCycle<N>>,
         tip_force_n: Option<Vector3<f64>>,
     ) -> Torques<N> {
         let config = controller.config();
+        if const { N >= DIRECTIONS }
+            && let (Some(pose), Some(_)) = (pose, reference)
+        {
+            return self.pose_torques(controller, pose);
+        }
         match (&self.activity, task, reference) {
             (Activity::Track(_), Some(task), Some(reference)) => {
                 let tip = self.terms.base_from_tip.translation;

@@ -71,6 +71,18 @@ pub(super) fn tracking(limit_m: f64, error: &Vector3<f64>) -> Result<(), Fault> 
     Ok(())
 }
 
+/// Checks the angle between the tip and the reference of its orientation.
+pub(super) fn rotation(limit_rad: f64, error: &Vector3<f64>) -> Result<(), Fault> {
+    let value_rad = sqrt(error.dot(error));
+    if exceeds(value_rad, limit_rad) {
+        return Err(Fault::RotationError {
+            value_rad,
+            limit_rad,
+        });
+    }
+    Ok(())
+}
+
 /// Checks the tracking error of each joint with a position loop.
 pub(super) fn joint_tracking<const N: usize>(
     limits: &Limits<N>,

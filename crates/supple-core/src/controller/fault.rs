@@ -70,6 +70,13 @@ pub enum Fault {
         /// Limit \[m\].
         limit_m: f64,
     },
+    /// The angle between the tip and the reference of its orientation exceeds its limit.
+    RotationError {
+        /// Angle \[rad\].
+        value_rad: f64,
+        /// Limit \[rad\].
+        limit_rad: f64,
+    },
     /// Joint tracking error beyond its limit: the joint is blocked in a move, or pushed away.
     JointTrackingError {
         /// Joint index.
@@ -300,6 +307,13 @@ impl fmt::Display for Fault {
             Fault::ZoneForce { value_n, limit_n } => write!(
                 f,
                 "external force on the tip is {value_n:.1} N, limit of this zone {limit_n:.1} N"
+            ),
+            Fault::RotationError {
+                value_rad,
+                limit_rad,
+            } => write!(
+                f,
+                "tip is turned {value_rad:.3} rad away from its reference, limit {limit_rad:.3} rad"
             ),
             Fault::MassMatrix => write!(f, "mass matrix is not positive definite"),
             Fault::TorqueNotFinite { term } => {

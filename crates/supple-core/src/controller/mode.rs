@@ -1,15 +1,15 @@
 //! Modes, the requests that change them, and why a request is refused.
 
-use crate::config::{Gains, JointGains};
+use crate::config::{Gains, JointGains, RotationalGains};
 use crate::math::Vector;
-use crate::trajectory::{Fourier, Trajectory, TrajectoryError};
+use crate::trajectory::{Fourier, Rotation, Trajectory, TrajectoryError};
 use core::fmt;
 
 /// Mode of the controller.
 ///
 /// ```text
 /// idle <-> gravity hold <-> work (move, track, probe, excite, breakaway,      any -> fault
-///                                 float, joint impedance)
+///                                 float, joint impedance, track pose)
 ///          work -> work      breakaway -> gravity hold (done)
 ///          fault -> gravity hold | idle  (reset)
 /// ```
@@ -47,6 +47,10 @@ pub enum Mode {
     /// Compliant joint-space motion to a pose, with the feed-forward of the move mode; holds the pose at the end
     /// with the same gains. Contact is allowed. Held joints keep their own stiff loop.
     JointImpedance,
+    /// The impedance law follows a trajectory and a rotation of the tip: six directions, so that at least six joints
+    /// must be active. Its inertia is always the arm's own. Near singular poses the task is damped (see
+    /// [`crate::task`]).
+    TrackPose,
 }
 
 impl Mode {
@@ -63,6 +67,7 @@ impl Mode {
             Mode::Breakaway => "breakaway",
             Mode::Float => "float",
             Mode::JointImpedance => "joint_impedance",
+            Mode::TrackPose => "track_pose",
         }
     }
 }
@@ -112,6 +117,20 @@ pub enum Request<const N: usize> {
     JointGains {
         /// Final gains; the stiffness is at most that of the move mode.
         gains: JointGains<N>,
+        /// Ramp time \[s\], zero or more.
+        ramp_s: f64,
+    },
+    /// Follows a trajectory that starts near the tip, while the tip turns from its present orientation.
+    TrackPose {
+        /// Of the tip's position.
+        trajectory: Trajectory,
+        /// Of its orientation.
+        rotation: Rotation,
+    },
+    /// Changes the gains of the tip's orientation linearly over `ramp_s`.
+    RotationalGains {
+        /// Final gains.
+        gains: RotationalGains,
         /// Ramp time \[s\], zero or more.
         ramp_s: f64,
     },
@@ -190,6 +209,8 @@ pub enum Refusal {
         /// Limit \[N m\].
         limit_nm: f64,
     },
+    /// The pose mode was requested near a singular pose, where its task is damped, or its motion leads to one.
+    Singular,
     /// The trajectory leaves the workspace.
     Workspace {
         /// Border, counted from 0.
@@ -246,6 +267,10 @@ impl fmt::Display for Refusal {
                 f,
                 "refused: joint {joint} would need {value_nm:.2} N m, limit {limit_nm:.2} N m; request a \
                  slower motion"
+            ),
+            Refusal::Singular => f.write_str(
+                "refused: near a singular pose the tip cannot move and turn in every direction; move the arm \
+                 away from it first",
             ),
             Refusal::Workspace { border, value_m } => write!(
                 f,

@@ -3,18 +3,24 @@
 
 use super::Controller;
 use super::mode::{Refusal, Request};
-use super::requests::active_target;
+use super::pose_task::{DIRECTIONS, pose_reference};
+use super::requests::{active_target, check_pose_joints, check_stops};
 use crate::config::{Config, Role};
 use crate::dynamics::inverse_kinematics::inverse_kinematics;
 use crate::dynamics::{Terms, terms};
 use crate::law::impedance::Task;
 use crate::math::{Vector, abs, smooth_step};
-use crate::trajectory::{JointReference, Trajectory};
+use crate::model::pose::{Pose, rotation_vector};
+use crate::trajectory::{JointReference, Rotation, Trajectory};
 
 /// Number of equal time intervals of a motion; it is checked at their ends.
 const INTERVALS: u32 = 128;
 /// Maximum distance at which a point of a trajectory counts as reached \[m\].
 const REACHED_M: f64 = 1e-3;
+/// Maximum angle at which an orientation counts as reached \[rad\].
+const REACHED_RAD: f64 = 1e-3;
+/// Newton steps from one point to the next.
+const NEWTON_STEPS: u32 = 20;
 /// Fraction of the torque limits available to the feed-forward of a motion; the rest is for
 /// feedback.
 const TORQUE_SHARE: f64 = 0.9;
@@ -33,6 +39,15 @@ pub fn check_motion<const N: usize>(
         Request::Track(trajectory) => {
             trajectory.validate().map_err(Refusal::Trajectory)?;
             check_trajectory(config, position_rad, trajectory)
+        }
+        Request::TrackPose {
+            trajectory,
+            rotation,
+        } => {
+            check_pose_joints(config)?;
+            trajectory.validate().map_err(Refusal::Trajectory)?;
+            rotation.validate().map_err(Refusal::Trajectory)?;
+            check_pose(config, position_rad, trajectory, rotation)
         }
         Request::Move {
             target_rad,
@@ -111,6 +126,69 @@ fn check_trajectory<const N: usize>(
         check_joints(config, &dynamics, &qd, &qdd)?;
     }
     Ok(())
+}
+
+/// Follows position and orientation with the joints' motion that the task gives, starting from rest.
+fn check_pose<const N: usize>(
+    config: &Config<N>,
+    from_rad: &Vector<N>,
+    trajectory: &Trajectory,
+    rotation: &Rotation,
+) -> Result<(), Refusal> {
+    let mut q = *from_rad;
+    let mut state = Terms::default();
+    terms(&config.arm, &q, &Vector::zeros(), &mut state);
+    let start = state.base_from_tip.rotation;
+    let length_s = trajectory.length_s().max(rotation.duration_s);
+    for k in 0..=INTERVALS {
+        let time_s = length_s * f64::from(k) / f64::from(INTERVALS);
+        let position = trajectory.at(time_s);
+        if let Some((border, value_m)) = config.workspace.violated_border(&position.position) {
+            return Err(Refusal::Workspace { border, value_m });
+        }
+        let reference = pose_reference(&position, &rotation.at(&start, time_s));
+        let task = solve_pose(config, &reference.base_from_tip, &mut q, &mut state, time_s)?;
+        check_stops(config, &q)?;
+        let velocity = task.inverse * reference.velocity();
+        terms(&config.arm, &q, &velocity, &mut state);
+        let acceleration = task.inverse * (reference.acceleration() - state.jacobian_dot_qd);
+        check_joints(config, &state, &velocity, &acceleration)?;
+    }
+    Ok(())
+}
+
+/// Moves the joints to a pose of the tip from one that is near, by Newton steps; returns the task there.
+fn solve_pose<const N: usize>(
+    config: &Config<N>,
+    wanted: &Pose,
+    q: &mut Vector<N>,
+    state: &mut Terms<N>,
+    time_s: f64,
+) -> Result<Task<N, DIRECTIONS>, Refusal> {
+    let mut steps = 0;
+    loop {
+        terms(&config.arm, q, &Vector::zeros(), state);
+        let task = Task::of_pose(state, &config.roles).ok_or(Refusal::Singular)?;
+        let found = &state.base_from_tip;
+        let distance = wanted.translation - found.translation;
+        let angle = rotation_vector(&(wanted.rotation * found.rotation.transpose()));
+        let (distance_m, angle_rad) = (distance.norm(), angle.norm());
+        if distance_m <= REACHED_M && angle_rad <= REACHED_RAD {
+            return Ok(task);
+        }
+        if steps == NEWTON_STEPS {
+            return Err(match distance_m <= REACHED_M || task.is_damped {
+                true => Refusal::Singular,
+                false => Refusal::OutOfReach { time_s, distance_m },
+            });
+        }
+        let error = Vector::<DIRECTIONS>::from_fn(|k, _| match k {
+            0..3 => distance[k],
+            _ => angle[k - 3],
+        });
+        *q += task.inverse * error;
+        steps += 1;
+    }
 }
 
 fn check_joint_motion<const N: usize>(

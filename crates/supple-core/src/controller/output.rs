@@ -3,10 +3,12 @@
 
 use super::fault::{Fault, SafeAction};
 use super::mode::{Mode, Refusal, Request};
-use crate::config::{Gains, JointGains};
+use super::pose_task::PoseCycle;
+use crate::config::{Gains, JointGains, RotationalGains};
 use crate::controller::codes::{self, FaultCode, RequestCode, RequestCodeError, VALUES};
 use crate::law::torques::Torques;
-use crate::math::{Vector, Vector3};
+use crate::math::{Matrix3, Vector, Vector3};
+use crate::model::pose::rotation_vector;
 use crate::record::{Field, List, Pack, Recorded, Text, Unpack, words_of};
 use crate::trajectory::Reference;
 
@@ -24,6 +26,24 @@ pub struct Input<const N: usize> {
     pub drives_active: bool,
     /// The operator's request, if there is one.
     pub request: Option<Request<N>>,
+}
+
+/// Reference of the tip's orientation in the pose mode, and how far the tip is from it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Orientation {
+    /// The reference: columns are the axes of the tip in base coordinates.
+    pub base_from_tip: Matrix3<f64>,
+    /// Axis times angle from the tip to its reference, base axes \[rad\].
+    pub error_rad: Vector3<f64>,
+}
+
+impl Orientation {
+    pub(super) fn new<const N: usize>(pose: &PoseCycle<N>) -> Orientation {
+        Orientation {
+            base_from_tip: pose.base_from_tip(),
+            error_rad: pose.error_rad,
+        }
+    }
 }
 
 /// Type of a quantity in [`Output`].
@@ -146,7 +166,7 @@ cycle! {
         flag drives_active = input.drives_active;
         /// Kind of the request.
         code request = request_code.kind;
-        /// Kind of the trajectory of a track request.
+        /// Kind of the trajectory of a track or track_pose request.
         code trajectory = request_code.trajectory;
         /// Values of the request, vectors as x, y, z:
         /// move, joint_impedance  target_rad (N), duration_s
@@ -154,6 +174,8 @@ cycle! {
         /// excite    centre_rad (N), sine_rad (5 harmonics of N), cosine_rad (5 of N),
         ///           angular_frequency_rad_per_s, duration_s, ramp_s
         /// breakaway joint, rate_nm_per_s, stop_rad, limit_nm
+        /// track_pose  axis, angle_rad, duration_s of the rotation, then the values of the trajectory
+        /// rotational_gains  stiffness_nm_per_rad, damping_nm_s_per_rad, ramp_s
         /// gains     stiffness_n_per_m, damping_n_s_per_m, ramp_s
         /// hold      position_m
         /// line      from_m, to_m, duration_s
@@ -177,6 +199,13 @@ cycle! {
         vector reference_velocity_m_per_s = of_reference(output, |reference| reference.velocity);
         /// Reference of the tip's acceleration \[m/s^2\].
         vector reference_acceleration_m_per_s2 = of_reference(output, |reference| reference.acceleration);
+        /// The tip's orientation has a reference.
+        flag has_orientation_reference = output.orientation.is_some();
+        /// Reference of the tip's orientation: axis times angle, from the base axes \[rad\].
+        vector reference_rotation_rad =
+            of_orientation(output, |orientation| rotation_vector(&orientation.base_from_tip));
+        /// Rotation from the tip to that reference: axis times angle, base axes \[rad\].
+        vector rotation_error_rad = of_orientation(output, |orientation| orientation.error_rad);
         /// Stiffness `K` in force \[N/m\].
         vector stiffness_n_per_m = output.gains.stiffness_n_per_m.into();
         /// Damping `B` in force \[N s/m\].
@@ -185,6 +214,10 @@ cycle! {
         joints joint_stiffness_nm_per_rad = output.joint_gains.stiffness_nm_per_rad;
         /// Damping of the joint impedance mode in force \[N m s/rad\].
         joints joint_damping_nm_s_per_rad = output.joint_gains.damping_nm_s_per_rad;
+        /// Rotational stiffness of the pose mode in force \[N m/rad\].
+        vector rotational_stiffness_nm_per_rad = output.rotational_gains.stiffness_nm_per_rad.into();
+        /// Rotational damping of the pose mode in force \[N m s/rad\].
+        vector rotational_damping_nm_s_per_rad = output.rotational_gains.damping_nm_s_per_rad.into();
         /// Kind of the latched fault.
         code fault = fault_code.kind;
         /// Joint of the fault, counted from 0, or -1.
@@ -252,11 +285,25 @@ cycle! {
         torques: Torques<N>;
         /// Reference of the tip; `None` if no tip trajectory runs.
         reference: Option<Reference>;
+        /// Reference of the tip's orientation; `None` in other modes than the pose mode.
+        orientation: Option<Orientation>;
         /// Gains in force.
         gains: Gains;
         /// Gains of the joint impedance mode in force.
         joint_gains: JointGains<N>;
+        /// Rotational gains of the pose mode in force.
+        rotational_gains: RotationalGains;
     }
+}
+
+fn of_orientation<const N: usize>(
+    output: &Output<N>,
+    part: fn(&Orientation) -> Vector3<f64>,
+) -> [f64; 3] {
+    output
+        .orientation
+        .as_ref()
+        .map_or([0.0; 3], |orientation| part(orientation).into())
 }
 
 fn of_reference<const N: usize>(

@@ -7,15 +7,17 @@ use super::Controller;
 use super::activity::Activity;
 use super::fault::SafeAction;
 use super::mode::{Breakaway, Mode, Refusal, Request};
+use super::pose_task::DIRECTIONS;
 use super::state::State;
 use super::validate;
-use crate::config::{Config, Gains, JointGains, Role};
+use crate::config::{Config, Gains, JointGains, Role, RotationalGains};
 use crate::law::impedance::Task;
+use crate::law::task::count_active;
 use crate::math::linalg::Cholesky;
 use crate::math::{Matrix, Matrix3, Vector, abs, sqrt};
 use crate::trajectory::{
     Fourier, LimitViolation, MINIMUM_JERK_ACCELERATION, MINIMUM_JERK_JERK, MINIMUM_JERK_SPEED,
-    Trajectory,
+    Rotation, Trajectory,
 };
 
 /// Angle by which the target of a held joint may differ from its own \[rad\].
@@ -28,7 +30,7 @@ const MAX_RAMP_S: f64 = 3600.0;
 const MAX_JOINT_DAMPING_NM_S_PER_RAD: f64 = 1e5;
 /// Stability margin for damping with a delayed velocity: `B delay / mass` must not exceed this,
 /// half of the stability limit pi/2.
-const DAMPING_MARGIN: f64 = core::f64::consts::FRAC_PI_4;
+pub(super) const DAMPING_MARGIN: f64 = core::f64::consts::FRAC_PI_4;
 
 impl<const N: usize> State<N> {
     /// Carries out a request, or returns why it is refused.
@@ -55,12 +57,20 @@ impl<const N: usize> State<N> {
             Request::Gains { gains, ramp_s } => {
                 check_gains(config, &gains, ramp_s)?;
                 self.check_damping(controller, task, &gains)?;
+                if mode == Mode::TrackPose {
+                    self.check_pose_damping(controller, &gains, &self.rotational_gains.to)?;
+                }
                 self.gains.change(gains, ramp_s);
             }
             Request::JointGains { gains, ramp_s } => {
                 check_joint_gains(config, &gains, ramp_s)?;
                 self.check_joint_damping(controller, &gains)?;
                 self.joint_gains.change(gains, ramp_s);
+            }
+            Request::RotationalGains { gains, ramp_s } => {
+                check_rotational_gains(config, &gains, ramp_s)?;
+                self.check_pose_damping(controller, &self.gains.to, &gains)?;
+                self.rotational_gains.change(gains, ramp_s);
             }
             // Idle is allowed in a fault without a reset; the fault stays latched.
             Request::Idle if mode == Mode::Fault => self.enter(Activity::Fault(SafeAction::Idle)),
@@ -83,22 +93,24 @@ impl<const N: usize> State<N> {
                 });
             }
             Request::Track(trajectory) => {
-                trajectory.validate().map_err(Refusal::Trajectory)?;
-                check_peak(config, &trajectory)?;
-                self.check_damping(controller, task, &self.gains.to)?;
-                let displacement =
-                    trajectory.at(0.0).position - self.terms.base_from_tip.translation;
-                let (distance_m, limit_m) = (
-                    sqrt(displacement.dot(&displacement)),
-                    config.limits.start_error_m,
-                );
-                if distance_m > limit_m || distance_m.is_nan() {
-                    return Err(Refusal::FarFromStart {
-                        distance_m,
-                        limit_m,
-                    });
-                }
+                self.check_trajectory(controller, task, &trajectory)?;
                 self.enter(Activity::Track(trajectory));
+            }
+            Request::TrackPose {
+                trajectory,
+                rotation,
+            } => {
+                check_pose_joints(config)?;
+                self.check_trajectory(controller, task, &trajectory)?;
+                check_rotation(config, &rotation)?;
+                self.check_pose_damping(controller, &self.gains.to, &self.rotational_gains.to)?;
+                self.check_regular(config)?;
+                self.enter(Activity::TrackPose {
+                    trajectory,
+                    rotation,
+                    from_base_from_tip: self.terms.base_from_tip.rotation,
+                    posture_rad: self.position,
+                });
             }
             Request::Float => self.enter(Activity::Float),
             Request::JointImpedance {
@@ -128,6 +140,39 @@ impl<const N: usize> State<N> {
         Ok(())
     }
 
+    fn check_trajectory(
+        &self,
+        controller: &Controller<N>,
+        task: Option<&Task<N>>,
+        trajectory: &Trajectory,
+    ) -> Result<(), Refusal> {
+        let config = controller.config();
+        trajectory.validate().map_err(Refusal::Trajectory)?;
+        check_peak(config, trajectory)?;
+        self.check_damping(controller, task, &self.gains.to)?;
+        let displacement = trajectory.at(0.0).position - self.terms.base_from_tip.translation;
+        let (distance_m, limit_m) = (
+            sqrt(displacement.dot(&displacement)),
+            config.limits.start_error_m,
+        );
+        if distance_m > limit_m || distance_m.is_nan() {
+            return Err(Refusal::FarFromStart {
+                distance_m,
+                limit_m,
+            });
+        }
+        Ok(())
+    }
+
+    /// Refuses a pose near a singular one, where the task of six directions is damped.
+    #[inline(never)]
+    fn check_regular(&self, config: &Config<N>) -> Result<(), Refusal> {
+        match Task::of_pose(&self.terms, &config.roles) {
+            Some(task) if !task.is_damped => Ok(()),
+            _ => Err(Refusal::Singular),
+        }
+    }
+
     /// Refuses damping that would excite the arm at its current pose because of the loop delay.
     fn check_damping(
         &self,
@@ -148,6 +193,35 @@ impl<const N: usize> State<N> {
         within_delay(
             "damping_n_s_per_m at the delay of this loop",
             gains.damping_n_s_per_m.max(),
+            rate_per_s * controller.delay_s(),
+        )
+    }
+
+    /// The same for linear and rotational damping together.
+    fn check_pose_damping(
+        &self,
+        controller: &Controller<N>,
+        gains: &Gains,
+        rotational: &RotationalGains,
+    ) -> Result<(), Refusal> {
+        let Some(mass) = Cholesky::new(&self.terms.mass_matrix) else {
+            return Ok(());
+        };
+        let roles = &controller.config().roles;
+        let damping = |k: usize| match k {
+            0..3 => gains.damping_n_s_per_m[k],
+            _ => rotational.damping_nm_s_per_rad[k - 3],
+        };
+        // The Jacobian of the active joints, each direction weighted by the root of its damping.
+        let weighted = Matrix::<DIRECTIONS, N>::from_fn(|k, joint| match roles[joint] {
+            Role::Active => sqrt(damping(k)) * self.terms.jacobian[(k, joint)],
+            Role::Held { .. } => 0.0,
+        });
+        // Upper bound of the fastest damping rate, at most sqrt(6) times too large.
+        let rate_per_s = sqrt((weighted * mass.solve(&weighted.transpose())).norm_squared());
+        within_delay(
+            "rotational damping_nm_s_per_rad, with damping_n_s_per_m, at the delay of this loop",
+            rotational.damping_nm_s_per_rad.max(),
             rate_per_s * controller.delay_s(),
         )
     }
@@ -239,6 +313,65 @@ fn check_joint_gains<const N: usize>(
         }
     }
     check_ramp(ramp_s)
+}
+
+fn check_rotational_gains<const N: usize>(
+    config: &Config<N>,
+    gains: &RotationalGains,
+    ramp_s: f64,
+) -> Result<(), Refusal> {
+    for axis in 0..3 {
+        for (entry, value, limit) in [
+            (
+                "rotational stiffness_nm_per_rad",
+                gains.stiffness_nm_per_rad[axis],
+                config.pose.max_stiffness_nm_per_rad,
+            ),
+            (
+                "rotational damping_nm_s_per_rad",
+                gains.damping_nm_s_per_rad[axis],
+                config.pose.max_damping_nm_s_per_rad,
+            ),
+        ] {
+            if !(0.0..=limit).contains(&value) {
+                return Err(Refusal::Value {
+                    entry,
+                    value,
+                    limit: if value < 0.0 { 0.0 } else { limit },
+                });
+            }
+        }
+    }
+    check_ramp(ramp_s)
+}
+
+/// The pose has six directions.
+pub(super) fn check_pose_joints<const N: usize>(config: &Config<N>) -> Result<(), Refusal> {
+    let active = count_active(&config.roles);
+    if active >= DIRECTIONS {
+        return Ok(());
+    }
+    Err(Refusal::Value {
+        entry: "number of active joints, of which a pose needs six,",
+        value: active as f64,
+        limit: DIRECTIONS as f64,
+    })
+}
+
+fn check_rotation<const N: usize>(config: &Config<N>, rotation: &Rotation) -> Result<(), Refusal> {
+    rotation.validate().map_err(Refusal::Trajectory)?;
+    let (value, limit) = (
+        rotation.peak_rad_per_s(),
+        config.pose.angular_speed_rad_per_s,
+    );
+    if value > limit || value.is_nan() {
+        return Err(Refusal::Value {
+            entry: "peak angular speed of the rotation [rad/s]",
+            value,
+            limit,
+        });
+    }
+    Ok(())
 }
 
 fn check_ramp(ramp_s: f64) -> Result<(), Refusal> {
@@ -364,7 +497,10 @@ fn check_held_targets<const N: usize>(
     Ok(())
 }
 
-fn check_stops<const N: usize>(config: &Config<N>, target_rad: &Vector<N>) -> Result<(), Refusal> {
+pub(super) fn check_stops<const N: usize>(
+    config: &Config<N>,
+    target_rad: &Vector<N>,
+) -> Result<(), Refusal> {
     let limits = &config.limits;
     for joint in 0..N {
         let value_rad = target_rad[joint];

@@ -6,7 +6,7 @@ use super::fault::{Fault, SafeAction};
 use super::mode::Mode;
 use super::output::Input;
 use super::plausibility::Plausibility;
-use crate::config::{Config, Gains, JointGains, Role};
+use crate::config::{Config, Gains, JointGains, Role, RotationalGains};
 use crate::controller::estimator::Estimator;
 use crate::controller::latch::Latch;
 use crate::controller::observer::MomentumObserver;
@@ -47,6 +47,15 @@ impl Interpolate for Gains {
 impl<const N: usize> Interpolate for JointGains<N> {
     fn between(&self, to: &Self, x: f64) -> Self {
         JointGains {
+            stiffness_nm_per_rad: self.stiffness_nm_per_rad.lerp(&to.stiffness_nm_per_rad, x),
+            damping_nm_s_per_rad: self.damping_nm_s_per_rad.lerp(&to.damping_nm_s_per_rad, x),
+        }
+    }
+}
+
+impl Interpolate for RotationalGains {
+    fn between(&self, to: &Self, x: f64) -> Self {
+        RotationalGains {
             stiffness_nm_per_rad: self.stiffness_nm_per_rad.lerp(&to.stiffness_nm_per_rad, x),
             damping_nm_s_per_rad: self.damping_nm_s_per_rad.lerp(&to.damping_nm_s_per_rad, x),
         }
@@ -100,6 +109,7 @@ pub struct State<const N: usize> {
     pub(super) latch: Latch,
     pub(super) gains: GainRamp<Gains>,
     pub(super) joint_gains: GainRamp<JointGains<N>>,
+    pub(super) rotational_gains: GainRamp<RotationalGains>,
     /// Set-points of held joints.
     pub(super) held_setpoint_rad: Vector<N>,
     /// Last torque and fallback torque sent.
@@ -135,6 +145,7 @@ impl<const N: usize> State<N> {
             latch: Latch::default(),
             gains: GainRamp::at_rest(config.law.gains),
             joint_gains: GainRamp::at_rest(config.joint_gains),
+            rotational_gains: GainRamp::at_rest(config.pose.gains),
             held_setpoint_rad: Vector::zeros(),
             torque: Vector::zeros(),
             fallback: Vector::zeros(),

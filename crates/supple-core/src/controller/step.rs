@@ -3,7 +3,7 @@
 use super::activity::Activity;
 use super::fault::{Fault, SafeAction};
 use super::mode::{Refusal, Request};
-use super::output::{Input, Output};
+use super::output::{Input, Orientation, Output};
 use super::state::State;
 use super::{Controller, checks, limiter};
 use crate::dynamics::terms;
@@ -46,6 +46,7 @@ pub fn step<const N: usize>(
     });
     state.gains.elapsed_s += elapsed_s;
     state.joint_gains.elapsed_s += elapsed_s;
+    state.rotational_gains.elapsed_s += elapsed_s;
     state.update_held_setpoints(config, elapsed_s);
     state.end_breakaway(config);
 
@@ -56,7 +57,21 @@ pub fn step<const N: usize>(
         state.latch_fault(fault);
         reference = None;
     }
-    let external_force = match state.observe(config, task.as_ref(), reference.as_ref(), elapsed_s) {
+    let pose = state
+        .pose_cycle(config, reference.as_ref())
+        .unwrap_or_else(|fault| {
+            state.latch_fault(fault);
+            reference = None;
+            None
+        });
+    let observed = state.observe(
+        config,
+        task.as_ref(),
+        reference.as_ref(),
+        pose.as_ref(),
+        elapsed_s,
+    );
+    let external_force = match observed {
         Ok(force_n) => force_n,
         Err((force_n, fault)) => {
             state.latch_fault(fault);
@@ -75,6 +90,7 @@ pub fn step<const N: usize>(
         controller,
         task.as_ref(),
         reference.as_ref(),
+        pose.as_ref(),
         input.tip_force_n,
     );
     if !(state.activity.is_torque_off() || state.fault.is_some() || state.is_stale(config)) {
@@ -129,8 +145,10 @@ pub fn step<const N: usize>(
         tip_position_m: tip_position,
         tip_velocity_m_per_s: tip_velocity,
         reference,
+        orientation: reference.and(pose.as_ref().map(Orientation::new)),
         gains: state.gains.current(),
         joint_gains: state.joint_gains.current(),
+        rotational_gains: state.rotational_gains.current(),
         external_torque_nm: state.observer.external_torque_nm(),
         external_force_n: external_force,
         force_against_n: state.latch.force_against_n(),

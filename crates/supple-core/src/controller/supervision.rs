@@ -8,6 +8,7 @@ use super::plausibility::{
     OTHER_JOINT_MOVING_RAD_PER_S, PlausibilityInput, SUDDEN_STOP_SHARE, joint_collision,
     tip_collision,
 };
+use super::pose_task::PoseCycle;
 use super::state::State;
 use crate::config::Config;
 use crate::law::impedance::{SINGULAR_BELOW_M, Task};
@@ -64,6 +65,7 @@ impl<const N: usize> State<N> {
         config: &Config<N>,
         task: Option<&Task<N>>,
         reference: Option<&Reference>,
+        pose: Option<&PoseCycle<N>>,
         elapsed_s: f64,
     ) -> Result<Vector3<f64>, (Vector3<f64>, Fault)> {
         if self.activity.is_torque_off() || !self.drives_active {
@@ -95,7 +97,10 @@ impl<const N: usize> State<N> {
         if let Some(reference) = reference {
             self.latch.update_direction(&reference.velocity, elapsed_s);
             let along = task.inverse * self.latch.direction();
-            let velocity = task.inverse * reference.velocity;
+            let velocity = match pose {
+                Some(pose) => pose.joint_velocity_rad_per_s,
+                None => task.inverse * reference.velocity,
+            };
             let friction_uncertainty_n = (0..N)
                 .map(|i| {
                     let friction = &config.friction[i];

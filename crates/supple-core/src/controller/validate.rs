@@ -1,6 +1,6 @@
 //! Validation of a configuration.
 
-use crate::config::{ApparentInertia, Config, Gains, Role};
+use crate::config::{ApparentInertia, Config, Gains, PoseLaw, Role};
 use crate::math::linalg::Cholesky;
 use crate::math::{Matrix, Vector};
 use crate::model::friction::FrictionError;
@@ -115,6 +115,42 @@ pub(super) fn gains(gains: &Gains, stiffness: f64, damping: f64) -> Result<(), C
     Ok(())
 }
 
+fn pose<const N: usize>(pose: &PoseLaw<N>) -> Result<(), ConfigError> {
+    let (stiffest, most) = (pose.max_stiffness_nm_per_rad, pose.max_damping_nm_s_per_rad);
+    positive("rotational stiffness limit", stiffest)?;
+    positive("rotational damping limit", most)?;
+    for (entry, values, limit) in [
+        (
+            "rotational stiffness_nm_per_rad",
+            &pose.gains.stiffness_nm_per_rad,
+            stiffest,
+        ),
+        (
+            "rotational damping_nm_s_per_rad",
+            &pose.gains.damping_nm_s_per_rad,
+            most,
+        ),
+    ] {
+        for value in values {
+            check(
+                (0.0..=limit).contains(value),
+                entry,
+                None,
+                *value,
+                "finite, not negative and within its limit",
+            )?;
+        }
+    }
+    positive("angular_speed_rad_per_s", pose.angular_speed_rad_per_s)?;
+    positive("rotation_error_rad", pose.rotation_error_rad)?;
+    each(
+        "posture_stiffness_nm_per_rad",
+        &pose.posture_stiffness_nm_per_rad,
+        true,
+    )?;
+    each("posture_torque_nm", &pose.posture_torque_nm, true)
+}
+
 pub(super) fn validate<const N: usize>(config: &Config<N>) -> Result<(), ConfigError> {
     let Config {
         law, latch, limits, ..
@@ -210,6 +246,7 @@ pub(super) fn validate<const N: usize>(config: &Config<N>) -> Result<(), ConfigE
             "at most that of the move mode",
         )?;
     }
+    pose(&config.pose)?;
     check(
         (0.0..=1.0).contains(&config.float_friction_share),
         "float friction_share",

@@ -1,9 +1,12 @@
 //! What the law wants of the tip: reference and gains of its position, or of its pose.
 //!
-//! **Orientation.** The error is `e = (r1 x r1o + r2 x r2o + r3 x r3o) / 2 = sin(angle) axis`, with `ri`
-//! and `rio` the axes of the tip and of its reference (Luh, Walker and Paul, "Resolved-acceleration
-//! control of mechanical manipulators", 1980). For equal stiffness `k` about all axes it is the gradient
-//! of `k (1 - cos(angle))`: beyond 90 degrees it weakens, at 180 degrees it vanishes.
+//! **Orientation.** With the rotation from the tip to its reference by `angle` about the unit vector `a`,
+//! a stiffness `K` about the base axes stores the energy `(1 - cos(angle)) a^T K a`, and its torque is the
+//! gradient: `sin(angle) K a + (1 - cos(angle)) (K a) x a`. For equal stiffness about all axes this is `K e`
+//! with `e = sin(angle) a = (r1 x r1o + r2 x r2o + r3 x r3o) / 2`, `ri` and `rio` the axes of the tip and of
+//! its reference (Luh, Walker and Paul, "Resolved-acceleration control of mechanical manipulators", 1980);
+//! for other stiffness `K e` has no potential, and going round a loop could put energy into the arm. Beyond
+//! 90 degrees the torque weakens, at 180 degrees it vanishes.
 
 use crate::config::Gains;
 use crate::math::linalg::symmetric_eigenvalues;
@@ -92,6 +95,21 @@ impl PoseReference {
             angular_acceleration_rad_per_s2: Vector3::zeros(),
         }
     }
+
+    /// Both velocities \[m/s, rad/s\].
+    #[inline(always)]
+    pub fn velocity(&self) -> Vector<6> {
+        pair(&self.velocity_m_per_s, &self.angular_velocity_rad_per_s)
+    }
+
+    /// Both accelerations \[m/s^2, rad/s^2\].
+    #[inline(always)]
+    pub fn acceleration(&self) -> Vector<6> {
+        pair(
+            &self.acceleration_m_per_s2,
+            &self.angular_acceleration_rad_per_s2,
+        )
+    }
 }
 
 /// Impedance of the tip's pose in base axes: every matrix symmetric and positive semi-definite, or the
@@ -152,30 +170,22 @@ pub struct PoseTarget<'a> {
 impl Target<6> for PoseTarget<'_> {
     #[inline(always)]
     fn velocity(&self) -> Vector<6> {
-        let reference = self.reference;
-        pair(
-            &reference.velocity_m_per_s,
-            &reference.angular_velocity_rad_per_s,
-        )
+        self.reference.velocity()
     }
 
     #[inline(always)]
     fn acceleration(&self) -> Vector<6> {
-        let reference = self.reference;
-        pair(
-            &reference.acceleration_m_per_s2,
-            &reference.angular_acceleration_rad_per_s2,
-        )
+        self.reference.acceleration()
     }
 
     #[inline(always)]
     fn spring(&self, base_from_tip: &Pose) -> Vector<6> {
         let wanted = &self.reference.base_from_tip;
         let error = wanted.translation - base_from_tip.translation;
-        let turn = orientation_error(&wanted.rotation, &base_from_tip.rotation);
+        let stiffness = &self.gains.stiffness_nm_per_rad;
         pair(
             &(self.gains.stiffness_n_per_m * error),
-            &(self.gains.stiffness_nm_per_rad * turn),
+            &orientation_torque(stiffness, &wanted.rotation, &base_from_tip.rotation),
         )
     }
 
@@ -191,11 +201,23 @@ impl Target<6> for PoseTarget<'_> {
     }
 }
 
-/// `sin(angle) axis` of the rotation from `found` to `wanted`, in base axes.
+/// Torque of the stiffness \[N m/rad\], symmetric, from the orientation `found` towards `wanted` \[N m\]; base
+/// axes.
 #[inline]
-pub fn orientation_error(wanted: &Matrix3<f64>, found: &Matrix3<f64>) -> Vector3<f64> {
-    let column = |i: usize| found.column(i).cross(&wanted.column(i));
-    (column(0) + column(1) + column(2)) * 0.5
+pub fn orientation_torque(
+    stiffness_nm_per_rad: &Matrix3<f64>,
+    wanted: &Matrix3<f64>,
+    found: &Matrix3<f64>,
+) -> Vector3<f64> {
+    // The energy is tr(G (1 - E)), with E the rotation from `found` to `wanted` and G = tr(K) / 2 - K.
+    let half_trace = 0.5 * stiffness_nm_per_rad.trace();
+    let weight = Matrix3::from_diagonal_element(half_trace) - stiffness_nm_per_rad;
+    let moment = weight * (wanted * found.transpose());
+    Vector3::new(
+        moment.m32 - moment.m23,
+        moment.m13 - moment.m31,
+        moment.m21 - moment.m12,
+    )
 }
 
 #[inline(always)]

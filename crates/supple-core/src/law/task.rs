@@ -68,6 +68,8 @@ pub struct Task<const N: usize, const D: usize = 3> {
     pub inverse: Matrix<N, D>,
     /// Least singular value of the position's rows of `jacobian` \[m\].
     pub least_singular_value_m: f64,
+    /// Near a singular pose: the inverse is damped.
+    pub is_damped: bool,
 }
 
 impl<const N: usize> Task<N, 3> {
@@ -122,6 +124,7 @@ impl<const N: usize, const D: usize> Task<N, D> {
             return None;
         }
         let mass_matrix = active_mass_matrix(terms, roles);
+        let mut is_damped = damping != 0.0;
         let inverse = match three_active(roles) {
             Some(joints) if D == 3 && damping == 0.0 => {
                 // What the inverse does not ask for, but the arm has to be.
@@ -136,7 +139,11 @@ impl<const N: usize, const D: usize> Task<N, D> {
                 let factor = if D == 3 {
                     Cholesky::new(&mobility)?
                 } else {
-                    Cholesky::with_pivots(&mobility, damped_pivot)?
+                    Cholesky::with_pivots(&mobility, |i, pivot| {
+                        let damped = damped_pivot(i, pivot);
+                        is_damped |= damped != pivot;
+                        damped
+                    })?
                 };
                 factor.solve(&mobile.transpose()).transpose()
             }
@@ -145,6 +152,7 @@ impl<const N: usize, const D: usize> Task<N, D> {
             jacobian,
             inverse,
             least_singular_value_m: sigma,
+            is_damped,
         })
     }
 }
@@ -162,6 +170,7 @@ pub(crate) fn square_task<const N: usize, const D: usize>(
         jacobian: Matrix::from_fn(|direction, joint| columns[joint][direction]),
         inverse: spread(inverse.rows(), [0, 1, 2]),
         least_singular_value_m: min_singular_value(&Matrix3::from(columns)),
+        is_damped: false,
     })
 }
 

@@ -28,7 +28,7 @@ impl<const N: usize> Cholesky<N> {
     #[inline(always)]
     pub(crate) fn with_pivots(
         a: &Matrix<N, N>,
-        adjust_pivot: impl Fn(usize, f64) -> f64,
+        mut adjust_pivot: impl FnMut(usize, f64) -> f64,
     ) -> Option<Self> {
         let mut rest = a.data.0;
         let mut inverse_pivots = [0.0; N];

@@ -1,7 +1,7 @@
 //! Rigid transforms, named by their target and source frames: `base_from_tip` maps tip coordinates
 //! to base coordinates.
 
-use crate::math::{Matrix3, Vector3, abs, sin_cos};
+use crate::math::{Matrix3, Vector3, abs, atan2, sin_cos, sqrt};
 use core::ops::Mul;
 
 /// Rotation and translation of frame `b` in frame `a`.
@@ -82,6 +82,32 @@ impl Pose {
     pub fn transform_point(&self, point: &Vector3<f64>) -> Vector3<f64> {
         self.rotation * point + self.translation
     }
+}
+
+/// Axis times angle of a rotation \[rad\], the angle from 0 to pi.
+pub fn rotation_vector(rotation: &Matrix3<f64>) -> Vector3<f64> {
+    let r = rotation;
+    // A quaternion, not normalised, from the greatest of its entries (Shepperd, 1978).
+    let trace = r.trace();
+    let (real, imaginary) = if trace >= r.m11.max(r.m22).max(r.m33) {
+        let twist = Vector3::new(r.m32 - r.m23, r.m13 - r.m31, r.m21 - r.m12);
+        (1.0 + trace, twist)
+    } else if r.m11 >= r.m22.max(r.m33) {
+        let x = 1.0 + r.m11 - r.m22 - r.m33;
+        (r.m32 - r.m23, Vector3::new(x, r.m12 + r.m21, r.m13 + r.m31))
+    } else if r.m22 >= r.m33 {
+        let y = 1.0 + r.m22 - r.m11 - r.m33;
+        (r.m13 - r.m31, Vector3::new(r.m12 + r.m21, y, r.m23 + r.m32))
+    } else {
+        let z = 1.0 + r.m33 - r.m11 - r.m22;
+        (r.m21 - r.m12, Vector3::new(r.m13 + r.m31, r.m23 + r.m32, z))
+    };
+    let length = sqrt(imaginary.dot(&imaginary));
+    if length == 0.0 {
+        return Vector3::zeros();
+    }
+    let angle = 2.0 * atan2(length, abs(real));
+    imaginary * (angle / length).copysign(real)
 }
 
 impl Mul for Pose {

@@ -9,6 +9,7 @@ mod fourier;
 mod line;
 mod probe;
 mod quadrant;
+mod rotation;
 mod sinusoid;
 
 pub use arc::Arc;
@@ -16,6 +17,7 @@ pub use fourier::{Fourier, HARMONICS, JointReference, LimitViolation};
 pub use line::Line;
 pub use probe::{Probe, ProbePhase};
 pub use quadrant::{Piece, Quadrant};
+pub use rotation::{OrientationReference, Rotation};
 pub use sinusoid::Sinusoid;
 
 use crate::math::{Vector3, all_finite, smooth_step};

@@ -16,7 +16,7 @@ use supple_core::impedance::{
 };
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::nalgebra::{Rotation3, Unit};
-use supple_core::target::{PoseGains, PoseReference, PoseTarget, orientation_error};
+use supple_core::target::{PoseGains, PoseReference, PoseTarget, orientation_torque};
 use supple_core::{Arm, Matrix, Pose, Reference, Vector, impedance_torque};
 
 type Outcome = Result<(), TestCaseError>;
@@ -129,18 +129,15 @@ fn tip_moves_as_stated<const N: usize>(case: &Case<N>, active: usize) -> Outcome
     let relative = Rotation3::from_matrix_unchecked(
         reference.base_from_tip.rotation * now.rotation.transpose(),
     );
-    let turn = relative
-        .axis()
-        .map_or(Vector3::zeros(), |axis| axis.into_inner())
-        * relative.angle().sin();
+    let turn = relative.axis().map_or(Vector3::zeros(), |axis| {
+        let (pull, angle) = (gains.stiffness_nm_per_rad * *axis, relative.angle());
+        pull * angle.sin() + pull.cross(&axis) * (1.0 - angle.cos())
+    });
     let error = reference.base_from_tip.translation - now.translation;
     let velocity = terms.jacobian * qd;
     let linear = reference.velocity_m_per_s - velocity.fixed_rows::<3>(0);
     let angular = reference.angular_velocity_rad_per_s - velocity.fixed_rows::<3>(3);
-    let spring = pair(
-        &(gains.stiffness_n_per_m * error),
-        &(gains.stiffness_nm_per_rad * turn),
-    );
+    let spring = pair(&(gains.stiffness_n_per_m * error), &turn);
     let damper = pair(
         &(gains.damping_n_s_per_m * linear),
         &(gains.damping_nm_s_per_rad * angular),
@@ -421,7 +418,8 @@ fn gains_that_could_add_energy_are_not_passive() {
 }
 
 #[test]
-fn orientation_error_is_the_sine_along_the_axis() {
+fn equal_stiffness_pulls_with_the_sine_along_the_axis() {
+    let stiffness = Matrix3::from_diagonal_element(2.0);
     for (axis, angle) in [
         (Vector3::new(1.0, 0.0, 0.0), 0.3),
         (Vector3::new(0.6, 0.0, -0.8), -1.2),
@@ -429,13 +427,50 @@ fn orientation_error_is_the_sine_along_the_axis() {
     ] {
         let turn = Rotation3::from_axis_angle(&Unit::new_unchecked(axis), angle);
         let found = Pose::from_xyz_rpy([0.0; 3], [0.4, -0.7, 1.9]).rotation;
-        let error = orientation_error(&(turn.matrix() * found), &found);
-        assert!((error - axis * angle.sin()).norm() < 1e-15);
+        let torque = orientation_torque(&stiffness, &(turn.matrix() * found), &found);
+        assert!((torque - axis * (2.0 * angle.sin())).norm() < 1e-14);
     }
-    assert_eq!(
-        orientation_error(&Matrix3::identity(), &Matrix3::identity()),
-        Vector3::zeros()
-    );
+    let resting = Pose::from_xyz_rpy([0.0; 3], [0.4, -0.7, 1.9]).rotation;
+    assert!(orientation_torque(&stiffness, &resting, &resting).norm() < 1e-15);
+}
+
+/// Energy of coupled stiffness `K` about the axes: `(1 - cos(angle)) a^T K a`.
+fn orientation_energy_j(
+    stiffness: &Matrix3<f64>,
+    wanted: &Matrix3<f64>,
+    found: &Matrix3<f64>,
+) -> f64 {
+    let turn = Rotation3::from_matrix_unchecked(wanted * found.transpose());
+    turn.axis().map_or(0.0, |axis| {
+        (1.0 - turn.angle().cos()) * axis.dot(&(stiffness * *axis))
+    })
+}
+
+/// What the torque does while the tip turns is what the energy loses, up to 179 degrees of error and for coupled
+/// axes.
+#[test]
+fn the_torque_of_an_orientation_is_the_gradient_of_its_energy() {
+    let turn = |axis: Vector3<f64>, angle: f64| {
+        *Rotation3::from_axis_angle(&Unit::new_normalize(axis), angle).matrix()
+    };
+    let stiffness = gains().stiffness_nm_per_rad;
+    let wanted = Pose::from_xyz_rpy([0.0; 3], [0.4, -0.7, 1.9]).rotation;
+    for degrees in [1.0_f64, 40.0, 90.0, 100.0, 170.0, 179.0] {
+        for axis in [[1.0, 0.0, 0.0], [0.3, -0.5, 0.8], [-0.7, 0.7, 0.1]] {
+            let found = turn(Vector3::from(axis), -degrees.to_radians()) * wanted;
+            let torque = orientation_torque(&stiffness, &wanted, &found);
+            for along in 0..3 {
+                let mut direction = Vector3::zeros();
+                direction[along] = 1.0;
+                let energy = |by: f64| {
+                    orientation_energy_j(&stiffness, &wanted, &(turn(direction, by) * found))
+                };
+                let slope = (energy(1e-5) - energy(-1e-5)) / 2e-5;
+                let pull = torque[along];
+                assert!((slope + pull).abs() < 1e-7, "{degrees}: {slope} {pull}");
+            }
+        }
+    }
 }
 
 /// Stretched straight, with its axes in one plane, the arm still gets a finite torque.

@@ -5,10 +5,10 @@ use crate::support::settings::config;
 use proptest::prelude::*;
 use proptest::strategy::Union;
 use supple_core::codes::{RequestCode, RequestCodeError, VALUES};
-use supple_core::config::{Gains, JointGains};
+use supple_core::config::{Gains, JointGains, RotationalGains};
 use supple_core::controller::{Breakaway, Request};
 use supple_core::math::Vector3;
-use supple_core::trajectory::{Arc, Fourier, Line, Probe, Quadrant, Sinusoid};
+use supple_core::trajectory::{Arc, Fourier, Line, Probe, Quadrant, Rotation, Sinusoid};
 use supple_core::{Trajectory, Vector};
 
 fn number() -> impl Strategy<Value = f64> {
@@ -66,7 +66,7 @@ type Numbered = ((u8, u8), Option<Request<4>>);
 
 fn request() -> impl Strategy<Value = Numbered> {
     let moving = ([number(), number(), number(), number()], number());
-    let gains = (vector(), vector(), number());
+    let gains = || (vector(), vector(), number());
     Union::new([
         Just(((0, 0), None)).boxed(),
         Just(((1, 0), Some(Request::Idle))).boxed(),
@@ -130,7 +130,30 @@ fn request() -> impl Strategy<Value = Numbered> {
                 ((11, 0), Some(Request::JointGains { gains, ramp_s }))
             })
             .boxed(),
-        gains
+        (gains(), number(), trajectory())
+            .prop_map(|((axis, _, duration_s), angle_rad, (kind, trajectory))| {
+                let rotation = Rotation {
+                    axis,
+                    angle_rad,
+                    duration_s,
+                };
+                let request = Request::TrackPose {
+                    trajectory,
+                    rotation,
+                };
+                ((12, kind), Some(request))
+            })
+            .boxed(),
+        gains()
+            .prop_map(|(stiffness_nm_per_rad, damping_nm_s_per_rad, ramp_s)| {
+                let gains = RotationalGains {
+                    stiffness_nm_per_rad,
+                    damping_nm_s_per_rad,
+                };
+                ((13, 0), Some(Request::RotationalGains { gains, ramp_s }))
+            })
+            .boxed(),
+        gains()
             .prop_map(|(stiffness_n_per_m, damping_n_s_per_m, ramp_s)| {
                 let gains = Gains {
                     stiffness_n_per_m,
@@ -168,7 +191,7 @@ fn decode(
 
 #[test]
 fn unknown_and_incomplete_codes_are_rejected() {
-    assert_eq!(decode(12, 0, &[]), Err(RequestCodeError::Kind(12)));
+    assert_eq!(decode(14, 0, &[]), Err(RequestCodeError::Kind(14)));
     assert_eq!(decode(4, 0, &[]), Err(RequestCodeError::Trajectory(0)));
     assert_eq!(
         decode(4, 7, &[0.0; 16]),

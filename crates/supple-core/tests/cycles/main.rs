@@ -20,7 +20,7 @@ use supple_core::config::ApparentInertia;
 use supple_core::controller::{Mode, Request};
 use supple_core::math::Matrix3;
 use supple_core::{Config, Input, Output, Vector};
-use support::configs::{four, seven, three};
+use support::configs::{four, seven, seven_active, three};
 use support::random::Random;
 
 /// Cycles after which the arm restarts in another pose.
@@ -197,6 +197,7 @@ fn assert_modes<const N: usize>(
         (_, Mode::Excite) => matches!(request, Some(Request::Excite(_))),
         (_, Mode::Breakaway) => matches!(request, Some(Request::Breakaway(_))),
         (_, Mode::Float) => matches!(request, Some(Request::Float)),
+        (_, Mode::TrackPose) => matches!(request, Some(Request::TrackPose { .. })),
         (_, Mode::JointImpedance) => matches!(request, Some(Request::JointImpedance { .. })),
     };
     assert!(documented, "{}", describe());
@@ -220,6 +221,11 @@ fn seven_joints_three_of_them_held() {
     config.friction = support::configs::friction();
     config.latch.fade = true;
     survive(config, 7);
+}
+
+#[test]
+fn seven_joints_all_active() {
+    survive(seven_active(), 8);
 }
 
 /// Checks the properties themselves: each fails for an output that violates it.

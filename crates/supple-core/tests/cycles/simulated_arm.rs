@@ -2,11 +2,11 @@
 
 use crate::support::random::Random;
 use crate::support::rig::{Rig, probe_at, ramp};
-use supple_core::config::{Gains, JointGains, Role};
+use supple_core::config::{Gains, JointGains, Role, RotationalGains};
 use supple_core::controller::{Breakaway, Mode, Request};
 use supple_core::dynamics::aba;
 use supple_core::math::Vector3;
-use supple_core::trajectory::{Arc, Fourier, Line, Quadrant, Sinusoid};
+use supple_core::trajectory::{Arc, Fourier, Line, Quadrant, Rotation, Sinusoid};
 use supple_core::{Config, Input, Output, Trajectory, Vector};
 
 /// Whether the input of this cycle reports idle drives.
@@ -83,7 +83,7 @@ impl<const N: usize> SimulatedArm<N> {
             _ => {}
         }
         let tip = last.tip_position_m;
-        match random.below(20) {
+        match random.below(22) {
             0 => Request::Idle,
             1 => Request::GravityHold,
             2 => Request::Reset,
@@ -136,6 +136,22 @@ impl<const N: usize> SimulatedArm<N> {
                 gains: JointGains {
                     stiffness_nm_per_rad: Vector::from_fn(|_, _| random.number().abs()),
                     damping_nm_s_per_rad: Vector::from_fn(|_, _| random.number().abs()),
+                },
+                ramp_s: random.number(),
+            },
+            18 => self.rig.turn(0.4 * random.unit() - 0.2),
+            19 => Request::TrackPose {
+                trajectory: any_trajectory(random),
+                rotation: Rotation {
+                    axis: random.point(),
+                    angle_rad: random.number(),
+                    duration_s: random.number(),
+                },
+            },
+            20 => Request::RotationalGains {
+                gains: RotationalGains {
+                    stiffness_nm_per_rad: random.point().abs(),
+                    damping_nm_s_per_rad: random.point().abs(),
                 },
                 ramp_s: random.number(),
             },

@@ -3,7 +3,7 @@
 use super::arms::{wam3, wam4, wam7};
 use supple_core::config::{
     ApparentInertia, Collision, ContactLatch, FrictionVelocity, Gains, JointGains, Law, Limits,
-    PlausibilityLimits, Role, Workspace,
+    PlausibilityLimits, PoseLaw, Role, Workspace,
 };
 use supple_core::{Arm, Config, Friction, Matrix, RippleTable, Vector};
 
@@ -67,6 +67,16 @@ pub fn seven() -> Config<7> {
     }
 }
 
+/// All seven joints active.
+pub fn seven_active() -> Config<7> {
+    Config {
+        roles: [Role::Active; 7],
+        // For the small inertia of a wrist and the delay of the loop.
+        hold_damping_nm_s_per_rad: Vector::from([2.0, 2.0, 2.0, 2.0, 0.05, 0.05, 0.005]),
+        ..seven()
+    }
+}
+
 fn config<const N: usize>(
     arm: Arm<N>,
     roles: [Role; N],
@@ -99,6 +109,7 @@ fn config<const N: usize>(
             stiffness_nm_per_rad: all(10.0),
             damping_nm_s_per_rad: all(1.0),
         },
+        pose: PoseLaw::default(),
         float_friction_share: 0.5,
         hold_damping_nm_s_per_rad: all(2.0),
         handover_s: 0.1,

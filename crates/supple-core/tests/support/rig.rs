@@ -3,7 +3,7 @@
 use super::plant::{Plant, nothing};
 use supple_core::controller::{Breakaway, Fault, Mode, Request};
 use supple_core::math::Vector3;
-use supple_core::trajectory::{Fourier, Trajectory};
+use supple_core::trajectory::{Fourier, Rotation, Trajectory};
 use supple_core::{Arm, Config, Controller, Input, Output, State, Vector, step};
 
 /// A copy continues independently of the original.
@@ -113,6 +113,18 @@ impl<const N: usize> Rig<N> {
         Request::Track(Trajectory::Hold(self.tip()))
     }
 
+    /// Stays with the tip and turns it about an axis of the base within 1 s \[rad\].
+    pub fn turn(&self, angle_rad: f64) -> Request<N> {
+        Request::TrackPose {
+            trajectory: Trajectory::Hold(self.tip()),
+            rotation: Rotation {
+                axis: Vector3::new(0.48, -0.6, 0.64),
+                angle_rad,
+                duration_s: 1.0,
+            },
+        }
+    }
+
     /// Puts the controller into `mode`, at rest where the rig is.
     #[track_caller]
     pub fn bring_to(&mut self, mode: Mode) {
@@ -147,6 +159,9 @@ impl<const N: usize> Rig<N> {
             }
             Mode::JointImpedance => {
                 self.accept(self.joint_impedance_request());
+            }
+            Mode::TrackPose => {
+                self.accept(self.turn(0.2));
             }
             Mode::Fault => {
                 let output = self.step(&Input {
@@ -218,4 +233,9 @@ pub fn bent<const N: usize>() -> Vector<N> {
     q[1] = 0.7;
     q[if N == 3 { 2 } else { 3 }] = 1.4;
     q
+}
+
+/// The same with the roll and the wrist bent, so that the tip can turn about every axis.
+pub fn bent_wrist() -> Vector<7> {
+    Vector::from([0.3, 0.7, 0.2, 1.4, 0.3, 0.6, -0.2])
 }

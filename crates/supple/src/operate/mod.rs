@@ -21,9 +21,10 @@ use serde::Serialize;
 use supple_cli::arms;
 use supple_cli::console::{print_json, print_line};
 use supple_cli::exit::Failure;
-use supple_core::config::{Gains, JointGains};
+use supple_core::config::{Gains, JointGains, RotationalGains};
 use supple_core::controller::{Mode, Request};
 use supple_core::math::Vector3;
+use supple_core::trajectory::Rotation;
 use supple_core::{Trajectory, Vector};
 use supple_experiment::scenario;
 use supple_ipc::message::{OperatorReply, Outcome, Telemetry};
@@ -105,6 +106,8 @@ enum Asked<'a> {
     Reset,
     Gains(&'a GainsArgs),
     JointGains(&'a GainsArgs),
+    RotationalGains(&'a GainsArgs),
+    Pose(&'a TrackArgs),
 }
 
 impl Asked<'_> {
@@ -137,6 +140,35 @@ impl Asked<'_> {
                     damping_n_s_per_m: axes("--damping", &args.damping, now.damping_n_s_per_m)?,
                 },
                 ramp_s: args.ramp_s,
+            },
+            Asked::RotationalGains(args) => Request::RotationalGains {
+                gains: RotationalGains {
+                    stiffness_nm_per_rad: axes(
+                        "--rotational",
+                        &args.rotational,
+                        now.rotational_stiffness_nm_per_rad,
+                    )?,
+                    damping_nm_s_per_rad: axes(
+                        "--rotational-damping",
+                        &args.rotational_damping,
+                        now.rotational_damping_nm_s_per_rad,
+                    )?,
+                },
+                ramp_s: args.ramp_s,
+            },
+            Asked::Pose(args) => Request::TrackPose {
+                trajectory: Trajectory::Hold(Vector3::from(now.tip_position_m)),
+                rotation: Rotation {
+                    axis: match *args.rotate {
+                        [x, y, z] => Vector3::new(x, y, z).normalize(),
+                        _ => {
+                            let found = args.rotate.len();
+                            return Err(value_count("--rotate", found, "3, X,Y,Z".to_owned()));
+                        }
+                    },
+                    angle_rad: args.angle_rad,
+                    duration_s: args.duration_s,
+                },
             },
             Asked::JointGains(args) => {
                 let stiffness = first(&now.joint_stiffness_nm_per_rad);
@@ -217,16 +249,18 @@ fn ask(system: &SystemArgs, asked: &Asked<'_>) -> Result<(), Failure> {
     print_reply(system, &reply)
 }
 
-/// Runs `supple gains`: changes stiffness and damping along a ramp, of the tip, or of the joints where their gains are
-/// given. Gains that are not given are unchanged.
+/// Runs `supple gains`: changes stiffness and damping along a ramp, of the tip, or of the joints or the tip's orientation
+/// where their gains are given. Gains that are not given are unchanged.
 ///
 /// # Errors
 /// [`Failure`].
 pub fn gains(args: &GainsArgs) -> Result<(), Failure> {
     let of_joints = !(args.joint_stiffness.is_empty() && args.joint_damping.is_empty());
-    let asked = match of_joints {
-        true => Asked::JointGains(args),
-        false => Asked::Gains(args),
+    let of_orientation = !(args.rotational.is_empty() && args.rotational_damping.is_empty());
+    let asked = match (of_joints, of_orientation) {
+        (true, _) => Asked::JointGains(args),
+        (false, true) => Asked::RotationalGains(args),
+        (false, false) => Asked::Gains(args),
     };
     ask(&args.system, &asked)
 }
@@ -248,12 +282,17 @@ pub fn trajectory_for(trajectory: UpTrajectory, description: &Description) -> (T
     }
 }
 
-/// Runs `supple track`: moves the arm to the start of a trajectory and tracks it.
+/// Runs `supple track`: moves the arm to the start of a trajectory and tracks it; a pose starts where the tip is.
 ///
 /// # Errors
 /// [`Failure`].
 pub fn track(args: &TrackArgs) -> Result<(), Failure> {
+    if args.trajectory != TrackTrajectory::Pose && !args.rotate.is_empty() {
+        let none = "0: only a pose turns".to_owned();
+        return Err(value_count("--rotate", args.rotate.len(), none));
+    }
     let (trajectory, duration_s) = match args.trajectory {
+        TrackTrajectory::Pose => return ask(&args.system, &Asked::Pose(args)),
         TrackTrajectory::Sinusoid => scenario::sinusoid(args.speed),
         TrackTrajectory::Arc => scenario::arc(),
         TrackTrajectory::Quadrant => {

@@ -10,7 +10,7 @@ pub use request::{RequestCode, RequestCodeError, VALUES};
 use crate::controller::{Fault, Mode, Refusal, SafeAction};
 
 /// Every mode, at the place of its number.
-pub const MODES: [Mode; 10] = [
+pub const MODES: [Mode; 11] = [
     Mode::Idle,
     Mode::GravityHold,
     Mode::Move,
@@ -21,6 +21,7 @@ pub const MODES: [Mode; 10] = [
     Mode::Breakaway,
     Mode::Float,
     Mode::JointImpedance,
+    Mode::TrackPose,
 ];
 
 /// Named numbers. A number once given keeps its meaning.
@@ -52,6 +53,8 @@ numbered! {
         FLOAT = 9 "float",
         JOINT_IMPEDANCE = 10 "joint_impedance",
         JOINT_GAINS = 11 "joint_gains",
+        TRACK_POSE = 12 "track_pose",
+        ROTATIONAL_GAINS = 13 "rotational_gains",
     }
 }
 
@@ -93,6 +96,7 @@ numbered! {
         WORKSPACE = 19 "workspace",
         ZONE_SPEED = 20 "zone_speed",
         ZONE_FORCE = 21 "zone_force",
+        ROTATION_ERROR = 22 "rotation_error",
     }
 }
 
@@ -110,6 +114,7 @@ numbered! {
         OUT_OF_REACH = 8 "out_of_reach",
         TOO_MUCH_TORQUE = 9 "too_much_torque",
         WORKSPACE = 10 "workspace",
+        SINGULAR = 11 "singular",
     }
 }
 
@@ -190,6 +195,10 @@ impl FaultCode {
             Fault::TrackingError { value_m, limit_m } => {
                 (fault_kind::TRACKING_ERROR, -1, value_m, limit_m)
             }
+            Fault::RotationError {
+                value_rad,
+                limit_rad,
+            } => (fault_kind::ROTATION_ERROR, -1, value_rad, limit_rad),
             Fault::MassMatrix => (fault_kind::MASS_MATRIX, -1, 0.0, 0.0),
             Fault::TorqueNotFinite { .. } => (fault_kind::TORQUE_NOT_FINITE, -1, 0.0, 0.0),
             Fault::EncoderJump {
@@ -301,5 +310,6 @@ pub fn refusal(refusal: Option<&Refusal>) -> u8 {
         Some(Refusal::OutOfReach { .. }) => refusal_kind::OUT_OF_REACH,
         Some(Refusal::TooMuchTorque { .. }) => refusal_kind::TOO_MUCH_TORQUE,
         Some(Refusal::Workspace { .. }) => refusal_kind::WORKSPACE,
+        Some(Refusal::Singular) => refusal_kind::SINGULAR,
     }
 }

@@ -10,6 +10,8 @@
 //! | breakaway | `joint`, `rate_nm_per_s`, `stop_rad`, `limit_nm` |
 //! | joint_impedance | `target_rad` (N), `duration_s` |
 //! | joint_gains | `stiffness_nm_per_rad` (N), `damping_nm_s_per_rad` (N), `ramp_s` |
+//! | track_pose | `axis`, `angle_rad`, `duration_s` of the rotation, then those of the trajectory |
+//! | rotational_gains | `stiffness_nm_per_rad`, `damping_nm_s_per_rad`, `ramp_s` |
 //! | hold | `position_m` |
 //! | line | `from_m`, `to_m`, `duration_s` |
 //! | sinusoid | `centre_m`, `amplitude_m`, `angular_frequency_rad_per_s`, `ramp_s` |
@@ -20,10 +22,12 @@
 //! Decoding rejects numbers that encode no request; whether a request is valid, the controller checks.
 
 use super::{request_kind, trajectory_kind};
-use crate::config::{Gains, JointGains};
+use crate::config::{Gains, JointGains, RotationalGains};
 use crate::controller::{Breakaway, Request};
 use crate::math::{Vector, Vector3};
-use crate::trajectory::{Arc, Fourier, HARMONICS, Line, Probe, Quadrant, Sinusoid, Trajectory};
+use crate::trajectory::{
+    Arc, Fourier, HARMONICS, Line, Probe, Quadrant, Rotation, Sinusoid, Trajectory,
+};
 use core::fmt;
 
 /// Most values that a request carries: those of an excitation of 7 joints.
@@ -34,7 +38,7 @@ pub const VALUES: usize = 80;
 pub struct RequestCode {
     /// One of [`request_kind`].
     pub kind: u8,
-    /// Of a track request one of [`trajectory_kind`], otherwise none.
+    /// Of a track or track-pose request one of [`trajectory_kind`], otherwise none.
     pub trajectory: u8,
     /// How many of `values` count.
     pub count: u8,
@@ -66,7 +70,7 @@ impl fmt::Display for RequestCodeError {
             RequestCodeError::Kind(kind) => write!(
                 f,
                 "request is {kind}, known are 0 to {}",
-                request_kind::JOINT_GAINS
+                request_kind::ROTATIONAL_GAINS
             ),
             RequestCodeError::Trajectory(kind) => {
                 write!(
@@ -134,6 +138,21 @@ impl RequestCode {
                 code.kind = request_kind::JOINT_GAINS;
                 code.numbers(gains.stiffness_nm_per_rad.as_slice());
                 code.numbers(gains.damping_nm_s_per_rad.as_slice());
+                code.numbers(&[*ramp_s]);
+            }
+            Some(Request::TrackPose {
+                trajectory,
+                rotation,
+            }) => {
+                code.kind = request_kind::TRACK_POSE;
+                code.vector(&rotation.axis);
+                code.numbers(&[rotation.angle_rad, rotation.duration_s]);
+                code.track(trajectory);
+            }
+            Some(Request::RotationalGains { gains, ramp_s }) => {
+                code.kind = request_kind::ROTATIONAL_GAINS;
+                code.vector(&gains.stiffness_nm_per_rad);
+                code.vector(&gains.damping_nm_s_per_rad);
                 code.numbers(&[*ramp_s]);
             }
             Some(Request::Reset) => code.kind = request_kind::RESET,
@@ -233,6 +252,21 @@ impl RequestCode {
                 gains: JointGains {
                     stiffness_nm_per_rad: Vector::from(rest.take::<N>()),
                     damping_nm_s_per_rad: Vector::from(rest.take::<N>()),
+                },
+                ramp_s: rest.number(),
+            }),
+            request_kind::TRACK_POSE => Some(Request::TrackPose {
+                rotation: Rotation {
+                    axis: rest.vector(),
+                    angle_rad: rest.number(),
+                    duration_s: rest.number(),
+                },
+                trajectory: rest.trajectory(self.trajectory)?,
+            }),
+            request_kind::ROTATIONAL_GAINS => Some(Request::RotationalGains {
+                gains: RotationalGains {
+                    stiffness_nm_per_rad: rest.vector(),
+                    damping_nm_s_per_rad: rest.vector(),
                 },
                 ramp_s: rest.number(),
             }),

@@ -1,12 +1,13 @@
 //! Changes of mode with the arm in the loop: the torque does not jump, faults are not blended, and
 //! the blended torque decays to zero.
 
-use crate::support::configs::{four, stop_limited, three};
+use crate::support::configs::{four, seven_active, stop_limited, three};
 use crate::support::plant::Plant;
-use crate::support::rig::{Rig, bent, probe_at};
+use crate::support::rig::{Rig, bent, bent_wrist, probe_at};
 use crate::support::size;
 use supple_core::controller::{Mode, Request};
 use supple_core::math::Vector3;
+use supple_core::trajectory::Rotation;
 use supple_core::{Config, Input, Output, Trajectory, Vector};
 
 /// Maximum change of torque from one cycle to the next \[N m\].
@@ -26,9 +27,13 @@ struct Run<const N: usize> {
 
 impl<const N: usize> Run<N> {
     fn new(config: Config<N>) -> Self {
+        Run::at(config, bent())
+    }
+
+    fn at(config: Config<N>, pose: Vector<N>) -> Self {
         let mut run = Run {
-            rig: Rig::new(config, bent()),
-            plant: Plant::at_rest(config.arm, bent()),
+            rig: Rig::new(config, pose),
+            plant: Plant::at_rest(config.arm, pose),
             last: Vec::new(),
         };
         run.rig.cycle();
@@ -75,6 +80,33 @@ impl<const N: usize> Run<N> {
             }
         }
     }
+}
+
+/// Into the pose mode and out of it, with loaded springs.
+#[test]
+fn of_7_active_joints() {
+    let config = seven_active();
+    let handover_s = config.handover_s;
+    let mut run = Run::at(config, bent_wrist());
+    let pose = |run: &Run<7>| {
+        let tip = supple_core::dynamics::tip_pose(&run.plant.arm, &run.plant.q).translation;
+        Request::TrackPose {
+            trajectory: Trajectory::Hold(tip + Vector3::new(0.02, 0.01, -0.02)),
+            rotation: Rotation {
+                axis: Vector3::new(0.0, 0.6, 0.8),
+                angle_rad: 0.2,
+                duration_s: 1.0,
+            },
+        }
+    };
+    run.change(pose(&run), handover_s);
+    run.change(pose(&run), handover_s);
+    run.change(Request::GravityHold, handover_s);
+    run.change(pose(&run), handover_s);
+    run.change(Request::Float, handover_s);
+    run.change(pose(&run), handover_s);
+    run.change(Request::GravityHold, handover_s);
+    assert_eq!(run.rig.state.mode(), Mode::GravityHold);
 }
 
 fn through_all_modes<const N: usize>(config: Config<N>) {

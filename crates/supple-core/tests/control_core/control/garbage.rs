@@ -5,10 +5,10 @@ use crate::support::configs::{four, seven, three};
 use crate::support::property::{check, per_joint};
 use crate::support::rig::{Rig, bent, probe_at};
 use proptest::prelude::*;
-use supple_core::config::{ApparentInertia, Gains, JointGains};
+use supple_core::config::{ApparentInertia, Gains, JointGains, RotationalGains};
 use supple_core::controller::{Mode, Request};
 use supple_core::math::{Matrix3, Vector3};
-use supple_core::trajectory::{Arc, Line, Quadrant, Sinusoid};
+use supple_core::trajectory::{Arc, Line, Quadrant, Rotation, Sinusoid};
 use supple_core::{Config, Trajectory, Vector};
 
 /// Ordinary numbers and numerical edge cases.
@@ -68,6 +68,7 @@ enum RequestKind<const N: usize> {
     Any(Request<N>),
     HoldTip,
     Probe,
+    Turn(f64),
     MoveHere(f64),
 }
 
@@ -93,6 +94,23 @@ fn request_kind<const N: usize>() -> impl Strategy<Value = RequestKind<N>> {
             }
         }),
         trajectory().prop_map(Request::Track),
+        (trajectory(), point(), number(), number()).prop_map(
+            |(trajectory, axis, angle_rad, duration_s)| Request::TrackPose {
+                trajectory,
+                rotation: Rotation {
+                    axis,
+                    angle_rad,
+                    duration_s,
+                },
+            }
+        ),
+        (point(), point(), number()).prop_map(|(k, b, ramp_s)| Request::RotationalGains {
+            gains: RotationalGains {
+                stiffness_nm_per_rad: k,
+                damping_nm_s_per_rad: b,
+            },
+            ramp_s,
+        }),
         (prop::collection::vec(number(), N), number()).prop_map(|(target, duration_s)| {
             Request::Move {
                 target_rad: Vector::from_column_slice(&target),
@@ -113,6 +131,7 @@ fn request_kind<const N: usize>() -> impl Strategy<Value = RequestKind<N>> {
         2 => prop::sample::select(vec![Request::Reset, Request::GravityHold]).prop_map(RequestKind::Any),
         1 => Just(RequestKind::HoldTip),
         1 => Just(RequestKind::Probe),
+        1 => (-0.2..0.2).prop_map(RequestKind::Turn),
         1 => (0.01..2.0).prop_map(RequestKind::MoveHere),
     ]
 }
@@ -176,6 +195,7 @@ fn survive<const N: usize>(config: Config<N>) {
                 RequestKind::Any(request) => Some(request),
                 RequestKind::HoldTip => Some(rig.hold_tip_request()),
                 RequestKind::Probe => Some(Request::Track(probe_at(&rig.tip()))),
+                RequestKind::Turn(angle_rad) => Some(rig.turn(angle_rad)),
                 RequestKind::MoveHere(duration_s) => Some(Request::Move {
                     target_rad: bent(),
                     duration_s,

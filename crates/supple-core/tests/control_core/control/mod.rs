@@ -17,6 +17,7 @@ mod modes;
 mod motion;
 mod moving;
 mod observing;
+mod posing;
 mod protecting;
 mod refusals;
 mod settings;

@@ -1,14 +1,14 @@
 //! Every request in every mode: the table of transitions.
 
-use crate::support::configs::{four, seven, three};
-use crate::support::rig::{Rig, bent, probe_at, ramp};
+use crate::support::configs::{four, seven, seven_active, three};
+use crate::support::rig::{Rig, bent, bent_wrist, probe_at, ramp};
 use std::collections::BTreeSet;
-use supple_core::config::{Gains, JointGains};
+use supple_core::config::{Gains, JointGains, Role, RotationalGains};
 use supple_core::controller::{Fault, Mode, Refusal, Request};
 use supple_core::trajectory::Fourier;
 use supple_core::{Config, Input, Vector};
 
-const MODES: [Mode; 10] = [
+const MODES: [Mode; 11] = [
     Mode::Idle,
     Mode::GravityHold,
     Mode::Move,
@@ -19,6 +19,7 @@ const MODES: [Mode; 10] = [
     Mode::Breakaway,
     Mode::Float,
     Mode::JointImpedance,
+    Mode::TrackPose,
 ];
 
 /// Kind of a request, independent of the arm's pose.
@@ -33,12 +34,14 @@ enum RequestKind {
     Breakaway,
     Float,
     JointImpedance,
+    TrackPose,
     Gains,
     JointGains,
+    RotationalGains,
     Reset,
 }
 
-const REQUEST_KINDS: [RequestKind; 12] = [
+const REQUEST_KINDS: [RequestKind; 14] = [
     RequestKind::Idle,
     RequestKind::GravityHold,
     RequestKind::Move,
@@ -48,8 +51,10 @@ const REQUEST_KINDS: [RequestKind; 12] = [
     RequestKind::Breakaway,
     RequestKind::Float,
     RequestKind::JointImpedance,
+    RequestKind::TrackPose,
     RequestKind::Gains,
     RequestKind::JointGains,
+    RequestKind::RotationalGains,
     RequestKind::Reset,
 ];
 
@@ -67,6 +72,11 @@ fn request<const N: usize>(rig: &Rig<N>, requested: RequestKind) -> Request<N> {
         RequestKind::Breakaway => Request::Breakaway(ramp()),
         RequestKind::Float => Request::Float,
         RequestKind::JointImpedance => rig.joint_impedance_request(),
+        RequestKind::TrackPose => rig.turn(0.2),
+        RequestKind::RotationalGains => Request::RotationalGains {
+            gains: RotationalGains::isotropic(0.8, 0.015),
+            ramp_s: 0.1,
+        },
         RequestKind::JointGains => Request::JointGains {
             gains: JointGains {
                 stiffness_nm_per_rad: Vector::repeat(7.0),
@@ -85,7 +95,9 @@ fn request<const N: usize>(rig: &Rig<N>, requested: RequestKind) -> Request<N> {
 /// Mode after `requested` in `mode`; `None` if refused.
 fn table(mode: Mode, requested: RequestKind) -> Option<Mode> {
     match (mode, requested) {
-        (_, RequestKind::Gains | RequestKind::JointGains) => Some(mode),
+        (_, RequestKind::Gains | RequestKind::JointGains | RequestKind::RotationalGains) => {
+            Some(mode)
+        }
         // Only a reset leaves a fault; this one leads to gravity hold.
         (Mode::Fault, RequestKind::Reset) => Some(Mode::GravityHold),
         // Idle needs no reset; the fault stays latched.
@@ -101,22 +113,40 @@ fn table(mode: Mode, requested: RequestKind) -> Option<Mode> {
         (_, RequestKind::Breakaway) => Some(Mode::Breakaway),
         (_, RequestKind::Float) => Some(Mode::Float),
         (_, RequestKind::JointImpedance) => Some(Mode::JointImpedance),
+        (_, RequestKind::TrackPose) => Some(Mode::TrackPose),
     }
 }
 
-fn every_mode_asked_for_everything<const N: usize>(config: Config<N>) {
+fn every_mode_asked_for_everything<const N: usize>(config: Config<N>, pose: Vector<N>) {
+    let active = config.roles.iter().filter(|role| **role == Role::Active);
+    let has_pose = active.count() >= 6;
     for mode in MODES {
-        let mut there = Rig::new(config, bent());
+        if mode == Mode::TrackPose && !has_pose {
+            continue;
+        }
+        let mut there = Rig::new(config, pose);
         there.bring_to(mode);
         for requested in REQUEST_KINDS {
             let mut rig = there.clone();
             let before = rig.state.fault();
             let output = rig.request(request(&rig, requested));
+            if requested == RequestKind::TrackPose && !has_pose && table(mode, requested).is_some()
+            {
+                match output.refusal {
+                    Some(Refusal::Value { limit, .. }) => assert_eq!(limit, 6.0),
+                    other => panic!("{other:?}"),
+                }
+                assert_eq!(output.mode, mode);
+                continue;
+            }
             match table(mode, requested) {
                 Some(expected) => {
                     assert_eq!(output.refusal, None, "{requested:?} in {mode:?}");
                     assert_eq!(output.mode, expected, "{requested:?} in {mode:?}");
-                    if !matches!(requested, RequestKind::Gains | RequestKind::JointGains) {
+                    if !matches!(
+                        requested,
+                        RequestKind::Gains | RequestKind::JointGains | RequestKind::RotationalGains
+                    ) {
                         assert_eq!(output.mode_time_s, 0.0, "{requested:?} in {mode:?}");
                     }
                 }
@@ -137,23 +167,28 @@ fn every_mode_asked_for_everything<const N: usize>(config: Config<N>) {
 
 #[test]
 fn of_3_joints() {
-    every_mode_asked_for_everything(three());
+    every_mode_asked_for_everything(three(), bent());
 }
 
 #[test]
 fn of_4_joints() {
-    every_mode_asked_for_everything(four());
+    every_mode_asked_for_everything(four(), bent());
 }
 
 #[test]
 fn of_7_joints() {
-    every_mode_asked_for_everything(seven());
+    every_mode_asked_for_everything(seven(), bent());
+}
+
+#[test]
+fn of_7_active_joints() {
+    every_mode_asked_for_everything(seven_active(), bent_wrist());
 }
 
 #[test]
 fn any_mode_faults_and_idle_stays_without_torque() {
     for mode in MODES {
-        let mut rig = Rig::new(four(), bent());
+        let mut rig = Rig::new(seven_active(), bent_wrist());
         rig.bring_to(mode);
         let first = rig.state.fault();
         let output = rig.step(&Input {

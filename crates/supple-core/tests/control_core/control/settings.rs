@@ -76,6 +76,10 @@ fn entries_must_be_positive() {
         "start_error_m" => limits.start_error_m,
         "stiffness limit" => limits.stiffness_n_per_m,
         "damping limit" => limits.damping_n_s_per_m,
+        "rotational stiffness limit" => pose.max_stiffness_nm_per_rad,
+        "rotational damping limit" => pose.max_damping_nm_s_per_rad,
+        "angular_speed_rad_per_s" => pose.angular_speed_rad_per_s,
+        "rotation_error_rad" => pose.rotation_error_rad,
     );
     refuses_per_joint!(NOT_POSITIVE,
         "move stiffness_nm_per_rad" => move_gains.stiffness_nm_per_rad,
@@ -98,6 +102,8 @@ fn entries_must_not_be_negative() {
         "hold_damping_nm_s_per_rad" => hold_damping_nm_s_per_rad,
         "soft_stiffness_nm_per_rad" => limits.soft_stiffness_nm_per_rad,
         "soft_damping_nm_s_per_rad" => limits.soft_damping_nm_s_per_rad,
+        "posture_stiffness_nm_per_rad" => pose.posture_stiffness_nm_per_rad,
+        "posture_torque_nm" => pose.posture_torque_nm,
     );
 }
 

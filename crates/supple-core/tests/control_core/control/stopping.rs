@@ -12,12 +12,12 @@ use proptest::prelude::*;
 use std::collections::VecDeque;
 use supple_core::config::{
     ApparentInertia, Collision, FrictionVelocity, Gains, JointGains, Law, Limits,
-    PlausibilityLimits, Role, Workspace,
+    PlausibilityLimits, PoseLaw, Role, Workspace,
 };
 use supple_core::controller::{Fault, Mode, Request, SafeAction, State, step};
 use supple_core::dynamics::{aba, gravity, jacobian, kinetic_energy, tip_pose};
 use supple_core::math::Vector3;
-use supple_core::trajectory::Trajectory;
+use supple_core::trajectory::{Rotation, Trajectory};
 use supple_core::{
     Arm, Body, Config, Controller, Friction, Input, Joint, Matrix, Output, Pose, RippleTable,
     Vector,
@@ -72,7 +72,7 @@ fn case(joints: usize) -> impl Strategy<Value = Case> {
         0.02..0.3,
         prop::collection::vec(-1.8..1.8, joints),
         prop::collection::vec(-4.0..4.0, joints),
-        1..7_u8,
+        1..8_u8,
         defect,
         0..3_usize,
     )
@@ -148,6 +148,7 @@ fn config<const N: usize>(case: &Case) -> Config<N> {
             stiffness_nm_per_rad: all(5.0),
             damping_nm_s_per_rad: all(0.5),
         },
+        pose: PoseLaw::default(),
         float_friction_share: 0.5,
         hold_damping_nm_s_per_rad: all(0.5),
         handover_s: 0.1,
@@ -267,6 +268,14 @@ fn request<const N: usize>(case: &Case, config: &Config<N>, q: &Vector<N>) -> Re
         6 => Request::JointImpedance {
             target_rad: q.map(|angle| angle + 0.2),
             duration_s: 1.0,
+        },
+        7 if N >= 6 => Request::TrackPose {
+            trajectory: Trajectory::Hold(tip_pose(&config.arm, q).translation),
+            rotation: Rotation {
+                axis: Vector3::new(0.0, 0.6, 0.8),
+                angle_rad: 0.2,
+                duration_s: 1.0,
+            },
         },
         _ => Request::Move {
             target_rad: q.map(|angle| angle + 0.2),

@@ -1,0 +1,165 @@
+//! The pose mode: reference of the tip's position and orientation, the task in six directions, and its torques.
+//!
+//! Nothing of it is computed in other modes, nor compiled for arms of fewer than six joints.
+
+use super::activity::Activity;
+use super::fault::Fault;
+use super::requests::DAMPING_MARGIN;
+use super::state::State;
+use super::{Controller, checks};
+use crate::config::Config;
+use crate::law::impedance::{LawInput, Task, Torques, impedance};
+use crate::law::target::{PoseGains, PoseReference, PoseTarget, Posture};
+use crate::math::{Matrix, Matrix3, Vector, Vector3, sqrt};
+use crate::model::pose::{Pose, rotation_vector};
+use crate::trajectory::{OrientationReference, Reference, Rotation};
+
+/// Directions of the task.
+pub(super) const DIRECTIONS: usize = 6;
+
+/// What a cycle of the pose mode computes before its torques.
+pub(super) struct PoseCycle<const N: usize> {
+    reference: PoseReference,
+    task: Task<N, DIRECTIONS>,
+    /// Velocity of the active joints that moves the tip as its reference \[rad/s\].
+    pub joint_velocity_rad_per_s: Vector<N>,
+    /// Axis times angle from the tip to its reference \[rad\].
+    pub error_rad: Vector3<f64>,
+}
+
+impl<const N: usize> PoseCycle<N> {
+    /// Reference of the tip's orientation.
+    pub fn base_from_tip(&self) -> Matrix3<f64> {
+        self.reference.base_from_tip.rotation
+    }
+}
+
+/// Position and orientation together.
+pub(super) fn pose_reference(
+    position: &Reference,
+    orientation: &OrientationReference,
+) -> PoseReference {
+    PoseReference {
+        base_from_tip: Pose {
+            rotation: orientation.base_from_tip,
+            translation: position.position,
+        },
+        velocity_m_per_s: position.velocity,
+        angular_velocity_rad_per_s: orientation.velocity_rad_per_s,
+        acceleration_m_per_s2: position.acceleration,
+        angular_acceleration_rad_per_s2: orientation.acceleration_rad_per_s2,
+    }
+}
+
+impl<const N: usize> State<N> {
+    /// Reference and task of the pose mode, with its check; `None` in other modes.
+    #[inline(always)]
+    pub(super) fn pose_cycle(
+        &self,
+        config: &Config<N>,
+        reference: Option<&Reference>,
+    ) -> Result<Option<PoseCycle<N>>, Fault> {
+        if const { N >= DIRECTIONS }
+            && let (
+                Activity::TrackPose {
+                    rotation,
+                    from_base_from_tip,
+                    ..
+                },
+                Some(reference),
+            ) = (&self.activity, reference)
+        {
+            return self
+                .pose_task(config, reference, rotation, from_base_from_tip)
+                .map(Some);
+        }
+        Ok(None)
+    }
+
+    #[inline(never)]
+    fn pose_task(
+        &self,
+        config: &Config<N>,
+        reference: &Reference,
+        rotation: &Rotation,
+        from_base_from_tip: &Matrix3<f64>,
+    ) -> Result<PoseCycle<N>, Fault> {
+        let orientation = rotation.at(from_base_from_tip, self.activity_s(config));
+        let found = &self.terms.base_from_tip.rotation;
+        let error_rad = rotation_vector(&(orientation.base_from_tip * found.transpose()));
+        checks::rotation(config.pose.rotation_error_rad, &error_rad)?;
+        let task = Task::of_pose(&self.terms, &config.roles).ok_or(Fault::MassMatrix)?;
+        let reference = pose_reference(reference, &orientation);
+        Ok(PoseCycle {
+            joint_velocity_rad_per_s: task.inverse * reference.velocity(),
+            task,
+            error_rad,
+            reference,
+        })
+    }
+
+    /// Greatest mobility of the null space \[1/(kg m^2)\]: where the axes of the wrist align, its joints can turn
+    /// against each other, and little inertia resists. With one joint more than directions it is exact.
+    fn nullspace_mobility(&self, task: &Task<N, DIRECTIONS>) -> f64 {
+        let free = Matrix::<N, N>::identity() - task.inverse * task.jacobian;
+        let inertia = self.terms.mass_matrix * free;
+        (0..N)
+            .map(|joint| {
+                let motion = free.column(joint);
+                motion.norm_squared() / motion.dot(&inertia.column(joint))
+            })
+            .fold(0.0, f64::max)
+    }
+
+    /// The law of the pose: linear gains as for the position, rotational ones, and damping and posture in the null
+    /// space, both weakened together where the delay of the loop does not allow that much damping.
+    #[inline(never)]
+    pub(super) fn pose_torques(
+        &self,
+        controller: &Controller<N>,
+        pose: &PoseCycle<N>,
+    ) -> Torques<N> {
+        let config = controller.config();
+        let Activity::TrackPose { posture_rad, .. } = &self.activity else {
+            return self.safe_torques(controller);
+        };
+        let rotational = self.rotational_gains.current();
+        let mut gains = PoseGains::diagonal(
+            &self.gains.current(),
+            &rotational.stiffness_nm_per_rad,
+            &rotational.damping_nm_s_per_rad,
+        );
+        let tip = self.terms.base_from_tip.translation;
+        let limit_n = config.workspace.spring_limit_n(&tip);
+        let pull = gains.stiffness_n_per_m * (pose.reference.base_from_tip.translation - tip);
+        let pull_n2 = pull.dot(&pull);
+        if pull_n2 > limit_n * limit_n {
+            gains.stiffness_n_per_m *= limit_n / sqrt(pull_n2);
+        }
+        let posture = Posture {
+            position_rad: *posture_rad,
+            stiffness_nm_per_rad: config.pose.posture_stiffness_nm_per_rad,
+            max_torque_nm: config.pose.posture_torque_nm,
+        };
+        let target = PoseTarget {
+            reference: &pose.reference,
+            gains: &gains,
+        };
+        let law = &config.law;
+        let damping = law.nullspace_damping_nm_s_per_rad;
+        let share = (DAMPING_MARGIN
+            / (damping * self.nullspace_mobility(&pose.task) * controller.delay_s()))
+        .min(1.0);
+        let law_input = LawInput {
+            friction: Some((&config.friction, law.friction_velocity)),
+            friction_share: self.latch.friction_share(),
+            inertial_feedforward: law.inertial_feedforward,
+            nullspace_damping_nm_s_per_rad: damping * share,
+            nullspace_torque_nm: Some(&(posture.torque_nm(&self.position) * share)),
+            ..LawInput::new(target, &self.estimator.velocity_rad_per_s)
+        };
+        let mut torques = impedance(&config.roles, &self.terms, &pose.task, &law_input);
+        self.add_joint_loops_and_stops(config, &mut torques);
+        torques
+    }
+}
