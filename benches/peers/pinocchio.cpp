@@ -95,16 +95,20 @@ template <int N> static auto vector(const std::vector<double> &v) {
 template <int D, int N>
 static Matrix<double, D, 1> feedback(const Gains &gains, const State &s, const Terms<N> &t,
                                      const Matrix<double, D, 1> &velocity) {
-  Matrix<double, D, 1> error;
-  error.template head<3>() = Map<const Vector3d>(s.position) - t.tip.translation();
-  if constexpr (D == 6) {
-    const Matrix3d wanted = Map<const Rows3>(s.rotation);
-    const Matrix3d &r = t.tip.rotation();
-    error.template tail<3>() = 0.5 * (r.col(0).cross(wanted.col(0)) + r.col(1).cross(wanted.col(1)) +
-                                      r.col(2).cross(wanted.col(2)));
-  }
   using Vector = Map<const Matrix<double, D, 1>>;
-  return Vector(gains.stiffness).cwiseProduct(error) +
+  const Vector3d error = Map<const Vector3d>(s.position) - t.tip.translation();
+  Matrix<double, D, 1> spring;
+  spring.template head<3>() = Map<const Vector3d>(gains.stiffness).cwiseProduct(error);
+  if constexpr (D == 6) {
+    // Gradient of the energy tr(G (1 - E)), E the rotation to the reference, G = tr(K) / 2 - K.
+    const Vector3d about = Map<const Vector3d>(gains.stiffness + 3);
+    const Vector3d weight = Vector3d::Constant(0.5 * about.sum()) - about;
+    const Matrix3d turn = Map<const Rows3>(s.rotation) * t.tip.rotation().transpose();
+    const Matrix3d moment = weight.asDiagonal() * turn;
+    spring.template tail<3>() = Vector3d(moment(2, 1) - moment(1, 2), moment(0, 2) - moment(2, 0),
+                                         moment(1, 0) - moment(0, 1));
+  }
+  return spring +
          Vector(gains.damping).cwiseProduct(Vector(s.velocity) - velocity);
 }
 

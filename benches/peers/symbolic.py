@@ -216,14 +216,17 @@ class Arm:
         j = self.jacobian(poses, tip)[:d, :]
         drift = self.jacobian_dot_qd(poses, tip, motion, self.gravity)[:d]
         speed = j @ qd
-        error = position - tip[1]
+        spring = constant(k.stiffness[:3]) * (position - tip[1])
         if d == 6:
-            r = tip[0]
-            turn = sum(cross(r[:, i], rotation[:, i]) for i in range(3))
-            error = ca.vertcat(error, 0.5 * turn)
-        force = constant(k.stiffness[:d]) * error + constant(k.damping[:d]) * (
-            velocity[:d] - speed
-        )
+            # Gradient of the energy tr(G (1 - E)), E the rotation to the reference, G = tr(K) / 2 - K.
+            about = k.stiffness[3:6]
+            weight = constant([0.5 * sum(about) - x for x in about])
+            turn = rotation @ tip[0].T
+            m = ca.vertcat(*[weight[i] * turn[i, :] for i in range(3)])
+            spring = ca.vertcat(
+                spring, m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]
+            )
+        force = spring + constant(k.damping[:d]) * (velocity[:d] - speed)
         wanted = acceleration[:d] - drift
         if d == self.n:
             return nle + mass @ (inverse_3(j) @ wanted) + j.T @ force

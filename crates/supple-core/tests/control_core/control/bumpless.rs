@@ -103,8 +103,6 @@ fn of_7_active_joints() {
     run.change(pose(&run), handover_s);
     run.change(Request::GravityHold, handover_s);
     run.change(pose(&run), handover_s);
-    run.change(Request::Float, handover_s);
-    run.change(pose(&run), handover_s);
     run.change(Request::GravityHold, handover_s);
     assert_eq!(run.rig.state.mode(), Mode::GravityHold);
 }
