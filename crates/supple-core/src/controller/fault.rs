@@ -77,6 +77,8 @@ pub enum Fault {
         /// Limit \[rad\].
         limit_rad: f64,
     },
+    /// The pose mode came near a singular pose, where its task is damped and may put energy into the arm.
+    Singular,
     /// Joint tracking error beyond its limit: the joint is blocked in a move, or pushed away.
     JointTrackingError {
         /// Joint index.
@@ -314,6 +316,10 @@ impl fmt::Display for Fault {
             } => write!(
                 f,
                 "tip is turned {value_rad:.3} rad away from its reference, limit {limit_rad:.3} rad"
+            ),
+            Fault::Singular => write!(
+                f,
+                "near a singular pose the tip cannot move and turn in every direction; move the arm away from it"
             ),
             Fault::MassMatrix => write!(f, "mass matrix is not positive definite"),
             Fault::TorqueNotFinite { term } => {

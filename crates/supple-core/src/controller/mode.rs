@@ -48,8 +48,8 @@ pub enum Mode {
     /// with the same gains. Contact is allowed. Held joints keep their own stiff loop.
     JointImpedance,
     /// The impedance law follows a trajectory and a rotation of the tip: six directions, so that at least six joints
-    /// must be active. Its inertia is always the arm's own. Near singular poses the task is damped (see
-    /// [`crate::task`]).
+    /// must be active. Its inertia is always the arm's own. A pose near a singular one, where the task would be damped
+    /// (see [`crate::task`]), is a fault.
     TrackPose,
 }
 

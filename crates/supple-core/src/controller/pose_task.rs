@@ -89,6 +89,9 @@ impl<const N: usize> State<N> {
         let error_rad = rotation_vector(&(orientation.base_from_tip * found.transpose()));
         checks::rotation(config.pose.rotation_error_rad, &error_rad)?;
         let task = Task::of_pose(&self.terms, &config.roles).ok_or(Fault::MassMatrix)?;
+        if task.is_damped {
+            return Err(Fault::Singular);
+        }
         let reference = pose_reference(reference, &orientation);
         Ok(PoseCycle {
             joint_velocity_rad_per_s: task.inverse * reference.velocity(),

@@ -97,6 +97,7 @@ numbered! {
         ZONE_SPEED = 20 "zone_speed",
         ZONE_FORCE = 21 "zone_force",
         ROTATION_ERROR = 22 "rotation_error",
+        SINGULAR = 23 "singular",
     }
 }
 
@@ -199,6 +200,7 @@ impl FaultCode {
                 value_rad,
                 limit_rad,
             } => (fault_kind::ROTATION_ERROR, -1, value_rad, limit_rad),
+            Fault::Singular => (fault_kind::SINGULAR, -1, 0.0, 0.0),
             Fault::MassMatrix => (fault_kind::MASS_MATRIX, -1, 0.0, 0.0),
             Fault::TorqueNotFinite { .. } => (fault_kind::TORQUE_NOT_FINITE, -1, 0.0, 0.0),
             Fault::EncoderJump {
