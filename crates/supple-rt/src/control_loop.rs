@@ -69,8 +69,8 @@ pub struct ControlLoop<const N: usize> {
     reason = "the loop's thread allocates nothing: no request is boxed"
 )]
 enum RequestSource {
-    /// An operator request.
-    Operator(OperatorRequest),
+    /// An operator request, after the number of those that arrived before it and are still queued.
+    Operator(usize, OperatorRequest),
     /// All idle requests; the value is the last request number on the idle channel, if any came there.
     Idle(Option<u64>),
     /// The loop itself, during shutdown.
@@ -283,20 +283,19 @@ impl<const N: usize> ControlLoop<N> {
         if let Some((source, _)) = &received {
             self.answer(source, &output);
         }
-        let at_once = match &received {
-            Some((RequestSource::Operator(message), _)) => !message.is_scheduled(),
-            _ => true,
+        // Requests that were queued before this one, in their number.
+        let ended = match (&received, input.request) {
+            _ if output.fault.is_some() && !had_fault => self.queued.len(),
+            _ if output.refusal.is_some() => 0,
+            (_, Some(Request::Idle)) | (Some((RequestSource::Shutdown, _)), _) => self.queued.len(),
+            // Somebody wants the arm to rest now: what was scheduled before must not move it later.
+            (
+                Some((RequestSource::Operator(earlier, message), _)),
+                Some(Request::GravityHold | Request::Float),
+            ) if !message.is_scheduled() => *earlier,
+            _ => 0,
         };
-        let ends_motion = match input.request {
-            _ if output.refusal.is_some() => false,
-            Some(Request::Idle) => true,
-            // Somebody wants the arm to rest now: what others have scheduled must not move it later.
-            Some(Request::GravityHold | Request::Float) => at_once,
-            _ => false,
-        };
-        if ends_motion || (output.fault.is_some() && !had_fault) {
-            self.refuse_queued(arm.cycle, output.mode);
-        }
+        self.refuse_queued(ended, arm.cycle, output.mode);
         let timing = CycleTiming {
             period_ns: self.last_begin_ns.map_or(0, |last| begin_ns - last),
             latency_ns: match self.virtual_time {
@@ -340,9 +339,12 @@ impl<const N: usize> ControlLoop<N> {
         if self.shutting_down == Some(0) && !matches!(self.state.mode(), Mode::Idle | Mode::Fault) {
             return Some((RequestSource::Shutdown, Request::GravityHold));
         }
-        let message = self.queued.pop_due(cycle)?;
+        let (earlier, message) = self.queued.pop_due(cycle)?;
         match message.request::<N>() {
-            Ok(request) => request.map(|request| (RequestSource::Operator(message), request)),
+            Ok(request) => request.map(|request| {
+                let source = RequestSource::Operator(earlier, message);
+                (source, request)
+            }),
             Err(error) => {
                 let text = Text::of(&error);
                 self.reply(&message, cycle, self.state.mode(), Outcome::Refused, text);
@@ -358,7 +360,7 @@ impl<const N: usize> ControlLoop<N> {
             Some(refusal) => (Outcome::Refused, Text::of(refusal)),
         };
         match source {
-            RequestSource::Operator(request) => {
+            RequestSource::Operator(_, request) => {
                 self.reply(request, output.cycle, output.mode, outcome, text);
             }
             // Repeated in the next cycle until the torque is off.
@@ -382,11 +384,19 @@ impl<const N: usize> ControlLoop<N> {
         }
     }
 
-    /// Refuses the queued requests, which were sent under other conditions; idle requests stay valid and are kept.
-    fn refuse_queued(&mut self, cycle: u64, mode: Mode) {
+    /// Refuses the first `count` queued requests, which were sent under other conditions; idle requests stay valid and
+    /// are kept.
+    fn refuse_queued(&mut self, count: usize, cycle: u64, mode: Mode) {
+        if count == 0 {
+            return;
+        }
         let mut kept = RequestQueue::default();
-        while let Some(request) = self.queued.pop() {
-            if request.requests_idle() && kept.push(request).is_ok() {
+        for position in 0..self.queued.len() {
+            let Some(request) = self.queued.pop() else {
+                break;
+            };
+            let stays = position >= count || request.requests_idle();
+            if stays && kept.push(request).is_ok() {
                 continue;
             }
             let text = Text::of(&format_args!(

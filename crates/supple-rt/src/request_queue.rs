@@ -1,8 +1,8 @@
 //! Queue of requests that wait for their cycle.
 //!
 //! Due requests are carried out in order of arrival, one per cycle; idle requests come first. When the arm goes to idle,
-//! a fault latches, or an operator asks for gravity hold or float at once, all queued requests are refused, because they
-//! were sent under other conditions. One operator can use at most half of the queue, so it cannot block the others.
+//! a fault latches, or an operator asks for gravity hold or float at once, the requests that were queued before are
+//! refused, because they were sent under other conditions. One operator can use at most half of the queue, so it cannot block the others.
 
 use core::fmt;
 use supple_ipc::message::OperatorRequest;
@@ -57,13 +57,19 @@ impl RequestQueue {
         Ok(())
     }
 
-    /// Removes and returns the first due request; idle requests come first.
-    pub fn pop_due(&mut self, cycle: u64) -> Option<OperatorRequest> {
+    /// Removes and returns the first due request, with the number of those that arrived before it and are still queued;
+    /// idle requests come first.
+    pub fn pop_due(&mut self, cycle: u64) -> Option<(usize, OperatorRequest)> {
         let queued = self.entries[..self.length].iter().flatten();
         let mut due = queued.enumerate().filter(|(_, r)| r.is_due(cycle));
         let idle = due.clone().find(|(_, r)| r.requests_idle());
         let (index, _) = idle.or_else(|| due.next())?;
-        self.take(index)
+        self.take(index).map(|request| (index, request))
+    }
+
+    /// Number of queued requests.
+    pub fn len(&self) -> usize {
+        self.length
     }
 
     /// Whether the queue is empty.

@@ -13,6 +13,10 @@ fn exceeds(value: f64, limit: f64) -> bool {
     value > limit || value.is_nan()
 }
 
+/// Stability margin for damping with a delayed velocity: `B delay / mass` must not exceed this,
+/// half of the stability limit pi/2.
+pub(super) const DAMPING_MARGIN: f64 = core::f64::consts::FRAC_PI_4;
+
 /// Checks joint positions, joint speeds and tip speed; `speed_share` of the speed limits applies.
 pub(super) fn motion<const N: usize>(
     limits: &Limits<N>,

@@ -3,8 +3,8 @@
 //! Nothing of it is computed in other modes, nor compiled for arms of fewer than six joints.
 
 use super::activity::Activity;
+use super::checks::DAMPING_MARGIN;
 use super::fault::Fault;
-use super::requests::DAMPING_MARGIN;
 use super::state::State;
 use super::{Controller, checks};
 use crate::config::Config;

@@ -5,6 +5,7 @@
 
 use super::Controller;
 use super::activity::Activity;
+use super::checks::DAMPING_MARGIN;
 use super::fault::SafeAction;
 use super::mode::{Breakaway, Mode, Refusal, Request};
 use super::pose_task::DIRECTIONS;
@@ -28,9 +29,6 @@ const EXCITE_START_RAD: f64 = 0.02;
 const MAX_RAMP_S: f64 = 3600.0;
 /// Maximum joint damping that may be requested, whatever the delay allows \[N m s/rad\].
 const MAX_JOINT_DAMPING_NM_S_PER_RAD: f64 = 1e5;
-/// Stability margin for damping with a delayed velocity: `B delay / mass` must not exceed this,
-/// half of the stability limit pi/2.
-pub(super) const DAMPING_MARGIN: f64 = core::f64::consts::FRAC_PI_4;
 
 impl<const N: usize> State<N> {
     /// Carries out a request, or returns why it is refused.

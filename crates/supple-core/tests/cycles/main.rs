@@ -16,7 +16,7 @@ mod simulated_arm;
 
 use simulated_arm::SimulatedArm;
 use std::collections::BTreeMap;
-use supple_core::config::ApparentInertia;
+use supple_core::config::{ApparentInertia, Role};
 use supple_core::controller::{Mode, Request};
 use supple_core::math::Matrix3;
 use supple_core::{Config, Input, Output, Vector};
@@ -70,7 +70,13 @@ fn survive<const N: usize>(mut config: Config<N>, seed: u64) {
         }
         left -= left.min(EPISODE);
     }
+    let active = config.roles.iter().filter(|role| **role == Role::Active);
+    let has_pose = active.count() >= 6;
     for mode in supple_core::codes::MODES {
+        if mode == Mode::TrackPose && !has_pose {
+            assert_eq!(seen.get(mode.name()), None);
+            continue;
+        }
         let count = seen.get(mode.name()).copied().unwrap_or_default();
         assert!(
             count > cycles() / 2_000,
