@@ -64,14 +64,14 @@ impl Rotation {
     pub fn validate(&self) -> Result<(), TrajectoryError> {
         finite("rotation axis", &self.axis)?;
         let length = sqrt(self.axis.dot(&self.axis));
-        if !(abs(length - 1.0) <= UNIT_TOLERANCE) {
+        if !(0.0..=UNIT_TOLERANCE).contains(&abs(length - 1.0)) {
             return Err(TrajectoryError {
                 entry: "length of the rotation axis",
                 value: length,
                 must: "1",
             });
         }
-        if !(abs(self.angle_rad) <= PI) {
+        if !(0.0..=PI).contains(&abs(self.angle_rad)) {
             return Err(TrajectoryError {
                 entry: "rotation angle_rad",
                 value: self.angle_rad,
