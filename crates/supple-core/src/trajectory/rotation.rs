@@ -40,7 +40,7 @@ impl Rotation {
     /// Reference at `time_s` since the start, turned from `start`; before the start it is the start.
     pub fn at(&self, start: &Matrix3<f64>, time_s: f64) -> OrientationReference {
         let axis = self.axis / sqrt(self.axis.dot(&self.axis));
-        let (share, rate, rate_rate) = smooth_step(time_s / self.duration_s);
+        let (share, rate, second_derivative) = smooth_step(time_s / self.duration_s);
         let (sine, cosine) = sin_cos(self.angle_rad * share);
         let cross = skew(&axis);
         let turn = Matrix3::identity() + cross * sine + cross * cross * (1.0 - cosine);
@@ -48,7 +48,7 @@ impl Rotation {
         OrientationReference {
             base_from_tip: turn * start,
             velocity_rad_per_s: axis * (per_s * rate),
-            acceleration_rad_per_s2: axis * (per_s / self.duration_s * rate_rate),
+            acceleration_rad_per_s2: axis * (per_s / self.duration_s * second_derivative),
         }
     }
 

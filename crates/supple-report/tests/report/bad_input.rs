@@ -1,7 +1,7 @@
 //! Invalid descriptions, infeasible experiments, read-only folders, a full disk: each gives one error line, the
 //! documented exit code and no output files.
 
-use crate::support::{Answer, arg, assert_one_clear_line, program, run, tree};
+use crate::support::{Answer, arg, assert_one_clear_line, fifo, program, run, run_in, tree};
 use std::fs;
 use std::path::{Path, PathBuf};
 use supple_model::Description;
@@ -159,21 +159,6 @@ fn an_interrupt_is_code_130_and_leaves_no_files() {
     let status = child.wait().expect("it ends");
     assert_eq!(status.code(), Some(130));
     assert!(tree(folder.path()).is_empty(), "{:?}", tree(folder.path()));
-}
-
-/// Runs the program in a folder.
-fn run_in(folder: &Path, args: &[&str]) -> Answer {
-    let output = program(args)
-        .current_dir(folder)
-        .env("XDG_RUNTIME_DIR", folder)
-        .output();
-    output.expect("it starts").into()
-}
-
-#[cfg(unix)]
-fn fifo(path: &Path) {
-    let made = std::process::Command::new("mkfifo").arg(path).status();
-    assert!(made.expect("mkfifo is there").success());
 }
 
 /// Devices and FIFOs are rejected and stay what they were.

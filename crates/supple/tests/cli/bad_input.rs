@@ -1,25 +1,9 @@
 //! Invalid arguments and outputs of the operator's commands: each gives one error line, the documented exit code and no
 //! output files.
 
-use crate::support::{Answer, arg, assert_one_clear_line, program, tree};
+use crate::support::{arg, assert_one_clear_line, fifo, run_in, tree};
 use std::fs;
-use std::path::Path;
 use supple_model::Description;
-
-/// Runs the program in a folder.
-fn run_in(folder: &Path, args: &[&str]) -> Answer {
-    let output = program(args)
-        .current_dir(folder)
-        .env("XDG_RUNTIME_DIR", folder)
-        .output();
-    output.expect("it starts").into()
-}
-
-#[cfg(unix)]
-fn fifo(path: &Path) {
-    let made = std::process::Command::new("mkfifo").arg(path).status();
-    assert!(made.expect("mkfifo is there").success());
-}
 
 /// Writes nothing to a device: asserts that the device is rejected and unchanged.
 #[cfg(unix)]

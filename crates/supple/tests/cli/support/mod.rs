@@ -80,3 +80,19 @@ pub fn assert_one_clear_line(answer: &Answer, words: &[&str]) {
         assert!(errors[0].contains(word), "{word} in {}", errors[0]);
     }
 }
+
+/// Runs the program in a folder.
+pub fn run_in(folder: &Path, args: &[&str]) -> Answer {
+    let output = program(args)
+        .current_dir(folder)
+        .env("XDG_RUNTIME_DIR", folder)
+        .output();
+    output.expect("it starts").into()
+}
+
+/// Makes a FIFO.
+#[cfg(unix)]
+pub fn fifo(path: &Path) {
+    let made = std::process::Command::new("mkfifo").arg(path).status();
+    assert!(made.expect("mkfifo is there").success());
+}
