@@ -6,7 +6,7 @@ use supple_core::dynamics::gravity;
 use supple_experiment::metrics::{LineFit, median, spread};
 use supple_experiment::probing::{ContactMeter, Stroke, median_stroke};
 use supple_experiment::{
-    EdgeMeter, ExperimentError, Mismatch, Plan, Run, Setup, Variant, run, scenario,
+    EdgeMeter, ExperimentError, Mismatch, Plan, Run, Setup, Variant, run, scenario, track_pose,
 };
 use supple_model::Description;
 use supple_plant::Scene;
@@ -280,4 +280,22 @@ fn a_run_starts_with_gravity_hold_and_a_move() {
     })
     .expect("it runs");
     assert_eq!(modes, [Mode::GravityHold, Mode::Move, Mode::Track]);
+}
+
+#[test]
+fn perturbed_models_track_a_pose_at_5_n_per_m_and_half_a_n_m_per_rad() {
+    let description = Description::asset("wam7").expect("a built-in arm");
+    let setup = Setup::<7>::new(&description, 1).expect("seven joints");
+    let seeds: Vec<u64> = (0..10).collect();
+    let found = side_by_side(&seeds, |seed| {
+        track_pose(&setup, &perturbed(*seed)).expect("the pose is tracked")
+    });
+    for (seed, tracking) in found.iter().enumerate() {
+        println!("model {seed}: {tracking:?}");
+        assert!(tracking.rms_error_m <= 0.015, "model {seed}: {tracking:?}");
+        assert!(
+            tracking.rms_rotation_rad <= 2_f64.to_radians(),
+            "model {seed}: {tracking:?}"
+        );
+    }
 }

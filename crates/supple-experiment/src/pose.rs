@@ -1,0 +1,194 @@
+//! The pose mode: the tip follows the sinusoid while it turns, with every joint of an arm of six or seven active.
+
+use crate::error::ExperimentError;
+use crate::metrics::Rms;
+use crate::request_sequence::{RequestSequence, Step};
+use crate::scenario;
+use crate::setup::{Setup, Variant};
+use serde::Serialize;
+use supple_core::config::{Role, RotationalGains};
+use supple_core::controller::{Request, check_motion};
+use supple_core::dynamics::{Terms, terms, tip_pose};
+use supple_core::inverse_kinematics::inverse_kinematics;
+use supple_core::math::Vector3;
+use supple_core::pose::rotation_vector;
+use supple_core::task::Task;
+use supple_core::trajectory::Rotation;
+use supple_core::{Config, Controller, Trajectory, Vector};
+use supple_plant::Scene;
+
+/// Rotational stiffness \[N m/rad\].
+const STIFFNESS_NM_PER_RAD: f64 = 0.5;
+/// Angle of the turn \[rad\].
+const TURN_RAD: f64 = 0.4;
+/// Duration of the turn \[s\].
+const TURN_S: f64 = 8.0;
+/// Duration of gravity hold before the trajectory \[s\].
+const SETTLE_S: f64 = 0.3;
+/// Start poses that are tried.
+const CANDIDATES: u32 = 100;
+/// Points of a motion at which a start pose is judged.
+const PATH_POINTS: u32 = 64;
+/// Share of each joint's range in which they lie, around its middle.
+const RANGE_SHARE: f64 = 0.7;
+
+/// Errors of the tip in the pose mode.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct PoseTracking {
+    /// Root mean square distance of the true tip from its reference \[m\].
+    pub rms_error_m: f64,
+    /// Maximum distance \[m\].
+    pub max_error_m: f64,
+    /// Root mean square angle between the true orientation of the tip and its reference \[rad\].
+    pub rms_rotation_rad: f64,
+    /// Maximum angle \[rad\].
+    pub max_rotation_rad: f64,
+}
+
+/// Tracks the sinusoid at 5 N/m and a turn of 0.4 rad about the vertical at 0.5 N m/rad, with every joint active.
+///
+/// # Errors
+/// [`ExperimentError::Refused`] if no start pose of the arm allows the motion; [`ExperimentError::Fault`].
+pub fn track_pose<const N: usize>(
+    setup: &Setup<N>,
+    variant: &Variant,
+) -> Result<PoseTracking, ExperimentError> {
+    const NAME: &str = "pose";
+    let mut config = setup.config(variant)?;
+    config.roles = [Role::Active; N];
+    config.law.gains = scenario::gains(scenario::STIFFNESS_N_PER_M);
+    config.pose.gains = RotationalGains {
+        stiffness_nm_per_rad: Vector3::repeat(STIFFNESS_NM_PER_RAD),
+        ..config.pose.gains
+    };
+    let (trajectory, duration_s) = scenario::sinusoid(1.0);
+    let motion = Motion {
+        trajectory,
+        rotation: Rotation {
+            axis: Vector3::z(),
+            angle_rad: TURN_RAD,
+            duration_s: TURN_S,
+        },
+        duration_s,
+    };
+    let request = Request::TrackPose {
+        trajectory,
+        rotation: motion.rotation,
+    };
+    let plant = setup.plant(variant, Scene::default());
+    let true_arm = plant.arm;
+    let sequence = RequestSequence {
+        name: NAME.to_owned(),
+        start_rad: start_pose(&config, NAME, &motion, &request)?,
+        config,
+        plant,
+        steps: vec![
+            Step::wait(Request::GravityHold, SETTLE_S),
+            Step::wait(request, duration_s),
+        ],
+    };
+    let (mut distance, mut angle) = (Rms::default(), Rms::default());
+    sequence.perform(&mut |cycle, _| {
+        let output = &cycle.output;
+        if let (Some(reference), Some(orientation)) = (output.reference, output.orientation) {
+            let tip = tip_pose(&true_arm, &cycle.truth.position_rad);
+            distance.add((reference.position - tip.translation).norm());
+            let turn = orientation.base_from_tip * tip.rotation.transpose();
+            angle.add(rotation_vector(&turn).norm());
+        }
+        Ok(())
+    })?;
+    Ok(PoseTracking {
+        rms_error_m: distance.rms(),
+        max_error_m: distance.max_abs(),
+        rms_rotation_rad: angle.rms(),
+        max_rotation_rad: angle.max_abs(),
+    })
+}
+
+/// Motion of the tip.
+struct Motion {
+    trajectory: Trajectory,
+    rotation: Rotation,
+    duration_s: f64,
+}
+
+/// Of evenly spread poses with the tip at the start of the trajectory, the one whose motion is accepted and lets errors
+/// of the friction model disturb the tip least.
+fn start_pose<const N: usize>(
+    config: &Config<N>,
+    experiment: &str,
+    motion: &Motion,
+    request: &Request<N>,
+) -> Result<Vector<N>, ExperimentError> {
+    let controller = Controller::new(*config)?;
+    let limits = &config.limits;
+    let start_m = motion.trajectory.at(0.0).position;
+    let mut candidates: Vec<(f64, Vector<N>)> = (1..=CANDIDATES)
+        .filter_map(|k| {
+            let seed = Vector::from_fn(|i, _| {
+                let (lower, upper) = (limits.position_lower_rad[i], limits.position_upper_rad[i]);
+                let share = 0.5 + RANGE_SHARE * (halton(k, i) - 0.5);
+                lower + share * (upper - lower)
+            });
+            let found = inverse_kinematics(&config.arm, &config.roles, limits, &seed, &start_m);
+            found.reached().then_some(found.position_rad)
+        })
+        .map(|q| (friction_at_tip_n(config, motion, &q), q))
+        .collect();
+    candidates.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut refused = supple_core::controller::Refusal::Singular;
+    for (_, q) in candidates {
+        match check_motion(&controller, &q, request) {
+            Ok(()) => return Ok(q),
+            Err(refusal) => refused = refusal,
+        }
+    }
+    Err(ExperimentError::Refused {
+        experiment: experiment.to_owned(),
+        refusal: refused,
+    })
+}
+
+/// Force \[N\] on the tip to which the law's inverse maps the joints' dry friction, all joints together (root of the sum
+/// of squares), at its maximum along the motion; [`f64::MAX`] if the motion meets a singular pose. The joints move as the task's inverse moves them.
+fn friction_at_tip_n<const N: usize>(
+    config: &Config<N>,
+    motion: &Motion,
+    start_rad: &Vector<N>,
+) -> f64 {
+    let mut q = *start_rad;
+    let mut state = Terms::default();
+    let start = tip_pose(&config.arm, &q).rotation;
+    let mut greatest_n2 = 0.0_f64;
+    for k in 0..=PATH_POINTS {
+        let time_s = motion.duration_s * f64::from(k) / f64::from(PATH_POINTS);
+        terms(&config.arm, &q, &Vector::zeros(), &mut state);
+        let Some(task) = Task::of_pose(&state, &config.roles).filter(|task| !task.is_damped) else {
+            return f64::MAX;
+        };
+        let of_joint = |i: usize| {
+            task.inverse.fixed_view::<1, 3>(i, 0).norm_squared()
+                * config.friction[i].coulomb_nm.powi(2)
+        };
+        greatest_n2 = greatest_n2.max((0..N).map(of_joint).sum());
+        let distance = motion.trajectory.at(time_s).position - state.base_from_tip.translation;
+        let wanted = motion.rotation.at(&start, time_s).base_from_tip;
+        let angle = rotation_vector(&(wanted * state.base_from_tip.rotation.transpose()));
+        q += task.inverse * Vector::<6>::from_fn(|i, _| [distance, angle][i / 3][i % 3]);
+    }
+    greatest_n2.sqrt()
+}
+
+/// Element `index` of the Halton sequence of the `dimension`-th prime, between 0 and 1.
+fn halton(mut index: u32, dimension: usize) -> f64 {
+    const PRIMES: [u32; 7] = [2, 3, 5, 7, 11, 13, 17];
+    let base = PRIMES[dimension % PRIMES.len()];
+    let (mut value, mut digit) = (0.0, 1.0);
+    while index > 0 {
+        digit /= f64::from(base);
+        value += digit * f64::from(index % base);
+        index /= base;
+    }
+    value
+}
