@@ -6,6 +6,10 @@ use crate::config::Limits;
 use crate::law::impedance::Torques;
 use crate::math::{Vector, Vector3, abs, all_finite, sqrt};
 
+/// Share of the speed limits that applies in float and joint impedance: little or nothing but the model resists a
+/// fall there, and a hand guides slowly.
+pub(super) const COMPLIANT_SPEED_SHARE: f64 = 0.5;
+
 /// Fraction of a speed limit above which a joint or the tip counts as moving.
 pub(super) const MOVING_SHARE: f64 = 0.2;
 

@@ -2,6 +2,7 @@
 //! workspace borders. They take some milliseconds and do not run in the control loop.
 
 use super::Controller;
+use super::checks::COMPLIANT_SPEED_SHARE;
 use super::mode::{Refusal, Request};
 use super::pose_task::{DIRECTIONS, pose_reference};
 use super::requests::{active_target, check_pose_joints, check_stops};
@@ -52,16 +53,22 @@ pub fn check_motion<const N: usize>(
         Request::Move {
             target_rad,
             duration_s,
-        } => check_joint_line(config, position_rad, target_rad, *duration_s),
+        } => check_joint_line(config, 1.0, position_rad, target_rad, *duration_s),
         Request::JointImpedance {
             target_rad,
             duration_s,
         } => {
             let target_rad = active_target(config, position_rad, target_rad);
-            check_joint_line(config, position_rad, &target_rad, *duration_s)
+            check_joint_line(
+                config,
+                COMPLIANT_SPEED_SHARE,
+                position_rad,
+                &target_rad,
+                *duration_s,
+            )
         }
         Request::Excite(series) => {
-            check_joint_motion(config, series.duration_s, |time_s| series.at(time_s))
+            check_joint_motion(config, 1.0, series.duration_s, |time_s| series.at(time_s))
         }
         _ => Ok(()),
     }
@@ -70,12 +77,13 @@ pub fn check_motion<const N: usize>(
 /// Checks a minimum-jerk motion on a straight line in joint space.
 fn check_joint_line<const N: usize>(
     config: &Config<N>,
+    speed_share: f64,
     from_rad: &Vector<N>,
     to_rad: &Vector<N>,
     duration_s: f64,
 ) -> Result<(), Refusal> {
     let displacement = to_rad - from_rad;
-    check_joint_motion(config, duration_s, |time_s| {
+    check_joint_motion(config, speed_share, duration_s, |time_s| {
         let (share, first_derivative, second_derivative) = smooth_step(time_s / duration_s);
         JointReference {
             position_rad: from_rad + displacement * share,
@@ -123,7 +131,7 @@ fn check_trajectory<const N: usize>(
         terms(&config.arm, &q, &qd, &mut dynamics);
         let bias_acceleration = dynamics.jacobian_dot_qd.fixed_rows::<3>(0);
         let qdd = task.inverse * (reference.acceleration - bias_acceleration);
-        check_joints(config, &dynamics, &qd, &qdd)?;
+        check_joints(config, 1.0, &dynamics, &qd, &qdd)?;
     }
     Ok(())
 }
@@ -152,7 +160,7 @@ fn check_pose<const N: usize>(
         let velocity = task.inverse * reference.velocity();
         terms(&config.arm, &q, &velocity, &mut state);
         let acceleration = task.inverse * (reference.acceleration() - state.jacobian_dot_qd);
-        check_joints(config, &state, &velocity, &acceleration)?;
+        check_joints(config, 1.0, &state, &velocity, &acceleration)?;
     }
     Ok(())
 }
@@ -191,8 +199,10 @@ fn solve_pose<const N: usize>(
     }
 }
 
+/// Checks a joint motion; `speed_share` of the limits of joint and tip speed applies.
 fn check_joint_motion<const N: usize>(
     config: &Config<N>,
+    speed_share: f64,
     duration_s: f64,
     reference_at: impl Fn(f64) -> JointReference<N>,
 ) -> Result<(), Refusal> {
@@ -209,7 +219,8 @@ fn check_joint_motion<const N: usize>(
             return Err(Refusal::Workspace { border, value_m });
         }
         let tip_velocity = dynamics.jacobian.fixed_rows::<3>(0) * qd;
-        let (value, limit) = (tip_velocity.norm(), config.limits.tip_speed_m_per_s);
+        let limit = speed_share * config.limits.tip_speed_m_per_s;
+        let value = tip_velocity.norm();
         if value > limit {
             return Err(Refusal::Value {
                 entry: "peak tip speed of the motion [m/s]",
@@ -217,7 +228,8 @@ fn check_joint_motion<const N: usize>(
                 limit,
             });
         }
-        check_joints(config, &dynamics, &qd, &reference.acceleration_rad_per_s2)?;
+        let qdd = &reference.acceleration_rad_per_s2;
+        check_joints(config, speed_share, &dynamics, &qd, qdd)?;
     }
     Ok(())
 }
@@ -225,13 +237,14 @@ fn check_joint_motion<const N: usize>(
 /// Checks joint speeds and torques at one point of the motion.
 fn check_joints<const N: usize>(
     config: &Config<N>,
+    speed_share: f64,
     dynamics: &Terms<N>,
     qd: &Vector<N>,
     qdd: &Vector<N>,
 ) -> Result<(), Refusal> {
     let torque = dynamics.coriolis_gravity + dynamics.mass_matrix * qdd;
     for joint in 0..N {
-        let limit_rad_per_s = config.limits.joint_speed_rad_per_s[joint];
+        let limit_rad_per_s = speed_share * config.limits.joint_speed_rad_per_s[joint];
         let value_rad_per_s = abs(qd[joint]);
         if value_rad_per_s > limit_rad_per_s {
             return Err(Refusal::TooFast {

@@ -5,7 +5,7 @@
 
 use super::Controller;
 use super::activity::Activity;
-use super::checks::DAMPING_MARGIN;
+use super::checks::{COMPLIANT_SPEED_SHARE, DAMPING_MARGIN};
 use super::fault::SafeAction;
 use super::mode::{Breakaway, Mode, Refusal, Request};
 use super::pose_task::DIRECTIONS;
@@ -83,7 +83,7 @@ impl<const N: usize> State<N> {
             } => {
                 check_stops(config, &target_rad)?;
                 check_held_targets(config, &target_rad)?;
-                check_line(config, &self.position, &target_rad, duration_s)?;
+                check_line(config, 1.0, &self.position, &target_rad, duration_s)?;
                 self.enter(Activity::Move {
                     from_rad: self.position,
                     to_rad: target_rad,
@@ -117,7 +117,13 @@ impl<const N: usize> State<N> {
             } => {
                 let target_rad = active_target(config, &self.position, &target_rad);
                 check_stops(config, &target_rad)?;
-                check_line(config, &self.position, &target_rad, duration_s)?;
+                check_line(
+                    config,
+                    COMPLIANT_SPEED_SHARE,
+                    &self.position,
+                    &target_rad,
+                    duration_s,
+                )?;
                 self.check_joint_damping(controller, &self.joint_gains.to)?;
                 self.enter(Activity::JointImpedance {
                     from_rad: self.position,
@@ -513,8 +519,10 @@ pub(super) fn check_stops<const N: usize>(
     Ok(())
 }
 
+/// `speed_share` of the joints' speed limits applies.
 fn check_line<const N: usize>(
     config: &Config<N>,
+    speed_share: f64,
     from_rad: &Vector<N>,
     to_rad: &Vector<N>,
     duration_s: f64,
@@ -530,7 +538,7 @@ fn check_line<const N: usize>(
     for joint in 0..N {
         let displacement_rad = abs(to_rad[joint] - from_rad[joint]);
         let value_rad_per_s = MINIMUM_JERK_SPEED * displacement_rad / duration_s;
-        let limit_rad_per_s = limits.joint_speed_rad_per_s[joint];
+        let limit_rad_per_s = speed_share * limits.joint_speed_rad_per_s[joint];
         if value_rad_per_s > limit_rad_per_s || value_rad_per_s.is_nan() {
             return Err(Refusal::TooFast {
                 joint,

@@ -2,7 +2,7 @@
 
 use super::activity::Activity;
 use super::checks;
-use super::checks::MOVING_SHARE;
+use super::checks::{COMPLIANT_SPEED_SHARE, MOVING_SHARE};
 use super::fault::Fault;
 use super::plausibility::{
     OTHER_JOINT_MOVING_RAD_PER_S, PlausibilityInput, SUDDEN_STOP_SHARE, joint_collision,
@@ -15,10 +15,6 @@ use crate::law::impedance::{SINGULAR_BELOW_M, Task};
 use crate::math::{Vector, Vector3, abs};
 use crate::model::workspace::WorkspaceViolation;
 use crate::trajectory::Reference;
-
-/// Share of the speed limits that applies in float: nothing but the model resists a fall there, and a hand guides
-/// slowly.
-const FLOAT_SPEED_SHARE: f64 = 0.5;
 
 /// Whether the pose is regular, so that the tip force can be estimated from the joint torques.
 fn is_regular<const N: usize>(task: &Task<N>) -> bool {
@@ -37,7 +33,7 @@ impl<const N: usize> State<N> {
         }
         let velocity = &self.estimator.velocity_rad_per_s;
         let speed_share = match self.activity {
-            Activity::Float => FLOAT_SPEED_SHARE,
+            Activity::Float | Activity::JointImpedance { .. } => COMPLIANT_SPEED_SHARE,
             _ => 1.0,
         };
         checks::motion(

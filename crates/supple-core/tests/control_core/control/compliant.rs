@@ -8,7 +8,7 @@ use crate::support::rig::{Rig, bent};
 use crate::support::{assert_close, size};
 use proptest::prelude::*;
 use supple_core::config::{Config, JointGains, Role};
-use supple_core::controller::{Mode, Refusal, Request};
+use supple_core::controller::{Fault, Mode, Refusal, Request};
 use supple_core::dynamics::{aba, gravity, kinetic_energy, tip_pose};
 use supple_core::math::Vector3;
 use supple_core::{Arm, Output, Vector};
@@ -205,6 +205,54 @@ fn the_spring_has_a_bound() {
     let output = rig.rest();
     assert_eq!((output.mode, output.fault), (Mode::JointImpedance, None));
     assert_eq!(output.torques.stiffness[1], -10.0);
+}
+
+/// Half of the speed limits: a request that would reach more is refused, a joint that is faster is a fault.
+#[test]
+fn compliant_joints_have_half_of_the_speed_limits() {
+    let config = four();
+    let half = 0.5 * config.limits.joint_speed_rad_per_s[0];
+    let mut rig = Rig::holding(config, bent());
+    let distance_rad = 0.3;
+    // The peak speed of a minimum-jerk motion is 15/8 of its mean.
+    let line = |share: f64| Request::JointImpedance {
+        target_rad: bent::<4>() + Vector::<4>::new(distance_rad, 0.0, 0.0, 0.0),
+        duration_s: 1.875 * distance_rad / (half * share),
+    };
+    match rig.request(line(1.01)).refusal {
+        Some(Refusal::TooFast {
+            joint,
+            limit_rad_per_s,
+            ..
+        }) => assert_eq!((joint, limit_rad_per_s), (0, half)),
+        other => panic!("{other:?}"),
+    }
+    for (request, faults) in [
+        (Request::GravityHold, false),
+        (rig.joint_impedance_request(), true),
+    ] {
+        let mut rig = Rig::holding(free_of_collisions(config), bent());
+        rig.accept(request);
+        let output = (0..300)
+            .map(|_| {
+                rig.q[0] += 1.1 * half * config.period_s;
+                rig.cycle()
+            })
+            .last();
+        let fault = output.and_then(|output| output.fault);
+        assert_eq!(
+            matches!(fault, Some(Fault::JointSpeed { joint: 0, .. })),
+            faults,
+            "{request:?}: {fault:?}"
+        );
+    }
+}
+
+fn free_of_collisions(config: Config<4>) -> Config<4> {
+    Config {
+        collision: supple_core::config::Collision::disabled(),
+        ..config
+    }
 }
 
 #[test]

@@ -297,6 +297,43 @@ fn a_stuck_encoder_faults() {
     );
 }
 
+/// Encoders that all stopped count as stuck after half of the way that a single one may be unchanged.
+#[test]
+fn all_encoders_stuck_at_once_fault_sooner() {
+    let stuck = |jitter_rad: f64| {
+        let mut config = guarded();
+        config.plausible.stuck_rad = 0.1;
+        config.collision = Collision::disabled();
+        let mut rig = Rig::holding(config, bent());
+        rig.accept(Request::JointImpedance {
+            target_rad: bent::<4>() + Vector::<4>::new(0.3, 0.3, 0.0, 0.3),
+            duration_s: 2.0,
+        });
+        for k in 0..2000 {
+            rig.q[2] += if k % 2 == 0 { jitter_rad } else { -jitter_rad };
+            if let Some(fault) = rig.cycle().fault {
+                return fault;
+            }
+        }
+        panic!("no fault");
+    };
+    for (jitter_rad, expected_rad) in [(0.0, 0.05), (1e-6, 0.1)] {
+        let Fault::EncoderStuck {
+            value_rad,
+            limit_rad,
+            ..
+        } = stuck(jitter_rad)
+        else {
+            panic!("another fault");
+        };
+        assert_eq!(limit_rad, expected_rad);
+        assert!(
+            value_rad < 1.02 * limit_rad,
+            "{value_rad} rad before the fault"
+        );
+    }
+}
+
 /// A joint that moved when the drives became idle and is at rest when they are re-enabled does not
 /// count as a stuck encoder.
 #[test]
