@@ -159,8 +159,8 @@ fn limit(instructions: u64) -> LibraryBenchmarkConfig {
 #[bench::law_apart_3(args = (position_apart::<3>("wam3")), config = limit(4_850))]
 #[bench::law_apart_4(args = (position_apart::<4>("wam4")), config = limit(5_550))]
 #[bench::law_apart_7(args = (pose_apart::<7>("wam7")), config = limit(17_500))]
-#[bench::step_3(args = (controller_step::<3>("wam3")), config = limit(7_450))]
-#[bench::step_4(args = (controller_step::<4>("wam4")), config = limit(8_100))]
+#[bench::step_3(args = (controller_step::<3>("wam3")), config = limit(7_200))]
+#[bench::step_4(args = (controller_step::<4>("wam4")), config = limit(7_950))]
 #[bench::step_7(args = (controller_step::<7>("wam7")), config = limit(16_700))]
 fn instructions(mut call: Call) {
     call();

@@ -77,6 +77,7 @@ impl<'a, T, const N: usize, const D: usize> LawInput<'a, T, N, D> {
 impl<'a, T, const N: usize> LawInput<'a, T, N> {
     /// The configured law of the position, with the friction of the joints and the measured force on
     /// the tip, base axes \[N\].
+    #[inline(always)]
     pub fn of_law(
         law: &Law,
         friction: &'a [Friction; N],
@@ -113,6 +114,7 @@ impl<const D: usize> Apparent<D> {
 }
 
 /// The law, term by term. Adds nothing for held joints but the model's own terms.
+#[inline(always)]
 pub fn impedance<T: Target<D>, const N: usize, const D: usize>(
     roles: &[Role; N],
     terms: &Terms<N>,
