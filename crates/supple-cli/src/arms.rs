@@ -1,5 +1,6 @@
-//! Loads arm descriptions, built in or from files.
+//! Loads arm descriptions, built in or from files; `supple arms`.
 
+use crate::arguments::{ArmsArgs, ArmsCommand};
 use crate::console::{print_json, print_line, print_status};
 use crate::exit::Failure;
 use serde::Serialize;
@@ -58,11 +59,40 @@ struct Line {
     source: Option<String>,
 }
 
-/// Lists the built-in arms.
+/// Runs `supple arms`.
 ///
 /// # Errors
-/// [`Failure`] if an arm description is invalid or standard output cannot be written.
-pub fn list(as_json: bool) -> Result<(), Failure> {
+/// [`Failure`] if an arm description is invalid, a file exists or cannot be written, or standard output cannot be
+/// written.
+pub fn run(args: &ArmsArgs) -> Result<(), Failure> {
+    match &args.command {
+        None => list(args.json),
+        Some(ArmsCommand::Copy {
+            arm,
+            folder,
+            all_joints_active,
+            force,
+        }) => copy(arm, folder, *all_joints_active, *force),
+    }
+}
+
+fn copy(arm: &str, folder: &Path, all_joints_active: bool, force: bool) -> Result<(), Failure> {
+    let mut description = find(arm, false)?;
+    if all_joints_active {
+        description = description.with_all_joints_active()?;
+    }
+    let existing = ["arm.toml", "arm.urdf"].map(|name| folder.join(name));
+    if let (false, Some(path)) = (force, existing.into_iter().find(|path| path.exists())) {
+        return Err(Failure::Exists { path });
+    }
+    description.save(folder)?;
+    print_line(&format!(
+        "{0}/arm.toml and {0}/arm.urdf; use it with --arm {0}",
+        folder.display()
+    ))
+}
+
+fn list(as_json: bool) -> Result<(), Failure> {
     let lines = assets()
         .iter()
         .map(|name| {

@@ -64,7 +64,7 @@ pub use demo_options::DemoOptions;
 pub use error::ExperimentError;
 pub use excite::{constant_speed_runs, excitation, slow_motion};
 pub use mismatch::Mismatch;
-pub use pose::{PoseTracking, track_pose};
+pub use pose::{PoseMotion, PoseTracking, pose_start, track_pose};
 pub use quadrant::{Edge, EdgeMeter};
 pub use record::Recorder;
 pub use request_sequence::{Recording, RequestSequence, Step, StepCallback};

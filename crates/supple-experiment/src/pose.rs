@@ -5,6 +5,7 @@ use crate::metrics::Rms;
 use crate::request_sequence::{RequestSequence, Step};
 use crate::scenario;
 use crate::setup::{Setup, Variant};
+use crate::start::spread_poses;
 use serde::Serialize;
 use supple_core::config::{Role, RotationalGains};
 use supple_core::controller::{Request, check_motion};
@@ -29,8 +30,6 @@ const SETTLE_S: f64 = 0.3;
 const CANDIDATES: u32 = 100;
 /// Points of a motion at which a start pose is judged.
 const PATH_POINTS: u32 = 64;
-/// Share of each joint's range in which they lie, around its middle.
-const RANGE_SHARE: f64 = 0.7;
 
 /// Errors of the tip in the pose mode.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -62,7 +61,7 @@ pub fn track_pose<const N: usize>(
         ..config.pose.gains
     };
     let (trajectory, duration_s) = scenario::sinusoid(1.0);
-    let motion = Motion {
+    let motion = PoseMotion {
         trajectory,
         rotation: Rotation {
             axis: Vector3::z(),
@@ -71,20 +70,16 @@ pub fn track_pose<const N: usize>(
         },
         duration_s,
     };
-    let request = Request::TrackPose {
-        trajectory,
-        rotation: motion.rotation,
-    };
     let plant = setup.plant(variant, Scene::default());
     let true_arm = plant.arm;
     let sequence = RequestSequence {
         name: NAME.to_owned(),
-        start_rad: start_pose(&config, NAME, &motion, &request)?,
+        start_rad: pose_start(&config, NAME, &motion)?,
         config,
         plant,
         steps: vec![
             Step::wait(Request::GravityHold, SETTLE_S),
-            Step::wait(request, duration_s),
+            Step::wait(motion.request(), duration_s),
         ],
     };
     let (mut distance, mut angle) = (Rms::default(), Rms::default());
@@ -106,40 +101,49 @@ pub fn track_pose<const N: usize>(
     })
 }
 
-/// Motion of the tip.
-struct Motion {
-    trajectory: Trajectory,
-    rotation: Rotation,
-    duration_s: f64,
+/// A motion of the tip's position and orientation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PoseMotion {
+    /// Trajectory of the position.
+    pub trajectory: Trajectory,
+    /// Turn of the orientation.
+    pub rotation: Rotation,
+    /// Duration \[s\].
+    pub duration_s: f64,
+}
+
+impl PoseMotion {
+    /// The request of this motion.
+    pub fn request<const N: usize>(&self) -> Request<N> {
+        Request::TrackPose {
+            trajectory: self.trajectory,
+            rotation: self.rotation,
+        }
+    }
 }
 
 /// Of evenly spread poses with the tip at the start of the trajectory, the one whose motion is accepted and lets errors
 /// of the friction model disturb the tip least.
-fn start_pose<const N: usize>(
+///
+/// # Errors
+/// [`ExperimentError::Refused`] with the reason of the last pose if no pose allows the motion.
+pub fn pose_start<const N: usize>(
     config: &Config<N>,
     experiment: &str,
-    motion: &Motion,
-    request: &Request<N>,
+    motion: &PoseMotion,
 ) -> Result<Vector<N>, ExperimentError> {
     let controller = Controller::new(*config)?;
     let limits = &config.limits;
     let start_m = motion.trajectory.at(0.0).position;
-    let mut candidates: Vec<(f64, Vector<N>)> = (1..=CANDIDATES)
-        .filter_map(|k| {
-            let seed = Vector::from_fn(|i, _| {
-                let (lower, upper) = (limits.position_lower_rad[i], limits.position_upper_rad[i]);
-                let share = 0.5 + RANGE_SHARE * (halton(k, i) - 0.5);
-                lower + share * (upper - lower)
-            });
-            let found = inverse_kinematics(&config.arm, &config.roles, limits, &seed, &start_m);
-            found.reached().then_some(found.position_rad)
-        })
+    let mut candidates: Vec<(f64, Vector<N>)> = spread_poses(config, CANDIDATES)
+        .map(|seed| inverse_kinematics(&config.arm, &config.roles, limits, &seed, &start_m))
+        .filter_map(|found| found.reached().then_some(found.position_rad))
         .map(|q| (friction_at_tip_n(config, motion, &q), q))
         .collect();
     candidates.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut refused = supple_core::controller::Refusal::Singular;
     for (_, q) in candidates {
-        match check_motion(&controller, &q, request) {
+        match check_motion(&controller, &q, &motion.request()) {
             Ok(()) => return Ok(q),
             Err(refusal) => refused = refusal,
         }
@@ -154,7 +158,7 @@ fn start_pose<const N: usize>(
 /// of squares), at its maximum along the motion; [`f64::MAX`] if the motion meets a singular pose. The joints move as the task's inverse moves them.
 fn friction_at_tip_n<const N: usize>(
     config: &Config<N>,
-    motion: &Motion,
+    motion: &PoseMotion,
     start_rad: &Vector<N>,
 ) -> f64 {
     let mut q = *start_rad;
@@ -178,17 +182,4 @@ fn friction_at_tip_n<const N: usize>(
         q += task.inverse * Vector::<6>::from_fn(|i, _| [distance, angle][i / 3][i % 3]);
     }
     greatest_n2.sqrt()
-}
-
-/// Element `index` of the Halton sequence of the `dimension`-th prime, between 0 and 1.
-fn halton(mut index: u32, dimension: usize) -> f64 {
-    const PRIMES: [u32; 7] = [2, 3, 5, 7, 11, 13, 17];
-    let base = PRIMES[dimension % PRIMES.len()];
-    let (mut value, mut digit) = (0.0, 1.0);
-    while index > 0 {
-        digit /= f64::from(base);
-        value += digit * f64::from(index % base);
-        index /= base;
-    }
-    value
 }

@@ -1,4 +1,4 @@
-//! Writes an identified model into a description (URDF and TOML).
+//! Writes an identified model or other settings into a description (URDF and TOML).
 //!
 //! The texts are edited in place, so shapes, limits, gains and comments are kept. The inertia of each moving
 //! link, including all links fixed to it and the tool, goes into the `<inertial>` of that link; the fixed links
@@ -66,6 +66,18 @@ impl Description {
                 let joint = self.joint_table(&mut document, joint)?;
                 put(joint, "move_collision_torque_nm", (*threshold_nm).into());
             }
+        }
+        Description::from_text(&document.to_string(), self.urdf())
+    }
+
+    /// Returns the same arm with every joint active: no joint is held.
+    ///
+    /// # Errors
+    /// Any [`ModelError`] of the edited text.
+    pub fn with_all_joints_active(&self) -> Result<Description, ModelError> {
+        let mut document = self.document()?;
+        for joint in 0..self.dof() {
+            self.joint_table(&mut document, joint)?.remove("held");
         }
         Description::from_text(&document.to_string(), self.urdf())
     }

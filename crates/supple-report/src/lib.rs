@@ -43,6 +43,6 @@ fn dispatch(command: &OfflineCommand) -> Result<(), Failure> {
         OfflineCommand::Demo(args) => demo::run(args),
         OfflineCommand::Identification(command) => identification::run(command),
         OfflineCommand::Log(command) => log::run(command),
-        OfflineCommand::Arms { json } => arms::list(*json),
+        OfflineCommand::Arms(args) => arms::run(args),
     }
 }

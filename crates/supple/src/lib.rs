@@ -51,7 +51,7 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
         Command::Reset(system) => operate::reset(system),
         Command::Stop(system) => operate::stop(system),
         Command::Offline(OfflineCommand::Log(command)) => log::run(command),
-        Command::Offline(OfflineCommand::Arms { json }) => arms::list(*json),
+        Command::Offline(OfflineCommand::Arms(args)) => arms::run(args),
         Command::Doctor { json } => doctor::run(*json),
         Command::Completions { shell } => {
             let mut script = Vec::new();

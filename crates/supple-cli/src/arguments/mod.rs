@@ -12,7 +12,8 @@ pub use identification::{
 pub use log::LogCommand;
 
 use crate::exit::CODES;
-use clap::Subcommand;
+use clap::{Args, Subcommand};
+use std::path::PathBuf;
 
 /// Command that needs no running system.
 #[derive(Clone, Debug, Subcommand)]
@@ -26,11 +27,37 @@ pub enum OfflineCommand {
     /// Inspect, export, replay and recover logs.
     #[command(subcommand)]
     Log(LogCommand),
-    /// List the built-in arms.
-    Arms {
-        /// Print the result as JSON.
+    /// List the built-in arms, or copy one.
+    Arms(ArmsArgs),
+}
+
+/// Arguments of `supple arms`.
+#[derive(Clone, Debug, Args)]
+#[command(args_conflicts_with_subcommands = true)]
+pub struct ArmsArgs {
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+    /// What to do instead of listing the arms.
+    #[command(subcommand)]
+    pub command: Option<ArmsCommand>,
+}
+
+/// What to do with a built-in arm.
+#[derive(Clone, Debug, Subcommand)]
+pub enum ArmsCommand {
+    /// Write the TOML and the URDF of an arm into a folder, as a start for another arm.
+    Copy {
+        /// A built-in arm, or the path of an arm's TOML or of its folder.
+        arm: String,
+        /// Folder of the copy; it is created if necessary.
+        folder: PathBuf,
+        /// Leave out the `held` entries: the law controls every joint, as the pose mode needs it.
         #[arg(long)]
-        json: bool,
+        all_joints_active: bool,
+        /// Replace files of an existing arm.
+        #[arg(long)]
+        force: bool,
     },
 }
 
@@ -41,7 +68,7 @@ impl OfflineCommand {
             OfflineCommand::Demo(args) => args.json,
             OfflineCommand::Identification(command) => command.json(),
             OfflineCommand::Log(command) => command.json(),
-            OfflineCommand::Arms { json } => *json,
+            OfflineCommand::Arms(args) => args.json,
         }
     }
 }

@@ -44,6 +44,8 @@ pub(super) struct Plausibility<const N: usize> {
     opposed_cycles: [u32; N],
     last_momentum: Vector<N>,
     load_s: f64,
+    /// An encoder has changed in the present contact.
+    moved_in_contact: bool,
 }
 
 impl<const N: usize> Default for Plausibility<N> {
@@ -58,6 +60,7 @@ impl<const N: usize> Default for Plausibility<N> {
             opposed_cycles: [0; N],
             last_momentum: Vector::zeros(),
             load_s: 0.0,
+            moved_in_contact: false,
         }
     }
 }
@@ -153,6 +156,13 @@ impl<const N: usize> Plausibility<N> {
             }
             fault => fault,
         }
+    }
+
+    /// Whether the latched contact is one: some encoder has changed in it.
+    pub fn is_contact_plausible(&mut self, in_contact: bool) -> bool {
+        self.moved_in_contact =
+            in_contact && (self.moved_in_contact || self.unchanged.contains(&false));
+        self.moved_in_contact
     }
 
     /// Reports a stuck encoder if its value is unchanged while the joint's reference travels further than the limit,

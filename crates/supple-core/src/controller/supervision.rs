@@ -197,10 +197,12 @@ impl<const N: usize> State<N> {
                 against?;
             }
             // In contact the joints may stand still while their references move; but if other
-            // joints move, a single unchanged encoder is stuck.
+            // joints move, a single unchanged encoder is stuck. Encoders that are all stuck make a
+            // contact themselves: it counts once one of them has changed in it.
             let others_move =
                 (0..N).any(|joint| abs(velocity[joint]) > OTHER_JOINT_MOVING_RAD_PER_S);
-            if others_move || !self.latch.in_contact() {
+            let in_contact = plausibility.is_contact_plausible(self.latch.in_contact());
+            if others_move || !in_contact {
                 let limit_rad = config.plausible.stuck_rad;
                 plausibility.check_stuck_encoder(
                     limit_rad,

@@ -1,12 +1,13 @@
 //! Runs a test case in virtual time. All requests are queued before the first cycle, so every run is bit-identical.
 
+use super::TestArm;
 use super::evaluation::evaluate;
 use super::metrics::{ControllerSample, RowMetrics};
 use super::row::Row;
 use super::spec::{DriveShutdown, Event, InvalidRequest, Spec, TestTask};
 use super::task::Script;
 use super::trace;
-use crate::cli::{DrillArgs, PlantKind, UpArgs, UpTrajectory};
+use crate::cli::{PlantKind, UpArgs, UpTrajectory};
 use crate::up::{START_S, System};
 use core::time::Duration;
 use std::path::PathBuf;
@@ -38,11 +39,11 @@ const PUSHED_M_PER_S: f64 = 0.25;
 ///
 /// # Errors
 /// If the system cannot be started, or one of its processes exits.
-pub fn perform<const N: usize>(
-    spec: &Spec,
-    args: &DrillArgs,
-    description: &Description,
-) -> Result<Row, Failure> {
+pub fn perform<const N: usize>(spec: &Spec, arm: &TestArm) -> Result<Row, Failure> {
+    let description = &match arm.rate_hz {
+        Some(rate_hz) => arm.description.clone().at_rate(f64::from(rate_hz))?,
+        None => arm.description.clone(),
+    };
     let config = description.config::<N>()?;
     let home_rad = description.home::<N>()?;
     let script = Script::new(spec, &config, description, &home_rad)?;
@@ -62,8 +63,8 @@ pub fn perform<const N: usize>(
     let push_rad_per_s = -PUSHED_M_PER_S / jacobian(&config.arm, &script.start_rad)[(2, 1)];
     let up = UpArgs {
         plant: spec.plant,
-        arm: args.arm.clone(),
-        strict: args.strict,
+        arm: arm.name.clone(),
+        strict: arm.strict,
         track: UpTrajectory::Sinusoid,
         bus: None,
         zero_at_home: false,
@@ -75,7 +76,7 @@ pub fn perform<const N: usize>(
         }),
         inject: injections(spec, event_s, back_s, pushed.then_some(push_rad_per_s)),
         trace: Some(file.clone()),
-        rate_hz: None,
+        rate_hz: arm.rate_hz,
         for_s: Some(event_s + back_s + OBSERVED_S),
         virtual_time: true,
         log: PathBuf::new(),

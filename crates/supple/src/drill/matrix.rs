@@ -30,7 +30,17 @@ const CONTACT_FAULTS: &[&str] = &[
     "workspace",
     "joint_tracking_error",
 ];
-/// Valid faults after a disturbance: the arm leaves its path or exceeds a speed limit.
+/// The same in the pose mode.
+const POSE_CONTACT_FAULTS: &[&str] = &[
+    "joint_collision",
+    "tip_collision",
+    "joint_speed",
+    "rotation_error",
+    "singular",
+    "workspace",
+];
+/// Valid faults after a disturbance: the arm leaves its path, exceeds a speed limit or, in the pose mode, gets near a
+/// singular pose.
 const DISTURBANCE_FAULTS: &[&str] = &[
     "joint_collision",
     "tip_collision",
@@ -39,6 +49,8 @@ const DISTURBANCE_FAULTS: &[&str] = &[
     "joint_tracking_error",
     "tracking_error",
     "workspace",
+    "rotation_error",
+    "singular",
 ];
 /// Valid faults for a stuck encoder.
 const STUCK_ENCODER_FAULTS: &[&str] = &[
@@ -49,6 +61,8 @@ const STUCK_ENCODER_FAULTS: &[&str] = &[
     "tracking_error",
     "joint_collision",
     "tip_collision",
+    "rotation_error",
+    "singular",
 ];
 /// Valid faults when a joint moves in the wrong direction: reversed encoder, motor or gravity.
 const WRONG_DIRECTION_FAULTS: &[&str] = &[
@@ -62,6 +76,8 @@ const WRONG_DIRECTION_FAULTS: &[&str] = &[
     "joint_speed",
     "tip_speed",
     "workspace",
+    "rotation_error",
+    "singular",
 ];
 /// Valid faults for lost, jumping or non-finite joint angles.
 const ENCODER_LOSS_FAULTS: &[&str] = &[
@@ -106,6 +122,7 @@ const ALL_TASKS: [TestTask; 7] = [
     TestTask::JointImpedance,
 ];
 
+/// Cases of processes that fail: of the tasks that `supple up` begins with.
 fn wall_clock_cases(plant: PlantKind) -> Vec<Spec> {
     let brakes = |(from, to)| Expected::Brakes(from, to);
     let mut processes = match plant {
@@ -149,7 +166,7 @@ fn wall_clock_cases(plant: PlantKind) -> Vec<Spec> {
 
 fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
     use InjectionKind as Kind;
-    use TestTask::{Excite, Float, GravityHold, JointImpedance, Move, Probe, Track};
+    use TestTask::{Excite, Float, GravityHold, JointImpedance, Move, Probe, Track, TrackPose};
     let mut cases = Vec::new();
     let mut add = |tasks: &[TestTask], event, expected, within_ms| {
         cases.extend(tasks.iter().map(|task| Spec {
@@ -170,8 +187,9 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
     };
     let (stops, runs_or_faults) = (Expected::FaultAndRest, Expected::KeepsRunningOrFault);
     let one = Some(1);
+    let all: Vec<TestTask> = ALL_TASKS.into_iter().chain([TrackPose]).collect();
     add(
-        &ALL_TASKS,
+        &all,
         Event::Nothing { wall: false },
         Expected::KeepsRunning,
         0.0,
@@ -183,7 +201,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         speed_rad_per_s: 2.5,
     });
     add(
-        &ALL_TASKS,
+        &all,
         bump,
         runs_or_faults(DISTURBANCE_FAULTS),
         FAULT_AND_STOP_MS,
@@ -203,6 +221,13 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         &[GravityHold, Track, Probe, Float, JointImpedance],
         Event::Obstacle,
         runs_or_faults(CONTACT_FAULTS),
+        FAULT_AND_STOP_MS,
+    );
+    // A contact flings the light joints of the wrist.
+    add(
+        &[TrackPose],
+        Event::Obstacle,
+        runs_or_faults(POSE_CONTACT_FAULTS),
         FAULT_AND_STOP_MS,
     );
     add(
@@ -229,7 +254,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         FAULT_AND_STOP_MS,
     );
     add(
-        &[Track, JointImpedance],
+        &[Track, JointImpedance, TrackPose],
         stuck,
         stops(STUCK_ENCODER_FAULTS),
         LATE_FAULT_AND_STOP_MS,
@@ -248,7 +273,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         FAULT_AND_STOP_MS,
     );
     add(
-        &[Move, Track, JointImpedance],
+        &[Move, Track, JointImpedance, TrackPose],
         all_stuck,
         stops(STUCK_ENCODER_FAULTS),
         LATE_FAULT_AND_STOP_MS,
@@ -258,7 +283,15 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         cycles: 20,
     });
     add(
-        &[GravityHold, Move, Track, Excite, Float, JointImpedance],
+        &[
+            GravityHold,
+            Move,
+            Track,
+            Excite,
+            Float,
+            JointImpedance,
+            TrackPose,
+        ],
         late,
         runs_or_faults(WRONG_DIRECTION_FAULTS),
         LATE_FAULT_AND_STOP_MS,
@@ -271,7 +304,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         LATE_FAULT_AND_STOP_MS,
     );
     add(
-        &[Move, Track, JointImpedance],
+        &[Move, Track, JointImpedance, TrackPose],
         sign,
         stops(WRONG_DIRECTION_FAULTS),
         LATE_FAULT_AND_STOP_MS,
@@ -281,7 +314,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         every: 2,
     });
     add(
-        &[GravityHold, Track, Float, JointImpedance],
+        &[GravityHold, Track, Float, JointImpedance, TrackPose],
         second,
         stops(ENCODER_LOSS_FAULTS),
         FAULT_AND_STOP_MS,
@@ -291,7 +324,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         offset_rad: 0.2,
     });
     add(
-        &[GravityHold, Track, Float, JointImpedance],
+        &[GravityHold, Track, Float, JointImpedance, TrackPose],
         jump,
         stops(ENCODER_LOSS_FAULTS),
         FAULT_AND_STOP_MS,
@@ -304,21 +337,21 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
     // Motors.
     let dead = injected(Kind::MotorDead { motor: 1 });
     add(
-        &[GravityHold, Move, Track, Float, JointImpedance],
+        &[GravityHold, Move, Track, Float, JointImpedance, TrackPose],
         dead,
         stops(WRONG_DIRECTION_FAULTS),
         FAULT_AND_STOP_MS,
     );
     let reversed = injected(Kind::TorqueSign { joint: 1 });
     add(
-        &[GravityHold, Track, Float, JointImpedance],
+        &[GravityHold, Track, Float, JointImpedance, TrackPose],
         reversed,
         stops(WRONG_DIRECTION_FAULTS),
         FAULT_AND_STOP_MS,
     );
     let later = injected(Kind::TorqueLate { cycles: 3 });
     add(
-        &[GravityHold, Move, Track, Float, JointImpedance],
+        &[GravityHold, Move, Track, Float, JointImpedance, TrackPose],
         later,
         runs_or_faults(DISTURBANCE_FAULTS),
         LATE_FAULT_AND_STOP_MS,
@@ -327,7 +360,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
     // Unmodelled effects.
     let gravity = Kind::GravityReversed;
     add(
-        &[GravityHold, Move, Track, Float, JointImpedance],
+        &[GravityHold, Move, Track, Float, JointImpedance, TrackPose],
         injected(gravity),
         stops(WRONG_DIRECTION_FAULTS),
         FAULT_AND_STOP_MS,
@@ -377,7 +410,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
     // Drives and requests.
     let idle = Event::Drives(DriveShutdown::Idle);
     add(
-        &[GravityHold, Move, Track, Float, JointImpedance],
+        &[GravityHold, Move, Track, Float, JointImpedance, TrackPose],
         idle,
         Expected::ReturnsToGravityHold,
         FAULT_AND_STOP_MS,

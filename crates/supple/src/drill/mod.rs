@@ -25,19 +25,28 @@ mod trace;
 
 use crate::cli::{DrillArgs, PlantKind};
 use row::Row;
-use spec::Spec;
+use spec::{Spec, TestTask};
+use std::path::PathBuf;
 use supple_cli::arms;
 use supple_cli::console::{print_json, print_line, print_status};
 use supple_cli::exit::Failure;
 use supple_cli::interrupt;
+use supple_ipc::Domain;
 use supple_model::{Description, with_dof};
+
+/// Arm of the pose mode if the one of the command line has too few joints.
+const POSE_ARM: &str = "wam7";
+/// Joints that the pose mode needs.
+const POSE_JOINTS: usize = 6;
+/// Control rate of the pose mode on the emulated bus \[Hz\].
+const POSE_BUS_RATE_HZ: u32 = 700;
 
 /// Runs `supple drill`.
 ///
 /// # Errors
 /// [`Failure::Drill`] if a result differs from the expected one; [`Failure::NoSuchTestCase`].
 pub fn run(args: &DrillArgs) -> Result<(), Failure> {
-    let description = arms::find(&args.arm, args.strict)?;
+    let mut arms = TestArms::new(args)?;
     let specs = chosen(args)?;
     if args.list {
         let lines: Vec<String> = specs
@@ -53,7 +62,7 @@ pub fn run(args: &DrillArgs) -> Result<(), Failure> {
             break;
         }
         print_status(&format!("{}/{}: {}", index + 1, specs.len(), spec.name()));
-        rows.push(perform(spec, args, &description)?);
+        rows.push(perform(spec, args, arms.of(spec))?);
     }
     match args.json {
         true => print_json(&rows)?,
@@ -106,11 +115,75 @@ fn chosen(args: &DrillArgs) -> Result<Vec<Spec>, Failure> {
     }
 }
 
+/// The arm of a test case.
+struct TestArm {
+    description: Description,
+    /// Built-in arm or path, for the processes.
+    name: String,
+    strict: bool,
+    rate_hz: Option<u32>,
+}
+
+/// The arm of the command line, and the one of the pose mode.
+struct TestArms {
+    general: TestArm,
+    pose: TestArm,
+    /// Folder of the arm of the pose mode.
+    folder: PathBuf,
+}
+
+impl TestArms {
+    /// The pose mode needs six active joints: it has the arm of the command line, or else [`POSE_ARM`], without held
+    /// joints. The copy without held joints is in a folder of its own until the end.
+    fn new(args: &DrillArgs) -> Result<TestArms, Failure> {
+        let description = arms::find(&args.arm, args.strict)?;
+        let free = match description.dof() >= POSE_JOINTS {
+            true => description.with_all_joints_active()?,
+            false => Description::asset(POSE_ARM)?.with_all_joints_active()?,
+        };
+        let prefix = format!("drill-arm-{}", std::process::id());
+        let domain = Domain::new(Some(&prefix)).map_err(Failure::system)?;
+        let folder = domain.folder().join(prefix);
+        free.save(&folder)?;
+        Ok(TestArms {
+            general: TestArm {
+                description,
+                name: args.arm.clone(),
+                strict: args.strict,
+                rate_hz: None,
+            },
+            pose: TestArm {
+                description: Description::load(&folder)?,
+                name: folder.display().to_string(),
+                strict: args.strict,
+                rate_hz: None,
+            },
+            folder,
+        })
+    }
+
+    fn of(&mut self, spec: &Spec) -> &TestArm {
+        if spec.task != TestTask::TrackPose {
+            return &self.general;
+        }
+        // Seven motors do not fit into a millisecond of the bus.
+        self.pose.rate_hz = (spec.plant == PlantKind::Emu).then_some(POSE_BUS_RATE_HZ);
+        &self.pose
+    }
+}
+
+impl Drop for TestArms {
+    fn drop(&mut self) {
+        // A copy that cannot be removed does no harm.
+        let _ = std::fs::remove_dir_all(&self.folder);
+    }
+}
+
 /// Runs a test case. A case that cannot be run counts as failed; the others continue.
-fn perform(spec: &Spec, args: &DrillArgs, description: &Description) -> Result<Row, Failure> {
-    let result = with_dof!(description.dof(), N => match spec.runs_in_wall_clock_time() {
-        true => perform::perform::<N>(spec, args, description),
-        false => lockstep::perform::<N>(spec, args, description),
+fn perform(spec: &Spec, args: &DrillArgs, arm: &TestArm) -> Result<Row, Failure> {
+    let result = with_dof!(arm.description.dof(), N => match spec.runs_in_wall_clock_time() {
+        true => perform::perform::<N>(spec, args, &arm.description),
+        false => lockstep::perform::<N>(spec, arm),
     })?;
     match result {
         Ok(row) => Ok(row),

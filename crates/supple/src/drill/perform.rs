@@ -122,6 +122,7 @@ fn mode_of(task: TestTask) -> Mode {
         TestTask::Excite => Mode::Excite,
         TestTask::Float => Mode::Float,
         TestTask::JointImpedance => Mode::JointImpedance,
+        TestTask::TrackPose => Mode::TrackPose,
     }
 }
 

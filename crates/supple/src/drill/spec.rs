@@ -23,6 +23,8 @@ pub enum TestTask {
     Float,
     /// The downward motion of the move with compliant joints, at up to 0.19 m/s.
     JointImpedance,
+    /// The same downward path of the tip while it turns, with the 7-joint WAM and every joint active.
+    TrackPose,
 }
 
 /// How a process fails.
@@ -154,6 +156,7 @@ impl fmt::Display for TestTask {
             TestTask::Excite => "excite",
             TestTask::Float => "float",
             TestTask::JointImpedance => "joint_impedance",
+            TestTask::TrackPose => "track_pose",
         })
     }
 }

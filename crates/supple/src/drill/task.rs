@@ -7,9 +7,9 @@ use supple_cli::exit::Failure;
 use supple_core::config::Gains;
 use supple_core::controller::Request;
 use supple_core::math::Vector3;
-use supple_core::trajectory::{Fourier, Line};
+use supple_core::trajectory::{Fourier, Line, Rotation};
 use supple_core::{Config, Trajectory, Vector};
-use supple_experiment::{scenario, start_pose};
+use supple_experiment::{PoseMotion, scenario, start_pose};
 use supple_model::Description;
 
 /// Distance and duration of the downward move: minimum jerk, peak speed 0.25 m/s.
@@ -17,6 +17,10 @@ const DESCENT_M: f64 = 0.2;
 const DESCENT_S: f64 = 1.5;
 /// Duration of the same motion with compliant joints, which lag and catch up: peak speed 0.19 m/s.
 const COMPLIANT_DESCENT_S: f64 = 2.0;
+/// Duration of the same motion at the tip stiffness of the law, while the tip turns: peak speed 0.15 m/s.
+const POSE_DESCENT_S: f64 = 2.5;
+/// Turn of the tip on the same path \[rad\].
+const TURN_RAD: f64 = 0.4;
 /// Amplitude and angular frequency of the shoulder's oscillation: 0.25 m/s at the tip, which is 0.6 m away.
 const SWING_RAD: f64 = 0.15;
 const SWING_RAD_PER_S: f64 = 2.8;
@@ -46,7 +50,6 @@ pub fn request<const N: usize>(
 ) -> Result<Request<N>, Failure> {
     let (sinusoid, duration_s) = scenario::sinusoid(1.0);
     let start_m = sinusoid.at(0.0).position;
-    let start_rad = start_pose(config, "drill", &sinusoid, duration_s)?;
     let down_m = start_m - Vector3::new(0.0, 0.0, DESCENT_M);
     Ok(match spec.task {
         TestTask::GravityHold => Request::GravityHold,
@@ -68,7 +71,9 @@ pub fn request<const N: usize>(
         }
         TestTask::Track => Request::Track(sinusoid),
         TestTask::Probe => Request::Track(trajectory_for(UpTrajectory::Probe, description).0),
+        TestTask::TrackPose => pose_motion().request(),
         TestTask::Excite => {
+            let start_rad = start_pose(config, "drill", &sinusoid, duration_s)?;
             let mut series = Fourier::at_rest(start_rad, SWING_RAD_PER_S);
             series.sine_rad[0][SHOULDER.min(N - 1)] = SWING_RAD;
             series.duration_s = 3.0;
@@ -76,6 +81,24 @@ pub fn request<const N: usize>(
             Request::Excite(series)
         }
     })
+}
+
+/// The downward path of the joint impedance task, slower, while the tip turns about the vertical.
+fn pose_motion() -> PoseMotion {
+    let from_m = scenario::sinusoid(1.0).0.at(0.0).position;
+    PoseMotion {
+        trajectory: Trajectory::Line(Line {
+            from_m,
+            to_m: from_m - Vector3::new(0.0, 0.0, DESCENT_M),
+            duration_s: POSE_DESCENT_S,
+        }),
+        rotation: Rotation {
+            axis: Vector3::z(),
+            angle_rad: TURN_RAD,
+            duration_s: POSE_DESCENT_S,
+        },
+        duration_s: POSE_DESCENT_S,
+    }
 }
 
 impl<const N: usize> Script<N> {
@@ -89,11 +112,16 @@ impl<const N: usize> Script<N> {
         description: &Description,
         home_rad: &Vector<N>,
     ) -> Result<Script<N>, Failure> {
-        let (trajectory, duration_s) = match spec.task {
-            TestTask::Probe => trajectory_for(UpTrajectory::Probe, description),
-            _ => scenario::sinusoid(1.0),
+        let approach = match spec.task {
+            TestTask::TrackPose => Approach::to_pose(config, &pose_motion())?,
+            _ => {
+                let (trajectory, duration_s) = match spec.task {
+                    TestTask::Probe => trajectory_for(UpTrajectory::Probe, description),
+                    _ => scenario::sinusoid(1.0),
+                };
+                Approach::new(config, trajectory, duration_s)?
+            }
         };
-        let approach = Approach::new(config, trajectory, duration_s)?;
         let (to_start, task_start_cycle, _) = approach.requests(home_rad);
         let cycles = |time_s: f64| (time_s / config.period_s).round() as u64;
         let mut script = Script {
@@ -105,10 +133,11 @@ impl<const N: usize> Script<N> {
                     // The event comes at the highest speed of the motion.
                     TestTask::Move => 0.6,
                     TestTask::JointImpedance => 0.8,
+                    TestTask::TrackPose => 1.0,
                     TestTask::Track | TestTask::Probe => 0.8,
                     TestTask::Excite => 0.7,
                 }),
-            start_rad: start_pose(config, "drill", &trajectory, duration_s)?,
+            start_rad: approach.start_rad(),
         };
         if let Event::Request(wrong) = spec.event {
             let request = match wrong {

@@ -4,7 +4,7 @@ use core::time::Duration;
 use supple_cli::exit::Failure;
 use supple_core::controller::Request;
 use supple_core::{Config, Trajectory, Vector};
-use supple_experiment::start_pose;
+use supple_experiment::{PoseMotion, pose_start, start_pose};
 
 /// Minimum duration of the move \[s\].
 const MOVE_S: f64 = 1.0;
@@ -40,6 +40,25 @@ impl<const N: usize> Approach<N> {
             speed_rad_per_s: config.limits.joint_speed_rad_per_s,
             period_s: config.period_s,
         })
+    }
+
+    /// The approach to a motion of position and orientation. [`Approach::requests`] gives the trajectory of its position
+    /// alone as the last request.
+    ///
+    /// # Errors
+    /// [`Failure::Experiment`] if the arm cannot perform the motion.
+    pub fn to_pose(config: &Config<N>, motion: &PoseMotion) -> Result<Self, Failure> {
+        Ok(Approach {
+            start_rad: pose_start(config, "pose", motion)?,
+            trajectory: motion.trajectory,
+            speed_rad_per_s: config.limits.joint_speed_rad_per_s,
+            period_s: config.period_s,
+        })
+    }
+
+    /// Pose in which the trajectory starts \[rad\].
+    pub fn start_rad(&self) -> Vector<N> {
+        self.start_rad
     }
 
     /// Requests from a given pose: the move, the number of cycles to wait, and the trajectory.

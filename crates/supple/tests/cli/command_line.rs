@@ -65,6 +65,39 @@ fn the_built_in_arms_are_listed() {
     );
 }
 
+/// A copy loads, is as the arm, and replaces nothing unless asked to.
+#[test]
+fn an_arm_is_copied() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("mine");
+    let path = path.to_str().expect("UTF-8");
+    let answer = run(&["arms", "copy", "wam7", path]);
+    assert_eq!(answer.code, Some(0), "{}", answer.stderr);
+    let held = |path: &str| {
+        let arm = supple_model::Description::load(path).expect("an arm");
+        let roles = arm.config::<7>().expect("seven joints").roles;
+        roles
+            .iter()
+            .filter(|role| **role != supple_core::config::Role::Active)
+            .count()
+    };
+    assert_eq!(held(path), 4);
+    let again = run(&["arms", "copy", "wam7", path, "--all-joints-active"]);
+    assert_eq!(again.code, Some(6), "{}", again.stderr);
+    assert!(again.stderr.contains("--force"), "{}", again.stderr);
+    assert_eq!(held(path), 4);
+    let forced = [
+        "arms",
+        "copy",
+        "wam7",
+        path,
+        "--all-joints-active",
+        "--force",
+    ];
+    assert_eq!(run(&forced).code, Some(0));
+    assert_eq!(held(path), 0);
+}
+
 #[test]
 fn completions_name_the_commands() {
     for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {

@@ -9,7 +9,7 @@ use supple_core::config::{Border, Collision, Config, Gains, PlausibilityLimits, 
 use supple_core::controller::{Fault, Mode, Refusal, Request, check_motion};
 use supple_core::dynamics::gravity;
 use supple_core::math::Vector3;
-use supple_core::trajectory::{Sinusoid, Trajectory};
+use supple_core::trajectory::{Line, Sinusoid, Trajectory};
 
 fn guarded() -> Config<4> {
     let mut config = four();
@@ -332,6 +332,43 @@ fn all_encoders_stuck_at_once_fault_sooner() {
             "{value_rad} rad before the fault"
         );
     }
+}
+
+/// A contact that no encoder has moved in is one that stuck encoders make: it does not suspend the check. A contact in
+/// which the arm still moved does, until its reference is far away.
+#[test]
+fn stuck_encoders_are_no_contact() {
+    let contact = |jolt: bool| {
+        let mut config = guarded();
+        config.plausible.stuck_rad = 0.1;
+        config.collision = Collision::disabled();
+        config.latch.threshold_n = 0.1;
+        let mut rig = Rig::holding(config, bent());
+        let down = rig.tip() - Vector3::new(0.0, 0.0, 0.12);
+        rig.accept(Request::Track(Trajectory::Line(Line {
+            from_m: rig.tip(),
+            to_m: down,
+            duration_s: 2.0,
+        })));
+        let mut latched = false;
+        for _ in 0..2000 {
+            let output = rig.cycle();
+            if output.in_contact && !latched {
+                latched = true;
+                rig.q[0] += if jolt { 1e-6 } else { 0.0 };
+            }
+            if let Some(fault) = output.fault {
+                return (latched, Some(fault));
+            }
+        }
+        (latched, None)
+    };
+    let (latched, fault) = contact(false);
+    assert!(
+        latched && matches!(fault, Some(Fault::EncoderStuck { .. })),
+        "{fault:?}"
+    );
+    assert_eq!(contact(true), (true, None));
 }
 
 /// A joint that moved when the drives became idle and is at rest when they are re-enabled does not
