@@ -16,6 +16,8 @@ const LOSS_WEIGHT: u32 = 8;
 /// Fraction of `stuck_rad` that a moving joint may travel, at its last speed, while its encoder is
 /// unchanged (0.02 rad for 0.1 rad).
 pub(super) const SUDDEN_STOP_SHARE: f64 = 0.2;
+/// Cycles with motion that make a contact plausible; encoders that stop one after the other show some.
+const CONTACT_CYCLES: u32 = 5;
 /// Time for which the encoder of a joint in a collision may stay unchanged before it counts as
 /// stuck \[s\].
 const UNCHANGED_LIMIT_S: f64 = 0.03;
@@ -44,8 +46,8 @@ pub(super) struct Plausibility<const N: usize> {
     opposed_cycles: [u32; N],
     last_momentum: Vector<N>,
     load_s: f64,
-    /// An encoder has changed in the present contact.
-    moved_in_contact: bool,
+    /// Cycles of the present contact in which an encoder has changed, up to [`CONTACT_CYCLES`].
+    contact_cycles: u32,
 }
 
 impl<const N: usize> Default for Plausibility<N> {
@@ -60,7 +62,7 @@ impl<const N: usize> Default for Plausibility<N> {
             opposed_cycles: [0; N],
             last_momentum: Vector::zeros(),
             load_s: 0.0,
-            moved_in_contact: false,
+            contact_cycles: 0,
         }
     }
 }
@@ -158,11 +160,14 @@ impl<const N: usize> Plausibility<N> {
         }
     }
 
-    /// Whether the latched contact is one: some encoder has changed in it.
+    /// Whether the latched contact is one: encoders have changed in [`CONTACT_CYCLES`] of its cycles.
     pub fn is_contact_plausible(&mut self, in_contact: bool) -> bool {
-        self.moved_in_contact =
-            in_contact && (self.moved_in_contact || self.unchanged.contains(&false));
-        self.moved_in_contact
+        if !in_contact {
+            self.contact_cycles = 0;
+        } else if self.contact_cycles < CONTACT_CYCLES && self.unchanged.contains(&false) {
+            self.contact_cycles += 1;
+        }
+        self.contact_cycles >= CONTACT_CYCLES
     }
 
     /// Reports a stuck encoder if its value is unchanged while the joint's reference travels further than the limit,

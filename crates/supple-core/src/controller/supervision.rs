@@ -198,7 +198,7 @@ impl<const N: usize> State<N> {
             }
             // In contact the joints may stand still while their references move; but if other
             // joints move, a single unchanged encoder is stuck. Encoders that are all stuck make a
-            // contact themselves: it counts once one of them has changed in it.
+            // contact themselves: it counts once they have changed in it.
             let others_move =
                 (0..N).any(|joint| abs(velocity[joint]) > OTHER_JOINT_MOVING_RAD_PER_S);
             let in_contact = plausibility.is_contact_plausible(self.latch.in_contact());
