@@ -299,3 +299,26 @@ fn perturbed_models_track_a_pose_at_5_n_per_m_and_half_a_n_m_per_rad() {
         );
     }
 }
+
+/// Seven active joints have four directions in which the position task leaves them free, down to the wrist.
+#[test]
+fn the_sinusoid_runs_with_seven_active_joints() {
+    let description = Description::asset("wam7")
+        .and_then(|arm| arm.with_all_joints_active())
+        .expect("the 7-joint arm");
+    let setup = Setup::<7>::new(&description, 1).expect("seven joints");
+    let mut config = setup.config(&perturbed(1)).expect("a physical model");
+    config.law.gains = scenario::gains(scenario::STIFFNESS_N_PER_M);
+    let (trajectory, duration_s) = scenario::sinusoid(1.0);
+    let plan = Plan {
+        name: "seven".to_owned(),
+        config,
+        plant: setup.plant(&perturbed(1), Scene::default()),
+        trajectory,
+        duration_s,
+    };
+    let run = run(&plan, &mut |_, _| Ok(())).expect("the sinusoid runs");
+    println!("{:.1} mm", run.rms_error_m * 1e3);
+    assert_eq!(run.ended, None);
+    assert!(run.rms_error_m < 0.015, "{} m", run.rms_error_m);
+}

@@ -89,7 +89,7 @@ impl<const N: usize> LawBench<N, Gains> {
             spring_limit_n: f64::MAX,
         };
         LawInput {
-            nullspace_damping_nm_s_per_rad: self.nullspace_damping,
+            nullspace_damping_nm_s_per_rad: Vector::repeat(self.nullspace_damping),
             ..LawInput::new(target, &s.qd)
         }
     }
@@ -118,7 +118,7 @@ impl<const N: usize> LawBench<N, PoseGains> {
             gains: &self.gains,
         };
         LawInput {
-            nullspace_damping_nm_s_per_rad: self.nullspace_damping,
+            nullspace_damping_nm_s_per_rad: Vector::repeat(self.nullspace_damping),
             ..LawInput::new(target, &s.qd)
         }
     }

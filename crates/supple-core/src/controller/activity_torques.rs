@@ -64,6 +64,7 @@ impl<const N: usize> State<N> {
                 let (law, friction) = (&config.law, &config.friction);
                 let law_input = LawInput {
                     friction_share: self.latch.friction_share(),
+                    nullspace_damping_nm_s_per_rad: *controller.nullspace_damping_nm_s_per_rad(),
                     ..LawInput::of_law(law, friction, target, velocity, tip_force_n)
                 };
                 let mut torques = impedance(&config.roles, &self.terms, task, &law_input);

@@ -12,6 +12,7 @@ pub mod latch;
 mod limiter;
 mod mode;
 mod motion_check;
+mod nullspace;
 pub mod observer;
 mod output;
 mod plausibility;
@@ -35,6 +36,7 @@ pub use validate::ConfigError;
 use crate::config::Config;
 use crate::math::linalg::Cholesky;
 use crate::math::{Matrix, Vector};
+use nullspace::nullspace_damping_nm_s_per_rad;
 
 /// A validated configuration and the constants derived from it.
 #[derive(Clone, Copy, Debug)]
@@ -46,6 +48,7 @@ pub struct Controller<const N: usize> {
     delay_s: f64,
     torque_step_nm: Vector<N>,
     stop_step_nm: Vector<N>,
+    nullspace_damping_nm_s_per_rad: Vector<N>,
 }
 
 /// Maximum delay from a measurement to the resulting torque in cycles, with half a cycle for the
@@ -67,10 +70,12 @@ impl<const N: usize> Controller<N> {
             .map_or_else(Matrix::identity, |square| {
                 square.solve(&to_joint.transpose())
             });
+        let delay_s = DELAY_CYCLES * config.period_s + 2.0 / config.estimator_rad_per_s;
         Ok(Controller {
+            nullspace_damping_nm_s_per_rad: nullspace_damping_nm_s_per_rad(&config, delay_s),
             motor_from_joint,
             groups: MotorGroups::new(&config.joint_from_motor),
-            delay_s: DELAY_CYCLES * config.period_s + 2.0 / config.estimator_rad_per_s,
+            delay_s,
             torque_step_nm: config.limits.torque_rate_nm_per_s * config.period_s,
             stop_step_nm: Vector::from_fn(|i, _| {
                 let slow = config.limits.torque_rate_nm_per_s[i];
@@ -85,6 +90,12 @@ impl<const N: usize> Controller<N> {
     /// velocity estimate.
     pub fn delay_s(&self) -> f64 {
         self.delay_s
+    }
+
+    /// Damping of each joint in the null space of the position task \[N m s/rad\]: that of the law, or as much
+    /// as the delay allows where the joint is light, as the last ones of a wrist are.
+    pub fn nullspace_damping_nm_s_per_rad(&self) -> &Vector<N> {
+        &self.nullspace_damping_nm_s_per_rad
     }
 
     /// Maximum change of joint torque per cycle \[N m\]: by the rate limit, or with `stopping` the

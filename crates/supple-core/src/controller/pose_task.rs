@@ -157,7 +157,7 @@ impl<const N: usize> State<N> {
             friction: Some((&config.friction, law.friction_velocity)),
             friction_share: self.latch.friction_share(),
             inertial_feedforward: law.inertial_feedforward,
-            nullspace_damping_nm_s_per_rad: damping * share,
+            nullspace_damping_nm_s_per_rad: Vector::repeat(damping * share),
             nullspace_torque_nm: Some(&(posture.torque_nm(&self.position) * share)),
             ..LawInput::new(target, &self.estimator.velocity_rad_per_s)
         };

@@ -52,8 +52,8 @@ pub struct LawInput<'a, T, const N: usize, const D: usize = 3> {
     pub friction_share: f64,
     /// Adds `M Xo''`.
     pub inertial_feedforward: bool,
-    /// Damping of null-space motion \[N m s/rad\], zero or more.
-    pub nullspace_damping_nm_s_per_rad: f64,
+    /// Damping of each joint's motion in the null space \[N m s/rad\], zero or more.
+    pub nullspace_damping_nm_s_per_rad: Vector<N>,
     /// Torque to apply in the null space, as of a [`Posture`] \[N m\]; held joints get none of it.
     pub nullspace_torque_nm: Option<&'a Vector<N>>,
 }
@@ -68,7 +68,7 @@ impl<'a, T, const N: usize, const D: usize> LawInput<'a, T, N, D> {
             friction: None,
             friction_share: 1.0,
             inertial_feedforward: true,
-            nullspace_damping_nm_s_per_rad: 0.0,
+            nullspace_damping_nm_s_per_rad: Vector::zeros(),
             nullspace_torque_nm: None,
         }
     }
@@ -92,7 +92,7 @@ impl<'a, T, const N: usize> LawInput<'a, T, N> {
             },
             friction: Some((friction, law.friction_velocity)),
             inertial_feedforward: law.inertial_feedforward,
-            nullspace_damping_nm_s_per_rad: law.nullspace_damping_nm_s_per_rad,
+            nullspace_damping_nm_s_per_rad: Vector::repeat(law.nullspace_damping_nm_s_per_rad),
             ..LawInput::new(target, velocity_rad_per_s)
         }
     }
@@ -211,9 +211,9 @@ pub(super) fn act<T: Target<D>, F: Form<N, D>, const N: usize, const D: usize>(
         let tip_motion = task.inverse * (task.jacobian * now.velocity_rad_per_s);
         let mut torque = Vector::zeros();
         for i in (0..N).filter(|i| is_active(*i)) {
-            torque[i] = now.velocity_rad_per_s[i] - tip_motion[i];
+            let free_motion = now.velocity_rad_per_s[i] - tip_motion[i];
+            torque[i] = free_motion * -now.nullspace_damping_nm_s_per_rad[i];
         }
-        torque *= -now.nullspace_damping_nm_s_per_rad;
         if let Some(more) = now.nullspace_torque_nm {
             for i in (0..N).filter(|i| is_active(*i)) {
                 torque[i] += more[i];

@@ -67,7 +67,7 @@ fn damped<T, const N: usize, const D: usize>(
     damping: f64,
 ) -> LawInput<'_, T, N, D> {
     LawInput {
-        nullspace_damping_nm_s_per_rad: damping,
+        nullspace_damping_nm_s_per_rad: Vector::repeat(damping),
         ..LawInput::new(target, qd)
     }
 }

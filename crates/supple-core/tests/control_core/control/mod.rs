@@ -16,6 +16,7 @@ mod messages;
 mod modes;
 mod motion;
 mod moving;
+mod nullspace;
 mod observing;
 mod posing;
 mod protecting;
