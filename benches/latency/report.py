@@ -102,7 +102,7 @@ def section(rounds, kind, targets):
 
 def lines(machine, rounds, seconds):
     return [
-        "# Wake-up and reply",
+        "# Wake-up latency and round-trip time",
         "",
         f"Written by `benches/latency/run.sh`; do not edit. {len(rounds)} rounds of {seconds} s each for the system,",
         "cyclictest, the echo and the messages alone, alternating, all at 1 kHz on one core. Percentiles are medians",
@@ -111,7 +111,7 @@ def lines(machine, rounds, seconds):
         "its load determine the tail: compare only the ratios.",
         "",
         *(f"- {key}: {value}" for key, value in machine.items()),
-        f"- cycles of the system without a reply in time: {sum(each.missed for each in rounds)} of "
+        f"- cycles in which `supple-sim` received no command before its deadline: {sum(each.missed for each in rounds)} of "
         f"{len(rounds) * seconds * 1000}",
         "",
         "## Wake-up",
@@ -121,7 +121,7 @@ def lines(machine, rounds, seconds):
         "",
         *section(rounds, "wake", WAKE_TARGETS),
         "",
-        "## State published to command received",
+        "## Round trip: from state published to command received",
         "",
         "`supple-sim` and `supple-rt` in gravity hold, the controller's step included, compared with two processes that",
         "only exchange Unix datagrams of the same sizes (echo), and with two that exchange the system's own messages",

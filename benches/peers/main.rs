@@ -1,4 +1,5 @@
-//! Our program of the comparison, the counterpart of `harness.hpp` and the peers' programs.
+//! This project's side of the comparison with other libraries of rigid-body dynamics (the peers), the counterpart of
+//! `harness.hpp`.
 //!
 //! `peers case.txt outputs.bin` prints `function mode median_ns minimum_ns` lines.
 
@@ -93,7 +94,7 @@ fn position_law<const N: usize>(
     step(asset, bench)
 }
 
-/// The same of the pose; the controller's law is that of the position.
+/// The pose law in the same three ways, except that the controller's step still runs the position law.
 fn pose_law<const N: usize>(
     asset: &str,
     numbers: &[f64],
@@ -113,7 +114,7 @@ fn pose_law<const N: usize>(
     step(asset, bench)
 }
 
-/// `controller::step` whole, which measures one of the states after the other.
+/// A whole `controller::step`; its measured joint angles are those of each state in turn.
 fn step<const N: usize, W: Write>(
     asset: &str,
     mut bench: Bench<'_, N, W>,
@@ -141,7 +142,7 @@ impl<const R: usize, const C: usize> Numbers for Matrix<R, C> {
     }
 }
 
-/// Their total is written.
+/// Their sum is written.
 impl<const N: usize> Numbers for Torques<N> {
     #[inline]
     fn first(&self) -> f64 {
@@ -189,7 +190,8 @@ impl<const N: usize, W: Write> Bench<'_, N, W> {
             0.0
         });
         time(name, "dependent", self.states, |state, before| {
-            // Too small to change the angle, but the compiler cannot know that.
+            // Makes this call depend on the result of the last; the product is too small to change the angle, which the
+            // compiler cannot know.
             let angle = state.q[0];
             state.q[0] += before * 1e-200;
             let result = call(state);

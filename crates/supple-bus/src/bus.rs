@@ -19,7 +19,7 @@ pub trait Bus {
     /// only an event that has already arrived.
     ///
     /// # Errors
-    /// If the bus itself fails. Faults on the bus are events.
+    /// If the interface or socket fails. Faults that the CAN controller reports are [`Event::Fault`].
     fn receive_until(&mut self, until_ns: u64) -> Result<Option<Event>, BusError>;
 
     /// As [`Bus::receive_until`], with lookahead: the host promises to send nothing until `frames` more frames
@@ -37,7 +37,7 @@ pub trait Bus {
         self.receive_until(until_ns)
     }
 
-    /// Total time for which the clock of this bus was paused relative to the machine's clock \[ns\].
+    /// Total time for which the clock of this bus was fallen behind CLOCK_MONOTONIC \[ns\].
     fn clock_stall_ns(&self) -> u64 {
         0
     }
@@ -101,7 +101,7 @@ pub enum BusFault {
     Warning,
     /// Protocol violation: bit, stuffing or checksum error.
     Protocol,
-    /// The error counters passed the passive limit: this node no longer flags errors.
+    /// The error counters passed the passive limit: The node is error-passive: it no longer sends active error flags.
     Passive,
     /// Frames were lost because they were not read in time.
     Overrun,
@@ -128,7 +128,7 @@ impl fmt::Display for BusFault {
             BusFault::NoAcknowledge => "no node acknowledged a frame; is the arm on and connected?",
             BusFault::TransmitTimeout => "a frame was not sent in time",
             BusFault::BusOff => {
-                "the CAN controller is off the bus; check cable and termination, then restart it"
+                "the CAN controller is bus-off; check cable and termination, then restart it"
             }
         })
     }

@@ -37,7 +37,7 @@ impl LockstepClient {
         }
     }
 
-    /// Queues a frame for the next request, to be delivered at `time_ns`.
+    /// Queues a frame for the next request; the emulator puts it on the bus at `time_ns`.
     pub fn queue_frame(&mut self, frame: &CanFrame, time_ns: u64) -> Result<(), BusError> {
         match self.request.push(time_ns, Event::Sent(*frame)) {
             true => Ok(()),
@@ -58,7 +58,8 @@ impl LockstepClient {
         }
     }
 
-    /// Prepares the next request, with all queued frames.
+    /// Prepares the next request, which contains all queued frames: run until `until_ns`, or until `frames` frames of
+    /// other nodes have arrived.
     pub fn prepare_request(&mut self, until_ns: u64, frames: u32) -> &mut Message {
         self.request.sequence = self.request.sequence.wrapping_add(1);
         self.request.time_ns = until_ns;

@@ -8,23 +8,26 @@ use supple_realtime::StopError;
 /// Errors in the configuration or operation of an emulator.
 #[derive(Debug, thiserror::Error)]
 pub enum EmulatorError {
-    /// The arm is not a WAM.
-    #[error("the arm has {found} moving joints, pucks are emulated for 4 or 7: give wam4 or wam7")]
+    /// The arm has neither 4 nor 7 movable joints.
+    #[error(
+        "the arm has {found} movable joints, but the emulator has pucks for 4 or 7 only: use wam4 or wam7"
+    )]
     Joints {
         /// Joints found.
         found: usize,
     },
     /// The numbers of pucks and joints differ.
-    #[error("{found} pucks are configured for {expected} joints: give one for each")]
+    #[error("{found} pucks are configured for {expected} joints: configure one puck per joint")]
     Pucks {
         /// Pucks found.
         found: usize,
         /// Joints.
         expected: usize,
     },
-    /// The firmware has no known list of property ids.
+    /// The property ids of this firmware version are unknown.
     #[error(
-        "node {node} has firmware {version}, property ids are known from version 32: give a newer one"
+        "node {node} is configured with firmware {version}: property ids are known from version 32 on; \
+         configure 32 or later"
     )]
     Firmware {
         /// Node number.
@@ -46,8 +49,8 @@ pub enum EmulatorError {
     Bus(#[from] BusError),
     /// An invalid button press.
     #[error(
-        "press `{text}`: expected BUTTON@SECONDS or BUTTON@held+SECONDS with one of idle, activate, e-stop, \
-         release, and at most 1e6 s"
+        "press `{text}`: expected BUTTON@SECONDS or BUTTON@held+SECONDS (since gravity hold began) with one of idle, \
+         activate, e-stop, release, and at most 1e6 s"
     )]
     Press {
         /// Text given.
@@ -60,9 +63,11 @@ pub enum EmulatorError {
     #[error(transparent)]
     Trace(#[from] TraceError),
     /// A CAN interface was combined with virtual time.
-    #[error("a CAN interface keeps its own time: leave out --virtual-time, or give unix:FOLDER")]
+    #[error(
+        "a CAN interface runs in real time: omit --virtual-time, or use a bus over sockets, unix:FOLDER"
+    )]
     VirtualInterface,
-    /// Error in setting up signal handling.
+    /// The signal handlers cannot be installed.
     #[error(transparent)]
     Stop(#[from] StopError),
 }

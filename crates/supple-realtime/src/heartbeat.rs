@@ -79,7 +79,8 @@ impl Heartbeat {
     /// affinity.
     ///
     /// # Errors
-    /// [`NotifyError::Socket`] if the manager does not listen, [`NotifyError::Thread`].
+    /// [`NotifyError::Socket`] if the manager's socket cannot be reached, [`NotifyError::Thread`] if the thread cannot
+    /// be created.
     pub fn start(
         notifier: Notifier,
         counters: &[LivenessCounter],
@@ -120,7 +121,7 @@ fn send_watchdog_messages(
 ) {
     while wait(every) {
         if monitor.all_advanced() {
-            // If the manager is gone, there is no watchdog.
+            // An error is ignored: without a manager, no watchdog can expire.
             let _ = notifier.alive();
         }
     }
@@ -183,7 +184,7 @@ mod tests {
         );
     }
 
-    /// The thread's own loop with scripted time: the counter advances in three of five intervals.
+    /// The loop of the heartbeat thread with a simulated wait: the counter advances in three of five intervals.
     #[test]
     fn hanging_thread_stops_the_watchdog_messages() {
         let folder = tempfile::tempdir().unwrap();
@@ -221,7 +222,7 @@ mod tests {
             counter.increment();
             assert_eq!(next(), "WATCHDOG=1\n", "each iteration sends a message");
         }
-        // However long this takes, an unchanged counter sends none.
+        // While the counter does not change, no watchdog message is sent, however long the drop takes.
         drop(heartbeat);
         assert_eq!(received(&manager), ["STOPPING=1\n"]);
     }

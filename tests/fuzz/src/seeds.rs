@@ -83,7 +83,7 @@ fn named<T: crate::bytes::AnyBitPattern>(name: &str, value: &T) -> Seed {
     (name.to_owned(), bytes_of(value))
 }
 
-/// State of an arm at rest in a cycle.
+/// State of an arm at rest, in cycle `cycle`.
 pub fn state_at_rest<const N: usize>(cycle: u64, position_rad: &Vector<N>) -> ArmState {
     ArmState::new::<N>(
         cycle,
@@ -135,7 +135,7 @@ fn telemetry() -> Vec<Seed> {
     let input = at_rest(1, Some(Request::GravityHold));
     let telemetry = Telemetry::new(1, &arm, &input, &output, CycleTiming::default());
     let request = OperatorRequest::new(1, 1, None, &Request::<4>::Idle);
-    let text = Text::of(&"refused: not from mode idle");
+    let text = Text::of(&"refused: not allowed in mode idle");
     let reply = OperatorReply::new(&request, 1, output.mode, Outcome::Refused, text);
     vec![named("hold", &telemetry), named("reply", &reply)]
 }

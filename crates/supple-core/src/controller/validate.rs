@@ -171,7 +171,7 @@ pub(super) fn validate<const N: usize>(config: &Config<N>) -> Result<(), ConfigE
     roles(config)?;
     let square = config.joint_from_motor * config.joint_from_motor.transpose();
     let scale = square.trace() / N as f64;
-    // The shift rejects a matrix that is singular but for rounding.
+    // Without this shift, rounding could let a singular matrix pass the Cholesky decomposition.
     let shift = Matrix::from_diagonal_element(1e-12);
     check(
         scale.is_finite() && Cholesky::new(&(square / scale - shift)).is_some(),
@@ -243,7 +243,7 @@ pub(super) fn validate<const N: usize>(config: &Config<N>) -> Result<(), ConfigE
             "impedance_stiffness_nm_per_rad",
             Some(joint),
             value,
-            "at most that of the move mode",
+            "at most the joint's move_stiffness_nm_per_rad",
         )?;
     }
     pose(&config.pose)?;
@@ -346,7 +346,7 @@ fn roles<const N: usize>(config: &Config<N>) -> Result<(), ConfigError> {
             "held position_rad",
             (lower..=upper).contains(&position_rad),
             position_rad,
-            "within the joint's stops",
+            "within the joint's position range",
         )?;
         at(
             "held stiffness_nm_per_rad",
@@ -366,6 +366,6 @@ fn roles<const N: usize>(config: &Config<N>) -> Result<(), ConfigError> {
         "number of active joints",
         None,
         f64::from(active),
-        "at least 3: the task has three directions",
+        "at least 3, because the law controls the tip's position in three directions",
     )
 }

@@ -5,16 +5,17 @@ use super::{children, place};
 use crate::error::{ModelError, Reporter};
 use roxmltree::{Document, Node, ParsingOptions};
 
-/// Maximum number of nodes, text between elements included: a hundred times that of a humanoid.
+/// Maximum number of XML nodes, text nodes included: a hundred times as many as in the URDF of a humanoid.
 const MAX_NODES: u32 = 500_000;
 /// Maximum nesting depth; published URDFs have about ten levels.
 const MAX_DEPTH: usize = 64;
-/// Maximum number of attributes of one element: the parser compares all pairs.
+/// Maximum number of attributes of one element: to find duplicates, the parser compares every pair.
 const MAX_ATTRIBUTES: usize = 256;
-/// Maximum number of links, and of joints.
+/// Maximum number of links, and likewise of joints.
 const MAX_LINKS: usize = 1000;
 
-const REMEDY: &str = "give the URDF of an arm, without extensions of other programs";
+const REMEDY: &str =
+    "give a URDF of the arm only, without elements of other programs such as <gazebo>";
 
 /// Parses a text within the size limits.
 pub(crate) fn parse<'a>(report: Reporter<'_>, text: &'a str) -> Result<Document<'a>, ModelError> {
@@ -53,7 +54,9 @@ pub(crate) fn parse<'a>(report: Reporter<'_>, text: &'a str) -> Result<Document<
     Ok(document)
 }
 
-/// Limits the number of attributes; between two `<` there are the attributes of at most one element.
+/// Limits the number of attributes per element before parsing: each piece of the text between two `<` has the
+/// attributes of
+/// at most one element.
 fn check_attributes(report: Reporter<'_>, text: &str) -> Result<(), ModelError> {
     let values = |tag: &str| {
         let mut before = 0_u8;

@@ -1,4 +1,5 @@
-//! Requests that bring the arm to its task, with their cycle relative to the first free cycle.
+//! Requests that move the arm to its start pose and start the task. Cycles are counted from the first one in which the
+//! controller accepts requests.
 
 use super::spec::{DriveShutdown, Event, InvalidRequest, Spec, TestTask};
 use crate::cli::UpTrajectory;
@@ -15,7 +16,8 @@ use supple_model::Description;
 /// Distance and duration of the downward move: minimum jerk, peak speed 0.25 m/s.
 const DESCENT_M: f64 = 0.2;
 const DESCENT_S: f64 = 1.5;
-/// Duration of the same motion with compliant joints, which lag and catch up: peak speed 0.19 m/s.
+/// Duration of the same motion in joint impedance mode, where the joints lag behind the reference and catch up: peak
+/// speed 0.19 m/s.
 const COMPLIANT_DESCENT_S: f64 = 2.0;
 /// Duration of the same motion at the tip stiffness of the law, while the tip turns: peak speed 0.15 m/s.
 const POSE_DESCENT_S: f64 = 2.5;
@@ -102,7 +104,8 @@ fn pose_motion() -> PoseMotion {
 }
 
 impl<const N: usize> Script<N> {
-    /// Requests from the home pose to the start pose, the task and the event.
+    /// Requests that move the arm from the home pose to the start pose and start the task, and the request that is or
+    /// prepares the event.
     ///
     /// # Errors
     /// [`Failure::Experiment`] if the arm cannot perform the task.
@@ -130,7 +133,7 @@ impl<const N: usize> Script<N> {
             event_cycle: task_start_cycle
                 + cycles(match spec.task {
                     TestTask::GravityHold | TestTask::Float => 0.3,
-                    // The event comes at the highest speed of the motion.
+                    // In the tasks below, the event comes near the highest speed of the motion.
                     TestTask::Move => 0.6,
                     TestTask::JointImpedance => 0.8,
                     TestTask::TrackPose => 1.0,
@@ -147,7 +150,8 @@ impl<const N: usize> Script<N> {
                     ramp_s: 0.0,
                 },
                 InvalidRequest::WhileIdle => {
-                    // The arm is never activated, or its drives are idle from the start.
+                    // The arm stays idle: it is never activated (emu), or its drives are idle from the first cycle
+                    // (sim).
                     script.requests.clear();
                     to_start
                 }
