@@ -32,25 +32,32 @@
 pub mod actuators;
 pub mod config;
 pub mod contact;
+pub mod elasticity;
 pub mod filter;
 pub mod friction;
+pub mod friction_variation;
 pub mod injection;
 pub mod noise;
 pub mod scene;
 
 mod description;
 mod error;
+mod joint_frictions;
+pub mod options;
 mod plant;
 mod record;
 mod trace_file;
 mod world;
 
-pub use actuators::{ActuatorModel, Ripple};
-pub use config::{ForceSensor, HardStops, PlantConfig};
+pub use actuators::{ActuatorModel, Ripple, TorqueRipple};
+pub use config::{ForceSensor, HardStops, Hose, PlantConfig};
 pub use contact::{Contact, Material};
+pub use elasticity::Elasticity;
 pub use error::PlantError;
 pub use friction::LuGre;
+pub use friction_variation::{FrictionScale, FrictionVariation};
 pub use injection::{ControllerView, Injection, InjectionError, InjectionKind, Injector, Trigger};
+pub use options::{PlantOptions, PlantOptionsError};
 pub use plant::Plant;
 pub use record::{Measurement, StepRecord, Truth};
 pub use scene::{FixedBlock, FreeBox, Ground, Layer, Scene, SceneError};

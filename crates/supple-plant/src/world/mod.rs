@@ -66,7 +66,7 @@ impl<const N: usize> World<N> {
         if let Some((arm, _)) = physics.multibody_joints.get_mut(last_joint) {
             // The engine damps joints by default.
             arm.damping_mut().fill(0.0);
-            let armature = config.arm.armature();
+            let armature = link_armature(config);
             arm.armature_mut().copy_from_slice(armature.as_slice());
         }
         let mut world = World {
@@ -90,6 +90,27 @@ impl<const N: usize> World<N> {
             }
         }
         (q, qd)
+    }
+
+    /// Diagonal of the inverse mass matrix of the links, with the rotors of rigid joints \[1/(kg m^2)\].
+    pub fn link_inverse_inertia(&mut self) -> Vector<N> {
+        let PhysicsWorld {
+            multibody_joints,
+            bodies,
+            ..
+        } = &mut self.physics;
+        let arm = multibody_joints.get_mut(self.last_joint);
+        let found = arm
+            .map(|(arm, _)| Vector::from_column_slice(arm.dof_inverse_inertia(bodies).as_slice()));
+        found.unwrap_or_else(Vector::zeros)
+    }
+
+    /// Sets the damping of the joints in the next steps, which the engine integrates implicitly \[N m s/rad\].
+    pub fn set_joint_damping(&mut self, damping_nm_s_per_rad: &Vector<N>) {
+        if let Some((arm, _)) = self.physics.multibody_joints.get_mut(self.last_joint) {
+            let damping = damping_nm_s_per_rad.as_slice();
+            arm.damping_mut().copy_from_slice(damping);
+        }
     }
 
     pub fn set_state(&mut self, q: &Vector<N>, qd: &Vector<N>) {
@@ -205,5 +226,13 @@ impl<const N: usize> World<N> {
         let bodies = &self.physics.bodies;
         let surfaces = self.surfaces.iter();
         surfaces.map(|surface| surface.object(&bodies[surface.body]))
+    }
+}
+
+/// Rotor inertias that turn with the joints: not those behind elastic transmissions.
+fn link_armature<const N: usize>(config: &PlantConfig<N>) -> Vector<N> {
+    match config.elasticity {
+        Some(_) => Vector::zeros(),
+        None => config.arm.armature(),
     }
 }
