@@ -16,6 +16,7 @@ mod list;
 
 pub use list::{OPTIONS, PlantOption, PlantOptions};
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// TOML of the set `realistic`.
@@ -156,6 +157,13 @@ impl PlantOptions {
             .values()
             .filter_map(|(option, value)| Some(format!("{} = {}", option.name, value?)));
         set.collect::<Vec<_>>().join(", ")
+    }
+
+    /// The options in force as a note of a log, by the name `plant`; empty without any.
+    pub fn notes(&self) -> BTreeMap<String, String> {
+        let line = self.line();
+        let note = (!line.is_empty()).then(|| ("plant".to_owned(), line));
+        note.into_iter().collect()
     }
 
     fn validate(&self, file: &str) -> Result<(), PlantOptionsError> {

@@ -11,6 +11,7 @@ use crate::up::{START_S, System};
 use core::time::Duration;
 use std::path::PathBuf;
 use std::time::Instant;
+use supple_cli::arguments::PlantArgs;
 use supple_cli::exit::Failure;
 use supple_core::dynamics::jacobian;
 use supple_ipc::Domain;
@@ -74,6 +75,7 @@ pub fn perform<const N: usize>(
             _ => -(BLOCK_CLEARANCE_M + cap_m),
         }),
         inject: injections(spec, event_s, back_s, pushed.then_some(push_rad_per_s)),
+        plant_options: PlantArgs::default(),
         trace: Some(file.clone()),
         rate_hz: None,
         for_s: Some(event_s + back_s + OBSERVED_S),
