@@ -23,7 +23,7 @@ impl<'py> FromPyObject<'_, 'py> for PlantEffects {
             Err(_) => PlantOptions::from_file(&given.extract::<PathBuf>()?),
             Ok(values) => {
                 let mut text = String::new();
-                for (name, value) in values {
+                for (name, value) in values.iter() {
                     let (name, value): (String, f64) = (name.extract()?, value.extract()?);
                     // A whole number is also the form of the seed.
                     text.push_str(&format!("{name:?} = {value}\n"));

@@ -1,10 +1,10 @@
 //! Simulated arm and environment: torques in, measurements out.
 //!
-//! The arm is a reduced-coordinate multibody of the rapier engine with the rotor inertias on the
-//! diagonal of its mass matrix; the joints have bristle friction, quantised encoders and quantised,
-//! delayed torques; the tip is a sphere with a Hunt-Crossley contact force implemented here, because the
-//! impulse-based contact of the engine has no defined stiffness: its peak grows as the step shrinks. The engine
-//! solves contacts between scene objects only.
+//! The arm is a chain in joint coordinates with the rotor inertias on the diagonal of its mass matrix; the joints have
+//! bristle friction, quantised encoders and quantised, delayed torques; [`options`] add what else a real arm has. The
+//! tip is a sphere with a Hunt-Crossley contact force implemented here, because the impulse-based contact of the rapier
+//! engine has no defined stiffness: its peak grows as the step shrinks. The engine solves contacts between scene objects
+//! only, and runs only if one of them can move.
 //!
 //! The crate contains no controller; links other than the tip do not collide; integration is first-order
 //! accurate. The same configuration and torques give bit-identical results.

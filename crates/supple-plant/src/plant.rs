@@ -8,9 +8,8 @@ use crate::filter::Butterworth;
 use crate::joint_frictions::{JointFrictions, Load};
 use crate::noise::Noise;
 use crate::record::{Measurement, StepRecord, Truth};
-use crate::world::{Object, TipForce, TipMotion, World};
-use core::array;
-use supple_core::dynamics::{gravity, joint_poses, kinetic_energy};
+use crate::world::{Forces, Object, TipForce, TipMotion, World};
+use supple_core::dynamics::{gravity, kinetic_energy};
 use supple_core::nalgebra::Vector3;
 use supple_core::{Arm, ArmError, Body, Pose, Vector};
 
@@ -55,11 +54,11 @@ impl<const N: usize> Plant<N> {
         finite("q0", &q0)?;
         finite("qd0", &qd0)?;
         let gravity_nm = gravity(&config.arm, &q0);
-        let mut world = World::new(&config, &q0, &qd0)?;
+        let world = World::new(&config, &q0, &qd0)?;
         let transmission = motor_from_joint(&config.actuators).ok_or(PlantError::Transmission)?;
         let rotors = config.elasticity.as_ref().map(|elasticity| {
             let rotor_kg_m2 = config.arm.armature();
-            let links = world.link_inverse_inertia();
+            let links = world.arm().inverse_inertia();
             let mut rotors = Rotors::new(elasticity, &rotor_kg_m2, &links, config.step_s);
             rotors.set_state(&q0, &qd0, &gravity_nm);
             rotors
@@ -319,17 +318,13 @@ impl<const N: usize> Plant<N> {
         }
         let tip = self.tip_motion();
         let contact = self.world.compute_tip_contact(&tip, dt_s);
-        let about_axis: [Vector3<f64>; N] =
-            array::from_fn(|i| self.poses[i].rotation.column(2) * torque[i]);
-        let link_torque = array::from_fn(|i| match about_axis.get(i + 1) {
-            Some(reaction) => about_axis[i] - reaction,
-            None => about_axis[i],
-        });
-        if self.rotors.is_some() {
-            let damping = &transmitted.damping_nm_s_per_rad;
-            self.world.set_joint_damping(damping);
-        }
-        self.world.step(&link_torque, &contact, &tip.center_m, dt_s);
+        let forces = Forces {
+            torque_nm: &torque,
+            damping_nm_s_per_rad: &transmitted.damping_nm_s_per_rad,
+            tip: &contact,
+            tip_center_m: &tip.center_m,
+        };
+        self.world.step(&forces, dt_s);
         if contact.force_n.norm_squared() > self.max_force_n.norm_squared() {
             self.max_force_n = contact.force_n;
         }
@@ -340,8 +335,8 @@ impl<const N: usize> Plant<N> {
         self.truth.friction_torque_nm = friction;
         self.truth.motor_torque_nm = motor;
         if let Some(rotors) = &mut self.rotors {
-            let (q, qd) = self.world.state();
-            rotors.advance((&q, &qd), dt_s);
+            let arm = self.world.arm();
+            rotors.advance((&arm.position_rad, &arm.velocity_rad_per_s), dt_s);
         }
         self.read_state();
         contact
@@ -365,8 +360,9 @@ impl<const N: usize> Plant<N> {
     }
 
     fn read_state(&mut self) {
-        let (q, qd) = self.world.state();
-        self.poses = joint_poses(&self.config.arm, &q);
+        let arm = self.world.arm();
+        let (q, qd) = (arm.position_rad, arm.velocity_rad_per_s);
+        self.poses = arm.poses;
         let tip = self.poses[N - 1] * self.config.arm.joint_from_tip();
         self.truth.position_rad = q;
         self.truth.velocity_rad_per_s = qd;

@@ -9,6 +9,7 @@ mod contact;
 mod description;
 mod effects;
 mod elasticity;
+mod engine;
 mod free_box;
 mod free_motion;
 mod friction;
