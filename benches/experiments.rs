@@ -6,6 +6,7 @@ use std::time::Instant;
 use supple_core::Trajectory;
 use supple_experiment::{DemoOptions, Plan, Setup, Variant, demo, run, scenario};
 use supple_model::Description;
+use supple_plant::PlantOptions;
 
 const ROUNDS: usize = 5;
 const DEMO_ROUNDS: usize = 3;
@@ -39,6 +40,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         seed: 0,
         log_dir: Some(folder.path().to_owned()),
         model: None,
+        plant: PlantOptions::default(),
+        realistic_seeds: 0,
     };
     let mut seconds = Vec::new();
     for _ in 0..DEMO_ROUNDS {

@@ -40,10 +40,18 @@ fn side_by_side<O: Send>(seeds: u64, f: impl Fn(u64) -> O + Sync) -> Vec<O> {
     })
 }
 
+/// A calibration whose plant has exactly the friction that the model can express, so that the model is comparable.
+fn without_load(seed: u64) -> Calibration {
+    Calibration {
+        load: false,
+        ..Calibration::new(seed)
+    }
+}
+
 #[test]
 fn the_identified_model_is_accurate_enough_for_5_n_per_m() {
     let results = side_by_side(SEEDS, |seed| {
-        let calibration = Calibration::new(seed);
+        let calibration = without_load(seed);
         let found = found(&calibration);
         let errors = sinusoid(&found, &calibration);
         let plant = plant_of::<4>(&wam4(), &calibration).expect("four joints");
@@ -83,7 +91,7 @@ fn ripple_is_identified_and_compensated() {
     let errors = side_by_side(SEEDS, |seed| {
         let calibration = Calibration {
             ripple_nm: 0.3,
-            ..Calibration::new(seed)
+            ..without_load(seed)
         };
         let found = found(&calibration);
         assert!(
@@ -123,7 +131,7 @@ fn ripple_is_identified_and_compensated() {
 fn load_dependent_friction_increases_the_error_little() {
     let calibration = Calibration {
         load: true,
-        ..Calibration::new(3)
+        ..without_load(3)
     };
     let errors = sinusoid(&found(&calibration), &calibration);
     println!("{errors:?}");
@@ -133,7 +141,7 @@ fn load_dependent_friction_increases_the_error_little() {
 
 #[test]
 fn measured_breakaway_torque_matches_the_plant() {
-    let calibration = Calibration::new(0);
+    let calibration = without_load(0);
     let description = wam4();
     let config = description.config::<4>().expect("four joints");
     let off = calibration.start.apply(&config).expect("an arm");
@@ -162,7 +170,7 @@ fn measured_breakaway_torque_matches_the_plant() {
 fn ripple_compensation_improves_the_breakaway_measurement() {
     let calibration = Calibration {
         ripple_nm: 0.3,
-        ..Calibration::new(0)
+        ..without_load(0)
     };
     let description = wam4();
     let config = description.config::<4>().expect("four joints");
@@ -194,7 +202,7 @@ fn ripple_compensation_improves_the_breakaway_measurement() {
 
 #[test]
 fn predicted_tracking_error_bounds_the_measured_one() {
-    let calibration = Calibration::new(2);
+    let calibration = without_load(2);
     let found = found(&calibration);
     let predicted = predict_tracking_error(&found.description, &found.fit, 3)
         .expect("it runs")
@@ -214,7 +222,7 @@ fn predicted_tracking_error_bounds_the_measured_one() {
 /// has set from the model's residual, and these are tighter than the default.
 #[test]
 fn identified_collision_thresholds_are_tight_and_not_reached_by_moves() {
-    let calibration = Calibration::new(3);
+    let calibration = without_load(3);
     let found = found(&calibration);
     let config = found.description.config::<4>().expect("four joints");
     let default_nm = wam4().config::<4>().expect("four joints").collision;
@@ -268,7 +276,7 @@ fn identified_collision_thresholds_are_tight_and_not_reached_by_moves() {
 #[test]
 fn a_friction_error_of_10_percent_is_learnt_within_four_periods() {
     let description = wam4();
-    let plant = plant_of::<4>(&description, &Calibration::new(0)).expect("four joints");
+    let plant = plant_of::<4>(&description, &without_load(0)).expect("four joints");
     let mut config = description.config::<4>().expect("four joints");
     config.law.gains = scenario::gains(scenario::STIFFNESS_N_PER_M);
     for friction in &mut config.friction {

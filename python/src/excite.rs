@@ -3,6 +3,7 @@
 use crate::arm::Arm;
 use crate::arrays;
 use crate::errors;
+use crate::plant_options::PlantEffects;
 use crate::table::Table;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -175,6 +176,7 @@ pub struct ExciteOptions {
     load: bool,
     seed: u64,
     log_dir: Option<PathBuf>,
+    plant_options: PlantEffects,
 }
 
 /// Simulates an arm that tracks a series and returns its log. `model` is the controller's model of the arm.
@@ -221,12 +223,18 @@ fn followed<const N: usize>(
     let calibration = Calibration {
         encoder_noise_rad: options.encoder_noise_rad,
         load: options.load,
+        plant: options.plant_options.0.clone(),
         ..Calibration::new(options.seed)
     };
     let plant = plant_of::<N>(truth, &calibration)?;
     let (config, home) = (known.config::<N>()?, truth.home::<N>()?);
     let series = series.fourier::<N>()?;
     let sequence = excitation("excitation", &config, &plant, &home, &[series]);
-    let recordings = sequence.record(options.log_dir.as_deref(), known, options.seed)?;
+    let recordings = sequence.record_with_notes(
+        options.log_dir.as_deref(),
+        known,
+        options.seed,
+        options.plant_options.0.notes(),
+    )?;
     Ok((log_of(&recordings[0]), config.period_s))
 }

@@ -17,6 +17,7 @@ mod learn;
 mod load;
 mod log;
 mod options;
+mod plant_options;
 mod samples;
 mod simulate;
 mod table;
@@ -44,6 +45,8 @@ mod _native {
     use super::load::{payload, ripple, torque_scale};
     #[pymodule_export]
     use super::log::read_log;
+    #[pymodule_export]
+    use super::plant_options::plant_options;
     #[pymodule_export]
     use super::simulate::simulate;
 

@@ -2,6 +2,7 @@
 
 use crate::arm::Arm;
 use crate::errors;
+use crate::plant_options::PlantEffects;
 use crate::table::Table;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -29,6 +30,7 @@ pub struct Options {
     fade: bool,
     seed: u64,
     log_dir: Option<PathBuf>,
+    plant_options: PlantEffects,
 }
 
 /// The plant and the controller's model of it.
@@ -80,7 +82,13 @@ fn sized<const N: usize>(arms: &Arms<'_>, options: &Options) -> Result<Outcome, 
     let plan = plan::<N>(arms, options)?;
     let description = arms.model.unwrap_or(arms.plant);
     let mut recorder = match &options.log_dir {
-        Some(folder) => Some(Recorder::create(folder, description, &plan, options.seed)?),
+        Some(folder) => Some(Recorder::create(
+            folder,
+            description,
+            &plan,
+            options.seed,
+            options.plant_options.0.notes(),
+        )?),
         None => None,
     };
     let mut meter = match plan.trajectory {
@@ -115,6 +123,7 @@ fn plan<const N: usize>(arms: &Arms<'_>, options: &Options) -> Result<Plan<N>, E
         Some(model) => Setup::<N>::with_model(arms.plant, model, options.seed)?,
         None => Setup::<N>::new(arms.plant, options.seed)?,
     };
+    let setup = setup.with_plant_options(&options.plant_options.0)?;
     let wrong = options.gravity_error != 0.0 || options.friction_error != 0.0;
     let variant = Variant {
         mismatch: wrong.then_some(Mismatch {

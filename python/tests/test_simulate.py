@@ -98,3 +98,45 @@ def test_invalid_logs_are_rejected(tmp_path, run):
     cut.write_bytes(content[: len(content) * 2 // 3])
     with pytest.raises(ValueError, match="cut.mcap is incomplete .*supple log recover"):
         supple.read_log(cut)
+
+
+def test_plant_options_change_the_plant_and_are_noted_in_the_log(arm, run, tmp_path):
+    options = {"tool_extra_kg": 0.05}
+    heavy = supple.simulate(
+        arm, "sinusoid", duration_s=2.0, seed=3, plant_options=options, log_dir=tmp_path
+    )
+    assert heavy.rms_error_m > 2.0 * run.rms_error_m
+    file = tmp_path / "plant.toml"
+    file.write_text("tool_extra_kg = 0.05\n")
+    same = supple.simulate(arm, "sinusoid", duration_s=2.0, seed=3, plant_options=file)
+    np.testing.assert_array_equal(same.q, heavy.q)
+    none = supple.simulate(arm, "sinusoid", duration_s=2.0, seed=3, plant_options={})
+    np.testing.assert_array_equal(none.q, run.q)
+
+
+def test_realistic_is_the_named_set(arm):
+    named = supple.simulate(arm, "sinusoid", duration_s=1.0, realistic=True)
+    same = supple.simulate(
+        arm, "sinusoid", duration_s=1.0, plant_options=supple.plant_options("realistic")
+    )
+    np.testing.assert_array_equal(named.q, same.q)
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        ({"tool_kg": 1.0}, "tool_kg"),
+        ({"base_tilt_rad": 3.0}, "base_tilt_rad is 3"),
+        ("nowhere.toml", "nowhere.toml"),
+    ],
+)
+def test_wrong_plant_options_are_named(arm, options, expected):
+    with pytest.raises(ValueError, match=expected):
+        supple.simulate(arm, plant_options=options)
+
+
+def test_plant_options_and_realistic_exclude_each_other(arm):
+    with pytest.raises(ValueError, match="realistic"):
+        supple.simulate(arm, plant_options={}, realistic=True)
+    with pytest.raises(ValueError, match="realistic"):
+        supple.plant_options("surreal")

@@ -23,7 +23,7 @@ use supple_experiment::ExperimentError;
 use supple_ident::{IdentError, ReadError, SaveError};
 use supple_log::LogError;
 use supple_model::ModelError;
-use supple_plant::InjectionError;
+use supple_plant::{InjectionError, PlantOptionsError};
 
 /// Table of the exit codes, printed at the end of `--help`.
 pub const CODES: &str = "Exit codes:
@@ -162,9 +162,23 @@ pub enum Failure {
     /// An injected fault that this plant does not support.
     #[error("--inject: {0}")]
     Injection(#[from] InjectionError),
+    /// A file of plant options is invalid.
+    #[error(transparent)]
+    PlantOptions(#[from] PlantOptionsError),
+    /// No effect matches the given texts.
+    #[error("no effect of `supple effects` contains {text}: leave out --only to see all names")]
+    NoSuchEffect {
+        /// Texts given by the user.
+        text: String,
+    },
     /// Fault injection was requested for a real arm.
     #[error("--inject works only with a simulated arm: use --plant sim or --plant emu")]
     InjectionIntoRealArm,
+    /// Plant options were given for a real arm.
+    #[error(
+        "--plant-options and --realistic work only with a simulated arm: use --plant sim or --plant emu"
+    )]
+    OptionsOfRealArm,
     /// The system under test did not reach tracking mode.
     #[error(
         "the system did not reach tracking mode within 20 s in three attempts: see the messages of its \
@@ -339,6 +353,8 @@ impl Failure {
             | Failure::FaultTestOnRealArm
             | Failure::ValueCount { .. } => 2,
             Failure::Injection(_) | Failure::InjectionIntoRealArm => 2,
+            Failure::OptionsOfRealArm | Failure::NoSuchEffect { .. } => 2,
+            Failure::PlantOptions(error) => plant_options_code(error),
             Failure::NoSuchProcess { .. } | Failure::NoSuchTestCase { .. } => 2,
             Failure::Drill { .. } | Failure::DidNotReachTracking => 12,
             Failure::System(_)
@@ -368,6 +384,16 @@ fn experiment_code(error: &ExperimentError) -> u8 {
         ExperimentError::Ident(_) => 9,
         ExperimentError::Save(error) => save_code(error),
         ExperimentError::Log(error) => log_code(error),
+    }
+}
+
+fn plant_options_code(error: &PlantOptionsError) -> u8 {
+    match error {
+        PlantOptionsError::UnknownSet { .. } => 2,
+        PlantOptionsError::File { .. } => 6,
+        PlantOptionsError::Toml { .. }
+        | PlantOptionsError::Value { .. }
+        | PlantOptionsError::Needs { .. } => 3,
     }
 }
 

@@ -66,8 +66,9 @@ pub struct Emulator<const N: usize> {
 }
 
 impl<const N: usize> Emulator<N> {
-    /// An arm at rest at `start_rad`, powered up in the emergency stop, at time `start_ns`. Transmission, ripple
-    /// and braking come from the plant's actuator model; counts and torque units from the pucks.
+    /// An arm at rest at `start_rad`, powered up in the emergency stop, at time `start_ns`. Transmission, amplifiers,
+    /// braking and delays beyond the first cycle come from the plant's actuator model; counts and torque units from the
+    /// pucks. With an encoder bias the arm starts beside `start_rad` by as much.
     ///
     /// # Errors
     /// If the arm does not have 4 or 7 joints, no property ids are known for a puck's firmware, or the plant
@@ -91,14 +92,21 @@ impl<const N: usize> Emulator<N> {
         let motor_from_joint = joint_from_motor
             .try_inverse()
             .ok_or(EmulatorError::Transmission)?;
+        let step_s = config.step_ns as f64 * 1e-9;
+        // The bus itself takes the first cycle.
+        let late_s = plant.actuators.torque_delay_cycles.saturating_sub(1) as f64 * plant.cycle_s;
         plant.actuators = ActuatorModel {
-            joint_from_motor,
-            ripple: plant.actuators.ripple,
-            braking_nm_s_per_rad: plant.actuators.braking_nm_s_per_rad,
-            ..ActuatorModel::direct()
+            counts_per_motor_revolution: Vector::zeros(),
+            motor_torque_quantum_nm: Vector::zeros(),
+            torque_delay_cycles: (late_s / step_s).round() as usize,
+            ..plant.actuators
         };
-        plant.step_s = config.step_ns as f64 * 1e-9;
+        plant.step_s = step_s;
         plant.cycle_s = plant.step_s;
+        // The bus has a jitter of its own.
+        plant.cycle_jitter = 0.0;
+        // The host takes the start pose for its home pose; the zero is then off by this.
+        let start_rad = start_rad - plant.actuators.encoder_bias_rad;
         let mut pucks = Vec::with_capacity(N);
         for (index, puck) in config.pucks.iter().enumerate() {
             let version = puck.version;
@@ -233,7 +241,7 @@ impl<const N: usize> Emulator<N> {
 
     /// Torque of each motor, braking included \[N m\].
     pub fn motor_torque_nm(&self) -> Vector<N> {
-        let speed = self.motor_from_joint * self.plant.truth().velocity_rad_per_s;
+        let speed = self.motor_from_joint * self.plant.truth().motor_velocity_rad_per_s;
         let braking = &self.plant.config().actuators.braking_nm_s_per_rad;
         let commanded = self.commanded_nm();
         Vector::from_fn(|i, _| match self.pucks[i].brakes() {
@@ -296,7 +304,7 @@ impl<const N: usize> Emulator<N> {
 
     /// Encoder counts of the true motor angles.
     fn true_counts(&self) -> Vec<i32> {
-        let angles = self.motor_from_joint * self.plant.truth().position_rad;
+        let angles = self.motor_from_joint * self.plant.measurement().position_rad;
         let scale = |i: usize| f64::from(self.config.pucks[i].counts_per_revolution);
         let counts = angles.iter().enumerate();
         counts

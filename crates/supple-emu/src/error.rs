@@ -2,7 +2,7 @@
 
 use supple_bus::BusError;
 use supple_model::ModelError;
-use supple_plant::{InjectionError, PlantError, TraceError};
+use supple_plant::{InjectionError, PlantError, PlantOptionsError, TraceError};
 use supple_realtime::StopError;
 
 /// Errors in the configuration or operation of an emulator.
@@ -41,6 +41,9 @@ pub enum EmulatorError {
     /// The plant rejects its configuration.
     #[error(transparent)]
     Plant(#[from] PlantError),
+    /// Invalid options of the plant.
+    #[error(transparent)]
+    Options(#[from] PlantOptionsError),
     /// Error in the description of the arm.
     #[error(transparent)]
     Model(#[from] ModelError),
@@ -85,6 +88,7 @@ impl EmulatorError {
             | EmulatorError::Firmware { .. }
             | EmulatorError::Transmission
             | EmulatorError::Plant(_)
+            | EmulatorError::Options(_)
             | EmulatorError::Model(_) => 3,
             EmulatorError::Trace(_) => 6,
             EmulatorError::Bus(_) => 10,

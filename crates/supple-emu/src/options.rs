@@ -50,6 +50,12 @@ pub struct Options {
     /// first commands torque (`activate@held+0.2`). May be repeated.
     #[arg(long, value_name = "BUTTON@TIME", value_parser = press)]
     pub press: Vec<ScheduledPress>,
+    /// Effects of a real arm, as TOML; `supple plant list` has all options.
+    #[arg(long, value_name = "FILE", conflicts_with = "realistic")]
+    pub plant_options: Option<PathBuf>,
+    /// All effects of a real arm, each of modest size: `supple plant show realistic`.
+    #[arg(long)]
+    pub realistic: bool,
     /// Injects a fault: KIND or KIND:key=value,..., for example encoder-stuck:joint=1,at-s=2; see --help. May be
     /// repeated.
     #[arg(long, value_name = "SPEC", long_help = supple_plant::injection::HELP)]

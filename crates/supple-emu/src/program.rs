@@ -13,7 +13,7 @@ use supple_bus::{
     Address, Bus, BusError, BusFault, DatagramBus, Event, OwnerFolder, PacedResponder, SocketCan,
 };
 use supple_model::{Description, with_dof};
-use supple_plant::{PlantConfig, Sample, Scene, TraceFile};
+use supple_plant::{PlantConfig, PlantOptions, Sample, Scene, TraceFile};
 use supple_puck::NodeId;
 use supple_puck::status::MotorMode;
 use supple_realtime::{Stop, apply_realtime_settings, diagnostics, die_with_parent, monotonic_ns};
@@ -71,7 +71,8 @@ fn run<const N: usize>(
     let mut config = EmulatorConfig::wam(N);
     config.zeroed = options.zeroed;
     config.force_sensor = !options.no_sensor;
-    let mut plant = PlantConfig::<N>::from_description(description)?;
+    let effects = PlantOptions::chosen(options.plant_options.as_deref(), options.realistic)?;
+    let mut plant = effects.apply(PlantConfig::<N>::from_description(description)?)?;
     if let Some(face_m) = options.block_m {
         plant.scene = Scene::with_block_at(face_m);
     }

@@ -3,6 +3,7 @@
 
 use supple_experiment::{DemoOptions, demo};
 use supple_model::Description;
+use supple_plant::PlantOptions;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
@@ -12,6 +13,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         seed,
         log_dir: None,
         model: None,
+        plant: PlantOptions::default(),
+        realistic_seeds: 0,
     };
     let demo = demo(&Description::asset(&arm)?, &options, &|progress| {
         eprintln!(

@@ -25,7 +25,7 @@ use supple_ident::{
     Validation, fit_ripple, fit_with_stribeck,
 };
 use supple_model::{Description, IdentifiedModel};
-use supple_plant::{LuGre, PlantConfig, Ripple};
+use supple_plant::{LuGre, PlantConfig, PlantOptions, Ripple};
 
 /// Speeds of the friction curve that is compared \[rad/s\].
 const CURVE_RAD_PER_S: (f64, f64, usize) = (0.02, 0.5, 49);
@@ -45,8 +45,10 @@ pub struct Calibration {
     pub start: Mismatch,
     /// Standard deviation of the noise on each motor angle \[rad\].
     pub encoder_noise_rad: f64,
-    /// Whether the plant's friction depends on direction and load.
+    /// Whether the plant's friction depends on direction and load; true by default.
     pub load: bool,
+    /// Effects of a real arm in the plant; none by default.
+    pub plant: PlantOptions,
     /// Amplitude of the torque ripple of each motor, reflected to its joint \[N m\]; zero for none.
     pub ripple_nm: f64,
     /// Number of candidates of the excitation design.
@@ -58,8 +60,7 @@ pub struct Calibration {
 }
 
 impl Calibration {
-    /// Model errors of 5 % in gravity and 30 % in friction, encoder noise of a third of a count, no load
-    /// dependence, no ripple.
+    /// Model errors of 5 % in gravity and 30 % in friction, encoder noise of a third of a count, no ripple.
     pub fn new(seed: u64) -> Calibration {
         Calibration {
             seed,
@@ -69,12 +70,21 @@ impl Calibration {
                 seed,
             },
             encoder_noise_rad: 5e-4,
-            load: false,
+            load: true,
+            plant: PlantOptions::default(),
             ripple_nm: 0.0,
             candidates: 600,
             breakaway: false,
             log_dir: None,
         }
+    }
+}
+
+impl Calibration {
+    /// Whether the motors ripple, so that runs at constant speed are needed.
+    fn ripples(&self) -> bool {
+        let options = [self.plant.ripple_nm, self.plant.torque_ripple_fraction];
+        self.ripple_nm > 0.0 || options.into_iter().flatten().any(|size| size > 0.0)
     }
 }
 
@@ -126,7 +136,7 @@ pub fn plant_of<const N: usize>(
     if calibration.ripple_nm > 0.0 {
         plant.actuators.ripple = ripple(&plant, calibration);
     }
-    Ok(plant)
+    Ok(calibration.plant.apply(plant)?)
 }
 
 /// Two harmonics for each motor, with seeded phases; their amplitudes at the joint add up to `ripple_nm`.
@@ -187,7 +197,7 @@ pub fn calibrate<const N: usize>(
     let slow = slow_motion(&free, &home, &joints)?;
     if calibration.breakaway {
         let mut compensated = start;
-        if calibration.ripple_nm > 0.0 {
+        if calibration.ripples() {
             progress("torque ripple, from runs at constant speed");
             compensated.ripple = identify_ripple(&start, &plant, &home)?;
         }
@@ -215,12 +225,17 @@ pub fn calibrate<const N: usize>(
 
     progress("excitation");
     let mut series = vec![designed.series, slow, other];
-    if calibration.ripple_nm > 0.0 {
+    if calibration.ripples() {
         series.extend(constant_speed_runs(&free, &home, &joints)?);
     }
     let sequence = excitation("excitation", &free, &plant, &home, &series);
     let folder = calibration.log_dir.as_deref();
-    let recordings = sequence.record(folder, description, calibration.seed)?;
+    let recordings = sequence.record_with_notes(
+        folder,
+        description,
+        calibration.seed,
+        calibration.plant.notes(),
+    )?;
     let logs: Vec<Log> = recordings.iter().map(log_of).collect();
 
     progress("identification");

@@ -7,6 +7,7 @@ use crate::job::{
 };
 use crate::metrics::{LineFit, spread};
 use crate::probing::{Stroke, median_stroke};
+use crate::realistic::{REALISTIC_S, Realistic, realistic_seed};
 use crate::run::Run;
 use crate::scenario;
 use crate::setup::Setup;
@@ -16,6 +17,7 @@ use crate::summary::{
 };
 use rayon::prelude::*;
 use supple_model::{Description, with_dof};
+use supple_plant::PlantOptions;
 
 /// Progress of the demo.
 #[derive(Clone, Debug)]
@@ -79,31 +81,49 @@ fn sized<const N: usize>(
         Some(model) => Setup::<N>::with_model(description, model, options.seed)?,
         None => Setup::<N>::new(description, options.seed)?,
     };
+    let setup = setup.with_plant_options(&options.plant)?;
+    let hard = match options.plant.is_none() {
+        true => PlantOptions::realistic(),
+        false => options.plant.clone(),
+    };
     let jobs = jobs();
     let plans = jobs
         .iter()
         .map(|job| job.plan(&setup, options.seed))
         .collect::<Result<Vec<_>, _>>()?;
-    let total_s = plans.iter().map(|plan| plan.duration_s).sum();
+    let seeds = options.realistic_seeds;
+    let total_s =
+        plans.iter().map(|plan| plan.duration_s).sum::<f64>() + seeds as f64 * REALISTIC_S;
     let done_s = std::sync::Mutex::new(0.0);
+    let report = |duration_s: f64, finished: String| {
+        let mut done_s = done_s
+            .lock()
+            .unwrap_or_else(|poisoned| poisoned.into_inner());
+        *done_s += duration_s;
+        progress(&Progress {
+            done_s: *done_s,
+            total_s,
+            finished,
+        });
+    };
+    let realistic = (0..seeds).into_par_iter().map(|offset| {
+        let seed = options.seed.wrapping_add(offset);
+        let done = realistic_seed::<N>(description, options.model.as_ref(), &hard, seed)?;
+        report(REALISTIC_S, format!("realistic, seed {seed}"));
+        Ok(done)
+    });
+    let realistic = realistic.collect::<Result<Vec<_>, ExperimentError>>()?;
     let results = jobs
         .par_iter()
         .zip(&plans)
         .map(|(job, plan)| {
             let done = job.run(plan, description, options)?;
-            let mut done_s = done_s
-                .lock()
-                .unwrap_or_else(|poisoned| poisoned.into_inner());
-            *done_s += plan.duration_s;
-            progress(&Progress {
-                done_s: *done_s,
-                total_s,
-                finished: plan.name.clone(),
-            });
+            report(plan.duration_s, plan.name.clone());
             Ok(done)
         })
         .collect::<Result<Vec<JobResult>, ExperimentError>>()?;
-    Ok(assemble(description, options, &jobs, results))
+    let realistic = (seeds > 0).then(|| Realistic::of(&realistic));
+    Ok(assemble(description, options, &jobs, results, realistic))
 }
 
 fn tracking(run: &Run) -> TrackingError {
@@ -193,6 +213,7 @@ fn assemble(
     options: &DemoOptions,
     jobs: &[Job],
     done: Vec<JobResult>,
+    realistic: Option<Realistic>,
 ) -> Demo {
     let mut results = Results {
         jobs: jobs.to_vec(),
@@ -228,6 +249,8 @@ fn assemble(
             let source = model.settings().source.clone();
             source.unwrap_or_else(|| model.name().to_owned())
         }),
+        plant: options.plant.clone(),
+        realistic,
         sinusoid: tracking(headline),
         sinusoid_by_speed: sinusoids
             .iter()

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 use supple_model::Description;
+use supple_plant::PlantOptions;
 
 /// Options of the demo.
 #[derive(Clone, Debug)]
@@ -13,4 +14,8 @@ pub struct DemoOptions {
     /// Model of every controller, unperturbed; `None` uses the arm's own parameters, perturbed if the run
     /// requires it.
     pub model: Option<Description>,
+    /// Effects of a real arm in the plant of every run.
+    pub plant: PlantOptions,
+    /// Number of seeds on the realistic plant, or on that of `plant` if it has options; zero leaves these runs out.
+    pub realistic_seeds: u64,
 }

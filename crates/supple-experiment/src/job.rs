@@ -177,7 +177,13 @@ impl Job {
         options: &DemoOptions,
     ) -> Result<JobResult, ExperimentError> {
         let mut recorder = match &options.log_dir {
-            Some(folder) => Some(Recorder::create(folder, description, plan, options.seed)?),
+            Some(folder) => Some(Recorder::create(
+                folder,
+                description,
+                plan,
+                options.seed,
+                options.plant.notes(),
+            )?),
             None => None,
         };
         let mut contact = match plan.trajectory {

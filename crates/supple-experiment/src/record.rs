@@ -4,6 +4,7 @@ use crate::error::ExperimentError;
 use crate::rig::Cycle;
 use crate::run::Plan;
 use crate::trace::xyz;
+use std::collections::BTreeMap;
 use std::path::Path;
 use supple_core::Config;
 use supple_log::{Extras, LogError, PlantTruth, RunInfo, Writer};
@@ -16,7 +17,7 @@ pub struct Recorder<const N: usize> {
 }
 
 impl<const N: usize> Recorder<N> {
-    /// Creates the log of a plan.
+    /// Creates the log of a plan; `notes` say what else belongs to it, such as the options of the plant.
     ///
     /// # Errors
     /// If the log cannot be written.
@@ -25,11 +26,12 @@ impl<const N: usize> Recorder<N> {
         description: &Description,
         plan: &Plan<N>,
         seed: u64,
+        notes: BTreeMap<String, String>,
     ) -> Result<Recorder<N>, ExperimentError> {
-        Self::named(folder, description, &plan.name, &plan.config, seed)
+        Self::named(folder, description, &plan.name, &plan.config, seed, notes)
     }
 
-    /// Creates a log with a given name.
+    /// Creates a log with a given name and notes.
     ///
     /// # Errors
     /// If the log cannot be written.
@@ -39,11 +41,13 @@ impl<const N: usize> Recorder<N> {
         name: &str,
         config: &Config<N>,
         seed: u64,
+        notes: BTreeMap<String, String>,
     ) -> Result<Recorder<N>, ExperimentError> {
         let path = folder.join(format!("{name}.mcap"));
         let run = RunInfo {
             experiment: name.to_owned(),
             seed: Some(seed),
+            notes,
             ..RunInfo::default()
         };
         Ok(Recorder {

@@ -4,6 +4,7 @@ use crate::error::ExperimentError;
 use crate::record::Recorder;
 use crate::rig::{Cycle, Rig};
 use nalgebra::DMatrix;
+use std::collections::BTreeMap;
 use std::path::Path;
 use supple_core::controller::{Mode, Request};
 use supple_core::{Config, Controller, Vector};
@@ -82,10 +83,27 @@ impl<const N: usize> RequestSequence<N> {
         description: &Description,
         seed: u64,
     ) -> Result<Vec<Recording>, ExperimentError> {
+        self.record_with_notes(folder, description, seed, BTreeMap::new())
+    }
+
+    /// As [`RequestSequence::record`], with notes in the log, such as [`PlantOptions::notes`].
+    ///
+    /// # Errors
+    /// As [`RequestSequence::record`].
+    ///
+    /// [`PlantOptions::notes`]: supple_plant::PlantOptions::notes
+    pub fn record_with_notes(
+        &self,
+        folder: Option<&Path>,
+        description: &Description,
+        seed: u64,
+        notes: BTreeMap<String, String>,
+    ) -> Result<Vec<Recording>, ExperimentError> {
         let Some(folder) = folder else {
             return self.perform(&mut |_, _| Ok(()));
         };
-        let mut recorder = Recorder::named(folder, description, &self.name, &self.config, seed)?;
+        let mut recorder =
+            Recorder::named(folder, description, &self.name, &self.config, seed, notes)?;
         let recordings = self.perform(&mut |cycle, _| Ok(recorder.cycle(cycle)?))?;
         recorder.finish()?;
         Ok(recordings)

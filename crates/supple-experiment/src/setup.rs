@@ -5,7 +5,7 @@ use crate::mismatch::Mismatch;
 use supple_core::config::Law;
 use supple_core::{Config, Friction};
 use supple_model::Description;
-use supple_plant::{LuGre, PlantConfig, Scene};
+use supple_plant::{LuGre, PlantConfig, PlantOptions, Scene};
 
 /// Noise of the force sensor, on each reported component \[N\].
 const FORCE_NOISE_N: f64 = 0.02;
@@ -42,6 +42,8 @@ impl Variant {
 pub struct Setup<const N: usize> {
     exact: Config<N>,
     plant: PlantConfig<N>,
+    /// Friction of the plant without options, which a model that knows nothing of them has.
+    described_friction: [LuGre; N],
     /// Whether `exact` is an identified model, whose Stribeck effect is its own.
     identified: bool,
 }
@@ -74,9 +76,19 @@ impl<const N: usize> Setup<N> {
         plant.seed = seed;
         Ok(Setup {
             exact,
+            described_friction: plant.friction,
             plant,
             identified: false,
         })
+    }
+
+    /// The same with effects of a real arm in the plant; the controller's model does not change.
+    ///
+    /// # Errors
+    /// If the options do not fit the arm.
+    pub fn with_plant_options(mut self, options: &PlantOptions) -> Result<Self, ExperimentError> {
+        self.plant = options.apply(self.plant)?;
+        Ok(self)
     }
 
     /// Radius of the cap \[m\].
@@ -90,7 +102,7 @@ impl<const N: usize> Setup<N> {
     /// If the mismatch makes the arm physically inconsistent.
     pub fn config(&self, variant: &Variant) -> Result<Config<N>, ExperimentError> {
         let mut config = self.exact;
-        for (friction, truth) in config.friction.iter_mut().zip(&self.plant.friction) {
+        for (friction, truth) in config.friction.iter_mut().zip(&self.described_friction) {
             let breakaway_nm = match (variant.stribeck, self.identified) {
                 (false, _) => friction.coulomb_nm,
                 (true, false) => truth.breakaway_nm,

@@ -3,9 +3,11 @@
 use crate::metrics::LineFit;
 use crate::probing::Stroke;
 use crate::quadrant::Edge;
+use crate::realistic::Realistic;
 use crate::run::FaultEnd;
 use crate::trace::JointTorque;
 use serde::Serialize;
+use supple_plant::PlantOptions;
 
 /// Tracking error of a run in free space.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -100,6 +102,12 @@ pub struct Summary {
     /// every run.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub model: Option<String>,
+    /// Effects of a real arm in the plant of every run but `realistic`; empty without any.
+    pub plant: PlantOptions,
+    /// Sinusoid and arc on the realistic plant, or on that of `plant` if it has options, with a model calibrated on the
+    /// same arm; absent if these runs were left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub realistic: Option<Realistic>,
     /// Figure 3a.
     pub sinusoid: TrackingError,
     /// Figure 3a at half, once and twice the paper's speed.

@@ -1,7 +1,8 @@
 //! Predicts the tracking error of an identified model at 5 N/m: simulates the identified arm with controllers
 //! whose models are drawn from the uncertainty of the fit.
 //!
-//! The prediction includes log noise but no unmodelled effects; expect larger errors on a real arm.
+//! The prediction includes log noise and friction that depends on load and direction as in every simulated arm, but no
+//! other unmodelled effects: expect larger errors on a real arm, as `docs/effects.md` shows effect by effect.
 
 use crate::error::ExperimentError;
 use crate::metrics::median;
@@ -10,7 +11,7 @@ use crate::scenario;
 use serde::Serialize;
 use supple_ident::Fit;
 use supple_model::Description;
-use supple_plant::{LuGre, PlantConfig};
+use supple_plant::PlantConfig;
 
 /// Maximum error that counts as good at 5 N/m \[m\].
 pub const GOOD_M: f64 = 0.010;
@@ -35,8 +36,7 @@ pub fn predict_tracking_error<const N: usize>(
     fit: &Fit<N>,
     draws: u64,
 ) -> Result<Option<TrackingPrediction>, ExperimentError> {
-    let mut plant = PlantConfig::<N>::from_description(identified)?;
-    plant.friction = plant.friction.map(LuGre::without_load);
+    let plant = PlantConfig::<N>::from_description(identified)?;
     let (trajectory, duration_s) = scenario::sinusoid(1.0);
     let (mut errors, mut faults) = (Vec::new(), 0);
     for seed in 0..draws {

@@ -9,11 +9,13 @@ use common::{block, tip_spring, wam4, wam4_at};
 use std::time::Instant;
 use supple_core::nalgebra::Vector3;
 use supple_core::{Friction, Vector};
-use supple_plant::{ActuatorModel, FreeBox, Ground, LuGre, Plant, PlantConfig, Scene};
+use supple_plant::{
+    ActuatorModel, FreeBox, Ground, LuGre, Plant, PlantConfig, PlantOptions, Scene,
+};
 
 const DURATION_S: f64 = 10.0;
 
-fn plant(scene: Scene) -> Plant<4> {
+fn plant(scene: Scene, options: &PlantOptions) -> Plant<4> {
     let arm = wam4();
     let friction = [
         (1.605, 1.648),
@@ -34,7 +36,8 @@ fn plant(scene: Scene) -> Plant<4> {
         ..PlantConfig::ideal(arm)
     };
     let q = wam4_at(&arm, 0.72, 0.06);
-    match Plant::new(config, q, Vector::zeros()) {
+    let config = options.apply(config);
+    match config.and_then(|config| Plant::new(config, q, Vector::zeros())) {
         Ok(plant) => plant,
         Err(error) => panic!("{error}"),
     }
@@ -74,12 +77,15 @@ fn main() {
         }],
         ..block()
     };
-    for (name, scene) in [
-        ("empty space", Scene::default()),
-        ("fixed block", block()),
-        ("fixed block and free box", with_box),
+    let (none, realistic) = (PlantOptions::default(), PlantOptions::realistic());
+    for (name, scene, options) in [
+        ("empty space", Scene::default(), &none),
+        ("empty space, realistic", Scene::default(), &realistic),
+        ("fixed block", block(), &none),
+        ("fixed block, realistic", block(), &realistic),
+        ("fixed block and free box", with_box, &none),
     ] {
-        let (speed, contact_fraction) = probe(plant(scene));
+        let (speed, contact_fraction) = probe(plant(scene, options));
         println!(
             "{name}: {speed:.1} times real time, in contact {:.0} % of the time",
             100.0 * contact_fraction

@@ -2,9 +2,17 @@
 //!
 //! Joint angles are `q = m2jp p` with the motor angles `p`; motor torques are `m2jp^T tau` with the joint
 //! torques `tau`. A commanded torque is rounded to the amplifier's resolution and acts a whole number of cycles
-//! later; a measured angle is rounded to the encoder's counts. A motor with shorted terminals (amplifier in idle)
-//! brakes by its own current: `tau = -(Kt^2 / R) p'` at the motor; the electrical time constant (inductance over
-//! resistance) is neglected. Cables are rigid.
+//! later:
+//!
+//! ```text
+//! motor torque = k (1 + sum r sin(n p + phase)) slack(command) + offset + sum a sin(n p + phase)
+//! ```
+//!
+//! with the torque constant's error `k`, the torque ripple `r`, the amplifier's dead zone (`slack` subtracts it), its
+//! offset and the cogging `a`, which do not depend on the command. A measured angle has a constant bias and is rounded
+//! to the encoder's counts. A motor with shorted terminals (amplifier in idle) brakes by its own current: `tau =
+//! -(Kt^2 / R) p'` at the motor; the electrical time constant (inductance over resistance) is neglected, and its
+//! amplifier has no offset. Elastic cables are in [`crate::elasticity`]; here `p` are the motor angles in both cases.
 
 use crate::error::{PlantError, entry};
 use crate::noise::Noise;
@@ -26,6 +34,19 @@ pub struct Ripple {
     pub phase_rad: f64,
 }
 
+/// A harmonic of a motor's torque constant over its angle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TorqueRipple {
+    /// Index of the motor, from 0.
+    pub motor: usize,
+    /// Periods per revolution of the motor.
+    pub harmonic: u32,
+    /// Amplitude as a fraction of the torque.
+    pub fraction: f64,
+    /// Phase \[rad\]: the torque is multiplied by `1 + fraction sin(harmonic p + phase)`.
+    pub phase_rad: f64,
+}
+
 /// Transmission, encoders and amplifiers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ActuatorModel<const N: usize> {
@@ -41,8 +62,19 @@ pub struct ActuatorModel<const N: usize> {
     pub braking_nm_s_per_rad: Vector<N>,
     /// Cycles after which a commanded torque acts; 1 on an arm whose drives apply it in the next cycle.
     pub torque_delay_cycles: usize,
-    /// Torque ripple of the motors; empty for none.
+    /// Torque ripple of the motors that does not depend on the command (cogging); empty for none.
     pub ripple: Vec<Ripple>,
+    /// Torque ripple of the motors in proportion to the torque; empty for none.
+    pub torque_ripple: Vec<TorqueRipple>,
+    /// Torque of each motor over the commanded one, positive; 1 for an exact torque constant.
+    pub torque_constant: Vector<N>,
+    /// Dead zone of each amplifier at the motor \[N m\], zero or more: smaller commands have no effect, larger ones lose
+    /// this much.
+    pub dead_zone_nm: Vector<N>,
+    /// Torque of each motor without command \[N m\], unless its terminals are shorted.
+    pub offset_nm: Vector<N>,
+    /// Measured minus true angle of each joint \[rad\].
+    pub encoder_bias_rad: Vector<N>,
 }
 
 impl<const N: usize> ActuatorModel<N> {
@@ -56,7 +88,22 @@ impl<const N: usize> ActuatorModel<N> {
             braking_nm_s_per_rad: Vector::zeros(),
             torque_delay_cycles: 0,
             ripple: Vec::new(),
+            torque_ripple: Vec::new(),
+            torque_constant: Vector::repeat(1.0),
+            dead_zone_nm: Vector::zeros(),
+            offset_nm: Vector::zeros(),
+            encoder_bias_rad: Vector::zeros(),
         }
+    }
+
+    /// Whether the amplifiers turn commands into other torques.
+    fn amplifiers_err(&self) -> bool {
+        let zero = |values: &Vector<N>| values.iter().all(|x| *x == 0.0);
+        let exact = self.torque_constant.iter().all(|k| *k == 1.0);
+        !(exact
+            && zero(&self.dead_zone_nm)
+            && zero(&self.offset_nm)
+            && self.torque_ripple.is_empty())
     }
 }
 
@@ -67,6 +114,8 @@ pub(crate) struct ActuatorState<const N: usize> {
     motor_from_joint: Matrix<N, N>,
     pending: VecDeque<Vector<N>>,
     last_command: Vector<N>,
+    /// Whether motor torques differ from commands.
+    amplifiers_err: bool,
     /// Shorted motors.
     shorted: [bool; N],
     /// Resulting joint-space damping matrix \[N m s/rad\].
@@ -86,10 +135,24 @@ impl<const N: usize> ActuatorState<N> {
                 ("encoder_noise_rad", model.encoder_noise_rad[i]),
                 ("motor_torque_quantum_nm", model.motor_torque_quantum_nm[i]),
                 ("braking_nm_s_per_rad", model.braking_nm_s_per_rad[i]),
+                ("dead_zone_nm", model.dead_zone_nm[i]),
             ] {
                 let valid = value >= 0.0 && value.is_finite();
                 let name = format!("{field} of motor {i}");
                 entry(valid, name, value, "finite and not negative")?;
+            }
+            let constant = model.torque_constant[i];
+            let valid = constant > 0.0 && constant.is_finite();
+            let name = format!("torque_constant of motor {i}");
+            entry(valid, name, constant, "finite and positive")?;
+            for (name, value) in [
+                (format!("offset_nm of motor {i}"), model.offset_nm[i]),
+                (
+                    format!("encoder_bias_rad of joint {i}"),
+                    model.encoder_bias_rad[i],
+                ),
+            ] {
+                entry(value.is_finite(), name, value, "finite")?;
             }
         }
         for ripple in &model.ripple {
@@ -100,7 +163,16 @@ impl<const N: usize> ActuatorState<N> {
             let name = format!("amplitude_nm or phase_rad of a ripple of motor {motor}");
             entry(valid, name, amplitude, "finite")?;
         }
+        for ripple in &model.torque_ripple {
+            let (motor, fraction) = (ripple.motor, ripple.fraction);
+            let must = "the index of a motor, from 0";
+            entry(motor < N, "motor of a torque ripple", motor as f64, must)?;
+            let valid = fraction.is_finite() && ripple.phase_rad.is_finite();
+            let name = format!("fraction or phase_rad of a torque ripple of motor {motor}");
+            entry(valid, name, fraction, "finite")?;
+        }
         let mut state = ActuatorState {
+            amplifiers_err: model.amplifiers_err(),
             model,
             motor_from_joint,
             pending: VecDeque::new(),
@@ -169,8 +241,34 @@ impl<const N: usize> ActuatorState<N> {
         }
     }
 
-    /// Joint torque of the motors' ripple at joint angles `q`.
-    pub fn ripple(&self, q: &Vector<N>) -> Vector<N> {
+    /// Torque of the motors at the joints for the acting command `applied`, with motor angles that are `q` at the joints;
+    /// without the braking of shorted motors.
+    pub fn motor_torque(&self, applied: &Vector<N>, q: &Vector<N>) -> Vector<N> {
+        if !self.amplifiers_err {
+            return applied + self.ripple(q);
+        }
+        let model = &self.model;
+        let angle = self.motor_from_joint * q;
+        let commanded = model.joint_from_motor.transpose() * applied;
+        let mut ripple = Vector::<N>::zeros();
+        for line in &model.torque_ripple {
+            let phase = f64::from(line.harmonic) * angle[line.motor] + line.phase_rad;
+            ripple[line.motor] += line.fraction * libm::sin(phase);
+        }
+        let motor = Vector::from_fn(|i, _| {
+            let beyond = (commanded[i].abs() - model.dead_zone_nm[i]).max(0.0);
+            let offset_nm = if self.shorted[i] {
+                0.0
+            } else {
+                model.offset_nm[i]
+            };
+            beyond.copysign(commanded[i]) * model.torque_constant[i] * (1.0 + ripple[i]) + offset_nm
+        });
+        self.motor_from_joint.transpose() * motor + self.ripple(q)
+    }
+
+    /// Joint torque of the motors' cogging with motor angles that are `q` at the joints.
+    fn ripple(&self, q: &Vector<N>) -> Vector<N> {
         if self.model.ripple.is_empty() {
             return Vector::zeros();
         }
@@ -183,12 +281,13 @@ impl<const N: usize> ActuatorState<N> {
         self.motor_from_joint.transpose() * motor
     }
 
-    /// Joint angles as measured by the encoders.
+    /// Joint angles as measured by the encoders, with motor angles that are `q` at the joints.
     pub fn measure(&self, q: &Vector<N>, noise: &mut Noise) -> Vector<N> {
         let counts = &self.model.counts_per_motor_revolution;
         let deviation = &self.model.encoder_noise_rad;
+        let q = q + self.model.encoder_bias_rad;
         if counts.iter().chain(deviation.iter()).all(|x| *x == 0.0) {
-            return *q;
+            return q;
         }
         let mut angle = self.motor_from_joint * q;
         for i in 0..N {
@@ -201,6 +300,11 @@ impl<const N: usize> ActuatorState<N> {
         }
         self.model.joint_from_motor * angle
     }
+}
+
+/// Motor angles from joint angles; `None` for a singular transmission.
+pub(crate) fn motor_from_joint<const N: usize>(model: &ActuatorModel<N>) -> Option<Matrix<N, N>> {
+    inverse(&model.joint_from_motor)
 }
 
 /// Inverse by the normal equations, `(A^T A)^-1 A^T`; `None` for a singular matrix.

@@ -1,8 +1,10 @@
 //! Configuration of a plant; [`crate::Plant::new`] rejects invalid values.
 
 use crate::actuators::ActuatorModel;
+use crate::elasticity::Elasticity;
 use crate::error::{PlantError, entry};
 use crate::friction::LuGre;
+use crate::friction_variation::FrictionVariation;
 use crate::scene::Scene;
 use supple_core::{Arm, Vector};
 
@@ -65,6 +67,25 @@ impl Default for ForceSensor {
     }
 }
 
+/// Torque of hoses and wires along the arm: a spring over each joint angle, `-(k q + preload)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hose<const N: usize> {
+    /// `k` of every joint \[N m/rad\], zero or more; it is relaxed at the joint's zero but for the preload.
+    pub stiffness_nm_per_rad: f64,
+    /// Torque against positive motion at the joint's zero \[N m\].
+    pub preload_nm: Vector<N>,
+}
+
+impl<const N: usize> Hose<N> {
+    /// No hose.
+    pub fn none() -> Hose<N> {
+        Hose {
+            stiffness_nm_per_rad: 0.0,
+            preload_nm: Vector::zeros(),
+        }
+    }
+}
+
 /// Plant configuration.
 #[derive(Clone, Debug)]
 pub struct PlantConfig<const N: usize> {
@@ -72,6 +93,15 @@ pub struct PlantConfig<const N: usize> {
     pub arm: Arm<N>,
     /// True friction of each joint.
     pub friction: [LuGre; N],
+    /// True friction of each motor, in units of the motor's angle and torque, in addition to that of the joints; its
+    /// load fraction has no effect.
+    pub motor_friction: [LuGre; N],
+    /// Variation of the friction of the joints and, with time, of the motors.
+    pub friction_variation: FrictionVariation<N>,
+    /// Elasticity between motors and joints; `None` for a rigid transmission.
+    pub elasticity: Option<Elasticity<N>>,
+    /// Hoses along the arm.
+    pub hose: Hose<N>,
     /// Motors, encoders, amplifiers.
     pub actuators: ActuatorModel<N>,
     /// Hard stops, if any.
@@ -88,6 +118,9 @@ pub struct PlantConfig<const N: usize> {
     pub step_s: f64,
     /// Control cycle \[s\], a whole number of steps; 1 ms by default.
     pub cycle_s: f64,
+    /// Deviation of a cycle's start from its schedule, as a fraction of the cycle, 0 to 0.4: uniform, seeded, without
+    /// drift. The physics of a cycle lasts from its start to the next one's.
+    pub cycle_jitter: f64,
     /// Environment of the arm.
     pub scene: Scene,
     /// Seed of all noise.
@@ -100,12 +133,17 @@ impl<const N: usize> PlantConfig<N> {
         PlantConfig {
             arm,
             friction: [LuGre::NONE; N],
+            motor_friction: [LuGre::NONE; N],
+            friction_variation: FrictionVariation::none(),
+            elasticity: None,
+            hose: Hose::none(),
             actuators: ActuatorModel::direct(),
             stops: None,
             tip_radius_m: 0.02,
             force_sensor: ForceSensor::default(),
             step_s: 2e-4,
             cycle_s: 1e-3,
+            cycle_jitter: 0.0,
             scene: Scene::default(),
             seed: 0,
         }
@@ -122,8 +160,23 @@ impl<const N: usize> PlantConfig<N> {
             entry(valid, name, value, "finite and not negative")
         };
         for (joint, friction) in self.friction.iter().enumerate() {
-            friction.validate(joint)?;
+            friction.validate("joint", joint)?;
         }
+        for (motor, friction) in self.motor_friction.iter().enumerate() {
+            friction.validate("motor", motor)?;
+        }
+        self.friction_variation.validate()?;
+        if let Some(elasticity) = &self.elasticity {
+            elasticity.validate()?;
+        }
+        not_negative("hose.stiffness_nm_per_rad", self.hose.stiffness_nm_per_rad)?;
+        for (joint, preload) in self.hose.preload_nm.iter().enumerate() {
+            let name = format!("hose.preload_nm of joint {joint}");
+            entry(preload.is_finite(), name, *preload, "finite")?;
+        }
+        let jitter = self.cycle_jitter;
+        let valid = (0.0..=0.4).contains(&jitter);
+        entry(valid, "cycle_jitter", jitter, "from 0 to 0.4")?;
         if let Some(stops) = &self.stops {
             positive("stops.stiffness_nm_per_rad", stops.stiffness_nm_per_rad)?;
             not_negative("stops.damping_nm_s_per_rad", stops.damping_nm_s_per_rad)?;

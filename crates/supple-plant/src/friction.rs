@@ -12,6 +12,7 @@
 //! deflection. Known limitation: under an oscillating load below breakaway the model drifts.
 
 use crate::error::{PlantError, entry};
+use crate::friction_variation::FrictionScale;
 use supple_core::Friction;
 
 /// Breakaway torque over Coulomb torque if the given friction has no Stribeck effect.
@@ -114,13 +115,28 @@ impl LuGre {
         load: f64,
         dt_s: f64,
     ) -> f64 {
+        let scale = FrictionScale::ONE;
+        self.advance_scaled(deflection_rad, velocity_rad_per_s, load, scale, dt_s)
+    }
+
+    /// As [`LuGre::advance`], with dry and viscous friction multiplied by `scale`; stiffness and damping of the bristle
+    /// are unchanged.
+    pub fn advance_scaled(
+        &self,
+        deflection_rad: &mut f64,
+        velocity_rad_per_s: f64,
+        load: f64,
+        scale: FrictionScale,
+        dt_s: f64,
+    ) -> f64 {
         let v = velocity_rad_per_s;
-        let smooth = self.viscous_nm_s_per_rad * v + self.offset_nm;
+        let smooth = scale.viscous * self.viscous_nm_s_per_rad * v + self.offset_nm;
         if self.bristle_stiffness_nm_per_rad == 0.0 {
             return smooth;
         }
         let z = *deflection_rad;
-        let rate = self.bristle_stiffness_nm_per_rad * v.abs() / self.sliding_nm(v, load);
+        let sliding_nm = scale.dry * self.sliding_nm(v, load);
+        let rate = self.bristle_stiffness_nm_per_rad * v.abs() / sliding_nm;
         // (1 - exp(-rate dt)) / rate, whose limit at rest is dt.
         let reach = if rate > 0.0 {
             -libm::expm1(-rate * dt_s) / rate
@@ -134,9 +150,9 @@ impl LuGre {
             + smooth
     }
 
-    /// Rejects invalid friction parameters; errors name `joint`.
-    pub(crate) fn validate(&self, joint: usize) -> Result<(), PlantError> {
-        let name = |field: &str| format!("friction of joint {joint}: {field}");
+    /// Rejects invalid friction parameters; errors name the `part` (joint or motor) and its index.
+    pub(crate) fn validate(&self, part: &str, index: usize) -> Result<(), PlantError> {
+        let name = |field: &str| format!("friction of {part} {index}: {field}");
         let check = |field, value: f64, valid: bool, must| {
             entry(valid && value.is_finite(), name(field), value, must)
         };

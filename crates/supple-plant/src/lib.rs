@@ -1,10 +1,10 @@
 //! Simulated arm and environment: torques in, measurements out.
 //!
-//! The arm is a reduced-coordinate multibody of the rapier engine with the rotor inertias on the
-//! diagonal of its mass matrix; the joints have bristle friction, quantised encoders and quantised,
-//! delayed torques; the tip is a sphere with a Hunt-Crossley contact force implemented here, because the
-//! impulse-based contact of the engine has no defined stiffness: its peak grows as the step shrinks. The engine
-//! solves contacts between scene objects only.
+//! The arm is a chain in joint coordinates with the rotor inertias on the diagonal of its mass matrix; the joints have
+//! bristle friction, quantised encoders and quantised, delayed torques; [`options`] add what else a real arm has. The
+//! tip is a sphere with a Hunt-Crossley contact force implemented here, because the impulse-based contact of the rapier
+//! engine has no defined stiffness: its peak grows as the step shrinks. The engine solves contacts between scene objects
+//! only, and runs only if one of them can move.
 //!
 //! The crate contains no controller; links other than the tip do not collide; integration is first-order
 //! accurate. The same configuration and torques give bit-identical results.
@@ -32,25 +32,32 @@
 pub mod actuators;
 pub mod config;
 pub mod contact;
+pub mod elasticity;
 pub mod filter;
 pub mod friction;
+pub mod friction_variation;
 pub mod injection;
 pub mod noise;
 pub mod scene;
 
 mod description;
 mod error;
+mod joint_frictions;
+pub mod options;
 mod plant;
 mod record;
 mod trace_file;
 mod world;
 
-pub use actuators::{ActuatorModel, Ripple};
-pub use config::{ForceSensor, HardStops, PlantConfig};
+pub use actuators::{ActuatorModel, Ripple, TorqueRipple};
+pub use config::{ForceSensor, HardStops, Hose, PlantConfig};
 pub use contact::{Contact, Material};
+pub use elasticity::Elasticity;
 pub use error::PlantError;
 pub use friction::LuGre;
+pub use friction_variation::{FrictionScale, FrictionVariation};
 pub use injection::{ControllerView, Injection, InjectionError, InjectionKind, Injector, Trigger};
+pub use options::{PlantOptions, PlantOptionsError};
 pub use plant::Plant;
 pub use record::{Measurement, StepRecord, Truth};
 pub use scene::{FixedBlock, FreeBox, Ground, Layer, Scene, SceneError};

@@ -1,14 +1,15 @@
 //! The plant: one control cycle of physics at a time.
 
-use crate::actuators::ActuatorState;
-use crate::config::PlantConfig;
+use crate::actuators::{ActuatorState, motor_from_joint};
+use crate::config::{Hose, PlantConfig};
+use crate::elasticity::{LinkTorque, Rotors};
 use crate::error::{PlantError, entry};
 use crate::filter::Butterworth;
+use crate::joint_frictions::{JointFrictions, Load};
 use crate::noise::Noise;
 use crate::record::{Measurement, StepRecord, Truth};
-use crate::world::{Object, TipForce, TipMotion, World};
-use core::array;
-use supple_core::dynamics::{gravity, joint_poses, kinetic_energy};
+use crate::world::{Forces, Object, TipForce, TipMotion, World};
+use supple_core::dynamics::{gravity, kinetic_energy};
 use supple_core::nalgebra::Vector3;
 use supple_core::{Arm, ArmError, Body, Pose, Vector};
 
@@ -23,10 +24,14 @@ pub struct Plant<const N: usize> {
     filter: Butterworth,
     encoder_noise: Noise,
     force_noise: Noise,
-    bristles_rad: [f64; N],
-    load_bound_nm: Vector<N>,
+    cycle_noise: Noise,
+    frictions: JointFrictions<N>,
+    /// Motors behind elastic transmissions.
+    rotors: Option<Rotors<N>>,
     steps: Vec<StepRecord>,
     steps_per_cycle: usize,
+    /// Time from the scheduled to the actual start of the next cycle \[s\].
+    late_s: f64,
     measurement: Measurement<N>,
     truth: Truth<N>,
     poses: [Pose; N],
@@ -50,6 +55,14 @@ impl<const N: usize> Plant<N> {
         finite("qd0", &qd0)?;
         let gravity_nm = gravity(&config.arm, &q0);
         let world = World::new(&config, &q0, &qd0)?;
+        let transmission = motor_from_joint(&config.actuators).ok_or(PlantError::Transmission)?;
+        let rotors = config.elasticity.as_ref().map(|elasticity| {
+            let rotor_kg_m2 = config.arm.armature();
+            let links = world.arm().inverse_inertia();
+            let mut rotors = Rotors::new(elasticity, &rotor_kg_m2, &links, config.step_s);
+            rotors.set_state(&q0, &qd0, &gravity_nm);
+            rotors
+        });
         let actuators = ActuatorState::new(config.actuators.clone(), &gravity_nm)?;
         let filter = Butterworth::new(config.force_sensor.cutoff_hz, config.step_s)?;
         let mut plant = Plant {
@@ -58,10 +71,12 @@ impl<const N: usize> Plant<N> {
             filter,
             encoder_noise: Noise::new(config.seed, 1),
             force_noise: Noise::new(config.seed, 2),
-            bristles_rad: [0.0; N],
-            load_bound_nm: load_bound(&config.arm),
+            cycle_noise: Noise::new(config.seed, 3),
+            frictions: JointFrictions::new(&config, transmission),
+            rotors,
             steps: Vec::with_capacity(steps_per_cycle),
             steps_per_cycle,
+            late_s: 0.0,
             measurement: Measurement {
                 cycle: 0,
                 time_s: 0.0,
@@ -77,6 +92,8 @@ impl<const N: usize> Plant<N> {
                 contact_force_n: Vector3::zeros(),
                 friction_torque_nm: Vector::zeros(),
                 motor_torque_nm: gravity_nm,
+                motor_position_rad: q0,
+                motor_velocity_rad_per_s: qd0,
             },
             poses: [Pose::IDENTITY; N],
             max_force_n: Vector3::zeros(),
@@ -92,13 +109,14 @@ impl<const N: usize> Plant<N> {
     /// it acts after the actuators' delay. A non-finite command is ignored.
     pub fn cycle(&mut self, torque_nm: &Vector<N>) -> Measurement<N> {
         let applied = self.actuators.command(torque_nm);
-        let start_s = self.measurement.cycle as f64 * self.config.cycle_s;
+        let start_s = self.measurement.cycle as f64 * self.config.cycle_s + self.late_s;
+        let step_s = self.jittered_step_s();
         self.steps.clear();
         let mut filtered = Vector3::zeros();
         for step in 1..=self.steps_per_cycle {
-            let contact = self.step(&applied);
+            let contact = self.step(&applied, step_s);
             filtered = self.filter.step(&contact.force_n);
-            self.truth.time_s = start_s + step as f64 * self.config.step_s;
+            self.truth.time_s = start_s + step as f64 * step_s;
             self.steps.push(StepRecord {
                 time_s: self.truth.time_s,
                 force_n: contact.force_n,
@@ -107,9 +125,21 @@ impl<const N: usize> Plant<N> {
             });
         }
         self.measurement.cycle += 1;
-        self.truth.time_s = self.measurement.cycle as f64 * self.config.cycle_s;
+        self.truth.time_s = self.measurement.cycle as f64 * self.config.cycle_s + self.late_s;
         self.measure(filtered);
         self.measurement
+    }
+
+    /// Step of the physics in this cycle \[s\], which ends when the next one starts.
+    fn jittered_step_s(&mut self) -> f64 {
+        let (cycle_s, jitter) = (self.config.cycle_s, self.config.cycle_jitter);
+        if jitter == 0.0 {
+            return self.config.step_s;
+        }
+        let next_s = jitter * cycle_s * (2.0 * self.cycle_noise.uniform() - 1.0);
+        let lasts_s = cycle_s + next_s - self.late_s;
+        self.late_s = next_s;
+        lasts_s / self.steps_per_cycle as f64
     }
 
     /// Shorts exactly these motors from this call on: they brake in addition to any commanded torque. Initially none
@@ -134,7 +164,7 @@ impl<const N: usize> Plant<N> {
         let arm = &self.config.arm;
         // The arm was valid and stays valid with the reversed gravity vector.
         if let Ok(arm) = with_last_link(arm, arm.body(N - 1), -arm.gravity()) {
-            self.load_bound_nm = load_bound(&arm);
+            self.frictions.set_arm(&arm);
             self.world.set_last_link_and_gravity(&arm);
             self.config.arm = arm;
         }
@@ -148,17 +178,14 @@ impl<const N: usize> Plant<N> {
     pub fn add_payload(&mut self, mass_kg: f64) -> Result<(), PlantError> {
         let valid = mass_kg > 0.0 && mass_kg.is_finite();
         entry(valid, "payload mass_kg", mass_kg, "finite and positive")?;
-        let arm = &self.config.arm;
-        let at_m = arm.joint_from_tip().translation;
-        let payload = Body::ball(mass_kg, self.config.tip_radius_m, at_m);
-        let loaded = with_last_link(arm, arm.body(N - 1).merged(&payload), arm.gravity());
+        let loaded = with_payload(&self.config.arm, mass_kg, self.config.tip_radius_m);
         let must = "such that the last link stays a physical body";
         let arm = loaded.or(Err(PlantError::Entry {
             entry: "payload mass_kg".to_owned(),
             value: mass_kg,
             must,
         }))?;
-        self.load_bound_nm = load_bound(&arm);
+        self.frictions.set_arm(&arm);
         self.world.set_last_link_and_gravity(&arm);
         self.config.arm = arm;
         Ok(())
@@ -167,11 +194,22 @@ impl<const N: usize> Plant<N> {
     /// Kinetic energy of the arm with its rotors and payload \[J\].
     pub fn kinetic_energy_j(&self) -> f64 {
         let truth = &self.truth;
-        kinetic_energy(
-            &self.config.arm,
-            &truth.position_rad,
-            &truth.velocity_rad_per_s,
-        )
+        let qd = &truth.velocity_rad_per_s;
+        let energy_j = kinetic_energy(&self.config.arm, &truth.position_rad, qd);
+        let Some(rotors) = &self.rotors else {
+            return energy_j;
+        };
+        // That of the arm has its rotors at the speed of the joints.
+        let armature = self.config.arm.armature();
+        let moved = (0..N).filter(|i| rotors.is_elastic(*i));
+        let at_joints: f64 = moved.map(|i| 0.5 * armature[i] * qd[i] * qd[i]).sum();
+        energy_j - at_joints + rotors.energy_j(&truth.position_rad).1
+    }
+
+    /// Potential energy of elastic cables or gears \[J\]; zero for a rigid transmission.
+    pub fn elastic_energy_j(&self) -> f64 {
+        let rotors = self.rotors.as_ref();
+        rotors.map_or(0.0, |rotors| rotors.energy_j(&self.truth.position_rad).0)
     }
 
     /// Largest contact force on the tip in all steps since the last call, base axes \[N\].
@@ -212,19 +250,7 @@ impl<const N: usize> Plant<N> {
     /// Load of each joint, 0 to 1: gravity moment on motor and bearings, relative to that of the horizontally
     /// stretched arm.
     pub fn load(&self) -> Vector<N> {
-        let mut load = Vector::zeros();
-        let (mut mass, mut moment) = (0.0, Vector3::zeros());
-        for j in (0..N).rev() {
-            let body = self.config.arm.body(j);
-            mass += body.mass_kg;
-            moment += self.poses[j].transform_point(&body.com_m) * body.mass_kg;
-            let first_moment = moment - self.poses[j].translation * mass;
-            let gravity_moment = first_moment.cross(&self.config.arm.gravity());
-            if self.load_bound_nm[j] > 0.0 {
-                load[j] = libm::sqrt(gravity_moment.dot(&gravity_moment)) / self.load_bound_nm[j];
-            }
-        }
-        load
+        Load::new(&self.config.arm).relative(&self.poses)
     }
 
     /// Sets the arm to `q` \[rad\], `qd` \[rad/s\], with relaxed bristles, a reset filter and motors that hold it
@@ -237,9 +263,13 @@ impl<const N: usize> Plant<N> {
         finite("q", &q)?;
         finite("qd", &qd)?;
         self.world.set_state(&q, &qd);
-        self.actuators.restart(&gravity(&self.config.arm, &q));
+        let gravity_nm = gravity(&self.config.arm, &q);
+        if let Some(rotors) = &mut self.rotors {
+            rotors.set_state(&q, &qd, &gravity_nm);
+        }
+        self.actuators.restart(&gravity_nm);
         self.filter.reset();
-        self.bristles_rad = [0.0; N];
+        self.frictions.reset();
         self.steps.clear();
         self.truth.contact_force_n = Vector3::zeros();
         self.truth.friction_torque_nm = Vector::zeros();
@@ -258,44 +288,64 @@ impl<const N: usize> Plant<N> {
         }
     }
 
-    /// One step of the physics under the joint torque `applied`, which excludes ripple.
-    fn step(&mut self, applied: &Vector<N>) -> TipForce {
-        let dt_s = self.config.step_s;
+    /// One step of the physics of `dt_s` under the commanded joint torque `applied`.
+    fn step(&mut self, applied: &Vector<N>, dt_s: f64) -> TipForce {
         let (q, qd) = (self.truth.position_rad, self.truth.velocity_rad_per_s);
-        let motor = applied + self.actuators.ripple(&q) + self.actuators.braking(&qd);
-        let friction = self.friction(&qd, dt_s);
-        let mut torque = motor - friction;
+        let (motor_q, motor_qd) = self.motor_state();
+        let motor =
+            self.actuators.motor_torque(applied, &motor_q) + self.actuators.braking(&motor_qd);
+        let time_s = self.truth.time_s;
+        let frictions = &mut self.frictions;
+        let mut friction = frictions.joints_nm((&q, &qd), &self.poses, time_s, dt_s);
+        let at_motors = frictions.motors_nm(&motor_qd, time_s, dt_s);
+        let on_rotors = at_motors.map_or(motor, |friction| motor - friction);
+        let transmitted = match &mut self.rotors {
+            Some(rotors) => rotors.torque((&q, &qd), &on_rotors, dt_s),
+            None => LinkTorque {
+                torque_nm: on_rotors,
+                damping_nm_s_per_rad: Vector::zeros(),
+            },
+        };
+        let mut torque = transmitted.torque_nm - friction;
         if let Some(stops) = &self.config.stops {
             for i in 0..N {
                 torque[i] += stops.torque_nm(i, q[i], qd[i]);
             }
         }
+        let hose = &self.config.hose;
+        if *hose != Hose::none() {
+            torque -= q * hose.stiffness_nm_per_rad + hose.preload_nm;
+        }
         let tip = self.tip_motion();
         let contact = self.world.compute_tip_contact(&tip, dt_s);
-        let about_axis: [Vector3<f64>; N] =
-            array::from_fn(|i| self.poses[i].rotation.column(2) * torque[i]);
-        let link_torque = array::from_fn(|i| match about_axis.get(i + 1) {
-            Some(reaction) => about_axis[i] - reaction,
-            None => about_axis[i],
-        });
-        self.world.step(&link_torque, &contact, &tip.center_m, dt_s);
+        let forces = Forces {
+            torque_nm: &torque,
+            damping_nm_s_per_rad: &transmitted.damping_nm_s_per_rad,
+            tip: &contact,
+            tip_center_m: &tip.center_m,
+        };
+        self.world.step(&forces, dt_s);
         if contact.force_n.norm_squared() > self.max_force_n.norm_squared() {
             self.max_force_n = contact.force_n;
+        }
+        if let Some(at_motors) = at_motors {
+            friction += at_motors;
         }
         self.truth.contact_force_n = contact.force_n;
         self.truth.friction_torque_nm = friction;
         self.truth.motor_torque_nm = motor;
+        if let Some(rotors) = &mut self.rotors {
+            let arm = self.world.arm();
+            rotors.advance((&arm.position_rad, &arm.velocity_rad_per_s), dt_s);
+        }
         self.read_state();
         contact
     }
 
-    fn friction(&mut self, qd: &Vector<N>, dt_s: f64) -> Vector<N> {
-        let loaded = self.config.friction.iter().any(|f| f.load_fraction > 0.0);
-        let load = if loaded { self.load() } else { Vector::zeros() };
-        Vector::from_fn(|i, _| {
-            let bristle = &mut self.bristles_rad[i];
-            self.config.friction[i].advance(bristle, qd[i], load[i], dt_s)
-        })
+    /// Angles and velocities of the motors, seen at the joints.
+    fn motor_state(&self) -> (Vector<N>, Vector<N>) {
+        let truth = &self.truth;
+        (truth.motor_position_rad, truth.motor_velocity_rad_per_s)
     }
 
     fn tip_motion(&self) -> TipMotion {
@@ -310,11 +360,18 @@ impl<const N: usize> Plant<N> {
     }
 
     fn read_state(&mut self) {
-        let (q, qd) = self.world.state();
-        self.poses = joint_poses(&self.config.arm, &q);
+        let arm = self.world.arm();
+        let (q, qd) = (arm.position_rad, arm.velocity_rad_per_s);
+        self.poses = arm.poses;
         let tip = self.poses[N - 1] * self.config.arm.joint_from_tip();
         self.truth.position_rad = q;
         self.truth.velocity_rad_per_s = qd;
+        let (motor_q, motor_qd) = match &self.rotors {
+            Some(rotors) => rotors.state(),
+            None => (q, qd),
+        };
+        self.truth.motor_position_rad = motor_q;
+        self.truth.motor_velocity_rad_per_s = motor_qd;
         self.truth.tip_position_m = tip.translation;
         // Use J qd: the link velocities of the engine lag by one step.
         let tip_velocity = |pose: &Pose, rate: f64| {
@@ -326,7 +383,8 @@ impl<const N: usize> Plant<N> {
     }
 
     fn measure(&mut self, filtered_n: Vector3<f64>) {
-        let (q, noise_n) = (self.truth.position_rad, self.config.force_sensor.noise_n);
+        let q = self.truth.motor_position_rad;
+        let noise_n = self.config.force_sensor.noise_n;
         let mut noise = || {
             if noise_n > 0.0 {
                 noise_n * self.force_noise.normal()
@@ -337,7 +395,7 @@ impl<const N: usize> Plant<N> {
         let noise = Vector3::new(noise(), noise(), noise());
         self.measurement = Measurement {
             cycle: self.measurement.cycle,
-            time_s: self.truth.time_s,
+            time_s: self.measurement.cycle as f64 * self.config.cycle_s,
             position_rad: self.actuators.measure(&q, &mut self.encoder_noise),
             force_n: filtered_n + noise,
         };
@@ -350,6 +408,16 @@ fn finite<const N: usize>(name: &str, values: &Vector<N>) -> Result<(), PlantErr
         Some((joint, value)) => entry(false, format!("{name} of joint {joint}"), *value, "finite"),
         None => Ok(()),
     }
+}
+
+/// The same arm with a ball of this mass and radius fixed to its tip.
+pub(crate) fn with_payload<const N: usize>(
+    arm: &Arm<N>,
+    mass_kg: f64,
+    radius_m: f64,
+) -> Result<Arm<N>, ArmError> {
+    let payload = Body::ball(mass_kg, radius_m, arm.joint_from_tip().translation);
+    with_last_link(arm, arm.body(N - 1).merged(&payload), arm.gravity())
 }
 
 /// The same arm with another last link and another gravity.
@@ -369,21 +437,4 @@ fn with_last_link<const N: usize>(
         arm.joint_from_tip(),
         gravity_m_per_s2,
     )
-}
-
-/// Moment on each joint if all links beyond it formed a horizontal line: mass times gravity times the length of
-/// the chain.
-fn load_bound<const N: usize>(arm: &Arm<N>) -> Vector<N> {
-    let gravity = libm::sqrt(arm.gravity().dot(&arm.gravity()));
-    Vector::from_fn(|j, _| {
-        let (mut length, mut moment) = (0.0, 0.0);
-        for k in j..N {
-            if k > j {
-                length += arm.parent_from_joint(k).translation.norm();
-            }
-            let body = arm.body(k);
-            moment += body.mass_kg * gravity * (length + body.com_m.norm());
-        }
-        moment
-    })
 }

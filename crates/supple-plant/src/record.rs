@@ -31,10 +31,14 @@ pub struct Truth<const N: usize> {
     pub tip_velocity_m_per_s: Vector3<f64>,
     /// Contact force on the tip over the last step, base axes \[N\].
     pub contact_force_n: Vector3<f64>,
-    /// Friction torque over the last step, positive against positive motion \[N m\].
+    /// Friction torque of joints and motors over the last step, seen at the joints, positive against positive motion \[N m\].
     pub friction_torque_nm: Vector<N>,
     /// Torque of the motors over the last step, ripple and braking included \[N m\].
     pub motor_torque_nm: Vector<N>,
+    /// Angles of the motors, seen at the joints \[rad\]; those of the joints if the transmission is rigid.
+    pub motor_position_rad: Vector<N>,
+    /// Velocities of the motors, seen at the joints \[rad/s\]; those of the joints if the transmission is rigid.
+    pub motor_velocity_rad_per_s: Vector<N>,
 }
 
 /// One step of the physics.

@@ -21,8 +21,11 @@ pub fn run(args: &DemoArgs) -> Result<(), Failure> {
         .as_ref()
         .map(|path| arms::load(path, args.strict));
     let model = model.transpose()?;
+    let plant = args.plant.options()?;
     let staging = Staging::new(&args.out, &["report.html", "summary.json"])?;
     let options = DemoOptions {
+        plant,
+        realistic_seeds: args.realistic_seeds,
         seed: args.seed,
         model,
         log_dir: match args.no_logs {

@@ -6,6 +6,7 @@
 #![forbid(unsafe_code)]
 
 mod demo;
+mod effects;
 pub mod figures;
 mod identification;
 mod progress;
@@ -41,8 +42,10 @@ pub fn run() -> ExitCode {
 fn dispatch(command: &OfflineCommand) -> Result<(), Failure> {
     match command {
         OfflineCommand::Demo(args) => demo::run(args),
+        OfflineCommand::Effects(args) => effects::run(args),
         OfflineCommand::Identification(command) => identification::run(command),
         OfflineCommand::Log(command) => log::run(command),
         OfflineCommand::Arms(args) => arms::run(args),
+        OfflineCommand::Plant(command) => command.run(),
     }
 }

@@ -2,9 +2,9 @@
 
 use crate::units::{figures, newton_seconds, newtons, percent, plain, seconds};
 use comfy_table::{ContentArrangement, Table, presets};
-use supple_experiment::JointTorque;
 use supple_experiment::metrics::median;
 use supple_experiment::summary::{ContactStatistics, Summary, TrackingError};
+use supple_experiment::{JointTorque, Realistic};
 
 /// Formats the summary, one line per quantity.
 pub fn table(summary: &Summary) -> String {
@@ -42,9 +42,11 @@ fn free_motion(summary: &Summary) -> Vec<Line> {
         let terms = [t.gravity, t.friction, t.feedback].map(figures);
         format!("{} N m", terms.join(", "))
     };
-    vec![
+    let realistic = summary.realistic.as_ref().map(realistic);
+    let mut lines = realistic.unwrap_or_default();
+    lines.extend([
         line(
-            "sinusoid at 5 N/m, RMS error",
+            "ideal plant: sinusoid at 5 N/m, RMS error",
             rms(&[&summary.sinusoid]),
             "follows closely (fig. 3a)",
         ),
@@ -59,7 +61,7 @@ fn free_motion(summary: &Summary) -> Vec<Line> {
             "",
         ),
         line(
-            "  exact model: Coulomb, Stribeck",
+            "  exact model, no load friction: Coulomb, Stribeck",
             rms(&[&exact.coulomb, &exact.stribeck]),
             "",
         ),
@@ -95,6 +97,33 @@ fn free_motion(summary: &Summary) -> Vec<Line> {
             torque(&summary.torque_rms.elbow),
             "in this order (fig. 4)",
         ),
+    ]);
+    lines
+}
+
+/// The plant with all effects of a real arm, first: the other rows leave these out.
+fn realistic(found: &Realistic) -> Vec<Line> {
+    let median_and_worst = |errors: &[f64]| {
+        let worst = errors.iter().copied().fold(0.0, f64::max);
+        millimetres(&[median(errors).unwrap_or(0.0), worst])
+    };
+    let faults = match found.ended.len() {
+        0 => String::new(),
+        faults => format!(", {faults} ended by a fault"),
+    };
+    vec![
+        line(
+            "realistic plant, calibrated: sinusoid at 5 N/m",
+            format!("{}{faults}", median_and_worst(&found.sinusoid_rms_m)),
+            "follows closely (fig. 3a)",
+        ),
+        line(
+            "  after 20 min of warm-up",
+            median_and_worst(&found.warm_rms_m),
+            "",
+        ),
+        line("  arc", median_and_worst(&found.arc_rms_m), ""),
+        line("  false contacts", found.false_latches.to_string(), ""),
     ]
 }
 

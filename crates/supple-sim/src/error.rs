@@ -3,7 +3,7 @@
 use supple_ipc::IpcError;
 use supple_ipc::message::MessageError;
 use supple_model::ModelError;
-use supple_plant::{InjectionError, PlantError, TraceError};
+use supple_plant::{InjectionError, PlantError, PlantOptionsError, TraceError};
 use supple_realtime::StopError;
 
 /// Why the process cannot start or continue.
@@ -15,6 +15,9 @@ pub enum SimError {
     /// The plant.
     #[error("the plant: {0}")]
     Plant(#[from] PlantError),
+    /// Invalid options of the plant.
+    #[error(transparent)]
+    Options(#[from] PlantOptionsError),
     /// An invalid fault injection.
     #[error("--inject: {0}")]
     Injection(#[from] InjectionError),
@@ -38,7 +41,7 @@ impl SimError {
     pub fn code(&self) -> u8 {
         match self {
             SimError::Injection(_) => 2,
-            SimError::Model(_) | SimError::Plant(_) => 3,
+            SimError::Model(_) | SimError::Plant(_) | SimError::Options(_) => 3,
             SimError::Trace(_) => 6,
             SimError::Ipc(_) | SimError::Message(_) => 10,
             SimError::Stop(_) => 1,

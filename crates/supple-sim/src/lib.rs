@@ -22,7 +22,7 @@ use std::process::ExitCode;
 use supple_core::drive_guard::DriveGuard;
 use supple_ipc::{Domain, PlantLink};
 use supple_model::{Description, with_dof};
-use supple_plant::{Plant, PlantConfig, Scene, TraceFile};
+use supple_plant::{Plant, PlantConfig, PlantOptions, Scene, TraceFile};
 use supple_realtime::{Stop, apply_realtime_settings, diagnostics, die_with_parent, spin_duration};
 
 /// Runs the program: parses the arguments and returns the exit code.
@@ -74,7 +74,8 @@ pub fn run<const N: usize>(
     options: &Options,
     stop: &Stop,
 ) -> Result<Summary, SimError> {
-    let mut config = PlantConfig::<N>::from_description(description)?;
+    let effects = PlantOptions::chosen(options.plant_options.as_deref(), options.realistic)?;
+    let mut config = effects.apply(PlantConfig::<N>::from_description(description)?)?;
     if let Some(face_m) = options.block_m {
         config.scene = Scene::with_block_at(face_m);
     }

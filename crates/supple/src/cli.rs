@@ -4,7 +4,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use std::path::PathBuf;
 use supple_bus::Address;
-use supple_cli::arguments::OfflineCommand;
+use supple_cli::arguments::{OfflineCommand, PlantArgs};
 use supple_cli::exit::CODES;
 use supple_cli::range::between;
 use supple_plant::Injection;
@@ -240,6 +240,9 @@ pub struct UpArgs {
     /// encoder-stuck:joint=1,at-s=2; see --help. May be repeated.
     #[arg(long, value_name = "SPEC", long_help = supple_plant::injection::HELP)]
     pub inject: Vec<Injection>,
+    /// The simulated or emulated arm.
+    #[command(flatten)]
+    pub plant_options: PlantArgs,
     /// Write motor torques and tip forces of the simulated or emulated arm as CSV.
     #[arg(long, value_name = "FILE")]
     pub trace: Option<PathBuf>,

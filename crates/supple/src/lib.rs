@@ -33,9 +33,11 @@ pub fn run() -> ExitCode {
 
 fn dispatch(command: &Command) -> Result<(), Failure> {
     match command {
-        Command::Offline(OfflineCommand::Demo(_) | OfflineCommand::Identification(_)) => {
-            Err(exec_report())
-        }
+        Command::Offline(
+            OfflineCommand::Demo(_)
+            | OfflineCommand::Effects(_)
+            | OfflineCommand::Identification(_),
+        ) => Err(exec_report()),
         Command::Up(args) => up::run(args),
         Command::Drill(args) => drill::run(args),
         Command::Status(system) => operate::status(system),
@@ -52,6 +54,7 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
         Command::Stop(system) => operate::stop(system),
         Command::Offline(OfflineCommand::Log(command)) => log::run(command),
         Command::Offline(OfflineCommand::Arms(args)) => arms::run(args),
+        Command::Offline(OfflineCommand::Plant(command)) => command.run(),
         Command::Doctor { json } => doctor::run(*json),
         Command::Completions { shell } => {
             let mut script = Vec::new();

@@ -17,6 +17,7 @@ from supple._identify import DataWarning, FrictionColumns, identify
 from supple._learn import Learned, learn
 from supple._log import Log, Truth, read_log
 from supple._native import Arm, Friction, __version__, assets
+from supple._plant import plant_options
 from supple._simulate import Run, simulate
 from supple._sweep import Sweep, sweep
 
@@ -43,6 +44,7 @@ __all__ = [
     "excite",
     "identify",
     "learn",
+    "plant_options",
     "read_log",
     "simulate",
     "sweep",

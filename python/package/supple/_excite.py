@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple import _native
+from supple._plant import PlantOptions, _chosen
 
 Array = NDArray[np.float64]
 
@@ -150,6 +151,8 @@ def excite(
     load: bool = False,
     seed: int = 0,
     log_dir: str | os.PathLike[str] | None = None,
+    plant_options: PlantOptions | None = None,
+    realistic: bool = False,
 ) -> Recording:
     """Let the simulated arm track an excitation and return its recorded data.
 
@@ -169,6 +172,11 @@ def excite(
         Seed of all noise, zero or more.
     log_dir : str or os.PathLike, optional
         Folder for ``excitation.mcap``; see :func:`read_log`.
+    plant_options : mapping or path, optional
+        Effects of a real arm in the plant: sizes by name, as :func:`plant_options` returns them, or a TOML file. Default:
+        none.
+    realistic : bool
+        The same as ``plant_options=supple.plant_options("realistic")``.
 
     Returns
     -------
@@ -206,6 +214,7 @@ def excite(
             "load": load,
             "seed": seed,
             "log_dir": None if log_dir is None else os.fspath(log_dir),
+            "plant_options": _chosen(plant_options, realistic),
         },
     )
     return Recording(torque_delay_s=1.5 * found.pop("period_s"), **found)

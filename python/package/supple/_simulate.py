@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple import _native
+from supple._plant import PlantOptions, _chosen
 
 Array = NDArray[np.float64]
 EXPERIMENTS = ("sinusoid", "arc", "quadrant", "probing")
@@ -73,12 +74,14 @@ def simulate(
     fade: bool = True,
     seed: int = 0,
     log_dir: str | os.PathLike[str] | None = None,
+    plant_options: PlantOptions | None = None,
+    realistic: bool = False,
 ) -> Run:
     """Run one of the paper's experiments on the simulated arm, in virtual time.
 
     ``arm`` defines the plant; ``model`` or the error options set the controller's model of it. The plant uses a different
     dynamics engine than the controller's model, with bristle friction, quantised encoders and torques,
-    and a delay of one cycle. The interpreter lock is released during the run; the same arguments give
+    and a delay of one cycle; ``plant_options`` adds effects of a real arm. The interpreter lock is released during the run; the same arguments give
     the same numbers.
 
     Parameters
@@ -110,6 +113,11 @@ def simulate(
         Seed of all noise and of the signs above, zero or more.
     log_dir : str or os.PathLike, optional
         Folder for ``<experiment>.mcap``, created if necessary; see :func:`read_log`.
+    plant_options : mapping or path, optional
+        Effects of a real arm in the plant: sizes by name, as :func:`plant_options` returns them, or a TOML file. Default:
+        none.
+    realistic : bool
+        The same as ``plant_options=supple.plant_options("realistic")``.
 
     Returns
     -------
@@ -162,6 +170,7 @@ def simulate(
             "fade": fade,
             "seed": seed,
             "log_dir": None if log_dir is None else os.fspath(log_dir),
+            "plant_options": _chosen(plant_options, realistic),
         },
     )
     cycles = result["cycles"]

@@ -1,5 +1,6 @@
 //! Arguments of `supple demo`.
 
+use super::PlantArgs;
 use std::path::PathBuf;
 
 /// Arguments of `demo`.
@@ -30,4 +31,10 @@ pub struct DemoArgs {
     /// Write no logs; all of them take about half a gigabyte.
     #[arg(long)]
     pub no_logs: bool,
+    /// Number of calibrated arms with the effects of a real one; 0 leaves these runs out.
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u64).range(0..=1000))]
+    pub realistic_seeds: u64,
+    /// The simulated arm.
+    #[command(flatten)]
+    pub plant: PlantArgs,
 }

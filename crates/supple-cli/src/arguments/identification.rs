@@ -1,5 +1,6 @@
 //! Arguments of the identification commands.
 
+use super::PlantArgs;
 use crate::exit::CODES;
 use crate::range::between;
 use clap::builder::RangedU64ValueParser;
@@ -191,12 +192,15 @@ pub struct RunArgs {
     /// Torque ripple of the plant's motors, seen at the joints (N m).
     #[arg(long, value_name = "NM", default_value_t = 0.0, value_parser = between(0.0, 100.0))]
     pub ripple: f64,
-    /// Make the plant's friction depend on direction and load.
+    /// Leave out that the plant's friction depends on direction and load.
     #[arg(long)]
-    pub load: bool,
+    pub no_load_friction: bool,
     /// Skip the slow motion, which is needed to identify dry friction at low speed.
     #[arg(long)]
     pub no_slow: bool,
+    /// The simulated arm.
+    #[command(flatten)]
+    pub plant: PlantArgs,
     /// Print the summary as JSON.
     #[arg(long)]
     pub json: bool,
@@ -221,6 +225,9 @@ pub struct BreakawayArgs {
     /// compensated.
     #[arg(long, value_name = "NM", default_value_t = 0.0, value_parser = between(0.0, 100.0))]
     pub ripple: f64,
+    /// The simulated arm.
+    #[command(flatten)]
+    pub plant: PlantArgs,
     /// Print the result as JSON.
     #[arg(long)]
     pub json: bool,
@@ -244,12 +251,15 @@ pub struct CalibrateArgs {
     /// Torque ripple of the plant's motors, seen at the joints (N m).
     #[arg(long, value_name = "NM", default_value_t = 0.0, value_parser = between(0.0, 100.0))]
     pub ripple: f64,
-    /// Make the plant's friction depend on direction and load.
+    /// Leave out that the plant's friction depends on direction and load.
     #[arg(long)]
-    pub load: bool,
+    pub no_load_friction: bool,
     /// Stop after identification; do not run the demo.
     #[arg(long)]
     pub no_demo: bool,
+    /// The simulated arm.
+    #[command(flatten)]
+    pub plant: PlantArgs,
     /// Print the summary as JSON.
     #[arg(long)]
     pub json: bool,

@@ -1,25 +1,21 @@
-//! The rapier world behind types of this crate and of nalgebra.
+//! The arm and, by the rapier engine, the objects of its scene; behind types of this crate and of nalgebra.
 
-mod arm;
+mod chain;
 mod convert;
 mod surface;
 
+pub(crate) use chain::{Chain, Forces};
 pub use surface::{Object, ObjectKind};
 
 use crate::config::PlantConfig;
 use crate::contact::Bristle;
 use crate::error::PlantError;
-use arm::{insert_arm, mass_properties};
 use convert::to_glam_vector;
-use rapier3d_f64::dynamics::{MultibodyJointHandle, RigidBodyHandle};
 use rapier3d_f64::geometry::Ball;
 use rapier3d_f64::pipeline::PhysicsWorld;
 use supple_core::nalgebra::Vector3;
 use supple_core::{Arm, Vector};
 use surface::{Surface, insert_scene};
-
-/// Index of the angular x coordinate, the free coordinate of a revolute joint.
-const ANGULAR_X: usize = 3;
 
 /// Motion of the spherical tip.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,10 +33,13 @@ pub(crate) struct TipForce {
     pub depth_m: f64,
 }
 
+/// The arm in its scene. Only the tip's contact force couples the two, so that the engine of the scene runs only if
+/// something in it can move.
 pub(crate) struct World<const N: usize> {
+    arm: Chain<N>,
     physics: PhysicsWorld,
-    links: [RigidBodyHandle; N],
-    last_joint: MultibodyJointHandle,
+    /// Whether the scene has objects that move.
+    scene_moves: bool,
     surfaces: Vec<Surface>,
     tip: Ball,
 }
@@ -58,21 +57,14 @@ impl<const N: usize> World<N> {
         // Recycled contacts would be wrong by millimetres.
         parameters.contact_recycling = false;
         parameters.max_ccd_substeps = 0;
-        let (links, last_joint) = insert_arm(&mut physics, &config.arm);
         let surfaces = insert_scene(&mut physics, &config.scene)?;
-        // A step of zero duration initialises masses and degrees of freedom.
+        // A step of zero duration initialises masses.
         physics.integration_parameters.dt = 0.0;
         physics.step();
-        if let Some((arm, _)) = physics.multibody_joints.get_mut(last_joint) {
-            // The engine damps joints by default.
-            arm.damping_mut().fill(0.0);
-            let armature = config.arm.armature();
-            arm.armature_mut().copy_from_slice(armature.as_slice());
-        }
         let mut world = World {
+            arm: Chain::new(&config.arm, link_armature(config)),
             physics,
-            links,
-            last_joint,
+            scene_moves: !config.scene.free_boxes.is_empty(),
             surfaces,
             tip: Ball::new(config.tip_radius_m),
         };
@@ -80,31 +72,13 @@ impl<const N: usize> World<N> {
         Ok(world)
     }
 
-    /// Joint angles \[rad\] and velocities \[rad/s\].
-    pub fn state(&self) -> (Vector<N>, Vector<N>) {
-        let (mut q, mut qd) = (Vector::zeros(), Vector::zeros());
-        if let Some((arm, _)) = self.physics.multibody_joints.get(self.last_joint) {
-            for (i, link) in arm.links().skip(1).enumerate() {
-                q[i] = link.joint().coords()[ANGULAR_X];
-                qd[i] = arm.generalized_velocity()[i];
-            }
-        }
-        (q, qd)
+    /// The arm.
+    pub fn arm(&self) -> &Chain<N> {
+        &self.arm
     }
 
     pub fn set_state(&mut self, q: &Vector<N>, qd: &Vector<N>) {
-        let (now, _) = self.state();
-        let PhysicsWorld {
-            multibody_joints,
-            bodies,
-            ..
-        } = &mut self.physics;
-        if let Some((arm, _)) = multibody_joints.get_mut(self.last_joint) {
-            arm.apply_displacements((q - now).as_slice());
-            arm.generalized_velocity_mut().copy_from(qd);
-            arm.forward_kinematics(bodies, false);
-            arm.update_rigid_bodies(bodies, true);
-        }
+        self.arm.set_state(q, qd);
         for surface in &mut self.surfaces {
             surface.bristle = Bristle::default();
         }
@@ -112,25 +86,13 @@ impl<const N: usize> World<N> {
 
     /// Adds to the joint velocities \[rad/s\], as an impulse does.
     pub fn apply_velocity_step(&mut self, change: &Vector<N>) {
-        let PhysicsWorld {
-            multibody_joints,
-            bodies,
-            ..
-        } = &mut self.physics;
-        if let Some((arm, _)) = multibody_joints.get_mut(self.last_joint) {
-            for (speed, change) in arm.generalized_velocity_mut().iter_mut().zip(change.iter()) {
-                *speed += change;
-            }
-            arm.forward_kinematics(bodies, false);
-            arm.update_rigid_bodies(bodies, true);
-        }
+        self.arm.velocity_rad_per_s += change;
     }
 
     /// Sets gravity and the last link to those of `arm`, which is otherwise the same arm.
     pub fn set_last_link_and_gravity(&mut self, arm: &Arm<N>) {
         self.physics.gravity = to_glam_vector(&arm.gravity());
-        let last = &mut self.physics.bodies[self.links[N - 1]];
-        last.set_additional_mass_properties(mass_properties(&arm.body(N - 1)), true);
+        self.arm.set_arm(arm);
     }
 
     /// Computes the contact of the tip with every surface, applies the reaction to free objects, and returns the
@@ -165,28 +127,11 @@ impl<const N: usize> World<N> {
         met.max_by(|a, b| a.1.total_cmp(&b.1))
     }
 
-    /// Advances everything by `dt_s` under a torque on each link and a force at a point of the last
-    /// one, base axes.
-    pub fn step(
-        &mut self,
-        link_torque_nm: &[Vector3<f64>; N],
-        tip: &TipForce,
-        tip_center_m: &Vector3<f64>,
-        dt_s: f64,
-    ) {
-        for (i, handle) in self.links.iter().enumerate() {
-            let link = &mut self.physics.bodies[*handle];
-            link.reset_forces(false);
-            link.reset_torques(false);
-            link.add_torque(to_glam_vector(&link_torque_nm[i]), true);
-            if i + 1 == N {
-                link.add_torque(to_glam_vector(&tip.moment_nm), true);
-                link.add_force_at_point(
-                    to_glam_vector(&tip.force_n),
-                    to_glam_vector(tip_center_m),
-                    true,
-                );
-            }
+    /// Advances everything by `dt_s`.
+    pub fn step(&mut self, forces: &Forces<'_, N>, dt_s: f64) {
+        self.arm.step(forces, dt_s);
+        if !self.scene_moves {
+            return;
         }
         self.physics.integration_parameters.dt = dt_s;
         self.physics.step();
@@ -205,5 +150,13 @@ impl<const N: usize> World<N> {
         let bodies = &self.physics.bodies;
         let surfaces = self.surfaces.iter();
         surfaces.map(|surface| surface.object(&bodies[surface.body]))
+    }
+}
+
+/// Rotor inertias that turn with the joints: not those behind elastic transmissions.
+fn link_armature<const N: usize>(config: &PlantConfig<N>) -> Vector<N> {
+    match config.elasticity {
+        Some(_) => Vector::zeros(),
+        None => config.arm.armature(),
     }
 }

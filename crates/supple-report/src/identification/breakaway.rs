@@ -31,8 +31,10 @@ pub struct Line {
 pub fn run(args: &BreakawayArgs) -> Result<(), Failure> {
     let arm = arms::find(&args.arm, args.strict)?;
     let joints = joints(&args.joints, arm.dof())?;
+    let effects = args.plant.options()?;
     let lines = with_dof!(arm.dof(), N => {
         let calibration = Calibration {
+            plant: effects.clone(),
             ripple_nm: args.ripple,
             ..Calibration::new(args.seed)
         };

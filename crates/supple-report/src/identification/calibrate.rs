@@ -15,6 +15,7 @@ use supple_experiment::{
     track_with_identified_model,
 };
 use supple_model::{Description, with_dof};
+use supple_plant::PlantOptions;
 
 /// Number of models drawn from the uncertainty of the fit to predict the tracking error.
 const DRAWS: u64 = 5;
@@ -26,6 +27,8 @@ const PLANT: &str = "plant";
 struct Summary {
     arm: String,
     seed: u64,
+    /// Effects of a real arm in the plant; empty without any.
+    plant: PlantOptions,
     /// Joint, measured and true breakaway torque \[N m\].
     breakaway: Vec<(String, f64, f64)>,
     identification: super::report::Summary,
@@ -61,6 +64,8 @@ pub fn run(args: &CalibrateArgs) -> Result<(), Failure> {
         json: false,
         quiet: args.quiet || args.json,
         no_logs: true,
+        realistic_seeds: 1,
+        plant: args.plant.clone(),
     })
 }
 
@@ -68,7 +73,8 @@ fn run_with_dof<const N: usize>(arm: &Description, args: &CalibrateArgs) -> Resu
     let staging = Staging::new(&args.out, &[&FILES[..], &["calibration.json"]].concat())?;
     let calibration = Calibration {
         ripple_nm: args.ripple,
-        load: args.load,
+        load: !args.no_load_friction,
+        plant: args.plant.options()?,
         breakaway: true,
         log_dir: Some(staging.folder("logs")?),
         ..Calibration::new(args.seed)
@@ -86,7 +92,7 @@ fn run_with_dof<const N: usize>(arm: &Description, args: &CalibrateArgs) -> Resu
     };
     let followed = follow(&calibration, &found.description)?;
     let mut without_load = None;
-    if args.load {
+    if !args.no_load_friction {
         if !args.quiet {
             print_status("the same without direction- and load-dependent friction");
         }
@@ -122,6 +128,7 @@ fn run_with_dof<const N: usize>(arm: &Description, args: &CalibrateArgs) -> Resu
     let numbers = Summary {
         arm: arm.name().to_owned(),
         seed: args.seed,
+        plant: calibration.plant.clone(),
         breakaway: names
             .iter()
             .zip(&found.breakaway)

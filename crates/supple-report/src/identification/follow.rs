@@ -11,6 +11,7 @@ use supple_experiment::calibrate::plant_of;
 use supple_experiment::{Calibration, excitation, slow_motion};
 use supple_ident::{ReadError, SeriesLists};
 use supple_model::{Description, with_dof};
+use supple_plant::PlantOptions;
 
 /// Maximum size of a design file \[bytes\].
 const MAX_BYTES: u64 = 1 << 20;
@@ -29,6 +30,8 @@ struct Summary<'a> {
     design: &'a Path,
     log: std::path::PathBuf,
     seed: u64,
+    /// Effects of a real arm in the plant; empty without any.
+    plant: &'a PlantOptions,
     /// Durations of the designed motion and of the slow motion after it \[s\].
     recorded_s: Vec<f64>,
 }
@@ -68,24 +71,32 @@ fn run_with_dof<const N: usize>(
     args: &RunArgs,
 ) -> Result<(), Failure> {
     let calibration = Calibration {
-        load: args.load,
+        load: !args.no_load_friction,
+        plant: args.plant.options()?,
         ripple_nm: args.ripple,
         ..Calibration::new(args.seed)
     };
     let staging = Staging::new(&args.out, &["summary.json", "logs/excitation.mcap"])?;
     let plant = plant_of::<N>(arm, &calibration)?;
+    let effects = &calibration.plant;
     let (config, home) = (arm.config::<N>()?, arm.home::<N>()?);
     let mut series = vec![design.series.fourier::<N>()?];
     if !args.no_slow {
         series.push(slow_motion(&config, &home, &design.moving)?);
     }
     let session = excitation("excitation", &config, &plant, &home, &series);
-    session.record(Some(&staging.folder("logs")?), arm, args.seed)?;
+    session.record_with_notes(
+        Some(&staging.folder("logs")?),
+        arm,
+        args.seed,
+        effects.notes(),
+    )?;
     let summary = Summary {
         arm: arm.name(),
         design: &args.design,
         log: args.out.join("logs/excitation.mcap"),
         seed: args.seed,
+        plant: effects,
         recorded_s: series.iter().map(|series| series.duration_s).collect(),
     };
     let text = supple_cli::console::json(&summary)?;

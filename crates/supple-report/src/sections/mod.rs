@@ -56,6 +56,11 @@ pub fn faults(summary: &Summary) -> Vec<(String, &FaultEnd)> {
             &at.tracking.ended,
         ));
     }
+    let found = summary.realistic.iter().flat_map(|found| &found.ended);
+    let realistic = found.map(|ended| {
+        let name = format!("realistic plant, seed {}", ended.seed);
+        (name, &ended.fault)
+    });
     for (k, run) in summary.seed_runs.iter().enumerate() {
         runs.push((format!("sinusoid, perturbed model {k}"), &run.ended));
     }
@@ -77,8 +82,9 @@ pub fn faults(summary: &Summary) -> Vec<(String, &FaultEnd)> {
             runs.push((name, &line.ended));
         }
     }
-    runs.into_iter()
-        .filter_map(|(name, ended)| Some((name, ended.as_ref()?)))
+    let runs = runs.into_iter();
+    realistic
+        .chain(runs.filter_map(|(name, ended)| Some((name, ended.as_ref()?))))
         .collect()
 }
 

@@ -12,6 +12,7 @@ use crate::up::{START_S, System};
 use core::time::Duration;
 use std::path::PathBuf;
 use std::time::Instant;
+use supple_cli::arguments::PlantArgs;
 use supple_cli::exit::Failure;
 use supple_core::dynamics::jacobian;
 use supple_ipc::Domain;
@@ -75,6 +76,7 @@ pub fn perform<const N: usize>(spec: &Spec, arm: &TestArm) -> Result<Row, Failur
             _ => -(BLOCK_CLEARANCE_M + cap_m),
         }),
         inject: injections(spec, event_s, back_s, pushed.then_some(push_rad_per_s)),
+        plant_options: PlantArgs::default(),
         trace: Some(file.clone()),
         rate_hz: arm.rate_hz,
         for_s: Some(event_s + back_s + OBSERVED_S),

@@ -12,6 +12,7 @@ use rustix::process::{Pid, Signal, kill_process};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Instant;
+use supple_cli::arguments::PlantArgs;
 use supple_cli::console::print_status;
 use supple_cli::exit::Failure;
 use supple_core::config::Gains;
@@ -72,6 +73,7 @@ pub fn perform<const N: usize>(
             _ => Some(-(BLOCK_CLEARANCE_M + cap_m)),
         },
         inject: Vec::new(),
+        plant_options: PlantArgs::default(),
         trace: Some(trace.clone()),
         rate_hz: None,
         for_s: None,

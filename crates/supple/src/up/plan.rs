@@ -44,6 +44,7 @@ impl Plan {
     /// emulated bus does not belong to this user; [`Failure::VirtualTimeOnRealBus`].
     pub fn new(args: &UpArgs, domain: &Domain, cycles: Option<u64>) -> Result<Plan, Failure> {
         args.check_injections()?;
+        args.check_plant_options()?;
         let controller = Program {
             name: CONTROLLER,
             arguments: args.timed_arguments(domain),
@@ -168,6 +169,7 @@ impl UpArgs {
         if let Some(file) = &self.trace {
             arguments.extend(["--trace".to_owned(), file.display().to_string()]);
         }
+        arguments.extend(self.plant_options.to_arguments());
         for injection in &self.inject {
             arguments.extend(["--inject".to_owned(), injection.to_string()]);
         }
@@ -183,6 +185,15 @@ impl UpArgs {
                 .try_for_each(Injection::check_bus_support)?),
             PlantKind::Can if self.inject.is_empty() => Ok(()),
             PlantKind::Can => Err(Failure::InjectionIntoRealArm),
+        }
+    }
+
+    /// The simulated arm's options are checked before any process starts.
+    fn check_plant_options(&self) -> Result<(), Failure> {
+        let given = !self.plant_options.to_arguments().is_empty();
+        match self.plant {
+            PlantKind::Can if given => Err(Failure::OptionsOfRealArm),
+            _ => self.plant_options.options().map(drop),
         }
     }
 

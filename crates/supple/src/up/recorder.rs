@@ -9,6 +9,7 @@ use supple_core::Config;
 use supple_ipc::message::Telemetry;
 use supple_log::{CycleTiming, Extras, RunInfo, Writer};
 use supple_model::Description;
+use supple_plant::PlantOptions;
 
 /// The log of a run, if there is one, and why it ended before the run, if it did.
 pub struct RunLog<const N: usize> {
@@ -75,7 +76,7 @@ pub struct Recorder<const N: usize> {
 }
 
 impl<const N: usize> Recorder<N> {
-    /// Begins a log. In virtual time it is the same for the same run: no clock, no timing.
+    /// Begins a log of an arm with these plant options. In virtual time it is the same for the same run: no clock, no timing.
     ///
     /// # Errors
     /// [`Failure::File`], [`Failure::Log`].
@@ -84,6 +85,7 @@ impl<const N: usize> Recorder<N> {
         description: &Description,
         config: &Config<N>,
         virtual_time: bool,
+        plant: &PlantOptions,
     ) -> Result<Self, Failure> {
         if let Some(folder) = file.parent() {
             fs::create_dir_all(folder).map_err(|error| Failure::file("create", folder, error))?;
@@ -101,6 +103,7 @@ impl<const N: usize> Recorder<N> {
         let run = RunInfo {
             experiment: "supple up".to_owned(),
             start_ns,
+            notes: plant.notes(),
             ..RunInfo::default()
         };
         Ok(Recorder {

@@ -60,9 +60,10 @@ impl<'a, const N: usize> System<'a, N> {
         let limit = args.for_s.map(|for_s| cycles_of(for_s, period_s));
         let (trajectory, duration_s) = trajectory_for(args.track, description);
         let plan = Plan::new(args, domain, limit)?;
+        let options = args.plant_options.options()?;
         let recorder = args
             .log_file()
-            .map(|file| Recorder::create(&file, description, &config, args.virtual_time));
+            .map(|file| Recorder::create(&file, description, &config, args.virtual_time, &options));
         Ok(System {
             stages: Stages::new(plan.pendant.clone(), args.plant, period_s),
             approach: Approach::new(&config, trajectory, duration_s)?,

@@ -1,0 +1,268 @@
+//! Which effects of a real arm ruin low stiffness: tracking at 5 N/m with each effect alone and with all together.
+//!
+//! The plant has the effect; the controller's model comes from one of the [`ModelSource`]s. Nothing in the controller
+//! knows of the effect otherwise. The sizes of single effects are larger than in `realistic`; all are assumptions, see
+//! `supple plant list`.
+
+use crate::calibrate::{Calibration, calibrate};
+use crate::error::ExperimentError;
+use crate::run::{FaultEnd, Plan, run};
+use crate::scenario;
+use crate::setup::{Setup, Variant};
+use rayon::prelude::*;
+use serde::Serialize;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use supple_core::Trajectory;
+use supple_model::{Description, with_dof};
+use supple_plant::{PlantOptions, Scene};
+
+/// An effect with its size.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Effect {
+    /// Name in the table.
+    pub name: &'static str,
+    /// Options of the plant.
+    pub options: PlantOptions,
+}
+
+/// Where the controller's model is from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ModelSource {
+    /// The description, which knows nothing of the effect: a model identified without it.
+    Nominal,
+    /// A calibration on the arm with the effect, as `supple calibrate` does it, with ripple runs if a motor ripples.
+    Calibrated,
+}
+
+impl ModelSource {
+    /// All, in the order of the table.
+    pub const ALL: [ModelSource; 2] = [ModelSource::Nominal, ModelSource::Calibrated];
+
+    /// Head of the table's columns.
+    pub fn name(self) -> &'static str {
+        match self {
+            ModelSource::Nominal => "not calibrated",
+            ModelSource::Calibrated => "calibrated",
+        }
+    }
+}
+
+/// Free motion at 5 N/m with one effect, one model and one seed.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FreeMotion {
+    /// Root mean square tip error on the sinusoid \[m\].
+    pub sinusoid_rms_m: f64,
+    /// Root mean square tip error on the arc \[m\].
+    pub arc_rms_m: f64,
+    /// Times at which the contact latch reported a contact; nothing is there to touch.
+    pub false_latches: usize,
+    /// The first fault that ended a run early; its errors are those before it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ended: Option<FaultEnd>,
+}
+
+/// Result of one effect, one model and one seed.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct EffectRun {
+    /// The effect.
+    pub effect: &'static str,
+    /// Where the model is from.
+    pub model: ModelSource,
+    /// Seed of the calibration, the noise, and the signs and phases of the effect.
+    pub seed: u64,
+    /// The motion; `None` if the calibration failed.
+    pub motion: Option<FreeMotion>,
+    /// Why the calibration failed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub failed: Option<String>,
+}
+
+fn effect(name: &'static str, set: impl FnOnce(&mut PlantOptions)) -> Effect {
+    let mut options = PlantOptions::default();
+    set(&mut options);
+    Effect { name, options }
+}
+
+/// The rows of the table: none, each effect alone, all at modest size.
+pub fn effects() -> Vec<Effect> {
+    vec![
+        effect("none", |_| {}),
+        effect("cables of 3000 N m/rad", |o| {
+            o.cable_stiffness_nm_per_rad = Some(3000.0);
+            o.cable_damping_ratio = Some(0.05);
+        }),
+        effect("cables of 1000 N m/rad", |o| {
+            o.cable_stiffness_nm_per_rad = Some(1000.0);
+            o.cable_damping_ratio = Some(0.05);
+        }),
+        effect("gears of 3000 N m/rad with 1 mrad of backlash", |o| {
+            o.cable_stiffness_nm_per_rad = Some(3000.0);
+            o.cable_damping_ratio = Some(0.05);
+            o.backlash_rad = Some(0.001);
+        }),
+        effect("cogging of 0.3 N m", |o| o.ripple_nm = Some(0.3)),
+        effect("torque ripple of 3 %", |o| {
+            o.torque_ripple_fraction = Some(0.03)
+        }),
+        effect("dry friction 20 % up", |o| {
+            o.dry_friction_change = Some(0.2)
+        }),
+        effect("cold: dry friction 30 %, viscous 50 % up", |o| {
+            o.warm_up_dry_fraction = Some(0.3);
+            o.warm_up_viscous_fraction = Some(0.5);
+        }),
+        effect("friction 10 % with load", |o| {
+            o.friction_load_fraction = Some(0.1)
+        }),
+        effect("friction 5 % with direction", |o| {
+            o.friction_direction_fraction = Some(0.05);
+        }),
+        effect("friction 10 % with angle", |o| {
+            o.friction_angle_fraction = Some(0.1)
+        }),
+        effect("all friction possible at the motors", |o| {
+            o.motor_friction_share = Some(1.0)
+        }),
+        effect("bristles a tenth as stiff", |o| {
+            o.bristle_stiffness_factor = Some(0.1)
+        }),
+        effect("dead zone of 2 mN m", |o| o.dead_zone_nm = Some(2e-3)),
+        effect("amplifier offset of 1 mN m", |o| {
+            o.amplifier_offset_nm = Some(1e-3)
+        }),
+        effect("torque constants 2 % off", |o| {
+            o.torque_constant_fraction = Some(0.02)
+        }),
+        effect("base tilted by 0.5 degrees", |o| {
+            o.base_tilt_rad = Some(0.5_f64.to_radians());
+        }),
+        effect("encoder bias of 3 mrad", |o| {
+            o.encoder_bias_rad = Some(3e-3)
+        }),
+        effect("hose of 0.3 N m/rad", |o| {
+            o.hose_stiffness_nm_per_rad = Some(0.3)
+        }),
+        effect("tool 50 g too heavy", |o| o.tool_extra_kg = Some(0.05)),
+        effect("one more cycle of delay", |o| {
+            o.extra_delay_cycles = Some(1.0)
+        }),
+        effect("cycle jitter of 10 %", |o| {
+            o.cycle_jitter_fraction = Some(0.1)
+        }),
+        Effect {
+            name: "realistic: all, of modest size",
+            options: PlantOptions::realistic(),
+        },
+    ]
+}
+
+/// Runs every effect with every model and seed, on all cores. `progress` receives the number of effects with their seeds
+/// that are done, and of all. The results are in the order of effects, seeds and models.
+///
+/// # Errors
+/// [`ExperimentError`] if the arm cannot do the motions. A calibration that fails is a result.
+pub fn run_effects(
+    description: &Description,
+    effects: &[Effect],
+    models: &[ModelSource],
+    seeds: u64,
+    progress: &(dyn Fn(usize, usize, &str) + Sync),
+) -> Result<Vec<EffectRun>, ExperimentError> {
+    let jobs: Vec<(&Effect, u64)> = effects
+        .iter()
+        .flat_map(|effect| (0..seeds).map(move |seed| (effect, seed)))
+        .collect();
+    let done = AtomicUsize::new(0);
+    let each = jobs.par_iter().map(|(effect, seed)| {
+        let runs = with_dof!(description.dof(), N => one::<N>(description, effect, models, *seed))
+            .map_err(ExperimentError::from)
+            .flatten();
+        let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+        progress(done, jobs.len(), effect.name);
+        runs
+    });
+    let each: Result<Vec<_>, _> = each.collect();
+    Ok(each?.into_iter().flatten().collect())
+}
+
+fn one<const N: usize>(
+    description: &Description,
+    effect: &Effect,
+    models: &[ModelSource],
+    seed: u64,
+) -> Result<Vec<EffectRun>, ExperimentError> {
+    let result = |model, found: Result<FreeMotion, String>| EffectRun {
+        effect: effect.name,
+        model,
+        seed,
+        motion: found.as_ref().ok().cloned(),
+        failed: found.err(),
+    };
+    let run = |model: &ModelSource| {
+        let setup = match model {
+            ModelSource::Nominal => Setup::<N>::new(description, seed)?,
+            ModelSource::Calibrated => match calibrated::<N>(description, &effect.options, seed) {
+                Ok(found) => Setup::<N>::with_model(description, &found, seed)?,
+                // A controller that faults on this arm, or a fit that is refused, is a result.
+                Err(error @ (ExperimentError::Fault { .. } | ExperimentError::Ident(_))) => {
+                    return Ok(result(*model, Err(error.to_string())));
+                }
+                Err(error) => return Err(error),
+            },
+        };
+        let motion = free_motion(&setup.with_plant_options(&effect.options)?)?;
+        Ok(result(*model, Ok(motion)))
+    };
+    models.iter().map(run).collect()
+}
+
+/// The model of a calibration on the arm with these options.
+///
+/// # Errors
+/// As [`calibrate`].
+pub fn calibrated<const N: usize>(
+    description: &Description,
+    options: &PlantOptions,
+    seed: u64,
+) -> Result<Description, ExperimentError> {
+    let calibration = Calibration {
+        plant: options.clone(),
+        ..Calibration::new(seed)
+    };
+    Ok(calibrate::<N>(description, &calibration, &mut |_| {})?.description)
+}
+
+/// Sinusoid and arc at 5 N/m in empty space.
+///
+/// # Errors
+/// [`ExperimentError`]; a fault is a result.
+pub fn free_motion<const N: usize>(setup: &Setup<N>) -> Result<FreeMotion, ExperimentError> {
+    let mut false_latches = 0;
+    let mut track = |name: &str, (trajectory, duration_s): (Trajectory, f64)| {
+        let mut config = setup.config(&Variant::EXACT)?;
+        config.law.gains = scenario::gains(scenario::STIFFNESS_N_PER_M);
+        let plan = Plan {
+            name: name.to_owned(),
+            config,
+            plant: setup.plant(&Variant::EXACT, Scene::default()),
+            trajectory,
+            duration_s,
+        };
+        let mut latched = false;
+        run(&plan, &mut |cycle, time_s| {
+            let now = time_s.is_some() && cycle.output.in_contact;
+            false_latches += usize::from(now && !latched);
+            latched = now;
+            Ok(())
+        })
+    };
+    let sinusoid = track("sinusoid", scenario::sinusoid(1.0))?;
+    let arc = track("arc", scenario::arc())?;
+    Ok(FreeMotion {
+        sinusoid_rms_m: sinusoid.rms_error_m,
+        arc_rms_m: arc.rms_error_m,
+        false_latches,
+        ended: sinusoid.ended.or(arc.ended),
+    })
+}

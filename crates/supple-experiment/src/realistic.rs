@@ -1,0 +1,94 @@
+//! The headline of the demo: a calibrated controller on the plant `realistic`, cold and warmed up.
+
+use crate::effects::{FreeMotion, calibrated, free_motion};
+use crate::error::ExperimentError;
+use crate::run::FaultEnd;
+use crate::setup::Setup;
+use serde::Serialize;
+use supple_model::Description;
+use supple_plant::PlantOptions;
+
+/// Simulated time that one seed takes, about \[s\]; for progress.
+pub(crate) const REALISTIC_S: f64 = 400.0;
+/// Time of work after which the arm counts as warm \[s\].
+const WARM_S: f64 = 1200.0;
+
+/// Free motion at 5 N/m on the realistic plant, by seed.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Realistic {
+    /// Root mean square tip error on the sinusoid, cold, by seed \[m\].
+    pub sinusoid_rms_m: Vec<f64>,
+    /// Root mean square tip error on the arc, cold, by seed \[m\].
+    pub arc_rms_m: Vec<f64>,
+    /// Root mean square tip error on the sinusoid after 20 minutes of warm-up, by seed, with the model calibrated cold
+    /// \[m\].
+    pub warm_rms_m: Vec<f64>,
+    /// False reports of contact in all of these runs.
+    pub false_latches: usize,
+    /// Faults that ended runs early.
+    pub ended: Vec<SeedFault>,
+}
+
+/// A fault that ended a run of one seed.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SeedFault {
+    /// The seed, counted from that of the demo.
+    pub seed: u64,
+    /// The fault.
+    #[serde(flatten)]
+    pub fault: FaultEnd,
+}
+
+/// Result of one seed.
+pub(crate) struct RealisticSeed {
+    cold: FreeMotion,
+    warm: FreeMotion,
+}
+
+/// Calibrates on the arm with `options` and tracks, cold and warm. With a `model`, that model is used instead.
+pub(crate) fn realistic_seed<const N: usize>(
+    description: &Description,
+    model: Option<&Description>,
+    options: &PlantOptions,
+    seed: u64,
+) -> Result<RealisticSeed, ExperimentError> {
+    let found = match model {
+        Some(model) => model.clone(),
+        None => calibrated::<N>(description, options, seed)?,
+    };
+    let track = |options: &PlantOptions| {
+        let setup = Setup::<N>::with_model(description, &found, seed)?;
+        free_motion(&setup.with_plant_options(options)?)
+    };
+    let warms = options
+        .warm_up_dry_fraction
+        .or(options.warm_up_viscous_fraction);
+    let warm = PlantOptions {
+        warmed_s: warms.map(|_| options.warmed_s.unwrap_or(0.0) + WARM_S),
+        ..options.clone()
+    };
+    Ok(RealisticSeed {
+        cold: track(options)?,
+        warm: track(&warm)?,
+    })
+}
+
+impl Realistic {
+    pub(crate) fn of(seeds: &[RealisticSeed]) -> Realistic {
+        let motions = seeds.iter().flat_map(|seed| [&seed.cold, &seed.warm]);
+        let ended = seeds.iter().enumerate().flat_map(|(k, seed)| {
+            let faults = [&seed.cold.ended, &seed.warm.ended].into_iter().flatten();
+            faults.map(move |fault| SeedFault {
+                seed: k as u64,
+                fault: fault.clone(),
+            })
+        });
+        Realistic {
+            sinusoid_rms_m: seeds.iter().map(|s| s.cold.sinusoid_rms_m).collect(),
+            arc_rms_m: seeds.iter().map(|s| s.cold.arc_rms_m).collect(),
+            warm_rms_m: seeds.iter().map(|s| s.warm.sinusoid_rms_m).collect(),
+            false_latches: motions.map(|motion| motion.false_latches).sum(),
+            ended: ended.collect(),
+        }
+    }
+}

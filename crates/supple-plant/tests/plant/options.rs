@@ -1,0 +1,194 @@
+//! Options of the plant: files, ranges, seeds, determinism.
+
+use crate::common::{wam4, wam4_at};
+use supple_core::{Friction, Vector};
+use supple_plant::options::{OPTIONS, REALISTIC};
+use supple_plant::{ActuatorModel, LuGre, Plant, PlantConfig, PlantOptions};
+
+fn config(seed: u64) -> PlantConfig<4> {
+    PlantConfig {
+        friction: [LuGre::from_friction(&Friction::coulomb(1.0, 0.5)); 4],
+        actuators: ActuatorModel {
+            counts_per_motor_revolution: Vector::repeat(4096.0),
+            torque_delay_cycles: 1,
+            ..ActuatorModel::direct()
+        },
+        seed,
+        ..PlantConfig::ideal(wam4())
+    }
+}
+
+/// Bits of the measurements over half a second of motion.
+fn digest(options: &PlantOptions, seed: u64) -> Vec<u64> {
+    let arm = wam4();
+    let config = options.apply(config(seed)).unwrap();
+    let mut plant = Plant::new(config, wam4_at(&arm, 0.6, 0.0), Vector::zeros()).unwrap();
+    let mut bits = Vec::new();
+    for cycle in 0..500 {
+        let tau = Vector::from([0.5, -12.0, 0.1, -3.0]) * (1.0 + 0.001 * f64::from(cycle));
+        let measured = plant.cycle(&tau);
+        assert!(measured.position_rad.iter().all(|q| q.is_finite()));
+        bits.extend(measured.position_rad.iter().map(|q| q.to_bits()));
+    }
+    bits
+}
+
+fn alone(name: &str, value: f64) -> PlantOptions {
+    let mut options = PlantOptions::default();
+    *options.value_mut(name).unwrap() = Some(value);
+    if ["cable_damping_ratio", "backlash_rad"].contains(&name) {
+        options.cable_stiffness_nm_per_rad = Some(3000.0);
+    }
+    if ["warm_up_s", "warmed_s"].contains(&name) {
+        options.warm_up_dry_fraction = Some(0.5);
+    }
+    options
+}
+
+#[test]
+fn the_realistic_set_is_valid_and_has_all_effects_of_an_arm_with_cables() {
+    let realistic = PlantOptions::realistic();
+    assert_eq!(realistic, PlantOptions::from_toml(REALISTIC, "x").unwrap());
+    let off: Vec<_> = realistic
+        .values()
+        .filter(|(_, value)| value.is_none_or(|x| x == 0.0))
+        .map(|(option, _)| option.name)
+        .collect();
+    // Cables have no backlash; the others belong to an experiment.
+    assert_eq!(off, ["backlash_rad", "dry_friction_change", "warmed_s"]);
+}
+
+#[test]
+fn without_options_the_plant_keeps_its_bits() {
+    let none = PlantOptions::default();
+    assert!(none.is_none() && none.line().is_empty());
+    let arm = wam4();
+    let mut plain = Plant::new(config(0), wam4_at(&arm, 0.6, 0.0), Vector::zeros()).unwrap();
+    let bits = digest(&none, 0);
+    for (cycle, expected) in bits.chunks(4).enumerate() {
+        let tau = Vector::from([0.5, -12.0, 0.1, -3.0]) * (1.0 + 0.001 * cycle as f64);
+        let measured = plain.cycle(&tau).position_rad;
+        let found: Vec<u64> = measured.iter().map(|q| q.to_bits()).collect();
+        assert_eq!(found, expected);
+    }
+}
+
+#[test]
+fn every_option_changes_the_motion_and_the_same_seed_gives_the_same_bits() {
+    let plain = digest(&PlantOptions::default(), 0);
+    let realistic = PlantOptions::realistic();
+    for (option, value) in realistic.values() {
+        let value = match option.name {
+            "backlash_rad" => 0.005,
+            "dry_friction_change" => 0.2,
+            "warmed_s" => 100.0,
+            // The default is 600 s, the size of the set.
+            "warm_up_s" => 60.0,
+            _ => value.unwrap(),
+        };
+        let options = alone(option.name, value);
+        let (first, second) = (digest(&options, 0), digest(&options, 0));
+        assert_eq!(first, second, "{}", option.name);
+        assert_ne!(first, plain, "{}", option.name);
+    }
+    assert_eq!(digest(&realistic, 1), digest(&realistic, 1));
+    assert_ne!(digest(&realistic, 1), digest(&realistic, 2));
+    let fixed = PlantOptions {
+        seed: Some(1),
+        encoder_noise_rad: None,
+        cycle_jitter_fraction: None,
+        ..realistic
+    };
+    assert_eq!(digest(&fixed, 1), digest(&fixed, 2), "the file's seed wins");
+}
+
+#[test]
+fn an_effect_draws_the_same_whether_or_not_others_are_on() {
+    let both = PlantOptions::realistic().apply(config(5)).unwrap();
+    let bias = alone("encoder_bias_rad", 0.002).apply(config(5)).unwrap();
+    let tilt = alone("base_tilt_rad", 0.0035).apply(config(5)).unwrap();
+    assert_eq!(
+        both.actuators.encoder_bias_rad,
+        bias.actuators.encoder_bias_rad
+    );
+    assert_eq!(both.arm.gravity(), tilt.arm.gravity());
+}
+
+#[test]
+fn errors_name_file_option_value_and_remedy() {
+    for (text, expected) in [
+        (
+            "cable_stifness_nm_per_rad = 3.0",
+            vec!["mine.toml", "cable_stifness", "plant list"],
+        ),
+        (
+            "base_tilt_rad = \"a\"",
+            vec!["mine.toml", "base_tilt_rad", "plant list"],
+        ),
+        (
+            "base_tilt_rad = 3.5",
+            vec![
+                "mine.toml",
+                "base_tilt_rad",
+                "3.5",
+                "from 0 to 0.5 rad",
+                "leave it out",
+            ],
+        ),
+        (
+            "tool_extra_kg = nan",
+            vec!["mine.toml", "tool_extra_kg", "NaN", "from 0 to 100 kg"],
+        ),
+        (
+            "extra_delay_cycles = 1.5",
+            vec!["mine.toml", "1.5", "a whole number from 0 to 50"],
+        ),
+        (
+            "backlash_rad = 0.01",
+            vec!["mine.toml", "cable_stiffness_nm_per_rad"],
+        ),
+        ("warmed_s = 10", vec!["mine.toml", "warm_up_dry_fraction"]),
+    ] {
+        let error = PlantOptions::from_toml(text, "mine.toml")
+            .unwrap_err()
+            .to_string();
+        for part in expected {
+            assert!(error.contains(part), "{text}: {error}");
+        }
+    }
+    let missing = PlantOptions::from_file("/nowhere/mine.toml".as_ref()).unwrap_err();
+    assert!(missing.to_string().contains("/nowhere/mine.toml"));
+    assert_eq!(
+        PlantOptions::from_toml("extra_delay_cycles = 2", "x")
+            .unwrap()
+            .extra_delay_cycles,
+        Some(2.0)
+    );
+}
+
+#[test]
+fn every_option_says_what_it_does_and_where_its_size_is_from() {
+    for option in OPTIONS {
+        assert!(
+            option.effect.len() > 20 && option.source.len() > 10,
+            "{option:?}"
+        );
+        assert!(option.min < option.max, "{option:?}");
+    }
+    let options = alone("backlash_rad", 0.001);
+    assert_eq!(
+        options.line(),
+        "cable_stiffness_nm_per_rad = 3000, backlash_rad = 0.001"
+    );
+}
+
+#[test]
+fn the_published_schema_is_that_of_the_options() {
+    let published: serde_json::Value =
+        serde_json::from_str(include_str!("../../../../assets/plants/plant.schema.json")).unwrap();
+    let schema = serde_json::to_value(schemars::schema_for!(PlantOptions)).unwrap();
+    assert_eq!(
+        published, schema,
+        "run `cargo run -p supple-plant --example plant_schema > assets/plants/plant.schema.json`"
+    );
+}

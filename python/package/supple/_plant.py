@@ -1,0 +1,52 @@
+"""Effects of a real arm in the simulated one."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+
+from supple import _native
+
+PlantOptions = Mapping[str, float] | str | os.PathLike[str]
+
+__all__ = ["plant_options"]
+
+
+def plant_options(name: str = "realistic") -> dict[str, float]:
+    """Return a built-in set of effects of a real arm, to change and pass on.
+
+    ``supple plant list`` describes all options. The sizes are assumptions, not measurements of an arm.
+
+    Parameters
+    ----------
+    name : {"realistic"}
+        All effects together, each of modest size.
+
+    Returns
+    -------
+    dict
+        Size of each effect by name; SI units, with the unit in the name.
+
+    Raises
+    ------
+    ValueError
+        For an unknown name.
+
+    Examples
+    --------
+    >>> import supple
+    >>> options = supple.plant_options()
+    >>> options["cable_stiffness_nm_per_rad"]
+    3000.0
+    """
+    return _native.plant_options(name)
+
+
+def _chosen(options: PlantOptions | None, realistic: bool) -> dict[str, float] | str | None:
+    if options is not None and realistic:
+        raise ValueError("realistic: expected False if plant_options is given")
+    if realistic:
+        return plant_options()
+    if options is None or isinstance(options, Mapping):
+        return None if options is None else dict(options)
+    return os.fspath(options)

@@ -1,0 +1,52 @@
+//! Options of the simulated arm beyond its description.
+
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::path::PathBuf;
+use supple_plant::PlantOptions;
+
+/// Name of options that were given as a dictionary, in errors.
+const DICTIONARY: &str = "plant_options";
+
+/// Plant options from Python: `None`, a path, or a dictionary of numbers.
+pub struct PlantEffects(pub PlantOptions);
+
+impl<'py> FromPyObject<'_, 'py> for PlantEffects {
+    type Error = PyErr;
+
+    fn extract(given: Borrowed<'_, 'py, PyAny>) -> PyResult<PlantEffects> {
+        if given.is_none() {
+            return Ok(PlantEffects(PlantOptions::default()));
+        }
+        let found = match given.cast::<PyDict>() {
+            Err(_) => PlantOptions::from_file(&given.extract::<PathBuf>()?),
+            Ok(values) => {
+                let mut text = String::new();
+                for (name, value) in values.iter() {
+                    let (name, value): (String, f64) = (name.extract()?, value.extract()?);
+                    // A whole number is also the form of the seed.
+                    text.push_str(&format!("{name:?} = {value}\n"));
+                }
+                PlantOptions::from_toml(&text, DICTIONARY)
+            }
+        };
+        let found = found.map_err(|error| PyValueError::new_err(error.to_string()))?;
+        Ok(PlantEffects(found))
+    }
+}
+
+/// The set of options `name` as a dictionary.
+#[pyfunction]
+pub fn plant_options<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyDict>> {
+    let error = |error: supple_plant::PlantOptionsError| PyValueError::new_err(error.to_string());
+    let text = PlantOptions::set(name).map_err(error)?;
+    let options = PlantOptions::from_toml(text, name).map_err(error)?;
+    let dict = PyDict::new(py);
+    for (option, value) in options.values() {
+        if let Some(value) = value {
+            dict.set_item(option.name, value)?;
+        }
+    }
+    Ok(dict)
+}
