@@ -32,6 +32,7 @@ fn plan(setup: &Setup<4>, variant: &Variant, trajectory: Trajectory, duration_s:
         plant: setup.plant(variant, Scene::default()),
         trajectory,
         duration_s,
+        learning: false,
     }
 }
 

@@ -150,6 +150,7 @@ fn plan<const N: usize>(arms: &Arms<'_>, options: &Options) -> Result<Plan<N>, E
         plant: setup.plant(&variant, scene),
         trajectory,
         duration_s: options.duration_s.unwrap_or(whole_s),
+        learning: false,
     })
 }
 

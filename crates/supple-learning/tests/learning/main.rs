@@ -1,0 +1,1 @@
+//! Tests of the learner against arms whose parameters are known.
