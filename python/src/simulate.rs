@@ -27,6 +27,7 @@ pub struct Options {
     stribeck: bool,
     load: bool,
     fade: bool,
+    learning: bool,
     seed: u64,
     log_dir: Option<PathBuf>,
 }
@@ -150,7 +151,7 @@ fn plan<const N: usize>(arms: &Arms<'_>, options: &Options) -> Result<Plan<N>, E
         plant: setup.plant(&variant, scene),
         trajectory,
         duration_s: options.duration_s.unwrap_or(whole_s),
-        learning: false,
+        learning: options.learning,
     })
 }
 

@@ -39,9 +39,9 @@ use unknowns::{TILT, VISCOUS};
 /// Standard deviation of the prior over the bound: of a payload, a tilt, an offset, friction and torque scale.
 const PRIOR_SHARE: f64 = 0.4;
 /// The same of an offset, which a payload and a tilt explain as well.
-const OFFSET_SHARE: f64 = 0.1;
+const OFFSET_SHARE: f64 = 0.05;
 /// The same of the map's part over the angle alone.
-const MAP_TORQUE_SHARE: f64 = 0.15;
+const MAP_TORQUE_SHARE: f64 = 0.1;
 /// The same of the map's part against the motion, over the Coulomb friction.
 const MAP_DRY_SHARE: f64 = 0.1;
 /// Standard deviation of the map's second differences over that of its coefficients: how smooth it is.
