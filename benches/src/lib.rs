@@ -11,8 +11,8 @@ use supple_core::dynamics::{Terms, terms};
 use supple_core::impedance::{
     LawInput, PositionTarget, SINGULAR_BELOW_M, Task, Torques, impedance,
 };
-use supple_core::linalg::min_singular_value;
 use supple_core::learned::LearnedBounds;
+use supple_core::linalg::min_singular_value;
 use supple_core::math::Vector3;
 use supple_core::target::{PoseGains, PoseReference, PoseTarget};
 use supple_core::{Arm, Config, Controller, Input, Output, Reference, Trajectory, Vector};

@@ -219,7 +219,7 @@ impl<const N: usize> Learner<N> {
             self.frozen = Some(Frozen::Disturbed);
             self.freeze();
             if self.disturbed_s >= PERSISTENT_S {
-                self.accept_change();
+                self.accept_change(&interval);
             }
             return;
         }
@@ -246,9 +246,18 @@ impl<const N: usize> Learner<N> {
         })
     }
 
-    /// The arm has changed: what was learned before counts for little.
-    fn accept_change(&mut self) {
+    /// The arm has changed: what was learned before counts for little, and an error as large as in this interval is no
+    /// disturbance until less is left of it.
+    fn accept_change(&mut self, interval: &[Information]) {
         self.disturbed_s = 0.0;
+        if let Some(estimate) = &self.estimate {
+            for (i, samples) in interval.iter().enumerate() {
+                if !samples.is_empty() {
+                    let square = samples.mean_square(&estimate.unknowns(i));
+                    self.residual[i] = self.residual[i].max(square);
+                }
+            }
+        }
         for samples in &mut self.samples {
             samples.forget(KEPT_AFTER_CHANGE);
         }

@@ -67,13 +67,13 @@ impl<const N: usize> LearnedAtPose<N> {
             )
             + tilt_torque_nm(terms, gravity_m_per_s2, &parameters.tilt_rad);
         let mut dry_nm = parameters.coulomb_nm;
-        for i in 0..N {
+        for (i, friction) in friction.iter().enumerate() {
             let (lower, upper) = (limits.position_lower_rad[i], limits.position_upper_rad[i]);
             let weights = MapWeights::new(q[i], lower, upper);
             static_nm[i] += weights.of(&learned.map[i].torque_nm);
             dry_nm[i] += weights.of(&learned.map[i].dry_nm);
             // More friction than there is would be compensated.
-            dry_nm[i] = dry_nm[i].max(-friction[i].coulomb_nm);
+            dry_nm[i] = dry_nm[i].max(-friction.coulomb_nm);
         }
         LearnedAtPose { static_nm, dry_nm }
     }

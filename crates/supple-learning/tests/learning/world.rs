@@ -57,12 +57,29 @@ impl<const N: usize> Truth<N> {
     }
 }
 
+/// Size of a joint's friction and loops over that of a joint of shoulder and elbow: the wrist is small.
+pub fn size_of_joint(joint: usize) -> f64 {
+    match joint {
+        0..4 => 1.0,
+        4 | 5 => 0.02,
+        _ => 0.005,
+    }
+}
+
 /// The model: the arm of `config` with friction.
 pub fn model<const N: usize>(config: Config<N>) -> Config<N> {
-    Config {
-        friction: [Friction::coulomb(0.8, 0.4); N],
-        ..config
+    let mut config = config;
+    for i in 0..N {
+        let size = size_of_joint(i);
+        config.friction[i] = Friction::coulomb(0.8 * size, 0.4 * size);
+        if i >= 4 {
+            config.move_gains.stiffness_nm_per_rad[i] = 200.0 * size;
+            config.move_gains.damping_nm_s_per_rad[i] = 2.0 * size;
+            config.joint_gains.stiffness_nm_per_rad[i] = 10.0 * size;
+            config.joint_gains.damping_nm_s_per_rad[i] = size;
+        }
     }
+    config
 }
 
 /// A motion of every joint between the stops, different for each.
