@@ -23,6 +23,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         plant: setup.plant(&Variant::EXACT, scenario::block()),
         trajectory: Trajectory::Probe(probe),
         duration_s,
+        learning: false,
     };
     let mut ratios = Vec::new();
     for _ in 0..ROUNDS {

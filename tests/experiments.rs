@@ -32,6 +32,7 @@ fn plan(setup: &Setup<4>, variant: &Variant, trajectory: Trajectory, duration_s:
         plant: setup.plant(variant, Scene::default()),
         trajectory,
         duration_s,
+        learning: false,
     }
 }
 
@@ -316,6 +317,7 @@ fn the_sinusoid_runs_with_seven_active_joints() {
         plant: setup.plant(&perturbed(1), Scene::default()),
         trajectory,
         duration_s,
+        learning: false,
     };
     let run = run(&plan, &mut |_, _| Ok(())).expect("the sinusoid runs");
     println!("{:.1} mm", run.rms_error_m * 1e3);

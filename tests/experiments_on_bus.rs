@@ -73,6 +73,7 @@ fn in_one_process(trajectory: Trajectory, duration_s: f64, scene: Scene) -> (f64
         plant: setup.plant(&Variant::EXACT, scene),
         trajectory,
         duration_s,
+        learning: false,
     };
     let mut forces = Vec::new();
     let run = run(&plan, &mut |cycle, _| {

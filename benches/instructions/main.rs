@@ -117,6 +117,13 @@ fn controller_step<const N: usize>(asset: &str) -> Call {
     })
 }
 
+fn learned_step<const N: usize>(asset: &str) -> Call {
+    let mut rig = Rig::<N>::learned(asset);
+    Box::new(move || {
+        black_box(rig.step());
+    })
+}
+
 fn limit(instructions: u64) -> LibraryBenchmarkConfig {
     let mut callgrind = Callgrind::default();
     callgrind.hard_limits([(EventKind::Ir, instructions)]);
@@ -162,6 +169,10 @@ fn limit(instructions: u64) -> LibraryBenchmarkConfig {
 #[bench::step_3(args = (controller_step::<3>("wam3")), config = limit(7_200))]
 #[bench::step_4(args = (controller_step::<4>("wam4")), config = limit(7_950))]
 #[bench::step_7(args = (controller_step::<7>("wam7")), config = limit(16_700))]
+// With learned terms of every kind: at most a tenth more than without.
+#[bench::step_3_learned(args = (learned_step::<3>("wam3")), config = limit(7_450))]
+#[bench::step_4_learned(args = (learned_step::<4>("wam4")), config = limit(8_100))]
+#[bench::step_7_learned(args = (learned_step::<7>("wam7")), config = limit(16_700))]
 fn instructions(mut call: Call) {
     call();
 }

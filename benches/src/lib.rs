@@ -11,6 +11,7 @@ use supple_core::dynamics::{Terms, terms};
 use supple_core::impedance::{
     LawInput, PositionTarget, SINGULAR_BELOW_M, Task, Torques, impedance,
 };
+use supple_core::learned::LearnedBounds;
 use supple_core::linalg::min_singular_value;
 use supple_core::math::Vector3;
 use supple_core::target::{PoseGains, PoseReference, PoseTarget};
@@ -189,6 +190,21 @@ impl<const N: usize> Rig<N> {
     /// If the controller does not reach the mode, or the pose is near a singular one.
     pub fn tracking(asset: &str) -> Self {
         Rig::of_config(config(asset))
+    }
+
+    /// As [`Rig::tracking`], with learned terms of every kind in force.
+    pub fn learned(asset: &str) -> Self {
+        let mut config = config::<N>(asset);
+        let limits = &config.limits;
+        let bounds = LearnedBounds::new(&config.friction, &limits.joint_torque_nm);
+        let parameters = &mut config.learned.parameters;
+        parameters.each(&bounds.parameters, |_, _, to, bound| *to = 0.01 * bound);
+        for (joint, map) in config.learned.map.iter_mut().enumerate() {
+            for coefficient in map.coefficients_mut() {
+                *coefficient = 0.01 * bounds.map_nm[joint];
+            }
+        }
+        Rig::of_config(config)
     }
 
     /// As [`Rig::tracking`], with limits that nothing reaches: the arm may be measured anywhere, at any speed.

@@ -28,6 +28,7 @@ pub struct Options {
     stribeck: bool,
     load: bool,
     fade: bool,
+    learning: bool,
     seed: u64,
     log_dir: Option<PathBuf>,
     plant_options: PlantEffects,
@@ -159,6 +160,7 @@ fn plan<const N: usize>(arms: &Arms<'_>, options: &Options) -> Result<Plan<N>, E
         plant: setup.plant(&variant, scene),
         trajectory,
         duration_s: options.duration_s.unwrap_or(whole_s),
+        learning: options.learning,
     })
 }
 

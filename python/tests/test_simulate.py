@@ -140,3 +140,18 @@ def test_plant_options_and_realistic_exclude_each_other(arm):
         supple.simulate(arm, plant_options={}, realistic=True)
     with pytest.raises(ValueError, match="realistic"):
         supple.plant_options("surreal")
+
+
+def test_learning_brings_wrong_friction_back(arm, tmp_path):
+    def late_rms_m(learning):
+        run = supple.simulate(
+            arm, duration_s=24.0, friction_error=0.15, seed=1, learning=learning, log_dir=tmp_path
+        )
+        distance = np.linalg.norm(run.reference_position_m - run.tip_position_m, axis=1)
+        return np.sqrt(np.mean(distance[run.t >= 16.0] ** 2)), run
+
+    without, _ = late_rms_m(False)
+    found, run = late_rms_m(True)
+    assert found < 0.006 and found < 0.5 * without
+    log = supple.read_log(run.log)
+    assert np.abs(log.torques["learned"]).max() > 0.05

@@ -7,6 +7,7 @@ mod table;
 
 mod drill;
 mod ends;
+mod learning;
 mod operator;
 mod regressions;
 mod running;

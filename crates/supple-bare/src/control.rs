@@ -9,6 +9,7 @@ use supple_core::config::{
     PlausibilityLimits, PoseLaw, Role, Workspace,
 };
 use supple_core::controller::{Controller, Input, Output, Request, State, step};
+use supple_core::learned::LearnedTerms;
 use supple_core::math::{Matrix3, Vector3, sqrt};
 use supple_core::ripple::Harmonic;
 use supple_core::trajectory::{Sinusoid, Trajectory};
@@ -110,6 +111,7 @@ fn config<const N: usize>(arm: Arm<N>) -> Config<N> {
         roles,
         joint_from_motor,
         ripple: [ripple(); N],
+        learned: LearnedTerms::zero(),
         period_s: PERIOD_S,
         estimator_rad_per_s: 200.0,
         law: Law {

@@ -200,6 +200,12 @@ pub enum Failure {
         /// The prefix.
         prefix: String,
     },
+    /// Learned terms are to be saved, but there are none.
+    #[error(
+        "nothing is learned yet: begin with `supple learning on`, let the arm move freely for some seconds, and save \
+         again"
+    )]
+    NothingLearned,
     /// An option with the wrong number of values.
     #[error("{option} has {found} values: give {expected}")]
     ValueCount {
@@ -363,7 +369,7 @@ impl Failure {
             | Failure::MissingProgram { .. }
             | Failure::ProcessEnded { .. }
             | Failure::NotRunning { .. } => 10,
-            Failure::Refused { .. } => 11,
+            Failure::Refused { .. } | Failure::NothingLearned => 11,
             Failure::Figure(_) | Failure::ReportGeneration(_) => 1,
         }
     }

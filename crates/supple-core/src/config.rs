@@ -4,6 +4,7 @@
 use crate::math::{Matrix, Matrix3, Vector, Vector3};
 use crate::model::arm::Arm;
 use crate::model::friction::Friction;
+use crate::model::learned::LearnedTerms;
 pub use crate::model::ripple::RippleTable;
 pub use crate::model::workspace::{Border, Workspace, Zone};
 
@@ -305,6 +306,9 @@ pub struct Config<const N: usize> {
     pub joint_from_motor: Matrix<N, N>,
     /// Torque ripple of each motor, compensated by feed-forward.
     pub ripple: [RippleTable; N],
+    /// What was learned of the model before: the terms in force at the start. Within
+    /// [`LearnedBounds`](crate::learned::LearnedBounds).
+    pub learned: LearnedTerms<N>,
     /// Cycle period \[s\], positive.
     pub period_s: f64,
     /// Bandwidth of the velocity estimator \[rad/s\], positive.

@@ -25,9 +25,9 @@ mod property;
 
 pub use controller::{codes, drive_guard, estimator, latch, observer};
 pub use dynamics::inverse_kinematics;
-pub use law::{impedance, impedance_torque, target, task, torques};
+pub use law::{impedance, impedance_torque, learned as learned_torque, target, task, torques};
 pub use math::{linalg, sincos};
-pub use model::{arm, body, friction, pose, ripple, workspace};
+pub use model::{arm, body, friction, learned, pose, ripple, workspace};
 
 pub use arm::{Arm, ArmError, Joint, Link};
 pub use body::{Body, BodyError};

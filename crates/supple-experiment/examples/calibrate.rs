@@ -34,6 +34,7 @@ fn main() -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
                     plant: plant_of::<4>(&description, &calibration)?,
                     trajectory,
                     duration_s,
+                    learning: false,
                 };
                 run(&plan, &mut |_, _| Ok(()))
             };

@@ -115,6 +115,7 @@ fn free_plan(setup: &Setup<4>, seed: u64) -> Result<Plan<4>, ExperimentError> {
         plant: setup.plant(&variant, Scene::default()),
         trajectory,
         duration_s,
+        learning: false,
     })
 }
 
@@ -131,6 +132,7 @@ fn probing_plan(
         plant: setup.plant(&Variant::EXACT, scenario::block()),
         trajectory: Trajectory::Probe(probe),
         duration_s: probe.cycle_s(),
+        learning: false,
     };
     Ok((plan, probe))
 }

@@ -248,6 +248,7 @@ pub fn free_motion<const N: usize>(setup: &Setup<N>) -> Result<FreeMotion, Exper
             plant: setup.plant(&Variant::EXACT, Scene::default()),
             trajectory,
             duration_s,
+            learning: false,
         };
         let mut latched = false;
         run(&plan, &mut |cycle, time_s| {

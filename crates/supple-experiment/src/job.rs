@@ -167,6 +167,7 @@ impl Job {
             plant: setup.plant(&variant, scene),
             trajectory,
             duration_s,
+            learning: false,
         })
     }
 

@@ -21,6 +21,7 @@
 //!     plant: setup.plant(&variant, Scene::default()),
 //!     trajectory,
 //!     duration_s: 1.0,
+//!     learning: false,
 //! };
 //! let run = run(&plan, &mut |_cycle, _time_s| Ok(()))?;
 //! assert!(run.ended.is_none() && run.rms_error_m < 0.02);
@@ -35,6 +36,7 @@ mod breakaway;
 pub mod calibrate;
 mod demo;
 mod demo_options;
+mod deviation;
 pub mod effects;
 mod error;
 mod excite;
@@ -63,6 +65,7 @@ pub use breakaway::{JointBreakaway, RATE_NM_PER_S, STOP_RAD, breakaway};
 pub use calibrate::{Calibrated, Calibration, ModelAccuracy, calibrate};
 pub use demo::{Demo, ProbingRun, Progress, demo};
 pub use demo_options::DemoOptions;
+pub use deviation::Deviation;
 pub use error::ExperimentError;
 pub use excite::{constant_speed_runs, excitation, slow_motion};
 pub use mismatch::Mismatch;

@@ -1,8 +1,10 @@
 //! Controller and plant in one process, in virtual time, one cycle at a time.
 
 use crate::error::ExperimentError;
-use supple_core::controller::{Mode, Request};
+use std::collections::VecDeque;
+use supple_core::controller::{CycleRecord, Mode, Request};
 use supple_core::{Controller, Input, Output, State, Vector, step};
+use supple_learning::{Learner, Report, Scheduled};
 use supple_plant::{Measurement, Plant, PlantConfig, StepRecord, Truth};
 
 /// A controller connected to a simulated plant.
@@ -13,6 +15,10 @@ pub struct Rig<const N: usize> {
     /// Whether the drives are active: as in `supple-sim`, from gravity hold until the controller requests
     /// torque off.
     active: bool,
+    learner: Option<Learner<N>>,
+    /// What the learner wants to bring into force.
+    scheduled: VecDeque<Scheduled<N>>,
+    steps: u64,
 }
 
 /// Data of one cycle.
@@ -44,7 +50,24 @@ impl<const N: usize> Rig<N> {
             controller,
             plant: Plant::new(plant, start_rad, Vector::zeros())?,
             active: false,
+            learner: None,
+            scheduled: VecDeque::new(),
+            steps: 0,
         })
+    }
+
+    /// Adds a learner. It learns once learning is requested, as in `supple-rt`.
+    #[must_use]
+    pub fn with_learner(self) -> Rig<N> {
+        Rig {
+            learner: Some(Learner::new(self.controller.config())),
+            ..self
+        }
+    }
+
+    /// What the learner knows, if there is one.
+    pub fn report(&self) -> Option<Report<N>> {
+        self.learner.as_ref().map(Learner::report)
     }
 
     /// The controller.
@@ -57,10 +80,18 @@ impl<const N: usize> Rig<N> {
         &self.plant
     }
 
-    /// Runs one cycle: measure, step the controller, actuate.
+    /// Runs one cycle: measure, step the controller, actuate. What is learned enters in a cycle without a request.
     pub fn cycle(&mut self, request: Option<Request<N>>) -> Cycle<'_, N> {
         let measurement = *self.plant.measurement();
         let truth = *self.plant.truth();
+        let cycle = measurement.cycle;
+        let is_due = |scheduled: &Scheduled<N>| cycle >= scheduled.at_cycle;
+        let learned = || {
+            let due = self.scheduled.front().is_some_and(is_due);
+            let scheduled = due.then(|| self.scheduled.pop_front()).flatten();
+            scheduled.map(|scheduled| scheduled.request)
+        };
+        let request = request.or_else(learned);
         let input = Input {
             cycle: measurement.cycle,
             position_rad: core::array::from_fn(|i| Some(measurement.position_rad[i])),
@@ -69,6 +100,11 @@ impl<const N: usize> Rig<N> {
             request,
         };
         let output = step(&self.controller, &mut self.state, &input);
+        if let Some(learner) = &mut self.learner {
+            let record = CycleRecord::new(self.steps, &input, &output);
+            self.scheduled.extend(learner.observe(&record));
+        }
+        self.steps += 1;
         self.active = !output.torque_off && (self.active || output.mode == Mode::GravityHold);
         self.plant.short_motors([!self.active; N]);
         let torque_nm = match self.active {

@@ -6,7 +6,7 @@ use crate::rig::{Cycle, Rig};
 use crate::start::{active_joints, start_pose};
 use crate::trace::{JointTorque, Sample, Trace, xyz};
 use serde::Serialize;
-use supple_core::controller::{Mode, Request};
+use supple_core::controller::{LearningSwitch, Mode, Request};
 use supple_core::dynamics::tip_pose;
 use supple_core::{Config, Controller, Trajectory, Vector};
 use supple_plant::PlantConfig;
@@ -38,6 +38,8 @@ pub struct Plan<const N: usize> {
     pub trajectory: Trajectory,
     /// Duration of the trajectory \[s\].
     pub duration_s: f64,
+    /// Whether the model is refined while the arm moves.
+    pub learning: bool,
 }
 
 /// A fault that ended a run.
@@ -85,6 +87,9 @@ pub fn run<const N: usize>(
     let config = &plan.config;
     let start = start_pose(config, &plan.name, &plan.trajectory, plan.duration_s)?;
     let mut rig = Rig::new(controller, plan.plant.clone(), offset_pose(config, &start))?;
+    if plan.learning {
+        rig = rig.with_learner();
+    }
     let cycles = |seconds: f64| (seconds / config.period_s).round() as u64;
     let move_at = cycles(SETTLE_S);
     let track_at = move_at + cycles(MOVE_S + REST_S);
@@ -104,6 +109,7 @@ pub fn run<const N: usize>(
     while k < end && ended.as_ref().is_none_or(|(_, until)| k <= *until) {
         let request = match k {
             0 => Some(Request::GravityHold),
+            1 if plan.learning => Some(Request::Learning(LearningSwitch::On)),
             _ if k == move_at => Some(Request::Move {
                 target_rad: start,
                 duration_s: MOVE_S,

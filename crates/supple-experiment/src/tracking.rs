@@ -40,6 +40,7 @@ pub fn track_with_identified_model<const N: usize>(
             plant: plant.clone(),
             trajectory,
             duration_s,
+            learning: false,
         };
         run(&plan, &mut |_, _| Ok(())).map(|run| run.rms_error_m)
     };

@@ -53,6 +53,7 @@ pub fn predict_tracking_error<const N: usize>(
             plant: plant.clone(),
             trajectory,
             duration_s,
+            learning: false,
         };
         match run(&plan, &mut |_, _| Ok(())) {
             Ok(run) => {

@@ -93,6 +93,11 @@ impl Domain {
         &self.folder
     }
 
+    /// Folder in which the controller keeps its arm with what it has learned.
+    pub fn learned_folder(&self) -> PathBuf {
+        self.folder.join(format!("learned-{}", self.prefix))
+    }
+
     pub(crate) fn config(&self) -> &Config {
         &self.config
     }

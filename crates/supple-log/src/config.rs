@@ -11,8 +11,10 @@ use serde::{Deserialize, Serialize};
 use supple_core::config::{
     Collision, ContactLatch, JointGains, Law, Limits, PlausibilityLimits, PoseLaw, Role, Workspace,
 };
+use supple_core::learned::LearnedTerms;
 use supple_core::math::Vector3;
 use supple_core::{Arm, Config, Friction, Link, Matrix, Pose, Vector};
+use supple_model::LearnedSettings;
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -35,6 +37,9 @@ struct Stored<const N: usize> {
     ripple: Vec<RippleDef>,
     #[serde(with = "ContactLatchDef")]
     latch: ContactLatch,
+    /// Terms in force at the start, if any; older logs have none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    learned: Option<LearnedSettings>,
     #[serde(with = "JointGainsDef")]
     move_gains: JointGains<N>,
     /// Older logs have neither joint impedance nor float.
@@ -76,6 +81,7 @@ pub(crate) fn to_toml<const N: usize>(config: &Config<N>) -> Result<String, toml
         roles,
         joint_from_motor,
         ripple,
+        learned,
         period_s,
         estimator_rad_per_s,
         law,
@@ -101,6 +107,7 @@ pub(crate) fn to_toml<const N: usize>(config: &Config<N>) -> Result<String, toml
         last_joint_from_tip: arm.joint_from_tip(),
         law,
         ripple: RippleDef::list(&ripple),
+        learned: (learned != LearnedTerms::zero()).then(|| LearnedSettings::new(&learned)),
         latch,
         move_gains,
         joint_gains,
@@ -141,6 +148,10 @@ pub(crate) fn from_toml<const N: usize>(text: &str) -> Result<Config<N>, String>
         roles: joints.each_ref().map(|joint| joint.role),
         joint_from_motor: stored.joint_from_motor,
         ripple: RippleDef::tables(&stored.ripple)?,
+        learned: match &stored.learned {
+            Some(learned) => learned.terms()?,
+            None => LearnedTerms::zero(),
+        },
         period_s: stored.period_s,
         estimator_rad_per_s: stored.estimator_rad_per_s,
         law: stored.law,
@@ -232,6 +243,8 @@ mod tests {
             }),
             ..config.workspace
         };
+        config.learned.parameters.tilt_rad.y = 1.0 / 3.0;
+        config.learned.map[3].dry_nm[15] = -0.0;
         config.ripple[1] = RippleTable::new(&[line(2), line(42)]).expect("a table");
         round_trip(&config);
     }

@@ -117,6 +117,7 @@ impl Description {
                 self.motors().joint_from_motor[(i, j)]
             }),
             ripple: core::array::from_fn(|m| self.motors().ripple[m]),
+            learned: self.learned()?,
             period_s: settings.period_s,
             estimator_rad_per_s: settings.estimator_rad_per_s,
             law: self.law(),

@@ -144,6 +144,8 @@ impl Description {
         let mut document = self.document()?;
         document["urdf"] = value(URDF);
         document["source"] = value(model.source);
+        // It belongs to the model that is replaced.
+        document.remove("learned");
         for i in 0..N {
             let joint = self.joint_table(&mut document, i)?;
             put(joint, "source", model.source.into());

@@ -4,7 +4,7 @@
 //! schema of these types is `assets/arm.schema.json`.
 
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// One arm.
@@ -73,6 +73,8 @@ pub struct Settings {
     pub pose: PoseSettings,
     /// Tool at the tip. Default: none.
     pub tool: Option<ToolSettings>,
+    /// What was learned of the model while the arm moved, as `supple learning save` writes it. Default: nothing.
+    pub learned: Option<LearnedSettings>,
 }
 
 /// One moving joint.
@@ -637,6 +639,50 @@ mod default {
     pub fn band_rad_per_s() -> f64 {
         supple_core::Friction::NONE.band_rad_per_s
     }
+}
+
+/// What was learned of the model while the arm moved; lists have one entry per moving joint. The controller rejects
+/// values beyond its bounds.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LearnedSettings {
+    /// Source of the numbers.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub source: Option<String>,
+    /// Change of the viscous friction (N m s/rad). Default 0.
+    #[serde(default)]
+    pub viscous_nm_s_per_rad: Vec<f64>,
+    /// Change of the Coulomb friction (N m). Default 0.
+    #[serde(default)]
+    pub coulomb_nm: Vec<f64>,
+    /// Torque offset (N m). Default 0.
+    #[serde(default)]
+    pub offset_nm: Vec<f64>,
+    /// Share of the model's torque by which the drives fall short. Default 0.
+    #[serde(default)]
+    pub torque_scale: Vec<f64>,
+    /// Mass of a payload at the tip (kg). Default 0.
+    #[serde(default)]
+    pub payload_kg: f64,
+    /// First moment of the payload in the tip frame (kg m). Default 0.
+    #[serde(default)]
+    pub payload_moment_kg_m: [f64; 3],
+    /// Rotation of gravity in root link axes, axis times angle (rad). Default 0.
+    #[serde(default)]
+    pub tilt_rad: [f64; 3],
+    /// Torque of each joint over its angle. Default: none.
+    #[serde(default)]
+    pub map: Vec<MapSettings>,
+}
+
+/// Torque of a joint over its angle: coefficients of 16 quadratic splines over the joint's range.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MapSettings {
+    /// Part that depends on the angle alone (N m).
+    pub torque_nm: Vec<f64>,
+    /// Part against the direction of motion (N m).
+    pub dry_nm: Vec<f64>,
 }
 
 /// The JSON schema of the TOML, as pretty-printed JSON with a trailing newline.

@@ -75,6 +75,8 @@ enum RequestSource {
     Idle(Option<u64>),
     /// The loop itself, during shutdown.
     Shutdown,
+    /// The learner, which expects no reply.
+    Learner,
 }
 
 /// A step with its telemetry data.
@@ -339,7 +341,9 @@ impl<const N: usize> ControlLoop<N> {
         if self.shutting_down == Some(0) && !matches!(self.state.mode(), Mode::Idle | Mode::Fault) {
             return Some((RequestSource::Shutdown, Request::GravityHold));
         }
-        let (earlier, message) = self.queued.pop_due(cycle)?;
+        let Some((earlier, message)) = self.queued.pop_due(cycle) else {
+            return self.next_learned(cycle);
+        };
         match message.request::<N>() {
             Ok(request) => request.map(|request| {
                 let source = RequestSource::Operator(earlier, message);
@@ -351,6 +355,16 @@ impl<const N: usize> ControlLoop<N> {
                 None
             }
         }
+    }
+
+    /// What is learned and due; in a cycle in which no operator requests anything.
+    fn next_learned(&mut self, cycle: u64) -> Option<(RequestSource, Request<N>)> {
+        let learned = &mut self.queues.learned;
+        if !learned.peek().is_ok_and(|message| message.is_due(cycle)) {
+            return None;
+        }
+        let request = learned.pop().ok()?.request::<N>().ok()??;
+        Some((RequestSource::Learner, request))
     }
 
     /// Sends the outcome to the source of the request.
@@ -373,7 +387,7 @@ impl<const N: usize> ControlLoop<N> {
                     self.reply(&request, output.cycle, output.mode, outcome, text);
                 }
             }
-            RequestSource::Shutdown => {}
+            RequestSource::Shutdown | RequestSource::Learner => {}
         }
     }
 

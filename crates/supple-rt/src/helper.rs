@@ -3,6 +3,7 @@
 
 use crate::error::RtError;
 use crate::fault_file::{FaultFiles, FaultRecorder};
+use crate::learning::Learning;
 use crate::options::Options;
 use crate::queues::HelperQueues;
 use core::fmt::Display;
@@ -65,7 +66,8 @@ pub struct Helper {
 }
 
 impl Helper {
-    /// Starts the thread and waits until its ports are open. `motion_check` checks requested motions.
+    /// Starts the thread and waits until its ports are open. `motion_check` checks requested motions, `learning` refines
+    /// the model.
     ///
     /// # Errors
     /// [`RtError::Ipc`] if the ports cannot be opened, [`RtError::Thread`].
@@ -74,6 +76,7 @@ impl Helper {
         queues: HelperQueues,
         options: &Options,
         motion_check: MotionCheck,
+        learning: Learning,
     ) -> Result<Helper, RtError> {
         let backpressure = match options.virtual_time {
             true => Backpressure::Block,
@@ -86,7 +89,10 @@ impl Helper {
         let (ready, is_ready) = sync_channel(1);
         let thread = Builder::new()
             .name("supple-rt-helper".to_owned())
-            .spawn(move || work(&domain, backpressure, queues, files, motion_check, &ready))
+            .spawn(move || {
+                let works = (motion_check, learning);
+                work(&domain, backpressure, queues, files, works, &ready)
+            })
             .map_err(RtError::Thread)?;
         let helper = Helper { thread };
         match is_ready.recv() {
@@ -113,7 +119,7 @@ fn work(
     backpressure: Backpressure,
     queues: HelperQueues,
     files: FaultFiles,
-    motion_check: MotionCheck,
+    (motion_check, learning): (MotionCheck, Learning),
     ready: &SyncSender<()>,
 ) -> Result<(), IpcError> {
     let link = OperatorServer::new(domain, backpressure)?;
@@ -124,6 +130,7 @@ fn work(
         queues,
         fault_recorder: FaultRecorder::new(files),
         motion_check,
+        learning,
         position_rad: None,
         move_ends: None,
         awaiting_check: VecDeque::with_capacity(MAX_PER_ITERATION),
@@ -150,6 +157,7 @@ struct HelperState {
     queues: HelperQueues,
     fault_recorder: FaultRecorder,
     motion_check: MotionCheck,
+    learning: Learning,
     /// Requests waiting for their motion check.
     awaiting_check: VecDeque<OperatorRequest>,
     /// Last known joint angles.
@@ -239,6 +247,10 @@ impl HelperState {
             }
             self.fault_recorder.add(&telemetry);
             self.position_rad = Some(telemetry.record().position_rad.into());
+            for request in (self.learning)(&telemetry) {
+                // If the queue is full, it is lost: the next estimate follows.
+                self.queues.learned(request);
+            }
         }
         if self.queues.states_dropped() > 0 && !self.dropped_states_reported {
             self.dropped_states_reported = true;

@@ -2,7 +2,7 @@
 //!
 //! The loop thread has only the ports to the plant; after its start it allocates nothing, locks nothing and logs
 //! nothing ([`ControlLoop`]). The helper thread has the ports to the clients: telemetry, requests, replies
-//! ([`Helper`]). A third thread receives only idle requests ([`IdleRequestThread`]). Separate threads write to the disk
+//! ([`Helper`]); it also refines the model from the telemetry ([`learning()`]). A third thread receives only idle requests ([`IdleRequestThread`]). Separate threads write to the disk
 //! and to standard error; no other thread waits for them. The threads exchange data through lock-free queues of fixed
 //! size. If the helper or the idle-request thread ends, no request can be received any more: the loop sets the drives
 //! to idle and ends, and the process exits with an error. If a service manager supervises the process, one more thread
@@ -16,6 +16,7 @@ mod error;
 mod fault_file;
 mod helper;
 mod idle_thread;
+mod learning;
 mod options;
 mod queues;
 mod request_queue;
@@ -26,6 +27,7 @@ pub use error::RtError;
 pub use fault_file::{FaultFiles, FaultRecorder, KEPT_CYCLES, KEPT_FILES};
 pub use helper::{Helper, MotionCheck, motion_check};
 pub use idle_thread::IdleRequestThread;
+pub use learning::{Learning, learning};
 pub use options::Options;
 pub use queues::{
     HelperQueues, IdleThreadChannel, LoopIdleChannel, LoopQueues, idle_channel, loop_queues,
@@ -98,7 +100,10 @@ pub fn run<const N: usize>(
     let link = ControllerLink::new(&domain)?;
     let (queues, helper_queues) = loop_queues();
     let counters = [queues.liveness(), helper_queues.liveness()];
-    let helper = Helper::start(&domain, helper_queues, options, motion_check(controller))?;
+    let learning = learning::<N>(controller.config(), description, &domain);
+    let learning = learning.map_err(RtError::Thread)?;
+    let checks = motion_check(controller);
+    let helper = Helper::start(&domain, helper_queues, options, checks, learning)?;
     let (loop_channel, thread_channel) = idle_channel();
     let idle_thread = IdleRequestThread::start(&domain, thread_channel, options.realtime())?;
     let mut control = ControlLoop::new(controller, queues, options.virtual_time);

@@ -16,6 +16,8 @@ const TELEMETRY: usize = 1024;
 const REQUESTS: usize = 16;
 const IDLE_REQUESTS: usize = 8;
 const REPLIES: usize = 64;
+/// What is learned: the requests of two estimates of the largest arm.
+const LEARNED: usize = 32;
 /// At most one per cycle.
 const IDLE_REPLIES: usize = 64;
 
@@ -25,6 +27,7 @@ pub struct LoopQueues {
     pub(crate) telemetry: Producer<Telemetry>,
     pub(crate) requests: Consumer<OperatorRequest>,
     pub(crate) replies: Producer<OperatorReply>,
+    pub(crate) learned: Consumer<OperatorRequest>,
     pub(crate) liveness: LivenessCounter,
     pub(crate) states_dropped: Arc<AtomicU64>,
 }
@@ -35,6 +38,7 @@ pub struct HelperQueues {
     pub(crate) telemetry: Consumer<Telemetry>,
     pub(crate) requests: Producer<OperatorRequest>,
     pub(crate) replies: Consumer<OperatorReply>,
+    pub(crate) learned: Producer<OperatorRequest>,
     pub(crate) liveness: LivenessCounter,
     pub(crate) states_dropped: Arc<AtomicU64>,
 }
@@ -44,11 +48,13 @@ pub fn loop_queues() -> (LoopQueues, HelperQueues) {
     let (telemetry_in, telemetry_out) = RingBuffer::new(TELEMETRY);
     let (requests_in, requests_out) = RingBuffer::new(REQUESTS + IDLE_REQUESTS);
     let (replies_in, replies_out) = RingBuffer::new(REPLIES);
+    let (learned_in, learned_out) = RingBuffer::new(LEARNED);
     let states_dropped = Arc::new(AtomicU64::new(0));
     let loop_end = LoopQueues {
         telemetry: telemetry_in,
         requests: requests_out,
         replies: replies_in,
+        learned: learned_out,
         liveness: LivenessCounter::default(),
         states_dropped: states_dropped.clone(),
     };
@@ -56,6 +62,7 @@ pub fn loop_queues() -> (LoopQueues, HelperQueues) {
         telemetry: telemetry_out,
         requests: requests_in,
         replies: replies_out,
+        learned: learned_in,
         liveness: LivenessCounter::default(),
         states_dropped,
     };
@@ -97,6 +104,11 @@ impl HelperQueues {
             false => IDLE_REQUESTS,
         };
         self.requests.slots() > reserved && self.requests.push(request).is_ok()
+    }
+
+    /// Queues what is learned, for its cycle; returns false if the queue is full, and it is lost.
+    pub fn learned(&mut self, request: OperatorRequest) -> bool {
+        self.learned.push(request).is_ok()
     }
 
     /// Number of arm states that the loop has discarded.

@@ -33,6 +33,9 @@ pub enum Command {
     Mode(ModeArgs),
     /// Change stiffness and damping of a running system, along a ramp.
     Gains(GainsArgs),
+    /// Refine the model of a running system while its arm moves freely, or save what was learned.
+    #[command(after_help = LEARNING)]
+    Learning(LearningArgs),
     /// Make a running system follow a trajectory; the arm moves to its start first.
     Track(TrackArgs),
     /// Make a running system probe for contact; the arm moves to the start first.
@@ -75,6 +78,41 @@ pub enum Command {
     Completions {
         /// The shell.
         shell: Shell,
+    },
+}
+
+/// After the help of `learning`.
+const LEARNING: &str = "Friction, payload, base tilt, torque offsets, torque constants and a smooth map of the rest over each \
+joint's angle are estimated from the prediction error of the torques, never from the tracking error. They stay within \
+bounds around the model, and nothing is learned in contact, in faults, in idle, gravity hold, float and joint impedance. \
+`supple status` shows them.
+
+`save DIR` writes arm.toml and arm.urdf, for --arm DIR and --model DIR.";
+
+/// Arguments of `learning`.
+#[derive(Clone, Debug, Args)]
+pub struct LearningArgs {
+    /// What to do.
+    #[command(subcommand)]
+    pub action: LearningAction,
+}
+
+/// What to do with learning.
+#[derive(Clone, Debug, Subcommand)]
+pub enum LearningAction {
+    /// Begin to learn, or go on.
+    On(SystemArgs),
+    /// Learn nothing more; what was learned stays in force.
+    Off(SystemArgs),
+    /// Go back to the arm's description; learning stays on or off.
+    Reset(SystemArgs),
+    /// Write the arm with what was learned; existing files are replaced.
+    Save {
+        /// Folder for arm.toml and arm.urdf.
+        folder: PathBuf,
+        /// System to use.
+        #[command(flatten)]
+        system: SystemArgs,
     },
 }
 
@@ -229,6 +267,9 @@ pub struct UpArgs {
     /// arm always starts there.
     #[arg(long)]
     pub zero_at_home: bool,
+    /// Refine the model while the arm moves freely, as `supple learning on` does.
+    #[arg(long)]
+    pub learn: bool,
     /// Tare the arm's force/torque sensor at start-up.
     #[arg(long)]
     pub tare: bool,
@@ -338,6 +379,13 @@ impl Command {
             Command::Drill(args) => args.json,
             Command::Mode(ModeArgs { system, .. })
             | Command::Gains(GainsArgs { system, .. })
+            | Command::Learning(LearningArgs {
+                action:
+                    LearningAction::On(system)
+                    | LearningAction::Off(system)
+                    | LearningAction::Reset(system)
+                    | LearningAction::Save { system, .. },
+            })
             | Command::Track(TrackArgs { system, .. })
             | Command::Probe { system, .. }
             | Command::Status(system)

@@ -43,6 +43,7 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
         Command::Status(system) => operate::status(system),
         Command::Mode(args) => operate::mode(args),
         Command::Gains(args) => operate::gains(args),
+        Command::Learning(args) => operate::learning(&args.action),
         Command::Track(args) => operate::track(args),
         Command::Probe {
             arm,

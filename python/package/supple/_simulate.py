@@ -72,6 +72,7 @@ def simulate(
     stribeck: bool = True,
     load: bool = True,
     fade: bool = True,
+    learning: bool = False,
     seed: int = 0,
     log_dir: str | os.PathLike[str] | None = None,
     plant_options: PlantOptions | None = None,
@@ -109,6 +110,9 @@ def simulate(
         Whether the plant's friction depends on direction and load.
     fade : bool
         Whether the contact latch fades the friction feed-forward.
+    learning : bool
+        Whether the controller refines its model while the arm moves, from the prediction error of the
+        torques. What it learned is in the log.
     seed : int
         Seed of all noise and of the signs above, zero or more.
     log_dir : str or os.PathLike, optional
@@ -168,6 +172,7 @@ def simulate(
             "stribeck": stribeck,
             "load": load,
             "fade": fade,
+            "learning": learning,
             "seed": seed,
             "log_dir": None if log_dir is None else os.fspath(log_dir),
             "plant_options": _chosen(plant_options, realistic),

@@ -9,6 +9,7 @@ pub mod drive_guard;
 pub mod estimator;
 mod fault;
 pub mod latch;
+mod learning;
 mod limiter;
 mod mode;
 mod motion_check;
@@ -25,8 +26,9 @@ mod supervision;
 mod validate;
 
 pub use fault::{Fault, SafeAction};
+pub use learning::LEARNED_RAMP_S;
 pub use limiter::{Limited, MotorGroups, limit, limit_torque};
-pub use mode::{Breakaway, Mode, Refusal, Request};
+pub use mode::{Breakaway, LearningSwitch, Mode, Refusal, Request};
 pub use motion_check::check_motion;
 pub use output::{CycleRecord, Input, Orientation, Output};
 pub use state::State;
@@ -36,6 +38,7 @@ pub use validate::ConfigError;
 use crate::config::Config;
 use crate::math::linalg::Cholesky;
 use crate::math::{Matrix, Vector};
+use crate::model::learned::LearnedBounds;
 use nullspace::nullspace_damping_nm_s_per_rad;
 
 /// A validated configuration and the constants derived from it.
@@ -49,6 +52,7 @@ pub struct Controller<const N: usize> {
     torque_step_nm: Vector<N>,
     stop_step_nm: Vector<N>,
     nullspace_damping_nm_s_per_rad: Vector<N>,
+    learned_bounds: LearnedBounds<N>,
 }
 
 /// Maximum delay from a measurement to the resulting torque in cycles, with half a cycle for the
@@ -71,7 +75,9 @@ impl<const N: usize> Controller<N> {
                 square.solve(&to_joint.transpose())
             });
         let delay_s = DELAY_CYCLES * config.period_s + 2.0 / config.estimator_rad_per_s;
+        let limits = &config.limits;
         Ok(Controller {
+            learned_bounds: LearnedBounds::new(&config.friction, &limits.joint_torque_nm),
             nullspace_damping_nm_s_per_rad: nullspace_damping_nm_s_per_rad(&config, delay_s),
             motor_from_joint,
             groups: MotorGroups::new(&config.joint_from_motor),
@@ -106,6 +112,11 @@ impl<const N: usize> Controller<N> {
         } else {
             &self.torque_step_nm
         }
+    }
+
+    /// What learning may change at most.
+    pub fn learned_bounds(&self) -> &LearnedBounds<N> {
+        &self.learned_bounds
     }
 
     /// The configuration.

@@ -2,6 +2,7 @@
 
 use crate::config::{Gains, JointGains, RotationalGains};
 use crate::math::Vector;
+use crate::model::learned::{JointMap, LearnedParameters};
 use crate::trajectory::{Fourier, Rotation, Trajectory, TrajectoryError};
 use core::fmt;
 
@@ -134,6 +135,29 @@ pub enum Request<const N: usize> {
         /// Ramp time \[s\], zero or more.
         ramp_s: f64,
     },
+    /// Switches the refinement of the model while the arm moves.
+    Learning(LearningSwitch),
+    /// Brings learned parameters into force, along a ramp of [`LEARNED_RAMP_S`](super::LEARNED_RAMP_S). Only while
+    /// learning is on and the mode allows it ([`Mode::allows_learning`]).
+    LearnedParameters(LearnedParameters<N>),
+    /// Brings the learned map of a joint into force, likewise.
+    LearnedMap {
+        /// Joint index.
+        joint: usize,
+        /// Its map.
+        map: JointMap,
+    },
+}
+
+/// What a request asks of learning.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LearningSwitch {
+    /// The learned terms stay as they are.
+    Off,
+    /// New terms are accepted.
+    On,
+    /// The terms go back to those of the configuration, along the ramp. Learning stays on or off.
+    Reset,
 }
 
 /// A torque ramp on one joint, added to gravity compensation, until the joint has moved.
@@ -211,6 +235,8 @@ pub enum Refusal {
     },
     /// The pose mode was requested near a singular pose, where its task is damped, or its motion leads to one.
     Singular,
+    /// Learned terms were sent while learning is off.
+    LearningOff,
     /// The trajectory leaves the workspace.
     Workspace {
         /// Border, counted from 0.
@@ -272,6 +298,7 @@ impl fmt::Display for Refusal {
                 "refused: near a singular pose the tip cannot move and turn in every direction; move the arm \
                  away from it first",
             ),
+            Refusal::LearningOff => f.write_str("refused: learning is off"),
             Refusal::Workspace { border, value_m } => write!(
                 f,
                 "refused: the motion would go {value_m:.3} m beyond border {border} of the workspace"

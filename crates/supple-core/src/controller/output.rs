@@ -8,6 +8,7 @@ use crate::config::{Gains, JointGains, RotationalGains};
 use crate::controller::codes::{self, FaultCode, RequestCode, RequestCodeError, VALUES};
 use crate::law::torques::Torques;
 use crate::math::{Matrix3, Vector, Vector3};
+use crate::model::learned::LearnedParameters;
 use crate::model::pose::rotation_vector;
 use crate::record::{Field, List, Pack, Recorded, Text, Unpack, words_of};
 use crate::trajectory::Reference;
@@ -177,6 +178,10 @@ cycle! {
         /// track_pose  axis, angle_rad, duration_s of the rotation, then the values of the trajectory
         /// rotational_gains  stiffness_nm_per_rad, damping_nm_s_per_rad, ramp_s
         /// gains     stiffness_n_per_m, damping_n_s_per_m, ramp_s
+        /// learning  0 off, 1 on, 2 reset
+        /// learned_parameters  viscous_nm_s_per_rad (N), coulomb_nm (N), offset_nm (N), torque_scale (N), payload_kg,
+        ///           payload_moment_kg_m, tilt_rad
+        /// learned_map  joint, torque_nm (16), dry_nm (16)
         /// hold      position_m
         /// line      from_m, to_m, duration_s
         /// sinusoid  centre_m, amplitude_m, angular_frequency_rad_per_s, ramp_s
@@ -218,6 +223,20 @@ cycle! {
         vector rotational_stiffness_nm_per_rad = output.rotational_gains.stiffness_nm_per_rad.into();
         /// Rotational damping of the pose mode in force \[N m s/rad\].
         vector rotational_damping_nm_s_per_rad = output.rotational_gains.damping_nm_s_per_rad.into();
+        /// Learned change of the viscous friction \[N m s/rad\].
+        joints learned_viscous_nm_s_per_rad = output.learned.viscous_nm_s_per_rad;
+        /// Learned change of the Coulomb friction \[N m\].
+        joints learned_coulomb_nm = output.learned.coulomb_nm;
+        /// Learned torque offset \[N m\].
+        joints learned_offset_nm = output.learned.offset_nm;
+        /// Learned share of the model's torque by which the drives fall short.
+        joints learned_torque_scale = output.learned.torque_scale;
+        /// Learned mass of a payload at the tip \[kg\].
+        number learned_payload_kg = output.learned.payload_kg;
+        /// Its first moment in the tip frame \[kg m\].
+        vector learned_payload_moment_kg_m = output.learned.payload_moment_kg_m.into();
+        /// Learned rotation of gravity: axis times angle, base axes \[rad\].
+        vector learned_tilt_rad = output.learned.tilt_rad.into();
         /// Kind of the latched fault.
         code fault = fault_code.kind;
         /// Joint of the fault, counted from 0, or -1.
@@ -263,6 +282,8 @@ cycle! {
         number contact_threshold_n;
         /// Contact is latched.
         flag in_contact;
+        /// Learning is on: new learned terms are accepted.
+        flag learning;
         /// Share of the dry friction feed-forward applied, 0 to 1.
         number friction_share;
         /// Least singular value of the active joints' linear Jacobian \[m\].
@@ -293,6 +314,8 @@ cycle! {
         joint_gains: JointGains<N>;
         /// Rotational gains of the pose mode in force.
         rotational_gains: RotationalGains;
+        /// Learned parameters in force.
+        learned: LearnedParameters<N>;
     }
 }
 

@@ -70,6 +70,13 @@ impl<const N: usize> State<N> {
                 self.check_pose_damping(controller, &self.gains.to, &gains)?;
                 self.rotational_gains.change(gains, ramp_s);
             }
+            Request::Learning(switch) => self.switch_learning(config, switch),
+            Request::LearnedParameters(ref parameters) => {
+                self.receive_learned(controller, parameters)?;
+            }
+            Request::LearnedMap { joint, ref map } => {
+                self.receive_learned_map(controller, joint, map)?;
+            }
             // Idle is allowed in a fault without a reset; the fault stays latched.
             Request::Idle if mode == Mode::Fault => self.enter(Activity::Fault(SafeAction::Idle)),
             _ if mode == Mode::Fault => return Err(Refusal::Mode { mode }),

@@ -9,6 +9,7 @@ use super::plausibility::Plausibility;
 use crate::config::{Config, Gains, JointGains, Role, RotationalGains};
 use crate::controller::estimator::Estimator;
 use crate::controller::latch::Latch;
+use crate::controller::learning::Learned;
 use crate::controller::observer::MomentumObserver;
 use crate::dynamics::Terms;
 use crate::math::{Vector, abs, all_finite};
@@ -127,6 +128,8 @@ pub struct State<const N: usize> {
     pub(super) peak_energy_j: f64,
     /// Time for which an unexplained torque has acted in a fault \[s\].
     pub(super) unexplained_s: f64,
+    /// What is learned of the model.
+    pub(super) learned: Learned<N>,
 }
 
 impl<const N: usize> State<N> {
@@ -157,6 +160,7 @@ impl<const N: usize> State<N> {
             plausibility: Plausibility::default(),
             peak_energy_j: 0.0,
             unexplained_s: 0.0,
+            learned: Learned::new(&config.learned),
         }
     }
 

@@ -64,11 +64,13 @@ pub fn step<const N: usize>(
             reference = None;
             None
         });
+    let learned = state.learned_at_pose(config, reference.as_ref(), elapsed_s);
     let observed = state.observe(
         config,
         task.as_ref(),
         reference.as_ref(),
         pose.as_ref(),
+        learned.as_ref(),
         elapsed_s,
     );
     let external_force = match observed {
@@ -96,6 +98,16 @@ pub fn step<const N: usize>(
     if !(state.activity.is_torque_off() || state.fault.is_some() || state.is_stale(config)) {
         let tables = &config.ripple;
         torques.ripple = compensation_nm(tables, controller.motor_from_joint(), &state.position);
+        if let Some(learned) = &learned {
+            torques.learned = state.learned_torques(
+                controller,
+                task.as_ref(),
+                reference.as_ref(),
+                pose.as_ref(),
+                learned,
+                &torques,
+            );
+        }
     }
     state.blend_torque(config, &mut torques);
     let total = checks::total(&torques).unwrap_or_else(|fault| {
@@ -149,6 +161,8 @@ pub fn step<const N: usize>(
         gains: state.gains.current(),
         joint_gains: state.joint_gains.current(),
         rotational_gains: state.rotational_gains.current(),
+        learned: state.learned.current.parameters,
+        learning: state.learned.on,
         external_torque_nm: state.observer.external_torque_nm(),
         external_force_n: external_force,
         force_against_n: state.latch.force_against_n(),

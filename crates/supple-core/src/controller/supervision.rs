@@ -12,6 +12,7 @@ use super::pose_task::PoseCycle;
 use super::state::State;
 use crate::config::Config;
 use crate::law::impedance::{SINGULAR_BELOW_M, Task};
+use crate::law::learned::LearnedAtPose;
 use crate::math::{Vector, Vector3, abs};
 use crate::model::workspace::WorkspaceViolation;
 use crate::trajectory::Reference;
@@ -62,6 +63,7 @@ impl<const N: usize> State<N> {
         task: Option<&Task<N>>,
         reference: Option<&Reference>,
         pose: Option<&PoseCycle<N>>,
+        learned: Option<&LearnedAtPose<N>>,
         elapsed_s: f64,
     ) -> Result<Vector3<f64>, (Vector3<f64>, Fault)> {
         if self.activity.is_torque_off() || !self.drives_active {
@@ -76,7 +78,9 @@ impl<const N: usize> State<N> {
             let velocity = &self.estimator.velocity_rad_per_s;
             let friction: Vector<N> =
                 Vector::from_fn(|i, _| config.friction[i].torque_nm(velocity[i]));
-            net_torque = self.torque + self.terms.kinetic_gradient - self.terms.gravity - friction;
+            let (torque, learned) = self.learned_in_observer(config, learned);
+            net_torque =
+                torque + self.terms.kinetic_gradient - self.terms.gravity - friction - learned;
             let bandwidth = config.latch.observer_rad_per_s;
             self.observer
                 .update(&self.terms.momentum, &net_torque, elapsed_s, bandwidth);

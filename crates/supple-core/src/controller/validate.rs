@@ -4,6 +4,7 @@ use crate::config::{ApparentInertia, Config, Gains, PoseLaw, Role};
 use crate::math::linalg::Cholesky;
 use crate::math::{Matrix, Vector};
 use crate::model::friction::FrictionError;
+use crate::model::learned::LearnedBounds;
 use core::fmt;
 
 /// The invalid entry of a configuration. Joints are counted from 0.
@@ -312,9 +313,30 @@ pub(super) fn validate<const N: usize>(config: &Config<N>) -> Result<(), ConfigE
     if let Some((entry, value, must)) = config.workspace.first_invalid() {
         return check(false, entry, None, value, must);
     }
+    learned(config)?;
     positive("tracking_error_m", limits.tracking_error_m)?;
     positive("joint_tracking_error_rad", limits.joint_tracking_error_rad)?;
     positive("start_error_m", limits.start_error_m)
+}
+
+fn learned<const N: usize>(config: &Config<N>) -> Result<(), ConfigError> {
+    let bounds = LearnedBounds::new(&config.friction, &config.limits.joint_torque_nm);
+    let maps = config.learned.map.iter().enumerate();
+    let checked = maps.fold(
+        bounds
+            .check(&config.learned.parameters)
+            .map_err(|wrong| (None, wrong)),
+        |checked, (joint, map)| {
+            let in_map = || bounds.check_map(joint, map);
+            checked.and_then(|()| in_map().map_err(|wrong| (Some(joint), wrong)))
+        },
+    );
+    checked.map_err(|(joint, wrong)| ConfigError {
+        entry: wrong.entry,
+        joint,
+        value: wrong.value,
+        must: "within the bounds of what is learned",
+    })
 }
 
 fn roles<const N: usize>(config: &Config<N>) -> Result<(), ConfigError> {

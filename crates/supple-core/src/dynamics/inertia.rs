@@ -89,3 +89,12 @@ pub(super) fn gravity_torque_about<T: Number>(axis: [T; 6], body: [T; 10], gravi
     let moment = cross([body[1], body[2], body[3]], gravity);
     -(dot(linear, scale(gravity, body[0])) + dot(angular, moment))
 }
+
+/// Gradient of that torque by gravity \[kg m\]: the torque is its product with gravity.
+#[inline(always)]
+pub(super) fn gravity_gradient_about<T: Number>(axis: [T; 6], body: [T; 10]) -> V3<T> {
+    let (linear, angular) = halves(axis);
+    let moment = [body[1], body[2], body[3]];
+    let lever = scale(linear, -body[0]);
+    add_cross(lever, moment, angular)
+}

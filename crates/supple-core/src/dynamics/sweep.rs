@@ -4,7 +4,7 @@
 use super::chain::Chain;
 use super::crba::mass_columns;
 use super::frames::{bodies, joint_motions};
-use super::inertia::gravity_torque_about;
+use super::inertia::{gravity_gradient_about, gravity_torque_about};
 use super::motion::{Motion, split};
 use crate::math::Vector;
 use crate::math::lanes::{Column, Columns, Rows, column, for_each_joint, splat, suffix_sums};
@@ -65,6 +65,13 @@ impl<const G: usize> Sweep<G> {
         let (carried, falls) = (suffix_sums(self.bodies), splat(arm.gravity.data.0[0]));
         let [weight] = for_each_joint!(axis in &self.motions, body in &carried => [gravity_torque_about(axis, body, falls)]);
         weight
+    }
+
+    /// Gradient of `G` by gravity.
+    #[inline(always)]
+    pub fn gravity_gradient(&self) -> Rows<3, G> {
+        let carried = suffix_sums(self.bodies);
+        for_each_joint!(axis in &self.motions, body in &carried => gravity_gradient_about(axis, body))
     }
 
     /// Joint torques, momenta and kinetic gradient of this motion.

@@ -20,6 +20,8 @@ pub struct Terms<const N: usize> {
     pub mass_matrix: Matrix<N, N>,
     /// Gravity torque `G` \[N m\].
     pub gravity: Vector<N>,
+    /// Gradient of `G` by gravity \[kg m\]: `G` is the product of its transpose with gravity in base axes.
+    pub gravity_gradient: Matrix<3, N>,
     // Depends on velocity too.
     /// `C qd + G` \[N m\].
     pub coriolis_gravity: Vector<N>,
@@ -38,6 +40,7 @@ impl<const N: usize> Default for Terms<N> {
             jacobian: Matrix::zeros(),
             mass_matrix: Matrix::zeros(),
             gravity: Vector::zeros(),
+            gravity_gradient: Matrix::zeros(),
             coriolis_gravity: Vector::zeros(),
             jacobian_dot_qd: Vector::zeros(),
             momentum: Vector::zeros(),
@@ -75,6 +78,7 @@ pub(crate) fn fill<const N: usize, const G: usize>(
     out.jacobian = matrix(&sweep.motions);
     out.jacobian_dot_qd = Vector::from(sweep.tip_bias_acceleration::<N>());
     out.gravity = Vector::from(per_joint(&sweep.gravity(arm)));
+    out.gravity_gradient = matrix(&sweep.gravity_gradient());
     out.coriolis_gravity = Vector::from(per_joint(&projection.torque));
     out.momentum = Vector::from(per_joint(&projection.momentum)) + arm.armature.component_mul(qd);
     out.kinetic_gradient = Vector::from(per_joint(&projection.kinetic_gradient));

@@ -1,6 +1,7 @@
 //! The impedance law for the tip's position or pose, and what it works on.
 
 pub mod impedance;
+pub mod learned;
 mod sum;
 pub mod target;
 pub mod task;

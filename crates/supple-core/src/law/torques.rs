@@ -71,6 +71,8 @@ torque_terms! {
     soft_stop,
     /// Compensation of the motors' torque ripple.
     ripple,
+    /// What was learned of the model while the arm moved: payload, tilt, offsets, friction, torque scale and map.
+    learned,
     /// Remainder of the torque before the last change of mode, blended out.
     handover,
 }

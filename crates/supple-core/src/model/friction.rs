@@ -138,16 +138,22 @@ impl Friction {
             + self.dry_torque_nm(velocity_rad_per_s) * share
     }
 
+    /// `p(v / delta)`: the sign of the velocity, made continuous in the band; -1 to 1.
+    #[inline]
+    pub fn direction(&self, velocity_rad_per_s: f64) -> f64 {
+        let x = velocity_rad_per_s / self.band_rad_per_s;
+        if abs(x) <= 1.0 {
+            x * (2.0 - abs(x))
+        } else {
+            1.0_f64.copysign(x)
+        }
+    }
+
     /// The dry part of `D(v)`: Coulomb torque with the Stribeck effect, parabolic in the band \[N
     /// m\].
     #[inline]
     pub fn dry_torque_nm(&self, velocity_rad_per_s: f64) -> f64 {
-        let x = velocity_rad_per_s / self.band_rad_per_s;
-        let parabola = if abs(x) <= 1.0 {
-            x * (2.0 - abs(x))
-        } else {
-            1.0_f64.copysign(x)
-        };
+        let parabola = self.direction(velocity_rad_per_s);
         let s = velocity_rad_per_s / self.stribeck_rad_per_s;
         let dip = self.breakaway_nm - self.coulomb_nm;
         let dry = self.coulomb_nm + if dip > 0.0 { dip * exp(-s * s) } else { 0.0 };

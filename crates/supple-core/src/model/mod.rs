@@ -3,6 +3,7 @@
 pub mod arm;
 pub mod body;
 pub mod friction;
+pub mod learned;
 mod link;
 mod link_rows;
 pub mod pose;

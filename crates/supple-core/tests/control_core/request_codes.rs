@@ -6,7 +6,8 @@ use proptest::prelude::*;
 use proptest::strategy::Union;
 use supple_core::codes::{RequestCode, RequestCodeError, VALUES};
 use supple_core::config::{Gains, JointGains, RotationalGains};
-use supple_core::controller::{Breakaway, Request};
+use supple_core::controller::{Breakaway, LearningSwitch, Request};
+use supple_core::learned::{JointMap, LearnedParameters, MAP_KNOTS};
 use supple_core::math::Vector3;
 use supple_core::trajectory::{Arc, Fourier, Line, Probe, Quadrant, Rotation, Sinusoid};
 use supple_core::{Trajectory, Vector};
@@ -153,6 +154,38 @@ fn request() -> impl Strategy<Value = Numbered> {
                 ((13, 0), Some(Request::RotationalGains { gains, ramp_s }))
             })
             .boxed(),
+        (0_usize..3)
+            .prop_map(|value| {
+                let switches = [
+                    LearningSwitch::Off,
+                    LearningSwitch::On,
+                    LearningSwitch::Reset,
+                ];
+                ((14, 0), Some(Request::Learning(switches[value])))
+            })
+            .boxed(),
+        proptest::collection::vec(number(), LearnedParameters::<4>::COUNT)
+            .prop_map(|values| {
+                let mut values = values.into_iter();
+                let mut parameters = LearnedParameters::zero();
+                let zero = parameters;
+                parameters.each(&zero, |_, _, to, _| *to = values.next().expect("enough"));
+                ((15, 0), Some(Request::LearnedParameters(parameters)))
+            })
+            .boxed(),
+        (
+            any::<u8>(),
+            proptest::collection::vec(number(), 2 * MAP_KNOTS),
+        )
+            .prop_map(|(joint, values)| {
+                let map = JointMap {
+                    torque_nm: std::array::from_fn(|k| values[k]),
+                    dry_nm: std::array::from_fn(|k| values[MAP_KNOTS + k]),
+                };
+                let joint = joint.into();
+                ((16, 0), Some(Request::LearnedMap { joint, map }))
+            })
+            .boxed(),
         gains()
             .prop_map(|(stiffness_n_per_m, damping_n_s_per_m, ramp_s)| {
                 let gains = Gains {
@@ -191,7 +224,8 @@ fn decode(
 
 #[test]
 fn unknown_and_incomplete_codes_are_rejected() {
-    assert_eq!(decode(14, 0, &[]), Err(RequestCodeError::Kind(14)));
+    assert_eq!(decode(17, 0, &[]), Err(RequestCodeError::Kind(17)));
+    assert_eq!(decode(14, 0, &[3.0]), Err(RequestCodeError::Whole(3.0)));
     assert_eq!(decode(4, 0, &[]), Err(RequestCodeError::Trajectory(0)));
     assert_eq!(
         decode(4, 7, &[0.0; 16]),

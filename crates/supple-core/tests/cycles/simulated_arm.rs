@@ -3,8 +3,9 @@
 use crate::support::random::Random;
 use crate::support::rig::{Rig, probe_at, ramp};
 use supple_core::config::{Gains, JointGains, Role, RotationalGains};
-use supple_core::controller::{Breakaway, Mode, Request};
+use supple_core::controller::{Breakaway, LearningSwitch, Mode, Request};
 use supple_core::dynamics::aba;
+use supple_core::learned::{JointMap, LearnedParameters};
 use supple_core::math::Vector3;
 use supple_core::trajectory::{Arc, Fourier, Line, Quadrant, Rotation, Sinusoid};
 use supple_core::{Config, Input, Output, Trajectory, Vector};
@@ -83,7 +84,7 @@ impl<const N: usize> SimulatedArm<N> {
             _ => {}
         }
         let tip = last.tip_position_m;
-        match random.below(22) {
+        match random.below(26) {
             0 => Request::Idle,
             1 => Request::GravityHold,
             2 => Request::Reset,
@@ -155,6 +156,30 @@ impl<const N: usize> SimulatedArm<N> {
                 },
                 ramp_s: random.number(),
             },
+            22 => Request::Learning(LearningSwitch::On),
+            23 => Request::Learning(match random.below(2) {
+                0 => LearningSwitch::Off,
+                _ => LearningSwitch::Reset,
+            }),
+            24 => {
+                let mut parameters = LearnedParameters::zero();
+                let bounds = self.rig.controller.learned_bounds().parameters;
+                // A little beyond the bounds now and then.
+                let share = if random.once_in(4) { 1.1 } else { 0.9 };
+                parameters.each(&bounds, |_, _, to, bound| {
+                    *to = share * bound * random.unit()
+                });
+                Request::LearnedParameters(parameters)
+            }
+            25 => {
+                let joint = random.below(N as u64 + 1) as usize;
+                let bounds = self.rig.controller.learned_bounds().map_nm;
+                let mut map = JointMap::ZERO;
+                for value in map.coefficients_mut() {
+                    *value = bounds[joint.min(N - 1)] * random.unit();
+                }
+                Request::LearnedMap { joint, map }
+            }
             13 => {
                 let mut series = Fourier::at_rest(self.rig.q, random.number());
                 series.sine_rad[random.below(5) as usize] = random.joints(0.1);

@@ -5,6 +5,7 @@ use supple_core::config::{
     ApparentInertia, Collision, ContactLatch, FrictionVelocity, Gains, JointGains, Law, Limits,
     PlausibilityLimits, PoseLaw, Role, Workspace,
 };
+use supple_core::learned::LearnedTerms;
 use supple_core::{Arm, Config, Friction, Matrix, RippleTable, Vector};
 
 /// Held with the gains of the shoulder roll.
@@ -91,6 +92,7 @@ fn config<const N: usize>(
         roles,
         joint_from_motor,
         ripple: [RippleTable::NONE; N],
+        learned: LearnedTerms::zero(),
         period_s: 1e-3,
         estimator_rad_per_s: 200.0,
         law: Law {

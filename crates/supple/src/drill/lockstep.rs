@@ -69,6 +69,7 @@ pub fn perform<const N: usize>(spec: &Spec, arm: &TestArm) -> Result<Row, Failur
         track: UpTrajectory::Sinusoid,
         bus: None,
         zero_at_home: false,
+        learn: false,
         tare: false,
         block_m: (spec.event == Event::Obstacle).then_some(match spec.task {
             TestTask::Probe => 0.0,

@@ -66,6 +66,7 @@ pub fn perform<const N: usize>(
         },
         bus: None,
         zero_at_home: false,
+        learn: false,
         tare: false,
         // Tasks that move the arm down would hit the block.
         block_m: match spec.task {

@@ -3,11 +3,13 @@
 //! The controller checks every request; the command prints its reply.
 
 mod approach;
+mod learning;
 pub mod pendant;
 mod session;
 mod status;
 
 pub use approach::Approach;
+pub use learning::learning;
 pub use pendant::{Pendant, pendant};
 pub use session::OperatorSession;
 pub use status::status;
@@ -22,7 +24,7 @@ use supple_cli::arms;
 use supple_cli::console::{print_json, print_line};
 use supple_cli::exit::Failure;
 use supple_core::config::{Gains, JointGains, RotationalGains};
-use supple_core::controller::{Mode, Request};
+use supple_core::controller::{LearningSwitch, Mode, Request};
 use supple_core::math::Vector3;
 use supple_core::trajectory::Rotation;
 use supple_core::{Trajectory, Vector};
@@ -104,6 +106,7 @@ enum Asked<'a> {
     Float,
     JointImpedance(&'a ModeArgs),
     Reset,
+    Learning(LearningSwitch),
     Gains(&'a GainsArgs),
     JointGains(&'a GainsArgs),
     RotationalGains(&'a GainsArgs),
@@ -117,6 +120,7 @@ impl Asked<'_> {
             Asked::GravityHold => Request::GravityHold,
             Asked::Float => Request::Float,
             Asked::Reset => Request::Reset,
+            Asked::Learning(switch) => Request::Learning(*switch),
             Asked::JointImpedance(args) => match args.target.len() {
                 0 => Request::JointImpedance {
                     target_rad: first(&now.position_rad),

@@ -9,7 +9,9 @@ use serde::Serialize;
 use std::time::Instant;
 use supple_cli::console::{print_json, print_line};
 use supple_cli::exit::Failure;
+use supple_core::controller::CycleRecord;
 use supple_ipc::message::Telemetry;
+use supple_learning::Frozen;
 
 /// Duration of the telemetry sample.
 const SAMPLE_WINDOW: Duration = Duration::from_millis(500);
@@ -41,6 +43,88 @@ struct Status {
     damping_n_s_per_m: [f64; 3],
     in_contact: bool,
     fault: Option<String>,
+    learning: LearningStatus,
+}
+
+/// What is learned and in force, one value per joint.
+#[derive(Serialize)]
+struct LearningStatus {
+    on: bool,
+    /// Why nothing is learned at the moment.
+    frozen: Option<&'static str>,
+    viscous_nm_s_per_rad: Vec<f64>,
+    coulomb_nm: Vec<f64>,
+    offset_nm: Vec<f64>,
+    torque_scale: Vec<f64>,
+    payload_kg: f64,
+    payload_moment_kg_m: [f64; 3],
+    tilt_rad: [f64; 3],
+    /// Torque of all that is learned.
+    torque_nm: Vec<f64>,
+}
+
+impl LearningStatus {
+    fn new<const N: usize>(record: &CycleRecord<N>, joints: usize) -> LearningStatus {
+        let of = |values: &[f64]| values[..joints].to_vec();
+        LearningStatus {
+            on: record.learning,
+            frozen: Frozen::of_cycle(record).map(Frozen::name),
+            viscous_nm_s_per_rad: of(record.learned_viscous_nm_s_per_rad.as_slice()),
+            coulomb_nm: of(record.learned_coulomb_nm.as_slice()),
+            offset_nm: of(record.learned_offset_nm.as_slice()),
+            torque_scale: of(record.learned_torque_scale.as_slice()),
+            payload_kg: record.learned_payload_kg,
+            payload_moment_kg_m: record.learned_payload_moment_kg_m,
+            tilt_rad: record.learned_tilt_rad,
+            torque_nm: of(record.torques.learned.as_slice()),
+        }
+    }
+
+    /// Whether anything of it is worth a line.
+    fn is_in_use(&self) -> bool {
+        let parts = [
+            &self.viscous_nm_s_per_rad,
+            &self.coulomb_nm,
+            &self.offset_nm,
+            &self.torque_scale,
+            &self.torque_nm,
+        ];
+        self.on
+            || parts
+                .iter()
+                .any(|part| part.iter().any(|value| *value != 0.0))
+    }
+}
+
+impl fmt::Display for LearningStatus {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let numbers = |values: &[f64], scale: f64, digits: usize| {
+            let each = values
+                .iter()
+                .map(|value| format!("{:+.digits$}", value * scale));
+            each.collect::<Vec<_>>().join(" ")
+        };
+        let state = match (self.on, self.frozen) {
+            (false, _) => "off".to_owned(),
+            (true, None) => "on".to_owned(),
+            (true, Some(frozen)) => format!("on, frozen: {frozen}"),
+        };
+        writeln!(
+            f,
+            "learning  {state}; torque {} N m; payload {:+.1} g, tilt {} mrad",
+            numbers(&self.torque_nm, 1.0, 3),
+            1e3 * self.payload_kg,
+            numbers(&self.tilt_rad, 1e3, 2)
+        )?;
+        writeln!(
+            f,
+            "          Coulomb {} N m, viscous {} N m s/rad, offset {} N m, torque scale {} %",
+            numbers(&self.coulomb_nm, 1.0, 3),
+            numbers(&self.viscous_nm_s_per_rad, 1.0, 3),
+            numbers(&self.offset_nm, 1.0, 3),
+            numbers(&self.torque_scale, 100.0, 2)
+        )
+    }
 }
 
 /// Reads telemetry for half a second and prints the status.
@@ -88,6 +172,7 @@ impl Status {
             damping_n_s_per_m: record.damping_n_s_per_m,
             in_contact: record.in_contact,
             fault: (record.fault != 0).then(|| record.fault_text.to_string()),
+            learning: LearningStatus::new(&record, last.dof()),
         }
     }
 }
@@ -113,6 +198,9 @@ impl fmt::Display for Status {
             "gains     K {:?} N/m, B {:?} N s/m",
             self.stiffness_n_per_m, self.damping_n_s_per_m
         )?;
+        if self.learning.is_in_use() {
+            write!(f, "{}", self.learning)?;
+        }
         writeln!(
             f,
             "round trip  p50 {:.0} p99 {:.0} max {:.0} us, over {} cycles",

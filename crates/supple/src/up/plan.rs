@@ -152,6 +152,7 @@ impl UpArgs {
         });
         arguments.extend(self.no_realtime.then_some("--no-realtime"));
         arguments.extend(self.strict.then_some("--strict"));
+        arguments.extend(self.learn.then_some("--learn"));
         let mut arguments: Vec<String> = arguments.into_iter().map(str::to_owned).collect();
         if let Some(prefix) = &self.prefix {
             arguments.extend(["--prefix".to_owned(), prefix.clone()]);

@@ -6,11 +6,11 @@
 //!                              +-- an arm on a bus waits here for its pendant
 //! ```
 
-use crate::cli::PlantKind;
+use crate::cli::{PlantKind, UpArgs};
 use crate::operate::{Approach, OperatorSession, Pendant};
 use supple_cli::console::print_status;
 use supple_cli::exit::Failure;
-use supple_core::controller::Request;
+use supple_core::controller::{LearningSwitch, Request};
 use supple_ipc::message::{Drives, Telemetry};
 
 /// Gravity hold before the approach to the start pose \[s\].
@@ -42,6 +42,8 @@ pub struct Stages {
     stage: Stage,
     pendant: Option<Pendant>,
     plant: PlantKind,
+    /// Learning begins with gravity hold.
+    learn: bool,
     period_s: f64,
 }
 
@@ -52,11 +54,12 @@ pub fn cycles_of(time_s: f64, period_s: f64) -> u64 {
 
 impl Stages {
     /// Starts the sequence. `pendant` is that of an emulated arm.
-    pub fn new(pendant: Option<Pendant>, plant: PlantKind, period_s: f64) -> Stages {
+    pub fn new(pendant: Option<Pendant>, args: &UpArgs, period_s: f64) -> Stages {
         Stages {
             stage: Stage::Joining,
             pendant,
-            plant,
+            plant: args.plant,
+            learn: args.learn,
             period_s,
         }
     }
@@ -90,6 +93,10 @@ impl Stages {
         match self.stage {
             Stage::Joining => {
                 session.send_request(&Request::GravityHold, None)?;
+                if self.learn {
+                    let learn = Request::Learning(LearningSwitch::On);
+                    session.send_request(&learn, None)?;
+                }
                 self.stage = Stage::GravityHold(cycle);
             }
             Stage::GravityHold(_) | Stage::ActivationRequested if active => {

@@ -13,7 +13,7 @@ use rustix::process::Signal;
 use std::time::Instant;
 use supple_cli::console::print_status;
 use supple_cli::exit::Failure;
-use supple_core::controller::Request;
+use supple_core::controller::{LearningSwitch, Request};
 use supple_ipc::message::Telemetry;
 use supple_ipc::{Domain, TelemetryReader};
 use supple_model::Description;
@@ -23,6 +23,8 @@ use supple_realtime::Stop;
 const JOIN_TIMEOUT_S: u64 = 20;
 /// Time after which the shutdown kills a process that has not exited.
 const SHUTDOWN_TIMEOUT: Duration = Duration::from_secs(5);
+/// Cycle in which learning begins in virtual time, after the request for gravity hold.
+const LEARN_CYCLE: u64 = 1;
 /// Maximum duration of one wait for telemetry.
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
@@ -65,7 +67,7 @@ impl<'a, const N: usize> System<'a, N> {
             .log_file()
             .map(|file| Recorder::create(&file, description, &config, args.virtual_time, &options));
         Ok(System {
-            stages: Stages::new(plan.pendant.clone(), args.plant, period_s),
+            stages: Stages::new(plan.pendant.clone(), args, period_s),
             approach: Approach::new(&config, trajectory, duration_s)?,
             run_log: RunLog::new(recorder.transpose()?),
             // Create readers before writers, so that no message is missed.
@@ -93,6 +95,10 @@ impl<'a, const N: usize> System<'a, N> {
             let home = description.home::<N>()?;
             self.hold_first()?;
             let start = self.stages.plan()?;
+            if self.args.learn {
+                let learn = Request::Learning(LearningSwitch::On);
+                self.session.queue(&learn, LEARN_CYCLE)?;
+            }
             self.session.follow(&self.approach, &home, Some(start))?;
         }
         self.children.start(&self.plan.clock_owner)
@@ -347,7 +353,7 @@ impl<'a, const N: usize> System<'a, N> {
     /// Restarts the start-up sequence.
     pub fn restart_stages(&mut self) {
         let pendant = self.plan.pendant.clone();
-        self.stages = Stages::new(pendant, self.args.plant, self.period_s);
+        self.stages = Stages::new(pendant, self.args, self.period_s);
     }
 
     /// Sends a request to the controller.

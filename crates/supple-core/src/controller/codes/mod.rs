@@ -55,6 +55,9 @@ numbered! {
         JOINT_GAINS = 11 "joint_gains",
         TRACK_POSE = 12 "track_pose",
         ROTATIONAL_GAINS = 13 "rotational_gains",
+        LEARNING = 14 "learning",
+        LEARNED_PARAMETERS = 15 "learned_parameters",
+        LEARNED_MAP = 16 "learned_map",
     }
 }
 
@@ -116,6 +119,7 @@ numbered! {
         TOO_MUCH_TORQUE = 9 "too_much_torque",
         WORKSPACE = 10 "workspace",
         SINGULAR = 11 "singular",
+        LEARNING_OFF = 12 "learning_off",
     }
 }
 
@@ -313,5 +317,6 @@ pub fn refusal(refusal: Option<&Refusal>) -> u8 {
         Some(Refusal::TooMuchTorque { .. }) => refusal_kind::TOO_MUCH_TORQUE,
         Some(Refusal::Workspace { .. }) => refusal_kind::WORKSPACE,
         Some(Refusal::Singular) => refusal_kind::SINGULAR,
+        Some(Refusal::LearningOff) => refusal_kind::LEARNING_OFF,
     }
 }

@@ -12,6 +12,9 @@
 //! | joint_gains | `stiffness_nm_per_rad` (N), `damping_nm_s_per_rad` (N), `ramp_s` |
 //! | track_pose | `axis`, `angle_rad`, `duration_s` of the rotation, then those of the trajectory |
 //! | rotational_gains | `stiffness_nm_per_rad`, `damping_nm_s_per_rad`, `ramp_s` |
+//! | learning | 0 off, 1 on, 2 reset |
+//! | learned_parameters | `viscous_nm_s_per_rad` (N), `coulomb_nm` (N), `offset_nm` (N), `torque_scale` (N), `payload_kg`, `payload_moment_kg_m`, `tilt_rad` |
+//! | learned_map | `joint`, `torque_nm` (16 coefficients), `dry_nm` (16) |
 //! | hold | `position_m` |
 //! | line | `from_m`, `to_m`, `duration_s` |
 //! | sinusoid | `centre_m`, `amplitude_m`, `angular_frequency_rad_per_s`, `ramp_s` |
@@ -23,8 +26,9 @@
 
 use super::{request_kind, trajectory_kind};
 use crate::config::{Gains, JointGains, RotationalGains};
-use crate::controller::{Breakaway, Request};
+use crate::controller::{Breakaway, LearningSwitch, Request};
 use crate::math::{Vector, Vector3};
+use crate::model::learned::{JointMap, LearnedParameters};
 use crate::trajectory::{
     Arc, Fourier, HARMONICS, Line, Probe, Quadrant, Rotation, Sinusoid, Trajectory,
 };
@@ -60,7 +64,7 @@ pub enum RequestCodeError {
         /// Values that the request takes.
         expected: usize,
     },
-    /// A number of strokes, or of a joint, that is not whole.
+    /// A number of strokes, of a joint or of a switch that is not whole or too great.
     Whole(f64),
 }
 
@@ -70,7 +74,7 @@ impl fmt::Display for RequestCodeError {
             RequestCodeError::Kind(kind) => write!(
                 f,
                 "request is {kind}, known are 0 to {}",
-                request_kind::ROTATIONAL_GAINS
+                request_kind::LEARNED_MAP
             ),
             RequestCodeError::Trajectory(kind) => {
                 write!(
@@ -154,6 +158,24 @@ impl RequestCode {
                 code.vector(&gains.stiffness_nm_per_rad);
                 code.vector(&gains.damping_nm_s_per_rad);
                 code.numbers(&[*ramp_s]);
+            }
+            Some(Request::Learning(switch)) => {
+                code.kind = request_kind::LEARNING;
+                code.numbers(&[match switch {
+                    LearningSwitch::Off => 0.0,
+                    LearningSwitch::On => 1.0,
+                    LearningSwitch::Reset => 2.0,
+                }]);
+            }
+            Some(Request::LearnedParameters(parameters)) => {
+                code.kind = request_kind::LEARNED_PARAMETERS;
+                LearnedParameters::zero().each(parameters, |_, _, _, value| code.numbers(&[value]));
+            }
+            Some(Request::LearnedMap { joint, map }) => {
+                code.kind = request_kind::LEARNED_MAP;
+                code.numbers(&[*joint as f64]);
+                code.numbers(&map.torque_nm);
+                code.numbers(&map.dry_nm);
             }
             Some(Request::Reset) => code.kind = request_kind::RESET,
             Some(Request::Excite(series)) => {
@@ -269,6 +291,26 @@ impl RequestCode {
                     damping_nm_s_per_rad: rest.vector(),
                 },
                 ramp_s: rest.number(),
+            }),
+            request_kind::LEARNING => Some(Request::Learning(match rest.count()? {
+                0 => LearningSwitch::Off,
+                1 => LearningSwitch::On,
+                2 => LearningSwitch::Reset,
+                other => return Err(RequestCodeError::Whole(f64::from(other))),
+            })),
+            request_kind::LEARNED_PARAMETERS => {
+                let mut parameters = LearnedParameters::zero();
+                parameters.each(&LearnedParameters::zero(), |_, _, value, _| {
+                    *value = rest.number();
+                });
+                Some(Request::LearnedParameters(parameters))
+            }
+            request_kind::LEARNED_MAP => Some(Request::LearnedMap {
+                joint: rest.count()? as usize,
+                map: JointMap {
+                    torque_nm: rest.take(),
+                    dry_nm: rest.take(),
+                },
             }),
             unknown => return Err(RequestCodeError::Kind(unknown)),
         };

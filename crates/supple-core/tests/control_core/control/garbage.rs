@@ -6,7 +6,8 @@ use crate::support::property::{check, per_joint};
 use crate::support::rig::{Rig, bent, probe_at};
 use proptest::prelude::*;
 use supple_core::config::{ApparentInertia, Gains, JointGains, RotationalGains};
-use supple_core::controller::{Mode, Request};
+use supple_core::controller::{LearningSwitch, Mode, Request};
+use supple_core::learned::{JointMap, LearnedParameters, MAP_KNOTS};
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::trajectory::{Arc, Line, Quadrant, Rotation, Sinusoid};
 use supple_core::{Config, Trajectory, Vector};
@@ -22,6 +23,11 @@ fn number() -> impl Strategy<Value = f64> {
             5e-324, -5e-324, 0.0, -0.0, 1e-300, 1e300, -1e308,
         ]),
     ]
+}
+
+/// Mostly within the bounds of what is learned.
+fn small() -> impl Strategy<Value = f64> {
+    prop_oneof![20 => -0.02..0.02, 1 => number()]
 }
 
 fn point() -> impl Strategy<Value = Vector3<f64>> {
@@ -78,6 +84,26 @@ fn request_kind<const N: usize>() -> impl Strategy<Value = RequestKind<N>> {
         Just(Request::GravityHold),
         Just(Request::Reset),
         Just(Request::Float),
+        prop::sample::select(vec![
+            LearningSwitch::On,
+            LearningSwitch::Off,
+            LearningSwitch::Reset
+        ])
+        .prop_map(Request::Learning),
+        prop::collection::vec(small(), LearnedParameters::<N>::COUNT).prop_map(|values| {
+            let mut values = values.into_iter();
+            let mut parameters = LearnedParameters::zero();
+            let zero = parameters;
+            parameters.each(&zero, |_, _, to, _| *to = values.next().expect("enough"));
+            Request::LearnedParameters(parameters)
+        }),
+        (0..N + 1, small(), small()).prop_map(|(joint, torque, dry)| Request::LearnedMap {
+            joint,
+            map: JointMap {
+                torque_nm: [torque; MAP_KNOTS],
+                dry_nm: [dry; MAP_KNOTS],
+            },
+        }),
         (prop::collection::vec(number(), N), number()).prop_map(|(target, duration_s)| {
             Request::JointImpedance {
                 target_rad: Vector::from_column_slice(&target),

@@ -11,6 +11,7 @@ mod faults;
 mod gains;
 mod garbage;
 mod holding;
+mod learning;
 mod limits;
 mod messages;
 mod modes;

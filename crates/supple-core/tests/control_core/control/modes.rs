@@ -4,7 +4,7 @@ use crate::support::configs::{four, seven, seven_active, three};
 use crate::support::rig::{Rig, bent, bent_wrist, probe_at, ramp};
 use std::collections::BTreeSet;
 use supple_core::config::{Gains, JointGains, Role, RotationalGains};
-use supple_core::controller::{Fault, Mode, Refusal, Request};
+use supple_core::controller::{Fault, LearningSwitch, Mode, Refusal, Request};
 use supple_core::trajectory::Fourier;
 use supple_core::{Config, Input, Vector};
 
@@ -38,10 +38,11 @@ enum RequestKind {
     Gains,
     JointGains,
     RotationalGains,
+    Learning,
     Reset,
 }
 
-const REQUEST_KINDS: [RequestKind; 14] = [
+const REQUEST_KINDS: [RequestKind; 15] = [
     RequestKind::Idle,
     RequestKind::GravityHold,
     RequestKind::Move,
@@ -55,6 +56,7 @@ const REQUEST_KINDS: [RequestKind; 14] = [
     RequestKind::Gains,
     RequestKind::JointGains,
     RequestKind::RotationalGains,
+    RequestKind::Learning,
     RequestKind::Reset,
 ];
 
@@ -88,16 +90,26 @@ fn request<const N: usize>(rig: &Rig<N>, requested: RequestKind) -> Request<N> {
             gains: Gains::isotropic(10.0, 2.0),
             ramp_s: 0.1,
         },
+        RequestKind::Learning => Request::Learning(LearningSwitch::On),
         RequestKind::Reset => Request::Reset,
     }
+}
+
+/// Requests that are carried out in every mode.
+fn keeps_mode(requested: RequestKind) -> bool {
+    matches!(
+        requested,
+        RequestKind::Gains
+            | RequestKind::JointGains
+            | RequestKind::RotationalGains
+            | RequestKind::Learning
+    )
 }
 
 /// Mode after `requested` in `mode`; `None` if refused.
 fn table(mode: Mode, requested: RequestKind) -> Option<Mode> {
     match (mode, requested) {
-        (_, RequestKind::Gains | RequestKind::JointGains | RequestKind::RotationalGains) => {
-            Some(mode)
-        }
+        (_, requested) if keeps_mode(requested) => Some(mode),
         // Only a reset leaves a fault; this one leads to gravity hold.
         (Mode::Fault, RequestKind::Reset) => Some(Mode::GravityHold),
         // Idle needs no reset; the fault stays latched.
@@ -114,6 +126,7 @@ fn table(mode: Mode, requested: RequestKind) -> Option<Mode> {
         (_, RequestKind::Float) => Some(Mode::Float),
         (_, RequestKind::JointImpedance) => Some(Mode::JointImpedance),
         (_, RequestKind::TrackPose) => Some(Mode::TrackPose),
+        (_, requested) => panic!("{requested:?} keeps the mode"),
     }
 }
 
@@ -143,10 +156,7 @@ fn every_mode_asked_for_everything<const N: usize>(config: Config<N>, pose: Vect
                 Some(expected) => {
                     assert_eq!(output.refusal, None, "{requested:?} in {mode:?}");
                     assert_eq!(output.mode, expected, "{requested:?} in {mode:?}");
-                    if !matches!(
-                        requested,
-                        RequestKind::Gains | RequestKind::JointGains | RequestKind::RotationalGains
-                    ) {
+                    if !keeps_mode(requested) {
                         assert_eq!(output.mode_time_s, 0.0, "{requested:?} in {mode:?}");
                     }
                 }

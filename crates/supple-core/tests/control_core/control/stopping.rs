@@ -16,6 +16,7 @@ use supple_core::config::{
 };
 use supple_core::controller::{Fault, Mode, Request, SafeAction, State, step};
 use supple_core::dynamics::{aba, gravity, jacobian, kinetic_energy, tip_pose};
+use supple_core::learned::LearnedTerms;
 use supple_core::math::Vector3;
 use supple_core::trajectory::{Rotation, Trajectory};
 use supple_core::{
@@ -130,6 +131,7 @@ fn config<const N: usize>(case: &Case) -> Config<N> {
         roles: [Role::Active; N],
         joint_from_motor: Matrix::identity(),
         ripple: [RippleTable::NONE; N],
+        learned: LearnedTerms::zero(),
         period_s: PERIOD_S,
         estimator_rad_per_s: 300.0,
         law: Law {

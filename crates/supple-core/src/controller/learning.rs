@@ -1,0 +1,274 @@
+//! What is learned, in the controller: received by requests, brought into force along a ramp, applied as one torque term.
+//!
+//! Nothing is estimated here. A request replaces the target of the ramp; the terms in force approach it linearly, so
+//! that no torque steps. In contact, in faults, without torque and in modes in which people push, the ramp stands still
+//! and new terms are refused.
+
+use super::Controller;
+use super::activity::Activity;
+use super::mode::{LearningSwitch, Mode, Refusal};
+use super::pose_task::PoseCycle;
+use super::state::State;
+use crate::config::{Config, FrictionVelocity, Role};
+use crate::law::impedance::{Task, Torques};
+use crate::law::learned::{LearnedAtPose, learned_torque_nm};
+use crate::math::{Vector, Vector3};
+use crate::model::learned::{JointMap, LearnedParameters, LearnedTerms, OutOfBounds};
+use crate::trajectory::Reference;
+
+/// Time in which new terms come into force \[s\].
+pub const LEARNED_RAMP_S: f64 = 1.0;
+
+impl Mode {
+    /// Whether the model may be refined in this mode: the arm moves by itself, and nobody is to push it.
+    pub fn allows_learning(self) -> bool {
+        matches!(
+            self,
+            Mode::Move | Mode::Track | Mode::Probe | Mode::Excite | Mode::TrackPose
+        )
+    }
+}
+
+/// The terms in force and those to come.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Learned<const N: usize> {
+    /// New terms are accepted.
+    pub on: bool,
+    pub current: LearnedTerms<N>,
+    target: LearnedTerms<N>,
+    /// Cycles until the target is in force.
+    cycles_left: u32,
+    /// Any number is not zero; otherwise nothing is computed.
+    in_use: bool,
+}
+
+impl<const N: usize> Learned<N> {
+    /// The terms of a configuration, in force.
+    pub fn new(initial: &LearnedTerms<N>) -> Self {
+        Learned {
+            on: false,
+            current: *initial,
+            target: *initial,
+            cycles_left: 0,
+            in_use: *initial != LearnedTerms::zero(),
+        }
+    }
+
+    fn approach(&mut self, target: LearnedTerms<N>, period_s: f64) {
+        self.target = target;
+        self.cycles_left = (LEARNED_RAMP_S / period_s) as u32 + 1;
+        self.in_use = true;
+    }
+
+    /// One cycle of the ramp. It ends exactly at the target.
+    #[inline(never)]
+    fn advance(&mut self) {
+        let share = 1.0 / f64::from(self.cycles_left);
+        self.cycles_left -= 1;
+        if self.cycles_left == 0 {
+            self.current = self.target;
+            self.in_use = self.current != LearnedTerms::zero();
+            return;
+        }
+        self.current
+            .each(&self.target, |now, target| *now += (target - *now) * share);
+    }
+}
+
+impl<const N: usize> State<N> {
+    /// Switches learning on or off, or goes back to the configuration's terms.
+    pub(super) fn switch_learning(&mut self, config: &Config<N>, switch: LearningSwitch) {
+        match switch {
+            LearningSwitch::On => self.learned.on = true,
+            LearningSwitch::Off => self.learned.on = false,
+            LearningSwitch::Reset if self.applies_learned(config) => {
+                self.learned.approach(config.learned, config.period_s);
+            }
+            LearningSwitch::Reset => {
+                let on = self.learned.on;
+                self.learned = Learned {
+                    on,
+                    ..Learned::new(&config.learned)
+                };
+            }
+        }
+    }
+
+    pub(super) fn receive_learned(
+        &mut self,
+        controller: &Controller<N>,
+        parameters: &LearnedParameters<N>,
+    ) -> Result<(), Refusal> {
+        self.accepts_learned()?;
+        let bounds = &controller.learned_bounds;
+        bounds.check(parameters).map_err(out_of_bounds)?;
+        let target = LearnedTerms {
+            parameters: *parameters,
+            ..self.learned.target
+        };
+        let period_s = controller.config().period_s;
+        self.learned.approach(target, period_s);
+        Ok(())
+    }
+
+    pub(super) fn receive_learned_map(
+        &mut self,
+        controller: &Controller<N>,
+        joint: usize,
+        map: &JointMap,
+    ) -> Result<(), Refusal> {
+        self.accepts_learned()?;
+        if joint >= N {
+            return Err(Refusal::Value {
+                entry: "joint of the learned map",
+                value: joint as f64,
+                limit: N as f64 - 1.0,
+            });
+        }
+        let bounds = &controller.learned_bounds;
+        bounds.check_map(joint, map).map_err(out_of_bounds)?;
+        let mut target = self.learned.target;
+        target.map[joint] = *map;
+        self.learned.approach(target, controller.config().period_s);
+        Ok(())
+    }
+
+    fn accepts_learned(&self) -> Result<(), Refusal> {
+        let mode = self.mode();
+        if !self.learned.on {
+            return Err(Refusal::LearningOff);
+        }
+        if mode.allows_learning() {
+            return Ok(());
+        }
+        Err(Refusal::Mode { mode })
+    }
+
+    /// Whether learned torques act: not without torque, in a fault or on a stale state.
+    fn applies_learned(&self, config: &Config<N>) -> bool {
+        !(self.activity.is_torque_off() || self.fault.is_some() || self.is_stale(config))
+    }
+
+    /// Advances the ramp and evaluates the terms in force at this pose; `None` if there are none, or no torque may
+    /// come of them.
+    pub(super) fn learned_at_pose(
+        &mut self,
+        config: &Config<N>,
+        reference: Option<&Reference>,
+        elapsed_s: f64,
+    ) -> Option<LearnedAtPose<N>> {
+        if !self.learned.in_use || !self.applies_learned(config) {
+            return None;
+        }
+        if self.learned.cycles_left > 0 {
+            let frozen = self.latch.in_contact() || !self.drives_active || elapsed_s == 0.0;
+            let resets = self.learned.target == config.learned;
+            if !frozen && (resets || self.mode().allows_learning()) {
+                self.learned.advance();
+            }
+        }
+        let acceleration = match reference {
+            Some(reference) if config.law.inertial_feedforward => reference.acceleration,
+            _ => Vector3::zeros(),
+        };
+        Some(LearnedAtPose::new(
+            &self.learned.current,
+            &config.friction,
+            &config.limits,
+            &config.arm.gravity(),
+            &self.position,
+            &self.terms,
+            &acceleration,
+        ))
+    }
+
+    /// Torque that acts on the arm when `torque` is commanded, and the change of the model's torque at the measured
+    /// motion: what the observer needs.
+    pub(super) fn learned_in_observer(
+        &self,
+        config: &Config<N>,
+        learned: Option<&LearnedAtPose<N>>,
+    ) -> (Vector<N>, Vector<N>) {
+        let Some(learned) = learned else {
+            return (self.torque, Vector::zeros());
+        };
+        let terms = &self.learned.current;
+        let velocity = &self.estimator.velocity_rad_per_s;
+        let scale = &terms.parameters.torque_scale;
+        (
+            Vector::from_fn(|i, _| self.torque[i] / (1.0 + scale[i])),
+            learned.torque_nm(terms, &config.friction, velocity, 1.0),
+        )
+    }
+
+    /// The learned term beside the others in `torques`.
+    pub(super) fn learned_torques(
+        &self,
+        controller: &Controller<N>,
+        task: Option<&Task<N>>,
+        reference: Option<&Reference>,
+        pose: Option<&PoseCycle<N>>,
+        learned: &LearnedAtPose<N>,
+        torques: &Torques<N>,
+    ) -> Vector<N> {
+        let config = controller.config();
+        let terms = &self.learned.current;
+        let velocity = self.friction_velocity(config, task, reference, pose);
+        let mut change = learned.torque_nm(
+            terms,
+            &config.friction,
+            &velocity,
+            self.latch.friction_share(),
+        );
+        if let Activity::Breakaway { ramp, .. } = &self.activity {
+            change[ramp.joint] = 0.0;
+        }
+        let model = torques.gravity
+            + torques.coriolis
+            + torques.friction
+            + torques.jacobian_rate
+            + torques.inertial;
+        learned_torque_nm(terms, &controller.learned_bounds, &model, &change)
+    }
+
+    /// Joint velocities at which this activity feeds learned friction forward; zero where it feeds none.
+    fn friction_velocity(
+        &self,
+        config: &Config<N>,
+        task: Option<&Task<N>>,
+        reference: Option<&Reference>,
+        pose: Option<&PoseCycle<N>>,
+    ) -> Vector<N> {
+        let measured = &self.estimator.velocity_rad_per_s;
+        let is_active = |i: usize| config.roles[i] == Role::Active;
+        match (&self.activity, task, reference, pose) {
+            // What is learned of the friction damps a hand's motion; only the model's share is compensated.
+            (Activity::Float, ..) => Vector::zeros(),
+            (_, Some(task), Some(reference), pose) => {
+                let along = match pose {
+                    Some(pose) => pose.joint_velocity_rad_per_s,
+                    None => task.inverse * reference.velocity,
+                };
+                match config.law.friction_velocity {
+                    FrictionVelocity::Reference => along,
+                    FrictionVelocity::Measured => Vector::from_fn(|i, _| match is_active(i) {
+                        true => measured[i],
+                        false => along[i],
+                    }),
+                }
+            }
+            _ => match self.joint_reference(config) {
+                Some(reference) => reference.velocity_rad_per_s,
+                None => Vector::zeros(),
+            },
+        }
+    }
+}
+
+fn out_of_bounds(wrong: OutOfBounds) -> Refusal {
+    Refusal::Value {
+        entry: wrong.entry,
+        value: wrong.value,
+        limit: wrong.bound,
+    }
+}

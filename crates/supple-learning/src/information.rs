@@ -1,0 +1,72 @@
+//! Normal equations of one joint: what its samples say about the unknowns.
+
+use crate::prior::unknowns::ALL;
+use crate::rows::Row;
+use nalgebra::{DMatrix, DVector};
+
+/// Sums over samples, each divided by the variance of its noise.
+#[derive(Clone, Debug)]
+pub struct Information {
+    /// `sum a a^T`, (ALL, ALL).
+    pub gram: DMatrix<f64>,
+    /// `sum a e`.
+    pub right: DVector<f64>,
+    /// `sum e^2`.
+    pub square: f64,
+    /// Sum of the weights.
+    pub weight: f64,
+}
+
+impl Information {
+    /// No samples.
+    pub fn empty() -> Information {
+        Information {
+            gram: DMatrix::zeros(ALL, ALL),
+            right: DVector::zeros(ALL),
+            square: 0.0,
+            weight: 0.0,
+        }
+    }
+
+    /// Whether there are samples.
+    pub fn is_empty(&self) -> bool {
+        self.weight == 0.0
+    }
+
+    /// Adds an equation.
+    pub fn add(&mut self, row: &Row, weight: f64) {
+        let a = DVector::from_column_slice(&row.columns);
+        self.gram.ger(weight, &a, &a, 1.0);
+        self.right.axpy(weight * row.error_nm, &a, 1.0);
+        self.square += weight * row.error_nm * row.error_nm;
+        self.weight += weight;
+    }
+
+    /// Adds the samples of `other`.
+    pub fn merge(&mut self, other: &Information) {
+        self.gram += &other.gram;
+        self.right += &other.right;
+        self.square += other.square;
+        self.weight += other.weight;
+    }
+
+    /// Keeps a fraction of the samples' weight.
+    pub fn forget(&mut self, kept: f64) {
+        self.gram *= kept;
+        self.right *= kept;
+        self.square *= kept;
+        self.weight *= kept;
+    }
+
+    /// Mean square of the error that `unknowns` leave \[N^2 m^2\].
+    pub fn mean_square(&self, unknowns: &DVector<f64>) -> f64 {
+        let sum =
+            self.square - 2.0 * self.right.dot(unknowns) + unknowns.dot(&(&self.gram * unknowns));
+        (sum / self.weight).max(0.0)
+    }
+
+    /// Mean square of the torque that `covariance` of the unknowns leaves uncertain \[N^2 m^2\].
+    pub fn mean_variance(&self, covariance: &DMatrix<f64>) -> f64 {
+        (self.gram.component_mul(covariance)).sum() / self.weight
+    }
+}

@@ -1,0 +1,305 @@
+//! From records to requests.
+
+use crate::freeze::Frozen;
+use crate::information::Information;
+use crate::prior::Prior;
+use crate::report::Report;
+use crate::rows::Rows;
+use crate::solve::{Estimate, of_prior, solve};
+use std::collections::VecDeque;
+use supple_core::Config;
+use supple_core::controller::{CycleRecord, Request};
+use supple_core::learned::LearnedTerms;
+use supple_core::math::exp;
+
+/// Slower joints give no equations: their friction is not identifiable \[rad/s\].
+const MIN_SPEED_RAD_PER_S: f64 = 0.08;
+/// Time after a restart, a freeze or a reversal until a joint's filters have settled \[s\].
+const SETTLE_S: f64 = 0.15;
+/// Time between samples \[s\].
+const SAMPLE_S: f64 = 0.01;
+/// Time over which errors of the model are correlated: one sample of this time is independent \[s\].
+const CORRELATION_S: f64 = 1.0;
+/// Samples are collected, judged and used by intervals of this length \[s\].
+const INTERVAL_S: f64 = 0.25;
+/// Intervals for which samples wait: a freeze meanwhile discards them.
+const WAITING: usize = 2;
+/// Time after a freeze in which no samples are collected \[s\].
+const AFTER_FREEZE_S: f64 = 0.5;
+/// Time constant of forgetting, in time of motion \[s\].
+const FORGET_S: f64 = 60.0;
+/// An interval is disturbed if its error is greater than this multiple of its standard deviation.
+const DISTURBED: f64 = 4.0;
+/// Time of unexplained torque in free motion after which it is taken for a change of the arm \[s\].
+const PERSISTENT_S: f64 = 20.0;
+/// Weight that older samples keep then.
+const KEPT_AFTER_CHANGE: f64 = 0.02;
+/// Time between estimates \[s\].
+const SOLVE_S: f64 = 2.0;
+/// Time from the last sample of an estimate until it comes into force, and the least number of cycles, which no queue
+/// between controller and learner exceeds: the cycle does not depend on the speed of either.
+const LATENCY_S: f64 = 2.0;
+const MIN_LATENCY_CYCLES: u64 = 2500;
+/// Time constant of the measured residual, in intervals.
+const RESIDUAL_INTERVALS: f64 = 40.0;
+
+/// A request with the cycle in which it is to be carried out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scheduled<const N: usize> {
+    /// Cycle.
+    pub at_cycle: u64,
+    /// Learned parameters, or the map of a joint.
+    pub request: Request<N>,
+}
+
+/// Learns from the records of a controller.
+#[derive(Clone, Debug)]
+pub struct Learner<const N: usize> {
+    prior: Prior<N>,
+    period_s: f64,
+    rows: Rows<N>,
+    last_cycle: Option<u64>,
+    /// Time since the filters of all joints, and of each joint, may be relied on \[s\].
+    since_freeze_s: f64,
+    since_slow_s: [f64; N],
+    cycles_to_sample: u32,
+    interval_s: f64,
+    collecting: Vec<Information>,
+    waiting: VecDeque<Vec<Information>>,
+    samples: Vec<Information>,
+    estimate: Option<Estimate>,
+    since_solve_s: f64,
+    has_news: bool,
+    /// Measured variance of what the estimate leaves \[N^2 m^2\].
+    residual: [f64; N],
+    disturbed_s: f64,
+    disturbances: u64,
+    frozen: Option<Frozen>,
+}
+
+impl<const N: usize> Learner<N> {
+    /// Of the controller with this configuration, before its first cycle.
+    pub fn new(config: &Config<N>) -> Learner<N> {
+        let prior = Prior::new(config);
+        Learner {
+            rows: Rows::new(config),
+            estimate: of_prior(&prior),
+            period_s: config.period_s,
+            last_cycle: None,
+            since_freeze_s: 0.0,
+            since_slow_s: [0.0; N],
+            cycles_to_sample: 0,
+            interval_s: 0.0,
+            collecting: vec![Information::empty(); N],
+            waiting: VecDeque::new(),
+            samples: vec![Information::empty(); N],
+            since_solve_s: 0.0,
+            has_news: false,
+            residual: [0.0; N],
+            disturbed_s: 0.0,
+            disturbances: 0,
+            frozen: Some(Frozen::Off),
+            prior,
+        }
+    }
+
+    /// Forgets all samples: the estimate is the prior again.
+    pub fn reset(&mut self) {
+        self.samples = vec![Information::empty(); N];
+        self.estimate = of_prior(&self.prior);
+        self.residual = [0.0; N];
+        self.disturbed_s = 0.0;
+        self.has_news = false;
+        self.discard();
+    }
+
+    /// What is known.
+    pub fn report(&self) -> Report<N> {
+        let zero = LearnedTerms::zero();
+        let of = |part: fn(&Estimate) -> LearnedTerms<N>| self.estimate.as_ref().map_or(zero, part);
+        Report {
+            terms: of(Estimate::terms),
+            deviations: of(Estimate::deviations),
+            learned_s: core::array::from_fn(|i| {
+                self.samples[i].weight * self.prior.noise_nm[i].powi(2) * CORRELATION_S
+            }),
+            residual_nm: self.residual.map(f64::sqrt),
+            disturbances: self.disturbances,
+            frozen: self.frozen,
+        }
+    }
+
+    /// Takes the record of a cycle; returns the requests that an estimate leads to, mostly none.
+    pub fn observe(&mut self, record: &CycleRecord<N>) -> Vec<Scheduled<N>> {
+        use supple_core::codes::request_kind;
+        if record.request == request_kind::LEARNING
+            && record.refusal == 0
+            && record.request_values.values() == [2.0]
+        {
+            self.reset();
+        }
+        let cycle = record.input_cycle;
+        let follows = self.last_cycle.is_some_and(|last| cycle == last + 1);
+        self.last_cycle = Some(cycle);
+        if !follows {
+            self.rows.restart();
+            self.freeze();
+        }
+        let rows = self.rows.cycle(record);
+        self.since_freeze_s += self.period_s;
+        for (since, velocity) in self.since_slow_s.iter_mut().zip(&record.velocity_rad_per_s) {
+            let fast = velocity.abs() >= MIN_SPEED_RAD_PER_S;
+            *since = if fast { *since + self.period_s } else { 0.0 };
+        }
+        match Frozen::of_cycle(record) {
+            Some(frozen) => {
+                self.frozen = Some(frozen);
+                self.freeze();
+                return Vec::new();
+            }
+            None if self.since_freeze_s < AFTER_FREEZE_S => return Vec::new(),
+            None => {}
+        }
+        self.collect(&rows);
+        self.interval_s += self.period_s;
+        if self.interval_s >= INTERVAL_S {
+            self.interval_s = 0.0;
+            self.end_interval();
+        }
+        self.since_solve_s += self.period_s;
+        if self.since_solve_s < SOLVE_S || !self.has_news {
+            return Vec::new();
+        }
+        self.since_solve_s = 0.0;
+        self.has_news = false;
+        self.requests(cycle)
+    }
+
+    /// Samples of the joints that move.
+    fn collect(&mut self, rows: &[crate::rows::Row]) {
+        if self.cycles_to_sample > 0 {
+            self.cycles_to_sample -= 1;
+            return;
+        }
+        let cycles = (SAMPLE_S / self.period_s) as u32;
+        self.cycles_to_sample = cycles.saturating_sub(1);
+        let sample_s = f64::from(cycles.max(1)) * self.period_s;
+        for (i, row) in rows.iter().enumerate() {
+            if self.since_slow_s[i] >= SETTLE_S {
+                let weight = sample_s / CORRELATION_S / self.prior.noise_nm[i].powi(2);
+                self.collecting[i].add(row, weight);
+            }
+        }
+    }
+
+    /// Discards all samples that have not been used.
+    fn discard(&mut self) {
+        self.waiting.clear();
+        self.collecting = vec![Information::empty(); N];
+        self.interval_s = 0.0;
+    }
+
+    fn freeze(&mut self) {
+        if self.since_freeze_s > 0.0 {
+            self.discard();
+        }
+        self.since_freeze_s = 0.0;
+    }
+
+    /// Judges the samples of an interval, and uses those that have waited.
+    fn end_interval(&mut self) {
+        let interval = core::mem::replace(&mut self.collecting, vec![Information::empty(); N]);
+        if interval.iter().all(Information::is_empty) {
+            self.frozen = Some(Frozen::Slow);
+            return;
+        }
+        if self.is_disturbed(&interval) {
+            self.disturbances += 1;
+            self.disturbed_s += INTERVAL_S + AFTER_FREEZE_S;
+            self.frozen = Some(Frozen::Disturbed);
+            self.freeze();
+            if self.disturbed_s >= PERSISTENT_S {
+                self.accept_change(&interval);
+            }
+            return;
+        }
+        self.frozen = None;
+        self.disturbed_s = 0.0;
+        self.waiting.push_back(interval);
+        if self.waiting.len() > WAITING
+            && let Some(oldest) = self.waiting.pop_front()
+        {
+            self.take(&oldest);
+        }
+    }
+
+    fn is_disturbed(&self, interval: &[Information]) -> bool {
+        let Some(estimate) = &self.estimate else {
+            return false;
+        };
+        interval.iter().enumerate().any(|(i, samples)| {
+            let noise = self.prior.noise_nm[i].powi(2).max(self.residual[i]);
+            !samples.is_empty() && {
+                let expected = noise + samples.mean_variance(&estimate.covariance[i]);
+                samples.mean_square(&estimate.unknowns(i)) > DISTURBED * DISTURBED * expected
+            }
+        })
+    }
+
+    /// The arm has changed: what was learned before counts for little, and an error as large as in this interval is no
+    /// disturbance until less is left of it.
+    fn accept_change(&mut self, interval: &[Information]) {
+        self.disturbed_s = 0.0;
+        if let Some(estimate) = &self.estimate {
+            for (i, samples) in interval.iter().enumerate() {
+                if !samples.is_empty() {
+                    let square = samples.mean_square(&estimate.unknowns(i));
+                    self.residual[i] = self.residual[i].max(square);
+                }
+            }
+        }
+        for samples in &mut self.samples {
+            samples.forget(KEPT_AFTER_CHANGE);
+        }
+        self.estimate = solve(&self.prior, &self.samples).or_else(|| of_prior(&self.prior));
+    }
+
+    fn take(&mut self, interval: &[Information]) {
+        for (i, new) in interval.iter().enumerate() {
+            if new.is_empty() {
+                continue;
+            }
+            let learned_s = new.weight * self.prior.noise_nm[i].powi(2) * CORRELATION_S;
+            self.samples[i].forget(exp(-learned_s / FORGET_S));
+            self.samples[i].merge(new);
+            if let Some(estimate) = &self.estimate {
+                let square = new.mean_square(&estimate.unknowns(i));
+                let known = new.mean_variance(&estimate.covariance[i]);
+                self.residual[i] +=
+                    ((square - known).max(0.0) - self.residual[i]) / RESIDUAL_INTERVALS;
+            }
+        }
+        self.has_news = true;
+    }
+
+    /// A new estimate as requests, all for cycles that the learner's delay cannot reach.
+    fn requests(&mut self, cycle: u64) -> Vec<Scheduled<N>> {
+        let Some(estimate) = solve(&self.prior, &self.samples) else {
+            return Vec::new();
+        };
+        let terms = estimate.terms::<N>();
+        self.estimate = Some(estimate);
+        let latency = ((LATENCY_S / self.period_s) as u64).max(MIN_LATENCY_CYCLES);
+        let at_cycle = cycle + latency;
+        let parameters = Request::LearnedParameters(terms.parameters);
+        let maps = (0..N).filter(|i| !self.samples[*i].is_empty());
+        let maps = maps.map(|joint| Request::LearnedMap {
+            joint,
+            map: terms.map[joint],
+        });
+        core::iter::once(parameters)
+            .chain(maps)
+            .map(|request| Scheduled { at_cycle, request })
+            .collect()
+    }
+}

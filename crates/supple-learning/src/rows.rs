@@ -1,0 +1,205 @@
+//! Equations of the unknowns, one per joint and sample.
+//!
+//! With the generalised momentum `p = H qd` and a low-pass filter `F`, the torque that the model needs is
+//!
+//! ```text
+//! F[p' - C^T qd + G + D] = b (p - F p) + F[G + D - C^T qd]
+//! ```
+//!
+//! (`b` the gain that makes the first term the filtered difference of `p`). What the filtered command has beyond it is
+//! the prediction error; the columns of the unknowns pass `F` too. Before that, command and angle pass the filter whose
+//! derivative the velocity estimate is, so that angle, velocity and torque belong to the same time; the command is
+//! delayed as the drives delay it.
+
+use crate::prior::unknowns::{
+    ALL, COULOMB, MAP_DRY, MAP_TORQUE, MOMENT, OFFSET, PAYLOAD, SCALE, TILT, VISCOUS,
+};
+use std::collections::VecDeque;
+use supple_core::controller::CycleRecord;
+use supple_core::dynamics::{Terms, terms};
+use supple_core::learned::MapWeights;
+use supple_core::learned_torque::{payload_torque_nm, tilt_torque_nm};
+use supple_core::math::{Vector3, exp};
+use supple_core::{Config, Vector};
+
+/// Bandwidth of the filter `F` \[rad/s\].
+pub const FILTER_RAD_PER_S: f64 = 40.0;
+/// Cycles from a command to the torque of the drives.
+pub const DRIVE_DELAY_CYCLES: usize = 1;
+
+/// One equation: `columns . unknowns = error_nm`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// Columns, in the order of [`crate::unknowns`].
+    pub columns: [f64; ALL],
+    /// Commanded torque beyond the model's \[N m\].
+    pub error_nm: f64,
+}
+
+/// Filters of an arm.
+#[derive(Clone, Debug)]
+pub struct Rows<const N: usize> {
+    config: Config<N>,
+    terms: Terms<N>,
+    /// Gains of the two filters.
+    aligning: f64,
+    filter: f64,
+    started: bool,
+    position: [Vector<N>; 2],
+    torque: [Vector<N>; 2],
+    commands: VecDeque<Vector<N>>,
+    /// `F p`, and `F[G + D - C^T qd]`, `F[tau]`.
+    momentum: Vector<N>,
+    model: Vector<N>,
+    command: Vector<N>,
+    /// `F` of the tip's velocity.
+    tip_velocity: Vector3<f64>,
+    /// `F` of the columns.
+    columns: Vec<[f64; ALL]>,
+}
+
+impl<const N: usize> Rows<N> {
+    /// Filters before the first cycle.
+    pub fn new(config: &Config<N>) -> Rows<N> {
+        let gain = |rad_per_s: f64| 1.0 - exp(-rad_per_s * config.period_s);
+        Rows {
+            terms: Terms::default(),
+            aligning: gain(config.estimator_rad_per_s),
+            filter: gain(FILTER_RAD_PER_S),
+            started: false,
+            position: [Vector::zeros(); 2],
+            torque: [Vector::zeros(); 2],
+            commands: VecDeque::new(),
+            momentum: Vector::zeros(),
+            model: Vector::zeros(),
+            command: Vector::zeros(),
+            tip_velocity: Vector3::zeros(),
+            columns: vec![[0.0; ALL]; N],
+            config: *config,
+        }
+    }
+
+    /// Forgets all cycles; the filters have settled again after some of their time constants.
+    pub fn restart(&mut self) {
+        self.started = false;
+    }
+
+    /// Passes a cycle through the filters; returns the equations of all joints.
+    pub fn cycle(&mut self, record: &CycleRecord<N>) -> Vec<Row> {
+        let velocity = &record.velocity_rad_per_s;
+        let first = !self.started;
+        // The compensation of the ripple is not part of the model's torque: what it cancels is not either.
+        let command = record.torque_nm - record.torques.ripple;
+        if first {
+            self.started = true;
+            self.position = [record.position_rad; 2];
+            self.torque = [command; 2];
+            self.commands = vec![command; DRIVE_DELAY_CYCLES + 1].into();
+        }
+        self.commands.push_back(command);
+        let acting = self.commands.pop_front().unwrap_or(command);
+        let gain = self.aligning;
+        for (stages, new) in [
+            (&mut self.position, &record.position_rad),
+            (&mut self.torque, &acting),
+        ] {
+            stages[0] += (new - stages[0]) * gain;
+            stages[1] = stages[1] + (stages[0] - stages[1]) * gain;
+        }
+        let (q, config) = (self.position[1], &self.config);
+        terms(&config.arm, &q, velocity, &mut self.terms);
+        let friction = Vector::<N>::from_fn(|i, _| config.friction[i].torque_nm(velocity[i]));
+        let model = self.terms.gravity + friction - self.terms.kinetic_gradient;
+        let tip_velocity = self.terms.jacobian.fixed_rows::<3>(0) * velocity;
+        if first {
+            self.momentum = self.terms.momentum;
+            self.model = model;
+            self.command = self.torque[1];
+            self.tip_velocity = tip_velocity;
+        }
+        let a = self.filter;
+        // The filtered difference quotient of a quantity whose filtered value is subtracted from it.
+        let rate = a / ((1.0 - a) * config.period_s);
+        self.momentum += (self.terms.momentum - self.momentum) * a;
+        self.model += (model - self.model) * a;
+        self.command += (self.torque[1] - self.command) * a;
+        self.tip_velocity += (tip_velocity - self.tip_velocity) * a;
+        let needed = (self.terms.momentum - self.momentum) * rate + self.model;
+        let acceleration = (tip_velocity - self.tip_velocity) * rate;
+
+        let raw = self.columns_now(&q, velocity);
+        let payload_inertia = payload_columns(&self.terms, &acceleration);
+        let mut rows = Vec::with_capacity(N);
+        for (i, raw) in raw.iter().enumerate() {
+            let filtered = &mut self.columns[i];
+            for (filtered, raw) in filtered.iter_mut().zip(raw) {
+                *filtered = if first {
+                    *raw
+                } else {
+                    *filtered + (raw - *filtered) * a
+                };
+            }
+            let mut columns = *filtered;
+            for (k, column) in payload_inertia.iter().enumerate() {
+                columns[PAYLOAD + k] += column[i];
+            }
+            columns[SCALE] = needed[i];
+            rows.push(Row {
+                columns,
+                error_nm: self.command[i] - needed[i],
+            });
+        }
+        rows
+    }
+
+    /// Columns before the filter, but for the inertia of the payload and the torque scale.
+    fn columns_now(&self, q: &Vector<N>, velocity: &Vector<N>) -> Vec<[f64; ALL]> {
+        let config = &self.config;
+        let gravity = config.arm.gravity();
+        let weight = payload_columns(&self.terms, &-gravity);
+        let tilt: [Vector<N>; 3] = core::array::from_fn(|axis| {
+            let mut unit = Vector3::zeros();
+            unit[axis] = 1.0;
+            tilt_torque_nm(&self.terms, &gravity, &unit)
+        });
+        (0..N)
+            .map(|i| {
+                let direction = config.friction[i].direction(velocity[i]);
+                let lower = config.limits.position_lower_rad[i];
+                let upper = config.limits.position_upper_rad[i];
+                let map = MapWeights::new(q[i], lower, upper);
+                let mut columns = [0.0; ALL];
+                columns[VISCOUS] = velocity[i];
+                columns[COULOMB] = direction;
+                columns[OFFSET] = 1.0;
+                for (k, weight) in map.weights.iter().enumerate() {
+                    columns[MAP_TORQUE + map.first + k] = *weight;
+                    columns[MAP_DRY + map.first + k] = weight * direction;
+                }
+                for (k, column) in weight.iter().enumerate() {
+                    columns[PAYLOAD + k] = column[i];
+                }
+                for (k, column) in tilt.iter().enumerate() {
+                    columns[TILT + k] = column[i];
+                }
+                columns
+            })
+            .collect()
+    }
+}
+
+/// Torques of a unit of mass and of each unit of its first moment.
+fn payload_columns<const N: usize>(
+    terms: &Terms<N>,
+    force_n_per_kg: &Vector3<f64>,
+) -> [Vector<N>; 4] {
+    const { assert!(MOMENT == PAYLOAD + 1) };
+    core::array::from_fn(|k| {
+        let mut moment = Vector3::zeros();
+        if k > 0 {
+            moment[k - 1] = 1.0;
+        }
+        let mass = if k == 0 { 1.0 } else { 0.0 };
+        payload_torque_nm(terms, force_n_per_kg, mass, &moment)
+    })
+}

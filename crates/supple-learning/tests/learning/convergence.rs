@@ -1,0 +1,225 @@
+//! Where the motion excites them, the terms converge to the truth; they never leave their bounds.
+
+use crate::support::configs::{four, seven, three};
+use crate::support::size;
+use crate::world::{Truth, World, exciting, model, size_of_joint};
+use proptest::prelude::*;
+use supple_core::controller::Request;
+use supple_core::dynamics::{gravity, rnea};
+use supple_core::learned::LearnedBounds;
+use supple_core::math::Vector3;
+use supple_core::{Arm, Config, Vector};
+
+fn truth<const N: usize>() -> impl Strategy<Value = Truth<N>> {
+    let joints = |reach: f64| {
+        proptest::collection::vec(-reach..reach, N).prop_map(|v| Vector::from_column_slice(&v))
+    };
+    (
+        joints(0.25),
+        joints(0.25),
+        joints(0.3),
+        -0.05..0.15_f64,
+        [-0.02..0.02_f64, -0.02..0.02],
+    )
+        .prop_map(|(viscous, coulomb, offset_nm, payload_kg, [x, y])| Truth {
+            viscous,
+            coulomb,
+            offset_nm: Vector::from_fn(|i, _| offset_nm[i] * size_of_joint(i)),
+            payload_kg,
+            tilt_rad: Vector3::new(x, y, 0.0),
+        })
+}
+
+/// After 40 s of motion the controller's prediction of the torque misses less than a fifth of what it missed before,
+/// RMS along a motion of the same joints, and no learned number is beyond its bound.
+fn learns<const N: usize>(config: Config<N>, truth: Truth<N>) -> Result<(), TestCaseError> {
+    let config = model(config);
+    let mut world = World::new(config, truth);
+    let series = exciting::<N>(40.0);
+    world.request(Request::Excite(series));
+    let mut missed = [0.0_f64; 2];
+    let bounds = LearnedBounds::new(&config.friction, &config.limits.joint_torque_nm);
+    let mut feedback = |output: &supple_core::Output<N>, late: usize| {
+        missed[late] += output.torques.joint_pd.norm_squared();
+    };
+    for k in 0..39_000 {
+        let output = world.cycle(None, Vector3::zeros());
+        prop_assert_eq!(output.fault, None);
+        prop_assert!(bounds.check(&output.learned).is_ok());
+        // The stiff loops carry what the feed-forward lacks: before the first terms, and at the end.
+        match k {
+            1000..4000 => feedback(&output, 0),
+            36_000..39_000 => feedback(&output, 1),
+            _ => {}
+        }
+    }
+    let [before, after] = missed.map(|sum| (sum / 3000.0_f64).sqrt());
+    prop_assert!(
+        after < 0.2 * before + 0.02,
+        "{:.3} N m before, {:.3} N m after",
+        before,
+        after
+    );
+    Ok(())
+}
+
+fn check<const N: usize>(cases: u32, config: Config<N>) {
+    let settings = crate::support::settings::config(cases, 20_261_123);
+    crate::support::property::run(settings, truth::<N>(), |truth| learns(config, truth));
+}
+
+#[test]
+fn terms_of_three_joints_converge() {
+    check(3, three());
+}
+
+#[test]
+fn terms_of_four_joints_converge() {
+    check(3, four());
+}
+
+#[test]
+fn terms_of_seven_joints_converge() {
+    check(2, seven());
+}
+
+/// The learned payload and tilt are those of the arm, not something else that happens to fit: their gravity torque at
+/// poses that the motion did not visit is right within a tenth of the whole, and friction within a tenth of the change.
+#[test]
+fn single_deviations_are_found_as_what_they_are() {
+    let config = model(four());
+    let learned = |truth: Truth<4>| {
+        let mut world = World::new(config, truth);
+        world.request(Request::Excite(exciting::<4>(60.0)));
+        world.run(58.0, Vector3::zeros()).learned
+    };
+    let payload = learned(Truth {
+        payload_kg: 0.12,
+        ..Truth::none()
+    });
+    assert!((payload.payload_kg - 0.12).abs() < 0.03, "{payload:?}");
+    let tilt = learned(Truth {
+        tilt_rad: Vector3::new(0.015, -0.01, 0.0),
+        ..Truth::none()
+    });
+    let off = tilt.tilt_rad - Vector3::new(0.015, -0.01, 0.0);
+    assert!(off.x.abs() < 4e-3 && off.y.abs() < 4e-3, "{tilt:?}");
+    let friction = learned(Truth {
+        viscous: Vector::repeat(0.2),
+        coulomb: Vector::repeat(0.2),
+        ..Truth::none()
+    });
+    for i in 0..4 {
+        // The map takes a small part of it.
+        let coulomb = friction.coulomb_nm[i];
+        assert!((coulomb - 0.08).abs() < 0.02, "joint {i}: {coulomb} N m");
+        let viscous = friction.viscous_nm_s_per_rad[i];
+        assert!((viscous - 0.16).abs() < 0.05, "joint {i}: {viscous}");
+    }
+}
+
+/// Friction of 1.8 times the model's is beyond the bound of half: the learned change stops there.
+#[test]
+fn deviations_beyond_the_bounds_stop_at_them() {
+    let config = model(three());
+    let truth = Truth {
+        coulomb: Vector::repeat(0.8),
+        viscous: Vector::repeat(0.8),
+        ..Truth::none()
+    };
+    let mut world = World::new(config, truth);
+    world.request(Request::Excite(exciting::<3>(40.0)));
+    let bounds = *world.rig.controller.learned_bounds();
+    let mut largest = 0.0_f64;
+    for _ in 0..39_000 {
+        let output = world.cycle(None, Vector3::zeros());
+        assert_eq!(output.fault, None);
+        assert!(
+            bounds.check(&output.learned).is_ok(),
+            "{:?}",
+            output.learned
+        );
+        let share = output.torques.learned.component_div(&bounds.torque_nm);
+        assert!(size(&share) <= 1.0);
+        let learned = &output.learned.coulomb_nm;
+        let coulomb = learned.component_div(&bounds.parameters.coulomb_nm);
+        largest = largest.max(size(&coulomb));
+    }
+    assert!(
+        largest > 0.99,
+        "a Coulomb friction of {largest} of its bound"
+    );
+}
+
+/// Joints that do not move keep the model's values, whatever acts on them.
+#[test]
+fn joints_at_rest_keep_the_models_values() {
+    let config = model(four());
+    let truth = Truth {
+        coulomb: Vector::repeat(0.2),
+        offset_nm: Vector::repeat(0.2),
+        ..Truth::none()
+    };
+    let mut world = World::new(config, truth);
+    let mut series = exciting::<4>(20.0);
+    for columns in series.sine_rad.iter_mut().chain(&mut series.cosine_rad) {
+        columns[0] = 0.0;
+        columns[2] = 0.0;
+    }
+    series.centre_rad[0] = world.plant.q[0];
+    series.centre_rad[2] = world.plant.q[2];
+    world.request(Request::Excite(series));
+    let learned = world.run(19.0, Vector3::zeros()).learned;
+    for i in [0, 2] {
+        assert!(learned.coulomb_nm[i].abs() < 1e-9, "{learned:?}");
+        assert!(learned.viscous_nm_s_per_rad[i].abs() < 1e-9, "{learned:?}");
+        assert!(learned.offset_nm[i].abs() < 1e-9, "{learned:?}");
+    }
+    for i in [1, 3] {
+        assert!(learned.coulomb_nm[i] > 0.04, "{learned:?}");
+    }
+}
+
+/// The regressor of the learner against inverse dynamics of a changed arm: a wrong sign fails.
+#[test]
+fn prediction_error_has_the_sign_of_what_is_missing() {
+    let config = model(three());
+    let truth = Truth {
+        payload_kg: 0.1,
+        ..Truth::none()
+    };
+    let mut world = World::new(config, truth);
+    world.request(Request::Excite(exciting::<3>(20.0)));
+    let learned = world.run(15.0, Vector3::zeros()).learned;
+    let q = world.plant.q;
+    let change = gravity(&world.plant.arm, &q) - gravity(&config.arm, &q);
+    let rest = Vector::zeros();
+    let missing: Vector<3> = rnea(&world.plant.arm, &q, &rest, &rest) - gravity(&config.arm, &q);
+    assert!((change - missing).norm() < 1e-9);
+    let with = |kg: f64| {
+        let arm: Arm<3> = config.arm;
+        let lever = supple_core::dynamics::jacobian(&arm, &q);
+        lever.fixed_rows::<3>(0).tr_mul(&(-arm.gravity() * kg))
+    };
+    assert!(
+        with(learned.payload_kg).dot(&missing) > 0.5 * missing.norm_squared(),
+        "{learned:?}"
+    );
+}
+
+#[test]
+fn same_records_give_the_same_requests() {
+    let run = || {
+        let truth = Truth {
+            payload_kg: 0.1,
+            ..Truth::none()
+        };
+        let mut world = World::new(model(three()), truth);
+        world.request(Request::Excite(exciting::<3>(10.0)));
+        world.run(8.0, Vector3::zeros());
+        world.requests
+    };
+    let first = run();
+    assert!(first.len() >= 4, "{} requests", first.len());
+    assert_eq!(first, run());
+}

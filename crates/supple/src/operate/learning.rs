@@ -1,0 +1,54 @@
+//! `supple learning`: switches the refinement of the model, and saves what was learned.
+
+use super::{Asked, ask, running};
+use crate::cli::{LearningAction, SystemArgs};
+use serde::Serialize;
+use std::path::Path;
+use supple_cli::console::{print_json, print_line};
+use supple_cli::exit::Failure;
+use supple_core::controller::LearningSwitch;
+use supple_model::Description;
+
+/// What was saved, as `--json` prints it.
+#[derive(Serialize)]
+struct Saved<'a> {
+    folder: &'a Path,
+    source: Option<&'a str>,
+}
+
+/// Runs `supple learning`.
+///
+/// # Errors
+/// [`Failure`].
+pub fn learning(action: &LearningAction) -> Result<(), Failure> {
+    let (system, switch) = match action {
+        LearningAction::On(system) => (system, LearningSwitch::On),
+        LearningAction::Off(system) => (system, LearningSwitch::Off),
+        LearningAction::Reset(system) => (system, LearningSwitch::Reset),
+        LearningAction::Save { folder, system } => return save(system, folder),
+    };
+    ask(system, &Asked::Learning(switch))
+}
+
+/// Copies the arm that the controller keeps with what it has learned.
+fn save(system: &SystemArgs, folder: &Path) -> Result<(), Failure> {
+    let (domain, ..) = running(system)?;
+    let kept = domain.learned_folder().join("arm.toml");
+    if !kept.exists() {
+        return Err(Failure::NothingLearned);
+    }
+    let learned = Description::load(kept)?;
+    learned.save(folder)?;
+    let source = learned.settings().learned.as_ref();
+    let source = source.and_then(|learned| learned.source.as_deref());
+    match system.json {
+        true => print_json(&Saved { folder, source }),
+        false => {
+            let folder = folder.display();
+            let source = source.unwrap_or_default();
+            print_line(&format!(
+                "wrote arm.toml and arm.urdf to {folder}: {source}"
+            ))
+        }
+    }
+}

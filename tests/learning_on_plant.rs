@@ -1,0 +1,145 @@
+//! Learning while moving, on the plant, whose friction, engine, encoders and delays are not those of the model.
+
+use supple_core::Trajectory;
+use supple_core::controller::Request;
+use supple_core::learned::LearnedTerms;
+use supple_experiment::metrics::Rms;
+use supple_experiment::probing::{ContactMeter, Stroke, median_stroke};
+use supple_experiment::{Deviation, Plan, Setup, Variant, run, scenario};
+use supple_model::Description;
+use supple_plant::Scene;
+
+/// Time of free motion after which the error counts \[s\].
+const LEARNED_S: f64 = 24.0;
+
+fn wam4() -> Setup<4> {
+    let description = Description::asset("wam4").expect("a built-in arm");
+    Setup::new(&description, 1).expect("four joints")
+}
+
+fn plan(deviation: Deviation, (trajectory, duration_s): (Trajectory, f64)) -> Plan<4> {
+    let setup = wam4();
+    let mut config = setup.config(&Variant::EXACT).expect("a physical model");
+    config.law.gains = scenario::gains(scenario::STIFFNESS_N_PER_M);
+    let mut plant = setup.plant(&Variant::EXACT, Scene::default());
+    deviation.apply(&mut plant).expect("a physical arm");
+    Plan {
+        name: "learning".to_owned(),
+        config,
+        plant,
+        trajectory,
+        duration_s,
+        learning: true,
+    }
+}
+
+/// RMS error of the tip after [`LEARNED_S`] \[m\], and what was asked to come into force until the end.
+fn track(plan: &Plan<4>) -> (f64, LearnedTerms<4>) {
+    let (mut late, mut terms) = (Rms::default(), plan.config.learned);
+    let run = run(plan, &mut |cycle, time_s| {
+        if let (Some(time_s), Some(reference)) = (time_s, cycle.output.reference)
+            && time_s >= LEARNED_S
+        {
+            late.add((reference.position - cycle.truth.tip_position_m).norm());
+        }
+        assert!(!cycle.output.in_contact, "a false contact");
+        match cycle.input.request {
+            Some(Request::LearnedMap { joint, map }) => terms.map[joint] = map,
+            Some(Request::LearnedParameters(parameters)) => terms.parameters = parameters,
+            _ => {}
+        }
+        Ok(())
+    })
+    .expect("the sinusoid runs");
+    assert_eq!(run.ended, None);
+    (late.rms(), terms)
+}
+
+fn sinusoid() -> (Trajectory, f64) {
+    (scenario::sinusoid(1.0).0, LEARNED_S + 16.0)
+}
+
+/// Each of them alone leaves 50 to 97 mm without learning.
+#[test]
+fn deviations_are_within_6_mm_after_24_s() {
+    for deviation in [
+        Deviation::Payload(0.05),
+        Deviation::TorqueConstant(-0.02),
+        Deviation::TorqueConstant(0.02),
+        Deviation::Friction(0.2),
+        Deviation::Friction(-0.2),
+        Deviation::Tilt(0.0, 0.5_f64.to_radians()),
+    ] {
+        let (rms_m, _) = track(&plan(deviation, sinusoid()));
+        assert!(rms_m <= 6e-3, "{deviation:?}: {:.2} mm", 1e3 * rms_m);
+    }
+}
+
+/// A model without deviation tracks at least as well as before: 3.2 mm without learning.
+#[test]
+fn learning_does_no_harm_to_a_good_model() {
+    let (rms_m, terms) = track(&plan(Deviation::None, sinusoid()));
+    assert!(rms_m <= 3.5e-3, "{:.2} mm", 1e3 * rms_m);
+    // Also on another path, with what the sinusoid taught.
+    let mut arc = plan(Deviation::None, (scenario::arc().0, LEARNED_S + 16.0));
+    arc.learning = false;
+    let (without_m, _) = track(&arc);
+    arc.config.learned = terms;
+    let (with_m, _) = track(&arc);
+    assert!(
+        with_m <= 1.25 * without_m,
+        "{:.2} mm with, {:.2} mm without",
+        1e3 * with_m,
+        1e3 * without_m
+    );
+}
+
+fn probing(learned: Option<LearnedTerms<4>>, stiffness_n_per_m: f64) -> Stroke {
+    let (probe, duration_s) = scenario::probe(wam4().tip_radius_m());
+    let mut plan = plan(Deviation::None, (Trajectory::Probe(probe), duration_s));
+    plan.learning = learned.is_some();
+    plan.config.learned = learned.unwrap_or(plan.config.learned);
+    plan.config.law.gains = scenario::gains(stiffness_n_per_m);
+    plan.plant.scene = scenario::block();
+    let mut meter = ContactMeter::new(probe);
+    run(&plan, &mut |cycle, time_s| {
+        if let Some(time_s) = time_s {
+            let in_contact = cycle.output.in_contact;
+            meter.cycle(time_s, &cycle.truth, cycle.steps, in_contact);
+        }
+        Ok(())
+    })
+    .expect("probing runs");
+    median_stroke(&meter.finish())
+}
+
+/// Impact, impulse and resting force of probing with learning on, after a sinusoid has taught, are those without.
+#[test]
+fn contact_is_the_same_with_learning() {
+    let (_, terms) = track(&plan(Deviation::None, sinusoid()));
+    for stiffness_n_per_m in [5.0, 125.0] {
+        let without = probing(None, stiffness_n_per_m);
+        let with = probing(Some(terms), stiffness_n_per_m);
+        println!("{stiffness_n_per_m} N/m: {without:?}\n{with:?}");
+        let same = |a: f64, b: f64, absolute: f64| (a - b).abs() <= 0.05 * a.abs() + absolute;
+        let (a, b) = (&without, &with);
+        assert!(
+            same(a.peak_filtered_n, b.peak_filtered_n, 0.0),
+            "{a:?} {b:?}"
+        );
+        assert!(
+            same(
+                a.impulse_first_50ms_newton_s,
+                b.impulse_first_50ms_newton_s,
+                0.0
+            ),
+            "{a:?} {b:?}"
+        );
+        assert!(
+            same(a.impulse_newton_s, b.impulse_newton_s, 0.0),
+            "{a:?} {b:?}"
+        );
+        // At 5 N/m the force is 0.2 N, and 0.05 N m of gravity are 0.07 N.
+        assert!(same(a.rest_force_n, b.rest_force_n, 0.05), "{a:?} {b:?}");
+    }
+}
