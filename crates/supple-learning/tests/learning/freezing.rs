@@ -72,14 +72,15 @@ fn nothing_is_learned_while_off_and_in_modes_in_which_people_push() {
     };
     let mut world = World::new(model(four()), truth);
     assert_eq!(world.learner.report().frozen, Some(Frozen::Mode));
-    for request in [
-        Request::Float,
-        Request::JointImpedance {
-            target_rad: world.plant.q,
-            duration_s: 0.5,
-        },
-    ] {
-        world.request(request);
+    for is_compliant in [false, true] {
+        let target_rad = world.plant.q;
+        world.request(match is_compliant {
+            false => Request::Float,
+            true => Request::JointImpedance {
+                target_rad,
+                duration_s: 0.5,
+            },
+        });
         // A hand moves the arm about.
         for k in 0..4000 {
             let t = f64::from(k) * 1e-3;
