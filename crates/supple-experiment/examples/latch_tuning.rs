@@ -185,7 +185,7 @@ fn probe_once(
     let mut meter = ContactMeter::new(probe);
     run(&plan, &mut |cycle, time_s| {
         if let Some(time_s) = time_s {
-            meter.cycle(time_s, &cycle.truth, cycle.steps, cycle.output.in_contact);
+            meter.cycle(time_s, &cycle.truth, cycle.steps, &cycle.output);
         }
         Ok(())
     })?;

@@ -206,7 +206,7 @@ impl Job {
             };
             let error_m = (reference.position - cycle.truth.tip_position_m).norm();
             if let Some((meter, probe)) = &mut contact {
-                meter.cycle(time_s, &cycle.truth, cycle.steps, cycle.output.in_contact);
+                meter.cycle(time_s, &cycle.truth, cycle.steps, &cycle.output);
                 if is_free(probe, time_s, reference.position.z - face_m) {
                     free.add(error_m);
                 }

@@ -1,14 +1,17 @@
 //! Contact quantities of a probing run: one [`Stroke`] for each stroke.
 
-use crate::metrics::median;
+use crate::metrics::{Mean, median};
 use serde::Serialize;
+use supple_core::Output;
 use supple_core::trajectory::{Probe, ProbePhase};
 use supple_plant::{StepRecord, Truth};
 
 /// Duration of the first transient, from the first touch on \[s\].
 const TRANSIENT_S: f64 = 0.05;
-/// Time before the reversal of the reference over which the resting force is averaged \[s\].
+/// Last part of the way down over which [`Stroke::rest_force_n`] is averaged \[s\].
 const REST_S: f64 = 0.3;
+/// Last part of the dwell over which the force while pressing is averaged \[s\].
+const PRESSING_S: f64 = 0.5;
 
 /// Contact in one stroke.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -17,14 +20,21 @@ pub struct Stroke {
     pub approach_m_per_s: f64,
     /// Maximum vertical force of the first transient, as the 100 Hz filter of the sensor reports it \[N\].
     pub peak_filtered_n: f64,
-    /// Time in contact from the start of this stroke to the start of the next \[s\].
+    /// Time in contact from the start of this stroke to the start of the next, without the dwell, which the
+    /// paper's cycle does not have \[s\].
     pub contact_s: f64,
     /// Integral of the vertical force over the same time \[N s\].
     pub impulse_newton_s: f64,
     /// Integral of the vertical force over the first 50 ms after the first touch \[N s\].
     pub impulse_first_50ms_newton_s: f64,
-    /// Mean vertical force over the last 0.3 s before the reversal of the reference \[N\].
+    /// Mean vertical force over the last 0.3 s of the way down \[N\]: while the reference slows down to rest, the
+    /// friction feed-forward falls to nothing. It is no force at rest; `pressing_force_n` is.
     pub rest_force_n: f64,
+    /// Mean vertical force while pressing: over the last 0.5 s of the dwell, in which the reference rests at the
+    /// bottom of the stroke \[N\]. Zero without a dwell.
+    pub pressing_force_n: f64,
+    /// Mean vertical force that the spring asks for over the same time, `K (X - Xo)` with the true tip \[N\].
+    pub spring_force_n: f64,
     /// Time from the first touch until contact was detected \[s\]; `None` if it was not.
     pub latched_after_s: Option<f64>,
 }
@@ -36,8 +46,9 @@ pub struct ContactMeter {
     current: Option<((u32, u32), Stroke)>,
     first_touch_s: Option<f64>,
     last_speed_m_per_s: f64,
-    rest_force_sum_n: f64,
-    rest_cycles: u32,
+    rest_n: Mean,
+    pressing_n: Mean,
+    spring_n: Mean,
     finished: Vec<Stroke>,
 }
 
@@ -49,20 +60,21 @@ impl ContactMeter {
             current: None,
             first_touch_s: None,
             last_speed_m_per_s: 0.0,
-            rest_force_sum_n: 0.0,
-            rest_cycles: 0,
+            rest_n: Mean::default(),
+            pressing_n: Mean::default(),
+            spring_n: Mean::default(),
             finished: Vec::new(),
         }
     }
 
     /// Adds one controller cycle. `time_s` is the time since the start of the trajectory, `truth` the plant's
-    /// state at the start of the cycle.
+    /// state at the start of the cycle, `output` the controller's answer.
     pub fn cycle<const N: usize>(
         &mut self,
         time_s: f64,
         truth: &Truth<N>,
         steps: &[StepRecord],
-        in_contact: bool,
+        output: &Output<N>,
     ) {
         let (phase, phase_time_s, stroke, column) = self.probe.phase_at(time_s);
         let id = (column, stroke);
@@ -82,8 +94,11 @@ impl ContactMeter {
                 self.first_touch_s = Some(step.time_s);
                 record.approach_m_per_s = self.last_speed_m_per_s;
             }
-            record.impulse_newton_s += force_n * dt_s;
-            if force_n > 0.0 {
+            let counts = phase != ProbePhase::Dwell;
+            if counts {
+                record.impulse_newton_s += force_n * dt_s;
+            }
+            if counts && force_n > 0.0 {
                 record.contact_s += dt_s;
             }
             if let Some(touch_s) = self.first_touch_s
@@ -94,25 +109,30 @@ impl ContactMeter {
             }
         }
         self.last_speed_m_per_s = -truth.tip_velocity_m_per_s.z;
-        if in_contact && record.latched_after_s.is_none() {
+        if output.in_contact && record.latched_after_s.is_none() {
             record.latched_after_s = self.first_touch_s.map(|touch_s| truth.time_s - touch_s);
         }
-        let stroke_s = self.probe.stroke_m / self.probe.speed_m_per_s + self.probe.ramp_s;
-        if phase == ProbePhase::Down && phase_time_s > stroke_s - REST_S {
-            self.rest_force_sum_n += truth.contact_force_n.z;
-            self.rest_cycles += 1;
+        let force_n = truth.contact_force_n.z;
+        if phase == ProbePhase::Down && phase_time_s > self.probe.stroke_s() - REST_S {
+            self.rest_n.add(force_n);
+        }
+        if phase == ProbePhase::Dwell && phase_time_s > self.probe.dwell_s - PRESSING_S {
+            self.pressing_n.add(force_n);
+            if let Some(reference) = output.reference {
+                let above_m = truth.tip_position_m.z - reference.position.z;
+                self.spring_n.add(output.gains.stiffness_n_per_m.z * above_m);
+            }
         }
     }
 
     fn finish_stroke(&mut self) {
         if let Some((_, mut stroke)) = self.current.take() {
-            if self.rest_cycles > 0 {
-                stroke.rest_force_n = self.rest_force_sum_n / f64::from(self.rest_cycles);
-            }
+            stroke.rest_force_n = core::mem::take(&mut self.rest_n).mean();
+            stroke.pressing_force_n = core::mem::take(&mut self.pressing_n).mean();
+            stroke.spring_force_n = core::mem::take(&mut self.spring_n).mean();
             self.finished.push(stroke);
         }
         self.first_touch_s = None;
-        (self.rest_force_sum_n, self.rest_cycles) = (0.0, 0);
     }
 
     /// All strokes, the unfinished last one included.
@@ -136,6 +156,8 @@ pub fn median_stroke(strokes: &[Stroke]) -> Stroke {
         impulse_newton_s: median_of(&|s| s.impulse_newton_s),
         impulse_first_50ms_newton_s: median_of(&|s| s.impulse_first_50ms_newton_s),
         rest_force_n: median_of(&|s| s.rest_force_n),
+        pressing_force_n: median_of(&|s| s.pressing_force_n),
+        spring_force_n: median_of(&|s| s.spring_force_n),
         latched_after_s: median(&latched),
     }
 }

@@ -19,6 +19,8 @@ pub const QUADRANT_PAPER_SPEED_M_PER_S: f64 = 0.1 * core::f64::consts::PI;
 pub const FACE_M: f64 = 0.0;
 /// Length of the stroke before the cap meets the face \[m\].
 const FACE_INTO_STROKE_M: f64 = 0.06;
+/// Rest at the bottom of the stroke, over whose last half the force while pressing is averaged \[s\].
+pub const PROBE_DWELL_S: f64 = 1.0;
 /// Number of columns of a probing run; the base rotates by one step between them.
 const COLUMNS: u32 = 2;
 
@@ -70,6 +72,7 @@ pub fn probe(tip_radius_m: f64) -> (Probe, f64) {
         azimuth_step_rad: 0.05,
         speed_m_per_s: 0.04,
         ramp_s: 0.25,
+        dwell_s: PROBE_DWELL_S,
     };
     (probe, probe.column_s() * f64::from(COLUMNS))
 }
