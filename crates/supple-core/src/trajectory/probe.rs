@@ -182,7 +182,7 @@ impl Probe {
         positive("stroke_m", self.stroke_m)?;
         positive("speed_m_per_s", self.speed_m_per_s)?;
         positive("ramp_s", self.ramp_s)?;
-        if !(self.dwell_s >= 0.0 && self.dwell_s.is_finite()) {
+        if self.dwell_s < 0.0 || !self.dwell_s.is_finite() {
             return Err(TrajectoryError {
                 entry: "dwell_s",
                 value: self.dwell_s,
