@@ -2,8 +2,10 @@
 
 use crate::metrics::{Mean, median};
 use serde::Serialize;
-use supple_core::Output;
+use supple_core::dynamics::{crba, jacobian};
+use supple_core::nalgebra::Vector3;
 use supple_core::trajectory::{Probe, ProbePhase};
+use supple_core::{Arm, Output, Vector};
 use supple_plant::{StepRecord, Truth};
 
 /// Duration of the first transient, from the first touch on \[s\].
@@ -25,6 +27,14 @@ pub struct Stroke {
     pub contact_s: f64,
     /// Integral of the vertical force over the same time \[N s\].
     pub impulse_newton_s: f64,
+    /// Integral of the vertical force over the first impact, from the first touch until the tip leaves the block
+    /// again \[N s\].
+    pub impact_newton_s: f64,
+    /// Speed at which the tip leaves the block after the first impact, over `approach_m_per_s`.
+    pub restitution: f64,
+    /// Integral over the same time as `impulse_newton_s`, from the first touch on, of the force that the spring asks
+    /// for: `K (X - Xo)` with the true tip, where it presses \[N s\].
+    pub spring_impulse_newton_s: f64,
     /// Integral of the vertical force over the first 50 ms after the first touch \[N s\].
     pub impulse_first_50ms_newton_s: f64,
     /// Mean vertical force over the last 0.3 s of the way down \[N\]: while the reference slows down to rest, the
@@ -39,12 +49,24 @@ pub struct Stroke {
     pub latched_after_s: Option<f64>,
 }
 
+/// Progress of the first impact of a stroke.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Impact {
+    Before,
+    Touching,
+    /// The tip has left the block within the last cycle.
+    Left,
+    Over,
+}
+
 /// Collects strokes from the cycles of a run.
 #[derive(Debug)]
 pub struct ContactMeter {
     probe: Probe,
     current: Option<((u32, u32), Stroke)>,
     first_touch_s: Option<f64>,
+    /// The first impact: before it, in it, just over, over.
+    impact: Impact,
     last_speed_m_per_s: f64,
     rest_n: Mean,
     pressing_n: Mean,
@@ -59,6 +81,7 @@ impl ContactMeter {
             probe,
             current: None,
             first_touch_s: None,
+            impact: Impact::Before,
             last_speed_m_per_s: 0.0,
             rest_n: Mean::default(),
             pressing_n: Mean::default(),
@@ -85,6 +108,18 @@ impl ContactMeter {
         let Some((_, record)) = &mut self.current else {
             return;
         };
+        if self.impact == Impact::Left {
+            self.impact = Impact::Over;
+            record.restitution = truth.tip_velocity_m_per_s.z / record.approach_m_per_s;
+        }
+        let pull_n = output.reference.map_or(0.0, |reference| {
+            let above_m = truth.tip_position_m.z - reference.position.z;
+            output.gains.stiffness_n_per_m.z * above_m
+        });
+        let period_s = steps.last().map_or(0.0, |step| step.time_s - truth.time_s);
+        if self.first_touch_s.is_some() && phase != ProbePhase::Dwell {
+            record.spring_impulse_newton_s += pull_n.max(0.0) * period_s;
+        }
         let mut before_s = truth.time_s;
         for step in steps {
             let dt_s = step.time_s - before_s;
@@ -92,7 +127,14 @@ impl ContactMeter {
             let force_n = step.force_n.z;
             if force_n > 0.0 && self.first_touch_s.is_none() {
                 self.first_touch_s = Some(step.time_s);
+                self.impact = Impact::Touching;
                 record.approach_m_per_s = self.last_speed_m_per_s;
+            }
+            if self.impact == Impact::Touching {
+                record.impact_newton_s += force_n * dt_s;
+                if force_n <= 0.0 {
+                    self.impact = Impact::Left;
+                }
             }
             let counts = phase != ProbePhase::Dwell;
             if counts {
@@ -118,10 +160,7 @@ impl ContactMeter {
         }
         if phase == ProbePhase::Dwell && phase_time_s > self.probe.dwell_s - PRESSING_S {
             self.pressing_n.add(force_n);
-            if let Some(reference) = output.reference {
-                let above_m = truth.tip_position_m.z - reference.position.z;
-                self.spring_n.add(output.gains.stiffness_n_per_m.z * above_m);
-            }
+            self.spring_n.add(pull_n);
         }
     }
 
@@ -132,7 +171,7 @@ impl ContactMeter {
             stroke.spring_force_n = core::mem::take(&mut self.spring_n).mean();
             self.finished.push(stroke);
         }
-        self.first_touch_s = None;
+        (self.first_touch_s, self.impact) = (None, Impact::Before);
     }
 
     /// All strokes, the unfinished last one included.
@@ -140,6 +179,18 @@ impl ContactMeter {
         self.finish_stroke();
         self.finished
     }
+}
+
+/// Mass with which the tip meets a force along `direction`, a unit vector, at the pose `q`: `1 / (n' J H^-1 J' n)`
+/// \[kg\], for joints that are free to move. `None` if the pose is singular.
+pub fn effective_mass_kg<const N: usize>(
+    arm: &Arm<N>,
+    q: &Vector<N>,
+    direction: &Vector3<f64>,
+) -> Option<f64> {
+    let turning = jacobian(arm, q).fixed_rows::<3>(0).tr_mul(direction);
+    let mobility = crba(arm, q).cholesky()?.solve(&turning).dot(&turning);
+    (mobility > 0.0).then(|| 1.0 / mobility)
 }
 
 /// Median of each quantity over the strokes.
@@ -154,6 +205,9 @@ pub fn median_stroke(strokes: &[Stroke]) -> Stroke {
         peak_filtered_n: median_of(&|s| s.peak_filtered_n),
         contact_s: median_of(&|s| s.contact_s),
         impulse_newton_s: median_of(&|s| s.impulse_newton_s),
+        impact_newton_s: median_of(&|s| s.impact_newton_s),
+        restitution: median_of(&|s| s.restitution),
+        spring_impulse_newton_s: median_of(&|s| s.spring_impulse_newton_s),
         impulse_first_50ms_newton_s: median_of(&|s| s.impulse_first_50ms_newton_s),
         rest_force_n: median_of(&|s| s.rest_force_n),
         pressing_force_n: median_of(&|s| s.pressing_force_n),
