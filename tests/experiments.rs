@@ -3,8 +3,9 @@
 use supple_core::Trajectory;
 use supple_core::controller::Mode;
 use supple_core::dynamics::gravity;
+use supple_core::inverse_kinematics::inverse_kinematics;
 use supple_experiment::metrics::{LineFit, median, spread};
-use supple_experiment::probing::{ContactMeter, Stroke, median_stroke};
+use supple_experiment::probing::{ContactMeter, Stroke, effective_mass_kg, median_stroke};
 use supple_experiment::{
     EdgeMeter, ExperimentError, Mismatch, Plan, Run, Setup, Variant, run, scenario, track_pose,
 };
@@ -54,8 +55,7 @@ fn probing(variant: &Variant, stiffness_n_per_m: f64) -> Stroke {
     let mut meter = ContactMeter::new(probe);
     run(&plan, &mut |cycle, time_s| {
         if let Some(time_s) = time_s {
-            let in_contact = cycle.output.in_contact;
-            meter.cycle(time_s, &cycle.truth, cycle.steps, in_contact);
+            meter.cycle(time_s, &cycle.truth, cycle.steps, &cycle.output);
         }
         Ok(())
     })
@@ -140,16 +140,12 @@ fn the_law_as_printed_diverges_and_ends_in_a_fault() {
 
 #[test]
 fn the_impulse_depends_on_stiffness_and_the_first_transient_does_not() {
-    let stiffness = &scenario::PROBING_STIFFNESS_N_PER_M[1..];
+    let stiffness = &scenario::PROBING_STIFFNESS_N_PER_M[3..];
     let strokes = side_by_side(stiffness, |k| probing(&Variant::EXACT, *k));
     let peaks: Vec<f64> = strokes.iter().map(|s| s.peak_filtered_n).collect();
     let over_speed: Vec<f64> = strokes
         .iter()
         .map(|s| s.peak_filtered_n / s.approach_m_per_s)
-        .collect();
-    let first_50ms: Vec<f64> = strokes
-        .iter()
-        .map(|s| s.impulse_first_50ms_newton_s)
         .collect();
     let middle = median(&peaks).expect("six runs");
     assert!((15.0..=25.0).contains(&middle), "{peaks:?}");
@@ -158,7 +154,6 @@ fn the_impulse_depends_on_stiffness_and_the_first_transient_does_not() {
         spread(&over_speed).expect("six runs") <= 0.15,
         "{over_speed:?}"
     );
-    assert!(strokes[0].rest_force_n <= 0.5, "{:?}", strokes[0]);
 
     let points: Vec<(f64, f64)> = stiffness
         .iter()
@@ -167,11 +162,51 @@ fn the_impulse_depends_on_stiffness_and_the_first_transient_does_not() {
         .collect();
     let fit = LineFit::new(&points).expect("a line");
     assert!(fit.slope > 0.0 && fit.r2 >= 0.97, "{fit:?}");
-    let impact = median(&first_50ms).expect("six runs");
-    assert!(
-        fit.intercept > 0.0 && fit.intercept <= 2.0 * impact,
-        "{fit:?} {impact}"
-    );
+}
+
+/// At low stiffness the impulse is the impact and what friction adds. The impact by itself is that of the mass
+/// which the arm's own dynamics give the tip, whatever the stiffness.
+#[test]
+fn a_soft_contact_is_the_impact_and_little_else() {
+    let stiffness = [0.5, 1.0, 2.0, 125.0];
+    let strokes = side_by_side(&stiffness, |k| probing(&perturbed(0), *k));
+    let setup = wam4();
+    let config = setup.config(&Variant::EXACT).expect("valid");
+    let touch_m = [0.70, 0.0, scenario::FACE_M + setup.tip_radius_m()].into();
+    let bent = [0.0, 1.0, 0.0, 1.4].into();
+    let (arm, roles, limits) = (&config.arm, &config.roles, &config.limits);
+    let touch = inverse_kinematics(arm, roles, limits, &bent, &touch_m);
+    assert!(touch.reached());
+    let mass_kg = effective_mass_kg(arm, &touch.position_rad, &[0.0, 0.0, 1.0].into());
+    let mass_kg = mass_kg.expect("a regular pose");
+    for stroke in &strokes {
+        let speed = stroke.approach_m_per_s * (1.0 + stroke.restitution);
+        let ratio = stroke.impact_newton_s / (mass_kg * speed);
+        assert!((0.9..=1.1).contains(&ratio), "{ratio} {stroke:?}");
+    }
+    for stroke in &strokes[..3] {
+        assert!(stroke.impulse_newton_s >= stroke.impact_newton_s);
+        assert!(stroke.impulse_newton_s <= 0.4, "{stroke:?}");
+    }
+}
+
+/// With the error of an identification the arm presses as the spring asks at 125 N/m. At 5 N/m the spring's 0.2 N
+/// are a tenth of what friction can hide at rest: the arm may press less, never more.
+#[test]
+fn the_force_while_pressing_is_the_springs() {
+    let cases: Vec<(u64, f64)> = (0..5)
+        .flat_map(|seed| [(seed, 5.0), (seed, 125.0)])
+        .collect();
+    let strokes = side_by_side(&cases, |(seed, k)| probing(&perturbed(*seed), *k));
+    for ((seed, k), stroke) in cases.iter().zip(&strokes) {
+        let beyond_n = stroke.pressing_force_n - stroke.spring_force_n;
+        let (least_n, most_n) = match *k {
+            5.0 => (-0.2, 0.1),
+            _ => (-0.05 * stroke.spring_force_n, 0.05 * stroke.spring_force_n),
+        };
+        let within = (least_n..=most_n).contains(&beyond_n);
+        assert!(within, "{k} N/m, model {seed}: {stroke:?}");
+    }
 }
 
 #[test]
@@ -185,7 +220,7 @@ fn without_fading_the_friction_feed_forward_becomes_contact_force() {
         5.0,
     );
     assert!(
-        left_on.rest_force_n > 2.0 * faded.rest_force_n,
+        left_on.rest_force_n > 2.0 * faded.rest_force_n.max(0.1),
         "{left_on:?} {faded:?}"
     );
     assert!(left_on.impulse_newton_s > 1.5 * faded.impulse_newton_s);

@@ -104,7 +104,7 @@ fn sized<const N: usize>(arms: &Arms<'_>, options: &Options) -> Result<Outcome, 
         if let Some(time_s) = time_s {
             row(&mut cycles, time_s, cycle);
             if let Some(meter) = &mut meter {
-                meter.cycle(time_s, &cycle.truth, cycle.steps, cycle.output.in_contact);
+                meter.cycle(time_s, &cycle.truth, cycle.steps, &cycle.output);
             }
         }
         Ok(())
@@ -188,6 +188,8 @@ fn strokes(strokes: &[Stroke]) -> Table {
         table.number("contact_s", stroke.contact_s);
         table.number("impulse_newton_s", stroke.impulse_newton_s);
         table.number("rest_force_n", stroke.rest_force_n);
+        table.number("pressing_force_n", stroke.pressing_force_n);
+        table.number("spring_force_n", stroke.spring_force_n);
         table.end_row();
     }
     table

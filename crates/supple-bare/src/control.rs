@@ -130,6 +130,10 @@ fn config<const N: usize>(arm: Arm<N>) -> Config<N> {
             contact_share: 0.3,
             fade_s: 0.01,
             restore_s: 0.2,
+            settle_s: 0.05,
+            hold_friction: true,
+            false_alarms_per_hour: 1.0,
+            release_s: 0.2,
         },
         move_gains: JointGains {
             stiffness_nm_per_rad: all(100.0),

@@ -152,7 +152,8 @@ impl Law {
 /// The threshold of the observed force against the reference's motion is `threshold_n + sum_i |(Jb
 /// d)_i| S_i (friction_error + exp(-(v_i / v_s)^2))`: the uncertainty of each joint's friction,
 /// projected onto the direction `d` of the reference. A joint with a slow reference `v_i` may
-/// stick; then all of its friction torque is uncertain.
+/// stick; then all of its friction torque is uncertain. The residuals of free motion scale it, see
+/// [`crate::controller::residual`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactLatch {
     /// Fades the friction feed-forward on contact. Without it the latch still reports.
@@ -171,6 +172,18 @@ pub struct ContactLatch {
     pub fade_s: f64,
     /// Time for restoring the full feed-forward after release \[s\], positive.
     pub restore_s: f64,
+    /// Time from contact to the beginning of the fade \[s\], zero or more: with all of the feed-forward the tip settles
+    /// on what it met, instead of hovering where the joints' friction holds it after a bounce.
+    pub settle_s: f64,
+    /// Keeps the friction feed-forward of the moment of contact until release, instead of following a reference
+    /// that the blocked arm does not follow. Logs from before it existed have `false`.
+    pub hold_friction: bool,
+    /// Rate of false alarms in free motion for which the residuals of the model in use set the threshold \[1/h\],
+    /// positive; infinite: the threshold stays as configured.
+    pub false_alarms_per_hour: f64,
+    /// Time after which a latch opens that nothing but the force speaks for \[s\], positive; infinite: every latch
+    /// stays closed until the reference retreats.
+    pub release_s: f64,
 }
 
 /// Thresholds on the external forces that the momentum observer estimates; above them the motion

@@ -23,7 +23,7 @@ pub mod trajectory;
 #[path = "../../../tests/support/property.rs"]
 mod property;
 
-pub use controller::{codes, drive_guard, estimator, latch, observer};
+pub use controller::{codes, drive_guard, estimator, latch, observer, residual};
 pub use dynamics::inverse_kinematics;
 pub use law::{impedance, impedance_torque, learned as learned_torque, target, task, torques};
 pub use math::{linalg, sincos};

@@ -1,23 +1,18 @@
 //! Data behind the contact-detection parameters, for an arm with held roll (`wam4`).
 //!
-//! First table: for several bandwidths, the maximum opposing force beyond friction in free motion over
+//! For several bandwidths, the maximum opposing force beyond friction in free motion over
 //! perturbed models, and its minimum within 40 ms of a first touch. A threshold between the two distinguishes
 //! contact from free motion.
-//!
-//! Second table: for several fractions of the dry feed-forward left on in contact, the resting force minus the
-//! spring force, and the line of the impulse against stiffness.
+//! `contact_share` of the same folder chooses what the latch leaves of the friction feed-forward.
 
 use rayon::prelude::*;
 use supple_core::Trajectory;
 use supple_core::trajectory::Probe;
-use supple_experiment::metrics::LineFit;
-use supple_experiment::probing::{ContactMeter, Stroke, median_stroke};
 use supple_experiment::{ExperimentError, Mismatch, Plan, Setup, Variant, run, scenario};
 use supple_model::Description;
 use supple_plant::Scene;
 
 const BANDWIDTHS: [(f64, f64); 4] = [(180.0, 40.0), (400.0, 80.0), (500.0, 120.0), (600.0, 120.0)];
-const FRACTIONS: [f64; 5] = [0.0, 0.3, 0.55, 0.7, 1.0];
 const STIFFNESS_N_PER_M: [f64; 4] = [5.0, 25.0, 75.0, 125.0];
 /// A threshold that is never reached.
 const NEVER_N: f64 = 1e9;
@@ -50,46 +45,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let min_touch = touch.into_iter().fold(f64::MAX, f64::min);
         println!("{estimator:9}  {observer:8}  {max_free:11.2}  {min_touch:11.2}");
     }
-    println!("\nfraction  rest force - K e at 5, 25, 75, 125 N/m [N]   impulse over K [N s]");
-    let commanded_penetration_m = commanded_penetration_m(setup.tip_radius_m());
-    for fraction in FRACTIONS {
-        let strokes = STIFFNESS_N_PER_M
-            .par_iter()
-            .map(|stiffness| probe_once(&setup, *stiffness, fraction))
-            .collect::<Result<Vec<_>, _>>()?;
-        let beyond: Vec<String> = strokes
-            .iter()
-            .zip(STIFFNESS_N_PER_M)
-            .map(|(stroke, k)| format!("{:6.2}", stroke.rest_force_n - k * commanded_penetration_m))
-            .collect();
-        let points: Vec<_> = strokes
-            .iter()
-            .zip(STIFFNESS_N_PER_M)
-            .map(|(stroke, k)| (k, stroke.impulse_newton_s))
-            .collect();
-        if let Some(fit) = LineFit::new(&points) {
-            println!(
-                "{fraction:5}  {}                  {:.3} + {:.4} K, R2 {:.3}",
-                beyond.join(" "),
-                fit.intercept,
-                fit.slope,
-                fit.r2
-            );
-        }
-    }
     Ok(())
-}
-
-/// Mean commanded penetration of the cap into the block over the last 0.3 s of the stroke, the time over which
-/// the resting force is averaged \[m\].
-fn commanded_penetration_m(tip_radius_m: f64) -> f64 {
-    let (probe, _) = scenario::probe(tip_radius_m);
-    let stroke_s = probe.stroke_m / probe.speed_m_per_s + probe.ramp_s;
-    let below = |k: u32| {
-        let time_s = stroke_s - 1e-3 * f64::from(k);
-        scenario::FACE_M + tip_radius_m - Trajectory::Probe(probe).at(time_s).position.z
-    };
-    (0..300).map(below).sum::<f64>() / 300.0
 }
 
 fn free_plan(setup: &Setup<4>, seed: u64) -> Result<Plan<4>, ExperimentError> {
@@ -148,6 +104,8 @@ fn force_beyond_friction_uncertainty(
     plan.config.estimator_rad_per_s = estimator_rad_per_s;
     plan.config.latch.observer_rad_per_s = observer_rad_per_s;
     plan.config.latch.threshold_n = NEVER_N;
+    // The configured threshold, so that the uncertainty in it can be told.
+    plan.config.latch.false_alarms_per_hour = f64::INFINITY;
     let mut max_force_n = 0.0_f64;
     let mut touched_s = None;
     run(&plan, &mut |cycle, time_s| {
@@ -173,21 +131,4 @@ fn force_beyond_friction_uncertainty(
         Ok(())
     })?;
     Ok(max_force_n)
-}
-
-fn probe_once(
-    setup: &Setup<4>,
-    stiffness_n_per_m: f64,
-    contact_share: f64,
-) -> Result<Stroke, ExperimentError> {
-    let (mut plan, probe) = probing_plan(setup, stiffness_n_per_m)?;
-    plan.config.latch.contact_share = contact_share;
-    let mut meter = ContactMeter::new(probe);
-    run(&plan, &mut |cycle, time_s| {
-        if let Some(time_s) = time_s {
-            meter.cycle(time_s, &cycle.truth, cycle.steps, cycle.output.in_contact);
-        }
-        Ok(())
-    })?;
-    Ok(median_stroke(&meter.finish()))
 }

@@ -3,7 +3,7 @@
 use crate::demo_options::DemoOptions;
 use crate::error::ExperimentError;
 use crate::job::{
-    Job, JobResult, QUADRANT, QUADRANT_FAST, QUADRANT_PERTURBED, SEEDS, SPEEDS, jobs,
+    Job, JobResult, Probing, QUADRANT, QUADRANT_FAST, QUADRANT_PERTURBED, SEEDS, SPEEDS, jobs,
 };
 use crate::metrics::{LineFit, spread};
 use crate::probing::{Stroke, median_stroke};
@@ -12,8 +12,8 @@ use crate::run::Run;
 use crate::scenario;
 use crate::setup::Setup;
 use crate::summary::{
-    AtSpeed, ContactStatistics, ExactModel, ProbingSummary, QuadrantSummary, Summary, TorqueRms,
-    TrackingError,
+    AtSpeed, ContactStatistics, ExactModel, ImpulseSlope, ProbingSummary, QuadrantSummary, Summary,
+    TorqueRms, TrackingError,
 };
 use rayon::prelude::*;
 use supple_model::{Description, with_dof};
@@ -50,12 +50,15 @@ pub struct Demo {
     pub sinusoids: Vec<(f64, Run)>,
     /// The arc.
     pub arc: Run,
-    /// Figure 3b: with the exact model, with the perturbed model, and at the paper's maximum speed.
-    pub quadrants: [Run; 3],
+    /// Figure 3b: with the exact model, with the perturbed model, at the paper's maximum speed, and there with
+    /// more damping.
+    pub quadrants: [Run; 4],
     /// Figures 5 and 6.
     pub probing: Vec<ProbingRun>,
     /// Probing with the friction feed-forward left on in contact.
     pub probing_fade_off: Vec<ProbingRun>,
+    /// Probing on rubber, at 5 and 125 N/m.
+    pub probing_rubber: Vec<ProbingRun>,
     /// Equation (3.6) exactly as printed.
     pub paper_letter: Run,
 }
@@ -135,10 +138,15 @@ fn tracking(run: &Run) -> TrackingError {
 }
 
 fn exploration(stiffness_n_per_m: f64, done: &JobResult) -> ProbingSummary {
+    let contact = median_stroke(&done.strokes);
     ProbingSummary {
         stiffness_n_per_m,
         damping_n_s_per_m: scenario::gains(stiffness_n_per_m).damping_n_s_per_m.x,
-        contact: median_stroke(&done.strokes),
+        effective_mass_kg: done.effective_mass_kg,
+        impact_theory_newton_s: done.effective_mass_kg
+            * contact.approach_m_per_s
+            * (1.0 + contact.restitution),
+        contact,
         free_rms_m: done.free_rms_m,
         ended: done.run.ended.clone(),
     }
@@ -159,9 +167,26 @@ fn contact(explorations: &[ProbingSummary]) -> ContactStatistics {
         .collect();
     ContactStatistics {
         impulse_fit: LineFit::new(&points),
+        impulse_slopes: slopes(explorations),
         peak_spread: spread(&peaks),
         peak_over_speed_spread: spread(&over_speed),
     }
+}
+
+fn slopes(explorations: &[ProbingSummary]) -> Vec<ImpulseSlope> {
+    let pairs = explorations.windows(2);
+    pairs
+        .map(|pair| {
+            let (low, high) = (&pair[0], &pair[1]);
+            let (from_n_per_m, to_n_per_m) = (low.stiffness_n_per_m, high.stiffness_n_per_m);
+            let impulse_newton_s = high.contact.impulse_newton_s - low.contact.impulse_newton_s;
+            ImpulseSlope {
+                from_n_per_m,
+                to_n_per_m,
+                slope: impulse_newton_s / (to_n_per_m - from_n_per_m),
+            }
+        })
+        .collect()
 }
 
 /// Distributes the job results.
@@ -177,30 +202,26 @@ impl Results {
         done.expect("every job is run once and taken once")
     }
 
-    fn probing(&mut self, fade: bool) -> Vec<ProbingRun> {
-        scenario::PROBING_STIFFNESS_N_PER_M
-            .map(|stiffness_n_per_m| {
-                let done = self.take(Job::Probing {
-                    stiffness_n_per_m,
-                    fade,
-                });
-                ProbingRun {
-                    exploration: exploration(stiffness_n_per_m, &done),
-                    run: done.run,
-                    strokes: done.strokes,
-                }
-            })
-            .into()
+    fn probing(&mut self, stiffness: &[f64], kind: Probing) -> Vec<ProbingRun> {
+        let runs = stiffness.iter().map(|stiffness_n_per_m| {
+            let stiffness_n_per_m = *stiffness_n_per_m;
+            let done = self.take(Job::Probing {
+                stiffness_n_per_m,
+                kind,
+            });
+            ProbingRun {
+                exploration: exploration(stiffness_n_per_m, &done),
+                run: done.run,
+                strokes: done.strokes,
+            }
+        });
+        runs.collect()
     }
 
     fn quadrant(&mut self, job: Job) -> (Run, QuadrantSummary) {
         let done = self.take(job);
-        let speed_m_per_s = match job {
-            Job::Quadrant { speed_m_per_s, .. } => speed_m_per_s,
-            _ => 0.0,
-        };
         let summary = QuadrantSummary {
-            speed_m_per_s,
+            speed_m_per_s: job.quadrant_speed_m_per_s(),
             tracking: tracking(&done.run),
             edges: done.edges,
         };
@@ -228,8 +249,14 @@ fn assemble(
     let (slow, quadrant) = results.quadrant(QUADRANT);
     let (perturbed, quadrant_perturbed) = results.quadrant(QUADRANT_PERTURBED);
     let (fast, quadrant_at_paper_speed) = results.quadrant(QUADRANT_FAST);
-    let probing = results.probing(true);
-    let probing_fade_off = results.probing(false);
+    let (damped, quadrant_damped) = results.quadrant(Job::QuadrantDamped);
+    let all = &scenario::PROBING_STIFFNESS_N_PER_M;
+    let two = &scenario::PAPER_STIFFNESS_N_PER_M;
+    let probing = results.probing(all, Probing::Plain);
+    let probing_fade_off = results.probing(all, Probing::FadeOff);
+    let [probing_exact, probing_rubber, probing_apparent] =
+        Probing::AT_TWO.map(|kind| results.probing(two, kind));
+    let apparent_inertia = results.take(Job::ApparentInertia).run;
     let lines = |runs: &[ProbingRun]| -> Vec<ProbingSummary> {
         runs.iter().map(|run| run.exploration.clone()).collect()
     };
@@ -271,6 +298,11 @@ fn assemble(
         exploration,
         fade_off: contact(&exploration_fade_off),
         exploration_fade_off,
+        exploration_exact_model: lines(&probing_exact),
+        exploration_rubber: lines(&probing_rubber),
+        exploration_apparent_inertia: lines(&probing_apparent),
+        sinusoid_apparent_inertia: tracking(&apparent_inertia),
+        quadrant_damped,
         sinusoid_exact_model: ExactModel {
             coulomb: exact(&mut results, false),
             stribeck: exact(&mut results, true),
@@ -283,9 +315,10 @@ fn assemble(
         summary,
         sinusoids,
         arc,
-        quadrants: [slow, perturbed, fast],
+        quadrants: [slow, perturbed, fast, damped],
         probing,
         probing_fade_off,
+        probing_rubber,
         paper_letter,
     }
 }

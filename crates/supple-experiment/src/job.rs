@@ -4,14 +4,18 @@ use crate::demo_options::DemoOptions;
 use crate::error::ExperimentError;
 use crate::metrics::Rms;
 use crate::mismatch::Mismatch;
-use crate::probing::{ContactMeter, Stroke};
+use crate::probing::{ContactMeter, Stroke, effective_mass_kg};
 use crate::quadrant::{Edge, EdgeMeter};
 use crate::record::Recorder;
 use crate::run::{Plan, Run, run};
 use crate::scenario;
 use crate::setup::{Setup, Variant};
+use crate::start::start_pose;
 
 use supple_core::Trajectory;
+use supple_core::config::ApparentInertia;
+use supple_core::inverse_kinematics::inverse_kinematics;
+use supple_core::nalgebra::{Matrix3, Vector3};
 use supple_core::trajectory::{Probe, ProbePhase};
 use supple_model::Description;
 use supple_plant::Scene;
@@ -26,13 +30,57 @@ const CLEARANCE_M: f64 = 0.01;
 /// One run of the demo.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Job {
-    Sinusoid { speed: f64 },
+    Sinusoid {
+        speed: f64,
+    },
     Arc,
-    Quadrant { speed_m_per_s: f64, exact: bool },
+    Quadrant {
+        speed_m_per_s: f64,
+        exact: bool,
+    },
+    QuadrantDamped,
     Seed(u64),
-    Exact { stribeck: bool },
+    Exact {
+        stribeck: bool,
+    },
     PaperLetter,
-    Probing { stiffness_n_per_m: f64, fade: bool },
+    Probing {
+        stiffness_n_per_m: f64,
+        kind: Probing,
+    },
+    ApparentInertia,
+}
+
+/// What differs between probing runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Probing {
+    /// Perturbed model, friction feed-forward fades in contact.
+    Plain,
+    /// The friction feed-forward stays on.
+    FadeOff,
+    /// The plant's own parameters.
+    Exact,
+    /// A sheet of rubber on the block.
+    Rubber,
+    /// Apparent inertia by the force sensor.
+    ApparentInertia,
+}
+
+impl Probing {
+    /// The runs over all stiffnesses.
+    pub const OVER_ALL: [Probing; 2] = [Probing::Plain, Probing::FadeOff];
+    /// The runs at the stiffnesses of the paper's figure 5.
+    pub const AT_TWO: [Probing; 3] = [Probing::Exact, Probing::Rubber, Probing::ApparentInertia];
+
+    fn suffix(self) -> &'static str {
+        match self {
+            Probing::Plain => "",
+            Probing::FadeOff => "_fade_off",
+            Probing::Exact => "_exact",
+            Probing::Rubber => "_rubber",
+            Probing::ApparentInertia => "_apparent_inertia",
+        }
+    }
 }
 
 pub(crate) const QUADRANT: Job = Job::Quadrant {
@@ -54,24 +102,31 @@ pub(crate) struct JobResult {
     pub strokes: Vec<Stroke>,
     pub edges: Vec<Edge>,
     pub free_rms_m: f64,
+    /// Mass with which the tip of a probing run meets the block \[kg\]; zero in others.
+    pub effective_mass_kg: f64,
 }
 
 /// All runs, the longest first so that all cores finish at about the same time.
 pub(crate) fn jobs() -> Vec<Job> {
     let mut jobs = Vec::new();
-    for fade in [true, false] {
-        for stiffness_n_per_m in scenario::PROBING_STIFFNESS_N_PER_M {
-            jobs.push(Job::Probing {
-                stiffness_n_per_m,
-                fade,
-            });
-        }
+    let mut probing = |stiffness: &[f64], kind| {
+        jobs.extend(stiffness.iter().map(|stiffness_n_per_m| Job::Probing {
+            stiffness_n_per_m: *stiffness_n_per_m,
+            kind,
+        }));
+    };
+    for kind in Probing::OVER_ALL {
+        probing(&scenario::PROBING_STIFFNESS_N_PER_M, kind);
+    }
+    for kind in Probing::AT_TWO {
+        probing(&scenario::PAPER_STIFFNESS_N_PER_M, kind);
     }
     jobs.extend(SPEEDS.map(|speed| Job::Sinusoid { speed }));
     jobs.push(Job::Arc);
     jobs.extend((0..SEEDS).map(Job::Seed));
     jobs.extend([false, true].map(|stribeck| Job::Exact { stribeck }));
     jobs.extend([QUADRANT, QUADRANT_PERTURBED, QUADRANT_FAST]);
+    jobs.extend([Job::QuadrantDamped, Job::ApparentInertia]);
     jobs.push(Job::PaperLetter);
     jobs
 }
@@ -94,11 +149,10 @@ impl Job {
             Job::PaperLetter => "sinusoid_paper_letter".to_owned(),
             Job::Probing {
                 stiffness_n_per_m,
-                fade,
-            } => {
-                let fade = if *fade { "" } else { "_fade_off" };
-                format!("probing_{stiffness_n_per_m}_n_per_m{fade}")
-            }
+                kind,
+            } => format!("probing_{stiffness_n_per_m}_n_per_m{}", kind.suffix()),
+            Job::QuadrantDamped => "quadrant_damped".to_owned(),
+            Job::ApparentInertia => "sinusoid_apparent_inertia".to_owned(),
         }
     }
 
@@ -108,8 +162,11 @@ impl Job {
             ..Variant::EXACT
         };
         match *self {
-            Job::Sinusoid { .. } | Job::Arc | Job::Quadrant { exact: false, .. } => perturbed(0),
-            Job::Quadrant { exact: true, .. } => Variant::EXACT,
+            Job::Sinusoid { .. }
+            | Job::Arc
+            | Job::ApparentInertia
+            | Job::Quadrant { exact: false, .. } => perturbed(0),
+            Job::Quadrant { exact: true, .. } | Job::QuadrantDamped => Variant::EXACT,
             Job::Seed(offset) => perturbed(offset),
             Job::PaperLetter => Variant {
                 paper_letter: true,
@@ -121,9 +178,12 @@ impl Job {
                 load: false,
                 ..Variant::EXACT
             },
-            Job::Probing { fade, .. } => Variant {
-                fade,
-                ..Variant::EXACT
+            Job::Probing { kind, .. } => Variant {
+                fade: kind != Probing::FadeOff,
+                ..match kind {
+                    Probing::Exact => Variant::EXACT,
+                    _ => perturbed(0),
+                }
             },
         }
     }
@@ -131,16 +191,26 @@ impl Job {
     fn trajectory(&self, tip_radius_m: f64) -> (Trajectory, f64) {
         match *self {
             Job::Sinusoid { speed } => scenario::sinusoid(speed),
-            Job::Seed(_) | Job::Exact { .. } | Job::PaperLetter => scenario::sinusoid(1.0),
+            Job::Seed(_) | Job::Exact { .. } | Job::PaperLetter | Job::ApparentInertia => {
+                scenario::sinusoid(1.0)
+            }
             Job::Arc => scenario::arc(),
-            Job::Quadrant { speed_m_per_s, .. } => {
-                let (quadrant, duration_s) = scenario::quadrant(speed_m_per_s);
+            Job::Quadrant { .. } | Job::QuadrantDamped => {
+                let (quadrant, duration_s) = scenario::quadrant(self.quadrant_speed_m_per_s());
                 (Trajectory::Quadrant(quadrant), duration_s)
             }
             Job::Probing { .. } => {
                 let (probe, duration_s) = scenario::probe(tip_radius_m);
                 (Trajectory::Probe(probe), duration_s)
             }
+        }
+    }
+
+    /// Speed of a quadrant \[m/s\].
+    pub fn quadrant_speed_m_per_s(&self) -> f64 {
+        match *self {
+            Job::Quadrant { speed_m_per_s, .. } => speed_m_per_s,
+            _ => scenario::QUADRANT_PAPER_SPEED_M_PER_S,
         }
     }
 
@@ -153,12 +223,28 @@ impl Job {
         let mut config = setup.config(&variant)?;
         let mut scene = Scene::default();
         config.law.gains = scenario::gains(scenario::STIFFNESS_N_PER_M);
-        if let Job::Probing {
-            stiffness_n_per_m, ..
-        } = *self
-        {
-            config.law.gains = scenario::gains(stiffness_n_per_m);
-            scene = scenario::block();
+        let mut apparent = *self == Job::ApparentInertia;
+        match *self {
+            Job::Probing {
+                stiffness_n_per_m,
+                kind,
+            } => {
+                config.law.gains = scenario::gains(stiffness_n_per_m);
+                scene = match kind {
+                    Probing::Rubber => scenario::rubber_block(),
+                    _ => scenario::block(),
+                };
+                apparent = kind == Probing::ApparentInertia;
+            }
+            Job::QuadrantDamped => {
+                let damping = Vector3::repeat(scenario::CORNER_DAMPING_N_S_PER_M);
+                config.law.gains.damping_n_s_per_m = damping;
+            }
+            _ => {}
+        }
+        if apparent {
+            let inertia = Matrix3::identity() * scenario::APPARENT_INERTIA_KG;
+            config.law.inertia = ApparentInertia::Chosen(inertia);
         }
         let (trajectory, duration_s) = self.trajectory(setup.tip_radius_m());
         Ok(Plan {
@@ -206,7 +292,7 @@ impl Job {
             };
             let error_m = (reference.position - cycle.truth.tip_position_m).norm();
             if let Some((meter, probe)) = &mut contact {
-                meter.cycle(time_s, &cycle.truth, cycle.steps, cycle.output.in_contact);
+                meter.cycle(time_s, &cycle.truth, cycle.steps, &cycle.output);
                 if is_free(probe, time_s, reference.position.z - face_m) {
                     free.add(error_m);
                 }
@@ -224,8 +310,26 @@ impl Job {
             strokes: contact.map_or_else(Vec::new, |(meter, _)| meter.finish()),
             edges: edges.map_or_else(Vec::new, EdgeMeter::finish),
             free_rms_m: free.rms(),
+            effective_mass_kg: touch_mass_kg(plan),
         })
     }
+}
+
+/// Mass with which the plant's tip meets the block in the first stroke \[kg\]; zero without a stroke.
+fn touch_mass_kg<const N: usize>(plan: &Plan<N>) -> f64 {
+    let Trajectory::Probe(probe) = plan.trajectory else {
+        return 0.0;
+    };
+    let config = &plan.config;
+    let start = start_pose(config, &plan.name, &plan.trajectory, probe.stroke_s());
+    let mass = start.ok().and_then(|start| {
+        let mut touch_m = plan.trajectory.at(0.0).position;
+        touch_m.z = scenario::FACE_M + plan.plant.tip_radius_m;
+        let (arm, roles) = (&config.arm, &config.roles);
+        let touch = inverse_kinematics(arm, roles, &config.limits, &start, &touch_m);
+        effective_mass_kg(&plan.plant.arm, &touch.position_rad, &Vector3::z())
+    });
+    mass.unwrap_or(0.0)
 }
 
 /// Whether the reference descends and is not yet near the block.

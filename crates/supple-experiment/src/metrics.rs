@@ -32,6 +32,29 @@ impl Rms {
     }
 }
 
+/// Running mean.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Mean {
+    sum: f64,
+    count: u64,
+}
+
+impl Mean {
+    /// Adds a value.
+    pub fn add(&mut self, value: f64) {
+        self.sum += value;
+        self.count += 1;
+    }
+
+    /// Mean; zero without values.
+    pub fn mean(&self) -> f64 {
+        if self.count == 0 {
+            return 0.0;
+        }
+        self.sum / self.count as f64
+    }
+}
+
 /// Straight line through points by least squares.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct LineFit {

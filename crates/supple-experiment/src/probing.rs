@@ -1,14 +1,19 @@
 //! Contact quantities of a probing run: one [`Stroke`] for each stroke.
 
-use crate::metrics::median;
+use crate::metrics::{Mean, median};
 use serde::Serialize;
+use supple_core::dynamics::{crba, jacobian};
+use supple_core::nalgebra::Vector3;
 use supple_core::trajectory::{Probe, ProbePhase};
+use supple_core::{Arm, Output, Vector};
 use supple_plant::{StepRecord, Truth};
 
 /// Duration of the first transient, from the first touch on \[s\].
 const TRANSIENT_S: f64 = 0.05;
-/// Time before the reversal of the reference over which the resting force is averaged \[s\].
+/// Last part of the way down over which [`Stroke::rest_force_n`] is averaged \[s\].
 const REST_S: f64 = 0.3;
+/// Last part of the dwell over which the force while pressing is averaged \[s\].
+const PRESSING_S: f64 = 0.5;
 
 /// Contact in one stroke.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -17,16 +22,41 @@ pub struct Stroke {
     pub approach_m_per_s: f64,
     /// Maximum vertical force of the first transient, as the 100 Hz filter of the sensor reports it \[N\].
     pub peak_filtered_n: f64,
-    /// Time in contact from the start of this stroke to the start of the next \[s\].
+    /// Time in contact from the start of this stroke to the start of the next, without the dwell, which the
+    /// paper's cycle does not have \[s\].
     pub contact_s: f64,
     /// Integral of the vertical force over the same time \[N s\].
     pub impulse_newton_s: f64,
+    /// Integral of the vertical force over the first impact, from the first touch until the tip leaves the block
+    /// again \[N s\].
+    pub impact_newton_s: f64,
+    /// Speed at which the tip leaves the block after the first impact, over `approach_m_per_s`.
+    pub restitution: f64,
+    /// Integral over the same time as `impulse_newton_s`, from the first touch on, of the force that the spring asks
+    /// for: `K (X - Xo)` with the true tip, where it presses \[N s\].
+    pub spring_impulse_newton_s: f64,
     /// Integral of the vertical force over the first 50 ms after the first touch \[N s\].
     pub impulse_first_50ms_newton_s: f64,
-    /// Mean vertical force over the last 0.3 s before the reversal of the reference \[N\].
+    /// Mean vertical force over the last 0.3 s of the way down \[N\]: while the reference slows down to rest, the
+    /// friction feed-forward falls to nothing. It is no force at rest; `pressing_force_n` is.
     pub rest_force_n: f64,
+    /// Mean vertical force while pressing: over the last 0.5 s of the dwell, in which the reference rests at the
+    /// bottom of the stroke \[N\]. Zero without a dwell.
+    pub pressing_force_n: f64,
+    /// Mean vertical force that the spring asks for over the same time, `K (X - Xo)` with the true tip \[N\].
+    pub spring_force_n: f64,
     /// Time from the first touch until contact was detected \[s\]; `None` if it was not.
     pub latched_after_s: Option<f64>,
+}
+
+/// Progress of the first impact of a stroke.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Impact {
+    Before,
+    Touching,
+    /// The tip has left the block within the last cycle.
+    Left,
+    Over,
 }
 
 /// Collects strokes from the cycles of a run.
@@ -35,9 +65,12 @@ pub struct ContactMeter {
     probe: Probe,
     current: Option<((u32, u32), Stroke)>,
     first_touch_s: Option<f64>,
+    /// The first impact: before it, in it, just over, over.
+    impact: Impact,
     last_speed_m_per_s: f64,
-    rest_force_sum_n: f64,
-    rest_cycles: u32,
+    rest_n: Mean,
+    pressing_n: Mean,
+    spring_n: Mean,
     finished: Vec<Stroke>,
 }
 
@@ -48,21 +81,23 @@ impl ContactMeter {
             probe,
             current: None,
             first_touch_s: None,
+            impact: Impact::Before,
             last_speed_m_per_s: 0.0,
-            rest_force_sum_n: 0.0,
-            rest_cycles: 0,
+            rest_n: Mean::default(),
+            pressing_n: Mean::default(),
+            spring_n: Mean::default(),
             finished: Vec::new(),
         }
     }
 
     /// Adds one controller cycle. `time_s` is the time since the start of the trajectory, `truth` the plant's
-    /// state at the start of the cycle.
+    /// state at the start of the cycle, `output` the controller's answer.
     pub fn cycle<const N: usize>(
         &mut self,
         time_s: f64,
         truth: &Truth<N>,
         steps: &[StepRecord],
-        in_contact: bool,
+        output: &Output<N>,
     ) {
         let (phase, phase_time_s, stroke, column) = self.probe.phase_at(time_s);
         let id = (column, stroke);
@@ -73,6 +108,18 @@ impl ContactMeter {
         let Some((_, record)) = &mut self.current else {
             return;
         };
+        if self.impact == Impact::Left {
+            self.impact = Impact::Over;
+            record.restitution = truth.tip_velocity_m_per_s.z / record.approach_m_per_s;
+        }
+        let pull_n = output.reference.map_or(0.0, |reference| {
+            let above_m = truth.tip_position_m.z - reference.position.z;
+            output.gains.stiffness_n_per_m.z * above_m
+        });
+        let period_s = steps.last().map_or(0.0, |step| step.time_s - truth.time_s);
+        if self.first_touch_s.is_some() && phase != ProbePhase::Dwell {
+            record.spring_impulse_newton_s += pull_n.max(0.0) * period_s;
+        }
         let mut before_s = truth.time_s;
         for step in steps {
             let dt_s = step.time_s - before_s;
@@ -80,10 +127,20 @@ impl ContactMeter {
             let force_n = step.force_n.z;
             if force_n > 0.0 && self.first_touch_s.is_none() {
                 self.first_touch_s = Some(step.time_s);
+                self.impact = Impact::Touching;
                 record.approach_m_per_s = self.last_speed_m_per_s;
             }
-            record.impulse_newton_s += force_n * dt_s;
-            if force_n > 0.0 {
+            if self.impact == Impact::Touching {
+                record.impact_newton_s += force_n * dt_s;
+                if force_n <= 0.0 {
+                    self.impact = Impact::Left;
+                }
+            }
+            let counts = phase != ProbePhase::Dwell;
+            if counts {
+                record.impulse_newton_s += force_n * dt_s;
+            }
+            if counts && force_n > 0.0 {
                 record.contact_s += dt_s;
             }
             if let Some(touch_s) = self.first_touch_s
@@ -94,25 +151,27 @@ impl ContactMeter {
             }
         }
         self.last_speed_m_per_s = -truth.tip_velocity_m_per_s.z;
-        if in_contact && record.latched_after_s.is_none() {
+        if output.in_contact && record.latched_after_s.is_none() {
             record.latched_after_s = self.first_touch_s.map(|touch_s| truth.time_s - touch_s);
         }
-        let stroke_s = self.probe.stroke_m / self.probe.speed_m_per_s + self.probe.ramp_s;
-        if phase == ProbePhase::Down && phase_time_s > stroke_s - REST_S {
-            self.rest_force_sum_n += truth.contact_force_n.z;
-            self.rest_cycles += 1;
+        let force_n = truth.contact_force_n.z;
+        if phase == ProbePhase::Down && phase_time_s > self.probe.stroke_s() - REST_S {
+            self.rest_n.add(force_n);
+        }
+        if phase == ProbePhase::Dwell && phase_time_s > self.probe.dwell_s - PRESSING_S {
+            self.pressing_n.add(force_n);
+            self.spring_n.add(pull_n);
         }
     }
 
     fn finish_stroke(&mut self) {
         if let Some((_, mut stroke)) = self.current.take() {
-            if self.rest_cycles > 0 {
-                stroke.rest_force_n = self.rest_force_sum_n / f64::from(self.rest_cycles);
-            }
+            stroke.rest_force_n = core::mem::take(&mut self.rest_n).mean();
+            stroke.pressing_force_n = core::mem::take(&mut self.pressing_n).mean();
+            stroke.spring_force_n = core::mem::take(&mut self.spring_n).mean();
             self.finished.push(stroke);
         }
-        self.first_touch_s = None;
-        (self.rest_force_sum_n, self.rest_cycles) = (0.0, 0);
+        (self.first_touch_s, self.impact) = (None, Impact::Before);
     }
 
     /// All strokes, the unfinished last one included.
@@ -120,6 +179,18 @@ impl ContactMeter {
         self.finish_stroke();
         self.finished
     }
+}
+
+/// Mass with which the tip meets a force along `direction`, a unit vector, at the pose `q`: `1 / (n' J H^-1 J' n)`
+/// \[kg\], for joints that are free to move. `None` if the pose is singular.
+pub fn effective_mass_kg<const N: usize>(
+    arm: &Arm<N>,
+    q: &Vector<N>,
+    direction: &Vector3<f64>,
+) -> Option<f64> {
+    let turning = jacobian(arm, q).fixed_rows::<3>(0).tr_mul(direction);
+    let mobility = crba(arm, q).cholesky()?.solve(&turning).dot(&turning);
+    (mobility > 0.0).then(|| 1.0 / mobility)
 }
 
 /// Median of each quantity over the strokes.
@@ -134,8 +205,13 @@ pub fn median_stroke(strokes: &[Stroke]) -> Stroke {
         peak_filtered_n: median_of(&|s| s.peak_filtered_n),
         contact_s: median_of(&|s| s.contact_s),
         impulse_newton_s: median_of(&|s| s.impulse_newton_s),
+        impact_newton_s: median_of(&|s| s.impact_newton_s),
+        restitution: median_of(&|s| s.restitution),
+        spring_impulse_newton_s: median_of(&|s| s.spring_impulse_newton_s),
         impulse_first_50ms_newton_s: median_of(&|s| s.impulse_first_50ms_newton_s),
         rest_force_n: median_of(&|s| s.rest_force_n),
+        pressing_force_n: median_of(&|s| s.pressing_force_n),
+        spring_force_n: median_of(&|s| s.spring_force_n),
         latched_after_s: median(&latched),
     }
 }

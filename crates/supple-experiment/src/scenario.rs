@@ -3,14 +3,21 @@
 use supple_core::Trajectory;
 use supple_core::config::Gains;
 use supple_core::trajectory::{Arc, Probe, Quadrant, Sinusoid};
-use supple_plant::{FixedBlock, Scene};
+use supple_plant::{FixedBlock, Layer, Scene};
 
 /// Stiffness of the free-motion experiments \[N/m\].
 pub const STIFFNESS_N_PER_M: f64 = 5.0;
 /// Damping of the free-motion experiments \[N s/m\].
 pub const DAMPING_N_S_PER_M: f64 = 1.5;
-/// Stiffnesses of the probing runs \[N/m\]; the fits of figure 6 start at the second.
-pub const PROBING_STIFFNESS_N_PER_M: [f64; 7] = [0.5, 5.0, 25.0, 50.0, 75.0, 100.0, 125.0];
+/// Stiffnesses of the probing runs \[N/m\].
+pub const PROBING_STIFFNESS_N_PER_M: [f64; 9] =
+    [0.5, 1.0, 2.0, 5.0, 25.0, 50.0, 75.0, 100.0, 125.0];
+/// Stiffnesses of the paper's figure 5 \[N/m\], at which variants are run too.
+pub const PAPER_STIFFNESS_N_PER_M: [f64; 2] = [5.0, 125.0];
+/// Damping with which the error after a corner dies out within an edge at the paper's speed \[N s/m\].
+pub const CORNER_DAMPING_N_S_PER_M: f64 = 15.0;
+/// Apparent inertia of the runs that use the force sensor \[kg\].
+pub const APPARENT_INERTIA_KG: f64 = 1.0;
 /// Speed of the quadrant in the headline run \[m/s\].
 pub const QUADRANT_SPEED_M_PER_S: f64 = 0.02 * core::f64::consts::PI;
 /// Maximum commanded speed in the paper \[m/s\].
@@ -19,6 +26,10 @@ pub const QUADRANT_PAPER_SPEED_M_PER_S: f64 = 0.1 * core::f64::consts::PI;
 pub const FACE_M: f64 = 0.0;
 /// Length of the stroke before the cap meets the face \[m\].
 const FACE_INTO_STROKE_M: f64 = 0.06;
+/// Rest at the bottom of the stroke, over whose last half the force while pressing is averaged \[s\].
+pub const PROBE_DWELL_S: f64 = 1.0;
+/// Thickness of the rubber sheet \[m\].
+const RUBBER_M: f64 = 0.005;
 /// Number of columns of a probing run; the base rotates by one step between them.
 const COLUMNS: u32 = 2;
 
@@ -70,8 +81,23 @@ pub fn probe(tip_radius_m: f64) -> (Probe, f64) {
         azimuth_step_rad: 0.05,
         speed_m_per_s: 0.04,
         ramp_s: 0.25,
+        dwell_s: PROBE_DWELL_S,
     };
     (probe, probe.column_s() * f64::from(COLUMNS))
+}
+
+/// The block with a sheet of rubber on its face, at the same height.
+pub fn rubber_block() -> Scene {
+    let mut scene = block();
+    for block in &mut scene.fixed_blocks {
+        // The layer lies on top of the block.
+        block.center_m[2] -= RUBBER_M;
+        block.layer = Some(Layer {
+            thickness_m: RUBBER_M,
+            material: "rubber".to_owned(),
+        });
+    }
+    scene
 }
 
 /// The wooden block beneath the probing cycle.

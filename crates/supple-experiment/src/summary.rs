@@ -59,6 +59,11 @@ pub struct ProbingSummary {
     pub stiffness_n_per_m: f64,
     /// `B` \[N s/m\].
     pub damping_n_s_per_m: f64,
+    /// Mass with which the plant's tip meets the block, at the pose of the first touch and with all joints free
+    /// \[kg\]; zero at a singular pose.
+    pub effective_mass_kg: f64,
+    /// `m v (1 + e)`: impulse of an impact of that mass at `approach_m_per_s` with `restitution` \[N s\].
+    pub impact_theory_newton_s: f64,
     /// Contact: each value is the median over the strokes.
     #[serde(flatten)]
     pub contact: Stroke,
@@ -69,11 +74,26 @@ pub struct ProbingSummary {
     pub ended: Option<FaultEnd>,
 }
 
+/// Impulse between two neighbouring stiffnesses.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ImpulseSlope {
+    /// Lower stiffness \[N/m\].
+    pub from_n_per_m: f64,
+    /// Higher stiffness \[N/m\].
+    pub to_n_per_m: f64,
+    /// Change of the impulse over that of the stiffness \[N s per N/m\].
+    pub slope: f64,
+}
+
 /// Statistics over the probing runs with K of at least 5 N/m.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ContactStatistics {
-    /// Line of impulse against stiffness \[N s per N/m; N s\]; `None` if the runs do not determine a line.
+    /// Line of impulse against stiffness \[N s per N/m; N s\]; `None` if the runs do not determine a line. The
+    /// impulse is curved over the stiffness: the intercept is neither the impact nor the impulse at low stiffness,
+    /// which the runs have.
     pub impulse_fit: Option<LineFit>,
+    /// The curve: slope of the impulse from each stiffness to the next, over all runs.
+    pub impulse_slopes: Vec<ImpulseSlope>,
     /// (max - min) / median of the peak force of the first transient.
     pub peak_spread: Option<f64>,
     /// (max - min) / median of that peak force divided by the approach speed.
@@ -120,9 +140,9 @@ pub struct Summary {
     pub quadrant: QuadrantSummary,
     /// Figure 3b with the perturbed model.
     pub quadrant_perturbed: QuadrantSummary,
-    /// Figure 3b at the paper's maximum speed.
+    /// Figure 3b at the paper's maximum speed, with the unperturbed model.
     pub quadrant_at_paper_speed: QuadrantSummary,
-    /// Figures 5 and 6.
+    /// Figures 5 and 6, with the perturbed model.
     pub exploration: Vec<ProbingSummary>,
     /// Statistics over these runs.
     #[serde(flatten)]
@@ -131,6 +151,16 @@ pub struct Summary {
     pub exploration_fade_off: Vec<ProbingSummary>,
     /// Statistics over these runs.
     pub fade_off: ContactStatistics,
+    /// Probing at 5 and 125 N/m with the plant's own parameters in the model: without the model error.
+    pub exploration_exact_model: Vec<ProbingSummary>,
+    /// Probing at 5 and 125 N/m on a block with a sheet of rubber, perturbed model.
+    pub exploration_rubber: Vec<ProbingSummary>,
+    /// Probing at 5 and 125 N/m with an apparent inertia of 1 kg by the force sensor, (3.6) whole; perturbed model.
+    pub exploration_apparent_inertia: Vec<ProbingSummary>,
+    /// Figure 3a with that apparent inertia, perturbed model.
+    pub sinusoid_apparent_inertia: TrackingError,
+    /// Figure 3b at the paper's maximum speed with the damping raised to [`crate::scenario::CORNER_DAMPING_N_S_PER_M`].
+    pub quadrant_damped: QuadrantSummary,
     /// Sinusoid with the plant's own parameters in the model.
     pub sinusoid_exact_model: ExactModel,
     /// Sinusoid with equation (3.6) exactly as printed.

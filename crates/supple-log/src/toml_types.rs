@@ -152,6 +152,19 @@ pub(crate) struct ContactLatchDef {
     reversal_s: f64,
     fade_s: f64,
     restore_s: f64,
+    /// Logs from before these four replay without them.
+    #[serde(default)]
+    settle_s: f64,
+    #[serde(default)]
+    hold_friction: bool,
+    #[serde(default = "infinite")]
+    false_alarms_per_hour: f64,
+    #[serde(default = "infinite")]
+    release_s: f64,
+}
+
+fn infinite() -> f64 {
+    f64::INFINITY
 }
 
 #[derive(Serialize, Deserialize)]

@@ -250,6 +250,10 @@ impl Description {
             reversal_s: latch.reversal_s,
             fade_s: latch.fade_s,
             restore_s: latch.restore_s,
+            settle_s: latch.settle_s,
+            hold_friction: latch.hold_friction,
+            false_alarms_per_hour: latch.false_alarms_per_hour,
+            release_s: latch.release_s,
         }
     }
 }

@@ -397,6 +397,18 @@ pub struct LatchSettings {
     pub fade_s: f64,
     /// Time for the feed-forward to return to full after release (s). Default 0.05.
     pub restore_s: f64,
+    /// Time from contact to the beginning of the fade (s): with all of the feed-forward the tip settles on what it
+    /// met, instead of hovering where the joints' friction holds it after a bounce. Default 0.1.
+    pub settle_s: f64,
+    /// Keeps the feed-forward of the moment of contact until release, instead of following a reference that the
+    /// blocked arm does not follow. Default true.
+    pub hold_friction: bool,
+    /// Rate of false alarms in free motion for which the residuals of the model in use set the threshold, from half
+    /// to five times the configured one (1/h); `inf`: the threshold stays as configured. Default 1.
+    pub false_alarms_per_hour: f64,
+    /// Time after which a latch opens that nothing but the force speaks for (s); `inf`: every latch stays closed
+    /// until the reference retreats. Default 0.2.
+    pub release_s: f64,
 }
 
 /// Tool at the tip, in tip frame coordinates: force sensor and cap.
@@ -496,6 +508,10 @@ impl Default for LatchSettings {
             reversal_s: 0.2,
             fade_s: 0.01,
             restore_s: 0.05,
+            settle_s: 0.1,
+            hold_friction: true,
+            false_alarms_per_hour: 1.0,
+            release_s: 0.2,
         }
     }
 }

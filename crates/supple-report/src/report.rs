@@ -21,7 +21,7 @@ struct Report<'a> {
     logs: bool,
     faults: Vec<String>,
     parts: Vec<Part<'a>>,
-    stiffness_tables: [StiffnessTable; 2],
+    stiffness_tables: [StiffnessTable; 5],
     gravity_off: String,
     friction_off: String,
     contact_stiffness: String,
@@ -36,8 +36,8 @@ struct Part<'a> {
 
 struct StiffnessTable {
     title: &'static str,
-    head: [&'static str; 9],
-    rows: Vec<[String; 9]>,
+    head: [&'static str; 13],
+    rows: Vec<[String; 13]>,
 }
 
 /// Renders the report of a demo.
@@ -77,6 +77,18 @@ pub fn html(
             stiffness_table(
                 "Friction feed-forward stays on",
                 &summary.exploration_fade_off,
+            ),
+            stiffness_table(
+                "The plant's own parameters in the model",
+                &summary.exploration_exact_model,
+            ),
+            stiffness_table(
+                "A sheet of rubber on the block",
+                &summary.exploration_rubber,
+            ),
+            stiffness_table(
+                "Apparent inertia of 1 kg by the force sensor",
+                &summary.exploration_apparent_inertia,
             ),
         ],
         gravity_off: percent(off.gravity),
@@ -124,8 +136,12 @@ fn stiffness_table(title: &'static str, lines: &[ProbingSummary]) -> StiffnessTa
             plain(e.contact.peak_filtered_n, 1),
             plain(e.contact.contact_s, 3),
             plain(e.contact.impulse_newton_s, 3),
+            plain(e.contact.spring_impulse_newton_s, 3),
+            plain(e.contact.impact_newton_s, 3),
+            plain(e.impact_theory_newton_s, 3),
             plain(e.contact.impulse_first_50ms_newton_s, 3),
-            plain(e.contact.rest_force_n, 2),
+            plain(e.contact.pressing_force_n, 2),
+            plain(e.contact.spring_force_n, 2),
             plain(1e3 * e.free_rms_m, 1),
         ]
     });
@@ -138,8 +154,12 @@ fn stiffness_table(title: &'static str, lines: &[ProbingSummary]) -> StiffnessTa
             "peak [N]",
             "contact [s]",
             "impulse [N\u{a0}s]",
+            "of the spring [N\u{a0}s]",
+            "first impact [N\u{a0}s]",
+            "m v (1 + e) [N\u{a0}s]",
             "first 50\u{a0}ms [N\u{a0}s]",
-            "at rest [N]",
+            "pressing [N]",
+            "spring K\u{a0}(X\u{a0}\u{2212}\u{a0}Xo) [N]",
             "free RMS [mm]",
         ],
         rows: rows.collect(),

@@ -3,7 +3,7 @@
 use crate::units::{figures, newton_seconds, newtons, percent, plain, seconds};
 use comfy_table::{ContentArrangement, Table, presets};
 use supple_experiment::metrics::median;
-use supple_experiment::summary::{ContactStatistics, Summary, TrackingError};
+use supple_experiment::summary::{ContactStatistics, ProbingSummary, Summary, TrackingError};
 use supple_experiment::{JointTorque, Realistic};
 
 /// Formats the summary, one line per quantity.
@@ -66,23 +66,36 @@ fn free_motion(summary: &Summary) -> Vec<Line> {
             "",
         ),
         line(
+            "  apparent inertia of 1 kg by the sensor",
+            rms(&[&summary.sinusoid_apparent_inertia]),
+            "(3.6) whole",
+        ),
+        line(
             "  (3.6) exactly as printed",
             paper_law(&summary.paper_letter),
             "the law of the paper",
         ),
         line(
-            "quadrant, RMS error, exact model",
-            rms(&[&summary.quadrant.tracking]),
+            &format!(
+                "quadrant at {:.3} m/s, RMS error",
+                summary.quadrant_at_paper_speed.speed_m_per_s
+            ),
+            rms(&[&summary.quadrant_at_paper_speed.tracking]),
             "errors at corners decay (fig. 3b)",
         ),
         line(
+            "  with ten times the damping",
+            rms(&[&summary.quadrant_damped.tracking]),
+            "",
+        ),
+        line(
             &format!(
-                "  perturbed; exact at {:.3} m/s",
-                summary.quadrant_at_paper_speed.speed_m_per_s
+                "  at {:.3} m/s: exact, perturbed model",
+                summary.quadrant.speed_m_per_s
             ),
             rms(&[
+                &summary.quadrant.tracking,
                 &summary.quadrant_perturbed.tracking,
-                &summary.quadrant_at_paper_speed.tracking,
             ]),
             "",
         ),
@@ -146,7 +159,24 @@ fn contact(summary: &Summary) -> Vec<Line> {
             )
         }))
     };
-    let softest = from_five().next().map(|e| newtons(e.contact.rest_force_n));
+    let pressing = |stiffness: f64| {
+        let found = lines.iter().find(|e| e.stiffness_n_per_m == stiffness);
+        found.map(|e| {
+            format!(
+                "{} of {}",
+                newtons(e.contact.pressing_force_n),
+                newtons(e.contact.spring_force_n)
+            )
+        })
+    };
+    let soft = lines.iter().filter(|e| e.stiffness_n_per_m < 5.0);
+    let soft: Vec<_> = soft.map(|e| plain(e.contact.impulse_newton_s, 2)).collect();
+    let impacts: Vec<_> = lines.iter().map(|e| e.contact.impact_newton_s).collect();
+    let theory: Vec<_> = lines.iter().map(|e| e.impact_theory_newton_s).collect();
+    let peak_at_five = |lines: &[ProbingSummary]| {
+        let found = lines.iter().find(|e| e.stiffness_n_per_m >= 5.0);
+        or_none(found.map(|e| newtons(e.contact.peak_filtered_n)))
+    };
     vec![
         line(
             "first transient, median over K",
@@ -158,17 +188,47 @@ fn contact(summary: &Summary) -> Vec<Line> {
             or_none(summary.contact.peak_spread.map(percent)),
             "largely independent of K",
         ),
-        line("resting force at 5 N/m", or_none(softest), ""),
         line(
-            "impulse over K, fade on",
+            "  at 5 N/m: no model error, rubber, 1 kg",
+            [
+                &summary.exploration_exact_model,
+                &summary.exploration_rubber,
+                &summary.exploration_apparent_inertia,
+            ]
+            .map(|lines| peak_at_five(lines))
+            .join(", "),
+            "rubber: much lower (section 5)",
+        ),
+        line(
+            "force while pressing at 5 N/m, of the spring's",
+            or_none(pressing(5.0)),
+            "",
+        ),
+        line("  at 125 N/m", or_none(pressing(125.0)), ""),
+        line(
+            "impulse at 0.5, 1 and 2 N/m",
+            format!("{} N s", soft.join(", ")),
+            "not zero at K = 0 (fig. 6)",
+        ),
+        line(
+            "  of the first impact, and m v (1 + e)",
+            format!(
+                "{}, {}",
+                or_none(median(&impacts).map(newton_seconds)),
+                or_none(median(&theory).map(newton_seconds))
+            ),
+            "contribution of the impact",
+        ),
+        line(
+            "impulse over K from 5 N/m, fade on",
             fit(&summary.contact),
-            "linear, not zero at K = 0 (fig. 6)",
+            "linear (fig. 6)",
         ),
         line("  fade off", fit(&summary.fade_off), ""),
         line(
             "  first 50 ms, median, fade on",
             or_none(median(&first).map(newton_seconds)),
-            "contribution of the impact",
+            "",
         ),
     ]
 }

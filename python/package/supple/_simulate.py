@@ -51,7 +51,7 @@ class Run:
     """Whether contact is latched, (cycles,)."""
     strokes: Mapping[str, Array]
     """Probing only, by name, (strokes,) each: ``approach_m_per_s``, ``peak_filtered_n``,
-    ``contact_s``, ``impulse_newton_s``, ``rest_force_n``."""
+    ``contact_s``, ``impulse_newton_s``, ``rest_force_n``, ``pressing_force_n``, ``spring_force_n``."""
     log: Path | None
     """Path of the log, if ``log_dir`` was given."""
 

@@ -224,6 +224,7 @@ fn requests() -> Vec<Seed> {
                 azimuth_step_rad: 0.05,
                 speed_m_per_s: 0.04,
                 ramp_s: 0.1,
+                dwell_s: 0.0,
             })),
         ),
     ];

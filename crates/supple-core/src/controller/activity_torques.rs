@@ -5,7 +5,7 @@ use super::pose_task::{DIRECTIONS, PoseCycle};
 use super::state::State;
 use super::{Controller, checks, limiter};
 use crate::config::{Config, Role};
-use crate::law::impedance::{LawInput, PositionTarget, Task, Torques, impedance};
+use crate::law::impedance::{HeldFriction, LawInput, PositionTarget, Task, Torques, impedance};
 use crate::math::{Vector, Vector3, abs, smooth_step};
 use crate::trajectory::{JointReference, Reference};
 
@@ -65,6 +65,7 @@ impl<const N: usize> State<N> {
                 let law_input = LawInput {
                     friction_share: self.latch.friction_share(),
                     nullspace_damping_nm_s_per_rad: *controller.nullspace_damping_nm_s_per_rad(),
+                    held_friction: self.held_friction(config),
                     ..LawInput::of_law(law, friction, target, velocity, tip_force_n)
                 };
                 let mut torques = impedance(&config.roles, &self.terms, task, &law_input);
@@ -76,6 +77,15 @@ impl<const N: usize> State<N> {
             (Activity::Float, ..) => self.float_torques(controller),
             _ => self.safe_torques(controller),
         }
+    }
+
+    /// Friction of an arm that contact blocks, or has just blocked.
+    pub(super) fn held_friction(&self, config: &Config<N>) -> Option<HeldFriction<'_, N>> {
+        (config.latch.hold_friction && self.latch.held() > 0.0).then(|| HeldFriction {
+            velocity_rad_per_s: &self.contact_velocity_rad_per_s,
+            weight: self.latch.held(),
+            viscous_share: self.latch.viscous_share(&config.latch),
+        })
     }
 
     /// Gravity hold with joint damping, the safe action, or nothing.

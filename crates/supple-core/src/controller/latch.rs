@@ -4,12 +4,39 @@
 //! stiffness *is* the contact force. The latch closes when the observed force against the
 //! reference's motion exceeds a threshold, fades the feed-forward, and opens when the reference
 //! retreats.
+//!
+//! A latch that closed by mistake opens by itself. What contact blocks does not move on with the
+//! reference: if the tip does for 10 ms, without a force above the threshold, nothing is
+//! there. And contact that does not even slow the tip to half of the reference's speed before the
+//! feed-forward fades is doubted: after `release_s` it must raise the force over the threshold once more,
+//! and is believed then.
 
+use super::residual::ResidualScale;
 use crate::config::ContactLatch;
 use crate::math::{Vector3, sqrt};
 
 /// Minimum reference speed for which a direction is defined \[m/s\].
 const MIN_SPEED_M_PER_S: f64 = 1e-3;
+/// Share of the reference's speed above which the tip follows it.
+const FOLLOWING_SHARE: f64 = 0.5;
+/// Time for which the tip must follow the reference until the latch opens \[s\]: less than friction needs
+/// to stop an arm whose feed-forward has begun to fade.
+const FOLLOWING_S: f64 = 0.01;
+/// Time after closing in which the tip must be slowed, if the feed-forward fades earlier than that \[s\].
+const SLOWED_S: f64 = 0.005;
+/// Time after a release in which the next contact is believed \[s\].
+const AGAIN_S: f64 = 0.5;
+
+/// What a cycle shows of contact.
+#[derive(Clone, Copy, Debug)]
+pub struct Evidence {
+    /// Observed force on the tip, base axes \[N\].
+    pub force_n: Vector3<f64>,
+    /// Uncertainty of the joints' friction along the reference's direction \[N\], by which the threshold grows.
+    pub friction_uncertainty_n: f64,
+    /// Velocity of the tip, base axes \[m/s\].
+    pub tip_velocity_m_per_s: Vector3<f64>,
+}
 
 /// State of the latch.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,27 +45,61 @@ pub struct Latch {
     /// has moved.
     direction: Vector3<f64>,
     since_reversal_s: f64,
+    reference_m_per_s: f64,
     in_contact: bool,
+    /// Whether more than the force speaks for contact.
+    believed: bool,
+    latched_s: f64,
+    following_s: f64,
+    /// Since the latch opened by itself.
+    since_release_s: f64,
+    residual: ResidualScale,
     /// Fraction of the friction feed-forward that is applied, 0 to 1.
     share: f64,
+    held: f64,
     force_against_n: f64,
     threshold_n: f64,
 }
 
-impl Default for Latch {
-    fn default() -> Self {
+impl Latch {
+    /// An open latch, before any motion, whose velocities have the bandwidth `estimator_rad_per_s`.
+    pub fn new(config: &ContactLatch, estimator_rad_per_s: f64) -> Self {
         Latch {
             direction: Vector3::zeros(),
             since_reversal_s: 0.0,
+            reference_m_per_s: 0.0,
             in_contact: false,
+            believed: false,
+            latched_s: 0.0,
+            following_s: 0.0,
+            since_release_s: f64::MAX,
+            residual: ResidualScale::new(config.false_alarms_per_hour, estimator_rad_per_s),
             share: 1.0,
+            held: 0.0,
             force_against_n: 0.0,
             threshold_n: 0.0,
         }
     }
-}
 
-impl Latch {
+    /// An open latch before any motion that knows the residuals of this one.
+    pub fn restarted(&self) -> Self {
+        Latch {
+            direction: Vector3::zeros(),
+            since_reversal_s: 0.0,
+            reference_m_per_s: 0.0,
+            in_contact: false,
+            believed: false,
+            latched_s: 0.0,
+            following_s: 0.0,
+            since_release_s: f64::MAX,
+            residual: self.residual,
+            share: 1.0,
+            held: 0.0,
+            force_against_n: 0.0,
+            threshold_n: 0.0,
+        }
+    }
+
     /// Whether contact is latched.
     pub fn in_contact(&self) -> bool {
         self.in_contact
@@ -47,6 +108,22 @@ impl Latch {
     /// Fraction of the friction feed-forward to apply, 0 to 1.
     pub fn friction_share(&self) -> f64 {
         self.share
+    }
+
+    /// How much of the dry friction feed-forward is that of the moment of contact, 0 to 1: all of it in
+    /// contact, after release less and less.
+    pub fn held(&self) -> f64 {
+        self.held
+    }
+
+    /// Fraction of the viscous friction feed-forward to apply, 0 to 1: an arm that is blocked has none.
+    pub fn viscous_share(&self, config: &ContactLatch) -> f64 {
+        let fades = 1.0 - config.contact_share;
+        if fades > 0.0 {
+            ((self.share - config.contact_share) / fades).clamp(0.0, 1.0)
+        } else {
+            1.0 - self.held
+        }
     }
 
     /// Observed force against the reference's motion \[N\].
@@ -70,6 +147,7 @@ impl Latch {
     pub fn update_direction(&mut self, velocity: &Vector3<f64>, elapsed_s: f64) {
         self.since_reversal_s += elapsed_s;
         let speed = sqrt(velocity.dot(velocity));
+        self.reference_m_per_s = speed;
         if speed <= MIN_SPEED_M_PER_S {
             return;
         }
@@ -83,25 +161,66 @@ impl Latch {
         }
     }
 
-    /// Second half of a cycle: compares the observed tip force `force_n` with the threshold, which
-    /// grows by the friction uncertainty `friction_uncertainty_n` along the direction.
-    pub fn update_contact(
+    /// Adds the observed force of an arm at rest or without a reference of the tip; nothing but residual.
+    pub fn observe_at_rest(
         &mut self,
         config: &ContactLatch,
         force_n: &Vector3<f64>,
         friction_uncertainty_n: f64,
         elapsed_s: f64,
     ) {
-        self.force_against_n = -force_n.dot(&self.direction);
+        let configured_n = config.threshold_n + friction_uncertainty_n;
+        let along_axis_n = sqrt(force_n.dot(force_n) / 3.0);
+        self.residual.add(along_axis_n / configured_n, elapsed_s);
+    }
+
+    /// Second half of a cycle: compares the observed tip force with the threshold.
+    pub fn update_contact(&mut self, config: &ContactLatch, evidence: &Evidence, elapsed_s: f64) {
+        self.force_against_n = -evidence.force_n.dot(&self.direction);
         let reversing = self.since_reversal_s < config.reversal_s;
-        self.threshold_n =
-            (config.threshold_n + friction_uncertainty_n) * if reversing { 2.0 } else { 1.0 };
-        self.in_contact |= self.force_against_n > self.threshold_n;
-        let faded = self.in_contact && config.fade;
-        self.share = if faded {
-            (self.share - elapsed_s / config.fade_s).max(config.contact_share.min(self.share))
+        let configured_n = config.threshold_n + evidence.friction_uncertainty_n;
+        let factor = self.residual.factor() * if reversing { 2.0 } else { 1.0 };
+        self.threshold_n = configured_n * factor;
+        let pushed = self.force_against_n > self.threshold_n;
+        let tip_m_per_s = evidence.tip_velocity_m_per_s.dot(&self.direction);
+        let follows = self.reference_m_per_s > MIN_SPEED_M_PER_S
+            && tip_m_per_s >= FOLLOWING_SHARE * self.reference_m_per_s;
+        self.since_release_s += elapsed_s;
+        if self.in_contact {
+            self.latched_s += elapsed_s;
+            self.believed |= !follows && self.latched_s <= config.settle_s.max(SLOWED_S);
+            self.following_s = match follows && !pushed {
+                true => self.following_s + elapsed_s,
+                false => 0.0,
+            };
+            if self.is_false(config) {
+                (self.in_contact, self.since_release_s) = (false, 0.0);
+            }
+        } else if pushed {
+            self.in_contact = true;
+            self.believed = !follows || self.since_release_s < AGAIN_S;
+            (self.latched_s, self.following_s) = (0.0, 0.0);
+        } else if self.share >= 1.0 && !reversing {
+            self.residual
+                .add(self.force_against_n / configured_n, elapsed_s);
+        }
+        if self.in_contact && config.fade {
+            self.held = 1.0;
+            if self.latched_s >= config.settle_s {
+                let faded = self.share - elapsed_s / config.fade_s;
+                self.share = faded.max(config.contact_share.min(self.share));
+            }
         } else {
-            (self.share + elapsed_s / config.restore_s).min(1.0)
-        };
+            let restored = elapsed_s / config.restore_s;
+            self.share = (self.share + restored).min(1.0);
+            self.held = (self.held - restored).max(0.0);
+        }
+    }
+
+    /// Whether what speaks for contact has gone.
+    fn is_false(&self, config: &ContactLatch) -> bool {
+        config.release_s.is_finite()
+            && (self.following_s >= FOLLOWING_S
+                || !self.believed && self.latched_s >= config.release_s)
     }
 }

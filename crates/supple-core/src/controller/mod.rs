@@ -19,6 +19,7 @@ mod output;
 mod plausibility;
 mod pose_task;
 mod requests;
+pub mod residual;
 mod state;
 mod step;
 mod stop;

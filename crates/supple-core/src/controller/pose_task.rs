@@ -156,6 +156,7 @@ impl<const N: usize> State<N> {
         let law_input = LawInput {
             friction: Some((&config.friction, law.friction_velocity)),
             friction_share: self.latch.friction_share(),
+            held_friction: self.held_friction(config),
             inertial_feedforward: law.inertial_feedforward,
             nullspace_damping_nm_s_per_rad: Vector::repeat(damping * share),
             nullspace_torque_nm: Some(&(posture.torque_nm(&self.position) * share)),

@@ -108,6 +108,8 @@ pub struct State<const N: usize> {
     pub(super) estimator: Estimator<N>,
     pub(super) observer: MomentumObserver<N>,
     pub(super) latch: Latch,
+    /// Joint velocities of the reference when contact was latched \[rad/s\].
+    pub(super) contact_velocity_rad_per_s: Vector<N>,
     pub(super) gains: GainRamp<Gains>,
     pub(super) joint_gains: GainRamp<JointGains<N>>,
     pub(super) rotational_gains: GainRamp<RotationalGains>,
@@ -145,7 +147,8 @@ impl<const N: usize> State<N> {
             position: Vector::zeros(),
             estimator: Estimator::at_rest(Vector::zeros()),
             observer: MomentumObserver::default(),
-            latch: Latch::default(),
+            latch: Latch::new(&config.latch, config.estimator_rad_per_s),
+            contact_velocity_rad_per_s: Vector::zeros(),
             gains: GainRamp::at_rest(config.law.gains),
             joint_gains: GainRamp::at_rest(config.joint_gains),
             rotational_gains: GainRamp::at_rest(config.pose.gains),
@@ -300,7 +303,7 @@ impl<const N: usize> State<N> {
         self.handover = Vector::zeros();
         self.activity = activity;
         self.activity_start = self.cycle.unwrap_or(0);
-        self.latch = Latch::default();
+        self.latch = self.latch.restarted();
         self.plausibility.begin();
         self.unexplained_s = 0.0;
     }

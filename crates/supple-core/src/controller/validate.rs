@@ -216,6 +216,13 @@ pub(super) fn validate<const N: usize>(config: &Config<N>) -> Result<(), ConfigE
     )?;
     positive("fade_s", latch.fade_s)?;
     positive("restore_s", latch.restore_s)?;
+    not_negative("settle_s", latch.settle_s)?;
+    for (name, value) in [
+        ("false_alarms_per_hour", latch.false_alarms_per_hour),
+        ("release_s", latch.release_s),
+    ] {
+        check(value > 0.0, name, None, value, "positive; infinite is off")?;
+    }
     each(
         "move stiffness_nm_per_rad",
         &config.move_gains.stiffness_nm_per_rad,

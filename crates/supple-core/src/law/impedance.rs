@@ -50,6 +50,8 @@ pub struct LawInput<'a, T, const N: usize, const D: usize = 3> {
     pub friction: Option<(&'a [Friction; N], FrictionVelocity)>,
     /// Share of the dry friction feed-forward to apply, 0 to 1.
     pub friction_share: f64,
+    /// Friction of an arm that is blocked.
+    pub held_friction: Option<HeldFriction<'a, N>>,
     /// Adds `M Xo''`.
     pub inertial_feedforward: bool,
     /// Damping of each joint's motion in the null space \[N m s/rad\], zero or more.
@@ -67,6 +69,7 @@ impl<'a, T, const N: usize, const D: usize> LawInput<'a, T, N, D> {
             apparent: None,
             friction: None,
             friction_share: 1.0,
+            held_friction: None,
             inertial_feedforward: true,
             nullspace_damping_nm_s_per_rad: Vector::zeros(),
             nullspace_torque_nm: None,
@@ -95,6 +98,35 @@ impl<'a, T, const N: usize> LawInput<'a, T, N> {
             nullspace_damping_nm_s_per_rad: Vector::repeat(law.nullspace_damping_nm_s_per_rad),
             ..LawInput::new(target, velocity_rad_per_s)
         }
+    }
+}
+
+/// Friction feed-forward of an arm that is blocked: joints at rest have no viscous friction, and their dry
+/// friction is what it was when they came to rest, whatever the reference does.
+#[derive(Clone, Copy, Debug)]
+pub struct HeldFriction<'a, const N: usize> {
+    /// Joint velocities of the reference when the arm was blocked \[rad/s\].
+    pub velocity_rad_per_s: &'a Vector<N>,
+    /// How much of the dry friction is that of these velocities, 0 to 1; the rest is that of the reference.
+    pub weight: f64,
+    /// Share of the viscous friction to apply, 0 to 1.
+    pub viscous_share: f64,
+}
+
+impl<const N: usize> HeldFriction<'_, N> {
+    /// What to add to the feed-forward of `joint` at `velocity_rad_per_s`, of whose dry part `share` is applied
+    /// \[N m\].
+    fn difference_nm(
+        &self,
+        friction: &Friction,
+        joint: usize,
+        velocity_rad_per_s: f64,
+        share: f64,
+    ) -> f64 {
+        let dry = |velocity: f64| friction.dry_torque_nm(velocity);
+        let kept = dry(self.velocity_rad_per_s[joint]) - dry(velocity_rad_per_s);
+        let viscous_nm = friction.viscous_nm_s_per_rad * velocity_rad_per_s;
+        share * self.weight * kept - (1.0 - self.viscous_share) * viscous_nm
     }
 }
 
@@ -202,7 +234,12 @@ pub(super) fn act<T: Target<D>, F: Form<N, D>, const N: usize, const D: usize>(
                 FrictionVelocity::Measured if is_active(i) => now.velocity_rad_per_s[i],
                 _ => reference[i],
             };
-            friction[i].torque_with_dry_share_nm(velocity, now.friction_share)
+            let share = now.friction_share;
+            let torque_nm = friction[i].torque_with_dry_share_nm(velocity, share);
+            match &now.held_friction {
+                Some(held) => torque_nm + held.difference_nm(&friction[i], i, velocity, share),
+                None => torque_nm,
+            }
         };
         form.add(|t| &mut t.friction, Torque(Vector::from_fn(feed_forward)));
     }

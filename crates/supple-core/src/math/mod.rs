@@ -16,7 +16,7 @@ pub type Vector<const N: usize> = nalgebra::SVector<f64, N>;
 pub type Matrix<const R: usize, const C: usize> = nalgebra::SMatrix<f64, R, C>;
 pub use nalgebra::{Matrix3, Vector3};
 
-pub use libm::{acos, atan2, cos, exp, fabs as abs, sin};
+pub use libm::{acos, atan2, cos, exp, fabs as abs, log, sin};
 
 /// Square root, correctly rounded.
 ///

@@ -1,7 +1,8 @@
-//! The probing cycle of the paper: down, up, out; at the end of a column the base advances.
+//! The probing cycle of the paper: down, up, out; at the end of a column the base advances. A dwell at the bottom of the
+//! stroke, which the paper's cycle does not have, shows the force while pressing.
 //!
-//! The stroke goes vertically down and up again at a constant speed with smooth ramps at its ends;
-//! then the tip steps out along the radius, from rest to rest. After the last stroke of a column
+//! The stroke goes vertically down, rests there for the dwell, and goes up again at a constant speed
+//! with smooth ramps at its ends; then the tip steps out along the radius, from rest to rest. After the last stroke of a column
 //! the base rotates by one step while the tip returns to the first radius, and the next column
 //! begins.
 
@@ -19,6 +20,8 @@ const MINIMUM_JERK_PEAK: f64 = 1.875;
 pub enum ProbePhase {
     /// Moving down.
     Down,
+    /// At rest at the bottom of the stroke.
+    Dwell,
     /// Moving up.
     Up,
     /// Stepping out along the radius.
@@ -48,10 +51,13 @@ pub struct Probe {
     pub speed_m_per_s: f64,
     /// Ramp time of the stroke's speed \[s\], positive.
     pub ramp_s: f64,
+    /// Rest at the bottom of the stroke \[s\], zero or more; the paper's cycle has none.
+    pub dwell_s: f64,
 }
 
 impl Probe {
-    fn stroke_s(&self) -> f64 {
+    /// Time of the way down, and of the way up \[s\].
+    pub fn stroke_s(&self) -> f64 {
         self.stroke_m / self.speed_m_per_s + self.ramp_s
     }
 
@@ -72,9 +78,14 @@ impl Probe {
         f64::from(self.strokes.saturating_sub(1))
     }
 
-    /// Time of one down, up and out \[s\].
+    /// Time of one down, dwell, up and out \[s\].
     pub fn cycle_s(&self) -> f64 {
-        2.0 * self.stroke_s() + self.step_s(self.radial_step_m)
+        self.retreated_s() + self.step_s(self.radial_step_m)
+    }
+
+    /// Time from the start of a stroke to the end of its way up \[s\].
+    fn retreated_s(&self) -> f64 {
+        2.0 * self.stroke_s() + self.dwell_s
     }
 
     /// Time of one column with the base advance that ends it \[s\].
@@ -91,14 +102,17 @@ impl Probe {
         let t = in_column - stroke * self.cycle_s();
         let (stroke, column) = (stroke as u32, column as u32);
         let stroke_s = self.stroke_s();
+        let (rises_s, retreated_s) = (stroke_s + self.dwell_s, self.retreated_s());
         if t < stroke_s {
             (ProbePhase::Down, t, stroke, column)
-        } else if t < 2.0 * stroke_s {
-            (ProbePhase::Up, t - stroke_s, stroke, column)
+        } else if t < rises_s {
+            (ProbePhase::Dwell, t - stroke_s, stroke, column)
+        } else if t < retreated_s {
+            (ProbePhase::Up, t - rises_s, stroke, column)
         } else if stroke + 1 < self.strokes {
-            (ProbePhase::Out, t - 2.0 * stroke_s, stroke, column)
+            (ProbePhase::Out, t - retreated_s, stroke, column)
         } else {
-            (ProbePhase::Advance, t - 2.0 * stroke_s, stroke, column)
+            (ProbePhase::Advance, t - retreated_s, stroke, column)
         }
     }
 
@@ -109,6 +123,7 @@ impl Probe {
         let still = (0.0, 0.0, 0.0);
         let (r, phi, z) = match phase {
             ProbePhase::Down => (still, still, self.stroke(t)),
+            ProbePhase::Dwell => (still, still, (-self.stroke_m, 0.0, 0.0)),
             ProbePhase::Up => {
                 let (z, velocity, acceleration) = self.stroke(t);
                 (still, still, (-self.stroke_m - z, -velocity, -acceleration))
@@ -167,6 +182,13 @@ impl Probe {
         positive("stroke_m", self.stroke_m)?;
         positive("speed_m_per_s", self.speed_m_per_s)?;
         positive("ramp_s", self.ramp_s)?;
+        if self.dwell_s < 0.0 || !self.dwell_s.is_finite() {
+            return Err(TrajectoryError {
+                entry: "dwell_s",
+                value: self.dwell_s,
+                must: "finite and not negative",
+            });
+        }
         if self.ramp_s * self.speed_m_per_s > self.stroke_m {
             return Err(TrajectoryError {
                 entry: "ramp_s",

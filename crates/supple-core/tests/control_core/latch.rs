@@ -2,7 +2,7 @@
 //! `control/contact.rs`.
 
 use supple_core::config::ContactLatch;
-use supple_core::latch::Latch;
+use supple_core::latch::{Evidence, Latch};
 use supple_core::math::Vector3;
 
 use crate::support::configs::latch;
@@ -11,7 +11,7 @@ const PERIOD_S: f64 = 1e-3;
 
 /// A latch after one second of reference motion along x.
 fn moving(config: &ContactLatch) -> Latch {
-    let mut latch = Latch::default();
+    let mut latch = Latch::new(config, 200.0);
     for _ in 0..1000 {
         cycle(&mut latch, config, Vector3::x() * 0.04, 0.0);
     }
@@ -19,22 +19,26 @@ fn moving(config: &ContactLatch) -> Latch {
     latch
 }
 
+/// A force opposite to x on a tip at rest.
+fn against(newtons: f64, friction_uncertainty_n: f64) -> Evidence {
+    Evidence {
+        force_n: -Vector3::x() * newtons,
+        friction_uncertainty_n,
+        tip_velocity_m_per_s: Vector3::zeros(),
+    }
+}
+
 /// One cycle with a force of `against_n` opposite to x.
 fn cycle(latch: &mut Latch, config: &ContactLatch, velocity: Vector3<f64>, against_n: f64) {
     latch.update_direction(&velocity, PERIOD_S);
-    latch.update_contact(config, &(-Vector3::x() * against_n), 0.0, PERIOD_S);
+    latch.update_contact(config, &against(against_n, 0.0), PERIOD_S);
 }
 
 /// Whether `newtons` against a continued motion along x latch contact.
 fn closes(config: &ContactLatch, newtons: f64, friction_uncertainty_n: f64) -> bool {
     let mut latch = moving(config);
     latch.update_direction(&(Vector3::x() * 0.04), PERIOD_S);
-    latch.update_contact(
-        config,
-        &(-Vector3::x() * newtons),
-        friction_uncertainty_n,
-        PERIOD_S,
-    );
+    latch.update_contact(config, &against(newtons, friction_uncertainty_n), PERIOD_S);
     assert_eq!(latch.force_against_n(), newtons);
     latch.in_contact()
 }
@@ -52,7 +56,7 @@ fn the_latch_closes_above_its_threshold_and_not_at_it() {
 #[test]
 fn the_threshold_is_doubled_after_a_start_and_a_reversal() {
     let config = latch();
-    let mut latch = Latch::default();
+    let mut latch = Latch::new(&config, 200.0);
     let mut doubled = [0, 0];
     for (k, direction) in [1.0, -1.0].into_iter().enumerate() {
         for _ in 0..1000 {
@@ -114,7 +118,7 @@ fn a_creeping_reference_is_at_rest() {
     cycle(&mut latch, &config, Vector3::x() * -2e-3, 0.0);
     assert!(!latch.in_contact(), "the retreat releases");
     // Before the reference has moved there is no direction.
-    let mut new = Latch::default();
+    let mut new = Latch::new(&config, 200.0);
     cycle(&mut new, &config, Vector3::x() * 5e-4, 50.0);
     assert_eq!(new.direction(), Vector3::zeros());
     assert!(!new.in_contact());
@@ -150,7 +154,76 @@ fn zero_elapsed_time_updates_contact_without_fading() {
     let config = latch();
     let mut latch = moving(&config);
     latch.update_direction(&(Vector3::x() * 0.04), 0.0);
-    latch.update_contact(&config, &(-Vector3::x() * 10.0), 0.0, 0.0);
+    latch.update_contact(&config, &against(10.0, 0.0), 0.0);
     assert!(latch.in_contact());
     assert_eq!(latch.friction_share(), 1.0);
+}
+
+/// Contact on a tip that moves with the reference.
+fn following(newtons: f64) -> Evidence {
+    Evidence {
+        tip_velocity_m_per_s: Vector3::x() * 0.04,
+        ..against(newtons, 0.0)
+    }
+}
+
+fn releasing() -> ContactLatch {
+    ContactLatch {
+        release_s: 0.2,
+        ..latch()
+    }
+}
+
+/// Cycles until the latch is open, at most a second.
+fn open_after(latch: &mut Latch, config: &ContactLatch, evidence: &Evidence) -> u32 {
+    for cycle in 1..=1000 {
+        latch.update_direction(&(Vector3::x() * 0.04), PERIOD_S);
+        latch.update_contact(config, evidence, PERIOD_S);
+        if !latch.in_contact() {
+            return cycle;
+        }
+    }
+    u32::MAX
+}
+
+fn close(latch: &mut Latch, config: &ContactLatch, evidence: &Evidence) {
+    latch.update_direction(&(Vector3::x() * 0.04), PERIOD_S);
+    latch.update_contact(config, evidence, PERIOD_S);
+    assert!(latch.in_contact());
+}
+
+/// Nothing is where the tip moves on with the reference: the latch opens before friction could have stopped it.
+#[test]
+fn a_latch_opens_while_the_tip_follows_the_reference() {
+    let config = releasing();
+    let mut latch = moving(&config);
+    close(&mut latch, &config, &following(10.0));
+    let cycles = open_after(&mut latch, &config, &following(0.0));
+    assert!((10..=11).contains(&cycles), "{cycles} ms");
+    // While the force is above the threshold, something is pushed along.
+    close(&mut latch, &config, &following(10.0));
+    assert_eq!(open_after(&mut latch, &config, &following(10.0)), u32::MAX);
+}
+
+/// The force alone spoke for contact, and the arm stands still without its feed-forward: the latch opens, and
+/// believes the next force.
+#[test]
+fn contact_that_only_the_force_speaks_for_must_push_twice() {
+    let config = releasing();
+    let mut latch = moving(&config);
+    close(&mut latch, &config, &following(10.0));
+    let cycles = open_after(&mut latch, &config, &against(0.5, 0.0));
+    assert!((199..=201).contains(&cycles), "{cycles} ms");
+    close(&mut latch, &config, &following(10.0));
+    let believed = open_after(&mut latch, &config, &against(0.5, 0.0));
+    assert_eq!(believed, u32::MAX);
+}
+
+#[test]
+fn contact_that_stops_the_tip_stays_closed() {
+    let config = releasing();
+    let mut latch = moving(&config);
+    close(&mut latch, &config, &against(10.0, 0.0));
+    let cycles = open_after(&mut latch, &config, &against(0.5, 0.0));
+    assert_eq!(cycles, u32::MAX);
 }

@@ -20,5 +20,6 @@ mod linalg;
 mod observer;
 mod operational;
 mod request_codes;
+mod residual;
 mod sincos;
 mod trajectory;

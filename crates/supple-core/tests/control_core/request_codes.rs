@@ -23,7 +23,7 @@ fn vector() -> impl Strategy<Value = Vector3<f64>> {
 /// One trajectory of every kind, with its code.
 fn trajectory() -> impl Strategy<Value = (u8, Trajectory)> {
     let vectors = (vector(), vector(), vector());
-    let numbers = proptest::array::uniform8(number());
+    let numbers = proptest::array::uniform9(number());
     (1_u8..=6, vectors, numbers, any::<u32>()).prop_map(|(kind, (a, b, c), x, strokes)| {
         let trajectory = match kind {
             1 => Trajectory::Hold(a),
@@ -57,6 +57,7 @@ fn trajectory() -> impl Strategy<Value = (u8, Trajectory)> {
                 azimuth_step_rad: x[5],
                 speed_m_per_s: x[6],
                 ramp_s: x[7],
+                dwell_s: x[8],
             }),
         };
         (kind, trajectory)
@@ -237,12 +238,30 @@ fn unknown_and_incomplete_codes_are_rejected() {
             Err(RequestCodeError::Count { found, expected })
         );
     }
-    let strokes = |count| [0.1, count, 0.1, 0.0, 0.1, 0.0, 0.1, 0.04, 0.1];
+    let strokes = |count| [0.1, count, 0.1, 0.0, 0.1, 0.0, 0.1, 0.04, 0.1, 0.5];
     assert!(decode(4, 6, &strokes(3.0)).is_ok());
+    for found in [8, 11] {
+        let values = [[0.0; 10], [0.0; 10]].concat();
+        assert!(matches!(
+            decode(4, 6, &values[..found]),
+            Err(RequestCodeError::Count { .. })
+        ));
+    }
     for count in [2.5, -1.0] {
         assert_eq!(
             decode(4, 6, &strokes(count)),
             Err(RequestCodeError::Whole(count))
         );
     }
+}
+
+/// Logs from before the dwell have nine values of a probe.
+#[test]
+fn a_probe_of_an_older_log_has_no_dwell() {
+    let values = [0.5, 3.0, 0.01, 0.0, 0.1, 0.0, 0.1, 0.04, 0.1];
+    let request = decode(4, 6, &values).expect("known");
+    let Some(Request::Track(Trajectory::Probe(probe))) = request else {
+        panic!("{request:?}");
+    };
+    assert_eq!((probe.ramp_s, probe.dwell_s), (0.1, 0.0));
 }

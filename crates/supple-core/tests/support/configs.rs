@@ -200,6 +200,10 @@ pub fn latch() -> ContactLatch {
         reversal_s: 0.2,
         fade_s: 0.01,
         restore_s: 0.05,
+        settle_s: 0.0,
+        hold_friction: false,
+        false_alarms_per_hour: f64::INFINITY,
+        release_s: f64::INFINITY,
     }
 }
 

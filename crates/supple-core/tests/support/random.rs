@@ -22,6 +22,12 @@ impl Random {
         (self.bits() >> 11) as f64 * (2.0 / (1_u64 << 53) as f64) - 1.0
     }
 
+    /// Gaussian, mean zero, variance one.
+    pub fn normal(&mut self) -> f64 {
+        let uniform = 0.5 * (self.unit() + 1.0);
+        (-2.0 * (1.0 - uniform).ln()).sqrt() * (std::f64::consts::PI * self.unit()).cos()
+    }
+
     pub fn below(&mut self, end: u64) -> u64 {
         self.bits() % end
     }

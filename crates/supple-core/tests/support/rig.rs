@@ -223,6 +223,7 @@ pub fn probe_at(tip: &Vector3<f64>) -> Trajectory {
         azimuth_step_rad: 0.05,
         speed_m_per_s: 0.04,
         ramp_s: 0.1,
+        dwell_s: 0.0,
     })
 }
 

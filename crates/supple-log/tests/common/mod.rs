@@ -130,6 +130,7 @@ fn request(k: u64, home: &Vector<N>, tip: Vector3<f64>) -> Option<Request<N>> {
             azimuth_step_rad: 0.1,
             speed_m_per_s: 0.04,
             ramp_s: 0.1,
+            dwell_s: 0.0,
         }))),
         1_510 => Some(Request::Reset),
         _ => None,

@@ -164,8 +164,22 @@ pub(crate) fn check_rest(report: Reporter<'_>, settings: &Settings) -> Result<()
         ),
         ("[latch] friction_error", latch.friction_error),
         ("[latch] reversal_s", latch.reversal_s),
+        ("[latch] settle_s", latch.settle_s),
     ] {
         report.not_negative(element, value)?;
+    }
+    for (element, value) in [
+        ("[latch] false_alarms_per_hour", latch.false_alarms_per_hour),
+        ("[latch] release_s", latch.release_s),
+    ] {
+        if value.is_nan() || value <= 0.0 {
+            return Err(report.invalid(
+                element,
+                "must be positive",
+                value,
+                "give a positive number, or inf for none",
+            ));
+        }
     }
     if !(0.0..=1.0).contains(&latch.contact_share) {
         return Err(report.invalid(

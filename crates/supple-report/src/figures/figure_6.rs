@@ -1,4 +1,4 @@
-//! Figure 6: impulse of one contact over stiffness, with the line through it.
+//! Figure 6: impulse of one contact over stiffness, with a line through it, and the first impact by itself.
 
 use super::axis::Axis;
 use super::panel::{Area, LegendSymbol, Margins, Mark, Panel, legend};
@@ -7,9 +7,9 @@ use super::ticks::{Ticks, extent, number};
 use super::{FigureError, draw_canvas};
 use plotters::style::RGBColor;
 use std::ops::Range;
-use supple_experiment::Demo;
 use supple_experiment::metrics::LineFit;
 use supple_experiment::summary::ProbingSummary;
+use supple_experiment::{Demo, scenario};
 
 /// Range of stiffness of the second panel \[N/m\].
 const NEAR_ZERO_N_PER_M: f64 = 25.0;
@@ -18,8 +18,8 @@ const NEAR_ZERO_N_PER_M: f64 = 25.0;
 pub struct Series {
     /// `K` \[N/m\], impulse over the whole cycle \[N s\].
     pub whole: Vec<(f64, f64)>,
-    /// `K` \[N/m\], impulse over the first 50 ms \[N s\].
-    pub first_50ms: Vec<(f64, f64)>,
+    /// `K` \[N/m\], impulse of the first impact \[N s\].
+    pub impact: Vec<(f64, f64)>,
     /// Line fitted to `whole`.
     pub fit: Option<LineFit>,
 }
@@ -38,7 +38,7 @@ impl Impulses {
         let summary = &demo.summary;
         let series = |lines: &[ProbingSummary], fit: Option<LineFit>| Series {
             whole: column(lines, |e| e.contact.impulse_newton_s),
-            first_50ms: column(lines, |e| e.contact.impulse_first_50ms_newton_s),
+            impact: column(lines, |e| e.contact.impact_newton_s),
             fit,
         };
         Impulses {
@@ -85,12 +85,9 @@ fn panel(
     (stiffness, step): (Range<f64>, f64),
 ) -> Result<(), FigureError> {
     let series = [&impulses.fade_on, &impulses.fade_off];
-    let fits = series.iter().filter_map(|s| s.fit.map(|fit| fit.intercept));
     let shown = |(k, impulse): &(f64, f64)| stiffness.contains(k).then_some(*impulse);
-    let all = series
-        .iter()
-        .flat_map(|s| s.whole.iter().chain(&s.first_50ms));
-    let values = extent(all.filter_map(shown).chain(fits).chain([0.0]));
+    let all = series.iter().flat_map(|s| s.whole.iter().chain(&s.impact));
+    let values = extent(all.filter_map(shown).chain([0.0]));
     let mut panel = Panel::new(
         area,
         title,
@@ -107,7 +104,7 @@ fn panel(
     )?;
     line_and_marks(&mut panel, &impulses.fade_off, Mark::Square, VERMILION)?;
     line_and_marks(&mut panel, &impulses.fade_on, Mark::Dot, BLUE)?;
-    panel.marks(&impulses.fade_on.first_50ms, Mark::Triangle, GREEN)
+    panel.marks(&impulses.fade_on.impact, Mark::Triangle, GREEN)
 }
 
 fn keys(area: &Area<'_>, impulses: &Impulses) -> Result<(), FigureError> {
@@ -126,7 +123,7 @@ fn keys(area: &Area<'_>, impulses: &Impulses) -> Result<(), FigureError> {
         [
             (on.as_str(), LegendSymbol::Mark(Mark::Dot), BLUE),
             (
-                "first 50 ms, fade on",
+                "first impact, fade on",
                 LegendSymbol::Mark(Mark::Triangle),
                 GREEN,
             ),
@@ -134,8 +131,8 @@ fn keys(area: &Area<'_>, impulses: &Impulses) -> Result<(), FigureError> {
         [
             (off.as_str(), LegendSymbol::Mark(Mark::Square), VERMILION),
             (
-                "intercept of a line",
-                LegendSymbol::Mark(Mark::Ring),
+                "line through 5 to 125 N/m",
+                LegendSymbol::Line(1.4),
                 TEXT_COLOUR,
             ),
         ],
@@ -157,11 +154,11 @@ fn line_and_marks(
         slope, intercept, ..
     }) = series.fit
     {
+        let start = scenario::STIFFNESS_N_PER_M;
         let end = extent(series.whole.iter().map(|p| p.0)).end;
-        // Short steps, because a panel omits points beyond its range.
-        let steps = (0..=100).map(|k| end * f64::from(k) / 100.0);
+        // Short steps, because a panel omits points beyond its range. The line ends where its points do.
+        let steps = (0..=100).map(|k| start + (end - start) * f64::from(k) / 100.0);
         panel.line(steps.map(|k| (k, intercept + slope * k)), colour, 1.4)?;
-        panel.marks(&[(0.0, intercept)], Mark::Ring, colour)?;
     }
     panel.marks(&series.whole, mark, colour)
 }
@@ -191,7 +188,7 @@ mod tests {
         let series = |intercept: f64| {
             let whole: Vec<_> = stiffnesses.map(|k| (k, intercept + 0.02 * k)).into();
             Series {
-                first_50ms: stiffnesses.map(|k| (k, 0.1)).into(),
+                impact: stiffnesses.map(|k| (k, 0.1)).into(),
                 fit: LineFit::new(&whole),
                 whole,
             }
@@ -226,7 +223,7 @@ mod tests {
     fn a_figure_without_a_fitted_line_is_drawn() {
         let none = || Series {
             whole: vec![(5.0, f64::NAN)],
-            first_50ms: Vec::new(),
+            impact: Vec::new(),
             fit: None,
         };
         let svg = draw(&Impulses {

@@ -203,8 +203,6 @@ pub enum Mark {
     Square,
     /// Triangle, point up.
     Triangle,
-    /// Ring.
-    Ring,
 }
 
 impl Mark {
@@ -219,7 +217,6 @@ impl Mark {
     fn draw_at(self, area: &Area<'_>, at: (i32, i32), colour: RGBColor) -> Result<(), FigureError> {
         match self {
             Mark::Dot => area.draw(&Circle::new(at, px(4.2), style::fill(colour, 1.0)))?,
-            Mark::Ring => area.draw(&Circle::new(at, px(4.2), stroke(colour, 1.6)))?,
             _ => {
                 let corners = self.outline();
                 let corners: Vec<_> = corners.iter().map(|c| (at.0 + c.0, at.1 + c.1)).collect();

@@ -73,15 +73,20 @@ pub fn faults(summary: &Summary) -> Vec<(String, &FaultEnd)> {
     for (name, tracking) in [("Coulomb", &exact.coulomb), ("Stribeck", &exact.stribeck)] {
         runs.push((format!("sinusoid, exact model, {name}"), &tracking.ended));
     }
-    for (fade, lines) in [
-        ("on", &summary.exploration),
-        ("off", &summary.exploration_fade_off),
+    for (kind, lines) in [
+        ("fade on", &summary.exploration),
+        ("fade off", &summary.exploration_fade_off),
+        ("exact model", &summary.exploration_exact_model),
+        ("rubber", &summary.exploration_rubber),
+        ("apparent inertia", &summary.exploration_apparent_inertia),
     ] {
         for line in lines {
-            let name = format!("probing at {} N/m, fade {fade}", line.stiffness_n_per_m);
+            let name = format!("probing at {} N/m, {kind}", line.stiffness_n_per_m);
             runs.push((name, &line.ended));
         }
     }
+    let apparent = &summary.sinusoid_apparent_inertia;
+    runs.push(("sinusoid, apparent inertia".to_owned(), &apparent.ended));
     let runs = runs.into_iter();
     realistic
         .chain(runs.filter_map(|(name, ended)| Some((name, ended.as_ref()?))))
@@ -89,11 +94,15 @@ pub fn faults(summary: &Summary) -> Vec<(String, &FaultEnd)> {
 }
 
 /// Runs of the quadrant, each with the model of its controller.
-pub fn quadrants_with_models(summary: &Summary) -> [(&QuadrantSummary, &'static str); 3] {
+pub fn quadrants_with_models(summary: &Summary) -> [(&QuadrantSummary, &'static str); 4] {
     [
         (&summary.quadrant, "exact model"),
         (&summary.quadrant_perturbed, "perturbed model"),
         (&summary.quadrant_at_paper_speed, "exact model"),
+        (
+            &summary.quadrant_damped,
+            "exact model, ten times the damping",
+        ),
     ]
 }
 

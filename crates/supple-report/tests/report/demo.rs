@@ -136,6 +136,17 @@ fn the_summary_has_every_promised_number() {
         "exploration.6.impulse_first_50ms_newton_s",
         "exploration.6.rest_force_n",
         "exploration.6.free_rms_m",
+        "exploration.8.pressing_force_n",
+        "exploration.8.spring_force_n",
+        "exploration.8.impact_newton_s",
+        "exploration.8.impact_theory_newton_s",
+        "exploration.8.spring_impulse_newton_s",
+        "exploration_exact_model.1.pressing_force_n",
+        "exploration_rubber.1.peak_filtered_n",
+        "exploration_apparent_inertia.1.peak_filtered_n",
+        "sinusoid_apparent_inertia.rms_error_m",
+        "quadrant_damped.rms_error_m",
+        "impulse_slopes.7.slope",
         "impulse_fit.slope",
         "impulse_fit.intercept",
         "impulse_fit.r2",
@@ -171,7 +182,10 @@ fn the_summary_has_every_promised_number() {
         .iter()
         .filter_map(|line| line["stiffness_n_per_m"].as_f64())
         .collect();
-    assert_eq!(stiffnesses, [0.5, 5.0, 25.0, 50.0, 75.0, 100.0, 125.0]);
+    assert_eq!(
+        stiffnesses,
+        [0.5, 1.0, 2.0, 5.0, 25.0, 50.0, 75.0, 100.0, 125.0]
+    );
 }
 
 /// Asserts that the page neither loads nor runs anything.

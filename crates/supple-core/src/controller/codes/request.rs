@@ -20,8 +20,9 @@
 //! | sinusoid | `centre_m`, `amplitude_m`, `angular_frequency_rad_per_s`, `ramp_s` |
 //! | arc | `radius_m`, `height_m`, `centre_rad`, `amplitude_rad`, `angular_frequency_rad_per_s`, `ramp_s` |
 //! | quadrant | `centre_m`, `first_m`, `second_m`, `speed_m_per_s`, `ramp_s` |
-//! | probe | `radius_m`, `strokes`, `radial_step_m`, `top_m`, `stroke_m`, `azimuth_rad`, `azimuth_step_rad`, `speed_m_per_s`, `ramp_s` |
+//! | probe | `radius_m`, `strokes`, `radial_step_m`, `top_m`, `stroke_m`, `azimuth_rad`, `azimuth_step_rad`, `speed_m_per_s`, `ramp_s`, `dwell_s` |
 //!
+//! A probe of an older log has no `dwell_s`: it is zero.
 //! Decoding rejects numbers that encode no request; whether a request is valid, the controller checks.
 
 use super::{request_kind, trajectory_kind};
@@ -380,6 +381,7 @@ impl RequestCode {
                     t.azimuth_step_rad,
                     t.speed_m_per_s,
                     t.ramp_s,
+                    t.dwell_s,
                 ]);
             }
         }
@@ -397,6 +399,14 @@ impl Rest<'_> {
         let number = self.values.get(self.taken).copied().unwrap_or(0.0);
         self.taken += 1;
         number
+    }
+
+    /// A value that older logs lack; zero without it.
+    fn number_if_present(&mut self) -> f64 {
+        match self.taken < self.values.len() {
+            true => self.number(),
+            false => 0.0,
+        }
     }
 
     fn take<const K: usize>(&mut self) -> [f64; K] {
@@ -470,6 +480,7 @@ impl Rest<'_> {
                 azimuth_step_rad: self.number(),
                 speed_m_per_s: self.number(),
                 ramp_s: self.number(),
+                dwell_s: self.number_if_present(),
             }),
             unknown => return Err(RequestCodeError::Trajectory(unknown)),
         })

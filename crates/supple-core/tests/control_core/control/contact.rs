@@ -2,13 +2,14 @@
 
 use crate::support::configs::{friction, three, unlimited};
 use crate::support::plant::{Plant, nothing, push};
+use crate::support::random::Random;
 use crate::support::rig::Rig;
 use supple_core::config::{ContactLatch, Gains};
 use supple_core::controller::Request;
 use supple_core::inverse_kinematics::inverse_kinematics;
 use supple_core::math::Vector3;
-use supple_core::trajectory::Line;
-use supple_core::{Config, Friction, Output, Trajectory, Vector};
+use supple_core::trajectory::{Line, Sinusoid};
+use supple_core::{Arm, Config, Friction, Input, Output, Trajectory, Vector};
 
 const CENTRE: Vector3<f64> = Vector3::new(0.6, 0.0, 0.0);
 
@@ -293,4 +294,89 @@ fn a_reference_at_rest_never_latches() {
         assert!(!output.in_contact);
         assert_eq!(output.force_against_n, 0.0);
     }
+}
+
+/// Motor counts of the WAM's encoders, at the joints \[rad\].
+const COUNT_RAD: f64 = std::f64::consts::TAU / 4096.0 / 28.25;
+
+/// A latch as the WAM's, with the residuals of its model.
+fn adapting(config: &mut Config<3>) {
+    config.law.gains = Gains::isotropic(5.0, 1.5);
+    config.friction = friction();
+    config.estimator_rad_per_s = 500.0;
+    config.latch = ContactLatch {
+        observer_rad_per_s: 120.0,
+        threshold_n: 3.5,
+        hold_friction: true,
+        false_alarms_per_hour: 1.0,
+        release_s: 0.2,
+        ..config.latch
+    };
+}
+
+/// Friction of the arm: that of the model times `factor`, smooth through rest.
+fn against_motion(qd: &Vector<3>, factor: f64) -> Vector<3> {
+    let model: [Friction; 3] = friction();
+    Vector::from_fn(|i, _| {
+        let f = &model[i];
+        -factor * (f.viscous_nm_s_per_rad * qd[i] + f.coulomb_nm * (qd[i] / 0.01).tanh())
+            - f.offset_nm
+    })
+}
+
+/// What the latch did in a sinusoid of 20 s: contacts begun, and the longest of them in cycles.
+fn in_free_motion(config: Config<3>, friction_factor: f64, noise_counts: f64) -> (u32, u32) {
+    let mut bench = Bench::new(config);
+    bench.rig.accept(Request::GravityHold);
+    let mut random = Random::new(20_260_117);
+    let sinusoid = Trajectory::Sinusoid(Sinusoid {
+        centre_m: CENTRE,
+        amplitude_m: Vector3::new(0.0, 0.0, -0.1),
+        angular_frequency_rad_per_s: 0.8,
+        ramp_s: 1.0,
+    });
+    let (mut contacts, mut longest, mut present) = (0, 0, 0);
+    for k in 0..22_000 {
+        let request = (k == 2_000).then_some(Request::Track(sinusoid));
+        let noise = Vector::from_fn(|_, _| noise_counts * COUNT_RAD * random.normal());
+        bench.rig.q = bench.plant.q + noise;
+        let input = Input {
+            request,
+            ..bench.rig.input()
+        };
+        let output = bench.rig.step(&input);
+        assert_eq!((output.refusal, output.fault), (None, None), "{k}");
+        let friction =
+            |_: &Arm<3>, _: &Vector<3>, qd: &Vector<3>| against_motion(qd, friction_factor);
+        bench.plant.advance(&output.torque_nm, friction, 1e-3, 4);
+        contacts += u32::from(output.in_contact && present == 0);
+        present = if output.in_contact { present + 1 } else { 0 };
+        longest = longest.max(present);
+    }
+    (contacts, longest)
+}
+
+/// Two counts of noise on every encoder, standard deviation. With a threshold that knows no residuals it latches.
+#[test]
+fn encoder_noise_of_two_counts_does_not_trigger_the_latch() {
+    let fixed = config(|_| {});
+    let mut adapted = fixed;
+    adapting(&mut adapted);
+    assert_eq!(in_free_motion(adapted, 1.0, 2.0), (0, 0));
+    let mut unaware = adapted;
+    unaware.latch.false_alarms_per_hour = f64::INFINITY;
+    let (contacts, _) = in_free_motion(unaware, 1.0, 2.0);
+    assert!(contacts > 0, "the noise is too small to show anything");
+}
+
+/// The arm has 20 % more friction than the model, and the threshold is low: no latch stays closed for 0.3 s.
+#[test]
+fn a_false_latch_of_a_moderately_wrong_model_opens_within_300_ms() {
+    let mut wrong = config(|_| {});
+    adapting(&mut wrong);
+    wrong.latch.threshold_n = 1.0;
+    let (contacts, longest) = in_free_motion(wrong, 1.2, 0.5);
+    println!("{contacts} false latches, the longest of {longest} ms");
+    assert!(contacts > 0, "the model is too good to show anything");
+    assert!(longest < 300, "{longest} ms");
 }

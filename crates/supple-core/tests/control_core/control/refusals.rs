@@ -194,6 +194,7 @@ fn trajectories_that_overflow_are_refused() {
         azimuth_step_rad: 0.1,
         speed_m_per_s: 0.04,
         ramp_s: 0.1,
+        dwell_s: 0.0,
     };
     let refusal = refused(Request::Track(Trajectory::Probe(probe)));
     assert!(matches!(refusal, Refusal::FarFromStart { .. }), "{refusal}");

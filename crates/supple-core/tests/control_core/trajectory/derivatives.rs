@@ -105,12 +105,14 @@ fn quadrant_walk() -> impl Strategy<Value = Walk> {
 pub fn probe() -> impl Strategy<Value = Probe> {
     let place = (0.3..0.6, -0.3..0.3, -3.0..3.0);
     let shape = (1_u32..5, 0.002..0.05, 0.02..0.2, -0.4..0.4);
-    (place, shape, 0.01..0.3, 0.01..1.0).prop_map(
+    let dwell_s = prop_oneof![Just(0.0), 0.01..3.0];
+    (place, shape, 0.01..0.3, 0.01..1.0, dwell_s).prop_map(
         |(
             (radius_m, top_m, azimuth_rad),
             (strokes, radial_step_m, stroke_m, azimuth_step_rad),
             speed_m_per_s,
             ramp_share,
+            dwell_s,
         )| Probe {
             radius_m,
             strokes,
@@ -121,6 +123,7 @@ pub fn probe() -> impl Strategy<Value = Probe> {
             azimuth_step_rad,
             speed_m_per_s,
             ramp_s: ramp_share * stroke_m / speed_m_per_s,
+            dwell_s,
         },
     )
 }

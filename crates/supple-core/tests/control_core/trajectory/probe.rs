@@ -17,6 +17,7 @@ fn paper() -> Probe {
         azimuth_step_rad: 0.1,
         speed_m_per_s: 0.04,
         ramp_s: 0.1,
+        dwell_s: 0.0,
     }
 }
 
@@ -107,7 +108,7 @@ fn mid_stroke_is_vertical_at_the_speed() {
         let direction = match phase {
             ProbePhase::Down => -1.0,
             ProbePhase::Up => 1.0,
-            ProbePhase::Out | ProbePhase::Advance => continue,
+            ProbePhase::Dwell | ProbePhase::Out | ProbePhase::Advance => continue,
         };
         let reference = trajectory.at(time_s);
         assert_eq!(reference.velocity.xy().norm(), 0.0);
@@ -128,6 +129,31 @@ fn times_of_a_cycle_and_of_a_column() {
     assert!((probe.cycle_s() - (2.0 * stroke_s + out_s)).abs() < 1e-12);
     let (_, t, stroke, column) = probe.phase_at(probe.column_s() + 1e-6);
     assert!((t - 1e-6).abs() < 1e-9 && stroke == 0 && column == 1);
+}
+
+/// The dwell delays the way up and changes nothing else.
+#[test]
+fn a_dwell_rests_at_the_bottom_between_down_and_up() {
+    let (without, dwell_s) = (paper(), 0.7);
+    let probe = Probe { dwell_s, ..without };
+    let stroke_s = probe.stroke_s();
+    let [dwelling, plain] = [probe, without].map(Trajectory::Probe);
+    for k in 0..=700 {
+        let time_s = stroke_s + 1e-3 * f64::from(k);
+        let reference = dwelling.at(time_s);
+        assert!((reference.position.z - (0.02 - 0.1)).abs() < 1e-15);
+        assert!(reference.velocity.norm() + reference.acceleration.norm() < 1e-12);
+        let inside = (1..700).contains(&k);
+        assert!(!inside || probe.phase_at(time_s).0 == ProbePhase::Dwell);
+    }
+    for k in 0..2 * 2600 {
+        let time_s = 1e-3 * f64::from(k);
+        let later_s = if time_s > stroke_s { dwell_s } else { 0.0 };
+        let difference = dwelling.at(time_s + later_s).position - plain.at(time_s).position;
+        assert!(difference.norm() < 1e-12, "at {time_s} s");
+    }
+    assert!((probe.cycle_s() - without.cycle_s() - dwell_s).abs() < 1e-12);
+    assert!((probe.column_s() - without.column_s() - 4.0 * dwell_s).abs() < 1e-12);
 }
 
 fn never_faster_than_the_speed(probe: Probe) -> Outcome {

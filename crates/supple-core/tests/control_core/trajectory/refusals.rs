@@ -53,6 +53,7 @@ fn probe() -> Probe {
         azimuth_step_rad: 0.1,
         speed_m_per_s: 0.04,
         ramp_s: 0.1,
+        dwell_s: 0.0,
     }
 }
 
@@ -106,6 +107,10 @@ fn entries_must_be_positive() {
         ..probe()
     };
     refused(Trajectory::Probe(no_strokes), "strokes", 0.0);
+    for dwell_s in [-1e-9, f64::NAN, f64::INFINITY] {
+        let wrong = Probe { dwell_s, ..probe() };
+        refused(Trajectory::Probe(wrong), "dwell_s", dwell_s);
+    }
 }
 
 #[test]

@@ -1,0 +1,73 @@
+//! Scale of the observed force in free motion: sets the contact threshold at a constant false-alarm rate.
+//!
+//! In free motion all of the observed force is residual: noise of the encoders and error of the model in
+//! use. `x` is that force over the threshold as configured. Its root mean square `s` follows the last
+//! seconds; contact is a force above the configured threshold times `z s`, with
+//!
+//! ```text
+//! z = sqrt(2 ln(n0 / n))
+//! ```
+//!
+//! which a Gaussian residual crosses upwards `n` times per second if it crosses zero `n0` times (Rice,
+//! 1945). `n0` is bounded by the bandwidth of the velocity estimate, `omega / (2 pi)`. Until residuals
+//! are known, and without a stated rate, the factor is one.
+
+use crate::math::{log, sqrt};
+
+/// Seconds of an hour.
+const HOUR_S: f64 = 3600.0;
+/// Time over which the mean square is taken \[s\].
+const WINDOW_S: f64 = 5.0;
+/// Weight of the first assumption, `z s = 1` \[s\].
+const PRIOR_S: f64 = 0.1;
+/// Residuals count up to this multiple of their scale, so that a contact that is about to be detected does
+/// not raise the threshold.
+const CLIP: f64 = 3.0;
+/// Range of the factor. A model cannot be so good that less than half of the threshold is noise, nor may
+/// noise hide every force.
+const FACTOR: (f64, f64) = (0.5, 5.0);
+
+/// Mean square of the residual.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ResidualScale {
+    /// `z`; zero without a stated rate.
+    deviations: f64,
+    /// `(z s)^2`.
+    mean_square: f64,
+    seen_s: f64,
+}
+
+impl ResidualScale {
+    /// For a rate of false alarms \[1/h\] and a bandwidth of the velocity estimate \[rad/s\].
+    pub fn new(false_alarms_per_hour: f64, estimator_rad_per_s: f64) -> ResidualScale {
+        let crossings_per_hour = HOUR_S * estimator_rad_per_s / core::f64::consts::TAU;
+        let deviations = if false_alarms_per_hour < crossings_per_hour {
+            sqrt(2.0 * log(crossings_per_hour / false_alarms_per_hour))
+        } else {
+            0.0
+        };
+        ResidualScale {
+            deviations,
+            mean_square: 1.0,
+            seen_s: 0.0,
+        }
+    }
+
+    /// Adds a residual `x` of a cycle without contact.
+    pub fn add(&mut self, x: f64, elapsed_s: f64) {
+        let window_s = (self.seen_s + PRIOR_S).min(WINDOW_S);
+        self.seen_s += elapsed_s;
+        let square = (self.deviations * x) * (self.deviations * x);
+        let most = CLIP * CLIP * self.mean_square;
+        self.mean_square += (square.min(most) - self.mean_square) * (elapsed_s / window_s).min(1.0);
+    }
+
+    /// Factor of the configured threshold.
+    pub fn factor(&self) -> f64 {
+        if self.deviations > 0.0 {
+            sqrt(self.mean_square).clamp(FACTOR.0, FACTOR.1)
+        } else {
+            1.0
+        }
+    }
+}
