@@ -147,6 +147,7 @@ fn probe<const N: usize>(
         plant: setup.plant(&model.variant, scenario::block()),
         trajectory: Trajectory::Probe(probe),
         duration_s: probe.cycle_s(),
+        learning: false,
     };
     let mut meter = ContactMeter::new(probe);
     run(&plan, &mut |cycle, time_s| {
