@@ -63,6 +63,11 @@ impl<const N: usize> Activity<N> {
         )
     }
 
+    /// Whether joints follow a reference of their own, by stiff loops or compliant springs.
+    pub fn has_joint_reference(&self) -> bool {
+        self.has_joint_loops() || matches!(self, Activity::JointImpedance { .. })
+    }
+
     /// Whether the activity commands no torque at all.
     pub fn is_torque_off(&self) -> bool {
         matches!(self, Activity::Idle | Activity::Fault(SafeAction::Idle))

@@ -3,7 +3,7 @@
 //! | finding | criterion |
 //! |---|---|
 //! | replies lost too often | each lost reply counts as eight received ones; the balance exceeds its limit |
-//! | encoder stuck | unchanged value while the joint's reference moves, out of contact, half as far if all encoders are unchanged; or from one cycle to the next for a moving joint |
+//! | encoder stuck | unchanged value while the joint's reference moves, out of contact, in modes of joint references half as far if all encoders are unchanged; or from one cycle to the next for a moving joint |
 //! | moves against its torque | 20 cycles in which a joint's momentum grows against its net torque |
 //! | unmodelled load | a force along gravity for 50 ms, in gravity hold or after the end of a move |
 //! | collision | the observed external torque or force exceeds its threshold |
@@ -21,9 +21,9 @@ const CONTACT_CYCLES: u32 = 5;
 /// Time for which the encoder of a joint in a collision may stay unchanged before it counts as
 /// stuck \[s\].
 const UNCHANGED_LIMIT_S: f64 = 0.03;
-/// Fraction of `stuck_rad` that a joint's reference may travel while no encoder changes: dry friction rarely holds all
-/// joints at once, and the encoders of a bus that stopped do not change.
-const ALL_STUCK_SHARE: f64 = 0.5;
+/// Fraction of `stuck_rad` that a joint's reference may travel while no encoder changes, in modes of joint references.
+/// At a few newtons per metre of tip stiffness dry friction may hold all joints at once; the springs of joints are stiffer.
+pub(super) const ALL_STUCK_SHARE: f64 = 0.5;
 /// Speed above which a joint counts as moving freely \[rad/s\].
 pub(super) const OTHER_JOINT_MOVING_RAD_PER_S: f64 = 0.1;
 const AGAINST_CYCLES: u32 = 20;
@@ -170,17 +170,18 @@ impl<const N: usize> Plausibility<N> {
         self.contact_cycles >= CONTACT_CYCLES
     }
 
-    /// Reports a stuck encoder if its value is unchanged while the joint's reference travels further than the limit,
-    /// or than half of it if no encoder changes.
+    /// Reports a stuck encoder if its value is unchanged while the joint's reference travels further than the limit, or
+    /// than `all_share` of it if no encoder changes.
     pub fn check_stuck_encoder(
         &mut self,
         limit_rad: f64,
+        all_share: f64,
         reference_rad_per_s: &Vector<N>,
         elapsed_s: f64,
     ) -> Result<(), Fault> {
         let limit_rad = match self.unchanged.contains(&false) {
             true => limit_rad,
-            false => ALL_STUCK_SHARE * limit_rad,
+            false => all_share * limit_rad,
         };
         for joint in 0..N {
             if !self.unchanged[joint] {

@@ -6,8 +6,8 @@ use super::checks::{COMPLIANT_SPEED_SHARE, MOVING_SHARE};
 use super::fault::Fault;
 use super::latch::Evidence;
 use super::plausibility::{
-    OTHER_JOINT_MOVING_RAD_PER_S, PlausibilityInput, SUDDEN_STOP_SHARE, joint_collision,
-    tip_collision,
+    ALL_STUCK_SHARE, OTHER_JOINT_MOVING_RAD_PER_S, PlausibilityInput, SUDDEN_STOP_SHARE,
+    joint_collision, tip_collision,
 };
 use super::pose_task::PoseCycle;
 use super::state::State;
@@ -235,8 +235,13 @@ impl<const N: usize> State<N> {
             let in_contact = plausibility.is_contact_plausible(self.latch.in_contact());
             if others_move || !in_contact {
                 let limit_rad = config.plausible.stuck_rad;
+                let all_share = match self.activity.has_joint_reference() {
+                    true => ALL_STUCK_SHARE,
+                    false => 1.0,
+                };
                 plausibility.check_stuck_encoder(
                     limit_rad,
+                    all_share,
                     evidence.reference_rad_per_s,
                     evidence.elapsed_s,
                 )?;

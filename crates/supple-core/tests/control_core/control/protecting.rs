@@ -297,17 +297,27 @@ fn a_stuck_encoder_faults() {
     );
 }
 
-/// Encoders that all stopped count as stuck after half of the way that a single one may be unchanged.
+/// Encoders that all stopped count as stuck after half of the way that a single one may be unchanged, in a mode of joint
+/// references. Under the law of the tip dry friction may hold all joints of an arm.
 #[test]
 fn all_encoders_stuck_at_once_fault_sooner() {
-    let stuck = |jitter_rad: f64| {
+    let stuck = |of_tip: bool, jitter_rad: f64| {
         let mut config = guarded();
         config.plausible.stuck_rad = 0.1;
         config.collision = Collision::disabled();
+        config.latch.threshold_n = 1e3;
         let mut rig = Rig::holding(config, bent());
-        rig.accept(Request::JointImpedance {
-            target_rad: bent::<4>() + Vector::<4>::new(0.3, 0.3, 0.0, 0.3),
-            duration_s: 2.0,
+        let from_m = rig.tip();
+        rig.accept(match of_tip {
+            true => Request::Track(Trajectory::Line(Line {
+                from_m,
+                to_m: from_m - Vector3::new(0.0, 0.0, 0.15),
+                duration_s: 2.0,
+            })),
+            false => Request::JointImpedance {
+                target_rad: bent::<4>() + Vector::<4>::new(0.3, 0.3, 0.0, 0.3),
+                duration_s: 2.0,
+            },
         });
         for k in 0..2000 {
             rig.q[2] += if k % 2 == 0 { jitter_rad } else { -jitter_rad };
@@ -317,12 +327,14 @@ fn all_encoders_stuck_at_once_fault_sooner() {
         }
         panic!("no fault");
     };
-    for (jitter_rad, expected_rad) in [(0.0, 0.05), (1e-6, 0.1)] {
+    for (of_tip, jitter_rad, expected_rad) in
+        [(false, 0.0, 0.05), (false, 1e-6, 0.1), (true, 0.0, 0.1)]
+    {
         let Fault::EncoderStuck {
             value_rad,
             limit_rad,
             ..
-        } = stuck(jitter_rad)
+        } = stuck(of_tip, jitter_rad)
         else {
             panic!("another fault");
         };
