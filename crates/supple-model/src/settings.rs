@@ -403,8 +403,8 @@ pub struct LatchSettings {
     /// Keeps the feed-forward of the moment of contact until release, instead of following a reference that the
     /// blocked arm does not follow. Default true.
     pub hold_friction: bool,
-    /// Rate of false alarms in free motion for which the residuals of the model in use set the threshold, from half
-    /// to five times the configured one (1/h); `inf`: the threshold stays as configured. Default 1.
+    /// Rate of false alarms in free motion for which the residuals of the model in use raise the threshold, up to five
+    /// times the configured one (1/h); `inf`: the threshold stays as configured. Default 1.
     pub false_alarms_per_hour: f64,
     /// Time after which a latch opens that nothing but the force speaks for (s); `inf`: every latch stays closed
     /// until the reference retreats. Default 0.2.

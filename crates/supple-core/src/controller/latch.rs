@@ -24,6 +24,8 @@ const FOLLOWING_SHARE: f64 = 0.5;
 const FOLLOWING_S: f64 = 0.01;
 /// Time after closing in which the tip must be slowed, if the feed-forward fades earlier than that \[s\].
 const SLOWED_S: f64 = 0.005;
+/// Time over which the force at rest is averaged \[s\].
+const RESTING_S: f64 = 0.1;
 /// Time after a release in which the next contact is believed \[s\].
 const AGAIN_S: f64 = 0.5;
 
@@ -54,6 +56,8 @@ pub struct Latch {
     /// Since the latch opened by itself.
     since_release_s: f64,
     residual: ResidualScale,
+    /// Mean force at rest, which friction holds \[N\].
+    resting_force_n: Vector3<f64>,
     /// Fraction of the friction feed-forward that is applied, 0 to 1.
     share: f64,
     held: f64,
@@ -74,6 +78,7 @@ impl Latch {
             following_s: 0.0,
             since_release_s: f64::MAX,
             residual: ResidualScale::new(config.false_alarms_per_hour, estimator_rad_per_s),
+            resting_force_n: Vector3::zeros(),
             share: 1.0,
             held: 0.0,
             force_against_n: 0.0,
@@ -93,6 +98,7 @@ impl Latch {
             following_s: 0.0,
             since_release_s: f64::MAX,
             residual: self.residual,
+            resting_force_n: self.resting_force_n,
             share: 1.0,
             held: 0.0,
             force_against_n: 0.0,
@@ -161,17 +167,18 @@ impl Latch {
         }
     }
 
-    /// Adds the observed force of an arm at rest or without a reference of the tip; nothing but residual.
+    /// Adds the observed force of an arm that is to stand still \[N\]: what changes of it is noise, whatever
+    /// friction hides.
     pub fn observe_at_rest(
         &mut self,
         config: &ContactLatch,
         force_n: &Vector3<f64>,
-        friction_uncertainty_n: f64,
         elapsed_s: f64,
     ) {
-        let configured_n = config.threshold_n + friction_uncertainty_n;
-        let along_axis_n = sqrt(force_n.dot(force_n) / 3.0);
-        self.residual.add(along_axis_n / configured_n, elapsed_s);
+        let noise_n = force_n - self.resting_force_n;
+        self.resting_force_n += noise_n * (elapsed_s / RESTING_S).min(1.0);
+        let size_n = sqrt(noise_n.dot(&noise_n));
+        self.residual.add(size_n / config.threshold_n, elapsed_s);
     }
 
     /// Second half of a cycle: compares the observed tip force with the threshold.

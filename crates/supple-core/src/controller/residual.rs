@@ -23,9 +23,8 @@ const PRIOR_S: f64 = 0.1;
 /// Residuals count up to this multiple of their scale, so that a contact that is about to be detected does
 /// not raise the threshold.
 const CLIP: f64 = 3.0;
-/// Range of the factor. A model cannot be so good that less than half of the threshold is noise, nor may
-/// noise hide every force.
-const FACTOR: (f64, f64) = (0.5, 5.0);
+/// Range of the factor: residuals only raise the configured threshold, and may not hide every force.
+const FACTOR: (f64, f64) = (1.0, 5.0);
 
 /// Mean square of the residual.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,13 +58,15 @@ impl ResidualScale {
         self.seen_s += elapsed_s;
         let square = (self.deviations * x) * (self.deviations * x);
         let most = CLIP * CLIP * self.mean_square;
-        self.mean_square += (square.min(most) - self.mean_square) * (elapsed_s / window_s).min(1.0);
+        let change = (square.min(most) - self.mean_square) * (elapsed_s / window_s).min(1.0);
+        let (least, greatest) = (FACTOR.0 * FACTOR.0, FACTOR.1 * FACTOR.1);
+        self.mean_square = (self.mean_square + change).clamp(least, greatest);
     }
 
     /// Factor of the configured threshold.
     pub fn factor(&self) -> f64 {
         if self.deviations > 0.0 {
-            sqrt(self.mean_square).clamp(FACTOR.0, FACTOR.1)
+            sqrt(self.mean_square)
         } else {
             1.0
         }

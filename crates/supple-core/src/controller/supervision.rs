@@ -14,7 +14,7 @@ use super::state::State;
 use crate::config::Config;
 use crate::law::impedance::{SINGULAR_BELOW_M, Task};
 use crate::law::learned::LearnedAtPose;
-use crate::math::{Vector, Vector3, abs, sqrt};
+use crate::math::{Vector, Vector3, abs};
 use crate::model::workspace::WorkspaceViolation;
 use crate::trajectory::Reference;
 
@@ -95,15 +95,6 @@ impl<const N: usize> State<N> {
         if let Some(reference) = self.joint_reference(config) {
             reference_rad_per_s = reference.velocity_rad_per_s;
         }
-        let uncertainty_n = |along: &Vector<N>, velocity: &Vector<N>| {
-            (0..N)
-                .map(|i| {
-                    let friction = &config.friction[i];
-                    abs(along[i])
-                        * friction.uncertainty_nm(velocity[i], config.latch.friction_error)
-                })
-                .sum()
-        };
         if let Some(reference) = reference {
             self.latch.update_direction(&reference.velocity, elapsed_s);
             let along = task.inverse * self.latch.direction();
@@ -111,10 +102,17 @@ impl<const N: usize> State<N> {
                 Some(pose) => pose.joint_velocity_rad_per_s,
                 None => task.inverse * reference.velocity,
             };
+            let friction_uncertainty_n = (0..N)
+                .map(|i| {
+                    let friction = &config.friction[i];
+                    abs(along[i])
+                        * friction.uncertainty_nm(velocity[i], config.latch.friction_error)
+                })
+                .sum();
             let was_in_contact = self.latch.in_contact();
             let evidence = Evidence {
                 force_n: force,
-                friction_uncertainty_n: uncertainty_n(&along, &velocity),
+                friction_uncertainty_n,
                 tip_velocity_m_per_s: self.terms.jacobian.fixed_rows::<3>(0)
                     * self.estimator.velocity_rad_per_s,
             };
@@ -125,13 +123,7 @@ impl<const N: usize> State<N> {
             }
             reference_rad_per_s = velocity;
         } else if self.is_resting(&reference_rad_per_s) && is_regular(task) {
-            let size_n = sqrt(force.dot(&force));
-            if size_n > 0.0 {
-                let along = task.inverse * (force / size_n);
-                let friction_n = uncertainty_n(&along, &reference_rad_per_s);
-                self.latch
-                    .observe_at_rest(&config.latch, &force, friction_n, elapsed_s);
-            }
+            self.latch.observe_at_rest(&config.latch, &force, elapsed_s);
         }
         let evidence = PlausibilityInput {
             reference_rad_per_s: &reference_rad_per_s,
