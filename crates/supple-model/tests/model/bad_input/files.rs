@@ -35,7 +35,7 @@ fn elements_nested_deeper_than_the_stack_are_rejected() {
                 "small.urdf",
                 "<gazebo>",
                 "at most 64 levels deep",
-                "without extensions",
+                "without elements of other programs",
             ],
         );
     }
