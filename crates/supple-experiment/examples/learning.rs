@@ -1,13 +1,14 @@
 //! The sinusoid at 5 N/m on arms that deviate from the controller's model, without and with learning while moving; then
 //! the arc with what was learned, without learning further.
 //!
-//! Prints the tip's RMS error, of the sinusoid from 24 s on, and the learned parameters in force at the end:
+//! The arm without a deviation also probes, without and with what the sinusoid taught and learning on. Prints the tip's RMS error, of the sinusoid from 24 s on, and the learned parameters in force at the end:
 //! `cargo run --release -p supple-experiment --example learning`.
 
 use supple_core::Trajectory;
 use supple_core::controller::Request;
 use supple_core::learned::LearnedTerms;
 use supple_experiment::metrics::Rms;
+use supple_experiment::probing::{ContactMeter, Stroke, median_stroke};
 use supple_experiment::{Deviation, ExperimentError, Plan, Setup, Variant, run, scenario};
 use supple_model::Description;
 use supple_plant::Scene;
@@ -59,6 +60,35 @@ fn track(
     Ok((words, terms))
 }
 
+/// The median stroke of probing with these terms and learning on, or without either.
+fn probing(
+    setup: &Setup<4>,
+    stiffness_n_per_m: f64,
+    learned: Option<LearnedTerms<4>>,
+) -> Result<Stroke, ExperimentError> {
+    let (probe, duration_s) = scenario::probe(setup.tip_radius_m());
+    let mut config = setup.config(&Variant::EXACT)?;
+    config.law.gains = scenario::gains(stiffness_n_per_m);
+    config.learned = learned.unwrap_or(config.learned);
+    let plan = Plan {
+        name: "probing".to_owned(),
+        config,
+        plant: setup.plant(&Variant::EXACT, scenario::block()),
+        trajectory: Trajectory::Probe(probe),
+        duration_s,
+        learning: learned.is_some(),
+    };
+    let mut meter = ContactMeter::new(probe);
+    run(&plan, &mut |cycle, time_s| {
+        if let Some(time_s) = time_s {
+            let in_contact = cycle.output.in_contact;
+            meter.cycle(time_s, &cycle.truth, cycle.steps, in_contact);
+        }
+        Ok(())
+    })?;
+    Ok(median_stroke(&meter.finish()))
+}
+
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let description = Description::asset("wam4")?;
     let setup = Setup::<4>::new(&description, 0)?;
@@ -85,6 +115,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let (arc_learning, _) = track((arc, DURATION_S, FROM_S), true, zero)?;
         println!("{deviation:?}: {without} / {with}, {arc_without} / {arc_with} / {arc_learning}");
         println!("    {:?}", learned.parameters);
+        if deviation == Deviation::None {
+            for stiffness_n_per_m in [5.0, 125.0] {
+                for terms in [None, Some(learned)] {
+                    let stroke = probing(&setup, stiffness_n_per_m, terms)?;
+                    let with = if terms.is_some() { "with" } else { "without" };
+                    println!("    probing at {stiffness_n_per_m} N/m {with}: {stroke:?}");
+                }
+            }
+        }
     }
     Ok(())
 }

@@ -224,7 +224,8 @@ impl<const N: usize> Learner<N> {
             return;
         }
         self.frozen = None;
-        self.disturbed_s = 0.0;
+        // In some intervals of a motion a lasting change hardly shows: they do not disprove it.
+        self.disturbed_s = (self.disturbed_s - INTERVAL_S).max(0.0);
         self.waiting.push_back(interval);
         if self.waiting.len() > WAITING
             && let Some(oldest) = self.waiting.pop_front()

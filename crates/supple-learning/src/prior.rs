@@ -49,8 +49,8 @@ const SMOOTHNESS: f64 = 0.5;
 /// Smallest standard deviation that counts, so that no precision is infinite.
 const MIN_STD: f64 = 1e-9;
 /// Share of the dry friction, and of the torque limit, in the noise of a joint's torque.
-const NOISE_FRICTION_SHARE: f64 = 0.05;
-const NOISE_TORQUE_SHARE: f64 = 2e-4;
+const NOISE_FRICTION_SHARE: f64 = 0.1;
+const NOISE_TORQUE_SHARE: f64 = 4e-4;
 
 /// Prior and bounds of one arm.
 #[derive(Clone, Debug)]
