@@ -437,6 +437,7 @@ mod tests {
     use super::*;
     use std::collections::BTreeSet;
     use std::io::ErrorKind;
+    use supple_plant::PlantOptions;
 
     /// Rows of the table without a [`Failure`]: success, wrong use as clap has it, interrupted.
     const ELSEWHERE: [u8; 3] = [0, 2, 130];
@@ -469,11 +470,21 @@ mod tests {
         let arm = "invalid arm description";
         let (fault, disk, system) = ("a fault", "a file cannot be", "no system is running");
         let runs = text();
+        let plant = |set| PlantOptions::set(set).expect_err("unknown");
+        let plant_file = |toml| PlantOptions::from_toml(toml, "file").expect_err("invalid");
         vec![
             (Failure::ReportGeneration(text()), "a bug"),
             (Failure::VirtualTimeOnRealBus, "invalid command line"),
             (Failure::FaultTestOnRealArm, "invalid command line"),
             (Failure::NoSuchProcess { name: "" }, "invalid command line"),
+            (Failure::OptionsOfRealArm, "invalid command line"),
+            (
+                Failure::NoSuchEffect { text: text() },
+                "invalid command line",
+            ),
+            (plant("surreal").into(), "invalid command line"),
+            (plant_file("base_tilt_rad = 9").into(), arm),
+            (plant_file("tilt = 9").into(), arm),
             (Failure::Model(model()), arm),
             (
                 Failure::UnknownArm {

@@ -109,13 +109,6 @@ fn sized<const N: usize>(
             finished,
         });
     };
-    let realistic = (0..seeds).into_par_iter().map(|offset| {
-        let seed = options.seed.wrapping_add(offset);
-        let done = realistic_seed::<N>(description, options.model.as_ref(), &hard, seed)?;
-        report(REALISTIC_S, format!("realistic, seed {seed}"));
-        Ok(done)
-    });
-    let realistic = realistic.collect::<Result<Vec<_>, ExperimentError>>()?;
     let results = jobs
         .par_iter()
         .zip(&plans)
@@ -125,6 +118,13 @@ fn sized<const N: usize>(
             Ok(done)
         })
         .collect::<Result<Vec<JobResult>, ExperimentError>>()?;
+    let realistic = (0..seeds).into_par_iter().map(|offset| {
+        let seed = options.seed.wrapping_add(offset);
+        let done = realistic_seed::<N>(description, options.model.as_ref(), &hard, seed)?;
+        report(REALISTIC_S, format!("realistic, seed {seed}"));
+        Ok(done)
+    });
+    let realistic = realistic.collect::<Result<Vec<_>, ExperimentError>>()?;
     let realistic = (seeds > 0).then(|| Realistic::of(&realistic));
     Ok(assemble(description, options, &jobs, results, realistic))
 }

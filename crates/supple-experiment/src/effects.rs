@@ -71,9 +71,9 @@ pub struct EffectRun {
     pub model: ModelSource,
     /// Seed of the calibration, the noise, and the signs and phases of the effect.
     pub seed: u64,
-    /// The motion; `None` if the calibration failed.
+    /// The motion; `None` if calibration or motion failed.
     pub motion: Option<FreeMotion>,
-    /// Why the calibration failed.
+    /// Why it failed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub failed: Option<String>,
 }
@@ -192,29 +192,45 @@ fn one<const N: usize>(
     models: &[ModelSource],
     seed: u64,
 ) -> Result<Vec<EffectRun>, ExperimentError> {
-    let result = |model, found: Result<FreeMotion, String>| EffectRun {
-        effect: effect.name,
-        model,
-        seed,
-        motion: found.as_ref().ok().cloned(),
-        failed: found.err(),
-    };
-    let run = |model: &ModelSource| {
+    let track = |model: ModelSource| {
         let setup = match model {
             ModelSource::Nominal => Setup::<N>::new(description, seed)?,
-            ModelSource::Calibrated => match calibrated::<N>(description, &effect.options, seed) {
-                Ok(found) => Setup::<N>::with_model(description, &found, seed)?,
-                // A controller that faults on this arm, or a fit that is refused, is a result.
-                Err(error @ (ExperimentError::Fault { .. } | ExperimentError::Ident(_))) => {
-                    return Ok(result(*model, Err(error.to_string())));
-                }
-                Err(error) => return Err(error),
-            },
+            ModelSource::Calibrated => {
+                let found = calibrated::<N>(description, &effect.options, seed)?;
+                Setup::<N>::with_model(description, &found, seed)?
+            }
         };
-        let motion = free_motion(&setup.with_plant_options(&effect.options)?)?;
-        Ok(result(*model, Ok(motion)))
+        free_motion(&setup.with_plant_options(&effect.options)?)
+    };
+    let run = |model: &ModelSource| {
+        let found = result_or_error(track(*model))?;
+        Ok(EffectRun {
+            effect: effect.name,
+            model: *model,
+            seed,
+            motion: found.as_ref().ok().cloned(),
+            failed: found.err(),
+        })
     };
     models.iter().map(run).collect()
+}
+
+/// What the arm makes of an experiment is a result, also that it cannot be done: a fault outside of the trajectory, a
+/// refused request, a joint that sticks, a fit that is refused. Other errors are errors.
+pub(crate) fn result_or_error<T>(
+    done: Result<T, ExperimentError>,
+) -> Result<Result<T, String>, ExperimentError> {
+    match done {
+        Ok(done) => Ok(Ok(done)),
+        Err(
+            error @ (ExperimentError::Fault { .. }
+            | ExperimentError::FaultAtStart { .. }
+            | ExperimentError::Refused { .. }
+            | ExperimentError::Stuck { .. }
+            | ExperimentError::Ident(_)),
+        ) => Ok(Err(error.to_string())),
+        Err(error) => Err(error),
+    }
 }
 
 /// The model of a calibration on the arm with these options.

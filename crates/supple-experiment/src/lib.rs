@@ -71,7 +71,7 @@ pub use excite::{constant_speed_runs, excitation, slow_motion};
 pub use mismatch::Mismatch;
 pub use pose::{PoseMotion, PoseTracking, pose_start, track_pose};
 pub use quadrant::{Edge, EdgeMeter};
-pub use realistic::{Realistic, SeedFault};
+pub use realistic::{Realistic, SeedFailure, SeedFault};
 pub use record::Recorder;
 pub use request_sequence::{Recording, RequestSequence, Step, StepCallback};
 pub use rig::{Cycle, Rig};

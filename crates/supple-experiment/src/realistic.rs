@@ -1,6 +1,6 @@
 //! The headline of the demo: a calibrated controller on the plant `realistic`, cold and warmed up.
 
-use crate::effects::{FreeMotion, calibrated, free_motion};
+use crate::effects::{FreeMotion, calibrated, free_motion, result_or_error};
 use crate::error::ExperimentError;
 use crate::run::FaultEnd;
 use crate::setup::Setup;
@@ -27,6 +27,17 @@ pub struct Realistic {
     pub false_latches: usize,
     /// Faults that ended runs early.
     pub ended: Vec<SeedFault>,
+    /// Seeds without a result, with the reason: a calibration or a start that failed.
+    pub failed: Vec<SeedFailure>,
+}
+
+/// Why one seed has no result.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SeedFailure {
+    /// The seed, counted from that of the demo.
+    pub seed: u64,
+    /// The reason.
+    pub reason: String,
 }
 
 /// A fault that ended a run of one seed.
@@ -45,8 +56,18 @@ pub(crate) struct RealisticSeed {
     warm: FreeMotion,
 }
 
-/// Calibrates on the arm with `options` and tracks, cold and warm. With a `model`, that model is used instead.
+/// Calibrates on the arm with `options` and tracks, cold and warm. With a `model`, that model is used instead. An arm that
+/// cannot be calibrated is a result.
 pub(crate) fn realistic_seed<const N: usize>(
+    description: &Description,
+    model: Option<&Description>,
+    options: &PlantOptions,
+    seed: u64,
+) -> Result<Result<RealisticSeed, String>, ExperimentError> {
+    result_or_error(tracked::<N>(description, model, options, seed))
+}
+
+fn tracked<const N: usize>(
     description: &Description,
     model: Option<&Description>,
     options: &PlantOptions,
@@ -74,21 +95,29 @@ pub(crate) fn realistic_seed<const N: usize>(
 }
 
 impl Realistic {
-    pub(crate) fn of(seeds: &[RealisticSeed]) -> Realistic {
-        let motions = seeds.iter().flat_map(|seed| [&seed.cold, &seed.warm]);
-        let ended = seeds.iter().enumerate().flat_map(|(k, seed)| {
-            let faults = [&seed.cold.ended, &seed.warm.ended].into_iter().flatten();
-            faults.map(move |fault| SeedFault {
-                seed: k as u64,
-                fault: fault.clone(),
-            })
-        });
+    pub(crate) fn of(seeds: &[Result<RealisticSeed, String>]) -> Realistic {
+        let done = || seeds.iter().filter_map(|seed| seed.as_ref().ok());
+        let motions = done().flat_map(|seed| [&seed.cold, &seed.warm]);
+        let (mut ended, mut failed) = (Vec::new(), Vec::new());
+        for (seed, found) in (0..).zip(seeds) {
+            match found {
+                Err(reason) => failed.push(SeedFailure {
+                    seed,
+                    reason: reason.clone(),
+                }),
+                Ok(found) => {
+                    let faults = [&found.cold.ended, &found.warm.ended].into_iter().flatten();
+                    ended.extend(faults.cloned().map(|fault| SeedFault { seed, fault }));
+                }
+            }
+        }
         Realistic {
-            sinusoid_rms_m: seeds.iter().map(|s| s.cold.sinusoid_rms_m).collect(),
-            arc_rms_m: seeds.iter().map(|s| s.cold.arc_rms_m).collect(),
-            warm_rms_m: seeds.iter().map(|s| s.warm.sinusoid_rms_m).collect(),
+            sinusoid_rms_m: done().map(|s| s.cold.sinusoid_rms_m).collect(),
+            arc_rms_m: done().map(|s| s.cold.arc_rms_m).collect(),
+            warm_rms_m: done().map(|s| s.warm.sinusoid_rms_m).collect(),
             false_latches: motions.map(|motion| motion.false_latches).sum(),
-            ended: ended.collect(),
+            ended,
+            failed,
         }
     }
 }

@@ -1,6 +1,7 @@
 //! `supple effects`: tracking at 5 N/m with each effect of a real arm alone and with all together, as a table.
 
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::fmt::Write;
 use supple_cli::arguments::EffectsArgs;
 use supple_cli::arms;
@@ -73,12 +74,12 @@ pub fn run(args: &EffectsArgs) -> Result<(), Failure> {
 fn page(arm: &str, seeds: u64, effects: &[Effect], runs: &[EffectRun]) -> String {
     let mut page = format!(
         "# What ruins low stiffness\n\n\
-         Tracking error of the tip at 5 N/m on the simulated {arm}, RMS in mm: median over {seeds} seeds, the worst in \
-         brackets. Each row has one effect of a real arm in the plant, the last one all of them together at modest size. \
-         The sizes are assumptions, not measurements of an arm; `supple plant list` describes each option. *Not \
-         calibrated*: the controller's model is exact but for the effect. *Calibrated*: the model was identified on the \
-         arm with the effect, with the errors that an identification leaves. Latches are false reports of contact, summed \
-         over all seeds; nothing is there to touch.\n\n\
+         Tracking error of the tip at 5 N/m on the simulated {arm}, RMS in mm: median over the seeds ({seeds}), the worst in\n\
+         brackets. Each row has one effect of a real arm in the plant, the last one all of them together at modest size. The\n\
+         sizes are assumptions, not measurements of an arm; `supple plant list` describes each option. *Not calibrated*: the\n\
+         controller's model is exact but for the effect. *Calibrated*: the model was identified on the arm with the effect,\n\
+         with the errors that an identification leaves. Latches are false reports of contact, summed over all seeds; nothing\n\
+         is there to touch.\n\n\
          Made by `supple effects --arm {arm} --seeds {seeds}`.\n\n| effect |"
     );
     let models = ModelSource::ALL;
@@ -90,7 +91,7 @@ fn page(arm: &str, seeds: u64, effects: &[Effect], runs: &[EffectRun]) -> String
     page.push_str("\n|---|");
     page.push_str(&"---:|".repeat(3 * models.len()));
     page.push('\n');
-    let mut notes = Vec::new();
+    let mut notes: BTreeMap<_, Vec<String>> = BTreeMap::new();
     for effect in effects {
         let _ = write!(page, "| {} |", effect.name);
         let of = |model: ModelSource| {
@@ -113,15 +114,11 @@ fn page(arm: &str, seeds: u64, effects: &[Effect], runs: &[EffectRun]) -> String
             for run in of(model) {
                 let ended = run.motion.as_ref().and_then(|m| m.ended.as_ref());
                 let fault = ended.map(|ended| format!("a fault ended a run: {}", ended.fault));
-                let failed = run.failed.clone().map(|f| format!("no calibration: {f}"));
-                notes.extend(fault.or(failed).map(|note| {
-                    format!(
-                        "- {}, {}, seed {}: {note}",
-                        effect.name,
-                        model.name(),
-                        run.seed
-                    )
-                }));
+                let failed = run.failed.clone().map(|f| format!("no result: {f}"));
+                if let Some(note) = fault.or(failed) {
+                    let of = (effect.name, model.name(), note);
+                    notes.entry(of).or_default().push(run.seed.to_string());
+                }
             }
         }
         page.push('\n');
@@ -129,9 +126,12 @@ fn page(arm: &str, seeds: u64, effects: &[Effect], runs: &[EffectRun]) -> String
     if !notes.is_empty() {
         let _ = write!(
             page,
-            "\nErrors of runs that a fault ended are those before it.\n\n{}\n",
-            notes.join("\n")
+            "\nErrors of runs that a fault ended are those before it.\n\n"
         );
+        for ((effect, model, note), seeds) in notes {
+            let seeds = seeds.join(", ");
+            let _ = writeln!(page, "- {effect}, {model}, seed {seeds}: {note}");
+        }
     }
     page
 }
@@ -181,7 +181,7 @@ mod tests {
             "{page}"
         );
         assert!(
-            page.contains("- none, calibrated, seed 1: no calibration: no torque"),
+            page.contains("- none, calibrated, seed 1: no result: no torque"),
             "{page}"
         );
     }

@@ -42,11 +42,15 @@ fn free_motion(summary: &Summary) -> Vec<Line> {
         let terms = [t.gravity, t.friction, t.feedback].map(figures);
         format!("{} N m", terms.join(", "))
     };
-    let realistic = summary.realistic.as_ref().map(realistic);
+    let (ideal, hard) = plants(summary);
+    let realistic = summary
+        .realistic
+        .as_ref()
+        .map(|found| realistic(found, hard));
     let mut lines = realistic.unwrap_or_default();
     lines.extend([
         line(
-            "ideal plant: sinusoid at 5 N/m, RMS error",
+            &format!("{ideal}: sinusoid at 5 N/m, RMS error"),
             rms(&[&summary.sinusoid]),
             "follows closely (fig. 3a)",
         ),
@@ -114,19 +118,30 @@ fn free_motion(summary: &Summary) -> Vec<Line> {
     lines
 }
 
+/// Names of the plant of most rows, and of the calibrated one.
+pub(crate) fn plants(summary: &Summary) -> (&'static str, &'static str) {
+    match summary.plant.is_none() {
+        true => ("ideal plant", "realistic plant"),
+        false => ("given plant", "given plant"),
+    }
+}
+
 /// The plant with all effects of a real arm, first: the other rows leave these out.
-fn realistic(found: &Realistic) -> Vec<Line> {
+fn realistic(found: &Realistic, hard: &str) -> Vec<Line> {
     let median_and_worst = |errors: &[f64]| {
         let worst = errors.iter().copied().fold(0.0, f64::max);
         millimetres(&[median(errors).unwrap_or(0.0), worst])
     };
-    let faults = match found.ended.len() {
+    let mut faults = match found.ended.len() {
         0 => String::new(),
         faults => format!(", {faults} ended by a fault"),
     };
+    if !found.failed.is_empty() {
+        faults.push_str(&format!(", {} without result", found.failed.len()));
+    }
     vec![
         line(
-            "realistic plant, calibrated: sinusoid at 5 N/m",
+            &format!("{hard}, calibrated: sinusoid at 5 N/m"),
             format!("{}{faults}", median_and_worst(&found.sinusoid_rms_m)),
             "follows closely (fig. 3a)",
         ),

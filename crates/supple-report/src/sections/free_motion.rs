@@ -1,6 +1,7 @@
 //! Free motion: figures 3 and 4, the arc, the perturbed models, and equation (3.6) exactly as printed.
 
 use super::{Row, Section, quadrants_with_models, row};
+use crate::table::plants;
 use crate::units::{mm, newton_metres, seconds};
 use supple_experiment::JointTorque;
 use supple_experiment::metrics::median;
@@ -17,9 +18,10 @@ fn error(tracking: &TrackingError) -> String {
 
 pub(super) fn sinusoid(summary: &Summary) -> Section {
     let mut rows: Vec<Row> = realistic(summary);
+    let (ideal, _) = plants(summary);
     for at in &summary.sinusoid_by_speed {
         let quantity = format!(
-            "ideal plant: error at {} \u{d7} the speed: RMS, maximum",
+            "{ideal}: error at {} \u{d7} the speed: RMS, maximum",
             at.speed
         );
         rows.push(row(quantity, error(&at.tracking)));
@@ -37,7 +39,7 @@ pub(super) fn sinusoid(summary: &Summary) -> Section {
                the periods. The controller's model is perturbed. The first rows are the headline: a plant with elastic \
                cables, ripple, friction that warms up and varies, errors of amplifiers, encoders, mounting and tool, \
                and a controller calibrated on that arm. The figure and all other rows are of the ideal plant, \
-               which has none of these.",
+               which has none of these, unless plant options were given.",
         rows,
     }
 }
@@ -47,15 +49,13 @@ fn realistic(summary: &Summary) -> Vec<Row> {
     let Some(found) = &summary.realistic else {
         return Vec::new();
     };
+    let (_, hard) = plants(summary);
     let errors = |errors: &[f64]| {
         let worst = errors.iter().copied().fold(0.0, f64::max);
         format!("{}, {}", mm(median(errors).unwrap_or(f64::NAN)), mm(worst))
     };
-    let of = format!(
-        "realistic plant, calibrated, {} seeds",
-        found.sinusoid_rms_m.len()
-    );
-    vec![
+    let of = format!("{hard}, calibrated, {} seeds", found.sinusoid_rms_m.len());
+    let mut rows = vec![
         row(
             format!("{of}: RMS, median, worst"),
             errors(&found.sinusoid_rms_m),
@@ -69,7 +69,12 @@ fn realistic(summary: &Summary) -> Vec<Row> {
             "false reports of contact in these runs",
             found.false_latches.to_string(),
         ),
-    ]
+    ];
+    for failure in &found.failed {
+        let name = format!("{hard}, seed {}: no result", failure.seed);
+        rows.push(row(name, failure.reason.clone()));
+    }
+    rows
 }
 
 pub(super) fn quadrant(summary: &Summary) -> Section {

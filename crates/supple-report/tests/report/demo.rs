@@ -41,7 +41,14 @@ fn ran() -> &'static Ran {
             fs::write(out.join(old), "old").expect("written");
         }
         fs::write(out.join("notes.txt"), "someone else's").expect("written");
-        let answer = run(&["demo", "--json", "--out", arg(&out)]);
+        let answer = run(&[
+            "demo",
+            "--json",
+            "--realistic-seeds",
+            "2",
+            "--out",
+            arg(&out),
+        ]);
         let files = tree(&out);
         let logs = files
             .iter()
@@ -128,6 +135,10 @@ fn the_summary_has_every_promised_number() {
         "torque_rms.elbow.inertial",
         "torque_rms.elbow.feedback",
         "quadrant.rms_error_m",
+        "realistic.sinusoid_rms_m.1",
+        "realistic.arc_rms_m.1",
+        "realistic.warm_rms_m.1",
+        "realistic.false_latches",
         "exploration.6.stiffness_n_per_m",
         "exploration.6.approach_m_per_s",
         "exploration.6.peak_filtered_n",

@@ -45,6 +45,8 @@ fn runs_that_a_fault_ends_are_code_5_with_all_results() {
         "--json",
         "--quiet",
         "--no-logs",
+        "--realistic-seeds",
+        "1",
         "--arm",
         arg(&arm),
         "--out",

@@ -1,6 +1,8 @@
 //! The interface of the command line: help, names, exit codes.
 
 use crate::support::{self, assert_one_clear_line, run};
+use supple_plant::PlantOptions;
+use supple_plant::options::OPTIONS;
 
 #[test]
 fn help_lists_the_commands_and_the_exit_codes() {
@@ -10,6 +12,8 @@ fn help_lists_the_commands_and_the_exit_codes() {
         "demo",
         "log",
         "arms",
+        "plant",
+        "effects",
         "completions",
         "Exit codes",
         "a file cannot be read",
@@ -96,6 +100,46 @@ fn an_arm_is_copied() {
     ];
     assert_eq!(run(&forced).code, Some(0));
     assert_eq!(held(path), 0);
+}
+
+#[test]
+fn plant_options_are_listed_and_a_set_is_shown_as_a_file() {
+    let list = run(&["plant", "list"]);
+    assert_eq!(list.code, Some(0), "{}", list.stderr);
+    let json = run(&["plant", "list", "--json"]);
+    let options: serde_json::Value = serde_json::from_str(&json.stdout).expect("JSON");
+    for option in OPTIONS {
+        assert!(list.stdout.contains(option.name), "{}", option.name);
+    }
+    assert_eq!(options.as_array().expect("a list").len(), OPTIONS.len());
+    let shown = run(&["plant", "show", "realistic"]);
+    let found = PlantOptions::from_toml(&shown.stdout, "shown").expect("a file of options");
+    assert_eq!(found, PlantOptions::realistic());
+    let unknown = run(&["plant", "show", "surreal"]);
+    assert_eq!(unknown.code, Some(2));
+    assert_one_clear_line(&unknown, &["surreal", "realistic"]);
+}
+
+#[test]
+fn invalid_plant_options_are_rejected_before_anything_starts() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("plant.toml");
+    std::fs::write(&file, "base_tilt_rad = 3.5\n").expect("written");
+    let file = support::arg(&file);
+    let up = ["up", "--no-log", "--for", "1", "--plant"];
+    let wrong = run(&[&up[..], &["sim", "--plant-options", file]].concat());
+    assert_eq!(wrong.code, Some(3), "{}", wrong.stderr);
+    assert_one_clear_line(
+        &wrong,
+        &["plant.toml", "base_tilt_rad", "3.5", "from 0 to 0.5 rad"],
+    );
+    let absent = run(&[&up[..], &["emu", "--plant-options", "nowhere.toml"]].concat());
+    assert_eq!(absent.code, Some(6), "{}", absent.stderr);
+    let real = run(&[&up[..], &["can", "--realistic"]].concat());
+    assert_eq!(real.code, Some(2), "{}", real.stderr);
+    assert_one_clear_line(&real, &["--plant sim"]);
+    let both = run(&[&up[..], &["sim", "--realistic", "--plant-options", file]].concat());
+    assert_eq!(both.code, Some(2), "{}", both.stderr);
 }
 
 #[test]
