@@ -6,6 +6,7 @@
 
 use crate::calibrate::{Calibration, calibrate};
 use crate::error::ExperimentError;
+use crate::metrics::Rms;
 use crate::run::{FaultEnd, Plan, run};
 use crate::scenario;
 use crate::setup::{Setup, Variant};
@@ -15,6 +16,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use supple_core::Trajectory;
 use supple_model::{Description, with_dof};
 use supple_plant::{PlantOptions, Scene};
+
+/// Motion before the error of a learning controller counts: three periods of the sinusoid \[s\].
+pub const LEARNING_S: f64 = 24.0;
 
 /// An effect with its size.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,17 +37,24 @@ pub enum ModelSource {
     Nominal,
     /// A calibration on the arm with the effect, as `supple calibrate` does it, with ripple runs if a motor ripples.
     Calibrated,
+    /// The same, refined while the arm moves. Errors count after [`LEARNING_S`] of motion.
+    Learning,
 }
 
 impl ModelSource {
     /// All, in the order of the table.
-    pub const ALL: [ModelSource; 2] = [ModelSource::Nominal, ModelSource::Calibrated];
+    pub const ALL: [ModelSource; 3] = [
+        ModelSource::Nominal,
+        ModelSource::Calibrated,
+        ModelSource::Learning,
+    ];
 
     /// Head of the table's columns.
     pub fn name(self) -> &'static str {
         match self {
             ModelSource::Nominal => "not calibrated",
             ModelSource::Calibrated => "calibrated",
+            ModelSource::Learning => "learning",
         }
     }
 }
@@ -195,12 +206,13 @@ fn one<const N: usize>(
     let track = |model: ModelSource| {
         let setup = match model {
             ModelSource::Nominal => Setup::<N>::new(description, seed)?,
-            ModelSource::Calibrated => {
+            ModelSource::Calibrated | ModelSource::Learning => {
                 let found = calibrated::<N>(description, &effect.options, seed)?;
                 Setup::<N>::with_model(description, &found, seed)?
             }
         };
-        free_motion(&setup.with_plant_options(&effect.options)?)
+        let learning = model == ModelSource::Learning;
+        free_motion(&setup.with_plant_options(&effect.options)?, learning)
     };
     let run = |model: &ModelSource| {
         let found = result_or_error(track(*model))?;
@@ -249,12 +261,16 @@ pub fn calibrated<const N: usize>(
     Ok(calibrate::<N>(description, &calibration, &mut |_| {})?.description)
 }
 
-/// Sinusoid and arc at 5 N/m in empty space.
+/// Sinusoid and arc at 5 N/m in empty space. With `learning` each goes on for [`LEARNING_S`] before its error counts.
 ///
 /// # Errors
 /// [`ExperimentError`]; a fault is a result.
-pub fn free_motion<const N: usize>(setup: &Setup<N>) -> Result<FreeMotion, ExperimentError> {
+pub fn free_motion<const N: usize>(
+    setup: &Setup<N>,
+    learning: bool,
+) -> Result<FreeMotion, ExperimentError> {
     let mut false_latches = 0;
+    let learning_s = if learning { LEARNING_S } else { 0.0 };
     let mut track = |name: &str, (trajectory, duration_s): (Trajectory, f64)| {
         let mut config = setup.config(&Variant::EXACT)?;
         config.law.gains = scenario::gains(scenario::STIFFNESS_N_PER_M);
@@ -263,23 +279,36 @@ pub fn free_motion<const N: usize>(setup: &Setup<N>) -> Result<FreeMotion, Exper
             config,
             plant: setup.plant(&Variant::EXACT, Scene::default()),
             trajectory,
-            duration_s,
-            learning: false,
+            duration_s: learning_s + duration_s,
+            learning,
         };
         let mut latched = false;
-        run(&plan, &mut |cycle, time_s| {
+        let mut error = Rms::default();
+        let run = run(&plan, &mut |cycle, time_s| {
+            if let (Some(time_s), Some(reference)) = (time_s, cycle.output.reference)
+                && time_s >= learning_s
+            {
+                error.add((reference.position - cycle.truth.tip_position_m).norm());
+            }
             let now = time_s.is_some() && cycle.output.in_contact;
             false_latches += usize::from(now && !latched);
             latched = now;
             Ok(())
-        })
+        })?;
+        // A fault while learning: the error before it.
+        let rms_m = if error.is_empty() {
+            run.rms_error_m
+        } else {
+            error.rms()
+        };
+        Ok::<_, ExperimentError>((rms_m, run.ended))
     };
-    let sinusoid = track("sinusoid", scenario::sinusoid(1.0))?;
-    let arc = track("arc", scenario::arc())?;
+    let (sinusoid_rms_m, sinusoid_ended) = track("sinusoid", scenario::sinusoid(1.0))?;
+    let (arc_rms_m, arc_ended) = track("arc", scenario::arc())?;
     Ok(FreeMotion {
-        sinusoid_rms_m: sinusoid.rms_error_m,
-        arc_rms_m: arc.rms_error_m,
+        sinusoid_rms_m,
+        arc_rms_m,
         false_latches,
-        ended: sinusoid.ended.or(arc.ended),
+        ended: sinusoid_ended.or(arc_ended),
     })
 }

@@ -18,6 +18,11 @@ impl Rms {
         self.max_abs = self.max_abs.max(value.abs());
     }
 
+    /// Whether there are no values.
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
     /// Root mean square; zero without values.
     pub fn rms(&self) -> f64 {
         if self.count == 0 {

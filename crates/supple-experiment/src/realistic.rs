@@ -79,7 +79,7 @@ fn tracked<const N: usize>(
     };
     let track = |options: &PlantOptions| {
         let setup = Setup::<N>::with_model(description, &found, seed)?;
-        free_motion(&setup.with_plant_options(options)?)
+        free_motion(&setup.with_plant_options(options)?, false)
     };
     let warms = options
         .warm_up_dry_fraction
