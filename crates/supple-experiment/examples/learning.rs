@@ -81,8 +81,7 @@ fn probing(
     let mut meter = ContactMeter::new(probe);
     run(&plan, &mut |cycle, time_s| {
         if let Some(time_s) = time_s {
-            let in_contact = cycle.output.in_contact;
-            meter.cycle(time_s, &cycle.truth, cycle.steps, in_contact);
+            meter.cycle(time_s, &cycle.truth, cycle.steps, &cycle.output);
         }
         Ok(())
     })?;
