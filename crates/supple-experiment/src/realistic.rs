@@ -1,4 +1,4 @@
-//! The headline of the demo: a calibrated controller on the plant `realistic`, cold and warmed up.
+//! The headline of the demo: a controller on the plant `realistic`, calibrated and learning, cold and warmed up.
 
 use crate::effects::{FreeMotion, calibrated, free_motion, result_or_error};
 use crate::error::ExperimentError;
@@ -9,11 +9,12 @@ use supple_model::Description;
 use supple_plant::PlantOptions;
 
 /// Simulated time that one seed takes, about \[s\]; for progress.
-pub(crate) const REALISTIC_S: f64 = 400.0;
+pub(crate) const REALISTIC_S: f64 = 500.0;
 /// Time of work after which the arm counts as warm \[s\].
 const WARM_S: f64 = 1200.0;
 
-/// Free motion at 5 N/m on the realistic plant, by seed.
+/// Free motion at 5 N/m on the realistic plant, by seed, calibrated and learning: errors count after
+/// [`crate::effects::LEARNING_S`] of motion.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Realistic {
     /// Root mean square tip error on the sinusoid, cold, by seed \[m\].
@@ -23,8 +24,14 @@ pub struct Realistic {
     /// Root mean square tip error on the sinusoid after 20 minutes of warm-up, by seed, with the model calibrated cold
     /// \[m\].
     pub warm_rms_m: Vec<f64>,
-    /// False reports of contact in all of these runs.
+    /// False reports of contact in all of these runs while learning.
     pub false_latches: usize,
+    /// Calibrated alone: root mean square tip error on the sinusoid, cold, by seed \[m\].
+    pub calibrated_sinusoid_rms_m: Vec<f64>,
+    /// Calibrated alone: root mean square tip error on the arc, cold, by seed \[m\].
+    pub calibrated_arc_rms_m: Vec<f64>,
+    /// Calibrated alone: root mean square tip error on the sinusoid after 20 minutes of warm-up, by seed \[m\].
+    pub calibrated_warm_rms_m: Vec<f64>,
     /// Faults that ended runs early.
     pub ended: Vec<SeedFault>,
     /// Seeds without a result, with the reason: a calibration or a start that failed.
@@ -52,8 +59,25 @@ pub struct SeedFault {
 
 /// Result of one seed.
 pub(crate) struct RealisticSeed {
+    learning: ColdAndWarm,
+    calibrated: ColdAndWarm,
+}
+
+struct ColdAndWarm {
     cold: FreeMotion,
     warm: FreeMotion,
+}
+
+impl RealisticSeed {
+    fn motions(&self) -> [&FreeMotion; 4] {
+        let (learning, calibrated) = (&self.learning, &self.calibrated);
+        [
+            &learning.cold,
+            &learning.warm,
+            &calibrated.cold,
+            &calibrated.warm,
+        ]
+    }
 }
 
 /// Calibrates on the arm with `options` and tracks, cold and warm. With a `model`, that model is used instead. An arm that
@@ -77,9 +101,9 @@ fn tracked<const N: usize>(
         Some(model) => model.clone(),
         None => calibrated::<N>(description, options, seed)?,
     };
-    let track = |options: &PlantOptions| {
+    let track = |options: &PlantOptions, learning: bool| {
         let setup = Setup::<N>::with_model(description, &found, seed)?;
-        free_motion(&setup.with_plant_options(options)?, false)
+        free_motion(&setup.with_plant_options(options)?, learning)
     };
     let warms = options
         .warm_up_dry_fraction
@@ -88,16 +112,22 @@ fn tracked<const N: usize>(
         warmed_s: warms.map(|_| options.warmed_s.unwrap_or(0.0) + WARM_S),
         ..options.clone()
     };
+    let both = |learning: bool| {
+        Ok::<_, ExperimentError>(ColdAndWarm {
+            cold: track(options, learning)?,
+            warm: track(&warm, learning)?,
+        })
+    };
     Ok(RealisticSeed {
-        cold: track(options)?,
-        warm: track(&warm)?,
+        learning: both(true)?,
+        calibrated: both(false)?,
     })
 }
 
 impl Realistic {
     pub(crate) fn of(seeds: &[Result<RealisticSeed, String>]) -> Realistic {
         let done = || seeds.iter().filter_map(|seed| seed.as_ref().ok());
-        let motions = done().flat_map(|seed| [&seed.cold, &seed.warm]);
+        let motions = done().flat_map(|seed| [&seed.learning.cold, &seed.learning.warm]);
         let (mut ended, mut failed) = (Vec::new(), Vec::new());
         for (seed, found) in (0..).zip(seeds) {
             match found {
@@ -106,15 +136,20 @@ impl Realistic {
                     reason: reason.clone(),
                 }),
                 Ok(found) => {
-                    let faults = [&found.cold.ended, &found.warm.ended].into_iter().flatten();
-                    ended.extend(faults.cloned().map(|fault| SeedFault { seed, fault }));
+                    let faults = found.motions().map(|motion| motion.ended.clone());
+                    let faults = faults.into_iter().flatten();
+                    ended.extend(faults.map(|fault| SeedFault { seed, fault }));
                 }
             }
         }
+        let of = |error: fn(&RealisticSeed) -> f64| done().map(error).collect();
         Realistic {
-            sinusoid_rms_m: done().map(|s| s.cold.sinusoid_rms_m).collect(),
-            arc_rms_m: done().map(|s| s.cold.arc_rms_m).collect(),
-            warm_rms_m: done().map(|s| s.warm.sinusoid_rms_m).collect(),
+            sinusoid_rms_m: of(|seed| seed.learning.cold.sinusoid_rms_m),
+            arc_rms_m: of(|seed| seed.learning.cold.arc_rms_m),
+            warm_rms_m: of(|seed| seed.learning.warm.sinusoid_rms_m),
+            calibrated_sinusoid_rms_m: of(|seed| seed.calibrated.cold.sinusoid_rms_m),
+            calibrated_arc_rms_m: of(|seed| seed.calibrated.cold.arc_rms_m),
+            calibrated_warm_rms_m: of(|seed| seed.calibrated.warm.sinusoid_rms_m),
             false_latches: motions.map(|motion| motion.false_latches).sum(),
             ended,
             failed,

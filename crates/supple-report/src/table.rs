@@ -141,7 +141,7 @@ fn realistic(found: &Realistic, hard: &str) -> Vec<Line> {
     }
     vec![
         line(
-            &format!("{hard}, calibrated: sinusoid at 5 N/m"),
+            &format!("{hard}, calibrated and learning: sinusoid at 5 N/m"),
             format!("{}{faults}", median_and_worst(&found.sinusoid_rms_m)),
             "follows closely (fig. 3a)",
         ),
@@ -151,6 +151,11 @@ fn realistic(found: &Realistic, hard: &str) -> Vec<Line> {
             "",
         ),
         line("  arc", median_and_worst(&found.arc_rms_m), ""),
+        line(
+            "  calibrated alone: sinusoid",
+            median_and_worst(&found.calibrated_sinusoid_rms_m),
+            "",
+        ),
         line("  false contacts", found.false_latches.to_string(), ""),
     ]
 }
