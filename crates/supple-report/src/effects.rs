@@ -78,8 +78,8 @@ fn page(arm: &str, seeds: u64, effects: &[Effect], runs: &[EffectRun]) -> String
          brackets. Each row has one effect of a real arm in the plant, the last one all of them together at modest size. The\n\
          sizes are assumptions, not measurements of an arm; `supple plant list` describes each option. *Not calibrated*: the\n\
          controller's model is exact but for the effect. *Calibrated*: the model was identified on the arm with the effect,\n\
-         with the errors that an identification leaves. Latches are false reports of contact, summed over all seeds; nothing\n\
-         is there to touch.\n\n\
+         with the errors that an identification leaves. *Learning*: that model, refined while the arm moves; errors count\n\
+         after 24 s of motion. Latches are false reports of contact, summed over all seeds; nothing is there to touch.\n\n\
          Made by `supple effects --arm {arm} --seeds {seeds}`.\n\n| effect |"
     );
     let models = ModelSource::ALL;
@@ -173,11 +173,12 @@ mod tests {
             run(2, ModelSource::Nominal, 2e-3),
             run(0, ModelSource::Calibrated, 4e-3),
             run(1, ModelSource::Calibrated, 0.0),
+            run(0, ModelSource::Learning, 1e-3),
         ];
         let effects = &effects()[..1];
         let page = page("wam4", 3, effects, &runs);
         assert!(
-            page.contains("| none | 2.0 (3.0) | 4.0 | 4.0 (6.0) | 8.0 | 6 | 2 |"),
+            page.contains("| none | 2.0 (3.0) | 4.0 | 1.0 | 4.0 (6.0) | 8.0 | 2.0 | 6 | 2 | 2 |"),
             "{page}"
         );
         assert!(

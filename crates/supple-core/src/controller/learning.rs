@@ -6,6 +6,7 @@
 
 use super::Controller;
 use super::activity::Activity;
+use super::learned_ramp::Learned;
 use super::mode::{LearningSwitch, Mode, Refusal};
 use super::pose_task::PoseCycle;
 use super::state::State;
@@ -16,9 +17,6 @@ use crate::math::{Vector, Vector3};
 use crate::model::learned::{JointMap, LearnedParameters, LearnedTerms, OutOfBounds};
 use crate::trajectory::Reference;
 
-/// Time in which new terms come into force \[s\].
-pub const LEARNED_RAMP_S: f64 = 1.0;
-
 impl Mode {
     /// Whether the model may be refined in this mode: the arm moves by itself, and nobody is to push it.
     pub fn allows_learning(self) -> bool {
@@ -26,52 +24,6 @@ impl Mode {
             self,
             Mode::Move | Mode::Track | Mode::Probe | Mode::Excite | Mode::TrackPose
         )
-    }
-}
-
-/// The terms in force and those to come.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Learned<const N: usize> {
-    /// New terms are accepted.
-    pub on: bool,
-    pub current: LearnedTerms<N>,
-    target: LearnedTerms<N>,
-    /// Cycles until the target is in force.
-    cycles_left: u32,
-    /// Any number is not zero; otherwise nothing is computed.
-    in_use: bool,
-}
-
-impl<const N: usize> Learned<N> {
-    /// The terms of a configuration, in force.
-    pub fn new(initial: &LearnedTerms<N>) -> Self {
-        Learned {
-            on: false,
-            current: *initial,
-            target: *initial,
-            cycles_left: 0,
-            in_use: *initial != LearnedTerms::zero(),
-        }
-    }
-
-    fn approach(&mut self, target: LearnedTerms<N>, period_s: f64) {
-        self.target = target;
-        self.cycles_left = (LEARNED_RAMP_S / period_s) as u32 + 1;
-        self.in_use = true;
-    }
-
-    /// One cycle of the ramp. It ends exactly at the target.
-    #[inline(never)]
-    fn advance(&mut self) {
-        let share = 1.0 / f64::from(self.cycles_left);
-        self.cycles_left -= 1;
-        if self.cycles_left == 0 {
-            self.current = self.target;
-            self.in_use = self.current != LearnedTerms::zero();
-            return;
-        }
-        self.current
-            .each(&self.target, |now, target| *now += (target - *now) * share);
     }
 }
 

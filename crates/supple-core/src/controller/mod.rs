@@ -9,6 +9,7 @@ pub mod drive_guard;
 pub mod estimator;
 mod fault;
 pub mod latch;
+mod learned_ramp;
 mod learning;
 mod limiter;
 mod mode;
@@ -27,7 +28,7 @@ mod supervision;
 mod validate;
 
 pub use fault::{Fault, SafeAction};
-pub use learning::LEARNED_RAMP_S;
+pub use learned_ramp::LEARNED_RAMP_S;
 pub use limiter::{Limited, MotorGroups, limit, limit_torque};
 pub use mode::{Breakaway, LearningSwitch, Mode, Refusal, Request};
 pub use motion_check::check_motion;

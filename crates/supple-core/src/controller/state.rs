@@ -9,7 +9,7 @@ use super::plausibility::Plausibility;
 use crate::config::{Config, Gains, JointGains, Role, RotationalGains};
 use crate::controller::estimator::Estimator;
 use crate::controller::latch::Latch;
-use crate::controller::learning::Learned;
+use crate::controller::learned_ramp::Learned;
 use crate::controller::observer::MomentumObserver;
 use crate::dynamics::Terms;
 use crate::math::{Vector, abs, all_finite};

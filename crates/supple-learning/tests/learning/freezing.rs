@@ -67,7 +67,7 @@ fn person_leaning_on_the_arm_changes_nothing() {
 #[test]
 fn nothing_is_learned_while_off_and_in_modes_in_which_people_push() {
     let truth = Truth {
-        payload_kg: 0.1,
+        payload_kg: 0.03,
         ..Truth::none()
     };
     let mut world = World::new(model(four()), truth);
@@ -84,7 +84,7 @@ fn nothing_is_learned_while_off_and_in_modes_in_which_people_push() {
         // A hand moves the arm about.
         for k in 0..4000 {
             let t = f64::from(k) * 1e-3;
-            let force = Vector3::new(0.0, 2.5 * (2.0 * t).sin(), 2.5 * (1.5 * t).cos());
+            let force = Vector3::new(0.0, (2.0 * t).sin(), (1.5 * t).cos());
             let output = world.cycle(None, force);
             assert_eq!(output.fault, None);
         }

@@ -68,6 +68,7 @@ fn trajectory() -> impl Strategy<Value = Trajectory> {
 }
 
 /// A request, or the kind of a request that depends on the arm's pose.
+#[expect(clippy::large_enum_variant, reason = "a few hundred of them in a test")]
 #[derive(Clone, Debug)]
 enum RequestKind<const N: usize> {
     None,
