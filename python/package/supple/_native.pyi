@@ -21,6 +21,7 @@ __all__ = [
     "identify",
     "learn",
     "payload",
+    "plant_options",
     "read_log",
     "ripple",
     "simulate",
