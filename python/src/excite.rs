@@ -188,6 +188,7 @@ pub fn excite<'py>(
     series: Series,
     options: ExciteOptions,
 ) -> PyResult<Bound<'py, PyDict>> {
+    options.plant_options.check()?;
     let (truth, known) = (arm.description(), model.description());
     let series = SeriesLists::from(series);
     let log = py.detach(|| {
@@ -223,7 +224,7 @@ fn followed<const N: usize>(
     let calibration = Calibration {
         encoder_noise_rad: options.encoder_noise_rad,
         load: options.load,
-        plant: options.plant_options.0.clone(),
+        plant: options.plant_options.options.clone(),
         ..Calibration::new(options.seed)
     };
     let plant = plant_of::<N>(truth, &calibration)?;
@@ -234,7 +235,7 @@ fn followed<const N: usize>(
         options.log_dir.as_deref(),
         known,
         options.seed,
-        options.plant_options.0.notes(),
+        options.plant_options.options.notes(),
     )?;
     Ok((log_of(&recordings[0]), config.period_s))
 }

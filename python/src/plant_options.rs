@@ -9,15 +9,37 @@ use supple_plant::PlantOptions;
 /// Name of options that were given as a dictionary, in errors.
 const DICTIONARY: &str = "plant_options";
 
-/// Plant options from Python: `None`, a path, or a dictionary of numbers.
-pub struct PlantEffects(pub PlantOptions);
+/// Plant options from Python: `None`, a path, or a dictionary of numbers. What is wrong with them is kept until they are
+/// used: an error of the conversion would become a TypeError of all options.
+pub struct PlantEffects {
+    /// The options; the default if they are wrong.
+    pub options: PlantOptions,
+    error: Option<String>,
+}
+
+impl PlantEffects {
+    /// A ValueError if the options are wrong.
+    pub fn check(&self) -> PyResult<()> {
+        match &self.error {
+            None => Ok(()),
+            Some(message) => Err(PyValueError::new_err(message.clone())),
+        }
+    }
+
+    fn valid(options: PlantOptions) -> PlantEffects {
+        PlantEffects {
+            options,
+            error: None,
+        }
+    }
+}
 
 impl<'py> FromPyObject<'_, 'py> for PlantEffects {
     type Error = PyErr;
 
     fn extract(given: Borrowed<'_, 'py, PyAny>) -> PyResult<PlantEffects> {
         if given.is_none() {
-            return Ok(PlantEffects(PlantOptions::default()));
+            return Ok(PlantEffects::valid(PlantOptions::default()));
         }
         let found = match given.cast::<PyDict>() {
             Err(_) => PlantOptions::from_file(&given.extract::<PathBuf>()?),
@@ -31,8 +53,13 @@ impl<'py> FromPyObject<'_, 'py> for PlantEffects {
                 PlantOptions::from_toml(&text, DICTIONARY)
             }
         };
-        let found = found.map_err(|error| PyValueError::new_err(error.to_string()))?;
-        Ok(PlantEffects(found))
+        Ok(match found {
+            Ok(options) => PlantEffects::valid(options),
+            Err(error) => PlantEffects {
+                options: PlantOptions::default(),
+                error: Some(error.to_string()),
+            },
+        })
     }
 }
 

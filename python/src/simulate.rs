@@ -55,6 +55,7 @@ pub fn simulate<'py>(
     model: Option<&Arm>,
     options: Options,
 ) -> PyResult<Bound<'py, PyDict>> {
+    options.plant_options.check()?;
     let arms = Arms {
         plant: arm.description(),
         model: model.map(Arm::description),
@@ -88,7 +89,7 @@ fn sized<const N: usize>(arms: &Arms<'_>, options: &Options) -> Result<Outcome, 
             description,
             &plan,
             options.seed,
-            options.plant_options.0.notes(),
+            options.plant_options.options.notes(),
         )?),
         None => None,
     };
@@ -124,7 +125,7 @@ fn plan<const N: usize>(arms: &Arms<'_>, options: &Options) -> Result<Plan<N>, E
         Some(model) => Setup::<N>::with_model(arms.plant, model, options.seed)?,
         None => Setup::<N>::new(arms.plant, options.seed)?,
     };
-    let setup = setup.with_plant_options(&options.plant_options.0)?;
+    let setup = setup.with_plant_options(&options.plant_options.options)?;
     let wrong = options.gravity_error != 0.0 || options.friction_error != 0.0;
     let variant = Variant {
         mismatch: wrong.then_some(Mismatch {
