@@ -181,7 +181,7 @@ pub struct ContactLatch {
     /// Rate of false alarms in free motion for which the residuals of the model in use set the threshold \[1/h\],
     /// positive; infinite: the threshold stays as configured.
     pub false_alarms_per_hour: f64,
-    /// Time after which a latch opens that nothing but the force speaks for \[s\], positive; infinite: every latch
+    /// Time after which a latch opens if the tip's motion does not confirm the contact \[s\], positive; infinite: every latch
     /// stays closed until the reference retreats.
     pub release_s: f64,
 }

@@ -9,14 +9,16 @@ mod counting;
 mod support;
 
 use counting::count_allocations;
-use supple_core::Config;
+use supple_core::codes::MODES;
 use supple_core::config::Gains;
-use supple_core::controller::{Mode, Request};
+use supple_core::controller::{LearningSwitch, Mode, Request};
+use supple_core::learned::{JointMap, LearnedParameters};
 use supple_core::math::Vector3;
-use support::configs::{four, friction, seven};
-use support::rig::{Rig, bent, probe_at};
+use supple_core::{Config, Vector};
+use support::configs::{four, friction, seven, seven_active};
+use support::rig::{Rig, bent, bent_wrist, probe_at};
 
-/// Runs through every mode, a refusal, two kinds of fault and random input.
+/// Runs through the modes of the paper's experiments, a refusal and three kinds of fault.
 fn step_allocates_nothing<const N: usize>(mut config: Config<N>) {
     config.friction = friction();
     let mut rig = Rig::new(config, bent());
@@ -35,7 +37,7 @@ fn step_allocates_nothing<const N: usize>(mut config: Config<N>) {
             modes[output.mode as usize] = true;
         }
     });
-    assert_eq!(modes, [true; 6], "every mode was run");
+    assert_eq!(modes, [true; 6], "each of these modes was run");
     assert_eq!(count, 0);
 }
 
@@ -55,6 +57,36 @@ fn request<const N: usize>(rig: &Rig<N>, cycle: u32) -> Option<Request<N>> {
         1400 | 1700 => Some(Request::Reset),
         _ => None,
     }
+}
+
+/// Enters every mode with learning on and learned terms that come into force or are refused.
+fn learning_in_every_mode_allocates_nothing<const N: usize>(config: Config<N>, q: Vector<N>) {
+    let mut parameters = LearnedParameters::zero();
+    parameters.payload_kg = 0.1;
+    let mut map = JointMap::ZERO;
+    map.torque_nm.fill(0.01);
+    for mode in MODES {
+        if mode == Mode::TrackPose && N < 6 {
+            continue;
+        }
+        let mut rig = Rig::new(config, q);
+        let mut learned = false;
+        let count = count_allocations(|| {
+            rig.bring_to(mode);
+            rig.request(Request::Learning(LearningSwitch::On));
+            rig.request(Request::LearnedParameters(parameters));
+            rig.request(Request::LearnedMap { joint: 1, map });
+            learned = rig.rest().torques.learned.amax() > 0.0;
+        });
+        assert_eq!(count, 0, "{mode:?}");
+        assert_eq!(learned, mode.allows_learning(), "{mode:?}");
+    }
+}
+
+#[test]
+fn of_every_mode_with_learning() {
+    learning_in_every_mode_allocates_nothing(four(), bent());
+    learning_in_every_mode_allocates_nothing(seven_active(), bent_wrist());
 }
 
 #[test]

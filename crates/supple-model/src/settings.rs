@@ -406,7 +406,7 @@ pub struct LatchSettings {
     /// Rate of false alarms in free motion for which the residuals of the model in use raise the threshold, up to five
     /// times the configured one (1/h); `inf`: the threshold stays as configured. Default 1.
     pub false_alarms_per_hour: f64,
-    /// Time after which a latch opens that nothing but the force speaks for (s); `inf`: every latch stays closed
+    /// Time after which a latch opens if the tip's motion does not confirm the contact (s); `inf`: every latch stays closed
     /// until the reference retreats. Default 0.2.
     pub release_s: f64,
 }

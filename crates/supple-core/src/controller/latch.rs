@@ -5,11 +5,11 @@
 //! reference's motion exceeds a threshold, fades the feed-forward, and opens when the reference
 //! retreats.
 //!
-//! A latch that closed by mistake opens by itself. What contact blocks does not move on with the
-//! reference: if the tip does for 10 ms, without a force above the threshold, nothing is
-//! there. And contact that does not even slow the tip to half of the reference's speed before the
-//! feed-forward fades is doubted: after `release_s` it must raise the force over the threshold once more,
-//! and is believed then.
+//! A latch that closed by mistake opens by itself, in two cases. If the tip moves at more than half of the
+//! reference's speed for 10 ms, without a force above the threshold, nothing blocks it. And a contact is
+//! confirmed only if the tip is slower than that at some time before the feed-forward fades; without it
+//! the latch opens after `release_s`, and if the force exceeds the threshold again soon, the contact counts
+//! as confirmed.
 
 use super::residual::ResidualScale;
 use crate::config::ContactLatch;
@@ -26,7 +26,7 @@ const FOLLOWING_S: f64 = 0.01;
 const SLOWED_S: f64 = 0.005;
 /// Time over which the force at rest is averaged \[s\].
 const RESTING_S: f64 = 0.1;
-/// Time after a release in which the next contact is believed \[s\].
+/// Time after a release in which the next contact counts as confirmed \[s\].
 const AGAIN_S: f64 = 0.5;
 
 /// What a cycle shows of contact.
@@ -49,8 +49,8 @@ pub struct Latch {
     since_reversal_s: f64,
     reference_m_per_s: f64,
     in_contact: bool,
-    /// Whether more than the force speaks for contact.
-    believed: bool,
+    /// Whether the tip's motion has confirmed the contact, or the force has exceeded the threshold twice.
+    confirmed: bool,
     latched_s: f64,
     following_s: f64,
     /// Since the latch opened by itself.
@@ -68,37 +68,27 @@ pub struct Latch {
 impl Latch {
     /// An open latch, before any motion, whose velocities have the bandwidth `estimator_rad_per_s`.
     pub fn new(config: &ContactLatch, estimator_rad_per_s: f64) -> Self {
-        Latch {
-            direction: Vector3::zeros(),
-            since_reversal_s: 0.0,
-            reference_m_per_s: 0.0,
-            in_contact: false,
-            believed: false,
-            latched_s: 0.0,
-            following_s: 0.0,
-            since_release_s: f64::MAX,
-            residual: ResidualScale::new(config.false_alarms_per_hour, estimator_rad_per_s),
-            resting_force_n: Vector3::zeros(),
-            share: 1.0,
-            held: 0.0,
-            force_against_n: 0.0,
-            threshold_n: 0.0,
-        }
+        let residual = ResidualScale::new(config.false_alarms_per_hour, estimator_rad_per_s);
+        Latch::open(residual, Vector3::zeros())
     }
 
     /// An open latch before any motion that knows the residuals of this one.
     pub fn restarted(&self) -> Self {
+        Latch::open(self.residual, self.resting_force_n)
+    }
+
+    fn open(residual: ResidualScale, resting_force_n: Vector3<f64>) -> Self {
         Latch {
             direction: Vector3::zeros(),
             since_reversal_s: 0.0,
             reference_m_per_s: 0.0,
             in_contact: false,
-            believed: false,
+            confirmed: false,
             latched_s: 0.0,
             following_s: 0.0,
             since_release_s: f64::MAX,
-            residual: self.residual,
-            resting_force_n: self.resting_force_n,
+            residual,
+            resting_force_n,
             share: 1.0,
             held: 0.0,
             force_against_n: 0.0,
@@ -195,7 +185,7 @@ impl Latch {
         self.since_release_s += elapsed_s;
         if self.in_contact {
             self.latched_s += elapsed_s;
-            self.believed |= !follows && self.latched_s <= config.settle_s.max(SLOWED_S);
+            self.confirmed |= !follows && self.latched_s <= config.settle_s.max(SLOWED_S);
             self.following_s = match follows && !pushed {
                 true => self.following_s + elapsed_s,
                 false => 0.0,
@@ -205,7 +195,7 @@ impl Latch {
             }
         } else if pushed {
             self.in_contact = true;
-            self.believed = !follows || self.since_release_s < AGAIN_S;
+            self.confirmed = !follows || self.since_release_s < AGAIN_S;
             (self.latched_s, self.following_s) = (0.0, 0.0);
         } else if self.share >= 1.0 && !reversing {
             self.residual
@@ -224,10 +214,10 @@ impl Latch {
         }
     }
 
-    /// Whether what speaks for contact has gone.
+    /// Whether the tip follows the reference, or nothing has confirmed the contact in time.
     fn is_false(&self, config: &ContactLatch) -> bool {
         config.release_s.is_finite()
             && (self.following_s >= FOLLOWING_S
-                || !self.believed && self.latched_s >= config.release_s)
+                || !self.confirmed && self.latched_s >= config.release_s)
     }
 }

@@ -209,10 +209,10 @@ fn a_latch_opens_while_the_tip_follows_the_reference() {
     assert_eq!(open_after(&mut latch, &config, &following(10.0)), u32::MAX);
 }
 
-/// The force alone spoke for contact, and the arm stands still without its feed-forward: the latch opens, and
-/// believes the next force.
+/// The motion of the tip does not confirm the contact, and the arm stands still without its feed-forward: the latch
+/// opens, and the next force above the threshold confirms it.
 #[test]
-fn contact_that_only_the_force_speaks_for_must_push_twice() {
+fn an_unconfirmed_contact_must_push_twice() {
     let config = releasing();
     let mut latch = moving(&config);
     close(&mut latch, &config, &following(10.0));
@@ -221,8 +221,8 @@ fn contact_that_only_the_force_speaks_for_must_push_twice() {
     let cycles = open_after(&mut latch, &config, &against(0.5, 0.0));
     assert!((193..=195).contains(&cycles), "{cycles} ms");
     close(&mut latch, &config, &following(10.0));
-    let believed = open_after(&mut latch, &config, &against(0.5, 0.0));
-    assert_eq!(believed, u32::MAX);
+    let confirmed = open_after(&mut latch, &config, &against(0.5, 0.0));
+    assert_eq!(confirmed, u32::MAX);
 }
 
 #[test]
