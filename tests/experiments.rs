@@ -5,7 +5,7 @@ use supple_core::controller::Mode;
 use supple_core::dynamics::gravity;
 use supple_core::inverse_kinematics::inverse_kinematics;
 use supple_experiment::metrics::{LineFit, median, spread};
-use supple_experiment::probing::{ContactMeter, Stroke, effective_mass_kg, median_stroke};
+use supple_experiment::probing::{Stroke, effective_mass_kg, median_stroke, strokes};
 use supple_experiment::{
     EdgeMeter, ExperimentError, Mismatch, Plan, Run, Setup, Variant, run, scenario, track_pose,
 };
@@ -52,15 +52,7 @@ fn probing(variant: &Variant, stiffness_n_per_m: f64) -> Stroke {
     let mut plan = plan(&setup, variant, Trajectory::Probe(probe), probe.cycle_s());
     plan.config.law.gains = scenario::gains(stiffness_n_per_m);
     plan.plant.scene = scenario::block();
-    let mut meter = ContactMeter::new(probe);
-    run(&plan, &mut |cycle, time_s| {
-        if let Some(time_s) = time_s {
-            meter.cycle(time_s, &cycle.truth, cycle.steps, &cycle.output);
-        }
-        Ok(())
-    })
-    .expect("probing runs");
-    median_stroke(&meter.finish())
+    median_stroke(&strokes(&plan).expect("probing runs"))
 }
 
 /// Applies `f` to every item on two threads.
@@ -154,6 +146,7 @@ fn the_impulse_depends_on_stiffness_and_the_first_transient_does_not() {
         spread(&over_speed).expect("six runs") <= 0.15,
         "{over_speed:?}"
     );
+    assert!(strokes[0].rest_force_n <= 0.5, "{:?}", strokes[0]);
 
     let points: Vec<(f64, f64)> = stiffness
         .iter()

@@ -4,7 +4,7 @@ use supple_core::Trajectory;
 use supple_core::controller::Request;
 use supple_core::learned::LearnedTerms;
 use supple_experiment::metrics::Rms;
-use supple_experiment::probing::{ContactMeter, Stroke, median_stroke};
+use supple_experiment::probing::{Stroke, median_stroke, strokes};
 use supple_experiment::{Deviation, Plan, Setup, Variant, run, scenario};
 use supple_model::Description;
 use supple_plant::Scene;
@@ -101,15 +101,7 @@ fn probing(learned: Option<LearnedTerms<4>>, stiffness_n_per_m: f64) -> Stroke {
     plan.config.learned = learned.unwrap_or(plan.config.learned);
     plan.config.law.gains = scenario::gains(stiffness_n_per_m);
     plan.plant.scene = scenario::block();
-    let mut meter = ContactMeter::new(probe);
-    run(&plan, &mut |cycle, time_s| {
-        if let Some(time_s) = time_s {
-            meter.cycle(time_s, &cycle.truth, cycle.steps, &cycle.output);
-        }
-        Ok(())
-    })
-    .expect("probing runs");
-    median_stroke(&meter.finish())
+    median_stroke(&strokes(&plan).expect("probing runs"))
 }
 
 /// Peak, impact and force while pressing of probing with learning on, after a sinusoid has taught, are those without.

@@ -8,9 +8,9 @@
 
 use rayon::prelude::*;
 use supple_core::Trajectory;
-use supple_experiment::probing::{ContactMeter, Stroke, median_stroke};
+use supple_experiment::probing::{Stroke, median_stroke, strokes};
 use supple_experiment::{
-    Calibration, ExperimentError, Mismatch, Plan, Setup, Variant, calibrate, run, scenario,
+    Calibration, ExperimentError, Mismatch, Plan, Setup, Variant, calibrate, scenario,
 };
 use supple_model::{Description, with_dof};
 
@@ -149,12 +149,5 @@ fn probe<const N: usize>(
         duration_s: probe.cycle_s(),
         learning: false,
     };
-    let mut meter = ContactMeter::new(probe);
-    run(&plan, &mut |cycle, time_s| {
-        if let Some(time_s) = time_s {
-            meter.cycle(time_s, &cycle.truth, cycle.steps, &cycle.output);
-        }
-        Ok(())
-    })?;
-    Ok(median_stroke(&meter.finish()))
+    Ok(median_stroke(&strokes(&plan)?))
 }

@@ -8,7 +8,7 @@ use supple_core::Trajectory;
 use supple_core::controller::Request;
 use supple_core::learned::LearnedTerms;
 use supple_experiment::metrics::Rms;
-use supple_experiment::probing::{ContactMeter, Stroke, median_stroke};
+use supple_experiment::probing::{Stroke, median_stroke, strokes};
 use supple_experiment::{Deviation, ExperimentError, Plan, Setup, Variant, run, scenario};
 use supple_model::Description;
 use supple_plant::Scene;
@@ -78,14 +78,7 @@ fn probing(
         duration_s,
         learning: learned.is_some(),
     };
-    let mut meter = ContactMeter::new(probe);
-    run(&plan, &mut |cycle, time_s| {
-        if let Some(time_s) = time_s {
-            meter.cycle(time_s, &cycle.truth, cycle.steps, &cycle.output);
-        }
-        Ok(())
-    })?;
-    Ok(median_stroke(&meter.finish()))
+    Ok(median_stroke(&strokes(&plan)?))
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -1,11 +1,13 @@
 //! Contact quantities of a probing run: one [`Stroke`] for each stroke.
 
+use crate::error::ExperimentError;
 use crate::metrics::{Mean, median};
+use crate::run::{Plan, run};
 use serde::Serialize;
 use supple_core::dynamics::{crba, jacobian};
 use supple_core::nalgebra::Vector3;
 use supple_core::trajectory::{Probe, ProbePhase};
-use supple_core::{Arm, Output, Vector};
+use supple_core::{Arm, Output, Trajectory, Vector};
 use supple_plant::{StepRecord, Truth};
 
 /// Duration of the first transient, from the first touch on \[s\].
@@ -47,6 +49,24 @@ pub struct Stroke {
     pub spring_force_n: f64,
     /// Time from the first touch until contact was detected \[s\]; `None` if it was not.
     pub latched_after_s: Option<f64>,
+}
+
+/// Runs a plan whose trajectory is a [`Probe`]; returns its strokes, none for another trajectory.
+///
+/// # Errors
+/// As [`run()`].
+pub fn strokes<const N: usize>(plan: &Plan<N>) -> Result<Vec<Stroke>, ExperimentError> {
+    let Trajectory::Probe(probe) = plan.trajectory else {
+        return Ok(Vec::new());
+    };
+    let mut meter = ContactMeter::new(probe);
+    run(plan, &mut |cycle, time_s| {
+        if let Some(time_s) = time_s {
+            meter.cycle(time_s, &cycle.truth, cycle.steps, &cycle.output);
+        }
+        Ok(())
+    })?;
+    Ok(meter.finish())
 }
 
 /// Progress of the first impact of a stroke.
