@@ -85,7 +85,7 @@ fn sized<const N: usize>(
         None => Setup::<N>::new(description, options.seed)?,
     };
     let setup = setup.with_plant_options(&options.plant)?;
-    let hard = match options.plant.is_none() {
+    let imperfect = match options.plant.is_none() {
         true => PlantOptions::realistic(),
         false => options.plant.clone(),
     };
@@ -120,7 +120,7 @@ fn sized<const N: usize>(
         .collect::<Result<Vec<JobResult>, ExperimentError>>()?;
     let realistic = (0..seeds).into_par_iter().map(|offset| {
         let seed = options.seed.wrapping_add(offset);
-        let done = realistic_seed::<N>(description, options.model.as_ref(), &hard, seed)?;
+        let done = realistic_seed::<N>(description, options.model.as_ref(), &imperfect, seed)?;
         report(REALISTIC_S, format!("realistic, seed {seed}"));
         Ok(done)
     });

@@ -42,11 +42,11 @@ fn free_motion(summary: &Summary) -> Vec<Line> {
         let terms = [t.gravity, t.friction, t.feedback].map(figures);
         format!("{} N m", terms.join(", "))
     };
-    let (ideal, hard) = plants(summary);
+    let (ideal, imperfect) = plants(summary);
     let realistic = summary
         .realistic
         .as_ref()
-        .map(|found| realistic(found, hard));
+        .map(|found| realistic(found, imperfect));
     let mut lines = realistic.unwrap_or_default();
     lines.extend([
         line(
@@ -127,7 +127,7 @@ pub(crate) fn plants(summary: &Summary) -> (&'static str, &'static str) {
 }
 
 /// The plant with all effects of a real arm, first: the other rows leave these out.
-fn realistic(found: &Realistic, hard: &str) -> Vec<Line> {
+fn realistic(found: &Realistic, imperfect: &str) -> Vec<Line> {
     let median_and_worst = |errors: &[f64]| {
         let worst = errors.iter().copied().fold(0.0, f64::max);
         millimetres(&[median(errors).unwrap_or(0.0), worst])
@@ -141,7 +141,7 @@ fn realistic(found: &Realistic, hard: &str) -> Vec<Line> {
     }
     vec![
         line(
-            &format!("{hard}, calibrated and learning: sinusoid at 5 N/m"),
+            &format!("{imperfect}, calibrated and learning: sinusoid at 5 N/m"),
             format!("{}{faults}", median_and_worst(&found.sinusoid_rms_m)),
             "follows closely (fig. 3a)",
         ),

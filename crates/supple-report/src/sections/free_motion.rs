@@ -49,13 +49,13 @@ fn realistic(summary: &Summary) -> Vec<Row> {
     let Some(found) = &summary.realistic else {
         return Vec::new();
     };
-    let (_, hard) = plants(summary);
+    let (_, imperfect) = plants(summary);
     let errors = |errors: &[f64]| {
         let worst = errors.iter().copied().fold(0.0, f64::max);
         format!("{}, {}", mm(median(errors).unwrap_or(f64::NAN)), mm(worst))
     };
     let of = format!(
-        "{hard}, calibrated and learning, {} seeds",
+        "{imperfect}, calibrated and learning, {} seeds",
         found.sinusoid_rms_m.len()
     );
     let mut rows = vec![
@@ -83,7 +83,7 @@ fn realistic(summary: &Summary) -> Vec<Row> {
         ),
     ];
     for failure in &found.failed {
-        let name = format!("{hard}, seed {}: no result", failure.seed);
+        let name = format!("{imperfect}, seed {}: no result", failure.seed);
         rows.push(row(name, failure.reason.clone()));
     }
     rows
