@@ -145,7 +145,7 @@ fn plan<const N: usize>(arms: &Arms<'_>, options: &Options) -> Result<Plan<N>, E
         "arc" => scenario::arc(),
         "quadrant" => {
             let speed = options.speed * scenario::QUADRANT_SPEED_M_PER_S;
-            let (quadrant, duration_s) = scenario::quadrant(speed);
+            let (quadrant, duration_s) = scenario::quadrant(speed, 0.0);
             (Trajectory::Quadrant(quadrant), duration_s)
         }
         "probing" => {

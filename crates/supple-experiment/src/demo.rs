@@ -16,6 +16,8 @@ use crate::summary::{
     TorqueRms, TrackingError,
 };
 use rayon::prelude::*;
+use supple_core::trajectory::Quadrant;
+use supple_core::trajectory::Quadrant;
 use supple_model::{Description, with_dof};
 use supple_plant::PlantOptions;
 
@@ -51,8 +53,8 @@ pub struct Demo {
     /// The arc.
     pub arc: Run,
     /// Figure 3b: with the exact model, with the perturbed model, at the paper's maximum speed, and there with
-    /// more damping.
-    pub quadrants: [Run; 4],
+    /// more damping and with ramps at its corners.
+    pub quadrants: [(Quadrant, Run); 5],
     /// Figures 5 and 6.
     pub probing: Vec<ProbingRun>,
     /// Probing with the friction feed-forward left on in contact.
@@ -218,14 +220,15 @@ impl Results {
         runs.collect()
     }
 
-    fn quadrant(&mut self, job: Job) -> (Run, QuadrantSummary) {
+    fn quadrant(&mut self, job: Job) -> ((Quadrant, Run), QuadrantSummary) {
         let done = self.take(job);
+        let (quadrant, _) = job.quadrant();
         let summary = QuadrantSummary {
-            speed_m_per_s: job.quadrant_speed_m_per_s(),
+            speed_m_per_s: quadrant.speed_m_per_s(),
             tracking: tracking(&done.run),
             edges: done.edges,
         };
-        (done.run, summary)
+        ((quadrant, done.run), summary)
     }
 }
 
@@ -250,6 +253,7 @@ fn assemble(
     let (perturbed, quadrant_perturbed) = results.quadrant(QUADRANT_PERTURBED);
     let (fast, quadrant_at_paper_speed) = results.quadrant(QUADRANT_FAST);
     let (damped, quadrant_damped) = results.quadrant(Job::QuadrantDamped);
+    let (ramped, quadrant_corner_ramp) = results.quadrant(Job::QuadrantCornerRamp);
     let all = &scenario::PROBING_STIFFNESS_N_PER_M;
     let two = &scenario::PAPER_STIFFNESS_N_PER_M;
     let probing = results.probing(all, Probing::Plain);
@@ -303,6 +307,7 @@ fn assemble(
         exploration_apparent_inertia: lines(&probing_apparent),
         sinusoid_apparent_inertia: tracking(&apparent_inertia),
         quadrant_damped,
+        quadrant_corner_ramp,
         sinusoid_exact_model: ExactModel {
             coulomb: exact(&mut results, false),
             stribeck: exact(&mut results, true),
@@ -315,7 +320,7 @@ fn assemble(
         summary,
         sinusoids,
         arc,
-        quadrants: [slow, perturbed, fast, damped],
+        quadrants: [slow, perturbed, fast, damped, ramped],
         probing,
         probing_fade_off,
         probing_rubber,

@@ -16,7 +16,7 @@ use supple_core::Trajectory;
 use supple_core::config::ApparentInertia;
 use supple_core::inverse_kinematics::inverse_kinematics;
 use supple_core::nalgebra::{Matrix3, Vector3};
-use supple_core::trajectory::{Probe, ProbePhase};
+use supple_core::trajectory::{Probe, ProbePhase, Quadrant};
 use supple_model::Description;
 use supple_plant::Scene;
 
@@ -39,6 +39,7 @@ pub(crate) enum Job {
         exact: bool,
     },
     QuadrantDamped,
+    QuadrantCornerRamp,
     Seed(u64),
     Exact {
         stribeck: bool,
@@ -126,7 +127,8 @@ pub(crate) fn jobs() -> Vec<Job> {
     jobs.extend((0..SEEDS).map(Job::Seed));
     jobs.extend([false, true].map(|stribeck| Job::Exact { stribeck }));
     jobs.extend([QUADRANT, QUADRANT_PERTURBED, QUADRANT_FAST]);
-    jobs.extend([Job::QuadrantDamped, Job::ApparentInertia]);
+    jobs.extend([Job::QuadrantDamped, Job::QuadrantCornerRamp]);
+    jobs.push(Job::ApparentInertia);
     jobs.push(Job::PaperLetter);
     jobs
 }
@@ -152,6 +154,7 @@ impl Job {
                 kind,
             } => format!("probing_{stiffness_n_per_m}_n_per_m{}", kind.suffix()),
             Job::QuadrantDamped => "quadrant_damped".to_owned(),
+            Job::QuadrantCornerRamp => "quadrant_corner_ramp".to_owned(),
             Job::ApparentInertia => "sinusoid_apparent_inertia".to_owned(),
         }
     }
@@ -166,7 +169,9 @@ impl Job {
             | Job::Arc
             | Job::ApparentInertia
             | Job::Quadrant { exact: false, .. } => perturbed(0),
-            Job::Quadrant { exact: true, .. } | Job::QuadrantDamped => Variant::EXACT,
+            Job::Quadrant { exact: true, .. } | Job::QuadrantDamped | Job::QuadrantCornerRamp => {
+                Variant::EXACT
+            }
             Job::Seed(offset) => perturbed(offset),
             Job::PaperLetter => Variant {
                 paper_letter: true,
@@ -195,8 +200,8 @@ impl Job {
                 scenario::sinusoid(1.0)
             }
             Job::Arc => scenario::arc(),
-            Job::Quadrant { .. } | Job::QuadrantDamped => {
-                let (quadrant, duration_s) = scenario::quadrant(self.quadrant_speed_m_per_s());
+            Job::Quadrant { .. } | Job::QuadrantDamped | Job::QuadrantCornerRamp => {
+                let (quadrant, duration_s) = self.quadrant();
                 (Trajectory::Quadrant(quadrant), duration_s)
             }
             Job::Probing { .. } => {
@@ -206,11 +211,15 @@ impl Job {
         }
     }
 
-    /// Speed of a quadrant \[m/s\].
-    pub fn quadrant_speed_m_per_s(&self) -> f64 {
+    /// The quadrant of figure 3b of this job, and its duration \[s\].
+    pub fn quadrant(&self) -> (Quadrant, f64) {
+        let corner_ramp_s = match self {
+            Job::QuadrantCornerRamp => scenario::CORNER_RAMP_S,
+            _ => 0.0,
+        };
         match *self {
-            Job::Quadrant { speed_m_per_s, .. } => speed_m_per_s,
-            _ => scenario::QUADRANT_PAPER_SPEED_M_PER_S,
+            Job::Quadrant { speed_m_per_s, .. } => scenario::quadrant(speed_m_per_s, corner_ramp_s),
+            _ => scenario::quadrant(scenario::QUADRANT_PAPER_SPEED_M_PER_S, corner_ramp_s),
         }
     }
 

@@ -16,6 +16,8 @@ pub const PROBING_STIFFNESS_N_PER_M: [f64; 9] =
 pub const PAPER_STIFFNESS_N_PER_M: [f64; 2] = [5.0, 125.0];
 /// Damping with which the error after a corner dies out within an edge at the paper's speed \[N s/m\].
 pub const CORNER_DAMPING_N_S_PER_M: f64 = 15.0;
+/// Time in which the speed falls and rises at a corner of the quadrant that has no velocity jumps \[s\].
+pub const CORNER_RAMP_S: f64 = 0.3;
 /// Apparent inertia of the runs that use the force sensor \[kg\].
 pub const APPARENT_INERTIA_KG: f64 = 1.0;
 /// Speed of the quadrant in the headline run \[m/s\].
@@ -61,9 +63,10 @@ pub fn arc() -> (Trajectory, f64) {
     (Trajectory::Arc(arc), 2.0 * period_s + 0.5 * arc.ramp_s)
 }
 
-/// Two rounds of the quadrant of figure 3b in the vertical plane. Returns quadrant and duration \[s\].
-pub fn quadrant(speed_m_per_s: f64) -> (Quadrant, f64) {
-    let quadrant = Quadrant::vertical(speed_m_per_s);
+/// Two rounds of the quadrant of figure 3b in the vertical plane. Its velocity jumps at the corners if
+/// `corner_ramp_s` is zero, see [`Quadrant::with_corner_ramp`]. Returns quadrant and duration \[s\].
+pub fn quadrant(speed_m_per_s: f64, corner_ramp_s: f64) -> (Quadrant, f64) {
+    let quadrant = Quadrant::vertical(speed_m_per_s).with_corner_ramp(corner_ramp_s);
     let duration_s = 2.0 * quadrant.period_s() + 0.25;
     (quadrant, duration_s)
 }

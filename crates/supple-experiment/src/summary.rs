@@ -161,6 +161,9 @@ pub struct Summary {
     pub sinusoid_apparent_inertia: TrackingError,
     /// Figure 3b at the paper's maximum speed with the damping raised to [`crate::scenario::CORNER_DAMPING_N_S_PER_M`].
     pub quadrant_damped: QuadrantSummary,
+    /// Figure 3b at the paper's maximum speed with a speed that falls and rises in
+    /// [`crate::scenario::CORNER_RAMP_S`] at each corner, unperturbed model.
+    pub quadrant_corner_ramp: QuadrantSummary,
     /// Sinusoid with the plant's own parameters in the model.
     pub sinusoid_exact_model: ExactModel,
     /// Sinusoid with equation (3.6) exactly as printed.

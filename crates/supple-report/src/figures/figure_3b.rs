@@ -9,7 +9,7 @@ use crate::sections::quadrants_with_models;
 use plotters::style::text_anchor::HPos;
 use std::ops::Range;
 use supple_core::trajectory::{Piece, Quadrant};
-use supple_experiment::{Demo, Sample, scenario};
+use supple_experiment::{Demo, Sample};
 
 /// Height of the legend above all rows \[px\].
 const HEAD_PX: f64 = 24.0;
@@ -35,8 +35,8 @@ pub fn quadrant_runs(demo: &Demo) -> Vec<QuadrantRun<'_>> {
     let runs = quadrants_with_models(&demo.summary)
         .into_iter()
         .zip(&demo.quadrants);
-    runs.map(|((summary, model), run)| QuadrantRun {
-        quadrant: scenario::quadrant(summary.speed_m_per_s).0,
+    runs.map(|((summary, model), (quadrant, run))| QuadrantRun {
+        quadrant: *quadrant,
         title: format!("{:.3} m/s, {model}", summary.speed_m_per_s),
         samples: &run.trace.samples,
     })

@@ -275,7 +275,7 @@ pub fn trajectory_for(trajectory: UpTrajectory, description: &Description) -> (T
         UpTrajectory::Sinusoid => scenario::sinusoid(1.0),
         UpTrajectory::Arc => scenario::arc(),
         UpTrajectory::Quadrant => {
-            let (quadrant, duration_s) = scenario::quadrant(scenario::QUADRANT_SPEED_M_PER_S);
+            let (quadrant, duration_s) = scenario::quadrant(scenario::QUADRANT_SPEED_M_PER_S, 0.0);
             (Trajectory::Quadrant(quadrant), duration_s)
         }
         UpTrajectory::Probe => {
@@ -301,7 +301,7 @@ pub fn track(args: &TrackArgs) -> Result<(), Failure> {
         TrackTrajectory::Arc => scenario::arc(),
         TrackTrajectory::Quadrant => {
             let speed_m_per_s = args.speed * scenario::QUADRANT_SPEED_M_PER_S;
-            let (quadrant, duration_s) = scenario::quadrant(speed_m_per_s);
+            let (quadrant, duration_s) = scenario::quadrant(speed_m_per_s, 0.0);
             (Trajectory::Quadrant(quadrant), duration_s)
         }
     };
