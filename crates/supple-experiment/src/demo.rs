@@ -17,7 +17,6 @@ use crate::summary::{
 };
 use rayon::prelude::*;
 use supple_core::trajectory::Quadrant;
-use supple_core::trajectory::Quadrant;
 use supple_model::{Description, with_dof};
 use supple_plant::PlantOptions;
 
