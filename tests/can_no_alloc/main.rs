@@ -12,12 +12,12 @@ use supple_bus::virtual_time::DirectBus;
 use supple_bus::{Bus, BusError, Event, FaultInjector, FaultKind, FaultRule, Traffic};
 use supple_can::guard::Stage;
 use supple_can::{Cycle, CycleConfig, StartupConfig, start_up};
+use supple_can_frame::CanFrame;
 use supple_core::Controller;
 use supple_core::controller::Request;
 use supple_emu::{ButtonPress, Emulator, EmulatorConfig};
 use supple_model::Description;
 use supple_plant::PlantConfig;
-use supple_puck::CanFrame;
 use supple_puck::safety::SafetyLimits;
 
 const MS: u64 = 1_000_000;

@@ -6,7 +6,7 @@
 //! and the controller's answer time must fit one period.
 
 use core::fmt;
-use supple_puck::timing::max_bits;
+use supple_can_frame::timing::max_bits;
 
 const NS_PER_BIT: u64 = 1_000;
 const REQUEST_DLC: u8 = 1;

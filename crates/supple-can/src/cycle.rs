@@ -16,6 +16,8 @@ use crate::sensor::Readings;
 use crate::start_up::Ready;
 use crate::unconfirmed::UnconfirmedFrames;
 use supple_bus::{Bus, BusError, BusFault, Event};
+use supple_can_frame::CanFrame;
+use supple_can_frame::timing::bits;
 use supple_core::controller::Mode;
 use supple_core::drive_guard::DriveGuard;
 use supple_core::dynamics::tip_pose;
@@ -23,10 +25,8 @@ use supple_core::{Arm, Config, Vector};
 use supple_puck::force_torque;
 use supple_puck::property::{get, set};
 use supple_puck::safety::{PenWord, Pendant, SafetyMode};
-use supple_puck::timing::bits;
 use supple_puck::{
-    CanFrame, Counts, GroupId, Inbound, NodeId, PackedTorques, Property, PropertyId, PuckTorque,
-    Value,
+    Counts, GroupId, Inbound, NodeId, PackedTorques, Property, PropertyId, PuckTorque, Value,
 };
 
 /// Period of each auxiliary poll, in bus time \[ns\].

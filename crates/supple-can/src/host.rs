@@ -2,8 +2,9 @@
 
 use crate::error::CanError;
 use supple_bus::{Bus, BusFault, Event};
+use supple_can_frame::CanFrame;
 use supple_puck::property::{get, set};
-use supple_puck::{CanFrame, Destination, GroupId, Inbound, NodeId, PropertyId, Value};
+use supple_puck::{Destination, GroupId, Inbound, NodeId, PropertyId, Value};
 
 /// One millisecond in nanoseconds.
 pub const MS: u64 = 1_000_000;

@@ -1,6 +1,6 @@
 //! Frames sent in a cycle and not yet confirmed by the interface.
 
-use supple_puck::CanFrame;
+use supple_can_frame::CanFrame;
 
 /// Maximum number of frames in a cycle: request, two torque frames, module mode, motor mode, a poll; rounded up.
 const CAPACITY: usize = 8;

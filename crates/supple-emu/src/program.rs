@@ -14,8 +14,8 @@ use supple_bus::{
 };
 use supple_model::{Description, with_dof};
 use supple_plant::{PlantConfig, PlantOptions, Sample, Scene, TraceFile};
-use supple_puck::NodeId;
 use supple_puck::status::MotorMode;
+use supple_puck::{MessageId, NodeId};
 use supple_realtime::{Stop, apply_realtime_settings, diagnostics, die_with_parent, monotonic_ns};
 
 /// Delay above which this process counts as stalled; the arm's clock pauses for it \[ns\].
@@ -187,7 +187,7 @@ pub fn receive_host_frame<const N: usize>(
 ) -> Result<(), BusError> {
     let until_ns = emulator.next_ns().min(bus.now_ns() + POLL_INTERVAL_NS);
     if let Some(Event::Frame(frame)) = bus.receive_until(until_ns)?
-        && frame.id().from() == NodeId::HOST
+        && MessageId::of(&frame).is_none_or(|id| id.from() == NodeId::HOST)
     {
         advance_to_bus_time(emulator, bus)?;
         emulator.host_sends(&frame);

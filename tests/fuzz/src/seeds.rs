@@ -8,6 +8,7 @@ use crate::bytes::bytes_of;
 use crate::logs;
 use crate::requests::{at_rest, controller};
 use supple_bus::WireFrame;
+use supple_can_frame::CanFrame;
 use supple_core::config::Gains;
 use supple_core::controller::{Breakaway, Request};
 use supple_core::dynamics::tip_pose;
@@ -20,7 +21,6 @@ use supple_ipc::message::{
     Text, TorqueCommand,
 };
 use supple_model::Description;
-use supple_puck::CanFrame;
 
 /// Name and bytes of an input.
 pub type Seed = (String, Vec<u8>);
@@ -280,7 +280,7 @@ fn bus() -> Vec<Seed> {
             let id = u32::from(u16::from_le_bytes([bytes[0], bytes[1]]));
             WireFrame::data(&CanFrame::from_raw(id, &bytes[2..]).expect("a frame"))
         });
-        raw.flatten().collect()
+        raw.flat_map(|raw| raw.to_vec()).collect()
     };
     let positions: &[u8] = &[0x04, 0x04, 0x30];
     vec![
