@@ -2,13 +2,13 @@
 
 use super::explained::{Context, Explained};
 use super::finding::{Consequence, Finding, Problem};
+use super::gravity::Gravities;
 use super::runs::median;
 use crate::columns::Column;
 use crate::error::IdentError;
 use crate::motion::Motion;
 use crate::regressor::joint_rows;
 use nalgebra::DVector;
-use supple_core::Vector;
 
 /// A contact's torque over the usual residual.
 const CONTACT_OVER_NOISE: f64 = 8.0;
@@ -16,8 +16,6 @@ const CONTACT_OVER_NOISE: f64 = 8.0;
 const CONTACT_OVER_TORQUE: f64 = 0.15;
 /// Longest contact \[s\].
 const CONTACT_S: f64 = 5.0;
-/// Ratio of the gravity found to that of the given arm beyond which the torques have another unit.
-const OTHER_UNIT: f64 = 3.0;
 
 pub(super) fn check<const N: usize>(
     context: &Context<'_, N>,
@@ -27,7 +25,9 @@ pub(super) fn check<const N: usize>(
     let mut findings = Vec::new();
     let residuals = residuals(context, motion, &explained)?;
     findings.extend(contacts(context, motion, &explained, &residuals));
-    findings.extend(gravity(context, motion, &explained));
+    let gravities = Gravities::new(context, motion, &explained);
+    findings.extend(gravities.unit());
+    findings.extend(gravities.payload());
     findings.extend(offsets(context, motion, &explained));
     if std::env::var_os("SUPPLE_SHOW_REMEDIES").is_some() {
         eprintln!("excess: {:.3?}", explained.relative);
@@ -114,69 +114,6 @@ fn contacts<const N: usize>(
         findings.push(finding);
     }
     findings
-}
-
-/// Gravity found against that of the given arm, over the poses of the log.
-fn gravity<const N: usize>(
-    context: &Context<'_, N>,
-    motion: &Motion,
-    explained: &Explained,
-) -> Vec<Finding> {
-    let moving = context.columns.moving();
-    let mut sums = vec![[0.0_f64; 4]; moving.len()];
-    let every = (motion.samples() / 200).max(1);
-    for i in (0..motion.samples()).step_by(every) {
-        let q = Vector::<N>::from_fn(|j, _| motion.q[(i, j)]);
-        let [found, given] = context.gravities(&explained.x, &q);
-        for (row, &j) in moving.iter().enumerate() {
-            sums[row][0] += found[j] * given[j];
-            sums[row][1] += given[j] * given[j];
-            sums[row][2] += found[j] * found[j];
-            sums[row][3] += motion.tau[(i, j)].powi(2);
-        }
-    }
-    let mut ratios = Vec::new();
-    for (row, &j) in moving.iter().enumerate() {
-        let [product, given, found, torque] = sums[row];
-        // Joints with little weight to hold say nothing: gravity must be a fifth of the torques, found or given.
-        let counts = found.max(given.min(torque)) > 0.04 * torque.max(given);
-        let ratio = product / given.max(f64::MIN_POSITIVE);
-        let alike = product / (given * found).sqrt().max(f64::MIN_POSITIVE);
-        if std::env::var_os("SUPPLE_SHOW_REMEDIES").is_some() {
-            eprintln!(
-                "gravity joint {j}: ratio {ratio:.3}, alike {alike:.3}, given {:.2}, found {:.2}, torque {:.2}",
-                given.sqrt(),
-                found.sqrt(),
-                torque.sqrt()
-            );
-        }
-        if counts && given > 0.0 {
-            ratios.push((j, ratio, given, alike));
-        }
-    }
-    // The joints with most weight decide.
-    let heaviest = ratios.iter().map(|r| r.2).fold(0.0, f64::max);
-    ratios.retain(|r| r.2 > 0.01 * heaviest && r.3 > 0.7);
-    if ratios.is_empty() {
-        return Vec::new();
-    }
-    let middle = median(ratios.iter().map(|r| r.1).collect());
-    let off = |r: f64| !(1.0 / OTHER_UNIT..=OTHER_UNIT).contains(&r);
-    if off(middle) {
-        let joints: Vec<usize> = ratios.iter().map(|r| r.0).collect();
-        let all: Vec<String> = ratios.iter().map(|r| format!("{:.3}", r.1)).collect();
-        return vec![Finding::stop(
-            Problem::NotJointTorques,
-            &joints,
-            "tau",
-            format!(
-                "holds {} times the weight of the given arm: these are currents or torques of the motors, or have another unit",
-                all.join(", ")
-            ),
-            "give N m at the joint: multiply currents by torque constant and gear ratio, torques of motors by the gear ratio",
-        )];
-    }
-    Vec::new()
 }
 
 /// Offsets beyond the dry friction: in one direction the joint would be driven by its friction.

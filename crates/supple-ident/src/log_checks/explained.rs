@@ -53,6 +53,22 @@ pub(super) struct Grams {
     samples: usize,
 }
 
+impl Grams {
+    /// With the torque of one joint multiplied by a factor; rotors are unknown, so that nothing else changes.
+    pub fn scaled(&self, row: usize, factor: f64) -> Grams {
+        let mut of_joint = self.of_joint.clone();
+        let (gram, deviation) = &mut of_joint[row];
+        let last = gram.nrows() - 1;
+        gram.row_mut(last).scale_mut(factor);
+        gram.column_mut(last).scale_mut(factor);
+        *deviation *= factor.abs();
+        Grams {
+            of_joint,
+            samples: self.samples,
+        }
+    }
+}
+
 impl<'a, const N: usize> Context<'a, N> {
     pub fn new(
         arm: &'a Arm<N>,
@@ -110,7 +126,7 @@ impl<'a, const N: usize> Context<'a, N> {
         Ok(self.solve(&self.grams(motion)?))
     }
 
-    /// As [`Context::explain`], with the torques of some rows multiplied by factors.
+    /// As [`Context::explain`], from sums.
     pub fn solve(&self, grams: &Grams) -> Explained {
         let width = self.columns.len();
         let joints = grams.of_joint.len();

@@ -15,6 +15,7 @@
 mod excess;
 mod explained;
 mod finding;
+mod gravity;
 mod remedies;
 mod runs;
 mod sampling;
@@ -29,7 +30,7 @@ use crate::motion::{Motion, Preparation};
 use supple_core::Arm;
 
 /// Number of samples of a log that are used to compare remedies.
-const SAMPLES: f64 = 500.0;
+const SAMPLES: f64 = 300.0;
 /// Highest cutoff of the filter for these checks \[Hz\].
 const CUTOFF_HZ: f64 = 8.0;
 
@@ -50,7 +51,9 @@ pub fn check_log<const N: usize>(
     if findings.iter().any(|f| f.problem == Problem::TimeUnit) {
         return Ok(findings);
     }
-    findings.extend(velocity::check(log, moving));
+    if findings.iter().all(|f| f.consequence != Consequence::Stop) {
+        findings.extend(velocity::check(log, moving));
+    }
     let stopped = |findings: &[Finding]| {
         let stops = |f: &Finding| f.consequence == Consequence::Stop;
         findings.iter().any(stops)

@@ -1,7 +1,8 @@
 //! Remedies of a log's columns, compared by how well the arm explains the log with each.
 
-use super::explained::{Context, Explained};
+use super::explained::{Context, Explained, Grams};
 use super::finding::{Finding, Problem};
+use super::gravity::Gravities;
 use crate::error::IdentError;
 use crate::motion::Motion;
 
@@ -80,7 +81,8 @@ impl Remedy {
             Remedy::Reverse | Remedy::Angle(None, _) => 0.12,
             Remedy::Time(_) => 0.04,
             Remedy::Zero(..) => 0.06,
-            Remedy::Angle(..) | Remedy::Torque(..) => 0.06,
+            Remedy::Angle(..) => 0.04,
+            Remedy::Torque(..) => 0.06,
         }
     }
 }
@@ -124,7 +126,7 @@ type Family = (fn(usize, f64) -> Remedy, &'static [f64], bool);
 const FAMILIES: [Family; 3] = [
     (
         |j, f| Remedy::Angle(Some(j), f),
-        &[0.02, 0.05, 0.1, 0.3, 0.5, 0.7, 0.85, 1.2, 1.5, 2.0, 3.0],
+        &[0.01, 0.03, 0.1, 0.5, 0.8, 1.25, 2.0],
         true,
     ),
     (
@@ -134,9 +136,7 @@ const FAMILIES: [Family; 3] = [
     ),
     (
         |j, c| Remedy::Zero(j, c),
-        &[
-            -1.5708, -1.0, -0.5, -0.2, -0.08, 0.08, 0.2, 0.5, 1.0, 1.5708, 3.14159,
-        ],
+        &[-1.5708, -0.5, -0.15, 0.15, 0.5, 1.5708, 3.14159],
         false,
     ),
 ];
@@ -144,6 +144,8 @@ const FAMILIES: [Family; 3] = [
 pub(super) struct Search<'a, const N: usize> {
     context: &'a Context<'a, N>,
     motion: &'a Motion,
+    grams: Grams,
+    given: Explained,
     before: f64,
 }
 
@@ -152,20 +154,28 @@ impl<'a, const N: usize> Search<'a, N> {
         context: &'a Context<'a, N>,
         motion: &'a Motion,
     ) -> Result<(Self, Explained), IdentError> {
-        let given = context.explain(motion)?;
+        let grams = context.grams(motion)?;
+        let given = context.solve(&grams);
         let before = given.score();
-        Ok((
-            Search {
-                context,
-                motion,
-                before,
-            },
-            given,
-        ))
+        let search = Search {
+            context,
+            motion,
+            grams,
+            given: given.clone(),
+            before,
+        };
+        Ok((search, given))
     }
 
     pub fn try_one(&self, remedy: Remedy) -> Result<Tried, IdentError> {
-        let after = self.context.explain(&remedy.apply(self.motion))?;
+        let moving = self.context.columns.moving();
+        let after = match remedy {
+            Remedy::Torque(Some(joint), factor) => {
+                let row = moving.binary_search(&joint).unwrap_or(0);
+                self.context.solve(&self.grams.scaled(row, factor))
+            }
+            _ => self.context.explain(&remedy.apply(self.motion))?,
+        };
         Ok(Tried {
             remedy,
             gain: self.before - after.score(),
@@ -176,6 +186,16 @@ impl<'a, const N: usize> Search<'a, N> {
     /// Whether a factor is determined from both sides. A torque times zero, or an angle times zero, frees the fit of a
     /// joint and so always helps a little; a true factor is better than half and twice of it.
     fn is_a_peak(&self, tried: &Tried) -> Result<bool, IdentError> {
+        // A joint's angle and torque also act on its neighbours: one that only trades one residual for another is no error.
+        let pairs = || self.given.relative.iter().zip(&tried.after.relative);
+        let better = pairs()
+            .filter(|(before, after)| **after < 0.96 * **before)
+            .count();
+        let worse = pairs().any(|(before, after)| *after > 1.05 * *before);
+        let small = tried.gain < 0.15;
+        if small && (worse || better < 2) && !matches!(tried.remedy, Remedy::Zero(..)) {
+            return Ok(false);
+        }
         let beside = match tried.remedy {
             Remedy::Torque(joint, f) => [0.5, 2.0].map(|k| Remedy::Torque(joint, k * f)),
             Remedy::Angle(joint, f) => [0.5, 2.0].map(|k| Remedy::Angle(joint, k * f)),
@@ -230,6 +250,13 @@ impl<'a, const N: usize> Search<'a, N> {
         Ok(best.unwrap_or(at_c))
     }
 
+    /// The factor common to all angles: degrees, or the ratio of the gears if it is the same for all.
+    fn common_factor(&self, degrees: &Tried) -> Result<Tried, IdentError> {
+        let refined = self.refine(&|f| Remedy::Angle(None, f), 0.004, 0.08, true)?;
+        let better = refined.gain > degrees.gain + 0.02;
+        Ok(if better { refined } else { degrees.clone() })
+    }
+
     /// The best remedy among all, and the best of each other kind for comparison.
     pub fn best(&self, moving: &[usize]) -> Result<Vec<Tried>, IdentError> {
         let mut all = Vec::new();
@@ -245,7 +272,8 @@ impl<'a, const N: usize> Search<'a, N> {
                 let (at, gain) = gains.enumerate().fold((0, f64::MIN), |best, (i, gain)| {
                     if gain > best.1 { (i, gain) } else { best }
                 });
-                if gain <= 0.0 {
+                // A remedy that is far off can be refined only if it already helps.
+                if gain <= 0.004 {
                     continue;
                 }
                 let neutral = if logarithmic { 1.0 } else { 0.0 };
@@ -296,12 +324,40 @@ pub(super) fn check<const N: usize>(
         }
         let Some(best) = tried.first() else { break };
         if best.gain < best.remedy.threshold() {
+            findings.extend(zero(&search, &motion, &given)?);
             break;
         }
-        findings.push(finding(&best.remedy, &given, &best.after, best.gain));
+        let best = match best.remedy {
+            Remedy::Angle(None, f) if f > 0.0 => search.common_factor(best)?,
+            _ => best.clone(),
+        };
+        findings.push(finding(&best.remedy, &given, &best.after));
         motion = best.remedy.apply(&motion);
     }
     Ok(findings)
+}
+
+/// A zero that the weight of the given arm shows: a constant error of an angle changes few torques, but it turns the arm
+/// about that joint.
+fn zero<const N: usize>(
+    search: &Search<'_, N>,
+    motion: &Motion,
+    given: &Explained,
+) -> Result<Option<Finding>, IdentError> {
+    let gravities = Gravities::new(search.context, motion, given);
+    let Some((joint, by, before, after)) = gravities.zero() else {
+        return Ok(None);
+    };
+    let tried = search.try_one(Remedy::Zero(joint, by))?;
+    if tried.gain < 0.004 {
+        return Ok(None);
+    }
+    let mut finding = finding(&tried.remedy, given, &tried.after);
+    finding.evidence += &format!(
+        "; the correlation of the weight that is held with that of the given arm is {before:.3} at least, and {after:.3} with \
+         it"
+    );
+    Ok(Some(finding))
 }
 
 fn percent(relative: &[f64]) -> String {
@@ -312,7 +368,7 @@ fn percent(relative: &[f64]) -> String {
     all.join(", ")
 }
 
-fn finding(remedy: &Remedy, given: &Explained, after: &Explained, _gain: f64) -> Finding {
+fn finding(remedy: &Remedy, given: &Explained, after: &Explained) -> Finding {
     let better = format!(
         "the arm leaves {} % of the joints' torques unexplained, and {} % with this remedy",
         percent(&given.relative),
@@ -343,11 +399,14 @@ fn finding(remedy: &Remedy, given: &Explained, after: &Explained, _gain: f64) ->
         Remedy::Angle(joint, f) => {
             let joints: Vec<usize> = joint.into_iter().collect();
             Finding::stop(
-                Problem::AngleScale,
+                match joint {
+                    None => Problem::MotorAngles,
+                    Some(_) => Problem::AngleScale,
+                },
                 &joints,
                 "q",
                 format!(
-                    "is {:.2} times too large, a wrong gear ratio or scale: {better}",
+                    "is {:.2} times too large, an angle of the motor, a wrong gear ratio or scale: {better}",
                     1.0 / f
                 ),
                 format!("give the angle of the joint: multiply by {f:.3}"),

@@ -293,41 +293,64 @@ fn lost_samples(log: &Log, moving: &[usize], step_s: f64) -> Option<Finding> {
     let step = |i: usize, j: usize| log.q_rad[(i + 1, j)] - log.q_rad[(i, j)];
     let span = |i: usize| log.t_s[i + 1] - log.t_s[i];
     let (mut places, mut lost_s, mut first_s) = (0, 0.0, None);
+    let (mut jumps, mut jump_s) = (0, 0.0);
+    // The step at nearly the greatest speed of each joint.
+    let fastest: Vec<f64> = moving
+        .iter()
+        .map(|&j| {
+            let mut steps: Vec<f64> = (0..n - 1).map(|i| step(i, j).abs()).collect();
+            steps.sort_by(f64::total_cmp);
+            steps[(n - 2) * 99 / 100]
+        })
+        .collect();
     for i in reach..n - 1 - reach {
-        let (mut product, mut square, mut noise) = (0.0, 0.0, 0.0);
-        let mut steps = Vec::new();
+        let mut ratios = Vec::new();
+        let mut leaps = 0;
         for (row, &j) in moving.iter().enumerate() {
             let around = (i - reach..i).chain(i + 1..=i + reach);
             let speeds: Vec<f64> = around.map(|k| step(k, j) / span(k)).collect();
             let spread = median(speeds.iter().map(|v| v.abs()).collect());
-            let speed = 0.5 * (median(speeds.clone()) + mean_of_middle(speeds));
-            // A joint that turns around has no speed to compare with.
-            let usual = speed * span(i);
-            if usual.abs() < 0.5 * spread * span(i) || usual == 0.0 {
-                continue;
+            let largest = speeds.iter().map(|v| v.abs()).fold(0.0, f64::max);
+            let usual = mean_of_middle(speeds) * span(i);
+            let fine = 5.0 * quanta[row];
+            if step(i, j).abs() > (8.0 * largest * span(i)).max(3.0 * fastest[row]) {
+                leaps += 1;
             }
-            product += step(i, j) * usual;
-            square += usual * usual;
-            noise += (0.5 * quanta[row]).powi(2);
-            steps.push((step(i, j), usual));
+            // A joint that turns around has no speed to compare with.
+            if usual.abs() > 0.7 * spread * span(i) && usual.abs() > fine {
+                ratios.push(step(i, j) / usual);
+            }
         }
-        if square < 100.0 * noise.max(1e-18) || steps.is_empty() {
+        if leaps >= 2 || (leaps == 1 && moving.len() == 1) {
+            jumps += 1;
+            jump_s = log.t_s[i];
+        }
+        if ratios.len() < moving.len().min(2) || ratios.is_empty() {
             continue;
         }
-        let ratio = product / square;
-        let unexplained: f64 = steps.iter().map(|(s, u)| (s - ratio * u).powi(2)).sum();
-        let alike = unexplained < 0.04 * ratio * ratio * square;
-        if ratio > LOST && alike && (steps.len() >= 2 || moving.len() == 1) {
+        let ratio = median(ratios.clone());
+        let alike = ratios.iter().all(|r| (r / ratio - 1.0).abs() < 0.25);
+        if ratio > LOST && alike {
             places += 1;
             lost_s += (ratio - 1.0) * span(i);
             first_s = first_s.or(Some(log.t_s[i]));
         }
     }
-    let fraction = lost_s / (log.t_s[n - 1] - log.t_s[0]);
-    if places < 3 && lost_s < 20.0 * step_s {
-        return None;
+    let remedy = "log the time of each sample, not its number times the period; split the log where samples are missing";
+    if jumps > 0 && places < 3 {
+        return Some(Finding::stop(
+            Problem::LostSamples,
+            &[],
+            "t",
+            format!(
+                "{jumps} jumps of several joints at once, the last at {jump_s:.3} s: samples were lost and the times do not \
+                 show it"
+            ),
+            remedy,
+        ));
     }
-    if fraction < 5e-4 {
+    let enough = places >= 3 || lost_s > 20.0 * step_s;
+    if !enough || lost_s < 5e-4 * (log.t_s[n - 1] - log.t_s[0]) {
         return None;
     }
     Some(Finding::stop(
@@ -339,7 +362,7 @@ fn lost_samples(log: &Log, moving: &[usize], step_s: f64) -> Option<Finding> {
              and the times do not show it",
             first_s.unwrap_or(0.0)
         ),
-        "log the time of each sample, not its number times the period",
+        remedy,
     ))
 }
 

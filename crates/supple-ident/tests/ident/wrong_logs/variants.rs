@@ -136,11 +136,8 @@ pub fn all(log: &Log, s: &Sizes, rate_hz: f64) -> Vec<Variant> {
         ("clock half as fast", 0.5),
         ("clock 1.1 times too fast", 1.1),
     ] {
-        let mut changed = scaled(log, |l| l.t_s.iter_mut().for_each(|t| *t *= factor));
-        // Velocities computed from the same clock.
-        if let Some(qd) = &mut changed.qd_rad_per_s {
-            *qd /= factor;
-        }
+        // Velocities that the robot measures have its own clock.
+        let changed = scaled(log, |l| l.t_s.iter_mut().for_each(|t| *t *= factor));
         add(name, None, &[TimeScale], changed);
     }
     for j in [a, b, w] {
