@@ -50,6 +50,7 @@ fn main() {
         tau,
         independent_fraction: 1.0,
         cutoff_hz: None,
+        start_s: 0.0,
     };
     let columns = Columns::new(7, &JOINTS, true, FrictionColumns::OFFSET, &[]).expect("columns");
     let before = Instant::now();

@@ -28,6 +28,7 @@ pub mod fit;
 mod joint_rows;
 pub mod learn;
 mod log;
+pub mod log_checks;
 pub mod model;
 mod motion;
 mod options;

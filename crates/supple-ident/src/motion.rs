@@ -82,6 +82,8 @@ pub struct Motion {
     /// Cutoff of the zero-phase filter applied to the torques \[Hz\]; columns that are discontinuous at a
     /// reversal are filtered likewise.
     pub cutoff_hz: Option<f64>,
+    /// Time of the first sample \[s\], on the log's clock.
+    pub start_s: f64,
 }
 
 impl Motion {
@@ -95,7 +97,12 @@ impl Motion {
         moving: &[usize],
         preparation: &Preparation,
     ) -> Result<(Motion, Vec<Warning>), IdentError> {
-        let warnings = log.check(dof, moving)?;
+        let warnings = log.check_for(dof, moving, preparation.cutoff_hz)?;
+        Ok((Self::of_checked(log, preparation)?, warnings))
+    }
+
+    /// As [`Motion::prepare`], from a log whose table is known to be sound.
+    pub(crate) fn of_checked(log: &Log, preparation: &Preparation) -> Result<Motion, IdentError> {
         if preparation.keep_every == 0 {
             return Err(IdentError::Option {
                 option: "keep_every",
@@ -150,8 +157,14 @@ impl Motion {
             tau: tau.select_rows(&rows),
             independent_fraction: independent.min(1.0),
             cutoff_hz: preparation.cutoff_hz.filter(|hz| *hz < 0.45 * kept_hz),
+            start_s: log.t_s[0] + rows[0] as f64 / rate_hz,
         };
-        Ok((motion, warnings))
+        Ok(motion)
+    }
+
+    /// Time of a sample \[s\], on the log's clock.
+    pub fn time_s(&self, sample: usize) -> f64 {
+        self.start_s + sample as f64 / self.rate_hz
     }
 
     /// Number of samples.
@@ -167,6 +180,7 @@ impl Motion {
             qd: cut(&self.qd),
             qdd: cut(&self.qdd),
             tau: cut(&self.tau),
+            start_s: self.time_s(range.start),
             ..*self
         }
     }

@@ -217,6 +217,7 @@ fn motion_with_ripple(
         tau,
         independent_fraction: 1.0,
         cutoff_hz: None,
+        start_s: 0.0,
     }
 }
 

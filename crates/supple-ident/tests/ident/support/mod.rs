@@ -93,5 +93,6 @@ pub fn motion<const N: usize>(
         tau,
         independent_fraction: 1.0,
         cutoff_hz: None,
+        start_s: 0.0,
     }
 }
