@@ -82,6 +82,24 @@ impl Description {
         Description::from_text(&document.to_string(), self.urdf())
     }
 
+    /// Returns the same arm with the held joints of `of`: those, at the same angles and with the same loops, and no other.
+    ///
+    /// # Errors
+    /// [`ModelError::JointCount`]; any [`ModelError`] of the edited text.
+    pub fn with_held_joints_of(&self, of: &Description) -> Result<Description, ModelError> {
+        self.expect_dof(of.dof())?;
+        let (mut document, mut other) = (self.document()?, of.document()?);
+        for joint in 0..self.dof() {
+            let held = of.joint_table(&mut other, joint)?.remove("held");
+            let table = self.joint_table(&mut document, joint)?;
+            table.remove("held");
+            if let Some(held) = held {
+                table.insert("held", held);
+            }
+        }
+        Description::from_text(&document.to_string(), self.urdf())
+    }
+
     /// Writes `arm.toml` and `arm.urdf` into a folder, which it creates if necessary; [`Description::load`] reads
     /// them. Existing files of these names are replaced.
     ///
