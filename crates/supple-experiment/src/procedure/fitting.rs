@@ -82,20 +82,36 @@ pub fn with_breakaway<const N: usize>(
     })?)
 }
 
-/// Fits the first pass without its last part, on which it is compared with `model`. The model is `None` if the fit is not
-/// better there.
+/// All motion with position loops in a log: moves and series.
+///
+/// # Errors
+/// A log that cannot be read, or has no such motion.
+pub fn all_motion<const N: usize>(file: &Path) -> Result<Vec<Log>, ProcedureError> {
+    Ok(
+        supple_ident::read_mcap::<N>(file).map_err(|error| ProcedureError::Resume {
+            file: file.to_owned(),
+            problem: error.to_string(),
+        })?,
+    )
+}
+
+/// Fits `others` and the first pass without its last part, on which it is compared with `model`. The model is `None` if
+/// the fit is not better there.
 ///
 /// # Errors
 /// A log that cannot be used.
 pub fn fit_first<const N: usize>(
     model: &Description,
     pass: &Log,
+    others: &[Log],
 ) -> Result<Option<(Description, FitQuality)>, ProcedureError> {
     let config = model.config::<N>()?;
     let rows = pass.t_s.len();
     let cut = ((1.0 - HELD_OUT) * rows as f64) as usize;
     let (fitted, unseen) = (part(pass, 0, cut), part(pass, cut, rows - cut));
-    let (fit, _) = identify(&config, &[fitted], &[])?;
+    let mut logs = vec![fitted];
+    logs.extend_from_slice(others);
+    let (fit, _) = identify(&config, &logs, &[])?;
     let unseen = prepared(&unseen, &fit)?;
     let quality = quality(&config, &fit, &unseen)?;
     let better = quality.unseen_relative < quality.unseen_relative_before;

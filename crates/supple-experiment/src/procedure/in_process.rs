@@ -176,7 +176,7 @@ impl<const N: usize> MotionArm<N> for InProcessArm<N> {
             Some(rig) => rig.replace_controller(controller),
             None => {
                 let rig = Rig::new(controller, self.plant.clone(), self.start_rad)?;
-                self.rig = Some(rig.with_wiring(self.wiring));
+                self.rig = Some(rig.with_wiring(self.wiring).with_learner());
             }
         }
         self.model = Some(model.clone());

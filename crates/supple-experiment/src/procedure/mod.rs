@@ -27,7 +27,7 @@ pub use motions::Motions;
 pub use progress::{FILE, FinishedStep, FitQuality, Progress, SinusoidResult, StepName};
 pub use steps::{CalibratedArm, calibrate_arm};
 pub use sweep::Sweep;
-pub use wiring::{JointWiring, check_gravity, check_ramp, ramp_result};
+pub use wiring::JointWiring;
 
 use std::path::PathBuf;
 

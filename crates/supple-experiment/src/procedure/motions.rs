@@ -18,7 +18,7 @@ const SLOW: (f64, f64) = (0.1, 40.0);
 const UNSEEN_SEED: u64 = 1000;
 
 /// Slope of the torque ramps that show which joint a motor moves \[N m/s\], and motion at which they stop \[rad\].
-pub const WIRING_RAMP: (f64, f64) = (0.5, 0.012);
+pub const WIRING_RAMP: (f64, f64) = (15.0, 0.03);
 /// Slope of the ramps that measure the breakaway torque \[N m/s\], and motion at which they stop \[rad\].
 pub const BREAKAWAY_RAMP: (f64, f64) = (0.25, 0.025);
 /// Maximum torque of a ramp \[N m\].
@@ -145,5 +145,5 @@ pub fn ramp<const N: usize>(
 pub fn ramps_s<const N: usize>(config: &Config<N>) -> f64 {
     let breakaway_nm: f64 = config.friction.iter().map(|f| f.breakaway_nm).sum();
     let moves_s = 3.0 * N as f64 * move_to(&Vector::<N>::zeros(), &Vector::zeros()).duration_s;
-    breakaway_nm / WIRING_RAMP.0 + 2.0 * breakaway_nm / BREAKAWAY_RAMP.0 + moves_s
+    2.0 * breakaway_nm / BREAKAWAY_RAMP.0 + moves_s
 }

@@ -5,7 +5,7 @@ use super::error::ProcedureError;
 use super::motions::{BREAKAWAY_RAMP, Motions, WIRING_RAMP, follow, ramp, ramps_s};
 use super::progress::{FinishedStep, FitQuality, Progress, SinusoidResult, StepName, write_whole};
 use super::sweep::Sweep;
-use super::wiring::{check_gravity, check_ramp, ramp_result};
+use super::wiring::{check_direction, check_gravity, check_ramp, difference_rad, ramp_result};
 use super::{
     DRAWING, FIRST_MODEL, HOLD_REMEDY, LEARNING_S, LOGS, Operator, ProcedureOptions, fitting,
 };
@@ -14,7 +14,7 @@ use crate::calibrate::upright;
 use crate::error::ExperimentError;
 use crate::excite::move_to;
 use crate::metrics::Rms;
-use crate::request_sequence::Step;
+use crate::request_sequence::{Recording, Step};
 use crate::scenario;
 use crate::start::start_pose;
 use std::path::PathBuf;
@@ -31,6 +31,9 @@ const REST_S: f64 = 1.0;
 const FLOAT_S: f64 = 2.0;
 /// Duration of a change of gains \[s\].
 const GAINS_S: f64 = 0.2;
+/// Share of the collision thresholds, and load at the tip \[N\], at which the arm stops while its model is unknown.
+const WIDE_MOVE_SHARE: f64 = 1.0;
+const WIDE_LOAD_N: f64 = 40.0;
 /// Attempts at a motion that contact stops.
 const ATTEMPTS: usize = 3;
 
@@ -180,7 +183,11 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
             "the controller starts with the {}",
             text_of(stage)
         ));
-        let model = self.model(stage)?;
+        let mut model = self.model(stage)?;
+        if stage != Stage::Identified {
+            let wide = model.with_wide_thresholds(WIDE_MOVE_SHARE, WIDE_LOAD_N);
+            model = wide.map_err(ProcedureError::from)?;
+        }
         self.arm.load(&model)?;
         self.loaded = Some(stage);
         Ok(())
@@ -273,28 +280,14 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
         let pose_rad = self.arm.position_rad()?;
         self.progress.wiring.clear();
         for joint in 0..N {
-            let steps = ramp(&config, &pose_rad, &pose_rad, joint, WIRING_RAMP);
-            let performed = self.arm.perform(&format!("wiring-{joint}"), &steps)?;
-            self.progress.moved_s += performed.moved_s;
-            let recording = performed.motions.first().map(|motion| &motion.recording);
-            if let Some(recording) = recording.filter(|recording| !recording.t_s.is_empty()) {
-                let found = ramp_result(recording, WIRING_RAMP.0);
-                let breakaway_nm = config.friction[joint].breakaway_nm;
-                if found.moved.is_some() || performed.stopped.is_none() {
-                    check_ramp(&self.names, joint, &found, breakaway_nm)?;
-                }
-                self.progress.wiring.push(found);
-            }
-            if let Some(stopped) = performed.stopped {
-                return Err(ProcedureError::Stopped {
-                    motion: format!("torque ramp on joint {joint} ({})", self.names[joint]),
-                    fault: stopped.fault,
-                    remedy: HOLD_REMEDY,
-                }
-                .into());
+            let up = self.wiring_ramp(&config, &pose_rad, joint, 1.0)?;
+            let down = self.wiring_ramp(&config, &pose_rad, joint, -1.0)?;
+            let turned_rad = difference_rad(&up, &down, joint);
+            check_direction(&self.names, joint, turned_rad)?;
+            if let Some(found) = self.progress.wiring.last_mut() {
+                found.difference_rad = turned_rad;
             }
         }
-        // At the pose with more gravity; the ramps have shown that the position loops are safe.
         let rest = Step {
             recorded: true,
             ..Step::wait(
@@ -312,6 +305,48 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
             check_gravity(&self.names, &rest.recording, &model_nm, &friction_nm)?;
         }
         Ok(self.finish(StepName::Wiring, before_s, None)?)
+    }
+
+    /// Ramps the torque of a joint and checks which encoders moved. The arm returns to the pose before the ramp down.
+    fn wiring_ramp(
+        &mut self,
+        config: &Config<N>,
+        pose_rad: &Vector<N>,
+        joint: usize,
+        direction: f64,
+    ) -> Result<Recording, A::Error> {
+        let up = direction > 0.0;
+        let name = format!("wiring-{joint}-{}", if up { "up" } else { "down" });
+        let (rate_nm_per_s, stop_rad) = WIRING_RAMP;
+        let slope = (direction * rate_nm_per_s, stop_rad);
+        let from_rad = self.arm.position_rad()?;
+        let mut steps = ramp(config, &from_rad, pose_rad, joint, slope);
+        if joint == 0 && up {
+            // The first ramp begins in gravity hold: no position loop has been tried yet.
+            steps.remove(0);
+        }
+        let performed = self.arm.perform(&name, &steps)?;
+        self.progress.moved_s += performed.moved_s;
+        let motion = performed.motions.into_iter().next();
+        let recording = motion.map(|motion| motion.recording);
+        if let Some(recording) = recording.as_ref().filter(|found| !found.t_s.is_empty()) {
+            let found = ramp_result(recording, joint, rate_nm_per_s);
+            if performed.stopped.is_none() || !found.others.is_empty() {
+                check_ramp(&self.names, joint, &found)?;
+            }
+            if up {
+                self.progress.wiring.push(found);
+            }
+        }
+        match (performed.stopped, recording) {
+            (None, Some(recording)) => Ok(recording),
+            (stopped, _) => Err(ProcedureError::Stopped {
+                motion: format!("torque ramp on joint {joint} ({})", self.names[joint]),
+                fault: stopped.map_or("no data".to_owned(), |stopped| stopped.fault),
+                remedy: HOLD_REMEDY,
+            }
+            .into()),
+        }
     }
 
     fn design(&mut self, config: &Config<N>) -> Result<Motions<N>, A::Error> {
@@ -458,10 +493,18 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
         let scaled = fitting::with_breakaway::<N>(&model, &self.progress.breakaway)?;
         let logs = self.logs(StepName::FirstPass)?;
         let pass = only(&logs, "first-pass")?.clone();
+        // The moves from the home pose reach where the pass does not.
+        let mut others = Vec::new();
+        for name in ["warm-up", "breakaway-0-positive"] {
+            let file = self.options.out.join(LOGS).join(format!("{name}.mcap"));
+            if file.exists() {
+                others.extend(fitting::all_motion::<N>(&file)?);
+            }
+        }
         let of = scaled.clone();
         let fit = self
             .arm
-            .meanwhile(move || fitting::fit_first::<N>(&of, &pass))??;
+            .meanwhile(move || fitting::fit_first::<N>(&of, &pass, &others))??;
         let (found, quality) = match fit {
             Some((found, quality)) => (found, Some(quality)),
             None => (scaled, None),

@@ -1,7 +1,8 @@
-//! Whether each motor moves its own joint, in its direction, with torques of the right size: from torque ramps on one
-//! joint after the other, and from the torque that holds the arm at rest.
+//! Whether each motor moves its own joint, in its direction, with torques of the right size: from short torque ramps on
+//! one joint after the other, and from the torque that holds the arm at rest.
 //!
-//! A ramp needs no position loop on its joint. The joint whose encoder moves first is the one that the motor moves.
+//! A ramp needs no position loop on its joint; the loops of the others show whether those hold. The difference between a
+//! ramp up and a ramp down tells the direction, whatever gravity the model lacks.
 
 use super::error::ProcedureError;
 use crate::request_sequence::Recording;
@@ -9,53 +10,63 @@ use serde::{Deserialize, Serialize};
 use supple_core::Vector;
 
 /// Motion of an encoder that counts as motion of its joint: more than bristles and cables give \[rad\].
-const MOVED_RAD: f64 = 6e-3;
-/// Factor between the ramp's torque at the first motion and the model's breakaway torque, above which units differ.
-const BREAKAWAY_FACTOR: f64 = 4.0;
+const MOVED_RAD: f64 = 0.01;
 /// Gravity torque above which the torque at rest tells the scale \[N m\].
 const HEAVY_NM: f64 = 4.0;
 /// Factor between the holding torque and the model's gravity, above which units differ.
 const GRAVITY_FACTOR: f64 = 1.6;
 
 /// Finding for one joint.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct JointWiring {
-    /// Joint whose encoder moved first; `None` if none moved.
-    pub moved: Option<usize>,
-    /// Its direction for a positive torque.
-    pub positive: bool,
-    /// Torque of the ramp at which it moved, or its greatest torque \[N m\].
+    /// Whether its own encoder moved.
+    pub moved: bool,
+    /// Other joints whose encoders moved.
+    pub others: Vec<usize>,
+    /// Greatest torque of the ramp \[N m\].
     pub torque_nm: f64,
+    /// Angle after the ramp up minus that after the ramp down, at the same time \[rad\].
+    pub difference_rad: f64,
 }
 
-/// Evaluates a ramp of `rate_nm_per_s`: which encoder moved first, where, and at which torque.
-pub fn ramp_result(recording: &Recording, rate_nm_per_s: f64) -> JointWiring {
-    let (Some(begin_s), rows) = (recording.t_s.first(), recording.t_s.len()) else {
-        return JointWiring {
-            moved: None,
-            positive: true,
-            torque_nm: 0.0,
-        };
+/// Evaluates a ramp of `rate_nm_per_s` on a joint: which encoders moved.
+pub fn ramp_result(recording: &Recording, joint: usize, rate_nm_per_s: f64) -> JointWiring {
+    let Some(last) = recording.t_s.len().checked_sub(1) else {
+        return JointWiring::default();
     };
-    let travel =
-        |row: usize, joint: usize| recording.q_rad[(row, joint)] - recording.q_rad[(0, joint)];
-    let first = (0..rows).find_map(|row| {
-        let joints = 0..recording.q_rad.ncols();
-        let farthest =
-            joints.max_by(|a, b| travel(row, *a).abs().total_cmp(&travel(row, *b).abs()))?;
-        (travel(row, farthest).abs() > MOVED_RAD).then_some((row, farthest))
-    });
-    let row = first.map_or(rows - 1, |(row, _)| row);
+    let moved = |other: &usize| {
+        let travel_rad = recording.q_rad[(last, *other)] - recording.q_rad[(0, *other)];
+        travel_rad.abs() > MOVED_RAD
+    };
+    let all = 0..recording.q_rad.ncols();
     JointWiring {
-        moved: first.map(|(_, joint)| joint),
-        positive: first.is_none_or(|(row, joint)| {
-            travel(row, joint).is_sign_positive() == rate_nm_per_s.is_sign_positive()
-        }),
-        torque_nm: rate_nm_per_s.abs() * (recording.t_s[row] - begin_s),
+        moved: moved(&joint),
+        others: all
+            .filter(|other| *other != joint && moved(other))
+            .collect(),
+        torque_nm: rate_nm_per_s.abs() * (recording.t_s[last] - recording.t_s[0]),
+        difference_rad: 0.0,
     }
 }
 
-/// Names the first joint whose ramp does not fit the description.
+/// Angle of a joint in the ramp up minus that in the ramp down, at the end of the shorter one \[rad\].
+pub fn difference_rad(up: &Recording, down: &Recording, joint: usize) -> f64 {
+    let rows = up.t_s.len().min(down.t_s.len());
+    if rows == 0 {
+        return 0.0;
+    }
+    let travel = |of: &Recording| of.q_rad[(rows - 1, joint)] - of.q_rad[(0, joint)];
+    travel(up) - travel(down)
+}
+
+fn wrong(problem: String, remedy: &str) -> Result<(), ProcedureError> {
+    Err(ProcedureError::Wiring {
+        problem,
+        remedy: remedy.to_owned(),
+    })
+}
+
+/// Names what does not fit the description in the ramp of a joint.
 ///
 /// # Errors
 /// [`ProcedureError::Wiring`].
@@ -63,47 +74,60 @@ pub fn check_ramp(
     names: &[String],
     joint: usize,
     found: &JointWiring,
-    model_breakaway_nm: f64,
 ) -> Result<(), ProcedureError> {
-    let (name, torque_nm) = (&names[joint], found.torque_nm);
-    let wrong = |problem: String, remedy: &str| {
-        Err(ProcedureError::Wiring {
-            problem,
-            remedy: remedy.to_owned(),
-        })
-    };
-    let Some(moved) = found.moved else {
-        return wrong(
-            format!("joint {joint} ({name}) did not move at {torque_nm:.2} N m, and no other did"),
+    let title = |joint: usize| format!("joint {joint} ({})", names[joint]);
+    match (found.moved, &found.others[..]) {
+        (true, []) => Ok(()),
+        (false, []) => wrong(
+            format!(
+                "{} did not move at {:.2} N m, and no other did",
+                title(joint),
+                found.torque_nm
+            ),
             "check its brake, its stops and its motor, and the unit of its torque (torque constant, N m or A)",
-        );
-    };
-    if moved != joint {
-        let other = &names[moved];
-        return wrong(
+        ),
+        (false, [other]) => wrong(
             format!(
-                "a torque on joint {joint} ({name}) moves the encoder of joint {moved} ({other}): motors or encoders \
-                 are swapped"
+                "the encoder of {} runs away while a torque acts on {}, which stands still",
+                title(*other),
+                title(joint)
             ),
-            "correct the order of the motors or encoders in the arm's TOML, or their plugs",
-        );
+            "reverse the sign of its motor or of its encoder in the arm's TOML, or correct the order of motors and \
+             encoders",
+        ),
+        (_, others) => {
+            let others: Vec<String> = others.iter().map(|other| title(*other)).collect();
+            wrong(
+                format!(
+                    "a torque on {} moves the encoder of {}: motors or encoders are swapped",
+                    title(joint),
+                    others.join(" and of ")
+                ),
+                "correct the order of the motors or encoders in the arm's TOML, or their plugs",
+            )
+        }
     }
-    if !found.positive {
-        return wrong(
-            format!("a positive torque on joint {joint} ({name}) turns its encoder backwards"),
-            "reverse the sign of its motor or of its encoder in the arm's TOML",
-        );
+}
+
+/// Rejects a joint that turns the other way.
+///
+/// # Errors
+/// [`ProcedureError::Wiring`].
+pub fn check_direction(
+    names: &[String],
+    joint: usize,
+    difference_rad: f64,
+) -> Result<(), ProcedureError> {
+    if difference_rad > 0.0 {
+        return Ok(());
     }
-    let factor = torque_nm / model_breakaway_nm.max(1e-3);
-    if factor > BREAKAWAY_FACTOR {
-        return wrong(
-            format!(
-                "joint {joint} ({name}) moved at {torque_nm:.2} N m, its model breaks away at {model_breakaway_nm:.2} N m"
-            ),
-            "check the unit of its torque (torque constant, N m or A, gear ratio), or its friction in the arm's TOML",
-        );
-    }
-    Ok(())
+    wrong(
+        format!(
+            "a positive torque on joint {joint} ({}) turns its encoder backwards, by {:.3} rad",
+            names[joint], difference_rad
+        ),
+        "reverse the sign of its motor or of its encoder in the arm's TOML",
+    )
 }
 
 /// Compares the mean torque at rest with the gravity of the model.
