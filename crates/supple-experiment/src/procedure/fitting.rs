@@ -119,7 +119,8 @@ pub fn fit_first<const N: usize>(
     better.then(found).transpose()
 }
 
-/// Fits all motions: the full pass, slow motion and runs at constant speed, and validates on `unseen`.
+/// Fits all motions: the full pass, slow motion and runs at constant speed, and validates on `unseen`. The collision
+/// thresholds come from the residual on these and on `others`, such as moves.
 ///
 /// # Errors
 /// A log that cannot be used.
@@ -128,7 +129,8 @@ pub fn fit_all<const N: usize>(
     logs: &[Log],
     constant_speed: &[Log],
     unseen: &Log,
-) -> Result<(Description, Fit<N>, FitQuality), ProcedureError> {
+    others: &[Log],
+) -> Result<(Description, FitQuality), ProcedureError> {
     let config = model.config::<N>()?;
     let (fit, ripple) = identify(&config, logs, constant_speed)?;
     let motor_from_joint = *supple_core::Controller::new(config)?.motor_from_joint();
@@ -136,9 +138,13 @@ pub fn fit_all<const N: usize>(
     let unseen = prepared(&unseen, &fit)?;
     let quality = quality(&config, &fit, &unseen)?;
     let described = fit.description(model, Some(&ripple))?;
-    let validation = fit.validate_motion(&unseen)?;
-    let thresholds = fit.move_collision_nm(core::slice::from_ref(&validation), &config);
-    Ok((described.with_move_collision(&thresholds)?, fit, quality))
+    let mut validations = vec![fit.validate_motion(&unseen)?];
+    for log in logs.iter().chain(others) {
+        let log = without_ripple(log, &ripple, &motor_from_joint);
+        validations.push(fit.validate_motion(&prepared(&log, &fit)?)?);
+    }
+    let thresholds = fit.move_collision_nm(&validations, &config);
+    Ok((described.with_move_collision(&thresholds)?, quality))
 }
 
 fn part(log: &Log, first: usize, rows: usize) -> Log {

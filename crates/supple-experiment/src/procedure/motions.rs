@@ -1,26 +1,29 @@
 //! The motions of a calibration, their requests and how long they take.
 
 use crate::error::ExperimentError;
-use crate::excite::{constant_speed_runs, move_to};
+use crate::excite::move_to;
 use crate::request_sequence::Step;
 use supple_core::controller::{Breakaway, Request};
 use supple_core::trajectory::{Fourier, HARMONICS};
 use supple_core::{Config, Vector};
-use supple_ident::design::{DesignOptions, design, slow_series};
+use supple_ident::IdentError;
+use supple_ident::design::{DesignOptions, constant_speed_series, design, slow_series};
 
 /// Period of the excitation \[s\], its number of periods, and those of the unseen motion.
-const EXCITATION: (f64, f64, f64) = (12.0, 4.0, 1.5);
+const EXCITATION: (f64, f64, f64) = (12.0, 3.0, 1.25);
 /// Fraction of the amplitude of the first pass, and its number of periods.
 const FIRST: (f64, f64) = (0.25, 2.0);
 /// Maximum joint speed \[rad/s\] and period \[s\] of slow motion.
 const SLOW: (f64, f64) = (0.1, 40.0);
+/// Speeds of the runs at constant speed \[rad/s\], and the period of each \[s\].
+const CONSTANT: ([f64; 2], f64) = ([0.06, 0.12], 28.0);
 /// Seed of the unseen motion, relative to that of the excitation.
 const UNSEEN_SEED: u64 = 1000;
 
 /// Slope of the torque ramps that show which joint a motor moves \[N m/s\], and motion at which they stop \[rad\].
 pub const WIRING_RAMP: (f64, f64) = (15.0, 0.03);
 /// Slope of the ramps that measure the breakaway torque \[N m/s\], and motion at which they stop \[rad\].
-pub const BREAKAWAY_RAMP: (f64, f64) = (0.25, 0.025);
+pub const BREAKAWAY_RAMP: (f64, f64) = (0.4, 0.025);
 /// Maximum torque of a ramp \[N m\].
 const RAMP_LIMIT_NM: f64 = 6.0;
 /// Time in which the mode of a ramp ends after its torque limit \[s\].
@@ -70,11 +73,14 @@ impl<const N: usize> Motions<N> {
             unseen_periods,
             (candidates / 10).max(20),
         )?;
+        let (speeds, constant_s) = CONSTANT;
+        let run = |speed| constant_speed_series(config, home_rad, &joints, speed, constant_s);
+        let constant: Result<_, IdentError> = speeds.into_iter().map(run).collect();
         let (speed_rad_per_s, slow_period_s) = SLOW;
         Ok(Motions {
             first: scaled(&full, FIRST.0, FIRST.1),
             slow: slow_series(config, home_rad, &joints, speed_rad_per_s, slow_period_s)?,
-            constant: constant_speed_runs(config, home_rad, &joints)?,
+            constant: constant?,
             full,
             unseen,
         })

@@ -478,11 +478,15 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
 
     /// The motions along series of a finished step.
     fn logs(&self, step: StepName) -> Result<Vec<Log>, ProcedureError> {
+        fitting::excitations::<N>(&self.log_file(step))
+    }
+
+    /// The log of a finished step.
+    fn log_file(&self, step: StepName) -> PathBuf {
         let finished = self.progress.finished(step);
         let name = finished.and_then(|finished| finished.log.as_deref());
-        let file = self.options.out.join(LOGS);
-        let file = file.join(format!("{}.mcap", name.unwrap_or_default()));
-        fitting::excitations::<N>(&file)
+        let folder = self.options.out.join(LOGS);
+        folder.join(format!("{}.mcap", name.unwrap_or_default()))
     }
 
     fn first_fit(&mut self) -> Result<(), A::Error> {
@@ -533,10 +537,18 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
         let constant = self.logs(StepName::ConstantSpeed)?;
         let unseen = self.logs(StepName::UnseenMotion)?;
         let unseen = only(&unseen, "unseen-motion")?.clone();
+        let mut others = Vec::new();
+        for step in [
+            StepName::FullPass,
+            StepName::SlowMotion,
+            StepName::UnseenMotion,
+        ] {
+            others.extend(fitting::all_motion::<N>(&self.log_file(step))?);
+        }
         let fitted = self
             .arm
-            .meanwhile(move || fitting::fit_all::<N>(&model, &logs, &constant, &unseen))??;
-        let (found, _, quality) = fitted;
+            .meanwhile(move || fitting::fit_all::<N>(&model, &logs, &constant, &unseen, &others))?;
+        let (found, quality) = fitted?;
         self.say(&summary(&quality));
         let found = found
             .with_held_joints_of(self.start)
