@@ -33,7 +33,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (gravity, friction) = (number(3, 0.15)?, number(4, 0.5)?);
     let arm = Description::asset("wam4")?;
     println!(
-        "| seed | motion [min] | gravity [%] | friction [%] | 5 N/m calibrated [mm] | learning [mm] | contacts | unexplained [%] |"
+        "| seed | motion [min] | gravity [%] | 5 N/m calibrated [mm] | learning [mm] | contacts | unexplained [%] |"
     );
     for seed in first..=last {
         let row = calibrated(
@@ -93,17 +93,12 @@ fn calibrated(
     let progress = &found.progress;
     let mm = |error: Option<f64>| error.map_or("fault".to_owned(), |m| format!("{:.1}", 1e3 * m));
     let sinusoid = progress.sinusoid.clone().unwrap_or_default();
-    let worst = truth
-        .friction_relative
-        .iter()
-        .fold(0.0_f64, |a, b| a.max(*b));
     let unexplained = progress.fit.as_ref().map_or(1.0, |fit| fit.unseen_relative);
     Ok(format!(
-        "| {seed} | {:.2} (stated {:.2}) | {:.2} | {:.1} | {} | {} | {} | {:.2} |",
+        "| {seed} | {:.2} (stated {:.2}) | {:.2} | {} | {} | {} | {:.2} |",
         progress.moved_s / 60.0,
         progress.stated_s / 60.0,
         100.0 * truth.gravity_relative,
-        100.0 * worst,
         mm(sinusoid.calibrated_rms_m),
         mm(sinusoid.learning_rms_m),
         sinusoid.false_contacts,

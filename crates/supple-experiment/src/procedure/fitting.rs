@@ -9,12 +9,16 @@ use std::path::Path;
 use supple_core::controller::Mode;
 use supple_core::dynamics::rnea;
 use supple_core::{Config, Vector};
-use supple_ident::{Fit, Log, Motion};
+use supple_ident::{Fit, Log, Motion, ReadError};
 use supple_log::Reader;
 use supple_model::{Description, IdentifiedModel};
 
 /// Last part of the first pass that its fit does not see.
 const HELD_OUT: f64 = 0.25;
+/// Least range of each joint in a motion that is fitted \[rad\].
+const ALL_MOVE_RAD: f64 = 0.05;
+/// Least collision threshold of a joint, as a fraction of that of the description.
+const LEAST_THRESHOLD: f64 = 0.5;
 /// Range of the factor between measured and given breakaway torque by which dry friction is scaled.
 const FACTOR: (f64, f64) = (0.2, 5.0);
 
@@ -82,17 +86,25 @@ pub fn with_breakaway<const N: usize>(
     })?)
 }
 
-/// All motion with position loops in a log: moves and series.
+/// All motion with position loops in a log, moves and series; none if all of it is short.
 ///
 /// # Errors
-/// A log that cannot be read, or has no such motion.
+/// A log that cannot be read.
 pub fn all_motion<const N: usize>(file: &Path) -> Result<Vec<Log>, ProcedureError> {
-    Ok(
-        supple_ident::read_mcap::<N>(file).map_err(|error| ProcedureError::Resume {
+    match supple_ident::read_mcap::<N>(file) {
+        Ok(logs) => Ok(logs.into_iter().filter(all_move).collect()),
+        Err(ReadError::Table { .. }) => Ok(Vec::new()),
+        Err(error) => Err(ProcedureError::Resume {
             file: file.to_owned(),
             problem: error.to_string(),
-        })?,
-    )
+        }),
+    }
+}
+
+/// Whether every joint moves: another motion cannot be fitted.
+fn all_move(log: &Log) -> bool {
+    let mut columns = log.q_rad.column_iter();
+    columns.all(|q| q.max() - q.min() > ALL_MOVE_RAD)
 }
 
 /// Fits `others` and the first pass without its last part, on which it is compared with `model`. The model is `None` if
@@ -143,7 +155,13 @@ pub fn fit_all<const N: usize>(
         let log = without_ripple(log, &ripple, &motor_from_joint);
         validations.push(fit.validate_motion(&prepared(&log, &fit)?)?);
     }
-    let thresholds = fit.move_collision_nm(&validations, &config);
+    let present_nm = config.collision.move_joint_torque_nm;
+    let mut thresholds = fit.move_collision_nm(&validations, &config);
+    for (joint, threshold_nm) in thresholds.iter_mut().enumerate() {
+        // The observer is faster than the filter of the residuals.
+        let least_nm = LEAST_THRESHOLD * present_nm[joint];
+        *threshold_nm = threshold_nm.map(|nm| nm.max(least_nm));
+    }
     Ok((described.with_move_collision(&thresholds)?, quality))
 }
 

@@ -60,13 +60,13 @@ pub struct ProcedureOptions {
 }
 
 impl ProcedureOptions {
-    /// Seed 0, 600 candidates, a warm-up of 12 s.
+    /// Seed 0, 600 candidates, a warm-up of 10 s.
     pub fn new(out: PathBuf) -> ProcedureOptions {
         ProcedureOptions {
             out,
             seed: 0,
             candidates: 600,
-            warm_up_s: 12.0,
+            warm_up_s: 10.0,
             resume: false,
         }
     }

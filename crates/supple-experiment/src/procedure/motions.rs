@@ -9,14 +9,16 @@ use supple_core::{Config, Vector};
 use supple_ident::IdentError;
 use supple_ident::design::{DesignOptions, constant_speed_series, design, slow_series};
 
-/// Period of the excitation \[s\], its number of periods, and those of the unseen motion.
-const EXCITATION: (f64, f64, f64) = (12.0, 3.0, 1.25);
+/// Period of the excitations \[s\], and the number of periods of each and of the unseen motion.
+const EXCITATION: (f64, f64, f64) = (12.0, 1.0, 1.25);
+/// Number of excitations: other poses tell more than repetitions.
+const EXCITATIONS: u64 = 3;
 /// Fraction of the amplitude of the first pass, and its number of periods.
 const FIRST: (f64, f64) = (0.25, 2.0);
 /// Maximum joint speed \[rad/s\] and period \[s\] of slow motion.
 const SLOW: (f64, f64) = (0.1, 40.0);
 /// Speeds of the runs at constant speed \[rad/s\], and the period of each \[s\].
-const CONSTANT: ([f64; 2], f64) = ([0.06, 0.12], 28.0);
+const CONSTANT: ([f64; 2], f64) = ([0.06, 0.12], 26.0);
 /// Seed of the unseen motion, relative to that of the excitation.
 const UNSEEN_SEED: u64 = 1000;
 
@@ -34,8 +36,8 @@ const RAMP_END_S: f64 = 0.3;
 pub struct Motions<const N: usize> {
     /// The excitation at a quarter of its amplitude.
     pub first: Fourier<N>,
-    /// The designed excitation.
-    pub full: Fourier<N>,
+    /// The designed excitations.
+    pub full: Vec<Fourier<N>>,
     /// Slow motion, for dry friction.
     pub slow: Fourier<N>,
     /// Motion at constant speeds, for torque ripple.
@@ -67,7 +69,8 @@ impl<const N: usize> Motions<N> {
             };
             design(config, home_rad, &options, &mut |_, _| {}).map(|found| found.series)
         };
-        let full = search(seed, periods, candidates)?;
+        let full = (0..EXCITATIONS).map(|k| search(seed.wrapping_add(k), periods, candidates));
+        let full = full.collect::<Result<Vec<_>, _>>()?;
         let unseen = search(
             seed.wrapping_add(UNSEEN_SEED),
             unseen_periods,
@@ -78,7 +81,7 @@ impl<const N: usize> Motions<N> {
         let constant: Result<_, IdentError> = speeds.into_iter().map(run).collect();
         let (speed_rad_per_s, slow_period_s) = SLOW;
         Ok(Motions {
-            first: scaled(&full, FIRST.0, FIRST.1),
+            first: scaled(&full[0], FIRST.0, FIRST.1),
             slow: slow_series(config, home_rad, &joints, speed_rad_per_s, slow_period_s)?,
             constant: constant?,
             full,
@@ -88,7 +91,9 @@ impl<const N: usize> Motions<N> {
 
     /// All series, in the order in which they are performed.
     pub fn all(&self) -> Vec<Fourier<N>> {
-        let mut all = vec![self.first, self.full, self.slow];
+        let mut all = vec![self.first];
+        all.extend(&self.full);
+        all.push(self.slow);
         all.extend(&self.constant);
         all.push(self.unseen);
         all

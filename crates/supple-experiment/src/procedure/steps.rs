@@ -129,7 +129,7 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
         )?;
         self.first_fit()?;
         for (step, name, series) in [
-            (StepName::FullPass, "full-pass", &[motions.full][..]),
+            (StepName::FullPass, "full-pass", &motions.full[..]),
             (StepName::SlowMotion, "slow-motion", &[motions.slow][..]),
             (
                 StepName::ConstantSpeed,
@@ -391,7 +391,7 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
             .sum();
         let (_, sinusoid_s) = scenario::sinusoid(1.0);
         let returns_s =
-            4.0 * move_to(&motions.full.at(0.0).position_rad, &self.home_rad).duration_s;
+            9.0 * move_to(&motions.first.at(0.0).position_rad, &self.home_rad).duration_s;
         all + self.options.warm_up_s
             + ramps_s(config)
             + REST_S
@@ -534,6 +534,7 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
         let model = self.model(Stage::First)?;
         let mut logs = self.logs(StepName::FullPass)?;
         logs.extend(self.logs(StepName::SlowMotion)?);
+        logs.extend(self.logs(StepName::FirstPass)?);
         let constant = self.logs(StepName::ConstantSpeed)?;
         let unseen = self.logs(StepName::UnseenMotion)?;
         let unseen = only(&unseen, "unseen-motion")?.clone();
