@@ -5,6 +5,7 @@ mod support;
 #[path = "../support/table.rs"]
 mod table;
 
+mod calibration;
 mod drill;
 mod ends;
 mod learning;

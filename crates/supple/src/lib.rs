@@ -5,6 +5,7 @@
 
 #![forbid(unsafe_code)]
 
+mod calibrate;
 mod cli;
 mod doctor;
 mod drill;
@@ -15,7 +16,7 @@ use clap::{CommandFactory, Parser};
 use cli::{Cli, Command};
 use std::os::unix::process::CommandExt;
 use std::process::ExitCode;
-use supple_cli::arguments::OfflineCommand;
+use supple_cli::arguments::{IdentificationCommand, OfflineCommand};
 use supple_cli::exit::Failure;
 use supple_cli::sibling::program_beside;
 use supple_cli::{arms, console, interrupt, log};
@@ -32,6 +33,12 @@ pub fn run() -> ExitCode {
 }
 
 fn dispatch(command: &Command) -> Result<(), Failure> {
+    if let Command::Offline(OfflineCommand::Identification(command)) = command
+        && let IdentificationCommand::Calibrate(args) = command
+        && let Some(on) = args.on
+    {
+        return calibrate::run(args, on);
+    }
     match command {
         Command::Offline(
             OfflineCommand::Demo(_)

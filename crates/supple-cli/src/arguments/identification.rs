@@ -8,6 +8,7 @@ use clap::{Args, Subcommand, ValueEnum};
 use std::path::PathBuf;
 use supple_ident::Method;
 use supple_ident::design::MAX_CANDIDATES;
+use supple_plant::Injection;
 
 /// Identification command.
 #[derive(Clone, Debug, Subcommand)]
@@ -21,7 +22,10 @@ pub enum IdentificationCommand {
     /// Measure the breakaway torque of each joint of the simulated arm.
     #[command(after_help = CODES)]
     Breakaway(BreakawayArgs),
-    /// Run breakaway, excitation, identification, validation and demo on the simulated arm.
+    /// Calibrate an arm: wiring, breakaway, excitation, identification, validation, sinusoid at 5 N/m.
+    ///
+    /// Without --plant the simulated arm is calibrated from a model that is 5 % off in gravity and 30 % in friction, and
+    /// the demo runs with the result. With --plant the steps are those for a real arm, also on simulated ones.
     #[command(after_help = CODES)]
     Calibrate(CalibrateArgs),
     /// Refit friction and payload from logs of a repeated motion.
@@ -233,9 +237,70 @@ pub struct BreakawayArgs {
     pub json: bool,
 }
 
+/// The arm that is calibrated step by step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum CalibrationPlant {
+    /// A simulated arm in this process, in virtual time.
+    InProcess,
+    /// A simulated arm on shared memory.
+    Sim,
+    /// A simulated arm on an emulated CAN bus, with motor pucks, safety module and pendant.
+    Emu,
+    /// An arm on a CAN bus; its operator activates it at its pendant.
+    Can,
+    /// The arm of a system that runs already; another model is loaded by starting that again.
+    Running,
+}
+
 /// Arguments of `calibrate`.
 #[derive(Clone, Debug, Args)]
 pub struct CalibrateArgs {
+    /// Calibrate this arm step by step, as a real one.
+    #[arg(long = "plant", value_enum)]
+    pub on: Option<CalibrationPlant>,
+    /// Model to start from: path of its TOML or folder. Default: the arm's own.
+    #[arg(long, value_name = "PATH", requires = "on")]
+    pub model: Option<PathBuf>,
+    /// Relative errors of the starting model in gravity and in friction, with the signs of --seed, for example 0.15,0.5.
+    /// For simulated arms.
+    #[arg(long, value_name = "GRAVITY,FRICTION", value_delimiter = ',', num_args = 2, requires = "on", value_parser = between(0.0, 0.9))]
+    pub start_error: Vec<f64>,
+    /// The swept space is free: do not ask.
+    #[arg(long, requires = "on")]
+    pub yes: bool,
+    /// Go on after the last finished step of the calibration in --out.
+    #[arg(long, requires = "on")]
+    pub resume: bool,
+    /// Duration of the warm-up (s).
+    #[arg(long, value_name = "S", default_value_t = 10.0, requires = "on", value_parser = between(0.0, 3600.0))]
+    pub warm_up: f64,
+    /// Number of candidates of the design of the excitation.
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 600,
+        requires = "on",
+        value_parser = RangedU64ValueParser::<usize>::new().range(1..=MAX_CANDIDATES as u64)
+    )]
+    pub candidates: usize,
+    /// The arm's bus, can:NAME or unix:FOLDER. Default: can:can0 for `can`, private sockets for `emu`.
+    #[arg(long, value_name = "BUS", requires = "on")]
+    pub bus: Option<String>,
+    /// Declare that the arm is in its home pose now; used if the motor pucks have lost their positions.
+    #[arg(long, requires = "on")]
+    pub zero_at_home: bool,
+    /// Inject a fault into the simulated or emulated arm, as `supple up --inject`.
+    #[arg(long, value_name = "SPEC", requires = "on")]
+    pub inject: Vec<Injection>,
+    /// Run the processes in lockstep, as fast as possible: `emu` only.
+    #[arg(long, requires = "on")]
+    pub virtual_time: bool,
+    /// Prefix of the system. Default: SUPPLE_PREFIX or `supple`.
+    #[arg(long, value_name = "NAME", requires = "on")]
+    pub prefix: Option<String>,
+    /// Run without real-time priority and without locked memory.
+    #[arg(long, requires = "on")]
+    pub no_realtime: bool,
     /// A built-in arm, or the path of an arm's TOML or of its folder: the simulated plant.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,

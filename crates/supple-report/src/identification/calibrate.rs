@@ -46,6 +46,9 @@ struct Summary {
 /// # Errors
 /// [`Failure`].
 pub fn run(args: &CalibrateArgs) -> Result<(), Failure> {
+    if args.on.is_some() {
+        return Err(Failure::NeedsSupple { option: "--plant" });
+    }
     let arm = arms::find(&args.arm, args.strict)?;
     with_dof!(arm.dof(), N => run_with_dof::<N>(&arm, args))??;
     if args.no_demo {

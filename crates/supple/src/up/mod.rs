@@ -15,14 +15,14 @@ mod statistics;
 mod status_line;
 mod system;
 
-pub use children::stop_running;
-pub use plan::CONTROLLER;
+pub use children::{ChildProcesses, Pidfile, stop_running};
+pub use plan::{CONTROLLER, Plan};
+pub use recorder::Recorder;
 pub use stages::{GRAVITY_HOLD_S, START_S};
 pub use statistics::{Percentiles, RunStatistics};
 pub use system::System;
 
 use crate::cli::UpArgs;
-use children::Pidfile;
 use supple_cli::arms;
 use supple_cli::console::{print_json, print_line, print_status, write_stderr_in_background};
 use supple_cli::exit::Failure;
