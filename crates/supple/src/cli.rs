@@ -4,7 +4,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use std::path::PathBuf;
 use supple_bus::Address;
-use supple_cli::arguments::{OfflineCommand, PlantArgs};
+use supple_cli::arguments::{OfflineCommand, PlantArgs, ViewArgs};
 use supple_cli::exit::CODES;
 use supple_cli::range::between;
 use supple_plant::Injection;
@@ -29,6 +29,9 @@ pub enum Command {
     Up(UpArgs),
     /// Show the state of a running system.
     Status(SystemArgs),
+    /// Show a running system, or a log, on a page in the browser; viewers of the Foxglove protocol can connect too.
+    #[command(after_help = CODES)]
+    View(ViewArgs),
     /// Put a running system into a mode.
     Mode(ModeArgs),
     /// Change stiffness and damping of a running system, along a ramp.
@@ -302,6 +305,9 @@ pub struct UpArgs {
     /// Write no log.
     #[arg(long, conflicts_with = "log")]
     pub no_log: bool,
+    /// Also start the live page and print its URL, as `supple view` does.
+    #[arg(long, conflicts_with = "virtual_time")]
+    pub view: bool,
     /// Prefix of the new system. Default: SUPPLE_PREFIX or `supple`.
     #[arg(long, value_name = "NAME")]
     pub prefix: Option<String>,
@@ -377,6 +383,7 @@ impl Command {
             Command::Offline(command) => command.json(),
             Command::Up(args) => args.json,
             Command::Drill(args) => args.json,
+            Command::View(args) => args.json,
             Command::Mode(ModeArgs { system, .. })
             | Command::Gains(GainsArgs { system, .. })
             | Command::Learning(LearningArgs {

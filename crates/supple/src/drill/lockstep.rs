@@ -84,6 +84,7 @@ pub fn perform<const N: usize>(spec: &Spec, arm: &TestArm) -> Result<Row, Failur
         virtual_time: true,
         log: PathBuf::new(),
         no_log: true,
+        view: false,
         prefix: Some(prefix),
         no_realtime: true,
         json: true,

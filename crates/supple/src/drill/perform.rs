@@ -81,6 +81,7 @@ pub fn perform<const N: usize>(
         virtual_time: false,
         log: PathBuf::new(),
         no_log: true,
+        view: false,
         prefix: Some(prefix),
         no_realtime: args.no_realtime,
         json: true,

@@ -14,6 +14,7 @@ mod stages;
 mod statistics;
 mod status_line;
 mod system;
+mod viewer;
 
 pub use children::{ChildProcesses, Pidfile, stop_running};
 pub use plan::{CONTROLLER, Plan};
@@ -29,6 +30,7 @@ use supple_cli::exit::Failure;
 use supple_cli::interrupt;
 use supple_ipc::Domain;
 use supple_model::{Description, with_dof};
+use viewer::Viewer;
 
 /// Runs `supple up`.
 ///
@@ -51,7 +53,15 @@ fn sized<const N: usize>(args: &UpArgs, description: &Description) -> Result<(),
     let _pidfile = Pidfile::create(&domain)?;
     let mut system = System::<N>::new(args, description, &domain)?;
     let started = system.start(description);
+    let viewer = match (&started, args.view) {
+        (Ok(()), true) => Viewer::start(args, &domain).map(Some),
+        _ => Ok(None),
+    };
+    if let Err(failure) = &viewer {
+        print_status(&format!("the arm runs without its page: {failure}"));
+    }
     let result = started.and_then(|()| system.watch(&stop));
+    drop(viewer);
     let shut_down = system.end();
     let mut summary = system.finish();
     let cut_short = system.cut_short();

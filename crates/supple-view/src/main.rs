@@ -1,0 +1,5 @@
+//! The live page.
+
+fn main() -> std::process::ExitCode {
+    supple_view::run()
+}
