@@ -151,6 +151,7 @@ fn up_args(args: &CalibrateArgs, on: CalibrationPlant) -> Result<UpArgs, Failure
         log: PathBuf::new(),
         no_log: true,
         prefix: args.prefix.clone(),
+        view: false,
         no_realtime: args.no_realtime,
         json: args.json,
     })
