@@ -141,7 +141,7 @@ fn exploration(stiffness_n_per_m: f64, done: &JobResult) -> ProbingSummary {
     let contact = median_stroke(&done.strokes);
     ProbingSummary {
         stiffness_n_per_m,
-        damping_n_s_per_m: scenario::gains(stiffness_n_per_m).damping_n_s_per_m.x,
+        damping_n_s_per_m: done.damping_n_s_per_m,
         effective_mass_kg: done.effective_mass_kg,
         impact_theory_newton_s: done.effective_mass_kg
             * contact.approach_m_per_s
@@ -271,6 +271,7 @@ fn assemble(
     let summary = Summary {
         version: env!("CARGO_PKG_VERSION"),
         arm: description.name().to_owned(),
+        paths: description.paths(),
         seed: options.seed,
         model: options.model.as_ref().map(|model| {
             let source = model.settings().source.clone();

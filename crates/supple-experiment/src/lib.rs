@@ -32,6 +32,7 @@
 
 #![forbid(unsafe_code)]
 
+mod approach_time;
 mod breakaway;
 pub mod calibrate;
 mod demo;
@@ -61,6 +62,7 @@ mod trace;
 mod tracking;
 mod tracking_prediction;
 
+pub use approach_time::approach_s;
 pub use breakaway::{JointBreakaway, RATE_NM_PER_S, STOP_RAD, breakaway};
 pub use calibrate::{Calibrated, Calibration, ModelAccuracy, calibrate};
 pub use demo::{Demo, ProbingRun, Progress, demo};

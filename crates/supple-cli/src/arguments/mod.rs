@@ -5,6 +5,7 @@ mod effects;
 mod identification;
 mod log;
 mod plant;
+mod urdf;
 
 pub use demo::DemoArgs;
 pub use effects::EffectsArgs;
@@ -14,6 +15,7 @@ pub use identification::{
 };
 pub use log::LogCommand;
 pub use plant::{PlantArgs, PlantCommand};
+pub use urdf::UrdfArgs;
 
 use crate::exit::CODES;
 use clap::{Args, Subcommand};
