@@ -37,8 +37,13 @@ const STOP_MARGIN_RAD: f64 = 0.05;
 const GRAVITY_SHARE: f64 = 0.6;
 /// Share of the joint speed limits that the fastest path may use.
 const SPEED_SHARE: f64 = 0.6;
-/// Least singular value on the paths \[m\], or this share of the arm's best.
-const SINGULAR: (f64, f64) = (0.18, 0.5);
+/// Least singular value on the paths with which the law is not damped ([`supple_core::task`]) \[m\], and the least size for
+/// which it is asked.
+const REGULAR: (f64, f64) = (0.19, 0.3);
+/// Otherwise this share of the arm's best, for paths of at most this size: the law then leaves out a part of the inertia.
+const NEAR_REGULAR: (f64, f64) = (0.75, 0.4);
+/// Otherwise this share, for any size.
+const SINGULAR_SHARE: f64 = 0.5;
 /// Least distance of the tip from the base's vertical axis, as a share of the arm's reach.
 const LEAST_RADIUS: f64 = 0.15;
 /// Fastest of the demo's sinusoids and quadrants, relative to the paper and in m/s.
@@ -229,11 +234,11 @@ fn place<const N: usize>(config: &Config<N>) -> Option<(Vector<N>, Paths)> {
         .map(|(_, tip, _)| tip.xy().norm())
         .fold(0.0, f64::max);
     let best_sigma = all.iter().map(|(.., sigma)| *sigma).fold(0.0, f64::max);
-    let least_sigma = SINGULAR.0.min(SINGULAR.1 * best_sigma);
+    let any_sigma = REGULAR.0.min(SINGULAR_SHARE * best_sigma);
     let mut candidates: Vec<(f64, Vector3<f64>, Vector<N>)> = all
         .into_iter()
         .filter(|(q, tip, sigma)| {
-            *sigma >= least_sigma
+            *sigma >= any_sigma
                 && tip.xy().norm() >= LEAST_RADIUS * reach_m
                 && gravity_share(config, q) <= GRAVITY_SHARE
         })
@@ -241,11 +246,16 @@ fn place<const N: usize>(config: &Config<N>) -> Option<(Vector<N>, Paths)> {
         .collect();
     candidates.sort_by(|a, b| a.0.total_cmp(&b.0));
     candidates.truncate(TRIED);
-    let check = Check {
-        config,
-        least_sigma,
-    };
-    for scale in SCALES {
+    let regular = SCALES.iter().filter(|scale| **scale >= REGULAR.1);
+    let regular = regular.map(|scale| (*scale, REGULAR.0));
+    let near = SCALES.iter().filter(|scale| **scale <= NEAR_REGULAR.1);
+    let near = near.map(|scale| (*scale, NEAR_REGULAR.0 * best_sigma));
+    let any = SCALES.iter().map(|scale| (*scale, any_sigma));
+    for (scale, least_sigma) in regular.chain(near).chain(any) {
+        let check = Check {
+            config,
+            least_sigma,
+        };
         let mut found: Vec<(f64, Paths)> = candidates
             .iter()
             .filter_map(|(_, tip, q)| {
