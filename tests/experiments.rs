@@ -225,7 +225,7 @@ fn without_fading_the_friction_feed_forward_becomes_contact_force() {
 #[test]
 fn the_error_after_a_corner_decays_along_the_edge() {
     let setup = wam4();
-    let (quadrant, duration_s) = scenario::quadrant(scenario::QUADRANT_SPEED_M_PER_S, 0.0);
+    let (quadrant, duration_s) = scenario::quadrant(scenario::QUADRANT_SPEED_M_PER_S);
     let trajectory = Trajectory::Quadrant(quadrant);
     let mut meter = EdgeMeter::new(quadrant);
     run(

@@ -113,7 +113,7 @@ fn the_arc_tracking_error_matches_one_process() {
 
 #[test]
 fn the_quadrant_tracking_error_matches_one_process() {
-    let (quadrant, _) = scenario::quadrant(scenario::QUADRANT_SPEED_M_PER_S, 0.0);
+    let (quadrant, _) = scenario::quadrant(scenario::QUADRANT_SPEED_M_PER_S);
     assert_same_tracking_error("quadrant", Trajectory::Quadrant(quadrant));
 }
 

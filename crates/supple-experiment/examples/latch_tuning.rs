@@ -59,7 +59,7 @@ fn free_plan(setup: &Setup<4>, seed: u64) -> Result<Plan<4>, ExperimentError> {
         1 => scenario::sinusoid(1.0),
         2 => scenario::arc(),
         _ => {
-            let (quadrant, duration_s) = scenario::quadrant(scenario::QUADRANT_SPEED_M_PER_S, 0.0);
+            let (quadrant, duration_s) = scenario::quadrant(scenario::QUADRANT_SPEED_M_PER_S);
             (Trajectory::Quadrant(quadrant), duration_s)
         }
     };

@@ -17,7 +17,7 @@ use crate::summary::{
 };
 use rayon::prelude::*;
 use supple_core::trajectory::Quadrant;
-use supple_model::{Description, with_dof};
+use supple_model::{Description, Paths, with_dof};
 use supple_plant::PlantOptions;
 
 /// Progress of the demo.
@@ -142,7 +142,7 @@ fn exploration(stiffness_n_per_m: f64, done: &JobResult) -> ProbingSummary {
     let contact = median_stroke(&done.strokes);
     ProbingSummary {
         stiffness_n_per_m,
-        damping_n_s_per_m: scenario::gains(stiffness_n_per_m).damping_n_s_per_m.x,
+        damping_n_s_per_m: done.damping_n_s_per_m,
         effective_mass_kg: done.effective_mass_kg,
         impact_theory_newton_s: done.effective_mass_kg
             * contact.approach_m_per_s
@@ -192,6 +192,7 @@ fn slopes(explorations: &[ProbingSummary]) -> Vec<ImpulseSlope> {
 
 /// Distributes the job results.
 struct Results {
+    paths: Paths,
     jobs: Vec<Job>,
     done: Vec<Option<JobResult>>,
 }
@@ -221,7 +222,7 @@ impl Results {
 
     fn quadrant(&mut self, job: Job) -> ((Quadrant, Run), QuadrantSummary) {
         let done = self.take(job);
-        let (quadrant, _) = job.quadrant();
+        let (quadrant, _) = job.quadrant(&self.paths);
         let summary = QuadrantSummary {
             speed_m_per_s: quadrant.speed_m_per_s(),
             tracking: tracking(&done.run),
@@ -239,6 +240,7 @@ fn assemble(
     realistic: Option<Realistic>,
 ) -> Demo {
     let mut results = Results {
+        paths: description.paths(),
         jobs: jobs.to_vec(),
         done: done.into_iter().map(Some).collect(),
     };
@@ -274,6 +276,7 @@ fn assemble(
     let summary = Summary {
         version: env!("CARGO_PKG_VERSION"),
         arm: description.name().to_owned(),
+        paths: description.paths(),
         seed: options.seed,
         model: options.model.as_ref().map(|model| {
             let source = model.settings().source.clone();

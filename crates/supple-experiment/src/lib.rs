@@ -32,6 +32,7 @@
 
 #![forbid(unsafe_code)]
 
+mod approach_time;
 mod breakaway;
 pub mod calibrate;
 mod demo;
@@ -63,6 +64,7 @@ mod tracking;
 mod tracking_prediction;
 mod wiring;
 
+pub use approach_time::approach_s;
 pub use breakaway::{JointBreakaway, RATE_NM_PER_S, STOP_RAD, breakaway};
 pub use calibrate::{Calibrated, Calibration, ModelAccuracy, calibrate};
 pub use demo::{Demo, ProbingRun, Progress, demo};

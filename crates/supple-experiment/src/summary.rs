@@ -7,6 +7,7 @@ use crate::realistic::Realistic;
 use crate::run::FaultEnd;
 use crate::trace::JointTorque;
 use serde::Serialize;
+use supple_model::Paths;
 use supple_plant::PlantOptions;
 
 /// Tracking error of a run in free space.
@@ -116,6 +117,8 @@ pub struct Summary {
     pub version: &'static str,
     /// Name of the arm.
     pub arm: String,
+    /// Place and size of the trajectories; the speeds below are those of the paper's size.
+    pub paths: Paths,
     /// Seed of the demo.
     pub seed: u64,
     /// Source of the controllers' model if it is not the arm's own parameters; that model is unperturbed in

@@ -37,7 +37,7 @@ pub fn predict_tracking_error<const N: usize>(
     draws: u64,
 ) -> Result<Option<TrackingPrediction>, ExperimentError> {
     let plant = PlantConfig::<N>::from_description(identified)?;
-    let (trajectory, duration_s) = scenario::sinusoid(1.0);
+    let (trajectory, duration_s) = identified.paths().sinusoid(1.0);
     let (mut errors, mut faults) = (Vec::new(), 0);
     for seed in 0..draws {
         let (arm, friction) = fit.draw(seed)?;
@@ -46,7 +46,7 @@ pub fn predict_tracking_error<const N: usize>(
         for joint in fit.columns.moving() {
             config.friction[*joint] = friction[*joint];
         }
-        config.law.gains = scenario::gains(scenario::STIFFNESS_N_PER_M);
+        config.law.gains = scenario::gains_like(&config.law.gains, scenario::STIFFNESS_N_PER_M);
         let plan = Plan {
             name: "sinusoid".to_owned(),
             config,

@@ -4,7 +4,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use std::path::PathBuf;
 use supple_bus::Address;
-use supple_cli::arguments::{OfflineCommand, PlantArgs, ViewArgs};
+use supple_cli::arguments::{OfflineCommand, PlantArgs, UrdfArgs, ViewArgs};
 use supple_cli::exit::CODES;
 use supple_cli::range::between;
 use supple_plant::Injection;
@@ -160,12 +160,15 @@ pub struct DrillArgs {
     /// Also write the result table as Markdown.
     #[arg(long, value_name = "FILE")]
     pub markdown: Option<PathBuf>,
-    /// A built-in arm (see `supple arms`), or the path of an arm's TOML or of its folder.
+    /// A built-in arm (see `supple arms`), or the path of an arm's TOML, of its folder, or of a URDF.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
+    /// What a URDF alone does not say.
+    #[command(flatten)]
+    pub urdf: UrdfArgs,
     /// Run without real-time priority and without locked memory.
     #[arg(long)]
     pub no_realtime: bool,
@@ -254,12 +257,15 @@ pub struct UpArgs {
     /// Plant to run.
     #[arg(long, value_enum)]
     pub plant: PlantKind,
-    /// A built-in arm (see `supple arms`), or the path of an arm's TOML or of its folder.
+    /// A built-in arm (see `supple arms`), or the path of an arm's TOML, of its folder, or of a URDF.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
+    /// What a URDF alone does not say.
+    #[command(flatten)]
+    pub urdf: UrdfArgs,
     /// Trajectory: the arm moves to its start and then follows it.
     #[arg(long, value_enum, default_value = "sinusoid")]
     pub track: UpTrajectory,
@@ -371,6 +377,9 @@ pub struct TrackArgs {
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
+    /// What a URDF alone does not say.
+    #[command(flatten)]
+    pub urdf: UrdfArgs,
     /// System to use.
     #[command(flatten)]
     pub system: SystemArgs,

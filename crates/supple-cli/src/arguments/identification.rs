@@ -1,6 +1,6 @@
 //! Arguments of the identification commands.
 
-use super::PlantArgs;
+use super::{PlantArgs, UrdfArgs};
 use crate::exit::CODES;
 use crate::range::between;
 use clap::builder::RangedU64ValueParser;
@@ -83,12 +83,15 @@ pub struct IdentifyArgs {
     /// Logs: supple's MCAP, or CSV with the columns `t`, `q[0]` .., `tau[0]` .. and, if measured, `qd[0]` ..
     #[arg(required = true, value_name = "LOG")]
     pub logs: Vec<PathBuf>,
-    /// A built-in arm, or the path of an arm's TOML or of its folder: kinematics and prior.
+    /// A built-in arm, or the path of an arm's TOML, of its folder, or of a URDF: kinematics and prior.
     #[arg(long, value_name = "NAME|PATH")]
     pub arm: String,
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
+    /// What a URDF alone does not say.
+    #[command(flatten)]
+    pub urdf: UrdfArgs,
     /// Folder for arm.toml, arm.urdf, report.html and summary.json.
     #[arg(long, value_name = "DIR", default_value = "out/identified")]
     pub out: PathBuf,
@@ -125,12 +128,15 @@ pub struct IdentifyArgs {
 /// Arguments of `excite design`.
 #[derive(Clone, Debug, Args)]
 pub struct DesignArgs {
-    /// A built-in arm, or the path of an arm's TOML or of its folder.
+    /// A built-in arm, or the path of an arm's TOML, of its folder, or of a URDF.
     #[arg(long, value_name = "NAME|PATH")]
     pub arm: String,
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
+    /// What a URDF alone does not say.
+    #[command(flatten)]
+    pub urdf: UrdfArgs,
     /// Folder for excitation.csv, excitation.svg and summary.json.
     #[arg(long, value_name = "DIR", default_value = "out/excitation")]
     pub out: PathBuf,
@@ -178,12 +184,15 @@ pub struct DesignArgs {
 /// Arguments of `excite run`.
 #[derive(Clone, Debug, Args)]
 pub struct RunArgs {
-    /// A built-in arm, or the path of an arm's TOML or of its folder: plant and controller.
+    /// A built-in arm, or the path of an arm's TOML, of its folder, or of a URDF: plant and controller.
     #[arg(long, value_name = "NAME|PATH")]
     pub arm: String,
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
+    /// What a URDF alone does not say.
+    #[command(flatten)]
+    pub urdf: UrdfArgs,
     /// Folder that `excite design` wrote, or its summary.json.
     #[arg(long, value_name = "PATH", default_value = "out/excitation")]
     pub design: PathBuf,
@@ -213,12 +222,15 @@ pub struct RunArgs {
 /// Arguments of `breakaway`.
 #[derive(Clone, Debug, Args)]
 pub struct BreakawayArgs {
-    /// A built-in arm, or the path of an arm's TOML or of its folder.
+    /// A built-in arm, or the path of an arm's TOML, of its folder, or of a URDF.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
+    /// What a URDF alone does not say.
+    #[command(flatten)]
+    pub urdf: UrdfArgs,
     /// Joints, counted from 0. Default: all.
     #[arg(long, value_name = "J,J..", value_delimiter = ',')]
     pub joints: Vec<usize>,
@@ -301,12 +313,15 @@ pub struct CalibrateArgs {
     /// Run without real-time priority and without locked memory.
     #[arg(long, requires = "on")]
     pub no_realtime: bool,
-    /// A built-in arm, or the path of an arm's TOML or of its folder: the simulated plant.
+    /// A built-in arm, or the path of an arm's TOML, of its folder, or of a URDF: the simulated plant.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
+    /// What a URDF alone does not say.
+    #[command(flatten)]
+    pub urdf: UrdfArgs,
     /// Folder for the identified arm, the reports and the logs.
     #[arg(long, value_name = "DIR", default_value = "out/calibrate")]
     pub out: PathBuf,
@@ -345,6 +360,9 @@ pub struct LearnArgs {
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
+    /// What a URDF alone does not say.
+    #[command(flatten)]
+    pub urdf: UrdfArgs,
     /// Folder for the refitted model.
     #[arg(long, value_name = "DIR", default_value = "out/learnt")]
     pub out: PathBuf,

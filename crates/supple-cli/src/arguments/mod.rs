@@ -5,6 +5,7 @@ mod effects;
 mod identification;
 mod log;
 mod plant;
+mod urdf;
 mod view;
 
 pub use demo::DemoArgs;
@@ -15,6 +16,7 @@ pub use identification::{
 };
 pub use log::LogCommand;
 pub use plant::{PlantArgs, PlantCommand};
+pub use urdf::UrdfArgs;
 pub use view::{ViewArgs, ViewCommand};
 
 use crate::exit::CODES;

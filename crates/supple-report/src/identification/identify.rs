@@ -30,7 +30,7 @@ pub const FILES: [&str; 4] = ["arm.urdf", "arm.toml", "report.html", "summary.js
 /// # Errors
 /// [`Failure`].
 pub fn run(args: &IdentifyArgs) -> Result<(), Failure> {
-    let arm = arms::find(&args.arm, args.strict)?;
+    let arm = arms::find(&args.urdf.name(&args.arm), args.strict)?;
     with_dof!(arm.dof(), N => run_with_dof::<N>(&arm, args))?
 }
 

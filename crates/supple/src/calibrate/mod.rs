@@ -35,7 +35,7 @@ const PLANT_OPTIONS: &str = "plant.toml";
 /// # Errors
 /// [`Failure`]; what is finished stays finished, see `--resume`.
 pub fn run(args: &CalibrateArgs, on: CalibrationPlant) -> Result<(), Failure> {
-    let arm = arms::find(&args.arm, args.strict)?;
+    let arm = arms::find(&args.urdf.name(&args.arm), args.strict)?;
     let found = with_dof!(arm.dof(), N => sized::<N>(&arm, args, on))??;
     report::print(&found, &args.out, args.json)
 }
@@ -135,6 +135,7 @@ fn up_args(args: &CalibrateArgs, on: CalibrationPlant) -> Result<UpArgs, Failure
             _ => PlantKind::Sim,
         },
         arm: absolute(&args.arm),
+        urdf: args.urdf.clone(),
         strict: args.strict,
         track: UpTrajectory::Sinusoid,
         bus: bus.map_err(Failure::system)?,

@@ -12,7 +12,7 @@ use rustix::process::{Pid, Signal, kill_process};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Instant;
-use supple_cli::arguments::PlantArgs;
+use supple_cli::arguments::{PlantArgs, UrdfArgs};
 use supple_cli::console::print_status;
 use supple_cli::exit::Failure;
 use supple_core::config::Gains;
@@ -57,6 +57,7 @@ pub fn perform<const N: usize>(
     let trace = domain.folder().join(format!("{prefix}.csv"));
     let cap_m = description.tool().map_or(CAP_M, |tool| tool.cap_radius_m);
     let up = UpArgs {
+        urdf: UrdfArgs::default(),
         plant: spec.plant,
         arm: args.arm.clone(),
         strict: args.strict,

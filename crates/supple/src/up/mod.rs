@@ -37,7 +37,12 @@ use viewer::Viewer;
 /// # Errors
 /// [`Failure`]; [`Failure::RunFault`] after the system is shut down and everything is written.
 pub fn run(args: &UpArgs) -> Result<(), Failure> {
-    let description = args.at_rate(arms::find(&args.arm, args.strict)?)?;
+    // The other processes get the arm's name with its tip.
+    let args = &UpArgs {
+        arm: args.urdf.name(&args.arm),
+        ..args.clone()
+    };
+    let description = args.at_rate(arms::find(&args.urdf.name(&args.arm), args.strict)?)?;
     with_dof!(description.dof(), N => sized::<N>(args, &description))?
 }
 
