@@ -2,7 +2,7 @@
 //! [`Description::config`] return the types of the core, in which it is a const parameter.
 
 use crate::error::{Finding, ModelError, Reporter};
-use crate::resolve::{self, JointResolved, Motors, Tool};
+use crate::resolve::{self, BusDescription, JointResolved, Motors, Tool};
 use crate::settings::Settings;
 use crate::shapes::{self, Capsule, Transform};
 use crate::tree::{self, Chain};
@@ -24,6 +24,8 @@ pub struct Description {
     friction: Vec<Friction>,
     motors: Motors,
     tool: Option<Tool>,
+    bus: Option<BusDescription>,
+    stow_rad: Option<Vec<f64>>,
     capsules: Vec<Capsule>,
     toml: String,
     urdf: String,
@@ -157,6 +159,8 @@ impl Description {
         let joints = resolve::joints(in_urdf, in_toml, &settings, &robot, &chain)?;
         let motors = resolve::motors(in_toml, &settings, &joints)?;
         let tool = resolve::tool(in_toml, &settings)?;
+        let bus = resolve::bus(in_toml, &settings, &joints)?;
+        let stow_rad = resolve::stow(in_toml, &settings, &joints)?;
         Ok(Self {
             names: joints.iter().map(|joint| joint.name.clone()).collect(),
             home_rad: joints.iter().map(|joint| joint.home_rad).collect(),
@@ -169,6 +173,8 @@ impl Description {
             robot,
             motors,
             tool,
+            bus,
+            stow_rad,
             toml,
             urdf,
             warnings: checked.warnings,
@@ -252,6 +258,16 @@ impl Description {
     /// Pose that the arm starts from, one angle per joint \[rad\].
     pub fn home_rad(&self) -> &[f64] {
         &self.home_rad
+    }
+
+    /// Pose in which the arm stays without torque, one angle per joint \[rad\]; `None` if the TOML gives none.
+    pub fn stow_rad(&self) -> Option<&[f64]> {
+        self.stow_rad.as_deref()
+    }
+
+    /// Drives as their bus addresses them; `None` if the TOML has no `[bus]`.
+    pub fn bus(&self) -> Option<&BusDescription> {
+        self.bus.as_ref()
     }
 
     /// Friction, one per joint.

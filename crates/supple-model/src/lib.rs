@@ -10,6 +10,7 @@
 
 mod assets;
 mod bounds;
+pub mod bus_settings;
 mod const_generic;
 mod description;
 mod error;
@@ -25,10 +26,11 @@ mod workspace;
 mod xml;
 
 pub use assets::assets;
+pub use bus_settings::{BusFormat, BusKind};
 pub use const_generic::Parts;
 pub use description::Description;
 pub use error::{Finding, ModelError};
 pub use identified::IdentifiedModel;
-pub use resolve::{Motors, Tool};
+pub use resolve::{BusDescription, BusMotor, Motors, Tool};
 pub use settings::{LearnedSettings, Settings, schema_json};
 pub use shapes::{Capsule, Transform};

@@ -3,6 +3,7 @@
 //! Key names contain units; unknown keys are rejected; optional keys document their defaults. The JSON
 //! schema of these types is `assets/arm.schema.json`.
 
+use crate::bus_settings::BusSettings;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -38,6 +39,9 @@ pub struct Settings {
     /// Pose that the arm starts from, one angle per moving joint (rad). Default: the middle of each
     /// joint's range, held joints at the angle they are held at.
     pub home_rad: Option<Vec<f64>>,
+    /// Pose in which the arm stays without torque, one angle per moving joint (rad): where a shutdown leaves an arm
+    /// without brakes. Default: none.
+    pub stow_rad: Option<Vec<f64>>,
     /// Movable joints of the URDF that are fixed, each at an angle (rad); their child links become part of
     /// the parent link. Movable joints outside the chain to the tip must be listed here.
     #[serde(default)]
@@ -47,6 +51,8 @@ pub struct Settings {
     pub joints: Vec<JointSettings>,
     /// Motors and transmission. Default: one motor per joint, ratio 1, no quantisation.
     pub motors: Option<MotorSettings>,
+    /// Motors as their bus addresses them. Default: none; the WAM's motors need no entry.
+    pub bus: Option<BusSettings>,
     /// Limits that apply to the whole arm.
     #[serde(default)]
     pub limits: LimitSettings,
