@@ -4,12 +4,11 @@
 use crate::rig::{MS, Rig, TestBus};
 use supple_bus::virtual_time::Peer;
 use supple_bus::{FaultKind, FaultRule, Traffic};
-use supple_can::guard::{Stage, Torque};
-use supple_can::{Drives, LossReason};
 use supple_can_frame::CanId;
 use supple_core::Vector;
 use supple_core::controller::{Fault, Mode, Request};
 use supple_core::dynamics::gravity;
+use supple_drive::{Drives, LossReason, Stage, Torque};
 use supple_emu::{ArmEvent, ButtonPress, Cause};
 use supple_puck::safety::SafetyMode;
 use supple_puck::status::MotorMode;
@@ -32,7 +31,7 @@ fn is_request_to_module(id: CanId) -> bool {
 }
 
 fn fault_injector(rig: &mut Rig<4>) -> &mut TestBus<4> {
-    rig.cycle.bus_mut()
+    rig.cycle.drive_mut().bus_mut()
 }
 
 /// Time from `begin_ns` until the motors became idle \[ns\].
@@ -157,7 +156,7 @@ fn a_lost_encoder_ends_torque_at_once() {
     rig.step();
     let action = rig.step();
     assert_eq!(action.torque, Torque::None);
-    assert!(action.lower_module);
+    assert!(action.lower);
     rig.run(30);
     assert_idle_in_time(&rig, now_ns);
     assert_eq!(

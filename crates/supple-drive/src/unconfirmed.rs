@@ -2,8 +2,8 @@
 
 use supple_can_frame::CanFrame;
 
-/// Maximum number of frames in a cycle: request, two torque frames, module mode, motor mode, a poll; rounded up.
-const CAPACITY: usize = 8;
+/// Maximum number of frames in a cycle: a torque and a setting for each of seven motors, rounded up.
+const CAPACITY: usize = 16;
 
 /// Unconfirmed frames of one cycle.
 #[derive(Clone, Copy, Debug, Default)]

@@ -1,8 +1,8 @@
 //! Motor pucks: identification, comparison with the description, and settings.
 
 use super::common_property_id;
-use crate::error::CanError;
-use crate::host::Host;
+use crate::drives::barrett::error::CanError;
+use crate::drives::barrett::host::Host;
 use supple_bus::Bus;
 use supple_model::Description;
 use supple_puck::status::{Role, RoleType};

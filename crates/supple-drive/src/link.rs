@@ -1,6 +1,6 @@
-//! Interface between the bus cycle and the controller, independent of the transport.
+//! Interface between the plant loop and the controller, independent of the transport.
 
-use crate::error::CanError;
+use crate::error::LoopError;
 use supple_core::Vector;
 use supple_core::controller::Mode;
 use supple_core::drive_guard::DriveCommand;
@@ -17,7 +17,7 @@ pub enum Drives {
     Active,
 }
 
-/// Counters and timing of the bus, since the start unless stated otherwise.
+/// Counters and timing of the loop, since the start unless stated otherwise.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Counters {
     /// Cycles started.
@@ -32,7 +32,7 @@ pub struct Counters {
     pub skipped: u64,
     /// Frames that the interface did not confirm.
     pub tx_lost: u64,
-    /// Missing position replies.
+    /// Missing replies of motors.
     pub replies_lost: u64,
     /// Number of gaps in the received frames because they were not read in time.
     pub overruns: u64,
@@ -42,7 +42,7 @@ pub struct Counters {
     pub round_trip_ns: u64,
     /// Fraction of the previous cycle in which the bus was busy, 0 to 1.
     pub bus_load: f64,
-    /// Total time for which bus time was paused \[ns\], see [`supple_bus::Bus::clock_stall_ns`].
+    /// Total time for which bus time was paused \[ns\], see [`crate::Drive::clock_stall_ns`].
     pub clock_stall_ns: u64,
 }
 
@@ -51,7 +51,7 @@ pub struct Counters {
 pub struct ArmReport<const N: usize> {
     /// Cycle number, incremented every period.
     pub cycle: u64,
-    /// Time of the position request, by the machine's monotonic clock or in virtual time \[ns\].
+    /// Time of the request for the angles, by the machine's monotonic clock or in virtual time \[ns\].
     pub stamp_ns: u64,
     /// Joint angles \[rad\]; `None` if a motor that moves the joint did not reply.
     pub position_rad: [Option<f64>; N],
@@ -84,6 +84,8 @@ pub struct Command<const N: usize> {
     pub mode: Option<Mode>,
     /// The controller is in a fault.
     pub fault: bool,
+    /// Numbers of mode and fault as in the message, for a trace.
+    pub codes: [u8; 2],
 }
 
 impl<const N: usize> Command<N> {
@@ -112,18 +114,18 @@ pub trait Link<const N: usize> {
     ///
     /// # Errors
     /// If the transport fails. A missing controller is not an error.
-    fn announce(&mut self) -> Result<(), CanError>;
+    fn announce(&mut self) -> Result<(), LoopError>;
 
     /// Sends the report to the controller.
     ///
     /// # Errors
     /// If the transport fails. A missing controller is not an error.
-    fn publish(&mut self, report: &ArmReport<N>) -> Result<(), CanError>;
+    fn publish(&mut self, report: &ArmReport<N>) -> Result<(), LoopError>;
 
     /// Waits for the answer to a cycle, at most for `wait_ns`; in virtual time bus time does not advance
     /// meanwhile.
     ///
     /// # Errors
     /// If the transport fails. A missing controller is not an error.
-    fn answer(&mut self, cycle: u64, wait_ns: u64) -> Result<Answer<N>, CanError>;
+    fn answer(&mut self, cycle: u64, wait_ns: u64) -> Result<Answer<N>, LoopError>;
 }

@@ -1,6 +1,6 @@
 //! Link to the controller through shared memory.
 
-use crate::error::CanError;
+use crate::error::LoopError;
 use crate::link::{Answer, ArmReport, Command, Drives, Link};
 use core::time::Duration;
 use supple_ipc::message::{self, ArmState, PlantReport, TorqueCommand};
@@ -50,6 +50,7 @@ impl SharedMemoryLink {
             wants_torque: command.wants_torque(),
             mode: command.mode(),
             fault: command.fault != 0,
+            codes: [command.mode, command.fault],
         })
     }
 
@@ -59,21 +60,21 @@ impl SharedMemoryLink {
     }
 }
 
-impl From<IpcError> for CanError {
-    fn from(error: IpcError) -> CanError {
-        CanError::Link(Box::new(error))
+impl From<IpcError> for LoopError {
+    fn from(error: IpcError) -> LoopError {
+        LoopError::Link(Box::new(error))
     }
 }
 
 impl<const N: usize> Link<N> for SharedMemoryLink {
-    fn announce(&mut self) -> Result<(), CanError> {
+    fn announce(&mut self) -> Result<(), LoopError> {
         if !self.virtual_time {
             self.link.announce()?;
         }
         Ok(())
     }
 
-    fn publish(&mut self, report: &ArmReport<N>) -> Result<(), CanError> {
+    fn publish(&mut self, report: &ArmReport<N>) -> Result<(), LoopError> {
         let counters = &report.counters;
         let state = ArmState::new(
             report.cycle,
@@ -106,7 +107,7 @@ impl<const N: usize> Link<N> for SharedMemoryLink {
         Ok(())
     }
 
-    fn answer(&mut self, cycle: u64, wait_ns: u64) -> Result<Answer<N>, CanError> {
+    fn answer(&mut self, cycle: u64, wait_ns: u64) -> Result<Answer<N>, LoopError> {
         let mut late = 0;
         let polls = match (self.virtual_time, self.lost) {
             (false, _) | (true, true) => 1,

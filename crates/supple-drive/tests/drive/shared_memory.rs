@@ -1,8 +1,8 @@
 //! Link to the controller: commands for another arm are discarded without an error.
 
 use core::time::Duration;
-use supple_can::{ArmReport, Counters, Drives, Link, SharedMemoryLink};
 use supple_core::{Controller, State, step};
+use supple_drive::{ArmReport, Counters, Drives, Link, SharedMemoryLink};
 use supple_ipc::message::TorqueCommand;
 use supple_ipc::{ControllerLink, Domain, PlantLink};
 use supple_model::Description;

@@ -1,8 +1,8 @@
 //! The safety module during start-up: identification, mode and limits. The host never activates it.
 
 use super::{common_property_id, motors};
-use crate::error::CanError;
-use crate::host::Host;
+use crate::drives::barrett::error::CanError;
+use crate::drives::barrett::host::Host;
 use supple_bus::Bus;
 use supple_puck::safety::{SafetyLimits, SafetyMode};
 use supple_puck::status::{Role, RoleType};

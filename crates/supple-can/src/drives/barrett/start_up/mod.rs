@@ -13,9 +13,9 @@
 mod module;
 mod motors;
 
-use crate::error::CanError;
-use crate::host::{Host, MS};
-use crate::transmission::Transmission;
+use crate::drives::barrett::error::CanError;
+use crate::drives::barrett::host::{Host, MS};
+use crate::drives::barrett::transmission::Transmission;
 pub use motors::{ARM_GROUPS, MotorPuck};
 use supple_bus::Bus;
 use supple_core::Vector;

@@ -1,7 +1,8 @@
 //! Errors of start-up and operation.
 
-use crate::bus_time::Overload;
+use super::bus_time::Overload;
 use supple_bus::{BusError, BusFault};
+use supple_drive::LoopError;
 use supple_model::ModelError;
 use supple_puck::Property;
 use supple_puck::position::{CountsError, PositionScaleError};
@@ -18,6 +19,12 @@ pub enum CanError {
     /// A fault on the bus.
     #[error("the bus failed: {0}")]
     BusFault(BusFault),
+    /// The plant loop cannot continue.
+    #[error(transparent)]
+    Loop(#[from] LoopError),
+    /// The rate exceeds the bandwidth of the drives' bus.
+    #[error(transparent)]
+    Rate(#[from] supple_drive::Overload),
     /// The rate exceeds the bus bandwidth.
     #[error(transparent)]
     Overload(#[from] Overload),
@@ -226,10 +233,20 @@ impl CanError {
             | CanError::Joints { .. }
             | CanError::MissingKey { .. }
             | CanError::Overload(_)
+            | CanError::Rate(_)
             | CanError::Home(_)
             | CanError::Limits(_) => 3,
-            CanError::Bus(_) | CanError::BusFault(_) | CanError::Link(_) => 10,
+            CanError::Bus(_)
+            | CanError::BusFault(_)
+            | CanError::Link(_)
+            | CanError::Loop(LoopError::Bus(_) | LoopError::Link(_)) => 10,
             _ => 4,
         }
+    }
+}
+
+impl From<supple_ipc::IpcError> for CanError {
+    fn from(error: supple_ipc::IpcError) -> CanError {
+        CanError::Link(Box::new(error))
     }
 }

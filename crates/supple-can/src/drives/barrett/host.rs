@@ -1,6 +1,6 @@
 //! Blocking property access during start-up, one property at a time.
 
-use crate::error::CanError;
+use crate::drives::barrett::error::CanError;
 use supple_bus::{Bus, BusFault, Event};
 use supple_can_frame::CanFrame;
 use supple_puck::property::{get, set};

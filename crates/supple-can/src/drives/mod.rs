@@ -1,0 +1,3 @@
+//! Makes of drives on a bus: a folder each. [`registry`](crate::registry) names them.
+
+pub mod barrett;
