@@ -12,6 +12,7 @@ use supple_bus::virtual_time::{LockstepResponder, Peer};
 use supple_bus::{
     Address, Bus, BusError, BusFault, DatagramBus, Event, OwnerFolder, PacedResponder, SocketCan,
 };
+use supple_can_frame::CanFrame;
 use supple_model::{Description, with_dof};
 use supple_plant::{PlantConfig, PlantOptions, Sample, Scene, TraceFile};
 use supple_puck::status::MotorMode;
@@ -23,7 +24,7 @@ const STALL_THRESHOLD_NS: u64 = 50_000_000;
 /// Maximum wait between polls of the pendant's socket \[ns\].
 const POLL_INTERVAL_NS: u64 = 1_000_000;
 /// Maximum wait in virtual time, which pauses while the host is silent \[ns\].
-const IDLE_NS: u64 = 10_000_000;
+pub(crate) const IDLE_NS: u64 = 10_000_000;
 
 /// Maximum time until the motors are idle at shutdown \[ns\].
 const SHUTDOWN_TIMEOUT_NS: u64 = 300_000_000;
@@ -59,7 +60,10 @@ fn start(options: &Options) -> Result<(), EmulatorError> {
     {
         eprintln!("supple-emu: warning: {warning}");
     }
-    with_dof!(description.dof(), N => run::<N>(&description, options, &stop))?
+    with_dof!(description.dof(), N => match description.bus() {
+        Some(_) => crate::damiao::run::<N>(&description, options, &stop),
+        None => run::<N>(&description, options, &stop),
+    })?
 }
 
 /// Runs until a shutdown is requested.
@@ -149,13 +153,39 @@ impl ArmBus for SocketCan {
     }
 }
 
+/// An emulated arm that runs in real time.
+pub trait EmulatedArm: Peer {
+    /// Time of the next event that does not depend on the host \[ns\].
+    fn next_ns(&self) -> u64;
+
+    /// Pauses the arm for `gap_ns`.
+    fn shift_clock(&mut self, gap_ns: u64);
+
+    /// Whether a received frame is one of the host.
+    fn is_from_host(&self, frame: &CanFrame) -> bool;
+}
+
+impl<const N: usize> EmulatedArm for Emulator<N> {
+    fn next_ns(&self) -> u64 {
+        Emulator::next_ns(self)
+    }
+
+    fn shift_clock(&mut self, gap_ns: u64) {
+        Emulator::shift_clock(self, gap_ns);
+    }
+
+    fn is_from_host(&self, frame: &CanFrame) -> bool {
+        MessageId::of(frame).is_none_or(|id| id.from() == NodeId::HOST)
+    }
+}
+
 /// Advances the arm to the bus time and sends its frames. If this process stalled, the arm's clock pauses for
 /// that time instead.
 ///
 /// # Errors
 /// If the bus fails.
-pub fn advance_to_bus_time<const N: usize>(
-    emulator: &mut Emulator<N>,
+pub fn advance_to_bus_time(
+    emulator: &mut impl EmulatedArm,
     bus: &mut impl ArmBus,
 ) -> Result<(), BusError> {
     let now_ns = bus.now_ns();
@@ -181,13 +211,13 @@ pub fn advance_to_bus_time<const N: usize>(
 ///
 /// # Errors
 /// If the bus fails.
-pub fn receive_host_frame<const N: usize>(
-    emulator: &mut Emulator<N>,
+pub fn receive_host_frame(
+    emulator: &mut impl EmulatedArm,
     bus: &mut impl ArmBus,
 ) -> Result<(), BusError> {
     let until_ns = emulator.next_ns().min(bus.now_ns() + POLL_INTERVAL_NS);
     if let Some(Event::Frame(frame)) = bus.receive_until(until_ns)?
-        && MessageId::of(&frame).is_none_or(|id| id.from() == NodeId::HOST)
+        && emulator.is_from_host(&frame)
     {
         advance_to_bus_time(emulator, bus)?;
         emulator.host_sends(&frame);
