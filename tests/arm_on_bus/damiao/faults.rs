@@ -176,3 +176,66 @@ fn single_lost_replies_are_bridged() {
     assert!(missing > 0);
     assert_eq!(rig.plant.counters().replies_lost, missing as u64);
 }
+
+/// Every row of the table while the arm moves and while it tracks: the same names in the same time, no joint faster than
+/// it was allowed to be, and disabled motors at the end.
+#[test]
+fn the_fault_table_holds_while_moving_and_tracking() {
+    let motor = |fault| LossReason::Motor(6, fault);
+    let rows = [
+        ("error:motor=7,code=8", motor(MotorFault::OverVoltage)),
+        ("error:motor=7,code=9", motor(MotorFault::UnderVoltage)),
+        ("error:motor=7,code=A", motor(MotorFault::OverCurrent)),
+        ("error:motor=7,code=B", motor(MotorFault::HotDriver)),
+        ("error:motor=7,code=C", motor(MotorFault::HotWinding)),
+        ("error:motor=7,code=D", motor(MotorFault::CommunicationLost)),
+        ("error:motor=7,code=E", motor(MotorFault::Overload)),
+        ("silent:motor=7", LossReason::Encoder(6)),
+        ("reappears:motor=7", motor(MotorFault::Disabled)),
+        ("hot:motor=7,celsius=110", motor(MotorFault::HotWinding)),
+        ("wedged", LossReason::Transmit),
+        ("bus-off", LossReason::BusOff),
+    ];
+    for track in [false, true] {
+        for (kind, expected) in rows {
+            let separator = if kind.contains(':') { ',' } else { ':' };
+            let spec = format!("{kind}{separator}at-s=1");
+            let mut rig = Rig::<7>::new("openarm", &[&spec]);
+            rig.without_motor = Some(6);
+            rig.activate();
+            rig.begin(track);
+            rig.forget();
+            for _ in 0..2000 {
+                if rig.plant.guard().stage() != Stage::Active {
+                    break;
+                }
+                rig.step();
+            }
+            let (reason, _) = rig.plant.guard().last_loss().expect("a loss");
+            assert_eq!(reason, expected, "{spec}, tracking: {track}");
+            let within = if expected == LossReason::Transmit {
+                12
+            } else {
+                2
+            };
+            let delay = delay_cycles(&rig);
+            assert!(delay <= within, "{spec}, tracking: {track}: {delay} cycles");
+            let powered = !matches!(expected, LossReason::Transmit | LossReason::BusOff);
+            rig.run_s(if powered { 12.0 } else { 0.03 });
+            let enabled = rig.arm().motors()[..6]
+                .iter()
+                .any(|motor| motor.status() == Status::Enabled);
+            assert!(!enabled, "{spec}, tracking: {track}");
+            if powered {
+                // The limit of the arm's joints is 2 rad/s.
+                let speed = rig.max_speed_rad_per_s;
+                assert!(
+                    speed < 1.5,
+                    "{spec}, tracking: {track}: {speed} {:?}",
+                    rig.fastest
+                );
+                assert_eq!(rig.plant.guard().stage(), Stage::Resting, "{spec}");
+            }
+        }
+    }
+}

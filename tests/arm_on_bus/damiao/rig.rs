@@ -4,9 +4,11 @@ use crate::link::InProcessLink;
 use supple_bus::FaultInjector;
 use supple_bus::virtual_time::DirectBus;
 use supple_can::drives::damiao::{DamiaoError, DamiaoLoop, start_up, with_drive};
-use supple_core::controller::Request;
+use supple_core::controller::{Mode, Request};
 use supple_core::dynamics::tip_pose;
-use supple_core::{Controller, Vector};
+use supple_core::nalgebra::Vector3;
+use supple_core::trajectory::Sinusoid;
+use supple_core::{Controller, Trajectory, Vector};
 use supple_damiao::Status;
 use supple_drive::{CycleConfig, Drives, Stage};
 use supple_emu::damiao::{DamiaoArm, DamiaoConfig, Misbehaviour};
@@ -142,6 +144,30 @@ impl<const N: usize> Rig<N> {
         assert_eq!(self.plant.guard().stage(), Stage::Active);
         assert!(self.all(Status::Enabled));
         self.forget();
+    }
+
+    /// A slow move of the elbow is under way for half a second, or with `track` a small sinusoid about the pose.
+    pub fn begin(&mut self, track: bool) {
+        let config = self.description.config::<N>().unwrap();
+        let home_rad = self.description.home::<N>().unwrap();
+        if track {
+            let sinusoid = Sinusoid {
+                centre_m: tip_pose(&config.arm, &home_rad).translation,
+                amplitude_m: Vector3::new(0.03, 0.0, 0.0),
+                ..Sinusoid::paper(1.0)
+            };
+            self.request(Request::Track(Trajectory::Sinusoid(sinusoid)));
+        } else {
+            let mut target_rad = home_rad;
+            target_rad[3] -= 0.3;
+            self.request(Request::Move {
+                target_rad,
+                duration_s: 3.0,
+            });
+        }
+        self.run_s(0.5);
+        let mode = self.plant.link_mut().output.unwrap().mode;
+        assert_eq!(mode, if track { Mode::Track } else { Mode::Move });
     }
 
     pub fn forget(&mut self) {
