@@ -8,6 +8,7 @@ mod table;
 mod drill;
 mod ends;
 mod learning;
+mod motors;
 mod operator;
 mod regressions;
 mod running;

@@ -8,6 +8,7 @@
 mod cli;
 mod doctor;
 mod drill;
+mod motors;
 mod operate;
 mod up;
 
@@ -40,6 +41,7 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
         ) => Err(exec_report()),
         Command::Up(args) => up::run(args),
         Command::Drill(args) => drill::run(args),
+        Command::Motors(args) => motors::run(args),
         Command::Status(system) => operate::status(system),
         Command::Mode(args) => operate::mode(args),
         Command::Gains(args) => operate::gains(args),
