@@ -9,6 +9,7 @@ mod calibration;
 mod drill;
 mod ends;
 mod learning;
+mod motors;
 mod operator;
 mod regressions;
 mod running;

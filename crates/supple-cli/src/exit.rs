@@ -12,7 +12,7 @@
 //! | 7 | a replay differs from the logged outputs |
 //! | 8 | the machine does not meet the real-time requirements |
 //! | 9 | no model can be identified from the logs |
-//! | 10 | no system is running, or one of its processes cannot start or has exited |
+//! | 10 | no system is running, one of its processes cannot start or has exited, or a motor does not fit |
 //! | 11 | the controller refused a request |
 //! | 12 | a test case of `supple drill` failed |
 //! | 130 | interrupted |
@@ -38,7 +38,7 @@ pub const CODES: &str = "Exit codes:
   7    a replay differs from the logged outputs
   8    the machine does not meet the real-time requirements
   9    no model can be identified from the logs
-  10   no system is running, or one of its processes cannot start or has exited
+  10   no system is running, one of its processes cannot start or has exited, or a motor does not fit
   11   the controller refused a request
   12   a test case of `supple drill` failed
   130  interrupted";
@@ -271,6 +271,12 @@ pub enum Failure {
         /// All steps.
         steps: u64,
     },
+    /// Motors that do not answer, do not fit the arm's description, or refuse a register.
+    #[error("{problem}")]
+    Motors {
+        /// What is wrong, with its remedy.
+        problem: String,
+    },
     /// The machine does not meet the real-time requirements.
     #[error("this machine is not ready for real time: {failed}; see the remedies above")]
     NotReady {
@@ -402,6 +408,7 @@ impl Failure {
             Failure::Drill { .. } | Failure::DidNotReachTracking => 12,
             Failure::System(_)
             | Failure::Pendant { .. }
+            | Failure::Motors { .. }
             | Failure::AlreadyRunning { .. }
             | Failure::MissingProgram { .. }
             | Failure::ProcessEnded { .. }
@@ -627,6 +634,7 @@ mod tests {
                 },
                 system,
             ),
+            (Failure::Motors { problem: text() }, system),
             (Failure::Refused { reason: text() }, "refused a request"),
             (Failure::DidNotReachTracking, "supple drill"),
             (Failure::Drill { rows: text() }, "supple drill"),

@@ -20,6 +20,8 @@ pub struct BudgetLine {
     pub count: u32,
     /// Longest time of each \[ns\].
     pub each_ns: u64,
+    /// Whether the bus is busy meanwhile.
+    pub on_bus: bool,
 }
 
 /// Time of a period, line by line.
@@ -56,15 +58,27 @@ impl Budget {
             what,
             count: count as u32,
             each_ns,
+            on_bus: true,
         })
     }
 
-    /// Adds a time \[ns\].
+    /// Adds a time in which the bus is busy \[ns\].
+    pub fn bus_time(self, what: &'static str, each_ns: u64) -> Budget {
+        self.line(BudgetLine {
+            what,
+            count: 1,
+            each_ns,
+            on_bus: true,
+        })
+    }
+
+    /// Adds a time in which the bus is free \[ns\].
     pub fn time(self, what: &'static str, each_ns: u64) -> Budget {
         self.line(BudgetLine {
             what,
             count: 1,
             each_ns,
+            on_bus: false,
         })
     }
 
@@ -99,17 +113,27 @@ impl Budget {
             .sum()
     }
 
+    /// Time of a period in which the bus is busy \[ns\].
+    pub fn bus_ns(&self) -> u64 {
+        self.lines()
+            .filter(|line| line.on_bus)
+            .map(|line| u64::from(line.count) * line.each_ns)
+            .sum()
+    }
+
     /// Largest possible rate \[Hz\], rounded down.
     pub fn max_rate_hz(&self) -> u64 {
         NS_PER_S / self.min_period_ns().max(1)
     }
 
-    /// Largest rate of the usual ones \[Hz\] that leaves [`SPARE_SHARE`] of its period free; `None` if there is none.
+    /// Largest rate of the usual ones \[Hz\] at which the bus is free for [`SPARE_SHARE`] of the period; `None` if there
+    /// is none.
     pub fn default_rate_hz(&self) -> Option<u32> {
         const USUAL_HZ: [u32; 8] = [1000, 800, 500, 400, 250, 200, 125, 100];
         let fits = |rate_hz: &u32| {
             let period_ns = NS_PER_S as f64 / f64::from(*rate_hz);
-            self.min_period_ns() as f64 <= (1.0 - SPARE_SHARE) * period_ns
+            let spare = self.bus_ns() as f64 <= (1.0 - SPARE_SHARE) * period_ns;
+            spare && self.min_period_ns() as f64 <= period_ns
         };
         USUAL_HZ.into_iter().find(fits)
     }
@@ -168,13 +192,14 @@ impl fmt::Display for Table {
         }
         let min_ns = budget.min_period_ns();
         writeln!(f, "{:<67}{:>5} us", "together", us(min_ns))?;
-        let load = 100.0 * min_ns as f64 / self.period_ns.max(1) as f64;
-        writeln!(f, "{:<67}{load:>5.0} %", "of the period")?;
+        let load = 100.0 * budget.bus_ns() as f64 / self.period_ns.max(1) as f64;
+        let busy = "the bus is busy for at most";
+        writeln!(f, "{busy:<67}{load:>5.1} %")?;
         write!(f, "The maximum rate is {} Hz", budget.max_rate_hz())?;
         match budget.default_rate_hz() {
             Some(rate_hz) => write!(
                 f,
-                "; {rate_hz} Hz leaves {:.0} % of the period free.",
+                "; at {rate_hz} Hz the bus is free for at least {:.0} % of the time.",
                 100.0 * SPARE_SHARE
             ),
             None => f.write_str("."),

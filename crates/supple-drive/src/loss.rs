@@ -28,6 +28,12 @@ pub enum MotorFault {
     CommunicationLost,
     /// It is overloaded.
     Overload,
+    /// Its position jumped farther than it can turn.
+    PositionJump,
+    /// A setting has another value than at the start.
+    RegisterChanged,
+    /// Two motors answer with its id.
+    TwoMotors,
     /// A code that its protocol does not define.
     Unknown(u8),
 }
@@ -43,6 +49,9 @@ impl fmt::Display for MotorFault {
             MotorFault::HotWinding => "reports that its winding is too hot; let it cool down",
             MotorFault::CommunicationLost => "reports that commands were missing",
             MotorFault::Overload => "reports overload",
+            MotorFault::PositionJump => "reports a position that jumped farther than it can turn",
+            MotorFault::RegisterChanged => "has another setting than at the start",
+            MotorFault::TwoMotors => "has an id that two motors answer to",
             MotorFault::Unknown(code) => return write!(f, "reports unknown code {code:#x}"),
         })
     }

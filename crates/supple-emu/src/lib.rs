@@ -28,11 +28,13 @@ mod options;
 mod pendant;
 mod pendant_clients;
 mod program;
+mod real_time;
 mod store;
 
 pub use config::{EmulatorConfig, PuckConfig, SafetyConfig};
 pub use emulator::{ArmEvent, Emulator};
 pub use error::EmulatorError;
 pub use pendant::{SOCKET as PENDANT_SOCKET, answer as answer_pendant};
-pub use program::{ArmBus, EmulatedArm, advance_to_bus_time, main, receive_host_frame};
+pub use program::main;
+pub use real_time::{ArmBus, EmulatedArm, advance_to_bus_time, receive_host_frame};
 pub use safety::{ButtonPress, Cause};

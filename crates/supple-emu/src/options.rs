@@ -51,7 +51,7 @@ pub struct Options {
     /// first commands torque (`activate@held+0.2`). May be repeated.
     #[arg(long, value_name = "BUTTON@TIME", value_parser = press)]
     pub press: Vec<ScheduledPress>,
-    /// Effects of a real arm, as TOML; `supple plant list` has all options.
+    /// Effects of a real arm, as TOML, or a built-in set by name; `supple plant list` has all options.
     #[arg(long, value_name = "FILE", conflicts_with = "realistic")]
     pub plant_options: Option<PathBuf>,
     /// All effects of a real arm, each of modest size: `supple plant show realistic`.
@@ -65,6 +65,9 @@ pub struct Options {
     /// see --help. May be repeated.
     #[arg(long, value_name = "SPEC", long_help = crate::damiao::HELP)]
     pub misbehave: Vec<Misbehaviour>,
+    /// Obeys frames that write a motor's flash (arms with `[bus]`); without it they end the emulation.
+    #[arg(long)]
+    pub allow_flash: bool,
     /// Where the arm starts (arms with `[bus]`): in its home pose, supported until all motors are enabled, or in the pose
     /// in which it stays without torque.
     #[arg(long, value_name = "POSE", value_enum, default_value_t = StartPose::Home)]

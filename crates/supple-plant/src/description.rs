@@ -48,6 +48,8 @@ impl<const N: usize> PlantConfig<N> {
                 counts_per_motor_revolution: Vector::repeat(counts),
                 motor_torque_quantum_nm: quantum
                     .map_or_else(Vector::zeros, Vector::from_column_slice),
+                // The drive of these motors does.
+                carries_remainder: description.bus().is_some(),
                 braking_nm_s_per_rad: braking.map_or_else(
                     || rotors_kg_m2.diagonal() / SHORTED_TIME_CONSTANT_S,
                     Vector::from_column_slice,

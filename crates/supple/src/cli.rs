@@ -62,6 +62,10 @@ pub enum Command {
         #[arg(long, value_name = "NAME")]
         prefix: Option<String>,
     },
+    /// List the motors of an arm on their bus, compare them with the arm's file and, asked explicitly, set registers; for
+    /// arms of Damiao motors.
+    #[command(after_help = CODES)]
+    Motors(MotorsArgs),
     /// Test simulated arms against process failures, faults, collisions and invalid requests, and compare each result
     /// with the expected one.
     #[command(after_help = CODES)]
@@ -139,6 +143,41 @@ pub enum PlantKind {
     Emu,
     /// An arm on a CAN bus; its operator activates it at its pendant.
     Can,
+}
+
+/// Arguments of `motors`.
+#[derive(Clone, Debug, Args)]
+pub struct MotorsArgs {
+    /// A built-in arm with `[bus]`, or the path of an arm's TOML or of its folder.
+    #[arg(long, value_name = "NAME|PATH", default_value = "openarm")]
+    pub arm: String,
+    /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
+    #[arg(long)]
+    pub strict: bool,
+    /// can:NAME or unix:FOLDER; default: the bus of an emulated arm with the prefix.
+    #[arg(long, value_name = "BUS")]
+    pub bus: Option<Address>,
+    /// Prefix of an emulated arm. Default: SUPPLE_PREFIX or `supple`.
+    #[arg(long, value_name = "NAME")]
+    pub prefix: Option<String>,
+    /// Only the motor with this id.
+    #[arg(long, value_name = "ID")]
+    pub motor: Option<u16>,
+    /// Read all registers.
+    #[arg(long)]
+    pub registers: bool,
+    /// Set a register by name or number, as in TIMEOUT=400; lost when the motor's supply is switched off. May be repeated.
+    #[arg(long, value_name = "NAME=VALUE", requires = "motor")]
+    pub set: Vec<String>,
+    /// Clear the latched error.
+    #[arg(long, requires = "motor")]
+    pub clear: bool,
+    /// Store all registers of the motor in its flash, which endures some 10000 writes.
+    #[arg(long, requires = "motor")]
+    pub store: bool,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Arguments of `drill`.
@@ -272,6 +311,9 @@ pub struct UpArgs {
     /// The arm's bus, can:NAME or unix:FOLDER. Default: can:can0 for `can`, private sockets for `emu`.
     #[arg(long, value_name = "BUS")]
     pub bus: Option<Address>,
+    /// Print the bus time of a cycle of this arm at the requested rate and end; the exit code tells whether it fits.
+    #[arg(long)]
+    pub budget: bool,
     /// Declare that the arm is in its home pose now; used if the motor pucks have lost their positions. An emulated
     /// arm always starts there.
     #[arg(long)]
@@ -409,6 +451,7 @@ impl Command {
             | Command::Stop(system) => system.json,
             // Its output is already JSON; its errors are plain text.
             Command::Pendant { .. } => false,
+            Command::Motors(args) => args.json,
             Command::Doctor { json } => *json,
             Command::Completions { .. } => false,
         }

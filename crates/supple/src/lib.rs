@@ -9,6 +9,7 @@ mod calibrate;
 mod cli;
 mod doctor;
 mod drill;
+mod motors;
 mod operate;
 mod up;
 
@@ -50,6 +51,7 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
         Command::View(_) => Err(exec(VIEWER)),
         Command::Up(args) => up::run(args),
         Command::Drill(args) => drill::run(args),
+        Command::Motors(args) => motors::run(args),
         Command::Status(system) => operate::status(system),
         Command::Mode(args) => operate::mode(args),
         Command::Gains(args) => operate::gains(args),

@@ -4,7 +4,7 @@ use super::arm::DamiaoArm;
 use super::config::DamiaoConfig;
 use crate::error::EmulatorError;
 use crate::options::{Options, StartPose};
-use crate::program::{EmulatedArm, IDLE_NS, advance_to_bus_time, receive_host_frame};
+use crate::real_time::{EmulatedArm, advance_to_bus_time, receive_host_frame};
 use supple_bus::virtual_time::LockstepResponder;
 use supple_bus::{Address, OwnerFolder, PacedResponder, SocketCan};
 use supple_can_frame::CanFrame;
@@ -14,6 +14,8 @@ use supple_model::Description;
 use supple_plant::{PlantConfig, PlantOptions, Sample, Scene, TraceFile};
 use supple_realtime::{Stop, apply_realtime_settings, diagnostics, monotonic_ns};
 
+/// Maximum wait in virtual time, which pauses while the host is silent \[ns\].
+const IDLE_NS: u64 = 10_000_000;
 /// Time for which the process serves its host after a shutdown was requested \[ns\]: the host lays the arm down first.
 const SHUTDOWN_TIMEOUT_NS: u64 = 30_000_000_000;
 /// Time for which it continues after all motors are disabled \[ns\].
@@ -54,6 +56,7 @@ pub(crate) fn run<const N: usize>(
     };
     let bus = description.bus().ok_or(missing("[bus]"))?;
     let mut config = DamiaoConfig::expected(bus);
+    config.allow_flash = options.allow_flash;
     let effects = PlantOptions::chosen(options.plant_options.as_deref(), options.realistic)?;
     let mut plant = effects.apply(PlantConfig::<N>::from_description(description)?)?;
     if let Some(face_m) = options.block_m {

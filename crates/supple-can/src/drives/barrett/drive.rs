@@ -354,5 +354,5 @@ fn budget(time: &BusTime) -> Budget {
             shape(6),
         )
         .frames("torques", time.joints.div_ceil(4), shape(8));
-    budget.time("one auxiliary poll", time.auxiliary_poll_ns)
+    budget.bus_time("one auxiliary poll", time.auxiliary_poll_ns)
 }
