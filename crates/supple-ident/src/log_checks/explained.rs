@@ -22,7 +22,7 @@ const ROUNDS: usize = 4;
 const FLOOR: f64 = 2e-3;
 
 /// Arm, columns and prior.
-pub(super) struct Context<'a, const N: usize> {
+pub(crate) struct Context<'a, const N: usize> {
     pub arm: &'a Arm<N>,
     pub columns: Columns,
     prior: DVector<f64>,
@@ -32,7 +32,7 @@ pub(super) struct Context<'a, const N: usize> {
 
 /// What is left of a motion's torques.
 #[derive(Clone, Debug)]
-pub(super) struct Explained {
+pub(crate) struct Explained {
     /// RMS residual of each moving joint over the deviation of its torque.
     pub relative: Vec<f64>,
     /// Parameters.
@@ -48,12 +48,37 @@ impl Explained {
 }
 
 /// `[A b]' [A b]` of each moving joint, with the deviation of its torque and the number of samples.
-pub(super) struct Grams {
+#[derive(Clone)]
+pub(crate) struct Grams {
     of_joint: Vec<(DMatrix<f64>, f64)>,
     samples: usize,
 }
 
 impl Grams {
+    /// The sums over the samples of both.
+    pub fn plus(mut self, other: Grams) -> Grams {
+        for ((gram, deviation), (added, other_deviation)) in
+            self.of_joint.iter_mut().zip(other.of_joint)
+        {
+            *gram += added;
+            *deviation = deviation.max(other_deviation);
+        }
+        self.samples += other.samples;
+        self
+    }
+
+    /// Sums of squares of each joint's residual and torque.
+    pub fn errors(&self, x: &DVector<f64>) -> Vec<[f64; 2]> {
+        let of_joint = |(gram, _): &(DMatrix<f64>, f64)| {
+            let mut full = DVector::zeros(x.len() + 1);
+            full.rows_mut(0, x.len()).copy_from(x);
+            full[x.len()] = -1.0;
+            let error = (gram * &full).dot(&full).max(0.0);
+            [error, gram[(x.len(), x.len())]]
+        };
+        self.of_joint.iter().map(of_joint).collect()
+    }
+
     /// With the torque of one joint multiplied by a factor; rotors are unknown, so that nothing else changes.
     pub fn scaled(&self, row: usize, factor: f64) -> Grams {
         let mut of_joint = self.of_joint.clone();
