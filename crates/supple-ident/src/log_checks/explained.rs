@@ -14,6 +14,8 @@ use supple_core::{Arm, Vector};
 /// Standard deviation of the prior of a link's parameters, relative to the mass of the link or, if greater, to a tenth of
 /// the mean mass.
 const PRIOR: f64 = 0.7;
+/// The same where the weights of the given arm are compared with those found: a short log determines them badly.
+const TIGHT_PRIOR: f64 = 0.1;
 /// Length by which first moments are scaled, as a fraction of the arm's reach.
 const LENGTH: f64 = 0.15;
 /// Rounds of weighting.
@@ -25,6 +27,7 @@ const FLOOR: f64 = 2e-3;
 pub(crate) struct Context<'a, const N: usize> {
     pub arm: &'a Arm<N>,
     pub columns: Columns,
+    couplings: Vec<(usize, usize)>,
     prior: DVector<f64>,
     /// One over the standard deviation of the prior.
     stiffness: DVector<f64>,
@@ -100,6 +103,16 @@ impl<'a, const N: usize> Context<'a, N> {
         moving: &[usize],
         couplings: &[(usize, usize)],
     ) -> Result<Self, IdentError> {
+        Self::with_prior(arm, moving, couplings, PRIOR)
+    }
+
+    /// As [`Context::new`], with another relative deviation of the links' parameters.
+    pub fn with_prior(
+        arm: &'a Arm<N>,
+        moving: &[usize],
+        couplings: &[(usize, usize)],
+        prior_deviation: f64,
+    ) -> Result<Self, IdentError> {
         let columns = Columns::new(N, moving, true, FrictionColumns::OFFSET, couplings)?;
         let prior = model::prior(arm, &columns);
         let mass = |k: usize| prior[10 * k];
@@ -111,7 +124,7 @@ impl<'a, const N: usize> Context<'a, N> {
         let length = (LENGTH * reach).max(0.02);
         let stiffness = columns.list().iter().map(|column| match *column {
             Column::Link { link, entry } => {
-                let scale = PRIOR * mass(link).max(0.1 * mean_mass);
+                let scale = prior_deviation * mass(link).max(0.1 * mean_mass);
                 let unit = match entry {
                     0 => scale,
                     1..=3 => scale * length,
@@ -125,9 +138,20 @@ impl<'a, const N: usize> Context<'a, N> {
         Ok(Context {
             arm,
             columns,
+            couplings: couplings.to_vec(),
             prior,
             stiffness,
         })
+    }
+
+    /// The same with the given arm believed more.
+    pub fn believing_the_arm(&self) -> Result<Self, IdentError> {
+        Self::with_prior(
+            self.arm,
+            self.columns.moving(),
+            &self.couplings,
+            TIGHT_PRIOR,
+        )
     }
 
     pub fn grams(&self, motion: &Motion) -> Result<Grams, IdentError> {
