@@ -6,7 +6,7 @@ use crate::error::{IdentError, Warning, log_error, shape_error};
 use nalgebra::DMatrix;
 
 /// Angles larger than this are assumed to be in degrees \[rad\].
-const MAX_ANGLE_RAD: f64 = 25.0;
+pub(crate) const MAX_ANGLE_RAD: f64 = 25.0;
 /// Minimum range of motion for identifying a joint \[rad\].
 const MIN_RANGE_RAD: f64 = 0.02;
 /// A time step longer than this multiple of the median is a gap.
@@ -51,6 +51,18 @@ impl Log {
         moving: &[usize],
         cutoff_hz: Option<f64>,
     ) -> Result<Vec<Warning>, IdentError> {
+        let warnings = self.check_for_fit(dof, moving, cutoff_hz)?;
+        self.check_units(moving)?;
+        Ok(warnings)
+    }
+
+    /// As [`Log::check_for`], without the units of angles and velocities.
+    pub(crate) fn check_for_fit(
+        &self,
+        dof: usize,
+        moving: &[usize],
+        cutoff_hz: Option<f64>,
+    ) -> Result<Vec<Warning>, IdentError> {
         self.check_table(dof, moving)?;
         self.check_gaps(cutoff_hz)?;
         let mut warnings = self.check_motion(moving)?;
@@ -59,7 +71,7 @@ impl Log {
             warnings.push(Warning {
                 column: "t".to_owned(),
                 problem: format!("the log lasts {duration:.3} s"),
-                remedy: "record 30 s or more of excitation",
+                remedy: "record 30 s or more of excitation".to_owned(),
             });
         }
         Ok(warnings)
@@ -152,14 +164,6 @@ impl Log {
         let mut warnings = Vec::new();
         for (joint, column) in self.q_rad.column_iter().enumerate() {
             let (min, max) = (column.min(), column.max());
-            let max_angle = max.abs().max(min.abs());
-            if max_angle > MAX_ANGLE_RAD {
-                return Err(log_error(
-                    format!("q[{joint}]"),
-                    format!("reaches {max_angle:.1}, which looks like degrees"),
-                    "give radians: multiply by pi / 180",
-                ));
-            }
             if !moving.contains(&joint) {
                 continue;
             }
@@ -175,7 +179,7 @@ impl Log {
                 warnings.push(Warning {
                     column: format!("q[{joint}]"),
                     problem: format!("moves by {range:.3} rad only"),
-                    remedy: "excite it over a larger part of its range",
+                    remedy: "excite it over a larger part of its range".to_owned(),
                 });
             }
             let torque = self.tau_nm.column(joint);
@@ -186,9 +190,22 @@ impl Log {
                     "check that the right column was read, or leave the joint out of the moving ones",
                 ));
             }
-            self.check_velocity_unit(joint)?;
         }
         Ok(warnings)
+    }
+
+    fn check_units(&self, moving: &[usize]) -> Result<(), IdentError> {
+        for (joint, column) in self.q_rad.column_iter().enumerate() {
+            let max_angle = column.amax();
+            if max_angle > MAX_ANGLE_RAD {
+                return Err(log_error(
+                    format!("q[{joint}]"),
+                    format!("reaches {max_angle:.1}, which looks like degrees"),
+                    "give radians: multiply by pi / 180",
+                ));
+            }
+        }
+        moving.iter().try_for_each(|j| self.check_velocity_unit(*j))
     }
 
     /// Compares velocity with the slope of the angle; a ratio of 57 indicates degrees.

@@ -46,15 +46,15 @@ impl<const N: usize> Fit<N> {
     /// [`IdentError::Shape`] if the motion has another number of joints.
     pub fn validate_motion(&self, motion: &Motion) -> Result<Validation, IdentError> {
         let joints = joint_rows(self.nominal(), &self.columns, motion)?;
-        let samples = motion.samples() as f64;
         let (mut rms_nm, mut peak_nm, mut relative) = (Vec::new(), Vec::new(), Vec::new());
         let (mut error, mut torque) = (0.0, 0.0);
         for joint in &joints {
-            let errors = &joint.a * &self.x - &joint.b;
-            let wrong = errors.norm_squared();
-            peak_nm.push(errors.amax());
-            let size = joint.b.norm_squared();
-            rms_nm.push((wrong / samples).sqrt());
+            let errors = joint.residual(&self.x);
+            let squared = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>();
+            let wrong = squared(&errors);
+            peak_nm.push(errors.iter().map(|e| e.abs()).fold(0.0, f64::max));
+            let size = squared(&joint.torques());
+            rms_nm.push((wrong / (errors.len().max(1) as f64)).sqrt());
             relative.push((wrong / size).sqrt());
             error += wrong;
             torque += size;

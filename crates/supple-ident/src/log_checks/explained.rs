@@ -14,6 +14,8 @@ use supple_core::{Arm, Vector};
 /// Standard deviation of the prior of a link's parameters, relative to the mass of the link or, if greater, to a tenth of
 /// the mean mass.
 const PRIOR: f64 = 0.7;
+/// The same where the weights of the given arm are compared with those found: a short log determines them badly.
+const TIGHT_PRIOR: f64 = 0.1;
 /// Length by which first moments are scaled, as a fraction of the arm's reach.
 const LENGTH: f64 = 0.15;
 /// Rounds of weighting.
@@ -22,9 +24,10 @@ const ROUNDS: usize = 4;
 const FLOOR: f64 = 2e-3;
 
 /// Arm, columns and prior.
-pub(super) struct Context<'a, const N: usize> {
+pub(crate) struct Context<'a, const N: usize> {
     pub arm: &'a Arm<N>,
     pub columns: Columns,
+    couplings: Vec<(usize, usize)>,
     prior: DVector<f64>,
     /// One over the standard deviation of the prior.
     stiffness: DVector<f64>,
@@ -32,7 +35,7 @@ pub(super) struct Context<'a, const N: usize> {
 
 /// What is left of a motion's torques.
 #[derive(Clone, Debug)]
-pub(super) struct Explained {
+pub(crate) struct Explained {
     /// RMS residual of each moving joint over the deviation of its torque.
     pub relative: Vec<f64>,
     /// Parameters.
@@ -48,12 +51,37 @@ impl Explained {
 }
 
 /// `[A b]' [A b]` of each moving joint, with the deviation of its torque and the number of samples.
-pub(super) struct Grams {
+#[derive(Clone)]
+pub(crate) struct Grams {
     of_joint: Vec<(DMatrix<f64>, f64)>,
     samples: usize,
 }
 
 impl Grams {
+    /// The sums over the samples of both.
+    pub fn plus(mut self, other: Grams) -> Grams {
+        for ((gram, deviation), (added, other_deviation)) in
+            self.of_joint.iter_mut().zip(other.of_joint)
+        {
+            *gram += added;
+            *deviation = deviation.max(other_deviation);
+        }
+        self.samples += other.samples;
+        self
+    }
+
+    /// Sums of squares of each joint's residual and torque.
+    pub fn errors(&self, x: &DVector<f64>) -> Vec<[f64; 2]> {
+        let of_joint = |(gram, _): &(DMatrix<f64>, f64)| {
+            let mut full = DVector::zeros(x.len() + 1);
+            full.rows_mut(0, x.len()).copy_from(x);
+            full[x.len()] = -1.0;
+            let error = (gram * &full).dot(&full).max(0.0);
+            [error, gram[(x.len(), x.len())]]
+        };
+        self.of_joint.iter().map(of_joint).collect()
+    }
+
     /// With the torque of one joint multiplied by a factor; rotors are unknown, so that nothing else changes.
     pub fn scaled(&self, row: usize, factor: f64) -> Grams {
         let mut of_joint = self.of_joint.clone();
@@ -75,6 +103,16 @@ impl<'a, const N: usize> Context<'a, N> {
         moving: &[usize],
         couplings: &[(usize, usize)],
     ) -> Result<Self, IdentError> {
+        Self::with_prior(arm, moving, couplings, PRIOR)
+    }
+
+    /// As [`Context::new`], with another relative deviation of the links' parameters.
+    pub fn with_prior(
+        arm: &'a Arm<N>,
+        moving: &[usize],
+        couplings: &[(usize, usize)],
+        prior_deviation: f64,
+    ) -> Result<Self, IdentError> {
         let columns = Columns::new(N, moving, true, FrictionColumns::OFFSET, couplings)?;
         let prior = model::prior(arm, &columns);
         let mass = |k: usize| prior[10 * k];
@@ -86,7 +124,7 @@ impl<'a, const N: usize> Context<'a, N> {
         let length = (LENGTH * reach).max(0.02);
         let stiffness = columns.list().iter().map(|column| match *column {
             Column::Link { link, entry } => {
-                let scale = PRIOR * mass(link).max(0.1 * mean_mass);
+                let scale = prior_deviation * mass(link).max(0.1 * mean_mass);
                 let unit = match entry {
                     0 => scale,
                     1..=3 => scale * length,
@@ -100,9 +138,20 @@ impl<'a, const N: usize> Context<'a, N> {
         Ok(Context {
             arm,
             columns,
+            couplings: couplings.to_vec(),
             prior,
             stiffness,
         })
+    }
+
+    /// The same with the given arm believed more.
+    pub fn believing_the_arm(&self) -> Result<Self, IdentError> {
+        Self::with_prior(
+            self.arm,
+            self.columns.moving(),
+            &self.couplings,
+            TIGHT_PRIOR,
+        )
     }
 
     pub fn grams(&self, motion: &Motion) -> Result<Grams, IdentError> {

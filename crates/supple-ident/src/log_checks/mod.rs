@@ -13,8 +13,8 @@
 //! Nothing here knows an arm: every threshold is a ratio to what the log itself shows, or to the gravity of the given arm.
 
 mod excess;
-mod explained;
-mod finding;
+pub(crate) mod explained;
+pub(crate) mod finding;
 mod gravity;
 mod remedies;
 mod runs;
@@ -25,7 +25,7 @@ pub use finding::{Consequence, Finding, Problem};
 
 use crate::error::IdentError;
 use crate::filter::LowPass;
-use crate::log::Log;
+use crate::log::{Log, MAX_ANGLE_RAD};
 use crate::motion::{Motion, Preparation};
 use supple_core::Arm;
 
@@ -64,11 +64,31 @@ pub fn check_log<const N: usize>(
     let motion = coarse(log, preparation)?;
     let context = explained::Context::new(arm, moving, couplings)?;
     findings.extend(remedies::check(&context, &motion)?);
+    findings.extend(turns(log, &findings));
     if !stopped(&findings) {
         let fine = fine(log, preparation)?;
         findings.extend(excess::check(&context, &fine)?);
     }
     Ok(findings)
+}
+
+/// Angles of many turns that no remedy explains.
+fn turns(log: &Log, findings: &[Finding]) -> Vec<Finding> {
+    let mut found = Vec::new();
+    for (joint, column) in log.q_rad.column_iter().enumerate() {
+        let largest = column.amax();
+        let named = |f: &Finding| f.joints.is_empty() || f.joints.contains(&joint);
+        if largest > MAX_ANGLE_RAD && !findings.iter().any(named) {
+            found.push(Finding::stop(
+                Problem::Degrees,
+                &[joint],
+                "q",
+                format!("reaches {largest:.1}, which looks like degrees, or the angle of a motor"),
+                "give radians of the joint: multiply degrees by pi / 180, divide angles of motors by the gear ratio",
+            ));
+        }
+    }
+    found
 }
 
 /// The log at a rate of a few samples per period of the cutoff, at most [`SAMPLES`] from its middle.
@@ -88,6 +108,12 @@ fn fine(log: &Log, preparation: &Preparation) -> Result<Motion, IdentError> {
     let span_s = log.t_s[log.t_s.len() - 1] - log.t_s[0];
     let own_hz = (log.t_s.len() - 1) as f64 / span_s;
     at_rate(log, preparation, own_hz.min(50.0))
+}
+
+/// The whole log at 30 samples per second, or more if it is short.
+pub(crate) fn reduced(log: &Log, preparation: &Preparation) -> Result<Motion, IdentError> {
+    let span_s = log.t_s[log.t_s.len() - 1] - log.t_s[0];
+    at_rate(log, preparation, (800.0 / span_s).clamp(20.0, 100.0))
 }
 
 fn at_rate(log: &Log, preparation: &Preparation, rate_hz: f64) -> Result<Motion, IdentError> {

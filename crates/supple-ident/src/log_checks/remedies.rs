@@ -324,7 +324,7 @@ pub(super) fn check<const N: usize>(
         }
         let Some(best) = tried.first() else { break };
         if best.gain < best.remedy.threshold() {
-            findings.extend(zero(&search, &motion, &given)?);
+            findings.extend(zero(context, &motion)?);
             break;
         }
         let best = match best.remedy {
@@ -340,16 +340,24 @@ pub(super) fn check<const N: usize>(
 /// A zero that the weight of the given arm shows: a constant error of an angle changes few torques, but it turns the arm
 /// about that joint.
 fn zero<const N: usize>(
-    search: &Search<'_, N>,
+    context: &Context<'_, N>,
     motion: &Motion,
-    given: &Explained,
 ) -> Result<Option<Finding>, IdentError> {
-    let gravities = Gravities::new(search.context, motion, given);
+    let context = context.believing_the_arm()?;
+    let (search, given) = Search::new(&context, motion)?;
+    let given = &given;
+    let gravities = Gravities::new(&context, motion, given);
     let Some((joint, by, before, after)) = gravities.zero() else {
         return Ok(None);
     };
     let tried = search.try_one(Remedy::Zero(joint, by))?;
-    if tried.gain < 0.004 {
+    if std::env::var_os("SUPPLE_SHOW_REMEDIES").is_some() {
+        eprintln!(
+            "zero {joint} {by:.3}: {before:.4} {after:.4} gain {:.4}",
+            tried.gain
+        );
+    }
+    if tried.gain < 0.01 {
         return Ok(None);
     }
     let mut finding = finding(&tried.remedy, given, &tried.after);

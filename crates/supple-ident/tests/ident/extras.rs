@@ -218,6 +218,8 @@ fn motion_with_ripple(
         independent_fraction: 1.0,
         cutoff_hz: None,
         start_s: 0.0,
+        torque_delay_s: 0.0,
+        masks: Vec::new(),
     }
 }
 

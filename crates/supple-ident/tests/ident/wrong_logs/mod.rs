@@ -6,7 +6,7 @@ use crate::{tx40, ur10e};
 use supple_core::dynamics::regressor;
 use supple_core::{Arm, Vector};
 use supple_ident::log_checks::{Finding, check_log};
-use supple_ident::{DMatrix, Log, Motion, Preparation};
+use supple_ident::{DMatrix, Log, Motion, Preparation, estimate_delay, resample};
 use variants::{Sizes, Variant, all};
 
 /// Torques that a point mass at the tip adds to a log.
@@ -79,6 +79,9 @@ fn count<const N: usize>(
     assert_eq!(variants.len(), 39);
     let mut count = 0;
     for variant in &variants {
+        if std::env::var("VARIANT").is_ok_and(|v| !variant.name.contains(&v)) {
+            continue;
+        }
         let found = findings(arm, &variant.log, couplings, preparation);
         let good = named(variant, &found);
         count += usize::from(good);
@@ -169,4 +172,43 @@ fn errors_of_a_log_of_a_ur10e_are_named() {
     }
     assert!(counts.iter().all(|count| *count >= 34), "{counts:?}");
     assert!(wrong.is_empty(), "{wrong:?}");
+}
+
+/// Shifts the torques of a log: positive if they lag.
+fn lagging(log: &Log, lag_s: f64) -> Log {
+    let rate_hz = (log.t_s.len() - 1) as f64 / (log.t_s[log.t_s.len() - 1] - log.t_s[0]);
+    let shifted = resample(&log.t_s, &log.tau_nm, rate_hz, lag_s);
+    let q = resample(&log.t_s, &log.q_rad, rate_hz, 0.0);
+    Log {
+        t_s: (0..q.nrows()).map(|i| i as f64 / rate_hz).collect(),
+        q_rad: q,
+        qd_rad_per_s: None,
+        tau_nm: shifted,
+    }
+}
+
+#[test]
+fn a_delay_put_into_a_log_is_found() {
+    let arm = tx40::description().arm::<6>().expect("six joints");
+    let log = tx40::log();
+    let preparation = Preparation {
+        rate_hz: Some(5000.0),
+        cutoff_hz: Some(40.0),
+        keep_every: 10,
+        ..Preparation::default()
+    };
+    let moving: Vec<usize> = (0..6).collect();
+    let found = |lag_s: f64| {
+        let log = lagging(&log, lag_s);
+        estimate_delay(&arm, &log, &moving, &[(4, 5)], &preparation).unwrap()
+    };
+    let own = found(0.0);
+    println!("{own:?}");
+    for lag_s in [0.03, -0.03] {
+        let with = found(lag_s);
+        println!("{lag_s}: {with:?}");
+        let error_s = with.delay_s - own.delay_s + lag_s;
+        assert!(error_s.abs() < 2e-3, "{lag_s}: {with:?}");
+        assert!(with.error_with < with.error_without);
+    }
 }
