@@ -263,7 +263,7 @@ pub struct CalibrateArgs {
     pub model: Option<PathBuf>,
     /// Relative errors of the starting model in gravity and in friction, with the signs of --seed, for example 0.15,0.5.
     /// For simulated arms.
-    #[arg(long, value_name = "GRAVITY,FRICTION", value_delimiter = ',', num_args = 2, requires = "on", value_parser = between(0.0, 0.9))]
+    #[arg(long, value_name = "GRAVITY,FRICTION", value_delimiter = ',', requires = "on", value_parser = between(0.0, 0.9))]
     pub start_error: Vec<f64>,
     /// The swept space is free: do not ask.
     #[arg(long, requires = "on")]

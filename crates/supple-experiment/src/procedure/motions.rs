@@ -126,7 +126,8 @@ pub fn follow<const N: usize>(from_rad: &Vector<N>, all: &[Fourier<N>]) -> Vec<S
     steps
 }
 
-/// Moves to `pose_rad` and ramps the torque of a joint there, in the direction of the sign of `rate_nm_per_s`.
+/// Moves to `pose_rad`, ramps the torque of a joint there, in the direction of the sign of `rate_nm_per_s`, and moves
+/// back.
 pub fn ramp<const N: usize>(
     config: &Config<N>,
     from_rad: &Vector<N>,
@@ -149,12 +150,14 @@ pub fn ramp<const N: usize>(
             recorded: true,
             ..Step::wait(Request::Breakaway(ramp), duration_s)
         },
+        // Gravity that the model lacks would pull the arm away from there.
+        move_to(pose_rad, pose_rad),
     ]
 }
 
 /// Time that ramps in both directions take, for a model with these breakaway torques \[s\].
 pub fn ramps_s<const N: usize>(config: &Config<N>) -> f64 {
     let breakaway_nm: f64 = config.friction.iter().map(|f| f.breakaway_nm).sum();
-    let moves_s = 3.0 * N as f64 * move_to(&Vector::<N>::zeros(), &Vector::zeros()).duration_s;
+    let moves_s = 8.0 * N as f64 * move_to(&Vector::<N>::zeros(), &Vector::zeros()).duration_s;
     2.0 * breakaway_nm / BREAKAWAY_RAMP.0 + moves_s
 }

@@ -103,8 +103,16 @@ fn start_model<const N: usize>(
         Some(path) => arms::find(&path.display().to_string(), args.strict)?,
         None => arm.clone(),
     };
-    let [gravity, friction] = args.start_error[..] else {
-        return Ok(model);
+    let (gravity, friction) = match args.start_error[..] {
+        [] => return Ok(model),
+        [gravity, friction] => (gravity, friction),
+        _ => {
+            return Err(Failure::ValueCount {
+                option: "--start-error",
+                found: args.start_error.len(),
+                expected: "2, GRAVITY,FRICTION".to_owned(),
+            });
+        }
     };
     if matches!(on, CalibrationPlant::Can | CalibrationPlant::Running) {
         return Err(Failure::OptionsOfRealArm);
