@@ -53,6 +53,7 @@ fn sized<const N: usize>(
         warm_up_s: args.warm_up,
         candidates: args.candidates,
         resume: args.resume,
+        until: args.until,
         ..ProcedureOptions::new(args.out.clone())
     };
     let mut terminal = Terminal {

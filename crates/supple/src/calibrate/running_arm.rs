@@ -30,6 +30,8 @@ const ACTIVATION_TIMEOUT: Duration = Duration::from_secs(300);
 const SHUTDOWN_TIMEOUT: Duration = Duration::from_secs(5);
 /// Longest wait for one telemetry.
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
+/// Maximum number of messages that may be waiting for this reader.
+const MAX_WAITING: u32 = 20_000;
 /// Gravity hold before the drives are activated \[s\].
 const HOLD_S: f64 = 0.2;
 /// Time in which a stopped arm comes to rest \[s\].
@@ -380,6 +382,14 @@ impl<const N: usize> MotionArm<N> for RunningArm<N> {
     }
 
     fn position_rad(&mut self) -> Result<Vector<N>, Failure> {
+        // Telemetry may be waiting; the last is the present one.
+        let mut waiting = 0;
+        while waiting < MAX_WAITING
+            && let Some(telemetry) = self.reader.receive().map_err(Failure::system)?
+        {
+            self.last = Some(telemetry);
+            waiting += 1;
+        }
         if !self.wait_for(TIMEOUT, |_| true)? {
             return Err(self.not_running());
         }
