@@ -6,6 +6,7 @@ use crate::range::between;
 use clap::builder::RangedU64ValueParser;
 use clap::{Args, Subcommand, ValueEnum};
 use std::path::PathBuf;
+use supple_experiment::procedure::StepName;
 use supple_ident::Method;
 use supple_ident::design::MAX_CANDIDATES;
 use supple_plant::Injection;
@@ -275,7 +276,7 @@ pub struct CalibrateArgs {
     pub model: Option<PathBuf>,
     /// Relative errors of the starting model in gravity and in friction, with the signs of --seed, for example 0.15,0.5.
     /// For simulated arms.
-    #[arg(long, value_name = "GRAVITY,FRICTION", value_delimiter = ',', num_args = 2, requires = "on", value_parser = between(0.0, 0.9))]
+    #[arg(long, value_name = "GRAVITY,FRICTION", value_delimiter = ',', requires = "on", value_parser = between(0.0, 0.9))]
     pub start_error: Vec<f64>,
     /// The swept space is free: do not ask.
     #[arg(long, requires = "on")]
@@ -283,6 +284,9 @@ pub struct CalibrateArgs {
     /// Go on after the last finished step of the calibration in --out.
     #[arg(long, requires = "on")]
     pub resume: bool,
+    /// Perform no step after this one, for example wiring, breakaway or unseen_motion.
+    #[arg(long, value_name = "STEP", requires = "on")]
+    pub until: Option<StepName>,
     /// Duration of the warm-up (s).
     #[arg(long, value_name = "S", default_value_t = 10.0, requires = "on", value_parser = between(0.0, 3600.0))]
     pub warm_up: f64,

@@ -15,6 +15,8 @@ use supple_model::{Description, IdentifiedModel};
 
 /// Last part of the first pass that its fit does not see.
 const HELD_OUT: f64 = 0.25;
+/// Time in the mode by which a series is seen to begin; its first cycles may be lost \[s\].
+const BEGIN_S: f64 = 0.1;
 /// Least range of each joint in a motion that is fitted \[rad\].
 const ALL_MOVE_RAD: f64 = 0.05;
 /// Least collision threshold of a joint, as a fraction of that of the description.
@@ -30,18 +32,24 @@ pub fn excitations<const N: usize>(file: &Path) -> Result<Vec<Log>, ProcedureErr
     let reader = Reader::open(file)?;
     let mut logs = Vec::new();
     let mut rows: Vec<(f64, Vector<N>, Vector<N>)> = Vec::new();
+    let mut last_s = f64::INFINITY;
     for record in reader.records::<N>()? {
         let record = record?;
         let value = record.value;
-        if value.mode() == Some(Mode::Excite) && value.mode_time_s == 0.0 {
+        let excited_s = match value.mode() {
+            Some(Mode::Excite) => value.mode_time_s,
+            _ => f64::INFINITY,
+        };
+        if excited_s.is_infinite() || excited_s < last_s {
             logs.extend(log_of(&mut rows));
         }
-        if value.mode() != Some(Mode::Excite) {
-            logs.extend(log_of(&mut rows));
-            continue;
+        // A log may begin while the arm rests at the end of an earlier series.
+        let begins = excited_s < BEGIN_S && excited_s < last_s;
+        if begins || (excited_s.is_finite() && !rows.is_empty()) {
+            let torque_nm = value.torque_nm - value.torques.ripple;
+            rows.push((record.time_ns as f64 * 1e-9, value.position_rad, torque_nm));
         }
-        let torque_nm = value.torque_nm - value.torques.ripple;
-        rows.push((record.time_ns as f64 * 1e-9, value.position_rad, torque_nm));
+        last_s = excited_s;
     }
     logs.extend(log_of(&mut rows));
     Ok(logs)

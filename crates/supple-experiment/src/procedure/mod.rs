@@ -24,7 +24,7 @@ pub use error::ProcedureError;
 pub use fitting::excitations;
 pub use in_process::{InProcessArm, moves_joints};
 pub use motions::Motions;
-pub use progress::{FILE, FinishedStep, FitQuality, Progress, SinusoidResult, StepName};
+pub use progress::{FILE, FinishedStep, FitQuality, Progress, STEPS, SinusoidResult, StepName};
 pub use steps::{CalibratedArm, calibrate_arm};
 pub use sweep::Sweep;
 pub use wiring::JointWiring;
@@ -57,6 +57,8 @@ pub struct ProcedureOptions {
     pub warm_up_s: f64,
     /// Whether to go on after the last finished step.
     pub resume: bool,
+    /// The last step to perform; `None` for all.
+    pub until: Option<StepName>,
 }
 
 impl ProcedureOptions {
@@ -68,6 +70,7 @@ impl ProcedureOptions {
             candidates: 600,
             warm_up_s: 10.0,
             resume: false,
+            until: None,
         }
     }
 }

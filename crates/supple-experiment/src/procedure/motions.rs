@@ -14,11 +14,11 @@ const EXCITATION: (f64, f64, f64) = (12.0, 1.0, 1.25);
 /// Number of excitations: other poses tell more than repetitions.
 const EXCITATIONS: u64 = 3;
 /// Fraction of the amplitude of the first pass, and its number of periods.
-const FIRST: (f64, f64) = (0.25, 2.0);
+const FIRST: (f64, f64) = (0.25, 1.5);
 /// Maximum joint speed \[rad/s\] and period \[s\] of slow motion.
 const SLOW: (f64, f64) = (0.1, 40.0);
 /// Speeds of the runs at constant speed \[rad/s\], and the period of each \[s\].
-const CONSTANT: ([f64; 2], f64) = ([0.06, 0.12], 26.0);
+const CONSTANT: ([f64; 2], f64) = ([0.06, 0.12], 25.0);
 /// Seed of the unseen motion, relative to that of the excitation.
 const UNSEEN_SEED: u64 = 1000;
 
@@ -28,6 +28,8 @@ pub const WIRING_RAMP: (f64, f64) = (15.0, 0.03);
 pub const BREAKAWAY_RAMP: (f64, f64) = (0.4, 0.025);
 /// Maximum torque of a ramp \[N m\].
 const RAMP_LIMIT_NM: f64 = 6.0;
+/// Distance from its pose within which a joint needs no move \[rad\].
+const THERE_RAD: f64 = 5e-3;
 /// Time in which the mode of a ramp ends after its torque limit \[s\].
 const RAMP_END_S: f64 = 0.3;
 
@@ -126,7 +128,8 @@ pub fn follow<const N: usize>(from_rad: &Vector<N>, all: &[Fourier<N>]) -> Vec<S
     steps
 }
 
-/// Moves to `pose_rad` and ramps the torque of a joint there, in the direction of the sign of `rate_nm_per_s`.
+/// Moves to `pose_rad`, ramps the torque of a joint there, in the direction of the sign of `rate_nm_per_s`, and moves
+/// back.
 pub fn ramp<const N: usize>(
     config: &Config<N>,
     from_rad: &Vector<N>,
@@ -142,19 +145,23 @@ pub fn ramp<const N: usize>(
         limit_nm,
     };
     let duration_s = limit_nm / rate_nm_per_s.abs() + RAMP_END_S;
-    vec![
-        move_to(pose_rad, from_rad),
+    let ramp = [
         Step {
             until_done: true,
             recorded: true,
             ..Step::wait(Request::Breakaway(ramp), duration_s)
         },
-    ]
+        // Gravity that the model lacks would pull the arm away from there.
+        move_to(pose_rad, pose_rad),
+    ];
+    let is_there = (pose_rad - from_rad).amax() < THERE_RAD;
+    let approach = (!is_there).then(|| move_to(pose_rad, from_rad));
+    approach.into_iter().chain(ramp).collect()
 }
 
 /// Time that ramps in both directions take, for a model with these breakaway torques \[s\].
 pub fn ramps_s<const N: usize>(config: &Config<N>) -> f64 {
     let breakaway_nm: f64 = config.friction.iter().map(|f| f.breakaway_nm).sum();
-    let moves_s = 3.0 * N as f64 * move_to(&Vector::<N>::zeros(), &Vector::zeros()).duration_s;
+    let moves_s = 5.0 * N as f64 * move_to(&Vector::<N>::zeros(), &Vector::zeros()).duration_s;
     2.0 * breakaway_nm / BREAKAWAY_RAMP.0 + moves_s
 }

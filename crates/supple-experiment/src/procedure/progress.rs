@@ -6,6 +6,7 @@ use super::wiring::JointWiring;
 use crate::breakaway::JointBreakaway;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+use std::str::FromStr;
 
 /// Name of the file in the folder of the results.
 pub const FILE: &str = "calibration.json";
@@ -42,6 +43,36 @@ pub enum StepName {
     Float,
     /// Sinusoid at 5 N/m.
     Sinusoid,
+}
+
+/// All steps in order, with their names in files and on the command line.
+pub const STEPS: [(&str, StepName); 13] = [
+    ("wiring", StepName::Wiring),
+    ("confirmed", StepName::Confirmed),
+    ("warm_up", StepName::WarmUp),
+    ("breakaway", StepName::Breakaway),
+    ("first_pass", StepName::FirstPass),
+    ("first_fit", StepName::FirstFit),
+    ("full_pass", StepName::FullPass),
+    ("slow_motion", StepName::SlowMotion),
+    ("constant_speed", StepName::ConstantSpeed),
+    ("unseen_motion", StepName::UnseenMotion),
+    ("identification", StepName::Identification),
+    ("float", StepName::Float),
+    ("sinusoid", StepName::Sinusoid),
+];
+
+impl FromStr for StepName {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<StepName, String> {
+        let wanted = text.replace('-', "_");
+        let found = STEPS.iter().find(|(name, _)| *name == wanted);
+        found.map(|(_, step)| *step).ok_or_else(|| {
+            let names: Vec<&str> = STEPS.iter().map(|(name, _)| *name).collect();
+            format!("no step `{text}`; give one of {}", names.join(", "))
+        })
+    }
 }
 
 /// A finished step.

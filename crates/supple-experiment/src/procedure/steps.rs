@@ -31,6 +31,8 @@ const REST_S: f64 = 1.0;
 const FLOAT_S: f64 = 2.0;
 /// Duration of a change of gains \[s\].
 const GAINS_S: f64 = 0.2;
+/// Duration of the move back to the start of the sinusoid \[s\].
+const RETURN_S: f64 = 2.0;
 /// Share of the collision thresholds, and load at the tip \[N\], at which the arm stops while its model is unknown.
 const WIDE_MOVE_SHARE: f64 = 1.0;
 const WIDE_LOAD_N: f64 = 40.0;
@@ -115,43 +117,81 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
     }
 
     fn all(mut self) -> Result<CalibratedArm, A::Error> {
+        self.perform()?;
+        let description = match self.progress.finished(StepName::Identification) {
+            Some(_) => self.model(Stage::Identified)?,
+            None => self.start.clone(),
+        };
+        Ok(CalibratedArm {
+            description,
+            progress: self.progress,
+        })
+    }
+
+    /// Whether the last wanted step is finished.
+    fn is_over(&self) -> bool {
+        let until = self.options.until;
+        until.is_some_and(|step| self.progress.finished(step).is_some())
+    }
+
+    fn perform(&mut self) -> Result<(), A::Error> {
         self.wiring()?;
+        if self.is_over() {
+            return Ok(());
+        }
         let config = config::<N>(&self.model(Stage::Start)?)?;
         let motions = self.design(&config)?;
         self.confirm(&config, &motions)?;
+        if self.is_over() {
+            return Ok(());
+        }
         self.warm_up(&motions)?;
+        if self.is_over() {
+            return Ok(());
+        }
         self.breakaway(&config)?;
-        self.series(
-            StepName::FirstPass,
-            "first-pass",
-            Stage::Start,
-            &[motions.first],
-        )?;
-        self.first_fit()?;
-        for (step, name, series) in [
-            (StepName::FullPass, "full-pass", &motions.full[..]),
-            (StepName::SlowMotion, "slow-motion", &[motions.slow][..]),
+        let first = [motions.first];
+        let (start, first_model) = (Stage::Start, Stage::First);
+        for (step, name, stage, series) in [
+            (StepName::FirstPass, "first-pass", start, &first[..]),
+            (StepName::FullPass, "full-pass", first_model, &motions.full),
+            (
+                StepName::SlowMotion,
+                "slow-motion",
+                first_model,
+                &[motions.slow],
+            ),
             (
                 StepName::ConstantSpeed,
                 "constant-speed",
-                &motions.constant[..],
+                first_model,
+                &motions.constant,
             ),
             (
                 StepName::UnseenMotion,
                 "unseen-motion",
-                &[motions.unseen][..],
+                first_model,
+                &[motions.unseen],
             ),
         ] {
-            self.series(step, name, Stage::First, series)?;
+            if self.is_over() {
+                return Ok(());
+            }
+            if stage == first_model {
+                self.first_fit()?;
+                if self.is_over() {
+                    return Ok(());
+                }
+            }
+            self.series(step, name, stage, series)?;
         }
-        self.identification()?;
-        self.float()?;
-        self.sinusoid()?;
-        Ok(CalibratedArm {
-            description: Description::load(self.options.out.join("arm.toml"))
-                .map_err(ProcedureError::from)?,
-            progress: self.progress,
-        })
+        for step in [Self::identification, Self::float, Self::sinusoid] {
+            if self.is_over() {
+                return Ok(());
+            }
+            step(self)?;
+        }
+        Ok(())
     }
 
     fn say(&mut self, text: &str) {
@@ -323,7 +363,8 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
         let mut steps = ramp(config, &from_rad, pose_rad, joint, slope);
         if joint == 0 && up {
             // The first ramp begins in gravity hold: no position loop has been tried yet.
-            steps.remove(0);
+            let moves = |step: &Step<N>| matches!(step.request, Request::Move { .. });
+            steps.retain(|step| !moves(step));
         }
         let performed = self.arm.perform(&name, &steps)?;
         self.progress.moved_s += performed.moved_s;
@@ -572,7 +613,10 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
             ..Step::wait(Request::Float, FLOAT_S)
         };
         let start_rad = self.sinusoid_start()?.unwrap_or(self.home_rad);
-        let done = self.motion("float", &|from| vec![move_to(&start_rad, from), float])?;
+        let done = self.motion("float", &|from| {
+            let hold = move_to(&start_rad, &start_rad);
+            vec![move_to(&start_rad, from), float, hold]
+        })?;
         let drift_rad = done.motions.first().map(|motion| {
             let q = &motion.recording.q_rad;
             let ranges = q.column_iter().map(|column| column.max() - column.min());
@@ -626,6 +670,14 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
                 steps.push(Step::wait(on, GAINS_S));
             }
             steps.push(track(lead_s + duration_s));
+            // The sinusoid goes on until something else is requested.
+            steps.push(Step::wait(
+                Request::Move {
+                    target_rad: start_rad,
+                    duration_s: RETURN_S,
+                },
+                RETURN_S + GAINS_S,
+            ));
             let performed = self.arm.perform(name, &steps)?;
             self.progress.moved_s += performed.moved_s;
             let motion = performed.motions.first();

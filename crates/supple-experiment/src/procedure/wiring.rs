@@ -88,12 +88,12 @@ pub fn check_ramp(
         ),
         (false, [other]) => wrong(
             format!(
-                "the encoder of {} runs away while a torque acts on {}, which stands still",
-                title(*other),
-                title(joint)
+                "a torque on {} moves the encoder of {} instead of its own: motors or encoders of both are swapped, or \
+                 the latter turns against its torque",
+                title(joint),
+                title(*other)
             ),
-            "reverse the sign of its motor or of its encoder in the arm's TOML, or correct the order of motors and \
-             encoders",
+            "correct the order of the motors or encoders in the arm's TOML, or reverse the sign of the latter",
         ),
         (_, others) => {
             let others: Vec<String> = others.iter().map(|other| title(*other)).collect();

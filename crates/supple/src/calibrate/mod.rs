@@ -53,6 +53,7 @@ fn sized<const N: usize>(
         warm_up_s: args.warm_up,
         candidates: args.candidates,
         resume: args.resume,
+        until: args.until,
         ..ProcedureOptions::new(args.out.clone())
     };
     let mut terminal = Terminal {
@@ -103,8 +104,16 @@ fn start_model<const N: usize>(
         Some(path) => arms::find(&path.display().to_string(), args.strict)?,
         None => arm.clone(),
     };
-    let [gravity, friction] = args.start_error[..] else {
-        return Ok(model);
+    let (gravity, friction) = match args.start_error[..] {
+        [] => return Ok(model),
+        [gravity, friction] => (gravity, friction),
+        _ => {
+            return Err(Failure::ValueCount {
+                option: "--start-error",
+                found: args.start_error.len(),
+                expected: "2, GRAVITY,FRICTION".to_owned(),
+            });
+        }
     };
     if matches!(on, CalibrationPlant::Can | CalibrationPlant::Running) {
         return Err(Failure::OptionsOfRealArm);

@@ -4,6 +4,7 @@ use crate::cli::{PlantKind, UpArgs};
 use crate::operate::OperatorSession;
 use crate::up::{CONTROLLER, ChildProcesses, Plan, Recorder};
 use core::time::Duration;
+use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use supple_cli::console::print_status;
@@ -29,6 +30,8 @@ const ACTIVATION_TIMEOUT: Duration = Duration::from_secs(300);
 const SHUTDOWN_TIMEOUT: Duration = Duration::from_secs(5);
 /// Longest wait for one telemetry.
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
+/// Maximum number of messages that may be waiting for this reader.
+const MAX_WAITING: u32 = 20_000;
 /// Gravity hold before the drives are activated \[s\].
 const HOLD_S: f64 = 0.2;
 /// Time in which a stopped arm comes to rest \[s\].
@@ -149,28 +152,46 @@ impl<const N: usize> RunningArm<N> {
         Ok(false)
     }
 
-    /// Sends a request and waits for its reply while telemetry is read: in virtual time the controller waits for its
-    /// readers. Returns the telemetry since the request was carried out.
-    fn request(
-        &mut self,
-        request: &Request<N>,
-    ) -> Result<(OperatorReply, Vec<Telemetry>), Failure> {
+    /// Sends a request, for a cycle or at once. Telemetry is read until a controller is connected.
+    fn begin(&mut self, request: &Request<N>, at_cycle: Option<u64>) -> Result<u64, Failure> {
         let start = Instant::now();
-        let (mut sequence, mut meanwhile) = (None, Vec::new());
-        while start.elapsed() < TIMEOUT {
-            sequence = match sequence {
-                Some(sequence) => Some(sequence),
-                None => self.session.begin_request(request, None)?,
-            };
-            meanwhile.extend(self.poll()?);
-            if let Some(sequence) = sequence
-                && let Some(reply) = self.session.reply_to(sequence)?
-            {
-                meanwhile.retain(|telemetry| telemetry.state.cycle >= reply.cycle);
-                return Ok((reply, meanwhile));
+        loop {
+            if let Some(sequence) = self.session.begin_request(request, at_cycle)? {
+                return Ok(sequence);
+            }
+            self.poll()?;
+            if start.elapsed() > TIMEOUT {
+                return Err(self.not_running());
             }
         }
-        Err(self.not_running())
+    }
+
+    /// Waits until a request is carried out, while telemetry is read into `read`: in virtual time the controller waits
+    /// for its readers.
+    fn carried_out(
+        &mut self,
+        sequence: u64,
+        read: &mut VecDeque<Telemetry>,
+    ) -> Result<OperatorReply, Failure> {
+        let mut silent = Instant::now();
+        loop {
+            if let Some(reply) = self.session.reply_to(sequence)? {
+                return Ok(reply);
+            }
+            match self.poll()? {
+                Some(telemetry) => {
+                    read.push_back(telemetry);
+                    silent = Instant::now();
+                }
+                None if silent.elapsed() > TIMEOUT => return Err(self.not_running()),
+                None => {}
+            }
+        }
+    }
+
+    fn request(&mut self, request: &Request<N>) -> Result<(), Failure> {
+        let sequence = self.begin(request, None)?;
+        self.carried_out(sequence, &mut VecDeque::new()).map(|_| ())
     }
 
     fn not_running(&self) -> Failure {
@@ -255,14 +276,21 @@ impl<const N: usize> RunningArm<N> {
     fn performed(&mut self, steps: &[Step<N>]) -> Result<Performed, Failure> {
         let period_s = self.model.settings().period_s;
         let mut performed = Performed::default();
+        let (mut read, mut queued) = (VecDeque::new(), None);
         for (number, step) in steps.iter().enumerate() {
-            let (reply, mut early) = self.request(&step.request)?;
-            early.reverse();
-            let cycles = (step.duration_s / period_s).round() as u64;
+            let sequence = match queued.take() {
+                Some(sequence) => sequence,
+                None => self.begin(&step.request, None)?,
+            };
+            let reply = self.carried_out(sequence, &mut read)?;
+            let end = reply.cycle + (step.duration_s / period_s).round() as u64;
+            if let (false, Some(next)) = (step.until_done, steps.get(number + 1)) {
+                queued = Some(self.begin(&next.request, Some(end))?);
+            }
             let mut collector = Motion::collector::<N>();
             let mut silent = Instant::now();
             loop {
-                let next = match early.pop() {
+                let next = match read.pop_front() {
                     Some(telemetry) => Some(telemetry),
                     None => self.poll()?,
                 };
@@ -273,6 +301,13 @@ impl<const N: usize> RunningArm<N> {
                     continue;
                 };
                 silent = Instant::now();
+                if telemetry.state.cycle < reply.cycle {
+                    continue;
+                }
+                if telemetry.state.cycle >= end {
+                    read.push_front(telemetry);
+                    break;
+                }
                 let record = telemetry.record_of::<N>();
                 let mode = record.mode();
                 if record.fault != 0 {
@@ -286,8 +321,7 @@ impl<const N: usize> RunningArm<N> {
                 if mode.is_some_and(moves_joints) {
                     performed.moved_s += period_s;
                 }
-                let over = telemetry.state.cycle >= reply.cycle + cycles;
-                if over || (step.until_done && mode != reply.mode()) {
+                if step.until_done && mode != reply.mode() {
                     break;
                 }
                 if telemetry.state.drives() != Drives::Active {
@@ -348,6 +382,14 @@ impl<const N: usize> MotionArm<N> for RunningArm<N> {
     }
 
     fn position_rad(&mut self) -> Result<Vector<N>, Failure> {
+        // Telemetry may be waiting; the last is the present one.
+        let mut waiting = 0;
+        while waiting < MAX_WAITING
+            && let Some(telemetry) = self.reader.receive().map_err(Failure::system)?
+        {
+            self.last = Some(telemetry);
+            waiting += 1;
+        }
         if !self.wait_for(TIMEOUT, |_| true)? {
             return Err(self.not_running());
         }

@@ -78,17 +78,18 @@ impl<const N: usize> OperatorSession<N> {
             .map_err(Failure::system)
     }
 
-    /// The reply to a request of [`OperatorSession::begin_request`], if it has arrived.
+    /// The reply to a request of [`OperatorSession::begin_request`], if the controller has carried it out. Replies to other
+    /// requests are discarded.
     ///
     /// # Errors
     /// [`Failure::Refused`] with the controller's reason.
     pub fn reply_to(&mut self, sequence: u64) -> Result<Option<OperatorReply>, Failure> {
         while let Some(reply) = self.operator.receive().map_err(Failure::system)? {
-            if reply.outcome() == Outcome::Refused {
-                return Err(refused(&reply));
-            }
-            if reply.sequence == sequence {
-                return Ok(Some(reply));
+            match reply.outcome() {
+                _ if reply.sequence != sequence => {}
+                Outcome::Refused => return Err(refused(&reply)),
+                Outcome::Accepted => return Ok(Some(reply)),
+                Outcome::Queued => {}
             }
         }
         Ok(None)
