@@ -1,7 +1,7 @@
 //! The operator's command line: complete systems as processes, commands to running systems, fault tests, logs.
 //!
 //! For a command that draws figures the process replaces itself with `supple-report` (exec), so that `supple` needs no
-//! plotting library; so it does for the live page, with `supple-view`.
+//! plotting library.
 
 #![forbid(unsafe_code)]
 
@@ -10,6 +10,7 @@ mod doctor;
 mod drill;
 mod operate;
 mod up;
+mod view;
 
 use clap::{CommandFactory, Parser};
 use cli::{Cli, Command};
@@ -22,8 +23,6 @@ use supple_cli::{arms, console, interrupt, log};
 
 /// Program that runs the commands that draw figures.
 const REPORT: &str = "supple-report";
-/// Program that serves the live page.
-pub(crate) const VIEWER: &str = "supple-view";
 
 /// Runs the program: parses its arguments and returns its exit code.
 pub fn run() -> ExitCode {
@@ -39,8 +38,8 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
             OfflineCommand::Demo(_)
             | OfflineCommand::Effects(_)
             | OfflineCommand::Identification(_),
-        ) => Err(exec(REPORT)),
-        Command::View(_) => Err(exec(VIEWER)),
+        ) => Err(exec_report()),
+        Command::View(args) => view::run(args),
         Command::Up(args) => up::run(args),
         Command::Drill(args) => drill::run(args),
         Command::Status(system) => operate::status(system),
@@ -68,9 +67,9 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
     }
 }
 
-/// Replaces this process with another program, with the same arguments. Returns only if that fails.
-fn exec(name: &'static str) -> Failure {
-    let program = match program_beside(name) {
+/// Replaces this process with `supple-report`, with the same arguments. Returns only if that fails.
+fn exec_report() -> Failure {
+    let program = match program_beside(REPORT) {
         Ok(program) => program,
         Err(failure) => return failure,
     };

@@ -5,7 +5,6 @@ mod effects;
 mod identification;
 mod log;
 mod plant;
-mod view;
 
 pub use demo::DemoArgs;
 pub use effects::EffectsArgs;
@@ -15,7 +14,6 @@ pub use identification::{
 };
 pub use log::LogCommand;
 pub use plant::{PlantArgs, PlantCommand};
-pub use view::{ViewArgs, ViewCommand};
 
 use crate::exit::CODES;
 use clap::{Args, Subcommand};
