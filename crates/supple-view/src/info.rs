@@ -41,6 +41,7 @@ pub fn info(subject: &Subject<'_>) -> Result<Vec<u8>, ViewError> {
         "joints": description.joint_names(),
         "urdf": description.urdf(),
         "fixed_joints_rad": description.settings().fixed_joints_rad,
+        "home_rad": description.home_rad(),
         "period_s": period_s,
         "max_stiffness_n_per_m": stiffness,
         "max_damping_n_s_per_m": damping,

@@ -82,6 +82,7 @@ export class Plots {
     ctx.save();
     ctx.strokeStyle = css("--accent");
     ctx.lineWidth = 2;
+    ctx.setLineDash([]);
     ctx.beginPath();
     ctx.moveTo(x, bbox.top);
     ctx.lineTo(x, bbox.top + bbox.height);
