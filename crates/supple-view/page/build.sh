@@ -3,12 +3,8 @@
 set -eu
 cd "$(dirname "$0")"
 npm ci --no-audit --no-fund --silent
-out=dist
-if [ "${1:-}" = check ]; then
-    out=$(mktemp -d)
-    trap 'rm -rf "$out"' EXIT
-fi
-mkdir -p "$out"
+out=$(mktemp -d)
+trap 'rm -rf "$out"' EXIT
 npx esbuild src/main.js --bundle --minify --format=esm --target=es2022 --legal-comments=none \
     --outfile="$out/page.js" --log-level=warning
 npx esbuild src/page.css --bundle --minify --outfile="$out/page.css" --log-level=warning
@@ -20,6 +16,9 @@ cp src/index.html "$out/index.html"
         cat "node_modules/$name/LICENSE"
     done
 } > "$out/licences.txt"
-if [ "$out" != dist ]; then
+if [ "${1:-}" = check ]; then
     diff -r dist "$out" || { echo "page/dist is not what page/src gives: run page/build.sh" >&2; exit 1; }
+else
+    mkdir -p dist
+    cp "$out"/* dist/
 fi

@@ -1,8 +1,8 @@
 //! What the page must know before the first picture, as JSON.
 
+use crate::error::ViewError;
 use crate::protocol::Channel;
 use serde_json::{Value, json};
-use supple_cli::exit::Failure;
 use supple_core::torques::TERMS;
 use supple_log::LiveEncoder;
 use supple_model::{Description, with_dof};
@@ -26,8 +26,8 @@ pub struct Subject<'a> {
 /// The page's description.
 ///
 /// # Errors
-/// [`Failure::Model`] if the arm's configuration is invalid.
-pub fn info(subject: &Subject<'_>) -> Result<Vec<u8>, Failure> {
+/// [`ViewError::Model`] if the arm's configuration is invalid.
+pub fn info(subject: &Subject<'_>) -> Result<Vec<u8>, ViewError> {
     let description = subject.description;
     let limits = with_dof!(description.dof(), N => description.config::<N>().map(|config| {
         (config.limits.stiffness_n_per_m, config.limits.damping_n_s_per_m, config.period_s)
@@ -41,6 +41,7 @@ pub fn info(subject: &Subject<'_>) -> Result<Vec<u8>, Failure> {
         "joints": description.joint_names(),
         "urdf": description.urdf(),
         "fixed_joints_rad": description.settings().fixed_joints_rad,
+        "home_rad": description.home_rad(),
         "period_s": period_s,
         "max_stiffness_n_per_m": stiffness,
         "max_damping_n_s_per_m": damping,
@@ -56,8 +57,8 @@ pub fn info(subject: &Subject<'_>) -> Result<Vec<u8>, Failure> {
 /// The channels of a running system: the pictures, and those of a log.
 ///
 /// # Errors
-/// [`Failure::Log`].
-pub fn channels(description: &Description) -> Result<Vec<Channel>, Failure> {
+/// [`ViewError::Log`].
+pub fn channels(description: &Description) -> Result<Vec<Channel>, ViewError> {
     let of_log = with_dof!(description.dof(), N => LiveEncoder::<N>::channels())??;
     let of_log = of_log.into_iter().map(|channel| Channel {
         topic: channel.topic,

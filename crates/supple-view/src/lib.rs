@@ -15,8 +15,9 @@
 #![forbid(unsafe_code)]
 
 mod command;
+mod error;
 mod frame;
-pub mod http;
+mod http;
 mod hub;
 mod info;
 mod live;
@@ -29,67 +30,92 @@ mod server;
 mod token;
 mod viewer;
 
-use clap::Parser;
+pub use error::ViewError;
+
 use http::Gate;
 use hub::Hub;
 use live::Live;
 use serde::Serialize;
 use server::Shown;
-use std::net::TcpListener;
-use std::path::Path;
-use std::process::ExitCode;
+use std::path::PathBuf;
 use std::sync::Arc;
-use supple_cli::arguments::{ViewArgs, ViewCommand};
-use supple_cli::console::{print_json, print_line, print_status};
-use supple_cli::exit::{CODES, Failure};
-use supple_cli::{arms, console, interrupt};
+use std::sync::mpsc::{Receiver, channel};
 use supple_ipc::Domain;
-use supple_model::with_dof;
-use supple_realtime::{Stop, die_with_parent, pause};
+use supple_model::{Description, with_dof};
+use supple_realtime::{Stop, pause};
 use token::Token;
 
 /// Steps of niceness that the process takes: whatever else wants the processor comes first.
 const NICENESS: i32 = 10;
+/// Time between two looks for a shutdown.
+const POLL_INTERVAL: core::time::Duration = core::time::Duration::from_millis(20);
 
-/// The live page. The program `supple` has this command too.
-#[derive(Debug, Parser)]
-#[command(version, after_help = CODES, arg_required_else_help = true)]
-struct Cli {
-    /// Command to run.
-    #[command(subcommand)]
-    command: ViewCommand,
+/// What to show.
+#[derive(Clone, Debug)]
+pub enum Source {
+    /// A running system.
+    System {
+        /// Its namespace.
+        domain: Domain,
+        /// Its arm.
+        description: Box<Description>,
+    },
+    /// A log.
+    Log(PathBuf),
 }
 
-/// What `--json` prints.
-#[derive(Serialize)]
-struct Addresses {
-    url: String,
-    foxglove_url: String,
+/// How to show it.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// Draw a block with its top face at this height \[m\].
+    pub block_m: Option<f64>,
+    /// Port on 127.0.0.1; 0 for a free one.
+    pub port: u16,
+    /// Accept no requests.
+    pub read_only: bool,
+    /// Pages of other viewers that may connect if they have the URL, such as `http://localhost:8080`.
+    pub allow_origin: Vec<String>,
 }
 
-/// Runs the program: parses its arguments and returns its exit code.
-pub fn run() -> ExitCode {
-    let Cli {
-        command: ViewCommand::View(args),
-    } = Cli::parse();
-    interrupt::install();
-    console::exit_code(view(&args), args.json)
+/// Where the page is. Both addresses contain the token.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Addresses {
+    /// The page.
+    pub url: String,
+    /// For viewers of the Foxglove protocol.
+    pub foxglove_url: String,
 }
 
-fn view(args: &ViewArgs) -> Result<(), Failure> {
-    if args.supervised {
-        die_with_parent();
-    }
-    let stop = interrupt::shutdown_on_interrupt();
+/// Serves the page until a shutdown is requested; `announce` receives its addresses once it can be opened.
+///
+/// # Errors
+/// [`ViewError`].
+pub fn run(
+    source: &Source,
+    options: &Options,
+    stop: &Stop,
+    announce: impl FnOnce(&Addresses),
+) -> Result<(), ViewError> {
     // Without the permission it runs as it is.
     let _ = rustix::process::nice(NICENESS);
-    match &args.log {
-        Some(log) => show_log(args, log, &stop),
-        None => show_system(args, &stop),
+    match source {
+        Source::Log(log) => {
+            announce(&start(options, shown_log(log, options)?)?);
+            while !stop.shutdown_requested() {
+                pause(POLL_INTERVAL);
+            }
+            Ok(())
+        }
+        Source::System {
+            domain,
+            description,
+        } => {
+            with_dof!(description.dof(), N => run_live::<N>(domain, description, options, stop, announce))?
+        }
     }
 }
 
-fn show_log(args: &ViewArgs, log: &Path, stop: &Stop) -> Result<(), Failure> {
+fn shown_log(log: &std::path::Path, options: &Options) -> Result<Shown, ViewError> {
     let replay = replay::read(log)?;
     let title = log.file_name().unwrap_or(log.as_os_str());
     let subject = info::Subject {
@@ -100,38 +126,38 @@ fn show_log(args: &ViewArgs, log: &Path, stop: &Stop) -> Result<(), Failure> {
             "interval_s": replay.interval_s,
             "incomplete": replay.incomplete,
         })),
-        block_m: args.block_m,
+        block_m: options.block_m,
         commands: false,
         pendant: false,
     };
-    let frames = serde_json::to_vec(&replay.frames)
-        .map_err(|error| Failure::ReportGeneration(error.to_string()))?;
-    let shown = Shown {
+    Ok(Shown {
         hub: Arc::new(Hub::new(Vec::new())),
         domain: None,
         name: subject.title.clone(),
         info: info::info(&subject)?,
-        log: Some(frames),
-    };
-    start(args, shown)?;
-    while !stop.shutdown_requested() {
-        pause(core::time::Duration::from_millis(50));
-    }
-    Ok(())
+        log: Some(serde_json::to_vec(&replay.frames)?),
+    })
 }
 
-fn show_system(args: &ViewArgs, stop: &Stop) -> Result<(), Failure> {
-    let description = arms::find(&args.arm, args.strict)?;
-    let domain = Domain::new(args.prefix.as_deref()).map_err(Failure::system)?;
-    let hub = Arc::new(Hub::new(info::channels(&description)?));
-    let commands = hub_commands(&hub, args.read_only);
+fn run_live<const N: usize>(
+    domain: &Domain,
+    description: &Description,
+    options: &Options,
+    stop: &Stop,
+    announce: impl FnOnce(&Addresses),
+) -> Result<(), ViewError> {
+    let hub = Arc::new(Hub::new(info::channels(description)?));
+    let commands: Receiver<_> = match options.read_only {
+        true => channel().1,
+        false => hub.accept_commands(),
+    };
     let subject = info::Subject {
-        description: &description,
+        description,
         title: domain.prefix().to_owned(),
         log: None,
-        block_m: args.block_m,
-        commands: !args.read_only,
-        pendant: pendant::socket(&domain).is_some(),
+        block_m: options.block_m,
+        commands: !options.read_only,
+        pendant: pendant::socket(domain).is_some(),
     };
     let shown = Shown {
         name: format!("supple {}", domain.prefix()),
@@ -140,29 +166,18 @@ fn show_system(args: &ViewArgs, stop: &Stop) -> Result<(), Failure> {
         hub: hub.clone(),
         log: None,
     };
-    with_dof!(description.dof(), N => {
-        let mut live = Live::<N>::new(&domain, &description, &hub, !args.read_only)?;
-        start(args, shown)?;
-        live.run(&commands, stop)
-    })?
+    let mut live = Live::<N>::new(domain, description, &hub, !options.read_only)?;
+    announce(&start(options, shown)?);
+    live.run(&commands, stop)
 }
 
-/// The end at which commands arrive; if none are accepted nothing does.
-fn hub_commands(hub: &Hub, read_only: bool) -> std::sync::mpsc::Receiver<hub::Pending> {
-    match read_only {
-        true => std::sync::mpsc::channel().1,
-        false => hub.accept_commands(),
-    }
-}
-
-/// Serves in a thread of its own, and prints the addresses.
-fn start(args: &ViewArgs, shown: Shown) -> Result<(), Failure> {
-    let failed = |error: std::io::Error| {
-        let address = format!("127.0.0.1:{}", args.port);
-        Failure::file("listen on", Path::new(&address), error)
-    };
-    let (listener, port): (TcpListener, u16) = server::listen(args.port).map_err(failed)?;
-    let gate = Arc::new(Gate::new(Token::new()?, port, &args.allow_origin));
+/// Serves in a thread of its own.
+fn start(options: &Options, shown: Shown) -> Result<Addresses, ViewError> {
+    let port = options.port;
+    let failed = |error| ViewError::Listen { port, error };
+    let (listener, port) = server::listen(port).map_err(failed)?;
+    let token = Token::new().map_err(failed)?;
+    let gate = Arc::new(Gate::new(token, port, &options.allow_origin));
     let addresses = Addresses {
         url: gate.url(),
         foxglove_url: gate.websocket_url(),
@@ -171,13 +186,5 @@ fn start(args: &ViewArgs, shown: Shown) -> Result<(), Failure> {
     let server = std::thread::Builder::new().name("server".to_owned());
     let started = server.spawn(move || server::run(&listener, &gate, &shown));
     started.map_err(failed)?;
-    match args.json {
-        true => print_json(&addresses)?,
-        false => print_line(&format!("page      {}", addresses.url))?,
-    }
-    if !args.json {
-        print_line(&format!("foxglove  {}", addresses.foxglove_url))?;
-        print_status("the URLs contain a secret: whoever knows them commands the arm");
-    }
-    Ok(())
+    Ok(addresses)
 }

@@ -1,12 +1,12 @@
 //! The thread that reads a running system's telemetry and sends its requests. Only it touches shared memory, and it
 //! polls: it has no way to delay the controller.
 
+use crate::error::ViewError;
 use crate::frame::{Beside, Reducer};
 use crate::hub::{Answer, Hub, Pending};
 use core::time::Duration;
 use std::sync::mpsc::{Receiver, Sender};
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
-use supple_cli::exit::Failure;
 use supple_ipc::message::{OperatorReply, Outcome, Telemetry};
 use supple_ipc::{Domain, OperatorClient, TelemetryReader};
 use supple_log::{CycleTiming, Extras, LiveEncoder};
@@ -49,21 +49,21 @@ impl<'a, const N: usize> Live<'a, N> {
     /// Connects; as an operator too if `commands` is set.
     ///
     /// # Errors
-    /// [`Failure::System`] if there is no free place, [`Failure::Log`] for another arm.
+    /// [`ViewError::Ipc`] if there is no free place, [`ViewError::Log`] for another arm.
     pub fn new(
         domain: &Domain,
         description: &Description,
         hub: &'a Hub,
         commands: bool,
-    ) -> Result<Self, Failure> {
+    ) -> Result<Self, ViewError> {
         let operator = commands.then(|| OperatorClient::new(domain));
         let mut encoder = LiveEncoder::new(description)?;
         let urdf = encoder.robot_description()?;
         hub.retain(channel_of(urdf.channel), urdf.data);
         Ok(Live {
             hub,
-            reader: TelemetryReader::new(domain).map_err(Failure::system)?,
-            operator: operator.transpose().map_err(Failure::system)?,
+            reader: TelemetryReader::new(domain)?,
+            operator: operator.transpose()?,
             encoder,
             reducer: Reducer::default(),
             last: None,
@@ -76,11 +76,11 @@ impl<'a, const N: usize> Live<'a, N> {
     /// Runs until a shutdown is requested.
     ///
     /// # Errors
-    /// [`Failure::System`] if shared memory cannot be accessed; [`Failure::Log`] for a message that cannot be encoded.
-    pub fn run(&mut self, commands: &Receiver<Pending>, stop: &Stop) -> Result<(), Failure> {
+    /// [`ViewError::Ipc`] if shared memory cannot be accessed; [`ViewError::Log`] for a message that cannot be encoded.
+    pub fn run(&mut self, commands: &Receiver<Pending>, stop: &Stop) -> Result<(), ViewError> {
         let mut shown = Instant::now();
         while !stop.shutdown_requested() {
-            while let Some(telemetry) = self.reader.receive().map_err(Failure::system)? {
+            while let Some(telemetry) = self.reader.receive()? {
                 self.add(&telemetry)?;
             }
             if shown.elapsed() >= FRAME_INTERVAL {
@@ -96,7 +96,7 @@ impl<'a, const N: usize> Live<'a, N> {
         Ok(())
     }
 
-    fn add(&mut self, telemetry: &Telemetry) -> Result<(), Failure> {
+    fn add(&mut self, telemetry: &Telemetry) -> Result<(), ViewError> {
         if telemetry.dof() != N {
             return Ok(());
         }
@@ -149,7 +149,7 @@ impl<'a, const N: usize> Live<'a, N> {
         self.hub.set_latest(frame);
     }
 
-    fn send(&mut self, pending: Pending) -> Result<(), Failure> {
+    fn send(&mut self, pending: Pending) -> Result<(), ViewError> {
         let Pending { command, answer } = pending;
         let refuse = |reason: &str| {
             // The viewer may have gone.
@@ -162,7 +162,7 @@ impl<'a, const N: usize> Live<'a, N> {
         let Some(request) = command.request::<N>(&last.record_of()) else {
             return refuse("no request to the controller");
         };
-        match operator.send(&request, None).map_err(Failure::system)? {
+        match operator.send(&request, None)? {
             Some(sequence) => {
                 let at = Instant::now();
                 self.sent.push(Sent {
@@ -176,11 +176,11 @@ impl<'a, const N: usize> Live<'a, N> {
         }
     }
 
-    fn answer(&mut self) -> Result<(), Failure> {
+    fn answer(&mut self) -> Result<(), ViewError> {
         let Some(operator) = &self.operator else {
             return Ok(());
         };
-        while let Some(reply) = operator.receive().map_err(Failure::system)? {
+        while let Some(reply) = operator.receive()? {
             let of_this = |sent: &Sent| sent.sequence == reply.sequence;
             if let Some(index) = self.sent.iter().position(of_this) {
                 let _ = self.sent.swap_remove(index).answer.send(in_words(&reply));

@@ -1,8 +1,8 @@
 //! A log as pictures, evenly spaced, for the page's time slider.
 
+use crate::error::ViewError;
 use crate::frame::{Beside, Frame, Reducer};
 use std::path::Path;
-use supple_cli::exit::Failure;
 use supple_log::{CycleTiming, LogError, Reader, Timed};
 use supple_model::{Description, with_dof};
 
@@ -29,8 +29,8 @@ pub struct Replay {
 /// Reads a log.
 ///
 /// # Errors
-/// [`Failure::Log`] if it is no log with at least one cycle.
-pub fn read(file: &Path) -> Result<Replay, Failure> {
+/// [`ViewError::Log`] if it is no log with at least one cycle.
+pub fn read(file: &Path) -> Result<Replay, ViewError> {
     let reader = Reader::open(file)?;
     let description = reader.description()?;
     let read = with_dof!(description.dof(), N => frames::<N>(&reader))?;

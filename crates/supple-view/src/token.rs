@@ -1,6 +1,6 @@
 //! The secret in the URL: another user of the machine can connect to the port, but does not know it.
 
-use supple_cli::exit::Failure;
+use std::io;
 
 /// Random bytes of a token.
 const BYTES: usize = 16;
@@ -12,17 +12,15 @@ impl Token {
     /// A new token from the random numbers of the kernel.
     ///
     /// # Errors
-    /// [`Failure::System`] if the kernel has none.
-    pub fn new() -> Result<Token, Failure> {
+    /// If the kernel has none.
+    pub fn new() -> io::Result<Token> {
         let mut bytes = [0; BYTES];
         let filled = rustix::rand::getrandom(&mut bytes[..], rustix::rand::GetRandomFlags::empty());
-        match filled.map_err(|errno| Failure::system(std::io::Error::from(errno)))? {
+        match filled? {
             BYTES => Ok(Token(
                 bytes.iter().map(|byte| format!("{byte:02x}")).collect(),
             )),
-            _ => Err(Failure::system(std::io::Error::other(
-                "the kernel gave too few random numbers",
-            ))),
+            _ => Err(io::Error::other("the kernel gave too few random numbers")),
         }
     }
 

@@ -1,10 +1,11 @@
 //! Definition of the command-line arguments.
 
+use crate::view::ViewArgs;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use std::path::PathBuf;
 use supple_bus::Address;
-use supple_cli::arguments::{OfflineCommand, PlantArgs, UrdfArgs, ViewArgs};
+use supple_cli::arguments::{OfflineCommand, PlantArgs, UrdfArgs};
 use supple_cli::exit::CODES;
 use supple_cli::range::between;
 use supple_plant::Injection;

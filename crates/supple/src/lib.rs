@@ -1,7 +1,7 @@
 //! The operator's command line: complete systems as processes, commands to running systems, fault tests, logs.
 //!
 //! For a command that draws figures the process replaces itself with `supple-report` (exec), so that `supple` needs no
-//! plotting library; so it does for the live page, with `supple-view`.
+//! plotting library.
 
 #![forbid(unsafe_code)]
 
@@ -12,6 +12,7 @@ mod drill;
 mod motors;
 mod operate;
 mod up;
+mod view;
 
 use clap::{CommandFactory, Parser};
 use cli::{Cli, Command};
@@ -24,8 +25,6 @@ use supple_cli::{arms, console, interrupt, log};
 
 /// Program that runs the commands that draw figures.
 const REPORT: &str = "supple-report";
-/// Program that serves the live page.
-pub(crate) const VIEWER: &str = "supple-view";
 
 /// Runs the program: parses its arguments and returns its exit code.
 pub fn run() -> ExitCode {
@@ -47,8 +46,8 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
             OfflineCommand::Demo(_)
             | OfflineCommand::Effects(_)
             | OfflineCommand::Identification(_),
-        ) => Err(exec(REPORT)),
-        Command::View(_) => Err(exec(VIEWER)),
+        ) => Err(exec_report()),
+        Command::View(args) => view::run(args),
         Command::Up(args) => up::run(args),
         Command::Drill(args) => drill::run(args),
         Command::Motors(args) => motors::run(args),
@@ -77,9 +76,9 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
     }
 }
 
-/// Replaces this process with another program, with the same arguments. Returns only if that fails.
-fn exec(name: &'static str) -> Failure {
-    let program = match program_beside(name) {
+/// Replaces this process with `supple-report`, with the same arguments. Returns only if that fails.
+fn exec_report() -> Failure {
+    let program = match program_beside(REPORT) {
         Ok(program) => program,
         Err(failure) => return failure,
     };

@@ -6,7 +6,6 @@ mod identification;
 mod log;
 mod plant;
 mod urdf;
-mod view;
 
 pub use demo::DemoArgs;
 pub use effects::EffectsArgs;
@@ -17,7 +16,6 @@ pub use identification::{
 pub use log::LogCommand;
 pub use plant::{PlantArgs, PlantCommand};
 pub use urdf::UrdfArgs;
-pub use view::{ViewArgs, ViewCommand};
 
 use crate::exit::CODES;
 use clap::{Args, Subcommand};

@@ -16,7 +16,6 @@ const series = (labels) =>
     width: 1.6,
     dash: i < COLOURS ? undefined : [6, 4],
     points: { show: false },
-    value: (_, v) => (v === null || v === undefined ? "–" : Number(v.toPrecision(3)).toString()),
   }));
 
 export class Plots {
@@ -59,7 +58,8 @@ export class Plots {
         height: HEIGHT,
         scales: { x: { time: false } },
         axes: [{ ...axis, values: (_, ticks) => ticks.map((t) => `${t} s`) }, { ...axis, size: 56 }],
-        series: [{ label: "time", value: (_, v) => (v === null ? "–" : `${v.toFixed(2)} s`) }, ...series(this.labels[name])],
+        series: [{}, ...series(this.labels[name])],
+        legend: { live: false },
         cursor: { drag: { x: true, y: false } },
         hooks: { draw: [(plot) => this.drawCursor(plot)] },
       };
@@ -82,6 +82,7 @@ export class Plots {
     ctx.save();
     ctx.strokeStyle = css("--accent");
     ctx.lineWidth = 2;
+    ctx.setLineDash([]);
     ctx.beginPath();
     ctx.moveTo(x, bbox.top);
     ctx.lineTo(x, bbox.top + bbox.height);
@@ -113,7 +114,7 @@ export class Plots {
   hideZeroTerms(plot, data) {
     data.forEach((values, i) => {
       const used = i === 0 || values.some((v) => Math.abs(v) > LEAST_TERM_NM);
-      const entry = plot.root.querySelectorAll(".u-legend .u-series")[i + 1];
+      const entry = plot.root.querySelectorAll(".u-legend .u-series")[i];
       if (entry) entry.style.display = used ? "" : "none";
       if (!used) values.fill(null);
     });

@@ -48,6 +48,8 @@ export class ArmScene {
     this.scene.add(sun);
     this.arm = arm(info.urdf, info.fixed_joints_rad);
     this.scene.add(this.arm.root);
+    info.home_rad.forEach((angle, i) => this.arm.set(this.joints[i], angle));
+    this.arm.root.updateMatrixWorld(true);
     this.tip = new Path(css("--tip"));
     this.reference = new Path(css("--reference"));
     this.marker = new Mesh(new SphereGeometry(0.012, 20, 12), new MeshStandardMaterial({ color: css("--reference") }));
@@ -78,7 +80,7 @@ export class ArmScene {
     const box = new Box3().setFromObject(this.arm.root);
     const reach = Math.max(0.8, box.getSize(new Vector3()).length());
     const centre = box.getCenter(new Vector3());
-    this.camera.position.copy(centre).add(new Vector3(0.9, -1.25, 0.55).multiplyScalar(reach));
+    this.camera.position.copy(centre).add(new Vector3(0.85, -1.2, 0.5).multiplyScalar(reach));
     this.controls = new OrbitControls(this.camera, this.renderer.domElement);
     this.controls.target.copy(centre);
     this.floorHeight = box.min.z;

@@ -30,7 +30,6 @@ export function showState(frame) {
   }
   for (const button of document.querySelectorAll("#commands [data-request]")) {
     const { request } = JSON.parse(button.dataset.request);
-    const mode = request === "hold_tip" ? "track" : request;
-    button.classList.toggle("current", request !== "pendant" && mode === frame.mode);
+    button.classList.toggle("current", request !== "pendant" && request === frame.mode);
   }
 }

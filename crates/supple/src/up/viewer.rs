@@ -1,15 +1,14 @@
-//! The live page of a system: a program beside this one. It is no part of the system: nobody waits for it, and the
+//! The live page of a system: this program again, as `supple view`. It is no part of the system: nobody waits for it, and the
 //! system goes on without it.
 
-use crate::VIEWER;
 use crate::cli::UpArgs;
 use core::time::Duration;
 use rustix::process::{Pid, Signal, kill_process};
 use std::os::fd::AsFd;
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::Instant;
 use supple_cli::exit::Failure;
-use supple_cli::sibling::program_beside;
 use supple_ipc::Domain;
 use supple_realtime::pause;
 
@@ -26,9 +25,10 @@ impl Viewer {
     /// Starts it. It prints its URL on standard error: standard output is the summary's.
     ///
     /// # Errors
-    /// [`Failure::MissingProgram`], [`Failure::File`].
+    /// [`Failure::File`].
     pub fn start(args: &UpArgs, domain: &Domain) -> Result<Viewer, Failure> {
-        let program = program_beside(VIEWER)?;
+        let this = |error| Failure::file("find", Path::new("this program"), error);
+        let program = std::env::current_exe().map_err(this)?;
         let failed = |error| Failure::file("start", &program, error);
         let stderr = std::io::stderr().as_fd().try_clone_to_owned();
         let mut command = Command::new(&program);

@@ -1,5 +1,0 @@
-//! The live page.
-
-fn main() -> std::process::ExitCode {
-    supple_view::run()
-}
