@@ -11,7 +11,7 @@ mod support;
 use counting::count_allocations;
 use supple_core::codes::MODES;
 use supple_core::config::Gains;
-use supple_core::controller::{LearningSwitch, Mode, Request};
+use supple_core::controller::{LearningSwitch, Mode, Request, SetPoint};
 use supple_core::learned::{JointMap, LearnedParameters};
 use supple_core::math::Vector3;
 use supple_core::{Config, Vector};
@@ -54,6 +54,12 @@ fn request<const N: usize>(rig: &Rig<N>, cycle: u32) -> Option<Request<N>> {
         }),
         600 => Some(Request::Track(probe_at(&rig.tip()))),
         900 => Some(rig.hold_tip_request()),
+        910 | 915 => Some(Request::SetPoint(SetPoint {
+            position_m: rig.tip(),
+            velocity_m_per_s: Vector3::zeros(),
+            acceleration_m_per_s2: Vector3::zeros(),
+            at_cycle: rig.cycle + 20,
+        })),
         1400 | 1700 => Some(Request::Reset),
         _ => None,
     }

@@ -55,5 +55,7 @@ pub use domain::{DEFAULT_PREFIX, Domain, PREFIX_VARIABLE};
 pub use error::IpcError;
 pub use idle::{IdleAnswer, IdleServer, idle_reply, request_idle};
 pub use link::{ControllerLink, PlantLink, ReceivedAnswer, WakeEvent};
-pub use operator_link::{OperatorClient, OperatorServer, TELEMETRY_DEPTH, TelemetryReader};
+pub use operator_link::{
+    CommandSlot, OperatorClient, OperatorServer, TELEMETRY_DEPTH, TelemetryReader,
+};
 pub use port::Backpressure;

@@ -64,6 +64,12 @@ const SUPERVISOR_SLOTS: SlotKind = SlotKind {
     description: "programs that run the system",
     slots: 3,
 };
+/// Of programs that command a running system, one at a time; see [`CommandSlot`].
+const COMMANDER_SLOTS: SlotKind = SlotKind {
+    name: "commander",
+    description: "programs that command the system",
+    slots: 1,
+};
 const _: () = assert!(VIEWER_SLOTS.slots + RECORDER_SLOTS.slots == TELEMETRY.readers);
 const _: () = assert!(OPERATOR_SLOTS.slots + SUPERVISOR_SLOTS.slots == REQUESTS.writers);
 const _: () = assert!(REPLIES.readers == REQUESTS.writers);
@@ -210,6 +216,24 @@ impl TelemetryReader {
     /// Number of published cycles whose telemetry this reader did not receive.
     pub fn lost(&self) -> u64 {
         self.lost
+    }
+}
+
+/// The right to command a system continuously, which one program at a time has while others watch. An agreement between
+/// programs, such as those that use the Python package: the controller checks every request whoever sends it, and a
+/// person may intervene from the command line at any time. The kernel releases it when the process ends.
+#[derive(Debug)]
+pub struct CommandSlot {
+    _slot: ClientSlot,
+}
+
+impl CommandSlot {
+    /// Takes the right to command.
+    ///
+    /// # Errors
+    /// [`IpcError::NoFreeSlot`] names the process that has it.
+    pub fn acquire(domain: &Domain) -> Result<CommandSlot, IpcError> {
+        ClientSlot::acquire(domain, &COMMANDER_SLOTS).map(|slot| CommandSlot { _slot: slot })
     }
 }
 

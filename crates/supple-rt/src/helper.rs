@@ -22,6 +22,8 @@ use supple_realtime::{diagnostics, pause};
 const POLL_INTERVAL: Duration = Duration::from_millis(1);
 /// Maximum number of messages of one kind per iteration.
 const MAX_PER_ITERATION: usize = 256;
+/// Maximum number of set-points that one iteration checks.
+const MAX_SET_POINTS_PER_ITERATION: usize = 8;
 /// Folder for faults beside the system's sockets.
 const FAULT_FOLDER: &str = "faults";
 /// Maximum time that the shutdown waits for the disk.
@@ -171,7 +173,7 @@ struct HelperState {
 impl HelperState {
     fn requests(&mut self) {
         // Idle requests are forwarded without a check; of the others one is checked per iteration, because the check
-        // takes milliseconds.
+        // of a whole motion takes milliseconds.
         while self.awaiting_check.len() < MAX_PER_ITERATION {
             match self.link.request() {
                 Ok(Some(request)) if request.requests_idle_now() => self.enqueue(request),
@@ -183,9 +185,20 @@ impl HelperState {
                 }
             }
         }
-        let Some(request) = self.awaiting_check.pop_front() else {
-            return;
-        };
+        // A set-point takes microseconds.
+        for _ in 0..MAX_SET_POINTS_PER_ITERATION {
+            let Some(request) = self.awaiting_check.pop_front() else {
+                return;
+            };
+            self.check(request);
+            if !request.is_set_point() {
+                return;
+            }
+        }
+    }
+
+    /// Checks a request, then passes it on or refuses it.
+    fn check(&mut self, request: OperatorRequest) {
         let from_rad = self.start_pose(&request);
         match (self.motion_check)(&request, from_rad.as_ref()) {
             Ok(end_rad) => {

@@ -3,6 +3,7 @@
 //! Due requests are carried out in order of arrival, one per cycle; idle requests come first. When the arm goes to idle,
 //! a fault latches, or an operator asks for gravity hold or float at once, the requests that were queued before are
 //! refused, because they were sent under other conditions. One operator can use at most half of the queue, so it cannot block the others.
+//! Of an operator's set-points only the newest waits: it replaces an older one, which gets no reply.
 
 use core::fmt;
 use supple_ipc::message::OperatorRequest;
@@ -41,11 +42,23 @@ pub struct RequestQueue {
 }
 
 impl RequestQueue {
-    /// Appends a request.
+    /// Appends a request, or replaces an older set-point by a newer one.
     ///
     /// # Errors
     /// [`QueueFull`].
     pub fn push(&mut self, request: OperatorRequest) -> Result<(), QueueFull> {
+        if request.is_set_point() && !request.is_scheduled() {
+            let entries = self.entries[..self.length].iter_mut().flatten();
+            let mut older = entries.filter(|queued| {
+                queued.operator == request.operator
+                    && queued.is_set_point()
+                    && !queued.is_scheduled()
+            });
+            if let Some(older) = older.next() {
+                *older = request;
+                return Ok(());
+            }
+        }
         let queued = self.entries.iter().flatten();
         let same_operator = queued.filter(|queued| queued.operator == request.operator);
         if same_operator.count() >= CAPACITY_PER_OPERATOR {

@@ -3,7 +3,7 @@
 use super::fault::SafeAction;
 use super::mode::{Breakaway, Mode};
 use crate::math::{Matrix3, Vector};
-use crate::trajectory::{Fourier, Rotation, Trajectory};
+use crate::trajectory::{Fourier, Rotation, Segment, Trajectory};
 
 /// A mode with its data.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,6 +16,8 @@ pub(super) enum Activity<const N: usize> {
         duration_s: f64,
     },
     Track(Trajectory),
+    /// Follows set-points; the segment is on the clock of the activity.
+    SetPoints(Segment),
     Excite(Fourier<N>),
     Breakaway {
         ramp: Breakaway,
@@ -45,7 +47,7 @@ impl<const N: usize> Activity<N> {
             Activity::GravityHold => Mode::GravityHold,
             Activity::Move { .. } => Mode::Move,
             Activity::Track(Trajectory::Probe(_)) => Mode::Probe,
-            Activity::Track(_) => Mode::Track,
+            Activity::Track(_) | Activity::SetPoints(_) => Mode::Track,
             Activity::Excite(_) => Mode::Excite,
             Activity::Breakaway { .. } => Mode::Breakaway,
             Activity::Float => Mode::Float,

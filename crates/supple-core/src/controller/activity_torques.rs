@@ -18,6 +18,7 @@ impl<const N: usize> State<N> {
             Activity::Track(trajectory) | Activity::TrackPose { trajectory, .. } => {
                 Some(trajectory.at(self.activity_s(config)))
             }
+            Activity::SetPoints(segment) => Some(segment.at(self.activity_s(config))),
             _ => None,
         }
     }
@@ -53,7 +54,7 @@ impl<const N: usize> State<N> {
             return self.pose_torques(controller, pose);
         }
         match (&self.activity, task, reference) {
-            (Activity::Track(_), Some(task), Some(reference)) => {
+            (Activity::Track(_) | Activity::SetPoints(_), Some(task), Some(reference)) => {
                 let tip = self.terms.base_from_tip.translation;
                 let target = PositionTarget {
                     reference,

@@ -1,7 +1,7 @@
 //! Modes, the requests that change them, and why a request is refused.
 
 use crate::config::{Gains, JointGains, RotationalGains};
-use crate::math::Vector;
+use crate::math::{Vector, Vector3};
 use crate::model::learned::{JointMap, LearnedParameters};
 use crate::trajectory::{Fourier, Rotation, Trajectory, TrajectoryError};
 use core::fmt;
@@ -91,6 +91,10 @@ pub enum Request<const N: usize> {
     /// Follows a trajectory that starts near the tip; the mode is [`Mode::Probe`] for the probing
     /// cycle and [`Mode::Track`] otherwise.
     Track(Trajectory),
+    /// Brings the reference of the tip to a point at a given cycle, from wherever it is, and to rest behind it. Set-points
+    /// that follow one another make a continuous motion; silence ends in a held position. Only while a
+    /// [`Trajectory::Hold`] or earlier set-points are tracked; the mode stays [`Mode::Track`].
+    SetPoint(SetPoint),
     /// Follows a Fourier series of all joints, from near its start.
     Excite(Fourier<N>),
     /// Measures the breakaway torque of a joint.
@@ -147,6 +151,20 @@ pub enum Request<const N: usize> {
         /// Its map.
         map: JointMap,
     },
+}
+
+/// A point through which the reference of the tip is to pass.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SetPoint {
+    /// Position \[m\], base axes.
+    pub position_m: Vector3<f64>,
+    /// Velocity there \[m/s\], base axes.
+    pub velocity_m_per_s: Vector3<f64>,
+    /// Acceleration there \[m/s^2\], base axes.
+    pub acceleration_m_per_s2: Vector3<f64>,
+    /// Cycle at which the reference is there: after the cycle that receives it, by at most
+    /// [`MAX_SET_POINT_AHEAD_S`](super::MAX_SET_POINT_AHEAD_S).
+    pub at_cycle: u64,
 }
 
 /// What a request asks of learning.

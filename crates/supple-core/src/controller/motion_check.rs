@@ -12,7 +12,7 @@ use crate::dynamics::{Terms, terms};
 use crate::law::impedance::Task;
 use crate::math::{Vector, abs, smooth_step};
 use crate::model::pose::{Pose, rotation_vector};
-use crate::trajectory::{JointReference, Rotation, Trajectory};
+use crate::trajectory::{JointReference, Reference, Rotation, Trajectory};
 
 /// Number of equal time intervals of a motion; it is checked at their ends.
 const INTERVALS: u32 = 128;
@@ -70,6 +70,11 @@ pub fn check_motion<const N: usize>(
         Request::Excite(series) => {
             check_joint_motion(config, 1.0, series.duration_s, |time_s| series.at(time_s))
         }
+        Request::SetPoint(set_point) => {
+            set_point.validate()?;
+            let reference = set_point.reference();
+            check_point(config, &mut { *position_rad }, &reference, 0.0)
+        }
         _ => Ok(()),
     }
 }
@@ -103,37 +108,46 @@ fn check_trajectory<const N: usize>(
     let duration_s = trajectory.length_s();
     for k in 0..=INTERVALS {
         let time_s = duration_s * f64::from(k) / f64::from(INTERVALS);
-        let reference = trajectory.at(time_s);
-        if let Some((border, value_m)) = config.workspace.violated_border(&reference.position) {
-            return Err(Refusal::Workspace { border, value_m });
-        }
-        let found = inverse_kinematics(
-            &config.arm,
-            &config.roles,
-            &config.limits,
-            &q,
-            &reference.position,
-        );
-        if found.distance_m > REACHED_M {
-            return Err(Refusal::OutOfReach {
-                time_s,
-                distance_m: found.distance_m,
-            });
-        }
-        q = found.position_rad;
-        let mut dynamics = Terms::default();
-        terms(&config.arm, &q, &Vector::zeros(), &mut dynamics);
-        let Some(task) = Task::new(&dynamics, &config.roles) else {
-            // The mass matrix is not positive definite: only reach and borders are checked.
-            continue;
-        };
-        let qd = task.inverse * reference.velocity;
-        terms(&config.arm, &q, &qd, &mut dynamics);
-        let bias_acceleration = dynamics.jacobian_dot_qd.fixed_rows::<3>(0);
-        let qdd = task.inverse * (reference.acceleration - bias_acceleration);
-        check_joints(config, 1.0, &dynamics, &qd, &qdd)?;
+        check_point(config, &mut q, &trajectory.at(time_s), time_s)?;
     }
     Ok(())
+}
+
+/// Checks one point of a tip motion, and moves the joints there from a pose that is near.
+fn check_point<const N: usize>(
+    config: &Config<N>,
+    q: &mut Vector<N>,
+    reference: &Reference,
+    time_s: f64,
+) -> Result<(), Refusal> {
+    if let Some((border, value_m)) = config.workspace.violated_border(&reference.position) {
+        return Err(Refusal::Workspace { border, value_m });
+    }
+    let found = inverse_kinematics(
+        &config.arm,
+        &config.roles,
+        &config.limits,
+        q,
+        &reference.position,
+    );
+    if found.distance_m > REACHED_M {
+        return Err(Refusal::OutOfReach {
+            time_s,
+            distance_m: found.distance_m,
+        });
+    }
+    *q = found.position_rad;
+    let mut dynamics = Terms::default();
+    terms(&config.arm, q, &Vector::zeros(), &mut dynamics);
+    let Some(task) = Task::new(&dynamics, &config.roles) else {
+        // The mass matrix is not positive definite: only reach and borders are checked.
+        return Ok(());
+    };
+    let qd = task.inverse * reference.velocity;
+    terms(&config.arm, q, &qd, &mut dynamics);
+    let bias_acceleration = dynamics.jacobian_dot_qd.fixed_rows::<3>(0);
+    let qdd = task.inverse * (reference.acceleration - bias_acceleration);
+    check_joints(config, 1.0, &dynamics, &qd, &qdd)
 }
 
 /// Follows position and orientation with the joints' motion that the task gives, starting from rest.

@@ -182,6 +182,7 @@ cycle! {
         /// learned_parameters  viscous_nm_s_per_rad (N), coulomb_nm (N), offset_nm (N), torque_scale (N), payload_kg,
         ///           payload_moment_kg_m, tilt_rad
         /// learned_map  joint, torque_nm (16), dry_nm (16)
+        /// set_point position_m, velocity_m_per_s, acceleration_m_per_s2, at_cycle
         /// hold      position_m
         /// line      from_m, to_m, duration_s
         /// sinusoid  centre_m, amplitude_m, angular_frequency_rad_per_s, ramp_s

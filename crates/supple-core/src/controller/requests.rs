@@ -101,6 +101,9 @@ impl<const N: usize> State<N> {
                 self.check_trajectory(controller, task, &trajectory)?;
                 self.enter(Activity::Track(trajectory));
             }
+            Request::SetPoint(ref set_point) => {
+                self.receive_set_point(controller, set_point)?;
+            }
             Request::TrackPose {
                 trajectory,
                 rotation,

@@ -10,6 +10,7 @@ mod line;
 mod probe;
 mod quadrant;
 mod rotation;
+mod segment;
 mod sinusoid;
 
 pub use arc::Arc;
@@ -18,6 +19,7 @@ pub use line::Line;
 pub use probe::{Probe, ProbePhase};
 pub use quadrant::{Piece, Quadrant};
 pub use rotation::{OrientationReference, Rotation};
+pub use segment::{Segment, SegmentPeaks};
 pub use sinusoid::Sinusoid;
 
 use crate::math::{Vector3, all_finite, smooth_step};

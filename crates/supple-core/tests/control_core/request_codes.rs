@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use proptest::strategy::Union;
 use supple_core::codes::{RequestCode, RequestCodeError, VALUES};
 use supple_core::config::{Gains, JointGains, RotationalGains};
-use supple_core::controller::{Breakaway, LearningSwitch, Request};
+use supple_core::controller::{Breakaway, LearningSwitch, Request, SetPoint};
 use supple_core::learned::{JointMap, LearnedParameters, MAP_KNOTS};
 use supple_core::math::Vector3;
 use supple_core::trajectory::{Arc, Fourier, Line, Probe, Quadrant, Rotation, Sinusoid};
@@ -187,6 +187,19 @@ fn request() -> impl Strategy<Value = Numbered> {
                 ((16, 0), Some(Request::LearnedMap { joint, map }))
             })
             .boxed(),
+        (vector(), vector(), vector(), 0_u64..1 << 53)
+            .prop_map(
+                |(position_m, velocity_m_per_s, acceleration_m_per_s2, at_cycle)| {
+                    let point = SetPoint {
+                        position_m,
+                        velocity_m_per_s,
+                        acceleration_m_per_s2,
+                        at_cycle,
+                    };
+                    ((17, 0), Some(Request::SetPoint(point)))
+                },
+            )
+            .boxed(),
         gains()
             .prop_map(|(stiffness_n_per_m, damping_n_s_per_m, ramp_s)| {
                 let gains = Gains {
@@ -225,7 +238,13 @@ fn decode(
 
 #[test]
 fn unknown_and_incomplete_codes_are_rejected() {
-    assert_eq!(decode(17, 0, &[]), Err(RequestCodeError::Kind(17)));
+    assert_eq!(decode(18, 0, &[]), Err(RequestCodeError::Kind(18)));
+    for cycle in [-1.0, 0.5, 9.1e15, f64::NAN] {
+        let mut values = [0.0; 10];
+        values[9] = cycle;
+        let error = decode(17, 0, &values).expect_err("no cycle");
+        assert!(matches!(error, RequestCodeError::Whole(_)), "{error}");
+    }
     assert_eq!(decode(14, 0, &[3.0]), Err(RequestCodeError::Whole(3.0)));
     assert_eq!(decode(4, 0, &[]), Err(RequestCodeError::Trajectory(0)));
     assert_eq!(

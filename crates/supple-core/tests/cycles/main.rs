@@ -199,6 +199,7 @@ fn assert_modes<const N: usize>(
         }
         (Mode::Idle, _) => false,
         (_, Mode::Move) => matches!(request, Some(Request::Move { .. })),
+        // Set-points change no mode.
         (_, Mode::Track | Mode::Probe) => matches!(request, Some(Request::Track(_))),
         (_, Mode::Excite) => matches!(request, Some(Request::Excite(_))),
         (_, Mode::Breakaway) => matches!(request, Some(Request::Breakaway(_))),

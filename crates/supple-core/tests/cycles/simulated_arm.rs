@@ -3,7 +3,7 @@
 use crate::support::random::Random;
 use crate::support::rig::{Rig, probe_at, ramp};
 use supple_core::config::{Gains, JointGains, Role, RotationalGains};
-use supple_core::controller::{Breakaway, LearningSwitch, Mode, Request};
+use supple_core::controller::{Breakaway, LearningSwitch, Mode, Request, SetPoint};
 use supple_core::dynamics::aba;
 use supple_core::learned::{JointMap, LearnedParameters};
 use supple_core::math::Vector3;
@@ -84,7 +84,7 @@ impl<const N: usize> SimulatedArm<N> {
             _ => {}
         }
         let tip = last.tip_position_m;
-        match random.below(26) {
+        match random.below(30) {
             0 => Request::Idle,
             1 => Request::GravityHold,
             2 => Request::Reset,
@@ -156,6 +156,18 @@ impl<const N: usize> SimulatedArm<N> {
                 },
                 ramp_s: random.number(),
             },
+            26..29 => Request::SetPoint(SetPoint {
+                position_m: tip + Vector3::from(random.joints::<3>(0.02)),
+                velocity_m_per_s: Vector3::from(random.joints::<3>(0.1)),
+                acceleration_m_per_s2: Vector3::zeros(),
+                at_cycle: self.rig.cycle + random.below(300),
+            }),
+            29 => Request::SetPoint(SetPoint {
+                position_m: random.point(),
+                velocity_m_per_s: random.point(),
+                acceleration_m_per_s2: random.point(),
+                at_cycle: random.below(2000),
+            }),
             22 => Request::Learning(LearningSwitch::On),
             23 => Request::Learning(match random.below(2) {
                 0 => LearningSwitch::Off,

@@ -75,6 +75,11 @@ impl OperatorRequest {
         !self.is_scheduled() && self.requests_idle()
     }
 
+    /// A set-point, of which a newer one replaces an older.
+    pub fn is_set_point(&self) -> bool {
+        self.kind == request_kind::SET_POINT
+    }
+
     /// Whether it waits for a given cycle.
     pub fn is_scheduled(&self) -> bool {
         self.has_at_cycle != 0

@@ -1,7 +1,8 @@
 //! The loop receives operator requests within a bounded number of cycles, whatever else is queued.
 
 use crate::support::Bench;
-use supple_core::controller::{Mode, Request};
+use supple_core::controller::{Mode, Request, SetPoint};
+use supple_core::math::Vector3;
 use supple_ipc::message::{ArmState, Drives, OperatorReply, Outcome};
 
 /// A cycle that no test reaches.
@@ -115,6 +116,34 @@ fn gravity_hold_and_float_at_once_refuse_what_is_scheduled() {
         bench.active_cycle();
         assert_eq!(refused(bench.replies()), [2]);
     }
+}
+
+/// A burst of set-points between two cycles is not carried out one cycle after another: the newest counts.
+#[test]
+fn of_several_set_points_the_newest_is_carried_out() {
+    let mut bench = Bench::new(false);
+    let point = |at_cycle| {
+        Request::SetPoint(SetPoint {
+            position_m: Vector3::zeros(),
+            velocity_m_per_s: Vector3::zeros(),
+            acceleration_m_per_s2: Vector3::zeros(),
+            at_cycle,
+        })
+    };
+    bench.active_cycle();
+    for sequence in 1..=12 {
+        assert!(bench.enqueue(1, sequence, &point(100 + sequence), None));
+    }
+    assert!(bench.enqueue(2, 1, &point(200), None));
+    for _ in 0..3 {
+        bench.active_cycle();
+    }
+    let answered: Vec<(u64, u64)> = bench
+        .replies()
+        .iter()
+        .map(|reply| (reply.operator, reply.sequence))
+        .collect();
+    assert_eq!(answered, [(1, 12), (2, 1)]);
 }
 
 #[test]

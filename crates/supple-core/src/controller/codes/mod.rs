@@ -58,6 +58,7 @@ numbered! {
         LEARNING = 14 "learning",
         LEARNED_PARAMETERS = 15 "learned_parameters",
         LEARNED_MAP = 16 "learned_map",
+        SET_POINT = 17 "set_point",
     }
 }
 

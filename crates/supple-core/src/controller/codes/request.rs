@@ -15,6 +15,7 @@
 //! | learning | 0 off, 1 on, 2 reset |
 //! | learned_parameters | `viscous_nm_s_per_rad` (N), `coulomb_nm` (N), `offset_nm` (N), `torque_scale` (N), `payload_kg`, `payload_moment_kg_m`, `tilt_rad` |
 //! | learned_map | `joint`, `torque_nm` (16 coefficients), `dry_nm` (16) |
+//! | set_point | `position_m`, `velocity_m_per_s`, `acceleration_m_per_s2`, `at_cycle` |
 //! | hold | `position_m` |
 //! | line | `from_m`, `to_m`, `duration_s` |
 //! | sinusoid | `centre_m`, `amplitude_m`, `angular_frequency_rad_per_s`, `ramp_s` |
@@ -27,7 +28,7 @@
 
 use super::{request_kind, trajectory_kind};
 use crate::config::{Gains, JointGains, RotationalGains};
-use crate::controller::{Breakaway, LearningSwitch, Request};
+use crate::controller::{Breakaway, LearningSwitch, Request, SetPoint};
 use crate::math::{Vector, Vector3};
 use crate::model::learned::{JointMap, LearnedParameters};
 use crate::trajectory::{
@@ -65,7 +66,7 @@ pub enum RequestCodeError {
         /// Values that the request takes.
         expected: usize,
     },
-    /// A number of strokes, of a joint or of a switch that is not whole or too great.
+    /// A number of strokes, of a joint, of a switch or of a cycle that is not whole or too great.
     Whole(f64),
 }
 
@@ -75,7 +76,7 @@ impl fmt::Display for RequestCodeError {
             RequestCodeError::Kind(kind) => write!(
                 f,
                 "request is {kind}, known are 0 to {}",
-                request_kind::LEARNED_MAP
+                request_kind::SET_POINT
             ),
             RequestCodeError::Trajectory(kind) => {
                 write!(
@@ -177,6 +178,13 @@ impl RequestCode {
                 code.numbers(&[*joint as f64]);
                 code.numbers(&map.torque_nm);
                 code.numbers(&map.dry_nm);
+            }
+            Some(Request::SetPoint(point)) => {
+                code.kind = request_kind::SET_POINT;
+                code.vector(&point.position_m);
+                code.vector(&point.velocity_m_per_s);
+                code.vector(&point.acceleration_m_per_s2);
+                code.numbers(&[point.at_cycle as f64]);
             }
             Some(Request::Reset) => code.kind = request_kind::RESET,
             Some(Request::Excite(series)) => {
@@ -313,6 +321,12 @@ impl RequestCode {
                     dry_nm: rest.take(),
                 },
             }),
+            request_kind::SET_POINT => Some(Request::SetPoint(SetPoint {
+                position_m: rest.vector(),
+                velocity_m_per_s: rest.vector(),
+                acceleration_m_per_s2: rest.vector(),
+                at_cycle: rest.cycle()?,
+            })),
             unknown => return Err(RequestCodeError::Kind(unknown)),
         };
         let (found, expected) = (rest.values.len(), rest.taken);
@@ -437,6 +451,17 @@ impl Rest<'_> {
         let count = number as u32;
         if f64::from(count) == number {
             Ok(count)
+        } else {
+            Err(RequestCodeError::Whole(number))
+        }
+    }
+
+    /// A cycle number; a whole number below 2^53.
+    fn cycle(&mut self) -> Result<u64, RequestCodeError> {
+        let number = self.number();
+        let cycle = number as u64;
+        if cycle < 1 << 53 && cycle as f64 == number {
+            Ok(cycle)
         } else {
             Err(RequestCodeError::Whole(number))
         }

@@ -6,7 +6,7 @@ use crate::support::property::{check, per_joint};
 use crate::support::rig::{Rig, bent, probe_at};
 use proptest::prelude::*;
 use supple_core::config::{ApparentInertia, Gains, JointGains, RotationalGains};
-use supple_core::controller::{LearningSwitch, Mode, Request};
+use supple_core::controller::{LearningSwitch, Mode, Request, SetPoint};
 use supple_core::learned::{JointMap, LearnedParameters, MAP_KNOTS};
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::trajectory::{Arc, Line, Quadrant, Rotation, Sinusoid};
@@ -121,6 +121,14 @@ fn request_kind<const N: usize>() -> impl Strategy<Value = RequestKind<N>> {
             }
         }),
         trajectory().prop_map(Request::Track),
+        (point(), point(), point(), 0_u64..3000).prop_map(|(p, v, a, at_cycle)| {
+            Request::SetPoint(SetPoint {
+                position_m: p,
+                velocity_m_per_s: v,
+                acceleration_m_per_s2: a,
+                at_cycle,
+            })
+        }),
         (trajectory(), point(), number(), number()).prop_map(
             |(trajectory, axis, angle_rad, duration_s)| Request::TrackPose {
                 trajectory,

@@ -22,6 +22,7 @@ mod observing;
 mod posing;
 mod protecting;
 mod refusals;
+mod set_points;
 mod settings;
 mod stiffness;
 mod stopping;

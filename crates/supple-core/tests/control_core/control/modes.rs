@@ -4,7 +4,8 @@ use crate::support::configs::{four, seven, seven_active, three};
 use crate::support::rig::{Rig, bent, bent_wrist, probe_at, ramp};
 use std::collections::BTreeSet;
 use supple_core::config::{Gains, JointGains, Role, RotationalGains};
-use supple_core::controller::{Fault, LearningSwitch, Mode, Refusal, Request};
+use supple_core::controller::{Fault, LearningSwitch, Mode, Refusal, Request, SetPoint};
+use supple_core::math::Vector3;
 use supple_core::trajectory::Fourier;
 use supple_core::{Config, Input, Vector};
 
@@ -39,10 +40,11 @@ enum RequestKind {
     JointGains,
     RotationalGains,
     Learning,
+    SetPoint,
     Reset,
 }
 
-const REQUEST_KINDS: [RequestKind; 15] = [
+const REQUEST_KINDS: [RequestKind; 16] = [
     RequestKind::Idle,
     RequestKind::GravityHold,
     RequestKind::Move,
@@ -57,6 +59,7 @@ const REQUEST_KINDS: [RequestKind; 15] = [
     RequestKind::JointGains,
     RequestKind::RotationalGains,
     RequestKind::Learning,
+    RequestKind::SetPoint,
     RequestKind::Reset,
 ];
 
@@ -91,6 +94,12 @@ fn request<const N: usize>(rig: &Rig<N>, requested: RequestKind) -> Request<N> {
             ramp_s: 0.1,
         },
         RequestKind::Learning => Request::Learning(LearningSwitch::On),
+        RequestKind::SetPoint => Request::SetPoint(SetPoint {
+            position_m: rig.tip(),
+            velocity_m_per_s: Vector3::zeros(),
+            acceleration_m_per_s2: Vector3::zeros(),
+            at_cycle: rig.cycle + 20,
+        }),
         RequestKind::Reset => Request::Reset,
     }
 }
@@ -110,6 +119,9 @@ fn keeps_mode(requested: RequestKind) -> bool {
 fn table(mode: Mode, requested: RequestKind) -> Option<Mode> {
     match (mode, requested) {
         (_, requested) if keeps_mode(requested) => Some(mode),
+        // Set-points move a held tip; they begin no motion in any other mode.
+        (Mode::Track, RequestKind::SetPoint) => Some(Mode::Track),
+        (_, RequestKind::SetPoint) => None,
         // Only a reset leaves a fault; this one leads to gravity hold.
         (Mode::Fault, RequestKind::Reset) => Some(Mode::GravityHold),
         // Idle needs no reset; the fault stays latched.
@@ -156,7 +168,7 @@ fn every_mode_asked_for_everything<const N: usize>(config: Config<N>, pose: Vect
                 Some(expected) => {
                     assert_eq!(output.refusal, None, "{requested:?} in {mode:?}");
                     assert_eq!(output.mode, expected, "{requested:?} in {mode:?}");
-                    if !keeps_mode(requested) {
+                    if !keeps_mode(requested) && requested != RequestKind::SetPoint {
                         assert_eq!(output.mode_time_s, 0.0, "{requested:?} in {mode:?}");
                     }
                 }

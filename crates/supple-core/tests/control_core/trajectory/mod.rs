@@ -6,3 +6,4 @@ mod paths;
 mod probe;
 mod quadrant;
 mod refusals;
+mod segment;

@@ -1,0 +1,152 @@
+//! A piece of a motion that set-points describe one after another: from the present reference to the newest set-point,
+//! then to rest.
+
+use super::Reference;
+use crate::math::{Vector3, sqrt};
+
+/// Times at which the peaks of the way to the set-point are sampled; between two of them speed and acceleration of a
+/// motion from rest to rest exceed the samples by less than 2 %.
+const SAMPLES: u32 = 16;
+/// The same while it comes to rest.
+const STOP_SAMPLES: u32 = 8;
+/// Shortest time in which the reference comes to rest \[s\].
+const MIN_STOP_S: f64 = 0.1;
+/// Stopping time over speed by the limit of acceleration: the mean deceleration is a third of the limit, which leaves
+/// room for the acceleration at its begin to fade.
+const STOP_SHARE: f64 = 3.0;
+
+/// Quintic polynomial between two references that are given with velocity and acceleration. After its end the velocity
+/// falls to zero, and the reference stays.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Segment {
+    from: Reference,
+    from_s: f64,
+    to: Reference,
+    duration_s: f64,
+    stop_s: f64,
+}
+
+/// Peak values along a segment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SegmentPeaks {
+    /// Speed \[m/s\].
+    pub speed_m_per_s: f64,
+    /// Acceleration \[m/s^2\].
+    pub acceleration_m_per_s2: f64,
+}
+
+impl Segment {
+    /// From `from` at `from_s` to `to`, `duration_s` later; at the end it stops with about a third of
+    /// `max_acceleration_m_per_s2`. Both times \[s\] are on the clock of [`Segment::at`]; `duration_s` and the
+    /// acceleration are positive.
+    pub fn new(
+        from: Reference,
+        from_s: f64,
+        to: Reference,
+        duration_s: f64,
+        max_acceleration_m_per_s2: f64,
+    ) -> Segment {
+        let speed = sqrt(to.velocity.dot(&to.velocity));
+        Segment {
+            from,
+            from_s,
+            to,
+            duration_s,
+            stop_s: (STOP_SHARE * speed / max_acceleration_m_per_s2).max(MIN_STOP_S),
+        }
+    }
+
+    /// Reference at a time \[s\]; before the start it is the start.
+    pub fn at(&self, time_s: f64) -> Reference {
+        let since_s = (time_s - self.from_s).max(0.0);
+        if since_s < self.duration_s {
+            return self.quintic(since_s / self.duration_s);
+        }
+        let after_s = since_s - self.duration_s;
+        self.stopping((after_s / self.stop_s).min(1.0))
+    }
+
+    /// Where it comes to rest \[m\], base axes.
+    pub fn rest_m(&self) -> Vector3<f64> {
+        self.stopping(1.0).position
+    }
+
+    /// Time from its start until it rests \[s\].
+    pub fn length_s(&self) -> f64 {
+        self.duration_s + self.stop_s
+    }
+
+    /// Peaks over the whole length, from samples.
+    pub fn peaks(&self) -> SegmentPeaks {
+        let way = (0..=SAMPLES).map(|k| self.quintic(f64::from(k) / f64::from(SAMPLES)));
+        let stop =
+            (0..=STOP_SAMPLES).map(|k| self.stopping(f64::from(k) / f64::from(STOP_SAMPLES)));
+        let (speed, acceleration) = way.chain(stop).fold((0.0, 0.0), |(v, a): (f64, f64), r| {
+            // Not `max`, which would drop what is not a number.
+            let greater = |old: f64, new: f64| if new <= old { old } else { new };
+            (
+                greater(v, r.velocity.dot(&r.velocity)),
+                greater(a, r.acceleration.dot(&r.acceleration)),
+            )
+        });
+        SegmentPeaks {
+            speed_m_per_s: sqrt(speed),
+            acceleration_m_per_s2: sqrt(acceleration),
+        }
+    }
+
+    /// Points along it, at which borders are checked \[m\].
+    pub fn points_m(&self) -> impl Iterator<Item = Vector3<f64>> + '_ {
+        let way = (1..=SAMPLES).map(|k| self.quintic(f64::from(k) / f64::from(SAMPLES)).position);
+        way.chain([self.rest_m()])
+    }
+
+    /// The polynomial in Bernstein form, at a share of its duration.
+    fn quintic(&self, share: f64) -> Reference {
+        let (from, to, t) = (&self.from, &self.to, self.duration_s);
+        let (a, b) = (t / 5.0, t * t / 20.0);
+        let points = [
+            from.position,
+            from.position + from.velocity * a,
+            from.position + from.velocity * (2.0 * a) + from.acceleration * b,
+            to.position - to.velocity * (2.0 * a) + to.acceleration * b,
+            to.position - to.velocity * a,
+            to.position,
+        ];
+        let velocities: [Vector3<f64>; 5] =
+            core::array::from_fn(|i| (points[i + 1] - points[i]) * (5.0 / t));
+        let accelerations: [Vector3<f64>; 4] =
+            core::array::from_fn(|i| (velocities[i + 1] - velocities[i]) * (4.0 / t));
+        Reference {
+            position: de_casteljau(points, share),
+            velocity: de_casteljau(velocities, share),
+            acceleration: de_casteljau(accelerations, share),
+        }
+    }
+
+    /// After the end, at a share of the stopping time: velocity and acceleration fall to zero along a cubic.
+    fn stopping(&self, share: f64) -> Reference {
+        let (to, t) = (&self.to, self.stop_s);
+        let x = share;
+        let (x2, x3) = (x * x, x * x * x);
+        Reference {
+            position: to.position
+                + to.velocity * (t * (x - x3 + 0.5 * x2 * x2))
+                + to.acceleration * (t * t * (0.5 * x2 - 2.0 / 3.0 * x3 + 0.25 * x2 * x2)),
+            velocity: to.velocity * (1.0 - 3.0 * x2 + 2.0 * x3)
+                + to.acceleration * (t * (x - 2.0 * x2 + x3)),
+            acceleration: to.velocity * (6.0 * (x2 - x) / t)
+                + to.acceleration * (1.0 - 4.0 * x + 3.0 * x2),
+        }
+    }
+}
+
+/// Value of a Bezier curve.
+fn de_casteljau<const K: usize>(mut points: [Vector3<f64>; K], share: f64) -> Vector3<f64> {
+    for level in (1..K).rev() {
+        for i in 0..level {
+            points[i] = points[i] + (points[i + 1] - points[i]) * share;
+        }
+    }
+    points[0]
+}
