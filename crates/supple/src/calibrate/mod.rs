@@ -162,6 +162,7 @@ fn up_args(args: &CalibrateArgs, on: CalibrationPlant) -> Result<UpArgs, Failure
         no_log: true,
         prefix: args.prefix.clone(),
         view: false,
+        budget: false,
         no_realtime: args.no_realtime,
         json: args.json,
     })

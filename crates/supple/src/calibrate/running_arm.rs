@@ -73,7 +73,7 @@ impl<const N: usize> RunningArm<N> {
     ) -> Result<Self, Failure> {
         let out = std::path::absolute(out).map_err(|error| Failure::file("find", out, error))?;
         Ok(RunningArm {
-            plan: Plan::new(args, domain, None)?,
+            plan: Plan::new(args, description, domain, None)?,
             children: ChildProcesses::default(),
             reader: TelemetryReader::for_log(domain).map_err(Failure::system)?,
             session: OperatorSession::for_system(domain)?,

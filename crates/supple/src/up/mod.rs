@@ -24,7 +24,6 @@ pub use statistics::{Percentiles, RunStatistics};
 pub use system::System;
 
 use crate::cli::{PlantKind, UpArgs};
-use children::Pidfile;
 use std::os::unix::process::CommandExt;
 use supple_cli::arms;
 use supple_cli::console::{print_json, print_line, print_status, write_stderr_in_background};
