@@ -36,8 +36,7 @@ impl Emulated {
         let arguments = [&["motors"], arguments].concat();
         for _ in 0..200 {
             let output = run(self.path(), &arguments);
-            let text = stderr_of(&output);
-            if !(text.contains("supple-emu") || text.contains("No such file")) {
+            if !stderr_of(&output).contains("start the emulator first") {
                 return output;
             }
             std::thread::sleep(core::time::Duration::from_millis(20));
