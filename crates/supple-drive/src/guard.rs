@@ -272,7 +272,13 @@ impl SafeActionMachine {
             return Some(LossReason::Answer);
         }
         if input.answer == Some(false) {
-            return Some(LossReason::TorqueNotWanted);
+            // Motors that carry their state in the reply to their torque are lost to the controller with the frames: it
+            // wants no torque before the transmission has failed for long.
+            let cause = self.rest == Rest::Falls && input.unsent;
+            return Some(match cause {
+                true => LossReason::Transmit,
+                false => LossReason::TorqueNotWanted,
+            });
         }
         input.drive_guard_loss.or(input.drive_loss)
     }

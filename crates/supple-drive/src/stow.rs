@@ -3,7 +3,9 @@
 //! While the arm is held, its torque is gravity compensation at the measured pose, and the motors damp. While it is
 //! laid down, a reference moves from the pose at which that began to the rest pose, at a low joint speed, and a weak
 //! spring of each joint pulls towards it: `tau = g(q) + k (q_ref - q)`. A joint without an angle keeps its last one
-//! for gravity and has no spring. Source: own derivation; the reference is the quintic `10 s^3 - 15 s^4 + 6 s^5`.
+//! for gravity and has no spring. When the reference has arrived, the torque fades to zero while the motors still damp:
+//! the arm settles on its support, and disabling the motors takes no torque away. Source: own derivation; the
+//! reference is the quintic `10 s^3 - 15 s^4 + 6 s^5`.
 
 use supple_core::dynamics::gravity;
 use supple_core::{Arm, Vector};
@@ -25,7 +27,9 @@ pub struct StowConfig<const N: usize> {
     pub hold_at_end: bool,
 }
 
-/// Time after the reference has arrived until the motors are disabled \[s\].
+/// Time in which the torque fades after the reference has arrived, and time without torque until the motors are
+/// disabled \[s\].
+const FADE_S: f64 = 1.0;
 const SETTLE_S: f64 = 0.5;
 /// Peak of the speed of the quintic, times duration over distance.
 const QUINTIC_PEAK: f64 = 1.875;
@@ -97,18 +101,19 @@ impl<const N: usize> Stowing<N> {
         };
         let share = s * s * s * (10.0 + s * (6.0 * s - 15.0));
         let reference_rad = from_rad + (stow_rad - from_rad) * share;
-        Vector::from_fn(|joint, _| {
+        let torque_nm = Vector::from_fn(|joint, _| {
             let error_rad = reference_rad[joint] - self.pose_rad[joint];
             let spring = self.config.stiffness_nm_per_rad[joint] * error_rad;
             hold_nm[joint] + if self.present[joint] { spring } else { 0.0 }
-        })
+        });
+        torque_nm * (1.0 - (elapsed_s - duration_s) / FADE_S).clamp(0.0, 1.0)
     }
 
     /// Whether the arm lies, `elapsed_s` after laying down began.
     pub fn has_ended(&self, elapsed_s: f64) -> bool {
         match (self.config.stow_rad, self.begin) {
             (None, _) => true,
-            (Some(_), Some((_, duration_s))) => elapsed_s > duration_s + SETTLE_S,
+            (Some(_), Some((_, duration_s))) => elapsed_s > duration_s + FADE_S + SETTLE_S,
             (Some(_), None) => false,
         }
     }

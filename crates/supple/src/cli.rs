@@ -302,6 +302,9 @@ pub struct UpArgs {
     /// The arm's bus, can:NAME or unix:FOLDER. Default: can:can0 for `can`, private sockets for `emu`.
     #[arg(long, value_name = "BUS")]
     pub bus: Option<Address>,
+    /// Print the bus time of a cycle of this arm at the requested rate and end; the exit code tells whether it fits.
+    #[arg(long)]
+    pub budget: bool,
     /// Declare that the arm is in its home pose now; used if the motor pucks have lost their positions. An emulated
     /// arm always starts there.
     #[arg(long)]

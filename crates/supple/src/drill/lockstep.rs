@@ -68,6 +68,7 @@ pub fn perform<const N: usize>(spec: &Spec, arm: &TestArm) -> Result<Row, Failur
         strict: arm.strict,
         track: UpTrajectory::Sinusoid,
         bus: None,
+        budget: false,
         zero_at_home: false,
         learn: false,
         tare: false,

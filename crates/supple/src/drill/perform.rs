@@ -65,6 +65,7 @@ pub fn perform<const N: usize>(
             _ => UpTrajectory::Sinusoid,
         },
         bus: None,
+        budget: false,
         zero_at_home: false,
         learn: false,
         tare: false,

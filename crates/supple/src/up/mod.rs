@@ -21,12 +21,14 @@ pub use stages::{GRAVITY_HOLD_S, START_S};
 pub use statistics::{Percentiles, RunStatistics};
 pub use system::System;
 
-use crate::cli::UpArgs;
+use crate::cli::{PlantKind, UpArgs};
 use children::Pidfile;
+use std::os::unix::process::CommandExt;
 use supple_cli::arms;
 use supple_cli::console::{print_json, print_line, print_status, write_stderr_in_background};
 use supple_cli::exit::Failure;
 use supple_cli::interrupt;
+use supple_cli::sibling::program_beside;
 use supple_ipc::Domain;
 use supple_model::{Description, with_dof};
 
@@ -36,7 +38,24 @@ use supple_model::{Description, with_dof};
 /// [`Failure`]; [`Failure::RunFault`] after the system is shut down and everything is written.
 pub fn run(args: &UpArgs) -> Result<(), Failure> {
     let description = args.at_rate(arms::find(&args.arm, args.strict)?)?;
+    if args.budget {
+        return show_budget(args);
+    }
     with_dof!(description.dof(), N => sized::<N>(args, &description))?
+}
+
+/// Replaces this process by the one that owns the bus, which prints its arithmetic.
+fn show_budget(args: &UpArgs) -> Result<(), Failure> {
+    if args.plant == PlantKind::Sim {
+        return print_line("A simulated arm has no bus: --plant emu or --plant can.");
+    }
+    let program = program_beside(PlantKind::Can.clock_owner())?;
+    let mut command = std::process::Command::new(&program);
+    command.args(["--arm", &args.arm, "--budget"]);
+    if let Some(rate_hz) = args.rate_hz {
+        command.args(["--rate-hz".to_owned(), rate_hz.to_string()]);
+    }
+    Err(Failure::file("start", &program, command.exec()))
 }
 
 fn sized<const N: usize>(args: &UpArgs, description: &Description) -> Result<(), Failure> {

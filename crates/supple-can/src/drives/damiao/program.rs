@@ -6,6 +6,7 @@ use super::start_up::{rates, start_up};
 use crate::options::Options;
 use crate::serve::{Ended, SEARCH_INTERVAL, open, serve, sum_counters};
 use supple_bus::{Address, Bus, BusError};
+use supple_can_frame::BitRates;
 use supple_core::{Config, Vector};
 use supple_drive::{Counters, CycleConfig, Link, PlantLoop, SharedMemoryLink, StowConfig};
 use supple_ipc::{Domain, PlantLink};
@@ -158,6 +159,14 @@ fn check_rate(
     let budget = budget.time("the controller's answer", cycle_config.answer_ns);
     if shown {
         println!("{}", budget.display(cycle_config.period_ns));
+        let other = match rates(bus).has_fd() {
+            true => BitRates::CLASSIC_1M,
+            false => BitRates::FD_1M_5M,
+        };
+        let other = super::budget(other, joints);
+        let other = other.time("the controller's answer", cycle_config.answer_ns);
+        println!("\nWith the motors set to the other format:");
+        println!("{}", other.display(cycle_config.period_ns));
     }
     Ok(budget.check(cycle_config.period_ns)?)
 }
