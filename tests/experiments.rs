@@ -356,6 +356,8 @@ fn the_sinusoid_runs_with_seven_active_joints() {
 }
 
 /// Sinusoids in the workspace of the arms with geared motors, at 5 N/m with a model that has the error of an identification.
+/// In the sagittal plane of the OpenArm joint 2 rests, as the base of the paper's arm does. Beside that plane it moves little
+/// and reverses, at a short lever: its dry friction then holds the tip some 20 mm off.
 #[test]
 fn openarm_and_yam_track_a_sinusoid_at_5_n_per_m() {
     fn rms_error_m<const N: usize>(name: &str, centre_m: [f64; 3], seed: u64) -> f64 {
@@ -384,8 +386,9 @@ fn openarm_and_yam_track_a_sinusoid_at_5_n_per_m() {
     let seeds: Vec<u64> = (0..4).collect();
     let found = side_by_side(&seeds, |seed| {
         [
-            rms_error_m::<7>("openarm", [0.31, -0.23, 0.43], *seed),
+            rms_error_m::<7>("openarm", [0.31, -0.149, 0.42], *seed),
             rms_error_m::<6>("yam", [0.40, 0.0, 0.42], *seed),
+            rms_error_m::<7>("openarm", [0.31, -0.23, 0.43], *seed),
         ]
     });
     for errors_m in found {

@@ -7,8 +7,9 @@ use moteus_protocol::query::{QueryFormat, QueryResult};
 use moteus_protocol::{CanFdFrame, Mode, Resolution, calculate_arbitration_id};
 use supple_bus::{Bus, Event};
 use supple_can_frame::timing::Shape;
-use supple_can_frame::{BitRates, CanFrame, CanId, FrameFormat};
+use supple_can_frame::{BitRates, CanFrame, CanId};
 use supple_core::Vector;
+use supple_core::controller::Mode::GravityHold;
 use supple_drive::{
     Budget, BusPort, Command, Drive, DriveCounters, DriveState, Drives, LoopError, LossReason,
     Lower, MotorFault, Reading, Received, Reserved, Rest,
@@ -19,20 +20,13 @@ pub const KD_NM_S_PER_RAD: f64 = 4.0;
 /// Silence after which a motor ends its torque \[s\].
 const WATCHDOG_S: f32 = 0.02;
 const MAX_TORQUE_NM: f32 = 100.0;
-const FD: FrameFormat = FrameFormat::Fd {
-    bit_rate_switch: true,
-};
 /// Data length codes of 48 and 32 bytes.
 const COMMAND_DLC: u8 = 14;
 const REPLY_DLC: u8 = 13;
 const REGISTER_MAP: u16 = 0x102;
 
-pub fn query_format() -> QueryFormat {
-    QueryFormat::default()
-}
-
 /// A torque at the output \[N m\], with a share of the motor's own damping.
-pub fn torque_frame(frame: &mut CanFdFrame, torque_nm: f64, kd_scale: f64) {
+fn torque_frame(frame: &mut CanFdFrame, torque_nm: f64, kd_scale: f64) {
     PositionCommand::new()
         .position(f32::NAN)
         .velocity(0.0)
@@ -43,7 +37,7 @@ pub fn torque_frame(frame: &mut CanFdFrame, torque_nm: f64, kd_scale: f64) {
         .watchdog_timeout(WATCHDOG_S)
         .ilimit_scale(0.0)
         .serialize(frame, &PositionFormat::default());
-    query_format().serialize(frame);
+    QueryFormat::default().serialize(frame);
 }
 
 /// Frame to motor `index`, counted from 0, on the bus.
@@ -163,14 +157,14 @@ impl<const N: usize, B: Bus> Drive<N> for Moteus<N, B> {
     }
 
     fn budget(&self) -> Budget {
+        let format = self.port.rates().format();
         let command = Shape {
-            format: FD,
             extended: true,
-            dlc: COMMAND_DLC,
+            ..Shape::standard(format, COMMAND_DLC)
         };
         Budget::new(self.port.rates(), N)
             .frames("commands", N, command)
-            .frames("replies", N, Shape::standard(FD, REPLY_DLC))
+            .frames("replies", N, Shape::standard(format, REPLY_DLC))
     }
 
     fn request(&mut self) -> Result<(), LoopError> {
@@ -182,7 +176,7 @@ impl<const N: usize, B: Bus> Drive<N> for Moteus<N, B> {
                 torque_frame(&mut frame, self.torque_nm[index], kd_scale);
             } else {
                 StopCommand::serialize(&mut frame);
-                query_format().serialize(&mut frame);
+                QueryFormat::default().serialize(&mut frame);
             }
             self.port.send(&on_bus(index, frame))?;
         }
@@ -232,14 +226,13 @@ impl<const N: usize, B: Bus> Drive<N> for Moteus<N, B> {
     }
 
     fn operate(&mut self, command: Option<&Command<N>>, allowed: bool) -> bool {
-        use supple_core::controller::Mode as ControllerMode;
         let Some(command) = command else {
             return false;
         };
         self.latched &= command.wants_torque;
-        let holding = command.mode == Some(ControllerMode::GravityHold) && command.wants_torque;
-        let stopped = self.modes.iter().all(|mode| *mode == Mode::Stopped);
-        let may = allowed && holding && stopped && !self.latched && !self.enabled;
+        let holding = command.mode == Some(GravityHold) && command.wants_torque;
+        let stopped = self.modes == [Mode::Stopped; N] && !self.enabled;
+        let may = allowed && holding && stopped && !self.latched;
         self.enabled |= may;
         may
     }

@@ -14,7 +14,7 @@ const RATES: BitRates = BitRates::FD_1M_5M;
 const LATENCY_NS: u64 = 20_000;
 const STEP_NS: u64 = 250_000;
 
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 struct Motor {
     mode: Mode,
     fault: i8,
@@ -32,8 +32,7 @@ impl Motor {
             0x000 => {
                 let mode = Mode::try_from(raw[0]).unwrap_or(Mode::Fault);
                 // Only a stop leaves a fault or a timeout.
-                let stuck = matches!(self.mode, Mode::Fault | Mode::Timeout);
-                if !stuck || mode == Mode::Stopped {
+                if !matches!(self.mode, Mode::Fault | Mode::Timeout) || mode == Mode::Stopped {
                     self.mode = mode;
                 }
             }
@@ -50,8 +49,8 @@ pub struct EmulatedMoteus {
     motors: [Motor; 4],
     now_ns: u64,
     next_tick_ns: u64,
-    /// Frames with the time at which they may start \[ns\]; in order of sending.
-    waiting: VecDeque<(u64, Event)>,
+    /// Frames in order of sending: when they may start, and how long they last \[ns\].
+    waiting: VecDeque<(u64, u64, Event)>,
     free_ns: u64,
     pub register_map: i16,
 }
@@ -62,16 +61,9 @@ impl EmulatedMoteus {
         config.step_s = STEP_NS as f64 * 1e-9;
         config.cycle_s = config.step_s;
         config.actuators.torque_delay_cycles = 0;
-        let home = description.home().unwrap();
         EmulatedMoteus {
-            plant: Plant::new(config, home, Vector::zeros()).unwrap(),
-            motors: [Motor {
-                mode: Mode::Stopped,
-                fault: 0,
-                torque_nm: 0.0,
-                kd_scale: 0.0,
-                due_ns: u64::MAX,
-            }; 4],
+            plant: Plant::new(config, description.home().unwrap(), Vector::zeros()).unwrap(),
+            motors: [Motor::default(); 4],
             now_ns: 0,
             next_tick_ns: STEP_NS,
             waiting: VecDeque::new(),
@@ -182,18 +174,17 @@ impl Peer for EmulatedMoteus {
     }
 
     fn host_sends(&mut self, frame: &CanFrame) {
-        self.waiting.push_back((self.now_ns, Event::Sent(*frame)));
+        let event = Event::Sent(*frame);
+        self.waiting
+            .push_back((self.now_ns, RATES.duration_ns(frame), event));
     }
 
     fn run_until(&mut self, until_ns: u64) -> Option<Event> {
         loop {
-            let next = self.waiting.front().map(|(ready_ns, event)| {
-                let (Event::Sent(frame) | Event::Frame(frame)) = event else {
-                    return u64::MAX;
-                };
-                self.free_ns.max(*ready_ns) + RATES.duration_ns(frame)
+            let front = self.waiting.front();
+            let end_ns = front.map_or(u64::MAX, |(ready_ns, lasts_ns, _)| {
+                self.free_ns.max(*ready_ns) + lasts_ns
             });
-            let end_ns = next.unwrap_or(u64::MAX);
             let next_ns = end_ns.min(self.next_tick_ns);
             if next_ns > until_ns {
                 self.now_ns = until_ns.max(self.now_ns);
@@ -205,12 +196,14 @@ impl Peer for EmulatedMoteus {
                 continue;
             }
             self.free_ns = end_ns;
-            let (_, event) = self.waiting.pop_front()?;
+            let (_, _, event) = self.waiting.pop_front()?;
             if let Event::Sent(frame) = &event
                 && let Some(reply) = self.reaction(frame)
             {
+                let lasts_ns = RATES.duration_ns(&reply);
                 let ready_ns = self.now_ns + LATENCY_NS;
-                self.waiting.push_back((ready_ns, Event::Frame(reply)));
+                self.waiting
+                    .push_back((ready_ns, lasts_ns, Event::Frame(reply)));
             }
             return Some(event);
         }

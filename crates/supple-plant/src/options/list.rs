@@ -146,7 +146,7 @@ plant_options! {
         "users of geared motors find the commanded torque divided by 1.3 to 1.5: 0.28 with a spread of 0.05.";
     torque_shortfall_spread: "1", 0.0..=0.3,
         "Largest deviation of a motor's shortfall from the mean, uniform by motor.",
-        "as above.";
+        "users of geared motors: the commanded torque divided by 1.3 to 1.5.";
     base_tilt_rad: "rad", 0.0..=0.5,
         "Angle between the base axis and the vertical; direction by seed.",
         "assumption; 0.2 degrees are 3.5 mrad.";
