@@ -36,6 +36,7 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
         Command::Offline(
             OfflineCommand::Demo(_)
             | OfflineCommand::Effects(_)
+            | OfflineCommand::New(_)
             | OfflineCommand::Identification(_),
         ) => Err(exec_report()),
         Command::Up(args) => up::run(args),
