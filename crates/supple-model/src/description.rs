@@ -177,9 +177,13 @@ impl Description {
             in_urdf,
             in_toml,
             &robot,
-            &settings.tip_frame,
-            &settings.fixed_joints_rad,
-            settings.repair_inertia,
+            &tree::ChainSettings {
+                tip_frame: &settings.tip_frame,
+                fixed: &settings.fixed_joints_rad,
+                // A TOML that lists joints counts them.
+                freeze_on_path: settings.joints.is_empty() && settings.home_rad.is_none(),
+                repair: settings.repair_inertia,
+            },
         )?;
         resolve::check_rest(in_toml, &settings)?;
         let joints = resolve::joints(in_urdf, in_toml, &settings, &robot, &chain)?;
@@ -333,6 +337,11 @@ impl Description {
     pub fn transforms(&self, q_rad: &[f64]) -> Result<Vec<Transform<'_>>, ModelError> {
         self.expect_dof(q_rad.len())?;
         Ok(shapes::transforms(&self.robot, &self.chain, q_rad))
+    }
+
+    /// Joints that do not move, with their positions \[rad, m for a prismatic joint\].
+    pub(crate) fn frozen(&self) -> &crate::frozen::Frozen {
+        &self.chain.frozen
     }
 
     /// Name of the TOML's file, for messages.

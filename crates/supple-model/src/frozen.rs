@@ -1,5 +1,6 @@
-//! Movable joints that do not move: those that the TOML fixes, those beside the way to the tip, and those on it that no
-//! controller of this crate moves (prismatic joints, mimics, and the first ones of a chain of more than seven).
+//! Movable joints that do not move: those that the TOML fixes, those beside the way to the tip, and, if the TOML says nothing
+//! about single joints, those on the way that no controller of this crate moves (prismatic joints, mimics, and the first ones
+//! of a chain of more than seven).
 //!
 //! Each stays at the angle that the TOML gives, otherwise at zero or at the end of its range that is closest to zero; one
 //! warning lists the joints of each kind.
@@ -15,12 +16,14 @@ pub(crate) type Frozen = BTreeMap<String, f64>;
 /// Maximum number of moving joints.
 const MAX_MOVING: usize = 7;
 
-/// The frozen joints, `given` by the TOML or found here. `path` are the joints from the root to the tip, in order.
+/// The frozen joints, `given` by the TOML or found here. `path` are the joints from the root to the tip, in order;
+/// `on_path` allows to freeze some of them.
 pub(crate) fn frozen(
     report: Reporter<'_>,
     robot: &Robot,
     path: &[usize],
     given: &BTreeMap<String, f64>,
+    on_path: bool,
 ) -> (Frozen, Vec<Finding>) {
     let mut frozen = given.clone();
     let mut warnings = Vec::new();
@@ -28,7 +31,11 @@ pub(crate) fn frozen(
         let joint = &robot.joints[joint];
         joint.joint_type != JointType::Fixed && !given.contains_key(&joint.name)
     };
-    let free_on_path = || path.iter().copied().filter(|joint| is_free(*joint));
+    let free_on_path = || {
+        path.iter()
+            .copied()
+            .filter(|joint| on_path && is_free(*joint))
+    };
     let cannot_move = |joint: &usize| {
         let joint = &robot.joints[*joint];
         joint.mimic.is_some() || !is_revolute(&joint.joint_type)

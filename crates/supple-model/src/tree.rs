@@ -51,21 +51,36 @@ pub(crate) struct Chain {
     pub warnings: Vec<Finding>,
 }
 
-/// Reads the chain. `given` are the joints that the TOML freezes; `repair` replaces every inertia that no rigid body has.
+/// What the TOML says about the chain.
+pub(crate) struct ChainSettings<'a> {
+    pub tip_frame: &'a str,
+    /// Joints that the TOML freezes, with their positions.
+    pub fixed: &'a BTreeMap<String, f64>,
+    /// Whether joints on the way to the tip may be frozen too.
+    pub freeze_on_path: bool,
+    /// Replaces every inertia that no rigid body has.
+    pub repair: bool,
+}
+
+/// Reads the chain.
 pub(crate) fn chain(
     report: Reporter<'_>,
     toml: Reporter<'_>,
     robot: &Robot,
-    tip_frame: &str,
-    given: &BTreeMap<String, f64>,
-    repair: bool,
+    settings: &ChainSettings<'_>,
 ) -> Result<Chain, ModelError> {
     let tree = Tree::new(report, robot)?;
     let tip = tree
-        .link(tip_frame)
-        .ok_or_else(|| no_tip(toml, robot, tip_frame))?;
+        .link(settings.tip_frame)
+        .ok_or_else(|| no_tip(toml, robot, settings.tip_frame))?;
     let path = tree.path_to(tip);
-    let (frozen, mut warnings) = frozen::frozen(report, robot, &path, given);
+    let (frozen, mut warnings) = frozen::frozen(
+        report,
+        robot,
+        &path,
+        settings.fixed,
+        settings.freeze_on_path,
+    );
     let on_chain = |joint: usize| {
         path.contains(&joint)
             && is_movable(&robot.joints[joint].joint_type)
@@ -77,7 +92,7 @@ pub(crate) fn chain(
         frozen: &frozen,
         on_chain: &on_chain,
         on_path: &on_path,
-        repair,
+        repair: settings.repair,
         repaired: RefCell::default(),
         body: None,
         next: None,
@@ -467,7 +482,7 @@ fn unsupported(report: Reporter<'_>, joint: &urdf_rs::Joint) -> ModelError {
         format!("joint `{}`", joint.name),
         "only revolute, continuous and fixed joints are supported",
         format!("{:?}", joint.joint_type).to_lowercase(),
-        "take another tip_frame, or make it fixed in the URDF",
+        "fix it under [fixed_joints_rad] of the TOML (in m if it is prismatic), or take another tip_frame",
     )
 }
 

@@ -9,6 +9,7 @@ mod demo;
 mod effects;
 pub mod figures;
 mod identification;
+mod new_arm;
 mod progress;
 pub mod report;
 pub mod sections;
@@ -44,6 +45,7 @@ fn dispatch(command: &OfflineCommand) -> Result<(), Failure> {
         OfflineCommand::Demo(args) => demo::run(args),
         OfflineCommand::Effects(args) => effects::run(args),
         OfflineCommand::Identification(command) => identification::run(command),
+        OfflineCommand::New(args) => new_arm::run(args),
         OfflineCommand::Log(command) => log::run(command),
         OfflineCommand::Arms(args) => arms::run(args),
         OfflineCommand::Plant(command) => command.run(),

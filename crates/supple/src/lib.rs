@@ -45,6 +45,7 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
         Command::Offline(
             OfflineCommand::Demo(_)
             | OfflineCommand::Effects(_)
+            | OfflineCommand::New(_)
             | OfflineCommand::Identification(_),
         ) => Err(exec_report()),
         Command::View(args) => view::run(args),

@@ -4,6 +4,7 @@ mod demo;
 mod effects;
 mod identification;
 mod log;
+mod new;
 mod plant;
 mod urdf;
 
@@ -14,6 +15,7 @@ pub use identification::{
     IdentificationCommand, IdentifyArgs, LearnArgs, RunArgs, Solver,
 };
 pub use log::LogCommand;
+pub use new::NewArgs;
 pub use plant::{PlantArgs, PlantCommand};
 pub use urdf::UrdfArgs;
 
@@ -33,6 +35,9 @@ pub enum OfflineCommand {
     /// Identify an arm, and measure what the identification needs.
     #[command(flatten)]
     Identification(IdentificationCommand),
+    /// Make an arm from a URDF: a commented TOML with every derived setting, a drawing, and a first run in simulation.
+    #[command(after_help = CODES)]
+    New(NewArgs),
     /// Inspect, export, replay and recover logs.
     #[command(subcommand)]
     Log(LogCommand),
@@ -80,6 +85,7 @@ impl OfflineCommand {
             OfflineCommand::Demo(args) => args.json,
             OfflineCommand::Effects(args) => args.json,
             OfflineCommand::Identification(command) => command.json(),
+            OfflineCommand::New(args) => args.json,
             OfflineCommand::Log(command) => command.json(),
             OfflineCommand::Plant(command) => command.json(),
             OfflineCommand::Arms(args) => args.json,

@@ -97,6 +97,11 @@ fn complete<const N: usize>(given: &Description) -> Result<Completed, ModelError
     }
     let mut description = given.clone();
     if !is_complete {
+        // A TOML that lists joints freezes none on the way to the tip by itself.
+        for (joint, position) in given.frozen() {
+            let why = "no controller here moves it, or it does not carry the tip";
+            writer.set("fixed_joints_rad", joint, *position, why);
+        }
         inertia::add(&mut writer, &description.config::<N>()?);
         description = writer.read(&description)?;
     }

@@ -24,6 +24,7 @@ impl Writer {
         })?;
         for key in [
             "joints",
+            "fixed_joints_rad",
             "limits",
             "law",
             "latch",
