@@ -9,8 +9,8 @@ mod plant;
 pub use demo::DemoArgs;
 pub use effects::EffectsArgs;
 pub use identification::{
-    BreakawayArgs, CalibrateArgs, Criterion, DesignArgs, ExciteCommand, IdentificationCommand,
-    IdentifyArgs, LearnArgs, RunArgs, Solver,
+    BreakawayArgs, CalibrateArgs, Criterion, DesignArgs, ExciteCommand, FrictionArg,
+    IdentificationCommand, IdentifyArgs, LearnArgs, RunArgs, Solver, TorqueDelay,
 };
 pub use log::LogCommand;
 pub use plant::{PlantArgs, PlantCommand};

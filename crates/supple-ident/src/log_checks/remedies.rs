@@ -103,8 +103,6 @@ fn discrete(moving: &[usize]) -> Vec<Remedy> {
         Remedy::Angle(None, -1.0),
         Remedy::Torque(None, -1.0),
         Remedy::Reverse,
-        Remedy::Time(0.5),
-        Remedy::Time(2.0),
     ];
     for (i, &a) in moving.iter().enumerate() {
         all.push(Remedy::Angle(Some(a), -1.0));
@@ -193,6 +191,10 @@ impl<'a, const N: usize> Search<'a, N> {
             .count();
         let worse = pairs().any(|(before, after)| *after > 1.05 * *before);
         let small = tried.gain < 0.15;
+        if matches!(tried.remedy, Remedy::Time(_)) {
+            let half = 2 * better >= self.given.relative.len();
+            return Ok(half && !worse);
+        }
         if small && (worse || better < 2) && !matches!(tried.remedy, Remedy::Zero(..)) {
             return Ok(false);
         }
@@ -293,8 +295,12 @@ impl<'a, const N: usize> Search<'a, N> {
                 }
             }
         }
-        all.push(self.refine(&|f| Remedy::Time(f), 0.4, 1.0, true)?);
-        all.push(self.refine(&|f| Remedy::Time(f), 1.0, 2.5, true)?);
+        for (low, high) in [(0.4, 1.0), (1.0, 2.5)] {
+            let tried = self.refine(&|f| Remedy::Time(f), low, high, true)?;
+            if self.is_a_peak(&tried)? {
+                all.push(tried);
+            }
+        }
         all.sort_by(|a, b| {
             (b.gain - b.remedy.threshold()).total_cmp(&(a.gain - a.remedy.threshold()))
         });

@@ -2,15 +2,16 @@
 
 use super::report::{ReportInput, Summary, html, summary};
 use std::path::Path;
-use supple_cli::arguments::IdentifyArgs;
+use supple_cli::arguments::{IdentifyArgs, TorqueDelay};
 use supple_cli::arms;
 use supple_cli::console::{json, print_line};
 use supple_cli::exit::Failure;
 use supple_cli::out::Staging;
+use supple_core::Arm;
 use supple_experiment::predict_tracking_error;
 use supple_ident::{
-    Fit, FrictionChoice, Log, Motion, Preparation, Procedure, Validation, fit_with_stribeck,
-    identify_motions, read_logs,
+    Fit, Log, Motion, Preparation, Procedure, Validation, fit_with_stribeck, identify_motions,
+    read_logs,
 };
 use supple_model::{Description, with_dof};
 
@@ -45,10 +46,21 @@ fn procedure(args: &IdentifyArgs, period_s: f64) -> Procedure {
             keep_every: if all_mcap { 10 } else { 1 },
             // supple's own logs contain commanded torques; a command acts one cycle later and for one cycle, hence
             // the delay of 1.5 periods.
-            torque_delay_s: if all_mcap { 1.5 * period_s } else { 0.0 },
+            torque_delay_s: match args.torque_delay {
+                Some(TorqueDelay::Seconds(delay_s)) => delay_s,
+                Some(TorqueDelay::Estimate) => 0.0,
+                None if all_mcap => 1.5 * period_s,
+                None => 0.0,
+            },
         },
+        estimate_delay: match args.torque_delay {
+            Some(delay) => delay == TorqueDelay::Estimate,
+            None => !all_mcap,
+        },
+        accept_wrong_logs: args.accept_wrong_logs,
+        prior_weight: args.prior_weight,
         method: args.method.into(),
-        friction: FrictionChoice::Auto,
+        friction: args.friction.into(),
         slow_rad_per_s: slow_limit_rad_per_s(args).unwrap_or(0.0),
         joint_noise_nm: (!args.noise.is_empty()).then(|| args.noise.clone()),
         ..Procedure::default()
@@ -76,16 +88,17 @@ fn slow_limit_rad_per_s(args: &IdentifyArgs) -> Option<f64> {
 type NamedMotions = Vec<(String, Motion)>;
 
 fn motions<const N: usize>(
+    nominal: &Arm<N>,
     paths: &[std::path::PathBuf],
     moving: &[usize],
-    preparation: &Preparation,
+    procedure: &Procedure,
     warnings: &mut Vec<supple_ident::Warning>,
 ) -> Result<NamedMotions, Failure> {
     let mut all = Vec::new();
     for path in paths {
         let logs: Vec<Log> = read_logs::<N>(path)?;
         for log in &logs {
-            let (motion, motion_warnings) = Motion::prepare(log, N, moving, preparation)?;
+            let (motion, motion_warnings) = procedure.prepare(nominal, log, moving)?;
             warnings.extend(motion_warnings);
             all.push((path.display().to_string(), motion));
         }
@@ -99,9 +112,8 @@ fn run_with_dof<const N: usize>(arm: &Description, args: &IdentifyArgs) -> Resul
     let procedure = procedure(args, arm.settings().period_s);
     let moving = procedure.moving_joints(N)?;
     let mut warnings = Vec::new();
-    let preparation = &procedure.preparation;
-    let mut fitted = motions::<N>(&args.logs, &moving, preparation, &mut warnings)?;
-    let mut held_out = motions::<N>(&args.validate, &moving, preparation, &mut warnings)?;
+    let mut fitted = motions::<N>(&nominal, &args.logs, &moving, &procedure, &mut warnings)?;
+    let mut held_out = motions::<N>(&nominal, &args.validate, &moving, &procedure, &mut warnings)?;
     if held_out.is_empty()
         && let Some((name, motion)) = fitted.first_mut()
     {
@@ -116,7 +128,7 @@ fn run_with_dof<const N: usize>(arm: &Description, args: &IdentifyArgs) -> Resul
     let data: Vec<Motion> = fitted.iter().map(|(_, motion)| motion.clone()).collect();
     let mut fit: Fit<N> = if slow_limit_rad_per_s(args).is_some() {
         let with_fixed_prior = Procedure {
-            prior_weight: Some(1.0),
+            prior_weight: procedure.prior_weight.or(Some(1.0)),
             ..procedure.clone()
         };
         fit_with_stribeck(&nominal, &data, &moving, &with_fixed_prior)?
