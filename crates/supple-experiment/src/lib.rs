@@ -83,4 +83,4 @@ pub use setup::{Setup, Variant};
 pub use start::{active_joints, start_pose};
 pub use trace::{JointTorque, Sample, Trace};
 pub use tracking::{IdentifiedModelTracking, track_with_identified_model};
-pub use tracking_prediction::{TrackingPrediction, predict_tracking_error};
+pub use tracking_prediction::{GOOD_M, TrackingPrediction, predict_tracking_error};

@@ -4,7 +4,7 @@
 //! the force `F` at the tip that has the torques `J' F = r` at the joints that move the tip. What the residual is made of
 //! does not matter: noise averages out over the time that the tip needs to move, structure over joint angle and direction
 //! does not. So the residuals are averaged over cells of angle and direction of each joint first; what the cells keep
-//! beyond their own noise counts, and a share of the rest.
+//! beyond their own noise counts.
 //!
 //! The factor to the upper bound is that which covers nine tenths of the calibrations of simulated arms with random effects
 //! of real ones (`docs/verdict.md`).
@@ -18,17 +18,17 @@ use supple_ident::estimate::pseudo_inverse;
 use supple_ident::{DMatrix as Matrix, Motion};
 
 /// Cells of angle over the range of a joint.
-const CELLS: usize = 12;
+const CELLS: usize = 6;
 /// Fewest samples of a cell.
 const MIN_SAMPLES: usize = 8;
 /// Samples that one independent one stands for: residuals are smooth.
-const CORRELATED_S: f64 = 0.1;
+const CORRELATED_S: f64 = 0.24;
 /// Number of poses at which forces are computed.
 const POSES: usize = 200;
 /// Upper bound over the estimate.
 pub const UPPER_FACTOR: f64 = 1.0;
 /// Lower bound over the estimate.
-pub const LOWER_FACTOR: f64 = 0.2;
+pub const LOWER_FACTOR: f64 = 0.1;
 
 /// Interval that contains the tracking error in nine of ten cases.
 #[derive(Clone, Debug, PartialEq, Serialize)]

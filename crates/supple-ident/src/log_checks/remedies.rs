@@ -319,15 +319,6 @@ pub(super) fn check<const N: usize>(
     for _ in 0..2 {
         let (search, given) = Search::new(context, &motion)?;
         let tried = search.best(&moving)?;
-        if std::env::var_os("SUPPLE_SHOW_REMEDIES").is_some() {
-            eprintln!("given {:.3} {:.3?}", given.score(), given.relative);
-            for tried in tried.iter().take(12) {
-                eprintln!(
-                    "  {:?} gain {:.3} {:.3?}",
-                    tried.remedy, tried.gain, tried.after.relative
-                );
-            }
-        }
         let Some(best) = tried.first() else { break };
         if best.gain < best.remedy.threshold() {
             findings.extend(zero(context, &motion)?);
@@ -357,12 +348,6 @@ fn zero<const N: usize>(
         return Ok(None);
     };
     let tried = search.try_one(Remedy::Zero(joint, by))?;
-    if std::env::var_os("SUPPLE_SHOW_REMEDIES").is_some() {
-        eprintln!(
-            "zero {joint} {by:.3}: {before:.4} {after:.4} gain {:.4}",
-            tried.gain
-        );
-    }
     if tried.gain < 0.01 {
         return Ok(None);
     }

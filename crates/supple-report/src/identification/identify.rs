@@ -189,9 +189,32 @@ pub fn write<const N: usize>(
 /// # Errors
 /// [`Failure::File`].
 pub fn print(summary: &Summary, out: &Path) -> Result<(), Failure> {
-    for (subject, table) in &summary.choices {
-        print_line(&format!("{subject}\n{}", table.trim_end()))?;
+    for line in [
+        &summary.verdict,
+        &summary.verdict_at_5_n_per_m,
+        &summary.trial_runs,
+    ] {
+        print_line(line)?;
     }
+    for friction in &summary.friction {
+        print_line(&format!(
+            "{}: Coulomb {:.3} N m, viscous {:.3} N m s/rad, breakaway {:.3} N m, offset {:.3} N m",
+            friction.joint,
+            friction.coulomb_nm,
+            friction.viscous_nm_s_per_rad,
+            friction.breakaway_nm,
+            friction.offset_nm
+        ))?;
+    }
+    let delays: Vec<String> = summary
+        .torque_delay_s
+        .iter()
+        .map(|delay_s| format!("{:.1} ms", 1e3 * delay_s))
+        .collect();
+    print_line(&format!(
+        "time from a logged torque to its action, by held-out log: {}",
+        delays.join(", ")
+    ))?;
     print_line(&format!(
         "rank {} of {} columns, condition number {:.1}, residual {:.2} % of the torque",
         summary.rank,
@@ -209,7 +232,5 @@ pub fn print(summary: &Summary, out: &Path) -> Result<(), Failure> {
     for warning in &summary.warnings {
         print_line(&format!("warning: {warning}"))?;
     }
-    print_line(&summary.verdict)?;
-    print_line(&summary.verdict_at_5_n_per_m)?;
     print_line(&format!("model and report: {}", out.display()))
 }
