@@ -219,7 +219,7 @@ fn predicted_tracking_error_bounds_the_measured_one() {
         "{predicted:?}"
     );
     assert!(
-        measured <= 2.0 * predicted.worst_m,
+        measured <= 2.0 * predicted.worst_m.expect("a run"),
         "{measured} m against {predicted:?}"
     );
 }

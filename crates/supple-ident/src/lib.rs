@@ -64,4 +64,4 @@ pub use ripple::{RippleSearch, fit_ripple};
 pub use save::SaveError;
 pub use series::SeriesLists;
 pub use stribeck::fit_with_stribeck;
-pub use validate::Validation;
+pub use validate::{Validation, verdict};

@@ -7,8 +7,8 @@ use clap::builder::RangedU64ValueParser;
 use clap::{Args, Subcommand, ValueEnum};
 use std::path::PathBuf;
 use supple_experiment::procedure::StepName;
-use supple_ident::Method;
 use supple_ident::design::MAX_CANDIDATES;
+use supple_ident::{FrictionChoice, FrictionColumns, Method};
 use supple_plant::Injection;
 
 /// Identification command.
@@ -78,6 +78,68 @@ impl From<Solver> for Method {
     }
 }
 
+/// Friction columns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum FrictionArg {
+    /// By cross-validation.
+    Auto,
+    /// None.
+    None,
+    /// Viscous.
+    Viscous,
+    /// Viscous and Coulomb.
+    Coulomb,
+    /// Viscous, Coulomb and an offset.
+    Offset,
+    /// Viscous by direction, Coulomb and an offset.
+    Asymmetric,
+    /// Viscous, and Coulomb that grows with the load.
+    Load,
+}
+
+impl From<FrictionArg> for FrictionChoice {
+    fn from(argument: FrictionArg) -> FrictionChoice {
+        let columns = match argument {
+            FrictionArg::Auto => return FrictionChoice::Auto,
+            FrictionArg::None => FrictionColumns::NONE,
+            FrictionArg::Viscous => FrictionColumns {
+                viscous: true,
+                ..FrictionColumns::NONE
+            },
+            FrictionArg::Coulomb => FrictionColumns::COULOMB,
+            FrictionArg::Offset => FrictionColumns::OFFSET,
+            FrictionArg::Asymmetric => FrictionColumns {
+                asymmetry: true,
+                ..FrictionColumns::OFFSET
+            },
+            FrictionArg::Load => FrictionColumns {
+                load: true,
+                ..FrictionColumns::COULOMB
+            },
+        };
+        FrictionChoice::Columns(columns)
+    }
+}
+
+/// Time from a logged torque to its action.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum TorqueDelay {
+    /// Estimated for each log.
+    Estimate,
+    /// Given \[s\].
+    Seconds(f64),
+}
+
+fn torque_delay(text: &str) -> Result<TorqueDelay, String> {
+    if text == "estimate" {
+        return Ok(TorqueDelay::Estimate);
+    }
+    match text.parse::<f64>() {
+        Ok(value) if value.abs() <= 1.0 => Ok(TorqueDelay::Seconds(value)),
+        _ => Err("give seconds from -1 to 1, as in -0.008, or `estimate`".to_owned()),
+    }
+}
+
 /// Arguments of `identify`.
 #[derive(Clone, Debug, Args)]
 pub struct IdentifyArgs {
@@ -118,6 +180,19 @@ pub struct IdentifyArgs {
     /// Default: 0.15 for MCAP, 0 (none) for CSV, where friction columns are chosen by cross-validation.
     #[arg(long, value_name = "RAD/S", value_parser = between(0.0, 100.0))]
     pub slow: Option<f64>,
+    /// Friction columns of every moving joint. Default: chosen by cross-validation.
+    #[arg(long, value_enum, default_value = "auto")]
+    pub friction: FrictionArg,
+    /// Weight of the given arm, in equivalent observations. Default: chosen by cross-validation.
+    #[arg(long, value_name = "N", value_parser = between(1e-6, 1e9))]
+    pub prior_weight: Option<f64>,
+    /// Time from a logged torque to its action (s): positive for commands, negative for measured torques that lag; or
+    /// `estimate`. Default: 1.5 control periods for supple's own logs, which hold commands; otherwise `estimate`.
+    #[arg(long, value_name = "S|estimate", value_parser = torque_delay, allow_hyphen_values = true)]
+    pub torque_delay: Option<TorqueDelay>,
+    /// Fit a log although the checks against the arm found an error in it; what they found is then a warning.
+    #[arg(long)]
+    pub accept_wrong_logs: bool,
     /// Standard deviation of the torque noise of each moving joint (N m). Default: estimated from the residuals.
     #[arg(long, value_name = "NM,NM..", value_delimiter = ',', value_parser = between(1e-9, 1e6))]
     pub noise: Vec<f64>,

@@ -11,8 +11,8 @@ mod urdf;
 pub use demo::DemoArgs;
 pub use effects::EffectsArgs;
 pub use identification::{
-    BreakawayArgs, CalibrateArgs, CalibrationPlant, Criterion, DesignArgs, ExciteCommand,
-    IdentificationCommand, IdentifyArgs, LearnArgs, RunArgs, Solver,
+    BreakawayArgs, CalibrateArgs, CalibrationPlant, Criterion, DesignArgs, ExciteCommand, FrictionArg,
+    IdentificationCommand, IdentifyArgs, LearnArgs, RunArgs, Solver, TorqueDelay,
 };
 pub use log::LogCommand;
 pub use new::NewArgs;

@@ -29,9 +29,6 @@ pub(super) fn check<const N: usize>(
     findings.extend(gravities.unit());
     findings.extend(gravities.payload());
     findings.extend(offsets(context, motion, &explained));
-    if std::env::var_os("SUPPLE_SHOW_REMEDIES").is_some() {
-        eprintln!("excess: {:.3?}", explained.relative);
-    }
     Ok(findings)
 }
 
@@ -73,13 +70,6 @@ fn contacts<const N: usize>(
                 if r > best.1 { (i, r) } else { best }
             },
         );
-        if std::env::var_os("SUPPLE_SHOW_REMEDIES").is_some() {
-            eprintln!(
-                "contact joint {joint}: peak {:.1} usual, {:.2} of the torque",
-                peak / usual,
-                peak / deviation
-            );
-        }
         if peak < bound {
             continue;
         }
@@ -134,9 +124,6 @@ fn offsets<const N: usize>(
         let torque = motion.tau.column(joint);
         let mean = torque.mean();
         let deviation = torque.map(|t| (t - mean).powi(2)).mean().sqrt();
-        if std::env::var_os("SUPPLE_SHOW_REMEDIES").is_some() {
-            eprintln!("offset joint {joint}: {offset:.3} N m, dry {dry:.3}, torque {deviation:.3}");
-        }
         if offset.abs() > 1.5 * dry && offset.abs() > 0.4 * deviation {
             findings.push(
                 Finding::stop(

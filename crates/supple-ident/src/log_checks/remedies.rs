@@ -103,8 +103,6 @@ fn discrete(moving: &[usize]) -> Vec<Remedy> {
         Remedy::Angle(None, -1.0),
         Remedy::Torque(None, -1.0),
         Remedy::Reverse,
-        Remedy::Time(0.5),
-        Remedy::Time(2.0),
     ];
     for (i, &a) in moving.iter().enumerate() {
         all.push(Remedy::Angle(Some(a), -1.0));
@@ -193,6 +191,10 @@ impl<'a, const N: usize> Search<'a, N> {
             .count();
         let worse = pairs().any(|(before, after)| *after > 1.05 * *before);
         let small = tried.gain < 0.15;
+        if matches!(tried.remedy, Remedy::Time(_)) {
+            let half = 2 * better >= self.given.relative.len();
+            return Ok(half && !worse);
+        }
         if small && (worse || better < 2) && !matches!(tried.remedy, Remedy::Zero(..)) {
             return Ok(false);
         }
@@ -293,8 +295,12 @@ impl<'a, const N: usize> Search<'a, N> {
                 }
             }
         }
-        all.push(self.refine(&|f| Remedy::Time(f), 0.4, 1.0, true)?);
-        all.push(self.refine(&|f| Remedy::Time(f), 1.0, 2.5, true)?);
+        for (low, high) in [(0.4, 1.0), (1.0, 2.5)] {
+            let tried = self.refine(&|f| Remedy::Time(f), low, high, true)?;
+            if self.is_a_peak(&tried)? {
+                all.push(tried);
+            }
+        }
         all.sort_by(|a, b| {
             (b.gain - b.remedy.threshold()).total_cmp(&(a.gain - a.remedy.threshold()))
         });
@@ -313,15 +319,6 @@ pub(super) fn check<const N: usize>(
     for _ in 0..2 {
         let (search, given) = Search::new(context, &motion)?;
         let tried = search.best(&moving)?;
-        if std::env::var_os("SUPPLE_SHOW_REMEDIES").is_some() {
-            eprintln!("given {:.3} {:.3?}", given.score(), given.relative);
-            for tried in tried.iter().take(12) {
-                eprintln!(
-                    "  {:?} gain {:.3} {:.3?}",
-                    tried.remedy, tried.gain, tried.after.relative
-                );
-            }
-        }
         let Some(best) = tried.first() else { break };
         if best.gain < best.remedy.threshold() {
             findings.extend(zero(context, &motion)?);
@@ -351,12 +348,6 @@ fn zero<const N: usize>(
         return Ok(None);
     };
     let tried = search.try_one(Remedy::Zero(joint, by))?;
-    if std::env::var_os("SUPPLE_SHOW_REMEDIES").is_some() {
-        eprintln!(
-            "zero {joint} {by:.3}: {before:.4} {after:.4} gain {:.4}",
-            tried.gain
-        );
-    }
     if tried.gain < 0.01 {
         return Ok(None);
     }
