@@ -40,12 +40,15 @@ fn steps(progress: &Value) -> Vec<String> {
 fn an_emulated_arm_is_calibrated_across_an_interrupt() {
     let folder = temporary_folder();
     let mut interrupted = supple(folder.path(), &EMULATED).spawn().expect("it starts");
-    let log = folder.path().join("out/calibrate/logs/first-pass.mcap");
-    while !std::fs::metadata(&log).is_ok_and(|file| file.len() > 100_000) {
+    // A log gets its name once it is whole; the motion after this one is the first pass.
+    let logs = folder.path().join("out/calibrate/logs");
+    let log = logs.join("breakaway-3-negative.mcap");
+    while !log.exists() {
         let ended = interrupted.try_wait().expect("a child");
         assert!(ended.is_none(), "it ended before the first pass: {ended:?}");
         std::thread::sleep(std::time::Duration::from_millis(20));
     }
+    std::thread::sleep(std::time::Duration::from_millis(500));
     kill_process(Pid::from_child(&interrupted), Signal::INT).expect("it runs");
     let output = interrupted.wait_with_output().expect("it ends");
     assert_eq!(output.status.code(), Some(130), "{}", stderr_of(&output));
