@@ -36,6 +36,10 @@ fn steps(progress: &Value) -> Vec<String> {
 /// The emulated arm is interrupted in the middle of a motion: every log is whole. It is resumed: nothing that is finished
 /// is repeated, and the controller is started anew with the model of the first pass, with which the arm moves at full
 /// amplitude.
+#[expect(
+    clippy::disallowed_methods,
+    reason = "the interrupt comes while the processes of a system run"
+)]
 #[test]
 fn an_emulated_arm_is_calibrated_across_an_interrupt() {
     let folder = temporary_folder();

@@ -32,7 +32,7 @@ const FLOAT_S: f64 = 2.0;
 /// Duration of a change of gains \[s\].
 const GAINS_S: f64 = 0.2;
 /// Duration of the move back to the start of the sinusoid \[s\].
-const RETURN_S: f64 = 2.0;
+const RETURN_S: f64 = 1.5;
 /// Share of the collision thresholds, and load at the tip \[N\], at which the arm stops while its model is unknown.
 const WIDE_MOVE_SHARE: f64 = 1.0;
 const WIDE_LOAD_N: f64 = 40.0;
@@ -437,7 +437,8 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
             + ramps_s(config)
             + REST_S
             + returns_s
-            + 2.0 * sinusoid_s
+            + FLOAT_S
+            + 2.0 * (sinusoid_s + RETURN_S + GAINS_S)
             + LEARNING_S
     }
 
@@ -607,17 +608,27 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
             ..Step::wait(Request::Float, FLOAT_S)
         };
         let start_rad = self.sinusoid_start()?.unwrap_or(self.home_rad);
-        let done = self.motion("float", &|from| {
-            let hold = move_to(&start_rad, &start_rad);
-            vec![move_to(&start_rad, from), float, hold]
-        })?;
-        let drift_rad = done.motions.first().map(|motion| {
-            let q = &motion.recording.q_rad;
-            let ranges = q.column_iter().map(|column| column.max() - column.min());
-            ranges.fold(0.0, f64::max)
-        });
-        self.progress.float_drift_rad = drift_rad;
-        Ok(self.finish(StepName::Float, before_s, Some(done))?)
+        let hold = move_to(&start_rad, &start_rad);
+        let from_rad = self.arm.position_rad()?;
+        let steps = [move_to(&start_rad, &from_rad), float, hold];
+        let performed = self.arm.perform("float", &steps)?;
+        self.progress.moved_s += performed.moved_s;
+        match performed.stopped {
+            None => {
+                self.progress.float_drift_rad = performed.motions.first().map(|motion| {
+                    let q = &motion.recording.q_rad;
+                    let ranges = q.column_iter().map(|column| column.max() - column.min());
+                    ranges.fold(0.0, f64::max)
+                });
+            }
+            // A trial that fails does not cost the model.
+            Some(stopped) => {
+                self.say(&format!("float ended by a fault: {}", stopped.fault));
+                self.progress.float_ended = Some(stopped.fault);
+                self.arm.recover()?;
+            }
+        }
+        Ok(self.finish(StepName::Float, before_s, None)?)
     }
 
     /// Start of the sinusoid; `None` if the arm cannot reach it.
