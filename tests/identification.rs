@@ -370,7 +370,7 @@ fn wrong_wiring_is_named() {
         torque_factor: Some([-1.0, 1.0, 1.0, 1.0]),
         ..Wiring::RIGHT
     });
-    for part in ["joint 0 (joint1)", "backwards", "reverse the sign"] {
+    for part in ["joint 0 (joint1)", "check the signs of encoder and motor"] {
         assert!(reversed.contains(part), "{part}: {reversed}");
     }
 }

@@ -33,18 +33,26 @@ fn steps(progress: &Value) -> Vec<String> {
     steps.iter().map(name).collect()
 }
 
-/// The emulated arm is interrupted in the middle of a motion: every log is whole. It is resumed to the end: nothing that
-/// is finished is repeated, and the saved model explains the torques better than the one that it started from.
+/// The emulated arm is interrupted in the middle of a motion: every log is whole. It is resumed: nothing that is finished
+/// is repeated, and the controller is started anew with the model of the first pass, with which the arm moves at full
+/// amplitude.
+#[expect(
+    clippy::disallowed_methods,
+    reason = "the interrupt comes while the processes of a system run"
+)]
 #[test]
 fn an_emulated_arm_is_calibrated_across_an_interrupt() {
     let folder = temporary_folder();
     let mut interrupted = supple(folder.path(), &EMULATED).spawn().expect("it starts");
-    let log = folder.path().join("out/calibrate/logs/full-pass.mcap");
-    while !std::fs::metadata(&log).is_ok_and(|file| file.len() > 100_000) {
+    // A log gets its name once it is whole; the motion after this one is the first pass.
+    let logs = folder.path().join("out/calibrate/logs");
+    let log = logs.join("breakaway-3-negative.mcap");
+    while !log.exists() {
         let ended = interrupted.try_wait().expect("a child");
-        assert!(ended.is_none(), "it ended before the full pass: {ended:?}");
+        assert!(ended.is_none(), "it ended before the first pass: {ended:?}");
         std::thread::sleep(std::time::Duration::from_millis(20));
     }
+    std::thread::sleep(std::time::Duration::from_millis(500));
     kill_process(Pid::from_child(&interrupted), Signal::INT).expect("it runs");
     let output = interrupted.wait_with_output().expect("it ends");
     assert_eq!(output.status.code(), Some(130), "{}", stderr_of(&output));
@@ -53,42 +61,42 @@ fn an_emulated_arm_is_calibrated_across_an_interrupt() {
         "{}",
         stderr_of(&output)
     );
-    let replayed = run(
+    // It has its summary at the end, so that nothing has to be recovered.
+    let info = run(
         folder.path(),
-        &["log", "replay", "out/calibrate/logs/full-pass.mcap"],
+        &["log", "info", "out/calibrate/logs/first-pass.mcap"],
     );
-    assert!(replayed.status.success(), "{}", stderr_of(&replayed));
+    assert!(info.status.success(), "{}", stderr_of(&info));
     let before = steps(&progress(folder.path()));
-    assert_eq!(
-        before.last().map(String::as_str),
-        Some("first_fit"),
-        "{before:?}"
-    );
+    assert_eq!(before, ["wiring", "confirmed", "warm_up", "breakaway"]);
 
-    let resumed = run(
-        folder.path(),
-        &[&EMULATED[..], &["--resume", "--json"]].concat(),
-    );
+    let on = ["--resume", "--json", "--until", "full_pass"];
+    let resumed = run(folder.path(), &[&EMULATED[..], &on].concat());
     assert!(resumed.status.success(), "{}", stderr_of(&resumed));
-    assert!(
-        !stderr_of(&resumed).contains("breakaway torque"),
-        "{}",
-        stderr_of(&resumed)
-    );
+    let text = stderr_of(&resumed);
+    assert!(!text.contains("breakaway torque"), "{text}");
+    assert!(text.contains("model of the first pass"), "{text}");
     let found = json(&resumed);
     let all = steps(&found);
-    assert_eq!(all.len(), 13, "{all:?}");
     assert_eq!(all[..before.len()], before);
-    let fit = &found["fit"];
-    let unexplained = |key: &str| fit[key].as_f64().expect("a fraction");
+    assert_eq!(
+        all[before.len()..],
+        ["first_pass", "first_fit", "full_pass"]
+    );
+    let fit = &found["first_fit"];
+    let unexplained = |key: &str| {
+        fit[key]
+            .as_f64()
+            .expect("a better model than the wrong one")
+    };
     assert!(
         unexplained("unseen_relative") < unexplained("unseen_relative_before"),
         "{fit}"
     );
-    assert!(unexplained("unseen_relative") < 0.1, "{fit}");
-    let moved_s = found["moved_s"].as_f64().expect("a time");
-    assert!(moved_s < 400.0, "{moved_s} s of motion");
-    assert!(folder.path().join("out/calibrate/arm.toml").exists());
+    for breakaway in found["breakaway"].as_array().expect("a list") {
+        let positive_nm = breakaway["positive_nm"].as_f64().expect("a torque");
+        assert!((0.2..3.0).contains(&positive_nm), "{breakaway}");
+    }
     let svg = std::fs::read_to_string(folder.path().join("out/calibrate/sweep.svg"));
     assert!(svg.expect("drawn").contains("from the side"));
 }

@@ -363,7 +363,7 @@ pub struct CalibrateArgs {
     #[arg(long, value_name = "STEP", requires = "on")]
     pub until: Option<StepName>,
     /// Duration of the warm-up (s).
-    #[arg(long, value_name = "S", default_value_t = 10.0, requires = "on", value_parser = between(0.0, 3600.0))]
+    #[arg(long, value_name = "S", default_value_t = 7.0, requires = "on", value_parser = between(0.0, 3600.0))]
     pub warm_up: f64,
     /// Number of candidates of the design of the excitation.
     #[arg(

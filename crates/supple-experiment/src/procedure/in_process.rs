@@ -204,7 +204,9 @@ impl<const N: usize> MotionArm<N> for InProcessArm<N> {
     fn recover(&mut self) -> Result<(), ProcedureError> {
         let rig = self.rig()?;
         let rest = cycles(REST_S, rig.controller().config().period_s);
-        (0..rest).for_each(|_| drop(rig.cycle(None)));
+        for _ in 0..rest {
+            let _ = rig.cycle(None);
+        }
         self.hold(Request::Reset, IDLE_S)?;
         match self.hold(Request::GravityHold, SETTLE_S)? {
             None => Ok(()),

@@ -62,13 +62,13 @@ pub struct ProcedureOptions {
 }
 
 impl ProcedureOptions {
-    /// Seed 0, 600 candidates, a warm-up of 10 s.
+    /// Seed 0, 600 candidates, a warm-up of 7 s.
     pub fn new(out: PathBuf) -> ProcedureOptions {
         ProcedureOptions {
             out,
             seed: 0,
             candidates: 600,
-            warm_up_s: 10.0,
+            warm_up_s: 7.0,
             resume: false,
             until: None,
         }

@@ -141,6 +141,8 @@ pub struct Progress {
     pub fit: Option<FitQuality>,
     /// Greatest motion of a joint in float \[rad\].
     pub float_drift_rad: Option<f64>,
+    /// The fault that ended float.
+    pub float_ended: Option<String>,
     /// Sinusoid at 5 N/m; `None` if the arm cannot reach it.
     pub sinusoid: Option<SinusoidResult>,
 }

@@ -32,7 +32,7 @@ const FLOAT_S: f64 = 2.0;
 /// Duration of a change of gains \[s\].
 const GAINS_S: f64 = 0.2;
 /// Duration of the move back to the start of the sinusoid \[s\].
-const RETURN_S: f64 = 2.0;
+const RETURN_S: f64 = 1.5;
 /// Share of the collision thresholds, and load at the tip \[N\], at which the arm stops while its model is unknown.
 const WIDE_MOVE_SHARE: f64 = 1.0;
 const WIDE_LOAD_N: f64 = 40.0;
@@ -437,7 +437,8 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
             + ramps_s(config)
             + REST_S
             + returns_s
-            + 2.0 * sinusoid_s
+            + FLOAT_S
+            + 2.0 * (sinusoid_s + RETURN_S + GAINS_S)
             + LEARNING_S
     }
 
@@ -517,11 +518,6 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
         Ok(self.finish(step, before_s, Some(done))?)
     }
 
-    /// The motions along series of a finished step.
-    fn logs(&self, step: StepName) -> Result<Vec<Log>, ProcedureError> {
-        fitting::excitations::<N>(&self.log_file(step))
-    }
-
     /// The log of a finished step.
     fn log_file(&self, step: StepName) -> PathBuf {
         let finished = self.progress.finished(step);
@@ -536,20 +532,20 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
         }
         let model = self.model(Stage::Start)?;
         let scaled = fitting::with_breakaway::<N>(&model, &self.progress.breakaway)?;
-        let logs = self.logs(StepName::FirstPass)?;
-        let pass = only(&logs, "first-pass")?.clone();
+        let pass = self.log_file(StepName::FirstPass);
         // The moves from the home pose reach where the pass does not.
-        let mut others = Vec::new();
-        for name in ["warm-up", "breakaway-0-positive"] {
-            let file = self.options.out.join(LOGS).join(format!("{name}.mcap"));
-            if file.exists() {
-                others.extend(fitting::all_motion::<N>(&file)?);
-            }
-        }
+        let logs = self.options.out.join(LOGS);
+        let moves =
+            ["warm-up", "breakaway-0-positive"].map(|name| logs.join(format!("{name}.mcap")));
         let of = scaled.clone();
-        let fit = self
-            .arm
-            .meanwhile(move || fitting::fit_first::<N>(&of, &pass, &others))??;
+        let fit = self.arm.meanwhile(move || {
+            let mut others = Vec::new();
+            for file in moves.iter().filter(|file| file.exists()) {
+                others.extend(fitting::all_motion::<N>(file)?);
+            }
+            let pass = only(&fitting::excitations::<N>(&pass)?, "first-pass")?.clone();
+            fitting::fit_first::<N>(&of, &pass, &others)
+        })??;
         let (found, quality) = match fit {
             Some((found, quality)) => (found, Some(quality)),
             None => (scaled, None),
@@ -573,24 +569,23 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
             return Ok(());
         }
         let model = self.model(Stage::First)?;
-        let mut logs = self.logs(StepName::FullPass)?;
-        logs.extend(self.logs(StepName::SlowMotion)?);
-        logs.extend(self.logs(StepName::FirstPass)?);
-        let constant = self.logs(StepName::ConstantSpeed)?;
-        let unseen = self.logs(StepName::UnseenMotion)?;
-        let unseen = only(&unseen, "unseen-motion")?.clone();
-        let mut others = Vec::new();
-        for step in [
-            StepName::FullPass,
-            StepName::SlowMotion,
-            StepName::UnseenMotion,
-        ] {
-            others.extend(fitting::all_motion::<N>(&self.log_file(step))?);
-        }
-        let fitted = self
-            .arm
-            .meanwhile(move || fitting::fit_all::<N>(&model, &logs, &constant, &unseen, &others))?;
-        let (found, quality) = fitted?;
+        let file = |step| self.log_file(step);
+        let [full, slow] = [StepName::FullPass, StepName::SlowMotion].map(file);
+        let [first, constant] = [StepName::FirstPass, StepName::ConstantSpeed].map(file);
+        let unseen = self.log_file(StepName::UnseenMotion);
+        // Reading takes as long as fitting; the arm's telemetry must be read meanwhile.
+        let (found, quality) = self.arm.meanwhile(move || {
+            let (mut logs, mut others) = (Vec::new(), Vec::new());
+            for file in [&full, &slow, &first] {
+                logs.extend(fitting::excitations::<N>(file)?);
+            }
+            for file in [&full, &slow, &unseen] {
+                others.extend(fitting::all_motion::<N>(file)?);
+            }
+            let constant = fitting::excitations::<N>(&constant)?;
+            let unseen = only(&fitting::excitations::<N>(&unseen)?, "unseen-motion")?.clone();
+            fitting::fit_all::<N>(&model, &logs, &constant, &unseen, &others)
+        })??;
         self.say(&summary(&quality));
         let found = found
             .with_held_joints_of(self.start)
@@ -613,17 +608,27 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
             ..Step::wait(Request::Float, FLOAT_S)
         };
         let start_rad = self.sinusoid_start()?.unwrap_or(self.home_rad);
-        let done = self.motion("float", &|from| {
-            let hold = move_to(&start_rad, &start_rad);
-            vec![move_to(&start_rad, from), float, hold]
-        })?;
-        let drift_rad = done.motions.first().map(|motion| {
-            let q = &motion.recording.q_rad;
-            let ranges = q.column_iter().map(|column| column.max() - column.min());
-            ranges.fold(0.0, f64::max)
-        });
-        self.progress.float_drift_rad = drift_rad;
-        Ok(self.finish(StepName::Float, before_s, Some(done))?)
+        let hold = move_to(&start_rad, &start_rad);
+        let from_rad = self.arm.position_rad()?;
+        let steps = [move_to(&start_rad, &from_rad), float, hold];
+        let performed = self.arm.perform("float", &steps)?;
+        self.progress.moved_s += performed.moved_s;
+        match performed.stopped {
+            None => {
+                self.progress.float_drift_rad = performed.motions.first().map(|motion| {
+                    let q = &motion.recording.q_rad;
+                    let ranges = q.column_iter().map(|column| column.max() - column.min());
+                    ranges.fold(0.0, f64::max)
+                });
+            }
+            // A trial that fails does not cost the model.
+            Some(stopped) => {
+                self.say(&format!("float ended by a fault: {}", stopped.fault));
+                self.progress.float_ended = Some(stopped.fault);
+                self.arm.recover()?;
+            }
+        }
+        Ok(self.finish(StepName::Float, before_s, None)?)
     }
 
     /// Start of the sinusoid; `None` if the arm cannot reach it.

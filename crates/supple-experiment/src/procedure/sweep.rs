@@ -68,9 +68,9 @@ impl Sweep {
         let tip_m: [f64; 3] = tip_pose(&config.arm, q).translation.into();
         let joints = joint_poses(&config.arm, q).map(|pose| pose.translation.into());
         for point in joints.into_iter().chain([tip_m]) {
-            for axis in 0..3 {
-                self.lower_m[axis] = self.lower_m[axis].min(point[axis]);
-                self.upper_m[axis] = self.upper_m[axis].max(point[axis]);
+            for (axis, value_m) in point.into_iter().enumerate() {
+                self.lower_m[axis] = self.lower_m[axis].min(value_m);
+                self.upper_m[axis] = self.upper_m[axis].max(value_m);
             }
         }
         for joint in 0..N {

@@ -40,6 +40,9 @@ pub fn print(found: &CalibratedArm, out: &Path, json: bool) -> Result<(), Failur
             "float: the joints drift by at most {drift_rad:.4} rad in 2 s"
         ))?;
     }
+    if let Some(fault) = &progress.float_ended {
+        print_line(&format!("a fault ended float: {fault}"))?;
+    }
     if let Some(sinusoid) = &progress.sinusoid {
         let mm = |error: Option<f64>| {
             error.map_or("ended by a fault".to_owned(), |m| {
