@@ -56,7 +56,7 @@ pub enum Source {
     /// A running system.
     System {
         /// Its namespace.
-        domain: Domain,
+        domain: Box<Domain>,
         /// Its arm.
         description: Box<Description>,
     },
