@@ -194,7 +194,7 @@ pub fn respond(
          Cache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\nX-Frame-Options: DENY\r\n\
          Referrer-Policy: no-referrer\r\nCross-Origin-Resource-Policy: same-origin\r\n\
          Content-Security-Policy: default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; \
-         connect-src 'self' ws:; frame-ancestors 'none'; base-uri 'none'; form-action 'none'\r\n\r\n",
+         connect-src 'self' ws://127.0.0.1:* ws://localhost:*; frame-ancestors 'none'; base-uri 'none'; form-action 'none'\r\n\r\n",
         body.len()
     )?;
     stream.write_all(body)?;

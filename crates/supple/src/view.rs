@@ -69,7 +69,7 @@ pub fn run(args: &ViewArgs) -> Result<(), Failure> {
     let source = match &args.log {
         Some(log) => Source::Log(log.clone()),
         None => Source::System {
-            domain: Domain::new(args.prefix.as_deref()).map_err(Failure::system)?,
+            domain: Box::new(Domain::new(args.prefix.as_deref()).map_err(Failure::system)?),
             description: Box::new(arms::find(&args.arm, args.strict)?),
         },
     };

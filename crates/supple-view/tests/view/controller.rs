@@ -38,7 +38,7 @@ impl System {
         let server = OperatorServer::new(&domain, Backpressure::Drop).expect("a controller");
         let (stop, (sender, receiver)) = (Stop::default(), channel());
         let source = Source::System {
-            domain: domain.clone(),
+            domain: Box::new(domain.clone()),
             description: Box::new(Description::asset("wam4").expect("a built-in arm")),
         };
         let stopped = stop.clone();
