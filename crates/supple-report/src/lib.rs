@@ -9,6 +9,7 @@ mod demo;
 mod effects;
 pub mod figures;
 mod identification;
+mod plot;
 mod progress;
 pub mod report;
 pub mod sections;
@@ -17,7 +18,7 @@ mod units;
 
 use clap::Parser;
 use std::process::ExitCode;
-use supple_cli::arguments::OfflineCommand;
+use supple_cli::arguments::{LogCommand, OfflineCommand};
 use supple_cli::exit::{CODES, Failure};
 use supple_cli::{arms, console, interrupt, log};
 
@@ -44,7 +45,8 @@ fn dispatch(command: &OfflineCommand) -> Result<(), Failure> {
         OfflineCommand::Demo(args) => demo::run(args),
         OfflineCommand::Effects(args) => effects::run(args),
         OfflineCommand::Identification(command) => identification::run(command),
-        OfflineCommand::Log(command) => log::run(command),
+        OfflineCommand::Log(LogCommand::Plot(args)) => plot::run(args),
+        OfflineCommand::Log(LogCommand::Data(command)) => log::run(command),
         OfflineCommand::Arms(args) => arms::run(args),
         OfflineCommand::Plant(command) => command.run(),
     }

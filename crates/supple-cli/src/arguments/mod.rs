@@ -12,7 +12,7 @@ pub use identification::{
     BreakawayArgs, CalibrateArgs, Criterion, DesignArgs, ExciteCommand, IdentificationCommand,
     IdentifyArgs, LearnArgs, RunArgs, Solver,
 };
-pub use log::LogCommand;
+pub use log::{LogCommand, LogDataCommand, PlotArgs};
 pub use plant::{PlantArgs, PlantCommand};
 
 use crate::exit::CODES;
