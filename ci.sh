@@ -4,7 +4,7 @@ set -euo pipefail
 cd "$(dirname "$0")"
 
 PLAIN=(fmt clippy test doctest doc)
-FULL=(deny advisories page python package ur10e instructions fused edits cycles fuzz cortex-m socketcan services)
+FULL=(deny advisories page python package site ur10e instructions fused edits cycles fuzz cortex-m socketcan services)
 CARGO_DENY_VERSION=0.20.2
 CARGO_FUZZ_VERSION=0.13.2
 GUNGRAUN_VERSION=0.20.0
@@ -93,6 +93,18 @@ step_package() {
         "$bin/python" -m mypy.stubtest supple
         "$bin/python" -m pytest
     )
+}
+
+# site: the site of the documentation, without a warning, and every command in it; installs mkdocs, uses what `package` installed
+step_site() {
+    virtual_environment site docs/site/requirements.txt
+    cargo build --locked -p supple -p supple-report -p supple-rt -p supple-sim -p supple-can -p supple-emu
+    local package=()
+    if "$WORK/package/bin/python" -c "import supple" 2>/dev/null; then
+        package=(--package "$PWD/$WORK/package/bin/python")
+    fi
+    "$WORK/site/bin/python" docs/site/build.py --programs target/debug "${package[@]}"
+    "$WORK/site/bin/python" docs/site/run_commands.py --programs target/debug "${package[@]}"
 }
 
 # Makes a virtual environment of this name with these requirements.

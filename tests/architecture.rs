@@ -318,19 +318,29 @@ fn links_in_the_documents_have_targets() {
     let documents = ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md"].map(|name| root.join(name));
     let pages = std::fs::read_dir(root.join("docs")).expect("a folder");
     let pages = pages.map(|page| page.expect("an entry").path());
+    let pages = pages.filter(|path| path.extension().is_some_and(|end| end == "md"));
     for path in documents.into_iter().chain(pages) {
         let (document, folder) = (path.display(), path.parent().expect("a folder"));
         let text = std::fs::read_to_string(&path).expect("a document");
         for link in text.split("](").skip(1) {
             let target = link.split(')').next().expect("text before the bracket");
-            match target.strip_prefix('#') {
-                Some(anchor) => assert!(
-                    text.lines()
-                        .any(|line| heading_anchor(line).as_deref() == Some(anchor)),
-                    "{document} has no heading for #{anchor}"
-                ),
-                None if target.contains("://") => {}
-                None => assert!(folder.join(target).exists(), "{document} -> {target}"),
+            if target.contains("://") {
+                continue;
+            }
+            let (file, anchor) = target.split_once('#').unwrap_or((target, ""));
+            let linked = match file {
+                "" => path.clone(),
+                file => folder.join(file),
+            };
+            assert!(linked.exists(), "{document} -> {target}");
+            if !anchor.is_empty() {
+                let text = std::fs::read_to_string(&linked).expect("a document");
+                let mut anchors = text.lines().filter_map(heading_anchor);
+                assert!(
+                    anchors.any(|heading| heading == anchor),
+                    "{document}: {} has no heading for #{anchor}",
+                    linked.display()
+                );
             }
         }
     }

@@ -1,6 +1,6 @@
 //! `supple log`: info, export, replay, recover.
 
-use crate::arguments::LogCommand;
+use crate::arguments::LogDataCommand;
 use crate::console::{print_json, print_line};
 use crate::exit::Failure;
 use std::fs;
@@ -19,23 +19,25 @@ const PART_SUFFIX: &str = ".part";
 ///
 /// # Errors
 /// [`Failure`].
-pub fn run(command: &LogCommand) -> Result<(), Failure> {
+pub fn run(command: &LogDataCommand) -> Result<(), Failure> {
     match command {
-        LogCommand::Info { file, json: false } => print_line(info(file)?.to_string().trim_end()),
-        LogCommand::Info { file, json: true } => print_json(&info(file)?),
-        LogCommand::Export {
+        LogDataCommand::Info { file, json: false } => {
+            print_line(info(file)?.to_string().trim_end())
+        }
+        LogDataCommand::Info { file, json: true } => print_json(&info(file)?),
+        LogDataCommand::Export {
             file,
             channel,
             every,
             out: None,
         } => export_to_stdout(file, channel, *every),
-        LogCommand::Export {
+        LogDataCommand::Export {
             file,
             channel,
             every,
             out: Some(out),
         } => export_to_file(file, channel, *every, out),
-        LogCommand::Replay { file, json } => {
+        LogDataCommand::Replay { file, json } => {
             let replay = replay(file)?;
             match json {
                 true => print_json(&replay)?,
@@ -50,7 +52,7 @@ pub fn run(command: &LogCommand) -> Result<(), Failure> {
                 }),
             }
         }
-        LogCommand::Recover {
+        LogDataCommand::Recover {
             from,
             to,
             force,

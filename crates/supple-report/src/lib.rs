@@ -10,6 +10,7 @@ mod effects;
 pub mod figures;
 mod identification;
 mod new_arm;
+mod plot;
 mod progress;
 pub mod report;
 pub mod sections;
@@ -18,7 +19,7 @@ mod units;
 
 use clap::Parser;
 use std::process::ExitCode;
-use supple_cli::arguments::OfflineCommand;
+use supple_cli::arguments::{LogCommand, OfflineCommand};
 use supple_cli::exit::{CODES, Failure};
 use supple_cli::{arms, console, interrupt, log};
 
@@ -46,7 +47,8 @@ fn dispatch(command: &OfflineCommand) -> Result<(), Failure> {
         OfflineCommand::Effects(args) => effects::run(args),
         OfflineCommand::Identification(command) => identification::run(command),
         OfflineCommand::New(args) => new_arm::run(args),
-        OfflineCommand::Log(command) => log::run(command),
+        OfflineCommand::Log(LogCommand::Plot(args)) => plot::run(args),
+        OfflineCommand::Log(LogCommand::Data(command)) => log::run(command),
         OfflineCommand::Arms(args) => arms::run(args),
         OfflineCommand::Plant(command) => command.run(),
     }

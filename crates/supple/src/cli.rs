@@ -87,6 +87,14 @@ pub enum Command {
         /// The shell.
         shell: Shell,
     },
+    /// Write a manual page for every command, to read with `man`.
+    Man {
+        /// Folder of the pages; it is created if necessary. `man -M FOLDER/..` finds those in a folder named man1.
+        folder: PathBuf,
+        /// Print the names of the pages as JSON.
+        #[arg(long)]
+        json: bool,
+    },
 }
 
 /// After the help of `learning`.
@@ -455,6 +463,7 @@ impl Command {
             Command::Motors(args) => args.json,
             Command::Doctor { json } => *json,
             Command::Completions { .. } => false,
+            Command::Man { json, .. } => *json,
         }
     }
 }

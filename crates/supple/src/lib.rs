@@ -9,6 +9,7 @@ mod calibrate;
 mod cli;
 mod doctor;
 mod drill;
+mod man;
 mod motors;
 mod operate;
 mod up;
@@ -18,7 +19,7 @@ use clap::{CommandFactory, Parser};
 use cli::{Cli, Command};
 use std::os::unix::process::CommandExt;
 use std::process::ExitCode;
-use supple_cli::arguments::{IdentificationCommand, OfflineCommand};
+use supple_cli::arguments::{IdentificationCommand, LogCommand, OfflineCommand};
 use supple_cli::exit::Failure;
 use supple_cli::sibling::program_beside;
 use supple_cli::{arms, console, interrupt, log};
@@ -46,6 +47,7 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
             OfflineCommand::Demo(_)
             | OfflineCommand::Effects(_)
             | OfflineCommand::New(_)
+            | OfflineCommand::Log(LogCommand::Plot(_))
             | OfflineCommand::Identification(_),
         ) => Err(exec_report()),
         Command::View(args) => view::run(args),
@@ -65,10 +67,11 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
         Command::Pendant { action, prefix } => operate::pendant(*action, prefix.as_deref()),
         Command::Reset(system) => operate::reset(system),
         Command::Stop(system) => operate::stop(system),
-        Command::Offline(OfflineCommand::Log(command)) => log::run(command),
+        Command::Offline(OfflineCommand::Log(LogCommand::Data(command))) => log::run(command),
         Command::Offline(OfflineCommand::Arms(args)) => arms::run(args),
         Command::Offline(OfflineCommand::Plant(command)) => command.run(),
         Command::Doctor { json } => doctor::run(*json),
+        Command::Man { folder, json } => man::run(Cli::command(), folder, *json),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(*shell, &mut Cli::command(), "supple", &mut script);

@@ -1,13 +1,36 @@
 //! Arguments of `supple log`.
 
 use crate::exit::CODES;
-use clap::Subcommand;
+use clap::{Args, Subcommand};
 use std::num::NonZeroU64;
 use std::path::PathBuf;
 
 /// Command of `supple log`.
 #[derive(Clone, Debug, Subcommand)]
 pub enum LogCommand {
+    /// Commands that draw nothing.
+    #[command(flatten)]
+    Data(LogDataCommand),
+    /// Draw the standard figures of a log: tracking and contact, the torque terms of every joint, the timing.
+    Plot(PlotArgs),
+}
+
+/// Arguments of `supple log plot`.
+#[derive(Clone, Debug, Args)]
+pub struct PlotArgs {
+    /// The log. A truncated log must be recovered first.
+    pub file: PathBuf,
+    /// Folder for the figures, each as SVG and PNG; it is created if necessary.
+    #[arg(long, value_name = "FOLDER", default_value = "out/plot")]
+    pub out: PathBuf,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Command of `supple log` that draws nothing.
+#[derive(Clone, Debug, Subcommand)]
+pub enum LogDataCommand {
     /// Show the contents of a log: arm, time span, channels, modes, faults.
     Info {
         /// The log.
@@ -58,10 +81,13 @@ impl LogCommand {
     /// Whether the command prints JSON on standard output.
     pub fn json(&self) -> bool {
         match self {
-            LogCommand::Info { json, .. }
-            | LogCommand::Recover { json, .. }
-            | LogCommand::Replay { json, .. } => *json,
-            LogCommand::Export { .. } => false,
+            LogCommand::Plot(args) => args.json,
+            LogCommand::Data(
+                LogDataCommand::Info { json, .. }
+                | LogDataCommand::Recover { json, .. }
+                | LogDataCommand::Replay { json, .. },
+            ) => *json,
+            LogCommand::Data(LogDataCommand::Export { .. }) => false,
         }
     }
 }

@@ -9,6 +9,7 @@ mod figure_4;
 mod figure_5;
 mod figure_6;
 pub mod identification;
+pub mod log;
 mod panel;
 mod paper_letter;
 mod png;

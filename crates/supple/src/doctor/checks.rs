@@ -41,7 +41,7 @@ pub struct Check {
 }
 
 impl Check {
-    fn pass(name: &'static str, found: impl Into<String>) -> Check {
+    pub(super) fn pass(name: &'static str, found: impl Into<String>) -> Check {
         Check {
             name,
             verdict: Verdict::Pass,
@@ -50,7 +50,11 @@ impl Check {
         }
     }
 
-    fn warn(name: &'static str, found: impl Into<String>, remedy: &'static str) -> Check {
+    pub(super) fn warn(
+        name: &'static str,
+        found: impl Into<String>,
+        remedy: &'static str,
+    ) -> Check {
         Check {
             name,
             verdict: Verdict::Warn,

@@ -1,10 +1,11 @@
 //! `supple doctor`: checks whether this machine can run the arm in real time, and prints a remedy for each failed
 //! check.
 //!
-//! Read-only: it changes, writes and sends nothing.
+//! Read-only: it changes, writes and sends nothing. To look for the Python package it runs `python3`.
 
 mod checks;
 mod machine;
+mod python;
 
 use checks::{Check, Verdict};
 use machine::Machine;
@@ -26,7 +27,8 @@ struct Report {
 /// # Errors
 /// [`Failure::NotReady`] if a check failed; warnings do not count.
 pub fn run(as_json: bool) -> Result<(), Failure> {
-    let checks = checks::all(&Machine::new(Path::new("/")));
+    let mut checks = checks::all(&Machine::new(Path::new("/")));
+    checks.push(python::check("python3"));
     let failed: Vec<_> = checks
         .iter()
         .filter(|check| check.verdict == Verdict::Fail)

@@ -82,7 +82,7 @@ fn the_reference_never_jumps_and_silence_ends_at_rest() {
         // At irregular times, to both sides, with speed at its end; the last one after a second.
         let request = [3, 17, 18, 19, 250, 251, 600, 990].contains(&k).then(|| {
             let side = if k.is_multiple_of(2) { 1.0 } else { -1.0 };
-            next = beside(&rig, [0.0, 0.01 * side, 0.0], 60 + k / 10);
+            next = beside(&rig, [0.0, 0.01 * side, 0.0], 300 + k / 10);
             next.velocity_m_per_s.y = 0.08 * side;
             Request::SetPoint(next)
         });

@@ -1,0 +1,133 @@
+//! The standard figures of a log: tracking and contact, the torque terms of every joint, the timing of the cycles.
+
+use super::axis::Axis;
+use super::panel::{LegendSymbol, Margins, Panel, legend};
+use super::style::{BLUE, GREEN, PURPLE, REFERENCE, VERMILION};
+use super::ticks::{Ticks, extent};
+use super::{Figure, FigureError, draw_canvas};
+use plotters::style::RGBColor;
+
+/// Width of the canvas and height of a panel \[px\].
+const SIZE_PX: (u32, u32) = (760, 190);
+/// Longest curve that is drawn point by point; of a longer one each pair of points has the extremes of an interval.
+const MAX_POINTS: usize = 4000;
+
+/// Points of a curve: time \[s\] and value.
+pub type Points = Vec<(f64, f64)>;
+
+/// A line of a panel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Curve {
+    /// Name in the legend.
+    pub name: &'static str,
+    /// Points, in order of time.
+    pub points: Points,
+}
+
+/// One panel: its curves over time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LogPanel {
+    /// Title.
+    pub title: String,
+    /// Quantity and unit of the vertical axis.
+    pub unit: &'static str,
+    /// The curves; the first is drawn wide and grey, below the others, if `wide_first`.
+    pub curves: Vec<Curve>,
+    /// Whether the first curve is a reference.
+    pub wide_first: bool,
+    /// Intervals that are shaded \[s\].
+    pub shaded_s: Vec<(f64, f64)>,
+    /// Times of vertical lines \[s\].
+    pub marked_s: Vec<f64>,
+}
+
+/// Draws panels below one another, over the same time.
+///
+/// # Errors
+/// [`FigureError::Draw`].
+pub fn draw(
+    name: &'static str,
+    alt_text: &str,
+    panels: &[LogPanel],
+) -> Result<Figure, FigureError> {
+    let (width, height) = SIZE_PX;
+    let count = panels.len().max(1) as u32;
+    let all = || panels.iter().flat_map(|panel| &panel.curves);
+    let time = extent(all().flat_map(|curve| curve.points.iter().map(|point| point.0)));
+    let svg = draw_canvas((width, height * count), alt_text, |area| {
+        for (panel, area) in panels.iter().zip(area.split_evenly((panels.len(), 1))) {
+            let values = panel.curves.iter().flat_map(|curve| &curve.points);
+            let value = extent(values.map(|point| point.1));
+            let mut drawn = Panel::new(
+                &area,
+                &panel.title,
+                Margins::default(),
+                &Axis::new("time [s]", Ticks::around(time.clone(), 8)),
+                &Axis::new(panel.unit, Ticks::around(value, 4)),
+            )?;
+            for (from, to) in &panel.shaded_s {
+                drawn.band(*from, *to)?;
+            }
+            for at in &panel.marked_s {
+                drawn.vertical(*at, VERMILION)?;
+            }
+            let mut entries = Vec::new();
+            for (index, curve) in panel.curves.iter().enumerate() {
+                let (colour, width_px) = stroke_of(index, panel.wide_first);
+                drawn.line(thinned(&curve.points), colour, width_px)?;
+                entries.push((curve.name, LegendSymbol::Line(width_px), colour));
+            }
+            legend(&area, (360.0, 14.0), &entries)?;
+        }
+        Ok(())
+    })?;
+    Ok(Figure { name, svg })
+}
+
+fn stroke_of(index: usize, wide_first: bool) -> (RGBColor, f64) {
+    const COLOURS: [RGBColor; 4] = [BLUE, VERMILION, GREEN, PURPLE];
+    match (wide_first, index) {
+        (true, 0) => (REFERENCE, 3.0),
+        (true, _) => (COLOURS[(index - 1) % COLOURS.len()], 1.2),
+        (false, _) => (COLOURS[index % COLOURS.len()], 1.2),
+    }
+}
+
+/// The least and the greatest value of each of equal numbers of points, in their order.
+fn thinned(points: &[(f64, f64)]) -> Points {
+    let size = points.len().div_ceil(MAX_POINTS / 2);
+    if size <= 2 {
+        return points.to_vec();
+    }
+    let mut thinned = Vec::with_capacity(MAX_POINTS);
+    for points in points.chunks(size) {
+        let by_value = |a: &&(f64, f64), b: &&(f64, f64)| a.1.total_cmp(&b.1);
+        let ends = [
+            points.iter().min_by(by_value),
+            points.iter().max_by(by_value),
+        ];
+        let mut ends: Points = ends.into_iter().flatten().copied().collect();
+        ends.sort_by(|a, b| a.0.total_cmp(&b.0));
+        thinned.extend(ends);
+    }
+    thinned
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_curve_keeps_its_peaks_and_its_order() {
+        let mut points: Points = (0..100_000).map(|k| (f64::from(k), 0.0)).collect();
+        points[12_345].1 = 7.0;
+        points[54_321].1 = -3.0;
+        let thinned = thinned(&points);
+        assert!(thinned.len() <= MAX_POINTS, "{}", thinned.len());
+        for peak in [(12_345.0, 7.0), (54_321.0, -3.0)] {
+            assert!(thinned.contains(&peak), "{peak:?}");
+        }
+        assert!(thinned.windows(2).all(|pair| pair[0].0 <= pair[1].0));
+        assert_eq!(super::thinned(&points[..100]), points[..100]);
+    }
+}
