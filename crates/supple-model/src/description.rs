@@ -2,12 +2,12 @@
 //! [`Description::config`] return the types of the core, in which it is a const parameter.
 
 use crate::error::{Finding, ModelError, Reporter};
-use crate::from_urdf::UrdfName;
 use crate::paths::Paths;
 use crate::resolve::{self, BusDescription, JointResolved, Motors, Tool};
 use crate::settings::Settings;
 use crate::shapes::{self, Capsule, Transform};
 use crate::tree::{self, Chain};
+use crate::urdf_name::UrdfName;
 use crate::{assets, xml};
 use std::path::Path;
 use supple_core::Friction;

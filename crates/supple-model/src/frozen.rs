@@ -6,7 +6,6 @@
 //! warning lists the joints of each kind.
 
 use crate::error::{Finding, Reporter};
-use crate::tree::is_revolute;
 use std::collections::BTreeMap;
 use urdf_rs::{JointType, Robot};
 
@@ -77,6 +76,11 @@ pub(crate) fn frozen(
         }
     }
     (frozen, warnings)
+}
+
+/// Whether a controller here can move the joint.
+pub(crate) fn is_revolute(kind: &JointType) -> bool {
+    matches!(kind, JointType::Revolute | JointType::Continuous)
 }
 
 /// Zero, or the end of the joint's range that is closest to it.

@@ -28,6 +28,7 @@ pub mod settings;
 mod shapes;
 mod tree;
 pub mod unlimited;
+mod urdf_name;
 mod workspace;
 mod xml;
 
@@ -37,9 +38,9 @@ pub use const_generic::Parts;
 pub use derive::{Completed, Derived, tip_weight_n};
 pub use description::Description;
 pub use error::{Finding, ModelError};
-pub use from_urdf::UrdfName;
 pub use identified::IdentifiedModel;
 pub use paths::{PROBE_DWELL_S, Paths};
 pub use resolve::{BusDescription, BusMotor, Motors, Tool};
 pub use settings::{LearnedSettings, Settings, schema_json};
 pub use shapes::{Capsule, Transform};
+pub use urdf_name::UrdfName;

@@ -7,7 +7,7 @@
 //! link it is always replaced, with a warning ([`crate::repair`]), as is a mass without inertia on a fixed link.
 
 use crate::error::{Finding, ModelError, Reporter};
-use crate::frozen::{self, Frozen};
+use crate::frozen::{self, Frozen, is_revolute};
 use crate::repair;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -471,10 +471,6 @@ fn no_tip(toml: Reporter<'_>, robot: &Robot, tip_frame: &str) -> ModelError {
 
 fn is_movable(kind: &JointType) -> bool {
     !matches!(kind, JointType::Fixed)
-}
-
-pub(crate) fn is_revolute(kind: &JointType) -> bool {
-    matches!(kind, JointType::Revolute | JointType::Continuous)
 }
 
 fn unsupported(report: Reporter<'_>, joint: &urdf_rs::Joint) -> ModelError {
