@@ -108,9 +108,17 @@ impl<const N: usize, B: Bus> Damiao<N, B> {
             .all(|motor| motor.status() == Some(status))
     }
 
+    /// Whether any reply of this cycle is from an enabled motor.
+    fn any_enabled(&self) -> bool {
+        let mut replies = self.motors.iter().filter_map(Running::feedback);
+        replies.any(|feedback| feedback.status == Status::Enabled)
+    }
+
     /// Judges the replies of this cycle.
     fn judge(&mut self) {
         match self.power {
+            // A motor that missed its disable frame is told again.
+            Power::Disabled if self.any_enabled() => self.power = Power::Disabling,
             Power::Disabled => {}
             Power::Starting(_) if self.all(Status::Enabled) => {
                 self.power = Power::Enabled;
@@ -126,12 +134,9 @@ impl<const N: usize, B: Bus> Damiao<N, B> {
             }
             Power::Starting(_) => {}
             Power::Enabled => self.motors.iter_mut().for_each(Running::judge),
-            Power::Disabling => {
-                let enabled = |motor: &Running| motor.status() == Some(Status::Enabled);
-                if !self.motors.iter().any(enabled) {
-                    self.power = Power::Disabled;
-                }
-            }
+            // A silent motor is left to its watchdog.
+            Power::Disabling if !self.any_enabled() => self.power = Power::Disabled,
+            Power::Disabling => {}
         }
     }
 }
