@@ -4,6 +4,7 @@ use crate::running::{PREFIX, json, run, stderr_of, temporary_folder};
 use crate::support::programs;
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
+use supple_realtime::pause;
 use tempfile::TempDir;
 
 /// An emulated arm in a folder of its own.
@@ -38,7 +39,7 @@ impl Emulated {
             if !stderr_of(&output).contains("start the emulator first") {
                 return output;
             }
-            std::thread::sleep(core::time::Duration::from_millis(20));
+            pause(core::time::Duration::from_millis(20));
         }
         panic!("the emulated arm does not answer");
     }
