@@ -91,10 +91,6 @@ impl<B: Bus + ?Sized> Bus for Box<B> {
 
 /// An event on the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[expect(
-    clippy::large_enum_variant,
-    reason = "nearly every event is a frame, and a box would allocate"
-)]
 pub enum Event {
     /// Another node sent this frame.
     Frame(CanFrame),

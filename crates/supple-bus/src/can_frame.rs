@@ -47,10 +47,6 @@ const CONTROLLER_FLAGS: [(u8, BusFault); 3] = [
 
 /// A parsed raw frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[expect(
-    clippy::large_enum_variant,
-    reason = "it lives on the stack of one function, and a box would allocate"
-)]
 pub enum WireFrame {
     /// A data frame.
     Data(CanFrame),

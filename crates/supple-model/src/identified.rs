@@ -95,8 +95,17 @@ impl Description {
     ) -> Result<Description, ModelError> {
         let mut document = self.document()?;
         let settings = self.settings();
-        document["collision"]["move_share"] = value(move_share.max(settings.collision.move_share));
-        document["plausible"]["load_n"] = value(load_n.max(settings.plausible.load_n));
+        for (key, entry, wide) in [
+            (
+                "collision",
+                "move_share",
+                move_share.max(settings.collision.move_share),
+            ),
+            ("plausible", "load_n", load_n.max(settings.plausible.load_n)),
+        ] {
+            let section = document.entry(key).or_insert_with(toml_edit::table);
+            section[entry] = value(wide);
+        }
         for joint in 0..self.dof() {
             let table = self.joint_table(&mut document, joint)?;
             table.remove("move_collision_torque_nm");

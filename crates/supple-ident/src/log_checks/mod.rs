@@ -31,6 +31,10 @@ use supple_core::Arm;
 
 /// Number of samples of a log that are used to compare remedies.
 const SAMPLES: f64 = 300.0;
+/// Least number of reversals of every joint in a motion that is compared with the arm.
+const REVERSALS: usize = 3;
+/// Speed, as a fraction of the greatest, above which a joint has a direction.
+const REVERSING_SHARE: f64 = 0.1;
 /// Highest cutoff of the filter for these checks \[Hz\].
 const CUTOFF_HZ: f64 = 8.0;
 
@@ -62,6 +66,9 @@ pub fn check_log<const N: usize>(
         return Ok(findings);
     }
     let motion = coarse(log, preparation)?;
+    if moving.iter().any(|&joint| !turns_around(&motion, joint)) {
+        return Ok(findings);
+    }
     let context = explained::Context::new(arm, moving, couplings)?;
     findings.extend(remedies::check(&context, &motion)?);
     findings.extend(turns(log, &findings));
@@ -70,6 +77,21 @@ pub fn check_log<const N: usize>(
         findings.extend(excess::check(&context, &fine)?);
     }
     Ok(findings)
+}
+
+/// Whether a joint reverses its direction at least [`REVERSALS`] times: in a motion to one side an offset looks like dry
+/// friction, and much else explains the torques as well.
+fn turns_around(motion: &Motion, joint: usize) -> bool {
+    let speeds = motion.qd.column(joint);
+    let least = REVERSING_SHARE * speeds.amax();
+    let mut reversals = 0;
+    let mut forward = None;
+    for &speed in speeds.iter().filter(|speed| speed.abs() > least) {
+        let now = speed > 0.0;
+        reversals += usize::from(forward.is_some_and(|before| before != now));
+        forward = Some(now);
+    }
+    reversals >= REVERSALS
 }
 
 /// Angles of many turns that no remedy explains.

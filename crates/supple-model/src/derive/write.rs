@@ -17,7 +17,7 @@ impl Writer {
     pub fn new(description: &Description) -> Result<Self, ModelError> {
         let file = description.toml_file();
         let document = description.toml().parse::<DocumentMut>();
-        let document = document.map_err(|error| ModelError::Syntax {
+        let mut document = document.map_err(|error| ModelError::Syntax {
             file: file.to_owned(),
             message: error.to_string(),
             remedy: "correct the text",
@@ -32,18 +32,23 @@ impl Writer {
             "collision",
             "paths",
         ] {
-            let is_table = |item: &Item| match key {
-                "joints" => item.is_array_of_tables(),
-                _ => item.is_table(),
+            // Settings are added with a comment each, for which an inline table has no place.
+            let Some(item) = document.get_mut(key) else {
+                continue;
             };
-            if !document.get(key).is_none_or(is_table) {
-                return Err(Reporter { file }.invalid(
+            let given = std::mem::take(item);
+            let tables = match key {
+                "joints" => given.into_array_of_tables().map(Item::ArrayOfTables),
+                _ => given.into_table().map(Item::Table),
+            };
+            *item = tables.map_err(|_| {
+                Reporter { file }.invalid(
                     format!("`{key}`"),
-                    "must be written as tables, so that derived settings can be added",
-                    "an inline value",
+                    "must be a table, or tables",
+                    "another value",
                     format!("write it as [{key}] or [[{key}]]"),
-                ));
-            }
+                )
+            })?;
         }
         Ok(Self {
             document,

@@ -82,7 +82,11 @@ fn a_trajectory_out_of_reach_is_code_4() {
     let folder = tempfile::tempdir().expect("a folder");
     // The elbow's origin is the length of the upper arm: the shortened arm cannot reach the trajectory.
     let shorter = |urdf: String| replaced(urdf, "0.55", "0.15");
-    let arm = arm_in(folder.path(), unchanged, shorter);
+    // Without [paths] the trajectories would be scaled to the shorter arm.
+    let as_in_the_paper = |toml: String| {
+        toml + "\n[paths]\nradius_m = 0.6\nazimuth_rad = 0.0\nheight_m = 0.0\nscale = 1.0\n"
+    };
+    let arm = arm_in(folder.path(), as_in_the_paper, shorter);
     let out = folder.path().join("out");
     let answer = demo_of(&arm, &out);
     assert_eq!(answer.code, Some(4), "{}", answer.stderr);
@@ -288,8 +292,15 @@ fn a_resampling_grid_that_exceeds_memory_is_rejected() {
         table += &format!("{i},{q},{q},{q},{q},{q},{q},{q},{q}\n");
     }
     fs::write(folder.path().join("log.csv"), table).expect("written");
-    let args = ["identify", "--arm", "wam4", "log.csv", "--rate", "1e5"];
-    let answer = run_in(folder.path(), &args);
+    // One sample per second looks like a wrong unit of time, which is checked first.
+    let args = [
+        "identify",
+        "--arm",
+        "wam4",
+        "log.csv",
+        "--accept-wrong-logs",
+    ];
+    let answer = run_in(folder.path(), &[&args[..], &["--rate", "1e5"]].concat());
     assert_eq!(answer.code, Some(9), "{}", answer.stderr);
     assert_one_clear_line(&answer, &["samples at the rate of the grid", "1.999e8"]);
 }

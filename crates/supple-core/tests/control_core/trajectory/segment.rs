@@ -58,8 +58,11 @@ proptest! {
     }
 
     #[test]
-    fn velocity_and_acceleration_are_the_derivatives(segment in segment(), share in 0.01..0.99) {
-        let time_s = 5.0 * share;
+    fn velocity_and_acceleration_are_the_derivatives(
+        (from, to, at_s, length_s, share) in (reference(), reference(), 0.0..5.0, 0.01..1.0, 0.01..0.99)
+    ) {
+        let segment = Segment::new(from, at_s, to, length_s, MAX_ACCELERATION);
+        let time_s = at_s + share * segment.length_s();
         let h = 1e-6;
         let (before, now, after) = (segment.at(time_s - h), segment.at(time_s), segment.at(time_s + h));
         let scale = 1.0 + segment.peaks().acceleration_m_per_s2;
