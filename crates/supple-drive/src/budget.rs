@@ -142,14 +142,14 @@ impl Budget {
     ///
     /// # Errors
     /// [`Overload`] with the times of all frames.
-    pub fn check(&self, period_ns: u64) -> Result<(), Overload> {
+    pub fn check(&self, period_ns: u64) -> Result<(), Box<Overload>> {
         if self.min_period_ns() <= period_ns {
             return Ok(());
         }
-        Err(Overload {
+        Err(Box::new(Overload {
             budget: *self,
             period_ns,
-        })
+        }))
     }
 
     /// Text for a period \[ns\], whether it is long enough or not.
@@ -184,7 +184,7 @@ impl fmt::Display for Table {
             let all_us = us(u64::from(line.count) * line.each_ns);
             if line.count > 1 {
                 let each_us = line.each_ns as f64 * 1e-3;
-                let each = format_args!("{} x {each_us:.1} us =", line.count);
+                let each = format!("{} x {each_us:.1} us =", line.count);
                 writeln!(f, "{:<50}{each:>16} {all_us:>5} us", line.what)?;
             } else {
                 writeln!(f, "{:<67}{all_us:>5} us", line.what)?;

@@ -65,7 +65,7 @@ impl<const N: usize, D: Drive<N>, L: Link<N>> PlantLoop<N, D, L> {
         config: &Config<N>,
         cycle_config: CycleConfig,
         stow: Option<StowConfig<N>>,
-    ) -> Result<PlantLoop<N, D, L>, Overload> {
+    ) -> Result<PlantLoop<N, D, L>, Box<Overload>> {
         let budget = drive.budget();
         let budget = budget.time("the controller's answer", cycle_config.answer_ns);
         budget.check(cycle_config.period_ns)?;

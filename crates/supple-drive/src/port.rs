@@ -123,10 +123,6 @@ impl<B: Bus> BusPort<B> {
 
 /// Result of waiting at a [`BusPort`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[expect(
-    clippy::large_enum_variant,
-    reason = "nearly every event is a frame, and a box would allocate"
-)]
 pub enum Received {
     /// A frame of another node.
     Frame(CanFrame),

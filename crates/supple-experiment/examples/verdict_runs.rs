@@ -31,8 +31,10 @@ fn options(seed: u64) -> PlantOptions {
     let text = include_str!("../../../assets/plants/realistic.toml");
     let realistic: PlantOptions = toml_of(text);
     let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x0076_6572_6469);
-    let mut chosen = PlantOptions::default();
-    chosen.seed = Some(seed as u32);
+    let mut chosen = PlantOptions {
+        seed: Some(seed as u32),
+        ..PlantOptions::default()
+    };
     if seed >= IDEAL {
         return chosen;
     }

@@ -18,8 +18,7 @@ const BALL_RADIUS_M: f64 = 0.02;
 /// The nearest body; `None` if there is no mass to give it. `body` is about its centre of mass.
 pub(crate) fn nearest(body: &Body) -> Option<Body> {
     let numbers = body.inertia_kg_m2.iter().chain(body.com_m.iter());
-    if !(body.mass_kg > 0.0 && body.mass_kg.is_finite()) || !numbers.clone().all(|x| x.is_finite())
-    {
+    if body.mass_kg <= 0.0 || !body.mass_kg.is_finite() || numbers.clone().any(|x| !x.is_finite()) {
         return None;
     }
     let inertia = 0.5 * (body.inertia_kg_m2 + body.inertia_kg_m2.transpose());

@@ -32,7 +32,7 @@ pub enum SimError {
     Loop(#[from] LoopError),
     /// The period is too short.
     #[error(transparent)]
-    Rate(#[from] Overload),
+    Rate(#[from] Box<Overload>),
     /// Signals.
     #[error(transparent)]
     Stop(#[from] StopError),

@@ -1,13 +1,13 @@
 //! Checks of a log against the physics of the given arm, before a fit.
 //!
 //! Three groups, in this order; each finds only what the one before lets it see:
-//! - [`sampling`]: what the columns show by themselves. An encoder cannot stop within a sample, time cannot jump for all
+//! - `sampling`: what the columns show by themselves. An encoder cannot stop within a sample, time cannot jump for all
 //!   joints at once, a torque does not rest on its largest value.
-//! - [`remedies`]: what would be right if a column had another sign, unit, order, zero or clock. The torques of an arm
+//! - `remedies`: what would be right if a column had another sign, unit, order, zero or clock. The torques of an arm
 //!   whose links may have any inertia are computed for the log as given and for the log with each remedy. If the remedy
 //!   explains them far better, the log has that error. Gravity fixes the time scale and the zeros, the friction that must
 //!   dissipate power fixes the signs.
-//! - [`excess`]: what the arm does not explain at some times (contact), or at all poses (torques in another unit, a
+//! - `excess`: what the arm does not explain at some times (contact), or at all poses (torques in another unit, a
 //!   payload, an offset).
 //!
 //! Nothing here knows an arm: every threshold is a ratio to what the log itself shows, or to the gravity of the given arm.

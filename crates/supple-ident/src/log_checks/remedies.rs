@@ -5,6 +5,7 @@ use super::finding::{Finding, Problem};
 use super::gravity::Gravities;
 use crate::error::IdentError;
 use crate::motion::Motion;
+use core::f64::consts::{FRAC_PI_2, PI};
 
 /// A change of a motion's columns that would undo an error.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -134,7 +135,7 @@ const FAMILIES: [Family; 3] = [
     ),
     (
         |j, c| Remedy::Zero(j, c),
-        &[-1.5708, -0.5, -0.15, 0.15, 0.5, 1.5708, 3.14159],
+        &[-FRAC_PI_2, -0.5, -0.15, 0.15, 0.5, FRAC_PI_2, PI],
         false,
     ),
 ];

@@ -24,7 +24,7 @@ pub enum CanError {
     Loop(#[from] LoopError),
     /// The rate exceeds the bandwidth of the drives' bus.
     #[error(transparent)]
-    Rate(#[from] supple_drive::Overload),
+    Rate(#[from] Box<supple_drive::Overload>),
     /// The rate exceeds the bus bandwidth.
     #[error(transparent)]
     Overload(#[from] Overload),

@@ -52,7 +52,7 @@ pub enum DamiaoError {
     },
     /// The period is too short for the bus.
     #[error(transparent)]
-    Rate(#[from] Overload),
+    Rate(#[from] Box<Overload>),
     /// The plant loop cannot continue.
     #[error(transparent)]
     Loop(#[from] LoopError),
