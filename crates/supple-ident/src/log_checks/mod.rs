@@ -67,6 +67,7 @@ pub fn check_log<const N: usize>(
     }
     let motion = coarse(log, preparation)?;
     if moving.iter().any(|&joint| !turns_around(&motion, joint)) {
+        findings.extend(turns(log, &findings));
         return Ok(findings);
     }
     let context = explained::Context::new(arm, moving, couplings)?;

@@ -68,7 +68,7 @@ impl Description {
     /// paper's sinusoid: then the paths are placed.
     ///
     /// # Errors
-    /// [`ModelError::NoPlace`] if no pose allows even small paths; as [`Description::config`].
+    /// [`ModelError`] if no pose allows even small paths; as [`Description::config`].
     pub fn completed(&self) -> Result<Completed, ModelError> {
         with_dof!(self.dof(), N => complete::<N>(self))?
     }
