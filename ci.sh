@@ -4,7 +4,7 @@ set -euo pipefail
 cd "$(dirname "$0")"
 
 PLAIN=(fmt clippy test doctest doc)
-FULL=(deny advisories python package site ur10e instructions fused edits cycles fuzz cortex-m socketcan services)
+FULL=(deny advisories page python package site ur10e instructions fused edits cycles fuzz cortex-m socketcan services)
 CARGO_DENY_VERSION=0.20.2
 CARGO_FUZZ_VERSION=0.13.2
 GUNGRAUN_VERSION=0.20.0
@@ -56,6 +56,12 @@ step_doc() {
 # deny: licences, sources and bans of every dependency; installs cargo-deny under target/
 step_deny() {
     cargo_deny check licenses sources bans
+}
+
+# page: the committed bundle of the live page is what its sources give, with three.js and uPlot from npm
+step_page() {
+    command -v npm >/dev/null || skip "there is no npm"
+    crates/supple-view/page/build.sh check
 }
 
 # advisories: known vulnerabilities, where their database can be fetched

@@ -50,6 +50,9 @@ fn main() {
         tau,
         independent_fraction: 1.0,
         cutoff_hz: None,
+        start_s: 0.0,
+        torque_delay_s: 0.0,
+        masks: Vec::new(),
     };
     let columns = Columns::new(7, &JOINTS, true, FrictionColumns::OFFSET, &[]).expect("columns");
     let before = Instant::now();

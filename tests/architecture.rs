@@ -297,7 +297,12 @@ fn every_crate_uses_the_workspace_lints() {
 
 #[test]
 fn core_and_protocol_have_neither_std_nor_unsafe_code() {
-    for package in ["supple-core", "supple-puck"] {
+    for package in [
+        "supple-core",
+        "supple-can-frame",
+        "supple-damiao",
+        "supple-puck",
+    ] {
         let path = format!("{}/crates/{package}/src/lib.rs", env!("CARGO_MANIFEST_DIR"));
         let source = std::fs::read_to_string(path).expect("the root of the crate");
         for attribute in ["#![no_std]", "#![forbid(unsafe_code)]"] {

@@ -6,6 +6,7 @@ use std::path::Path;
 use std::thread;
 use supple_core::controller::{Mode, Request};
 use supple_core::{Controller, Vector};
+use supple_drive::SharedMemoryLink;
 use supple_experiment::{Rig, scenario, start_pose};
 use supple_ipc::message::{OperatorRequest, Telemetry};
 use supple_ipc::{ControllerLink, Domain, PlantLink};
@@ -13,7 +14,7 @@ use supple_model::Description;
 use supple_plant::{Plant, PlantConfig};
 use supple_realtime::{Stop, pause};
 use supple_rt::{ControlLoop, loop_queues};
-use supple_sim::{Motors, SimulationLoop};
+use supple_sim::{SimulatedArm, run_simulation, simulation};
 
 /// Cycles of a run: the move to the start and a part of the sinusoid.
 const CYCLES: u64 = 5000;
@@ -66,13 +67,13 @@ fn over_shared_memory(folder: &Path) -> Vec<Telemetry> {
     let simulation = thread::spawn(move || {
         let config = plant();
         let home = description().home().expect("four joints");
-        let motors = Motors::new(
-            config.cycle_s,
-            supple_core::drive_guard::DriveGuard::new(&description().config().expect("valid")),
-        );
         let link = PlantLink::new(&plant_domain).expect("a plant");
+        let link = SharedMemoryLink::new(link, true, Stop::default());
         let plant = Plant::new(config, home, Vector::zeros()).expect("valid");
-        SimulationLoop::new(plant, motors, link).run_in_virtual_time(Some(CYCLES), &Stop::default())
+        let arm = SimulatedArm::new(plant, true, 0.75);
+        let limits = description().config().expect("valid");
+        let mut simulation = simulation(arm, link, &limits).expect("a bus is not needed");
+        run_simulation(&mut simulation, Some(CYCLES), true, &Stop::default())
     });
     let mut telemetry = Vec::new();
     while telemetry.len() < CYCLES as usize {

@@ -643,7 +643,7 @@ fn entry(key: &str, value: impl Into<toml::Value>) -> (String, toml::Value) {
 /// --------
 /// >>> import supple
 /// >>> supple.assets()
-/// ['paper3', 'wam3', 'wam4', 'wam7']
+/// ['openarm', 'paper3', 'wam3', 'wam4', 'wam7', 'yam']
 #[pyfunction]
 pub fn assets() -> Vec<&'static str> {
     supple_model::assets().to_vec()

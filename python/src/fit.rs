@@ -377,7 +377,7 @@ fn sized<const N: usize>(
     let moving = procedure.moving_joints(N)?;
     let (mut motions, mut warnings) = (Vec::new(), Vec::new());
     for log in logs {
-        let (motion, result_warnings) = log.motion(&moving, &procedure.preparation)?;
+        let (motion, result_warnings) = log.checked_motion(&arm, &moving, procedure)?;
         motions.push(motion);
         warnings.extend(result_warnings);
     }

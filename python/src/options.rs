@@ -13,7 +13,8 @@ pub struct Options {
     rate_hz: Option<f64>,
     cutoff_hz: Option<f64>,
     keep_every: usize,
-    torque_delay_s: f64,
+    torque_delay_s: Option<f64>,
+    accept_wrong_logs: bool,
     method: String,
     friction: Option<Shape>,
     /// Whether to fit a Stribeck effect, its speed included.
@@ -65,7 +66,7 @@ impl Options {
                 rate_hz: self.rate_hz,
                 cutoff_hz: self.cutoff_hz,
                 keep_every: self.keep_every,
-                torque_delay_s: self.torque_delay_s,
+                torque_delay_s: self.torque_delay_s.unwrap_or(0.0),
             },
             method,
             friction: self.friction.map_or(FrictionChoice::Auto, |shape| {
@@ -75,6 +76,8 @@ impl Options {
             slow_rad_per_s: self.slow_rad_per_s,
             prior_weight: self.prior_weight,
             joint_noise_nm: self.joint_noise_nm,
+            estimate_delay: self.torque_delay_s.is_none(),
+            accept_wrong_logs: self.accept_wrong_logs,
         })
     }
 }

@@ -6,8 +6,9 @@
 use crate::arrays;
 use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+use supple_core::Arm;
 use supple_ident::filter::LowPass;
-use supple_ident::{DMatrix, IdentError, Log, Motion, Preparation, Warning, resample};
+use supple_ident::{DMatrix, IdentError, Log, Motion, Preparation, Procedure, Warning, resample};
 
 /// The columns of one log as Python passes them.
 #[derive(FromPyObject)]
@@ -57,6 +58,20 @@ impl Samples {
     }
 
     /// Checks and prepares the log.
+    /// As [`Samples::motion`], checked against the given arm and with the delay of its torques estimated, unless rows
+    /// are used as they are.
+    pub fn checked_motion<const N: usize>(
+        &self,
+        arm: &Arm<N>,
+        moving: &[usize],
+        procedure: &Procedure,
+    ) -> Result<(Motion, Vec<Warning>), IdentError> {
+        if self.qdd_rad_per_s2.is_some() {
+            return self.motion(moving, &procedure.preparation);
+        }
+        procedure.prepare(arm, &self.log, moving)
+    }
+
     pub fn motion(
         &self,
         moving: &[usize],
@@ -98,6 +113,9 @@ impl Samples {
             tau: self.log.tau_nm.clone(),
             independent_fraction: 1.0,
             cutoff_hz: None,
+            start_s: t[0],
+            torque_delay_s: 0.0,
+            masks: Vec::new(),
         };
         Ok((motion, warnings))
     }

@@ -139,21 +139,22 @@ fn plan<const N: usize>(arms: &Arms<'_>, options: &Options) -> Result<Plan<N>, E
         ..Variant::EXACT
     };
     let mut config = setup.config(&variant)?;
-    config.law.gains = scenario::gains(options.stiffness_n_per_m);
+    config.law.gains = scenario::gains_like(&config.law.gains, options.stiffness_n_per_m);
     let mut scene = Scene::default();
+    let paths = setup.paths();
     let (trajectory, whole_s) = match &options.experiment[..] {
-        "arc" => scenario::arc(),
+        "arc" => paths.arc(options.speed),
         "quadrant" => {
             let speed = options.speed * scenario::QUADRANT_SPEED_M_PER_S;
-            let (quadrant, duration_s) = scenario::quadrant(speed);
+            let (quadrant, duration_s) = paths.quadrant(speed);
             (Trajectory::Quadrant(quadrant), duration_s)
         }
         "probing" => {
-            scene = scenario::block();
-            let (probe, duration_s) = scenario::probe(setup.tip_radius_m());
+            scene = scenario::block_at(&paths);
+            let (probe, duration_s) = paths.probe(setup.tip_radius_m());
             (Trajectory::Probe(probe), duration_s)
         }
-        _ => scenario::sinusoid(options.speed),
+        _ => paths.sinusoid(options.speed),
     };
     Ok(Plan {
         name: options.experiment.clone(),

@@ -4,13 +4,12 @@
 use crate::rig::{MS, Rig, TestBus};
 use supple_bus::virtual_time::Peer;
 use supple_bus::{FaultKind, FaultRule, Traffic};
-use supple_can::guard::{Stage, Torque};
-use supple_can::{Drives, LossReason};
+use supple_can_frame::CanId;
 use supple_core::Vector;
 use supple_core::controller::{Fault, Mode, Request};
 use supple_core::dynamics::gravity;
+use supple_drive::{Drives, LossReason, Stage, Torque};
 use supple_emu::{ArmEvent, ButtonPress, Cause};
-use supple_puck::MessageId;
 use supple_puck::safety::SafetyMode;
 use supple_puck::status::MotorMode;
 
@@ -19,20 +18,20 @@ const MAX_SAFE_ACTION_NS: u64 = 20 * MS;
 /// Torque resolution of a motor puck \[N m\].
 const QUANTUM_NM: f64 = 1.0 / 2700.0;
 
-fn is_torque_frame(id: MessageId) -> bool {
+fn is_torque_frame(id: CanId) -> bool {
     id.raw() == 0x401
 }
 
-fn is_reply_of_puck_2(id: MessageId) -> bool {
+fn is_reply_of_puck_2(id: CanId) -> bool {
     id.raw() == 0x443
 }
 
-fn is_request_to_module(id: MessageId) -> bool {
+fn is_request_to_module(id: CanId) -> bool {
     id.raw() == 0x00a
 }
 
 fn fault_injector(rig: &mut Rig<4>) -> &mut TestBus<4> {
-    rig.cycle.bus_mut()
+    rig.cycle.drive_mut().bus_mut()
 }
 
 /// Time from `begin_ns` until the motors became idle \[ns\].
@@ -157,7 +156,7 @@ fn a_lost_encoder_ends_torque_at_once() {
     rig.step();
     let action = rig.step();
     assert_eq!(action.torque, Torque::None);
-    assert!(action.lower_module);
+    assert!(action.lower);
     rig.run(30);
     assert_idle_in_time(&rig, now_ns);
     assert_eq!(
@@ -239,7 +238,7 @@ fn a_corrupted_reply_is_accepted_or_ends_torque() {
         let mut rig = Rig::<4>::seeded(seed);
         rig.activate();
         let now_ns = rig.now_ns();
-        let is_reply_of_puck: [fn(MessageId) -> bool; 4] = [
+        let is_reply_of_puck: [fn(CanId) -> bool; 4] = [
             |id| id.raw() == 0x423,
             is_reply_of_puck_2,
             |id| id.raw() == 0x463,
@@ -398,7 +397,7 @@ fn without_the_module_the_motors_are_set_to_idle_directly() {
 fn a_silent_module_ends_torque() {
     let mut rig = Rig::<4>::holding();
     let begin_ns = rig.now_ns();
-    let is_reply_of_module = |id: MessageId| id.raw() == 0x546;
+    let is_reply_of_module = |id: CanId| id.raw() == 0x546;
     let rule = FaultRule::always(Traffic::Received, FaultKind::Loss).only(is_reply_of_module);
     fault_injector(&mut rig).add(rule.within(begin_ns, u64::MAX));
     rig.run(150);

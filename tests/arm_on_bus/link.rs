@@ -1,8 +1,8 @@
 //! In-process link that calls the controller step directly.
 
-use supple_can::{Answer, ArmReport, CanError, Command, Link};
 use supple_core::controller::Request;
 use supple_core::{Controller, Input, Output, State, step};
+use supple_drive::{Answer, ArmReport, Command, Drives, Link, LoopError};
 
 pub struct InProcessLink<const N: usize> {
     controller: Controller<N>,
@@ -31,11 +31,11 @@ impl<const N: usize> InProcessLink<N> {
 }
 
 impl<const N: usize> Link<N> for InProcessLink<N> {
-    fn announce(&mut self) -> Result<(), CanError> {
+    fn announce(&mut self) -> Result<(), LoopError> {
         Ok(())
     }
 
-    fn publish(&mut self, report: &ArmReport<N>) -> Result<(), CanError> {
+    fn publish(&mut self, report: &ArmReport<N>) -> Result<(), LoopError> {
         self.report = Some(*report);
         self.output = None;
         if !self.dead {
@@ -43,7 +43,7 @@ impl<const N: usize> Link<N> for InProcessLink<N> {
                 cycle: report.cycle,
                 position_rad: report.position_rad,
                 tip_force_n: report.tip_force_n,
-                drives_active: report.drives == supple_can::Drives::Active,
+                drives_active: report.drives == Drives::Active,
                 request: self.request.take(),
             };
             self.output = Some(step(&self.controller, &mut self.state, &input));
@@ -51,7 +51,7 @@ impl<const N: usize> Link<N> for InProcessLink<N> {
         Ok(())
     }
 
-    fn answer(&mut self, cycle: u64, _wait_ns: u64) -> Result<Answer<N>, CanError> {
+    fn answer(&mut self, cycle: u64, _wait_ns: u64) -> Result<Answer<N>, LoopError> {
         let answers = |output: &Output<N>| output.cycle == cycle;
         let output = self.output.as_ref().filter(|output| answers(output));
         let command = output.map(|output| Command {
@@ -63,6 +63,7 @@ impl<const N: usize> Link<N> for InProcessLink<N> {
             wants_torque: wants_torque(output),
             mode: Some(output.mode),
             fault: output.fault.is_some(),
+            codes: [0; 2],
         });
         Ok(Answer { command, late: 0 })
     }

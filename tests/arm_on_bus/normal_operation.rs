@@ -2,10 +2,10 @@
 
 use crate::rig::{MS, PERIOD_NS, Rig};
 use supple_bus::virtual_time::Peer;
-use supple_can::guard::Stage;
-use supple_can::{BusTime, Drives};
+use supple_can::BusTime;
 use supple_core::Vector;
 use supple_core::controller::{Mode, Request};
+use supple_drive::{Drives, Stage};
 use supple_emu::{ButtonPress, Cause};
 use supple_experiment::{scenario, start_pose};
 use supple_puck::safety::SafetyMode;

@@ -3,10 +3,10 @@
 use crate::link::InProcessLink;
 use supple_bus::FaultInjector;
 use supple_bus::virtual_time::{DirectBus, Peer};
-use supple_can::guard::{Action, Stage};
-use supple_can::{CanError, Cycle, CycleConfig, Ready, StartupConfig, start_up};
+use supple_can::{CanError, Cycle, Ready, StartupConfig, start_up};
 use supple_core::controller::Request;
 use supple_core::{Controller, Vector};
+use supple_drive::{Action, CycleConfig, Stage};
 use supple_emu::{ButtonPress, Emulator, EmulatorConfig};
 use supple_model::Description;
 use supple_plant::PlantConfig;
@@ -93,7 +93,7 @@ impl<const N: usize> Rig<N> {
             period_ns,
             answer_ns: ANSWER_NS,
         };
-        let cycle = Cycle::new(bus, link, ready, &config, cycle_config).unwrap();
+        let cycle = supple_can::cycle(bus, link, ready, &config, cycle_config).unwrap();
         Rig {
             cycle,
             history: Vec::new(),
@@ -117,11 +117,11 @@ impl<const N: usize> Rig<N> {
     }
 
     pub fn emulator(&self) -> &Emulator<N> {
-        &self.cycle.bus().inner().0
+        &self.cycle.drive().bus().inner().0
     }
 
     pub fn emulator_mut(&mut self) -> &mut Emulator<N> {
-        &mut self.cycle.bus_mut().inner_mut().0
+        &mut self.cycle.drive_mut().bus_mut().inner_mut().0
     }
 
     pub fn now_ns(&self) -> u64 {

@@ -10,14 +10,14 @@ use counting::{count_allocations, without_counting};
 use link::InProcessLink;
 use supple_bus::virtual_time::DirectBus;
 use supple_bus::{Bus, BusError, Event, FaultInjector, FaultKind, FaultRule, Traffic};
-use supple_can::guard::Stage;
-use supple_can::{Cycle, CycleConfig, StartupConfig, start_up};
+use supple_can::{Cycle, StartupConfig, start_up};
+use supple_can_frame::CanFrame;
 use supple_core::Controller;
 use supple_core::controller::Request;
+use supple_drive::{CycleConfig, Stage};
 use supple_emu::{ButtonPress, Emulator, EmulatorConfig};
 use supple_model::Description;
 use supple_plant::PlantConfig;
-use supple_puck::CanFrame;
 use supple_puck::safety::SafetyLimits;
 
 const MS: u64 = 1_000_000;
@@ -41,7 +41,7 @@ impl Bus for Uncounted {
 type Service = Cycle<4, FaultInjector<Uncounted>, InProcessLink<4>>;
 
 fn press(cycle: &mut Service, press: ButtonPress) {
-    cycle.bus_mut().inner_mut().0.0.press(press);
+    cycle.drive_mut().bus_mut().inner_mut().0.0.press(press);
 }
 
 fn in_service() -> Service {
@@ -70,7 +70,7 @@ fn in_service() -> Service {
         answer_ns: MS / 20,
     };
     let link = InProcessLink::new(Controller::new(config).unwrap());
-    Cycle::new(bus, link, ready, &config, cycle_config).unwrap()
+    supple_can::cycle(bus, link, ready, &config, cycle_config).unwrap()
 }
 
 fn run(cycle: &mut Service, cycles: usize) {
@@ -107,10 +107,13 @@ fn cycles_with_lost_frames_allocate_nothing() {
     press(&mut cycle, ButtonPress::Activate);
     run(&mut cycle, 50);
     let lost = FaultRule::always(Traffic::Received, FaultKind::Loss).with_probability(0.01);
-    cycle.bus_mut().add(lost);
+    cycle.drive_mut().bus_mut().add(lost);
     assert_eq!(count_allocations(|| run(&mut cycle, 100)), 0);
     let silent = FaultRule::always(Traffic::Sent, FaultKind::SilentLoss);
-    cycle.bus_mut().add(silent.only(|id| id.raw() == 0x401));
+    cycle
+        .drive_mut()
+        .bus_mut()
+        .add(silent.only(|id| id.raw() == 0x401));
     cycle.link_mut().dead = true;
     assert_eq!(count_allocations(|| run(&mut cycle, 300)), 0);
     assert_eq!(cycle.guard().stage(), Stage::Resting);

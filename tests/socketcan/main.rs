@@ -12,10 +12,10 @@ mod link;
 use arm::Arm;
 use link::InProcessLink;
 use supple_bus::{BusFault, FaultInjector, FaultKind, FaultRule, SocketCan, Traffic};
-use supple_can::guard::Stage;
-use supple_can::{Cycle, CycleConfig, LossReason, StartupConfig, start_up};
+use supple_can::{Cycle, StartupConfig, start_up};
 use supple_core::Controller;
 use supple_core::controller::Request;
+use supple_drive::{CycleConfig, LossReason, Stage};
 use supple_emu::ButtonPress;
 use supple_model::Description;
 use supple_puck::safety::SafetyLimits;
@@ -77,7 +77,7 @@ fn in_service(interface: &str) -> Service {
         period_ns: PERIOD_NS,
         answer_ns: ANSWER_NS,
     };
-    Cycle::new(bus, link, ready, &config, cycle_config).unwrap()
+    supple_can::cycle(bus, link, ready, &config, cycle_config).unwrap()
 }
 
 fn activate(cycle: &mut Service, arm: &Arm) {
@@ -142,7 +142,10 @@ fn an_arm_on_a_kernel_can_interface_runs_and_is_set_to_idle_after_every_loss() {
     activate(&mut cycle, &arm);
     let lost = cycle.counters().tx_lost;
     let rule = FaultRule::always(Traffic::Sent, FaultKind::SilentLoss);
-    cycle.bus_mut().add(rule.only(|id| id.raw() == 0x401));
+    cycle
+        .drive_mut()
+        .bus_mut()
+        .add(rule.only(|id| id.raw() == 0x401));
     run(&mut cycle, 1);
     assert_eq!(cycle.counters().tx_lost, lost + 1);
     run(&mut cycle, SAFE);
@@ -150,7 +153,7 @@ fn an_arm_on_a_kernel_can_interface_runs_and_is_set_to_idle_after_every_loss() {
     assert!(arm.motors_in(MotorMode::Idle));
 
     // A controller that stops answering.
-    cycle.bus_mut().clear();
+    cycle.drive_mut().bus_mut().clear();
     activate(&mut cycle, &arm);
     cycle.link_mut().dead = true;
     run(&mut cycle, SAFE);

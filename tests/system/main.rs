@@ -5,9 +5,11 @@ mod support;
 #[path = "../support/table.rs"]
 mod table;
 
+mod calibration;
 mod drill;
 mod ends;
 mod learning;
+mod motors;
 mod operator;
 mod regressions;
 mod running;

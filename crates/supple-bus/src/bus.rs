@@ -2,7 +2,7 @@
 
 use crate::error::BusError;
 use core::fmt;
-use supple_puck::CanFrame;
+use supple_can_frame::CanFrame;
 
 /// One node's view of a CAN bus.
 pub trait Bus {
@@ -12,7 +12,8 @@ pub trait Bus {
     /// Queues a frame for sending and returns at once. [`Event::Sent`] confirms that it was sent.
     ///
     /// # Errors
-    /// [`BusError::Full`] if the transmit queue is full; the frame is then not sent.
+    /// [`BusError::Full`] if the transmit queue is full, [`BusError::ClassicOnly`] for an FD frame on a bus without CAN
+    /// FD; the frame is then not sent.
     fn send(&mut self, frame: &CanFrame) -> Result<(), BusError>;
 
     /// The next event, or `None` once [`Bus::now_ns`] has reached `until_ns`. With a time in the past, returns
@@ -35,6 +36,11 @@ pub trait Bus {
     ) -> Result<Option<Event>, BusError> {
         let _ = frames;
         self.receive_until(until_ns)
+    }
+
+    /// Whether this bus carries frames of CAN FD; all carry classic ones.
+    fn carries_fd(&self) -> bool {
+        true
     }
 
     /// Total time for which the clock of this bus was fallen behind CLOCK_MONOTONIC \[ns\].
@@ -70,6 +76,10 @@ impl<B: Bus + ?Sized> Bus for Box<B> {
         (**self).receive_with_lookahead(until_ns, frames)
     }
 
+    fn carries_fd(&self) -> bool {
+        (**self).carries_fd()
+    }
+
     fn clock_stall_ns(&self) -> u64 {
         (**self).clock_stall_ns()
     }
@@ -81,6 +91,10 @@ impl<B: Bus + ?Sized> Bus for Box<B> {
 
 /// An event on the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "nearly every event is a frame, and a box would allocate"
+)]
 pub enum Event {
     /// Another node sent this frame.
     Frame(CanFrame),

@@ -1,18 +1,18 @@
 //! A bus of two nodes over Unix datagrams: the host and the emulated arm.
 //!
-//! Each datagram is a raw `struct can_frame`, either a data frame or an error frame. There is no bit rate: the
+//! Each datagram is a raw `struct can_frame` or `struct canfd_frame`: a data frame or an error frame. There is no bit rate: the
 //! arm's side may delay its frames. A frame counts as sent when the peer's socket has accepted it; without a
 //! peer frames are not acknowledged, as on a real bus without an arm. No data leave the machine.
 
 use crate::bus::{Bus, BusFault, Event};
-use crate::can_frame::{CAN_FRAME_BYTES, WireFrame};
+use crate::can_frame::{FD_FRAME_BYTES, WireFrame};
 use crate::endpoint::{Delivery, Endpoint};
 use crate::error::BusError;
 use crate::folder::OwnerFolder;
 use crate::wait::wait_readable_until;
 use rustix::fd::{AsFd, BorrowedFd};
 use std::collections::VecDeque;
-use supple_puck::CanFrame;
+use supple_can_frame::CanFrame;
 use supple_realtime::monotonic_ns;
 
 /// Maximum number of unread confirmations; a transmit queue of the kernel has at least ten entries.
@@ -69,8 +69,9 @@ impl DatagramBus {
         if let Some(event) = self.confirmations.pop_front() {
             return Ok(Some(event));
         }
-        while let Some(raw) = self.endpoint.receive::<CAN_FRAME_BYTES>()? {
-            match WireFrame::parse(&raw) {
+        let mut buffer = [0; FD_FRAME_BYTES + 1];
+        while let Some(raw) = self.endpoint.receive_into(&mut buffer)? {
+            match WireFrame::parse(raw) {
                 WireFrame::Data(frame) => return Ok(Some(Event::Frame(frame))),
                 WireFrame::Fault(fault) => return Ok(Some(Event::Fault(fault))),
                 WireFrame::Unsupported => {}

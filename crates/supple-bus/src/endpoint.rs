@@ -59,21 +59,6 @@ impl Endpoint {
         }
     }
 
-    /// Receives a datagram of exactly `N` bytes; discards others.
-    pub fn receive<const N: usize>(&self) -> Result<Option<[u8; N]>, BusError> {
-        let mut buffer = [0; 64];
-        loop {
-            match self.receive_into(&mut buffer)? {
-                Some(datagram) => {
-                    if let Ok(datagram) = datagram.try_into() {
-                        return Ok(Some(datagram));
-                    }
-                }
-                None => return Ok(None),
-            }
-        }
-    }
-
     /// Receives a datagram; one longer than the buffer is truncated.
     pub fn receive_into<'a>(&self, buffer: &'a mut [u8]) -> Result<Option<&'a [u8]>, BusError> {
         loop {

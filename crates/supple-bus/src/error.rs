@@ -11,6 +11,16 @@ pub enum BusError {
         "the transmit queue is full: frames are queued faster than the bus sends them, or the bus sends nothing"
     )]
     Full,
+    /// A frame of CAN FD for an interface that carries classic frames only.
+    #[error(
+        "CAN interface `{interface}` carries classic frames only, and a frame of CAN FD was to be sent: set it to \
+         CAN FD (ip link set {interface} type can bitrate 1000000 dbitrate 5000000 fd on), or set the arm's motors and \
+         its TOML to classic CAN"
+    )]
+    ClassicOnly {
+        /// Name of the interface.
+        interface: String,
+    },
     /// A CAN interface that cannot be opened.
     #[error("CAN interface `{interface}`: {source}; {remedy}")]
     Interface {

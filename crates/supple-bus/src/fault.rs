@@ -9,7 +9,7 @@ use crate::error::BusError;
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use std::collections::VecDeque;
-use supple_puck::{CanFrame, MessageId};
+use supple_can_frame::{CanFrame, CanId, MAX_FD_BYTES};
 
 /// Direction of the frames that a rule affects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,7 +47,7 @@ pub struct FaultRule {
     /// Direction. Ignored for [`FaultKind::BusOff`].
     pub traffic: Traffic,
     /// Frames that the rule affects; `None` for all.
-    pub only: Option<fn(MessageId) -> bool>,
+    pub only: Option<fn(CanId) -> bool>,
     /// Start of the window in bus time \[ns\].
     pub from_ns: u64,
     /// End of the window in bus time \[ns\].
@@ -81,7 +81,7 @@ impl FaultRule {
     }
 
     /// The same rule for frames of these ids only.
-    pub fn only(self, ids: fn(MessageId) -> bool) -> FaultRule {
+    pub fn only(self, ids: fn(CanId) -> bool) -> FaultRule {
         FaultRule {
             only: Some(ids),
             ..self
@@ -155,7 +155,7 @@ impl<B: Bus> FaultInjector<B> {
         unit < probability
     }
 
-    fn fault_for(&mut self, traffic: Traffic, id: MessageId) -> Option<FaultKind> {
+    fn fault_for(&mut self, traffic: Traffic, id: CanId) -> Option<FaultKind> {
         let now = self.bus.now_ns();
         for i in 0..self.rules.len() {
             let rule = self.rules[i];
@@ -176,11 +176,11 @@ impl<B: Bus> FaultInjector<B> {
             return *frame;
         }
         let bit = (self.random.next_u64() % bits) as usize;
-        let mut payload = [0; 8];
+        let mut payload = [0; MAX_FD_BYTES];
         let length = frame.payload().len();
         payload[..length].copy_from_slice(frame.payload());
         payload[bit / 8] ^= 1 << (bit % 8);
-        CanFrame::new(frame.id(), &payload[..length]).unwrap_or(*frame)
+        CanFrame::of_format(frame.id(), frame.format(), &payload[..length]).unwrap_or(*frame)
     }
 
     fn delay_event(&mut self, due_ns: u64, event: Event) {
@@ -286,6 +286,10 @@ impl<B: Bus> FaultInjector<B> {
 }
 
 impl<B: Bus> Bus for FaultInjector<B> {
+    fn carries_fd(&self) -> bool {
+        self.bus.carries_fd()
+    }
+
     fn clock_stall_ns(&self) -> u64 {
         self.bus.clock_stall_ns()
     }

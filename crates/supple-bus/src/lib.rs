@@ -1,4 +1,4 @@
-//! One node's view of the arm's CAN bus.
+//! One node's view of a CAN bus.
 //!
 //! A [`Bus`] sends frames and returns [`Event`]s: frames of other nodes, confirmations of sent frames, and bus
 //! faults. It also owns the time: [`Bus::receive_until`] is the only way to wait. On a real bus the time is the
@@ -9,13 +9,14 @@
 //! | backend | is |
 //! |---|---|
 //! | [`SocketCan`] | a CAN interface of the kernel, real or `vcan` |
-//! | [`DatagramBus`] | Unix datagrams in an owner-only folder, each one a raw `struct can_frame` |
+//! | [`DatagramBus`] | Unix datagrams in an owner-only folder, each one a raw frame as of SocketCAN |
 //! | [`virtual_time::DirectBus`] | the emulated arm in the same process |
 //! | [`virtual_time::LockstepBus`] | the emulated arm in another process |
 //! | [`PacedBus`] | an emulated arm in another process, synchronised to the wall clock |
 //! | [`FaultInjector`] | a decorator that injects faults into any of these |
 //!
-//! It transports frames; `supple-puck` encodes and decodes their contents. Sending and receiving allocate
+//! It transports frames of classic CAN and CAN FD and knows no protocol: codecs such as `supple-puck` encode and
+//! decode their contents. Sending and receiving allocate
 //! nothing.
 
 #![forbid(unsafe_code)]
@@ -39,7 +40,7 @@ mod wait;
 
 pub use address::{Address, AddressError};
 pub use bus::{Bus, BusFault, Event};
-pub use can_frame::{CAN_FRAME_BYTES, WireFrame};
+pub use can_frame::{CAN_FRAME_BYTES, FD_FRAME_BYTES, RawFrame, WireFrame};
 pub use datagram::{DatagramBus, Side};
 pub use error::BusError;
 pub use fault::{FaultInjector, FaultKind, FaultRule, Traffic};

@@ -6,7 +6,7 @@ use crate::endpoint::{Delivery, Endpoint};
 use crate::error::BusError;
 use crate::message::{ENTRIES, Entry, Kind, MAX_BYTES, Message};
 use std::collections::VecDeque;
-use supple_puck::CanFrame;
+use supple_can_frame::CanFrame;
 
 #[derive(Debug)]
 pub(crate) struct LockstepClient {

@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! 0 kind   4..8 sequence   8..16 time [ns]   16..24 offset [ns]   24..32 sent [ns]   32..36 frames   36..40 entries
-//! then for each entry: 0 kind   8..16 time [ns]   16..32 struct can_frame
+//! then for each entry: 0 kind   8..16 time [ns]   16..32 struct can_frame, or 16..88 struct canfd_frame
 //! ```
 //!
 //! A request gives the time to run until, and the frames that the host has sent since the last request, each
@@ -14,16 +14,17 @@
 //! monotonic clock from the arm's time, and "sent" is the time of sending by that clock.
 
 use crate::bus::Event;
-use crate::can_frame::{CAN_FRAME_BYTES, WireFrame};
-use supple_puck::CanFrame;
+use crate::can_frame::{CAN_FRAME_BYTES, FD_FRAME_BYTES, WireFrame};
+use supple_can_frame::CanFrame;
 
 /// Maximum number of entries in a datagram. A bus at 1 Mbit/s carries no more frames in three milliseconds.
 pub(crate) const ENTRIES: usize = 64;
 /// Maximum size of a datagram.
-pub(crate) const MAX_BYTES: usize = HEAD_BYTES + ENTRIES * ENTRY_BYTES;
+pub(crate) const MAX_BYTES: usize = HEAD_BYTES + ENTRIES * MAX_ENTRY_BYTES;
 
 const HEAD_BYTES: usize = 40;
-const ENTRY_BYTES: usize = 32;
+const ENTRY_HEAD_BYTES: usize = 16;
+const MAX_ENTRY_BYTES: usize = ENTRY_HEAD_BYTES + FD_FRAME_BYTES;
 
 const FRAME: u8 = 1;
 const SENT: u8 = 2;
@@ -31,6 +32,8 @@ const FAULT: u8 = 3;
 const RUN_UNTIL: u8 = 4;
 const REACHED: u8 = 5;
 const STOPPED: u8 = 6;
+/// Flag of the kind of an entry with an FD frame.
+const FD: u8 = 0x80;
 
 /// Kind of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -133,18 +136,20 @@ impl Message {
         bytes[24..32].copy_from_slice(&self.sent_ns.to_ne_bytes());
         bytes[32..36].copy_from_slice(&self.frames.to_ne_bytes());
         bytes[36..40].copy_from_slice(&(self.count as u32).to_ne_bytes());
-        let end = HEAD_BYTES + self.count * ENTRY_BYTES;
-        let slots = bytes[HEAD_BYTES..end].chunks_exact_mut(ENTRY_BYTES);
-        for (slot, entry) in slots.zip(self.entries()) {
+        let mut end = HEAD_BYTES;
+        for entry in self.entries() {
             let (kind, raw) = match &entry.event {
                 Event::Frame(frame) => (FRAME, WireFrame::data(frame)),
                 Event::Sent(frame) => (SENT, WireFrame::data(frame)),
                 Event::Fault(fault) => (FAULT, WireFrame::fault(*fault)),
             };
+            let fd = if raw.len() == FD_FRAME_BYTES { FD } else { 0 };
+            let slot = &mut bytes[end..end + ENTRY_HEAD_BYTES + raw.len()];
             slot[..8].fill(0);
-            slot[0] = kind;
+            slot[0] = kind | fd;
             slot[8..16].copy_from_slice(&entry.time_ns.to_ne_bytes());
-            slot[16..].copy_from_slice(&raw);
+            slot[ENTRY_HEAD_BYTES..].copy_from_slice(&raw);
+            end += slot.len();
         }
         &bytes[..end]
     }
@@ -162,20 +167,27 @@ impl Message {
         message.sent_ns = u64_at(bytes, 24)?;
         message.frames = u32_at(bytes, 32)?;
         let count = usize::try_from(u32_at(bytes, 36)?).ok()?;
-        if count > ENTRIES || bytes.len() != HEAD_BYTES + count * ENTRY_BYTES {
+        if count > ENTRIES {
             return None;
         }
-        for slot in bytes[HEAD_BYTES..].chunks_exact(ENTRY_BYTES) {
-            let raw: &[u8; CAN_FRAME_BYTES] = slot[16..].try_into().ok()?;
-            let event = match (slot[0], WireFrame::parse(raw)) {
+        let mut rest = bytes.get(HEAD_BYTES..)?;
+        for _ in 0..count {
+            let kind = *rest.first()?;
+            let raw_bytes = match kind & FD {
+                0 => CAN_FRAME_BYTES,
+                _ => FD_FRAME_BYTES,
+            };
+            let (slot, after) = rest.split_at_checked(ENTRY_HEAD_BYTES + raw_bytes)?;
+            let event = match (kind & !FD, WireFrame::parse(&slot[ENTRY_HEAD_BYTES..])) {
                 (FRAME, WireFrame::Data(frame)) => Event::Frame(frame),
                 (SENT, WireFrame::Data(frame)) => Event::Sent(frame),
                 (FAULT, WireFrame::Fault(fault)) => Event::Fault(fault),
                 _ => return None,
             };
             message.push(u64_at(slot, 8)?, event);
+            rest = after;
         }
-        Some(message)
+        rest.is_empty().then_some(message)
     }
 }
 
@@ -193,15 +205,19 @@ fn u32_at(bytes: &[u8], at: usize) -> Option<u32> {
 mod tests {
     use super::*;
     use crate::bus::BusFault;
+    use supple_can_frame::CanId;
 
     #[test]
     fn messages_round_trip_and_truncated_ones_are_rejected() {
         let frame = CanFrame::from_raw(0x423, &[1, 2, 3]).expect("a frame");
+        let long = CanId::extended(0x8001).expect("an id");
+        let long = CanFrame::fd(long, true, &[7; 64]).expect("a frame");
         let mut message = Message::new(Kind::Stopped, 12, 7);
         (message.offset_ns, message.sent_ns, message.frames) = (3, 4, 5);
         for (time_ns, event) in [
             (9, Event::Sent(frame)),
             (10, Event::Frame(frame)),
+            (11, Event::Frame(long)),
             (12, Event::Fault(BusFault::BusOff)),
         ] {
             assert!(message.push(time_ns, event));
@@ -215,7 +231,8 @@ mod tests {
         for length in 0..written.len() {
             assert!(Message::parse(&written[..length]).is_none(), "{length}");
         }
-        while message.push(12, Event::Frame(frame)) {}
+        message.clear();
+        while message.push(12, Event::Frame(long)) {}
         assert!(message.is_full());
         assert_eq!(message.emit(&mut bytes).len(), MAX_BYTES);
     }

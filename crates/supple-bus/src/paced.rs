@@ -19,7 +19,7 @@ use crate::lockstep_server::LockstepServer;
 use crate::message::{Kind, MAX_BYTES, Message};
 use crate::peer::Peer;
 use crate::wait::wait_readable_until;
-use supple_puck::CanFrame;
+use supple_can_frame::CanFrame;
 use supple_realtime::{monotonic_ns, sleep_until_ns};
 
 /// Maximum lateness that a host sees after a stall \[ns\].

@@ -1,7 +1,7 @@
 //! The arm as seen from its bus.
 
 use crate::bus::Event;
-use supple_puck::CanFrame;
+use supple_can_frame::CanFrame;
 
 /// All nodes on the bus except the host.
 pub trait Peer {

@@ -2,21 +2,21 @@
 //!
 //! The socket receives its own messages as echoes, so that a frame counts as sent only when the driver confirms
 //! it, all error frames, and a count of the frames that were lost because they were not read in time
-//! (`SO_RXQ_OVFL`). Frames with extended ids and remote requests are ignored. Bit rate and automatic restart are
-//! properties of the interface, set when it is brought up:
-//! `ip link set can0 up type can bitrate 1000000 restart-ms 100`.
+//! (`SO_RXQ_OVFL`). It carries frames of classic CAN, and those of CAN FD if the interface does; remote requests are
+//! ignored. Bit rates and automatic restart are properties of the interface, set when it is brought up:
+//! `ip link set can0 up type can bitrate 1000000 restart-ms 100`, for CAN FD with `dbitrate 5000000 fd on`.
 
 use crate::bus::{Bus, BusFault, Event};
-use crate::can_frame::{CAN_FRAME_BYTES, WireFrame};
+use crate::can_frame::{FD_FRAME_BYTES, WireFrame};
 use crate::error::BusError;
 use crate::wait::wait_readable_until;
 use nix::sys::socket::{self as kernel, ControlMessageOwned, MsgFlags, setsockopt};
 use rustix::fd::{AsFd, AsRawFd, BorrowedFd};
 use rustix::io::{Errno, IoSliceMut};
 use rustix::net::{RecvAncillaryBuffer, RecvFlags, ReturnFlags, recvmsg, sockopt};
-use socketcan::{CanSocket, Socket, SocketOptions};
+use socketcan::{CanFdSocket, Socket, SocketOptions};
 use std::io;
-use supple_puck::CanFrame;
+use supple_can_frame::CanFrame;
 use supple_realtime::monotonic_ns;
 
 /// Flag of the kernel for an echo of a frame that the reading socket itself sent (`MSG_CONFIRM`).
@@ -29,7 +29,11 @@ const RECEIVE_BUFFER_BYTES: usize = 1 << 20;
 /// A raw CAN socket.
 #[derive(Debug)]
 pub struct SocketCan {
-    socket: CanSocket,
+    socket: CanFdSocket,
+    /// Name of the interface.
+    interface: String,
+    /// The interface carries FD frames.
+    fd: bool,
     /// An overrun has occurred: from then on the kernel attaches its counter to every frame.
     overrun_counting: bool,
     /// Number of frames lost.
@@ -50,7 +54,7 @@ impl SocketCan {
             remedy: remedy(&source),
             source,
         };
-        let socket = CanSocket::open(interface).map_err(refused)?;
+        let socket = CanFdSocket::open(interface).map_err(refused)?;
         let set_up = || -> io::Result<()> {
             socket.set_recv_own_msgs(true)?;
             socket.set_error_filter_accept_all()?;
@@ -62,6 +66,8 @@ impl SocketCan {
         set_up().map_err(refused)?;
         Ok(SocketCan {
             socket,
+            interface: interface.to_owned(),
+            fd: carries_fd(interface),
             overrun_counting: false,
             lost: 0,
             lost_by_kernel: 0,
@@ -87,7 +93,7 @@ impl SocketCan {
 
     /// Whether frames were lost before the next one.
     fn detect_overrun(&mut self) -> Result<bool, BusError> {
-        let mut raw = [0; CAN_FRAME_BYTES];
+        let mut raw = [0; FD_FRAME_BYTES];
         let mut buffers = [IoSliceMut::new(&mut raw)];
         let peeked = kernel::recvmsg::<()>(
             self.socket.as_raw_fd(),
@@ -120,7 +126,7 @@ impl SocketCan {
             if self.overrun_counting && self.detect_overrun()? {
                 return Ok(Some(Event::Fault(BusFault::Overrun)));
             }
-            let mut raw = [0; CAN_FRAME_BYTES];
+            let mut raw = [0; FD_FRAME_BYTES];
             let received = recvmsg(
                 &self.socket,
                 &mut [IoSliceMut::new(&mut raw)],
@@ -135,7 +141,7 @@ impl SocketCan {
             };
             // This read had no buffer for the counter; it is read with the next frame.
             self.overrun_counting |= message.flags.contains(ReturnFlags::CTRUNC);
-            match WireFrame::parse(&raw) {
+            match WireFrame::parse(&raw[..message.bytes]) {
                 WireFrame::Data(frame) if message.flags.bits() & CONFIRM != 0 => {
                     return Ok(Some(Event::Sent(frame)));
                 }
@@ -152,7 +158,16 @@ impl Bus for SocketCan {
         monotonic_ns()
     }
 
+    fn carries_fd(&self) -> bool {
+        self.fd
+    }
+
     fn send(&mut self, frame: &CanFrame) -> Result<(), BusError> {
+        if frame.is_fd() && !self.fd {
+            return Err(BusError::ClassicOnly {
+                interface: self.interface.clone(),
+            });
+        }
         match rustix::io::write(&self.socket, &WireFrame::data(frame)) {
             Ok(_) => Ok(()),
             Err(Errno::AGAIN | Errno::NOBUFS) => Err(BusError::Full),
@@ -177,6 +192,13 @@ impl AsFd for SocketCan {
     fn as_fd(&self) -> BorrowedFd<'_> {
         self.socket.as_fd()
     }
+}
+
+/// Whether an interface carries FD frames: its largest transfer is then a `struct canfd_frame`.
+fn carries_fd(interface: &str) -> bool {
+    let mtu = std::fs::read_to_string(format!("/sys/class/net/{interface}/mtu"));
+    let mtu = mtu.ok().and_then(|text| text.trim().parse::<usize>().ok());
+    mtu.is_some_and(|bytes| bytes >= FD_FRAME_BYTES)
 }
 
 fn remedy(error: &io::Error) -> &'static str {

@@ -20,7 +20,7 @@ use crate::message::{Kind, MAX_BYTES, Message};
 pub use crate::peer::Peer;
 use crate::wait::wait_readable_until;
 use rustix::fd::{AsFd, BorrowedFd};
-use supple_puck::CanFrame;
+use supple_can_frame::CanFrame;
 use supple_realtime::monotonic_ns;
 
 /// The host's bus, with the peer in the same process.

@@ -6,7 +6,7 @@ mod counting;
 use counting::count_allocations;
 use supple_bus::{Bus, DatagramBus, Event, FaultInjector, FaultKind, FaultRule};
 use supple_bus::{OwnerFolder, Side, Traffic};
-use supple_puck::CanFrame;
+use supple_can_frame::CanFrame;
 
 #[test]
 fn a_thousand_exchanges_allocate_nothing() {

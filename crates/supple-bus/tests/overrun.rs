@@ -2,7 +2,7 @@
 //! `./ci.sh socketcan` provides such an interface.
 
 use supple_bus::{Bus, BusError, BusFault, Event, SocketCan};
-use supple_puck::CanFrame;
+use supple_can_frame::CanFrame;
 
 /// More frames than the requested receive buffer holds.
 const FLOOD: u64 = 20_000;

@@ -1,37 +1,29 @@
-//! Runs the arm's CAN bus and owns the clock.
+//! Runs an arm's CAN bus and owns the clock.
 //!
-//! [`start_up()`] prepares an arm for polling after power-up and rejects one that does not match its
-//! description. [`Cycle`] then polls positions, publishes the arm's state, waits a bounded time for the
-//! controller's torques, sends them and checks that they were sent. [`guard`] defines the safe action after a
-//! loss. The host sets the arm's safety module to idle and never activates it: that requires a person at the
-//! pendant.
+//! Each make of drives is a folder of [`drives`] and a line of [`registry`]. Its start-up prepares an arm after
+//! power-up and rejects one that does not match its description; then it is a [`supple_drive::Drive`], and the plant
+//! loop of that crate polls positions, publishes the arm's state, waits a bounded time for the controller's torques,
+//! sends them and checks that they were sent. What happens after a loss is the same for all drives.
 //!
-//! It computes no torques and does not depend on the controller, which it reaches through a [`Link`]. Time is
-//! bus time ([`supple_bus::Bus`]): the same code runs on a CAN card, on an emulator, and in virtual time.
+//! It computes no torques and does not depend on the controller. Time is bus time ([`supple_bus::Bus`]): the same
+//! code runs on a CAN card, on an emulator, and in virtual time.
 
 #![forbid(unsafe_code)]
 
-pub mod bus_time;
-pub mod guard;
-pub mod transmission;
+pub mod drives;
+pub mod registry;
 
-mod cycle;
-mod error;
-mod host;
-mod link;
+mod make;
 mod options;
 mod program;
-mod sensor;
-mod shared_memory;
-mod start_up;
-mod unconfirmed;
+mod serve;
 
-pub use bus_time::{Budget, BusTime, Overload};
-pub use cycle::{Cycle, CycleConfig};
-pub use error::CanError;
-pub use guard::{LossReason, SafeActionMachine};
-pub use link::{Answer, ArmReport, Command, Counters, Drives, Link};
+pub use drives::barrett::bus_time::{Budget, BusTime, Overload};
+pub use drives::barrett::start_up::{
+    ARM_GROUPS, MotorPuck, Progress, Ready, StartupConfig, start_up,
+};
+pub use drives::barrett::transmission::{self, Transmission};
+pub use drives::barrett::{Barrett, CanError, Cycle, cycle};
+pub use make::{Make, RunError};
+pub use options::Options;
 pub use program::main;
-pub use shared_memory::SharedMemoryLink;
-pub use start_up::{ARM_GROUPS, MotorPuck, Progress, Ready, StartupConfig, start_up};
-pub use transmission::Transmission;

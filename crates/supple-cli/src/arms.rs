@@ -7,19 +7,24 @@ use serde::Serialize;
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Mutex;
-use supple_model::{Description, assets};
+use supple_model::{Description, Paths, UrdfName, assets};
 
 /// Warnings that were already printed.
 static PRINTED_WARNINGS: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
 
-/// Loads a built-in arm by name, or an arm from a file. A built-in name takes precedence; write `./wam4` for a path.
-/// Unread URDF content is reported on standard error, or is an error if `strict` is set.
+/// Loads a built-in arm by name, or an arm from a file. A built-in name takes precedence; write `./wam4` for a path. What a
+/// controller needs and the arm's TOML leaves out is derived. Unread URDF content is reported on standard error, or is an error if `strict` is set.
 ///
 /// # Errors
 /// [`Failure::UnknownArm`] or [`Failure::Model`].
 pub fn find(name_or_path: &str, strict: bool) -> Result<Description, Failure> {
     if assets().contains(&name_or_path) {
-        return Ok(Description::asset(name_or_path)?);
+        return completed(Description::asset(name_or_path)?);
+    }
+    if let Some(urdf) = UrdfName::parse(name_or_path) {
+        let description = Description::from_urdf(&urdf)?.strict_if(strict)?;
+        print_warnings(&description);
+        return completed(description);
     }
     let meant_as_path = name_or_path.contains(std::path::MAIN_SEPARATOR)
         || name_or_path.ends_with(".toml")
@@ -39,17 +44,58 @@ pub fn find(name_or_path: &str, strict: bool) -> Result<Description, Failure> {
 /// [`Failure::Model`].
 pub fn load(path: &Path, strict: bool) -> Result<Description, Failure> {
     let description = Description::load(path)?.strict_if(strict)?;
+    print_warnings(&description);
+    completed(description)
+}
+
+/// The arm with all that its TOML leaves out, which is reported on standard error.
+fn completed(description: Description) -> Result<Description, Failure> {
+    let completed = description.completed()?;
+    let estimates = completed.derived.iter();
+    let estimates = estimates
+        .filter(|derived| derived.key.ends_with("armature_kg_m2"))
+        .count();
+    let derived = completed.derived.len();
+    if derived > 0 {
+        let description = &completed.description;
+        let mut line = format!(
+            "{}: {derived} settings derived from the arm; `supple new` writes them with their reasons",
+            description.name()
+        );
+        if estimates > 0 {
+            line += &format!("; the rotor inertias of {estimates} joints are estimates");
+        }
+        print_once(&line);
+        let paths = description.paths();
+        if paths != Paths::PAPER {
+            print_once(&format!(
+                "{}: the paper's paths are placed about a point {:.3} m from the base's vertical axis, {:.3} m \
+                 high, at {:.2} rad, {} times the paper's size",
+                description.name(),
+                paths.radius_m,
+                paths.height_m,
+                paths.azimuth_rad,
+                paths.scale
+            ));
+        }
+    }
+    Ok(completed.description)
+}
+
+fn print_warnings(description: &Description) {
+    for warning in description.warnings() {
+        print_once(&format!("warning: {warning}"));
+    }
+}
+
+/// A command may load an arm more than once.
+fn print_once(line: &str) {
     let mut printed = PRINTED_WARNINGS
         .lock()
         .unwrap_or_else(|poisoned| poisoned.into_inner());
-    for warning in description.warnings() {
-        let line = format!("warning: {warning}");
-        // A command may load an arm more than once.
-        if printed.insert(line.clone()) {
-            print_status(&line);
-        }
+    if printed.insert(line.to_owned()) {
+        print_status(line);
     }
-    Ok(description)
 }
 
 #[derive(Serialize)]

@@ -12,7 +12,7 @@
 //! | 7 | a replay differs from the logged outputs |
 //! | 8 | the machine does not meet the real-time requirements |
 //! | 9 | no model can be identified from the logs |
-//! | 10 | no system is running, or one of its processes cannot start or has exited |
+//! | 10 | no system is running, one of its processes cannot start or has exited, or a motor does not fit |
 //! | 11 | the controller refused a request |
 //! | 12 | a test case of `supple drill` failed |
 //! | 130 | interrupted |
@@ -20,6 +20,7 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use supple_experiment::ExperimentError;
+use supple_experiment::procedure::ProcedureError;
 use supple_ident::{IdentError, ReadError, SaveError};
 use supple_log::LogError;
 use supple_model::ModelError;
@@ -37,7 +38,7 @@ pub const CODES: &str = "Exit codes:
   7    a replay differs from the logged outputs
   8    the machine does not meet the real-time requirements
   9    no model can be identified from the logs
-  10   no system is running, or one of its processes cannot start or has exited
+  10   no system is running, one of its processes cannot start or has exited, or a motor does not fit
   11   the controller refused a request
   12   a test case of `supple drill` failed
   130  interrupted";
@@ -62,6 +63,37 @@ pub enum Failure {
     /// An experiment that could not be run.
     #[error(transparent)]
     Experiment(#[from] ExperimentError),
+    /// A calibration that ended early.
+    #[error(transparent)]
+    Procedure(#[from] ProcedureError),
+    /// The command needs the program `supple`.
+    #[error("{option} starts processes, which `supple-report` cannot: use the program `supple`")]
+    NeedsSupple {
+        /// The option.
+        option: &'static str,
+    },
+    /// Processes in virtual time cannot do this with this plant.
+    #[error("--virtual-time loads models with the plant `emu` only: use that, or leave it out")]
+    VirtualTimeNeedsEmu,
+    /// The operator or a signal interrupted a calibration, whose logs are complete.
+    #[error("interrupted; all logs are complete, go on with --resume")]
+    Interrupted,
+    /// The drives did not become active.
+    #[error(
+        "the drives did not become active: release the emergency stop, press Shift-Idle and then Shift-Activate on the \
+         pendant, and go on with --resume"
+    )]
+    DrivesNotActive,
+    /// The running system needs another model.
+    #[error(
+        "the controller of the running system needs the model of {}: stop the system, start it again with \
+         `--arm {}`, and go on with --resume",
+        folder.display(), folder.display()
+    )]
+    OtherModelNeeded {
+        /// Folder of the model.
+        folder: PathBuf,
+    },
     /// A fault ended one or more runs; all results are written.
     #[error("a fault ended {runs}; the results are in {}, with the fault in the report", out.display())]
     Fault {
@@ -239,6 +271,12 @@ pub enum Failure {
         /// All steps.
         steps: u64,
     },
+    /// Motors that do not answer, do not fit the arm's description, or refuse a register.
+    #[error("{problem}")]
+    Motors {
+        /// What is wrong, with its remedy.
+        problem: String,
+    },
     /// The machine does not meet the real-time requirements.
     #[error("this machine is not ready for real time: {failed}; see the remedies above")]
     NotReady {
@@ -320,6 +358,7 @@ impl Failure {
             8 => "machine",
             12 => "drill",
             9 => "identification",
+            130 => "interrupted",
             _ => "internal",
         }
     }
@@ -344,6 +383,10 @@ impl Failure {
         match self {
             Failure::UnknownArm { .. } | Failure::Model(_) => 3,
             Failure::Experiment(error) => experiment_code(error),
+            Failure::Procedure(error) => procedure_code(error),
+            Failure::NeedsSupple { .. } | Failure::VirtualTimeNeedsEmu => 2,
+            Failure::Interrupted => 130,
+            Failure::DrivesNotActive | Failure::OtherModelNeeded { .. } => 10,
             Failure::Fault { .. } | Failure::RunFault { .. } | Failure::SystemInFault => 5,
             Failure::Log(error) => log_code(error),
             Failure::File { .. }
@@ -365,6 +408,7 @@ impl Failure {
             Failure::Drill { .. } | Failure::DidNotReachTracking => 12,
             Failure::System(_)
             | Failure::Pendant { .. }
+            | Failure::Motors { .. }
             | Failure::AlreadyRunning { .. }
             | Failure::MissingProgram { .. }
             | Failure::ProcessEnded { .. }
@@ -372,6 +416,15 @@ impl Failure {
             Failure::Refused { .. } | Failure::NothingLearned => 11,
             Failure::Figure(_) | Failure::ReportGeneration(_) => 1,
         }
+    }
+}
+
+fn procedure_code(error: &ProcedureError) -> u8 {
+    match error {
+        ProcedureError::Experiment(error) => experiment_code(error),
+        ProcedureError::Wiring { .. } | ProcedureError::NotConfirmed { .. } => 4,
+        ProcedureError::Stopped { .. } => 5,
+        ProcedureError::Resume { .. } | ProcedureError::Write { .. } => 6,
     }
 }
 
@@ -499,6 +552,23 @@ mod tests {
             (Failure::Fault { runs, out: path() }, fault),
             (Failure::RunFault { faults: text() }, fault),
             (Failure::SystemInFault, fault),
+            (
+                Failure::Procedure(ProcedureError::Stopped {
+                    motion: text(),
+                    fault: text(),
+                    remedy: "",
+                }),
+                fault,
+            ),
+            (
+                Failure::Procedure(ProcedureError::Wiring {
+                    problem: text(),
+                    remedy: text(),
+                }),
+                "the arm cannot perform",
+            ),
+            (Failure::Interrupted, "interrupted"),
+            (Failure::DrivesNotActive, system),
             (file(), disk),
             (Failure::Exists { path: path() }, disk),
             (Failure::Log(mcap()), disk),
@@ -564,6 +634,7 @@ mod tests {
                 },
                 system,
             ),
+            (Failure::Motors { problem: text() }, system),
             (Failure::Refused { reason: text() }, "refused a request"),
             (Failure::DidNotReachTracking, "supple drill"),
             (Failure::Drill { rows: text() }, "supple drill"),

@@ -11,6 +11,7 @@ use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use std::collections::VecDeque;
 use supple_bus::virtual_time::Peer;
 use supple_bus::{BusFault, Event};
+use supple_can_frame::{BitRates, CanFrame};
 use supple_core::dynamics::tip_pose;
 use supple_core::nalgebra::Matrix4;
 use supple_core::{Matrix, Vector};
@@ -19,7 +20,7 @@ use supple_plant::{
 };
 use supple_puck::safety::SafetyMode;
 use supple_puck::status::MotorMode;
-use supple_puck::{CanFrame, Destination, GroupId, NodeId, PackedTorques};
+use supple_puck::{Destination, GroupId, MessageId, NodeId, PackedTorques};
 
 /// An event of the emulated arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -134,7 +135,7 @@ impl<const N: usize> Emulator<N> {
             injector: Injector::none(&plant),
             now_ns: start_ns,
             next_tick_ns: start_ns + config.step_ns,
-            wire: Wire::default(),
+            wire: Wire::new(BitRates::CLASSIC_1M),
             plant,
             motor_from_joint,
             pucks,
@@ -408,7 +409,8 @@ impl<const N: usize> Emulator<N> {
 
     /// A frame transmission is complete: delivers it to all other nodes. Returns the event for the host.
     fn deliver(&mut self, frame: CanFrame) -> Option<Event> {
-        let from_host = frame.id().from() == NodeId::HOST;
+        // No node of the arm has other ids than those of its protocol.
+        let from_host = MessageId::of(&frame).is_none_or(|id| id.from() == NodeId::HOST);
         if from_host && self.any_transceiver_off() {
             self.record(ArmEvent::HostSentDuringWakeUp);
             self.host_bus_off_until_ns = Some(self.now_ns + self.config.restart_ns);
@@ -469,16 +471,23 @@ impl<const N: usize> Emulator<N> {
     }
 }
 
+/// Destination of a frame of the arm's protocol.
+fn destination(frame: &CanFrame) -> Option<Destination> {
+    MessageId::of(frame).map(MessageId::to)
+}
+
 /// Whether the frame is a puck's reply to a position request.
 fn is_position(frame: &CanFrame) -> bool {
-    frame.id().to() == Destination::Group(GroupId::POSITION)
+    destination(frame) == Some(Destination::Group(GroupId::POSITION))
 }
 
 /// Whether the frame is a packed torque frame with a nonzero torque.
 fn commands_torque(frame: &CanFrame) -> bool {
     let to_motors = matches!(
-        frame.id().to(),
-        Destination::Group(GroupId::LOWER_TORQUES | GroupId::UPPER_TORQUES)
+        destination(frame),
+        Some(Destination::Group(
+            GroupId::LOWER_TORQUES | GroupId::UPPER_TORQUES
+        ))
     );
     let torques = PackedTorques::parse(frame);
     to_motors && torques.is_ok_and(|torques| torques.slots.iter().any(|t| t.units() != 0))

@@ -35,6 +35,31 @@ pub enum EmulatorError {
         /// Version found.
         version: i32,
     },
+    /// Motors of a make that drives each joint directly do not.
+    #[error("motors of this bus drive each joint directly: remove joint_from_motor of [motors]")]
+    NotDirect,
+    /// A motor that the arm does not have.
+    #[error("--misbehave: motor {found} does not exist, the arm has {motors}")]
+    Motor {
+        /// Motor given, counted from 1.
+        found: usize,
+        /// Number of motors.
+        motors: usize,
+    },
+    /// An option that applies to other motors.
+    #[error("{option} does not apply to the motors of this arm: leave it out")]
+    NotForThisArm {
+        /// The option.
+        option: &'static str,
+    },
+    /// The arm has no `[bus]`, or no pose without torque.
+    #[error("{arm} has no {section}: add it to the arm's TOML")]
+    Missing {
+        /// Name of the arm.
+        arm: String,
+        /// What is missing.
+        section: &'static str,
+    },
     /// The motor-to-joint matrix has no inverse.
     #[error("joint_from_motor is singular: correct [motors] in the arm's TOML")]
     Transmission,
@@ -81,12 +106,16 @@ impl EmulatorError {
     pub fn code(&self) -> u8 {
         match self {
             EmulatorError::Press { .. }
+            | EmulatorError::Motor { .. }
+            | EmulatorError::NotForThisArm { .. }
             | EmulatorError::Injection(_)
             | EmulatorError::VirtualInterface => 2,
             EmulatorError::Joints { .. }
             | EmulatorError::Pucks { .. }
             | EmulatorError::Firmware { .. }
             | EmulatorError::Transmission
+            | EmulatorError::NotDirect
+            | EmulatorError::Missing { .. }
             | EmulatorError::Plant(_)
             | EmulatorError::Options(_)
             | EmulatorError::Model(_) => 3,

@@ -6,6 +6,8 @@
 //! synchronises it to the wall clock on Unix datagrams or a CAN interface, or lets a host in another process
 //! advance it in lockstep.
 //!
+//! An arm of Damiao motors ([`damiao`]) is emulated in the same way, without module and pendant.
+//!
 //! It checks the host independently: it shares only the codec and the bus with `supple-can`, and does not depend
 //! on the controller. Properties that the manufacturer has not published are parameters of [`EmulatorConfig`],
 //! each with the reason for its value.
@@ -13,6 +15,7 @@
 #![forbid(unsafe_code)]
 
 pub mod config;
+pub mod damiao;
 pub mod elbow;
 pub mod puck;
 pub mod safety;
@@ -25,11 +28,13 @@ mod options;
 mod pendant;
 mod pendant_clients;
 mod program;
+mod real_time;
 mod store;
 
 pub use config::{EmulatorConfig, PuckConfig, SafetyConfig};
 pub use emulator::{ArmEvent, Emulator};
 pub use error::EmulatorError;
 pub use pendant::{SOCKET as PENDANT_SOCKET, answer as answer_pendant};
-pub use program::{ArmBus, advance_to_bus_time, main, receive_host_frame};
+pub use program::main;
+pub use real_time::{ArmBus, EmulatedArm, advance_to_bus_time, receive_host_frame};
 pub use safety::{ButtonPress, Cause};

@@ -1,5 +1,6 @@
 //! Command-line options.
 
+use crate::damiao::Misbehaviour;
 use crate::emulator::Emulator;
 use crate::error::EmulatorError;
 use crate::safety::ButtonPress;
@@ -17,7 +18,7 @@ use supple_realtime::{RealtimeOptions, Settings};
 #[derive(Clone, Debug, Parser)]
 #[command(name = "supple-emu", version)]
 pub struct Options {
-    /// A WAM with 4 or 7 joints: a built-in arm, or the path of its TOML or of its folder.
+    /// A WAM with 4 or 7 joints, or an arm with `[bus]`: a built-in arm, or the path of its TOML or of its folder.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
     /// Treats URDF elements that are not supported as errors instead of warnings.
@@ -50,7 +51,7 @@ pub struct Options {
     /// first commands torque (`activate@held+0.2`). May be repeated.
     #[arg(long, value_name = "BUTTON@TIME", value_parser = press)]
     pub press: Vec<ScheduledPress>,
-    /// Effects of a real arm, as TOML; `supple plant list` has all options.
+    /// Effects of a real arm, as TOML, or a built-in set by name; `supple plant list` has all options.
     #[arg(long, value_name = "FILE", conflicts_with = "realistic")]
     pub plant_options: Option<PathBuf>,
     /// All effects of a real arm, each of modest size: `supple plant show realistic`.
@@ -60,6 +61,17 @@ pub struct Options {
     /// repeated.
     #[arg(long, value_name = "SPEC", long_help = supple_plant::injection::HELP)]
     pub inject: Vec<Injection>,
+    /// Lets a motor or the bus misbehave (arms with `[bus]`): KIND:motor=K,..., for example error:motor=2,code=B,at-s=1;
+    /// see --help. May be repeated.
+    #[arg(long, value_name = "SPEC", long_help = crate::damiao::HELP)]
+    pub misbehave: Vec<Misbehaviour>,
+    /// Obeys frames that write a motor's flash (arms with `[bus]`); without it they end the emulation.
+    #[arg(long)]
+    pub allow_flash: bool,
+    /// Where the arm starts (arms with `[bus]`): in its home pose, supported until all motors are enabled, or in the pose
+    /// in which it stays without torque.
+    #[arg(long, value_name = "POSE", value_enum, default_value_t = StartPose::Home)]
+    pub start: StartPose,
     /// Writes motor torques and tip forces as CSV, once per millisecond.
     #[arg(long, value_name = "FILE")]
     pub trace: Option<PathBuf>,
@@ -80,6 +92,15 @@ impl Options {
     pub fn realtime(&self) -> Settings {
         self.realtime.settings(self.priority, self.virtual_time)
     }
+}
+
+/// Where an arm without brakes starts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum StartPose {
+    /// The home pose, supported until all motors are enabled.
+    Home,
+    /// The pose in which it stays without torque.
+    Stow,
 }
 
 fn height(text: &str) -> Result<f64, String> {

@@ -6,22 +6,18 @@ use crate::error::EmulatorError;
 use crate::options::Options;
 use crate::pendant::PendantSocket;
 use crate::puck::Puck;
+use crate::real_time::{ArmBus, EmulatedArm, advance_to_bus_time, receive_host_frame};
 use clap::Parser;
 use std::process::ExitCode;
 use supple_bus::virtual_time::{LockstepResponder, Peer};
-use supple_bus::{
-    Address, Bus, BusError, BusFault, DatagramBus, Event, OwnerFolder, PacedResponder, SocketCan,
-};
+use supple_bus::{Address, OwnerFolder, PacedResponder, SocketCan};
+use supple_can_frame::CanFrame;
 use supple_model::{Description, with_dof};
 use supple_plant::{PlantConfig, PlantOptions, Sample, Scene, TraceFile};
-use supple_puck::NodeId;
 use supple_puck::status::MotorMode;
+use supple_puck::{MessageId, NodeId};
 use supple_realtime::{Stop, apply_realtime_settings, diagnostics, die_with_parent, monotonic_ns};
 
-/// Delay above which this process counts as stalled; the arm's clock pauses for it \[ns\].
-const STALL_THRESHOLD_NS: u64 = 50_000_000;
-/// Maximum wait between polls of the pendant's socket \[ns\].
-const POLL_INTERVAL_NS: u64 = 1_000_000;
 /// Maximum wait in virtual time, which pauses while the host is silent \[ns\].
 const IDLE_NS: u64 = 10_000_000;
 
@@ -59,7 +55,10 @@ fn start(options: &Options) -> Result<(), EmulatorError> {
     {
         eprintln!("supple-emu: warning: {warning}");
     }
-    with_dof!(description.dof(), N => run::<N>(&description, options, &stop))?
+    with_dof!(description.dof(), N => match description.bus() {
+        Some(_) => crate::damiao::run::<N>(&description, options, &stop),
+        None => run::<N>(&description, options, &stop),
+    })?
 }
 
 /// Runs until a shutdown is requested.
@@ -128,71 +127,18 @@ fn run<const N: usize>(
     }
 }
 
-/// The arm's side of a bus in real time.
-pub trait ArmBus: Bus {
-    /// Sends an error frame to the host.
-    ///
-    /// # Errors
-    /// If the bus fails.
-    fn fault(&mut self, fault: BusFault) -> Result<(), BusError>;
-}
+impl<const N: usize> EmulatedArm for Emulator<N> {
+    fn next_ns(&self) -> u64 {
+        Emulator::next_ns(self)
+    }
 
-impl ArmBus for DatagramBus {
-    fn fault(&mut self, fault: BusFault) -> Result<(), BusError> {
-        self.send_fault(fault)
+    fn shift_clock(&mut self, gap_ns: u64) {
+        Emulator::shift_clock(self, gap_ns);
     }
-}
 
-impl ArmBus for SocketCan {
-    fn fault(&mut self, fault: BusFault) -> Result<(), BusError> {
-        self.send_fault(fault)
+    fn is_from_host(&self, frame: &CanFrame) -> bool {
+        MessageId::of(frame).is_none_or(|id| id.from() == NodeId::HOST)
     }
-}
-
-/// Advances the arm to the bus time and sends its frames. If this process stalled, the arm's clock pauses for
-/// that time instead.
-///
-/// # Errors
-/// If the bus fails.
-pub fn advance_to_bus_time<const N: usize>(
-    emulator: &mut Emulator<N>,
-    bus: &mut impl ArmBus,
-) -> Result<(), BusError> {
-    let now_ns = bus.now_ns();
-    let behind_ns = now_ns.saturating_sub(emulator.now_ns());
-    if behind_ns > STALL_THRESHOLD_NS {
-        emulator.shift_clock(behind_ns);
-    }
-    while let Some(event) = emulator.run_until(now_ns) {
-        match event {
-            // If the host does not read, frames are lost, as on a real bus.
-            Event::Frame(frame) => match bus.send(&frame) {
-                Ok(()) | Err(BusError::Full) => {}
-                Err(error) => return Err(error),
-            },
-            Event::Fault(fault) => bus.fault(fault)?,
-            Event::Sent(_) => {}
-        }
-    }
-    Ok(())
-}
-
-/// Waits for a frame of the host until the arm's next own event, at most for a millisecond.
-///
-/// # Errors
-/// If the bus fails.
-pub fn receive_host_frame<const N: usize>(
-    emulator: &mut Emulator<N>,
-    bus: &mut impl ArmBus,
-) -> Result<(), BusError> {
-    let until_ns = emulator.next_ns().min(bus.now_ns() + POLL_INTERVAL_NS);
-    if let Some(Event::Frame(frame)) = bus.receive_until(until_ns)?
-        && frame.id().from() == NodeId::HOST
-    {
-        advance_to_bus_time(emulator, bus)?;
-        emulator.host_sends(&frame);
-    }
-    Ok(())
 }
 
 struct Arm<const N: usize> {

@@ -11,9 +11,10 @@
 
 use crate::config::PuckConfig;
 use crate::store::{PropertyStore, property_of};
+use supple_can_frame::CanFrame;
 use supple_puck::status::{MotorMode, Role, Stat};
 use supple_puck::{
-    CanFrame, Counts, Destination, GroupId, NodeId, PackedTorques, PositionReply, Property,
+    Counts, Destination, GroupId, MessageId, NodeId, PackedTorques, PositionReply, Property,
     PropertyId, PropertyMessage, PropertyTable, PuckKind, Value, Width,
 };
 
@@ -177,14 +178,15 @@ impl Puck {
 
     /// Handles a frame of another node; returns the reply, if any.
     pub fn handle_frame(&mut self, now_ns: u64, frame: &CanFrame) -> Option<CanFrame> {
-        let addressed = match frame.id().to() {
+        let to = MessageId::of(frame)?.to();
+        let addressed = match to {
             Destination::Node(node) => node == self.node,
             Destination::Group(group) => self.belongs_to(group),
         };
         if !addressed {
             return None;
         }
-        match (self.power, frame.id().to()) {
+        match (self.power, to) {
             (Power::Off | Power::Waking(_), _) => None,
             (_, Destination::Group(GroupId::LOWER_TORQUES | GroupId::UPPER_TORQUES))
                 if frame.dlc() == 8 =>

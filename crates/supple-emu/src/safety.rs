@@ -14,11 +14,12 @@
 use crate::config::SafetyConfig;
 use crate::elbow::monitored_points_m;
 use crate::store::{PropertyStore, property_of};
+use supple_can_frame::CanFrame;
 use supple_core::nalgebra::{Matrix4, Vector3, Vector4};
 use supple_puck::safety::{Button, Level, Pendant, SafetyLimits, SafetyMode, SevenSegment};
 use supple_puck::status::{MotorMode, Role, Stat};
 use supple_puck::{
-    CanFrame, Destination, GroupId, NodeId, PackedTorques, PositionReply, Property,
+    Destination, GroupId, MessageId, NodeId, PackedTorques, PositionReply, Property,
     PropertyMessage, PropertyTable, PuckKind, Value, Width,
 };
 
@@ -261,7 +262,7 @@ impl SafetyModule {
         if !self.config.present {
             return None;
         }
-        match frame.id().to() {
+        match MessageId::of(frame)?.to() {
             Destination::Group(GroupId::LOWER_TORQUES | GroupId::UPPER_TORQUES) => {
                 self.check_torques(frame)
             }
@@ -354,7 +355,7 @@ impl SafetyModule {
     }
 
     fn update_position(&mut self, now_ns: u64, frame: &CanFrame) -> Option<CanFrame> {
-        let index = usize::from(frame.id().from().number()).checked_sub(1)?;
+        let index = usize::from(MessageId::of(frame)?.from().number()).checked_sub(1)?;
         *self.last_seen_ns.get_mut(index)? = now_ns;
         let reply = PositionReply::parse(frame).ok()?;
         *self.counts.get_mut(index)? = Some(reply.motor.get());

@@ -5,11 +5,12 @@
 //! btclient, OWD.
 
 use crate::store::property_of;
+use supple_can_frame::CanFrame;
 use supple_core::nalgebra::Vector3;
 use supple_puck::force_torque::{Quantity, SensorReading, SensorStatus};
 use supple_puck::status::{Role, Stat};
 use supple_puck::{
-    CanFrame, Destination, GroupId, NodeId, Property, PropertyMessage, PropertyTable, Value,
+    Destination, GroupId, MessageId, NodeId, Property, PropertyMessage, PropertyTable, Value,
 };
 
 /// Time that taring takes \[ns\].
@@ -46,7 +47,8 @@ impl ForceSensor {
 
     /// Handles a frame of another node; returns the replies.
     pub fn handle_frame(&mut self, now_ns: u64, frame: &CanFrame) -> [Option<CanFrame>; 2] {
-        if frame.id().to() != Destination::Node(NodeId::FORCE_TORQUE) {
+        let to = MessageId::of(frame).map(MessageId::to);
+        if to != Some(Destination::Node(NodeId::FORCE_TORQUE)) {
             return [None; 2];
         }
         let table = PropertyTable::FORCE_TORQUE;

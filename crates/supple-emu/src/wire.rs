@@ -1,11 +1,9 @@
-//! Model of the bus medium: one frame at a time, for the duration of its bits at 1 Mbit/s.
+//! Model of the bus medium: one frame at a time, for the duration of its bits.
 //!
 //! When the bus is free, the waiting frame with the lowest id starts; a frame that has started is not
 //! interrupted. Bus errors and retransmissions are not modelled.
 
-use supple_puck::{CanFrame, timing};
-
-const NS_PER_BIT: u64 = 1_000_000_000 / timing::BIT_RATE as u64;
+use supple_can_frame::{BitRates, CanFrame};
 
 /// A waiting frame.
 #[derive(Clone, Copy, Debug)]
@@ -15,8 +13,9 @@ struct Waiting {
 }
 
 /// The bus medium with all waiting frames.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Wire {
+    rates: BitRates,
     waiting: Vec<Waiting>,
     /// The current frame and its end time \[ns\].
     current: Option<(CanFrame, u64)>,
@@ -25,6 +24,17 @@ pub struct Wire {
 }
 
 impl Wire {
+    /// A free bus with these bit rates.
+    pub fn new(rates: BitRates) -> Wire {
+        Wire {
+            rates,
+            waiting: Vec::new(),
+            current: None,
+            free_ns: 0,
+            busy_ns: 0,
+        }
+    }
+
     /// Queues a frame for transmission from `ready_ns` on. Frames of one node with the same time keep their
     /// order.
     pub fn queue(&mut self, ready_ns: u64, frame: CanFrame) {
@@ -37,7 +47,7 @@ impl Wire {
         match (self.current, self.next()) {
             (Some((_, end_ns)), _) => Some(end_ns),
             (None, Some((begin_ns, index))) => {
-                Some(begin_ns + duration_ns(&self.waiting[index].frame))
+                Some(begin_ns + self.rates.duration_ns(&self.waiting[index].frame))
             }
             (None, None) => None,
         }
@@ -50,7 +60,7 @@ impl Wire {
             && begin_ns <= now_ns
         {
             let frame = self.waiting.remove(index).frame;
-            let end_ns = begin_ns + duration_ns(&frame);
+            let end_ns = begin_ns + self.rates.duration_ns(&frame);
             self.busy_ns += end_ns - begin_ns;
             self.current = Some((frame, end_ns));
         }
@@ -85,11 +95,6 @@ impl Wire {
     }
 }
 
-/// Duration of a frame on the bus \[ns\].
-pub fn duration_ns(frame: &CanFrame) -> u64 {
-    u64::from(timing::bits(frame)) * NS_PER_BIT
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -98,7 +103,7 @@ mod tests {
         CanFrame::from_raw(id, &[0x55; 8][..dlc]).unwrap()
     }
 
-    fn run(wire: &mut Wire) -> Vec<(u16, u64)> {
+    fn run(wire: &mut Wire) -> Vec<(u32, u64)> {
         let mut ends = Vec::new();
         while let Some(end_ns) = wire.next_end_ns() {
             if let Some((frame, end_ns)) = wire.advance(end_ns) {
@@ -110,7 +115,7 @@ mod tests {
 
     #[test]
     fn the_waiting_frame_with_the_lowest_id_starts() {
-        let mut wire = Wire::default();
+        let mut wire = Wire::new(BitRates::CLASSIC_1M);
         wire.queue(0, frame(0x4e3, 3));
         wire.queue(10, frame(0x443, 3));
         wire.queue(20, frame(0x423, 3));
@@ -120,12 +125,15 @@ mod tests {
 
     #[test]
     fn frames_follow_each_other_without_overlap() {
-        let mut wire = Wire::default();
+        let mut wire = Wire::new(BitRates::CLASSIC_1M);
         let frames: Vec<_> = (1..=7u32).map(|n| frame(0x403 | n << 5, 3)).collect();
         for frame in &frames {
             wire.queue(1000, *frame);
         }
-        let total: u64 = frames.iter().map(duration_ns).sum();
+        let total: u64 = frames
+            .iter()
+            .map(|frame| BitRates::CLASSIC_1M.duration_ns(frame))
+            .sum();
         assert_eq!(
             run(&mut wire).last().map(|(_, end)| *end),
             Some(1000 + total)
@@ -136,7 +144,7 @@ mod tests {
     /// Barrett's 75 us for a position reply lies between no stuffing and the maximum.
     #[test]
     fn a_position_reply_lasts_for_its_bits() {
-        let ns = duration_ns(&frame(0x423, 3));
+        let ns = BitRates::CLASSIC_1M.duration_ns(&frame(0x423, 3));
         assert!((71_000..=85_000).contains(&ns), "{ns}");
     }
 }

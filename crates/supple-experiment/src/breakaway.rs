@@ -6,8 +6,8 @@
 
 use crate::error::ExperimentError;
 use crate::excite::{move_to, without_held_joints};
-use crate::request_sequence::{RequestSequence, Step};
-use serde::Serialize;
+use crate::request_sequence::{Recording, RequestSequence, Step};
+use serde::{Deserialize, Serialize};
 use supple_core::controller::{Breakaway, Mode, Request};
 use supple_core::{Config, Vector};
 use supple_plant::PlantConfig;
@@ -24,7 +24,7 @@ const SLIDING_RAD: f64 = 3.5e-3;
 const REST_S: f64 = 0.3;
 
 /// Breakaway of one joint.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct JointBreakaway {
     /// Torque at which the joint started to slide in the positive direction \[N m\].
     pub positive_nm: f64,
@@ -100,6 +100,25 @@ pub fn breakaway<const N: usize>(
         done(joint);
     }
     Ok(found)
+}
+
+/// Torque of a ramp at which its joint began to slide \[N m\], positive; `None` if it did not. The recording begins with
+/// the ramp.
+pub(crate) fn sliding_torque_nm(
+    recording: &Recording,
+    joint: usize,
+    rate_nm_per_s: f64,
+) -> Option<f64> {
+    let begin_s = *recording.t_s.first()?;
+    let ramp = |t_s: &f64| rate_nm_per_s.abs() * (t_s - begin_s);
+    let angles = recording.q_rad.column(joint);
+    let trace: Vec<(f64, f64)> = recording
+        .t_s
+        .iter()
+        .map(ramp)
+        .zip(angles.iter().copied())
+        .collect();
+    torque_before_sliding(&trace, rate_nm_per_s.signum())
 }
 
 /// Ramp torque of the last cycle before the joint slid.

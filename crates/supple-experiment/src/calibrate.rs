@@ -261,7 +261,7 @@ pub fn calibrate<const N: usize>(
 }
 
 /// A pose with little gravity torque: all joints at zero, or as close to it as their limits permit.
-fn upright<const N: usize>(config: &Config<N>) -> Vector<N> {
+pub(crate) fn upright<const N: usize>(config: &Config<N>) -> Vector<N> {
     let limits = &config.limits;
     Vector::from_fn(|i, _| {
         let zone = 2.0 * limits.soft_zone_rad;

@@ -16,7 +16,8 @@ use crate::summary::{
     TorqueRms, TrackingError,
 };
 use rayon::prelude::*;
-use supple_model::{Description, with_dof};
+use supple_core::trajectory::Quadrant;
+use supple_model::{Description, Paths, with_dof};
 use supple_plant::PlantOptions;
 
 /// Progress of the demo.
@@ -51,8 +52,8 @@ pub struct Demo {
     /// The arc.
     pub arc: Run,
     /// Figure 3b: with the exact model, with the perturbed model, at the paper's maximum speed, and there with
-    /// more damping.
-    pub quadrants: [Run; 4],
+    /// more damping and with ramps at its corners.
+    pub quadrants: [(Quadrant, Run); 5],
     /// Figures 5 and 6.
     pub probing: Vec<ProbingRun>,
     /// Probing with the friction feed-forward left on in contact.
@@ -141,7 +142,7 @@ fn exploration(stiffness_n_per_m: f64, done: &JobResult) -> ProbingSummary {
     let contact = median_stroke(&done.strokes);
     ProbingSummary {
         stiffness_n_per_m,
-        damping_n_s_per_m: scenario::gains(stiffness_n_per_m).damping_n_s_per_m.x,
+        damping_n_s_per_m: done.damping_n_s_per_m,
         effective_mass_kg: done.effective_mass_kg,
         impact_theory_newton_s: done.effective_mass_kg
             * contact.approach_m_per_s
@@ -191,6 +192,7 @@ fn slopes(explorations: &[ProbingSummary]) -> Vec<ImpulseSlope> {
 
 /// Distributes the job results.
 struct Results {
+    paths: Paths,
     jobs: Vec<Job>,
     done: Vec<Option<JobResult>>,
 }
@@ -218,14 +220,15 @@ impl Results {
         runs.collect()
     }
 
-    fn quadrant(&mut self, job: Job) -> (Run, QuadrantSummary) {
+    fn quadrant(&mut self, job: Job) -> ((Quadrant, Run), QuadrantSummary) {
         let done = self.take(job);
+        let (quadrant, _) = job.quadrant(&self.paths);
         let summary = QuadrantSummary {
-            speed_m_per_s: job.quadrant_speed_m_per_s(),
+            speed_m_per_s: quadrant.speed_m_per_s(),
             tracking: tracking(&done.run),
             edges: done.edges,
         };
-        (done.run, summary)
+        ((quadrant, done.run), summary)
     }
 }
 
@@ -237,6 +240,7 @@ fn assemble(
     realistic: Option<Realistic>,
 ) -> Demo {
     let mut results = Results {
+        paths: description.paths(),
         jobs: jobs.to_vec(),
         done: done.into_iter().map(Some).collect(),
     };
@@ -250,6 +254,7 @@ fn assemble(
     let (perturbed, quadrant_perturbed) = results.quadrant(QUADRANT_PERTURBED);
     let (fast, quadrant_at_paper_speed) = results.quadrant(QUADRANT_FAST);
     let (damped, quadrant_damped) = results.quadrant(Job::QuadrantDamped);
+    let (ramped, quadrant_corner_ramp) = results.quadrant(Job::QuadrantCornerRamp);
     let all = &scenario::PROBING_STIFFNESS_N_PER_M;
     let two = &scenario::PAPER_STIFFNESS_N_PER_M;
     let probing = results.probing(all, Probing::Plain);
@@ -271,6 +276,7 @@ fn assemble(
     let summary = Summary {
         version: env!("CARGO_PKG_VERSION"),
         arm: description.name().to_owned(),
+        paths: description.paths(),
         seed: options.seed,
         model: options.model.as_ref().map(|model| {
             let source = model.settings().source.clone();
@@ -303,6 +309,7 @@ fn assemble(
         exploration_apparent_inertia: lines(&probing_apparent),
         sinusoid_apparent_inertia: tracking(&apparent_inertia),
         quadrant_damped,
+        quadrant_corner_ramp,
         sinusoid_exact_model: ExactModel {
             coulomb: exact(&mut results, false),
             stribeck: exact(&mut results, true),
@@ -315,7 +322,7 @@ fn assemble(
         summary,
         sinusoids,
         arc,
-        quadrants: [slow, perturbed, fast, damped],
+        quadrants: [slow, perturbed, fast, damped, ramped],
         probing,
         probing_fade_off,
         probing_rubber,

@@ -273,7 +273,7 @@ pub fn free_motion<const N: usize>(
     let learning_s = if learning { LEARNING_S } else { 0.0 };
     let mut track = |name: &str, (trajectory, duration_s): (Trajectory, f64)| {
         let mut config = setup.config(&Variant::EXACT)?;
-        config.law.gains = scenario::gains(scenario::STIFFNESS_N_PER_M);
+        config.law.gains = scenario::gains_like(&config.law.gains, scenario::STIFFNESS_N_PER_M);
         let plan = Plan {
             name: name.to_owned(),
             config,
@@ -303,8 +303,8 @@ pub fn free_motion<const N: usize>(
         };
         Ok::<_, ExperimentError>((rms_m, run.ended))
     };
-    let (sinusoid_rms_m, sinusoid_ended) = track("sinusoid", scenario::sinusoid(1.0))?;
-    let (arc_rms_m, arc_ended) = track("arc", scenario::arc())?;
+    let (sinusoid_rms_m, sinusoid_ended) = track("sinusoid", setup.paths().sinusoid(1.0))?;
+    let (arc_rms_m, arc_ended) = track("arc", setup.paths().arc(1.0))?;
     Ok(FreeMotion {
         sinusoid_rms_m,
         arc_rms_m,

@@ -16,8 +16,8 @@ use supple_core::Trajectory;
 use supple_core::config::ApparentInertia;
 use supple_core::inverse_kinematics::inverse_kinematics;
 use supple_core::nalgebra::{Matrix3, Vector3};
-use supple_core::trajectory::{Probe, ProbePhase};
-use supple_model::Description;
+use supple_core::trajectory::{Probe, ProbePhase, Quadrant};
+use supple_model::{Description, Paths};
 use supple_plant::Scene;
 
 /// Number of perturbed models in the statistics of the sinusoid.
@@ -39,6 +39,7 @@ pub(crate) enum Job {
         exact: bool,
     },
     QuadrantDamped,
+    QuadrantCornerRamp,
     Seed(u64),
     Exact {
         stribeck: bool,
@@ -104,6 +105,8 @@ pub(crate) struct JobResult {
     pub free_rms_m: f64,
     /// Mass with which the tip of a probing run meets the block \[kg\]; zero in others.
     pub effective_mass_kg: f64,
+    /// Damping of the law along base axis x \[N s/m\].
+    pub damping_n_s_per_m: f64,
 }
 
 /// All runs, the longest first so that all cores finish at about the same time.
@@ -126,7 +129,8 @@ pub(crate) fn jobs() -> Vec<Job> {
     jobs.extend((0..SEEDS).map(Job::Seed));
     jobs.extend([false, true].map(|stribeck| Job::Exact { stribeck }));
     jobs.extend([QUADRANT, QUADRANT_PERTURBED, QUADRANT_FAST]);
-    jobs.extend([Job::QuadrantDamped, Job::ApparentInertia]);
+    jobs.extend([Job::QuadrantDamped, Job::QuadrantCornerRamp]);
+    jobs.push(Job::ApparentInertia);
     jobs.push(Job::PaperLetter);
     jobs
 }
@@ -152,6 +156,7 @@ impl Job {
                 kind,
             } => format!("probing_{stiffness_n_per_m}_n_per_m{}", kind.suffix()),
             Job::QuadrantDamped => "quadrant_damped".to_owned(),
+            Job::QuadrantCornerRamp => "quadrant_corner_ramp".to_owned(),
             Job::ApparentInertia => "sinusoid_apparent_inertia".to_owned(),
         }
     }
@@ -166,7 +171,9 @@ impl Job {
             | Job::Arc
             | Job::ApparentInertia
             | Job::Quadrant { exact: false, .. } => perturbed(0),
-            Job::Quadrant { exact: true, .. } | Job::QuadrantDamped => Variant::EXACT,
+            Job::Quadrant { exact: true, .. } | Job::QuadrantDamped | Job::QuadrantCornerRamp => {
+                Variant::EXACT
+            }
             Job::Seed(offset) => perturbed(offset),
             Job::PaperLetter => Variant {
                 paper_letter: true,
@@ -188,30 +195,37 @@ impl Job {
         }
     }
 
-    fn trajectory(&self, tip_radius_m: f64) -> (Trajectory, f64) {
+    fn trajectory(&self, paths: &Paths, tip_radius_m: f64) -> (Trajectory, f64) {
         match *self {
-            Job::Sinusoid { speed } => scenario::sinusoid(speed),
+            Job::Sinusoid { speed } => paths.sinusoid(speed),
             Job::Seed(_) | Job::Exact { .. } | Job::PaperLetter | Job::ApparentInertia => {
-                scenario::sinusoid(1.0)
+                paths.sinusoid(1.0)
             }
-            Job::Arc => scenario::arc(),
-            Job::Quadrant { .. } | Job::QuadrantDamped => {
-                let (quadrant, duration_s) = scenario::quadrant(self.quadrant_speed_m_per_s());
+            Job::Arc => paths.arc(1.0),
+            Job::Quadrant { .. } | Job::QuadrantDamped | Job::QuadrantCornerRamp => {
+                let (quadrant, duration_s) = self.quadrant(paths);
                 (Trajectory::Quadrant(quadrant), duration_s)
             }
             Job::Probing { .. } => {
-                let (probe, duration_s) = scenario::probe(tip_radius_m);
+                let (probe, duration_s) = paths.probe(tip_radius_m);
                 (Trajectory::Probe(probe), duration_s)
             }
         }
     }
 
-    /// Speed of a quadrant \[m/s\].
-    pub fn quadrant_speed_m_per_s(&self) -> f64 {
-        match *self {
+    /// The quadrant of figure 3b of this job, and its duration \[s\].
+    pub fn quadrant(&self, paths: &Paths) -> (Quadrant, f64) {
+        let speed_m_per_s = match *self {
             Job::Quadrant { speed_m_per_s, .. } => speed_m_per_s,
             _ => scenario::QUADRANT_PAPER_SPEED_M_PER_S,
+        };
+        let (quadrant, duration_s) = paths.quadrant(speed_m_per_s);
+        if *self != Job::QuadrantCornerRamp {
+            return (quadrant, duration_s);
         }
+        // Two rounds have six corners.
+        let with_ramps = quadrant.with_corner_ramp(scenario::CORNER_RAMP_S);
+        (with_ramps, duration_s + 6.0 * scenario::CORNER_RAMP_S)
     }
 
     pub fn plan<const N: usize>(
@@ -220,19 +234,20 @@ impl Job {
         seed: u64,
     ) -> Result<Plan<N>, ExperimentError> {
         let variant = self.variant(seed);
+        let paths = setup.paths();
         let mut config = setup.config(&variant)?;
         let mut scene = Scene::default();
-        config.law.gains = scenario::gains(scenario::STIFFNESS_N_PER_M);
+        config.law.gains = scenario::gains_like(&config.law.gains, scenario::STIFFNESS_N_PER_M);
         let mut apparent = *self == Job::ApparentInertia;
         match *self {
             Job::Probing {
                 stiffness_n_per_m,
                 kind,
             } => {
-                config.law.gains = scenario::gains(stiffness_n_per_m);
+                config.law.gains = scenario::gains_like(&config.law.gains, stiffness_n_per_m);
                 scene = match kind {
-                    Probing::Rubber => scenario::rubber_block(),
-                    _ => scenario::block(),
+                    Probing::Rubber => scenario::rubber_block_at(&paths),
+                    _ => scenario::block_at(&paths),
                 };
                 apparent = kind == Probing::ApparentInertia;
             }
@@ -246,7 +261,7 @@ impl Job {
             let inertia = Matrix3::identity() * scenario::APPARENT_INERTIA_KG;
             config.law.inertia = ApparentInertia::Chosen(inertia);
         }
-        let (trajectory, duration_s) = self.trajectory(setup.tip_radius_m());
+        let (trajectory, duration_s) = self.trajectory(&paths, setup.tip_radius_m());
         Ok(Plan {
             name: self.name(),
             config,
@@ -281,7 +296,7 @@ impl Job {
             Trajectory::Quadrant(quadrant) => Some(EdgeMeter::new(quadrant)),
             _ => None,
         };
-        let face_m = plan.plant.tip_radius_m + scenario::FACE_M;
+        let face_m = plan.plant.tip_radius_m + description.paths().face_m();
         let mut free = Rms::default();
         let run = run(plan, &mut |cycle, time_s| {
             if let Some(recorder) = &mut recorder {
@@ -310,13 +325,15 @@ impl Job {
             strokes: contact.map_or_else(Vec::new, |(meter, _)| meter.finish()),
             edges: edges.map_or_else(Vec::new, EdgeMeter::finish),
             free_rms_m: free.rms(),
-            effective_mass_kg: touch_mass_kg(plan),
+            effective_mass_kg: touch_mass_kg(plan, face_m),
+            damping_n_s_per_m: plan.config.law.gains.damping_n_s_per_m.x,
         })
     }
 }
 
-/// Mass with which the plant's tip meets the block in the first stroke \[kg\]; zero without a stroke.
-fn touch_mass_kg<const N: usize>(plan: &Plan<N>) -> f64 {
+/// Mass with which the plant's tip meets the block in the first stroke, its centre then at `face_m` \[kg\]; zero without
+/// a stroke.
+fn touch_mass_kg<const N: usize>(plan: &Plan<N>, face_m: f64) -> f64 {
     let Trajectory::Probe(probe) = plan.trajectory else {
         return 0.0;
     };
@@ -324,7 +341,7 @@ fn touch_mass_kg<const N: usize>(plan: &Plan<N>) -> f64 {
     let start = start_pose(config, &plan.name, &plan.trajectory, probe.stroke_s());
     let mass = start.ok().and_then(|start| {
         let mut touch_m = plan.trajectory.at(0.0).position;
-        touch_m.z = scenario::FACE_M + plan.plant.tip_radius_m;
+        touch_m.z = face_m;
         let (arm, roles) = (&config.arm, &config.roles);
         let touch = inverse_kinematics(arm, roles, &config.limits, &start, &touch_m);
         effective_mass_kg(&plan.plant.arm, &touch.position_rad, &Vector3::z())

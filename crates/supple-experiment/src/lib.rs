@@ -32,6 +32,7 @@
 
 #![forbid(unsafe_code)]
 
+mod approach_time;
 mod breakaway;
 pub mod calibrate;
 mod demo;
@@ -45,11 +46,13 @@ pub mod metrics;
 mod mismatch;
 mod pose;
 pub mod probing;
+pub mod procedure;
 mod quadrant;
 mod realistic;
 mod record;
 mod recorded_logs;
 mod request_sequence;
+mod residual_error;
 mod rig;
 mod ripple;
 mod run;
@@ -60,7 +63,9 @@ pub mod summary;
 mod trace;
 mod tracking;
 mod tracking_prediction;
+mod wiring;
 
+pub use approach_time::approach_s;
 pub use breakaway::{JointBreakaway, RATE_NM_PER_S, STOP_RAD, breakaway};
 pub use calibrate::{Calibrated, Calibration, ModelAccuracy, calibrate};
 pub use demo::{Demo, ProbingRun, Progress, demo};
@@ -74,6 +79,7 @@ pub use quadrant::{Edge, EdgeMeter};
 pub use realistic::{Realistic, SeedFailure, SeedFault};
 pub use record::Recorder;
 pub use request_sequence::{Recording, RequestSequence, Step, StepCallback};
+pub use residual_error::{ErrorInterval, error_interval, structure_nm};
 pub use rig::{Cycle, Rig};
 pub use ripple::identify_ripple;
 pub use run::{CycleCallback, FaultEnd, Plan, Run, run};
@@ -81,4 +87,5 @@ pub use setup::{Setup, Variant};
 pub use start::{active_joints, start_pose};
 pub use trace::{JointTorque, Sample, Trace};
 pub use tracking::{IdentifiedModelTracking, track_with_identified_model};
-pub use tracking_prediction::{TrackingPrediction, predict_tracking_error};
+pub use tracking_prediction::{GOOD_M, TrackingPrediction, predict_tracking_error};
+pub use wiring::Wiring;

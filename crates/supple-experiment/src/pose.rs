@@ -55,12 +55,12 @@ pub fn track_pose<const N: usize>(
     const NAME: &str = "pose";
     let mut config = setup.config(variant)?;
     config.roles = [Role::Active; N];
-    config.law.gains = scenario::gains(scenario::STIFFNESS_N_PER_M);
+    config.law.gains = scenario::gains_like(&config.law.gains, scenario::STIFFNESS_N_PER_M);
     config.pose.gains = RotationalGains {
         stiffness_nm_per_rad: Vector3::repeat(STIFFNESS_NM_PER_RAD),
         ..config.pose.gains
     };
-    let (trajectory, duration_s) = scenario::sinusoid(1.0);
+    let (trajectory, duration_s) = setup.paths().sinusoid(1.0);
     let motion = PoseMotion {
         trajectory,
         rotation: Rotation {

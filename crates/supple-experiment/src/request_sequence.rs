@@ -161,7 +161,8 @@ impl<const N: usize> RequestSequence<N> {
 }
 
 impl Recording {
-    fn of<const N: usize>(rows: &[(f64, Vector<N>, Vector<N>)]) -> Recording {
+    /// Of rows of time \[s\], angles \[rad\] and torques \[N m\].
+    pub(crate) fn of<const N: usize>(rows: &[(f64, Vector<N>, Vector<N>)]) -> Recording {
         Recording {
             t_s: rows.iter().map(|row| row.0).collect(),
             q_rad: DMatrix::from_fn(rows.len(), N, |i, j| rows[i].1[j]),

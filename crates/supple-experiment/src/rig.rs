@@ -1,6 +1,7 @@
 //! Controller and plant in one process, in virtual time, one cycle at a time.
 
 use crate::error::ExperimentError;
+use crate::wiring::Wiring;
 use std::collections::VecDeque;
 use supple_core::controller::{CycleRecord, Mode, Request};
 use supple_core::{Controller, Input, Output, State, Vector, step};
@@ -19,6 +20,7 @@ pub struct Rig<const N: usize> {
     /// What the learner wants to bring into force.
     scheduled: VecDeque<Scheduled<N>>,
     steps: u64,
+    wiring: Wiring<N>,
 }
 
 /// Data of one cycle.
@@ -53,7 +55,27 @@ impl<const N: usize> Rig<N> {
             learner: None,
             scheduled: VecDeque::new(),
             steps: 0,
+            wiring: Wiring::RIGHT,
         })
+    }
+
+    /// Connects encoders and motors wrongly.
+    #[must_use]
+    pub fn with_wiring(self, wiring: Wiring<N>) -> Rig<N> {
+        Rig { wiring, ..self }
+    }
+
+    /// Replaces the controller by an idle one, as a restart of its process does; the arm stays where it is. A learner
+    /// begins anew.
+    pub fn replace_controller(&mut self, controller: Controller<N>) {
+        self.state = State::new(&controller);
+        self.learner = self
+            .learner
+            .as_ref()
+            .map(|_| Learner::new(controller.config()));
+        self.scheduled.clear();
+        self.controller = controller;
+        (self.active, self.steps) = (false, 0);
     }
 
     /// Adds a learner. It learns once learning is requested, as in `supple-rt`.
@@ -94,7 +116,7 @@ impl<const N: usize> Rig<N> {
         let request = request.or_else(learned);
         let input = Input {
             cycle: measurement.cycle,
-            position_rad: core::array::from_fn(|i| Some(measurement.position_rad[i])),
+            position_rad: self.wiring.read(&measurement.position_rad).map(Some).into(),
             tip_force_n: Some(measurement.force_n),
             drives_active: self.active,
             request,
@@ -108,7 +130,7 @@ impl<const N: usize> Rig<N> {
         self.active = !output.torque_off && (self.active || output.mode == Mode::GravityHold);
         self.plant.short_motors([!self.active; N]);
         let torque_nm = match self.active {
-            true => output.torque_nm,
+            true => self.wiring.drive(&output.torque_nm),
             false => Vector::zeros(),
         };
         self.plant.cycle(&torque_nm);

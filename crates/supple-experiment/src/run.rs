@@ -1,5 +1,6 @@
 //! One run: gravity hold, a position-controlled move to the start, then the trajectory under the impedance law.
 
+use crate::approach_time::approach_s;
 use crate::error::ExperimentError;
 use crate::metrics::Rms;
 use crate::rig::{Cycle, Rig};
@@ -15,8 +16,6 @@ use supple_plant::PlantConfig;
 const START_OFFSET_RAD: f64 = 0.1;
 /// Duration of gravity hold before the move \[s\].
 const SETTLE_S: f64 = 0.1;
-/// Duration of the move to the start \[s\].
-const MOVE_S: f64 = 1.0;
 /// Rest in the start pose before the trajectory \[s\].
 const REST_S: f64 = 0.4;
 /// Simulated time after a fault, to record the safe action \[s\].
@@ -86,13 +85,15 @@ pub fn run<const N: usize>(
     let controller = Controller::new(plan.config)?;
     let config = &plan.config;
     let start = start_pose(config, &plan.name, &plan.trajectory, plan.duration_s)?;
-    let mut rig = Rig::new(controller, plan.plant.clone(), offset_pose(config, &start))?;
+    let from = offset_pose(config, &start);
+    let move_s = approach_s(config, &from, &start);
+    let mut rig = Rig::new(controller, plan.plant.clone(), from)?;
     if plan.learning {
         rig = rig.with_learner();
     }
     let cycles = |seconds: f64| (seconds / config.period_s).round() as u64;
     let move_at = cycles(SETTLE_S);
-    let track_at = move_at + cycles(MOVE_S + REST_S);
+    let track_at = move_at + cycles(move_s + REST_S);
     let end = track_at + cycles(plan.duration_s);
 
     let active = active_joints(config);
@@ -112,7 +113,7 @@ pub fn run<const N: usize>(
             1 if plan.learning => Some(Request::Learning(LearningSwitch::On)),
             _ if k == move_at => Some(Request::Move {
                 target_rad: start,
-                duration_s: MOVE_S,
+                duration_s: move_s,
             }),
             _ if k == track_at => Some(Request::Track(plan.trajectory)),
             _ => None,

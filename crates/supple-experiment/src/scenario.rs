@@ -2,7 +2,9 @@
 
 use supple_core::Trajectory;
 use supple_core::config::Gains;
-use supple_core::trajectory::{Arc, Probe, Quadrant, Sinusoid};
+use supple_core::trajectory::{Probe, Quadrant};
+pub use supple_model::PROBE_DWELL_S;
+use supple_model::Paths;
 use supple_plant::{FixedBlock, Layer, Scene};
 
 /// Stiffness of the free-motion experiments \[N/m\].
@@ -16,6 +18,8 @@ pub const PROBING_STIFFNESS_N_PER_M: [f64; 9] =
 pub const PAPER_STIFFNESS_N_PER_M: [f64; 2] = [5.0, 125.0];
 /// Damping with which the error after a corner dies out within an edge at the paper's speed \[N s/m\].
 pub const CORNER_DAMPING_N_S_PER_M: f64 = 15.0;
+/// Time in which the speed falls and rises at a corner of the quadrant that has no velocity jumps \[s\].
+pub const CORNER_RAMP_S: f64 = 0.3;
 /// Apparent inertia of the runs that use the force sensor \[kg\].
 pub const APPARENT_INERTIA_KG: f64 = 1.0;
 /// Speed of the quadrant in the headline run \[m/s\].
@@ -24,14 +28,8 @@ pub const QUADRANT_SPEED_M_PER_S: f64 = 0.02 * core::f64::consts::PI;
 pub const QUADRANT_PAPER_SPEED_M_PER_S: f64 = 0.1 * core::f64::consts::PI;
 /// Height of the block's face above the base frame \[m\].
 pub const FACE_M: f64 = 0.0;
-/// Length of the stroke before the cap meets the face \[m\].
-const FACE_INTO_STROKE_M: f64 = 0.06;
-/// Rest at the bottom of the stroke, over whose last half the force while pressing is averaged \[s\].
-pub const PROBE_DWELL_S: f64 = 1.0;
 /// Thickness of the rubber sheet \[m\].
 const RUBBER_M: f64 = 0.005;
-/// Number of columns of a probing run; the base rotates by one step between them.
-const COLUMNS: u32 = 2;
 
 /// Gains for a given stiffness \[N/m\]. The damping grows with the square root of the stiffness, from 1.5 N s/m
 /// at 5 N/m, which keeps the damping ratio at the tip constant.
@@ -40,55 +38,40 @@ pub fn gains(stiffness_n_per_m: f64) -> Gains {
     Gains::isotropic(stiffness_n_per_m, damping)
 }
 
-/// Two periods of the sinusoid of figure 3a, at `speed` times its speed. Returns trajectory and duration \[s\].
+/// Gains for a given stiffness \[N/m\] with the damping ratio that `law` has along base axis x: [`gains`] for the paper's law.
+pub fn gains_like(law: &Gains, stiffness_n_per_m: f64) -> Gains {
+    let (stiffness, damping) = (law.stiffness_n_per_m.x, law.damping_n_s_per_m.x);
+    if stiffness <= 0.0 {
+        return gains(stiffness_n_per_m);
+    }
+    let damping = damping * (stiffness_n_per_m / stiffness).sqrt();
+    Gains::isotropic(stiffness_n_per_m, damping)
+}
+
+/// Two periods of the sinusoid of figure 3a where the paper has it, see [`Paths::sinusoid`].
 pub fn sinusoid(speed: f64) -> (Trajectory, f64) {
-    let sinusoid = Sinusoid::paper(speed);
-    let duration_s = 2.0 * sinusoid.period_s() + 0.5 * sinusoid.ramp_s;
-    (Trajectory::Sinusoid(sinusoid), duration_s)
+    Paths::PAPER.sinusoid(speed)
 }
 
 /// Two periods of an arc at 0.65 m from the base axis, which moves the base joint by 0.4 rad to both sides.
 pub fn arc() -> (Trajectory, f64) {
-    let arc = Arc {
-        radius_m: 0.65,
-        height_m: 0.0,
-        centre_rad: 0.0,
-        amplitude_rad: 0.4,
-        angular_frequency_rad_per_s: core::f64::consts::FRAC_PI_4,
-        ramp_s: 1.0,
-    };
-    let period_s = core::f64::consts::TAU / arc.angular_frequency_rad_per_s;
-    (Trajectory::Arc(arc), 2.0 * period_s + 0.5 * arc.ramp_s)
+    Paths::PAPER.arc(1.0)
 }
 
 /// Two rounds of the quadrant of figure 3b in the vertical plane. Returns quadrant and duration \[s\].
 pub fn quadrant(speed_m_per_s: f64) -> (Quadrant, f64) {
-    let quadrant = Quadrant::vertical(speed_m_per_s);
-    let duration_s = 2.0 * quadrant.period_s() + 0.25;
-    (quadrant, duration_s)
+    Paths::PAPER.quadrant(speed_m_per_s)
 }
 
 /// The probing cycle over the block for a cap of this radius: two columns of two strokes each. Returns probe
 /// and duration \[s\].
 pub fn probe(tip_radius_m: f64) -> (Probe, f64) {
-    let probe = Probe {
-        radius_m: 0.70,
-        strokes: 2,
-        radial_step_m: 6.67e-3,
-        top_m: FACE_M + tip_radius_m + FACE_INTO_STROKE_M,
-        stroke_m: 0.10,
-        azimuth_rad: 0.0,
-        azimuth_step_rad: 0.05,
-        speed_m_per_s: 0.04,
-        ramp_s: 0.25,
-        dwell_s: PROBE_DWELL_S,
-    };
-    (probe, probe.column_s() * f64::from(COLUMNS))
+    Paths::PAPER.probe(tip_radius_m)
 }
 
-/// The block with a sheet of rubber on its face, at the same height.
-pub fn rubber_block() -> Scene {
-    let mut scene = block();
+/// The block of [`block_at`] with a sheet of rubber on its face, at the same height.
+pub fn rubber_block_at(paths: &Paths) -> Scene {
+    let mut scene = block_at(paths);
     for block in &mut scene.fixed_blocks {
         // The layer lies on top of the block.
         block.center_m[2] -= RUBBER_M;
@@ -102,15 +85,32 @@ pub fn rubber_block() -> Scene {
 
 /// The wooden block beneath the probing cycle.
 pub fn block() -> Scene {
+    block_at(&Paths::PAPER)
+}
+
+/// The wooden block beneath the probing cycle of an arm whose paths are placed elsewhere.
+pub fn block_at(paths: &Paths) -> Scene {
+    let mut block = FixedBlock {
+        name: "block".to_owned(),
+        center_m: [0.70, 0.0, FACE_M - 0.05],
+        size_m: [0.20, 0.40, 0.10],
+        rpy_rad: [0.0; 3],
+        material: "wood".to_owned(),
+        layer: None,
+    };
+    if *paths != Paths::PAPER {
+        let (probe, _) = paths.probe(0.0);
+        let centre_m = paths.outward() * probe.radius_m;
+        block.size_m = block.size_m.map(|length_m| length_m * paths.scale);
+        block.center_m = [
+            centre_m.x,
+            centre_m.y,
+            paths.face_m() - 0.5 * block.size_m[2],
+        ];
+        block.rpy_rad[2] = paths.azimuth_rad;
+    }
     Scene {
-        fixed_blocks: vec![FixedBlock {
-            name: "block".to_owned(),
-            center_m: [0.70, 0.0, FACE_M - 0.05],
-            size_m: [0.20, 0.40, 0.10],
-            rpy_rad: [0.0; 3],
-            material: "wood".to_owned(),
-            layer: None,
-        }],
+        fixed_blocks: vec![block],
         ..Scene::default()
     }
 }

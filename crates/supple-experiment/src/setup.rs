@@ -4,7 +4,7 @@ use crate::error::ExperimentError;
 use crate::mismatch::Mismatch;
 use supple_core::config::Law;
 use supple_core::{Config, Friction};
-use supple_model::Description;
+use supple_model::{Description, Paths};
 use supple_plant::{LuGre, PlantConfig, PlantOptions, Scene};
 
 /// Noise of the force sensor, on each reported component \[N\].
@@ -46,6 +46,7 @@ pub struct Setup<const N: usize> {
     described_friction: [LuGre; N],
     /// Whether `exact` is an identified model, whose Stribeck effect is its own.
     identified: bool,
+    paths: Paths,
 }
 
 impl<const N: usize> Setup<N> {
@@ -79,6 +80,7 @@ impl<const N: usize> Setup<N> {
             described_friction: plant.friction,
             plant,
             identified: false,
+            paths: description.paths(),
         })
     }
 
@@ -89,6 +91,11 @@ impl<const N: usize> Setup<N> {
     pub fn with_plant_options(mut self, options: &PlantOptions) -> Result<Self, ExperimentError> {
         self.plant = options.apply(self.plant)?;
         Ok(self)
+    }
+
+    /// Place and size of the trajectories.
+    pub fn paths(&self) -> Paths {
+        self.paths
     }
 
     /// Radius of the cap \[m\].

@@ -2,32 +2,12 @@
 
 use crate::error::ExperimentError;
 use crate::trace::xyz;
-use supple_core::config::Role;
-use supple_core::dynamics::{Terms, joint_poses, terms};
-use supple_core::inverse_kinematics::{IkSolution, inverse_kinematics};
-use supple_core::nalgebra::Vector3;
-use supple_core::task::Task;
 use supple_core::{Config, Trajectory, Vector};
+use supple_model::reach;
+pub use supple_model::reach::active_joints;
+pub(crate) use supple_model::reach::spread_poses;
 
-/// Time between the points at which the reach is checked \[s\].
-const REACH_CHECK_STEP_S: f64 = 0.05;
-/// Fractions of the joint ranges at which the search for a start pose begins.
-const SEEDS: [f64; 3] = [0.3, 0.5, 0.7];
-/// Evenly spread poses at which it begins otherwise.
-const CANDIDATES: u32 = 100;
-/// Share of each joint's range in which they lie, around its middle.
-const RANGE_SHARE: f64 = 0.7;
-
-/// Indices of the active joints, in order from the base.
-pub fn active_joints<const N: usize>(config: &Config<N>) -> Vec<usize> {
-    (0..N)
-        .filter(|i| config.roles[*i] == Role::Active)
-        .collect()
-}
-
-/// Joint angles that put the tip at the start of the trajectory, with the elbow as high as possible; checks that
-/// the whole trajectory can be reached from there. Where the third active joint is no elbow, it is the pose farthest from
-/// a singular one among evenly spread poses.
+/// Joint angles that put the tip at the start of the trajectory, see [`reach::start_pose`].
 ///
 /// # Errors
 /// [`ExperimentError::BeyondJointStop`] names the first point out of reach.
@@ -37,108 +17,12 @@ pub fn start_pose<const N: usize>(
     trajectory: &Trajectory,
     duration_s: f64,
 ) -> Result<Vector<N>, ExperimentError> {
-    let start = trajectory.at(0.0).position;
-    let active = active_joints(config);
-    let elbow = active[2];
-    let solve = |seed: &Vector<N>, point: &Vector3<f64>| {
-        inverse_kinematics(&config.arm, &config.roles, &config.limits, seed, point)
-    };
-    let mut best: Option<(f64, IkSolution<N>)> = None;
-    let mut nearest = f64::MAX;
-    let seeds = SEEDS
-        .iter()
-        .flat_map(|a| SEEDS.iter().map(move |b| (*a, *b)));
-    for (shoulder_fraction, elbow_fraction) in seeds {
-        let seed = Vector::from_fn(|i, _| {
-            let (lower, upper) = (
-                config.limits.position_lower_rad[i],
-                config.limits.position_upper_rad[i],
-            );
-            let fraction = match i {
-                _ if i == elbow => elbow_fraction,
-                _ if i == active[1] => shoulder_fraction,
-                _ => return 0.0_f64.clamp(lower, upper),
-            };
-            lower + fraction * (upper - lower)
-        });
-        let found = solve(&seed, &start);
-        nearest = nearest.min(found.distance_m);
-        let height = joint_poses(&config.arm, &found.position_rad)[elbow]
-            .translation
-            .z;
-        if found.reached() && best.is_none_or(|(highest, _)| height > highest + 1e-6) {
-            best = Some((height, found));
+    reach::start_pose(config, trajectory, duration_s).map_err(|beyond| {
+        ExperimentError::BeyondJointStop {
+            experiment: experiment.to_owned(),
+            time_s: beyond.time_s,
+            point_m: xyz(&beyond.point_m),
+            distance_m: beyond.distance_m,
         }
-    }
-    let out_of_reach = |time_s, point, distance_m| ExperimentError::BeyondJointStop {
-        experiment: experiment.to_owned(),
-        time_s,
-        point_m: xyz(&point),
-        distance_m,
-    };
-    let mut starts: Vec<Vector<N>> = best.iter().map(|(_, found)| found.position_rad).collect();
-    if starts.is_empty() {
-        // Not an arm with a shoulder and an elbow among its first three active joints.
-        let mut found: Vec<(f64, Vector<N>)> = spread_poses(config, CANDIDATES)
-            .map(|seed| solve(&seed, &start))
-            .inspect(|found| nearest = nearest.min(found.distance_m))
-            .filter_map(|found| found.reached().then_some(found.position_rad))
-            .map(|q| (least_singular_value_m(config, &q), q))
-            .collect();
-        found.sort_by(|a, b| b.0.total_cmp(&a.0));
-        starts.extend(found.into_iter().map(|(_, q)| q));
-    }
-    let mut failure = out_of_reach(0.0, start, nearest);
-    let steps = (duration_s / REACH_CHECK_STEP_S).ceil() as u32;
-    'starts: for (index, start_rad) in starts.into_iter().enumerate() {
-        let mut q = start_rad;
-        for k in 1..=steps {
-            let time_s = f64::from(k) * REACH_CHECK_STEP_S;
-            let point = trajectory.at(time_s).position;
-            let there = solve(&q, &point);
-            if !there.reached() {
-                if index == 0 {
-                    failure = out_of_reach(time_s, point, there.distance_m);
-                }
-                continue 'starts;
-            }
-            q = there.position_rad;
-        }
-        return Ok(start_rad);
-    }
-    Err(failure)
-}
-
-/// Least singular value of the Jacobian of the tip's position \[m\]; zero where there is no law.
-fn least_singular_value_m<const N: usize>(config: &Config<N>, q: &Vector<N>) -> f64 {
-    let mut state = Terms::default();
-    terms(&config.arm, q, &Vector::zeros(), &mut state);
-    Task::new(&state, &config.roles).map_or(0.0, |task| task.least_singular_value_m)
-}
-
-/// Poses that are spread evenly over the middle of the joint ranges.
-pub(crate) fn spread_poses<const N: usize>(
-    config: &Config<N>,
-    count: u32,
-) -> impl Iterator<Item = Vector<N>> + '_ {
-    let limits = &config.limits;
-    (1..=count).map(|k| {
-        Vector::from_fn(|i, _| {
-            let (lower, upper) = (limits.position_lower_rad[i], limits.position_upper_rad[i]);
-            lower + (0.5 + RANGE_SHARE * (halton(k, i) - 0.5)) * (upper - lower)
-        })
     })
-}
-
-/// Element `index` of the Halton sequence of the `dimension`-th prime, between 0 and 1.
-fn halton(mut index: u32, dimension: usize) -> f64 {
-    const PRIMES: [u32; 7] = [2, 3, 5, 7, 11, 13, 17];
-    let base = PRIMES[dimension % PRIMES.len()];
-    let (mut value, mut digit) = (0.0, 1.0);
-    while index > 0 {
-        digit /= f64::from(base);
-        value += digit * f64::from(index % base);
-        index /= base;
-    }
-    value
 }

@@ -7,6 +7,7 @@ use crate::realistic::Realistic;
 use crate::run::FaultEnd;
 use crate::trace::JointTorque;
 use serde::Serialize;
+use supple_model::Paths;
 use supple_plant::PlantOptions;
 
 /// Tracking error of a run in free space.
@@ -116,6 +117,8 @@ pub struct Summary {
     pub version: &'static str,
     /// Name of the arm.
     pub arm: String,
+    /// Place and size of the trajectories; the speeds below are those of the paper's size.
+    pub paths: Paths,
     /// Seed of the demo.
     pub seed: u64,
     /// Source of the controllers' model if it is not the arm's own parameters; that model is unperturbed in
@@ -161,6 +164,9 @@ pub struct Summary {
     pub sinusoid_apparent_inertia: TrackingError,
     /// Figure 3b at the paper's maximum speed with the damping raised to [`crate::scenario::CORNER_DAMPING_N_S_PER_M`].
     pub quadrant_damped: QuadrantSummary,
+    /// Figure 3b at the paper's maximum speed with a speed that falls and rises in
+    /// [`crate::scenario::CORNER_RAMP_S`] at each corner, unperturbed model.
+    pub quadrant_corner_ramp: QuadrantSummary,
     /// Sinusoid with the plant's own parameters in the model.
     pub sinusoid_exact_model: ExactModel,
     /// Sinusoid with equation (3.6) exactly as printed.

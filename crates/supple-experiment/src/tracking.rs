@@ -27,13 +27,13 @@ pub fn track_with_identified_model<const N: usize>(
 ) -> Result<Option<IdentifiedModelTracking>, ExperimentError> {
     let error_m = |stribeck: bool| {
         let mut config = identified.config::<N>()?;
-        config.law.gains = scenario::gains(scenario::STIFFNESS_N_PER_M);
+        config.law.gains = scenario::gains_like(&config.law.gains, scenario::STIFFNESS_N_PER_M);
         if !stribeck {
             for friction in &mut config.friction {
                 friction.breakaway_nm = friction.coulomb_nm;
             }
         }
-        let (trajectory, duration_s) = scenario::sinusoid(1.0);
+        let (trajectory, duration_s) = identified.paths().sinusoid(1.0);
         let plan = Plan {
             name: "sinusoid".to_owned(),
             config,

@@ -20,33 +20,48 @@ pub const GOOD_M: f64 = 0.010;
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TrackingPrediction {
     /// Median over the draws.
-    pub median_m: f64,
+    pub median_m: Option<f64>,
     /// Maximum over the draws.
-    pub worst_m: f64,
+    pub worst_m: Option<f64>,
     /// Number of draws that ended in a fault.
     pub faults: usize,
+    /// Why trial runs failed or ended early, each reason once.
+    pub reasons: Vec<String>,
 }
 
-/// Draws `draws` models and tracks the sinusoid with each; `None` if the arm cannot reach it.
+/// Draws `draws` models and tracks the sinusoid with each; `None` if the arm cannot reach it. A trial run that cannot be
+/// is a reason in the result, never an error.
 ///
 /// # Errors
-/// [`ExperimentError`].
+/// [`ExperimentError`] for a description that is not one of `N` joints.
 pub fn predict_tracking_error<const N: usize>(
     identified: &Description,
     fit: &Fit<N>,
     draws: u64,
 ) -> Result<Option<TrackingPrediction>, ExperimentError> {
     let plant = PlantConfig::<N>::from_description(identified)?;
-    let (trajectory, duration_s) = scenario::sinusoid(1.0);
+    let (trajectory, duration_s) = identified.paths().sinusoid(1.0);
     let (mut errors, mut faults) = (Vec::new(), 0);
+    let mut reasons: Vec<String> = Vec::new();
+    let mut note = |reason: String| {
+        if !reasons.contains(&reason) {
+            reasons.push(reason);
+        }
+    };
     for seed in 0..draws {
-        let (arm, friction) = fit.draw(seed)?;
+        let (arm, friction) = match fit.draw(seed) {
+            Ok(drawn) => drawn,
+            Err(error) => {
+                note(error.to_string());
+                continue;
+            }
+        };
         let mut config = identified.config::<N>()?;
         config.arm = arm;
         for joint in fit.columns.moving() {
             config.friction[*joint] = friction[*joint];
         }
-        config.law.gains = scenario::gains(scenario::STIFFNESS_N_PER_M);
+        config.law.gains = scenario::gains_like(&config.law.gains, scenario::STIFFNESS_N_PER_M);
         let plan = Plan {
             name: "sinusoid".to_owned(),
             config,
@@ -57,17 +72,21 @@ pub fn predict_tracking_error<const N: usize>(
         };
         match run(&plan, &mut |_, _| Ok(())) {
             Ok(run) => {
-                faults += usize::from(run.ended.is_some());
+                if let Some(ended) = &run.ended {
+                    faults += 1;
+                    note(format!("{} at {:.2} s", ended.fault, ended.ended_s));
+                }
                 errors.push(run.rms_error_m);
             }
             Err(ExperimentError::BeyondJointStop { .. }) => return Ok(None),
-            Err(error) => return Err(error),
+            Err(error) => note(error.to_string()),
         }
     }
-    Ok(median(&errors).map(|median_m| TrackingPrediction {
-        median_m,
-        worst_m: errors.iter().copied().fold(0.0, f64::max),
+    Ok(Some(TrackingPrediction {
+        median_m: median(&errors),
+        worst_m: errors.iter().copied().reduce(f64::max),
         faults,
+        reasons,
     }))
 }
 
@@ -75,13 +94,17 @@ impl TrackingPrediction {
     /// Verdict as text.
     pub fn verdict(&self) -> String {
         let mm = |m: f64| format!("{:.1} mm", 1e3 * m);
-        let (median, worst) = (mm(self.median_m), mm(self.worst_m));
+        let reasons = self.reasons.join("; ");
+        let (Some(median_m), Some(worst_m)) = (self.median_m, self.worst_m) else {
+            return format!("no trial run at 5 N/m: {reasons}");
+        };
+        let (median, worst) = (mm(median_m), mm(worst_m));
         if self.faults > 0 {
             format!(
-                "not good for 5 N/m: {} of the draws ended by a fault",
+                "not good for 5 N/m: {} of the draws ended by a fault: {reasons}",
                 self.faults
             )
-        } else if self.worst_m <= GOOD_M {
+        } else if worst_m <= GOOD_M {
             format!("good for 5 N/m: predicted tracking error {median}, worst {worst}")
         } else {
             format!(

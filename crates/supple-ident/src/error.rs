@@ -1,5 +1,6 @@
 //! Errors of identification: location, problem and remedy.
 
+use crate::log_checks::finding::Finding;
 use std::fmt;
 
 /// Error of identification. Columns are named as in `q[2]`: quantity and joint, counted from 0.
@@ -15,6 +16,9 @@ pub enum IdentError {
         /// Remedy.
         remedy: &'static str,
     },
+    /// The checks of [`crate::log_checks`] found errors in a log.
+    #[error("{}", joined(.0))]
+    WrongLog(Vec<Finding>),
     /// Two shapes do not agree.
     #[error("{argument}: expected {expected}, got {found}")]
     Shape {
@@ -48,6 +52,11 @@ pub enum IdentError {
     NotPhysical(supple_core::ArmError),
 }
 
+fn joined(findings: &[Finding]) -> String {
+    let all: Vec<String> = findings.iter().map(ToString::to_string).collect();
+    all.join("; also ")
+}
+
 /// A warning about the data or the result.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Warning {
@@ -56,7 +65,7 @@ pub struct Warning {
     /// Problem.
     pub problem: String,
     /// Remedy.
-    pub remedy: &'static str,
+    pub remedy: String,
 }
 
 impl fmt::Display for Warning {

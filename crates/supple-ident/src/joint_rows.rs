@@ -15,6 +15,8 @@ pub struct JointRows {
     pub speed: Vec<f64>,
     /// Travel since the last reversal of the joint \[rad\].
     pub travel_since_reversal_rad: Vec<f64>,
+    /// Whether the sample is used.
+    pub used: Vec<bool>,
     /// Cached QR reduction of the rows above a given speed.
     cached: OnceLock<(f64, ReducedSystem)>,
 }
@@ -24,6 +26,7 @@ impl JointRows {
     pub fn new(a: DMatrix<f64>, b: DVector<f64>, speed: Vec<f64>) -> JointRows {
         JointRows {
             travel_since_reversal_rad: vec![f64::INFINITY; speed.len()],
+            used: vec![true; speed.len()],
             a,
             b,
             speed,
@@ -41,13 +44,27 @@ impl JointRows {
         make().1
     }
 
+    /// `a x - b` of the samples that are used.
+    pub fn residual(&self, x: &DVector<f64>) -> Vec<f64> {
+        let all = &self.a * x - &self.b;
+        let pairs = all.iter().zip(&self.used);
+        pairs.filter(|(_, used)| **used).map(|(r, _)| *r).collect()
+    }
+
+    /// `b` of the samples that are used.
+    pub fn torques(&self) -> Vec<f64> {
+        let pairs = self.b.iter().zip(&self.used);
+        pairs.filter(|(_, used)| **used).map(|(b, _)| *b).collect()
+    }
+
     /// Samples `range`.
     pub fn part(&self, range: std::ops::Range<usize>) -> JointRows {
         JointRows {
             a: self.a.rows_range(range.clone()).into_owned(),
             b: self.b.rows_range(range.clone()).into_owned(),
             speed: self.speed[range.clone()].to_vec(),
-            travel_since_reversal_rad: self.travel_since_reversal_rad[range].to_vec(),
+            travel_since_reversal_rad: self.travel_since_reversal_rad[range.clone()].to_vec(),
+            used: self.used[range].to_vec(),
             cached: OnceLock::new(),
         }
     }
@@ -55,7 +72,7 @@ impl JointRows {
     /// Reduces the rows above `slow_rad_per_s`, each multiplied by the square root of its weight.
     pub fn reduced(&self, slow_rad_per_s: f64, weights: Option<&[f64]>) -> ReducedSystem {
         let kept: Vec<usize> = (0..self.b.len())
-            .filter(|i| self.speed[*i] >= slow_rad_per_s)
+            .filter(|i| self.used[*i] && self.speed[*i] >= slow_rad_per_s)
             .collect();
         let columns = self.a.ncols();
         let mut block = ReducedSystem::empty(columns);

@@ -6,11 +6,14 @@ use crate::error::{IdentError, Warning, log_error, shape_error};
 use nalgebra::DMatrix;
 
 /// Angles larger than this are assumed to be in degrees \[rad\].
-const MAX_ANGLE_RAD: f64 = 25.0;
+pub(crate) const MAX_ANGLE_RAD: f64 = 25.0;
 /// Minimum range of motion for identifying a joint \[rad\].
 const MIN_RANGE_RAD: f64 = 0.02;
 /// A time step longer than this multiple of the median is a gap.
 const GAP_MEDIANS: f64 = 5.0;
+/// Gap that linear interpolation bridges, in periods of the filter's cutoff: a sinusoid at the cutoff is off by
+/// `(2 pi 0.1)^2 / 8`, 5 % of its amplitude, at the worst moment.
+const GAP_PERIODS: f64 = 0.1;
 /// Logs shorter than this cause a warning \[s\].
 const SHORT_S: f64 = 5.0;
 
@@ -34,20 +37,52 @@ impl Log {
     /// # Errors
     /// [`IdentError`] with column, sample, value and remedy.
     pub fn check(&self, dof: usize, moving: &[usize]) -> Result<Vec<Warning>, IdentError> {
-        self.check_shapes(dof)?;
-        check_moving(dof, moving)?;
-        self.check_values()?;
-        self.check_clock()?;
+        self.check_for(dof, moving, None)
+    }
+
+    /// As [`Log::check`], with gaps judged by the cutoff of the filter \[Hz\] that the log will pass: a gap that is short
+    /// against its period is interpolated without harm.
+    ///
+    /// # Errors
+    /// As [`Log::check`].
+    pub fn check_for(
+        &self,
+        dof: usize,
+        moving: &[usize],
+        cutoff_hz: Option<f64>,
+    ) -> Result<Vec<Warning>, IdentError> {
+        let warnings = self.check_for_fit(dof, moving, cutoff_hz)?;
+        self.check_units(moving)?;
+        Ok(warnings)
+    }
+
+    /// As [`Log::check_for`], without the units of angles and velocities.
+    pub(crate) fn check_for_fit(
+        &self,
+        dof: usize,
+        moving: &[usize],
+        cutoff_hz: Option<f64>,
+    ) -> Result<Vec<Warning>, IdentError> {
+        self.check_table(dof, moving)?;
+        self.check_gaps(cutoff_hz)?;
         let mut warnings = self.check_motion(moving)?;
         let duration = self.t_s[self.t_s.len() - 1] - self.t_s[0];
         if duration < SHORT_S {
             warnings.push(Warning {
                 column: "t".to_owned(),
                 problem: format!("the log lasts {duration:.3} s"),
-                remedy: "record 30 s or more of excitation",
+                remedy: "record 30 s or more of excitation".to_owned(),
             });
         }
         Ok(warnings)
+    }
+
+    /// Checks shapes, values and that times increase.
+    pub(crate) fn check_table(&self, dof: usize, moving: &[usize]) -> Result<(), IdentError> {
+        self.check_shapes(dof)?;
+        check_moving(dof, moving)?;
+        self.check_values()?;
+        self.check_times()
     }
 
     fn check_shapes(&self, dof: usize) -> Result<(), IdentError> {
@@ -84,8 +119,12 @@ impl Log {
         Ok(())
     }
 
-    fn check_clock(&self) -> Result<(), IdentError> {
-        let mut steps: Vec<f64> = self.t_s.windows(2).map(|w| w[1] - w[0]).collect();
+    fn steps_s(&self) -> Vec<f64> {
+        self.t_s.windows(2).map(|w| w[1] - w[0]).collect()
+    }
+
+    fn check_times(&self) -> Result<(), IdentError> {
+        let steps = self.steps_s();
         if let Some(i) = steps.iter().position(|dt| *dt <= 0.0) {
             let problem = format!(
                 "goes from {} to {} s at sample {i}",
@@ -98,11 +137,17 @@ impl Log {
                 "sort the rows and drop repeated ones",
             ));
         }
+        Ok(())
+    }
+
+    fn check_gaps(&self, cutoff_hz: Option<f64>) -> Result<(), IdentError> {
+        let mut steps = self.steps_s();
         let largest = steps.iter().copied().fold(0.0, f64::max);
         let at = steps.iter().position(|dt| *dt == largest).unwrap_or(0);
         steps.sort_by(f64::total_cmp);
         let median = steps[steps.len() / 2];
-        if largest > GAP_MEDIANS * median {
+        let harmless_s = cutoff_hz.map_or(0.0, |hz| GAP_PERIODS / hz);
+        if largest > (GAP_MEDIANS * median).max(harmless_s) {
             let problem = format!(
                 "a gap of {largest:.4} s after sample {at}, steps are {median:.4} s otherwise"
             );
@@ -119,14 +164,6 @@ impl Log {
         let mut warnings = Vec::new();
         for (joint, column) in self.q_rad.column_iter().enumerate() {
             let (min, max) = (column.min(), column.max());
-            let max_angle = max.abs().max(min.abs());
-            if max_angle > MAX_ANGLE_RAD {
-                return Err(log_error(
-                    format!("q[{joint}]"),
-                    format!("reaches {max_angle:.1}, which looks like degrees"),
-                    "give radians: multiply by pi / 180",
-                ));
-            }
             if !moving.contains(&joint) {
                 continue;
             }
@@ -142,7 +179,7 @@ impl Log {
                 warnings.push(Warning {
                     column: format!("q[{joint}]"),
                     problem: format!("moves by {range:.3} rad only"),
-                    remedy: "excite it over a larger part of its range",
+                    remedy: "excite it over a larger part of its range".to_owned(),
                 });
             }
             let torque = self.tau_nm.column(joint);
@@ -153,9 +190,22 @@ impl Log {
                     "check that the right column was read, or leave the joint out of the moving ones",
                 ));
             }
-            self.check_velocity_unit(joint)?;
         }
         Ok(warnings)
+    }
+
+    fn check_units(&self, moving: &[usize]) -> Result<(), IdentError> {
+        for (joint, column) in self.q_rad.column_iter().enumerate() {
+            let max_angle = column.amax();
+            if max_angle > MAX_ANGLE_RAD {
+                return Err(log_error(
+                    format!("q[{joint}]"),
+                    format!("reaches {max_angle:.1}, which looks like degrees"),
+                    "give radians: multiply by pi / 180",
+                ));
+            }
+        }
+        moving.iter().try_for_each(|j| self.check_velocity_unit(*j))
     }
 
     /// Compares velocity with the slope of the angle; a ratio of 57 indicates degrees.

@@ -24,8 +24,8 @@ pub struct Preparation {
     pub cutoff_hz: Option<f64>,
     /// Decimation factor, at least 1.
     pub keep_every: usize,
-    /// Delay of the logged torque relative to the logged angle \[s\], zero or more: 1.5 periods if the log
-    /// contains commands that act during the next cycle.
+    /// Time from a logged torque to its action on the logged angles \[s\], either sign: 1.5 periods if the log contains
+    /// commands that act during the next cycle, negative if it contains measured torques that lag behind the angles.
     pub torque_delay_s: f64,
 }
 
@@ -64,6 +64,17 @@ impl Preparation {
     }
 }
 
+/// An interval whose samples are not used.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mask {
+    /// The joint whose torque is not used; `None`: all joints.
+    pub joint: Option<usize>,
+    /// Start \[s\], on the log's clock.
+    pub from_s: f64,
+    /// End \[s\].
+    pub to_s: f64,
+}
+
 /// Prepared measurements, (samples, joints), at a constant rate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Motion {
@@ -82,6 +93,12 @@ pub struct Motion {
     /// Cutoff of the zero-phase filter applied to the torques \[Hz\]; columns that are discontinuous at a
     /// reversal are filtered likewise.
     pub cutoff_hz: Option<f64>,
+    /// Time of the first sample \[s\], on the log's clock.
+    pub start_s: f64,
+    /// Delay by which the torques were shifted \[s\], see [`Preparation::torque_delay_s`].
+    pub torque_delay_s: f64,
+    /// Intervals that are not used.
+    pub masks: Vec<Mask>,
 }
 
 impl Motion {
@@ -95,7 +112,12 @@ impl Motion {
         moving: &[usize],
         preparation: &Preparation,
     ) -> Result<(Motion, Vec<Warning>), IdentError> {
-        let warnings = log.check(dof, moving)?;
+        let warnings = log.check_for(dof, moving, preparation.cutoff_hz)?;
+        Ok((Self::of_checked(log, preparation)?, warnings))
+    }
+
+    /// As [`Motion::prepare`], from a log whose table is known to be sound.
+    pub(crate) fn of_checked(log: &Log, preparation: &Preparation) -> Result<Motion, IdentError> {
         if preparation.keep_every == 0 {
             return Err(IdentError::Option {
                 option: "keep_every",
@@ -120,11 +142,11 @@ impl Motion {
             .map(|cutoff_hz| LowPass::butterworth4(cutoff_hz, rate_hz))
             .transpose()?;
         let delay_s = preparation.torque_delay_s;
-        if !(delay_s.is_finite() && delay_s >= 0.0) {
+        if !delay_s.is_finite() {
             return Err(IdentError::Option {
                 option: "torque_delay_s",
                 value: delay_s,
-                must: "finite and not negative",
+                must: "finite",
             });
         }
         let smooth = |column: &DMatrix<f64>, delay_s: f64| {
@@ -150,8 +172,25 @@ impl Motion {
             tau: tau.select_rows(&rows),
             independent_fraction: independent.min(1.0),
             cutoff_hz: preparation.cutoff_hz.filter(|hz| *hz < 0.45 * kept_hz),
+            start_s: log.t_s[0] + rows[0] as f64 / rate_hz,
+            torque_delay_s: preparation.torque_delay_s,
+            masks: Vec::new(),
         };
-        Ok((motion, warnings))
+        Ok(motion)
+    }
+
+    /// Time of a sample \[s\], on the log's clock.
+    pub fn time_s(&self, sample: usize) -> f64 {
+        self.start_s + sample as f64 / self.rate_hz
+    }
+
+    /// Whether the torque of a joint at a sample is used.
+    pub fn used(&self, sample: usize, joint: usize) -> bool {
+        let t_s = self.time_s(sample);
+        let covers = |mask: &Mask| {
+            mask.joint.is_none_or(|j| j == joint) && (mask.from_s..=mask.to_s).contains(&t_s)
+        };
+        !self.masks.iter().any(covers)
     }
 
     /// Number of samples.
@@ -167,6 +206,8 @@ impl Motion {
             qd: cut(&self.qd),
             qdd: cut(&self.qdd),
             tau: cut(&self.tau),
+            start_s: self.time_s(range.start),
+            masks: self.masks.clone(),
             ..*self
         }
     }

@@ -4,10 +4,12 @@
 
 use crate::choice::Choice;
 use crate::columns::{Columns, FrictionColumns};
+use crate::delay::estimate_delay;
 use crate::error::{IdentError, Warning, shape_error};
 use crate::fit::{Fit, fit};
 use crate::log::{Log, check_moving};
-use crate::motion::{Motion, Preparation};
+use crate::log_checks::{Consequence, Finding, Problem, check_log};
+use crate::motion::{Mask, Motion, Preparation};
 use crate::options::{Options, Weights};
 use crate::select::{
     band_candidates, compare, friction_candidates, load_candidates, prior_candidates,
@@ -69,11 +71,16 @@ pub struct Procedure {
     /// Known standard deviation of the torque noise of each moving joint \[N m\]; it replaces the weights that the
     /// method would use.
     pub joint_noise_nm: Option<Vec<f64>>,
+    /// Whether to estimate the delay of each log's torques ([`crate::estimate_delay`]) instead of taking that of
+    /// `preparation`.
+    pub estimate_delay: bool,
+    /// Whether to fit a log although [`crate::log_checks`] found it wrong; the findings are then warnings.
+    pub accept_wrong_logs: bool,
 }
 
 impl Default for Procedure {
     /// All joints, cutoff of 8 Hz at the log's own rate, physically consistent, friction and prior by
-    /// cross-validation, rotors identified, no sample excluded.
+    /// cross-validation, rotors identified, no sample excluded, delay of the torques estimated.
     fn default() -> Self {
         Procedure {
             moving: None,
@@ -85,6 +92,8 @@ impl Default for Procedure {
             slow_rad_per_s: 0.0,
             prior_weight: None,
             joint_noise_nm: None,
+            estimate_delay: true,
+            accept_wrong_logs: false,
         }
     }
 }
@@ -101,7 +110,7 @@ pub fn identify<const N: usize>(
     let moving = procedure.moving_joints(N)?;
     let (mut motions, mut warnings) = (Vec::new(), Vec::new());
     for log in logs {
-        let (motion, motion_warnings) = Motion::prepare(log, N, &moving, &procedure.preparation)?;
+        let (motion, motion_warnings) = procedure.prepare(nominal, log, &moving)?;
         motions.push(motion);
         warnings.extend(motion_warnings);
     }
@@ -127,12 +136,68 @@ pub fn identify_motions<const N: usize>(
     let (options, choices) = procedure.options(nominal, motions, moving)?;
     let mut found = fit(nominal, motions, moving, &options)?;
     found.preparation = procedure.preparation;
+    if procedure.estimate_delay {
+        found.preparation.torque_delay_s = median_delay_s(motions);
+    }
     found.choices = choices;
     found.warnings = found.result_warnings();
     Ok(found)
 }
 
+/// Median of the delays with which the motions were prepared; that of logs to validate.
+fn median_delay_s(motions: &[Motion]) -> f64 {
+    let mut all: Vec<f64> = motions.iter().map(|m| m.torque_delay_s).collect();
+    all.sort_by(f64::total_cmp);
+    all[all.len() / 2]
+}
+
 impl Procedure {
+    /// Checks a log against the given arm ([`check_log`]) and prepares it. Samples that a finding concerns alone are left
+    /// out, with a warning.
+    ///
+    /// # Errors
+    /// As [`Motion::prepare`]; [`IdentError::WrongLog`] with everything that was found.
+    pub fn prepare<const N: usize>(
+        &self,
+        nominal: &Arm<N>,
+        log: &Log,
+        moving: &[usize],
+    ) -> Result<(Motion, Vec<Warning>), IdentError> {
+        let preparation = &self.preparation;
+        let mut warnings = log.check_for_fit(N, moving, preparation.cutoff_hz)?;
+        let findings = check_log(nominal, log, moving, &self.couplings, preparation)?;
+        let stops = |f: &Finding| f.consequence == Consequence::Stop;
+        if findings.iter().any(stops) && !self.accept_wrong_logs {
+            return Err(IdentError::WrongLog(findings));
+        }
+        let mut own = *preparation;
+        if self.estimate_delay {
+            let found = estimate_delay(nominal, log, moving, &self.couplings, preparation)?;
+            own.torque_delay_s = found.delay_s;
+        }
+        let mut motion = Motion::of_checked(log, &own)?;
+        for finding in findings {
+            if finding.consequence == Consequence::Mask {
+                let joint = match finding.problem {
+                    Problem::Contact => None,
+                    _ => finding.joints.first().copied(),
+                };
+                let masks = finding.intervals_s.iter();
+                motion.masks.extend(masks.map(|&(from_s, to_s)| Mask {
+                    joint,
+                    from_s,
+                    to_s,
+                }));
+            }
+            warnings.push(Warning {
+                column: finding.column,
+                problem: finding.evidence,
+                remedy: finding.remedy,
+            });
+        }
+        Ok((motion, warnings))
+    }
+
     /// The moving joints of an arm of `dof`.
     ///
     /// # Errors
@@ -213,7 +278,7 @@ impl<const N: usize> Fit<N> {
                     "the condition number of the scaled regressor is {:.0}",
                     self.base.condition
                 ),
-                remedy: "excite all joints at once: design a trajectory for this arm",
+                remedy: "excite all joints at once: design a trajectory for this arm".to_owned(),
             });
         }
         warnings

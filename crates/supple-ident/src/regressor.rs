@@ -124,6 +124,9 @@ pub fn joint_rows<const N: usize>(
             let speed = motion.qd.column(j).iter().map(|v| v.abs()).collect();
             let mut rows = JointRows::new(rows, torques, speed);
             rows.travel_since_reversal_rad = travel_since_reversal(motion, j);
+            if !motion.masks.is_empty() {
+                rows.used = (0..samples).map(|i| motion.used(i, j)).collect();
+            }
             rows
         })
         .collect();

@@ -228,8 +228,9 @@ fn held_out<const N: usize>(
             .collect();
         let fit = fit_rows(nominal, columns.clone(), &others, 1.0, options)?;
         let rows = || fold.iter().flatten();
-        let residual: f64 = rows().map(|r| (&r.a * &fit.x - &r.b).norm_squared()).sum();
-        let scale: f64 = rows().map(|r| r.b.norm_squared()).sum();
+        let squared = |values: Vec<f64>| values.iter().map(|v| v * v).sum::<f64>();
+        let residual: f64 = rows().map(|r| squared(r.residual(&fit.x))).sum();
+        let scale: f64 = rows().map(|r| squared(r.torques())).sum();
         errors.push((residual / scale).sqrt());
         error += residual;
         torque += scale;

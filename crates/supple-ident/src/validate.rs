@@ -23,6 +23,8 @@ pub struct Validation {
     pub peak_nm: Vec<f64>,
     /// `|tau - tau_hat| / |tau|` of each moving joint.
     pub relative: Vec<f64>,
+    /// RMS error of each moving joint over the standard deviation of its own torque: 1 says no more than its mean.
+    pub of_deviation: Vec<f64>,
     /// Relative error over all moving joints.
     pub total_relative: f64,
     /// Fraction of random poses, all angles within half a turn, with a positive definite mass matrix.
@@ -46,15 +48,21 @@ impl<const N: usize> Fit<N> {
     /// [`IdentError::Shape`] if the motion has another number of joints.
     pub fn validate_motion(&self, motion: &Motion) -> Result<Validation, IdentError> {
         let joints = joint_rows(self.nominal(), &self.columns, motion)?;
-        let samples = motion.samples() as f64;
         let (mut rms_nm, mut peak_nm, mut relative) = (Vec::new(), Vec::new(), Vec::new());
         let (mut error, mut torque) = (0.0, 0.0);
+        let mut of_deviation = Vec::new();
         for joint in &joints {
-            let errors = &joint.a * &self.x - &joint.b;
-            let wrong = errors.norm_squared();
-            peak_nm.push(errors.amax());
-            let size = joint.b.norm_squared();
-            rms_nm.push((wrong / samples).sqrt());
+            let errors = joint.residual(&self.x);
+            let squared = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>();
+            let wrong = squared(&errors);
+            peak_nm.push(errors.iter().map(|e| e.abs()).fold(0.0, f64::max));
+            let torques = joint.torques();
+            let size = squared(&torques);
+            let count = torques.len().max(1) as f64;
+            let mean = torques.iter().sum::<f64>() / count;
+            let deviation = (size / count - mean * mean).max(0.0).sqrt();
+            of_deviation.push((wrong / count).sqrt() / deviation.max(f64::MIN_POSITIVE));
+            rms_nm.push((wrong / (errors.len().max(1) as f64)).sqrt());
             relative.push((wrong / size).sqrt());
             error += wrong;
             torque += size;
@@ -63,6 +71,7 @@ impl<const N: usize> Fit<N> {
             rms_nm,
             peak_nm,
             relative,
+            of_deviation,
             total_relative: (error / torque).sqrt(),
             positive_definite: self.positive_definite_fraction()?,
         })
@@ -94,6 +103,41 @@ impl<const N: usize> Fit<N> {
         }
         Ok(positive_definite as f64 / POSES as f64)
     }
+}
+
+/// Error of a joint over the deviation of its torque from which its model is poor.
+const POOR_JOINT: f64 = 0.5;
+
+/// Verdict over all held-out logs, as text: the worst log and the worst joint decide. `joints` names the moving joints.
+pub fn verdict(held_out: &[(String, &Validation)], joints: &[String]) -> String {
+    let worst_log = held_out
+        .iter()
+        .max_by(|a, b| a.1.total_relative.total_cmp(&b.1.total_relative));
+    let Some((name, worst)) = worst_log else {
+        return "not validated".to_owned();
+    };
+    let all = held_out.iter().flat_map(|(log, v)| {
+        let errors = v.of_deviation.iter().zip(joints);
+        errors.map(move |(error, joint)| (log, joint, *error))
+    });
+    let Some((log, joint, error)) = all.max_by(|a, b| a.2.total_cmp(&b.2)) else {
+        return "not validated".to_owned();
+    };
+    let plain = worst.verdict();
+    let percent = 100.0 * error;
+    if worst.positive_definite < 1.0 || worst.total_relative > 0.2 {
+        return format!("{plain} (log {name})");
+    }
+    if error > POOR_JOINT {
+        return format!(
+            "poor for {joint}: its error is {percent:.0} % of the deviation of its own torque in {log}, {:.1} % of all joints' \
+             torque; excite this joint more, or check its torque",
+            100.0 * worst.total_relative
+        );
+    }
+    format!(
+        "{plain}; worst log {name}, worst joint {joint}: {percent:.0} % of the deviation of its own torque"
+    )
 }
 
 impl Validation {

@@ -28,10 +28,12 @@
 mod cdr;
 mod config;
 mod definition;
+mod emit;
 mod error;
 mod export;
 mod file;
 mod info;
+mod live;
 mod messages;
 mod parse;
 mod reader;
@@ -45,14 +47,16 @@ mod toml_types;
 mod values;
 mod writer;
 
+pub use emit::Extras;
 pub use error::LogError;
 pub use export::export_csv;
 pub use file::Written;
 pub use info::{AttachmentInfo, ChannelInfo, FaultInfo, Info, ModeChange, info};
+pub use live::{LiveChannel, LiveEncoder, LiveMessage};
 pub use messages::{CycleTiming, PlantTruth};
 pub use reader::{About, Messages, Reader, Timed};
 pub use recover::{Recovery, recover};
 pub use replay::{Difference, Replay, replay};
-pub use writer::{Extras, RunInfo, Writer};
+pub use writer::{RunInfo, Writer};
 
 pub use supple_core::controller::CycleRecord;

@@ -13,11 +13,13 @@ macro_rules! asset {
 }
 
 /// Name, TOML, URDF.
-const ASSETS: [(&str, &str, &str); 4] = [
+const ASSETS: [(&str, &str, &str); 6] = [
+    asset!("openarm"),
     asset!("paper3"),
     asset!("wam3"),
     asset!("wam4"),
     asset!("wam7"),
+    asset!("yam"),
 ];
 
 const NAMES: [&str; ASSETS.len()] = {
@@ -32,10 +34,12 @@ const NAMES: [&str; ASSETS.len()] = {
 
 /// Names of the built-in arms.
 ///
+/// - `openarm`: OpenArm 1.0, the right arm, seven Damiao motors; upper arm roll and wrist held.
 /// - `paper3`: the physically consistent arm closest to the paper's identified parameters, three joints.
 /// - `wam3`: the WAM with its roll joint fixed at 0, three joints.
 /// - `wam4`: the 4-joint WAM, roll held.
 /// - `wam7`: the 7-joint WAM, roll and wrist held.
+/// - `yam`: I2RT YAM with its gripper, six Damiao motors; wrist held.
 pub fn assets() -> &'static [&'static str] {
     &NAMES
 }

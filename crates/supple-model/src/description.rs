@@ -2,10 +2,12 @@
 //! [`Description::config`] return the types of the core, in which it is a const parameter.
 
 use crate::error::{Finding, ModelError, Reporter};
-use crate::resolve::{self, JointResolved, Motors, Tool};
+use crate::paths::Paths;
+use crate::resolve::{self, BusDescription, JointResolved, Motors, Tool};
 use crate::settings::Settings;
 use crate::shapes::{self, Capsule, Transform};
 use crate::tree::{self, Chain};
+use crate::urdf_name::UrdfName;
 use crate::{assets, xml};
 use std::path::Path;
 use supple_core::Friction;
@@ -18,12 +20,15 @@ pub struct Description {
     pub(crate) chain: Chain,
     pub(crate) joints: Vec<JointResolved>,
     pub(crate) toml_file: String,
+    urdf_file: String,
     robot: Robot,
     names: Vec<String>,
     home_rad: Vec<f64>,
     friction: Vec<Friction>,
     motors: Motors,
     tool: Option<Tool>,
+    bus: Option<BusDescription>,
+    stow_rad: Option<Vec<f64>>,
     capsules: Vec<Capsule>,
     toml: String,
     urdf: String,
@@ -66,11 +71,15 @@ impl Description {
         )
     }
 
-    /// Reads a built-in arm by its name, or another arm by the path of its TOML or folder.
+    /// Reads a built-in arm by its name, or another arm by the path of its TOML or folder, or of its URDF, with the tip's
+    /// link after a `#` ([`UrdfName`]).
     ///
     /// # Errors
     /// [`ModelError::UnknownAsset`] if it is neither, or as [`Description::load`].
     pub fn find(name_or_path: &str) -> Result<Self, ModelError> {
+        if let Some(urdf) = UrdfName::parse(name_or_path) {
+            return Self::from_urdf(&urdf);
+        }
         let is_path = name_or_path.contains(['/', '\\', '.']) || Path::new(name_or_path).exists();
         if is_path && !assets::assets().contains(&name_or_path) {
             return Self::load(name_or_path);
@@ -78,12 +87,13 @@ impl Description {
         Self::asset(name_or_path)
     }
 
-    /// As [`Description::find`]; `rate_hz`, if given, replaces the control rate of the TOML \[Hz\].
+    /// As [`Description::find`], with everything that a controller needs ([`Description::completed`]); `rate_hz`, if given,
+    /// replaces the control rate of the TOML \[Hz\].
     ///
     /// # Errors
-    /// As [`Description::find`] and [`Description::at_rate`].
+    /// As [`Description::find`], [`Description::completed`] and [`Description::at_rate`].
     pub fn find_at_rate(name_or_path: &str, rate_hz: Option<u32>) -> Result<Self, ModelError> {
-        let description = Self::find(name_or_path)?;
+        let description = Self::find(name_or_path)?.completed()?.description;
         match rate_hz {
             Some(rate_hz) => description.at_rate(f64::from(rate_hz)),
             None => Ok(description),
@@ -124,6 +134,22 @@ impl Description {
         )
     }
 
+    /// As [`Description::from_text`], with a name of the URDF for messages.
+    pub(crate) fn from_named_text(
+        toml: &str,
+        urdf_file: &str,
+        urdf: &str,
+    ) -> Result<Self, ModelError> {
+        let settings = parse_toml(urdf_file, toml)?;
+        Self::build(
+            settings,
+            urdf_file.to_owned(),
+            toml.to_owned(),
+            urdf_file.to_owned(),
+            urdf.to_owned(),
+        )
+    }
+
     fn build(
         settings: Settings,
         toml_file: String,
@@ -133,6 +159,7 @@ impl Description {
     ) -> Result<Self, ModelError> {
         let in_urdf = Reporter { file: &urdf_file };
         let in_toml = Reporter { file: &toml_file };
+        let urdf = xml::declare_prefixes(urdf);
         let checked = xml::check(in_urdf, &urdf)?;
         let mut robot =
             urdf_rs::read_from_string(&checked.text).map_err(|error| ModelError::Syntax {
@@ -150,13 +177,22 @@ impl Description {
             in_urdf,
             in_toml,
             &robot,
-            &settings.tip_frame,
-            &settings.fixed_joints_rad,
+            &tree::ChainSettings {
+                tip_frame: &settings.tip_frame,
+                fixed: &settings.fixed_joints_rad,
+                // A TOML that lists joints counts them.
+                freeze_on_path: settings.joints.is_empty() && settings.home_rad.is_none(),
+                repair: settings.repair_inertia,
+            },
         )?;
         resolve::check_rest(in_toml, &settings)?;
         let joints = resolve::joints(in_urdf, in_toml, &settings, &robot, &chain)?;
         let motors = resolve::motors(in_toml, &settings, &joints)?;
         let tool = resolve::tool(in_toml, &settings)?;
+        let bus = resolve::bus(in_toml, &settings, &joints)?;
+        let stow_rad = resolve::stow(in_toml, &settings, &joints)?;
+        let mut warnings = checked.warnings;
+        warnings.extend(chain.warnings.iter().cloned());
         Ok(Self {
             names: joints.iter().map(|joint| joint.name.clone()).collect(),
             home_rad: joints.iter().map(|joint| joint.home_rad).collect(),
@@ -166,18 +202,22 @@ impl Description {
             chain,
             joints,
             toml_file,
+            urdf_file,
             robot,
             motors,
             tool,
+            bus,
+            stow_rad,
             toml,
             urdf,
-            warnings: checked.warnings,
+            warnings,
         })
     }
 
     /// Ignored content of the URDF, each kind once with its first occurrence: Gazebo's elements, `mu_coulomb`, an
     /// `<origin>` of a link. Dynamics and limits do not depend on it; unknown content that could change them is
-    /// rejected. Empty for the built-in arms.
+    /// rejected. Then the joints that were frozen and the inertias that were replaced without a word of the TOML. Empty
+    /// for the built-in arms.
     pub fn warnings(&self) -> &[Finding] {
         &self.warnings
     }
@@ -234,7 +274,7 @@ impl Description {
         &self.names
     }
 
-    /// Text of the URDF, unchanged.
+    /// Text of the URDF, unchanged but for declarations of XML prefixes that it lacks.
     pub fn urdf(&self) -> &str {
         &self.urdf
     }
@@ -254,6 +294,16 @@ impl Description {
         &self.home_rad
     }
 
+    /// Pose in which the arm stays without torque, one angle per joint \[rad\]; `None` if the TOML gives none.
+    pub fn stow_rad(&self) -> Option<&[f64]> {
+        self.stow_rad.as_deref()
+    }
+
+    /// Drives as their bus addresses them; `None` if the TOML has no `[bus]`.
+    pub fn bus(&self) -> Option<&BusDescription> {
+        self.bus.as_ref()
+    }
+
     /// Friction, one per joint.
     pub fn friction(&self) -> &[Friction] {
         &self.friction
@@ -262,6 +312,11 @@ impl Description {
     /// Motors and transmission.
     pub fn motors(&self) -> &Motors {
         &self.motors
+    }
+
+    /// Place and size of the paper's trajectories: those of the TOML, or as in the paper.
+    pub fn paths(&self) -> Paths {
+        self.settings.paths.map_or(Paths::PAPER, Paths::from)
     }
 
     /// Tool at the tip.
@@ -281,12 +336,29 @@ impl Description {
     /// [`ModelError::JointCount`] if `q_rad` does not have one angle per moving joint.
     pub fn transforms(&self, q_rad: &[f64]) -> Result<Vec<Transform<'_>>, ModelError> {
         self.expect_dof(q_rad.len())?;
-        Ok(shapes::transforms(
-            &self.robot,
-            &self.chain,
-            &self.settings.fixed_joints_rad,
-            q_rad,
-        ))
+        Ok(shapes::transforms(&self.robot, &self.chain, q_rad))
+    }
+
+    /// Joints that do not move, with their positions \[rad, m for a prismatic joint\].
+    pub(crate) fn frozen(&self) -> &crate::frozen::Frozen {
+        &self.chain.frozen
+    }
+
+    /// Name of the TOML's file, for messages.
+    pub(crate) fn toml_file(&self) -> &str {
+        &self.toml_file
+    }
+
+    /// The same arm with another TOML.
+    pub(crate) fn with_toml(&self, toml: String) -> Result<Self, ModelError> {
+        let settings = parse_toml(&self.toml_file, &toml)?;
+        Self::build(
+            settings,
+            self.toml_file.clone(),
+            toml,
+            self.urdf_file.clone(),
+            self.urdf.clone(),
+        )
     }
 
     pub(crate) fn robot(&self) -> &Robot {
@@ -307,7 +379,7 @@ impl Description {
     }
 }
 
-fn read(path: &Path, remedy: &'static str) -> Result<String, ModelError> {
+pub(crate) fn read(path: &Path, remedy: &'static str) -> Result<String, ModelError> {
     supple_files::read_text(path, Description::MAX_BYTES).map_err(|error| ModelError::Read {
         file: path.display().to_string(),
         error,
@@ -320,7 +392,7 @@ fn parse_toml(file: &str, text: &str) -> Result<Settings, ModelError> {
         return Err(ModelError::Syntax {
             file: file.to_owned(),
             message: "this is XML, but a TOML is expected".to_owned(),
-            remedy: "give the TOML of the arm: name, urdf (the path of this file) and tip_frame suffice",
+            remedy: "give the TOML of the arm, or the URDF under its own name, FILE.urdf",
         });
     }
     toml::from_str(text).map_err(|error| ModelError::Syntax {

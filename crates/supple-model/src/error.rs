@@ -56,6 +56,12 @@ pub enum ModelError {
         /// Known names.
         expected: String,
     },
+    /// A file that is not named like a URDF.
+    #[error("{file}: the name of a URDF ends with .urdf or .xml; rename the file")]
+    NotUrdf {
+        /// File name.
+        file: String,
+    },
     /// The description and the caller disagree about the number of joints.
     #[error("{file}: arm `{arm}` has {found} moving joints, the caller expects {expected}")]
     JointCount {

@@ -82,6 +82,46 @@ impl Description {
         Description::from_text(&document.to_string(), self.urdf())
     }
 
+    /// Returns the same arm with thresholds for a model that is not identified yet: collisions in the modes with stiff joint
+    /// loops are detected at `move_share` of `collision_torque_nm` and of the tip's threshold, an unmodelled load at
+    /// `load_n` \[N\]. Greater values of the description stay.
+    ///
+    /// # Errors
+    /// Any [`ModelError`] of the edited text.
+    pub fn with_wide_thresholds(
+        &self,
+        move_share: f64,
+        load_n: f64,
+    ) -> Result<Description, ModelError> {
+        let mut document = self.document()?;
+        let settings = self.settings();
+        document["collision"]["move_share"] = value(move_share.max(settings.collision.move_share));
+        document["plausible"]["load_n"] = value(load_n.max(settings.plausible.load_n));
+        for joint in 0..self.dof() {
+            let table = self.joint_table(&mut document, joint)?;
+            table.remove("move_collision_torque_nm");
+        }
+        Description::from_text(&document.to_string(), self.urdf())
+    }
+
+    /// Returns the same arm with the held joints of `of`: those, at the same angles and with the same loops, and no other.
+    ///
+    /// # Errors
+    /// [`ModelError::JointCount`]; any [`ModelError`] of the edited text.
+    pub fn with_held_joints_of(&self, of: &Description) -> Result<Description, ModelError> {
+        self.expect_dof(of.dof())?;
+        let (mut document, mut other) = (self.document()?, of.document()?);
+        for joint in 0..self.dof() {
+            let held = of.joint_table(&mut other, joint)?.remove("held");
+            let table = self.joint_table(&mut document, joint)?;
+            table.remove("held");
+            if let Some(held) = held {
+                table.insert("held", held);
+            }
+        }
+        Description::from_text(&document.to_string(), self.urdf())
+    }
+
     /// Writes `arm.toml` and `arm.urdf` into a folder, which it creates if necessary; [`Description::load`] reads
     /// them. Existing files of these names are replaced.
     ///

@@ -10,25 +10,37 @@
 
 mod assets;
 mod bounds;
+pub mod bus_settings;
 mod const_generic;
+mod derive;
 mod description;
 mod error;
+mod from_urdf;
+mod frozen;
 mod identified;
 mod learned;
 pub mod paper;
+mod paths;
+pub mod reach;
+mod repair;
 mod resolve;
 pub mod settings;
 mod shapes;
 mod tree;
 pub mod unlimited;
+mod urdf_name;
 mod workspace;
 mod xml;
 
 pub use assets::assets;
+pub use bus_settings::{BusFormat, BusKind};
 pub use const_generic::Parts;
+pub use derive::{Completed, Derived, tip_weight_n};
 pub use description::Description;
 pub use error::{Finding, ModelError};
 pub use identified::IdentifiedModel;
-pub use resolve::{Motors, Tool};
+pub use paths::{PROBE_DWELL_S, Paths};
+pub use resolve::{BusDescription, BusMotor, Motors, Tool};
 pub use settings::{LearnedSettings, Settings, schema_json};
 pub use shapes::{Capsule, Transform};
+pub use urdf_name::UrdfName;

@@ -3,6 +3,7 @@
 //! Key names contain units; unknown keys are rejected; optional keys document their defaults. The JSON
 //! schema of these types is `assets/arm.schema.json`.
 
+use crate::bus_settings::BusSettings;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -26,6 +27,10 @@ pub struct Settings {
     /// Links with mass and zero inertia get the inertia of a solid ball of this radius (m). Default: such links
     /// are rejected.
     pub point_mass_radius_m: Option<f64>,
+    /// Replaces an inertia that no rigid body has by the nearest one that a rigid body has, with a warning. Default: such a
+    /// link between base and tip is rejected.
+    #[serde(default)]
+    pub repair_inertia: bool,
     /// Cycle period (s). Default 0.001.
     #[serde(default = "default::period_s")]
     pub period_s: f64,
@@ -38,8 +43,12 @@ pub struct Settings {
     /// Pose that the arm starts from, one angle per moving joint (rad). Default: the middle of each
     /// joint's range, held joints at the angle they are held at.
     pub home_rad: Option<Vec<f64>>,
-    /// Movable joints of the URDF that are fixed, each at an angle (rad); their child links become part of
-    /// the parent link. Movable joints outside the chain to the tip must be listed here.
+    /// Pose in which the arm stays without torque, one angle per moving joint (rad): where a shutdown leaves an arm
+    /// without brakes. Default: none.
+    pub stow_rad: Option<Vec<f64>>,
+    /// Movable joints of the URDF that are fixed, each at an angle (rad, m for a prismatic joint); their child links
+    /// become part of the parent link. Default: joints outside the chain to the tip, prismatic joints, mimics and the
+    /// first ones of more than seven stay at zero, or at the end of their range that is closest to it, with a warning.
     #[serde(default)]
     pub fixed_joints_rad: BTreeMap<String, f64>,
     /// Settings per moving joint, in any order. A joint without an entry has all defaults.
@@ -47,6 +56,8 @@ pub struct Settings {
     pub joints: Vec<JointSettings>,
     /// Motors and transmission. Default: one motor per joint, ratio 1, no quantisation.
     pub motors: Option<MotorSettings>,
+    /// Motors as their bus addresses them. Default: none; the WAM's motors need no entry.
+    pub bus: Option<BusSettings>,
     /// Limits that apply to the whole arm.
     #[serde(default)]
     pub limits: LimitSettings,
@@ -73,8 +84,26 @@ pub struct Settings {
     pub pose: PoseSettings,
     /// Tool at the tip. Default: none.
     pub tool: Option<ToolSettings>,
+    /// Where the trajectories of the paper's experiments lie. Default: where the paper has them, if the arm reaches them,
+    /// otherwise found in the arm's workspace.
+    pub paths: Option<PathSettings>,
     /// What was learned of the model while the arm moved, as `supple learning save` writes it. Default: nothing.
     pub learned: Option<LearnedSettings>,
+}
+
+/// Place and size of the paper's trajectories: the paper's own, about the point (0.6, 0, 0) m, are turned about the base's
+/// vertical axis, moved and scaled.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PathSettings {
+    /// Distance of their centre from the base's vertical axis (m), positive. The paper's: 0.6.
+    pub radius_m: f64,
+    /// Direction of their centre about that axis, from base axis x (rad). The paper's: 0.
+    pub azimuth_rad: f64,
+    /// Height of their centre above the base frame (m). The paper's: 0.
+    pub height_m: f64,
+    /// Their lengths as a multiple of the paper's, 0.01 to 10; speeds scale with it.
+    pub scale: f64,
 }
 
 /// One moving joint.
@@ -91,6 +120,9 @@ pub struct JointSettings {
     /// Rotor inertia reflected to the joint (kg m^2). Default 0.
     #[serde(default)]
     pub armature_kg_m2: f64,
+    /// Whether that inertia is an estimate from the limits of torque and speed, not a datum. Default false.
+    #[serde(default)]
+    pub armature_is_estimate: bool,
     /// Friction. Default: the URDF's `<dynamics>` (damping as viscous, friction as Coulomb), or none.
     pub friction: Option<FrictionSettings>,
     /// Lower hard stop (rad); may narrow the range of the URDF. Default: `lower` of the URDF; -2 pi for a
@@ -576,6 +608,7 @@ impl JointSettings {
             source: None,
             held: None,
             armature_kg_m2: 0.0,
+            armature_is_estimate: false,
             friction: None,
             position_lower_rad: None,
             position_upper_rad: None,

@@ -4,10 +4,9 @@
 //! a sphere one of zero length. Boxes and meshes have no capsule; viewers read them from the URDF.
 
 use crate::tree::Chain;
-use std::collections::BTreeMap;
 use supple_core::Pose;
 use supple_core::math::Vector3;
-use urdf_rs::{Geometry, Robot};
+use urdf_rs::{Geometry, JointType, Robot};
 
 /// A capsule fixed to a link.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,26 +54,32 @@ pub(crate) fn capsules(robot: &Robot, chain: &Chain) -> Vec<Capsule> {
     capsules
 }
 
-pub(crate) fn transforms<'a>(
-    robot: &'a Robot,
-    chain: &Chain,
-    fixed_rad: &BTreeMap<String, f64>,
-    q_rad: &[f64],
-) -> Vec<Transform<'a>> {
+pub(crate) fn transforms<'a>(robot: &'a Robot, chain: &Chain, q_rad: &[f64]) -> Vec<Transform<'a>> {
     let angle = |index: usize| {
         let moving = chain.moving.iter().position(|moving| moving.joint == index);
-        let fixed = || fixed_rad.get(&robot.joints[index].name).copied();
-        moving.map(|i| q_rad[i]).or_else(fixed)
+        let frozen = || chain.frozen.get(&robot.joints[index].name).copied();
+        moving.map(|i| q_rad[i]).or_else(frozen)
     };
+    let is_moving = |index: usize| chain.moving.iter().any(|moving| moving.joint == index);
     let joints = robot.joints.iter().enumerate();
     joints
         .map(|(index, joint)| {
             let origin = Pose::from_xyz_rpy(joint.origin.xyz.0, joint.origin.rpy.0);
-            let turned = angle(index).map(|angle_rad| {
+            let displaced = |position: f64| {
                 let axis = Vector3::from(joint.axis.xyz.0);
-                let length = supple_core::math::sqrt(axis.dot(&axis));
-                origin * crate::tree::turn(&(axis / length), angle_rad)
-            });
+                let axis = axis / supple_core::math::sqrt(axis.dot(&axis));
+                origin
+                    * match joint.joint_type {
+                        JointType::Prismatic => Pose {
+                            translation: axis * position,
+                            ..Pose::IDENTITY
+                        },
+                        _ => crate::tree::turn(&axis, position),
+                    }
+            };
+            // A joint at zero may have no axis.
+            let is_displaced = |position: &f64| *position != 0.0 || is_moving(index);
+            let turned = angle(index).filter(is_displaced).map(displaced);
             Transform {
                 parent: &joint.parent.link,
                 child: &joint.child.link,

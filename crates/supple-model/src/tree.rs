@@ -1,11 +1,15 @@
 //! The links and joints of a URDF as a tree, and the tree as a chain of moving bodies.
 //!
 //! The arm is the chain of movable joints from the root link to the tip frame. Links that are fixed to
-//! another link, by a `fixed` joint or because the TOML fixes their joint at an angle, are lumped into it:
-//! masses, first moments and inertias add, frames are composed. A movable branch that does not carry the tip
-//! is rejected, because its angle would be unknown.
+//! another link, by a `fixed` joint or because their joint is frozen ([`crate::frozen`]), are lumped into it:
+//! masses, first moments and inertias add, frames are composed. What hangs on the base has no effect and is not read.
+//! An inertia that no rigid body has is rejected on the way from the base to the tip, or replaced on request; on a side
+//! link it is always replaced, with a warning ([`crate::repair`]), as is a mass without inertia on a fixed link.
 
-use crate::error::{ModelError, Reporter};
+use crate::error::{Finding, ModelError, Reporter};
+use crate::frozen::{self, Frozen, is_revolute};
+use crate::repair;
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 use supple_core::math::{Matrix3, Vector3, sin_cos};
 use supple_core::{Body, Pose};
@@ -41,30 +45,55 @@ pub(crate) struct Chain {
     pub moving: Vec<MovingJoint>,
     pub links: Vec<PlacedLink>,
     pub last_link_from_tip: Pose,
+    /// Joints that do not move.
+    pub frozen: Frozen,
+    /// What was frozen or replaced although nobody asked for it.
+    pub warnings: Vec<Finding>,
 }
 
-/// Reads the chain. `fixed_rad` are the joints that the TOML freezes.
+/// What the TOML says about the chain.
+pub(crate) struct ChainSettings<'a> {
+    pub tip_frame: &'a str,
+    /// Joints that the TOML freezes, with their positions.
+    pub fixed: &'a BTreeMap<String, f64>,
+    /// Whether joints on the way to the tip may be frozen too.
+    pub freeze_on_path: bool,
+    /// Replaces every inertia that no rigid body has.
+    pub repair: bool,
+}
+
+/// Reads the chain.
 pub(crate) fn chain(
     report: Reporter<'_>,
     toml: Reporter<'_>,
     robot: &Robot,
-    tip_frame: &str,
-    fixed_rad: &BTreeMap<String, f64>,
+    settings: &ChainSettings<'_>,
 ) -> Result<Chain, ModelError> {
     let tree = Tree::new(report, robot)?;
     let tip = tree
-        .link(tip_frame)
-        .ok_or_else(|| no_tip(toml, robot, tip_frame))?;
+        .link(settings.tip_frame)
+        .ok_or_else(|| no_tip(toml, robot, settings.tip_frame))?;
     let path = tree.path_to(tip);
+    let (frozen, mut warnings) = frozen::frozen(
+        report,
+        robot,
+        &path,
+        settings.fixed,
+        settings.freeze_on_path,
+    );
     let on_chain = |joint: usize| {
         path.contains(&joint)
             && is_movable(&robot.joints[joint].joint_type)
-            && !fixed_rad.contains_key(&robot.joints[joint].name)
+            && !frozen.contains_key(&robot.joints[joint].name)
     };
+    let on_path = |link: usize| tree.parent_joint[link].is_some_and(|joint| path.contains(&joint));
     let mut builder = Builder {
         tree: &tree,
-        fixed_rad,
+        frozen: &frozen,
         on_chain: &on_chain,
+        on_path: &on_path,
+        repair: settings.repair,
+        repaired: RefCell::default(),
         body: None,
         next: None,
         links: Vec::new(),
@@ -103,6 +132,7 @@ pub(crate) fn chain(
         root = tree.child[joint];
         carrier = Some(moving.len() - 1);
     }
+    warnings.extend(builder.repaired.take());
     let links = builder.links;
     let last_link_from_tip = links
         .iter()
@@ -112,6 +142,8 @@ pub(crate) fn chain(
         moving,
         links,
         last_link_from_tip,
+        frozen,
+        warnings,
     })
 }
 
@@ -271,17 +303,33 @@ impl<'a> Tree<'a> {
         ))
     }
 
-    fn body(&self, link: usize) -> Result<Option<Body>, ModelError> {
-        let link = &self.robot.links[link];
+    /// Pose of the child link, relative to its pose at zero, of a frozen joint at `position` (rad or m).
+    fn displaced(&self, joint: usize, position: f64) -> Result<Pose, ModelError> {
+        if position == 0.0 {
+            return Ok(Pose::IDENTITY);
+        }
+        Ok(match self.robot.joints[joint].joint_type {
+            JointType::Revolute | JointType::Continuous => turn(&self.axis(joint)?, position),
+            JointType::Prismatic => Pose {
+                translation: self.axis(joint)? * position,
+                ..Pose::IDENTITY
+            },
+            _ => Pose::IDENTITY,
+        })
+    }
+
+    /// Inertial data of a link as they are written, in its frame; `None` if there are none. The last part is the pose of
+    /// the centre of mass.
+    fn written_body(&self, link: usize) -> Option<(Body, Pose)> {
         let urdf_rs::Inertial {
             origin,
             mass,
             inertia: i,
-        } = &link.inertial;
+        } = &self.robot.links[link].inertial;
         let entries = [i.ixx, i.iyy, i.izz, i.ixy, i.ixz, i.iyz];
         // urdf-rs returns zeros for a missing <inertial>; an explicit all-zero one means the same.
         if mass.value == 0.0 && entries == [0.0; 6] {
-            return Ok(None);
+            return None;
         }
         let body = Body {
             mass_kg: mass.value,
@@ -293,30 +341,44 @@ impl<'a> Tree<'a> {
                 i.ixz, i.iyz, i.izz,
             ),
         };
-        body.validate().map_err(|error| {
-            self.report.invalid(
-                format!("link `{}` <inertial>", link.name),
-                error.to_string(),
-                format!(
-                    "mass {} kg, inertia (xx, yy, zz, xy, xz, yz) {entries:?}",
-                    mass.value
-                ),
-                "give inertia about the centre of mass in kg m^2 and mass in kg, or remove \
-                 <inertial> from a link that has no mass; point_mass_radius_m gives a mass without \
-                 inertia that of a ball",
-            )
-        })?;
-        Ok(Some(body.expressed_in(&Pose::from_xyz_rpy(
-            origin.xyz.0,
-            origin.rpy.0,
-        ))))
+        Some((body, Pose::from_xyz_rpy(origin.xyz.0, origin.rpy.0)))
+    }
+
+    fn inconsistent(&self, link: usize, body: &Body, error: &supple_core::BodyError) -> ModelError {
+        let i = &body.inertia_kg_m2;
+        let entries = [
+            i[(0, 0)],
+            i[(1, 1)],
+            i[(2, 2)],
+            i[(0, 1)],
+            i[(0, 2)],
+            i[(1, 2)],
+        ];
+        self.report.invalid(
+            format!("link `{}` <inertial>", self.robot.links[link].name),
+            error.to_string(),
+            format!(
+                "mass {} kg, inertia (xx, yy, zz, xy, xz, yz) {entries:?}",
+                body.mass_kg
+            ),
+            "give inertia about the centre of mass in kg m^2 and mass in kg, or remove \
+             <inertial> from a link that has no mass; point_mass_radius_m gives a mass without \
+             inertia that of a ball, --repair (repair_inertia = true in the TOML) the nearest one \
+             that a rigid body can have",
+        )
     }
 }
 
 struct Builder<'a, 'b> {
     tree: &'b Tree<'a>,
-    fixed_rad: &'b BTreeMap<String, f64>,
+    frozen: &'b Frozen,
     on_chain: &'b dyn Fn(usize) -> bool,
+    /// Whether a link lies on the way from the base to the tip.
+    on_path: &'b dyn Fn(usize) -> bool,
+    /// Replaces inconsistent inertias on that way too.
+    repair: bool,
+    /// What was replaced.
+    repaired: RefCell<Vec<Finding>>,
     /// Sum of everything lumped into the current moving link.
     body: Option<Body>,
     /// Next joint of the chain, with the frame of its child link at zero angle.
@@ -351,7 +413,10 @@ impl Builder<'_, '_> {
             carrier,
             carrier_from_link,
         });
-        if let Some(body) = self.tree.body(link)? {
+        // What is fixed to the base does not move and has no effect.
+        if carrier.is_some()
+            && let Some(body) = self.body(link)?
+        {
             let body = body.expressed_in(&carrier_from_link);
             self.body = Some(self.body.map_or(body, |sum| sum.merged(&body)));
         }
@@ -364,22 +429,33 @@ impl Builder<'_, '_> {
                 self.next = Some((joint, link_from_child));
             } else if matches!(urdf.joint_type, JointType::Fixed) {
                 open.push((self.tree.child[joint], link_from_child));
-            } else if let Some(angle) = self.fixed_rad.get(&urdf.name) {
-                if !is_revolute(&urdf.joint_type) {
-                    return Err(unsupported(self.tree.report, urdf));
-                }
-                let turned = link_from_child * turn(&self.tree.axis(joint)?, *angle);
-                open.push((self.tree.child[joint], turned));
             } else {
-                return Err(self.tree.report.invalid(
-                    format!("joint `{}`", urdf.name),
-                    "moves a branch that does not carry the tip",
-                    format!("{:?}", urdf.joint_type).to_lowercase(),
-                    "fix it at an angle under [fixed_joints_rad] of the TOML",
-                ));
+                let position = self.frozen.get(&urdf.name).copied().unwrap_or_default();
+                let moved = link_from_child * self.tree.displaced(joint, position)?;
+                open.push((self.tree.child[joint], moved));
             }
         }
         Ok(())
+    }
+
+    /// Inertia of a link in its frame; one that no rigid body has is replaced where that is allowed.
+    fn body(&self, link: usize) -> Result<Option<Body>, ModelError> {
+        let Some((body, frame)) = self.tree.written_body(link) else {
+            return Ok(None);
+        };
+        let Err(error) = body.validate() else {
+            return Ok(Some(body.expressed_in(&frame)));
+        };
+        let moves = self.tree.parent_joint[link].is_some_and(|joint| (self.on_chain)(joint));
+        let is_point = body.mass_kg > 0.0 && body.inertia_kg_m2 == Matrix3::zeros();
+        if (self.on_path)(link) && !self.repair && (moves || !is_point) {
+            return Err(self.tree.inconsistent(link, &body, &error));
+        }
+        let nearest = repair::nearest(&body);
+        let name = &self.tree.robot.links[link].name;
+        let finding = repair::finding(self.tree.report, name, &body, nearest.as_ref(), &error);
+        self.repaired.borrow_mut().push(finding);
+        Ok(nearest.map(|body| body.expressed_in(&frame)))
     }
 }
 
@@ -397,16 +473,12 @@ fn is_movable(kind: &JointType) -> bool {
     !matches!(kind, JointType::Fixed)
 }
 
-fn is_revolute(kind: &JointType) -> bool {
-    matches!(kind, JointType::Revolute | JointType::Continuous)
-}
-
 fn unsupported(report: Reporter<'_>, joint: &urdf_rs::Joint) -> ModelError {
     report.invalid(
         format!("joint `{}`", joint.name),
         "only revolute, continuous and fixed joints are supported",
         format!("{:?}", joint.joint_type).to_lowercase(),
-        "change its type to fixed in the URDF, or take another tip_frame",
+        "fix it under [fixed_joints_rad] of the TOML (in m if it is prismatic), or take another tip_frame",
     )
 }
 

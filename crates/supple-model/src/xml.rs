@@ -7,10 +7,12 @@
 
 pub(crate) mod bounds;
 mod ignored;
+mod prefixes;
 mod remove_unread;
 
 use crate::error::{Finding, ModelError, Reporter};
 use ignored::IgnoredElements;
+pub(crate) use prefixes::declare_prefixes;
 use roxmltree::Node;
 
 /// Maximum magnitude of a length, mass or inertia, SI units: far above any arm, and no product of such numbers

@@ -1,8 +1,8 @@
 //! Transmission, motors, encoders and amplifiers between controller and plant.
 //!
 //! Joint angles are `q = m2jp p` with the motor angles `p`; motor torques are `m2jp^T tau` with the joint
-//! torques `tau`. A commanded torque is rounded to the amplifier's resolution and acts a whole number of cycles
-//! later:
+//! torques `tau`. A commanded torque is rounded to the amplifier's resolution, the remainder carried to the next cycle if
+//! the drive does so, and acts a whole number of cycles later:
 //!
 //! ```text
 //! motor torque = k (1 + sum r sin(n p + phase)) slack(command) + offset + sum a sin(n p + phase)
@@ -58,6 +58,8 @@ pub struct ActuatorModel<const N: usize> {
     pub encoder_noise_rad: Vector<N>,
     /// Resolution of each motor's torque \[N m\], zero or more; zero commands without rounding.
     pub motor_torque_quantum_nm: Vector<N>,
+    /// Whether the drive carries the rounding error of a torque to the next cycle, so that the mean torque is exact.
+    pub carries_remainder: bool,
     /// Damping of each motor with shorted terminals, `Kt^2 / R` \[N m s/rad\], zero or more.
     pub braking_nm_s_per_rad: Vector<N>,
     /// Cycles after which a commanded torque acts; 1 on an arm whose drives apply it in the next cycle.
@@ -85,6 +87,7 @@ impl<const N: usize> ActuatorModel<N> {
             counts_per_motor_revolution: Vector::zeros(),
             encoder_noise_rad: Vector::zeros(),
             motor_torque_quantum_nm: Vector::zeros(),
+            carries_remainder: false,
             braking_nm_s_per_rad: Vector::zeros(),
             torque_delay_cycles: 0,
             ripple: Vec::new(),
@@ -114,6 +117,8 @@ pub(crate) struct ActuatorState<const N: usize> {
     motor_from_joint: Matrix<N, N>,
     pending: VecDeque<Vector<N>>,
     last_command: Vector<N>,
+    /// Rounding error of each motor's torque that the next cycle adds \[N m\].
+    remainder: Vector<N>,
     /// Whether motor torques differ from commands.
     amplifiers_err: bool,
     /// Shorted motors.
@@ -177,6 +182,7 @@ impl<const N: usize> ActuatorState<N> {
             motor_from_joint,
             pending: VecDeque::new(),
             last_command: Vector::zeros(),
+            remainder: Vector::zeros(),
             shorted: [false; N],
             braking: Matrix::zeros(),
         };
@@ -187,6 +193,7 @@ impl<const N: usize> ActuatorState<N> {
     /// Resets the command queue; `held` acts until the first new command takes effect.
     pub fn restart(&mut self, held: &Vector<N>) {
         self.last_command = *held;
+        self.remainder = Vector::zeros();
         self.pending.clear();
         for _ in 0..self.model.torque_delay_cycles {
             self.pending.push_back(*held);
@@ -203,7 +210,7 @@ impl<const N: usize> ActuatorState<N> {
         self.pending.pop_front().unwrap_or(self.last_command)
     }
 
-    fn rounded(&self, torque_nm: &Vector<N>) -> Vector<N> {
+    fn rounded(&mut self, torque_nm: &Vector<N>) -> Vector<N> {
         let quantum = &self.model.motor_torque_quantum_nm;
         if quantum.iter().all(|q| *q == 0.0) {
             return *torque_nm;
@@ -211,7 +218,11 @@ impl<const N: usize> ActuatorState<N> {
         let mut motor = self.model.joint_from_motor.transpose() * torque_nm;
         for i in 0..N {
             if quantum[i] > 0.0 {
-                motor[i] = libm::rint(motor[i] / quantum[i]) * quantum[i];
+                let wanted = motor[i] + self.remainder[i];
+                motor[i] = libm::rint(wanted / quantum[i]) * quantum[i];
+                if self.model.carries_remainder {
+                    self.remainder[i] = wanted - motor[i];
+                }
             }
         }
         self.motor_from_joint.transpose() * motor

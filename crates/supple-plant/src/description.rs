@@ -48,6 +48,8 @@ impl<const N: usize> PlantConfig<N> {
                 counts_per_motor_revolution: Vector::repeat(counts),
                 motor_torque_quantum_nm: quantum
                     .map_or_else(Vector::zeros, Vector::from_column_slice),
+                // The drive of these motors does.
+                carries_remainder: description.bus().is_some(),
                 braking_nm_s_per_rad: braking.map_or_else(
                     || rotors_kg_m2.diagonal() / SHORTED_TIME_CONSTANT_S,
                     Vector::from_column_slice,
@@ -66,7 +68,18 @@ impl<const N: usize> PlantConfig<N> {
             },
             force_sensor: ForceSensor::default(),
             cycle_s: control.period_s,
+            step_s: step_s(control.period_s, ideal.step_s),
             ..ideal
         })
+    }
+}
+
+/// The usual step of the physics \[s\], or the largest one below it of which a cycle is a whole number.
+fn step_s(cycle_s: f64, usual_s: f64) -> f64 {
+    let steps = cycle_s / usual_s;
+    if (steps - libm::rint(steps)).abs() < 1e-9 * steps {
+        usual_s
+    } else {
+        cycle_s / libm::ceil(steps)
     }
 }

@@ -1,12 +1,13 @@
 //! How the friction of the joints varies with angle, direction and temperature.
 //!
 //! ```text
-//! dry     *= (1 + a sin(n q + phase)) (1 + d sign(v)) (1 + c_S exp(-t / T))
+//! dry     *= ((1 + a sin(n q + phase)) (1 + d sign(v)) + g |tau| / S) (1 + c_S exp(-t / T))
 //! viscous *= 1 + c_V exp(-t / T)
 //! ```
 //!
 //! `sign` is continuous: `v / v_s`, limited to -1..1. `t` is the time since the cold start. Temperature is not modelled;
-//! the exponential is the response of one thermal mass to constant heating. The variation with load is part of
+//! the exponential is the response of one thermal mass to constant heating. `tau` is the torque that the motor transmits,
+//! `S` the Coulomb torque: gears under load have more friction. The variation with the load of bearings is part of
 //! [`crate::LuGre`].
 
 use crate::error::{PlantError, entry};
@@ -40,6 +41,8 @@ pub struct FrictionVariation<const N: usize> {
     pub phase_rad: Vector<N>,
     /// `d` of each joint, -0.5 to 0.5: positive if motion in the positive direction has more friction.
     pub direction_fraction: Vector<N>,
+    /// `g`, 0 to 0.5.
+    pub gear_fraction: f64,
     /// `c_S`, excess of the dry friction when cold, -0.9 to 10.
     pub cold_dry_fraction: f64,
     /// `c_V`, excess of the viscous friction when cold, -0.9 to 10.
@@ -58,6 +61,7 @@ impl<const N: usize> FrictionVariation<N> {
             periods_per_revolution: 1.0,
             phase_rad: Vector::zeros(),
             direction_fraction: Vector::zeros(),
+            gear_fraction: 0.0,
             cold_dry_fraction: 0.0,
             cold_viscous_fraction: 0.0,
             warm_up_s: 600.0,
@@ -112,6 +116,13 @@ impl<const N: usize> FrictionVariation<N> {
             let must = "from -0.5 to 0.5";
             check("direction_fraction", d, (-0.5..=0.5).contains(&d), must)?;
         }
+        let g = self.gear_fraction;
+        check(
+            "gear_fraction",
+            g,
+            (0.0..=0.5).contains(&g),
+            "from 0 to 0.5",
+        )?;
         let must = "from -0.9 to 10";
         let range = -0.9..=10.0;
         let c = self.cold_dry_fraction;

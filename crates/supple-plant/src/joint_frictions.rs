@@ -48,10 +48,12 @@ impl<const N: usize> JointFrictions<N> {
         self.motor_bristles_rad = [0.0; N];
     }
 
-    /// Advances the friction of the joints by `dt_s`; returns their torque, positive against positive motion \[N m\].
+    /// Advances the friction of the joints by `dt_s` while the motors transmit `motor_nm`; returns their torque, positive
+    /// against positive motion \[N m\].
     pub fn joints_nm(
         &mut self,
         (q, qd): (&Vector<N>, &Vector<N>),
+        motor_nm: &Vector<N>,
         poses: &[Pose; N],
         time_s: f64,
         dt_s: f64,
@@ -70,8 +72,12 @@ impl<const N: usize> JointFrictions<N> {
         Vector::from_fn(|i, _| {
             let friction = &self.joints[i];
             let speed = qd[i] / friction.stribeck_rad_per_s;
+            let geared = match friction.coulomb_nm > 0.0 {
+                true => variation.gear_fraction * motor_nm[i].abs() / friction.coulomb_nm,
+                false => 0.0,
+            };
             let scale = FrictionScale {
-                dry: warm.dry * variation.dry_factor(i, q[i], speed),
+                dry: warm.dry * (variation.dry_factor(i, q[i], speed) + geared),
                 ..warm
             };
             let bristle = &mut self.joint_bristles_rad[i];

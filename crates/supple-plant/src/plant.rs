@@ -296,7 +296,7 @@ impl<const N: usize> Plant<N> {
             self.actuators.motor_torque(applied, &motor_q) + self.actuators.braking(&motor_qd);
         let time_s = self.truth.time_s;
         let frictions = &mut self.frictions;
-        let mut friction = frictions.joints_nm((&q, &qd), &self.poses, time_s, dt_s);
+        let mut friction = frictions.joints_nm((&q, &qd), &motor, &self.poses, time_s, dt_s);
         let at_motors = frictions.motors_nm(&motor_qd, time_s, dt_s);
         let on_rotors = at_motors.map_or(motor, |friction| motor - friction);
         let transmitted = match &mut self.rotors {

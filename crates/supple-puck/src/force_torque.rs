@@ -5,10 +5,11 @@
 //! [`SensorStatus::TARING`]. Source: libbarrett, OWD, btclient. libbarrett relies on neither role nor version of
 //! this puck, which has a single property list.
 
-use crate::frame::{CanFrame, LengthError};
+use crate::frame::LengthError;
 use crate::id::{GroupId, MessageId, NodeId};
 use crate::property::{self, Property, PropertyId, PropertyTable, Value};
 use core::fmt;
+use supple_can_frame::CanFrame;
 
 /// Quantity of a sensor frame, with the value of one count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -122,7 +123,7 @@ impl SensorReading {
         let (bytes, status) = match *frame.payload() {
             [a, b, c, d, e, f] => ([a, b, c, d, e, f], None),
             [a, b, c, d, e, f, status] => ([a, b, c, d, e, f], Some(SensorStatus(status))),
-            _ => return Err(frame.wrong_length(&[6, 7])),
+            _ => return Err(LengthError::of(frame, &[6, 7])),
         };
         let [a, b, c, d, e, f] = bytes;
         let counts = [[a, b], [c, d], [e, f]].map(i16::from_le_bytes);
@@ -138,8 +139,8 @@ impl SensorReading {
         let id = MessageId::to_group(from, self.quantity.group());
         let [[a, b], [c, d], [e, f]] = self.counts.map(i16::to_le_bytes);
         match self.status {
-            None => CanFrame::of(id, [a, b, c, d, e, f]),
-            Some(status) => CanFrame::of(id, [a, b, c, d, e, f, status.0]),
+            None => CanFrame::of(id.can_id(), [a, b, c, d, e, f]),
+            Some(status) => CanFrame::of(id.can_id(), [a, b, c, d, e, f, status.0]),
         }
     }
 }

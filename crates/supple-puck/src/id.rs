@@ -4,6 +4,7 @@
 //! and libbarrett's masks; libbarrett for the meaning of the groups.
 
 use core::fmt;
+use supple_can_frame::{CanFrame, CanId};
 
 const GROUP_BIT: u16 = 0x400;
 const FROM_SHIFT: u16 = 5;
@@ -186,6 +187,19 @@ impl MessageId {
         }
     }
 
+    /// Id of a frame; `None` for a frame that is not of this protocol: one with an extended id, or an FD frame.
+    pub const fn of(frame: &CanFrame) -> Option<MessageId> {
+        match frame.id().as_standard() {
+            Some(raw) if !frame.is_fd() => Some(MessageId(raw)),
+            _ => None,
+        }
+    }
+
+    /// The id of a frame.
+    pub const fn can_id(self) -> CanId {
+        CanId::standard_masked(self.0)
+    }
+
     /// Number on the bus, 0 to 0x7FF.
     pub const fn raw(self) -> u16 {
         self.0
@@ -204,6 +218,12 @@ impl MessageId {
         } else {
             Destination::Group(GroupId(number))
         }
+    }
+}
+
+impl From<MessageId> for CanId {
+    fn from(id: MessageId) -> CanId {
+        id.can_id()
     }
 }
 

@@ -1,11 +1,12 @@
 //! Frames that the host receives, distinguished by destination group.
 
 use crate::force_torque::{Quantity, SensorReading};
-use crate::frame::{CanFrame, LengthError};
-use crate::id::{Destination, GroupId, NodeId};
+use crate::frame::LengthError;
+use crate::id::{Destination, GroupId, MessageId, NodeId};
 use crate::position::PositionReply;
 use crate::property::{PropertyError, Reply};
 use core::fmt;
+use supple_can_frame::CanFrame;
 
 /// A parsed frame of a node of the arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,6 +25,8 @@ pub enum Inbound {
 /// Errors of parsing a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InboundError {
+    /// The frame has an extended id or is an FD frame.
+    Foreign,
     /// The sender is node 0: another host, or an echo.
     FromHost,
     /// A position of the wrong length, from this node.
@@ -37,6 +40,9 @@ pub enum InboundError {
 impl fmt::Display for InboundError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            InboundError::Foreign => {
+                f.write_str("frame is extended or FD, expected a classic one with an 11-bit id")
+            }
             InboundError::FromHost => f.write_str("frame is from node 0, expected 1 to 31"),
             InboundError::Position(node, error) => {
                 write!(f, "position of node {}: {error}", node.number())
@@ -59,7 +65,8 @@ impl Inbound {
     /// # Errors
     /// See [`InboundError`].
     pub fn parse(frame: &CanFrame) -> Result<(NodeId, Inbound), InboundError> {
-        let from = frame.id().from();
+        let id = MessageId::of(frame).ok_or(InboundError::Foreign)?;
+        let from = id.from();
         if from == NodeId::HOST {
             return Err(InboundError::FromHost);
         }
@@ -67,7 +74,7 @@ impl Inbound {
             Ok(reading) => Ok(Inbound::Sensor(reading)),
             Err(error) => Err(InboundError::Sensor(from, error)),
         };
-        let inbound = match frame.id().to() {
+        let inbound = match id.to() {
             Destination::Group(GroupId::POSITION) => PositionReply::parse(frame)
                 .map(Inbound::Position)
                 .map_err(|error| InboundError::Position(from, error))?,

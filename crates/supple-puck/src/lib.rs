@@ -4,11 +4,12 @@
 //! polling sequence is defined elsewhere. Parsing a frame may fail, and the error names the value found and the
 //! one expected; encoding cannot fail, because the types hold only encodable values.
 //!
-//! The bus is classical CAN 2.0A with 11-bit ids at 1 Mbit/s. The facts come from Barrett's libbarrett (2018)
+//! The bus is classical CAN 2.0A with 11-bit ids at 1 Mbit/s; other frames are not parsed. The facts come from Barrett's libbarrett (2018)
 //! and btclient (2013), OWD (2015) and the WAM Arm User's Manual D1001 (2008); each module names its sources.
 //!
 //! ```
-//! use supple_puck::{CanFrame, Counts, GroupId, MessageId, NodeId, PositionReply};
+//! use supple_can_frame::CanFrame;
+//! use supple_puck::{Counts, GroupId, MessageId, NodeId, PositionReply};
 //!
 //! let id = MessageId::to_group(NodeId::joint(1).unwrap(), GroupId::POSITION);
 //! let frame = CanFrame::new(id, &[0x00, 0x10, 0x00])?;
@@ -27,10 +28,8 @@ pub mod position;
 pub mod property;
 pub mod safety;
 pub mod status;
-pub mod timing;
 pub mod torque;
 
-pub use frame::CanFrame;
 pub use id::{Destination, GroupId, MessageId, NodeId};
 pub use inbound::Inbound;
 pub use position::{Counts, PositionReply, PositionScale};

@@ -5,10 +5,11 @@
 //! of each triple are documented as zero; libbarrett has disabled its check of them, and all public
 //! implementations ignore them, as does this one. Source: libbarrett, btclient, OWD, manual.
 
-use crate::frame::{CanFrame, LengthError};
+use crate::frame::LengthError;
 use crate::id::{GroupId, MessageId, NodeId};
 use core::f64::consts::TAU;
 use core::fmt;
+use supple_can_frame::CanFrame;
 
 /// An encoder's position, -2 097 152 to 2 097 151 counts: the range of 22 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -151,7 +152,7 @@ impl PositionReply {
                 motor: Counts::parse([a, b, c]),
                 joint: Some(Counts::parse([d, e, f])),
             }),
-            _ => Err(frame.wrong_length(&[3, 6])),
+            _ => Err(LengthError::of(frame, &[3, 6])),
         }
     }
 
@@ -160,10 +161,10 @@ impl PositionReply {
         let id = MessageId::to_group(from, GroupId::POSITION);
         let [a, b, c] = self.motor.emit();
         match self.joint {
-            None => CanFrame::of(id, [a, b, c]),
+            None => CanFrame::of(id.can_id(), [a, b, c]),
             Some(joint) => {
                 let [d, e, f] = joint.emit();
-                CanFrame::of(id, [a, b, c, d, e, f])
+                CanFrame::of(id.can_id(), [a, b, c, d, e, f])
             }
         }
     }

@@ -5,10 +5,11 @@
 //! bias. (libbarrett rounds down, a bias of half a unit.) They saturate at +-8191 units, as in libbarrett.
 //! Source: libbarrett, manual.
 
-use crate::frame::{CanFrame, LengthError};
+use crate::frame::LengthError;
 use crate::id::{GroupId, MessageId, NodeId};
 use crate::property::{PropertyId, SET_BIT};
 use core::fmt;
+use supple_can_frame::CanFrame;
 
 /// A torque in a puck's units, -8192 to 8191; a host commands at most +-8191. 1024 units are 1 A.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -163,7 +164,7 @@ impl PackedTorques {
     /// A payload that is not eight bytes, or starts with a request byte.
     pub fn parse(frame: &CanFrame) -> Result<PackedTorques, PackedTorquesError> {
         let Ok([head, rest @ ..]) = <[u8; 8]>::try_from(frame.payload()) else {
-            return Err(PackedTorquesError::Length(frame.wrong_length(&[8])));
+            return Err(PackedTorquesError::Length(LengthError::of(frame, &[8])));
         };
         if head & SET_BIT == 0 {
             return Err(PackedTorquesError::NotASet(head));
@@ -184,7 +185,7 @@ impl PackedTorques {
             .fold(0, |bits, torque| bits << 14 | torque.low_14_bits());
         let [_, a, b, c, d, e, f, g] = bits.to_be_bytes();
         CanFrame::of(
-            MessageId::to_group(NodeId::HOST, group),
+            MessageId::to_group(NodeId::HOST, group).can_id(),
             [self.property.number() | SET_BIT, a, b, c, d, e, f, g],
         )
     }

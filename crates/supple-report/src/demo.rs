@@ -15,7 +15,7 @@ use supple_model::Description;
 /// # Errors
 /// [`Failure`]; [`Failure::Fault`] after all results are written.
 pub fn run(args: &DemoArgs) -> Result<(), Failure> {
-    let arm = arms::find(&args.arm, args.strict)?;
+    let arm = arms::find(&args.urdf.name(&args.arm), args.strict)?;
     let model = args
         .model
         .as_ref()

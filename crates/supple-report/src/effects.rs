@@ -32,7 +32,7 @@ struct Row<'a> {
 /// # Errors
 /// [`Failure`].
 pub fn run(args: &EffectsArgs) -> Result<(), Failure> {
-    let arm = arms::find(&args.arm, args.strict)?;
+    let arm = arms::find(&args.urdf.name(&args.arm), args.strict)?;
     let mut chosen = effects();
     if !args.only.is_empty() {
         chosen.retain(|effect| args.only.iter().any(|text| effect.name.contains(&**text)));

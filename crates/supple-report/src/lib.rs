@@ -9,6 +9,7 @@ mod demo;
 mod effects;
 pub mod figures;
 mod identification;
+mod new_arm;
 mod plot;
 mod progress;
 pub mod report;
@@ -45,6 +46,7 @@ fn dispatch(command: &OfflineCommand) -> Result<(), Failure> {
         OfflineCommand::Demo(args) => demo::run(args),
         OfflineCommand::Effects(args) => effects::run(args),
         OfflineCommand::Identification(command) => identification::run(command),
+        OfflineCommand::New(args) => new_arm::run(args),
         OfflineCommand::Log(LogCommand::Plot(args)) => plot::run(args),
         OfflineCommand::Log(LogCommand::Data(command)) => log::run(command),
         OfflineCommand::Arms(args) => arms::run(args),

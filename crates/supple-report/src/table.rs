@@ -93,6 +93,11 @@ fn free_motion(summary: &Summary) -> Vec<Line> {
             "",
         ),
         line(
+            "  with finite acceleration at its corners",
+            rms(&[&summary.quadrant_corner_ramp.tracking]),
+            "",
+        ),
+        line(
             &format!(
                 "  at {:.3} m/s: exact, perturbed model",
                 summary.quadrant.speed_m_per_s

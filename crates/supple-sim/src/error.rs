@@ -1,7 +1,7 @@
 //! Errors of the simulation process.
 
+use supple_drive::{LoopError, Overload};
 use supple_ipc::IpcError;
-use supple_ipc::message::MessageError;
 use supple_model::ModelError;
 use supple_plant::{InjectionError, PlantError, PlantOptionsError, TraceError};
 use supple_realtime::StopError;
@@ -27,9 +27,12 @@ pub enum SimError {
     /// Shared memory.
     #[error(transparent)]
     Ipc(#[from] IpcError),
-    /// A command for another arm.
+    /// The plant loop cannot continue.
     #[error(transparent)]
-    Message(#[from] MessageError),
+    Loop(#[from] LoopError),
+    /// The period is too short.
+    #[error(transparent)]
+    Rate(#[from] Overload),
     /// Signals.
     #[error(transparent)]
     Stop(#[from] StopError),
@@ -41,9 +44,9 @@ impl SimError {
     pub fn code(&self) -> u8 {
         match self {
             SimError::Injection(_) => 2,
-            SimError::Model(_) | SimError::Plant(_) | SimError::Options(_) => 3,
+            SimError::Model(_) | SimError::Plant(_) | SimError::Options(_) | SimError::Rate(_) => 3,
             SimError::Trace(_) => 6,
-            SimError::Ipc(_) | SimError::Message(_) => 10,
+            SimError::Ipc(_) | SimError::Loop(_) => 10,
             SimError::Stop(_) => 1,
         }
     }

@@ -1,25 +1,25 @@
 //! The simulated arm as a process: same messages and clock as a real one, no bus.
 //!
-//! It owns the clock. In real time each cycle starts at its scheduled time, whatever the controller does; when the host
-//! stalls, simulated time pauses; a missing answer is handled as the drives of a real arm would ([`Motors`]). In
-//! virtual time each cycle waits for its answer, so results are reproducible bit for bit and the run is as fast as both
-//! processes allow.
+//! It owns the clock, and runs the plant loop and the guard of every arm ([`supple_drive`]): a lost controller ends as
+//! on a real arm. In real time each cycle starts at its scheduled time, whatever the controller does; when the host
+//! stalls, simulated time pauses. In virtual time each cycle waits for its answer, so results are reproducible bit for
+//! bit and the run is as fast as both processes allow.
 //!
 //! It does not depend on the controller: it sends what an arm reports, and receives torques.
 
 mod error;
-mod motors;
 mod options;
-mod simulation_loop;
+mod simulated;
+mod simulation;
 
 pub use error::SimError;
-pub use motors::Motors;
 pub use options::Options;
-pub use simulation_loop::{SimulationLoop, Summary};
+pub use simulated::SimulatedArm;
+pub use simulation::{Simulation, Summary, run as run_simulation, simulation};
 
 use clap::Parser;
 use std::process::ExitCode;
-use supple_core::drive_guard::DriveGuard;
+use supple_drive::SharedMemoryLink;
 use supple_ipc::{Domain, PlantLink};
 use supple_model::{Description, with_dof};
 use supple_plant::{Plant, PlantConfig, PlantOptions, Scene, TraceFile};
@@ -80,23 +80,22 @@ pub fn run<const N: usize>(
         config.scene = Scene::with_block_at(face_m);
     }
     let home_rad = description.home::<N>()?;
-    let motors = Motors::new(config.cycle_s, DriveGuard::new(&description.config()?));
     let plant = Plant::new(config, home_rad, supple_core::Vector::zeros())?;
     let domain = Domain::new(options.prefix.as_deref())?;
     let link = PlantLink::new(&domain)?;
-    let mut simulation = SimulationLoop::new(plant, motors, link);
-    simulation.inject(&options.inject)?;
+    let mut link = SharedMemoryLink::new(link, options.virtual_time, stop.clone());
+    let mut arm = SimulatedArm::new(plant, options.virtual_time, options.answer_share);
+    arm.inject(&options.inject)?;
     if let Some(file) = &options.trace {
-        simulation.trace(TraceFile::create(file, N)?);
+        arm.trace(TraceFile::create(file, N)?);
     }
     for realtime_warning in apply_realtime_settings(&options.realtime()) {
         diagnostics::post(format_args!("supple-sim: warning: {realtime_warning}"));
     }
-    simulation.spin(spin_duration(options.spin_us));
-    let result = match options.virtual_time {
-        true => simulation.run_in_virtual_time(options.cycles, stop),
-        false => simulation.run_in_real_time(options.cycles, options.answer_share, stop),
-    };
+    link.spin(spin_duration(options.spin_us));
+    let mut simulation = simulation(arm, link, &description.config()?)?;
+    let result = run_simulation(&mut simulation, options.cycles, options.virtual_time, stop);
     let summary = result?;
-    simulation.end_trace().map(|()| summary)
+    simulation.drive_mut().end_trace()?;
+    Ok(summary)
 }

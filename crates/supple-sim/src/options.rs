@@ -34,7 +34,7 @@ pub struct Options {
     /// Writes joint torques and tip forces to a CSV file every millisecond.
     #[arg(long, value_name = "FILE")]
     pub trace: Option<PathBuf>,
-    /// Effects of a real arm, as TOML; `supple plant list` has all options.
+    /// Effects of a real arm, as TOML, or a built-in set by name; `supple plant list` has all options.
     #[arg(long, value_name = "FILE", conflicts_with = "realistic")]
     pub plant_options: Option<PathBuf>,
     /// All effects of a real arm, each of modest size: `supple plant show realistic`.

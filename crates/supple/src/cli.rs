@@ -1,10 +1,11 @@
 //! Definition of the command-line arguments.
 
+use crate::view::ViewArgs;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use std::path::PathBuf;
 use supple_bus::Address;
-use supple_cli::arguments::{OfflineCommand, PlantArgs};
+use supple_cli::arguments::{OfflineCommand, PlantArgs, UrdfArgs};
 use supple_cli::exit::CODES;
 use supple_cli::range::between;
 use supple_plant::Injection;
@@ -29,6 +30,9 @@ pub enum Command {
     Up(UpArgs),
     /// Show the state of a running system.
     Status(SystemArgs),
+    /// Show a running system, or a log, on a page in the browser; viewers of the Foxglove protocol can connect too.
+    #[command(after_help = CODES)]
+    View(ViewArgs),
     /// Put a running system into a mode.
     Mode(ModeArgs),
     /// Change stiffness and damping of a running system, along a ramp.
@@ -59,6 +63,10 @@ pub enum Command {
         #[arg(long, value_name = "NAME")]
         prefix: Option<String>,
     },
+    /// List the motors of an arm on their bus, compare them with the arm's file and, asked explicitly, set registers; for
+    /// arms of Damiao motors.
+    #[command(after_help = CODES)]
+    Motors(MotorsArgs),
     /// Test simulated arms against process failures, faults, collisions and invalid requests, and compare each result
     /// with the expected one.
     #[command(after_help = CODES)]
@@ -146,6 +154,41 @@ pub enum PlantKind {
     Can,
 }
 
+/// Arguments of `motors`.
+#[derive(Clone, Debug, Args)]
+pub struct MotorsArgs {
+    /// A built-in arm with `[bus]`, or the path of an arm's TOML or of its folder.
+    #[arg(long, value_name = "NAME|PATH", default_value = "openarm")]
+    pub arm: String,
+    /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
+    #[arg(long)]
+    pub strict: bool,
+    /// can:NAME or unix:FOLDER; default: the bus of an emulated arm with the prefix.
+    #[arg(long, value_name = "BUS")]
+    pub bus: Option<Address>,
+    /// Prefix of an emulated arm. Default: SUPPLE_PREFIX or `supple`.
+    #[arg(long, value_name = "NAME")]
+    pub prefix: Option<String>,
+    /// Only the motor with this id.
+    #[arg(long, value_name = "ID")]
+    pub motor: Option<u16>,
+    /// Read all registers.
+    #[arg(long)]
+    pub registers: bool,
+    /// Set a register by name or number, as in TIMEOUT=400; lost when the motor's supply is switched off. May be repeated.
+    #[arg(long, value_name = "NAME=VALUE", requires = "motor")]
+    pub set: Vec<String>,
+    /// Clear the latched error.
+    #[arg(long, requires = "motor")]
+    pub clear: bool,
+    /// Store all registers of the motor in its flash, which endures some 10000 writes.
+    #[arg(long, requires = "motor")]
+    pub store: bool,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
 /// Arguments of `drill`.
 #[derive(Clone, Debug, Args)]
 pub struct DrillArgs {
@@ -165,12 +208,15 @@ pub struct DrillArgs {
     /// Also write the result table as Markdown.
     #[arg(long, value_name = "FILE")]
     pub markdown: Option<PathBuf>,
-    /// A built-in arm (see `supple arms`), or the path of an arm's TOML or of its folder.
+    /// A built-in arm (see `supple arms`), or the path of an arm's TOML, of its folder, or of a URDF.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
+    /// What a URDF alone does not say.
+    #[command(flatten)]
+    pub urdf: UrdfArgs,
     /// Run without real-time priority and without locked memory.
     #[arg(long)]
     pub no_realtime: bool,
@@ -259,18 +305,24 @@ pub struct UpArgs {
     /// Plant to run.
     #[arg(long, value_enum)]
     pub plant: PlantKind,
-    /// A built-in arm (see `supple arms`), or the path of an arm's TOML or of its folder.
+    /// A built-in arm (see `supple arms`), or the path of an arm's TOML, of its folder, or of a URDF.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
+    /// What a URDF alone does not say.
+    #[command(flatten)]
+    pub urdf: UrdfArgs,
     /// Trajectory: the arm moves to its start and then follows it.
     #[arg(long, value_enum, default_value = "sinusoid")]
     pub track: UpTrajectory,
     /// The arm's bus, can:NAME or unix:FOLDER. Default: can:can0 for `can`, private sockets for `emu`.
     #[arg(long, value_name = "BUS")]
     pub bus: Option<Address>,
+    /// Print the bus time of a cycle of this arm at the requested rate and end; the exit code tells whether it fits.
+    #[arg(long)]
+    pub budget: bool,
     /// Declare that the arm is in its home pose now; used if the motor pucks have lost their positions. An emulated
     /// arm always starts there.
     #[arg(long)]
@@ -310,6 +362,9 @@ pub struct UpArgs {
     /// Write no log.
     #[arg(long, conflicts_with = "log")]
     pub no_log: bool,
+    /// Also start the live page and print its URL, as `supple view` does.
+    #[arg(long, conflicts_with = "virtual_time")]
+    pub view: bool,
     /// Prefix of the new system. Default: SUPPLE_PREFIX or `supple`.
     #[arg(long, value_name = "NAME")]
     pub prefix: Option<String>,
@@ -373,6 +428,9 @@ pub struct TrackArgs {
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
+    /// What a URDF alone does not say.
+    #[command(flatten)]
+    pub urdf: UrdfArgs,
     /// System to use.
     #[command(flatten)]
     pub system: SystemArgs,
@@ -385,6 +443,7 @@ impl Command {
             Command::Offline(command) => command.json(),
             Command::Up(args) => args.json,
             Command::Drill(args) => args.json,
+            Command::View(args) => args.json,
             Command::Mode(ModeArgs { system, .. })
             | Command::Gains(GainsArgs { system, .. })
             | Command::Learning(LearningArgs {
@@ -401,6 +460,7 @@ impl Command {
             | Command::Stop(system) => system.json,
             // Its output is already JSON; its errors are plain text.
             Command::Pendant { .. } => false,
+            Command::Motors(args) => args.json,
             Command::Doctor { json } => *json,
             Command::Completions { .. } => false,
             Command::Man { json, .. } => *json,

@@ -5,18 +5,21 @@
 
 #![forbid(unsafe_code)]
 
+mod calibrate;
 mod cli;
 mod doctor;
 mod drill;
 mod man;
+mod motors;
 mod operate;
 mod up;
+mod view;
 
 use clap::{CommandFactory, Parser};
 use cli::{Cli, Command};
 use std::os::unix::process::CommandExt;
 use std::process::ExitCode;
-use supple_cli::arguments::{LogCommand, OfflineCommand};
+use supple_cli::arguments::{IdentificationCommand, LogCommand, OfflineCommand};
 use supple_cli::exit::Failure;
 use supple_cli::sibling::program_beside;
 use supple_cli::{arms, console, interrupt, log};
@@ -33,15 +36,24 @@ pub fn run() -> ExitCode {
 }
 
 fn dispatch(command: &Command) -> Result<(), Failure> {
+    if let Command::Offline(OfflineCommand::Identification(command)) = command
+        && let IdentificationCommand::Calibrate(args) = command
+        && let Some(on) = args.on
+    {
+        return calibrate::run(args, on);
+    }
     match command {
         Command::Offline(
             OfflineCommand::Demo(_)
             | OfflineCommand::Effects(_)
+            | OfflineCommand::New(_)
             | OfflineCommand::Log(LogCommand::Plot(_))
             | OfflineCommand::Identification(_),
         ) => Err(exec_report()),
+        Command::View(args) => view::run(args),
         Command::Up(args) => up::run(args),
         Command::Drill(args) => drill::run(args),
+        Command::Motors(args) => motors::run(args),
         Command::Status(system) => operate::status(system),
         Command::Mode(args) => operate::mode(args),
         Command::Gains(args) => operate::gains(args),

@@ -71,11 +71,12 @@ def identify(
     *,
     rate_hz: float | None = None,
     keep_every: int = 1,
-    torque_delay_s: float = 0.0,
+    torque_delay_s: float | None = None,
     rotor: bool = True,
     slow_rad_per_s: float | None = None,
     prior_weight: float | None = None,
     joint_noise_nm: ArrayLike | None = None,
+    accept_wrong_logs: bool = False,
 ) -> Fit:
     """Identify an arm from one or several logs.
 
@@ -117,9 +118,10 @@ def identify(
         Rate of the regular grid to which the log is resampled (Hz). Default: the log's own mean rate.
     keep_every : int
         Decimation factor: every n-th sample of the grid is used.
-    torque_delay_s : float
-        Delay of the logged torque relative to the angle (s); 1.5 periods for commands that act during
-        the next cycle.
+    torque_delay_s : float, optional
+        Time from a logged torque to its action (s), either sign: 1.5 periods for commands that act during
+        the next cycle, negative for measured torques that lag. Default: estimated by cross-validation;
+        zero if ``qdd`` is given.
     rotor : bool
         Whether to fit a rotor inertia for each moving joint; otherwise those of ``arm`` are taken as
         known.
@@ -130,6 +132,9 @@ def identify(
         Weight of the nominal model, in equivalent observations. Default: by cross-validation.
     joint_noise_nm : array_like, (M,), optional
         Noise of each moving joint's torque (N m), instead of weights from residuals.
+    accept_wrong_logs : bool
+        Whether to fit a log although its checks against ``arm`` found an error (units, signs, order, zeros,
+        clock); what they found is then a warning.
 
     Returns
     -------
@@ -193,6 +198,7 @@ def identify(
             "rotor": rotor,
             "slow_rad_per_s": slow_rad_per_s,
             "prior_weight": prior_weight,
+            "accept_wrong_logs": accept_wrong_logs,
             "joint_noise_nm": _optional_list(joint_noise_nm),
         },
     )

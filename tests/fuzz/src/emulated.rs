@@ -47,7 +47,6 @@ pub fn pendant_line(data: &[u8]) {
 pub fn arm_bus(data: &[u8]) {
     let mut emulator = emulator();
     for raw in data.chunks_exact(CAN_FRAME_BYTES).take(FRAMES) {
-        let raw: &[u8; CAN_FRAME_BYTES] = raw.try_into().expect("exact chunks");
         match WireFrame::parse(raw) {
             WireFrame::Data(frame) => {
                 assert_eq!(

@@ -10,6 +10,7 @@
 
 pub mod arms;
 pub mod bytes;
+pub mod damiao;
 pub mod emulated;
 pub mod logs;
 pub mod messages;
@@ -33,7 +34,7 @@ pub struct Target {
 }
 
 /// All targets.
-pub const TARGETS: [Target; 18] = [
+pub const TARGETS: [Target; 20] = [
     target("inbound", pucks::inbound, 100_000),
     target("property", pucks::property, 100_000),
     target("position", pucks::position, 100_000),
@@ -52,6 +53,8 @@ pub const TARGETS: [Target; 18] = [
     target("csv", tables::csv, 3_000),
     target("pendant_line", emulated::pendant_line, 300),
     target("arm_bus", emulated::arm_bus, 300),
+    target("damiao_reply", damiao::damiao_reply, 100_000),
+    target("damiao_request", damiao::damiao_request, 100_000),
 ];
 
 const fn target(name: &'static str, body: fn(&[u8]), mutations: u32) -> Target {

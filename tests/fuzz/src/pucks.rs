@@ -1,12 +1,13 @@
 //! Frames of the arm's bus, one target per decoder.
 
+use supple_can_frame::{CanFrame, timing};
 use supple_puck::force_torque::{Quantity, SensorReading};
 use supple_puck::property::Reply;
 use supple_puck::safety::{PenWord, Pendant, SafetyMode, SpeedLimit};
 use supple_puck::status::{MotorMode, Role, Stat};
 use supple_puck::{
-    CanFrame, GroupId, Inbound, PackedTorques, PositionReply, PropertyMessage, PropertyTable,
-    PuckKind, timing,
+    GroupId, Inbound, MessageId, PackedTorques, PositionReply, PropertyMessage, PropertyTable,
+    PuckKind,
 };
 
 /// Builds a frame: two bytes of id, then the payload.
@@ -18,13 +19,18 @@ fn frame(data: &[u8]) -> Option<CanFrame> {
     frame.ok()
 }
 
+/// Id of a frame that [`frame`] has built.
+fn id_of(frame: &CanFrame) -> MessageId {
+    MessageId::of(frame).expect("a classic frame with an 11-bit id")
+}
+
 /// Any frame that reaches the host.
 pub fn inbound(data: &[u8]) {
     let Some(frame) = frame(data) else {
         return;
     };
     if let Ok((node, _)) = Inbound::parse(&frame) {
-        assert_eq!(node, frame.id().from());
+        assert_eq!(node, id_of(&frame).from());
     }
     let bits = timing::bits(&frame);
     assert!(bits >= timing::min_bits(frame.dlc()) && bits <= timing::max_bits(frame.dlc()));
@@ -39,7 +45,10 @@ pub fn property(data: &[u8]) {
         assert!(Reply::parse(&frame).is_err());
         return;
     };
-    assert_eq!(message.emit(frame.id().from(), frame.id().to()), frame);
+    assert_eq!(
+        message.emit(id_of(&frame).from(), id_of(&frame).to()),
+        frame
+    );
     if let PropertyMessage::Set(id, value) = message {
         for kind in [PuckKind::Motor, PuckKind::Safety, PuckKind::ForceTorque] {
             if let Ok(table) = PropertyTable::of_firmware(kind, value.get()) {
@@ -55,7 +64,7 @@ pub fn position(data: &[u8]) {
         return;
     };
     if let Ok(reply) = PositionReply::parse(&frame) {
-        let again = reply.emit(frame.id().from());
+        let again = reply.emit(id_of(&frame).from());
         assert_eq!(PositionReply::parse(&again), Ok(reply));
     }
 }
@@ -78,7 +87,7 @@ pub fn force_torque(data: &[u8]) {
     };
     for quantity in [Quantity::Force, Quantity::Torque, Quantity::Acceleration] {
         if let Ok(reading) = SensorReading::parse(quantity, &frame) {
-            let again = reading.emit(frame.id().from());
+            let again = reading.emit(id_of(&frame).from());
             assert_eq!(again.payload(), frame.payload());
             assert_eq!(quantity.counts(reading.components()), Ok(reading.counts));
         }

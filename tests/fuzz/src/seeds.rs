@@ -8,6 +8,7 @@ use crate::bytes::bytes_of;
 use crate::logs;
 use crate::requests::{at_rest, controller};
 use supple_bus::WireFrame;
+use supple_can_frame::CanFrame;
 use supple_core::config::Gains;
 use supple_core::controller::{Breakaway, Request};
 use supple_core::dynamics::tip_pose;
@@ -20,7 +21,6 @@ use supple_ipc::message::{
     Text, TorqueCommand,
 };
 use supple_model::Description;
-use supple_puck::CanFrame;
 
 /// Name and bytes of an input.
 pub type Seed = (String, Vec<u8>);
@@ -57,6 +57,8 @@ pub fn of(target: &str) -> Vec<Seed> {
             text("times", "idle@0.001\nactivate@held+0.002\nstatus\n"),
         ],
         "arm_bus" => bus(),
+        "damiao_reply" => frames(&[DAMIAO_FEEDBACK, DAMIAO_REGISTER]),
+        "damiao_request" => frames(&[DAMIAO_COMMAND, DAMIAO_SET_ZERO, DAMIAO_READ]),
         other => panic!("no target {other}"),
     }
 }
@@ -67,6 +69,11 @@ const REPLY: &[u8] = &[0x26, 0x04, 0x85, 0x00, 0x02, 0x00];
 const SET: &[u8] = &[0x01, 0x00, 0x88, 0x00, 0x02, 0x00];
 const GET: &[u8] = &[0x01, 0x00, 0x05];
 const TORQUES: &[u8] = &[0x01, 0x04, 0xaa, 0x00, 0x10, 0x20, 0x30, 0x40, 0x50, 0x60];
+const DAMIAO_FEEDBACK: &[u8] = &[0x13, 0x00, 0x13, 0x7f, 0x3b, 0x7f, 0xf8, 0x00, 0x1a, 0x19];
+const DAMIAO_REGISTER: &[u8] = &[0x13, 0x00, 0x03, 0x00, 0x33, 0x0e, 0x37, 0x30, 0x33, 0x38];
+const DAMIAO_COMMAND: &[u8] = &[0x03, 0x00, 0x7a, 0xe1, 0x83, 0x32, 0x8f, 0x40, 0x07, 0x24];
+const DAMIAO_SET_ZERO: &[u8] = &[0x02, 0x00, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xfe];
+const DAMIAO_READ: &[u8] = &[0xff, 0x07, 0x03, 0x00, 0x33, 0x09, 0x00, 0x00, 0x00, 0x00];
 const FORCE: &[u8] = &[0x0a, 0x05, 0x01, 0x00, 0x02, 0x00, 0xff, 0xff];
 const FORCE_AND_STATUS: &[u8] = &[0x0a, 0x05, 0x01, 0x00, 0x02, 0x00, 0xff, 0xff, 0x00];
 
@@ -280,7 +287,7 @@ fn bus() -> Vec<Seed> {
             let id = u32::from(u16::from_le_bytes([bytes[0], bytes[1]]));
             WireFrame::data(&CanFrame::from_raw(id, &bytes[2..]).expect("a frame"))
         });
-        raw.flatten().collect()
+        raw.flat_map(|raw| raw.to_vec()).collect()
     };
     let positions: &[u8] = &[0x04, 0x04, 0x30];
     vec![

@@ -87,7 +87,7 @@ macro_rules! targets {
 targets! {
     inbound property position torque force_torque pendant values
     arm_state torque_command telemetry operator_request
-    log log_schema urdf toml csv pendant_line arm_bus
+    log log_schema urdf toml csv pendant_line arm_bus damiao_reply damiao_request
 }
 
 /// Writes the valid inputs of every target, one folder per target.

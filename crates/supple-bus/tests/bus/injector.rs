@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use supple_bus::virtual_time::{DirectBus, Peer};
 use supple_bus::{Bus, BusFault, Event, FaultInjector, FaultKind, FaultRule, Traffic};
-use supple_puck::{CanFrame, MessageId};
+use supple_can_frame::{CanFrame, CanId};
 
 /// Records the frames that the host sends, and gives the host its scripted events.
 #[derive(Default)]
@@ -170,7 +170,7 @@ fn bus_off_blocks_all_frames_and_reports_start_and_end() {
 #[test]
 fn rules_affect_only_their_frames() {
     let mut bus = FaultInjector::new(DirectBus(ScriptedPeer::default()), 1);
-    let torques = |id: MessageId| id.raw() == 0x401;
+    let torques = |id: CanId| id.raw() == 0x401;
     bus.add(FaultRule::always(Traffic::Sent, FaultKind::SilentLoss).only(torques));
     bus.send(&frame(0x401, &[0xaa; 8])).unwrap();
     bus.send(&frame(0x404, &[0x30])).unwrap();

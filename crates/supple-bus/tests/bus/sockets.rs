@@ -3,7 +3,7 @@
 use std::os::unix::fs::PermissionsExt;
 use supple_bus::virtual_time::LockstepBus;
 use supple_bus::{Bus, BusError, BusFault, DatagramBus, Event, OwnerFolder, Side, SocketCan};
-use supple_puck::CanFrame;
+use supple_can_frame::CanFrame;
 
 fn mode(path: &std::path::Path) -> u32 {
     std::fs::metadata(path).unwrap().permissions().mode() & 0o777

@@ -3,7 +3,7 @@
 use crate::property::config;
 use proptest::prelude::*;
 use supple_bus::{BusFault, WireFrame};
-use supple_puck::CanFrame;
+use supple_can_frame::{CanFrame, CanId};
 
 proptest! {
     #![proptest_config(config(256, 20_260_303))]
@@ -15,18 +15,41 @@ proptest! {
     }
 
     #[test]
-    fn parsed_data_frames_are_re_encoded_identically(raw in any::<[u8; 16]>()) {
+    fn fd_frames_round_trip(
+        id in 0u32..0x2000_0000,
+        extended in any::<bool>(),
+        bit_rate_switch in any::<bool>(),
+        dlc in 0usize..16,
+        bytes in any::<[u8; 32]>(),
+    ) {
+        let id = if extended { CanId::extended(id) } else { CanId::standard(id & 0x7ff) };
+        let length = [0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64][dlc];
+        let payload = [bytes, bytes].concat();
+        let frame = CanFrame::fd(id.unwrap(), bit_rate_switch, &payload[..length]).unwrap();
+        let raw = WireFrame::data(&frame);
+        prop_assert_eq!(raw.len(), 72);
+        prop_assert_eq!(WireFrame::parse(&raw), WireFrame::Data(frame));
+        prop_assert_eq!(WireFrame::parse(&raw[..71]), WireFrame::Unsupported);
+    }
+
+    #[test]
+    fn parsed_data_frames_are_re_encoded_identically(
+        raw in any::<[u8; 16]>(),
+        fd in any::<bool>(),
+        head in any::<[u8; 8]>(),
+        bytes in any::<[u8; 32]>(),
+    ) {
+        let raw = if fd { [&head[..], &bytes, &bytes].concat() } else { raw.to_vec() };
         if let WireFrame::Data(frame) = WireFrame::parse(&raw) {
             prop_assert_eq!(WireFrame::parse(&WireFrame::data(&frame)), WireFrame::Data(frame));
         }
     }
 
-    /// Extended ids and remote requests are not supported on this bus.
+    /// Remote requests are not supported.
     #[test]
-    fn flagged_ids_are_unsupported(id in 0u32..0x800, remote in any::<bool>()) {
-        let flag = if remote { 0x4000_0000 } else { 0x8000_0000u32 };
+    fn remote_requests_are_unsupported(id in 0u32..0x800) {
         let mut raw = [0; 16];
-        raw[..4].copy_from_slice(&(id | flag).to_ne_bytes());
+        raw[..4].copy_from_slice(&(id | 0x4000_0000u32).to_ne_bytes());
         prop_assert_eq!(WireFrame::parse(&raw), WireFrame::Unsupported);
     }
 }
@@ -39,7 +62,7 @@ fn layout_matches_the_kernel() {
     expected[..4].copy_from_slice(&0x423u32.to_ne_bytes());
     expected[4] = 3;
     expected[8..11].copy_from_slice(&[0x00, 0x10, 0x00]);
-    assert_eq!(WireFrame::data(&frame), expected);
+    assert_eq!(WireFrame::data(&frame)[..], expected);
 
     let error = |class: u32, controller: u8| {
         let mut raw = [0; 16];

@@ -6,15 +6,19 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use supple_bus::virtual_time::{LockstepResponder, Peer};
 use supple_bus::{Bus, Event, PacedResponder};
-use supple_puck::{CanFrame, GroupId, MessageId, NodeId};
+use supple_can_frame::{CanFrame, CanId};
 
 /// Transmission time of a frame in virtual time \[ns\].
 const FRAME_NS: u64 = 100_000;
 
-/// Node 1's answer to a frame of the host: the same payload.
+/// The node's answer to a frame of the host: the same payload in the same format.
 pub fn echo_of(frame: &CanFrame) -> CanFrame {
-    let node = NodeId::new(1).unwrap();
-    CanFrame::new(MessageId::to_group(node, GroupId::REPLY), frame.payload()).unwrap()
+    CanFrame::of_format(
+        CanId::standard(0x426).unwrap(),
+        frame.format(),
+        frame.payload(),
+    )
+    .unwrap()
 }
 
 #[derive(Default)]

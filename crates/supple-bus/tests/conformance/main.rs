@@ -1,6 +1,6 @@
 //! One suite of the guarantees to a host, run on every backend and through the fault injector.
 //!
-//! The arm's side echoes: node 1 answers each frame of the host with a frame of the same payload.
+//! The arm's side echoes: its node answers each frame of the host with a frame of the same payload.
 
 mod backends;
 mod echo;
@@ -27,6 +27,7 @@ macro_rules! on_every_backend {
             a_frame_is_confirmed_once_and_then_answered,
             every_length_and_id_crosses_unchanged,
             frames_keep_their_order,
+            every_length_of_fd_and_extended_ids_cross_unchanged,
             a_cycle_of_frames_is_not_lost,
             lookahead_gives_the_same_events_in_the_same_order,
             waiting_ends_at_the_deadline,

@@ -1,8 +1,8 @@
 //! The cases. Each gets the host's bus.
 
 use crate::echo::echo_of;
-use supple_bus::{Bus, Event};
-use supple_puck::{CanFrame, MessageId};
+use supple_bus::{Bus, BusError, Event};
+use supple_can_frame::{CanFrame, CanId};
 
 /// Long enough for a thread to be scheduled on a busy machine; reached only on failure.
 const ANSWER_TIMEOUT_NS: u64 = 10_000_000_000;
@@ -60,7 +60,29 @@ pub fn every_length_and_id_crosses_unchanged(mut bus: Subject) {
         let (confirmed, answers) = collect(&mut bus, 1);
         assert_eq!(confirmed, [sent]);
         assert_eq!(answers[0].payload(), sent.payload());
-        assert_eq!(answers[0].id(), MessageId::from_raw(0x426).unwrap());
+        assert_eq!(answers[0].id(), CanId::standard(0x426).unwrap());
+    }
+}
+
+/// Frames of CAN FD on a bus that carries them; on another one, sending them is refused.
+pub fn every_length_of_fd_and_extended_ids_cross_unchanged(mut bus: Subject) {
+    let extended = CanId::extended(0x1234_5678).unwrap();
+    let classic = CanFrame::new(extended, &[1, 2, 3]).unwrap();
+    let payload: Vec<u8> = (0..64).collect();
+    let lengths = [0, 1, 8, 12, 16, 20, 24, 32, 48, 64];
+    let fd = lengths.into_iter().flat_map(|length| {
+        let standard = CanId::standard(0x001).unwrap();
+        [standard, extended].map(|id| CanFrame::fd(id, length > 8, &payload[..length]).unwrap())
+    });
+    for sent in core::iter::once(classic).chain(fd) {
+        if sent.is_fd() && !bus.carries_fd() {
+            assert!(matches!(bus.send(&sent), Err(BusError::ClassicOnly { .. })));
+            continue;
+        }
+        bus.send(&sent).unwrap();
+        let (confirmed, answers) = collect(&mut bus, 1);
+        assert_eq!(confirmed, [sent]);
+        assert_eq!(answers, [echo_of(&sent)]);
     }
 }
 

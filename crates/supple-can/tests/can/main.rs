@@ -1,5 +1,3 @@
-//! The process that owns the bus, and its parts.
+//! The program that owns the arm's bus.
 
 mod command_line;
-mod guard;
-mod shared_memory;

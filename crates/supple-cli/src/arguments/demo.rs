@@ -1,17 +1,20 @@
 //! Arguments of `supple demo`.
 
-use super::PlantArgs;
+use super::{PlantArgs, UrdfArgs};
 use std::path::PathBuf;
 
 /// Arguments of `demo`.
 #[derive(Clone, Debug, clap::Args)]
 pub struct DemoArgs {
-    /// A built-in arm (see `supple arms`), or the path of an arm's TOML or of its folder.
+    /// A built-in arm (see `supple arms`), or the path of an arm's TOML, of its folder, or of a URDF.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
+    /// What a URDF alone does not say.
+    #[command(flatten)]
+    pub urdf: UrdfArgs,
     /// The controller's model of the arm, for example the output of `supple identify`: path of its TOML or folder.
     /// Default: the plant's own parameters, with the perturbations that each experiment defines.
     #[arg(long, value_name = "PATH")]

@@ -1,13 +1,15 @@
 //! Arguments of the identification commands.
 
-use super::PlantArgs;
+use super::{PlantArgs, UrdfArgs};
 use crate::exit::CODES;
 use crate::range::between;
 use clap::builder::RangedU64ValueParser;
 use clap::{Args, Subcommand, ValueEnum};
 use std::path::PathBuf;
-use supple_ident::Method;
+use supple_experiment::procedure::StepName;
 use supple_ident::design::MAX_CANDIDATES;
+use supple_ident::{FrictionChoice, FrictionColumns, Method};
+use supple_plant::Injection;
 
 /// Identification command.
 #[derive(Clone, Debug, Subcommand)]
@@ -21,7 +23,10 @@ pub enum IdentificationCommand {
     /// Measure the breakaway torque of each joint of the simulated arm.
     #[command(after_help = CODES)]
     Breakaway(BreakawayArgs),
-    /// Run breakaway, excitation, identification, validation and demo on the simulated arm.
+    /// Calibrate an arm: wiring, breakaway, excitation, identification, validation, sinusoid at 5 N/m.
+    ///
+    /// Without --plant the simulated arm is calibrated from a model that is 5 % off in gravity and 30 % in friction, and
+    /// the demo runs with the result. With --plant the steps are those for a real arm, also on simulated ones.
     #[command(after_help = CODES)]
     Calibrate(CalibrateArgs),
     /// Refit friction and payload from logs of a repeated motion.
@@ -73,18 +78,83 @@ impl From<Solver> for Method {
     }
 }
 
+/// Friction columns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum FrictionArg {
+    /// By cross-validation.
+    Auto,
+    /// None.
+    None,
+    /// Viscous.
+    Viscous,
+    /// Viscous and Coulomb.
+    Coulomb,
+    /// Viscous, Coulomb and an offset.
+    Offset,
+    /// Viscous by direction, Coulomb and an offset.
+    Asymmetric,
+    /// Viscous, and Coulomb that grows with the load.
+    Load,
+}
+
+impl From<FrictionArg> for FrictionChoice {
+    fn from(argument: FrictionArg) -> FrictionChoice {
+        let columns = match argument {
+            FrictionArg::Auto => return FrictionChoice::Auto,
+            FrictionArg::None => FrictionColumns::NONE,
+            FrictionArg::Viscous => FrictionColumns {
+                viscous: true,
+                ..FrictionColumns::NONE
+            },
+            FrictionArg::Coulomb => FrictionColumns::COULOMB,
+            FrictionArg::Offset => FrictionColumns::OFFSET,
+            FrictionArg::Asymmetric => FrictionColumns {
+                asymmetry: true,
+                ..FrictionColumns::OFFSET
+            },
+            FrictionArg::Load => FrictionColumns {
+                load: true,
+                ..FrictionColumns::COULOMB
+            },
+        };
+        FrictionChoice::Columns(columns)
+    }
+}
+
+/// Time from a logged torque to its action.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum TorqueDelay {
+    /// Estimated for each log.
+    Estimate,
+    /// Given \[s\].
+    Seconds(f64),
+}
+
+fn torque_delay(text: &str) -> Result<TorqueDelay, String> {
+    if text == "estimate" {
+        return Ok(TorqueDelay::Estimate);
+    }
+    match text.parse::<f64>() {
+        Ok(value) if value.abs() <= 1.0 => Ok(TorqueDelay::Seconds(value)),
+        _ => Err("give seconds from -1 to 1, as in -0.008, or `estimate`".to_owned()),
+    }
+}
+
 /// Arguments of `identify`.
 #[derive(Clone, Debug, Args)]
 pub struct IdentifyArgs {
     /// Logs: supple's MCAP, or CSV with the columns `t`, `q[0]` .., `tau[0]` .. and, if measured, `qd[0]` ..
     #[arg(required = true, value_name = "LOG")]
     pub logs: Vec<PathBuf>,
-    /// A built-in arm, or the path of an arm's TOML or of its folder: kinematics and prior.
+    /// A built-in arm, or the path of an arm's TOML, of its folder, or of a URDF: kinematics and prior.
     #[arg(long, value_name = "NAME|PATH")]
     pub arm: String,
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
+    /// What a URDF alone does not say.
+    #[command(flatten)]
+    pub urdf: UrdfArgs,
     /// Folder for arm.toml, arm.urdf, report.html and summary.json.
     #[arg(long, value_name = "DIR", default_value = "out/identified")]
     pub out: PathBuf,
@@ -110,6 +180,19 @@ pub struct IdentifyArgs {
     /// Default: 0.15 for MCAP, 0 (none) for CSV, where friction columns are chosen by cross-validation.
     #[arg(long, value_name = "RAD/S", value_parser = between(0.0, 100.0))]
     pub slow: Option<f64>,
+    /// Friction columns of every moving joint. Default: chosen by cross-validation.
+    #[arg(long, value_enum, default_value = "auto")]
+    pub friction: FrictionArg,
+    /// Weight of the given arm, in equivalent observations. Default: chosen by cross-validation.
+    #[arg(long, value_name = "N", value_parser = between(1e-6, 1e9))]
+    pub prior_weight: Option<f64>,
+    /// Time from a logged torque to its action (s): positive for commands, negative for measured torques that lag; or
+    /// `estimate`. Default: 1.5 control periods for supple's own logs, which hold commands; otherwise `estimate`.
+    #[arg(long, value_name = "S|estimate", value_parser = torque_delay, allow_hyphen_values = true)]
+    pub torque_delay: Option<TorqueDelay>,
+    /// Fit a log although the checks against the arm found an error in it; what they found is then a warning.
+    #[arg(long)]
+    pub accept_wrong_logs: bool,
     /// Standard deviation of the torque noise of each moving joint (N m). Default: estimated from the residuals.
     #[arg(long, value_name = "NM,NM..", value_delimiter = ',', value_parser = between(1e-9, 1e6))]
     pub noise: Vec<f64>,
@@ -121,12 +204,15 @@ pub struct IdentifyArgs {
 /// Arguments of `excite design`.
 #[derive(Clone, Debug, Args)]
 pub struct DesignArgs {
-    /// A built-in arm, or the path of an arm's TOML or of its folder.
+    /// A built-in arm, or the path of an arm's TOML, of its folder, or of a URDF.
     #[arg(long, value_name = "NAME|PATH")]
     pub arm: String,
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
+    /// What a URDF alone does not say.
+    #[command(flatten)]
+    pub urdf: UrdfArgs,
     /// Folder for excitation.csv, excitation.svg and summary.json.
     #[arg(long, value_name = "DIR", default_value = "out/excitation")]
     pub out: PathBuf,
@@ -174,12 +260,15 @@ pub struct DesignArgs {
 /// Arguments of `excite run`.
 #[derive(Clone, Debug, Args)]
 pub struct RunArgs {
-    /// A built-in arm, or the path of an arm's TOML or of its folder: plant and controller.
+    /// A built-in arm, or the path of an arm's TOML, of its folder, or of a URDF: plant and controller.
     #[arg(long, value_name = "NAME|PATH")]
     pub arm: String,
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
+    /// What a URDF alone does not say.
+    #[command(flatten)]
+    pub urdf: UrdfArgs,
     /// Folder that `excite design` wrote, or its summary.json.
     #[arg(long, value_name = "PATH", default_value = "out/excitation")]
     pub design: PathBuf,
@@ -209,12 +298,15 @@ pub struct RunArgs {
 /// Arguments of `breakaway`.
 #[derive(Clone, Debug, Args)]
 pub struct BreakawayArgs {
-    /// A built-in arm, or the path of an arm's TOML or of its folder.
+    /// A built-in arm, or the path of an arm's TOML, of its folder, or of a URDF.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
+    /// What a URDF alone does not say.
+    #[command(flatten)]
+    pub urdf: UrdfArgs,
     /// Joints, counted from 0. Default: all.
     #[arg(long, value_name = "J,J..", value_delimiter = ',')]
     pub joints: Vec<usize>,
@@ -233,15 +325,82 @@ pub struct BreakawayArgs {
     pub json: bool,
 }
 
+/// The arm that is calibrated step by step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum CalibrationPlant {
+    /// A simulated arm in this process, in virtual time.
+    InProcess,
+    /// A simulated arm on shared memory.
+    Sim,
+    /// A simulated arm on an emulated CAN bus, with motor pucks, safety module and pendant.
+    Emu,
+    /// An arm on a CAN bus; its operator activates it at its pendant.
+    Can,
+    /// The arm of a system that runs already; another model is loaded by starting that again.
+    Running,
+}
+
 /// Arguments of `calibrate`.
 #[derive(Clone, Debug, Args)]
 pub struct CalibrateArgs {
-    /// A built-in arm, or the path of an arm's TOML or of its folder: the simulated plant.
+    /// Calibrate this arm step by step, as a real one.
+    #[arg(long = "plant", value_enum)]
+    pub on: Option<CalibrationPlant>,
+    /// Model to start from: path of its TOML or folder. Default: the arm's own.
+    #[arg(long, value_name = "PATH", requires = "on")]
+    pub model: Option<PathBuf>,
+    /// Relative errors of the starting model in gravity and in friction, with the signs of --seed, for example 0.15,0.5.
+    /// For simulated arms.
+    #[arg(long, value_name = "GRAVITY,FRICTION", value_delimiter = ',', requires = "on", value_parser = between(0.0, 0.9))]
+    pub start_error: Vec<f64>,
+    /// The swept space is free: do not ask.
+    #[arg(long, requires = "on")]
+    pub yes: bool,
+    /// Go on after the last finished step of the calibration in --out.
+    #[arg(long, requires = "on")]
+    pub resume: bool,
+    /// Perform no step after this one, for example wiring, breakaway or unseen_motion.
+    #[arg(long, value_name = "STEP", requires = "on")]
+    pub until: Option<StepName>,
+    /// Duration of the warm-up (s).
+    #[arg(long, value_name = "S", default_value_t = 7.0, requires = "on", value_parser = between(0.0, 3600.0))]
+    pub warm_up: f64,
+    /// Number of candidates of the design of the excitation.
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 600,
+        requires = "on",
+        value_parser = RangedU64ValueParser::<usize>::new().range(1..=MAX_CANDIDATES as u64)
+    )]
+    pub candidates: usize,
+    /// The arm's bus, can:NAME or unix:FOLDER. Default: can:can0 for `can`, private sockets for `emu`.
+    #[arg(long, value_name = "BUS", requires = "on")]
+    pub bus: Option<String>,
+    /// Declare that the arm is in its home pose now; used if the motor pucks have lost their positions.
+    #[arg(long, requires = "on")]
+    pub zero_at_home: bool,
+    /// Inject a fault into the simulated or emulated arm, as `supple up --inject`.
+    #[arg(long, value_name = "SPEC", requires = "on")]
+    pub inject: Vec<Injection>,
+    /// Run the processes in lockstep, as fast as possible: `emu` only.
+    #[arg(long, requires = "on")]
+    pub virtual_time: bool,
+    /// Prefix of the system. Default: SUPPLE_PREFIX or `supple`.
+    #[arg(long, value_name = "NAME", requires = "on")]
+    pub prefix: Option<String>,
+    /// Run without real-time priority and without locked memory.
+    #[arg(long, requires = "on")]
+    pub no_realtime: bool,
+    /// A built-in arm, or the path of an arm's TOML, of its folder, or of a URDF: the simulated plant.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
+    /// What a URDF alone does not say.
+    #[command(flatten)]
+    pub urdf: UrdfArgs,
     /// Folder for the identified arm, the reports and the logs.
     #[arg(long, value_name = "DIR", default_value = "out/calibrate")]
     pub out: PathBuf,
@@ -280,6 +439,9 @@ pub struct LearnArgs {
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
+    /// What a URDF alone does not say.
+    #[command(flatten)]
+    pub urdf: UrdfArgs,
     /// Folder for the refitted model.
     #[arg(long, value_name = "DIR", default_value = "out/learnt")]
     pub out: PathBuf,

@@ -4,16 +4,20 @@ mod demo;
 mod effects;
 mod identification;
 mod log;
+mod new;
 mod plant;
+mod urdf;
 
 pub use demo::DemoArgs;
 pub use effects::EffectsArgs;
 pub use identification::{
-    BreakawayArgs, CalibrateArgs, Criterion, DesignArgs, ExciteCommand, IdentificationCommand,
-    IdentifyArgs, LearnArgs, RunArgs, Solver,
+    BreakawayArgs, CalibrateArgs, CalibrationPlant, Criterion, DesignArgs, ExciteCommand,
+    FrictionArg, IdentificationCommand, IdentifyArgs, LearnArgs, RunArgs, Solver, TorqueDelay,
 };
 pub use log::{LogCommand, LogDataCommand, PlotArgs};
+pub use new::NewArgs;
 pub use plant::{PlantArgs, PlantCommand};
+pub use urdf::UrdfArgs;
 
 use crate::exit::CODES;
 use clap::{Args, Subcommand};
@@ -31,6 +35,9 @@ pub enum OfflineCommand {
     /// Identify an arm, and measure what the identification needs.
     #[command(flatten)]
     Identification(IdentificationCommand),
+    /// Make an arm from a URDF: a commented TOML with every derived setting, a drawing, and a first run in simulation.
+    #[command(after_help = CODES)]
+    New(NewArgs),
     /// Inspect, export, replay and recover logs.
     #[command(subcommand)]
     Log(LogCommand),
@@ -78,6 +85,7 @@ impl OfflineCommand {
             OfflineCommand::Demo(args) => args.json,
             OfflineCommand::Effects(args) => args.json,
             OfflineCommand::Identification(command) => command.json(),
+            OfflineCommand::New(args) => args.json,
             OfflineCommand::Log(command) => command.json(),
             OfflineCommand::Plant(command) => command.json(),
             OfflineCommand::Arms(args) => args.json,

@@ -11,7 +11,7 @@ use supple_plant::options::OPTIONS;
 /// Effects of a real arm in the simulated one.
 #[derive(Clone, Debug, Default, Args)]
 pub struct PlantArgs {
-    /// Effects of a real arm in the simulated one, as TOML; `supple plant list` has all options.
+    /// Effects of a real arm in the simulated one, as TOML, or a built-in set by name; `supple plant list` has all options.
     #[arg(long, value_name = "FILE", conflicts_with = "realistic")]
     pub plant_options: Option<PathBuf>,
     /// Give the simulated arm all effects of a real one, each of modest size: `supple plant show realistic`.

@@ -11,7 +11,7 @@
 //! - in a fault, a joint that still moves after 0.25 s, or that accelerates, ends the torque.
 //!
 //! The guard keeps no latch: its caller ends the torque at the first reason and decides when it may
-//! return (`supple-sim/src/motors.rs`, `supple-can/src/guard.rs`).
+//! return (`supple-drive/src/guard.rs`).
 
 use crate::config::{Config, Limits};
 use crate::controller::estimator::Estimator;

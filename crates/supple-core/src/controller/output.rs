@@ -187,9 +187,9 @@ cycle! {
         /// line      from_m, to_m, duration_s
         /// sinusoid  centre_m, amplitude_m, angular_frequency_rad_per_s, ramp_s
         /// arc       radius_m, height_m, centre_rad, amplitude_rad, angular_frequency_rad_per_s, ramp_s
-        /// quadrant  centre_m, first_m, second_m, speed_m_per_s, ramp_s
+        /// quadrant  centre_m, first_m, second_m, speed_m_per_s, ramp_s, corner_ramp_s
         /// probe     radius_m, strokes, radial_step_m, top_m, stroke_m, azimuth_rad, azimuth_step_rad,
-        ///           speed_m_per_s, ramp_s
+        ///           speed_m_per_s, ramp_s, dwell_s
         numbers request_values = List::new(request_code.values());
         /// Output: cycle of the state that this step answers.
         counter cycle = output.cycle;

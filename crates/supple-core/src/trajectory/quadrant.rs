@@ -2,7 +2,8 @@
 //!
 //! The path starts at the centre, runs out along the first semi-axis, along the quarter ellipse,
 //! and back along the second semi-axis; then it repeats. Speed is constant on each piece, so the
-//! velocity jumps at the three corners, where the acceleration stays that of the piece.
+//! velocity jumps at the three corners, where the acceleration stays that of the piece. With a corner
+//! ramp the speed rises from zero and falls to zero on each piece, so that no velocity jumps.
 
 use super::{MINIMUM_JERK_SPEED, Reference, TrajectoryError, finite, positive, time_scaling};
 use crate::math::{Vector3, abs, sin_cos, sqrt};
@@ -29,6 +30,17 @@ pub enum Piece {
     Back,
 }
 
+/// A place on the path, and how fast the path time advances there.
+struct OnPath {
+    piece: Piece,
+    round: u32,
+    /// Distance from the start of the piece \[m\].
+    along_m: f64,
+    time_scale: f64,
+    /// \[1/s\]
+    time_scale_rate: f64,
+}
+
 /// Quarter ellipse and edges, followed at constant speed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quadrant {
@@ -37,6 +49,7 @@ pub struct Quadrant {
     second_m: Vector3<f64>,
     speed_m_per_s: f64,
     ramp_s: f64,
+    corner_ramp_s: f64,
     /// Arc length of the ellipse from the first semi-axis at evenly spaced parameters.
     arc_length_m: [f64; KNOTS],
 }
@@ -58,6 +71,7 @@ impl Quadrant {
             second_m,
             speed_m_per_s,
             ramp_s,
+            corner_ramp_s: 0.0,
             arc_length_m: [0.0; KNOTS],
         };
         for k in 1..KNOTS {
@@ -65,6 +79,16 @@ impl Quadrant {
                 quadrant.arc_length_m[k - 1] + quadrant.arc_between(knot(k - 1), knot(k));
         }
         quadrant
+    }
+
+    /// The same path with a speed that rises from zero and falls to zero on every piece, each in
+    /// `corner_ramp_s`, with minimum jerk; zero: the velocity jumps at the corners. A piece must be
+    /// at least as long as its two ramps at that speed.
+    pub fn with_corner_ramp(self, corner_ramp_s: f64) -> Quadrant {
+        Quadrant {
+            corner_ramp_s,
+            ..self
+        }
     }
 
     /// In the vertical plane `y = 0`: centre (0.48, 0, -0.06) m, 0.26 m along x, 0.32 m along z.
@@ -103,6 +127,11 @@ impl Quadrant {
         self.ramp_s
     }
 
+    /// Time in which the speed rises or falls at a corner \[s\]; zero where the velocity jumps.
+    pub fn corner_ramp_s(&self) -> f64 {
+        self.corner_ramp_s
+    }
+
     /// Lengths of the pieces in order \[m\].
     pub fn lengths_m(&self) -> [f64; 3] {
         [
@@ -112,56 +141,91 @@ impl Quadrant {
         ]
     }
 
-    /// Time of one round at full speed \[s\].
+    /// Time of one round at full speed, with the ramps at its corners \[s\].
     pub fn period_s(&self) -> f64 {
-        self.lengths_m().iter().sum::<f64>() / self.speed_m_per_s
+        self.lengths_m().iter().sum::<f64>() / self.speed_m_per_s + 3.0 * self.corner_ramp_s
     }
 
     /// Piece, covered fraction of it (0 to 1), and completed rounds at `time_s`.
     pub fn piece_at(&self, time_s: f64) -> (Piece, f64, u32) {
         let (s, _, _) = time_scaling(time_s.max(0.0), self.ramp_s);
-        let (piece, along, round) = self.locate(s);
+        let at = self.locate(s);
         let lengths = self.lengths_m();
-        (piece, along / lengths[piece as usize], round)
+        (at.piece, at.along_m / lengths[at.piece as usize], at.round)
     }
 
-    fn locate(&self, path_time_s: f64) -> (Piece, f64, u32) {
+    fn locate(&self, path_time_s: f64) -> OnPath {
         let lengths = self.lengths_m();
         let whole = lengths[0] + lengths[1] + lengths[2];
+        // With ramps, a time on the path becomes the distance that the full speed covers in it.
+        let ramp_m = self.corner_ramp_s * self.speed_m_per_s;
+        let whole = whole + 3.0 * ramp_m;
         let distance = path_time_s * self.speed_m_per_s;
         let round = libm::floor(distance / whole);
         let along = distance - round * whole;
-        let round = round as u32;
-        if along < lengths[0] {
-            (Piece::Out, along, round)
-        } else if along < lengths[0] + lengths[1] {
-            (Piece::Ellipse, along - lengths[0], round)
+        let out = lengths[0] + ramp_m;
+        let ellipse = out + lengths[1] + ramp_m;
+        let (piece, along) = if along < out {
+            (Piece::Out, along)
+        } else if along < ellipse {
+            (Piece::Ellipse, along - out)
         } else {
-            (Piece::Back, along - lengths[0] - lengths[1], round)
+            (Piece::Back, along - out - (lengths[1] + ramp_m))
+        };
+        let (along_m, time_scale, time_scale_rate) =
+            self.corner_scaling(along, lengths[piece as usize]);
+        OnPath {
+            piece,
+            round: round as u32,
+            along_m,
+            time_scale,
+            time_scale_rate,
+        }
+    }
+
+    /// Distance along a piece, time scale and its rate \[1/s\], `distance_m` after the corner at full speed.
+    fn corner_scaling(&self, distance_m: f64, length_m: f64) -> (f64, f64, f64) {
+        let ramp_s = self.corner_ramp_s;
+        if ramp_s <= 0.0 {
+            return (distance_m, 1.0, 0.0);
+        }
+        let speed = self.speed_m_per_s;
+        let time_s = distance_m / speed;
+        let left_s = (length_m / speed + ramp_s - time_s).max(0.0);
+        if time_s <= left_s {
+            let (s, scale, rate) = time_scaling(time_s, ramp_s);
+            (speed * s, scale, rate)
+        } else {
+            let (s, scale, rate) = time_scaling(left_s, ramp_s);
+            (length_m - speed * s, scale, -rate)
         }
     }
 
     pub(super) fn at(&self, time_s: f64) -> Reference {
-        let (s, time_scale, time_scale_rate) = time_scaling(time_s, self.ramp_s);
-        let (piece, along, _) = self.locate(s);
-        let (position, tangent, curvature) = match piece {
+        let (s, start_scale, start_rate) = time_scaling(time_s, self.ramp_s);
+        let at = self.locate(s);
+        let (position, tangent, curvature) = match at.piece {
             Piece::Out => {
                 let tangent = self.first_m / norm(&self.first_m);
-                (self.centre_m + tangent * along, tangent, Vector3::zeros())
+                (
+                    self.centre_m + tangent * at.along_m,
+                    tangent,
+                    Vector3::zeros(),
+                )
             }
-            Piece::Ellipse => self.on_ellipse(along),
+            Piece::Ellipse => self.on_ellipse(at.along_m),
             Piece::Back => {
                 let tangent = -self.second_m / norm(&self.second_m);
-                let position = self.centre_m + self.second_m + tangent * along;
+                let position = self.centre_m + self.second_m + tangent * at.along_m;
                 (position, tangent, Vector3::zeros())
             }
         };
-        let speed = self.speed_m_per_s * time_scale;
+        let speed = self.speed_m_per_s * start_scale * at.time_scale;
+        let rate = start_rate * at.time_scale + start_scale * start_scale * at.time_scale_rate;
         Reference {
             position,
             velocity: tangent * speed,
-            acceleration: curvature * (speed * speed)
-                + tangent * (self.speed_m_per_s * time_scale_rate),
+            acceleration: curvature * (speed * speed) + tangent * (self.speed_m_per_s * rate),
         }
     }
 
@@ -212,7 +276,13 @@ impl Quadrant {
         let (long, short) = (first.max(second), first.min(second));
         let speed = self.speed_m_per_s;
         let bend = speed * long / (short * short);
-        (speed, speed * (MINIMUM_JERK_SPEED / self.ramp_s + bend))
+        let corner = if self.corner_ramp_s > 0.0 {
+            MINIMUM_JERK_SPEED / self.corner_ramp_s
+        } else {
+            0.0
+        };
+        let start = MINIMUM_JERK_SPEED / self.ramp_s;
+        (speed, speed * (start + bend + corner))
     }
 
     /// Time of the ramp and one round \[s\].
@@ -236,7 +306,17 @@ impl Quadrant {
             });
         }
         positive("speed_m_per_s", self.speed_m_per_s)?;
-        positive("ramp_s", self.ramp_s)
+        positive("ramp_s", self.ramp_s)?;
+        let shortest_m = self.lengths_m().into_iter().fold(f64::INFINITY, f64::min);
+        let corner_m = self.corner_ramp_s * self.speed_m_per_s;
+        if (0.0..=shortest_m).contains(&corner_m) {
+            return Ok(());
+        }
+        Err(TrajectoryError {
+            entry: "corner_ramp_s",
+            value: self.corner_ramp_s,
+            must: "zero, or at most the time of the shortest piece at full speed",
+        })
     }
 }
 

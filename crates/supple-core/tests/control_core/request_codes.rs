@@ -46,7 +46,7 @@ fn trajectory() -> impl Strategy<Value = (u8, Trajectory)> {
                 angular_frequency_rad_per_s: x[4],
                 ramp_s: x[5],
             }),
-            5 => Trajectory::Quadrant(Quadrant::new(a, b, c, x[0], x[1])),
+            5 => Trajectory::Quadrant(Quadrant::new(a, b, c, x[0], x[1]).with_corner_ramp(x[2])),
             _ => Trajectory::Probe(Probe {
                 radius_m: x[0],
                 strokes,

@@ -4,6 +4,7 @@ mod support;
 
 mod bus_time;
 mod command_line;
+mod damiao;
 mod injection;
 mod pendant;
 mod pucks;

@@ -217,6 +217,9 @@ fn motion_with_ripple(
         tau,
         independent_fraction: 1.0,
         cutoff_hz: None,
+        start_s: 0.0,
+        torque_delay_s: 0.0,
+        masks: Vec::new(),
     }
 }
 

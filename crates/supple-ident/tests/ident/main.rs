@@ -13,3 +13,4 @@ mod recovery;
 mod select;
 mod tx40;
 mod ur10e;
+mod wrong_logs;

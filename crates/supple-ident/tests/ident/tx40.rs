@@ -16,7 +16,7 @@ fn table(text: &str) -> Vec<[f64; 6]> {
     text.lines().skip(1).map(row).collect()
 }
 
-fn log() -> Log {
+pub(crate) fn log() -> Log {
     let p = table(include_str!("../data/tx40/pos_read_data.csv"));
     let m = table(include_str!("../data/tx40/curr_data.csv"));
     let offset = [0.0, -FRAC_PI_2, FRAC_PI_2, 0.0, 0.0, 0.0];
@@ -46,7 +46,7 @@ fn part(log: &Log, rows: std::ops::Range<usize>) -> Log {
     }
 }
 
-fn description() -> Description {
+pub(crate) fn description() -> Description {
     let urdf = include_str!("../data/tx40/tx40.urdf");
     let none = r#"ixx="0.000" ixy="0.000" ixz="0.000" iyy="0.000" iyz="0.000" izz="0.000""#;
     let some = r#"ixx="1e-4" ixy="0" ixz="0" iyy="1e-4" iyz="0" izz="1e-4""#;

@@ -12,7 +12,7 @@ const GAIN: [f64; 6] = [14.87, 13.26, 11.13, 10.62, 11.03, 11.47];
 /// Relative error allowed: point to point, 40 s, 20 s.
 const BOUNDS: [f64; 3] = [0.040, 0.031, 0.044];
 
-fn log(folder: &Path, file: &str, rows: std::ops::Range<usize>) -> Log {
+pub(crate) fn log(folder: &Path, file: &str, rows: std::ops::Range<usize>) -> Log {
     let text = std::fs::read_to_string(folder.join(file)).expect(file);
     let lines: Vec<Vec<f64>> = text
         .lines()
@@ -35,7 +35,7 @@ fn log(folder: &Path, file: &str, rows: std::ops::Range<usize>) -> Log {
     }
 }
 
-fn description(folder: &Path) -> Description {
+pub(crate) fn description(folder: &Path) -> Description {
     let urdf = folder.join("ur10e.urdf");
     let toml = std::env::temp_dir().join(format!("supple-ur10e-{}.toml", std::process::id()));
     let text = format!(

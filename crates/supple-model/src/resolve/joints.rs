@@ -63,6 +63,32 @@ pub(crate) fn joints(
     resolved.collect()
 }
 
+/// The pose without torque, within the joints' limits: it may lie in a soft zone, where the arm rests on a stop.
+pub(crate) fn stow(
+    toml: Reporter<'_>,
+    settings: &Settings,
+    joints: &[JointResolved],
+) -> Result<Option<Vec<f64>>, ModelError> {
+    let Some(stow) = &settings.stow_rad else {
+        return Ok(None);
+    };
+    if stow.len() != joints.len() {
+        return Err(wrong_count(toml, "stow_rad", stow.len(), joints.len()));
+    }
+    for (joint, angle_rad) in joints.iter().zip(stow) {
+        let (lower, upper) = (joint.position_lower_rad, joint.position_upper_rad);
+        if !(lower..=upper).contains(angle_rad) {
+            return Err(toml.invalid(
+                format!("stow_rad of joint `{}`", joint.name),
+                "must be within the joint's limits",
+                format!("{angle_rad} rad"),
+                format!("give an angle from {lower} to {upper} rad"),
+            ));
+        }
+    }
+    Ok(Some(stow.clone()))
+}
+
 fn joint(
     urdf: Reporter<'_>,
     toml: Reporter<'_>,

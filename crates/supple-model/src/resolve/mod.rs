@@ -1,12 +1,15 @@
 //! Checks the TOML against the kinematic chain: all numbers validated, all defaults filled in, everything in
 //! chain order.
 
+mod bus;
 mod hardware;
 mod joints;
 
+pub(crate) use bus::bus;
+pub use bus::{BusDescription, BusMotor};
 pub use hardware::{Motors, Tool};
 pub(crate) use hardware::{motors, tool};
-pub(crate) use joints::{JointResolved, joints};
+pub(crate) use joints::{JointResolved, joints, stow};
 
 use crate::error::{ModelError, Reporter};
 use crate::settings::Settings;

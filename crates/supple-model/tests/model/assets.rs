@@ -74,6 +74,112 @@ fn arms_match_the_reference() {
     agrees_with_the_reference::<7>("wam7");
 }
 
+/// The same for the arms whose reference is 40 states of all quantities; see `supple-core/tests/data`.
+fn agrees_in_all_states<const N: usize>(name: &str, states: &str) {
+    let reference: Value = serde_json::from_str(states).unwrap();
+    let samples = &reference["samples"];
+    let arm = bare::<N>(&asset(name)).build().unwrap();
+    for k in 0..40 {
+        let vector = |key: &str| Vector::<N>::from_column_slice(&numbers(&samples[key][k]));
+        let (q, qd, qdd) = (vector("q"), vector("qd"), vector("qdd"));
+        let tip = dynamics::tip_pose(&arm, &q);
+        assert!(largest_difference(&tip.translation, &samples["tip_pos"][k]) < 1e-12);
+        assert!(largest_difference(&tip.rotation.transpose(), &samples["tip_rot"][k]) < 1e-12);
+        assert!(largest_difference(&dynamics::gravity(&arm, &q), &samples["gravity"][k]) < 1e-10);
+        assert!(largest_difference(&dynamics::crba(&arm, &q), &samples["M"][k]) < 1e-12);
+        let found = dynamics::rnea(&arm, &q, &qd, &qdd);
+        assert!(largest_difference(&found, &samples["rnea"][k]) < 1e-9);
+    }
+}
+
+#[test]
+fn openarm_and_yam_match_their_reference() {
+    let openarm = include_str!("../../../supple-core/tests/data/openarm.json");
+    agrees_in_all_states::<7>("openarm", openarm);
+    let yam = include_str!("../../../supple-core/tests/data/yam.json");
+    agrees_in_all_states::<6>("yam", yam);
+}
+
+/// The chosen limits lie inside the makers', and each joint stays inside its motor's peak torque.
+#[test]
+fn limits_of_openarm_and_yam_are_below_the_makers() {
+    for name in ["openarm", "yam"] {
+        let description = asset(name);
+        let robot = urdf_rs::read_from_string(description.urdf()).unwrap();
+        let stow = description.stow_rad().expect("a pose without torque");
+        with_dof!(description.dof(), N => {
+            let limits = description.config::<N>().unwrap().limits;
+            let arm = bare::<N>(&description).build().unwrap();
+            for (i, joint) in description.joint_names().iter().enumerate() {
+                let limit = &robot.joints.iter().find(|j| j.name == *joint).unwrap().limit;
+                assert!(limits.joint_torque_nm[i] < 0.8 * limit.effort, "{joint}");
+                assert!(limits.joint_speed_rad_per_s[i] < 0.4 * limit.velocity, "{joint}");
+                assert!(limits.position_upper_rad[i] <= limit.upper - 0.029, "{joint}");
+                // Where the arm rests on a stop, its angle there is the edge of the soft zone.
+                let rests = stow[i] - limits.position_lower_rad[i] < limits.soft_zone_rad + 1e-6
+                    && stow[i] <= limits.position_lower_rad[i] + limits.soft_zone_rad + 1e-6;
+                let margin = if rests { 0.0 } else { 0.029 };
+                assert!(limits.position_lower_rad[i] >= limit.lower + margin, "{joint}");
+            }
+            // Gravity anywhere in the range stays below the limits.
+            for k in 0..2000u32 {
+                let q = Vector::<N>::from_fn(|i, _| {
+                    let fraction = (f64::from(k) * (0.37 + 0.11 * i as f64)).fract();
+                    let (lower, upper) = (limits.position_lower_rad[i], limits.position_upper_rad[i]);
+                    lower + fraction * (upper - lower)
+                });
+                let gravity = dynamics::gravity(&arm, &q);
+                for i in 0..N {
+                    assert!(gravity[i].abs() < 0.8 * limits.joint_torque_nm[i], "{name} {i}");
+                }
+            }
+        })
+        .unwrap();
+    }
+}
+
+/// In the stow pose gravity is below the dry friction, or pushes the joint onto the stop that it rests on.
+#[test]
+fn openarm_and_yam_stay_in_their_stow_pose_without_torque() {
+    for name in ["openarm", "yam"] {
+        let description = asset(name);
+        with_dof!(description.dof(), N => {
+            let limits = description.config::<N>().unwrap().limits;
+            let arm = bare::<N>(&description).build().unwrap();
+            let stow = Vector::<N>::from_column_slice(description.stow_rad().unwrap());
+            let gravity = dynamics::gravity(&arm, &stow);
+            for i in 0..N {
+                let on_stop = stow[i] - limits.position_lower_rad[i] <= limits.soft_zone_rad + 1e-9;
+                let dry_nm = description.friction()[i].coulomb_nm;
+                assert!(gravity[i].abs() < dry_nm || (on_stop && gravity[i] > 0.0), "{name} {i}: {}", gravity[i]);
+            }
+        })
+        .unwrap();
+    }
+}
+
+/// The bus section agrees with the motors section: steps of torque and position of the frames.
+#[test]
+fn the_steps_of_the_bus_are_those_of_the_motors() {
+    for name in ["openarm", "yam"] {
+        let description = asset(name);
+        let bus = description.bus().expect("a bus");
+        let motors = description.motors();
+        let quanta = motors.torque_quantum_nm.as_ref().unwrap();
+        for (i, motor) in bus.motors.iter().enumerate() {
+            let step_nm = 2.0 * motor.torque_range_nm / 4095.0;
+            assert!(
+                (quanta[i] / step_nm - 1.0).abs() < 1e-3,
+                "{name} {i}: {step_nm}"
+            );
+            let counts = core::f64::consts::TAU / (2.0 * motor.position_range_rad) * 65535.0;
+            assert!((f64::from(motors.counts_per_revolution.unwrap()) - counts).abs() < 1.0);
+            assert_eq!((motor.id, motor.reply_id), (i as u16 + 1, i as u16 + 0x11));
+        }
+    }
+    assert_eq!(asset("wam7").bus(), None);
+}
+
 /// `j2mp` as printed for the 7-joint arm: ratios 42, 28.25, 28.25 / 1.68, 18, 9.7, 9.7, 14.93.
 fn motor_from_joint() -> DMatrix<f64> {
     let mut j2mp = DMatrix::zeros(7, 7);
@@ -207,6 +313,8 @@ fn home_poses_are_outside_the_soft_zones() {
 #[test]
 fn the_law_controls_three_joints_of_every_asset() {
     for (name, expected) in [
+        ("openarm", vec![0, 1, 3]),
+        ("yam", vec![0, 1, 2]),
         ("paper3", vec![0, 1, 2]),
         ("wam3", vec![0, 1, 2]),
         ("wam4", vec![0, 1, 3]),

@@ -6,6 +6,7 @@ mod property;
 
 mod assets;
 mod bad_input;
+mod derived;
 mod description;
 mod paper;
 mod paper_asset;

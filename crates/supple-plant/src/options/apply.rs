@@ -33,6 +33,7 @@ enum Draw {
     Tilt,
     EncoderBias,
     HosePreload,
+    Shortfall,
 }
 
 impl PlantOptions {
@@ -80,6 +81,7 @@ impl PlantOptions {
         if let Some(fraction) = self.friction_direction_fraction {
             variation.direction_fraction = signs(Draw::Direction, fraction);
         }
+        variation.gear_fraction = self.gear_friction_fraction.unwrap_or(0.0);
         variation.cold_dry_fraction = self.warm_up_dry_fraction.unwrap_or(0.0);
         variation.cold_viscous_fraction = self.warm_up_viscous_fraction.unwrap_or(0.0);
         variation.warm_up_s = self.warm_up_s.unwrap_or(WARM_UP_S);
@@ -121,6 +123,13 @@ impl PlantOptions {
         }
         if let Some(fraction) = self.torque_constant_fraction {
             actuators.torque_constant = signs(Draw::TorqueConstant, fraction).add_scalar(1.0);
+        }
+        if self.torque_shortfall_fraction.is_some() || self.torque_shortfall_spread.is_some() {
+            let mean = self.torque_shortfall_fraction.unwrap_or(0.0);
+            let spread = self.torque_shortfall_spread.unwrap_or(0.0);
+            let mut noise = noise(Draw::Shortfall);
+            let share = Vector::from_fn(|_, _| 1.0 - mean + spread * (2.0 * noise.uniform() - 1.0));
+            actuators.torque_constant = actuators.torque_constant.component_mul(&share);
         }
         if let Some(bias_rad) = self.encoder_bias_rad {
             actuators.encoder_bias_rad = signs(Draw::EncoderBias, bias_rad);

@@ -22,6 +22,10 @@ use std::path::Path;
 /// TOML of the set `realistic`.
 pub const REALISTIC: &str = include_str!("../../../../assets/plants/realistic.toml");
 
+/// TOML of the set `openarm-realistic`.
+pub const OPENARM_REALISTIC: &str =
+    include_str!("../../../../assets/plants/openarm-realistic.toml");
+
 /// Name of the set `realistic`, and of its file in messages.
 const REALISTIC_NAME: &str = "assets/plants/realistic.toml";
 
@@ -29,7 +33,7 @@ const REALISTIC_NAME: &str = "assets/plants/realistic.toml";
 const MAX_BYTES: u64 = 1 << 16;
 
 /// Names of the built-in sets.
-pub const SETS: [&str; 1] = ["realistic"];
+pub const SETS: [&str; 2] = ["realistic", "openarm-realistic"];
 
 /// Error of a file of plant options.
 #[derive(Debug, thiserror::Error)]
@@ -127,6 +131,7 @@ impl PlantOptions {
     pub fn set(name: &str) -> Result<&'static str, PlantOptionsError> {
         match name {
             "realistic" => Ok(REALISTIC),
+            "openarm-realistic" => Ok(OPENARM_REALISTIC),
             _ => Err(PlantOptionsError::UnknownSet {
                 name: name.to_owned(),
                 known: SETS.join(", "),
@@ -134,11 +139,18 @@ impl PlantOptions {
         }
     }
 
-    /// The options of a command line: a file, the set `realistic`, or none.
+    /// The options of a command line: a file or a built-in set by its name, the set `realistic`, or none. A name takes
+    /// precedence; write `./realistic` for a file.
     ///
     /// # Errors
     /// As [`PlantOptions::from_file`].
     pub fn chosen(file: Option<&Path>, realistic: bool) -> Result<PlantOptions, PlantOptionsError> {
+        let named = file
+            .and_then(Path::to_str)
+            .filter(|name| SETS.contains(name));
+        if let Some(name) = named {
+            return Self::from_toml(Self::set(name)?, name);
+        }
         match (file, realistic) {
             (Some(file), _) => Self::from_file(file),
             (None, true) => Ok(Self::realistic()),

@@ -77,6 +77,27 @@ fn torques_are_quantised_to_amplifier_steps_within_half_a_step() {
     }
 }
 
+/// A drive that carries the remainder gives the commanded torque in the mean, one that does not is off by up to half a step.
+#[test]
+fn a_carried_remainder_makes_the_mean_torque_exact() {
+    let mean_nm = |carries_remainder| {
+        let mut plant = plant_with(ActuatorModel {
+            motor_torque_quantum_nm: Vector::repeat(0.5),
+            carries_remainder,
+            ..ActuatorModel::direct()
+        });
+        let mut sum = Vector::<4>::zeros();
+        for _ in 0..100 {
+            plant.cycle(&Vector::from([0.2, -0.2, 1.3, 0.0]));
+            sum += plant.truth().motor_torque_nm;
+        }
+        sum / 100.0
+    };
+    let exact = mean_nm(true) - Vector::from([0.2, -0.2, 1.3, 0.0]);
+    assert!(exact.amax() <= 0.25 / 100.0 + 1e-12, "{exact}");
+    assert_eq!(mean_nm(false), Vector::from([0.0, 0.0, 1.5, 0.0]));
+}
+
 #[test]
 fn a_torque_acts_after_exactly_its_delay_and_gravity_is_compensated_until_then() {
     for delay in [0, 1, 3] {

@@ -45,6 +45,21 @@ fn the_wam_has_the_actuators_and_friction_of_its_description() {
     assert!(config.actuators.motor_torque_quantum_nm[0] > 0.0);
 }
 
+/// Any control rate runs: the step is 0.2 ms, or what divides the cycle.
+#[test]
+fn the_step_of_the_physics_divides_the_cycle() {
+    let wam = Description::asset("wam4").unwrap();
+    let usual = PlantConfig::<4>::from_description(&wam).unwrap();
+    assert_eq!(usual.step_s, 2e-4);
+    for rate_hz in [250.0, 400.0, 500.0, 700.0, 1000.0] {
+        let arm = wam.clone().at_rate(rate_hz).unwrap();
+        let config = PlantConfig::<4>::from_description(&arm).unwrap();
+        assert!((1e-4..=2e-4).contains(&config.step_s), "{rate_hz}");
+        let home = arm.home::<4>().unwrap();
+        Plant::new(config, home, Vector::zeros()).unwrap();
+    }
+}
+
 #[test]
 fn a_wrong_number_of_joints_is_rejected() {
     let description = Description::asset("wam4").unwrap();

@@ -54,8 +54,63 @@ fn the_realistic_set_is_valid_and_has_all_effects_of_an_arm_with_cables() {
         .filter(|(_, value)| value.is_none_or(|x| x == 0.0))
         .map(|(option, _)| option.name)
         .collect();
-    // Cables have no backlash; the others belong to an experiment.
-    assert_eq!(off, ["backlash_rad", "dry_friction_change", "warmed_s"]);
+    // Cables have no backlash and no gears, and the WAM's torques are calibrated; the others belong to an experiment.
+    assert_eq!(
+        off,
+        [
+            "backlash_rad",
+            "dry_friction_change",
+            "warmed_s",
+            "gear_friction_fraction",
+            "torque_shortfall_fraction",
+            "torque_shortfall_spread"
+        ]
+    );
+}
+
+/// The set of geared motors: friction grows with load and differs by direction, and every motor falls short of its command by
+/// what users report.
+#[test]
+fn the_set_of_geared_motors_has_what_users_report() {
+    let name = std::path::Path::new("openarm-realistic");
+    let geared = PlantOptions::chosen(Some(name), false).unwrap();
+    let config = geared.apply(config(3)).unwrap();
+    for k in config.actuators.torque_constant.iter() {
+        assert!((1.0 / 1.5..=1.0 / 1.29).contains(k), "{k}");
+    }
+    let all = config.actuators.torque_constant;
+    assert!(all.max() - all.min() > 0.01, "{all}");
+    assert_eq!(config.friction_variation.gear_fraction, 0.1);
+    assert!(
+        config
+            .friction_variation
+            .direction_fraction
+            .iter()
+            .all(|d| d.abs() == 0.1)
+    );
+}
+
+/// Breakaway against gravity: the motor must give gravity, dry friction, and a tenth of what it transmits.
+#[test]
+fn gears_under_load_have_more_friction() {
+    let friction_nm = |gear_fraction: f64| {
+        let mut config = config(0);
+        config.friction = [LuGre::from_friction(&Friction::coulomb(0.0, 0.5)).without_load(); 4];
+        config.friction_variation.gear_fraction = gear_fraction;
+        config.stops = None;
+        let arm = wam4();
+        let mut plant = Plant::new(config, wam4_at(&arm, 0.6, 0.0), Vector::zeros()).unwrap();
+        let mut greatest = Vector::<4>::zeros();
+        // A torque that lifts the shoulder, far above breakaway.
+        for _ in 0..400 {
+            plant.cycle(&Vector::from([0.0, -45.0, 0.0, 0.0]));
+            greatest = greatest.sup(&plant.truth().friction_torque_nm.abs());
+        }
+        greatest[1]
+    };
+    let (without, with) = (friction_nm(0.0), friction_nm(0.1));
+    // Sliding at the torque of 45 N m: a tenth of it more, with the share of the Stribeck effect at most.
+    assert!((4.4..=5.1).contains(&(with - without)), "{without} {with}");
 }
 
 #[test]
@@ -82,6 +137,9 @@ fn every_option_changes_the_motion_and_the_same_seed_gives_the_same_bits() {
             "backlash_rad" => 0.005,
             "dry_friction_change" => 0.2,
             "warmed_s" => 100.0,
+            "gear_friction_fraction" => 0.1,
+            "torque_shortfall_fraction" => 0.28,
+            "torque_shortfall_spread" => 0.05,
             // The default is 600 s, the size of the set.
             "warm_up_s" => 60.0,
             _ => value.unwrap(),

@@ -16,9 +16,10 @@ mod table;
 
 pub use table::{FirmwareTooOld, PropertyTable, PuckKind, Slot};
 
-use crate::frame::{CanFrame, LengthError};
+use crate::frame::LengthError;
 use crate::id::{Destination, GroupId, MessageId, NodeId};
 use core::fmt;
+use supple_can_frame::CanFrame;
 
 pub(crate) const SET_BIT: u8 = 0x80;
 
@@ -180,7 +181,7 @@ impl PropertyMessage {
                 let value = i32::from_le_bytes([a, b, c, d]);
                 (head, padding, Value::Wide(value))
             }
-            _ => return Err(PropertyError::Length(frame.wrong_length(&[1, 4, 6]))),
+            _ => return Err(PropertyError::Length(LengthError::of(frame, &[1, 4, 6]))),
         };
         if head & SET_BIT == 0 {
             return Err(PropertyError::GetWithValue(head));
@@ -195,14 +196,14 @@ impl PropertyMessage {
     pub const fn emit(&self, from: NodeId, to: Destination) -> CanFrame {
         let id = MessageId::new(from, to);
         match *self {
-            PropertyMessage::Get(property) => CanFrame::of(id, [property.0]),
+            PropertyMessage::Get(property) => CanFrame::of(id.can_id(), [property.0]),
             PropertyMessage::Set(property, Value::Narrow(value)) => {
                 let [a, b] = value.to_le_bytes();
-                CanFrame::of(id, [property.0 | SET_BIT, 0, a, b])
+                CanFrame::of(id.can_id(), [property.0 | SET_BIT, 0, a, b])
             }
             PropertyMessage::Set(property, Value::Wide(value)) => {
                 let [a, b, c, d] = value.to_le_bytes();
-                CanFrame::of(id, [property.0 | SET_BIT, 0, a, b, c, d])
+                CanFrame::of(id.can_id(), [property.0 | SET_BIT, 0, a, b, c, d])
             }
         }
     }

@@ -3,11 +3,12 @@
 
 use crate::property::config;
 use proptest::prelude::*;
+use supple_can_frame::CanFrame;
+use supple_can_frame::timing::{bits, max_bits, min_bits};
 use supple_puck::force_torque::{Quantity, SensorReading, SensorStatus};
 use supple_puck::property::Reply;
 use supple_puck::safety::{PenWord, Pendant, SafetyMode, SevenSegment, SpeedLimit};
 use supple_puck::status::{MotorMode, Role, Stat};
-use supple_puck::timing::{bits, max_bits, min_bits};
 use supple_puck::*;
 
 #[test]
@@ -122,8 +123,9 @@ proptest! {
         let id = PropertyId::new(id).unwrap();
         for message in [PropertyMessage::Get(id), PropertyMessage::Set(id, value)] {
             let frame = message.emit(from, to);
-            prop_assert_eq!(frame.id().from(), from);
-            prop_assert_eq!(frame.id().to(), to);
+            let id = MessageId::of(&frame).unwrap();
+            prop_assert_eq!(id.from(), from);
+            prop_assert_eq!(id.to(), to);
             prop_assert_eq!(PropertyMessage::parse(&frame), Ok(message));
         }
         let reply = Reply { property: id, value };
@@ -148,7 +150,8 @@ proptest! {
     /// Decoders accept or reject any frame, and re-encode an accepted one identically.
     #[test]
     fn frames_are_rejected_or_round_trip(frame in any_frame()) {
-        let (from, to) = (frame.id().from(), frame.id().to());
+        let id = MessageId::of(&frame).unwrap();
+        let (from, to) = (id.from(), id.to());
         if let Ok(message) = PropertyMessage::parse(&frame) {
             prop_assert_eq!(message.emit(from, to), frame);
         }

@@ -1,10 +1,11 @@
 //! Frames encoded by hand from the protocol descriptions, byte by byte.
 
+use supple_can_frame::CanFrame;
+use supple_can_frame::timing::{max_bits, min_bits};
 use supple_puck::force_torque::{self, Quantity, SensorReading, SensorStatus};
 use supple_puck::inbound::InboundError;
 use supple_puck::property::{self, PropertyError, Reply};
 use supple_puck::safety::{Button, Level, PenWord, Pendant, PendantError, SevenSegment};
-use supple_puck::timing::{max_bits, min_bits};
 use supple_puck::*;
 
 fn frame(id: u32, payload: &[u8]) -> CanFrame {

@@ -9,7 +9,7 @@ use crate::sections::quadrants_with_models;
 use plotters::style::text_anchor::HPos;
 use std::ops::Range;
 use supple_core::trajectory::{Piece, Quadrant};
-use supple_experiment::{Demo, Sample, scenario};
+use supple_experiment::{Demo, Sample};
 
 /// Height of the legend above all rows \[px\].
 const HEAD_PX: f64 = 24.0;
@@ -35,8 +35,8 @@ pub fn quadrant_runs(demo: &Demo) -> Vec<QuadrantRun<'_>> {
     let runs = quadrants_with_models(&demo.summary)
         .into_iter()
         .zip(&demo.quadrants);
-    runs.map(|((summary, model), run)| QuadrantRun {
-        quadrant: scenario::quadrant(summary.speed_m_per_s).0,
+    runs.map(|((summary, model), (quadrant, run))| QuadrantRun {
+        quadrant: *quadrant,
         title: format!("{:.3} m/s, {model}", summary.speed_m_per_s),
         samples: &run.trace.samples,
     })
@@ -66,35 +66,39 @@ pub fn draw(quadrant_runs: &[QuadrantRun<'_>]) -> Result<String, FigureError> {
 }
 
 fn draw_path(area: &super::panel::Area<'_>, run: &QuadrantRun<'_>) -> Result<(), FigureError> {
-    let coordinate = |axis: usize| {
-        extent(
-            run.samples
-                .iter()
-                .flat_map(move |s| [s.reference_m[axis], s.tip_m[axis]]),
-        )
+    // Horizontal coordinate along the first semi-axis: x where the paper has the path.
+    let along = run.quadrant.first_m();
+    let along = along / along.norm();
+    let seen = move |point: &[f64; 3]| (along.x * point[0] + along.y * point[1], point[2]);
+    let points = || {
+        let samples = run.samples.iter();
+        samples.flat_map(|s| [seen(&s.reference_m), seen(&s.tip_m)])
+    };
+    let horizontal = if along.y == 0.0 {
+        "x [m]"
+    } else {
+        "outward [m]"
     };
     let margins = Margins::default();
     let axes_px = margins.axes_px(PATH_WIDTH_PX, HEIGHT_PX);
-    let (x_range, z_range) = same_scale(coordinate(0), coordinate(2), axes_px);
+    let (x_range, z_range) = same_scale(
+        extent(points().map(|(x, _)| x)),
+        extent(points().map(|(_, z)| z)),
+        axes_px,
+    );
     let mut panel = Panel::new(
         area,
         &run.title,
         margins,
-        &Axis::bounded("x [m]", Ticks::stepped(x_range.clone(), 0.1), x_range),
+        &Axis::bounded(horizontal, Ticks::stepped(x_range.clone(), 0.1), x_range),
         &Axis::bounded("z [m]", Ticks::stepped(z_range.clone(), 0.1), z_range),
     )?;
     panel.line(
-        run.samples
-            .iter()
-            .map(|s| (s.reference_m[0], s.reference_m[2])),
+        run.samples.iter().map(|s| seen(&s.reference_m)),
         REFERENCE,
         5.0,
     )?;
-    panel.line(
-        run.samples.iter().map(|s| (s.tip_m[0], s.tip_m[2])),
-        BLUE,
-        1.4,
-    )
+    panel.line(run.samples.iter().map(|s| seen(&s.tip_m)), BLUE, 1.4)
 }
 
 /// Widens both ranges to axis ranges that have the same scale (metres per pixel).

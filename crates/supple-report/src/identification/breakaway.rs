@@ -29,7 +29,7 @@ pub struct Line {
 /// # Errors
 /// [`Failure`].
 pub fn run(args: &BreakawayArgs) -> Result<(), Failure> {
-    let arm = arms::find(&args.arm, args.strict)?;
+    let arm = arms::find(&args.urdf.name(&args.arm), args.strict)?;
     let joints = joints(&args.joints, arm.dof())?;
     let effects = args.plant.options()?;
     let lines = with_dof!(arm.dof(), N => {

@@ -4,7 +4,7 @@ use super::identify::{FILES, print, write};
 use super::report::{ReportInput, summary};
 use crate::demo;
 use serde::Serialize;
-use supple_cli::arguments::{CalibrateArgs, DemoArgs};
+use supple_cli::arguments::{CalibrateArgs, DemoArgs, UrdfArgs};
 use supple_cli::arms;
 use supple_cli::console::{json, print_line, print_status};
 use supple_cli::exit::Failure;
@@ -46,13 +46,17 @@ struct Summary {
 /// # Errors
 /// [`Failure`].
 pub fn run(args: &CalibrateArgs) -> Result<(), Failure> {
-    let arm = arms::find(&args.arm, args.strict)?;
+    if args.on.is_some() {
+        return Err(Failure::NeedsSupple { option: "--plant" });
+    }
+    let arm = arms::find(&args.urdf.name(&args.arm), args.strict)?;
     with_dof!(arm.dof(), N => run_with_dof::<N>(&arm, args))??;
     if args.no_demo {
         return Ok(());
     }
     let plant = args.out.join(PLANT);
     demo::run(&DemoArgs {
+        urdf: UrdfArgs::default(),
         arm: match args.ripple > 0.0 {
             true => plant.display().to_string(),
             false => args.arm.clone(),

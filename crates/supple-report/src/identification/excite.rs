@@ -37,7 +37,7 @@ struct Summary<'a> {
 /// # Errors
 /// [`Failure`].
 pub fn run(args: &DesignArgs) -> Result<(), Failure> {
-    let arm = arms::find(&args.arm, args.strict)?;
+    let arm = arms::find(&args.urdf.name(&args.arm), args.strict)?;
     let moving = joints(&args.moving, arm.dof())?;
     let workspace = match args.workspace[..] {
         [a, b, c, d, e, f] => Some(Workspace {

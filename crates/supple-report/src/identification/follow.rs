@@ -41,7 +41,7 @@ struct Summary<'a> {
 /// # Errors
 /// [`Failure`].
 pub fn run(args: &RunArgs) -> Result<(), Failure> {
-    let arm = arms::find(&args.arm, args.strict)?;
+    let arm = arms::find(&args.urdf.name(&args.arm), args.strict)?;
     let design = read(&args.design)?;
     with_dof!(arm.dof(), N => run_with_dof::<N>(&arm, &design, args))?
 }

@@ -2,15 +2,16 @@
 
 use super::report::{ReportInput, Summary, html, summary};
 use std::path::Path;
-use supple_cli::arguments::IdentifyArgs;
+use supple_cli::arguments::{IdentifyArgs, TorqueDelay};
 use supple_cli::arms;
 use supple_cli::console::{json, print_line};
 use supple_cli::exit::Failure;
 use supple_cli::out::Staging;
+use supple_core::Arm;
 use supple_experiment::predict_tracking_error;
 use supple_ident::{
-    Fit, FrictionChoice, Log, Motion, Preparation, Procedure, Validation, fit_with_stribeck,
-    identify_motions, read_logs,
+    Fit, Log, Motion, Preparation, Procedure, Validation, fit_with_stribeck, identify_motions,
+    read_logs,
 };
 use supple_model::{Description, with_dof};
 
@@ -30,7 +31,7 @@ pub const FILES: [&str; 4] = ["arm.urdf", "arm.toml", "report.html", "summary.js
 /// # Errors
 /// [`Failure`].
 pub fn run(args: &IdentifyArgs) -> Result<(), Failure> {
-    let arm = arms::find(&args.arm, args.strict)?;
+    let arm = arms::find(&args.urdf.name(&args.arm), args.strict)?;
     with_dof!(arm.dof(), N => run_with_dof::<N>(&arm, args))?
 }
 
@@ -45,10 +46,21 @@ fn procedure(args: &IdentifyArgs, period_s: f64) -> Procedure {
             keep_every: if all_mcap { 10 } else { 1 },
             // supple's own logs contain commanded torques; a command acts one cycle later and for one cycle, hence
             // the delay of 1.5 periods.
-            torque_delay_s: if all_mcap { 1.5 * period_s } else { 0.0 },
+            torque_delay_s: match args.torque_delay {
+                Some(TorqueDelay::Seconds(delay_s)) => delay_s,
+                Some(TorqueDelay::Estimate) => 0.0,
+                None if all_mcap => 1.5 * period_s,
+                None => 0.0,
+            },
         },
+        estimate_delay: match args.torque_delay {
+            Some(delay) => delay == TorqueDelay::Estimate,
+            None => !all_mcap,
+        },
+        accept_wrong_logs: args.accept_wrong_logs,
+        prior_weight: args.prior_weight,
         method: args.method.into(),
-        friction: FrictionChoice::Auto,
+        friction: args.friction.into(),
         slow_rad_per_s: slow_limit_rad_per_s(args).unwrap_or(0.0),
         joint_noise_nm: (!args.noise.is_empty()).then(|| args.noise.clone()),
         ..Procedure::default()
@@ -76,16 +88,17 @@ fn slow_limit_rad_per_s(args: &IdentifyArgs) -> Option<f64> {
 type NamedMotions = Vec<(String, Motion)>;
 
 fn motions<const N: usize>(
+    nominal: &Arm<N>,
     paths: &[std::path::PathBuf],
     moving: &[usize],
-    preparation: &Preparation,
+    procedure: &Procedure,
     warnings: &mut Vec<supple_ident::Warning>,
 ) -> Result<NamedMotions, Failure> {
     let mut all = Vec::new();
     for path in paths {
         let logs: Vec<Log> = read_logs::<N>(path)?;
         for log in &logs {
-            let (motion, motion_warnings) = Motion::prepare(log, N, moving, preparation)?;
+            let (motion, motion_warnings) = procedure.prepare(nominal, log, moving)?;
             warnings.extend(motion_warnings);
             all.push((path.display().to_string(), motion));
         }
@@ -99,9 +112,8 @@ fn run_with_dof<const N: usize>(arm: &Description, args: &IdentifyArgs) -> Resul
     let procedure = procedure(args, arm.settings().period_s);
     let moving = procedure.moving_joints(N)?;
     let mut warnings = Vec::new();
-    let preparation = &procedure.preparation;
-    let mut fitted = motions::<N>(&args.logs, &moving, preparation, &mut warnings)?;
-    let mut held_out = motions::<N>(&args.validate, &moving, preparation, &mut warnings)?;
+    let mut fitted = motions::<N>(&nominal, &args.logs, &moving, &procedure, &mut warnings)?;
+    let mut held_out = motions::<N>(&nominal, &args.validate, &moving, &procedure, &mut warnings)?;
     if held_out.is_empty()
         && let Some((name, motion)) = fitted.first_mut()
     {
@@ -116,7 +128,7 @@ fn run_with_dof<const N: usize>(arm: &Description, args: &IdentifyArgs) -> Resul
     let data: Vec<Motion> = fitted.iter().map(|(_, motion)| motion.clone()).collect();
     let mut fit: Fit<N> = if slow_limit_rad_per_s(args).is_some() {
         let with_fixed_prior = Procedure {
-            prior_weight: Some(1.0),
+            prior_weight: procedure.prior_weight.or(Some(1.0)),
             ..procedure.clone()
         };
         fit_with_stribeck(&nominal, &data, &moving, &with_fixed_prior)?
@@ -177,9 +189,32 @@ pub fn write<const N: usize>(
 /// # Errors
 /// [`Failure::File`].
 pub fn print(summary: &Summary, out: &Path) -> Result<(), Failure> {
-    for (subject, table) in &summary.choices {
-        print_line(&format!("{subject}\n{}", table.trim_end()))?;
+    for line in [
+        &summary.verdict,
+        &summary.verdict_at_5_n_per_m,
+        &summary.trial_runs,
+    ] {
+        print_line(line)?;
     }
+    for friction in &summary.friction {
+        print_line(&format!(
+            "{}: Coulomb {:.3} N m, viscous {:.3} N m s/rad, breakaway {:.3} N m, offset {:.3} N m",
+            friction.joint,
+            friction.coulomb_nm,
+            friction.viscous_nm_s_per_rad,
+            friction.breakaway_nm,
+            friction.offset_nm
+        ))?;
+    }
+    let delays: Vec<String> = summary
+        .torque_delay_s
+        .iter()
+        .map(|delay_s| format!("{:.1} ms", 1e3 * delay_s))
+        .collect();
+    print_line(&format!(
+        "time from a logged torque to its action, by held-out log: {}",
+        delays.join(", ")
+    ))?;
     print_line(&format!(
         "rank {} of {} columns, condition number {:.1}, residual {:.2} % of the torque",
         summary.rank,
@@ -197,7 +232,5 @@ pub fn print(summary: &Summary, out: &Path) -> Result<(), Failure> {
     for warning in &summary.warnings {
         print_line(&format!("warning: {warning}"))?;
     }
-    print_line(&summary.verdict)?;
-    print_line(&summary.verdict_at_5_n_per_m)?;
     print_line(&format!("model and report: {}", out.display()))
 }

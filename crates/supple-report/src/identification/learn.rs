@@ -33,7 +33,7 @@ struct Summary<'a> {
 /// # Errors
 /// [`Failure`].
 pub fn run(args: &LearnArgs) -> Result<(), Failure> {
-    let arm = arms::find(&args.arm, args.strict)?;
+    let arm = arms::find(&args.urdf.name(&args.arm), args.strict)?;
     with_dof!(arm.dof(), N => run_with_dof::<N>(&arm, args))?
 }
 

@@ -4,7 +4,8 @@ use crate::figures::identification::{Curves, curves};
 use askama::Template;
 use serde::Serialize;
 use supple_cli::exit::Failure;
-use supple_experiment::TrackingPrediction;
+use supple_experiment::scenario::STIFFNESS_N_PER_M;
+use supple_experiment::{ErrorInterval, GOOD_M, TrackingPrediction, error_interval};
 use supple_ident::{DMatrix, Fit, Motion, Validation};
 use supple_model::Description;
 
@@ -46,8 +47,47 @@ pub struct Summary {
     pub verdict: String,
     /// Verdict for 5 N/m, as text.
     pub verdict_at_5_n_per_m: String,
-    /// The predicted tracking error on which that verdict is based.
+    /// Interval of the tracking error at 5 N/m from the held-out residuals; `None` if the joints that move the tip were not
+    /// identified.
+    pub interval_at_5_n_per_m: Option<ErrorInterval>,
+    /// Result of the trial runs in simulation, as text: what the uncertainty of the parameters alone would give.
+    pub trial_runs: String,
+    /// Given and found parameters of each link.
+    pub links: Vec<LinkChange>,
+    /// Mean residual of each moving joint over its angle, by direction, in the first held-out log.
+    pub residual_over_angle: Vec<OverAngle>,
+    /// Time from a logged torque to its action, for each held-out log \[s\]; negative if torques lag.
+    pub torque_delay_s: Vec<f64>,
+    /// The tracking error of the trial runs.
     pub foretold: Option<TrackingPrediction>,
+}
+
+/// Given and found parameters of a link.
+#[derive(Clone, Debug, Serialize)]
+pub struct LinkChange {
+    /// Name of the joint that moves it.
+    pub joint: String,
+    /// Mass \[kg\].
+    pub mass_kg: [f64; 2],
+    /// Centre of mass in the link's joint frame \[m\].
+    pub com_m: [[f64; 3]; 2],
+    /// Rotor inertia of the joint \[kg m^2\].
+    pub rotor_kg_m2: [f64; 2],
+}
+
+/// Mean residual of a joint over its angle.
+#[derive(Clone, Debug, Serialize)]
+pub struct OverAngle {
+    /// Name of the joint.
+    pub joint: String,
+    /// Least angle, as text \[rad\].
+    pub from_rad: String,
+    /// Greatest angle, as text \[rad\].
+    pub to_rad: String,
+    /// Mean residual in each twelfth of the range while the angle grows \[N m\], as text.
+    pub forward: String,
+    /// The same while it falls.
+    pub backward: String,
 }
 
 /// Prediction of one log.
@@ -118,6 +158,22 @@ pub fn summary<const N: usize>(input: &ReportInput<'_, N>) -> Summary {
         });
     let friction = fit.friction_with(input.arm.friction());
     let names = input.arm.joint_names();
+    let moving: Vec<String> = fit
+        .columns
+        .moving()
+        .iter()
+        .map(|j| names[*j].clone())
+        .collect();
+    let named: Vec<(String, &Validation)> = input
+        .held_out
+        .iter()
+        .map(|(log, _, validation)| (log.clone(), validation))
+        .collect();
+    let interval = interval(input);
+    let delays_s = input
+        .held_out
+        .iter()
+        .map(|(_, motion, _)| motion.torque_delay_s);
     Summary {
         arm: input.arm.name().to_owned(),
         logs: input.logs.clone(),
@@ -157,16 +213,131 @@ pub fn summary<const N: usize>(input: &ReportInput<'_, N>) -> Summary {
             .map(|choice| (choice.subject.to_owned(), choice.table.to_string()))
             .collect(),
         warnings: fit.warnings.iter().map(ToString::to_string).collect(),
-        verdict: input
-            .held_out
-            .first()
-            .map_or_else(|| "not validated".to_owned(), |(_, _, v)| v.verdict()),
-        verdict_at_5_n_per_m: input.predicted_tracking.as_ref().map_or_else(
-            || "no prediction: the arm cannot reach the paper's sinusoid".to_owned(),
-            TrackingPrediction::verdict,
-        ),
+        verdict: supple_ident::verdict(&named, &moving),
+        verdict_at_5_n_per_m: at_5_n_per_m(interval.as_ref(), input, &names),
+        trial_runs: trial_runs(input.predicted_tracking.as_ref()),
+        links: links(input, &names),
+        residual_over_angle: over_angle(input, &names),
+        interval_at_5_n_per_m: interval,
+        torque_delay_s: delays_s.collect(),
         foretold: input.predicted_tracking.clone(),
     }
+}
+
+/// Result of the trial runs as text.
+fn trial_runs(found: Option<&TrackingPrediction>) -> String {
+    let Some(found) = found else {
+        return "no trial run: the arm cannot reach the paper's sinusoid".to_owned();
+    };
+    let reasons = found.reasons.join("; ");
+    match (found.median_m, found.worst_m) {
+        (Some(median_m), Some(worst_m)) if found.reasons.is_empty() => format!(
+            "trial runs in simulation, with models drawn from the uncertainty of the parameters alone: tracking error {:.1} mm, \
+             worst {:.1} mm",
+            1e3 * median_m,
+            1e3 * worst_m
+        ),
+        (Some(_), Some(_)) => format!("trial runs in simulation failed or ended early: {reasons}"),
+        _ => format!("no trial run in simulation: {reasons}"),
+    }
+}
+
+fn links<const N: usize>(input: &ReportInput<'_, N>, names: &[String]) -> Vec<LinkChange> {
+    let given = input.fit.nominal();
+    let Ok(found) = input.fit.arm() else {
+        return Vec::new();
+    };
+    let both = |k: usize| [given.body(k), found.body(k)];
+    let change = |k: usize| LinkChange {
+        joint: names[k].clone(),
+        mass_kg: both(k).map(|body| body.mass_kg),
+        com_m: both(k).map(|body| body.com_m.into()),
+        rotor_kg_m2: [given.armature()[k], found.armature()[k]],
+    };
+    (0..N).map(change).collect()
+}
+
+/// Number of cells of [`OverAngle`].
+const CELLS: usize = 12;
+
+fn over_angle<const N: usize>(input: &ReportInput<'_, N>, names: &[String]) -> Vec<OverAngle> {
+    let Some((_, motion, _)) = input.held_out.first() else {
+        return Vec::new();
+    };
+    let Ok(predicted) = input.fit.predict_motion(motion) else {
+        return Vec::new();
+    };
+    let of_joint = |(row, &joint): (usize, &usize)| {
+        let angles = motion.q.column(joint);
+        let (low, high) = (angles.min(), angles.max());
+        let mut sums = [[(0.0, 0.0); CELLS]; 2];
+        for i in 0..motion.samples() {
+            let place = CELLS as f64 * (angles[i] - low) / (high - low).max(f64::MIN_POSITIVE);
+            let cell = (place as usize).min(CELLS - 1);
+            let sum = &mut sums[usize::from(motion.qd[(i, joint)] > 0.0)][cell];
+            sum.0 += 1.0;
+            sum.1 += motion.tau[(i, joint)] - predicted[(i, row)];
+        }
+        let text = |cells: &[(f64, f64); CELLS]| {
+            let means = cells.iter().map(|(n, sum)| match *n > 0.0 {
+                true => format!("{:+.2}", sum / n),
+                false => "-".to_owned(),
+            });
+            means.collect::<Vec<_>>().join(" ")
+        };
+        OverAngle {
+            joint: names[joint].clone(),
+            from_rad: format!("{low:.2}"),
+            to_rad: format!("{high:.2}"),
+            forward: text(&sums[1]),
+            backward: text(&sums[0]),
+        }
+    };
+    input
+        .fit
+        .columns
+        .moving()
+        .iter()
+        .enumerate()
+        .map(of_joint)
+        .collect()
+}
+
+/// The interval of the tracking error at 5 N/m.
+fn interval<const N: usize>(input: &ReportInput<'_, N>) -> Option<ErrorInterval> {
+    let config = input.arm.config::<N>().ok()?;
+    let moving = input.fit.columns.moving();
+    let mut residuals = Vec::new();
+    for (_, motion, _) in &input.held_out {
+        let predicted = input.fit.predict_motion(motion).ok()?;
+        let measured = motion.tau.select_columns(moving);
+        residuals.push((motion, measured - predicted));
+    }
+    let pairs: Vec<_> = residuals.iter().map(|(motion, r)| (*motion, r)).collect();
+    error_interval(&config, moving, &pairs, STIFFNESS_N_PER_M)
+}
+
+/// Verdict at 5 N/m as text, from the held-out residuals.
+fn at_5_n_per_m<const N: usize>(
+    interval: Option<&ErrorInterval>,
+    input: &ReportInput<'_, N>,
+    names: &[String],
+) -> String {
+    let Some(interval) = interval else {
+        return "no interval at 5 N/m: no joint that moves the tip was identified".to_owned();
+    };
+    let (lower, upper) = (1e3 * interval.lower_m, 1e3 * interval.upper_m);
+    let (log, joint) = interval.worst;
+    let good = if interval.upper_m <= GOOD_M {
+        "good"
+    } else {
+        "not good"
+    };
+    format!(
+        "{good} for 5 N/m: the residuals that are not noise allow a tracking error of {lower:.1} to {upper:.1} mm (90 %); {} \
+         in {} counts most",
+        names[joint], input.held_out[log].0
+    )
 }
 
 #[derive(Template)]

@@ -115,8 +115,8 @@ pub(super) fn quadrant(summary: &Summary) -> Section {
                with a perturbed model, then at the paper's maximum speed. A corner there changes the velocity by \
                0.3 to 0.4 m/s at once; no torque follows that, so the arm keeps the difference, which the \
                damping takes away with the time constant m / B: about a second for 1.4 kg and 1.5 N s/m, as long as \
-               a piece lasts. With ten times the damping it dies out; so it would with a reference of finite \
-               acceleration, which the law feeds forward (figure 3a at twice the speed).",
+               a piece lasts. With ten times the damping it dies out. With a reference that stops at each corner, by an acceleration \
+               that the law feeds forward, it does not arise.",
         rows,
     }
 }

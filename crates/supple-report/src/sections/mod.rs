@@ -94,7 +94,7 @@ pub fn faults(summary: &Summary) -> Vec<(String, &FaultEnd)> {
 }
 
 /// Runs of the quadrant, each with the model of its controller.
-pub fn quadrants_with_models(summary: &Summary) -> [(&QuadrantSummary, &'static str); 4] {
+pub fn quadrants_with_models(summary: &Summary) -> [(&QuadrantSummary, &'static str); 5] {
     [
         (&summary.quadrant, "exact model"),
         (&summary.quadrant_perturbed, "perturbed model"),
@@ -102,6 +102,10 @@ pub fn quadrants_with_models(summary: &Summary) -> [(&QuadrantSummary, &'static 
         (
             &summary.quadrant_damped,
             "exact model, ten times the damping",
+        ),
+        (
+            &summary.quadrant_corner_ramp,
+            "exact model, finite acceleration at the corners",
         ),
     ]
 }

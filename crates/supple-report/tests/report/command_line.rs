@@ -35,7 +35,12 @@ fn an_unknown_arm_is_code_3_and_the_arms_are_listed() {
     let out = folder.path().join("out");
     let answer = run(&["demo", "--arm", "wam5", "--out", crate::support::arg(&out)]);
     assert_eq!(answer.code, Some(3));
-    assert_one_clear_line(&answer, &["wam5", "paper3", "wam3", "wam4", "wam7", "TOML"]);
+    assert_one_clear_line(
+        &answer,
+        &[
+            "wam5", "paper3", "wam3", "wam4", "wam7", "openarm", "yam", "TOML",
+        ],
+    );
     assert!(answer.stdout.is_empty());
     assert!(
         crate::support::tree(folder.path()).is_empty(),

@@ -157,6 +157,7 @@ fn the_summary_has_every_promised_number() {
         "exploration_apparent_inertia.1.peak_filtered_n",
         "sinusoid_apparent_inertia.rms_error_m",
         "quadrant_damped.rms_error_m",
+        "quadrant_corner_ramp.rms_error_m",
         "impulse_slopes.7.slope",
         "impulse_fit.slope",
         "impulse_fit.intercept",

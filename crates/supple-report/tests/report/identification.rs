@@ -179,7 +179,7 @@ fn a_calibration_prints_its_verdict_and_that_it_is_a_simulation() {
     for words in [
         "breakaway of joint1",
         "ripple of motor 3: harmonic 6",
-        "good for 5 N/m",
+        "for 5 N/m: the residuals",
         "sinusoid at 5 N/m with this model",
         "this is a simulation",
     ] {

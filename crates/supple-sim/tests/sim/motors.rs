@@ -1,17 +1,75 @@
-//! Behaviour of the drives with and without answers: the fallback torque acts for at most 100 ms, then the motors
-//! brake, and braking only dissipates energy.
+//! Behaviour of the drives with and without answers, in the loop that every arm has: the fallback torque acts until the
+//! motors brake, 10 ms after the last answer, and braking only dissipates energy.
 
+use supple_core::Vector;
 use supple_core::controller::codes::fault_kind;
 use supple_core::controller::{Controller, Mode, Request, State};
 use supple_core::drive_guard::{DriveCommand, DriveGuard};
-use supple_core::{Input, Vector, step};
-use supple_ipc::message::{Drives, TorqueCommand};
+use supple_core::{Input, step};
+use supple_drive::{Answer, ArmReport, Command, Drives, Link, LoopError, LossReason, Stage};
+use supple_ipc::message::TorqueCommand;
 use supple_model::Description;
-use supple_sim::Motors;
+use supple_plant::{Plant, PlantConfig};
+use supple_sim::{SimulatedArm, Simulation, simulation};
 
-const FALLBACK_CYCLES: usize = 100;
+/// Cycles without an answer until the motors brake.
+const ANSWER_CYCLES: usize = 10;
 
-fn answer(request: Option<Request<4>>) -> TorqueCommand {
+/// A link whose answers the test gives.
+#[derive(Default)]
+struct Scripted {
+    command: Option<Command<4>>,
+    report: Option<ArmReport<4>>,
+}
+
+impl Link<4> for Scripted {
+    fn announce(&mut self) -> Result<(), LoopError> {
+        Ok(())
+    }
+
+    fn publish(&mut self, report: &ArmReport<4>) -> Result<(), LoopError> {
+        self.report = Some(*report);
+        Ok(())
+    }
+
+    fn answer(&mut self, _: u64, _: u64) -> Result<Answer<4>, LoopError> {
+        Ok(Answer {
+            command: self.command,
+            late: 0,
+        })
+    }
+}
+
+struct Motors(Simulation<4, Scripted>);
+
+impl Motors {
+    fn new() -> Motors {
+        let description = Description::asset("wam4").expect("built in");
+        let plant = PlantConfig::from_description(&description).expect("valid");
+        let home = description.home::<4>().expect("four joints");
+        let plant = Plant::new(plant, home, Vector::zeros()).expect("valid");
+        let arm = SimulatedArm::new(plant, true, 0.75);
+        let config = description.config().expect("valid");
+        Motors(simulation(arm, Scripted::default(), &config).expect("no bus is needed"))
+    }
+
+    /// Runs a cycle with an answer; returns the joint torques that the motors received.
+    fn cycle(&mut self, command: Option<&Command<4>>) -> Vector<4> {
+        self.0.link_mut().command = command.copied();
+        self.0.run().expect("it runs");
+        self.0.drive().applied_nm()
+    }
+
+    fn drives(&self) -> Drives {
+        self.0.drives()
+    }
+
+    fn loss(&self) -> Option<LossReason> {
+        self.0.guard().last_loss().map(|(loss, _)| loss)
+    }
+}
+
+fn answer(request: Option<Request<4>>) -> Command<4> {
     let description = Description::asset("wam4").expect("built in");
     let controller = Controller::new(description.config().expect("valid")).expect("valid");
     let home = description.home::<4>().expect("four joints");
@@ -23,12 +81,15 @@ fn answer(request: Option<Request<4>>) -> TorqueCommand {
         request,
     };
     let output = step(&controller, &mut State::new(&controller), &input);
-    TorqueCommand::new(&output, false)
-}
-
-fn motors() -> Motors<4> {
-    let config = Description::asset("wam4").expect("built in").config();
-    Motors::new(1e-3, DriveGuard::new(&config.expect("valid")))
+    let command = TorqueCommand::new(&output, false);
+    Command {
+        torque_nm: command.torque().expect("four joints"),
+        fallback_torque_nm: command.fallback_torque().expect("four joints"),
+        wants_torque: command.wants_torque(),
+        mode: command.mode(),
+        fault: command.fault != 0,
+        codes: [command.mode, command.fault],
+    }
 }
 
 fn home() -> [Option<f64>; 4] {
@@ -39,68 +100,71 @@ fn home() -> [Option<f64>; 4] {
 #[test]
 fn drives_are_active_exactly_while_torque_is_requested() {
     let (hold, idle) = (answer(Some(Request::GravityHold)), answer(None));
-    let mut motors = motors();
+    let mut motors = Motors::new();
     assert_eq!(motors.drives(), Drives::Idle);
-    assert_eq!(motors.torque(&home(), Some(&idle)), Ok(Vector::zeros()));
+    motors.cycle(Some(&idle));
     assert_eq!(motors.drives(), Drives::Idle);
-    assert_eq!(motors.torque(&home(), Some(&hold)), hold.torque());
+    let torque_nm = motors.cycle(Some(&hold));
+    assert_eq!(torque_nm, hold.torque_nm);
     assert_eq!(motors.drives(), Drives::Active);
-    assert_eq!(motors.torque(&home(), Some(&idle)), Ok(Vector::zeros()));
+    motors.cycle(Some(&idle));
     assert_eq!(motors.drives(), Drives::Idle);
+    assert_eq!(motors.loss(), Some(LossReason::TorqueNotWanted));
+    // No loss is latched.
+    motors.cycle(Some(&idle));
+    motors.cycle(Some(&hold));
+    assert_eq!(motors.drives(), Drives::Active);
 }
 
 #[test]
-fn the_fallback_acts_for_100_ms_and_then_the_motors_brake() {
-    let hold = answer(Some(Request::GravityHold));
-    let mut motors = motors();
-    motors.torque(&home(), Some(&hold)).expect("four joints");
-    for _ in 0..FALLBACK_CYCLES {
-        assert_eq!(motors.torque(&home(), None), hold.fallback_torque());
+fn the_fallback_acts_until_the_motors_brake_as_on_a_real_arm() {
+    let (hold, idle) = (answer(Some(Request::GravityHold)), answer(None));
+    let mut motors = Motors::new();
+    motors.cycle(Some(&hold));
+    for _ in 0..ANSWER_CYCLES {
+        let torque_nm = motors.cycle(None);
+        assert_eq!(torque_nm, hold.fallback_torque_nm);
         assert_eq!(motors.drives(), Drives::Active);
     }
-    assert_eq!(motors.torque(&home(), None), Ok(Vector::zeros()));
+    motors.cycle(None);
     assert_eq!(motors.drives(), Drives::Idle);
+    assert_eq!(motors.loss(), Some(LossReason::Answer));
     // After a loss of answers the controller must be idle before its torque is applied again.
-    assert_eq!(motors.torque(&home(), Some(&hold)), Ok(Vector::zeros()));
-    assert_eq!(motors.drives(), Drives::Idle);
-    motors
-        .torque(&home(), Some(&answer(None)))
-        .expect("four joints");
-    assert_eq!(motors.torque(&home(), Some(&hold)), hold.torque());
+    for _ in 0..5 {
+        motors.cycle(Some(&hold));
+        assert_eq!(motors.drives(), Drives::Idle);
+        assert_eq!(motors.0.guard().stage(), Stage::Resting);
+    }
+    motors.cycle(Some(&idle));
+    motors.cycle(Some(&hold));
+    assert_eq!(motors.drives(), Drives::Active);
 }
 
 #[test]
-fn an_answer_restarts_the_100_ms_of_fallback() {
+fn an_answer_restarts_the_time_of_the_fallback() {
     let hold = answer(Some(Request::GravityHold));
-    let mut motors = motors();
+    let mut motors = Motors::new();
     for _ in 0..5 {
-        motors.torque(&home(), Some(&hold)).expect("four joints");
-        for _ in 0..FALLBACK_CYCLES {
-            assert_eq!(motors.torque(&home(), None), hold.fallback_torque());
+        motors.cycle(Some(&hold));
+        for _ in 0..ANSWER_CYCLES {
+            motors.cycle(None);
         }
     }
     assert_eq!(motors.drives(), Drives::Active);
 }
 
 #[test]
-fn an_answer_for_another_arm_is_refused() {
-    let config = Description::asset("wam3").expect("built in").config();
-    let mut motors = Motors::<3>::new(1e-3, DriveGuard::new(&config.expect("valid")));
-    assert!(motors.torque(&[Some(0.0); 3], Some(&answer(None))).is_err());
-}
-
-#[test]
 fn drives_become_active_only_in_gravity_hold() {
     let hold = answer(Some(Request::GravityHold));
     for mode in [Mode::Move, Mode::Track, Mode::Excite, Mode::Fault] {
-        let mut motors = motors();
-        let command = TorqueCommand {
-            mode: mode as u8,
+        let mut motors = Motors::new();
+        let command = Command {
+            mode: Some(mode),
             ..hold
         };
-        assert_eq!(motors.torque(&home(), Some(&command)), Ok(Vector::zeros()));
+        motors.cycle(Some(&command));
         assert_eq!(motors.drives(), Drives::Idle, "{mode:?}");
-        motors.torque(&home(), Some(&hold)).expect("four joints");
+        motors.cycle(Some(&hold));
         assert_eq!(motors.drives(), Drives::Active, "{mode:?}");
     }
 }
@@ -109,60 +173,39 @@ fn drives_become_active_only_in_gravity_hold() {
 #[test]
 fn excessive_torque_is_limited_and_nan_counts_as_missing_answer() {
     let hold = answer(Some(Request::GravityHold));
-    let mut motors = motors();
-    motors.torque(&home(), Some(&hold)).expect("four joints");
+    let mut motors = Motors::new();
+    motors.cycle(Some(&hold));
     let mut excessive = hold;
     excessive.torque_nm[3] = f64::NAN;
-    assert_eq!(
-        motors.torque(&home(), Some(&excessive)),
-        hold.fallback_torque()
-    );
-    excessive.torque_nm = [-1e6; 7];
-    let before = hold.fallback_torque::<4>().expect("four joints");
-    let sent = motors
-        .torque(&home(), Some(&excessive))
-        .expect("four joints");
-    assert!(
-        (sent - before).amax() <= 1.0 + 1e-9,
-        "the rate limit: 1 N m per cycle"
-    );
-    for _ in 0..500 {
-        let sent = motors
-            .torque(&home(), Some(&excessive))
-            .expect("four joints");
-        // The largest torque limit of the arm's joints.
-        assert!(sent.amax() <= 101.7 + 1e-9, "{sent}");
-    }
+    let torque_nm = motors.cycle(Some(&excessive));
+    assert_eq!(torque_nm, hold.fallback_torque_nm);
+    assert_eq!(motors.0.counters().unusable, 1);
+    assert_eq!(motors.0.counters().missed, 1);
 }
 
-/// The guard ends the torque from the encoders alone: if a joint still moves 250 ms after a fault of the controller, or
-/// if a joint exceeds twice its speed limit.
+/// The guard ends the torque from the encoders alone: an arm that a faulty controller drives beyond twice a speed limit,
+/// or that still moves in a fault, is braked.
 #[test]
 fn an_arm_that_does_not_stop_in_a_fault_or_is_too_fast_is_braked() {
     let hold = answer(Some(Request::GravityHold));
-    let fault = TorqueCommand {
-        mode: Mode::Fault as u8,
-        fault: fault_kind::JOINT_SPEED,
-        ..hold
-    };
-    for (speed_rad_per_s, command, expected_cycles) in
-        [(1.0, fault, 251..=300), (9.0, hold, 1..=40)]
-    {
-        let mut motors = motors();
-        let mut angles = home();
+    for fault in [false, true] {
+        let mut motors = Motors::new();
         for _ in 0..100 {
-            motors.torque(&angles, Some(&hold)).expect("four joints");
+            motors.cycle(Some(&hold));
         }
-        let braked_in = (1..1000).find(|_| {
-            angles[0] = angles[0].map(|angle| angle + speed_rad_per_s * 1e-3);
-            motors.torque(&angles, Some(&command)).expect("four joints");
+        let mut push = hold;
+        push.torque_nm[0] += 20.0;
+        push.fault = fault;
+        push.codes[1] = if fault { fault_kind::JOINT_SPEED } else { 0 };
+        let braked_in = (1..2000).find(|_| {
+            motors.cycle(Some(&push));
             motors.drives() == Drives::Idle
         });
-        assert!(
-            braked_in.is_some_and(|cycle| expected_cycles.contains(&cycle)),
-            "{braked_in:?}"
-        );
-        assert!(motors.last_guard_reason().is_some());
+        assert!(braked_in.is_some(), "fault: {fault}");
+        match (fault, motors.loss()) {
+            (true, Some(LossReason::NotStopped(_))) | (false, Some(LossReason::Overspeed(_))) => {}
+            (_, other) => panic!("fault: {fault}: {other:?}"),
+        }
     }
 }
 
@@ -171,20 +214,19 @@ fn an_arm_that_does_not_stop_in_a_fault_or_is_too_fast_is_braked() {
 #[test]
 fn the_first_torque_is_limited_like_any_other() {
     let mut excessive = answer(Some(Request::GravityHold));
-    excessive.torque_nm = [-1e6; 7];
-    excessive.fallback_torque_nm = [1e6; 7];
+    excessive.torque_nm = Vector::repeat(-1e6);
+    excessive.fallback_torque_nm = Vector::repeat(1e6);
     let limits = Description::asset("wam4").expect("built in").config::<4>();
     let limits = limits.expect("valid").limits.joint_torque_nm;
     for answered in [true, false] {
-        let mut motors = motors();
-        for cycle in 0..50 {
+        let mut motors = Motors::new();
+        for cycle in 0..8 {
             let command = (answered || cycle == 0).then_some(&excessive);
-            let sent = motors.torque(&home(), command).expect("four joints");
+            let sent = motors.cycle(command);
             for (torque_nm, limit_nm) in sent.iter().zip(&limits) {
                 assert!(torque_nm.abs() <= limit_nm + 1e-9, "cycle {cycle}: {sent}");
             }
         }
-        assert_eq!(motors.drives(), Drives::Active);
     }
 }
 

@@ -12,7 +12,7 @@ use crate::up::{START_S, System};
 use core::time::Duration;
 use std::path::PathBuf;
 use std::time::Instant;
-use supple_cli::arguments::PlantArgs;
+use supple_cli::arguments::{PlantArgs, UrdfArgs};
 use supple_cli::exit::Failure;
 use supple_core::dynamics::jacobian;
 use supple_ipc::Domain;
@@ -63,11 +63,13 @@ pub fn perform<const N: usize>(spec: &Spec, arm: &TestArm) -> Result<Row, Failur
     let pushed = spec.event == Event::Obstacle && at_rest;
     let push_rad_per_s = -PUSHED_M_PER_S / jacobian(&config.arm, &script.start_rad)[(2, 1)];
     let up = UpArgs {
+        urdf: UrdfArgs::default(),
         plant: spec.plant,
         arm: arm.name.clone(),
         strict: arm.strict,
         track: UpTrajectory::Sinusoid,
         bus: None,
+        budget: false,
         zero_at_home: false,
         learn: false,
         tare: false,
@@ -84,6 +86,7 @@ pub fn perform<const N: usize>(spec: &Spec, arm: &TestArm) -> Result<Row, Failur
         virtual_time: true,
         log: PathBuf::new(),
         no_log: true,
+        view: false,
         prefix: Some(prefix),
         no_realtime: true,
         json: true,

@@ -7,13 +7,11 @@ use crate::cli::PlantKind;
 use crate::up::CONTROLLER;
 use supple_plant::InjectionKind;
 
-/// Time from a process loss until the motors of an arm on the bus brake \[ms\]: 10 ms without an answer, then one
-/// frame to the safety module and one to the motors.
+/// Time from a process loss until the motors brake \[ms\]: 10 ms without an answer, on a bus then one frame to the safety
+/// module and one to the motors.
 const DRIVE_SHUTDOWN_MS: (f64, f64) = (8.0, 25.0);
 /// Time without frames from the host after which the safety module disables torque \[ms\].
 const HEARTBEAT_MS: (f64, f64) = (90.0, 120.0);
-/// Time for which the simulated arm's motors apply the fallback torque \[ms\].
-const FALLBACK_MS: (f64, f64) = (95.0, 120.0);
 /// Maximum time from the termination signal until the controller has set the drives to idle \[ms\].
 const CONTROLLER_EXIT_MS: (f64, f64) = (0.0, 50.0);
 
@@ -127,7 +125,7 @@ fn wall_clock_cases(plant: PlantKind) -> Vec<Spec> {
     let brakes = |(from, to)| Expected::Brakes(from, to);
     let mut processes = match plant {
         PlantKind::Sim => vec![
-            (CONTROLLER, brakes(FALLBACK_MS)),
+            (CONTROLLER, brakes(DRIVE_SHUTDOWN_MS)),
             ("supple-sim", Expected::ControllerFault),
         ],
         PlantKind::Emu | PlantKind::Can => vec![

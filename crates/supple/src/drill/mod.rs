@@ -136,7 +136,7 @@ impl TestArms {
     /// The pose mode needs six active joints: it has the arm of the command line, or else [`POSE_ARM`], without held
     /// joints. The copy without held joints is in a folder of its own until the end.
     fn new(args: &DrillArgs) -> Result<TestArms, Failure> {
-        let description = arms::find(&args.arm, args.strict)?;
+        let description = arms::find(&args.urdf.name(&args.arm), args.strict)?;
         let free = match description.dof() >= POSE_JOINTS {
             true => description.with_all_joints_active()?,
             false => Description::asset(POSE_ARM)?.with_all_joints_active()?,
@@ -148,7 +148,7 @@ impl TestArms {
         Ok(TestArms {
             general: TestArm {
                 description,
-                name: args.arm.clone(),
+                name: args.urdf.name(&args.arm),
                 strict: args.strict,
                 rate_hz: None,
             },

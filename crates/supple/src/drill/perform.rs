@@ -12,7 +12,7 @@ use rustix::process::{Pid, Signal, kill_process};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Instant;
-use supple_cli::arguments::PlantArgs;
+use supple_cli::arguments::{PlantArgs, UrdfArgs};
 use supple_cli::console::print_status;
 use supple_cli::exit::Failure;
 use supple_core::config::Gains;
@@ -57,6 +57,7 @@ pub fn perform<const N: usize>(
     let trace = domain.folder().join(format!("{prefix}.csv"));
     let cap_m = description.tool().map_or(CAP_M, |tool| tool.cap_radius_m);
     let up = UpArgs {
+        urdf: UrdfArgs::default(),
         plant: spec.plant,
         arm: args.arm.clone(),
         strict: args.strict,
@@ -65,6 +66,7 @@ pub fn perform<const N: usize>(
             _ => UpTrajectory::Sinusoid,
         },
         bus: None,
+        budget: false,
         zero_at_home: false,
         learn: false,
         tare: false,
@@ -81,6 +83,7 @@ pub fn perform<const N: usize>(
         virtual_time: false,
         log: PathBuf::new(),
         no_log: true,
+        view: false,
         prefix: Some(prefix),
         no_realtime: args.no_realtime,
         json: true,

@@ -271,16 +271,17 @@ pub fn gains(args: &GainsArgs) -> Result<(), Failure> {
 
 /// Returns the trajectory and its duration \[s\].
 pub fn trajectory_for(trajectory: UpTrajectory, description: &Description) -> (Trajectory, f64) {
+    let paths = description.paths();
     match trajectory {
-        UpTrajectory::Sinusoid => scenario::sinusoid(1.0),
-        UpTrajectory::Arc => scenario::arc(),
+        UpTrajectory::Sinusoid => paths.sinusoid(1.0),
+        UpTrajectory::Arc => paths.arc(1.0),
         UpTrajectory::Quadrant => {
-            let (quadrant, duration_s) = scenario::quadrant(scenario::QUADRANT_SPEED_M_PER_S);
+            let (quadrant, duration_s) = paths.quadrant(scenario::QUADRANT_SPEED_M_PER_S);
             (Trajectory::Quadrant(quadrant), duration_s)
         }
         UpTrajectory::Probe => {
             let radius_m = description.tool().map_or(CAP_M, |tool| tool.cap_radius_m);
-            let (probe, duration_s) = scenario::probe(radius_m);
+            let (probe, duration_s) = paths.probe(radius_m);
             (Trajectory::Probe(probe), duration_s)
         }
     }
@@ -295,17 +296,21 @@ pub fn track(args: &TrackArgs) -> Result<(), Failure> {
         let none = "0: only a pose turns".to_owned();
         return Err(value_count("--rotate", args.rotate.len(), none));
     }
+    if args.trajectory == TrackTrajectory::Pose {
+        return ask(&args.system, &Asked::Pose(args));
+    }
+    let description = arms::find(&args.urdf.name(&args.arm), args.strict)?;
+    let paths = description.paths();
     let (trajectory, duration_s) = match args.trajectory {
         TrackTrajectory::Pose => return ask(&args.system, &Asked::Pose(args)),
-        TrackTrajectory::Sinusoid => scenario::sinusoid(args.speed),
-        TrackTrajectory::Arc => scenario::arc(),
+        TrackTrajectory::Sinusoid => paths.sinusoid(args.speed),
+        TrackTrajectory::Arc => paths.arc(args.speed),
         TrackTrajectory::Quadrant => {
             let speed_m_per_s = args.speed * scenario::QUADRANT_SPEED_M_PER_S;
-            let (quadrant, duration_s) = scenario::quadrant(speed_m_per_s);
+            let (quadrant, duration_s) = paths.quadrant(speed_m_per_s);
             (Trajectory::Quadrant(quadrant), duration_s)
         }
     };
-    let description = arms::find(&args.arm, args.strict)?;
     follow(&args.system, &description, trajectory, duration_s)
 }
 

@@ -64,6 +64,37 @@ impl<const N: usize> OperatorSession<N> {
         self.wait_for_reply(sequence.ok_or_else(|| self.not_running())?)
     }
 
+    /// Sends a request without waiting; `None` if no controller is connected.
+    ///
+    /// # Errors
+    /// [`Failure::System`].
+    pub fn begin_request(
+        &mut self,
+        request: &Request<N>,
+        at_cycle: Option<u64>,
+    ) -> Result<Option<u64>, Failure> {
+        self.operator
+            .send(request, at_cycle)
+            .map_err(Failure::system)
+    }
+
+    /// The reply to a request of [`OperatorSession::begin_request`], if the controller has carried it out. Replies to other
+    /// requests are discarded.
+    ///
+    /// # Errors
+    /// [`Failure::Refused`] with the controller's reason.
+    pub fn reply_to(&mut self, sequence: u64) -> Result<Option<OperatorReply>, Failure> {
+        while let Some(reply) = self.operator.receive().map_err(Failure::system)? {
+            match reply.outcome() {
+                _ if reply.sequence != sequence => {}
+                Outcome::Refused => return Err(refused(&reply)),
+                Outcome::Accepted => return Ok(Some(reply)),
+                Outcome::Queued => {}
+            }
+        }
+        Ok(None)
+    }
+
     /// As [`OperatorSession::send_request`], but waits for a controller that may still be starting; `check` fails if
     /// it cannot start any more.
     ///

@@ -14,29 +14,55 @@ mod stages;
 mod statistics;
 mod status_line;
 mod system;
+mod viewer;
 
-pub use children::stop_running;
-pub use plan::CONTROLLER;
+pub use children::{ChildProcesses, Pidfile, stop_running};
+pub use plan::{CONTROLLER, Plan};
+pub use recorder::Recorder;
 pub use stages::{GRAVITY_HOLD_S, START_S};
 pub use statistics::{Percentiles, RunStatistics};
 pub use system::System;
 
-use crate::cli::UpArgs;
-use children::Pidfile;
+use crate::cli::{PlantKind, UpArgs};
+use std::os::unix::process::CommandExt;
 use supple_cli::arms;
 use supple_cli::console::{print_json, print_line, print_status, write_stderr_in_background};
 use supple_cli::exit::Failure;
 use supple_cli::interrupt;
+use supple_cli::sibling::program_beside;
 use supple_ipc::Domain;
 use supple_model::{Description, with_dof};
+use viewer::Viewer;
 
 /// Runs `supple up`.
 ///
 /// # Errors
 /// [`Failure`]; [`Failure::RunFault`] after the system is shut down and everything is written.
 pub fn run(args: &UpArgs) -> Result<(), Failure> {
+    // The other processes get the arm's name with its tip.
+    let args = &UpArgs {
+        arm: args.urdf.name(&args.arm),
+        ..args.clone()
+    };
     let description = args.at_rate(arms::find(&args.arm, args.strict)?)?;
+    if args.budget {
+        return show_budget(args);
+    }
     with_dof!(description.dof(), N => sized::<N>(args, &description))?
+}
+
+/// Replaces this process by the one that owns the bus, which prints its arithmetic.
+fn show_budget(args: &UpArgs) -> Result<(), Failure> {
+    if args.plant == PlantKind::Sim {
+        return print_line("A simulated arm has no bus: --plant emu or --plant can.");
+    }
+    let program = program_beside(PlantKind::Can.clock_owner())?;
+    let mut command = std::process::Command::new(&program);
+    command.args(["--arm", &args.arm, "--budget"]);
+    if let Some(rate_hz) = args.rate_hz {
+        command.args(["--rate-hz".to_owned(), rate_hz.to_string()]);
+    }
+    Err(Failure::file("start", &program, command.exec()))
 }
 
 fn sized<const N: usize>(args: &UpArgs, description: &Description) -> Result<(), Failure> {
@@ -51,7 +77,15 @@ fn sized<const N: usize>(args: &UpArgs, description: &Description) -> Result<(),
     let _pidfile = Pidfile::create(&domain)?;
     let mut system = System::<N>::new(args, description, &domain)?;
     let started = system.start(description);
+    let viewer = match (&started, args.view) {
+        (Ok(()), true) => Viewer::start(args, &domain).map(Some),
+        _ => Ok(None),
+    };
+    if let Err(failure) = &viewer {
+        print_status(&format!("the arm runs without its page: {failure}"));
+    }
     let result = started.and_then(|()| system.watch(&stop));
+    drop(viewer);
     let shut_down = system.end();
     let mut summary = system.finish();
     let cut_short = system.cut_short();

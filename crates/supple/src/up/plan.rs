@@ -34,6 +34,8 @@ pub struct Plan {
     pub arm: Option<Program>,
     /// Pendant of the emulated arm.
     pub pendant: Option<Pendant>,
+    /// The arm has no brakes: the clock owner lays it down before it exits.
+    pub lays_down: bool,
 }
 
 impl Plan {
@@ -42,7 +44,12 @@ impl Plan {
     /// # Errors
     /// [`Failure::Injection`] if this plant does not support an injected fault; [`Failure::System`] if the folder of an
     /// emulated bus does not belong to this user; [`Failure::VirtualTimeOnRealBus`].
-    pub fn new(args: &UpArgs, domain: &Domain, cycles: Option<u64>) -> Result<Plan, Failure> {
+    pub fn new(
+        args: &UpArgs,
+        description: &Description,
+        domain: &Domain,
+        cycles: Option<u64>,
+    ) -> Result<Plan, Failure> {
         args.check_injections()?;
         args.check_plant_options()?;
         let controller = Program {
@@ -77,6 +84,7 @@ impl Plan {
             clock_owner,
             arm: None,
             pendant: None,
+            lays_down: args.plant != PlantKind::Sim && description.bus().is_some(),
         };
         if let Some(bus) = bus {
             let emulated = args.plant == PlantKind::Emu;
@@ -96,7 +104,9 @@ impl Plan {
                     name: "supple-emu",
                     arguments,
                 });
+                // Only a WAM has a pendant.
                 plan.pendant = match bus {
+                    _ if description.bus().is_some() => None,
                     Address::Folder(_) => Pendant::of(&bus),
                     Address::Interface(_) => {
                         Pendant::of(&Address::of_system(domain.prefix()).map_err(Failure::system)?)
@@ -110,7 +120,7 @@ impl Plan {
 
 impl PlantKind {
     /// Program that owns the clock.
-    fn clock_owner(self) -> &'static str {
+    pub(super) fn clock_owner(self) -> &'static str {
         match self {
             PlantKind::Sim => "supple-sim",
             PlantKind::Emu | PlantKind::Can => "supple-can",

@@ -23,6 +23,8 @@ use supple_realtime::Stop;
 const JOIN_TIMEOUT_S: u64 = 20;
 /// Time after which the shutdown kills a process that has not exited.
 const SHUTDOWN_TIMEOUT: Duration = Duration::from_secs(5);
+/// Maximum time for an arm without brakes to be laid down.
+const LAY_DOWN_TIMEOUT: Duration = Duration::from_secs(70);
 /// Cycle in which learning begins in virtual time, after the request for gravity hold.
 const LEARN_CYCLE: u64 = 1;
 /// Maximum duration of one wait for telemetry.
@@ -61,7 +63,7 @@ impl<'a, const N: usize> System<'a, N> {
         let period_s = config.period_s;
         let limit = args.for_s.map(|for_s| cycles_of(for_s, period_s));
         let (trajectory, duration_s) = trajectory_for(args.track, description);
-        let plan = Plan::new(args, domain, limit)?;
+        let plan = Plan::new(args, description, domain, limit)?;
         let options = args.plant_options.options()?;
         let recorder = args
             .log_file()
@@ -291,7 +293,11 @@ impl<'a, const N: usize> System<'a, N> {
         };
         let children = &mut self.children;
         let controller = children.end(self.plan.controller.name, SHUTDOWN_TIMEOUT, &mut drain);
-        let clock_owner = children.end(self.plan.clock_owner.name, SHUTDOWN_TIMEOUT, &mut drain);
+        let within = match self.plan.lays_down {
+            true => LAY_DOWN_TIMEOUT,
+            false => SHUTDOWN_TIMEOUT,
+        };
+        let clock_owner = children.end(self.plan.clock_owner.name, within, &mut drain);
         let drained = drain();
         if let Some(pendant) = &self.plan.pendant {
             match pendant.record() {

@@ -20,10 +20,10 @@
 //! | line | `from_m`, `to_m`, `duration_s` |
 //! | sinusoid | `centre_m`, `amplitude_m`, `angular_frequency_rad_per_s`, `ramp_s` |
 //! | arc | `radius_m`, `height_m`, `centre_rad`, `amplitude_rad`, `angular_frequency_rad_per_s`, `ramp_s` |
-//! | quadrant | `centre_m`, `first_m`, `second_m`, `speed_m_per_s`, `ramp_s` |
+//! | quadrant | `centre_m`, `first_m`, `second_m`, `speed_m_per_s`, `ramp_s`, `corner_ramp_s` |
 //! | probe | `radius_m`, `strokes`, `radial_step_m`, `top_m`, `stroke_m`, `azimuth_rad`, `azimuth_step_rad`, `speed_m_per_s`, `ramp_s`, `dwell_s` |
 //!
-//! A probe of an older log has no `dwell_s`: it is zero.
+//! A probe of an older log has no `dwell_s`, a quadrant no `corner_ramp_s`: they are zero.
 //! Decoding rejects numbers that encode no request; whether a request is valid, the controller checks.
 
 use super::{request_kind, trajectory_kind};
@@ -381,7 +381,7 @@ impl RequestCode {
                 self.vector(&t.centre_m());
                 self.vector(&t.first_m());
                 self.vector(&t.second_m());
-                self.numbers(&[t.speed_m_per_s(), t.ramp_s()]);
+                self.numbers(&[t.speed_m_per_s(), t.ramp_s(), t.corner_ramp_s()]);
             }
             Trajectory::Probe(t) => {
                 self.trajectory = trajectory_kind::PROBE;
@@ -493,7 +493,7 @@ impl Rest<'_> {
                 let (centre_m, first_m, second_m) = (self.vector(), self.vector(), self.vector());
                 let (speed_m_per_s, ramp_s) = (self.number(), self.number());
                 let quadrant = Quadrant::new(centre_m, first_m, second_m, speed_m_per_s, ramp_s);
-                Trajectory::Quadrant(quadrant)
+                Trajectory::Quadrant(quadrant.with_corner_ramp(self.number_if_present()))
             }
             trajectory_kind::PROBE => Trajectory::Probe(Probe {
                 radius_m: self.number(),

@@ -48,7 +48,21 @@ pub fn wam7() -> Reference<7> {
     read("wam7", include_str!("../../data/wam7.json"))
 }
 
+pub fn openarm() -> Reference<7> {
+    let plain = include_str!("../../data/openarm_plain.json");
+    read_from(plain, "openarm", include_str!("../../data/openarm.json"))
+}
+
+pub fn yam() -> Reference<6> {
+    let plain = include_str!("../../data/yam_plain.json");
+    read_from(plain, "yam", include_str!("../../data/yam.json"))
+}
+
 fn read<const N: usize>(name: &str, states: &str) -> Reference<N> {
+    read_from(ARMS, name, states)
+}
+
+fn read_from<const N: usize>(arms: &str, name: &str, states: &str) -> Reference<N> {
     let states = json(states);
     let regressors = &json(REGRESSORS)[name];
     let s = &states["samples"];
@@ -75,7 +89,7 @@ fn read<const N: usize>(name: &str, states: &str) -> Reference<N> {
         regressor: regressors.get(k).map(regressor),
     };
     Reference {
-        arm: arm(&json(ARMS)[name], vector(&states["gravity"])),
+        arm: arm(&json(arms)[name], vector(&states["gravity"])),
         samples: (0..count).map(sample).collect(),
     }
 }

@@ -1,7 +1,7 @@
 //! Every function compared with Pinocchio's values on the reference arms, 40 states each, to 1e-10.
 
 use crate::common::numeric::{error_at_scale, mixed_error, scalar, size};
-use crate::common::reference::{Sample, wam3, wam4, wam7};
+use crate::common::reference::{Sample, openarm, wam3, wam4, wam7, yam};
 use supple_core::dynamics::{
     Terms, aba, coriolis, coriolis_matrix, crba, gravity, jacobian, jacobian_dot_qd,
     kinetic_energy, momentum, parameters, potential_energy, regressor, regressor_times, rnea,
@@ -30,6 +30,9 @@ macro_rules! on_the_reference_arms {
             hold(&three.arm, &three.samples, $error);
             hold(&four.arm, &four.samples, $error);
             hold(&seven.arm, &seven.samples, $error);
+            let (openarm, yam) = (openarm(), yam());
+            hold(&openarm.arm, &openarm.samples, $error);
+            hold(&yam.arm, &yam.samples, $error);
         }
     )*};
 }

@@ -83,13 +83,19 @@ pub fn quadrant() -> impl Strategy<Value = Quadrant> {
     )
 }
 
+/// With corners at which the velocity jumps, and with ramps up to as long as the shortest piece allows.
 fn quadrant_walk() -> impl Strategy<Value = Walk> {
-    (quadrant(), 0.0..2.5).prop_map(|(quadrant, rounds)| {
+    let corner = prop_oneof![Just(0.0), 0.05..1.0];
+    (quadrant(), 0.0..2.5, corner).prop_map(|(quadrant, rounds, corner)| {
+        let shortest_m = quadrant.lengths_m().into_iter().fold(f64::MAX, f64::min);
+        let corner_ramp_s = corner * shortest_m / quadrant.speed_m_per_s();
+        let quadrant = quadrant.with_corner_ramp(corner_ramp_s);
         let period_s = quadrant.period_s();
-        let reference = Trajectory::Quadrant(quadrant).at(2.0 * period_s + 10.0);
-        let speed_m_per_s = reference.velocity.norm();
-        let shortest = quadrant.lengths_m().into_iter().fold(f64::MAX, f64::min);
-        let tau_s = 0.1 * shortest / speed_m_per_s;
+        let speed_m_per_s = quadrant.speed_m_per_s();
+        let mut tau_s = 0.1 * shortest_m / speed_m_per_s;
+        if corner_ramp_s > 0.0 {
+            tau_s = tau_s.min(0.3 * corner_ramp_s);
+        }
         // The ramp ends within a second: it is short compared with the pieces, or they are short
         // compared with it.
         Walk {

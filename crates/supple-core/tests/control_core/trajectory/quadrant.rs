@@ -205,6 +205,42 @@ fn the_ramp_reaches_the_speed_and_adds_half_its_time() {
     assert!((round.position - at(0.0).position).norm() < 1e-12);
 }
 
+/// With corner ramps the velocity is continuous everywhere and zero at the corners, the same path is followed, and
+/// a round takes three ramps longer.
+#[test]
+fn corner_ramps_leave_the_path_and_stop_at_its_corners() {
+    check(
+        100,
+        (quadrant(), 0.05..1.0),
+        |(without, share): (Quadrant, f64)| {
+            let speed = without.speed_m_per_s();
+            let shortest_m = without.lengths_m().into_iter().fold(f64::MAX, f64::min);
+            let ramp_s = share * shortest_m / speed;
+            let with = without.with_corner_ramp(ramp_s);
+            prop_assert!(
+                (with.period_s() - without.period_s() - 3.0 * ramp_s).abs()
+                    < 1e-12 * with.period_s()
+            );
+            let (_, max_acceleration) = Trajectory::Quadrant(with).peaks();
+            for piece in [Piece::Out, Piece::Ellipse, Piece::Back] {
+                let start_s = start_of(&with, piece);
+                let trajectory = Trajectory::Quadrant(with);
+                for beside_s in [-1e-6 * ramp_s, 1e-6 * ramp_s] {
+                    let velocity = trajectory.at(start_s + beside_s).velocity;
+                    prop_assert!(velocity.norm() < 1e-9 * speed);
+                }
+                let corner_m = Trajectory::Quadrant(without)
+                    .at(start_of(&without, piece))
+                    .position;
+                prop_assert!((trajectory.at(start_s).position - corner_m).norm() < 1e-8);
+                let middle = trajectory.at(start_s + 0.5 * ramp_s);
+                prop_assert!(middle.acceleration.norm() <= max_acceleration);
+            }
+            Ok(())
+        },
+    );
+}
+
 /// The arc length is accurate to 12 digits up to an axis ratio of 2, as in the paper's figure, and
 /// to 8 digits up to 8.
 #[test]

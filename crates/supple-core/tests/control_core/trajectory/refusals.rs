@@ -168,6 +168,15 @@ fn degenerate_quadrants_are_rejected() {
         refused(quadrant(x, z, value, 0.1), "speed_m_per_s", value);
         refused(quadrant(x, z, 0.1, value), "ramp_s", value);
     }
+    let with_corners = |corner_ramp_s| {
+        let quadrant = Quadrant::new(zero, x, z, 0.1, 0.1);
+        Trajectory::Quadrant(quadrant.with_corner_ramp(corner_ramp_s))
+    };
+    // The shortest piece takes one second at full speed.
+    assert!(with_corners(1.0).validate().is_ok());
+    for value in [-0.1, 1.001, f64::NAN, f64::INFINITY] {
+        refused(with_corners(value), "corner_ramp_s", value);
+    }
     let oblique = Vector3::new((PI / 3.0).cos(), 0.0, (PI / 3.0).sin());
     let error = quadrant(x, oblique, 0.1, 0.1)
         .validate()

@@ -2,10 +2,10 @@
 
 use supple_bus::virtual_time::{DirectBus, Peer};
 use supple_bus::{Bus, Event};
+use supple_can_frame::CanFrame;
 use supple_emu::{ButtonPress, Emulator, EmulatorConfig};
 use supple_model::Description;
 use supple_plant::PlantConfig;
-use supple_puck::CanFrame;
 
 pub const MS: u64 = 1_000_000;
 
@@ -93,7 +93,7 @@ impl Host {
     }
 
     /// Frames of other nodes within a time, as id and payload.
-    pub fn receive_frames(&mut self, duration_ns: u64) -> Vec<(u16, Vec<u8>)> {
+    pub fn receive_frames(&mut self, duration_ns: u64) -> Vec<(u32, Vec<u8>)> {
         let events = self.listen(duration_ns).into_iter();
         events
             .filter_map(|(_, event)| match event {
@@ -106,7 +106,7 @@ impl Host {
     /// Payload of a node's reply to a request, `None` after a millisecond.
     pub fn get(&mut self, node: u8, property: u8) -> Option<Vec<u8>> {
         self.send(u32::from(node), &[property]);
-        let from = |id: u16| id & 0x3e0 == u16::from(node) << 5;
+        let from = |id: u32| id & 0x3e0 == u32::from(node) << 5;
         let received = self.receive_frames(MS).into_iter();
         received
             .filter(|(id, _)| from(*id))

@@ -93,5 +93,8 @@ pub fn motion<const N: usize>(
         tau,
         independent_fraction: 1.0,
         cutoff_hz: None,
+        start_s: 0.0,
+        torque_delay_s: 0.0,
+        masks: Vec::new(),
     }
 }

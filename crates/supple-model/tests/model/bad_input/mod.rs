@@ -97,7 +97,7 @@ fn the_error_of_an_unknown_asset_lists_the_assets() {
     assert_eq!(Description::find("wam3").unwrap().name(), "wam3");
     let message = Description::find("wam5").unwrap_err().to_string();
     assert!(
-        message.contains("`wam5`") && message.contains("paper3, wam3, wam4, wam7"),
+        message.contains("`wam5`") && message.contains("openarm, paper3, wam3, wam4, wam7, yam"),
         "{message}"
     );
 }

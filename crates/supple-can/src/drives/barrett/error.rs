@@ -1,0 +1,252 @@
+//! Errors of start-up and operation.
+
+use super::bus_time::Overload;
+use supple_bus::{BusError, BusFault};
+use supple_drive::LoopError;
+use supple_model::ModelError;
+use supple_puck::Property;
+use supple_puck::position::{CountsError, PositionScaleError};
+use supple_puck::property::FirmwareTooOld;
+use supple_puck::safety::{SafetyLimitsError, SafetyMode};
+use supple_puck::torque::TorqueError;
+
+/// Errors of start-up and operation. Each message gives the value found, the value expected, and the remedy.
+#[derive(Debug, thiserror::Error)]
+pub enum CanError {
+    /// Error of the bus itself.
+    #[error(transparent)]
+    Bus(#[from] BusError),
+    /// A fault on the bus.
+    #[error("the bus failed: {0}")]
+    BusFault(BusFault),
+    /// The plant loop cannot continue.
+    #[error(transparent)]
+    Loop(#[from] LoopError),
+    /// The rate exceeds the bandwidth of the drives' bus.
+    #[error(transparent)]
+    Rate(#[from] supple_drive::Overload),
+    /// The rate exceeds the bus bandwidth.
+    #[error(transparent)]
+    Overload(#[from] Overload),
+    /// Error in the description of the arm.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// An arm that is not a WAM with 4 or 7 joints.
+    #[error(
+        "arm `{arm}` has {found} moving joints, a WAM has 4 or 7 motor pucks: give such an arm"
+    )]
+    Joints {
+        /// Name of the arm.
+        arm: String,
+        /// Joints found.
+        found: usize,
+    },
+    /// The description lacks a value that the pucks are checked against.
+    #[error("arm `{arm}`: [motors] {key} is missing: add it, the pucks are checked against it")]
+    MissingKey {
+        /// Name of the arm.
+        arm: String,
+        /// Key of the TOML.
+        key: &'static str,
+    },
+    /// A node that does not answer.
+    #[error("{what} (node {node}) does not answer: {remedy}")]
+    Missing {
+        /// Kind of node.
+        what: &'static str,
+        /// Number of the node.
+        node: u8,
+        /// Remedy.
+        remedy: &'static str,
+    },
+    /// More motors than joints.
+    #[error(
+        "motor puck {node} answers, but arm `{arm}` has {joints} joints: select the connected arm with --arm"
+    )]
+    UnexpectedMotor {
+        /// Number of the node.
+        node: u8,
+        /// Name of the arm.
+        arm: String,
+        /// Joints of the arm.
+        joints: usize,
+    },
+    /// A puck with another role.
+    #[error(
+        "node {node} has role {role:#06x}, expected {expected}: check that the arm is wired as described"
+    )]
+    Role {
+        /// Number of the node.
+        node: u8,
+        /// Role found.
+        role: u16,
+        /// Expected role.
+        expected: &'static str,
+    },
+    /// A firmware whose property ids are not known.
+    #[error("node {node}: {source}; update it")]
+    Firmware {
+        /// Number of the node.
+        node: u8,
+        /// Version found and minimum version.
+        source: FirmwareTooOld,
+    },
+    /// A firmware that lacks a property.
+    #[error("firmware {version} of node {node} has no property {property}: update it")]
+    Property {
+        /// Number of the node.
+        node: u8,
+        /// Version found.
+        version: i32,
+        /// Property.
+        property: Property,
+    },
+    /// Pucks of one torque frame with different torque ids.
+    #[error(
+        "node {node} has torque at id {found}, its group at {expected}: give all pucks of a group one firmware"
+    )]
+    MixedTorqueIds {
+        /// Number of the node.
+        node: u8,
+        /// Id found.
+        found: u8,
+        /// Id of the first puck of the group.
+        expected: u8,
+    },
+    /// A puck that does not wake up.
+    #[error("motor puck {node} stays at STAT {stat} after the wake-up: switch the arm off and on")]
+    NotAwake {
+        /// Number of the node.
+        node: u8,
+        /// Value found.
+        stat: i32,
+    },
+    /// A setting that was not applied.
+    #[error(
+        "{property} of node {node} is {found} after it was set to {expected}: switch the arm off and on"
+    )]
+    SettingIgnored {
+        /// Property.
+        property: Property,
+        /// Node.
+        node: u8,
+        /// Value found.
+        found: i32,
+        /// Value set.
+        expected: i32,
+    },
+    /// A puck that contradicts the description.
+    #[error(
+        "{property} of motor puck {node} is {found}, the arm's {key} requires {expected}: correct the TOML or the puck"
+    )]
+    Contradiction {
+        /// Property.
+        property: Property,
+        /// Node.
+        node: u8,
+        /// Value found.
+        found: i32,
+        /// Key of the TOML.
+        key: &'static str,
+        /// Value of the description.
+        expected: f64,
+    },
+    /// A puck above its temperature limit.
+    #[error(
+        "motor puck {node} is at {found} degrees Celsius, its limit is {limit}: let it cool down"
+    )]
+    OverTemperature {
+        /// Node.
+        node: u8,
+        /// Temperature.
+        found: i32,
+        /// Limit.
+        limit: i32,
+    },
+    /// Invalid number of encoder counts.
+    #[error("node {node}: {source}")]
+    Counts {
+        /// Node.
+        node: u8,
+        /// The error in CTS.
+        source: PositionScaleError,
+    },
+    /// Invalid torque units.
+    #[error("node {node}: {source}")]
+    Units {
+        /// Node.
+        node: u8,
+        /// The error in IPNM.
+        source: TorqueError,
+    },
+    /// A home pose outside the range of positions.
+    #[error("home pose: {0}; correct home_rad")]
+    Home(#[from] CountsError),
+    /// Inconsistent limits of the safety module.
+    #[error("safety limits: {0}")]
+    Limits(#[from] SafetyLimitsError),
+    /// The positions are unknown.
+    #[error(
+        "the safety module's ZERO is {zero}: the arm has lost its positions; put it into its home pose \
+         {home} rad, and start again with --zero-at-home"
+    )]
+    NotZeroed {
+        /// Value found.
+        zero: i32,
+        /// Home pose as text.
+        home: String,
+    },
+    /// The module is in another mode than requested.
+    #[error(
+        "the safety module is in {found:?}, expected {expected:?}: press Shift-Idle at the pendant and start again"
+    )]
+    Mode {
+        /// Found.
+        found: SafetyMode,
+        /// Expected.
+        expected: SafetyMode,
+    },
+    /// A value that the protocol does not define.
+    #[error("{property} of node {node} is {found}, an unknown value: check the node's firmware")]
+    Value {
+        /// Property.
+        property: Property,
+        /// Node.
+        node: u8,
+        /// Value found.
+        found: i32,
+    },
+    /// A shutdown was requested.
+    #[error("stopped before start-up was complete")]
+    Stopped,
+    /// Error of the link to the controller.
+    #[error("shared memory: {0}")]
+    Link(Box<dyn std::error::Error + Send + Sync>),
+}
+
+impl CanError {
+    /// Exit code, as for the command line: 3 for a wrong arm or description, 4 for an arm that fails a check, 10
+    /// for the bus, shared memory or the system.
+    pub fn code(&self) -> u8 {
+        match self {
+            CanError::Model(_)
+            | CanError::Joints { .. }
+            | CanError::MissingKey { .. }
+            | CanError::Overload(_)
+            | CanError::Rate(_)
+            | CanError::Home(_)
+            | CanError::Limits(_) => 3,
+            CanError::Bus(_)
+            | CanError::BusFault(_)
+            | CanError::Link(_)
+            | CanError::Loop(LoopError::Bus(_) | LoopError::Link(_)) => 10,
+            _ => 4,
+        }
+    }
+}
+
+impl From<supple_ipc::IpcError> for CanError {
+    fn from(error: supple_ipc::IpcError) -> CanError {
+        CanError::Link(Box::new(error))
+    }
+}

@@ -1,0 +1,49 @@
+//! Barrett's arms: pucks, safety module and pendant on classic CAN.
+
+pub mod bus_time;
+pub mod start_up;
+pub mod transmission;
+
+mod drive;
+mod error;
+mod host;
+mod program;
+mod sensor;
+
+pub use drive::Barrett;
+pub use error::CanError;
+
+use crate::make::{Make, RunError};
+
+use supple_bus::Bus;
+use supple_core::Config;
+use supple_drive::{CycleConfig, Link, PlantLoop};
+
+/// The plant loop of an arm with these drives.
+pub type Cycle<const N: usize, B, L> = PlantLoop<N, Barrett<N, B>, L>;
+
+/// The plant loop of an arm that has completed start-up.
+///
+/// # Errors
+/// [`CanError::Overload`] if the period exceeds the bus bandwidth; an error if a puck's firmware lacks a property.
+pub fn cycle<const N: usize, B: Bus, L: Link<N>>(
+    bus: B,
+    link: L,
+    ready: start_up::Ready<N>,
+    config: &Config<N>,
+    cycle_config: CycleConfig,
+) -> Result<Cycle<N, B, L>, CanError> {
+    let drive = Barrett::new(bus, ready, cycle_config)?;
+    Ok(PlantLoop::new(drive, link, config, cycle_config, None)?)
+}
+
+/// Line of the registry: every arm without another make.
+pub const MAKE: Make = Make {
+    name: "barrett",
+    is_of: |_| true,
+    run: |description, options, stop| match program::run(description, options, stop) {
+        Err(CanError::Stopped) => Err(RunError::Stopped),
+        Err(error) => Err(RunError::new(error.code(), error)),
+        Ok(counters) => Ok(counters),
+    },
+};

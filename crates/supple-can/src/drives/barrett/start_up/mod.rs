@@ -1,0 +1,289 @@
+//! Start-up: enumerates the nodes, identifies them, compares them with the description, and sets their
+//! encoder positions.
+//!
+//! ```text
+//! safety module -> (operator: Shift-Idle) -> enumerate -> roles, versions -> wake -> motors idle
+//!   -> bus groups, torque slots, torque limits -> limits of the safety module
+//!   -> encoder positions from the home pose -> tare the sensor
+//! ```
+//!
+//! The host sets the motors to idle and never activates them: the operator does, at the pendant. Order and times
+//! follow libbarrett.
+
+mod module;
+mod motors;
+
+use crate::drives::barrett::error::CanError;
+use crate::drives::barrett::host::{Host, MS};
+use crate::drives::barrett::transmission::Transmission;
+pub use motors::{ARM_GROUPS, MotorPuck};
+use supple_bus::Bus;
+use supple_core::Vector;
+use supple_model::Description;
+use supple_puck::safety::{SafetyLimits, SafetyMode};
+use supple_puck::status::Stat;
+use supple_puck::{NodeId, Property, PropertyId, PropertyTable, Value, force_torque, property};
+
+/// Time after the wake-up in which the host sends nothing, because the pucks' transceivers leave the bus and return.
+const WAKE_QUIET_NS: u64 = 1_000 * MS;
+/// Time that taring the sensor takes, with a margin.
+const TARE_NS: u64 = 1_200 * MS;
+/// Poll interval of the module's mode while waiting for the operator.
+const OPERATOR_POLL_NS: u64 = 100 * MS;
+/// Number of velocity faults that the safety module ignores after positions are redefined: more than the cycles of
+/// positions from which it computes the speed.
+const IGNORED_FAULTS: i32 = 8;
+
+/// Start-up configuration from the command line.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StartupConfig<const N: usize> {
+    /// Current pose of the arm \[rad\]; `None` if unknown.
+    pub zero_at_rad: Option<Vector<N>>,
+    /// Limits of the safety module.
+    pub limits: SafetyLimits,
+    /// Tare the force/torque sensor, if there is one. If false, the sensor keeps its last tare.
+    pub tare: bool,
+}
+
+/// Progress of the start-up, for display.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Progress {
+    /// Waiting for the operator to select idle.
+    WaitingForIdle,
+    /// Searching for nodes.
+    Enumerating,
+    /// Waking this many pucks.
+    Waking(usize),
+    /// Comparing pucks with the description.
+    Checking,
+    /// Setting the positions to the home pose.
+    Zeroing,
+    /// Taring the sensor.
+    Taring,
+    /// The arm is ready for the polling cycle.
+    Ready,
+}
+
+/// An arm that is ready for the polling cycle.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ready<const N: usize> {
+    /// Motor pucks, in the order of the joints.
+    pub pucks: [MotorPuck; N],
+    /// Transmission between motors and joints.
+    pub transmission: Transmission<N>,
+    /// Property ids of the safety module.
+    pub module: PropertyTable,
+    /// Whether there is a force/torque sensor.
+    pub sensor: bool,
+}
+
+/// Prepares an arm for polling after power-up. The safety module is in idle at the end.
+///
+/// # Errors
+/// [`CanError`] with the mismatch and the remedy.
+pub fn start_up<const N: usize, B: Bus>(
+    bus: &mut B,
+    description: &Description,
+    startup_config: &StartupConfig<N>,
+    stop: &dyn Fn() -> bool,
+    progress: &mut dyn FnMut(Progress),
+) -> Result<Ready<N>, CanError> {
+    if (N != 4 && N != 7) || description.dof() != N {
+        return Err(CanError::Joints {
+            arm: description.name().to_owned(),
+            found: description.dof(),
+        });
+    }
+    startup_config.limits.validate()?;
+    let mut host = Host { bus, stop };
+    let module = module::find(&mut host)?;
+    wait_for_idle(&mut host, &module, progress)?;
+
+    progress(Progress::Enumerating);
+    let stats = enumerate(&mut host)?;
+    motors::check_nodes(&stats, description)?;
+    let mut pucks = Vec::with_capacity(N);
+    for node in (1..=N as u8).filter_map(NodeId::joint) {
+        pucks.push(motors::identify(&mut host, node)?);
+    }
+    motors::check_same_ids(&pucks)?;
+    wake(&mut host, &pucks, &stats, progress)?;
+
+    progress(Progress::Checking);
+    let mode = motors::property_id(&pucks[0], Property::MODE)?;
+    for puck in &pucks {
+        host.set_property(puck.node, mode, 0)?;
+    }
+    let mut scales = Vec::with_capacity(N);
+    for (index, puck) in pucks.iter().enumerate() {
+        motors::configure(&mut host, puck, index)?;
+        scales.push(motors::check_and_limit(
+            &mut host,
+            puck,
+            index,
+            description,
+        )?);
+    }
+    module::set_limits(&mut host, &module, &startup_config.limits)?;
+    let joints_error = || CanError::Joints {
+        arm: description.name().to_owned(),
+        found: description.dof(),
+    };
+    let transmission = Transmission::new(
+        description,
+        core::array::from_fn(|i| scales[i].0),
+        core::array::from_fn(|i| scales[i].1),
+    );
+    let transmission = transmission.ok_or_else(joints_error)?;
+    set_home_positions(
+        &mut host,
+        &module,
+        &pucks,
+        &transmission,
+        description,
+        startup_config,
+        progress,
+    )?;
+    let sensor = stats[usize::from(NodeId::FORCE_TORQUE.number())].is_some();
+    if sensor && startup_config.tare {
+        progress(Progress::Taring);
+        host.bus.send(&force_torque::tare())?;
+        host.wait_silently(TARE_NS)?;
+    }
+    let pucks: [MotorPuck; N] = pucks.try_into().map_err(|_| joints_error())?;
+    progress(Progress::Ready);
+    Ok(Ready {
+        pucks,
+        transmission,
+        module,
+        sensor,
+    })
+}
+
+/// Status ([`Property::STAT`]) by node number; `None` if the node does not answer.
+fn enumerate<B: Bus>(host: &mut Host<'_, B>) -> Result<[Option<i32>; 32], CanError> {
+    let stat = common_property_id(Property::STAT)?;
+    let mut stats = [None; 32];
+    for number in 1..32u8 {
+        if let Ok(node) = NodeId::new(number) {
+            stats[usize::from(number)] = host.get_property(node, stat)?;
+        }
+    }
+    Ok(stats)
+}
+
+fn wait_for_idle<B: Bus>(
+    host: &mut Host<'_, B>,
+    module: &PropertyTable,
+    progress: &mut dyn FnMut(Progress),
+) -> Result<(), CanError> {
+    let mut prompted = false;
+    loop {
+        match module::mode(host, module)? {
+            SafetyMode::Idle => return Ok(()),
+            SafetyMode::Active => module::set_idle(host, module)?,
+            SafetyMode::EStop => {
+                if !prompted {
+                    progress(Progress::WaitingForIdle);
+                    prompted = true;
+                }
+                host.wait_silently(OPERATOR_POLL_NS)?;
+            }
+        }
+    }
+}
+
+fn wake<B: Bus>(
+    host: &mut Host<'_, B>,
+    pucks: &[MotorPuck],
+    stats: &[Option<i32>; 32],
+    progress: &mut dyn FnMut(Progress),
+) -> Result<(), CanError> {
+    let ready = i32::from(Stat::Ready.value());
+    let stat = common_property_id(Property::STAT)?;
+    let is_asleep = |puck: &&MotorPuck| stats[usize::from(puck.node.number())] != Some(ready);
+    let asleep: Vec<&MotorPuck> = pucks.iter().filter(is_asleep).collect();
+    if asleep.is_empty() {
+        return Ok(());
+    }
+    progress(Progress::Waking(asleep.len()));
+    for puck in &asleep {
+        host.set_property(puck.node, stat, ready)?;
+    }
+    host.wait_silently(WAKE_QUIET_NS)?;
+    for puck in &asleep {
+        let found = motors::get_required(host, puck.node, stat)?;
+        if found != ready {
+            return Err(CanError::NotAwake {
+                node: puck.node.number(),
+                stat: found,
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Sets the motor positions from the home pose, unless the safety module reports that they are already set.
+fn set_home_positions<const N: usize, B: Bus>(
+    host: &mut Host<'_, B>,
+    module: &PropertyTable,
+    pucks: &[MotorPuck],
+    transmission: &Transmission<N>,
+    description: &Description,
+    startup_config: &StartupConfig<N>,
+    progress: &mut dyn FnMut(Progress),
+) -> Result<(), CanError> {
+    let zero_id = module::property_id(module, Property::ZERO)?;
+    let found = motors::get_required(host, NodeId::SAFETY, zero_id)?;
+    if found == 1 {
+        return Ok(());
+    }
+    let Some(home) = startup_config.zero_at_rad else {
+        return Err(CanError::NotZeroed {
+            zero: found,
+            home: format!("{:?}", description.home_rad()),
+        });
+    };
+    progress(Progress::Zeroing);
+    let counts = transmission.counts(&home)?;
+    let ifault_id = module::property_id(module, Property::IFAULT)?;
+    host.set_property(NodeId::SAFETY, ifault_id, IGNORED_FAULTS)?;
+    for (puck, counts) in pucks.iter().zip(counts) {
+        let set_position = property::set(puck.node, puck.position, Value::Wide(counts.get()));
+        host.bus.send(&set_position)?;
+        host.wait_silently(MS)?;
+    }
+    // The safety module receives these replies as well, and with them the new positions.
+    let replies = host.positions(pucks[0].position, N)?;
+    for (puck, expected) in pucks.iter().zip(counts) {
+        let node = puck.node.number();
+        let reply = replies.iter().find(|(from, _)| *from == puck.node);
+        let found = reply.map(|(_, counts)| *counts).ok_or(CanError::Missing {
+            what: "a motor puck",
+            node,
+            remedy: "check its cable, then switch the arm off and on",
+        })?;
+        // The arm may sag a little in the meantime; a puck that ignored the setting differs by far more.
+        if (found - expected.get()).abs() > puck.counts_per_revolution / 8 {
+            return Err(CanError::SettingIgnored {
+                property: Property::P,
+                node,
+                found,
+                expected: expected.get(),
+            });
+        }
+    }
+    host.set_property(NodeId::SAFETY, zero_id, 1)?;
+    motors::verify_setting(host, NodeId::SAFETY, Property::ZERO, zero_id, 1)
+}
+
+/// Id of a property that is the same in every firmware.
+fn common_property_id(property: Property) -> Result<PropertyId, CanError> {
+    PropertyTable::MONITOR
+        .id(property)
+        .ok_or(CanError::Property {
+            node: 0,
+            version: 0,
+            property,
+        })
+}

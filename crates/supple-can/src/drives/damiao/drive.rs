@@ -1,0 +1,306 @@
+//! Damiao motors as drives: the torque is the question. A cycle opens with the torques of the previous one, whose
+//! replies carry the state, so that the state is fresh when the controller gets it and its torque acts one period later.
+//!
+//! ```text
+//! disabled --(gravity hold requests torque)--> enable --> starting --(all enabled)--> enabled
+//! enabled or starting --(lowered, or a motor that cannot be enabled)--> disabling --(all disabled)--> disabled
+//! ```
+//!
+//! In the cycle that enables the motors each of them gets the enable frame instead of a command; from the next cycle on
+//! the torque is gravity compensation. Nothing here clears an error, sets a zero or writes a register.
+
+use super::motor::{Motor, Running};
+use supple_bus::Bus;
+use supple_can_frame::timing::Shape;
+use supple_can_frame::{BitRates, FrameFormat};
+use supple_core::Vector;
+use supple_core::controller::Mode;
+use supple_damiao::{Frame, Special, Status};
+use supple_drive::{
+    Budget, BusPort, Command, Drive, DriveCounters, DriveState, Drives, LoopError, LossReason,
+    Lower, Reading, Received, Reserved, Rest,
+};
+
+/// Cycles within which all motors must be enabled.
+const STARTING_CYCLES: u32 = 20;
+/// Cycles after which the enable frame is repeated.
+const ENABLE_AGAIN_CYCLES: u32 = 5;
+/// Bytes of every frame.
+const BYTES: u8 = 8;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Power {
+    Disabled,
+    /// This many cycles since the motors were first told.
+    Starting(u32),
+    Enabled,
+    Disabling,
+}
+
+/// Motors of an arm on their bus, after start-up.
+pub struct Damiao<const N: usize, B> {
+    port: BusPort<B>,
+    format: FrameFormat,
+    motors: [Running; N],
+    power: Power,
+    torque_nm: Vector<N>,
+    damping_nm_s_per_rad: Vector<N>,
+    /// Disabled after a loss; until the controller requests no torque.
+    latched: bool,
+}
+
+impl<const N: usize, B: Bus> Damiao<N, B> {
+    /// Disabled motors, in cycles of `period_s`.
+    pub fn new(bus: B, rates: BitRates, motors: [Motor; N], period_s: f64) -> Damiao<N, B> {
+        Damiao {
+            port: BusPort::new(bus, rates),
+            format: rates.format(),
+            motors: motors.map(|motor| Running::new(motor, period_s)),
+            power: Power::Disabled,
+            torque_nm: Vector::zeros(),
+            damping_nm_s_per_rad: Vector::zeros(),
+            latched: false,
+        }
+    }
+
+    /// The bus.
+    pub fn bus(&self) -> &B {
+        self.port.bus()
+    }
+
+    /// The bus.
+    pub fn bus_mut(&mut self) -> &mut B {
+        self.port.bus_mut()
+    }
+
+    /// Gives the bus back.
+    pub fn into_bus(self) -> B {
+        self.port.into_bus()
+    }
+
+    fn receive(&mut self, until_ns: u64, frames: u32) -> Result<bool, LoopError> {
+        match self.port.receive(until_ns, frames)? {
+            Received::Nothing => return Ok(false),
+            Received::Other => {}
+            Received::Frame(frame) => {
+                if let Ok(frame) = Frame::of_bus(&frame) {
+                    let mut motors = self.motors.iter_mut();
+                    if let Some(motor) = motors.find(|motor| motor.reply_id() == frame.id()) {
+                        motor.handle(&frame);
+                    }
+                }
+            }
+        }
+        Ok(true)
+    }
+
+    fn missing_replies(&self) -> u32 {
+        let missing = self
+            .motors
+            .iter()
+            .filter(|motor| motor.feedback().is_none());
+        missing.count() as u32
+    }
+
+    fn all(&self, status: Status) -> bool {
+        self.motors
+            .iter()
+            .all(|motor| motor.status() == Some(status))
+    }
+
+    /// Whether any reply of this cycle is from an enabled motor.
+    fn any_enabled(&self) -> bool {
+        let mut replies = self.motors.iter().filter_map(Running::feedback);
+        replies.any(|feedback| feedback.status == Status::Enabled)
+    }
+
+    /// Judges the replies of this cycle.
+    fn judge(&mut self) {
+        match self.power {
+            // A motor that missed its disable frame is told again.
+            Power::Disabled if self.any_enabled() => self.power = Power::Disabling,
+            Power::Disabled => {}
+            Power::Starting(_) if self.all(Status::Enabled) => {
+                self.power = Power::Enabled;
+            }
+            Power::Starting(cycles) if cycles > STARTING_CYCLES => {
+                let stuck = |motor: &&mut Running| motor.status() != Some(Status::Enabled);
+                self.motors
+                    .iter_mut()
+                    .filter(stuck)
+                    .for_each(Running::refuse);
+                self.latched = true;
+                self.power = Power::Disabling;
+            }
+            Power::Starting(_) => {}
+            Power::Enabled => self.motors.iter_mut().for_each(Running::judge),
+            // A silent motor is left to its watchdog.
+            Power::Disabling if !self.any_enabled() => self.power = Power::Disabled,
+            Power::Disabling => {}
+        }
+    }
+}
+
+/// Frames of a period: a command and a reply of each motor.
+pub fn budget(rates: BitRates, joints: usize) -> Budget {
+    let shape = Shape::standard(rates.format(), BYTES);
+    Budget::new(rates, joints)
+        .frames("commands", joints, shape)
+        .frames("replies", joints, shape)
+}
+
+impl<const N: usize, B: Bus> Drive<N> for Damiao<N, B> {
+    fn now_ns(&self) -> u64 {
+        self.port.bus().now_ns()
+    }
+
+    fn monotonic_ns(&self, time_ns: u64) -> u64 {
+        self.port.bus().monotonic_ns(time_ns)
+    }
+
+    fn clock_stall_ns(&self) -> u64 {
+        self.port.bus().clock_stall_ns()
+    }
+
+    fn rest(&self) -> Rest {
+        Rest::Falls
+    }
+
+    /// The torques wait for the next cycle.
+    fn reserved(&self) -> Reserved {
+        Reserved {
+            states_ns: self.budget().min_period_ns(),
+            torques_ns: 0,
+        }
+    }
+
+    fn budget(&self) -> Budget {
+        budget(self.port.rates(), N)
+    }
+
+    fn request(&mut self) -> Result<(), LoopError> {
+        let special = match &mut self.power {
+            Power::Disabled | Power::Enabled => None,
+            Power::Disabling => Some(Special::Disable),
+            Power::Starting(cycles) => {
+                *cycles += 1;
+                (*cycles % ENABLE_AGAIN_CYCLES == 1).then_some(Special::Enable)
+            }
+        };
+        for (joint, motor) in self.motors.iter_mut().enumerate() {
+            let enabled = motor.status() == Some(Status::Enabled);
+            let frame = match special {
+                Some(Special::Enable) if enabled => None,
+                special => special,
+            };
+            let frame = match frame {
+                Some(special) => motor.special(special, self.format),
+                None => {
+                    let damping = self.damping_nm_s_per_rad[joint];
+                    motor.command(self.torque_nm[joint], damping, self.format)
+                }
+            };
+            self.port.send(&frame)?;
+        }
+        Ok(())
+    }
+
+    fn collect(&mut self, until_ns: u64) -> Result<u8, LoopError> {
+        loop {
+            let missing = self.missing_replies();
+            if missing == 0 || !self.receive(until_ns, missing)? {
+                break;
+            }
+        }
+        let mut missing = 0;
+        for (index, motor) in self.motors.iter().enumerate() {
+            if motor.feedback().is_none() {
+                self.port.count_lost_replies(1);
+                let sent = motor.sent();
+                let confirmed = sent.is_some_and(|frame| !self.port.is_unconfirmed(frame));
+                missing |= u8::from(confirmed) << index;
+            }
+        }
+        self.judge();
+        Ok(missing)
+    }
+
+    fn reading(&self) -> Reading<N> {
+        Reading {
+            position_rad: core::array::from_fn(|joint| self.motors[joint].joint_rad()),
+            tip_force: None,
+        }
+    }
+
+    fn state(&self) -> DriveState {
+        let drives = match self.power {
+            Power::Enabled => Drives::Active,
+            // A motor that still has torque is lowered further.
+            Power::Disabling => Drives::Active,
+            Power::Starting(_) => Drives::Idle,
+            Power::Disabled if self.motors_replied() => Drives::Idle,
+            Power::Disabled => Drives::Off,
+        };
+        let mut faults = self.motors.iter().enumerate();
+        let loss = faults.find_map(|(index, motor)| {
+            let fault = motor.fault()?;
+            Some(LossReason::Motor(index, fault))
+        });
+        DriveState {
+            drives,
+            unsent: self.port.frames_lost(),
+            bus_off: self.port.bus_off(),
+            loss,
+        }
+    }
+
+    fn operate(&mut self, command: Option<&Command<N>>, allowed: bool) -> bool {
+        let Some(command) = command else {
+            return false;
+        };
+        self.latched &= command.wants_torque;
+        let holding = command.mode == Some(Mode::GravityHold) && command.wants_torque;
+        let idle = self.power == Power::Disabled && self.all(Status::Disabled);
+        if !(allowed && holding && idle && !self.latched && self.missing_replies() == 0) {
+            return false;
+        }
+        self.motors.iter_mut().for_each(Running::begin);
+        self.power = Power::Starting(0);
+        true
+    }
+
+    fn send_torques(
+        &mut self,
+        torque_nm: &Vector<N>,
+        damping_nm_s_per_rad: &Vector<N>,
+    ) -> Result<(), LoopError> {
+        self.torque_nm = *torque_nm;
+        self.damping_nm_s_per_rad = *damping_nm_s_per_rad;
+        Ok(())
+    }
+
+    fn lower(&mut self, _: Lower, reason: LossReason) -> Result<(), LoopError> {
+        self.latched |= reason != LossReason::TorqueNotWanted;
+        self.power = Power::Disabling;
+        Ok(())
+    }
+
+    fn drain(&mut self, next_period_ns: u64) -> Result<(), LoopError> {
+        self.skip(next_period_ns)?;
+        self.port.end_cycle();
+        Ok(())
+    }
+
+    fn skip(&mut self, next_period_ns: u64) -> Result<(), LoopError> {
+        while self.receive(next_period_ns, u32::MAX)? {}
+        Ok(())
+    }
+
+    fn motors_replied(&self) -> bool {
+        self.missing_replies() < N as u32
+    }
+
+    fn counters(&self) -> DriveCounters {
+        self.port.counters()
+    }
+}

@@ -1,0 +1,172 @@
+//! A run with Damiao motors: start-up, then cycles; repeated after the arm has lost its power.
+
+use super::drive::{Damiao, budget};
+use super::error::DamiaoError;
+use super::start_up::{rates, start_up};
+use crate::options::Options;
+use crate::serve::{Ended, SEARCH_INTERVAL, open, serve, sum_counters};
+use supple_bus::{Address, Bus, BusError};
+use supple_can_frame::BitRates;
+use supple_core::{Config, Vector};
+use supple_drive::{Counters, CycleConfig, Link, PlantLoop, SharedMemoryLink, StowConfig};
+use supple_ipc::{Domain, PlantLink};
+use supple_model::{Description, with_dof};
+use supple_realtime::{Stop, apply_realtime_settings, diagnostics, pause, spin_duration};
+
+/// Speed of the joints while the arm is laid down \[rad/s\].
+const STOW_SPEED_RAD_PER_S: f64 = 0.4;
+/// Time for which the arm is held before it is laid down \[s\].
+const HOLD_S: f64 = 0.5;
+/// Share of the stiffness of the move mode that lays the arm down: its friction must not stop it half way.
+const STOW_STIFFNESS_SHARE: f64 = 0.25;
+
+/// How an arm with these motors is held and laid down.
+///
+/// # Errors
+/// If the description does not fit `N` joints.
+pub fn stow_config<const N: usize>(
+    description: &Description,
+    config: &Config<N>,
+) -> Result<StowConfig<N>, DamiaoError> {
+    let bus = description.bus().ok_or_else(|| DamiaoError::NoMotors {
+        arm: description.name().to_owned(),
+    })?;
+    let stow_rad = description
+        .stow_rad()
+        .map(|angles| Vector::from_fn(|joint, _| angles.get(joint).copied().unwrap_or_default()));
+    Ok(StowConfig {
+        stow_rad,
+        damping_nm_s_per_rad: Vector::from_fn(|joint, _| {
+            bus.motors[joint].hold_damping_nm_s_per_rad
+        }),
+        stiffness_nm_per_rad: config.move_gains.stiffness_nm_per_rad * STOW_STIFFNESS_SHARE,
+        speed_rad_per_s: STOW_SPEED_RAD_PER_S,
+        hold_s: HOLD_S,
+        hold_at_end: false,
+    })
+}
+
+/// The plant loop of an arm with these motors.
+pub type DamiaoLoop<const N: usize, B, L> = PlantLoop<N, Damiao<N, B>, L>;
+
+/// The plant loop of an arm whose motors have completed start-up.
+///
+/// # Errors
+/// [`DamiaoError::Rate`] if the period is too short for the bus.
+pub fn with_drive<const N: usize, B: Bus, L: Link<N>>(
+    bus: B,
+    link: L,
+    motors: [super::Motor; N],
+    description: &Description,
+    config: &Config<N>,
+    cycle_config: CycleConfig,
+) -> Result<DamiaoLoop<N, B, L>, DamiaoError> {
+    let of_bus = description.bus().ok_or_else(|| DamiaoError::NoMotors {
+        arm: description.name().to_owned(),
+    })?;
+    let stow = stow_config(description, config)?;
+    let drive = Damiao::new(bus, rates(of_bus), motors, config.period_s);
+    let plant = PlantLoop::new(drive, link, config, cycle_config, Some(stow))?;
+    Ok(plant)
+}
+
+/// Runs an arm until the end of the program; returns the counters if start-up succeeded.
+///
+/// # Errors
+/// [`DamiaoError`] with the mismatch and the remedy.
+pub fn run(
+    description: &Description,
+    options: &Options,
+    stop: &Stop,
+) -> Result<Option<Counters>, DamiaoError> {
+    with_dof!(description.dof(), N => run_joints::<N>(description, options, stop))?
+}
+
+fn run_joints<const N: usize>(
+    description: &Description,
+    options: &Options,
+    stop: &Stop,
+) -> Result<Option<Counters>, DamiaoError> {
+    let config = description.config::<N>()?;
+    let cycle_config = CycleConfig {
+        period_ns: (config.period_s * 1e9).round() as u64,
+        answer_ns: options.answer_us * 1_000,
+    };
+    check_rate(description, N, cycle_config, options.budget)?;
+    if options.budget {
+        return Ok(None);
+    }
+    let domain = Domain::new(options.prefix.as_deref())?;
+    let link = PlantLink::new(&domain)?;
+    let mut link = SharedMemoryLink::new(link, options.virtual_time, stop.clone());
+    let address = match &options.bus {
+        Some(address) => address.clone(),
+        None => Address::of_system(domain.prefix())?,
+    };
+    let mut bus = open(address, options.virtual_time, stop)?;
+    let mut counters = Counters::default();
+    let mut first = true;
+    loop {
+        let stop_requested = || stop.shutdown_requested();
+        let motors = match start_up::<N, _>(&mut bus, description, &stop_requested) {
+            Ok(motors) => motors,
+            // After a power loss keep trying; the other processes continue meanwhile.
+            Err(
+                DamiaoError::Refused { .. }
+                | DamiaoError::BusFault(_)
+                | DamiaoError::Bus(BusError::Full),
+            ) if !first && !stop.shutdown_requested() => {
+                pause(SEARCH_INTERVAL);
+                continue;
+            }
+            Err(error) => return Err(error),
+        };
+        diagnostics::post(format_args!(
+            "supple-can: {N} motors ready; the arm has no brakes: support it, or let it lie, until gravity hold"
+        ));
+        if first {
+            for realtime_warning in apply_realtime_settings(&options.realtime()) {
+                diagnostics::post(format_args!("supple-can: warning: {realtime_warning}"));
+            }
+            link.spin(spin_duration(options.spin_us));
+        }
+        first = false;
+        let mut plant = with_drive(bus, link, motors, description, &config, cycle_config)?;
+        let ended = serve(&mut plant, options.cycles, stop)?;
+        counters = sum_counters(&counters, plant.counters());
+        let (drive, used_link) = plant.into_parts();
+        (bus, link) = (drive.into_bus(), used_link);
+        if ended == Ended::ShutDown {
+            return Ok(Some(counters));
+        }
+        diagnostics::post(format_args!(
+            "supple-can: the arm does not reply any more: searching for it"
+        ));
+    }
+}
+
+/// Checks the rate before the bus is opened; prints its arithmetic if `shown`.
+fn check_rate(
+    description: &Description,
+    joints: usize,
+    cycle_config: CycleConfig,
+    shown: bool,
+) -> Result<(), DamiaoError> {
+    let bus = description.bus().ok_or_else(|| DamiaoError::NoMotors {
+        arm: description.name().to_owned(),
+    })?;
+    let budget = budget(rates(bus), joints);
+    let budget = budget.time("the controller's answer", cycle_config.answer_ns);
+    if shown {
+        println!("{}", budget.display(cycle_config.period_ns));
+        let other = match rates(bus).has_fd() {
+            true => BitRates::CLASSIC_1M,
+            false => BitRates::FD_1M_5M,
+        };
+        let other = super::budget(other, joints);
+        let other = other.time("the controller's answer", cycle_config.answer_ns);
+        println!("\nWith the motors set to the other format:");
+        println!("{}", other.display(cycle_config.period_ns));
+    }
+    Ok(budget.check(cycle_config.period_ns)?)
+}

@@ -1,0 +1,166 @@
+//! Start-up: every motor is asked, compared with the arm's file and set, before any of them gets torque.
+//!
+//! ```text
+//! feedback of each motor -> registers -> compared -> mode and watchdog set in RAM and read back -> turns unwrapped
+//! ```
+//!
+//! Nothing is stored in flash and no zero is set. A motor whose last host was lost says so until it is told that the
+//! operator has started the program again: that one error is cleared, the motor stays disabled.
+
+use super::error::DamiaoError;
+use super::host::{Host, MS};
+use super::motor::Motor;
+use supple_bus::Bus;
+use supple_can_frame::{BitRates, FrameFormat};
+use supple_damiao::inspection::{Expectation, MIT_MODE, Readings, TO_READ};
+use supple_damiao::position::JointAngle;
+use supple_damiao::refusal::Problem;
+use supple_damiao::register::Register;
+use supple_damiao::temperature::Thermal;
+use supple_damiao::{Feedback, Special, Status};
+use supple_model::{BusDescription, BusFormat, BusMotor, Description};
+
+/// Silence before the first question: replies to an earlier host have passed \[ns\].
+const QUIET_NS: u64 = 5 * MS;
+/// Angle beyond a joint's limits that is allowed at the start, as on a stop \[rad\].
+const SLACK_RAD: f64 = 0.1;
+
+/// Bit rates of an arm's bus.
+pub fn rates(bus: &BusDescription) -> BitRates {
+    BitRates {
+        nominal_bit_per_s: bus.bit_rate,
+        data_bit_per_s: (bus.format == BusFormat::Fd).then_some(bus.data_bit_rate),
+    }
+}
+
+/// Asks all motors of an arm; they are disabled at the end.
+///
+/// # Errors
+/// [`DamiaoError`] with register, found, expected and remedy.
+pub fn start_up<const N: usize, B: Bus>(
+    bus: &mut B,
+    description: &Description,
+    stop: &dyn Fn() -> bool,
+) -> Result<[Motor; N], DamiaoError> {
+    let no_motors = || DamiaoError::NoMotors {
+        arm: description.name().to_owned(),
+    };
+    let of_bus = description.bus().ok_or_else(no_motors)?;
+    let config = description.config::<N>()?;
+    let format = rates(of_bus).format();
+    let fd = matches!(format, FrameFormat::Fd { .. });
+    if fd && !bus.carries_fd() {
+        return Err(DamiaoError::NoFd {
+            arm: description.name().to_owned(),
+        });
+    }
+    let thermal = Thermal::new(
+        of_bus.warning_celsius,
+        of_bus.derating_celsius,
+        of_bus.fault_celsius,
+    );
+    let thermal = thermal.ok_or_else(no_motors)?;
+    let mut host = Host { bus, format, stop };
+    host.discard(QUIET_NS)?;
+    let mut motors = Vec::with_capacity(N);
+    for (joint, motor) in of_bus.motors.iter().enumerate() {
+        let expectation = expectation(of_bus, motor, fd);
+        let refused = |problem| DamiaoError::Refused {
+            joint: motor.joint.clone(),
+            refusal: expectation.refuse(problem),
+        };
+        let feedback = disabled(&mut host, &expectation)?.map_err(refused)?;
+        let mut readings = Readings::new();
+        for register in TO_READ {
+            let bytes = host.read(expectation.id, expectation.reply_id, register)?;
+            readings.note(
+                register,
+                bytes.ok_or_else(|| refused(Problem::NotRead(register)))?,
+            );
+        }
+        let of_refusal = |refusal| DamiaoError::Refused {
+            joint: motor.joint.clone(),
+            refusal,
+        };
+        let ranges = expectation
+            .check(&readings, None)
+            .map_err(of_refusal)?
+            .ranges;
+        let motor_rad = feedback.position_rad(&ranges);
+        let inspected = expectation
+            .check(&readings, Some(motor_rad))
+            .map_err(of_refusal)?;
+        let mode = inspected.write_mode.then_some(MIT_MODE);
+        for (register, value) in [
+            (Register::MODE, mode),
+            (Register::TIMEOUT, inspected.write_timeout),
+        ] {
+            let Some(value) = value else {
+                continue;
+            };
+            let (id, reply_id) = (expectation.id, expectation.reply_id);
+            host.write(id, reply_id, register, value)?;
+            let bytes = host.read(id, reply_id, register)?;
+            let bytes = bytes.ok_or_else(|| refused(Problem::NotRead(register)))?;
+            let found = u32::from_le_bytes(bytes);
+            let written = expectation.check_written(register, value, found);
+            written.map_err(of_refusal)?;
+        }
+        let limits = &config.limits;
+        let angle = JointAngle::new(motor.direction, motor.zero_offset_rad).unwrapped(
+            motor_rad,
+            limits.position_lower_rad[joint],
+            limits.position_upper_rad[joint],
+            SLACK_RAD,
+        );
+        motors.push(Motor {
+            id: expectation.id,
+            reply_id: expectation.reply_id,
+            ranges,
+            angle: angle.map_err(|source| DamiaoError::Position {
+                joint: motor.joint.clone(),
+                source,
+            })?,
+            torque_scale: motor.torque_scale,
+            torque_limit_nm: limits.joint_torque_nm[joint],
+            thermal,
+        });
+    }
+    motors.try_into().map_err(|_| no_motors())
+}
+
+fn expectation<'a>(bus: &BusDescription, motor: &'a BusMotor, fd: bool) -> Expectation<'a> {
+    Expectation {
+        id: motor.id as u8,
+        reply_id: motor.reply_id,
+        gear_ratio: motor.gear_ratio,
+        position_range_rad: motor.position_range_rad,
+        velocity_range_rad_per_s: motor.velocity_range_rad_per_s,
+        torque_range_nm: motor.torque_range_nm,
+        firmware_series: motor.firmware_series.as_deref(),
+        watchdog_s: bus.watchdog_s,
+        without_watchdog: motor.without_watchdog,
+        fd,
+    }
+}
+
+/// The feedback of a motor that is disabled and without an error.
+fn disabled<B: Bus>(
+    host: &mut Host<'_, B>,
+    of: &Expectation<'_>,
+) -> Result<Result<Feedback, Problem>, DamiaoError> {
+    let mut found = host.feedback(of.id, of.reply_id)?;
+    if let Ok(feedback) = &found
+        && feedback.status == Status::CommunicationLost
+    {
+        found = host.special(of.id, of.reply_id, Special::ClearError)?;
+        if found.is_ok() {
+            found = host.feedback(of.id, of.reply_id)?;
+        }
+    }
+    Ok(found.and_then(|feedback| match feedback.status {
+        Status::Disabled => Ok(feedback),
+        Status::Enabled => Err(Problem::Enabled),
+        error => Err(Problem::Error(error)),
+    }))
+}

@@ -1,0 +1,158 @@
+//! Opening the bus and running cycles, for every make of drives.
+
+use core::time::Duration;
+use supple_bus::virtual_time::LockstepBus;
+use supple_bus::{Address, Bus, BusError, OwnerFolder, PacedBus, SocketCan};
+use supple_drive::{
+    Counters, Drive, Drives, LoopError, LossReason, PlantLoop, Rest, SharedMemoryLink, Stage,
+};
+use supple_realtime::{Stop, diagnostics, monotonic_ns, pause};
+
+/// Timeout for an emulated arm to appear \[ns\].
+const EMULATOR_TIMEOUT_NS: u64 = 5_000_000_000;
+/// Time without a reply from any motor after which start-up is repeated \[ns\].
+const ARM_LOST_AFTER_NS: u64 = 500_000_000;
+/// Maximum time for ending the torque at shutdown \[ns\]: of motors that brake, and of an arm that is laid down.
+const BRAKE_TIMEOUT_NS: u64 = 250_000_000;
+const STOW_TIMEOUT_NS: u64 = 60_000_000_000;
+/// Interval between attempts to reach a lost arm, or an emulator that has not started yet.
+pub const SEARCH_INTERVAL: Duration = Duration::from_millis(200);
+
+/// Why a run of cycles ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ended {
+    /// A shutdown was requested, or all cycles are done; the motors are idle.
+    ShutDown,
+    /// No motor replies any more.
+    ArmLost,
+}
+
+/// Runs cycles until a shutdown is requested, all `cycles` are done, or the arm has lost its power.
+///
+/// # Errors
+/// If the bus itself or the link to the controller fails.
+pub fn serve<const N: usize, D: Drive<N>>(
+    plant: &mut PlantLoop<N, D, SharedMemoryLink>,
+    cycles: Option<u64>,
+    stop: &Stop,
+) -> Result<Ended, LoopError> {
+    let mut last_reply_ns = plant.drive().now_ns();
+    let mut stages = Stages::default();
+    let all_cycles_done = |done: u64| cycles.is_some_and(|max| done >= max);
+    while !stop.shutdown_requested() && !all_cycles_done(plant.counters().cycles) {
+        plant.run()?;
+        let now_ns = plant.drive().now_ns();
+        if plant.drive().motors_replied() {
+            last_reply_ns = now_ns;
+        }
+        if now_ns > last_reply_ns + ARM_LOST_AFTER_NS {
+            return Ok(Ended::ArmLost);
+        }
+        stages.report(plant);
+    }
+    plant.begin_shutdown();
+    let timeout_ns = match plant.drive().rest() {
+        Rest::Brakes => BRAKE_TIMEOUT_NS,
+        Rest::Falls => STOW_TIMEOUT_NS,
+    };
+    let until_ns = plant.drive().now_ns() + timeout_ns;
+    while plant.drives() == Drives::Active && plant.drive().now_ns() < until_ns {
+        plant.run()?;
+        stages.report(plant);
+    }
+    Ok(Ended::ShutDown)
+}
+
+/// What was last reported.
+struct Stages {
+    loss: Option<(LossReason, u64)>,
+    stage: Stage,
+}
+
+impl Default for Stages {
+    fn default() -> Stages {
+        Stages {
+            loss: None,
+            stage: Stage::Resting,
+        }
+    }
+}
+
+impl Stages {
+    /// Posts a message when the drives become active or idle, so not in a cycle of steady operation.
+    fn report<const N: usize, D: Drive<N>>(&mut self, plant: &PlantLoop<N, D, SharedMemoryLink>) {
+        let guard = plant.guard();
+        let falls = plant.drive().rest() == Rest::Falls;
+        if guard.last_loss() != self.loss {
+            self.loss = guard.last_loss();
+            if let (Some((reason, _)), false) = (self.loss, falls) {
+                diagnostics::post(format_args!("supple-can: set to idle: {reason}"));
+            }
+        }
+        if guard.stage() == self.stage {
+            return;
+        }
+        let time_s = plant.drive().now_ns() as f64 * 1e-9;
+        match (guard.stage(), self.stage) {
+            (Stage::Active, _) => diagnostics::post(format_args!("supple-can: active")),
+            (Stage::Holding(reason, _), _) => diagnostics::post(format_args!(
+                "supple-can: {time_s:.3} s: holding the arm: {reason}"
+            )),
+            (Stage::Stowing(reason, _), _) => diagnostics::post(format_args!(
+                "supple-can: {time_s:.3} s: laying the arm down: {reason}"
+            )),
+            (Stage::Lowering(reason, _), _) if falls => diagnostics::post(format_args!(
+                "supple-can: {time_s:.3} s: disabling the motors: {reason}"
+            )),
+            (Stage::Resting, _) if falls => {
+                diagnostics::post(format_args!("supple-can: {time_s:.3} s: disabled"));
+            }
+            _ => {}
+        }
+        self.stage = guard.stage();
+    }
+}
+
+/// Opens a bus; waits for an emulator that has not started yet.
+///
+/// # Errors
+/// If the interface or folder cannot be used, or no emulator appears.
+pub fn open(address: Address, virtual_time: bool, stop: &Stop) -> Result<Box<dyn Bus>, BusError> {
+    diagnostics::post(format_args!("supple-can: bus {address}"));
+    match address {
+        Address::Interface(name) => Ok(Box::new(SocketCan::open(&name)?)),
+        Address::Folder(folder) => {
+            let folder = OwnerFolder::open(folder)?;
+            let until_ns = monotonic_ns() + EMULATOR_TIMEOUT_NS;
+            loop {
+                let opened: Result<Box<dyn Bus>, BusError> = match virtual_time {
+                    true => LockstepBus::open(&folder).map(|bus| Box::new(bus) as _),
+                    false => PacedBus::open(&folder).map(|bus| Box::new(bus) as _),
+                };
+                match opened {
+                    Err(BusError::NoPeer { .. })
+                        if monotonic_ns() < until_ns && !stop.shutdown_requested() =>
+                    {
+                        pause(SEARCH_INTERVAL);
+                    }
+                    opened => return opened,
+                }
+            }
+        }
+    }
+}
+
+/// Adds the counts of two runs; timing and load are those of the later run `b`.
+pub fn sum_counters(a: &Counters, b: &Counters) -> Counters {
+    Counters {
+        cycles: a.cycles + b.cycles,
+        missed: a.missed + b.missed,
+        late_answers: a.late_answers + b.late_answers,
+        skipped: a.skipped + b.skipped,
+        tx_lost: a.tx_lost + b.tx_lost,
+        unusable: a.unusable + b.unusable,
+        replies_lost: a.replies_lost + b.replies_lost,
+        overruns: a.overruns + b.overruns,
+        ..*b
+    }
+}

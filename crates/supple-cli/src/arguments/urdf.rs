@@ -1,0 +1,28 @@
+//! Arguments of an arm that is given as a URDF.
+
+use supple_model::UrdfName;
+
+/// What a URDF alone does not say.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct UrdfArgs {
+    /// The link whose origin is the tip, if the arm is given as a URDF. Default: the end of its longest chain.
+    #[arg(long, value_name = "LINK")]
+    pub tip: Option<String>,
+    /// Replace inertias in the URDF that no rigid body has by the nearest one that a rigid body has, and say so.
+    #[arg(long)]
+    pub repair: bool,
+}
+
+impl UrdfArgs {
+    /// The arm's name with the tip, as all programs read it. The two flags have no effect on other arms than a URDF.
+    pub fn name(&self, arm: &str) -> String {
+        match UrdfName::parse(arm) {
+            Some(mut name) => {
+                name.tip = self.tip.clone().or(name.tip);
+                name.repair |= self.repair;
+                name.to_text()
+            }
+            None => arm.to_owned(),
+        }
+    }
+}

@@ -1,0 +1,150 @@
+//! Losses that end normal operation, and the one table of what follows.
+//!
+//! | loss | motors that brake without torque | arm that falls without torque |
+//! |---|---|---|
+//! | no answer, no torque wanted, transmission, bus-off, safety module, leaving, activated by mistake | gravity at the last pose until they brake | held, laid down, disabled |
+//! | a lost encoder, a faulty motor | no torque | the other motors: held, laid down, disabled |
+//! | overspeed, no stop in a fault of the controller | no torque | the same |
+
+use core::fmt;
+use supple_core::drive_guard::GuardReason;
+
+/// What a motor reports about itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MotorFault {
+    /// It is disabled although it was enabled and nobody disabled it.
+    Disabled,
+    /// Its supply voltage is too high.
+    OverVoltage,
+    /// Its supply voltage is too low.
+    UnderVoltage,
+    /// Its current is too high.
+    OverCurrent,
+    /// Its driver is too hot.
+    HotDriver,
+    /// Its winding is too hot.
+    HotWinding,
+    /// It received no command in time.
+    CommunicationLost,
+    /// It is overloaded.
+    Overload,
+    /// Its position jumped farther than it can turn.
+    PositionJump,
+    /// A setting has another value than at the start.
+    RegisterChanged,
+    /// Two motors answer with its id.
+    TwoMotors,
+    /// A code that its protocol does not define.
+    Unknown(u8),
+}
+
+impl fmt::Display for MotorFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            MotorFault::Disabled => "is disabled and nobody disabled it",
+            MotorFault::OverVoltage => "reports over-voltage; check the supply",
+            MotorFault::UnderVoltage => "reports under-voltage; check the supply",
+            MotorFault::OverCurrent => "reports over-current",
+            MotorFault::HotDriver => "reports that its driver is too hot; let it cool down",
+            MotorFault::HotWinding => "reports that its winding is too hot; let it cool down",
+            MotorFault::CommunicationLost => "reports that commands were missing",
+            MotorFault::Overload => "reports overload",
+            MotorFault::PositionJump => "reports a position that jumped farther than it can turn",
+            MotorFault::RegisterChanged => "has another setting than at the start",
+            MotorFault::TwoMotors => "has an id that two motors answer to",
+            MotorFault::Unknown(code) => return write!(f, "reports unknown code {code:#x}"),
+        })
+    }
+}
+
+/// Reason for which normal operation ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LossReason {
+    /// The controller did not answer.
+    Answer,
+    /// The controller requests no torque.
+    TorqueNotWanted,
+    /// A joint is at twice its speed limit; its index.
+    Overspeed(usize),
+    /// A joint does not stop although the controller is in a fault; its index.
+    NotStopped(usize),
+    /// The motors were activated while the controller was not in gravity hold.
+    Activated,
+    /// A motor did not reply; its index.
+    Encoder(usize),
+    /// A motor reports a fault; its index.
+    Motor(usize, MotorFault),
+    /// Frames were not sent.
+    Transmit,
+    /// The controller of the CAN interface is bus-off.
+    BusOff,
+    /// The safety module did not answer.
+    Module,
+    /// This program is about to end.
+    Leaving,
+}
+
+impl fmt::Display for LossReason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            LossReason::Answer => f.write_str("the controller did not answer"),
+            LossReason::TorqueNotWanted => f.write_str("the controller requests no torque"),
+            LossReason::Overspeed(joint) => {
+                write!(f, "joint {joint} moves at twice its speed limit")
+            }
+            LossReason::NotStopped(joint) => write!(
+                f,
+                "joint {joint} does not stop although the controller is in a fault"
+            ),
+            LossReason::Activated => f.write_str(
+                "the motors were activated while the controller was not in gravity hold",
+            ),
+            LossReason::Encoder(index) => {
+                write!(f, "motor {} did not reply in two cycles", index + 1)
+            }
+            LossReason::Motor(index, fault) => write!(f, "motor {} {fault}", index + 1),
+            LossReason::Transmit => f.write_str("the CAN interface does not send its frames"),
+            LossReason::BusOff => f.write_str("the CAN interface is bus-off"),
+            LossReason::Module => f.write_str("the safety module does not answer"),
+            LossReason::Leaving => f.write_str("the program is shutting down"),
+        }
+    }
+}
+
+/// What the drives do after a loss: a row of the table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SafeAction {
+    /// Gravity compensation continues until the motors brake. On an arm that falls without torque it continues in
+    /// any case, with damping, as far as the motors can.
+    pub gravity: bool,
+}
+
+impl LossReason {
+    /// The table of safe actions, for every drive.
+    pub const fn safe_action(self) -> SafeAction {
+        let gravity = match self {
+            LossReason::Answer
+            | LossReason::TorqueNotWanted
+            | LossReason::Activated
+            | LossReason::Transmit
+            | LossReason::BusOff
+            | LossReason::Module
+            | LossReason::Leaving => true,
+            // Gravity computed from a lost encoder would be wrong.
+            LossReason::Encoder(_) | LossReason::Motor(..) => false,
+            // The pose or its torque is itself in doubt.
+            LossReason::Overspeed(_) | LossReason::NotStopped(_) => false,
+        };
+        SafeAction { gravity }
+    }
+}
+
+impl From<GuardReason> for LossReason {
+    fn from(reason: GuardReason) -> LossReason {
+        match reason {
+            GuardReason::Overspeed { joint, .. } => LossReason::Overspeed(joint),
+            GuardReason::NotStopped { joint, .. } => LossReason::NotStopped(joint),
+            GuardReason::NotInGravityHold => LossReason::Activated,
+        }
+    }
+}

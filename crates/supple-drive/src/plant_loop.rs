@@ -1,0 +1,357 @@
+//! The cycle: angles in, torques out, once per period.
+//!
+//! ```text
+//! 0  request -> collect the replies -> publish -> wait for the answer -> safe action -> torques
+//!    -> something less urgent, if it fits -> drain until the next period
+//! ```
+//!
+//! The loop computes no torques, with one exception: it holds and lays down an arm that falls without torque, when
+//! the controller is lost or wants none. A cycle allocates no memory, takes no lock and writes no log.
+
+use crate::budget::Overload;
+use crate::drive::{Drive, Lower, Reserved, Rest, TipForce};
+use crate::error::LoopError;
+use crate::guard::{Action, GuardInput, SafeActionMachine, Stage, Torque};
+use crate::link::{ArmReport, Command, Counters, Drives, Link};
+use crate::loss::LossReason;
+use crate::stow::{StowConfig, Stowing};
+use supple_core::controller::Mode;
+use supple_core::drive_guard::DriveGuard;
+use supple_core::dynamics::tip_pose;
+use supple_core::{Arm, Config, Vector};
+
+/// Configuration of the cycle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CycleConfig {
+    /// Period \[ns\].
+    pub period_ns: u64,
+    /// Time reserved for the controller's answer \[ns\].
+    pub answer_ns: u64,
+}
+
+/// The cycle of a running arm.
+pub struct PlantLoop<const N: usize, D, L> {
+    drive: D,
+    link: L,
+    arm: Arm<N>,
+    cycle_config: CycleConfig,
+    reserved: Reserved,
+    guard: SafeActionMachine,
+    drive_guard: DriveGuard<N>,
+    /// Of an arm that falls without torque.
+    stowing: Option<Stowing<N>>,
+    cycle: u64,
+    /// Cycle of the last angles that the drive guard observed.
+    observed_cycle: Option<u64>,
+    next_period_ns: u64,
+    /// Last joint angles for which all encoders replied \[rad\].
+    last_pose_rad: Vector<N>,
+    /// Time for which the bus had been busy at the start of this period \[ns\].
+    busy_ns: u64,
+    fallback_nm: Vector<N>,
+    counters: Counters,
+    shutting_down: bool,
+}
+
+impl<const N: usize, D: Drive<N>, L: Link<N>> PlantLoop<N, D, L> {
+    /// Starts the cycle of drives that have completed start-up; `stow` says how an arm that falls without torque is
+    /// laid down, and is not used for others.
+    ///
+    /// # Errors
+    /// [`Overload`] if the period is too short for the drives.
+    pub fn new(
+        drive: D,
+        link: L,
+        config: &Config<N>,
+        cycle_config: CycleConfig,
+        stow: Option<StowConfig<N>>,
+    ) -> Result<PlantLoop<N, D, L>, Overload> {
+        let budget = drive.budget();
+        let budget = budget.time("the controller's answer", cycle_config.answer_ns);
+        budget.check(cycle_config.period_ns)?;
+        let falls = drive.rest() == Rest::Falls;
+        let stowing = stow.filter(|_| falls);
+        let guard = match (falls, &stowing) {
+            (true, Some(stow)) => SafeActionMachine::falling((stow.hold_s.max(0.0) * 1e9) as u64),
+            (true, None) => SafeActionMachine::falling(0),
+            (false, _) => SafeActionMachine::new(),
+        };
+        Ok(PlantLoop {
+            next_period_ns: drive.now_ns(),
+            reserved: drive.reserved(),
+            busy_ns: drive.counters().busy_ns,
+            drive,
+            link,
+            arm: config.arm,
+            drive_guard: DriveGuard::new(config),
+            stowing: stowing.map(|stow| Stowing::new(config.arm, stow)),
+            cycle_config,
+            guard,
+            cycle: 0,
+            observed_cycle: None,
+            last_pose_rad: Vector::zeros(),
+            fallback_nm: Vector::zeros(),
+            counters: Counters::default(),
+            shutting_down: false,
+        })
+    }
+
+    /// Ends normal operation from the next cycle on, because the program is about to end.
+    pub fn begin_shutdown(&mut self) {
+        self.shutting_down = true;
+    }
+
+    /// Counters of the cycle.
+    pub fn counters(&self) -> &Counters {
+        &self.counters
+    }
+
+    /// State machine of the safe action.
+    pub fn guard(&self) -> &SafeActionMachine {
+        &self.guard
+    }
+
+    /// State of the drives, as last known.
+    pub fn drives(&self) -> Drives {
+        self.drive.state().drives
+    }
+
+    /// Number of the next cycle.
+    pub fn cycle_number(&self) -> u64 {
+        self.cycle
+    }
+
+    /// The drives.
+    pub fn drive(&self) -> &D {
+        &self.drive
+    }
+
+    /// The drives.
+    pub fn drive_mut(&mut self) -> &mut D {
+        &mut self.drive
+    }
+
+    /// Link to the controller.
+    pub fn link_mut(&mut self) -> &mut L {
+        &mut self.link
+    }
+
+    /// Returns the drives and the link to the controller after the last cycle.
+    pub fn into_parts(self) -> (D, L) {
+        (self.drive, self.link)
+    }
+
+    /// Runs one cycle, up to the start of the next period.
+    ///
+    /// # Errors
+    /// If the bus itself or the link to the controller fails. Faults on the bus are handled.
+    pub fn run(&mut self) -> Result<Action, LoopError> {
+        let start_ns = self.start_period()?;
+        self.drive.request()?;
+        self.link.announce()?;
+        // Replies after this time would leave too little of the period for the answer and the torques.
+        let reserved_ns = self.reserved.torques_ns + self.cycle_config.answer_ns;
+        let until_ns = start_ns + self.cycle_config.period_ns - reserved_ns;
+        let missing = self.drive.collect(until_ns)?;
+        let report = self.arm_report(start_ns);
+        let published_ns = self.drive.now_ns();
+        self.link.publish(&report)?;
+        let command = self.wait_for_answer(start_ns, published_ns)?;
+        let periods = report.cycle - self.observed_cycle.unwrap_or(report.cycle);
+        self.observed_cycle = Some(report.cycle);
+        self.drive_guard.observe(&report.position_rad, periods);
+        if let Some(stowing) = &mut self.stowing {
+            stowing.observe(&report.position_rad);
+        }
+        let allowed =
+            !self.shutting_down && matches!(self.guard.stage(), Stage::Resting | Stage::Active);
+        if self.drive.operate(command.as_ref(), allowed) {
+            let torque_nm = command.map_or(Vector::zeros(), |command| command.torque_nm);
+            self.drive_guard.reset_rate_limit(&torque_nm);
+        }
+        let state = self.drive.state();
+        let active = state.drives == Drives::Active;
+        let drive_guard_check = self
+            .drive_guard
+            .check_command(command.as_ref().map(Command::drive).as_ref(), active);
+        let now_ns = self.drive.now_ns();
+        let input = GuardInput {
+            now_ns,
+            answer: command.map(|command| command.wants_torque),
+            drive_guard_loss: drive_guard_check.err().map(LossReason::from),
+            missing,
+            unsent: state.unsent,
+            bus_off: state.bus_off,
+            drives: state.drives,
+            drive_loss: state.loss,
+            leaving: self.shutting_down,
+        };
+        let lies = self.has_stowed(now_ns);
+        let action = self.guard.cycle(&input, lies);
+        self.send_torques(&action, command.as_ref(), now_ns)?;
+        self.drive.poll(self.next_period_ns, action.lower)?;
+        self.drive.drain(self.next_period_ns)?;
+        self.copy_counts();
+        Ok(action)
+    }
+
+    /// Copies the counts of the drives.
+    fn copy_counts(&mut self) {
+        let counters = self.drive.counters();
+        self.counters.tx_lost = counters.tx_lost;
+        self.counters.replies_lost = counters.replies_lost;
+        self.counters.overruns = counters.overruns;
+    }
+
+    /// Starts the next period; returns its start \[ns\]. Skips periods that are over, and one whose remaining time is
+    /// too short for replies, answer and torques; the replies of a skipped period do not count as missing.
+    fn start_period(&mut self) -> Result<u64, LoopError> {
+        let now_ns = self.drive.now_ns();
+        let period_ns = self.cycle_config.period_ns;
+        let late_ns = now_ns.saturating_sub(self.next_period_ns);
+        self.skip_periods(late_ns / period_ns);
+        if late_ns % period_ns > self.slack_ns() {
+            self.skip_periods(1);
+            self.drive.skip(self.next_period_ns)?;
+        }
+        self.counters.wake_ns = late_ns;
+        self.counters.cycles += 1;
+        let busy_ns = self.drive.counters().busy_ns;
+        self.counters.bus_load = (busy_ns - self.busy_ns) as f64 / period_ns as f64;
+        self.busy_ns = busy_ns;
+        self.counters.clock_stall_ns = self.drive.clock_stall_ns();
+        let start_ns = self.next_period_ns;
+        self.next_period_ns += period_ns;
+        Ok(start_ns)
+    }
+
+    /// Maximum delay of a cycle's start that leaves time for replies, answer and torques \[ns\].
+    fn slack_ns(&self) -> u64 {
+        let reserved_ns = self.reserved.states_ns + self.reserved.torques_ns;
+        let needed_ns = reserved_ns + self.cycle_config.answer_ns;
+        self.cycle_config.period_ns.saturating_sub(needed_ns)
+    }
+
+    fn skip_periods(&mut self, periods: u64) {
+        self.cycle += periods;
+        self.next_period_ns += periods * self.cycle_config.period_ns;
+        self.counters.skipped += periods;
+    }
+
+    fn arm_report(&mut self, start_ns: u64) -> ArmReport<N> {
+        let reading = self.drive.reading();
+        let position_rad = reading.position_rad;
+        if position_rad.iter().all(Option::is_some) {
+            self.last_pose_rad = Vector::from(position_rad.map(Option::unwrap_or_default));
+        }
+        let tip_force_n = reading.tip_force.map(|force| match force {
+            TipForce::Base(force_n) => force_n,
+            TipForce::Tip(force_n) => tip_pose(&self.arm, &self.last_pose_rad).rotation * force_n,
+        });
+        self.copy_counts();
+        ArmReport {
+            cycle: self.cycle,
+            stamp_ns: self.drive.monotonic_ns(start_ns),
+            position_rad,
+            tip_force_n,
+            drives: self.drives(),
+            counters: self.counters,
+        }
+    }
+
+    fn wait_for_answer(
+        &mut self,
+        start_ns: u64,
+        published_ns: u64,
+    ) -> Result<Option<Command<N>>, LoopError> {
+        let until_ns = start_ns + self.cycle_config.period_ns - self.reserved.torques_ns;
+        let wait_ns = until_ns.saturating_sub(self.drive.now_ns());
+        let answer = self.link.answer(self.cycle, wait_ns)?;
+        self.cycle += 1;
+        self.counters.late_answers += answer.late;
+        // A command that is not finite counts as missing: the last fallback torque is applied.
+        let command = answer.command.filter(Command::is_finite);
+        self.counters.unusable += u64::from(answer.command.is_some() && command.is_none());
+        match &command {
+            Some(command) => {
+                self.fallback_nm = command.fallback_torque_nm;
+                self.counters.round_trip_ns = self.drive.now_ns().saturating_sub(published_ns);
+            }
+            None => {
+                self.counters.missed += u64::from(self.drives() == Drives::Active);
+                if self.guard.stage() == Stage::Resting {
+                    // The arm may move before the motors are activated, so the old fallback torque is not valid.
+                    self.fallback_nm = Vector::zeros();
+                }
+                self.counters.round_trip_ns = 0;
+            }
+        }
+        Ok(command)
+    }
+
+    /// Whether an arm that is being laid down has arrived.
+    fn has_stowed(&self, now_ns: u64) -> bool {
+        match (self.guard.stage(), &self.stowing) {
+            (Stage::Stowing(_, since_ns), Some(stowing)) => {
+                stowing.has_ended((now_ns - since_ns) as f64 * 1e-9)
+            }
+            (Stage::Stowing(..), None) => true,
+            _ => false,
+        }
+    }
+
+    /// Sends the torques, and ends them if the action requires it.
+    fn send_torques(
+        &mut self,
+        action: &Action,
+        command: Option<&Command<N>>,
+        now_ns: u64,
+    ) -> Result<(), LoopError> {
+        let mut damping_nm_s_per_rad = Vector::zeros();
+        let (wanted_nm, stopping) = match (action.torque, command) {
+            (Torque::Command, Some(command)) => (command.torque_nm, command.fault),
+            (Torque::Fallback, _) => (self.fallback_nm, true),
+            (Torque::Hold | Torque::Stow, _) => match &mut self.stowing {
+                Some(stowing) => {
+                    damping_nm_s_per_rad = stowing.config().damping_nm_s_per_rad;
+                    let torque_nm = match self.guard.stage() {
+                        Stage::Stowing(_, since_ns) => {
+                            stowing.stow_nm((now_ns - since_ns) as f64 * 1e-9)
+                        }
+                        _ => {
+                            stowing.reset();
+                            stowing.hold_nm()
+                        }
+                    };
+                    (torque_nm, false)
+                }
+                None => (self.fallback_nm, true),
+            },
+            (Torque::Command | Torque::None, _) => (Vector::zeros(), true),
+        };
+        let torque_nm = if self.drives() == Drives::Active && action.torque != Torque::None {
+            self.drive_guard.limited_nm(&wanted_nm, stopping)
+        } else {
+            // The motors become active some cycles before this program learns of it. Until then it sends gravity
+            // compensation only, within the limits, and zero in all other modes.
+            let in_gravity_hold =
+                command.is_some_and(|command| command.mode == Some(Mode::GravityHold));
+            let activation_nm = if in_gravity_hold {
+                wanted_nm
+            } else {
+                Vector::zeros()
+            };
+            self.drive_guard.reset_rate_limit(&activation_nm)
+        };
+        self.drive.send_torques(&torque_nm, &damping_nm_s_per_rad)?;
+        if let (true, Stage::Lowering(reason, _)) = (action.lower, self.guard.stage()) {
+            let how = if action.idle_motors {
+                Lower::Forced
+            } else {
+                Lower::Regular
+            };
+            self.drive.lower(how, reason)?;
+        }
+        Ok(())
+    }
+}

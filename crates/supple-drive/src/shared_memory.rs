@@ -1,0 +1,141 @@
+//! Link to the controller through shared memory.
+
+use crate::error::LoopError;
+use crate::link::{Answer, ArmReport, Command, Drives, Link};
+use core::time::Duration;
+use supple_ipc::message::{self, ArmState, PlantReport, TorqueCommand};
+use supple_ipc::{IpcError, PlantLink};
+use supple_realtime::{Stop, pause};
+
+/// Poll intervals in virtual time for an answer (and shutdown), and for a controller to join.
+const ANSWER_POLL_INTERVAL: Duration = Duration::from_millis(50);
+const JOIN_POLL_INTERVAL: Duration = Duration::from_millis(1);
+/// Polls without an answer after which the controller counts as lost in virtual time (2 s).
+const MAX_UNANSWERED_POLLS: u32 = 40;
+
+/// The plant's end of shared memory.
+pub struct SharedMemoryLink {
+    link: PlantLink,
+    virtual_time: bool,
+    /// The last cycle in virtual time was not answered, so the next ones do not wait.
+    lost: bool,
+    /// Number of commands for another arm.
+    unusable: u64,
+    stop: Stop,
+}
+
+impl SharedMemoryLink {
+    /// In real time an answer is awaited for as long as the cycle allows; in virtual time until it arrives, as bus
+    /// time does not advance meanwhile.
+    pub fn new(link: PlantLink, virtual_time: bool, stop: Stop) -> SharedMemoryLink {
+        SharedMemoryLink {
+            link,
+            virtual_time,
+            lost: false,
+            unusable: 0,
+            stop,
+        }
+    }
+
+    /// Decodes a command; one for another arm is counted and discarded.
+    fn read<const N: usize>(&mut self, command: &TorqueCommand) -> Option<Command<N>> {
+        let torques = (command.torque::<N>(), command.fallback_torque::<N>());
+        let (Ok(torque_nm), Ok(fallback_torque_nm)) = torques else {
+            self.unusable += 1;
+            return None;
+        };
+        Some(Command {
+            torque_nm,
+            fallback_torque_nm,
+            wants_torque: command.wants_torque(),
+            mode: command.mode(),
+            fault: command.fault != 0,
+            codes: [command.mode, command.fault],
+        })
+    }
+
+    /// Sets the time to poll for an answer before blocking, see [`PlantLink::spin`].
+    pub fn spin(&mut self, at_most: Duration) {
+        self.link.spin(at_most);
+    }
+}
+
+impl From<IpcError> for LoopError {
+    fn from(error: IpcError) -> LoopError {
+        LoopError::Link(Box::new(error))
+    }
+}
+
+impl<const N: usize> Link<N> for SharedMemoryLink {
+    fn announce(&mut self) -> Result<(), LoopError> {
+        if !self.virtual_time {
+            self.link.announce()?;
+        }
+        Ok(())
+    }
+
+    fn publish(&mut self, report: &ArmReport<N>) -> Result<(), LoopError> {
+        let counters = &report.counters;
+        let state = ArmState::new(
+            report.cycle,
+            report.stamp_ns,
+            &report.position_rad,
+            report.tip_force_n,
+            match report.drives {
+                Drives::Off => message::Drives::Off,
+                Drives::Idle => message::Drives::Idle,
+                Drives::Active => message::Drives::Active,
+            },
+            PlantReport {
+                missed: counters.missed,
+                late: counters.late_answers,
+                foreign: self.link.foreign(),
+                unusable: self.unusable + counters.unusable,
+                tx_lost: counters.tx_lost,
+                wake_ns: counters.wake_ns,
+                round_trip_ns: counters.round_trip_ns,
+                bus_load: counters.bus_load,
+                clock_stall_ns: counters.clock_stall_ns,
+            },
+        );
+        while !self.link.publish(&state)? {
+            if !self.virtual_time || self.lost || self.stop.shutdown_requested() {
+                break;
+            }
+            pause(JOIN_POLL_INTERVAL);
+        }
+        Ok(())
+    }
+
+    fn answer(&mut self, cycle: u64, wait_ns: u64) -> Result<Answer<N>, LoopError> {
+        let mut late = 0;
+        let polls = match (self.virtual_time, self.lost) {
+            (false, _) | (true, true) => 1,
+            (true, false) => MAX_UNANSWERED_POLLS,
+        };
+        let wait = match (self.virtual_time, self.lost) {
+            (false, _) => Duration::from_nanos(wait_ns),
+            (true, true) => JOIN_POLL_INTERVAL,
+            (true, false) => ANSWER_POLL_INTERVAL,
+        };
+        for _ in 0..polls {
+            let received = self.link.answer(cycle, wait)?;
+            late += received.late;
+            if let Some(command) = received.answer {
+                self.lost = false;
+                return Ok(Answer {
+                    command: self.read::<N>(&command),
+                    late,
+                });
+            }
+            if self.stop.shutdown_requested() {
+                break;
+            }
+        }
+        self.lost = self.virtual_time;
+        Ok(Answer {
+            command: None,
+            late,
+        })
+    }
+}

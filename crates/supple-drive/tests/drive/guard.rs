@@ -1,0 +1,129 @@
+//! Torque with several simultaneous losses: a loss that invalidates the fallback torque ends it.
+
+use supple_drive::{Drives, GuardInput, LossReason, MotorFault, SafeActionMachine, Stage, Torque};
+
+const MS: u64 = 1_000_000;
+
+fn without_loss(ms: u64) -> GuardInput {
+    GuardInput {
+        now_ns: ms * MS,
+        answer: Some(true),
+        drive_guard_loss: None,
+        missing: 0,
+        unsent: false,
+        bus_off: false,
+        drives: Drives::Active,
+        drive_loss: None,
+        leaving: false,
+    }
+}
+
+fn active() -> SafeActionMachine {
+    let mut guard = SafeActionMachine::new();
+    for ms in 0..10 {
+        guard.cycle(&without_loss(ms), false);
+    }
+    assert_eq!(guard.stage(), Stage::Active);
+    guard
+}
+
+#[test]
+fn overspeed_ends_the_fallback_torque_during_any_other_loss() {
+    type Change = fn(&mut GuardInput);
+    let losses: [(&str, Change); 4] = [
+        ("no answer", |input| input.answer = None),
+        ("leaving", |input| input.leaving = true),
+        ("unsent", |input| input.unsent = true),
+        ("bus off", |input| input.bus_off = true),
+    ];
+    for (name, lose) in losses {
+        for loss in [LossReason::Overspeed(1), LossReason::NotStopped(0)] {
+            let mut guard = active();
+            let mut action = guard.cycle(&without_loss(10), false);
+            for ms in 11..40 {
+                let mut input = without_loss(ms);
+                lose(&mut input);
+                action = guard.cycle(&input, false);
+            }
+            assert_eq!(action.torque, Torque::Fallback, "{name}");
+            let mut input = without_loss(40);
+            lose(&mut input);
+            input.drive_guard_loss = Some(loss);
+            assert_eq!(guard.cycle(&input, false).torque, Torque::None, "{name}");
+            // The torque remains zero until the motors brake.
+            let mut input = without_loss(41);
+            lose(&mut input);
+            assert_eq!(guard.cycle(&input, false).torque, Torque::None, "{name}");
+        }
+    }
+}
+
+#[test]
+fn activation_outside_gravity_hold_is_set_to_idle_with_the_fallback_torque() {
+    let mut guard = SafeActionMachine::new();
+    let mut input = without_loss(0);
+    input.drive_guard_loss = Some(LossReason::Activated);
+    let action = guard.cycle(&input, false);
+    assert_eq!(action.torque, Torque::Fallback);
+    assert!(action.lower);
+}
+
+/// Every loss, by the table: what a braking and a falling arm do in the cycle after it, and at the end.
+#[test]
+fn an_arm_that_falls_is_held_and_laid_down_before_its_motors_are_disabled() {
+    type Change = fn(&mut GuardInput);
+    let losses: [(LossReason, Change); 8] = [
+        (LossReason::Answer, |input| input.answer = None),
+        (LossReason::TorqueNotWanted, |input| {
+            input.answer = Some(false);
+        }),
+        (LossReason::Overspeed(2), |input| {
+            input.drive_guard_loss = Some(LossReason::Overspeed(2));
+        }),
+        (LossReason::Encoder(0), |input| input.missing = 1),
+        (LossReason::Motor(3, MotorFault::HotWinding), |input| {
+            input.drive_loss = Some(LossReason::Motor(3, MotorFault::HotWinding));
+        }),
+        (LossReason::Transmit, |input| input.unsent = true),
+        (LossReason::BusOff, |input| input.bus_off = true),
+        (LossReason::Leaving, |input| input.leaving = true),
+    ];
+    for (reason, lose) in losses {
+        let mut guard = SafeActionMachine::falling(100 * MS);
+        guard.cycle(&without_loss(0), false);
+        assert_eq!(guard.stage(), Stage::Active);
+        let mut stages = Vec::new();
+        for ms in 1..500 {
+            let mut input = without_loss(ms);
+            lose(&mut input);
+            // The arm lies 200 ms later, and a disabled motor is idle.
+            if matches!(guard.stage(), Stage::Lowering(..)) {
+                input.drives = Drives::Idle;
+            }
+            let action = guard.cycle(&input, ms >= 300);
+            let (found, torque) = match guard.stage() {
+                Stage::Active => ("active", None),
+                Stage::Holding(of, _) if of == reason => ("holding", Some(Torque::Hold)),
+                Stage::Stowing(of, _) if of == reason => ("stowing", Some(Torque::Stow)),
+                Stage::Lowering(of, _) if of == reason => ("lowering", Some(Torque::None)),
+                Stage::Resting => break,
+                other => panic!("{reason}: {other:?}"),
+            };
+            assert!(
+                torque.is_none_or(|torque| torque == action.torque),
+                "{reason}"
+            );
+            assert_eq!(action.lower, found == "lowering", "{reason}");
+            if stages.last() != Some(&found) {
+                stages.push(found);
+            }
+        }
+        let stages = stages
+            .iter()
+            .filter(|stage| **stage != "active")
+            .copied()
+            .collect::<Vec<_>>();
+        assert_eq!(stages, ["holding", "stowing", "lowering"], "{reason}");
+        assert_eq!(guard.last_loss().map(|(loss, _)| loss), Some(reason));
+    }
+}

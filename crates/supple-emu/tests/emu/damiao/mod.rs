@@ -1,0 +1,5 @@
+//! Emulated Damiao motors, as a host observes them on the bus.
+
+mod host;
+mod misbehaving;
+mod regular;

@@ -1,0 +1,155 @@
+//! Calibrates simulated arms with random effects of real ones and tracks the sinusoid with each model: the data on which
+//! the verdict's interval is judged (`verdict_coverage`).
+//!
+//! ```text
+//! cargo run --release -p supple-experiment --example verdict_runs -- FOLDER FIRST LAST
+//! ```
+//! For each seed it writes `FOLDER/SEED.csv`: a line with the measured and the formerly predicted tracking errors, then
+//! the residuals of the model over the held-out motion and the slow one. Finished seeds are skipped, so that it resumes.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use supple_experiment::calibrate::{plant_of, without_ripple};
+use supple_experiment::{
+    Calibration, calibrate, predict_tracking_error, track_with_identified_model,
+};
+use supple_ident::{Motion, Preparation, read_mcap};
+use supple_model::Description;
+use supple_plant::PlantOptions;
+
+/// Samples per second of the written residuals.
+const RATE_HZ: f64 = 25.0;
+
+/// Seeds from here on are those of ideal plants.
+const IDEAL: u64 = 10_000;
+
+/// Effects of the set `realistic`, each left out in half of the combinations and otherwise from a third to three times its
+/// size.
+fn options(seed: u64) -> PlantOptions {
+    let text = include_str!("../../../assets/plants/realistic.toml");
+    let realistic: PlantOptions = toml_of(text);
+    let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x0076_6572_6469);
+    let mut chosen = PlantOptions::default();
+    chosen.seed = Some(seed as u32);
+    if seed >= IDEAL {
+        return chosen;
+    }
+    for (option, value) in realistic.values() {
+        let (used, size) = (
+            random.random::<f64>() < 0.5,
+            3.0_f64.powf(2.0 * random.random::<f64>() - 1.0),
+        );
+        if let (Some(value), true) = (value, used) {
+            let value = (value * size).clamp(option.min, option.max);
+            let value = if option.whole { value.round() } else { value };
+            if let Some(place) = chosen.value_mut(option.name) {
+                *place = Some(value);
+            }
+        }
+    }
+    chosen
+}
+
+/// The numbers of an options file: a name and a value on each line.
+fn toml_of(text: &str) -> PlantOptions {
+    let mut options = PlantOptions::default();
+    for line in text.lines() {
+        let line = line.split('#').next().unwrap_or_default();
+        let Some((name, value)) = line.split_once('=') else {
+            continue;
+        };
+        if let (Some(place), Ok(value)) = (options.value_mut(name.trim()), value.trim().parse()) {
+            *place = Some(value);
+        }
+    }
+    options
+}
+
+fn one(seed: u64, folder: &Path) -> Result<String, Box<dyn std::error::Error>> {
+    let description = Description::asset("wam4")?;
+    let logs = folder.join(format!("logs-{seed}"));
+    std::fs::create_dir_all(&logs)?;
+    let calibration = Calibration {
+        plant: options(seed),
+        candidates: 60,
+        log_dir: Some(logs.clone()),
+        ..Calibration::new(seed)
+    };
+    let found = calibrate::<4>(&description, &calibration, &mut |_| {})?;
+    let plant = plant_of::<4>(&description, &calibration)?;
+    let tracking = track_with_identified_model(&found.description, &plant)?;
+    let tracking = tracking.ok_or("out of reach")?;
+    let predicted = predict_tracking_error(&found.description, &found.fit, 2)?;
+    let predicted = predicted.ok_or("out of reach")?;
+    let mut text = format!(
+        "# {} {} {} {} {}\n",
+        tracking.coulomb_m,
+        tracking.stribeck_m,
+        predicted.median_m.unwrap_or(f64::INFINITY),
+        predicted.worst_m.unwrap_or(f64::INFINITY),
+        found.validation.total_relative
+    );
+    for (option, value) in calibration.plant.values() {
+        if let Some(value) = value {
+            write!(text, "{}={value:.4} ", option.name)?;
+        }
+    }
+    text.push('\n');
+    let friction = found.fit.friction();
+    for f in &friction {
+        write!(text, "{} ", f.coulomb_nm)?;
+    }
+    text.push('\n');
+    let config = description.config::<4>()?;
+    let motor_from_joint = *supple_core::Controller::new(config)?.motor_from_joint();
+    let file = std::fs::read_dir(&logs)?
+        .filter_map(Result::ok)
+        .map(|entry| entry.path())
+        .find(|path| path.extension().is_some_and(|end| end == "mcap"))
+        .ok_or("no log")?;
+    let stretches = read_mcap::<4>(&file)?;
+    // Excitation, slow motion, held-out excitation.
+    for (name, index) in [("slow", 1), ("held", 2)] {
+        let log = without_ripple(&stretches[index], &found.ripple, &motor_from_joint);
+        let preparation: Preparation = found.fit.preparation;
+        let (motion, _) = Motion::prepare(&log, 4, &[0, 1, 2, 3], &preparation)?;
+        let predicted = found.fit.predict_motion(&motion)?;
+        let every = (motion.rate_hz / RATE_HZ).round().max(1.0) as usize;
+        for i in (0..motion.samples()).step_by(every) {
+            write!(text, "{name},{:.3}", motion.time_s(i))?;
+            for j in 0..4 {
+                write!(
+                    text,
+                    ",{:.4},{:.4},{:.4}",
+                    motion.q[(i, j)],
+                    motion.qd[(i, j)],
+                    motion.tau[(i, j)] - predicted[(i, j)]
+                )?;
+            }
+            text.push('\n');
+        }
+    }
+    std::fs::remove_dir_all(&logs)?;
+    Ok(text)
+}
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let arguments: Vec<String> = std::env::args().collect();
+    let [_, folder, first, last] = &arguments[..] else {
+        return Err("usage: verdict_runs FOLDER FIRST LAST".into());
+    };
+    let folder = PathBuf::from(folder);
+    std::fs::create_dir_all(&folder)?;
+    for seed in first.parse::<u64>()?..last.parse::<u64>()? {
+        let path = folder.join(format!("{seed}.csv"));
+        if path.exists() {
+            continue;
+        }
+        let text = one(seed, &folder).unwrap_or_else(|error| format!("# failed: {error}\n"));
+        std::fs::write(&path, text)?;
+        println!("{seed}");
+    }
+    Ok(())
+}

@@ -1,0 +1,123 @@
+//! What the procedure needs of an arm: it loads models, performs motions and logs them.
+//!
+//! [`super::InProcessArm`] is the simulated arm in this process; the program `supple` has one for systems of processes.
+
+use super::error::ProcedureError;
+use crate::request_sequence::{Recording, Step};
+use supple_core::Vector;
+use supple_model::Description;
+
+/// An arm with its controller.
+pub trait MotionArm<const N: usize> {
+    /// Error of the arm or of its processes.
+    type Error: From<ProcedureError>;
+
+    /// Runs the controller with this model from now on. The drives are idle meanwhile, and the motors brake; afterwards
+    /// the arm is in gravity hold with active drives.
+    ///
+    /// # Errors
+    /// If the controller cannot be started with this model, or the drives do not become active.
+    fn load(&mut self, model: &Description) -> Result<(), Self::Error>;
+
+    /// Present joint angles \[rad\].
+    ///
+    /// # Errors
+    /// If the arm sends no state.
+    fn position_rad(&mut self) -> Result<Vector<N>, Self::Error>;
+
+    /// Performs the steps in order and writes `<name>.mcap`, which is whole also if a fault stops the motion. The
+    /// arm then stays in its safe action.
+    ///
+    /// # Errors
+    /// A refused request; a process or a log that is lost.
+    fn perform(&mut self, name: &str, steps: &[Step<N>]) -> Result<Performed, Self::Error>;
+
+    /// Clears the fault of a stopped motion: the arm is in gravity hold with active drives.
+    ///
+    /// # Errors
+    /// If the fault persists.
+    fn recover(&mut self) -> Result<(), Self::Error>;
+
+    /// Does `work` while the arm keeps its mode.
+    ///
+    /// # Errors
+    /// If the system is lost meanwhile.
+    fn meanwhile<T: Send>(&mut self, work: impl FnOnce() -> T + Send) -> Result<T, Self::Error>;
+}
+
+/// What an arm did.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Performed {
+    /// One for each recorded step, in order; the last one may be cut short by a fault.
+    pub motions: Vec<Motion>,
+    /// Time in modes that move joints \[s\].
+    pub moved_s: f64,
+    /// The fault that ended it.
+    pub stopped: Option<Stopped>,
+}
+
+/// Recorded data of one step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Motion {
+    /// Time, angles and commanded torques while the step's mode was in force.
+    pub recording: Recording,
+    /// Distance of the tip from its reference, one value for each cycle that has a reference \[m\]: of the true tip in
+    /// the simulated arm of this process, otherwise by the encoders.
+    pub tip_error_m: Vec<f64>,
+    /// Number of contacts that the controller reported.
+    pub contacts: usize,
+}
+
+/// A fault that stopped a motion.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stopped {
+    /// Index of the step.
+    pub step: usize,
+    /// The fault in words.
+    pub fault: String,
+    /// Whether it is one that contact causes: a collision, or a joint that is held back.
+    pub by_contact: bool,
+}
+
+impl Motion {
+    /// Collects the data of a step.
+    pub fn collector<const N: usize>() -> Collector<N> {
+        Collector::default()
+    }
+}
+
+/// Collects the cycles of a step.
+#[derive(Clone, Debug, Default)]
+pub struct Collector<const N: usize> {
+    rows: Vec<(f64, Vector<N>, Vector<N>)>,
+    tip_error_m: Vec<f64>,
+    contacts: usize,
+    in_contact: bool,
+}
+
+impl<const N: usize> Collector<N> {
+    /// Adds a cycle: time \[s\], angles \[rad\], commanded torques without ripple compensation \[N m\], distance of the tip
+    /// from its reference \[m\].
+    pub fn add(
+        &mut self,
+        time_s: f64,
+        position_rad: Vector<N>,
+        torque_nm: Vector<N>,
+        tip_error_m: Option<f64>,
+        in_contact: bool,
+    ) {
+        self.rows.push((time_s, position_rad, torque_nm));
+        self.tip_error_m.extend(tip_error_m);
+        self.contacts += usize::from(in_contact && !self.in_contact);
+        self.in_contact = in_contact;
+    }
+
+    /// The data of the step.
+    pub fn finish(self) -> Motion {
+        Motion {
+            recording: Recording::of(&self.rows),
+            tip_error_m: self.tip_error_m,
+            contacts: self.contacts,
+        }
+    }
+}

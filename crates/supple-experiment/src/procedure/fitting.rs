@@ -1,0 +1,216 @@
+//! Logs of the procedure's motions, and the fits of them.
+
+use super::error::ProcedureError;
+use super::progress::FitQuality;
+use crate::breakaway::JointBreakaway;
+use crate::calibrate::{identify, without_ripple};
+use nalgebra::DMatrix;
+use std::path::Path;
+use supple_core::controller::Mode;
+use supple_core::dynamics::rnea;
+use supple_core::{Config, Vector};
+use supple_ident::{Fit, Log, Motion, ReadError};
+use supple_log::Reader;
+use supple_model::{Description, IdentifiedModel};
+
+/// Last part of the first pass that its fit does not see.
+const HELD_OUT: f64 = 0.25;
+/// Time in the mode by which a series is seen to begin; its first cycles may be lost \[s\].
+const BEGIN_S: f64 = 0.1;
+/// Least range of each joint in a motion that is fitted \[rad\].
+const ALL_MOVE_RAD: f64 = 0.05;
+/// Least collision threshold of a joint, as a fraction of that of the description.
+const LEAST_THRESHOLD: f64 = 0.5;
+/// Range of the factor between measured and given breakaway torque by which dry friction is scaled.
+const FACTOR: (f64, f64) = (0.2, 5.0);
+
+/// The motions along series in a log, in order.
+///
+/// # Errors
+/// A log that cannot be read.
+pub fn excitations<const N: usize>(file: &Path) -> Result<Vec<Log>, ProcedureError> {
+    let reader = Reader::open(file)?;
+    let mut logs = Vec::new();
+    let mut rows: Vec<(f64, Vector<N>, Vector<N>)> = Vec::new();
+    let mut last_s = f64::INFINITY;
+    for record in reader.records::<N>()? {
+        let record = record?;
+        let value = record.value;
+        let excited_s = match value.mode() {
+            Some(Mode::Excite) => value.mode_time_s,
+            _ => f64::INFINITY,
+        };
+        if excited_s.is_infinite() || excited_s < last_s {
+            logs.extend(log_of(&mut rows));
+        }
+        // A log may begin while the arm rests at the end of an earlier series.
+        let begins = excited_s < BEGIN_S && excited_s < last_s;
+        if begins || (excited_s.is_finite() && !rows.is_empty()) {
+            let torque_nm = value.torque_nm - value.torques.ripple;
+            rows.push((record.time_ns as f64 * 1e-9, value.position_rad, torque_nm));
+        }
+        last_s = excited_s;
+    }
+    logs.extend(log_of(&mut rows));
+    Ok(logs)
+}
+
+fn log_of<const N: usize>(rows: &mut Vec<(f64, Vector<N>, Vector<N>)>) -> Option<Log> {
+    let rows = std::mem::take(rows);
+    let start_s = rows.first()?.0;
+    Some(Log {
+        t_s: rows.iter().map(|row| row.0 - start_s).collect(),
+        q_rad: DMatrix::from_fn(rows.len(), N, |i, j| rows[i].1[j]),
+        qd_rad_per_s: None,
+        tau_nm: DMatrix::from_fn(rows.len(), N, |i, j| rows[i].2[j]),
+    })
+}
+
+/// `model` with its dry friction scaled to the measured breakaway torques.
+///
+/// # Errors
+/// If the description cannot be edited.
+pub fn with_breakaway<const N: usize>(
+    model: &Description,
+    breakaway: &[JointBreakaway],
+) -> Result<Description, ProcedureError> {
+    let config = model.config::<N>()?;
+    let friction = core::array::from_fn(|joint| {
+        let mut friction = config.friction[joint];
+        if let Some(found) = breakaway.get(joint)
+            && friction.breakaway_nm > 0.0
+        {
+            let factor = (found.breakaway_nm() / friction.breakaway_nm).clamp(FACTOR.0, FACTOR.1);
+            friction.breakaway_nm *= factor;
+            friction.coulomb_nm *= factor;
+        }
+        friction
+    });
+    Ok(model.with_model(&IdentifiedModel {
+        arm: &config.arm,
+        friction: &friction,
+        ripple: None,
+        source: "dry friction scaled to measured breakaway torques",
+    })?)
+}
+
+/// All motion with position loops in a log, moves and series; none if all of it is short.
+///
+/// # Errors
+/// A log that cannot be read.
+pub fn all_motion<const N: usize>(file: &Path) -> Result<Vec<Log>, ProcedureError> {
+    match supple_ident::read_mcap::<N>(file) {
+        Ok(logs) => Ok(logs.into_iter().filter(all_move).collect()),
+        Err(ReadError::Table { .. }) => Ok(Vec::new()),
+        Err(error) => Err(ProcedureError::Resume {
+            file: file.to_owned(),
+            problem: error.to_string(),
+        }),
+    }
+}
+
+/// Whether every joint moves: another motion cannot be fitted.
+fn all_move(log: &Log) -> bool {
+    let mut columns = log.q_rad.column_iter();
+    columns.all(|q| q.max() - q.min() > ALL_MOVE_RAD)
+}
+
+/// Fits `others` and the first pass without its last part, on which it is compared with `model`. The model is `None` if
+/// the fit is not better there.
+///
+/// # Errors
+/// A log that cannot be used.
+pub fn fit_first<const N: usize>(
+    model: &Description,
+    pass: &Log,
+    others: &[Log],
+) -> Result<Option<(Description, FitQuality)>, ProcedureError> {
+    let config = model.config::<N>()?;
+    let rows = pass.t_s.len();
+    let cut = ((1.0 - HELD_OUT) * rows as f64) as usize;
+    let (fitted, unseen) = (part(pass, 0, cut), part(pass, cut, rows - cut));
+    let mut logs = vec![fitted];
+    logs.extend_from_slice(others);
+    let (fit, _) = identify(&config, &logs, &[])?;
+    let unseen = prepared(&unseen, &fit)?;
+    let quality = quality(&config, &fit, &unseen)?;
+    let better = quality.unseen_relative < quality.unseen_relative_before;
+    let found = || Ok::<_, ProcedureError>((fit.description(model, None)?, quality));
+    better.then(found).transpose()
+}
+
+/// Fits all motions: the full pass, slow motion and runs at constant speed, and validates on `unseen`. The collision
+/// thresholds come from the residual on these and on `others`, such as moves.
+///
+/// # Errors
+/// A log that cannot be used.
+pub fn fit_all<const N: usize>(
+    model: &Description,
+    logs: &[Log],
+    constant_speed: &[Log],
+    unseen: &Log,
+    others: &[Log],
+) -> Result<(Description, FitQuality), ProcedureError> {
+    let config = model.config::<N>()?;
+    let (fit, ripple) = identify(&config, logs, constant_speed)?;
+    let motor_from_joint = *supple_core::Controller::new(config)?.motor_from_joint();
+    let unseen = without_ripple(unseen, &ripple, &motor_from_joint);
+    let unseen = prepared(&unseen, &fit)?;
+    let quality = quality(&config, &fit, &unseen)?;
+    let described = fit.description(model, Some(&ripple))?;
+    let mut validations = vec![fit.validate_motion(&unseen)?];
+    for log in logs.iter().chain(others) {
+        let log = without_ripple(log, &ripple, &motor_from_joint);
+        validations.push(fit.validate_motion(&prepared(&log, &fit)?)?);
+    }
+    let present_nm = config.collision.move_joint_torque_nm;
+    let mut thresholds = fit.move_collision_nm(&validations, &config);
+    for (joint, threshold_nm) in thresholds.iter_mut().enumerate() {
+        // The observer is faster than the filter of the residuals.
+        let least_nm = LEAST_THRESHOLD * present_nm[joint];
+        *threshold_nm = threshold_nm.map(|nm| nm.max(least_nm));
+    }
+    Ok((described.with_move_collision(&thresholds)?, quality))
+}
+
+fn part(log: &Log, first: usize, rows: usize) -> Log {
+    Log {
+        t_s: log.t_s[first..first + rows].to_vec(),
+        q_rad: log.q_rad.rows(first, rows).into_owned(),
+        qd_rad_per_s: None,
+        tau_nm: log.tau_nm.rows(first, rows).into_owned(),
+    }
+}
+
+fn prepared<const N: usize>(log: &Log, fit: &Fit<N>) -> Result<Motion, ProcedureError> {
+    let joints: Vec<usize> = (0..N).collect();
+    Ok(Motion::prepare(log, N, &joints, &fit.preparation)?.0)
+}
+
+fn quality<const N: usize>(
+    before: &Config<N>,
+    fit: &Fit<N>,
+    unseen: &Motion,
+) -> Result<FitQuality, ProcedureError> {
+    let validation = fit.validate_motion(unseen)?;
+    let (mut error, mut torque) = (0.0, 0.0);
+    for row in 0..unseen.samples() {
+        let at = |m: &DMatrix<f64>| Vector::<N>::from_fn(|j, _| m[(row, j)]);
+        let (q, qd, qdd, tau) = (
+            at(&unseen.q),
+            at(&unseen.qd),
+            at(&unseen.qdd),
+            at(&unseen.tau),
+        );
+        let friction = Vector::from_fn(|j, _| before.friction[j].torque_nm(qd[j]));
+        error += (rnea(&before.arm, &q, &qd, &qdd) + friction - tau).norm_squared();
+        torque += tau.norm_squared();
+    }
+    Ok(FitQuality {
+        training_relative: fit.training_relative,
+        unseen_relative: validation.total_relative,
+        unseen_relative_before: (error / torque.max(f64::MIN_POSITIVE)).sqrt(),
+        unseen_rms_nm: validation.rms_nm.clone(),
+        verdict: validation.verdict(),
+    })
+}

@@ -1,0 +1,224 @@
+//! The simulated arm in this process, in virtual time: time passes only while it moves.
+
+use super::arm::{Motion, MotionArm, Performed, Stopped};
+use super::error::ProcedureError;
+use crate::error::ExperimentError;
+use crate::record::Recorder;
+use crate::request_sequence::Step;
+use crate::rig::Rig;
+use crate::wiring::Wiring;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use supple_core::controller::{Fault, Mode, Request};
+use supple_core::{Controller, Vector};
+use supple_model::Description;
+use supple_plant::PlantConfig;
+
+/// Time with idle drives while another model is loaded \[s\].
+const IDLE_S: f64 = 0.3;
+/// Gravity hold before the first motion \[s\].
+const SETTLE_S: f64 = 0.2;
+/// Time for which a stopped arm comes to rest \[s\].
+const REST_S: f64 = 1.0;
+
+/// A simulated arm with its controller.
+pub struct InProcessArm<const N: usize> {
+    rig: Option<Rig<N>>,
+    model: Option<Description>,
+    plant: PlantConfig<N>,
+    start_rad: Vector<N>,
+    /// How its encoders and motors are connected, if wrongly.
+    wiring: Wiring<N>,
+    folder: PathBuf,
+    notes: BTreeMap<String, String>,
+}
+
+impl<const N: usize> InProcessArm<N> {
+    /// An arm at rest at `start_rad`; logs go to the existing `folder`, with `notes`.
+    pub fn new(
+        plant: PlantConfig<N>,
+        start_rad: Vector<N>,
+        folder: PathBuf,
+        notes: BTreeMap<String, String>,
+    ) -> Self {
+        InProcessArm {
+            rig: None,
+            model: None,
+            plant,
+            start_rad,
+            wiring: Wiring::RIGHT,
+            folder,
+            notes,
+        }
+    }
+
+    /// The same arm with encoders or motors connected wrongly.
+    #[must_use]
+    pub fn with_wiring(self, wiring: Wiring<N>) -> Self {
+        InProcessArm { wiring, ..self }
+    }
+
+    fn rig(&mut self) -> Result<&mut Rig<N>, ProcedureError> {
+        self.rig.as_mut().ok_or_else(|| ProcedureError::Wiring {
+            problem: "no model is loaded".to_owned(),
+            remedy: "load one first".to_owned(),
+        })
+    }
+
+    /// Runs a mode for a time; returns the fault that is latched at its end.
+    fn hold(
+        &mut self,
+        request: Request<N>,
+        duration_s: f64,
+    ) -> Result<Option<Fault>, ProcedureError> {
+        let rig = self.rig()?;
+        let cycles = cycles(duration_s, rig.controller().config().period_s);
+        let mut fault = None;
+        for k in 0..cycles {
+            fault = rig.cycle((k == 0).then_some(request)).output.fault;
+        }
+        Ok(fault)
+    }
+
+    fn performed(&mut self, name: &str, steps: &[Step<N>]) -> Result<Performed, ProcedureError> {
+        let model = self.model.clone();
+        let (folder, notes) = (self.folder.clone(), self.notes.clone());
+        let seed = self.plant.seed;
+        let rig = self.rig()?;
+        let config = *rig.controller().config();
+        let mut recorder = match &model {
+            Some(model) => Some(Recorder::named(&folder, model, name, &config, seed, notes)?),
+            None => None,
+        };
+        let mut performed = Performed::default();
+        'steps: for (number, step) in steps.iter().enumerate() {
+            let mut collector = Motion::collector::<N>();
+            let mut wanted: Option<Mode> = None;
+            for k in 0..cycles(step.duration_s, config.period_s) {
+                let cycle = rig.cycle((k == 0).then_some(step.request));
+                let output = &cycle.output;
+                if let Some(recorder) = &mut recorder {
+                    recorder.cycle(&cycle)?;
+                }
+                if let Some(refusal) = output.refusal {
+                    return Err(ProcedureError::from(ExperimentError::Refused {
+                        experiment: name.to_owned(),
+                        refusal,
+                    }));
+                }
+                if let Some(fault) = output.fault {
+                    performed.stopped = Some(Stopped {
+                        step: number,
+                        fault: fault.to_string(),
+                        by_contact: is_contact(&fault),
+                    });
+                }
+                if moves_joints(output.mode) {
+                    performed.moved_s += config.period_s;
+                }
+                let wanted = *wanted.get_or_insert(output.mode);
+                if performed.stopped.is_some() || step.until_done && output.mode != wanted {
+                    break;
+                }
+                if step.recorded {
+                    let truth_m = cycle.truth.tip_position_m;
+                    let error_m = output.reference.map(|r| (r.position - truth_m).norm());
+                    collector.add(
+                        cycle.measurement.time_s,
+                        cycle.measurement.position_rad,
+                        output.torque_nm - output.torques.ripple,
+                        error_m,
+                        output.in_contact,
+                    );
+                }
+            }
+            if step.recorded {
+                performed.motions.push(collector.finish());
+            }
+            if performed.stopped.is_some() {
+                break 'steps;
+            }
+        }
+        if let Some(recorder) = recorder {
+            recorder.finish()?;
+        }
+        Ok(performed)
+    }
+}
+
+/// Whether a mode counts as motion of the arm.
+pub fn moves_joints(mode: Mode) -> bool {
+    matches!(
+        mode,
+        Mode::Move | Mode::Excite | Mode::Breakaway | Mode::Track | Mode::Probe
+    )
+}
+
+fn is_contact(fault: &Fault) -> bool {
+    matches!(
+        fault,
+        Fault::JointCollision { .. }
+            | Fault::TipCollision { .. }
+            | Fault::JointTrackingError { .. }
+    )
+}
+
+fn cycles(duration_s: f64, period_s: f64) -> u64 {
+    (duration_s / period_s).round() as u64
+}
+
+impl<const N: usize> MotionArm<N> for InProcessArm<N> {
+    type Error = ProcedureError;
+
+    fn load(&mut self, model: &Description) -> Result<(), ProcedureError> {
+        let controller = Controller::new(model.config::<N>()?)?;
+        match &mut self.rig {
+            Some(rig) => rig.replace_controller(controller),
+            None => {
+                let rig = Rig::new(controller, self.plant.clone(), self.start_rad)?;
+                self.rig = Some(rig.with_wiring(self.wiring).with_learner());
+            }
+        }
+        self.model = Some(model.clone());
+        self.hold(Request::Idle, IDLE_S)?;
+        match self.hold(Request::GravityHold, SETTLE_S)? {
+            None => Ok(()),
+            Some(fault) => Err(ProcedureError::Stopped {
+                motion: "gravity hold".to_owned(),
+                fault: fault.to_string(),
+                remedy: super::HOLD_REMEDY,
+            }),
+        }
+    }
+
+    fn position_rad(&mut self) -> Result<Vector<N>, ProcedureError> {
+        let wiring = self.wiring;
+        let rig = self.rig()?;
+        Ok(wiring.read(&rig.plant().measurement().position_rad))
+    }
+
+    fn perform(&mut self, name: &str, steps: &[Step<N>]) -> Result<Performed, ProcedureError> {
+        self.performed(name, steps)
+    }
+
+    fn recover(&mut self) -> Result<(), ProcedureError> {
+        let rig = self.rig()?;
+        let rest = cycles(REST_S, rig.controller().config().period_s);
+        for _ in 0..rest {
+            let _ = rig.cycle(None);
+        }
+        self.hold(Request::Reset, IDLE_S)?;
+        match self.hold(Request::GravityHold, SETTLE_S)? {
+            None => Ok(()),
+            Some(fault) => Err(ProcedureError::Stopped {
+                motion: "gravity hold after a fault".to_owned(),
+                fault: fault.to_string(),
+                remedy: "free the arm and clear the fault",
+            }),
+        }
+    }
+
+    fn meanwhile<T: Send>(&mut self, work: impl FnOnce() -> T + Send) -> Result<T, ProcedureError> {
+        Ok(work())
+    }
+}

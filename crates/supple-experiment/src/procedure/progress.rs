@@ -1,0 +1,199 @@
+//! What is finished of a procedure, in a file, so that it can be resumed.
+
+use super::error::ProcedureError;
+use super::sweep::Sweep;
+use super::wiring::JointWiring;
+use crate::breakaway::JointBreakaway;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+use std::str::FromStr;
+
+/// Name of the file in the folder of the results.
+pub const FILE: &str = "calibration.json";
+/// Maximum size of the file \[bytes\].
+const MAX_BYTES: u64 = 1 << 20;
+
+/// Step of the procedure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StepName {
+    /// Signs, order and torque units, by small motions.
+    Wiring,
+    /// The swept space was confirmed.
+    Confirmed,
+    /// Motion that warms the joints.
+    WarmUp,
+    /// Breakaway torque of each joint.
+    Breakaway,
+    /// Excitation at a quarter of the amplitude.
+    FirstPass,
+    /// Fit of the first pass.
+    FirstFit,
+    /// Excitation at full amplitude.
+    FullPass,
+    /// Slow motion.
+    SlowMotion,
+    /// Motion at constant speeds.
+    ConstantSpeed,
+    /// Motion for validation.
+    UnseenMotion,
+    /// Fit, validation and saving of the model.
+    Identification,
+    /// Float.
+    Float,
+    /// Sinusoid at 5 N/m.
+    Sinusoid,
+}
+
+/// All steps in order, with their names in files and on the command line.
+pub const STEPS: [(&str, StepName); 13] = [
+    ("wiring", StepName::Wiring),
+    ("confirmed", StepName::Confirmed),
+    ("warm_up", StepName::WarmUp),
+    ("breakaway", StepName::Breakaway),
+    ("first_pass", StepName::FirstPass),
+    ("first_fit", StepName::FirstFit),
+    ("full_pass", StepName::FullPass),
+    ("slow_motion", StepName::SlowMotion),
+    ("constant_speed", StepName::ConstantSpeed),
+    ("unseen_motion", StepName::UnseenMotion),
+    ("identification", StepName::Identification),
+    ("float", StepName::Float),
+    ("sinusoid", StepName::Sinusoid),
+];
+
+impl FromStr for StepName {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<StepName, String> {
+        let wanted = text.replace('-', "_");
+        let found = STEPS.iter().find(|(name, _)| *name == wanted);
+        found.map(|(_, step)| *step).ok_or_else(|| {
+            let names: Vec<&str> = STEPS.iter().map(|(name, _)| *name).collect();
+            format!("no step `{text}`; give one of {}", names.join(", "))
+        })
+    }
+}
+
+/// A finished step.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FinishedStep {
+    /// The step.
+    pub step: StepName,
+    /// Time of motion, repetitions after a contact included \[s\].
+    pub moved_s: f64,
+    /// Name of its complete log, without ending.
+    pub log: Option<String>,
+    /// Faults by contact, after which its motion was repeated.
+    pub contacts: Vec<String>,
+}
+
+/// Quality of a fit on motion that it has not seen.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct FitQuality {
+    /// Torque left unexplained in the fitted motion, relative.
+    pub training_relative: f64,
+    /// Torque left unexplained in the unseen motion, relative, over all joints.
+    pub unseen_relative: f64,
+    /// The same for the model that the fit started from.
+    pub unseen_relative_before: f64,
+    /// Unexplained torque of each joint in the unseen motion, RMS \[N m\].
+    pub unseen_rms_nm: Vec<f64>,
+    /// Verdict of the identification.
+    pub verdict: String,
+}
+
+/// Tracking of the sinusoid at 5 N/m.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SinusoidResult {
+    /// RMS error of the tip with the calibrated model alone \[m\]; `None` if a fault ended it.
+    pub calibrated_rms_m: Option<f64>,
+    /// RMS error after [`super::LEARNING_S`] of learning \[m\]; `None` if a fault ended it.
+    pub learning_rms_m: Option<f64>,
+    /// Contacts reported in free motion.
+    pub false_contacts: usize,
+    /// The fault that ended it.
+    pub ended: Option<String>,
+}
+
+/// Everything that is known of a procedure.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Progress {
+    /// Name of the arm.
+    pub arm: String,
+    /// Seed of the designs.
+    pub seed: u64,
+    /// Finished steps, in order.
+    pub finished: Vec<FinishedStep>,
+    /// Time of all motion, unfinished steps included \[s\].
+    pub moved_s: f64,
+    /// Time of motion that was stated beforehand \[s\].
+    pub stated_s: f64,
+    /// Finding of each joint's first ramp.
+    pub wiring: Vec<JointWiring>,
+    /// Swept space.
+    pub sweep: Option<Sweep>,
+    /// Breakaway torque of each joint.
+    pub breakaway: Vec<JointBreakaway>,
+    /// The fit of the first pass; `None` if the model before it predicted unseen motion better.
+    pub first_fit: Option<FitQuality>,
+    /// The fit of all motions.
+    pub fit: Option<FitQuality>,
+    /// Greatest motion of a joint in float \[rad\].
+    pub float_drift_rad: Option<f64>,
+    /// The fault that ended float.
+    pub float_ended: Option<String>,
+    /// Sinusoid at 5 N/m; `None` if the arm cannot reach it.
+    pub sinusoid: Option<SinusoidResult>,
+}
+
+impl Progress {
+    /// The finished step of this name.
+    pub fn finished(&self, step: StepName) -> Option<&FinishedStep> {
+        self.finished.iter().find(|finished| finished.step == step)
+    }
+
+    /// Reads the file in `folder`.
+    ///
+    /// # Errors
+    /// [`ProcedureError::Resume`] if there is none, or it is of another arm or seed.
+    pub fn read(folder: &Path, arm: &str, seed: u64) -> Result<Progress, ProcedureError> {
+        let file = folder.join(FILE);
+        let failed = |problem: String| ProcedureError::Resume {
+            file: file.clone(),
+            problem,
+        };
+        let text =
+            supple_files::read_text(&file, MAX_BYTES).map_err(|error| failed(error.to_string()))?;
+        let progress: Progress = serde_json::from_str(&text)
+            .map_err(|error| failed(format!("not a calibration: {error}")))?;
+        if progress.arm != arm || progress.seed != seed {
+            return Err(failed(format!(
+                "it is of the arm {} with seed {}, not of {arm} with seed {seed}",
+                progress.arm, progress.seed
+            )));
+        }
+        Ok(progress)
+    }
+
+    /// Writes the file completely or not at all.
+    ///
+    /// # Errors
+    /// [`ProcedureError::Write`].
+    pub fn write(&self, folder: &Path) -> Result<(), ProcedureError> {
+        let text = serde_json::to_string_pretty(self).unwrap_or_default();
+        write_whole(&folder.join(FILE), text.as_bytes())
+    }
+}
+
+/// Writes a file completely or not at all.
+///
+/// # Errors
+/// [`ProcedureError::Write`].
+pub fn write_whole(file: &Path, bytes: &[u8]) -> Result<(), ProcedureError> {
+    let failed = |error| ProcedureError::Write {
+        file: file.to_owned(),
+        error,
+    };
+    supple_files::write_atomic(file, bytes).map_err(failed)
+}

@@ -1,0 +1,114 @@
+//! What a check of a log found.
+
+use std::fmt;
+
+/// Kind of error of a log.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Problem {
+    /// Time in another unit than seconds.
+    TimeUnit,
+    /// Clock too fast or too slow by a factor.
+    TimeScale,
+    /// Samples are missing, the times do not show it.
+    LostSamples,
+    /// Angles in degrees.
+    Degrees,
+    /// Angles of the motors instead of the joints.
+    MotorAngles,
+    /// Angle by a wrong factor: gear ratio or scale.
+    AngleScale,
+    /// Angle with the wrong sign.
+    AngleSign,
+    /// Angle with another zero than the arm's.
+    ZeroOffset,
+    /// Torque with the wrong sign.
+    TorqueSign,
+    /// Torque by a wrong factor.
+    TorqueScale,
+    /// Currents, or torques of the motors, instead of torques of the joints.
+    NotJointTorques,
+    /// Torque with an offset.
+    TorqueOffset,
+    /// Two joints are exchanged in angle, torque or both.
+    Swapped,
+    /// Angles that stand while the joint moves.
+    FrozenAngle,
+    /// Torques that stand while the joint moves.
+    FrozenTorque,
+    /// A column that is refreshed at a lower rate than the log's.
+    Held,
+    /// Torque at its limit.
+    Saturated,
+    /// Torque that for a time is not the arm's own.
+    Contact,
+    /// A weight at the tip that the given arm does not have.
+    Payload,
+}
+
+/// What follows from a finding.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Consequence {
+    /// The log is not fitted.
+    Stop,
+    /// The log is fitted without the samples concerned.
+    Mask,
+    /// The log is fitted; the report says so.
+    Warn,
+}
+
+/// One finding.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Finding {
+    /// Kind of error.
+    pub problem: Problem,
+    /// What follows.
+    pub consequence: Consequence,
+    /// Joints concerned, counted from 0; empty if it concerns the whole log.
+    pub joints: Vec<usize>,
+    /// Where: column, such as `q[2]`, or `t`.
+    pub column: String,
+    /// What was found, with numbers.
+    pub evidence: String,
+    /// Remedy.
+    pub remedy: String,
+    /// Intervals to leave out, from and to (s of the log's own time).
+    pub intervals_s: Vec<(f64, f64)>,
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}; {}", self.column, self.evidence, self.remedy)
+    }
+}
+
+impl Finding {
+    pub(super) fn stop(
+        problem: Problem,
+        joints: &[usize],
+        column: &str,
+        evidence: String,
+        remedy: impl Into<String>,
+    ) -> Finding {
+        let indices: Vec<String> = joints.iter().map(usize::to_string).collect();
+        let column = match joints {
+            [] => column.to_owned(),
+            _ => format!("{column}[{}]", indices.join(", ")),
+        };
+        Finding {
+            problem,
+            consequence: Consequence::Stop,
+            joints: joints.to_vec(),
+            column,
+            evidence,
+            remedy: remedy.into(),
+            intervals_s: Vec::new(),
+        }
+    }
+
+    pub(super) fn with(self, consequence: Consequence) -> Finding {
+        Finding {
+            consequence,
+            ..self
+        }
+    }
+}

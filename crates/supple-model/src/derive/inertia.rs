@@ -1,0 +1,71 @@
+//! An estimate of the rotor inertia of each joint, reflected to it.
+//!
+//! A geared motor reaches the joint's greatest speed in 5 to 50 ms if only its own rotor is to be accelerated with the
+//! joint's greatest torque: 5 ms for the WAM, about 10 ms for the UR5e, 15 to 50 ms for the Panda's joints. The estimate is
+//! `J = 15 ms * torque / speed`. It is at most the greatest inertia of the arm itself, because limits in a URDF may be
+//! anything, and at least a hundredth of it at the joint.
+
+use super::rounded;
+use super::write::Writer;
+use supple_core::dynamics::crba;
+use supple_core::{Config, Vector};
+
+/// Time in which the motor accelerates its own rotor to the greatest speed \[s\].
+const ROTOR_S: f64 = 0.015;
+/// Greatest estimate as a share of the arm's greatest inertia.
+const MOST: f64 = 0.5;
+/// Least estimate as a share of the joint's own greatest inertia.
+const LEAST: f64 = 0.01;
+/// Number of poses over which inertias are compared.
+pub(super) const POSES: u32 = 64;
+/// Torque limits from here on are no limits of a motor \[N m\].
+const NO_LIMIT_NM: f64 = 1e4;
+
+/// Adds the estimates.
+pub(super) fn add<const N: usize>(writer: &mut Writer, config: &Config<N>) {
+    let greatest = greatest_inertia_kg_m2(config);
+    for joint in 0..N {
+        let torque_nm = config.limits.joint_torque_nm[joint];
+        let speed = config.limits.joint_speed_rad_per_s[joint];
+        let most = MOST * greatest.max();
+        let estimate = match torque_nm < NO_LIMIT_NM {
+            true => ROTOR_S * torque_nm / speed,
+            false => 0.1 * greatest[joint],
+        };
+        let estimate = estimate.min(most).max(LEAST * greatest[joint]);
+        let why = "an estimate from the limits of torque and speed, not a datum: identify it";
+        if writer.joint(joint, "armature_kg_m2", rounded(estimate), why) {
+            writer.joint(joint, "armature_is_estimate", true, "see above");
+        }
+    }
+}
+
+/// Greatest diagonal entries of the mass matrix over the joint ranges \[kg m^2\].
+pub(super) fn greatest_inertia_kg_m2<const N: usize>(config: &Config<N>) -> Vector<N> {
+    let mut greatest = Vector::<N>::zeros();
+    for pose in 0..POSES {
+        let mass = crba(&config.arm, &pose_rad(config, pose));
+        greatest = Vector::from_fn(|i, _| greatest[i].max(mass[(i, i)]));
+    }
+    greatest
+}
+
+/// One of the evenly spread poses over the joint ranges; ranges wider than a turn hold no other poses.
+pub(super) fn pose_rad<const N: usize>(config: &Config<N>, pose: u32) -> Vector<N> {
+    const ROOTS: [f64; 7] = [
+        core::f64::consts::SQRT_2,
+        1.732_050_807_568_877_2,
+        2.236_067_977_499_79,
+        2.645_751_311_064_590_7,
+        3.316_624_790_355_4,
+        3.605_551_275_463_989,
+        4.123_105_625_617_661,
+    ];
+    Vector::from_fn(|joint, _| {
+        let turn = core::f64::consts::PI;
+        let lower = config.limits.position_lower_rad[joint].max(-turn);
+        let upper = config.limits.position_upper_rad[joint].min(turn).max(lower);
+        let multiple = f64::from(pose + 1) * ROOTS[joint % ROOTS.len()];
+        lower + (multiple - multiple.floor()) * (upper - lower)
+    })
+}

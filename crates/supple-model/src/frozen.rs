@@ -1,0 +1,93 @@
+//! Movable joints that do not move: those that the TOML fixes, those beside the way to the tip, and, if the TOML says nothing
+//! about single joints, those on the way that no controller of this crate moves (prismatic joints, mimics, and the first ones
+//! of a chain of more than seven).
+//!
+//! Each stays at the angle that the TOML gives, otherwise at zero or at the end of its range that is closest to zero; one
+//! warning lists the joints of each kind.
+
+use crate::error::{Finding, Reporter};
+use std::collections::BTreeMap;
+use urdf_rs::{JointType, Robot};
+
+/// Positions of the frozen joints by name \[rad, m for a prismatic joint\].
+pub(crate) type Frozen = BTreeMap<String, f64>;
+
+/// Maximum number of moving joints.
+const MAX_MOVING: usize = 7;
+
+/// The frozen joints, `given` by the TOML or found here. `path` are the joints from the root to the tip, in order;
+/// `on_path` allows to freeze some of them.
+pub(crate) fn frozen(
+    report: Reporter<'_>,
+    robot: &Robot,
+    path: &[usize],
+    given: &BTreeMap<String, f64>,
+    on_path: bool,
+) -> (Frozen, Vec<Finding>) {
+    let mut frozen = given.clone();
+    let mut warnings = Vec::new();
+    let is_free = |joint: usize| {
+        let joint = &robot.joints[joint];
+        joint.joint_type != JointType::Fixed && !given.contains_key(&joint.name)
+    };
+    let free_on_path = || {
+        path.iter()
+            .copied()
+            .filter(|joint| on_path && is_free(*joint))
+    };
+    let cannot_move = |joint: &usize| {
+        let joint = &robot.joints[*joint];
+        joint.mimic.is_some() || !is_revolute(&joint.joint_type)
+    };
+    let moving: Vec<usize> = free_on_path().filter(|joint| !cannot_move(joint)).collect();
+    let surplus = moving.len().saturating_sub(MAX_MOVING);
+    let beside: Vec<usize> = (0..robot.joints.len())
+        .filter(|joint| !path.contains(joint) && is_free(*joint))
+        .collect();
+    let kinds = [
+        (beside, "does not carry the tip"),
+        (
+            free_on_path().filter(cannot_move).collect(),
+            "is prismatic or a mimic, which no controller here moves",
+        ),
+        (
+            moving[..surplus].to_vec(),
+            "is one more than the seven joints that a controller here moves",
+        ),
+    ];
+    for (joints, why) in kinds {
+        let mut places: Vec<String> = Vec::new();
+        for joint in joints {
+            let joint = &robot.joints[joint];
+            let position = resting_position(joint);
+            places.push(format!("`{}` at {position}", joint.name));
+            frozen.insert(joint.name.clone(), position);
+        }
+        if let Some(first) = places.first() {
+            let name = first.split(" at ").next().unwrap_or_default();
+            warnings.push(Finding {
+                file: report.file.to_owned(),
+                element: format!("joint {name}"),
+                problem: format!("it {why}, it is frozen"),
+                value: places.join(", "),
+                remedy: "give other positions under [fixed_joints_rad] of the TOML (m for a prismatic joint)"
+                    .to_owned(),
+            });
+        }
+    }
+    (frozen, warnings)
+}
+
+/// Whether a controller here can move the joint.
+pub(crate) fn is_revolute(kind: &JointType) -> bool {
+    matches!(kind, JointType::Revolute | JointType::Continuous)
+}
+
+/// Zero, or the end of the joint's range that is closest to it.
+fn resting_position(joint: &urdf_rs::Joint) -> f64 {
+    let (lower, upper) = (joint.limit.lower, joint.limit.upper);
+    match joint.joint_type {
+        JointType::Revolute | JointType::Prismatic if lower < upper => 0.0_f64.clamp(lower, upper),
+        _ => 0.0,
+    }
+}

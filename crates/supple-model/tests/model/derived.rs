@@ -1,0 +1,219 @@
+//! Settings derived from the arm: safe in every pose, the same again, and none where the TOML gives them.
+
+use crate::common::{TOML, URDF, with};
+use supple_core::controller::Controller;
+use supple_core::dynamics::crba;
+use supple_core::nalgebra::SymmetricEigen;
+use supple_core::{Config, Matrix, Vector};
+use supple_model::{Description, UrdfName, assets, reach};
+
+const BARE: &str = "name = \"small\"\nurdf = \"small.urdf\"\ntip_frame = \"tip\"\n";
+
+/// Rotor inertias of which half is an error must not make a loop unstable.
+fn fastest_rate<const N: usize>(config: &Config<N>, damping: &Vector<N>, pose: u32) -> f64 {
+    let share = |k: usize| (f64::from(pose) * [0.618, 0.755, 0.819][k % 3] + 0.1).fract();
+    let q = Vector::<N>::from_fn(|i, _| {
+        let (lower, upper) = (
+            config.limits.position_lower_rad[i].max(-3.1),
+            config.limits.position_upper_rad[i].min(3.1),
+        );
+        lower + share(i) * (upper - lower)
+    });
+    let mut mass = crba(&config.arm, &q);
+    for i in 0..N {
+        mass[(i, i)] -= 0.5 * config.arm.armature()[i];
+    }
+    let inverse = mass.try_inverse().expect("positive definite");
+    let root = Matrix::<N, N>::from_diagonal(&damping.map(f64::sqrt));
+    let coupled = root * inverse * root;
+    let coupled = supple_core::nalgebra::DMatrix::from_fn(N, N, |i, j| coupled[(i, j)]);
+    SymmetricEigen::new(coupled).eigenvalues.max()
+}
+
+#[test]
+fn derived_gains_are_stable_in_every_pose() {
+    let completed = Description::from_text(BARE, URDF)
+        .unwrap()
+        .completed()
+        .unwrap();
+    let config = completed.description.config::<3>().unwrap();
+    let delay_s = Controller::new(config).unwrap().delay_s();
+    let (stiffness, damping) = (
+        config.move_gains.stiffness_nm_per_rad,
+        config.move_gains.damping_nm_s_per_rad,
+    );
+    for pose in 0..500 {
+        let rate = fastest_rate(&config, &damping, pose);
+        assert!(
+            rate * delay_s < std::f64::consts::FRAC_PI_4,
+            "pose {pose}: {rate} 1/s"
+        );
+        // No mode is less than critically damped by more than rounding and the poses in between.
+        let frequency = fastest_rate(&config, &stiffness, pose).sqrt();
+        assert!(
+            2.0 * frequency < 1.3 * DAMPING_TIMES_DELAY / delay_s,
+            "pose {pose}: {frequency}"
+        );
+    }
+    // Each derived setting has its reason in the TOML, and an estimate says that it is one.
+    let toml = completed.description.toml();
+    for derived in &completed.derived {
+        assert!(toml.contains(&derived.why), "{derived}");
+    }
+    assert!(toml.contains("armature_is_estimate = true"), "{toml}");
+    assert!(
+        completed
+            .description
+            .settings()
+            .joints
+            .iter()
+            .all(|joint| joint.armature_is_estimate)
+    );
+}
+
+/// As the derivation documents it.
+const DAMPING_TIMES_DELAY: f64 = 0.4;
+
+#[test]
+fn a_completed_arm_is_complete_and_reaches_its_paths() {
+    let bare = Description::from_text(BARE, URDF).unwrap();
+    let first = bare.completed().unwrap().description;
+    let again = first.completed().unwrap();
+    assert_eq!(
+        (again.description.toml(), again.derived.len()),
+        (first.toml(), 0)
+    );
+    assert_eq!(bare.completed().unwrap().description.toml(), first.toml());
+    let config = first.config::<3>().unwrap();
+    let (trajectory, duration_s) = first.paths().sinusoid(2.0);
+    let start = reach::start_pose(&config, &trajectory, duration_s).expect("in reach");
+    let home = Vector::from_column_slice(first.home_rad());
+    assert!((start - home).norm() < 2e-3, "{start} {home}");
+}
+
+/// What the TOML gives stays, to the byte.
+#[test]
+fn given_settings_and_built_in_arms_stay() {
+    for name in assets() {
+        let arm = Description::asset(name).unwrap();
+        let completed = arm.completed().unwrap();
+        if ["paper3", "wam3", "wam4", "wam7"].contains(name) {
+            assert_eq!(completed.description.toml(), arm.toml(), "{name}");
+            assert!(
+                completed.derived.is_empty(),
+                "{name}: {:?}",
+                completed.derived
+            );
+        }
+    }
+    let given = with(
+        TOML,
+        "torque_nm = 15.0",
+        "torque_nm = 15.0\nmove_stiffness_nm_per_rad = 77.0",
+    );
+    let held =
+        "held = { position_rad = 0.2, stiffness_nm_per_rad = 100.0, damping_nm_s_per_rad = 3.0 }\n";
+    let given = with(&given, held, "");
+    let completed = Description::from_text(&given, URDF)
+        .unwrap()
+        .completed()
+        .unwrap();
+    let joints = &completed.description.settings().joints;
+    let elbow = joints.iter().find(|joint| joint.name == "elbow").unwrap();
+    assert_eq!(elbow.move_stiffness_nm_per_rad, 77.0);
+    // A TOML that lists joints decides which are held.
+    assert_eq!(
+        joints.iter().filter(|joint| joint.held.is_some()).count(),
+        0
+    );
+    assert_eq!(completed.description.home_rad(), [0.0, 0.5, 0.2]);
+}
+
+/// A prismatic lift, eight more joints, a gripper with a mimic, a point mass and an inertia that no body has.
+#[test]
+fn a_urdf_alone_makes_an_arm() {
+    let folder = tempfile::tempdir().unwrap();
+    let inertial = |mass: &str, i: &str| {
+        format!(
+            "<inertial><origin xyz=\"0 0 0.05\"/><mass value=\"{mass}\"/>\
+             <inertia ixx=\"{i}\" ixy=\"0\" ixz=\"0\" iyy=\"0.002\" iyz=\"0\" izz=\"0.002\"/></inertial>"
+        )
+    };
+    let mut urdf = String::from("<robot name=\"long\"><link name=\"base\"/>");
+    let mut joint = |name: &str, kind: &str, parent: &str, more: &str, inertia: &str| {
+        urdf += &format!(
+            "<link name=\"{name}_link\">{inertia}</link><joint name=\"{name}\" type=\"{kind}\">\
+             <parent link=\"{parent}\"/><child link=\"{name}_link\"/><origin xyz=\"0 0 0.15\"/>{more}</joint>"
+        );
+    };
+    let limit = "<limit lower=\"0.1\" upper=\"0.4\" effort=\"60\" velocity=\"3\"/>";
+    let turning = "<limit lower=\"-2.5\" upper=\"2.5\" effort=\"60\" velocity=\"3\"/>";
+    let sound = inertial("1", "0.002");
+    joint(
+        "lift",
+        "prismatic",
+        "base",
+        &format!("<axis xyz=\"0 0 1\"/>{limit}"),
+        &sound,
+    );
+    let mut parent = "lift_link".to_owned();
+    for k in 0..8 {
+        let axis = if k % 2 == 0 { "0 0 1" } else { "0 1 0" };
+        let name = format!("j{k}");
+        let inertia = if k == 7 {
+            inertial("1", "0.02")
+        } else {
+            sound.clone()
+        };
+        joint(
+            &name,
+            "revolute",
+            &parent,
+            &format!("<axis xyz=\"{axis}\"/>{turning}"),
+            &inertia,
+        );
+        parent = format!("{name}_link");
+    }
+    let mimic = "<axis xyz=\"0 1 0\"/><mimic joint=\"lift\"/>".to_owned() + limit;
+    joint("finger", "prismatic", &parent, &mimic, &sound);
+    joint("tool", "fixed", &parent, "", "");
+    urdf += "</robot>";
+    let path = folder.path().join("long.urdf");
+    std::fs::write(&path, urdf).unwrap();
+    let mut name = UrdfName::parse(&format!("{}#tool_link", path.display())).unwrap();
+    let message = Description::from_urdf(&name).unwrap_err().to_string();
+    for fragment in [
+        "link `j7_link` <inertial>",
+        "physically impossible",
+        "--repair",
+    ] {
+        assert!(message.contains(fragment), "{message}");
+    }
+    name.repair = true;
+    let arm = Description::from_urdf(&name).unwrap();
+    assert_eq!(
+        arm.joint_names(),
+        ["j1", "j2", "j3", "j4", "j5", "j6", "j7"]
+    );
+    let lines: Vec<String> = arm.warnings().iter().map(ToString::to_string).collect();
+    for fragment in [
+        "`lift` at 0.1",
+        "`j0` at 0",
+        "`finger` at 0.1",
+        "link `j7_link` <inertial>",
+    ] {
+        assert!(
+            lines.iter().any(|line| line.contains(fragment)),
+            "{fragment} in {lines:#?}"
+        );
+    }
+    let completed = arm.completed().unwrap();
+    let held = completed.description.settings().joints.iter();
+    assert_eq!(held.filter(|joint| joint.held.is_some()).count(), 4);
+    // Without a tip the longest chain ends in two places.
+    let ends = Description::from_urdf(&UrdfName { tip: None, ..name });
+    let message = ends.unwrap_err().to_string();
+    for fragment in ["--tip LINK", "tool_link", "finger_link"] {
+        assert!(message.contains(fragment), "{message}");
+    }
+}

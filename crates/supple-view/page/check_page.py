@@ -1,0 +1,100 @@
+"""Opens the live page of an emulated arm in headless Chromium and checks what a person would see.
+
+    python check_page.py PATH/TO/supple FOLDER_FOR_SCREENSHOTS
+
+Needs `pip install playwright` and Chromium (`CHROMIUM` names another program).
+"""
+
+import os
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from playwright.sync_api import Page, sync_playwright
+
+FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+READ = "id => document.getElementById(id).textContent"
+INK = """id => [...document.getElementById(id).querySelectorAll('canvas')].map(c => c.toDataURL()).join()"""
+
+
+def until(page: Page, what: str, condition, seconds: float = 60.0) -> None:
+    """Waits until the condition holds."""
+    for _ in range(int(seconds * 5)):
+        if condition():
+            print(f"ok: {what}", flush=True)
+            return
+        page.wait_for_timeout(200)
+    raise AssertionError(what)
+
+
+def check(page: Page, url: str, folder: Path, scheme: str) -> None:
+    """Checks the page of a running emulated arm."""
+    complaints: list[str] = []
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.on("request", lambda request: foreign(request.url, url, complaints))
+    page.goto(url)
+    read = lambda name: page.evaluate(READ, name)
+    until(page, "the arm tracks", lambda: read("mode") == "track")
+    page.wait_for_timeout(2000)
+    scene = page.locator("#scene canvas")
+    before, ink = scene.screenshot(), page.evaluate(INK, "plots")
+    page.wait_for_timeout(2000)
+    assert scene.screenshot() != before, "the arm moves"
+    assert page.evaluate(INK, "plots") != ink, "the plots update"
+    print("ok: the arm moves, the plots update", flush=True)
+    page.wait_for_timeout(4000)
+    page.screenshot(path=str(folder / f"page-{scheme}.png"), full_page=True)
+
+    slider = page.locator("#stiffness")
+    old = read("stiffness-reported")
+    slider.focus()
+    for _ in range(12):
+        page.keyboard.press("ArrowRight")
+    wanted = float(read("stiffness-wanted").split()[0])
+    reported = lambda: float(read("stiffness-reported").split()[0])
+    # The controller's own value, after its ramp; the page shows one decimal.
+    until(page, f"stiffness {old} became {wanted} N/m", lambda: abs(reported() - wanted) <= 0.051)
+
+    page.get_by_role("button", name="Gravity hold").click()
+    until(page, "gravity hold", lambda: read("mode") == "gravity hold")
+    page.get_by_role("button", name="Hold tip").click()
+    until(page, "hold tip", lambda: read("mode") == "track")
+    page.get_by_role("button", name="Emergency stop").click()
+    until(page, "the emergency stop takes the drives' power", lambda: read("drives") == "idle")
+    page.wait_for_timeout(500)
+    page.screenshot(path=str(folder / f"stopped-{scheme}.png"), full_page=True)
+    assert not complaints, complaints
+
+
+def foreign(url: str, own: str, complaints: list[str]) -> None:
+    """Notes a request to another server."""
+    if not url.startswith((own, "data:", "blob:")):
+        complaints.append(f"request to {url}")
+
+
+def main() -> None:
+    program, folder = Path(sys.argv[1]).resolve(), Path(sys.argv[2])
+    folder.mkdir(parents=True, exist_ok=True)
+    chromium = os.environ.get("CHROMIUM", "/usr/bin/chromium")
+    with sync_playwright() as playwright, tempfile.TemporaryDirectory() as work:
+        browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
+        for scheme in ("light", "dark"):
+            command = [program, "up", "--plant", "emu", "--view", "--no-realtime", "--prefix", f"page-{scheme}"]
+            command += ["--block-m", "-0.3", "--log", Path(work) / f"{scheme}.mcap"]
+            up = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+            try:
+                lines = iter(up.stderr.readline, "")
+                url = next(found[0] for line in lines if (found := re.search(r"http://127\.0\.0\.1\S+", line)))
+                context = browser.new_context(color_scheme=scheme, viewport={"width": 1280, "height": 900})
+                check(context.new_page(), url, folder, scheme)
+            finally:
+                up.terminate()
+                up.communicate(timeout=60)
+        browser.close()
+    print(f"screenshots in {folder}")
+
+
+if __name__ == "__main__":
+    main()

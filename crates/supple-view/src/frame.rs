@@ -1,0 +1,237 @@
+//! A picture of the system: the latest cycle, with the greatest values since the previous picture, so that no peak
+//! falls between two.
+
+use crate::remedy::remedy;
+use serde::Serialize;
+use supple_core::codes::{fault_name, refusal_kind};
+use supple_core::controller::CycleRecord;
+use supple_core::math::Vector;
+
+/// What is known of a cycle besides its record.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Beside {
+    /// Time of the measurement, on any clock \[s\].
+    pub time_s: f64,
+    /// Since the previous cycle began, the delay of its step, and its duration \[us\].
+    pub timing_us: Option<[f64; 3]>,
+    /// From the state to its answer \[us\]; 0 if unknown.
+    pub round_trip_us: f64,
+    /// Cycles without an answer since the start.
+    pub missed: u64,
+}
+
+/// A fault in words.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct FaultText {
+    /// Its name.
+    pub name: &'static str,
+    /// What happened.
+    pub text: String,
+    /// What to do about it.
+    pub remedy: &'static str,
+}
+
+/// A picture. Joints in order; positions in base axes.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Frame {
+    /// Time of the measurement \[s\].
+    pub time_s: f64,
+    /// Cycle number.
+    pub cycle: u64,
+    /// Mode of the controller.
+    pub mode: &'static str,
+    /// The drives apply torques.
+    pub drives_active: bool,
+    /// Joint angles \[rad\].
+    pub joints_rad: Vec<f32>,
+    /// Tip \[m\].
+    pub tip_m: [f32; 3],
+    /// Its reference \[m\].
+    pub reference_m: Option<[f32; 3]>,
+    /// Greatest distance of the tip from its reference \[m\].
+    pub tip_error_m: Option<f32>,
+    /// Force on the tip: measured, otherwise observed; the greatest since the previous picture \[N\].
+    pub force_n: [f32; 3],
+    /// The force was measured by a sensor.
+    pub force_is_measured: bool,
+    /// Contact is latched.
+    pub in_contact: bool,
+    /// Joint torques \[N m\].
+    pub torque_nm: Vec<f32>,
+    /// Each term of the torque, as `terms` of the page's description lists them, for each joint \[N m\].
+    pub terms_nm: Vec<Vec<f32>>,
+    /// Stiffness in force \[N/m\].
+    pub stiffness_n_per_m: [f32; 3],
+    /// Damping in force \[N s/m\].
+    pub damping_n_s_per_m: [f32; 3],
+    /// Greatest period, delay and duration of a step \[us\].
+    pub timing_us: Option<[f32; 3]>,
+    /// Greatest time from a state to its answer \[us\].
+    pub round_trip_us: f32,
+    /// Cycles without an answer since the start.
+    pub missed: u64,
+    /// The latched fault.
+    pub fault: Option<FaultText>,
+    /// The last refusal since the previous picture.
+    pub refusal: Option<String>,
+    /// Learning is on.
+    pub learning: bool,
+}
+
+/// Collects cycles until a picture is due.
+#[derive(Debug)]
+pub struct Reducer<const N: usize> {
+    last: Option<(CycleRecord<N>, Beside)>,
+    tip_error_m: Option<f64>,
+    force: (f64, [f64; 3]),
+    timing_us: Option<[f64; 3]>,
+    round_trip_us: f64,
+    refusal: Option<String>,
+}
+
+impl<const N: usize> Default for Reducer<N> {
+    fn default() -> Self {
+        Reducer {
+            last: None,
+            tip_error_m: None,
+            force: (-1.0, [0.0; 3]),
+            timing_us: None,
+            round_trip_us: 0.0,
+            refusal: None,
+        }
+    }
+}
+
+impl<const N: usize> Reducer<N> {
+    /// Adds a cycle.
+    pub fn add(&mut self, record: &CycleRecord<N>, beside: Beside) {
+        let greater = |old: Option<f64>, new: f64| old.map_or(new, |old| old.max(new));
+        if let Some(error_m) = record.tip_error_m() {
+            self.tip_error_m = Some(greater(self.tip_error_m, error_m));
+        }
+        let force_n = force_of(record);
+        let size_n = force_n.iter().map(|part| part * part).sum::<f64>().sqrt();
+        if size_n > self.force.0 {
+            self.force = (size_n, force_n);
+        }
+        if let Some(new) = beside.timing_us {
+            let old = self.timing_us.unwrap_or(new);
+            self.timing_us = Some(core::array::from_fn(|i| old[i].max(new[i])));
+        }
+        self.round_trip_us = self.round_trip_us.max(beside.round_trip_us);
+        if record.refusal != refusal_kind::NONE {
+            self.refusal = Some(record.refusal_text.to_string());
+        }
+        self.last = Some((*record, beside));
+    }
+
+    /// The picture of the cycles since the last one; `None` without any.
+    pub fn take(&mut self) -> Option<Frame> {
+        let Reducer {
+            last,
+            tip_error_m,
+            force: (_, force_n),
+            timing_us,
+            round_trip_us,
+            refusal,
+        } = core::mem::take(self);
+        let (record, beside) = last?;
+        Some(Frame {
+            time_s: beside.time_s,
+            cycle: record.cycle,
+            mode: record.mode().map_or("unknown", |mode| mode.name()),
+            drives_active: record.drives_active,
+            joints_rad: joints(&record.position_rad),
+            tip_m: narrow(record.tip_position_m),
+            reference_m: record
+                .has_reference
+                .then(|| narrow(record.reference_position_m)),
+            tip_error_m: tip_error_m.map(|error_m| error_m as f32),
+            force_n: narrow(force_n),
+            force_is_measured: record.has_tip_force,
+            in_contact: record.in_contact,
+            torque_nm: joints(&record.torque_nm),
+            terms_nm: record
+                .torques
+                .named()
+                .iter()
+                .map(|(_, term)| joints(term))
+                .collect(),
+            stiffness_n_per_m: narrow(record.stiffness_n_per_m),
+            damping_n_s_per_m: narrow(record.damping_n_s_per_m),
+            timing_us: timing_us.map(narrow),
+            round_trip_us: round_trip_us as f32,
+            missed: beside.missed,
+            fault: fault_name(record.fault).map(|name| FaultText {
+                name,
+                text: record.fault_text.to_string(),
+                remedy: remedy(record.fault),
+            }),
+            refusal,
+            learning: record.learning,
+        })
+    }
+}
+
+fn force_of<const N: usize>(record: &CycleRecord<N>) -> [f64; 3] {
+    match record.has_tip_force {
+        true => record.tip_force_n,
+        false => record.external_force_n,
+    }
+}
+
+fn narrow(values: [f64; 3]) -> [f32; 3] {
+    values.map(|value| value as f32)
+}
+
+fn joints<const N: usize>(values: &Vector<N>) -> Vec<f32> {
+    values.iter().map(|value| *value as f32).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A record of zeros: every word of a record is a number, a count or a flag.
+    fn record() -> CycleRecord<3> {
+        CycleRecord::unpack(&[0; CycleRecord::<3>::words(3)], 3)
+    }
+
+    #[test]
+    fn a_peak_between_two_pictures_is_in_the_later_one() {
+        let mut reducer = Reducer::default();
+        for (error_m, force_n, step_us) in
+            [(0.001, 1.0, 20.0), (0.009, -30.0, 90.0), (0.002, 2.0, 10.0)]
+        {
+            let mut record = record();
+            record.has_reference = true;
+            record.reference_position_m = [error_m, 0.0, 0.0];
+            record.external_force_n = [0.0, 0.0, force_n];
+            let beside = Beside {
+                timing_us: Some([1000.0, 5.0, step_us]),
+                ..Beside::default()
+            };
+            reducer.add(&record, beside);
+        }
+        let frame = reducer.take().expect("a picture");
+        assert!((frame.tip_error_m.expect("a reference") - 0.009).abs() < 1e-7);
+        assert_eq!(frame.force_n, [0.0, 0.0, -30.0]);
+        assert_eq!(frame.timing_us, Some([1000.0, 5.0, 90.0]));
+        // The positions are those of the latest cycle, and nothing is left over for the next picture.
+        assert_eq!(frame.reference_m, Some([0.002, 0.0, 0.0]));
+        assert_eq!(reducer.take(), None);
+    }
+
+    #[test]
+    fn a_fault_comes_with_its_remedy() {
+        let mut record = record();
+        record.fault = supple_core::codes::fault_kind::TIP_SPEED;
+        let mut reducer = Reducer::default();
+        reducer.add(&record, Beside::default());
+        let fault = reducer.take().expect("a picture").fault.expect("a fault");
+        assert_eq!(
+            (fault.name, fault.remedy),
+            ("tip_speed", remedy(record.fault))
+        );
+    }
+}

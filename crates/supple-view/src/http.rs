@@ -1,0 +1,281 @@
+//! Requests of a browser: their heads, who may ask, and the answers.
+//!
+//! Three checks apply to every request. The URL has the token. `Host` is this server, so that a name of another site
+//! that resolves to 127.0.0.1 (DNS rebinding) is of no use. `Origin`, which a browser always sends with a WebSocket, is
+//! this page or one that the user allowed.
+
+use crate::token::Token;
+use std::io::{self, Read, Write};
+use std::net::TcpStream;
+
+/// Greatest length of a request's head.
+const MAX_HEAD_BYTES: usize = 8192;
+/// Greatest number of its headers.
+const MAX_HEADERS: usize = 64;
+/// Origins of a viewer that is an installed program.
+const PROGRAM_ORIGIN: &str = "file://";
+
+/// The head of a request.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Head {
+    /// Method, such as `GET`.
+    pub method: String,
+    /// Path with the query.
+    pub path: String,
+    /// Names in lower case, with their values.
+    headers: Vec<(String, String)>,
+    /// What follows the head.
+    pub rest: Vec<u8>,
+}
+
+impl Head {
+    /// Reads a head; `None` if the peer sends none that is valid.
+    ///
+    /// # Errors
+    /// Of the connection.
+    pub fn read(stream: &mut TcpStream) -> io::Result<Option<Head>> {
+        let mut bytes = Vec::new();
+        let mut part = [0; 2048];
+        while bytes.len() < MAX_HEAD_BYTES {
+            let count = stream.read(&mut part)?;
+            if count == 0 {
+                return Ok(None);
+            }
+            bytes.extend_from_slice(&part[..count]);
+            match Head::parse(&bytes) {
+                Ok(None) => {}
+                parsed => return Ok(parsed.ok().flatten()),
+            }
+        }
+        Ok(None)
+    }
+
+    /// Parses a head; `None` if it is not complete yet.
+    ///
+    /// # Errors
+    /// Why it is not valid.
+    pub fn parse(bytes: &[u8]) -> Result<Option<Head>, httparse::Error> {
+        let mut headers = [httparse::EMPTY_HEADER; MAX_HEADERS];
+        let mut request = httparse::Request::new(&mut headers);
+        let length = match request.parse(bytes)? {
+            httparse::Status::Complete(length) => length,
+            httparse::Status::Partial => return Ok(None),
+        };
+        let header = |header: &httparse::Header<'_>| {
+            let value = String::from_utf8_lossy(header.value).trim().to_owned();
+            (header.name.to_ascii_lowercase(), value)
+        };
+        Ok(Some(Head {
+            method: request.method.unwrap_or_default().to_owned(),
+            path: request.path.unwrap_or_default().to_owned(),
+            headers: request.headers.iter().map(header).collect(),
+            rest: bytes[length..].to_vec(),
+        }))
+    }
+
+    /// Value of a header that is there once; its name in lower case.
+    pub fn header(&self, name: &str) -> Option<&str> {
+        let mut values = self.headers.iter().filter(|(found, _)| found == name);
+        let (_, value) = values.next()?;
+        values.next().is_none().then_some(value)
+    }
+
+    fn has(&self, name: &str) -> bool {
+        self.headers.iter().any(|(found, _)| found == name)
+    }
+}
+
+/// Who may ask.
+pub struct Gate {
+    token: Token,
+    port: u16,
+    origins: Vec<String>,
+}
+
+/// Why a request is answered with an error.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rejected {
+    /// Not a GET.
+    Method,
+    /// Without the token.
+    Token,
+    /// To a name that is not this server's.
+    Host,
+    /// From the page of another site.
+    Origin,
+}
+
+impl Rejected {
+    /// Status line and explanation.
+    pub fn answer(self) -> (&'static str, &'static str) {
+        match self {
+            Rejected::Method => ("405 Method Not Allowed", "Only GET.\n"),
+            Rejected::Token => (
+                "403 Forbidden",
+                "The URL lacks its token: open the one that supple printed.\n",
+            ),
+            Rejected::Host => ("403 Forbidden", "Use 127.0.0.1 or localhost.\n"),
+            Rejected::Origin => (
+                "403 Forbidden",
+                "This origin is not allowed: start the viewer with --allow-origin.\n",
+            ),
+        }
+    }
+}
+
+impl Gate {
+    /// For a server on this port of the loopback interface.
+    pub fn new(token: Token, port: u16, origins: &[String]) -> Gate {
+        let origins = origins.iter().map(|o| o.trim_end_matches('/').to_owned());
+        Gate {
+            token,
+            port,
+            origins: origins.collect(),
+        }
+    }
+
+    /// Address of the page.
+    pub fn url(&self) -> String {
+        format!("http://127.0.0.1:{}/{}/", self.port, self.token.as_str())
+    }
+
+    /// Address for viewers of the Foxglove protocol.
+    pub fn websocket_url(&self) -> String {
+        format!("ws://127.0.0.1:{}/{}/ws", self.port, self.token.as_str())
+    }
+
+    /// The path after the token.
+    ///
+    /// # Errors
+    /// [`Rejected`].
+    pub fn check<'a>(&self, head: &'a Head) -> Result<&'a str, Rejected> {
+        if head.method != "GET" {
+            return Err(Rejected::Method);
+        }
+        let own = ["127.0.0.1", "localhost"].map(|name| format!("{name}:{}", self.port));
+        let is_own = |host: &str| own.iter().any(|name| name == host);
+        if !head.header("host").is_some_and(is_own) {
+            return Err(Rejected::Host);
+        }
+        if head.has("origin") {
+            let allowed = |origin: &str| {
+                origin == PROGRAM_ORIGIN
+                    || origin.strip_prefix("http://").is_some_and(is_own)
+                    || self.origins.iter().any(|allowed| allowed == origin)
+            };
+            if !head.header("origin").is_some_and(allowed) {
+                return Err(Rejected::Origin);
+            }
+        }
+        let path = head.path.split(['?', '#']).next().unwrap_or_default();
+        let path = path.strip_prefix('/').ok_or(Rejected::Token)?;
+        let (token, rest) = path.split_once('/').unwrap_or((path, ""));
+        match self.token.matches(token) {
+            true => Ok(rest),
+            false => Err(Rejected::Token),
+        }
+    }
+}
+
+/// Writes an answer and ends the connection.
+///
+/// # Errors
+/// Of the connection.
+pub fn respond(
+    stream: &mut TcpStream,
+    status: &str,
+    media_type: &str,
+    body: &[u8],
+) -> io::Result<()> {
+    // The policy allows what comes from this server and nothing else; no other site may show the page in a frame.
+    write!(
+        stream,
+        "HTTP/1.1 {status}\r\nContent-Type: {media_type}\r\nContent-Length: {}\r\nConnection: close\r\n\
+         Cache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\nX-Frame-Options: DENY\r\n\
+         Referrer-Policy: no-referrer\r\nCross-Origin-Resource-Policy: same-origin\r\n\
+         Content-Security-Policy: default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; \
+         connect-src 'self' ws://127.0.0.1:* ws://localhost:*; frame-ancestors 'none'; base-uri 'none'; form-action 'none'\r\n\r\n",
+        body.len()
+    )?;
+    stream.write_all(body)?;
+    stream.flush()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn gate() -> (Gate, String) {
+        let token = Token::new().expect("random numbers");
+        let text = token.as_str().to_owned();
+        let allowed = ["http://localhost:8080/".to_owned()];
+        (Gate::new(token, 4000, &allowed), text)
+    }
+
+    fn head(method: &str, path: &str, headers: &str) -> Head {
+        let text = format!("{method} {path} HTTP/1.1\r\n{headers}\r\n");
+        let parsed = Head::parse(text.as_bytes()).expect("valid");
+        parsed.expect("complete")
+    }
+
+    #[test]
+    fn the_token_opens_the_page_to_its_own_host_and_origin_alone() {
+        let (gate, token) = gate();
+        let check = |path: &str, headers: &str| {
+            let head = head("GET", path, headers);
+            gate.check(&head).map(str::to_owned)
+        };
+        let own = "Host: 127.0.0.1:4000\r\n";
+        assert_eq!(check(&format!("/{token}/"), own), Ok(String::new()));
+        assert_eq!(check(&format!("/{token}/ws?x=1"), own), Ok("ws".to_owned()));
+        for path in [
+            "/",
+            "/ws",
+            "/page.js",
+            &format!("/{}0/", &token[1..]),
+            &format!("//{token}/"),
+        ] {
+            assert_eq!(check(path, own), Err(Rejected::Token), "{path}");
+        }
+        let path = format!("/{token}/ws");
+        for host in ["evil.example:4000", "127.0.0.1", "127.0.0.1:4001", ""] {
+            let rejected = check(&path, &format!("Host: {host}\r\n"));
+            assert_eq!(rejected, Err(Rejected::Host), "{host}");
+        }
+        assert_eq!(check(&path, ""), Err(Rejected::Host));
+        assert_eq!(
+            check(&path, "Host: 127.0.0.1:4000\r\nHost: a\r\n"),
+            Err(Rejected::Host)
+        );
+        for (origin, allowed) in [
+            ("http://127.0.0.1:4000", true),
+            ("http://localhost:4000", true),
+            ("http://localhost:8080", true),
+            ("file://", true),
+            ("http://localhost:8081", false),
+            ("https://evil.example", false),
+            ("null", false),
+            ("", false),
+        ] {
+            let checked = check(&path, &format!("{own}Origin: {origin}\r\n"));
+            let expected = if allowed {
+                Ok("ws".to_owned())
+            } else {
+                Err(Rejected::Origin)
+            };
+            assert_eq!(checked, expected, "{origin}");
+        }
+        assert_eq!(gate.check(&head("POST", &path, own)), Err(Rejected::Method));
+    }
+
+    #[test]
+    fn a_head_that_is_cut_is_incomplete_and_other_bytes_are_rejected() {
+        let whole = b"GET / HTTP/1.1\r\nHost: a\r\n\r\nrest";
+        let parsed = Head::parse(whole).expect("valid").expect("complete");
+        assert_eq!(parsed.rest, b"rest");
+        for end in 0..whole.len() - 4 {
+            assert_eq!(Head::parse(&whole[..end]), Ok(None), "{end}");
+        }
+        assert!(Head::parse(b"\x00\x01\x02").is_err());
+    }
+}

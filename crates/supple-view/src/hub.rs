@@ -1,0 +1,222 @@
+//! What the threads share: the viewers that are connected, the latest picture, and commands on their way.
+//!
+//! A viewer has a queue of bounded length. If it is slow its oldest messages are dropped; nobody waits for it.
+
+use crate::command::Command;
+use crate::frame::Frame;
+use crate::protocol::{Channel, message_data};
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// Most messages that wait for a viewer.
+const QUEUE_LENGTH: usize = 64;
+
+/// The answer to a command: the mode afterwards, or why it was refused.
+pub type Answer = Result<String, String>;
+
+/// A command with the way back of its answer.
+#[derive(Debug)]
+pub struct Pending {
+    /// The command.
+    pub command: Command,
+    /// Takes the answer.
+    pub answer: Sender<Answer>,
+}
+
+/// A connected viewer.
+#[derive(Debug, Default)]
+pub struct Viewer {
+    /// Subscription of each channel.
+    subscriptions: Mutex<BTreeMap<u32, u32>>,
+    queue: Mutex<VecDeque<Vec<u8>>>,
+}
+
+impl Viewer {
+    /// Subscribes to a channel.
+    pub fn subscribe(&self, subscription: u32, channel: u32) {
+        lock(&self.subscriptions).insert(channel, subscription);
+    }
+
+    /// Ends a subscription.
+    pub fn unsubscribe(&self, subscription: u32) {
+        lock(&self.subscriptions).retain(|_, id| *id != subscription);
+    }
+
+    /// The oldest message that waits.
+    pub fn next(&self) -> Option<Vec<u8>> {
+        lock(&self.queue).pop_front()
+    }
+
+    /// Sends a message on a channel, if it is subscribed to.
+    pub fn send(&self, channel: u32, time_ns: u64, payload: &[u8]) {
+        let Some(subscription) = lock(&self.subscriptions).get(&channel).copied() else {
+            return;
+        };
+        let mut queue = lock(&self.queue);
+        while queue.len() >= QUEUE_LENGTH {
+            queue.pop_front();
+        }
+        queue.push_back(message_data(subscription, time_ns, payload));
+    }
+
+    fn wants(&self, channel: u32) -> bool {
+        lock(&self.subscriptions).contains_key(&channel)
+    }
+}
+
+/// What the threads share.
+#[derive(Debug)]
+pub struct Hub {
+    channels: Vec<Channel>,
+    viewers: Mutex<BTreeMap<u64, Arc<Viewer>>>,
+    latest: Mutex<Option<Frame>>,
+    /// Messages that a channel repeats to each new subscriber, such as the arm's description.
+    retained: Mutex<BTreeMap<u32, Vec<u8>>>,
+    commands: Mutex<Option<Sender<Pending>>>,
+}
+
+impl Hub {
+    /// For these channels.
+    pub fn new(channels: Vec<Channel>) -> Hub {
+        Hub {
+            channels,
+            viewers: Mutex::default(),
+            latest: Mutex::default(),
+            retained: Mutex::default(),
+            commands: Mutex::default(),
+        }
+    }
+
+    /// The channels; the id of each is its index.
+    pub fn channels(&self) -> &[Channel] {
+        &self.channels
+    }
+
+    /// Accepts commands from now on; they arrive at the returned end.
+    pub fn accept_commands(&self) -> Receiver<Pending> {
+        let (sender, receiver) = channel();
+        *lock(&self.commands) = Some(sender);
+        receiver
+    }
+
+    /// Whether commands are accepted.
+    pub fn accepts_commands(&self) -> bool {
+        lock(&self.commands).is_some()
+    }
+
+    /// Passes a command on.
+    ///
+    /// # Errors
+    /// If no commands are accepted.
+    pub fn send_command(&self, pending: Pending) -> Result<(), String> {
+        let commands = lock(&self.commands);
+        let sent = commands.as_ref().map(|commands| commands.send(pending));
+        match sent {
+            Some(Ok(())) => Ok(()),
+            _ => Err("this page only shows: it is a log, or was started with --read-only".into()),
+        }
+    }
+
+    /// Adds a viewer under an id that no other has.
+    pub fn join(&self, id: u64) -> Arc<Viewer> {
+        let viewer = Arc::new(Viewer::default());
+        lock(&self.viewers).insert(id, viewer.clone());
+        viewer
+    }
+
+    /// Removes a viewer.
+    pub fn leave(&self, id: u64) {
+        lock(&self.viewers).remove(&id);
+    }
+
+    /// Whether a viewer has subscribed to one of these channels.
+    pub fn wanted(&self, channels: core::ops::Range<u32>) -> bool {
+        let viewers = lock(&self.viewers);
+        let wants = |viewer: &Arc<Viewer>| channels.clone().any(|channel| viewer.wants(channel));
+        viewers.values().any(wants)
+    }
+
+    /// Sends a message on a channel to those who subscribed to it.
+    pub fn publish(&self, channel: u32, time_ns: u64, payload: &[u8]) {
+        for viewer in lock(&self.viewers).values() {
+            viewer.send(channel, time_ns, payload);
+        }
+    }
+
+    /// Keeps a message that each new subscriber of the channel receives.
+    pub fn retain(&self, channel: u32, payload: Vec<u8>) {
+        lock(&self.retained).insert(channel, payload);
+    }
+
+    /// Subscribes a viewer and sends what the channel repeats.
+    pub fn subscribe(&self, viewer: &Viewer, subscription: u32, channel: u32) {
+        viewer.subscribe(subscription, channel);
+        if let Some(payload) = lock(&self.retained).get(&channel) {
+            viewer.send(channel, 0, payload);
+        }
+    }
+
+    /// The latest picture.
+    pub fn latest(&self) -> Option<Frame> {
+        lock(&self.latest).clone()
+    }
+
+    /// Replaces it.
+    pub fn set_latest(&self, frame: Frame) {
+        *lock(&self.latest) = Some(frame);
+    }
+}
+
+/// A lock whose holder panicked is as good as any other: every value in it is complete.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_viewer_that_does_not_read_loses_the_oldest_and_costs_a_bounded_queue() {
+        let hub = Hub::new(Vec::new());
+        let (slow, other) = (hub.join(1), hub.join(2));
+        hub.subscribe(&slow, 7, 0);
+        for number in 0..1000_u64 {
+            hub.publish(0, number, b"x");
+        }
+        let mut received = Vec::new();
+        while let Some(message) = slow.next() {
+            received.push(message);
+        }
+        assert_eq!(received.len(), QUEUE_LENGTH);
+        let newest = message_data(7, 999, b"x");
+        assert_eq!(received.last(), Some(&newest));
+        assert_eq!(other.next(), None, "it has not subscribed");
+    }
+
+    #[test]
+    fn what_a_channel_retains_reaches_whoever_subscribes_later() {
+        let hub = Hub::new(Vec::new());
+        hub.retain(3, b"urdf".to_vec());
+        let viewer = hub.join(1);
+        hub.subscribe(&viewer, 5, 3);
+        assert_eq!(viewer.next(), Some(message_data(5, 0, b"urdf")));
+        assert!(hub.wanted(2..4) && !hub.wanted(0..3));
+        hub.leave(1);
+        assert!(!hub.wanted(0..9));
+    }
+
+    #[test]
+    fn commands_are_refused_until_they_are_accepted() {
+        let hub = Hub::new(Vec::new());
+        let pending = || Pending {
+            command: Command::Reset,
+            answer: channel().0,
+        };
+        assert!(hub.send_command(pending()).is_err() && !hub.accepts_commands());
+        let receiver = hub.accept_commands();
+        assert!(hub.send_command(pending()).is_ok());
+        assert_eq!(receiver.recv().expect("a command").command, Command::Reset);
+    }
+}

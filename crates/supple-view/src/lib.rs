@@ -1,0 +1,190 @@
+//! The live page of a running system or of a log, and a server of the Foxglove WebSocket protocol.
+//!
+//! A process of its own, which `supple view` and `supple up --view` start: it reads telemetry like any other client and
+//! sends requests like any other operator. It runs at the lowest priority, polls shared memory and never makes the
+//! controller wait; without it, or with a browser that hangs, the loop is the same.
+//!
+//! The page is embedded and asks no other server for anything. Everything is served on 127.0.0.1 alone, and only to
+//! those who know the token in the URL (`http.rs`).
+//!
+//! ```text
+//!  telemetry --> live (one thread) --> hub --> viewer (a thread each) --> browser, Lichtblick
+//!  requests  <--                   <-- hub <--
+//! ```
+
+#![forbid(unsafe_code)]
+
+mod command;
+mod error;
+mod frame;
+mod http;
+mod hub;
+mod info;
+mod live;
+mod page;
+mod pendant;
+mod protocol;
+mod remedy;
+mod replay;
+mod server;
+mod token;
+mod viewer;
+
+pub use error::ViewError;
+
+use http::Gate;
+use hub::Hub;
+use live::Live;
+use serde::Serialize;
+use server::Shown;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, channel};
+use supple_ipc::Domain;
+use supple_model::{Description, with_dof};
+use supple_realtime::{Stop, pause};
+use token::Token;
+
+/// Steps of niceness that the process takes: whatever else wants the processor comes first.
+const NICENESS: i32 = 10;
+/// Time between two looks for a shutdown.
+const POLL_INTERVAL: core::time::Duration = core::time::Duration::from_millis(20);
+
+/// What to show.
+#[derive(Clone, Debug)]
+pub enum Source {
+    /// A running system.
+    System {
+        /// Its namespace.
+        domain: Box<Domain>,
+        /// Its arm.
+        description: Box<Description>,
+    },
+    /// A log.
+    Log(PathBuf),
+}
+
+/// How to show it.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// Draw a block with its top face at this height \[m\].
+    pub block_m: Option<f64>,
+    /// Port on 127.0.0.1; 0 for a free one.
+    pub port: u16,
+    /// Accept no requests.
+    pub read_only: bool,
+    /// Pages of other viewers that may connect if they have the URL, such as `http://localhost:8080`.
+    pub allow_origin: Vec<String>,
+}
+
+/// Where the page is. Both addresses contain the token.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Addresses {
+    /// The page.
+    pub url: String,
+    /// For viewers of the Foxglove protocol.
+    pub foxglove_url: String,
+}
+
+/// Serves the page until a shutdown is requested; `announce` receives its addresses once it can be opened.
+///
+/// # Errors
+/// [`ViewError`].
+pub fn run(
+    source: &Source,
+    options: &Options,
+    stop: &Stop,
+    announce: impl FnOnce(&Addresses),
+) -> Result<(), ViewError> {
+    // Without the permission it runs as it is.
+    let _ = rustix::process::nice(NICENESS);
+    match source {
+        Source::Log(log) => {
+            announce(&start(options, shown_log(log, options)?)?);
+            while !stop.shutdown_requested() {
+                pause(POLL_INTERVAL);
+            }
+            Ok(())
+        }
+        Source::System {
+            domain,
+            description,
+        } => {
+            with_dof!(description.dof(), N => run_live::<N>(domain, description, options, stop, announce))?
+        }
+    }
+}
+
+fn shown_log(log: &std::path::Path, options: &Options) -> Result<Shown, ViewError> {
+    let replay = replay::read(log)?;
+    let title = log.file_name().unwrap_or(log.as_os_str());
+    let subject = info::Subject {
+        description: &replay.description,
+        title: title.to_string_lossy().into_owned(),
+        log: Some(serde_json::json!({
+            "experiment": replay.experiment,
+            "interval_s": replay.interval_s,
+            "incomplete": replay.incomplete,
+        })),
+        block_m: options.block_m,
+        commands: false,
+        pendant: false,
+    };
+    Ok(Shown {
+        hub: Arc::new(Hub::new(Vec::new())),
+        domain: None,
+        name: subject.title.clone(),
+        info: info::info(&subject)?,
+        log: Some(serde_json::to_vec(&replay.frames)?),
+    })
+}
+
+fn run_live<const N: usize>(
+    domain: &Domain,
+    description: &Description,
+    options: &Options,
+    stop: &Stop,
+    announce: impl FnOnce(&Addresses),
+) -> Result<(), ViewError> {
+    let hub = Arc::new(Hub::new(info::channels(description)?));
+    let commands: Receiver<_> = match options.read_only {
+        true => channel().1,
+        false => hub.accept_commands(),
+    };
+    let subject = info::Subject {
+        description,
+        title: domain.prefix().to_owned(),
+        log: None,
+        block_m: options.block_m,
+        commands: !options.read_only,
+        pendant: pendant::socket(domain).is_some(),
+    };
+    let shown = Shown {
+        name: format!("supple {}", domain.prefix()),
+        info: info::info(&subject)?,
+        domain: Some(domain.clone()),
+        hub: hub.clone(),
+        log: None,
+    };
+    let mut live = Live::<N>::new(domain, description, &hub, !options.read_only)?;
+    announce(&start(options, shown)?);
+    live.run(&commands, stop)
+}
+
+/// Serves in a thread of its own.
+fn start(options: &Options, shown: Shown) -> Result<Addresses, ViewError> {
+    let port = options.port;
+    let failed = |error| ViewError::Listen { port, error };
+    let (listener, port) = server::listen(port).map_err(failed)?;
+    let token = Token::new().map_err(failed)?;
+    let gate = Arc::new(Gate::new(token, port, &options.allow_origin));
+    let addresses = Addresses {
+        url: gate.url(),
+        foxglove_url: gate.websocket_url(),
+    };
+    let shown = Arc::new(shown);
+    let server = std::thread::Builder::new().name("server".to_owned());
+    let started = server.spawn(move || server::run(&listener, &gate, &shown));
+    started.map_err(failed)?;
+    Ok(addresses)
+}

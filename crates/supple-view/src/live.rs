@@ -1,0 +1,218 @@
+//! The thread that reads a running system's telemetry and sends its requests. Only it touches shared memory, and it
+//! polls: it has no way to delay the controller.
+
+use crate::error::ViewError;
+use crate::frame::{Beside, Reducer};
+use crate::hub::{Answer, Hub, Pending};
+use core::time::Duration;
+use std::sync::mpsc::{Receiver, Sender};
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
+use supple_ipc::message::{OperatorReply, Outcome, Telemetry};
+use supple_ipc::{Domain, OperatorClient, TelemetryReader};
+use supple_log::{CycleTiming, Extras, LiveEncoder};
+use supple_model::Description;
+use supple_realtime::{Stop, monotonic_ns, pause};
+
+/// Channel of the pictures; the channels of the log follow it.
+pub const VIEW_CHANNEL: u32 = 0;
+/// Time between two polls. The queue of telemetry holds two seconds at 1 kHz.
+const POLL_INTERVAL: Duration = Duration::from_millis(5);
+/// Time between two pictures.
+const FRAME_INTERVAL: Duration = Duration::from_millis(33);
+/// Time between two messages of each channel of the log \[ns\].
+const MESSAGE_INTERVAL_NS: u64 = 10_000_000;
+/// How long a request waits for its reply.
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(4);
+
+/// A request that was sent.
+struct Sent {
+    sequence: u64,
+    at: Instant,
+    answer: Sender<Answer>,
+}
+
+/// Connection to a running system of an arm with `N` joints.
+pub struct Live<'a, const N: usize> {
+    hub: &'a Hub,
+    reader: TelemetryReader,
+    operator: Option<OperatorClient>,
+    encoder: LiveEncoder<N>,
+    reducer: Reducer<N>,
+    last: Option<Telemetry>,
+    sent: Vec<Sent>,
+    /// From the stamps of states to the time since the epoch \[ns\].
+    offset_ns: u64,
+    next_message_ns: u64,
+}
+
+impl<'a, const N: usize> Live<'a, N> {
+    /// Connects; as an operator too if `commands` is set.
+    ///
+    /// # Errors
+    /// [`ViewError::Ipc`] if there is no free place, [`ViewError::Log`] for another arm.
+    pub fn new(
+        domain: &Domain,
+        description: &Description,
+        hub: &'a Hub,
+        commands: bool,
+    ) -> Result<Self, ViewError> {
+        let operator = commands.then(|| OperatorClient::new(domain));
+        let mut encoder = LiveEncoder::new(description)?;
+        let urdf = encoder.robot_description()?;
+        hub.retain(channel_of(urdf.channel), urdf.data);
+        Ok(Live {
+            hub,
+            reader: TelemetryReader::new(domain)?,
+            operator: operator.transpose()?,
+            encoder,
+            reducer: Reducer::default(),
+            last: None,
+            sent: Vec::new(),
+            offset_ns: since_epoch_ns().saturating_sub(monotonic_ns()),
+            next_message_ns: 0,
+        })
+    }
+
+    /// Runs until a shutdown is requested.
+    ///
+    /// # Errors
+    /// [`ViewError::Ipc`] if shared memory cannot be accessed; [`ViewError::Log`] for a message that cannot be encoded.
+    pub fn run(&mut self, commands: &Receiver<Pending>, stop: &Stop) -> Result<(), ViewError> {
+        let mut shown = Instant::now();
+        while !stop.shutdown_requested() {
+            while let Some(telemetry) = self.reader.receive()? {
+                self.add(&telemetry)?;
+            }
+            if shown.elapsed() >= FRAME_INTERVAL {
+                shown = Instant::now();
+                self.show();
+            }
+            while let Ok(pending) = commands.try_recv() {
+                self.send(pending)?;
+            }
+            self.answer()?;
+            pause(POLL_INTERVAL);
+        }
+        Ok(())
+    }
+
+    fn add(&mut self, telemetry: &Telemetry) -> Result<(), ViewError> {
+        if telemetry.dof() != N {
+            return Ok(());
+        }
+        let record = telemetry.record_of::<N>();
+        let timing = &telemetry.timing;
+        let microseconds = |ns: u64| ns as f64 / 1e3;
+        let beside = Beside {
+            time_s: telemetry.state.stamp_ns as f64 / 1e9,
+            timing_us: Some([
+                microseconds(timing.period_ns),
+                microseconds(timing.latency_ns),
+                microseconds(timing.step_ns),
+            ]),
+            round_trip_us: microseconds(telemetry.state.plant.round_trip_ns),
+            missed: telemetry.state.plant.missed,
+        };
+        self.reducer.add(&record, beside);
+        self.last = Some(*telemetry);
+        let time_ns = telemetry.state.stamp_ns.saturating_add(self.offset_ns);
+        // The clock of the states begins anew with the plant.
+        let due =
+            time_ns >= self.next_message_ns || self.next_message_ns > time_ns + MESSAGE_INTERVAL_NS;
+        let channels = self.hub.channels().len() as u32;
+        if due && self.hub.wanted(VIEW_CHANNEL + 1..channels) {
+            self.next_message_ns = time_ns + MESSAGE_INTERVAL_NS;
+            let extras = Extras {
+                timing: Some(CycleTiming {
+                    period_ns: timing.period_ns,
+                    latency_ns: timing.latency_ns,
+                    step_ns: timing.step_ns,
+                }),
+                ..Extras::default()
+            };
+            for message in self.encoder.encode(time_ns, &record, &extras)? {
+                let channel = channel_of(message.channel);
+                self.hub.publish(channel, time_ns, &message.data);
+            }
+        }
+        Ok(())
+    }
+
+    fn show(&mut self) {
+        let Some(frame) = self.reducer.take() else {
+            return;
+        };
+        let time_ns = ((frame.time_s * 1e9) as u64).saturating_add(self.offset_ns);
+        if let Ok(json) = serde_json::to_vec(&frame) {
+            self.hub.publish(VIEW_CHANNEL, time_ns, &json);
+        }
+        self.hub.set_latest(frame);
+    }
+
+    fn send(&mut self, pending: Pending) -> Result<(), ViewError> {
+        let Pending { command, answer } = pending;
+        let refuse = |reason: &str| {
+            // The viewer may have gone.
+            let _ = answer.send(Err(reason.to_owned()));
+            Ok(())
+        };
+        let (Some(operator), Some(last)) = (&mut self.operator, &self.last) else {
+            return refuse("no system is running");
+        };
+        let Some(request) = command.request::<N>(&last.record_of()) else {
+            return refuse("no request to the controller");
+        };
+        match operator.send(&request, None)? {
+            Some(sequence) => {
+                let at = Instant::now();
+                self.sent.push(Sent {
+                    sequence,
+                    at,
+                    answer,
+                });
+                Ok(())
+            }
+            None => refuse("the controller does not answer, or has too many requests"),
+        }
+    }
+
+    fn answer(&mut self) -> Result<(), ViewError> {
+        let Some(operator) = &self.operator else {
+            return Ok(());
+        };
+        while let Some(reply) = operator.receive()? {
+            let of_this = |sent: &Sent| sent.sequence == reply.sequence;
+            if let Some(index) = self.sent.iter().position(of_this) {
+                let _ = self.sent.swap_remove(index).answer.send(in_words(&reply));
+            }
+        }
+        self.sent.retain(|sent| sent.at.elapsed() < ANSWER_TIMEOUT);
+        Ok(())
+    }
+}
+
+fn in_words(reply: &OperatorReply) -> Answer {
+    match reply.outcome() {
+        Outcome::Refused => Err(reply.text.to_string()),
+        _ => Ok(reply
+            .mode()
+            .map_or("unknown", |mode| mode.name())
+            .to_owned()),
+    }
+}
+
+/// Channel of a message of the log.
+fn channel_of(index: usize) -> u32 {
+    VIEW_CHANNEL + 1 + index as u32
+}
+
+#[expect(
+    clippy::disallowed_methods,
+    reason = "viewers order messages by the time of day; nothing is computed from it"
+)]
+fn since_epoch_ns() -> u64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    since.map_or(0, |since| {
+        u64::try_from(since.as_nanos()).unwrap_or(u64::MAX)
+    })
+}

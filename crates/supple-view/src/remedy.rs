@@ -1,0 +1,74 @@
+//! What an operator does about a fault, in a sentence.
+
+use supple_core::codes::fault_kind as fault;
+
+/// The remedy of a kind of fault, see [`fault_kind`](supple_core::codes::fault_kind).
+pub fn remedy(kind: u8) -> &'static str {
+    match kind {
+        fault::MEASUREMENT_NOT_FINITE => {
+            "Check the sensor and its cable; the arm brakes until it gives numbers again."
+        }
+        fault::ENCODER_LOST => {
+            "Check the bus and the cable of this joint, then reset and enter gravity hold."
+        }
+        fault::STATE_STALE => {
+            "The plant sent no states: check its process and the load of the machine (supple doctor), then reset."
+        }
+        fault::STATE_OUT_OF_ORDER => {
+            "A second plant writes states, or the plant restarted: end the other one, then reset."
+        }
+        fault::JOINT_POSITION => {
+            "Reset, enter float and guide the joint away from its stop by hand."
+        }
+        fault::JOINT_SPEED | fault::TIP_SPEED => "Reset, then request a slower motion.",
+        fault::TRACKING_ERROR => {
+            "Something held the tip back, or the model is wrong: clear the way, or raise the stiffness; then reset and \
+             move to the start again."
+        }
+        fault::ROTATION_ERROR => {
+            "The tip could not turn as requested: clear the way, or raise the rotational stiffness; then reset."
+        }
+        fault::MASS_MATRIX => "The arm's description is invalid: check its inertias.",
+        fault::TORQUE_NOT_FINITE => {
+            "This is a bug in supple, or an invalid description: keep the log and report it."
+        }
+        fault::ENCODER_JUMP | fault::ENCODER_STUCK | fault::ENCODER_UNRELIABLE => {
+            "Check the encoder of this joint and its cable before the arm moves again, then reset."
+        }
+        fault::JOINT_TRACKING_ERROR => {
+            "The joint did not follow its move: check for an obstacle, the drives and the payload; then reset."
+        }
+        fault::JOINT_COLLISION | fault::TIP_COLLISION => {
+            "The arm met something: remove it, or request a contact mode; then reset."
+        }
+        fault::MOVES_AGAINST_TORQUE => {
+            "The joint moves against its torque: check the sign of its torque and of its encoder."
+        }
+        fault::UNMODELLED_LOAD => {
+            "The arm carries a load that its model lacks: remove it or describe it; then reset."
+        }
+        fault::WORKSPACE => "Reset, enter float and guide the tip back into its workspace.",
+        fault::ZONE_SPEED => "Reset, then request a slower motion in this zone.",
+        fault::ZONE_FORCE => {
+            "The tip pressed too hard in this zone: remove what it met, then reset."
+        }
+        fault::SINGULAR => {
+            "Reset, then move the arm away from the singular pose before the pose mode."
+        }
+        _ => "See docs/safety.md; remove the cause, then reset.",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_fault_has_a_remedy_of_its_own_kind() {
+        let general = remedy(u8::MAX);
+        let faults = fault::ALL.iter().filter(|(_, kind)| *kind != fault::NONE);
+        for (name, kind) in faults {
+            assert_ne!(remedy(*kind), general, "{name}");
+        }
+    }
+}

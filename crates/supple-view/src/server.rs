@@ -1,0 +1,188 @@
+//! Listens on 127.0.0.1, and gives every connection a thread of its own.
+
+use crate::http::{Gate, Head, Rejected, respond};
+use crate::hub::Hub;
+use crate::page::FILES;
+use crate::protocol::SUBPROTOCOLS;
+use crate::viewer::{Context, serve};
+use core::time::Duration;
+use std::io::{self, Write};
+use std::net::{Ipv4Addr, Shutdown, TcpListener, TcpStream};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use supple_ipc::Domain;
+
+/// Most connections at a time.
+const MAX_CONNECTIONS: usize = 32;
+/// How long a peer may take to send the head of its request, or to read the answer.
+const HEAD_TIMEOUT: Duration = Duration::from_secs(5);
+/// What a WebSocket's key is digested with (RFC 6455, section 1.3).
+const WEBSOCKET_ID: &[u8] = b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11";
+
+/// What the server shows.
+pub struct Shown {
+    /// What the threads share.
+    pub hub: Arc<Hub>,
+    /// The running system; `None` for a log.
+    pub domain: Option<Domain>,
+    /// Name of what is shown.
+    pub name: String,
+    /// The page's description of it, JSON.
+    pub info: Vec<u8>,
+    /// Pictures of a log, JSON; `None` for a running system.
+    pub log: Option<Vec<u8>>,
+}
+
+/// Opens the port on the loopback interface; 0 for a free one.
+///
+/// # Errors
+/// If it is in use.
+pub fn listen(port: u16) -> io::Result<(TcpListener, u16)> {
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))?;
+    let port = listener.local_addr()?.port();
+    Ok((listener, port))
+}
+
+/// Serves connections until the process ends.
+pub fn run(listener: &TcpListener, gate: &Arc<Gate>, shown: &Arc<Shown>) {
+    let open = Arc::new(AtomicUsize::new(0));
+    let session = std::process::id().to_string();
+    static CONNECTIONS: AtomicU64 = AtomicU64::new(0);
+    for stream in listener.incoming() {
+        let Ok(stream) = stream else {
+            supple_realtime::pause(Duration::from_millis(50));
+            continue;
+        };
+        if open.fetch_add(1, Ordering::AcqRel) >= MAX_CONNECTIONS {
+            open.fetch_sub(1, Ordering::AcqRel);
+            continue;
+        }
+        let (gate, shown, session) = (gate.clone(), shown.clone(), session.clone());
+        let id = CONNECTIONS.fetch_add(1, Ordering::Relaxed);
+        let count = open.clone();
+        let started = std::thread::Builder::new()
+            .name("connection".to_owned())
+            .spawn(move || {
+                // A peer that goes away in the middle is no error of this program.
+                let _ = handle(stream, &gate, &shown, &session, id);
+                count.fetch_sub(1, Ordering::AcqRel);
+            });
+        if started.is_err() {
+            open.fetch_sub(1, Ordering::AcqRel);
+        }
+    }
+}
+
+fn handle(
+    mut stream: TcpStream,
+    gate: &Gate,
+    shown: &Shown,
+    session: &str,
+    id: u64,
+) -> io::Result<()> {
+    stream.set_read_timeout(Some(HEAD_TIMEOUT))?;
+    stream.set_write_timeout(Some(HEAD_TIMEOUT))?;
+    let Some(head) = Head::read(&mut stream)? else {
+        return respond(
+            &mut stream,
+            "400 Bad Request",
+            "text/plain",
+            b"Invalid request.\n",
+        );
+    };
+    let path = match gate.check(&head) {
+        Ok(path) => path,
+        Err(rejected) => return reject(&mut stream, rejected),
+    };
+    match path {
+        "ws" => return websocket(stream, &head, shown, session, id),
+        "info.json" => respond(&mut stream, "200 OK", "application/json", &shown.info)?,
+        "log.json" if shown.log.is_some() => {
+            let log = shown.log.as_deref().unwrap_or_default();
+            respond(&mut stream, "200 OK", "application/json", log)?;
+        }
+        path => match FILES.iter().find(|file| file.name == path) {
+            Some(file) => respond(&mut stream, "200 OK", file.media_type, file.bytes)?,
+            None => respond(
+                &mut stream,
+                "404 Not Found",
+                "text/plain",
+                b"No such page.\n",
+            )?,
+        },
+    }
+    stream.shutdown(Shutdown::Write)
+}
+
+fn reject(stream: &mut TcpStream, rejected: Rejected) -> io::Result<()> {
+    let (status, text) = rejected.answer();
+    respond(stream, status, "text/plain", text.as_bytes())
+}
+
+fn websocket(
+    mut stream: TcpStream,
+    head: &Head,
+    shown: &Shown,
+    session: &str,
+    id: u64,
+) -> io::Result<()> {
+    let is = |name: &str, value: &str| {
+        let found = head.header(name).unwrap_or_default();
+        found
+            .split(',')
+            .any(|part| part.trim().eq_ignore_ascii_case(value))
+    };
+    let offered = |protocol: &&&str| {
+        let offered = head.header("sec-websocket-protocol").unwrap_or_default();
+        offered.split(',').any(|part| part.trim() == **protocol)
+    };
+    let upgrade = is("upgrade", "websocket") && is("connection", "upgrade");
+    let (Some(key), true, Some(protocol)) = (
+        head.header("sec-websocket-key"),
+        upgrade && is("sec-websocket-version", "13"),
+        SUBPROTOCOLS.iter().find(offered),
+    ) else {
+        let text = format!("A WebSocket with the subprotocol {}.\n", SUBPROTOCOLS[0]);
+        return respond(
+            &mut stream,
+            "400 Bad Request",
+            "text/plain",
+            text.as_bytes(),
+        );
+    };
+    write!(
+        stream,
+        "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n\
+         Sec-WebSocket-Accept: {}\r\nSec-WebSocket-Protocol: {protocol}\r\n\r\n",
+        accept_key(key)
+    )?;
+    let viewer = shown.hub.join(id);
+    let context = Context {
+        hub: &shown.hub,
+        domain: shown.domain.as_ref(),
+        name: &shown.name,
+        session,
+    };
+    // A viewer may leave at any time and in any way.
+    let _ = serve(&context, &viewer, stream, head.rest.clone());
+    shown.hub.leave(id);
+    Ok(())
+}
+
+/// The answer to the key of a WebSocket.
+fn accept_key(key: &str) -> String {
+    let mut digest = sha1_smol::Sha1::new();
+    digest.update(key.as_bytes());
+    digest.update(WEBSOCKET_ID);
+    data_encoding::BASE64.encode(&digest.digest().bytes())
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn the_accept_key_is_that_of_the_standard() {
+        // RFC 6455, section 1.3.
+        let key = super::accept_key("dGhlIHNhbXBsZSBub25jZQ==");
+        assert_eq!(key, "s3pPLMBiTxaQ9kYGzzhZRbK+xOo=");
+    }
+}

@@ -1,0 +1,57 @@
+//! The secret in the URL: another user of the machine can connect to the port, but does not know it.
+
+use std::io;
+
+/// Random bytes of a token.
+const BYTES: usize = 16;
+
+/// A secret of 128 random bits, written as 32 hexadecimal digits.
+pub struct Token(String);
+
+impl Token {
+    /// A new token from the random numbers of the kernel.
+    ///
+    /// # Errors
+    /// If the kernel has none.
+    pub fn new() -> io::Result<Token> {
+        let mut bytes = [0; BYTES];
+        let filled = rustix::rand::getrandom(&mut bytes[..], rustix::rand::GetRandomFlags::empty());
+        match filled? {
+            BYTES => Ok(Token(
+                bytes.iter().map(|byte| format!("{byte:02x}")).collect(),
+            )),
+            _ => Err(io::Error::other("the kernel gave too few random numbers")),
+        }
+    }
+
+    /// The digits.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+
+    /// Whether the text is the token. The time it takes does not depend on how much of it is right.
+    pub fn matches(&self, text: &str) -> bool {
+        let (own, other) = (self.0.as_bytes(), text.as_bytes());
+        let differing = own.iter().zip(other).fold(0, |bits, (a, b)| bits | (a ^ b));
+        own.len() == other.len() && differing == 0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_whole_token_matches_and_no_two_are_equal() {
+        let (token, other) = (Token::new().expect("random"), Token::new().expect("random"));
+        let text = token.as_str().to_owned();
+        assert_eq!(text.len(), 2 * BYTES);
+        assert!(token.matches(&text) && !other.matches(&text));
+        for wrong in ["", &text[1..], &format!("{text}0"), &text.to_uppercase()] {
+            assert!(
+                !token.matches(wrong) || *wrong == *text,
+                "{wrong} against {text}"
+            );
+        }
+    }
+}

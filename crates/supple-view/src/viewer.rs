@@ -1,0 +1,222 @@
+//! One WebSocket connection: reads what the viewer sends, writes what waits for it.
+
+use crate::command::{Command, set_parameters};
+use crate::hub::{Answer, Hub, Pending, Viewer};
+use crate::protocol::{
+    ClientMessage, SERVICE, advertise, advertise_services, call_failure, call_response,
+    parameter_values, server_info, service_call, status,
+};
+use core::time::Duration;
+use std::net::TcpStream;
+use std::sync::mpsc::channel;
+use std::time::Instant;
+use supple_ipc::{Domain, request_idle};
+use tungstenite::protocol::{Role, WebSocketConfig};
+use tungstenite::{Error, Message, WebSocket};
+
+/// How long a read waits before waiting messages are written.
+const READ_TIMEOUT: Duration = Duration::from_millis(10);
+/// How long a write waits for a viewer that does not read.
+const WRITE_TIMEOUT: Duration = Duration::from_secs(2);
+/// How long a command waits for its answer.
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(5);
+/// Longest message of a viewer.
+const MAX_MESSAGE_BYTES: usize = 64 * 1024;
+/// Time between two messages with changed parameters.
+const PARAMETER_INTERVAL: Duration = Duration::from_millis(200);
+
+/// What a connection needs of its server.
+pub struct Context<'a> {
+    /// What the threads share.
+    pub hub: &'a Hub,
+    /// The running system; `None` for a log.
+    pub domain: Option<&'a Domain>,
+    /// Name of what is shown.
+    pub name: &'a str,
+    /// Id of this run of the server, which is no secret.
+    pub session: &'a str,
+}
+
+/// Serves a viewer after the handshake; `rest` is what it sent behind it.
+///
+/// # Errors
+/// Of the connection.
+pub fn serve(
+    context: &Context<'_>,
+    viewer: &Viewer,
+    stream: TcpStream,
+    rest: Vec<u8>,
+) -> Result<(), Error> {
+    stream.set_nodelay(true)?;
+    stream.set_read_timeout(Some(READ_TIMEOUT))?;
+    stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
+    let config = WebSocketConfig::default()
+        .max_message_size(Some(MAX_MESSAGE_BYTES))
+        .max_frame_size(Some(MAX_MESSAGE_BYTES));
+    let mut socket = WebSocket::from_partially_read(stream, rest, Role::Server, Some(config));
+    let hub = context.hub;
+    let commands = hub.accepts_commands();
+    let info = server_info(context.name, context.session, commands);
+    socket.send(Message::text(info))?;
+    socket.send(Message::text(advertise(hub.channels())))?;
+    if commands {
+        socket.send(Message::text(advertise_services()))?;
+    }
+    let mut updates = Updates::default();
+    loop {
+        match socket.read() {
+            Ok(Message::Text(text)) => {
+                for answer in text_message(context, viewer, &mut updates, text.as_str()) {
+                    socket.send(Message::text(answer))?;
+                }
+            }
+            Ok(Message::Binary(bytes)) => {
+                if let Some(answer) = binary_message(context, &bytes) {
+                    socket.send(answer)?;
+                }
+            }
+            Ok(_) => {}
+            Err(Error::Io(error)) if is_timeout(&error) => {}
+            Err(error) => return Err(error),
+        }
+        if let Some(text) = updates.due(hub) {
+            socket.write(Message::text(text))?;
+        }
+        while let Some(message) = viewer.next() {
+            socket.write(Message::binary(message))?;
+        }
+        socket.flush()?;
+    }
+}
+
+/// Changed parameters, for viewers that asked for them.
+#[derive(Default)]
+struct Updates {
+    subscribed: bool,
+    sent: Option<([f32; 3], [f32; 3], Instant)>,
+}
+
+impl Updates {
+    fn due(&mut self, hub: &Hub) -> Option<String> {
+        let waits = |(_, _, at): ([f32; 3], [f32; 3], Instant)| at.elapsed() < PARAMETER_INTERVAL;
+        if !self.subscribed || self.sent.is_some_and(waits) {
+            return None;
+        }
+        let frame = hub.latest()?;
+        let (stiffness, damping) = (frame.stiffness_n_per_m, frame.damping_n_s_per_m);
+        let changed = self
+            .sent
+            .is_none_or(|(k, b, _)| (k, b) != (stiffness, damping));
+        self.sent = Some((stiffness, damping, Instant::now()));
+        changed.then(|| parameter_values(Some(&frame), &[], None))
+    }
+}
+
+fn is_timeout(error: &std::io::Error) -> bool {
+    use std::io::ErrorKind;
+    matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut)
+}
+
+/// Handles a text of the viewer; returns the answers.
+fn text_message(
+    context: &Context<'_>,
+    viewer: &Viewer,
+    updates: &mut Updates,
+    text: &str,
+) -> Vec<String> {
+    let hub = context.hub;
+    let message = match serde_json::from_str(text) {
+        Ok(message) => message,
+        Err(error) => return vec![status(2, &format!("the message is invalid: {error}"))],
+    };
+    match message {
+        ClientMessage::Subscribe { subscriptions } => {
+            for subscription in subscriptions {
+                hub.subscribe(viewer, subscription.id, subscription.channel_id);
+            }
+            Vec::new()
+        }
+        ClientMessage::Unsubscribe { subscription_ids } => {
+            for id in subscription_ids {
+                viewer.unsubscribe(id);
+            }
+            Vec::new()
+        }
+        ClientMessage::GetParameters {
+            parameter_names,
+            id,
+        } => {
+            let frame = hub.latest();
+            vec![parameter_values(
+                frame.as_ref(),
+                &parameter_names,
+                id.as_deref(),
+            )]
+        }
+        ClientMessage::SetParameters { parameters, id } => {
+            let values: Vec<_> = parameters.into_iter().map(|p| (p.name, p.value)).collect();
+            let done = set_parameters(&values).and_then(|command| carry_out(context, command));
+            let frame = hub.latest();
+            let now = parameter_values(frame.as_ref(), &[], id.as_deref());
+            let refused = done.err().map(|reason| status(2, &reason));
+            refused.into_iter().chain([now]).collect()
+        }
+        ClientMessage::SubscribeParameterUpdates {} => {
+            updates.subscribed = true;
+            Vec::new()
+        }
+        ClientMessage::UnsubscribeParameterUpdates {} => {
+            updates.subscribed = false;
+            Vec::new()
+        }
+        ClientMessage::Other => Vec::new(),
+    }
+}
+
+/// Handles binary data of the viewer, which can only be a call of the service.
+fn binary_message(context: &Context<'_>, bytes: &[u8]) -> Option<Message> {
+    let call = service_call(bytes)?;
+    if call.service != SERVICE {
+        return Some(Message::text(call_failure(
+            &call,
+            "there is no such service",
+        )));
+    }
+    let answer = Command::parse(call.payload).and_then(|command| carry_out(context, command));
+    Some(match answer {
+        Ok(mode) => {
+            let reply = serde_json::json!({"accepted": true, "mode": mode}).to_string();
+            Message::binary(call_response(&call, reply.as_bytes()))
+        }
+        Err(reason) => Message::text(call_failure(&call, &reason)),
+    })
+}
+
+/// Carries a command out and waits for its answer.
+fn carry_out(context: &Context<'_>, command: Command) -> Answer {
+    let domain = context.domain.filter(|_| context.hub.accepts_commands());
+    match (command, domain) {
+        (Command::Idle, Some(domain)) => idle(domain),
+        (Command::Pendant { button }, Some(domain)) => {
+            crate::pendant::press(domain, button.line()).map(|()| "pendant".to_owned())
+        }
+        (command, _) => {
+            let (answer, answers) = channel();
+            context.hub.send_command(Pending { command, answer })?;
+            let answer = answers.recv_timeout(ANSWER_TIMEOUT);
+            answer.unwrap_or_else(|_| Err("the controller does not answer".to_owned()))
+        }
+    }
+}
+
+/// Idle has a way of its own, which no other client can block.
+fn idle(domain: &Domain) -> Answer {
+    match request_idle(domain, ANSWER_TIMEOUT) {
+        Ok(Some(answer)) => match answer.outcome {
+            supple_ipc::message::Outcome::Refused => Err(answer.text),
+            _ => Ok(answer.mode.map_or("unknown", |mode| mode.name()).to_owned()),
+        },
+        Ok(None) => Err("the controller does not answer".to_owned()),
+        Err(error) => Err(error.to_string()),
+    }
+}

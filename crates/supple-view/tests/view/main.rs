@@ -1,0 +1,7 @@
+//! The server against a scripted controller on real shared memory, and a client that speaks its protocols byte by byte.
+
+mod client;
+mod controller;
+mod live;
+mod replay;
+mod security;

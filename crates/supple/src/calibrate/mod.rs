@@ -1,0 +1,201 @@
+//! `supple calibrate --plant ..`: from an arm to its model, on a simulated, an emulated or a real arm.
+//!
+//! The steps are those of [`supple_experiment::procedure`]; this module starts the processes and talks to them.
+
+mod report;
+mod running_arm;
+mod terminal;
+
+use crate::cli::{PlantKind, UpArgs, UpTrajectory};
+use crate::up::Pidfile;
+use running_arm::RunningArm;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+use supple_bus::Address;
+use supple_cli::arguments::{CalibrateArgs, CalibrationPlant, PlantArgs};
+use supple_cli::arms;
+use supple_cli::console::{print_status, write_stderr_in_background};
+use supple_cli::exit::Failure;
+use supple_cli::interrupt;
+use supple_experiment::calibrate::plant_of;
+use supple_experiment::procedure::{
+    CalibratedArm, InProcessArm, LOGS, ProcedureOptions, calibrate_arm,
+};
+use supple_experiment::{Calibration, Mismatch};
+use supple_ipc::Domain;
+use supple_model::{Description, IdentifiedModel, with_dof};
+use supple_plant::PlantOptions;
+use terminal::Terminal;
+
+/// Options of the simulated arm, with their seed.
+const PLANT_OPTIONS: &str = "plant.toml";
+
+/// Runs `supple calibrate` with `--plant`.
+///
+/// # Errors
+/// [`Failure`]; what is finished stays finished, see `--resume`.
+pub fn run(args: &CalibrateArgs, on: CalibrationPlant) -> Result<(), Failure> {
+    let arm = arms::find(&args.urdf.name(&args.arm), args.strict)?;
+    let found = with_dof!(arm.dof(), N => sized::<N>(&arm, args, on))??;
+    report::print(&found, &args.out, args.json)
+}
+
+fn sized<const N: usize>(
+    arm: &Description,
+    args: &CalibrateArgs,
+    on: CalibrationPlant,
+) -> Result<CalibratedArm, Failure> {
+    let logs = args.out.join(LOGS);
+    std::fs::create_dir_all(&logs).map_err(|error| Failure::file("create", &logs, error))?;
+    let start = start_model::<N>(arm, args, on)?;
+    let options = ProcedureOptions {
+        seed: args.seed,
+        warm_up_s: args.warm_up,
+        candidates: args.candidates,
+        resume: args.resume,
+        until: args.until,
+        ..ProcedureOptions::new(args.out.clone())
+    };
+    let mut terminal = Terminal {
+        yes: args.yes,
+        quiet: args.quiet,
+    };
+    if on == CalibrationPlant::InProcess {
+        let calibration = Calibration {
+            ripple_nm: args.ripple,
+            load: !args.no_load_friction,
+            plant: args.plant.options()?,
+            ..Calibration::new(args.seed)
+        };
+        let plant = plant_of::<N>(arm, &calibration)?;
+        let notes = calibration.plant.notes();
+        let mut arm = InProcessArm::new(plant, arm.home::<N>()?, logs, notes);
+        return Ok(calibrate_arm(&mut arm, &start, &options, &mut terminal)?);
+    }
+    let domain = Domain::new(args.prefix.as_deref()).map_err(Failure::system)?;
+    write_stderr_in_background();
+    let stop = interrupt::shutdown_on_interrupt();
+    if args.virtual_time && on != CalibrationPlant::Emu {
+        return Err(Failure::VirtualTimeNeedsEmu);
+    }
+    let up = up_args(args, on)?;
+    let starts = on != CalibrationPlant::Running;
+    let _pidfile = starts.then(|| Pidfile::create(&domain)).transpose()?;
+    let mut running = RunningArm::<N>::new(&up, starts, arm, &domain, &args.out, stop)?;
+    let result = calibrate_arm(&mut running, &start, &options, &mut terminal);
+    let ended = running.end();
+    if result.is_err() {
+        print_status(&format!(
+            "what is finished is in {}; --resume goes on after it",
+            args.out.display()
+        ));
+    }
+    let found = result?;
+    ended.map(|()| found)
+}
+
+/// The model that the calibration starts from: `--model`, or the arm itself, with the errors of `--start-error`.
+fn start_model<const N: usize>(
+    arm: &Description,
+    args: &CalibrateArgs,
+    on: CalibrationPlant,
+) -> Result<Description, Failure> {
+    let model = match &args.model {
+        Some(path) => arms::find(&path.display().to_string(), args.strict)?,
+        None => arm.clone(),
+    };
+    let (gravity, friction) = match args.start_error[..] {
+        [] => return Ok(model),
+        [gravity, friction] => (gravity, friction),
+        _ => {
+            return Err(Failure::ValueCount {
+                option: "--start-error",
+                found: args.start_error.len(),
+                expected: "2, GRAVITY,FRICTION".to_owned(),
+            });
+        }
+    };
+    if matches!(on, CalibrationPlant::Can | CalibrationPlant::Running) {
+        return Err(Failure::OptionsOfRealArm);
+    }
+    let seed = args.seed;
+    let errors = Mismatch {
+        gravity,
+        friction,
+        seed,
+    };
+    let changed = errors.apply(&model.config::<N>()?);
+    let changed = changed.map_err(supple_experiment::ExperimentError::from)?;
+    Ok(model.with_model(&IdentifiedModel {
+        arm: &changed.arm,
+        friction: &changed.friction,
+        ripple: None,
+        source: "the arm's own model with errors, as a start for a calibration",
+    })?)
+}
+
+/// The system to start. The emulated arm draws the signs and phases of its effects from the seed.
+fn up_args(args: &CalibrateArgs, on: CalibrationPlant) -> Result<UpArgs, Failure> {
+    let bus = args.bus.as_deref().map(Address::from_str).transpose();
+    Ok(UpArgs {
+        plant: match on {
+            CalibrationPlant::Emu => PlantKind::Emu,
+            CalibrationPlant::Can => PlantKind::Can,
+            _ => PlantKind::Sim,
+        },
+        arm: absolute(&args.arm),
+        urdf: args.urdf.clone(),
+        strict: args.strict,
+        track: UpTrajectory::Sinusoid,
+        bus: bus.map_err(Failure::system)?,
+        zero_at_home: args.zero_at_home,
+        learn: false,
+        tare: false,
+        block_m: None,
+        inject: args.inject.clone(),
+        plant_options: seeded(args)?,
+        trace: None,
+        rate_hz: None,
+        for_s: None,
+        virtual_time: args.virtual_time,
+        log: PathBuf::new(),
+        no_log: true,
+        prefix: args.prefix.clone(),
+        view: false,
+        budget: false,
+        no_realtime: args.no_realtime,
+        json: args.json,
+    })
+}
+
+/// The options of the plant with the seed: a file in the folder of the results.
+fn seeded(args: &CalibrateArgs) -> Result<PlantArgs, Failure> {
+    let options = args.plant.options()?;
+    if !args.plant.realistic || options.seed.is_some() {
+        let file = args.plant.plant_options.as_deref();
+        return Ok(PlantArgs {
+            plant_options: file.map(|file| PathBuf::from(absolute(&file.display().to_string()))),
+            ..args.plant.clone()
+        });
+    }
+    let text = format!(
+        "{}\nseed = {}\n",
+        PlantOptions::set("realistic")?,
+        args.seed
+    );
+    let file = args.out.join(PLANT_OPTIONS);
+    supple_files::write_atomic(&file, text.as_bytes())
+        .map_err(|error| Failure::file("write", &file, error))?;
+    Ok(PlantArgs {
+        plant_options: Some(PathBuf::from(absolute(&file.display().to_string()))),
+        realistic: false,
+    })
+}
+
+/// The name of a built-in arm, or the path of another one.
+fn absolute(arm: &str) -> String {
+    match Path::new(arm).canonicalize() {
+        Ok(path) => path.display().to_string(),
+        Err(_) => arm.to_owned(),
+    }
+}

@@ -1,0 +1,449 @@
+//! An arm whose controller and plant are processes.
+
+use crate::cli::{PlantKind, UpArgs};
+use crate::operate::OperatorSession;
+use crate::up::{CONTROLLER, ChildProcesses, Plan, Recorder};
+use core::time::Duration;
+use std::collections::VecDeque;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+use supple_cli::console::print_status;
+use supple_cli::exit::Failure;
+use supple_core::Vector;
+use supple_core::codes::fault_kind;
+use supple_core::controller::{Mode, Request};
+use supple_experiment::Step;
+use supple_experiment::procedure::{Motion, MotionArm, Performed, Stopped, moves_joints};
+use supple_ipc::message::{Drives, OperatorReply, Telemetry};
+use supple_ipc::{Domain, TelemetryReader};
+use supple_model::Description;
+use supple_plant::PlantOptions;
+use supple_realtime::Stop;
+
+/// Folder of the model that the controller is started with, within that of the results.
+const MODEL: &str = "controller";
+/// Timeout for a process to join, for a reply and for telemetry.
+const TIMEOUT: Duration = Duration::from_secs(20);
+/// Timeout for an operator to activate a real arm.
+const ACTIVATION_TIMEOUT: Duration = Duration::from_secs(300);
+/// Time after which the shutdown kills a process.
+const SHUTDOWN_TIMEOUT: Duration = Duration::from_secs(5);
+/// Longest wait for one telemetry.
+const POLL_INTERVAL: Duration = Duration::from_millis(20);
+/// Maximum number of messages that may be waiting for this reader.
+const MAX_WAITING: u32 = 20_000;
+/// Gravity hold before the drives are activated \[s\].
+const HOLD_S: f64 = 0.2;
+/// Time in which a stopped arm comes to rest \[s\].
+const REST_S: f64 = 1.5;
+
+/// A system of processes with its arm.
+pub struct RunningArm<const N: usize> {
+    plan: Plan,
+    children: ChildProcesses,
+    reader: TelemetryReader,
+    session: OperatorSession<N>,
+    prefix: String,
+    plant: PlantKind,
+    /// Whether this program starts the processes; otherwise they run already.
+    starts: bool,
+    launched: bool,
+    virtual_time: bool,
+    options: PlantOptions,
+    folder: PathBuf,
+    logs: PathBuf,
+    model: Description,
+    stop: Stop,
+    recorder: Option<Recorder<N>>,
+    last: Option<Telemetry>,
+}
+
+impl<const N: usize> RunningArm<N> {
+    /// Prepares a system; nothing is started yet.
+    ///
+    /// # Errors
+    /// Options that do not fit the plant; shared memory that cannot be used.
+    pub fn new(
+        args: &UpArgs,
+        starts: bool,
+        description: &Description,
+        domain: &Domain,
+        out: &Path,
+        stop: Stop,
+    ) -> Result<Self, Failure> {
+        let out = std::path::absolute(out).map_err(|error| Failure::file("find", out, error))?;
+        Ok(RunningArm {
+            plan: Plan::new(args, description, domain, None)?,
+            children: ChildProcesses::default(),
+            reader: TelemetryReader::for_log(domain).map_err(Failure::system)?,
+            session: OperatorSession::for_system(domain)?,
+            prefix: domain.prefix().to_owned(),
+            plant: args.plant,
+            starts,
+            launched: false,
+            virtual_time: args.virtual_time,
+            options: args.plant_options.options()?,
+            folder: out.join(MODEL),
+            logs: out.join(supple_experiment::procedure::LOGS),
+            model: description.clone(),
+            stop,
+            recorder: None,
+            last: None,
+        })
+    }
+
+    /// Ends the processes in order: the controller sets the drives to idle first.
+    ///
+    /// # Errors
+    /// A process that cannot be waited for; a log that cannot be completed.
+    pub fn end(&mut self) -> Result<(), Failure> {
+        let log = self.finish_log();
+        let reader = &mut self.reader;
+        let mut drain = || -> Result<(), Failure> {
+            while reader.receive().map_err(Failure::system)?.is_some() {}
+            Ok(())
+        };
+        let children = &mut self.children;
+        let controller = children.end(CONTROLLER, SHUTDOWN_TIMEOUT, &mut drain);
+        let clock_owner = children.end(self.plan.clock_owner.name, SHUTDOWN_TIMEOUT, &mut drain);
+        let arm = match &self.plan.arm {
+            Some(arm) => children.end(arm.name, SHUTDOWN_TIMEOUT, &mut || Ok(())),
+            None => Ok(()),
+        };
+        log.and(controller).and(clock_owner).and(arm)
+    }
+
+    fn finish_log(&mut self) -> Result<(), Failure> {
+        self.recorder.take().map_or(Ok(()), Recorder::finish)
+    }
+
+    /// The next telemetry, if it comes soon; it is in the log.
+    fn poll(&mut self) -> Result<Option<Telemetry>, Failure> {
+        if self.stop.shutdown_requested() {
+            return Err(Failure::Interrupted);
+        }
+        let telemetry = self.reader.wait(POLL_INTERVAL).map_err(Failure::system)?;
+        match &telemetry {
+            Some(telemetry) => {
+                if let Some(recorder) = &mut self.recorder {
+                    recorder.add(telemetry)?;
+                }
+                self.last = Some(*telemetry);
+            }
+            None => self.children.check()?,
+        }
+        Ok(telemetry)
+    }
+
+    /// Reads telemetry until `condition` holds.
+    fn wait_for(
+        &mut self,
+        within: Duration,
+        mut condition: impl FnMut(&Telemetry) -> bool,
+    ) -> Result<bool, Failure> {
+        let start = Instant::now();
+        while start.elapsed() < within {
+            if let Some(telemetry) = self.poll()?
+                && condition(&telemetry)
+            {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// Sends a request, for a cycle or at once. Telemetry is read until a controller is connected.
+    fn begin(&mut self, request: &Request<N>, at_cycle: Option<u64>) -> Result<u64, Failure> {
+        let start = Instant::now();
+        loop {
+            if let Some(sequence) = self.session.begin_request(request, at_cycle)? {
+                return Ok(sequence);
+            }
+            self.poll()?;
+            if start.elapsed() > TIMEOUT {
+                return Err(self.not_running());
+            }
+        }
+    }
+
+    /// Waits until a request is carried out, while telemetry is read into `read`: in virtual time the controller waits
+    /// for its readers.
+    fn carried_out(
+        &mut self,
+        sequence: u64,
+        read: &mut VecDeque<Telemetry>,
+    ) -> Result<OperatorReply, Failure> {
+        let mut silent = Instant::now();
+        loop {
+            if let Some(reply) = self.session.reply_to(sequence)? {
+                return Ok(reply);
+            }
+            match self.poll()? {
+                Some(telemetry) => {
+                    read.push_back(telemetry);
+                    silent = Instant::now();
+                }
+                None if silent.elapsed() > TIMEOUT => return Err(self.not_running()),
+                None => {}
+            }
+        }
+    }
+
+    fn request(&mut self, request: &Request<N>) -> Result<(), Failure> {
+        let sequence = self.begin(request, None)?;
+        self.carried_out(sequence, &mut VecDeque::new()).map(|_| ())
+    }
+
+    fn not_running(&self) -> Failure {
+        Failure::NotRunning {
+            prefix: self.prefix.clone(),
+        }
+    }
+
+    /// Starts the processes, or the controller anew.
+    fn launch(&mut self) -> Result<(), Failure> {
+        let mut controller = self.plan.controller.clone();
+        let folder = self.folder.display().to_string();
+        let arm = controller.arguments.iter().position(|text| text == "--arm");
+        if let Some(arm) = arm {
+            controller.arguments[arm + 1] = folder;
+        }
+        if self.launched {
+            let reader = &mut self.reader;
+            let mut drain = || -> Result<(), Failure> {
+                while reader.receive().map_err(Failure::system)?.is_some() {}
+                Ok(())
+            };
+            self.children
+                .end(CONTROLLER, SHUTDOWN_TIMEOUT, &mut drain)?;
+            return self.children.start(&controller);
+        }
+        self.launched = true;
+        if let Some(arm) = &self.plan.arm {
+            self.children.start(arm)?;
+        }
+        if let Some(pendant) = self.plan.pendant.clone() {
+            let children = &mut self.children;
+            pendant.wait(TIMEOUT, &mut || children.check())?;
+            pendant.press("idle")?;
+        }
+        self.children.start(&controller)?;
+        self.children.start(&self.plan.clock_owner)
+    }
+
+    /// Gravity hold with active drives.
+    fn activate(&mut self) -> Result<(), Failure> {
+        self.request(&Request::GravityHold)?;
+        let since = self.last.as_ref().map_or(0, |last| last.state.cycle);
+        let period_s = self.model.settings().period_s;
+        let held = since + (HOLD_S / period_s) as u64;
+        let active = |telemetry: &Telemetry| telemetry.state.drives() == Drives::Active;
+        self.wait_for(TIMEOUT, |telemetry| {
+            telemetry.state.cycle >= held || active(telemetry)
+        })?;
+        let mut within = TIMEOUT;
+        if let Some(pendant) = &self.plan.pendant {
+            let pressed = self.last.as_ref().is_some_and(active);
+            if !pressed {
+                pendant.press("activate")?;
+            }
+        } else if self.plant == PlantKind::Can && !self.last.as_ref().is_some_and(active) {
+            print_status("the controller is in gravity hold: press Shift-Activate on the pendant");
+            within = ACTIVATION_TIMEOUT;
+        }
+        let mut fault = None;
+        let up = self.wait_for(within, |telemetry| {
+            let record = telemetry.record();
+            fault = (record.fault != 0).then(|| record.fault_text.to_string());
+            fault.is_some() || active(telemetry)
+        })?;
+        let settled = self.last.as_ref().map_or(0, |last| last.state.cycle);
+        let settled = settled + (HOLD_S / period_s) as u64;
+        if up && fault.is_none() {
+            self.wait_for(TIMEOUT, |telemetry| {
+                let record = telemetry.record();
+                fault = (record.fault != 0).then(|| record.fault_text.to_string());
+                fault.is_some() || telemetry.state.cycle >= settled
+            })?;
+        }
+        match (up, fault) {
+            (true, None) => Ok(()),
+            (_, Some(fault)) => Err(Failure::RunFault { faults: fault }),
+            (false, None) => Err(Failure::DrivesNotActive),
+        }
+    }
+
+    fn performed(&mut self, steps: &[Step<N>]) -> Result<Performed, Failure> {
+        let period_s = self.model.settings().period_s;
+        let mut performed = Performed::default();
+        let (mut read, mut queued) = (VecDeque::new(), None);
+        for (number, step) in steps.iter().enumerate() {
+            let sequence = match queued.take() {
+                Some(sequence) => sequence,
+                None => self.begin(&step.request, None)?,
+            };
+            let reply = self.carried_out(sequence, &mut read)?;
+            let end = reply.cycle + (step.duration_s / period_s).round() as u64;
+            if let (false, Some(next)) = (step.until_done, steps.get(number + 1)) {
+                queued = Some(self.begin(&next.request, Some(end))?);
+            }
+            let mut collector = Motion::collector::<N>();
+            let mut silent = Instant::now();
+            loop {
+                let next = match read.pop_front() {
+                    Some(telemetry) => Some(telemetry),
+                    None => self.poll()?,
+                };
+                let Some(telemetry) = next else {
+                    if silent.elapsed() > TIMEOUT {
+                        return Err(self.not_running());
+                    }
+                    continue;
+                };
+                silent = Instant::now();
+                if telemetry.state.cycle < reply.cycle {
+                    continue;
+                }
+                if telemetry.state.cycle >= end {
+                    read.push_front(telemetry);
+                    break;
+                }
+                let record = telemetry.record_of::<N>();
+                let mode = record.mode();
+                if record.fault != 0 {
+                    performed.stopped = Some(Stopped {
+                        step: number,
+                        fault: record.fault_text.to_string(),
+                        by_contact: is_contact(record.fault),
+                    });
+                    break;
+                }
+                if mode.is_some_and(moves_joints) {
+                    performed.moved_s += period_s;
+                }
+                if step.until_done && mode != reply.mode() {
+                    break;
+                }
+                if telemetry.state.drives() != Drives::Active {
+                    performed.stopped = Some(Stopped {
+                        step: number,
+                        fault: "the drives are not active".to_owned(),
+                        by_contact: false,
+                    });
+                    break;
+                }
+                if step.recorded {
+                    let error_m = match mode {
+                        Some(Mode::Track) => record.tip_error_m(),
+                        _ => None,
+                    };
+                    collector.add(
+                        telemetry.state.stamp_ns as f64 * 1e-9,
+                        record.position_rad,
+                        record.torque_nm - record.torques.ripple,
+                        error_m,
+                        record.in_contact,
+                    );
+                }
+            }
+            if step.recorded {
+                performed.motions.push(collector.finish());
+            }
+            if performed.stopped.is_some() {
+                break;
+            }
+        }
+        Ok(performed)
+    }
+}
+
+fn is_contact(fault: u8) -> bool {
+    matches!(
+        fault,
+        fault_kind::JOINT_COLLISION | fault_kind::TIP_COLLISION | fault_kind::JOINT_TRACKING_ERROR
+    )
+}
+
+impl<const N: usize> MotionArm<N> for RunningArm<N> {
+    type Error = Failure;
+
+    fn load(&mut self, model: &Description) -> Result<(), Failure> {
+        model.save(&self.folder)?;
+        self.model = model.clone();
+        if self.starts {
+            self.launch()?;
+        } else if self.launched {
+            return Err(Failure::OtherModelNeeded {
+                folder: self.folder.clone(),
+            });
+        }
+        self.launched = true;
+        self.activate()
+    }
+
+    fn position_rad(&mut self) -> Result<Vector<N>, Failure> {
+        // Telemetry may be waiting; the last is the present one.
+        let mut waiting = 0;
+        while waiting < MAX_WAITING
+            && let Some(telemetry) = self.reader.receive().map_err(Failure::system)?
+        {
+            self.last = Some(telemetry);
+            waiting += 1;
+        }
+        if !self.wait_for(TIMEOUT, |_| true)? {
+            return Err(self.not_running());
+        }
+        let last = self
+            .last
+            .as_ref()
+            .map(|last| last.record_of::<N>().position_rad);
+        last.ok_or_else(|| self.not_running())
+    }
+
+    fn perform(&mut self, name: &str, steps: &[Step<N>]) -> Result<Performed, Failure> {
+        let file = self.logs.join(format!("{name}.mcap"));
+        let config = self.model.config::<N>()?;
+        let recorder = Recorder::create(
+            &file,
+            &self.model,
+            &config,
+            self.virtual_time,
+            &self.options,
+        )?;
+        self.recorder = Some(recorder);
+        let performed = self.performed(steps);
+        // The log is whole also after an error.
+        let finished = self.finish_log();
+        let performed = performed?;
+        finished.map(|()| performed)
+    }
+
+    fn recover(&mut self) -> Result<(), Failure> {
+        let from = self.last.as_ref().map_or(0, |last| last.state.cycle);
+        let rested = from + (REST_S / self.model.settings().period_s) as u64;
+        self.wait_for(TIMEOUT, |telemetry| telemetry.state.cycle >= rested)?;
+        match self.request(&Request::Reset) {
+            // There is no fault if the drives alone became idle.
+            Ok(_) | Err(Failure::Refused { .. }) => {}
+            Err(failure) => return Err(failure),
+        }
+        self.activate()
+    }
+
+    fn meanwhile<T: Send>(&mut self, work: impl FnOnce() -> T + Send) -> Result<T, Failure> {
+        std::thread::scope(|scope| {
+            let worker = scope.spawn(work);
+            let mut lost = Ok(());
+            while !worker.is_finished() {
+                if lost.is_ok() {
+                    lost = self.poll().map(|_| ());
+                }
+            }
+            let done = match worker.join() {
+                Ok(done) => done,
+                Err(panic) => std::panic::resume_unwind(panic),
+            };
+            lost.map(|()| done)
+        })
+    }
+}

@@ -1,0 +1,241 @@
+//! Every error code, and every loss: a named fault within two cycles, then held, laid down, disabled.
+
+use super::rig::{MS, Rig};
+use supple_bus::{FaultKind, FaultRule, Traffic};
+use supple_core::controller::Request;
+use supple_damiao::Status;
+use supple_drive::{LossReason, MotorFault, Stage};
+
+/// Time of the misbehaviours after the motors were enabled \[s\], and of the check \[s\].
+const AT: &str = "at-s=0.4";
+
+/// Runs until normal operation ends; returns the reason and the cycles since the fault began.
+fn until_lost(rig: &mut Rig<7>) -> LossReason {
+    for _ in 0..1000 {
+        rig.step();
+        if rig.plant.guard().stage() != Stage::Active {
+            break;
+        }
+    }
+    rig.plant.guard().last_loss().expect("a loss").0
+}
+
+/// Cycles between the beginning of the misbehaviour and the end of normal operation.
+fn delay_cycles(rig: &Rig<7>) -> u64 {
+    let began = rig.arm().events().iter().find_map(|(ns, event)| {
+        matches!(event, supple_emu::damiao::MotorEvent::Misbehaves(_)).then_some(*ns)
+    });
+    let lost_ns = rig.plant.guard().last_loss().unwrap().1;
+    lost_ns.saturating_sub(began.expect("it began")) / rig.period_ns
+}
+
+#[test]
+fn every_error_code_is_a_named_fault_within_two_cycles() {
+    for (code, fault) in [
+        ("8", MotorFault::OverVoltage),
+        ("9", MotorFault::UnderVoltage),
+        ("A", MotorFault::OverCurrent),
+        ("B", MotorFault::HotDriver),
+        ("C", MotorFault::HotWinding),
+        ("D", MotorFault::CommunicationLost),
+        ("E", MotorFault::Overload),
+        ("5", MotorFault::Unknown(5)),
+    ] {
+        // The wrist's last motor: the arm does not depend on it.
+        let spec = format!("error:motor=7,code={code},{AT}");
+        let mut rig = Rig::<7>::new("openarm", &[&spec]);
+        rig.without_motor = Some(6);
+        rig.activate();
+        assert_eq!(until_lost(&mut rig), LossReason::Motor(6, fault), "{code}");
+        assert!(delay_cycles(&rig) <= 2, "{code}: {}", delay_cycles(&rig));
+        rig.run_s(15.0);
+        assert_eq!(
+            rig.stage_names(),
+            [
+                "resting", "active", "holding", "stowing", "lowering", "resting"
+            ],
+            "{code}"
+        );
+        let enabled = rig
+            .arm()
+            .motors()
+            .iter()
+            .any(|motor| motor.status() == Status::Enabled);
+        assert!(!enabled, "{code}");
+        assert!(
+            rig.max_speed_rad_per_s < 0.5,
+            "{code}: {} {:?}",
+            rig.max_speed_rad_per_s,
+            rig.fastest
+        );
+        // Never enabled again without the operator: the error stays.
+        rig.request(Request::Reset);
+        rig.run(10);
+        rig.request(Request::GravityHold);
+        rig.run_s(0.3);
+        let enabled = rig
+            .arm()
+            .motors()
+            .iter()
+            .any(|motor| motor.status() == Status::Enabled);
+        assert!(!enabled, "{code}");
+    }
+}
+
+#[test]
+fn a_silent_motor_one_that_came_back_and_a_hot_one_are_named() {
+    for (spec, expected) in [
+        (format!("silent:motor=7,{AT}"), LossReason::Encoder(6)),
+        (
+            format!("reappears:motor=7,{AT}"),
+            LossReason::Motor(6, MotorFault::Disabled),
+        ),
+        (
+            format!("hot:motor=7,celsius=110,{AT}"),
+            LossReason::Motor(6, MotorFault::HotWinding),
+        ),
+    ] {
+        let mut rig = Rig::<7>::new("openarm", &[&spec]);
+        rig.without_motor = Some(6);
+        rig.activate();
+        assert_eq!(until_lost(&mut rig), expected, "{spec}");
+        assert!(delay_cycles(&rig) <= 2, "{spec}: {}", delay_cycles(&rig));
+        rig.run_s(15.0);
+        let healthy = &rig.arm().motors()[..6];
+        assert!(
+            healthy.iter().all(|m| m.status() == Status::Disabled),
+            "{spec}"
+        );
+        assert!(
+            rig.max_speed_rad_per_s < 0.5,
+            "{spec}: {} {:?}",
+            rig.max_speed_rad_per_s,
+            rig.fastest
+        );
+    }
+}
+
+/// The controller is lost: the plant loop holds the arm itself, lays it down and disables the motors.
+#[test]
+fn a_lost_controller_ends_with_the_arm_at_rest() {
+    let mut rig = Rig::<7>::new("openarm", &[]);
+    rig.activate();
+    let tip_m = rig.tip_m();
+    rig.plant.link_mut().dead = true;
+    rig.run_s(0.4);
+    assert!(tip_m - rig.min_tip_m < 0.03, "{}", tip_m - rig.min_tip_m);
+    rig.run_s(15.0);
+    assert_eq!(rig.plant.guard().last_loss().unwrap().0, LossReason::Answer);
+    assert!(rig.all(Status::Disabled));
+    assert!(rig.max_speed_rad_per_s < 0.5, "{}", rig.max_speed_rad_per_s);
+}
+
+/// The host itself is lost: within 20 ms and one period no motor has torque.
+#[test]
+fn a_lost_host_ends_the_torque_within_the_watchdog() {
+    use supple_bus::Bus;
+    let mut rig = Rig::<7>::new("openarm", &[]);
+    rig.activate();
+    let bus = rig.plant.drive_mut().bus_mut();
+    let until_ns = bus.now_ns() + 22 * MS;
+    while bus.receive_until(until_ns).unwrap().is_some() {}
+    assert!(rig.all(Status::CommunicationLost));
+    assert_eq!(rig.arm().motor_torque_nm().amax(), 0.0);
+}
+
+/// A wedged adapter and bus-off: named, and the motors end their torque by themselves.
+#[test]
+fn a_dead_bus_is_named_and_the_motors_end_their_torque() {
+    for (spec, expected) in [
+        (format!("wedged:{AT}"), LossReason::Transmit),
+        (format!("bus-off:{AT}"), LossReason::BusOff),
+    ] {
+        let mut rig = Rig::<7>::new("openarm", &[&spec]);
+        rig.activate();
+        assert_eq!(until_lost(&mut rig), expected, "{spec}");
+        rig.run_s(0.03);
+        assert!(rig.all(Status::CommunicationLost), "{spec}");
+    }
+}
+
+/// Lost replies here and there are bridged; a state is never used twice.
+#[test]
+fn single_lost_replies_are_bridged() {
+    let mut rig = Rig::<7>::new("openarm", &[]);
+    rig.activate();
+    let rule = FaultRule::always(Traffic::Received, FaultKind::Loss)
+        .only(|id| id.raw() == 0x13)
+        .with_probability(0.02);
+    rig.plant.drive_mut().bus_mut().add(rule);
+    let mut missing = 0;
+    for _ in 0..300 {
+        rig.step();
+        let report = rig.plant.link_mut().report.unwrap();
+        missing += report.position_rad.iter().filter(|q| q.is_none()).count();
+    }
+    assert!(missing > 0);
+    assert_eq!(rig.plant.counters().replies_lost, missing as u64);
+}
+
+/// Every row of the table while the arm moves and while it tracks: the same names in the same time, no joint faster than
+/// it was allowed to be, and disabled motors at the end.
+#[test]
+fn the_fault_table_holds_while_moving_and_tracking() {
+    let motor = |fault| LossReason::Motor(6, fault);
+    let rows = [
+        ("error:motor=7,code=8", motor(MotorFault::OverVoltage)),
+        ("error:motor=7,code=9", motor(MotorFault::UnderVoltage)),
+        ("error:motor=7,code=A", motor(MotorFault::OverCurrent)),
+        ("error:motor=7,code=B", motor(MotorFault::HotDriver)),
+        ("error:motor=7,code=C", motor(MotorFault::HotWinding)),
+        ("error:motor=7,code=D", motor(MotorFault::CommunicationLost)),
+        ("error:motor=7,code=E", motor(MotorFault::Overload)),
+        ("silent:motor=7", LossReason::Encoder(6)),
+        ("reappears:motor=7", motor(MotorFault::Disabled)),
+        ("hot:motor=7,celsius=110", motor(MotorFault::HotWinding)),
+        ("wedged", LossReason::Transmit),
+        ("bus-off", LossReason::BusOff),
+    ];
+    for track in [false, true] {
+        for (kind, expected) in rows {
+            let separator = if kind.contains(':') { ',' } else { ':' };
+            let spec = format!("{kind}{separator}at-s=1");
+            let mut rig = Rig::<7>::new("openarm", &[&spec]);
+            rig.without_motor = Some(6);
+            rig.activate();
+            rig.begin(track);
+            rig.forget();
+            for _ in 0..2000 {
+                if rig.plant.guard().stage() != Stage::Active {
+                    break;
+                }
+                rig.step();
+            }
+            let (reason, _) = rig.plant.guard().last_loss().expect("a loss");
+            assert_eq!(reason, expected, "{spec}, tracking: {track}");
+            let within = if expected == LossReason::Transmit {
+                12
+            } else {
+                2
+            };
+            let delay = delay_cycles(&rig);
+            assert!(delay <= within, "{spec}, tracking: {track}: {delay} cycles");
+            let powered = !matches!(expected, LossReason::Transmit | LossReason::BusOff);
+            rig.run_s(if powered { 12.0 } else { 0.03 });
+            let enabled = rig.arm().motors()[..6]
+                .iter()
+                .any(|motor| motor.status() == Status::Enabled);
+            assert!(!enabled, "{spec}, tracking: {track}");
+            if powered {
+                // The limit of the arm's joints is 2 rad/s.
+                let speed = rig.max_speed_rad_per_s;
+                assert!(
+                    speed < 1.5,
+                    "{spec}, tracking: {track}: {speed} {:?}",
+                    rig.fastest
+                );
+                assert_eq!(rig.plant.guard().stage(), Stage::Resting, "{spec}");
+            }
+        }
+    }
+}

@@ -1,0 +1,139 @@
+//! Normal operation: enabling, holding, laying down, rates.
+
+use super::rig::Rig;
+use supple_core::controller::Request;
+use supple_damiao::Status;
+use supple_drive::{Drives, LossReason, Stage};
+use supple_model::Description;
+
+/// Enabled with gravity torque from the first command on: the tip sags less than 2 mm, no joint moves 0.01 rad.
+#[test]
+fn enabling_in_gravity_hold_moves_nothing() {
+    fn check<const N: usize>(name: &str) {
+        let mut rig = Rig::<N>::new(name, &[]);
+        let (pose, tip_m) = (rig.arm().truth().position_rad, rig.tip_m());
+        rig.activate();
+        rig.run_s(0.5);
+        let moved = (rig.arm().truth().position_rad - pose).amax();
+        assert!(moved < 0.01, "{name}: {moved} rad");
+        let sag_m = tip_m - rig.min_tip_m;
+        assert!(sag_m < 0.002, "{name}: {sag_m} m");
+        assert!(
+            rig.max_speed_rad_per_s < 0.05,
+            "{name}: {}",
+            rig.max_speed_rad_per_s
+        );
+        assert_eq!(rig.plant.counters().tx_lost, 0);
+        assert_eq!(rig.plant.counters().replies_lost, 0);
+    }
+    check::<7>("openarm");
+    check::<6>("yam");
+}
+
+/// The motors stay disabled in every mode but gravity hold, and without a controller that wants torque.
+#[test]
+fn motors_are_enabled_in_gravity_hold_only() {
+    let mut rig = Rig::<7>::new("openarm", &[]);
+    rig.run(100);
+    assert!(rig.all(Status::Disabled));
+    assert_eq!(rig.plant.drives(), Drives::Idle);
+    rig.activate();
+}
+
+/// Idle is asked for: held, laid down, disabled, each with its reason, never faster than 0.5 rad/s.
+#[test]
+fn idle_lays_the_arm_down_before_the_motors_are_disabled() {
+    fn check<const N: usize>(name: &str) {
+        let mut rig = Rig::<N>::new(name, &[]);
+        rig.activate();
+        rig.request(Request::Idle);
+        rig.run_s(20.0);
+        assert_eq!(
+            rig.stage_names(),
+            [
+                "resting", "active", "holding", "stowing", "lowering", "resting"
+            ],
+            "{name}"
+        );
+        for stage in &rig.stages[2..5] {
+            let (Stage::Holding(reason, _)
+            | Stage::Stowing(reason, _)
+            | Stage::Lowering(reason, _)) = stage
+            else {
+                panic!("{stage:?}");
+            };
+            assert_eq!(*reason, LossReason::TorqueNotWanted);
+        }
+        assert!(rig.all(Status::Disabled), "{name}");
+        assert!(
+            rig.max_speed_rad_per_s < 0.5,
+            "{name}: {} {:?}",
+            rig.max_speed_rad_per_s,
+            rig.fastest
+        );
+        let stow = rig.description.stow_rad().unwrap().to_vec();
+        let off = rig.arm().truth().position_rad.iter().zip(&stow);
+        let off = off.map(|(q, stow)| (q - stow).abs()).fold(0.0, f64::max);
+        assert!(off < 0.1, "{name}: {off} rad from the rest pose");
+        // Nothing is latched: the operator may go on.
+        rig.activate();
+    }
+    check::<7>("openarm");
+    check::<6>("yam");
+}
+
+/// A shutdown in the middle ends there too.
+#[test]
+fn a_shutdown_lays_the_arm_down() {
+    let mut rig = Rig::<7>::new("openarm", &[]);
+    rig.activate();
+    rig.plant.begin_shutdown();
+    rig.run_s(15.0);
+    assert!(rig.all(Status::Disabled));
+    assert_eq!(
+        rig.plant.guard().last_loss().unwrap().0,
+        LossReason::Leaving
+    );
+    assert_eq!(rig.plant.guard().stage(), Stage::Resting);
+    assert!(rig.max_speed_rad_per_s < 0.5, "{}", rig.max_speed_rad_per_s);
+}
+
+/// The arm with its motors set to classic frames.
+fn classic_openarm() -> Description {
+    let from = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/assets/openarm"));
+    let folder = tempfile::tempdir().unwrap();
+    let toml = std::fs::read_to_string(from.join("arm.toml")).unwrap();
+    let toml = toml.replace("format = \"fd\"", "format = \"classic\"");
+    std::fs::write(folder.path().join("arm.toml"), toml).unwrap();
+    std::fs::copy(from.join("arm.urdf"), folder.path().join("arm.urdf")).unwrap();
+    let path = folder.path().join("arm.toml");
+    Description::find_at_rate(path.to_str().unwrap(), None).unwrap()
+}
+
+/// The period is a value: gravity hold at each rate, on the bus that carries it.
+#[test]
+fn every_rate_that_the_bus_carries_holds_the_arm() {
+    for (rate_hz, classic) in [
+        (250, true),
+        (400, true),
+        (500, true),
+        (500, false),
+        (1000, false),
+    ] {
+        let description = if classic {
+            classic_openarm()
+        } else {
+            Description::asset("openarm").unwrap()
+        };
+        let description = description.at_rate(f64::from(rate_hz)).unwrap();
+        let mut rig = Rig::<7>::try_new(description, |_| (), None, &[]).unwrap();
+        let pose = rig.arm().truth().position_rad;
+        rig.activate();
+        rig.run_s(1.0);
+        let moved = (rig.arm().truth().position_rad - pose).amax();
+        assert!(moved < 0.01, "{rate_hz} Hz: {moved} rad");
+        assert_eq!(rig.plant.counters().replies_lost, 0, "{rate_hz} Hz");
+        let load = rig.plant.counters().bus_load;
+        assert!(load < 0.95, "{rate_hz} Hz: {load}");
+    }
+}

@@ -1,0 +1,138 @@
+//! `supple calibrate --plant`: from an arm to its model, on processes.
+
+use crate::running::{json, run, stderr_of, supple, temporary_folder};
+use rustix::process::{Pid, Signal, kill_process};
+use serde_json::Value;
+use std::path::Path;
+
+/// Arguments of a short calibration on the emulated arm in lockstep.
+const EMULATED: [&str; 12] = [
+    "calibrate",
+    "--plant",
+    "emu",
+    "--virtual-time",
+    "--realistic",
+    "--start-error",
+    "0.15,0.5",
+    "--candidates",
+    "60",
+    "--warm-up",
+    "0",
+    "--yes",
+];
+
+fn progress(folder: &Path) -> Value {
+    let text = std::fs::read_to_string(folder.join("out/calibrate/calibration.json"));
+    serde_json::from_str(&text.expect("written")).expect("JSON")
+}
+
+/// Names of the finished steps.
+fn steps(progress: &Value) -> Vec<String> {
+    let steps = progress["finished"].as_array().expect("a list");
+    let name = |step: &Value| step["step"].as_str().expect("a name").to_owned();
+    steps.iter().map(name).collect()
+}
+
+/// The emulated arm is interrupted in the middle of a motion: every log is whole. It is resumed: nothing that is finished
+/// is repeated, and the controller is started anew with the model of the first pass, with which the arm moves at full
+/// amplitude.
+#[expect(
+    clippy::disallowed_methods,
+    reason = "the interrupt comes while the processes of a system run"
+)]
+#[test]
+fn an_emulated_arm_is_calibrated_across_an_interrupt() {
+    let folder = temporary_folder();
+    let mut interrupted = supple(folder.path(), &EMULATED).spawn().expect("it starts");
+    // A log gets its name once it is whole; the motion after this one is the first pass.
+    let logs = folder.path().join("out/calibrate/logs");
+    let log = logs.join("breakaway-3-negative.mcap");
+    while !log.exists() {
+        let ended = interrupted.try_wait().expect("a child");
+        assert!(ended.is_none(), "it ended before the first pass: {ended:?}");
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    std::thread::sleep(std::time::Duration::from_millis(500));
+    kill_process(Pid::from_child(&interrupted), Signal::INT).expect("it runs");
+    let output = interrupted.wait_with_output().expect("it ends");
+    assert_eq!(output.status.code(), Some(130), "{}", stderr_of(&output));
+    assert!(
+        stderr_of(&output).contains("--resume"),
+        "{}",
+        stderr_of(&output)
+    );
+    // It has its summary at the end, so that nothing has to be recovered.
+    let info = run(
+        folder.path(),
+        &["log", "info", "out/calibrate/logs/first-pass.mcap"],
+    );
+    assert!(info.status.success(), "{}", stderr_of(&info));
+    let before = steps(&progress(folder.path()));
+    assert_eq!(before, ["wiring", "confirmed", "warm_up", "breakaway"]);
+
+    let on = ["--resume", "--json", "--until", "full_pass"];
+    let resumed = run(folder.path(), &[&EMULATED[..], &on].concat());
+    assert!(resumed.status.success(), "{}", stderr_of(&resumed));
+    let text = stderr_of(&resumed);
+    assert!(!text.contains("breakaway torque"), "{text}");
+    assert!(text.contains("model of the first pass"), "{text}");
+    let found = json(&resumed);
+    let all = steps(&found);
+    assert_eq!(all[..before.len()], before);
+    assert_eq!(
+        all[before.len()..],
+        ["first_pass", "first_fit", "full_pass"]
+    );
+    let fit = &found["first_fit"];
+    let unexplained = |key: &str| {
+        fit[key]
+            .as_f64()
+            .expect("a better model than the wrong one")
+    };
+    assert!(
+        unexplained("unseen_relative") < unexplained("unseen_relative_before"),
+        "{fit}"
+    );
+    for breakaway in found["breakaway"].as_array().expect("a list") {
+        let positive_nm = breakaway["positive_nm"].as_f64().expect("a torque");
+        assert!((0.2..3.0).contains(&positive_nm), "{breakaway}");
+    }
+    let svg = std::fs::read_to_string(folder.path().join("out/calibrate/sweep.svg"));
+    assert!(svg.expect("drawn").contains("from the side"));
+}
+
+/// A motor that turns the other way is named before anything moves far, with the remedy.
+#[test]
+fn a_reversed_motor_is_named() {
+    let folder = temporary_folder();
+    let wrong = ["--inject", "torque-sign:joint=0", "--warm-up", "0"];
+    let arguments = [&EMULATED[..4], &["--candidates", "60", "--yes"], &wrong].concat();
+    let output = run(folder.path(), &arguments);
+    // The controller notices before the ramp has ended.
+    assert_eq!(output.status.code(), Some(5), "{}", stderr_of(&output));
+    let text = stderr_of(&output);
+    for part in [
+        "torque ramp on joint 0 (joint1)",
+        "check the signs",
+        "--resume",
+    ] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+}
+
+/// Without a terminal and without --yes nothing sweeps the space; the drawing is there to be looked at.
+#[test]
+fn the_swept_space_must_be_confirmed() {
+    let folder = temporary_folder();
+    let arguments = ["calibrate", "--plant", "in-process", "--candidates", "60"];
+    let output = run(folder.path(), &arguments);
+    assert_eq!(output.status.code(), Some(4), "{}", stderr_of(&output));
+    for part in ["minutes of motion", "sweep.svg", "--yes"] {
+        assert!(
+            stderr_of(&output).contains(part),
+            "{part}: {}",
+            stderr_of(&output)
+        );
+    }
+    assert_eq!(steps(&progress(folder.path())), ["wiring"]);
+}
