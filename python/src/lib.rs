@@ -8,6 +8,7 @@
 mod arm;
 mod arrays;
 mod base;
+mod complete;
 mod dynamics;
 mod errors;
 mod excite;

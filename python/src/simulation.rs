@@ -2,6 +2,7 @@
 //! system: waiting is what runs it.
 
 use crate::arm::Arm;
+use crate::complete::completed;
 use crate::errors;
 use crate::live::{code, columns};
 use crate::plant_options::PlantEffects;
@@ -149,8 +150,8 @@ impl Simulation {
         options: Options,
     ) -> PyResult<Simulation> {
         options.plant_options.check()?;
-        let plant = arm.description();
-        let model = model.map(Arm::description);
+        let plant = completed(py, arm)?;
+        let model = model.map(|model| completed(py, model)).transpose()?;
         let built = py.detach(|| {
             with_dof!(plant.dof(), N => sized::<N>(plant, model, &options))
                 .map_err(ExperimentError::from)
@@ -314,15 +315,16 @@ fn sized<const N: usize>(
         ..Variant::EXACT
     };
     let mut config = setup.config(&variant)?;
-    config.law.gains = scenario::gains(options.stiffness_n_per_m);
+    config.law.gains = scenario::gains_like(&config.law.gains, options.stiffness_n_per_m);
+    let paths = setup.paths();
     let scene = match options.block {
-        true => scenario::block(),
+        true => scenario::block_at(&paths),
         false => Scene::default(),
     };
     let start_rad = match &options.start_rad {
         Some(start) => Vector::<N>::from_column_slice(start),
         None => {
-            let (sinusoid, _) = scenario::sinusoid(1.0);
+            let (sinusoid, _) = paths.sinusoid(1.0);
             let hold = Trajectory::Hold(sinusoid.at(0.0).position);
             let home = Vector::<N>::from_column_slice(plant.home_rad());
             start_pose(&config, "the start", &hold, 0.0).unwrap_or(home)

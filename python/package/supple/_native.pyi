@@ -11,8 +11,10 @@ _Array = NDArray[np.float64]
 
 __all__ = [
     "Arm",
+    "Connection",
     "Fit",
     "Friction",
+    "Simulation",
     "__version__",
     "assets",
     "base_parameters",
@@ -48,6 +50,7 @@ class Arm:
     @staticmethod
     def _from_text(toml: str, urdf: str) -> Arm: ...
     def _save(self, folder: PathLike[str]) -> None: ...
+    def completed(self) -> Arm: ...
     @property
     def name(self) -> str: ...
     @property

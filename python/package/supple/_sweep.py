@@ -68,9 +68,11 @@ class Sweep(Sequence[R], Generic[P, R]):
 
     def _repr_html_(self) -> str:
         shown = 20
-        rows = list(zip(self.parameters, self.seeds, self.results, strict=True))
-        more = [("..", "", f"{len(rows) - shown} more")] if len(rows) > shown else []
-        return table(repr(self), ("parameter", "seed", "result"), rows[:shown] + more)
+        every = zip(self.parameters, self.seeds, self.results, strict=True)
+        rows: list[tuple[object, ...]] = list(every)[:shown]
+        if len(self) > shown:
+            rows.append(("..", "", f"{len(self) - shown} more"))
+        return table(repr(self), ("parameter", "seed", "result"), rows)
 
 
 def sweep(

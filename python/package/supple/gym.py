@@ -76,11 +76,14 @@ class ReachEnv(gymnasium.Env[Array, Array]):
         force_cost_per_n: float = 0.01,
         options: dict[str, Any] | None = None,
     ) -> None:
-        if (arm is None) == (system is None):
-            raise ValueError("arm, system: expected exactly one of them")
         self._arm = arm
         self._options = options or {}
-        self._system = system if system is not None else simulated(arm, **self._options)
+        if arm is not None and system is None:
+            self._system = simulated(arm, **self._options)
+        elif system is not None and arm is None:
+            self._system = system
+        else:
+            raise ValueError("arm, system: expected exactly one of them")
         self._rate_hz = rate_hz
         self._step_m = speed_m_per_s / rate_hz
         self._reach_m = reach_m

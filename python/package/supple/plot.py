@@ -30,7 +30,7 @@ __all__ = ["joints", "sweep", "torques", "tracking"]
 Array = NDArray[np.float64]
 BLUE, VERMILION, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#B45A96"
 COLOURS = (BLUE, VERMILION, GREEN, PURPLE)
-REFERENCE = {"color": "#B4BBC6", "linewidth": 3.0}
+REFERENCE: dict[str, Any] = {"color": "#B4BBC6", "linewidth": 3.0}
 FEEDBACK = ("stiffness", "damping", "joint_pd")
 MOTION = ("inertial", "jacobian_rate", "coriolis")
 
