@@ -8,10 +8,15 @@ use std::ffi::CString;
 use supple_model::unlimited::{UNLIMITED_NM, UNLIMITED_RAD_PER_S};
 use supple_model::{Completed, Description, ModelError, with_dof};
 
-/// The arm with everything that a controller needs. A `UserWarning` says what was derived, if anything was.
+/// The arm with everything that a controller needs. A `UserWarning` says that settings were
+/// derived, unless only the paths are placed.
 pub fn completed<'a>(py: Python<'_>, arm: &'a Arm) -> PyResult<&'a Description> {
     let completed = of(py, arm)?;
-    let derived = completed.derived.len();
+    // Where the arm does not reach the paper's paths, others are no guess about the arm.
+    let of_arm = completed.derived.iter();
+    let derived = of_arm
+        .filter(|derived| !derived.key.starts_with("[paths]"))
+        .count();
     if derived > 0 {
         let estimates = completed.derived.iter();
         let estimates = estimates

@@ -9,6 +9,8 @@ import supple
 gymnasium = pytest.importorskip("gymnasium")
 
 
+# What it observes has no bounds that hold in every pose and fault.
+@pytest.mark.filterwarnings("ignore:.*Box observation space m.*imum value is -?infinity")
 def test_it_has_the_interface_and_is_reproducible():
     import supple.gym
     from gymnasium.utils.env_checker import check_env
@@ -26,7 +28,7 @@ def test_a_simple_policy_reaches_the_goal():
     done = False
     while not done:
         way_m = info["goal_m"] - env._reference
-        action = way_m / max(np.abs(way_m).max(), env._step_m)
+        action = way_m * 20.0 / 0.1
         observation, reward, terminated, truncated, info = env.step(action)
         assert not terminated and "refused" not in info
         done = truncated

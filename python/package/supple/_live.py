@@ -194,7 +194,7 @@ def simulated(
     Examples
     --------
     >>> import supple
-    >>> system = supple.simulated(supple.Arm.load("wam4"))
+    >>> system = supple.simulated(supple.Arm.load("wam4"), stiffness_n_per_m=200.0)
     >>> system.hold().mode
     'track'
     >>> start = system.state.tip_position_m
@@ -403,11 +403,14 @@ class System:
             cycle, mode = self._native.request(kind, numbers, trajectory, at_cycle)
         except RuntimeError as refusal:
             raise Refused(str(refusal).removeprefix("refused: ")) from None
+        if at_cycle is None:
+            self._see(cycle)
         return Answer(cycle, mode)
 
     def idle(self) -> Answer:
         """Take the torque off. It passes every queue, and works from a watching connection too."""
         cycle, mode = self._native.idle()
+        self._see(cycle)
         return Answer(cycle, mode)
 
     def gravity_hold(self) -> Answer:
@@ -567,6 +570,12 @@ class System:
         """
         return SetPoints(self, rate_hz, lead_s)
 
+    def _see(self, cycle: int) -> None:
+        """Wait briefly for the telemetry of a cycle, which may come after the reply: the state is then after the request."""
+        native = self._native
+        while native.cycle() < cycle and native.wait(native.received(), 0.2):
+            pass
+
     def _joints(self, name: str, given: ArrayLike) -> Array:
         array = np.asarray(given, dtype=np.float64)
         if array.shape != (self.dof,):
@@ -667,6 +676,12 @@ class SetPoints:
             at_cycle += late + lead
         native.set_point(position.tolist(), velocity.tolist(), acceleration.tolist(), at_cycle)
         self._sent += 1
+
+    def wait(self) -> State:
+        """Wait until the next set-point is due to be sent, and return the state then."""
+        period_s = self._system.period_s
+        self._wait_until(self._begin + round(self.time_s / period_s) - round(self._lead_s / period_s))
+        return self._system.state
 
     def finish(self) -> State:
         """Wait until the reference rests, and return the state then."""

@@ -68,8 +68,9 @@ class Sweep(Sequence[R], Generic[P, R]):
 
     def _repr_html_(self) -> str:
         shown = 20
-        every = zip(self.parameters, self.seeds, self.results, strict=True)
-        rows: list[tuple[object, ...]] = list(every)[:shown]
+        rows: list[tuple[object, ...]] = [
+            *zip(self.parameters[:shown], self.seeds[:shown], self.results[:shown], strict=True)
+        ]
         if len(self) > shown:
             rows.append(("..", "", f"{len(self) - shown} more"))
         return table(repr(self), ("parameter", "seed", "result"), rows)

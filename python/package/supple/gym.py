@@ -33,14 +33,15 @@ Array = NDArray[np.float64]
 class ReachEnv(gymnasium.Env[Array, Array]):
     """Bring the tip to a goal near its start, softly.
 
-    *Action*, (3,): velocity of the tip's reference as a share of ``speed_m_per_s`` along the base axes, -1 to 1.
+    *Action*, (3,): velocity that the tip's reference shall have at the end of the step, as a share of ``speed_m_per_s`` along
+    the base axes, -1 to 1. It changes by at most ``acceleration_m_per_s2`` times the length of the step.
 
     *Observation*, (3 N + 9,): joint angles (rad), velocities (rad/s) and commanded torques (N m), then the tip, its
     way to the goal (m) and the observed force on it (N), in base axes.
 
     *Reward*: minus the distance to the goal (m), minus ``force_cost_per_n`` times the observed force. The episode ends at a
     fault of the controller (``info["fault"]``), and is truncated after ``duration_s``. An action that the controller refuses
-    leaves the reference where it is (``info["refused"]``).
+    lets the reference come to rest (``info["refused"]``).
 
     Parameters
     ----------
@@ -52,6 +53,8 @@ class ReachEnv(gymnasium.Env[Array, Array]):
         Steps per second of the arm's time (Hz).
     speed_m_per_s : float
         Greatest speed of the reference along an axis (m/s).
+    acceleration_m_per_s2 : float
+        Greatest mean acceleration of the reference over a step along an axis (m/s^2). Its peak is half as much again.
     reach_m : float
         Greatest distance of a goal from the start, along an axis (m).
     duration_s : float
@@ -71,6 +74,7 @@ class ReachEnv(gymnasium.Env[Array, Array]):
         system: System | None = None,
         rate_hz: float = 20.0,
         speed_m_per_s: float = 0.1,
+        acceleration_m_per_s2: float = 2.0,
         reach_m: float = 0.05,
         duration_s: float = 5.0,
         force_cost_per_n: float = 0.01,
@@ -85,13 +89,14 @@ class ReachEnv(gymnasium.Env[Array, Array]):
         else:
             raise ValueError("arm, system: expected exactly one of them")
         self._rate_hz = rate_hz
-        self._step_m = speed_m_per_s / rate_hz
+        self._speed_m_per_s = speed_m_per_s
+        self._change_m_per_s = acceleration_m_per_s2 / rate_hz
         self._reach_m = reach_m
         self._steps = round(duration_s * rate_hz)
         self._force_cost = force_cost_per_n
         self._points: SetPoints | None = None
         self._taken = 0
-        self._reference = self._goal = self._start = np.zeros(3)
+        self._reference = self._velocity = self._goal = np.zeros(3)
         size = 3 * self._system.dof + 9
         self.action_space = spaces.Box(-1.0, 1.0, (3,), np.float64)
         self.observation_space = spaces.Box(-np.inf, np.inf, (size,), np.float64)
@@ -113,12 +118,12 @@ class ReachEnv(gymnasium.Env[Array, Array]):
         state = self._system.state
         reference = state.reference_position_m
         self._reference = state.tip_position_m if reference is None else reference
-        self._start = self._reference
+        self._velocity = np.zeros(3)
         goal = (options or {}).get("goal_m")
         offset = self.np_random.uniform(-self._reach_m, self._reach_m, 3)
-        self._goal = self._start + offset if goal is None else np.asarray(goal, np.float64)
+        self._goal = self._reference + offset if goal is None else np.asarray(goal, np.float64)
         self._taken = 0
-        return self._observation(state), {"goal_m": self._goal}
+        return self._observation(state), {"goal_m": self._goal.copy()}
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Move the reference for one step; returns observation, reward, terminated, truncated and info."""
@@ -127,14 +132,23 @@ class ReachEnv(gymnasium.Env[Array, Array]):
         wanted = np.asarray(action, np.float64)
         if wanted.shape != (3,):
             raise ValueError(f"action: expected shape (3,), for x, y, z of the base axes, got {wanted.shape}")
-        info: dict[str, Any] = {"goal_m": self._goal}
-        target = self._reference + self._step_m * np.clip(wanted, -1.0, 1.0)
+        info: dict[str, Any] = {"goal_m": self._goal.copy()}
+        velocity = self._speed_m_per_s * np.clip(wanted, -1.0, 1.0)
+        change = np.clip(velocity - self._velocity, -self._change_m_per_s, self._change_m_per_s)
+        velocity = self._velocity + change
+        # The way at constant acceleration: so the reference's own way from one velocity to the next has no detour.
+        target = self._reference + 0.5 * (self._velocity + velocity) / self._rate_hz
         try:
-            self._points.send(target)
-            self._reference = target
+            self._points.send(target, velocity)
         except Refused as refusal:
             info["refused"] = str(refusal)
-        state = self._system.wait(1.0 / self._rate_hz)
+            state = self._system.wait(1.0 / self._rate_hz)
+            reference = state.reference_position_m
+            self._reference = state.tip_position_m if reference is None else reference
+            self._velocity = state.columns["reference_velocity_m_per_s"]
+        else:
+            state = self._points.wait()
+            self._reference, self._velocity = target, velocity
         self._taken += 1
         force_n = float(np.linalg.norm(state.external_force_n))
         distance_m = float(np.linalg.norm(self._goal - state.tip_position_m))

@@ -244,7 +244,7 @@ pub fn code(kind: &str, trajectory: Option<&str>, values: &[f64]) -> PyResult<Re
         known.map(|(_, number)| *number).ok_or_else(|| {
             let names: Vec<&str> = names.iter().map(|(name, _)| *name).collect();
             PyValueError::new_err(format!(
-                "{what}: expected one of {}, got {name:?}",
+                "{what}: expected one of {}, got '{name}'",
                 names.join(", ")
             ))
         })
