@@ -22,6 +22,8 @@ use supple_plant::Scene;
 
 /// Number of cycles that are kept.
 const HISTORY: usize = 8192;
+/// Number of cycles between two looks for signals.
+const SIGNAL_CHECK: u32 = 1000;
 /// Time in gravity hold before the first request \[s\].
 const SETTLE_S: f64 = 0.2;
 
@@ -204,16 +206,25 @@ impl Simulation {
         0
     }
 
-    /// Runs until more than `received` cycles are done.
+    /// Runs until more than `received` cycles are done. Signals such as Ctrl-C end it.
     fn wait(&self, py: Python<'_>, received: u64, timeout_s: f64) -> PyResult<bool> {
         let _ = timeout_s;
-        py.detach(|| {
-            let mut running = self.lock();
-            while running.received() <= received {
-                running.run(None)?;
+        loop {
+            let is_done = py.detach(|| {
+                let mut running = self.lock();
+                for _ in 0..SIGNAL_CHECK {
+                    if running.received() > received {
+                        return PyResult::Ok(true);
+                    }
+                    running.run(None)?;
+                }
+                Ok(false)
+            })?;
+            if is_done {
+                return Ok(true);
             }
-            Ok(true)
-        })
+            py.check_signals()?;
+        }
     }
 
     /// The cycles after the first `received`, as far as they are kept, as columns.

@@ -16,6 +16,7 @@ import pytest
 import supple
 
 PROGRAMS = Path(os.environ.get("SUPPLE_PROGRAMS", Path(__file__).resolve().parents[2] / "target/debug"))
+RATE_HZ = 250
 AMPLITUDE_M, OMEGA = 0.03, np.pi
 
 
@@ -194,22 +195,38 @@ def running(tmp_path_factory):
     prefix = f"pytest-{os.getpid()}"
     folder = tmp_path_factory.mktemp("up")
     command = [PROGRAMS / "supple", "up", "--plant", "sim", "--prefix", prefix, "--no-realtime", "--no-log"]
-    up = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-    try:
-        with supple.connect(prefix, timeout_s=60.0) as watching:
-            while watching.state.mode != "track":
-                assert up.poll() is None, up.stdout.read()
-                time.sleep(0.1)
-        yield prefix
-    finally:
-        up.send_signal(signal.SIGTERM)
-        up.wait(30)
-        up.stdout.close()
+    # Four times slower than usual: a machine that is busy with other tests then holds up no cycle for too long.
+    command += ["--rate-hz", str(RATE_HZ)]
+    for _ in range(5):
+        up = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        try:
+            state = begun(prefix, up)
+            if state.mode == "track":
+                yield prefix
+                return
+            # The machine held a cycle up. Any other fault is not its doing.
+            assert state.fault is not None and state.fault.startswith("no new arm state"), state
+        finally:
+            up.send_signal(signal.SIGTERM)
+            up.wait(30)
+            up.stdout.close()
+    pytest.fail(f"the machine is too busy for a system at {RATE_HZ} Hz: {state}")
+
+
+def begun(prefix, up):
+    """The state once it tracks or has a fault."""
+    with supple.connect(prefix, watch=True, timeout_s=60.0) as watching:
+        end = time.monotonic() + 60.0
+        while (state := watching.state).mode != "track" and state.fault is None:
+            assert up.poll() is None, up.stdout.read()
+            assert time.monotonic() < end, state
+            time.sleep(0.1)
+    return state
 
 
 def test_a_running_system_is_seen_and_commanded(running):
     with supple.connect(running) as system, supple.connect(running, watch=True) as watching:
-        assert (system.dof, round(1.0 / system.period_s)) == (4, 1000)
+        assert (system.dof, round(1.0 / system.period_s)) == (4, RATE_HZ)
         answer = system.gravity_hold()
         assert answer.mode == "gravity_hold"
         assert watching.wait(0.1).mode == "gravity_hold"

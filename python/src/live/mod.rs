@@ -8,7 +8,7 @@ use pyo3::exceptions::{PyConnectionError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use supple_core::codes::{RequestCode, RequestCodeError, request_kind, trajectory_kind};
 use supple_core::controller::{Request, SetPoint};
 use supple_core::math::Vector3;
@@ -19,6 +19,8 @@ use worker::{RequestError, Worker};
 
 /// Timeout for the answer to an idle request.
 const IDLE_TIMEOUT: Duration = Duration::from_secs(5);
+/// Time between two looks for signals.
+const SIGNAL_CHECK: Duration = Duration::from_millis(100);
 
 /// A connection to the system with a prefix. A thread receives its telemetry from the beginning.
 #[pyclass(frozen, module = "supple._native")]
@@ -87,10 +89,23 @@ impl Connection {
         self.with(|worker| Ok(worker.with_history(|history| history.lost)))
     }
 
-    /// Waits until more than `received` cycles have come; returns whether there are more.
+    /// Waits until more than `received` cycles have come; returns whether there are more. Signals such as Ctrl-C end it.
     fn wait(&self, py: Python<'_>, received: u64, timeout_s: f64) -> PyResult<bool> {
         let timeout = seconds("timeout_s", timeout_s)?;
-        py.detach(|| self.with(|worker| Ok(worker.wait(received, timeout))))
+        let start = Instant::now();
+        loop {
+            let left = timeout.saturating_sub(start.elapsed());
+            let (has_more, has_ended) = py.detach(|| {
+                self.with(|worker| {
+                    let has_more = worker.wait(received, left.min(SIGNAL_CHECK));
+                    Ok((has_more, worker.with_history(|h| h.ended.is_some())))
+                })
+            })?;
+            if has_more || has_ended || left.is_zero() {
+                return Ok(has_more);
+            }
+            py.check_signals()?;
+        }
     }
 
     /// The cycles after the first `received`, as far as they are kept, as columns; `modes` and `faults` are lists.
@@ -213,7 +228,7 @@ fn sender<const N: usize>(request: Request<N>, at_cycle: Option<u64>) -> worker:
 
 /// Joints, and the period: by which the time in the mode grows from one cycle to the next.
 fn first_cycles(worker: &Worker, timeout: Duration) -> Option<(usize, f64)> {
-    let start = std::time::Instant::now();
+    let start = Instant::now();
     let mut received = 0;
     loop {
         let found = worker.with_history(|history| {
