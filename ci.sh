@@ -87,6 +87,8 @@ step_package() {
     local bin=$PWD/$WORK/package/bin
     PYO3_PYTHON=$bin/python cargo clippy --locked -p supple-python -- -D warnings
     "$bin/pip" install --quiet ./python
+    cargo build --locked -p supple -p supple-rt -p supple-sim
+    export SUPPLE_PROGRAMS=$PWD/target/debug
     (
         cd python
         "$bin/python" -m mypy package/supple benchmarks examples

@@ -1,13 +1,15 @@
 //! The class `Arm`.
 
 use crate::arrays::{self, Argument, Array, Batch};
+use crate::complete;
 use crate::dynamics::{Dynamics, Quantity};
 use crate::errors;
 use crate::friction::Friction;
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use supple_model::{Description, ModelError, with_dof};
+use std::sync::OnceLock;
+use supple_model::{Completed, Description, ModelError, with_dof};
 
 /// A serial arm of 3 to 7 revolute joints with a tip frame. Immutable.
 ///
@@ -32,6 +34,7 @@ use supple_model::{Description, ModelError, with_dof};
 pub struct Arm {
     description: Description,
     dynamics: Box<dyn Dynamics>,
+    completed: OnceLock<Completed>,
 }
 
 impl Arm {
@@ -44,12 +47,18 @@ impl Arm {
         Ok(Self {
             dynamics: dynamics?,
             description,
+            completed: OnceLock::new(),
         })
     }
 
     /// The description of the arm.
     pub fn description(&self) -> &Description {
         &self.description
+    }
+
+    /// The arm with everything that a controller needs, once it was asked for.
+    pub fn known_completed(&self) -> &OnceLock<Completed> {
+        &self.completed
     }
 
     fn evaluate<'py>(
@@ -149,10 +158,21 @@ impl Arm {
     ///
     /// Notes
     /// -----
-    /// Friction is read from the URDF's ``<dynamics>``. A joint whose range, effort or velocity the URDF omits
-    /// or sets to zero is practically unlimited: one turn in either direction, 1e5 N m, 100 rad/s. Dynamics and
-    /// identification use no limits, but :func:`design_excitation` and :func:`simulate` do: specify them there.
-    /// All other settings of a controller have defaults; :meth:`Arm.load` reads them from a TOML.
+    /// Friction is read from the URDF's ``<dynamics>``. A joint that does not carry the tip, one that is prismatic or a
+    /// mimic, and the first ones of more than seven are frozen, each kind with a warning; ``fixed_joints_rad`` gives other
+    /// positions. A joint whose range, effort or velocity the URDF omits or sets to zero is practically unlimited: one turn
+    /// in either direction, 1e5 N m, 100 rad/s. That does for dynamics and identification;
+    /// :func:`design_excitation` needs the true limits too.
+    ///
+    /// Dynamics are those of the URDF, with ``armature``. :func:`simulate`, :func:`simulated` and :func:`excite` take the
+    /// rest, such as gains, home pose and estimated rotor inertias, from :meth:`completed`. They need the limits of
+    /// torque and speed of every joint.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import supple
+    /// >>> arm = supple.Arm.from_urdf("robot.urdf", tip="tool0").completed()  # doctest: +SKIP
+    /// >>> supple.simulate(arm, "sinusoid", stiffness_n_per_m=50.0).rms_error_m  # doctest: +SKIP
     #[staticmethod]
     #[pyo3(signature = (path, tip = "tip", *, gravity = None, armature = None, fixed_joints_rad = None,
         point_mass_radius_m = None, strict = false),
@@ -247,6 +267,36 @@ impl Arm {
     #[getter]
     fn joint_names(&self) -> Vec<String> {
         self.description.joint_names().to_vec()
+    }
+
+    /// The arm with every setting that a controller needs.
+    ///
+    /// What its TOML leaves out is derived from the arm: estimates of rotor inertias, gains, damping, rates, thresholds,
+    /// home pose and the place of the paper's trajectories. If the TOML says nothing about single joints, the three that
+    /// move the tip best are active and the others are held. :attr:`toml` gives each derived setting with its reason. What
+    /// the TOML gives stays, so that a built-in arm is returned as it is, except for what it leaves out.
+    ///
+    /// Returns
+    /// -------
+    /// Arm
+    ///     The arm; its :attr:`armature` and hence its mass matrix have the estimates.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     If a joint has no limits of torque and speed, or if there is no pose from which the tip follows even small
+    ///     trajectories.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import supple
+    /// >>> arm = supple.Arm.load("wam4")
+    /// >>> arm.completed() == arm
+    /// True
+    #[pyo3(name = "completed")]
+    fn completed_arm(&self, py: Python<'_>) -> PyResult<Self> {
+        let completed = complete::of(py, self)?;
+        Self::new(completed.description.clone()).map_err(errors::model)
     }
 
     /// Inertial parameters, (10 N,), in the order of :meth:`regressor`.

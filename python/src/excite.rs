@@ -2,6 +2,7 @@
 
 use crate::arm::Arm;
 use crate::arrays;
+use crate::complete::completed;
 use crate::errors;
 use crate::plant_options::PlantEffects;
 use crate::table::Table;
@@ -189,7 +190,7 @@ pub fn excite<'py>(
     options: ExciteOptions,
 ) -> PyResult<Bound<'py, PyDict>> {
     options.plant_options.check()?;
-    let (truth, known) = (arm.description(), model.description());
+    let (truth, known) = (completed(py, arm)?, completed(py, model)?);
     let series = SeriesLists::from(series);
     let log = py.detach(|| {
         with_dof!(truth.dof(), N => followed::<N>(truth, known, &series, &options))

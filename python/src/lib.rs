@@ -8,18 +8,21 @@
 mod arm;
 mod arrays;
 mod base;
+mod complete;
 mod dynamics;
 mod errors;
 mod excite;
 mod fit;
 mod friction;
 mod learn;
+mod live;
 mod load;
 mod log;
 mod options;
 mod plant_options;
 mod samples;
 mod simulate;
+mod simulation;
 mod table;
 
 use pyo3::prelude::*;
@@ -42,6 +45,8 @@ mod _native {
     #[pymodule_export]
     use super::learn::learn;
     #[pymodule_export]
+    use super::live::Connection;
+    #[pymodule_export]
     use super::load::{payload, ripple, torque_scale};
     #[pymodule_export]
     use super::log::read_log;
@@ -49,6 +54,8 @@ mod _native {
     use super::plant_options::plant_options;
     #[pymodule_export]
     use super::simulate::simulate;
+    #[pymodule_export]
+    use super::simulation::Simulation;
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -85,7 +85,7 @@ fn sized<const N: usize>(reader: &Reader) -> Result<Columns, LogError> {
 }
 
 /// Every field of a record under its name, the terms of the torque as `torques.<term>`; texts and lists are not numbers.
-fn step<const N: usize>(table: &mut Table, t: f64, record: &CycleRecord<N>) {
+pub fn step<const N: usize>(table: &mut Table, t: f64, record: &CycleRecord<N>) {
     table.number("t", t);
     let mut words = vec![0; CycleRecord::<N>::words(N)];
     record.pack(&mut words);

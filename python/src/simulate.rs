@@ -1,6 +1,7 @@
 //! An experiment of `supple-experiment`, returned as columns.
 
 use crate::arm::Arm;
+use crate::complete::completed;
 use crate::errors;
 use crate::plant_options::PlantEffects;
 use crate::table::Table;
@@ -57,8 +58,8 @@ pub fn simulate<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     options.plant_options.check()?;
     let arms = Arms {
-        plant: arm.description(),
-        model: model.map(Arm::description),
+        plant: completed(py, arm)?,
+        model: model.map(|model| completed(py, model)).transpose()?,
     };
     let outcome = py.detach(|| {
         with_dof!(arms.plant.dof(), N => sized::<N>(&arms, &options))

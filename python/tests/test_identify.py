@@ -288,9 +288,9 @@ def put(index, value):
         ("t", lambda t: np.where(np.arange(600) > 300, t + 2.0, t), r"t: a gap of 2.\d* s after"),
         ("t", lambda t: t[:-1], r"q: expected shape \(599, 4\), a row for each of t, got \(600, 4\)"),
         ("q", lambda q: q[:, :3], r"q: expected shape \(600, 4\), .*got \(600, 3\)"),
-        ("q", lambda q: np.degrees(q), r"q\[\d\]: reaches .*degrees; give radians"),
+        ("q", lambda q: np.degrees(q), r"q: .*in degrees; give radians: multiply q by pi / 180"),
         ("q", put((slice(None), 3), 0.4), r"q\[3\]: moves by .*not excited; leave it out"),
-        ("qd", lambda qd: np.degrees(qd), r"qd\[0\]: is 57\.\d* times the slope .*give rad/s"),
+        ("qd", lambda qd: np.degrees(qd), r"qd: is 57\.\d* times the slope .*give rad/s: multiply qd"),
         ("tau", put((slice(None), 0), 2.0), r"tau\[0\]: is 2 throughout; check"),
     ],
 )

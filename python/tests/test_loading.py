@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 
 import numpy as np
 import pytest
@@ -114,10 +115,22 @@ def test_dynamics_need_no_joint_limits(tmp_path, limit):
         supple.Arm.from_urdf(path)
 
 
-@pytest.mark.parametrize("dof", [2, 8])
-def test_unsupported_numbers_of_joints_are_rejected(tmp_path, dof):
-    with pytest.raises(ValueError, match=f"an arm of {dof} moving joints is not supported"):
-        supple.Arm.from_urdf(write_random_urdf(tmp_path, dof, 0))
+def test_two_joints_are_too_few(tmp_path):
+    with pytest.raises(ValueError, match="an arm of 2 moving joints is not supported"):
+        supple.Arm.from_urdf(write_random_urdf(tmp_path, 2, 0))
+
+
+def test_of_more_than_seven_joints_the_first_are_frozen(tmp_path):
+    path = write_random_urdf(tmp_path, 8, 0)
+    with pytest.warns(UserWarning, match="`joint1`: it is one more than the seven.*frozen") as caught:
+        arm = supple.Arm.from_urdf(path)
+    assert len(caught) == 1
+    assert arm.joint_names == [f"joint{i}" for i in range(2, 9)]
+    given = supple.Arm.from_urdf(path, fixed_joints_rad={"joint1": 0.0})
+    q = np.random.default_rng(0).normal(size=(5, 7))
+    np.testing.assert_array_equal(given.gravity(q), arm.gravity(q))
+    with pytest.raises(ValueError, match="it is frozen"):
+        supple.Arm.from_urdf(path, strict=True)
 
 
 def test_a_fixed_joint_merges_its_links(tmp_path):
@@ -130,3 +143,67 @@ def test_a_fixed_joint_merges_its_links(tmp_path):
     np.testing.assert_allclose(frozen.tip_pose(q), whole.tip_pose(full), atol=1e-12)
     expected = np.delete(whole.gravity(full), 2, axis=1)
     np.testing.assert_allclose(frozen.gravity(q), expected, atol=1e-12)
+
+
+def planar_urdf(limit):
+    """Four links of half a kilogram each about a vertical and three horizontal axes."""
+    parts = ['<robot name="four"><link name="base"/>']
+    parent = "base"
+    for i, axis in enumerate(("0 0 1", "0 1 0", "0 1 0", "1 0 0"), start=1):
+        parts.append(
+            f'<link name="link{i}"><inertial><origin xyz="0 0 0.12"/><mass value="0.5"/>'
+            '<inertia ixx="0.003" ixy="0" ixz="0" iyy="0.003" iyz="0" izz="0.0006"/></inertial></link>'
+            f'<joint name="joint{i}" type="revolute"><parent link="{parent}"/><child link="link{i}"/>'
+            f'<origin xyz="0 0 0.25"/><axis xyz="{axis}"/>{limit}'
+            '<dynamics damping="0.05" friction="0.1"/></joint>'
+        )
+        parent = f"link{i}"
+    parts.append(
+        f'<link name="tip"/><joint name="tip_joint" type="fixed"><parent link="{parent}"/>'
+        '<child link="tip"/><origin xyz="0 0 0.25"/></joint></robot>'
+    )
+    return "".join(parts)
+
+
+LIMIT = '<limit lower="-2.5" upper="2.5" effort="30" velocity="4"/>'
+
+
+def test_an_arm_from_a_urdf_can_be_simulated(tmp_path):
+    path = tmp_path / "four.urdf"
+    path.write_text(planar_urdf(LIMIT))
+    arm = supple.Arm.from_urdf(path)
+    np.testing.assert_array_equal(arm.armature, 0.0)
+    with pytest.warns(UserWarning, match=r"four: \d+ settings .* derived.*rotor inertias of 4 joints are estimates"):
+        by_itself = supple.simulate(arm, "sinusoid", duration_s=1.0, stiffness_n_per_m=200.0)
+    whole = arm.completed()
+    assert (whole.armature > 0.0).all() and "an estimate" in whole.toml
+    assert whole.completed() == whole
+    assert pickle.loads(pickle.dumps(arm)).completed() == whole
+    run = supple.simulate(whole, "sinusoid", duration_s=1.0, stiffness_n_per_m=200.0)
+    np.testing.assert_array_equal(run.tau, by_itself.tau)
+    assert run.ended is None and run.max_error_m < 5e-3
+    # The torque limit is that of the URDF, and it is enough.
+    assert 0.1 < np.abs(run.tau).max() < 30.0
+    system = supple.simulated(whole, stiffness_n_per_m=200.0)
+    system.hold()
+    start = system.state.reference_position_m
+    system.line(start + [0.0, 0.01, 0.01], 1.0)
+    state = system.wait(0.5)
+    assert (state.mode, state.fault) == ("track", None)
+    np.testing.assert_allclose(state.tip_position_m, start + [0.0, 0.01, 0.01], atol=5e-3)
+
+
+def test_a_simulation_needs_limits_of_torque_and_speed(tmp_path):
+    path = tmp_path / "four.urdf"
+    for limit in ("", LIMIT.replace('velocity="4"', ""), LIMIT.replace('effort="30"', 'effort="0"')):
+        path.write_text(planar_urdf(LIMIT).replace(LIMIT, limit, 1))
+        arm = supple.Arm.from_urdf(path)
+        for call in (arm.completed, lambda arm=arm: supple.simulate(arm), lambda arm=arm: supple.simulated(arm)):
+            with pytest.raises(ValueError, match="four: joint `joint1`: .*no limit of torque or of speed.*<limit"):
+                call()
+
+
+@pytest.mark.parametrize("name", supple.assets())
+def test_built_in_arms_can_be_simulated(name):
+    run = supple.simulate(supple.Arm.load(name), "sinusoid", duration_s=0.2)
+    assert run.ended is None

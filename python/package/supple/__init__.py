@@ -15,6 +15,7 @@ from supple._excite import Excitation, Recording, design_excitation, excite
 from supple._fit import Fit, Payload, Validation
 from supple._identify import DataWarning, FrictionColumns, identify
 from supple._learn import Learned, learn
+from supple._live import Answer, Refused, SetPoints, State, States, System, connect, simulated
 from supple._log import Log, Truth, read_log
 from supple._native import Arm, Friction, __version__, assets
 from supple._plant import plant_options
@@ -22,6 +23,7 @@ from supple._simulate import Run, simulate
 from supple._sweep import Sweep, sweep
 
 __all__ = [
+    "Answer",
     "Arm",
     "BaseParameters",
     "DataWarning",
@@ -33,13 +35,19 @@ __all__ = [
     "Log",
     "Payload",
     "Recording",
+    "Refused",
     "Run",
+    "SetPoints",
+    "State",
+    "States",
     "Sweep",
+    "System",
     "Truth",
     "Validation",
     "__version__",
     "assets",
     "base_parameters",
+    "connect",
     "design_excitation",
     "excite",
     "identify",
@@ -47,5 +55,6 @@ __all__ = [
     "plant_options",
     "read_log",
     "simulate",
+    "simulated",
     "sweep",
 ]

@@ -41,6 +41,10 @@ class Payload:
         """A solid ball."""
         return Payload(mass_kg, com_m, 0.4 * mass_kg * radius_m**2 * np.eye(3))
 
+    def __repr__(self) -> str:
+        com = ", ".join(f"{x:.4f}" for x in np.asarray(self.com_m, float))
+        return f"<Payload of {self.mass_kg:.3f} kg at ({com}) m>"
+
     def _dict(self) -> dict[str, Any]:
         com, inertia = np.asarray(self.com_m, float), np.asarray(self.inertia_kg_m2, float)
         for name, array, shape in (("com_m", com, (3,)), ("inertia_kg_m2", inertia, (3, 3))):

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple import _native
+from supple._frames import Tabular
 
 Array = NDArray[np.float64]
 
@@ -18,7 +19,7 @@ __all__ = ["Log", "Truth", "read_log"]
 
 
 @dataclass(frozen=True, eq=False)
-class Truth:
+class Truth(Tabular):
     """Ground truth of a simulated plant, one row at the start of each cycle."""
 
     t: Array
@@ -40,7 +41,7 @@ class Truth:
 
 
 @dataclass(frozen=True, eq=False)
-class Log:
+class Log(Tabular):
     """A log of a controlled arm, one row for each step of the controller."""
 
     arm: _native.Arm

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple import _native
+from supple._frames import Tabular
 from supple._plant import PlantOptions, _chosen
 
 Array = NDArray[np.float64]
@@ -22,7 +23,7 @@ __all__ = ["Run", "simulate"]
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class Run(Tabular):
     """Result of :func:`simulate`: one row for each cycle, from the start of the trajectory."""
 
     experiment: str

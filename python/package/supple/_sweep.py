@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass
-from typing import Generic, TypeVar, overload
+from typing import TYPE_CHECKING, Generic, TypeVar, overload
 
 import numpy as np
+
+from supple._frames import table
+from supple._progress import bar
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 P = TypeVar("P")
 R = TypeVar("R")
@@ -42,6 +48,33 @@ class Sweep(Sequence[R], Generic[P, R]):
     def __iter__(self) -> Iterator[R]:
         return iter(self.results)
 
+    def __repr__(self) -> str:
+        return f"<Sweep of {len(self)} results>"
+
+    def to_pandas(self) -> pd.DataFrame:
+        """One row per task: ``parameter``, ``seed``, ``result``. Needs pandas.
+
+        Parameters and results that are mappings become columns of their own.
+        """
+        import pandas as pd
+
+        rows = []
+        for parameter, seed, result in zip(self.parameters, self.seeds, self.results, strict=True):
+            row: dict[str, object] = dict(parameter) if isinstance(parameter, Mapping) else {"parameter": parameter}
+            row["seed"] = seed
+            row |= dict(result) if isinstance(result, Mapping) else {"result": result}
+            rows.append(row)
+        return pd.DataFrame(rows)
+
+    def _repr_html_(self) -> str:
+        shown = 20
+        rows: list[tuple[object, ...]] = [
+            *zip(self.parameters[:shown], self.seeds[:shown], self.results[:shown], strict=True)
+        ]
+        if len(self) > shown:
+            rows.append(("..", "", f"{len(self) - shown} more"))
+        return table(repr(self), ("parameter", "seed", "result"), rows)
+
 
 def sweep(
     function: Callable[[P, int], R],
@@ -49,7 +82,7 @@ def sweep(
     *,
     seed: int,
     executor: Executor | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Callable[[int, int], None] | bool | None = None,
 ) -> Sweep[P, R]:
     """Call ``function(parameter, seed)`` for every parameter, with a seed spawned for each.
 
@@ -68,8 +101,8 @@ def sweep(
     executor : concurrent.futures.Executor, optional
         Executor of the tasks, such as ``distributed.Client.get_executor()``. Default: run in this
         thread, in order.
-    progress : callable, optional
-        Called as ``progress(done, total)`` after each task.
+    progress : callable or bool, optional
+        Called as ``progress(done, total)`` after each task; True shows a bar (needs tqdm).
 
     Returns
     -------
@@ -98,6 +131,7 @@ def sweep(
         raise TypeError(f"function: expected a callable, got {type(function).__name__}")
     if seed < 0:
         raise ValueError(f"seed: expected zero or more, got {seed}")
+    report = bar("sweep") if progress is True else progress or None
     given = tuple(parameters)
     seeds = tuple(
         int(child.generate_state(1, np.uint64)[0] >> np.uint64(1))
@@ -107,8 +141,8 @@ def sweep(
     if executor is None:
         for parameter, task_seed in zip(given, seeds, strict=True):
             results.append(function(parameter, task_seed))
-            if progress is not None:
-                progress(len(results), len(given))
+            if report is not None:
+                report(len(results), len(given))
         return Sweep(given, seeds, tuple(results))
     futures: list[Future[R]] = [
         executor.submit(function, parameter, task_seed)
@@ -117,8 +151,8 @@ def sweep(
     try:
         for future in futures:
             results.append(future.result())
-            if progress is not None:
-                progress(len(results), len(given))
+            if report is not None:
+                report(len(results), len(given))
     except BaseException:
         for future in futures:
             future.cancel()

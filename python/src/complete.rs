@@ -1,0 +1,67 @@
+//! The settings of a controller that an arm's files leave out.
+
+use crate::arm::Arm;
+use crate::errors;
+use pyo3::exceptions::{PyUserWarning, PyValueError};
+use pyo3::prelude::*;
+use std::ffi::CString;
+use supple_model::unlimited::{UNLIMITED_NM, UNLIMITED_RAD_PER_S};
+use supple_model::{Completed, Description, ModelError, with_dof};
+
+/// The arm with everything that a controller needs. A `UserWarning` says that settings were
+/// derived, unless only the paths are placed.
+pub fn completed<'a>(py: Python<'_>, arm: &'a Arm) -> PyResult<&'a Description> {
+    let completed = of(py, arm)?;
+    // Where the arm does not reach the paper's paths, others are no guess about the arm.
+    let of_arm = completed.derived.iter();
+    let derived = of_arm
+        .filter(|derived| !derived.key.starts_with("[paths]"))
+        .count();
+    if derived > 0 {
+        let estimates = completed.derived.iter();
+        let estimates = estimates
+            .filter(|derived| derived.key.ends_with("armature_kg_m2"))
+            .count();
+        let mut text = format!(
+            "{}: {derived} settings of the controller are derived from the arm",
+            arm.description().name()
+        );
+        if estimates > 0 {
+            text += &format!("; the rotor inertias of {estimates} joints are estimates");
+        }
+        text += ": arm.completed() is the arm with them, its toml gives the reasons";
+        let text = CString::new(text.replace('\0', " "))?;
+        PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 1)?;
+    }
+    Ok(&completed.description)
+}
+
+/// The arm with everything that a controller needs, and what was derived.
+pub fn of<'a>(py: Python<'_>, arm: &'a Arm) -> PyResult<&'a Completed> {
+    if let Some(known) = arm.known_completed().get() {
+        return Ok(known);
+    }
+    let description = arm.description();
+    if let Some(unlimited) = unlimited(description).map_err(errors::model)? {
+        return Err(PyValueError::new_err(format!(
+            "{}: joint `{unlimited}`: its URDF gives no limit of torque or of speed, which a simulation needs: give \
+             <limit effort=\"..\" velocity=\"..\"/> (N m, rad/s) greater than zero",
+            description.name()
+        )));
+    }
+    let completed = py.detach(|| description.completed());
+    let completed = completed.map_err(errors::model)?;
+    Ok(arm.known_completed().get_or_init(|| completed))
+}
+
+/// A joint without limits of torque and speed, see [`supple_model::unlimited`].
+fn unlimited(description: &Description) -> Result<Option<&String>, ModelError> {
+    with_dof!(description.dof(), N => {
+        let limits = description.config::<N>()?.limits;
+        let joint = (0..N).find(|&joint| {
+            limits.joint_torque_nm[joint] == UNLIMITED_NM
+                || limits.joint_speed_rad_per_s[joint] == UNLIMITED_RAD_PER_S
+        });
+        Ok(joint.map(|joint| &description.joint_names()[joint]))
+    })?
+}
