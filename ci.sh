@@ -87,8 +87,11 @@ step_package() {
     local bin=$PWD/$WORK/package/bin
     PYO3_PYTHON=$bin/python cargo clippy --locked -p supple-python -- -D warnings
     "$bin/pip" install --quiet ./python
-    cargo build --locked -p supple -p supple-rt -p supple-sim
-    export SUPPLE_PROGRAMS=$PWD/target/debug
+    # The tests of a system in real time fail on a busy machine: they run when asked for.
+    if [[ ${SUPPLE_LIVE:-} == 1 ]]; then
+        cargo build --locked --workspace --exclude supple-python --bins
+        export SUPPLE_PROGRAMS=$PWD/target/debug
+    fi
     (
         cd python
         "$bin/python" -m mypy package/supple benchmarks examples
@@ -100,7 +103,7 @@ step_package() {
 # site: the site of the documentation, without a warning, and every command in it; installs mkdocs, uses what `package` installed
 step_site() {
     virtual_environment site docs/site/requirements.txt
-    cargo build --locked -p supple -p supple-report -p supple-rt -p supple-sim -p supple-can -p supple-emu
+    cargo build --locked --workspace --exclude supple-python --bins
     local package=()
     if "$WORK/package/bin/python" -c "import supple" 2>/dev/null; then
         package=(--package "$PWD/$WORK/package/bin/python")

@@ -166,8 +166,8 @@ fn limit(instructions: u64) -> LibraryBenchmarkConfig {
 #[bench::law_apart_3(args = (position_apart::<3>("wam3")), config = limit(4_850))]
 #[bench::law_apart_4(args = (position_apart::<4>("wam4")), config = limit(5_550))]
 #[bench::law_apart_7(args = (pose_apart::<7>("wam7")), config = limit(17_500))]
-#[bench::step_3(args = (controller_step::<3>("wam3")), config = limit(7_200))]
-#[bench::step_4(args = (controller_step::<4>("wam4")), config = limit(7_950))]
+#[bench::step_3(args = (controller_step::<3>("wam3")), config = limit(7_350))]
+#[bench::step_4(args = (controller_step::<4>("wam4")), config = limit(8_200))]
 #[bench::step_7(args = (controller_step::<7>("wam7")), config = limit(16_700))]
 // With learned terms of every kind: at most a tenth more than without.
 #[bench::step_3_learned(args = (learned_step::<3>("wam3")), config = limit(8_000))]
