@@ -4,7 +4,7 @@ set -euo pipefail
 cd "$(dirname "$0")"
 
 PLAIN=(fmt clippy test doctest doc)
-FULL=(deny advisories page python package site ur10e instructions fused edits cycles fuzz cortex-m socketcan services)
+FULL=(deny advisories page python package ur10e instructions fused edits cycles fuzz cortex-m socketcan services)
 CARGO_DENY_VERSION=0.20.2
 CARGO_FUZZ_VERSION=0.13.2
 GUNGRAUN_VERSION=0.20.0
