@@ -65,17 +65,17 @@ pub fn check_log<const N: usize>(
     if stopped(&findings) {
         return Ok(findings);
     }
-    let motion = coarse(log, preparation)?;
-    if moving.iter().any(|&joint| !turns_around(&motion, joint)) {
+    let whole = fine(log, preparation)?;
+    if moving.iter().any(|&joint| !turns_around(&whole, joint)) {
         findings.extend(turns(log, &findings));
         return Ok(findings);
     }
+    let motion = coarse(log, preparation)?;
     let context = explained::Context::new(arm, moving, couplings)?;
     findings.extend(remedies::check(&context, &motion)?);
     findings.extend(turns(log, &findings));
     if !stopped(&findings) {
-        let fine = fine(log, preparation)?;
-        findings.extend(excess::check(&context, &fine)?);
+        findings.extend(excess::check(&context, &whole)?);
     }
     Ok(findings)
 }
