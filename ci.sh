@@ -100,7 +100,7 @@ step_package() {
     )
 }
 
-# site: the site of the documentation, without a warning, and every command in it; installs mkdocs, uses what `package` installed
+# site: the site of the documentation, without a warning, and the commands in it that need no arm; in no list; installs mkdocs, uses what `package` installed
 step_site() {
     virtual_environment site docs/site/requirements.txt
     cargo build --locked --workspace --exclude supple-python --bins

@@ -8,11 +8,12 @@ use supple_realtime::{RealtimeOptions, Settings};
 
 /// Operates an arm on its CAN bus: polls it, publishes its state, and sends the controller's torques.
 ///
-/// It never activates the arm: the operator does, at the pendant. It may switch the arm to idle at any time.
+/// It never activates Barrett's pucks: the operator does, at the pendant. Damiao motors have no pendant: it enables them
+/// when a controller in gravity hold requests torque. It may end torque at any time.
 #[derive(Clone, Debug, Parser)]
 #[command(name = "supple-can", version)]
 pub struct Options {
-    /// A WAM with 4 or 7 joints: a built-in arm, or the path of its TOML or of its folder.
+    /// A WAM with 4 or 7 joints, or an arm with `[bus]`: a built-in arm, or the path of its TOML or of its folder.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
     /// Treats URDF elements that are not supported as errors instead of warnings.

@@ -12,9 +12,10 @@ use supple_realtime::{RealtimeOptions, Settings};
 
 /// Emulates an arm on its bus, instead of a real one.
 ///
-/// It starts in the emergency stop, in its home pose, held by a cradle until it is activated. Its pendant is the
+/// A WAM starts in the emergency stop, in its home pose, held by a cradle until it is activated. Its pendant is the
 /// socket `pendant` in the bus's folder. It accepts one line per connection: idle, activate, e-stop, release,
-/// status, record, or a button with a time as in --press; the answer is a line of JSON.
+/// status, record, or a button with a time as in --press; the answer is a line of JSON. An arm with `[bus]` has no
+/// pendant; see --start.
 #[derive(Clone, Debug, Parser)]
 #[command(name = "supple-emu", version)]
 pub struct Options {

@@ -148,9 +148,9 @@ pub struct SystemArgs {
 pub enum PlantKind {
     /// A simulated arm on shared memory.
     Sim,
-    /// A simulated arm on an emulated CAN bus, with motor pucks, safety module and pendant.
+    /// A simulated arm on an emulated CAN bus: with motor pucks, safety module and pendant, or with Damiao motors.
     Emu,
-    /// An arm on a CAN bus; its operator activates it at its pendant.
+    /// An arm on a CAN bus. The operator activates a WAM at its pendant; Damiao motors are enabled without one.
     Can,
 }
 

@@ -298,7 +298,7 @@ class Fit:
     def plot(self, log: int = 0) -> Figure:
         """Plot measured and predicted torque of each moving joint, with the residual, over a fitted log.
 
-        Needs matplotlib: ``pip install supple[viz]``.
+        Needs matplotlib: ``pip install './python[viz]'``.
 
         Parameters
         ----------
@@ -315,7 +315,7 @@ class Fit:
         try:
             from matplotlib.figure import Figure
         except ImportError as error:
-            raise ImportError("plot needs matplotlib: pip install 'supple[viz]'") from error
+            raise ImportError("plot needs matplotlib: pip install './python[viz]'") from error
         motion = self._fit.motions()[log]
         figure = Figure(figsize=(9.0, 2.2 * len(self.moving)), layout="constrained")
         axes = figure.subplots(len(self.moving), 1, sharex=True, squeeze=False)[:, 0]

@@ -1,4 +1,4 @@
-"""A Gymnasium environment over a simulated or a running system (``pip install 'supple[gym]'``).
+"""A Gymnasium environment over a simulated or a running system (``pip install './python[gym]'``).
 
 The action is where the tip's reference shall go; the controller of the system moves it there, with all its checks. So a
 policy cannot command more than a person can, and one that stops leaves the arm holding.

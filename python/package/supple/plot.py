@@ -1,4 +1,4 @@
-"""Figures of results, with matplotlib (``pip install 'supple[viz]'``).
+"""Figures of results, with matplotlib (``pip install './python[viz]'``).
 
 Every function takes what :func:`simulate`, :func:`read_log` or :meth:`System.record` returned, draws on the axes that it is
 given, or on a figure of its own, and returns the figure.

@@ -332,9 +332,9 @@ pub enum CalibrationPlant {
     InProcess,
     /// A simulated arm on shared memory.
     Sim,
-    /// A simulated arm on an emulated CAN bus, with motor pucks, safety module and pendant.
+    /// A simulated arm on an emulated CAN bus: with motor pucks, safety module and pendant, or with Damiao motors.
     Emu,
-    /// An arm on a CAN bus; its operator activates it at its pendant.
+    /// An arm on a CAN bus. The operator activates a WAM at its pendant; Damiao motors are enabled without one.
     Can,
     /// The arm of a system that runs already; another model is loaded by starting that again.
     Running,

@@ -1,9 +1,10 @@
 //! An estimate of the rotor inertia of each joint, reflected to it.
 //!
-//! A geared motor reaches the joint's greatest speed in 5 to 50 ms if only its own rotor is to be accelerated with the
-//! joint's greatest torque: 5 ms for the WAM, about 10 ms for the UR5e, 15 to 50 ms for the Panda's joints. The estimate is
-//! `J = 15 ms * torque / speed`. It is at most the greatest inertia of the arm itself, because limits in a URDF may be
-//! anything, and at least a hundredth of it at the joint.
+//! The estimate is `J = 15 ms * torque / speed`: the joint's greatest torque accelerates the rotor alone to the joint's
+//! greatest speed in 15 ms. The 15 ms are an assumption without a source; the built-in WAM's joints need 2 to 5 ms, and
+//! stronger gears make it longer. The estimate is at most half of the arm's greatest inertia, because limits in a URDF may
+//! be anything, and at least a hundredth of the greatest inertia at the joint. Without a limit of torque (10 kN m or
+//! more) it is a tenth of that inertia.
 
 use super::rounded;
 use super::write::Writer;
