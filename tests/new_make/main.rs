@@ -37,7 +37,6 @@ fn in_service() -> Loop {
         stiffness_nm_per_rad: config.move_gains.stiffness_nm_per_rad * 0.25,
         speed_rad_per_s: 0.4,
         hold_s: 0.1,
-        hold_at_end: false,
     };
     PlantLoop::new(Moteus::new(bus), link, &config, cycle_config, Some(stow)).unwrap()
 }

@@ -56,6 +56,11 @@ pub fn serve<const N: usize, D: Drive<N>>(
         Rest::Falls => STOW_TIMEOUT_NS,
     };
     let until_ns = plant.drive().now_ns() + timeout_ns;
+    if plant.drive().rest() == Rest::Falls {
+        // Motors that are just being enabled are not active yet: this cycle ends that.
+        plant.run()?;
+        stages.report(plant);
+    }
     while plant.drives() == Drives::Active && plant.drive().now_ns() < until_ns {
         plant.run()?;
         stages.report(plant);

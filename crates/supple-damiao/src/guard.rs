@@ -123,13 +123,15 @@ impl MotorGuard {
     /// arrived for the one command of the cycle.
     ///
     /// # Errors
-    /// The first fault, in this and in all later cycles.
+    /// The first fault, in this and in all later cycles. Silence is told as long as it lasts, and what follows it is judged.
     pub fn cycle(&mut self, feedback: Option<&Feedback>, answers: u32) -> Result<(), MotorFault> {
         if let Some(fault) = self.fault {
             return Err(fault);
         }
         let found = self.judge(feedback, answers);
-        self.fault = found.err();
+        self.fault = found
+            .err()
+            .filter(|fault| !matches!(fault, MotorFault::Silent { .. }));
         found
     }
 

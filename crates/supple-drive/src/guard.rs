@@ -161,8 +161,9 @@ impl SafeActionMachine {
                     self.stage = Stage::Resting;
                 }
             }
-            // Motors of an arm that falls may be lost one after another: the others go on.
-            Stage::Holding(..) | Stage::Stowing(..) if input.drives == Drives::Off => {
+            // Motors of an arm that falls may be lost one after another: the others go on. Without an active motor there is
+            // nothing to hold.
+            Stage::Holding(..) | Stage::Stowing(..) if !active => {
                 self.stage = Stage::Resting;
             }
             Stage::Holding(reason, since_ns) => {

@@ -24,14 +24,14 @@ pub enum MotorFault {
     HotDriver,
     /// Its winding is too hot.
     HotWinding,
+    /// It is hotter than the arm allows.
+    Hot,
     /// It received no command in time.
     CommunicationLost,
     /// It is overloaded.
     Overload,
     /// Its position jumped farther than it can turn.
     PositionJump,
-    /// A setting has another value than at the start.
-    RegisterChanged,
     /// Two motors answer with its id.
     TwoMotors,
     /// A code that its protocol does not define.
@@ -47,10 +47,10 @@ impl fmt::Display for MotorFault {
             MotorFault::OverCurrent => "reports over-current",
             MotorFault::HotDriver => "reports that its driver is too hot; let it cool down",
             MotorFault::HotWinding => "reports that its winding is too hot; let it cool down",
+            MotorFault::Hot => "is hotter than the arm allows; let it cool down",
             MotorFault::CommunicationLost => "reports that commands were missing",
             MotorFault::Overload => "reports overload",
             MotorFault::PositionJump => "reports a position that jumped farther than it can turn",
-            MotorFault::RegisterChanged => "has another setting than at the start",
             MotorFault::TwoMotors => "has an id that two motors answer to",
             MotorFault::Unknown(code) => return write!(f, "reports unknown code {code:#x}"),
         })

@@ -188,6 +188,12 @@ impl<const N: usize, D: Drive<N>, L: Link<N>> PlantLoop<N, D, L> {
         };
         let lies = self.has_stowed(now_ns);
         let action = self.guard.cycle(&input, lies);
+        let overspeed = matches!(input.drive_guard_loss, Some(LossReason::Overspeed(_)));
+        if let (Stage::Stowing(..), true, Some(stowing)) =
+            (self.guard.stage(), overspeed, &mut self.stowing)
+        {
+            stowing.drop_spring();
+        }
         self.send_torques(&action, command.as_ref(), now_ns)?;
         self.drive.poll(self.next_period_ns, action.lower)?;
         self.drive.drain(self.next_period_ns)?;
@@ -323,7 +329,8 @@ impl<const N: usize, D: Drive<N>, L: Link<N>> PlantLoop<N, D, L> {
                             stowing.hold_nm()
                         }
                     };
-                    (torque_nm, false)
+                    // What the controller last sent ends as fast as with a fallback torque.
+                    (torque_nm, action.torque == Torque::Hold)
                 }
                 None => (self.fallback_nm, true),
             },

@@ -3,7 +3,7 @@
 //! While the arm is held, its torque is gravity compensation at the measured pose, and the motors damp. While it is
 //! laid down, a reference moves from the pose at which that began to the rest pose, at a low joint speed, and a weak
 //! spring of each joint pulls towards it: `tau = g(q) + k (q_ref - q)`. A joint without an angle keeps its last one
-//! for gravity and has no spring. When the reference has arrived, the torque fades to zero while the motors still damp:
+//! for gravity and has no spring; where a joint exceeds twice its speed limit, no joint has one any more. When the reference has arrived, the torque fades to zero while the motors still damp:
 //! the arm settles on its support, and disabling the motors takes no torque away. Source: own derivation; the
 //! reference is the quintic `10 s^3 - 15 s^4 + 6 s^5`.
 
@@ -23,14 +23,14 @@ pub struct StowConfig<const N: usize> {
     pub speed_rad_per_s: f64,
     /// Time for which the arm is held before it is laid down \[s\].
     pub hold_s: f64,
-    /// Hold the arm without a limit of time when the program ends, until the operator ends it again.
-    pub hold_at_end: bool,
 }
 
 /// Time in which the torque fades after the reference has arrived, and time without torque until the motors are
 /// disabled \[s\].
 const FADE_S: f64 = 1.0;
 const SETTLE_S: f64 = 0.5;
+/// Largest error that the spring sees \[rad\]: a blocked arm is not pushed harder and harder.
+const MAX_ERROR_RAD: f64 = 0.2;
 /// Peak of the speed of the quintic, times duration over distance.
 const QUINTIC_PEAK: f64 = 1.875;
 
@@ -44,6 +44,8 @@ pub struct Stowing<const N: usize> {
     present: [bool; N],
     /// Pose in which laying down began \[rad\], and its duration \[s\].
     begin: Option<(Vector<N>, f64)>,
+    /// The spring may be what drives the arm, as with a wrong angle: it stays off.
+    spring_is_off: bool,
 }
 
 impl<const N: usize> Stowing<N> {
@@ -55,6 +57,7 @@ impl<const N: usize> Stowing<N> {
             pose_rad: Vector::zeros(),
             present: [false; N],
             begin: None,
+            spring_is_off: false,
         }
     }
 
@@ -76,6 +79,12 @@ impl<const N: usize> Stowing<N> {
     /// Ends laying down; the next call of [`Stowing::stow_nm`] begins anew.
     pub fn reset(&mut self) {
         self.begin = None;
+        self.spring_is_off = false;
+    }
+
+    /// Lays the arm down without the spring from now on: gravity compensation and damping alone.
+    pub fn drop_spring(&mut self) {
+        self.spring_is_off = true;
     }
 
     /// Torque that holds the arm \[N m\].
@@ -103,8 +112,10 @@ impl<const N: usize> Stowing<N> {
         let reference_rad = from_rad + (stow_rad - from_rad) * share;
         let torque_nm = Vector::from_fn(|joint, _| {
             let error_rad = reference_rad[joint] - self.pose_rad[joint];
+            let error_rad = error_rad.clamp(-MAX_ERROR_RAD, MAX_ERROR_RAD);
             let spring = self.config.stiffness_nm_per_rad[joint] * error_rad;
-            hold_nm[joint] + if self.present[joint] { spring } else { 0.0 }
+            let pulls = self.present[joint] && !self.spring_is_off;
+            hold_nm[joint] + if pulls { spring } else { 0.0 }
         });
         torque_nm * (1.0 - (elapsed_s - duration_s) / FADE_S).clamp(0.0, 1.0)
     }

@@ -92,7 +92,7 @@ fn a_silent_motor_one_that_came_back_and_a_hot_one_are_named() {
         ),
         (
             format!("hot:motor=7,celsius=110,{AT}"),
-            LossReason::Motor(6, MotorFault::HotWinding),
+            LossReason::Motor(6, MotorFault::Hot),
         ),
     ] {
         let mut rig = Rig::<7>::new("openarm", &[&spec]);
@@ -112,6 +112,24 @@ fn a_silent_motor_one_that_came_back_and_a_hot_one_are_named() {
             rig.max_speed_rad_per_s,
             rig.fastest
         );
+    }
+}
+
+/// The controller is lost in motion: the plant loop ends that, lays the arm down and disables the motors.
+#[test]
+fn a_controller_lost_in_motion_ends_with_the_arm_at_rest() {
+    for track in [false, true] {
+        let mut rig = Rig::<7>::new("openarm", &[]);
+        rig.activate();
+        rig.begin(track);
+        rig.forget();
+        rig.plant.link_mut().dead = true;
+        rig.run_s(16.0);
+        assert_eq!(rig.plant.guard().last_loss().unwrap().0, LossReason::Answer);
+        assert!(rig.all(Status::Disabled), "tracking: {track}");
+        // The limit of the arm's joints is 2 rad/s.
+        let speed = rig.max_speed_rad_per_s;
+        assert!(speed < 1.5, "tracking: {track}: {speed} {:?}", rig.fastest);
     }
 }
 
@@ -192,14 +210,16 @@ fn the_fault_table_holds_while_moving_and_tracking() {
         ("error:motor=7,code=E", motor(MotorFault::Overload)),
         ("silent:motor=7", LossReason::Encoder(6)),
         ("reappears:motor=7", motor(MotorFault::Disabled)),
-        ("hot:motor=7,celsius=110", motor(MotorFault::HotWinding)),
+        ("hot:motor=7,celsius=110", motor(MotorFault::Hot)),
         ("wedged", LossReason::Transmit),
         ("bus-off", LossReason::BusOff),
     ];
     for track in [false, true] {
         for (kind, expected) in rows {
             let separator = if kind.contains(':') { ',' } else { ':' };
-            let spec = format!("{kind}{separator}at-s=1");
+            // In the middle of each motion.
+            let at_s = if track { 3 } else { 1 };
+            let spec = format!("{kind}{separator}at-s={at_s}");
             let mut rig = Rig::<7>::new("openarm", &[&spec]);
             rig.without_motor = Some(6);
             rig.activate();

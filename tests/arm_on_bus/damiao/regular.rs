@@ -1,6 +1,7 @@
 //! Normal operation: enabling, holding, laying down, rates.
 
 use super::rig::Rig;
+use supple_bus::{FaultKind, FaultRule, Traffic};
 use supple_core::controller::Request;
 use supple_damiao::Status;
 use supple_drive::{Drives, LossReason, Stage};
@@ -38,6 +39,39 @@ fn motors_are_enabled_in_gravity_hold_only() {
     assert!(rig.all(Status::Disabled));
     assert_eq!(rig.plant.drives(), Drives::Idle);
     rig.activate();
+}
+
+/// A controller that withdraws its torque while the motors are being enabled gets them disabled, not an arm that is laid
+/// down. One motor's replies are lost, so that enabling lasts.
+#[test]
+fn torque_withdrawn_while_the_motors_are_enabled_disables_them() {
+    let cycles_until_enabled = |rig: &mut Rig<7>| {
+        rig.run(5);
+        rig.request(Request::GravityHold);
+        let mut cycles = 0;
+        while rig.all(Status::Disabled) {
+            rig.step();
+            cycles += 1;
+        }
+        cycles
+    };
+    let cycles = cycles_until_enabled(&mut Rig::<7>::new("openarm", &[]));
+    let mut rig = Rig::<7>::new("openarm", &[]);
+    rig.run(5);
+    rig.request(Request::GravityHold);
+    rig.run(cycles - 1);
+    let rule = FaultRule::always(Traffic::Received, FaultKind::Loss).only(|id| id.raw() == 0x17);
+    rig.plant.drive_mut().bus_mut().add(rule);
+    rig.step();
+    assert!(rig.all(Status::Enabled));
+    assert_eq!(rig.plant.drives(), Drives::Idle);
+    rig.request(Request::Idle);
+    rig.run(4);
+    assert!(rig.all(Status::Disabled));
+    rig.run_s(1.0);
+    assert!(rig.all(Status::Disabled));
+    let stages = rig.stage_names();
+    assert!(!stages.contains(&"stowing"), "{stages:?}");
 }
 
 /// Idle is asked for: held, laid down, disabled, each with its reason, never faster than 0.5 rad/s.

@@ -165,14 +165,18 @@ impl<const N: usize> Rig<N> {
                 duration_s: 3.0,
             });
         }
-        self.run_s(0.5);
+        // The sinusoid begins slowly.
+        self.run_s(if track { 1.5 } else { 0.5 });
         let mode = self.plant.link_mut().output.unwrap().mode;
         assert_eq!(mode, if track { Mode::Track } else { Mode::Move });
+        let speed = self.arm().truth().velocity_rad_per_s.amax();
+        assert!(speed > 0.02, "nothing moves: {speed} rad/s");
     }
 
     pub fn forget(&mut self) {
         self.max_speed_rad_per_s = 0.0;
         self.min_tip_m = f64::INFINITY;
+        self.fastest = None;
     }
 
     pub fn all(&self, status: Status) -> bool {

@@ -48,7 +48,7 @@ impl SetPoint {
 impl<const N: usize> State<N> {
     /// Continues the reference to a set-point, or returns why not. The tip must already be held by the impedance law:
     /// by a track request of a hold, or by earlier set-points. So set-points that are still under way do not restart a
-    /// motion that somebody else has ended.
+    /// motion that somebody else has ended by another mode; a hold is continued.
     #[inline(never)]
     pub(super) fn receive_set_point(
         &mut self,

@@ -73,6 +73,23 @@ fn a_silent_motor_is_a_fault_in_the_second_cycle() {
     guard.cycle(None, 0).unwrap();
 }
 
+/// A gap of replies hides no later fault.
+#[test]
+fn an_error_after_a_silence_is_named() {
+    let mut guard = guard();
+    for _ in 0..10 {
+        let _ = guard.cycle(None, 0);
+    }
+    let over = Feedback {
+        status: Status::OverVoltage,
+        ..feedback()
+    };
+    assert_eq!(
+        guard.cycle(Some(&over), 1),
+        Err(MotorFault::Error(Status::OverVoltage))
+    );
+}
+
 #[test]
 fn a_fault_stays() {
     let mut guard = guard();

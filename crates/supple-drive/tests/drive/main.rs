@@ -2,3 +2,4 @@
 
 mod guard;
 mod shared_memory;
+mod stow;

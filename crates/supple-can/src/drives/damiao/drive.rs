@@ -63,6 +63,11 @@ impl<const N: usize, B: Bus> Damiao<N, B> {
         }
     }
 
+    /// Keeps the motors disabled until the controller has wanted no torque, as after a loss.
+    pub fn latch(&mut self) {
+        self.latched = true;
+    }
+
     /// The bus.
     pub fn bus(&self) -> &B {
         self.port.bus()
@@ -134,7 +139,7 @@ impl<const N: usize, B: Bus> Damiao<N, B> {
             }
             Power::Starting(_) => {}
             Power::Enabled => self.motors.iter_mut().for_each(Running::judge),
-            // A silent motor is left to its watchdog.
+            // A motor that does not confirm is told again in every cycle, and its watchdog ends its torque.
             Power::Disabling if !self.any_enabled() => self.power = Power::Disabled,
             Power::Disabling => {}
         }
@@ -187,10 +192,13 @@ impl<const N: usize, B: Bus> Drive<N> for Damiao<N, B> {
                 (*cycles % ENABLE_AGAIN_CYCLES == 1).then_some(Special::Enable)
             }
         };
+        let disabled = self.power == Power::Disabled;
         for (joint, motor) in self.motors.iter_mut().enumerate() {
             let enabled = motor.status() == Some(Status::Enabled);
             let frame = match special {
                 Some(Special::Enable) if enabled => None,
+                // It has not confirmed that it is disabled: no command may feed its watchdog.
+                None if disabled && enabled => Some(Special::Disable),
                 special => special,
             };
             let frame = match frame {
@@ -255,11 +263,18 @@ impl<const N: usize, B: Bus> Drive<N> for Damiao<N, B> {
     }
 
     fn operate(&mut self, command: Option<&Command<N>>, allowed: bool) -> bool {
+        let holds =
+            |command: &Command<N>| command.mode == Some(Mode::GravityHold) && command.wants_torque;
+        if matches!(self.power, Power::Starting(_)) && !(allowed && command.is_none_or(holds)) {
+            // Nobody wants the torque of motors that are just being enabled.
+            self.power = Power::Disabling;
+            return false;
+        }
         let Some(command) = command else {
             return false;
         };
         self.latched &= command.wants_torque;
-        let holding = command.mode == Some(Mode::GravityHold) && command.wants_torque;
+        let holding = holds(command);
         let idle = self.power == Power::Disabled && self.all(Status::Disabled);
         if !(allowed && holding && idle && !self.latched && self.missing_replies() == 0) {
             return false;

@@ -82,8 +82,14 @@ impl Running {
         self.sent.as_ref()
     }
 
-    /// Angle of the joint in this cycle \[rad\].
+    /// Angle of the joint in this cycle \[rad\]; none where it is known to be wrong.
     pub(super) fn joint_rad(&self) -> Option<f64> {
+        if matches!(
+            self.fault,
+            Some(MotorFault::PositionJump | MotorFault::TwoMotors)
+        ) {
+            return None;
+        }
         let feedback = self.feedback?;
         let motor_rad = feedback.position_rad(&self.motor.ranges);
         Some(self.motor.angle.joint_rad(motor_rad))
@@ -118,7 +124,9 @@ impl Running {
         format: FrameFormat,
     ) -> CanFrame {
         let motor = &self.motor;
-        let limit_nm = motor.torque_limit_nm * self.guard.torque_share();
+        // The shaper and rounding add one step of the code at most: it stays within the limit.
+        let step_nm = motor.ranges.torque().step() * motor.torque_scale;
+        let limit_nm = (motor.torque_limit_nm * self.guard.torque_share() - step_nm).max(0.0);
         let joint_nm = joint_nm.clamp(-limit_nm, limit_nm);
         let motor_nm = motor.angle.signed(joint_nm) / motor.torque_scale;
         let ranges = &motor.ranges;
@@ -175,9 +183,9 @@ fn named(found: &Found) -> MotorFault {
     match *found {
         Found::Error(status) => of_status(status),
         Found::Disabled | Found::Silent { .. } => MotorFault::Disabled,
-        Found::Hot { .. } => MotorFault::HotWinding,
-        Found::PositionJump { .. } => MotorFault::PositionJump,
-        Found::RegisterChanged { .. } => MotorFault::RegisterChanged,
+        Found::Hot { .. } => MotorFault::Hot,
+        // No register is read in the cycle: a changed range shows as a jump.
+        Found::PositionJump { .. } | Found::RegisterChanged { .. } => MotorFault::PositionJump,
         Found::ForeignFeedback { .. } | Found::TwoAnswers => MotorFault::TwoMotors,
     }
 }

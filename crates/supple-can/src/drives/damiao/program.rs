@@ -42,7 +42,6 @@ pub fn stow_config<const N: usize>(
         stiffness_nm_per_rad: config.move_gains.stiffness_nm_per_rad * STOW_STIFFNESS_SHARE,
         speed_rad_per_s: STOW_SPEED_RAD_PER_S,
         hold_s: HOLD_S,
-        hold_at_end: false,
     })
 }
 
@@ -130,8 +129,12 @@ fn run_joints<const N: usize>(
             }
             link.spin(spin_duration(options.spin_us));
         }
+        let restarted = !first;
         first = false;
         let mut plant = with_drive(bus, link, motors, description, &config, cycle_config)?;
+        if restarted {
+            plant.drive_mut().latch();
+        }
         let ended = serve(&mut plant, options.cycles, stop)?;
         counters = sum_counters(&counters, plant.counters());
         let (drive, used_link) = plant.into_parts();

@@ -1,0 +1,51 @@
+//! Laying down: what its spring may do.
+
+use supple_core::Vector;
+use supple_core::dynamics::gravity;
+use supple_drive::{StowConfig, Stowing};
+use supple_model::Description;
+
+fn stowing(stow_rad: Vector<4>) -> (Stowing<4>, Vector<4>) {
+    let config = Description::asset("wam4").unwrap().config::<4>().unwrap();
+    let pose_rad = Vector::from([0.1, 0.4, 0.0, 1.2]);
+    let mut stowing = Stowing::new(
+        config.arm,
+        StowConfig {
+            stow_rad: Some(stow_rad),
+            damping_nm_s_per_rad: Vector::repeat(1.0),
+            stiffness_nm_per_rad: Vector::repeat(50.0),
+            speed_rad_per_s: 0.4,
+            hold_s: 0.5,
+        },
+    );
+    stowing.observe(&core::array::from_fn(|joint| Some(pose_rad[joint])));
+    (stowing, gravity(&config.arm, &pose_rad))
+}
+
+/// The reference goes on while something blocks the arm: the spring pulls with 0.2 rad at most.
+#[test]
+fn a_blocked_arm_is_not_pushed_harder_and_harder() {
+    let (mut stowing, gravity_nm) = stowing(Vector::zeros());
+    let mut greatest = 0.0_f64;
+    for ms in 0..5000 {
+        let torque_nm = stowing.stow_nm(f64::from(ms) * 1e-3);
+        // Within the time of the reference: afterwards the torque fades.
+        if f64::from(ms) * 1e-3 < 1.875 * 1.2 / 0.4 {
+            greatest = greatest.max((torque_nm - gravity_nm).amax());
+        }
+    }
+    assert!(greatest > 9.9 && greatest < 10.0 + 1e-9, "{greatest} N m");
+}
+
+/// After a joint was too fast nothing but gravity is left, until the arm is held anew.
+#[test]
+fn without_the_spring_only_gravity_is_compensated() {
+    let (mut stowing, gravity_nm) = stowing(Vector::zeros());
+    stowing.stow_nm(0.0);
+    assert!((stowing.stow_nm(2.0) - gravity_nm).amax() > 1.0);
+    stowing.drop_spring();
+    assert!((stowing.stow_nm(2.0) - gravity_nm).amax() < 1e-12);
+    stowing.reset();
+    stowing.stow_nm(0.0);
+    assert!((stowing.stow_nm(2.0) - gravity_nm).amax() > 1.0);
+}
