@@ -12,8 +12,9 @@ packages=$("$venv/bin/python" -c 'import sysconfig; print(sysconfig.get_paths()[
 cases=$(sed -e "s#^PACKAGES#$packages#" -e "s#^REPOSITORY#$repository#" "$here/cases.txt")
 cd "$repository"
 # shellcheck disable=SC2086 # one argument per case, no case has a space
-cargo run --release -q -p supple-experiment --example any_arm -- $cases | tee "$venv/results.txt"
-awk '
+cargo run --release -q -p supple-experiment --example any_arm -- $cases > "$venv/results.txt"
+cat "$venv/results.txt"
+awk -v wanted="$(wc -l < "$here/cases.txt")" '
     / FAILED: / { print "failed: " $0; bad = 1; next }
     {
         for (i = 1; i <= NF; i++) {
@@ -24,5 +25,8 @@ awk '
         allowed = 15 * (weight > 23 ? weight / 23 : 1)
         if (faults > 0 || error > allowed) { print "not allowed (" allowed " mm): " $0; bad = 1 }
     }
-    END { exit bad }
+    END {
+        if (NR != wanted) { print NR " of " wanted " arms"; bad = 1 }
+        exit bad
+    }
 ' "$venv/results.txt"

@@ -65,6 +65,9 @@ fn sized<const N: usize>(
             learning: false,
         };
         let found = run(&plan, &mut |_, _| Ok(()))?;
+        if !found.rms_error_m.is_finite() {
+            return Err("the error is not a number".into());
+        }
         worst_m = worst_m.max(found.rms_error_m);
         faults.extend(
             found

@@ -28,8 +28,7 @@ const IDEAL: u64 = 10_000;
 /// Effects of the set `realistic`, each left out in half of the combinations and otherwise from a third to three times its
 /// size.
 fn options(seed: u64) -> PlantOptions {
-    let text = include_str!("../../../assets/plants/realistic.toml");
-    let realistic: PlantOptions = toml_of(text);
+    let realistic = PlantOptions::realistic();
     let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x0076_6572_6469);
     let mut chosen = PlantOptions {
         seed: Some(seed as u32),
@@ -52,21 +51,6 @@ fn options(seed: u64) -> PlantOptions {
         }
     }
     chosen
-}
-
-/// The numbers of an options file: a name and a value on each line.
-fn toml_of(text: &str) -> PlantOptions {
-    let mut options = PlantOptions::default();
-    for line in text.lines() {
-        let line = line.split('#').next().unwrap_or_default();
-        let Some((name, value)) = line.split_once('=') else {
-            continue;
-        };
-        if let (Some(place), Ok(value)) = (options.value_mut(name.trim()), value.trim().parse()) {
-            *place = Some(value);
-        }
-    }
-    options
 }
 
 fn one(seed: u64, folder: &Path) -> Result<String, Box<dyn std::error::Error>> {

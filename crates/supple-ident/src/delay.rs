@@ -31,7 +31,7 @@ pub struct DelayEstimate {
     pub error_with: f64,
 }
 
-/// Estimates the delay of `log`. `preparation` gives rate and filter; its own delay is the origin of the search.
+/// Estimates the delay of `log`. Rate, filter and delay of `preparation` are replaced; the search is around no delay.
 ///
 /// # Errors
 /// A log that is too short for its filter.

@@ -7,7 +7,10 @@
 use crate::token::Token;
 use std::io::{self, Read, Write};
 use std::net::TcpStream;
+use std::time::{Duration, Instant};
 
+/// Time within which a whole head must arrive.
+const HEAD_TIMEOUT: Duration = Duration::from_secs(5);
 /// Greatest length of a request's head.
 const MAX_HEAD_BYTES: usize = 8192;
 /// Greatest number of its headers.
@@ -36,7 +39,13 @@ impl Head {
     pub fn read(stream: &mut TcpStream) -> io::Result<Option<Head>> {
         let mut bytes = Vec::new();
         let mut part = [0; 2048];
+        let start = Instant::now();
         while bytes.len() < MAX_HEAD_BYTES {
+            let left = HEAD_TIMEOUT.saturating_sub(start.elapsed());
+            if left.is_zero() {
+                return Ok(None);
+            }
+            stream.set_read_timeout(Some(left))?;
             let count = stream.read(&mut part)?;
             if count == 0 {
                 return Ok(None);

@@ -29,13 +29,15 @@ pub fn press(domain: &Domain, line: &str) -> Result<(), String> {
     let exchange = || -> std::io::Result<String> {
         let mut stream = UnixStream::connect(&socket)?;
         stream.set_read_timeout(Some(ANSWER_TIMEOUT))?;
+        stream.set_write_timeout(Some(ANSWER_TIMEOUT))?;
         writeln!(stream, "{line}")?;
         let mut answer = String::new();
         stream.read_to_string(&mut answer)?;
         Ok(answer)
     };
     let answer = exchange().map_err(|error| format!("the pendant does not answer: {error}"))?;
-    let answer: serde_json::Value = serde_json::from_str(&answer).unwrap_or_default();
+    let answer: serde_json::Value = serde_json::from_str(&answer)
+        .map_err(|error| format!("the pendant does not answer: {error}"))?;
     match answer.get("error") {
         Some(error) => Err(format!("the pendant refuses: {error}")),
         None => Ok(()),

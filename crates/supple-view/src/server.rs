@@ -14,8 +14,8 @@ use supple_ipc::Domain;
 
 /// Most connections at a time.
 const MAX_CONNECTIONS: usize = 32;
-/// How long a peer may take to send the head of its request, or to read the answer.
-const HEAD_TIMEOUT: Duration = Duration::from_secs(5);
+/// How long a peer may take to read the answer.
+const WRITE_TIMEOUT: Duration = Duration::from_secs(5);
 /// What a WebSocket's key is digested with (RFC 6455, section 1.3).
 const WEBSOCKET_ID: &[u8] = b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11";
 
@@ -80,8 +80,7 @@ fn handle(
     session: &str,
     id: u64,
 ) -> io::Result<()> {
-    stream.set_read_timeout(Some(HEAD_TIMEOUT))?;
-    stream.set_write_timeout(Some(HEAD_TIMEOUT))?;
+    stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
     let Some(head) = Head::read(&mut stream)? else {
         return respond(
             &mut stream,

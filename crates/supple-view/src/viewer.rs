@@ -132,7 +132,9 @@ fn text_message(
     match message {
         ClientMessage::Subscribe { subscriptions } => {
             for subscription in subscriptions {
-                hub.subscribe(viewer, subscription.id, subscription.channel_id);
+                if (subscription.channel_id as usize) < hub.channels().len() {
+                    hub.subscribe(viewer, subscription.id, subscription.channel_id);
+                }
             }
             Vec::new()
         }

@@ -112,7 +112,8 @@ class States(Tabular):
 def connect(prefix: str | None = None, *, watch: bool = False, timeout_s: float = 5.0) -> System:
     """Connect to a running system, such as one that ``supple up`` has started.
 
-    Any number of programs up to five watch; one at a time commands. The first command takes the right to,
+    Any number of programs up to five watch; one Python program at a time commands; the command line
+    and the live page may intervene at any time. The first command takes the right to,
     until the connection is closed; the error that another program gets names the process that has it. The
     controller checks every request.
 

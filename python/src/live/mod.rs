@@ -328,6 +328,8 @@ fn request_error(error: RequestError) -> PyErr {
     match error {
         RequestError::Refused(reason) => PyRuntimeError::new_err(reason),
         RequestError::Ipc(error) => ipc(error),
-        RequestError::NoAnswer => PyConnectionError::new_err(error.to_string()),
+        RequestError::Ended(_) | RequestError::NoAnswer => {
+            PyConnectionError::new_err(error.to_string())
+        }
     }
 }

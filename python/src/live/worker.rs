@@ -30,6 +30,9 @@ pub enum RequestError {
     /// The controller refuses it, with its reason.
     #[error("{0}")]
     Refused(String),
+    /// The connection has ended, with the reason.
+    #[error("the connection has ended: {0}")]
+    Ended(String),
     /// No controller answers.
     #[error("no controller answers: it has ended, or its queue of requests is full")]
     NoAnswer,
@@ -163,7 +166,7 @@ impl Worker {
         let commands = self.commands.as_ref().ok_or(RequestError::NoAnswer)?;
         commands.send(command).map_err(|_| {
             let ended = self.shared.lock().ended.clone();
-            ended.map_or(RequestError::NoAnswer, RequestError::Refused)
+            ended.map_or(RequestError::NoAnswer, RequestError::Ended)
         })
     }
 }

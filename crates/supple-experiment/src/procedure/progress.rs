@@ -181,8 +181,14 @@ impl Progress {
     /// # Errors
     /// [`ProcedureError::Write`].
     pub fn write(&self, folder: &Path) -> Result<(), ProcedureError> {
-        let text = serde_json::to_string_pretty(self).unwrap_or_default();
-        write_whole(&folder.join(FILE), text.as_bytes())
+        let file = folder.join(FILE);
+        match serde_json::to_string_pretty(self) {
+            Ok(text) => write_whole(&file, text.as_bytes()),
+            Err(error) => Err(ProcedureError::Write {
+                file,
+                error: error.into(),
+            }),
+        }
     }
 }
 

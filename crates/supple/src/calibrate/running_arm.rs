@@ -2,7 +2,7 @@
 
 use crate::cli::{PlantKind, UpArgs};
 use crate::operate::OperatorSession;
-use crate::up::{CONTROLLER, ChildProcesses, Plan, Recorder};
+use crate::up::{CONTROLLER, ChildProcesses, Plan, Recorder, SHUTDOWN_TIMEOUT};
 use core::time::Duration;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -18,7 +18,7 @@ use supple_ipc::message::{Drives, OperatorReply, Telemetry};
 use supple_ipc::{Domain, TelemetryReader};
 use supple_model::Description;
 use supple_plant::PlantOptions;
-use supple_realtime::Stop;
+use supple_realtime::{Stop, pause};
 
 /// Folder of the model that the controller is started with, within that of the results.
 const MODEL: &str = "controller";
@@ -26,8 +26,6 @@ const MODEL: &str = "controller";
 const TIMEOUT: Duration = Duration::from_secs(20);
 /// Timeout for an operator to activate a real arm.
 const ACTIVATION_TIMEOUT: Duration = Duration::from_secs(300);
-/// Time after which the shutdown kills a process.
-const SHUTDOWN_TIMEOUT: Duration = Duration::from_secs(5);
 /// Longest wait for one telemetry.
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
 /// Maximum number of messages that may be waiting for this reader.
@@ -97,15 +95,20 @@ impl<const N: usize> RunningArm<N> {
     /// # Errors
     /// A process that cannot be waited for; a log that cannot be completed.
     pub fn end(&mut self) -> Result<(), Failure> {
+        if !self.starts && self.launched {
+            // Nobody ends these processes: what was requested must not go on. The controller may have gone.
+            let _ = self.session.begin_request(&Request::GravityHold, None);
+        }
         let log = self.finish_log();
         let reader = &mut self.reader;
         let mut drain = || -> Result<(), Failure> {
             while reader.receive().map_err(Failure::system)?.is_some() {}
             Ok(())
         };
+        let within = self.plan.clock_owner_timeout();
         let children = &mut self.children;
         let controller = children.end(CONTROLLER, SHUTDOWN_TIMEOUT, &mut drain);
-        let clock_owner = children.end(self.plan.clock_owner.name, SHUTDOWN_TIMEOUT, &mut drain);
+        let clock_owner = children.end(self.plan.clock_owner.name, within, &mut drain);
         let arm = match &self.plan.arm {
             Some(arm) => children.end(arm.name, SHUTDOWN_TIMEOUT, &mut || Ok(())),
             None => Ok(()),
@@ -173,18 +176,14 @@ impl<const N: usize> RunningArm<N> {
         sequence: u64,
         read: &mut VecDeque<Telemetry>,
     ) -> Result<OperatorReply, Failure> {
-        let mut silent = Instant::now();
+        let start = Instant::now();
         loop {
             if let Some(reply) = self.session.reply_to(sequence)? {
                 return Ok(reply);
             }
-            match self.poll()? {
-                Some(telemetry) => {
-                    read.push_back(telemetry);
-                    silent = Instant::now();
-                }
-                None if silent.elapsed() > TIMEOUT => return Err(self.not_running()),
-                None => {}
+            read.extend(self.poll()?);
+            if start.elapsed() > TIMEOUT {
+                return Err(self.not_running());
             }
         }
     }
@@ -435,8 +434,9 @@ impl<const N: usize> MotionArm<N> for RunningArm<N> {
             let worker = scope.spawn(work);
             let mut lost = Ok(());
             while !worker.is_finished() {
-                if lost.is_ok() {
-                    lost = self.poll().map(|_| ());
+                match lost {
+                    Ok(()) => lost = self.poll().map(|_| ()),
+                    Err(_) => pause(POLL_INTERVAL),
                 }
             }
             let done = match worker.join() {

@@ -17,7 +17,7 @@ mod system;
 mod viewer;
 
 pub use children::{ChildProcesses, Pidfile, stop_running};
-pub use plan::{CONTROLLER, Plan};
+pub use plan::{CONTROLLER, Plan, SHUTDOWN_TIMEOUT};
 pub use recorder::Recorder;
 pub use stages::{GRAVITY_HOLD_S, START_S};
 pub use statistics::{Percentiles, RunStatistics};

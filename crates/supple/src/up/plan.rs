@@ -2,6 +2,7 @@
 
 use crate::cli::{PlantKind, UpArgs, UpTrajectory};
 use crate::operate::pendant::Pendant;
+use core::time::Duration;
 use std::path::PathBuf;
 use supple_bus::Address;
 use supple_cli::exit::Failure;
@@ -38,7 +39,20 @@ pub struct Plan {
     pub lays_down: bool,
 }
 
+/// Time after which the shutdown kills a process.
+pub const SHUTDOWN_TIMEOUT: Duration = Duration::from_secs(5);
+/// The same for a clock owner that lays an arm down first.
+const LAY_DOWN_TIMEOUT: Duration = Duration::from_secs(70);
+
 impl Plan {
+    /// Time after which the shutdown kills the clock owner.
+    pub fn clock_owner_timeout(&self) -> Duration {
+        match self.lays_down {
+            true => LAY_DOWN_TIMEOUT,
+            false => SHUTDOWN_TIMEOUT,
+        }
+    }
+
     /// Plans the processes; in virtual time the clock owner exits after `cycles`.
     ///
     /// # Errors

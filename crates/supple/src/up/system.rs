@@ -1,7 +1,7 @@
 //! A running system: its processes, telemetry and log.
 
 use super::children::ChildProcesses;
-use super::plan::Plan;
+use super::plan::{Plan, SHUTDOWN_TIMEOUT};
 use super::recorder::{Recorder, RunLog};
 use super::stages::{GRAVITY_HOLD_S, START_S, Stages, cycles_of};
 use super::statistics::{RunStatistics, UpSummary};
@@ -21,10 +21,6 @@ use supple_realtime::Stop;
 
 /// Timeout for a process to join the system \[s\].
 const JOIN_TIMEOUT_S: u64 = 20;
-/// Time after which the shutdown kills a process that has not exited.
-const SHUTDOWN_TIMEOUT: Duration = Duration::from_secs(5);
-/// Maximum time for an arm without brakes to be laid down.
-const LAY_DOWN_TIMEOUT: Duration = Duration::from_secs(70);
 /// Cycle in which learning begins in virtual time, after the request for gravity hold.
 const LEARN_CYCLE: u64 = 1;
 /// Maximum duration of one wait for telemetry.
@@ -293,10 +289,7 @@ impl<'a, const N: usize> System<'a, N> {
         };
         let children = &mut self.children;
         let controller = children.end(self.plan.controller.name, SHUTDOWN_TIMEOUT, &mut drain);
-        let within = match self.plan.lays_down {
-            true => LAY_DOWN_TIMEOUT,
-            false => SHUTDOWN_TIMEOUT,
-        };
+        let within = self.plan.clock_owner_timeout();
         let clock_owner = children.end(self.plan.clock_owner.name, within, &mut drain);
         let drained = drain();
         if let Some(pendant) = &self.plan.pendant {
