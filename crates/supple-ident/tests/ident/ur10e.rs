@@ -37,15 +37,14 @@ pub(crate) fn log(folder: &Path, file: &str, rows: std::ops::Range<usize>) -> Lo
 
 pub(crate) fn description(folder: &Path) -> Description {
     let urdf = folder.join("ur10e.urdf");
-    let toml = std::env::temp_dir().join(format!("supple-ur10e-{}.toml", std::process::id()));
+    let own = tempfile::tempdir().expect("a folder");
+    let toml = own.path().join("ur10e.toml");
     let text = format!(
         "name = \"ur10e\"\nurdf = {:?}\ntip_frame = \"tool0\"\n",
         urdf.display().to_string()
     );
     std::fs::write(&toml, text).expect("a TOML");
-    let description = Description::load(&toml);
-    std::fs::remove_file(&toml).expect("remove the TOML");
-    description.unwrap_or_else(|error| panic!("{error}"))
+    Description::load(&toml).unwrap_or_else(|error| panic!("{error}"))
 }
 
 #[test]
