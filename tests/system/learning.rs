@@ -69,7 +69,7 @@ fn same_log_in_every_run_of_virtual_time() {
 
 #[test]
 fn learning_is_switched_shown_saved_and_reset() {
-    let up = Up::start(&["--plant", "sim", "--no-log"]);
+    let up = Up::tracking(&["--plant", "sim", "--no-log"]);
     let status = up.wait_until("tracking", |status| status["mode"] == "track");
     assert_eq!(status["learning"]["on"], false);
     assert_eq!(status["learning"]["frozen"], "off");

@@ -20,7 +20,7 @@ const TIMEOUT: Duration = Duration::from_secs(30);
 
 /// Starts a simulated arm that tracks; returns the system, its domain and a reader of its telemetry.
 fn tracking() -> (Up, Domain, TelemetryReader) {
-    let up = Up::start(&["--plant", "sim", "--no-log"]);
+    let up = Up::tracking(&["--plant", "sim", "--no-log"]);
     let domain = Domain::in_folder(&up.folder.path().join("supple"), PREFIX).expect("a domain");
     let mut reader = TelemetryReader::new(&domain).expect("a reader");
     wait_for_mode(&mut reader, Mode::Track);

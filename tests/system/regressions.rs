@@ -51,12 +51,6 @@ fn max_tip_speed(up: &Up) -> f64 {
     steps.lengths().fold(0.0, f64::max)
 }
 
-fn tracking(arguments: &[&str]) -> Up {
-    let up = Up::start(arguments);
-    up.wait_until("tracking", |status| status["mode"] == "track");
-    up
-}
-
 /// Waits for `cycles` control cycles.
 fn wait(up: &Up, cycles: u64) {
     let now = up.wait_until("a look", |_| true)["cycle"].as_u64();
@@ -76,7 +70,7 @@ fn accepted_or_refused(output: &Output) {
 
 #[test]
 fn a_motion_that_is_too_fast_does_not_make_the_arm_oscillate() {
-    let up = &mut tracking(&["--plant", "sim"]);
+    let up = &mut Up::tracking(&["--plant", "sim"]);
     accepted_or_refused(&up.run(&["track", "sinusoid", "--speed", "1000"]));
     wait(up, 2000);
     up.run(&["stop"]);
@@ -87,7 +81,7 @@ fn a_motion_that_is_too_fast_does_not_make_the_arm_oscillate() {
 
 #[test]
 fn reenabled_drives_do_not_jump() {
-    let up = &mut tracking(&["--plant", "emu"]);
+    let up = &mut Up::tracking(&["--plant", "emu"]);
     let stiff = [
         "gains",
         "--stiffness",

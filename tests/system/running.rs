@@ -9,6 +9,11 @@ use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use tempfile::TempDir;
 
+/// Starts of a system that is to track, of which one must succeed.
+const STARTS: u32 = 4;
+/// Cycles after which the drives of a system that starts have been activated.
+const SETTLED_CYCLES: u64 = 2000;
+
 /// Every test has its own folder for sockets and shared memory, so all systems can use the same prefix.
 pub const PREFIX: &str = "test";
 
@@ -61,6 +66,25 @@ impl Up {
             .spawn();
         let child = Some(child.expect("it starts"));
         Up { folder, child }
+    }
+
+    /// As [`Up::start`], and waits until it tracks. A busy machine may stall a process, after which the drives become idle
+    /// or a fault is latched: then it is started again, a few times.
+    pub fn tracking(arguments: &[&str]) -> Up {
+        let mut last = String::new();
+        for _ in 0..STARTS {
+            let up = Up::start(arguments);
+            let status = up.wait_until("tracking or a stall", |status| {
+                let settled = status["cycle"].as_u64() > Some(SETTLED_CYCLES);
+                let lost = settled && status["drives"] == "idle";
+                status["mode"] == "track" || status["mode"] == "fault" || lost
+            });
+            if status["mode"] == "track" {
+                return up;
+            }
+            last = format!("{status}: {}", stderr_of(&up.end()));
+        }
+        panic!("it did not track: {last}");
     }
 
     pub fn run(&self, arguments: &[&str]) -> Output {

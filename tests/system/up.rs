@@ -98,10 +98,7 @@ fn seven_joints_run_as_processes() {
 
 #[test]
 fn a_running_system_executes_or_refuses_requests() {
-    let mut up = Up::start(&["--plant", "sim", "--json"]);
-    up.wait_until("tracking", |status| {
-        status["mode"] == "track" && status["drives"] == "active"
-    });
+    let mut up = Up::tracking(&["--plant", "sim", "--json"]);
 
     let output = up.run(&[
         "gains",

@@ -10,7 +10,7 @@ use crate::cli::{PlantKind, UpArgs};
 use crate::operate::{Approach, OperatorSession, Pendant};
 use supple_cli::console::print_status;
 use supple_cli::exit::Failure;
-use supple_core::controller::{LearningSwitch, Request};
+use supple_core::controller::{LearningSwitch, Mode, Request};
 use supple_ipc::message::{Drives, Telemetry};
 
 /// Gravity hold before the approach to the start pose \[s\].
@@ -45,6 +45,8 @@ pub struct Stages {
     /// Learning begins with gravity hold.
     learn: bool,
     period_s: f64,
+    /// The drives were active while torque was wanted.
+    was_active: bool,
 }
 
 /// Number of cycles in a time \[s\], rounded.
@@ -61,7 +63,33 @@ impl Stages {
             plant: args.plant,
             learn: args.learn,
             period_s,
+            was_active: false,
         }
+    }
+
+    /// What to tell the operator when the drives have become idle although the controller wants torque, as after a stall of
+    /// this machine: once for each time.
+    fn lost_drives(&mut self, telemetry: &Telemetry) -> Option<&'static str> {
+        let wants_torque = !matches!(
+            telemetry.record().mode(),
+            Some(Mode::Idle | Mode::Fault) | None
+        );
+        let active = telemetry.state.drives() == Drives::Active;
+        let lost = wants_torque && self.was_active && !active;
+        self.was_active = active && wants_torque;
+        lost.then_some(match self.plant {
+            PlantKind::Sim => {
+                "the drives became idle and brake: the controller did not answer in time. To activate them again: \
+                 `supple mode idle`, then `supple mode gravity_hold`"
+            }
+            PlantKind::Emu => {
+                "the drives became idle and brake. To activate them again: `supple mode gravity_hold`, then \
+                 `supple pendant activate`"
+            }
+            PlantKind::Can => {
+                "the drives became idle. To activate them again: `supple mode gravity_hold`, then the arm's pendant"
+            }
+        })
     }
 
     /// Schedules the start-up in advance, as virtual time requires: the emulated arm presses the pendant at fixed
@@ -90,6 +118,9 @@ impl Stages {
     ) -> Result<(), Failure> {
         let cycle = telemetry.state.cycle;
         let active = telemetry.state.drives() == Drives::Active;
+        if let Some(text) = self.lost_drives(telemetry) {
+            print_status(text);
+        }
         match self.stage {
             Stage::Joining => {
                 session.send_request(&Request::GravityHold, None)?;
