@@ -681,6 +681,12 @@ impl Arm {
     fn __repr__(&self) -> String {
         format!("<Arm {:?}, {} joints>", self.name(), self.dof())
     }
+
+    /// A table of the joints, for notebooks.
+    fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let module = slf.py().import("supple._arm_html")?;
+        module.call_method1("arm_table", (slf,))
+    }
 }
 
 fn entry(key: &str, value: impl Into<toml::Value>) -> (String, toml::Value) {

@@ -4,6 +4,7 @@ use crate::arm::Arm;
 use crate::arrays;
 use crate::complete::completed;
 use crate::errors;
+use crate::interrupt::interruptible;
 use crate::plant_options::PlantEffects;
 use crate::table::Table;
 use pyo3::prelude::*;
@@ -190,13 +191,14 @@ pub fn excite<'py>(
     options: ExciteOptions,
 ) -> PyResult<Bound<'py, PyDict>> {
     options.plant_options.check()?;
-    let (truth, known) = (completed(py, arm)?, completed(py, model)?);
+    let (truth, known) = (completed(py, arm)?.clone(), completed(py, model)?.clone());
+    let log_dir = options.log_dir.clone();
     let series = SeriesLists::from(series);
-    let log = py.detach(|| {
-        with_dof!(truth.dof(), N => followed::<N>(truth, known, &series, &options))
+    let log = interruptible(py, move |_| {
+        with_dof!(truth.dof(), N => followed::<N>(&truth, &known, &series, &options))
             .map_err(ExperimentError::from)
             .flatten()
-    });
+    })?;
     let (log, period_s) = log.map_err(errors::experiment)?;
     let (samples, joints) = log.q_rad.shape();
     let dict = PyDict::new(py);
@@ -211,7 +213,7 @@ pub fn excite<'py>(
     dict.set_item("q", rows(&log.q_rad)?)?;
     dict.set_item("tau", rows(&log.tau_nm)?)?;
     dict.set_item("period_s", period_s)?;
-    let path = options.log_dir.map(|folder| folder.join("excitation.mcap"));
+    let path = log_dir.map(|folder| folder.join("excitation.mcap"));
     dict.set_item("log", path)?;
     Ok(dict)
 }

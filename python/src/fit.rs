@@ -4,6 +4,7 @@ use crate::arm::Arm;
 use crate::arrays::{self, Argument, Array, Batch, States};
 use crate::errors;
 use crate::friction::Friction;
+use crate::interrupt::interruptible;
 use crate::options::Options;
 use crate::samples::{LogInput, Samples};
 use pyo3::prelude::*;
@@ -337,9 +338,10 @@ pub fn identify(
     let logs = logs.collect::<PyResult<Vec<_>>>()?;
     let find_stribeck = options.find_stribeck;
     let procedure = options.procedure()?;
-    let found = py.detach(|| -> Result<_, Refused> {
-        with_dof!(of.dof(), N => sized::<N>(&of, &logs, &procedure, find_stribeck))?
-    });
+    let whole = of.clone();
+    let found = interruptible(py, move |_| -> Result<_, Refused> {
+        with_dof!(whole.dof(), N => sized::<N>(&whole, &logs, &procedure, find_stribeck))?
+    })?;
     let (model, motions, warnings) = found.map_err(|refused| match refused {
         Refused::Model(error) => errors::model(error),
         Refused::Identification(error) => errors::identification(error),

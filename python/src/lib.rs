@@ -14,6 +14,7 @@ mod errors;
 mod excite;
 mod fit;
 mod friction;
+mod interrupt;
 mod learn;
 mod live;
 mod load;

@@ -3,11 +3,13 @@
 use crate::arm::Arm;
 use crate::complete::completed;
 use crate::errors;
+use crate::interrupt::interruptible;
 use crate::plant_options::PlantEffects;
 use crate::table::Table;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 use supple_core::Trajectory;
 use supple_experiment::probing::{ContactMeter, Stroke};
 use supple_experiment::{
@@ -57,20 +59,24 @@ pub fn simulate<'py>(
     options: Options,
 ) -> PyResult<Bound<'py, PyDict>> {
     options.plant_options.check()?;
-    let arms = Arms {
-        plant: completed(py, arm)?,
-        model: model.map(|model| completed(py, model)).transpose()?,
-    };
-    let outcome = py.detach(|| {
-        with_dof!(arms.plant.dof(), N => sized::<N>(&arms, &options))
+    let plant = completed(py, arm)?.clone();
+    let model = model
+        .map(|model| completed(py, model))
+        .transpose()?
+        .cloned();
+    let log_dir = options.log_dir.clone();
+    let outcome = interruptible(py, move |cancelled| {
+        let arms = Arms {
+            plant: &plant,
+            model: model.as_ref(),
+        };
+        with_dof!(plant.dof(), N => sized::<N>(&arms, &options, cancelled))
             .map_err(ExperimentError::from)
             .flatten()
-    });
+    })?;
     let outcome = outcome.map_err(errors::experiment)?;
     let dict = PyDict::new(py);
-    let log = options
-        .log_dir
-        .map(|folder| folder.join(format!("{}.mcap", outcome.run.name)));
+    let log = log_dir.map(|folder| folder.join(format!("{}.mcap", outcome.run.name)));
     dict.set_item("log", log)?;
     dict.set_item("rms_error_m", outcome.run.rms_error_m)?;
     dict.set_item("max_error_m", outcome.run.max_error_m)?;
@@ -81,7 +87,11 @@ pub fn simulate<'py>(
     Ok(dict)
 }
 
-fn sized<const N: usize>(arms: &Arms<'_>, options: &Options) -> Result<Outcome, ExperimentError> {
+fn sized<const N: usize>(
+    arms: &Arms<'_>,
+    options: &Options,
+    cancelled: &AtomicBool,
+) -> Result<Outcome, ExperimentError> {
     let plan = plan::<N>(arms, options)?;
     let description = arms.model.unwrap_or(arms.plant);
     let mut recorder = match &options.log_dir {
@@ -100,6 +110,9 @@ fn sized<const N: usize>(arms: &Arms<'_>, options: &Options) -> Result<Outcome, 
     };
     let mut cycles = Table::default();
     let run = run(&plan, &mut |cycle, time_s| {
+        if cancelled.load(Ordering::Relaxed) {
+            return Err(ExperimentError::Interrupted);
+        }
         if let Some(recorder) = &mut recorder {
             recorder.cycle(cycle)?;
         }

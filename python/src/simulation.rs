@@ -12,7 +12,7 @@ use pyo3::types::PyDict;
 use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use supple_core::codes::RequestCode;
-use supple_core::controller::{CycleRecord, Request, SetPoint, check_motion};
+use supple_core::controller::{CycleRecord, NamesJoints, Refusal, Request, SetPoint, check_motion};
 use supple_core::math::Vector3;
 use supple_core::{Controller, Trajectory, Vector};
 use supple_experiment::{ExperimentError, Mismatch, Rig, Setup, Variant, scenario, start_pose};
@@ -65,16 +65,19 @@ impl<const N: usize> Cycles for SizedSystem<N> {
             Some(code) => code.request::<N>().map_err(|error| error.to_string())?,
             None => None,
         };
+        let names = self.rig.controller().config().joint_names;
+        let named = |refusal: &Refusal| refusal.with_names(names.as_slice()).to_string();
         // As the helper of supple-rt does, before the loop sees it.
         let checked = request.as_ref().map_or(Ok(()), |request| {
             check_motion(self.rig.controller(), &self.position_rad, request)
         });
         let (request, unchecked) = match checked {
             Ok(()) => (request, None),
-            Err(refusal) => (None, Some(refusal.to_string())),
+            Err(refusal) => (None, Some(named(&refusal))),
         };
         let cycle = self.rig.cycle(request);
-        let record = CycleRecord::new(self.steps, &cycle.input, &cycle.output);
+        let record = CycleRecord::new(self.steps, &cycle.input, &cycle.output)
+            .with_joint_names(&cycle.output, &names);
         let state = ArmState::new(
             cycle.input.cycle,
             (cycle.input.cycle as f64 * self.period_s * 1e9) as u64,
@@ -88,7 +91,7 @@ impl<const N: usize> Cycles for SizedSystem<N> {
         );
         self.steps += 1;
         self.position_rad = cycle.output.position_rad;
-        let refused = cycle.output.refusal.map(|refusal| refusal.to_string());
+        let refused = cycle.output.refusal.as_ref().map(named);
         Ok(Done {
             telemetry: Telemetry::of(&record, &state, CycleTiming::default()),
             mode: cycle.output.mode.name(),

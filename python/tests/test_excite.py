@@ -83,9 +83,9 @@ def test_the_identified_model_controls_the_arm_it_came_from(arm, excitation):
         ({"criterion": "luck"}, "criterion: expected condition or d-optimality, got 'luck'"),
         ({"workspace": [0.0, 1.0]}, r"workspace: expected shape \(2, 3\), got \(2,\)"),
         ({"candidates": 0}, "candidates: expected 1 or more, got 0"),
-        ({"rate_hz": 0.0}, "rate_hz: expected a positive number, got 0.0"),
+        ({"rate_hz": 0.0}, "rate_hz: expected a number that is finite and positive, got 0.0"),
         ({"moving": [0, 7]}, r"moving: expected joint numbers below 3"),
-        ({"period_s": -1.0}, "period_s is -1, it must be finite and positive"),
+        ({"period_s": -1.0}, "period_s: expected a number that is finite and positive, got -1.0"),
     ],
 )
 def test_invalid_options_are_reported(arm, options, message):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from html import escape
+
 import numpy as np
 import pytest
 import supple
@@ -33,6 +35,30 @@ def test_tables_for_notebooks(run):
     assert "<table>" in html and "mm RMS" in html and f"{len(run.t)} x 3" in html
     payload = supple.Payload.ball(0.5, 0.03, [0.0, 0.0, 0.1])
     assert "0.500 kg" in repr(payload)
+    html = payload._repr_html_()
+    assert "0.500 kg" in html and "<td>z</td><td>0.1000</td>" in html and "0.00018" in html
+
+
+def test_an_arm_is_a_table_of_its_joints():
+    arm = supple.Arm.load("wam4")
+    html = arm._repr_html_()
+    assert html.count("<tr>") == 1 + arm.dof and "wam4, 4 joints" in html
+    for name, friction in zip(arm.joint_names, arm.friction, strict=True):
+        assert f"<td>{name}</td>" in html and f"<td>{friction.coulomb_nm:.4g}</td>" in html
+
+
+def test_a_fit_is_a_table_of_its_joints_and_base_parameters():
+    arm = supple.Arm.load("wam3")
+    motion = supple.design_excitation(arm, candidates=20, seed=0)
+    data = supple.excite(arm, motion, seed=0)
+    fit = supple.identify(arm, data.t, data.q, data.tau, torque_delay_s=data.torque_delay_s)
+    html = fit._repr_html_()
+    assert f"rank {fit.rank}" in html
+    assert html.count("<tr>") == 2 + len(fit.moving) + fit.rank
+    for warning in fit.warnings:
+        assert escape(warning) in html
+    # Names of combinations have signs that mean something in HTML.
+    assert all(escape(name) in html for name in fit.base_names)
 
 
 def square(parameter, seed):

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple import _native
+from supple._check import integer
 
 Array = NDArray[np.float64]
 
@@ -90,7 +91,7 @@ def base_parameters(
     """
     if samples < 20 * arm.dof:
         raise ValueError(f"samples: expected {20 * arm.dof} or more for this arm, got {samples}")
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(integer("seed", seed))
     q = rng.uniform(-np.pi, np.pi, size=(samples, arm.dof))
     qd, qdd = rng.normal(scale=3.0, size=(2, samples, arm.dof))
     joints = list(range(arm.dof)) if moving is None else [int(joint) for joint in moving]

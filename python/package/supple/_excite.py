@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple import _native
+from supple._check import flag, integer, number
 from supple._plant import PlantOptions, _chosen
 
 Array = NDArray[np.float64]
@@ -117,8 +118,11 @@ def design_excitation(
         raise ValueError(f"criterion: expected condition or d-optimality, got {criterion!r}")
     if candidates < 1:
         raise ValueError(f"candidates: expected 1 or more, got {candidates}")
-    if not rate_hz > 0.0:
-        raise ValueError(f"rate_hz: expected a positive number, got {rate_hz}")
+    rate_hz = number("rate_hz", rate_hz, positive=True)
+    period_s = number("period_s", period_s, positive=True)
+    periods = number("periods", periods, positive=True)
+    candidates = integer("candidates", candidates)
+    seed = integer("seed", seed)
     box = None
     if workspace is not None:
         array = np.asarray(workspace, float)
@@ -197,10 +201,9 @@ def excite(
     >>> recording.q.shape == recording.tau.shape
     True
     """
-    if not 0.0 <= encoder_noise_rad < np.inf:
-        raise ValueError(f"encoder_noise_rad: expected zero or more, got {encoder_noise_rad}")
-    if seed < 0:
-        raise ValueError(f"seed: expected zero or more, got {seed}")
+    encoder_noise_rad = number("encoder_noise_rad", encoder_noise_rad)
+    seed = integer("seed", seed)
+    load = flag("load", load)
     if excitation.q.shape[1] != arm.dof:
         raise ValueError(
             f"excitation: expected {arm.dof} joints, as arm, got {excitation.q.shape[1]}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple import _native
+from supple._frames import AXES, table
 from supple._log_input import log_input, log_inputs
 
 if TYPE_CHECKING:
@@ -44,6 +46,15 @@ class Payload:
     def __repr__(self) -> str:
         com = ", ".join(f"{x:.4f}" for x in np.asarray(self.com_m, float))
         return f"<Payload of {self.mass_kg:.3f} kg at ({com}) m>"
+
+    def _repr_html_(self) -> str:
+        com_m, inertia_kg_m2 = np.asarray(self.com_m, float), np.asarray(self.inertia_kg_m2, float)
+        rows = [
+            (axis, f"{com:.4f}", *(f"{moment:.3g}" for moment in moments))
+            for axis, com, moments in zip(AXES, com_m, inertia_kg_m2, strict=True)
+        ]
+        head = ("", "centre [m]", *(f"inertia {axis} [kg m²]" for axis in AXES))
+        return table(f"Payload of {self.mass_kg:.3f} kg", head, rows)
 
     def _dict(self) -> dict[str, Any]:
         com, inertia = np.asarray(self.com_m, float), np.asarray(self.inertia_kg_m2, float)
@@ -337,12 +348,38 @@ class Fit:
         """The nominal arm, which gives kinematics and undetermined parameters."""
         return self._fit.arm_given()
 
+    def _repr_html_(self) -> str:
+        joints = self.arm_given.joint_names
+        residuals = [
+            (joints[joint], f"{noise:.3g}", f"{friction.coulomb_nm:.4g}", f"{friction.viscous_nm_s_per_rad:.4g}")
+            for joint, noise, friction in zip(
+                self.moving, self.noise_nm, (self.friction[joint] for joint in self.moving), strict=True
+            )
+        ]
+        combinations = [
+            (name, f"{value:.4g}", f"{std:.2g}")
+            for name, value, std in zip(self.base_names, self.base_parameters, self.std, strict=True)
+        ]
+        head = ("joint", "residual [N m]", "Coulomb [N m]", "viscous [N m s/rad]")
+        below = table("Base parameters, SI units", ("combination", "value", "standard deviation"), combinations)
+        warnings = "".join(f"<li>{escape(warning)}</li>" for warning in self.warnings)
+        return (
+            table(self._summary(), head, residuals)
+            + f"<details><summary>{self.rank} base parameters</summary>{below}</details>"
+            + (f"<p>Warnings:</p><ul>{warnings}</ul>" if warnings else "")
+        )
+
+    def _summary(self) -> str:
+        return (
+            f"{self.arm_given.name}: rank {self.rank} of {len(self.columns)} columns,"
+            f" condition {self.condition:.0f},"
+            f" {100.0 * self.training_relative:.2f} % of the torque unexplained"
+        )
+
     def __str__(self) -> str:
         joints = self.arm_given.joint_names
         lines = [
-            f"{self.arm_given.name}: rank {self.rank} of {len(self.columns)} columns,"
-            f" condition {self.condition:.0f},"
-            f" {100.0 * self.training_relative:.2f} % of the torque unexplained",
+            self._summary(),
             *(
                 f"  {name:40} {value:12.6g} +- {std:.2g}"
                 for name, value, std in zip(

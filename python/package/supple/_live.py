@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from supple import _native
+from supple._check import flag, integer, number
 from supple._frames import Tabular
 from supple._plant import PlantOptions, _chosen
 
@@ -206,8 +207,11 @@ def simulated(
     >>> bool(abs(state.tip_position_m[2] - start[2] - 0.01) < 2e-3)
     True
     """
-    if seed < 0:
-        raise ValueError(f"seed: expected zero or more, got {seed}")
+    seed = integer("seed", seed)
+    stiffness_n_per_m = number("stiffness_n_per_m", stiffness_n_per_m)
+    gravity_error = number("gravity_error", gravity_error)
+    friction_error = number("friction_error", friction_error)
+    block = flag("block", block)
     start = None
     if start_rad is not None:
         start = np.asarray(start_rad, dtype=np.float64)

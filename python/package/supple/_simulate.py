@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import isfinite
 from pathlib import Path
 from typing import Literal
 
@@ -13,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from supple import _native
+from supple._check import flag, integer, number
 from supple._frames import Tabular
 from supple._plant import PlantOptions, _chosen
 
@@ -146,16 +146,18 @@ def simulate(
     if experiment not in EXPERIMENTS:
         known = ", ".join(EXPERIMENTS)
         raise ValueError(f"experiment: expected one of {known}, got {experiment!r}")
-    _check("stiffness_n_per_m", stiffness_n_per_m, positive=False)
-    _check("speed", speed, positive=True)
+    stiffness_n_per_m = number("stiffness_n_per_m", stiffness_n_per_m)
+    speed = number("speed", speed, positive=True)
     if duration_s is not None:
-        _check("duration_s", duration_s, positive=True)
+        duration_s = number("duration_s", duration_s, positive=True)
+    gravity_error = number("gravity_error", gravity_error)
+    friction_error = number("friction_error", friction_error)
     for name, value in (("gravity_error", gravity_error), ("friction_error", friction_error)):
-        _check(name, value, positive=False)
         if value >= 1.0:
             raise ValueError(f"{name}: expected a fraction below 1, got {value}")
-    if seed < 0:
-        raise ValueError(f"seed: expected zero or more, got {seed}")
+    seed = integer("seed", seed)
+    stribeck, load = flag("stribeck", stribeck), flag("load", load)
+    fade, learning = flag("fade", fade), flag("learning", learning)
     if model is not None and (gravity_error or friction_error):
         raise ValueError("gravity_error, friction_error: expected 0 if model is given")
     if log_dir is not None:
@@ -191,9 +193,3 @@ def simulate(
         in_contact=in_contact,
         **cycles,
     )
-
-
-def _check(name: str, value: float, *, positive: bool) -> None:
-    if not isfinite(value) or value < 0.0 or (positive and value == 0.0):
-        wanted = "finite and positive" if positive else "finite and not negative"
-        raise ValueError(f"{name}: expected a number that is {wanted}, got {value}")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Generic, TypeVar, overload
 
 import numpy as np
 
+from supple._check import integer
 from supple._frames import table
 from supple._progress import bar
 
@@ -116,7 +117,8 @@ def sweep(
     ValueError
         If the seed is negative.
     Exception
-        The first exception of a task; tasks that have not started are cancelled.
+        The first exception of a task, or KeyboardInterrupt; tasks that have not started are cancelled. What is
+        finished is not lost: the exception's attribute ``sweep`` is a :class:`Sweep` of it.
 
     Examples
     --------
@@ -129,8 +131,7 @@ def sweep(
     """
     if not callable(function):
         raise TypeError(f"function: expected a callable, got {type(function).__name__}")
-    if seed < 0:
-        raise ValueError(f"seed: expected zero or more, got {seed}")
+    seed = integer("seed", seed)
     report = bar("sweep") if progress is True else progress or None
     given = tuple(parameters)
     seeds = tuple(
@@ -139,10 +140,14 @@ def sweep(
     )
     results: list[R] = []
     if executor is None:
-        for parameter, task_seed in zip(given, seeds, strict=True):
-            results.append(function(parameter, task_seed))
-            if report is not None:
-                report(len(results), len(given))
+        try:
+            for parameter, task_seed in zip(given, seeds, strict=True):
+                results.append(function(parameter, task_seed))
+                if report is not None:
+                    report(len(results), len(given))
+        except BaseException as error:
+            _keep(error, Sweep(given[: len(results)], seeds[: len(results)], tuple(results)), len(given))
+            raise
         return Sweep(given, seeds, tuple(results))
     futures: list[Future[R]] = [
         executor.submit(function, parameter, task_seed)
@@ -153,8 +158,28 @@ def sweep(
             results.append(future.result())
             if report is not None:
                 report(len(results), len(given))
-    except BaseException:
+    except BaseException as error:
         for future in futures:
             future.cancel()
+        done = [
+            (parameter, task_seed, future.result())
+            for parameter, task_seed, future in zip(given, seeds, futures, strict=True)
+            if future.done() and not future.cancelled() and future.exception() is None
+        ]
+        _keep(
+            error,
+            Sweep(
+                tuple(parameter for parameter, _, _ in done),
+                tuple(task_seed for _, task_seed, _ in done),
+                tuple(result for _, _, result in done),
+            ),
+            len(given),
+        )
         raise
     return Sweep(given, seeds, tuple(results))
+
+
+def _keep(error: BaseException, finished: Sweep[P, R], total: int) -> None:
+    """Attaches the finished tasks to the exception that ends a sweep."""
+    error.sweep = finished  # type: ignore[attr-defined]
+    error.add_note(f"{len(finished)} of {total} tasks of this sweep are finished: attribute `sweep` of this exception")
