@@ -1,4 +1,4 @@
-"""Opens the live page of an emulated arm in headless Chromium and checks what a person would see.
+"""Opens the live page of a simulated and of an emulated arm in headless Chromium and checks what a person would see.
 
     python check_page.py PATH/TO/supple FOLDER_FOR_SCREENSHOTS
 
@@ -29,8 +29,8 @@ def until(page: Page, what: str, condition, seconds: float = 60.0) -> None:
     raise AssertionError(what)
 
 
-def check(page: Page, url: str, folder: Path, scheme: str) -> None:
-    """Checks the page of a running emulated arm."""
+def check(page: Page, url: str, folder: Path, scheme: str, plant: str) -> None:
+    """Checks the page of a running arm."""
     complaints: list[str] = []
     page.on("pageerror", lambda error: complaints.append(str(error)))
     page.on("request", lambda request: foreign(request.url, url, complaints))
@@ -61,8 +61,10 @@ def check(page: Page, url: str, folder: Path, scheme: str) -> None:
     until(page, "gravity hold", lambda: read("mode") == "gravity hold")
     page.get_by_role("button", name="Hold tip").click()
     until(page, "hold tip", lambda: read("mode") == "track")
-    page.get_by_role("button", name="Emergency stop").click()
-    until(page, "the emergency stop takes the drives' power", lambda: read("drives") == "idle")
+    # Only the emulated arm has a pendant.
+    name = {"emu": "Emergency stop", "sim": "Idle"}[plant]
+    page.get_by_role("button", name=name, exact=True).first.click()
+    until(page, f"{name} takes the drives' power", lambda: read("drives") == "idle")
     page.wait_for_timeout(500)
     page.screenshot(path=str(folder / f"stopped-{scheme}.png"), full_page=True)
     assert not complaints, complaints
@@ -80,15 +82,15 @@ def main() -> None:
     chromium = os.environ.get("CHROMIUM", "/usr/bin/chromium")
     with sync_playwright() as playwright, tempfile.TemporaryDirectory() as work:
         browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
-        for scheme in ("light", "dark"):
-            command = [program, "up", "--plant", "emu", "--view", "--no-realtime", "--prefix", f"page-{scheme}"]
+        for scheme, plant in (("light", "sim"), ("dark", "emu")):
+            command = [program, "up", "--plant", plant, "--view", "--no-realtime", "--prefix", f"page-{scheme}"]
             command += ["--block-m", "-0.3", "--log", Path(work) / f"{scheme}.mcap"]
             up = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
             try:
                 lines = iter(up.stderr.readline, "")
                 url = next(found[0] for line in lines if (found := re.search(r"http://127\.0\.0\.1\S+", line)))
                 context = browser.new_context(color_scheme=scheme, viewport={"width": 1280, "height": 900})
-                check(context.new_page(), url, folder, scheme)
+                check(context.new_page(), url, folder, scheme, plant)
             finally:
                 up.terminate()
                 up.communicate(timeout=60)

@@ -14,6 +14,7 @@
 
 #![forbid(unsafe_code)]
 
+mod calls;
 mod command;
 mod error;
 mod frame;

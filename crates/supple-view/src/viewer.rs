@@ -1,16 +1,16 @@
 //! One WebSocket connection: reads what the viewer sends, writes what waits for it.
 
+use crate::calls::{Calls, ReplyTo};
 use crate::command::{Command, set_parameters};
-use crate::hub::{Answer, Hub, Pending, Viewer};
+use crate::hub::{Answer, Hub, Viewer};
 use crate::protocol::{
-    ClientMessage, SERVICE, advertise, advertise_services, call_failure, call_response,
-    parameter_values, server_info, service_call, status,
+    ClientMessage, SERVICE, ServiceCall, advertise, advertise_services, call_failure,
+    call_response, parameter_values, server_info, service_call, status,
 };
 use core::time::Duration;
 use std::net::TcpStream;
-use std::sync::mpsc::channel;
 use std::time::Instant;
-use supple_ipc::{Domain, request_idle};
+use supple_ipc::Domain;
 use tungstenite::protocol::{Role, WebSocketConfig};
 use tungstenite::{Error, Message, WebSocket};
 
@@ -18,8 +18,6 @@ use tungstenite::{Error, Message, WebSocket};
 const READ_TIMEOUT: Duration = Duration::from_millis(10);
 /// How long a write waits for a viewer that does not read.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(2);
-/// How long a command waits for its answer.
-const ANSWER_TIMEOUT: Duration = Duration::from_secs(5);
 /// Longest message of a viewer.
 const MAX_MESSAGE_BYTES: usize = 64 * 1024;
 /// Time between two messages with changed parameters.
@@ -63,21 +61,27 @@ pub fn serve(
         socket.send(Message::text(advertise_services()))?;
     }
     let mut updates = Updates::default();
+    let mut calls = Calls::default();
     loop {
         match socket.read() {
             Ok(Message::Text(text)) => {
-                for answer in text_message(context, viewer, &mut updates, text.as_str()) {
+                for answer in text_message(context, viewer, &mut updates, &mut calls, &text) {
                     socket.send(Message::text(answer))?;
                 }
             }
             Ok(Message::Binary(bytes)) => {
-                if let Some(answer) = binary_message(context, &bytes) {
+                if let Some(answer) = binary_message(context, &mut calls, &bytes) {
                     socket.send(answer)?;
                 }
             }
             Ok(_) => {}
             Err(Error::Io(error)) if is_timeout(&error) => {}
             Err(error) => return Err(error),
+        }
+        for (reply_to, answer) in calls.answered() {
+            for message in replies(hub, reply_to, answer) {
+                socket.send(message)?;
+            }
         }
         if let Some(text) = updates.due(hub) {
             socket.write(Message::text(text))?;
@@ -117,11 +121,12 @@ fn is_timeout(error: &std::io::Error) -> bool {
     matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut)
 }
 
-/// Handles a text of the viewer; returns the answers.
+/// Handles a text of the viewer; returns the answers that need no waiting.
 fn text_message(
     context: &Context<'_>,
     viewer: &Viewer,
     updates: &mut Updates,
+    calls: &mut Calls,
     text: &str,
 ) -> Vec<String> {
     let hub = context.hub;
@@ -157,11 +162,14 @@ fn text_message(
         }
         ClientMessage::SetParameters { parameters, id } => {
             let values: Vec<_> = parameters.into_iter().map(|p| (p.name, p.value)).collect();
-            let done = set_parameters(&values).and_then(|command| carry_out(context, command));
-            let frame = hub.latest();
-            let now = parameter_values(frame.as_ref(), &[], id.as_deref());
-            let refused = done.err().map(|reason| status(2, &reason));
-            refused.into_iter().chain([now]).collect()
+            match set_parameters(&values) {
+                Ok(command) => {
+                    let reply_to = ReplyTo::Parameters(id);
+                    calls.start(hub, context.domain, command, reply_to);
+                    Vec::new()
+                }
+                Err(reason) => parameter_reply(hub, id.as_deref(), Some(&reason)),
+            }
         }
         ClientMessage::SubscribeParameterUpdates {} => {
             updates.subscribed = true;
@@ -175,50 +183,54 @@ fn text_message(
     }
 }
 
-/// Handles binary data of the viewer, which can only be a call of the service.
-fn binary_message(context: &Context<'_>, bytes: &[u8]) -> Option<Message> {
+/// Handles binary data of the viewer, which can only be a call of the service; returns an answer that needs no waiting.
+fn binary_message(context: &Context<'_>, calls: &mut Calls, bytes: &[u8]) -> Option<Message> {
     let call = service_call(bytes)?;
     if call.service != SERVICE {
-        return Some(Message::text(call_failure(
-            &call,
-            "there is no such service",
-        )));
+        let reason = "there is no such service";
+        return Some(Message::text(call_failure(&call, reason)));
     }
-    let answer = Command::parse(call.payload).and_then(|command| carry_out(context, command));
-    Some(match answer {
-        Ok(mode) => {
-            let reply = serde_json::json!({"accepted": true, "mode": mode}).to_string();
-            Message::binary(call_response(&call, reply.as_bytes()))
+    match Command::parse(call.payload) {
+        Ok(command) => {
+            let reply_to = ReplyTo::Call {
+                service: call.service,
+                call: call.call,
+            };
+            calls.start(context.hub, context.domain, command, reply_to);
+            None
         }
-        Err(reason) => Message::text(call_failure(&call, &reason)),
-    })
-}
-
-/// Carries a command out and waits for its answer.
-fn carry_out(context: &Context<'_>, command: Command) -> Answer {
-    let domain = context.domain.filter(|_| context.hub.accepts_commands());
-    match (command, domain) {
-        (Command::Idle, Some(domain)) => idle(domain),
-        (Command::Pendant { button }, Some(domain)) => {
-            crate::pendant::press(domain, button.line()).map(|()| "pendant".to_owned())
-        }
-        (command, _) => {
-            let (answer, answers) = channel();
-            context.hub.send_command(Pending { command, answer })?;
-            let answer = answers.recv_timeout(ANSWER_TIMEOUT);
-            answer.unwrap_or_else(|_| Err("the controller does not answer".to_owned()))
-        }
+        Err(reason) => Some(Message::text(call_failure(&call, &reason))),
     }
 }
 
-/// Idle has a way of its own, which no other client can block.
-fn idle(domain: &Domain) -> Answer {
-    match request_idle(domain, ANSWER_TIMEOUT) {
-        Ok(Some(answer)) => match answer.outcome {
-            supple_ipc::message::Outcome::Refused => Err(answer.text),
-            _ => Ok(answer.mode.map_or("unknown", |mode| mode.name()).to_owned()),
-        },
-        Ok(None) => Err("the controller does not answer".to_owned()),
-        Err(error) => Err(error.to_string()),
+/// The messages that tell a viewer how its command ended.
+fn replies(hub: &Hub, reply_to: ReplyTo, answer: Answer) -> Vec<Message> {
+    match reply_to {
+        ReplyTo::Parameters(id) => {
+            let texts = parameter_reply(hub, id.as_deref(), answer.err().as_deref());
+            texts.into_iter().map(Message::text).collect()
+        }
+        ReplyTo::Call { service, call } => {
+            let call = ServiceCall {
+                service,
+                call,
+                payload: &[],
+            };
+            vec![match answer {
+                Ok(mode) => {
+                    let reply = serde_json::json!({"accepted": true, "mode": mode}).to_string();
+                    Message::binary(call_response(&call, reply.as_bytes()))
+                }
+                Err(reason) => Message::text(call_failure(&call, &reason)),
+            }]
+        }
     }
+}
+
+/// The parameters as they are now, behind the reason for which they could not be set.
+fn parameter_reply(hub: &Hub, id: Option<&str>, refused: Option<&str>) -> Vec<String> {
+    let frame = hub.latest();
+    let now = parameter_values(frame.as_ref(), &[], id);
+    let refused = refused.map(|reason| status(2, reason));
+    refused.into_iter().chain([now]).collect()
 }

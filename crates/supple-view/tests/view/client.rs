@@ -132,21 +132,43 @@ impl Client {
 
     /// Calls the service; the reply, or the message of its failure.
     pub fn call(&mut self, meanwhile: &mut dyn FnMut(), command: &Value) -> Result<Value, String> {
-        let mut bytes = vec![2, 1, 0, 0, 0, 77, 0, 0, 0, 4, 0, 0, 0];
+        self.begin_call(77, command);
+        let (call, answer) = self.wait_for_answer(meanwhile);
+        assert_eq!(call, 77);
+        answer
+    }
+
+    /// Calls the service under this id and does not wait.
+    pub fn begin_call(&mut self, call: u8, command: &Value) {
+        let mut bytes = vec![2, 1, 0, 0, 0, call, 0, 0, 0, 4, 0, 0, 0];
         bytes.extend_from_slice(b"json");
         bytes.extend_from_slice(command.to_string().as_bytes());
         self.0.send(Message::binary(bytes)).expect("sent");
+    }
+
+    /// The next answer to any call, with the id of the call.
+    pub fn wait_for_answer(&mut self, meanwhile: &mut dyn FnMut()) -> (u64, Result<Value, String>) {
         self.wait_for(meanwhile, |message| match message {
             Message::Binary(bytes) if bytes[0] == 3 => {
-                assert_eq!(bytes[5..9], [77, 0, 0, 0]);
-                Some(Ok(serde_json::from_slice(&bytes[17..]).expect("JSON")))
+                let call = u64::from(bytes[5]);
+                Some((
+                    call,
+                    Ok(serde_json::from_slice(&bytes[17..]).expect("JSON")),
+                ))
             }
             Message::Text(text) => {
                 let value: Value = serde_json::from_str(text.as_str()).expect("JSON");
                 let failed = value["op"] == "serviceCallFailure";
-                failed.then(|| Err(value["message"].as_str().unwrap_or_default().to_owned()))
+                let reason = value["message"].as_str().unwrap_or_default().to_owned();
+                failed.then(|| (value["callId"].as_u64().expect("an id"), Err(reason)))
             }
             _ => None,
         })
+    }
+
+    /// Port of this end.
+    pub fn port(&self) -> u16 {
+        let address = self.0.get_ref().local_addr();
+        address.expect("an address").port()
     }
 }

@@ -1,6 +1,7 @@
 //! A scripted controller: publishes telemetry, takes gains into force, and refuses more than 500 N/m.
 
-use core::cell::Cell;
+use core::cell::{Cell, RefCell};
+use core::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::channel;
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -8,7 +9,7 @@ use supple_core::controller::{CycleRecord, Mode, Request};
 use supple_ipc::message::{
     ArmState, CycleTiming, Drives, OperatorReply, Outcome, PlantReport, Telemetry, Text,
 };
-use supple_ipc::{Backpressure, Domain, OperatorServer};
+use supple_ipc::{Backpressure, Domain, IdleServer, OperatorServer, idle_reply};
 use supple_model::Description;
 use supple_realtime::{Stop, pause};
 use supple_view::{Addresses, Options, Source};
@@ -25,6 +26,9 @@ pub struct System {
     domain: Domain,
     cycle: Cell<u64>,
     stiffness: Cell<[f64; 3]>,
+    idle: RefCell<IdleServer>,
+    /// Whether it reads no operator's requests, as a controller whose helper hangs.
+    pub mute: Cell<bool>,
     stop: Stop,
     view: Option<JoinHandle<()>>,
     _folder: TempDir,
@@ -34,7 +38,11 @@ impl System {
     /// Starts both.
     pub fn start(options: Options) -> (System, Addresses) {
         let folder = tempfile::tempdir().expect("a folder");
-        let domain = Domain::in_folder(&folder.path().join("run"), "view").expect("a domain");
+        static SYSTEMS: AtomicU32 = AtomicU32::new(0);
+        let number = SYSTEMS.fetch_add(1, Ordering::Relaxed);
+        // The folder of an emulated arm's bus depends on this name alone.
+        let prefix = format!("view-{}-{number}", std::process::id());
+        let domain = Domain::in_folder(&folder.path().join("run"), &prefix).expect("a domain");
         let server = OperatorServer::new(&domain, Backpressure::Drop).expect("a controller");
         let (stop, (sender, receiver)) = (Stop::default(), channel());
         let source = Source::System {
@@ -49,6 +57,8 @@ impl System {
         let addresses = receiver.recv_timeout(Duration::from_secs(60));
         let system = System {
             server,
+            idle: RefCell::new(IdleServer::new(&domain).expect("a socket")),
+            mute: Cell::new(false),
             domain,
             cycle: Cell::new(0),
             stiffness: Cell::new([5.0; 3]),
@@ -87,7 +97,17 @@ impl System {
         let state = ArmState::new(cycle, stamp_ns, &measured, None, Drives::Active, report);
         let telemetry = Telemetry::of(&record, &state, CycleTiming::default());
         self.server.publish(&telemetry).expect("published");
-        while let Some(message) = self.server.request().expect("a request") {
+        let mut idle = self.idle.borrow_mut();
+        if idle
+            .receive_requests(cycle, Duration::ZERO)
+            .expect("a socket")
+        {
+            let accepted = Outcome::Accepted;
+            idle.answer(&idle_reply(cycle, cycle, Mode::Idle, accepted, Text::EMPTY));
+        }
+        while !self.mute.get()
+            && let Some(message) = self.server.request().expect("a request")
+        {
             let request = message.request::<N>().expect("for this arm");
             let refused = match request {
                 Some(Request::Gains { gains, .. }) => {

@@ -3,5 +3,7 @@
 mod client;
 mod controller;
 mod live;
+mod passing;
 mod replay;
 mod security;
+mod stalled;
