@@ -64,6 +64,15 @@ step_page() {
     crates/supple-view/page/build.sh check
 }
 
+# browser: the live page of a simulated and of an emulated arm in headless Chromium; in no list; installs Chromium and Playwright
+step_browser() {
+    needs_command chromium chromium
+    virtual_environment browser crates/supple-view/page/requirements.txt
+    cargo build --locked --workspace --exclude supple-python --bins
+    CHROMIUM=$(command -v chromium) "$WORK/browser/bin/python" crates/supple-view/page/check_page.py \
+        target/debug/supple $WORK/browser-screenshots
+}
+
 # advisories: known vulnerabilities, where their database can be fetched
 step_advisories() {
     local log
@@ -100,16 +109,29 @@ step_package() {
     )
 }
 
-# site: the site of the documentation, without a warning, and the commands in it that need no arm; in no list; installs mkdocs, uses what `package` installed
+# site: the site of the documentation without a warning, its commands, figures and notebooks; uses what `package` installed, installs mkdocs and Jupyter
 step_site() {
-    virtual_environment site docs/site/requirements.txt
+    local python=$PWD/$WORK/package/bin/python programs=target/debug made=target/site
+    "$python" -c "import supple" 2>/dev/null || skip "./ci.sh package has not installed the Python package"
+    virtual_environment package docs/site/requirements.txt
     cargo build --locked --workspace --exclude supple-python --bins
-    local package=()
-    if "$WORK/package/bin/python" -c "import supple" 2>/dev/null; then
-        package=(--package "$PWD/$WORK/package/bin/python")
-    fi
-    "$WORK/site/bin/python" docs/site/build.py --programs target/debug "${package[@]}"
-    "$WORK/site/bin/python" docs/site/run_commands.py --programs target/debug "${package[@]}"
+    rm -rf $made
+    "$python" docs/site/check_inline.py --programs $programs
+    "$python" docs/site/notebooks.py --programs $programs --out $made/notebooks >$WORK/notebooks.log 2>&1 &
+    local notebooks=$!
+    "$python" docs/site/run_commands.py --programs $programs --figures $made/figures || {
+        wait $notebooks
+        return 1
+    }
+    wait $notebooks || {
+        cat $WORK/notebooks.log
+        return 1
+    }
+    cat $WORK/notebooks.log
+    local rustdoc=()
+    [[ ! -d target/doc ]] || rustdoc=(--rustdoc target/doc)
+    "$python" docs/site/build.py --programs $programs --figures $made/figures --notebooks $made/notebooks "${rustdoc[@]}"
+    echo "the site is in $made/html"
 }
 
 # Makes a virtual environment of this name with these requirements.
@@ -124,6 +146,13 @@ virtual_environment() {
     fi
     "$environment/bin/pip" install --quiet --requirement "$2" ||
         skip "the packages of $2 cannot be installed"
+}
+
+# urdfs: ten public URDFs, unedited, through the demo and through `up --plant sim`; in no list; installs packages that carry them
+step_urdfs() {
+    virtual_environment urdfs tests/any_arm/requirements.txt
+    cargo build --release --locked --workspace --exclude supple-python --bins
+    "$WORK/urdfs/bin/python" tests/any_arm/run.py --programs target/release
 }
 
 # instructions: instruction counts of the core against committed limits, and no bounds checks; installs Valgrind and gungraun-runner

@@ -219,3 +219,38 @@ fn demo_is_run_by_the_program_that_draws() {
     let object: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
     assert_eq!(object["error"]["kind"], "description");
 }
+
+/// Without a terminal each change of mode or drives is a line.
+#[test]
+fn a_piped_run_says_what_the_arm_does() {
+    let folder = temporary_folder();
+    let how = ["up", "--plant", "sim", "--virtual-time", "--for", "6"];
+    let output = run(folder.path(), &how);
+    let text = stderr_of(&output);
+    let at = |what: &str| {
+        let found = text.find(what);
+        found.unwrap_or_else(|| panic!("{what}: {text}"))
+    };
+    assert!(at("s: gravity_hold, drives active") < at("s: move, drives active"));
+    assert!(at("s: move, drives active") < at("s: track, drives active"));
+    assert!(!text.contains("Shift-Activate"), "{text}");
+}
+
+/// The emergency stop is named with the way out of it. Without power the arm falls, as far as onto its stops.
+#[test]
+fn an_emergency_stop_is_named_and_released() {
+    let up = Up::tracking(&["--plant", "emu"]);
+    let press = |arguments: &[&str]| {
+        let output = up.run(arguments);
+        assert!(output.status.success(), "{}", stderr_of(&output));
+    };
+    press(&["pendant", "e-stop"]);
+    up.wait_until("no power", |status| status["drives"] == "off");
+    press(&["pendant", "release"]);
+    press(&["pendant", "idle"]);
+    up.wait_until("power", |status| status["drives"] == "idle");
+    let output = up.end();
+    let text = stderr_of(&output);
+    assert!(text.contains("emergency stop"), "{text}");
+    assert!(text.contains("supple pendant release"), "{text}");
+}

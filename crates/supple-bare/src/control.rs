@@ -5,8 +5,8 @@ use crate::digest::Digest;
 use crate::{PERIOD_S, print, refused};
 use core::fmt::{self, Write};
 use supple_core::config::{
-    ApparentInertia, Collision, ContactLatch, FrictionVelocity, Gains, JointGains, Law, Limits,
-    PlausibilityLimits, PoseLaw, Role, Workspace,
+    ApparentInertia, Collision, ContactLatch, FrictionVelocity, Gains, JointGains, JointNames, Law,
+    Limits, PlausibilityLimits, PoseLaw, Role, Workspace,
 };
 use supple_core::controller::{Controller, Input, Output, Request, State, step};
 use supple_core::learned::LearnedTerms;
@@ -171,6 +171,7 @@ fn config<const N: usize>(arm: Arm<N>) -> Config<N> {
         collision: Collision::disabled(),
         plausible: PlausibilityLimits::disabled(),
         workspace: Workspace::UNBOUNDED,
+        joint_names: JointNames::NONE,
     }
 }
 

@@ -3,6 +3,8 @@
 use core::time::Duration;
 use supple_bus::virtual_time::LockstepBus;
 use supple_bus::{Address, Bus, BusError, OwnerFolder, PacedBus, SocketCan};
+use supple_core::controller::NamesJoints;
+use supple_core::record::Text;
 use supple_drive::{
     Counters, Drive, Drives, LoopError, LossReason, PlantLoop, Rest, SharedMemoryLink, Stage,
 };
@@ -35,6 +37,7 @@ pub fn serve<const N: usize, D: Drive<N>>(
     plant: &mut PlantLoop<N, D, SharedMemoryLink>,
     cycles: Option<u64>,
     stop: &Stop,
+    joint_names: &[Text],
 ) -> Result<Ended, LoopError> {
     let mut last_reply_ns = plant.drive().now_ns();
     let mut stages = Stages::default();
@@ -48,7 +51,7 @@ pub fn serve<const N: usize, D: Drive<N>>(
         if now_ns > last_reply_ns + ARM_LOST_AFTER_NS {
             return Ok(Ended::ArmLost);
         }
-        stages.report(plant);
+        stages.report(plant, joint_names);
     }
     plant.begin_shutdown();
     let timeout_ns = match plant.drive().rest() {
@@ -59,11 +62,11 @@ pub fn serve<const N: usize, D: Drive<N>>(
     if plant.drive().rest() == Rest::Falls {
         // Motors that are just being enabled are not active yet: this cycle ends that.
         plant.run()?;
-        stages.report(plant);
+        stages.report(plant, joint_names);
     }
     while plant.drives() == Drives::Active && plant.drive().now_ns() < until_ns {
         plant.run()?;
-        stages.report(plant);
+        stages.report(plant, joint_names);
     }
     Ok(Ended::ShutDown)
 }
@@ -85,32 +88,42 @@ impl Default for Stages {
 
 impl Stages {
     /// Posts a message when the drives become active or idle, so not in a cycle of steady operation.
-    fn report<const N: usize, D: Drive<N>>(&mut self, plant: &PlantLoop<N, D, SharedMemoryLink>) {
+    fn report<const N: usize, D: Drive<N>>(
+        &mut self,
+        plant: &PlantLoop<N, D, SharedMemoryLink>,
+        joint_names: &[Text],
+    ) {
+        let in_words = |reason: &LossReason| reason.with_names(joint_names).to_string();
         let guard = plant.guard();
         let falls = plant.drive().rest() == Rest::Falls;
         if guard.last_loss() != self.loss {
             self.loss = guard.last_loss();
             if let (Some((reason, _)), false) = (self.loss, falls) {
+                let reason = in_words(&reason);
                 diagnostics::post(format_args!("supple-can: set to idle: {reason}"));
             }
         }
         if guard.stage() == self.stage {
             return;
         }
-        let time_s = plant.drive().now_ns() as f64 * 1e-9;
+        let drive = plant.drive();
+        let time_s = drive.monotonic_ns(drive.now_ns()) as f64 * 1e-9;
         match (guard.stage(), self.stage) {
             (Stage::Active, _) => diagnostics::post(format_args!("supple-can: active")),
             (Stage::Holding(reason, _), _) => diagnostics::post(format_args!(
-                "supple-can: {time_s:.3} s: holding the arm: {reason}"
+                "supple-can: {time_s:.4} s: holding the arm: {}",
+                in_words(&reason)
             )),
             (Stage::Stowing(reason, _), _) => diagnostics::post(format_args!(
-                "supple-can: {time_s:.3} s: laying the arm down: {reason}"
+                "supple-can: {time_s:.4} s: laying the arm down: {}",
+                in_words(&reason)
             )),
             (Stage::Lowering(reason, _), _) if falls => diagnostics::post(format_args!(
-                "supple-can: {time_s:.3} s: disabling the motors: {reason}"
+                "supple-can: {time_s:.4} s: disabling the motors: {}",
+                in_words(&reason)
             )),
             (Stage::Resting, _) if falls => {
-                diagnostics::post(format_args!("supple-can: {time_s:.3} s: disabled"));
+                diagnostics::post(format_args!("supple-can: {time_s:.4} s: disabled"));
             }
             _ => {}
         }

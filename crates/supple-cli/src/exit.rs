@@ -21,6 +21,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use supple_experiment::ExperimentError;
 use supple_experiment::procedure::ProcedureError;
+use supple_experiment::teaching::PointsError;
 use supple_ident::{IdentError, ReadError, SaveError};
 use supple_log::LogError;
 use supple_model::ModelError;
@@ -206,11 +207,22 @@ pub enum Failure {
     /// Fault injection was requested for a real arm.
     #[error("--inject works only with a simulated arm: use --plant sim or --plant emu")]
     InjectionIntoRealArm,
+    /// Misbehaviour was requested of an arm that is not emulated with Damiao motors.
+    #[error(
+        "--misbehave is for emulated Damiao motors: use --plant emu with an arm that has [bus], such as openarm or yam"
+    )]
+    MisbehaviourWithoutMotors,
     /// Plant options were given for a real arm.
     #[error(
         "--plant-options and --realistic work only with a simulated arm: use --plant sim or --plant emu"
     )]
     OptionsOfRealArm,
+    /// The hand of an emulated arm waits for a mode that it never hears of.
+    #[error(
+        "the hand of an emulated arm does not learn when float begins: write `when = \"active\"` in its [hand] of the plant \
+         options, or use --plant sim"
+    )]
+    HandNeedsMode,
     /// The system under test did not reach tracking mode.
     #[error(
         "the system did not reach tracking mode within 20 s in three attempts: see the messages of its \
@@ -253,6 +265,34 @@ pub enum Failure {
     Refused {
         /// Reason given by the controller.
         reason: String,
+    },
+    /// A file of a motion is invalid, or cannot be written.
+    #[error(transparent)]
+    Points(Box<PointsError>),
+    /// A motion that cannot be repeated, or was not.
+    #[error("{}: {reason}; change the file, or teach another motion", file.display())]
+    Motion {
+        /// Its file.
+        file: PathBuf,
+        /// The reason.
+        reason: String,
+    },
+    /// The arm was not guided.
+    #[error(
+        "the arm rested during the whole recording, nothing is written: guide it by hand while it floats"
+    )]
+    NothingTaught,
+    /// The running system has another arm.
+    #[error(
+        "the arm {arm} has {joints} joints, that of the running system {running}: name its arm with --arm"
+    )]
+    OtherArm {
+        /// Name of the given arm.
+        arm: String,
+        /// Its joints.
+        joints: usize,
+        /// Joints of the running system.
+        running: usize,
     },
     /// A log cannot be read or written.
     #[error(transparent)]
@@ -402,7 +442,8 @@ impl Failure {
             | Failure::FaultTestOnRealArm
             | Failure::ValueCount { .. } => 2,
             Failure::Injection(_) | Failure::InjectionIntoRealArm => 2,
-            Failure::OptionsOfRealArm | Failure::NoSuchEffect { .. } => 2,
+            Failure::OptionsOfRealArm | Failure::MisbehaviourWithoutMotors => 2,
+            Failure::HandNeedsMode | Failure::NoSuchEffect { .. } => 2,
             Failure::PlantOptions(error) => plant_options_code(error),
             Failure::NoSuchProcess { .. } | Failure::NoSuchTestCase { .. } => 2,
             Failure::Drill { .. } | Failure::DidNotReachTracking => 12,
@@ -414,6 +455,12 @@ impl Failure {
             | Failure::ProcessEnded { .. }
             | Failure::NotRunning { .. } => 10,
             Failure::Refused { .. } | Failure::NothingLearned => 11,
+            Failure::Points(error) => match **error {
+                PointsError::File { .. } => 6,
+                _ => 3,
+            },
+            Failure::OtherArm { .. } => 3,
+            Failure::Motion { .. } | Failure::NothingTaught => 4,
             Failure::Figure(_) | Failure::ReportGeneration(_) => 1,
         }
     }
@@ -440,6 +487,7 @@ fn experiment_code(error: &ExperimentError) -> u8 {
         | ExperimentError::FaultAtStart { .. }
         | ExperimentError::Fault { .. }
         | ExperimentError::Stuck { .. } => 4,
+        ExperimentError::Interrupted => 130,
         ExperimentError::Ident(_) => 9,
         ExperimentError::Save(error) => save_code(error),
         ExperimentError::Log(error) => log_code(error),
@@ -531,6 +579,7 @@ mod tests {
             (Failure::FaultTestOnRealArm, "invalid command line"),
             (Failure::NoSuchProcess { name: "" }, "invalid command line"),
             (Failure::OptionsOfRealArm, "invalid command line"),
+            (Failure::MisbehaviourWithoutMotors, "invalid command line"),
             (
                 Failure::NoSuchEffect { text: text() },
                 "invalid command line",
@@ -640,7 +689,7 @@ mod tests {
             (Failure::Drill { rows: text() }, "supple drill"),
             (
                 Failure::Experiment(ExperimentError::Stuck {
-                    joint: 0,
+                    joint: text(),
                     torque_nm: 1.0,
                 }),
                 "the arm cannot perform",

@@ -13,5 +13,6 @@ pub mod exit;
 pub mod interrupt;
 pub mod log;
 pub mod out;
+pub mod parse;
 pub mod range;
 pub mod sibling;

@@ -22,9 +22,9 @@ const PART_SUFFIX: &str = ".part";
 pub fn run(command: &LogDataCommand) -> Result<(), Failure> {
     match command {
         LogDataCommand::Info { file, json: false } => {
-            print_line(info(file)?.to_string().trim_end())
+            print_line(read(file, |file| info(file))?.to_string().trim_end())
         }
-        LogDataCommand::Info { file, json: true } => print_json(&info(file)?),
+        LogDataCommand::Info { file, json: true } => print_json(&read(file, |file| info(file))?),
         LogDataCommand::Export {
             file,
             channel,
@@ -38,7 +38,7 @@ pub fn run(command: &LogDataCommand) -> Result<(), Failure> {
             out: Some(out),
         } => export_to_file(file, channel, *every, out),
         LogDataCommand::Replay { file, json } => {
-            let replay = replay(file)?;
+            let replay = read(file, |file| replay(file))?;
             match json {
                 true => print_json(&replay)?,
                 false => print_line(&replay.to_string())?,
@@ -69,6 +69,22 @@ pub fn run(command: &LogDataCommand) -> Result<(), Failure> {
             }
         }
     }
+}
+
+/// Reads a log. Where it is missing because its writer was killed, the error names the part that is there.
+fn read<T>(file: &Path, reader: impl Fn(&Path) -> Result<T, LogError>) -> Result<T, Failure> {
+    reader(file).map_err(|error| {
+        let part = with_suffix(file, PART_SUFFIX);
+        if file.exists() || !part.exists() {
+            return error.into();
+        }
+        let why = format!(
+            "it does not exist; its writer was killed or still writes {}: read that file, or `supple log recover {}`",
+            part.display(),
+            part.display()
+        );
+        Failure::file("read", file, std::io::Error::new(ErrorKind::NotFound, why))
+    })
 }
 
 fn export_to_stdout(file: &Path, channel: &str, every: NonZeroU64) -> Result<(), Failure> {

@@ -7,6 +7,30 @@ use crate::model::friction::Friction;
 use crate::model::learned::LearnedTerms;
 pub use crate::model::ripple::RippleTable;
 pub use crate::model::workspace::{Border, Workspace, Zone};
+use crate::record::Text;
+
+/// Names of the joints in messages, as in the URDF; an empty one stands for the joint's index.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct JointNames<const N: usize>([Text; N]);
+
+impl<const N: usize> JointNames<N> {
+    /// No names: messages have the index of each joint, from 0.
+    pub const NONE: JointNames<N> = JointNames([Text::EMPTY; N]);
+
+    /// The names of `names`, in order; joints beyond them have none.
+    pub fn new<S: AsRef<str>>(names: &[S]) -> JointNames<N> {
+        JointNames(core::array::from_fn(|i| {
+            names
+                .get(i)
+                .map_or(Text::EMPTY, |name| Text::from_display(&name.as_ref()))
+        }))
+    }
+
+    /// The names.
+    pub fn as_slice(&self) -> &[Text] {
+        &self.0
+    }
+}
 
 /// Role of a joint while the impedance law runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -309,6 +333,8 @@ pub struct Limits<const N: usize> {
 /// Configuration of a controller.
 #[derive(Clone, Copy, Debug)]
 pub struct Config<const N: usize> {
+    /// Names of the joints in messages.
+    pub joint_names: JointNames<N>,
     /// The controller's model of the arm.
     pub arm: Arm<N>,
     /// The controller's model of the friction.

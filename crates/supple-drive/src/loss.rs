@@ -7,7 +7,9 @@
 //! | overspeed, no stop in a fault of the controller | no torque | the same |
 
 use core::fmt;
+use supple_core::controller::{JointLabel, NamesJoints};
 use supple_core::drive_guard::GuardReason;
+use supple_core::record::Text;
 
 /// What a motor reports about itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,17 +86,19 @@ pub enum LossReason {
     Leaving,
 }
 
-impl fmt::Display for LossReason {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
+impl NamesJoints for LossReason {
+    fn write(&self, f: &mut fmt::Formatter<'_>, names: &[Text]) -> fmt::Result {
+        let label = |joint: usize| JointLabel::new(joint, names);
+        match *self {
             LossReason::Answer => f.write_str("the controller did not answer"),
             LossReason::TorqueNotWanted => f.write_str("the controller requests no torque"),
             LossReason::Overspeed(joint) => {
-                write!(f, "joint {joint} moves at twice its speed limit")
+                write!(f, "{} moves at twice its speed limit", label(joint))
             }
             LossReason::NotStopped(joint) => write!(
                 f,
-                "joint {joint} does not stop although the controller is in a fault"
+                "{} does not stop although the controller is in a fault",
+                label(joint)
             ),
             LossReason::Activated => f.write_str(
                 "the motors were activated while the controller was not in gravity hold",
@@ -108,6 +112,12 @@ impl fmt::Display for LossReason {
             LossReason::Module => f.write_str("the safety module does not answer"),
             LossReason::Leaving => f.write_str("the program is shutting down"),
         }
+    }
+}
+
+impl fmt::Display for LossReason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.write(f, &[])
     }
 }
 

@@ -260,8 +260,18 @@ impl<const N: usize, D: Drive<N>, L: Link<N>> PlantLoop<N, D, L> {
             stamp_ns: self.drive.monotonic_ns(start_ns),
             position_rad,
             tip_force_n,
-            drives: self.drives(),
+            drives: self.drives_of_controller(),
             counters: self.counters,
+        }
+    }
+
+    /// State of the drives for the controller. An arm that this loop holds or lays down itself does not follow the
+    /// controller's torques, whatever it requests: its drives are idle to it.
+    fn drives_of_controller(&self) -> Drives {
+        match (self.guard.stage(), self.drives()) {
+            (Stage::Holding(..) | Stage::Stowing(..), Drives::Active) => Drives::Idle,
+            (Stage::Lowering(..), Drives::Active) if self.stowing.is_some() => Drives::Idle,
+            (_, drives) => drives,
         }
     }
 

@@ -32,7 +32,10 @@ pub fn main() -> ExitCode {
     let options = Options::parse();
     diagnostics::start();
     match start(&options) {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => {
+            diagnostics::flush();
+            ExitCode::SUCCESS
+        }
         Err(error) => {
             diagnostics::post(format_args!("supple-emu: error: {error}"));
             diagnostics::flush();

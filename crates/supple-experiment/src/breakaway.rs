@@ -1,14 +1,17 @@
 //! Measures the breakaway torque of each joint: ramps its torque in both directions until it has moved by two
 //! degrees, while the other joints are held.
 //!
-//! The torque at which a joint starts to slide is `S_0`. Half the sum of both directions is independent of
-//! errors of the gravity model; half the difference is that error.
+//! The torque beyond the model's gravity at which a joint starts to slide is `S_0`. Half the sum of both directions is
+//! independent of errors of the gravity model; half the difference is that error. A ramp begins at the torque that held
+//! its joint, which is part of it.
 
 use crate::error::ExperimentError;
 use crate::excite::{move_to, without_held_joints};
 use crate::request_sequence::{Recording, RequestSequence, Step};
+use crate::run::joint_label;
 use serde::{Deserialize, Serialize};
 use supple_core::controller::{Breakaway, Mode, Request};
+use supple_core::dynamics::gravity;
 use supple_core::{Config, Vector};
 use supple_plant::PlantConfig;
 
@@ -26,9 +29,9 @@ const REST_S: f64 = 0.3;
 /// Breakaway of one joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct JointBreakaway {
-    /// Torque at which the joint started to slide in the positive direction \[N m\].
+    /// Torque beyond the model's gravity at which the joint started to slide in the positive direction \[N m\].
     pub positive_nm: f64,
-    /// Torque at which the joint started to slide in the negative direction, as a positive number \[N m\].
+    /// The same in the negative direction, positive if the torque was negative \[N m\].
     pub negative_nm: f64,
 }
 
@@ -66,7 +69,7 @@ pub fn breakaway<const N: usize>(
                 limit_nm,
             };
             let sequence = RequestSequence {
-                name: format!("breakaway of joint {joint}"),
+                name: format!("breakaway of {}", joint_label(config, joint)),
                 config: without_held_joints(config),
                 plant: plant.clone(),
                 start_rad: *pose_rad,
@@ -79,17 +82,19 @@ pub fn breakaway<const N: usize>(
                     },
                 ],
             };
-            // Ramp torque and angle of each cycle.
+            // Torque beyond gravity and angle of each cycle.
             let mut trace: Vec<(f64, f64)> = Vec::new();
             sequence.perform(&mut |cycle, _| {
                 if cycle.output.mode == Mode::Breakaway {
-                    let ramp = cycle.output.torques.friction[joint].abs();
-                    trace.push((ramp, cycle.measurement.position_rad[joint]));
+                    let torques = &cycle.output.torques;
+                    let beyond_nm =
+                        torques.friction[joint] + torques.joint_pd[joint] + torques.handover[joint];
+                    trace.push((beyond_nm, cycle.measurement.position_rad[joint]));
                 }
                 Ok(())
             })?;
             torque_before_sliding(&trace, direction).ok_or(ExperimentError::Stuck {
-                joint,
+                joint: joint_label(config, joint),
                 torque_nm: limit_nm,
             })
         };
@@ -102,30 +107,30 @@ pub fn breakaway<const N: usize>(
     Ok(found)
 }
 
-/// Torque of a ramp at which its joint began to slide \[N m\], positive; `None` if it did not. The recording begins with
-/// the ramp.
-pub(crate) fn sliding_torque_nm(
+/// Torque of a ramp beyond the gravity of `config` at which its joint began to slide \[N m\], positive along the ramp's
+/// direction, which is 1 or -1; `None` if it did not slide. The recording begins with the ramp.
+pub(crate) fn sliding_torque_nm<const N: usize>(
+    config: &Config<N>,
     recording: &Recording,
     joint: usize,
-    rate_nm_per_s: f64,
+    direction: f64,
 ) -> Option<f64> {
-    let begin_s = *recording.t_s.first()?;
-    let ramp = |t_s: &f64| rate_nm_per_s.abs() * (t_s - begin_s);
-    let angles = recording.q_rad.column(joint);
-    let trace: Vec<(f64, f64)> = recording
-        .t_s
-        .iter()
-        .map(ramp)
-        .zip(angles.iter().copied())
+    let trace: Vec<(f64, f64)> = (0..recording.t_s.len())
+        .map(|k| {
+            let angles = recording.q_rad.row(k).transpose();
+            let gravity_nm = gravity(&config.arm, &Vector::from_column_slice(angles.as_slice()));
+            let beyond_nm = recording.tau_nm[(k, joint)] - gravity_nm[joint];
+            (beyond_nm, angles[joint])
+        })
         .collect();
-    torque_before_sliding(&trace, rate_nm_per_s.signum())
+    torque_before_sliding(&trace, direction)
 }
 
-/// Ramp torque of the last cycle before the joint slid.
+/// Torque of the last cycle before the joint slid, positive along `direction`.
 fn torque_before_sliding(trace: &[(f64, f64)], direction: f64) -> Option<f64> {
     let start = trace.first()?.1;
     let slid = |q: f64| direction * (q - start) > SLIDING_RAD;
     slid(trace.last()?.1).then_some(())?;
     let last = trace.iter().rposition(|(_, q)| !slid(*q))?;
-    Some(trace[last].0)
+    Some(direction * trace[last].0)
 }

@@ -1,5 +1,6 @@
 //! Runs all experiments of the paper.
 
+use crate::adapted::{Adapted, Performed, expected_s, may_adapt, perform};
 use crate::demo_options::DemoOptions;
 use crate::error::ExperimentError;
 use crate::job::{
@@ -12,12 +13,12 @@ use crate::run::Run;
 use crate::scenario;
 use crate::setup::Setup;
 use crate::summary::{
-    AtSpeed, ContactStatistics, ExactModel, ImpulseSlope, ProbingSummary, QuadrantSummary, Summary,
-    TorqueRms, TrackingError,
+    AtSpeed, ContactStatistics, DerivedArm, ExactModel, ImpulseSlope, ProbingSummary,
+    QuadrantSummary, Summary, TorqueRms, TrackingError,
 };
 use rayon::prelude::*;
 use supple_core::trajectory::Quadrant;
-use supple_model::{Description, Paths, with_dof};
+use supple_model::{Description, Paths, tip_weight_n, with_dof};
 use supple_plant::PlantOptions;
 
 /// Progress of the demo.
@@ -87,17 +88,13 @@ fn sized<const N: usize>(
     };
     let setup = setup.with_plant_options(&options.plant)?;
     let imperfect = match options.plant.is_none() {
-        true => PlantOptions::realistic(),
+        true => PlantOptions::realistic_of(description),
         false => options.plant.clone(),
     };
     let jobs = jobs();
-    let plans = jobs
-        .iter()
-        .map(|job| job.plan(&setup, options.seed))
-        .collect::<Result<Vec<_>, _>>()?;
+    let expected = |job: &Job| expected_s(job, &setup, options.seed);
     let seeds = options.realistic_seeds;
-    let total_s =
-        plans.iter().map(|plan| plan.duration_s).sum::<f64>() + seeds as f64 * REALISTIC_S;
+    let total_s = jobs.iter().map(expected).sum::<f64>() + seeds as f64 * REALISTIC_S;
     let done_s = std::sync::Mutex::new(0.0);
     let report = |duration_s: f64, finished: String| {
         let mut done_s = done_s
@@ -112,13 +109,15 @@ fn sized<const N: usize>(
     };
     let results = jobs
         .par_iter()
-        .zip(&plans)
-        .map(|(job, plan)| {
-            let done = job.run(plan, description, options)?;
-            report(plan.duration_s, plan.name.clone());
+        .map(|job| {
+            let done = perform(job, &setup, description, options)?;
+            report(expected(job), job.name());
             Ok(done)
         })
-        .collect::<Result<Vec<JobResult>, ExperimentError>>()?;
+        .collect::<Result<Vec<Performed>, ExperimentError>>()?;
+    let adapted = results.iter().filter_map(|done| done.adapted.clone());
+    let adapted: Vec<Adapted> = adapted.collect();
+    let results = results.into_iter().map(|done| done.result).collect();
     let realistic = (0..seeds).into_par_iter().map(|offset| {
         let seed = options.seed.wrapping_add(offset);
         let done = realistic_seed::<N>(description, options.model.as_ref(), &imperfect, seed)?;
@@ -127,7 +126,16 @@ fn sized<const N: usize>(
     });
     let realistic = realistic.collect::<Result<Vec<_>, ExperimentError>>()?;
     let realistic = (seeds > 0).then(|| Realistic::of(&realistic));
-    Ok(assemble(description, options, &jobs, results, realistic))
+    let mut demo = assemble(description, options, &jobs, results, realistic);
+    demo.summary.adapted = adapted;
+    if may_adapt(description, options) {
+        let tip_weight_n = tip_weight_n::<N>(description)?;
+        demo.summary.derived = Some(DerivedArm {
+            tip_weight_n,
+            allowed_error_m: scenario::allowed_error_m(tip_weight_n),
+        });
+    }
+    Ok(demo)
 }
 
 fn tracking(run: &Run) -> TrackingError {
@@ -205,24 +213,24 @@ impl Results {
     }
 
     fn probing(&mut self, stiffness: &[f64], kind: Probing) -> Vec<ProbingRun> {
-        let runs = stiffness.iter().map(|stiffness_n_per_m| {
+        let runs = stiffness.iter().filter_map(|stiffness_n_per_m| {
             let stiffness_n_per_m = *stiffness_n_per_m;
             let done = self.take(Job::Probing {
                 stiffness_n_per_m,
                 kind,
             });
-            ProbingRun {
+            (!done.run.is_left_out()).then(|| ProbingRun {
                 exploration: exploration(stiffness_n_per_m, &done),
                 run: done.run,
                 strokes: done.strokes,
-            }
+            })
         });
         runs.collect()
     }
 
     fn quadrant(&mut self, job: Job) -> ((Quadrant, Run), QuadrantSummary) {
         let done = self.take(job);
-        let (quadrant, _) = job.quadrant(&self.paths);
+        let quadrant = done.quadrant.unwrap_or_else(|| job.quadrant(&self.paths).0);
         let summary = QuadrantSummary {
             speed_m_per_s: quadrant.speed_m_per_s(),
             tracking: tracking(&done.run),
@@ -315,8 +323,14 @@ fn assemble(
             stribeck: exact(&mut results, true),
         },
         paper_letter: tracking(&paper_letter),
-        seeds: seed_runs.iter().map(|run| run.rms_error_m).collect(),
+        seeds: seed_runs
+            .iter()
+            .map(|run| run.rms_error_m)
+            .filter(|error_m| error_m.is_finite())
+            .collect(),
         seed_runs,
+        adapted: Vec::new(),
+        derived: None,
     };
     Demo {
         summary,

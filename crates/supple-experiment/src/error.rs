@@ -1,7 +1,7 @@
 //! Errors of experiments.
 
 use supple_core::ArmError;
-use supple_core::controller::{ConfigError, Fault, Refusal};
+use supple_core::controller::ConfigError;
 use supple_plant::PlantError;
 
 /// Error of an experiment. A fault of the controller *during* a run is a result, not an error.
@@ -45,12 +45,12 @@ pub enum ExperimentError {
         distance_m: f64,
     },
     /// The controller refused a request of the experiment.
-    #[error("{experiment}: {refusal}")]
+    #[error("{experiment}: {reason}")]
     Refused {
         /// Name of the experiment.
         experiment: String,
-        /// Reason.
-        refusal: Refusal,
+        /// The refusal in words, with the names of joints.
+        reason: String,
     },
     /// A fault during an experiment that must not fault.
     #[error("{experiment}: fault at {time_s:.2} s: {fault}")]
@@ -59,17 +59,20 @@ pub enum ExperimentError {
         experiment: String,
         /// Time since the start of the experiment \[s\].
         time_s: f64,
-        /// The fault.
-        fault: Fault,
+        /// The fault in words, with the names of joints.
+        fault: String,
     },
+    /// The caller ended a run before its end.
+    #[error("interrupted")]
+    Interrupted,
     /// A joint did not break away.
     #[error(
-        "joint {joint} did not move at {torque_nm} N m: check its brake and its stops, or choose \
+        "{joint} did not move at {torque_nm} N m: check its brake and its stops, or choose \
          another pose"
     )]
     Stuck {
-        /// Joint index.
-        joint: usize,
+        /// Label of the joint.
+        joint: String,
         /// Maximum torque applied \[N m\].
         torque_nm: f64,
     },
@@ -78,7 +81,7 @@ pub enum ExperimentError {
     FaultAtStart {
         /// Name of the experiment.
         experiment: String,
-        /// The fault.
-        fault: Fault,
+        /// The fault in words, with the names of joints.
+        fault: String,
     },
 }

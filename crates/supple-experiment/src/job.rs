@@ -107,6 +107,30 @@ pub(crate) struct JobResult {
     pub effective_mass_kg: f64,
     /// Damping of the law along base axis x \[N s/m\].
     pub damping_n_s_per_m: f64,
+    /// The quadrant that was run, if it was one.
+    pub quadrant: Option<Quadrant>,
+}
+
+impl JobResult {
+    /// Of a job that was left out: no samples, and errors that are not numbers.
+    pub fn left_out<const N: usize>(job: &Job, plan: Option<&Plan<N>>) -> JobResult {
+        JobResult {
+            run: Run::left_out(job.name()),
+            strokes: Vec::new(),
+            edges: Vec::new(),
+            free_rms_m: f64::NAN,
+            effective_mass_kg: 0.0,
+            damping_n_s_per_m: plan.map_or(0.0, |plan| plan.config.law.gains.damping_n_s_per_m.x),
+            quadrant: plan.and_then(|plan| quadrant_of(&plan.trajectory)),
+        }
+    }
+}
+
+fn quadrant_of(trajectory: &Trajectory) -> Option<Quadrant> {
+    match trajectory {
+        Trajectory::Quadrant(quadrant) => Some(*quadrant),
+        _ => None,
+    }
 }
 
 /// All runs, the longest first so that all cores finish at about the same time.
@@ -136,7 +160,12 @@ pub(crate) fn jobs() -> Vec<Job> {
 }
 
 impl Job {
-    fn name(&self) -> String {
+    /// Whether a fault is the expected result: of the equation as printed.
+    pub fn may_fault(&self) -> bool {
+        *self == Job::PaperLetter
+    }
+
+    pub fn name(&self) -> String {
         match self {
             Job::Sinusoid { speed } => format!("sinusoid_speed_{speed}"),
             Job::Arc => "arc".to_owned(),
@@ -327,6 +356,7 @@ impl Job {
             free_rms_m: free.rms(),
             effective_mass_kg: touch_mass_kg(plan, face_m),
             damping_n_s_per_m: plan.config.law.gains.damping_n_s_per_m.x,
+            quadrant: quadrant_of(&plan.trajectory),
         })
     }
 }

@@ -32,6 +32,7 @@
 
 #![forbid(unsafe_code)]
 
+mod adapted;
 mod approach_time;
 mod breakaway;
 pub mod calibrate;
@@ -44,6 +45,7 @@ mod excite;
 mod job;
 pub mod metrics;
 mod mismatch;
+pub mod paper_procedure;
 mod pose;
 pub mod probing;
 pub mod procedure;
@@ -60,11 +62,13 @@ pub mod scenario;
 mod setup;
 mod start;
 pub mod summary;
+pub mod teaching;
 mod trace;
 mod tracking;
 mod tracking_prediction;
 mod wiring;
 
+pub use adapted::Adapted;
 pub use approach_time::approach_s;
 pub use breakaway::{JointBreakaway, RATE_NM_PER_S, STOP_RAD, breakaway};
 pub use calibrate::{Calibrated, Calibration, ModelAccuracy, calibrate};

@@ -3,6 +3,7 @@
 use crate::error::ExperimentError;
 use crate::metrics::Rms;
 use crate::request_sequence::{RequestSequence, Step};
+use crate::run::in_words;
 use crate::scenario;
 use crate::setup::{Setup, Variant};
 use crate::start::spread_poses;
@@ -150,7 +151,7 @@ pub fn pose_start<const N: usize>(
     }
     Err(ExperimentError::Refused {
         experiment: experiment.to_owned(),
-        refusal: refused,
+        reason: in_words(config, &refused),
     })
 }
 

@@ -3,6 +3,7 @@
 use crate::error::ExperimentError;
 use crate::record::Recorder;
 use crate::rig::{Cycle, Rig};
+use crate::run::in_words;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -130,14 +131,14 @@ impl<const N: usize> RequestSequence<N> {
                 if let Some(refusal) = output.refusal {
                     return Err(ExperimentError::Refused {
                         experiment: self.name.clone(),
-                        refusal,
+                        reason: in_words(&self.config, &refusal),
                     });
                 }
                 if let Some(fault) = output.fault {
                     return Err(ExperimentError::Fault {
                         experiment: self.name.clone(),
                         time_s: cycle.measurement.time_s,
-                        fault,
+                        fault: in_words(&self.config, &fault),
                     });
                 }
                 on_step(&cycle, number)?;

@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 use supple_core::controller::{CycleRecord, Mode, Request};
 use supple_core::{Controller, Input, Output, State, Vector, step};
 use supple_learning::{Learner, Report, Scheduled};
-use supple_plant::{Measurement, Plant, PlantConfig, StepRecord, Truth};
+use supple_plant::{ControllerView, Measurement, Plant, PlantConfig, StepRecord, Truth};
 
 /// A controller connected to a simulated plant.
 pub struct Rig<const N: usize> {
@@ -128,6 +128,10 @@ impl<const N: usize> Rig<N> {
         }
         self.steps += 1;
         self.active = !output.torque_off && (self.active || output.mode == Mode::GravityHold);
+        self.plant.see_controller(ControllerView {
+            active: self.active,
+            mode: Some(output.mode),
+        });
         self.plant.short_motors([!self.active; N]);
         let torque_nm = match self.active {
             true => self.wiring.drive(&output.torque_nm),

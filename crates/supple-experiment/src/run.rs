@@ -7,7 +7,7 @@ use crate::rig::{Cycle, Rig};
 use crate::start::{active_joints, start_pose};
 use crate::trace::{JointTorque, Sample, Trace, xyz};
 use serde::Serialize;
-use supple_core::controller::{LearningSwitch, Mode, Request};
+use supple_core::controller::{JointLabel, LearningSwitch, Mode, NamesJoints, Request};
 use supple_core::dynamics::tip_pose;
 use supple_core::{Config, Controller, Trajectory, Vector};
 use supple_plant::PlantConfig;
@@ -69,6 +69,26 @@ pub struct Run {
     pub simulated_s: f64,
 }
 
+impl Run {
+    /// A run that was left out: no samples, and errors that are not numbers.
+    pub(crate) fn left_out(name: String) -> Run {
+        Run {
+            name,
+            rms_error_m: f64::NAN,
+            max_error_m: f64::NAN,
+            torque_rms: [JointTorque::default(); 2],
+            ended: None,
+            trace: Trace::default(),
+            simulated_s: 0.0,
+        }
+    }
+
+    /// Whether it was left out.
+    pub fn is_left_out(&self) -> bool {
+        self.trace.samples.is_empty()
+    }
+}
+
 /// Called after every cycle of a run with the time since the start of the trajectory \[s\], `None` before it.
 /// An error ends the run.
 pub type CycleCallback<'a, const N: usize> =
@@ -123,7 +143,7 @@ pub fn run<const N: usize>(
         if let Some(refusal) = output.refusal {
             return Err(ExperimentError::Refused {
                 experiment: plan.name.clone(),
-                refusal,
+                reason: in_words(config, &refusal),
             });
         }
         let tracking = matches!(output.mode, Mode::Track | Mode::Probe);
@@ -133,11 +153,11 @@ pub fn run<const N: usize>(
             if k < track_at {
                 return Err(ExperimentError::FaultAtStart {
                     experiment: plan.name.clone(),
-                    fault,
+                    fault: in_words(config, &fault),
                 });
             }
             let ended_s = (k - track_at) as f64 * config.period_s;
-            let fault = fault.to_string();
+            let fault = in_words(config, &fault);
             ended = Some((FaultEnd { ended_s, fault }, k + cycles(AFTER_FAULT_S)));
         }
         if let (Some(time_s), Some(reference)) = (time_s, output.reference) {
@@ -181,6 +201,18 @@ pub fn run<const N: usize>(
         trace,
         simulated_s: k as f64 * config.period_s,
     })
+}
+
+/// A joint as messages call it.
+pub(crate) fn joint_label<const N: usize>(config: &Config<N>, joint: usize) -> String {
+    JointLabel::new(joint, config.joint_names.as_slice()).to_string()
+}
+
+/// A fault or a refusal in words, with the names of the joints.
+pub(crate) fn in_words<const N: usize>(config: &Config<N>, message: &impl NamesJoints) -> String {
+    message
+        .with_names(config.joint_names.as_slice())
+        .to_string()
 }
 
 /// A pose slightly off `start`, so that the initial move is not trivial: each active joint is rotated in the

@@ -98,6 +98,12 @@ impl<const N: usize> Setup<N> {
         self.paths
     }
 
+    /// The same with the trajectories at another place or of another size.
+    #[must_use]
+    pub fn with_paths(self, paths: Paths) -> Self {
+        Setup { paths, ..self }
+    }
+
     /// Radius of the cap \[m\].
     pub fn tip_radius_m(&self) -> f64 {
         self.plant.tip_radius_m

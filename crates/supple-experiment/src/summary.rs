@@ -1,5 +1,6 @@
 //! Numerical results of a demo, as in `summary.json`.
 
+use crate::adapted::Adapted;
 use crate::metrics::LineFit;
 use crate::probing::Stroke;
 use crate::quadrant::Edge;
@@ -175,4 +176,21 @@ pub struct Summary {
     pub seeds: Vec<f64>,
     /// The same runs with their maximum errors and faults.
     pub seed_runs: Vec<TrackingError>,
+    /// Runs that the arm cannot perform at the size of its paths, with the size at which it can, or left out: their errors
+    /// are `null`, and probing runs are not in their list. Only for arms whose settings are derived from the URDF.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub adapted: Vec<Adapted>,
+    /// For such an arm: its weight at the tip and the error that it allows. Faults on the realistic plant are results of
+    /// it and no failures.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub derived: Option<DerivedArm>,
+}
+
+/// An arm whose settings are derived from its URDF.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct DerivedArm {
+    /// Root mean square, over the sinusoid, of the force at the tip that carries the gravity torques \[N\].
+    pub tip_weight_n: f64,
+    /// Error allowed on the sinusoid, see [`crate::scenario::allowed_error_m`] \[m\].
+    pub allowed_error_m: f64,
 }

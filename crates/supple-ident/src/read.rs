@@ -44,13 +44,19 @@ pub enum ReadError {
     },
 }
 
-/// All usable intervals of a file: MCAP if its extension is `.mcap`, otherwise CSV.
+/// The usable intervals of a file: MCAP if its extension is `.mcap`, otherwise CSV. Where an MCAP has an excitation, the
+/// moves between poses in it are left out: they hardly move some joints, and a verdict does not rest on them.
 ///
 /// # Errors
 /// [`ReadError`]; an MCAP of an arm with another number of joints.
 pub fn read_logs<const N: usize>(path: &Path) -> Result<Vec<Log>, ReadError> {
     if path.extension().is_some_and(|ending| ending == "mcap") {
-        read_mcap::<N>(path)
+        let stretches = stretches::<N>(path)?;
+        let excites = stretches.iter().any(|(mode, _)| *mode == Mode::Excite);
+        let kept = stretches
+            .into_iter()
+            .filter(|(mode, _)| !excites || *mode != Mode::Move);
+        Ok(kept.map(|(_, log)| log).collect())
     } else {
         Ok(vec![read_csv(path, N)?])
     }
@@ -61,10 +67,24 @@ pub fn read_logs<const N: usize>(path: &Path) -> Result<Vec<Log>, ReadError> {
 /// # Errors
 /// [`ReadError`].
 pub fn read_mcap<const N: usize>(path: &Path) -> Result<Vec<Log>, ReadError> {
+    Ok(stretches::<N>(path)?
+        .into_iter()
+        .map(|(_, log)| log)
+        .collect())
+}
+
+/// The intervals of free motion of an MCAP, each with its mode.
+fn stretches<const N: usize>(path: &Path) -> Result<Vec<(Mode, Log)>, ReadError> {
     let reader = Reader::open(path)?;
     let mut logs = Vec::new();
     let mut stretch: Vec<(f64, [f64; N], [f64; N])> = Vec::new();
     let (mut settled_s, mut mode) = (f64::NEG_INFINITY, None);
+    // A stretch ends where its mode does.
+    let mut finish = |stretch: &mut Vec<_>, mode: Option<Mode>| {
+        if let (Some(mode), Some(log)) = (mode, finished(std::mem::take(stretch))) {
+            logs.push((mode, log));
+        }
+    };
     for record in reader.records::<N>()? {
         let record = record?;
         let (t_s, value) = (record.time_ns as f64 * 1e-9, record.value);
@@ -75,15 +95,15 @@ pub fn read_mcap<const N: usize>(path: &Path) -> Result<Vec<Log>, ReadError> {
         if !moves || value.in_contact || value.mode() != mode {
             settled_s = t_s + SETTLE_S;
         }
-        mode = value.mode();
         if !moves || t_s < settled_s {
-            finish(&mut stretch, &mut logs);
+            finish(&mut stretch, mode);
+            mode = value.mode();
             continue;
         }
         let torque = core::array::from_fn(|j| value.torque_nm[j] - value.torques.ripple[j]);
         stretch.push((t_s, value.position_rad.into(), torque));
     }
-    finish(&mut stretch, &mut logs);
+    finish(&mut stretch, mode);
     if logs.is_empty() {
         return Err(ReadError::Table {
             file: path.display().to_string(),
@@ -94,20 +114,15 @@ pub fn read_mcap<const N: usize>(path: &Path) -> Result<Vec<Log>, ReadError> {
     Ok(logs)
 }
 
-fn finish<const N: usize>(stretch: &mut Vec<(f64, [f64; N], [f64; N])>, logs: &mut Vec<Log>) {
-    let rows = std::mem::take(stretch);
-    let (Some(first), Some(last)) = (rows.first(), rows.last()) else {
-        return;
-    };
-    if last.0 - first.0 < MIN_STRETCH_S {
-        return;
-    }
-    logs.push(Log {
+/// The log of a stretch; `None` if it is too short.
+fn finished<const N: usize>(rows: Vec<(f64, [f64; N], [f64; N])>) -> Option<Log> {
+    let (first, last) = (rows.first()?, rows.last()?);
+    (last.0 - first.0 >= MIN_STRETCH_S).then(|| Log {
         t_s: rows.iter().map(|row| row.0).collect(),
         q_rad: DMatrix::from_fn(rows.len(), N, |i, j| rows[i].1[j]),
         qd_rad_per_s: None,
         tau_nm: DMatrix::from_fn(rows.len(), N, |i, j| rows[i].2[j]),
-    });
+    })
 }
 
 /// Reads a table of numbers with a header line.

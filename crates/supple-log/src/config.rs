@@ -9,7 +9,8 @@ use crate::toml_types::{
 };
 use serde::{Deserialize, Serialize};
 use supple_core::config::{
-    Collision, ContactLatch, JointGains, Law, Limits, PlausibilityLimits, PoseLaw, Role, Workspace,
+    Collision, ContactLatch, JointGains, JointNames, Law, Limits, PlausibilityLimits, PoseLaw,
+    Role, Workspace,
 };
 use supple_core::learned::LearnedTerms;
 use supple_core::math::Vector3;
@@ -65,6 +66,9 @@ struct Stored<const N: usize> {
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Joint {
+    /// Older logs have no names here.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    name: String,
     armature_kg_m2: f64,
     #[serde(with = "RoleDef")]
     role: Role,
@@ -76,6 +80,7 @@ struct Joint {
 
 pub(crate) fn to_toml<const N: usize>(config: &Config<N>) -> Result<String, toml::ser::Error> {
     let Config {
+        joint_names,
         arm,
         friction,
         roles,
@@ -119,6 +124,7 @@ pub(crate) fn to_toml<const N: usize>(config: &Config<N>) -> Result<String, toml
         workspace: Some(WorkspaceDef::new(&workspace)),
         joints: (0..N)
             .map(|i| Joint {
+                name: joint_names.as_slice()[i].as_str().to_owned(),
                 armature_kg_m2: arm.armature()[i],
                 role: roles[i],
                 friction: friction[i],
@@ -142,7 +148,9 @@ pub(crate) fn from_toml<const N: usize>(text: &str) -> Result<Config<N>, String>
         stored.last_joint_from_tip,
         stored.gravity_m_per_s2,
     );
+    let names = joints.each_ref().map(|joint| joint.name.as_str());
     Ok(Config {
+        joint_names: JointNames::new(&names),
         arm: arm.map_err(|error| error.to_string())?,
         friction: joints.each_ref().map(|joint| joint.friction),
         roles: joints.each_ref().map(|joint| joint.role),

@@ -8,6 +8,7 @@ use mcap::records::MessageHeader;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
+use supple_core::config::JointNames;
 use supple_core::controller::CycleRecord;
 use supple_core::{Config, Input, Output};
 use supple_model::Description;
@@ -33,6 +34,7 @@ pub struct Writer<const N: usize> {
     channels: Channels,
     description: Description,
     base: String,
+    joint_names: JointNames<N>,
     next_step: u64,
     written: u64,
     events: u64,
@@ -79,6 +81,7 @@ impl<const N: usize> Writer<N> {
             channels,
             description: description.clone(),
             base,
+            joint_names: config.joint_names,
             next_step: 0,
             written: 0,
             events: 0,
@@ -98,7 +101,9 @@ impl<const N: usize> Writer<N> {
         extras: &Extras<N>,
     ) -> Result<(), LogError> {
         let step = extras.step.unwrap_or(self.next_step);
-        self.write_record(time_ns, &CycleRecord::new(step, input, output), extras)
+        let record =
+            CycleRecord::new(step, input, output).with_joint_names(output, &self.joint_names);
+        self.write_record(time_ns, &record, extras)
     }
 
     /// One step that is a record already, such as another process has sent; `extras.step` has no say.

@@ -5,7 +5,7 @@ use crate::description::Description;
 use crate::error::{ModelError, Reporter};
 use crate::settings::FrictionVelocity;
 use supple_core::config::{
-    self, ApparentInertia, Collision, ContactLatch, Gains, JointGains, Law, Limits,
+    self, ApparentInertia, Collision, ContactLatch, Gains, JointGains, JointNames, Law, Limits,
     PlausibilityLimits, PoseLaw, Role, RotationalGains,
 };
 use supple_core::controller::ConfigError;
@@ -103,6 +103,7 @@ impl Description {
         };
         let friction: [Friction; N] = core::array::from_fn(|i| self.joints[i].friction);
         let config = Config {
+            joint_names: JointNames::new(self.joint_names()),
             arm,
             friction,
             roles: core::array::from_fn(|i| match self.joints[i].held {

@@ -24,7 +24,11 @@ impl Description {
                 "the file",
                 "a xacro file must be expanded first",
                 "a xacro file",
-                format!("run: xacro {} > robot.urdf", name.path),
+                format!(
+                    "run `xacro {} > robot.urdf`, with its arguments as name:=value (without ROS: `pip install xacro`), and give \
+                     robot.urdf",
+                    name.path
+                ),
             ));
         }
         let tip = match &name.tip {

@@ -31,6 +31,18 @@ pub struct IdentifiedModel<'a, const N: usize> {
     pub source: &'a str,
 }
 
+/// Thresholds for a model that is not identified yet.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WideThresholds {
+    /// Collision thresholds in the modes with stiff joint loops, as a share of `collision_torque_nm` and of the tip's
+    /// threshold.
+    pub move_share: f64,
+    /// Unmodelled load at the tip \[N\].
+    pub load_n: f64,
+    /// Torque that may oppose the acceleration of a joint, as a share of its torque limit.
+    pub against_share: f64,
+}
+
 impl Description {
     /// Returns the same arm with another model.
     ///
@@ -82,29 +94,32 @@ impl Description {
         Description::from_text(&document.to_string(), self.urdf())
     }
 
-    /// Returns the same arm with thresholds for a model that is not identified yet: collisions in the modes with stiff joint
-    /// loops are detected at `move_share` of `collision_torque_nm` and of the tip's threshold, an unmodelled load at
-    /// `load_n` \[N\]. Greater values of the description stay.
+    /// Returns the same arm with thresholds for a model that is not identified yet. Greater values of the description stay.
     ///
     /// # Errors
     /// Any [`ModelError`] of the edited text.
-    pub fn with_wide_thresholds(
-        &self,
-        move_share: f64,
-        load_n: f64,
-    ) -> Result<Description, ModelError> {
+    pub fn with_wide_thresholds(&self, wide: &WideThresholds) -> Result<Description, ModelError> {
         let mut document = self.document()?;
         let settings = self.settings();
-        for (key, entry, wide) in [
+        for (key, entry, threshold) in [
             (
                 "collision",
                 "move_share",
-                move_share.max(settings.collision.move_share),
+                wide.move_share.max(settings.collision.move_share),
             ),
-            ("plausible", "load_n", load_n.max(settings.plausible.load_n)),
+            (
+                "plausible",
+                "load_n",
+                wide.load_n.max(settings.plausible.load_n),
+            ),
+            (
+                "plausible",
+                "against_share",
+                wide.against_share.max(settings.plausible.against_share),
+            ),
         ] {
             let section = document.entry(key).or_insert_with(toml_edit::table);
-            section[entry] = value(wide);
+            section[entry] = value(threshold);
         }
         for joint in 0..self.dof() {
             let table = self.joint_table(&mut document, joint)?;

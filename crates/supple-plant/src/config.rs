@@ -5,6 +5,7 @@ use crate::elasticity::Elasticity;
 use crate::error::{PlantError, entry};
 use crate::friction::LuGre;
 use crate::friction_variation::FrictionVariation;
+use crate::hand::Hand;
 use crate::scene::Scene;
 use supple_core::{Arm, Vector};
 
@@ -123,6 +124,8 @@ pub struct PlantConfig<const N: usize> {
     pub cycle_jitter: f64,
     /// Environment of the arm.
     pub scene: Scene,
+    /// A hand that guides the tip, if any.
+    pub hand: Option<Hand>,
     /// Seed of all noise.
     pub seed: u64,
 }
@@ -145,6 +148,7 @@ impl<const N: usize> PlantConfig<N> {
             cycle_s: 1e-3,
             cycle_jitter: 0.0,
             scene: Scene::default(),
+            hand: None,
             seed: 0,
         }
     }
@@ -199,6 +203,11 @@ impl<const N: usize> PlantConfig<N> {
             "a whole number of steps of step_s",
         )?;
         self.scene.validate()?;
+        if let Some(hand) = &self.hand
+            && let Err((name, value, _)) = hand.validate()
+        {
+            entry(false, name, value, "as a hand of the plant options")?;
+        }
         Ok(steps as usize)
     }
 }

@@ -5,6 +5,8 @@ use crate::config::{Hose, PlantConfig};
 use crate::elasticity::{LinkTorque, Rotors};
 use crate::error::{PlantError, entry};
 use crate::filter::Butterworth;
+use crate::hand::HandState;
+use crate::injection::ControllerView;
 use crate::joint_frictions::{JointFrictions, Load};
 use crate::noise::Noise;
 use crate::record::{Measurement, StepRecord, Truth};
@@ -28,6 +30,7 @@ pub struct Plant<const N: usize> {
     frictions: JointFrictions<N>,
     /// Motors behind elastic transmissions.
     rotors: Option<Rotors<N>>,
+    hand: Option<HandState>,
     steps: Vec<StepRecord>,
     steps_per_cycle: usize,
     /// Time from the scheduled to the actual start of the next cycle \[s\].
@@ -74,6 +77,7 @@ impl<const N: usize> Plant<N> {
             cycle_noise: Noise::new(config.seed, 3),
             frictions: JointFrictions::new(&config, transmission),
             rotors,
+            hand: config.hand.clone().map(HandState::new),
             steps: Vec::with_capacity(steps_per_cycle),
             steps_per_cycle,
             late_s: 0.0,
@@ -140,6 +144,13 @@ impl<const N: usize> Plant<N> {
         let lasts_s = cycle_s + next_s - self.late_s;
         self.late_s = next_s;
         lasts_s / self.steps_per_cycle as f64
+    }
+
+    /// Tells a hand that guides the arm what the controller does in the next cycle.
+    pub fn see_controller(&mut self, view: ControllerView) {
+        if let Some(hand) = &mut self.hand {
+            hand.see(view, self.truth.time_s);
+        }
     }
 
     /// Shorts exactly these motors from this call on: they brake in addition to any commanded torque. Initially none
@@ -317,7 +328,10 @@ impl<const N: usize> Plant<N> {
             torque -= q * hose.stiffness_nm_per_rad + hose.preload_nm;
         }
         let tip = self.tip_motion();
-        let contact = self.world.compute_tip_contact(&tip, dt_s);
+        let mut contact = self.world.compute_tip_contact(&tip, dt_s);
+        if let Some(hand) = &mut self.hand {
+            contact.force_n += hand.force_n(time_s, &tip.center_m, &tip.linear_m_per_s);
+        }
         let forces = Forces {
             torque_nm: &torque,
             damping_nm_s_per_rad: &transmitted.damping_nm_s_per_rad,

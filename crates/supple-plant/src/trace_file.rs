@@ -67,8 +67,11 @@ impl TraceFile {
             active: 0,
         };
         let motors: String = (1..=joints).map(|i| format!(",motor{i}_nm")).collect();
+        let speeds: String = (1..=joints)
+            .map(|i| format!(",joint{i}_rad_per_s"))
+            .collect();
         trace.line(&format!(
-            "time_ns,motors_in_torque_mode{motors},force_x_n,force_y_n,force_z_n,tip_x_m,tip_y_m,tip_z_m,\
+            "time_ns,motors_in_torque_mode{motors}{speeds},force_x_n,force_y_n,force_z_n,tip_x_m,tip_y_m,tip_z_m,\
              tip_speed_m_per_s,joint_speed_rad_per_s,kinetic_energy_j,mode,fault,injections"
         ));
         Ok(trace)
@@ -90,10 +93,15 @@ impl TraceFile {
         let force = plant.take_max_force_n();
         let truth = plant.truth();
         let tip = truth.tip_position_m;
+        let speeds = truth
+            .velocity_rad_per_s
+            .iter()
+            .map(|speed| format!(",{speed:.6}"));
         let code_text = |code: Option<u8>| code.map_or_else(String::new, |code| code.to_string());
         let line = format!(
-            "{time_ns},{active}{},{:.4},{:.4},{:.4},{:.6},{:.6},{:.6},{:.6},{:.6},{:.6},{},{},{}",
+            "{time_ns},{active}{}{},{:.4},{:.4},{:.4},{:.6},{:.6},{:.6},{:.6},{:.6},{:.6},{},{},{}",
             torques.collect::<String>(),
+            speeds.collect::<String>(),
             force.x,
             force.y,
             force.z,

@@ -46,6 +46,10 @@ pub fn run(args: &DemoArgs) -> Result<(), Failure> {
         print_line(&summary)?;
     } else {
         print_line(&format!("{}\n", table::table(&demo.summary)))?;
+        let adapted = table::adapted_lines(&demo.summary);
+        if !adapted.is_empty() {
+            print_line(&format!("of this arm:\n  {}\n", adapted.join("\n  ")))?;
+        }
     }
     let report = args.out.join("report.html");
     if !args.quiet {

@@ -35,7 +35,7 @@ struct Cli {
 
 /// Runs the program: parses its arguments and returns its exit code.
 pub fn run() -> ExitCode {
-    let cli = Cli::parse();
+    let cli: Cli = supple_cli::parse::parse();
     interrupt::install();
     let result = dispatch(&cli.command);
     console::exit_code(result, cli.command.json())

@@ -1,9 +1,10 @@
-//! Progress of the demo: a bar on a terminal, a line every 20 % otherwise, nothing in quiet mode.
+//! Progress of long work on standard error: of the demo a bar on a terminal and a line every 20 % otherwise, of work in
+//! steps a line as each begins.
 
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
 use std::sync::Mutex;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use supple_cli::console::print_status;
 use supple_experiment::Progress;
 
@@ -69,6 +70,57 @@ impl ProgressReporter {
     pub fn finish(&self) {
         if let ProgressReporter::Bar(bar) = self {
             bar.finish_and_clear();
+        }
+    }
+}
+
+/// Progress of work in steps: a line when a step begins, with the time since the start; on a terminal the running step
+/// shows its own time as well.
+pub struct Steps {
+    total: usize,
+    begun: usize,
+    start: Instant,
+    spinner: Option<ProgressBar>,
+    quiet: bool,
+}
+
+impl Steps {
+    /// So many steps are to come.
+    pub fn new(total: usize, quiet: bool) -> Steps {
+        Steps {
+            total,
+            begun: 0,
+            start: Instant::now(),
+            spinner: None,
+            quiet,
+        }
+    }
+
+    /// Ends the last step and begins one.
+    pub fn begin(&mut self, text: &str) {
+        self.finish();
+        self.begun += 1;
+        if self.quiet {
+            return;
+        }
+        let elapsed_s = self.start.elapsed().as_secs_f64();
+        let line = format!("{elapsed_s:5.1} s  {}/{}  {text}", self.begun, self.total);
+        if !std::io::stderr().is_terminal() {
+            return print_status(&line);
+        }
+        let spinner = ProgressBar::new_spinner();
+        if let Ok(style) = ProgressStyle::with_template("{msg}  {elapsed}") {
+            spinner.set_style(style);
+        }
+        spinner.set_message(line);
+        spinner.enable_steady_tick(Duration::from_millis(200));
+        self.spinner = Some(spinner);
+    }
+
+    /// Ends the last step; its line stays.
+    pub fn finish(&mut self) {
+        if let Some(spinner) = self.spinner.take() {
+            spinner.finish();
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::figures::Figure;
 use crate::sections::{Section, faults, sections};
+use crate::table::adapted_lines;
 use crate::units::{figures, percent, plain, seconds};
 use askama::Template;
 use supple_cli::exit::Failure;
@@ -20,6 +21,7 @@ struct Report<'a> {
     model: Option<&'a str>,
     logs: bool,
     faults: Vec<String>,
+    adapted: Vec<String>,
     parts: Vec<Part<'a>>,
     stiffness_tables: [StiffnessTable; 5],
     gravity_off: String,
@@ -68,6 +70,7 @@ pub fn html(
         model: summary.model.as_deref(),
         logs,
         faults: fault_lines(summary),
+        adapted: adapted_lines(summary),
         parts: parts.collect(),
         stiffness_tables: [
             stiffness_table(

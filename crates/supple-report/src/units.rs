@@ -1,5 +1,8 @@
 //! Formats numbers for people: three significant figures, a unit, a typographic minus sign.
 
+/// In place of a value of a run that was left out.
+pub const LEFT_OUT: &str = "left out";
+
 /// Three significant figures.
 pub fn figures(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
@@ -9,13 +12,19 @@ pub fn figures(value: f64) -> String {
     plain(value, usize::try_from(2 - magnitude).unwrap_or(0))
 }
 
-/// Fixed number of decimals.
+/// Fixed number of decimals; a value that a run left out gives is no number.
 pub fn plain(value: f64, decimals: usize) -> String {
+    if value.is_nan() {
+        return LEFT_OUT.to_owned();
+    }
     format!("{value:.decimals$}").replace('-', "\u{2212}")
 }
 
 /// Metres, in millimetres.
 pub fn mm(metres: f64) -> String {
+    if metres.is_nan() {
+        return LEFT_OUT.to_owned();
+    }
     format!("{} mm", plain(1e3 * metres, 1))
 }
 

@@ -19,7 +19,7 @@ use crate::timing::Timing;
 use core::hint::black_box;
 use core::sync::atomic::Ordering;
 use core::time::Duration;
-use supple_core::controller::{Controller, Mode, Request, State, step};
+use supple_core::controller::{Controller, CycleRecord, Mode, NamesJoints, Request, State, step};
 use supple_core::{Input, Output};
 use supple_ipc::message::{
     ArmState, CycleTiming, Drives, OperatorReply, OperatorRequest, Outcome, Telemetry, Text,
@@ -371,7 +371,11 @@ impl<const N: usize> ControlLoop<N> {
     fn answer(&mut self, source: &RequestSource, output: &Output<N>) {
         let (outcome, text) = match &output.refusal {
             None => (Outcome::Accepted, Text::EMPTY),
-            Some(refusal) => (Outcome::Refused, Text::of(refusal)),
+            Some(refusal) => {
+                let names = self.controller.config().joint_names;
+                let refusal = refusal.with_names(names.as_slice());
+                (Outcome::Refused, Text::of(&refusal))
+            }
         };
         match source {
             RequestSource::Operator(_, request) => {
@@ -449,13 +453,10 @@ impl<const N: usize> ControlLoop<N> {
         {
             std::thread::yield_now();
         }
-        let mut telemetry = Telemetry::new(
-            self.steps,
-            &last.arm,
-            &last.input,
-            &last.output,
-            last.timing,
-        );
+        let names = &self.controller.config().joint_names;
+        let record = CycleRecord::new(self.steps, &last.input, &last.output)
+            .with_joint_names(&last.output, names);
+        let mut telemetry = Telemetry::of(&record, &last.arm, last.timing);
         telemetry.states_dropped = self.states_dropped.0 + self.states_dropped.1;
         self.steps += 1;
         let _ = self.queues.telemetry.push(telemetry);

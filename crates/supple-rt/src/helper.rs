@@ -13,7 +13,7 @@ use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::{Builder, JoinHandle};
 use supple_core::Vector;
 use supple_core::codes::request_kind;
-use supple_core::controller::{Controller, Mode, Refusal, Request, check_motion};
+use supple_core::controller::{Controller, Mode, NamesJoints, Request, check_motion};
 use supple_ipc::message::{MAX_DOF, OperatorReply, OperatorRequest, Outcome, Text};
 use supple_ipc::{Backpressure, Domain, IpcError, OperatorServer};
 use supple_realtime::{diagnostics, pause};
@@ -34,8 +34,11 @@ type Pose = [f64; MAX_DOF];
 
 /// Checks whether a requested motion is feasible over its whole length, from its start pose if that is known
 /// ([`supple_core::controller::check_motion()`]). Returns the end pose of a move.
+///
+/// # Errors
+/// The refusal in words.
 pub type MotionCheck =
-    Box<dyn Fn(&OperatorRequest, Option<&Pose>) -> Result<Option<Pose>, Refusal> + Send>;
+    Box<dyn Fn(&OperatorRequest, Option<&Pose>) -> Result<Option<Pose>, String> + Send>;
 
 /// Feasibility check for an arm of `N` joints. Invalid requests pass; the loop refuses them.
 pub fn motion_check<const N: usize>(controller: Controller<N>) -> MotionCheck {
@@ -50,7 +53,10 @@ pub fn motion_check<const N: usize>(controller: Controller<N>) -> MotionCheck {
             _ => from_rad,
         };
         if let Some(from_rad) = from_rad {
-            check_motion(&controller, &from_rad, &request)?;
+            check_motion(&controller, &from_rad, &request).map_err(|refusal| {
+                let names = controller.config().joint_names;
+                refusal.with_names(names.as_slice()).to_string()
+            })?;
         }
         Ok(match &request {
             Request::Move { target_rad, .. } => Some(core::array::from_fn(|i| {
@@ -207,8 +213,7 @@ impl HelperState {
                 }
                 self.enqueue(request);
             }
-            Err(refusal) => {
-                let text = refusal.to_string();
+            Err(text) => {
                 self.reply(&reply_before_step(&request, Outcome::Refused, &text));
             }
         }

@@ -40,8 +40,14 @@ pub enum Command {
     /// Refine the model of a running system while its arm moves freely, or save what was learned.
     #[command(after_help = LEARNING)]
     Learning(LearningArgs),
-    /// Make a running system follow a trajectory; the arm moves to its start first.
+    /// Make a running system follow a trajectory, or the waypoints of a CSV file; the arm moves to its start first.
     Track(TrackArgs),
+    /// Let a running arm float and record how it is guided by hand.
+    #[command(after_help = CODES)]
+    Teach(TeachArgs),
+    /// Repeat a recorded motion on a running system, within its limits; the arm moves to the start first.
+    #[command(after_help = CODES)]
+    Play(PlayArgs),
     /// Make a running system probe for contact; the arm moves to the start first.
     Probe {
         /// The arm of the running system.
@@ -341,6 +347,10 @@ pub struct UpArgs {
     /// encoder-stuck:joint=1,at-s=2; see --help. May be repeated.
     #[arg(long, value_name = "SPEC", long_help = supple_plant::injection::HELP)]
     pub inject: Vec<Injection>,
+    /// Make an emulated Damiao motor or its bus misbehave, as in error:motor=2,code=B,at-s=3; `supple-emu --help` has the
+    /// kinds. May be repeated.
+    #[arg(long, value_name = "SPEC")]
+    pub misbehave: Vec<String>,
     /// The simulated or emulated arm.
     #[command(flatten)]
     pub plant_options: PlantArgs,
@@ -405,11 +415,80 @@ pub struct GainsArgs {
     pub system: SystemArgs,
 }
 
+/// What `track` follows.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum TrackTarget {
+    /// A trajectory by its name.
+    Named(TrackTrajectory),
+    /// A file of waypoints, or of a motion with times.
+    File(PathBuf),
+}
+
+impl core::str::FromStr for TrackTarget {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<TrackTarget, String> {
+        if let Ok(named) = TrackTrajectory::from_str(text, false) {
+            return Ok(TrackTarget::Named(named));
+        }
+        match text.contains(['.', '/']) {
+            true => Ok(TrackTarget::File(text.into())),
+            false => {
+                Err("give pose, sinusoid, arc, quadrant, or a file such as points.csv".to_owned())
+            }
+        }
+    }
+}
+
+/// Arguments of `teach`.
+#[derive(Clone, Debug, Args)]
+pub struct TeachArgs {
+    /// The recording, CSV; an existing file is replaced.
+    pub file: PathBuf,
+    /// End after this many seconds. Default: with Ctrl-C, or when float ends.
+    #[arg(long = "for", value_name = "SECONDS", value_parser = between(0.1, 3600.0))]
+    pub for_s: Option<f64>,
+    /// System to use.
+    #[command(flatten)]
+    pub system: SystemArgs,
+}
+
+/// Arguments of `play`.
+#[derive(Clone, Debug, Args)]
+pub struct PlayArgs {
+    /// The recording of `supple teach`, or another CSV file with the columns time_s,x_m,y_m,z_m.
+    pub file: PathBuf,
+    /// Stiffness for all axes, or X,Y,Z. Default: unchanged.
+    #[arg(long, value_name = "N/M", value_delimiter = ',', value_parser = between(0.0, 1e6))]
+    pub stiffness: Vec<f64>,
+    /// Damping for all axes, or X,Y,Z. Default: unchanged.
+    #[arg(long, value_name = "N S/M", value_delimiter = ',', value_parser = between(0.0, 1e6))]
+    pub damping: Vec<f64>,
+    /// Speed relative to the recording. Where a limit needs it, the motion is slower.
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = between(0.1, 10.0))]
+    pub speed: f64,
+    /// The arm of the running system.
+    #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
+    pub arm: String,
+    /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
+    #[arg(long)]
+    pub strict: bool,
+    /// What a URDF alone does not say.
+    #[command(flatten)]
+    pub urdf: UrdfArgs,
+    /// System to use.
+    #[command(flatten)]
+    pub system: SystemArgs,
+}
+
 /// Arguments of `track`.
 #[derive(Clone, Debug, Args)]
 pub struct TrackArgs {
-    /// The trajectory.
-    pub trajectory: TrackTrajectory,
+    /// `sinusoid`, `arc` or `quadrant`, trajectories of the paper; `pose`, which keeps the tip's position and turns it:
+    /// --rotate, --angle-rad, --duration, with at least six joints that are not held; or a CSV file with the columns
+    /// x_m,y_m,z_m of waypoints in base axes, passed as fast as the limits allow, and time_s if the motion has times.
+    #[arg(value_name = "NAME|FILE")]
+    pub trajectory: TrackTarget,
     /// Axis of a pose's turn in base coordinates, of any length but zero.
     #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', allow_hyphen_values = true, required_if_eq("trajectory", "pose"), value_parser = between(-1e3, 1e3))]
     pub rotate: Vec<f64>,
@@ -419,7 +498,8 @@ pub struct TrackArgs {
     /// Duration of the turn.
     #[arg(long = "duration", value_name = "SECONDS", requires = "rotate", default_value_t = 3.0, value_parser = between(1e-3, 3600.0))]
     pub duration_s: f64,
-    /// Speed factor relative to the paper.
+    /// Speed factor relative to the paper or to the times in a file; for waypoints 1 is 0.8 of the limits of speed and
+    /// acceleration, the most.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = between(1e-6, 1e6))]
     pub speed: f64,
     /// The arm of the running system.
@@ -454,6 +534,8 @@ impl Command {
                     | LearningAction::Save { system, .. },
             })
             | Command::Track(TrackArgs { system, .. })
+            | Command::Teach(TeachArgs { system, .. })
+            | Command::Play(PlayArgs { system, .. })
             | Command::Probe { system, .. }
             | Command::Status(system)
             | Command::Reset(system)

@@ -15,7 +15,7 @@ mod operate;
 mod up;
 mod view;
 
-use clap::{CommandFactory, Parser};
+use clap::CommandFactory;
 use cli::{Cli, Command};
 use std::os::unix::process::CommandExt;
 use std::process::ExitCode;
@@ -29,7 +29,7 @@ const REPORT: &str = "supple-report";
 
 /// Runs the program: parses its arguments and returns its exit code.
 pub fn run() -> ExitCode {
-    let cli = Cli::parse();
+    let cli: Cli = supple_cli::parse::parse();
     interrupt::install();
     let result = dispatch(&cli.command);
     console::exit_code(result, cli.command.json())
@@ -59,6 +59,8 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
         Command::Gains(args) => operate::gains(args),
         Command::Learning(args) => operate::learning(&args.action),
         Command::Track(args) => operate::track(args),
+        Command::Teach(args) => operate::teach(args),
+        Command::Play(args) => operate::play(args),
         Command::Probe {
             arm,
             strict,

@@ -8,6 +8,7 @@ use clap::{Args, Subcommand, ValueEnum};
 use std::path::PathBuf;
 use supple_experiment::procedure::StepName;
 use supple_ident::design::MAX_CANDIDATES;
+use supple_ident::paper::MIN_SAMPLES;
 use supple_ident::{FrictionChoice, FrictionColumns, Method};
 use supple_plant::Injection;
 
@@ -29,6 +30,12 @@ pub enum IdentificationCommand {
     /// the demo runs with the result. With --plant the steps are those for a real arm, also on simulated ones.
     #[command(after_help = CODES)]
     Calibrate(CalibrateArgs),
+    /// Identify the paper's own arm by the paper's own procedure, Eq. (3.7) and (3.8), in simulation.
+    ///
+    /// Coulomb friction from breakaway, m3 known, twelve columns, least squares over N samples of an excitation; beside
+    /// it this program's own fit of the same arm.
+    #[command(after_help = CODES)]
+    CalibratePaper(CalibratePaperArgs),
     /// Refit friction and payload from logs of a repeated motion.
     #[command(after_help = CODES)]
     Learn(LearnArgs),
@@ -199,6 +206,9 @@ pub struct IdentifyArgs {
     /// Print the summary as JSON.
     #[arg(long)]
     pub json: bool,
+    /// Print no progress.
+    #[arg(long)]
+    pub quiet: bool,
 }
 
 /// Arguments of `excite design`.
@@ -239,9 +249,8 @@ pub struct DesignArgs {
     /// Box that the tip stays in, base axes: minimum x, y, z, maximum x, y, z (m).
     #[arg(
         long,
-        value_name = "M",
+        value_name = "X,Y,Z,X,Y,Z",
         value_delimiter = ',',
-        num_args = 6,
         value_parser = between(-1e3, 1e3),
         allow_hyphen_values = true
     )]
@@ -349,9 +358,9 @@ pub struct CalibrateArgs {
     /// Model to start from: path of its TOML or folder. Default: the arm's own.
     #[arg(long, value_name = "PATH", requires = "on")]
     pub model: Option<PathBuf>,
-    /// Relative errors of the starting model in gravity and in friction, with the signs of --seed, for example 0.15,0.5.
-    /// For simulated arms.
-    #[arg(long, value_name = "GRAVITY,FRICTION", value_delimiter = ',', requires = "on", value_parser = between(0.0, 0.9))]
+    /// Relative errors of the starting model in gravity, in friction and, if given, in rotor inertia, with the signs of
+    /// --seed, for example 0.15,0.5,1. For simulated arms.
+    #[arg(long, value_name = "GRAVITY,FRICTION[,INERTIA]", value_delimiter = ',', requires = "on", value_parser = between(0.0, 1.0))]
     pub start_error: Vec<f64>,
     /// The swept space is free: do not ask.
     #[arg(long, requires = "on")]
@@ -427,6 +436,34 @@ pub struct CalibrateArgs {
     pub quiet: bool,
 }
 
+/// Arguments of `calibrate-paper`.
+#[derive(Clone, Debug, Args)]
+pub struct CalibratePaperArgs {
+    /// Number of samples, spread over the excitation: at least the 1600 of the paper.
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = MIN_SAMPLES,
+        value_parser = RangedU64ValueParser::<usize>::new().range(MIN_SAMPLES as u64..=1_000_000)
+    )]
+    pub samples: usize,
+    /// Seed of the starting model, of the design and of all noise.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// Leave out that the plant's friction depends on direction and load.
+    #[arg(long)]
+    pub no_load_friction: bool,
+    /// The simulated arm.
+    #[command(flatten)]
+    pub plant: PlantArgs,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+    /// Print no progress.
+    #[arg(long)]
+    pub quiet: bool,
+}
+
 /// Arguments of `learn`.
 #[derive(Clone, Debug, Args)]
 pub struct LearnArgs {
@@ -465,6 +502,7 @@ impl IdentificationCommand {
             IdentificationCommand::Excite(ExciteCommand::Run(args)) => args.json,
             IdentificationCommand::Breakaway(args) => args.json,
             IdentificationCommand::Calibrate(args) => args.json,
+            IdentificationCommand::CalibratePaper(args) => args.json,
             IdentificationCommand::Learn(args) => args.json,
         }
     }

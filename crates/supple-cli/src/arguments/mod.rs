@@ -11,8 +11,9 @@ mod urdf;
 pub use demo::DemoArgs;
 pub use effects::EffectsArgs;
 pub use identification::{
-    BreakawayArgs, CalibrateArgs, CalibrationPlant, Criterion, DesignArgs, ExciteCommand,
-    FrictionArg, IdentificationCommand, IdentifyArgs, LearnArgs, RunArgs, Solver, TorqueDelay,
+    BreakawayArgs, CalibrateArgs, CalibratePaperArgs, CalibrationPlant, Criterion, DesignArgs,
+    ExciteCommand, FrictionArg, IdentificationCommand, IdentifyArgs, LearnArgs, RunArgs, Solver,
+    TorqueDelay,
 };
 pub use log::{LogCommand, LogDataCommand, PlotArgs};
 pub use new::NewArgs;

@@ -21,7 +21,10 @@ pub(super) enum Activity<const N: usize> {
     Excite(Fourier<N>),
     Breakaway {
         ramp: Breakaway,
+        /// Set-points of the other joints; for the ramped joint the angle from which its motion is measured.
         from_rad: Vector<N>,
+        /// Torque of the ramped joint's position loop and friction at the entry, which the ramp is added to.
+        held_nm: f64,
     },
     Float,
     JointImpedance {

@@ -1,6 +1,7 @@
 //! The torque of each activity, term by term.
 
 use super::activity::Activity;
+use super::mode::Breakaway;
 use super::pose_task::{DIRECTIONS, PoseCycle};
 use super::state::State;
 use super::{Controller, checks, limiter};
@@ -25,7 +26,7 @@ impl<const N: usize> State<N> {
 
     /// Set-point of each joint's position loop, if one is active \[rad\].
     pub(super) fn joint_setpoints(&self, config: &Config<N>) -> [Option<f64>; N] {
-        if let Activity::Breakaway { ramp, from_rad } = &self.activity {
+        if let Activity::Breakaway { ramp, from_rad, .. } = &self.activity {
             return core::array::from_fn(|i| (i != ramp.joint).then_some(from_rad[i]));
         }
         if self.activity.has_joint_loops()
@@ -38,7 +39,9 @@ impl<const N: usize> State<N> {
         })
     }
 
-    /// Torque terms of the activity.
+    /// Torque terms of the activity, without those that every activity has. Inlined, so that the terms are written where
+    /// the cycle's record has them.
+    #[inline(always)]
     pub(super) fn activity_torques(
         &self,
         controller: &Controller<N>,
@@ -69,9 +72,7 @@ impl<const N: usize> State<N> {
                     held_friction: self.held_friction(config),
                     ..LawInput::of_law(law, friction, target, velocity, tip_force_n)
                 };
-                let mut torques = impedance(&config.roles, &self.terms, task, &law_input);
-                self.add_joint_loops_and_stops(config, &mut torques);
-                torques
+                impedance(&config.roles, &self.terms, task, &law_input)
             }
             (activity, ..) if activity.has_joint_loops() => self.joint_motion_torques(controller),
             (Activity::JointImpedance { .. }, ..) => self.joint_impedance_torques(controller),
@@ -107,13 +108,11 @@ impl<const N: usize> State<N> {
             return self.stopping(controller);
         }
         let velocity = &self.estimator.velocity_rad_per_s;
-        let mut torques = Torques {
+        Torques {
             gravity: self.terms.gravity,
             damping: -config.hold_damping_nm_s_per_rad.component_mul(velocity),
             ..Torques::zeros()
-        };
-        self.add_joint_loops_and_stops(config, &mut torques);
-        torques
+        }
     }
 
     /// Joint reference in the modes that move joints.
@@ -181,7 +180,6 @@ impl<const N: usize> State<N> {
                 (gains.stiffness_nm_per_rad[joint] * error).clamp(-limit, limit);
             torques.damping[joint] = gains.damping_nm_s_per_rad[joint] * velocity_error[joint];
         }
-        self.add_joint_loops_and_stops(config, &mut torques);
         torques
     }
 
@@ -200,7 +198,6 @@ impl<const N: usize> State<N> {
                     config.float_friction_share * config.friction[joint].torque_nm(velocity[joint]);
             }
         }
-        self.add_joint_loops_and_stops(config, &mut torques);
         torques
     }
 
@@ -219,18 +216,39 @@ impl<const N: usize> State<N> {
                 + gains.damping_nm_s_per_rad.component_mul(&velocity_error),
             ..self.joint_feedforward(config, &reference)
         };
-        if let Activity::Breakaway { ramp, .. } = &self.activity {
+        if let Activity::Breakaway { ramp, held_nm, .. } = &self.activity {
             torques.friction[ramp.joint] = ramp.rate_nm_per_s * self.activity_s(config);
-            torques.joint_pd[ramp.joint] = 0.0;
+            torques.joint_pd[ramp.joint] = *held_nm;
         }
-        self.add_joint_loops_and_stops(config, &mut torques);
         torques
+    }
+
+    /// Start of a breakaway ramp. What position loops have held until now goes on: their set-points for the other joints,
+    /// their torque for the ramped one, so that gravity which the model lacks does not move the arm.
+    pub(super) fn breakaway_from(&self, config: &Config<N>, ramp: Breakaway) -> Activity<N> {
+        let joint = ramp.joint;
+        let (mut from_rad, mut held_nm) = (self.position, 0.0);
+        if self.activity.has_joint_loops()
+            && let Some(reference) = self.joint_reference(config)
+        {
+            let error_rad = reference.position_rad[joint] - self.position[joint];
+            // The constant part of the friction model acts at rest, too.
+            held_nm = config.move_gains.stiffness_nm_per_rad[joint] * error_rad
+                + config.friction[joint].torque_nm(0.0);
+            from_rad = reference.position_rad;
+            from_rad[joint] = self.position[joint];
+        }
+        Activity::Breakaway {
+            ramp,
+            from_rad,
+            held_nm,
+        }
     }
 
     /// Leaves the breakaway mode for gravity hold once its joint has moved or the ramp has reached its
     /// limit.
     pub(super) fn end_breakaway(&mut self, config: &Config<N>) {
-        let Activity::Breakaway { ramp, from_rad } = self.activity else {
+        let Activity::Breakaway { ramp, from_rad, .. } = self.activity else {
             return;
         };
         let moved = abs(self.position[ramp.joint] - from_rad[ramp.joint]);
@@ -240,9 +258,13 @@ impl<const N: usize> State<N> {
         }
     }
 
-    /// Adds the terms that are active in every activity: held-joint loops, soft stops and the
-    /// workspace margin.
+    /// Adds the terms of every activity whose torques follow a fresh state and act on the arm: held-joint loops, soft
+    /// stops and the workspace margin. A fault has none of them.
+    #[inline(always)]
     pub(super) fn add_joint_loops_and_stops(&self, config: &Config<N>, torques: &mut Torques<N>) {
+        if !self.drives_active {
+            return;
+        }
         let velocity = &self.estimator.velocity_rad_per_s;
         if !self.activity.has_joint_loops() {
             for (joint, role) in config.roles.iter().enumerate() {
@@ -270,6 +292,7 @@ impl<const N: usize> State<N> {
 
     /// Bumpless transfer: blends out, over `handover_s`, the torque difference at the start of the
     /// activity.
+    #[inline(always)]
     pub(super) fn blend_torque(&mut self, config: &Config<N>, torques: &mut Torques<N>) {
         if self.handover_pending {
             self.handover_pending = false;
@@ -278,8 +301,10 @@ impl<const N: usize> State<N> {
         if self.fault.is_some() {
             self.handover = Vector::zeros();
         }
-        let (blended, ..) = smooth_step(self.activity_s(config) / config.handover_s);
-        torques.handover = self.handover * (1.0 - blended);
+        if self.handover != Vector::<N>::zeros() {
+            let (blended, ..) = smooth_step(self.activity_s(config) / config.handover_s);
+            torques.handover = self.handover * (1.0 - blended);
+        }
     }
 
     /// Updates the fallback torque: gravity at the last trusted pose, within the torque limits;

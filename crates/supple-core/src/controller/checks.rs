@@ -112,6 +112,7 @@ pub(super) fn joint_tracking<const N: usize>(
 }
 
 /// The sum of all terms; an error if a term or the sum is not finite.
+#[inline(always)]
 pub(super) fn total<const N: usize>(torques: &Torques<N>) -> Result<Vector<N>, Fault> {
     let total = torques.total();
     if all_finite(&total) {

@@ -13,10 +13,12 @@
 //! The guard keeps no latch: its caller ends the torque at the first reason and decides when it may
 //! return (`supple-drive/src/guard.rs`).
 
+use super::words::{JointLabel, NamesJoints};
 use crate::config::{Config, Limits};
-use crate::controller::estimator::Estimator;
+use crate::controller::estimator::{Estimator, EstimatorGains};
 use crate::controller::{Mode, MotorGroups, limit, limit_torque};
 use crate::math::{Vector, abs, all_finite};
+use crate::record::Text;
 use core::fmt;
 
 /// Ratio of joint speed to its limit at which the guard ends the torque, whatever the controller
@@ -60,17 +62,19 @@ pub enum GuardReason {
     NotInGravityHold,
 }
 
-impl fmt::Display for GuardReason {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
+impl NamesJoints for GuardReason {
+    fn write(&self, f: &mut fmt::Formatter<'_>, names: &[Text]) -> fmt::Result {
+        let label = |joint: usize| JointLabel::new(joint, names);
+        match *self {
             GuardReason::Overspeed {
                 joint,
                 value_rad_per_s,
                 limit_rad_per_s,
             } => write!(
                 f,
-                "joint {joint} turns at {value_rad_per_s:.3} rad/s, the drives end torque at \
-                 {limit_rad_per_s:.3} rad/s"
+                "{} turns at {value_rad_per_s:.3} rad/s, the drives end torque at \
+                 {limit_rad_per_s:.3} rad/s",
+                label(joint)
             ),
             GuardReason::NotStopped {
                 joint,
@@ -78,13 +82,20 @@ impl fmt::Display for GuardReason {
                 limit_rad_per_s,
             } => write!(
                 f,
-                "the controller is in a fault and joint {joint} still turns at {value_rad_per_s:.3} rad/s, \
-                 limit {limit_rad_per_s:.3} rad/s"
+                "the controller is in a fault and {} still turns at {value_rad_per_s:.3} rad/s, \
+                 limit {limit_rad_per_s:.3} rad/s",
+                label(joint)
             ),
             GuardReason::NotInGravityHold => f.write_str(
                 "the drives were activated while the controller was not in gravity hold",
             ),
         }
+    }
+}
+
+impl fmt::Display for GuardReason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.write(f, &[])
     }
 }
 
@@ -142,7 +153,8 @@ impl<const N: usize> DriveGuard<N> {
         let measured = position_rad.map(|angle| angle.filter(|angle| angle.is_finite()));
         match &mut self.estimator {
             Some(estimator) => {
-                estimator.update(&measured, self.elapsed_s, self.bandwidth_rad_per_s);
+                let gains = EstimatorGains::new(self.elapsed_s, self.bandwidth_rad_per_s);
+                estimator.update(&measured, &gains);
             }
             None if measured.iter().all(Option::is_some) => {
                 let position = Vector::from(measured.map(Option::unwrap_or_default));

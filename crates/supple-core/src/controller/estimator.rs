@@ -16,6 +16,33 @@ use crate::math::{Vector, abs, exp};
 /// to a subnormal number, which many processors handle a hundred times slower.
 const MIN_SPEED_RAD_PER_S: f64 = 1e-12;
 
+/// Gains of one update, which depend on the time between two measurements alone.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EstimatorGains {
+    elapsed_s: f64,
+    /// Share of the innovation that corrects the position.
+    position: f64,
+    /// Correction of the velocity per innovation \[1/s\].
+    velocity_per_s: f64,
+}
+
+impl EstimatorGains {
+    /// Gains for positions measured `elapsed_s` after the last ones; `bandwidth_rad_per_s` is `omega`.
+    pub fn new(elapsed_s: f64, bandwidth_rad_per_s: f64) -> Self {
+        let r = exp(-bandwidth_rad_per_s * elapsed_s);
+        EstimatorGains {
+            elapsed_s,
+            position: 1.0 - r * r,
+            velocity_per_s: (1.0 - r) * (1.0 - r) / elapsed_s,
+        }
+    }
+
+    /// Time between the measurements \[s\].
+    pub fn elapsed_s(&self) -> f64 {
+        self.elapsed_s
+    }
+}
+
 /// State of the estimator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimator<const N: usize> {
@@ -34,25 +61,15 @@ impl<const N: usize> Estimator<N> {
         }
     }
 
-    /// Updates the estimate with the positions measured `elapsed_s` after the last ones; `None` is
-    /// bridged by prediction. If finite positions are so far apart that the estimate overflows, it
-    /// restarts at rest.
-    ///
-    /// `bandwidth_rad_per_s` is `omega`.
-    pub fn update(
-        &mut self,
-        measured_rad: &[Option<f64>; N],
-        elapsed_s: f64,
-        bandwidth_rad_per_s: f64,
-    ) {
-        let r = exp(-bandwidth_rad_per_s * elapsed_s);
-        let (position_gain, velocity_gain) = (1.0 - r * r, (1.0 - r) * (1.0 - r) / elapsed_s);
+    /// Updates the estimate with the measured positions; `None` is bridged by prediction. If finite positions are so far
+    /// apart that the estimate overflows, it restarts at rest.
+    pub fn update(&mut self, measured_rad: &[Option<f64>; N], gains: &EstimatorGains) {
         for (i, measured) in measured_rad.iter().enumerate() {
-            self.position_rad[i] += self.velocity_rad_per_s[i] * elapsed_s;
+            self.position_rad[i] += self.velocity_rad_per_s[i] * gains.elapsed_s;
             if let Some(y) = measured {
                 let innovation = y - self.position_rad[i];
-                self.position_rad[i] += position_gain * innovation;
-                self.velocity_rad_per_s[i] += velocity_gain * innovation;
+                self.position_rad[i] += gains.position * innovation;
+                self.velocity_rad_per_s[i] += gains.velocity_per_s * innovation;
                 if abs(self.velocity_rad_per_s[i]) < MIN_SPEED_RAD_PER_S {
                     self.velocity_rad_per_s[i] = 0.0;
                 }

@@ -1,5 +1,7 @@
 //! Faults: why the controller stopped, with the measured value and the violated limit.
 
+use super::words::{JointLabel, NamesJoints};
+use crate::record::Text;
 use core::fmt;
 
 /// A latched fault. Joints are counted from 0.
@@ -193,17 +195,18 @@ impl Fault {
     }
 }
 
-impl fmt::Display for Fault {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+impl NamesJoints for Fault {
+    fn write(&self, f: &mut fmt::Formatter<'_>, names: &[Text]) -> fmt::Result {
+        let label = |joint: usize| JointLabel::new(joint, names);
         match *self {
             Fault::MeasurementNotFinite { joint: Some(joint) } => {
-                write!(f, "position of joint {joint} is not a finite number")
+                write!(f, "position of {} is not a finite number", label(joint))
             }
             Fault::MeasurementNotFinite { joint: None } => {
                 write!(f, "tip force is not a finite number")
             }
             Fault::EncoderLost { joint } => {
-                write!(f, "no encoder reply from joint {joint} for two cycles")
+                write!(f, "no encoder reply from {} for two cycles", label(joint))
             }
             Fault::EncoderJump {
                 joint,
@@ -211,8 +214,9 @@ impl fmt::Display for Fault {
                 limit_rad,
             } => write!(
                 f,
-                "encoder of joint {joint} jumped by {value_rad:.4} rad from the expected angle, limit \
-                 {limit_rad:.4} rad"
+                "encoder of {} jumped by {value_rad:.4} rad from the expected angle, limit \
+                 {limit_rad:.4} rad",
+                label(joint)
             ),
             Fault::StateStale { cycles, limit } => write!(
                 f,
@@ -227,7 +231,8 @@ impl fmt::Display for Fault {
                 limit_rad,
             } => write!(
                 f,
-                "joint {joint} at {value_rad:.4} rad is beyond its stop at {limit_rad:.4} rad"
+                "{} at {value_rad:.4} rad is beyond its stop at {limit_rad:.4} rad",
+                label(joint)
             ),
             Fault::JointSpeed {
                 joint,
@@ -235,7 +240,8 @@ impl fmt::Display for Fault {
                 limit_rad_per_s,
             } => write!(
                 f,
-                "joint {joint} turns at {value_rad_per_s:.3} rad/s, limit {limit_rad_per_s:.3} rad/s"
+                "{} turns at {value_rad_per_s:.3} rad/s, limit {limit_rad_per_s:.3} rad/s",
+                label(joint)
             ),
             Fault::TipSpeed {
                 value_m_per_s,
@@ -254,7 +260,8 @@ impl fmt::Display for Fault {
                 limit_rad,
             } => write!(
                 f,
-                "tracking error of joint {joint} is {value_rad:.4} rad, limit {limit_rad:.4} rad"
+                "tracking error of {} is {value_rad:.4} rad, limit {limit_rad:.4} rad",
+                label(joint)
             ),
             Fault::JointCollision {
                 joint,
@@ -262,7 +269,8 @@ impl fmt::Display for Fault {
                 limit_nm,
             } => write!(
                 f,
-                "external torque on joint {joint} is {value_nm:.2} N m, limit {limit_nm:.2} N m"
+                "external torque on {} is {value_nm:.2} N m, limit {limit_nm:.2} N m",
+                label(joint)
             ),
             Fault::TipCollision { value_n, limit_n } => write!(
                 f,
@@ -274,12 +282,14 @@ impl fmt::Display for Fault {
                 limit_rad,
             } => write!(
                 f,
-                "encoder of joint {joint} is unchanged while its reference has moved {value_rad:.4} rad, \
-                 limit {limit_rad:.4} rad"
+                "encoder of {} is unchanged while its reference has moved {value_rad:.4} rad, \
+                 limit {limit_rad:.4} rad",
+                label(joint)
             ),
             Fault::EncoderUnreliable { joint } => write!(
                 f,
-                "encoder replies of joint {joint} are lost too often, more than one in nine"
+                "encoder replies of {} are lost too often, more than one in nine",
+                label(joint)
             ),
             Fault::MotionAgainstTorque {
                 joint,
@@ -287,8 +297,9 @@ impl fmt::Display for Fault {
                 limit_nm,
             } => write!(
                 f,
-                "joint {joint} accelerates against a net torque of {value_nm:.2} N m, limit {limit_nm:.2} N m: \
-                 check the signs of encoder and motor"
+                "{} accelerates against a net torque of {value_nm:.2} N m, limit {limit_nm:.2} N m: \
+                 check the signs of encoder and motor",
+                label(joint)
             ),
             Fault::UnmodelledLoad { value_n, limit_n } => write!(
                 f,
@@ -326,6 +337,12 @@ impl fmt::Display for Fault {
                 write!(f, "torque term {term} is not a finite number")
             }
         }
+    }
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.write(f, &[])
     }
 }
 

@@ -81,6 +81,7 @@ pub fn limit<const N: usize>(
 }
 
 /// Applies the joint limits individually, then the motor limits by scaling whole groups.
+#[inline(always)]
 pub fn limit_torque<const N: usize>(
     limits: &Limits<N>,
     groups: &MotorGroups<N>,

@@ -27,22 +27,25 @@ mod step;
 mod stop;
 mod supervision;
 mod validate;
+mod words;
 
 pub use fault::{Fault, SafeAction};
 pub use learned_ramp::LEARNED_RAMP_S;
 pub use limiter::{Limited, MotorGroups, limit, limit_torque};
 pub use mode::{Breakaway, LearningSwitch, Mode, Refusal, Request, SetPoint};
-pub use motion_check::check_motion;
+pub use motion_check::{check_motion, check_references};
 pub use output::{CycleRecord, Input, Orientation, Output};
 pub use set_point::MAX_SET_POINT_AHEAD_S;
 pub use state::State;
 pub use step::step;
 pub use validate::ConfigError;
+pub use words::{JointLabel, NamesJoints, WithNames};
 
 use crate::config::Config;
 use crate::math::linalg::Cholesky;
 use crate::math::{Matrix, Vector};
 use crate::model::learned::LearnedBounds;
+use estimator::EstimatorGains;
 use nullspace::nullspace_damping_nm_s_per_rad;
 
 /// A validated configuration and the constants derived from it.
@@ -53,6 +56,8 @@ pub struct Controller<const N: usize> {
     /// `j2mp`.
     motor_from_joint: Matrix<N, N>,
     delay_s: f64,
+    /// The estimator's gains after one period.
+    one_period: EstimatorGains,
     torque_step_nm: Vector<N>,
     stop_step_nm: Vector<N>,
     nullspace_damping_nm_s_per_rad: Vector<N>,
@@ -86,6 +91,7 @@ impl<const N: usize> Controller<N> {
             motor_from_joint,
             groups: MotorGroups::new(&config.joint_from_motor),
             delay_s,
+            one_period: EstimatorGains::new(config.period_s, config.estimator_rad_per_s),
             torque_step_nm: config.limits.torque_rate_nm_per_s * config.period_s,
             stop_step_nm: Vector::from_fn(|i, _| {
                 let slow = config.limits.torque_rate_nm_per_s[i];
@@ -100,6 +106,17 @@ impl<const N: usize> Controller<N> {
     /// velocity estimate.
     pub fn delay_s(&self) -> f64 {
         self.delay_s
+    }
+
+    /// The estimator's gains after so many periods. One, the common case, needs no exponential.
+    fn estimator_gains(&self, periods: u64) -> EstimatorGains {
+        match periods {
+            1 => self.one_period,
+            _ => EstimatorGains::new(
+                periods as f64 * self.config.period_s,
+                self.config.estimator_rad_per_s,
+            ),
+        }
     }
 
     /// Damping of each joint in the null space of the position task \[N m s/rad\]: that of the law, or as much

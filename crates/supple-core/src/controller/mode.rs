@@ -1,8 +1,10 @@
 //! Modes, the requests that change them, and why a request is refused.
 
+use super::words::{JointLabel, NamesJoints};
 use crate::config::{Gains, JointGains, RotationalGains};
 use crate::math::{Vector, Vector3};
 use crate::model::learned::{JointMap, LearnedParameters};
+use crate::record::Text;
 use crate::trajectory::{Fourier, Rotation, Trajectory, TrajectoryError};
 use core::fmt;
 
@@ -264,8 +266,9 @@ pub enum Refusal {
     },
 }
 
-impl fmt::Display for Refusal {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+impl NamesJoints for Refusal {
+    fn write(&self, f: &mut fmt::Formatter<'_>, names: &[Text]) -> fmt::Result {
+        let label = |joint: usize| JointLabel::new(joint, names);
         match *self {
             Refusal::Mode { mode } => write!(f, "refused: not possible in mode {}", mode.name()),
             Refusal::Value {
@@ -275,17 +278,15 @@ impl fmt::Display for Refusal {
             } => write!(f, "refused: {entry} is {value}, the limit is {limit}"),
             Refusal::BeyondJointStop { joint, value_rad } => write!(
                 f,
-                "refused: joint {joint} would go to {value_rad:.4} rad, beyond its stop"
-            ),
+                "refused: {} would go to {value_rad:.4} rad, beyond its stop", label(joint)),
             Refusal::TooFast {
                 joint,
                 value_rad_per_s,
                 limit_rad_per_s,
             } => write!(
                 f,
-                "refused: joint {joint} would turn at {value_rad_per_s:.3} rad/s, limit \
-                 {limit_rad_per_s:.3} rad/s; give the move more time"
-            ),
+                "refused: {} would turn at {value_rad_per_s:.3} rad/s, limit \
+                 {limit_rad_per_s:.3} rad/s; give the move more time", label(joint)),
             Refusal::FarFromStart {
                 distance_m,
                 limit_m,
@@ -309,9 +310,8 @@ impl fmt::Display for Refusal {
                 limit_nm,
             } => write!(
                 f,
-                "refused: joint {joint} would need {value_nm:.2} N m, limit {limit_nm:.2} N m; request a \
-                 slower motion"
-            ),
+                "refused: {} would need {value_nm:.2} N m, limit {limit_nm:.2} N m; request a \
+                 slower motion", label(joint)),
             Refusal::Singular => f.write_str(
                 "refused: near a singular pose the tip cannot move and turn in every direction; move the arm \
                  away from it first",
@@ -322,6 +322,12 @@ impl fmt::Display for Refusal {
                 "refused: the motion would go {value_m:.3} m beyond border {border} of the workspace"
             ),
         }
+    }
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.write(f, &[])
     }
 }
 

@@ -39,7 +39,12 @@ pub fn check_motion<const N: usize>(
     match request {
         Request::Track(trajectory) => {
             trajectory.validate().map_err(Refusal::Trajectory)?;
-            check_trajectory(config, position_rad, trajectory)
+            let length_s = trajectory.length_s();
+            let samples = (0..=INTERVALS).map(|k| {
+                let time_s = length_s * f64::from(k) / f64::from(INTERVALS);
+                (time_s, trajectory.at(time_s))
+            });
+            check_references(controller, position_rad, samples)
         }
         Request::TrackPose {
             trajectory,
@@ -79,6 +84,24 @@ pub fn check_motion<const N: usize>(
     }
 }
 
+/// Checks a motion of the tip that set-points are to describe, from a pose near its first sample: times \[s\] and
+/// references, in order. Each sample is checked as [`check_motion`] checks those of a trajectory.
+///
+/// # Errors
+/// The first [`Refusal`] along the motion.
+pub fn check_references<const N: usize>(
+    controller: &Controller<N>,
+    position_rad: &Vector<N>,
+    references: impl IntoIterator<Item = (f64, Reference)>,
+) -> Result<(), Refusal> {
+    // The solution of each sample is the first guess of the next.
+    let mut q = *position_rad;
+    for (time_s, reference) in references {
+        check_point(controller.config(), &mut q, &reference, time_s)?;
+    }
+    Ok(())
+}
+
 /// Checks a minimum-jerk motion on a straight line in joint space.
 fn check_joint_line<const N: usize>(
     config: &Config<N>,
@@ -96,21 +119,6 @@ fn check_joint_line<const N: usize>(
             acceleration_rad_per_s2: displacement * (second_derivative / (duration_s * duration_s)),
         }
     })
-}
-
-fn check_trajectory<const N: usize>(
-    config: &Config<N>,
-    from_rad: &Vector<N>,
-    trajectory: &Trajectory,
-) -> Result<(), Refusal> {
-    // The solution of each sample is the first guess of the next.
-    let mut q = *from_rad;
-    let duration_s = trajectory.length_s();
-    for k in 0..=INTERVALS {
-        let time_s = duration_s * f64::from(k) / f64::from(INTERVALS);
-        check_point(config, &mut q, &trajectory.at(time_s), time_s)?;
-    }
-    Ok(())
 }
 
 /// Checks one point of a tip motion, and moves the joints there from a pose that is near.

@@ -4,7 +4,8 @@
 use super::fault::{Fault, SafeAction};
 use super::mode::{Mode, Refusal, Request};
 use super::pose_task::PoseCycle;
-use crate::config::{Gains, JointGains, RotationalGains};
+use super::words::NamesJoints;
+use crate::config::{Gains, JointGains, JointNames, RotationalGains};
 use crate::controller::codes::{self, FaultCode, RequestCode, RequestCodeError, VALUES};
 use crate::law::torques::Torques;
 use crate::math::{Matrix3, Vector, Vector3};
@@ -247,11 +248,11 @@ cycle! {
         /// The limit.
         number fault_limit = fault_code.limit;
         /// The fault in words.
-        text fault_text = output.fault.map_or(Text::EMPTY, |fault| Text::from_display(&fault));
+        text fault_text = in_words(output.fault.as_ref(), &[]);
         /// Kind of the refusal of this cycle's request.
         code refusal = codes::refusal(output.refusal.as_ref());
         /// The refusal in words.
-        text refusal_text = output.refusal.map_or(Text::EMPTY, |refusal| Text::from_display(&refusal));
+        text refusal_text = in_words(output.refusal.as_ref(), &[]);
     }
     both {
         /// Time since the mode was entered \[s\].
@@ -320,6 +321,12 @@ cycle! {
     }
 }
 
+fn in_words(message: Option<&impl NamesJoints>, names: &[Text]) -> Text {
+    message.map_or(Text::EMPTY, |message| {
+        Text::from_display(&message.with_names(names))
+    })
+}
+
 fn of_orientation<const N: usize>(
     output: &Output<N>,
     part: fn(&Orientation) -> Vector3<f64>,
@@ -344,6 +351,13 @@ impl<const N: usize> CycleRecord<N> {
     /// Words of the record of an arm with `joints` joints.
     pub const fn words(joints: usize) -> usize {
         words_of(Self::FIELDS, joints)
+    }
+
+    /// The record of a step with this output, its texts with these joint names.
+    pub fn with_joint_names(mut self, output: &Output<N>, names: &JointNames<N>) -> Self {
+        self.fault_text = in_words(output.fault.as_ref(), names.as_slice());
+        self.refusal_text = in_words(output.refusal.as_ref(), names.as_slice());
+        self
     }
 
     /// The input of the step, to the last bit.

@@ -162,8 +162,6 @@ impl<const N: usize> State<N> {
             nullspace_torque_nm: Some(&(posture.torque_nm(&self.position) * share)),
             ..LawInput::new(target, &self.estimator.velocity_rad_per_s)
         };
-        let mut torques = impedance(&config.roles, &self.terms, &pose.task, &law_input);
-        self.add_joint_loops_and_stops(config, &mut torques);
-        torques
+        impedance(&config.roles, &self.terms, &pose.task, &law_input)
     }
 }

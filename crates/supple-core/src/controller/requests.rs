@@ -142,13 +142,18 @@ impl<const N: usize> State<N> {
                 });
             }
             Request::Excite(series) => {
-                check_excitation(config, &self.position, &series)?;
+                let held = match self.activity.has_joint_loops() {
+                    true => self.joint_reference(config),
+                    false => None,
+                };
+                // A joint that friction or gravity keeps from its set-point goes on from there.
+                let from_rad = held.map_or(self.position, |held| held.position_rad);
+                check_excitation(config, &from_rad, &series)?;
                 self.enter(Activity::Excite(series));
             }
             Request::Breakaway(ramp) => {
                 check_breakaway(config, &ramp)?;
-                let from_rad = self.position;
-                self.enter(Activity::Breakaway { ramp, from_rad });
+                self.enter(self.breakaway_from(config, ramp));
             }
         }
         Ok(())

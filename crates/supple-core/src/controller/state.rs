@@ -7,7 +7,7 @@ use super::mode::Mode;
 use super::output::Input;
 use super::plausibility::Plausibility;
 use crate::config::{Config, Gains, JointGains, Role, RotationalGains};
-use crate::controller::estimator::Estimator;
+use crate::controller::estimator::{Estimator, EstimatorGains};
 use crate::controller::latch::Latch;
 use crate::controller::learned_ramp::Learned;
 use crate::controller::observer::MomentumObserver;
@@ -186,7 +186,12 @@ impl<const N: usize> State<N> {
     }
 
     /// Receives a state. Returns the time since the last one \[s\]; zero if it is a repetition.
-    pub(super) fn receive(&mut self, config: &Config<N>, input: &Input<N>) -> Result<f64, Fault> {
+    pub(super) fn receive(
+        &mut self,
+        controller: &Controller<N>,
+        input: &Input<N>,
+    ) -> Result<f64, Fault> {
+        let config = controller.config();
         let limit = config.limits.stale_cycles;
         let out_of_order = match self.cycle {
             Some(last) if input.cycle < last => {
@@ -210,8 +215,9 @@ impl<const N: usize> State<N> {
             }
             return force.map(|()| 0.0);
         }
-        let elapsed_s = periods as f64 * config.period_s;
-        self.receive_positions(config, &input.position_rad, elapsed_s)?;
+        let gains = controller.estimator_gains(periods);
+        let elapsed_s = gains.elapsed_s();
+        self.receive_positions(config, &input.position_rad, &gains)?;
         self.cycle = Some(input.cycle);
         self.stale = 0;
         if let Some(fault) = out_of_order {
@@ -230,8 +236,9 @@ impl<const N: usize> State<N> {
         &mut self,
         config: &Config<N>,
         measured_rad: &[Option<f64>; N],
-        elapsed_s: f64,
+        gains: &EstimatorGains,
     ) -> Result<(), Fault> {
+        let elapsed_s = gains.elapsed_s();
         let first = self.cycle.is_none();
         let tolerated = if first { 0 } else { 1 };
         for (joint, position) in measured_rad.iter().enumerate() {
@@ -265,8 +272,7 @@ impl<const N: usize> State<N> {
                 });
             }
         }
-        self.estimator
-            .update(measured_rad, elapsed_s, config.estimator_rad_per_s);
+        self.estimator.update(measured_rad, gains);
         for (joint, position) in measured_rad.iter().enumerate() {
             self.position[joint] = position.unwrap_or(self.estimator.position_rad[joint]);
         }

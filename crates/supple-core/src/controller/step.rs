@@ -23,7 +23,7 @@ pub fn step<const N: usize>(
     input: &Input<N>,
 ) -> Output<N> {
     let config = controller.config();
-    let (elapsed_s, state_valid) = match state.receive(config, input) {
+    let (elapsed_s, state_valid) = match state.receive(controller, input) {
         Ok(elapsed_s) => (elapsed_s, true),
         Err(fault) => {
             state.latch_fault(fault);
@@ -96,6 +96,7 @@ pub fn step<const N: usize>(
         input.tip_force_n,
     );
     if !(state.activity.is_torque_off() || state.fault.is_some() || state.is_stale(config)) {
+        state.add_joint_loops_and_stops(config, &mut torques);
         let tables = &config.ripple;
         torques.ripple = compensation_nm(tables, controller.motor_from_joint(), &state.position);
         if let Some(learned) = &learned {

@@ -24,6 +24,7 @@ fn is_regular<const N: usize>(task: &Task<N>) -> bool {
 }
 
 impl<const N: usize> State<N> {
+    #[inline(always)]
     pub(super) fn check(
         &self,
         config: &Config<N>,
@@ -58,6 +59,7 @@ impl<const N: usize> State<N> {
 
     /// Estimates the external torque and tip force, updates the contact latch, and runs the
     /// plausibility and collision checks. Returns the force also with a fault.
+    #[inline(always)]
     pub(super) fn observe(
         &mut self,
         config: &Config<N>,

@@ -1,10 +1,12 @@
 //! Validation of a configuration.
 
+use super::words::{JointLabel, NamesJoints};
 use crate::config::{ApparentInertia, Config, Gains, PoseLaw, Role};
 use crate::math::linalg::Cholesky;
 use crate::math::{Matrix, Vector};
 use crate::model::friction::FrictionError;
 use crate::model::learned::LearnedBounds;
+use crate::record::Text;
 use core::fmt;
 
 /// The invalid entry of a configuration. Joints are counted from 0.
@@ -20,15 +22,26 @@ pub struct ConfigError {
     pub must: &'static str,
 }
 
-impl fmt::Display for ConfigError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+impl NamesJoints for ConfigError {
+    fn write(&self, f: &mut fmt::Formatter<'_>, names: &[Text]) -> fmt::Result {
+        let label = |joint: usize| JointLabel::new(joint, names);
         let ConfigError {
             entry, value, must, ..
         } = self;
         match self.joint {
-            Some(joint) => write!(f, "{entry} of joint {joint} is {value}, it must be {must}"),
+            Some(joint) => write!(
+                f,
+                "{entry} of {} is {value}, it must be {must}",
+                label(joint)
+            ),
             None => write!(f, "{entry} is {value}, it must be {must}"),
         }
+    }
+}
+
+impl fmt::Display for ConfigError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.write(f, &[])
     }
 }
 

@@ -75,6 +75,7 @@ pub struct Task<const N: usize, const D: usize = 3> {
 impl<const N: usize> Task<N, 3> {
     /// The task of the tip's position. `None` where the mass matrix of the active joints is not
     /// positive definite.
+    #[inline(always)]
     pub fn new(terms: &Terms<N>, roles: &[Role; N]) -> Option<Task<N, 3>> {
         let jacobian = active_jacobian(terms, roles);
         let sigma = min_singular_value(&jacobian);

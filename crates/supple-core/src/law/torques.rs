@@ -22,6 +22,7 @@ macro_rules! torque_terms {
 
         impl<const N: usize> Torques<N> {
             /// No torque.
+            #[inline(always)]
             pub fn zeros() -> Self {
                 Torques { $($term: Vector::zeros(),)* }
             }
@@ -79,6 +80,7 @@ torque_terms! {
 
 impl<const N: usize> Torques<N> {
     /// Sum of all terms \[N m\].
+    #[inline(always)]
     pub fn total(&self) -> Vector<N> {
         let mut sum = Vector::zeros();
         for (_, term) in self.named() {

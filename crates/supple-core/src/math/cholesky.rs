@@ -6,7 +6,6 @@
 
 use crate::math::Matrix;
 use crate::math::lanes::{LANES, Lanes, Number};
-use core::array::from_fn;
 
 /// Factors of a symmetric positive definite matrix: `A = L D L^T`, `L` unit lower, `D` diagonal.
 #[derive(Clone, Copy, Debug)]
@@ -68,8 +67,10 @@ impl<const N: usize> Cholesky<N> {
                 column if column < C => b.data.0[column][i],
                 _ => 0.0,
             };
-            let mut group: [Lanes; N] =
-                from_fn(|i| Lanes::new([at(i, 0), at(i, 1), at(i, 2), at(i, 3)]));
+            let mut group = [Lanes::splat(0.0); N];
+            for i in 0..N {
+                group[i] = Lanes::new([at(i, 0), at(i, 1), at(i, 2), at(i, 3)]);
+            }
             self.solve_in_place(&mut group);
             for lane in 0..LANES.min(C - first) {
                 for i in 0..N {

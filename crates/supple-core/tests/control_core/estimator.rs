@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use supple_core::Vector;
-use supple_core::estimator::Estimator;
+use supple_core::estimator::{Estimator, EstimatorGains};
 
 use crate::support::property::check;
 
@@ -21,7 +21,7 @@ fn a_ramp_is_followed_without_error() {
             let cycles = (40.0_f64 / (omega * period_s)).ceil() as u32;
             for k in 1..=cycles {
                 let y = start + speed * f64::from(k) * period_s;
-                estimator.update(&[Some(y)], period_s, omega);
+                estimator.update(&[Some(y)], &EstimatorGains::new(period_s, omega));
             }
             let y = start + speed * f64::from(cycles) * period_s;
             let error = (estimator.velocity_rad_per_s[0] - speed).abs();
@@ -45,7 +45,10 @@ fn a_sudden_start_is_followed_as_a_critically_damped_loop() {
     let mut last = 0.0;
     let mut errors = Vec::new();
     for k in 1..=100 {
-        estimator.update(&[Some(speed * f64::from(k) * period_s)], period_s, omega);
+        estimator.update(
+            &[Some(speed * f64::from(k) * period_s)],
+            &EstimatorGains::new(period_s, omega),
+        );
         let velocity = estimator.velocity_rad_per_s[0];
         assert!(velocity >= last - 1e-12, "monotone at {k}");
         last = velocity;
@@ -74,7 +77,7 @@ fn velocity_lags_by_two_over_omega() {
             for k in 1..=cycles {
                 time_s = f64::from(k) * period_s;
                 let y = 0.5 * acceleration * time_s * time_s;
-                estimator.update(&[Some(y)], period_s, omega);
+                estimator.update(&[Some(y)], &EstimatorGains::new(period_s, omega));
             }
             let late_s = time_s - estimator.velocity_rad_per_s[0] / acceleration;
             prop_assert!(
@@ -98,8 +101,11 @@ fn noise(quantum: f64, omega: f64, period_s: f64, quanta_per_cycle: f64) -> f64 
     for k in 1..=count {
         let t = f64::from(k);
         let q = quanta_per_cycle * quantum * ((0.01 * t).sin() * 100.0 + 0.31 * t);
-        exact.update(&[Some(q)], period_s, omega);
-        quantised.update(&[Some((q / quantum).round() * quantum)], period_s, omega);
+        exact.update(&[Some(q)], &EstimatorGains::new(period_s, omega));
+        quantised.update(
+            &[Some((q / quantum).round() * quantum)],
+            &EstimatorGains::new(period_s, omega),
+        );
         let error = quantised.velocity_rad_per_s[0] - exact.velocity_rad_per_s[0];
         squares += error * error;
     }
@@ -136,11 +142,17 @@ fn a_lost_reading_is_coasted_over_at_the_last_velocity() {
     let mut estimator = Estimator::at_rest(Vector::<2>::zeros());
     for k in 1..=400 {
         let t = f64::from(k) * period_s;
-        estimator.update(&[Some(0.5 * t), Some(-0.3 * t)], period_s, omega);
+        estimator.update(
+            &[Some(0.5 * t), Some(-0.3 * t)],
+            &EstimatorGains::new(period_s, omega),
+        );
     }
     let before = estimator;
     let t = 401.0 * period_s;
-    estimator.update(&[None, Some(-0.3 * t)], period_s, omega);
+    estimator.update(
+        &[None, Some(-0.3 * t)],
+        &EstimatorGains::new(period_s, omega),
+    );
     assert_eq!(
         estimator.velocity_rad_per_s[0],
         before.velocity_rad_per_s[0]
@@ -151,7 +163,10 @@ fn a_lost_reading_is_coasted_over_at_the_last_velocity() {
     assert!((estimator.position_rad[1] + 0.3 * t).abs() < 1e-12);
     // The estimate continues as if no reading had been lost.
     let t = 402.0 * period_s;
-    estimator.update(&[Some(0.5 * t), Some(-0.3 * t)], period_s, omega);
+    estimator.update(
+        &[Some(0.5 * t), Some(-0.3 * t)],
+        &EstimatorGains::new(period_s, omega),
+    );
     assert!((estimator.velocity_rad_per_s[0] - 0.5).abs() < 1e-9);
 }
 
@@ -163,7 +178,10 @@ fn missing_cycles_equal_one_long_cycle() {
     for k in 0..600 {
         let elapsed_s = if k % 50 == 7 { 3e-3 } else { 1e-3 };
         time_s += elapsed_s;
-        estimator.update(&[Some(0.8 * time_s)], elapsed_s, omega);
+        estimator.update(
+            &[Some(0.8 * time_s)],
+            &EstimatorGains::new(elapsed_s, omega),
+        );
         if k > 300 {
             assert!((estimator.velocity_rad_per_s[0] - 0.8).abs() < 1e-9);
         }
@@ -175,12 +193,12 @@ fn missing_cycles_equal_one_long_cycle() {
 fn the_estimator_recovers_from_overflowing_readings() {
     let mut estimator = Estimator::at_rest(one(0.0));
     for y in [f64::MAX, -f64::MAX, f64::MAX, 0.0, -f64::MAX] {
-        estimator.update(&[Some(y)], 1e-3, 200.0);
+        estimator.update(&[Some(y)], &EstimatorGains::new(1e-3, 200.0));
         assert!(estimator.position_rad[0].is_finite(), "after {y}");
         assert!(estimator.velocity_rad_per_s[0].is_finite(), "after {y}");
     }
     for _ in 0..8000 {
-        estimator.update(&[Some(0.5)], 1e-3, 200.0);
+        estimator.update(&[Some(0.5)], &EstimatorGains::new(1e-3, 200.0));
     }
     assert!((estimator.position_rad[0] - 0.5).abs() < 1e-9);
     assert!(estimator.velocity_rad_per_s[0].abs() < 1e-9);
@@ -195,7 +213,7 @@ fn a_joint_that_comes_to_rest_has_no_subnormal_velocity() {
             let mut estimator = Estimator::at_rest(one(start));
             for k in 0..20_000_u32 {
                 let y = start + 0.7 * period_s * f64::from(k.min(40));
-                estimator.update(&[Some(y)], period_s, omega);
+                estimator.update(&[Some(y)], &EstimatorGains::new(period_s, omega));
                 let velocity = estimator.velocity_rad_per_s[0];
                 assert!(
                     velocity == 0.0 || velocity.abs() > 1e-13,

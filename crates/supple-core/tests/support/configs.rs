@@ -2,8 +2,8 @@
 
 use super::arms::{wam3, wam4, wam7};
 use supple_core::config::{
-    ApparentInertia, Collision, ContactLatch, FrictionVelocity, Gains, JointGains, Law, Limits,
-    PlausibilityLimits, PoseLaw, Role, Workspace,
+    ApparentInertia, Collision, ContactLatch, FrictionVelocity, Gains, JointGains, JointNames, Law,
+    Limits, PlausibilityLimits, PoseLaw, Role, Workspace,
 };
 use supple_core::learned::LearnedTerms;
 use supple_core::{Arm, Config, Friction, Matrix, RippleTable, Vector};
@@ -139,6 +139,7 @@ fn config<const N: usize>(
         collision: Collision::disabled(),
         plausible: PlausibilityLimits::disabled(),
         workspace: Workspace::UNBOUNDED,
+        joint_names: JointNames::NONE,
     }
 }
 

@@ -97,6 +97,43 @@ pub enum MisbehaviourKind {
     Wedged,
 }
 
+impl fmt::Display for Misbehaviour {
+    /// What begins, without its time.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(motor) = self.motor {
+            write!(f, "motor {} ", motor + 1)?;
+        }
+        match self.kind {
+            MisbehaviourKind::Error { status } => write!(f, "has an error: {status}"),
+            MisbehaviourKind::Silent => f.write_str("is silent"),
+            MisbehaviourKind::Reappears => f.write_str("loses its supply for a moment"),
+            MisbehaviourKind::Register { register, .. } => {
+                write!(f, "has another value in {register}")
+            }
+            MisbehaviourKind::Hot { celsius } => write!(f, "is at {celsius} degrees Celsius"),
+            MisbehaviourKind::Zero { offset_rad } => {
+                write!(f, "has its zero {offset_rad} rad elsewhere")
+            }
+            MisbehaviourKind::SwappedWith { other, same: false } => {
+                write!(f, "has exchanged its ids with motor {}", other + 1)
+            }
+            MisbehaviourKind::SwappedWith { other, same: true } => {
+                write!(f, "has the ids of motor {}", other + 1)
+            }
+            MisbehaviourKind::FirstWriteIgnored => f.write_str("ignores the next write"),
+            MisbehaviourKind::NoWatchdog => f.write_str("keeps its watchdog setting"),
+            MisbehaviourKind::ReplyLost { every } => write!(f, "loses one of {every} replies"),
+            MisbehaviourKind::Late { delay_ns } => {
+                write!(f, "replies {} us later", delay_ns / 1000)
+            }
+            MisbehaviourKind::Enabled => f.write_str("is enabled"),
+            MisbehaviourKind::Classic => f.write_str("answers with classic frames"),
+            MisbehaviourKind::BusOff => f.write_str("the host's controller is bus-off"),
+            MisbehaviourKind::Wedged => f.write_str("the adapter sends nothing any more"),
+        }
+    }
+}
+
 /// A specification that is not valid.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MisbehaviourError {

@@ -42,7 +42,7 @@ pub struct Motor {
     flash: Registers,
     status: Status,
     command: Option<MitCodes>,
-    /// Time of the last command \[ns\].
+    /// Time of the last command while enabled \[ns\].
     commanded_ns: u64,
     /// Position of the shaft, turns included \[rad\].
     position_rad: f64,
@@ -93,6 +93,11 @@ impl Motor {
     /// State.
     pub fn status(&self) -> Status {
         self.status
+    }
+
+    /// Time of the last command that it had while enabled \[ns\].
+    pub fn commanded_ns(&self) -> u64 {
+        self.commanded_ns
     }
 
     /// Bytes of a register, as a host would read them.
@@ -217,7 +222,9 @@ impl Motor {
         match request {
             Request::Mit(codes) => {
                 self.command = Some(codes);
-                self.commanded_ns = now_ns;
+                if self.status == Status::Enabled {
+                    self.commanded_ns = now_ns;
+                }
             }
             Request::Special(Special::Enable) => {
                 if self.status == Status::Disabled {

@@ -1,11 +1,11 @@
 //! The process with an arm of Damiao motors: in real time, or as its host advances it.
 
-use super::arm::DamiaoArm;
+use super::arm::{DamiaoArm, MotorEvent};
 use super::config::DamiaoConfig;
 use crate::error::EmulatorError;
 use crate::options::{Options, StartPose};
 use crate::real_time::{EmulatedArm, advance_to_bus_time, receive_host_frame};
-use supple_bus::virtual_time::LockstepResponder;
+use supple_bus::virtual_time::{LockstepResponder, Peer};
 use supple_bus::{Address, OwnerFolder, PacedResponder, SocketCan};
 use supple_can_frame::CanFrame;
 use supple_core::Vector;
@@ -99,13 +99,14 @@ pub(crate) fn run<const N: usize>(
         trace,
         until_ns: None,
         disabled: false,
+        reported: 0,
     };
     match (&address, options.virtual_time) {
         (Address::Folder(folder), true) => {
             let mut responder = LockstepResponder::open(&OwnerFolder::open(folder.clone())?)?;
             while !process.is_finished(stop) {
                 responder.serve(&mut process.arm, IDLE_NS)?;
-                process.write_trace();
+                process.report();
             }
         }
         (Address::Folder(folder), false) => {
@@ -114,14 +115,14 @@ pub(crate) fn run<const N: usize>(
             while !process.is_finished(stop) {
                 responder.serve(&mut process.arm)?;
                 process.arm.set_offset_ns(responder.offset_ns());
-                process.write_trace();
+                process.report();
             }
         }
         (Address::Interface(name), false) => {
             let mut can = SocketCan::open(name)?;
             while !process.is_finished(stop) {
                 advance_to_bus_time(&mut process.arm, &mut can)?;
-                process.write_trace();
+                process.report();
                 receive_host_frame(&mut process.arm, &mut can)?;
             }
         }
@@ -140,6 +141,8 @@ struct Process<const N: usize> {
     until_ns: Option<u64>,
     /// Whether all motors were disabled during the shutdown.
     disabled: bool,
+    /// Number of events that were reported on standard error.
+    reported: usize,
 }
 
 impl<const N: usize> Process<N> {
@@ -148,6 +151,46 @@ impl<const N: usize> Process<N> {
         motors
             .filter(|motor| motor.status() == Status::Enabled)
             .count()
+    }
+
+    /// Writes the trace, and reports new events.
+    fn report(&mut self) {
+        self.write_trace();
+        let events = self.arm.events();
+        // By the machine's clock, as the trace.
+        let offset_ns = self.arm.wall_ns() - self.arm.now_ns();
+        for (number, (time_ns, event)) in events.iter().enumerate().skip(self.reported) {
+            let time_s = (*time_ns + offset_ns) as f64 * 1e-9;
+            match event {
+                MotorEvent::Status(index, Status::CommunicationLost) => {
+                    let commanded_ns = self.arm.motors()[*index].commanded_ns();
+                    let since_ms = (*time_ns - commanded_ns) as f64 * 1e-6;
+                    diagnostics::post(format_args!(
+                        "supple-emu: {time_s:.4} s: motor {}: no torque, {since_ms:.1} ms after its last command",
+                        index + 1
+                    ));
+                }
+                MotorEvent::Status(index, status) if status.is_error() => diagnostics::post(
+                    format_args!("supple-emu: {time_s:.4} s: motor {}: {status}", index + 1),
+                ),
+                MotorEvent::Status(_, status) => {
+                    let mut motors = self.arm.motors().iter();
+                    if number + 1 == events.len() && motors.all(|motor| motor.status() == *status) {
+                        diagnostics::post(format_args!(
+                            "supple-emu: {time_s:.4} s: all motors {status}"
+                        ));
+                    }
+                }
+                MotorEvent::Flash(index, request) => diagnostics::post(format_args!(
+                    "supple-emu: {time_s:.4} s: motor {} writes flash: {request:?}",
+                    index + 1
+                )),
+                MotorEvent::Misbehaves(misbehaviour) => diagnostics::post(format_args!(
+                    "supple-emu: {time_s:.4} s: misbehaves: {misbehaviour}"
+                )),
+            }
+        }
+        self.reported = self.arm.events().len();
     }
 
     fn write_trace(&mut self) {

@@ -12,8 +12,9 @@ pub trait MotionArm<const N: usize> {
     /// Error of the arm or of its processes.
     type Error: From<ProcedureError>;
 
-    /// Runs the controller with this model from now on. The drives are idle meanwhile, and the motors brake; afterwards
-    /// the arm is in gravity hold with active drives.
+    /// Runs the controller with this model from now on. The drives are idle meanwhile, and the motors brake or the arm is
+    /// laid down; afterwards the drives are active, and the arm is in gravity hold or, where no brakes would stop it, in
+    /// the move mode at its pose, which holds against gravity that the model lacks.
     ///
     /// # Errors
     /// If the controller cannot be started with this model, or the drives do not become active.
@@ -32,7 +33,7 @@ pub trait MotionArm<const N: usize> {
     /// A refused request; a process or a log that is lost.
     fn perform(&mut self, name: &str, steps: &[Step<N>]) -> Result<Performed, Self::Error>;
 
-    /// Clears the fault of a stopped motion: the arm is in gravity hold with active drives.
+    /// Clears the fault of a stopped motion: the arm is held as by [`MotionArm::load`].
     ///
     /// # Errors
     /// If the fault persists.

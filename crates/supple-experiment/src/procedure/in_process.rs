@@ -6,6 +6,7 @@ use crate::error::ExperimentError;
 use crate::record::Recorder;
 use crate::request_sequence::Step;
 use crate::rig::Rig;
+use crate::run::in_words;
 use crate::wiring::Wiring;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -65,19 +66,50 @@ impl<const N: usize> InProcessArm<N> {
         })
     }
 
-    /// Runs a mode for a time; returns the fault that is latched at its end.
+    /// Runs a mode for a time; returns the fault that is latched at its end, in words.
     fn hold(
         &mut self,
         request: Request<N>,
         duration_s: f64,
-    ) -> Result<Option<Fault>, ProcedureError> {
+    ) -> Result<Option<String>, ProcedureError> {
         let rig = self.rig()?;
         let cycles = cycles(duration_s, rig.controller().config().period_s);
         let mut fault = None;
         for k in 0..cycles {
             fault = rig.cycle((k == 0).then_some(request)).output.fault;
         }
-        Ok(fault)
+        let config = rig.controller().config();
+        Ok(fault.map(|fault| in_words(config, &fault)))
+    }
+
+    /// Holds still: in gravity hold, or by position loops where no brakes would stop the arm.
+    fn settle(&mut self, motion: &str, remedy: &'static str) -> Result<(), ProcedureError> {
+        let without_brakes = self
+            .model
+            .as_ref()
+            .is_some_and(|model| model.bus().is_some());
+        let fault = if without_brakes {
+            let period_s = self.rig()?.controller().config().period_s;
+            self.hold(Request::GravityHold, period_s)?;
+            let target_rad = self.position_rad()?;
+            self.hold(
+                Request::Move {
+                    target_rad,
+                    duration_s: SETTLE_S,
+                },
+                SETTLE_S,
+            )?
+        } else {
+            self.hold(Request::GravityHold, SETTLE_S)?
+        };
+        match fault {
+            None => Ok(()),
+            Some(fault) => Err(ProcedureError::Stopped {
+                motion: motion.to_owned(),
+                fault,
+                remedy,
+            }),
+        }
     }
 
     fn performed(&mut self, name: &str, steps: &[Step<N>]) -> Result<Performed, ProcedureError> {
@@ -103,13 +135,13 @@ impl<const N: usize> InProcessArm<N> {
                 if let Some(refusal) = output.refusal {
                     return Err(ProcedureError::from(ExperimentError::Refused {
                         experiment: name.to_owned(),
-                        refusal,
+                        reason: in_words(&config, &refusal),
                     }));
                 }
                 if let Some(fault) = output.fault {
                     performed.stopped = Some(Stopped {
                         step: number,
-                        fault: fault.to_string(),
+                        fault: in_words(&config, &fault),
                         by_contact: is_contact(&fault),
                     });
                 }
@@ -181,14 +213,7 @@ impl<const N: usize> MotionArm<N> for InProcessArm<N> {
         }
         self.model = Some(model.clone());
         self.hold(Request::Idle, IDLE_S)?;
-        match self.hold(Request::GravityHold, SETTLE_S)? {
-            None => Ok(()),
-            Some(fault) => Err(ProcedureError::Stopped {
-                motion: "gravity hold".to_owned(),
-                fault: fault.to_string(),
-                remedy: super::HOLD_REMEDY,
-            }),
-        }
+        self.settle("holding still", super::HOLD_REMEDY)
     }
 
     fn position_rad(&mut self) -> Result<Vector<N>, ProcedureError> {
@@ -208,14 +233,10 @@ impl<const N: usize> MotionArm<N> for InProcessArm<N> {
             let _ = rig.cycle(None);
         }
         self.hold(Request::Reset, IDLE_S)?;
-        match self.hold(Request::GravityHold, SETTLE_S)? {
-            None => Ok(()),
-            Some(fault) => Err(ProcedureError::Stopped {
-                motion: "gravity hold after a fault".to_owned(),
-                fault: fault.to_string(),
-                remedy: "free the arm and clear the fault",
-            }),
-        }
+        self.settle(
+            "holding still after a fault",
+            "free the arm and clear the fault",
+        )
     }
 
     fn meanwhile<T: Send>(&mut self, work: impl FnOnce() -> T + Send) -> Result<T, ProcedureError> {

@@ -4,6 +4,7 @@ use crate::error::ExperimentError;
 use crate::excite::move_to;
 use crate::request_sequence::Step;
 use supple_core::controller::{Breakaway, Request};
+use supple_core::dynamics::crba;
 use supple_core::trajectory::{Fourier, HARMONICS};
 use supple_core::{Config, Vector};
 use supple_ident::IdentError;
@@ -24,6 +25,8 @@ const UNSEEN_SEED: u64 = 1000;
 
 /// Slope of the torque ramps that show which joint a motor moves \[N m/s\], and motion at which they stop \[rad\].
 pub const WIRING_RAMP: (f64, f64) = (15.0, 0.03);
+/// Maximum of that slope over the inertia of the joint \[rad/s^3\]: the joint has about 1 rad/s when its ramp stops.
+const WIRING_RAMP_PER_INERTIA: f64 = 200.0;
 /// Slope of the ramps that measure the breakaway torque \[N m/s\], and motion at which they stop \[rad\].
 pub const BREAKAWAY_RAMP: (f64, f64) = (0.4, 0.025);
 /// Maximum torque of a ramp \[N m\].
@@ -157,6 +160,16 @@ pub fn ramp<const N: usize>(
     let is_there = (pose_rad - from_rad).amax() < THERE_RAD;
     let approach = (!is_there).then(|| move_to(pose_rad, from_rad));
     approach.into_iter().chain(ramp).collect()
+}
+
+/// Slope of the ramp that shows whether a motor moves this joint \[N m/s\]: less for a light joint.
+pub fn wiring_slope_nm_per_s<const N: usize>(
+    config: &Config<N>,
+    pose_rad: &Vector<N>,
+    joint: usize,
+) -> f64 {
+    let inertia_kg_m2 = crba(&config.arm, pose_rad)[(joint, joint)];
+    WIRING_RAMP.0.min(WIRING_RAMP_PER_INERTIA * inertia_kg_m2)
 }
 
 /// Time that ramps in both directions take, for a model with these breakaway torques \[s\].

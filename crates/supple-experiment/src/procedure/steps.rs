@@ -2,7 +2,9 @@
 
 use super::arm::{Motion, MotionArm};
 use super::error::ProcedureError;
-use super::motions::{BREAKAWAY_RAMP, Motions, WIRING_RAMP, follow, ramp, ramps_s};
+use super::motions::{
+    BREAKAWAY_RAMP, Motions, WIRING_RAMP, follow, ramp, ramps_s, wiring_slope_nm_per_s,
+};
 use super::progress::{FinishedStep, FitQuality, Progress, SinusoidResult, StepName, write_whole};
 use super::sweep::Sweep;
 use super::wiring::{check_direction, check_gravity, check_ramp, difference_rad, ramp_result};
@@ -15,6 +17,7 @@ use crate::error::ExperimentError;
 use crate::excite::move_to;
 use crate::metrics::Rms;
 use crate::request_sequence::{Recording, Step};
+use crate::run::joint_label;
 use crate::scenario;
 use crate::start::start_pose;
 use std::path::PathBuf;
@@ -23,7 +26,7 @@ use supple_core::dynamics::gravity;
 use supple_core::trajectory::Fourier;
 use supple_core::{Config, Vector};
 use supple_ident::Log;
-use supple_model::Description;
+use supple_model::{Description, WideThresholds};
 
 /// Rest in which the torque at a standstill is measured \[s\].
 const REST_S: f64 = 1.0;
@@ -33,9 +36,20 @@ const FLOAT_S: f64 = 2.0;
 const GAINS_S: f64 = 0.2;
 /// Duration of the move back to the start of the sinusoid \[s\].
 const RETURN_S: f64 = 1.5;
-/// Share of the collision thresholds, and load at the tip \[N\], at which the arm stops while its model is unknown.
-const WIDE_MOVE_SHARE: f64 = 1.0;
-const WIDE_LOAD_N: f64 = 40.0;
+/// Thresholds at which the arm stops while its model is unknown.
+const WIDE: WideThresholds = WideThresholds {
+    move_share: 1.0,
+    load_n: 40.0,
+    // As in the description: motion against its torque is what a motor of the wrong sign makes.
+    against_share: 0.0,
+};
+/// The same for arms without brakes, whose motors may give two thirds of what is commanded: the observer takes a third of
+/// every torque for an external one.
+const WIDE_OF_WEAK_MOTORS: WideThresholds = WideThresholds {
+    move_share: 2.0,
+    against_share: 0.35,
+    ..WIDE
+};
 /// Attempts at a motion that contact stops.
 const ATTEMPTS: usize = 3;
 
@@ -225,8 +239,13 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
         ));
         let mut model = self.model(stage)?;
         if stage != Stage::Identified {
-            let wide = model.with_wide_thresholds(WIDE_MOVE_SHARE, WIDE_LOAD_N);
-            model = wide.map_err(ProcedureError::from)?;
+            let wide = match model.bus() {
+                Some(_) => WIDE_OF_WEAK_MOTORS,
+                None => WIDE,
+            };
+            model = model
+                .with_wide_thresholds(&wide)
+                .map_err(ProcedureError::from)?;
         }
         self.arm.load(&model)?;
         self.loaded = Some(stage);
@@ -357,12 +376,13 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
     ) -> Result<Recording, A::Error> {
         let up = direction > 0.0;
         let name = format!("wiring-{joint}-{}", if up { "up" } else { "down" });
-        let (rate_nm_per_s, stop_rad) = WIRING_RAMP;
+        let (_, stop_rad) = WIRING_RAMP;
+        let rate_nm_per_s = wiring_slope_nm_per_s(config, pose_rad, joint);
         let slope = (direction * rate_nm_per_s, stop_rad);
         let from_rad = self.arm.position_rad()?;
         let mut steps = ramp(config, &from_rad, pose_rad, joint, slope);
         if joint == 0 && up {
-            // The first ramp begins in gravity hold: no position loop has been tried yet.
+            // The first ramp begins where the arm is held: no move has been tried yet.
             let moves = |step: &Step<N>| matches!(step.request, Request::Move { .. });
             steps.retain(|step| !moves(step));
         }
@@ -482,10 +502,10 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
                 let done =
                     self.motion(&name, &|from| ramp(config, from, &pose_rad, joint, slope))?;
                 let found = done.motions.first().and_then(|motion| {
-                    sliding_torque_nm(&motion.recording, joint, direction * rate_nm_per_s)
+                    sliding_torque_nm(config, &motion.recording, joint, direction)
                 });
                 *torque_nm = found.ok_or(ProcedureError::from(ExperimentError::Stuck {
-                    joint,
+                    joint: joint_label(config, joint),
                     torque_nm: config.limits.joint_torque_nm[joint],
                 }))?;
             }

@@ -20,7 +20,9 @@ fn every_step_is_read_back_bit_exactly() {
     common::run(STEPS, |cycle| {
         let read = records.next().expect("a step").expect("complete");
         assert_eq!(read.time_ns, cycle.time_ns);
-        let record = CycleRecord::new(k, &cycle.input, &cycle.output);
+        let names = common::config().joint_names;
+        let record = CycleRecord::new(k, &cycle.input, &cycle.output)
+            .with_joint_names(&cycle.output, &names);
         assert_eq!(read.value, record);
         assert_eq!(read.value.input().expect("a known request"), cycle.input);
         assert_eq!(read.value.mode(), Some(cycle.output.mode));

@@ -5,6 +5,9 @@ use crate::description::Description;
 use crate::error::{ModelError, Reporter};
 use toml_edit::{ArrayOfTables, DocumentMut, Item, Table, Value, value};
 
+/// What the comment of a derived setting begins with.
+pub(super) const MARK: &str = " # derived:";
+
 /// The TOML of an arm while settings are added to it.
 pub(super) struct Writer {
     document: DocumentMut,
@@ -153,7 +156,7 @@ fn name_of(table: &Table) -> Option<&str> {
 
 /// Adds `key = value # why`.
 fn put(table: &mut Table, key: &str, mut new: Value, why: &str) {
-    new.decor_mut().set_suffix(format!(" # derived: {why}"));
+    new.decor_mut().set_suffix(format!("{MARK} {why}"));
     table.insert(key, Item::Value(new));
 }
 

@@ -59,7 +59,7 @@ impl IgnoredElements {
                 place(node),
                 "an element of xacro is a macro, its content would be lost",
                 format!("<xacro:{name}>"),
-                "expand the file first, as `xacro robot.urdf.xacro > robot.urdf` does",
+                "expand the file first, as `xacro robot.urdf.xacro > robot.urdf` does (without ROS: `pip install xacro`)",
             ));
         }
         let rejected = is_own(node)

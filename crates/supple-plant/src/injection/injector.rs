@@ -127,6 +127,7 @@ impl<const N: usize> Injector<N> {
     ) {
         self.trigger(view);
         self.begin_due(plant);
+        plant.see_controller(view);
         let (mut torque_nm, mut shorted) = (*torque_nm, shorted);
         if self.drives_idle() {
             torque_nm = Vector::zeros();

@@ -47,6 +47,7 @@ impl PlantOptions {
         config: PlantConfig<N>,
     ) -> Result<PlantConfig<N>, PlantError> {
         let mut config = config;
+        config.hand.clone_from(&self.hand);
         let seed = self.seed.map_or(config.seed, u64::from);
         let noise = |draw: Draw| Noise::new(seed, draw as u64);
         let signs = |draw, size: f64| {

@@ -1,5 +1,6 @@
 //! The options, each declared once: name, unit, range, what it is, where its usual size is from.
 
+use crate::hand::Hand;
 use serde::{Deserialize, Serialize};
 
 /// An option, for lists.
@@ -49,9 +50,12 @@ macro_rules! plant_options {
                 #[schemars(range(min = $min, max = $max))]
                 pub $name: Option<f64>,
             )*
+            /// A hand that guides the tip.
+            #[serde(skip_serializing_if = "Option::is_none")]
+            pub hand: Option<Hand>,
         }
 
-        /// All options except the seed, in the order of the file.
+        /// All options that are numbers, except the seed, in the order of the file.
         pub const OPTIONS: &[PlantOption] = &[$(PlantOption {
             name: stringify!($name),
             unit: $unit,

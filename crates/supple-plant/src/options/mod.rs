@@ -7,6 +7,13 @@
 //! base_tilt_rad = 0.0035
 //! ```
 //!
+//! A table `[hand]` puts a hand on the tip, see [`Hand`](crate::Hand):
+//!
+//! ```toml
+//! [hand]
+//! path = [[1.0, 0.0, 0.0, 0.0], [3.0, 0.1, 0.0, 0.05], [5.0, 0.0, 0.0, 0.0]]
+//! ```
+//!
 //! Sizes are seen at each joint unless the option says otherwise. Where an effect has a sign, a direction or a phase, each
 //! joint or motor draws its own from the seed; one effect draws the same whether or not others are on. Unknown keys
 //! and values out of range are rejected. [`PlantOptions::realistic`] is the named set that the demo uses.
@@ -18,6 +25,7 @@ pub use list::{OPTIONS, PlantOption, PlantOptions};
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use supple_model::Description;
 
 /// TOML of the set `realistic`.
 pub const REALISTIC: &str = include_str!("../../../../assets/plants/realistic.toml");
@@ -124,6 +132,16 @@ impl PlantOptions {
         Self::from_toml(REALISTIC, REALISTIC_NAME).expect("the built-in set is valid")
     }
 
+    /// The set of an arm: `openarm-realistic` for geared motors on a bus (`[bus]`), else `realistic`.
+    pub fn realistic_of(arm: &Description) -> PlantOptions {
+        match arm.bus() {
+            Some(_) => {
+                Self::from_toml(OPENARM_REALISTIC, SETS[1]).expect("the built-in set is valid")
+            }
+            None => Self::realistic(),
+        }
+    }
+
     /// The TOML of a built-in set.
     ///
     /// # Errors
@@ -160,7 +178,7 @@ impl PlantOptions {
 
     /// Whether all effects are off.
     pub fn is_none(&self) -> bool {
-        self.values().all(|(_, value)| value.is_none())
+        self.hand.is_none() && self.values().all(|(_, value)| value.is_none())
     }
 
     /// The options in force as one line, `name = value` separated by commas; empty without any.
@@ -168,7 +186,11 @@ impl PlantOptions {
         let set = self
             .values()
             .filter_map(|(option, value)| Some(format!("{} = {}", option.name, value?)));
-        set.collect::<Vec<_>>().join(", ")
+        let hand = self.hand.as_ref().map(|hand| {
+            let rows = hand.path.len() + hand.force.len();
+            format!("hand = {rows} rows")
+        });
+        set.chain(hand).collect::<Vec<_>>().join(", ")
     }
 
     /// The options in force as a note of a log, by the name `plant`; empty without any.
@@ -179,6 +201,15 @@ impl PlantOptions {
     }
 
     fn validate(&self, file: &str) -> Result<(), PlantOptionsError> {
+        if let Some(hand) = &self.hand {
+            hand.validate()
+                .map_err(|(option, value, must)| PlantOptionsError::Value {
+                    file: file.to_owned(),
+                    option,
+                    value,
+                    must,
+                })?;
+        }
         for (option, value) in self.values() {
             let Some(value) = value else { continue };
             let whole = !option.whole || value.fract() == 0.0;

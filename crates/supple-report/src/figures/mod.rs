@@ -21,7 +21,7 @@ mod trade_off;
 use plotters::drawing::DrawingAreaErrorKind;
 use plotters::prelude::*;
 use supple_cli::exit::Failure;
-use supple_experiment::Demo;
+use supple_experiment::{Demo, scenario};
 
 /// Why a figure cannot be drawn.
 #[derive(Debug, thiserror::Error)]
@@ -70,34 +70,73 @@ impl Figure {
     }
 }
 
-/// All figures, in the order of the report.
+/// All figures whose runs were not left out, in the order of the report.
 ///
 /// # Errors
 /// [`FigureError::Draw`].
 pub fn all(demo: &Demo) -> Result<Vec<Figure>, FigureError> {
-    let figure = |name, svg: Result<String, FigureError>| svg.map(|svg| Figure { name, svg });
-    [
-        figure(
+    let sinusoids = demo.sinusoids.iter().all(|(_, run)| !run.is_left_out());
+    let quadrants = demo.quadrants.iter().all(|(_, run)| !run.is_left_out());
+    let summary = &demo.summary;
+    let all = scenario::PROBING_STIFFNESS_N_PER_M.len();
+    let probing = [&demo.probing, &demo.probing_fade_off]
+        .iter()
+        .all(|runs| runs.len() == all);
+    let exact = &summary.sinusoid_exact_model;
+    let exact = exact.coulomb.rms_error_m.is_finite() && exact.stribeck.rms_error_m.is_finite();
+    type Draw<'a> = Box<dyn Fn() -> Result<String, FigureError> + 'a>;
+    let figures: [(&'static str, bool, Draw<'_>); 9] = [
+        (
             "figure_3a",
-            figure_3a::draw(&figure_3a::SinusoidRuns::of(demo)),
+            sinusoids,
+            Box::new(|| figure_3a::draw(&figure_3a::SinusoidRuns::of(demo))),
         ),
-        figure(
+        (
             "figure_3b",
-            figure_3b::draw(&figure_3b::quadrant_runs(demo)),
+            quadrants,
+            Box::new(|| figure_3b::draw(&figure_3b::quadrant_runs(demo))),
         ),
-        figure("figure_4", figure_4::draw(figure_4::samples(demo))),
-        figure("figure_5", figure_5::draw(&figure_5::probings(demo))),
-        figure("figure_6", figure_6::draw(&figure_6::Impulses::of(demo))),
-        figure("trade_off", trade_off::draw(&trade_off::points(demo))),
-        figure(
+        (
+            "figure_4",
+            sinusoids,
+            Box::new(|| figure_4::draw(figure_4::samples(demo))),
+        ),
+        (
+            "figure_5",
+            probing,
+            Box::new(|| figure_5::draw(&figure_5::probings(demo))),
+        ),
+        (
+            "figure_6",
+            probing,
+            Box::new(|| figure_6::draw(&figure_6::Impulses::of(demo))),
+        ),
+        (
+            "trade_off",
+            probing,
+            Box::new(|| trade_off::draw(&trade_off::points(demo))),
+        ),
+        (
             "paper_letter",
-            paper_letter::draw(&paper_letter::PaperLawRuns::of(demo)),
+            sinusoids && !demo.paper_letter.is_left_out(),
+            Box::new(|| paper_letter::draw(&paper_letter::PaperLawRuns::of(demo))),
         ),
-        figure("seeds", seeds::draw(&seeds::Seeds::of(demo))),
-        figure("arc", arc::draw(&demo.arc.trace.samples)),
-    ]
-    .into_iter()
-    .collect()
+        (
+            "seeds",
+            exact && !summary.seeds.is_empty(),
+            Box::new(|| seeds::draw(&seeds::Seeds::of(demo))),
+        ),
+        (
+            "arc",
+            !demo.arc.is_left_out(),
+            Box::new(|| arc::draw(&demo.arc.trace.samples)),
+        ),
+    ];
+    figures
+        .into_iter()
+        .filter(|(_, has_its_runs, _)| *has_its_runs)
+        .map(|(name, _, draw)| draw().map(|svg| Figure { name, svg }))
+        .collect()
 }
 
 /// Draws on a canvas of the given display size \[px\]; `alt_text` is the alternative text.

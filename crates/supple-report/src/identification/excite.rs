@@ -44,7 +44,14 @@ pub fn run(args: &DesignArgs) -> Result<(), Failure> {
             lower_m: [a, b, c],
             upper_m: [d, e, f],
         }),
-        _ => None,
+        [] => None,
+        _ => {
+            return Err(Failure::ValueCount {
+                option: "--workspace",
+                found: args.workspace.len(),
+                expected: "6: minimum x, y, z, maximum x, y, z".to_owned(),
+            });
+        }
     };
     let options = DesignOptions {
         period_s: args.period,

@@ -1,6 +1,7 @@
 //! `supple identify`: identifies a model from logs; the controller can load it.
 
 use super::report::{ReportInput, Summary, html, summary};
+use crate::progress::Steps;
 use std::path::Path;
 use supple_cli::arguments::{IdentifyArgs, TorqueDelay};
 use supple_cli::arms;
@@ -22,6 +23,9 @@ const HELD_OUT_FRACTION: f64 = 0.2;
 const SLOW_RAD_PER_S: f64 = 0.15;
 /// Number of models drawn from the uncertainty of the fit to predict the tracking error.
 const DRAWS: u64 = 5;
+
+/// Steps of an identification that are announced.
+const STEPS: usize = 4;
 
 /// Output files.
 pub const FILES: [&str; 4] = ["arm.urdf", "arm.toml", "report.html", "summary.json"];
@@ -112,6 +116,11 @@ fn run_with_dof<const N: usize>(arm: &Description, args: &IdentifyArgs) -> Resul
     let procedure = procedure(args, arm.settings().period_s);
     let moving = procedure.moving_joints(N)?;
     let mut warnings = Vec::new();
+    let mut steps = Steps::new(STEPS, args.quiet);
+    let logs = args.logs.len() + args.validate.len();
+    steps.begin(&format!(
+        "logs: reading {logs}, checking them against the arm, estimating delays"
+    ));
     let mut fitted = motions::<N>(&nominal, &args.logs, &moving, &procedure, &mut warnings)?;
     let mut held_out = motions::<N>(&nominal, &args.validate, &moving, &procedure, &mut warnings)?;
     if held_out.is_empty()
@@ -126,6 +135,11 @@ fn run_with_dof<const N: usize>(arm: &Description, args: &IdentifyArgs) -> Resul
         *motion = motion.part(0..cut);
     }
     let data: Vec<Motion> = fitted.iter().map(|(_, motion)| motion.clone()).collect();
+    let samples: usize = data.iter().map(Motion::samples).sum();
+    steps.begin(&format!(
+        "fit: {} joints, {samples} samples; friction columns and weights by cross-validation",
+        moving.len()
+    ));
     let mut fit: Fit<N> = if slow_limit_rad_per_s(args).is_some() {
         let with_fixed_prior = Procedure {
             prior_weight: procedure.prior_weight.or(Some(1.0)),
@@ -136,6 +150,7 @@ fn run_with_dof<const N: usize>(arm: &Description, args: &IdentifyArgs) -> Resul
         identify_motions(&nominal, &data, &moving, &procedure)?
     };
     fit.warnings.extend(warnings);
+    steps.begin(&format!("validation: {} held-out motions", held_out.len()));
     let mut validated: Vec<(String, Motion, Validation)> = Vec::new();
     for (name, motion) in held_out {
         let validation = fit.validate_motion(&motion)?;
@@ -149,6 +164,7 @@ fn run_with_dof<const N: usize>(arm: &Description, args: &IdentifyArgs) -> Resul
     let identified = fit
         .description(arm, None)?
         .with_move_collision(&thresholds)?;
+    steps.begin("trial runs: the sinusoid at 5 N/m with models drawn from the fit's uncertainty");
     let input = ReportInput {
         arm: &identified,
         fit: &fit,
@@ -160,6 +176,7 @@ fn run_with_dof<const N: usize>(arm: &Description, args: &IdentifyArgs) -> Resul
         held_out: validated,
         predicted_tracking: predict_tracking_error(&identified, &fit, DRAWS)?,
     };
+    steps.finish();
     let summary = summary(&input);
     write(&staging, &input, &summary)?;
     staging.publish()?;

@@ -7,6 +7,7 @@ mod excite;
 mod follow;
 mod identify;
 mod learn;
+mod paper;
 mod report;
 
 use supple_cli::arguments::{ExciteCommand, IdentificationCommand};
@@ -24,6 +25,7 @@ pub fn run(command: &IdentificationCommand) -> Result<(), Failure> {
         IdentificationCommand::Excite(ExciteCommand::Run(args)) => follow::run(args),
         IdentificationCommand::Breakaway(args) => breakaway::run(args),
         IdentificationCommand::Calibrate(args) => calibrate::run(args),
+        IdentificationCommand::CalibratePaper(args) => paper::run(args),
         IdentificationCommand::Learn(args) => learn::run(args),
     }
 }

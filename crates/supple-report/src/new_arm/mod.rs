@@ -6,7 +6,6 @@ use serde::Serialize;
 use std::io::{IsTerminal, Write as _};
 use std::path::{Path, PathBuf};
 use supple_cli::arguments::NewArgs;
-use supple_cli::arms;
 use supple_cli::console::{print_json, print_line, print_status};
 use supple_cli::exit::Failure;
 use supple_experiment::{Mismatch, Plan, Setup, Variant, run as simulate, scenario};
@@ -15,6 +14,15 @@ use supple_plant::Scene;
 
 /// Time of the first run on the sinusoid \[s\].
 const RUN_S: f64 = 5.0;
+/// What must be known about an arm, and no URDF says.
+const BEFORE_A_REAL_ARM: [&str; 6] = [
+    "sign and zero of every encoder and motor (`supple calibrate` checks the wiring first)",
+    "torque constants and transmission: [motors]",
+    "the real limits of position, speed and torque, not the URDF's",
+    "how drives and brakes behave without commands, and whether the arm falls: [bus], stow_rad",
+    "what stands around the arm: [workspace]",
+    "where the arm collides with itself: supple checks no collision of links",
+];
 /// Files of the result.
 const FILES: [&str; 3] = ["arm.toml", "arm.urdf", "arm.svg"];
 
@@ -23,6 +31,7 @@ const FILES: [&str; 3] = ["arm.toml", "arm.urdf", "arm.svg"];
 struct Summary {
     arm: String,
     folder: PathBuf,
+    tip: String,
     joints: Vec<String>,
     held: Vec<String>,
     tip_weight_n: f64,
@@ -70,8 +79,8 @@ pub fn run(args: &NewArgs) -> Result<(), Failure> {
     arm.save(&folder)?;
     write(&folder.join("arm.toml"), &with_heading(arm, &folder, args)?)?;
     write(&folder.join("arm.svg"), &svg)?;
-    // What was written is what will be read.
-    arms::load(&folder, false)?;
+    // What was written is what will be read; its warnings are those of the summary.
+    Description::load(&folder)?.completed()?;
     if args.json {
         return print_json(&summary);
     }
@@ -131,6 +140,7 @@ fn first_run<const N: usize>(completed: &Completed) -> Result<Summary, Failure> 
     Ok(Summary {
         arm: arm.name().to_owned(),
         folder: PathBuf::new(),
+        tip: arm.settings().tip_frame.clone(),
         joints: arm.joint_names().to_vec(),
         held: names(&|i| of_joint(i).is_some_and(|joint| joint.held.is_some())),
         tip_weight_n: tip_weight_n::<N>(arm)?,
@@ -175,6 +185,37 @@ fn write(path: &Path, text: &str) -> Result<(), Failure> {
         .map_err(|error| Failure::file("write", path, error))
 }
 
+/// Lines of the derived settings: one for each key, with the values of all joints that share its reason.
+fn settings_lines(derived: &[Setting]) -> Vec<String> {
+    // Key, reason, and the values by joint.
+    let mut groups: Vec<(&str, &str, Vec<String>)> = Vec::new();
+    for setting in derived {
+        let of_joint = setting.key.strip_prefix("joint `");
+        let (joint, key) = match of_joint.and_then(|rest| rest.split_once("` ")) {
+            Some((joint, key)) => (Some(joint), key),
+            None => (None, setting.key.as_str()),
+        };
+        // Beside the inertia itself this says nothing new.
+        if key == "armature_is_estimate" {
+            continue;
+        }
+        let value = match joint {
+            Some(joint) => format!("{joint} {}", setting.value),
+            None => setting.value.clone(),
+        };
+        let known =
+            |group: &&mut (&str, &str, Vec<String>)| group.0 == key && group.1 == setting.why;
+        match groups.iter_mut().find(known) {
+            Some(group) => group.2.push(value),
+            None => groups.push((key, &setting.why, vec![value])),
+        }
+    }
+    let groups = groups.into_iter();
+    groups
+        .map(|(key, why, values)| format!("  {key}: {}  ({why})", values.join(", ")))
+        .collect()
+}
+
 fn text(summary: &Summary) -> String {
     let list = |names: &[String]| match names {
         [] => "none".to_owned(),
@@ -186,15 +227,25 @@ fn text(summary: &Summary) -> String {
         .iter()
         .map(|line| format!("warning: {line}"))
         .collect();
+    let free: Vec<String> = summary
+        .joints
+        .iter()
+        .filter(|joint| !summary.held.contains(joint))
+        .cloned()
+        .collect();
     lines.push(format!(
-        "{}: {} joints, the law controls all but {}",
+        "{}: {} joints from the base to the tip `{}` (another: --tip LINK)",
         summary.arm,
         summary.joints.len(),
-        list(&summary.held)
+        summary.tip
     ));
-    lines.push(format!("{} settings derived:", summary.derived.len()));
-    let settings = summary.derived.iter();
-    lines.extend(settings.map(|s| format!("  {} = {}  ({})", s.key, s.value, s.why)));
+    lines.push(format!("  the law controls: {}", list(&free)));
+    lines.push(format!("  held at an angle: {}", list(&summary.held)));
+    lines.push(format!(
+        "{} settings derived; {folder}/arm.toml has each with its reason:",
+        summary.derived.len()
+    ));
+    lines.extend(settings_lines(&summary.derived));
     let ending = match &summary.fault {
         None => "no fault".to_owned(),
         Some(fault) => format!("it ended with a fault: {fault}"),
@@ -210,21 +261,51 @@ fn text(summary: &Summary) -> String {
         summary.tip_weight_n,
         1e3 * 0.01 * summary.tip_weight_n / scenario::STIFFNESS_N_PER_M
     ));
-    lines.push(format!(
-        "identification (supple excite, supple identify) finds masses, centres of mass, inertias and friction as torques show \
-         them, and the rotor inertias that are estimates now: {}; friction is not in the URDF for: {}",
-        list(&summary.estimated_rotors),
-        list(&summary.without_friction)
-    ));
     lines.push(
-        "before a real arm is touched you must know: the sign and zero of every encoder and motor, the torque constants and \
-         the transmission ([motors]), the real limits of position, speed and torque, how drives and brakes behave without \
-         commands, what stands around the arm ([workspace]), and whether the arm can collide with itself: none of it is in \
-         the URDF, and supple checks no collision of links"
+        "identification (`supple excite`, `supple identify`) finds masses, centres of mass, inertias and friction, as torques \
+         show them"
             .to_owned(),
     );
     lines.push(format!(
-        "{folder}/arm.toml, {folder}/arm.urdf, {folder}/arm.svg; next: supple demo --arm {folder}, or supple up --plant sim --arm {folder}"
+        "  rotor inertias that are estimates until then: {}",
+        list(&summary.estimated_rotors)
+    ));
+    lines.push(format!(
+        "  joints without friction in the URDF: {}",
+        list(&summary.without_friction)
+    ));
+    lines.push("before a real arm moves you must know what no URDF says:".to_owned());
+    lines.extend(BEFORE_A_REAL_ARM.map(|line| format!("  - {line}")));
+    lines.push(format!(
+        "written: {folder}/arm.toml, {folder}/arm.urdf, {folder}/arm.svg (open it in a browser)\n\
+         next: supple demo --arm {folder}, or supple up --plant sim --arm {folder}; docs/own_arm.md goes on from here"
     ));
     lines.join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Setting, settings_lines};
+
+    #[test]
+    fn settings_of_joints_with_one_reason_share_a_line() {
+        let setting = |key: &str, value: &str, why: &str| Setting {
+            key: key.to_owned(),
+            value: value.to_owned(),
+            why: why.to_owned(),
+        };
+        let lines = settings_lines(&[
+            setting("joint `a` armature_kg_m2", "0.1", "an estimate"),
+            setting("joint `a` armature_is_estimate", "true", "see above"),
+            setting("joint `b` armature_kg_m2", "0.2", "an estimate"),
+            setting("[paths] scale", "0.5", "the largest"),
+        ]);
+        assert_eq!(
+            lines,
+            [
+                "  armature_kg_m2: a 0.1, b 0.2  (an estimate)",
+                "  [paths] scale: 0.5  (the largest)",
+            ]
+        );
+    }
 }

@@ -47,7 +47,8 @@ pub fn sections(summary: &Summary) -> Vec<Section> {
     ]
 }
 
-/// Runs that ended with an unexpected fault. Equation (3.6) as printed is excluded: its instability is a result.
+/// Runs that ended with an unexpected fault. Equation (3.6) as printed is excluded: its instability is a result; so is the
+/// realistic plant for an arm whose settings are derived.
 pub fn faults(summary: &Summary) -> Vec<(String, &FaultEnd)> {
     let mut runs: Vec<(String, &Option<FaultEnd>)> = Vec::new();
     for at in &summary.sinusoid_by_speed {
@@ -57,6 +58,7 @@ pub fn faults(summary: &Summary) -> Vec<(String, &FaultEnd)> {
         ));
     }
     let found = summary.realistic.iter().flat_map(|found| &found.ended);
+    let found = found.filter(|_| summary.derived.is_none());
     let realistic = found.map(|ended| {
         let name = format!("realistic plant, seed {}", ended.seed);
         (name, &ended.fault)

@@ -201,6 +201,30 @@ fn a_calibration_prints_its_verdict_and_that_it_is_a_simulation() {
     }
 }
 
+/// Expected before the run: ten of twelve combinations; moments within 5 % of the plant's; gravity within 3 %.
+#[test]
+fn the_papers_procedure_finds_the_moments_of_the_papers_arm() {
+    let answer = run(&["calibrate-paper", "--json", "--quiet"]);
+    assert_eq!(answer.code, Some(0), "{}", answer.stderr);
+    let found: serde_json::Value = serde_json::from_str(&answer.stdout).expect("JSON");
+    assert_eq!(
+        (found["samples"].as_u64(), found["rank"].as_u64()),
+        (Some(1600), Some(10))
+    );
+    for name in ["m2r2", "m3r3"] {
+        let rows = found["combinations"].as_array().expect("rows");
+        let row = rows.iter().find(|row| row["name"] == name).expect("named");
+        let number = |key: &str| row[key].as_f64().expect("a number");
+        let error = number("found") / number("plant") - 1.0;
+        assert!(error.abs() < 0.05, "{name}: {error}");
+    }
+    let gravity = found["gravity_error_relative"].as_f64().expect("a number");
+    assert!(gravity < 0.03, "{gravity}");
+    let short = run(&["calibrate-paper", "--samples", "1599"]);
+    assert_eq!(short.code, Some(2));
+    assert!(short.stderr.contains("1600"), "{}", short.stderr);
+}
+
 #[test]
 fn help_lists_the_identification_commands() {
     let help = run(&["--help"]).stdout;

@@ -17,14 +17,16 @@ use supple_cli::arms;
 use supple_cli::console::{print_status, write_stderr_in_background};
 use supple_cli::exit::Failure;
 use supple_cli::interrupt;
+use supple_core::{Arm, Vector};
 use supple_experiment::calibrate::plant_of;
 use supple_experiment::procedure::{
     CalibratedArm, InProcessArm, LOGS, ProcedureOptions, calibrate_arm,
 };
-use supple_experiment::{Calibration, Mismatch};
+use supple_experiment::{Calibration, ExperimentError, Mismatch};
 use supple_ipc::Domain;
 use supple_model::{Description, IdentifiedModel, with_dof};
 use supple_plant::PlantOptions;
+use supple_plant::options::SETS;
 use terminal::Terminal;
 
 /// Options of the simulated arm, with their seed.
@@ -94,6 +96,29 @@ fn sized<const N: usize>(
     ended.map(|()| found)
 }
 
+/// Every rotor inertia too large by this fraction, or too small by as much; the seed says which.
+fn with_inertia_error<const N: usize>(
+    arm: &Arm<N>,
+    fraction: f64,
+    seed: u64,
+) -> Result<Arm<N>, ExperimentError> {
+    let signs = seed.wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 32;
+    let armature_kg_m2 = Vector::from_fn(|joint, _| {
+        let factor = match signs >> joint & 1 {
+            1 => 1.0 + fraction,
+            _ => 1.0 / (1.0 + fraction),
+        };
+        arm.armature()[joint] * factor
+    });
+    let changed = Arm::from_links(
+        *arm.links(),
+        armature_kg_m2,
+        arm.joint_from_tip(),
+        arm.gravity(),
+    );
+    Ok(changed?)
+}
+
 /// The model that the calibration starts from: `--model`, or the arm itself, with the errors of `--start-error`.
 fn start_model<const N: usize>(
     arm: &Description,
@@ -104,14 +129,15 @@ fn start_model<const N: usize>(
         Some(path) => arms::find(&path.display().to_string(), args.strict)?,
         None => arm.clone(),
     };
-    let (gravity, friction) = match args.start_error[..] {
+    let (gravity, friction, inertia) = match args.start_error[..] {
         [] => return Ok(model),
-        [gravity, friction] => (gravity, friction),
+        [gravity, friction] => (gravity, friction, 0.0),
+        [gravity, friction, inertia] => (gravity, friction, inertia),
         _ => {
             return Err(Failure::ValueCount {
                 option: "--start-error",
                 found: args.start_error.len(),
-                expected: "2, GRAVITY,FRICTION".to_owned(),
+                expected: "2 or 3, GRAVITY,FRICTION[,ROTOR INERTIA]".to_owned(),
             });
         }
     };
@@ -125,9 +151,10 @@ fn start_model<const N: usize>(
         seed,
     };
     let changed = errors.apply(&model.config::<N>()?);
-    let changed = changed.map_err(supple_experiment::ExperimentError::from)?;
+    let changed = changed.map_err(ExperimentError::from)?;
+    let changed_arm = with_inertia_error(&changed.arm, inertia, seed)?;
     Ok(model.with_model(&IdentifiedModel {
-        arm: &changed.arm,
+        arm: &changed_arm,
         friction: &changed.friction,
         ripple: None,
         source: "the arm's own model with errors, as a start for a calibration",
@@ -153,6 +180,7 @@ fn up_args(args: &CalibrateArgs, on: CalibrationPlant) -> Result<UpArgs, Failure
         tare: false,
         block_m: None,
         inject: args.inject.clone(),
+        misbehave: Vec::new(),
         plant_options: seeded(args)?,
         trace: None,
         rate_hz: None,
@@ -171,18 +199,19 @@ fn up_args(args: &CalibrateArgs, on: CalibrationPlant) -> Result<UpArgs, Failure
 /// The options of the plant with the seed: a file in the folder of the results.
 fn seeded(args: &CalibrateArgs) -> Result<PlantArgs, Failure> {
     let options = args.plant.options()?;
-    if !args.plant.realistic || options.seed.is_some() {
-        let file = args.plant.plant_options.as_deref();
+    let file = args.plant.plant_options.as_deref();
+    let named = file.and_then(Path::to_str);
+    let set = match args.plant.realistic {
+        true => Some("realistic"),
+        false => named.filter(|name| SETS.contains(name)),
+    };
+    let Some(set) = set.filter(|_| options.seed.is_none()) else {
         return Ok(PlantArgs {
             plant_options: file.map(|file| PathBuf::from(absolute(&file.display().to_string()))),
             ..args.plant.clone()
         });
-    }
-    let text = format!(
-        "{}\nseed = {}\n",
-        PlantOptions::set("realistic")?,
-        args.seed
-    );
+    };
+    let text = format!("{}\nseed = {}\n", PlantOptions::set(set)?, args.seed);
     let file = args.out.join(PLANT_OPTIONS);
     supple_files::write_atomic(&file, text.as_bytes())
         .map_err(|error| Failure::file("write", &file, error))?;

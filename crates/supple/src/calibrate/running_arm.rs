@@ -24,6 +24,10 @@ use supple_realtime::{Stop, pause};
 const MODEL: &str = "controller";
 /// Timeout for a process to join, for a reply and for telemetry.
 const TIMEOUT: Duration = Duration::from_secs(20);
+/// Time for which an arm without a pendant may take to become active \[s\], and the number of attempts: laying down takes
+/// some ten seconds.
+const ENABLING_S: f64 = 1.0;
+const ENABLING_ATTEMPTS: usize = 40;
 /// Timeout for an operator to activate a real arm.
 const ACTIVATION_TIMEOUT: Duration = Duration::from_secs(300);
 /// Longest wait for one telemetry.
@@ -230,9 +234,59 @@ impl<const N: usize> RunningArm<N> {
         self.children.start(&self.plan.clock_owner)
     }
 
-    /// Gravity hold with active drives.
+    /// An arm without a pendant is active soon after gravity hold wants torque. After a loss, as of the controller, it is
+    /// laid down first, and its motors are enabled only if idle was requested since.
+    fn enable(&mut self) -> Result<(), Failure> {
+        let period_s = self.model.settings().period_s;
+        let cycles = |time_s: f64| (time_s / period_s) as u64;
+        for _ in 0..ENABLING_ATTEMPTS {
+            self.request(&Request::GravityHold)?;
+            let since = self.last.as_ref().map_or(0, |last| last.state.cycle);
+            self.wait_for(TIMEOUT, |telemetry| {
+                telemetry.state.drives() == Drives::Active
+                    || telemetry.state.cycle >= since + cycles(ENABLING_S)
+            })?;
+            let active = self
+                .last
+                .as_ref()
+                .is_some_and(|last| last.state.drives() == Drives::Active);
+            let fault = self
+                .last
+                .as_ref()
+                .is_some_and(|last| last.record().fault != 0);
+            if active && !fault {
+                return self.hold_pose();
+            }
+            if fault {
+                return Ok(());
+            }
+            self.request(&Request::Idle)?;
+            let since = self.last.as_ref().map_or(0, |last| last.state.cycle);
+            self.wait_for(TIMEOUT, |telemetry| {
+                telemetry.state.cycle >= since + cycles(HOLD_S)
+            })?;
+        }
+        Err(Failure::DrivesNotActive)
+    }
+
+    /// Holds the present pose by the position loops, at once: gravity hold has none, and an arm without brakes would sink
+    /// by what its model lacks.
+    fn hold_pose(&mut self) -> Result<(), Failure> {
+        let last = self.last.as_ref();
+        let target_rad = last.map(|last| last.record_of::<N>().position_rad);
+        self.request(&Request::Move {
+            target_rad: target_rad.ok_or_else(|| self.not_running())?,
+            duration_s: HOLD_S,
+        })
+    }
+
+    /// Active drives, in gravity hold or holding the present pose.
     fn activate(&mut self) -> Result<(), Failure> {
-        self.request(&Request::GravityHold)?;
+        if self.plan.lays_down {
+            self.enable()?;
+        } else {
+            self.request(&Request::GravityHold)?;
+        }
         let since = self.last.as_ref().map_or(0, |last| last.state.cycle);
         let period_s = self.model.settings().period_s;
         let held = since + (HOLD_S / period_s) as u64;
@@ -246,7 +300,10 @@ impl<const N: usize> RunningArm<N> {
             if !pressed {
                 pendant.press("activate")?;
             }
-        } else if self.plant == PlantKind::Can && !self.last.as_ref().is_some_and(active) {
+        } else if self.plant == PlantKind::Can
+            && !self.plan.lays_down
+            && !self.last.as_ref().is_some_and(active)
+        {
             print_status("the controller is in gravity hold: press Shift-Activate on the pendant");
             within = ACTIVATION_TIMEOUT;
         }

@@ -280,6 +280,7 @@ mod tests {
                 force_n: 0.0,
                 tip_m: [0.0; 3],
                 tip_speed_m_per_s: 0.1,
+                joint_rad_per_s: Vec::new(),
                 joint_speed_rad_per_s: 0.0,
                 kinetic_energy_j: 0.01,
                 injections: u64::from(ms >= 1000),

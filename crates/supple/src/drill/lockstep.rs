@@ -79,6 +79,7 @@ pub fn perform<const N: usize>(spec: &Spec, arm: &TestArm) -> Result<Row, Failur
             _ => -(BLOCK_CLEARANCE_M + cap_m),
         }),
         inject: injections(spec, event_s, back_s, pushed.then_some(push_rad_per_s)),
+        misbehave: Vec::new(),
         plant_options: PlantArgs::default(),
         trace: Some(file.clone()),
         rate_hz: arm.rate_hz,

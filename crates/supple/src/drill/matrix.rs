@@ -63,7 +63,7 @@ const STUCK_ENCODER_FAULTS: &[&str] = &[
     "singular",
 ];
 /// Valid faults when a joint moves in the wrong direction: reversed encoder, motor or gravity.
-const WRONG_DIRECTION_FAULTS: &[&str] = &[
+pub const WRONG_DIRECTION_FAULTS: &[&str] = &[
     "moves_against_torque",
     "encoder_unreliable",
     "joint_collision",
@@ -78,7 +78,7 @@ const WRONG_DIRECTION_FAULTS: &[&str] = &[
     "singular",
 ];
 /// Valid faults for lost, jumping or non-finite joint angles.
-const ENCODER_LOSS_FAULTS: &[&str] = &[
+pub const ENCODER_LOSS_FAULTS: &[&str] = &[
     "encoder_lost",
     "encoder_unreliable",
     "encoder_jump",

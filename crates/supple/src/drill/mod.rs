@@ -17,6 +17,7 @@ mod evaluation;
 mod lockstep;
 mod matrix;
 mod metrics;
+mod motors;
 mod perform;
 mod row;
 mod spec;
@@ -34,6 +35,8 @@ use supple_cli::interrupt;
 use supple_ipc::Domain;
 use supple_model::{Description, with_dof};
 
+/// Arm of the command line, unless another one is named.
+const DEFAULT_ARM: &str = "wam4";
 /// Arm of the pose mode if the one of the command line has too few joints.
 const POSE_ARM: &str = "wam7";
 /// Joints that the pose mode needs.
@@ -46,6 +49,10 @@ const POSE_BUS_RATE_HZ: u32 = 700;
 /// # Errors
 /// [`Failure::Drill`] if a result differs from the expected one; [`Failure::NoSuchTestCase`].
 pub fn run(args: &DrillArgs) -> Result<(), Failure> {
+    let description = arms::find(&args.urdf.name(&args.arm), args.strict)?;
+    if description.bus().is_some() {
+        return motors::run(args, &description);
+    }
     let mut arms = TestArms::new(args)?;
     let specs = chosen(args)?;
     if args.list {
@@ -69,7 +76,7 @@ pub fn run(args: &DrillArgs) -> Result<(), Failure> {
         false => print_line(&row::table(&rows))?,
     }
     if let Some(file) = &args.markdown {
-        supple_files::write_atomic(file, row::page(&rows, &command(args)).as_bytes())
+        supple_files::write_atomic(file, row::page(&rows, &args.command_line()).as_bytes())
             .map_err(|error| Failure::file("write", file, error))?;
     }
     let failed = rows.iter().filter(|row| !row.as_expected);
@@ -82,16 +89,25 @@ pub fn run(args: &DrillArgs) -> Result<(), Failure> {
     }
 }
 
-/// The command line that selects these test cases.
-fn command(args: &DrillArgs) -> String {
-    let mut parts = vec!["supple drill".to_owned()];
-    if let Some(plant) = args.plant {
-        parts.push(format!("--plant {plant:?}").to_lowercase());
+impl DrillArgs {
+    /// The command line that selects these test cases.
+    fn command_line(&self) -> String {
+        let mut parts = vec!["supple drill".to_owned()];
+        if self.arm != DEFAULT_ARM {
+            parts.push(format!("--arm {}", self.arm));
+        }
+        if let Some(plant) = self.plant {
+            parts.push(format!("--plant {plant:?}").to_lowercase());
+        }
+        parts.extend(self.only.iter().map(|part| format!("--only {part}")));
+        parts.extend(self.virtual_time.then(|| "--virtual-time".to_owned()));
+        if let Some(file) = &self.markdown {
+            // The page says how to write it, wherever it was written.
+            let name = file.file_name().unwrap_or_default().to_string_lossy();
+            parts.push(format!("--markdown docs/{name}"));
+        }
+        parts.join(" ")
     }
-    parts.extend(args.only.iter().map(|part| format!("--only {part}")));
-    parts.extend(args.virtual_time.then(|| "--virtual-time".to_owned()));
-    parts.push("--markdown docs/drill.md".to_owned());
-    parts.join(" ")
 }
 
 fn chosen(args: &DrillArgs) -> Result<Vec<Spec>, Failure> {

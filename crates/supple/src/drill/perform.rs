@@ -9,6 +9,7 @@ use crate::operate::OperatorSession;
 use crate::up::System;
 use core::time::Duration;
 use rustix::process::{Pid, Signal, kill_process};
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Instant;
@@ -76,6 +77,7 @@ pub fn perform<const N: usize>(
             _ => Some(-(BLOCK_CLEARANCE_M + cap_m)),
         },
         inject: Vec::new(),
+        misbehave: Vec::new(),
         plant_options: PlantArgs::default(),
         trace: Some(trace.clone()),
         rate_hz: None,
@@ -337,16 +339,21 @@ fn comes_to_rest<const N: usize>(system: &mut System<'_, N>) -> Result<bool, Fai
 }
 
 /// `supple up` as a child process.
-struct Up(Child);
+pub struct Up(Child);
 
 impl Up {
-    fn start(up: &UpArgs) -> Result<Up, Failure> {
+    /// Starts it; `reports` takes what it and its processes write on standard error.
+    ///
+    /// # Errors
+    /// [`Failure::File`].
+    pub fn start(up: &UpArgs, reports: Option<File>) -> Result<Up, Failure> {
         let this = std::env::current_exe()
             .map_err(|error| Failure::file("find", Path::new("this program"), error))?;
         let child = Command::new(&this)
             .args(up.to_arguments())
             .stdin(Stdio::null())
             .stdout(Stdio::null())
+            .stderr(reports.map_or(Stdio::inherit(), Stdio::from))
             .spawn();
         child
             .map(Up)
@@ -383,7 +390,7 @@ fn lose_up_process<const N: usize>(
     domain: &Domain,
 ) -> Result<(u64, ProcessTestResult), Failure> {
     let mut reader = TelemetryReader::new(domain).map_err(Failure::system)?;
-    let mut running = Up::start(up)?;
+    let mut running = Up::start(up, None)?;
     start_task::<N>(spec, description, domain, || next_telemetry(&mut reader))?;
     let begin_ns = monotonic_ns();
     let stopped = matches!(
@@ -416,7 +423,7 @@ fn lose_up_process<const N: usize>(
                 ..up.clone()
             };
             drop(running);
-            running = Up::start(&again)?;
+            running = Up::start(&again, None)?;
         }
         false => {}
     }

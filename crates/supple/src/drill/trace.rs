@@ -21,6 +21,8 @@ pub struct TraceRow {
     pub tip_m: [f64; 3],
     /// Tip speed \[m/s\].
     pub tip_speed_m_per_s: f64,
+    /// Speed of each joint \[rad/s\].
+    pub joint_rad_per_s: Vec<f64>,
     /// Speed of the fastest joint \[rad/s\].
     pub joint_speed_rad_per_s: f64,
     /// Kinetic energy \[J\].
@@ -118,6 +120,9 @@ impl TraceRow {
         let motors = head
             .iter()
             .filter(|name| name.starts_with("motor") && name.ends_with("_nm"));
+        let speeds = head
+            .iter()
+            .filter(|name| name.starts_with("joint") && !name.starts_with("joint_"));
         let [x, y, z] = three(["force_x_n", "force_y_n", "force_z_n"])?;
         Some(TraceRow {
             time_ns: text("time_ns")?.parse().ok()?,
@@ -126,6 +131,7 @@ impl TraceRow {
             force_n: (x * x + y * y + z * z).sqrt(),
             tip_m: three(["tip_x_m", "tip_y_m", "tip_z_m"])?,
             tip_speed_m_per_s: number("tip_speed_m_per_s")?,
+            joint_rad_per_s: speeds.map(|name| number(name)).collect::<Option<_>>()?,
             joint_speed_rad_per_s: number("joint_speed_rad_per_s")?,
             kinetic_energy_j: number("kinetic_energy_j")?,
             injections: text("injections")?.parse().ok()?,

@@ -33,6 +33,15 @@ impl<const N: usize> Approach<N> {
         })
     }
 
+    /// The approach to a trajectory from a pose that puts the tip at its start.
+    pub fn from_pose(config: &Config<N>, trajectory: Trajectory, start_rad: Vector<N>) -> Self {
+        Approach {
+            trajectory,
+            start_rad,
+            config: *config,
+        }
+    }
+
     /// The approach to a motion of position and orientation. [`Approach::requests`] gives the trajectory of its position
     /// alone as the last request.
     ///

@@ -7,15 +7,18 @@ mod learning;
 pub mod pendant;
 mod session;
 mod status;
+mod teaching;
 
 pub use approach::Approach;
 pub use learning::learning;
 pub use pendant::{Pendant, pendant};
 pub use session::OperatorSession;
 pub use status::status;
+pub use teaching::{play, teach};
 
 use crate::cli::{
-    GainsArgs, ModeArgs, ModeName, SystemArgs, TrackArgs, TrackTrajectory, UpTrajectory,
+    GainsArgs, ModeArgs, ModeName, SystemArgs, TrackArgs, TrackTarget, TrackTrajectory,
+    UpTrajectory,
 };
 use crate::up::stop_running;
 use core::time::Duration;
@@ -287,21 +290,36 @@ pub fn trajectory_for(trajectory: UpTrajectory, description: &Description) -> (T
     }
 }
 
-/// Runs `supple track`: moves the arm to the start of a trajectory and tracks it; a pose starts where the tip is.
+/// Runs `supple track`: moves the arm to the start of a trajectory or of a file's motion and tracks it; a pose starts where
+/// the tip is.
 ///
 /// # Errors
 /// [`Failure`].
 pub fn track(args: &TrackArgs) -> Result<(), Failure> {
-    if args.trajectory != TrackTrajectory::Pose && !args.rotate.is_empty() {
+    let trajectory = match &args.trajectory {
+        TrackTarget::Named(trajectory) => *trajectory,
+        TrackTarget::File(file) => {
+            return teaching::perform(&teaching::Performance {
+                file,
+                speed: args.speed,
+                arm: &args.urdf.name(&args.arm),
+                strict: args.strict,
+                stiffness: &[],
+                damping: &[],
+                system: &args.system,
+            });
+        }
+    };
+    if trajectory != TrackTrajectory::Pose && !args.rotate.is_empty() {
         let none = "0: only a pose turns".to_owned();
         return Err(value_count("--rotate", args.rotate.len(), none));
     }
-    if args.trajectory == TrackTrajectory::Pose {
+    if trajectory == TrackTrajectory::Pose {
         return ask(&args.system, &Asked::Pose(args));
     }
     let description = arms::find(&args.urdf.name(&args.arm), args.strict)?;
     let paths = description.paths();
-    let (trajectory, duration_s) = match args.trajectory {
+    let (trajectory, duration_s) = match trajectory {
         TrackTrajectory::Pose => return ask(&args.system, &Asked::Pose(args)),
         TrackTrajectory::Sinusoid => paths.sinusoid(args.speed),
         TrackTrajectory::Arc => paths.arc(args.speed),

@@ -145,6 +145,16 @@ impl<const N: usize> OperatorSession<N> {
         self.queue(&along, start_cycle + between)
     }
 
+    /// Number of queued requests that have not been carried out.
+    pub fn pending(&self) -> usize {
+        self.pending_requests.len()
+    }
+
+    /// Whether queued requests have not been carried out.
+    pub fn is_pending(&self) -> bool {
+        !self.pending_requests.is_empty()
+    }
+
     /// Collects the replies to pending requests.
     ///
     /// # Errors

@@ -177,6 +177,16 @@ impl Status {
     }
 }
 
+/// Three numbers of at most six decimals: a ramp ends at 1.4999999999999998 where a person set 1.5.
+fn axes(values: &[f64; 3]) -> String {
+    let values = values.map(|value| {
+        // Adding zero makes a zero of -0.
+        let rounded = (value * 1e6).round() / 1e6 + 0.0;
+        rounded.to_string()
+    });
+    format!("[{}]", values.join(", "))
+}
+
 impl fmt::Display for Status {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
@@ -195,8 +205,9 @@ impl fmt::Display for Status {
         }
         writeln!(
             f,
-            "gains     K {:?} N/m, B {:?} N s/m",
-            self.stiffness_n_per_m, self.damping_n_s_per_m
+            "gains     K {} N/m, B {} N s/m",
+            axes(&self.stiffness_n_per_m),
+            axes(&self.damping_n_s_per_m)
         )?;
         if self.learning.is_in_use() {
             write!(f, "{}", self.learning)?;
@@ -222,5 +233,15 @@ impl fmt::Display for Status {
             )?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::axes;
+
+    #[test]
+    fn gains_have_no_noise_of_rounding() {
+        assert_eq!(axes(&[1.4999999999999998, 5.0, -0.0]), "[1.5, 5, 0]");
     }
 }

@@ -32,9 +32,16 @@ pub struct ChildProcesses {
     running: Vec<(&'static str, Child)>,
     /// Programs that have exited, with their exit status.
     ended: Vec<(&'static str, ExitStatus)>,
+    /// Takes what the processes write on standard error; without it that of this process does.
+    reports: Option<File>,
 }
 
 impl ChildProcesses {
+    /// Processes that are started from now on write their standard error to a file.
+    pub fn report_to(&mut self, file: File) {
+        self.reports = Some(file);
+    }
+
     /// Starts a program that is installed beside this one. The child ignores terminal interrupts: the parent
     /// terminates it in order, after it has collected its data.
     ///
@@ -43,10 +50,18 @@ impl ChildProcesses {
     pub fn start(&mut self, program: &Program) -> Result<(), Failure> {
         let Program { name, arguments } = program;
         let program = program_beside(name)?;
+        let reports = match &self.reports {
+            Some(file) => {
+                let file = file.try_clone();
+                Stdio::from(file.map_err(|error| Failure::file("start", &program, error))?)
+            }
+            None => Stdio::inherit(),
+        };
         let child = Command::new(&program)
             .args(arguments)
             .stdin(Stdio::null())
             .stdout(Stdio::null())
+            .stderr(reports)
             .process_group(0)
             .spawn()
             .map_err(|error| Failure::file("start", &program, error))?;

@@ -8,7 +8,7 @@ use supple_bus::Address;
 use supple_cli::exit::Failure;
 use supple_ipc::Domain;
 use supple_model::{Description, ModelError};
-use supple_plant::Injection;
+use supple_plant::{Grip, Injection};
 
 /// Program name of the controller.
 pub const CONTROLLER: &str = "supple-rt";
@@ -53,6 +53,11 @@ impl Plan {
         }
     }
 
+    /// Whether an operator activates the drives at a pendant, of the emulated arm or of a real one.
+    pub fn has_pendant(&self, plant: PlantKind) -> bool {
+        self.pendant.is_some() || plant == PlantKind::Can && !self.lays_down
+    }
+
     /// Plans the processes; in virtual time the clock owner exits after `cycles`.
     ///
     /// # Errors
@@ -65,6 +70,10 @@ impl Plan {
         cycles: Option<u64>,
     ) -> Result<Plan, Failure> {
         args.check_injections()?;
+        let has_emulated_motors = args.plant == PlantKind::Emu && description.bus().is_some();
+        if !args.misbehave.is_empty() && !has_emulated_motors {
+            return Err(Failure::MisbehaviourWithoutMotors);
+        }
         args.check_plant_options()?;
         let controller = Program {
             name: CONTROLLER,
@@ -114,6 +123,9 @@ impl Plan {
                 let mut arguments = args.common_arguments(domain);
                 arguments.extend(["--bus".to_owned(), bus.to_string()]);
                 arguments.extend(args.simulation_arguments());
+                for misbehaviour in &args.misbehave {
+                    arguments.extend(["--misbehave".to_owned(), misbehaviour.clone()]);
+                }
                 plan.arm = Some(Program {
                     name: "supple-emu",
                     arguments,
@@ -182,6 +194,9 @@ impl UpArgs {
             arguments.extend(["--prefix".to_owned(), prefix.clone()]);
         }
         arguments.extend(self.simulation_arguments());
+        for misbehaviour in &self.misbehave {
+            arguments.extend(["--misbehave".to_owned(), misbehaviour.clone()]);
+        }
         arguments
     }
 
@@ -218,7 +233,16 @@ impl UpArgs {
         let given = !self.plant_options.to_arguments().is_empty();
         match self.plant {
             PlantKind::Can if given => Err(Failure::OptionsOfRealArm),
-            _ => self.plant_options.options().map(drop),
+            plant => {
+                let hand = self.plant_options.options()?.hand;
+                match hand {
+                    // An arm on a bus does not receive the mode.
+                    Some(hand) if plant == PlantKind::Emu && hand.when == Grip::Float => {
+                        Err(Failure::HandNeedsMode)
+                    }
+                    _ => Ok(()),
+                }
+            }
         }
     }
 

@@ -6,6 +6,7 @@
 //!                              +-- an arm on a bus waits here for its pendant
 //! ```
 
+use super::plan::Plan;
 use crate::cli::{PlantKind, UpArgs};
 use crate::operate::{Approach, OperatorSession, Pendant};
 use supple_cli::console::print_status;
@@ -42,11 +43,15 @@ pub struct Stages {
     stage: Stage,
     pendant: Option<Pendant>,
     plant: PlantKind,
+    /// The arm has no pendant: its drives become active when gravity hold requests torque.
+    without_pendant: bool,
     /// Learning begins with gravity hold.
     learn: bool,
     period_s: f64,
     /// The drives were active while torque was wanted.
     was_active: bool,
+    /// The drives had no power; so it is at the start.
+    was_off: bool,
 }
 
 /// Number of cycles in a time \[s\], rounded.
@@ -55,15 +60,17 @@ pub fn cycles_of(time_s: f64, period_s: f64) -> u64 {
 }
 
 impl Stages {
-    /// Starts the sequence. `pendant` is that of an emulated arm.
-    pub fn new(pendant: Option<Pendant>, args: &UpArgs, period_s: f64) -> Stages {
+    /// Starts the sequence of these processes.
+    pub fn new(plan: &Plan, args: &UpArgs, period_s: f64) -> Stages {
         Stages {
             stage: Stage::Joining,
-            pendant,
+            pendant: plan.pendant.clone(),
             plant: args.plant,
+            without_pendant: plan.lays_down,
             learn: args.learn,
             period_s,
             was_active: false,
+            was_off: true,
         }
     }
 
@@ -77,17 +84,35 @@ impl Stages {
         let active = telemetry.state.drives() == Drives::Active;
         let lost = wants_torque && self.was_active && !active;
         self.was_active = active && wants_torque;
+        let stopped = telemetry.state.drives() == Drives::Off && !self.was_off;
+        self.was_off = telemetry.state.drives() == Drives::Off;
+        if stopped && !self.without_pendant {
+            return Some(match self.pendant {
+                Some(_) => {
+                    "emergency stop: the motors have no power. To go on: `supple pendant release`, `supple pendant idle`, \
+                     `supple reset` after a fault, `supple mode gravity-hold`, `supple pendant activate`"
+                }
+                None => {
+                    "emergency stop: the motors have no power. To go on: release the button, press Shift-Idle, \
+                     `supple reset` after a fault, `supple mode gravity-hold`, then press Shift-Activate"
+                }
+            });
+        }
         lost.then_some(match self.plant {
+            _ if self.without_pendant => {
+                "the arm is laid down, then its motors are disabled; the reason is above. To activate them again: \
+                 `supple reset` after a fault, `supple mode idle`, then `supple mode gravity-hold`"
+            }
             PlantKind::Sim => {
                 "the drives became idle and brake: the controller did not answer in time. To activate them again: \
-                 `supple mode idle`, then `supple mode gravity_hold`"
+                 `supple mode idle`, then `supple mode gravity-hold`"
             }
             PlantKind::Emu => {
-                "the drives became idle and brake. To activate them again: `supple mode gravity_hold`, then \
+                "the drives became idle and brake. To activate them again: `supple mode gravity-hold`, then \
                  `supple pendant activate`"
             }
             PlantKind::Can => {
-                "the drives became idle. To activate them again: `supple mode gravity_hold`, then the arm's pendant"
+                "the drives became idle. To activate them again: `supple mode gravity-hold`, then the arm's pendant"
             }
         })
     }
@@ -141,7 +166,7 @@ impl Stages {
             {
                 match &self.pendant {
                     Some(pendant) => pendant.press("activate")?,
-                    None if self.plant == PlantKind::Can => {
+                    None if self.plant == PlantKind::Can && !self.without_pendant => {
                         print_status(
                             "the controller is in gravity hold: press Shift-Activate on the pendant",
                         );

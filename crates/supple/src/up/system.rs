@@ -10,6 +10,7 @@ use crate::cli::UpArgs;
 use crate::operate::{Approach, OperatorSession, Pendant, trajectory_for};
 use core::time::Duration;
 use rustix::process::Signal;
+use std::path::Path;
 use std::time::Instant;
 use supple_cli::console::print_status;
 use supple_cli::exit::Failure;
@@ -65,7 +66,7 @@ impl<'a, const N: usize> System<'a, N> {
             .log_file()
             .map(|file| Recorder::create(&file, description, &config, args.virtual_time, &options));
         Ok(System {
-            stages: Stages::new(plan.pendant.clone(), args, period_s),
+            stages: Stages::new(&plan, args, period_s),
             approach: Approach::new(&config, trajectory, duration_s)?,
             run_log: RunLog::new(recorder.transpose()?),
             // Create readers before writers, so that no message is missed.
@@ -73,13 +74,24 @@ impl<'a, const N: usize> System<'a, N> {
             session: OperatorSession::for_system(domain)?,
             children: ChildProcesses::default(),
             statistics: RunStatistics::default(),
-            line: StatusLine::new(args.json),
+            line: StatusLine::new(args.json, plan.has_pendant(args.plant), period_s),
             seen: None,
             args,
             plan,
             period_s,
             limit,
         })
+    }
+
+    /// The processes write what they report to a file instead of standard error.
+    ///
+    /// # Errors
+    /// [`Failure::File`].
+    pub fn report_to(&mut self, file: &Path) -> Result<(), Failure> {
+        let created = std::fs::File::create(file);
+        let created = created.map_err(|error| Failure::file("create", file, error))?;
+        self.children.report_to(created);
+        Ok(())
     }
 
     /// Starts the processes. In virtual time all requests are queued before the first cycle, so that runs are
@@ -351,8 +363,7 @@ impl<'a, const N: usize> System<'a, N> {
 
     /// Restarts the start-up sequence.
     pub fn restart_stages(&mut self) {
-        let pendant = self.plan.pendant.clone();
-        self.stages = Stages::new(pendant, self.args, self.period_s);
+        self.stages = Stages::new(&self.plan, self.args, self.period_s);
     }
 
     /// Sends a request to the controller.

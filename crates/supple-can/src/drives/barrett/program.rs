@@ -96,7 +96,8 @@ fn run_joints<const N: usize>(
         }
         first = false;
         let mut plant = cycle(bus, link, ready, &config, cycle_config)?;
-        let ended = serve(&mut plant, options.cycles, stop)?;
+        let names = config.joint_names;
+        let ended = serve(&mut plant, options.cycles, stop, names.as_slice())?;
         counters = sum_counters(&counters, plant.counters());
         let (drive, used_link) = plant.into_parts();
         (bus, link) = (drive.into_bus(), used_link);

@@ -135,7 +135,8 @@ fn run_joints<const N: usize>(
         if restarted {
             plant.drive_mut().latch();
         }
-        let ended = serve(&mut plant, options.cycles, stop)?;
+        let names = config.joint_names;
+        let ended = serve(&mut plant, options.cycles, stop, names.as_slice())?;
         counters = sum_counters(&counters, plant.counters());
         let (drive, used_link) = plant.into_parts();
         (bus, link) = (drive.into_bus(), used_link);

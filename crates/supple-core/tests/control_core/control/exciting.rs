@@ -128,6 +128,52 @@ fn a_ramp_grows_beside_gravity_while_the_other_joints_are_held() {
     }
 }
 
+/// An arm that gravity or friction keeps 30 mrad from the end of its move.
+fn sagging() -> Rig<4> {
+    let mut rig = Rig::holding(open(), bent() - Vector::from([0.0, 0.03, 0.0, 0.03]));
+    rig.accept(Request::Move {
+        target_rad: bent(),
+        duration_s: 0.5,
+    });
+    rig.cycles(2000);
+    rig
+}
+
+#[test]
+fn a_ramp_begins_at_the_torque_that_held_the_arm() {
+    let mut rig = sagging();
+    let held = rig.cycle();
+    let stiffness = open().move_gains.stiffness_nm_per_rad;
+    assert!((held.torques.joint_pd[1] - 0.03 * stiffness[1]).abs() < 1e-6);
+    let mut output = rig.accept(Request::Breakaway(ramp()));
+    for _ in 0..1000 {
+        assert_eq!(output.mode, Mode::Breakaway);
+        let mut wanted = held.torque_nm;
+        wanted[1] += 0.5 * output.mode_time_s;
+        assert_close(&output.torque_nm, &wanted, 1e-5);
+        output = rig.cycle();
+    }
+}
+
+#[test]
+fn a_series_begins_where_the_set_point_is_although_the_arm_sags() {
+    let mut rig = sagging();
+    let held = rig.cycle();
+    let output = rig.accept(Request::Excite(series()));
+    assert!(
+        (output.torque_nm - held.torque_nm).amax() < 0.05,
+        "{}",
+        output.torque_nm
+    );
+    // Without a set-point, in gravity hold, the same distance is refused.
+    rig.accept(Request::GravityHold);
+    let refusal = rig.request(Request::Excite(series())).refusal;
+    assert!(
+        matches!(refusal, Some(Refusal::Value { .. })),
+        "{refusal:?}"
+    );
+}
+
 #[test]
 fn breakaway_ends_in_gravity_hold_after_motion_or_at_the_torque_limit() {
     let mut rig = Rig::holding(four(), bent());

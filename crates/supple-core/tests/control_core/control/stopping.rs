@@ -11,7 +11,7 @@ use crate::support::property::{Outcome, check};
 use proptest::prelude::*;
 use std::collections::VecDeque;
 use supple_core::config::{
-    ApparentInertia, Collision, FrictionVelocity, Gains, JointGains, Law, Limits,
+    ApparentInertia, Collision, FrictionVelocity, Gains, JointGains, JointNames, Law, Limits,
     PlausibilityLimits, PoseLaw, Role, Workspace,
 };
 use supple_core::controller::{Fault, Mode, Request, SafeAction, State, step};
@@ -188,6 +188,7 @@ fn config<const N: usize>(case: &Case) -> Config<N> {
             load_n: 8.0,
         },
         workspace: Workspace::UNBOUNDED,
+        joint_names: JointNames::NONE,
     }
 }
 

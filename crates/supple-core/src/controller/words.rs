@@ -1,0 +1,60 @@
+//! Faults, refusals and reasons of the drive guard in words, with the names that the arm gives its joints.
+
+use crate::record::Text;
+use core::fmt;
+
+/// A joint as messages call it: `joint elbow`, or by its index from 0 where it has no name, `joint 2`.
+#[derive(Clone, Copy, Debug)]
+pub struct JointLabel<'a> {
+    joint: usize,
+    names: &'a [Text],
+}
+
+impl<'a> JointLabel<'a> {
+    /// Label of the joint with this index.
+    pub fn new(joint: usize, names: &'a [Text]) -> JointLabel<'a> {
+        JointLabel { joint, names }
+    }
+}
+
+impl fmt::Display for JointLabel<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.names.get(self.joint).map(Text::as_str) {
+            None | Some("") => write!(f, "joint {}", self.joint),
+            Some(name) => write!(f, "joint {name}"),
+        }
+    }
+}
+
+/// A message that names joints.
+pub trait NamesJoints {
+    /// Writes the message; joints beyond `names` have their index.
+    ///
+    /// # Errors
+    /// Those of the formatter.
+    fn write(&self, f: &mut fmt::Formatter<'_>, names: &[Text]) -> fmt::Result;
+
+    /// The message with these joint names.
+    fn with_names<'a>(&'a self, names: &'a [Text]) -> WithNames<'a, Self>
+    where
+        Self: Sized,
+    {
+        WithNames {
+            message: self,
+            names,
+        }
+    }
+}
+
+/// A message with the names of an arm's joints, see [`NamesJoints::with_names`].
+#[derive(Clone, Copy, Debug)]
+pub struct WithNames<'a, M> {
+    message: &'a M,
+    names: &'a [Text],
+}
+
+impl<M: NamesJoints> fmt::Display for WithNames<'_, M> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.message.write(f, self.names)
+    }
+}

@@ -1,0 +1,195 @@
+//! A motion as set-points that the controller accepts.
+
+use super::Shown;
+use super::smoothing::reference_at;
+use crate::start::start_pose;
+use supple_core::controller::{Refusal, Request, SetPoint, check_references};
+use supple_core::trajectory::Segment;
+use supple_core::{Controller, Reference, Trajectory, Vector};
+
+/// Time between two set-points at the speed that was shown \[s\].
+const SPACING_S: f64 = 0.04;
+/// Half of the time over which the motion is smoothed \[s\].
+const HALF_S: f64 = 0.06;
+/// Factor by which a motion that breaks a limit is slowed down at a time.
+const SLOWER: f64 = 1.1;
+/// Longest time between two set-points \[s\]: the slowest repetition.
+const MAX_SPACING_S: f64 = 0.8;
+
+/// Why a motion cannot be repeated.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RepetitionError {
+    /// The controller would refuse it.
+    #[error("at {time_s:.2} s of the motion: {refusal}")]
+    Refused {
+        /// Time in the motion \[s\].
+        time_s: f64,
+        /// The reason.
+        refusal: Refusal,
+    },
+    /// The arm cannot reach its start.
+    #[error("the start: {0}")]
+    Start(String),
+    /// The tip never moves.
+    #[error("the tip rests during the whole motion: there is nothing to repeat")]
+    NoMotion,
+}
+
+/// A motion to repeat, checked.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Repetition<const N: usize> {
+    /// Pose in which it starts \[rad\].
+    pub start_rad: Vector<N>,
+    /// Set-points, the first one at rest at the start.
+    pub points: Vec<Reference>,
+    /// Cycles from one set-point to the next.
+    pub spacing_cycles: u64,
+    /// Duration over that of the motion as it was shown.
+    pub slowdown: f64,
+}
+
+impl<const N: usize> Repetition<N> {
+    /// Plans a motion at `speed` times the shown one, or slower where a limit needs it. The pose at the start is the shown
+    /// one, or else any that reaches it.
+    ///
+    /// # Errors
+    /// [`RepetitionError`]: a motion out of reach, or one that is too fast or needs too much torque at every speed.
+    pub fn plan(
+        controller: &Controller<N>,
+        shown: &Shown,
+        speed: f64,
+    ) -> Result<Repetition<N>, RepetitionError> {
+        let config = controller.config();
+        let (Some(begin_s), Some(tip_m)) = (shown.time_s.first(), shown.tip_m.first()) else {
+            return Err(RepetitionError::NoMotion);
+        };
+        // The motion as the smoothing sees it begins before its first sample, and ends after its last one.
+        let length_s = shown.duration_s() + 2.0 * HALF_S;
+        let intervals = (length_s / SPACING_S).ceil() as usize;
+        let at = |k: usize| reference_at(shown, begin_s - HALF_S + SPACING_S * k as f64, HALF_S);
+        let mut points: Vec<Reference> = (0..=intervals).map(at).collect();
+        for end in [0, intervals] {
+            points[end] = Reference::at_rest(points[end].position);
+        }
+        let start_rad = match shown.joints_rad.first() {
+            Some(joints) if joints.len() == N => Vector::from_column_slice(joints),
+            _ => start_pose(config, "motion", &Trajectory::Hold(*tip_m), 0.0)
+                .map_err(|error| RepetitionError::Start(error.to_string()))?,
+        };
+        // Rounded up, but for what the division adds.
+        let cycles = |spacing_s: f64| (spacing_s / config.period_s - 1e-9).ceil().max(1.0) as u64;
+        let mut spacing_cycles = cycles(SPACING_S / speed);
+        loop {
+            let slowdown = spacing_cycles as f64 * config.period_s / SPACING_S;
+            let repetition = Repetition {
+                start_rad,
+                points: points.iter().map(|point| slower(point, slowdown)).collect(),
+                spacing_cycles,
+                slowdown,
+            };
+            let Err((time_s, refusal)) = repetition.check(controller) else {
+                return Ok(repetition);
+            };
+            let next = cycles(SLOWER * spacing_cycles as f64 * config.period_s);
+            let may_help = !matches!(
+                refusal,
+                Refusal::OutOfReach { .. } | Refusal::Workspace { .. }
+            );
+            if !may_help || next as f64 * config.period_s > MAX_SPACING_S {
+                return Err(RepetitionError::Refused {
+                    time_s: time_s / slowdown - HALF_S,
+                    refusal,
+                });
+            }
+            spacing_cycles = next.max(spacing_cycles + 1);
+        }
+    }
+
+    /// The checks that the controller and its helper make, before anything moves.
+    fn check(&self, controller: &Controller<N>) -> Result<(), (f64, Refusal)> {
+        let config = controller.config();
+        let spacing_s = self.spacing_cycles as f64 * config.period_s;
+        let limits = &config.limits;
+        for (k, pair) in self.points.windows(2).enumerate() {
+            let acceleration = limits.tip_acceleration_m_per_s2;
+            let peaks = Segment::new(pair[0], 0.0, pair[1], spacing_s, acceleration).peaks();
+            for (entry, value, limit) in [
+                (
+                    "peak speed on the way to the set-point [m/s]",
+                    peaks.speed_m_per_s,
+                    limits.tip_speed_m_per_s,
+                ),
+                (
+                    "peak acceleration on the way to the set-point [m/s^2]",
+                    peaks.acceleration_m_per_s2,
+                    acceleration,
+                ),
+            ] {
+                if value.is_nan() || value > limit {
+                    let refusal = Refusal::Value {
+                        entry,
+                        value,
+                        limit,
+                    };
+                    return Err((spacing_s * k as f64, refusal));
+                }
+            }
+        }
+        let mut reached_s = 0.0;
+        let timed = self.points.iter().enumerate().map(|(k, point)| {
+            reached_s = spacing_s * k as f64;
+            (reached_s, *point)
+        });
+        let checked = check_references(controller, &self.start_rad, timed);
+        checked.map_err(|refusal| (reached_s, refusal))
+    }
+
+    /// Where it starts.
+    pub fn start(&self) -> Trajectory {
+        Trajectory::Hold(self.points[0].position)
+    }
+
+    /// Number of requests.
+    pub fn len(&self) -> usize {
+        self.points.len() - 1
+    }
+
+    /// Whether it has no requests; never of a planned motion.
+    pub fn is_empty(&self) -> bool {
+        self.points.len() < 2
+    }
+
+    /// Request number `k`, from 0, of a motion that starts in `start_cycle`, and the cycle in which it must take effect: that
+    /// in which the reference passes the set-point before, so that the motion does not depend on when requests arrive.
+    pub fn request(&self, k: usize, start_cycle: u64) -> (Request<N>, u64) {
+        let at_cycle = start_cycle + self.spacing_cycles * (k as u64 + 1);
+        let point = &self.points[k + 1];
+        let request = Request::SetPoint(SetPoint {
+            position_m: point.position,
+            velocity_m_per_s: point.velocity,
+            acceleration_m_per_s2: point.acceleration,
+            at_cycle,
+        });
+        (request, at_cycle - self.spacing_cycles)
+    }
+
+    /// Cycle in which a motion that starts in `start_cycle` ends.
+    pub fn end_cycle(&self, start_cycle: u64) -> u64 {
+        start_cycle + self.spacing_cycles * self.len() as u64
+    }
+
+    /// The time of the shown motion that is repeated in this cycle, from its first sample \[s\].
+    pub fn shown_s(&self, start_cycle: u64, cycle: u64) -> f64 {
+        let cycles = cycle.saturating_sub(start_cycle) as f64;
+        SPACING_S * cycles / self.spacing_cycles as f64 - HALF_S
+    }
+}
+
+/// The same point of a motion that takes `factor` times as long.
+fn slower(point: &Reference, factor: f64) -> Reference {
+    Reference {
+        position: point.position,
+        velocity: point.velocity / factor,
+        acceleration: point.acceleration / (factor * factor),
+    }
+}

@@ -1,0 +1,189 @@
+//! All test cases with their expected results, for an arm of any number of joints. They were written before the first
+//! run, except for the time of a killed controller, which allows for telemetry that ends with it, and for the sinking tip,
+//! which is not judged where a motor is lost.
+//!
+//! Most events hit the last motor of the wrist, on which the arm's weight does not rest, so that what the others do can be
+//! judged; some hit the shoulder's second motor, which carries the arm, or the elbow's.
+
+use super::super::matrix::{ENCODER_LOSS_FAULTS, WRONG_DIRECTION_FAULTS};
+use super::case::{Case, Event, Expected, TASKS};
+
+/// Resolution of the reported times \[ms\].
+const RESOLUTION_MS: f64 = 0.1;
+/// Cycles within which a fault that a motor reports is named, and one that shows in missing replies: the event falls into
+/// a cycle, and one lost reply is tolerated.
+const NAMED_CYCLES: f64 = 2.0;
+const SILENT_CYCLES: f64 = 3.0;
+/// Answers that do not come for 10 ms are a loss \[ms\].
+const ANSWER_MS: f64 = 10.0;
+/// Cycles whose telemetry may end with the controller: the time counts from the last one that arrived.
+const UNSEEN_CYCLES: f64 = 6.0;
+/// Faults that show in the motion alone \[ms\].
+const MOTION_MS: f64 = 1100.0;
+/// The motors' watchdog, 20 ms in units of its step \[ms\].
+const WATCHDOG_MS: f64 = 20.5;
+/// Error codes with what the loop says of them.
+const ERRORS: [(&str, &str); 8] = [
+    ("8", "reports over-voltage"),
+    ("9", "reports under-voltage"),
+    ("A", "reports over-current"),
+    ("B", "reports that its driver is too hot"),
+    ("C", "reports that its winding is too hot"),
+    ("D", "reports that commands were missing"),
+    ("E", "reports overload"),
+    ("5", "reports unknown code 0x5"),
+];
+/// Faults of the controller when a motor does not give the torque that it is asked for.
+const WEAK_MOTOR_FAULTS: &[&str] = WRONG_DIRECTION_FAULTS;
+
+/// All test cases of an arm with this number of joints, at this period \[s\].
+pub fn all(joints: usize, period_s: f64) -> Vec<Case> {
+    let cycles_ms = |cycles: f64| 1e3 * cycles * period_s + RESOLUTION_MS;
+    let (named_ms, silent_ms) = (cycles_ms(NAMED_CYCLES), cycles_ms(SILENT_CYCLES));
+    let wrist = joints;
+    let (shoulder, elbow) = (2.min(joints), joints.min(if joints > 6 { 4 } else { 3 }));
+    let mut events: Vec<(Event, Expected)> = Vec::new();
+    let misbehaves = |spec: String, without: Option<usize>| Event::Misbehaves { spec, without };
+    let laid_down = |reason: String, within_ms: f64| Expected::LaidDown { reason, within_ms };
+    let of = |motor: usize, what: &str| format!("motor {motor} {what}");
+
+    events.push((Event::Nothing, Expected::KeepsRunning));
+
+    // Errors that a motor reports.
+    for (code, what) in ERRORS {
+        events.push((
+            misbehaves(format!("error:motor={wrist},code={code}"), Some(wrist - 1)),
+            laid_down(of(wrist, what), named_ms),
+        ));
+    }
+    events.push((
+        misbehaves(format!("error:motor={shoulder},code=A"), Some(shoulder - 1)),
+        laid_down(of(shoulder, "reports over-current"), named_ms),
+    ));
+
+    // Motors that are lost.
+    for motor in [wrist, shoulder] {
+        events.push((
+            misbehaves(format!("silent:motor={motor}"), Some(motor - 1)),
+            laid_down(of(motor, "did not reply in two cycles"), silent_ms),
+        ));
+        events.push((
+            misbehaves(format!("reappears:motor={motor}"), Some(motor - 1)),
+            laid_down(of(motor, "is disabled and nobody disabled it"), named_ms),
+        ));
+    }
+    // One lost reply is bridged; two in a row are a lost encoder.
+    events.push((
+        misbehaves(format!("reply-lost:motor={wrist},every=50"), None),
+        Expected::KeepsRunning,
+    ));
+    events.push((
+        misbehaves(format!("reply-lost:motor={wrist},every=2"), None),
+        Expected::Fault {
+            reason: None,
+            names: ENCODER_LOSS_FAULTS,
+            within_ms: MOTION_MS,
+        },
+    ));
+    events.push((
+        misbehaves(format!("late:motor={wrist},delay-us=9000"), None),
+        laid_down(of(wrist, "did not reply in two cycles"), silent_ms),
+    ));
+
+    // Temperature: a warning, less torque, then a fault.
+    for celsius in [75, 90] {
+        events.push((
+            misbehaves(format!("hot:motor={wrist},celsius={celsius}"), None),
+            Expected::KeepsRunning,
+        ));
+    }
+    events.push((
+        misbehaves(format!("hot:motor={wrist},celsius=97"), None),
+        laid_down(of(wrist, "is hotter than the arm allows"), named_ms),
+    ));
+
+    // Registers and ids that change.
+    events.push((
+        misbehaves(
+            format!("register:motor={elbow},number=21,value=25"),
+            Some(elbow - 1),
+        ),
+        laid_down(of(elbow, "reports a position that jumped"), named_ms),
+    ));
+    events.push((
+        misbehaves(
+            format!("zero:motor={wrist},offset-rad=6.2832"),
+            Some(wrist - 1),
+        ),
+        laid_down(of(wrist, "reports a position that jumped"), named_ms),
+    ));
+    // No register is read in the cycle: a motor that gives no torque, or half of it, shows in the motion.
+    for (number, value) in [(10, 2), (23, 10)] {
+        events.push((
+            misbehaves(
+                format!("register:motor={shoulder},number={number},value={value}"),
+                Some(shoulder - 1),
+            ),
+            Expected::Fault {
+                reason: None,
+                names: WEAK_MOTOR_FAULTS,
+                within_ms: MOTION_MS,
+            },
+        ));
+    }
+    events.push((
+        misbehaves(
+            format!("same-id:motor={wrist},with={}", wrist - 1),
+            Some(wrist - 1),
+        ),
+        laid_down("motor".to_owned(), silent_ms),
+    ));
+
+    // The bus.
+    for (spec, reason) in [
+        ("bus-off", "the CAN interface is bus-off"),
+        ("wedged", "the CAN interface does not send its frames"),
+    ] {
+        events.push((
+            misbehaves(spec.to_owned(), None),
+            Expected::TorqueGone {
+                reason: Some(reason),
+                within_ms: WATCHDOG_MS,
+            },
+        ));
+    }
+
+    // The operator and the processes.
+    events.push((
+        Event::Idle,
+        laid_down("the controller requests no torque".to_owned(), named_ms),
+    ));
+    events.push((
+        Event::KillController,
+        laid_down(
+            "the controller did not answer".to_owned(),
+            ANSWER_MS + cycles_ms(SILENT_CYCLES + UNSEEN_CYCLES),
+        ),
+    ));
+    for event in [Event::KillHost, Event::StopHost] {
+        events.push((
+            event,
+            Expected::TorqueGone {
+                reason: None,
+                within_ms: WATCHDOG_MS,
+            },
+        ));
+    }
+    // By the wall clock: from the signal, which all processes get.
+    events.push((Event::KillUp, laid_down("the".to_owned(), 1000.0)));
+
+    let of_tasks = TASKS.iter().flat_map(|task| {
+        let of_task = events.iter().map(|(event, expected)| Case {
+            task: *task,
+            event: event.clone(),
+            expected: expected.clone(),
+        });
+        of_task.collect::<Vec<_>>()
+    });
+    of_tasks.collect()
+}

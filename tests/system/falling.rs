@@ -1,0 +1,115 @@
+//! Arms without brakes as processes: their motors are enabled, track, and are laid down before they are disabled.
+
+use crate::running::{Up, json, run, stderr_of, temporary_folder};
+use rustix::process::{Signal, kill_process};
+use std::path::Path;
+
+/// Cycles of the longest laying down.
+const LAID_DOWN_CYCLES: u64 = 6000;
+
+/// Numbers of a column of a trace.
+fn column(trace: &Path, name: &str) -> Vec<f64> {
+    let text = std::fs::read_to_string(trace).expect("a trace");
+    let mut lines = text.lines();
+    let mut head = lines.next().expect("a head").split(',');
+    let at = head.position(|column| column == name).expect("the column");
+    let values = lines.filter_map(|line| line.split(',').nth(at)?.parse().ok());
+    values.collect()
+}
+
+/// The arm was laid down: the reports say so in order, and it lies when its motors are disabled.
+fn assert_laid_down(stderr: &str, trace: &Path) {
+    let mut from = 0;
+    for stage in [
+        "supple-can: active",
+        "holding the arm: ",
+        "laying the arm down: ",
+        "disabling the motors: ",
+        "s: disabled",
+    ] {
+        let found = stderr[from..].find(stage);
+        from += found.unwrap_or_else(|| panic!("{stage}: {stderr}"));
+    }
+    let enabled = column(trace, "motors_in_torque_mode");
+    assert!(enabled.contains(&6.0));
+    assert_eq!(enabled.last(), Some(&0.0));
+    let speed = column(trace, "joint_speed_rad_per_s");
+    let fastest = |rows: &[f64]| rows.iter().copied().fold(0.0, f64::max);
+    // No joint moves fast at any time, and when the motors are disabled none moves.
+    assert!(fastest(&speed) < 0.8, "{} rad/s", fastest(&speed));
+    let disabled = enabled.iter().rposition(|motors| *motors > 0.0);
+    let at_rest = &speed[disabled.expect("enabled")..];
+    assert!(fastest(at_rest) < 0.05, "{} rad/s", fastest(at_rest));
+}
+
+/// Two runs give the same log, which replays; the arm tracks and is laid down at the end.
+#[test]
+fn an_arm_without_brakes_tracks_and_is_laid_down_at_the_end_of_its_run() {
+    let up = |name: &str| {
+        let folder = temporary_folder();
+        let (log, trace) = (format!("{name}.mcap"), format!("{name}.csv"));
+        let output = run(
+            folder.path(),
+            &[
+                "up",
+                "--plant",
+                "emu",
+                "--arm",
+                "yam",
+                "--virtual-time",
+                "--for",
+                "10",
+                "--json",
+                "--log",
+                &log,
+                "--trace",
+                &trace,
+            ],
+        );
+        let stderr = stderr_of(&output);
+        assert_eq!(output.status.code(), Some(0), "{stderr}");
+        let summary = json(&output);
+        for counter in ["missed", "late", "tx_lost", "telemetry_lost"] {
+            assert_eq!(summary[counter], 0, "{counter} in {summary}");
+        }
+        assert_eq!(summary["faults"], serde_json::json!([]));
+        let cycles = summary["cycles"].as_u64().expect("a number");
+        assert!(
+            (4000..4000 + LAID_DOWN_CYCLES).contains(&cycles),
+            "{summary}"
+        );
+        let rms_m = summary["rms_error_m"].as_f64().expect("it tracked");
+        assert!(rms_m < 0.02, "{summary}");
+        assert_laid_down(&stderr, &folder.path().join(trace));
+        let replayed = run(folder.path(), &["log", "replay", &log]);
+        assert!(replayed.status.success(), "{}", stderr_of(&replayed));
+        std::fs::read(folder.path().join(log)).expect("the log")
+    };
+    assert!(up("one") == up("two"), "two runs wrote different logs");
+}
+
+#[test]
+fn a_signal_in_motion_lays_the_arm_down_before_its_motors_are_disabled() {
+    let mut up = Up::start(&[
+        "--plant",
+        "emu",
+        "--arm",
+        "yam",
+        "--virtual-time",
+        "--for",
+        "3600",
+        "--trace",
+        "trace.csv",
+        "--no-log",
+        "--json",
+    ]);
+    up.wait_until("tracking", |status| {
+        status["mode"] == "track" && status["mode_time_s"].as_f64() > Some(2.0)
+    });
+    kill_process(up.process(), Signal::TERM).expect("it runs");
+    let output = up.ended();
+    let stderr = stderr_of(&output);
+    assert_eq!(output.status.code(), Some(0), "{stderr}");
+    assert_eq!(json(&output)["faults"], serde_json::json!([]));
+    assert_laid_down(&stderr, &up.folder.path().join("trace.csv"));
+}
