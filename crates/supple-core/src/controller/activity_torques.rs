@@ -223,19 +223,32 @@ impl<const N: usize> State<N> {
         torques
     }
 
-    /// Start of a breakaway ramp. What position loops have held until now goes on: their set-points for the other joints,
-    /// their torque for the ramped one, so that gravity which the model lacks does not move the arm.
+    /// Start of a breakaway ramp. What position loops or an earlier ramp have held until now goes on: their set-points for
+    /// the other joints, their torque for the ramped one, so that gravity which the model lacks does not move the arm.
     pub(super) fn breakaway_from(&self, config: &Config<N>, ramp: Breakaway) -> Activity<N> {
         let joint = ramp.joint;
+        let stiffness = &config.move_gains.stiffness_nm_per_rad;
+        let constant_nm = |joint: usize| config.friction[joint].torque_nm(0.0);
         let (mut from_rad, mut held_nm) = (self.position, 0.0);
         if self.activity.has_joint_loops()
             && let Some(reference) = self.joint_reference(config)
         {
-            let error_rad = reference.position_rad[joint] - self.position[joint];
-            // The constant part of the friction model acts at rest, too.
-            held_nm = config.move_gains.stiffness_nm_per_rad[joint] * error_rad
-                + config.friction[joint].torque_nm(0.0);
             from_rad = reference.position_rad;
+            if let Activity::Breakaway {
+                ramp: earlier,
+                held_nm,
+                ..
+            } = &self.activity
+            {
+                // The set-point from which the loop gives the torque of the ramp.
+                let ramped = earlier.joint;
+                let torque_nm = held_nm + earlier.rate_nm_per_s * self.activity_s(config);
+                from_rad[ramped] =
+                    self.position[ramped] + (torque_nm - constant_nm(ramped)) / stiffness[ramped];
+            }
+            let error_rad = from_rad[joint] - self.position[joint];
+            // The constant part of the friction model acts at rest, too.
+            held_nm = stiffness[joint] * error_rad + constant_nm(joint);
             from_rad[joint] = self.position[joint];
         }
         Activity::Breakaway {
@@ -293,18 +306,19 @@ impl<const N: usize> State<N> {
     /// Bumpless transfer: blends out, over `handover_s`, the torque difference at the start of the
     /// activity.
     #[inline(always)]
-    pub(super) fn blend_torque(&mut self, config: &Config<N>, torques: &mut Torques<N>) {
-        if self.handover_pending {
-            self.handover_pending = false;
-            self.handover = self.torque - torques.total();
+    pub(super) fn blend_torque(&mut self, controller: &Controller<N>, torques: &mut Torques<N>) {
+        if self.fault.is_some() || !self.handover.is_active() {
+            return;
         }
-        if self.fault.is_some() {
-            self.handover = Vector::zeros();
-        }
-        if self.handover != Vector::<N>::zeros() {
-            let (blended, ..) = smooth_step(self.activity_s(config) / config.handover_s);
-            torques.handover = self.handover * (1.0 - blended);
-        }
+        let config = controller.config();
+        let share = self.activity_s(config) / config.handover_s;
+        torques.handover = self.handover.blend(
+            &self.torque,
+            torques,
+            share,
+            config.period_s / config.handover_s,
+            config.period_s / controller.stop_s(),
+        );
     }
 
     /// Updates the fallback torque: gravity at the last trusted pose, within the torque limits;

@@ -8,6 +8,7 @@ pub mod codes;
 pub mod drive_guard;
 pub mod estimator;
 mod fault;
+mod handover;
 pub mod latch;
 mod learned_ramp;
 mod learning;
@@ -106,6 +107,11 @@ impl<const N: usize> Controller<N> {
     /// velocity estimate.
     pub fn delay_s(&self) -> f64 {
         self.delay_s
+    }
+
+    /// Time constant `t_s` with which the safe action stops a motion \[s\].
+    pub fn stop_s(&self) -> f64 {
+        stop::STOP_TIME_CONSTANT_DELAYS * self.delay_s
     }
 
     /// The estimator's gains after so many periods. One, the common case, needs no exponential.

@@ -22,8 +22,9 @@ use core::fmt;
 /// torque changes to gravity hold at the current pose, and requests for motion are refused: drives
 /// become active only in gravity hold. A reset leaves the fault for the mode of its safe action:
 /// gravity hold, or idle if the angles could not be trusted or the fault occurred in idle. A reset
-/// is refused in a cycle that would raise a fault again. Every transition except to idle and fault
-/// is bumpless: it starts from the previous torque and blends it out.
+/// is refused in a cycle that would raise a fault again, and until the safe action has stopped the arm.
+/// Every transition except to idle and fault is bumpless: it starts from the previous torque and
+/// blends it out; after a reset the soft stops come back gradually.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
     /// No torque.
@@ -180,7 +181,8 @@ pub enum LearningSwitch {
     Reset,
 }
 
-/// A torque ramp on one joint, added to gravity compensation, until the joint has moved.
+/// A torque ramp on one joint, added to gravity compensation and to what a position loop held the joint with, until the
+/// joint has moved. Refused while the joints' set-points move.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Breakaway {
     /// Joint index.
@@ -189,7 +191,7 @@ pub struct Breakaway {
     pub rate_nm_per_s: f64,
     /// Angle from the start at which it ends \[rad\], positive.
     pub stop_rad: f64,
-    /// Torque at which it ends without motion \[N m\], positive, within the joint's limit.
+    /// Torque of the ramp alone at which it ends without motion \[N m\], positive, within the joint's limit.
     pub limit_nm: f64,
 }
 

@@ -14,8 +14,10 @@ use crate::math::{Vector, abs, smooth_step};
 use crate::model::pose::{Pose, rotation_vector};
 use crate::trajectory::{JointReference, Reference, Rotation, Trajectory};
 
-/// Number of equal time intervals of a motion; it is checked at their ends.
+/// Number of equal time intervals in a period of a motion; it is checked at their ends.
 const INTERVALS: u32 = 128;
+/// Greatest number of periods of a motion, ramps included: what can be checked within a second.
+const MAX_PERIODS: f64 = 1000.0;
 /// Maximum distance at which a point of a trajectory counts as reached \[m\].
 const REACHED_M: f64 = 1e-3;
 /// Maximum angle at which an orientation counts as reached \[rad\].
@@ -39,11 +41,8 @@ pub fn check_motion<const N: usize>(
     match request {
         Request::Track(trajectory) => {
             trajectory.validate().map_err(Refusal::Trajectory)?;
-            let length_s = trajectory.length_s();
-            let samples = (0..=INTERVALS).map(|k| {
-                let time_s = length_s * f64::from(k) / f64::from(INTERVALS);
-                (time_s, trajectory.at(time_s))
-            });
+            let samples = times_s(trajectory.length_s(), trajectory.periods())?;
+            let samples = samples.map(|time_s| (time_s, trajectory.at(time_s)));
             check_references(controller, position_rad, samples)
         }
         Request::TrackPose {
@@ -73,7 +72,9 @@ pub fn check_motion<const N: usize>(
             )
         }
         Request::Excite(series) => {
-            check_joint_motion(config, 1.0, series.duration_s, |time_s| series.at(time_s))
+            series.validate().map_err(Refusal::Trajectory)?;
+            let times_s = times_s(series.duration_s, series.duration_s / series.period_s())?;
+            check_joint_motion(config, 1.0, times_s, |time_s| series.at(time_s))
         }
         Request::SetPoint(set_point) => {
             set_point.validate()?;
@@ -111,7 +112,8 @@ fn check_joint_line<const N: usize>(
     duration_s: f64,
 ) -> Result<(), Refusal> {
     let displacement = to_rad - from_rad;
-    check_joint_motion(config, speed_share, duration_s, |time_s| {
+    let times_s = times_s(duration_s, 0.0)?;
+    check_joint_motion(config, speed_share, times_s, |time_s| {
         let (share, first_derivative, second_derivative) = smooth_step(time_s / duration_s);
         JointReference {
             position_rad: from_rad + displacement * share,
@@ -170,8 +172,11 @@ fn check_pose<const N: usize>(
     terms(&config.arm, &q, &Vector::zeros(), &mut state);
     let start = state.base_from_tip.rotation;
     let length_s = trajectory.length_s().max(rotation.duration_s);
-    for k in 0..=INTERVALS {
-        let time_s = length_s * f64::from(k) / f64::from(INTERVALS);
+    let periods = match trajectory.length_s() > 0.0 {
+        true => trajectory.periods() * length_s / trajectory.length_s(),
+        false => 1.0,
+    };
+    for time_s in times_s(length_s, periods)? {
         let position = trajectory.at(time_s);
         if let Some((border, value_m)) = config.workspace.violated_border(&position.position) {
             return Err(Refusal::Workspace { border, value_m });
@@ -221,21 +226,34 @@ fn solve_pose<const N: usize>(
     }
 }
 
+/// Times at which a motion of this length is checked \[s\], from its start to its end.
+fn times_s(length_s: f64, periods: f64) -> Result<impl Iterator<Item = f64>, Refusal> {
+    if periods > MAX_PERIODS || periods.is_nan() {
+        return Err(Refusal::Value {
+            entry: "number of periods of the motion, with its ramps,",
+            value: periods,
+            limit: MAX_PERIODS,
+        });
+    }
+    let intervals = INTERVALS * (periods as u32).saturating_add(1);
+    Ok((0..=intervals).map(move |k| length_s * f64::from(k) / f64::from(intervals)))
+}
+
 /// Checks a joint motion; `speed_share` of the limits of joint and tip speed applies.
 fn check_joint_motion<const N: usize>(
     config: &Config<N>,
     speed_share: f64,
-    duration_s: f64,
+    times_s: impl Iterator<Item = f64>,
     reference_at: impl Fn(f64) -> JointReference<N>,
 ) -> Result<(), Refusal> {
     let mut dynamics = Terms::default();
-    for k in 0..=INTERVALS {
-        let reference = reference_at(duration_s * f64::from(k) / f64::from(INTERVALS));
+    for time_s in times_s {
+        let reference = reference_at(time_s);
         let (q, qd) = (reference.position_rad, reference.velocity_rad_per_s);
         terms(&config.arm, &q, &qd, &mut dynamics);
         let tip = dynamics.base_from_tip.translation;
         // The first sample is the current pose, which a request cannot change.
-        if k > 0
+        if time_s > 0.0
             && let Some((border, value_m)) = config.workspace.violated_border(&tip)
         {
             return Err(Refusal::Workspace { border, value_m });

@@ -25,6 +25,8 @@ use crate::trajectory::{
 const HELD_TOLERANCE_RAD: f64 = 1e-6;
 /// Maximum distance of a joint from the start of an excitation \[rad\].
 const EXCITE_START_RAD: f64 = 0.02;
+/// Fraction of a joint's speed limit up to which an arm counts as stopped at a reset.
+const RESET_SPEED_SHARE: f64 = 0.05;
 /// Longest ramp of gains \[s\].
 const MAX_RAMP_S: f64 = 3600.0;
 /// Maximum joint damping that may be requested, whatever the delay allows \[N m s/rad\].
@@ -46,6 +48,9 @@ impl<const N: usize> State<N> {
                 let Activity::Fault(action) = self.activity else {
                     return Err(Refusal::Mode { mode });
                 };
+                if action == SafeAction::GravityHold {
+                    self.check_at_rest(config)?;
+                }
                 self.fault = None;
                 self.enter(match action {
                     SafeAction::GravityHold => Activity::GravityHold,
@@ -56,7 +61,7 @@ impl<const N: usize> State<N> {
                 check_gains(config, &gains, ramp_s)?;
                 self.check_damping(controller, task, &gains)?;
                 if mode == Mode::TrackPose {
-                    self.check_pose_damping(controller, &gains, &self.rotational_gains.to)?;
+                    self.check_pose_damping(controller, &gains, &self.rotational_gains.bound())?;
                 }
                 self.gains.change(gains, ramp_s);
             }
@@ -67,7 +72,7 @@ impl<const N: usize> State<N> {
             }
             Request::RotationalGains { gains, ramp_s } => {
                 check_rotational_gains(config, &gains, ramp_s)?;
-                self.check_pose_damping(controller, &self.gains.to, &gains)?;
+                self.check_pose_damping(controller, &self.gains.bound(), &gains)?;
                 self.rotational_gains.change(gains, ramp_s);
             }
             Request::Learning(switch) => self.switch_learning(config, switch),
@@ -111,7 +116,11 @@ impl<const N: usize> State<N> {
                 check_pose_joints(config)?;
                 self.check_trajectory(controller, task, &trajectory)?;
                 check_rotation(config, &rotation)?;
-                self.check_pose_damping(controller, &self.gains.to, &self.rotational_gains.to)?;
+                self.check_pose_damping(
+                    controller,
+                    &self.gains.bound(),
+                    &self.rotational_gains.bound(),
+                )?;
                 self.check_regular(config)?;
                 self.enter(Activity::TrackPose {
                     trajectory,
@@ -134,7 +143,7 @@ impl<const N: usize> State<N> {
                     &target_rad,
                     duration_s,
                 )?;
-                self.check_joint_damping(controller, &self.joint_gains.to)?;
+                self.check_joint_damping(controller, &self.joint_gains.bound())?;
                 self.enter(Activity::JointImpedance {
                     from_rad: self.position,
                     to_rad: target_rad,
@@ -153,8 +162,43 @@ impl<const N: usize> State<N> {
             }
             Request::Breakaway(ramp) => {
                 check_breakaway(config, &ramp)?;
+                self.check_reference_at_rest(config)?;
                 self.enter(self.breakaway_from(config, ramp));
             }
+        }
+        Ok(())
+    }
+
+    /// Refuses to leave the safe action before it has stopped the arm.
+    fn check_at_rest(&self, config: &Config<N>) -> Result<(), Refusal> {
+        let velocity = &self.estimator.velocity_rad_per_s;
+        for joint in 0..N {
+            let limit = RESET_SPEED_SHARE * config.limits.joint_speed_rad_per_s[joint];
+            if abs(velocity[joint]) > limit {
+                return Err(Refusal::Value {
+                    entry: "speed of a joint at a reset [rad/s]",
+                    value: abs(velocity[joint]),
+                    limit,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses a ramp while the set-points of the joints still move: the torque of a moving joint does not hold it.
+    fn check_reference_at_rest(&self, config: &Config<N>) -> Result<(), Refusal> {
+        let speed_rad_per_s = match self.activity.has_joint_loops() {
+            true => self
+                .joint_reference(config)
+                .map_or(0.0, |reference| reference.velocity_rad_per_s.amax()),
+            false => 0.0,
+        };
+        if speed_rad_per_s > 0.0 {
+            return Err(Refusal::Value {
+                entry: "speed of a joint's set-point before a ramp [rad/s]",
+                value: speed_rad_per_s,
+                limit: 0.0,
+            });
         }
         Ok(())
     }
@@ -168,7 +212,7 @@ impl<const N: usize> State<N> {
         let config = controller.config();
         trajectory.validate().map_err(Refusal::Trajectory)?;
         check_peak(config, trajectory)?;
-        self.check_damping(controller, task, &self.gains.to)?;
+        self.check_damping(controller, task, &self.gains.bound())?;
         let displacement = trajectory.at(0.0).position - self.terms.base_from_tip.translation;
         let (distance_m, limit_m) = (
             sqrt(displacement.dot(&displacement)),

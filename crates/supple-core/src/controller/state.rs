@@ -3,6 +3,7 @@
 use super::Controller;
 use super::activity::Activity;
 use super::fault::{Fault, SafeAction};
+use super::handover::{Handover, HandoverFrom, REPEATED_CYCLES};
 use super::mode::Mode;
 use super::output::Input;
 use super::plausibility::Plausibility;
@@ -34,6 +35,9 @@ pub(super) struct GainRamp<G> {
 pub(super) trait Interpolate: Copy {
     /// `self` at 0, `to` at 1.
     fn between(&self, to: &Self, x: f64) -> Self;
+
+    /// The greater of the two, entry by entry.
+    fn max(&self, other: &Self) -> Self;
 }
 
 impl Interpolate for Gains {
@@ -41,6 +45,13 @@ impl Interpolate for Gains {
         Gains {
             stiffness_n_per_m: self.stiffness_n_per_m.lerp(&to.stiffness_n_per_m, x),
             damping_n_s_per_m: self.damping_n_s_per_m.lerp(&to.damping_n_s_per_m, x),
+        }
+    }
+
+    fn max(&self, other: &Self) -> Self {
+        Gains {
+            stiffness_n_per_m: self.stiffness_n_per_m.sup(&other.stiffness_n_per_m),
+            damping_n_s_per_m: self.damping_n_s_per_m.sup(&other.damping_n_s_per_m),
         }
     }
 }
@@ -52,6 +63,13 @@ impl<const N: usize> Interpolate for JointGains<N> {
             damping_nm_s_per_rad: self.damping_nm_s_per_rad.lerp(&to.damping_nm_s_per_rad, x),
         }
     }
+
+    fn max(&self, other: &Self) -> Self {
+        JointGains {
+            stiffness_nm_per_rad: self.stiffness_nm_per_rad.sup(&other.stiffness_nm_per_rad),
+            damping_nm_s_per_rad: self.damping_nm_s_per_rad.sup(&other.damping_nm_s_per_rad),
+        }
+    }
 }
 
 impl Interpolate for RotationalGains {
@@ -59,6 +77,13 @@ impl Interpolate for RotationalGains {
         RotationalGains {
             stiffness_nm_per_rad: self.stiffness_nm_per_rad.lerp(&to.stiffness_nm_per_rad, x),
             damping_nm_s_per_rad: self.damping_nm_s_per_rad.lerp(&to.damping_nm_s_per_rad, x),
+        }
+    }
+
+    fn max(&self, other: &Self) -> Self {
+        RotationalGains {
+            stiffness_nm_per_rad: self.stiffness_nm_per_rad.sup(&other.stiffness_nm_per_rad),
+            damping_nm_s_per_rad: self.damping_nm_s_per_rad.sup(&other.damping_nm_s_per_rad),
         }
     }
 }
@@ -81,6 +106,11 @@ impl<G: Interpolate> GainRamp<G> {
             elapsed_s: 0.0,
             ramp_s,
         };
+    }
+
+    /// Upper bound, entry by entry, of the gains in force from now on.
+    pub fn bound(&self) -> G {
+        self.current().max(&self.to)
     }
 
     /// The gains in force.
@@ -118,9 +148,7 @@ pub struct State<const N: usize> {
     /// Last torque and fallback torque sent.
     pub(super) torque: Vector<N>,
     pub(super) fallback: Vector<N>,
-    /// Torque to blend out after a change of activity; `pending` until it is known.
-    pub(super) handover: Vector<N>,
-    pub(super) handover_pending: bool,
+    pub(super) handover: Handover<N>,
     pub(super) fault: Option<Fault>,
     pub(super) terms: Terms<N>,
     /// The motors apply torques.
@@ -155,8 +183,7 @@ impl<const N: usize> State<N> {
             held_setpoint_rad: Vector::zeros(),
             torque: Vector::zeros(),
             fallback: Vector::zeros(),
-            handover: Vector::zeros(),
-            handover_pending: false,
+            handover: Handover::none(),
             fault: None,
             terms: Terms::default(),
             drives_active: false,
@@ -195,7 +222,9 @@ impl<const N: usize> State<N> {
         let limit = config.limits.stale_cycles;
         let out_of_order = match self.cycle {
             Some(last) if input.cycle < last => {
-                // The plant was restarted: reinitialise from its state, but report a fault.
+                // The plant was restarted: reinitialise from its state, but report a fault. The activity goes on.
+                let activity_cycles = last.wrapping_sub(self.activity_start);
+                self.activity_start = input.cycle.wrapping_sub(activity_cycles);
                 self.cycle = None;
                 let received = input.cycle;
                 Some(Fault::StateOutOfOrder { last, received })
@@ -295,7 +324,7 @@ impl<const N: usize> State<N> {
             _ => {
                 self.fault = Some(fault);
                 self.enter(Activity::Fault(action));
-                self.handover_pending = false;
+                self.handover = Handover::none();
             }
         }
     }
@@ -305,8 +334,17 @@ impl<const N: usize> State<N> {
         if self.held_loops_inactive() {
             self.held_setpoint_rad = self.position;
         }
-        self.handover_pending = !self.activity.is_torque_off() && !activity.is_torque_off();
-        self.handover = Vector::zeros();
+        let has_torque = !self.activity.is_torque_off() && !activity.is_torque_off();
+        match (has_torque, &self.activity) {
+            (false, _) => self.handover = Handover::none(),
+            (true, Activity::Fault(_)) => self.handover.begin(HandoverFrom::Stopping),
+            (true, before)
+                if before.mode() == activity.mode() && self.activity_cycles() < REPEATED_CYCLES =>
+            {
+                self.handover.begin(HandoverFrom::SameMode);
+            }
+            (true, _) => self.handover.begin(HandoverFrom::LastTorque),
+        }
         self.activity = activity;
         self.activity_start = self.cycle.unwrap_or(0);
         self.latch = self.latch.restarted();
@@ -323,23 +361,24 @@ impl<const N: usize> State<N> {
             Activity::Idle | Activity::Fault(_) => {}
             Activity::GravityHold if !came_back => {}
             Activity::GravityHold => self.enter(Activity::GravityHold),
-            _ if !active => {
-                self.enter(Activity::GravityHold);
-                self.handover_pending = false;
-            }
+            _ if !active => self.enter(Activity::GravityHold),
             _ => {}
         }
         if !active {
             // Otherwise the remainder of another activity's torque would act when the drives become
             // active again.
-            self.handover = Vector::zeros();
+            self.handover = Handover::none();
         }
     }
 
     /// Time since the activity began \[s\].
     pub(super) fn activity_s(&self, config: &Config<N>) -> f64 {
-        let cycles = self.cycle.unwrap_or(0).saturating_sub(self.activity_start);
-        cycles as f64 * config.period_s
+        self.activity_cycles() as f64 * config.period_s
+    }
+
+    fn activity_cycles(&self) -> u64 {
+        self.cycle
+            .map_or(0, |cycle| cycle.wrapping_sub(self.activity_start))
     }
 
     /// Whether the last state is older than tolerated: then only gravity may still be computed from

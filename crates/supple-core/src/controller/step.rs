@@ -110,7 +110,7 @@ pub fn step<const N: usize>(
             );
         }
     }
-    state.blend_torque(config, &mut torques);
+    state.blend_torque(controller, &mut torques);
     let total = checks::total(&torques).unwrap_or_else(|fault| {
         state.latch_fault(fault);
         reference = None;

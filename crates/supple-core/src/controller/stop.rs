@@ -33,7 +33,7 @@ use crate::law::impedance::Torques;
 use crate::math::{Vector, Vector3, abs};
 
 /// Time constant `t_s` as a multiple of the delay.
-const STOP_TIME_CONSTANT_DELAYS: f64 = 4.0;
+pub(super) const STOP_TIME_CONSTANT_DELAYS: f64 = 4.0;
 /// Settling time of the velocity estimate after a step in speed, as a multiple of the delay.
 const ESTIMATOR_SETTLING_DELAYS: f64 = 2.0;
 /// Time within which the arm must come to rest \[s\].
@@ -54,7 +54,7 @@ impl<const N: usize> State<N> {
     pub(super) fn stopping(&self, controller: &Controller<N>) -> Torques<N> {
         let limits = &controller.config().limits;
         let gravity = self.terms.gravity;
-        let damping = self.terms.momentum / (-STOP_TIME_CONSTANT_DELAYS * controller.delay_s());
+        let damping = self.terms.momentum / -controller.stop_s();
         let motors = controller.motors();
         let share = fraction_within_limit(&limits.joint_torque_nm, &gravity, &damping).min(
             fraction_within_limit(

@@ -52,7 +52,7 @@ torque_terms! {
     gravity,
     /// Coriolis and centrifugal torque `C qd`.
     coriolis,
-    /// Friction feed-forward `D`, its dry part scaled by `friction_share`; in the breakaway mode the ramp.
+    /// Friction feed-forward `D`, its dry part scaled by `friction_share`; in the breakaway mode the ramp of its joint.
     friction,
     /// `-H J^-1 J' qd`.
     jacobian_rate,
@@ -66,7 +66,8 @@ torque_terms! {
     force,
     /// Damping of motion that does not move the tip.
     nullspace,
-    /// Stiff loops of held joints, and of all joints in the move, excite and breakaway modes.
+    /// Stiff loops of held joints, and of all joints in the move, excite and breakaway modes; for the joint of a ramp
+    /// the torque that held it before.
     joint_pd,
     /// Spring-dampers before the hard stops, and at the borders of the workspace.
     soft_stop,

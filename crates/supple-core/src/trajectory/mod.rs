@@ -139,6 +139,21 @@ impl Trajectory {
         }
     }
 
+    /// Periods within [`Trajectory::length_s`]: how often a check of equal time intervals has to see the path; for a
+    /// probe a quarter of its strokes, each of which is a straight line, and 1 where nothing repeats.
+    pub fn periods(&self) -> f64 {
+        let of_length = |period_s: f64| self.length_s() / period_s;
+        match self {
+            Trajectory::Hold(_) | Trajectory::Line(_) => 1.0,
+            Trajectory::Sinusoid(sinusoid) => of_length(sinusoid.period_s()),
+            Trajectory::Arc(arc) => {
+                of_length(core::f64::consts::TAU / arc.angular_frequency_rad_per_s)
+            }
+            Trajectory::Quadrant(quadrant) => of_length(quadrant.period_s()),
+            Trajectory::Probe(probe) => 0.25 * f64::from(probe.strokes),
+        }
+    }
+
     /// Rejects a trajectory that cannot be followed: entries that are not finite or have the wrong
     /// sign.
     ///

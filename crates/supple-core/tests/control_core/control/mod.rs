@@ -26,3 +26,4 @@ mod set_points;
 mod settings;
 mod stiffness;
 mod stopping;
+mod untimely;
