@@ -243,7 +243,8 @@ impl<const N: usize> State<N> {
         }
         let external = self.observer.external_torque_nm();
         let collision = &config.collision;
-        let (joint_torque_nm, tip_force_n) = if self.activity.has_joint_loops() {
+        let has_loops = self.activity.has_joint_loops() || self.holds_pose();
+        let (joint_torque_nm, tip_force_n) = if has_loops {
             (&collision.move_joint_torque_nm, collision.move_tip_force_n)
         } else {
             (&collision.joint_torque_nm, collision.tip_force_n)
