@@ -145,6 +145,7 @@ fn config<const N: usize>(arm: Arm<N>) -> Config<N> {
         },
         pose: PoseLaw::default(),
         float_friction_share: 0.5,
+        hold_pose: false,
         hold_damping_nm_s_per_rad: all(1.0),
         handover_s: 0.05,
         limits: Limits {

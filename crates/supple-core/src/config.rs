@@ -367,6 +367,9 @@ pub struct Config<const N: usize> {
     pub float_friction_share: f64,
     /// Joint damping of gravity hold \[N m s/rad\], zero or more.
     pub hold_damping_nm_s_per_rad: Vector<N>,
+    /// Gravity hold keeps every joint by a position loop with the move mode's gains and collision thresholds: for a model
+    /// that would let the arm sink. A fault opens these loops as all others.
+    pub hold_pose: bool,
     /// Time over which the torque is blended after a change of mode \[s\], positive.
     pub handover_s: f64,
     /// Limits.

@@ -34,7 +34,7 @@ const POSES: usize = 500;
 /// Number of alternations between the fits of ripple and model.
 const ROUNDS: usize = 2;
 /// Samples of joints slower than this are excluded \[rad/s\].
-const SLOW_RAD_PER_S: f64 = 0.15;
+pub(crate) const SLOW_RAD_PER_S: f64 = 0.15;
 
 /// Options of a calibration and of its simulated plant.
 #[derive(Clone, Debug, PartialEq)]
@@ -298,12 +298,27 @@ pub fn identify<const N: usize>(
     logs: &[Log],
     runs: &[Log],
 ) -> Result<(Fit<N>, [RippleTable; N]), ExperimentError> {
+    let (columns, slow) = (FrictionColumns::OFFSET, SLOW_RAD_PER_S);
+    identify_with(start, logs, runs, columns, slow)
+}
+
+/// As [`identify`], with these columns of friction; samples of a joint slower than `slow_rad_per_s` are excluded.
+///
+/// # Errors
+/// [`ExperimentError::Ident`].
+pub fn identify_with<const N: usize>(
+    start: &Config<N>,
+    logs: &[Log],
+    runs: &[Log],
+    columns: FrictionColumns,
+    slow_rad_per_s: f64,
+) -> Result<(Fit<N>, [RippleTable; N]), ExperimentError> {
     let joints: Vec<usize> = (0..N).collect();
     let motor_from_joint = *supple_core::Controller::new(*start)?.motor_from_joint();
     let procedure = Procedure {
         preparation: preparation(start.period_s, CUTOFF_HZ.0),
-        friction: FrictionChoice::Columns(FrictionColumns::OFFSET),
-        slow_rad_per_s: SLOW_RAD_PER_S,
+        friction: FrictionChoice::Columns(columns),
+        slow_rad_per_s,
         prior_weight: Some(1e-2),
         ..Procedure::default()
     };

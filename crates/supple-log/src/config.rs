@@ -25,6 +25,9 @@ struct Stored<const N: usize> {
     handover_s: f64,
     #[serde(with = "column")]
     hold_damping_nm_s_per_rad: Vector<N>,
+    /// Older logs have a gravity hold without position loops.
+    #[serde(default)]
+    hold_pose: bool,
     #[serde(with = "rows")]
     joint_from_motor: Matrix<N, N>,
     #[serde(with = "column")]
@@ -96,6 +99,7 @@ pub(crate) fn to_toml<const N: usize>(config: &Config<N>) -> Result<String, toml
         pose,
         float_friction_share,
         hold_damping_nm_s_per_rad,
+        hold_pose,
         handover_s,
         limits,
         collision,
@@ -107,6 +111,7 @@ pub(crate) fn to_toml<const N: usize>(config: &Config<N>) -> Result<String, toml
         estimator_rad_per_s,
         handover_s,
         hold_damping_nm_s_per_rad,
+        hold_pose,
         joint_from_motor,
         gravity_m_per_s2: arm.gravity(),
         last_joint_from_tip: arm.joint_from_tip(),
@@ -169,6 +174,7 @@ pub(crate) fn from_toml<const N: usize>(text: &str) -> Result<Config<N>, String>
         pose: stored.pose,
         float_friction_share: stored.float_friction_share,
         hold_damping_nm_s_per_rad: stored.hold_damping_nm_s_per_rad,
+        hold_pose: stored.hold_pose,
         handover_s: stored.handover_s,
         limits: stored.limits,
         collision: match &stored.collision {

@@ -151,6 +151,7 @@ impl Description {
             },
             float_friction_share: settings.float.friction_share,
             hold_damping_nm_s_per_rad: gain(|joint| joint.hold_damping_nm_s_per_rad),
+            hold_pose: settings.hold_pose,
             handover_s: settings.handover_s,
             limits: Limits {
                 position_lower_rad: Vector::from_fn(|i, _| self.joints[i].position_lower_rad),

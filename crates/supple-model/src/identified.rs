@@ -32,11 +32,17 @@ pub struct IdentifiedModel<'a, const N: usize> {
 }
 
 /// Thresholds for a model that is not identified yet.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct WideThresholds {
     /// Collision thresholds in the modes with stiff joint loops, as a share of `collision_torque_nm` and of the tip's
     /// threshold.
     pub move_share: f64,
+    /// `collision_torque_nm` of each joint \[N m\]; `None` keeps those of the description.
+    pub joint_torque_nm: Option<Vec<f64>>,
+    /// Force at the tip \[N\].
+    pub tip_force_n: f64,
+    /// Whether gravity hold keeps the pose by position loops.
+    pub hold_pose: bool,
     /// Unmodelled load at the tip \[N\].
     pub load_n: f64,
     /// Torque that may oppose the acceleration of a joint, as a share of its torque limit.
@@ -108,6 +114,11 @@ impl Description {
                 wide.move_share.max(settings.collision.move_share),
             ),
             (
+                "collision",
+                "tip_force_n",
+                wide.tip_force_n.max(settings.collision.tip_force_n),
+            ),
+            (
                 "plausible",
                 "load_n",
                 wide.load_n.max(settings.plausible.load_n),
@@ -124,6 +135,13 @@ impl Description {
         for joint in 0..self.dof() {
             let table = self.joint_table(&mut document, joint)?;
             table.remove("move_collision_torque_nm");
+            let given_nm = wide.joint_torque_nm.as_deref().and_then(|nm| nm.get(joint));
+            if let Some(torque_nm) = given_nm {
+                put(table, "collision_torque_nm", (*torque_nm).into());
+            }
+        }
+        if wide.hold_pose {
+            document["hold_pose"] = value(true);
         }
         Description::from_text(&document.to_string(), self.urdf())
     }

@@ -40,6 +40,10 @@ pub struct Settings {
     /// Duration of the torque blend after a change of mode (s). Default 0.2.
     #[serde(default = "default::handover_s")]
     pub handover_s: f64,
+    /// Gravity hold keeps every joint by a position loop with the move mode's gains, for a model that would let the arm
+    /// sink, as before a calibration. Default: false, held joints alone have a loop.
+    #[serde(default)]
+    pub hold_pose: bool,
     /// Pose that the arm starts from, one angle per moving joint (rad). Default: the middle of each
     /// joint's range, held joints at the angle they are held at.
     pub home_rad: Option<Vec<f64>>,

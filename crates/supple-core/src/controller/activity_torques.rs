@@ -29,14 +29,36 @@ impl<const N: usize> State<N> {
         if let Activity::Breakaway { ramp, from_rad, .. } = &self.activity {
             return core::array::from_fn(|i| (i != ramp.joint).then_some(from_rad[i]));
         }
-        if self.activity.has_joint_loops()
-            && let Some(reference) = self.joint_reference(config)
-        {
-            return core::array::from_fn(|i| Some(reference.position_rad[i]));
+        if let Some(setpoint_rad) = self.loop_setpoints_rad(config) {
+            return core::array::from_fn(|i| Some(setpoint_rad[i]));
         }
         core::array::from_fn(|i| {
             (config.roles[i] != Role::Active).then_some(self.held_setpoint_rad[i])
         })
+    }
+
+    /// Set-points of the loops that hold or move every joint, if they are active \[rad\].
+    pub(super) fn loop_setpoints_rad(&self, config: &Config<N>) -> Option<Vector<N>> {
+        if self.holds_pose() {
+            return Some(self.held_setpoint_rad);
+        }
+        let has_loops = self.activity.has_joint_loops();
+        let reference = has_loops.then(|| self.joint_reference(config)).flatten()?;
+        Some(reference.position_rad)
+    }
+
+    /// Set-points with which a gravity hold that keeps the pose would go on from loops, `None` without loops or such a
+    /// hold. The joint of a ramp keeps the torque that it had before.
+    pub(super) fn pose_to_hold_rad(&self, config: &Config<N>) -> Option<Vector<N>> {
+        if !config.hold_pose {
+            return None;
+        }
+        let mut setpoint_rad = self.loop_setpoints_rad(config)?;
+        if let Activity::Breakaway { ramp, held_nm, .. } = &self.activity {
+            let stiffness = config.move_gains.stiffness_nm_per_rad[ramp.joint];
+            setpoint_rad[ramp.joint] = self.position[ramp.joint] + held_nm / stiffness;
+        }
+        Some(setpoint_rad)
     }
 
     /// Torque terms of the activity, without those that every activity has. Inlined, so that the terms are written where
@@ -230,10 +252,8 @@ impl<const N: usize> State<N> {
         let stiffness = &config.move_gains.stiffness_nm_per_rad;
         let constant_nm = |joint: usize| config.friction[joint].torque_nm(0.0);
         let (mut from_rad, mut held_nm) = (self.position, 0.0);
-        if self.activity.has_joint_loops()
-            && let Some(reference) = self.joint_reference(config)
-        {
-            from_rad = reference.position_rad;
+        if let Some(setpoint_rad) = self.loop_setpoints_rad(config) {
+            from_rad = setpoint_rad;
             if let Activity::Breakaway {
                 ramp: earlier,
                 held_nm,
@@ -279,19 +299,25 @@ impl<const N: usize> State<N> {
             return;
         }
         let velocity = &self.estimator.velocity_rad_per_s;
-        if !self.activity.has_joint_loops() {
+        if self.has_held_loops && !self.activity.has_joint_loops() {
+            let (all, gains) = (self.holds_pose(), &config.move_gains);
             for (joint, role) in config.roles.iter().enumerate() {
-                if let Role::Held {
-                    stiffness_nm_per_rad,
-                    damping_nm_s_per_rad,
-                    ..
-                } = role
-                {
-                    torques.joint_pd[joint] += stiffness_nm_per_rad
-                        * (self.held_setpoint_rad[joint] - self.position[joint])
-                        - damping_nm_s_per_rad * velocity[joint];
-                    torques.damping[joint] = 0.0;
-                }
+                let (stiffness, damping) = match *role {
+                    _ if all => (
+                        gains.stiffness_nm_per_rad[joint],
+                        gains.damping_nm_s_per_rad[joint],
+                    ),
+                    Role::Held {
+                        stiffness_nm_per_rad,
+                        damping_nm_s_per_rad,
+                        ..
+                    } => (stiffness_nm_per_rad, damping_nm_s_per_rad),
+                    Role::Active => continue,
+                };
+                torques.joint_pd[joint] += stiffness
+                    * (self.held_setpoint_rad[joint] - self.position[joint])
+                    - damping * velocity[joint];
+                torques.damping[joint] = 0.0;
             }
         }
         torques.soft_stop = checks::soft_stop(&config.limits, &self.position, velocity);

@@ -43,6 +43,7 @@ pub use validate::ConfigError;
 pub use words::{JointLabel, NamesJoints, WithNames};
 
 use crate::config::Config;
+use crate::law::task::count_active;
 use crate::math::linalg::Cholesky;
 use crate::math::{Matrix, Vector};
 use crate::model::learned::LearnedBounds;
@@ -57,6 +58,10 @@ pub struct Controller<const N: usize> {
     /// `j2mp`.
     motor_from_joint: Matrix<N, N>,
     delay_s: f64,
+    /// Number of active joints.
+    active_joints: usize,
+    /// A motor has a table of its ripple.
+    has_ripple: bool,
     /// The estimator's gains after one period.
     one_period: EstimatorGains,
     torque_step_nm: Vector<N>,
@@ -92,6 +97,11 @@ impl<const N: usize> Controller<N> {
             motor_from_joint,
             groups: MotorGroups::new(&config.joint_from_motor),
             delay_s,
+            active_joints: count_active(&config.roles),
+            has_ripple: config
+                .ripple
+                .iter()
+                .any(|table| !table.harmonics().is_empty()),
             one_period: EstimatorGains::new(config.period_s, config.estimator_rad_per_s),
             torque_step_nm: config.limits.torque_rate_nm_per_s * config.period_s,
             stop_step_nm: Vector::from_fn(|i, _| {
@@ -107,6 +117,14 @@ impl<const N: usize> Controller<N> {
     /// velocity estimate.
     pub fn delay_s(&self) -> f64 {
         self.delay_s
+    }
+
+    fn active_joints(&self) -> usize {
+        self.active_joints
+    }
+
+    fn has_ripple(&self) -> bool {
+        self.has_ripple
     }
 
     /// Time constant `t_s` with which the safe action stops a motion \[s\].

@@ -95,9 +95,12 @@ impl<const N: usize> State<N> {
             } => {
                 check_stops(config, &target_rad)?;
                 check_held_targets(config, &target_rad)?;
-                check_line(config, 1.0, &self.position, &target_rad, duration_s)?;
+                // Where gravity hold keeps the pose, the loops go on from their set-points.
+                let held_rad = self.pose_to_hold_rad(config);
+                let from_rad = held_rad.unwrap_or(self.position);
+                check_line(config, 1.0, &from_rad, &target_rad, duration_s)?;
                 self.enter(Activity::Move {
-                    from_rad: self.position,
+                    from_rad,
                     to_rad: target_rad,
                     duration_s,
                 });
@@ -151,12 +154,9 @@ impl<const N: usize> State<N> {
                 });
             }
             Request::Excite(series) => {
-                let held = match self.activity.has_joint_loops() {
-                    true => self.joint_reference(config),
-                    false => None,
-                };
                 // A joint that friction or gravity keeps from its set-point goes on from there.
-                let from_rad = held.map_or(self.position, |held| held.position_rad);
+                let held_rad = self.loop_setpoints_rad(config);
+                let from_rad = held_rad.unwrap_or(self.position);
                 check_excitation(config, &from_rad, &series)?;
                 self.enter(Activity::Excite(series));
             }

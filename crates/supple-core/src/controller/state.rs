@@ -145,6 +145,10 @@ pub struct State<const N: usize> {
     pub(super) rotational_gains: GainRamp<RotationalGains>,
     /// Set-points of held joints.
     pub(super) held_setpoint_rad: Vector<N>,
+    /// Whether gravity hold keeps the pose, see [`Config::hold_pose`].
+    hold_pose: bool,
+    /// Whether there are position loops outside the modes that move joints.
+    pub(super) has_held_loops: bool,
     /// Last torque and fallback torque sent.
     pub(super) torque: Vector<N>,
     pub(super) fallback: Vector<N>,
@@ -181,6 +185,9 @@ impl<const N: usize> State<N> {
             joint_gains: GainRamp::at_rest(config.joint_gains),
             rotational_gains: GainRamp::at_rest(config.pose.gains),
             held_setpoint_rad: Vector::zeros(),
+            hold_pose: config.hold_pose,
+            has_held_loops: config.hold_pose
+                || config.roles.iter().any(|role| *role != Role::Active),
             torque: Vector::zeros(),
             fallback: Vector::zeros(),
             handover: Handover::none(),
@@ -331,7 +338,8 @@ impl<const N: usize> State<N> {
 
     /// Starts an activity; the present torque, if any, will be blended out.
     pub(super) fn enter(&mut self, activity: Activity<N>) {
-        if self.held_loops_inactive() {
+        let loops_go_on = self.hold_pose && self.activity.has_joint_loops();
+        if self.held_loops_inactive() && !loops_go_on {
             self.held_setpoint_rad = self.position;
         }
         let has_torque = !self.activity.is_torque_off() && !activity.is_torque_off();
@@ -394,14 +402,28 @@ impl<const N: usize> State<N> {
         !self.drives_active || self.activity.is_torque_off() || has_own || in_fault
     }
 
+    /// Whether position loops keep every joint in gravity hold.
+    pub(super) fn holds_pose(&self) -> bool {
+        let holding = matches!(self.activity, Activity::GravityHold);
+        self.hold_pose && self.drives_active && holding
+    }
+
     /// Moves the set-points of held joints towards their configured angles at a limited speed.
     /// While the loops are off, the set-points follow the joints, so that the loops engage without
-    /// a jump.
+    /// a jump. Where gravity hold keeps the pose, they follow the loops of the other modes.
     pub(super) fn update_held_setpoints(&mut self, config: &Config<N>, elapsed_s: f64) {
+        if !self.has_held_loops {
+            return;
+        }
         let free = self.held_loops_inactive();
         let step = HELD_APPROACH_RAD_PER_S * elapsed_s;
+        if let Some(setpoint_rad) = self.pose_to_hold_rad(config) {
+            self.held_setpoint_rad = setpoint_rad;
+            return;
+        }
         for (joint, role) in config.roles.iter().enumerate() {
-            if free {
+            let is_held = *role != Role::Active;
+            if free || self.hold_pose && !is_held {
                 self.held_setpoint_rad[joint] = self.position[joint];
             } else if let Role::Held { position_rad, .. } = role {
                 self.held_setpoint_rad[joint] +=

@@ -32,7 +32,7 @@ pub fn step<const N: usize>(
     };
     let velocity = state.estimator.velocity_rad_per_s;
     terms(&config.arm, &state.position, &velocity, &mut state.terms);
-    let task = Task::new(&state.terms, &config.roles);
+    let task = Task::with_count(&state.terms, &config.roles, controller.active_joints());
     if task.is_none() {
         state.latch_fault(Fault::MassMatrix);
     }
@@ -97,8 +97,11 @@ pub fn step<const N: usize>(
     );
     if !(state.activity.is_torque_off() || state.fault.is_some() || state.is_stale(config)) {
         state.add_joint_loops_and_stops(config, &mut torques);
-        let tables = &config.ripple;
-        torques.ripple = compensation_nm(tables, controller.motor_from_joint(), &state.position);
+        if controller.has_ripple() {
+            let tables = &config.ripple;
+            torques.ripple =
+                compensation_nm(tables, controller.motor_from_joint(), &state.position);
+        }
         if let Some(learned) = &learned {
             torques.learned = state.learned_torques(
                 controller,

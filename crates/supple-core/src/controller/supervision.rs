@@ -46,8 +46,10 @@ impl<const N: usize> State<N> {
             velocity,
             tip_velocity,
         )?;
-        let joint_setpoints = self.joint_setpoints(config);
-        checks::joint_tracking(&config.limits, &joint_setpoints, &self.position)?;
+        if self.has_held_loops || self.activity.has_joint_loops() {
+            let joint_setpoints = self.joint_setpoints(config);
+            checks::joint_tracking(&config.limits, &joint_setpoints, &self.position)?;
+        }
         match reference {
             Some(reference) => {
                 let error = reference.position - self.terms.base_from_tip.translation;
@@ -243,7 +245,8 @@ impl<const N: usize> State<N> {
         }
         let external = self.observer.external_torque_nm();
         let collision = &config.collision;
-        let (joint_torque_nm, tip_force_n) = if self.activity.has_joint_loops() {
+        let has_loops = self.activity.has_joint_loops() || self.holds_pose();
+        let (joint_torque_nm, tip_force_n) = if has_loops {
             (&collision.move_joint_torque_nm, collision.move_tip_force_n)
         } else {
             (&collision.joint_torque_nm, collision.tip_force_n)

@@ -77,15 +77,20 @@ impl<const N: usize> Task<N, 3> {
     /// positive definite.
     #[inline(always)]
     pub fn new(terms: &Terms<N>, roles: &[Role; N]) -> Option<Task<N, 3>> {
-        let jacobian = active_jacobian(terms, roles);
+        Task::with_count(terms, roles, count_active(roles))
+    }
+
+    /// As [`Task::new`], for whoever has counted the active joints before.
+    #[inline(always)]
+    pub(crate) fn with_count(
+        terms: &Terms<N>,
+        roles: &[Role; N],
+        active: usize,
+    ) -> Option<Task<N, 3>> {
+        let jacobian = active_jacobian(terms, roles, active);
         let sigma = min_singular_value(&jacobian);
-        Task::damped(
-            jacobian,
-            terms,
-            roles,
-            sigma,
-            singularity_damping_per_kg(sigma),
-        )
+        let damping = singularity_damping_per_kg(sigma);
+        Task::damped(jacobian, terms, roles, active, sigma, damping)
     }
 }
 
@@ -102,14 +107,16 @@ impl<const N: usize, const D: usize> Task<N, D> {
     /// wait for it, which takes as long as the rest of the law, where it is surely great enough.
     #[inline(always)]
     pub(crate) fn of_state(terms: &Terms<N>, roles: &[Role; N]) -> Option<Task<N, D>> {
-        let position = active_jacobian::<N, 3>(terms, roles);
+        let active = count_active(roles);
+        let position = active_jacobian::<N, 3>(terms, roles, active);
         let sigma = min_singular_value(&position);
         let damping = if D == 3 && !singular_values_exceed(&position.data.0, SINGULAR_BELOW_M) {
             singularity_damping_per_kg(sigma)
         } else {
             0.0
         };
-        Task::damped(active_jacobian(terms, roles), terms, roles, sigma, damping)
+        let jacobian = active_jacobian(terms, roles, active);
+        Task::damped(jacobian, terms, roles, active, sigma, damping)
     }
 
     #[inline(always)]
@@ -117,25 +124,39 @@ impl<const N: usize, const D: usize> Task<N, D> {
         jacobian: Matrix<D, N>,
         terms: &Terms<N>,
         roles: &[Role; N],
+        active: usize,
         sigma: f64,
         damping: f64,
     ) -> Option<Task<N, D>> {
         const { assert!(D == 3 || D == 6, "a task is a position or a pose") };
-        if D == 6 && count_active(roles) < D {
+        if D == 6 && active < D {
             return None;
         }
-        let mass_matrix = active_mass_matrix(terms, roles);
+        let decoupled;
+        let mass_matrix = if active == N {
+            &terms.mass_matrix
+        } else {
+            decoupled = active_mass_matrix(terms, roles);
+            &decoupled
+        };
         let mut is_damped = damping != 0.0;
-        let inverse = match three_active(roles) {
+        let three = if N == 3 && active == 3 {
+            Some([0, 1, 2])
+        } else if active == 3 {
+            three_active(roles)
+        } else {
+            None
+        };
+        let inverse = match three {
             Some(joints) if D == 3 && damping == 0.0 => {
                 // What the inverse does not ask for, but the arm has to be.
-                if !is_positive_definite_3(&mass_matrix, joints) {
+                if !is_positive_definite_3(mass_matrix, joints) {
                     return None;
                 }
                 inverse_of_three(&jacobian, joints)
             }
             _ => {
-                let mobile = Cholesky::new(&mass_matrix)?.solve(&jacobian.transpose());
+                let mobile = Cholesky::new(mass_matrix)?.solve(&jacobian.transpose());
                 let mobility = lower_product(&jacobian, &mobile, damping);
                 let factor = if D == 3 {
                     Cholesky::new(&mobility)?
@@ -200,9 +221,10 @@ fn lower_product<const N: usize, const D: usize>(
 fn active_jacobian<const N: usize, const D: usize>(
     terms: &Terms<N>,
     roles: &[Role; N],
+    active: usize,
 ) -> Matrix<D, N> {
     let mut jacobian: Matrix<D, N> = terms.jacobian.fixed_rows::<D>(0).into_owned();
-    if count_active(roles) == N {
+    if active == N {
         return jacobian;
     }
     for (i, role) in roles.iter().enumerate() {
@@ -217,9 +239,6 @@ fn active_jacobian<const N: usize, const D: usize>(
 #[inline(always)]
 fn active_mass_matrix<const N: usize>(terms: &Terms<N>, roles: &[Role; N]) -> Matrix<N, N> {
     let mut mass_matrix = terms.mass_matrix;
-    if count_active(roles) == N {
-        return mass_matrix;
-    }
     for (i, role) in roles.iter().enumerate() {
         if *role != Role::Active {
             mass_matrix.row_mut(i).fill(0.0);

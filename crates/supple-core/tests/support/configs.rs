@@ -113,6 +113,7 @@ fn config<const N: usize>(
         },
         pose: PoseLaw::default(),
         float_friction_share: 0.5,
+        hold_pose: false,
         hold_damping_nm_s_per_rad: all(2.0),
         handover_s: 0.1,
         limits: Limits {

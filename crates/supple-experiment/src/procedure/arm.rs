@@ -13,8 +13,7 @@ pub trait MotionArm<const N: usize> {
     type Error: From<ProcedureError>;
 
     /// Runs the controller with this model from now on. The drives are idle meanwhile, and the motors brake or the arm is
-    /// laid down; afterwards the drives are active, and the arm is in gravity hold or, where no brakes would stop it, in
-    /// the move mode at its pose, which holds against gravity that the model lacks.
+    /// laid down; afterwards the drives are active, and the arm is in gravity hold.
     ///
     /// # Errors
     /// If the controller cannot be started with this model, or the drives do not become active.

@@ -3,13 +3,13 @@
 use super::error::ProcedureError;
 use super::progress::FitQuality;
 use crate::breakaway::JointBreakaway;
-use crate::calibrate::{identify, without_ripple};
+use crate::calibrate::{SLOW_RAD_PER_S, identify_with, without_ripple};
 use nalgebra::DMatrix;
 use std::path::Path;
 use supple_core::controller::Mode;
 use supple_core::dynamics::rnea;
 use supple_core::{Config, Vector};
-use supple_ident::{Fit, Log, Motion, ReadError};
+use supple_ident::{Fit, FrictionColumns, Log, Motion, ReadError};
 use supple_log::Reader;
 use supple_model::{Description, IdentifiedModel};
 
@@ -23,6 +23,11 @@ const ALL_MOVE_RAD: f64 = 0.05;
 const LEAST_THRESHOLD: f64 = 0.5;
 /// Range of the factor between measured and given breakaway torque by which dry friction is scaled.
 const FACTOR: (f64, f64) = (0.2, 5.0);
+
+/// Share of the greatest speed of the slowest joint above which samples are fitted.
+const FAST_SHARE: f64 = 0.3;
+/// Time over which the speed of a joint is averaged \[s\].
+const SPEED_S: f64 = 0.1;
 
 /// The motions along series in a log, in order.
 ///
@@ -131,7 +136,7 @@ pub fn fit_first<const N: usize>(
     let (fitted, unseen) = (part(pass, 0, cut), part(pass, cut, rows - cut));
     let mut logs = vec![fitted];
     logs.extend_from_slice(others);
-    let (fit, _) = identify(&config, &logs, &[])?;
+    let (fit, _) = identify_with(&config, &logs, &[], columns(model), fast_rad_per_s(&logs))?;
     let unseen = prepared(&unseen, &fit)?;
     let quality = quality(&config, &fit, &unseen)?;
     let better = quality.unseen_relative < quality.unseen_relative_before;
@@ -152,7 +157,8 @@ pub fn fit_all<const N: usize>(
     others: &[Log],
 ) -> Result<(Description, FitQuality), ProcedureError> {
     let config = model.config::<N>()?;
-    let (fit, ripple) = identify(&config, logs, constant_speed)?;
+    let (columns, fast_rad_per_s) = (columns(model), fast_rad_per_s(logs));
+    let (fit, ripple) = identify_with(&config, logs, constant_speed, columns, fast_rad_per_s)?;
     let motor_from_joint = *supple_core::Controller::new(config)?.motor_from_joint();
     let unseen = without_ripple(unseen, &ripple, &motor_from_joint);
     let unseen = prepared(&unseen, &fit)?;
@@ -171,6 +177,39 @@ pub fn fit_all<const N: usize>(
         *threshold_nm = threshold_nm.map(|nm| nm.max(least_nm));
     }
     Ok((described.with_move_collision(&thresholds)?, quality))
+}
+
+/// Columns of friction: the gears of motors on a bus rub more under load.
+fn columns(model: &Description) -> FrictionColumns {
+    FrictionColumns {
+        load: model.bus().is_some(),
+        ..FrictionColumns::OFFSET
+    }
+}
+
+/// Speed above which samples are fitted: less than usual if a joint is always slow.
+fn fast_rad_per_s(logs: &[Log]) -> f64 {
+    let joints = logs.first().map_or(0, |log| log.q_rad.ncols());
+    let slowest = (0..joints).map(|joint| {
+        let of_log = |log: &Log| peak_rad_per_s(log, joint);
+        logs.iter().map(of_log).fold(0.0, f64::max)
+    });
+    SLOW_RAD_PER_S.min(FAST_SHARE * slowest.fold(f64::INFINITY, f64::min))
+}
+
+/// Greatest speed of a joint in a log.
+fn peak_rad_per_s(log: &Log, joint: usize) -> f64 {
+    let mut first = 0;
+    let mut peak: f64 = 0.0;
+    for (last, t_s) in log.t_s.iter().enumerate() {
+        let over_s = t_s - log.t_s[first];
+        if over_s >= SPEED_S {
+            let travel_rad = log.q_rad[(last, joint)] - log.q_rad[(first, joint)];
+            peak = peak.max(travel_rad.abs() / over_s);
+            first = last;
+        }
+    }
+    peak
 }
 
 fn part(log: &Log, first: usize, rows: usize) -> Log {

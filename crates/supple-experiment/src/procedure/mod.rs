@@ -17,6 +17,7 @@ mod motions;
 mod progress;
 mod steps;
 mod sweep;
+mod thresholds;
 mod wiring;
 
 pub use arm::{Collector, Motion, MotionArm, Performed, Stopped};

@@ -4,8 +4,8 @@ use crate::error::ExperimentError;
 use crate::excite::move_to;
 use crate::request_sequence::Step;
 use supple_core::controller::{Breakaway, Request};
-use supple_core::dynamics::crba;
-use supple_core::trajectory::{Fourier, HARMONICS};
+use supple_core::dynamics::{crba, gravity, rnea};
+use supple_core::trajectory::{Fourier, HARMONICS, JointReference};
 use supple_core::{Config, Vector};
 use supple_ident::IdentError;
 use supple_ident::design::{DesignOptions, constant_speed_series, design, slow_series};
@@ -16,6 +16,16 @@ const EXCITATION: (f64, f64, f64) = (12.0, 1.0, 1.25);
 const EXCITATIONS: u64 = 3;
 /// Fraction of the amplitude of the first pass, and its number of periods.
 const FIRST: (f64, f64) = (0.25, 1.5);
+/// The same fraction where the designs are [careful](DesignPlan::careful).
+const FIRST_OF_CAREFUL: f64 = 0.5;
+/// Share of the torque limits that careful designs and their ripple runs use.
+const CAREFUL_SHARE: f64 = 1.0 / 1.5;
+/// Share of the torque limits that a motion about a pose may need.
+const TORQUE_SHARE: f64 = 0.8;
+/// Number of times that the amplitude of such a motion is reduced, and the factor.
+const REDUCTIONS: (usize, f64) = (20, 0.85);
+/// Poses of a series at which torques are evaluated.
+const POSES: usize = 400;
 /// Maximum joint speed \[rad/s\] and period \[s\] of slow motion.
 const SLOW: (f64, f64) = (0.1, 40.0);
 /// Speeds of the runs at constant speed \[rad/s\], and the period of each \[s\].
@@ -30,7 +40,7 @@ const WIRING_RAMP_PER_INERTIA: f64 = 200.0;
 /// Slope of the ramps that measure the breakaway torque \[N m/s\], and motion at which they stop \[rad\].
 pub const BREAKAWAY_RAMP: (f64, f64) = (0.4, 0.025);
 /// Maximum torque of a ramp \[N m\].
-const RAMP_LIMIT_NM: f64 = 6.0;
+pub const RAMP_LIMIT_NM: f64 = 6.0;
 /// Distance from its pose within which a joint needs no move \[rad\].
 const THERE_RAD: f64 = 5e-3;
 /// Time in which the mode of a ramp ends after its torque limit \[s\].
@@ -49,6 +59,21 @@ pub struct Motions<const N: usize> {
     pub constant: Vec<Fourier<N>>,
     /// Another excitation, for validation.
     pub unseen: Fourier<N>,
+    /// The pose of the excitations in which gravity needs the smallest share of the torque limits.
+    pub light_rad: Vector<N>,
+}
+
+/// How the motions are designed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DesignPlan {
+    /// Seed of the designs.
+    pub seed: u64,
+    /// Number of candidates of each.
+    pub candidates: usize,
+    /// Whether gravity may need much of the torque limits, so that slow motion is about the light pose instead of home.
+    pub about_light_pose: bool,
+    /// Whether motors may give a share of the commanded torque only.
+    pub careful: bool,
 }
 
 impl<const N: usize> Motions<N> {
@@ -59,9 +84,14 @@ impl<const N: usize> Motions<N> {
     pub fn design(
         config: &Config<N>,
         home_rad: &Vector<N>,
-        seed: u64,
-        candidates: usize,
+        plan: &DesignPlan,
     ) -> Result<Motions<N>, ExperimentError> {
+        let mut config = *config;
+        if plan.careful {
+            config.limits.joint_torque_nm *= CAREFUL_SHARE;
+        }
+        let config = &config;
+        let (seed, candidates) = (plan.seed, plan.candidates);
         let joints: Vec<usize> = (0..N).collect();
         let (period_s, periods, unseen_periods) = EXCITATION;
         let search = |seed, periods, candidates| {
@@ -81,16 +111,33 @@ impl<const N: usize> Motions<N> {
             unseen_periods,
             (candidates / 10).max(20),
         )?;
+        let light_rad = light_pose(config, &full);
+        let centre_rad = if plan.about_light_pose {
+            &light_rad
+        } else {
+            home_rad
+        };
+        let fitting = |series: Fourier<N>| match plan.about_light_pose {
+            true => within_torque(config, series),
+            false => series,
+        };
         let (speeds, constant_s) = CONSTANT;
-        let run = |speed| constant_speed_series(config, home_rad, &joints, speed, constant_s);
-        let constant: Result<_, IdentError> = speeds.into_iter().map(run).collect();
+        let run = |speed| constant_speed_series(config, centre_rad, &joints, speed, constant_s);
+        let constant: Result<Vec<_>, IdentError> = speeds.into_iter().map(run).collect();
         let (speed_rad_per_s, slow_period_s) = SLOW;
+        let slow = slow_series(config, centre_rad, &joints, speed_rad_per_s, slow_period_s)?;
+        let first = if plan.careful {
+            FIRST_OF_CAREFUL
+        } else {
+            FIRST.0
+        };
         Ok(Motions {
-            first: scaled(&full[0], FIRST.0, FIRST.1),
-            slow: slow_series(config, home_rad, &joints, speed_rad_per_s, slow_period_s)?,
-            constant: constant?,
+            first: scaled(&full[0], first, FIRST.1),
+            slow: fitting(slow),
+            constant: constant?.into_iter().map(fitting).collect(),
             full,
             unseen,
+            light_rad,
         })
     }
 
@@ -103,6 +150,44 @@ impl<const N: usize> Motions<N> {
         all.push(self.unseen);
         all
     }
+}
+
+fn states<const N: usize>(series: &Fourier<N>) -> impl Iterator<Item = JointReference<N>> {
+    let series = *series;
+    (0..=POSES).map(move |i| series.at(series.duration_s * i as f64 / POSES as f64))
+}
+
+/// Greatest share of a torque limit.
+fn share<const N: usize>(config: &Config<N>, torque_nm: &Vector<N>) -> f64 {
+    let shares = torque_nm.component_div(&config.limits.joint_torque_nm);
+    shares.amax()
+}
+
+/// The pose of these series in which gravity needs the smallest share of the torque limits.
+fn light_pose<const N: usize>(config: &Config<N>, all: &[Fourier<N>]) -> Vector<N> {
+    let poses = all.iter().flat_map(states).map(|state| state.position_rad);
+    let weighed = poses.map(|q| (share(config, &gravity(&config.arm, &q)), q));
+    let light = weighed.min_by(|a, b| a.0.total_cmp(&b.0));
+    light.map_or_else(Vector::zeros, |(_, q)| q)
+}
+
+/// The series with amplitudes for which the model needs no more than [`TORQUE_SHARE`] of the torque limits.
+fn within_torque<const N: usize>(config: &Config<N>, mut series: Fourier<N>) -> Fourier<N> {
+    let (times, by) = REDUCTIONS;
+    for _ in 0..times {
+        let needs = states(&series).map(|state| {
+            let speed = &state.velocity_rad_per_s;
+            let friction = Vector::from_fn(|j, _| config.friction[j].torque_nm(speed[j]));
+            let q = &state.position_rad;
+            let moved = rnea(&config.arm, q, speed, &state.acceleration_rad_per_s2);
+            share(config, &(moved + friction))
+        });
+        if needs.fold(0.0, f64::max) <= TORQUE_SHARE {
+            break;
+        }
+        series = scaled(&series, by, 1.0);
+    }
+    series
 }
 
 /// The series with smaller amplitudes and another number of periods.

@@ -3,10 +3,11 @@
 use super::arm::{Motion, MotionArm};
 use super::error::ProcedureError;
 use super::motions::{
-    BREAKAWAY_RAMP, Motions, WIRING_RAMP, follow, ramp, ramps_s, wiring_slope_nm_per_s,
+    BREAKAWAY_RAMP, DesignPlan, Motions, WIRING_RAMP, follow, ramp, ramps_s, wiring_slope_nm_per_s,
 };
 use super::progress::{FinishedStep, FitQuality, Progress, SinusoidResult, StepName, write_whole};
 use super::sweep::Sweep;
+use super::thresholds::wide_thresholds;
 use super::wiring::{check_direction, check_gravity, check_ramp, difference_rad, ramp_result};
 use super::{
     DRAWING, FIRST_MODEL, HOLD_REMEDY, LEARNING_S, LOGS, Operator, ProcedureOptions, fitting,
@@ -26,7 +27,7 @@ use supple_core::dynamics::gravity;
 use supple_core::trajectory::Fourier;
 use supple_core::{Config, Vector};
 use supple_ident::Log;
-use supple_model::{Description, WideThresholds};
+use supple_model::Description;
 
 /// Rest in which the torque at a standstill is measured \[s\].
 const REST_S: f64 = 1.0;
@@ -36,20 +37,6 @@ const FLOAT_S: f64 = 2.0;
 const GAINS_S: f64 = 0.2;
 /// Duration of the move back to the start of the sinusoid \[s\].
 const RETURN_S: f64 = 1.5;
-/// Thresholds at which the arm stops while its model is unknown.
-const WIDE: WideThresholds = WideThresholds {
-    move_share: 1.0,
-    load_n: 40.0,
-    // As in the description: motion against its torque is what a motor of the wrong sign makes.
-    against_share: 0.0,
-};
-/// The same for arms without brakes, whose motors may give two thirds of what is commanded: the observer takes a third of
-/// every torque for an external one.
-const WIDE_OF_WEAK_MOTORS: WideThresholds = WideThresholds {
-    move_share: 2.0,
-    against_share: 0.35,
-    ..WIDE
-};
 /// Attempts at a motion that contact stops.
 const ATTEMPTS: usize = 3;
 
@@ -154,7 +141,7 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
             return Ok(());
         }
         let config = config::<N>(&self.model(Stage::Start)?)?;
-        let motions = self.design(&config)?;
+        let motions = self.design(Stage::Start)?;
         self.confirm(&config, &motions)?;
         if self.is_over() {
             return Ok(());
@@ -163,41 +150,30 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
         if self.is_over() {
             return Ok(());
         }
-        self.breakaway(&config)?;
+        self.breakaway(&config, &motions)?;
+        if self.is_over() {
+            return Ok(());
+        }
         let first = [motions.first];
-        let (start, first_model) = (Stage::Start, Stage::First);
-        for (step, name, stage, series) in [
-            (StepName::FirstPass, "first-pass", start, &first[..]),
-            (StepName::FullPass, "full-pass", first_model, &motions.full),
-            (
-                StepName::SlowMotion,
-                "slow-motion",
-                first_model,
-                &[motions.slow],
-            ),
-            (
-                StepName::ConstantSpeed,
-                "constant-speed",
-                first_model,
-                &motions.constant,
-            ),
-            (
-                StepName::UnseenMotion,
-                "unseen-motion",
-                first_model,
-                &[motions.unseen],
-            ),
+        self.series(StepName::FirstPass, "first-pass", Stage::Start, &first)?;
+        if self.is_over() {
+            return Ok(());
+        }
+        self.first_fit()?;
+        if self.is_over() {
+            return Ok(());
+        }
+        let motions = self.redesign(motions)?;
+        for (step, name, series) in [
+            (StepName::FullPass, "full-pass", &motions.full[..]),
+            (StepName::SlowMotion, "slow-motion", &[motions.slow]),
+            (StepName::ConstantSpeed, "constant-speed", &motions.constant),
+            (StepName::UnseenMotion, "unseen-motion", &[motions.unseen]),
         ] {
+            self.series(step, name, Stage::First, series)?;
             if self.is_over() {
                 return Ok(());
             }
-            if stage == first_model {
-                self.first_fit()?;
-                if self.is_over() {
-                    return Ok(());
-                }
-            }
-            self.series(step, name, stage, series)?;
         }
         for step in [Self::identification, Self::float, Self::sinusoid] {
             if self.is_over() {
@@ -239,10 +215,8 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
         ));
         let mut model = self.model(stage)?;
         if stage != Stage::Identified {
-            let wide = match model.bus() {
-                Some(_) => WIDE_OF_WEAK_MOTORS,
-                None => WIDE,
-            };
+            let unknown = stage == Stage::Start || self.progress.first_fit.is_none();
+            let wide = wide_thresholds::<N>(&model, unknown)?;
             model = model
                 .with_wide_thresholds(&wide)
                 .map_err(ProcedureError::from)?;
@@ -410,37 +384,70 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
         }
     }
 
-    fn design(&mut self, config: &Config<N>) -> Result<Motions<N>, A::Error> {
+    /// Whether the arm falls without torque: its motors may give less torque than is commanded, and gravity may need
+    /// much of their limits.
+    fn falls(&self) -> bool {
+        self.start.bus().is_some()
+    }
+
+    /// Designs the motions with the model of a stage.
+    fn design(&mut self, stage: Stage) -> Result<Motions<N>, A::Error> {
         self.say("design of the excitation");
-        let (home_rad, options) = (self.home_rad, self.options.clone());
-        let config = *config;
-        let designed = self.arm.meanwhile(move || {
-            Motions::design(&config, &home_rad, options.seed, options.candidates)
-        })?;
+        let home_rad = self.home_rad;
+        let config = config::<N>(&self.model(stage)?)?;
+        let unknown = stage == Stage::Start || self.progress.first_fit.is_none();
+        let plan = DesignPlan {
+            seed: self.options.seed,
+            candidates: self.options.candidates,
+            about_light_pose: self.falls(),
+            careful: self.falls() && unknown,
+        };
+        let work = move || Motions::design(&config, &home_rad, &plan);
+        let designed = self.arm.meanwhile(work)?;
         Ok(designed.map_err(ProcedureError::from)?)
+    }
+
+    /// The remaining motions within the torque limits by the model of the first fit, if the arm falls without torque. A
+    /// space that they sweep beyond what was confirmed is confirmed anew.
+    fn redesign(&mut self, motions: Motions<N>) -> Result<Motions<N>, A::Error> {
+        if !self.falls() || self.progress.finished(StepName::UnseenMotion).is_some() {
+            return Ok(motions);
+        }
+        let motions = self.design(Stage::First)?;
+        let config = config::<N>(&self.model(Stage::First)?)?;
+        let sweep = Sweep::of(&config, &self.home_rad, &motions.all());
+        let confirmed = self.progress.sweep.as_ref();
+        if confirmed.is_none_or(|confirmed| !confirmed.contains(&sweep)) {
+            self.say("by the model of the first pass the arm sweeps another space");
+            self.ask(&sweep)?;
+        }
+        Ok(motions)
+    }
+
+    /// Asks whether the arm may sweep a space.
+    fn ask(&mut self, sweep: &Sweep) -> Result<(), ProcedureError> {
+        let drawing = self.options.out.join(DRAWING);
+        write_whole(&drawing, sweep.svg().as_bytes())?;
+        let text = format!("the arm sweeps {}: {}", sweep.text(), drawing.display());
+        self.say(&text);
+        let confirmed = self.operator.confirms(sweep, &drawing);
+        self.progress.sweep = Some(sweep.clone());
+        self.progress.write(&self.options.out)?;
+        match confirmed {
+            true => Ok(()),
+            false => Err(ProcedureError::NotConfirmed { drawing }),
+        }
     }
 
     fn confirm(&mut self, config: &Config<N>, motions: &Motions<N>) -> Result<(), A::Error> {
         if self.progress.finished(StepName::Confirmed).is_some() {
             return Ok(());
         }
-        let sweep = Sweep::of(config, &self.home_rad, &motions.all());
-        let drawing = self.options.out.join(DRAWING);
-        write_whole(&drawing, sweep.svg().as_bytes())?;
         let stated_s = self.stated_s(config, motions);
         self.progress.stated_s = stated_s;
-        self.say(&format!(
-            "about {:.1} minutes of motion follow; the arm sweeps {}: {}",
-            stated_s / 60.0,
-            sweep.text(),
-            drawing.display()
-        ));
-        let confirmed = self.operator.confirms(&sweep, &drawing);
-        self.progress.sweep = Some(sweep);
-        if !confirmed {
-            self.progress.write(&self.options.out)?;
-            return Err(ProcedureError::NotConfirmed { drawing }.into());
-        }
+        let text = format!("about {:.1} minutes of motion follow", stated_s / 60.0);
+        self.say(&text);
+        self.ask(&Sweep::of(config, &self.home_rad, &motions.all()))?;
         Ok(self.finish(StepName::Confirmed, self.progress.moved_s, None)?)
     }
 
@@ -480,13 +487,16 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
         Ok(self.finish(StepName::WarmUp, before_s, done)?)
     }
 
-    fn breakaway(&mut self, config: &Config<N>) -> Result<(), A::Error> {
+    fn breakaway(&mut self, config: &Config<N>, motions: &Motions<N>) -> Result<(), A::Error> {
         if self.is_done(StepName::Breakaway, "breakaway torque of each joint") {
             return Ok(());
         }
         let before_s = self.progress.moved_s;
         self.ensure(Stage::Start)?;
-        let pose_rad = upright(config);
+        let pose_rad = match self.falls() {
+            true => motions.light_rad,
+            false => upright(config),
+        };
         self.progress.breakaway.clear();
         for joint in 0..N {
             let mut torque_nm = [0.0; 2];

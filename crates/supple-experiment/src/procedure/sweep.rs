@@ -64,6 +64,14 @@ impl Sweep {
         sweep
     }
 
+    /// Whether another space lies within this one.
+    pub fn contains(&self, other: &Sweep) -> bool {
+        let within = |axis: usize| {
+            other.lower_m[axis] >= self.lower_m[axis] && other.upper_m[axis] <= self.upper_m[axis]
+        };
+        (0..3).all(within)
+    }
+
     fn add<const N: usize>(&mut self, config: &Config<N>, q: &Vector<N>) -> [f64; 3] {
         let tip_m: [f64; 3] = tip_pose(&config.arm, q).translation.into();
         let joints = joint_poses(&config.arm, q).map(|pose| pose.translation.into());

@@ -13,9 +13,9 @@ use supple_core::Vector;
 const MOVED_RAD: f64 = 0.01;
 /// Gravity torque above which the torque at rest tells the scale \[N m\].
 const HEAVY_NM: f64 = 4.0;
-/// Factor between the holding torque and the model's gravity, above which units differ: 15 % of gravity and motors that give
-/// two thirds of what is commanded make 1.8.
-const GRAVITY_FACTOR: f64 = 2.0;
+/// Factor between the holding torque and the model's gravity, above which units differ: first moments that are 28 % off and
+/// motors that give two thirds of what is commanded make 2.1.
+const GRAVITY_FACTOR: f64 = 2.3;
 
 /// Finding for one joint.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

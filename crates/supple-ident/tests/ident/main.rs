@@ -10,6 +10,7 @@ mod extras;
 mod filter;
 mod paper;
 mod recovery;
+mod scales;
 mod select;
 mod tx40;
 mod ur10e;

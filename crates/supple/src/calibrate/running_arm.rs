@@ -254,10 +254,7 @@ impl<const N: usize> RunningArm<N> {
                 .last
                 .as_ref()
                 .is_some_and(|last| last.record().fault != 0);
-            if active && !fault {
-                return self.hold_pose();
-            }
-            if fault {
+            if active || fault {
                 return Ok(());
             }
             self.request(&Request::Idle)?;
@@ -269,18 +266,7 @@ impl<const N: usize> RunningArm<N> {
         Err(Failure::DrivesNotActive)
     }
 
-    /// Holds the present pose by the position loops, at once: gravity hold has none, and an arm without brakes would sink
-    /// by what its model lacks.
-    fn hold_pose(&mut self) -> Result<(), Failure> {
-        let last = self.last.as_ref();
-        let target_rad = last.map(|last| last.record_of::<N>().position_rad);
-        self.request(&Request::Move {
-            target_rad: target_rad.ok_or_else(|| self.not_running())?,
-            duration_s: HOLD_S,
-        })
-    }
-
-    /// Active drives, in gravity hold or holding the present pose.
+    /// Active drives in gravity hold.
     fn activate(&mut self) -> Result<(), Failure> {
         if self.plan.lays_down {
             self.enable()?;

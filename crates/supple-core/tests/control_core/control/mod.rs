@@ -11,6 +11,7 @@ mod faults;
 mod gains;
 mod garbage;
 mod holding;
+mod holding_pose;
 mod learning;
 mod limits;
 mod messages;

@@ -152,6 +152,7 @@ fn config<const N: usize>(case: &Case) -> Config<N> {
         },
         pose: PoseLaw::default(),
         float_friction_share: 0.5,
+        hold_pose: false,
         hold_damping_nm_s_per_rad: all(0.5),
         handover_s: 0.1,
         limits: Limits {
