@@ -84,6 +84,8 @@ pub struct RowMetrics {
     pub tip_later_m_per_s: Option<f64>,
     /// Maximum distance of the tip from its position at the event \[m\].
     pub tip_moved_m: f64,
+    /// The same until 0.2 s after the fault, or after braking began; none without either \[m\].
+    pub stopped_in_m: Option<f64>,
     /// Maximum force in the first 20 ms of the first contact \[N\].
     pub impact_n: f64,
     /// Maximum force after these 20 ms \[N\].
@@ -170,6 +172,11 @@ impl RowMetrics {
             metrics.energy_later_j = Some(max(later));
             let later = from(stop_ns + STOPPED_NS).filter(|line| line.active);
             metrics.tip_later_m_per_s = Some(max(later.map(|l| l.tip_speed_m_per_s)));
+            let until = after
+                .iter()
+                .take_while(|line| line.time_ns < stop_ns + ENERGY_CHECK_NS);
+            metrics.stopped_in_m = event_tip_m
+                .map(|event_tip_m| max(until.map(|line| distance(&line.tip_m, &event_tip_m))));
         }
         if let Some(touched) = touched {
             let (begin_ns, over_ns) = (touched.time_ns, touched.time_ns + IMPACT_NS);
