@@ -121,7 +121,7 @@ pub fn perform<const N: usize>(spec: &Spec, arm: &TestArm) -> Result<Row, Failur
             _ => at(script.event_cycle),
         };
         let mut metrics = RowMetrics::new(&lines, &samples, task_start_ns, event_ns);
-        let resolution_rad = config.plausibility.stuck_rad;
+        let resolution_rad = config.plausible.stuck_rad;
         metrics.observable_at(
             observable_ns(spec, &lines, event_ns, resolution_rad),
             event_ns,
