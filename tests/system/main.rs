@@ -9,6 +9,7 @@ mod calibration;
 mod drill;
 mod ends;
 mod falling;
+mod heard;
 mod learning;
 mod motors;
 mod operator;

@@ -118,6 +118,10 @@ impl Stages {
                 "supple-can: {time_s:.4} s: laying the arm down: {}",
                 in_words(&reason)
             )),
+            (Stage::Damping(reason, _), _) => diagnostics::post(format_args!(
+                "supple-can: {time_s:.4} s: ending the torque, the motors damp: {}",
+                in_words(&reason)
+            )),
             (Stage::Lowering(reason, _), _) if falls => diagnostics::post(format_args!(
                 "supple-can: {time_s:.4} s: disabling the motors: {}",
                 in_words(&reason)

@@ -6,6 +6,7 @@
 //!   active --(loss, or the controller requests none)--> lowering --(drives idle, or 100 ms)--> resting
 //! arms that fall without torque:
 //!   active --(the same)--> holding --(a time)--> stowing --(the arm lies)--> lowering --> resting
+//!   holding or stowing --(that torque drives the arm)--> damping --(rest, or 10 s)--> lowering --> resting
 //! ```
 //!
 //! Torques are sent in the active stage and also in the resting stage, in which idle motors ignore them, so that
@@ -13,7 +14,9 @@
 //! torque is sent from the first cycle on. After [`ANSWER_TIMEOUT_NS`] the drives are lowered, and the motors brake;
 //! the fallback continues until they do, for at most [`FALLBACK_NS`], because the arm would drop without torque before
 //! the motors brake. What a loss permits is in [`LossReason::safe_action`]. An arm that falls is first held by gravity
-//! compensation and the damping of its motors, then laid down, then disabled. The machine never activates the arm. It
+//! compensation and the damping of its motors, then laid down, then disabled. If that torque drives the arm, because an
+//! angle is wrong, the motors damp without any torque: what they do then takes energy from the arm. With a motor that has
+//! no torque the arm is held in any case: its joint falls, and moves the others. The machine never activates the arm. It
 //! has no access to bus or clock: time is an argument.
 
 use crate::drive::Rest;
@@ -24,6 +27,8 @@ use crate::loss::LossReason;
 pub const ANSWER_TIMEOUT_NS: u64 = 10_000_000;
 /// Maximum time of the fallback torque while the drives are lowered \[ns\].
 pub const FALLBACK_NS: u64 = 100_000_000;
+/// Maximum time for which motors damp without torque before they are disabled \[ns\].
+const DAMPING_NS: u64 = 10_000_000_000;
 /// Consecutive cycles in which a motor may miss its reply; in the next one its encoder counts as lost.
 const TOLERATED_MISSED_REPLIES: u32 = 1;
 
@@ -36,6 +41,8 @@ pub struct GuardInput {
     pub answer: Option<bool>,
     /// Verdict of the drive guard, if it ended the torque.
     pub drive_guard_loss: Option<LossReason>,
+    /// The torque with which the loop holds the arm or lays it down drives it.
+    pub hold_loss: Option<LossReason>,
     /// Bit `i` is set if motor `i` did not reply although the request was sent.
     pub missing: u8,
     /// Frames of the previous cycle were not sent.
@@ -61,6 +68,8 @@ pub enum Torque {
     Hold,
     /// As [`Torque::Hold`], towards the rest pose.
     Stow,
+    /// Zero, with the damping of the motors.
+    Damp,
     /// Zero.
     None,
 }
@@ -87,6 +96,8 @@ pub enum Stage {
     Holding(LossReason, u64),
     /// It is laid down: the reason, and since when \[ns\].
     Stowing(LossReason, u64),
+    /// Its motors damp without torque: the reason, and since when \[ns\].
+    Damping(LossReason, u64),
     /// The torque is being ended: the reason, and since when \[ns\].
     Lowering(LossReason, u64),
 }
@@ -102,6 +113,8 @@ pub struct SafeActionMachine {
     unanswered_ns: Option<u64>,
     unsent_ns: Option<u64>,
     missing: [u32; 8],
+    /// A motor has no torque since the loss.
+    motor_ended: bool,
     last_loss: Option<(LossReason, u64)>,
 }
 
@@ -121,6 +134,7 @@ impl SafeActionMachine {
             unanswered_ns: None,
             unsent_ns: None,
             missing: [0; 8],
+            motor_ended: false,
             last_loss: None,
         }
     }
@@ -144,10 +158,21 @@ impl SafeActionMachine {
         self.last_loss
     }
 
-    /// Runs one cycle. `lies` says whether an arm that is being laid down has arrived.
+    /// Whether the loop itself holds an arm that falls without torque, or lays it down.
+    pub fn holds(&self) -> bool {
+        match self.stage {
+            Stage::Holding(..) | Stage::Stowing(..) | Stage::Damping(..) => true,
+            Stage::Lowering(..) => self.rest == Rest::Falls,
+            Stage::Resting | Stage::Active => false,
+        }
+    }
+
+    /// Runs one cycle. `lies` says whether an arm that is being laid down has arrived, or one that is damped is at rest.
     pub fn cycle(&mut self, input: &GuardInput, lies: bool) -> Action {
         let loss = self.watch(input);
         let active = input.drives == Drives::Active;
+        self.motor_ended |= loss.is_some_and(LossReason::ends_a_motor);
+        let hold_loss = input.hold_loss.filter(|_| !self.motor_ended);
         match self.stage {
             Stage::Resting if active && loss.is_none() => self.stage = Stage::Active,
             Stage::Resting if active => {
@@ -163,16 +188,25 @@ impl SafeActionMachine {
             }
             // Motors of an arm that falls may be lost one after another: the others go on. Without an active motor there is
             // nothing to hold.
-            Stage::Holding(..) | Stage::Stowing(..) if !active => {
+            Stage::Holding(..) | Stage::Stowing(..) | Stage::Damping(..) if !active => {
                 self.stage = Stage::Resting;
             }
             Stage::Holding(reason, since_ns) => {
-                if input.now_ns >= since_ns + self.hold_ns {
+                if let Some(loss) = hold_loss {
+                    self.stage = Stage::Damping(loss, input.now_ns);
+                } else if input.now_ns >= since_ns + self.hold_ns {
                     self.stage = Stage::Stowing(reason, input.now_ns);
                 }
             }
             Stage::Stowing(reason, _) => {
-                if lies {
+                if let Some(loss) = hold_loss {
+                    self.stage = Stage::Damping(loss, input.now_ns);
+                } else if lies {
+                    self.stage = Stage::Lowering(reason, input.now_ns);
+                }
+            }
+            Stage::Damping(reason, since_ns) => {
+                if lies || input.now_ns >= since_ns + DAMPING_NS {
                     self.stage = Stage::Lowering(reason, input.now_ns);
                 }
             }
@@ -201,6 +235,7 @@ impl SafeActionMachine {
             Stage::Active => only(commanded(Torque::Fallback)),
             Stage::Holding(..) => only(Torque::Hold),
             Stage::Stowing(..) => only(Torque::Stow),
+            Stage::Damping(..) => only(Torque::Damp),
             Stage::Lowering(loss, since_ns) => {
                 let overdue = input.now_ns >= since_ns + FALLBACK_NS;
                 let torque = match self.rest {
@@ -222,6 +257,7 @@ impl SafeActionMachine {
             Rest::Brakes => Stage::Lowering(loss, now_ns),
             Rest::Falls => Stage::Holding(loss, now_ns),
         };
+        self.motor_ended = loss.ends_a_motor();
         self.last_loss = Some((loss, now_ns));
     }
 

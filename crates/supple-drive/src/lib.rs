@@ -17,6 +17,7 @@ mod budget;
 mod drive;
 mod error;
 mod guard;
+mod hold_check;
 mod link;
 mod loss;
 mod plant_loop;

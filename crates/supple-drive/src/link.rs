@@ -15,6 +15,9 @@ pub enum Drives {
     Idle,
     /// The motors apply torques.
     Active,
+    /// The motors have torque that the plant loop commands: it holds an arm that falls without torque, or lays it down.
+    /// The controller's torques are not applied.
+    Held,
 }
 
 /// Counters and timing of the loop, since the start unless stated otherwise.

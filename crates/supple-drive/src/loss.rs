@@ -5,6 +5,7 @@
 //! | no answer, no torque wanted, transmission, bus-off, safety module, leaving, activated by mistake | gravity at the last pose until they brake | held, laid down, disabled |
 //! | a lost encoder, a faulty motor | no torque | the other motors: held, laid down, disabled |
 //! | overspeed, no stop in a fault of the controller | no torque | the same |
+//! | the torque of holding drives the arm | - | the motors damp without torque, then are disabled |
 
 use core::fmt;
 use supple_core::controller::{JointLabel, NamesJoints};
@@ -70,6 +71,8 @@ pub enum LossReason {
     Overspeed(usize),
     /// A joint does not stop although the controller is in a fault; its index.
     NotStopped(usize),
+    /// A joint exceeds its speed limit while the plant loop holds the arm or lays it down; its index.
+    HoldDrives(usize),
     /// The motors were activated while the controller was not in gravity hold.
     Activated,
     /// A motor did not reply; its index.
@@ -98,6 +101,11 @@ impl NamesJoints for LossReason {
             LossReason::NotStopped(joint) => write!(
                 f,
                 "{} does not stop although the controller is in a fault",
+                label(joint)
+            ),
+            LossReason::HoldDrives(joint) => write!(
+                f,
+                "{} exceeds its speed limit while the arm is held: an angle is wrong",
                 label(joint)
             ),
             LossReason::Activated => f.write_str(
@@ -130,6 +138,18 @@ pub struct SafeAction {
 }
 
 impl LossReason {
+    /// Whether a motor has no torque any more, so that its joint moves as it likes.
+    pub const fn ends_a_motor(self) -> bool {
+        match self {
+            LossReason::Encoder(_) => true,
+            LossReason::Motor(_, fault) => !matches!(
+                fault,
+                MotorFault::Hot | MotorFault::PositionJump | MotorFault::TwoMotors
+            ),
+            _ => false,
+        }
+    }
+
     /// The table of safe actions, for every drive.
     pub const fn safe_action(self) -> SafeAction {
         let gravity = match self {
@@ -143,7 +163,9 @@ impl LossReason {
             // Gravity computed from a lost encoder would be wrong.
             LossReason::Encoder(_) | LossReason::Motor(..) => false,
             // The pose or its torque is itself in doubt.
-            LossReason::Overspeed(_) | LossReason::NotStopped(_) => false,
+            LossReason::Overspeed(_) | LossReason::NotStopped(_) | LossReason::HoldDrives(_) => {
+                false
+            }
         };
         SafeAction { gravity }
     }

@@ -12,6 +12,7 @@ use crate::budget::Overload;
 use crate::drive::{Drive, Lower, Reserved, Rest, TipForce};
 use crate::error::LoopError;
 use crate::guard::{Action, GuardInput, SafeActionMachine, Stage, Torque};
+use crate::hold_check::HoldCheck;
 use crate::link::{ArmReport, Command, Counters, Drives, Link};
 use crate::loss::LossReason;
 use crate::stow::{StowConfig, Stowing};
@@ -40,6 +41,9 @@ pub struct PlantLoop<const N: usize, D, L> {
     drive_guard: DriveGuard<N>,
     /// Of an arm that falls without torque.
     stowing: Option<Stowing<N>>,
+    /// Motion of an arm that the loop holds.
+    hold_check: HoldCheck<N>,
+    period_s: f64,
     cycle: u64,
     /// Cycle of the last angles that the drive guard observed.
     observed_cycle: Option<u64>,
@@ -85,6 +89,8 @@ impl<const N: usize, D: Drive<N>, L: Link<N>> PlantLoop<N, D, L> {
             arm: config.arm,
             drive_guard: DriveGuard::new(config),
             stowing: stowing.map(|stow| Stowing::new(config.arm, stow)),
+            hold_check: HoldCheck::new(config.limits.joint_speed_rad_per_s),
+            period_s: config.period_s,
             cycle_config,
             guard,
             cycle: 0,
@@ -163,6 +169,13 @@ impl<const N: usize, D: Drive<N>, L: Link<N>> PlantLoop<N, D, L> {
         if let Some(stowing) = &mut self.stowing {
             stowing.observe(&report.position_rad);
         }
+        match self.drive_guard.velocity_rad_per_s() {
+            Some(velocity) if self.guard.holds() => {
+                let elapsed_s = periods as f64 * self.period_s;
+                self.hold_check.observe(&velocity, elapsed_s);
+            }
+            _ => self.hold_check.reset(),
+        }
         let allowed =
             !self.shutting_down && matches!(self.guard.stage(), Stage::Resting | Stage::Active);
         if self.drive.operate(command.as_ref(), allowed) {
@@ -179,6 +192,7 @@ impl<const N: usize, D: Drive<N>, L: Link<N>> PlantLoop<N, D, L> {
             now_ns,
             answer: command.map(|command| command.wants_torque),
             drive_guard_loss: drive_guard_check.err().map(LossReason::from),
+            hold_loss: self.hold_check.driven().map(LossReason::HoldDrives),
             missing,
             unsent: state.unsent,
             bus_off: state.bus_off,
@@ -188,12 +202,6 @@ impl<const N: usize, D: Drive<N>, L: Link<N>> PlantLoop<N, D, L> {
         };
         let lies = self.has_stowed(now_ns);
         let action = self.guard.cycle(&input, lies);
-        let overspeed = matches!(input.drive_guard_loss, Some(LossReason::Overspeed(_)));
-        if let (Stage::Stowing(..), true, Some(stowing)) =
-            (self.guard.stage(), overspeed, &mut self.stowing)
-        {
-            stowing.drop_spring();
-        }
         self.send_torques(&action, command.as_ref(), now_ns)?;
         self.drive.poll(self.next_period_ns, action.lower)?;
         self.drive.drain(self.next_period_ns)?;
@@ -266,12 +274,11 @@ impl<const N: usize, D: Drive<N>, L: Link<N>> PlantLoop<N, D, L> {
     }
 
     /// State of the drives for the controller. An arm that this loop holds or lays down itself does not follow the
-    /// controller's torques, whatever it requests: its drives are idle to it.
+    /// controller's torques, whatever it requests: its drives are not active to it.
     fn drives_of_controller(&self) -> Drives {
-        match (self.guard.stage(), self.drives()) {
-            (Stage::Holding(..) | Stage::Stowing(..), Drives::Active) => Drives::Idle,
-            (Stage::Lowering(..), Drives::Active) if self.stowing.is_some() => Drives::Idle,
-            (_, drives) => drives,
+        match self.drives() {
+            Drives::Active if self.guard.holds() => Drives::Held,
+            drives => drives,
         }
     }
 
@@ -305,13 +312,14 @@ impl<const N: usize, D: Drive<N>, L: Link<N>> PlantLoop<N, D, L> {
         Ok(command)
     }
 
-    /// Whether an arm that is being laid down has arrived.
+    /// Whether an arm that is being laid down has arrived, or one that is damped is at rest.
     fn has_stowed(&self, now_ns: u64) -> bool {
         match (self.guard.stage(), &self.stowing) {
             (Stage::Stowing(_, since_ns), Some(stowing)) => {
                 stowing.has_ended((now_ns - since_ns) as f64 * 1e-9)
             }
             (Stage::Stowing(..), None) => true,
+            (Stage::Damping(..), _) => self.hold_check.rests(),
             _ => false,
         }
     }
@@ -344,6 +352,12 @@ impl<const N: usize, D: Drive<N>, L: Link<N>> PlantLoop<N, D, L> {
                 }
                 None => (self.fallback_nm, true),
             },
+            (Torque::Damp, _) => {
+                if let Some(stowing) = &self.stowing {
+                    damping_nm_s_per_rad = stowing.config().damping_nm_s_per_rad;
+                }
+                (Vector::zeros(), true)
+            }
             (Torque::Command | Torque::None, _) => (Vector::zeros(), true),
         };
         let torque_nm = if self.drives() == Drives::Active && action.torque != Torque::None {

@@ -85,6 +85,7 @@ impl<const N: usize> Link<N> for SharedMemoryLink {
                 Drives::Off => message::Drives::Off,
                 Drives::Idle => message::Drives::Idle,
                 Drives::Active => message::Drives::Active,
+                Drives::Held => message::Drives::Held,
             },
             PlantReport {
                 missed: counters.missed,

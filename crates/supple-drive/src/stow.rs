@@ -3,9 +3,9 @@
 //! While the arm is held, its torque is gravity compensation at the measured pose, and the motors damp. While it is
 //! laid down, a reference moves from the pose at which that began to the rest pose, at a low joint speed, and a weak
 //! spring of each joint pulls towards it: `tau = g(q) + k (q_ref - q)`. A joint without an angle keeps its last one
-//! for gravity and has no spring; where a joint exceeds twice its speed limit, no joint has one any more. When the reference has arrived, the torque fades to zero while the motors still damp:
-//! the arm settles on its support, and disabling the motors takes no torque away. Source: own derivation; the
-//! reference is the quintic `10 s^3 - 15 s^4 + 6 s^5`.
+//! for gravity and has no spring. When the reference has arrived, the torque fades to zero while the motors still damp:
+//! the arm settles on its support, and disabling the motors takes no torque away. Where that torque drives the arm, the
+//! safe action ends it (`guard.rs`). Source: own derivation; the reference is the quintic `10 s^3 - 15 s^4 + 6 s^5`.
 
 use supple_core::dynamics::gravity;
 use supple_core::{Arm, Vector};
@@ -44,8 +44,6 @@ pub struct Stowing<const N: usize> {
     present: [bool; N],
     /// Pose in which laying down began \[rad\], and its duration \[s\].
     begin: Option<(Vector<N>, f64)>,
-    /// The spring may be what drives the arm, as with a wrong angle: it stays off.
-    spring_is_off: bool,
 }
 
 impl<const N: usize> Stowing<N> {
@@ -57,7 +55,6 @@ impl<const N: usize> Stowing<N> {
             pose_rad: Vector::zeros(),
             present: [false; N],
             begin: None,
-            spring_is_off: false,
         }
     }
 
@@ -79,12 +76,6 @@ impl<const N: usize> Stowing<N> {
     /// Ends laying down; the next call of [`Stowing::stow_nm`] begins anew.
     pub fn reset(&mut self) {
         self.begin = None;
-        self.spring_is_off = false;
-    }
-
-    /// Lays the arm down without the spring from now on: gravity compensation and damping alone.
-    pub fn drop_spring(&mut self) {
-        self.spring_is_off = true;
     }
 
     /// Torque that holds the arm \[N m\].
@@ -114,8 +105,7 @@ impl<const N: usize> Stowing<N> {
             let error_rad = reference_rad[joint] - self.pose_rad[joint];
             let error_rad = error_rad.clamp(-MAX_ERROR_RAD, MAX_ERROR_RAD);
             let spring = self.config.stiffness_nm_per_rad[joint] * error_rad;
-            let pulls = self.present[joint] && !self.spring_is_off;
-            hold_nm[joint] + if pulls { spring } else { 0.0 }
+            hold_nm[joint] + if self.present[joint] { spring } else { 0.0 }
         });
         torque_nm * (1.0 - (elapsed_s - duration_s) / FADE_S).clamp(0.0, 1.0)
     }

@@ -1,6 +1,7 @@
 //! The helper thread: telemetry, requests and replies. It never blocks: separate threads write to the disk and to
 //! standard error.
 
+use crate::deferred::{MotionPlan, StartPose, WaitingMotions, ends_motions};
 use crate::error::RtError;
 use crate::fault_file::{FaultFiles, FaultRecorder};
 use crate::learning::Learning;
@@ -12,7 +13,6 @@ use std::collections::VecDeque;
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::{Builder, JoinHandle};
 use supple_core::Vector;
-use supple_core::codes::request_kind;
 use supple_core::controller::{Controller, Mode, NamesJoints, Request, check_motion};
 use supple_ipc::message::{MAX_DOF, OperatorReply, OperatorRequest, Outcome, Text};
 use supple_ipc::{Backpressure, Domain, IpcError, OperatorServer};
@@ -30,10 +30,10 @@ const FAULT_FOLDER: &str = "faults";
 const DISK_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// Joint angles, padded for any arm \[rad\].
-type Pose = [f64; MAX_DOF];
+pub type Pose = [f64; MAX_DOF];
 
 /// Checks whether a requested motion is feasible over its whole length, from its start pose if that is known
-/// ([`supple_core::controller::check_motion()`]). Returns the end pose of a move.
+/// ([`supple_core::controller::check_motion()`]); otherwise whether its target is. Returns the end pose, if known.
 ///
 /// # Errors
 /// The refusal in words.
@@ -47,9 +47,13 @@ pub fn motion_check<const N: usize>(controller: Controller<N>) -> MotionCheck {
             return Ok(None);
         };
         let from_rad = from_rad.map(|from_rad| Vector::from_fn(|i, _| from_rad[i]));
-        // An excitation starts near its own centre, so it is checked from there if the pose is unknown.
+        // If the pose is unknown, an excitation is checked from its own centre, near which it starts, and a motion of the
+        // joints at its target, for workspace and torque.
         let from_rad = match &request {
             Request::Excite(series) => from_rad.or(Some(series.centre_rad)),
+            Request::Move { target_rad, .. } | Request::JointImpedance { target_rad, .. } => {
+                from_rad.or(Some(*target_rad))
+            }
             _ => from_rad,
         };
         if let Some(from_rad) = from_rad {
@@ -58,12 +62,13 @@ pub fn motion_check<const N: usize>(controller: Controller<N>) -> MotionCheck {
                 refusal.with_names(names.as_slice()).to_string()
             })?;
         }
-        Ok(match &request {
-            Request::Move { target_rad, .. } => Some(core::array::from_fn(|i| {
-                target_rad.get(i).copied().unwrap_or_default()
-            })),
+        let end_rad = match &request {
+            Request::Move { target_rad, .. } => Some(*target_rad),
+            Request::Excite(series) => Some(series.at(series.duration_s).position_rad),
             _ => None,
-        })
+        };
+        Ok(end_rad
+            .map(|end_rad| core::array::from_fn(|i| end_rad.get(i).copied().unwrap_or_default())))
     })
 }
 
@@ -139,8 +144,11 @@ fn work(
         fault_recorder: FaultRecorder::new(files),
         motion_check,
         learning,
+        virtual_time: backpressure == Backpressure::Block,
         position_rad: None,
-        move_ends: None,
+        cycle: 0,
+        plan: MotionPlan::default(),
+        waiting: WaitingMotions::default(),
         awaiting_check: VecDeque::with_capacity(MAX_PER_ITERATION),
         failed: false,
         dropped_states_reported: false,
@@ -150,6 +158,7 @@ fn work(
         let ended = state.queues.ended();
         state.requests();
         state.telemetry();
+        state.due_motion();
         state.replies();
         if ended {
             state.fault_recorder.finish(DISK_TIMEOUT);
@@ -168,10 +177,14 @@ struct HelperState {
     learning: Learning,
     /// Requests waiting for their motion check.
     awaiting_check: VecDeque<OperatorRequest>,
-    /// Last known joint angles.
+    virtual_time: bool,
+    /// Last known joint angles, and their cycle.
     position_rad: Option<Pose>,
-    /// End pose of an operator's last move, kept until that operator's next motion request.
-    move_ends: Option<(u64, Pose)>,
+    cycle: u64,
+    /// Poses between the motions that were requested.
+    plan: MotionPlan,
+    /// Motions that wait for their cycle.
+    waiting: WaitingMotions,
     failed: bool,
     dropped_states_reported: bool,
 }
@@ -182,7 +195,10 @@ impl HelperState {
         // of a whole motion takes milliseconds.
         while self.awaiting_check.len() < MAX_PER_ITERATION {
             match self.link.request() {
-                Ok(Some(request)) if request.requests_idle_now() => self.enqueue(request),
+                Ok(Some(request)) if request.requests_idle_now() => {
+                    self.end_motions();
+                    self.enqueue(request);
+                }
                 Ok(Some(request)) => self.awaiting_check.push_back(request),
                 Ok(None) => break,
                 Err(error) => {
@@ -203,14 +219,31 @@ impl HelperState {
         }
     }
 
-    /// Checks a request, then passes it on or refuses it.
+    /// Checks a request, then passes it on, keeps it or refuses it.
     fn check(&mut self, request: OperatorRequest) {
-        let from_rad = self.start_pose(&request);
+        if ends_motions(&request) {
+            self.end_motions();
+        }
+        let from_rad = match self.plan.start_pose(&request) {
+            StartPose::Present => self.position_rad,
+            StartPose::Known(pose) => Some(pose),
+            StartPose::Unknown => None,
+        };
         match (self.motion_check)(&request, from_rad.as_ref()) {
-            Ok(end_rad) => {
-                if let Some(end_rad) = end_rad {
-                    self.move_ends = Some((request.operator, end_rad));
+            Ok(end_rad) if !self.virtual_time && WaitingMotions::keeps(&request, self.cycle) => {
+                match self.waiting.push(request) {
+                    Ok(()) => {
+                        self.plan.passed(&request, end_rad);
+                        self.reply(&reply_before_step(&request, Outcome::Queued, ""));
+                    }
+                    Err(full) => {
+                        let text = format!("refused: {full}");
+                        self.reply(&reply_before_step(&request, Outcome::Refused, &text));
+                    }
                 }
+            }
+            Ok(end_rad) => {
+                self.plan.passed(&request, end_rad);
                 self.enqueue(request);
             }
             Err(text) => {
@@ -221,38 +254,47 @@ impl HelperState {
 
     fn enqueue(&mut self, request: OperatorRequest) {
         let queued = self.queues.request(request);
-        match (queued, request.has_at_cycle != 0) {
+        match (queued, request.is_scheduled()) {
             // The loop reads the request before the step of its cycle.
             (true, true) => self.reply(&reply_before_step(&request, Outcome::Queued, "")),
             (true, false) => {}
-            (false, _) => {
-                let text = "refused: too many requests at once";
-                self.reply(&reply_before_step(&request, Outcome::Refused, text));
-            }
+            (false, _) => self.refuse_for_now(&request),
         }
     }
 
-    /// Start pose of a motion: the end pose of the operator's last move for a deferred motion after it, otherwise the
-    /// current pose. `None` if unknown, as for a deferred move.
-    fn start_pose(&mut self, request: &OperatorRequest) -> Option<Pose> {
-        let is_deferred = request.has_at_cycle != 0;
-        let is_move = request.kind == request_kind::MOVE;
-        let is_motion = matches!(
-            request.kind,
-            request_kind::TRACK | request_kind::EXCITE | request_kind::BREAKAWAY
-        );
-        match self.move_ends {
-            Some((operator, pose)) if is_motion && operator == request.operator => {
-                self.move_ends = None;
-                if is_deferred {
-                    Some(pose)
-                } else {
-                    self.position_rad
+    fn refuse_for_now(&mut self, request: &OperatorRequest) {
+        let text = "refused: too many requests at once";
+        self.reply(&reply_before_step(request, Outcome::Refused, text));
+    }
+
+    /// Checks a motion that waited, from the pose in which the arm is now, and passes it to the loop. One per iteration.
+    fn due_motion(&mut self) {
+        let Some(request) = self.waiting.pop(self.cycle) else {
+            return;
+        };
+        match (self.motion_check)(&request, self.position_rad.as_ref()) {
+            Ok(_) => {
+                if !self.queues.request(request) {
+                    self.refuse_for_now(&request);
                 }
             }
-            _ if is_deferred && is_move => None,
-            _ => self.position_rad,
+            Err(text) => self.refuse_waiting(&request, &text),
         }
+    }
+
+    /// Refuses the motions that wait, because the arm is to rest, or is in a fault.
+    fn end_motions(&mut self) {
+        self.plan.ended();
+        while let Some(request) = self.waiting.take() {
+            let text = "refused: it waited when the arm was told to rest, or a fault was latched";
+            self.refuse_waiting(&request, text);
+        }
+    }
+
+    fn refuse_waiting(&mut self, request: &OperatorRequest, text: &str) {
+        let reply = reply_before_step(request, Outcome::Refused, text);
+        self.plan.replied(&reply);
+        self.reply(&reply);
     }
 
     fn telemetry(&mut self) {
@@ -264,7 +306,13 @@ impl HelperState {
                 self.port_failed(&error);
             }
             self.fault_recorder.add(&telemetry);
-            self.position_rad = Some(telemetry.record().position_rad.into());
+            let record = telemetry.record();
+            self.position_rad = Some(record.position_rad.into());
+            self.cycle = telemetry.state.cycle;
+            self.plan.cycle(self.cycle);
+            if self.waiting.is_ended_by(record.mode(), record.fault != 0) {
+                self.end_motions();
+            }
             for request in (self.learning)(&telemetry) {
                 // If the queue is full, it is lost: the next estimate follows.
                 self.queues.learned(request);
@@ -284,6 +332,7 @@ impl HelperState {
             let Some(reply) = self.queues.reply() else {
                 break;
             };
+            self.plan.replied(&reply);
             self.reply(&reply);
         }
     }

@@ -12,6 +12,7 @@
 //! for the plant without a timeout. The computed torques never depend on a clock.
 
 mod control_loop;
+mod deferred;
 mod error;
 mod fault_file;
 mod helper;

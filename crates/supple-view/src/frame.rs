@@ -18,6 +18,8 @@ pub struct Beside {
     pub round_trip_us: f64,
     /// Cycles without an answer since the start.
     pub missed: u64,
+    /// The plant holds the arm or lays it down itself.
+    pub held: bool,
 }
 
 /// A fault in words.
@@ -40,7 +42,7 @@ pub struct Frame {
     pub cycle: u64,
     /// Mode of the controller.
     pub mode: &'static str,
-    /// The drives apply torques.
+    /// The drives apply torques: the controller's, or those with which they hold the arm and lay it down.
     pub drives_active: bool,
     /// Joint angles \[rad\].
     pub joints_rad: Vec<f32>,
@@ -140,7 +142,7 @@ impl<const N: usize> Reducer<N> {
             time_s: beside.time_s,
             cycle: record.cycle,
             mode: record.mode().map_or("unknown", |mode| mode.name()),
-            drives_active: record.drives_active,
+            drives_active: record.drives_active || beside.held,
             joints_rad: joints(&record.position_rad),
             tip_m: narrow(record.tip_position_m),
             reference_m: record

@@ -7,7 +7,7 @@ use crate::hub::{Answer, Hub, Pending};
 use core::time::Duration;
 use std::sync::mpsc::{Receiver, Sender};
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
-use supple_ipc::message::{OperatorReply, Outcome, Telemetry};
+use supple_ipc::message::{Drives, OperatorReply, Outcome, Telemetry};
 use supple_ipc::{Domain, OperatorClient, TelemetryReader};
 use supple_log::{CycleTiming, Extras, LiveEncoder};
 use supple_model::Description;
@@ -112,6 +112,7 @@ impl<'a, const N: usize> Live<'a, N> {
             ]),
             round_trip_us: microseconds(telemetry.state.plant.round_trip_ns),
             missed: telemetry.state.plant.missed,
+            held: telemetry.state.drives() == Drives::Held,
         };
         self.reducer.add(&record, beside);
         self.last = Some(*telemetry);

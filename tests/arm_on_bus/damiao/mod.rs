@@ -4,3 +4,4 @@ mod faults;
 mod regular;
 mod rig;
 mod start_up;
+mod wrong_zero;

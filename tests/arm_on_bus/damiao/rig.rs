@@ -92,6 +92,12 @@ impl<const N: usize> Rig<N> {
         Rig::try_new(description, |_| (), None, misbehaviours).unwrap()
     }
 
+    /// The same, from a pose.
+    pub fn new_at(name: &str, start_rad: Vector<N>, misbehaviours: &[&str]) -> Rig<N> {
+        let description = Description::asset(name).unwrap();
+        Rig::try_new(description, |_| (), Some(start_rad), misbehaviours).unwrap()
+    }
+
     pub fn arm(&self) -> &DamiaoArm<N> {
         &self.plant.drive().bus().inner().0
     }
@@ -146,6 +152,20 @@ impl<const N: usize> Rig<N> {
         self.forget();
     }
 
+    /// Gravity hold until the motors are enabled, and no longer.
+    pub fn enable(&mut self) {
+        self.run(5);
+        self.request(Request::GravityHold);
+        for _ in 0..100 {
+            if self.plant.guard().stage() == Stage::Active {
+                break;
+            }
+            self.step();
+        }
+        assert!(self.all(Status::Enabled));
+        self.forget();
+    }
+
     /// A slow move of the elbow is under way for half a second, or with `track` a small sinusoid about the pose.
     pub fn begin(&mut self, track: bool) {
         let config = self.description.config::<N>().unwrap();
@@ -193,6 +213,7 @@ impl<const N: usize> Rig<N> {
             Stage::Active => "active",
             Stage::Holding(..) => "holding",
             Stage::Stowing(..) => "stowing",
+            Stage::Damping(..) => "damping",
             Stage::Lowering(..) => "lowering",
         };
         self.stages.iter().map(name).collect()

@@ -164,6 +164,12 @@ impl<const N: usize> DriveGuard<N> {
         }
     }
 
+    /// Joint speeds as the guard estimates them \[rad/s\]; none before the first complete angles.
+    pub fn velocity_rad_per_s(&self) -> Option<Vector<N>> {
+        let estimator = self.estimator.as_ref()?;
+        Some(estimator.velocity_rad_per_s)
+    }
+
     /// Checks a command before the drives apply it. `command` is `None` if the controller did not
     /// answer; `active` says whether the motors apply torques.
     ///

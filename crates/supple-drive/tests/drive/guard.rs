@@ -9,6 +9,7 @@ fn without_loss(ms: u64) -> GuardInput {
         now_ns: ms * MS,
         answer: Some(true),
         drive_guard_loss: None,
+        hold_loss: None,
         missing: 0,
         unsent: false,
         bus_off: false,
@@ -126,4 +127,66 @@ fn an_arm_that_falls_is_held_and_laid_down_before_its_motors_are_disabled() {
         assert_eq!(stages, ["holding", "stowing", "lowering"], "{reason}");
         assert_eq!(guard.last_loss().map(|(loss, _)| loss), Some(reason));
     }
+}
+
+/// A held arm that its own torque drives: damped without torque until it rests, then disabled. With a motor that has no
+/// torque the others go on holding.
+#[test]
+fn a_hold_that_drives_the_arm_ends_in_damping() {
+    let driven = Some(LossReason::HoldDrives(1));
+    for stowing in [false, true] {
+        for motor_ended in [false, true] {
+            let mut guard = SafeActionMachine::falling(100 * MS);
+            guard.cycle(&without_loss(0), false);
+            let begun = if stowing { 150 } else { 50 };
+            let mut input = without_loss(1);
+            for ms in 1..=begun {
+                input = GuardInput {
+                    now_ns: ms * MS,
+                    answer: Some(false),
+                    drive_loss: motor_ended.then_some(LossReason::Motor(3, MotorFault::Overload)),
+                    ..without_loss(ms)
+                };
+                guard.cycle(&input, false);
+            }
+            assert!(guard.holds());
+            let before = guard.stage();
+            input.now_ns += MS;
+            input.hold_loss = driven;
+            let action = guard.cycle(&input, false);
+            if motor_ended {
+                assert_eq!(guard.stage(), before);
+                continue;
+            }
+            assert_eq!((action.torque, action.lower), (Torque::Damp, false));
+            // What drove the arm is over; the torque does not come back.
+            input.now_ns += MS;
+            input.hold_loss = None;
+            assert_eq!(guard.cycle(&input, false).torque, Torque::Damp);
+            assert!(guard.cycle(&input, true).lower);
+            assert!(matches!(
+                guard.stage(),
+                Stage::Lowering(LossReason::HoldDrives(1), _)
+            ));
+        }
+    }
+}
+
+/// An arm that falls without torque and does not come to rest while it is damped is disabled in the end.
+#[test]
+fn damping_ends_after_ten_seconds() {
+    let mut guard = SafeActionMachine::falling(100 * MS);
+    guard.cycle(&without_loss(0), false);
+    let mut ended_ms = None;
+    for ms in 1..20_000 {
+        let input = GuardInput {
+            answer: Some(false),
+            hold_loss: Some(LossReason::HoldDrives(0)),
+            ..without_loss(ms)
+        };
+        if guard.cycle(&input, false).lower && ended_ms.is_none() {
+            ended_ms = Some(ms);
+        }
+    }
+    assert_eq!(ended_ms, Some(10_002));
 }

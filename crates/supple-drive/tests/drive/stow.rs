@@ -36,16 +36,3 @@ fn a_blocked_arm_is_not_pushed_harder_and_harder() {
     }
     assert!(greatest > 9.9 && greatest < 10.0 + 1e-9, "{greatest} N m");
 }
-
-/// After a joint was too fast nothing but gravity is left, until the arm is held anew.
-#[test]
-fn without_the_spring_only_gravity_is_compensated() {
-    let (mut stowing, gravity_nm) = stowing(Vector::zeros());
-    stowing.stow_nm(0.0);
-    assert!((stowing.stow_nm(2.0) - gravity_nm).amax() > 1.0);
-    stowing.drop_spring();
-    assert!((stowing.stow_nm(2.0) - gravity_nm).amax() < 1e-12);
-    stowing.reset();
-    stowing.stow_nm(0.0);
-    assert!((stowing.stow_nm(2.0) - gravity_nm).amax() > 1.0);
-}

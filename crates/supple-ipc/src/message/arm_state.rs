@@ -9,7 +9,7 @@ use supple_core::math::Vector3;
 /// Measurements of the arm at the start of a cycle, and the plant's status report.
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
 #[repr(C)]
-#[type_name("supple.ArmState.v3")]
+#[type_name("supple.ArmState.v4")]
 pub struct ArmState {
     /// Writer id, see `writer_identity`; zero outside shared memory. Readers discard states with another id.
     pub writer: u64,

@@ -31,14 +31,27 @@ pub enum Drives {
     Idle = 1,
     /// The motors produce the commanded torques.
     Active = 2,
+    /// The motors have torque, but not the commanded one: the plant holds an arm that falls without torque, or lays it
+    /// down.
+    Held = 3,
 }
 
 impl Drives {
     /// Converts a code.
     pub fn from_code(code: u8) -> Option<Drives> {
-        [Drives::Off, Drives::Idle, Drives::Active]
+        [Drives::Off, Drives::Idle, Drives::Active, Drives::Held]
             .into_iter()
             .find(|drives| *drives as u8 == code)
+    }
+
+    /// What the state means for a person, where its name does not say it.
+    pub fn caution(self) -> &'static str {
+        match self {
+            Drives::Held => {
+                " (the motors have torque: the drives hold the arm and lay it down; keep out of reach)"
+            }
+            Drives::Off | Drives::Idle | Drives::Active => "",
+        }
     }
 
     /// Short name for status lines.
@@ -47,6 +60,7 @@ impl Drives {
             Drives::Off => "off",
             Drives::Idle => "idle",
             Drives::Active => "active",
+            Drives::Held => "held",
         }
     }
 }

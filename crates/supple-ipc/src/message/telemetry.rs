@@ -11,7 +11,7 @@ const WORDS: usize = CycleRecord::<MAX_DOF>::words(MAX_DOF);
 /// One cycle of the controller: input, output and timing.
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
 #[repr(C)]
-#[type_name("supple.Telemetry.v5")]
+#[type_name("supple.Telemetry.v6")]
 pub struct Telemetry {
     /// The state that the controller received, with the report of the plant.
     pub state: ArmState,

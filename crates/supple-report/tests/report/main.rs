@@ -7,4 +7,5 @@ mod bad_input;
 mod command_line;
 mod demo;
 mod faults;
+mod hostile;
 mod identification;

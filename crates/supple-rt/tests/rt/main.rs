@@ -4,7 +4,9 @@
 mod support;
 
 mod fault_files;
+mod heard;
 mod heartbeat;
 mod operator_requests;
 mod process;
+mod scripted;
 mod standard_error;

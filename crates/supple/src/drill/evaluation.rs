@@ -30,7 +30,16 @@ const POSE_BRAKED_SINK: BrakedSink = BrakedSink {
 const MAX_FORCE_AFTER_IMPACT_N: f64 = 65.0;
 /// Maximum time from contact to collision fault and gravity compensation \[ms\].
 const MAX_COLLISION_DETECTION_MS: f64 = 20.0;
-/// Maximum steady pressing force \[N\].
+/// Maximum time from the moment at which the fault of a sensor can be observed \[ms\].
+const MAX_DETECTION_MS: f64 = 100.0;
+/// Rise of the mechanical energy that is the error of its computation from angles of the last cycle \[J\].
+const ENERGY_ERROR_J: f64 = 0.1;
+/// Square of the tip speed per descent of a rod that turns about its end, over the acceleration of gravity.
+const FALLING_ROD: f64 = 3.0;
+const GRAVITY_M_PER_S2: f64 = 9.81;
+/// Maximum time for which drives that were activated in a fault are active \[ms\].
+const MAX_ACTIVATED_MS: f64 = 25.0;
+/// Maximum steady pressing force beyond the one of the law \[N\].
 const MAX_PRESSING_FORCE_N: f64 = 5.0;
 /// Ratio of tip speeds above which the arm counts as accelerated.
 const SPEED_INCREASE_RATIO: f64 = 1.1;
@@ -65,10 +74,16 @@ pub fn evaluate(spec: &Spec, metrics: &RowMetrics, refusals: &[String]) -> (Stri
             expect(keeps_running, "it does not keep running".to_owned());
         }
         Expected::FaultAndRest(names) => {
-            expect(
-                stopped_by(metrics, names) && metrics.fault_after_ms <= Some(spec.within_ms),
-                format!("no expected fault within {:.0} ms", spec.within_ms),
-            );
+            match (metrics.observable_after_ms, metrics.detected_after_ms) {
+                (Some(_), detected_ms) => expect(
+                    stopped_by(metrics, names) && detected_ms <= Some(MAX_DETECTION_MS),
+                    format!("no expected fault {MAX_DETECTION_MS:.0} ms after it was observable"),
+                ),
+                (None, _) => expect(
+                    stopped_by(metrics, names) && metrics.fault_after_ms <= Some(spec.within_ms),
+                    format!("no expected fault within {:.0} ms", spec.within_ms),
+                ),
+            }
             check_safe_stop(spec, metrics, &mut expect);
         }
         Expected::KeepsRunningOrFault(names) => {
@@ -123,6 +138,20 @@ pub fn evaluate(spec: &Spec, metrics: &RowMetrics, refusals: &[String]) -> (Stri
                 ),
             );
         }
+        Expected::StaysIdle(names) => {
+            expect(stopped_by(metrics, names), "no expected fault".to_owned());
+            let active_ms = metrics.back_active_ms.unwrap_or(0.0);
+            expect(
+                !metrics.end_active && active_ms <= MAX_ACTIVATED_MS,
+                format!("the activated drives had torque for {active_ms:.0} ms"),
+            );
+            let speed = metrics.back_tip_m_per_s.unwrap_or(0.0);
+            let bound = braked_sink(spec).tip_m_per_s;
+            expect(
+                speed <= bound,
+                format!("tip at {speed:.2} m/s after activation"),
+            );
+        }
         // Evaluated from wall-clock metrics elsewhere.
         Expected::Brakes(..) | Expected::ControllerFault | Expected::IdleAccepted => {}
     }
@@ -139,17 +168,12 @@ pub fn evaluate(spec: &Spec, metrics: &RowMetrics, refusals: &[String]) -> (Stri
             );
         }
         // While probing or tracking, and with compliant joints, the law itself presses on the block.
-        let presses = matches!(
-            spec.task,
-            TestTask::Probe | TestTask::Track | TestTask::JointImpedance | TestTask::TrackPose
+        let pressed_n = metrics.pressed_n.unwrap_or(0.0);
+        let allowed_n = MAX_PRESSING_FORCE_N + metrics.law_force_n.unwrap_or(0.0);
+        expect(
+            pressed_n < allowed_n,
+            format!("pressed with {pressed_n:.0} N after 0.5 s, {allowed_n:.0} N allowed"),
         );
-        if !presses {
-            let pressed_n = metrics.pressed_n.unwrap_or(0.0);
-            expect(
-                pressed_n < MAX_PRESSING_FORCE_N,
-                format!("pressed with {pressed_n:.0} N after 0.5 s"),
-            );
-        }
     }
     (outcome(metrics, keeps_running, refusals), deviations)
 }
@@ -167,11 +191,13 @@ fn stopped_by(metrics: &RowMetrics, names: &[&str]) -> bool {
 
 /// Checks that the arm came to rest or braked in time and did not move faster than before.
 fn check_safe_stop(spec: &Spec, metrics: &RowMetrics, expect: &mut impl FnMut(bool, String)) {
+    // Before the fault of a sensor can be observed, nothing can stop the arm.
+    let within_ms = spec.within_ms + metrics.observable_after_ms.unwrap_or(0.0);
     expect(
-        metrics.moving_until_ms <= spec.within_ms,
+        metrics.moving_until_ms <= within_ms,
         format!(
-            "above 0.25 m/s until {:.0} ms, {:.0} allowed",
-            metrics.moving_until_ms, spec.within_ms
+            "above 0.25 m/s until {:.0} ms, {within_ms:.0} allowed",
+            metrics.moving_until_ms
         ),
     );
     if let Some(tip) = metrics.tip_later_m_per_s {
@@ -186,7 +212,23 @@ fn check_safe_stop(spec: &Spec, metrics: &RowMetrics, expect: &mut impl FnMut(bo
     } = spec.event
         && metrics.braked_after_ms.is_some()
     {
-        // An open-circuit motor does not brake; the arm descends on the other motors alone.
+        // An open-circuit motor does not brake; the arm descends on the other motors alone, as a rod that falls at most:
+        // nothing adds energy to what the descent releases.
+        let gained_j = metrics.energy_gained_j.unwrap_or(f64::INFINITY);
+        expect(
+            gained_j <= ENERGY_ERROR_J,
+            format!("{gained_j:.2} J more than at the fault, kinetic and potential"),
+        );
+        let at_fault = metrics.tip_at_fault_m_per_s.unwrap_or(0.0);
+        let released = FALLING_ROD * GRAVITY_M_PER_S2 * metrics.descent_m;
+        let bound = (at_fault * at_fault + released).sqrt();
+        expect(
+            metrics.tip_after_m_per_s <= bound,
+            format!(
+                "tip at up to {:.2} m/s, {bound:.2} allowed",
+                metrics.tip_after_m_per_s
+            ),
+        );
         return;
     }
     if let (Some(at_j), Some(later_j)) = (metrics.energy_at_fault_j, metrics.energy_later_j) {
@@ -239,6 +281,11 @@ fn outcome(metrics: &RowMetrics, keeps_running: bool, refusals: &[String]) -> St
     let mut parts = Vec::new();
     if let (Some(fault), Some(ms)) = (metrics.fault, metrics.fault_after_ms) {
         parts.push(format!("{fault} after {ms:.0} ms"));
+    }
+    if let (Some(from_ms), Some(ms)) = (metrics.observable_after_ms, metrics.detected_after_ms) {
+        parts.push(format!(
+            "{ms:.0} ms after it was observable, at {from_ms:.0} ms"
+        ));
     }
     if let Some(ms) = metrics.braked_after_ms {
         parts.push(format!("braked after {ms:.0} ms"));
@@ -294,6 +341,7 @@ mod tests {
             mode: Some(Mode::Track),
             fault: if ms >= 1050 { fault } else { 0 },
             active: true,
+            position_rad: [0.0; supple_ipc::message::MAX_DOF],
         });
         let (lines, samples): (Vec<TraceRow>, Vec<ControllerSample>) =
             (lines.collect(), samples.collect());
@@ -378,6 +426,101 @@ mod tests {
         );
     }
 
+    /// An encoder that sticks while its joint turns at 0.05 rad/s shows an angle that is wrong by 0.1 rad after 2 s.
+    #[test]
+    fn a_stuck_encoder_is_observable_when_its_angle_is_wrong() {
+        let turning = |ms: u64| TraceRow {
+            time_ns: ms * MS,
+            active: true,
+            torque_nm: Vec::new(),
+            force_n: 0.0,
+            tip_m: [0.0; 3],
+            tip_speed_m_per_s: 0.0,
+            joint_rad_per_s: vec![0.5, 0.05],
+            joint_speed_rad_per_s: 0.0,
+            kinetic_energy_j: 0.0,
+            injections: 0,
+        };
+        let lines: Vec<TraceRow> = (0..4000).map(turning).collect();
+        let after = |joint, limit| {
+            super::super::metrics::stuck_angle_is_wrong_ns(&lines, 1000 * MS, joint, limit)
+                .map(|ns| ns / MS)
+        };
+        assert_eq!(after(Some(1), 0.1001), Some(3003));
+        assert_eq!(after(None, 0.1001), Some(1201));
+        assert_eq!(after(Some(1), 1.0), None);
+    }
+
+    /// A fault that comes late is judged from the moment at which it could be observed.
+    #[test]
+    fn detection_is_judged_from_the_moment_of_being_observable() {
+        let mut metrics = run(15, |_, _| {});
+        metrics.observable_at(Some(1040 * MS), 1000 * MS);
+        assert_eq!(metrics.detected_after_ms, Some(10.0));
+        assert!(evaluate(&stuck(NAMED), &metrics, &[]).1.is_empty());
+        metrics.fault_after_ms = Some(141.0);
+        metrics.observable_at(Some(1040 * MS), 1000 * MS);
+        assert_eq!(
+            evaluate(&stuck(NAMED), &metrics, &[]).1,
+            ["no expected fault 100 ms after it was observable"]
+        );
+    }
+
+    #[test]
+    fn a_law_may_press_with_its_own_force_and_no_more() {
+        let pressing = |pressed_n: f64| {
+            let mut metrics = run(0, move |ms, line| {
+                line.force_n = if ms >= 1040 { pressed_n } else { 0.0 };
+            });
+            metrics.law_force_n = Some(1.0);
+            let runs = Expected::KeepsRunningOrFault(&[]);
+            evaluate(&spec(Event::Obstacle, runs), &metrics, &[]).1
+        };
+        assert_eq!(pressing(5.5), [""; 0]);
+        assert_eq!(pressing(6.5), ["pressed with 6 N after 0.5 s, 6 N allowed"]);
+    }
+
+    #[test]
+    fn a_dead_motor_may_release_what_the_descent_gives() {
+        let kind = InjectionKind::MotorDead { motor: 1 };
+        let at_once = false;
+        let dead = |energy_j: f64, tip_m_per_s: f64| {
+            let mut metrics = run(15, |ms, line| line.active = ms < 1060);
+            metrics.energy_gained_j = Some(energy_j);
+            metrics.tip_after_m_per_s = tip_m_per_s;
+            metrics.descent_m = 0.1;
+            evaluate(
+                &spec(Event::Injected { kind, at_once }, NAMED),
+                &metrics,
+                &[],
+            )
+            .1
+        };
+        assert_eq!(dead(0.0, 1.7), [""; 0]);
+        assert_eq!(dead(0.2, 1.7).len(), 1);
+        assert_eq!(dead(0.0, 1.8).len(), 1);
+    }
+
+    #[test]
+    fn drives_that_stay_active_after_activation_in_a_fault_fail() {
+        let event = Event::Activation(super::super::spec::Activation::InFault);
+        let activated_for = |for_ms: u64| {
+            let metrics = run(15, move |ms, line| {
+                line.active = ms < 1060 || (2000..2000 + for_ms).contains(&ms);
+            });
+            let mut metrics = metrics;
+            metrics.end_active = false;
+            evaluate(
+                &spec(event, Expected::StaysIdle(&["encoder_stuck"])),
+                &metrics,
+                &[],
+            )
+            .1
+        };
+        assert_eq!(activated_for(20), [""; 0]);
+        assert_eq!(activated_for(40).len(), 1);
+    }
+
     #[test]
     fn pressing_on_a_block_after_the_impact_fails() {
         let met = |later_n: f64| {
@@ -392,7 +535,7 @@ mod tests {
         assert!(evaluate(&obstacle, &met(2.0), &[]).1.is_empty());
         assert_eq!(
             evaluate(&obstacle, &met(60.0), &[]).1,
-            ["pressed with 60 N after 0.5 s"]
+            ["pressed with 60 N after 0.5 s, 5 N allowed"]
         );
         assert_eq!(evaluate(&obstacle, &met(90.0), &[]).1.len(), 2);
     }

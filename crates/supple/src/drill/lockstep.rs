@@ -2,11 +2,11 @@
 
 use super::TestArm;
 use super::evaluation::evaluate;
-use super::metrics::{ControllerSample, RowMetrics};
+use super::metrics::{ControllerSample, RowMetrics, stuck_angle_is_wrong_ns};
 use super::row::Row;
-use super::spec::{DriveShutdown, Event, InvalidRequest, Spec, TestTask};
-use super::task::Script;
-use super::trace;
+use super::spec::{Activation, DriveShutdown, Event, InvalidRequest, Spec, TestTask};
+use super::task::{Script, law_force_n};
+use super::trace::{self, TraceRow};
 use crate::cli::{PlantKind, UpArgs, UpTrajectory};
 use crate::up::{START_S, System};
 use core::time::Duration;
@@ -14,7 +14,8 @@ use std::path::PathBuf;
 use std::time::Instant;
 use supple_cli::arguments::{PlantArgs, UrdfArgs};
 use supple_cli::exit::Failure;
-use supple_core::dynamics::jacobian;
+use supple_core::Vector;
+use supple_core::dynamics::{jacobian, potential_energy};
 use supple_ipc::Domain;
 use supple_model::Description;
 use supple_plant::{Injection, InjectionKind, Trigger};
@@ -56,10 +57,13 @@ pub fn perform<const N: usize>(spec: &Spec, arm: &TestArm) -> Result<Row, Failur
     let event_s = start_s + script.event_cycle as f64 * config.period_s;
     let back_s = match spec.event {
         Event::Drives(DriveShutdown::EStop) => REENABLE_S.1,
-        Event::Drives(_) => REENABLE_S.0,
+        Event::Drives(_) | Event::Activation(Activation::InFault) => REENABLE_S.0,
         _ => 0.0,
     };
-    let at_rest = matches!(spec.task, TestTask::GravityHold | TestTask::Float);
+    let at_rest = matches!(
+        spec.task,
+        TestTask::GravityHold | TestTask::Float | TestTask::Breakaway
+    );
     let pushed = spec.event == Event::Obstacle && at_rest;
     let push_rad_per_s = -PUSHED_M_PER_S / jacobian(&config.arm, &script.start_rad)[(2, 1)];
     let up = UpArgs {
@@ -75,7 +79,7 @@ pub fn perform<const N: usize>(spec: &Spec, arm: &TestArm) -> Result<Row, Failur
         tare: false,
         block_m: (spec.event == Event::Obstacle).then_some(match spec.task {
             TestTask::Probe => 0.0,
-            TestTask::GravityHold | TestTask::Float => -(PUSHED_BLOCK_CLEARANCE_M + cap_m),
+            _ if at_rest => -(PUSHED_BLOCK_CLEARANCE_M + cap_m),
             _ => -(BLOCK_CLEARANCE_M + cap_m),
         }),
         inject: injections(spec, event_s, back_s, pushed.then_some(push_rad_per_s)),
@@ -116,13 +120,49 @@ pub fn perform<const N: usize>(spec: &Spec, arm: &TestArm) -> Result<Row, Failur
             Event::Obstacle => task_start_ns,
             _ => at(script.event_cycle),
         };
-        let metrics = RowMetrics::new(&lines, &samples, task_start_ns, event_ns);
+        let mut metrics = RowMetrics::new(&lines, &samples, task_start_ns, event_ns);
+        let resolution_rad = config.plausible.stuck_rad;
+        metrics.observable_at(
+            observable_ns(spec, &lines, event_ns, resolution_rad),
+            event_ns,
+        );
+        metrics.law_force_n = law_force_n(spec.task, &config, &script.start_rad);
+        if let Event::Injected {
+            kind: InjectionKind::MotorDead { .. },
+            ..
+        } = spec.event
+        {
+            metrics.energy_since_fault(&lines, &samples, event_ns, |position_rad| {
+                potential_energy(&config.arm, &Vector::from_fn(|i, _| position_rad[i]))
+            });
+        }
         let (outcome, deviations) = evaluate(spec, &metrics, &refusals);
         Ok(Row::lockstep(spec, metrics, outcome, deviations))
     });
     // The trace file belongs to this test case only.
     let _ = std::fs::remove_file(&file);
     row
+}
+
+/// When the fault of a sensor could be observed \[ns\]; none where that cannot be computed from the trace.
+fn observable_ns(
+    spec: &Spec,
+    lines: &[TraceRow],
+    event_ns: u64,
+    resolution_rad: f64,
+) -> Option<u64> {
+    let Event::Injected { kind, .. } = spec.event else {
+        return None;
+    };
+    match kind {
+        InjectionKind::EncoderStuck { joint } => {
+            stuck_angle_is_wrong_ns(lines, event_ns, joint, resolution_rad)
+        }
+        InjectionKind::EncoderOffset { .. }
+        | InjectionKind::EncoderNan { .. }
+        | InjectionKind::ReplyLost { .. } => Some(event_ns),
+        _ => None,
+    }
 }
 
 /// Faults to inject, with their times counted from active drives.
@@ -148,6 +188,10 @@ fn injections(spec: &Spec, event_s: f64, back_s: f64, push: Option<f64>) -> Vec<
             at_once: true,
         } => vec![at_once(kind)],
         Event::Injected { kind, .. } => vec![at(kind)],
+        Event::Activation(Activation::InFault) => vec![at(InjectionKind::EncoderOffset {
+            joint: Some(1),
+            offset_rad: 0.2,
+        })],
         Event::Drives(_) if on_sim => vec![at(InjectionKind::DrivesIdle {
             for_s: Some(back_s),
         })],
@@ -179,6 +223,7 @@ fn presses(spec: &Spec, event_s: f64, back_s: f64) -> Vec<String> {
             at("idle", 0.6),
             at("activate", back_s),
         ],
+        Event::Activation(_) => vec![at("activate", back_s)],
         _ => Vec::new(),
     }
 }

@@ -1,7 +1,7 @@
 //! All test cases with their expected results. The expectations were written before the first run.
 
 use super::spec::{
-    DriveShutdown, Event, Expected, InvalidRequest, ProcessFailure, Spec, TestTask, UP,
+    Activation, DriveShutdown, Event, Expected, InvalidRequest, ProcessFailure, Spec, TestTask, UP,
 };
 use crate::cli::PlantKind;
 use crate::up::CONTROLLER;
@@ -135,6 +135,7 @@ fn wall_clock_cases(plant: PlantKind) -> Vec<Spec> {
         ],
     };
     processes.push((UP, brakes(CONTROLLER_EXIT_MS)));
+    let orderly = [ProcessFailure::Terminate, ProcessFailure::Interrupt];
     let row = |task, event, expected| Spec {
         plant,
         task,
@@ -144,19 +145,30 @@ fn wall_clock_cases(plant: PlantKind) -> Vec<Spec> {
     };
     let nothing = Event::Nothing { wall: true };
     let mut cases = vec![row(TestTask::Track, nothing, Expected::KeepsRunning)];
-    for task in ALL_TASKS {
+    for task in ALL_TASKS.into_iter().chain([TestTask::TrackPose]) {
         for (name, expected) in &processes {
-            for loss in [ProcessFailure::Kill, ProcessFailure::Stop] {
+            for loss in [ProcessFailure::Kill, ProcessFailure::Stop]
+                .into_iter()
+                .chain(orderly)
+            {
                 let expected = match (*name, loss) {
                     // `supple up` only supervises; stopping it does not affect the arm.
                     (UP, ProcessFailure::Stop) => Expected::KeepsRunning,
+                    // The emulated arm is gone, with its motors.
+                    ("supple-emu", ProcessFailure::Terminate) => *expected,
+                    // The processes that `supple up` starts ignore the interrupt of a terminal.
+                    (name, ProcessFailure::Interrupt) if name != UP => Expected::KeepsRunning,
+                    // Who is asked to end sets the drives to idle first.
+                    (_, ProcessFailure::Terminate | ProcessFailure::Interrupt) => {
+                        brakes(CONTROLLER_EXIT_MS)
+                    }
                     _ => *expected,
                 };
                 cases.push(row(task, Event::Process { name, loss }, expected));
             }
         }
     }
-    for task in [TestTask::GravityHold, TestTask::Track] {
+    for task in ALL_TASKS.into_iter().chain([TestTask::TrackPose]) {
         cases.push(row(task, Event::RequestQueueFull, Expected::IdleAccepted));
     }
     cases
@@ -164,7 +176,9 @@ fn wall_clock_cases(plant: PlantKind) -> Vec<Spec> {
 
 fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
     use InjectionKind as Kind;
-    use TestTask::{Excite, Float, GravityHold, JointImpedance, Move, Probe, Track, TrackPose};
+    use TestTask::{
+        Breakaway, Excite, Float, GravityHold, JointImpedance, Move, Probe, Track, TrackPose,
+    };
     let mut cases = Vec::new();
     let mut add = |tasks: &[TestTask], event, expected, within_ms| {
         cases.extend(tasks.iter().map(|task| Spec {
@@ -185,7 +199,10 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
     };
     let (stops, runs_or_faults) = (Expected::FaultAndRest, Expected::KeepsRunningOrFault);
     let one = Some(1);
-    let all: Vec<TestTask> = ALL_TASKS.into_iter().chain([TrackPose]).collect();
+    let all: Vec<TestTask> = ALL_TASKS
+        .into_iter()
+        .chain([TrackPose, Breakaway])
+        .collect();
     add(
         &all,
         Event::Nothing { wall: false },
@@ -216,7 +233,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
     );
     // Compliant modes may continue; stiff modes must fault.
     add(
-        &[GravityHold, Track, Probe, Float, JointImpedance],
+        &[GravityHold, Track, Probe, Float, JointImpedance, Breakaway],
         Event::Obstacle,
         runs_or_faults(CONTACT_FAULTS),
         FAULT_AND_STOP_MS,
@@ -240,7 +257,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
     let all_stuck = injected(Kind::EncoderStuck { joint: None });
     // A stuck encoder is not observable while the arm is stationary.
     add(
-        &[GravityHold, Float],
+        &[GravityHold, Float, Breakaway],
         stuck,
         runs_or_faults(STUCK_ENCODER_FAULTS),
         FAULT_AND_STOP_MS,
@@ -265,7 +282,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         LATE_FAULT_AND_STOP_MS,
     );
     add(
-        &[GravityHold],
+        &[GravityHold, Breakaway],
         all_stuck,
         runs_or_faults(STUCK_ENCODER_FAULTS),
         FAULT_AND_STOP_MS,
@@ -289,6 +306,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
             Float,
             JointImpedance,
             TrackPose,
+            Breakaway,
         ],
         late,
         runs_or_faults(WRONG_DIRECTION_FAULTS),
@@ -296,7 +314,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
     );
     let sign = injected(Kind::EncoderSign { joint: one });
     add(
-        &[GravityHold, Float],
+        &[GravityHold, Float, Breakaway],
         sign,
         runs_or_faults(WRONG_DIRECTION_FAULTS),
         LATE_FAULT_AND_STOP_MS,
@@ -312,7 +330,14 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         every: 2,
     });
     add(
-        &[GravityHold, Track, Float, JointImpedance, TrackPose],
+        &[
+            GravityHold,
+            Track,
+            Float,
+            JointImpedance,
+            TrackPose,
+            Breakaway,
+        ],
         second,
         stops(ENCODER_LOSS_FAULTS),
         FAULT_AND_STOP_MS,
@@ -322,7 +347,14 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         offset_rad: 0.2,
     });
     add(
-        &[GravityHold, Track, Float, JointImpedance, TrackPose],
+        &[
+            GravityHold,
+            Track,
+            Float,
+            JointImpedance,
+            TrackPose,
+            Breakaway,
+        ],
         jump,
         stops(ENCODER_LOSS_FAULTS),
         FAULT_AND_STOP_MS,
@@ -335,21 +367,44 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
     // Motors.
     let dead = injected(Kind::MotorDead { motor: 1 });
     add(
-        &[GravityHold, Move, Track, Float, JointImpedance, TrackPose],
+        &[
+            GravityHold,
+            Move,
+            Track,
+            Float,
+            JointImpedance,
+            TrackPose,
+            Breakaway,
+        ],
         dead,
         stops(WRONG_DIRECTION_FAULTS),
         FAULT_AND_STOP_MS,
     );
     let reversed = injected(Kind::TorqueSign { joint: 1 });
     add(
-        &[GravityHold, Track, Float, JointImpedance, TrackPose],
+        &[
+            GravityHold,
+            Track,
+            Float,
+            JointImpedance,
+            TrackPose,
+            Breakaway,
+        ],
         reversed,
         stops(WRONG_DIRECTION_FAULTS),
         FAULT_AND_STOP_MS,
     );
     let later = injected(Kind::TorqueLate { cycles: 3 });
     add(
-        &[GravityHold, Move, Track, Float, JointImpedance, TrackPose],
+        &[
+            GravityHold,
+            Move,
+            Track,
+            Float,
+            JointImpedance,
+            TrackPose,
+            Breakaway,
+        ],
         later,
         runs_or_faults(DISTURBANCE_FAULTS),
         LATE_FAULT_AND_STOP_MS,
@@ -358,7 +413,15 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
     // Unmodelled effects.
     let gravity = Kind::GravityReversed;
     add(
-        &[GravityHold, Move, Track, Float, JointImpedance, TrackPose],
+        &[
+            GravityHold,
+            Move,
+            Track,
+            Float,
+            JointImpedance,
+            TrackPose,
+            Breakaway,
+        ],
         injected(gravity),
         stops(WRONG_DIRECTION_FAULTS),
         FAULT_AND_STOP_MS,
@@ -371,7 +434,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
     );
     let payload = Kind::Payload { mass_kg: 1.0 };
     add(
-        &[GravityHold],
+        &[GravityHold, Breakaway],
         injected(payload),
         stops(UNMODELLED_LOAD_FAULTS),
         FAULT_AND_STOP_MS,
@@ -408,7 +471,15 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
     // Drives and requests.
     let idle = Event::Drives(DriveShutdown::Idle);
     add(
-        &[GravityHold, Move, Track, Float, JointImpedance, TrackPose],
+        &[
+            GravityHold,
+            Move,
+            Track,
+            Float,
+            JointImpedance,
+            TrackPose,
+            Breakaway,
+        ],
         idle,
         Expected::ReturnsToGravityHold,
         FAULT_AND_STOP_MS,
@@ -422,6 +493,20 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
     );
     if plant == PlantKind::Emu {
         // Without power the motor pucks lose their positions, so the drives cannot be re-enabled automatically.
+        let activated = Event::Activation(Activation::InFault);
+        add(
+            &[GravityHold, Move, Track, Float, JointImpedance, Breakaway],
+            activated,
+            Expected::StaysIdle(ENCODER_LOSS_FAULTS),
+            FAULT_AND_STOP_MS,
+        );
+        let pressed = Event::Activation(Activation::InWork);
+        add(
+            &[Move, Track, Probe, Excite, JointImpedance, Breakaway],
+            pressed,
+            Expected::KeepsRunning,
+            0.0,
+        );
         let e_stop = Event::Drives(DriveShutdown::EStop);
         add(
             &[Move, Track],

@@ -4,7 +4,7 @@ use super::trace::TraceRow;
 use serde::Serialize;
 use supple_core::codes::fault_name;
 use supple_core::controller::Mode;
-use supple_ipc::message::{Drives, Telemetry};
+use supple_ipc::message::{Drives, MAX_DOF, Telemetry};
 
 /// Time after a fault from which the tip must be slow \[ns\].
 const STOPPED_NS: u64 = 500_000_000;
@@ -34,6 +34,8 @@ pub struct ControllerSample {
     pub fault: u8,
     /// Whether the drives are active.
     pub active: bool,
+    /// Estimated joint angles, padded \[rad\].
+    pub position_rad: [f64; MAX_DOF],
 }
 
 impl ControllerSample {
@@ -45,6 +47,7 @@ impl ControllerSample {
             mode: telemetry.record().mode(),
             fault: telemetry.record().fault,
             active: telemetry.state.drives() == Drives::Active,
+            position_rad: telemetry.record().position_rad.into(),
         }
     }
 }
@@ -58,6 +61,11 @@ pub struct RowMetrics {
     pub fault_before: Option<&'static str>,
     /// Time from the event to that fault \[ms\].
     pub fault_after_ms: Option<f64>,
+    /// Time from the event until the fault of a sensor can be observed \[ms\], if that can be computed: an angle is wrong
+    /// by more than the check resolves, or a reply is missing.
+    pub observable_after_ms: Option<f64>,
+    /// Time from then to the fault, zero if the fault came first \[ms\].
+    pub detected_after_ms: Option<f64>,
     /// Time from the event until the motors brake \[ms\].
     pub braked_after_ms: Option<f64>,
     /// Last time at which the tip was faster than 0.25 m/s while the motors did not brake; 0 if never \[ms\].
@@ -76,6 +84,8 @@ pub struct RowMetrics {
     pub tip_later_m_per_s: Option<f64>,
     /// Maximum distance of the tip from its position at the event \[m\].
     pub tip_moved_m: f64,
+    /// The same until 0.2 s after the fault, or after braking began; none without either \[m\].
+    pub stopped_in_m: Option<f64>,
     /// Maximum force in the first 20 ms of the first contact \[N\].
     pub impact_n: f64,
     /// Maximum force after these 20 ms \[N\].
@@ -84,6 +94,12 @@ pub struct RowMetrics {
     pub fault_after_contact_ms: Option<f64>,
     /// Mean force from 0.5 s to 0.7 s after the contact began \[N\].
     pub pressed_n: Option<f64>,
+    /// Force with which the law itself may press \[N\]; none if the task follows no path.
+    pub law_force_n: Option<f64>,
+    /// Maximum rise of the mechanical energy, kinetic and potential, after the fault \[J\]; where the encoders are right.
+    pub energy_gained_j: Option<f64>,
+    /// Maximum descent of the tip after the fault \[m\].
+    pub descent_m: f64,
     /// Mode at the end.
     pub end_mode: &'static str,
     /// Whether the drives are active at the end.
@@ -92,6 +108,8 @@ pub struct RowMetrics {
     pub back_tip_m_per_s: Option<f64>,
     /// Maximum tip displacement after the drives are re-enabled \[m\].
     pub back_moved_m: Option<f64>,
+    /// Total time for which the re-enabled drives were active \[ms\].
+    pub back_active_ms: Option<f64>,
 }
 
 impl RowMetrics {
@@ -154,6 +172,11 @@ impl RowMetrics {
             metrics.energy_later_j = Some(max(later));
             let later = from(stop_ns + STOPPED_NS).filter(|line| line.active);
             metrics.tip_later_m_per_s = Some(max(later.map(|l| l.tip_speed_m_per_s)));
+            let until = after
+                .iter()
+                .take_while(|line| line.time_ns < stop_ns + ENERGY_CHECK_NS);
+            metrics.stopped_in_m = event_tip_m
+                .map(|event_tip_m| max(until.map(|line| distance(&line.tip_m, &event_tip_m))));
         }
         if let Some(touched) = touched {
             let (begin_ns, over_ns) = (touched.time_ns, touched.time_ns + IMPACT_NS);
@@ -182,9 +205,75 @@ impl RowMetrics {
             metrics.back_tip_m_per_s = Some(max(from(back.time_ns).map(|l| l.tip_speed_m_per_s)));
             let distances_m = from(back.time_ns).map(|line| distance(&line.tip_m, &back.tip_m));
             metrics.back_moved_m = Some(max(distances_m));
+            let pairs = after
+                .windows(2)
+                .filter(|pair| pair[0].time_ns >= back.time_ns);
+            let active = pairs.filter(|pair| pair[0].active);
+            let active_ns: u64 = active.map(|pair| pair[1].time_ns - pair[0].time_ns).sum();
+            metrics.back_active_ms = Some(active_ns as f64 * 1e-6);
+        }
+        if let Some(stop) = stop_ns.and_then(at) {
+            let lowest_m = from(stop.time_ns).map(|line| line.tip_m[2]);
+            metrics.descent_m = stop.tip_m[2] - lowest_m.fold(stop.tip_m[2], f64::min);
         }
         metrics
     }
+
+    /// Adds when the fault of a sensor could be observed: `at_ns` on the arm's clock, with the event at `event_ns`.
+    pub fn observable_at(&mut self, at_ns: Option<u64>, event_ns: u64) {
+        self.observable_after_ms = at_ns.map(|at_ns| at_ns.saturating_sub(event_ns) as f64 * 1e-6);
+        if let (Some(from_ms), Some(fault_ms)) = (self.observable_after_ms, self.fault_after_ms) {
+            self.detected_after_ms = Some((fault_ms - from_ms).max(0.0));
+        }
+    }
+
+    /// Adds the rise of the mechanical energy from the fault on, with the arm's potential energy \[J\] at given angles.
+    pub fn energy_since_fault(
+        &mut self,
+        lines: &[TraceRow],
+        samples: &[ControllerSample],
+        event_ns: u64,
+        potential_j: impl Fn(&[f64; MAX_DOF]) -> f64,
+    ) {
+        let after_ms = [self.fault_after_ms, self.braked_after_ms];
+        let Some(after_ms) = after_ms.into_iter().flatten().reduce(f64::min) else {
+            return;
+        };
+        let stop_ns = event_ns + (after_ms * 1e6).round() as u64;
+        let later = samples.iter().filter(|sample| sample.time_ns >= stop_ns);
+        let mut energies_j = later.filter_map(|sample| {
+            let line = lines.iter().find(|line| line.time_ns >= sample.time_ns)?;
+            Some(line.kinetic_energy_j + potential_j(&sample.position_rad))
+        });
+        if let Some(first_j) = energies_j.next() {
+            self.energy_gained_j = Some(energies_j.fold(0.0, |gained, j| gained.max(j - first_j)));
+        }
+    }
+}
+
+/// First time from `event_ns` on at which the angle that the encoder of `joint`, or of any joint, shows is wrong by more
+/// than `resolution_rad`, if that encoder sticks at the event \[ns\].
+pub fn stuck_angle_is_wrong_ns(
+    lines: &[TraceRow],
+    event_ns: u64,
+    joint: Option<usize>,
+    resolution_rad: f64,
+) -> Option<u64> {
+    let mut turned_rad: Vec<f64> = Vec::new();
+    let after = lines.windows(2).filter(|pair| pair[0].time_ns >= event_ns);
+    for pair in after {
+        let period_s = (pair[1].time_ns - pair[0].time_ns) as f64 * 1e-9;
+        turned_rad.resize(pair[0].joint_rad_per_s.len(), 0.0);
+        for (turned_rad, speed) in turned_rad.iter_mut().zip(&pair[0].joint_rad_per_s) {
+            *turned_rad += speed * period_s;
+        }
+        let mut angles = turned_rad.iter().enumerate();
+        let stuck = |index: usize| joint.is_none_or(|joint| joint == index);
+        if angles.any(|(index, angle)| stuck(index) && angle.abs() > resolution_rad) {
+            return Some(pair[1].time_ns);
+        }
+    }
+    None
 }
 
 fn max(values: impl Iterator<Item = f64>) -> f64 {

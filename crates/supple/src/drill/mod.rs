@@ -49,6 +49,10 @@ const POSE_BUS_RATE_HZ: u32 = 700;
 /// # Errors
 /// [`Failure::Drill`] if a result differs from the expected one; [`Failure::NoSuchTestCase`].
 pub fn run(args: &DrillArgs) -> Result<(), Failure> {
+    // Check the output before any test case is run.
+    if let Some(file) = &args.markdown {
+        supple_files::check_output(file).map_err(|error| Failure::file("write", file, error))?;
+    }
     let description = arms::find(&args.urdf.name(&args.arm), args.strict)?;
     if description.bus().is_some() {
         return motors::run(args, &description);
@@ -198,7 +202,7 @@ impl Drop for TestArms {
 /// Runs a test case. A case that cannot be run counts as failed; the others continue.
 fn perform(spec: &Spec, args: &DrillArgs, arm: &TestArm) -> Result<Row, Failure> {
     let result = with_dof!(arm.description.dof(), N => match spec.runs_in_wall_clock_time() {
-        true => perform::perform::<N>(spec, args, &arm.description),
+        true => perform::perform::<N>(spec, args, arm),
         false => lockstep::perform::<N>(spec, arm),
     })?;
     match result {

@@ -2,8 +2,8 @@
 
 use super::row::{ProcessTestResult, Row};
 use super::spec::{Event, ProcessFailure, Spec, TestTask, UP};
-use super::task;
 use super::trace::TraceAfterLoss;
+use super::{TestArm, task};
 use crate::cli::{DrillArgs, PlantKind, UpArgs, UpTrajectory};
 use crate::operate::OperatorSession;
 use crate::up::System;
@@ -43,6 +43,8 @@ const QUEUE_CAPACITY: u64 = 16;
 const FAR_FUTURE_CYCLES: u64 = 1_000_000_000;
 /// Time of the move to the start of an excitation \[s\].
 const MOVE_TO_START_S: f64 = 1.0;
+/// The same to the start of the pose task, which is farther away \[s\].
+const MOVE_TO_POSE_S: f64 = 4.0;
 
 /// Runs a test case in wall-clock time.
 ///
@@ -51,8 +53,12 @@ const MOVE_TO_START_S: f64 = 1.0;
 pub fn perform<const N: usize>(
     spec: &Spec,
     args: &DrillArgs,
-    description: &Description,
+    arm: &TestArm,
 ) -> Result<Row, Failure> {
+    let description = &match arm.rate_hz {
+        Some(rate_hz) => arm.description.clone().at_rate(f64::from(rate_hz))?,
+        None => arm.description.clone(),
+    };
     let prefix = format!("drill-{}", std::process::id());
     let domain = Domain::new(Some(&prefix)).map_err(Failure::system)?;
     let trace = domain.folder().join(format!("{prefix}.csv"));
@@ -60,8 +66,8 @@ pub fn perform<const N: usize>(
     let up = UpArgs {
         urdf: UrdfArgs::default(),
         plant: spec.plant,
-        arm: args.arm.clone(),
-        strict: args.strict,
+        arm: arm.name.clone(),
+        strict: arm.strict,
         track: match spec.task {
             TestTask::Probe => UpTrajectory::Probe,
             _ => UpTrajectory::Sinusoid,
@@ -73,14 +79,14 @@ pub fn perform<const N: usize>(
         tare: false,
         // Tasks that move the arm down would hit the block.
         block_m: match spec.task {
-            TestTask::Move | TestTask::Excite => None,
+            TestTask::Move | TestTask::Excite | TestTask::TrackPose => None,
             _ => Some(-(BLOCK_CLEARANCE_M + cap_m)),
         },
         inject: Vec::new(),
         misbehave: Vec::new(),
         plant_options: PlantArgs::default(),
         trace: Some(trace.clone()),
-        rate_hz: None,
+        rate_hz: arm.rate_hz,
         for_s: None,
         virtual_time: false,
         log: PathBuf::new(),
@@ -131,6 +137,7 @@ fn mode_of(task: TestTask) -> Mode {
         TestTask::Float => Mode::Float,
         TestTask::JointImpedance => Mode::JointImpedance,
         TestTask::TrackPose => Mode::TrackPose,
+        TestTask::Breakaway => Mode::Breakaway,
     }
 }
 
@@ -161,14 +168,19 @@ fn start_task<const N: usize>(
     let config = description.config::<N>()?;
     let mut session = OperatorSession::<N>::new(domain)?;
     let request = task::request(spec, &config, description)?;
-    if let Request::Excite(series) = &request {
+    let from = match &request {
+        Request::Excite(series) => Some((series.at(0.0).position_rad, MOVE_TO_START_S)),
+        Request::TrackPose { .. } => Some((task::pose_start_rad(&config)?, MOVE_TO_POSE_S)),
+        _ => None,
+    };
+    if let Some((target_rad, duration_s)) = from {
         let back = Request::Move {
-            target_rad: series.at(0.0).position_rad,
-            duration_s: MOVE_TO_START_S,
+            target_rad,
+            duration_s,
         };
         session.send_request(&back, None)?;
         poll_until(&mut next, TIMEOUT, |t| {
-            has_been_in_mode(Mode::Move, t, MOVE_TO_START_S + 0.2)
+            has_been_in_mode(Mode::Move, t, duration_s + 0.2)
         })?
         .ok_or(Failure::DidNotReachTracking)?;
     }
@@ -221,8 +233,9 @@ fn lose_process<const N: usize>(
     let back = Instant::now();
     if let Event::Process { name, loss } = spec.event {
         match loss {
-            ProcessFailure::Kill => system.restart(name)?,
+            ProcessFailure::Kill | ProcessFailure::Terminate => system.restart(name)?,
             ProcessFailure::Stop => system.signal(name, Signal::CONT)?,
+            ProcessFailure::Interrupt => {}
         }
     }
     if result.recovery_expected {
@@ -238,6 +251,8 @@ fn signal(loss: ProcessFailure) -> Signal {
     match loss {
         ProcessFailure::Kill => Signal::KILL,
         ProcessFailure::Stop => Signal::STOP,
+        ProcessFailure::Terminate => Signal::TERM,
+        ProcessFailure::Interrupt => Signal::INT,
     }
 }
 
@@ -400,7 +415,9 @@ fn lose_up_process<const N: usize>(
             ..
         }
     );
-    running.signal(if stopped { Signal::STOP } else { Signal::KILL });
+    if let Event::Process { loss, .. } = spec.event {
+        running.signal(signal(loss));
+    }
     let (mut last, start) = (None, Instant::now());
     while start.elapsed() < observation_time(spec) {
         last = next_telemetry(&mut reader)?.or(last);

@@ -23,6 +23,8 @@ pub enum TestTask {
     Float,
     /// The downward motion of the move with compliant joints, at up to 0.19 m/s.
     JointImpedance,
+    /// A torque ramp on the shoulder that has not moved it yet, with the other joints held.
+    Breakaway,
     /// The same downward path of the tip while it turns, with the 7-joint WAM and every joint active.
     TrackPose,
 }
@@ -35,6 +37,10 @@ pub enum ProcessFailure {
     Kill,
     /// By SIGSTOP; SIGCONT follows.
     Stop,
+    /// By SIGTERM, which asks for an orderly end.
+    Terminate,
+    /// By SIGINT, as from a terminal that sends it to one process alone.
+    Interrupt,
 }
 
 /// How the drives are disabled.
@@ -46,6 +52,15 @@ pub enum DriveShutdown {
     IdleWhenStiff,
     /// By the emergency stop.
     EStop,
+}
+
+/// When an operator presses the pendant's activate button although the controller is not in gravity hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Activation {
+    /// A fault has set the drives to idle.
+    InFault,
+    /// The drives are active, and the arm works.
+    InWork,
 }
 
 /// A request that the controller must refuse.
@@ -87,6 +102,8 @@ pub enum Event {
     Obstacle,
     /// The drives are disabled, and activated again later.
     Drives(DriveShutdown),
+    /// Somebody activates the drives where that must not have an effect.
+    Activation(Activation),
     /// An operator sends an invalid request.
     Request(InvalidRequest),
 }
@@ -110,6 +127,8 @@ pub enum Expected {
     ReturnsToGravityHold,
     /// Idle is accepted within 20 ms.
     IdleAccepted,
+    /// One of these faults occurs; the drives that are activated in it are idle again at once, and the arm does not jump.
+    StaysIdle(&'static [&'static str]),
 }
 
 /// A test case.
@@ -156,6 +175,7 @@ impl fmt::Display for TestTask {
             TestTask::Excite => "excite",
             TestTask::Float => "float",
             TestTask::JointImpedance => "joint_impedance",
+            TestTask::Breakaway => "breakaway",
             TestTask::TrackPose => "track_pose",
         })
     }
@@ -170,6 +190,8 @@ impl fmt::Display for Event {
                 let how = match loss {
                     ProcessFailure::Kill => "kill",
                     ProcessFailure::Stop => "stop",
+                    ProcessFailure::Terminate => "terminate",
+                    ProcessFailure::Interrupt => "interrupt",
                 };
                 write!(f, "{how}-{name}")
             }
@@ -188,6 +210,8 @@ impl fmt::Display for Event {
                 f.write_str("stiff-drives-idle-and-back")
             }
             Event::Drives(DriveShutdown::EStop) => f.write_str("e-stop-and-back"),
+            Event::Activation(Activation::InFault) => f.write_str("activated-in-a-fault"),
+            Event::Activation(Activation::InWork) => f.write_str("activated-in-work"),
             Event::Request(InvalidRequest::TooFast) => f.write_str("too-fast-request"),
             Event::Request(InvalidRequest::TooStiff) => f.write_str("too-much-damping"),
             Event::Request(InvalidRequest::WhileIdle) => f.write_str("work-while-drives-idle"),
@@ -211,6 +235,13 @@ impl fmt::Display for Expected {
             Expected::Refused => f.write_str("refused, arm does not move"),
             Expected::ReturnsToGravityHold => f.write_str("gravity hold again, no jump"),
             Expected::IdleAccepted => f.write_str("idle within 20 ms"),
+            Expected::StaysIdle(names) => {
+                write!(
+                    f,
+                    "faults: {}; activated in it, idle again within 25 ms",
+                    any(names)
+                )
+            }
         }
     }
 }

@@ -6,7 +6,8 @@ use crate::cli::UpTrajectory;
 use crate::operate::{Approach, trajectory_for};
 use supple_cli::exit::Failure;
 use supple_core::config::Gains;
-use supple_core::controller::Request;
+use supple_core::controller::{Breakaway, Request};
+use supple_core::dynamics::jacobian;
 use supple_core::math::Vector3;
 use supple_core::trajectory::{Fourier, Line, Rotation};
 use supple_core::{Config, Trajectory, Vector};
@@ -26,7 +27,11 @@ const TURN_RAD: f64 = 0.4;
 /// Amplitude and angular frequency of the shoulder's oscillation: 0.25 m/s at the tip, which is 0.6 m away.
 const SWING_RAD: f64 = 0.15;
 const SWING_RAD_PER_S: f64 = 2.8;
-/// Joint that oscillates.
+/// Torque ramp of the breakaway task: its joint still rests at the event \[N m/s\], \[rad\], \[N m\].
+const RAMP_NM_PER_S: f64 = 0.5;
+const RAMP_STOP_RAD: f64 = 0.03;
+const RAMP_LIMIT_NM: f64 = 6.0;
+/// Joint that oscillates, or is loaded by the ramp.
 const SHOULDER: usize = 1;
 
 /// Requests with their cycles, and the cycle of the event.
@@ -74,6 +79,12 @@ pub fn request<const N: usize>(
         TestTask::Track => Request::Track(sinusoid),
         TestTask::Probe => Request::Track(trajectory_for(UpTrajectory::Probe, description).0),
         TestTask::TrackPose => pose_motion().request(),
+        TestTask::Breakaway => Request::Breakaway(Breakaway {
+            joint: SHOULDER.min(N - 1),
+            rate_nm_per_s: RAMP_NM_PER_S,
+            stop_rad: RAMP_STOP_RAD,
+            limit_nm: RAMP_LIMIT_NM,
+        }),
         TestTask::Excite => {
             let start_rad = start_pose(config, "drill", &sinusoid, duration_s)?;
             let mut series = Fourier::at_rest(start_rad, SWING_RAD_PER_S);
@@ -83,6 +94,38 @@ pub fn request<const N: usize>(
             Request::Excite(series)
         }
     })
+}
+
+/// Pose from which the pose task starts \[rad\].
+///
+/// # Errors
+/// [`Failure::Experiment`] if the arm cannot perform the task.
+pub fn pose_start_rad<const N: usize>(config: &Config<N>) -> Result<Vector<N>, Failure> {
+    Ok(Approach::to_pose(config, &pose_motion())?.start_rad())
+}
+
+/// Force with which the law itself may press on a block under the path \[N\]: stiffness times the length of the path, of
+/// the tip or of the springs of the joints as they act downwards at the tip. None if the task does not follow a path.
+pub fn law_force_n<const N: usize>(
+    task: TestTask,
+    config: &Config<N>,
+    start_rad: &Vector<N>,
+) -> Option<f64> {
+    match task {
+        TestTask::Track | TestTask::Probe | TestTask::TrackPose => {
+            Some(config.law.gains.stiffness_n_per_m.z * DESCENT_M)
+        }
+        TestTask::JointImpedance => {
+            let down = jacobian(&config.arm, start_rad);
+            let springs = &config.joint_gains.stiffness_nm_per_rad;
+            let compliance_m_per_n: f64 = (0..N)
+                .filter(|joint| springs[*joint] > 0.0)
+                .map(|joint| down[(2, joint)] * down[(2, joint)] / springs[joint])
+                .sum();
+            Some(DESCENT_M / compliance_m_per_n)
+        }
+        _ => None,
+    }
 }
 
 /// The downward path of the joint impedance task, slower, while the tip turns about the vertical.
@@ -139,6 +182,7 @@ impl<const N: usize> Script<N> {
                     TestTask::TrackPose => 1.0,
                     TestTask::Track | TestTask::Probe => 0.8,
                     TestTask::Excite => 0.7,
+                    TestTask::Breakaway => 0.5,
                 }),
             start_rad: approach.start_rad(),
         };

@@ -22,6 +22,8 @@ struct Status {
     mode: &'static str,
     mode_time_s: f64,
     drives: &'static str,
+    #[serde(skip)]
+    caution: &'static str,
     cycle: u64,
     /// Number of sampled cycles.
     cycles: u64,
@@ -155,6 +157,7 @@ impl Status {
             mode: record.mode().map_or("unknown", |mode| mode.name()),
             mode_time_s: record.mode_time_s,
             drives: last.state.drives().name(),
+            caution: last.state.drives().caution(),
             cycle: last.state.cycle,
             cycles: seen.cycles,
             missed: last.state.plant.missed,
@@ -191,8 +194,8 @@ impl fmt::Display for Status {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "mode      {} for {:.1} s, drives {}, cycle {}",
-            self.mode, self.mode_time_s, self.drives, self.cycle
+            "mode      {} for {:.1} s, drives {}{}, cycle {}",
+            self.mode, self.mode_time_s, self.drives, self.caution, self.cycle
         )?;
         if let Some(fault) = &self.fault {
             writeln!(f, "fault     {fault}")?;

@@ -69,9 +69,10 @@ impl StatusLine {
             Output::Lines(last) if *last != Some((mode, drives)) => {
                 *last = Some((mode, drives));
                 print_status(&format!(
-                    "{:.2} s: {name}, drives {}{waits}",
+                    "{:.2} s: {name}, drives {}{}{waits}",
                     telemetry.state.cycle as f64 * self.period_s,
-                    drives.name()
+                    drives.name(),
+                    drives.caution()
                 ));
             }
             Output::Terminal { .. } | Output::Lines(_) | Output::Quiet => {}
@@ -82,6 +83,7 @@ impl StatusLine {
         match (mode, drives) {
             (Some(Mode::Idle | Mode::Fault) | None, _) | (_, Drives::Active) => "",
             _ if !self.pendant => "",
+            (_, Drives::Held) => "",
             (_, Drives::Idle) => " (waiting for Shift-Activate)",
             (_, Drives::Off) => " (waiting for Shift-Idle: emergency stop)",
         }

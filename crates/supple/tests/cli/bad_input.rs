@@ -30,6 +30,24 @@ fn outputs_that_are_not_regular_files_are_code_6_before_anything_is_written() {
             "a character device",
             &["up", "--plant", "sim", "--no-log", "--trace", "/dev/full"],
         ),
+        ("a character device", &["drill", "--markdown", "/dev/null"]),
+        ("a FIFO", &["drill", "--markdown", "fifo"]),
+        ("a folder", &["drill", "--markdown", "folder"]),
+        (
+            "a character device",
+            &[
+                "drill",
+                "--arm",
+                "openarm",
+                "--plant",
+                "emu",
+                "--markdown",
+                "/dev/null",
+            ],
+        ),
+        ("a character device", &["teach", "/dev/null"]),
+        ("a FIFO", &["teach", "fifo"]),
+        ("a folder", &["teach", "folder"]),
     ] {
         let answer = run_in(folder.path(), args);
         assert_eq!(answer.code, Some(6), "{args:?}: {}", answer.stderr);

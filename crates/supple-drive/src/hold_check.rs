@@ -1,0 +1,124 @@
+//! Judges an arm that the plant loop holds or lays down itself, from encoder speeds and speed limits alone.
+//!
+//! The torque of holding is gravity at the measured pose. If an angle is wrong, as with a zero that moved, that torque
+//! drives the arm instead. Nothing that the loop does moves a joint at its speed limit, and damping slows what moved
+//! before: a joint that exceeds its limit for [`FAST_S`], and is faster than when holding began or exceeds the limit
+//! [`STOP_S`] later, is driven.
+
+use supple_core::Vector;
+
+/// Time for which a joint is too fast before it counts \[s\].
+const FAST_S: f64 = 0.01;
+/// Settling time of the speeds after holding began; speeds in it count as speeds before \[s\].
+const SETTLING_S: f64 = 0.02;
+/// Ratio to the speed at the beginning above which a joint counts as driven.
+const SPEED_GROWTH: f64 = 1.25;
+/// Time after which no joint may exceed its limit, whatever its speed at the beginning \[s\].
+const STOP_S: f64 = 0.25;
+/// Fraction of a joint's speed limit below which it rests.
+const REST_SHARE: f64 = 0.05;
+/// Time for which all joints rest before the arm lies \[s\].
+const REST_S: f64 = 0.5;
+
+/// Check of the motion of an arm that the loop holds.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct HoldCheck<const N: usize> {
+    limit_rad_per_s: Vector<N>,
+    /// Time since holding began \[s\].
+    elapsed_s: f64,
+    /// Speed of the fastest joint at the beginning \[rad/s\].
+    fastest_rad_per_s: f64,
+    /// Joint that is too fast, and for how long \[s\].
+    fast: Option<(usize, f64)>,
+    /// Time for which all joints have rested \[s\].
+    rest_s: f64,
+}
+
+impl<const N: usize> HoldCheck<N> {
+    pub(crate) fn new(limit_rad_per_s: Vector<N>) -> HoldCheck<N> {
+        HoldCheck {
+            limit_rad_per_s,
+            elapsed_s: 0.0,
+            fastest_rad_per_s: 0.0,
+            fast: None,
+            rest_s: 0.0,
+        }
+    }
+
+    /// The loop does not hold the arm.
+    pub(crate) fn reset(&mut self) {
+        *self = HoldCheck::new(self.limit_rad_per_s);
+    }
+
+    /// Takes the speeds of a cycle \[rad/s\], `period_s` after the previous ones.
+    pub(crate) fn observe(&mut self, velocity_rad_per_s: &Vector<N>, period_s: f64) {
+        self.elapsed_s += period_s;
+        let speed = velocity_rad_per_s.abs();
+        if self.elapsed_s <= SETTLING_S {
+            self.fastest_rad_per_s = self.fastest_rad_per_s.max(speed.max());
+        }
+        let allowed = |joint: usize| match self.elapsed_s > STOP_S {
+            true => self.limit_rad_per_s[joint],
+            false => self.limit_rad_per_s[joint].max(SPEED_GROWTH * self.fastest_rad_per_s),
+        };
+        let settled = self.elapsed_s > SETTLING_S;
+        let found = (0..N).find(|joint| settled && speed[*joint] > allowed(*joint));
+        let before_s = self.fast.map_or(0.0, |(_, fast_s)| fast_s);
+        self.fast = found.map(|joint| (joint, before_s + period_s));
+        let rests = (0..N).all(|joint| speed[joint] < REST_SHARE * self.limit_rad_per_s[joint]);
+        self.rest_s = if rests { self.rest_s + period_s } else { 0.0 };
+    }
+
+    /// Joint that the torque of holding drives.
+    pub(crate) fn driven(&self) -> Option<usize> {
+        let (joint, fast_s) = self.fast?;
+        (fast_s > FAST_S).then_some(joint)
+    }
+
+    /// Whether the arm lies.
+    pub(crate) fn rests(&self) -> bool {
+        self.rest_s > REST_S
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MS: f64 = 1e-3;
+
+    /// Judges an arm with a speed limit of 2 rad/s whose joint 1 has this speed after a time \[s\]; returns the time
+    /// at which it counts as driven.
+    fn driven_after_s(speed: impl Fn(f64) -> f64) -> Option<f64> {
+        let mut check = HoldCheck::<2>::new(Vector::repeat(2.0));
+        (1..2000).map(|k| f64::from(k) * MS).find(|time_s| {
+            check.observe(&Vector::from([0.0, speed(*time_s)]), MS);
+            check.driven() == Some(1)
+        })
+    }
+
+    #[test]
+    fn a_motion_that_grows_above_the_limit_is_driven_and_one_that_decays_is_not() {
+        // 20 rad/s^2 from rest exceed the limit after 0.1 s.
+        let after_s = driven_after_s(|time_s| 20.0 * time_s).expect("driven");
+        assert!((0.1..0.12).contains(&after_s), "{after_s}");
+        assert_eq!(driven_after_s(|time_s| 4.5 * (-time_s / 0.1).exp()), None);
+        assert_eq!(driven_after_s(|_| 1.9), None);
+    }
+
+    #[test]
+    fn a_motion_that_does_not_decay_is_driven_after_a_quarter_of_a_second() {
+        let after_s = driven_after_s(|_| 4.0).expect("driven");
+        assert!((0.25..0.27).contains(&after_s), "{after_s}");
+    }
+
+    #[test]
+    fn an_arm_lies_after_half_a_second_of_rest() {
+        let mut check = HoldCheck::<2>::new(Vector::repeat(2.0));
+        for k in 0..1000 {
+            let speed = if k < 100 { 0.2 } else { 0.01 };
+            check.observe(&Vector::repeat(speed), MS);
+            assert_eq!(check.rests(), k > 600, "{k}");
+        }
+    }
+}

@@ -1,0 +1,256 @@
+//! The operator is heard whatever else happens: idle acts within 20 cycles of being asked.
+
+use crate::scripted::{Bench, PERIOD};
+use crate::support::terminate;
+use core::time::Duration;
+use std::os::unix::fs::chown;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::Instant;
+use supple_core::controller::{Mode, Request};
+use supple_core::{Controller, Vector};
+use supple_ipc::message::{Drives, Outcome};
+use supple_ipc::{OperatorClient, TelemetryReader};
+use supple_model::Description;
+use supple_realtime::pause;
+
+/// Time for which the disk does not answer.
+const DISK_HANGS: Duration = Duration::from_secs(4);
+/// A user that owns nothing of ours.
+const NOBODY: u32 = 65534;
+/// Says to a child process of this test that it has shared memory of its own.
+const OWN_SHARED_MEMORY: &str = "SUPPLE_TEST_OWN_SHARED_MEMORY";
+
+fn end(mut bench: Bench) {
+    terminate(&bench.child);
+    let status = bench.child.wait().expect("it ends");
+    assert_eq!(status.code(), Some(0), "{status}");
+}
+
+/// A thread of another process that is stopped, alone, until this is dropped.
+struct Stopped(libc::pid_t);
+
+impl Stopped {
+    /// Stops the thread of this name; `None` if the system does not permit it.
+    fn thread(child: &Child, name: &str) -> Option<Stopped> {
+        let tasks = format!("/proc/{}/task", child.id());
+        let mut tasks = std::fs::read_dir(tasks).expect("it runs").flatten();
+        let task = tasks.find(|task| {
+            std::fs::read_to_string(task.path().join("comm")).is_ok_and(|comm| comm.trim() == name)
+        });
+        let task = task.expect("the thread is there").file_name();
+        let id: libc::pid_t = task.to_string_lossy().parse().expect("a number");
+        let none = core::ptr::null_mut::<libc::c_void>();
+        // SAFETY: these calls pass no memory but the word for the status.
+        unsafe {
+            if libc::ptrace(libc::PTRACE_SEIZE, id, none, none) != 0 {
+                println!(
+                    "skipped: no thread can be stopped: {}",
+                    std::io::Error::last_os_error()
+                );
+                return None;
+            }
+            assert_eq!(libc::ptrace(libc::PTRACE_INTERRUPT, id, none, none), 0);
+            let mut status = 0;
+            assert_eq!(libc::waitpid(id, &raw mut status, libc::__WALL), id);
+        }
+        Some(Stopped(id))
+    }
+}
+
+impl Drop for Stopped {
+    fn drop(&mut self) {
+        let none = core::ptr::null_mut::<libc::c_void>();
+        // SAFETY: no memory is passed; the thread may be gone.
+        unsafe { libc::ptrace(libc::PTRACE_DETACH, self.0, none, none) };
+    }
+}
+
+fn fault_tables(bench: &Bench) -> usize {
+    std::fs::read_dir(bench.domain.folder().join("faults")).map_or(0, Iterator::count)
+}
+
+/// A disk that does not answer for four seconds while it takes the table of a fault: idle, reset and telemetry go on, and
+/// the table is written afterwards.
+#[test]
+fn idle_acts_while_the_disk_hangs() {
+    let mut bench = Bench::start(Stdio::null());
+    let mut reader = TelemetryReader::new(&bench.domain).expect("a reader");
+    let mut operator = OperatorClient::new(&bench.domain).expect("an operator");
+    bench.hold(&mut operator);
+    let Some(stopped) = Stopped::thread(&bench.child, "supple-rt-disk") else {
+        return end(bench);
+    };
+    bench.fault();
+    bench.reset(&mut operator);
+    let since = Instant::now();
+    let (mut steps, mut lost) = (None, 0);
+    while since.elapsed() < DISK_HANGS {
+        bench.assert_heard(&mut operator);
+        bench.hold(&mut operator);
+        bench.run(100);
+        while let Some(telemetry) = reader.receive().expect("read") {
+            lost += steps.map_or(0, |step: u64| telemetry.step() - step - 1);
+            steps = Some(telemetry.step());
+        }
+    }
+    assert_eq!(lost, 0, "cycles of telemetry");
+    assert_eq!(fault_tables(&bench), 0, "the disk hangs");
+    drop(stopped);
+    for _ in 0..2000 {
+        if fault_tables(&bench) > 0 {
+            break;
+        }
+        bench.cycle();
+    }
+    assert!(fault_tables(&bench) > 0, "the disk answers again");
+    end(bench);
+}
+
+/// A reader of telemetry that does not read for more than two seconds: idle acts, and the reader goes on afterwards with
+/// what is left for it.
+#[test]
+fn idle_acts_while_a_reader_lags() {
+    let mut bench = Bench::start(Stdio::null());
+    let mut reader = TelemetryReader::new(&bench.domain).expect("a reader");
+    let mut operator = OperatorClient::new(&bench.domain).expect("an operator");
+    bench.hold(&mut operator);
+    bench.run(2500);
+    bench.assert_heard(&mut operator);
+    bench.run(100);
+    let mut last = None;
+    while let Some(telemetry) = reader.receive().expect("read") {
+        last = Some(telemetry.state.cycle);
+    }
+    let behind = bench.cycle - last.expect("some telemetry");
+    assert!(behind < 100, "{behind} cycles behind");
+    end(bench);
+}
+
+/// Removes a file that the test created in /dev/shm.
+struct Made(PathBuf);
+
+impl Drop for Made {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_file(&self.0);
+    }
+}
+
+/// Another user's files in /dev/shm that are named like ours, made while the system runs: new clients are refused with
+/// the reason or served, and idle acts.
+#[test]
+fn idle_acts_beside_files_of_another_user() {
+    let mut bench = Bench::start(Stdio::null());
+    let mut operator = OperatorClient::new(&bench.domain).expect("an operator");
+    bench.hold(&mut operator);
+    let prefix = bench.domain.object_prefix();
+    let mut made = Vec::new();
+    for name in ["not_ours", "node.0_9_3.global_mgmt", "zzz.data"] {
+        let file = Made(Path::new("/dev/shm").join(format!("{prefix}{name}")));
+        std::fs::write(&file.0, b"nonsense").expect("written");
+        if let Err(error) = chown(&file.0, Some(NOBODY), Some(NOBODY)) {
+            println!("skipped: no file can be given to another user: {error}");
+            return end(bench);
+        }
+        made.push(file);
+    }
+    bench.assert_heard(&mut operator);
+    if let Err(error) = TelemetryReader::new(&bench.domain) {
+        assert!(error.to_string().contains("user"), "{error}");
+    }
+    bench.assert_heard(&mut operator);
+    assert!(
+        made.iter().all(|file| file.0.exists()),
+        "others' files stay"
+    );
+    end(bench);
+}
+
+/// Shared memory of which other processes have taken all that was left: idle acts. In a namespace of its own.
+#[test]
+fn idle_acts_while_shared_memory_is_full() {
+    if std::env::var_os(OWN_SHARED_MEMORY).is_some() {
+        return with_full_shared_memory();
+    }
+    let this = std::env::current_exe().expect("this test");
+    let mount = "mount -t tmpfs -o size=100m tmpfs /dev/shm";
+    let in_namespace = |script: &str| {
+        let mut command = Command::new("unshare");
+        command.args(["-rm", "sh", "-c", script]).arg(&this);
+        command.env(OWN_SHARED_MEMORY, "1").output()
+    };
+    if !in_namespace(mount).is_ok_and(|output| output.status.success()) {
+        println!("skipped: mount namespaces are not permitted");
+        return;
+    }
+    let test = "heard::idle_acts_while_shared_memory_is_full";
+    let script = format!("{mount} && exec \"$0\" --exact {test} --nocapture");
+    let output = in_namespace(&script).expect("it runs");
+    let words = String::from_utf8_lossy(&output.stdout).into_owned();
+    let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{words}{errors}");
+    assert!(words.contains("1 passed"), "{words}");
+}
+
+fn with_full_shared_memory() {
+    let mut bench = Bench::start(Stdio::null());
+    let mut operator = OperatorClient::new(&bench.domain).expect("an operator");
+    bench.hold(&mut operator);
+    let filled = std::fs::write("/dev/shm/fill", vec![0_u8; 200 << 20]);
+    assert!(filled.is_err(), "it is full");
+    bench.assert_heard(&mut operator);
+    bench.hold(&mut operator);
+    bench.fault();
+    bench.reset(&mut operator);
+    bench.assert_heard(&mut operator);
+    end(bench);
+}
+
+/// A move that waits is checked from the pose in which the arm is shortly before: there the tip would be too fast.
+#[test]
+fn a_move_that_waits_is_checked_from_the_pose_in_which_it_begins() {
+    let description = Description::asset("wam4").expect("built in");
+    let config = description.config::<4>().expect("valid");
+    let controller = Controller::new(config).expect("valid");
+    let mut bench = Bench::start(Stdio::null());
+    let home = Vector::from(bench.position_rad);
+    let mut target_rad = home;
+    target_rad[0] += 1.2;
+    let request = Request::Move {
+        target_rad,
+        duration_s: 1.7,
+    };
+    let refusal = supple_core::controller::check_motion(&controller, &home, &request)
+        .expect_err("the tip is too fast");
+    assert!(refusal.to_string().contains("tip speed"), "{refusal}");
+    // From its target it is no motion at all.
+    bench.position_rad = target_rad.into();
+    let mut operator = OperatorClient::new(&bench.domain).expect("an operator");
+    bench.hold(&mut operator);
+    let at_cycle = bench.cycle + 600;
+    operator
+        .send::<4>(&request, Some(at_cycle))
+        .expect("sent")
+        .expect("a controller");
+    bench.run(100);
+    // The arm is moved by hand meanwhile, without torque.
+    bench.drives = Drives::Idle;
+    for k in 1..=200 {
+        bench.position_rad[0] = target_rad[0] - 1.2 * f64::from(k) / 200.0;
+        bench.cycle();
+    }
+    bench.run(50);
+    bench.drives = Drives::Active;
+    let mut replies = Vec::new();
+    for _ in 0..400 {
+        assert_ne!(bench.cycle(), Some(Mode::Move));
+        while let Some(reply) = operator.receive().expect("read") {
+            replies.push((reply.outcome(), reply.text.as_str().to_owned()));
+        }
+    }
+    pause(PERIOD);
+    let (outcome, text) = replies.last().expect("a reply");
+    assert_eq!(*outcome, Outcome::Refused, "{replies:?}");
+    assert!(text.contains("tip speed"), "{text}");
+    end(bench);
+}
