@@ -8,3 +8,4 @@ mod command_line;
 mod demo;
 mod faults;
 mod identification;
+mod new;
