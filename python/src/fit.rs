@@ -9,6 +9,7 @@ use crate::options::Options;
 use crate::samples::{LogInput, Samples};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use std::sync::Arc;
 use supple_core::ripple::{Harmonic, LINES};
 use supple_core::{Body, Matrix, RippleTable, Vector};
 use supple_ident::payload::{payload, torque_scale};
@@ -337,9 +338,10 @@ pub fn identify(
     let logs = logs.iter().map(|log| Samples::read(log, of.dof()));
     let logs = logs.collect::<PyResult<Vec<_>>>()?;
     let find_stribeck = options.find_stribeck;
-    let procedure = options.procedure()?;
+    let mut procedure = options.procedure()?;
     let whole = of.clone();
-    let found = interruptible(py, move |_| -> Result<_, Refused> {
+    let found = interruptible(py, move |cancelled| -> Result<_, Refused> {
+        procedure.cancellation = Arc::clone(cancelled).into();
         with_dof!(whole.dof(), N => sized::<N>(&whole, &logs, &procedure, find_stribeck))?
     })?;
     let (model, motions, warnings) = found.map_err(|refused| match refused {

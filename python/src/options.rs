@@ -2,7 +2,7 @@
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use supple_ident::{FrictionChoice, FrictionColumns, Method, Preparation, Procedure};
+use supple_ident::{Cancellation, FrictionChoice, FrictionColumns, Method, Preparation, Procedure};
 
 /// Options of an identification; the package checks names and fills in defaults.
 #[derive(FromPyObject)]
@@ -78,6 +78,7 @@ impl Options {
             joint_noise_nm: self.joint_noise_nm,
             estimate_delay: self.torque_delay_s.is_none(),
             accept_wrong_logs: self.accept_wrong_logs,
+            cancellation: Cancellation::default(),
         })
     }
 }

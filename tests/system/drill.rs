@@ -50,6 +50,14 @@ fn faults_collisions_and_invalid_requests_give_the_expected_results() {
     arguments.push("--virtual-time");
     let (rows, stderr, code) = drill(folder.path(), &arguments);
     assert_eq!(rows.len(), wanted.len(), "{stderr}");
+    // Standard error is a pipe: each case is announced on a line of its own.
+    for number in 1..=wanted.len() {
+        let line = format!("{number}/{}: ", wanted.len());
+        assert!(
+            stderr.lines().any(|said| said.starts_with(&line)),
+            "{line}in {stderr}"
+        );
+    }
     for row in &rows {
         assert_eq!(row["as_expected"], true, "{row:#}");
     }

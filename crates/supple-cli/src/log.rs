@@ -3,6 +3,7 @@
 use crate::arguments::LogDataCommand;
 use crate::console::{print_json, print_line};
 use crate::exit::Failure;
+use serde::Serialize;
 use std::fs;
 use std::io::{BufWriter, ErrorKind, Write};
 use std::num::NonZeroU64;
@@ -14,6 +15,14 @@ use supple_log::{LogError, export_csv, info, recover, replay};
 const PART: &str = "part";
 /// The same with the dot.
 const PART_SUFFIX: &str = ".part";
+
+/// What `log export --json` prints.
+#[derive(Serialize)]
+struct Exported<'a> {
+    file: &'a Path,
+    channel: &'a str,
+    rows: u64,
+}
 
 /// Runs `supple log`.
 ///
@@ -30,13 +39,25 @@ pub fn run(command: &LogDataCommand) -> Result<(), Failure> {
             channel,
             every,
             out: None,
+            ..
         } => export_to_stdout(file, channel, *every),
         LogDataCommand::Export {
             file,
             channel,
             every,
             out: Some(out),
-        } => export_to_file(file, channel, *every, out),
+            json,
+        } => {
+            let rows = export_to_file(file, channel, *every, out)?;
+            match json {
+                true => print_json(&Exported {
+                    file: out,
+                    channel,
+                    rows,
+                }),
+                false => print_line(&format!("{}: {rows} rows", out.display())),
+            }
+        }
         LogDataCommand::Replay { file, json } => {
             let replay = read(file, |file| replay(file))?;
             match json {
@@ -71,20 +92,22 @@ pub fn run(command: &LogDataCommand) -> Result<(), Failure> {
     }
 }
 
-/// Reads a log. Where it is missing because its writer was killed, the error names the part that is there.
 fn read<T>(file: &Path, reader: impl Fn(&Path) -> Result<T, LogError>) -> Result<T, Failure> {
-    reader(file).map_err(|error| {
-        let part = with_suffix(file, PART_SUFFIX);
-        if file.exists() || !part.exists() {
-            return error.into();
-        }
-        let why = format!(
-            "it does not exist; its writer was killed or still writes {}: read that file, or `supple log recover {}`",
-            part.display(),
-            part.display()
-        );
-        Failure::file("read", file, std::io::Error::new(ErrorKind::NotFound, why))
-    })
+    reader(file).map_err(|error| failure(file, error))
+}
+
+/// Where a log is missing because its writer was killed, the error names the part that is there.
+fn failure(file: &Path, error: LogError) -> Failure {
+    let part = with_suffix(file, PART_SUFFIX);
+    if file.exists() || !part.exists() {
+        return error.into();
+    }
+    let why = format!(
+        "it does not exist; its writer was killed or still writes {}: read that file, or `supple log recover {}`",
+        part.display(),
+        part.display()
+    );
+    Failure::file("read", file, std::io::Error::new(ErrorKind::NotFound, why))
 }
 
 fn export_to_stdout(file: &Path, channel: &str, every: NonZeroU64) -> Result<(), Failure> {
@@ -92,18 +115,18 @@ fn export_to_stdout(file: &Path, channel: &str, every: NonZeroU64) -> Result<(),
     match export_csv(file, channel, every, &mut out) {
         // A closed pipe is not an error.
         Err(LogError::Output(error)) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
-        Err(error) => Err(error.into()),
+        Err(error) => Err(failure(file, error)),
         Ok(_) => Ok(()),
     }
 }
 
-/// Writes the table to a temporary file and renames it when it is complete.
+/// Writes the table to a temporary file and renames it when it is complete. Returns the number of rows.
 fn export_to_file(
     file: &Path,
     channel: &str,
     every: NonZeroU64,
     out: &Path,
-) -> Result<(), Failure> {
+) -> Result<u64, Failure> {
     let part = with_suffix(out, PART_SUFFIX);
     let failed = |action, error| Failure::file(action, out, error);
     let created = check_output(out).and_then(|()| create_output(&part));
@@ -111,7 +134,7 @@ fn export_to_file(
     let written = export_csv(file, channel, every, &mut table)
         .map_err(|error| match error {
             LogError::Output(error) => failed("write", error),
-            error => error.into(),
+            error => failure(file, error),
         })
         .and_then(|rows| {
             let whole = table
@@ -120,13 +143,9 @@ fn export_to_file(
                 .and_then(|()| fs::rename(&part, out));
             whole.map(|()| rows).map_err(|error| failed("write", error))
         });
-    match written {
-        Ok(rows) => print_line(&format!("{}: {rows} rows", out.display())),
-        Err(failure) => {
-            let _ = fs::remove_file(&part);
-            Err(failure)
-        }
-    }
+    written.inspect_err(|_| {
+        let _ = fs::remove_file(&part);
+    })
 }
 
 /// Name of the recovered log: `run.mcap` and `run.mcap.part` become `run.recovered.mcap`.

@@ -1,4 +1,4 @@
-//! Other programs of supple, which are installed in the same folder.
+//! Other programs that are installed in the same folder.
 
 use crate::exit::Failure;
 use std::path::{Path, PathBuf};
@@ -15,4 +15,12 @@ pub fn program_beside(name: &'static str) -> Result<PathBuf, Failure> {
         true => Ok(program),
         false => Err(Failure::MissingProgram { name, program }),
     }
+}
+
+/// The Python interpreter: that of the environment in which this program is installed, else the one in PATH.
+pub fn python() -> PathBuf {
+    const NAME: &str = "python3";
+    let beside = std::env::current_exe().map(|this| this.with_file_name(NAME));
+    let found = beside.ok().filter(|program| program.is_file());
+    found.unwrap_or_else(|| PathBuf::from(NAME))
 }

@@ -47,6 +47,9 @@ pub enum IdentError {
         /// Remedy.
         remedy: &'static str,
     },
+    /// Another thread has ended the identification, see [`crate::Cancellation`].
+    #[error("the identification was cancelled")]
+    Cancelled,
     /// The estimate is physically inconsistent; only unconstrained methods can give this.
     #[error("the estimate is physically inconsistent ({0}); use the consistent method")]
     NotPhysical(supple_core::ArmError),

@@ -98,6 +98,7 @@ pub fn fit_rows<const N: usize>(
     independent_fraction: f64,
     options: &Options,
 ) -> Result<Fit<N>, IdentError> {
+    options.cancellation.check()?;
     let second_stage =
         options.slow_rad_per_s > 0.0 && options.friction.stribeck_rad_per_s.is_some();
     let used: Vec<usize> = (0..columns.len())
@@ -213,6 +214,7 @@ impl Stage<'_> {
             Weights::ByJointResidual | Weights::Huber
         ) {
             for _ in 0..ROUNDS {
+                self.options.cancellation.check()?;
                 if self.options.weights == Weights::Huber {
                     let mut full = DVector::zeros(self.columns.len());
                     self.used

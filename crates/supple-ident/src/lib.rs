@@ -17,6 +17,7 @@
 #![forbid(unsafe_code)]
 
 pub mod base;
+mod cancellation;
 mod choice;
 pub mod columns;
 pub mod consistent;
@@ -49,6 +50,7 @@ mod stribeck;
 pub mod validate;
 
 pub use base::BaseParameters;
+pub use cancellation::Cancellation;
 pub use choice::Choice;
 pub use columns::{Columns, FrictionColumns};
 pub use delay::{DelayEstimate, MAX_DELAY_S, estimate_delay};

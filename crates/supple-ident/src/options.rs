@@ -1,5 +1,6 @@
 //! Options of a fit.
 
+use crate::cancellation::Cancellation;
 use crate::columns::FrictionColumns;
 
 /// Weights of the joints' residuals.
@@ -32,6 +33,8 @@ pub struct Options {
     /// `Some(weight of the prior)`: physically consistent estimate, see
     /// [`crate::consistent::Constraints::prior_weight`]; `None`: plain least squares.
     pub consistent_prior_weight: Option<f64>,
+    /// Ends the fit early.
+    pub cancellation: Cancellation,
 }
 
 impl Default for Options {
@@ -45,6 +48,7 @@ impl Default for Options {
             slow_rad_per_s: 0.15,
             weights: Weights::ByJointResidual,
             consistent_prior_weight: Some(1.0),
+            cancellation: Cancellation::default(),
         }
     }
 }

@@ -2,6 +2,7 @@
 //!
 //! Unset options of a [`Procedure`] are chosen by cross-validation within the logs ([`crate::select`]).
 
+use crate::cancellation::Cancellation;
 use crate::choice::Choice;
 use crate::columns::{Columns, FrictionColumns};
 use crate::delay::estimate_delay;
@@ -76,6 +77,8 @@ pub struct Procedure {
     pub estimate_delay: bool,
     /// Whether to fit a log although [`crate::log_checks`] found it wrong; the findings are then warnings.
     pub accept_wrong_logs: bool,
+    /// Ends the identification early.
+    pub cancellation: Cancellation,
 }
 
 impl Default for Procedure {
@@ -94,6 +97,7 @@ impl Default for Procedure {
             joint_noise_nm: None,
             estimate_delay: true,
             accept_wrong_logs: false,
+            cancellation: Cancellation::default(),
         }
     }
 }
@@ -101,7 +105,7 @@ impl Default for Procedure {
 /// Identifies an arm from one or several logs. Kinematics and undetermined parameters are those of `nominal`.
 ///
 /// # Errors
-/// A log that [`Log::check`] rejects; too little data; options out of range; singular data.
+/// A log that [`Log::check`] rejects; too little data; options out of range; singular data; [`IdentError::Cancelled`].
 pub fn identify<const N: usize>(
     nominal: &Arm<N>,
     logs: &[Log],
@@ -163,6 +167,7 @@ impl Procedure {
         log: &Log,
         moving: &[usize],
     ) -> Result<(Motion, Vec<Warning>), IdentError> {
+        self.cancellation.check()?;
         let preparation = &self.preparation;
         let mut warnings = log.check_for_fit(N, moving, preparation.cutoff_hz)?;
         let findings = check_log(nominal, log, moving, &self.couplings, preparation)?;
@@ -170,6 +175,7 @@ impl Procedure {
         if findings.iter().any(stops) && !self.accept_wrong_logs {
             return Err(IdentError::WrongLog(findings));
         }
+        self.cancellation.check()?;
         let mut own = *preparation;
         if self.estimate_delay {
             let found = estimate_delay(nominal, log, moving, &self.couplings, preparation)?;
@@ -235,6 +241,7 @@ impl Procedure {
                 (None, Method::Wls | Method::Consistent) => Weights::ByJointResidual,
             },
             consistent_prior_weight: consistent.then(|| self.prior_weight.unwrap_or(PRIOR)),
+            cancellation: self.cancellation.clone(),
         };
         // Rejects invalid columns before the cross-validation.
         Columns::new(

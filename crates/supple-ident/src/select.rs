@@ -155,6 +155,8 @@ pub fn compare<const N: usize>(
         )?;
         let folds = folds(nominal, &columns, motions, parts)?;
         let outcome = held_out(nominal, &columns, &folds, options);
+        // Whatever made a candidate fail, a cancelled comparison has no result.
+        options.cancellation.check()?;
         let (errors, total) = outcome.unwrap_or_else(|error| {
             reason = Some(error);
             (Vec::new(), f64::INFINITY)

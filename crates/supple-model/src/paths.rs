@@ -155,6 +155,31 @@ mod tests {
     use super::Paths;
     use supple_core::Trajectory;
 
+    /// At twice the speed the arc is where it was at twice the time, and takes half as long.
+    #[test]
+    fn an_arc_at_twice_the_speed_is_the_same_path() {
+        let placed = Paths {
+            radius_m: 0.4,
+            azimuth_rad: 0.7,
+            height_m: 0.3,
+            scale: 0.5,
+        };
+        for paths in [Paths::PAPER, placed] {
+            let ((once, duration_s), (twice, shorter_s)) = (paths.arc(1.0), paths.arc(2.0));
+            assert!((duration_s - 2.0 * shorter_s).abs() < 1e-12);
+            for k in 0..=200 {
+                let time_s = shorter_s * f64::from(k) / 200.0;
+                let (slow, fast) = (once.at(2.0 * time_s), twice.at(time_s));
+                let moved = (slow.position - fast.position).norm();
+                let velocity = (2.0 * slow.velocity - fast.velocity).norm();
+                assert!(
+                    moved < 1e-12 && velocity < 1e-12,
+                    "{time_s} s: {moved} {velocity}"
+                );
+            }
+        }
+    }
+
     /// Turned, moved and halved, every point of every path lies where the same point of the paper's path goes.
     #[test]
     fn a_placed_path_is_the_papers_turned_moved_and_scaled() {

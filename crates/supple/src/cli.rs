@@ -1,5 +1,6 @@
 //! Definition of the command-line arguments.
 
+use crate::sweep::SweepArgs;
 use crate::view::ViewArgs;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
@@ -56,23 +57,29 @@ pub enum Command {
         /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
         #[arg(long)]
         strict: bool,
+        /// What a URDF alone does not say.
+        #[command(flatten)]
+        urdf: UrdfArgs,
         /// System to use.
         #[command(flatten)]
         system: SystemArgs,
     },
-    /// Press a button on the pendant of a running system's emulated arm, or show its state.
+    /// Press a button on the pendant of a running system's emulated arm, or show its state. The answer is always JSON.
     Pendant {
         /// Button or query.
         #[arg(value_enum)]
         action: PendantAction,
         /// System to use.
-        #[arg(long, value_name = "NAME")]
-        prefix: Option<String>,
+        #[command(flatten)]
+        system: SystemArgs,
     },
     /// List the motors of an arm on their bus, compare them with the arm's file and, asked explicitly, set registers; for
     /// arms of Damiao motors.
     #[command(after_help = CODES)]
     Motors(MotorsArgs),
+    /// Run many experiments on this machine or on a cluster; needs the Python package. A sweep that ended goes on.
+    #[command(after_help = CODES)]
+    Sweep(SweepArgs),
     /// Test simulated arms against process failures, faults, collisions and invalid requests, and compare each result
     /// with the expected one.
     #[command(after_help = CODES)]
@@ -169,6 +176,9 @@ pub struct MotorsArgs {
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
+    /// What a URDF alone does not say.
+    #[command(flatten)]
+    pub urdf: UrdfArgs,
     /// can:NAME or unix:FOLDER; default: the bus of an emulated arm with the prefix.
     #[arg(long, value_name = "BUS")]
     pub bus: Option<Address>,
@@ -537,12 +547,12 @@ impl Command {
             | Command::Teach(TeachArgs { system, .. })
             | Command::Play(PlayArgs { system, .. })
             | Command::Probe { system, .. }
+            | Command::Pendant { system, .. }
             | Command::Status(system)
             | Command::Reset(system)
             | Command::Stop(system) => system.json,
-            // Its output is already JSON; its errors are plain text.
-            Command::Pendant { .. } => false,
             Command::Motors(args) => args.json,
+            Command::Sweep(args) => args.json,
             Command::Doctor { json } => *json,
             Command::Completions { .. } => false,
             Command::Man { json, .. } => *json,

@@ -12,6 +12,7 @@ mod drill;
 mod man;
 mod motors;
 mod operate;
+mod sweep;
 mod up;
 mod view;
 
@@ -54,6 +55,7 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
         Command::Up(args) => up::run(args),
         Command::Drill(args) => drill::run(args),
         Command::Motors(args) => motors::run(args),
+        Command::Sweep(_) => Err(sweep::exec()),
         Command::Status(system) => operate::status(system),
         Command::Mode(args) => operate::mode(args),
         Command::Gains(args) => operate::gains(args),
@@ -64,9 +66,10 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
         Command::Probe {
             arm,
             strict,
+            urdf,
             system,
-        } => operate::probe(arm, *strict, system),
-        Command::Pendant { action, prefix } => operate::pendant(*action, prefix.as_deref()),
+        } => operate::probe(&urdf.name(arm), *strict, system),
+        Command::Pendant { action, system } => operate::pendant(*action, system.prefix.as_deref()),
         Command::Reset(system) => operate::reset(system),
         Command::Stop(system) => operate::stop(system),
         Command::Offline(OfflineCommand::Log(LogCommand::Data(command))) => log::run(command),

@@ -2,6 +2,7 @@
 
 use clap::Args;
 use std::path::{Path, PathBuf};
+use supple_cli::arguments::UrdfArgs;
 use supple_cli::arms;
 use supple_cli::console::{print_json, print_line, print_status};
 use supple_cli::exit::Failure;
@@ -31,6 +32,9 @@ pub struct ViewArgs {
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
+    /// What a URDF alone does not say.
+    #[command(flatten)]
+    pub urdf: UrdfArgs,
     /// Draw a block, its top face at this height above the base frame (m).
     #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = between(-10.0, 10.0))]
     pub block_m: Option<f64>,
@@ -70,7 +74,7 @@ pub fn run(args: &ViewArgs) -> Result<(), Failure> {
         Some(log) => Source::Log(log.clone()),
         None => Source::System {
             domain: Box::new(Domain::new(args.prefix.as_deref()).map_err(Failure::system)?),
-            description: Box::new(arms::find(&args.arm, args.strict)?),
+            description: Box::new(arms::find(&args.urdf.name(&args.arm), args.strict)?),
         },
     };
     let options = Options {

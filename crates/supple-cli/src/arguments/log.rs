@@ -52,6 +52,9 @@ pub enum LogDataCommand {
         /// Output file. Default: standard output.
         #[arg(long, value_name = "FILE")]
         out: Option<PathBuf>,
+        /// Print file, channel and number of rows as JSON; the table itself stays comma-separated.
+        #[arg(long, requires = "out")]
+        json: bool,
     },
     /// Run the controller over a log again and compare every output bit for bit.
     #[command(after_help = CODES)]
@@ -84,10 +87,10 @@ impl LogCommand {
             LogCommand::Plot(args) => args.json,
             LogCommand::Data(
                 LogDataCommand::Info { json, .. }
+                | LogDataCommand::Export { json, .. }
                 | LogDataCommand::Recover { json, .. }
                 | LogDataCommand::Replay { json, .. },
             ) => *json,
-            LogCommand::Data(LogDataCommand::Export { .. }) => false,
         }
     }
 }

@@ -4,7 +4,9 @@ use crate::support::{Noise, motion, random_arm};
 use supple_core::dynamics::gravity;
 use supple_core::{Friction, Vector};
 use supple_ident::select::{compare, friction_candidates, load_candidates, prior_candidates};
-use supple_ident::{DMatrix, FrictionColumns, Motion, Options};
+use supple_ident::{
+    DMatrix, FrictionColumns, IdentError, Motion, Options, Procedure, fit, identify_motions,
+};
 
 const JOINTS: [usize; 3] = [0, 1, 2];
 
@@ -113,4 +115,24 @@ fn rejects_a_single_part_and_an_empty_list() {
     let model = random_arm::<3>(61);
     assert!(compare(&model, &data, &JOINTS, &friction_candidates(&base()), 1).is_err());
     assert!(compare(&model, &data, &JOINTS, &[], 4).is_err());
+}
+
+/// The flag ends a comparison between its fits and a fit between its steps, whatever else would come of them.
+#[test]
+fn a_cancelled_identification_has_no_result() {
+    let model = random_arm::<3>(61);
+    let motions = [noisy(Friction::coulomb(0.6, 1.0))];
+    let procedure = Procedure::default();
+    identify_motions(&model, &motions, &JOINTS, &procedure).expect("not cancelled");
+    procedure.cancellation.cancel();
+    let found = identify_motions(&model, &motions, &JOINTS, &procedure);
+    assert_eq!(found.err(), Some(IdentError::Cancelled));
+    let options = Options {
+        cancellation: procedure.cancellation.clone(),
+        ..base()
+    };
+    let found = compare(&model, &motions, &JOINTS, &friction_candidates(&options), 4);
+    assert_eq!(found.err(), Some(IdentError::Cancelled));
+    let found = fit(&model, &motions, &JOINTS, &options);
+    assert_eq!(found.err(), Some(IdentError::Cancelled));
 }

@@ -38,6 +38,8 @@ struct Summary {
     run_s: f64,
     rms_error_m: f64,
     max_error_m: f64,
+    /// Root mean square error that the rule allows, see [`scenario::allowed_error_m`].
+    allowed_error_m: f64,
     fault: Option<String>,
     derived: Vec<Setting>,
     warnings: Vec<String>,
@@ -137,16 +139,18 @@ fn first_run<const N: usize>(completed: &Completed) -> Result<Summary, Failure> 
             .iter()
             .find(|joint| joint.name == arm.joint_names()[i])
     };
+    let tip_weight_n = tip_weight_n::<N>(arm)?;
     Ok(Summary {
         arm: arm.name().to_owned(),
         folder: PathBuf::new(),
         tip: arm.settings().tip_frame.clone(),
         joints: arm.joint_names().to_vec(),
         held: names(&|i| of_joint(i).is_some_and(|joint| joint.held.is_some())),
-        tip_weight_n: tip_weight_n::<N>(arm)?,
+        tip_weight_n,
         run_s: RUN_S,
         rms_error_m: found.rms_error_m,
         max_error_m: found.max_error_m,
+        allowed_error_m: scenario::allowed_error_m(tip_weight_n),
         fault: found.ended.map(|ended| ended.fault),
         derived: completed
             .derived
@@ -251,9 +255,11 @@ fn text(summary: &Summary) -> String {
         Some(fault) => format!("it ended with a fault: {fault}"),
     };
     lines.push(format!(
-        "simulated {} s of the sinusoid at 5 N/m, model 0.1 % and 3 % off: {:.1} mm RMS, {:.1} mm at most, {ending}",
+        "simulated {} s of the sinusoid at 5 N/m, model 0.1 % and 3 % off: {:.1} mm RMS of {:.1} mm allowed, {:.1} mm at most, \
+         {ending}",
         summary.run_s,
         1e3 * summary.rms_error_m,
+        1e3 * summary.allowed_error_m,
         1e3 * summary.max_error_m
     ));
     lines.push(format!(

@@ -335,3 +335,21 @@ fn unread_urdf_elements_are_a_warning_or_an_error_with_strict() {
         assert_one_clear_line(&answer, &["arm.urdf", "<gazebo>", "without strict"]);
     }
 }
+
+#[test]
+fn a_workspace_has_six_numbers() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let design = ["excite", "design", "--arm", "wam4", "--quiet"];
+    for workspace in ["-1,-1,-1,1,1", "-1,-1,-1,1,1,1,1"] {
+        let answer = run_in(
+            folder.path(),
+            &[&design[..], &["--workspace", workspace]].concat(),
+        );
+        assert_eq!(answer.code, Some(2), "{workspace}: {}", answer.stderr);
+        assert_one_clear_line(&answer, &["--workspace", "6: minimum x, y, z"]);
+    }
+    assert!(tree(folder.path()).is_empty());
+    let six = ["--workspace", "-2,-2,-2,2,2,2", "--candidates", "1"];
+    let answer = run_in(folder.path(), &[&design[..], &six].concat());
+    assert_eq!(answer.code, Some(0), "{}", answer.stderr);
+}

@@ -9,3 +9,4 @@ mod demo;
 mod faults;
 mod hostile;
 mod identification;
+mod new;

@@ -1,7 +1,7 @@
 //! `supple doctor`: checks whether this machine can run the arm in real time, and prints a remedy for each failed
 //! check.
 //!
-//! Read-only: it changes, writes and sends nothing. To look for the Python package it runs `python3`.
+//! Read-only: it changes, writes and sends nothing. To look for the Python package it runs the interpreter.
 
 mod checks;
 mod machine;
@@ -13,6 +13,7 @@ use serde::Serialize;
 use std::path::Path;
 use supple_cli::console::{print_json, print_line};
 use supple_cli::exit::Failure;
+use supple_cli::sibling::python;
 
 /// Results of all checks.
 #[derive(Debug, Serialize)]
@@ -28,7 +29,7 @@ struct Report {
 /// [`Failure::NotReady`] if a check failed; warnings do not count.
 pub fn run(as_json: bool) -> Result<(), Failure> {
     let mut checks = checks::all(&Machine::new(Path::new("/")));
-    checks.push(python::check("python3"));
+    checks.push(python::check(&python().display().to_string()));
     let failed: Vec<_> = checks
         .iter()
         .filter(|check| check.verdict == Verdict::Fail)

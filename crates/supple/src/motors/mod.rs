@@ -23,7 +23,7 @@ use supple_model::{BusDescription, BusMotor};
 /// # Errors
 /// [`Failure`]: an arm without `[bus]`, a bus that cannot be used, a register that is not set, motors that do not fit.
 pub fn run(args: &MotorsArgs) -> Result<(), Failure> {
-    let description = arms::find(&args.arm, args.strict)?;
+    let description = arms::find(&args.urdf.name(&args.arm), args.strict)?;
     let Some(described) = description.bus() else {
         let problem = format!(
             "arm `{}` has no [bus] in its TOML; `supple motors` knows arms of Damiao motors, such as openarm and yam",

@@ -49,6 +49,12 @@ struct Answer {
     cycle: u64,
 }
 
+/// Result of `supple stop`, as `--json` prints it: the prefix of the system that has been told to shut down.
+#[derive(Serialize)]
+struct Stopping<'a> {
+    stopping: &'a str,
+}
+
 /// Connects to the system and waits for its telemetry.
 ///
 /// # Errors
@@ -375,7 +381,12 @@ fn follow(
 pub fn stop(system: &SystemArgs) -> Result<(), Failure> {
     let domain = Domain::new(system.prefix.as_deref()).map_err(Failure::system)?;
     if stop_running(&domain)? {
-        return Ok(());
+        return match system.json {
+            true => print_json(&Stopping {
+                stopping: domain.prefix(),
+            }),
+            false => Ok(()),
+        };
     }
     Err(Failure::NotRunning {
         prefix: domain.prefix().to_owned(),
@@ -400,5 +411,28 @@ fn print_mode(system: &SystemArgs, mode: Option<Mode>, cycle: u64) -> Result<(),
     match mode {
         Some(Mode::Fault) => Err(Failure::SystemInFault),
         _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::axes;
+    use supple_cli::exit::Failure;
+
+    const NOW: [f64; 3] = [1.0, 2.0, 3.0];
+
+    #[test]
+    fn gains_are_one_value_or_one_per_axis() {
+        let read = |given: &[f64]| axes("--stiffness", given, NOW).map(<[f64; 3]>::from);
+        assert_eq!(read(&[]).expect("what is in force"), NOW);
+        assert_eq!(read(&[7.0]).expect("all axes"), [7.0; 3]);
+        assert_eq!(read(&[7.0, 8.0, 9.0]).expect("by axis"), [7.0, 8.0, 9.0]);
+        for given in [&[7.0, 8.0][..], &[7.0, 8.0, 9.0, 10.0]] {
+            let refused = read(given).expect_err("neither one nor three");
+            assert!(
+                matches!(refused, Failure::ValueCount { option: "--stiffness", found, .. } if found == given.len()),
+                "{refused}"
+            );
+        }
     }
 }

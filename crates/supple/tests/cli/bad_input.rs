@@ -75,6 +75,9 @@ fn numbers_out_of_range_are_code_2_with_their_range() {
         (&gains, "--damping", "nan"),
         (&gains, "--ramp", "1e300"),
         (&["track", "sinusoid"], "--speed", "1e300"),
+        (&["track", "arc"], "--speed", "0"),
+        (&["track", "arc"], "--speed", "nan"),
+        (&["track", "arc"], "--speed", "-1"),
     ] {
         let value = format!("{option}={value}");
         let answer = run_in(folder.path(), &[command, &[value.as_str()]].concat());
@@ -125,5 +128,56 @@ fn unread_urdf_elements_are_a_warning_or_an_error_with_strict() {
         let answer = run_in(folder.path(), &[command, &["--strict"]].concat());
         assert_eq!(answer.code, Some(3), "{command:?}: {}", answer.stderr);
         assert_one_clear_line(&answer, &["arm.urdf", "<gazebo>", "without strict"]);
+    }
+}
+
+/// The writer of a log renames it when it is complete; a killed one leaves the part.
+#[test]
+fn a_log_whose_writer_was_killed_is_found_beside_its_name() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("run.mcap.part"), "cut").expect("written");
+    for command in ["info", "replay", "export"] {
+        let answer = run_in(folder.path(), &["log", command, "run.mcap"]);
+        let words = ["run.mcap.part", "supple log recover"];
+        assert_one_clear_line(&answer, &words);
+        assert_eq!(answer.code, Some(6), "{command}: {}", answer.stderr);
+    }
+}
+
+/// The tip of a URDF can be named wherever the arm can.
+#[test]
+fn a_tip_that_a_urdf_does_not_have_is_code_3() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let built_in = Description::asset("wam4").expect("built in");
+    fs::write(folder.path().join("robot.urdf"), built_in.urdf()).expect("written");
+    for command in [
+        &["probe"][..],
+        &["motors"],
+        &["view"],
+        &["track", "arc"],
+        &["play", "a.csv"],
+        &["up", "--plant", "sim"],
+        &["drill"],
+    ] {
+        let arm = ["--arm", "robot.urdf", "--tip", "no_such_link"];
+        let answer = run_in(folder.path(), &[command, &arm].concat());
+        assert_eq!(answer.code, Some(3), "{command:?}: {}", answer.stderr);
+        assert_one_clear_line(&answer, &["robot.urdf", "no_such_link"]);
+    }
+}
+
+#[test]
+fn with_json_errors_of_operator_commands_are_objects_on_standard_output() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for command in [
+        &["stop"][..],
+        &["pendant", "status"],
+        &["log", "export", "none.mcap", "--out", "none.csv"],
+    ] {
+        let answer = run_in(folder.path(), &[command, &["--json"]].concat());
+        let object: serde_json::Value = serde_json::from_str(&answer.stdout)
+            .unwrap_or_else(|error| panic!("{command:?}: {error}"));
+        let code = object["error"]["exit_code"].as_i64();
+        assert_eq!(code, answer.code.map(i64::from), "{command:?}: {object}");
     }
 }

@@ -208,11 +208,41 @@ fn the_doctor_lists_every_check_and_its_exit_code_matches() {
         "governor",
         "isolation",
         "can",
+        "python",
     ] {
         assert!(names.contains(&name), "{name} in {names:?}");
     }
     let text = run(&["doctor"]).stdout;
     for name in names {
         assert!(text.contains(name), "{name} in {text}");
+    }
+}
+
+/// Below the definitions for other readers of the format a page begins with its title.
+#[test]
+fn every_manual_page_begins_with_its_title() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let pages = folder.path().join("man1");
+    let answer = run(&["man", support::arg(&pages), "--json"]);
+    assert_eq!(answer.code, Some(0), "{}", answer.stderr);
+    let written: Vec<std::path::PathBuf> = serde_json::from_str(&answer.stdout).expect("JSON");
+    assert_eq!(written.len(), support::tree(&pages).len());
+    for name in ["supple.1", "supple-up.1", "supple-log-info.1"] {
+        assert!(written.contains(&pages.join(name)), "{name} in {written:?}");
+    }
+    for page in written {
+        let text = std::fs::read_to_string(&page).expect("a page");
+        let first = text
+            .lines()
+            .find(|line| !line.starts_with(".ie") && !line.starts_with(".el"));
+        let name = page
+            .file_stem()
+            .and_then(|name| name.to_str())
+            .expect("text");
+        let title = format!(".TH {name} 1");
+        assert!(
+            first.is_some_and(|line| line.starts_with(&title)),
+            "{first:?} in {name}"
+        );
     }
 }
