@@ -123,7 +123,7 @@ impl Problem {
     fn normal(
         &self,
         log_scale: &DVector<f64>,
-        noise: &mut Vec<f64>,
+        noise: &mut [f64],
     ) -> Result<(DVector<f64>, DMatrix<f64>), IdentError> {
         let joints = self.blocks.len();
         let unknowns = self.prior.len();
