@@ -8,17 +8,18 @@
 //! of torques already on the way.
 
 use crate::support::property::{Outcome, check};
+use crate::support::rig::probe_at;
 use proptest::prelude::*;
 use std::collections::VecDeque;
 use supple_core::config::{
     ApparentInertia, Collision, FrictionVelocity, Gains, JointGains, JointNames, Law, Limits,
     PlausibilityLimits, PoseLaw, Role, Workspace,
 };
-use supple_core::controller::{Fault, Mode, Request, SafeAction, State, step};
+use supple_core::controller::{Breakaway, Fault, Mode, Request, SafeAction, State, step};
 use supple_core::dynamics::{aba, gravity, jacobian, kinetic_energy, tip_pose};
 use supple_core::learned::LearnedTerms;
 use supple_core::math::Vector3;
-use supple_core::trajectory::{Rotation, Trajectory};
+use supple_core::trajectory::{Fourier, Line, Rotation, Trajectory};
 use supple_core::{
     Arm, Body, Config, Controller, Friction, Input, Joint, Matrix, Output, Pose, RippleTable,
     Vector,
@@ -73,7 +74,7 @@ fn case(joints: usize) -> impl Strategy<Value = Case> {
         0.02..0.3,
         prop::collection::vec(-1.8..1.8, joints),
         prop::collection::vec(-4.0..4.0, joints),
-        1..8_u8,
+        1..11_u8,
         defect,
         0..3_usize,
     )
@@ -281,6 +282,24 @@ fn request<const N: usize>(case: &Case, config: &Config<N>, q: &Vector<N>) -> Re
                 duration_s: 1.0,
             },
         },
+        4 => Request::Track(Trajectory::Line(Line {
+            from_m: tip_pose(&config.arm, q).translation,
+            to_m: tip_pose(&config.arm, q).translation + Vector3::new(-0.03, 0.02, 0.04),
+            duration_s: 0.5,
+        })),
+        8 => {
+            let mut series = Fourier::at_rest(*q, 4.0);
+            series.sine_rad[0] = Vector::repeat(0.1);
+            series.duration_s = 2.0;
+            Request::Excite(series)
+        }
+        9 => Request::Breakaway(Breakaway {
+            joint: N - 1,
+            rate_nm_per_s: 2.0,
+            stop_rad: 0.1,
+            limit_nm: 4.0,
+        }),
+        10 => Request::Track(probe_at(&tip_pose(&config.arm, q).translation)),
         _ => Request::Move {
             target_rad: q.map(|angle| angle + 0.2),
             duration_s: 1.0,
