@@ -5,11 +5,13 @@
 //! its cycle, from the pose in which the arm is then; until then the helper keeps it. In virtual time the loop gets it
 //! at once, because requests must not depend on the speed of a thread.
 
-use crate::helper::Pose;
 use crate::request_queue::{QueueFull, RequestQueue};
 use supple_core::codes::request_kind;
 use supple_core::controller::Mode;
-use supple_ipc::message::{OperatorReply, OperatorRequest, Outcome};
+use supple_ipc::message::{MAX_DOF, OperatorReply, OperatorRequest, Outcome};
+
+/// Joint angles, padded for any arm \[rad\].
+pub type Pose = [f64; MAX_DOF];
 
 /// Cycles before its own in which a motion that waits is checked again, and passed to the loop. A check takes
 /// milliseconds, and several motions may be due at once.

@@ -1,7 +1,7 @@
 //! The helper thread: telemetry, requests and replies. It never blocks: separate threads write to the disk and to
 //! standard error.
 
-use crate::deferred::{MotionPlan, StartPose, WaitingMotions, ends_motions};
+use crate::deferred::{MotionPlan, Pose, StartPose, WaitingMotions, ends_motions};
 use crate::error::RtError;
 use crate::fault_file::{FaultFiles, FaultRecorder};
 use crate::learning::Learning;
@@ -28,9 +28,6 @@ const MAX_SET_POINTS_PER_ITERATION: usize = 8;
 const FAULT_FOLDER: &str = "faults";
 /// Maximum time that the shutdown waits for the disk.
 const DISK_TIMEOUT: Duration = Duration::from_secs(2);
-
-/// Joint angles, padded for any arm \[rad\].
-pub type Pose = [f64; MAX_DOF];
 
 /// Checks whether a requested motion is feasible over its whole length, from its start pose if that is known
 /// ([`supple_core::controller::check_motion()`]); otherwise whether its target is. Returns the end pose, if known.

@@ -333,7 +333,11 @@ impl<const N: usize> State<N> {
     /// activity.
     #[inline(always)]
     pub(super) fn blend_torque(&mut self, controller: &Controller<N>, torques: &mut Torques<N>) {
-        if self.fault.is_some() || !self.handover.is_active() {
+        if self.fault.is_some() {
+            return;
+        }
+        if let Some(zeros) = self.handover.ended() {
+            torques.handover = *zeros;
             return;
         }
         let config = controller.config();

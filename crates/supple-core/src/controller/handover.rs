@@ -60,9 +60,9 @@ impl<const N: usize> Handover<N> {
         }
     }
 
-    /// Whether something is to be blended out.
-    pub fn is_active(&self) -> bool {
-        self.active
+    /// What acts if nothing is to be blended out: zeros.
+    pub fn ended(&self) -> Option<&Vector<N>> {
+        (!self.active).then_some(&self.difference_nm)
     }
 
     /// Notes a change of activity.
@@ -107,8 +107,12 @@ impl<const N: usize> Handover<N> {
             None => {}
         }
         if share >= 1.0 {
-            *self = Handover::none();
-            return Vector::zeros();
+            *self = Handover {
+                // Zeros with the sign that blending leads to.
+                difference_nm: self.difference_nm * 0.0,
+                ..Handover::none()
+            };
+            return self.difference_nm;
         }
         let (blended, ..) = smooth_step(share);
         self.last_nm = (self.difference_nm + self.earlier_nm) * (1.0 - blended);

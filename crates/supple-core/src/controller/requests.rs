@@ -48,7 +48,7 @@ impl<const N: usize> State<N> {
                 let Activity::Fault(action) = self.activity else {
                     return Err(Refusal::Mode { mode });
                 };
-                if action == SafeAction::GravityHold {
+                if action == SafeAction::GravityHold && self.drives_active {
                     self.check_at_rest(config)?;
                 }
                 self.fault = None;
