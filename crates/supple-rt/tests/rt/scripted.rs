@@ -135,3 +135,11 @@ impl Bench {
         self.until(Mode::Idle);
     }
 }
+
+impl Drop for Bench {
+    fn drop(&mut self) {
+        // A test that failed leaves no process.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
