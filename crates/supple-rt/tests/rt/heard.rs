@@ -216,27 +216,22 @@ fn a_move_that_waits_is_checked_from_the_pose_in_which_it_begins() {
     let controller = Controller::new(config).expect("valid");
     let mut bench = Bench::start(Stdio::null());
     let home = Vector::from(bench.position_rad);
-    // A move from home that is refused for the speed of the tip alone.
-    let moves = (0..4).flat_map(|joint| [(joint, 1.0), (joint, -1.0)]);
-    let found = moves.flat_map(|(joint, way_rad)| {
-        let mut target_rad = home;
-        target_rad[joint] += way_rad;
-        [2.5, 2.0, 1.7, 1.4, 1.1].map(|duration_s| (joint, way_rad, target_rad, duration_s))
+    // A move from home that is refused for the speed of the tip alone: each joint turns by one radian, or not, and slower
+    // than it may.
+    let to = |code: u32| {
+        let way = |joint: usize| f64::from(code / 3_u32.pow(joint as u32) % 3) - 1.0;
+        Request::Move {
+            target_rad: home + Vector::from_fn(|joint, _| way(joint)),
+            duration_s: 1.1,
+        }
+    };
+    let request = (0..81).map(to).find(|request| {
+        let checked = supple_core::controller::check_motion(&controller, &home, request);
+        checked.is_err_and(|refusal| refusal.to_string().contains("tip speed"))
     });
-    let (joint, way_rad, target_rad, duration_s) = found
-        .into_iter()
-        .find(|(_, _, target_rad, duration_s)| {
-            let request = Request::Move {
-                target_rad: *target_rad,
-                duration_s: *duration_s,
-            };
-            let checked = supple_core::controller::check_motion(&controller, &home, &request);
-            checked.is_err_and(|refusal| refusal.to_string().contains("tip speed"))
-        })
-        .expect("a move with a fast tip");
-    let request = Request::Move {
-        target_rad,
-        duration_s,
+    let request = request.expect("a move with a fast tip");
+    let Request::Move { target_rad, .. } = request else {
+        panic!("{request:?}");
     };
     // From its target it is no motion at all.
     bench.position_rad = target_rad.into();
@@ -251,7 +246,8 @@ fn a_move_that_waits_is_checked_from_the_pose_in_which_it_begins() {
     // The arm is moved by hand meanwhile, without torque.
     bench.drives = Drives::Idle;
     for k in 1..=200 {
-        bench.position_rad[joint] = target_rad[joint] - way_rad * f64::from(k) / 200.0;
+        let share = f64::from(k) / 200.0;
+        bench.position_rad = (target_rad + (home - target_rad) * share).into();
         bench.cycle();
     }
     bench.run(50);
