@@ -146,7 +146,8 @@ impl WaitingMotions {
     /// idle.
     pub fn is_ended_by(&mut self, mode: Option<Mode>, fault: bool) -> bool {
         let latched = fault && !self.fault;
-        let idle = mode == Some(Mode::Idle) && self.mode != mode;
+        // Before the first cycle the controller is idle already.
+        let idle = mode == Some(Mode::Idle) && !matches!(self.mode, None | Some(Mode::Idle));
         (self.fault, self.mode) = (fault, mode);
         latched || idle
     }
@@ -272,6 +273,7 @@ mod tests {
     #[test]
     fn a_fault_and_idle_end_what_waits_once() {
         let mut waiting = WaitingMotions::default();
+        assert!(!waiting.is_ended_by(Some(Mode::Idle), false));
         assert!(!waiting.is_ended_by(Some(Mode::Move), false));
         assert!(waiting.is_ended_by(Some(Mode::Fault), true));
         assert!(!waiting.is_ended_by(Some(Mode::Fault), true));
