@@ -30,6 +30,8 @@ class Outcome:
     """What failed."""
     skipped: str | None = None
     """Why it was not tried."""
+    took_s: float = 0.0
+    """How long it took (s)."""
 
     @property
     def name(self) -> tuple[str, str]:
@@ -46,7 +48,7 @@ class Outcome:
     def line(self) -> str:
         """For a terminal."""
         results = "; ".join(f"{step} {result}" for step, result in self.found.items())
-        return f"{'#'.join(self.name):44} {self.verdict()}; {results}"
+        return f"{'#'.join(self.name):44} {self.verdict()}; {results}; {self.took_s:.0f} s"
 
 
 def write(file: Path, outcomes: list[Outcome]) -> None:
