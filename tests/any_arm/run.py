@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import subprocess
 import sys
 import tempfile
@@ -99,7 +100,7 @@ def up(programs: Path, case: Case, out: Path, number: int) -> str:
     """Tracks on processes; returns how well."""
     done = command(
         [str(programs / "supple"), "up", "--plant", "sim", "--virtual-time", "--for", str(TRACKED_S), "--json"]
-        + ["--arm", case.name, "--prefix", f"any_arm_{number}_", "--log", str(out / "up.mcap")]
+        + ["--arm", case.name, "--prefix", f"any_arm_{os.getpid()}_{number}_", "--log", str(out / "up.mcap")]
     )
     found = json.loads(done.stdout)
     if found["faults"]:
