@@ -158,8 +158,8 @@ def test_an_interrupted_identification_stops_computing():
 
 def test_representations_are_short():
     rng = np.random.default_rng(0)
-    q, qd, qdd = rng.normal(size=(3, 200, ARM.dof))
-    fit = supple.identify(ARM, 0.02 * np.arange(200), q, ARM.rnea(q, qd, qdd), qd, qdd, method="ols", friction="none")
+    q, qd, qdd = rng.normal(size=(3, 2000, ARM.dof))
+    fit = supple.identify(ARM, 0.02 * np.arange(2000), q, ARM.rnea(q, qd, qdd), qd, qdd, method="ols", friction="none")
     assert repr(fit).startswith("<Fit of wam4") and len(repr(fit)) < 160
     assert len(repr(supple.Payload.ball(1.0, 0.05, [0.0, 0.0, 0.1]))) < 80
     assert len(repr(supple.sweep(lambda p, s: p, range(1000), seed=0))) < 80

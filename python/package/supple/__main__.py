@@ -58,7 +58,7 @@ def _run(spec: Spec, options: argparse.Namespace) -> Sweep[dict[str, object], di
             return sweep(spec.run, tasks, seed=spec.seed, executor=executor, progress=report, results=options.results)
     with (
         distributed.LocalCluster(
-            n_workers=options.workers, threads_per_worker=1, host="127.0.0.1", dashboard_address=None
+            n_workers=options.workers, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0"
         ) as cluster,
         distributed.Client(cluster) as client,
     ):
