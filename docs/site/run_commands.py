@@ -30,7 +30,7 @@ from pages import FIGURE, NOT_CHECKED, ROOT, Code, blocks, pages, read
 TIMEOUT_S = 300
 HELPERS = Path(__file__).with_name("helpers.sh")
 # What may keep a command from being run by a test.
-NEEDS = ("arm", "root", "build", "viewer", "minutes", "clock")
+NEEDS = ("arm", "root", "build", "viewer", "minutes", "clock", "cluster")
 
 
 def main() -> int:

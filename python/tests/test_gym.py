@@ -47,3 +47,20 @@ def test_wrong_arguments_are_named():
     env.reset(seed=0)
     with pytest.raises(ValueError, match=r"action: expected shape \(3,\)"):
         env.step(np.zeros(2))
+
+
+def test_a_simulated_system_can_be_given_and_is_used_again():
+    import supple.gym
+
+    system = supple.simulated(supple.Arm.load("wam4"), seed=1)
+    env = supple.gym.ReachEnv(system=system, duration_s=0.5)
+    for seed in (1, 2):
+        observation, info = env.reset(seed=seed)
+        assert env.system is system and env.observation_space.contains(observation)
+        # A reset leaves the arm where it is: the goal is near its reference, wherever that is now.
+        reference = system.state.reference_position_m
+        assert np.abs(info["goal_m"] - reference).max() <= 0.05
+        truncated = False
+        while not truncated:
+            _, _, terminated, truncated, info = env.step(np.array([0.3, 0.0, 0.1]))
+            assert not terminated and "refused" not in info, info

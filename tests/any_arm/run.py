@@ -11,17 +11,21 @@ A case passes if
 
 Run it with the interpreter of a virtual environment that has requirements.txt, with `--all` requirements-held-back.txt:
 
-    python tests/any_arm/run.py --programs target/release [--all] [--quick] [--only NAME] [--out FOLDER] [--table FILE]
+    python tests/any_arm/run.py --programs target/release [--all] [--quick] [--only NAME] [--jobs N] [--out FOLDER]
+                                [--table FILE]
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
 import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from cases import REPOSITORY, Case, Missing, chosen
@@ -30,6 +34,8 @@ from table import Outcome, write
 TRACKED_S = 60
 # Of each command, on a busy machine.
 LIMIT_S = 1200
+
+Step = Callable[[Path, Case, Path, int], str]
 
 
 class Failed(Exception):
@@ -52,7 +58,10 @@ def new(programs: Path, case: Case, out: Path, _number: int) -> str:
     """Makes an arm of the URDF; returns its first run."""
     tip = ["--tip", case.tip] if case.tip else []
     repair = ["--repair"] if case.repair else []
-    done = command([str(programs / "supple-report"), "new", case.file, *tip, *repair, "--json", "--out", str(out / "arm")])
+    done = command(
+        [str(programs / "supple-report"), "new", case.file, *tip, *repair]
+        + ["--json", "--force", "--out", str(out / "arm")]
+    )
     found = json.loads(done.stdout)
     rms_m, allowed_m, fault = found["rms_error_m"], found["allowed_error_m"], found["fault"]
     if fault is not None:
@@ -91,7 +100,7 @@ def up(programs: Path, case: Case, out: Path, number: int) -> str:
     """Tracks on processes; returns how well."""
     done = command(
         [str(programs / "supple"), "up", "--plant", "sim", "--virtual-time", "--for", str(TRACKED_S), "--json"]
-        + ["--arm", case.name, "--prefix", f"any_arm_{number}_", "--log", str(out / "up.mcap")]
+        + ["--arm", case.name, "--prefix", f"any_arm_{os.getpid()}_{number}_", "--log", str(out / "up.mcap")]
     )
     found = json.loads(done.stdout)
     if found["faults"]:
@@ -99,33 +108,42 @@ def up(programs: Path, case: Case, out: Path, number: int) -> str:
     return f"{1e3 * found['rms_error_m']:.1f} mm, no fault in {TRACKED_S} s"
 
 
+def attempt(steps: dict[str, Step], programs: Path, case: Case | Missing, results: Path, number: int) -> Outcome:
+    """Tries a case."""
+    if isinstance(case, Missing):
+        return Outcome(case.text, skipped=case.why)
+    out = results / f"{number:02}"
+    out.mkdir(parents=True, exist_ok=True)
+    outcome, since = Outcome(case.text), time.monotonic()
+    for name, step in steps.items():
+        try:
+            outcome.found[name] = step(programs, case, out, number)
+        except (Failed, KeyError, ValueError) as error:
+            outcome.problems.append(f"{name}: {error}")
+    outcome.took_s = time.monotonic() - since
+    return outcome
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--programs", type=Path, default=REPOSITORY / "target" / "release")
     parser.add_argument("--all", action="store_true", help="also the cases that are held back")
     parser.add_argument("--quick", action="store_true", help="leave out the demo")
+    parser.add_argument("--jobs", type=int, default=2, help="cases at a time")
     parser.add_argument("--only", default="", help="cases whose path contains this")
     parser.add_argument("--out", type=Path, help="keep the results here")
     parser.add_argument("--table", type=Path, help="write the results as Markdown")
     options = parser.parse_args()
-    steps = {"new": new, "up": up} if options.quick else {"new": new, "demo": demo, "up": up}
+    steps: dict[str, Step] = {"new": new, "up": up} if options.quick else {"new": new, "demo": demo, "up": up}
     outcomes: list[Outcome] = []
-    with tempfile.TemporaryDirectory() as folder:
-        for number, case in enumerate(chosen(options.all, options.only)):
-            if isinstance(case, Missing):
-                outcomes.append(Outcome(case.text, skipped=case.why))
-                print(outcomes[-1].line(), flush=True)
-                continue
-            out = (options.out or Path(folder)) / f"{number:02}"
-            out.mkdir(parents=True, exist_ok=True)
-            outcome, since = Outcome(case.text), time.monotonic()
-            for name, step in steps.items():
-                try:
-                    outcome.found[name] = step(options.programs, case, out, number)
-                except (Failed, KeyError, ValueError) as error:
-                    outcome.problems.append(f"{name}: {error}")
+    with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(options.jobs) as pool:
+        results = options.out or Path(folder)
+        for outcome in pool.map(
+            lambda item: attempt(steps, options.programs, item[1], results, item[0]),
+            enumerate(chosen(options.all, options.only)),
+        ):
             outcomes.append(outcome)
-            print(f"{outcome.line()}; {time.monotonic() - since:.0f} s", flush=True)
+            print(outcome.line(), flush=True)
     tried = [outcome for outcome in outcomes if outcome.skipped is None]
     passed = sum(not outcome.problems for outcome in tried)
     print(f"{passed} of {len(tried)} arms, {len(outcomes) - len(tried)} skipped")

@@ -30,6 +30,8 @@ class Outcome:
     """What failed."""
     skipped: str | None = None
     """Why it was not tried."""
+    took_s: float = 0.0
+    """How long it took (s)."""
 
     @property
     def name(self) -> tuple[str, str]:
@@ -46,7 +48,7 @@ class Outcome:
     def line(self) -> str:
         """For a terminal."""
         results = "; ".join(f"{step} {result}" for step, result in self.found.items())
-        return f"{'#'.join(self.name):44} {self.verdict()}; {results}"
+        return f"{'#'.join(self.name):44} {self.verdict()}; {results}; {self.took_s:.0f} s"
 
 
 def write(file: Path, outcomes: list[Outcome]) -> None:
@@ -57,4 +59,5 @@ def write(file: Path, outcomes: list[Outcome]) -> None:
         results = [outcome.found.get(step, "-") for step in STEPS]
         rows.append("| " + " | ".join([urdf, tip.replace(",", ", --"), *results, outcome.verdict()]) + " |")
     passed = sum(outcome.verdict() == "OK" for outcome in outcomes)
-    file.write_text(HEADING + "\n".join(rows) + f"\n\n{passed} of {len(outcomes)} pass.\n")
+    left_out = "" if any("demo" in outcome.found for outcome in outcomes) else "\nThe demo was left out (`--quick`).\n"
+    file.write_text(HEADING + "\n".join(rows) + f"\n\n{passed} of {len(outcomes)} pass.\n{left_out}")

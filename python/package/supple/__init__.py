@@ -20,7 +20,7 @@ from supple._log import Log, Truth, read_log
 from supple._native import Arm, Friction, __version__, assets
 from supple._plant import plant_options
 from supple._simulate import Run, simulate
-from supple._sweep import Sweep, sweep
+from supple._sweep import Failed, Sweep, sweep
 
 __all__ = [
     "Answer",
@@ -28,6 +28,7 @@ __all__ = [
     "BaseParameters",
     "DataWarning",
     "Excitation",
+    "Failed",
     "Fit",
     "Friction",
     "FrictionColumns",

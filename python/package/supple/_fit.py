@@ -348,6 +348,9 @@ class Fit:
         """The nominal arm, which gives kinematics and undetermined parameters."""
         return self._fit.arm_given()
 
+    def __repr__(self) -> str:
+        return f"<Fit of {self._summary()}>"
+
     def _repr_html_(self) -> str:
         joints = self.arm_given.joint_names
         residuals = [

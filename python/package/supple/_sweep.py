@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor, Future
+from concurrent.futures import BrokenExecutor, Executor, Future, as_completed
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Generic, TypeVar, overload
 
@@ -12,6 +13,7 @@ import numpy as np
 from supple._check import integer
 from supple._frames import table
 from supple._progress import bar
+from supple._results import Results
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -19,7 +21,19 @@ if TYPE_CHECKING:
 P = TypeVar("P")
 R = TypeVar("R")
 
-__all__ = ["Sweep", "sweep"]
+__all__ = ["Failed", "Sweep", "sweep"]
+
+
+@dataclass(frozen=True)
+class Failed(Generic[P]):
+    """A task of :func:`sweep` that raised an exception."""
+
+    parameter: P
+    """Its parameter."""
+    seed: int
+    """Its seed."""
+    error: str
+    """The exception, with its type."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +49,8 @@ class Sweep(Sequence[R], Generic[P, R]):
     """Seed of each task, all distinct: ``function(parameters[i], seeds[i])`` gives ``results[i]``."""
     results: tuple[R, ...]
     """Result of each task."""
+    failures: tuple[Failed[P], ...] = ()
+    """Tasks that failed, which are not among the above; only with ``results``, otherwise the first one is raised."""
 
     @overload
     def __getitem__(self, index: int) -> R: ...
@@ -50,7 +66,8 @@ class Sweep(Sequence[R], Generic[P, R]):
         return iter(self.results)
 
     def __repr__(self) -> str:
-        return f"<Sweep of {len(self)} results>"
+        failed = f", {len(self.failures)} failed" if self.failures else ""
+        return f"<Sweep of {len(self)} results{failed}>"
 
     def to_pandas(self) -> pd.DataFrame:
         """One row per task: ``parameter``, ``seed``, ``result``. Needs pandas.
@@ -84,6 +101,7 @@ def sweep(
     seed: int,
     executor: Executor | None = None,
     progress: Callable[[int, int], None] | bool | None = None,
+    results: str | os.PathLike[str] | None = None,
 ) -> Sweep[P, R]:
     """Call ``function(parameter, seed)`` for every parameter, with a seed spawned for each.
 
@@ -104,6 +122,11 @@ def sweep(
         thread, in order.
     progress : callable or bool, optional
         Called as ``progress(done, total)`` after each task; True shows a bar (needs tqdm).
+    results : path, optional
+        Folder for the results, Parquet, a row for each task with its seed (needs pyarrow). Tasks that it has are not run
+        again: a sweep that was ended goes on, and one with more parameters runs the new ones. A task that fails is listed
+        (:attr:`Sweep.failures`, column ``error``), the others go on, and the next call runs it again. Results are numbers,
+        text, lists of them, or mappings of those; a worker of a Dask cluster that is killed loses nothing.
 
     Returns
     -------
@@ -117,7 +140,7 @@ def sweep(
     ValueError
         If the seed is negative.
     Exception
-        The first exception of a task, or KeyboardInterrupt; tasks that have not started are cancelled. What is
+        Without ``results`` the first exception of a task, or KeyboardInterrupt; tasks that have not started are cancelled. What is
         finished is not lost: the exception's attribute ``sweep`` is a :class:`Sweep` of it.
 
     Examples
@@ -138,26 +161,29 @@ def sweep(
         int(child.generate_state(1, np.uint64)[0] >> np.uint64(1))
         for child in np.random.SeedSequence(seed).spawn(len(given))
     )
-    results: list[R] = []
+    if results is not None:
+        store = Results(results, _name(function))
+        return _stored(function, given, seeds, executor, report, store)
+    found: list[R] = []
     if executor is None:
         try:
             for parameter, task_seed in zip(given, seeds, strict=True):
-                results.append(function(parameter, task_seed))
+                found.append(function(parameter, task_seed))
                 if report is not None:
-                    report(len(results), len(given))
+                    report(len(found), len(given))
         except BaseException as error:
-            _keep(error, Sweep(given[: len(results)], seeds[: len(results)], tuple(results)), len(given))
+            _keep(error, Sweep(given[: len(found)], seeds[: len(found)], tuple(found)), len(given))
             raise
-        return Sweep(given, seeds, tuple(results))
+        return Sweep(given, seeds, tuple(found))
     futures: list[Future[R]] = [
         executor.submit(function, parameter, task_seed)
         for parameter, task_seed in zip(given, seeds, strict=True)
     ]
     try:
         for future in futures:
-            results.append(future.result())
+            found.append(future.result())
             if report is not None:
-                report(len(results), len(given))
+                report(len(found), len(given))
     except BaseException as error:
         for future in futures:
             future.cancel()
@@ -176,7 +202,70 @@ def sweep(
             len(given),
         )
         raise
-    return Sweep(given, seeds, tuple(results))
+    return Sweep(given, seeds, tuple(found))
+
+
+def _name(function: Callable[..., object]) -> str:
+    """Name of a function, without its module: that differs where it is defined in a program or a notebook."""
+    inner = getattr(function, "func", function)
+    return str(getattr(inner, "__qualname__", type(inner).__qualname__))
+
+
+def _stored(
+    function: Callable[[P, int], R],
+    given: tuple[P, ...],
+    seeds: tuple[int, ...],
+    executor: Executor | None,
+    report: Callable[[int, int], None] | None,
+    store: Results,
+) -> Sweep[P, R]:
+    """As :func:`sweep`, with the results in a folder."""
+    parameters = dict(zip(seeds, given, strict=True))
+    found: dict[int, R] = store.finished(parameters)
+    errors: dict[int, str] = {}
+    tasks = [seed for seed in seeds if seed not in found]
+
+    def finish(seed: int, outcome: Callable[[], R]) -> None:
+        try:
+            result = outcome()
+            store.add(seed, parameters[seed], result)
+        except Exception as error:
+            errors[seed] = f"{type(error).__name__}: {error}"
+            store.fail(seed, parameters[seed], errors[seed])
+        else:
+            found[seed] = result
+        if report is not None:
+            report(len(found) + len(errors), len(given))
+
+    def result() -> Sweep[P, R]:
+        done = [seed for seed in seeds if seed in found]
+        failures = (Failed(parameters[seed], seed, errors[seed]) for seed in seeds if seed in errors)
+        return Sweep(
+            tuple(parameters[seed] for seed in done),
+            tuple(done),
+            tuple(found[seed] for seed in done),
+            tuple(failures),
+        )
+
+    futures: dict[Future[R], int] = {}
+    try:
+        if executor is None:
+            for seed in tasks:
+                finish(seed, lambda seed=seed: function(parameters[seed], seed))  # type: ignore[misc]
+        else:
+            futures = {executor.submit(function, parameters[seed], seed): seed for seed in tasks}
+            for future in as_completed(futures):
+                if isinstance(broken := future.exception(), BrokenExecutor):
+                    raise broken
+                finish(futures[future], future.result)
+    except BaseException as error:
+        for future in futures:
+            future.cancel()
+        _keep(error, result(), len(given))
+        raise
+    finally:
+        store.write()
+    return result()
 
 
 def _keep(error: BaseException, finished: Sweep[P, R], total: int) -> None:
