@@ -25,6 +25,9 @@ use supple_core::friction;
 ///     Torque that does not depend on the velocity (N m). Default 0.
 /// band_rad_per_s : float
 ///     ``delta`` (rad/s), positive. Default 0.01.
+/// presliding_rad : float
+///     Travel over which dry friction turns round after a reversal (rad), zero or more. Default 0: its direction is
+///     that of the velocity.
 ///
 /// Raises
 /// ------
@@ -54,8 +57,10 @@ impl Friction {
         stribeck_rad_per_s = friction::Friction::NONE.stribeck_rad_per_s,
         offset_nm = 0.0,
         band_rad_per_s = friction::Friction::NONE.band_rad_per_s,
+        presliding_rad = 0.0,
     ), text_signature = "(*, viscous_nm_s_per_rad=0.0, coulomb_nm=0.0, breakaway_nm=None, \
-        stribeck_rad_per_s=0.05, offset_nm=0.0, band_rad_per_s=0.01)")]
+        stribeck_rad_per_s=0.05, offset_nm=0.0, band_rad_per_s=0.01, \
+        presliding_rad=0.0)")]
     fn new(
         viscous_nm_s_per_rad: f64,
         coulomb_nm: f64,
@@ -63,6 +68,7 @@ impl Friction {
         stribeck_rad_per_s: f64,
         offset_nm: f64,
         band_rad_per_s: f64,
+        presliding_rad: f64,
     ) -> PyResult<Self> {
         let inner = friction::Friction {
             viscous_nm_s_per_rad,
@@ -71,6 +77,7 @@ impl Friction {
             stribeck_rad_per_s,
             offset_nm,
             band_rad_per_s,
+            presliding_rad,
         };
         inner
             .validate()
@@ -100,6 +107,12 @@ impl Friction {
     #[getter]
     fn stribeck_rad_per_s(&self) -> f64 {
         self.inner.stribeck_rad_per_s
+    }
+
+    /// Travel over which dry friction turns round after a reversal (rad).
+    #[getter]
+    fn presliding_rad(&self) -> f64 {
+        self.inner.presliding_rad
     }
 
     /// Torque that does not depend on the velocity (N m).
@@ -133,12 +146,28 @@ impl Friction {
 
     /// Constructor for pickles: viscous, Coulomb, breakaway, Stribeck speed, offset, band.
     #[staticmethod]
-    fn _of(values: [f64; 6]) -> PyResult<Self> {
-        let [viscous, coulomb, breakaway, stribeck, offset, band] = values;
-        Self::new(viscous, coulomb, Some(breakaway), stribeck, offset, band)
+    fn _of(values: [f64; 7]) -> PyResult<Self> {
+        let [
+            viscous,
+            coulomb,
+            breakaway,
+            stribeck,
+            offset,
+            band,
+            presliding,
+        ] = values;
+        Self::new(
+            viscous,
+            coulomb,
+            Some(breakaway),
+            stribeck,
+            offset,
+            band,
+            presliding,
+        )
     }
 
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, ([f64; 6],))> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, ([f64; 7],))> {
         let f = &self.inner;
         let rebuild = py.get_type::<Self>().getattr("_of")?;
         let values = [
@@ -148,6 +177,7 @@ impl Friction {
             f.stribeck_rad_per_s,
             f.offset_nm,
             f.band_rad_per_s,
+            f.presliding_rad,
         ];
         Ok((rebuild, (values,)))
     }
@@ -156,13 +186,14 @@ impl Friction {
         let f = &self.inner;
         format!(
             "Friction(viscous_nm_s_per_rad={}, coulomb_nm={}, breakaway_nm={}, \
-             stribeck_rad_per_s={}, offset_nm={}, band_rad_per_s={})",
+             stribeck_rad_per_s={}, offset_nm={}, band_rad_per_s={}, presliding_rad={})",
             f.viscous_nm_s_per_rad,
             f.coulomb_nm,
             f.breakaway_nm,
             f.stribeck_rad_per_s,
             f.offset_nm,
-            f.band_rad_per_s
+            f.band_rad_per_s,
+            f.presliding_rad
         )
     }
 }

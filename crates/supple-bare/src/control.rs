@@ -112,6 +112,7 @@ fn config<const N: usize>(arm: Arm<N>) -> Config<N> {
         joint_from_motor,
         ripple: [ripple(); N],
         learned: LearnedTerms::zero(),
+        compliance_rad_per_nm: Vector::zeros(),
         period_s: PERIOD_S,
         estimator_rad_per_s: 200.0,
         law: Law {

@@ -348,6 +348,9 @@ pub struct Config<const N: usize> {
     /// What was learned of the model before: the terms in force at the start. Within
     /// [`LearnedBounds`](crate::learned::LearnedBounds).
     pub learned: LearnedTerms<N>,
+    /// Compliance between the encoder of each joint and its link, zero or more \[rad/(N m)\]: under the model's gravity
+    /// torque `G` the link's angle is the measured one minus this times `G`.
+    pub compliance_rad_per_nm: Vector<N>,
     /// Cycle period \[s\], positive.
     pub period_s: f64,
     /// Bandwidth of the velocity estimator \[rad/s\], positive.

@@ -21,8 +21,8 @@ use supple_core::ripple::{Harmonic, compensation_nm};
 use supple_core::{Config, RippleTable, Vector};
 use supple_ident::design::{DesignOptions, ExcitationDesign, design};
 use supple_ident::{
-    Fit, FrictionChoice, FrictionColumns, Log, Motion, Preparation, Procedure, RippleSearch,
-    Validation, fit_ripple, fit_with_stribeck,
+    Effects, Fit, FrictionChoice, FrictionColumns, Log, Motion, Preparation, Procedure,
+    RippleSearch, Validation, fit_ripple, fit_with_stribeck,
 };
 use supple_model::{Description, IdentifiedModel};
 use supple_plant::{LuGre, PlantConfig, PlantOptions, Ripple};
@@ -245,6 +245,9 @@ pub fn calibrate<const N: usize>(
     let (held_out, _) = Motion::prepare(&unrippled, N, &joints, &fit.preparation)?;
     let validation = fit.validate_motion(&held_out)?;
     let described = fit.description(description, Some(&ripple))?;
+    let described = described.with_compliance(&fit.compliance_rad_per_nm())?;
+    let learned = fit.learned(&described.config::<N>()?);
+    let described = described.with_learned(&learned, "identified with the model")?;
     let thresholds = fit.move_collision_nm(core::slice::from_ref(&validation), &nominal);
     let described = described.with_move_collision(&thresholds)?;
     let truth = model_accuracy(&described.config::<N>()?, &plant, calibration.seed);
@@ -320,6 +323,7 @@ pub fn identify_with<const N: usize>(
         friction: FrictionChoice::Columns(columns),
         slow_rad_per_s,
         prior_weight: Some(1e-2),
+        effects: Effects::all(&motor_from_joint),
         ..Procedure::default()
     };
     let fine = preparation(start.period_s, CUTOFF_HZ.1);

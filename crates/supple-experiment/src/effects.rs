@@ -269,11 +269,23 @@ pub fn free_motion<const N: usize>(
     setup: &Setup<N>,
     learning: bool,
 ) -> Result<FreeMotion, ExperimentError> {
+    free_motion_at(setup, scenario::STIFFNESS_N_PER_M, learning)
+}
+
+/// As [`free_motion`] at another stiffness.
+///
+/// # Errors
+/// As [`free_motion`].
+pub fn free_motion_at<const N: usize>(
+    setup: &Setup<N>,
+    stiffness_n_per_m: f64,
+    learning: bool,
+) -> Result<FreeMotion, ExperimentError> {
     let mut false_latches = 0;
     let learning_s = if learning { LEARNING_S } else { 0.0 };
     let mut track = |name: &str, (trajectory, duration_s): (Trajectory, f64)| {
         let mut config = setup.config(&Variant::EXACT)?;
-        config.law.gains = scenario::gains_like(&config.law.gains, scenario::STIFFNESS_N_PER_M);
+        config.law.gains = scenario::gains_like(&config.law.gains, stiffness_n_per_m);
         let plan = Plan {
             name: name.to_owned(),
             config,

@@ -11,6 +11,7 @@
 //! the links, by the nominal model (gear friction grows with load). A coupled motor turns with the sum of two
 //! joints; its torque acts on both.
 
+use crate::effects::Effects;
 use crate::error::{IdentError, positive, shape_error};
 use supple_core::Friction;
 
@@ -92,6 +93,16 @@ pub enum Column {
     CoupledViscous(usize, usize),
     /// Coulomb friction of such a motor.
     CoupledCoulomb(usize, usize),
+    /// Spring over a joint, see [`crate::effects`].
+    Spring(usize),
+    /// Compliance of a joint, in 1e-3 rad/(N m).
+    Compliance(usize),
+    /// Dry friction of a motor that drives several joints, at the joint that it drives fastest.
+    MotorCoulomb(usize),
+    /// Viscous friction of such a motor.
+    MotorViscous(usize),
+    /// Tilt of the base about base axis x (0) or y (1).
+    Tilt(usize),
 }
 
 impl Column {
@@ -99,7 +110,11 @@ impl Column {
     pub fn discontinuous_at_reversal(&self) -> bool {
         matches!(
             self,
-            Column::Coulomb(_) | Column::Stribeck(_) | Column::Load(_) | Column::CoupledCoulomb(..)
+            Column::Coulomb(_)
+                | Column::Stribeck(_)
+                | Column::Load(_)
+                | Column::CoupledCoulomb(..)
+                | Column::MotorCoulomb(_)
         )
     }
 }
@@ -110,6 +125,7 @@ pub struct Columns {
     dof: usize,
     moving: Vec<usize>,
     friction: FrictionColumns,
+    effects: Effects,
     columns: Vec<Column>,
 }
 
@@ -188,8 +204,22 @@ impl Columns {
             dof,
             moving: moving.to_vec(),
             friction,
+            effects: Effects::default(),
             columns,
         })
+    }
+
+    /// The same with the columns of other effects, after all others.
+    #[must_use]
+    pub fn with_effects(mut self, effects: &Effects) -> Self {
+        self.columns.extend(effects.columns(&self.moving));
+        self.effects = effects.clone();
+        self
+    }
+
+    /// Other effects than friction.
+    pub fn effects(&self) -> &Effects {
+        &self.effects
     }
 
     /// Number of joints of the arm.
@@ -241,6 +271,11 @@ impl Columns {
             Column::CoupledRotor(a, b) => format!("Ir{a}+{b}"),
             Column::CoupledViscous(a, b) => format!("V{a}+{b}"),
             Column::CoupledCoulomb(a, b) => format!("S{a}+{b}"),
+            Column::Spring(j) => format!("k{j}"),
+            Column::Compliance(j) => format!("C{j}"),
+            Column::MotorCoulomb(m) => format!("S of motor {m}"),
+            Column::MotorViscous(m) => format!("V of motor {m}"),
+            Column::Tilt(axis) => format!("tilt{}", ["x", "y"][axis.min(1)]),
         };
         self.columns.iter().map(name).collect()
     }
@@ -251,7 +286,7 @@ impl Columns {
         let mut forms = Vec::new();
         for (i, column) in self.columns.iter().enumerate() {
             match *column {
-                Column::Link { .. } | Column::Offset(_) => {}
+                Column::Link { .. } | Column::Offset(_) | Column::Tilt(_) => {}
                 Column::Asymmetry(joint) => {
                     let viscous = self.position(Column::Viscous(joint)).map(|v| (v, 1.0));
                     for sign in [1.0, -1.0] {

@@ -4,6 +4,7 @@ use crate::base::{BaseParameters, RANK_TOLERANCE};
 use crate::choice::Choice;
 use crate::columns::{Column, Columns};
 use crate::consistent::{Constraints, solve};
+use crate::effects;
 use crate::error::{IdentError, Warning, shape_error};
 use crate::estimate::{huber_weights, nearest, noise_nm, weighted, weighted_least_squares};
 use crate::joint_rows::JointRows;
@@ -13,9 +14,10 @@ pub use crate::options::{Options, Weights};
 use crate::qr_reduction::ReducedSystem;
 use crate::random::Random;
 use crate::regressor::{joint_rows, rows};
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use supple_core::dynamics::{regressor, regressor_times};
-use supple_core::{Arm, Friction, Vector};
+use supple_core::learned::LearnedTerms;
+use supple_core::{Arm, Config, Friction, Vector};
 
 /// Travel after a reversal from which friction is in steady sliding \[rad\]; bristle deflection is about 1
 /// mrad.
@@ -26,6 +28,9 @@ const MIN_ROWS: usize = 20;
 
 /// Maximum number of reweighting iterations.
 const ROUNDS: usize = 5;
+
+/// Samples that the prior of an effect counts for, as a root: errors of the model are correlated over many samples.
+const EFFECT_PRIOR_WEIGHT: f64 = 50.0;
 
 /// An identified model.
 #[derive(Clone, Debug)]
@@ -53,6 +58,9 @@ pub struct Fit<const N: usize> {
     /// Load \[N m\] of each moving joint at which load-dependent friction best matches load-independent
     /// friction over the fitted samples; zero without load columns.
     pub load_nm: Vec<f64>,
+    /// Travel of each joint of the arm over which its dry friction turns round after a reversal \[rad\]; zero where the
+    /// reversals do not show it, see [`crate::presliding_rad`].
+    pub presliding_rad: Vec<f64>,
     /// Standard deviation of the weighted residuals, corrected for the correlation that the filter introduces.
     spread: f64,
     nominal: Arm<N>,
@@ -75,7 +83,8 @@ pub fn fit<const N: usize>(
         options.rotor,
         options.friction,
         &options.couplings,
-    )?;
+    )?
+    .with_effects(&options.effects);
     let parts = motions
         .iter()
         .map(|motion| joint_rows(nominal, &columns, motion));
@@ -157,11 +166,23 @@ pub fn fit_rows<const N: usize>(
         base_std,
         noise_nm: noise_nm(&blocks, &solution),
         load_nm: loads(&columns, parts),
+        presliding_rad: vec![0.0; N],
         columns,
         x,
         optimality_gap: gap,
         nominal: *nominal,
     })
+}
+
+/// Mean and standard deviation of an effect's column before any motion.
+fn effect_prior(column: &Column) -> Option<(f64, f64)> {
+    match column {
+        Column::Spring(_) => Some((0.0, 0.2)),
+        Column::Compliance(_) => Some((0.33, 0.33)),
+        Column::MotorCoulomb(_) | Column::MotorViscous(_) => Some((0.0, 0.5)),
+        Column::Tilt(_) => Some((0.0, 0.005)),
+        _ => None,
+    }
 }
 
 struct Stage<'a> {
@@ -241,12 +262,28 @@ impl Stage<'_> {
         Ok((x, blocks, noise, gap))
     }
 
+    /// What is known of the effects before any motion, as rows.
+    fn effect_prior(&self) -> DMatrix<f64> {
+        let known = self.used.iter().enumerate().filter_map(|(k, i)| {
+            let (mean, deviation) = effect_prior(&self.columns.list()[*i])?;
+            Some((k, mean, EFFECT_PRIOR_WEIGHT / deviation))
+        });
+        let known: Vec<_> = known.collect();
+        let mut rows = DMatrix::zeros(known.len(), self.used.len() + 1);
+        for (row, (k, mean, weight)) in known.into_iter().enumerate() {
+            rows[(row, k)] = weight;
+            rows[(row, self.used.len())] = weight * mean;
+        }
+        rows
+    }
+
     fn step(
         &self,
         blocks: &[ReducedSystem],
         noise: &[f64],
     ) -> Result<(DVector<f64>, Option<f64>), IdentError> {
-        let stacked = weighted(blocks, noise, self.used.len());
+        let mut stacked = weighted(blocks, noise, self.used.len());
+        stacked.append(&self.effect_prior(), 0);
         let Some(prior_weight) = self.options.consistent_prior_weight else {
             return Ok((nearest(&stacked, &self.prior)?, None));
         };
@@ -340,7 +377,29 @@ impl<const N: usize> Fit<N> {
     /// Friction of every joint of the arm, in the controller's law; load-dependent friction is taken at
     /// [`Fit::load_nm`].
     pub fn friction(&self) -> Vec<Friction> {
-        model::friction(&self.columns, &self.x, &self.load_nm)
+        self.friction_of(&self.x)
+    }
+
+    /// Springs and tilt as terms of a controller with this configuration.
+    pub fn learned(&self, config: &Config<N>) -> LearnedTerms<N> {
+        effects::learned(&self.columns, &|column| self.value(column), config)
+    }
+
+    /// Compliance between encoder and link of each joint \[rad/(N m)\]; zero where it is not identified.
+    pub fn compliance_rad_per_nm(&self) -> [f64; N] {
+        core::array::from_fn(|j| effects::COMPLIANCE_UNIT * self.value(Column::Compliance(j)))
+    }
+
+    pub(crate) fn value(&self, column: Column) -> f64 {
+        self.columns.position(column).map_or(0.0, |i| self.x[i])
+    }
+
+    fn friction_of(&self, x: &DVector<f64>) -> Vec<Friction> {
+        let mut friction = model::friction(&self.columns, x, &self.load_nm);
+        for (friction, presliding_rad) in friction.iter_mut().zip(&self.presliding_rad) {
+            friction.presliding_rad = *presliding_rad;
+        }
+        friction
     }
 
     /// The nominal arm: kinematics and prior.
@@ -395,7 +454,7 @@ impl<const N: usize> Fit<N> {
             for (i, position) in self.base.independent.iter().enumerate() {
                 x[*position] += change[i];
             }
-            let friction = model::friction(&self.columns, &x, &self.load_nm);
+            let friction = self.friction_of(&x);
             match model::arm(&self.nominal, &self.columns, &x) {
                 Ok(arm) if friction.iter().all(|f| f.validate().is_ok()) => {
                     return Ok((arm, friction));

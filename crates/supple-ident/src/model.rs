@@ -61,10 +61,11 @@ pub fn friction(columns: &Columns, x: &DVector<f64>, load_nm: &[f64]) -> Vec<Fri
         row.map_or(0.0, |row| load_nm[row] * value(Column::Load(j)))
     };
     let of_joint = |j: usize| {
-        let coulomb_nm = value(Column::Coulomb(j)) + load(j);
+        let (motor_coulomb_nm, motor_viscous) = motor_friction(columns, x, j);
+        let coulomb_nm = value(Column::Coulomb(j)) + load(j) + motor_coulomb_nm;
         let shape = columns.friction();
         Friction {
-            viscous_nm_s_per_rad: value(Column::Viscous(j)),
+            viscous_nm_s_per_rad: value(Column::Viscous(j)) + motor_viscous,
             coulomb_nm,
             breakaway_nm: coulomb_nm + value(Column::Stribeck(j)),
             stribeck_rad_per_s: shape
@@ -72,9 +73,23 @@ pub fn friction(columns: &Columns, x: &DVector<f64>, load_nm: &[f64]) -> Vec<Fri
                 .unwrap_or(Friction::NONE.stribeck_rad_per_s),
             offset_nm: value(Column::Offset(j)),
             band_rad_per_s: shape.band_rad_per_s,
+            presliding_rad: 0.0,
         }
     };
     (0..columns.dof()).map(of_joint).collect()
+}
+
+/// Coulomb and viscous friction of the motors at a joint that moves alone.
+fn motor_friction(columns: &Columns, x: &DVector<f64>, joint: usize) -> (f64, f64) {
+    let mut sums = (0.0, 0.0);
+    for (column, value) in columns.list().iter().zip(x) {
+        match *column {
+            Column::MotorCoulomb(m) => sums.0 += columns.effects().row(m)[joint].abs() * value,
+            Column::MotorViscous(m) => sums.1 += columns.effects().row(m)[joint].powi(2) * value,
+            _ => {}
+        }
+    }
+    sums
 }
 
 /// Mass matrix of the parameters `x` at `q`, even if they are physically inconsistent \[kg m^2\].

@@ -2,6 +2,7 @@
 
 use crate::cancellation::Cancellation;
 use crate::columns::FrictionColumns;
+use crate::effects::Effects;
 
 /// Weights of the joints' residuals.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,6 +26,8 @@ pub struct Options {
     pub friction: FrictionColumns,
     /// Pairs of joints coupled by a gear: one motor turns with the sum of their angles.
     pub couplings: Vec<(usize, usize)>,
+    /// Other effects.
+    pub effects: Effects,
     /// Samples of a joint slower than this are excluded from its rows \[rad/s\]. A Stribeck column is then
     /// fitted to the slow samples in a second stage.
     pub slow_rad_per_s: f64,
@@ -45,6 +48,7 @@ impl Default for Options {
             rotor: true,
             friction: FrictionColumns::OFFSET,
             couplings: Vec::new(),
+            effects: Effects::default(),
             slow_rad_per_s: 0.15,
             weights: Weights::ByJointResidual,
             consistent_prior_weight: Some(1.0),

@@ -6,6 +6,7 @@ use crate::cancellation::Cancellation;
 use crate::choice::Choice;
 use crate::columns::{Columns, FrictionColumns};
 use crate::delay::estimate_delay;
+use crate::effects::Effects;
 use crate::error::{IdentError, Warning, shape_error};
 use crate::fit::{Fit, fit};
 use crate::log::{Log, check_moving};
@@ -13,8 +14,8 @@ use crate::log_checks::{Consequence, Finding, Problem, check_log};
 use crate::motion::{Mask, Motion, Preparation};
 use crate::options::{Options, Weights};
 use crate::select::{
-    band_candidates, compare, friction_candidates, load_candidates, prior_candidates,
-    weights_candidates,
+    band_candidates, compare, effects_candidates, friction_candidates, load_candidates,
+    prior_candidates, weights_candidates,
 };
 use supple_core::{Arm, Friction};
 
@@ -55,6 +56,8 @@ pub struct Procedure {
     pub moving: Option<Vec<usize>>,
     /// Pairs of joints coupled by a gear: one motor turns with the sum of their angles.
     pub couplings: Vec<(usize, usize)>,
+    /// Other effects of a real arm that are identified; none by default.
+    pub effects: Effects,
     /// Resampling, filter and decimation of the logs.
     pub preparation: Preparation,
     /// Estimation method.
@@ -88,6 +91,7 @@ impl Default for Procedure {
         Procedure {
             moving: None,
             couplings: Vec::new(),
+            effects: Effects::default(),
             preparation: Preparation::default(),
             method: Method::Consistent,
             friction: FrictionChoice::Auto,
@@ -217,6 +221,25 @@ impl Procedure {
         Ok(moving)
     }
 
+    /// The effects of this procedure that explain motions which took no part in the fit.
+    ///
+    /// # Errors
+    /// As [`identify_motions`].
+    pub(crate) fn chosen_effects<const N: usize>(
+        &self,
+        nominal: &Arm<N>,
+        motions: &[Motion],
+        moving: &[usize],
+    ) -> Result<Effects, IdentError> {
+        let (options, _) = self.options(nominal, motions, moving)?;
+        let candidates = effects_candidates(&options, &self.effects);
+        if candidates.is_empty() {
+            return Ok(Effects::default());
+        }
+        let table = compare(nominal, motions, moving, &candidates, FOLDS)?;
+        Ok(table.options().effects.clone())
+    }
+
     /// Complete options and the choices that led to them.
     pub(crate) fn options<const N: usize>(
         &self,
@@ -233,6 +256,7 @@ impl Procedure {
                 FrictionChoice::Columns(columns) => columns,
             },
             couplings: self.couplings.clone(),
+            effects: self.effects.clone(),
             slow_rad_per_s: self.slow_rad_per_s,
             weights: match (&self.joint_noise_nm, self.method) {
                 (Some(noise), _) => Weights::Given(noise.clone()),

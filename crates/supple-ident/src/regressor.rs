@@ -1,6 +1,7 @@
 //! Rows of the regressor: the contribution of each column to each moving joint's torque.
 
 use crate::columns::{Column, Columns};
+use crate::effects::EffectState;
 use crate::error::{IdentError, shape_error};
 use crate::filter::LowPass;
 pub use crate::joint_rows::JointRows;
@@ -38,6 +39,7 @@ pub fn rows<const N: usize>(
         band_rad_per_s: friction.band_rad_per_s,
         ..Friction::coulomb(0.0, 1.0)
     };
+    let effects = EffectState::new(arm, columns.effects(), q);
     let moving = columns.moving();
     let mut rows = DMatrix::zeros(moving.len(), columns.len());
     for (c, column) in columns.list().iter().enumerate() {
@@ -70,6 +72,15 @@ pub fn rows<const N: usize>(
             Column::CoupledCoulomb(a, b) => {
                 let torque = dry.dry_torque_nm(qd[a] + qd[b]);
                 [a, b].iter().for_each(|j| put(*j, torque));
+            }
+            Column::Spring(_)
+            | Column::Compliance(_)
+            | Column::MotorCoulomb(_)
+            | Column::MotorViscous(_)
+            | Column::Tilt(_) => {
+                if let Some(torque) = effects.torque_nm(columns, *column, q, &qd) {
+                    moving.iter().for_each(|j| put(*j, torque[*j]));
+                }
             }
         }
     }

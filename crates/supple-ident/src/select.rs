@@ -5,6 +5,7 @@
 
 pub use crate::choice::{Candidate, Line, Table};
 use crate::columns::{Columns, FrictionColumns};
+use crate::effects::Effects;
 use crate::error::IdentError;
 use crate::fit::fit_rows;
 use crate::joint_rows::JointRows;
@@ -111,6 +112,31 @@ pub fn weights_candidates(base: &Options) -> Vec<Candidate> {
     .to_vec()
 }
 
+/// No other effects than friction, those of `effects` without compliance, and all of them; empty without effects.
+pub fn effects_candidates(base: &Options, effects: &Effects) -> Vec<Candidate> {
+    if *effects == Effects::default() {
+        return Vec::new();
+    }
+    let rigid = Effects {
+        compliance: false,
+        ..effects.clone()
+    };
+    let candidate = |(name, effects): (&str, Effects)| Candidate {
+        name: name.to_owned(),
+        options: Options {
+            effects,
+            ..base.clone()
+        },
+    };
+    [
+        ("friction alone", Effects::default()),
+        ("effects without compliance", rigid),
+        ("all effects", effects.clone()),
+    ]
+    .map(candidate)
+    .to_vec()
+}
+
 /// Weights of the prior from large to small, with all other options as in `base`.
 pub fn prior_candidates(base: &Options) -> Vec<Candidate> {
     let candidate = |weight: f64| Candidate {
@@ -152,7 +178,8 @@ pub fn compare<const N: usize>(
             options.rotor,
             options.friction,
             &options.couplings,
-        )?;
+        )?
+        .with_effects(&options.effects);
         let folds = folds(nominal, &columns, motions, parts)?;
         let outcome = held_out(nominal, &columns, &folds, options);
         // Whatever made a candidate fail, a cancelled comparison has no result.

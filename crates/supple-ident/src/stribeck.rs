@@ -4,6 +4,7 @@ use crate::columns::FrictionColumns;
 use crate::error::IdentError;
 use crate::fit::{Fit, STEADY_SLIDING_RAD, fit};
 use crate::motion::Motion;
+use crate::presliding::presliding_rad;
 use crate::procedure::{FrictionChoice, Procedure};
 use crate::regressor::joint_rows;
 use supple_core::Arm;
@@ -24,6 +25,10 @@ pub fn fit_with_stribeck<const N: usize>(
     moving: &[usize],
     procedure: &Procedure,
 ) -> Result<Fit<N>, IdentError> {
+    let procedure = &Procedure {
+        effects: procedure.chosen_effects(nominal, motions, moving)?,
+        ..procedure.clone()
+    };
     let mut best: Option<(Fit<N>, f64)> = None;
     for speed in SPEEDS_RAD_PER_S {
         let columns = match procedure.friction {
@@ -45,8 +50,11 @@ pub fn fit_with_stribeck<const N: usize>(
             best = Some((found, residual));
         }
     }
-    best.map(|(found, _)| found)
-        .ok_or_else(|| crate::error::shape_error("motions", "at least one", "none"))
+    let best = best.map(|(found, _)| found);
+    let mut found =
+        best.ok_or_else(|| crate::error::shape_error("motions", "at least one", "none"))?;
+    found.presliding_rad = presliding_rad(&found, motions)?;
+    Ok(found)
 }
 
 /// Sum of squared residuals of slow, steady sliding outside the band, after subtraction of each joint's mean.

@@ -44,6 +44,9 @@ struct Stored<const N: usize> {
     /// Terms in force at the start, if any; older logs have none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     learned: Option<LearnedSettings>,
+    /// Compliance of the joints, if any; older logs have none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    compliance_rad_per_nm: Option<Vec<f64>>,
     #[serde(with = "JointGainsDef")]
     move_gains: JointGains<N>,
     /// Older logs have neither joint impedance nor float.
@@ -90,6 +93,7 @@ pub(crate) fn to_toml<const N: usize>(config: &Config<N>) -> Result<String, toml
         joint_from_motor,
         ripple,
         learned,
+        compliance_rad_per_nm,
         period_s,
         estimator_rad_per_s,
         law,
@@ -118,6 +122,8 @@ pub(crate) fn to_toml<const N: usize>(config: &Config<N>) -> Result<String, toml
         law,
         ripple: RippleDef::list(&ripple),
         learned: (learned != LearnedTerms::zero()).then(|| LearnedSettings::new(&learned)),
+        compliance_rad_per_nm: (compliance_rad_per_nm != Vector::<N>::zeros())
+            .then(|| compliance_rad_per_nm.iter().copied().collect()),
         latch,
         move_gains,
         joint_gains,
@@ -164,6 +170,11 @@ pub(crate) fn from_toml<const N: usize>(text: &str) -> Result<Config<N>, String>
         learned: match &stored.learned {
             Some(learned) => learned.terms()?,
             None => LearnedTerms::zero(),
+        },
+        compliance_rad_per_nm: match &stored.compliance_rad_per_nm {
+            Some(values) if values.len() == N => Vector::from_column_slice(values),
+            Some(values) => return Err(format!("{} compliances of {N} joints", values.len())),
+            None => Vector::zeros(),
         },
         period_s: stored.period_s,
         estimator_rad_per_s: stored.estimator_rad_per_s,

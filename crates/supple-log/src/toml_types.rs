@@ -43,6 +43,8 @@ pub(crate) struct FrictionDef {
     stribeck_rad_per_s: f64,
     offset_nm: f64,
     band_rad_per_s: f64,
+    #[serde(default)]
+    presliding_rad: f64,
 }
 
 /// One line of the ripple tables, which are stored as one list.

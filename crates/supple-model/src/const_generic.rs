@@ -119,6 +119,7 @@ impl Description {
             }),
             ripple: core::array::from_fn(|m| self.motors().ripple[m]),
             learned: self.learned()?,
+            compliance_rad_per_nm: gain(|joint| joint.compliance_rad_per_nm),
             period_s: settings.period_s,
             estimator_rad_per_s: settings.estimator_rad_per_s,
             law: self.law(),

@@ -88,6 +88,23 @@ impl Description {
         Description::from_text(&document.to_string(), self.urdf())
     }
 
+    /// Returns the same arm with this compliance between encoder and link of each joint \[rad/(N m)\].
+    ///
+    /// # Errors
+    /// [`ModelError::JointCount`]; any [`ModelError`] of the edited text.
+    pub fn with_compliance(
+        &self,
+        compliance_rad_per_nm: &[f64],
+    ) -> Result<Description, ModelError> {
+        self.expect_dof(compliance_rad_per_nm.len())?;
+        let mut document = self.document()?;
+        for (joint, compliance) in compliance_rad_per_nm.iter().enumerate() {
+            let joint = self.joint_table(&mut document, joint)?;
+            put(joint, "compliance_rad_per_nm", (*compliance).into());
+        }
+        Description::from_text(&document.to_string(), self.urdf())
+    }
+
     /// Returns the same arm with every joint active: no joint is held.
     ///
     /// # Errors
@@ -345,6 +362,9 @@ fn friction(f: &Friction) -> InlineTable {
     table.insert("stribeck_rad_per_s", f.stribeck_rad_per_s.into());
     table.insert("offset_nm", f.offset_nm.into());
     table.insert("band_rad_per_s", f.band_rad_per_s.into());
+    if f.presliding_rad > 0.0 {
+        table.insert("presliding_rad", f.presliding_rad.into());
+    }
     table
 }
 

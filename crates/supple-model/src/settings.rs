@@ -124,6 +124,10 @@ pub struct JointSettings {
     /// Rotor inertia reflected to the joint (kg m^2). Default 0.
     #[serde(default)]
     pub armature_kg_m2: f64,
+    /// Compliance of cables or gears between the joint's encoder and its link (rad/(N m)), 0 to 0.02: the law then takes
+    /// the link's angle under the model's gravity. Default 0.
+    #[serde(default)]
+    pub compliance_rad_per_nm: f64,
     /// Whether that inertia is an estimate from the limits of torque and speed, not a datum. Default false.
     #[serde(default)]
     pub armature_is_estimate: bool,
@@ -218,6 +222,10 @@ pub struct FrictionSettings {
     /// Half-width of the band in which friction is a parabola (rad/s), positive. Default 0.01.
     #[serde(default = "default::band_rad_per_s")]
     pub band_rad_per_s: f64,
+    /// Travel over which dry friction turns round after a reversal (rad), zero or more. Default 0: its direction is that of
+    /// the velocity.
+    #[serde(default)]
+    pub presliding_rad: f64,
 }
 
 /// Motors and transmission. As many motors as moving joints.
@@ -612,6 +620,7 @@ impl JointSettings {
             source: None,
             held: None,
             armature_kg_m2: 0.0,
+            compliance_rad_per_nm: 0.0,
             armature_is_estimate: false,
             friction: None,
             position_lower_rad: None,
@@ -645,6 +654,7 @@ impl From<FrictionSettings> for supple_core::Friction {
             stribeck_rad_per_s: f.stribeck_rad_per_s,
             offset_nm: f.offset_nm,
             band_rad_per_s: f.band_rad_per_s,
+            presliding_rad: f.presliding_rad,
         }
     }
 }

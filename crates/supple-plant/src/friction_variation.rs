@@ -1,14 +1,15 @@
 //! How the friction of the joints varies with angle, direction and temperature.
 //!
 //! ```text
-//! dry     *= ((1 + a sin(n q + phase)) (1 + d sign(v)) + g |tau| / S) (1 + c_S exp(-t / T))
-//! viscous *= 1 + c_V exp(-t / T)
+//! varied   = (1 + a sin(n q + phase)) (1 + d sign(v))
+//! dry     *= (varied + g |tau| / S) (1 + c_S exp(-t / T))
+//! viscous *= varied (1 + f l (2 + sign(v)) / 3) (1 + c_V exp(-t / T))
 //! ```
 //!
 //! `sign` is continuous: `v / v_s`, limited to -1..1. `t` is the time since the cold start. Temperature is not modelled;
 //! the exponential is the response of one thermal mass to constant heating. `tau` is the torque that the motor transmits,
-//! `S` the Coulomb torque: gears under load have more friction. The variation with the load of bearings is part of
-//! [`crate::LuGre`].
+//! `S` the Coulomb torque: gears under load have more friction. `l` is the gravity load of the joint; the variation of the
+//! dry friction with it is part of [`crate::LuGre`].
 
 use crate::error::{PlantError, entry};
 use supple_core::Vector;
@@ -41,6 +42,8 @@ pub struct FrictionVariation<const N: usize> {
     pub phase_rad: Vector<N>,
     /// `d` of each joint, -0.5 to 0.5: positive if motion in the positive direction has more friction.
     pub direction_fraction: Vector<N>,
+    /// `f`, 0 to 0.5.
+    pub viscous_load_fraction: f64,
     /// `g`, 0 to 0.5.
     pub gear_fraction: f64,
     /// `c_S`, excess of the dry friction when cold, -0.9 to 10.
@@ -61,6 +64,7 @@ impl<const N: usize> FrictionVariation<N> {
             periods_per_revolution: 1.0,
             phase_rad: Vector::zeros(),
             direction_fraction: Vector::zeros(),
+            viscous_load_fraction: 0.0,
             gear_fraction: 0.0,
             cold_dry_fraction: 0.0,
             cold_viscous_fraction: 0.0,
@@ -81,9 +85,9 @@ impl<const N: usize> FrictionVariation<N> {
         }
     }
 
-    /// Factor of the dry friction of `joint` at `angle_rad`, moving at `speed` in units of its Stribeck speed; without
-    /// the warm-up.
-    pub fn dry_factor(&self, joint: usize, angle_rad: f64, speed: f64) -> f64 {
+    /// Factor of dry and viscous friction of `joint` from its angle `angle_rad` and its direction of motion, at `speed` in
+    /// units of its Stribeck speed.
+    pub fn factor(&self, joint: usize, angle_rad: f64, speed: f64) -> f64 {
         let mut factor = 1.0;
         if self.angle_fraction != 0.0 {
             let phase = self.periods_per_revolution * angle_rad + self.phase_rad[joint];
@@ -93,6 +97,11 @@ impl<const N: usize> FrictionVariation<N> {
             factor *= 1.0 + self.direction_fraction[joint] * speed.clamp(-1.0, 1.0);
         }
         factor
+    }
+
+    /// Factor of the viscous friction of a joint with this load, 0 to 1, at `speed` in units of its Stribeck speed.
+    pub fn viscous_load_factor(&self, load: f64, speed: f64) -> f64 {
+        1.0 + self.viscous_load_fraction * load * (2.0 + speed.clamp(-1.0, 1.0)) / 3.0
     }
 
     pub(crate) fn validate(&self) -> Result<(), PlantError> {
@@ -116,6 +125,13 @@ impl<const N: usize> FrictionVariation<N> {
             let must = "from -0.5 to 0.5";
             check("direction_fraction", d, (-0.5..=0.5).contains(&d), must)?;
         }
+        let f = self.viscous_load_fraction;
+        check(
+            "viscous_load_fraction",
+            f,
+            (0.0..=0.5).contains(&f),
+            "from 0 to 0.5",
+        )?;
         let g = self.gear_fraction;
         check(
             "gear_fraction",

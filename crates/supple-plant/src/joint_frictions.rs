@@ -76,9 +76,10 @@ impl<const N: usize> JointFrictions<N> {
                 true => variation.gear_fraction * motor_nm[i].abs() / friction.coulomb_nm,
                 false => 0.0,
             };
+            let varied = variation.factor(i, q[i], speed);
             let scale = FrictionScale {
-                dry: warm.dry * (variation.dry_factor(i, q[i], speed) + geared),
-                ..warm
+                dry: warm.dry * (varied + geared),
+                viscous: warm.viscous * varied * variation.viscous_load_factor(load[i], speed),
             };
             let bristle = &mut self.joint_bristles_rad[i];
             friction.advance_scaled(bristle, qd[i], load[i], scale, dt_s)

@@ -193,6 +193,11 @@ fn realistic(found: &Realistic, imperfect: &str) -> Vec<Line> {
         ),
         line("  arc", median_and_worst(&found.arc_rms_m), ""),
         line(
+            "  sinusoid at 0.5 N/m",
+            median_and_worst(&found.soft_rms_m),
+            "",
+        ),
+        line(
             "  calibrated alone: sinusoid",
             median_and_worst(&found.calibrated_sinusoid_rms_m),
             "",

@@ -89,6 +89,7 @@ impl<const N: usize> State<N> {
                 let velocity = &self.estimator.velocity_rad_per_s;
                 let (law, friction) = (&config.law, &config.friction);
                 let law_input = LawInput {
+                    dry_direction: self.dry_direction.as_ref(),
                     friction_share: self.latch.friction_share(),
                     nullspace_damping_nm_s_per_rad: *controller.nullspace_damping_nm_s_per_rad(),
                     held_friction: self.held_friction(config),

@@ -149,7 +149,7 @@ impl<const N: usize> State<N> {
         let scale = &terms.parameters.torque_scale;
         (
             Vector::from_fn(|i, _| self.torque[i] / (1.0 + scale[i])),
-            learned.torque_nm(terms, &config.friction, velocity, 1.0),
+            learned.torque_nm(terms, &config.friction, velocity, None, 1.0),
         )
     }
 
@@ -170,6 +170,7 @@ impl<const N: usize> State<N> {
             terms,
             &config.friction,
             &velocity,
+            self.dry_direction.as_ref(),
             self.latch.friction_share(),
         );
         if let Activity::Breakaway { ramp, .. } = &self.activity {

@@ -20,6 +20,7 @@ pub mod observer;
 mod output;
 mod plausibility;
 mod pose_task;
+mod presliding;
 mod requests;
 pub mod residual;
 mod set_point;

@@ -134,12 +134,17 @@ pub struct State<const N: usize> {
     pub(super) stale: u32,
     /// Consecutive lost replies of each encoder.
     pub(super) missing: [u32; N],
+    /// Angles of the links: those of the encoders less the sag.
     pub(super) position: Vector<N>,
+    /// What the compliance of the joints makes of gravity \[rad\].
+    pub(super) sag_rad: Vector<N>,
     pub(super) estimator: Estimator<N>,
     pub(super) observer: MomentumObserver<N>,
     pub(super) latch: Latch,
     /// Joint velocities of the reference when contact was latched \[rad/s\].
     pub(super) contact_velocity_rad_per_s: Vector<N>,
+    /// Direction of the dry friction to feed forward; `None`: that of the velocity.
+    pub(super) dry_direction: Option<Vector<N>>,
     pub(super) gains: GainRamp<Gains>,
     pub(super) joint_gains: GainRamp<JointGains<N>>,
     pub(super) rotational_gains: GainRamp<RotationalGains>,
@@ -177,10 +182,12 @@ impl<const N: usize> State<N> {
             stale: 0,
             missing: [0; N],
             position: Vector::zeros(),
+            sag_rad: Vector::zeros(),
             estimator: Estimator::at_rest(Vector::zeros()),
             observer: MomentumObserver::default(),
             latch: Latch::new(&config.latch, config.estimator_rad_per_s),
             contact_velocity_rad_per_s: Vector::zeros(),
+            dry_direction: None,
             gains: GainRamp::at_rest(config.law.gains),
             joint_gains: GainRamp::at_rest(config.joint_gains),
             rotational_gains: GainRamp::at_rest(config.pose.gains),
@@ -254,6 +261,7 @@ impl<const N: usize> State<N> {
         let gains = controller.estimator_gains(periods);
         let elapsed_s = gains.elapsed_s();
         self.receive_positions(config, &input.position_rad, &gains)?;
+        self.subtract_sag(config);
         self.cycle = Some(input.cycle);
         self.stale = 0;
         if let Some(fault) = out_of_order {
@@ -294,8 +302,9 @@ impl<const N: usize> State<N> {
             return Ok(());
         }
         for (joint, measured) in measured_rad.iter().enumerate() {
-            let expected =
-                self.position[joint] + self.estimator.velocity_rad_per_s[joint] * elapsed_s;
+            let expected = self.position[joint]
+                + self.sag_rad[joint]
+                + self.estimator.velocity_rad_per_s[joint] * elapsed_s;
             let limit_rad =
                 JUMP_OVER_SPEED_LIMIT * config.limits.joint_speed_rad_per_s[joint] * elapsed_s;
             if let Some(measured) = measured
@@ -313,6 +322,16 @@ impl<const N: usize> State<N> {
             self.position[joint] = position.unwrap_or(self.estimator.position_rad[joint]);
         }
         Ok(())
+    }
+
+    /// From the encoders' angles to those of the links, with gravity at the last angles.
+    #[inline]
+    pub(super) fn subtract_sag(&mut self, config: &Config<N>) {
+        let compliance = &config.compliance_rad_per_nm;
+        if *compliance != Vector::<N>::zeros() {
+            self.sag_rad = compliance.component_mul(&self.terms.gravity);
+            self.position -= self.sag_rad;
+        }
     }
 
     /// Latches a fault. The first fault is kept; the safe action can only change from gravity hold

@@ -87,6 +87,14 @@ pub fn step<const N: usize>(
         reference = None;
     }
     state.supervise_stop(controller, &tip_velocity, elapsed_s);
+    let pose_cycle = pose.as_ref();
+    state.update_presliding(
+        config,
+        task.as_ref(),
+        reference.as_ref(),
+        pose_cycle,
+        elapsed_s,
+    );
 
     let mut torques = state.activity_torques(
         controller,

@@ -165,6 +165,9 @@ fn pose<const N: usize>(pose: &PoseLaw<N>) -> Result<(), ConfigError> {
     each("posture_torque_nm", &pose.posture_torque_nm, true)
 }
 
+/// Softer joints need more than a correction of the angle.
+const MAX_COMPLIANCE_RAD_PER_NM: f64 = 0.02;
+
 pub(super) fn validate<const N: usize>(config: &Config<N>) -> Result<(), ConfigError> {
     let Config {
         law, latch, limits, ..
@@ -194,6 +197,15 @@ pub(super) fn validate<const N: usize>(config: &Config<N>) -> Result<(), ConfigE
         scale,
         "an invertible matrix",
     )?;
+    for (joint, value) in config.compliance_rad_per_nm.iter().enumerate() {
+        check(
+            (0.0..=MAX_COMPLIANCE_RAD_PER_NM).contains(value),
+            "compliance_rad_per_nm",
+            Some(joint),
+            *value,
+            "from 0 to 0.02",
+        )?;
+    }
     positive("period_s", config.period_s)?;
     positive("estimator_rad_per_s", config.estimator_rad_per_s)?;
     positive("handover_s", config.handover_s)?;

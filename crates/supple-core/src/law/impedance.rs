@@ -48,6 +48,8 @@ pub struct LawInput<'a, T, const N: usize, const D: usize = 3> {
     pub apparent: Option<Apparent<D>>,
     /// Friction of the joints to feed forward, and at which velocity.
     pub friction: Option<(&'a [Friction; N], FrictionVelocity)>,
+    /// Direction of each joint's dry friction, -1 to 1; `None`: that of the velocity.
+    pub dry_direction: Option<&'a Vector<N>>,
     /// Share of the dry friction feed-forward to apply, 0 to 1.
     pub friction_share: f64,
     /// Friction of an arm that is blocked.
@@ -68,6 +70,7 @@ impl<'a, T, const N: usize, const D: usize> LawInput<'a, T, N, D> {
             velocity_rad_per_s,
             apparent: None,
             friction: None,
+            dry_direction: None,
             friction_share: 1.0,
             held_friction: None,
             inertial_feedforward: true,
@@ -114,17 +117,17 @@ pub struct HeldFriction<'a, const N: usize> {
 }
 
 impl<const N: usize> HeldFriction<'_, N> {
-    /// What to add to the feed-forward of `joint` at `velocity_rad_per_s`, of whose dry part `share` is applied
+    /// What to add to the feed-forward of `joint` at `velocity_rad_per_s`, of whose dry part `dry_nm` a `share` is applied
     /// \[N m\].
     fn difference_nm(
         &self,
         friction: &Friction,
         joint: usize,
         velocity_rad_per_s: f64,
+        dry_nm: f64,
         share: f64,
     ) -> f64 {
-        let dry = |velocity: f64| friction.dry_torque_nm(velocity);
-        let kept = dry(self.velocity_rad_per_s[joint]) - dry(velocity_rad_per_s);
+        let kept = friction.dry_torque_nm(self.velocity_rad_per_s[joint]) - dry_nm;
         let viscous_nm = friction.viscous_nm_s_per_rad * velocity_rad_per_s;
         share * self.weight * kept - (1.0 - self.viscous_share) * viscous_nm
     }
@@ -235,9 +238,18 @@ pub(super) fn act<T: Target<D>, F: Form<N, D>, const N: usize, const D: usize>(
                 _ => reference[i],
             };
             let share = now.friction_share;
-            let torque_nm = friction[i].torque_with_dry_share_nm(velocity, share);
+            let torque_nm = match now.dry_direction {
+                Some(of) => friction[i].torque_in_direction_nm(velocity, of[i], share),
+                None => friction[i].torque_with_dry_share_nm(velocity, share),
+            };
             match &now.held_friction {
-                Some(held) => torque_nm + held.difference_nm(&friction[i], i, velocity, share),
+                Some(held) => {
+                    let dry_nm = match now.dry_direction {
+                        Some(of) => friction[i].dry_size_nm(velocity) * of[i],
+                        None => friction[i].dry_torque_nm(velocity),
+                    };
+                    torque_nm + held.difference_nm(&friction[i], i, velocity, dry_nm, share)
+                }
                 None => torque_nm,
             }
         };

@@ -5,6 +5,13 @@
 //! p(x) = 2 x - sign(x) x^2  for |x| <= 1,   sign(x) beyond
 //! ```
 //!
+//! After a reversal real dry friction turns round over a travel `d` (presliding), whatever the velocity. Where `d` is known,
+//! the law replaces `p` by a state that follows the reference (Dahl 1968):
+//!
+//! ```text
+//! p' = v (1 - p sign(v)) / d
+//! ```
+//!
 //! As printed, the inner branch of (3.2) reads `S/delta (sign(v) v^2/delta + 2 v)`; at `|v| =
 //! delta` that is `3 S` where the outer branch is `S`. With the opposite sign of the parabola,
 //! value and slope are continuous: `D` is continuously differentiable in `v`.
@@ -28,6 +35,9 @@ pub struct Friction {
     pub offset_nm: f64,
     /// `delta`, half-width of the band of (3.2) in which friction is a parabola \[rad/s\], positive.
     pub band_rad_per_s: f64,
+    /// `d`, travel over which dry friction turns round after a reversal \[rad\]; zero: its direction is that of the
+    /// velocity.
+    pub presliding_rad: f64,
 }
 
 /// The entry of a [`Friction`] that is not physical, with its value.
@@ -62,6 +72,7 @@ impl Friction {
         stribeck_rad_per_s: 0.05,
         offset_nm: 0.0,
         band_rad_per_s: 0.01,
+        presliding_rad: 0.0,
     };
 
     /// Viscous and Coulomb friction, the paper's `V` and `S`, with the default band and no Stribeck
@@ -108,6 +119,7 @@ impl Friction {
             "finite and positive",
         )?;
         at_least("offset_nm", self.offset_nm, f64::MIN, "finite")?;
+        at_least("presliding_rad", self.presliding_rad, 0.0, not_negative)?;
         at_least(
             "band_rad_per_s",
             self.band_rad_per_s,
@@ -153,10 +165,34 @@ impl Friction {
     /// m\].
     #[inline]
     pub fn dry_torque_nm(&self, velocity_rad_per_s: f64) -> f64 {
-        let parabola = self.direction(velocity_rad_per_s);
+        self.dry_size_nm(velocity_rad_per_s) * self.direction(velocity_rad_per_s)
+    }
+
+    /// Size of the dry part of `D(v)`: Coulomb torque with the Stribeck effect \[N m\].
+    #[inline]
+    pub fn dry_size_nm(&self, velocity_rad_per_s: f64) -> f64 {
         let s = velocity_rad_per_s / self.stribeck_rad_per_s;
         let dip = self.breakaway_nm - self.coulomb_nm;
-        let dry = self.coulomb_nm + if dip > 0.0 { dip * exp(-s * s) } else { 0.0 };
-        dry * parabola
+        self.coulomb_nm + if dip > 0.0 { dip * exp(-s * s) } else { 0.0 }
+    }
+
+    /// `D(v)` with dry friction in the given direction, -1 to 1, and a fraction `share` of it, 0 to 1 \[N m\].
+    #[inline]
+    pub fn torque_in_direction_nm(
+        &self,
+        velocity_rad_per_s: f64,
+        direction: f64,
+        share: f64,
+    ) -> f64 {
+        self.viscous_nm_s_per_rad * velocity_rad_per_s
+            + self.offset_nm
+            + self.dry_size_nm(velocity_rad_per_s) * direction * share
+    }
+
+    /// The direction of the dry friction after `travel_rad` more, either way, from `direction`. Only with presliding.
+    #[inline]
+    pub fn direction_after(&self, direction: f64, travel_rad: f64) -> f64 {
+        let to = 1.0_f64.copysign(travel_rad);
+        to + (direction - to) * exp(-abs(travel_rad) / self.presliding_rad)
     }
 }

@@ -31,6 +31,7 @@ fn any_friction() -> impl Strategy<Value = Friction> {
             stribeck_rad_per_s: stribeck,
             offset_nm: offset,
             band_rad_per_s: band,
+            presliding_rad: 0.0,
         })
 }
 
@@ -214,5 +215,50 @@ fn invalid_friction_is_rejected() {
             let start = format!("{entry} is {value}, it must be finite");
             assert!(text.starts_with(&start), "{text:?} against {start:?}");
         }
+    }
+}
+
+const WITH_TRAVEL: Friction = Friction {
+    presliding_rad: 1e-3,
+    ..WITH_DIP
+};
+
+/// The direction depends on the travel alone, not on the steps in which it is taken, and tends to that of the motion.
+#[test]
+fn direction_after_a_reversal_depends_on_the_travel_alone() {
+    let law = WITH_TRAVEL;
+    for from in [-1.0, -0.3, 0.0, 0.8] {
+        for travel in [2e-4, 1e-3, -7e-4] {
+            let once = law.direction_after(from, travel);
+            let twice = law.direction_after(law.direction_after(from, 0.3 * travel), 0.7 * travel);
+            close(once, twice, 1e-12);
+            assert!(once.abs() <= 1.0);
+        }
+        close(law.direction_after(from, 0.02), 1.0, 1e-7);
+        close(law.direction_after(from, -0.02), -1.0, 1e-7);
+    }
+    // In steady sliding the law is the same with and without it.
+    let (sliding, v) = (law.direction_after(0.0, 0.1), 0.2);
+    close(
+        law.torque_in_direction_nm(v, sliding, 1.0),
+        WITH_DIP.torque_nm(v),
+        1e-12,
+    );
+}
+
+/// Over a closed motion presliding takes energy, however small the motion.
+#[test]
+fn presliding_takes_energy() {
+    for size_rad in [1e-4, 5e-4, 2e-3, 2e-2] {
+        let (mut direction, mut last, mut energy) = (0.0, 0.0_f64, 0.0);
+        for k in 1..=20_000 {
+            let at = size_rad * (f64::from(k) * core::f64::consts::TAU / 1000.0).sin();
+            let travel = at - last;
+            let before = direction;
+            direction = WITH_TRAVEL.direction_after(direction, travel);
+            energy += 0.5 * (before + direction) * travel;
+            last = at;
+        }
+        assert!(energy > 0.0, "{size_rad}: {energy}");
     }
 }

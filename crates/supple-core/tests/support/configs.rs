@@ -93,6 +93,7 @@ fn config<const N: usize>(
         joint_from_motor,
         ripple: [RippleTable::NONE; N],
         learned: LearnedTerms::zero(),
+        compliance_rad_per_nm: Vector::zeros(),
         period_s: 1e-3,
         estimator_rad_per_s: 200.0,
         law: Law {
@@ -218,6 +219,7 @@ pub fn friction<const N: usize>() -> [Friction; N] {
         stribeck_rad_per_s: 0.05,
         offset_nm: 0.1 - 0.05 * i as f64,
         band_rad_per_s: 0.01,
+        presliding_rad: 0.0,
     })
 }
 

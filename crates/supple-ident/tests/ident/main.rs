@@ -6,6 +6,7 @@ mod support;
 
 mod consistent;
 mod describe;
+mod effects;
 mod extras;
 mod filter;
 mod paper;

@@ -82,6 +82,7 @@ impl PlantOptions {
         if let Some(fraction) = self.friction_direction_fraction {
             variation.direction_fraction = signs(Draw::Direction, fraction);
         }
+        variation.viscous_load_fraction = self.friction_load_fraction.unwrap_or(0.0);
         variation.gear_fraction = self.gear_friction_fraction.unwrap_or(0.0);
         variation.cold_dry_fraction = self.warm_up_dry_fraction.unwrap_or(0.0);
         variation.cold_viscous_fraction = self.warm_up_viscous_fraction.unwrap_or(0.0);

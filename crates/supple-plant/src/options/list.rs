@@ -117,17 +117,17 @@ plant_options! {
         "Time for which the arm has already warmed up at the start; 0 if not set: cold.",
         "choice of the experiment.";
     friction_load_fraction: "1", 0.0..=0.5,
-        "Fraction of the dry friction that grows with the gravity load of the joint, more against it than with it; 0.02 if \
-         not set.",
-        "Hamon, Gautier and Garrec 2010 for the model; size assumed.";
+        "Fraction of the friction that grows with the gravity load of the joint, more against it than with it; if not set, \
+         0.02 of the dry friction alone.",
+        "Hamon, Gautier and Garrec 2010 for the model of dry friction; size, and the same for viscous friction, assumed.";
     gear_friction_fraction: "1", 0.0..=0.5,
         "Dry friction that each gear adds under load, as a share of the torque that its motor transmits.",
         "one user's bench of geared motors: breakaway rises by about a tenth of the load.";
     friction_direction_fraction: "1", 0.0..=0.5,
-        "Difference of the dry friction between the directions of motion, as a fraction; sign by joint.",
+        "Difference of the friction between the directions of motion, as a fraction; sign by joint.",
         "assumption.";
     friction_angle_fraction: "1", 0.0..=0.5,
-        "Variation of the dry friction over the joint angle, as a fraction: four periods per revolution, phase by joint.",
+        "Variation of the friction over the joint angle, as a fraction: four periods per revolution, phase by joint.",
         "assumption: eccentric drums and pulleys.";
     motor_friction_share: "1", 0.0..=1.0,
         "Share of dry and viscous friction that acts at the motors instead of at the joints; motion of one joint alone \

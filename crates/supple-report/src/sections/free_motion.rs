@@ -68,6 +68,7 @@ fn realistic(summary: &Summary) -> Vec<Row> {
             errors(&found.warm_rms_m),
         ),
         row("the same on the arc", errors(&found.arc_rms_m)),
+        row("the sinusoid at 0.5 N/m", errors(&found.soft_rms_m)),
         row(
             "the same calibrated alone: cold",
             errors(&found.calibrated_sinusoid_rms_m),

@@ -138,6 +138,7 @@ fn the_summary_has_every_promised_number() {
         "realistic.sinusoid_rms_m.1",
         "realistic.arc_rms_m.1",
         "realistic.warm_rms_m.1",
+        "realistic.soft_rms_m.1",
         "realistic.false_latches",
         "exploration.6.stiffness_n_per_m",
         "exploration.6.approach_m_per_s",

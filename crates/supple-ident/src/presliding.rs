@@ -1,0 +1,151 @@
+//! Presliding: the travel over which dry friction turns round after a reversal.
+//!
+//! Below it a joint does not slide: its bearings and cables act as a spring, and the friction follows `p' = v (1 - p
+//! sign(v)) / d` (Dahl 1968) rather than the sign of the velocity. `d` of each joint is the one of a list for which the
+//! torque around every other reversal of the logs is explained best; it counts if the remaining reversals, which took no
+//! part in the choice, are then explained much better than without it.
+
+use crate::columns::Column;
+use crate::error::IdentError;
+use crate::filter::LowPass;
+use crate::fit::Fit;
+use crate::motion::Motion;
+use crate::regressor::joint_rows;
+use nalgebra::DVector;
+use supple_core::Friction;
+
+/// Travels that are tried \[rad\].
+const TRAVELS_RAD: [f64; 10] = [
+    1.5e-4, 2.5e-4, 3.5e-4, 5e-4, 7e-4, 1e-3, 1.4e-3, 2e-3, 4e-3, 8e-3,
+];
+/// Travel before and after a reversal that counts \[rad\].
+const WINDOW_RAD: f64 = 0.01;
+/// Greatest error of the reversals that were not used in the choice, over that without presliding.
+const IMPROVEMENT: f64 = 0.7;
+/// Least number of reversals, and of samples around one.
+const REVERSALS: usize = 4;
+const SAMPLES: usize = 8;
+
+/// Samples around one reversal of a joint.
+struct Reversal {
+    motion: usize,
+    samples: core::ops::Range<usize>,
+}
+
+/// Travel of each joint of the arm over which its dry friction turns round \[rad\]; zero where it is not known.
+///
+/// # Errors
+/// As [`joint_rows`].
+pub fn presliding_rad<const N: usize>(
+    fit: &Fit<N>,
+    motions: &[Motion],
+) -> Result<Vec<f64>, IdentError> {
+    let mut found = vec![0.0; N];
+    let parts = motions
+        .iter()
+        .map(|motion| joint_rows(fit.nominal(), &fit.columns, motion));
+    let parts = parts.collect::<Result<Vec<_>, _>>()?;
+    let friction = fit.friction();
+    for (row, &joint) in fit.columns.moving().iter().enumerate() {
+        let dry = [Column::Coulomb(joint), Column::Stribeck(joint)];
+        let mut smooth = fit.x.clone();
+        for position in dry
+            .iter()
+            .filter_map(|column| fit.columns.position(*column))
+        {
+            smooth[position] = 0.0;
+        }
+        // What dry friction has to explain.
+        let rest: Vec<DVector<f64>> = parts
+            .iter()
+            .map(|part| &part[row].b - &part[row].a * &smooth)
+            .collect();
+        let [coulomb_nm, dip_nm] = dry.map(|column| fit.value(column));
+        let reversals = reversals(motions, joint);
+        if reversals.len() < REVERSALS || coulomb_nm <= 0.0 {
+            continue;
+        }
+        let errors = |travel_rad: f64| -> Result<[f64; 2], IdentError> {
+            // That of the motors is in the rest of the model.
+            let law = Friction {
+                coulomb_nm,
+                breakaway_nm: coulomb_nm + dip_nm,
+                presliding_rad: travel_rad,
+                ..friction[joint]
+            };
+            let dry = motions.iter().map(|motion| dry_nm(&law, motion, joint));
+            let dry = dry.collect::<Result<Vec<_>, _>>()?;
+            let mut sums = [0.0; 2];
+            for (k, reversal) in reversals.iter().enumerate() {
+                let of = |i: usize| rest[reversal.motion][i] - dry[reversal.motion][i];
+                // What changes slowly is not of the reversal.
+                let mean =
+                    reversal.samples.clone().map(of).sum::<f64>() / reversal.samples.len() as f64;
+                let square: f64 = reversal
+                    .samples
+                    .clone()
+                    .map(|i| (of(i) - mean).powi(2))
+                    .sum();
+                sums[k % 2] += square / reversal.samples.len() as f64;
+            }
+            Ok(sums)
+        };
+        let without = errors(0.0)?;
+        let mut best = (0.0, without);
+        for travel_rad in TRAVELS_RAD {
+            let sums = errors(travel_rad)?;
+            if sums[0] < best.1[0] {
+                best = (travel_rad, sums);
+            }
+        }
+        if best.1[1] <= IMPROVEMENT * IMPROVEMENT * without[1] {
+            found[joint] = best.0;
+        }
+    }
+    Ok(found)
+}
+
+/// Dry friction along a motion, filtered as its torques.
+fn dry_nm(law: &Friction, motion: &Motion, joint: usize) -> Result<Vec<f64>, IdentError> {
+    let step_s = 1.0 / motion.rate_hz;
+    let mut direction = 0.0;
+    let speeds = motion.qd.column(joint);
+    let along = speeds.iter().map(|v| {
+        direction = match law.presliding_rad > 0.0 {
+            true => law.direction_after(direction, v * step_s),
+            false => law.direction(*v),
+        };
+        law.dry_size_nm(*v) * direction
+    });
+    let along: Vec<f64> = along.collect();
+    match motion.cutoff_hz {
+        Some(cutoff_hz) => LowPass::butterworth4(cutoff_hz, motion.rate_hz)?.zero_phase(&along),
+        None => Ok(along),
+    }
+}
+
+/// The reversals of a joint from which it travels on by [`WINDOW_RAD`] both before and after.
+fn reversals(motions: &[Motion], joint: usize) -> Vec<Reversal> {
+    let mut all = Vec::new();
+    for (number, motion) in motions.iter().enumerate() {
+        let (q, qd) = (motion.q.column(joint), motion.qd.column(joint));
+        for at in 1..motion.samples() {
+            if qd[at - 1] * qd[at] >= 0.0 {
+                continue;
+            }
+            let near = |i: &usize| (q[*i] - q[at]).abs() < WINDOW_RAD;
+            let before = (0..at).rev().take_while(near).count();
+            let after = (at..motion.samples()).take_while(near).count();
+            let (from, to) = (at - before, at + after);
+            let whole = from > 0 && to < motion.samples();
+            let steady = (from + 1..to).filter(|i| qd[*i - 1] * qd[*i] < 0.0).count() == 1;
+            if whole && steady && to - from >= SAMPLES && motion.used(at, joint) {
+                all.push(Reversal {
+                    motion: number,
+                    samples: from..to,
+                });
+            }
+        }
+    }
+    all
+}

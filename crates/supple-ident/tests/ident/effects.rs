@@ -1,0 +1,209 @@
+//! Effects beside links and joint friction: their columns against the arm that has them, and the travel of a reversal.
+
+use supple_core::dynamics::gravity;
+use supple_core::learned::MapWeights;
+use supple_core::nalgebra::Rotation3;
+use supple_core::{Arm, Config, Friction, Vector};
+use supple_ident::columns::Column;
+use supple_ident::regressor::rows;
+use supple_ident::{
+    Columns, DMatrix, Effects, FrictionColumns, Motion, Options, fit, presliding_rad,
+};
+use supple_model::Description;
+
+const ALL: [usize; 4] = [0, 1, 2, 3];
+
+fn wam4() -> Config<4> {
+    Description::asset("wam4").unwrap().config::<4>().unwrap()
+}
+
+fn all_effects(config: &Config<4>) -> Effects {
+    let motor_from_joint = config.joint_from_motor.try_inverse().unwrap();
+    Effects::all(&motor_from_joint)
+}
+
+fn columns(config: &Config<4>) -> Columns {
+    let columns = Columns::new(4, &ALL, true, FrictionColumns::OFFSET, &[]).unwrap();
+    columns.with_effects(&all_effects(config))
+}
+
+fn poses() -> impl Iterator<Item = Vector<4>> {
+    (0..12).map(|k| Vector::from_fn(|j, _| 1.3 * f64::from(3 * k + 2 * j as i32 + 1).sin()))
+}
+
+#[test]
+fn columns_of_tilt_and_compliance_are_the_change_of_gravity() {
+    let config = wam4();
+    let (arm, columns) = (config.arm, columns(&config));
+    let rest = Vector::<4>::zeros();
+    let at = |column| columns.position(column).unwrap();
+    for q in poses() {
+        let found = rows(&arm, &columns, &q, &rest, &rest);
+        for axis in 0..2 {
+            let mut tilt = supple_core::math::Vector3::zeros();
+            tilt[axis] = 1e-4;
+            let turned = Rotation3::from_scaled_axis(tilt) * arm.gravity();
+            let tip = arm.joint_from_tip();
+            let tilted = Arm::from_links(*arm.links(), arm.armature(), tip, turned).unwrap();
+            let change = gravity(&tilted, &q) - gravity(&arm, &q);
+            for j in ALL {
+                let expected = found[(j, at(Column::Tilt(axis)))] * 1e-4;
+                assert!((change[j] - expected).abs() < 1e-6, "joint {j}");
+            }
+        }
+        // A compliance of 1e-5 rad/(N m) of each joint in turn.
+        for soft in ALL {
+            let mut sagged = q;
+            sagged[soft] -= 1e-5 * gravity(&arm, &q)[soft];
+            let change = gravity(&arm, &sagged) - gravity(&arm, &q);
+            for j in ALL {
+                let expected = found[(j, at(Column::Compliance(soft)))] * 1e-2;
+                assert!((change[j] - expected).abs() < 1e-5, "joint {j}");
+            }
+        }
+    }
+}
+
+/// Friction of the motors is dissipative, and has columns only where a motor drives several joints.
+#[test]
+fn motors_that_drive_several_joints_have_friction_of_their_own() {
+    let config = wam4();
+    let columns = columns(&config);
+    let has = |column| columns.position(column).is_some();
+    assert!(has(Column::MotorCoulomb(1)) && has(Column::MotorViscous(2)));
+    assert!(!has(Column::MotorCoulomb(0)) && !has(Column::MotorViscous(3)));
+    let rest = Vector::<4>::zeros();
+    for qd in poses() {
+        let found = rows(&config.arm, &columns, &rest, &qd, &rest);
+        for motor in [1, 2] {
+            for column in [Column::MotorCoulomb(motor), Column::MotorViscous(motor)] {
+                let at = columns.position(column).unwrap();
+                let power: f64 = ALL.iter().map(|j| qd[*j] * found[(*j, at)]).sum();
+                assert!(power >= 0.0);
+            }
+        }
+    }
+}
+
+/// A fit of an arm with a hose finds its stiffness, and the terms of the controller are its torque.
+#[test]
+fn spring_is_found_and_becomes_a_map() {
+    let config = wam4();
+    let (rate_hz, samples, stiffness) = (100.0, 6000, 0.3);
+    let angle = |i: usize, j: usize| {
+        let t = i as f64 / rate_hz;
+        let f = 0.9 + 0.37 * j as f64;
+        (
+            0.8 * (f * t).sin(),
+            0.8 * f * (f * t).cos(),
+            -0.8 * f * f * (f * t).sin(),
+        )
+    };
+    let matrix =
+        |of: fn((f64, f64, f64)) -> f64| DMatrix::from_fn(samples, 4, |i, j| of(angle(i, j)));
+    let (q, qd, qdd) = (matrix(|a| a.0), matrix(|a| a.1), matrix(|a| a.2));
+    let mut tau = DMatrix::zeros(samples, 4);
+    for i in 0..samples {
+        let at = |m: &DMatrix<f64>| Vector::<4>::from_fn(|j, _| m[(i, j)]);
+        let torque = supple_core::dynamics::rnea(&config.arm, &at(&q), &at(&qd), &at(&qdd));
+        for j in ALL {
+            let friction = config.friction[j].torque_nm(qd[(i, j)]);
+            tau[(i, j)] = torque[j] + friction + stiffness * q[(i, j)];
+        }
+    }
+    let motion = Motion {
+        rate_hz,
+        q,
+        qd,
+        qdd,
+        tau,
+        independent_fraction: 1.0,
+        cutoff_hz: None,
+        start_s: 0.0,
+        torque_delay_s: 0.0,
+        masks: Vec::new(),
+    };
+    let options = Options {
+        effects: Effects {
+            springs: true,
+            ..Effects::default()
+        },
+        consistent_prior_weight: Some(1e-4),
+        ..Options::default()
+    };
+    let found = fit(&config.arm, core::slice::from_ref(&motion), &ALL, &options).unwrap();
+    let learned = found.learned(&config);
+    for j in ALL {
+        let limits = &config.limits;
+        let (lower, upper) = (limits.position_lower_rad[j], limits.position_upper_rad[j]);
+        for x in [0.1, 0.5, 0.8] {
+            let q = lower + x * (upper - lower);
+            let torque = MapWeights::new(q, lower, upper).of(&learned.map[j].torque_nm);
+            // The map is bounded: only what fits into it.
+            let bound = 0.02 * limits.joint_torque_nm[j];
+            let expected = (stiffness * q).clamp(-bound, bound);
+            assert!(
+                (torque - expected).abs() < 0.03,
+                "joint {j} at {q}: {torque}, {expected}"
+            );
+        }
+    }
+}
+
+/// Friction that turns round over a travel: the travel is found; friction by the sign of the velocity has none.
+#[test]
+fn travel_of_a_reversal_is_found_where_there_is_one() {
+    let config = wam4();
+    let (rate_hz, samples) = (200.0, 12_000);
+    for travel_rad in [0.0, 1e-3] {
+        let angle = |i: usize, j: usize| {
+            let t = i as f64 / rate_hz;
+            let f = 0.35 + 0.11 * j as f64;
+            (
+                0.5 * (f * t).sin(),
+                0.5 * f * (f * t).cos(),
+                -0.5 * f * f * (f * t).sin(),
+            )
+        };
+        let matrix =
+            |of: fn((f64, f64, f64)) -> f64| DMatrix::from_fn(samples, 4, |i, j| of(angle(i, j)));
+        let mut motion = Motion {
+            rate_hz,
+            q: matrix(|a| a.0),
+            qd: matrix(|a| a.1),
+            qdd: matrix(|a| a.2),
+            tau: DMatrix::zeros(samples, 4),
+            independent_fraction: 1.0,
+            cutoff_hz: None,
+            start_s: 0.0,
+            torque_delay_s: 0.0,
+            masks: Vec::new(),
+        };
+        let mut direction = [0.0; 4];
+        for i in 0..samples {
+            let at = |m: &DMatrix<f64>| Vector::<4>::from_fn(|j, _| m[(i, j)]);
+            let (q, qd, qdd) = (at(&motion.q), at(&motion.qd), at(&motion.qdd));
+            let torque = supple_core::dynamics::rnea(&config.arm, &q, &qd, &qdd);
+            for j in ALL {
+                let law = Friction {
+                    presliding_rad: travel_rad,
+                    ..config.friction[j]
+                };
+                direction[j] = match travel_rad > 0.0 {
+                    true => law.direction_after(direction[j], qd[j] / rate_hz),
+                    false => law.direction(qd[j]),
+                };
+                let friction = law.torque_in_direction_nm(qd[j], direction[j], 1.0);
+                motion.tau[(i, j)] = torque[j] + friction;
+            }
+        }
+        let motions = [motion];
+        let options = Options {
+            consistent_prior_weight: Some(1e-4),
+            ..Options::default()
+        };
+        let found = fit(&config.arm, &motions, &ALL, &options).unwrap();
+        let travels = presliding_rad(&found, &motions).unwrap();
+        assert_eq!(travels, vec![travel_rad; 4]);
+    }
+}
