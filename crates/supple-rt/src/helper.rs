@@ -14,7 +14,7 @@ use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::{Builder, JoinHandle};
 use supple_core::Vector;
 use supple_core::controller::{Controller, Mode, NamesJoints, Request, check_motion};
-use supple_ipc::message::{MAX_DOF, OperatorReply, OperatorRequest, Outcome, Text};
+use supple_ipc::message::{OperatorReply, OperatorRequest, Outcome, Text};
 use supple_ipc::{Backpressure, Domain, IpcError, OperatorServer};
 use supple_realtime::{diagnostics, pause};
 
