@@ -45,7 +45,6 @@ mod read;
 pub mod regressor;
 pub mod ripple;
 mod save;
-pub mod scales;
 pub mod select;
 mod series;
 mod stribeck;
@@ -69,7 +68,6 @@ pub use procedure::{FrictionChoice, Method, Procedure, identify, identify_motion
 pub use read::{ReadError, read_csv, read_logs, read_mcap};
 pub use ripple::{RippleSearch, fit_ripple};
 pub use save::SaveError;
-pub use scales::{TorqueScales, torque_scales};
 pub use series::SeriesLists;
 pub use stribeck::fit_with_stribeck;
 pub use validate::{Validation, verdict};

@@ -11,7 +11,6 @@ mod extras;
 mod filter;
 mod paper;
 mod recovery;
-mod scales;
 mod select;
 mod tx40;
 mod ur10e;
