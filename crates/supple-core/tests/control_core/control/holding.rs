@@ -281,3 +281,23 @@ fn a_joint_moved_in_idle_is_held_from_its_new_angle() {
     assert!((set_point(&output) - rig.q[2]).abs() < 1e-3);
     assert!(output.torques.joint_pd[2].abs() < 0.5);
 }
+
+/// With compliance the law takes the angles of the links, which hang below those of the encoders by gravity.
+#[test]
+fn soft_joints_hang_by_their_gravity() {
+    fn hangs<const N: usize>(config: Config<N>) {
+        let config = Config {
+            compliance_rad_per_nm: Vector::repeat(3e-4),
+            ..config
+        };
+        let mut rig = Rig::holding(config, bent());
+        let output = rig.cycle();
+        let weight = gravity(&config.arm, &output.position_rad);
+        assert_close(&(rig.q - weight * 3e-4), &output.position_rad, 1e-9);
+        assert_close(&output.torques.gravity, &weight, 1e-9);
+        assert_eq!(output.fault, None);
+    }
+    hangs(three());
+    hangs(four());
+    hangs(seven());
+}

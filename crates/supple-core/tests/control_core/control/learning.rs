@@ -169,7 +169,10 @@ fn learned_map_adds_no_energy() {
                 &terms_of(&config.arm, &q, &qd),
                 &Vector3::zeros(),
             );
-            work += at.torque_nm(&learned, &config.friction, &qd, 1.0).dot(&qd) * h;
+            work += at
+                .torque_nm(&learned, &config.friction, &qd, None, 1.0)
+                .dot(&qd)
+                * h;
         }
         work
     };

@@ -132,6 +132,7 @@ fn config<const N: usize>(case: &Case) -> Config<N> {
         joint_from_motor: Matrix::identity(),
         ripple: [RippleTable::NONE; N],
         learned: LearnedTerms::zero(),
+        compliance_rad_per_nm: Vector::zeros(),
         period_s: PERIOD_S,
         estimator_rad_per_s: 300.0,
         law: Law {
