@@ -90,13 +90,15 @@ fn motors_that_drive_several_joints_have_friction_of_their_own() {
 fn spring_is_found_and_becomes_a_map() {
     let config = wam4();
     let (rate_hz, samples, stiffness) = (100.0, 6000, 0.3);
+    // Two frequencies: with one alone the torque of a spring is that of an inertia.
     let angle = |i: usize, j: usize| {
         let t = i as f64 / rate_hz;
-        let f = 0.9 + 0.37 * j as f64;
+        let (f, g) = (0.9 + 0.37 * j as f64, 2.3 + 0.29 * j as f64);
+        let (x, y) = (f * t, g * t);
         (
-            0.8 * (f * t).sin(),
-            0.8 * f * (f * t).cos(),
-            -0.8 * f * f * (f * t).sin(),
+            0.7 * x.sin() + 0.2 * y.sin(),
+            0.7 * f * x.cos() + 0.2 * g * y.cos(),
+            -0.7 * f * f * x.sin() - 0.2 * g * g * y.sin(),
         )
     };
     let matrix =
