@@ -212,7 +212,7 @@ impl Columns {
     /// The same with the columns of other effects, after all others.
     #[must_use]
     pub fn with_effects(mut self, effects: &Effects) -> Self {
-        self.columns.extend(effects.columns(&self.moving));
+        self.columns.extend(of_effects(effects, &self.moving));
         self.effects = effects.clone();
         self
     }
@@ -298,4 +298,23 @@ impl Columns {
         }
         forms
     }
+}
+
+/// The columns of effects for the moving joints.
+fn of_effects(effects: &Effects, moving: &[usize]) -> Vec<Column> {
+    let mut columns = Vec::new();
+    for &joint in moving {
+        columns.extend(effects.springs.then_some(Column::Spring(joint)));
+        columns.extend(effects.compliance.then_some(Column::Compliance(joint)));
+    }
+    columns.extend(
+        effects
+            .motors(moving)
+            .iter()
+            .flat_map(|motor| [Column::MotorCoulomb(*motor), Column::MotorViscous(*motor)]),
+    );
+    if effects.tilt {
+        columns.extend([Column::Tilt(0), Column::Tilt(1)]);
+    }
+    columns
 }

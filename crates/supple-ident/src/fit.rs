@@ -4,7 +4,7 @@ use crate::base::{BaseParameters, RANK_TOLERANCE};
 use crate::choice::Choice;
 use crate::columns::{Column, Columns};
 use crate::consistent::{Constraints, solve};
-use crate::effects;
+use crate::effect_rows;
 use crate::error::{IdentError, Warning, shape_error};
 use crate::estimate::{huber_weights, nearest, noise_nm, weighted, weighted_least_squares};
 use crate::joint_rows::JointRows;
@@ -382,12 +382,12 @@ impl<const N: usize> Fit<N> {
 
     /// Springs and tilt as terms of a controller with this configuration.
     pub fn learned(&self, config: &Config<N>) -> LearnedTerms<N> {
-        effects::learned(&self.columns, &|column| self.value(column), config)
+        effect_rows::learned(&self.columns, &|column| self.value(column), config)
     }
 
     /// Compliance between encoder and link of each joint \[rad/(N m)\]; zero where it is not identified.
     pub fn compliance_rad_per_nm(&self) -> [f64; N] {
-        core::array::from_fn(|j| effects::COMPLIANCE_UNIT * self.value(Column::Compliance(j)))
+        core::array::from_fn(|j| effect_rows::COMPLIANCE_UNIT * self.value(Column::Compliance(j)))
     }
 
     pub(crate) fn value(&self, column: Column) -> f64 {

@@ -23,6 +23,7 @@ pub mod columns;
 pub mod consistent;
 mod delay;
 pub mod design;
+mod effect_rows;
 pub mod effects;
 mod error;
 pub mod estimate;

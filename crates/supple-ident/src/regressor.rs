@@ -1,7 +1,7 @@
 //! Rows of the regressor: the contribution of each column to each moving joint's torque.
 
 use crate::columns::{Column, Columns};
-use crate::effects::EffectState;
+use crate::effect_rows::EffectState;
 use crate::error::{IdentError, shape_error};
 use crate::filter::LowPass;
 pub use crate::joint_rows::JointRows;

@@ -4,7 +4,7 @@ use crate::prior::unknowns::ALL;
 use crate::rows::Row;
 use nalgebra::{DMatrix, DVector};
 
-/// Weighted sums over samples; a sample of its own has the weight one.
+/// Sums over samples, each divided by the variance of its noise.
 #[derive(Clone, Debug)]
 pub struct Information {
     /// `sum a a^T`, (ALL, ALL).
@@ -13,7 +13,7 @@ pub struct Information {
     pub right: DVector<f64>,
     /// `sum e^2`.
     pub square: f64,
-    /// Sum of the weights: the number of independent samples.
+    /// Sum of the weights.
     pub weight: f64,
 }
 

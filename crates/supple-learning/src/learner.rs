@@ -19,7 +19,7 @@ const SETTLE_S: f64 = 0.15;
 /// Time between samples \[s\].
 const SAMPLE_S: f64 = 0.01;
 /// Time over which errors of the model are correlated: one sample of this time is independent \[s\].
-const CORRELATION_S: f64 = 0.3;
+const CORRELATION_S: f64 = 1.0;
 /// Samples are collected, judged and used by intervals of this length \[s\].
 const INTERVAL_S: f64 = 0.25;
 /// Intervals for which samples wait: a freeze meanwhile discards them.
@@ -40,10 +40,8 @@ const SOLVE_S: f64 = 2.0;
 /// between controller and learner exceeds: the cycle does not depend on the speed of either.
 const LATENCY_S: f64 = 2.0;
 const MIN_LATENCY_CYCLES: u64 = 2500;
-/// Time constants, in intervals, of the measured residual with which samples are weighted, 5 s of motion, and of the one
-/// that is no disturbance.
-const RESIDUAL_INTERVALS: f64 = 20.0;
-const USUAL_INTERVALS: f64 = 40.0;
+/// Time constant of the measured residual, in intervals.
+const RESIDUAL_INTERVALS: f64 = 40.0;
 
 /// A request with the cycle in which it is to be carried out.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,10 +70,8 @@ pub struct Learner<const N: usize> {
     estimate: Option<Estimate>,
     since_solve_s: f64,
     has_news: bool,
-    /// Measured variance of what the estimate leaves \[N^2 m^2\]; before any motion the prior's.
+    /// Measured variance of what the estimate leaves \[N^2 m^2\].
     residual: [f64; N],
-    /// The same over a longer time, and raised where the arm has changed: less is no disturbance \[N^2 m^2\].
-    usual: [f64; N],
     disturbed_s: f64,
     disturbances: u64,
     frozen: Option<Frozen>,
@@ -99,8 +95,7 @@ impl<const N: usize> Learner<N> {
             samples: vec![Information::empty(); N],
             since_solve_s: 0.0,
             has_news: false,
-            residual: prior.first_error_nm.map(|error_nm| error_nm * error_nm),
-            usual: [0.0; N],
+            residual: [0.0; N],
             disturbed_s: 0.0,
             disturbances: 0,
             frozen: Some(Frozen::Off),
@@ -112,11 +107,7 @@ impl<const N: usize> Learner<N> {
     pub fn reset(&mut self) {
         self.samples = vec![Information::empty(); N];
         self.estimate = of_prior(&self.prior);
-        self.residual = self
-            .prior
-            .first_error_nm
-            .map(|error_nm| error_nm * error_nm);
-        self.usual = [0.0; N];
+        self.residual = [0.0; N];
         self.disturbed_s = 0.0;
         self.has_news = false;
         self.discard();
@@ -129,7 +120,9 @@ impl<const N: usize> Learner<N> {
         Report {
             terms: of(Estimate::terms),
             deviations: of(Estimate::deviations),
-            learned_s: core::array::from_fn(|i| self.samples[i].weight * CORRELATION_S),
+            learned_s: core::array::from_fn(|i| {
+                self.samples[i].weight * self.prior.noise_nm[i].powi(2) * CORRELATION_S
+            }),
             residual_nm: self.residual.map(f64::sqrt),
             disturbances: self.disturbances,
             frozen: self.frozen,
@@ -190,9 +183,10 @@ impl<const N: usize> Learner<N> {
         }
         let cycles = (SAMPLE_S / self.period_s) as u32;
         self.cycles_to_sample = cycles.saturating_sub(1);
-        let weight = f64::from(cycles.max(1)) * self.period_s / CORRELATION_S;
+        let sample_s = f64::from(cycles.max(1)) * self.period_s;
         for (i, row) in rows.iter().enumerate() {
             if self.since_slow_s[i] >= SETTLE_S {
+                let weight = sample_s / CORRELATION_S / self.prior.noise_nm[i].powi(2);
                 self.collecting[i].add(row, weight);
             }
         }
@@ -245,7 +239,7 @@ impl<const N: usize> Learner<N> {
             return false;
         };
         interval.iter().enumerate().any(|(i, samples)| {
-            let noise = self.prior.first_error_nm[i].powi(2).max(self.usual[i]);
+            let noise = self.prior.noise_nm[i].powi(2).max(self.residual[i]);
             !samples.is_empty() && {
                 let expected = noise + samples.mean_variance(&estimate.covariance[i]);
                 samples.mean_square(&estimate.unknowns(i)) > DISTURBED * DISTURBED * expected
@@ -261,14 +255,14 @@ impl<const N: usize> Learner<N> {
             for (i, samples) in interval.iter().enumerate() {
                 if !samples.is_empty() {
                     let square = samples.mean_square(&estimate.unknowns(i));
-                    self.usual[i] = self.usual[i].max(square);
+                    self.residual[i] = self.residual[i].max(square);
                 }
             }
         }
         for samples in &mut self.samples {
             samples.forget(KEPT_AFTER_CHANGE);
         }
-        self.estimate = self.solved().or_else(|| of_prior(&self.prior));
+        self.estimate = solve(&self.prior, &self.samples).or_else(|| of_prior(&self.prior));
     }
 
     fn take(&mut self, interval: &[Information]) {
@@ -276,29 +270,22 @@ impl<const N: usize> Learner<N> {
             if new.is_empty() {
                 continue;
             }
-            self.samples[i].forget(exp(-new.weight * CORRELATION_S / FORGET_S));
+            let learned_s = new.weight * self.prior.noise_nm[i].powi(2) * CORRELATION_S;
+            self.samples[i].forget(exp(-learned_s / FORGET_S));
             self.samples[i].merge(new);
             if let Some(estimate) = &self.estimate {
                 let square = new.mean_square(&estimate.unknowns(i));
                 let known = new.mean_variance(&estimate.covariance[i]);
-                let left = (square - known).max(0.0);
-                self.residual[i] += (left - self.residual[i]) / RESIDUAL_INTERVALS;
-                self.usual[i] += (left - self.usual[i]) / USUAL_INTERVALS;
+                self.residual[i] +=
+                    ((square - known).max(0.0) - self.residual[i]) / RESIDUAL_INTERVALS;
             }
         }
         self.has_news = true;
     }
 
-    /// The estimate of all samples, weighted by what the model has left unexplained of late.
-    fn solved(&self) -> Option<Estimate> {
-        let least = &self.prior.least_error_nm;
-        let variance = core::array::from_fn(|i| self.residual[i].max(least[i] * least[i]));
-        solve(&self.prior, &self.samples, &variance)
-    }
-
     /// A new estimate as requests, all for cycles that the learner's delay cannot reach.
     fn requests(&mut self, cycle: u64) -> Vec<Scheduled<N>> {
-        let Some(estimate) = self.solved() else {
+        let Some(estimate) = solve(&self.prior, &self.samples) else {
             return Vec::new();
         };
         let terms = estimate.terms::<N>();

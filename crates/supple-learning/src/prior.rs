@@ -41,17 +41,16 @@ const PRIOR_SHARE: f64 = 0.4;
 /// The same of an offset, which a payload and a tilt explain as well.
 const OFFSET_SHARE: f64 = 0.05;
 /// The same of the map's part over the angle alone.
-const MAP_TORQUE_SHARE: f64 = 0.3;
+const MAP_TORQUE_SHARE: f64 = 0.1;
 /// The same of the map's part against the motion, over the Coulomb friction.
-const MAP_DRY_SHARE: f64 = 0.2;
+const MAP_DRY_SHARE: f64 = 0.1;
 /// Standard deviation of the map's second differences over that of its coefficients: how smooth it is.
 const SMOOTHNESS: f64 = 0.5;
 /// Smallest standard deviation that counts, so that no precision is infinite.
 const MIN_STD: f64 = 1e-9;
-/// Share of the dry friction, and of the torque limit, in the error of a joint's torque before any of it was measured.
-const FIRST_ERROR: (f64, f64) = (0.1, 4e-4);
-/// The same of the least error that counts, whatever was measured.
-const LEAST_ERROR: (f64, f64) = (0.02, 1e-4);
+/// Share of the dry friction, and of the torque limit, in the noise of a joint's torque.
+const NOISE_FRICTION_SHARE: f64 = 0.1;
+const NOISE_TORQUE_SHARE: f64 = 4e-4;
 
 /// Prior and bounds of one arm.
 #[derive(Clone, Debug)]
@@ -68,11 +67,8 @@ pub struct Prior<const N: usize> {
     pub joint_bound: Vec<DVector<f64>>,
     /// Bound of the shared unknowns.
     pub shared_bound: DVector<f64>,
-    /// Standard deviation of the filtered torque of each joint before any residual was measured, and of what counts as a
-    /// disturbance at least \[N m\].
-    pub first_error_nm: [f64; N],
-    /// Least standard deviation with which samples are weighted \[N m\].
-    pub least_error_nm: [f64; N],
+    /// Standard deviation of the filtered torque of each joint \[N m\].
+    pub noise_nm: [f64; N],
 }
 
 impl<const N: usize> Prior<N> {
@@ -88,12 +84,6 @@ impl<const N: usize> Prior<N> {
             }),
         };
         let shared_bound = shared_of(&box_of.parameters);
-        let error_nm = |i: usize, (of_friction, of_limit): (f64, f64)| {
-            (
-                of_friction * config.friction[i].breakaway_nm,
-                of_limit * limits.joint_torque_nm[i],
-            )
-        };
         Prior {
             joint_precision: (0..N)
                 .map(|i| {
@@ -106,13 +96,9 @@ impl<const N: usize> Prior<N> {
             shared_mean: shared_of(&config.learned.parameters),
             joint_bound: (0..N).map(|i| joint_of(&box_of, i)).collect(),
             shared_bound,
-            first_error_nm: core::array::from_fn(|i| {
-                let (friction_nm, drive_nm) = error_nm(i, FIRST_ERROR);
-                friction_nm + drive_nm
-            }),
-            least_error_nm: core::array::from_fn(|i| {
-                let (friction_nm, drive_nm) = error_nm(i, LEAST_ERROR);
-                friction_nm.hypot(drive_nm)
+            noise_nm: core::array::from_fn(|i| {
+                NOISE_FRICTION_SHARE * config.friction[i].breakaway_nm
+                    + NOISE_TORQUE_SHARE * limits.joint_torque_nm[i]
             }),
         }
     }

@@ -56,16 +56,11 @@ impl Estimate {
 /// Unknowns that are fixed at a value.
 type Fixed = Vec<Option<f64>>;
 
-/// Solves for all unknowns, with the variance of each joint's samples \[N^2 m^2\]. `None` if the equations are not positive
-/// definite, as if a number in them is not finite.
-pub fn solve<const N: usize>(
-    prior: &Prior<N>,
-    samples: &[Information],
-    variance: &[f64; N],
-) -> Option<Estimate> {
+/// Solves for all unknowns. `None` if the equations are not positive definite, as if a number in them is not finite.
+pub fn solve<const N: usize>(prior: &Prior<N>, samples: &[Information]) -> Option<Estimate> {
     let mut joint_fixed: Vec<Fixed> = vec![vec![None; JOINT]; N];
     let mut shared_fixed: Fixed = vec![None; SHARED];
-    let mut estimate = solve_with(prior, samples, variance, &joint_fixed, &shared_fixed)?;
+    let mut estimate = solve_with(prior, samples, &joint_fixed, &shared_fixed)?;
     for _ in 0..ROUNDS {
         let mut beyond = fix(&estimate.shared, &prior.shared_bound, &mut shared_fixed);
         for (joint, fixed) in joint_fixed.iter_mut().enumerate() {
@@ -74,7 +69,7 @@ pub fn solve<const N: usize>(
         if !beyond {
             break;
         }
-        estimate = solve_with(prior, samples, variance, &joint_fixed, &shared_fixed)?;
+        estimate = solve_with(prior, samples, &joint_fixed, &shared_fixed)?;
     }
     for (x, bound) in estimate.joints.iter_mut().zip(&prior.joint_bound) {
         clamp(x, bound);
@@ -86,7 +81,7 @@ pub fn solve<const N: usize>(
 
 /// The estimate before any sample.
 pub fn of_prior<const N: usize>(prior: &Prior<N>) -> Option<Estimate> {
-    solve(prior, &vec![Information::empty(); N], &[1.0; N])
+    solve(prior, &vec![Information::empty(); N])
 }
 
 /// The estimate that these terms are, with the covariance of another.
@@ -141,7 +136,6 @@ struct Eliminated {
 fn solve_with<const N: usize>(
     prior: &Prior<N>,
     samples: &[Information],
-    variance: &[f64; N],
     joint_fixed: &[Fixed],
     shared_fixed: &Fixed,
 ) -> Option<Estimate> {
@@ -155,23 +149,21 @@ fn solve_with<const N: usize>(
     );
     let mut eliminated = Vec::with_capacity(N);
     for (joint, sample) in samples.iter().enumerate() {
-        let scaled = &sample.gram / variance[joint];
-        let known = &sample.right / variance[joint];
-        let own = scaled.view((0, 0), (JOINT, JOINT));
+        let own = sample.gram.view((0, 0), (JOINT, JOINT));
         let mut gram = &prior.joint_precision[joint] + own;
         let mut right =
-            &prior.joint_precision[joint] * &prior.joint_mean[joint] + known.rows(0, JOINT);
+            &prior.joint_precision[joint] * &prior.joint_mean[joint] + sample.right.rows(0, JOINT);
         add_fixed(
             &joint_fixed[joint],
             &prior.joint_bound[joint],
             &mut gram,
             &mut right,
         );
-        let cross = scaled.view((0, JOINT), (JOINT, SHARED)).into_owned();
+        let cross = sample.gram.view((0, JOINT), (JOINT, SHARED)).into_owned();
         let factor = Cholesky::new(gram)?;
-        shared +=
-            scaled.view((JOINT, JOINT), (SHARED, SHARED)) - cross.tr_mul(&factor.solve(&cross));
-        shared_right += known.rows(JOINT, SHARED) - cross.tr_mul(&factor.solve(&right));
+        shared += sample.gram.view((JOINT, JOINT), (SHARED, SHARED))
+            - cross.tr_mul(&factor.solve(&cross));
+        shared_right += sample.right.rows(JOINT, SHARED) - cross.tr_mul(&factor.solve(&right));
         eliminated.push(Eliminated {
             factor,
             cross,
