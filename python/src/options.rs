@@ -60,6 +60,7 @@ impl Options {
             band_rad_per_s: shape.band_rad_per_s,
         };
         Ok(Procedure {
+            effects: supple_ident::Effects::default(),
             moving: self.moving,
             couplings: self.couplings,
             preparation: Preparation {
