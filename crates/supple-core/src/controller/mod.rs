@@ -63,6 +63,10 @@ pub struct Controller<const N: usize> {
     active_joints: usize,
     /// A motor has a table of its ripple.
     has_ripple: bool,
+    /// The travel of a joint's reversals is known.
+    has_presliding: bool,
+    /// A joint is compliant between encoder and link.
+    has_compliance: bool,
     /// The estimator's gains after one period.
     one_period: EstimatorGains,
     torque_step_nm: Vector<N>,
@@ -103,6 +107,8 @@ impl<const N: usize> Controller<N> {
                 .ripple
                 .iter()
                 .any(|table| !table.harmonics().is_empty()),
+            has_presliding: config.friction.iter().any(|f| f.presliding_rad > 0.0),
+            has_compliance: config.compliance_rad_per_nm != Vector::<N>::zeros(),
             one_period: EstimatorGains::new(config.period_s, config.estimator_rad_per_s),
             torque_step_nm: config.limits.torque_rate_nm_per_s * config.period_s,
             stop_step_nm: Vector::from_fn(|i, _| {
@@ -126,6 +132,14 @@ impl<const N: usize> Controller<N> {
 
     fn has_ripple(&self) -> bool {
         self.has_ripple
+    }
+
+    fn has_presliding(&self) -> bool {
+        self.has_presliding
+    }
+
+    fn has_compliance(&self) -> bool {
+        self.has_compliance
     }
 
     /// Time constant `t_s` with which the safe action stops a motion \[s\].

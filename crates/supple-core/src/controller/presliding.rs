@@ -5,7 +5,6 @@
 //! it.
 
 use super::activity::Activity;
-use super::pose_task::PoseCycle;
 use super::state::State;
 use crate::config::{Config, FrictionVelocity};
 use crate::law::impedance::Task;
@@ -19,22 +18,8 @@ const REST_S: f64 = 0.5;
 
 impl<const N: usize> State<N> {
     /// Follows the reference for a cycle.
-    #[inline]
-    pub(super) fn update_presliding(
-        &mut self,
-        config: &Config<N>,
-        task: Option<&Task<N>>,
-        reference: Option<&Reference>,
-        pose: Option<&PoseCycle<N>>,
-        elapsed_s: f64,
-    ) {
-        if config.friction.iter().any(|f| f.presliding_rad > 0.0) {
-            self.follow_presliding(config, task.zip(reference), pose.is_some(), elapsed_s);
-        }
-    }
-
     #[inline(never)]
-    fn follow_presliding(
+    pub(super) fn follow_presliding(
         &mut self,
         config: &Config<N>,
         tracking: Option<(&Task<N>, &Reference)>,

@@ -261,7 +261,9 @@ impl<const N: usize> State<N> {
         let gains = controller.estimator_gains(periods);
         let elapsed_s = gains.elapsed_s();
         self.receive_positions(config, &input.position_rad, &gains)?;
-        self.subtract_sag(config);
+        if controller.has_compliance() {
+            self.subtract_sag(config);
+        }
         self.cycle = Some(input.cycle);
         self.stale = 0;
         if let Some(fault) = out_of_order {
@@ -325,13 +327,12 @@ impl<const N: usize> State<N> {
     }
 
     /// From the encoders' angles to those of the links, with gravity at the last angles.
-    #[inline]
-    pub(super) fn subtract_sag(&mut self, config: &Config<N>) {
-        let compliance = &config.compliance_rad_per_nm;
-        if *compliance != Vector::<N>::zeros() {
-            self.sag_rad = compliance.component_mul(&self.terms.gravity);
-            self.position -= self.sag_rad;
-        }
+    #[inline(never)]
+    fn subtract_sag(&mut self, config: &Config<N>) {
+        self.sag_rad = config
+            .compliance_rad_per_nm
+            .component_mul(&self.terms.gravity);
+        self.position -= self.sag_rad;
     }
 
     /// Latches a fault. The first fault is kept; the safe action can only change from gravity hold

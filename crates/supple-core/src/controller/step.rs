@@ -87,14 +87,10 @@ pub fn step<const N: usize>(
         reference = None;
     }
     state.supervise_stop(controller, &tip_velocity, elapsed_s);
-    let pose_cycle = pose.as_ref();
-    state.update_presliding(
-        config,
-        task.as_ref(),
-        reference.as_ref(),
-        pose_cycle,
-        elapsed_s,
-    );
+    if controller.has_presliding() {
+        let tracking = task.as_ref().zip(reference.as_ref());
+        state.follow_presliding(config, tracking, pose.is_some(), elapsed_s);
+    }
 
     let mut torques = state.activity_torques(
         controller,
