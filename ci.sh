@@ -104,7 +104,7 @@ step_package() {
     (
         cd python
         "$bin/python" -m mypy package/supple benchmarks examples
-        "$bin/python" -m mypy.stubtest supple
+        "$bin/python" -m mypy.stubtest supple --mypy-config-file pyproject.toml
         "$bin/python" -m pytest
     )
 }

@@ -498,6 +498,9 @@ class Friction:
         Torque that does not depend on the velocity (N m). Default 0.
     band_rad_per_s : float
         ``delta`` (rad/s), positive. Default 0.01.
+    presliding_rad : float
+        Travel over which dry friction turns round after a reversal (rad), zero or more. Default 0: its direction is
+        that of the velocity.
 
     Raises
     ------
@@ -520,6 +523,7 @@ class Friction:
         stribeck_rad_per_s: float = 0.05,
         offset_nm: float = 0.0,
         band_rad_per_s: float = 0.01,
+        presliding_rad: float = 0.0,
     ) -> Friction: ...
     @property
     def viscous_nm_s_per_rad(self) -> float:
@@ -544,6 +548,11 @@ class Friction:
     @property
     def band_rad_per_s(self) -> float:
         """Half-width of the band in which dry friction is a parabola (rad/s)."""
+
+    @property
+    def presliding_rad(self) -> float:
+        """Travel over which dry friction turns round after a reversal (rad)."""
+
 
     def torque_nm(self, velocity_rad_per_s: ArrayLike) -> _Array:
         """Torque that compensates friction (N m), of the shape of ``velocity_rad_per_s``.

@@ -7,7 +7,7 @@ import itertools
 import os
 import tomllib
 from dataclasses import dataclass, field
-from functools import lru_cache, partial
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -92,9 +92,12 @@ def _run(name: str, experiment: Any, fixed: dict[str, Any], varied: dict[str, An
     return {"rms_error_m": run.rms_error_m, "max_error_m": run.max_error_m, "fault_s": ended_s, "fault": fault}
 
 
-@lru_cache(maxsize=4)
+_arms: dict[str, _native.Arm] = {}
+
+
 def _arm(name: str) -> _native.Arm:
-    """An arm, once for each worker."""
-    if name.lower().endswith((".urdf", ".xml")):
-        return _native.Arm.from_urdf(name).completed()
-    return _native.Arm.load(name)
+    """An arm, loaded once in each worker."""
+    if name not in _arms:
+        is_urdf = name.lower().endswith((".urdf", ".xml"))
+        _arms[name] = _native.Arm.from_urdf(name).completed() if is_urdf else _native.Arm.load(name)
+    return _arms[name]
