@@ -4,7 +4,7 @@ set -euo pipefail
 cd "$(dirname "$0")"
 
 PLAIN=(fmt clippy test doctest doc)
-FULL=(deny advisories page python package urdfs ur10e instructions fused edits cycles fuzz cortex-m socketcan services)
+FULL=(deny advisories page python package ur10e instructions fused edits cycles fuzz cortex-m socketcan services)
 CARGO_DENY_VERSION=0.20.2
 CARGO_FUZZ_VERSION=0.13.2
 GUNGRAUN_VERSION=0.20.0
@@ -148,7 +148,7 @@ virtual_environment() {
         skip "the packages of $2 cannot be installed"
 }
 
-# urdfs: ten public URDFs, unedited, through `supple new` and `up --plant sim`; installs packages that carry them
+# urdfs: ten public URDFs, unedited, through `supple new` and `up --plant sim`; in no list; installs packages that carry them
 step_urdfs() {
     virtual_environment urdfs tests/any_arm/requirements.txt
     # The programs that `test` builds.
