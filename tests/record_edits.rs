@@ -35,7 +35,7 @@ const TERM: [Edit; 2] = [
     ),
     (
         "crates/supple-core/src/controller/step.rs",
-        "    state.blend_torque(config, &mut torques);\n",
+        "    state.blend_torque(controller, &mut torques);\n",
         "    torques.added_term[0] = 0.25;\n",
     ),
 ];
