@@ -1,6 +1,7 @@
 //! The torque of each activity, term by term.
 
 use super::activity::Activity;
+use super::fault::Fault;
 use super::mode::Breakaway;
 use super::pose_task::{DIRECTIONS, PoseCycle};
 use super::state::State;
@@ -279,17 +280,30 @@ impl<const N: usize> State<N> {
         }
     }
 
-    /// Leaves the breakaway mode for gravity hold once its joint has moved or the ramp has reached its
+    /// Leaves the breakaway mode for gravity hold once its joint has moved with the ramp, or the ramp has reached its
     /// limit.
-    pub(super) fn end_breakaway(&mut self, config: &Config<N>) {
+    ///
+    /// # Errors
+    /// [`Fault::MotionAgainstTorque`] if the joint has moved against the ramp.
+    pub(super) fn end_breakaway(&mut self, config: &Config<N>) -> Result<(), Fault> {
         let Activity::Breakaway { ramp, from_rad, .. } = self.activity else {
-            return;
+            return Ok(());
         };
-        let moved = abs(self.position[ramp.joint] - from_rad[ramp.joint]);
-        let torque = abs(ramp.rate_nm_per_s) * self.activity_s(config);
-        if moved >= ramp.stop_rad || torque >= ramp.limit_nm {
-            self.enter(Activity::GravityHold);
+        let joint = ramp.joint;
+        let moved_rad = self.position[joint] - from_rad[joint];
+        let torque_nm = ramp.rate_nm_per_s * self.activity_s(config);
+        if abs(moved_rad) < ramp.stop_rad && abs(torque_nm) < ramp.limit_nm {
+            return Ok(());
         }
+        self.enter(Activity::GravityHold);
+        if moved_rad * torque_nm < 0.0 && abs(moved_rad) >= ramp.stop_rad {
+            return Err(Fault::MotionAgainstTorque {
+                joint,
+                value_nm: abs(torque_nm),
+                limit_nm: 0.0,
+            });
+        }
+        Ok(())
     }
 
     /// Adds the terms of every activity whose torques follow a fresh state and act on the arm: held-joint loops, soft

@@ -3,8 +3,8 @@
 //! | finding | criterion |
 //! |---|---|
 //! | replies lost too often | each lost reply counts as eight received ones; the balance exceeds its limit |
-//! | encoder stuck | unchanged value while the joint's reference moves, out of contact, in modes of joint references half as far if all encoders are unchanged; or from one cycle to the next for a moving joint |
-//! | moves against its torque | 20 cycles in which a joint's momentum grows against its net torque |
+//! | encoder stuck | unchanged value while the joint's reference moves, out of contact, half as far with stiff position loops, while other joints move, or in joint impedance if all encoders are unchanged; or while a breakaway ramp would move the joint by the model; or from one cycle to the next for a moving joint |
+//! | moves against its torque | 20 cycles in which a joint's momentum grows against its net torque; or a joint that moves against its breakaway ramp |
 //! | unmodelled load | a force along gravity for 50 ms, in gravity hold or after the end of a move |
 //! | collision | the observed external torque or force exceeds its threshold |
 
@@ -21,9 +21,12 @@ const CONTACT_CYCLES: u32 = 5;
 /// Time for which the encoder of a joint in a collision may stay unchanged before it counts as
 /// stuck \[s\].
 const UNCHANGED_LIMIT_S: f64 = 0.03;
-/// Fraction of `stuck_rad` that a joint's reference may travel while no encoder changes, in modes of joint references.
-/// At a few newtons per metre of tip stiffness dry friction may hold all joints at once; the springs of joints are stiffer.
-pub(super) const ALL_STUCK_SHARE: f64 = 0.5;
+/// Fraction of `stuck_rad` that a joint's reference may travel while its encoder is unchanged: with stiff position loops,
+/// while other joints move, and in joint impedance while no encoder changes. At a few newtons per metre of tip stiffness
+/// dry friction may hold all joints at once.
+pub(super) const EARLY_STUCK_SHARE: f64 = 0.5;
+/// The same for the travel that the model predicts for the joint of a breakaway ramp, which no loop holds back.
+pub(super) const RAMP_STUCK_SHARE: f64 = 0.3;
 /// Speed above which a joint counts as moving freely \[rad/s\].
 pub(super) const OTHER_JOINT_MOVING_RAD_PER_S: f64 = 0.1;
 const AGAINST_CYCLES: u32 = 20;
@@ -43,6 +46,10 @@ pub(super) struct Plausibility<const N: usize> {
     unchanged_s: [f64; N],
     /// Travel of the reference since the encoder last changed \[rad\].
     travel_rad: [f64; N],
+    /// Speed at which a breakaway ramp would move its joint by the model, since the encoder last changed \[rad/s\].
+    ramped_rad_per_s: f64,
+    /// Torque of that ramp when the encoder last changed \[N m\].
+    ramp_nm: f64,
     opposed_cycles: [u32; N],
     last_momentum: Vector<N>,
     load_s: f64,
@@ -59,6 +66,8 @@ impl<const N: usize> Default for Plausibility<N> {
             speed_rad_per_s: [0.0; N],
             unchanged_s: [0.0; N],
             travel_rad: [0.0; N],
+            ramped_rad_per_s: 0.0,
+            ramp_nm: 0.0,
             opposed_cycles: [0; N],
             last_momentum: Vector::zeros(),
             load_s: 0.0,
@@ -99,11 +108,39 @@ impl<const N: usize> Plausibility<N> {
         self.unchanged[joint]
     }
 
+    /// Whether no encoder value has changed since the last cycle.
+    pub fn all_unchanged(&self) -> bool {
+        !self.unchanged.contains(&false)
+    }
+
     /// Resets the accumulated evidence at a change of activity.
     pub fn begin(&mut self) {
         self.travel_rad = [0.0; N];
+        self.ramped_rad_per_s = 0.0;
+        self.ramp_nm = 0.0;
         self.opposed_cycles = [0; N];
         self.load_s = 0.0;
+    }
+
+    /// Speed at which a breakaway ramp of `ramp_nm` would move `joint` by the model, counted from the last change of its
+    /// encoder value, with its inertia \[kg m^2\]. The dry friction at rest is `dry_nm` \[N m\], or what has held the joint
+    /// while its encoder still changed, if that is more.
+    pub fn ramped_rad_per_s(
+        &mut self,
+        joint: usize,
+        ramp_nm: f64,
+        dry_nm: f64,
+        inertia_kg_m2: f64,
+        elapsed_s: f64,
+    ) -> f64 {
+        if self.unchanged[joint] {
+            let excess_nm = abs(ramp_nm) - dry_nm.max(self.ramp_nm);
+            self.ramped_rad_per_s += excess_nm.max(0.0) / inertia_kg_m2 * elapsed_s;
+        } else {
+            self.ramped_rad_per_s = 0.0;
+            self.ramp_nm = abs(ramp_nm);
+        }
+        self.ramped_rad_per_s
     }
 
     /// Suspends the checks in this cycle and discards the joints' history.
@@ -170,19 +207,13 @@ impl<const N: usize> Plausibility<N> {
         self.contact_cycles >= CONTACT_CYCLES
     }
 
-    /// Reports a stuck encoder if its value is unchanged while the joint's reference travels further than the limit, or
-    /// than `all_share` of it if no encoder changes.
+    /// Reports a stuck encoder if its value is unchanged while the joint's reference travels further than the limit.
     pub fn check_stuck_encoder(
         &mut self,
         limit_rad: f64,
-        all_share: f64,
         reference_rad_per_s: &Vector<N>,
         elapsed_s: f64,
     ) -> Result<(), Fault> {
-        let limit_rad = match self.unchanged.contains(&false) {
-            true => limit_rad,
-            false => all_share * limit_rad,
-        };
         for joint in 0..N {
             if !self.unchanged[joint] {
                 self.travel_rad[joint] = 0.0;

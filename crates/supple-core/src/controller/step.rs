@@ -48,7 +48,9 @@ pub fn step<const N: usize>(
     state.joint_gains.elapsed_s += elapsed_s;
     state.rotational_gains.elapsed_s += elapsed_s;
     state.update_held_setpoints(config, elapsed_s);
-    state.end_breakaway(config);
+    if let Err(fault) = state.end_breakaway(config) {
+        state.latch_fault(fault);
+    }
 
     let tip_position = state.terms.base_from_tip.translation;
     let tip_velocity = state.terms.jacobian.fixed_rows::<3>(0) * velocity;

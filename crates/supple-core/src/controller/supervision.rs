@@ -6,8 +6,8 @@ use super::checks::{COMPLIANT_SPEED_SHARE, MOVING_SHARE};
 use super::fault::Fault;
 use super::latch::Evidence;
 use super::plausibility::{
-    ALL_STUCK_SHARE, OTHER_JOINT_MOVING_RAD_PER_S, PlausibilityInput, SUDDEN_STOP_SHARE,
-    joint_collision, tip_collision,
+    EARLY_STUCK_SHARE, OTHER_JOINT_MOVING_RAD_PER_S, PlausibilityInput, RAMP_STUCK_SHARE,
+    SUDDEN_STOP_SHARE, joint_collision, tip_collision,
 };
 use super::pose_task::PoseCycle;
 use super::state::State;
@@ -98,6 +98,19 @@ impl<const N: usize> State<N> {
         let mut reference_rad_per_s = Vector::zeros();
         if let Some(reference) = self.joint_reference(config) {
             reference_rad_per_s = reference.velocity_rad_per_s;
+        }
+        if let Activity::Breakaway { ramp, .. } = &self.activity {
+            let joint = ramp.joint;
+            let ramp_nm = ramp.rate_nm_per_s * self.activity_s(config);
+            let dry_nm = config.friction[joint].dry_size_nm(0.0);
+            let inertia_kg_m2 = self.terms.mass_matrix[(joint, joint)];
+            reference_rad_per_s[joint] = self.plausibility.ramped_rad_per_s(
+                joint,
+                ramp_nm,
+                dry_nm,
+                inertia_kg_m2,
+                elapsed_s,
+            );
         }
         if let Some(reference) = reference {
             self.latch.update_direction(&reference.velocity, elapsed_s);
@@ -230,14 +243,16 @@ impl<const N: usize> State<N> {
                 (0..N).any(|joint| abs(velocity[joint]) > OTHER_JOINT_MOVING_RAD_PER_S);
             let in_contact = plausibility.is_contact_plausible(self.latch.in_contact());
             if others_move || !in_contact {
-                let limit_rad = config.plausible.stuck_rad;
-                let all_share = match self.activity.has_joint_reference() {
-                    true => ALL_STUCK_SHARE,
-                    false => 1.0,
+                let early = others_move
+                    || self.activity.has_joint_loops()
+                    || (self.activity.has_joint_reference() && plausibility.all_unchanged());
+                let share = match self.activity {
+                    Activity::Breakaway { .. } => RAMP_STUCK_SHARE,
+                    _ if early => EARLY_STUCK_SHARE,
+                    _ => 1.0,
                 };
                 plausibility.check_stuck_encoder(
-                    limit_rad,
-                    all_share,
+                    share * config.plausible.stuck_rad,
                     evidence.reference_rad_per_s,
                     evidence.elapsed_s,
                 )?;

@@ -25,6 +25,8 @@ use supple_plant::{Injection, InjectionKind, Trigger};
 const BLOCK_CLEARANCE_M: f64 = 0.05;
 /// The same for an arm that is only pushed and does not travel far \[m\].
 const PUSHED_BLOCK_CLEARANCE_M: f64 = 0.01;
+/// The same for the ramp of the breakaway task \[m\].
+const RAMPED_BLOCK_CLEARANCE_M: f64 = 0.004;
 /// Cap radius of an arm without a tool \[m\].
 const CAP_M: f64 = 0.02;
 /// Observation time after the event \[s\].
@@ -60,10 +62,7 @@ pub fn perform<const N: usize>(spec: &Spec, arm: &TestArm) -> Result<Row, Failur
         Event::Drives(_) | Event::Activation(Activation::InFault) => REENABLE_S.0,
         _ => 0.0,
     };
-    let at_rest = matches!(
-        spec.task,
-        TestTask::GravityHold | TestTask::Float | TestTask::Breakaway
-    );
+    let at_rest = matches!(spec.task, TestTask::GravityHold | TestTask::Float);
     let pushed = spec.event == Event::Obstacle && at_rest;
     let push_rad_per_s = -PUSHED_M_PER_S / jacobian(&config.arm, &script.start_rad)[(2, 1)];
     let up = UpArgs {
@@ -79,6 +78,8 @@ pub fn perform<const N: usize>(spec: &Spec, arm: &TestArm) -> Result<Row, Failur
         tare: false,
         block_m: (spec.event == Event::Obstacle).then_some(match spec.task {
             TestTask::Probe => 0.0,
+            // The ramp moves the tip by some millimetres only.
+            TestTask::Breakaway => -(RAMPED_BLOCK_CLEARANCE_M + cap_m),
             _ if at_rest => -(PUSHED_BLOCK_CLEARANCE_M + cap_m),
             _ => -(BLOCK_CLEARANCE_M + cap_m),
         }),

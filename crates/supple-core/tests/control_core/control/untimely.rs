@@ -1,5 +1,5 @@
-//! Requests at the wrong moment: a reset while the arm still moves, the same request in every cycle, a ramp on a ramp,
-//! gains that are still changing, cycle numbers that go back in a fault.
+//! Requests at the wrong moment: a reset while the arm still moves, the same request in every cycle, a ramp on a ramp or
+//! with a wrong encoder, gains that are still changing, cycle numbers that go back in a fault.
 //!
 //! Criterion, fixed before the first run: no request makes an arm faster than it was, and none ends the supervision of
 //! a fault.
@@ -11,11 +11,12 @@ use crate::support::rig::{Rig, bent, ramp};
 use crate::support::size;
 use proptest::prelude::*;
 use supple_core::config::Gains;
-use supple_core::controller::{Mode, Refusal, Request, SafeAction, check_motion};
+use supple_core::controller::{Fault, Mode, Refusal, Request, SafeAction, check_motion};
 use supple_core::dynamics::kinetic_energy;
 use supple_core::math::Vector3;
+
 use supple_core::trajectory::Fourier;
-use supple_core::{Config, Trajectory, Vector};
+use supple_core::{Config, Friction, Trajectory, Vector};
 
 /// An arm in gravity hold that somebody has set in motion, one cycle before a fault that is no defect.
 fn struck<const N: usize>(config: Config<N>, speed: &Vector<N>) -> (Rig<N>, Plant<N>) {
@@ -323,4 +324,58 @@ fn ramps_after_one_another_hold_what_the_model_lacks() {
         let moved = size(&(plant.q - start));
         assert!(moved < 2e-3, "{moved} rad after {request:?}");
     }
+}
+
+/// A breakaway ramp whose encoder shows `shown` of the true angle and of the start; returns the first fault and the
+/// greatest speed of the tip \[m/s\].
+fn ramped(shown: impl Fn(f64, f64) -> f64) -> (Option<Fault>, f64) {
+    let mut config = three();
+    let dry_nm = 1.0;
+    config.friction[1] = Friction::coulomb(0.0, dry_nm);
+    config.plausible.stuck_rad = 0.1;
+    let mut rig = Rig::holding(config, bent());
+    let mut plant = Plant::at_rest(config.arm, bent());
+    // Dry friction that holds the joint up to `dry_nm`, nearly.
+    let friction = |_: &supple_core::Arm<3>, _: &Vector<3>, qd: &Vector<3>| {
+        Vector::from([-4.0 * qd[0], -dry_nm * (qd[1] / 0.002).tanh(), -4.0 * qd[2]])
+    };
+    let start: Vector<3> = plant.q;
+    let mut speed_m_per_s = 0.0_f64;
+    let mut request = Some(Request::Breakaway(ramp()));
+    for _ in 0..9000 {
+        rig.q = plant.q;
+        rig.q[1] = shown(plant.q[1], start[1]);
+        let output = rig.step(&supple_core::Input {
+            request: request.take(),
+            ..rig.input()
+        });
+        assert_eq!(output.refusal, None);
+        plant.advance(&output.torque_nm, friction, config.period_s, 4);
+        let jacobian = supple_core::dynamics::jacobian(&plant.arm, &plant.q);
+        speed_m_per_s = speed_m_per_s.max(size(&(jacobian.fixed_rows::<3>(0) * plant.qd)));
+        if output.fault.is_some() {
+            return (output.fault, speed_m_per_s);
+        }
+    }
+    (None, speed_m_per_s)
+}
+
+/// Written before the run: an encoder that no longer changes, or shows the opposite, ends the ramp with its fault before the
+/// tip is faster than 0.25 m/s; a good one ends it without a fault.
+#[test]
+fn a_ramp_ends_with_a_wrong_encoder() {
+    let (fault, speed) = ramped(|_, start| start);
+    assert!(
+        matches!(fault, Some(Fault::EncoderStuck { joint: 1, .. })),
+        "{fault:?}"
+    );
+    assert!(speed < 0.25, "{speed} m/s");
+    let (fault, speed) = ramped(|true_rad, start| 2.0 * start - true_rad);
+    assert!(
+        matches!(fault, Some(Fault::MotionAgainstTorque { joint: 1, .. })),
+        "{fault:?}"
+    );
+    assert!(speed < 0.25, "{speed} m/s");
+    let (fault, _) = ramped(|true_rad, _| true_rad);
+    assert_eq!(fault, None);
 }
