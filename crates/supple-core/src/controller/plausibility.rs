@@ -3,7 +3,7 @@
 //! | finding | criterion |
 //! |---|---|
 //! | replies lost too often | each lost reply counts as eight received ones; the balance exceeds its limit |
-//! | encoder stuck | unchanged value while the joint's reference moves, out of contact, half as far with stiff position loops, while other joints move, or in joint impedance if all encoders are unchanged; or while a breakaway ramp would move the joint by the model; or from one cycle to the next for a moving joint |
+//! | encoder stuck | unchanged value while the joint's reference moves, out of contact or since before it, half as far with stiff position loops, while other joints move, or in joint impedance if all encoders are unchanged; or while a breakaway ramp would move the joint by the model; or from one cycle to the next for a moving joint |
 //! | moves against its torque | 20 cycles in which a joint's momentum grows against its net torque; or a joint that moves against its breakaway ramp |
 //! | unmodelled load | a force along gravity for 50 ms, in gravity hold or after the end of a move |
 //! | collision | the observed external torque or force exceeds its threshold |
@@ -41,6 +41,9 @@ pub(super) struct Plausibility<const N: usize> {
     last_measured: [Option<f64>; N],
     /// The encoder value is unchanged since the last cycle.
     unchanged: [bool; N],
+    in_contact: bool,
+    /// The encoder value is unchanged since before the present contact, although the joint's reference moved.
+    stopped_before_contact: [bool; N],
     /// Speed of the joint when the encoder last changed \[rad/s\], and time since then \[s\].
     speed_rad_per_s: [f64; N],
     unchanged_s: [f64; N],
@@ -63,6 +66,8 @@ impl<const N: usize> Default for Plausibility<N> {
             losses: [0; N],
             last_measured: [None; N],
             unchanged: [false; N],
+            in_contact: false,
+            stopped_before_contact: [false; N],
             speed_rad_per_s: [0.0; N],
             unchanged_s: [0.0; N],
             travel_rad: [0.0; N],
@@ -201,24 +206,40 @@ impl<const N: usize> Plausibility<N> {
     pub fn is_contact_plausible(&mut self, in_contact: bool) -> bool {
         if !in_contact {
             self.contact_cycles = 0;
-        } else if self.contact_cycles < CONTACT_CYCLES && self.unchanged.contains(&false) {
+            self.stopped_before_contact = [false; N];
+        } else if !self.in_contact {
+            self.stopped_before_contact =
+                core::array::from_fn(|joint| self.unchanged[joint] && self.travel_rad[joint] > 0.0);
+        }
+        self.in_contact = in_contact;
+        if in_contact && self.contact_cycles < CONTACT_CYCLES && self.unchanged.contains(&false) {
             self.contact_cycles += 1;
         }
         self.contact_cycles >= CONTACT_CYCLES
     }
 
-    /// Reports a stuck encoder if its value is unchanged while the joint's reference travels further than the limit.
+    /// Reports a stuck encoder if its value is unchanged while the joint's reference travels further than a limit:
+    /// `stopped_rad` for a joint that stopped before the present contact, `limit_rad` for the others, unless they are
+    /// `blocked` by contact.
     pub fn check_stuck_encoder(
         &mut self,
         limit_rad: f64,
+        stopped_rad: f64,
+        blocked: bool,
         reference_rad_per_s: &Vector<N>,
         elapsed_s: f64,
     ) -> Result<(), Fault> {
         for joint in 0..N {
             if !self.unchanged[joint] {
+                self.stopped_before_contact[joint] = false;
                 self.travel_rad[joint] = 0.0;
                 continue;
             }
+            let limit_rad = match self.stopped_before_contact[joint] {
+                true => stopped_rad.min(limit_rad),
+                false if blocked => continue,
+                false => limit_rad,
+            };
             self.travel_rad[joint] += abs(reference_rad_per_s[joint]) * elapsed_s;
             if self.travel_rad[joint] > limit_rad {
                 return Err(Fault::EncoderStuck {

@@ -338,11 +338,7 @@ impl<const N: usize> State<N> {
     /// Latches a fault. The first fault is kept; the safe action can only change from gravity hold
     /// to idle, and an arm without torque stays without torque.
     pub(super) fn latch_fault(&mut self, fault: Fault) {
-        let action = if self.activity.is_torque_off() {
-            SafeAction::Idle
-        } else {
-            fault.safe_action()
-        };
+        let action = self.action_of(&fault);
         match self.activity {
             Activity::Fault(_) if action == SafeAction::Idle => {
                 self.activity = Activity::Fault(SafeAction::Idle);

@@ -21,12 +21,14 @@
 //! than a fifth of the speed limit of a joint or of the tip. The drives brake if (1) the arm moves
 //! with over 1.25 times its kinetic energy before the fault; (2) the arm still moves 0.2 s after
 //! the fault; (3) an external torque above a tenth of a joint's limit acts for 50 ms, either later
-//! than 0.15 s after the fault or at a joint whose encoder is unchanged and may be stuck.
+//! than 0.15 s after the fault or at a joint whose encoder is unchanged and may be stuck; (4) one
+//! above a twentieth acted for 50 ms before a speed limit was exceeded, while the arm followed a
+//! reference out of contact.
 
 use super::Controller;
 use super::activity::Activity;
 use super::checks::MOVING_SHARE;
-use super::fault::SafeAction;
+use super::fault::{Fault, SafeAction};
 use super::state::State;
 use crate::config::Config;
 use crate::law::impedance::Torques;
@@ -42,6 +44,8 @@ pub(crate) const STOP_TIMEOUT_S: f64 = 0.2;
 pub(crate) const ENERGY_GROWTH_LIMIT: f64 = 1.25;
 /// Fraction of a joint's torque limit above which an external torque would move a joint at rest.
 const UNEXPLAINED_SHARE: f64 = 0.1;
+/// The same for an arm that follows a reference out of contact: its friction is known better than this.
+const UNEXPLAINED_MOVING_SHARE: f64 = 0.05;
 /// Time for which such a torque may act \[s\].
 const UNEXPLAINED_S: f64 = 0.05;
 /// Time after which an impact and the observer's response to it have decayed \[s\].
@@ -84,6 +88,11 @@ impl<const N: usize> State<N> {
         if !matches!(self.activity, Activity::Fault(SafeAction::GravityHold)) {
             let kept = (1.0 - elapsed_s / ENERGY_PEAK_DECAY_S).max(0.0);
             self.peak_energy_j = energy_j.max(self.peak_energy_j * kept);
+            let unexplained = self.follows_reference() && self.is_pushed(config);
+            self.unexplained_s = match unexplained {
+                true => self.unexplained_s + elapsed_s,
+                false => 0.0,
+            };
             return;
         }
         if self.activity_s(config) <= ESTIMATOR_SETTLING_DELAYS * controller.delay_s() {
@@ -108,6 +117,32 @@ impl<const N: usize> State<N> {
         if moving && (late || accelerates) || self.unexplained_s > UNEXPLAINED_S {
             self.activity = Activity::Fault(SafeAction::Idle);
         }
+    }
+
+    /// The action of a fault: braking without delay if the arm is too fast because of a torque that acted for some time
+    /// before, out of contact. A dead motor gives it; damping by motors of which one is dead might drive the arm.
+    pub(super) fn action_of(&self, fault: &Fault) -> SafeAction {
+        let too_fast = matches!(fault, Fault::JointSpeed { .. } | Fault::TipSpeed { .. });
+        if self.activity.is_torque_off() || too_fast && self.unexplained_s > UNEXPLAINED_S {
+            SafeAction::Idle
+        } else {
+            fault.safe_action()
+        }
+    }
+
+    /// Whether the arm follows a reference out of contact, so that nobody is expected to move it.
+    fn follows_reference(&self) -> bool {
+        let may_be_led = matches!(
+            self.activity,
+            Activity::GravityHold | Activity::Float | Activity::JointImpedance { .. }
+        );
+        !(may_be_led || self.latch.in_contact())
+    }
+
+    fn is_pushed(&self, config: &Config<N>) -> bool {
+        let external_nm = self.observer.external_torque_nm();
+        let limit_nm = &config.limits.joint_torque_nm;
+        (0..N).any(|joint| abs(external_nm[joint]) > UNEXPLAINED_MOVING_SHARE * limit_nm[joint])
     }
 
     /// Whether an external torque acts that should move the arm: on a joint with an unchanged

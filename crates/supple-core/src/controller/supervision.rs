@@ -237,26 +237,28 @@ impl<const N: usize> State<N> {
                 against?;
             }
             // In contact the joints may stand still while their references move; but if other
-            // joints move, a single unchanged encoder is stuck. Encoders that are all stuck make a
-            // contact themselves: it counts once they have changed in it.
+            // joints move, or it stood still before the contact, an unchanged encoder is stuck.
+            // Encoders that are all stuck make a contact themselves: it counts once they have
+            // changed in it.
             let others_move =
                 (0..N).any(|joint| abs(velocity[joint]) > OTHER_JOINT_MOVING_RAD_PER_S);
             let in_contact = plausibility.is_contact_plausible(self.latch.in_contact());
-            if others_move || !in_contact {
-                let early = others_move
+            let early = !in_contact
+                && (others_move
                     || self.activity.has_joint_loops()
-                    || (self.activity.has_joint_reference() && plausibility.all_unchanged());
-                let share = match self.activity {
-                    Activity::Breakaway { .. } => RAMP_STUCK_SHARE,
-                    _ if early => EARLY_STUCK_SHARE,
-                    _ => 1.0,
-                };
-                plausibility.check_stuck_encoder(
-                    share * config.plausible.stuck_rad,
-                    evidence.reference_rad_per_s,
-                    evidence.elapsed_s,
-                )?;
-            }
+                    || (self.activity.has_joint_reference() && plausibility.all_unchanged()));
+            let share = match self.activity {
+                Activity::Breakaway { .. } => RAMP_STUCK_SHARE,
+                _ if early => EARLY_STUCK_SHARE,
+                _ => 1.0,
+            };
+            plausibility.check_stuck_encoder(
+                share * config.plausible.stuck_rad,
+                EARLY_STUCK_SHARE * config.plausible.stuck_rad,
+                in_contact && !others_move,
+                evidence.reference_rad_per_s,
+                evidence.elapsed_s,
+            )?;
         }
         let external = self.observer.external_torque_nm();
         let collision = &config.collision;

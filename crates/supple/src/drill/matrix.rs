@@ -28,6 +28,14 @@ const CONTACT_FAULTS: &[&str] = &[
     "workspace",
     "joint_tracking_error",
 ];
+/// The same of the joint of a breakaway ramp.
+const RAMP_CONTACT_FAULTS: &[&str] = &[
+    "joint_collision",
+    "tip_collision",
+    "workspace",
+    "joint_tracking_error",
+    "encoder_stuck",
+];
 /// The same in the pose mode.
 const POSE_CONTACT_FAULTS: &[&str] = &[
     "joint_collision",
@@ -233,10 +241,17 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
     );
     // Compliant modes may continue; stiff modes must fault.
     add(
-        &[GravityHold, Track, Probe, Float, JointImpedance, Breakaway],
+        &[GravityHold, Track, Probe, Float, JointImpedance],
         Event::Obstacle,
         runs_or_faults(CONTACT_FAULTS),
         FAULT_AND_STOP_MS,
+    );
+    // A torque ramp cannot tell a blocked joint from a stuck encoder.
+    add(
+        &[Breakaway],
+        Event::Obstacle,
+        runs_or_faults(RAMP_CONTACT_FAULTS),
+        LATE_FAULT_AND_STOP_MS,
     );
     // A contact flings the light joints of the wrist.
     add(
