@@ -22,7 +22,8 @@ const CONTACT_CYCLES: u32 = 5;
 /// stuck \[s\].
 const UNCHANGED_LIMIT_S: f64 = 0.03;
 /// Fraction of `stuck_rad` that a joint's reference may travel while its encoder is unchanged: with stiff position loops,
-/// while other joints move, and in joint impedance while no encoder changes. At a few newtons per metre of tip stiffness
+/// while other joints move, for a joint whose encoder had stopped when a contact was found (a block stops no joint within a
+/// cycle), and in joint impedance while no encoder changes. At a few newtons per metre of tip stiffness
 /// dry friction may hold all joints at once.
 pub(super) const EARLY_STUCK_SHARE: f64 = 0.5;
 /// The same for the travel that the model predicts for the joint of a breakaway ramp, which no loop holds back.
@@ -42,7 +43,7 @@ pub(super) struct Plausibility<const N: usize> {
     /// The encoder value is unchanged since the last cycle.
     unchanged: [bool; N],
     in_contact: bool,
-    /// The encoder value is unchanged since before the present contact, although the joint's reference moved.
+    /// The encoder value is unchanged since before the present contact.
     stopped_before_contact: [bool; N],
     /// Speed of the joint when the encoder last changed \[rad/s\], and time since then \[s\].
     speed_rad_per_s: [f64; N],
@@ -208,8 +209,7 @@ impl<const N: usize> Plausibility<N> {
             self.contact_cycles = 0;
             self.stopped_before_contact = [false; N];
         } else if !self.in_contact {
-            self.stopped_before_contact =
-                core::array::from_fn(|joint| self.unchanged[joint] && self.travel_rad[joint] > 0.0);
+            self.stopped_before_contact = self.unchanged;
         }
         self.in_contact = in_contact;
         if in_contact && self.contact_cycles < CONTACT_CYCLES && self.unchanged.contains(&false) {
