@@ -3,7 +3,7 @@
 use super::error::ProcedureError;
 use super::progress::FitQuality;
 use crate::breakaway::JointBreakaway;
-use crate::calibrate::{SLOW_RAD_PER_S, identify_with, without_ripple};
+use crate::calibrate::{Knowledge, SLOW_RAD_PER_S, identify_with, without_ripple};
 use nalgebra::DMatrix;
 use std::path::Path;
 use supple_core::controller::Mode;
@@ -24,6 +24,10 @@ const LEAST_THRESHOLD: f64 = 0.5;
 /// Range of the factor between measured and given breakaway torque by which dry friction is scaled.
 const FACTOR: (f64, f64) = (0.2, 5.0);
 
+/// Weight of the links of the model where inertia adds little to the torque, in equivalent samples.
+const LINKS_WEIGHT: f64 = 100.0;
+/// Standard deviation of rotor inertias there, relative to those of the model.
+const ROTOR_DEVIATION: f64 = 1.0;
 /// Share of the greatest speed of the slowest joint above which samples are fitted.
 const FAST_SHARE: f64 = 0.3;
 /// Time over which the speed of a joint is averaged \[s\].
@@ -136,7 +140,13 @@ pub fn fit_first<const N: usize>(
     let (fitted, unseen) = (part(pass, 0, cut), part(pass, cut, rows - cut));
     let mut logs = vec![fitted];
     logs.extend_from_slice(others);
-    let (fit, _) = identify_with(&config, &logs, &[], columns(model), fast_rad_per_s(&logs))?;
+    let (fit, _) = identify_with(
+        &config,
+        &logs,
+        &[],
+        &knowledge(model),
+        fast_rad_per_s(&logs),
+    )?;
     let unseen = prepared(&unseen, &fit)?;
     let quality = quality(&config, &fit, &unseen)?;
     let better = quality.unseen_relative < quality.unseen_relative_before;
@@ -157,8 +167,8 @@ pub fn fit_all<const N: usize>(
     others: &[Log],
 ) -> Result<(Description, FitQuality), ProcedureError> {
     let config = model.config::<N>()?;
-    let (columns, fast_rad_per_s) = (columns(model), fast_rad_per_s(logs));
-    let (fit, ripple) = identify_with(&config, logs, constant_speed, columns, fast_rad_per_s)?;
+    let (known, fast_rad_per_s) = (knowledge(model), fast_rad_per_s(logs));
+    let (fit, ripple) = identify_with(&config, logs, constant_speed, &known, fast_rad_per_s)?;
     let motor_from_joint = *supple_core::Controller::new(config)?.motor_from_joint();
     let unseen = without_ripple(unseen, &ripple, &motor_from_joint);
     let unseen = prepared(&unseen, &fit)?;
@@ -179,11 +189,20 @@ pub fn fit_all<const N: usize>(
     Ok((described.with_move_collision(&thresholds)?, quality))
 }
 
-/// Columns of friction: the gears of motors on a bus rub more under load.
-fn columns(model: &Description) -> FrictionColumns {
-    FrictionColumns {
-        load: model.bus().is_some(),
-        ..FrictionColumns::OFFSET
+/// What is known of an arm before it moves. The gears of motors on a bus rub more under load. Such arms move slowly within
+/// the torque that gravity leaves, so that inertia adds little to it: rotors and links stay near those of the model where
+/// errors of friction would move them.
+fn knowledge(model: &Description) -> Knowledge {
+    match model.bus() {
+        None => Knowledge::of(FrictionColumns::OFFSET),
+        Some(_) => Knowledge {
+            friction: FrictionColumns {
+                load: true,
+                ..FrictionColumns::OFFSET
+            },
+            links_weight: LINKS_WEIGHT,
+            rotor_deviation: Some(ROTOR_DEVIATION),
+        },
     }
 }
 

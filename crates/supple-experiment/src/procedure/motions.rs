@@ -3,10 +3,11 @@
 use crate::error::ExperimentError;
 use crate::excite::move_to;
 use crate::request_sequence::Step;
+use supple_core::config::JointGains;
 use supple_core::controller::{Breakaway, Request};
 use supple_core::dynamics::{crba, gravity, rnea};
 use supple_core::trajectory::{Fourier, HARMONICS, JointReference};
-use supple_core::{Config, Vector};
+use supple_core::{Config, Controller, Vector};
 use supple_ident::IdentError;
 use supple_ident::design::{DesignOptions, constant_speed_series, design, slow_series};
 
@@ -150,6 +151,24 @@ impl<const N: usize> Motions<N> {
         all.push(self.unseen);
         all
     }
+}
+
+/// The greatest gains of the move mode that the loop of `model` allows in all poses of these series.
+///
+/// # Errors
+/// A configuration that no controller accepts.
+pub fn gains_along<const N: usize>(
+    model: &Config<N>,
+    all: &[Fourier<N>],
+) -> Result<JointGains<N>, ExperimentError> {
+    let controller = Controller::new(*model)?;
+    let mut gains = model.move_gains;
+    for state in all.iter().flat_map(states) {
+        let here = controller.move_gains(&crba(&model.arm, &state.position_rad));
+        gains.stiffness_nm_per_rad = gains.stiffness_nm_per_rad.inf(&here.stiffness_nm_per_rad);
+        gains.damping_nm_s_per_rad = gains.damping_nm_s_per_rad.inf(&here.damping_nm_s_per_rad);
+    }
+    Ok(gains)
 }
 
 fn states<const N: usize>(series: &Fourier<N>) -> impl Iterator<Item = JointReference<N>> {

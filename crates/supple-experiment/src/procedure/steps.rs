@@ -3,7 +3,8 @@
 use super::arm::{Motion, MotionArm};
 use super::error::ProcedureError;
 use super::motions::{
-    BREAKAWAY_RAMP, DesignPlan, Motions, WIRING_RAMP, follow, ramp, ramps_s, wiring_slope_nm_per_s,
+    BREAKAWAY_RAMP, DesignPlan, Motions, WIRING_RAMP, follow, gains_along, ramp, ramps_s,
+    wiring_slope_nm_per_s,
 };
 use super::progress::{FinishedStep, FitQuality, Progress, SinusoidResult, StepName, write_whole};
 use super::sweep::Sweep;
@@ -22,6 +23,7 @@ use crate::run::joint_label;
 use crate::scenario;
 use crate::start::start_pose;
 use std::path::PathBuf;
+use supple_core::config::JointGains;
 use supple_core::controller::{LearningSwitch, Request};
 use supple_core::dynamics::gravity;
 use supple_core::trajectory::Fourier;
@@ -81,6 +83,8 @@ struct Run<'a, const N: usize, A> {
     names: Vec<String>,
     home_rad: Vector<N>,
     loaded: Option<Stage>,
+    /// Gains of the move mode with the model of the first pass; `None`: those of the description.
+    first_gains: Option<JointGains<N>>,
 }
 
 /// A motion that was completed.
@@ -114,6 +118,7 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
             operator,
             progress,
             loaded: None,
+            first_gains: None,
         })
     }
 
@@ -219,6 +224,11 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
             let wide = wide_thresholds::<N>(&model, unknown)?;
             model = model
                 .with_wide_thresholds(&wide)
+                .map_err(ProcedureError::from)?;
+        }
+        if let Some(gains) = self.first_gains.filter(|_| stage == Stage::First) {
+            model = model
+                .with_move_gains(&gains)
                 .map_err(ProcedureError::from)?;
         }
         self.arm.load(&model)?;
@@ -421,6 +431,12 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
             self.say("by the model of the first pass the arm sweeps another space");
             self.ask(&sweep)?;
         }
+        // A first pass tells little of the inertias: the loops must be stable with those of the given model, too.
+        let given = self
+            .model(Stage::Start)?
+            .config::<N>()
+            .map_err(ProcedureError::from)?;
+        self.first_gains = Some(gains_along(&given, &motions.all()).map_err(ProcedureError::from)?);
         Ok(motions)
     }
 
@@ -457,7 +473,7 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
             .iter()
             .map(|step| step.duration_s)
             .sum();
-        let (_, sinusoid_s) = scenario::sinusoid(1.0);
+        let (_, sinusoid_s) = self.start.paths().sinusoid(1.0);
         let returns_s =
             9.0 * move_to(&motions.first.at(0.0).position_rad, &self.home_rad).duration_s;
         all + self.options.warm_up_s
@@ -664,7 +680,7 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
     /// Start of the sinusoid; `None` if the arm cannot reach it.
     fn sinusoid_start(&self) -> Result<Option<Vector<N>>, ProcedureError> {
         let config = config::<N>(&self.model(Stage::Identified)?)?;
-        let (trajectory, duration_s) = scenario::sinusoid(1.0);
+        let (trajectory, duration_s) = self.start.paths().sinusoid(1.0);
         match start_pose(&config, "sinusoid", &trajectory, duration_s) {
             Ok(start_rad) => Ok(Some(start_rad)),
             Err(ExperimentError::BeyondJointStop { .. }) => Ok(None),
@@ -682,7 +698,7 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
             return Ok(self.finish(StepName::Sinusoid, before_s, None)?);
         };
         self.ensure(Stage::Identified)?;
-        let (trajectory, duration_s) = scenario::sinusoid(1.0);
+        let (trajectory, duration_s) = self.start.paths().sinusoid(1.0);
         let track = |duration_s| Step {
             recorded: true,
             ..Step::wait(Request::Track(trajectory), duration_s)
