@@ -11,7 +11,7 @@ use supple_core::dynamics::rnea;
 use supple_core::{Config, Vector};
 use supple_ident::{Fit, FrictionColumns, Log, Motion, ReadError};
 use supple_log::Reader;
-use supple_model::{Description, IdentifiedModel};
+use supple_model::{Description, IdentifiedModel, WideThresholds};
 
 /// Last part of the first pass that its fit does not see.
 const HELD_OUT: f64 = 0.25;
@@ -24,6 +24,8 @@ const LEAST_THRESHOLD: f64 = 0.5;
 /// Range of the factor between measured and given breakaway torque by which dry friction is scaled.
 const FACTOR: (f64, f64) = (0.2, 5.0);
 
+/// Margin of the limit that dry friction must not reach.
+const DRY_MARGIN: f64 = 1.3;
 /// Weight of the links of the model where inertia adds little to the torque, in equivalent samples.
 const LINKS_WEIGHT: f64 = 100.0;
 /// Standard deviation of rotor inertias there, relative to those of the model.
@@ -186,7 +188,30 @@ pub fn fit_all<const N: usize>(
         let least_nm = LEAST_THRESHOLD * present_nm[joint];
         *threshold_nm = threshold_nm.map(|nm| nm.max(least_nm));
     }
+    let described = match model.bus() {
+        Some(_) => with_friction_either_way::<N>(&described)?,
+        None => described,
+    };
     Ok((described.with_move_collision(&thresholds)?, quality))
+}
+
+/// `model` with a limit of the torque against the acceleration of a joint that dry friction at rest, which may act either
+/// way, does not reach.
+fn with_friction_either_way<const N: usize>(
+    model: &Description,
+) -> Result<Description, ProcedureError> {
+    let config = model.config::<N>()?;
+    let limits_nm = &config.limits.joint_torque_nm;
+    let dry = Vector::<N>::from_fn(|j, _| config.friction[j].breakaway_nm / limits_nm[j]);
+    let wide = WideThresholds {
+        move_share: 0.0,
+        joint_torque_nm: None,
+        tip_force_n: 0.0,
+        hold_pose: false,
+        load_n: 0.0,
+        against_share: DRY_MARGIN * dry.max(),
+    };
+    Ok(model.with_wide_thresholds(&wide)?)
 }
 
 /// What is known of an arm before it moves. The gears of motors on a bus rub more under load. Such arms move slowly within
