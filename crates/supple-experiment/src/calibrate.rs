@@ -301,11 +301,33 @@ pub fn identify<const N: usize>(
     logs: &[Log],
     runs: &[Log],
 ) -> Result<(Fit<N>, [RippleTable; N]), ExperimentError> {
-    let (columns, slow) = (FrictionColumns::OFFSET, SLOW_RAD_PER_S);
-    identify_with(start, logs, runs, columns, slow)
+    let known = Knowledge::of(FrictionColumns::OFFSET);
+    identify_with(start, logs, runs, &known, SLOW_RAD_PER_S)
 }
 
-/// As [`identify`], with these columns of friction; samples of a joint slower than `slow_rad_per_s` are excluded.
+/// What is known of an arm before it moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Knowledge {
+    /// Columns of friction.
+    pub friction: FrictionColumns,
+    /// Weight of the model's links, see [`supple_ident::consistent::Constraints::prior_weight`].
+    pub links_weight: f64,
+    /// Standard deviation of the rotor inertias relative to those of the model; `None`: unknown.
+    pub rotor_deviation: Option<f64>,
+}
+
+impl Knowledge {
+    /// These columns of friction; links and rotors are for the motion to tell.
+    pub fn of(friction: FrictionColumns) -> Knowledge {
+        Knowledge {
+            friction,
+            links_weight: 1e-2,
+            rotor_deviation: None,
+        }
+    }
+}
+
+/// As [`identify`], with what is known of the arm; samples of a joint slower than `slow_rad_per_s` are excluded.
 ///
 /// # Errors
 /// [`ExperimentError::Ident`].
@@ -313,16 +335,17 @@ pub fn identify_with<const N: usize>(
     start: &Config<N>,
     logs: &[Log],
     runs: &[Log],
-    columns: FrictionColumns,
+    knowledge: &Knowledge,
     slow_rad_per_s: f64,
 ) -> Result<(Fit<N>, [RippleTable; N]), ExperimentError> {
     let joints: Vec<usize> = (0..N).collect();
     let motor_from_joint = *supple_core::Controller::new(*start)?.motor_from_joint();
     let procedure = Procedure {
         preparation: preparation(start.period_s, CUTOFF_HZ.0),
-        friction: FrictionChoice::Columns(columns),
+        friction: FrictionChoice::Columns(knowledge.friction),
         slow_rad_per_s,
-        prior_weight: Some(1e-2),
+        prior_weight: Some(knowledge.links_weight),
+        rotor_deviation: knowledge.rotor_deviation,
         effects: Effects::all(&motor_from_joint),
         ..Procedure::default()
     };

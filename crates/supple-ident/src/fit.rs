@@ -262,10 +262,19 @@ impl Stage<'_> {
         Ok((x, blocks, noise, gap))
     }
 
-    /// What is known of the effects before any motion, as rows.
+    /// Mean and standard deviation of a rotor's inertia before any motion.
+    fn rotor_prior(&self, unknown: usize, column: &Column) -> Option<(f64, f64)> {
+        let nominal = self.prior[unknown];
+        let is_rotor = matches!(column, Column::Rotor(_)) && nominal > 0.0;
+        let relative = self.options.rotor_deviation.filter(|_| is_rotor)?;
+        Some((nominal, relative * nominal))
+    }
+
+    /// What is known of the effects and of the rotors before any motion, as rows.
     fn effect_prior(&self) -> DMatrix<f64> {
         let known = self.used.iter().enumerate().filter_map(|(k, i)| {
-            let (mean, deviation) = effect_prior(&self.columns.list()[*i])?;
+            let column = &self.columns.list()[*i];
+            let (mean, deviation) = effect_prior(column).or_else(|| self.rotor_prior(k, column))?;
             Some((k, mean, EFFECT_PRIOR_WEIGHT / deviation))
         });
         let known: Vec<_> = known.collect();

@@ -36,6 +36,8 @@ pub struct Options {
     /// `Some(weight of the prior)`: physically consistent estimate, see
     /// [`crate::consistent::Constraints::prior_weight`]; `None`: plain least squares.
     pub consistent_prior_weight: Option<f64>,
+    /// Standard deviation of each rotor inertia before any motion, relative to that of the nominal arm; `None`: unknown.
+    pub rotor_deviation: Option<f64>,
     /// Ends the fit early.
     pub cancellation: Cancellation,
 }
@@ -52,6 +54,7 @@ impl Default for Options {
             slow_rad_per_s: 0.15,
             weights: Weights::ByJointResidual,
             consistent_prior_weight: Some(1.0),
+            rotor_deviation: None,
             cancellation: Cancellation::default(),
         }
     }

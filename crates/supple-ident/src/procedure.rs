@@ -66,6 +66,8 @@ pub struct Procedure {
     pub friction: FrictionChoice,
     /// Whether to fit a rotor inertia for each moving joint; otherwise the nominal rotors are taken as known.
     pub rotor: bool,
+    /// Standard deviation of each rotor inertia before any motion, relative to that of the nominal arm; `None`: unknown.
+    pub rotor_deviation: Option<f64>,
     /// Samples of a joint slower than this are excluded from its rows \[rad/s\]; a Stribeck effect is then
     /// fitted to them in a second stage.
     pub slow_rad_per_s: f64,
@@ -96,6 +98,7 @@ impl Default for Procedure {
             method: Method::Consistent,
             friction: FrictionChoice::Auto,
             rotor: true,
+            rotor_deviation: None,
             slow_rad_per_s: 0.0,
             prior_weight: None,
             joint_noise_nm: None,
@@ -265,6 +268,7 @@ impl Procedure {
                 (None, Method::Wls | Method::Consistent) => Weights::ByJointResidual,
             },
             consistent_prior_weight: consistent.then(|| self.prior_weight.unwrap_or(PRIOR)),
+            rotor_deviation: self.rotor_deviation,
             cancellation: self.cancellation.clone(),
         };
         // Rejects invalid columns before the cross-validation.

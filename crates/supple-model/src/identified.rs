@@ -9,7 +9,7 @@ use crate::error::{ModelError, Reporter};
 use roxmltree::{Document, Node};
 use std::collections::BTreeMap;
 use std::path::Path;
-use supple_core::config::RippleTable;
+use supple_core::config::{JointGains, RippleTable};
 use supple_core::{Arm, Body, Friction, Pose};
 use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value, value};
 
@@ -84,6 +84,25 @@ impl Description {
                 let joint = self.joint_table(&mut document, joint)?;
                 put(joint, "move_collision_torque_nm", (*threshold_nm).into());
             }
+        }
+        Description::from_text(&document.to_string(), self.urdf())
+    }
+
+    /// Returns the same arm with other gains of the move mode.
+    ///
+    /// # Errors
+    /// [`ModelError::JointCount`]; any [`ModelError`] of the edited text.
+    pub fn with_move_gains<const N: usize>(
+        &self,
+        gains: &JointGains<N>,
+    ) -> Result<Description, ModelError> {
+        self.expect_dof(N)?;
+        let mut document = self.document()?;
+        for joint in 0..N {
+            let (stiffness, damping) = (gains.stiffness_nm_per_rad, gains.damping_nm_s_per_rad);
+            let table = self.joint_table(&mut document, joint)?;
+            put(table, "move_stiffness_nm_per_rad", stiffness[joint].into());
+            put(table, "move_damping_nm_s_per_rad", damping[joint].into());
         }
         Description::from_text(&document.to_string(), self.urdf())
     }

@@ -6,7 +6,7 @@ use super::mode::Breakaway;
 use super::pose_task::{DIRECTIONS, PoseCycle};
 use super::state::State;
 use super::{Controller, checks, limiter};
-use crate::config::{Config, Role};
+use crate::config::{Config, JointGains, Role};
 use crate::law::impedance::{HeldFriction, LawInput, PositionTarget, Task, Torques, impedance};
 use crate::math::{Vector, Vector3, abs, smooth_step};
 use crate::trajectory::{JointReference, Reference};
@@ -48,15 +48,21 @@ impl<const N: usize> State<N> {
         Some(reference.position_rad)
     }
 
+    /// Gains of the move mode in the pose of this cycle.
+    fn move_gains(&self, controller: &Controller<N>) -> JointGains<N> {
+        controller.move_gains(&self.terms.mass_matrix)
+    }
+
     /// Set-points with which a gravity hold that keeps the pose would go on from loops, `None` without loops or such a
     /// hold. The joint of a ramp keeps the torque that it had before.
-    pub(super) fn pose_to_hold_rad(&self, config: &Config<N>) -> Option<Vector<N>> {
+    pub(super) fn pose_to_hold_rad(&self, controller: &Controller<N>) -> Option<Vector<N>> {
+        let config = controller.config();
         if !config.hold_pose {
             return None;
         }
         let mut setpoint_rad = self.loop_setpoints_rad(config)?;
         if let Activity::Breakaway { ramp, held_nm, .. } = &self.activity {
-            let stiffness = config.move_gains.stiffness_nm_per_rad[ramp.joint];
+            let stiffness = self.move_gains(controller).stiffness_nm_per_rad[ramp.joint];
             setpoint_rad[ramp.joint] = self.position[ramp.joint] + held_nm / stiffness;
         }
         Some(setpoint_rad)
@@ -232,7 +238,7 @@ impl<const N: usize> State<N> {
         let Some(reference) = self.joint_reference(config) else {
             return self.safe_torques(controller);
         };
-        let gains = &config.move_gains;
+        let gains = self.move_gains(controller);
         let position_error = reference.position_rad - self.position;
         let velocity_error = reference.velocity_rad_per_s - self.estimator.velocity_rad_per_s;
         let mut torques = Torques {
@@ -249,9 +255,13 @@ impl<const N: usize> State<N> {
 
     /// Start of a breakaway ramp. What position loops or an earlier ramp have held until now goes on: their set-points for
     /// the other joints, their torque for the ramped one, so that gravity which the model lacks does not move the arm.
-    pub(super) fn breakaway_from(&self, config: &Config<N>, ramp: Breakaway) -> Activity<N> {
-        let joint = ramp.joint;
-        let stiffness = &config.move_gains.stiffness_nm_per_rad;
+    pub(super) fn breakaway_from(
+        &self,
+        controller: &Controller<N>,
+        ramp: Breakaway,
+    ) -> Activity<N> {
+        let (config, joint) = (controller.config(), ramp.joint);
+        let stiffness = self.move_gains(controller).stiffness_nm_per_rad;
         let constant_nm = |joint: usize| config.friction[joint].torque_nm(0.0);
         let (mut from_rad, mut held_nm) = (self.position, 0.0);
         if let Some(setpoint_rad) = self.loop_setpoints_rad(config) {
@@ -309,25 +319,33 @@ impl<const N: usize> State<N> {
     /// Adds the terms of every activity whose torques follow a fresh state and act on the arm: held-joint loops, soft
     /// stops and the workspace margin. A fault has none of them.
     #[inline(always)]
-    pub(super) fn add_joint_loops_and_stops(&self, config: &Config<N>, torques: &mut Torques<N>) {
+    pub(super) fn add_joint_loops_and_stops(
+        &self,
+        controller: &Controller<N>,
+        torques: &mut Torques<N>,
+    ) {
+        let config = controller.config();
         if !self.drives_active {
             return;
         }
         let velocity = &self.estimator.velocity_rad_per_s;
         if self.has_held_loops && !self.activity.has_joint_loops() {
-            let (all, gains) = (self.holds_pose(), &config.move_gains);
+            let all = self.holds_pose().then(|| self.move_gains(controller));
             for (joint, role) in config.roles.iter().enumerate() {
-                let (stiffness, damping) = match *role {
-                    _ if all => (
+                let (stiffness, damping) = match (&all, *role) {
+                    (Some(gains), _) => (
                         gains.stiffness_nm_per_rad[joint],
                         gains.damping_nm_s_per_rad[joint],
                     ),
-                    Role::Held {
-                        stiffness_nm_per_rad,
-                        damping_nm_s_per_rad,
-                        ..
-                    } => (stiffness_nm_per_rad, damping_nm_s_per_rad),
-                    Role::Active => continue,
+                    (
+                        None,
+                        Role::Held {
+                            stiffness_nm_per_rad,
+                            damping_nm_s_per_rad,
+                            ..
+                        },
+                    ) => (stiffness_nm_per_rad, damping_nm_s_per_rad),
+                    (None, Role::Active) => continue,
                 };
                 torques.joint_pd[joint] += stiffness
                     * (self.held_setpoint_rad[joint] - self.position[joint])

@@ -15,6 +15,7 @@ mod learning;
 mod limiter;
 mod mode;
 mod motion_check;
+mod move_gains;
 mod nullspace;
 pub mod observer;
 mod output;

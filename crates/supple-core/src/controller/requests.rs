@@ -96,7 +96,7 @@ impl<const N: usize> State<N> {
                 check_stops(config, &target_rad)?;
                 check_held_targets(config, &target_rad)?;
                 // Where gravity hold keeps the pose, the loops go on from their set-points.
-                let held_rad = self.pose_to_hold_rad(config);
+                let held_rad = self.pose_to_hold_rad(controller);
                 let from_rad = held_rad.unwrap_or(self.position);
                 check_line(config, 1.0, &from_rad, &target_rad, duration_s)?;
                 self.enter(Activity::Move {
@@ -163,7 +163,7 @@ impl<const N: usize> State<N> {
             Request::Breakaway(ramp) => {
                 check_breakaway(config, &ramp)?;
                 self.check_reference_at_rest(config)?;
-                self.enter(self.breakaway_from(config, ramp));
+                self.enter(self.breakaway_from(controller, ramp));
             }
         }
         Ok(())

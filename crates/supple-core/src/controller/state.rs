@@ -427,13 +427,14 @@ impl<const N: usize> State<N> {
     /// Moves the set-points of held joints towards their configured angles at a limited speed.
     /// While the loops are off, the set-points follow the joints, so that the loops engage without
     /// a jump. Where gravity hold keeps the pose, they follow the loops of the other modes.
-    pub(super) fn update_held_setpoints(&mut self, config: &Config<N>, elapsed_s: f64) {
+    pub(super) fn update_held_setpoints(&mut self, controller: &Controller<N>, elapsed_s: f64) {
         if !self.has_held_loops {
             return;
         }
+        let config = controller.config();
         let free = self.held_loops_inactive();
         let step = HELD_APPROACH_RAD_PER_S * elapsed_s;
-        if let Some(setpoint_rad) = self.pose_to_hold_rad(config) {
+        if let Some(setpoint_rad) = self.pose_to_hold_rad(controller) {
             self.held_setpoint_rad = setpoint_rad;
             return;
         }

@@ -47,7 +47,7 @@ pub fn step<const N: usize>(
     state.gains.elapsed_s += elapsed_s;
     state.joint_gains.elapsed_s += elapsed_s;
     state.rotational_gains.elapsed_s += elapsed_s;
-    state.update_held_setpoints(config, elapsed_s);
+    state.update_held_setpoints(controller, elapsed_s);
     if let Err(fault) = state.end_breakaway(config) {
         state.latch_fault(fault);
     }
@@ -102,7 +102,7 @@ pub fn step<const N: usize>(
         input.tip_force_n,
     );
     if !(state.activity.is_torque_off() || state.fault.is_some() || state.is_stale(config)) {
-        state.add_joint_loops_and_stops(config, &mut torques);
+        state.add_joint_loops_and_stops(controller, &mut torques);
         if controller.has_ripple() {
             let tables = &config.ripple;
             torques.ripple =

@@ -60,6 +60,11 @@ pub fn seven() -> Config<7> {
     );
     let reach = [2.6, 2.0, 2.8, 3.1, 1.2, 1.5, 3.0];
     Config {
+        // For the small inertia of a wrist and the delay of the loop.
+        move_gains: JointGains {
+            stiffness_nm_per_rad: Vector::repeat(600.0),
+            damping_nm_s_per_rad: Vector::from([5.0, 5.0, 5.0, 5.0, 0.05, 0.05, 0.005]),
+        },
         joint_gains: JointGains {
             stiffness_nm_per_rad: Vector::from([20.0, 20.0, 20.0, 20.0, 1.0, 1.0, 0.2]),
             damping_nm_s_per_rad: Vector::from([1.0, 1.0, 1.0, 1.0, 0.02, 0.02, 0.005]),
@@ -106,7 +111,7 @@ fn config<const N: usize>(
         latch: latch(),
         move_gains: JointGains {
             stiffness_nm_per_rad: all(600.0),
-            damping_nm_s_per_rad: all(10.0),
+            damping_nm_s_per_rad: all(5.0),
         },
         joint_gains: JointGains {
             stiffness_nm_per_rad: all(10.0),

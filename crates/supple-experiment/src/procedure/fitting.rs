@@ -3,7 +3,7 @@
 use super::error::ProcedureError;
 use super::progress::FitQuality;
 use crate::breakaway::JointBreakaway;
-use crate::calibrate::{SLOW_RAD_PER_S, identify_with, without_ripple};
+use crate::calibrate::{Knowledge, SLOW_RAD_PER_S, identify_with, without_ripple};
 use nalgebra::DMatrix;
 use std::path::Path;
 use supple_core::controller::Mode;
@@ -11,7 +11,7 @@ use supple_core::dynamics::rnea;
 use supple_core::{Config, Vector};
 use supple_ident::{Fit, FrictionColumns, Log, Motion, ReadError};
 use supple_log::Reader;
-use supple_model::{Description, IdentifiedModel};
+use supple_model::{Description, IdentifiedModel, WideThresholds};
 
 /// Last part of the first pass that its fit does not see.
 const HELD_OUT: f64 = 0.25;
@@ -24,6 +24,12 @@ const LEAST_THRESHOLD: f64 = 0.5;
 /// Range of the factor between measured and given breakaway torque by which dry friction is scaled.
 const FACTOR: (f64, f64) = (0.2, 5.0);
 
+/// Margin of the limit that dry friction must not reach.
+const DRY_MARGIN: f64 = 1.3;
+/// Weight of the links of the model where inertia adds little to the torque, in equivalent samples.
+const LINKS_WEIGHT: f64 = 100.0;
+/// Standard deviation of rotor inertias there, relative to those of the model.
+const ROTOR_DEVIATION: f64 = 1.0;
 /// Share of the greatest speed of the slowest joint above which samples are fitted.
 const FAST_SHARE: f64 = 0.3;
 /// Time over which the speed of a joint is averaged \[s\].
@@ -136,7 +142,13 @@ pub fn fit_first<const N: usize>(
     let (fitted, unseen) = (part(pass, 0, cut), part(pass, cut, rows - cut));
     let mut logs = vec![fitted];
     logs.extend_from_slice(others);
-    let (fit, _) = identify_with(&config, &logs, &[], columns(model), fast_rad_per_s(&logs))?;
+    let (fit, _) = identify_with(
+        &config,
+        &logs,
+        &[],
+        &knowledge(model),
+        fast_rad_per_s(&logs),
+    )?;
     let unseen = prepared(&unseen, &fit)?;
     let quality = quality(&config, &fit, &unseen)?;
     let better = quality.unseen_relative < quality.unseen_relative_before;
@@ -157,8 +169,8 @@ pub fn fit_all<const N: usize>(
     others: &[Log],
 ) -> Result<(Description, FitQuality), ProcedureError> {
     let config = model.config::<N>()?;
-    let (columns, fast_rad_per_s) = (columns(model), fast_rad_per_s(logs));
-    let (fit, ripple) = identify_with(&config, logs, constant_speed, columns, fast_rad_per_s)?;
+    let (known, fast_rad_per_s) = (knowledge(model), fast_rad_per_s(logs));
+    let (fit, ripple) = identify_with(&config, logs, constant_speed, &known, fast_rad_per_s)?;
     let motor_from_joint = *supple_core::Controller::new(config)?.motor_from_joint();
     let unseen = without_ripple(unseen, &ripple, &motor_from_joint);
     let unseen = prepared(&unseen, &fit)?;
@@ -176,14 +188,46 @@ pub fn fit_all<const N: usize>(
         let least_nm = LEAST_THRESHOLD * present_nm[joint];
         *threshold_nm = threshold_nm.map(|nm| nm.max(least_nm));
     }
+    let described = match model.bus() {
+        Some(_) => with_friction_either_way::<N>(&described)?,
+        None => described,
+    };
     Ok((described.with_move_collision(&thresholds)?, quality))
 }
 
-/// Columns of friction: the gears of motors on a bus rub more under load.
-fn columns(model: &Description) -> FrictionColumns {
-    FrictionColumns {
-        load: model.bus().is_some(),
-        ..FrictionColumns::OFFSET
+/// `model` with a limit of the torque against the acceleration of a joint that dry friction at rest, which may act either
+/// way, does not reach.
+fn with_friction_either_way<const N: usize>(
+    model: &Description,
+) -> Result<Description, ProcedureError> {
+    let config = model.config::<N>()?;
+    let limits_nm = &config.limits.joint_torque_nm;
+    let dry = Vector::<N>::from_fn(|j, _| config.friction[j].breakaway_nm / limits_nm[j]);
+    let wide = WideThresholds {
+        move_share: 0.0,
+        joint_torque_nm: None,
+        tip_force_n: 0.0,
+        hold_pose: false,
+        load_n: 0.0,
+        against_share: DRY_MARGIN * dry.max(),
+    };
+    Ok(model.with_wide_thresholds(&wide)?)
+}
+
+/// What is known of an arm before it moves. The gears of motors on a bus rub more under load. Such arms move slowly within
+/// the torque that gravity leaves, so that inertia adds little to it: rotors and links stay near those of the model where
+/// errors of friction would move them.
+fn knowledge(model: &Description) -> Knowledge {
+    match model.bus() {
+        None => Knowledge::of(FrictionColumns::OFFSET),
+        Some(_) => Knowledge {
+            friction: FrictionColumns {
+                load: true,
+                ..FrictionColumns::OFFSET
+            },
+            links_weight: LINKS_WEIGHT,
+            rotor_deviation: Some(ROTOR_DEVIATION),
+        },
     }
 }
 

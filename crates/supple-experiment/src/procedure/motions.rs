@@ -3,10 +3,11 @@
 use crate::error::ExperimentError;
 use crate::excite::move_to;
 use crate::request_sequence::Step;
+use supple_core::config::JointGains;
 use supple_core::controller::{Breakaway, Request};
 use supple_core::dynamics::{crba, gravity, rnea};
 use supple_core::trajectory::{Fourier, HARMONICS, JointReference};
-use supple_core::{Config, Vector};
+use supple_core::{Config, Controller, Vector};
 use supple_ident::IdentError;
 use supple_ident::design::{DesignOptions, constant_speed_series, design, slow_series};
 
@@ -24,6 +25,8 @@ const CAREFUL_SHARE: f64 = 1.0 / 1.5;
 const TORQUE_SHARE: f64 = 0.8;
 /// Number of times that the amplitude of such a motion is reduced, and the factor.
 const REDUCTIONS: (usize, f64) = (20, 0.85);
+/// Poses of a straight line at which they are.
+const LINE_POSES: usize = 40;
 /// Poses of a series at which torques are evaluated.
 const POSES: usize = 400;
 /// Maximum joint speed \[rad/s\] and period \[s\] of slow motion.
@@ -152,6 +155,24 @@ impl<const N: usize> Motions<N> {
     }
 }
 
+/// The greatest gains of the move mode that the loop of `model` allows in all poses of these series.
+///
+/// # Errors
+/// A configuration that no controller accepts.
+pub fn gains_along<const N: usize>(
+    model: &Config<N>,
+    all: &[Fourier<N>],
+) -> Result<JointGains<N>, ExperimentError> {
+    let controller = Controller::new(*model)?;
+    let mut gains = model.move_gains;
+    for state in all.iter().flat_map(states) {
+        let here = controller.move_gains(&crba(&model.arm, &state.position_rad));
+        gains.stiffness_nm_per_rad = gains.stiffness_nm_per_rad.inf(&here.stiffness_nm_per_rad);
+        gains.damping_nm_s_per_rad = gains.damping_nm_s_per_rad.inf(&here.damping_nm_s_per_rad);
+    }
+    Ok(gains)
+}
+
 fn states<const N: usize>(series: &Fourier<N>) -> impl Iterator<Item = JointReference<N>> {
     let series = *series;
     (0..=POSES).map(move |i| series.at(series.duration_s * i as f64 / POSES as f64))
@@ -201,12 +222,53 @@ fn scaled<const N: usize>(series: &Fourier<N>, by: f64, periods: f64) -> Fourier
     scaled
 }
 
+/// A pose through which moves go whose straight line would need more than [`TORQUE_SHARE`] of the torque limits.
+#[derive(Clone, Copy, Debug)]
+pub struct Detour<const N: usize> {
+    /// The model.
+    pub config: Config<N>,
+    /// The pose: gravity needs little torque there.
+    pub light_rad: Vector<N>,
+}
+
+impl<const N: usize> Detour<N> {
+    /// Greatest share of a torque limit that gravity and dry friction need along a line.
+    fn share_along(&self, from_rad: &Vector<N>, to_rad: &Vector<N>) -> f64 {
+        let config = &self.config;
+        let dry_nm = Vector::from_fn(|j, _| config.friction[j].breakaway_nm);
+        let at = |i: usize| {
+            let q = from_rad + (to_rad - from_rad) * (i as f64 / LINE_POSES as f64);
+            share(config, &(gravity(&config.arm, &q).abs() + dry_nm))
+        };
+        (0..=LINE_POSES).map(at).fold(0.0, f64::max)
+    }
+
+    fn moves(&self, from_rad: &Vector<N>, to_rad: &Vector<N>) -> Vec<Step<N>> {
+        let straight = self.share_along(from_rad, to_rad);
+        let light_rad = &self.light_rad;
+        let around = self.share_along(from_rad, light_rad);
+        let around = around.max(self.share_along(light_rad, to_rad));
+        if straight <= TORQUE_SHARE || straight <= around {
+            return vec![move_to(to_rad, from_rad)];
+        }
+        vec![move_to(light_rad, from_rad), move_to(to_rad, light_rad)]
+    }
+}
+
 /// Moves to the start of each series and follows it.
-pub fn follow<const N: usize>(from_rad: &Vector<N>, all: &[Fourier<N>]) -> Vec<Step<N>> {
+pub fn follow<const N: usize>(
+    from_rad: &Vector<N>,
+    all: &[Fourier<N>],
+    detour: Option<&Detour<N>>,
+) -> Vec<Step<N>> {
     let mut steps = Vec::new();
     let mut at_rad = *from_rad;
     for series in all {
-        steps.push(move_to(&series.at(0.0).position_rad, &at_rad));
+        let start_rad = series.at(0.0).position_rad;
+        match detour {
+            Some(detour) => steps.extend(detour.moves(&at_rad, &start_rad)),
+            None => steps.push(move_to(&start_rad, &at_rad)),
+        }
         steps.push(Step {
             recorded: true,
             ..Step::wait(Request::Excite(*series), series.duration_s)

@@ -9,6 +9,9 @@ use crate::request_sequence::Recording;
 use serde::{Deserialize, Serialize};
 use supple_core::Vector;
 
+/// Motion of another encoder as a share of that of the ramped joint, above which it counts: a joint that others accelerate
+/// moves less than they do.
+const OTHER_SHARE: f64 = 0.5;
 /// Motion of an encoder that counts as motion of its joint: more than bristles and cables give \[rad\].
 const MOVED_RAD: f64 = 0.01;
 /// Gravity torque above which the torque at rest tells the scale \[N m\].
@@ -35,15 +38,16 @@ pub fn ramp_result(recording: &Recording, joint: usize, rate_nm_per_s: f64) -> J
     let Some(last) = recording.t_s.len().checked_sub(1) else {
         return JointWiring::default();
     };
-    let moved = |other: &usize| {
-        let travel_rad = recording.q_rad[(last, *other)] - recording.q_rad[(0, *other)];
-        travel_rad.abs() > MOVED_RAD
+    let travel_rad = |joint: usize| {
+        let travel_rad = recording.q_rad[(last, joint)] - recording.q_rad[(0, joint)];
+        travel_rad.abs()
     };
+    let other_rad = MOVED_RAD.max(OTHER_SHARE * travel_rad(joint));
     let all = 0..recording.q_rad.ncols();
     JointWiring {
-        moved: moved(&joint),
+        moved: travel_rad(joint) > MOVED_RAD,
         others: all
-            .filter(|other| *other != joint && moved(other))
+            .filter(|other| *other != joint && travel_rad(*other) > other_rad)
             .collect(),
         torque_nm: rate_nm_per_s.abs() * (recording.t_s[last] - recording.t_s[0]),
         difference_rad: 0.0,

@@ -17,6 +17,7 @@ mod limits;
 mod messages;
 mod modes;
 mod motion;
+mod move_gains;
 mod moving;
 mod nullspace;
 mod observing;

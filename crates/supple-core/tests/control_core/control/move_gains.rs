@@ -1,0 +1,120 @@
+//! Gains of the move mode where a joint has little inertia for the delay of the loop.
+
+use crate::support::configs::{four, seven, unlimited};
+use crate::support::inverse;
+use crate::support::plant::Plant;
+use crate::support::rig::{Rig, bent};
+use std::f64::consts::FRAC_PI_2;
+use supple_core::config::JointGains;
+use supple_core::controller::{Mode, Request};
+use supple_core::dynamics::crba;
+use supple_core::{Config, Controller, Matrix, Vector};
+
+/// Damping that these arms cannot have in any pose.
+fn stiff() -> Config<7> {
+    Config {
+        move_gains: JointGains {
+            stiffness_nm_per_rad: Vector::repeat(600.0),
+            damping_nm_s_per_rad: Vector::repeat(30.0),
+        },
+        ..seven()
+    }
+}
+
+fn pose(number: u32) -> Vector<7> {
+    Vector::from_fn(|joint, _| 2.0 * (f64::from(number) * (1.0 + 0.37 * joint as f64)).sin())
+}
+
+/// Greatest eigenvalue of a product of positive matrices, by power iteration.
+fn greatest_eigenvalue(a: &Matrix<7, 7>) -> f64 {
+    let mut v = Vector::<7>::from_fn(|i, _| 1.0 + 0.1 * i as f64);
+    let mut value = 0.0;
+    for _ in 0..3000 {
+        let next = a * v;
+        value = next.norm() / v.norm();
+        v = next / next.norm();
+    }
+    value
+}
+
+#[test]
+fn damping_stays_below_the_stability_limit_of_the_delay() {
+    let controller = Controller::new(stiff()).expect("valid");
+    let damping = &stiff().move_gains.damping_nm_s_per_rad;
+    for number in 0..50 {
+        let mass_matrix = crba(&stiff().arm, &pose(number));
+        let rate = |damping: &Vector<7>| {
+            greatest_eigenvalue(&(inverse(&mass_matrix) * Matrix::from_diagonal(damping)))
+        };
+        let found = controller.move_gains(&mass_matrix).damping_nm_s_per_rad;
+        let (before, after) = (rate(damping), rate(&found));
+        assert!(before * controller.delay_s() > FRAC_PI_2);
+        assert!(
+            after * controller.delay_s() < 0.751 * FRAC_PI_2,
+            "pose {number}: {after} 1/s"
+        );
+    }
+}
+
+#[test]
+fn stiffness_and_damping_of_a_joint_shrink_alike_and_only_where_they_must() {
+    let controller = Controller::new(stiff()).expect("valid");
+    let given = stiff().move_gains;
+    for number in 0..50 {
+        let found = controller.move_gains(&crba(&stiff().arm, &pose(number)));
+        for joint in 0..7 {
+            let share = found.damping_nm_s_per_rad[joint] / given.damping_nm_s_per_rad[joint];
+            let same = found.stiffness_nm_per_rad[joint] / given.stiffness_nm_per_rad[joint];
+            assert!(share > 0.0 && share <= 1.0 && (share - same).abs() < 1e-12);
+        }
+    }
+    let low = Config {
+        move_gains: JointGains {
+            damping_nm_s_per_rad: Vector::from([1.0, 1.0, 0.5, 0.5, 0.02, 0.02, 0.002]),
+            ..given
+        },
+        ..seven()
+    };
+    let controller = Controller::new(low).expect("valid");
+    for number in 0..50 {
+        let found = controller.move_gains(&crba(&low.arm, &pose(number)));
+        assert_eq!(found, low.move_gains);
+    }
+}
+
+/// Joints that do not act on each other: the margin times inertia over delay.
+#[test]
+fn a_decoupled_joint_has_the_damping_of_its_own_inertia() {
+    let controller = Controller::new(stiff()).expect("valid");
+    let inertia = Vector::from([5.0, 0.1, 0.02, 5.0, 5.0, 0.004, 5.0]);
+    let found = controller.move_gains(&Matrix::from_diagonal(&inertia));
+    for joint in 0..7 {
+        let most = 0.75 * FRAC_PI_2 * inertia[joint] / controller.delay_s();
+        let error = found.damping_nm_s_per_rad[joint] - most.min(30.0);
+        assert!(error.abs() < 1e-9, "joint {joint}: {error}");
+    }
+}
+
+#[test]
+fn a_move_with_too_much_damping_comes_to_rest() {
+    let mut config = four();
+    unlimited(&mut config);
+    config.move_gains.damping_nm_s_per_rad = Vector::repeat(60.0);
+    let mut rig = Rig::holding(config, bent());
+    let mut plant = Plant::at_rest(config.arm, bent());
+    let target_rad = bent() + Vector::from([0.2, -0.1, 0.0, 0.2]);
+    rig.accept(Request::Move {
+        target_rad,
+        duration_s: 1.0,
+    });
+    let mut most: f64 = 0.0;
+    for cycle in 0..4000 {
+        let output = rig.drive(&mut plant, None, |_, _, _| Vector::zeros());
+        assert_eq!((output.mode, output.fault), (Mode::Move, None));
+        if cycle > 3000 {
+            most = most.max(output.velocity_rad_per_s.amax());
+        }
+    }
+    assert!(most < 1e-3, "{most} rad/s");
+    assert!((plant.q - target_rad).amax() < 1e-3);
+}

@@ -1,0 +1,107 @@
+//! The fits.
+
+use super::{Run, Stage};
+use crate::procedure::arm::MotionArm;
+use crate::procedure::error::ProcedureError;
+use crate::procedure::progress::{FitQuality, StepName};
+use crate::procedure::{FIRST_MODEL, LOGS, fitting};
+use std::path::PathBuf;
+use supple_ident::Log;
+
+impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
+    /// The log of a finished step.
+    pub(super) fn log_file(&self, step: StepName) -> PathBuf {
+        let finished = self.progress.finished(step);
+        let name = finished.and_then(|finished| finished.log.as_deref());
+        let folder = self.options.out.join(LOGS);
+        folder.join(format!("{}.mcap", name.unwrap_or_default()))
+    }
+
+    pub(super) fn first_fit(&mut self) -> Result<(), A::Error> {
+        if self.is_done(StepName::FirstFit, "first fit") {
+            return Ok(());
+        }
+        let model = self.model(Stage::Start)?;
+        let scaled = fitting::with_breakaway::<N>(&model, &self.progress.breakaway)?;
+        let pass = self.log_file(StepName::FirstPass);
+        // The moves from the home pose reach where the pass does not.
+        let logs = self.options.out.join(LOGS);
+        let moves =
+            ["warm-up", "breakaway-0-positive"].map(|name| logs.join(format!("{name}.mcap")));
+        let of = scaled.clone();
+        let fit = self.arm.meanwhile(move || {
+            let mut others = Vec::new();
+            for file in moves.iter().filter(|file| file.exists()) {
+                others.extend(fitting::all_motion::<N>(file)?);
+            }
+            let pass = only(&fitting::excitations::<N>(&pass)?, "first-pass")?.clone();
+            fitting::fit_first::<N>(&of, &pass, &others)
+        })??;
+        let (found, quality) = match fit {
+            Some((found, quality)) => (found, Some(quality)),
+            None => (scaled, None),
+        };
+        match &quality {
+            Some(quality) => self.say(&format!(
+                "unseen part of the first pass: {:.1} % of the torque unexplained, {:.1} % before",
+                100.0 * quality.unseen_relative,
+                100.0 * quality.unseen_relative_before
+            )),
+            None => self.say("the first fit is no better than the model before it, which stays"),
+        }
+        let folder = self.options.out.join(FIRST_MODEL);
+        found.save(&folder).map_err(ProcedureError::from)?;
+        self.progress.first_fit = quality;
+        Ok(self.finish(StepName::FirstFit, self.progress.moved_s, None)?)
+    }
+
+    pub(super) fn identification(&mut self) -> Result<(), A::Error> {
+        if self.is_done(StepName::Identification, "identification") {
+            return Ok(());
+        }
+        let model = self.model(Stage::First)?;
+        let file = |step| self.log_file(step);
+        let [full, slow] = [StepName::FullPass, StepName::SlowMotion].map(file);
+        let [first, constant] = [StepName::FirstPass, StepName::ConstantSpeed].map(file);
+        let unseen = self.log_file(StepName::UnseenMotion);
+        // Reading takes as long as fitting; the arm's telemetry must be read meanwhile.
+        let (found, quality) = self.arm.meanwhile(move || {
+            let (mut logs, mut others) = (Vec::new(), Vec::new());
+            for file in [&full, &slow, &first] {
+                logs.extend(fitting::excitations::<N>(file)?);
+            }
+            for file in [&full, &slow, &unseen] {
+                others.extend(fitting::all_motion::<N>(file)?);
+            }
+            let constant = fitting::excitations::<N>(&constant)?;
+            let unseen = only(&fitting::excitations::<N>(&unseen)?, "unseen-motion")?.clone();
+            fitting::fit_all::<N>(&model, &logs, &constant, &unseen, &others)
+        })??;
+        self.say(&summary(&quality));
+        let found = found
+            .with_held_joints_of(self.start)
+            .map_err(ProcedureError::from)?;
+        found
+            .save(&self.options.out)
+            .map_err(ProcedureError::from)?;
+        self.progress.fit = Some(quality);
+        Ok(self.finish(StepName::Identification, self.progress.moved_s, None)?)
+    }
+}
+
+fn only<'a>(logs: &'a [Log], name: &str) -> Result<&'a Log, ProcedureError> {
+    logs.first().ok_or_else(|| ProcedureError::Stopped {
+        motion: name.to_owned(),
+        fault: "its log has no motion along a series".to_owned(),
+        remedy: "repeat the calibration",
+    })
+}
+
+fn summary(quality: &FitQuality) -> String {
+    format!(
+        "unseen motion: {:.2} % of the torque unexplained, {:.2} % before; {}",
+        100.0 * quality.unseen_relative,
+        100.0 * quality.unseen_relative_before,
+        quality.verdict
+    )
+}

@@ -1,0 +1,322 @@
+//! The steps, one after the other.
+
+mod design;
+mod fits;
+mod passes;
+mod trials;
+mod wiring;
+
+use crate::excite::move_to;
+use crate::procedure::arm::{Motion, MotionArm};
+use crate::procedure::error::ProcedureError;
+use crate::procedure::progress::{FinishedStep, Progress, StepName};
+use crate::procedure::thresholds::wide_thresholds;
+use crate::procedure::{FIRST_MODEL, HOLD_REMEDY, Operator, ProcedureOptions};
+use crate::request_sequence::Step;
+use std::path::PathBuf;
+use supple_core::config::JointGains;
+use supple_core::{Config, Vector};
+use supple_model::Description;
+
+/// Rest in which the torque at a standstill is measured \[s\].
+const REST_S: f64 = 1.0;
+/// Duration of float \[s\].
+const FLOAT_S: f64 = 2.0;
+/// Duration of a change of gains \[s\].
+const GAINS_S: f64 = 0.2;
+/// Duration of the move back to the start of the sinusoid \[s\].
+const RETURN_S: f64 = 1.5;
+/// Attempts at a motion that contact stops.
+const ATTEMPTS: usize = 3;
+
+/// What the calibration found.
+#[derive(Clone, Debug)]
+pub struct CalibratedArm {
+    /// The identified arm, with the held joints of the description.
+    pub description: Description,
+    /// All that was measured on the way.
+    pub progress: Progress,
+}
+
+/// Calibrates an arm whose description is `start`. The result is in `options.out`: arm.toml, arm.urdf, calibration.json,
+/// the drawing of the swept space, the model of the first pass and one log for each motion.
+///
+/// # Errors
+/// [`ProcedureError`] with the remedy, and the errors of the arm. What is finished stays finished.
+pub fn calibrate_arm<const N: usize, A: MotionArm<N>>(
+    arm: &mut A,
+    start: &Description,
+    options: &ProcedureOptions,
+    operator: &mut dyn Operator,
+) -> Result<CalibratedArm, A::Error> {
+    let run = Run::new(arm, start, options, operator)?;
+    run.all()
+}
+
+/// Model in the controller.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stage {
+    Start,
+    First,
+    Identified,
+}
+
+struct Run<'a, const N: usize, A> {
+    arm: &'a mut A,
+    start: &'a Description,
+    options: &'a ProcedureOptions,
+    operator: &'a mut dyn Operator,
+    progress: Progress,
+    names: Vec<String>,
+    home_rad: Vector<N>,
+    loaded: Option<Stage>,
+    /// Pose in which gravity needs little torque, of an arm that falls without torque.
+    light_rad: Option<Vector<N>>,
+    /// Gains of the move mode with the model of the first pass; `None`: those of the description.
+    first_gains: Option<JointGains<N>>,
+}
+
+/// A motion that was completed.
+struct Done {
+    motions: Vec<Motion>,
+    log: String,
+    contacts: Vec<String>,
+}
+
+impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
+    fn new(
+        arm: &'a mut A,
+        start: &'a Description,
+        options: &'a ProcedureOptions,
+        operator: &'a mut dyn Operator,
+    ) -> Result<Self, ProcedureError> {
+        let progress = match options.resume {
+            true => Progress::read(&options.out, start.name(), options.seed)?,
+            false => Progress {
+                arm: start.name().to_owned(),
+                seed: options.seed,
+                ..Progress::default()
+            },
+        };
+        Ok(Run {
+            home_rad: start.home::<N>()?,
+            names: start.joint_names().to_vec(),
+            arm,
+            start,
+            options,
+            operator,
+            progress,
+            loaded: None,
+            light_rad: None,
+            first_gains: None,
+        })
+    }
+
+    fn all(mut self) -> Result<CalibratedArm, A::Error> {
+        self.perform()?;
+        let description = match self.progress.finished(StepName::Identification) {
+            Some(_) => self.model(Stage::Identified)?,
+            None => self.start.clone(),
+        };
+        Ok(CalibratedArm {
+            description,
+            progress: self.progress,
+        })
+    }
+
+    /// Whether the last wanted step is finished.
+    fn is_over(&self) -> bool {
+        let until = self.options.until;
+        until.is_some_and(|step| self.progress.finished(step).is_some())
+    }
+
+    fn perform(&mut self) -> Result<(), A::Error> {
+        self.wiring()?;
+        if self.is_over() {
+            return Ok(());
+        }
+        let config = config::<N>(&self.model(Stage::Start)?)?;
+        let motions = self.design(Stage::Start)?;
+        self.confirm(&config, &motions)?;
+        if self.is_over() {
+            return Ok(());
+        }
+        self.warm_up(&motions)?;
+        if self.is_over() {
+            return Ok(());
+        }
+        self.breakaway(&config, &motions)?;
+        if self.is_over() {
+            return Ok(());
+        }
+        let first = [motions.first];
+        self.series(StepName::FirstPass, "first-pass", Stage::Start, &first)?;
+        if self.is_over() {
+            return Ok(());
+        }
+        self.first_fit()?;
+        if self.is_over() {
+            return Ok(());
+        }
+        let motions = self.redesign(motions)?;
+        for (step, name, series) in [
+            (StepName::FullPass, "full-pass", &motions.full[..]),
+            (StepName::SlowMotion, "slow-motion", &[motions.slow]),
+            (StepName::ConstantSpeed, "constant-speed", &motions.constant),
+            (StepName::UnseenMotion, "unseen-motion", &[motions.unseen]),
+        ] {
+            self.series(step, name, Stage::First, series)?;
+            if self.is_over() {
+                return Ok(());
+            }
+        }
+        for step in [Self::identification, Self::float, Self::sinusoid] {
+            if self.is_over() {
+                return Ok(());
+            }
+            step(self)?;
+        }
+        Ok(())
+    }
+
+    fn say(&mut self, text: &str) {
+        self.operator.progress(text);
+    }
+
+    /// The description that the controller uses in a stage. All joints move except for the last one, in which the held
+    /// joints of the description are held.
+    fn model(&self, stage: Stage) -> Result<Description, ProcedureError> {
+        let load = |folder: PathBuf| Description::load(folder.join("arm.toml"));
+        Ok(match stage {
+            Stage::Start => self.start.with_all_joints_active()?,
+            Stage::First => load(self.options.out.join(FIRST_MODEL))?,
+            Stage::Identified => load(self.options.out.clone())?,
+        })
+    }
+
+    /// Loads the model of a stage, in the home pose if the arm has moved.
+    fn ensure(&mut self, stage: Stage) -> Result<(), A::Error> {
+        if self.loaded == Some(stage) {
+            return Ok(());
+        }
+        if self.loaded.is_some() {
+            let home_rad = self.home_rad;
+            let name = format!("home-before-{}", name_of(stage));
+            self.motion(&name, &|from| vec![move_to(&home_rad, from)])?;
+        }
+        self.say(&format!(
+            "the controller starts with the {}",
+            text_of(stage)
+        ));
+        let mut model = self.model(stage)?;
+        if stage != Stage::Identified {
+            let unknown = stage == Stage::Start || self.progress.first_fit.is_none();
+            let wide = wide_thresholds::<N>(&model, unknown)?;
+            model = model
+                .with_wide_thresholds(&wide)
+                .map_err(ProcedureError::from)?;
+        }
+        if let Some(gains) = self.first_gains.filter(|_| stage == Stage::First) {
+            model = model
+                .with_move_gains(&gains)
+                .map_err(ProcedureError::from)?;
+        }
+        self.arm.load(&model)?;
+        self.loaded = Some(stage);
+        Ok(())
+    }
+
+    /// Performs a motion that begins where the arm is. After a contact it is repeated.
+    fn motion(
+        &mut self,
+        name: &str,
+        steps: &dyn Fn(&Vector<N>) -> Vec<Step<N>>,
+    ) -> Result<Done, A::Error> {
+        let mut contacts = Vec::new();
+        loop {
+            let log = match contacts.len() {
+                0 => name.to_owned(),
+                repeated => format!("{name}-{}", repeated + 1),
+            };
+            let from_rad = self.arm.position_rad()?;
+            let performed = self.arm.perform(&log, &steps(&from_rad))?;
+            self.progress.moved_s += performed.moved_s;
+            let Some(stopped) = performed.stopped else {
+                return Ok(Done {
+                    motions: performed.motions,
+                    log,
+                    contacts,
+                });
+            };
+            let fault = stopped.fault;
+            contacts.push(fault.clone());
+            let remedy = match (stopped.by_contact, contacts.len() < ATTEMPTS) {
+                (true, true) => {
+                    self.say(&format!(
+                        "{name}: {fault}; the arm rests, then repeats the motion"
+                    ));
+                    self.arm.recover()?;
+                    continue;
+                }
+                (true, false) => "clear the space that the arm sweeps",
+                (false, _) => HOLD_REMEDY,
+            };
+            self.progress.write(&self.options.out)?;
+            return Err(ProcedureError::Stopped {
+                motion: name.to_owned(),
+                fault,
+                remedy,
+            }
+            .into());
+        }
+    }
+
+    /// Records that a step is finished.
+    fn finish(
+        &mut self,
+        step: StepName,
+        before_s: f64,
+        done: Option<Done>,
+    ) -> Result<(), ProcedureError> {
+        let (log, contacts) = match done {
+            Some(done) => (Some(done.log), done.contacts),
+            None => (None, Vec::new()),
+        };
+        self.progress.finished.push(FinishedStep {
+            step,
+            moved_s: self.progress.moved_s - before_s,
+            log,
+            contacts,
+        });
+        self.progress.write(&self.options.out)
+    }
+
+    /// Whether a step is finished; otherwise it is announced.
+    fn is_done(&mut self, step: StepName, text: &str) -> bool {
+        let done = self.progress.finished(step).is_some();
+        if !done {
+            self.say(text);
+        }
+        done
+    }
+}
+
+fn config<const N: usize>(model: &Description) -> Result<Config<N>, ProcedureError> {
+    Ok(model.config::<N>()?)
+}
+
+fn name_of(stage: Stage) -> &'static str {
+    match stage {
+        Stage::Start => "start",
+        Stage::First => "full-pass",
+        Stage::Identified => "float",
+    }
+}
+
+fn text_of(stage: Stage) -> &'static str {
+    match stage {
+        Stage::Start => "given model",
+        Stage::First => "model of the first pass",
+        Stage::Identified => "identified model",
+    }
+}

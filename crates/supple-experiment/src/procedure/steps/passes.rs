@@ -1,0 +1,99 @@
+//! Motion with the models before the identified one.
+
+use super::{Run, Stage};
+use crate::breakaway::{JointBreakaway, sliding_torque_nm};
+use crate::calibrate::upright;
+use crate::error::ExperimentError;
+use crate::procedure::arm::MotionArm;
+use crate::procedure::error::ProcedureError;
+use crate::procedure::motions::{BREAKAWAY_RAMP, Motions, follow, ramp};
+use crate::procedure::progress::StepName;
+use crate::run::joint_label;
+use supple_core::Config;
+use supple_core::trajectory::Fourier;
+
+impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
+    pub(super) fn warm_up(&mut self, motions: &Motions<N>) -> Result<(), A::Error> {
+        let text = format!("warm-up for {} s", self.options.warm_up_s);
+        if self.is_done(StepName::WarmUp, &text) {
+            return Ok(());
+        }
+        let before_s = self.progress.moved_s;
+        let mut done = None;
+        if self.options.warm_up_s > 2.0 * motions.first.ramp_s {
+            self.ensure(Stage::Start)?;
+            let series = Fourier {
+                duration_s: self.options.warm_up_s,
+                ..motions.first
+            };
+            done = Some(self.motion("warm-up", &|from| follow(from, &[series], None))?);
+        }
+        Ok(self.finish(StepName::WarmUp, before_s, done)?)
+    }
+
+    pub(super) fn breakaway(
+        &mut self,
+        config: &Config<N>,
+        motions: &Motions<N>,
+    ) -> Result<(), A::Error> {
+        if self.is_done(StepName::Breakaway, "breakaway torque of each joint") {
+            return Ok(());
+        }
+        let before_s = self.progress.moved_s;
+        self.ensure(Stage::Start)?;
+        let pose_rad = match self.falls() {
+            true => motions.light_rad,
+            false => upright(config),
+        };
+        self.progress.breakaway.clear();
+        for joint in 0..N {
+            let mut torque_nm = [0.0; 2];
+            for (direction, torque_nm) in [1.0, -1.0].into_iter().zip(&mut torque_nm) {
+                let sign = if direction > 0.0 {
+                    "positive"
+                } else {
+                    "negative"
+                };
+                let name = format!("breakaway-{joint}-{sign}");
+                let (rate_nm_per_s, stop_rad) = BREAKAWAY_RAMP;
+                let slope = (direction * rate_nm_per_s, stop_rad);
+                let done =
+                    self.motion(&name, &|from| ramp(config, from, &pose_rad, joint, slope))?;
+                let found = done.motions.first().and_then(|motion| {
+                    sliding_torque_nm(config, &motion.recording, joint, direction)
+                });
+                *torque_nm = found.ok_or(ProcedureError::from(ExperimentError::Stuck {
+                    joint: joint_label(config, joint),
+                    torque_nm: config.limits.joint_torque_nm[joint],
+                }))?;
+            }
+            self.progress.breakaway.push(JointBreakaway {
+                positive_nm: torque_nm[0],
+                negative_nm: torque_nm[1],
+            });
+        }
+        Ok(self.finish(StepName::Breakaway, before_s, None)?)
+    }
+
+    /// Follows series and keeps the log.
+    pub(super) fn series(
+        &mut self,
+        step: StepName,
+        name: &str,
+        stage: Stage,
+        series: &[Fourier<N>],
+    ) -> Result<(), A::Error> {
+        let duration_s: f64 = series.iter().map(|series| series.duration_s).sum();
+        if self.is_done(
+            step,
+            &format!("{}, {duration_s:.0} s", name.replace('-', " ")),
+        ) {
+            return Ok(());
+        }
+        let before_s = self.progress.moved_s;
+        self.ensure(stage)?;
+        let detour = self.detour(stage)?;
+        let done = self.motion(name, &|from| follow(from, series, detour.as_ref()))?;
+        Ok(self.finish(step, before_s, Some(done))?)
+    }
+}
