@@ -14,6 +14,9 @@ use supple_core::controller::Request;
 use supple_core::dynamics::gravity;
 use supple_core::{Config, Vector};
 
+/// Time in which an arm without brakes comes to rest in its position loops \[s\].
+const SETTLE_S: f64 = 2.0;
+
 impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
     pub(super) fn wiring(&mut self) -> Result<(), A::Error> {
         if self.is_done(
@@ -25,6 +28,12 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         let before_s = self.progress.moved_s;
         self.ensure(Stage::Start)?;
         let config = config::<N>(&self.model(Stage::Start)?)?;
+        if self.falls() {
+            // Gravity that the model lacks lets the arm sink into its position loops; that is no motion of a ramp.
+            self.motion("settle", &|_| {
+                vec![Step::wait(Request::GravityHold, SETTLE_S)]
+            })?;
+        }
         let pose_rad = self.arm.position_rad()?;
         self.progress.wiring.clear();
         for joint in 0..N {
