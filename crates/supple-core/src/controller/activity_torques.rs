@@ -295,6 +295,7 @@ impl<const N: usize> State<N> {
     ///
     /// # Errors
     /// [`Fault::MotionAgainstTorque`] if the joint has moved against the ramp.
+    #[inline(always)]
     pub(super) fn end_breakaway(&mut self, config: &Config<N>) -> Result<(), Fault> {
         let Activity::Breakaway { ramp, from_rad, .. } = self.activity else {
             return Ok(());
@@ -330,27 +331,29 @@ impl<const N: usize> State<N> {
         }
         let velocity = &self.estimator.velocity_rad_per_s;
         if self.has_held_loops && !self.activity.has_joint_loops() {
-            let all = self.holds_pose().then(|| self.move_gains(controller));
-            for (joint, role) in config.roles.iter().enumerate() {
-                let (stiffness, damping) = match (&all, *role) {
-                    (Some(gains), _) => (
-                        gains.stiffness_nm_per_rad[joint],
-                        gains.damping_nm_s_per_rad[joint],
-                    ),
-                    (
-                        None,
-                        Role::Held {
-                            stiffness_nm_per_rad,
-                            damping_nm_s_per_rad,
-                            ..
-                        },
-                    ) => (stiffness_nm_per_rad, damping_nm_s_per_rad),
-                    (None, Role::Active) => continue,
-                };
-                torques.joint_pd[joint] += stiffness
+            let mut add = |joint: usize, stiffness_nm_per_rad: f64, damping_nm_s_per_rad: f64| {
+                torques.joint_pd[joint] += stiffness_nm_per_rad
                     * (self.held_setpoint_rad[joint] - self.position[joint])
-                    - damping * velocity[joint];
+                    - damping_nm_s_per_rad * velocity[joint];
                 torques.damping[joint] = 0.0;
+            };
+            if self.holds_pose() {
+                let gains = self.move_gains(controller);
+                let stiffness = &gains.stiffness_nm_per_rad;
+                for joint in 0..N {
+                    add(joint, stiffness[joint], gains.damping_nm_s_per_rad[joint]);
+                }
+            } else {
+                for (joint, role) in config.roles.iter().enumerate() {
+                    if let Role::Held {
+                        stiffness_nm_per_rad,
+                        damping_nm_s_per_rad,
+                        ..
+                    } = *role
+                    {
+                        add(joint, stiffness_nm_per_rad, damping_nm_s_per_rad);
+                    }
+                }
             }
         }
         torques.soft_stop = checks::soft_stop(&config.limits, &self.position, velocity);

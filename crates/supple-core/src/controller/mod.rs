@@ -71,6 +71,8 @@ pub struct Controller<const N: usize> {
     /// The estimator's gains after one period.
     one_period: EstimatorGains,
     torque_step_nm: Vector<N>,
+    /// Weights of squared external torques whose sum exceeds one where something pushes the arm \[1/(N m)^2\].
+    push_weight_per_nm2: Vector<N>,
     stop_step_nm: Vector<N>,
     nullspace_damping_nm_s_per_rad: Vector<N>,
     learned_bounds: LearnedBounds<N>,
@@ -112,6 +114,10 @@ impl<const N: usize> Controller<N> {
             has_compliance: config.compliance_rad_per_nm != Vector::<N>::zeros(),
             one_period: EstimatorGains::new(config.period_s, config.estimator_rad_per_s),
             torque_step_nm: config.limits.torque_rate_nm_per_s * config.period_s,
+            push_weight_per_nm2: limits.joint_torque_nm.map(|limit_nm| {
+                let strong_nm = stop::UNEXPLAINED_MOVING_SHARE * limit_nm;
+                1.0 / (strong_nm * strong_nm)
+            }),
             stop_step_nm: Vector::from_fn(|i, _| {
                 let slow = config.limits.torque_rate_nm_per_s[i];
                 let fast = config.limits.joint_torque_nm[i] / STOP_TORQUE_S;

@@ -17,6 +17,7 @@ const MOVE_DAMPING_MARGIN: f64 = 0.75 * core::f64::consts::FRAC_PI_2;
 impl<const N: usize> Controller<N> {
     /// Gains of the move mode with this mass matrix \[kg m^2\]: those of the configuration, less where the delay of the
     /// loop does not allow them.
+    #[inline(never)]
     pub fn move_gains(&self, mass_matrix: &Matrix<N, N>) -> JointGains<N> {
         let gains = &self.config.move_gains;
         let Some(mass) = Cholesky::new(mass_matrix) else {

@@ -28,8 +28,8 @@ const UNCHANGED_LIMIT_S: f64 = 0.03;
 pub(super) const EARLY_STUCK_SHARE: f64 = 0.5;
 /// The same for the travel that the model predicts for the joint of a breakaway ramp, which no loop holds back.
 pub(super) const RAMP_STUCK_SHARE: f64 = 0.3;
-/// Speed above which a joint counts as moving freely \[rad/s\].
-pub(super) const OTHER_JOINT_MOVING_RAD_PER_S: f64 = 0.1;
+/// Sum of the squared speeds of all joints above which some of them move freely \[(rad/s)^2\].
+pub(super) const OTHER_JOINTS_MOVING_RAD_PER_S2: f64 = 0.1 * 0.1;
 const AGAINST_CYCLES: u32 = 20;
 const LOAD_S: f64 = 0.05;
 /// Maximum ratio of the force perpendicular to gravity to the force along it, for a load.
@@ -205,17 +205,15 @@ impl<const N: usize> Plausibility<N> {
 
     /// Whether the latched contact is one: encoders have changed in [`CONTACT_CYCLES`] of its cycles.
     pub fn is_contact_plausible(&mut self, in_contact: bool) -> bool {
-        if !in_contact {
+        if in_contact && !self.in_contact {
             self.contact_cycles = 0;
-            self.stopped_before_contact = [false; N];
-        } else if !self.in_contact {
             self.stopped_before_contact = self.unchanged;
         }
         self.in_contact = in_contact;
         if in_contact && self.contact_cycles < CONTACT_CYCLES && self.unchanged.contains(&false) {
             self.contact_cycles += 1;
         }
-        self.contact_cycles >= CONTACT_CYCLES
+        in_contact && self.contact_cycles >= CONTACT_CYCLES
     }
 
     /// Reports a stuck encoder if its value is unchanged while the joint's reference travels further than a limit:
@@ -231,15 +229,20 @@ impl<const N: usize> Plausibility<N> {
     ) -> Result<(), Fault> {
         for joint in 0..N {
             if !self.unchanged[joint] {
-                self.stopped_before_contact[joint] = false;
                 self.travel_rad[joint] = 0.0;
+                if self.in_contact {
+                    self.stopped_before_contact[joint] = false;
+                }
                 continue;
             }
-            let limit_rad = match self.stopped_before_contact[joint] {
-                true => stopped_rad.min(limit_rad),
-                false if blocked => continue,
-                false => limit_rad,
-            };
+            let mut limit_rad = limit_rad;
+            if self.in_contact {
+                match self.stopped_before_contact[joint] {
+                    true => limit_rad = stopped_rad.min(limit_rad),
+                    false if blocked => continue,
+                    false => {}
+                }
+            }
             self.travel_rad[joint] += abs(reference_rad_per_s[joint]) * elapsed_s;
             if self.travel_rad[joint] > limit_rad {
                 return Err(Fault::EncoderStuck {

@@ -434,7 +434,9 @@ impl<const N: usize> State<N> {
         let config = controller.config();
         let free = self.held_loops_inactive();
         let step = HELD_APPROACH_RAD_PER_S * elapsed_s;
-        if let Some(setpoint_rad) = self.pose_to_hold_rad(controller) {
+        if config.hold_pose
+            && let Some(setpoint_rad) = self.pose_to_hold_rad(controller)
+        {
             self.held_setpoint_rad = setpoint_rad;
             return;
         }

@@ -45,7 +45,7 @@ pub(crate) const ENERGY_GROWTH_LIMIT: f64 = 1.25;
 /// Fraction of a joint's torque limit above which an external torque would move a joint at rest.
 const UNEXPLAINED_SHARE: f64 = 0.1;
 /// The same for an arm that follows a reference out of contact: its friction is known better than this.
-const UNEXPLAINED_MOVING_SHARE: f64 = 0.05;
+pub(super) const UNEXPLAINED_MOVING_SHARE: f64 = 0.05;
 /// Time for which such a torque may act \[s\].
 const UNEXPLAINED_S: f64 = 0.05;
 /// Time after which an impact and the observer's response to it have decayed \[s\].
@@ -88,11 +88,11 @@ impl<const N: usize> State<N> {
         if !matches!(self.activity, Activity::Fault(SafeAction::GravityHold)) {
             let kept = (1.0 - elapsed_s / ENERGY_PEAK_DECAY_S).max(0.0);
             self.peak_energy_j = energy_j.max(self.peak_energy_j * kept);
-            let unexplained = self.follows_reference() && self.is_pushed(config);
-            self.unexplained_s = match unexplained {
-                true => self.unexplained_s + elapsed_s,
-                false => 0.0,
-            };
+            if self.is_pushed(controller) && self.follows_reference() {
+                self.unexplained_s += elapsed_s;
+            } else {
+                self.unexplained_s = 0.0;
+            }
             return;
         }
         if self.activity_s(config) <= ESTIMATOR_SETTLING_DELAYS * controller.delay_s() {
@@ -139,10 +139,11 @@ impl<const N: usize> State<N> {
         !(may_be_led || self.latch.in_contact())
     }
 
-    fn is_pushed(&self, config: &Config<N>) -> bool {
+    /// Whether the external torques, each as a share of what counts as strong, exceed one together.
+    fn is_pushed(&self, controller: &Controller<N>) -> bool {
         let external_nm = self.observer.external_torque_nm();
-        let limit_nm = &config.limits.joint_torque_nm;
-        (0..N).any(|joint| abs(external_nm[joint]) > UNEXPLAINED_MOVING_SHARE * limit_nm[joint])
+        let squares = external_nm.component_mul(&external_nm);
+        squares.dot(&controller.push_weight_per_nm2) > 1.0
     }
 
     /// Whether an external torque acts that should move the arm: on a joint with an unchanged

@@ -6,7 +6,7 @@ use super::checks::{COMPLIANT_SPEED_SHARE, MOVING_SHARE};
 use super::fault::Fault;
 use super::latch::Evidence;
 use super::plausibility::{
-    EARLY_STUCK_SHARE, OTHER_JOINT_MOVING_RAD_PER_S, PlausibilityInput, RAMP_STUCK_SHARE,
+    EARLY_STUCK_SHARE, OTHER_JOINTS_MOVING_RAD_PER_S2, PlausibilityInput, RAMP_STUCK_SHARE,
     SUDDEN_STOP_SHARE, joint_collision, tip_collision,
 };
 use super::pose_task::PoseCycle;
@@ -98,19 +98,7 @@ impl<const N: usize> State<N> {
         let mut reference_rad_per_s = Vector::zeros();
         if let Some(reference) = self.joint_reference(config) {
             reference_rad_per_s = reference.velocity_rad_per_s;
-        }
-        if let Activity::Breakaway { ramp, .. } = &self.activity {
-            let joint = ramp.joint;
-            let ramp_nm = ramp.rate_nm_per_s * self.activity_s(config);
-            let dry_nm = config.friction[joint].dry_size_nm(0.0);
-            let inertia_kg_m2 = self.terms.mass_matrix[(joint, joint)];
-            reference_rad_per_s[joint] = self.plausibility.ramped_rad_per_s(
-                joint,
-                ramp_nm,
-                dry_nm,
-                inertia_kg_m2,
-                elapsed_s,
-            );
+            self.add_ramped_motion(config, &mut reference_rad_per_s, elapsed_s);
         }
         if let Some(reference) = reference {
             self.latch.update_direction(&reference.velocity, elapsed_s);
@@ -153,6 +141,26 @@ impl<const N: usize> State<N> {
             Ok(()) => Ok(force),
             Err(fault) => Err((force, fault)),
         }
+    }
+
+    /// Sets the speed at which a breakaway ramp would move its joint by the model.
+    #[inline(never)]
+    fn add_ramped_motion(
+        &mut self,
+        config: &Config<N>,
+        reference_rad_per_s: &mut Vector<N>,
+        elapsed_s: f64,
+    ) {
+        let Activity::Breakaway { ramp, .. } = &self.activity else {
+            return;
+        };
+        let joint = ramp.joint;
+        let ramp_nm = ramp.rate_nm_per_s * self.activity_s(config);
+        let dry_nm = config.friction[joint].dry_size_nm(0.0);
+        let inertia_kg_m2 = self.terms.mass_matrix[(joint, joint)];
+        reference_rad_per_s[joint] =
+            self.plausibility
+                .ramped_rad_per_s(joint, ramp_nm, dry_nm, inertia_kg_m2, elapsed_s);
     }
 
     /// Whether the arm is to stand still and nobody is to push it.
@@ -240,8 +248,7 @@ impl<const N: usize> State<N> {
             // joints move, or it stood still before the contact, an unchanged encoder is stuck.
             // Encoders that are all stuck make a contact themselves: it counts once they have
             // changed in it.
-            let others_move =
-                (0..N).any(|joint| abs(velocity[joint]) > OTHER_JOINT_MOVING_RAD_PER_S);
+            let others_move = velocity.dot(velocity) > OTHER_JOINTS_MOVING_RAD_PER_S2;
             let in_contact = plausibility.is_contact_plausible(self.latch.in_contact());
             let early = !in_contact
                 && (others_move
