@@ -195,11 +195,11 @@ fn the_force_while_pressing_is_the_springs() {
     let strokes = side_by_side(&cases, |(seed, k)| probing(&perturbed(*seed), *k));
     for ((seed, k), stroke) in cases.iter().zip(&strokes) {
         let beyond_n = stroke.pressing_force_n - stroke.spring_force_n;
-        let (least_n, most_n) = match *k {
+        let (min_n, max_n) = match *k {
             5.0 => (-0.2, 0.1),
             _ => (-0.05 * stroke.spring_force_n, 0.05 * stroke.spring_force_n),
         };
-        let within = (least_n..=most_n).contains(&beyond_n);
+        let within = (min_n..=max_n).contains(&beyond_n);
         assert!(within, "{k} N/m, model {seed}: {stroke:?}");
     }
 }

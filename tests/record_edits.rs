@@ -17,7 +17,7 @@ type Edit = (&'static str, &'static str, &'static str);
 const SCALAR: [Edit; 2] = [
     (
         "crates/supple-core/src/controller/output.rs",
-        "        number least_singular_value_m;\n",
+        "        number min_singular_value_m;\n",
         "        /// A quantity of this test.\n        number added_scalar_m;\n",
     ),
     (

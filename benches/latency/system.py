@@ -70,7 +70,7 @@ def lines(machine, rounds, seconds):
             s = beside[plant]
             text.append(
                 f"| {number} | {share(bare['overruns'], bare['cycles']):.3f} | {bare['max_us']} | {plant} "
-                f"| {share(s['missed'], s['cycles']):.3f} | {s['tx_lost']} | {s['stood_still_ms']:.1f} "
+                f"| {share(s['missed'], s['cycles']):.3f} | {s['tx_lost']} | {s['clock_stall_ms']:.1f} "
                 f"| {s['step_ns']['p99'] / 1e3:.1f} |"
             )
     text += [""]

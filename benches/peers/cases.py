@@ -11,9 +11,9 @@ ARMS = pathlib.Path(__file__).parents[2] / "crates/supple-core/tests/data/arms.j
 STATES = 256
 # Near singular poses our law is damped and the peers' is not, so a pool excludes such poses. Position: minimum
 # singular value [m]; pose: maximum effective mass [kg] along, and inertia [kg m^2] about, any base axis.
-LEAST_SINGULAR_VALUE = 0.2
-GREATEST_MASS = 20.0
-GREATEST_INERTIA = 2.0
+MIN_SINGULAR_VALUE = 0.2
+MAX_MASS = 20.0
+MAX_INERTIA = 2.0
 GAINS = Record(
     stiffness=[50.0, 60.0, 70.0, 5.0, 6.0, 7.0], damping=[15.0, 16.0, 17.0, 0.5, 0.6, 0.7], nullspace=2.0
 )
@@ -126,10 +126,10 @@ def mass_matrix(arm, links):
 def regular(arm, links, tip):
     j = jacobian(links, tip[1], len(links))
     if arm.task == 3:
-        return np.linalg.svd(j[:3], compute_uv=False)[-1] > LEAST_SINGULAR_VALUE
+        return np.linalg.svd(j[:3], compute_uv=False)[-1] > MIN_SINGULAR_VALUE
     if arm.task == 6:
         felt = np.diag(np.linalg.inv(j @ np.linalg.inv(mass_matrix(arm, links)) @ j.T))
-        return felt[:3].max() < GREATEST_MASS and felt[3:].max() < GREATEST_INERTIA
+        return felt[:3].max() < MAX_MASS and felt[3:].max() < MAX_INERTIA
     return True
 
 

@@ -254,7 +254,7 @@ impl<const N: usize> Rig<N> {
             "the controller must follow the law"
         );
         assert!(
-            output.least_singular_value_m > SINGULAR_BELOW_M,
+            output.min_singular_value_m > SINGULAR_BELOW_M,
             "the pose must be regular"
         );
         rig

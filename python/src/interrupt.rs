@@ -1,4 +1,4 @@
-//! Work beside the interpreter, which hears Ctrl-C meanwhile.
+//! Work without the interpreter lock, so that Ctrl-C acts meanwhile.
 
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;

@@ -40,11 +40,11 @@ def test_the_tip_stays_in_the_workspace(arm):
 
 
 def test_progress_is_reported_and_may_stop_the_search(arm):
-    heard = []
+    reports = []
     supple.design_excitation(
-        arm, candidates=50, period_s=5.0, periods=1, progress=lambda *seen: heard.append(seen)
+        arm, candidates=50, period_s=5.0, periods=1, progress=lambda *seen: reports.append(seen)
     )
-    assert [tried for tried, _ in heard] == list(range(1, 51))
+    assert [tried for tried, _ in reports] == list(range(1, 51))
 
     def enough(tried, _best):
         if tried == 10:

@@ -197,7 +197,7 @@ def running(tmp_path_factory):
     prefix = f"pytest-{os.getpid()}"
     folder = tmp_path_factory.mktemp("up")
     command = [PROGRAMS / "supple", "up", "--plant", "sim", "--prefix", prefix, "--no-realtime", "--no-log"]
-    # Four times slower than usual: a machine that is busy with other tests then holds up no cycle for too long.
+    # Four times slower than usual: a machine that is busy with other tests then delays no cycle for too long.
     command += ["--rate-hz", str(RATE_HZ)]
     for _ in range(5):
         up = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)

@@ -9,7 +9,7 @@ mod calibration;
 mod drill;
 mod ends;
 mod falling;
-mod heard;
+mod idle_requests;
 mod learning;
 mod motors;
 mod operator;

@@ -1,5 +1,5 @@
 //! A hand guides the simulated arm of a running system; what it showed is recorded, repeated, and refused where it is not
-//! possible. The motions are on the system's clock, which stands still while the machine holds it up.
+//! possible. The motions are on the system's clock, which pauses when the host stalls.
 
 use crate::running::{Up, json, stderr_of};
 use serde_json::Value;
@@ -28,7 +28,7 @@ fn a_motion_shown_by_hand_is_recorded_and_repeated() {
     assert!((0..ATTEMPTS).any(|_| attempt().is_some()), "stalled");
 }
 
-/// The answer of a command; `None` if the machine has held up the system, so that its drives are idle.
+/// The answer of a command; `None` if the host stalled, so that the drives are idle.
 fn answer(up: &Up, arguments: &[&str]) -> Option<Value> {
     let output = up.run(arguments);
     let status = json(&up.run(&["status", "--json"]));

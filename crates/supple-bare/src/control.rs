@@ -198,5 +198,5 @@ fn every_number<const N: usize>(digest: &mut Digest, output: &Output<N>) {
     digest.matrix(&output.external_torque_nm);
     digest.matrix(&output.external_force_n);
     digest.number(output.friction_share);
-    digest.number(output.least_singular_value_m);
+    digest.number(output.min_singular_value_m);
 }

@@ -217,7 +217,7 @@ pub enum Failure {
         "--plant-options and --realistic work only with a simulated arm: use --plant sim or --plant emu"
     )]
     OptionsOfRealArm,
-    /// The hand of an emulated arm waits for a mode that it never hears of.
+    /// The hand of an emulated arm waits for a mode that it is never notified of.
     #[error(
         "the hand of an emulated arm does not learn when float begins: write `when = \"active\"` in its [hand] of the plant \
          options, or use --plant sim"

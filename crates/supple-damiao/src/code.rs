@@ -14,7 +14,7 @@ use core::fmt;
 pub struct LinearCode {
     min: f64,
     max: f64,
-    greatest: u16,
+    max_code: u16,
 }
 
 /// A value that is not a number has no code.
@@ -38,7 +38,7 @@ impl LinearCode {
         LinearCode {
             min,
             max,
-            greatest: (u32::MAX >> (32 - bits)) as u16,
+            max_code: (u32::MAX >> (32 - bits)) as u16,
         }
     }
 
@@ -53,18 +53,18 @@ impl LinearCode {
         let value = value.clamp(self.min, self.max);
         let fraction = (value - self.min) / (self.max - self.min);
         // Not negative: the cast rounds down.
-        Ok((fraction * f64::from(self.greatest) + 0.5) as u16)
+        Ok((fraction * f64::from(self.max_code) + 0.5) as u16)
     }
 
     /// Value of a code; bits above the code's own are ignored.
     pub fn decode(&self, code: u16) -> f64 {
-        let code = f64::from(code & self.greatest);
-        code / f64::from(self.greatest) * (self.max - self.min) + self.min
+        let code = f64::from(code & self.max_code);
+        code / f64::from(self.max_code) * (self.max - self.min) + self.min
     }
 
     /// Difference between neighbouring codes.
     pub fn step(&self) -> f64 {
-        (self.max - self.min) / f64::from(self.greatest)
+        (self.max - self.min) / f64::from(self.max_code)
     }
 
     /// The upper end of the interval.

@@ -123,7 +123,7 @@ impl MotorGuard {
     /// arrived for the one command of the cycle.
     ///
     /// # Errors
-    /// The first fault, in this and in all later cycles. Silence is told as long as it lasts, and what follows it is judged.
+    /// The first fault, in this and in all later cycles. Silence is reported as long as it lasts; what follows it is checked again.
     pub fn cycle(&mut self, feedback: Option<&Feedback>, answers: u32) -> Result<(), MotorFault> {
         if let Some(fault) = self.fault {
             return Err(fault);

@@ -4,7 +4,7 @@
 //! request -> collect -> (published, answered, checked) -> operate -> send_torques -> lower -> poll -> drain
 //! ```
 //!
-//! Two shapes of a cycle fit: "ask, hear, answer, torque" (the request asks for positions and the torques go out at
+//! Two shapes of a cycle fit: "request, receive, compute, send torques" (the request asks for positions and the torques go out at
 //! once), and "the torque is the question" (the request sends the torques of the previous cycle, whose replies carry
 //! the state; the torques given in this cycle wait for the next one).
 //!

@@ -162,7 +162,7 @@ impl LossReason {
             | LossReason::Leaving => true,
             // Gravity computed from a lost encoder would be wrong.
             LossReason::Encoder(_) | LossReason::Motor(..) => false,
-            // The pose or its torque is itself in doubt.
+            // Neither the pose nor its torque can be relied on.
             LossReason::Overspeed(_) | LossReason::NotStopped(_) | LossReason::HoldDrives(_) => {
                 false
             }

@@ -60,9 +60,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for (name, mut ratios) in ["with effects", "ideal"].into_iter().zip(ratios) {
         ratios.sort_by(f64::total_cmp);
         let covered = ratios.iter().filter(|r| **r >= 1.0).count();
-        if let (Some(least), Some(median)) = (ratios.first(), ratios.get(ratios.len() / 2)) {
+        if let (Some(min), Some(median)) = (ratios.first(), ratios.get(ratios.len() / 2)) {
             println!(
-                "{name}: {} runs, covered {covered}, upper bound over error: median {median:.2}, least {least:.2}, tenth \
+                "{name}: {} runs, covered {covered}, upper bound over error: median {median:.2}, least {min:.2}, tenth \
                  {:.2}",
                 ratios.len(),
                 ratios[ratios.len() / 10]

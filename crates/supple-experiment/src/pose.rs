@@ -165,7 +165,7 @@ fn friction_at_tip_n<const N: usize>(
     let mut q = *start_rad;
     let mut state = Terms::default();
     let start = tip_pose(&config.arm, &q).rotation;
-    let mut greatest_n2 = 0.0_f64;
+    let mut max_n2 = 0.0_f64;
     for k in 0..=PATH_POINTS {
         let time_s = motion.duration_s * f64::from(k) / f64::from(PATH_POINTS);
         terms(&config.arm, &q, &Vector::zeros(), &mut state);
@@ -176,11 +176,11 @@ fn friction_at_tip_n<const N: usize>(
             task.inverse.fixed_view::<1, 3>(i, 0).norm_squared()
                 * config.friction[i].coulomb_nm.powi(2)
         };
-        greatest_n2 = greatest_n2.max((0..N).map(of_joint).sum());
+        max_n2 = max_n2.max((0..N).map(of_joint).sum());
         let distance = motion.trajectory.at(time_s).position - state.base_from_tip.translation;
         let wanted = motion.rotation.at(&start, time_s).base_from_tip;
         let angle = rotation_vector(&(wanted * state.base_from_tip.rotation.transpose()));
         q += task.inverse * Vector::<6>::from_fn(|i, _| [distance, angle][i / 3][i % 3]);
     }
-    greatest_n2.sqrt()
+    max_n2.sqrt()
 }

@@ -54,7 +54,7 @@ impl Effects {
             return Vec::new();
         };
         let row = matrix.row(motor);
-        let greatest = row.amax();
-        row.iter().map(|x| x / greatest).collect()
+        let max = row.amax();
+        row.iter().map(|x| x / max).collect()
     }
 }

@@ -45,7 +45,7 @@ pub fn pseudo_inverse(a: &DMatrix<f64>, tolerance: f64) -> Result<DMatrix<f64>, 
 ///
 /// # Errors
 /// As [`pseudo_inverse`].
-pub fn least_norm(
+pub fn min_norm_solution(
     a: &DMatrix<f64>,
     b: &DVector<f64>,
     tolerance: f64,
@@ -69,7 +69,7 @@ pub fn nearest(block: &ReducedSystem, prior: &DVector<f64>) -> Result<DVector<f6
         }
     };
     let scaled = DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)] * scale(j));
-    let step = least_norm(
+    let step = min_norm_solution(
         &scaled,
         &(block.b() - &a * prior),
         crate::base::RANK_TOLERANCE,

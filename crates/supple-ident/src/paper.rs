@@ -108,7 +108,7 @@ pub fn estimate(known: &Parameters, motion: &Motion) -> Result<Estimate, IdentEr
             remedy: "move all three joints, over larger arcs and at several speeds",
         });
     }
-    let solution = crate::estimate::least_norm(&block.a(), &block.b(), RANK_TOLERANCE)?;
+    let solution = crate::estimate::min_norm_solution(&block.a(), &block.b(), RANK_TOLERANCE)?;
     let psi: [f64; 12] = std::array::from_fn(|i| solution[i]);
     let freedom = (3 * samples - columns.rank()) as f64 * motion.independent_fraction;
     let error = block.error_squared(&solution);

@@ -131,7 +131,7 @@ impl PlantLink {
         self.controller.dropped()
     }
 
-    /// Tells the controller that a state follows within some tens or hundreds of microseconds, so that it can do its
+    /// Notifies the controller that a state follows within some tens or hundreds of microseconds, so that it can do its
     /// other work before that. Optional.
     ///
     /// # Errors

@@ -23,6 +23,8 @@ const TERMS_TYPE: &str = "supple_msgs/TorqueTerms";
 const VECTOR_TYPE: &str = "geometry_msgs/Vector3";
 /// Fields that earlier versions lack, whose value then is not zero.
 const DEFAULTS: &[(&str, u64)] = &[("drives_active", 1)];
+/// Names of fields in earlier versions, and their names now.
+const RENAMED: &[(&str, &str)] = &[("least_singular_value_m", "min_singular_value_m")];
 /// Before the fields of a record.
 const HEAD: &str = "\
 # One step of the controller: input, output, and every term of the torque.
@@ -371,8 +373,10 @@ fn check(definitions: &Definitions) -> Result<(), String> {
     }
 }
 
-/// The field of this name, and its first word.
+/// The field of this name or of this earlier name, and its first word.
 fn find(name: &str, joints: usize) -> Option<(Shape, usize)> {
+    let renamed = RENAMED.iter().find(|(earlier, _)| *earlier == name);
+    let name = renamed.map_or(name, |(_, now)| now);
     let mut at = 0;
     for field in FIELDS {
         if field.name == name {

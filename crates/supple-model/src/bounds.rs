@@ -32,13 +32,13 @@ pub(crate) fn first_out_of_range<const N: usize>(config: &Config<N>) -> Option<C
         ),
         one("handover_s", config.handover_s, 60.0, "at most 60"),
         one(
-            "[pose] greatest_stiffness_nm_per_rad",
+            "[pose] max_stiffness_nm_per_rad",
             config.pose.max_stiffness_nm_per_rad,
             1e4,
             "at most 10,000",
         ),
         one(
-            "[pose] greatest_damping_nm_s_per_rad",
+            "[pose] max_damping_nm_s_per_rad",
             config.pose.max_damping_nm_s_per_rad,
             1e3,
             "at most 1000",
@@ -92,13 +92,13 @@ pub(crate) fn first_out_of_range<const N: usize>(config: &Config<N>) -> Option<C
             "at most 1,000",
         ),
         one(
-            "[limits] greatest_stiffness_n_per_m",
+            "[limits] max_stiffness_n_per_m",
             limits.stiffness_n_per_m,
             1e5,
             hundred_k,
         ),
         one(
-            "[limits] greatest_damping_n_s_per_m",
+            "[limits] max_damping_n_s_per_m",
             limits.damping_n_s_per_m,
             1e4,
             "at most 10,000",

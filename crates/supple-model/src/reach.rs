@@ -58,7 +58,7 @@ pub fn start_pose<const N: usize>(
         .map(|seed| solve(config, &seed, &point_m))
         .inspect(|found| nearest = nearest.min(found.distance_m))
         .filter_map(|found| found.reached().then_some(found.position_rad))
-        .map(|q| (least_singular_value_m(config, &q), q))
+        .map(|q| (min_singular_value_m(config, &q), q))
         .collect();
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     for (_, start_rad) in found {
@@ -154,11 +154,11 @@ pub(crate) fn solve<const N: usize>(
     )
 }
 
-/// Least singular value of the Jacobian of the tip's position \[m\]; zero where there is no law.
-pub fn least_singular_value_m<const N: usize>(config: &Config<N>, q: &Vector<N>) -> f64 {
+/// Smallest singular value of the Jacobian of the tip's position \[m\]; zero where there is no law.
+pub fn min_singular_value_m<const N: usize>(config: &Config<N>, q: &Vector<N>) -> f64 {
     let mut state = Terms::default();
     terms(&config.arm, q, &Vector::zeros(), &mut state);
-    Task::new(&state, &config.roles).map_or(0.0, |task| task.least_singular_value_m)
+    Task::new(&state, &config.roles).map_or(0.0, |task| task.min_singular_value_m)
 }
 
 /// Poses that are spread evenly over the middle of the joint ranges.

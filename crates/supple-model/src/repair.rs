@@ -11,7 +11,7 @@ use supple_core::math::Matrix3;
 use supple_core::{Body, BodyError};
 
 /// Least second moment of mass along an axis, as a fraction of the greatest.
-const LEAST_SHARE: f64 = 1e-3;
+const MIN_SHARE: f64 = 1e-3;
 /// Radius of the ball whose inertia a body without any usable one gets \[m\].
 const BALL_RADIUS_M: f64 = 0.02;
 
@@ -24,13 +24,11 @@ pub(crate) fn nearest(body: &Body) -> Option<Body> {
     let inertia = 0.5 * (body.inertia_kg_m2 + body.inertia_kg_m2.transpose());
     let moments = Matrix3::from_diagonal_element(0.5 * inertia.trace()) - inertia;
     let eigen = SymmetricEigen::new(moments);
-    let greatest = eigen.eigenvalues.max();
-    if greatest <= 0.0 {
+    let max = eigen.eigenvalues.max();
+    if max <= 0.0 {
         return Some(Body::ball(body.mass_kg, BALL_RADIUS_M, body.com_m));
     }
-    let raised = eigen
-        .eigenvalues
-        .map(|moment| moment.max(LEAST_SHARE * greatest));
+    let raised = eigen.eigenvalues.map(|moment| moment.max(MIN_SHARE * max));
     let moments =
         eigen.eigenvectors * Matrix3::from_diagonal(&raised) * eigen.eigenvectors.transpose();
     let moments = 0.5 * (moments + moments.transpose());

@@ -289,9 +289,11 @@ pub struct LimitSettings {
     /// Maximum distance of the tip from the start of a requested trajectory (m). Default 0.02.
     pub start_error_m: f64,
     /// Maximum stiffness that a request may set (N/m). Default 1000.
-    pub greatest_stiffness_n_per_m: f64,
+    #[serde(alias = "greatest_stiffness_n_per_m")]
+    pub max_stiffness_n_per_m: f64,
     /// Maximum damping that a request may set (N s/m). Default 100.
-    pub greatest_damping_n_s_per_m: f64,
+    #[serde(alias = "greatest_damping_n_s_per_m")]
+    pub max_damping_n_s_per_m: f64,
 }
 
 /// Collision thresholds of external forces, observed from motion and torques without a sensor. The threshold of
@@ -483,8 +485,8 @@ impl Default for LimitSettings {
             joint_tracking_error_rad: 0.2,
             stale_cycles: 1,
             start_error_m: 0.02,
-            greatest_stiffness_n_per_m: 1000.0,
-            greatest_damping_n_s_per_m: 100.0,
+            max_stiffness_n_per_m: 1000.0,
+            max_damping_n_s_per_m: 100.0,
         }
     }
 }
@@ -588,9 +590,11 @@ pub struct PoseSettings {
     /// Damping about the base axes (N m s/rad), zero or more. Default 0.02 about each.
     pub damping_nm_s_per_rad: [f64; 3],
     /// Maximum rotational stiffness that a request may set (N m/rad). Default 20.
-    pub greatest_stiffness_nm_per_rad: f64,
+    #[serde(alias = "greatest_stiffness_nm_per_rad")]
+    pub max_stiffness_nm_per_rad: f64,
     /// Maximum rotational damping that a request may set (N m s/rad). Default 2.
-    pub greatest_damping_nm_s_per_rad: f64,
+    #[serde(alias = "greatest_damping_nm_s_per_rad")]
+    pub max_damping_nm_s_per_rad: f64,
     /// Maximum angular speed of a requested rotation (rad/s). Default 0.5.
     pub angular_speed_rad_per_s: f64,
     /// Angle between the tip and the reference of its orientation above which the controller faults (rad). Default
@@ -604,8 +608,8 @@ impl Default for PoseSettings {
             source: None,
             stiffness_nm_per_rad: [0.5; 3],
             damping_nm_s_per_rad: [0.02; 3],
-            greatest_stiffness_nm_per_rad: 20.0,
-            greatest_damping_nm_s_per_rad: 2.0,
+            max_stiffness_nm_per_rad: 20.0,
+            max_damping_nm_s_per_rad: 2.0,
             angular_speed_rad_per_s: 0.5,
             rotation_error_rad: 0.5,
         }

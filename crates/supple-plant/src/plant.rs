@@ -146,7 +146,7 @@ impl<const N: usize> Plant<N> {
         lasts_s / self.steps_per_cycle as f64
     }
 
-    /// Tells a hand that guides the arm what the controller does in the next cycle.
+    /// Passes what the controller does in the next cycle to a hand that guides the arm.
     pub fn see_controller(&mut self, view: ControllerView) {
         if let Some(hand) = &mut self.hand {
             hand.see(view, self.truth.time_s);

@@ -283,7 +283,8 @@ impl HelperState {
     fn end_motions(&mut self) {
         self.plan.ended();
         while let Some(request) = self.waiting.take() {
-            let text = "refused: it waited when the arm was told to rest, or a fault was latched";
+            let text =
+                "refused: while it waited, a mode at rest was requested or a fault was latched";
             self.refuse_waiting(&request, text);
         }
     }

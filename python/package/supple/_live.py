@@ -363,7 +363,7 @@ class System:
         Parameters
         ----------
         duration_s : float
-            Time (s), zero or more. The clock of a simulated arm stands still while its machine is held up.
+            Time (s), zero or more. When the host stalls, the time of a simulated arm pauses.
         """
         received = self._native.received() + max(1, round(duration_s / self.period_s)) - 1
         while not self._native.wait(received, 5.0):

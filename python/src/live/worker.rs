@@ -38,7 +38,7 @@ pub enum RequestError {
     NoAnswer,
 }
 
-/// What the thread tells readers.
+/// What the thread shares with readers.
 #[derive(Default)]
 pub struct History {
     /// The last cycles, oldest first.

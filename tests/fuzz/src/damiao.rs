@@ -40,7 +40,7 @@ pub fn damiao_request(data: &[u8]) {
     };
     let requests = (1..16u8).filter_map(|id| Some((id, Request::parse(&frame, id)?)));
     let requests: Vec<_> = requests.collect();
-    assert!(requests.len() <= 1, "one motor hears a frame");
+    assert!(requests.len() <= 1, "one motor receives a frame");
     for (id, request) in requests {
         if let Request::Mit(codes) = request {
             // What the host sends from the same numbers is a command too, never a special frame.

@@ -1,7 +1,7 @@
 //! What is learned, in the controller: received by requests, brought into force along a ramp, applied as one torque term.
 //!
 //! Nothing is estimated here. A request replaces the target of the ramp; the terms in force approach it linearly, so
-//! that no torque steps. In contact, in faults, without torque and in modes in which people push, the ramp stands still
+//! that no torque steps. In contact, in faults, without torque and in modes in which people push, the ramp pauses
 //! and new terms are refused.
 
 use super::Controller;

@@ -288,8 +288,8 @@ cycle! {
         flag learning;
         /// Share of the dry friction feed-forward applied, 0 to 1.
         number friction_share;
-        /// Least singular value of the active joints' linear Jacobian \[m\].
-        number least_singular_value_m;
+        /// Smallest singular value of the active joints' linear Jacobian \[m\].
+        number min_singular_value_m;
     }
     output {
         /// Cycle of the state that this answers.

@@ -57,10 +57,10 @@ impl ResidualScale {
         let window_s = (self.seen_s + PRIOR_S).min(WINDOW_S);
         self.seen_s += elapsed_s;
         let square = (self.deviations * x) * (self.deviations * x);
-        let most = CLIP * CLIP * self.mean_square;
-        let change = (square.min(most) - self.mean_square) * (elapsed_s / window_s).min(1.0);
-        let (least, greatest) = (FACTOR.0 * FACTOR.0, FACTOR.1 * FACTOR.1);
-        self.mean_square = (self.mean_square + change).clamp(least, greatest);
+        let clip = CLIP * CLIP * self.mean_square;
+        let change = (square.min(clip) - self.mean_square) * (elapsed_s / window_s).min(1.0);
+        let (min, max) = (FACTOR.0 * FACTOR.0, FACTOR.1 * FACTOR.1);
+        self.mean_square = (self.mean_square + change).clamp(min, max);
     }
 
     /// Factor of the configured threshold.

@@ -179,6 +179,6 @@ pub fn step<const N: usize>(
         contact_threshold_n: state.latch.threshold_n(),
         in_contact: state.latch.in_contact(),
         friction_share: state.latch.friction_share(),
-        least_singular_value_m: task.map_or(0.0, |task| task.least_singular_value_m),
+        min_singular_value_m: task.map_or(0.0, |task| task.min_singular_value_m),
     }
 }

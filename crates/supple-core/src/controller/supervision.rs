@@ -20,7 +20,7 @@ use crate::trajectory::Reference;
 
 /// Whether the pose is regular, so that the tip force can be estimated from the joint torques.
 fn is_regular<const N: usize>(task: &Task<N>) -> bool {
-    task.least_singular_value_m >= SINGULAR_BELOW_M
+    task.min_singular_value_m >= SINGULAR_BELOW_M
 }
 
 impl<const N: usize> State<N> {
@@ -163,7 +163,7 @@ impl<const N: usize> State<N> {
                 .ramped_rad_per_s(joint, ramp_nm, dry_nm, inertia_kg_m2, elapsed_s);
     }
 
-    /// Whether the arm is to stand still and nobody is to push it.
+    /// Whether the arm is to be at rest and nobody is to push it.
     fn is_resting(&self, reference_rad_per_s: &Vector<N>) -> bool {
         matches!(self.activity, Activity::GravityHold | Activity::Move { .. })
             && reference_rad_per_s.iter().all(|speed| *speed == 0.0)

@@ -6,7 +6,7 @@
 //! it is computed so, independent of the mass matrix.
 //!
 //! **Near singular poses** the position's `A` is damped: `A + f(sigma) / m_max I`, with `sigma` the
-//! least singular value of the active Jacobian, `f = (1 - (sigma / 0.18)^2)^2` below 0.18 and zero
+//! smallest singular value of the active Jacobian, `f = (1 - (sigma / 0.18)^2)^2` below 0.18 and zero
 //! above (the paper's sinusoid stays above), `m_max` = 20 kg. At a singular pose the mass that the
 //! inertial terms command along the lost direction is thus `m_max` instead of infinite; on the way
 //! there it may be greater, about twice that for an arm like the WAM.
@@ -24,14 +24,14 @@ use crate::math::linalg::{
 };
 use crate::math::{Matrix, Matrix3};
 
-/// Least singular value of the active Jacobian below which the position's inverse is damped \[m\].
+/// Smallest singular value of the active Jacobian below which the position's inverse is damped \[m\].
 pub const SINGULAR_BELOW_M: f64 = 0.18;
 /// Greatest mass that the damped inverse commands along a lost direction \[kg\].
 pub const MAX_TASK_MASS_KG: f64 = 20.0;
 /// Greatest moment of inertia that the damped inverse commands about a lost direction \[kg m^2\].
 pub const MAX_TASK_INERTIA_KG_M2: f64 = 2.0;
 
-/// Damping of the position's inverse at the least singular value `sigma_m` \[1/kg\]: zero from
+/// Damping of the position's inverse at the smallest singular value `sigma_m` \[1/kg\]: zero from
 /// [`SINGULAR_BELOW_M`] on, `1 / MAX_TASK_MASS_KG` at zero.
 pub fn singularity_damping_per_kg(sigma_m: f64) -> f64 {
     if sigma_m >= SINGULAR_BELOW_M {
@@ -66,8 +66,8 @@ pub struct Task<const N: usize, const D: usize = 3> {
     pub jacobian: Matrix<D, N>,
     /// `Jb`, joint motion per tip motion; rows of held joints zero.
     pub inverse: Matrix<N, D>,
-    /// Least singular value of the position's rows of `jacobian` \[m\].
-    pub least_singular_value_m: f64,
+    /// Smallest singular value of the position's rows of `jacobian` \[m\].
+    pub min_singular_value_m: f64,
     /// Near a singular pose: the inverse is damped.
     pub is_damped: bool,
 }
@@ -80,7 +80,7 @@ impl<const N: usize> Task<N, 3> {
         Task::with_count(terms, roles, count_active(roles))
     }
 
-    /// As [`Task::new`], for whoever has counted the active joints before.
+    /// As [`Task::new`], for a caller that has counted the active joints before.
     #[inline(always)]
     pub(crate) fn with_count(
         terms: &Terms<N>,
@@ -103,7 +103,7 @@ impl<const N: usize> Task<N, 6> {
 }
 
 impl<const N: usize, const D: usize> Task<N, D> {
-    /// The task of a state, for the sum: whoever does not read the least singular value does not
+    /// The task of a state, for the sum: a caller that does not read the smallest singular value does not
     /// wait for it, which takes as long as the rest of the law, where it is surely great enough.
     #[inline(always)]
     pub(crate) fn of_state(terms: &Terms<N>, roles: &[Role; N]) -> Option<Task<N, D>> {
@@ -173,7 +173,7 @@ impl<const N: usize, const D: usize> Task<N, D> {
         Some(Task {
             jacobian,
             inverse,
-            least_singular_value_m: sigma,
+            min_singular_value_m: sigma,
             is_damped,
         })
     }
@@ -191,7 +191,7 @@ pub(crate) fn square_task<const N: usize, const D: usize>(
     regular.then(|| Task {
         jacobian: Matrix::from_fn(|direction, joint| columns[joint][direction]),
         inverse: spread(inverse.rows(), [0, 1, 2]),
-        least_singular_value_m: min_singular_value(&Matrix3::from(columns)),
+        min_singular_value_m: min_singular_value(&Matrix3::from(columns)),
         is_damped: false,
     })
 }

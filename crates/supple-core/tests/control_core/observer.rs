@@ -136,7 +136,7 @@ fn a_rotating_tip_force_is_observed_with_first_order_gain_and_lag() {
         let mut here = Terms::default();
         terms(&wam3(), q, &Vector::zeros(), &mut here);
         let task = Task::new(&here, &roles).expect("a task");
-        if task.least_singular_value_m < supple_core::impedance::SINGULAR_BELOW_M {
+        if task.min_singular_value_m < supple_core::impedance::SINGULAR_BELOW_M {
             continue;
         }
         let seen = task.inverse.tr_mul(residual);

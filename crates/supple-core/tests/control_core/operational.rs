@@ -307,7 +307,7 @@ fn position_sum_is_the_total<const N: usize>(case: &Case<N>, active: usize) -> O
         let apart = impedance(&roles, &terms, &task, &law).total();
         let sum = impedance_torque(&case.arm(), &roles, &case.q, &law).expect("definite");
         // Both invert a mobility whose condition grows towards singular poses.
-        let sigma = task.least_singular_value_m.max(0.02);
+        let sigma = task.min_singular_value_m.max(0.02);
         let tolerance = 1e-10 / (sigma / SINGULAR_BELOW_M).min(1.0).powi(4);
         prop_assert!(
             mixed_error(&sum, &apart) < tolerance * (1.0 + apart.norm()),

@@ -28,7 +28,7 @@ fn feedback_has_eight_bytes() {
     assert_eq!(Feedback::parse(&frame), Err(FeedbackError::Length(2)));
 }
 
-/// A register reply looks like feedback of a disabled motor near -12.48 rad: only the request tells them apart.
+/// A register reply looks like feedback of a disabled motor near -12.48 rad: only the request distinguishes them.
 #[test]
 fn a_register_reply_could_be_feedback() {
     let frame = Frame::new(0x13, &[0x03, 0x00, 0x33, 0x0A, 1, 0, 0, 0]).unwrap();

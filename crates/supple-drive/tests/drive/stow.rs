@@ -26,13 +26,13 @@ fn stowing(stow_rad: Vector<4>) -> (Stowing<4>, Vector<4>) {
 #[test]
 fn a_blocked_arm_is_not_pushed_harder_and_harder() {
     let (mut stowing, gravity_nm) = stowing(Vector::zeros());
-    let mut greatest = 0.0_f64;
+    let mut max = 0.0_f64;
     for ms in 0..5000 {
         let torque_nm = stowing.stow_nm(f64::from(ms) * 1e-3);
         // Within the time of the reference: afterwards the torque fades.
         if f64::from(ms) * 1e-3 < 1.875 * 1.2 / 0.4 {
-            greatest = greatest.max((torque_nm - gravity_nm).amax());
+            max = max.max((torque_nm - gravity_nm).amax());
         }
     }
-    assert!(greatest > 9.9 && greatest < 10.0 + 1e-9, "{greatest} N m");
+    assert!(max > 9.9 && max < 10.0 + 1e-9, "{max} N m");
 }

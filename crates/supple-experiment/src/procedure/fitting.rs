@@ -20,7 +20,7 @@ const BEGIN_S: f64 = 0.1;
 /// Least range of each joint in a motion that is fitted \[rad\].
 const ALL_MOVE_RAD: f64 = 0.05;
 /// Least collision threshold of a joint, as a fraction of that of the description.
-const LEAST_THRESHOLD: f64 = 0.5;
+const MIN_THRESHOLD: f64 = 0.5;
 /// Range of the factor between measured and given breakaway torque by which dry friction is scaled.
 const FACTOR: (f64, f64) = (0.2, 5.0);
 
@@ -30,7 +30,7 @@ const DRY_MARGIN: f64 = 1.3;
 const LINKS_WEIGHT: f64 = 100.0;
 /// Standard deviation of rotor inertias there, relative to those of the model.
 const ROTOR_DEVIATION: f64 = 1.0;
-/// Share of the greatest speed of the slowest joint above which samples are fitted.
+/// Share of the largest speed of the slowest joint above which samples are fitted.
 const FAST_SHARE: f64 = 0.3;
 /// Time over which the speed of a joint is averaged \[s\].
 const SPEED_S: f64 = 0.1;
@@ -185,8 +185,8 @@ pub fn fit_all<const N: usize>(
     let mut thresholds = fit.move_collision_nm(&validations, &config);
     for (joint, threshold_nm) in thresholds.iter_mut().enumerate() {
         // The observer is faster than the filter of the residuals.
-        let least_nm = LEAST_THRESHOLD * present_nm[joint];
-        *threshold_nm = threshold_nm.map(|nm| nm.max(least_nm));
+        let min_nm = MIN_THRESHOLD * present_nm[joint];
+        *threshold_nm = threshold_nm.map(|nm| nm.max(min_nm));
     }
     let described = match model.bus() {
         Some(_) => with_friction_either_way::<N>(&described)?,

@@ -105,7 +105,7 @@ impl<'a, const N: usize> Gravities<'a, N> {
     }
 
     /// Least correlation over the heavy joints, with the angle of one joint changed.
-    fn least_alike(&self, change: Option<(usize, f64)>) -> f64 {
+    fn min_correlation(&self, change: Option<(usize, f64)>) -> f64 {
         let given = match change {
             None => self.given.clone(),
             Some((joint, by)) => self.given_at(joint, by),
@@ -125,7 +125,7 @@ impl<'a, const N: usize> Gravities<'a, N> {
 
     /// A zero: with one angle changed, the weight is held as the given arm would, and with none it is not.
     pub fn zero(&self) -> Option<(usize, f64, f64, f64)> {
-        let before = self.least_alike(None);
+        let before = self.min_correlation(None);
         if self.heavy.is_empty() || before > ALIKE.0 {
             return None;
         }
@@ -133,7 +133,7 @@ impl<'a, const N: usize> Gravities<'a, N> {
         for &joint in self.context.columns.moving() {
             for k in -31..=31 {
                 let by = 0.1 * f64::from(k);
-                let after = self.least_alike(Some((joint, by)));
+                let after = self.min_correlation(Some((joint, by)));
                 if after > best.2 {
                     best = (joint, by, after);
                 }
@@ -141,7 +141,7 @@ impl<'a, const N: usize> Gravities<'a, N> {
         }
         for k in -9..=9 {
             let by = best.1 + 0.01 * f64::from(k);
-            let after = self.least_alike(Some((best.0, by)));
+            let after = self.min_correlation(Some((best.0, by)));
             if after > best.2 {
                 best = (best.0, by, after);
             }

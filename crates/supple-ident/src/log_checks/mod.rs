@@ -84,10 +84,10 @@ pub fn check_log<const N: usize>(
 /// friction, and much else explains the torques as well.
 fn turns_around(motion: &Motion, joint: usize) -> bool {
     let speeds = motion.qd.column(joint);
-    let least = REVERSING_SHARE * speeds.amax();
+    let min = REVERSING_SHARE * speeds.amax();
     let mut reversals = 0;
     let mut forward = None;
-    for &speed in speeds.iter().filter(|speed| speed.abs() > least) {
+    for &speed in speeds.iter().filter(|speed| speed.abs() > min) {
         let now = speed > 0.0;
         reversals += usize::from(forward.is_some_and(|before| before != now));
         forward = Some(now);

@@ -294,7 +294,7 @@ fn lost_samples(log: &Log, moving: &[usize], step_s: f64) -> Option<Finding> {
     let span = |i: usize| log.t_s[i + 1] - log.t_s[i];
     let (mut places, mut lost_s, mut first_s) = (0, 0.0, None);
     let (mut jumps, mut jump_s) = (0, 0.0);
-    // The step at nearly the greatest speed of each joint.
+    // The step at nearly the largest speed of each joint.
     let fastest: Vec<f64> = moving
         .iter()
         .map(|&j| {

@@ -121,7 +121,7 @@ fn agrees(row: &BTreeMap<&str, &str>, time_ns: u64, r: &CycleRecord<N>) {
             r.damping_n_s_per_m[axis],
         );
     }
-    bits("least_singular_value_m", r.least_singular_value_m);
+    bits("min_singular_value_m", r.min_singular_value_m);
     bits("fault_limit", r.fault_limit);
 }
 

@@ -90,13 +90,13 @@ fn a_record_equals_the_output_of_the_controller() {
                 r.force_against_n,
                 r.contact_threshold_n,
                 r.friction_share,
-                r.least_singular_value_m
+                r.min_singular_value_m
             ],
             [
                 o.force_against_n,
                 o.contact_threshold_n,
                 o.friction_share,
-                o.least_singular_value_m
+                o.min_singular_value_m
             ]
         );
         let text = |said: Option<String>| said.unwrap_or_default();
@@ -212,4 +212,7 @@ fn a_log_of_the_first_format_is_read() {
     assert_eq!((last.mode(), last.fault), (Some(Mode::Move), 0));
     assert!(last.drives_active && last.fault_text.as_str().is_empty());
     assert!(last.torques.gravity.amax() > 1.0, "{last:?}");
+    // Called least_singular_value_m in that format.
+    let values = records.iter().map(|record| record.min_singular_value_m);
+    assert!(values.fold(f64::INFINITY, f64::min) > 0.01, "{last:?}");
 }

@@ -1,12 +1,12 @@
 //! Gains of the joint loops, from the mass matrix over the workspace and the delay of the loop.
 //!
-//! Let `H(q) >= diag(m)` in every pose, `m_i = d_i / l` with `d_i` the least inertia that joint `i` has alone, `1 / (H^-1)_ii`,
+//! Let `H(q) >= diag(m)` in every pose, `m_i = d_i / l` with `d_i` the smallest inertia that joint `i` has alone, `1 / (H^-1)_ii`,
 //! and `l` the greatest eigenvalue of `H^-1 diag(d)`. With `D = r diag(m)` and `K = w^2 diag(m)` no mode of the arm is damped
 //! faster than `r` or stiffer than `w`, in no pose. A loop whose velocity arrives `t` late is stable for `r t < pi / 2`;
 //! here `r t = 0.4`, and `w = r / 2` makes the fastest mode critically damped, all others more. Half of an estimated rotor
 //! inertia is left out of `H`: the loop stays stable if the rotor is that much lighter.
 
-use super::inertia::{POSES, greatest_inertia_kg_m2, pose_rad};
+use super::inertia::{POSES, max_inertia_kg_m2, pose_rad};
 use super::rounded;
 use super::write::Writer;
 use supple_core::dynamics::{crba, gravity};
@@ -28,7 +28,7 @@ const ESTIMATOR: (f64, f64) = (500.0, 0.5);
 /// Acceleration and jerk of moves: at most these \[rad/s^2\], and the ratio of jerk to acceleration \[1/s\].
 const ACCELERATION: (f64, f64) = (20.0, 50.0);
 /// Least acceleration of moves \[rad/s^2\].
-const LEAST_ACCELERATION: f64 = 2.0;
+const MIN_ACCELERATION: f64 = 2.0;
 
 /// Gains of each joint.
 pub(super) struct Gains<const N: usize> {
@@ -52,16 +52,16 @@ impl<const N: usize> Gains<N> {
         // The delay is that of the controller, which a valid configuration has.
         let delay_s = Controller::new(with_estimator).map_or(0.01, |found| found.delay_s());
         let rate = DAMPING_TIMES_DELAY / delay_s;
-        let inertia = least_inertia_kg_m2(config);
+        let min_kg_m2 = min_inertia_kg_m2(config);
         let torque_nm = config.limits.joint_torque_nm;
         let stiffness = Vector::from_fn(|i, _| {
-            let stable = inertia[i] * 0.25 * rate * rate;
+            let stable = min_kg_m2[i] * 0.25 * rate * rate;
             rounded(stable.min(TORQUE_PER_RAD * torque_nm[i]))
         });
-        let greatest = greatest_inertia_kg_m2(config);
-        let weight = greatest_gravity_nm(config);
+        let max_kg_m2 = max_inertia_kg_m2(config);
+        let weight = max_gravity_nm(config);
         Gains {
-            damping: Vector::from_fn(|i, _| rounded(inertia[i] * rate)),
+            damping: Vector::from_fn(|i, _| rounded(min_kg_m2[i] * rate)),
             soft_stiffness: Vector::from_fn(|i, _| {
                 let at_stop = 0.5 * torque_nm[i] / config.limits.soft_zone_rad;
                 rounded(at_stop.min(SOFT_OVER_MOVE * stiffness[i]))
@@ -69,8 +69,8 @@ impl<const N: usize> Gains<N> {
             torque_rate: torque_nm.map(|limit| rounded((limit / FULL_TORQUE_S).min(1e6))),
             acceleration: Vector::from_fn(|i, _| {
                 let spare = (0.9 * torque_nm[i] - weight[i]).max(0.0);
-                let possible = 0.5 * spare / greatest[i];
-                rounded(possible.clamp(LEAST_ACCELERATION, ACCELERATION.0))
+                let possible = 0.5 * spare / max_kg_m2[i];
+                rounded(possible.clamp(MIN_ACCELERATION, ACCELERATION.0))
             }),
             stiffness,
             estimator: rounded(estimator),
@@ -110,7 +110,7 @@ impl<const N: usize> Gains<N> {
             put(
                 "move_stiffness_nm_per_rad",
                 self.stiffness[i],
-                "critical with this damping for the least inertia in the workspace",
+                "critical with this damping for the smallest inertia in the workspace",
             );
             put("move_damping_nm_s_per_rad", self.damping[i], &damping);
             put(
@@ -131,7 +131,7 @@ impl<const N: usize> Gains<N> {
 }
 
 /// `m` of the module's description \[kg m^2\].
-fn least_inertia_kg_m2<const N: usize>(config: &Config<N>) -> Vector<N> {
+fn min_inertia_kg_m2<const N: usize>(config: &Config<N>) -> Vector<N> {
     let inverses: Vec<Matrix<N, N>> = (0..POSES)
         .filter_map(|pose| {
             let mut mass = crba(&config.arm, &pose_rad(config, pose));
@@ -155,11 +155,11 @@ fn least_inertia_kg_m2<const N: usize>(config: &Config<N>) -> Vector<N> {
 }
 
 /// Greatest gravity torque of each joint over its poses \[N m\].
-pub(super) fn greatest_gravity_nm<const N: usize>(config: &Config<N>) -> Vector<N> {
-    let mut greatest = Vector::<N>::zeros();
+pub(super) fn max_gravity_nm<const N: usize>(config: &Config<N>) -> Vector<N> {
+    let mut max = Vector::<N>::zeros();
     for pose in 0..POSES {
         let torque_nm = gravity(&config.arm, &pose_rad(config, pose));
-        greatest = Vector::from_fn(|i, _| greatest[i].max(torque_nm[i].abs()));
+        max = Vector::from_fn(|i, _| max[i].max(torque_nm[i].abs()));
     }
-    greatest
+    max
 }

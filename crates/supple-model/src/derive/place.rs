@@ -1,7 +1,7 @@
 //! Finds which joints the law controls, the home pose, and the place of the paths.
 //!
 //! Over poses that are spread evenly, the three active joints are those with which the tip moves best (the mean of the
-//! least singular value of their Jacobian, over the better half of the poses); all others are held, at zero or in the
+//! smallest singular value of their Jacobian, over the better half of the poses); all others are held, at zero or in the
 //! middle of their range. Then the paper's paths are laid around the tip of many poses, as large as the arm follows
 //! with a margin: joints clear of their stops, no pose near a singular one, gravity within half and speeds within the
 //! limits. Collisions of the arm with itself and with what stands around it are not known and not checked.
@@ -11,7 +11,7 @@ use super::write::{Writer, list};
 use crate::description::Description;
 use crate::error::{ModelError, Reporter};
 use crate::paths::Paths;
-use crate::reach::{self, active_joints, least_singular_value_m, spread_poses};
+use crate::reach::{self, active_joints, min_singular_value_m, spread_poses};
 use core::f64::consts::PI;
 use supple_core::config::Role;
 use supple_core::dynamics::{Terms, gravity, terms, tip_pose};
@@ -37,7 +37,7 @@ const STOP_MARGIN_RAD: f64 = 0.05;
 const GRAVITY_SHARE: f64 = 0.6;
 /// Share of the joint speed limits that the fastest path may use.
 const SPEED_SHARE: f64 = 0.6;
-/// Least singular value on the paths with which the law is not damped ([`supple_core::task`]) \[m\], and the least size for
+/// Smallest singular value on the paths with which the law is not damped ([`supple_core::task`]) \[m\], and the smallest size for
 /// which it is asked.
 const REGULAR: (f64, f64) = (0.19, 0.3);
 /// Otherwise this share of the arm's best, for paths of at most this size: the law then leaves out a part of the inertia.
@@ -45,7 +45,7 @@ const NEAR_REGULAR: (f64, f64) = (0.75, 0.4);
 /// Otherwise this share, for any size.
 const SINGULAR_SHARE: f64 = 0.5;
 /// Least distance of the tip from the base's vertical axis, as a share of the arm's reach.
-const LEAST_RADIUS: f64 = 0.15;
+const MIN_RADIUS: f64 = 0.15;
 /// Fastest of the demo's sinusoids and quadrants, relative to the paper and in m/s.
 const FASTEST: (f64, f64) = (2.0, 0.1 * PI);
 
@@ -179,7 +179,7 @@ fn choose_three<const N: usize>(config: &Config<N>) -> [Role; N] {
                 let roles = held_but(config, &[a, b, c]);
                 let config = Config { roles, ..*config };
                 let mut values: Vec<f64> = poses(&config, TRIPLE_POSES)
-                    .map(|q| least_singular_value_m(&config, &q))
+                    .map(|q| min_singular_value_m(&config, &q))
                     .collect();
                 values.sort_by(|x, y| y.total_cmp(x));
                 let half = &values[..values.len() / 2];
@@ -227,7 +227,7 @@ fn gravity_share<const N: usize>(config: &Config<N>, q: &Vector<N>) -> f64 {
 fn place<const N: usize>(config: &Config<N>) -> Option<(Vector<N>, Paths)> {
     let tip = |q: &Vector<N>| tip_pose(&config.arm, q).translation;
     let all: Vec<(Vector<N>, Vector3<f64>, f64)> = poses(config, POSES)
-        .map(|q| (q, tip(&q), least_singular_value_m(config, &q)))
+        .map(|q| (q, tip(&q), min_singular_value_m(config, &q)))
         .collect();
     let reach_m = all
         .iter()
@@ -239,7 +239,7 @@ fn place<const N: usize>(config: &Config<N>) -> Option<(Vector<N>, Paths)> {
         .into_iter()
         .filter(|(q, tip, sigma)| {
             *sigma >= any_sigma
-                && tip.xy().norm() >= LEAST_RADIUS * reach_m
+                && tip.xy().norm() >= MIN_RADIUS * reach_m
                 && gravity_share(config, q) <= GRAVITY_SHARE
         })
         .map(|(q, tip, _)| (tip_weight_n(config, &q), tip, q))
@@ -251,11 +251,8 @@ fn place<const N: usize>(config: &Config<N>) -> Option<(Vector<N>, Paths)> {
     let near = SCALES.iter().filter(|scale| **scale <= NEAR_REGULAR.1);
     let near = near.map(|scale| (*scale, NEAR_REGULAR.0 * best_sigma));
     let any = SCALES.iter().map(|scale| (*scale, any_sigma));
-    for (scale, least_sigma) in regular.chain(near).chain(any) {
-        let check = Check {
-            config,
-            least_sigma,
-        };
+    for (scale, min_sigma) in regular.chain(near).chain(any) {
+        let check = Check { config, min_sigma };
         let mut found: Vec<(f64, Paths)> = candidates
             .iter()
             .filter_map(|(_, tip, q)| {
@@ -281,7 +278,7 @@ fn place<const N: usize>(config: &Config<N>) -> Option<(Vector<N>, Paths)> {
 /// The checks of a place.
 struct Check<'a, const N: usize> {
     config: &'a Config<N>,
-    least_sigma: f64,
+    min_sigma: f64,
 }
 
 impl<const N: usize> Check<'_, N> {
@@ -337,7 +334,7 @@ impl<const N: usize> Check<'_, N> {
             return false;
         };
         let speed = task.inverse * velocity;
-        task.least_singular_value_m >= self.least_sigma
+        task.min_singular_value_m >= self.min_sigma
             && (0..N).all(|i| speed[i].abs() <= SPEED_SHARE * limits.joint_speed_rad_per_s[i])
     }
 

@@ -12,14 +12,14 @@ use supple_core::nalgebra::SymmetricEigen;
 use supple_core::task::Task;
 use supple_core::{Config, Vector};
 
-/// Force of an unmodelled load as a share of that weight, and its least value \[N\].
+/// Force of an unmodelled load as a share of that weight, and its smallest value \[N\].
 const LOAD: (f64, f64) = (0.05, 5.0);
-/// Contact threshold as a share of that weight, and its least value \[N\].
+/// Contact threshold as a share of that weight, and its smallest value \[N\].
 const CONTACT: (f64, f64) = (0.02, 3.0);
 /// Collision threshold as a share of the force that the torque limits allow, and its range \[N\].
 const COLLISION: (f64, f64, f64) = (0.5, 10.0, 60.0);
 
-/// Stiffness for which the damping of the law is derived \[N/m\], its damping ratio, and its least value \[N s/m\].
+/// Stiffness for which the damping of the law is derived \[N/m\], its damping ratio, and its smallest value \[N s/m\].
 const LAW: (f64, f64, f64) = (5.0, 0.7, 1.5);
 /// Torque against the motion over the torque limit that is a fault: at least, at most, and as a multiple of the share that
 /// dry friction has.
@@ -31,10 +31,10 @@ pub(super) fn add_damping<const N: usize>(
     config: &Config<N>,
     home: &Vector<N>,
 ) {
-    let (stiffness, ratio, least) = LAW;
+    let (stiffness, ratio, min) = LAW;
     let mass_kg = tip_mass_kg(config, home);
     let damping = 2.0 * ratio * supple_core::math::sqrt(stiffness * mass_kg);
-    let damping = rounded(damping.max(least).min(config.limits.damping_n_s_per_m));
+    let damping = rounded(damping.max(min).min(config.limits.damping_n_s_per_m));
     let why = format!(
         "damping ratio 0.7 at 5 N/m with the {mass_kg:.1} kg that the tip has at home along its heaviest direction, \
          rotors included"
@@ -70,9 +70,9 @@ pub(super) fn add<const N: usize>(
 ) {
     let home = Vector::<N>::from_column_slice(description.home_rad());
     let weight_n = tip_weight_n(config, &home);
-    let (least, most, friction) = AGAINST;
+    let (min, max, friction) = AGAINST;
     let shares = (0..N).map(|i| config.friction[i].breakaway_nm / config.limits.joint_torque_nm[i]);
-    let against = (friction * shares.fold(0.0, f64::max)).clamp(least, most);
+    let against = (friction * shares.fold(0.0, f64::max)).clamp(min, max);
     let why = "one and a half times the largest share of a torque limit that dry friction has, at least 0.05";
     writer.set("plausible", "against_share", rounded(against), why);
     let why = format!("5 % of the arm's weight at the tip at home, {weight_n:.0} N, at least 5 N");
@@ -89,8 +89,8 @@ pub(super) fn add<const N: usize>(
         joints.fold(f64::MAX, f64::min)
     };
     let possible_n = force(0).min(force(1)).min(force(2));
-    let (share, least, most) = COLLISION;
-    let collision_n = (share * possible_n).clamp(least, most).max(2.0 * load_n);
+    let (share, min, max) = COLLISION;
+    let collision_n = (share * possible_n).clamp(min, max).max(2.0 * load_n);
     let why = "half of what the torque limits can press along the weakest axis, 10 to 60 N";
     writer.set("collision", "tip_force_n", rounded(collision_n), why);
 }

@@ -115,12 +115,12 @@ pub(crate) fn check_rest(report: Reporter<'_>, settings: &Settings) -> Result<()
         ),
         ("[limits] start_error_m", limits.start_error_m),
         (
-            "[limits] greatest_stiffness_n_per_m",
-            limits.greatest_stiffness_n_per_m,
+            "[limits] max_stiffness_n_per_m",
+            limits.max_stiffness_n_per_m,
         ),
         (
-            "[limits] greatest_damping_n_s_per_m",
-            limits.greatest_damping_n_s_per_m,
+            "[limits] max_damping_n_s_per_m",
+            limits.max_damping_n_s_per_m,
         ),
         ("[latch] observer_rad_per_s", latch.observer_rad_per_s),
         ("[latch] threshold_n", latch.threshold_n),
@@ -129,22 +129,19 @@ pub(crate) fn check_rest(report: Reporter<'_>, settings: &Settings) -> Result<()
     ] {
         report.positive(element, value)?;
     }
-    let (stiffness, damping) = (
-        limits.greatest_stiffness_n_per_m,
-        limits.greatest_damping_n_s_per_m,
-    );
+    let (stiffness, damping) = (limits.max_stiffness_n_per_m, limits.max_damping_n_s_per_m);
     for (element, values, limit, key) in [
         (
             "[law] stiffness_n_per_m",
             law.stiffness_n_per_m,
             stiffness,
-            "greatest_stiffness_n_per_m",
+            "max_stiffness_n_per_m",
         ),
         (
             "[law] damping_n_s_per_m",
             law.damping_n_s_per_m,
             damping,
-            "greatest_damping_n_s_per_m",
+            "max_damping_n_s_per_m",
         ),
     ] {
         for (axis, value) in values.iter().enumerate() {

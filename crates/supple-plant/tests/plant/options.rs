@@ -100,13 +100,13 @@ fn gears_under_load_have_more_friction() {
         config.stops = None;
         let arm = wam4();
         let mut plant = Plant::new(config, wam4_at(&arm, 0.6, 0.0), Vector::zeros()).unwrap();
-        let mut greatest = Vector::<4>::zeros();
+        let mut max = Vector::<4>::zeros();
         // A torque that lifts the shoulder, far above breakaway.
         for _ in 0..400 {
             plant.cycle(&Vector::from([0.0, -45.0, 0.0, 0.0]));
-            greatest = greatest.sup(&plant.truth().friction_torque_nm.abs());
+            max = max.sup(&plant.truth().friction_torque_nm.abs());
         }
-        greatest[1]
+        max[1]
     };
     let (without, with) = (friction_nm(0.0), friction_nm(0.1));
     // Sliding at the torque of 45 N m: a tenth of it more, with the share of the Stribeck effect at most.

@@ -4,8 +4,8 @@
 mod support;
 
 mod fault_files;
-mod heard;
 mod heartbeat;
+mod idle_requests;
 mod operator_requests;
 mod process;
 mod scripted;

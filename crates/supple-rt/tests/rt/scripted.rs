@@ -31,10 +31,10 @@ pub struct Bench {
 impl Bench {
     pub fn start(stderr: impl Into<Stdio>) -> Bench {
         let folder = tempfile::tempdir().expect("a folder");
-        let domain = Domain::in_folder(&folder.path().join("supple"), "heard").expect("a domain");
+        let domain = Domain::in_folder(&folder.path().join("supple"), "idle").expect("a domain");
         let plant = PlantLink::new(&domain).expect("a plant");
         let child = Command::new(env!("CARGO_BIN_EXE_supple-rt"))
-            .args(["--prefix", "heard", "--no-realtime"])
+            .args(["--prefix", "idle", "--no-realtime"])
             .env("XDG_RUNTIME_DIR", folder.path())
             .stdout(Stdio::null())
             .stderr(stderr)
@@ -105,7 +105,7 @@ impl Bench {
         for _ in 0..10_000 {
             match self.cycle() {
                 Some(Mode::GravityHold) => return,
-                // A busy machine held up the states.
+                // The states came late from a busy machine.
                 Some(Mode::Fault) => {
                     self.reset(operator);
                     let sent = operator.send::<4>(&Request::GravityHold, None);
@@ -118,7 +118,7 @@ impl Bench {
     }
 
     /// Asks for idle in gravity hold, and asserts that it acts in time.
-    pub fn assert_heard(&mut self, operator: &mut OperatorClient) {
+    pub fn assert_idle_acts(&mut self, operator: &mut OperatorClient) {
         let mut quickest = u64::MAX;
         for _ in 0..ATTEMPTS {
             self.hold(operator);

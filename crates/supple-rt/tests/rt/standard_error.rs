@@ -22,7 +22,7 @@ fn full() -> (PipeReader, PipeWriter) {
 fn check(stderr: PipeWriter) {
     let mut bench = Bench::start(stderr);
     let mut operator = OperatorClient::new(&bench.domain).expect("an operator");
-    bench.assert_heard(&mut operator);
+    bench.assert_idle_acts(&mut operator);
     bench.hold(&mut operator);
     // A fault writes to standard error.
     bench.fault();
@@ -32,7 +32,7 @@ fn check(stderr: PipeWriter) {
         (Outcome::Accepted, Some(Mode::Fault))
     );
     bench.reset(&mut operator);
-    bench.assert_heard(&mut operator);
+    bench.assert_idle_acts(&mut operator);
     terminate(&bench.child);
     let status = bench.child.wait().expect("it ends");
     assert_eq!(status.code(), Some(0), "{status}");

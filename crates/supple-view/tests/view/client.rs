@@ -8,7 +8,7 @@ use tungstenite::protocol::Role;
 use tungstenite::{Error, Message, WebSocket};
 
 /// How long a test waits for something that must come.
-const PATIENCE: Duration = Duration::from_secs(60);
+const MESSAGE_TIMEOUT: Duration = Duration::from_secs(60);
 
 /// Address and path of a URL such as `http://127.0.0.1:4000/token/`.
 pub fn split(url: &str) -> (String, String) {
@@ -20,7 +20,9 @@ pub fn split(url: &str) -> (String, String) {
 /// Sends a request with these header lines; returns status and body.
 pub fn get(address: &str, path: &str, headers: &str) -> (u16, String) {
     let mut stream = TcpStream::connect(address).expect("a server");
-    stream.set_read_timeout(Some(PATIENCE)).expect("a timeout");
+    stream
+        .set_read_timeout(Some(MESSAGE_TIMEOUT))
+        .expect("a timeout");
     write!(stream, "GET {path} HTTP/1.1\r\n{headers}\r\n").expect("sent");
     let mut answer = Vec::new();
     stream.read_to_end(&mut answer).expect("an answer");
@@ -47,7 +49,9 @@ impl Client {
     pub fn connect(url: &str, headers: &str) -> Result<Client, u16> {
         let (address, path) = split(url);
         let mut stream = TcpStream::connect(&address).expect("a server");
-        stream.set_read_timeout(Some(PATIENCE)).expect("a timeout");
+        stream
+            .set_read_timeout(Some(MESSAGE_TIMEOUT))
+            .expect("a timeout");
         write!(
             stream,
             "GET {path} HTTP/1.1\r\nHost: {address}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n\
@@ -94,7 +98,10 @@ impl Client {
         self.0.get_ref().set_read_timeout(short).expect("a timeout");
         let start = Instant::now();
         loop {
-            assert!(start.elapsed() < PATIENCE, "the message did not come");
+            assert!(
+                start.elapsed() < MESSAGE_TIMEOUT,
+                "the message did not come"
+            );
             meanwhile();
             match self.0.read() {
                 Ok(message) => {

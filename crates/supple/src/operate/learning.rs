@@ -1,6 +1,6 @@
 //! `supple learning`: switches the refinement of the model, and saves what was learned.
 
-use super::{Asked, ask, running};
+use super::{SystemRequest, ask, running};
 use crate::cli::{LearningAction, SystemArgs};
 use serde::Serialize;
 use std::path::Path;
@@ -27,7 +27,7 @@ pub fn learning(action: &LearningAction) -> Result<(), Failure> {
         LearningAction::Reset(system) => (system, LearningSwitch::Reset),
         LearningAction::Save { folder, system } => return save(system, folder),
     };
-    ask(system, &Asked::Learning(switch))
+    ask(system, &SystemRequest::Learning(switch))
 }
 
 /// Copies the arm that the controller keeps with what it has learned.

@@ -49,7 +49,7 @@ struct Answer {
     cycle: u64,
 }
 
-/// Result of `supple stop`, as `--json` prints it: the prefix of the system that has been told to shut down.
+/// Result of `supple stop`, as `--json` prints it: the prefix of the system whose shutdown was requested.
 #[derive(Serialize)]
 struct Stopping<'a> {
     stopping: &'a str,
@@ -81,9 +81,9 @@ pub fn mode(args: &ModeArgs) -> Result<(), Failure> {
     let system = &args.system;
     match args.mode {
         ModeName::Idle => idle(system),
-        ModeName::GravityHold => ask(system, &Asked::GravityHold),
-        ModeName::Float => ask(system, &Asked::Float),
-        ModeName::JointImpedance => ask(system, &Asked::JointImpedance(args)),
+        ModeName::GravityHold => ask(system, &SystemRequest::GravityHold),
+        ModeName::Float => ask(system, &SystemRequest::Float),
+        ModeName::JointImpedance => ask(system, &SystemRequest::JointImpedance(args)),
     }
 }
 
@@ -106,11 +106,11 @@ fn idle(system: &SystemArgs) -> Result<(), Failure> {
 /// # Errors
 /// [`Failure`].
 pub fn reset(system: &SystemArgs) -> Result<(), Failure> {
-    ask(system, &Asked::Reset)
+    ask(system, &SystemRequest::Reset)
 }
 
-/// What a command asks of a running system, for an arm of any size.
-enum Asked<'a> {
+/// What a command requests of a running system, for an arm of any number of joints.
+enum SystemRequest<'a> {
     GravityHold,
     Float,
     JointImpedance(&'a ModeArgs),
@@ -122,15 +122,15 @@ enum Asked<'a> {
     Pose(&'a TrackArgs),
 }
 
-impl Asked<'_> {
+impl SystemRequest<'_> {
     fn request<const N: usize>(&self, telemetry: &Telemetry) -> Result<Request<N>, Failure> {
         let now = telemetry.record();
         Ok(match self {
-            Asked::GravityHold => Request::GravityHold,
-            Asked::Float => Request::Float,
-            Asked::Reset => Request::Reset,
-            Asked::Learning(switch) => Request::Learning(*switch),
-            Asked::JointImpedance(args) => match args.target.len() {
+            SystemRequest::GravityHold => Request::GravityHold,
+            SystemRequest::Float => Request::Float,
+            SystemRequest::Reset => Request::Reset,
+            SystemRequest::Learning(switch) => Request::Learning(*switch),
+            SystemRequest::JointImpedance(args) => match args.target.len() {
                 0 => Request::JointImpedance {
                     target_rad: first(&now.position_rad),
                     duration_s: COMPLY_S,
@@ -147,14 +147,14 @@ impl Asked<'_> {
                     ));
                 }
             },
-            Asked::Gains(args) => Request::Gains {
+            SystemRequest::Gains(args) => Request::Gains {
                 gains: Gains {
                     stiffness_n_per_m: axes("--stiffness", &args.stiffness, now.stiffness_n_per_m)?,
                     damping_n_s_per_m: axes("--damping", &args.damping, now.damping_n_s_per_m)?,
                 },
                 ramp_s: args.ramp_s,
             },
-            Asked::RotationalGains(args) => Request::RotationalGains {
+            SystemRequest::RotationalGains(args) => Request::RotationalGains {
                 gains: RotationalGains {
                     stiffness_nm_per_rad: axes(
                         "--rotational",
@@ -169,7 +169,7 @@ impl Asked<'_> {
                 },
                 ramp_s: args.ramp_s,
             },
-            Asked::Pose(args) => Request::TrackPose {
+            SystemRequest::Pose(args) => Request::TrackPose {
                 trajectory: Trajectory::Hold(Vector3::from(now.tip_position_m)),
                 rotation: Rotation {
                     axis: match *args.rotate {
@@ -183,7 +183,7 @@ impl Asked<'_> {
                     duration_s: args.duration_s,
                 },
             },
-            Asked::JointGains(args) => {
+            SystemRequest::JointGains(args) => {
                 let stiffness = first(&now.joint_stiffness_nm_per_rad);
                 let damping = first(&now.joint_damping_nm_s_per_rad);
                 Request::JointGains {
@@ -247,18 +247,18 @@ fn joints<const N: usize>(
     }
 }
 
-fn ask(system: &SystemArgs, asked: &Asked<'_>) -> Result<(), Failure> {
+fn ask(system: &SystemArgs, request: &SystemRequest<'_>) -> Result<(), Failure> {
     fn send<const N: usize>(
         domain: &Domain,
         telemetry: &Telemetry,
-        asked: &Asked<'_>,
+        request: &SystemRequest<'_>,
     ) -> Result<OperatorReply, Failure> {
-        let request = asked.request::<N>(telemetry)?;
+        let request = request.request::<N>(telemetry)?;
         OperatorSession::<N>::new(domain)?.send_request(&request, None)
     }
     let (domain, _reader, telemetry) = running(system)?;
     let dof = usize::from(telemetry.state.dof);
-    let reply = with_dof!(dof, N => send::<N>(&domain, &telemetry, asked))??;
+    let reply = with_dof!(dof, N => send::<N>(&domain, &telemetry, request))??;
     print_reply(system, &reply)
 }
 
@@ -270,12 +270,12 @@ fn ask(system: &SystemArgs, asked: &Asked<'_>) -> Result<(), Failure> {
 pub fn gains(args: &GainsArgs) -> Result<(), Failure> {
     let of_joints = !(args.joint_stiffness.is_empty() && args.joint_damping.is_empty());
     let of_orientation = !(args.rotational.is_empty() && args.rotational_damping.is_empty());
-    let asked = match (of_joints, of_orientation) {
-        (true, _) => Asked::JointGains(args),
-        (false, true) => Asked::RotationalGains(args),
-        (false, false) => Asked::Gains(args),
+    let request = match (of_joints, of_orientation) {
+        (true, _) => SystemRequest::JointGains(args),
+        (false, true) => SystemRequest::RotationalGains(args),
+        (false, false) => SystemRequest::Gains(args),
     };
-    ask(&args.system, &asked)
+    ask(&args.system, &request)
 }
 
 /// Returns the trajectory and its duration \[s\].
@@ -321,12 +321,12 @@ pub fn track(args: &TrackArgs) -> Result<(), Failure> {
         return Err(value_count("--rotate", args.rotate.len(), none));
     }
     if trajectory == TrackTrajectory::Pose {
-        return ask(&args.system, &Asked::Pose(args));
+        return ask(&args.system, &SystemRequest::Pose(args));
     }
     let description = arms::find(&args.urdf.name(&args.arm), args.strict)?;
     let paths = description.paths();
     let (trajectory, duration_s) = match trajectory {
-        TrackTrajectory::Pose => return ask(&args.system, &Asked::Pose(args)),
+        TrackTrajectory::Pose => return ask(&args.system, &SystemRequest::Pose(args)),
         TrackTrajectory::Sinusoid => paths.sinusoid(args.speed),
         TrackTrajectory::Arc => paths.arc(args.speed),
         TrackTrajectory::Quadrant => {

@@ -65,7 +65,7 @@ pub struct UpSummary {
     /// CAN frames whose transmission was not confirmed.
     pub tx_lost: u64,
     /// Time for which simulated time was paused because the host stalled the plant process.
-    pub stood_still_ms: f64,
+    pub clock_stall_ms: f64,
     /// Cycles whose telemetry was lost; they are missing in the log.
     pub telemetry_lost: u64,
     /// RMS distance of the tip from its reference while tracking, from the encoders; none if nothing was tracked.
@@ -157,7 +157,7 @@ impl RunStatistics {
             round_trip_us: self.round_trip_us(),
             bus_load: mean(self.bus_load, self.cycles).unwrap_or_default(),
             tx_lost: self.plant.tx_lost,
-            stood_still_ms: self.plant.clock_stall_ns as f64 * 1e-6,
+            clock_stall_ms: self.plant.clock_stall_ns as f64 * 1e-6,
             telemetry_lost,
             rms_error_m: mean(self.squared_error_m2, self.tracked).map(f64::sqrt),
             tracked_cycles: self.tracked,
@@ -196,11 +196,11 @@ impl fmt::Display for UpSummary {
                 s.p50, s.p99, s.p999, s.max
             )?;
         }
-        if self.stood_still_ms > 0.0 {
+        if self.clock_stall_ms > 0.0 {
             writeln!(
                 f,
                 "simulated time was paused for {:.1} ms (host stalls)",
-                self.stood_still_ms
+                self.clock_stall_ms
             )?;
         }
         if let Some(times) = self.times_real_time {

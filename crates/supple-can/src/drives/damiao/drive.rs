@@ -31,7 +31,7 @@ const BYTES: u8 = 8;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Power {
     Disabled,
-    /// This many cycles since the motors were first told.
+    /// This many cycles since the first command to the motors.
     Starting(u32),
     Enabled,
     Disabling,
@@ -122,7 +122,7 @@ impl<const N: usize, B: Bus> Damiao<N, B> {
     /// Judges the replies of this cycle.
     fn judge(&mut self) {
         match self.power {
-            // A motor that missed its disable frame is told again.
+            // A motor that missed its disable frame is sent another.
             Power::Disabled if self.any_enabled() => self.power = Power::Disabling,
             Power::Disabled => {}
             Power::Starting(_) if self.all(Status::Enabled) => {
@@ -139,7 +139,7 @@ impl<const N: usize, B: Bus> Damiao<N, B> {
             }
             Power::Starting(_) => {}
             Power::Enabled => self.motors.iter_mut().for_each(Running::judge),
-            // A motor that does not confirm is told again in every cycle, and its watchdog ends its torque.
+            // A motor that does not confirm is sent another in every cycle, and its watchdog ends its torque.
             Power::Disabling if !self.any_enabled() => self.power = Power::Disabled,
             Power::Disabling => {}
         }

@@ -27,8 +27,8 @@ pub struct Host<'a, B> {
     pub stop: &'a dyn Fn() -> bool,
 }
 
-/// What came back.
-struct Heard {
+/// A frame that a motor sent.
+struct ReceivedFrame {
     frame: Frame,
     fd: bool,
 }
@@ -86,18 +86,20 @@ impl<B: Bus> Host<'_, B> {
             self.bus.send(&question.on_bus(self.format))?;
             let until_ns = self.bus.now_ns() + REPLY_NS;
             let mut found: Option<Feedback> = None;
-            while let Some(heard) = self.next(until_ns)? {
-                if heard.fd != matches!(self.format, FrameFormat::Fd { .. }) {
-                    return Ok(Err(Problem::Format { found_fd: heard.fd }));
+            while let Some(received) = self.next(until_ns)? {
+                if received.fd != matches!(self.format, FrameFormat::Fd { .. }) {
+                    return Ok(Err(Problem::Format {
+                        found_fd: received.fd,
+                    }));
                 }
-                if heard.frame.id() != reply_id {
+                if received.frame.id() != reply_id {
                     other = Some(Problem::ReplyId {
-                        found: heard.frame.id(),
+                        found: received.frame.id(),
                         expected: reply_id,
                     });
                     continue;
                 }
-                match Feedback::of_motor(&heard.frame, id) {
+                match Feedback::of_motor(&received.frame, id) {
                     Ok(_) if found.is_some() => return Ok(Err(Problem::TwoAnswers)),
                     Ok(feedback) => found = Some(feedback),
                     Err(_) => return Ok(Err(Problem::TwoAnswers)),
@@ -152,9 +154,9 @@ impl<B: Bus> Host<'_, B> {
         for _ in 0..TRIES {
             self.bus.send(&question.on_bus(self.format))?;
             let until_ns = self.bus.now_ns() + REPLY_NS;
-            while let Some(heard) = self.next(until_ns)? {
-                let reply = RegisterReply::parse(&heard.frame, id, operation, of);
-                if let Some(reply) = reply.filter(|_| heard.frame.id() == reply_id) {
+            while let Some(received) = self.next(until_ns)? {
+                let reply = RegisterReply::parse(&received.frame, id, operation, of);
+                if let Some(reply) = reply.filter(|_| received.frame.id() == reply_id) {
                     return Ok(Some(reply.bytes));
                 }
             }
@@ -163,14 +165,14 @@ impl<B: Bus> Host<'_, B> {
     }
 
     /// The next frame of another node.
-    fn next(&mut self, until_ns: u64) -> Result<Option<Heard>, DamiaoError> {
+    fn next(&mut self, until_ns: u64) -> Result<Option<ReceivedFrame>, DamiaoError> {
         loop {
             match self.bus.receive_until(until_ns)? {
                 None => return Ok(None),
                 Some(Event::Frame(frame)) => {
                     if let Ok(parsed) = Frame::of_bus(&frame) {
                         let fd = frame.is_fd();
-                        return Ok(Some(Heard { frame: parsed, fd }));
+                        return Ok(Some(ReceivedFrame { frame: parsed, fd }));
                     }
                 }
                 Some(Event::Fault(fault @ BusFault::BusOff)) => {

@@ -84,7 +84,7 @@ fn the_latch_closes_when_the_force_exceeds_the_threshold() {
         let output = bench.cycle(None, up(0.01 * f64::from(k)));
         assert!(
             (output.contact_threshold_n - 3.0).abs() < 1e-12,
-            "no friction, no doubt"
+            "no friction, no uncertainty"
         );
         if closed == 0 {
             let passed = output.force_against_n > output.contact_threshold_n;

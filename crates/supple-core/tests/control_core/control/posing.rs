@@ -110,9 +110,9 @@ fn an_exact_model_reaches_position_and_orientation() {
         );
         assert!(distance_m < 1e-3, "{distance_m} m");
         assert!(angle < 1e-2, "{angle} rad");
-        let told = output.orientation.expect("a reference");
-        assert!((told.base_from_tip - wanted).norm() < 1e-12);
-        assert!((told.error_rad.norm() - angle).abs() < 1e-6);
+        let recorded = output.orientation.expect("a reference");
+        assert!((recorded.base_from_tip - wanted).norm() < 1e-12);
+        assert!((recorded.error_rad.norm() - angle).abs() < 1e-6);
     }
 }
 
@@ -457,7 +457,7 @@ fn rotational_gains_are_limited_and_ramped() {
     assert!((half.stiffness_nm_per_rad - mean).amax() < 0.05 * mean.amax());
 }
 
-/// What a cycle tells: the reference as axis times angle, and the error.
+/// What a cycle records: the reference as axis times angle, and the error.
 #[test]
 fn the_record_has_reference_and_error_of_the_orientation() {
     let mut rig = Rig::holding(seven_active(), bent_wrist());
@@ -469,8 +469,8 @@ fn the_record_has_reference_and_error_of_the_orientation() {
     let record = CycleRecord::new(1, &input, &output);
     let orientation = output.orientation.expect("a reference");
     assert!(record.has_orientation_reference);
-    let told = Rotation3::new(Vector3::from(record.reference_rotation_rad));
-    assert!((told.matrix() - orientation.base_from_tip).norm() < 1e-12);
+    let recorded = Rotation3::new(Vector3::from(record.reference_rotation_rad));
+    assert!((recorded.matrix() - orientation.base_from_tip).norm() < 1e-12);
     assert_eq!(
         Vector3::from(record.rotation_error_rad),
         orientation.error_rad

@@ -108,8 +108,8 @@ fn moves_that_are_too_fast_are_refused() {
     for joint in [0, 1, 3] {
         let mut target = bent::<4>();
         target[joint] += 0.4;
-        let least_s = 1.875 * 0.4 / 2.0;
-        let refusal = refused(go(target, least_s * 0.999));
+        let min_s = 1.875 * 0.4 / 2.0;
+        let refusal = refused(go(target, min_s * 0.999));
         let Refusal::TooFast {
             joint: named,
             value_rad_per_s,
@@ -121,7 +121,7 @@ fn moves_that_are_too_fast_are_refused() {
         assert_eq!((named, limit_rad_per_s), (joint, 2.0));
         assert!((value_rad_per_s - 2.0 / 0.999).abs() < 1e-9);
         says(refusal, &["more time", "2.000 rad/s"]);
-        Rig::holding(four(), bent()).accept(go(target, least_s * 1.001));
+        Rig::holding(four(), bent()).accept(go(target, min_s * 1.001));
     }
     let mut target = bent::<4>();
     target[0] += 0.1;

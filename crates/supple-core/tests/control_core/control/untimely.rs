@@ -191,18 +191,17 @@ fn damping_that_is_being_ramped_down_is_checked() {
         ramp_s: 0.0,
     };
     // The greatest damping that the delay allows in a pose.
-    let greatest = |pose: Vector<3>| match Rig::holding(config, pose).request(damping(9e3)).refusal
-    {
+    let max = |pose: Vector<3>| match Rig::holding(config, pose).request(damping(9e3)).refusal {
         Some(Refusal::Value { limit, .. }) => limit,
         other => panic!("{other:?}"),
     };
     let poses: Vec<Vector<3>> = (1..8)
         .map(|k| Vector::from([0.0, 0.9, 0.35 * f64::from(k)]))
         .collect();
-    let by = |a: &&Vector<3>, b: &&Vector<3>| greatest(**a).total_cmp(&greatest(**b));
+    let by = |a: &&Vector<3>, b: &&Vector<3>| max(**a).total_cmp(&max(**b));
     let heavy = *poses.iter().max_by(by).expect("poses");
     let light = *poses.iter().min_by(by).expect("poses");
-    let (most, less) = (greatest(heavy), greatest(light));
+    let (most, less) = (max(heavy), max(light));
     assert!(less < 0.9 * most, "{less} of {most}");
     let mut rig = {
         let mut moved = Rig::holding(config, heavy);

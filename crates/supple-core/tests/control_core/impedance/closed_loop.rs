@@ -68,7 +68,7 @@ fn feedback<const N: usize>(scene: &Scene<N>, arm: &Arm<N>) -> Vector3<f64> {
 
 /// Whether the inverse is undamped in this pose.
 fn regular<const N: usize>(scene: &Scene<N>, arm: &Arm<N>, roles: &[Role; N]) -> bool {
-    scene.task(arm, roles).least_singular_value_m > SINGULAR_BELOW_M
+    scene.task(arm, roles).min_singular_value_m > SINGULAR_BELOW_M
 }
 
 /// Checks `inertia (X'' - Xo'') = force + feedback` for the apparent inertia of `law`.

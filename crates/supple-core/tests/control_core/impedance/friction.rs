@@ -142,7 +142,7 @@ fn the_residual_friction_damps_the_error() {
         scene.friction_share = 1.0;
         scene.qd[2] = 0.0;
         let task = scene.task(&arm, &roles);
-        if task.least_singular_value_m < SINGULAR_BELOW_M {
+        if task.min_singular_value_m < SINGULAR_BELOW_M {
             return Ok(());
         }
         let found = scene

@@ -25,7 +25,7 @@ fn as_defined<const N: usize>(
         }
     });
     let mobile = inverse(&mass_matrix) * task.jacobian.transpose();
-    let damping = singularity_damping_per_kg(task.least_singular_value_m);
+    let damping = singularity_damping_per_kg(task.min_singular_value_m);
     let mobility = task.jacobian * mobile + Matrix3::from_diagonal_element(damping);
     mobile * inverse(&mobility)
 }
@@ -37,7 +37,7 @@ fn is_as_defined<const N: usize>(arm: Arm<N>, roles: [Role; N]) {
         let expected = as_defined(&mass_matrix, &task, &roles);
         let error = (task.inverse - expected).norm();
         prop_assert!(error < 1e-9 * expected.norm(), "{error:e}");
-        if task.least_singular_value_m > SINGULAR_BELOW_M {
+        if task.min_singular_value_m > SINGULAR_BELOW_M {
             let identity = task.jacobian * task.inverse;
             prop_assert!((identity - Matrix3::identity()).norm() < 1e-11);
         }

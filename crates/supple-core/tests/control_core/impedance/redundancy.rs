@@ -27,7 +27,7 @@ fn nullspace<const N: usize>(scene: &Scene<N>, arm: &Arm<N>, roles: &[Role; N]) 
 }
 
 fn regular<const N: usize>(task: &Task<N>) -> bool {
-    task.least_singular_value_m > SINGULAR_BELOW_M
+    task.min_singular_value_m > SINGULAR_BELOW_M
 }
 
 fn tip_feels_nothing<const N: usize>(arm: Arm<N>, roles: [Role; N]) {

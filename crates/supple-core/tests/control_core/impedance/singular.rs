@@ -58,7 +58,7 @@ fn no_damping_on_the_papers_sinusoid() {
         let rest = Vector::zeros();
         supple_core::dynamics::terms(&config.arm, &place.position_rad, &rest, &mut terms);
         let task = supple_core::impedance::Task::new(&terms, &config.roles).expect("a task");
-        let sigma = task.least_singular_value_m;
+        let sigma = task.min_singular_value_m;
         assert!(sigma > SINGULAR_BELOW_M - 0.01, "{sigma} at {x} m");
     }
 }
@@ -110,7 +110,7 @@ fn terms_are_bounded_in_singular_poses() {
             ..still.clone()
         };
         let task = scene.task(&wam3(), &[Role::Active; 3]);
-        assert!(task.least_singular_value_m < 1e-6, "{q:?} is singular");
+        assert!(task.min_singular_value_m < 1e-6, "{q:?} is singular");
         bounded(&scene, &wam3(), &[Role::Active; 3]);
         let with_roll = Scene {
             q: Vector::from([q[0], q[1], 0.0, q[2]]),
@@ -147,7 +147,7 @@ fn torques_are_continuous_at_the_onset_of_damping() {
         scene.q[1] = 0.8;
         let sigma = |elbow: f64, scene: &mut Scene<3>| {
             scene.q[2] = elbow;
-            scene.task(&arm, &roles).least_singular_value_m
+            scene.task(&arm, &roles).min_singular_value_m
         };
         let (mut below, mut above) = (0.0, 1.2);
         prop_assert!(sigma(above, &mut scene) > SINGULAR_BELOW_M);
@@ -175,7 +175,7 @@ fn torques_are_continuous_at_the_onset_of_damping() {
 fn commanded_mass(scene: &Scene<3>, arm: &Arm<3>) -> Matrix3<f64> {
     let roles = [Role::Active; 3];
     let task = scene.task(arm, &roles);
-    let damping = singularity_damping_per_kg(task.least_singular_value_m);
+    let damping = singularity_damping_per_kg(task.min_singular_value_m);
     let h = crba(arm, &scene.q);
     let mobility = task.jacobian * inverse(&h) * task.jacobian.transpose();
     let mass = inverse(&(mobility + Matrix3::from_diagonal_element(damping)));

@@ -183,7 +183,7 @@ fn as_published_matches_the_printed_equation() {
     check(300, scene::<3>(), |mut scene| {
         scene.friction_share = 1.0;
         let (q, qd) = (&scene.q, &scene.qd);
-        if scene.task(&arm, &roles).least_singular_value_m < SINGULAR_BELOW_M {
+        if scene.task(&arm, &roles).min_singular_value_m < SINGULAR_BELOW_M {
             return Ok(());
         }
         let j: Matrix3<f64> = jacobian(&arm, q).fixed_rows::<3>(0).into_owned();

@@ -258,6 +258,12 @@ fn errors_in_a_toml_are_rejected() {
             ),
             (
                 "soft_zone_rad = 0.2",
+                "max_stiffness_n_per_m = 6.5",
+                ["[law] stiffness_n_per_m[2]", "found 7", "lower it"],
+            ),
+            // The earlier name of the same key.
+            (
+                "soft_zone_rad = 0.2",
                 "greatest_stiffness_n_per_m = 6.5",
                 ["[law] stiffness_n_per_m[2]", "found 7", "lower it"],
             ),

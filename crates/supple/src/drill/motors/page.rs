@@ -100,7 +100,7 @@ from the process of the bus; times are those of the arm's clock.
 
 - **expected**: in quotes what the process of the bus must name, with the time from the event. Held: gravity
   compensation and the damping of the motors; then laid down; then disabled, for good: nobody enables a motor again.
-- **fastest joint**: greatest speed of a joint from the event until all motors are disabled, and its number; a joint whose
+- **fastest joint**: largest speed of a joint from the event until all motors are disabled, and its number; a joint whose
   own motor has no torque is left out. No joint may exceed 0.5 rad/s, or 1.1 times what the task had, unless the arm's
   weight rests on the motor that is lost, the torque of all motors has ended, or the event is seen in the motion
   alone; then the figure tells how fast it falls.

@@ -228,11 +228,11 @@ fn in_virtual_time<const N: usize>(
         event_s: None,
     };
     let loses_arm = matches!(case.expected, Expected::TorqueGone { .. });
-    let (begin, mut heard, mut killed) = (Instant::now(), Instant::now(), false);
+    let (begin, mut last_telemetry, mut killed) = (Instant::now(), Instant::now(), false);
     loop {
         let telemetry = system.poll_telemetry()?;
         if let Some(telemetry) = &telemetry {
-            heard = Instant::now();
+            last_telemetry = Instant::now();
             left.samples.push(ControllerSample::of(telemetry));
             let cycle = telemetry.state.cycle;
             if case.event == Event::KillController {
@@ -246,7 +246,7 @@ fn in_virtual_time<const N: usize>(
                 left.event_s = Some(telemetry.state.stamp_ns as f64 * 1e-9);
             }
         }
-        let silent = heard.elapsed() > SILENCE && loses_arm;
+        let silent = last_telemetry.elapsed() > SILENCE && loses_arm;
         if telemetry.is_none() && (silent || system.clock_has_ended()?) {
             break;
         }

@@ -1,4 +1,4 @@
-//! The operator is heard whatever else happens: idle acts within 20 cycles of being asked.
+//! Idle acts within 20 cycles of its request, whatever else happens.
 
 use crate::scripted::{Bench, PERIOD};
 use crate::support::terminate;
@@ -86,7 +86,7 @@ fn idle_acts_while_the_disk_hangs() {
     let since = Instant::now();
     let (mut steps, mut lost) = (None, 0);
     while since.elapsed() < DISK_HANGS {
-        bench.assert_heard(&mut operator);
+        bench.assert_idle_acts(&mut operator);
         bench.hold(&mut operator);
         bench.run(100);
         while let Some(telemetry) = reader.receive().expect("read") {
@@ -116,7 +116,7 @@ fn idle_acts_while_a_reader_lags() {
     let mut operator = OperatorClient::new(&bench.domain).expect("an operator");
     bench.hold(&mut operator);
     bench.run(2500);
-    bench.assert_heard(&mut operator);
+    bench.assert_idle_acts(&mut operator);
     // What it left unread is older; then it gets what is new.
     while reader.receive().expect("read").is_some() {}
     bench.run(100);
@@ -156,11 +156,11 @@ fn idle_acts_beside_files_of_another_user() {
         }
         made.push(file);
     }
-    bench.assert_heard(&mut operator);
+    bench.assert_idle_acts(&mut operator);
     if let Err(error) = TelemetryReader::new(&bench.domain) {
         assert!(error.to_string().contains("user"), "{error}");
     }
-    bench.assert_heard(&mut operator);
+    bench.assert_idle_acts(&mut operator);
     assert!(
         made.iter().all(|file| file.0.exists()),
         "others' files stay"
@@ -185,7 +185,7 @@ fn idle_acts_while_shared_memory_is_full() {
         println!("skipped: mount namespaces are not permitted");
         return;
     }
-    let test = "heard::idle_acts_while_shared_memory_is_full";
+    let test = "idle_requests::idle_acts_while_shared_memory_is_full";
     let script = format!("{mount} && exec \"$0\" --exact {test} --nocapture");
     let output = in_namespace(&script).expect("it runs");
     let words = String::from_utf8_lossy(&output.stdout).into_owned();
@@ -200,11 +200,11 @@ fn with_full_shared_memory() {
     bench.hold(&mut operator);
     let filled = std::fs::write("/dev/shm/fill", vec![0_u8; 200 << 20]);
     assert!(filled.is_err(), "it is full");
-    bench.assert_heard(&mut operator);
+    bench.assert_idle_acts(&mut operator);
     bench.hold(&mut operator);
     bench.fault();
     bench.reset(&mut operator);
-    bench.assert_heard(&mut operator);
+    bench.assert_idle_acts(&mut operator);
     end(bench);
 }
 

@@ -98,7 +98,7 @@ fn check(stderr: &PipeWriter) {
         let acted = up.until(tracks).and_then(|_| up.idle());
         if let Some(cycles) = acted {
             quickest = quickest.min(cycles);
-            // The operator is heard again, too.
+            // The controller answers the operator again, too.
             let mut operator = OperatorClient::new(&up.domain).expect("an operator");
             let sent = operator.send::<4>(&Request::GravityHold, None);
             assert!(sent.expect("sent").is_some());
