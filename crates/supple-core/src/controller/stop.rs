@@ -32,8 +32,6 @@ use crate::config::Config;
 use crate::law::impedance::Torques;
 use crate::math::{Vector, Vector3, abs};
 
-/// Time constant `t_s` as a multiple of the delay.
-pub(super) const STOP_TIME_CONSTANT_DELAYS: f64 = 4.0;
 /// Settling time of the velocity estimate after a step in speed, as a multiple of the delay.
 const ESTIMATOR_SETTLING_DELAYS: f64 = 2.0;
 /// Time within which the arm must come to rest \[s\].
