@@ -56,9 +56,10 @@ impl Arm {
         &self.description
     }
 
-    /// The arm with everything that a controller needs, once it was asked for.
-    pub fn known_completed(&self) -> &OnceLock<Completed> {
-        &self.completed
+    /// The arm with everything that a controller needs. A `UserWarning` says that settings were derived, unless only the
+    /// paths are placed.
+    pub fn for_controller(&self, py: Python<'_>) -> PyResult<&Description> {
+        complete::completed(py, &self.description, &self.completed)
     }
 
     fn evaluate<'py>(
@@ -295,7 +296,7 @@ impl Arm {
     /// True
     #[pyo3(name = "completed")]
     fn completed_arm(&self, py: Python<'_>) -> PyResult<Self> {
-        let completed = complete::of(py, self)?;
+        let completed = complete::of(py, &self.description, &self.completed)?;
         Self::new(completed.description.clone()).map_err(errors::model)
     }
 

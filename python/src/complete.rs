@@ -1,17 +1,21 @@
 //! The settings of a controller that an arm's files leave out.
 
-use crate::arm::Arm;
 use crate::errors;
 use pyo3::exceptions::{PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use std::ffi::CString;
+use std::sync::OnceLock;
 use supple_model::unlimited::{UNLIMITED_NM, UNLIMITED_RAD_PER_S};
 use supple_model::{Completed, Description, ModelError, with_dof};
 
 /// The arm with everything that a controller needs. A `UserWarning` says that settings were
 /// derived, unless only the paths are placed.
-pub fn completed<'a>(py: Python<'_>, arm: &'a Arm) -> PyResult<&'a Description> {
-    let completed = of(py, arm)?;
+pub fn completed<'a>(
+    py: Python<'_>,
+    arm: &Description,
+    known: &'a OnceLock<Completed>,
+) -> PyResult<&'a Description> {
+    let completed = of(py, arm, known)?;
     // Where the arm does not reach the paper's paths, others are no guess about the arm.
     let of_arm = completed.derived.iter();
     let derived = of_arm
@@ -24,7 +28,7 @@ pub fn completed<'a>(py: Python<'_>, arm: &'a Arm) -> PyResult<&'a Description> 
             .count();
         let mut text = format!(
             "{}: {derived} settings of the controller are derived from the arm",
-            arm.description().name()
+            arm.name()
         );
         if estimates > 0 {
             text += &format!("; the rotor inertias of {estimates} joints are estimates");
@@ -36,12 +40,15 @@ pub fn completed<'a>(py: Python<'_>, arm: &'a Arm) -> PyResult<&'a Description> 
     Ok(&completed.description)
 }
 
-/// The arm with everything that a controller needs, and what was derived.
-pub fn of<'a>(py: Python<'_>, arm: &'a Arm) -> PyResult<&'a Completed> {
-    if let Some(known) = arm.known_completed().get() {
+/// The arm with everything that a controller needs, and what was derived; `known` keeps it.
+pub fn of<'a>(
+    py: Python<'_>,
+    description: &Description,
+    known: &'a OnceLock<Completed>,
+) -> PyResult<&'a Completed> {
+    if let Some(known) = known.get() {
         return Ok(known);
     }
-    let description = arm.description();
     if let Some(unlimited) = unlimited(description).map_err(errors::model)? {
         return Err(PyValueError::new_err(format!(
             "{}: joint `{unlimited}`: its URDF gives no limit of torque or of speed, which a simulation needs: give \
@@ -51,7 +58,7 @@ pub fn of<'a>(py: Python<'_>, arm: &'a Arm) -> PyResult<&'a Completed> {
     }
     let completed = py.detach(|| description.completed());
     let completed = completed.map_err(errors::model)?;
-    Ok(arm.known_completed().get_or_init(|| completed))
+    Ok(known.get_or_init(|| completed))
 }
 
 /// A joint without limits of torque and speed, see [`supple_model::unlimited`].

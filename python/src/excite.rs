@@ -2,7 +2,6 @@
 
 use crate::arm::Arm;
 use crate::arrays;
-use crate::complete::completed;
 use crate::errors;
 use crate::interrupt::interruptible;
 use crate::plant_options::PlantEffects;
@@ -191,7 +190,10 @@ pub fn excite<'py>(
     options: ExciteOptions,
 ) -> PyResult<Bound<'py, PyDict>> {
     options.plant_options.check()?;
-    let (truth, known) = (completed(py, arm)?.clone(), completed(py, model)?.clone());
+    let (truth, known) = (
+        arm.for_controller(py)?.clone(),
+        model.for_controller(py)?.clone(),
+    );
     let log_dir = options.log_dir.clone();
     let series = SeriesLists::from(series);
     let log = interruptible(py, move |_| {

@@ -1,7 +1,6 @@
 //! An experiment of `supple-experiment`, returned as columns.
 
 use crate::arm::Arm;
-use crate::complete::completed;
 use crate::errors;
 use crate::interrupt::interruptible;
 use crate::plant_options::PlantEffects;
@@ -59,9 +58,9 @@ pub fn simulate<'py>(
     options: Options,
 ) -> PyResult<Bound<'py, PyDict>> {
     options.plant_options.check()?;
-    let plant = completed(py, arm)?.clone();
+    let plant = arm.for_controller(py)?.clone();
     let model = model
-        .map(|model| completed(py, model))
+        .map(|model| model.for_controller(py))
         .transpose()?
         .cloned();
     let log_dir = options.log_dir.clone();

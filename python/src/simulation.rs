@@ -2,7 +2,6 @@
 //! system: waiting is what runs it.
 
 use crate::arm::Arm;
-use crate::complete::completed;
 use crate::errors;
 use crate::live::{code, columns};
 use crate::plant_options::PlantEffects;
@@ -155,8 +154,8 @@ impl Simulation {
         options: Options,
     ) -> PyResult<Simulation> {
         options.plant_options.check()?;
-        let plant = completed(py, arm)?;
-        let model = model.map(|model| completed(py, model)).transpose()?;
+        let plant = arm.for_controller(py)?;
+        let model = model.map(|model| model.for_controller(py)).transpose()?;
         let built = py.detach(|| {
             with_dof!(plant.dof(), N => sized::<N>(plant, model, &options))
                 .map_err(ExperimentError::from)

@@ -83,7 +83,7 @@ fn emulate(interface: &str, commands: &Receiver<ArmCommand>) {
     let description = Description::asset("wam4").unwrap();
     let plant = PlantConfig::<4>::from_description(&description).unwrap();
     let home_rad = description.home::<4>().unwrap();
-    crate::realtime(crate::ARM_PRIORITY);
+    crate::realtime::realtime(crate::realtime::ARM_PRIORITY);
     let mut bus = SocketCan::open(interface).unwrap();
     let mut emulator =
         Emulator::new(EmulatorConfig::wam(4), plant, home_rad, bus.now_ns()).unwrap();

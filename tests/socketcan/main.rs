@@ -8,6 +8,9 @@ mod arm;
 mod counting;
 #[path = "../arm_on_bus/link.rs"]
 mod link;
+mod realtime;
+
+use realtime::{HOST_PRIORITY, realtime};
 
 use arm::Arm;
 use link::InProcessLink;
@@ -20,7 +23,6 @@ use supple_emu::ButtonPress;
 use supple_model::Description;
 use supple_puck::safety::SafetyLimits;
 use supple_puck::status::MotorMode;
-use supple_realtime::{Settings, apply_realtime_settings};
 
 const PERIOD_NS: u64 = 1_000_000;
 const ANSWER_NS: u64 = 50_000;
@@ -29,21 +31,7 @@ const SAFE: usize = 20;
 /// Cycles for the operator's button to reach the motors and the host: 50 ms.
 const PRESSED: usize = 50;
 
-/// Priorities of host and arm thread; the arm is higher, like real hardware.
-const HOST_PRIORITY: u8 = 79;
-const ARM_PRIORITY: u8 = 80;
-
 type Service = Cycle<4, FaultInjector<SocketCan>, InProcessLink<4>>;
-
-fn realtime(priority: u8) {
-    let settings = Settings {
-        priority: Some(priority),
-        ..Settings::NONE
-    };
-    for realtime_warning in apply_realtime_settings(&settings) {
-        eprintln!("{realtime_warning}");
-    }
-}
 
 fn run(cycle: &mut Service, cycles: usize) {
     for _ in 0..cycles {

@@ -1,6 +1,6 @@
 //! Baseline: two processes exchange one datagram each way per period.
 
-use crate::{
+use crate::common::{
     CONTROLLER_PRIORITY, Common, Failure, Measured, PLANT_PRIORITY, PeerProcess, run_periodically,
 };
 use std::io;

@@ -1,6 +1,6 @@
 //! Latency of the messages of a system alone: an arm state in one direction and torques in the other, in shared memory.
 
-use crate::{
+use crate::common::{
     CONTROLLER_PRIORITY, Common, Failure, Measured, PLANT_PRIORITY, PeerProcess, run_periodically,
 };
 use core::time::Duration;

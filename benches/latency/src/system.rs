@@ -1,6 +1,6 @@
 //! Measures a running system of two processes through its telemetry.
 
-use crate::{Common, Failure, Measured};
+use crate::common::{Common, Failure, Measured};
 use core::time::Duration;
 use rustix::process::{Pid, Signal, kill_process};
 use std::path::Path;

@@ -2,7 +2,7 @@
 
 use crate::arm::{arm, friction};
 use crate::digest::Digest;
-use crate::{PERIOD_S, print, refused};
+use crate::print::{PERIOD_S, print, refused};
 use core::fmt::{self, Write};
 use supple_core::config::{
     ApparentInertia, Collision, ContactLatch, FrictionVelocity, Gains, JointGains, JointNames, Law,

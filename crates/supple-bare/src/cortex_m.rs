@@ -1,6 +1,6 @@
 //! A bare-metal Cortex-M4 that prints through the debugger (semihosting).
 
-use core::arch::{asm, global_asm};
+use core::arch::asm;
 use core::fmt;
 
 /// Semihosting operations and exit reasons, numbered by ARM.
@@ -8,38 +8,6 @@ const WRITE_CHARACTER: usize = 0x03;
 const EXIT: usize = 0x18;
 const APPLICATION_EXIT: usize = 0x20026;
 const RUNTIME_ERROR: usize = 0x20023;
-
-// Vector table (stack, reset, every exception a fault) and reset: the floating-point unit is off at
-// power-on and must be switched on before the first compiled instruction.
-global_asm!(
-    ".section .vector_table, \"a\", %progbits",
-    ".word _stack_top",
-    ".word reset",
-    ".rept 14",
-    ".word {fault}",
-    ".endr",
-    ".section .text.reset, \"ax\", %progbits",
-    ".global reset",
-    ".type reset, %function",
-    ".thumb_func",
-    "reset:",
-    "movw r0, #0xed88",
-    "movt r0, #0xe000",
-    "ldr r1, [r0]",
-    "orr r1, r1, #0xf00000",
-    "str r1, [r0]",
-    "dsb",
-    "isb",
-    "bl {run}",
-    "udf #0",
-    ".size reset, . - reset",
-    run = sym super::run,
-    fault = sym fault,
-);
-
-extern "C" fn fault() -> ! {
-    exit(false)
-}
 
 /// # Safety
 /// `argument` is the operation's argument: a value, or the address of its data.

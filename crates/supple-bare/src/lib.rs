@@ -11,12 +11,9 @@ mod arm;
 mod control;
 mod digest;
 mod motion;
+mod print;
 
 use core::fmt::{self, Write};
-use supple_core::Vector;
-
-/// Period of every step \[s\].
-const PERIOD_S: f64 = 1e-3;
 
 /// Prints, for an arm of 4 and one of 7 joints, torques, the state at the end of a motion and of a
 /// controlled run, and a digest of all intermediate numbers. Numbers are printed as their bits and
@@ -30,20 +27,4 @@ pub fn report(out: &mut impl Write) -> fmt::Result {
     control::report::<4>(out)?;
     motion::report::<7>(out)?;
     control::report::<7>(out)
-}
-
-fn print<const N: usize>(out: &mut impl Write, name: &str, values: &Vector<N>) -> fmt::Result {
-    write!(out, "{name}")?;
-    for value in values.iter() {
-        write!(out, " {:016x} ({value:.6})", value.to_bits())?;
-    }
-    writeln!(out)
-}
-
-/// Prints why something was rejected.
-fn refused<T>(result: Result<T, impl fmt::Display>, out: &mut impl Write) -> Result<T, fmt::Error> {
-    result.or_else(|error| {
-        writeln!(out, "refused: {error}")?;
-        Err(fmt::Error)
-    })
 }

@@ -1,18 +1,11 @@
 //! Linux on x86-64 without its C library: two system calls.
 
-use core::arch::{asm, naked_asm};
+use core::arch::asm;
 use core::fmt;
 
 const WRITE: usize = 1;
 const EXIT_GROUP: usize = 231;
 const STANDARD_OUTPUT: usize = 1;
-
-/// Entry point of the program. The kernel aligns the stack to 16 bytes, as a call expects.
-#[unsafe(no_mangle)]
-#[unsafe(naked)]
-extern "C" fn _start() -> ! {
-    naked_asm!("xor ebp, ebp", "call {run}", "ud2", run = sym super::run)
-}
 
 /// Standard output.
 pub struct Console;

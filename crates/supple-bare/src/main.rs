@@ -10,6 +10,16 @@
 #[cfg_attr(all(target_arch = "arm", target_os = "none"), path = "cortex_m.rs")]
 mod system;
 
+#[cfg_attr(
+    all(target_arch = "x86_64", target_os = "linux"),
+    path = "linux_entry.rs"
+)]
+#[cfg_attr(
+    all(target_arch = "arm", target_os = "none"),
+    path = "cortex_m_entry.rs"
+)]
+mod entry;
+
 #[cfg(target_os = "linux")]
 mod memory;
 

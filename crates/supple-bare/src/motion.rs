@@ -2,7 +2,7 @@
 
 use crate::arm::{arm, friction};
 use crate::digest::Digest;
-use crate::{PERIOD_S, print, refused};
+use crate::print::{PERIOD_S, print, refused};
 use core::fmt::{self, Write};
 use supple_core::dynamics::{self, Terms};
 use supple_core::math::sin;

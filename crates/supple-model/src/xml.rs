@@ -6,9 +6,12 @@
 //! listed, see [`ignored`].
 
 pub(crate) mod bounds;
+mod elements;
 mod ignored;
 mod prefixes;
 mod remove_unread;
+
+use elements::{ELEMENT_RULES, children, is_known, is_own, known_children, place};
 
 use crate::error::{Finding, ModelError, Reporter};
 use ignored::IgnoredElements;
@@ -43,51 +46,6 @@ const NUMERIC_ATTRIBUTES: &[(&str, &str, usize, bool)] = &[
     ("dynamics", "friction", 1, false),
 ];
 
-/// Children that an element may have, those that it must have, and those that may occur more than once.
-struct ElementRule {
-    element: &'static str,
-    known: &'static [&'static str],
-    required: &'static [&'static str],
-    repeatable: &'static [&'static str],
-}
-
-const ELEMENT_RULES: &[ElementRule] = &[
-    ElementRule {
-        element: "robot",
-        known: &["link", "joint", "material"],
-        required: &[],
-        repeatable: &["link", "joint", "material"],
-    },
-    ElementRule {
-        element: "link",
-        known: &["inertial", "visual", "collision", "contact"],
-        required: &[],
-        repeatable: &["visual", "collision"],
-    },
-    ElementRule {
-        element: "inertial",
-        known: &["origin", "mass", "inertia"],
-        required: &["mass", "inertia"],
-        repeatable: &[],
-    },
-    ElementRule {
-        element: "joint",
-        known: &[
-            "origin",
-            "parent",
-            "child",
-            "axis",
-            "calibration",
-            "dynamics",
-            "limit",
-            "mimic",
-            "safety_controller",
-        ],
-        required: &["parent", "child"],
-        repeatable: &[],
-    },
-];
-
 /// Text attributes. Namespace declarations (`xmlns`) are not attributes here.
 const TEXT_ATTRIBUTES: &[(&str, &[&str])] = &[
     ("robot", &["name", "version"]),
@@ -108,21 +66,6 @@ pub(crate) struct Checked {
     pub warnings: Vec<Finding>,
     /// The text without the ignored content, for `urdf-rs`.
     pub text: String,
-}
-
-/// Names of the known children of an element.
-fn known_children(element: &str) -> &'static [&'static str] {
-    let rule = ELEMENT_RULES.iter().find(|rule| rule.element == element);
-    rule.map_or(&[], |rule| rule.known)
-}
-
-/// Returns whether the element belongs to the format, not to another program: its namespace is that of the root.
-fn is_own(node: &Node<'_, '_>) -> bool {
-    node.tag_name().namespace() == node.document().root_element().tag_name().namespace()
-}
-
-fn is_known(node: &Node<'_, '_>, names: &[&str]) -> bool {
-    is_own(node) && names.contains(&node.tag_name().name())
 }
 
 /// Checks the text against the format.
@@ -329,32 +272,4 @@ fn check_numbers(
         }
     }
     Ok(())
-}
-
-fn children<'a, 'input>(
-    node: &Node<'a, 'input>,
-) -> impl Iterator<Item = Node<'a, 'input>> + use<'a, 'input> {
-    node.children().filter(Node::is_element)
-}
-
-/// ``joint `elbow` <limit> (line 12)``.
-fn place(node: &Node<'_, '_>) -> String {
-    let owner = node
-        .ancestors()
-        .find(|n| n.has_tag_name("link") || n.has_tag_name("joint"))
-        .filter(|owner| owner.attribute("name").is_some());
-    let line = node.document().text_pos_at(node.range().start).row;
-    let tag = node.tag_name().name();
-    match owner {
-        Some(owner) => {
-            let kind = owner.tag_name().name();
-            let name = owner.attribute("name").unwrap_or_default();
-            if owner.id() == node.id() {
-                format!("{kind} `{name}` (line {line})")
-            } else {
-                format!("{kind} `{name}` <{tag}> (line {line})")
-            }
-        }
-        None => format!("<{tag}> (line {line})"),
-    }
 }

@@ -15,8 +15,11 @@ mod options;
 mod pause;
 mod private_folder;
 mod schedule;
+mod settings;
 mod spin;
 mod stop;
+
+pub use settings::Settings;
 
 pub use background::BackgroundWriter;
 pub use clock::{monotonic_ns, sleep_until_ns};
@@ -31,26 +34,6 @@ pub use spin::spin_duration;
 pub use stop::{Stop, StopError, die_with_parent, ignore_file_size_and_tty_signals};
 
 use std::io::Error;
-
-/// Realtime settings of a thread.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Settings {
-    /// Priority of the calling thread under SCHED_FIFO, 1 to 99; `None` leaves it as it is.
-    pub priority: Option<u8>,
-    /// Processor to bind the calling thread to; `None` leaves it to the scheduler.
-    pub cpu: Option<usize>,
-    /// Whether to lock all present and future memory of the process and prefault the stack.
-    pub lock_memory: bool,
-}
-
-impl Settings {
-    /// No settings: virtual time needs none.
-    pub const NONE: Settings = Settings {
-        priority: None,
-        cpu: None,
-        lock_memory: false,
-    };
-}
 
 /// A setting that the system refused: the thread runs, but may be late.
 #[derive(Debug, thiserror::Error)]

@@ -1,6 +1,6 @@
 //! Options shared by the periodic processes.
 
-use crate::Settings;
+use crate::settings::Settings;
 use clap::Args;
 
 /// Options of a periodic process, except the priority of its thread.

@@ -17,6 +17,7 @@ pub mod messages;
 pub mod mutate;
 pub mod pucks;
 pub mod requests;
+pub mod seed;
 pub mod seeds;
 pub mod tables;
 

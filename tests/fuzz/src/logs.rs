@@ -113,7 +113,7 @@ fn about() -> BTreeMap<String, String> {
 }
 
 /// A log of the built-in arm with three joints: complete, truncated, and without compression.
-pub fn seeds() -> Vec<crate::seeds::Seed> {
+pub fn seeds() -> Vec<crate::seed::Seed> {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("seed.mcap");
     write(&path);
@@ -137,7 +137,7 @@ fn write(path: &Path) {
     let run = RunInfo::default();
     let mut writer = Writer::create(path, &description, &config, &run).expect("a new file");
     for cycle in 0..6 {
-        let arm = crate::seeds::state_at_rest(if cycle < 5 { cycle } else { 99 }, &home);
+        let arm = crate::seed::state_at_rest(if cycle < 5 { cycle } else { 99 }, &home);
         let request = (cycle == 1).then_some(Request::GravityHold);
         let input = arm.input::<3>(request).expect("three joints");
         let output = step(&controller, &mut state, &input);

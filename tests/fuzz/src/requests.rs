@@ -37,7 +37,7 @@ fn home() -> &'static Vector<4> {
 
 /// Input of a cycle with the arm at rest in its home pose, converted from a message.
 pub fn at_rest(cycle: u64, request: Option<Request<4>>) -> Input<4> {
-    crate::seeds::state_at_rest(cycle, home())
+    crate::seed::state_at_rest(cycle, home())
         .input(request)
         .expect("four joints")
 }

@@ -3,6 +3,8 @@
 //! `cargo test -p supple-fuzz --test corpus -- --ignored write_seeds` writes them into the committed corpus, as
 //! `seed-*` files; run it after the layout of a message or a log has changed.
 
+pub use crate::seed::{Seed, state_at_rest};
+
 use crate::arms;
 use crate::bytes::bytes_of;
 use crate::logs;
@@ -17,13 +19,9 @@ use supple_core::trajectory::{Arc, Fourier, Line, Probe, Quadrant, Sinusoid, Tra
 use supple_core::{Output, State, Vector, step};
 use supple_ident::SeriesLists;
 use supple_ipc::message::{
-    ArmState, CycleTiming, Drives, OperatorReply, OperatorRequest, Outcome, PlantReport, Telemetry,
-    Text, TorqueCommand,
+    ArmState, CycleTiming, OperatorReply, OperatorRequest, Outcome, Telemetry, Text, TorqueCommand,
 };
 use supple_model::Description;
-
-/// Name and bytes of an input.
-pub type Seed = (String, Vec<u8>);
 
 /// Seeds of a target.
 ///
@@ -88,18 +86,6 @@ fn text(name: &str, text: &str) -> Seed {
 
 fn named<T: crate::bytes::AnyBitPattern>(name: &str, value: &T) -> Seed {
     (name.to_owned(), bytes_of(value))
-}
-
-/// State of an arm at rest, in cycle `cycle`.
-pub fn state_at_rest<const N: usize>(cycle: u64, position_rad: &Vector<N>) -> ArmState {
-    ArmState::new::<N>(
-        cycle,
-        cycle * 1_000_000,
-        &core::array::from_fn(|i| Some(position_rad[i])),
-        Some(Vector3::zeros()),
-        Drives::Active,
-        PlantReport::default(),
-    )
 }
 
 fn home() -> Vector<4> {

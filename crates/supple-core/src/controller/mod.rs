@@ -21,6 +21,7 @@ pub mod observer;
 mod output;
 mod plausibility;
 mod pose_task;
+mod prepared;
 mod presliding;
 mod requests;
 pub mod residual;
@@ -31,6 +32,8 @@ mod stop;
 mod supervision;
 mod validate;
 mod words;
+
+pub use prepared::Controller;
 
 pub use fault::{Fault, SafeAction};
 pub use learned_ramp::LEARNED_RAMP_S;
@@ -43,161 +46,3 @@ pub use state::State;
 pub use step::step;
 pub use validate::ConfigError;
 pub use words::{JointLabel, NamesJoints, WithNames};
-
-use crate::config::Config;
-use crate::law::task::count_active;
-use crate::math::linalg::Cholesky;
-use crate::math::{Matrix, Vector};
-use crate::model::learned::LearnedBounds;
-use estimator::EstimatorGains;
-use nullspace::nullspace_damping_nm_s_per_rad;
-
-/// A validated configuration and the constants derived from it.
-#[derive(Clone, Copy, Debug)]
-pub struct Controller<const N: usize> {
-    config: Config<N>,
-    groups: MotorGroups<N>,
-    /// `j2mp`.
-    motor_from_joint: Matrix<N, N>,
-    delay_s: f64,
-    /// Number of active joints.
-    active_joints: usize,
-    /// A motor has a table of its ripple.
-    has_ripple: bool,
-    /// The travel of a joint's reversals is known.
-    has_presliding: bool,
-    /// A joint is compliant between encoder and link.
-    has_compliance: bool,
-    /// The estimator's gains after one period.
-    one_period: EstimatorGains,
-    torque_step_nm: Vector<N>,
-    /// Weights of squared external torques whose sum exceeds one where something pushes the arm \[1/(N m)^2\].
-    push_weight_per_nm2: Vector<N>,
-    stop_step_nm: Vector<N>,
-    nullspace_damping_nm_s_per_rad: Vector<N>,
-    learned_bounds: LearnedBounds<N>,
-}
-
-/// Maximum delay from a measurement to the resulting torque in cycles, with half a cycle for the
-/// zero-order hold of the torque.
-const DELAY_CYCLES: f64 = 3.5;
-/// Time in which the safe action may ramp a joint from full torque to zero \[s\].
-const STOP_TORQUE_S: f64 = 0.005;
-
-impl<const N: usize> Controller<N> {
-    /// Validates a configuration and builds its controller.
-    ///
-    /// # Errors
-    /// [`ConfigError`] names the entry, the joint and the value.
-    pub fn new(config: Config<N>) -> Result<Self, ConfigError> {
-        validate::validate(&config)?;
-        let to_joint = &config.joint_from_motor;
-        // Validation guarantees that the product is positive definite.
-        let motor_from_joint = Cholesky::new(&(to_joint.transpose() * to_joint))
-            .map_or_else(Matrix::identity, |square| {
-                square.solve(&to_joint.transpose())
-            });
-        let delay_s = DELAY_CYCLES * config.period_s + 2.0 / config.estimator_rad_per_s;
-        let limits = &config.limits;
-        Ok(Controller {
-            learned_bounds: LearnedBounds::new(&config.friction, &limits.joint_torque_nm),
-            nullspace_damping_nm_s_per_rad: nullspace_damping_nm_s_per_rad(&config, delay_s),
-            motor_from_joint,
-            groups: MotorGroups::new(&config.joint_from_motor),
-            delay_s,
-            active_joints: count_active(&config.roles),
-            has_ripple: config
-                .ripple
-                .iter()
-                .any(|table| !table.harmonics().is_empty()),
-            has_presliding: config.friction.iter().any(|f| f.presliding_rad > 0.0),
-            has_compliance: config.compliance_rad_per_nm != Vector::<N>::zeros(),
-            one_period: EstimatorGains::new(config.period_s, config.estimator_rad_per_s),
-            torque_step_nm: config.limits.torque_rate_nm_per_s * config.period_s,
-            push_weight_per_nm2: limits.joint_torque_nm.map(|limit_nm| {
-                let strong_nm = stop::UNEXPLAINED_MOVING_SHARE * limit_nm;
-                1.0 / (strong_nm * strong_nm)
-            }),
-            stop_step_nm: Vector::from_fn(|i, _| {
-                let slow = config.limits.torque_rate_nm_per_s[i];
-                let fast = config.limits.joint_torque_nm[i] / STOP_TORQUE_S;
-                slow.max(fast) * config.period_s
-            }),
-            config,
-        })
-    }
-
-    /// Maximum delay from a motion to the resulting torque \[s\]: 3.5 cycles plus the lag of the
-    /// velocity estimate.
-    pub fn delay_s(&self) -> f64 {
-        self.delay_s
-    }
-
-    fn active_joints(&self) -> usize {
-        self.active_joints
-    }
-
-    fn has_ripple(&self) -> bool {
-        self.has_ripple
-    }
-
-    fn has_presliding(&self) -> bool {
-        self.has_presliding
-    }
-
-    fn has_compliance(&self) -> bool {
-        self.has_compliance
-    }
-
-    /// Time constant `t_s` with which the safe action stops a motion \[s\].
-    pub fn stop_s(&self) -> f64 {
-        stop::STOP_TIME_CONSTANT_DELAYS * self.delay_s
-    }
-
-    /// The estimator's gains after so many periods. One, the common case, needs no exponential.
-    fn estimator_gains(&self, periods: u64) -> EstimatorGains {
-        match periods {
-            1 => self.one_period,
-            _ => EstimatorGains::new(
-                periods as f64 * self.config.period_s,
-                self.config.estimator_rad_per_s,
-            ),
-        }
-    }
-
-    /// Damping of each joint in the null space of the position task \[N m s/rad\]: that of the law, or as much
-    /// as the delay allows where the joint is light, as the last ones of a wrist are.
-    pub fn nullspace_damping_nm_s_per_rad(&self) -> &Vector<N> {
-        &self.nullspace_damping_nm_s_per_rad
-    }
-
-    /// Maximum change of joint torque per cycle \[N m\]: by the rate limit, or with `stopping` the
-    /// larger of it and the rate of the safe action.
-    pub fn torque_step_nm(&self, stopping: bool) -> &Vector<N> {
-        if stopping {
-            &self.stop_step_nm
-        } else {
-            &self.torque_step_nm
-        }
-    }
-
-    /// What learning may change at most.
-    pub fn learned_bounds(&self) -> &LearnedBounds<N> {
-        &self.learned_bounds
-    }
-
-    /// The configuration.
-    pub fn config(&self) -> &Config<N> {
-        &self.config
-    }
-
-    /// `j2mp`: motor angles from joint angles.
-    pub fn motor_from_joint(&self) -> &Matrix<N, N> {
-        &self.motor_from_joint
-    }
-
-    /// Coupling between motors and joints.
-    pub fn motors(&self) -> &MotorGroups<N> {
-        &self.groups
-    }
-}

@@ -34,8 +34,6 @@ use crate::config::Config;
 use crate::law::impedance::Torques;
 use crate::math::{Vector, Vector3, abs};
 
-/// Time constant `t_s` as a multiple of the delay.
-pub(super) const STOP_TIME_CONSTANT_DELAYS: f64 = 4.0;
 /// Settling time of the velocity estimate after a step in speed, as a multiple of the delay.
 const ESTIMATOR_SETTLING_DELAYS: f64 = 2.0;
 /// Time within which the arm must come to rest \[s\].
@@ -44,8 +42,6 @@ pub(crate) const STOP_TIMEOUT_S: f64 = 0.2;
 pub(crate) const ENERGY_GROWTH_LIMIT: f64 = 1.25;
 /// Fraction of a joint's torque limit above which an external torque would move a joint at rest.
 const UNEXPLAINED_SHARE: f64 = 0.1;
-/// The same for an arm that follows a reference out of contact: its friction is known better than this.
-pub(super) const UNEXPLAINED_MOVING_SHARE: f64 = 0.05;
 /// Time for which such a torque may act \[s\].
 const UNEXPLAINED_S: f64 = 0.05;
 /// Time after which an impact and the observer's response to it have decayed \[s\].

@@ -5,7 +5,8 @@
 //! and Christoffel symbols for rigid-body systems", 2021), so that `H' - 2 C` is skew. Spatial vectors
 //! here are angular first.
 
-use super::{parent_rotations, rnea};
+use super::rnea;
+use super::rotations::parent_rotations;
 use crate::math::{Matrix, Matrix3, Vector, Vector3, skew};
 use crate::model::arm::Arm;
 

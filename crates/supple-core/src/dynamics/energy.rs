@@ -1,6 +1,7 @@
 //! Kinetic and potential energy.
 
-use super::{joint_poses, parent_rotations};
+use super::joint_poses;
+use super::rotations::parent_rotations;
 use crate::math::{Vector, Vector3};
 use crate::model::arm::Arm;
 

@@ -18,6 +18,7 @@ mod momentum;
 mod motion;
 mod regressor;
 mod rnea;
+mod rotations;
 mod sweep;
 mod terms;
 
@@ -32,19 +33,3 @@ pub use rnea::{gravity, rnea};
 pub(crate) use sweep::Sweep;
 pub(crate) use terms::fill;
 pub use terms::{Terms, terms};
-
-use crate::math::lanes::{in_groups, joint_values};
-use crate::math::{Matrix3, Vector};
-use crate::model::arm::Arm;
-
-/// Rotation of joint frame `i` in its parent's joint frame, for every joint.
-#[inline]
-fn parent_rotations<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> [Matrix3<f64>; N] {
-    in_groups!(N, rotations(arm, q))
-}
-
-#[inline]
-fn rotations<const N: usize, const G: usize>(arm: &Arm<N>, q: &Vector<N>) -> [Matrix3<f64>; N] {
-    let rows = chain::parent_rotations::<N, G>(arm, q);
-    core::array::from_fn(|i| Matrix3::from_column_slice(&joint_values(&rows, i)))
-}

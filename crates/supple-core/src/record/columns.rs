@@ -1,6 +1,7 @@
 //! The words of a record as the columns of a table.
 
-use super::{Element, Field, Recorded, Shape, Text, Unpack};
+use super::Text;
+use super::layout::{Element, Field, Recorded, Shape, Unpack};
 use core::fmt;
 
 /// A column: a field, or a part of it.

@@ -1,7 +1,7 @@
 //! Oscillation on a horizontal circle about the base axis; it moves the base joint, which the
 //! sinusoid does not.
 
-use super::{MINIMUM_JERK_SPEED, Reference, TrajectoryError, positive, time_scaling};
+use super::reference::{MINIMUM_JERK_SPEED, Reference, TrajectoryError, positive, time_scaling};
 use crate::math::{Vector3, abs, sin_cos};
 
 /// Azimuth `centre + amplitude sin(omega s(t))` at constant radius and height.

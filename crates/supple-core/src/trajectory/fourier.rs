@@ -9,7 +9,7 @@
 //! (series from Swevers et al. 1997, "Optimal robot excitation and identification"). After the end
 //! the reference is constant.
 
-use super::{TrajectoryError, positive, time_scaling};
+use super::reference::{TrajectoryError, positive, time_scaling};
 use crate::config::Limits;
 use crate::math::{Vector, abs, all_finite, sin_cos};
 use core::f64::consts::TAU;

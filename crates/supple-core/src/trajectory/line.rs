@@ -1,6 +1,6 @@
 //! Straight line from rest to rest with minimum jerk.
 
-use super::{
+use super::reference::{
     MINIMUM_JERK_ACCELERATION, MINIMUM_JERK_SPEED, Reference, TrajectoryError, finite, positive,
 };
 use crate::math::{Vector3, smooth_step, sqrt};

@@ -9,9 +9,15 @@ mod fourier;
 mod line;
 mod probe;
 mod quadrant;
+mod reference;
 mod rotation;
 mod segment;
 mod sinusoid;
+
+use reference::finite;
+pub use reference::{
+    MINIMUM_JERK_ACCELERATION, MINIMUM_JERK_JERK, MINIMUM_JERK_SPEED, Reference, TrajectoryError,
+};
 
 pub use arc::Arc;
 pub use fourier::{Fourier, HARMONICS, JointReference, LimitViolation};
@@ -22,61 +28,7 @@ pub use rotation::{OrientationReference, Rotation};
 pub use segment::{Segment, SegmentPeaks};
 pub use sinusoid::Sinusoid;
 
-use crate::math::{Vector3, all_finite, smooth_step};
-use core::fmt;
-
-/// Peak speed of a minimum-jerk motion over its mean speed.
-pub const MINIMUM_JERK_SPEED: f64 = 1.875;
-/// Peak acceleration of a minimum-jerk motion over its distance by its duration squared: 10 /
-/// sqrt(3).
-pub const MINIMUM_JERK_ACCELERATION: f64 = 5.773_502_691_896_258;
-/// Peak jerk of a minimum-jerk motion over its distance by its duration cubed.
-pub const MINIMUM_JERK_JERK: f64 = 60.0;
-
-/// Reference of the tip in base coordinates: `Xo`, `Xo'`, `Xo''`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Reference {
-    /// `Xo` \[m\].
-    pub position: Vector3<f64>,
-    /// `Xo'` \[m/s\].
-    pub velocity: Vector3<f64>,
-    /// `Xo''` \[m/s^2\].
-    pub acceleration: Vector3<f64>,
-}
-
-impl Reference {
-    /// A reference at rest at `position` \[m\].
-    pub fn at_rest(position: Vector3<f64>) -> Reference {
-        Reference {
-            position,
-            velocity: Vector3::zeros(),
-            acceleration: Vector3::zeros(),
-        }
-    }
-}
-
-/// The invalid entry of a trajectory, with its value.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TrajectoryError {
-    /// Name of the entry.
-    pub entry: &'static str,
-    /// Value found.
-    pub value: f64,
-    /// Requirement.
-    pub must: &'static str,
-}
-
-impl fmt::Display for TrajectoryError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "trajectory: {} is {}, it must be {}",
-            self.entry, self.value, self.must
-        )
-    }
-}
-
-impl core::error::Error for TrajectoryError {}
+use crate::math::Vector3;
 
 /// A trajectory of the tip.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -168,45 +120,5 @@ impl Trajectory {
             Trajectory::Quadrant(quadrant) => quadrant.validate(),
             Trajectory::Probe(probe) => probe.validate(),
         }
-    }
-}
-
-/// Path time for a time scaling that is ramped from rest over `ramp_s`: value, first and second
-/// derivative. The path time lags by half the ramp time.
-fn time_scaling(time_s: f64, ramp_s: f64) -> (f64, f64, f64) {
-    if time_s >= ramp_s {
-        return (time_s - 0.5 * ramp_s, 1.0, 0.0);
-    }
-    let x = time_s / ramp_s;
-    let (time_scale, slope, _) = smooth_step(x);
-    let x4 = x * x * x * x;
-    (
-        ramp_s * x4 * (2.5 + x * (x - 3.0)),
-        time_scale,
-        slope / ramp_s,
-    )
-}
-
-fn finite(entry: &'static str, v: &Vector3<f64>) -> Result<(), TrajectoryError> {
-    if all_finite(v) {
-        return Ok(());
-    }
-    let value = v.iter().copied().find(|x| !x.is_finite());
-    Err(TrajectoryError {
-        entry,
-        value: value.unwrap_or(f64::NAN),
-        must: "finite",
-    })
-}
-
-fn positive(entry: &'static str, value: f64) -> Result<(), TrajectoryError> {
-    if value > 0.0 && value.is_finite() {
-        Ok(())
-    } else {
-        Err(TrajectoryError {
-            entry,
-            value,
-            must: "finite and positive",
-        })
     }
 }

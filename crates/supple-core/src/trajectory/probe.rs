@@ -6,7 +6,7 @@
 //! the base rotates by one step while the tip returns to the first radius, and the next column
 //! begins.
 
-use super::{
+use super::reference::{
     MINIMUM_JERK_ACCELERATION, MINIMUM_JERK_SPEED, Reference, TrajectoryError, finite, positive,
     time_scaling,
 };

@@ -5,7 +5,9 @@
 //! velocity jumps at the three corners, where the acceleration stays that of the piece. With a corner
 //! ramp the speed rises from zero and falls to zero on each piece, so that no velocity jumps.
 
-use super::{MINIMUM_JERK_SPEED, Reference, TrajectoryError, finite, positive, time_scaling};
+use super::reference::{
+    MINIMUM_JERK_SPEED, Reference, TrajectoryError, finite, positive, time_scaling,
+};
 use crate::math::{Vector3, abs, sin_cos, sqrt};
 
 /// Knots of the arc-length table.

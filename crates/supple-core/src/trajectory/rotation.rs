@@ -1,6 +1,6 @@
 //! A turn of the tip about a fixed axis, from rest to rest.
 
-use super::{MINIMUM_JERK_SPEED, TrajectoryError, finite, positive};
+use super::reference::{MINIMUM_JERK_SPEED, TrajectoryError, finite, positive};
 use crate::math::{Matrix3, Vector3, abs, sin_cos, skew, smooth_step, sqrt};
 use core::f64::consts::PI;
 

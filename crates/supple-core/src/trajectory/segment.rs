@@ -1,7 +1,7 @@
 //! A piece of a motion that set-points describe one after another: from the present reference to the newest set-point,
 //! then to rest.
 
-use super::Reference;
+use super::reference::Reference;
 use crate::math::{Vector3, sqrt};
 
 /// Times at which the peaks of the way to the set-point are sampled; between two of them speed and acceleration of a

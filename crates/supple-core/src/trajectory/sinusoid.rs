@@ -1,6 +1,8 @@
 //! Sinusoid along a line: the paper's `x(t) = 0.6 + 0.2 sin(pi t / 4)`.
 
-use super::{MINIMUM_JERK_SPEED, Reference, TrajectoryError, finite, positive, time_scaling};
+use super::reference::{
+    MINIMUM_JERK_SPEED, Reference, TrajectoryError, finite, positive, time_scaling,
+};
 use crate::math::{Vector3, sin_cos, sqrt};
 
 /// `Xo = centre + amplitude sin(omega s(t))`, with the rate of `s` ramped from rest.

@@ -14,11 +14,15 @@ mod error;
 mod fitting;
 mod in_process;
 mod motions;
+mod options;
 mod progress;
 mod steps;
 mod sweep;
 mod thresholds;
 mod wiring;
+
+pub(crate) use options::HOLD_REMEDY;
+pub use options::{DRAWING, FIRST_MODEL, LEARNING_S, LOGS, Operator, ProcedureOptions};
 
 pub use arm::{Collector, Motion, MotionArm, Performed, Stopped};
 pub use error::ProcedureError;
@@ -29,58 +33,3 @@ pub use progress::{FILE, FinishedStep, FitQuality, Progress, STEPS, SinusoidResu
 pub use steps::{CalibratedArm, calibrate_arm};
 pub use sweep::Sweep;
 pub use wiring::JointWiring;
-
-use std::path::PathBuf;
-
-/// Time of learning before the second error of the sinusoid counts \[s\].
-pub const LEARNING_S: f64 = 24.0;
-/// Remedy for a fault in the first gravity hold.
-pub(crate) const HOLD_REMEDY: &str = "check signs and units of the torques, the order of joints, the mounting of the base and the masses of the \
-     description: the arm must stay where it is in gravity hold";
-
-/// Folder of the logs, within that of the results.
-pub const LOGS: &str = "logs";
-/// Folder of the model of the first pass, within that of the results.
-pub const FIRST_MODEL: &str = "first";
-/// Drawing of the swept space.
-pub const DRAWING: &str = "sweep.svg";
-
-/// Options of the procedure.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ProcedureOptions {
-    /// Existing folder of the results; logs are in its folder [`LOGS`].
-    pub out: PathBuf,
-    /// Seed of the designs.
-    pub seed: u64,
-    /// Number of candidates of the design.
-    pub candidates: usize,
-    /// Duration of the warm-up \[s\].
-    pub warm_up_s: f64,
-    /// Whether to go on after the last finished step.
-    pub resume: bool,
-    /// The last step to perform; `None` for all.
-    pub until: Option<StepName>,
-}
-
-impl ProcedureOptions {
-    /// Seed 0, 600 candidates, a warm-up of 7 s.
-    pub fn new(out: PathBuf) -> ProcedureOptions {
-        ProcedureOptions {
-            out,
-            seed: 0,
-            candidates: 600,
-            warm_up_s: 7.0,
-            resume: false,
-            until: None,
-        }
-    }
-}
-
-/// The person at the arm.
-pub trait Operator {
-    /// Receives a line about what is done.
-    fn progress(&mut self, text: &str);
-
-    /// Whether the arm may sweep this space, drawn in the file of this name.
-    fn confirms(&mut self, sweep: &Sweep, drawing: &std::path::Path) -> bool;
-}

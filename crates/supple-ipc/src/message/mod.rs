@@ -6,10 +6,13 @@
 
 mod arm_state;
 mod operator;
+mod shared;
 mod telemetry;
 mod text;
 mod torque_command;
 mod wake_request;
+
+pub use shared::{Drives, MAX_DOF, MessageError};
 
 pub use arm_state::{ArmState, PlantReport};
 pub use operator::{OperatorReply, OperatorRequest, Outcome};
@@ -17,97 +20,3 @@ pub use telemetry::{CycleTiming, Telemetry};
 pub use text::Text;
 pub use torque_command::TorqueCommand;
 pub use wake_request::WakeRequest;
-
-/// Maximum number of joints of an arm.
-pub const MAX_DOF: usize = 7;
-
-/// Drive state, as the safety module defines it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Drives {
-    /// Emergency stop: no power.
-    Off = 0,
-    /// Motors brake, torques are ignored.
-    Idle = 1,
-    /// The motors produce the commanded torques.
-    Active = 2,
-    /// The motors have torque, but not the commanded one: the plant holds an arm that falls without torque, or lays it
-    /// down.
-    Held = 3,
-}
-
-impl Drives {
-    /// Converts a code.
-    pub fn from_code(code: u8) -> Option<Drives> {
-        [Drives::Off, Drives::Idle, Drives::Active, Drives::Held]
-            .into_iter()
-            .find(|drives| *drives as u8 == code)
-    }
-
-    /// What the state means for a person, where its name does not say it.
-    pub fn caution(self) -> &'static str {
-        match self {
-            Drives::Held => {
-                " (the motors have torque: the drives hold the arm and lay it down; keep out of reach)"
-            }
-            Drives::Off | Drives::Idle | Drives::Active => "",
-        }
-    }
-
-    /// Short name for status lines.
-    pub fn name(self) -> &'static str {
-        match self {
-            Drives::Off => "off",
-            Drives::Idle => "idle",
-            Drives::Active => "active",
-            Drives::Held => "held",
-        }
-    }
-}
-
-/// A message that its reader cannot use.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum MessageError {
-    /// The message is for another number of joints.
-    #[error(
-        "{message} is for an arm with {found} joints, expected {expected}: start every process with the same \
-         --arm"
-    )]
-    Dof {
-        /// Name of the message.
-        message: &'static str,
-        /// Joints of the message.
-        found: u8,
-        /// Joints of the reader.
-        expected: usize,
-    },
-    /// The values are not a valid request.
-    #[error("the request cannot be read: {0}")]
-    Request(supple_core::codes::RequestCodeError),
-}
-
-/// Checks that the message is for this arm.
-fn expect_dof(message: &'static str, found: u8, expected: usize) -> Result<(), MessageError> {
-    if usize::from(found) == expected {
-        return Ok(());
-    }
-    Err(MessageError::Dof {
-        message,
-        found,
-        expected,
-    })
-}
-
-/// Values of `N` joints, padded with zeros.
-fn padded<const N: usize>(values: &[f64]) -> [f64; MAX_DOF] {
-    const { assert!(N <= MAX_DOF) };
-    let mut all = [0.0; MAX_DOF];
-    all[..N].copy_from_slice(values);
-    all
-}
-
-/// The first `N` values.
-fn first_values<const N: usize>(all: &[f64; MAX_DOF]) -> [f64; N] {
-    const { assert!(N <= MAX_DOF) };
-    core::array::from_fn(|i| all[i])
-}

@@ -6,8 +6,8 @@
 //! here `r t = 0.4`, and `w = r / 2` makes the fastest mode critically damped, all others more. Half of an estimated rotor
 //! inertia is left out of `H`: the loop stays stable if the rotor is that much lighter.
 
+use super::derived::rounded;
 use super::inertia::{POSES, max_inertia_kg_m2, pose_rad};
-use super::rounded;
 use super::write::Writer;
 use supple_core::dynamics::{crba, gravity};
 use supple_core::nalgebra::SymmetricEigen;

@@ -6,7 +6,7 @@
 //! be anything, and at least a hundredth of the largest inertia at the joint. Without a limit of torque (10 kN m or
 //! more) it is a tenth of that inertia.
 
-use super::rounded;
+use super::derived::rounded;
 use super::write::Writer;
 use supple_core::dynamics::crba;
 use supple_core::{Config, Vector};

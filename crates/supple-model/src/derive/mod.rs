@@ -10,36 +10,21 @@
 //! | gains, damping, rates | mass matrix over the workspace, torque limits, delay of the loop ([`gains`]) |
 //! | thresholds of force | weight of the arm as felt at the tip, torque limits ([`thresholds`]) |
 
+mod derived;
 mod gains;
 mod inertia;
 mod place;
 mod thresholds;
 mod write;
 
+pub use derived::Derived;
+
 use crate::description::Description;
 use crate::error::ModelError;
 use crate::reach;
 use crate::with_dof;
-use core::fmt;
 use place::Placed;
 use write::Writer;
-
-/// A setting that was derived, not given.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Derived {
-    /// The key, with its section.
-    pub key: String,
-    /// Its value, as in TOML.
-    pub value: String,
-    /// Where it comes from.
-    pub why: String,
-}
-
-impl fmt::Display for Derived {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} = {} ({})", self.key, self.value, self.why)
-    }
-}
 
 /// An arm with everything that a controller needs.
 #[derive(Clone, Debug)]
@@ -148,14 +133,4 @@ pub fn tip_weight_n<const N: usize>(description: &Description) -> Result<f64, Mo
     Ok(supple_core::math::sqrt(
         squares.sum::<f64>() / f64::from(POINTS),
     ))
-}
-
-/// Rounded to two significant digits, so that a reader sees what is chosen and what is exact, and that rounding in
-/// another build changes nothing.
-fn rounded(value: f64) -> f64 {
-    if value == 0.0 || !value.is_finite() {
-        return value;
-    }
-    // The shortest decimal of two digits is exact in text and reads back as the same number everywhere.
-    format!("{value:.1e}").parse().unwrap_or(value)
 }

@@ -3,8 +3,8 @@
 //! The error of a gravity model is a share of the arm's weight: the force at the tip that carries the gravity torques of
 //! the active joints is the measure of what a wrong model looks like there.
 
+use super::derived::rounded;
 use super::place::tip_weight_n;
-use super::rounded;
 use super::write::{Writer, list};
 use crate::description::Description;
 use supple_core::dynamics::{Terms, jacobian, terms};

@@ -1,6 +1,6 @@
 //! Adds settings to the text of a TOML, each with its reason as a comment.
 
-use super::Derived;
+use super::derived::Derived;
 use crate::description::Description;
 use crate::error::{ModelError, Reporter};
 use toml_edit::{ArrayOfTables, DocumentMut, Item, Table, Value, value};

@@ -1,7 +1,7 @@
 //! The drives' bus: `[bus]`, checked against the chain.
 
+use super::counts::wrong_count;
 use super::joints::JointResolved;
-use super::wrong_count;
 use crate::bus_settings::{BusFormat, BusKind, BusMotorSettings, BusSettings};
 use crate::error::{ModelError, Reporter};
 use crate::settings::Settings;

@@ -1,7 +1,7 @@
 //! Motors, transmission and tool.
 
+use super::counts::wrong_count;
 use super::joints::JointResolved;
-use super::wrong_count;
 use crate::error::{ModelError, Reporter};
 use crate::settings::{MotorSettings, Settings};
 use crate::xml::MAX_MAGNITUDE;

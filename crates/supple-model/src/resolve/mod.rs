@@ -2,6 +2,7 @@
 //! chain order.
 
 mod bus;
+mod counts;
 mod hardware;
 mod joints;
 
@@ -201,13 +202,4 @@ pub(crate) fn check_rest(report: Reporter<'_>, settings: &Settings) -> Result<()
         }
     }
     Ok(())
-}
-
-fn wrong_count(report: Reporter<'_>, element: &str, found: usize, expected: usize) -> ModelError {
-    report.invalid(
-        element,
-        format!("must have one entry per moving joint, {expected}"),
-        format!("{found} entries"),
-        "count the movable joints from the root link to tip_frame, fixed ones left out",
-    )
 }

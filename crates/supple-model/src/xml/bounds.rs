@@ -1,7 +1,7 @@
 //! Size limits of a URDF, which bound the processing time: a few megabytes can contain nesting deeper than the
 //! stack allows, or tens of thousands of links.
 
-use super::{children, place};
+use super::elements::{children, place};
 use crate::error::{ModelError, Reporter};
 use roxmltree::{Document, Node, ParsingOptions};
 

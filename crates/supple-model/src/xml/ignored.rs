@@ -13,7 +13,7 @@
 //!
 //! Elements with their own XML namespace belong to other programs and are always ignored.
 
-use super::{is_own, place};
+use super::elements::{is_own, place};
 use crate::error::{Finding, ModelError, Reporter};
 use roxmltree::{Attribute, Node};
 use std::collections::BTreeMap;

@@ -1,7 +1,7 @@
 //! Removes from a URDF everything that is not read (extensions of other programs, unsupported shapes), so that
 //! `urdf-rs` accepts the file.
 
-use super::{children, is_known, is_own};
+use super::elements::{children, is_known, is_own};
 use roxmltree::{Document, Node};
 
 /// Returns the text without everything that neither dynamics nor drawing read. Line numbers of the remaining
@@ -21,7 +21,7 @@ pub(super) fn remove_unread(document: &Document<'_>) -> String {
             }
             "joint" => {
                 let unread = ["calibration", "safety_controller"];
-                let known = super::known_children("joint");
+                let known = super::elements::known_children("joint");
                 let is_unread = |part: &Node<'_, '_>| {
                     unread.contains(&part.tag_name().name()) || !is_known(part, known)
                 };

@@ -1,21 +1,14 @@
 //! Applies injected faults to a plant.
 
-use super::{Injection, InjectionError, InjectionKind, Trigger};
+pub use super::view::ControllerView;
+
+use super::InjectionError;
+use super::kinds::{Injection, InjectionKind, Trigger};
 use crate::error::PlantError;
 use crate::plant::Plant;
 use core::array;
 use std::collections::VecDeque;
-use supple_core::controller::Mode;
 use supple_core::{Matrix, Vector};
-
-/// State of the controller as the plant sees it in one cycle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ControllerView {
-    /// The drives are active.
-    pub active: bool,
-    /// Mode of the torque command of this cycle; `None` if there is no command or the mode is unknown.
-    pub mode: Option<Mode>,
-}
 
 /// Wraps a plant and modifies its encoder readings and torque commands. Without injections it passes everything
 /// through bit-exactly.

@@ -1,6 +1,6 @@
 //! Injections as text: `KIND`, or `KIND:key=value,key=value`.
 
-use super::{Injection, InjectionKind, Trigger};
+use super::kinds::{Injection, InjectionKind, Trigger};
 use core::fmt;
 use core::str::FromStr;
 use supple_core::codes::MODES;

@@ -1,6 +1,6 @@
 //! Validation of a scene.
 
-use super::{FreeBox, Layer, Scene};
+use super::objects::{FreeBox, Layer, Scene};
 use crate::contact::Material;
 use supple_core::nalgebra::Vector3;
 

@@ -14,7 +14,7 @@
 //! the one case that the arm needs; a test runs both side by side. The controller's model is recursive, in the
 //! joints' frames, and shares no code with it.
 
-use super::TipForce;
+use super::tip::TipForce;
 use core::array;
 use supple_core::nalgebra::{Matrix3, Vector3};
 use supple_core::{Arm, Matrix, Pose, Vector};

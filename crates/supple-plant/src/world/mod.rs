@@ -3,6 +3,9 @@
 mod chain;
 mod convert;
 mod surface;
+mod tip;
+
+pub(crate) use tip::{TipForce, TipMotion};
 
 pub(crate) use chain::{Chain, Forces};
 pub use surface::{Object, ObjectKind};
@@ -13,25 +16,8 @@ use crate::error::PlantError;
 use convert::to_glam_vector;
 use rapier3d_f64::geometry::Ball;
 use rapier3d_f64::pipeline::PhysicsWorld;
-use supple_core::nalgebra::Vector3;
 use supple_core::{Arm, Vector};
 use surface::{Surface, insert_scene};
-
-/// Motion of the spherical tip.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct TipMotion {
-    pub center_m: Vector3<f64>,
-    pub linear_m_per_s: Vector3<f64>,
-    pub angular_rad_per_s: Vector3<f64>,
-}
-
-/// A force on the tip and the moment it has about the tip's centre.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct TipForce {
-    pub force_n: Vector3<f64>,
-    pub moment_nm: Vector3<f64>,
-    pub depth_m: f64,
-}
 
 /// The arm in its scene. Only the tip's contact force couples the two, so that the engine of the scene runs only if
 /// something in it can move.

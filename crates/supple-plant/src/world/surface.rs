@@ -1,7 +1,7 @@
 //! Contact surfaces of the scene: bodies of the engine with surface shapes of this crate.
 
-use super::TipMotion;
 use super::convert::{from_glam, from_glam_pose, to_glam_pose, to_glam_vector};
+use super::tip::TipMotion;
 use crate::contact::{Bristle, Contact, Material};
 use crate::scene::{Layer, Scene, SceneError};
 use rapier3d_f64::dynamics::{MassProperties, RigidBody, RigidBodyBuilder, RigidBodyHandle};

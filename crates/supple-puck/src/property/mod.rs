@@ -10,9 +10,13 @@
 //! [`force_torque`](crate::force_torque). The id of a property depends on the firmware: [`PropertyTable`].
 //! Source: libbarrett, btclient, manual.
 
+mod id;
 mod ids;
 mod names;
 mod table;
+
+pub(crate) use id::SET_BIT;
+pub use id::{Property, PropertyId, Width};
 
 pub use table::{FirmwareTooOld, PropertyTable, PuckKind, Slot};
 
@@ -20,12 +24,6 @@ use crate::frame::LengthError;
 use crate::id::{Destination, GroupId, MessageId, NodeId};
 use core::fmt;
 use supple_can_frame::CanFrame;
-
-pub(crate) const SET_BIT: u8 = 0x80;
-
-/// A property, named as in the property lists of Barrett's libbarrett. A [`PropertyTable`] gives its id.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub struct Property(u8);
 
 impl Property {
     /// All properties.
@@ -58,10 +56,6 @@ impl fmt::Display for Property {
     }
 }
 
-/// Number of a property in one firmware, 0 to 127.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct PropertyId(u8);
-
 impl PropertyId {
     /// Id `number`; `None` above 127.
     pub const fn new(number: u8) -> Option<PropertyId> {
@@ -80,15 +74,6 @@ impl PropertyId {
     pub(crate) const fn from_byte(byte: u8) -> PropertyId {
         PropertyId(byte & !SET_BIT)
     }
-}
-
-/// Width of a value on the wire.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Width {
-    /// 16 bits, a frame of four bytes.
-    Narrow,
-    /// 32 bits, a frame of six bytes. The next id is unused.
-    Wide,
 }
 
 /// A property's value with its width.

@@ -1,10 +1,11 @@
 //! Figure of the arc about the base: top view of the path, and tracking error.
 
 use super::axis::Axis;
+use super::canvas::{distance, draw_canvas, mm};
+use super::error::FigureError;
 use super::panel::{LegendSymbol, Margins, Panel, legend};
 use super::style::{BLUE, REFERENCE, px};
 use super::ticks::{Ticks, extent};
-use super::{FigureError, distance, draw_canvas, mm};
 use supple_experiment::Sample;
 
 /// Draws the figure as SVG.

@@ -1,10 +1,11 @@
 //! Figure 3a: the tip along x over time, its error, and the error at other speeds.
 
 use super::axis::Axis;
+use super::canvas::{distance, draw_canvas, mm};
+use super::error::FigureError;
 use super::panel::{LegendSymbol, Margins, Panel, legend};
 use super::style::{BLUE, GREEN, PURPLE, REFERENCE, VERMILION};
 use super::ticks::{Ticks, extent};
-use super::{FigureError, distance, draw_canvas, mm};
 use plotters::style::RGBColor;
 use supple_core::trajectory::Sinusoid;
 use supple_experiment::{Demo, Sample};

@@ -1,10 +1,11 @@
 //! Figure 3b: the path through the quadrant and the error along it, at each speed.
 
 use super::axis::Axis;
+use super::canvas::{distance, draw_canvas, mm};
+use super::error::FigureError;
 use super::panel::{LegendSymbol, Margins, Panel, legend};
 use super::style::{BLUE, MUTED, REFERENCE, px};
 use super::ticks::{Ticks, extent};
-use super::{FigureError, distance, draw_canvas, mm};
 use crate::sections::quadrants_with_models;
 use plotters::style::text_anchor::HPos;
 use std::ops::Range;

@@ -1,10 +1,11 @@
 //! Figure 4: torque components of shoulder pitch and elbow during the sinusoid.
 
 use super::axis::Axis;
+use super::canvas::draw_canvas;
+use super::error::FigureError;
 use super::panel::{Area, LegendSymbol, Margins, Panel, legend};
 use super::style::{BLUE, GREEN, PURPLE, VERMILION, px};
 use super::ticks::{Ticks, extent};
-use super::{FigureError, draw_canvas};
 use plotters::style::RGBColor;
 use supple_experiment::{Demo, JointTorque, Sample};
 

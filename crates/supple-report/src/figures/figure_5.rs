@@ -1,10 +1,11 @@
 //! Figure 5: force on the tip at a low and a high stiffness, aligned at the first touch.
 
 use super::axis::Axis;
+use super::canvas::draw_canvas;
+use super::error::FigureError;
 use super::panel::{Area, LegendSymbol, Margins, Panel, legend};
 use super::style::{BLUE, REFERENCE, VERMILION, px};
 use super::ticks::{Ticks, extent};
-use super::{FigureError, draw_canvas};
 use plotters::style::RGBColor;
 use supple_experiment::{Demo, Sample};
 

@@ -1,10 +1,11 @@
 //! Figure 6: impulse of one contact over stiffness, with a line through it, and the first impact by itself.
 
 use super::axis::Axis;
+use super::canvas::draw_canvas;
+use super::error::FigureError;
 use super::panel::{Area, LegendSymbol, Margins, Mark, Panel, legend};
 use super::style::{BLUE, GREEN, TEXT_COLOUR, VERMILION, px};
 use super::ticks::{Ticks, extent, number};
-use super::{FigureError, draw_canvas};
 use plotters::style::RGBColor;
 use std::ops::Range;
 use supple_experiment::metrics::LineFit;

@@ -1,10 +1,11 @@
 //! Curves of an identification: two quantities over time, one panel per joint.
 
 use super::axis::Axis;
+use super::canvas::draw_canvas;
+use super::error::FigureError;
 use super::panel::{LegendSymbol, Margins, Panel, legend};
 use super::style::{BLUE, REFERENCE};
 use super::ticks::{Ticks, extent};
-use super::{FigureError, draw_canvas};
 
 /// Width of the canvas and height of a panel \[px\].
 const SIZE_PX: (u32, u32) = (760, 190);

@@ -1,10 +1,11 @@
 //! The standard figures of a log: tracking and contact, the torque terms of every joint, the timing of the cycles.
 
 use super::axis::Axis;
+use super::canvas::{Figure, draw_canvas};
+use super::error::FigureError;
 use super::panel::{LegendSymbol, Margins, Panel, legend};
 use super::style::{BLUE, GREEN, PURPLE, REFERENCE, VERMILION};
 use super::ticks::{Ticks, extent};
-use super::{Figure, FigureError, draw_canvas};
 use plotters::style::RGBColor;
 
 /// Width of the canvas and height of a panel \[px\].

@@ -1,7 +1,7 @@
 //! A panel: one pair of axes and its contents. Only this module uses the chart API of the drawing library.
 
-use super::FigureError;
 use super::axis::{Axis, Scale};
+use super::error::FigureError;
 use super::style::{self, GRID, TEXT_COLOUR, TEXT_PX, px, stroke, text};
 use plotters::chart::ChartContext;
 use plotters::coord::Shift;

@@ -1,10 +1,11 @@
 //! Tracking error under equation (3.6) exactly as printed, until the supervisor ends the run.
 
 use super::axis::Axis;
+use super::canvas::{distance, draw_canvas, mm};
+use super::error::FigureError;
 use super::panel::{LegendSymbol, Margins, Panel, legend};
 use super::style::{BLUE, MUTED, REFERENCE, TEXT_COLOUR, VERMILION};
 use super::ticks::{Ticks, extent};
-use super::{FigureError, distance, draw_canvas, mm};
 use plotters::style::text_anchor::HPos;
 use supple_experiment::{Demo, FaultEnd, Sample};
 

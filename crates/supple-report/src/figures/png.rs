@@ -1,6 +1,6 @@
 //! Renders SVG to PNG with embedded fonts, so that the result does not depend on installed fonts.
 
-use super::FigureError;
+use super::error::FigureError;
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{Options, Tree};
 use std::sync::Arc;

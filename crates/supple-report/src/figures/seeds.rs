@@ -1,10 +1,11 @@
 //! Tracking error of the sinusoid for perturbed models, one bar per seed, and for an exact model.
 
 use super::axis::Axis;
+use super::canvas::{draw_canvas, mm};
+use super::error::FigureError;
 use super::panel::{Area, Margins, Panel};
 use super::style::{BLUE, GREEN, TEXT_COLOUR, VERMILION};
 use super::ticks::{Ticks, extent};
-use super::{FigureError, draw_canvas, mm};
 use plotters::style::text_anchor::HPos;
 use supple_experiment::Demo;
 use supple_experiment::metrics::median;

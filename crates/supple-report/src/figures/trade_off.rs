@@ -1,10 +1,11 @@
 //! The paper's trade-off: error in free motion against impulse in contact, over stiffness.
 
 use super::axis::Axis;
+use super::canvas::{draw_canvas, mm};
+use super::error::FigureError;
 use super::panel::{Margins, Mark, Panel};
 use super::style::{BLUE, REFERENCE, TEXT_COLOUR};
 use super::ticks::{Ticks, extent};
-use super::{FigureError, draw_canvas, mm};
 use plotters::style::text_anchor::HPos;
 use supple_experiment::Demo;
 

@@ -1,6 +1,6 @@
 //! `supple breakaway`: measures the breakaway torque of each joint of the simulated arm.
 
-use super::joints;
+use super::joints::joints;
 use serde::Serialize;
 use supple_cli::arguments::BreakawayArgs;
 use supple_cli::arms;

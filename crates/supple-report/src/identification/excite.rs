@@ -1,6 +1,6 @@
 //! `supple excite design`: designs an excitation trajectory; writes table, figure and summary.
 
-use super::joints;
+use super::joints::joints;
 use crate::figures::identification::{Curves, curves};
 use serde::Serialize;
 use std::fmt::Write;

@@ -1,6 +1,6 @@
 //! Contact: figures 5 and 6, and the trade-off.
 
-use super::{Section, row};
+use super::row::{Section, row};
 use crate::units::{figures, mm, newton_seconds, newtons, percent, plain, seconds};
 use supple_experiment::metrics::{LineFit, median};
 use supple_experiment::summary::{ContactStatistics, ProbingSummary, Summary};

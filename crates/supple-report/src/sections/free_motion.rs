@@ -1,6 +1,6 @@
 //! Free motion: figures 3 and 4, the arc, the perturbed models, and equation (3.6) exactly as printed.
 
-use super::{Row, Section, quadrants_with_models, row};
+use super::row::{Row, Section, quadrants_with_models, row};
 use crate::table::plants;
 use crate::units::{mm, newton_metres, seconds};
 use supple_experiment::JointTorque;

@@ -1,11 +1,11 @@
 //! Runs a test case in virtual time. All requests are queued before the first cycle, so every run is bit-identical.
 
-use super::TestArm;
 use super::evaluation::evaluate;
 use super::metrics::{ControllerSample, RowMetrics, stuck_angle_is_wrong_ns};
 use super::row::Row;
 use super::spec::{Activation, DriveShutdown, Event, InvalidRequest, Spec, TestTask};
 use super::task::{Script, law_force_n};
+use super::test_arms::TestArm;
 use super::trace::{self, TraceRow};
 use crate::cli::{PlantKind, UpArgs, UpTrajectory};
 use crate::up::{START_S, System};

@@ -22,27 +22,22 @@ mod perform;
 mod row;
 mod spec;
 mod task;
+mod test_arms;
 mod trace;
+
+use test_arms::{TestArm, TestArms};
 
 use crate::cli::{DrillArgs, PlantKind};
 use row::Row;
-use spec::{Spec, TestTask};
-use std::path::PathBuf;
+use spec::Spec;
 use supple_cli::arms;
 use supple_cli::console::{print_json, print_line, print_status};
 use supple_cli::exit::Failure;
 use supple_cli::interrupt;
-use supple_ipc::Domain;
-use supple_model::{Description, with_dof};
+use supple_model::with_dof;
 
 /// Arm of the command line, unless another one is named.
 const DEFAULT_ARM: &str = "wam4";
-/// Arm of the pose mode if the one of the command line has too few joints.
-const POSE_ARM: &str = "wam7";
-/// Joints that the pose mode needs.
-const POSE_JOINTS: usize = 6;
-/// Control rate of the pose mode on the emulated bus \[Hz\].
-const POSE_BUS_RATE_HZ: u32 = 700;
 
 /// Runs `supple drill`.
 ///
@@ -132,70 +127,6 @@ fn chosen(args: &DrillArgs) -> Result<Vec<Spec>, Failure> {
             patterns: args.only.join(", "),
         }),
         false => Ok(specs),
-    }
-}
-
-/// The arm of a test case.
-struct TestArm {
-    description: Description,
-    /// Built-in arm or path, for the processes.
-    name: String,
-    strict: bool,
-    rate_hz: Option<u32>,
-}
-
-/// The arm of the command line, and the one of the pose mode.
-struct TestArms {
-    general: TestArm,
-    pose: TestArm,
-    /// Folder of the arm of the pose mode.
-    folder: PathBuf,
-}
-
-impl TestArms {
-    /// The pose mode needs six active joints: it has the arm of the command line, or else [`POSE_ARM`], without held
-    /// joints. The copy without held joints is in a folder of its own until the end.
-    fn new(args: &DrillArgs) -> Result<TestArms, Failure> {
-        let description = arms::find(&args.urdf.name(&args.arm), args.strict)?;
-        let free = match description.dof() >= POSE_JOINTS {
-            true => description.with_all_joints_active()?,
-            false => Description::asset(POSE_ARM)?.with_all_joints_active()?,
-        };
-        let prefix = format!("drill-arm-{}", std::process::id());
-        let domain = Domain::new(Some(&prefix)).map_err(Failure::system)?;
-        let folder = domain.folder().join(prefix);
-        free.save(&folder)?;
-        Ok(TestArms {
-            general: TestArm {
-                description,
-                name: args.urdf.name(&args.arm),
-                strict: args.strict,
-                rate_hz: None,
-            },
-            pose: TestArm {
-                description: Description::load(&folder)?,
-                name: folder.display().to_string(),
-                strict: args.strict,
-                rate_hz: None,
-            },
-            folder,
-        })
-    }
-
-    fn of(&mut self, spec: &Spec) -> &TestArm {
-        if spec.task != TestTask::TrackPose {
-            return &self.general;
-        }
-        // Seven motors do not fit into a millisecond of the bus.
-        self.pose.rate_hz = (spec.plant == PlantKind::Emu).then_some(POSE_BUS_RATE_HZ);
-        &self.pose
-    }
-}
-
-impl Drop for TestArms {
-    fn drop(&mut self) {
-        // A copy that cannot be removed does no harm.
-        let _ = std::fs::remove_dir_all(&self.folder);
     }
 }
 

@@ -2,8 +2,9 @@
 
 use super::row::{ProcessTestResult, Row};
 use super::spec::{Event, ProcessFailure, Spec, TestTask, UP};
+use super::task;
+use super::test_arms::TestArm;
 use super::trace::TraceAfterLoss;
-use super::{TestArm, task};
 use crate::cli::{DrillArgs, PlantKind, UpArgs, UpTrajectory};
 use crate::operate::OperatorSession;
 use crate::up::System;

@@ -1,6 +1,6 @@
 //! `supple learning`: switches the refinement of the model, and saves what was learned.
 
-use super::{SystemRequest, ask, running};
+use super::ask::{SystemRequest, ask, running};
 use crate::cli::{LearningAction, SystemArgs};
 use serde::Serialize;
 use std::path::Path;

@@ -1,6 +1,6 @@
 //! `supple status`: shows the state of a running system.
 
-use super::running;
+use super::ask::running;
 use crate::cli::SystemArgs;
 use crate::up::{Percentiles, RunStatistics};
 use core::fmt;

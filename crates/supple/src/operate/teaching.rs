@@ -3,7 +3,8 @@
 //! A motion is repeated as set-points that wait in the controller for their cycle, so that neither this process nor the
 //! machine's load is in the motion. If this process ends, the reference comes to rest behind the last of them.
 
-use super::{Approach, OperatorSession, print_mode, running};
+use super::ask::{print_mode, running};
+use super::{Approach, OperatorSession};
 use crate::cli::{PlayArgs, SystemArgs, TeachArgs};
 use core::time::Duration;
 use serde::Serialize;

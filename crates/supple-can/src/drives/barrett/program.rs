@@ -1,7 +1,7 @@
 //! A run with Barrett's drives: start-up, then cycles; repeated after the arm has lost its power.
 
 use super::bus_time::BusTime;
-use super::cycle;
+use super::cycle::cycle;
 use super::error::CanError;
 use super::start_up::{Progress, StartupConfig, start_up};
 use crate::options::Options;

@@ -26,7 +26,7 @@
 //! A probe of an older log has no `dwell_s`, a quadrant no `corner_ramp_s`: they are zero.
 //! Decoding rejects numbers that encode no request; whether a request is valid, the controller checks.
 
-use super::{request_kind, trajectory_kind};
+use super::numbers::{request_kind, trajectory_kind};
 use crate::config::{Gains, JointGains, RotationalGains};
 use crate::controller::{Breakaway, LearningSwitch, Request, SetPoint};
 use crate::math::{Vector, Vector3};

@@ -10,8 +10,11 @@
 //! The host sets the motors to idle and never activates them: the operator does, at the pendant. Order and times
 //! follow libbarrett.
 
+mod common;
 mod module;
 mod motors;
+
+use common::common_property_id;
 
 use crate::drives::barrett::error::CanError;
 use crate::drives::barrett::host::{Host, MS};
@@ -22,7 +25,7 @@ use supple_core::Vector;
 use supple_model::Description;
 use supple_puck::safety::{SafetyLimits, SafetyMode};
 use supple_puck::status::Stat;
-use supple_puck::{NodeId, Property, PropertyId, PropertyTable, Value, force_torque, property};
+use supple_puck::{NodeId, Property, PropertyTable, Value, force_torque, property};
 
 /// Time after the wake-up in which the host sends nothing, because the pucks' transceivers leave the bus and return.
 const WAKE_QUIET_NS: u64 = 1_000 * MS;
@@ -275,15 +278,4 @@ fn set_home_positions<const N: usize, B: Bus>(
     }
     host.set_property(NodeId::SAFETY, zero_id, 1)?;
     motors::verify_setting(host, NodeId::SAFETY, Property::ZERO, zero_id, 1)
-}
-
-/// Id of a property that is the same in every firmware.
-fn common_property_id(property: Property) -> Result<PropertyId, CanError> {
-    PropertyTable::MONITOR
-        .id(property)
-        .ok_or(CanError::Property {
-            node: 0,
-            version: 0,
-            property,
-        })
 }

@@ -1,6 +1,7 @@
 //! The safety module during start-up: identification, mode and limits. The host never activates it.
 
-use super::{common_property_id, motors};
+use super::common::common_property_id;
+use super::motors;
 use crate::drives::barrett::error::CanError;
 use crate::drives::barrett::host::Host;
 use supple_bus::Bus;

@@ -1,6 +1,6 @@
 //! Motor pucks: identification, comparison with the description, and settings.
 
-use super::common_property_id;
+use super::common::common_property_id;
 use crate::drives::barrett::error::CanError;
 use crate::drives::barrett::host::Host;
 use supple_bus::Bus;

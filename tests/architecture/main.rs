@@ -1,7 +1,10 @@
-//! Checks the dependencies between crates against ARCHITECTURE.md.
+//! Checks the dependencies between crates, and between the files of each, against ARCHITECTURE.md.
 
+mod imports;
+
+use imports::{Modules, python_imports};
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 fn metadata() -> serde_json::Value {
@@ -77,84 +80,6 @@ fn documented_dependencies_are_the_real_ones() {
     }
 }
 
-/// Files of a crate by their module paths, such as `controller::step`; `mod.rs` and `lib.rs` are their folder's.
-fn modules(source: &Path) -> BTreeMap<String, String> {
-    let mut modules = BTreeMap::new();
-    let mut open = vec![(source.to_owned(), Vec::<String>::new())];
-    while let Some((folder, path)) = open.pop() {
-        for entry in std::fs::read_dir(folder).expect("a folder") {
-            let entry = entry.expect("an entry").path();
-            let stem = entry
-                .file_stem()
-                .expect("a name")
-                .to_string_lossy()
-                .into_owned();
-            let inner = |name: String| path.iter().cloned().chain([name]).collect::<Vec<_>>();
-            if entry.is_dir() {
-                open.push((entry, inner(stem)));
-            } else if entry.extension().is_some_and(|end| end == "rs") {
-                let own = match stem.as_str() {
-                    "mod" | "lib" | "main" => path.clone(),
-                    _ => inner(stem),
-                };
-                let text = std::fs::read_to_string(&entry).expect("readable");
-                modules
-                    .entry(own.join("::"))
-                    .or_insert_with(String::new)
-                    .push_str(&text);
-            }
-        }
-    }
-    modules
-}
-
-/// Modules that a file imports from by `use crate::..` or `use super::..`; a parent that re-exports its children does not
-/// import them so.
-fn imports(module: &str, text: &str, known: &BTreeMap<String, String>) -> BTreeSet<String> {
-    let mut found = BTreeSet::new();
-    let mut text = format!("\n{text}");
-    for visible in ["pub", "pub(crate)", "pub(super)"] {
-        text = text.replace(&format!("\n{visible} use "), "\nuse ");
-    }
-    for statement in text.split("\nuse ").skip(1) {
-        let statement = statement.split(';').next().unwrap_or_default();
-        let (head, list) = statement.split_once('{').unwrap_or((statement, ""));
-        let mut head: Vec<&str> = head
-            .trim()
-            .split("::")
-            .filter(|part| !part.is_empty())
-            .collect();
-        let mut base: Vec<&str> = Vec::new();
-        match head.first() {
-            Some(&"crate") => {}
-            Some(&"super") => {
-                base = module.split("::").collect();
-                base.pop();
-                while head.get(1) == Some(&"super") {
-                    base.pop();
-                    head.remove(1);
-                }
-            }
-            _ => continue,
-        }
-        head.remove(0);
-        let names = list.split([',', '{', '}']).map(str::trim).map(|name| {
-            let path = name.split(" as ").next().unwrap_or_default();
-            path.split("::").collect::<Vec<_>>()
-        });
-        for name in names.chain([Vec::new()]) {
-            let path = [&base[..], &head[..], &name[..]].concat();
-            let whole = (0..=path.len()).rev().map(|end| path[..end].join("::"));
-            let whole = whole.map(|path| path.trim_end_matches(':').to_owned());
-            if let Some(target) = whole.into_iter().find(|path| known.contains_key(path)) {
-                found.insert(target);
-            }
-        }
-    }
-    found.remove(module);
-    found
-}
-
 /// Layers of supple-core, as ARCHITECTURE.md lists them, from the lowest to the highest.
 const LAYERS: [&str; 8] = [
     "math",
@@ -167,44 +92,63 @@ const LAYERS: [&str; 8] = [
     "controller",
 ];
 
+/// Root files of all targets of the workspace; of the build scripts, none.
+fn targets() -> Vec<PathBuf> {
+    let metadata = metadata();
+    let packages = metadata["packages"].as_array().expect("packages").iter();
+    let targets = packages.flat_map(|package| package["targets"].as_array().expect("targets"));
+    let path =
+        |target: &serde_json::Value| PathBuf::from(target["src_path"].as_str().expect("a path"));
+    let mut targets: Vec<PathBuf> = targets.map(path).collect();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let programs = std::fs::read_dir(root.join("tests/fuzz/libfuzzer/fuzz_targets"));
+    let programs = programs.into_iter().flatten().flatten();
+    targets.extend(programs.map(|entry| entry.path()));
+    targets
+}
+
 #[test]
 fn layers_of_the_core_import_only_from_lower_ones() {
-    let known = modules(&Path::new(env!("CARGO_MANIFEST_DIR")).join("crates/supple-core/src"));
-    let layer = |module: &str| {
-        let folder = module.split("::").next().unwrap_or_default();
-        LAYERS.iter().position(|name| *name == folder)
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("crates/supple-core/src");
+    let layer = |file: &Path| {
+        let inner = file.strip_prefix(&source).ok()?;
+        let name = inner.components().next()?.as_os_str().to_str()?;
+        let name = name.trim_end_matches(".rs");
+        LAYERS.iter().position(|layer| *layer == name)
     };
-    for (module, text) in known.iter().filter(|(module, _)| !module.is_empty()) {
-        let own = layer(module).unwrap_or_else(|| panic!("{module} is in no layer"));
-        for imported in imports(module, text, &known) {
-            let other = layer(&imported);
-            assert!(
-                imported.is_empty() || other <= Some(own),
-                "{module} imports {imported}"
-            );
+    let mut edges = 0;
+    for (file, imported) in Modules::read(&source.join("lib.rs")).imports() {
+        if file == source.join("lib.rs") || !file.starts_with(&source) {
+            continue;
+        }
+        let own = layer(&file).unwrap_or_else(|| panic!("{} is in no layer", file.display()));
+        for other in imported.iter().filter(|other| other.starts_with(&source)) {
+            let of_other = layer(other);
+            let lower = of_other.is_some_and(|other| other <= own);
+            assert!(lower, "{} imports {}", file.display(), other.display());
+            edges += usize::from(of_other < Some(own));
         }
     }
+    assert!(edges > 100, "{edges} imports of lower layers");
 }
 
 #[test]
 fn no_two_files_import_each_other() {
-    let crates = Path::new(env!("CARGO_MANIFEST_DIR")).join("crates");
-    let mut pairs = Vec::new();
-    for folder in std::fs::read_dir(crates).expect("crates").flatten() {
-        let known = modules(&folder.path().join("src"));
-        let all: BTreeMap<&String, BTreeSet<String>> = known
-            .iter()
-            .map(|(module, text)| (module, imports(module, text, &known)))
-            .collect();
-        for (module, imported) in &all {
-            for other in imported {
-                if other > *module && all[other].contains(*module) {
-                    pairs.push(format!("{}: {module} <-> {other}", folder.path().display()));
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut pairs = BTreeSet::new();
+    let rust = targets()
+        .into_iter()
+        .map(|root| Modules::read(&root).imports());
+    for imports in rust.chain([python_imports(&root.join("python/package/supple"))]) {
+        for (file, imported) in &imports {
+            for other in imported.iter().filter(|other| *other > file) {
+                if imports.get(other).is_some_and(|back| back.contains(file)) {
+                    pairs.insert(format!("{} <-> {}", file.display(), other.display()));
                 }
             }
         }
     }
-    assert!(pairs.is_empty(), "{pairs:#?}");
+    assert!(pairs.is_empty(), "{}: {pairs:#?}", pairs.len());
 }
 
 #[test]

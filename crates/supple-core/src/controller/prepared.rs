@@ -1,0 +1,167 @@
+//! A configuration, checked, with the constants that every step takes from it.
+
+use super::estimator::EstimatorGains;
+use super::limiter::MotorGroups;
+use super::nullspace::nullspace_damping_nm_s_per_rad;
+use super::validate::{self, ConfigError};
+use crate::config::Config;
+use crate::law::task::count_active;
+use crate::math::linalg::Cholesky;
+use crate::math::{Matrix, Vector};
+use crate::model::learned::LearnedBounds;
+
+/// A validated configuration and the constants derived from it.
+#[derive(Clone, Copy, Debug)]
+pub struct Controller<const N: usize> {
+    pub(super) config: Config<N>,
+    pub(super) groups: MotorGroups<N>,
+    /// `j2mp`.
+    pub(super) motor_from_joint: Matrix<N, N>,
+    pub(super) delay_s: f64,
+    /// Number of active joints.
+    pub(super) active_joints: usize,
+    /// A motor has a table of its ripple.
+    pub(super) has_ripple: bool,
+    /// The travel of a joint's reversals is known.
+    pub(super) has_presliding: bool,
+    /// A joint is compliant between encoder and link.
+    pub(super) has_compliance: bool,
+    /// The estimator's gains after one period.
+    pub(super) one_period: EstimatorGains,
+    pub(super) torque_step_nm: Vector<N>,
+    /// Weights of squared external torques whose sum exceeds one where something pushes the arm \[1/(N m)^2\].
+    pub(super) push_weight_per_nm2: Vector<N>,
+    pub(super) stop_step_nm: Vector<N>,
+    pub(super) nullspace_damping_nm_s_per_rad: Vector<N>,
+    pub(super) learned_bounds: LearnedBounds<N>,
+}
+
+/// Maximum delay from a measurement to the resulting torque in cycles, with half a cycle for the
+/// zero-order hold of the torque.
+const DELAY_CYCLES: f64 = 3.5;
+
+/// Time in which the safe action may ramp a joint from full torque to zero \[s\].
+const STOP_TORQUE_S: f64 = 0.005;
+/// Time constant `t_s` with which the safe action stops a motion, as a multiple of the delay.
+const STOP_TIME_CONSTANT_DELAYS: f64 = 4.0;
+/// Fraction of a joint's torque limit above which an external torque pushes an arm that follows a reference: its friction is
+/// known better than this.
+const PUSH_SHARE: f64 = 0.05;
+
+impl<const N: usize> Controller<N> {
+    /// Validates a configuration and builds its controller.
+    ///
+    /// # Errors
+    /// [`ConfigError`] names the entry, the joint and the value.
+    pub fn new(config: Config<N>) -> Result<Self, ConfigError> {
+        validate::validate(&config)?;
+        let to_joint = &config.joint_from_motor;
+        // Validation guarantees that the product is positive definite.
+        let motor_from_joint = Cholesky::new(&(to_joint.transpose() * to_joint))
+            .map_or_else(Matrix::identity, |square| {
+                square.solve(&to_joint.transpose())
+            });
+        let delay_s = DELAY_CYCLES * config.period_s + 2.0 / config.estimator_rad_per_s;
+        let limits = &config.limits;
+        Ok(Controller {
+            learned_bounds: LearnedBounds::new(&config.friction, &limits.joint_torque_nm),
+            nullspace_damping_nm_s_per_rad: nullspace_damping_nm_s_per_rad(&config, delay_s),
+            motor_from_joint,
+            groups: MotorGroups::new(&config.joint_from_motor),
+            delay_s,
+            active_joints: count_active(&config.roles),
+            has_ripple: config
+                .ripple
+                .iter()
+                .any(|table| !table.harmonics().is_empty()),
+            has_presliding: config.friction.iter().any(|f| f.presliding_rad > 0.0),
+            has_compliance: config.compliance_rad_per_nm != Vector::<N>::zeros(),
+            one_period: EstimatorGains::new(config.period_s, config.estimator_rad_per_s),
+            torque_step_nm: config.limits.torque_rate_nm_per_s * config.period_s,
+            push_weight_per_nm2: limits.joint_torque_nm.map(|limit_nm| {
+                let strong_nm = PUSH_SHARE * limit_nm;
+                1.0 / (strong_nm * strong_nm)
+            }),
+            stop_step_nm: Vector::from_fn(|i, _| {
+                let slow = config.limits.torque_rate_nm_per_s[i];
+                let fast = config.limits.joint_torque_nm[i] / STOP_TORQUE_S;
+                slow.max(fast) * config.period_s
+            }),
+            config,
+        })
+    }
+
+    /// Maximum delay from a motion to the resulting torque \[s\]: 3.5 cycles plus the lag of the
+    /// velocity estimate.
+    pub fn delay_s(&self) -> f64 {
+        self.delay_s
+    }
+
+    pub(super) fn active_joints(&self) -> usize {
+        self.active_joints
+    }
+
+    pub(super) fn has_ripple(&self) -> bool {
+        self.has_ripple
+    }
+
+    pub(super) fn has_presliding(&self) -> bool {
+        self.has_presliding
+    }
+
+    pub(super) fn has_compliance(&self) -> bool {
+        self.has_compliance
+    }
+
+    /// Time constant `t_s` with which the safe action stops a motion \[s\].
+    pub fn stop_s(&self) -> f64 {
+        STOP_TIME_CONSTANT_DELAYS * self.delay_s
+    }
+
+    /// The estimator's gains after so many periods. One, the common case, needs no exponential.
+    pub(super) fn estimator_gains(&self, periods: u64) -> EstimatorGains {
+        match periods {
+            1 => self.one_period,
+            _ => EstimatorGains::new(
+                periods as f64 * self.config.period_s,
+                self.config.estimator_rad_per_s,
+            ),
+        }
+    }
+
+    /// Damping of each joint in the null space of the position task \[N m s/rad\]: that of the law, or as much
+    /// as the delay allows where the joint is light, as the last ones of a wrist are.
+    pub fn nullspace_damping_nm_s_per_rad(&self) -> &Vector<N> {
+        &self.nullspace_damping_nm_s_per_rad
+    }
+
+    /// Maximum change of joint torque per cycle \[N m\]: by the rate limit, or with `stopping` the
+    /// larger of it and the rate of the safe action.
+    pub fn torque_step_nm(&self, stopping: bool) -> &Vector<N> {
+        if stopping {
+            &self.stop_step_nm
+        } else {
+            &self.torque_step_nm
+        }
+    }
+
+    /// What learning may change at most.
+    pub fn learned_bounds(&self) -> &LearnedBounds<N> {
+        &self.learned_bounds
+    }
+
+    /// The configuration.
+    pub fn config(&self) -> &Config<N> {
+        &self.config
+    }
+
+    /// `j2mp`: motor angles from joint angles.
+    pub fn motor_from_joint(&self) -> &Matrix<N, N> {
+        &self.motor_from_joint
+    }
+
+    /// Coupling between motors and joints.
+    pub fn motors(&self) -> &MotorGroups<N> {
+        &self.groups
+    }
+}
