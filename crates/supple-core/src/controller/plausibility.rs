@@ -3,7 +3,7 @@
 //! | finding | criterion |
 //! |---|---|
 //! | replies lost too often | each lost reply counts as eight received ones; the balance exceeds its limit |
-//! | encoder stuck | unchanged value while the joint's reference moves, out of contact or since before it, half as far with stiff position loops, while other joints move, or in joint impedance if all encoders are unchanged; or while a breakaway ramp would move the joint by the model; or from one cycle to the next for a moving joint |
+//! | encoder stuck | unchanged value while the joint's reference moves, out of contact, half as far in modes of joint references if all encoders are unchanged; or while a breakaway ramp would move the joint by the model; or from one cycle to the next for a moving joint |
 //! | moves against its torque | 20 cycles in which a joint's momentum grows against its net torque; or a joint that moves against its breakaway ramp |
 //! | unmodelled load | a force along gravity for 50 ms, in gravity hold or after the end of a move |
 //! | collision | the observed external torque or force exceeds its threshold |
@@ -21,13 +21,14 @@ const CONTACT_CYCLES: u32 = 5;
 /// Time for which the encoder of a joint in a collision may stay unchanged before it counts as
 /// stuck \[s\].
 const UNCHANGED_LIMIT_S: f64 = 0.03;
-/// Fraction of `stuck_rad` that a joint's reference may travel while its encoder is unchanged: with stiff position loops,
-/// while other joints move, for a joint whose encoder had stopped when a contact was found (a block stops no joint within a
-/// cycle), and in joint impedance while no encoder changes. At a few newtons per metre of tip stiffness
-/// dry friction may hold all joints at once.
-pub(super) const EARLY_STUCK_SHARE: f64 = 0.5;
+/// Fraction of `stuck_rad` that a joint's reference may travel while no encoder changes, in modes of joint references.
+/// At a few newtons per metre of tip stiffness dry friction may hold all joints at once, or one while others move; the
+/// springs of joints are stiffer.
+pub(super) const ALL_STUCK_SHARE: f64 = 0.5;
 /// The same for the travel that the model predicts for the joint of a breakaway ramp, which no loop holds back.
 pub(super) const RAMP_STUCK_SHARE: f64 = 0.3;
+/// Change of an encoder value up to which it shows presliding, which turns friction round over some 5e-4 rad \[rad\].
+const FINE_ENCODER_RAD: f64 = 1e-4;
 /// Sum of the squared speeds of all joints above which some of them move freely \[(rad/s)^2\].
 pub(super) const OTHER_JOINTS_MOVING_RAD_PER_S2: f64 = 0.1 * 0.1;
 const AGAINST_CYCLES: u32 = 20;
@@ -40,11 +41,10 @@ const MAX_LATERAL_SHARE: f64 = 0.5;
 pub(super) struct Plausibility<const N: usize> {
     losses: [u32; N],
     last_measured: [Option<f64>; N],
+    /// Smallest change of the encoder value \[rad\].
+    min_change_rad: [f64; N],
     /// The encoder value is unchanged since the last cycle.
     unchanged: [bool; N],
-    in_contact: bool,
-    /// The encoder value is unchanged since before the present contact.
-    stopped_before_contact: [bool; N],
     /// Speed of the joint when the encoder last changed \[rad/s\], and time since then \[s\].
     speed_rad_per_s: [f64; N],
     unchanged_s: [f64; N],
@@ -66,9 +66,8 @@ impl<const N: usize> Default for Plausibility<N> {
         Plausibility {
             losses: [0; N],
             last_measured: [None; N],
+            min_change_rad: [f64::MAX; N],
             unchanged: [false; N],
-            in_contact: false,
-            stopped_before_contact: [false; N],
             speed_rad_per_s: [0.0; N],
             unchanged_s: [0.0; N],
             travel_rad: [0.0; N],
@@ -93,8 +92,14 @@ impl<const N: usize> Plausibility<N> {
             match *measured {
                 Some(position) => {
                     self.losses[joint] = self.losses[joint].saturating_sub(1);
-                    self.unchanged[joint] = self.last_measured[joint] == Some(position);
-                    self.last_measured[joint] = Some(position);
+                    let last = self.last_measured[joint].replace(position);
+                    self.unchanged[joint] = last == Some(position);
+                    if let Some(last) = last
+                        && last != position
+                    {
+                        let change_rad = abs(position - last);
+                        self.min_change_rad[joint] = self.min_change_rad[joint].min(change_rad);
+                    }
                 }
                 None => {
                     self.losses[joint] += LOSS_WEIGHT;
@@ -130,7 +135,8 @@ impl<const N: usize> Plausibility<N> {
 
     /// Speed at which a breakaway ramp of `ramp_nm` would move `joint` by the model, counted from the last change of its
     /// encoder value, with its inertia \[kg m^2\]. The dry friction at rest is `dry_nm` \[N m\], or what has held the joint
-    /// while its encoder still changed, if that is more.
+    /// while its encoder still changed, if that is more. Zero for an encoder that is too coarse to show the presliding of a
+    /// joint at rest: with friction that the model underestimates, an encoder that works would look like a stuck one.
     pub fn ramped_rad_per_s(
         &mut self,
         joint: usize,
@@ -139,6 +145,9 @@ impl<const N: usize> Plausibility<N> {
         inertia_kg_m2: f64,
         elapsed_s: f64,
     ) -> f64 {
+        if self.min_change_rad[joint] > FINE_ENCODER_RAD {
+            return 0.0;
+        }
         if self.unchanged[joint] {
             let excess_nm = abs(ramp_nm) - dry_nm.max(self.ramp_nm);
             self.ramped_rad_per_s += excess_nm.max(0.0) / inertia_kg_m2 * elapsed_s;
@@ -205,43 +214,25 @@ impl<const N: usize> Plausibility<N> {
 
     /// Whether the latched contact is one: encoders have changed in [`CONTACT_CYCLES`] of its cycles.
     pub fn is_contact_plausible(&mut self, in_contact: bool) -> bool {
-        if in_contact && !self.in_contact {
+        if !in_contact {
             self.contact_cycles = 0;
-            self.stopped_before_contact = self.unchanged;
-        }
-        self.in_contact = in_contact;
-        if in_contact && self.contact_cycles < CONTACT_CYCLES && self.unchanged.contains(&false) {
+        } else if self.contact_cycles < CONTACT_CYCLES && self.unchanged.contains(&false) {
             self.contact_cycles += 1;
         }
-        in_contact && self.contact_cycles >= CONTACT_CYCLES
+        self.contact_cycles >= CONTACT_CYCLES
     }
 
-    /// Reports a stuck encoder if its value is unchanged while the joint's reference travels further than a limit:
-    /// `stopped_rad` for a joint that stopped before the present contact, `limit_rad` for the others, unless they are
-    /// `blocked` by contact.
+    /// Reports a stuck encoder if its value is unchanged while the joint's reference travels further than the limit.
     pub fn check_stuck_encoder(
         &mut self,
         limit_rad: f64,
-        stopped_rad: f64,
-        blocked: bool,
         reference_rad_per_s: &Vector<N>,
         elapsed_s: f64,
     ) -> Result<(), Fault> {
         for joint in 0..N {
             if !self.unchanged[joint] {
                 self.travel_rad[joint] = 0.0;
-                if self.in_contact {
-                    self.stopped_before_contact[joint] = false;
-                }
                 continue;
-            }
-            let mut limit_rad = limit_rad;
-            if self.in_contact {
-                match self.stopped_before_contact[joint] {
-                    true => limit_rad = stopped_rad.min(limit_rad),
-                    false if blocked => continue,
-                    false => {}
-                }
             }
             self.travel_rad[joint] += abs(reference_rad_per_s[joint]) * elapsed_s;
             if self.travel_rad[joint] > limit_rad {

@@ -6,7 +6,7 @@ use super::checks::{COMPLIANT_SPEED_SHARE, MOVING_SHARE};
 use super::fault::Fault;
 use super::latch::Evidence;
 use super::plausibility::{
-    EARLY_STUCK_SHARE, OTHER_JOINTS_MOVING_RAD_PER_S2, PlausibilityInput, RAMP_STUCK_SHARE,
+    ALL_STUCK_SHARE, OTHER_JOINTS_MOVING_RAD_PER_S2, PlausibilityInput, RAMP_STUCK_SHARE,
     SUDDEN_STOP_SHARE, joint_collision, tip_collision,
 };
 use super::pose_task::PoseCycle;
@@ -244,28 +244,25 @@ impl<const N: usize> State<N> {
             if !matches!(self.activity, Activity::Fault(_)) {
                 against?;
             }
-            // In contact the joints may stand still while their references move; but if other
-            // joints move, or it stood still before the contact, an unchanged encoder is stuck.
-            // Encoders that are all stuck make a contact themselves: it counts once they have
-            // changed in it.
+            // In contact the joints may be at rest while their references move; but if other joints
+            // move, a single unchanged encoder is stuck. Encoders that are all stuck make a contact
+            // themselves: it counts once they have changed in it.
             let others_move = velocity.dot(velocity) > OTHER_JOINTS_MOVING_RAD_PER_S2;
             let in_contact = plausibility.is_contact_plausible(self.latch.in_contact());
-            let early = !in_contact
-                && (others_move
-                    || self.activity.has_joint_loops()
-                    || (self.activity.has_joint_reference() && plausibility.all_unchanged()));
-            let share = match self.activity {
-                Activity::Breakaway { .. } => RAMP_STUCK_SHARE,
-                _ if early => EARLY_STUCK_SHARE,
-                _ => 1.0,
-            };
-            plausibility.check_stuck_encoder(
-                share * config.plausible.stuck_rad,
-                EARLY_STUCK_SHARE * config.plausible.stuck_rad,
-                in_contact && !others_move,
-                evidence.reference_rad_per_s,
-                evidence.elapsed_s,
-            )?;
+            if others_move || !in_contact {
+                let share = match self.activity {
+                    Activity::Breakaway { .. } => RAMP_STUCK_SHARE,
+                    _ if self.activity.has_joint_reference() && plausibility.all_unchanged() => {
+                        ALL_STUCK_SHARE
+                    }
+                    _ => 1.0,
+                };
+                plausibility.check_stuck_encoder(
+                    share * config.plausible.stuck_rad,
+                    evidence.reference_rad_per_s,
+                    evidence.elapsed_s,
+                )?;
+            }
         }
         let external = self.observer.external_torque_nm();
         let collision = &config.collision;
