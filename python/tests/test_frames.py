@@ -30,6 +30,34 @@ def test_a_log_as_a_data_set(run):
     np.testing.assert_array_equal(data["tip_position_m"].sel(axis="x"), log.tip_position_m[:, 0])
 
 
+def test_the_terms_of_a_torque_add_up(tmp_path):
+    """On an arm with ripple, presliding and compliance; the curves of the figure add up, too."""
+    toml = supple.Arm.load("wam3").toml
+    ripple = "[[motors.ripple]]\nmotor = 0\nharmonic = 3\nsine_nm = 0.002\ncosine_nm = 0.001\n"
+    assert "coulomb_nm = " in toml
+    (tmp_path / "arm.urdf").write_text(supple.Arm.load("wam3").urdf)
+    (tmp_path / "arm.toml").write_text(toml.replace("coulomb_nm = ", "presliding_rad = 0.002, coulomb_nm = ") + ripple)
+    arm = supple.Arm.load(tmp_path)
+    log = supple.read_log(supple.simulate(arm, "sinusoid", duration_s=0.3, log_dir=tmp_path / "log").log)
+    free = (log.columns["torque_limited"] == 0) & (log.columns["rate_limited"] == 0)
+    assert free.sum() > 200
+    assert np.abs(log.torques["ripple"]).max() > 1e-3
+    np.testing.assert_allclose(sum(log.torques.values())[free], log.tau[free], atol=1e-12)
+
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+    import supple.plot
+
+    figure = supple.plot.torques(log)
+    for joint, panel in enumerate(figure.axes):
+        commanded, *curves = (line.get_ydata() for line in panel.lines)
+        assert len(curves) == 5
+        np.testing.assert_allclose(np.sum(curves, axis=0)[free], commanded[free], atol=1e-12)
+        np.testing.assert_array_equal(commanded, log.tau[:, joint])
+    plt.close("all")
+
+
 def test_tables_for_notebooks(run):
     html = run._repr_html_()
     assert "<table>" in html and "mm RMS" in html and f"{len(run.t)} x 3" in html

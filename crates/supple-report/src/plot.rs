@@ -11,6 +11,7 @@ use supple_cli::out::Staging;
 use supple_core::Vector;
 use supple_core::controller::CycleRecord;
 use supple_core::nalgebra::Vector3;
+use supple_core::torques::Torques;
 use supple_log::Reader;
 use supple_model::with_dof;
 
@@ -27,6 +28,29 @@ struct Summary<'a> {
     figures: Vec<PathBuf>,
 }
 
+/// Curves of the torque and the terms whose sum each of them is. All other terms are one more curve, so that the curves add
+/// up to the torque before its limits.
+const TERM_CURVES: [(&str, &[&str]); 4] = [
+    ("gravity", &["gravity"]),
+    ("friction", &["friction"]),
+    ("inertia", &["inertial", "jacobian_rate", "coriolis"]),
+    ("feedback", &["stiffness", "damping", "joint_pd"]),
+];
+/// Name of the curve of the other terms.
+const OTHER_TERMS: &str = "other";
+
+/// The sums of [`TERM_CURVES`], and that of the other terms \[N m\].
+fn sums_of_terms<const N: usize>(torques: &Torques<N>) -> [Vector<N>; TERM_CURVES.len() + 1] {
+    let mut sums = [Vector::zeros(); TERM_CURVES.len() + 1];
+    for (name, torque_nm) in torques.named() {
+        let curve = TERM_CURVES
+            .iter()
+            .position(|(_, terms)| terms.contains(&name));
+        sums[curve.unwrap_or(TERM_CURVES.len())] += torque_nm;
+    }
+    sums
+}
+
 /// Curves of a log.
 #[derive(Default)]
 struct Content {
@@ -38,8 +62,8 @@ struct Content {
     force_n: Points,
     contacts_s: Vec<(f64, f64)>,
     faults: Vec<(f64, String)>,
-    /// Of each joint: what is commanded, gravity, friction, inertia and Coriolis, feedback.
-    torques: Vec<[Points; 5]>,
+    /// Of each joint: what is commanded, then each of [`TERM_CURVES`], then all other terms.
+    torques: Vec<[Points; TERM_CURVES.len() + 2]>,
     step_us: Points,
     period_us: Points,
 }
@@ -152,19 +176,11 @@ impl Content {
         }
         let force_n = Vector3::from(cycle.external_force_n).norm();
         self.force_n.push((t, force_n));
-        let terms = &cycle.torques;
-        let motion: Vector<N> = terms.inertial + terms.jacobian_rate + terms.coriolis;
-        let feedback: Vector<N> = terms.stiffness + terms.damping + terms.joint_pd;
+        let sums = sums_of_terms(&cycle.torques);
         for (joint, curves) in self.torques.iter_mut().enumerate() {
-            let values = [
-                cycle.torque_nm[joint],
-                terms.gravity[joint],
-                terms.friction[joint],
-                motion[joint],
-                feedback[joint],
-            ];
+            let values = [&cycle.torque_nm].into_iter().chain(&sums);
             for (curve, value) in curves.iter_mut().zip(values) {
-                curve.push((t, value));
+                curve.push((t, value[joint]));
             }
         }
     }
@@ -218,20 +234,19 @@ fn figures(content: &Content, joints: &[String]) -> Result<Vec<Figure>, FigureEr
         .torques
         .iter()
         .enumerate()
-        .map(|(joint, [total, gravity, friction, motion, feedback])| {
+        .map(|(joint, curves)| {
+            let terms = TERM_CURVES.iter().map(|(name, _)| *name);
+            let names = ["commanded"].into_iter().chain(terms).chain([OTHER_TERMS]);
             let name = joints.get(joint).map_or("joint", String::as_str);
             LogPanel {
                 wide_first: true,
                 ..content.panel(
                     name,
                     "torque [N m]",
-                    vec![
-                        curve("commanded", total),
-                        curve("gravity", gravity),
-                        curve("friction", friction),
-                        curve("inertia", motion),
-                        curve("feedback", feedback),
-                    ],
+                    names
+                        .zip(curves)
+                        .map(|(name, points)| curve(name, points))
+                        .collect(),
                 )
             }
         })
@@ -264,4 +279,29 @@ fn figures(content: &Content, joints: &[String]) -> Result<Vec<Figure>, FigureEr
         )?);
     }
     Ok(figures)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use supple_core::record::{Recorded, Unpack};
+    use supple_core::torques::TERMS;
+
+    #[test]
+    fn the_curves_add_up_to_all_terms() {
+        let mut words = vec![0; TERMS.len()];
+        for (place, word) in words.iter_mut().enumerate() {
+            *word = f64::from(1 << place).to_bits();
+        }
+        let torques = <Torques<1> as Recorded<1>>::unpack(&mut Unpack::new(&words, 1));
+        let sums = sums_of_terms(&torques);
+        let sum: Vector<1> = sums.iter().sum();
+        assert_eq!(sum[0], f64::from((1 << TERMS.len()) - 1));
+        assert!(sums.iter().all(|sum| sum[0] > 0.0), "{sums:?}");
+        for (_, terms) in TERM_CURVES {
+            for term in terms {
+                assert!(TERMS.iter().any(|known| known.name == *term), "{term}");
+            }
+        }
+    }
 }

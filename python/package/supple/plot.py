@@ -28,11 +28,16 @@ if TYPE_CHECKING:
 __all__ = ["joints", "sweep", "torques", "tracking"]
 
 Array = NDArray[np.float64]
-BLUE, VERMILION, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#B45A96"
-COLOURS = (BLUE, VERMILION, GREEN, PURPLE)
+BLUE, VERMILION, GREEN, PURPLE, ORANGE = "#0072B2", "#D55E00", "#009E73", "#B45A96", "#E69F00"
+COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE)
 REFERENCE: dict[str, Any] = {"color": "#B4BBC6", "linewidth": 3.0}
-FEEDBACK = ("stiffness", "damping", "joint_pd")
-MOTION = ("inertial", "jacobian_rate", "coriolis")
+# Curves of the torque and the terms whose sum each of them is; all other terms are one more curve.
+TERM_CURVES = {
+    "gravity": ("gravity",),
+    "friction": ("friction",),
+    "inertia": ("inertial", "jacobian_rate", "coriolis"),
+    "feedback": ("stiffness", "damping", "joint_pd"),
+}
 
 
 class Tracked(Protocol):
@@ -114,7 +119,10 @@ def joints(result: Any, axes: Any = None) -> Figure:
 
 
 def torques(log: Log, axes: Any = None) -> Figure:
-    """The terms of each joint's torque: gravity, friction, inertia and Coriolis, feedback, and what was commanded.
+    """The terms of each joint's torque, which add up to it before its limits, and what was commanded.
+
+    The curves are gravity, friction, inertia with Coriolis, feedback, and the sum of all other terms, such as ripple and
+    what was learned.
 
     Parameters
     ----------
@@ -129,18 +137,16 @@ def torques(log: Log, axes: Any = None) -> Figure:
         The figure.
     """
     figure, drawn = _figure(log.q.shape[1], axes, 2.0)
-    terms = {
-        "gravity": log.torques["gravity"],
-        "friction": log.torques["friction"],
-        "inertia": np.sum([log.torques[name] for name in MOTION], axis=0),
-        "feedback": np.sum([log.torques[name] for name in FEEDBACK], axis=0),
-    }
+    curve_of = {term: curve for curve, terms in TERM_CURVES.items() for term in terms}
+    curves = {name: np.zeros_like(log.tau) for name in (*TERM_CURVES, "other")}
+    for term, torque_nm in log.torques.items():
+        curves[curve_of.get(term, "other")] += torque_nm
     for joint, panel in enumerate(drawn):
         panel.plot(log.t, log.tau[:, joint], label="commanded", **REFERENCE)
-        for colour, (name, term) in zip(COLOURS, terms.items(), strict=True):
+        for colour, (name, term) in zip(COLOURS, curves.items(), strict=True):
             panel.plot(log.t, term[:, joint], color=colour, linewidth=1.2, label=name)
         panel.set_ylabel(f"joint {joint} [N m]")
-    drawn[0].legend(loc="upper right", ncols=5, frameon=False)
+    drawn[0].legend(loc="upper right", ncols=6, frameon=False)
     drawn[-1].set_xlabel("time [s]")
     return figure
 

@@ -11,3 +11,4 @@ mod python_readers;
 mod recover;
 mod replay;
 mod round_trip;
+mod terms;

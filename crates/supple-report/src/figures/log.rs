@@ -4,7 +4,7 @@ use super::axis::Axis;
 use super::canvas::{Figure, draw_canvas};
 use super::error::FigureError;
 use super::panel::{LegendSymbol, Margins, Panel, legend};
-use super::style::{BLUE, GREEN, PURPLE, REFERENCE, VERMILION};
+use super::style::{BLUE, GREEN, ORANGE, PURPLE, REFERENCE, VERMILION};
 use super::ticks::{Ticks, extent};
 use plotters::style::RGBColor;
 
@@ -86,7 +86,7 @@ pub fn draw(
 }
 
 fn stroke_of(index: usize, wide_first: bool) -> (RGBColor, f64) {
-    const COLOURS: [RGBColor; 4] = [BLUE, VERMILION, GREEN, PURPLE];
+    const COLOURS: [RGBColor; 5] = [BLUE, VERMILION, GREEN, PURPLE, ORANGE];
     match (wide_first, index) {
         (true, 0) => (REFERENCE, 3.0),
         (true, _) => (COLOURS[(index - 1) % COLOURS.len()], 1.2),
@@ -94,7 +94,7 @@ fn stroke_of(index: usize, wide_first: bool) -> (RGBColor, f64) {
     }
 }
 
-/// The least and the greatest value of each of equal numbers of points, in their order.
+/// The smallest and the largest value of each of equal numbers of points, in their order.
 fn thinned(points: &[(f64, f64)]) -> Points {
     let size = points.len().div_ceil(MAX_POINTS / 2);
     if size <= 2 {

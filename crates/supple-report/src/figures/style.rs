@@ -29,6 +29,8 @@ pub const VERMILION: RGBColor = RGBColor(0xD5, 0x5E, 0x00);
 pub const GREEN: RGBColor = RGBColor(0x00, 0x9E, 0x73);
 /// Fourth series.
 pub const PURPLE: RGBColor = RGBColor(0xB4, 0x5A, 0x96);
+/// Fifth series.
+pub const ORANGE: RGBColor = RGBColor(0xE6, 0x9F, 0x00);
 
 /// Converts displayed pixels to drawn pixels.
 pub fn px(shown: f64) -> i32 {
