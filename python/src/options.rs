@@ -74,6 +74,7 @@ impl Options {
                 FrictionChoice::Columns(columns(shape))
             }),
             rotor: self.rotor,
+            rotor_deviation: None,
             slow_rad_per_s: self.slow_rad_per_s,
             prior_weight: self.prior_weight,
             joint_noise_nm: self.joint_noise_nm,
