@@ -1,4 +1,4 @@
-//! Rigid-body dynamics of a serial arm: free functions over an immutable [`Arm`].
+//! Rigid-body dynamics of a serial arm: free functions over an immutable [`crate::Arm`].
 //!
 //! Sweeps run in joint frames, so that each joint rotates about z and precision does not depend on
 //! how far the wrist is from the base. Accelerations are classical (of the frame's origin), and

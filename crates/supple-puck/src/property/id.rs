@@ -2,7 +2,7 @@
 
 pub(crate) const SET_BIT: u8 = 0x80;
 
-/// A property, named as in the property lists of Barrett's libbarrett. A [`PropertyTable`] gives its id.
+/// A property, named as in the property lists of Barrett's libbarrett. A [`super::PropertyTable`] gives its id.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Property(pub(super) u8);
 

@@ -52,7 +52,7 @@ numbered! {
 }
 
 numbered! {
-    /// Numbers of [`Fault`].
+    /// Numbers of [`crate::controller::Fault`].
     fault_kind {
         NONE = 0 "none",
         MEASUREMENT_NOT_FINITE = 1 "measurement_not_finite",
@@ -82,7 +82,7 @@ numbered! {
 }
 
 numbered! {
-    /// Numbers of [`Refusal`].
+    /// Numbers of [`crate::controller::Refusal`].
     refusal_kind {
         NONE = 0 "none",
         MODE = 1 "mode",
