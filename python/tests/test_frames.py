@@ -31,7 +31,12 @@ def test_a_log_as_a_data_set(run):
 
 
 def test_the_terms_of_a_torque_add_up(tmp_path):
-    """On an arm with ripple, presliding and compliance; the curves of the figure add up, too."""
+    """On an arm with ripple and presliding; the curves of the figure add up, too."""
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+    import supple.plot
+
     toml = supple.Arm.load("wam3").toml
     ripple = "[[motors.ripple]]\nmotor = 0\nharmonic = 3\nsine_nm = 0.002\ncosine_nm = 0.001\n"
     assert "coulomb_nm = " in toml
@@ -43,11 +48,6 @@ def test_the_terms_of_a_torque_add_up(tmp_path):
     assert free.sum() > 200
     assert np.abs(log.torques["ripple"]).max() > 1e-3
     np.testing.assert_allclose(sum(log.torques.values())[free], log.tau[free], atol=1e-12)
-
-    matplotlib = pytest.importorskip("matplotlib")
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-    import supple.plot
 
     figure = supple.plot.torques(log)
     for joint, panel in enumerate(figure.axes):

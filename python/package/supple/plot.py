@@ -139,12 +139,12 @@ def torques(log: Log, axes: Any = None) -> Figure:
     figure, drawn = _figure(log.q.shape[1], axes, 2.0)
     curve_of = {term: curve for curve, terms in TERM_CURVES.items() for term in terms}
     curves = {name: np.zeros_like(log.tau) for name in (*TERM_CURVES, "other")}
-    for term, torque_nm in log.torques.items():
-        curves[curve_of.get(term, "other")] += torque_nm
+    for name, torque_nm in log.torques.items():
+        curves[curve_of.get(name, "other")] += torque_nm
     for joint, panel in enumerate(drawn):
         panel.plot(log.t, log.tau[:, joint], label="commanded", **REFERENCE)
-        for colour, (name, term) in zip(COLOURS, curves.items(), strict=True):
-            panel.plot(log.t, term[:, joint], color=colour, linewidth=1.2, label=name)
+        for colour, (name, curve) in zip(COLOURS, curves.items(), strict=True):
+            panel.plot(log.t, curve[:, joint], color=colour, linewidth=1.2, label=name)
         panel.set_ylabel(f"joint {joint} [N m]")
     drawn[0].legend(loc="upper right", ncols=6, frameon=False)
     drawn[-1].set_xlabel("time [s]")
