@@ -121,13 +121,13 @@ pub enum Fault {
         joint: usize,
     },
     /// A joint accelerates against its net torque: the sign of its encoder or motor is wrong, or an
-    /// external torque is larger.
+    /// external torque is larger. Or it has moved against the torque of a breakaway ramp.
     MotionAgainstTorque {
         /// Joint index.
         joint: usize,
         /// Net torque on the joint, without gravity and friction \[N m\].
         value_nm: f64,
-        /// Torque above which this is a fault \[N m\].
+        /// Torque above which this is a fault; zero for a breakaway ramp \[N m\].
         limit_nm: f64,
     },
     /// A force along gravity acts on the tip: the model lacks a load, or its gravity is wrong.

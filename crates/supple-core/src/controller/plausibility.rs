@@ -216,7 +216,7 @@ impl<const N: usize> Plausibility<N> {
     pub fn is_contact_plausible(&mut self, in_contact: bool) -> bool {
         if !in_contact {
             self.contact_cycles = 0;
-        } else if self.contact_cycles < CONTACT_CYCLES && self.unchanged.contains(&false) {
+        } else if self.contact_cycles < CONTACT_CYCLES && !self.all_unchanged() {
             self.contact_cycles += 1;
         }
         self.contact_cycles >= CONTACT_CYCLES

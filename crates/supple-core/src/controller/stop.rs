@@ -21,8 +21,9 @@
 //! than a fifth of the speed limit of a joint or of the tip. The drives brake if (1) the arm moves
 //! with over 1.25 times its kinetic energy before the fault; (2) the arm still moves 0.2 s after
 //! the fault; (3) an external torque above a tenth of a joint's limit acts for 50 ms, either later
-//! than 0.15 s after the fault or at a joint whose encoder is unchanged and may be stuck; (4) one
-//! above a twentieth acted for 50 ms before a speed limit was exceeded, while the arm followed a
+//! than 0.15 s after the fault or at a joint whose encoder is unchanged and may be stuck; (4) the
+//! external torques, each divided by a twentieth of its joint's limit, had a root of the sum of
+//! squares above one for 50 ms before a speed limit was exceeded, while the arm followed a
 //! reference out of contact.
 
 use super::Controller;

@@ -384,6 +384,73 @@ fn stuck_encoders_are_no_contact() {
     assert_eq!(contact(true), (true, None));
 }
 
+/// Runs until a speed limit is exceeded, with these torques of the motors and of somebody who pushes; whether the arm has
+/// torque in the cycle of the fault.
+fn has_torque_when_too_fast(
+    request: Request<3>,
+    motors: impl Fn(u32, &Vector<3>) -> Vector<3>,
+    push_nm: impl Fn(u32) -> Vector<3>,
+) -> bool {
+    let mut config = three();
+    config.collision = Collision::disabled();
+    config.plausible.against_share = 1e3;
+    config.latch.threshold_n = 1e3;
+    config.limits.tracking_error_m = 10.0;
+    let mut rig = Rig::holding(config, bent());
+    let mut plant = Plant::at_rest(config.arm, bent());
+    let mut request = Some(request);
+    for k in 0..4000 {
+        rig.q = plant.q;
+        let output = rig.step(&supple_core::Input {
+            request: request.take(),
+            ..rig.input()
+        });
+        assert_eq!(output.refusal, None);
+        if let Some(fault) = output.fault {
+            let too_fast = matches!(fault, Fault::JointSpeed { .. } | Fault::TipSpeed { .. });
+            assert!(too_fast, "{fault:?}");
+            return !output.torque_off;
+        }
+        let torque_nm = motors(k, &output.torque_nm) + push_nm(k);
+        plant.advance(&torque_nm, |_, _, _| Vector::zeros(), config.period_s, 4);
+    }
+    panic!("the arm never is too fast");
+}
+
+/// Written before the run: an arm whose motor dies while it follows a line has no torque from the cycle in which it is too
+/// fast; one that is struck, or that a person leads faster than it may be, is stopped with torque.
+#[test]
+fn a_push_before_too_much_speed_brakes_only_where_a_reference_is_followed() {
+    let from_m = Rig::holding(three(), bent()).tip();
+    let line = Request::Track(Trajectory::Line(Line {
+        from_m,
+        to_m: from_m - Vector3::new(0.0, 0.0, 0.15),
+        duration_s: 1.5,
+    }));
+    let whole = |_, torque_nm: &Vector<3>| *torque_nm;
+    let dead = |k: u32, torque_nm: &Vector<3>| match k > 500 {
+        true => torque_nm.component_mul(&Vector::from([1.0, 0.0, 1.0])),
+        false => *torque_nm,
+    };
+    let pushed_nm = |from: u32, cycles: u32, nm: f64| {
+        move |k: u32| match k > from && k <= from + cycles {
+            true => Vector::from([0.0, nm, 0.0]),
+            false => Vector::zeros(),
+        }
+    };
+    assert!(!has_torque_when_too_fast(line, dead, pushed_nm(0, 0, 0.0)));
+    assert!(has_torque_when_too_fast(
+        line,
+        whole,
+        pushed_nm(500, 20, 100.0)
+    ));
+    assert!(has_torque_when_too_fast(
+        Request::Float,
+        whole,
+        pushed_nm(300, 3000, 6.0)
+    ));
+}
+
 /// A joint that moved when the drives became idle and is at rest when they are re-enabled does not
 /// count as a stuck encoder.
 #[test]

@@ -14,7 +14,6 @@ use supple_core::config::Gains;
 use supple_core::controller::{Fault, Mode, Refusal, Request, SafeAction, check_motion};
 use supple_core::dynamics::kinetic_energy;
 use supple_core::math::Vector3;
-
 use supple_core::trajectory::Fourier;
 use supple_core::{Config, Friction, Trajectory, Vector};
 
@@ -325,9 +324,9 @@ fn ramps_after_one_another_hold_what_the_model_lacks() {
     }
 }
 
-/// A breakaway ramp whose encoder shows `shown` of the true angle and of the start; returns the first fault and the
-/// greatest speed of the tip \[m/s\].
-fn ramped(shown: impl Fn(f64, f64) -> f64) -> (Option<Fault>, f64) {
+/// A breakaway ramp whose encoder shows `shown` of the true angle and of the start; returns the first fault, the largest
+/// speed of the tip \[m/s\], and the mode at the end of the ramp or of the fault.
+fn ramped(shown: impl Fn(f64, f64) -> f64) -> (Option<Fault>, f64, Mode) {
     let mut config = three();
     let dry_nm = 1.0;
     config.friction[1] = Friction::coulomb(0.0, dry_nm);
@@ -357,29 +356,29 @@ fn ramped(shown: impl Fn(f64, f64) -> f64) -> (Option<Fault>, f64) {
         plant.advance(&output.torque_nm, friction, config.period_s, 4);
         let jacobian = supple_core::dynamics::jacobian(&plant.arm, &plant.q);
         speed_m_per_s = speed_m_per_s.max(size(&(jacobian.fixed_rows::<3>(0) * plant.qd)));
-        if output.fault.is_some() {
-            return (output.fault, speed_m_per_s);
+        if output.mode != Mode::Breakaway {
+            return (output.fault, speed_m_per_s, output.mode);
         }
     }
-    (None, speed_m_per_s)
+    panic!("the ramp does not end");
 }
 
 /// Written before the run: an encoder that no longer changes, or shows the opposite, ends the ramp with its fault before the
 /// tip is faster than 0.25 m/s; a good one ends it without a fault.
 #[test]
 fn a_ramp_ends_with_a_wrong_encoder() {
-    let (fault, speed) = ramped(|_, start| start);
+    let (fault, speed, _) = ramped(|_, start| start);
     assert!(
         matches!(fault, Some(Fault::EncoderStuck { joint: 1, .. })),
         "{fault:?}"
     );
     assert!(speed < 0.25, "{speed} m/s");
-    let (fault, speed) = ramped(|true_rad, start| 2.0 * start - true_rad);
+    let (fault, speed, _) = ramped(|true_rad, start| 2.0 * start - true_rad);
     assert!(
         matches!(fault, Some(Fault::MotionAgainstTorque { joint: 1, .. })),
         "{fault:?}"
     );
     assert!(speed < 0.25, "{speed} m/s");
-    let (fault, _) = ramped(|true_rad, _| true_rad);
-    assert_eq!(fault, None);
+    let (fault, _, mode) = ramped(|true_rad, _| true_rad);
+    assert_eq!((fault, mode), (None, Mode::GravityHold));
 }
