@@ -5,7 +5,7 @@ use super::fault::Fault;
 use super::mode::Breakaway;
 use super::pose_task::{DIRECTIONS, PoseCycle};
 use super::state::State;
-use super::{Controller, checks, limiter};
+use super::{Controller, limiter};
 use crate::config::{Config, JointGains, Role};
 use crate::law::impedance::{HeldFriction, LawInput, PositionTarget, Task, Torques, impedance};
 use crate::math::{Vector, Vector3, abs, smooth_step};
@@ -356,7 +356,9 @@ impl<const N: usize> State<N> {
                 }
             }
         }
-        torques.soft_stop = checks::soft_stop(&config.limits, &self.position, velocity);
+        if let Some(stops) = self.soft_stops(controller) {
+            torques.soft_stop = stops.torque_nm(velocity);
+        }
         if !config.workspace.is_unbounded() {
             let jacobian = self.terms.jacobian.fixed_rows::<3>(0);
             let tip = self.terms.base_from_tip.translation;

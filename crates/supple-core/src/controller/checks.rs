@@ -124,29 +124,65 @@ pub(super) fn total<const N: usize>(torques: &Torques<N>) -> Result<Vector<N>, F
     Err(Fault::TorqueNotFinite { term })
 }
 
-/// Spring-dampers over the last `soft_zone_rad` before each hard stop. The damping coefficient grows from zero with the
-/// depth into this range, and only motion towards the stop is damped, so that the torque is continuous and never
-/// pulls towards the stop. Beyond the hard stop the spring torque stays constant.
-pub(super) fn soft_stop<const N: usize>(
+/// Depth of each joint into its soft zone as a share of it, from 0 outside to 1 or -1 at the hard stop and beyond, with
+/// the sign of the torque that pushes the joint back; `None` outside all soft zones.
+#[inline(always)]
+pub(super) fn soft_zone_depths<const N: usize>(
     limits: &Limits<N>,
     position_rad: &Vector<N>,
-    velocity_rad_per_s: &Vector<N>,
-) -> Vector<N> {
-    let push = |joint: usize, depth_rad: f64, approach_rad_per_s: f64| {
-        let share = (depth_rad / limits.soft_zone_rad).min(1.0);
-        limits.soft_stiffness_nm_per_rad[joint] * share * limits.soft_zone_rad
-            + limits.soft_damping_nm_s_per_rad[joint] * share * approach_rad_per_s.max(0.0)
-    };
-    Vector::from_fn(|joint, _| {
-        let (q, v) = (position_rad[joint], velocity_rad_per_s[joint]);
+) -> Option<Vector<N>> {
+    let mut inside = false;
+    let depths = Vector::from_fn(|joint, _| {
+        let q = position_rad[joint];
         let below = limits.position_lower_rad[joint] + limits.soft_zone_rad - q;
         let above = q - (limits.position_upper_rad[joint] - limits.soft_zone_rad);
         if below > 0.0 {
-            push(joint, below, -v)
+            inside = true;
+            (below / limits.soft_zone_rad).min(1.0)
         } else if above > 0.0 {
-            -push(joint, above, v)
+            inside = true;
+            -(above / limits.soft_zone_rad).min(1.0)
         } else {
             0.0
         }
-    })
+    });
+    inside.then_some(depths)
+}
+
+/// Spring-dampers over the last `soft_zone_rad` before each hard stop. The damping coefficient grows from zero with the
+/// depth into this range, and only motion towards the stop is damped, so that the torque is continuous and never
+/// pulls towards the stop. Beyond the hard stop the spring torque stays constant.
+pub(super) struct SoftStop<const N: usize> {
+    /// Of [`soft_zone_depths`]: its sign is the direction away from the stop.
+    depth: Vector<N>,
+    /// Torque of the springs.
+    pub spring_nm: Vector<N>,
+    /// Damping of motion towards the stop.
+    pub damping_nm_s_per_rad: Vector<N>,
+}
+
+impl<const N: usize> SoftStop<N> {
+    /// The soft stops of the configuration at these depths of [`soft_zone_depths`].
+    pub fn new(limits: &Limits<N>, depth: &Vector<N>) -> SoftStop<N> {
+        SoftStop {
+            depth: *depth,
+            spring_nm: limits.soft_stiffness_nm_per_rad.component_mul(depth) * limits.soft_zone_rad,
+            damping_nm_s_per_rad: limits.soft_damping_nm_s_per_rad.component_mul(&depth.abs()),
+        }
+    }
+
+    /// Torques at these joint velocities.
+    pub fn torque_nm(&self, velocity_rad_per_s: &Vector<N>) -> Vector<N> {
+        Vector::from_fn(|joint, _| {
+            let velocity = velocity_rad_per_s[joint];
+            let towards_stop = velocity * self.depth[joint] < 0.0;
+            let damping = self.damping_nm_s_per_rad[joint];
+            self.spring_nm[joint]
+                - if towards_stop {
+                    damping * velocity
+                } else {
+                    0.0
+                }
+        })
+    }
 }

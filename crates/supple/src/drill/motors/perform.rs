@@ -35,8 +35,10 @@ const MOVE_S: f64 = 3.0;
 /// Time from the event to the end of a run that goes on, and of one in which the arm is laid down \[s\].
 const GOES_ON_S: f64 = 3.0;
 const LAID_DOWN_S: f64 = 14.0;
-/// Time without telemetry after which a lost arm is no longer waited for.
-const SILENCE: Duration = Duration::from_secs(4);
+/// Time without telemetry after which a lost arm is looked at: it is no longer waited for if the watchdogs of all motors
+/// have ended their torque, or after the longer time.
+const SILENCE: Duration = Duration::from_secs(2);
+const LONG_SILENCE: Duration = Duration::from_secs(30);
 /// Timeout of a run by the wall clock; the longest takes a minute in an unoptimised build.
 const TIMEOUT: Duration = Duration::from_secs(400);
 /// Observation by the wall clock after the host is lost, and timeout for an arm that is laid down.
@@ -246,8 +248,14 @@ fn in_virtual_time<const N: usize>(
                 left.event_s = Some(telemetry.state.stamp_ns as f64 * 1e-9);
             }
         }
-        let silent = last_telemetry.elapsed() > SILENCE && loses_arm;
-        if telemetry.is_none() && (silent || system.clock_has_ended()?) {
+        let silence = last_telemetry.elapsed();
+        if telemetry.is_none() && loses_arm && left.event_s.is_some() && silence > SILENCE {
+            let without_torque = Course::read(reports)?.watchdogs.len();
+            if without_torque == N || silence > LONG_SILENCE {
+                break;
+            }
+        }
+        if telemetry.is_none() && system.clock_has_ended()? {
             break;
         }
         if begin.elapsed() > TIMEOUT {

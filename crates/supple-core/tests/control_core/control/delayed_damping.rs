@@ -1,11 +1,11 @@
-//! Gains of the move mode where a joint has little inertia for the delay of the loop.
+//! Gains of the move mode and soft stops where a joint has little inertia for the delay of the loop.
 
 use crate::support::configs::{four, seven, unlimited};
 use crate::support::inverse;
 use crate::support::plant::Plant;
 use crate::support::rig::{Rig, bent};
 use std::f64::consts::FRAC_PI_2;
-use supple_core::config::JointGains;
+use supple_core::config::{JointGains, Role};
 use supple_core::controller::{Mode, Request};
 use supple_core::dynamics::crba;
 use supple_core::{Config, Controller, Matrix, Vector};
@@ -117,4 +117,85 @@ fn a_move_with_too_much_damping_comes_to_rest() {
     }
     assert!(most < 1e-3, "{most} rad/s");
     assert!((plant.q - target_rad).amax() < 1e-3);
+}
+
+/// Depth into a soft zone as a share of it.
+const DEPTH: f64 = 0.5;
+
+/// Torque of the soft stop of a decoupled arm's joint that moves into its zone, and what its damping was.
+fn soft_stop_damping(hold_nm_s_per_rad: f64, soft_nm_s_per_rad: f64) -> f64 {
+    let mut config = four();
+    unlimited(&mut config);
+    config.hold_damping_nm_s_per_rad.fill(hold_nm_s_per_rad);
+    config.limits.soft_stiffness_nm_per_rad.fill(0.0);
+    config
+        .limits
+        .soft_damping_nm_s_per_rad
+        .fill(soft_nm_s_per_rad);
+    let edge = config.limits.position_upper_rad[3] - config.limits.soft_zone_rad;
+    let end = edge + DEPTH * config.limits.soft_zone_rad;
+    let speed = 0.2;
+    let mut start = bent::<4>();
+    start[3] = end - speed * 0.2;
+    let mut rig = Rig::holding(config, start);
+    let mut output = rig.cycle();
+    for cycle in 0..=200 {
+        rig.q[3] = start[3] + speed * 1e-3 * f64::from(cycle);
+        output = rig.cycle();
+        assert_eq!((output.mode, output.fault), (Mode::GravityHold, None));
+    }
+    -output.torques.soft_stop[3] / output.velocity_rad_per_s[3]
+}
+
+#[test]
+fn a_soft_stop_has_its_damping_where_the_delay_allows_it() {
+    for soft in [0.5, 2.0, 5.0] {
+        let found = soft_stop_damping(1.0, soft);
+        assert!((found - DEPTH * soft).abs() < 0.02 * soft, "{found}");
+    }
+}
+
+/// What the delay allows is for both together: the damping of gravity hold takes its part.
+#[test]
+fn a_soft_stop_has_the_damping_that_hold_leaves() {
+    let (alone, beside) = (soft_stop_damping(0.0, 1e3), soft_stop_damping(4.0, 1e3));
+    assert!(alone > 4.0 && alone < 0.1 * 1e3, "{alone}");
+    assert!(beside < alone - 3.0, "{beside} of {alone}");
+}
+
+/// An arm that enters its soft zones leaves them no faster, whatever damping the configuration has.
+#[test]
+fn a_soft_stop_with_too_much_damping_takes_energy() {
+    for joint in [0, 1, 3] {
+        for soft in [10.0, 200.0] {
+            let mut config = four();
+            unlimited(&mut config);
+            config.roles[2] = Role::Active;
+            config.hold_damping_nm_s_per_rad.fill(0.0);
+            config.limits.soft_stiffness_nm_per_rad.fill(30.0);
+            config.limits.soft_damping_nm_s_per_rad.fill(soft);
+            let mut start = bent::<4>();
+            start[joint] =
+                config.limits.position_upper_rad[joint] - config.limits.soft_zone_rad - 0.05;
+            let mut rig = Rig::holding(config, start);
+            let mut plant = Plant::at_rest(config.arm, start);
+            plant.qd[joint] = 0.8;
+            let energy_j =
+                |plant: &Plant<4>| 0.5 * plant.qd.dot(&(crba(&plant.arm, &plant.q) * plant.qd));
+            let before_j = energy_j(&plant);
+            for cycle in 0..600 {
+                let output = rig.drive(&mut plant, None, |_, _, _| Vector::zeros());
+                assert_eq!((output.mode, output.fault), (Mode::GravityHold, None));
+                let after_j = energy_j(&plant);
+                assert!(
+                    after_j < 1.05 * before_j,
+                    "joint {joint}, {soft} N m s/rad: {after_j} J of {before_j} J after {cycle} ms"
+                );
+            }
+            assert!(
+                energy_j(&plant) < 0.8 * before_j,
+                "joint {joint}, {soft} N m s/rad"
+            );
+        }
+    }
 }

@@ -1,0 +1,108 @@
+//! Damping at the joints that the delay of the loop allows in a pose: of the move mode, and of the soft stops.
+//!
+//! With a delayed velocity, damping `D` of joints with mass matrix `H` is stable while the greatest eigenvalue of
+//! `H^-1 D` times the delay stays below `pi/2`. A joint whose axis the arm lies along has little inertia: there its
+//! gains are reduced, stiffness and damping by the same share, so that its loop keeps its shape in time scaled by
+//! that share. The eigenvalues of `S D^1/2 H^-1 D^1/2`, with the diagonal `S` of the shares, are at most its
+//! greatest row sum (Gershgorin).
+
+use super::Controller;
+use super::activity::Activity;
+use super::checks::{SoftStop, soft_zone_depths};
+use super::state::State;
+use crate::config::{Config, JointGains, Role};
+use crate::math::linalg::Cholesky;
+use crate::math::{Matrix, Vector, abs, sqrt};
+
+/// Greatest eigenvalue of `H^-1 D` times the delay: three quarters of the stability limit.
+pub const JOINT_DAMPING_MARGIN: f64 = 0.75 * core::f64::consts::FRAC_PI_2;
+
+impl<const N: usize> Controller<N> {
+    /// Share of each joint's damping \[N m s/rad\] that the delay of the loop allows with this mass matrix \[kg m^2\]:
+    /// above 0, at most 1.
+    #[inline(never)]
+    pub fn allowed_damping_share(
+        &self,
+        mass_matrix: &Matrix<N, N>,
+        damping_nm_s_per_rad: &Vector<N>,
+    ) -> Vector<N> {
+        let Some(mass) = Cholesky::new(mass_matrix) else {
+            return Vector::repeat(1.0);
+        };
+        let inverse = mass.solve(&Matrix::<N, N>::identity());
+        let root = damping_nm_s_per_rad.map(sqrt);
+        Vector::from_fn(|joint, _| {
+            let mut sum = 0.0;
+            for other in 0..N {
+                sum += abs(inverse[(joint, other)]) * root[other];
+            }
+            let rate_times_delay = root[joint] * sum * self.delay_s;
+            if rate_times_delay > JOINT_DAMPING_MARGIN {
+                JOINT_DAMPING_MARGIN / rate_times_delay
+            } else {
+                1.0
+            }
+        })
+    }
+
+    /// Gains of the move mode with this mass matrix \[kg m^2\]: those of the configuration, less where the delay of the
+    /// loop does not allow them.
+    pub fn move_gains(&self, mass_matrix: &Matrix<N, N>) -> JointGains<N> {
+        let gains = &self.config.move_gains;
+        let share = self.allowed_damping_share(mass_matrix, &gains.damping_nm_s_per_rad);
+        JointGains {
+            stiffness_nm_per_rad: gains.stiffness_nm_per_rad.component_mul(&share),
+            damping_nm_s_per_rad: gains.damping_nm_s_per_rad.component_mul(&share),
+        }
+    }
+}
+
+impl<const N: usize> State<N> {
+    /// Soft stops in this pose: those of the configuration, less where the delay does not allow their damping together
+    /// with that of the joint's own loop. `None` outside all soft zones, the common case.
+    #[inline(always)]
+    pub(super) fn soft_stops(&self, controller: &Controller<N>) -> Option<SoftStop<N>> {
+        let depth = soft_zone_depths(&controller.config().limits, &self.position)?;
+        Some(self.allowed_soft_stops(controller, &depth))
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn allowed_soft_stops(&self, controller: &Controller<N>, depth: &Vector<N>) -> SoftStop<N> {
+        let config = controller.config();
+        let mut stop = SoftStop::new(&config.limits, depth);
+        let of_loops = self.loop_damping_nm_s_per_rad(controller);
+        let together = of_loops + stop.damping_nm_s_per_rad;
+        let share = controller.allowed_damping_share(&self.terms.mass_matrix, &together);
+        for joint in 0..N {
+            stop.spring_nm[joint] *= share[joint];
+            stop.damping_nm_s_per_rad[joint] =
+                (share[joint] * together[joint] - of_loops[joint]).max(0.0);
+        }
+        stop
+    }
+
+    /// Damping of the joints' own loops in this mode and pose.
+    fn loop_damping_nm_s_per_rad(&self, controller: &Controller<N>) -> Vector<N> {
+        let config: &Config<N> = controller.config();
+        if self.holds_pose() || self.activity.has_joint_loops() {
+            return controller
+                .move_gains(&self.terms.mass_matrix)
+                .damping_nm_s_per_rad;
+        }
+        Vector::from_fn(|joint, _| match (&config.roles[joint], &self.activity) {
+            (
+                Role::Held {
+                    damping_nm_s_per_rad,
+                    ..
+                },
+                _,
+            ) => *damping_nm_s_per_rad,
+            (Role::Active, Activity::JointImpedance { .. }) => {
+                self.joint_gains.current().damping_nm_s_per_rad[joint]
+            }
+            (Role::Active, Activity::GravityHold) => config.hold_damping_nm_s_per_rad[joint],
+            (Role::Active, _) => 0.0,
+        })
+    }
+}
