@@ -1,6 +1,7 @@
 //! Converts a description, whose number of joints is dynamic, to the types of the core.
 
 use crate::bounds::first_out_of_range;
+use crate::delayed_damping::first_beyond_delay;
 use crate::description::Description;
 use crate::error::{ModelError, Reporter};
 use crate::settings::FrictionVelocity;
@@ -192,8 +193,9 @@ impl Description {
             },
             workspace: self.workspace()?,
         };
-        Controller::new(config).map_err(|error| self.rejected(&error))?;
-        if let Some(error) = first_out_of_range(&config) {
+        let controller = Controller::new(config).map_err(|error| self.rejected(&error))?;
+        let invalid = first_out_of_range(&config).or_else(|| first_beyond_delay(&controller));
+        if let Some(error) = invalid {
             return Err(self.rejected(&error));
         }
         Ok(config)

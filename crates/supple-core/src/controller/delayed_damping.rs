@@ -15,7 +15,7 @@ use crate::math::linalg::Cholesky;
 use crate::math::{Matrix, Vector, abs, sqrt};
 
 /// Greatest eigenvalue of `H^-1 D` times the delay: three quarters of the stability limit.
-pub const JOINT_DAMPING_MARGIN: f64 = 0.75 * core::f64::consts::FRAC_PI_2;
+const JOINT_DAMPING_MARGIN: f64 = 0.75 * core::f64::consts::FRAC_PI_2;
 
 impl<const N: usize> Controller<N> {
     /// Share of each joint's damping \[N m s/rad\] that the delay of the loop allows with this mass matrix \[kg m^2\]:

@@ -7,8 +7,9 @@
 //! inertia is left out of `H`: the loop stays stable if the rotor is that much lighter.
 
 use super::derived::rounded;
-use super::inertia::{POSES, max_inertia_kg_m2, pose_rad};
+use super::inertia::{POSES, max_inertia_kg_m2};
 use super::write::Writer;
+use crate::poses::pose_rad;
 use supple_core::dynamics::{crba, gravity};
 use supple_core::nalgebra::SymmetricEigen;
 use supple_core::{Config, Controller, Matrix, Vector};

@@ -1,0 +1,111 @@
+//! Damping at the joints that the delay of the loop does not allow in some pose.
+//!
+//! With a delayed velocity, damping `D` of joints with mass matrix `H` is stable while the greatest eigenvalue of
+//! `H^-1 D` times the delay stays below `pi/2`. The core reduces the gains of moves and of soft stops by pose; those of
+//! gravity hold and of held joints it applies as they are.
+
+use crate::poses::pose_rad;
+use core::f64::consts::FRAC_PI_2;
+use nalgebra::{DMatrix, SymmetricEigen};
+use supple_core::config::Role;
+use supple_core::controller::ConfigError;
+use supple_core::dynamics::crba;
+use supple_core::{Config, Controller, Matrix, Vector};
+
+/// Number of poses.
+const POSES: u32 = 100;
+const MUST: &str = "less: with the delay of this loop it shakes the joint in poses where the arm has little inertia";
+
+/// The first entry that is too large in one of the poses, with its joint.
+pub(crate) fn first_beyond_delay<const N: usize>(
+    controller: &Controller<N>,
+) -> Option<ConfigError> {
+    let rates = rates_times_delay(controller);
+    rates
+        .into_iter()
+        .find(|(_, rate_times_delay)| *rate_times_delay > FRAC_PI_2)
+        .map(|(error, _)| error)
+}
+
+/// The largest damping rate times delay over the poses, of gravity hold and of the held joints: each with the joint that
+/// moves most in it.
+fn rates_times_delay<const N: usize>(controller: &Controller<N>) -> [(ConfigError, f64); 2] {
+    let config = controller.config();
+    let held = Vector::<N>::from_fn(|joint, _| match config.roles[joint] {
+        Role::Active => 0.0,
+        Role::Held {
+            damping_nm_s_per_rad,
+            ..
+        } => damping_nm_s_per_rad,
+    });
+    let entries = [
+        (
+            "hold_damping_nm_s_per_rad",
+            config.hold_damping_nm_s_per_rad,
+        ),
+        ("held damping_nm_s_per_rad", held),
+    ];
+    entries.map(|(entry, damping)| {
+        let mut largest = (0, 0.0);
+        for number in 0..POSES {
+            let Some((joint, rate_per_s)) = fastest(config, &damping, number) else {
+                continue;
+            };
+            if rate_per_s > largest.1 {
+                largest = (joint, rate_per_s);
+            }
+        }
+        let (joint, rate_per_s) = largest;
+        let error = ConfigError {
+            entry,
+            joint: Some(joint),
+            value: damping[joint],
+            must: MUST,
+        };
+        (error, rate_per_s * controller.delay_s())
+    })
+}
+
+/// The joint that moves most in the motion that this damping slows fastest in a pose, and the rate \[1/s\].
+fn fastest<const N: usize>(
+    config: &Config<N>,
+    damping: &Vector<N>,
+    number: u32,
+) -> Option<(usize, f64)> {
+    let inverse = crba(&config.arm, &pose_rad(config, number)).try_inverse()?;
+    let root = damping.map(f64::sqrt);
+    let rates = Matrix::<N, N>::from_fn(|i, j| root[i] * inverse[(i, j)] * root[j]);
+    // As a matrix of variable size: its eigenvalues are found for any number of joints.
+    let rates = DMatrix::from_column_slice(N, N, rates.as_slice());
+    let eigen = SymmetricEigen::new(rates);
+    let (motion, rate_per_s) = eigen.eigenvalues.argmax();
+    Some((eigen.eigenvectors.column(motion).iamax(), rate_per_s))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Description;
+
+    /// The built-in arms keep three quarters of the limit.
+    #[test]
+    fn built_in_arms_keep_a_margin() {
+        fn margin<const N: usize>(name: &str) {
+            let config = Description::asset(name).and_then(|arm| arm.config::<N>());
+            let controller = Controller::new(config.expect(name)).expect(name);
+            for (error, rate_times_delay) in rates_times_delay(&controller) {
+                let allowed = 0.75 * FRAC_PI_2;
+                assert!(
+                    rate_times_delay < allowed,
+                    "{name}: {error}: {rate_times_delay}"
+                );
+            }
+        }
+        margin::<3>("wam3");
+        margin::<4>("wam4");
+        margin::<7>("wam7");
+        margin::<3>("paper3");
+        margin::<7>("openarm");
+        margin::<6>("yam");
+    }
+}
