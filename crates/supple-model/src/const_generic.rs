@@ -95,8 +95,20 @@ impl Description {
     ///
     /// # Errors
     /// [`ModelError::JointCount`] if the arm does not have `N` moving joints; [`ModelError::Invalid`] for values that
-    /// [`supple_core::Controller::new`] rejects, such as fewer than three joints that the law controls.
+    /// [`supple_core::Controller::new`] rejects, such as fewer than three joints that the law controls, and for damping of
+    /// gravity hold or of held joints that the delay of the loop does not allow in every pose.
     pub fn config<const N: usize>(&self) -> Result<Config<N>, ModelError> {
+        let config = self.config_for_any_delay()?;
+        let controller = Controller::new(config).map_err(|error| self.rejected(&error))?;
+        match first_beyond_delay(&controller) {
+            Some(error) => Err(self.rejected(&error)),
+            None => Ok(config),
+        }
+    }
+
+    /// As [`Description::config`], without the check of the damping against the delay of the loop: while gains are being
+    /// derived, those that are not yet there have values that suit no arm.
+    pub(crate) fn config_for_any_delay<const N: usize>(&self) -> Result<Config<N>, ModelError> {
         let arm = self.arm::<N>()?;
         let settings = &self.settings;
         let gain = |of: fn(&crate::settings::JointSettings) -> f64| {
@@ -193,9 +205,8 @@ impl Description {
             },
             workspace: self.workspace()?,
         };
-        let controller = Controller::new(config).map_err(|error| self.rejected(&error))?;
-        let invalid = first_out_of_range(&config).or_else(|| first_beyond_delay(&controller));
-        if let Some(error) = invalid {
+        Controller::new(config).map_err(|error| self.rejected(&error))?;
+        if let Some(error) = first_out_of_range(&config) {
             return Err(self.rejected(&error));
         }
         Ok(config)

@@ -71,7 +71,7 @@ impl Description {
 
     fn reaches_paths<const N: usize>(&self) -> Result<bool, ModelError> {
         let (trajectory, duration_s) = self.paths().sinusoid(1.0);
-        let config = self.config::<N>()?;
+        let config = self.config_for_any_delay::<N>()?;
         Ok(reach::start_pose(&config, &trajectory, duration_s).is_ok())
     }
 }
@@ -92,17 +92,17 @@ fn complete<const N: usize>(given: &Description) -> Result<Completed, ModelError
             let why = "no controller here moves it, or it does not carry the tip";
             writer.set("fixed_joints_rad", joint, *position, why);
         }
-        inertia::add(&mut writer, &description.config::<N>()?);
+        inertia::add(&mut writer, &description.config_for_any_delay::<N>()?);
         description = writer.read(&description)?;
     }
     let placed = Placed::<N>::find(&description, !writer.has_given_joints())?;
     placed.add(&mut writer);
     if !is_complete {
-        let gains = gains::Gains::of(&description.config::<N>()?);
+        let gains = gains::Gains::of(&description.config_for_any_delay::<N>()?);
         placed.hold(&mut writer, &gains);
         gains.add(&mut writer);
         description = writer.read(&description)?;
-        let config = description.config::<N>()?;
+        let config = description.config_for_any_delay::<N>()?;
         thresholds::add_damping(&mut writer, &config, &description.home::<N>()?);
         thresholds::add(&mut writer, &config, &description);
     }

@@ -229,8 +229,15 @@ fn a_held_joint_has_its_role_if_three_others_remain() {
     let toml = with(TOML, "tip_frame = \"tip\"", "tip_frame = \"finger\"");
     let toml = with(&toml, "home_rad = [0.0, 0.5, 0.2]\n", "");
     let toml = with(&toml, "finger_joint = 0.3\n", "");
+    // The finger and its part of the elbow's motion are light.
+    let toml = with(
+        &toml,
+        "damping_nm_s_per_rad = 3.0 }",
+        "damping_nm_s_per_rad = 0.03 }",
+    );
     let (start, end) = (toml.find("[motors]").unwrap(), toml.find("[tool]").unwrap());
-    let toml = format!("{}{}", &toml[..start], &toml[end..]);
+    let finger = "[[joints]]\nname = \"finger_joint\"\nhold_damping_nm_s_per_rad = 0.001\n";
+    let toml = format!("{}{finger}{}", &toml[..start], &toml[end..]);
     let config = Description::from_text(&toml, URDF)
         .unwrap()
         .config::<4>()
@@ -238,7 +245,7 @@ fn a_held_joint_has_its_role_if_three_others_remain() {
     let held = Role::Held {
         position_rad: 0.2,
         stiffness_nm_per_rad: 100.0,
-        damping_nm_s_per_rad: 3.0,
+        damping_nm_s_per_rad: 0.03,
     };
     assert_eq!(
         config.roles,
@@ -359,4 +366,39 @@ fn extensions_and_decoration_are_accepted() {
         decorated.parts::<3>().unwrap(),
         small().parts::<3>().unwrap()
     );
+}
+
+/// With the delay of the loop, this damping shakes the finger, whose inertia is small.
+#[test]
+fn damping_that_the_delay_forbids_is_refused_by_joint() {
+    let toml = with(&free(), "tip_frame = \"tip\"", "tip_frame = \"finger\"");
+    let toml = with(&toml, "home_rad = [0.0, 0.5, 0.2]\n", "");
+    let toml = with(&toml, "finger_joint = 0.3\n", "");
+    let (start, end) = (toml.find("[motors]").unwrap(), toml.find("[tool]").unwrap());
+    let refusal = |entry: &str| {
+        let finger = format!("[[joints]]\nname = \"finger_joint\"\n{entry}\n");
+        let toml = format!("{}{finger}{}", &toml[..start], &toml[end..]);
+        let description = Description::from_text(&toml, URDF).unwrap();
+        description
+            .config::<4>()
+            .err()
+            .map(|error| error.to_string())
+    };
+    let soft = "hold_damping_nm_s_per_rad = 0.001";
+    assert_eq!(refusal(soft), None);
+    let hold = refusal("hold_damping_nm_s_per_rad = 1.0").unwrap();
+    assert!(
+        hold.contains("hold_damping_nm_s_per_rad of joint `finger_joint`"),
+        "{hold}"
+    );
+    let held =
+        "held = { position_rad = 0.2, stiffness_nm_per_rad = 1.0, damping_nm_s_per_rad = 1.0 }";
+    let held = refusal(&format!("{soft}\n{held}")).unwrap();
+    assert!(
+        held.contains("held damping_nm_s_per_rad of joint `finger_joint`"),
+        "{held}"
+    );
+    for refused in [hold, held] {
+        assert!(refused.contains("delay"), "{refused}");
+    }
 }

@@ -162,10 +162,11 @@ fn wall_clock_cases(plant: PlantKind) -> Vec<Spec> {
                 let expected = match (*name, loss) {
                     // `supple up` only supervises; stopping it does not affect the arm.
                     (UP, ProcessFailure::Stop) => Expected::KeepsRunning,
-                    // The emulated arm is gone, with its motors.
-                    ("supple-emu", ProcessFailure::Terminate) => *expected,
-                    // The processes that `supple up` starts ignore the interrupt of a terminal.
-                    (name, ProcessFailure::Interrupt) if name != UP => Expected::KeepsRunning,
+                    // The arm is gone, with its motors.
+                    (
+                        "supple-emu" | "supple-sim",
+                        ProcessFailure::Terminate | ProcessFailure::Interrupt,
+                    ) => *expected,
                     // Who is asked to end sets the drives to idle first.
                     (_, ProcessFailure::Terminate | ProcessFailure::Interrupt) => {
                         brakes(CONTROLLER_EXIT_MS)

@@ -234,9 +234,8 @@ fn lose_process<const N: usize>(
     let back = Instant::now();
     if let Event::Process { name, loss } = spec.event {
         match loss {
-            ProcessFailure::Kill | ProcessFailure::Terminate => system.restart(name)?,
             ProcessFailure::Stop => system.signal(name, Signal::CONT)?,
-            ProcessFailure::Interrupt => {}
+            _ => system.restart(name)?,
         }
     }
     if result.recovery_expected {

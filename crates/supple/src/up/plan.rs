@@ -193,6 +193,9 @@ impl UpArgs {
         if let Some(prefix) = &self.prefix {
             arguments.extend(["--prefix".to_owned(), prefix.clone()]);
         }
+        if let Some(rate_hz) = self.rate_hz {
+            arguments.extend(["--rate-hz".to_owned(), rate_hz.to_string()]);
+        }
         arguments.extend(self.simulation_arguments());
         for misbehaviour in &self.misbehave {
             arguments.extend(["--misbehave".to_owned(), misbehaviour.clone()]);
