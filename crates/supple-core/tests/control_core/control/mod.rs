@@ -24,6 +24,7 @@ mod observing;
 mod posing;
 mod protecting;
 mod refusals;
+mod reversed_encoder;
 mod set_points;
 mod settings;
 mod stiffness;
