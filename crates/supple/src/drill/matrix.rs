@@ -1,7 +1,8 @@
 //! All test cases with their expected results. The expectations were written before the first run.
 
 use super::spec::{
-    Activation, DriveShutdown, Event, Expected, InvalidRequest, ProcessFailure, Spec, TestTask, UP,
+    Activation, DriveShutdown, Event, Expected, Hindrance, InvalidRequest, ProcessFailure, Spec,
+    TestTask, UP,
 };
 use crate::cli::PlantKind;
 use crate::up::CONTROLLER;
@@ -178,7 +179,13 @@ fn wall_clock_cases(plant: PlantKind) -> Vec<Spec> {
         }
     }
     for task in ALL_TASKS.into_iter().chain([TestTask::TrackPose]) {
-        cases.push(row(task, Event::RequestQueueFull, Expected::IdleAccepted));
+        let waiting = Event::Hindered(Hindrance::RequestsWait);
+        cases.push(row(task, waiting, Expected::IdleAccepted));
+    }
+    for task in [TestTask::GravityHold, TestTask::Move, TestTask::Track] {
+        for full in [Hindrance::LogDiskFull, Hindrance::StandardErrorFull] {
+            cases.push(row(task, Event::Hindered(full), Expected::IdleAccepted));
+        }
     }
     cases
 }

@@ -3,7 +3,7 @@
 //!
 //! | event | test method |
 //! |---|---|
-//! | a process is killed or stopped; the request queue is full | in wall-clock time ([`perform`]), above a block |
+//! | a process is killed or stopped; request queue, disk or standard error is full | in wall-clock time ([`perform`]), above a block |
 //! | everything else | in virtual time ([`lockstep`]): runs are bit-identical and faster than real time |
 //!
 //! Measurements come from the plant process, which keeps running when the controller fails.
@@ -14,6 +14,7 @@
 //! (`supple-plant/tests/plant/braking.rs`).
 
 mod evaluation;
+mod hindrance;
 mod lockstep;
 mod matrix;
 mod metrics;
@@ -24,6 +25,7 @@ mod spec;
 mod task;
 mod test_arms;
 mod trace;
+mod up_process;
 
 use test_arms::{TestArm, TestArms};
 

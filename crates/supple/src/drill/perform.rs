@@ -1,23 +1,22 @@
 //! Runs a test case in wall-clock time, from normal operation through the failure to recovery.
 
+use super::hindrance::{FullOutput, idle_after, idle_past_a_full_queue};
 use super::row::{ProcessTestResult, Row};
-use super::spec::{Event, ProcessFailure, Spec, TestTask, UP};
+use super::spec::{Event, Hindrance, ProcessFailure, Spec, TestTask, UP};
 use super::task;
 use super::test_arms::TestArm;
 use super::trace::TraceAfterLoss;
+use super::up_process::Up;
 use crate::cli::{DrillArgs, PlantKind, UpArgs, UpTrajectory};
 use crate::operate::OperatorSession;
 use crate::up::System;
 use core::time::Duration;
-use rustix::process::{Pid, Signal, kill_process};
-use std::fs::File;
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use rustix::process::Signal;
+use std::path::PathBuf;
 use std::time::Instant;
 use supple_cli::arguments::{PlantArgs, UrdfArgs};
 use supple_cli::console::print_status;
 use supple_cli::exit::Failure;
-use supple_core::config::Gains;
 use supple_core::controller::{Mode, Request};
 use supple_ipc::message::{Drives, Telemetry};
 use supple_ipc::{Domain, TelemetryReader};
@@ -38,10 +37,6 @@ const ATTEMPTS: u32 = 3;
 const REST_TIMEOUT: Duration = Duration::from_millis(200);
 /// Cap radius of an arm without a tool \[m\].
 const CAP_M: f64 = 0.02;
-/// Number of queued requests that fills the request queue.
-const QUEUE_CAPACITY: u64 = 16;
-/// Distance of the cycles of those requests from the current cycle.
-const FAR_FUTURE_CYCLES: u64 = 1_000_000_000;
 /// Time of the move to the start of an excitation \[s\].
 const MOVE_TO_START_S: f64 = 1.0;
 /// The same to the start of the pose task, which is farther away \[s\].
@@ -99,6 +94,9 @@ pub fn perform<const N: usize>(
     };
     let lose = || match spec.event {
         Event::Process { name: UP, .. } => lose_up_process::<N>(spec, &up, description, &domain),
+        Event::Hindered(full @ (Hindrance::LogDiskFull | Hindrance::StandardErrorFull)) => {
+            hinder_up::<N>(spec, full, &up, description, &domain)
+        }
         _ => lose_process::<N>(spec, &up, description, &domain),
     };
     let mut lost = lose();
@@ -121,7 +119,7 @@ pub fn perform<const N: usize>(
 
 /// Whether the lost process is restarted: only if the arm was tracking.
 fn should_recover(spec: &Spec) -> bool {
-    spec.task == TestTask::Track && !matches!(spec.event, Event::RequestQueueFull)
+    spec.task == TestTask::Track && !matches!(spec.event, Event::Hindered(_))
 }
 
 fn observation_time(spec: &Spec) -> Duration {
@@ -207,8 +205,10 @@ fn lose_process<const N: usize>(
     let mut idle_after_ms = None;
     match spec.event {
         Event::Process { name, loss } => system.signal(name, signal(loss))?,
-        Event::RequestQueueFull => {
-            idle_after_ms = Some(idle_past_a_full_queue::<N>(&mut system, domain)?)
+        Event::Hindered(Hindrance::RequestsWait) => {
+            idle_after_ms = Some(idle_past_a_full_queue::<N>(domain, || {
+                system.poll_telemetry()
+            })?);
         }
         _ => {}
     }
@@ -253,34 +253,6 @@ fn signal(loss: ProcessFailure) -> Signal {
         ProcessFailure::Stop => Signal::STOP,
         ProcessFailure::Terminate => Signal::TERM,
         ProcessFailure::Interrupt => Signal::INT,
-    }
-}
-
-/// Time from an idle request to its reply while the request queue is full \[ms\], or the reason of a refusal.
-fn idle_past_a_full_queue<const N: usize>(
-    system: &mut System<'_, N>,
-    domain: &Domain,
-) -> Result<Result<f64, String>, Failure> {
-    let cycle = poll_until(|| system.poll_telemetry(), TIMEOUT, |_| true)?
-        .ok_or(Failure::DidNotReachTracking)?;
-    let far = cycle.state.cycle + FAR_FUTURE_CYCLES;
-    // One operator may fill at most half of the queue.
-    let mut others = [
-        OperatorSession::<N>::new(domain)?,
-        OperatorSession::<N>::new(domain)?,
-    ];
-    let gains = Request::Gains {
-        gains: Gains::isotropic(5.0, 1.5),
-        ramp_s: 1.0,
-    };
-    for request in 0..QUEUE_CAPACITY {
-        others[request as usize % 2].queue(&gains, far + request)?;
-    }
-    let begin = Instant::now();
-    match OperatorSession::<N>::new(domain)?.send_request(&Request::Idle, None) {
-        Ok(_) => Ok(Ok(begin.elapsed().as_secs_f64() * 1e3)),
-        Err(Failure::Refused { reason }) => Ok(Err(reason)),
-        Err(failure) => Err(failure),
     }
 }
 
@@ -353,51 +325,6 @@ fn comes_to_rest<const N: usize>(system: &mut System<'_, N>) -> Result<bool, Fai
     Ok(poll_until(|| system.poll_telemetry(), REST_TIMEOUT, comes_to_rest)?.is_some())
 }
 
-/// `supple up` as a child process.
-pub struct Up(Child);
-
-impl Up {
-    /// Starts it; `reports` takes what it and its processes write on standard error.
-    ///
-    /// # Errors
-    /// [`Failure::File`].
-    pub fn start(up: &UpArgs, reports: Option<File>) -> Result<Up, Failure> {
-        let this = std::env::current_exe()
-            .map_err(|error| Failure::file("find", Path::new("this program"), error))?;
-        let child = Command::new(&this)
-            .args(up.to_arguments())
-            .stdin(Stdio::null())
-            .stdout(Stdio::null())
-            .stderr(reports.map_or(Stdio::inherit(), Stdio::from))
-            .spawn();
-        child
-            .map(Up)
-            .map_err(|error| Failure::file("start", &this, error))
-    }
-
-    fn signal(&self, signal: Signal) {
-        if let Some(pid) = i32::try_from(self.0.id()).ok().and_then(Pid::from_raw) {
-            // Ignore errors: the process may have exited already.
-            let _ = kill_process(pid, signal);
-        }
-    }
-
-    /// Terminates the process and waits for it.
-    fn end(mut self) {
-        self.signal(Signal::CONT);
-        self.signal(Signal::TERM);
-        let _ = self.0.wait();
-    }
-}
-
-impl Drop for Up {
-    fn drop(&mut self) {
-        // The processes that it started terminate with it.
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
 fn lose_up_process<const N: usize>(
     spec: &Spec,
     up: &UpArgs,
@@ -461,4 +388,36 @@ fn next_telemetry(reader: &mut TelemetryReader) -> Result<Option<Telemetry>, Fai
     reader
         .wait(Duration::from_millis(20))
         .map_err(Failure::system)
+}
+
+/// Starts `supple up` whose output of this kind becomes full, and asks for idle.
+fn hinder_up<const N: usize>(
+    spec: &Spec,
+    full: Hindrance,
+    up: &UpArgs,
+    description: &Description,
+    domain: &Domain,
+) -> Result<(u64, ProcessTestResult), Failure> {
+    let mut reader = TelemetryReader::new(domain).map_err(Failure::system)?;
+    let output = FullOutput::new(full, domain)?;
+    let running = output.start(up)?;
+    start_task::<N>(spec, description, domain, || next_telemetry(&mut reader))?;
+    output.fill(&running)?;
+    let begin_ns = monotonic_ns();
+    let result = ProcessTestResult {
+        idle_after_ms: Some(idle_after::<N>(domain)?),
+        ..ProcessTestResult::default()
+    };
+    // The system goes on: its telemetry has the idle mode.
+    let idle = poll_until(
+        || next_telemetry(&mut reader),
+        OBSERVED[1],
+        |t| t.record().mode() == Some(Mode::Idle),
+    )?;
+    running.end();
+    output.remove();
+    match idle {
+        Some(_) => Ok((begin_ns, result)),
+        None => Err(Failure::DidNotReachTracking),
+    }
 }

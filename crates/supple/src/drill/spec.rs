@@ -74,6 +74,17 @@ pub enum InvalidRequest {
     WhileIdle,
 }
 
+/// What must not keep an operator from being heard.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Hindrance {
+    /// Sixteen requests fill the queue.
+    RequestsWait,
+    /// The disk of the log is full.
+    LogDiskFull,
+    /// Nobody reads standard error, and it is full.
+    StandardErrorFull,
+}
+
 /// Event of the test case.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event {
@@ -89,8 +100,8 @@ pub enum Event {
         /// How the process fails.
         loss: ProcessFailure,
     },
-    /// Idle is requested while sixteen requests fill the queue; in wall-clock time.
-    RequestQueueFull,
+    /// Idle is requested in spite of a hindrance; in wall-clock time.
+    Hindered(Hindrance),
     /// A fault in the arm, during the task or, with `at_once`, from the start.
     Injected {
         /// The injected fault.
@@ -154,7 +165,7 @@ impl Spec {
     pub fn runs_in_wall_clock_time(&self) -> bool {
         matches!(
             self.event,
-            Event::Nothing { wall: true } | Event::Process { .. } | Event::RequestQueueFull
+            Event::Nothing { wall: true } | Event::Process { .. } | Event::Hindered(_)
         )
     }
 
@@ -195,7 +206,11 @@ impl fmt::Display for Event {
                 };
                 write!(f, "{how}-{name}")
             }
-            Event::RequestQueueFull => f.write_str("sixteen-requests-wait"),
+            Event::Hindered(hindrance) => f.write_str(match hindrance {
+                Hindrance::RequestsWait => "sixteen-requests-wait",
+                Hindrance::LogDiskFull => "log-disk-full",
+                Hindrance::StandardErrorFull => "standard-error-full",
+            }),
             Event::Injected { kind, at_once } => {
                 let injection = supple_plant::Injection {
                     kind: *kind,

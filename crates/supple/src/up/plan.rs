@@ -171,9 +171,9 @@ impl UpArgs {
         }
     }
 
-    /// Command-line arguments that start the same system without a log.
+    /// Command-line arguments that start the same system.
     pub fn to_arguments(&self) -> Vec<String> {
-        let mut arguments = vec!["up", "--no-log", "--json", "--arm", &self.arm, "--plant"];
+        let mut arguments = vec!["up", "--json", "--arm", &self.arm, "--plant"];
         arguments.push(match self.plant {
             PlantKind::Sim => "sim",
             PlantKind::Emu => "emu",
@@ -190,6 +190,10 @@ impl UpArgs {
         arguments.extend(self.strict.then_some("--strict"));
         arguments.extend(self.learn.then_some("--learn"));
         let mut arguments: Vec<String> = arguments.into_iter().map(str::to_owned).collect();
+        match self.log_file() {
+            Some(file) => arguments.extend(["--log".to_owned(), file.display().to_string()]),
+            None => arguments.push("--no-log".to_owned()),
+        }
         if let Some(prefix) = &self.prefix {
             arguments.extend(["--prefix".to_owned(), prefix.clone()]);
         }

@@ -50,7 +50,10 @@ fn the_arm_comes_to_rest() {
     for joint in [0, 1, 3] {
         let cycles = reversed(joint);
         let since = cycles.last().and_then(|(_, _, since)| *since);
-        assert!(since.is_some_and(|since| since > 2 * SLOW_AFTER), "no fault");
+        assert!(
+            since.is_some_and(|since| since > 2 * SLOW_AFTER),
+            "no fault"
+        );
         for (output, tip_m_per_s, since) in cycles {
             let slow = tip_m_per_s < SLOW_M_PER_S;
             assert!(

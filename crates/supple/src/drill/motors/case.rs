@@ -146,7 +146,7 @@ impl fmt::Display for Expected {
                 }
                 write!(
                     f,
-                    "a fault within {within_ms:.0} ms: {}; then held or laid down",
+                    "a fault within {within_ms:.0} ms: {}; then laid down, or damped if a joint is too fast",
                     names.join(" or ")
                 )
             }
