@@ -2,7 +2,8 @@
 //!
 //! With a delayed velocity, damping `D` of joints with mass matrix `H` is stable while the greatest eigenvalue of
 //! `H^-1 D` times the delay stays below `pi/2`. The core reduces the gains of moves and of soft stops by pose; those of
-//! gravity hold and of held joints it applies as they are.
+//! gravity hold and of held joints it applies as they are: those of gravity hold in any pose, those of held joints with these
+//! at their angles.
 
 use crate::poses::pose_rad;
 use core::f64::consts::FRAC_PI_2;
@@ -42,13 +43,20 @@ fn rates_times_delay<const N: usize>(controller: &Controller<N>) -> [(ConfigErro
         (
             "hold_damping_nm_s_per_rad",
             config.hold_damping_nm_s_per_rad,
+            false,
         ),
-        ("held damping_nm_s_per_rad", held),
+        ("held damping_nm_s_per_rad", held, true),
     ];
-    entries.map(|(entry, damping)| {
+    entries.map(|(entry, damping, in_place)| {
         let mut largest = (0, 0.0);
         for number in 0..POSES {
-            let Some((joint, rate_per_s)) = fastest(config, &damping, number) else {
+            let mut pose = pose_rad(config, number);
+            for (joint, role) in config.roles.iter().enumerate() {
+                if let (Role::Held { position_rad, .. }, true) = (role, in_place) {
+                    pose[joint] = *position_rad;
+                }
+            }
+            let Some((joint, rate_per_s)) = fastest(config, &damping, &pose) else {
                 continue;
             };
             if rate_per_s > largest.1 {
@@ -70,9 +78,9 @@ fn rates_times_delay<const N: usize>(controller: &Controller<N>) -> [(ConfigErro
 fn fastest<const N: usize>(
     config: &Config<N>,
     damping: &Vector<N>,
-    number: u32,
+    pose_rad: &Vector<N>,
 ) -> Option<(usize, f64)> {
-    let inverse = crba(&config.arm, &pose_rad(config, number)).try_inverse()?;
+    let inverse = crba(&config.arm, pose_rad).try_inverse()?;
     let root = damping.map(f64::sqrt);
     let rates = Matrix::<N, N>::from_fn(|i, j| root[i] * inverse[(i, j)] * root[j]);
     // As a matrix of variable size: its eigenvalues are found for any number of joints.
