@@ -17,7 +17,7 @@ pub const MAX_DELAY_S: f64 = 0.06;
 const STEPS_S: [f64; 3] = [0.012, 0.004, 0.001];
 /// Number of parts of the log.
 const PARTS: usize = 4;
-/// Gain of the score below which the log does not tell a delay from none.
+/// Gain of the score below which the log does not distinguish a delay from none.
 const MIN_GAIN: f64 = 1e-3;
 
 /// Estimated delay of a log's torques after its angles.

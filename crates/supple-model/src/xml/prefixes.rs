@@ -55,7 +55,7 @@ mod tests {
         assert!(attribute.contains("xmlns:drake"), "{attribute}");
         let plain = "<robot name=\"a\"><link name=\"b\"/></robot>".to_owned();
         assert_eq!(declare_prefixes(plain.clone()), plain);
-        // xacro stays an error that says what to do.
+        // xacro stays an error that states the remedy.
         let xacro = declare_prefixes("<robot><xacro:arm/></robot>".to_owned());
         assert!(xacro.contains("undeclared:xacro"));
     }
