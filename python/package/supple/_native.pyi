@@ -173,7 +173,7 @@ class Arm:
         """The arm with every setting that a controller needs.
 
         What its TOML leaves out is derived from the arm: estimates of rotor inertias, gains, damping, rates, thresholds,
-        home pose and the place of the paper's trajectories. If the TOML says nothing about single joints, the three that
+        home pose and the place of the paper's trajectories. If the TOML has no entry for single joints, the three that
         move the tip best are active and the others are held. :attr:`toml` gives each derived setting with its reason. What
         the TOML gives stays, so that a built-in arm is returned as it is, except for what it leaves out.
 
@@ -825,7 +825,7 @@ class Fit:
     def validate(self, log: dict[str, Any]) -> dict[str, Any]: ...
 
 def read_log(path: str) -> dict[str, Any]:
-    """Reads a log: the arm, what it says of itself, and its columns."""
+    """Reads a log: the arm, its metadata and its columns."""
 
 def plant_options(name: str) -> dict[str, float]:
     """The set of options `name` as a dictionary."""
