@@ -21,7 +21,7 @@ use supple_core::controller::{Mode, Request};
 use supple_core::math::Matrix3;
 use supple_core::{Config, Input, Output, Vector};
 use support::configs::{four, seven, seven_active, three};
-use support::random::{Draws, Random};
+use support::random::Random;
 
 /// Cycles after which the arm restarts in another pose.
 const EPISODE: u64 = 2_000;
