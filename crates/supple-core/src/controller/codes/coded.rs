@@ -1,6 +1,6 @@
 //! What requests carry, as numbers: each struct is listed once, for both directions.
 
-use super::request::{RequestCode, RequestCodeError};
+use super::values::{RequestCode, RequestCodeError, Rest};
 use crate::config::{Gains, JointGains, RotationalGains};
 use crate::controller::{Breakaway, LearningSwitch, SetPoint};
 use crate::math::Vector;
@@ -14,30 +14,6 @@ pub(super) trait Coded: Sized {
 
     /// Takes its numbers.
     fn take(from: &mut Rest<'_>) -> Result<Self, RequestCodeError>;
-}
-
-/// Values taken one after another; zero beyond the last, which the count then shows.
-pub(super) struct Rest<'a> {
-    pub values: &'a [f64],
-    pub taken: usize,
-    /// Number of the trajectory.
-    pub trajectory: u8,
-}
-
-impl Rest<'_> {
-    fn number(&mut self) -> f64 {
-        let number = self.values.get(self.taken).copied().unwrap_or(0.0);
-        self.taken += 1;
-        number
-    }
-
-    /// A value that older logs lack; zero without it.
-    fn number_if_present(&mut self) -> f64 {
-        match self.taken < self.values.len() {
-            true => self.number(),
-            false => 0.0,
-        }
-    }
 }
 
 /// Structs whose fields are sent in this order; the number after the semicolon is zero if a log lacks it.

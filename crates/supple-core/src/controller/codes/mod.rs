@@ -6,10 +6,12 @@
 mod coded;
 mod numbers;
 mod request;
+mod values;
 
 pub use crate::controller::mode::MODES;
 pub use numbers::Code;
-pub use request::{RequestCode, RequestCodeError, VALUES, request_kind, trajectory_kind};
+pub use request::{request_kind, trajectory_kind};
+pub use values::{RequestCode, RequestCodeError, VALUES};
 
 use crate::controller::{Fault, Mode, Refusal, SafeAction};
 use numbers::{number_table, numbered_variants};

@@ -26,14 +26,12 @@
 //! A probe of an older log has no `dwell_s`, a quadrant no `corner_ramp_s`: they are zero.
 //! Decoding rejects numbers that encode no request; whether a request is valid, the controller checks.
 
-use super::coded::{Coded, Rest};
+use super::coded::Coded;
 use super::numbers::{carried_variants, number_table};
+use super::values::{RequestCode, RequestCodeError, Rest};
 use crate::controller::Request;
 use crate::trajectory::Trajectory;
 use core::fmt;
-
-/// Most values that a request carries: those of an excitation of 7 joints.
-pub const VALUES: usize = 80;
 
 carried_variants! {
     /// Numbers of [`Request`](crate::controller::Request).
@@ -103,37 +101,6 @@ impl Coded for Trajectory {
     }
 }
 
-/// A request as numbers.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RequestCode {
-    /// One of [`request_kind`].
-    pub kind: u8,
-    /// Of a track or track-pose request one of [`trajectory_kind`], otherwise none.
-    pub trajectory: u8,
-    /// How many of `values` count.
-    pub count: u8,
-    /// What the request carries, see the module; zero beyond `count`.
-    pub values: [f64; VALUES],
-}
-
-/// Why numbers are no request.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum RequestCodeError {
-    /// No request has this number.
-    Kind(u8),
-    /// No trajectory has this number.
-    Trajectory(u8),
-    /// Too few or too many values.
-    Count {
-        /// Values found.
-        found: usize,
-        /// Values that the request takes.
-        expected: usize,
-    },
-    /// A number of strokes, of a joint, of a switch or of a cycle that is not whole or too great.
-    Whole(f64),
-}
-
 impl fmt::Display for RequestCodeError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -162,14 +129,6 @@ impl fmt::Display for RequestCodeError {
 impl core::error::Error for RequestCodeError {}
 
 impl RequestCode {
-    /// No request.
-    pub const NONE: RequestCode = RequestCode {
-        kind: 0,
-        trajectory: 0,
-        count: 0,
-        values: [0.0; VALUES],
-    };
-
     /// Of a request.
     pub fn new<const N: usize>(request: Option<&Request<N>>) -> RequestCode {
         let mut code = RequestCode::NONE;
@@ -177,35 +136,6 @@ impl RequestCode {
             code.kind = encode_request(request, &mut code);
         }
         code
-    }
-
-    /// From its parts, such as a log holds them.
-    ///
-    /// # Errors
-    /// More than [`VALUES`] values.
-    pub fn from_parts(
-        kind: u8,
-        trajectory: u8,
-        values: &[f64],
-    ) -> Result<RequestCode, RequestCodeError> {
-        let mut code = RequestCode {
-            kind,
-            trajectory,
-            ..RequestCode::NONE
-        };
-        if values.len() > VALUES {
-            return Err(RequestCodeError::Count {
-                found: values.len(),
-                expected: VALUES,
-            });
-        }
-        code.numbers(values);
-        Ok(code)
-    }
-
-    /// The values that count.
-    pub fn values(&self) -> &[f64] {
-        &self.values[..usize::from(self.count).min(VALUES)]
     }
 
     /// The request of these numbers.
@@ -228,12 +158,5 @@ impl RequestCode {
         } else {
             Err(RequestCodeError::Count { found, expected })
         }
-    }
-
-    /// Appends values.
-    pub(super) fn numbers(&mut self, numbers: &[f64]) {
-        let count = usize::from(self.count);
-        self.values[count..count + numbers.len()].copy_from_slice(numbers);
-        self.count += numbers.len() as u8;
     }
 }
