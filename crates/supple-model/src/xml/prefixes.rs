@@ -1,4 +1,4 @@
-//! Declares the XML prefixes that a URDF uses without declaring them, such as `drake:`. Readers that know no
+//! Declares the XML prefixes that a URDF uses without declaring them, such as `drake:`. Readers that resolve no
 //! namespaces accept such files. What has a prefix belongs to another program and is not read.
 
 use std::collections::BTreeSet;
