@@ -28,7 +28,7 @@ fn bench<const N: usize, T>(
         b.iter(|| {
             let mut state = turn.next().copied();
             if let Some(state) = &mut state {
-                // Too small to change the angle, but the compiler cannot know that.
+                // Too small to change the angle, but the compiler cannot infer that.
                 state.q[0] += before * 1e-200;
                 let result = function(state);
                 before = first(&result);

@@ -56,7 +56,7 @@ fn copy_of_the_tree(to: &Path) {
 }
 
 /// Gives the packages of the copy a version of their own, so that in the shared target folder none of them is taken for
-/// a package of this tree: cargo tells members of a workspace apart by their path within it, not by its folder.
+/// a package of this tree: cargo distinguishes members of a workspace by their path within it, not by its folder.
 fn set_version(tree: &Path) {
     const OURS: &str = "version = \"0.1.0\"";
     const COPY: &str = "version = \"0.1.0-copy\"";
@@ -137,7 +137,7 @@ fn a_scalar_and_a_term_are_two_edits_each() {
         assert_eq!((row[scalar], row[term]), ("0.5", "0.25"));
         rows += 1;
     }
-    // This version reads the log of that one, and leaves out what it does not know.
+    // This version reads the log of that one, and leaves out what it does not have.
     let steps = Reader::open(&log).and_then(|reader| reader.records::<4>());
     assert_eq!(steps.expect("a log").count(), rows);
     assert!(rows > 1000);

@@ -191,7 +191,7 @@ impl<const N: usize, W: Write> Bench<'_, N, W> {
         });
         time(name, "dependent", self.states, |state, before| {
             // Makes this call depend on the result of the last; the product is too small to change the angle, which the
-            // compiler cannot know.
+            // compiler cannot infer.
             let angle = state.q[0];
             state.q[0] += before * 1e-200;
             let result = call(state);

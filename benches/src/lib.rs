@@ -3,8 +3,6 @@
 //! `dynamics.rs` measures wall-clock time, `instructions` counts instructions, and `peers` compares with other
 //! libraries.
 
-use rand_xoshiro::SplitMix64;
-use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use supple_core::config::{Collision, Gains, PlausibilityLimits, Role, Workspace};
 use supple_core::controller::{self, Mode, Request};
 use supple_core::dynamics::{Terms, terms};
@@ -18,6 +16,7 @@ use supple_core::target::{PoseGains, PoseReference, PoseTarget};
 use supple_core::{Arm, Config, Controller, Input, Output, Reference, Trajectory, Vector};
 use supple_core::{dynamics, impedance_torque, step};
 use supple_model::Description;
+use supple_random::Random;
 
 /// Number of states in a pool: more than a branch predictor can memorise.
 pub const STATES: usize = 256;
@@ -294,19 +293,15 @@ impl<const N: usize> Rig<N> {
 /// A limit that nothing reaches, in any unit.
 const FAR: f64 = 1e9;
 
-struct Random(SplitMix64);
+/// Draws of states.
+trait Draws {
+    fn vector<const R: usize>(&mut self, reach: f64) -> Vector<R>;
+    fn state<const N: usize>(&mut self, arm: &Arm<N>) -> State<N>;
+}
 
-impl Random {
-    fn new(seed: u64) -> Random {
-        Random(SplitMix64::seed_from_u64(seed))
-    }
-
-    fn within(&mut self, reach: f64) -> f64 {
-        ((self.0.next_u64() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0) * reach
-    }
-
+impl Draws for Random {
     fn vector<const R: usize>(&mut self, reach: f64) -> Vector<R> {
-        Vector::from_fn(|_, _| self.within(reach))
+        Vector::from_fn(|_, _| self.signed() * reach)
     }
 
     fn state<const N: usize>(&mut self, arm: &Arm<N>) -> State<N> {

@@ -98,7 +98,7 @@ def rust_reference(rustdoc: Path | None) -> str:
         rows.append(f'| {f"<a href=../{index}>{crate}</a>" if has_page else f"`{crate}`"} | {about} |')
     return (
         "# Rust\n\n`cargo doc --workspace --exclude supple-python --no-deps --open` shows the documentation of all crates. "
-        "[Architecture](../ARCHITECTURE.md) says how they depend on each other; `supple_core::controller::step` is where to "
+        "[Architecture](../ARCHITECTURE.md) shows how they depend on each other; `supple_core::controller::step` is where to "
         "begin reading.\n\n| crate | what it is |\n|---|---|\n" + "\n".join(rows) + "\n"
     )
 

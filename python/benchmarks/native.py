@@ -14,6 +14,8 @@ import statistics
 import subprocess
 import sys
 import time
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -36,20 +38,22 @@ def native_loop() -> Path:
 
 def batched(arm: supple.Arm, samples: int) -> dict[str, float]:
     """Nanoseconds per state of each function."""
-    states = np.random.default_rng(0).uniform(-1.5, 1.5, size=(3, samples, arm.dof))
+    q, qd, qdd = np.random.default_rng(0).uniform(-1.5, 1.5, size=(3, samples, arm.dof))
+    position = np.ascontiguousarray(qdd[:, :3])
+    calls: dict[str, Callable[..., np.ndarray]] = {
+        "rnea": partial(arm.rnea, q, qd, qdd),
+        "mass_matrix": partial(arm.mass_matrix, q),
+        "forward_dynamics": partial(arm.forward_dynamics, q, qd, qdd),
+        "gravity": partial(arm.gravity, q),
+        "impedance_torque": partial(arm.impedance_torque, q, qd, position, stiffness=5.0, damping=1.5),
+    }
     costs = {}
-    for name, arguments in (
-        ("rnea", 3),
-        ("mass_matrix", 1),
-        ("forward_dynamics", 3),
-        ("gravity", 1),
-    ):
-        call = getattr(arm, name)
-        out = call(*states[:arguments])
+    for name, call in calls.items():
+        out = call()
         passes = []
         for _ in range(3):
             start = time.perf_counter()
-            call(*states[:arguments], out=out)
+            call(out=out)
             passes.append(time.perf_counter() - start)
         costs[name] = 1e9 * min(passes) / samples
     return costs

@@ -1,7 +1,7 @@
 //! Conversion of NumPy arrays: shapes, batches, memory.
 //!
-//! Every argument of a state has shape `(..., width)`: the last axis is one state, the leading axes are the
-//! batch. All arguments of one call have the same batch axes or none; a single state is used for the whole
+//! Every argument of a state has shape `(..., width)`, or `(..., rows, columns)` for a matrix: the last axes are one
+//! state, the leading axes are the batch. All arguments of one call have the same batch axes or none; a single state is used for the whole
 //! batch. Float64 arrays in C order are read without a copy; others are copied first.
 
 use numpy::{
@@ -12,6 +12,7 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::IntoPyDict;
+use supple_core::Vector;
 
 /// An array of float64.
 pub type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
@@ -28,6 +29,23 @@ pub struct States<'a> {
 }
 
 impl<'a> States<'a> {
+    /// The same values for all states.
+    pub fn constant(values: &'a [f64]) -> Self {
+        States {
+            values,
+            stride: 0,
+            width: values.len(),
+        }
+    }
+
+    /// The values of state `k` as a vector; zeros if it has fewer.
+    #[inline(always)]
+    pub fn vector<const R: usize>(&self, k: usize) -> Vector<R> {
+        self.at(k)
+            .first_chunk::<R>()
+            .map_or_else(Vector::zeros, |values| Vector::from(*values))
+    }
+
     /// The values of state `k`.
     #[inline]
     pub fn at(&self, k: usize) -> &'a [f64] {
@@ -35,10 +53,13 @@ impl<'a> States<'a> {
     }
 }
 
+/// An argument and the shape of its value for one state.
+pub type Shaped<'a, 'py> = (Argument<'a, 'py>, &'a [usize]);
+
 /// The borrowed arguments of one call and their batch.
 pub struct Batch<'py> {
-    arguments: Vec<PyReadonlyArrayDyn<'py, f64>>,
-    width: usize,
+    /// Each argument with the number of values for one state.
+    arguments: Vec<(PyReadonlyArrayDyn<'py, f64>, usize, bool)>,
     /// Leading axes, empty for a single state.
     pub shape: Vec<usize>,
 }
@@ -49,52 +70,62 @@ impl<'py> Batch<'py> {
     /// # Errors
     /// `TypeError` if an argument is not numeric, `ValueError` if the shapes do not agree.
     pub fn read(arguments: &[Argument<'_, 'py>], width: usize) -> PyResult<Self> {
+        let shape = [width];
+        let shaped: Vec<Shaped<'_, 'py>> = arguments.iter().map(|a| (*a, &shape[..])).collect();
+        Self::read_shaped(&shaped)
+    }
+
+    /// As [`Batch::read`], for arguments of different shapes.
+    ///
+    /// # Errors
+    /// As [`Batch::read`].
+    pub fn read_shaped(arguments: &[Shaped<'_, 'py>]) -> PyResult<Self> {
         let mut arrays = Vec::with_capacity(arguments.len());
         let mut batch: Option<(&'static str, Vec<usize>)> = None;
-        for (name, value) in arguments {
+        for ((name, value), state) in arguments {
             let array = numbers(name, value)?;
-            let Some((last, leading)) = array.shape().split_last() else {
-                return Err(wrong_shape(name, &expected(width), &[]));
+            let Some(leading) = array.shape().strip_suffix(*state) else {
+                return Err(wrong_shape(name, &expected(state), array.shape()));
             };
-            if *last != width {
-                return Err(wrong_shape(name, &expected(width), array.shape()));
-            }
             match &batch {
                 _ if leading.is_empty() => {}
                 None => batch = Some((name, leading.to_vec())),
                 Some((_, shape)) if shape == leading => {}
                 Some((first, shape)) => {
                     let wanted = format!(
-                        "{}, the batch of {first}, or ({width},)",
-                        shape_text(&[&shape[..], &[width]].concat())
+                        "{}, the batch of {first}, or {}",
+                        shape_text(&[&shape[..], state].concat()),
+                        shape_text(state)
                     );
                     return Err(wrong_shape(name, &wanted, array.shape()));
                 }
             }
-            arrays.push(array);
+            let single = leading.is_empty();
+            arrays.push((array, state.iter().product(), single));
         }
         Ok(Self {
             arguments: arrays,
-            width,
             shape: batch.map_or_else(Vec::new, |(_, shape)| shape),
         })
     }
 
     /// The values of each argument.
     pub fn states(&self) -> PyResult<Vec<States<'_>>> {
-        let of = |array| {
+        let arguments = self.arguments.iter();
+        let states = arguments.map(|(array, width, single)| {
             Ok(States {
                 values: slice(array)?,
-                stride: if array.ndim() == 1 { 0 } else { self.width },
-                width: self.width,
+                stride: if *single { 0 } else { *width },
+                width: *width,
             })
-        };
-        self.arguments.iter().map(of).collect()
+        });
+        states.collect()
     }
 }
 
-fn expected(width: usize) -> String {
-    format!("({width},) or (..., {width})")
+fn expected(state: &[usize]) -> String {
+    let axes: Vec<String> = state.iter().map(usize::to_string).collect();
+    format!("{} or (..., {})", shape_text(state), axes.join(", "))
 }
 
 fn slice<'a>(array: &'a PyReadonlyArrayDyn<'_, f64>) -> PyResult<&'a [f64]> {

@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 use supple_model::unlimited::{UNLIMITED_NM, UNLIMITED_RAD_PER_S};
 use supple_model::{Completed, Description, ModelError, with_dof};
 
-/// The arm with everything that a controller needs. A `UserWarning` says that settings were
+/// The arm with everything that a controller needs. A `UserWarning` reports that settings were
 /// derived, unless only the paths are placed.
 pub fn completed<'a>(
     py: Python<'_>,

@@ -4,6 +4,7 @@
 //! rows, as in NumPy.
 
 use crate::arrays::States;
+use crate::law::BatchedLaw;
 use supple_core::{Arm, Matrix, Vector, dynamics};
 
 /// Quantity to compute for a state.
@@ -47,7 +48,7 @@ impl Quantity {
 }
 
 /// An arm with any number of joints.
-pub trait Dynamics: Send + Sync {
+pub trait Dynamics: BatchedLaw {
     /// Writes the results to `out`, one after the other. `states` are the arguments of the quantity, in its
     /// order.
     fn evaluate(&self, quantity: Quantity, states: &[States<'_>], out: &mut [f64]);
@@ -172,9 +173,7 @@ impl Each<'_> {
         // A loop, since a closure might not be inlined.
         let mut arguments = [Vector::zeros(); K];
         for (argument, states) in arguments.iter_mut().zip(self.states) {
-            if let Some(state) = states.at(k).first_chunk::<N>() {
-                *argument = Vector::from(*state);
-            }
+            *argument = states.vector(k);
         }
         arguments
     }

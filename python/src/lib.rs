@@ -15,6 +15,7 @@ mod excite;
 mod fit;
 mod friction;
 mod interrupt;
+mod law;
 mod learn;
 mod live;
 mod load;

@@ -20,7 +20,7 @@ struct Columns {
     timing: Table,
 }
 
-/// Reads a log: the arm, what it says of itself, and its columns.
+/// Reads a log: the arm, its metadata and its columns.
 #[pyfunction]
 pub fn read_log(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyDict>> {
     let (reader, columns) = py.detach(|| read(path)).map_err(errors::log)?;

@@ -38,7 +38,7 @@ def fail_at_three(parameter, _seed):
 
 
 def fails_until_mended(parameter, seed):
-    """Fails where the parameter says so, as long as a file is absent."""
+    """Fails for this parameter, as long as a file is absent."""
     if parameter["fails"] and not os.path.exists(parameter["flag"]):
         raise RuntimeError("not mended")
     return {"number": parameter["i"], "drawn": draw(1.0, seed)}

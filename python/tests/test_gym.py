@@ -1,4 +1,4 @@
-"""The environment: the interface of Gymnasium, and an arm that goes where the action says."""
+"""The environment: the interface of Gymnasium, and an arm that goes where the action leads."""
 
 from __future__ import annotations
 

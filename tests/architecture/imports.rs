@@ -54,7 +54,7 @@ impl Modules {
             let of_file = imports.entry(module.file.clone()).or_default();
             let globs = module.globs.iter().cloned();
             for path in module.paths.iter().cloned().chain(globs) {
-                self.resolve(at, &path, of_file, 0);
+                self.resolve(at, &path, of_file, &mut Search::default());
             }
             of_file.remove(&module.file);
         }
@@ -132,9 +132,8 @@ impl Modules {
         from: usize,
         path: &[String],
         files: &mut BTreeSet<PathBuf>,
-        depth: usize,
+        search: &mut Search,
     ) -> Option<Named> {
-        assert!(depth < 32, "{path:?} leads to itself");
         let mut at = from;
         for (index, name) in path.iter().enumerate() {
             let first = index == 0;
@@ -157,11 +156,21 @@ impl Modules {
                         return Some(Named::Item);
                     }
                     if let Some(used) = module.used.get(name).filter(|used| path != *used) {
-                        match self.resolve(at, used, files, depth + 1)? {
+                        search.depth += 1;
+                        assert!(search.depth < 256, "{path:?} leads to itself");
+                        match self.resolve(at, used, files, search)? {
                             Named::Module(found) => at = found,
                             Named::Item => return Some(Named::Item),
                         }
                         continue;
+                    }
+                    match self.through_globs(at, name, files, search) {
+                        Some(Named::Module(found)) => {
+                            at = found;
+                            continue;
+                        }
+                        Some(Named::Item) => return Some(Named::Item),
+                        None => {}
                     }
                     // Of another crate, or of the language, unless a macro of that module declares it.
                     if !first {
@@ -174,6 +183,40 @@ impl Modules {
         files.insert(self.all[at].file.clone());
         Some(Named::Module(at))
     }
+
+    /// What a name is that a module has by `use path::*` alone; adds the file that declares an item to `files`.
+    fn through_globs(
+        &self,
+        at: usize,
+        name: &str,
+        files: &mut BTreeSet<PathBuf>,
+        search: &mut Search,
+    ) -> Option<Named> {
+        if !search.begun.insert((at, name.to_owned())) {
+            return None;
+        }
+        self.all[at].globs.iter().find_map(|glob| {
+            let of_glob = self.resolve(at, glob, &mut BTreeSet::new(), search);
+            let Some(Named::Module(module)) = of_glob else {
+                return None;
+            };
+            let mut found = BTreeSet::new();
+            let named = self.resolve(module, &[name.to_owned()], &mut found, search)?;
+            if matches!(named, Named::Item) {
+                files.append(&mut found);
+            }
+            Some(named)
+        })
+    }
+}
+
+/// How a name is looked up.
+#[derive(Default)]
+struct Search {
+    /// Modules with the names that are looked up in what they glob: modules that glob each other have a name from neither.
+    begun: BTreeSet<(usize, String)>,
+    /// Number of re-exports followed.
+    depth: usize,
 }
 
 /// Values of `#[path = ".."]` and of `#[cfg_attr(.., path = "..")]`.
@@ -419,5 +462,30 @@ mod tests {
         assert_eq!(a, set(&["b/c.rs", "b/mod.rs"]));
         assert_eq!(b, set(&["b/c.rs"]));
         assert_eq!(c, set(&["b/mod.rs"]));
+    }
+    #[test]
+    fn a_name_is_followed_through_globs() {
+        // By `pub use x::*`, by `use x::*` in between, and with a module that is globbed too.
+        let [a, b, c] = imports(
+            "use crate::b::{Thing, LIMIT}; fn f() { crate::b::inner::Deep; }",
+            "mod c; pub use c::*;",
+            "pub struct Thing(crate::a::A); pub const LIMIT: u8 = 1; pub mod inner { pub struct Deep; }",
+        );
+        assert_eq!(a, set(&["b/c.rs"]));
+        assert_eq!(b, set(&["b/c.rs"]));
+        assert_eq!(c, set(&["a.rs"]));
+    }
+
+    #[test]
+    fn globs_of_each_other_end() {
+        // A name that neither has, one that the language has, and one that the parent has.
+        let [a, b, c] = imports(
+            "pub fn one() {}",
+            "mod c; pub use c::*; use crate::a::*; pub struct Parent; fn f() { one() }",
+            "use super::*; fn f(x: Vec::<u8>) { Missing::new(); Parent::new(); String::new(); super::one::<u8>() }",
+        );
+        assert_eq!(a, set(&[]));
+        assert_eq!(b, set(&["a.rs", "b/c.rs"]));
+        assert_eq!(c, set(&["a.rs", "b/mod.rs"]));
     }
 }

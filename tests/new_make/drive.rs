@@ -211,7 +211,7 @@ impl<const N: usize, B: Bus> Drive<N> for Moteus<N, B> {
             true => Drives::Active,
             false => Drives::Idle,
         };
-        // Numbers from 96 on say what limits the motor, and are no faults.
+        // Numbers from 96 on report what limits the motor, and are no faults.
         let fault = |index: usize| matches!(self.modes[index], Mode::Fault | Mode::Timeout);
         let faulty = (0..N).find(|index| self.enabled && fault(*index));
         DriveState {

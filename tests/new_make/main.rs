@@ -1,6 +1,6 @@
 //! A make of drives that the project does not ship, written against its public interfaces alone: mjbots moteus, through
 //! its published codec, on emulated motors. Codec glue, emulated motors, drive and tests are this folder; nothing else
-//! knows of them.
+//! depends on them.
 
 #[path = "../arm_on_bus/link.rs"]
 mod link;

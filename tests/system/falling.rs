@@ -17,7 +17,7 @@ fn column(trace: &Path, name: &str) -> Vec<f64> {
     values.collect()
 }
 
-/// The arm was laid down: the reports say so in order, and it lies when its motors are disabled.
+/// The arm was laid down: the reports list it in order, and it lies when its motors are disabled.
 fn assert_laid_down(stderr: &str, trace: &Path) {
     let mut from = 0;
     for stage in [

@@ -6,10 +6,9 @@
 
 use crate::bus::{Bus, BusFault, Event};
 use crate::error::BusError;
-use rand_xoshiro::SplitMix64;
-use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use std::collections::VecDeque;
 use supple_can_frame::{CanFrame, CanId, MAX_FD_BYTES};
+use supple_random::Random;
 
 /// Direction of the frames that a rule affects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -106,7 +105,7 @@ impl FaultRule {
 pub struct FaultInjector<B> {
     bus: B,
     rules: Vec<FaultRule>,
-    random: SplitMix64,
+    random: Random,
     /// Delayed events for the host, each with its due time \[ns\]; sorted by it.
     events: VecDeque<(u64, Event)>,
     /// Delayed frames of the host, each with its due time \[ns\]; sorted by it.
@@ -122,7 +121,7 @@ impl<B: Bus> FaultInjector<B> {
         FaultInjector {
             bus,
             rules: Vec::new(),
-            random: SplitMix64::seed_from_u64(seed),
+            random: Random::new(seed),
             events: VecDeque::with_capacity(256),
             frames: VecDeque::with_capacity(256),
             overtaken: None,
@@ -151,7 +150,7 @@ impl<B: Bus> FaultInjector<B> {
     }
 
     fn happens(&mut self, probability: f64) -> bool {
-        let unit = (self.random.next_u64() >> 11) as f64 / (1u64 << 53) as f64;
+        let unit = self.random.uniform();
         unit < probability
     }
 
@@ -175,7 +174,7 @@ impl<B: Bus> FaultInjector<B> {
         if bits == 0 {
             return *frame;
         }
-        let bit = (self.random.next_u64() % bits) as usize;
+        let bit = self.random.below(bits) as usize;
         let mut payload = [0; MAX_FD_BYTES];
         let length = frame.payload().len();
         payload[..length].copy_from_slice(frame.payload());

@@ -15,7 +15,7 @@
 //! | [`PacedBus`] | an emulated arm in another process, synchronised to the wall clock |
 //! | [`FaultInjector`] | a decorator that injects faults into any of these |
 //!
-//! It transports frames of classic CAN and CAN FD and knows no protocol: codecs such as `supple-puck` encode and
+//! It transports frames of classic CAN and CAN FD and has no protocol: codecs such as `supple-puck` encode and
 //! decode their contents. Sending and receiving allocate
 //! nothing.
 

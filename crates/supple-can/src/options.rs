@@ -44,7 +44,7 @@ pub struct Options {
     #[arg(long, value_name = "US", default_value_t = 100, value_parser = clap::value_parser!(u64).range(0..=1_000_000))]
     pub answer_us: u64,
     /// Prints the bus time of a cycle of this arm, with the force/torque sensor and without joint encoders, and
-    /// ends. The exit code tells whether it fits.
+    /// ends. The exit code shows whether it fits.
     #[arg(long)]
     pub budget: bool,
     /// Ends after this many cycles.

@@ -60,7 +60,7 @@ fn start(options: &Options) -> Result<Option<Counters>, RunError> {
         None => Err(RunError::new(
             3,
             format!(
-                "arm `{}`: [bus] kind names no make of drives that this program knows",
+                "arm `{}`: [bus] kind names no make of drives that this program supports",
                 description.name()
             ),
         )),

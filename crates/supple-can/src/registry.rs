@@ -1,4 +1,4 @@
-//! The makes of drives that this program knows, a line each.
+//! The makes of drives that this program supports, a line each.
 
 use crate::drives::{barrett, damiao};
 use crate::make::Make;

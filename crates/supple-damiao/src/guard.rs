@@ -207,7 +207,7 @@ impl MotorGuard {
         self.heat
     }
 
-    /// Temperature \[degrees Celsius\]; 0 until the motor knows it.
+    /// Temperature \[degrees Celsius\]; 0 until the motor has measured it.
     pub const fn celsius(&self) -> u8 {
         self.celsius
     }

@@ -76,7 +76,7 @@ impl Readings {
     }
 }
 
-/// What the arm's file says of one motor.
+/// What the arm's file states of one motor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Expectation<'a> {
     /// Id that it listens to.

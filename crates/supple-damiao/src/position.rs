@@ -7,7 +7,7 @@
 use core::f64::consts::TAU;
 use core::fmt;
 
-/// Greatest position that is believed \[rad\]: a turn and a little.
+/// Greatest position that is accepted \[rad\]: a turn and a little.
 pub const MAX_POSITION_RAD: f64 = 6.5;
 /// Turns that are tried to either side.
 const TURNS: i32 = 3;

@@ -34,7 +34,7 @@ pub enum Kind {
 pub enum Access {
     /// The motor alone.
     ReadOnly,
-    /// An operator, and the start-up where it says so.
+    /// An operator, and the start-up where its documentation states it.
     Writable,
     /// The motor would accept a write, but this program never sends one: ranges of the frames and the bit rate, with
     /// which host and motor must agree, and registers whose write stores a zero in some firmware.

@@ -1,4 +1,4 @@
-//! The four bits of every feedback that say whether a motor has torque, and if not, why.
+//! The four bits of every feedback that report whether a motor has torque, and if not, why.
 
 use core::fmt;
 

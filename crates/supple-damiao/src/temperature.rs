@@ -36,7 +36,7 @@ impl Thermal {
         })
     }
 
-    /// How hot a motor of `celsius` is. A temperature of 0 is one that the motor does not know yet, and is normal.
+    /// How hot a motor of `celsius` is. A temperature of 0 is one that the motor has not measured yet, and is normal.
     pub fn heat(&self, celsius: u8) -> Heat {
         let celsius = f64::from(celsius);
         if celsius >= self.fault_celsius {

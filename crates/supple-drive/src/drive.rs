@@ -156,7 +156,7 @@ pub trait Drive<const N: usize> {
     /// If the bus itself fails.
     fn lower(&mut self, how: Lower, reason: LossReason) -> Result<(), LoopError>;
 
-    /// Asks for something less urgent, if its replies fit before `next_period_ns`; `lowering` says that the torque is
+    /// Asks for something less urgent, if its replies fit before `next_period_ns`; `lowering` is set while the torque is
     /// being ended.
     ///
     /// # Errors

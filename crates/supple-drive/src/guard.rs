@@ -167,7 +167,7 @@ impl SafeActionMachine {
         }
     }
 
-    /// Runs one cycle. `lies` says whether an arm that is being laid down has arrived, or one that is damped is at rest.
+    /// Runs one cycle. `lies` is whether an arm that is being laid down has arrived, or one that is damped is at rest.
     pub fn cycle(&mut self, input: &GuardInput, lies: bool) -> Action {
         let loss = self.watch(input);
         let active = input.drives == Drives::Active;

@@ -6,7 +6,7 @@
 //! happens after a loss is one table for all of them ([`LossReason::safe_action`]) and one state machine
 //! ([`SafeActionMachine`]).
 //!
-//! The loop does not depend on the controller, which it reaches through a [`Link`], and knows no protocol. Time is
+//! The loop does not depend on the controller, which it reaches through a [`Link`], and has no protocol. Time is
 //! the drives' time ([`Drive::now_ns`]): the same code runs on a CAN card, on an emulator, and in virtual time. A
 //! cycle allocates no memory, takes no lock and writes no log.
 

@@ -58,7 +58,7 @@ pub struct PlantLoop<const N: usize, D, L> {
 }
 
 impl<const N: usize, D: Drive<N>, L: Link<N>> PlantLoop<N, D, L> {
-    /// Starts the cycle of drives that have completed start-up; `stow` says how an arm that falls without torque is
+    /// Starts the cycle of drives that have completed start-up; `stow` is how an arm that falls without torque is
     /// laid down, and is not used for others.
     ///
     /// # Errors

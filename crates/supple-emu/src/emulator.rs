@@ -6,8 +6,6 @@ use crate::puck::{Power, Puck};
 use crate::safety::{ButtonPress, SafetyModule};
 use crate::sensor::ForceSensor;
 use crate::wire::Wire;
-use rand_xoshiro::SplitMix64;
-use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use std::collections::VecDeque;
 use supple_bus::virtual_time::Peer;
 use supple_bus::{BusFault, Event};
@@ -21,6 +19,7 @@ use supple_plant::{
 use supple_puck::safety::SafetyMode;
 use supple_puck::status::MotorMode;
 use supple_puck::{Destination, GroupId, MessageId, NodeId, PackedTorques};
+use supple_random::Random;
 
 /// An event of the emulated arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,7 +50,7 @@ pub struct Emulator<const N: usize> {
     host_bus_off_until_ns: Option<u64>,
     /// Fault that the host has yet to receive.
     pending_fault: Option<BusFault>,
-    random: SplitMix64,
+    random: Random,
     arm_events: Vec<(u64, ArmEvent)>,
     /// Current offset of the machine's monotonic clock from the arm's time \[ns\].
     offset_ns: u64,
@@ -143,7 +142,7 @@ impl<const N: usize> Emulator<N> {
             sensor: config.force_sensor.then(ForceSensor::new),
             host_bus_off_until_ns: None,
             pending_fault: None,
-            random: SplitMix64::seed_from_u64(config.seed),
+            random: Random::new(config.seed),
             arm_events: Vec::new(),
             offset_ns: 0,
             event_offsets_ns: Vec::new(),
@@ -467,7 +466,7 @@ impl<const N: usize> Emulator<N> {
 
     /// Random jitter \[ns\].
     fn jitter_ns(&mut self) -> u64 {
-        self.random.next_u64() % (self.config.jitter_ns + 1)
+        self.random.below(self.config.jitter_ns + 1)
     }
 }
 

@@ -104,7 +104,7 @@ fn force_beyond_friction_uncertainty(
     plan.config.estimator_rad_per_s = estimator_rad_per_s;
     plan.config.latch.observer_rad_per_s = observer_rad_per_s;
     plan.config.latch.threshold_n = NEVER_N;
-    // The configured threshold, so that the uncertainty in it can be told.
+    // The configured threshold, so that the uncertainty in it can be separated.
     plan.config.latch.false_alarms_per_hour = f64::INFINITY;
     let mut max_force_n = 0.0_f64;
     let mut touched_s = None;

@@ -105,7 +105,7 @@ fn remove_part(job: &Job, options: &DemoOptions) {
     }
 }
 
-/// Whether the error says that the arm cannot perform the experiment, not that something else is wrong.
+/// Whether the error means that the arm cannot perform the experiment, not that something else is wrong.
 fn is_of_the_arm(error: &ExperimentError) -> bool {
     matches!(
         error,

@@ -317,7 +317,7 @@ pub struct Knowledge {
 }
 
 impl Knowledge {
-    /// These columns of friction; links and rotors are for the motion to tell.
+    /// These columns of friction; the motion identifies links and rotors.
     pub fn of(friction: FrictionColumns) -> Knowledge {
         Knowledge {
             friction,

@@ -1,7 +1,7 @@
 //! Which effects of a real arm ruin low stiffness: tracking at 5 N/m with each effect alone and with all together.
 //!
 //! The plant has the effect; the controller's model comes from one of the [`ModelSource`]s. Nothing in the controller
-//! knows of the effect otherwise. The sizes of single effects are larger than in `realistic`; all are assumptions, see
+//! contains the effect otherwise. The sizes of single effects are larger than in `realistic`; all are assumptions, see
 //! `supple plant list`.
 
 use crate::calibrate::{Calibration, calibrate};
@@ -33,7 +33,7 @@ pub struct Effect {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ModelSource {
-    /// The description, which knows nothing of the effect: a model identified without it.
+    /// The description, without the effect: a model identified without it.
     Nominal,
     /// A calibration on the arm with the effect, as `supple calibrate` does it, with ripple runs if a motor ripples.
     Calibrated,

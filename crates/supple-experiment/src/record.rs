@@ -17,7 +17,7 @@ pub struct Recorder<const N: usize> {
 }
 
 impl<const N: usize> Recorder<N> {
-    /// Creates the log of a plan; `notes` say what else belongs to it, such as the options of the plant.
+    /// Creates the log of a plan; `notes` list what else belongs to it, such as the options of the plant.
     ///
     /// # Errors
     /// If the log cannot be written.

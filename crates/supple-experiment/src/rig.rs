@@ -87,7 +87,7 @@ impl<const N: usize> Rig<N> {
         }
     }
 
-    /// What the learner knows, if there is one.
+    /// The learner's estimates, if there is one.
     pub fn report(&self) -> Option<Report<N>> {
         self.learner.as_ref().map(Learner::report)
     }

@@ -42,7 +42,7 @@ impl Variant {
 pub struct Setup<const N: usize> {
     exact: Config<N>,
     plant: PlantConfig<N>,
-    /// Friction of the plant without options, which a model that knows nothing of them has.
+    /// Friction of the plant without options, which a model without them has.
     described_friction: [LuGre; N],
     /// Whether `exact` is an identified model, whose Stribeck effect is its own.
     identified: bool,

@@ -5,7 +5,7 @@
 //! `dependent = independent B`, so that `x_independent + B x_dependent` is what can be identified.
 
 use crate::error::IdentError;
-use crate::random::Random;
+use crate::random::{Normal, Random};
 use nalgebra::{DMatrix, DVector};
 
 /// Diagonal entries below this fraction of the first are rounding errors.
@@ -195,7 +195,7 @@ pub(crate) fn pivot_order(columns: &DMatrix<f64>, tolerance: f64) -> Vec<usize> 
 #[cfg(test)]
 mod tests {
     use super::{BaseParameters, RANK_TOLERANCE};
-    use crate::random::Random;
+    use crate::random::{Normal, Random};
     use nalgebra::DMatrix;
 
     /// Eight columns of rank five, three of them combinations of others.

@@ -17,7 +17,7 @@ pub const MAX_DELAY_S: f64 = 0.06;
 const STEPS_S: [f64; 3] = [0.012, 0.004, 0.001];
 /// Number of parts of the log.
 const PARTS: usize = 4;
-/// Gain of the score below which the log does not tell a delay from none.
+/// Gain of the score below which the log does not distinguish a delay from none.
 const MIN_GAIN: f64 = 1e-3;
 
 /// Estimated delay of a log's torques after its angles.
@@ -90,11 +90,11 @@ pub fn estimate_delay<const N: usize>(
         0.0
     };
     let found_s = best.0 + step_s * shift.clamp(-0.5, 0.5);
-    let tells = origin - best.1 > MIN_GAIN;
+    let is_found = origin - best.1 > MIN_GAIN;
     Ok(DelayEstimate {
-        delay_s: if tells { found_s } else { 0.0 },
+        delay_s: if is_found { found_s } else { 0.0 },
         error_without: origin.exp(),
-        error_with: if tells { best.1.exp() } else { origin.exp() },
+        error_with: if is_found { best.1.exp() } else { origin.exp() },
     })
 }
 

@@ -9,7 +9,7 @@
 use crate::base::{BaseParameters, RANK_TOLERANCE};
 use crate::columns::{Columns, FrictionColumns};
 use crate::error::{IdentError, positive};
-use crate::random::Random;
+use crate::random::{Normal, Random};
 use crate::regressor::rows;
 use nalgebra::DMatrix;
 use std::f64::consts::{PI, TAU};

@@ -142,7 +142,7 @@ pub fn huber_weights(joints: &[JointRows], x: &DVector<f64>) -> Vec<Vec<f64>> {
 mod tests {
     use super::pseudo_inverse;
     use crate::base::RANK_TOLERANCE;
-    use crate::random::Random;
+    use crate::random::{Normal, Random};
     use nalgebra::DMatrix;
 
     /// The four Moore-Penrose conditions, for wide, square and tall matrices of every rank.

@@ -1,32 +1,17 @@
-//! Seeded random numbers for searches and draws; the same seed gives bit-identical numbers.
+//! Normal random numbers for searches and draws; the same seed gives bit-identical numbers.
 
-use rand_xoshiro::SplitMix64;
-use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use std::f64::consts::TAU;
 use supple_core::math::{cos, sqrt};
+pub use supple_random::Random;
 
-/// A random number generator.
-#[derive(Clone, Debug)]
-pub struct Random(SplitMix64);
-
-impl Random {
-    /// Creates a generator from a seed.
-    pub fn new(seed: u64) -> Random {
-        Random(SplitMix64::seed_from_u64(seed))
-    }
-
-    /// Uniform in \[0, 1).
-    pub fn uniform(&mut self) -> f64 {
-        (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    /// Uniform in \[-1, 1).
-    pub fn signed(&mut self) -> f64 {
-        2.0 * self.uniform() - 1.0
-    }
-
+/// Draws of the normal distribution.
+pub trait Normal {
     /// Normal with mean 0 and standard deviation 1 (Box and Muller).
-    pub fn normal(&mut self) -> f64 {
+    fn normal(&mut self) -> f64;
+}
+
+impl Normal for Random {
+    fn normal(&mut self) -> f64 {
         let radius = sqrt(-2.0 * (1.0 - self.uniform()).ln());
         radius * cos(TAU * self.uniform())
     }
@@ -34,7 +19,7 @@ impl Random {
 
 #[cfg(test)]
 mod tests {
-    use super::Random;
+    use super::{Normal, Random};
 
     #[test]
     fn normal_numbers_have_the_expected_moments() {

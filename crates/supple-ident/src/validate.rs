@@ -23,7 +23,7 @@ pub struct Validation {
     pub peak_nm: Vec<f64>,
     /// `|tau - tau_hat| / |tau|` of each moving joint.
     pub relative: Vec<f64>,
-    /// RMS error of each moving joint over the standard deviation of its own torque: 1 says no more than its mean.
+    /// RMS error of each moving joint over the standard deviation of its own torque: 1 explains no more than its mean.
     pub of_deviation: Vec<f64>,
     /// Relative error over all moving joints.
     pub total_relative: f64,

@@ -48,7 +48,7 @@ pub struct IdleAnswer {
     pub cycle: u64,
     /// Whether the controller accepted it.
     pub outcome: Outcome,
-    /// Mode after the request, if this version knows it.
+    /// Mode after the request, if this version has it.
     pub mode: Option<Mode>,
     /// Reason for a refusal; empty otherwise.
     pub text: String,

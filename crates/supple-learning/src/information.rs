@@ -1,4 +1,4 @@
-//! Normal equations of one joint: what its samples say about the unknowns.
+//! Normal equations of one joint: the information of its samples on the unknowns.
 
 use crate::prior::unknowns::ALL;
 use crate::rows::Row;

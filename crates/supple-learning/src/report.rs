@@ -1,4 +1,4 @@
-//! What a learner knows.
+//! What a learner has estimated.
 
 use crate::freeze::Frozen;
 use supple_core::learned::LearnedTerms;

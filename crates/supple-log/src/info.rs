@@ -20,7 +20,7 @@ pub struct Info {
     pub bytes: u64,
     /// Why it is not complete; `None` where it is.
     pub incomplete: Option<String>,
-    /// What it says of itself.
+    /// Its metadata.
     pub about: About,
     /// Times of the first and the last message \[ns\]; `None` where there is none.
     pub span_ns: Option<(u64, u64)>,

@@ -1,4 +1,4 @@
-//! From the bytes of a record to what it says, whatever the bytes: a damaged record gives an error, not
+//! From the bytes of a record to its content, whatever the bytes: a damaged record gives an error, not
 //! a panic and not a request for all memory.
 
 use mcap::McapError;
@@ -57,7 +57,7 @@ fn chunk_records(data: &[u8]) -> Result<VecDeque<Record<'static>>, McapError> {
     Ok(records)
 }
 
-/// Whether the name and the media type of an attachment, of the lengths that it says, leave room for
+/// Whether the name and the media type of an attachment, of the lengths that it states, leave room for
 /// the length of its content and its checksum.
 fn fits(attachment: &[u8]) -> bool {
     const TIMES_BYTES: usize = 16;

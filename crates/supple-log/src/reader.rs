@@ -14,7 +14,7 @@ use supple_core::Config;
 use supple_core::controller::CycleRecord;
 use supple_model::Description;
 
-/// What a log says of itself.
+/// Metadata of a log.
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct About {
     /// Name and version of the software that wrote it.
@@ -33,7 +33,7 @@ pub struct About {
     pub notes: BTreeMap<String, String>,
 }
 
-/// A log to read. Opening it reads what it says of itself and of the arm; the steps are read as they
+/// A log to read. Opening it reads its metadata and the arm; the steps are read as they
 /// are asked for.
 #[derive(Clone, Debug)]
 pub struct Reader {
@@ -92,7 +92,7 @@ impl Reader {
         &self.path
     }
 
-    /// What it says of itself.
+    /// Its metadata.
     pub fn about(&self) -> &About {
         &self.about
     }

@@ -72,8 +72,8 @@ pub(crate) fn terms_definition() -> String {
 
 /// Names of the numbers of a field that holds codes.
 fn constants(field: &str) -> Vec<(String, u8)> {
-    let named = |all: &[(&str, u8)]| {
-        let owned = |(name, number): &(&str, u8)| (name.to_uppercase(), *number);
+    let named = |all: &[codes::Code]| {
+        let owned = |code: &codes::Code| (code.name.to_uppercase(), code.number);
         all.iter().map(owned).collect()
     };
     match field {

@@ -13,7 +13,7 @@ use supple_core::controller::CycleRecord;
 use supple_core::{Config, Input, Output};
 use supple_model::Description;
 
-/// What a log says of its run besides the arm.
+/// Metadata of a run besides the arm.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RunInfo {
     /// Name of the experiment.
@@ -106,7 +106,7 @@ impl<const N: usize> Writer<N> {
         self.write_record(time_ns, &record, extras)
     }
 
-    /// One step that is a record already, such as another process has sent; `extras.step` has no say.
+    /// One step that is a record already, such as another process has sent; `extras.step` is not used.
     ///
     /// # Errors
     /// As [`Writer::write`].

@@ -1,11 +1,16 @@
 //! Cost per state in a plain loop: `state_loop ARM SAMPLES` prints nanoseconds by function, as JSON.
-//! `python/benchmarks/regressor.py` compares batched calls from Python with it.
+//! `python/benchmarks/native.py` compares batched calls from Python with it.
 
 use std::hint::black_box;
 use std::process::ExitCode;
 use std::time::Instant;
-use supple_core::{Arm, Vector, dynamics};
+use supple_core::config::Gains;
+use supple_core::dynamics::{self, Terms};
+use supple_core::impedance::{LawInput, PositionTarget, Task, impedance};
+use supple_core::math::Vector3;
+use supple_core::{Config, Reference, Vector};
 use supple_model::{Description, ModelError, with_dof};
+use supple_random::Random;
 
 fn main() -> ExitCode {
     let mut arguments = std::env::args().skip(1);
@@ -29,17 +34,17 @@ fn main() -> ExitCode {
 fn costs(arm: &str, samples: usize) -> Result<String, ModelError> {
     let description = Description::find(arm)?;
     with_dof!(description.dof(), N => {
-        let arm = description.arm::<N>()?;
-        for_dof::<N>(&arm, samples)
+        let config = description.config::<N>()?;
+        for_dof::<N>(&config, samples)
     })
 }
 
-fn for_dof<const N: usize>(arm: &Arm<N>, samples: usize) -> String {
-    let mut state = 1_u64;
+fn for_dof<const N: usize>(config: &Config<N>, samples: usize) -> String {
+    let arm = &config.arm;
+    let mut random = Random::new(1);
     let [q, qd, qdd]: [Vec<Vector<N>>; 3] = core::array::from_fn(|_| {
-        let random = |_, _| 1.5 * uniform(&mut state);
-        let mut random = random;
-        (0..samples).map(|_| Vector::from_fn(&mut random)).collect()
+        let mut draw = |_, _| 1.5 * random.signed();
+        (0..samples).map(|_| Vector::from_fn(&mut draw)).collect()
     });
     let lines = [
         (
@@ -66,9 +71,35 @@ fn for_dof<const N: usize>(arm: &Arm<N>, samples: usize) -> String {
                 out.copy_from_slice(dynamics::gravity(arm, &q[k]).as_slice());
             }),
         ),
+        (
+            "impedance_torque",
+            cost(samples, N, |k, out| {
+                out.copy_from_slice(law(config, &q[k], &qd[k], &qdd[k]).as_slice());
+            }),
+        ),
     ];
     let entries = lines.map(|(name, ns)| format!("\"{name}\": {ns:.1}"));
     format!("{{{}}}", entries.join(", "))
+}
+
+/// Torque of the impedance law towards a position that the last argument makes differ from state to state.
+fn law<const N: usize>(
+    config: &Config<N>,
+    q: &Vector<N>,
+    qd: &Vector<N>,
+    at: &Vector<N>,
+) -> Vector<N> {
+    let mut terms = Terms::default();
+    dynamics::terms(&config.arm, q, qd, &mut terms);
+    let target = PositionTarget {
+        reference: &Reference::at_rest(Vector3::new(at[0], at[1], at[2])),
+        gains: &Gains::isotropic(5.0, 1.5),
+        spring_limit_n: f64::MAX,
+    };
+    // Random angles: the mass matrix is positive definite everywhere.
+    Task::new(&terms, &config.roles).map_or_else(Vector::zeros, |task| {
+        impedance(&config.roles, &terms, &task, &LawInput::new(target, qd)).total()
+    })
 }
 
 /// Nanoseconds per state, the minimum of three passes.
@@ -83,13 +114,4 @@ fn cost(samples: usize, width: usize, mut f: impl FnMut(usize, &mut [f64])) -> f
         start.elapsed().as_secs_f64() * 1e9 / samples as f64
     };
     (0..3).map(pass).fold(f64::INFINITY, f64::min)
-}
-
-/// Uniform in (-1, 1), splitmix64.
-fn uniform(state: &mut u64) -> f64 {
-    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let mut z = *state;
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    (z ^ (z >> 31)) as f64 / (1_u64 << 63) as f64 - 1.0
 }

@@ -304,6 +304,14 @@ impl Description {
         self.bus.as_ref()
     }
 
+    /// Whether the impedance law acts on each joint: on those that the TOML does not hold.
+    pub fn active_joints(&self) -> Vec<bool> {
+        self.joints
+            .iter()
+            .map(|joint| joint.held.is_none())
+            .collect()
+    }
+
     /// Friction, one per joint.
     pub fn friction(&self) -> &[Friction] {
         &self.friction

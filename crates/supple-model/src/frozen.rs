@@ -1,4 +1,4 @@
-//! Movable joints that do not move: those that the TOML fixes, those beside the way to the tip, and, if the TOML says nothing
+//! Movable joints that do not move: those that the TOML fixes, those beside the way to the tip, and, if the TOML has no entry
 //! about single joints, those on the way that no controller of this crate moves (prismatic joints, mimics, and the first ones
 //! of a chain of more than seven).
 //!

@@ -131,7 +131,7 @@ impl Description {
     }
 
     /// Returns the same arm with these learned terms as `[learned]` in its TOML, whose other text is kept; `source`
-    /// says where they come from.
+    /// names where they come from.
     ///
     /// # Errors
     /// [`ModelError::JointCount`]; any [`ModelError`] of the edited text.

@@ -51,7 +51,7 @@ pub(crate) struct Chain {
     pub warnings: Vec<Finding>,
 }
 
-/// What the TOML says about the chain.
+/// What the TOML states about the chain.
 pub(crate) struct ChainSettings<'a> {
     pub tip_frame: &'a str,
     /// Joints that the TOML freezes, with their positions.

@@ -3,7 +3,7 @@
 //! service manager.
 //!
 //! Its settings affect timing, never results: what the system refuses is reported as a [`RealtimeWarning`], and the
-//! process continues. This crate knows no arm and no controller.
+//! process continues. This crate depends on no arm and no controller.
 
 mod background;
 mod clock;

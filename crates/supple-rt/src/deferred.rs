@@ -49,7 +49,7 @@ pub enum StartPose {
     Present,
     /// The end of the motion before it.
     Known(Pose),
-    /// Nobody knows it yet: what does not depend on it is checked.
+    /// Not known yet: what does not depend on it is checked.
     Unknown,
 }
 

@@ -38,7 +38,7 @@ impl FaultFiles {
         })
     }
 
-    /// Hands a table over; where too many wait for the disk, it is lost, counted, and said so.
+    /// Hands a table over; where too many wait for the disk, it is lost, counted and reported.
     fn write(&self, table: Table, step: u64) {
         let folder = self.folder.clone();
         let accepted = self.writer.submit(move || table.save(&folder, step));
@@ -92,7 +92,7 @@ impl FaultRecorder {
         }
     }
 
-    /// A cycle. Where a fault has just latched, it is said on standard error, and the table is handed to the thread
+    /// A cycle. Where a fault has just latched, it is reported on standard error, and the table is handed to the thread
     /// that writes; neither is waited for.
     pub fn add(&mut self, telemetry: &Telemetry) {
         let Table { kept, next } = &mut self.cycles;
@@ -111,7 +111,7 @@ impl FaultRecorder {
         }
     }
 
-    /// Waits for the disk at most for `timeout`, and says where it is not done by then.
+    /// Waits for the disk at most for `timeout`, and reports if it is not done by then.
     pub fn finish(&self, timeout: Duration) {
         if !self.files.writer.flush(timeout) {
             diagnostics::post(format_args!(
@@ -157,7 +157,7 @@ fn prune(folder: &Path) -> io::Result<()> {
 }
 
 impl Table {
-    /// Writes it and says where; what fails is said too.
+    /// Writes it and reports where; failures are reported too.
     fn save(&self, folder: &Path, step: u64) {
         match self.write(folder, step) {
             Ok(file) => diagnostics::post(format_args!(

@@ -1,4 +1,4 @@
-//! What the page must know before the first picture, as JSON.
+//! What the page must receive before the first picture, as JSON.
 
 use crate::error::ViewError;
 use crate::protocol::Channel;

@@ -5,7 +5,7 @@
 //! controller wait; without it, or with a browser that hangs, the loop is the same.
 //!
 //! The page is embedded and asks no other server for anything. Everything is served on 127.0.0.1 alone, and only to
-//! those who know the token in the URL (`http.rs`).
+//! those who have the token in the URL (`http.rs`).
 //!
 //! ```text
 //!  telemetry --> live (one thread) --> hub --> viewer (a thread each) --> browser, Lichtblick

@@ -66,9 +66,9 @@ mod tests {
     #[test]
     fn every_fault_has_a_remedy_of_its_own_kind() {
         let general = remedy(u8::MAX);
-        let faults = fault::ALL.iter().filter(|(_, kind)| *kind != fault::NONE);
-        for (name, kind) in faults {
-            assert_ne!(remedy(*kind), general, "{name}");
+        let faults = fault::ALL.iter().filter(|code| code.number != fault::NONE);
+        for code in faults {
+            assert_ne!(remedy(code.number), general, "{}", code.name);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The secret in the URL: another user of the machine can connect to the port, but does not know it.
+//! The secret in the URL: another user of the machine can connect to the port, but does not have it.
 
 use std::io;
 

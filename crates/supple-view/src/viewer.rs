@@ -203,7 +203,7 @@ fn binary_message(context: &Context<'_>, calls: &mut Calls, bytes: &[u8]) -> Opt
     }
 }
 
-/// The messages that tell a viewer how its command ended.
+/// The messages that report to a viewer how its command ended.
 fn replies(hub: &Hub, reply_to: ReplyTo, answer: Answer) -> Vec<Message> {
     match reply_to {
         ReplyTo::Parameters(id) => {

@@ -57,7 +57,7 @@ pub enum Command {
         /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
         #[arg(long)]
         strict: bool,
-        /// What a URDF alone does not say.
+        /// What a URDF alone does not contain.
         #[command(flatten)]
         urdf: UrdfArgs,
         /// System to use.
@@ -176,7 +176,7 @@ pub struct MotorsArgs {
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
-    /// What a URDF alone does not say.
+    /// What a URDF alone does not contain.
     #[command(flatten)]
     pub urdf: UrdfArgs,
     /// can:NAME or unix:FOLDER; default: the bus of an emulated arm with the prefix.
@@ -230,7 +230,7 @@ pub struct DrillArgs {
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
-    /// What a URDF alone does not say.
+    /// What a URDF alone does not contain.
     #[command(flatten)]
     pub urdf: UrdfArgs,
     /// Run without real-time priority and without locked memory.
@@ -327,7 +327,7 @@ pub struct UpArgs {
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
-    /// What a URDF alone does not say.
+    /// What a URDF alone does not contain.
     #[command(flatten)]
     pub urdf: UrdfArgs,
     /// Trajectory: the arm moves to its start and then follows it.
@@ -336,7 +336,7 @@ pub struct UpArgs {
     /// The arm's bus, can:NAME or unix:FOLDER. Default: can:can0 for `can`, private sockets for `emu`.
     #[arg(long, value_name = "BUS")]
     pub bus: Option<Address>,
-    /// Print the bus time of a cycle of this arm at the requested rate and end; the exit code tells whether it fits.
+    /// Print the bus time of a cycle of this arm at the requested rate and end; the exit code shows whether it fits.
     #[arg(long)]
     pub budget: bool,
     /// Declare that the arm is in its home pose now; used if the motor pucks have lost their positions. An emulated
@@ -483,7 +483,7 @@ pub struct PlayArgs {
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
-    /// What a URDF alone does not say.
+    /// What a URDF alone does not contain.
     #[command(flatten)]
     pub urdf: UrdfArgs,
     /// System to use.
@@ -518,7 +518,7 @@ pub struct TrackArgs {
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
-    /// What a URDF alone does not say.
+    /// What a URDF alone does not contain.
     #[command(flatten)]
     pub urdf: UrdfArgs,
     /// System to use.

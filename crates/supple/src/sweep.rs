@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use supple_cli::exit::Failure;
 use supple_cli::sibling::python;
 
-/// Starts the package's command with the arguments after `sweep`; without the package it says so, with exit code 10.
+/// Starts the package's command with the arguments after `sweep`; without the package it reports that, with exit code 10.
 const START: &str = "import sys
 try:
     from supple.__main__ import main

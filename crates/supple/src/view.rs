@@ -32,7 +32,7 @@ pub struct ViewArgs {
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
-    /// What a URDF alone does not say.
+    /// What a URDF alone does not contain.
     #[command(flatten)]
     pub urdf: UrdfArgs,
     /// Draw a block, its top face at this height above the base frame (m).

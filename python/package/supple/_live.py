@@ -370,7 +370,7 @@ class System:
             before = self._native.received()
             if not self._native.wait(before, 5.0):
                 raise ConnectionError(
-                    f"no telemetry from the system {self.prefix!r} for 5 s: `supple status` says whether it runs"
+                    f"no telemetry from the system {self.prefix!r} for 5 s: `supple status` shows whether it runs"
                 )
         return self.state
 

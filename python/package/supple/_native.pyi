@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
-from typing import Any, final
+from typing import Any, Literal, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -165,11 +165,15 @@ class Arm:
     @staticmethod
     def _from_text(toml: str, urdf: str) -> Arm: ...
     def _save(self, folder: PathLike[str]) -> None: ...
+    @property
+    def active_joints(self) -> list[bool]:
+        """Whether the impedance law acts on each joint: on those that the TOML does not hold."""
+
     def completed(self) -> Arm:
         """The arm with every setting that a controller needs.
 
         What its TOML leaves out is derived from the arm: estimates of rotor inertias, gains, damping, rates, thresholds,
-        home pose and the place of the paper's trajectories. If the TOML says nothing about single joints, the three that
+        home pose and the place of the paper's trajectories. If the TOML has no entry for single joints, the three that
         move the tip best are active and the others are held. :attr:`toml` gives each derived setting with its reason. What
         the TOML gives stays, so that a built-in arm is returned as it is, except for what it leaves out.
 
@@ -472,6 +476,125 @@ class Arm:
         True
         """
 
+    def impedance_torque(
+        self,
+        q: ArrayLike,
+        qd: ArrayLike,
+        reference: ArrayLike,
+        velocity: ArrayLike | None = None,
+        acceleration: ArrayLike | None = None,
+        *,
+        stiffness: ArrayLike,
+        damping: ArrayLike,
+        friction: Literal["reference", "measured"] | None = None,
+        active_joints: Sequence[bool] | None = None,
+        nullspace_damping: ArrayLike | None = None,
+        nullspace_torque: ArrayLike | None = None,
+        apparent_inertia: ArrayLike | None = None,
+        force: ArrayLike | None = None,
+        out: _Array | None = None,
+    ) -> _Array:
+        """Joint torques of the impedance law: the function that the controller runs in its modes track and track pose.
+
+        ``tau = G + C qd + D + H Jb (Xo'' - J' qd) + J^T (K (Xo - X) + B (Xo' - X'))``, with ``Jb`` the dynamically
+        consistent inverse of the active joints' Jacobian, damped near singular poses, and in the null space of the
+        tip's motion the damping and the torque that are given.
+
+        Every argument is one state or a batch, and everything of the tip is in base axes. The task is the tip's
+        position or its pose, by the shape of ``reference``. With ``d = 3`` for a position, vectors of the tip have
+        x, y and z; with ``d = 6`` for a pose they have x, y and z along the axes, then about them.
+
+        Parameters
+        ----------
+        q, qd : array_like, (..., N)
+            Angles (rad) and velocities (rad/s) of the joints.
+        reference : array_like, (..., 3) or (..., 4, 4)
+            Position of the tip that is wanted (m); or its pose, as :meth:`tip_pose` returns it.
+        velocity, acceleration : array_like, (..., d), optional
+            Of the reference (m/s and rad/s; m/s^2 and rad/s^2). Default: zero.
+        stiffness, damping : array_like, (..., d)
+            Diagonals of ``K`` (N/m, then N m/rad) and ``B`` (N s/m, then N m s/rad), zero or more. For a position a
+            single number stands for all axes.
+        friction : {"reference", "measured"}, optional
+            Adds the feed-forward of :attr:`friction` at the joint velocities of the reference, as the controller does,
+            or at ``qd``. Default: none.
+        active_joints : sequence of bool, (N,), optional
+            Joints on which the law acts; at least ``d``. The others get ``G + C qd``, friction and the coupling torque.
+            Default: :attr:`active_joints`.
+        nullspace_damping : array_like, (..., N), optional
+            Damping of the joints' motion that leaves the tip alone (N m s/rad), zero or more; a single number stands for
+            all joints. Default: 0.
+        nullspace_torque : array_like, (..., N), optional
+            Torque to apply where the tip does not feel it, as towards a posture (N m). Default: 0.
+        apparent_inertia : array_like, (..., d, d), optional
+            Inertia that the tip is to have, symmetric and positive definite (kg, kg m^2). It needs ``force``. Default:
+            the arm's own.
+        force : array_like, (..., d), optional
+            Measured force on the tip (N), for a pose with the moment (N m).
+        out : numpy.ndarray, (..., N), optional
+            Array for the result. If the call raises an error, it holds the states before the one that is wrong.
+
+        Returns
+        -------
+        numpy.ndarray, (..., N)
+            Joint torques (N m): the sum of :meth:`impedance_terms`, bit for bit. Without what the controller adds: loops
+            of held joints, soft stops, ripple, learned terms, handover and limits.
+
+        Raises
+        ------
+        ValueError
+            If the shapes do not agree, a gain is negative, too few joints are active, a reference is no pose or an
+            inertia not positive definite; the message names argument, index and remedy.
+
+        Examples
+        --------
+        >>> import numpy as np, supple
+        >>> arm = supple.Arm.load("wam4")
+        >>> q, still = arm.home_rad, np.zeros(arm.dof)
+        >>> here = arm.tip_pose(q)[:3, 3]
+        >>> tau = arm.impedance_torque(q, still, here, stiffness=5.0, damping=1.5)
+        >>> bool(np.allclose(tau, arm.gravity(q)))
+        True
+        """
+
+    def impedance_terms(
+        self,
+        q: ArrayLike,
+        qd: ArrayLike,
+        reference: ArrayLike,
+        velocity: ArrayLike | None = None,
+        acceleration: ArrayLike | None = None,
+        *,
+        stiffness: ArrayLike,
+        damping: ArrayLike,
+        friction: Literal["reference", "measured"] | None = None,
+        active_joints: Sequence[bool] | None = None,
+        nullspace_damping: ArrayLike | None = None,
+        nullspace_torque: ArrayLike | None = None,
+        apparent_inertia: ArrayLike | None = None,
+        force: ArrayLike | None = None,
+    ) -> dict[str, _Array]:
+        """Every term of the impedance law apart; arguments and errors are those of :meth:`impedance_torque`.
+
+        Returns
+        -------
+        dict of str to numpy.ndarray, (..., N)
+            The terms (N m): ``gravity``, ``coriolis``, ``friction``, ``jacobian_rate``, ``inertial``, ``stiffness``,
+            ``damping``, ``force``, ``nullspace``, with the names of the controller's record and of logs. Added in this
+            order they are the torque.
+
+        Examples
+        --------
+        >>> import numpy as np, supple
+        >>> arm = supple.Arm.load("wam4")
+        >>> q, still = np.tile(arm.home_rad, (1000, 1)), np.zeros(arm.dof)
+        >>> above = arm.tip_pose(arm.home_rad)[:3, 3] + [0.0, 0.0, 0.1]
+        >>> terms = arm.impedance_terms(q, still, above, stiffness=5.0, damping=1.5)
+        >>> pull = arm.jacobian(arm.home_rad)[2] * 0.5
+        >>> bool(np.allclose(terms["stiffness"], np.where(arm.active_joints, pull, 0.0)))
+        True
+        """
+
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self) -> int: ...
     def __reduce__(self) -> tuple[Any, tuple[str, str]]: ...
@@ -702,7 +825,7 @@ class Fit:
     def validate(self, log: dict[str, Any]) -> dict[str, Any]: ...
 
 def read_log(path: str) -> dict[str, Any]:
-    """Reads a log: the arm, what it says of itself, and its columns."""
+    """Reads a log: the arm, its metadata and its columns."""
 
 def plant_options(name: str) -> dict[str, float]:
     """The set of options `name` as a dictionary."""

@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
-use supple_core::codes::{RequestCode, RequestCodeError, request_kind, trajectory_kind};
+use supple_core::codes::{Code, RequestCode, RequestCodeError, request_kind, trajectory_kind};
 use supple_core::controller::{Request, SetPoint};
 use supple_core::math::Vector3;
 use supple_ipc::message::{MAX_DOF, Telemetry};
@@ -254,10 +254,10 @@ fn first_cycles(worker: &Worker, timeout: Duration) -> Option<(usize, f64)> {
 
 /// A request by its names, as logs have them.
 pub fn code(kind: &str, trajectory: Option<&str>, values: &[f64]) -> PyResult<RequestCode> {
-    let number = |what: &str, names: &[(&str, u8)], name: &str| {
-        let known = names.iter().find(|(known, _)| *known == name);
-        known.map(|(_, number)| *number).ok_or_else(|| {
-            let names: Vec<&str> = names.iter().map(|(name, _)| *name).collect();
+    let number = |what: &str, all: &[Code], name: &str| {
+        let known = all.iter().find(|code| code.name == name);
+        known.map(|code| code.number).ok_or_else(|| {
+            let names: Vec<&str> = all.iter().map(|code| code.name).collect();
             PyValueError::new_err(format!(
                 "{what}: expected one of {}, got '{name}'",
                 names.join(", ")

@@ -1,7 +1,6 @@
 //! Seeded mutations of inputs; the test on the stable compiler uses them instead of a fuzzer.
 
-use rand_xoshiro::SplitMix64;
-use rand_xoshiro::rand_core::{Rng, SeedableRng};
+pub use supple_random::Random;
 
 /// Byte values that often trigger bugs.
 const BYTES: [u8; 12] = [
@@ -29,31 +28,10 @@ const RUNS: [&[u8]; 16] = [
 /// Maximum size of a mutated input.
 const MAX_INPUT_BYTES: usize = 1 << 16;
 
-/// Pseudo-random numbers, reproducible for a seed.
-#[derive(Clone, Debug)]
-pub struct Random(SplitMix64);
-
-impl Random {
-    /// Creates a generator from a seed.
-    pub fn new(seed: u64) -> Random {
-        Random(SplitMix64::seed_from_u64(seed))
-    }
-
-    /// The next number.
-    pub fn bits(&mut self) -> u64 {
-        self.0.next_u64()
-    }
-
-    /// A number below `end`, which must not be zero.
-    pub fn below(&mut self, end: usize) -> usize {
-        (self.bits() % end.max(1) as u64) as usize
-    }
-}
-
 /// One of the inputs with one to four changes.
 pub fn mutated(random: &mut Random, inputs: &[Vec<u8>]) -> Vec<u8> {
-    let mut input = inputs[random.below(inputs.len())].clone();
-    for _ in 0..=random.below(4) {
+    let mut input = inputs[random.index(inputs.len())].clone();
+    for _ in 0..=random.index(4) {
         change(random, &mut input, inputs);
     }
     input.truncate(MAX_INPUT_BYTES);
@@ -61,38 +39,38 @@ pub fn mutated(random: &mut Random, inputs: &[Vec<u8>]) -> Vec<u8> {
 }
 
 fn change(random: &mut Random, input: &mut Vec<u8>, inputs: &[Vec<u8>]) {
-    let index = random.below(input.len() + 1);
+    let index = random.index(input.len() + 1);
     let rest = input.len() - index;
-    match random.below(9) {
-        0 if rest > 0 => input[index] ^= 1 << random.below(8),
-        1 if rest > 0 => input[index] = BYTES[random.below(BYTES.len())],
+    match random.index(9) {
+        0 if rest > 0 => input[index] ^= 1 << random.index(8),
+        1 if rest > 0 => input[index] = BYTES[random.index(BYTES.len())],
         2 if rest > 0 => input[index] = random.bits() as u8,
         3 => {
-            let run = RUNS[random.below(RUNS.len())];
+            let run = RUNS[random.index(RUNS.len())];
             let covered = run.len().min(rest);
             input.splice(index..index + covered, run.iter().copied());
         }
         4 => {
-            let run = RUNS[random.below(RUNS.len())];
+            let run = RUNS[random.index(RUNS.len())];
             input.splice(index..index, run.iter().copied());
         }
         5 => input.truncate(index),
         6 => {
-            let gone = random.below(rest.min(64) + 1);
+            let gone = random.index(rest.min(64) + 1);
             input.drain(index..index + gone);
         }
         7 => {
             // Insert a part of any input here, or replace bytes by it.
-            let other = &inputs[random.below(inputs.len())];
-            let from = random.below(other.len() + 1);
-            let length = random.below((other.len() - from).min(512) + 1);
-            let covered = random.below(rest.min(length) + 1);
+            let other = &inputs[random.index(inputs.len())];
+            let from = random.index(other.len() + 1);
+            let length = random.index((other.len() - from).min(512) + 1);
+            let covered = random.index(rest.min(length) + 1);
             let part = other[from..from + length].iter().copied();
             input.splice(index..index + covered, part);
         }
         _ => {
-            let length = random.below(rest.min(64) + 1);
-            let part = input[index..index + length].repeat(1 + random.below(3));
+            let length = random.index(rest.min(64) + 1);
+            let part = input[index..index + length].repeat(1 + random.index(3));
             input.splice(index..index, part);
         }
     }

@@ -12,7 +12,7 @@ pub struct DemoArgs {
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
-    /// What a URDF alone does not say.
+    /// What a URDF alone does not contain.
     #[command(flatten)]
     pub urdf: UrdfArgs,
     /// The controller's model of the arm, for example the output of `supple identify`: path of its TOML or folder.

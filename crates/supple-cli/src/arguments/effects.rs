@@ -12,7 +12,7 @@ pub struct EffectsArgs {
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
-    /// What a URDF alone does not say.
+    /// What a URDF alone does not contain.
     #[command(flatten)]
     pub urdf: UrdfArgs,
     /// Number of seeds of each effect.

@@ -159,7 +159,7 @@ pub struct IdentifyArgs {
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
-    /// What a URDF alone does not say.
+    /// What a URDF alone does not contain.
     #[command(flatten)]
     pub urdf: UrdfArgs,
     /// Folder for arm.toml, arm.urdf, report.html and summary.json.
@@ -220,7 +220,7 @@ pub struct DesignArgs {
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
-    /// What a URDF alone does not say.
+    /// What a URDF alone does not contain.
     #[command(flatten)]
     pub urdf: UrdfArgs,
     /// Folder for excitation.csv, excitation.svg and summary.json.
@@ -275,7 +275,7 @@ pub struct RunArgs {
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
-    /// What a URDF alone does not say.
+    /// What a URDF alone does not contain.
     #[command(flatten)]
     pub urdf: UrdfArgs,
     /// Folder that `excite design` wrote, or its summary.json.
@@ -313,7 +313,7 @@ pub struct BreakawayArgs {
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
-    /// What a URDF alone does not say.
+    /// What a URDF alone does not contain.
     #[command(flatten)]
     pub urdf: UrdfArgs,
     /// Joints, counted from 0. Default: all.
@@ -407,7 +407,7 @@ pub struct CalibrateArgs {
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
-    /// What a URDF alone does not say.
+    /// What a URDF alone does not contain.
     #[command(flatten)]
     pub urdf: UrdfArgs,
     /// Folder for the identified arm, the reports and the logs.
@@ -476,7 +476,7 @@ pub struct LearnArgs {
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
-    /// What a URDF alone does not say.
+    /// What a URDF alone does not contain.
     #[command(flatten)]
     pub urdf: UrdfArgs,
     /// Folder for the refitted model.

@@ -2,7 +2,7 @@
 
 use supple_model::UrdfName;
 
-/// What a URDF alone does not say.
+/// What a URDF alone does not contain.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct UrdfArgs {
     /// The link whose origin is the tip, if the arm is given as a URDF. Default: the end of its longest chain.

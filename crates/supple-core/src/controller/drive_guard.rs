@@ -171,7 +171,7 @@ impl<const N: usize> DriveGuard<N> {
     }
 
     /// Checks a command before the drives apply it. `command` is `None` if the controller did not
-    /// answer; `active` says whether the motors apply torques.
+    /// answer; `active` is whether the motors apply torques.
     ///
     /// # Errors
     /// The [`GuardReason`] for ending the torque.

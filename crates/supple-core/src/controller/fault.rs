@@ -167,15 +167,15 @@ pub enum Fault {
     },
 }
 
-/// Safe action of the controller in a fault.
+/// Safe action of the controller in a fault, with its number; 0 is none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SafeAction {
     /// Gravity compensation and damping of the momentum, without any position loop (see `stop.rs`).
     /// Replaced by [`SafeAction::Idle`] if the arm does not come to rest.
-    GravityHold,
+    GravityHold = 1,
     /// No torque, braking drives: the angles or the model cannot be trusted, so the gravity torque
     /// computed from them cannot be either.
-    Idle,
+    Idle = 2,
 }
 
 impl Fault {

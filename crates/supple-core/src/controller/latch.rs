@@ -72,7 +72,7 @@ impl Latch {
         Latch::open(residual, Vector3::zeros())
     }
 
-    /// An open latch before any motion that knows the residuals of this one.
+    /// An open latch before any motion that uses the residuals of this one.
     pub fn restarted(&self) -> Self {
         Latch::open(self.residual, self.resting_force_n)
     }

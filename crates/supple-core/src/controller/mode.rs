@@ -8,71 +8,96 @@ use crate::record::Text;
 use crate::trajectory::{Fourier, Rotation, Trajectory, TrajectoryError};
 use core::fmt;
 
-/// Mode of the controller.
-///
-/// ```text
-/// idle <-> gravity hold <-> work (move, track, probe, excite, breakaway,      any -> fault
-///                                 float, joint impedance, track pose)
-///          work -> work      breakaway -> gravity hold (done)
-///          fault -> gravity hold | idle  (reset)
-/// ```
-///
-/// Idle can be entered from every mode; in a fault it removes the torque and keeps the fault
-/// latched. From idle only gravity hold can be entered. While the drives are idle, every mode with
-/// torque changes to gravity hold at the current pose, and requests for motion are refused: drives
-/// become active only in gravity hold. A reset leaves the fault for the mode of its safe action:
-/// gravity hold, or idle if the angles could not be trusted or the fault occurred in idle. A reset
-/// is refused in a cycle that would raise a fault again, and until the safe action has stopped the arm.
-/// Every transition except to idle and fault is bumpless: it starts from the previous torque and
-/// blends it out; after a reset the soft stops come back gradually.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mode {
-    /// No torque.
-    Idle,
-    /// Gravity compensation with joint damping; held joints keep their position loop.
-    GravityHold,
-    /// Stiff joint-space motion to a pose, with model feed-forward; holds the pose at the end.
-    Move,
-    /// The impedance law follows a trajectory.
-    Track,
-    /// The impedance law follows the probing cycle.
-    Probe,
-    /// A fault is latched; the safe action runs until a reset.
-    Fault,
-    /// Stiff joint-space motion along a Fourier series, with model feed-forward, for
-    /// identification; held joints move too. Holds the end pose.
-    Excite,
-    /// The torque of one joint is ramped until it moves, the others are held; then gravity hold.
-    Breakaway,
-    /// The model alone, without stiffness and without damping beyond the arm's own friction, part of which is
-    /// compensated: for guiding by hand, at up to half of the speed limits. Held joints keep their position
-    /// loop.
-    Float,
-    /// Compliant joint-space motion to a pose, with the feed-forward of the move mode; holds the pose at the end
-    /// with the same gains. Contact is allowed. Held joints keep their own stiff loop.
-    JointImpedance,
-    /// The impedance law follows a trajectory and a rotation of the tip: six directions, so that at least six joints
-    /// must be active. Its inertia is always the arm's own. A pose near a singular one, where the task would be damped
-    /// (see [`crate::task`]), is a fault.
-    TrackPose,
+/// The modes, each declared once with its number, which once given keeps its meaning, and its name.
+macro_rules! modes {
+    (
+        $(#[$enum:meta])+
+        pub enum Mode {
+            $($(#[doc = $meaning:literal])+ $mode:ident = $number:literal $name:literal,)+
+        }
+    ) => {
+        $(#[$enum])+
+        pub enum Mode {
+            $($(#[doc = $meaning])+ $mode = $number,)+
+        }
+
+        /// Every mode, at the place of its number.
+        pub const MODES: [Mode; [$($number),+].len()] = [$(Mode::$mode),+];
+
+        const _: () = {
+            let mut place = 0;
+            while place < MODES.len() {
+                assert!(MODES[place] as usize == place, "a number is missing or out of order");
+                place += 1;
+            }
+        };
+
+        impl Mode {
+            /// Short name for logs and status lines.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Mode::$mode => $name,)+
+                }
+            }
+
+            /// What the mode does.
+            pub fn meaning(self) -> &'static str {
+                match self {
+                    $(Mode::$mode => concat!($($meaning),+).trim_ascii_start(),)+
+                }
+            }
+        }
+    };
 }
 
-impl Mode {
-    /// Short name for logs and status lines.
-    pub fn name(self) -> &'static str {
-        match self {
-            Mode::Idle => "idle",
-            Mode::GravityHold => "gravity_hold",
-            Mode::Move => "move",
-            Mode::Track => "track",
-            Mode::Probe => "probe",
-            Mode::Fault => "fault",
-            Mode::Excite => "excite",
-            Mode::Breakaway => "breakaway",
-            Mode::Float => "float",
-            Mode::JointImpedance => "joint_impedance",
-            Mode::TrackPose => "track_pose",
-        }
+modes! {
+    /// Mode of the controller.
+    ///
+    /// ```text
+    /// idle <-> gravity hold <-> work (move, track, probe, excite, breakaway,      any -> fault
+    ///                                 float, joint impedance, track pose)
+    ///          work -> work      breakaway -> gravity hold (done)
+    ///          fault -> gravity hold | idle  (reset)
+    /// ```
+    ///
+    /// Idle can be entered from every mode; in a fault it removes the torque and keeps the fault
+    /// latched. From idle only gravity hold can be entered. While the drives are idle, every mode with
+    /// torque changes to gravity hold at the current pose, and requests for motion are refused: drives
+    /// become active only in gravity hold. A reset leaves the fault for the mode of its safe action:
+    /// gravity hold, or idle if the angles could not be trusted or the fault occurred in idle. A reset
+    /// is refused in a cycle that would raise a fault again, and until the safe action has stopped the arm.
+    /// Every transition except to idle and fault is bumpless: it starts from the previous torque and
+    /// blends it out; after a reset the soft stops come back gradually.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub enum Mode {
+        /// No torque.
+        Idle = 0 "idle",
+        /// Gravity compensation with joint damping; held joints keep their position loop.
+        GravityHold = 1 "gravity_hold",
+        /// Stiff joint-space motion to a pose, with model feed-forward; holds the pose at the end.
+        Move = 2 "move",
+        /// The impedance law follows a trajectory.
+        Track = 3 "track",
+        /// The impedance law follows the probing cycle.
+        Probe = 4 "probe",
+        /// A fault is latched; the safe action runs until a reset.
+        Fault = 5 "fault",
+        /// Stiff joint-space motion along a Fourier series, with model feed-forward, for
+        /// identification; held joints move too. Holds the end pose.
+        Excite = 6 "excite",
+        /// The torque of one joint is ramped until it moves, the others are held; then gravity hold.
+        Breakaway = 7 "breakaway",
+        /// The model alone, without stiffness and without damping beyond the arm's own friction, part of which is
+        /// compensated: for guiding by hand, at up to half of the speed limits. Held joints keep their position
+        /// loop.
+        Float = 8 "float",
+        /// Compliant joint-space motion to a pose, with the feed-forward of the move mode; holds the pose at the end
+        /// with the same gains. Contact is allowed. Held joints keep their own stiff loop.
+        JointImpedance = 9 "joint_impedance",
+        /// The impedance law follows a trajectory and a rotation of the tip: six directions, so that at least six joints
+        /// must be active. Its inertia is always the arm's own. A pose near a singular one, where the task would be damped
+        /// (see [`crate::task`]), is a fault.
+        TrackPose = 10 "track_pose",
     }
 }
 

@@ -363,7 +363,7 @@ impl<const N: usize> CycleRecord<N> {
     /// The input of the step, to the last bit.
     ///
     /// # Errors
-    /// A request that this version does not know.
+    /// A request that this version does not have.
     pub fn input(&self) -> Result<Input<N>, RequestCodeError> {
         let position =
             |i: usize| self.has_measured_position[i].then_some(self.measured_position_rad[i]);
@@ -384,7 +384,7 @@ impl<const N: usize> CycleRecord<N> {
         RequestCode::from_parts(self.request, self.trajectory, self.request_values.values())
     }
 
-    /// Mode in force; `None` if this version does not know it.
+    /// Mode in force; `None` if this version does not have it.
     pub fn mode(&self) -> Option<Mode> {
         codes::mode(self.mode)
     }

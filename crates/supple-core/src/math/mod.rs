@@ -10,7 +10,7 @@ pub mod linalg;
 pub mod sincos;
 pub(crate) mod vec3;
 
-/// Column of `N` numbers, one per joint unless said otherwise.
+/// Column of `N` numbers, one per joint unless stated otherwise.
 pub type Vector<const N: usize> = nalgebra::SVector<f64, N>;
 /// Matrix of `R` rows and `C` columns.
 pub type Matrix<const R: usize, const C: usize> = nalgebra::SMatrix<f64, R, C>;

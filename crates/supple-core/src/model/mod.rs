@@ -1,4 +1,4 @@
-//! The arm and its surroundings as the controller knows them: links, friction, torque ripple, workspace.
+//! Model of the arm and its surroundings in the controller: links, friction, torque ripple, workspace.
 
 pub mod arm;
 pub mod body;

@@ -23,14 +23,14 @@ type Outcome = Result<(), TestCaseError>;
 
 const DAMPING: f64 = 1.7;
 
-fn filled<const N: usize>(arm: &Arm<N>, q: &Vector<N>, qd: &Vector<N>) -> Terms<N> {
+pub fn filled<const N: usize>(arm: &Arm<N>, q: &Vector<N>, qd: &Vector<N>) -> Terms<N> {
     let mut filled = Terms::default();
     terms(arm, q, qd, &mut filled);
     filled
 }
 
 /// With coupled axes.
-fn gains() -> PoseGains {
+pub fn coupled_gains() -> PoseGains {
     let coupled = |diagonal: [f64; 3], by: f64| {
         let axes = Pose::from_xyz_rpy([0.0; 3], [0.3 * by, -0.5, by]).rotation;
         let gain = axes * Matrix3::from_diagonal(&Vector3::from(diagonal)) * axes.transpose();
@@ -116,7 +116,7 @@ fn tip_moves_as_stated<const N: usize>(case: &Case<N>, active: usize) -> Outcome
     if mobility.symmetric_eigenvalues().min() < 1e-3 || !regular(&mobility) {
         return Ok(());
     }
-    let (reference, gains) = (reference(case, &terms), gains());
+    let (reference, gains) = (reference(case, &terms), coupled_gains());
     let target = PoseTarget {
         reference: &reference,
         gains: &gains,
@@ -180,7 +180,7 @@ fn a_pose_takes_six_active_joints() {
     check::<7>(|case| {
         let (arm, roles) = (case.arm(), roles::<7>(5));
         let terms = filled(&arm, &case.q, &case.qd);
-        let (reference, gains) = (reference(case, &terms), gains());
+        let (reference, gains) = (reference(case, &terms), coupled_gains());
         let target = PoseTarget {
             reference: &reference,
             gains: &gains,
@@ -199,7 +199,7 @@ fn null_space_damping_of_the_pose_only_takes_energy() {
     fn takes(case: &Case<7>) -> Outcome {
         let (arm, qd) = (case.arm(), &case.qd);
         let terms = filled(&arm, &case.q, qd);
-        let (reference, gains, roles) = (reference(case, &terms), gains(), roles::<7>(7));
+        let (reference, gains, roles) = (reference(case, &terms), coupled_gains(), roles::<7>(7));
         let target = PoseTarget {
             reference: &reference,
             gains: &gains,
@@ -320,7 +320,7 @@ fn position_sum_is_the_total<const N: usize>(case: &Case<N>, active: usize) -> O
 fn pose_sum_is_the_total<const N: usize>(case: &Case<N>, active: usize) -> Outcome {
     near_and_away(case, |case| {
         let terms = filled(&case.arm(), &case.q, &case.qd);
-        let (reference, gains) = (reference(case, &terms), gains());
+        let (reference, gains) = (reference(case, &terms), coupled_gains());
         let roles = roles::<N>(active);
         let target = PoseTarget {
             reference: &reference,
@@ -385,7 +385,7 @@ fn a_posture_does_no_work_at_the_tip() {
         for i in 0..7 {
             prop_assert_eq!(pull[i], (-1.5 * case.q[i]).clamp(-1.5, 1.5));
         }
-        let (reference, gains) = (PoseReference::at_rest(terms.base_from_tip), gains());
+        let (reference, gains) = (PoseReference::at_rest(terms.base_from_tip), coupled_gains());
         let target = PoseTarget {
             reference: &reference,
             gains: &gains,
@@ -406,11 +406,11 @@ fn a_posture_does_no_work_at_the_tip() {
 
 #[test]
 fn gains_that_could_add_energy_are_not_passive() {
-    let mut asymmetric = gains();
+    let mut asymmetric = coupled_gains();
     asymmetric.damping_n_s_per_m[(0, 1)] += 0.1;
-    let mut negative = gains();
+    let mut negative = coupled_gains();
     negative.stiffness_nm_per_rad -= Matrix3::identity() * 0.01;
-    let mut unknown = gains();
+    let mut unknown = coupled_gains();
     unknown.stiffness_n_per_m[(2, 2)] = f64::NAN;
     for gains in [asymmetric, negative, unknown] {
         assert!(!gains.is_passive());
@@ -435,7 +435,7 @@ fn equal_stiffness_pulls_with_the_sine_along_the_axis() {
 }
 
 /// Energy of coupled stiffness `K` about the axes: `(1 - cos(angle)) a^T K a`.
-fn orientation_energy_j(
+pub fn orientation_energy_j(
     stiffness: &Matrix3<f64>,
     wanted: &Matrix3<f64>,
     found: &Matrix3<f64>,
@@ -453,7 +453,7 @@ fn the_torque_of_an_orientation_is_the_gradient_of_its_energy() {
     let turn = |axis: Vector3<f64>, angle: f64| {
         *Rotation3::from_axis_angle(&Unit::new_normalize(axis), angle).matrix()
     };
-    let stiffness = gains().stiffness_nm_per_rad;
+    let stiffness = coupled_gains().stiffness_nm_per_rad;
     let wanted = Pose::from_xyz_rpy([0.0; 3], [0.4, -0.7, 1.9]).rotation;
     for degrees in [1.0_f64, 40.0, 90.0, 100.0, 170.0, 179.0] {
         for axis in [[1.0, 0.0, 0.0], [0.3, -0.5, 0.8], [-0.7, 0.7, 0.1]] {
@@ -485,7 +485,7 @@ fn singular_poses_have_a_finite_torque() {
             angular_acceleration_rad_per_s2: Vector3::repeat(1.0),
             ..PoseReference::at_rest(terms.base_from_tip)
         };
-        let gains = gains();
+        let gains = coupled_gains();
         let target = PoseTarget {
             reference: &reference,
             gains: &gains,

@@ -1,6 +1,6 @@
 //! The scale of the residual: false alarms at the stated rate.
 
-use crate::support::random::Random;
+use crate::support::random::{Draws, Random};
 use supple_core::residual::ResidualScale;
 
 const PERIOD_S: f64 = 1e-3;

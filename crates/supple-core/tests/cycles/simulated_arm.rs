@@ -1,6 +1,6 @@
 //! A simulated arm with external pushes, and random measurements and requests.
 
-use crate::support::random::Random;
+use crate::support::random::{Draws, Random};
 use crate::support::rig::{Rig, probe_at, ramp};
 use supple_core::config::{Gains, JointGains, Role, RotationalGains};
 use supple_core::controller::{Breakaway, LearningSwitch, Mode, Request, SetPoint};
@@ -93,13 +93,13 @@ impl<const N: usize> SimulatedArm<N> {
             5 => Request::Track(Trajectory::Line(Line {
                 from_m: tip,
                 to_m: tip + Vector3::from(random.joints::<3>(0.1)),
-                duration_s: 1.0 + random.unit(),
+                duration_s: 1.0 + random.signed(),
             })),
             6 => Request::Move {
                 target_rad: Vector::from_fn(|i, _| {
                     held_at(self.rig.controller.config(), i).unwrap_or(self.rig.q[i])
                 }),
-                duration_s: 1.0 + random.unit(),
+                duration_s: 1.0 + random.signed(),
             },
             7 => Request::Excite(Fourier::at_rest(self.rig.q, 1.0)),
             8 => Request::Breakaway(ramp()),
@@ -121,13 +121,16 @@ impl<const N: usize> SimulatedArm<N> {
                 ramp_s: random.number(),
             },
             12 => Request::Gains {
-                gains: Gains::isotropic(150.0 + 150.0 * random.unit(), 30.0 + 20.0 * random.unit()),
+                gains: Gains::isotropic(
+                    150.0 + 150.0 * random.signed(),
+                    30.0 + 20.0 * random.signed(),
+                ),
                 ramp_s: 0.1,
             },
             14 => Request::Float,
             15 => Request::JointImpedance {
                 target_rad: self.rig.q + random.joints::<N>(0.2),
-                duration_s: 1.0 + random.unit(),
+                duration_s: 1.0 + random.signed(),
             },
             16 => Request::JointImpedance {
                 target_rad: Vector::from_fn(|_, _| random.number()),
@@ -140,7 +143,7 @@ impl<const N: usize> SimulatedArm<N> {
                 },
                 ramp_s: random.number(),
             },
-            18 => self.rig.turn(0.4 * random.unit() - 0.2),
+            18 => self.rig.turn(0.4 * random.signed() - 0.2),
             19 => Request::TrackPose {
                 trajectory: any_trajectory(random),
                 rotation: Rotation {
@@ -179,7 +182,7 @@ impl<const N: usize> SimulatedArm<N> {
                 // A little beyond the bounds now and then.
                 let share = if random.once_in(4) { 1.1 } else { 0.9 };
                 parameters.each(&bounds, |_, _, to, bound| {
-                    *to = share * bound * random.unit()
+                    *to = share * bound * random.signed()
                 });
                 Request::LearnedParameters(parameters)
             }
@@ -188,7 +191,7 @@ impl<const N: usize> SimulatedArm<N> {
                 let bounds = self.rig.controller.learned_bounds().map_nm;
                 let mut map = JointMap::ZERO;
                 for value in map.coefficients_mut() {
-                    *value = bounds[joint.min(N - 1)] * random.unit();
+                    *value = bounds[joint.min(N - 1)] * random.signed();
                 }
                 Request::LearnedMap { joint, map }
             }

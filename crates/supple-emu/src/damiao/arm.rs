@@ -5,8 +5,6 @@ use super::misbehaviour::{Misbehaviour, MisbehaviourKind};
 use super::motor::Motor;
 use crate::error::EmulatorError;
 use crate::wire::Wire;
-use rand_xoshiro::SplitMix64;
-use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use supple_bus::virtual_time::Peer;
 use supple_bus::{BusFault, Event};
 use supple_can_frame::CanFrame;
@@ -16,6 +14,7 @@ use supple_plant::{
     ActuatorModel, ControllerView, HardStops, Injection, InjectionError, Injector, Plant,
     PlantConfig, Truth,
 };
+use supple_random::Random;
 
 /// What happened to a motor.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,7 +44,7 @@ pub struct DamiaoArm<const N: usize> {
     wedged: bool,
     bus_off_until_ns: Option<u64>,
     pending_fault: Option<BusFault>,
-    random: SplitMix64,
+    random: Random,
     events: Vec<(u64, MotorEvent)>,
     /// Current offset of the machine's monotonic clock from the arm's time \[ns\].
     offset_ns: u64,
@@ -103,7 +102,7 @@ impl<const N: usize> DamiaoArm<N> {
             wedged: false,
             bus_off_until_ns: None,
             pending_fault: None,
-            random: SplitMix64::seed_from_u64(config.seed),
+            random: Random::new(config.seed),
             events: Vec::new(),
             offset_ns: 0,
             config,
@@ -181,7 +180,7 @@ impl<const N: usize> DamiaoArm<N> {
         &mut self.plant
     }
 
-    /// Torque of each motor at its joint, as its current control believes it to be \[N m\].
+    /// Torque of each motor at its joint, as its current control estimates it \[N m\].
     pub fn motor_torque_nm(&self) -> Vector<N> {
         Vector::from_fn(|i, _| self.motors[i].joint_torque_nm())
     }
@@ -327,7 +326,7 @@ impl<const N: usize> DamiaoArm<N> {
             }
             if let Some(reply) = reaction.reply {
                 let late_ns = self.motors[index].late_ns();
-                let jitter_ns = self.random.next_u64() % (self.config.jitter_ns + 1);
+                let jitter_ns = self.random.below(self.config.jitter_ns + 1);
                 let ready_ns = self.now_ns + self.config.latency_ns + jitter_ns + late_ns;
                 self.wire.queue(ready_ns, reply);
             }

@@ -1,6 +1,6 @@
 //! One emulated motor: state, registers, replies, torque.
 //!
-//! Positions are those of the output shaft; codes are truncated, as the motors' own encoders are believed to do. The
+//! Positions are those of the output shaft; codes are truncated, as the motors' own encoders are assumed to do. The
 //! torque follows the last command, whether it came before or after the motor was enabled, until the watchdog ends it.
 
 use super::config::MotorConfig;
@@ -125,12 +125,12 @@ impl Motor {
         self.late_ns
     }
 
-    /// Position as the motor knows it \[rad\].
+    /// Position as the motor measures it \[rad\].
     fn reported_position_rad(&self) -> f64 {
         self.position_rad + self.shift_rad
     }
 
-    /// Joint torque of the motor, as its current control believes it to be \[N m\].
+    /// Joint torque of the motor, as its current control estimates it \[N m\].
     pub fn joint_torque_nm(&self) -> f64 {
         self.config.direction * self.shaft_torque_nm()
     }

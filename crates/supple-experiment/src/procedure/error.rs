@@ -1,4 +1,4 @@
-//! Why a procedure ends early. Each message says what to do.
+//! Why a procedure ends early. Each message states what to do.
 
 use crate::error::ExperimentError;
 use std::path::PathBuf;
@@ -9,7 +9,7 @@ pub enum ProcedureError {
     /// Design, model or simulated arm.
     #[error(transparent)]
     Experiment(#[from] ExperimentError),
-    /// The motors, encoders and joints do not belong together as the description says.
+    /// The motors, encoders and joints do not belong together as the description states.
     #[error("{problem}: {remedy}; then go on with --resume")]
     Wiring {
         /// Finding, with the joint.

@@ -13,7 +13,7 @@ use supple_ident::design::{DesignOptions, constant_speed_series, design, slow_se
 
 /// Period of the excitations \[s\], and the number of periods of each and of the unseen motion.
 const EXCITATION: (f64, f64, f64) = (12.0, 1.0, 1.25);
-/// Number of excitations: other poses tell more than repetitions.
+/// Number of excitations: other poses give more information than repetitions.
 const EXCITATIONS: u64 = 3;
 /// Fraction of the amplitude of the first pass, and its number of periods.
 const FIRST: (f64, f64) = (0.25, 1.5);

@@ -2,7 +2,7 @@
 //! one joint after the other, and from the torque that holds the arm at rest.
 //!
 //! A ramp needs no position loop on its joint; the loops of the others show whether those hold. The difference between a
-//! ramp up and a ramp down tells the direction, whatever gravity the model lacks.
+//! ramp up and a ramp down shows the direction, whatever gravity the model lacks.
 
 use super::error::ProcedureError;
 use crate::request_sequence::Recording;
@@ -14,7 +14,7 @@ use supple_core::Vector;
 const OTHER_SHARE: f64 = 0.5;
 /// Motion of an encoder that counts as motion of its joint: more than bristles and cables give \[rad\].
 const MOVED_RAD: f64 = 0.01;
-/// Gravity torque above which the torque at rest tells the scale \[N m\].
+/// Gravity torque above which the torque at rest shows the scale \[N m\].
 const HEAVY_NM: f64 = 4.0;
 /// Factor between the holding torque and the model's gravity, above which units differ: first moments that are 28 % off and
 /// motors that give two thirds of what is commanded make 2.1.

@@ -144,7 +144,7 @@ impl<'a, const N: usize> Context<'a, N> {
         })
     }
 
-    /// The same with the given arm believed more.
+    /// The same with more weight on the given arm.
     pub fn believing_the_arm(&self) -> Result<Self, IdentError> {
         Self::with_prior(
             self.arm,

@@ -52,7 +52,7 @@ pub enum Consequence {
     Stop,
     /// The log is fitted without the samples concerned.
     Mask,
-    /// The log is fitted; the report says so.
+    /// The log is fitted; the report names the finding.
     Warn,
 }
 

@@ -10,7 +10,7 @@
 //! - `excess`: what the arm does not explain at some times (contact), or at all poses (torques in another unit, a
 //!   payload, an offset).
 //!
-//! Nothing here knows an arm: every threshold is a ratio to what the log itself shows, or to the gravity of the given arm.
+//! Nothing here depends on an arm: every threshold is a ratio to what the log itself shows, or to the gravity of the given arm.
 
 mod excess;
 pub(crate) mod explained;

@@ -72,7 +72,7 @@ impl Remedy {
         m
     }
 
-    /// Smallest gain in the score at which the remedy is believed: small changes of a column may also make up for what
+    /// Smallest gain in the score at which the remedy is accepted: small changes of a column may also make up for what
     /// the arm's model lacks.
     fn threshold(&self) -> f64 {
         match self {

@@ -1,12 +1,12 @@
 //! The constrained solution compared with its optimality conditions, known solutions and random feasible
 //! points.
 
-use crate::support::Noise;
 use supple_core::math::Vector;
 use supple_ident::consistent::{Constraints, Solution, pseudo_inertia, solve};
 use supple_ident::qr_reduction::ReducedSystem;
 use supple_ident::regressor::JointRows;
 use supple_ident::{DMatrix, DVector};
+use supple_random::Random;
 
 type Link = Vector<10>;
 
@@ -38,9 +38,9 @@ fn objective(problem: &ReducedSystem, c: &Constraints, x: &DVector<f64>) -> Opti
 /// Noisy equations of two links and four friction columns, whose unconstrained solution is physically
 /// inconsistent.
 fn hard(seed: u64, prior_weight: f64) -> (ReducedSystem, Constraints) {
-    let mut noise = Noise::new(seed);
-    let a = DMatrix::from_fn(60, 24, |_, _| noise.draw());
-    let b = DVector::from_fn(60, |_, _| 2.0 * noise.draw());
+    let mut noise = Random::new(seed);
+    let a = DMatrix::from_fn(60, 24, |_, _| noise.signed());
+    let b = DVector::from_fn(60, |_, _| 2.0 * noise.signed());
     let constraints = Constraints {
         links: vec![ball(), ball()],
         not_negative: vec![
@@ -62,18 +62,18 @@ fn no_feasible_neighbour_is_better_than_the_optimality_gap() {
         let found = solve(&problem, &constraints).unwrap();
         let value = objective(&problem, &constraints, &found.x).expect("feasible");
         assert!((value - found.objective).abs() < 1e-8 * value.abs().max(1.0));
-        let mut noise = Noise::new(seed + 100);
+        let mut noise = Random::new(seed + 100);
         let mut feasible = 0;
         for round in 0..2000 {
             let size = 10.0_f64.powi(-(round % 6));
-            let step = DVector::from_fn(24, |_, _| size * noise.draw());
+            let step = DVector::from_fn(24, |_, _| size * noise.signed());
             // Also step towards the middle of the feasible set, since most random steps leave it.
             let middle = DVector::from_fn(24, |i, _| match i {
                 0..20 => ball()[i % 10],
                 20 | 21 => 1.0,
                 _ => 0.0,
             });
-            let inwards = size * (noise.draw() + 1.0) * 0.5;
+            let inwards = size * (noise.signed() + 1.0) * 0.5;
             let rival = &found.x + step * 0.3 + (&middle - &found.x) * inwards;
             if let Some(other) = objective(&problem, &constraints, &rival) {
                 feasible += 1;
@@ -130,9 +130,9 @@ fn multipliers_are_dual_feasible_and_complementary() {
 
 #[test]
 fn an_unconstrained_optimum_inside_the_set_is_found_exactly() {
-    let mut noise = Noise::new(5);
+    let mut noise = Random::new(5);
     let truth = DVector::from_iterator(11, ball().iter().copied().chain([0.7]));
-    let a = DMatrix::from_fn(400, 11, |_, _| 100.0 * noise.draw());
+    let a = DMatrix::from_fn(400, 11, |_, _| 100.0 * noise.signed());
     let b = &a * &truth;
     let mut other = ball();
     other[0] = 3.0;

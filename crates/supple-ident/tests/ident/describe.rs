@@ -1,17 +1,18 @@
 //! A fit as a description: the saved model equals the fit.
 
-use crate::support::{Noise, motion};
+use crate::support::motion;
 use supple_core::dynamics::rnea;
 use supple_core::{Friction, Vector};
 use supple_ident::{FrictionColumns, Options, fit};
 use supple_model::Description;
+use supple_random::Random;
 
 fn friction() -> [Friction; 4] {
     std::array::from_fn(|j| Friction::coulomb(1.0 + j as f64, 0.5))
 }
 
-fn state(noise: &mut Noise) -> [Vector<4>; 3] {
-    std::array::from_fn(|_| Vector::from_fn(|_, _| 1.5 * noise.draw()))
+fn state(noise: &mut Random) -> [Vector<4>; 3] {
+    std::array::from_fn(|_| Vector::from_fn(|_, _| 1.5 * noise.signed()))
 }
 
 fn options() -> Options {
@@ -34,7 +35,7 @@ fn a_saved_fit_is_loaded_as_the_same_arm() {
     let config = loaded.config::<4>().unwrap();
     std::fs::remove_dir_all(&folder).unwrap();
     let expected = found.arm().unwrap();
-    let mut noise = Noise::new(5);
+    let mut noise = Random::new(5);
     for _ in 0..20 {
         let [q, qd, qdd] = state(&mut noise);
         let difference = rnea(&config.arm, &q, &qd, &qdd) - rnea(&expected, &q, &qd, &qdd);
@@ -59,7 +60,7 @@ fn a_prediction_is_the_torque_of_the_identified_arm_and_its_friction() {
     let data = motion(&arm, &friction(), &joints, 900, 9);
     let found = fit(&arm, &[data], &joints, &options()).unwrap();
     let (model, joint_friction) = (found.arm().unwrap(), found.friction());
-    let mut noise = Noise::new(6);
+    let mut noise = Random::new(6);
     for _ in 0..20 {
         let [q, qd, qdd] = state(&mut noise);
         let mut expected = rnea(&model, &q, &qd, &qdd);

@@ -1,6 +1,6 @@
 //! Excitation design, ripple, learning and payload, each compared with a known arm.
 
-use crate::support::{Noise, motion};
+use crate::support::motion;
 use supple_core::dynamics::{gravity, rnea, tip_pose};
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::ripple::Harmonic;
@@ -14,6 +14,7 @@ use supple_ident::{
     DMatrix, FrictionColumns, Learning, Motion, Options, RippleSearch, fit, fit_ripple, learn,
 };
 use supple_model::Description;
+use supple_random::Random;
 
 const ALL: [usize; 4] = [0, 1, 2, 3];
 
@@ -185,7 +186,7 @@ fn motion_with_ripple(
     motor_from_joint: &Matrix<4, 4>,
 ) -> Motion {
     let (rate_hz, samples) = (100.0, 6000);
-    let mut noise = Noise::new(17);
+    let mut noise = Random::new(17);
     let angle = |t: f64, j: usize, derivative: usize| -> f64 {
         let (a, w) = (0.6, 0.12 + 0.02 * j as f64);
         match derivative {
@@ -206,7 +207,7 @@ fn motion_with_ripple(
         let ripple_nm = motor_from_joint.transpose() * ripple;
         for j in 0..4 {
             let friction_nm = friction[j].torque_nm(qd[(i, j)]);
-            tau[(i, j)] = arm_nm[j] + friction_nm - ripple_nm[j] + 0.01 * noise.draw();
+            tau[(i, j)] = arm_nm[j] + friction_nm - ripple_nm[j] + 0.01 * noise.signed();
         }
     }
     Motion {
@@ -266,9 +267,9 @@ fn a_payload_is_learnt_together_with_friction() {
     };
     let learnt = learn(&arm, &friction, &[data], &ALL, &learning).unwrap();
     let got = with_payload(&arm, learnt.payload.as_ref()).unwrap();
-    let mut noise = Noise::new(2);
+    let mut noise = Random::new(2);
     for _ in 0..30 {
-        let q = Vector::from_fn(|_, _| 2.0 * noise.draw());
+        let q = Vector::from_fn(|_, _| 2.0 * noise.signed());
         let (a, b) = (gravity(&got, &q), gravity(&loaded, &q));
         assert!((a - b).amax() < 0.05, "{}", (a - b).amax());
     }
@@ -308,8 +309,10 @@ fn a_payload_is_identified_and_a_known_one_gives_the_torque_scale() {
     let empty = motion(&arm, &friction, &ALL, 1500, 5);
     let loaded = motion(&carrying(&arm, &known_payload()), &friction, &ALL, 1500, 6);
     let noisy = |mut data: Motion, seed: u64| {
-        let mut noise = Noise::new(seed);
-        data.tau.iter_mut().for_each(|t| *t += 0.02 * noise.draw());
+        let mut noise = Random::new(seed);
+        data.tau
+            .iter_mut()
+            .for_each(|t| *t += 0.02 * noise.signed());
         data
     };
     let (empty, loaded) = (noisy(empty, 1), noisy(loaded, 2));

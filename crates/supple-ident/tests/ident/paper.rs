@@ -1,10 +1,10 @@
 //! The paper's estimator recovers exactly the ten determined combinations of the published set.
 
-use crate::support::Noise;
 use supple_core::Vector;
 use supple_ident::paper::{estimate, with_psi};
 use supple_ident::{DMatrix, Motion};
 use supple_model::paper::Parameters;
+use supple_random::Random;
 
 /// Sums of sinusoids with their exact derivatives, and the torques of `truth`.
 fn motion(truth: &Parameters, samples: usize) -> Motion {
@@ -87,8 +87,11 @@ fn the_null_space_couples_the_inertias_and_the_solution_has_minimum_norm() {
 fn standard_deviations_cover_the_errors_of_noisy_data() {
     let truth = Parameters::PUBLISHED;
     let mut noisy = motion(&truth, 3000);
-    let mut noise = Noise::new(7);
-    noisy.tau.iter_mut().for_each(|t| *t += 0.5 * noise.draw());
+    let mut noise = Random::new(7);
+    noisy
+        .tau
+        .iter_mut()
+        .for_each(|t| *t += 0.5 * noise.signed());
     let found = estimate(&truth, &noisy).unwrap();
     assert!((found.residual_nm - (1.0_f64 / 12.0).sqrt()).abs() < 0.01);
     let scores = (0..10).map(|i| (found.base[i] - truth.base()[i]) / found.base_std[i]);

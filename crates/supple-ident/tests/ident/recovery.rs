@@ -1,12 +1,13 @@
 //! Random arms are identified from their motion and torques.
 
 use crate::property::config;
-use crate::support::{Noise, motion, random_arm};
+use crate::support::{motion, random_arm};
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
 use supple_core::dynamics::{parameters, rnea};
 use supple_core::{Arm, Friction, Vector};
 use supple_ident::{Columns, DMatrix, FrictionColumns, Options, Weights, fit};
+use supple_random::Random;
 
 fn friction<const N: usize>() -> [Friction; N] {
     std::array::from_fn(|j| Friction {
@@ -17,12 +18,12 @@ fn friction<const N: usize>() -> [Friction; N] {
 
 /// Maximum difference of the joint torques of two arms at random states, without friction.
 fn max_torque_difference<const N: usize>(a: &Arm<N>, b: &Arm<N>, moving: &[usize]) -> f64 {
-    let mut noise = Noise::new(99);
+    let mut noise = Random::new(99);
     let mut worst: f64 = 0.0;
     for _ in 0..50 {
         let q = Vector::<N>::from_fn(|j, _| {
             if moving.contains(&j) {
-                3.0 * noise.draw()
+                3.0 * noise.signed()
             } else {
                 0.3 + j as f64
             }
@@ -30,7 +31,7 @@ fn max_torque_difference<const N: usize>(a: &Arm<N>, b: &Arm<N>, moving: &[usize
         let mut rate = || {
             Vector::<N>::from_fn(|j, _| {
                 if moving.contains(&j) {
-                    2.0 * noise.draw()
+                    2.0 * noise.signed()
                 } else {
                     0.0
                 }
@@ -100,8 +101,8 @@ proptest! {
         let (samples, amplitude_nm) = (300, 5.0);
         let exact = motion(&truth, &friction(), &joints, samples, seed);
         let mut data = exact.clone();
-        let mut noise = Noise::new(seed);
-        data.tau.iter_mut().for_each(|t| *t += amplitude_nm * noise.draw());
+        let mut noise = Random::new(seed);
+        data.tau.iter_mut().for_each(|t| *t += amplitude_nm * noise.signed());
         // Some of these arms hardly move, so no sample may be excluded.
         let options = Options { slow_rad_per_s: 0.0, ..Options::default() };
         let fit = fit(&truth, &[data], &joints, &options).unwrap();

@@ -1,19 +1,20 @@
 //! Cross-validation finds the true friction terms and rejects superfluous ones.
 
-use crate::support::{Noise, motion, random_arm};
+use crate::support::{motion, random_arm};
 use supple_core::dynamics::gravity;
 use supple_core::{Friction, Vector};
 use supple_ident::select::{compare, friction_candidates, load_candidates, prior_candidates};
 use supple_ident::{
     DMatrix, FrictionColumns, IdentError, Motion, Options, Procedure, fit, identify_motions,
 };
+use supple_random::Random;
 
 const JOINTS: [usize; 3] = [0, 1, 2];
 
 fn noisy(friction: Friction) -> Motion {
     let mut data = motion(&random_arm::<3>(61), &[friction; 3], &JOINTS, 1200, 8);
-    let mut noise = Noise::new(8);
-    data.tau.iter_mut().for_each(|t| *t += 0.3 * noise.draw());
+    let mut noise = Random::new(8);
+    data.tau.iter_mut().for_each(|t| *t += 0.3 * noise.signed());
     data
 }
 

@@ -165,7 +165,7 @@ impl OperatorReply {
         Outcome::from_code(self.outcome)
     }
 
-    /// Mode after the request, if this version knows it.
+    /// Mode after the request, if this version has it.
     pub fn mode(&self) -> Option<Mode> {
         codes::mode(self.mode)
     }

@@ -26,7 +26,7 @@ impl Drives {
             .find(|drives| *drives as u8 == code)
     }
 
-    /// What the state means for a person, where its name does not say it.
+    /// What the state means for a person, where its name does not state it.
     pub fn caution(self) -> &'static str {
         match self {
             Drives::Held => {

@@ -85,7 +85,7 @@ impl TorqueCommand {
         Ok(Vector::from(first_values::<N>(&self.fallback_torque_nm)))
     }
 
-    /// Mode of the controller, if this version knows it.
+    /// Mode of the controller, if this version has it.
     pub fn mode(&self) -> Option<Mode> {
         codes::mode(self.mode)
     }

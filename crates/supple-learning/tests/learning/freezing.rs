@@ -115,7 +115,7 @@ fn lasting_change_is_learned_in_the_end() {
     assert!((late.payload_kg - 0.15).abs() < 0.05, "{late:?}");
 }
 
-/// Resetting forgets the samples too.
+/// Resetting discards the samples too.
 #[test]
 fn reset_forgets() {
     let mut world = trained();

@@ -140,9 +140,44 @@ fn every_number_is_the_one_that_the_definition_gives_its_name() {
         ("FAULT", codes::fault_kind::ALL),
         ("REFUSAL", codes::refusal_kind::ALL),
     ] {
-        for (name, number) in all {
-            let name = format!("{prefix}_{}", name.to_uppercase());
-            assert_eq!(constant(&name), Some(*number), "{name}");
+        for code in all {
+            let name = format!("{prefix}_{}", code.name.to_uppercase());
+            assert_eq!(constant(&name), Some(code.number), "{name}");
         }
+    }
+}
+
+/// `docs/logs.md` has a row for each number. A mode's meaning ends there with its first clause.
+#[test]
+fn the_documentation_lists_every_number() {
+    let page = include_str!("../../../../docs/logs.md");
+    let mut rows = Vec::new();
+    for all in [
+        codes::fault_kind::ALL,
+        codes::refusal_kind::ALL,
+        codes::request_kind::ALL,
+        codes::trajectory_kind::ALL,
+    ] {
+        let numbers = all.iter().skip(1);
+        rows.extend(numbers.map(|code| (code.number, code.name, code.meaning)));
+    }
+    rows.extend(MODES.map(|mode| {
+        let meaning = mode.meaning().split([';', ':']).next().unwrap_or_default();
+        let meaning = meaning.split(". ").next().unwrap_or_default();
+        (mode as u8, mode.name(), meaning.trim_end_matches('.'))
+    }));
+    let documented = page.lines().filter(|line| {
+        let number = line
+            .strip_prefix("| ")
+            .and_then(|rest| rest.split(' ').next());
+        number.is_some_and(|number| number.parse::<u8>().is_ok())
+    });
+    assert_eq!(documented.count(), rows.len());
+    for (number, name, meaning) in rows {
+        let row = format!(
+            "| {number} | `{name}` | {}. |\n",
+            meaning.trim_end_matches('.')
+        );
+        assert!(page.contains(&row), "docs/logs.md lacks: {row}");
     }
 }

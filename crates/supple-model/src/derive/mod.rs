@@ -5,7 +5,7 @@
 //!
 //! | setting | from |
 //! |---|---|
-//! | rotor inertia | limits of torque and speed ([`inertia`]); it is an estimate and says so |
+//! | rotor inertia | limits of torque and speed ([`inertia`]); its comment marks it as an estimate |
 //! | roles, home pose, paths | search for a bent pose from which the paths are reached ([`place`]) |
 //! | gains, damping, rates | mass matrix over the workspace, torque limits, delay of the loop ([`gains`]) |
 //! | thresholds of force | weight of the arm as felt at the tip, torque limits ([`thresholds`]) |

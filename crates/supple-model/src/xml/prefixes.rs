@@ -1,4 +1,4 @@
-//! Declares the XML prefixes that a URDF uses without declaring them, such as `drake:`. Readers that know no
+//! Declares the XML prefixes that a URDF uses without declaring them, such as `drake:`. Readers that resolve no
 //! namespaces accept such files. What has a prefix belongs to another program and is not read.
 
 use std::collections::BTreeSet;
@@ -55,7 +55,7 @@ mod tests {
         assert!(attribute.contains("xmlns:drake"), "{attribute}");
         let plain = "<robot name=\"a\"><link name=\"b\"/></robot>".to_owned();
         assert_eq!(declare_prefixes(plain.clone()), plain);
-        // xacro stays an error that says what to do.
+        // xacro stays an error that states the remedy.
         let xacro = declare_prefixes("<robot><xacro:arm/></robot>".to_owned());
         assert!(xacro.contains("undeclared:xacro"));
     }

@@ -55,7 +55,7 @@ fn derived_gains_are_stable_in_every_pose() {
             "pose {pose}: {frequency}"
         );
     }
-    // Each derived setting has its reason in the TOML, and an estimate says that it is one.
+    // Each derived setting has its reason in the TOML, and an estimate is marked as one.
     let toml = completed.description.toml();
     for derived in &completed.derived {
         assert!(toml.contains(&derived.why), "{derived}");

@@ -25,7 +25,7 @@ impl Injection {
     pub fn check_bus_support(&self) -> Result<(), InjectionError> {
         let remedy = match (self.kind, self.trigger) {
             (_, Trigger::Mode { .. }) => {
-                "an arm on a bus does not know the controller mode: use at-s=SECONDS, counted from active drives"
+                "an arm on a bus does not receive the controller mode: use at-s=SECONDS, counted from active drives"
             }
             (InjectionKind::EncoderNan { .. }, _) => {
                 "encoder counts are always numbers: use reply-lost:every=1"

@@ -14,7 +14,7 @@
 //! path = [[1.0, 0.0, 0.0, 0.0], [3.0, 0.1, 0.0, 0.05], [5.0, 0.0, 0.0, 0.0]]
 //! ```
 //!
-//! Sizes are seen at each joint unless the option says otherwise. Where an effect has a sign, a direction or a phase, each
+//! Sizes are seen at each joint unless the option states otherwise. Where an effect has a sign, a direction or a phase, each
 //! joint or motor draws its own from the seed; one effect draws the same whether or not others are on. Unknown keys
 //! and values out of range are rejected. [`PlantOptions::realistic`] is the named set that the demo uses.
 

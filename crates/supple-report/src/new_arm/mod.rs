@@ -14,7 +14,7 @@ use supple_plant::Scene;
 
 /// Time of the first run on the sinusoid \[s\].
 const RUN_S: f64 = 5.0;
-/// What must be known about an arm, and no URDF says.
+/// What must be known about an arm, and no URDF contains.
 const BEFORE_A_REAL_ARM: [&str; 6] = [
     "sign and zero of every encoder and motor (`supple calibrate` checks the wiring first)",
     "torque constants and transmission: [motors]",
@@ -170,7 +170,7 @@ fn first_run<const N: usize>(completed: &Completed) -> Result<Summary, Failure> 
     })
 }
 
-/// The TOML with a heading that says how to read it.
+/// The TOML with a heading that explains how to read it.
 fn with_heading(arm: &Description, folder: &Path, args: &NewArgs) -> Result<String, Failure> {
     let path = folder.join("arm.toml");
     let saved = supple_files::read_text(&path, Description::MAX_BYTES)
@@ -199,7 +199,7 @@ fn settings_lines(derived: &[Setting]) -> Vec<String> {
             Some((joint, key)) => (Some(joint), key),
             None => (None, setting.key.as_str()),
         };
-        // Beside the inertia itself this says nothing new.
+        // Beside the inertia itself this adds nothing.
         if key == "armature_is_estimate" {
             continue;
         }
@@ -280,7 +280,7 @@ fn text(summary: &Summary) -> String {
         "  joints without friction in the URDF: {}",
         list(&summary.without_friction)
     ));
-    lines.push("before a real arm moves you must know what no URDF says:".to_owned());
+    lines.push("before a real arm moves you must know what no URDF contains:".to_owned());
     lines.extend(BEFORE_A_REAL_ARM.map(|line| format!("  - {line}")));
     lines.push(format!(
         "written: {folder}/arm.toml, {folder}/arm.urdf, {folder}/arm.svg (open it in a browser)\n\

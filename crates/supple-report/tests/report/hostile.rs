@@ -92,7 +92,7 @@ fn each_hostile_description_is_refused_within_a_second_of_processor_time() {
 fn each_hostile_log_is_refused_within_a_second_of_processor_time() {
     let folder = tempfile::tempdir().expect("a folder");
     let magic = b"\x89MCAP0\r\n";
-    // A record of this kind that says that it is this long.
+    // A record of this kind that states this length.
     let record = |kind: u8, length: u64, body: &[u8]| {
         let mut log = magic.to_vec();
         log.push(kind);

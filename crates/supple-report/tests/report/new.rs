@@ -35,7 +35,7 @@ fn a_urdf_gives_an_arm_with_every_derived_setting_and_its_reason() {
     assert!(roxmltree::Document::parse(&drawing).is_ok());
     let summary: Value = serde_json::from_str(&answer.stdout).expect("JSON");
 
-    // The text of the TOML has each setting; parsed, it has each value where the report says.
+    // The text of the TOML has each setting; parsed, it has each value where the report states.
     let toml = read(&arm.join("arm.toml"));
     let derived = summary["derived"].as_array().expect("a list");
     assert!(derived.len() > 20, "{derived:?}");

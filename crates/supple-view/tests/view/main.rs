@@ -1,4 +1,4 @@
-//! The server against a scripted controller on real shared memory, and a client that speaks its protocols byte by byte.
+//! The server against a scripted controller on real shared memory, and a client of its protocols byte by byte.
 
 mod client;
 mod controller;

@@ -12,7 +12,7 @@ const DESCRIPTIONS: usize = 1000;
 /// Pictures that another viewer must get while a connection is stuck.
 const PICTURES: usize = 10;
 
-/// What the kernel says of one end of a connection.
+/// What the kernel reports of one end of a connection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Sending {
     established: bool,

@@ -1,6 +1,6 @@
 //! `supple calibrate --plant ..`: from an arm to its model, on a simulated, an emulated or a real arm.
 //!
-//! The steps are those of [`supple_experiment::procedure`]; this module starts the processes and talks to them.
+//! The steps are those of [`supple_experiment::procedure`]; this module starts the processes and sends requests to them.
 
 mod report;
 mod running_arm;
@@ -96,7 +96,7 @@ fn sized<const N: usize>(
     ended.map(|()| found)
 }
 
-/// Every rotor inertia too large by this fraction, or too small by as much; the seed says which.
+/// Every rotor inertia too large by this fraction, or too small by as much; the seed decides which.
 fn with_inertia_error<const N: usize>(
     arm: &Arm<N>,
     fraction: f64,

@@ -254,7 +254,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         runs_or_faults(CONTACT_FAULTS),
         FAULT_AND_STOP_MS,
     );
-    // A torque ramp cannot tell a blocked joint from a stuck encoder.
+    // A torque ramp cannot distinguish a blocked joint from a stuck encoder.
     add(
         &[Breakaway],
         Event::Obstacle,

@@ -103,7 +103,7 @@ impl DrillArgs {
         parts.extend(self.only.iter().map(|part| format!("--only {part}")));
         parts.extend(self.virtual_time.then(|| "--virtual-time".to_owned()));
         if let Some(file) = &self.markdown {
-            // The page says how to write it, wherever it was written.
+            // The page states how to write it, wherever it was written.
             let name = file.file_name().unwrap_or_default().to_string_lossy();
             parts.push(format!("--markdown docs/{name}"));
         }

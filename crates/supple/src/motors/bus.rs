@@ -55,7 +55,7 @@ impl MotorBus {
         }
     }
 
-    /// Sends a frame and collects what arrives until `for_ns` have passed, or `enough` says so.
+    /// Sends a frame and collects what arrives until `for_ns` have passed, or `enough` returns true.
     fn ask(
         &mut self,
         frame: &Frame,

@@ -26,7 +26,7 @@ pub fn run(args: &MotorsArgs) -> Result<(), Failure> {
     let description = arms::find(&args.urdf.name(&args.arm), args.strict)?;
     let Some(described) = description.bus() else {
         let problem = format!(
-            "arm `{}` has no [bus] in its TOML; `supple motors` knows arms of Damiao motors, such as openarm and yam",
+            "arm `{}` has no [bus] in its TOML; `supple motors` supports arms of Damiao motors, such as openarm and yam",
             description.name()
         );
         return Err(Failure::Motors { problem });

@@ -46,7 +46,7 @@ impl ChildProcesses {
     /// terminates it in order, after it has collected its data.
     ///
     /// # Errors
-    /// [`Failure::MissingProgram`], which says how to build the program.
+    /// [`Failure::MissingProgram`], which states how to build the program.
     pub fn start(&mut self, program: &Program) -> Result<(), Failure> {
         let Program { name, arguments } = program;
         let program = program_beside(name)?;

@@ -36,7 +36,7 @@ impl<const N: usize> RunLog<N> {
         self.write(|recorder| recorder.event(stamp_ns, text));
     }
 
-    /// The log is whole, or it is said why it is not.
+    /// The log is whole, or the reason is reported.
     pub fn finish(&mut self) {
         let finished = self.recorder.take().map_or(Ok(()), Recorder::finish);
         self.end_with(finished);
@@ -156,7 +156,7 @@ impl<const N: usize> Recorder<N> {
 
 #[expect(
     clippy::disallowed_methods,
-    reason = "a log of the wall clock says when it was; in virtual time this is not called"
+    reason = "a log of the wall clock has the time of its start; in virtual time this is not called"
 )]
 fn since_epoch_ns() -> u64 {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);

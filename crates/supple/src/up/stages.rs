@@ -74,7 +74,7 @@ impl Stages {
         }
     }
 
-    /// What to tell the operator when the drives have become idle although the controller wants torque, as after a stall of
+    /// What the operator sees when the drives have become idle although the controller wants torque, as after a stall of
     /// this machine: once for each time.
     fn lost_drives(&mut self, telemetry: &Telemetry) -> Option<&'static str> {
         let wants_torque = !matches!(

@@ -4,9 +4,8 @@
 //! feedback of each motor -> registers -> compared -> mode and watchdog set in RAM and read back -> turns unwrapped
 //! ```
 //!
-//! Nothing is stored in flash and no zero is set. A motor whose last host was lost says so until it is told that its host
-//! is there again, after a start of the program or of an arm that was lost: that one error is cleared, the motor stays
-//! disabled.
+//! Nothing is stored in flash and no zero is set. A motor whose last host was lost reports that until the error is
+//! cleared, after a start of the program or of an arm that was lost: only that error is cleared, the motor stays disabled.
 
 use super::error::DamiaoError;
 use super::host::{Host, MS};

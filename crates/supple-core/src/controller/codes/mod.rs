@@ -3,29 +3,18 @@
 //! A number once given keeps its meaning. Zero is "none" where there can be none. The bytes of a message or
 //! a log are not here.
 
+mod coded;
 mod numbers;
 mod request;
+mod values;
 
-pub use numbers::{fault_kind, refusal_kind, request_kind, trajectory_kind};
-
-pub use request::{RequestCode, RequestCodeError, VALUES};
+pub use crate::controller::mode::MODES;
+pub use numbers::Code;
+pub use request::{request_kind, trajectory_kind};
+pub use values::{RequestCode, RequestCodeError, VALUES};
 
 use crate::controller::{Fault, Mode, Refusal, SafeAction};
-
-/// Every mode, at the place of its number.
-pub const MODES: [Mode; 11] = [
-    Mode::Idle,
-    Mode::GravityHold,
-    Mode::Move,
-    Mode::Track,
-    Mode::Probe,
-    Mode::Fault,
-    Mode::Excite,
-    Mode::Breakaway,
-    Mode::Float,
-    Mode::JointImpedance,
-    Mode::TrackPose,
-];
+use numbers::{number_table, numbered_variants};
 
 /// A mode by its number.
 pub fn mode(code: u8) -> Option<Mode> {
@@ -56,137 +45,113 @@ impl FaultCode {
 
     /// Of a latched fault.
     pub fn new(fault: Option<&Fault>) -> FaultCode {
-        let index = |joint: usize| i8::try_from(joint).unwrap_or(i8::MAX);
-        let Some(fault) = fault else {
-            return FaultCode::NONE;
-        };
-        let (kind, joint, value, limit) = match *fault {
-            Fault::MeasurementNotFinite { joint } => (
-                fault_kind::MEASUREMENT_NOT_FINITE,
-                joint.map_or(-1, index),
-                0.0,
-                0.0,
-            ),
-            Fault::EncoderLost { joint } => (fault_kind::ENCODER_LOST, index(joint), 0.0, 0.0),
-            Fault::StateStale { cycles, limit } => {
-                (fault_kind::STATE_STALE, -1, cycles as f64, f64::from(limit))
+        fault.map_or(FaultCode::NONE, |fault| {
+            let (kind, joint, value, limit) = fault_parts(fault);
+            FaultCode {
+                kind,
+                joint,
+                value,
+                limit,
             }
-            Fault::StateOutOfOrder { last, received } => (
-                fault_kind::STATE_OUT_OF_ORDER,
-                -1,
-                received as f64,
-                last as f64,
-            ),
-            Fault::JointPosition {
-                joint,
-                value_rad,
-                limit_rad,
-            } => (
-                fault_kind::JOINT_POSITION,
-                index(joint),
-                value_rad,
-                limit_rad,
-            ),
-            Fault::JointSpeed {
-                joint,
-                value_rad_per_s,
-                limit_rad_per_s,
-            } => (
-                fault_kind::JOINT_SPEED,
-                index(joint),
-                value_rad_per_s,
-                limit_rad_per_s,
-            ),
-            Fault::TipSpeed {
-                value_m_per_s,
-                limit_m_per_s,
-            } => (fault_kind::TIP_SPEED, -1, value_m_per_s, limit_m_per_s),
-            Fault::TrackingError { value_m, limit_m } => {
-                (fault_kind::TRACKING_ERROR, -1, value_m, limit_m)
-            }
-            Fault::RotationError {
-                value_rad,
-                limit_rad,
-            } => (fault_kind::ROTATION_ERROR, -1, value_rad, limit_rad),
-            Fault::Singular => (fault_kind::SINGULAR, -1, 0.0, 0.0),
-            Fault::MassMatrix => (fault_kind::MASS_MATRIX, -1, 0.0, 0.0),
-            Fault::TorqueNotFinite { .. } => (fault_kind::TORQUE_NOT_FINITE, -1, 0.0, 0.0),
-            Fault::EncoderJump {
-                joint,
-                value_rad,
-                limit_rad,
-            } => (fault_kind::ENCODER_JUMP, index(joint), value_rad, limit_rad),
-            Fault::JointTrackingError {
-                joint,
-                value_rad,
-                limit_rad,
-            } => (
-                fault_kind::JOINT_TRACKING_ERROR,
-                index(joint),
-                value_rad,
-                limit_rad,
-            ),
-            Fault::JointCollision {
-                joint,
-                value_nm,
-                limit_nm,
-            } => (
-                fault_kind::JOINT_COLLISION,
-                index(joint),
-                value_nm,
-                limit_nm,
-            ),
-            Fault::TipCollision { value_n, limit_n } => {
-                (fault_kind::TIP_COLLISION, -1, value_n, limit_n)
-            }
-            Fault::EncoderStuck {
-                joint,
-                value_rad,
-                limit_rad,
-            } => (
-                fault_kind::ENCODER_STUCK,
-                index(joint),
-                value_rad,
-                limit_rad,
-            ),
-            Fault::EncoderUnreliable { joint } => {
-                (fault_kind::ENCODER_UNRELIABLE, index(joint), 0.0, 0.0)
-            }
-            Fault::MotionAgainstTorque {
-                joint,
-                value_nm,
-                limit_nm,
-            } => (
-                fault_kind::MOVES_AGAINST_TORQUE,
-                index(joint),
-                value_nm,
-                limit_nm,
-            ),
-            Fault::UnmodelledLoad { value_n, limit_n } => {
-                (fault_kind::UNMODELLED_LOAD, -1, value_n, limit_n)
-            }
-            Fault::Workspace { value_m, border } => {
-                (fault_kind::WORKSPACE, -1, value_m, border as f64)
-            }
-            Fault::ZoneSpeed {
-                value_m_per_s,
-                limit_m_per_s,
-            } => (fault_kind::ZONE_SPEED, -1, value_m_per_s, limit_m_per_s),
-            Fault::ZoneForce { value_n, limit_n } => (fault_kind::ZONE_FORCE, -1, value_n, limit_n),
-        };
-        FaultCode {
-            kind,
-            joint,
-            value,
-            limit,
-        }
+        })
     }
+}
+
+/// No joint.
+const NO_JOINT: i8 = -1;
+
+fn index(joint: usize) -> i8 {
+    i8::try_from(joint).unwrap_or(i8::MAX)
+}
+
+numbered_variants! {
+    /// Numbers of [`crate::controller::Fault`].
+    fault_kind;
+    /// Number, joint, value and limit of a fault.
+    fn fault_parts(&Fault) -> (u8, i8, f64, f64);
+    /// A measurement is not finite.
+    MEASUREMENT_NOT_FINITE = 1 "measurement_not_finite": Fault::MeasurementNotFinite { joint } => [joint.map_or(NO_JOINT, index), 0.0, 0.0],
+    /// Encoder replies of a joint are missing.
+    ENCODER_LOST = 2 "encoder_lost": Fault::EncoderLost { joint } => [index(joint), 0.0, 0.0],
+    /// No new arm state; value and limit are cycles.
+    STATE_STALE = 3 "state_stale": Fault::StateStale { cycles, limit } => [NO_JOINT, cycles as f64, f64::from(limit)],
+    /// The state's cycle number went backwards; the value is the one received, the limit the last one.
+    STATE_OUT_OF_ORDER = 4 "state_out_of_order": Fault::StateOutOfOrder { last, received } => [NO_JOINT, received as f64, last as f64],
+    /// A joint is beyond its hard stop.
+    JOINT_POSITION = 5 "joint_position": Fault::JointPosition { joint, value_rad, limit_rad } => [index(joint), value_rad, limit_rad],
+    /// A joint exceeds its speed limit.
+    JOINT_SPEED = 6 "joint_speed": Fault::JointSpeed { joint, value_rad_per_s, limit_rad_per_s } => [index(joint), value_rad_per_s, limit_rad_per_s],
+    /// The tip exceeds its speed limit.
+    TIP_SPEED = 7 "tip_speed": Fault::TipSpeed { value_m_per_s, limit_m_per_s } => [NO_JOINT, value_m_per_s, limit_m_per_s],
+    /// The tracking error of the tip exceeds its limit.
+    TRACKING_ERROR = 8 "tracking_error": Fault::TrackingError { value_m, limit_m } => [NO_JOINT, value_m, limit_m],
+    /// The mass matrix of the active joints is not positive definite.
+    MASS_MATRIX = 9 "mass_matrix": Fault::MassMatrix => [NO_JOINT, 0.0, 0.0],
+    /// A term of the law, or the torque itself, is not finite.
+    TORQUE_NOT_FINITE = 10 "torque_not_finite": Fault::TorqueNotFinite { .. } => [NO_JOINT, 0.0, 0.0],
+    /// An encoder angle jumped further than the joint can have moved.
+    ENCODER_JUMP = 11 "encoder_jump": Fault::EncoderJump { joint, value_rad, limit_rad } => [index(joint), value_rad, limit_rad],
+    /// A joint's tracking error exceeds its limit.
+    JOINT_TRACKING_ERROR = 12 "joint_tracking_error": Fault::JointTrackingError { joint, value_rad, limit_rad } => [index(joint), value_rad, limit_rad],
+    /// The external torque on a joint exceeds the limit of the mode.
+    JOINT_COLLISION = 13 "joint_collision": Fault::JointCollision { joint, value_nm, limit_nm } => [index(joint), value_nm, limit_nm],
+    /// The external force on the tip exceeds the limit of the mode.
+    TIP_COLLISION = 14 "tip_collision": Fault::TipCollision { value_n, limit_n } => [NO_JOINT, value_n, limit_n],
+    /// An encoder value stays unchanged while the joint's reference moves.
+    ENCODER_STUCK = 15 "encoder_stuck": Fault::EncoderStuck { joint, value_rad, limit_rad } => [index(joint), value_rad, limit_rad],
+    /// Encoder replies of a joint are lost too often.
+    ENCODER_UNRELIABLE = 16 "encoder_unreliable": Fault::EncoderUnreliable { joint } => [index(joint), 0.0, 0.0],
+    /// A joint accelerates against its net torque.
+    MOVES_AGAINST_TORQUE = 17 "moves_against_torque": Fault::MotionAgainstTorque { joint, value_nm, limit_nm } => [index(joint), value_nm, limit_nm],
+    /// A force along gravity acts on the tip that the model lacks.
+    UNMODELLED_LOAD = 18 "unmodelled_load": Fault::UnmodelledLoad { value_n, limit_n } => [NO_JOINT, value_n, limit_n],
+    /// The tip is beyond a border of its workspace; the limit is the border's index.
+    WORKSPACE = 19 "workspace": Fault::Workspace { value_m, border } => [NO_JOINT, value_m, border as f64],
+    /// The tip exceeds the speed limit of a workspace zone.
+    ZONE_SPEED = 20 "zone_speed": Fault::ZoneSpeed { value_m_per_s, limit_m_per_s } => [NO_JOINT, value_m_per_s, limit_m_per_s],
+    /// The external force on the tip exceeds the limit of a workspace zone.
+    ZONE_FORCE = 21 "zone_force": Fault::ZoneForce { value_n, limit_n } => [NO_JOINT, value_n, limit_n],
+    /// The angle between the tip and its reference exceeds its limit.
+    ROTATION_ERROR = 22 "rotation_error": Fault::RotationError { value_rad, limit_rad } => [NO_JOINT, value_rad, limit_rad],
+    /// The pose mode came near a singular pose.
+    SINGULAR = 23 "singular": Fault::Singular => [NO_JOINT, 0.0, 0.0],
+}
+
+numbered_variants! {
+    /// Numbers of [`crate::controller::Refusal`].
+    refusal_kind;
+    /// Number of a refusal.
+    fn refusal_number(&Refusal) -> u8;
+    /// Not possible in this mode.
+    MODE = 1 "mode": Refusal::Mode { .. } => [],
+    /// An entry is out of its range.
+    VALUE = 2 "value": Refusal::Value { .. } => [],
+    /// The move would take a joint beyond its stops.
+    UNREACHABLE = 3 "unreachable": Refusal::BeyondJointStop { .. } => [],
+    /// The move would exceed the speed limit of a joint.
+    TOO_FAST = 4 "too_fast": Refusal::TooFast { .. } => [],
+    /// The trajectory starts too far from the tip.
+    FAR_FROM_START = 5 "far_from_start": Refusal::FarFromStart { .. } => [],
+    /// The trajectory itself is invalid.
+    TRAJECTORY = 6 "trajectory": Refusal::Trajectory(_) => [],
+    /// Motion was requested while the drives are idle.
+    DRIVES_IDLE = 7 "drives_idle": Refusal::DrivesIdle => [],
+    /// The tip cannot reach a point of the trajectory.
+    OUT_OF_REACH = 8 "out_of_reach": Refusal::OutOfReach { .. } => [],
+    /// The motion would need more torque than a joint has.
+    TOO_MUCH_TORQUE = 9 "too_much_torque": Refusal::TooMuchTorque { .. } => [],
+    /// The trajectory leaves the workspace.
+    WORKSPACE = 10 "workspace": Refusal::Workspace { .. } => [],
+    /// The pose mode was requested near a singular pose, or its motion leads to one.
+    SINGULAR = 11 "singular": Refusal::Singular => [],
+    /// Learned terms were sent while learning is off.
+    LEARNING_OFF = 12 "learning_off": Refusal::LearningOff => [],
 }
 
 /// Name of a kind of fault; `None` for no fault.
 pub fn fault_name(kind: u8) -> Option<&'static str> {
-    let known = fault_kind::ALL.iter().find(|(_, number)| *number == kind);
-    let name = known.map_or("unknown", |(name, _)| name);
+    let known = fault_kind::ALL.get(usize::from(kind));
+    let name = known.map_or("unknown", |code| code.name);
     (kind != fault_kind::NONE).then_some(name)
 }
 
@@ -199,28 +164,10 @@ impl Fault {
 
 /// A safe action as a number; 0 is none.
 pub fn safe_action(action: Option<SafeAction>) -> u8 {
-    match action {
-        None => 0,
-        Some(SafeAction::GravityHold) => 1,
-        Some(SafeAction::Idle) => 2,
-    }
+    action.map_or(0, |action| action as u8)
 }
 
 /// The kind of a refusal, from 1; 0 is none.
 pub fn refusal(refusal: Option<&Refusal>) -> u8 {
-    match refusal {
-        None => refusal_kind::NONE,
-        Some(Refusal::Mode { .. }) => refusal_kind::MODE,
-        Some(Refusal::Value { .. }) => refusal_kind::VALUE,
-        Some(Refusal::BeyondJointStop { .. }) => refusal_kind::UNREACHABLE,
-        Some(Refusal::TooFast { .. }) => refusal_kind::TOO_FAST,
-        Some(Refusal::FarFromStart { .. }) => refusal_kind::FAR_FROM_START,
-        Some(Refusal::Trajectory(_)) => refusal_kind::TRAJECTORY,
-        Some(Refusal::DrivesIdle) => refusal_kind::DRIVES_IDLE,
-        Some(Refusal::OutOfReach { .. }) => refusal_kind::OUT_OF_REACH,
-        Some(Refusal::TooMuchTorque { .. }) => refusal_kind::TOO_MUCH_TORQUE,
-        Some(Refusal::Workspace { .. }) => refusal_kind::WORKSPACE,
-        Some(Refusal::Singular) => refusal_kind::SINGULAR,
-        Some(Refusal::LearningOff) => refusal_kind::LEARNING_OFF,
-    }
+    refusal.map_or(refusal_kind::NONE, refusal_number)
 }

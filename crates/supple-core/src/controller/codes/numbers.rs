@@ -1,101 +1,135 @@
-//! The numbers themselves, each declared once with its name.
+//! Tables of numbers: each entry is declared once, with its name, its meaning, and what has the number.
 
-/// Named numbers. A number once given keeps its meaning.
-macro_rules! numbered {
-    ($(#[doc = $doc:literal])+ $module:ident { $($name:ident = $number:literal $text:literal,)+ }) => {
+/// A number of a table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Code {
+    /// The number; once given, it keeps its meaning.
+    pub number: u8,
+    /// Its name in logs and status lines.
+    pub name: &'static str,
+    /// What it means.
+    pub meaning: &'static str,
+}
+
+/// Declares a module with the constants of a table, and all of them as [`Code`]s at the places of their numbers.
+macro_rules! number_table {
+    (
+        $(#[doc = $doc:literal])+ $module:ident {
+            $($(#[doc = $meaning:literal])+ $constant:ident = $number:literal $name:literal,)+
+        }
+    ) => {
         $(#[doc = $doc])+
-        #[allow(missing_docs, reason = "the names say it")]
         pub mod $module {
-            $(pub const $name: u8 = $number;)+
+            use crate::controller::codes::Code;
 
-            /// Every name with its number.
-            pub const ALL: &[(&str, u8)] = &[$(($text, $name),)+];
+            /// Nothing.
+            pub const NONE: u8 = 0;
+            $($(#[doc = $meaning])+ pub const $constant: u8 = $number;)+
+
+            /// Every number of the table.
+            pub const ALL: &[Code] = &[
+                Code {
+                    number: NONE,
+                    name: "none",
+                    meaning: "Nothing.",
+                },
+                $(Code {
+                    number: $number,
+                    name: $name,
+                    meaning: concat!($($meaning),+).trim_ascii_start(),
+                },)+
+            ];
+
+            const _: () = {
+                let mut place = 0;
+                while place < ALL.len() {
+                    assert!(ALL[place].number as usize == place, "a number is missing or out of order");
+                    place += 1;
+                }
+            };
         }
     };
 }
 
-numbered! {
-    /// Numbers of [`Request`](crate::controller::Request).
-    request_kind {
-        NONE = 0 "none",
-        IDLE = 1 "idle",
-        GRAVITY_HOLD = 2 "gravity_hold",
-        MOVE = 3 "move",
-        TRACK = 4 "track",
-        GAINS = 5 "gains",
-        RESET = 6 "reset",
-        EXCITE = 7 "excite",
-        BREAKAWAY = 8 "breakaway",
-        FLOAT = 9 "float",
-        JOINT_IMPEDANCE = 10 "joint_impedance",
-        JOINT_GAINS = 11 "joint_gains",
-        TRACK_POSE = 12 "track_pose",
-        ROTATIONAL_GAINS = 13 "rotational_gains",
-        LEARNING = 14 "learning",
-        LEARNED_PARAMETERS = 15 "learned_parameters",
-        LEARNED_MAP = 16 "learned_map",
-        SET_POINT = 17 "set_point",
-    }
+/// A table of the variants of an enum that are numbered, with what goes with each number.
+///
+/// Generates the module of [`number_table`] and a function from a variant to its number and that.
+macro_rules! numbered_variants {
+    (@out $number:literal) => {
+        $number
+    };
+    (@out $number:literal, $($with:expr),+) => {
+        ($number, $($with),+)
+    };
+    (
+        $(#[doc = $doc:literal])+ $module:ident;
+        $(#[doc = $function_doc:literal])+ fn $function:ident(&$enum:ident) -> $out:ty;
+        $(
+            $(#[doc = $meaning:literal])+
+            $constant:ident = $number:literal $name:literal: $variant:pat => [$($with:expr),*],
+        )+
+    ) => {
+        number_table! {
+            $(#[doc = $doc])+ $module {
+                $($(#[doc = $meaning])+ $constant = $number $name,)+
+            }
+        }
+
+        $(#[doc = $function_doc])+
+        fn $function(value: &$enum) -> $out {
+            match *value {
+                $($variant => numbered_variants!(@out $number $(, $with)*),)+
+            }
+        }
+    };
 }
 
-numbered! {
-    /// Numbers of [`Trajectory`](crate::Trajectory).
-    trajectory_kind {
-        NONE = 0 "none",
-        HOLD = 1 "hold",
-        LINE = 2 "line",
-        SINUSOID = 3 "sinusoid",
-        ARC = 4 "arc",
-        QUADRANT = 5 "quadrant",
-        PROBE = 6 "probe",
-    }
+/// A table of the variants of an enum that are sent with what they carry: as the constructor of each, whose fields are
+/// sent in the order in which they stand there.
+///
+/// Generates the module of [`number_table`] and both directions, for fields that are [`Coded`](super::coded::Coded).
+macro_rules! carried_variants {
+    (
+        $(#[doc = $doc:literal])+ $module:ident;
+        $enum:ident $(<const $size:ident>)?: fn $encode:ident, fn $decode:ident, $unknown:path;
+        $(
+            $(#[doc = $meaning:literal])+
+            $constant:ident = $number:literal $name:literal:
+                $variant:ident $({ $($field:ident),+ })? $(( $item:ident ))?,
+        )+
+    ) => {
+        number_table! {
+            $(#[doc = $doc])+ $module {
+                $($(#[doc = $meaning])+ $constant = $number $name,)+
+            }
+        }
+
+        /// The number; what it carries is appended to `to`.
+        fn $encode $(<const $size: usize>)? (value: &$enum $(<$size>)?, to: &mut RequestCode) -> u8 {
+            match value {
+                $($enum::$variant $({ $($field),+ })? $(($item))? => {
+                    $($($field.put(to);)+)?
+                    $($item.put(to);)?
+                    $number
+                })+
+            }
+        }
+
+        /// What has the number, with what it carries taken from `from`.
+        fn $decode $(<const $size: usize>)? (
+            number: u8,
+            from: &mut Rest<'_>,
+        ) -> Result<$enum $(<$size>)?, RequestCodeError> {
+            Ok(match number {
+                $($number => {
+                    $($(let $field = Coded::take(from)?;)+)?
+                    $(let $item = Coded::take(from)?;)?
+                    $enum::$variant $({ $($field),+ })? $(($item))?
+                })+
+                unknown => return Err($unknown(unknown)),
+            })
+        }
+    };
 }
 
-numbered! {
-    /// Numbers of [`crate::controller::Fault`].
-    fault_kind {
-        NONE = 0 "none",
-        MEASUREMENT_NOT_FINITE = 1 "measurement_not_finite",
-        ENCODER_LOST = 2 "encoder_lost",
-        STATE_STALE = 3 "state_stale",
-        STATE_OUT_OF_ORDER = 4 "state_out_of_order",
-        JOINT_POSITION = 5 "joint_position",
-        JOINT_SPEED = 6 "joint_speed",
-        TIP_SPEED = 7 "tip_speed",
-        TRACKING_ERROR = 8 "tracking_error",
-        MASS_MATRIX = 9 "mass_matrix",
-        TORQUE_NOT_FINITE = 10 "torque_not_finite",
-        ENCODER_JUMP = 11 "encoder_jump",
-        JOINT_TRACKING_ERROR = 12 "joint_tracking_error",
-        JOINT_COLLISION = 13 "joint_collision",
-        TIP_COLLISION = 14 "tip_collision",
-        ENCODER_STUCK = 15 "encoder_stuck",
-        ENCODER_UNRELIABLE = 16 "encoder_unreliable",
-        MOVES_AGAINST_TORQUE = 17 "moves_against_torque",
-        UNMODELLED_LOAD = 18 "unmodelled_load",
-        WORKSPACE = 19 "workspace",
-        ZONE_SPEED = 20 "zone_speed",
-        ZONE_FORCE = 21 "zone_force",
-        ROTATION_ERROR = 22 "rotation_error",
-        SINGULAR = 23 "singular",
-    }
-}
-
-numbered! {
-    /// Numbers of [`crate::controller::Refusal`].
-    refusal_kind {
-        NONE = 0 "none",
-        MODE = 1 "mode",
-        VALUE = 2 "value",
-        UNREACHABLE = 3 "unreachable",
-        TOO_FAST = 4 "too_fast",
-        FAR_FROM_START = 5 "far_from_start",
-        TRAJECTORY = 6 "trajectory",
-        DRIVES_IDLE = 7 "drives_idle",
-        OUT_OF_REACH = 8 "out_of_reach",
-        TOO_MUCH_TORQUE = 9 "too_much_torque",
-        WORKSPACE = 10 "workspace",
-        SINGULAR = 11 "singular",
-        LEARNING_OFF = 12 "learning_off",
-    }
-}
+pub(super) use {carried_variants, number_table, numbered_variants};

@@ -2,7 +2,7 @@
 
 use crate::support::configs::{friction, three, unlimited};
 use crate::support::plant::{Plant, nothing, push};
-use crate::support::random::Random;
+use crate::support::random::{Draws, Random};
 use crate::support::rig::Rig;
 use supple_core::config::{ContactLatch, Gains};
 use supple_core::controller::Request;
@@ -357,7 +357,7 @@ fn in_free_motion(config: Config<3>, friction_factor: f64, noise_counts: f64) ->
     (contacts, longest)
 }
 
-/// Two counts of noise on every encoder, standard deviation. With a threshold that knows no residuals it latches.
+/// Two counts of noise on every encoder, standard deviation. With a threshold that does not depend on residuals it latches.
 #[test]
 fn encoder_noise_of_two_counts_does_not_trigger_the_latch() {
     let fixed = config(|_| {});

@@ -328,7 +328,7 @@ fn reset_goes_back_to_the_terms_of_the_configuration() {
     assert!(!end.learning);
 }
 
-/// The observer knows what is learned: a payload that the model lacks is no external force once it is learned.
+/// The observer includes what is learned: a payload that the model lacks is no external force once it is learned.
 #[test]
 fn observer_includes_what_is_learned() {
     let config = four();

@@ -229,9 +229,9 @@ fn encoder_jump() {
                     let output = rig.cycle();
                     (rig, output)
                 };
-                let (_, believed) = jump(0.999);
-                let taken = !matches!(believed.fault, Some(Fault::EncoderJump { .. }));
-                assert!(taken, "{:?}", believed.fault);
+                let (_, accepted) = jump(0.999);
+                let taken = !matches!(accepted.fault, Some(Fault::EncoderJump { .. }));
+                assert!(taken, "{:?}", accepted.fault);
                 let (mut rig, output) = jump(1.001);
                 let Some(Fault::EncoderJump {
                     joint: named,
@@ -291,7 +291,7 @@ fn an_encoder_jump_is_measured_from_the_predicted_angle() {
         assert_eq!(rig.cycle().fault, None);
     }
     // 0.04 rad are accepted, about an angle 0.0015 rad further on.
-    for (jump, believed) in [
+    for (jump, accepted) in [
         (-0.041, true),
         (-0.042, false),
         (0.038, true),
@@ -301,7 +301,7 @@ fn an_encoder_jump_is_measured_from_the_predicted_angle() {
         rig.q[0] += jump;
         let fault = rig.cycle().fault;
         let seen = matches!(fault, Some(Fault::EncoderJump { joint: 0, .. }));
-        assert_eq!(seen, !believed, "{jump}: {fault:?}");
+        assert_eq!(seen, !accepted, "{jump}: {fault:?}");
     }
 }
 

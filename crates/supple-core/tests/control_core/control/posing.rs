@@ -9,7 +9,9 @@ use crate::support::size;
 use proptest::prelude::*;
 use std::f64::consts::PI;
 use supple_core::config::{Config, Gains, Role, RotationalGains};
-use supple_core::controller::{CycleRecord, Fault, Mode, Refusal, Request, check_motion};
+use supple_core::controller::{
+    CycleRecord, Fault, Mode, Refusal, Request, SafeAction, check_motion,
+};
 use supple_core::dynamics::{jacobian, kinetic_energy, tip_pose};
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::nalgebra::{Rotation3, Unit};
@@ -262,6 +264,48 @@ fn a_singular_pose_is_a_fault() {
             prop_assert!(beyond < 60.0, "{beyond} N m");
         }
         prop_assert!(false, "no fault");
+        Ok(())
+    });
+}
+
+/// A hand that is a spring and a damper pulls the arm into a singular pose, through the fault and the stop. No energy
+/// comes from the controller: that of the arm, of the law's springs until the fault and of the hand stays what it was at
+/// the start, and then falls.
+#[test]
+fn energy_stays_bounded_into_a_singular_pose() {
+    let mut config = free();
+    let rotational = RotationalGains::isotropic(0.5, 0.3);
+    config.law.gains = Gains::isotropic(5.0, 20.0);
+    config.pose.gains = rotational;
+    let gains = config.law.gains;
+    let stiffness = Vector::from([30.0, 30.0, 20.0, 30.0, 2.0, 2.0, 0.5]);
+    let hand = move |_: &Arm<7>, q: &Vector<7>, qd: &Vector<7>| {
+        (-q).component_mul(&stiffness) - qd.component_mul(&stiffness)
+    };
+    let pulled_j = |q: &Vector<7>| 0.5 * q.dot(&q.component_mul(&stiffness));
+    check(6, per_joint::<7>(0.3), |bend| {
+        let from = bent_wrist() + bend * 0.3;
+        let tip = tip_pose(&config.arm, &from).translation;
+        let request = pose(Trajectory::Hold(tip), Rotation::NONE);
+        let (mut rig, mut plant) = in_mode(config, from, request);
+        let start = pulled_j(&plant.q);
+        let (mut fault, mut max, mut now) = (None, start, start);
+        for _ in 0..30_000 {
+            let output = rig.drive(&mut plant, None, hand);
+            fault = fault.or(output.fault);
+            let of_arm = match output.mode {
+                Mode::TrackPose => energy_j(&plant, &gains, &rotational, &output),
+                _ => kinetic_energy(&plant.arm, &plant.q, &plant.qd),
+            };
+            now = of_arm + pulled_j(&plant.q);
+            max = now.max(max);
+            if output.safe_action == Some(SafeAction::Idle) {
+                break;
+            }
+        }
+        prop_assert_eq!(fault, Some(Fault::Singular));
+        prop_assert!(max < 1.02 * start, "{start} J, then {max} J");
+        prop_assert!(now < 0.9 * start, "{start} J, at last {now} J");
         Ok(())
     });
 }

@@ -3,7 +3,7 @@
 
 use crate::support::configs::{four, held, three, unlimited};
 use crate::support::plant::{Plant, push};
-use crate::support::random::Random;
+use crate::support::random::{Draws, Random};
 use crate::support::rig::{Rig, bent};
 use crate::support::size;
 use supple_core::config::{ApparentInertia, Gains, Role};

@@ -1,6 +1,6 @@
 //! The safe action stops motion: on random arms, in random poses and modes, at any speed, with
-//! delayed torques, and with defects of encoders, motors, load or gravity that the controller does
-//! not know.
+//! delayed torques, and with defects of encoders, motors, load or gravity that the model does
+//! not contain.
 //!
 //! Criteria, fixed before the first run: once a fault is latched, the arm either brakes (the drives
 //! get no torque) or has a kinetic energy that falls from 0.2 s on and a tip slower than 0.25 m/s

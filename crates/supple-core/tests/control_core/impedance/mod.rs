@@ -3,6 +3,7 @@
 mod closed_loop;
 mod friction;
 mod inverse;
+mod passivity;
 mod redundancy;
 mod singular;
 mod terms;

@@ -1,4 +1,4 @@
-//! A host that knows the codec and nothing of the drive: asks, enables, commands.
+//! A host that uses the codec and nothing of the drive: asks, enables, commands.
 
 use supple_bus::virtual_time::DirectBus;
 use supple_bus::{Bus, Event};

@@ -228,7 +228,7 @@ fn exchanged_ids_of_equal_motors_show_in_a_small_motion() {
         let moved_rad = host.joints_rad() - before_rad;
         let truly_rad = host.emulated().truth().position_rad - true_before_rad;
         assert!(moved_rad[4] > 0.02, "{moved_rad}");
-        // The encoder that answers to joint 5 moves in both cases: only the model, or another look at the arm, tells.
+        // The encoder that answers to joint 5 moves in both cases: only the model, or another look at the arm, shows it.
         let found = if truly_rad[4].abs() > truly_rad[6].abs() {
             4
         } else {

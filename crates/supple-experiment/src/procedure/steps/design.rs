@@ -59,7 +59,7 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
             self.say("by the model of the first pass the arm sweeps another space");
             self.ask(&sweep)?;
         }
-        // A first pass tells little of the inertias: the loops must be stable with those of the given model, too.
+        // A first pass has little information on the inertias: the loops must be stable with those of the given model, too.
         let given = self
             .model(Stage::Start)?
             .config::<N>()

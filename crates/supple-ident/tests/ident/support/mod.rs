@@ -1,35 +1,21 @@
 //! Motions with exact derivatives, torques of a known arm, and noise with a seed.
 
-use rand_xoshiro::SplitMix64;
-use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use supple_core::dynamics::rnea;
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::{Arm, Body, Friction, Joint, Pose, Vector};
 use supple_ident::{DMatrix, Motion};
-
-pub struct Noise(SplitMix64);
-
-impl Noise {
-    pub fn new(seed: u64) -> Noise {
-        Noise(SplitMix64::seed_from_u64(seed))
-    }
-
-    /// Uniform in [-1, 1).
-    pub fn draw(&mut self) -> f64 {
-        (self.0.next_u64() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    }
-}
+use supple_random::Random;
 
 /// A physically consistent arm with random axes, offsets and rotors.
 pub fn random_arm<const N: usize>(seed: u64) -> Arm<N> {
-    let mut noise = Noise::new(seed);
+    let mut noise = Random::new(seed);
     let joints: [Joint; N] = std::array::from_fn(|_| {
-        let mut three = |s: f64| [s * noise.draw(), s * noise.draw(), s * noise.draw()];
+        let mut three = |s: f64| [s * noise.signed(), s * noise.signed(), s * noise.signed()];
         let (xyz, rpy, axis) = (three(0.4), three(3.0), three(1.0));
         let com_m = Vector3::from(three(0.2));
-        let spread = Matrix3::from_fn(|_, _| noise.draw());
+        let spread = Matrix3::from_fn(|_, _| noise.signed());
         let covariance = spread * spread.transpose() * 0.01 + Matrix3::identity() * 0.005;
-        let mass_kg = 2.5 + 2.0 * noise.draw();
+        let mass_kg = 2.5 + 2.0 * noise.signed();
         Joint {
             parent_from_link: Pose::from_xyz_rpy(xyz, rpy),
             axis: Vector3::from(axis).normalize(),
@@ -38,7 +24,7 @@ pub fn random_arm<const N: usize>(seed: u64) -> Arm<N> {
                 com_m,
                 inertia_kg_m2: (Matrix3::identity() * covariance.trace() - covariance) * mass_kg,
             },
-            armature_kg_m2: 0.05 + 0.04 * noise.draw(),
+            armature_kg_m2: 0.05 + 0.04 * noise.signed(),
         }
     });
     let gravity = Vector3::new(0.0, 0.0, -9.81);
@@ -54,13 +40,13 @@ pub fn motion<const N: usize>(
     seed: u64,
 ) -> Motion {
     let rate_hz = 50.0;
-    let mut noise = Noise::new(seed);
+    let mut noise = Random::new(seed);
     let waves: Vec<[f64; 3]> = (0..5 * N)
         .map(|_| {
             [
-                0.4 * noise.draw(),
-                2.0 + 1.7 * noise.draw(),
-                3.0 * noise.draw(),
+                0.4 * noise.signed(),
+                2.0 + 1.7 * noise.signed(),
+                3.0 * noise.signed(),
             ]
         })
         .collect();

@@ -1,10 +1,10 @@
 //! Thirty-nine errors of a log, each applied to a sound one.
 
-use crate::support::Noise;
 use supple_ident::log_checks::Problem;
 use supple_ident::{DMatrix, Log};
+use supple_random::Random;
 
-/// A log with one error, and what may be said of it.
+/// A log with one error, and what may be reported of it.
 pub struct Variant {
     pub name: String,
     pub log: Log,
@@ -286,8 +286,8 @@ pub fn all(log: &Log, s: &Sizes, rate_hz: f64) -> Vec<Variant> {
         &[Held],
         scaled(log, |l| hold(&mut l.tau_nm, None, every)),
     );
-    let mut noise = Noise::new(3);
-    let keep: Vec<usize> = (0..n).filter(|_| noise.draw() > -0.96).collect();
+    let mut noise = Random::new(3);
+    let keep: Vec<usize> = (0..n).filter(|_| noise.signed() > -0.96).collect();
     let step = (log.t_s[n - 1] - log.t_s[0]) / (n - 1) as f64;
     add(
         "2 % of the samples lost",

@@ -22,7 +22,7 @@ const UNSEEN_CYCLES: f64 = 6.0;
 const MOTION_MS: f64 = 1100.0;
 /// The motors' watchdog, 20 ms in units of its step \[ms\].
 const WATCHDOG_MS: f64 = 20.5;
-/// Error codes with what the loop says of them.
+/// Error codes with what the loop reports of them.
 const ERRORS: [(&str, &str); 8] = [
     ("8", "reports over-voltage"),
     ("9", "reports under-voltage"),

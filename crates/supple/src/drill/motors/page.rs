@@ -103,7 +103,7 @@ from the process of the bus; times are those of the arm's clock.
 - **fastest joint**: largest speed of a joint from the event until all motors are disabled, and its number; a joint whose
   own motor has no torque is left out. No joint may exceed 0.5 rad/s, or 1.1 times what the task had, unless the arm's
   weight rests on the motor that is lost, the torque of all motors has ended, or the event is seen in the motion
-  alone; then the figure tells how fast it falls.
+  alone; then the figure shows how fast it falls.
 - **tip sank**: from the event until laying down begins, at most 30 mm under the same conditions and if every motor has
   torque: what a lost motor of the wrist carries falls with its joint.
 - A run in which nothing is lost ends as by Ctrl-C, which lays the arm down too.

@@ -77,7 +77,7 @@ pub fn perform<const N: usize>(
         let rows = trace::read(&trace)?;
         Ok(row::<N>(case, &left, &course, &rows))
     });
-    // The files belong to this test case only; reports of a case that could not be run say why.
+    // The files belong to this test case only; reports of a case that could not be run state why.
     if let Err(failure) = &row {
         let reports = std::fs::read_to_string(&reports).unwrap_or_default();
         supple_cli::console::print_status(&format!("{case}: {failure}\n{}", reports.trim_end()));
