@@ -13,13 +13,13 @@ use supple_core::learned::LearnedTerms;
 use supple_core::math::exp;
 
 /// Slower joints give no equations: their friction is not identifiable \[rad/s\].
-const MIN_SPEED_RAD_PER_S: f64 = 0.08;
+const MIN_SPEED_RAD_PER_S: f64 = 0.04;
 /// Time after a restart, a freeze or a reversal until a joint's filters have settled \[s\].
 const SETTLE_S: f64 = 0.15;
 /// Time between samples \[s\].
 const SAMPLE_S: f64 = 0.01;
 /// Time over which errors of the model are correlated: one sample of this time is independent \[s\].
-const CORRELATION_S: f64 = 1.0;
+const CORRELATION_S: f64 = 0.2;
 /// Samples are collected, judged and used by intervals of this length \[s\].
 const INTERVAL_S: f64 = 0.25;
 /// Intervals for which samples wait: a freeze meanwhile discards them.
