@@ -20,6 +20,9 @@ use supple_core::{Matrix, RippleTable, Vector};
 const SIGNIFICANT: f64 = 4.0;
 /// The same of a part in proportion to the torque.
 const SIGNIFICANT_SHARE: f64 = 3.0;
+/// Lowest harmonic of a torque constant: motors have two pole pairs or more, and at one period per revolution an error of
+/// the friction over the angle looks alike.
+const FIRST_OF_CONSTANT: u32 = 2;
 /// Number of nuisance columns.
 const NUISANCE: usize = 5;
 
@@ -216,7 +219,9 @@ fn significant(
     let scaling: Vec<usize> = (0..lines)
         .filter(|k| {
             let (sine, cosine, _, deviations) = harmonic_at(&all, 2 * (lines + k));
-            deviations > SIGNIFICANT_SHARE && sine.abs().max(cosine.abs()) <= MAX_SHARE
+            search.harmonics[*k] >= FIRST_OF_CONSTANT
+                && deviations > SIGNIFICANT_SHARE
+                && sine.abs().max(cosine.abs()) <= MAX_SHARE
         })
         .collect();
     let kept: Vec<usize> = (0..2 * lines)
