@@ -19,7 +19,7 @@ const SETTLE_S: f64 = 0.15;
 /// Time between samples \[s\].
 const SAMPLE_S: f64 = 0.01;
 /// Time over which errors of the model are correlated: one sample of this time is independent \[s\].
-const CORRELATION_S: f64 = 0.2;
+const CORRELATION_S: f64 = 1.0;
 /// Samples are collected, judged and used by intervals of this length \[s\].
 const INTERVAL_S: f64 = 0.25;
 /// Intervals for which samples wait: a freeze meanwhile discards them.
