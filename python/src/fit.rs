@@ -68,6 +68,7 @@ fn tables<const N: usize>(ripple: &[Vec<Line>]) -> Result<[RippleTable; N], Iden
                 harmonic,
                 sine_nm,
                 cosine_nm,
+                ..Harmonic::default()
             });
         let harmonics: Vec<Harmonic> = harmonics.collect();
         *table = RippleTable::new(&harmonics).ok_or_else(|| wrong(format!("{lines:?}")))?;

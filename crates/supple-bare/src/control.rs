@@ -182,6 +182,7 @@ fn ripple() -> RippleTable {
         harmonic,
         sine_nm,
         cosine_nm,
+        ..Harmonic::default()
     };
     RippleTable::new(&[line(2, 0.01, -0.02), line(12, 0.005, 0.004)]).unwrap_or_default()
 }

@@ -283,9 +283,14 @@ pub fn without_ripple<const N: usize>(
     motor_from_joint: &supple_core::Matrix<N, N>,
 ) -> Log {
     let mut log = log.clone();
+    let joint_from_motor = motor_from_joint
+        .try_inverse()
+        .unwrap_or_else(supple_core::Matrix::identity);
     for i in 0..log.t_s.len() {
         let q = Vector::<N>::from_fn(|j, _| log.q_rad[(i, j)]);
-        let against = compensation_nm(tables, motor_from_joint, &q);
+        let tau = Vector::<N>::from_fn(|j, _| log.tau_nm[(i, j)]);
+        let motor_nm = joint_from_motor.tr_mul(&tau);
+        let against = compensation_nm(tables, motor_from_joint, &q, &motor_nm);
         (0..N).for_each(|j| log.tau_nm[(i, j)] -= against[j]);
     }
     log
@@ -420,6 +425,7 @@ fn table_of(ripple: &[Ripple], motor: usize) -> Option<RippleTable> {
             harmonic: line.harmonic,
             sine_nm: line.amplitude_nm * line.phase_rad.cos(),
             cosine_nm: line.amplitude_nm * line.phase_rad.sin(),
+            ..Harmonic::default()
         })
         .collect();
     RippleTable::new(&lines)

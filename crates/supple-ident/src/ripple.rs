@@ -2,9 +2,9 @@
 //! speed.
 //!
 //! The difference between received and commanded joint torque, transformed to the motors by `m2jp^T`, is fitted
-//! by sines and cosines of the motor angle. Nuisance columns (constant, direction, speed, angle) absorb other
-//! slow residuals and are discarded. All columns pass the filter of the torques. The largest significant
-//! harmonics are kept.
+//! by sines and cosines of the motor angle, constant (cogging) and in proportion to the motor's torque (a torque constant
+//! that varies with the angle). Nuisance columns (constant, direction, speed, angle) absorb other slow residuals and are
+//! discarded. All columns pass the filter of the torques. The largest significant harmonics are kept.
 
 use crate::error::{IdentError, positive};
 use crate::filter::LowPass;
@@ -13,11 +13,16 @@ use crate::motion::Motion;
 use crate::regressor::joint_rows;
 use nalgebra::{DMatrix, DVector};
 use supple_core::math::{cos, sin};
-use supple_core::ripple::{Harmonic, LINES};
+use supple_core::ripple::{Harmonic, LINES, MAX_SHARE};
 use supple_core::{Matrix, RippleTable, Vector};
 
 /// Minimum amplitude of a significant harmonic, in standard deviations.
 const SIGNIFICANT: f64 = 4.0;
+/// The same of a part in proportion to the torque.
+const SIGNIFICANT_SHARE: f64 = 3.0;
+/// Lowest harmonic of a torque constant: motors have two pole pairs or more, and at one period per revolution an error of
+/// the friction over the angle looks alike.
+const FIRST_OF_CONSTANT: u32 = 2;
 /// Number of nuisance columns.
 const NUISANCE: usize = 5;
 
@@ -60,7 +65,7 @@ pub fn fit_ripple<const N: usize>(
         ));
     }
     let mut tables = [RippleTable::NONE; N];
-    let width = 2 * search.harmonics.len() + NUISANCE;
+    let width = 4 * search.harmonics.len() + NUISANCE;
     for (motor, table) in tables.iter_mut().enumerate() {
         let mut all = Vec::new();
         for motion in motions {
@@ -117,18 +122,25 @@ fn motor_rows<const N: usize>(
         let qd = Vector::<N>::from_fn(|j, _| motion.qd[(i, j)]);
         (motor_from_joint * qd)[motor]
     };
+    let commanded = |i: usize| -> f64 {
+        (0..N)
+            .map(|j| joint_from_motor[(j, motor)] * joints[j].b[i])
+            .sum()
+    };
     let lines = search.harmonics.len();
-    let mut columns = DMatrix::zeros(samples, 2 * lines + NUISANCE);
+    let mut columns = DMatrix::zeros(samples, 4 * lines + NUISANCE);
     for i in 0..samples {
-        let (p, v) = (angle(i), speed(i));
+        let (p, v, tau) = (angle(i), speed(i), commanded(i));
         for (k, harmonic) in search.harmonics.iter().enumerate() {
             let phase = f64::from(*harmonic) * p;
             columns[(i, 2 * k)] = sin(phase);
             columns[(i, 2 * k + 1)] = cos(phase);
+            columns[(i, 2 * (lines + k))] = tau * sin(phase);
+            columns[(i, 2 * (lines + k) + 1)] = tau * cos(phase);
         }
         let rest = [1.0, v.signum(), v, p, p * p];
         for (k, value) in rest.into_iter().enumerate() {
-            columns[(i, 2 * lines + k)] = value;
+            columns[(i, 4 * lines + k)] = value;
         }
     }
     if let Some(cutoff_hz) = motion.cutoff_hz {
@@ -147,13 +159,17 @@ fn motor_rows<const N: usize>(
     Ok((columns.select_rows(&kept), torque.select_rows(&kept)))
 }
 
-/// The largest significant harmonics.
-fn significant(
+/// A least-squares solution with its standard deviations.
+struct Solution {
+    x: Vec<f64>,
+    deviation: Vec<f64>,
+}
+
+fn least_squares(
     a: &DMatrix<f64>,
     b: &DVector<f64>,
-    search: &RippleSearch,
     independent_fraction: f64,
-) -> Result<RippleTable, IdentError> {
+) -> Result<Solution, IdentError> {
     let singular = || IdentError::Singular {
         problem: "the slow motion does not distinguish the harmonics".to_owned(),
         remedy: "move every joint over several turns of its motor",
@@ -173,25 +189,83 @@ fn significant(
     let freedom = (a.nrows() - a.ncols()) as f64 * independent_fraction;
     let noise = (&scaled * &solution - b).norm() / freedom.max(1.0).sqrt();
     let inverse = root.inverse();
-    let value = |j: usize| solution[j] / lengths[j];
-    let deviation = |j: usize| noise * inverse[(j, j)].sqrt() / lengths[j];
-    let mut lines: Vec<(f64, Harmonic)> = Vec::new();
+    let columns = 0..a.ncols();
+    Ok(Solution {
+        x: columns.clone().map(|j| solution[j] / lengths[j]).collect(),
+        deviation: columns
+            .map(|j| noise * inverse[(j, j)].sqrt() / lengths[j])
+            .collect(),
+    })
+}
+
+/// Sine, cosine and amplitude of the harmonic whose columns begin at `first`, and the amplitude in standard deviations.
+fn harmonic_at(solution: &Solution, first: usize) -> (f64, f64, f64, f64) {
+    let (sine, cosine) = (solution.x[first], solution.x[first + 1]);
+    let deviation = solution.deviation[first].max(solution.deviation[first + 1]);
+    let amplitude = sine.hypot(cosine);
+    (sine, cosine, amplitude, amplitude / deviation)
+}
+
+/// The largest significant harmonics. What is in proportion to the torque is looked for first, beside everything else;
+/// without significance it is left out, because a torque that hardly varies does not tell it from cogging.
+fn significant(
+    a: &DMatrix<f64>,
+    b: &DVector<f64>,
+    search: &RippleSearch,
+    independent_fraction: f64,
+) -> Result<RippleTable, IdentError> {
+    let lines = search.harmonics.len();
+    let all = least_squares(a, b, independent_fraction)?;
+    let scaling: Vec<usize> = (0..lines)
+        .filter(|k| {
+            let (sine, cosine, _, deviations) = harmonic_at(&all, 2 * (lines + k));
+            search.harmonics[*k] >= FIRST_OF_CONSTANT
+                && deviations > SIGNIFICANT_SHARE
+                && sine.abs().max(cosine.abs()) <= MAX_SHARE
+        })
+        .collect();
+    let kept: Vec<usize> = (0..2 * lines)
+        .chain(
+            scaling
+                .iter()
+                .flat_map(|k| [2 * (lines + k), 2 * (lines + k) + 1]),
+        )
+        .chain(4 * lines..a.ncols())
+        .collect();
+    let found = least_squares(&a.select_columns(&kept), b, independent_fraction)?;
+    let mut harmonics: Vec<(f64, Harmonic)> = Vec::new();
     for (k, harmonic) in search.harmonics.iter().enumerate() {
-        let (sine_nm, cosine_nm) = (value(2 * k), value(2 * k + 1));
-        let amplitude = sine_nm.hypot(cosine_nm);
-        if amplitude > SIGNIFICANT * deviation(2 * k).max(deviation(2 * k + 1)) {
-            lines.push((
-                amplitude,
-                Harmonic {
-                    harmonic: *harmonic,
-                    sine_nm,
-                    cosine_nm,
-                },
-            ));
+        let (sine_nm, cosine_nm, amplitude_nm, deviations) = harmonic_at(&found, 2 * k);
+        let mut line = Harmonic {
+            harmonic: *harmonic,
+            sine_nm,
+            cosine_nm,
+            ..Harmonic::default()
+        };
+        let mut size_nm = amplitude_nm;
+        if let Some(at) = scaling.iter().position(|of| *of == k) {
+            let first = 2 * (lines + at);
+            let (sine, cosine, amplitude, _) = harmonic_at(&found, first);
+            line.sine_share = sine.clamp(-MAX_SHARE, MAX_SHARE);
+            line.cosine_share = cosine.clamp(-MAX_SHARE, MAX_SHARE);
+            let torques = pair_norm(a, 2 * (lines + k)) / pair_norm(a, 2 * k);
+            size_nm += amplitude * torques;
+        } else if deviations.is_nan() || deviations <= SIGNIFICANT {
+            continue;
         }
+        harmonics.push((size_nm, line));
     }
-    lines.sort_by(|x, y| y.0.total_cmp(&x.0));
-    lines.truncate(LINES);
-    let harmonics: Vec<Harmonic> = lines.into_iter().map(|(_, line)| line).collect();
-    RippleTable::new(&harmonics).ok_or_else(singular)
+    harmonics.sort_by(|x, y| y.0.total_cmp(&x.0));
+    harmonics.truncate(LINES);
+    let harmonics: Vec<Harmonic> = harmonics.into_iter().map(|(_, line)| line).collect();
+    RippleTable::new(&harmonics).ok_or_else(|| IdentError::Singular {
+        problem: "a harmonic of the ripple is not finite".to_owned(),
+        remedy: "move every joint over several turns of its motor",
+    })
+}
+
+/// Length of two columns together.
+fn pair_norm(a: &DMatrix<f64>, first: usize) -> f64 {
+    let square = a.columns(first, 2).norm_squared();
+    square.sqrt().max(f64::MIN_POSITIVE)
 }

@@ -245,6 +245,8 @@ mod tests {
             harmonic,
             sine_nm: 1.0 / 3.0,
             cosine_nm: -0.0,
+            sine_share: 0.01,
+            cosine_share: -0.02,
         };
         config.workspace = Workspace {
             borders: core::array::from_fn(|i| match i {

@@ -55,6 +55,11 @@ pub(crate) struct RippleDef {
     harmonic: u32,
     sine_nm: f64,
     cosine_nm: f64,
+    /// Absent in older logs.
+    #[serde(default)]
+    sine_share: f64,
+    #[serde(default)]
+    cosine_share: f64,
 }
 
 impl RippleDef {
@@ -65,6 +70,8 @@ impl RippleDef {
                 harmonic: line.harmonic,
                 sine_nm: line.sine_nm,
                 cosine_nm: line.cosine_nm,
+                sine_share: line.sine_share,
+                cosine_share: line.cosine_share,
             })
         });
         lines.collect()
@@ -87,6 +94,8 @@ impl RippleDef {
                     harmonic: line.harmonic,
                     sine_nm: line.sine_nm,
                     cosine_nm: line.cosine_nm,
+                    sine_share: line.sine_share,
+                    cosine_share: line.cosine_share,
                 })
                 .collect();
             *table = RippleTable::new(&lines)

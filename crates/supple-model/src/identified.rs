@@ -317,6 +317,10 @@ impl Description {
                 entry.insert("harmonic", i64::from(line.harmonic).into());
                 entry.insert("sine_nm", line.sine_nm.into());
                 entry.insert("cosine_nm", line.cosine_nm.into());
+                if line.sine_share != 0.0 || line.cosine_share != 0.0 {
+                    entry.insert("sine_share", line.sine_share.into());
+                    entry.insert("cosine_share", line.cosine_share.into());
+                }
                 list.push(entry);
             }
         }

@@ -252,7 +252,8 @@ pub struct MotorSettings {
     pub ripple: Vec<RippleSettings>,
 }
 
-/// A harmonic of a motor's torque over its angle: `sine sin(harmonic p) + cosine cos(harmonic p)`.
+/// A harmonic of a motor's torque over its angle: `sine sin(harmonic p) + cosine cos(harmonic p)`, each the sum of a torque
+/// and of a share of the motor's torque.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RippleSettings {
@@ -264,6 +265,13 @@ pub struct RippleSettings {
     pub sine_nm: f64,
     /// Amplitude of the cosine, at the motor (N m).
     pub cosine_nm: f64,
+    /// Part of the sine in proportion to the motor's torque, as a share of it: its torque constant varies with the angle.
+    /// Default: 0.
+    #[serde(default)]
+    pub sine_share: f64,
+    /// The same of the cosine. Default: 0.
+    #[serde(default)]
+    pub cosine_share: f64,
 }
 
 /// Limits that apply to the whole arm.

@@ -1,8 +1,9 @@
 //! Builds a plant configuration from an arm description.
 
-use crate::actuators::{ActuatorModel, Ripple};
+use crate::actuators::{ActuatorModel, Ripple, TorqueRipple};
 use crate::config::{ForceSensor, HardStops, PlantConfig};
 use crate::friction::LuGre;
+use supple_core::ripple::Harmonic;
 use supple_core::{Matrix, Vector};
 use supple_model::{Description, ModelError};
 
@@ -39,6 +40,20 @@ impl<const N: usize> PlantConfig<N> {
                     phase_rad: libm::atan2(harmonic.cosine_nm, harmonic.sine_nm),
                 })
             });
+        let torque_ripple = control
+            .ripple
+            .iter()
+            .enumerate()
+            .flat_map(|(motor, table)| {
+                let scales = |line: &&Harmonic| line.sine_share != 0.0 || line.cosine_share != 0.0;
+                let lines = table.harmonics().iter().filter(scales);
+                lines.map(move |line| TorqueRipple {
+                    motor,
+                    harmonic: line.harmonic,
+                    fraction: libm::hypot(line.sine_share, line.cosine_share),
+                    phase_rad: libm::atan2(line.cosine_share, line.sine_share),
+                })
+            });
         Ok(PlantConfig {
             friction: control
                 .friction
@@ -56,6 +71,7 @@ impl<const N: usize> PlantConfig<N> {
                 ),
                 torque_delay_cycles: 1,
                 ripple: ripple.collect(),
+                torque_ripple: torque_ripple.collect(),
                 ..ActuatorModel::direct()
             },
             stops: Some(HardStops::new(

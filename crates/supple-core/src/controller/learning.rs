@@ -142,13 +142,13 @@ impl<const N: usize> State<N> {
         learned: Option<&LearnedAtPose<N>>,
     ) -> (Vector<N>, Vector<N>) {
         let Some(learned) = learned else {
-            return (self.torque, Vector::zeros());
+            return (self.torque - self.ripple, Vector::zeros());
         };
         let terms = &self.learned.current;
         let velocity = &self.estimator.velocity_rad_per_s;
         let scale = &terms.parameters.torque_scale;
         (
-            Vector::from_fn(|i, _| self.torque[i] / (1.0 + scale[i])),
+            Vector::from_fn(|i, _| (self.torque[i] - self.ripple[i]) / (1.0 + scale[i])),
             learned.torque_nm(terms, &config.friction, velocity, None, 1.0),
         )
     }

@@ -4,7 +4,7 @@ use super::estimator::EstimatorGains;
 use super::limiter::MotorGroups;
 use super::nullspace::nullspace_damping_nm_s_per_rad;
 use super::validate::{self, ConfigError};
-use crate::config::Config;
+use crate::config::{Config, RippleTable};
 use crate::law::task::count_active;
 use crate::math::linalg::Cholesky;
 use crate::math::{Matrix, Vector};
@@ -22,6 +22,8 @@ pub struct Controller<const N: usize> {
     pub(super) active_joints: usize,
     /// A motor has a table of its ripple.
     pub(super) has_ripple: bool,
+    /// A part of it is in proportion to the torque.
+    pub(super) ripple_scales: bool,
     /// The travel of a joint's reversals is known.
     pub(super) has_presliding: bool,
     /// A joint is compliant between encoder and link.
@@ -74,6 +76,7 @@ impl<const N: usize> Controller<N> {
                 .ripple
                 .iter()
                 .any(|table| !table.harmonics().is_empty()),
+            ripple_scales: config.ripple.iter().any(RippleTable::scales_with_torque),
             has_presliding: config.friction.iter().any(|f| f.presliding_rad > 0.0),
             has_compliance: config.compliance_rad_per_nm != Vector::<N>::zeros(),
             one_period: EstimatorGains::new(config.period_s, config.estimator_rad_per_s),
@@ -103,6 +106,10 @@ impl<const N: usize> Controller<N> {
 
     pub(super) fn has_ripple(&self) -> bool {
         self.has_ripple
+    }
+
+    pub(super) fn ripple_scales(&self) -> bool {
+        self.ripple_scales
     }
 
     pub(super) fn has_presliding(&self) -> bool {

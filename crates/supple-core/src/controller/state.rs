@@ -156,6 +156,8 @@ pub struct State<const N: usize> {
     pub(super) has_held_loops: bool,
     /// Last torque and fallback torque sent.
     pub(super) torque: Vector<N>,
+    /// Part of the last torque that cancels the ripple of the motors, and so does not reach the links \[N m\].
+    pub(super) ripple: Vector<N>,
     pub(super) fallback: Vector<N>,
     pub(super) handover: Handover<N>,
     pub(super) fault: Option<Fault>,
@@ -196,6 +198,7 @@ impl<const N: usize> State<N> {
             has_held_loops: config.hold_pose
                 || config.roles.iter().any(|role| *role != Role::Active),
             torque: Vector::zeros(),
+            ripple: Vector::zeros(),
             fallback: Vector::zeros(),
             handover: Handover::none(),
             fault: None,

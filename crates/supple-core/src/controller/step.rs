@@ -104,9 +104,13 @@ pub fn step<const N: usize>(
     if !(state.activity.is_torque_off() || state.fault.is_some() || state.is_stale(config)) {
         state.add_joint_loops_and_stops(controller, &mut torques);
         if controller.has_ripple() {
-            let tables = &config.ripple;
-            torques.ripple =
-                compensation_nm(tables, controller.motor_from_joint(), &state.position);
+            // Torque constants vary slowly over a cycle: the last torque is near enough.
+            let motor_nm = match controller.ripple_scales() {
+                true => config.joint_from_motor.tr_mul(&state.torque),
+                false => Vector::zeros(),
+            };
+            let (tables, to_motors) = (&config.ripple, controller.motor_from_joint());
+            torques.ripple = compensation_nm(tables, to_motors, &state.position, &motor_nm);
         }
         if let Some(learned) = &learned {
             torques.learned = state.learned_torques(
@@ -147,6 +151,7 @@ pub fn step<const N: usize>(
         state.latch_fault(Fault::TorqueNotFinite { term: "total" });
     }
     state.torque = limited.torque_nm;
+    state.ripple = torques.ripple;
     state.update_fallback(controller);
 
     Output {

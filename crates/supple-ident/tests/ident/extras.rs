@@ -158,10 +158,18 @@ fn ripple_is_identified_at_its_harmonics_and_nowhere_else() {
         harmonic,
         sine_nm,
         cosine_nm,
+        ..Harmonic::default()
     };
     let tables = [
         RippleTable::new(&[harmonic(2, 4e-3, -3e-3)]).unwrap(),
-        RippleTable::new(&[harmonic(3, 5e-3, 0.0), harmonic(6, 0.0, 2e-3)]).unwrap(),
+        RippleTable::new(&[
+            harmonic(3, 5e-3, 0.0),
+            Harmonic {
+                sine_share: 0.02,
+                ..harmonic(6, 0.0, 2e-3)
+            },
+        ])
+        .unwrap(),
         RippleTable::NONE,
         RippleTable::new(&[harmonic(1, -2e-3, 6e-3)]).unwrap(),
     ];
@@ -171,7 +179,7 @@ fn ripple_is_identified_at_its_harmonics_and_nowhere_else() {
     for (motor, (got, wanted)) in got.iter().zip(&tables).enumerate() {
         for i in 0..200 {
             let p = 0.1 * f64::from(i);
-            let error = got.torque_nm(p) - wanted.torque_nm(p);
+            let error = got.torque_nm(p, 0.3) - wanted.torque_nm(p, 0.3);
             assert!(error.abs() < 4e-4, "motor {motor} at {p}: {error}");
         }
     }
@@ -198,16 +206,18 @@ fn motion_with_ripple(
     let columns =
         |derivative| DMatrix::from_fn(samples, 4, |i, j| angle(i as f64 / rate_hz, j, derivative));
     let (q, qd, qdd) = (columns(0), columns(1), columns(2));
+    let joint_from_motor = motor_from_joint.try_inverse().unwrap();
     let mut tau = DMatrix::zeros(samples, 4);
     for i in 0..samples {
         let at = |m: &DMatrix<f64>| Vector::<4>::from_fn(|j, _| m[(i, j)]);
         let arm_nm = rnea(arm, &at(&q), &at(&qd), &at(&qdd));
         let motor = motor_from_joint * at(&q);
-        let ripple = Vector::<4>::from_fn(|m, _| tables[m].torque_nm(motor[m]));
+        let needed = arm_nm + Vector::<4>::from_fn(|j, _| friction[j].torque_nm(qd[(i, j)]));
+        let motor_nm = joint_from_motor.transpose() * needed;
+        let ripple = Vector::<4>::from_fn(|m, _| tables[m].torque_nm(motor[m], motor_nm[m]));
         let ripple_nm = motor_from_joint.transpose() * ripple;
         for j in 0..4 {
-            let friction_nm = friction[j].torque_nm(qd[(i, j)]);
-            tau[(i, j)] = arm_nm[j] + friction_nm - ripple_nm[j] + 0.01 * noise.signed();
+            tau[(i, j)] = needed[j] - ripple_nm[j] + 0.01 * noise.signed();
         }
     }
     Motion {

@@ -31,6 +31,8 @@ fn config() -> Config<N> {
         harmonic: 3,
         sine_nm: 0.002,
         cosine_nm: 0.001,
+        sine_share: 0.01,
+        cosine_share: -0.02,
     };
     let mut config = Config {
         roles: [Role::Active; N],

@@ -7,7 +7,7 @@ use crate::settings::{MotorSettings, Settings};
 use crate::xml::MAX_MAGNITUDE;
 use nalgebra::DMatrix;
 use supple_core::math::{Matrix3, Vector3};
-use supple_core::ripple::{Harmonic, LINES};
+use supple_core::ripple::{Harmonic, LINES, MAX_SHARE};
 use supple_core::{Body, RippleTable};
 
 /// Motors and transmission, one motor per joint, as many as moving joints.
@@ -119,6 +119,19 @@ fn ripple(
         let element = |key: &str| format!("[motors] ripple[{i}] {key}");
         report.finite(&element("sine_nm"), entry.sine_nm)?;
         report.finite(&element("cosine_nm"), entry.cosine_nm)?;
+        for (key, share) in [
+            ("sine_share", entry.sine_share),
+            ("cosine_share", entry.cosine_share),
+        ] {
+            if !(-MAX_SHARE..=MAX_SHARE).contains(&share) {
+                return Err(report.invalid(
+                    element(key),
+                    format!("must be from -{MAX_SHARE} to {MAX_SHARE}"),
+                    share,
+                    "give the variation of the motor's torque constant as a share of it",
+                ));
+            }
+        }
         if entry.motor >= n {
             return Err(report.invalid(
                 element("motor"),
@@ -139,6 +152,8 @@ fn ripple(
             harmonic: entry.harmonic,
             sine_nm: entry.sine_nm,
             cosine_nm: entry.cosine_nm,
+            sine_share: entry.sine_share,
+            cosine_share: entry.cosine_share,
         });
     }
     let tables = lines.iter().enumerate().map(|(motor, lines)| {

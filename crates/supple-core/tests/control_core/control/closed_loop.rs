@@ -1,14 +1,14 @@
 //! Controller and arm together, exact model, no friction: from idle to the paper's sinusoid and back.
 
-use crate::support::configs::{four, three};
+use crate::support::configs::{four, friction, three};
 use crate::support::plant::{Plant, nothing, push};
 use crate::support::rig::Rig;
 use supple_core::config::Gains;
 use supple_core::controller::{Mode, Request};
 use supple_core::inverse_kinematics::inverse_kinematics;
 use supple_core::math::Vector3;
-use supple_core::trajectory::Sinusoid;
-use supple_core::{Config, Trajectory, Vector};
+use supple_core::trajectory::{Arc, Sinusoid};
+use supple_core::{Config, Friction, Output, Trajectory, Vector};
 
 fn start<const N: usize>(config: &Config<N>, seed: Vector<N>) -> Vector<N> {
     let point = Vector3::new(0.6, 0.0, 0.0);
@@ -128,4 +128,42 @@ fn gravity_hold_takes_energy() {
         }
     }
     assert!(last < 1e-3 * begun, "{last} of {begun} J left");
+}
+
+/// On an arc only the base joint moves. A tip that lags by two centimetres does not make the others seem to move: their dry
+/// friction is not fed forward.
+#[test]
+fn a_tip_behind_its_reference_turns_round_no_friction_of_other_joints() {
+    let mut config = four();
+    config.friction = friction().map(|friction| Friction {
+        presliding_rad: 1.5e-3,
+        offset_nm: 0.0,
+        ..friction
+    });
+    config.law.gains = Gains::isotropic(5.0, 1.5);
+    // The arm does not move; that is not to count as contact.
+    config.latch.threshold_n = 1e3;
+    let q = start(&config, Vector::<4>::new(0.0, 0.8, 0.0, 1.8));
+    let mut rig = Rig::holding(config, q);
+    let arc = Arc {
+        radius_m: 0.6,
+        height_m: 0.0,
+        centre_rad: 0.0,
+        amplitude_rad: 0.4,
+        angular_frequency_rad_per_s: 0.8,
+        ramp_s: 1.0,
+    };
+    let mut output = rig.accept(Request::Track(Trajectory::Arc(arc)));
+    let lag = |output: &Output<4>| {
+        let reference = output.reference.expect("it tracks");
+        (reference.position - output.tip_position_m).norm()
+    };
+    while lag(&output) < 0.02 {
+        output = rig.cycle();
+        assert_eq!(output.fault, None);
+    }
+    let dry = |joint: usize| output.torques.friction[joint] / config.friction[joint].coulomb_nm;
+    assert!(dry(0).abs() > 0.9, "{}", dry(0));
+    assert!(dry(1).abs() < 0.1, "{}", dry(1));
+    assert!(dry(3).abs() < 0.1, "{}", dry(3));
 }

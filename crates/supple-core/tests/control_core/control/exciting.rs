@@ -235,6 +235,7 @@ fn ripple_feedforward_cancels_the_motors_ripple() {
         harmonic: 3,
         sine_nm: 0.01,
         cosine_nm: -0.004,
+        ..Harmonic::default()
     };
     config.ripple[1] = RippleTable::new(&[line]).expect("a table");
     let mut rig = Rig::holding(config, bent());
@@ -249,4 +250,52 @@ fn ripple_feedforward_cancels_the_motors_ripple() {
     assert_close(&(output.torque_nm + joint), &output.torques.gravity, 1e-9);
     rig.request(Request::Idle);
     assert_eq!(rig.rest().torque_nm.norm(), 0.0);
+}
+
+/// The part of the command that cancels ripple does not reach the links: the observer takes it for no external torque.
+#[test]
+fn the_observer_leaves_the_ripple_out() {
+    let mut config = four();
+    let line = Harmonic {
+        harmonic: 3,
+        sine_nm: 0.01,
+        cosine_nm: -0.004,
+        ..Harmonic::default()
+    };
+    config.ripple = [RippleTable::new(&[line]).expect("a table"); 4];
+    let mut rig = Rig::holding(config, bent());
+    let output = rig.rest();
+    assert!(size(&output.torques.ripple) > 0.1);
+    assert!(size(&output.external_torque_nm) < 1e-6);
+}
+
+/// A torque constant that varies with the angle is cancelled in proportion to the motor's torque.
+#[test]
+fn ripple_of_the_torque_constant_is_cancelled_with_the_torque() {
+    let mut config = four();
+    let line = Harmonic {
+        harmonic: 6,
+        sine_share: 0.02,
+        cosine_share: 0.01,
+        ..Harmonic::default()
+    };
+    config.ripple[1] = RippleTable::new(&[line]).expect("a table");
+    let mut rig = Rig::holding(config, bent());
+    let output = rig.rest();
+    let motor_from_joint = config.joint_from_motor.try_inverse().expect("regular");
+    let angle = 6.0 * (motor_from_joint * bent::<4>())[1];
+    let commanded = config.joint_from_motor.tr_mul(&output.torque_nm);
+    let mut motor = Vector::<4>::zeros();
+    motor[1] = commanded[1] * (0.02 * angle.sin() + 0.01 * angle.cos());
+    assert!(motor[1].abs() > 1e-4);
+    let joint = motor_from_joint.transpose() * motor;
+    assert_close(&output.torques.ripple, &-joint, 1e-9);
+    assert_close(&(output.torque_nm + joint), &output.torques.gravity, 1e-9);
+    assert!(
+        RippleTable::new(&[Harmonic {
+            sine_share: 0.3,
+            ..line
+        }])
+        .is_none()
+    );
 }
