@@ -9,8 +9,8 @@ use crate::request_sequence::Recording;
 use serde::{Deserialize, Serialize};
 use supple_core::Vector;
 
-/// Motion of another encoder as a share of that of the ramped joint, above which it counts: a joint that others accelerate
-/// moves less than they do.
+/// Motion of another encoder as a share of that of the ramped joint, above which it counts. A joint that the ramped one
+/// accelerates may move more: as much as a free one would by the model.
 const OTHER_SHARE: f64 = 0.5;
 /// Motion of an encoder that counts as motion of its joint: more than bristles and cables give \[rad\].
 const MOVED_RAD: f64 = 0.01;
@@ -33,8 +33,14 @@ pub struct JointWiring {
     pub difference_rad: f64,
 }
 
-/// Evaluates a ramp of `rate_nm_per_s` on a joint: which encoders moved.
-pub fn ramp_result(recording: &Recording, joint: usize, rate_nm_per_s: f64) -> JointWiring {
+/// Evaluates a ramp of `rate_nm_per_s` on a joint: which encoders moved. `free_share` is how far each joint would move, as a
+/// share of the ramped one's travel, if nothing held it.
+pub fn ramp_result(
+    recording: &Recording,
+    joint: usize,
+    rate_nm_per_s: f64,
+    free_share: impl Fn(usize) -> f64,
+) -> JointWiring {
     let Some(last) = recording.t_s.len().checked_sub(1) else {
         return JointWiring::default();
     };
@@ -42,12 +48,13 @@ pub fn ramp_result(recording: &Recording, joint: usize, rate_nm_per_s: f64) -> J
         let travel_rad = recording.q_rad[(last, joint)] - recording.q_rad[(0, joint)];
         travel_rad.abs()
     };
-    let other_rad = MOVED_RAD.max(OTHER_SHARE * travel_rad(joint));
+    let other_rad =
+        |other: usize| MOVED_RAD.max(OTHER_SHARE.max(free_share(other)) * travel_rad(joint));
     let all = 0..recording.q_rad.ncols();
     JointWiring {
         moved: travel_rad(joint) > MOVED_RAD,
         others: all
-            .filter(|other| *other != joint && travel_rad(*other) > other_rad)
+            .filter(|other| *other != joint && travel_rad(*other) > other_rad(*other))
             .collect(),
         torque_nm: rate_nm_per_s.abs() * (recording.t_s[last] - recording.t_s[0]),
         difference_rad: 0.0,

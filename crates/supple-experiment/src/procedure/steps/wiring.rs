@@ -11,7 +11,7 @@ use crate::procedure::wiring::{
 };
 use crate::request_sequence::{Recording, Step};
 use supple_core::controller::Request;
-use supple_core::dynamics::gravity;
+use supple_core::dynamics::{crba, gravity};
 use supple_core::{Config, Vector};
 
 /// Time in which an arm without brakes comes to rest in its position loops \[s\].
@@ -89,7 +89,10 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         let motion = performed.motions.into_iter().next();
         let recording = motion.map(|motion| motion.recording);
         if let Some(recording) = recording.as_ref().filter(|found| !found.t_s.is_empty()) {
-            let found = ramp_result(recording, joint, rate_nm_per_s);
+            let mass_matrix = crba(&config.arm, pose_rad);
+            let found = ramp_result(recording, joint, rate_nm_per_s, |other| {
+                (mass_matrix[(other, joint)] / mass_matrix[(other, other)]).abs()
+            });
             if performed.stopped.is_none() || !found.others.is_empty() {
                 check_ramp(&self.names, joint, &found)?;
             }
