@@ -5,6 +5,7 @@
 //! gravity hold and of held joints it applies as they are: those of gravity hold in any pose, those of held joints with these
 //! at their angles.
 
+use crate::description::Description;
 use crate::poses::pose_rad;
 use core::f64::consts::FRAC_PI_2;
 use nalgebra::{DMatrix, SymmetricEigen};
@@ -13,6 +14,8 @@ use supple_core::controller::ConfigError;
 use supple_core::dynamics::crba;
 use supple_core::{Config, Controller, Matrix, Vector};
 
+/// Damping rate times delay that a lower control rate leaves: three quarters of the limit.
+const MARGIN: f64 = 0.75 * FRAC_PI_2;
 /// Number of poses.
 const POSES: u32 = 100;
 const MUST: &str = "less: with the delay of this loop it shakes the joint in poses where the arm has little inertia";
@@ -26,6 +29,29 @@ pub(crate) fn first_beyond_delay<const N: usize>(
         .into_iter()
         .find(|(_, rate_times_delay)| *rate_times_delay > FRAC_PI_2)
         .map(|(error, _)| error)
+}
+
+impl Description {
+    /// Share of the damping of gravity hold, and of held joints, that keeps the margin at the arm's control rate: at most 1.
+    pub(crate) fn allowed_damping_shares<const N: usize>(&self) -> [f64; 2] {
+        let config = self.config_for_any_delay::<N>().ok();
+        let controller = config.and_then(|config| Controller::new(config).ok());
+        controller.map_or([1.0; 2], |controller| {
+            rates_times_delay(&controller)
+                .map(|(_, rate_times_delay)| (MARGIN / rate_times_delay).min(1.0))
+        })
+    }
+
+    /// Multiplies the damping of gravity hold, and the gains of held joints, by these shares.
+    pub(crate) fn reduce_damping(&mut self, [hold, held]: [f64; 2]) {
+        for joint in &mut self.joints {
+            joint.gains.hold_damping_nm_s_per_rad *= hold;
+            if let Some(loops) = &mut joint.held {
+                loops.stiffness_nm_per_rad *= held;
+                loops.damping_nm_s_per_rad *= held;
+            }
+        }
+    }
 }
 
 /// The largest damping rate times delay over the poses, of gravity hold and of the held joints: each with the joint that
@@ -93,7 +119,6 @@ fn fastest<const N: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Description;
 
     /// The built-in arms keep three quarters of the limit.
     #[test]

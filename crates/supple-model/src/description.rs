@@ -246,7 +246,9 @@ impl Description {
         }
     }
 
-    /// Returns the same arm with another control rate \[Hz\]; the period is rounded to whole nanoseconds.
+    /// Returns the same arm with another control rate \[Hz\]; the period is rounded to whole nanoseconds. Where the longer
+    /// delay of a lower rate does not allow the damping of gravity hold or of held joints, it is reduced, with the stiffness
+    /// of held joints.
     ///
     /// # Errors
     /// [`ModelError::Invalid`] for a rate outside 10 Hz to 10 kHz.
@@ -255,7 +257,14 @@ impl Description {
         let report = Reporter { file };
         report.positive("the control rate (Hz)", rate_hz)?;
         report.within("the control rate (Hz)", rate_hz, 10.0..=1e4, "Hz")?;
-        self.settings.period_s = (1e9 / rate_hz).round() * 1e-9;
+        let period_s = (1e9 / rate_hz).round() * 1e-9;
+        let slower = period_s > self.settings.period_s;
+        self.settings.period_s = period_s;
+        if slower {
+            // An arm with a number of joints that no controller has keeps its values: its configuration is an error.
+            let shares = crate::with_dof!(self.dof(), N => self.allowed_damping_shares::<N>());
+            self.reduce_damping(shares.unwrap_or([1.0; 2]));
+        }
         Ok(self)
     }
 

@@ -15,6 +15,7 @@ mod const_generic;
 mod delayed_damping;
 mod derive;
 mod description;
+mod dof;
 mod error;
 mod from_urdf;
 mod frozen;

@@ -402,3 +402,26 @@ fn damping_that_the_delay_forbids_is_refused_by_joint() {
         assert!(refused.contains("delay"), "{refused}");
     }
 }
+
+/// At a quarter of the rate the delay is longer: the roll joint of the WAM is held with less.
+#[test]
+fn a_lower_rate_has_the_damping_that_its_delay_allows() {
+    let wam = Description::asset("wam4").unwrap();
+    let held = |description: &Description| match description.config::<4>().unwrap().roles[2] {
+        Role::Held {
+            stiffness_nm_per_rad,
+            damping_nm_s_per_rad,
+            ..
+        } => (stiffness_nm_per_rad, damping_nm_s_per_rad),
+        Role::Active => panic!("held"),
+    };
+    let (stiffness, damping) = held(&wam);
+    assert_eq!(
+        held(&wam.clone().at_rate(1000.0).unwrap()),
+        (stiffness, damping)
+    );
+    let (slower_stiffness, slower_damping) = held(&wam.at_rate(250.0).unwrap());
+    assert!(slower_damping < 0.6 * damping, "{slower_damping}");
+    let shares = (slower_stiffness / stiffness, slower_damping / damping);
+    assert!((shares.0 - shares.1).abs() < 1e-12, "{shares:?}");
+}
