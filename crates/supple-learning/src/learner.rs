@@ -13,7 +13,7 @@ use supple_core::learned::LearnedTerms;
 use supple_core::math::exp;
 
 /// Slower joints give no equations: their friction is not identifiable \[rad/s\].
-const MIN_SPEED_RAD_PER_S: f64 = 0.04;
+const MIN_SPEED_RAD_PER_S: f64 = 0.08;
 /// Time after a restart, a freeze or a reversal until a joint's filters have settled \[s\].
 const SETTLE_S: f64 = 0.15;
 /// Time between samples \[s\].
