@@ -3,14 +3,22 @@
 //! iceoryx2 removes the objects of closed ports and of killed processes, but not its own management files. When no
 //! process of the system is left, this module removes all of the system's objects. The membership lock keeps processes
 //! from joining meanwhile.
+//!
+//! Of each process that has ended, iceoryx2 0.9.3 leaves an empty folder, and it lists all of them whenever a process joins:
+//! with 8,500 an operator was connected after 33 ms instead of 6 ms. Whoever leaves removes those of all systems.
 
 use crate::domain::{Domain, Node};
 use crate::membership;
 use crate::shared_memory;
+use core::time::Duration;
 use iceoryx2::node::NodeState;
 use iceoryx2::prelude::CallbackProgression;
 use std::fs;
 use std::io;
+use std::path::Path;
+
+/// Age from which an empty folder of a node is removed: a process that joins has files in its own within microseconds.
+const ABANDONED: Duration = Duration::from_secs(60);
 
 /// Guard stored as the last field of every struct with ports, so that it is dropped after them.
 #[derive(Debug)]
@@ -35,6 +43,7 @@ fn clear(domain: &Domain) -> io::Result<()> {
         return Ok(());
     };
     membership::remove_unsized_objects(domain)?;
+    remove_abandoned_folders(domain);
     let mut has_live_node = false;
     let listed = Node::list(domain.config(), |state| {
         match state {
@@ -55,4 +64,23 @@ fn clear(domain: &Domain) -> io::Result<()> {
         fs::remove_file(object)?;
     }
     Ok(())
+}
+
+/// Removes the empty folders of nodes that have ended.
+fn remove_abandoned_folders(domain: &Domain) {
+    let nodes = domain.config().global.node_dir().to_string();
+    // What cannot be read or removed stays; the next process that leaves tries again.
+    let Ok(entries) = fs::read_dir(Path::new(&nodes)) else {
+        return;
+    };
+    for entry in entries.flatten() {
+        let is_old = entry.metadata().is_ok_and(|found| {
+            let age = found.modified().ok().and_then(|time| time.elapsed().ok());
+            found.is_dir() && age.is_some_and(|age| age > ABANDONED)
+        });
+        if is_old {
+            // The folder of a running process is not empty and stays.
+            let _ = fs::remove_dir(entry.path());
+        }
+    }
 }

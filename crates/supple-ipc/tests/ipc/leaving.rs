@@ -47,6 +47,32 @@ fn earlier_leavers_do_not_affect_the_others() {
     }
 }
 
+/// Each process that has ended leaves an empty folder, and every process that joins lists all of them: an operator would be
+/// connected later and later. Only old and empty ones are removed: others may be of a process that is joining.
+#[test]
+fn folders_of_ended_processes_are_removed() {
+    let system = support::system("folders");
+    let reader = TelemetryReader::new(&system.domain).expect("a reader");
+    let nodes = system.domain.folder().join("nodes");
+    let folder = |name: &str, age_s: u64| {
+        let folder = nodes.join(name);
+        std::fs::create_dir(&folder).expect("a folder");
+        let opened = std::fs::File::open(&folder).expect("opened");
+        let modified = opened.metadata().and_then(|found| found.modified());
+        let before = modified.expect("a time") - Duration::from_secs(age_s);
+        (folder, opened, before)
+    };
+    let (old, old_file, long_ago) = folder("1", 3600);
+    let (new, ..) = folder("2", 0);
+    let (used, used_file, _) = folder("3", 0);
+    std::fs::write(used.join("details"), "").expect("a file");
+    old_file.set_modified(long_ago).expect("an old folder");
+    used_file.set_modified(long_ago).expect("an old folder");
+    drop(OperatorClient::new(&system.domain).expect("an operator"));
+    assert!(!old.exists() && new.exists() && used.join("details").exists());
+    drop(reader);
+}
+
 /// Many clients join and leave a running system at once: none is refused, and no object is left at the end.
 #[test]
 fn concurrent_join_and_leave_is_safe() {

@@ -151,6 +151,18 @@ impl FullOutput {
         Ok(())
     }
 
+    /// Whether the output has taken nothing since it was full, after the run has ended: the log could not be finished, the
+    /// pipe still takes no byte.
+    pub fn was_full(&self) -> bool {
+        match self {
+            FullOutput::Log(file) => part_of(file).exists() && !file.exists(),
+            FullOutput::StandardError { writer, .. } => {
+                fcntl_setfl(writer, OFlags::NONBLOCK | OFlags::WRONLY).is_ok()
+                    && (&mut &*writer).write(b".").is_err()
+            }
+        }
+    }
+
     /// Removes what the run left.
     pub fn remove(self) {
         if let FullOutput::Log(file) = self {

@@ -404,20 +404,24 @@ fn hinder_up<const N: usize>(
     start_task::<N>(spec, description, domain, || next_telemetry(&mut reader))?;
     output.fill(&running)?;
     let begin_ns = monotonic_ns();
-    let result = ProcessTestResult {
-        idle_after_ms: Some(idle_after::<N>(domain)?),
-        ..ProcessTestResult::default()
-    };
+    let mut idle_after_ms = idle_after::<N>(domain)?;
     // The system goes on: its telemetry has the idle mode.
     let idle = poll_until(
         || next_telemetry(&mut reader),
         OBSERVED[1],
         |t| t.record().mode() == Some(Mode::Idle),
     )?;
-    running.end();
-    output.remove();
-    match idle {
-        Some(_) => Ok((begin_ns, result)),
-        None => Err(Failure::DidNotReachTracking),
+    if idle.is_none() {
+        idle_after_ms = Err("no telemetry in idle mode".to_owned());
     }
+    running.end();
+    if !output.was_full() {
+        idle_after_ms = Err("the output was not full".to_owned());
+    }
+    output.remove();
+    let result = ProcessTestResult {
+        idle_after_ms: Some(idle_after_ms),
+        ..ProcessTestResult::default()
+    };
+    Ok((begin_ns, result))
 }
