@@ -119,7 +119,7 @@ impl Row {
         let torque_rise_nm = after.torque_rise_nm();
         let outcome = match (&result.idle_after_ms, braked_after_ms, &result.fault) {
             (Some(Ok(ms)), ..) => format!("idle after {ms:.1} ms"),
-            (Some(Err(message)), ..) => format!("idle refused: {message}"),
+            (Some(Err(message)), ..) => format!("no idle: {message}"),
             (_, Some(ms), _) if spec.expected != Expected::ControllerFault => {
                 format!("braked after {ms:.1} ms")
             }
