@@ -1,7 +1,6 @@
 //! Converts a description, whose number of joints is dynamic, to the types of the core.
 
 use crate::bounds::first_out_of_range;
-use crate::delayed_damping::first_beyond_delay;
 use crate::description::Description;
 use crate::error::{ModelError, Reporter};
 use crate::settings::FrictionVelocity;
@@ -91,24 +90,13 @@ impl Description {
         Ok(Vector::from_column_slice(self.home_rad()))
     }
 
-    /// Controller configuration of this arm.
+    /// Controller configuration of this arm. Settings that its files leave out have values that suit no arm in particular:
+    /// a controller needs those of [`Description::completed`].
     ///
     /// # Errors
     /// [`ModelError::JointCount`] if the arm does not have `N` moving joints; [`ModelError::Invalid`] for values that
-    /// [`supple_core::Controller::new`] rejects, such as fewer than three joints that the law controls, and for damping of
-    /// gravity hold or of held joints that the delay of the loop does not allow in every pose.
+    /// [`supple_core::Controller::new`] rejects, such as fewer than three joints that the law controls.
     pub fn config<const N: usize>(&self) -> Result<Config<N>, ModelError> {
-        let config = self.config_for_any_delay()?;
-        let controller = Controller::new(config).map_err(|error| self.rejected(&error))?;
-        match first_beyond_delay(&controller) {
-            Some(error) => Err(self.rejected(&error)),
-            None => Ok(config),
-        }
-    }
-
-    /// As [`Description::config`], without the check of the damping against the delay of the loop: while gains are being
-    /// derived, those that are not yet there have values that suit no arm.
-    pub(crate) fn config_for_any_delay<const N: usize>(&self) -> Result<Config<N>, ModelError> {
         let arm = self.arm::<N>()?;
         let settings = &self.settings;
         let gain = |of: fn(&crate::settings::JointSettings) -> f64| {
@@ -218,7 +206,7 @@ impl Description {
         given.unwrap_or(DEFAULT_COLLISION_FRACTION * joint.torque_nm)
     }
 
-    fn rejected(&self, error: &ConfigError) -> ModelError {
+    pub(crate) fn rejected(&self, error: &ConfigError) -> ModelError {
         let joint = error.joint.and_then(|i| self.joint_names().get(i));
         let element = joint.map_or_else(
             || error.entry.to_owned(),

@@ -6,6 +6,7 @@
 //! at their angles.
 
 use crate::description::Description;
+use crate::error::ModelError;
 use crate::poses::pose_rad;
 use core::f64::consts::FRAC_PI_2;
 use nalgebra::{DMatrix, SymmetricEigen};
@@ -20,21 +21,20 @@ const MARGIN: f64 = 0.75 * FRAC_PI_2;
 const POSES: u32 = 100;
 const MUST: &str = "less: with the delay of this loop it shakes the joint in poses where the arm has little inertia";
 
-/// The first entry that is too large in one of the poses, with its joint.
-pub(crate) fn first_beyond_delay<const N: usize>(
-    controller: &Controller<N>,
-) -> Option<ConfigError> {
-    let rates = rates_times_delay(controller);
-    rates
-        .into_iter()
-        .find(|(_, rate_times_delay)| *rate_times_delay > FRAC_PI_2)
-        .map(|(error, _)| error)
-}
-
 impl Description {
+    /// Rejects damping of gravity hold and of held joints that is unstable in one of the poses.
+    pub(crate) fn check_damping<const N: usize>(&self) -> Result<(), ModelError> {
+        let controller = Controller::new(self.config::<N>()?).map_err(|e| self.rejected(&e))?;
+        let rates = rates_times_delay(&controller);
+        match rates.iter().find(|(_, rate)| *rate > FRAC_PI_2) {
+            Some((error, _)) => Err(self.rejected(error)),
+            None => Ok(()),
+        }
+    }
+
     /// Share of the damping of gravity hold, and of held joints, that keeps the margin at the arm's control rate: at most 1.
     pub(crate) fn allowed_damping_shares<const N: usize>(&self) -> [f64; 2] {
-        let config = self.config_for_any_delay::<N>().ok();
+        let config = self.config::<N>().ok();
         let controller = config.and_then(|config| Controller::new(config).ok());
         controller.map_or([1.0; 2], |controller| {
             rates_times_delay(&controller)

@@ -53,7 +53,8 @@ impl Description {
     /// paper's sinusoid: then the paths are placed.
     ///
     /// # Errors
-    /// [`ModelError`] if no pose allows even small paths; as [`Description::config`].
+    /// [`ModelError::Invalid`] for damping of gravity hold or of held joints that the delay of the loop does not allow in
+    /// every pose; [`ModelError`] if no pose allows even small paths; as [`Description::config`].
     pub fn completed(&self) -> Result<Completed, ModelError> {
         with_dof!(self.dof(), N => complete::<N>(self))?
     }
@@ -71,7 +72,7 @@ impl Description {
 
     fn reaches_paths<const N: usize>(&self) -> Result<bool, ModelError> {
         let (trajectory, duration_s) = self.paths().sinusoid(1.0);
-        let config = self.config_for_any_delay::<N>()?;
+        let config = self.config::<N>()?;
         Ok(reach::start_pose(&config, &trajectory, duration_s).is_ok())
     }
 }
@@ -80,6 +81,7 @@ fn complete<const N: usize>(given: &Description) -> Result<Completed, ModelError
     let mut writer = Writer::new(given)?;
     let is_complete = given.is_complete(&writer);
     if is_complete && (given.settings().paths.is_some() || given.reaches_paths::<N>()?) {
+        given.check_damping::<N>()?;
         return Ok(Completed {
             description: given.clone(),
             derived: Vec::new(),
@@ -92,22 +94,24 @@ fn complete<const N: usize>(given: &Description) -> Result<Completed, ModelError
             let why = "no controller here moves it, or it does not carry the tip";
             writer.set("fixed_joints_rad", joint, *position, why);
         }
-        inertia::add(&mut writer, &description.config_for_any_delay::<N>()?);
+        inertia::add(&mut writer, &description.config::<N>()?);
         description = writer.read(&description)?;
     }
     let placed = Placed::<N>::find(&description, !writer.has_given_joints())?;
     placed.add(&mut writer);
     if !is_complete {
-        let gains = gains::Gains::of(&description.config_for_any_delay::<N>()?);
+        let gains = gains::Gains::of(&description.config::<N>()?);
         placed.hold(&mut writer, &gains);
         gains.add(&mut writer);
         description = writer.read(&description)?;
-        let config = description.config_for_any_delay::<N>()?;
+        let config = description.config::<N>()?;
         thresholds::add_damping(&mut writer, &config, &description.home::<N>()?);
         thresholds::add(&mut writer, &config, &description);
     }
+    let description = writer.read(&description)?;
+    description.check_damping::<N>()?;
     Ok(Completed {
-        description: writer.read(&description)?,
+        description,
         derived: writer.finish(),
     })
 }

@@ -60,7 +60,7 @@ pub(super) struct Placed<const N: usize> {
 impl<const N: usize> Placed<N> {
     /// Searches; `choose_roles` replaces the roles of the description.
     pub fn find(description: &Description, choose_roles: bool) -> Result<Self, ModelError> {
-        let mut config = description.config_for_any_delay::<N>()?;
+        let mut config = description.config::<N>()?;
         let roles_are_chosen = choose_roles && N > 3;
         if roles_are_chosen {
             config.roles = choose_three(&config);
