@@ -3,7 +3,7 @@
 //! | finding | criterion |
 //! |---|---|
 //! | replies lost too often | each lost reply counts as eight received ones; the balance exceeds its limit |
-//! | encoder stuck | unchanged value while the joint's reference moves, out of contact, half as far in modes of joint references if all encoders are unchanged; or while a breakaway ramp would move the joint by the model; or from one cycle to the next for a moving joint |
+//! | encoder stuck | unchanged value while the joint's reference moves, out of contact, half as far in modes of joint references if all encoders are unchanged; or while a breakaway ramp would move the joint by the model; or from one cycle to the next for a joint that is fast, or that moved by several values in the cycle before |
 //! | moves against its torque | 20 cycles in which a joint's momentum grows against its net torque; or a joint that moves against its breakaway ramp |
 //! | unmodelled load | a force along gravity for 50 ms, in gravity hold or after the end of a move |
 //! | collision | the observed external torque or force exceeds its threshold |
@@ -16,6 +16,11 @@ const LOSS_WEIGHT: u32 = 8;
 /// Fraction of `stuck_rad` that a moving joint may travel, at its last speed, while its encoder is
 /// unchanged (0.02 rad for 0.1 rad).
 pub(super) const SUDDEN_STOP_SHARE: f64 = 0.2;
+/// Values per cycle by which a joint moves at least, if its encoder is to be seen to stop between two cycles.
+const FREEZING_VALUES: f64 = 5.0;
+/// Fraction of its speed with which it moves in the last cycle before. An impact takes some cycles: with a stiffness `k` on
+/// an inertia `m` a quarter period of `sqrt(m / k)`, 2 ms for the lightest wrist on a steel surface.
+const FREEZING_SHARE: f64 = 0.8;
 /// Cycles with motion that make a contact plausible; encoders that stop one after the other show some.
 const CONTACT_CYCLES: u32 = 5;
 /// Time for which the encoder of a joint in a collision may stay unchanged before it counts as
@@ -41,8 +46,9 @@ const MAX_LATERAL_SHARE: f64 = 0.5;
 pub(super) struct Plausibility<const N: usize> {
     losses: [u32; N],
     last_measured: [Option<f64>; N],
-    /// Smallest change of the encoder value \[rad\].
+    /// Smallest change of the encoder value, and the last one \[rad\].
     min_change_rad: [f64; N],
+    change_rad: [f64; N],
     /// The encoder value is unchanged since the last cycle.
     unchanged: [bool; N],
     /// Speed of the joint when the encoder last changed \[rad/s\], and time since then \[s\].
@@ -67,6 +73,7 @@ impl<const N: usize> Default for Plausibility<N> {
             losses: [0; N],
             last_measured: [None; N],
             min_change_rad: [f64::MAX; N],
+            change_rad: [0.0; N],
             unchanged: [false; N],
             speed_rad_per_s: [0.0; N],
             unchanged_s: [0.0; N],
@@ -98,6 +105,7 @@ impl<const N: usize> Plausibility<N> {
                         && last != position
                     {
                         let change_rad = abs(position - last);
+                        self.change_rad[joint] = change_rad;
                         self.min_change_rad[joint] = self.min_change_rad[joint].min(change_rad);
                     }
                 }
@@ -182,7 +190,10 @@ impl<const N: usize> Plausibility<N> {
             }
             self.unchanged_s[joint] += elapsed_s;
             let value_rad = self.speed_rad_per_s[joint] * self.unchanged_s[joint];
-            if self.speed_rad_per_s[joint] > moving_rad_per_s[joint] && value_rad > limit_rad {
+            if value_rad > limit_rad
+                && (self.speed_rad_per_s[joint] > moving_rad_per_s[joint]
+                    || self.froze(joint, elapsed_s))
+            {
                 return Err(Fault::EncoderStuck {
                     joint,
                     value_rad,
@@ -191,6 +202,14 @@ impl<const N: usize> Plausibility<N> {
             }
         }
         Ok(())
+    }
+
+    /// Whether the joint moved at its speed in the last cycle in which its encoder value changed, fast enough to see that.
+    #[inline(never)]
+    fn froze(&self, joint: usize, elapsed_s: f64) -> bool {
+        let travel_rad = self.speed_rad_per_s[joint] * elapsed_s;
+        self.change_rad[joint] > FREEZING_SHARE * travel_rad
+            && travel_rad > FREEZING_VALUES * self.min_change_rad[joint]
     }
 
     /// Reports a joint collision as a stuck encoder if the encoder has been unchanged for some

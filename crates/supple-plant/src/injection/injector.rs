@@ -244,6 +244,10 @@ impl<const N: usize> Injector<N> {
     fn read(&mut self, plant: &Plant<N>) {
         let mut position_rad = plant.measurement().position_rad;
         for running in self.running.iter_mut().filter(|running| running.begun) {
+            if let InjectionKind::MotorEncoderStuck { motor } = running.injection.kind {
+                let turned_rad = self.motor_from_joint * (position_rad - running.start_rad);
+                position_rad -= self.joint_from_motor.column(motor) * turned_rad[motor];
+            }
             running.corrupt_positions(&mut position_rad);
         }
         self.position_rad = position_rad;

@@ -39,6 +39,11 @@ pub enum InjectionKind {
         /// Index of the joint.
         joint: Option<usize>,
     },
+    /// The encoder of a motor repeats its last angle: with a coupled transmission the angles of several joints are wrong.
+    MotorEncoderStuck {
+        /// Index of the motor.
+        motor: usize,
+    },
     /// The encoder readings lag by this many control cycles. The reading is frozen until the delay has built up, so
     /// it does not jump.
     EncoderLate {
@@ -113,6 +118,7 @@ impl InjectionKind {
     pub fn name(&self) -> &'static str {
         match self {
             InjectionKind::EncoderStuck { .. } => "encoder-stuck",
+            InjectionKind::MotorEncoderStuck { .. } => "motor-encoder-stuck",
             InjectionKind::EncoderLate { .. } => "encoder-late",
             InjectionKind::EncoderSign { .. } => "encoder-sign",
             InjectionKind::EncoderOffset { .. } => "encoder-offset",
@@ -140,7 +146,9 @@ impl InjectionKind {
             InjectionKind::TorqueSign { joint } | InjectionKind::Bump { joint, .. } => {
                 Some(("joint", joint))
             }
-            InjectionKind::MotorDead { motor } => Some(("motor", motor)),
+            InjectionKind::MotorDead { motor } | InjectionKind::MotorEncoderStuck { motor } => {
+                Some(("motor", motor))
+            }
             InjectionKind::TorqueLate { .. }
             | InjectionKind::GravityReversed
             | InjectionKind::Payload { .. }

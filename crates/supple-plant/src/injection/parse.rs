@@ -12,6 +12,7 @@ A fault to inject into the simulated arm, KIND or KIND:key=value,key=value. May 
 
 Kinds, joints and motors counted from 0 (no joint: all of them):
   encoder-stuck[:joint=I]                the encoder keeps its last angle
+  motor-encoder-stuck:motor=I            the encoder of a motor keeps its last angle
   encoder-late:cycles=K[,joint=I]        the angles lag by K control cycles
   encoder-sign[:joint=I]                 the encoder counts backwards from its current angle
   encoder-offset:offset-rad=X[,joint=I]  the angle jumps once by X
@@ -33,8 +34,9 @@ Modes: idle, gravity_hold, move, track, probe, fault, excite, breakaway.
 Example: encoder-stuck:joint=1,when=track,after-s=0.5";
 
 /// Names of all kinds with their keys, without those of the trigger.
-const KINDS: [(&str, &[&str]); 13] = [
+const KINDS: [(&str, &[&str]); 14] = [
     ("encoder-stuck", &["joint"]),
+    ("motor-encoder-stuck", &["motor"]),
     ("encoder-late", &["joint", "cycles"]),
     ("encoder-sign", &["joint"]),
     ("encoder-offset", &["joint", "offset-rad"]),
@@ -267,6 +269,9 @@ impl FromStr for Injection {
             "encoder-stuck" => InjectionKind::EncoderStuck {
                 joint: keys.joint()?,
             },
+            "motor-encoder-stuck" => InjectionKind::MotorEncoderStuck {
+                motor: keys.needed("motor", INDEX, |_| true)?,
+            },
             "encoder-late" => InjectionKind::EncoderLate {
                 joint: keys.joint()?,
                 cycles: keys.count("cycles")?,
@@ -372,6 +377,7 @@ mod tests {
             "encoder-nan:joint=3",
             "reply-lost:every=2",
             "motor-dead:motor=1,at-s=0",
+            "motor-encoder-stuck:motor=1,at-s=0",
             "torque-sign:joint=2",
             "torque-late:cycles=3",
             "gravity-reversed:when=gravity_hold,after-s=1",

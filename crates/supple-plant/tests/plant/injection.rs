@@ -99,6 +99,29 @@ fn a_stuck_encoder_keeps_its_angle_from_its_start_time_on() {
     assert!((bench.true_rad()[2] - before[2]).abs() > 0.01, "it moved");
 }
 
+/// Motors 1 and 2 drive joints 1 and 2 together.
+#[test]
+fn a_stuck_motor_encoder_makes_the_angles_of_the_joints_that_it_drives_wrong() {
+    let mut bench = described(&["motor-encoder-stuck:motor=1,at-s=0.02"]);
+    let to_joints = bench.plant.config().actuators.joint_from_motor;
+    let to_motors = to_joints.try_inverse().expect("regular");
+    let mut start_rad = Vector::zeros();
+    for cycle in 0..40 {
+        let measured = to_motors * Vector::from(bench.cycle(TRACKS, [0.0, 2.0, 0.5, 1.0]));
+        let now = to_motors * bench.plant.measurement().position_rad;
+        if cycle < 10 {
+            start_rad = now;
+        }
+        let stuck = |motor| motor == 1 && cycle >= 10;
+        for motor in 0..4 {
+            let expected = if stuck(motor) { start_rad } else { now };
+            assert!((measured[motor] - expected[motor]).abs() < 1e-9, "{cycle}");
+        }
+    }
+    let turned = to_motors * bench.plant.measurement().position_rad - start_rad;
+    assert!(turned[1].abs() > 0.1, "it moved");
+}
+
 /// The time counts from the first start of the mode, even if the mode has ended by then.
 #[test]
 fn only_the_first_start_of_a_mode_counts() {

@@ -308,7 +308,7 @@ fn outcome(metrics: &RowMetrics, keeps_running: bool, refusals: &[String]) -> St
 
 #[cfg(test)]
 mod tests {
-    use super::super::metrics::{ControllerSample, RowMetrics};
+    use super::super::metrics::{ControllerSample, RowMetrics, angle_is_wrong_ns, stuck_error_rad};
     use super::super::trace::TraceRow;
     use super::*;
     use crate::cli::PlantKind;
@@ -443,8 +443,8 @@ mod tests {
         };
         let lines: Vec<TraceRow> = (0..4000).map(turning).collect();
         let after = |joint, limit| {
-            super::super::metrics::stuck_angle_is_wrong_ns(&lines, 1000 * MS, joint, limit)
-                .map(|ns| ns / MS)
+            let error_rad = |turned_rad: &[f64]| stuck_error_rad(turned_rad, joint);
+            angle_is_wrong_ns(&lines, 1000 * MS, limit, error_rad).map(|ns| ns / MS)
         };
         assert_eq!(after(Some(1), 0.1001), Some(3003));
         assert_eq!(after(None, 0.1001), Some(1201));

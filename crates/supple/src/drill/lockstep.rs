@@ -1,7 +1,7 @@
 //! Runs a test case in virtual time. All requests are queued before the first cycle, so every run is bit-identical.
 
 use super::evaluation::evaluate;
-use super::metrics::{ControllerSample, RowMetrics, stuck_angle_is_wrong_ns};
+use super::metrics::{ControllerSample, RowMetrics, angle_is_wrong_ns, stuck_error_rad};
 use super::row::Row;
 use super::spec::{Activation, DriveShutdown, Event, InvalidRequest, Spec, TestTask};
 use super::task::{Script, law_force_n};
@@ -14,8 +14,8 @@ use std::path::PathBuf;
 use std::time::Instant;
 use supple_cli::arguments::{PlantArgs, UrdfArgs};
 use supple_cli::exit::Failure;
-use supple_core::Vector;
 use supple_core::dynamics::{jacobian, potential_energy};
+use supple_core::{Config, Vector};
 use supple_ipc::Domain;
 use supple_model::Description;
 use supple_plant::{Injection, InjectionKind, Trigger};
@@ -122,11 +122,7 @@ pub fn perform<const N: usize>(spec: &Spec, arm: &TestArm) -> Result<Row, Failur
             _ => at(script.event_cycle),
         };
         let mut metrics = RowMetrics::new(&lines, &samples, task_start_ns, event_ns);
-        let resolution_rad = config.plausible.stuck_rad;
-        metrics.observable_at(
-            observable_ns(spec, &lines, event_ns, resolution_rad),
-            event_ns,
-        );
+        metrics.observable_at(observable_ns(spec, &config, &lines, event_ns), event_ns);
         metrics.law_force_n = law_force_n(spec.task, &config, &script.start_rad);
         if let Event::Injected {
             kind: InjectionKind::MotorDead { .. },
@@ -146,18 +142,29 @@ pub fn perform<const N: usize>(spec: &Spec, arm: &TestArm) -> Result<Row, Failur
 }
 
 /// When the fault of a sensor could be observed \[ns\]; none where that cannot be computed from the trace.
-fn observable_ns(
+fn observable_ns<const N: usize>(
     spec: &Spec,
+    config: &Config<N>,
     lines: &[TraceRow],
     event_ns: u64,
-    resolution_rad: f64,
 ) -> Option<u64> {
+    let resolution_rad = config.plausible.stuck_rad;
     let Event::Injected { kind, .. } = spec.event else {
         return None;
     };
     match kind {
         InjectionKind::EncoderStuck { joint } => {
-            stuck_angle_is_wrong_ns(lines, event_ns, joint, resolution_rad)
+            angle_is_wrong_ns(lines, event_ns, resolution_rad, |turned_rad| {
+                stuck_error_rad(turned_rad, joint)
+            })
+        }
+        InjectionKind::MotorEncoderStuck { motor } => {
+            let joint_from_motor = config.joint_from_motor;
+            let motor_from_joint = joint_from_motor.try_inverse()?;
+            angle_is_wrong_ns(lines, event_ns, resolution_rad, |turned_rad| {
+                let turned = motor_from_joint * Vector::<N>::from_column_slice(turned_rad);
+                (joint_from_motor.column(motor) * turned[motor]).amax()
+            })
         }
         InjectionKind::EncoderOffset { .. }
         | InjectionKind::EncoderNan { .. }

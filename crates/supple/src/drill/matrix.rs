@@ -316,6 +316,20 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         stops(STUCK_ENCODER_FAULTS),
         LATE_FAULT_AND_STOP_MS,
     );
+    // The encoders of many arms are on their motors: one that sticks shows two wrong angles if its motor drives two joints.
+    let motor_stuck = injected(Kind::MotorEncoderStuck { motor: 1 });
+    add(
+        &[GravityHold, Float, Breakaway],
+        motor_stuck,
+        runs_or_faults(STUCK_ENCODER_FAULTS),
+        FAULT_AND_STOP_MS,
+    );
+    add(
+        &[Move, Excite, Track, JointImpedance, TrackPose],
+        motor_stuck,
+        stops(STUCK_ENCODER_FAULTS),
+        LATE_FAULT_AND_STOP_MS,
+    );
     let late = injected(Kind::EncoderLate {
         joint: None,
         cycles: 20,

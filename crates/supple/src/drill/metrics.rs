@@ -251,13 +251,20 @@ impl RowMetrics {
     }
 }
 
-/// First time from `event_ns` on at which the angle that the encoder of `joint`, or of any joint, shows is wrong by more
-/// than `resolution_rad`, if that encoder sticks at the event \[ns\].
-pub fn stuck_angle_is_wrong_ns(
+/// Largest error of the angles if the encoder of `joint`, or of every joint, sticks while the joints turn by `turned_rad`.
+pub fn stuck_error_rad(turned_rad: &[f64], joint: Option<usize>) -> f64 {
+    let stuck = |(index, _): &(usize, &f64)| joint.is_none_or(|joint| joint == *index);
+    let turned_rad = turned_rad.iter().enumerate().filter(stuck);
+    max(turned_rad.map(|(_, angle)| angle.abs()))
+}
+
+/// First time from `event_ns` on at which the measured angles are wrong by more than `resolution_rad` \[ns\]; `error_rad`
+/// is their error once the joints have turned by these angles since the event.
+pub fn angle_is_wrong_ns(
     lines: &[TraceRow],
     event_ns: u64,
-    joint: Option<usize>,
     resolution_rad: f64,
+    error_rad: impl Fn(&[f64]) -> f64,
 ) -> Option<u64> {
     let mut turned_rad: Vec<f64> = Vec::new();
     let after = lines.windows(2).filter(|pair| pair[0].time_ns >= event_ns);
@@ -267,9 +274,7 @@ pub fn stuck_angle_is_wrong_ns(
         for (turned_rad, speed) in turned_rad.iter_mut().zip(&pair[0].joint_rad_per_s) {
             *turned_rad += speed * period_s;
         }
-        let mut angles = turned_rad.iter().enumerate();
-        let stuck = |index: usize| joint.is_none_or(|joint| joint == index);
-        if angles.any(|(index, angle)| stuck(index) && angle.abs() > resolution_rad) {
+        if error_rad(&turned_rad) > resolution_rad {
             return Some(pair[1].time_ns);
         }
     }

@@ -103,7 +103,9 @@ pub fn cloud() -> impl Strategy<Value = Cloud> {
     // Without it, a failing case shrinks to a point and fails for another reason.
     vec(point, 5..8)
         .prop_map(Cloud)
-        .prop_filter("a body with a volume", |cloud| cloud.body().validate().is_ok())
+        .prop_filter("a body with a volume", |cloud| {
+            cloud.body().validate().is_ok()
+        })
 }
 
 fn joint() -> impl Strategy<Value = (Joint, Cloud)> {
