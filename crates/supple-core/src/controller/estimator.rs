@@ -65,18 +65,33 @@ impl<const N: usize> Estimator<N> {
     /// apart that the estimate overflows, it restarts at rest.
     pub fn update(&mut self, measured_rad: &[Option<f64>; N], gains: &EstimatorGains) {
         for (i, measured) in measured_rad.iter().enumerate() {
-            self.position_rad[i] += self.velocity_rad_per_s[i] * gains.elapsed_s;
-            if let Some(y) = measured {
-                let innovation = y - self.position_rad[i];
-                self.position_rad[i] += gains.position * innovation;
-                self.velocity_rad_per_s[i] += gains.velocity_per_s * innovation;
-                if abs(self.velocity_rad_per_s[i]) < MIN_SPEED_RAD_PER_S {
-                    self.velocity_rad_per_s[i] = 0.0;
-                }
-                if !(self.position_rad[i].is_finite() && self.velocity_rad_per_s[i].is_finite()) {
-                    (self.position_rad[i], self.velocity_rad_per_s[i]) = (*y, 0.0);
-                }
+            match measured {
+                Some(position_rad) => self.correct(i, *position_rad, gains),
+                None => self.position_rad[i] += self.velocity_rad_per_s[i] * gains.elapsed_s,
             }
+        }
+    }
+
+    /// The same, of positions that are all measured.
+    pub(super) fn update_all(&mut self, measured_rad: &Vector<N>, gains: &EstimatorGains) {
+        for i in 0..N {
+            self.correct(i, measured_rad[i], gains);
+        }
+    }
+
+    #[inline(always)]
+    fn correct(&mut self, i: usize, measured_rad: f64, gains: &EstimatorGains) {
+        let velocity = self.velocity_rad_per_s[i];
+        let predicted = self.position_rad[i] + velocity * gains.elapsed_s;
+        let innovation = measured_rad - predicted;
+        let position = predicted + gains.position * innovation;
+        let velocity = velocity + gains.velocity_per_s * innovation;
+        let at_rest = abs(velocity) < MIN_SPEED_RAD_PER_S;
+        self.position_rad[i] = position;
+        self.velocity_rad_per_s[i] = if at_rest { 0.0 } else { velocity };
+        // Infinite or no number, if either is.
+        if !(position * 0.0 + velocity * 0.0 == 0.0) {
+            (self.position_rad[i], self.velocity_rad_per_s[i]) = (measured_rad, 0.0);
         }
     }
 }

@@ -8,6 +8,7 @@ pub mod codes;
 mod delayed_damping;
 mod delayed_gains;
 pub mod drive_guard;
+mod encoders;
 pub mod estimator;
 mod fault;
 mod handover;

@@ -1,5 +1,6 @@
 //! A configuration, checked, with the constants that every step takes from it.
 
+use super::encoders::Encoders;
 use super::estimator::EstimatorGains;
 use super::limiter::MotorGroups;
 use super::nullspace::nullspace_damping_nm_s_per_rad;
@@ -17,6 +18,7 @@ pub struct Controller<const N: usize> {
     pub(super) groups: MotorGroups<N>,
     /// `j2mp`.
     pub(super) motor_from_joint: Matrix<N, N>,
+    encoders: Encoders<N>,
     pub(super) delay_s: f64,
     /// Number of active joints.
     pub(super) active_joints: usize,
@@ -68,6 +70,7 @@ impl<const N: usize> Controller<N> {
         Ok(Controller {
             learned_bounds: LearnedBounds::new(&config.friction, &limits.joint_torque_nm),
             nullspace_damping_nm_s_per_rad: nullspace_damping_nm_s_per_rad(&config, delay_s),
+            encoders: Encoders::new(to_joint, &motor_from_joint),
             motor_from_joint,
             groups: MotorGroups::new(&config.joint_from_motor),
             delay_s,
@@ -165,6 +168,10 @@ impl<const N: usize> Controller<N> {
     /// `j2mp`: motor angles from joint angles.
     pub fn motor_from_joint(&self) -> &Matrix<N, N> {
         &self.motor_from_joint
+    }
+
+    pub(super) fn encoders(&self) -> &Encoders<N> {
+        &self.encoders
     }
 
     /// Coupling between motors and joints.

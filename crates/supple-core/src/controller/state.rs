@@ -263,7 +263,7 @@ impl<const N: usize> State<N> {
         }
         let gains = controller.estimator_gains(periods);
         let elapsed_s = gains.elapsed_s();
-        self.receive_positions(config, &input.position_rad, &gains)?;
+        self.receive_positions(controller, &input.position_rad, &gains)?;
         if controller.has_compliance() {
             self.subtract_sag(config);
         }
@@ -283,13 +283,64 @@ impl<const N: usize> State<N> {
     /// bridged by prediction.
     fn receive_positions(
         &mut self,
-        config: &Config<N>,
+        controller: &Controller<N>,
         measured_rad: &[Option<f64>; N],
         gains: &EstimatorGains,
     ) -> Result<(), Fault> {
+        let config = controller.config();
         let elapsed_s = gains.elapsed_s();
         let first = self.cycle.is_none();
-        let tolerated = if first { 0 } else { 1 };
+        let mut q = self.plausibility.measured_rad();
+        let mut all = true;
+        for (joint, measured) in measured_rad.iter().enumerate() {
+            match *measured {
+                Some(position) => q[joint] = position,
+                None => all = false,
+            }
+        }
+        if all && all_finite(&q) {
+            self.missing = [0; N];
+        } else {
+            self.miss(measured_rad, if first { 0 } else { 1 })?;
+        }
+        let plausible = &config.plausible;
+        self.plausibility
+            .receive_replies(plausible, measured_rad, all)?;
+        self.plausibility.receive_angles(controller.encoders(), &q);
+        if first {
+            self.position = q;
+            self.estimator = Estimator::at_rest(self.position);
+            return Ok(());
+        }
+        let velocity = self.estimator.velocity_rad_per_s;
+        let expected = self.position + self.sag_rad + velocity * elapsed_s;
+        let allowed_s = JUMP_OVER_SPEED_LIMIT * elapsed_s;
+        for (joint, measured) in measured_rad.iter().enumerate() {
+            let limit_rad = config.limits.joint_speed_rad_per_s[joint] * allowed_s;
+            let value_rad = abs(q[joint] - expected[joint]);
+            if value_rad > limit_rad && measured.is_some() {
+                return Err(Fault::EncoderJump {
+                    joint,
+                    value_rad,
+                    limit_rad,
+                });
+            }
+        }
+        if all {
+            self.estimator.update_all(&q, gains);
+            self.position = q;
+            return Ok(());
+        }
+        self.estimator.update(measured_rad, gains);
+        for (joint, position) in measured_rad.iter().enumerate() {
+            self.position[joint] = position.unwrap_or(self.estimator.position_rad[joint]);
+        }
+        Ok(())
+    }
+
+    /// Counts missing positions, and rejects one that is not finite or has been missing for more than the tolerated cycles.
+    #[inline(never)]
+    fn miss(&mut self, measured_rad: &[Option<f64>; N], tolerated: u32) -> Result<(), Fault> {
         for (joint, position) in measured_rad.iter().enumerate() {
             match position {
                 Some(position) if position.is_finite() => self.missing[joint] = 0,
@@ -299,32 +350,6 @@ impl<const N: usize> State<N> {
             if self.missing[joint] > tolerated {
                 return Err(Fault::EncoderLost { joint });
             }
-        }
-        self.plausibility.receive(&config.plausible, measured_rad)?;
-        if first {
-            self.position = Vector::from(measured_rad.map(Option::unwrap_or_default));
-            self.estimator = Estimator::at_rest(self.position);
-            return Ok(());
-        }
-        for (joint, measured) in measured_rad.iter().enumerate() {
-            let expected = self.position[joint]
-                + self.sag_rad[joint]
-                + self.estimator.velocity_rad_per_s[joint] * elapsed_s;
-            let limit_rad =
-                JUMP_OVER_SPEED_LIMIT * config.limits.joint_speed_rad_per_s[joint] * elapsed_s;
-            if let Some(measured) = measured
-                && abs(measured - expected) > limit_rad
-            {
-                return Err(Fault::EncoderJump {
-                    joint,
-                    value_rad: abs(measured - expected),
-                    limit_rad,
-                });
-            }
-        }
-        self.estimator.update(measured_rad, gains);
-        for (joint, position) in measured_rad.iter().enumerate() {
-            self.position[joint] = position.unwrap_or(self.estimator.position_rad[joint]);
         }
         Ok(())
     }

@@ -68,7 +68,7 @@ pub fn step<const N: usize>(
         });
     let learned = state.learned_at_pose(config, reference.as_ref(), elapsed_s);
     let observed = state.observe(
-        config,
+        controller,
         task.as_ref(),
         reference.as_ref(),
         pose.as_ref(),

@@ -31,7 +31,6 @@ use super::activity::Activity;
 use super::checks::MOVING_SHARE;
 use super::fault::{Fault, SafeAction};
 use super::state::State;
-use crate::config::Config;
 use crate::law::impedance::Torques;
 use crate::math::{Vector, Vector3, abs};
 
@@ -106,7 +105,7 @@ impl<const N: usize> State<N> {
         let time_s = self.activity_s(config);
         let late = time_s > STOP_TIMEOUT_S;
         let accelerates = energy_j > ENERGY_GROWTH_LIMIT * self.peak_energy_j;
-        self.unexplained_s = if self.has_unexplained_torque(config) {
+        self.unexplained_s = if self.has_unexplained_torque(controller) {
             self.unexplained_s + elapsed_s
         } else {
             0.0
@@ -145,14 +144,15 @@ impl<const N: usize> State<N> {
 
     /// Whether an external torque acts that should move the arm: on a joint with an unchanged
     /// encoder, or on any joint after an impact has decayed.
-    fn has_unexplained_torque(&self, config: &Config<N>) -> bool {
+    fn has_unexplained_torque(&self, controller: &Controller<N>) -> bool {
+        let (config, encoders) = (controller.config(), controller.encoders());
         let external_nm = self.observer.external_torque_nm();
         let limits = &config.limits;
         let settled = self.activity_s(config) > IMPACT_S;
         (0..N).any(|joint| {
             let torque_nm = abs(external_nm[joint]);
             let strong = UNEXPLAINED_SHARE * limits.joint_torque_nm[joint];
-            torque_nm > strong && (settled || self.plausibility.encoder_unchanged(joint))
+            torque_nm > strong && (settled || self.plausibility.encoder_unchanged(encoders, joint))
         })
     }
 }

@@ -1,14 +1,12 @@
 //! Checks of a cycle: motion against its limits, external torque and force against what is plausible and allowed.
 
+use super::Controller;
 use super::activity::Activity;
 use super::checks;
 use super::checks::{COMPLIANT_SPEED_SHARE, MOVING_SHARE};
 use super::fault::Fault;
 use super::latch::Evidence;
-use super::plausibility::{
-    ALL_STUCK_SHARE, OTHER_JOINTS_MOVING_RAD_PER_S2, PlausibilityInput, RAMP_STUCK_SHARE,
-    SUDDEN_STOP_SHARE, joint_collision, tip_collision,
-};
+use super::plausibility::{PlausibilityInput, SUDDEN_STOP_SHARE, joint_collision, tip_collision};
 use super::pose_task::PoseCycle;
 use super::state::State;
 use crate::config::Config;
@@ -64,13 +62,14 @@ impl<const N: usize> State<N> {
     #[inline(always)]
     pub(super) fn observe(
         &mut self,
-        config: &Config<N>,
+        controller: &Controller<N>,
         task: Option<&Task<N>>,
         reference: Option<&Reference>,
         pose: Option<&PoseCycle<N>>,
         learned: Option<&LearnedAtPose<N>>,
         elapsed_s: f64,
     ) -> Result<Vector3<f64>, (Vector3<f64>, Fault)> {
+        let config = controller.config();
         if self.activity.is_torque_off() || !self.drives_active {
             // Braking motors produce torques that the model does not contain, so the observer is
             // reset.
@@ -98,7 +97,7 @@ impl<const N: usize> State<N> {
         let mut reference_rad_per_s = Vector::zeros();
         if let Some(reference) = self.joint_reference(config) {
             reference_rad_per_s = reference.velocity_rad_per_s;
-            self.add_ramped_motion(config, &mut reference_rad_per_s, elapsed_s);
+            self.add_ramped_motion(controller, &mut reference_rad_per_s, elapsed_s);
         }
         if let Some(reference) = reference {
             self.latch.update_direction(&reference.velocity, elapsed_s);
@@ -137,7 +136,7 @@ impl<const N: usize> State<N> {
             regular: is_regular(task),
             elapsed_s,
         };
-        match self.check_plausibility(config, &evidence) {
+        match self.check_plausibility(controller, &evidence) {
             Ok(()) => Ok(force),
             Err(fault) => Err((force, fault)),
         }
@@ -147,20 +146,25 @@ impl<const N: usize> State<N> {
     #[inline(never)]
     fn add_ramped_motion(
         &mut self,
-        config: &Config<N>,
+        controller: &Controller<N>,
         reference_rad_per_s: &mut Vector<N>,
         elapsed_s: f64,
     ) {
         let Activity::Breakaway { ramp, .. } = &self.activity else {
             return;
         };
-        let joint = ramp.joint;
+        let (config, joint) = (controller.config(), ramp.joint);
         let ramp_nm = ramp.rate_nm_per_s * self.activity_s(config);
         let dry_nm = config.friction[joint].dry_size_nm(0.0);
         let inertia_kg_m2 = self.terms.mass_matrix[(joint, joint)];
-        reference_rad_per_s[joint] =
-            self.plausibility
-                .ramped_rad_per_s(joint, ramp_nm, dry_nm, inertia_kg_m2, elapsed_s);
+        reference_rad_per_s[joint] = self.plausibility.ramped_rad_per_s(
+            controller.encoders(),
+            joint,
+            ramp_nm,
+            dry_nm,
+            inertia_kg_m2,
+            elapsed_s,
+        );
     }
 
     /// Whether the arm is to be at rest and nobody is to push it.
@@ -214,9 +218,10 @@ impl<const N: usize> State<N> {
     /// Runs the plausibility and collision checks of one cycle.
     fn check_plausibility(
         &mut self,
-        config: &Config<N>,
+        controller: &Controller<N>,
         evidence: &PlausibilityInput<'_, N>,
     ) -> Result<(), Fault> {
+        let (config, encoders) = (controller.config(), controller.encoders());
         let resting = match &self.activity {
             Activity::GravityHold => true,
             Activity::Move { duration_s, .. } => self.activity_s(config) > *duration_s,
@@ -228,6 +233,7 @@ impl<const N: usize> State<N> {
             let moving = config.limits.joint_speed_rad_per_s * MOVING_SHARE;
             let velocity = &self.estimator.velocity_rad_per_s;
             plausibility.check_sudden_stop(
+                encoders,
                 sudden_stop_rad,
                 velocity,
                 &moving,
@@ -244,22 +250,15 @@ impl<const N: usize> State<N> {
             if !matches!(self.activity, Activity::Fault(_)) {
                 against?;
             }
-            // In contact the joints may be at rest while their references move; but if other joints
-            // move, a single unchanged encoder is stuck. Encoders that are all stuck make a contact
-            // themselves: it counts once they have changed in it.
-            let others_move = velocity.dot(velocity) > OTHER_JOINTS_MOVING_RAD_PER_S2;
-            let in_contact = plausibility.is_contact_plausible(self.latch.in_contact());
-            if others_move || !in_contact {
-                let share = match self.activity {
-                    Activity::Breakaway { .. } => RAMP_STUCK_SHARE,
-                    _ if self.activity.has_joint_reference() && plausibility.all_unchanged() => {
-                        ALL_STUCK_SHARE
-                    }
-                    _ => 1.0,
-                };
+            // In contact, joints may be at rest while their references move, at a few newtons per metre also some while
+            // others move. Encoders that are all stuck make a contact themselves: it counts once they have changed in it.
+            if !plausibility.is_contact_plausible(self.latch.in_contact()) {
+                let joint_reference = self.activity.has_joint_reference();
                 plausibility.check_stuck_encoder(
-                    share * config.plausible.stuck_rad,
+                    encoders,
+                    config.plausible.stuck_rad,
                     evidence.reference_rad_per_s,
+                    joint_reference,
                     evidence.elapsed_s,
                 )?;
             }
@@ -272,8 +271,15 @@ impl<const N: usize> State<N> {
         } else {
             (&collision.joint_torque_nm, collision.tip_force_n)
         };
-        joint_collision(joint_torque_nm, &external)
-            .map_err(|fault| self.plausibility.as_stuck_encoder(&config.plausible, fault))?;
+        joint_collision(joint_torque_nm, &external).map_err(|fault| {
+            self.plausibility
+                .as_stuck_encoder(&config.plausible, encoders, fault)
+        })?;
+        if has_loops {
+            let (plausible, threshold_nm) = (&config.plausible, joint_torque_nm);
+            self.plausibility
+                .check_driven_encoder(plausible, encoders, threshold_nm, &external)?;
+        }
         if !evidence.regular {
             return Ok(());
         }

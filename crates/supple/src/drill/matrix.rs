@@ -86,6 +86,22 @@ pub const WRONG_DIRECTION_FAULTS: &[&str] = &[
     "rotation_error",
     "singular",
 ];
+/// The same for angles that come late: until the delay has built up, they do not change.
+const LATE_ENCODER_FAULTS: &[&str] = &[
+    "encoder_stuck",
+    "moves_against_torque",
+    "encoder_unreliable",
+    "joint_collision",
+    "tip_collision",
+    "unmodelled_load",
+    "joint_tracking_error",
+    "tracking_error",
+    "joint_speed",
+    "tip_speed",
+    "workspace",
+    "rotation_error",
+    "singular",
+];
 /// Valid faults for lost, jumping or non-finite joint angles.
 pub const ENCODER_LOSS_FAULTS: &[&str] = &[
     "encoder_lost",
@@ -276,17 +292,18 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
     );
 
     // Encoders.
-    let stuck = injected(Kind::EncoderStuck { joint: one });
+    // Joint 3 has a motor, and so an encoder, of its own.
+    let stuck = injected(Kind::EncoderStuck { joint: Some(3) });
     let all_stuck = injected(Kind::EncoderStuck { joint: None });
-    // A stuck encoder is not observable while the arm is stationary.
+    // A stuck encoder is not observable while the arm is stationary, or moves this joint by less than the check resolves.
     add(
-        &[GravityHold, Float, Breakaway],
+        &[GravityHold, Float, Breakaway, Excite],
         stuck,
         runs_or_faults(STUCK_ENCODER_FAULTS),
         FAULT_AND_STOP_MS,
     );
     add(
-        &[Move, Excite],
+        &[Move],
         stuck,
         stops(STUCK_ENCODER_FAULTS),
         FAULT_AND_STOP_MS,
@@ -346,7 +363,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
             Breakaway,
         ],
         late,
-        runs_or_faults(WRONG_DIRECTION_FAULTS),
+        runs_or_faults(LATE_ENCODER_FAULTS),
         LATE_FAULT_AND_STOP_MS,
     );
     let sign = injected(Kind::EncoderSign { joint: one });

@@ -246,14 +246,15 @@ or emulated (`emu`) arm that performs a task, and one event. The expected result
 - **energy at fault / 0.2 s later**: kinetic energy at the fault, or when braking began, and its maximum from 0.2 s
   later. An arm that descends on shorted motors has up to 0.05 J.
 - **tip 0.5 s later**: maximum tip speed from 0.5 s after the fault, while the motors do not brake.
-- **after it was observable**: for an encoder that sticks, from the moment at which its angle is wrong by more than the
+- **after it was observable**: for an encoder that sticks, from the moment at which an angle is wrong by more than the
   check resolves (`stuck_rad`); for lost or jumping angles, from the event. At most 100 ms are allowed.
 - After a dead motor, whose joint nothing brakes, kinetic and potential energy together may not grow, and the tip may be
   as fast as that of a rod that falls by the same descent.
 - **force**: maximum force on the block after the first 20 ms of contact; in wall-clock time, the overall maximum.
 - **pressing force**: mean force from 0.5 s to 0.7 s after the contact began: at most 5 N, and where the task follows a
   path into the block, what its law gives: stiffness times the length of the path (1 N at 5 N/m and 0.2 m; the springs of
-  the joints as they act at the tip).
+  the joints as they act at the tip). A breakaway ramp that an obstacle ends looks like one with an encoder that sticks: the
+  arm brakes, and its weight may rest on the block.
 ";
 
 /// Formats the results as a Markdown page that states its command line.

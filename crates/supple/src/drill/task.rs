@@ -7,7 +7,7 @@ use crate::operate::{Approach, trajectory_for};
 use supple_cli::exit::Failure;
 use supple_core::config::Gains;
 use supple_core::controller::{Breakaway, Request};
-use supple_core::dynamics::jacobian;
+use supple_core::dynamics::{gravity, jacobian};
 use supple_core::math::Vector3;
 use supple_core::trajectory::{Fourier, Line, Rotation};
 use supple_core::{Config, Trajectory, Vector};
@@ -105,7 +105,9 @@ pub fn pose_start_rad<const N: usize>(config: &Config<N>) -> Result<Vector<N>, F
 }
 
 /// Force with which the law itself may press on a block under the path \[N\]: stiffness times the length of the path, of
-/// the tip or of the springs of the joints as they act downwards at the tip. None if the task does not follow a path.
+/// the tip or of the springs of the joints as they act downwards at the tip. Under a breakaway ramp the weight of the arm: an
+/// obstacle that stops its joint looks like an encoder that sticks, and an arm that brakes leans on it. None if the task does
+/// not follow a path.
 pub fn law_force_n<const N: usize>(
     task: TestTask,
     config: &Config<N>,
@@ -123,6 +125,10 @@ pub fn law_force_n<const N: usize>(
                 .map(|joint| down[(2, joint)] * down[(2, joint)] / springs[joint])
                 .sum();
             Some(DESCENT_M / compliance_m_per_n)
+        }
+        TestTask::Breakaway => {
+            let lever_m = jacobian(&config.arm, start_rad)[(2, SHOULDER)];
+            Some((gravity(&config.arm, start_rad)[SHOULDER] / lever_m).abs())
         }
         _ => None,
     }

@@ -297,8 +297,68 @@ fn a_stuck_encoder_faults() {
     );
 }
 
+/// Two motors drive joints 1 and 2 together, as the differential of a WAM: with the encoder of one stuck, the angles of both
+/// joints go on changing, each by a half.
+#[test]
+fn a_stuck_encoder_of_a_motor_of_two_joints_faults() {
+    let moved = |stuck: bool| {
+        let mut config = guarded();
+        config.plausible.stuck_rad = 0.1;
+        config.collision = Collision::disabled();
+        for (joint, sign) in [(1, 1.0), (2, -1.0)] {
+            config.joint_from_motor[(joint, 1)] = 0.02;
+            config.joint_from_motor[(joint, 2)] = 0.02 * sign;
+        }
+        let mut rig = Rig::holding(config, bent());
+        for _ in 0..300 {
+            rig.q[1] += 6e-4;
+            assert_eq!(rig.cycle().fault, None);
+        }
+        (0..60).find_map(|_| {
+            let step = if stuck { 3e-4 } else { 6e-4 };
+            rig.q[1] += step;
+            rig.q[2] -= if stuck { step } else { 0.0 };
+            rig.cycle().fault
+        })
+    };
+    assert_eq!(moved(false), None);
+    let fault = moved(true);
+    assert!(
+        matches!(fault, Some(Fault::EncoderStuck { joint: 1, .. })),
+        "{fault:?}"
+    );
+}
+
+/// An impact that stops a joint within three cycles, and friction that holds it afterwards, are no stuck encoder; an encoder
+/// that shows the joint's whole speed and then nothing is one.
+#[test]
+fn an_impact_is_no_stuck_encoder() {
+    let stopped = |last_steps: &[f64]| {
+        let mut config = guarded();
+        config.plausible.stuck_rad = 0.1;
+        config.collision = Collision::disabled();
+        let mut rig = Rig::holding(config, bent());
+        // Slower than a fifth of the speed limit: the joint does not count as fast. Its first step is one value.
+        for k in 0..300 {
+            rig.q[0] += if k == 0 { 5e-5 } else { 3e-4 };
+            assert_eq!(rig.cycle().fault, None);
+        }
+        for step in last_steps {
+            rig.q[0] += step;
+            assert_eq!(rig.cycle().fault, None);
+        }
+        (0..300).find_map(|_| rig.cycle().fault)
+    };
+    assert_eq!(stopped(&[2.5e-4, 1.6e-4, 0.6e-4]), None);
+    let fault = stopped(&[]);
+    assert!(
+        matches!(fault, Some(Fault::EncoderStuck { joint: 0, .. })),
+        "{fault:?}"
+    );
+}
+
 /// Encoders that all stopped count as stuck after half of the way that a single one may be unchanged, in a mode of joint
-/// references. Under the law of the tip dry friction may hold all joints of an arm.
+/// references, if they are too coarse to show presliding. Under the law of the tip dry friction may hold all joints of an arm.
 #[test]
 fn all_encoders_stuck_at_once_fault_sooner() {
     let stuck = |of_tip: bool, jitter_rad: f64| {
