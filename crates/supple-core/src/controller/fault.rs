@@ -106,11 +106,11 @@ pub enum Fault {
         /// Limit \[N\].
         limit_n: f64,
     },
-    /// An encoder value stays unchanged while the joint's reference moves.
+    /// The encoder of a joint's motor stays unchanged while the joint should move.
     EncoderStuck {
         /// Joint index.
         joint: usize,
-        /// Travel of the reference meanwhile \[rad\].
+        /// Travel of its reference meanwhile, or at its last speed \[rad\].
         value_rad: f64,
         /// Limit \[rad\].
         limit_rad: f64,
@@ -282,7 +282,7 @@ impl NamesJoints for Fault {
                 limit_rad,
             } => write!(
                 f,
-                "encoder of {} is unchanged while its reference has moved {value_rad:.4} rad, \
+                "encoder of {} is unchanged while the joint should have moved {value_rad:.4} rad, \
                  limit {limit_rad:.4} rad",
                 label(joint)
             ),

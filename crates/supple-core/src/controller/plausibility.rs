@@ -254,36 +254,39 @@ impl<const N: usize> Plausibility<N> {
             self.unchanged_s[encoder] += elapsed_s;
             let joint = encoders.joint(encoder);
             let value_rad = self.speed_rad_per_s[encoder] * self.unchanged_s[encoder];
+            let fast_rad_per_s = fast_rad_per_s[joint];
             if value_rad > FREEZING_TRAVEL_SHARE * limit_rad
-                && self.froze(encoder, limit_rad, fast_rad_per_s[joint], elapsed_s)
+                && let Some(share) = self.stopped_at(encoder, fast_rad_per_s, elapsed_s)
+                && value_rad > share * limit_rad
             {
                 return Err(Fault::EncoderStuck {
                     joint,
                     value_rad,
-                    limit_rad,
+                    limit_rad: share * limit_rad,
                 });
             }
         }
         Ok(())
     }
 
-    /// Whether an encoder was fast when its value last changed, and would have travelled further than the limit since then,
-    /// or turned with its whole speed in that cycle, fast enough to see that.
+    /// Fraction of the limit of travel after which an encoder that no longer changes counts as stuck: if it turned with its
+    /// whole speed, fast enough to see that, in the last cycle before; all of it, if it was fast.
     #[inline(never)]
-    fn froze(&self, encoder: usize, limit_rad: f64, fast_rad_per_s: f64, elapsed_s: f64) -> bool {
+    fn stopped_at(&self, encoder: usize, fast_rad_per_s: f64, elapsed_s: f64) -> Option<f64> {
         let speed_rad_per_s = self.speed_rad_per_s[encoder];
         let travel_rad = speed_rad_per_s * elapsed_s;
         let sudden = self.unchanged_s[encoder] > FREEZING_S
             && self.change_rad[encoder] > FREEZING_SHARE * travel_rad
             && travel_rad > FREEZING_VALUES * self.min_change_rad[encoder]
             && speed_rad_per_s > FREEZING_SPEED_SHARE * fast_rad_per_s;
-        sudden
-            || speed_rad_per_s > fast_rad_per_s
-                && speed_rad_per_s * self.unchanged_s[encoder] > limit_rad
+        match sudden {
+            true => Some(FREEZING_TRAVEL_SHARE),
+            false => (speed_rad_per_s > fast_rad_per_s).then_some(1.0),
+        }
     }
 
-    /// Reports a joint collision as a stuck encoder if an encoder of the joint has been unchanged for some time: both are
-    /// equally likely, and gravity compensation from a wrong angle would not hold the arm.
+    /// Reports a joint collision as a stuck encoder if no encoder of the joint has changed for some time: both are equally
+    /// likely, and gravity compensation from a wrong angle would not hold the arm.
     pub fn as_stuck_encoder(
         &self,
         plausible: &PlausibilityLimits,
@@ -293,16 +296,15 @@ impl<const N: usize> Plausibility<N> {
         let Fault::JointCollision { joint, .. } = fault else {
             return fault;
         };
-        let stuck = encoders
-            .of(joint)
-            .find(|encoder| self.unchanged_s[*encoder] > UNCHANGED_LIMIT_S);
-        match stuck {
-            Some(encoder) if plausible.stuck_rad < f64::MAX => Fault::EncoderStuck {
-                joint,
-                value_rad: self.travel_rad[encoder],
-                limit_rad: plausible.stuck_rad,
-            },
-            _ => fault,
+        let rests = |encoder: usize| self.unchanged_s[encoder] > UNCHANGED_LIMIT_S;
+        if !encoders.of(joint).all(rests) || plausible.stuck_rad == f64::MAX {
+            return fault;
+        }
+        let travel_rad = encoders.of(joint).map(|encoder| self.travel_rad[encoder]);
+        Fault::EncoderStuck {
+            joint,
+            value_rad: travel_rad.fold(0.0, f64::max),
+            limit_rad: plausible.stuck_rad,
         }
     }
 

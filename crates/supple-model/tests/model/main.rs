@@ -11,3 +11,4 @@ mod description;
 mod paper;
 mod paper_asset;
 mod properties;
+mod workspace;

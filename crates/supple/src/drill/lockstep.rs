@@ -90,10 +90,8 @@ pub fn perform<const N: usize>(spec: &Spec, arm: &TestArm) -> Result<Row, Failur
         rate_hz: arm.rate_hz,
         for_s: Some(event_s + back_s + OBSERVED_S),
         virtual_time: true,
-        log: std::env::var("DUMP_LOG")
-            .map(PathBuf::from)
-            .unwrap_or_default(),
-        no_log: std::env::var("DUMP_LOG").is_err(),
+        log: PathBuf::new(),
+        no_log: true,
         view: false,
         prefix: Some(prefix),
         no_realtime: true,

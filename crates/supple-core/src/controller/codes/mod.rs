@@ -97,7 +97,7 @@ numbered_variants! {
     JOINT_COLLISION = 13 "joint_collision": Fault::JointCollision { joint, value_nm, limit_nm } => [index(joint), value_nm, limit_nm],
     /// The external force on the tip exceeds the limit of the mode.
     TIP_COLLISION = 14 "tip_collision": Fault::TipCollision { value_n, limit_n } => [NO_JOINT, value_n, limit_n],
-    /// An encoder value stays unchanged while the joint's reference moves.
+    /// The encoder of a joint's motor stays unchanged while the joint should move.
     ENCODER_STUCK = 15 "encoder_stuck": Fault::EncoderStuck { joint, value_rad, limit_rad } => [index(joint), value_rad, limit_rad],
     /// Encoder replies of a joint are lost too often.
     ENCODER_UNRELIABLE = 16 "encoder_unreliable": Fault::EncoderUnreliable { joint } => [index(joint), 0.0, 0.0],

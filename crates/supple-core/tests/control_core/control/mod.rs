@@ -30,3 +30,4 @@ mod settings;
 mod stiffness;
 mod stopping;
 mod untimely;
+mod workspace;

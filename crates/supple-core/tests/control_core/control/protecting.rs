@@ -5,7 +5,7 @@ use crate::support::configs::{four, three};
 use crate::support::plant::{Plant, push};
 use crate::support::rig::{Rig, bent};
 use supple_core::Vector;
-use supple_core::config::{Border, Collision, Config, Gains, PlausibilityLimits, Workspace, Zone};
+use supple_core::config::{Border, Collision, Config, Gains, PlausibilityLimits, Workspace};
 use supple_core::controller::{Fault, Mode, Refusal, Request, check_motion};
 use supple_core::dynamics::gravity;
 use supple_core::math::Vector3;
@@ -170,29 +170,6 @@ fn a_border_pushes_back_and_then_faults() {
         ),
         "{found:?}"
     );
-}
-
-#[test]
-fn a_zone_has_its_own_speed_limit() {
-    let mut config = guarded();
-    let tip = Rig::new(four(), bent()).tip();
-    let mut zones = [None; supple_core::workspace::MAX_BOUNDARIES];
-    zones[0] = Some(Zone {
-        lower_m: tip - Vector3::repeat(0.5),
-        upper_m: tip + Vector3::repeat(0.5),
-        tip_speed_m_per_s: 0.1,
-        tip_force_n: f64::MAX,
-    });
-    config.workspace = Workspace {
-        zones,
-        ..Workspace::UNBOUNDED
-    };
-    let mut rig = Rig::holding(config, bent());
-    let found = (0..400).find_map(|_| {
-        rig.q[0] += 3e-4;
-        rig.cycle().fault
-    });
-    assert!(matches!(found, Some(Fault::ZoneSpeed { .. })), "{found:?}");
 }
 
 fn sinusoid(amplitude_m: Vector3<f64>, angular_frequency_rad_per_s: f64) -> Trajectory {
