@@ -2,6 +2,7 @@
 
 use core::time::Duration;
 use supple_cli::exit::Failure;
+use supple_core::config::Role;
 use supple_core::controller::Request;
 use supple_core::{Config, Trajectory, Vector};
 use supple_experiment::{PoseMotion, approach_s, pose_start, start_pose};
@@ -33,11 +34,15 @@ impl<const N: usize> Approach<N> {
         })
     }
 
-    /// The approach to a trajectory from a pose that puts the tip at its start.
+    /// The approach to a trajectory from a measured pose that puts the tip at its start; held joints go to their own angles,
+    /// from which a measured one may differ by a value of its encoder.
     pub fn from_pose(config: &Config<N>, trajectory: Trajectory, start_rad: Vector<N>) -> Self {
         Approach {
             trajectory,
-            start_rad,
+            start_rad: Vector::from_fn(|i, _| match config.roles[i] {
+                Role::Active => start_rad[i],
+                Role::Held { position_rad, .. } => position_rad,
+            }),
             config: *config,
         }
     }
