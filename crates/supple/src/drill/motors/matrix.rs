@@ -6,7 +6,7 @@
 //! judged; some hit the shoulder's second motor, which carries the arm, or the elbow's.
 
 use super::super::matrix::{ENCODER_LOSS_FAULTS, WRONG_DIRECTION_FAULTS};
-use super::case::{Case, Event, Expected, TASKS};
+use super::case::{Case, Event, Expected, TASKS, Task};
 
 /// Resolution of the reported times \[ms\].
 const RESOLUTION_MS: f64 = 0.1;
@@ -117,13 +117,18 @@ pub fn all(joints: usize, period_s: f64) -> Vec<Case> {
         ),
         laid_down(of(wrist, "reports a position that jumped"), named_ms),
     ));
-    // No register is read in the cycle: a motor that gives no torque, or half of it, shows in the motion.
-    for (number, value) in [(10, 2), (23, 10)] {
+    // No register is read in the cycle: a motor that gives no torque, or a fraction of it, shows in the motion.
+    let less_torque = misbehaves(
+        format!("register:motor={shoulder},number=23,value=10"),
+        Some(shoulder - 1),
+    );
+    let no_torque = misbehaves(
+        format!("register:motor={shoulder},number=10,value=2"),
+        Some(shoulder - 1),
+    );
+    for event in [no_torque, less_torque.clone()] {
         events.push((
-            misbehaves(
-                format!("register:motor={shoulder},number={number},value={value}"),
-                Some(shoulder - 1),
-            ),
+            event,
             Expected::Fault {
                 reason: None,
                 names: WEAK_MOTOR_FAULTS,
@@ -181,7 +186,11 @@ pub fn all(joints: usize, period_s: f64) -> Vec<Case> {
         let of_task = events.iter().map(|(event, expected)| Case {
             task: *task,
             event: event.clone(),
-            expected: expected.clone(),
+            expected: match task {
+                // The shoulder sinks to where it hangs, as slowly as under a hand that leads it with 5 N.
+                Task::GravityHold if *event == less_torque => Expected::KeepsRunning,
+                _ => expected.clone(),
+            },
         });
         of_task.collect::<Vec<_>>()
     });
