@@ -5,7 +5,7 @@
 //! | replies lost too often | each lost reply counts as eight received ones; the balance exceeds its limit |
 //! | encoder stuck, of a motor | unchanged value while the reference of a joint that it drives moves, out of contact, less far in modes of joint references if it is fine, or all encoders are unchanged; or while a stiff loop or, by the model, a breakaway ramp would move the joint; or from one cycle to the next if it was fast, or moved by several values in the cycle before |
 //! | moves against its torque | 20 cycles in which a joint's momentum grows against its net torque; or a joint that moves against its breakaway ramp |
-//! | unmodelled load | a force along gravity for 50 ms, in gravity hold or after the end of a move |
+//! | unmodelled load | a force along gravity for 50 ms, in gravity hold or after the end of a move, or while the tip falls away from its reference |
 //! | collision | the observed external torque or force exceeds its threshold |
 
 use super::encoders::Encoders;
@@ -409,6 +409,11 @@ impl<const N: usize> Plausibility<N> {
         Ok(())
     }
 
+    /// Discards the evidence of a load.
+    pub fn no_load(&mut self) {
+        self.load_s = 0.0;
+    }
+
     pub fn check_unmodelled_load(
         &mut self,
         force_n: &Vector3<f64>,
@@ -432,6 +437,16 @@ impl<const N: usize> Plausibility<N> {
     }
 }
 
+/// Speed at which a tip falls away from its reference \[m/s\].
+const FALLING_M_PER_S: f64 = 0.1;
+
+/// Whether the tip moves along gravity, faster than its reference.
+#[inline(never)]
+pub(super) fn falls(away_m_per_s: &Vector3<f64>, gravity: &Vector3<f64>) -> bool {
+    let along = away_m_per_s.dot(gravity);
+    along > 0.0 && along * along > FALLING_M_PER_S * FALLING_M_PER_S * gravity.dot(gravity)
+}
+
 /// Inputs of the plausibility checks in one cycle.
 pub(super) struct PlausibilityInput<'a, const N: usize> {
     /// Reference velocities of the joints \[rad/s\].
@@ -440,6 +455,8 @@ pub(super) struct PlausibilityInput<'a, const N: usize> {
     pub net_torque_nm: &'a Vector<N>,
     /// Observed force on the tip, base axes \[N\].
     pub force_n: &'a Vector3<f64>,
+    /// Whether the tip falls away from its reference.
+    pub falls: bool,
     /// Whether the pose is regular. Near a singular pose a small torque maps to a large force along
     /// the lost direction, so only the thresholds of the joints apply.
     pub regular: bool,

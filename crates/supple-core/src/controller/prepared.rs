@@ -8,7 +8,7 @@ use super::validate::{self, ConfigError};
 use crate::config::{Config, RippleTable};
 use crate::law::task::count_active;
 use crate::math::linalg::Cholesky;
-use crate::math::{Matrix, Vector};
+use crate::math::{Matrix, Vector, sqrt};
 use crate::model::learned::LearnedBounds;
 
 /// A validated configuration and the constants derived from it.
@@ -35,6 +35,8 @@ pub struct Controller<const N: usize> {
     pub(super) torque_step_nm: Vector<N>,
     /// Weights of squared external torques whose sum exceeds one where something pushes the arm \[1/(N m)^2\].
     pub(super) push_weight_per_nm2: Vector<N>,
+    /// Force of an unmodelled load times gravity \[N m/s^2\].
+    heavy_n_m_per_s2: f64,
     pub(super) stop_step_nm: Vector<N>,
     pub(super) nullspace_damping_nm_s_per_rad: Vector<N>,
     pub(super) learned_bounds: LearnedBounds<N>,
@@ -88,6 +90,10 @@ impl<const N: usize> Controller<N> {
                 let strong_nm = PUSH_SHARE * limit_nm;
                 1.0 / (strong_nm * strong_nm)
             }),
+            heavy_n_m_per_s2: {
+                let gravity = config.arm.gravity();
+                config.plausible.load_n * sqrt(gravity.dot(&gravity))
+            },
             stop_step_nm: Vector::from_fn(|i, _| {
                 let slow = config.limits.torque_rate_nm_per_s[i];
                 let fast = config.limits.joint_torque_nm[i] / STOP_TORQUE_S;
@@ -168,6 +174,11 @@ impl<const N: usize> Controller<N> {
     /// `j2mp`: motor angles from joint angles.
     pub fn motor_from_joint(&self) -> &Matrix<N, N> {
         &self.motor_from_joint
+    }
+
+    /// Scalar product of force and gravity above which a force on the tip may be an unmodelled load \[N m/s^2\].
+    pub(super) fn heavy_n_m_per_s2(&self) -> f64 {
+        self.heavy_n_m_per_s2
     }
 
     pub(super) fn encoders(&self) -> &Encoders<N> {

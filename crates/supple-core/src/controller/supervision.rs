@@ -6,7 +6,9 @@ use super::checks;
 use super::checks::{COMPLIANT_SPEED_SHARE, MOVING_SHARE};
 use super::fault::Fault;
 use super::latch::Evidence;
-use super::plausibility::{PlausibilityInput, SUDDEN_STOP_SHARE, joint_collision, tip_collision};
+use super::plausibility::{
+    PlausibilityInput, SUDDEN_STOP_SHARE, falls, joint_collision, tip_collision,
+};
 use super::pose_task::PoseCycle;
 use super::state::State;
 use crate::config::Config;
@@ -95,6 +97,7 @@ impl<const N: usize> State<N> {
         };
         let force = task.inverse.tr_mul(&external);
         let mut reference_rad_per_s = Vector::zeros();
+        let mut tip_falls = false;
         if let Some(reference) = self.joint_reference(config) {
             reference_rad_per_s = reference.velocity_rad_per_s;
             self.add_ramped_motion(controller, &mut reference_rad_per_s, elapsed_s);
@@ -122,6 +125,11 @@ impl<const N: usize> State<N> {
             };
             self.latch
                 .update_contact(&config.latch, &evidence, elapsed_s);
+            let gravity = config.arm.gravity();
+            if force.dot(&gravity) > controller.heavy_n_m_per_s2() {
+                let away_m_per_s = evidence.tip_velocity_m_per_s - reference.velocity;
+                tip_falls = falls(&away_m_per_s, &gravity);
+            }
             if self.latch.in_contact() && !was_in_contact {
                 self.contact_velocity_rad_per_s = velocity;
             }
@@ -133,6 +141,7 @@ impl<const N: usize> State<N> {
             reference_rad_per_s: &reference_rad_per_s,
             net_torque_nm: &net_torque,
             force_n: &force,
+            falls: tip_falls,
             regular: is_regular(task),
             elapsed_s,
         };
@@ -284,7 +293,7 @@ impl<const N: usize> State<N> {
             return Ok(());
         }
         tip_collision(tip_force_n, evidence.force_n)?;
-        if resting {
+        if resting || evidence.falls {
             let (gravity, limit_n) = (config.arm.gravity(), config.plausible.load_n);
             self.plausibility.check_unmodelled_load(
                 evidence.force_n,
@@ -292,6 +301,8 @@ impl<const N: usize> State<N> {
                 limit_n,
                 evidence.elapsed_s,
             )?;
+        } else {
+            self.plausibility.no_load();
         }
         Ok(())
     }

@@ -120,6 +120,41 @@ fn an_unmodelled_load_faults_within_100_ms() {
     );
 }
 
+/// While tracking, a load that falls away with the tip is named within 150 ms; a hand that pulls it aside as strongly, or
+/// down with less than the limit, is not.
+#[test]
+fn a_load_that_falls_while_tracking_faults() {
+    let tracked = |force_n: Vector3<f64>, stiffness_n_per_m: f64, cycles: usize| {
+        let mut config = guarded();
+        config.plausible.load_n = 5.0;
+        config.latch.observer_rad_per_s = 100.0;
+        let mut plant = Plant::at_rest(config.arm, bent());
+        let mut rig = Rig::holding(config, bent());
+        rig.accept(Request::Gains {
+            gains: Gains::isotropic(stiffness_n_per_m, 2.0),
+            ramp_s: 0.0,
+        });
+        let from_m = rig.tip();
+        rig.accept(Request::Track(Trajectory::Line(Line {
+            from_m,
+            to_m: from_m + Vector3::new(0.0, 0.0, 0.02),
+            duration_s: 2.0,
+        })));
+        (0..cycles).find_map(|cycle| {
+            let output = rig.drive(&mut plant, None, |arm, q, _| push(arm, q, &force_n));
+            output.fault.map(|fault| (cycle, fault))
+        })
+    };
+    let weight = Vector3::new(0.0, 0.0, -9.81);
+    let fault = tracked(weight, 5.0, 400);
+    assert!(
+        matches!(fault, Some((cycle, Fault::UnmodelledLoad { .. })) if cycle < 150),
+        "{fault:?}"
+    );
+    assert_eq!(tracked(Vector3::new(0.0, 9.81, 0.0), 5.0, 150), None);
+    assert_eq!(tracked(weight * 0.4, 5.0, 150), None);
+}
+
 fn floor_below(rig: &Rig<4>, by_m: f64) -> Workspace {
     let mut borders = [None; supple_core::workspace::MAX_BOUNDARIES];
     borders[0] = Some(Border::Wall {
