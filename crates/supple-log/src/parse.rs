@@ -18,10 +18,18 @@ pub(crate) fn decode_record(
     match opcode {
         op::ATTACHMENT if !fits(data) => Err(McapError::UnexpectedEof),
         op::CHUNK => {
-            let inside = chunk_records(data)?;
-            let Record::Chunk { header, .. } = mcap::parse_record(opcode, data)? else {
+            let Record::Chunk {
+                header,
+                data: content,
+            } = mcap::parse_record(opcode, data)?
+            else {
                 return Err(McapError::BadIndex);
             };
+            let whole = header.compressed_size == content.len() as u64;
+            if !whole || header.compression.is_empty() && !are_framed(&content) {
+                return Err(McapError::UnexpectedEof);
+            }
+            let inside = chunk_records(data)?;
             let data = Vec::new().into();
             Ok((Record::Chunk { header, data }, inside))
         }
@@ -55,6 +63,25 @@ fn chunk_records(data: &[u8]) -> Result<VecDeque<Record<'static>>, McapError> {
         }
     }
     Ok(records)
+}
+
+/// Whether records of an uncompressed chunk, of the lengths that they state, fill it: the reader takes one that is longer
+/// for granted.
+fn are_framed(mut records: &[u8]) -> bool {
+    while !records.is_empty() {
+        let prefix = records
+            .get(1..)
+            .and_then(|rest| rest.split_first_chunk::<8>());
+        let rest = prefix.and_then(|(length, rest)| {
+            let length = usize::try_from(u64::from_le_bytes(*length)).ok()?;
+            rest.get(length..)
+        });
+        let Some(rest) = rest else {
+            return false;
+        };
+        records = rest;
+    }
+    true
 }
 
 /// Whether the name and the media type of an attachment, of the lengths that it states, leave room for
