@@ -55,9 +55,7 @@ impl<const N: usize> Encoders<N> {
 
     /// The same of one encoder.
     pub(super) fn of_joints_at(&self, encoder: usize, joints: &Vector<N>) -> f64 {
-        (0..N).fold(0.0, |sum, joint| {
-            sum + self.from_joint[(encoder, joint)] * joints[joint]
-        })
+        (self.from_joint.row(encoder) * joints)[0]
     }
 
     /// The joint that turns the motor of an encoder most.

@@ -31,6 +31,7 @@ mod set_point;
 mod state;
 mod step;
 mod stop;
+mod stuck_encoder;
 mod supervision;
 mod validate;
 mod words;

@@ -36,7 +36,7 @@ pub struct Controller<const N: usize> {
     /// Weights of squared external torques whose sum exceeds one where something pushes the arm \[1/(N m)^2\].
     pub(super) push_weight_per_nm2: Vector<N>,
     /// Force of an unmodelled load times gravity \[N m/s^2\].
-    heavy_n_m_per_s2: f64,
+    load_n_m_per_s2: f64,
     pub(super) stop_step_nm: Vector<N>,
     pub(super) nullspace_damping_nm_s_per_rad: Vector<N>,
     pub(super) learned_bounds: LearnedBounds<N>,
@@ -90,7 +90,7 @@ impl<const N: usize> Controller<N> {
                 let strong_nm = PUSH_SHARE * limit_nm;
                 1.0 / (strong_nm * strong_nm)
             }),
-            heavy_n_m_per_s2: {
+            load_n_m_per_s2: {
                 let gravity = config.arm.gravity();
                 config.plausible.load_n * sqrt(gravity.dot(&gravity))
             },
@@ -177,10 +177,11 @@ impl<const N: usize> Controller<N> {
     }
 
     /// Scalar product of force and gravity above which a force on the tip may be an unmodelled load \[N m/s^2\].
-    pub(super) fn heavy_n_m_per_s2(&self) -> f64 {
-        self.heavy_n_m_per_s2
+    pub(super) fn load_n_m_per_s2(&self) -> f64 {
+        self.load_n_m_per_s2
     }
 
+    /// What the encoders see.
     pub(super) fn encoders(&self) -> &Encoders<N> {
         &self.encoders
     }

@@ -7,6 +7,7 @@ use super::handover::{Handover, HandoverFrom, REPEATED_CYCLES};
 use super::mode::Mode;
 use super::output::Input;
 use super::plausibility::Plausibility;
+use super::stuck_encoder::StuckEncoders;
 use crate::config::{Config, Gains, JointGains, Role, RotationalGains};
 use crate::controller::estimator::{Estimator, EstimatorGains};
 use crate::controller::latch::Latch;
@@ -165,6 +166,7 @@ pub struct State<const N: usize> {
     /// The motors apply torques.
     pub(super) drives_active: bool,
     pub(super) plausibility: Plausibility<N>,
+    pub(super) stuck_encoders: StuckEncoders<N>,
     /// Recent peak of the kinetic energy, with decay; in a fault the peak before it \[J\].
     pub(super) peak_energy_j: f64,
     /// Time for which an unexplained torque has acted in a fault \[s\].
@@ -205,6 +207,7 @@ impl<const N: usize> State<N> {
             terms: Terms::default(),
             drives_active: false,
             plausibility: Plausibility::default(),
+            stuck_encoders: StuckEncoders::default(),
             peak_energy_j: 0.0,
             unexplained_s: 0.0,
             learned: Learned::new(&config.learned),
@@ -290,7 +293,7 @@ impl<const N: usize> State<N> {
         let config = controller.config();
         let elapsed_s = gains.elapsed_s();
         let first = self.cycle.is_none();
-        let mut q = self.plausibility.measured_rad();
+        let mut q = self.stuck_encoders.measured_rad();
         let mut all = true;
         for (joint, measured) in measured_rad.iter().enumerate() {
             match *measured {
@@ -306,7 +309,7 @@ impl<const N: usize> State<N> {
         let plausible = &config.plausible;
         self.plausibility
             .receive_replies(plausible, measured_rad, all)?;
-        self.plausibility.receive_angles(controller.encoders(), &q);
+        self.stuck_encoders.receive(controller.encoders(), &q);
         if first {
             self.position = q;
             self.estimator = Estimator::at_rest(self.position);
@@ -401,6 +404,7 @@ impl<const N: usize> State<N> {
         self.activity_start = self.cycle.unwrap_or(0);
         self.latch = self.latch.restarted();
         self.plausibility.begin();
+        self.stuck_encoders.begin();
         self.unexplained_s = 0.0;
     }
 

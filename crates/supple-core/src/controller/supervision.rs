@@ -3,12 +3,10 @@
 use super::Controller;
 use super::activity::Activity;
 use super::checks;
-use super::checks::{COMPLIANT_SPEED_SHARE, MOVING_SHARE};
+use super::checks::COMPLIANT_SPEED_SHARE;
 use super::fault::Fault;
 use super::latch::Evidence;
-use super::plausibility::{
-    PlausibilityInput, SUDDEN_STOP_SHARE, falls, joint_collision, tip_collision,
-};
+use super::plausibility::{PlausibilityInput, falls, joint_collision, tip_collision};
 use super::pose_task::PoseCycle;
 use super::state::State;
 use crate::config::Config;
@@ -76,7 +74,8 @@ impl<const N: usize> State<N> {
             // Braking motors produce torques that the model does not contain, so the observer is
             // reset.
             self.observer.reset();
-            self.plausibility.reset_history(&self.terms.momentum);
+            self.plausibility.suspend(&self.terms.momentum);
+            self.stuck_encoders.suspend();
             return Ok(Vector3::zeros());
         }
         let mut net_torque = Vector::zeros();
@@ -126,7 +125,7 @@ impl<const N: usize> State<N> {
             self.latch
                 .update_contact(&config.latch, &evidence, elapsed_s);
             let gravity = config.arm.gravity();
-            if force.dot(&gravity) > controller.heavy_n_m_per_s2() {
+            if force.dot(&gravity) > controller.load_n_m_per_s2() {
                 let away_m_per_s = evidence.tip_velocity_m_per_s - reference.velocity;
                 tip_falls = falls(&away_m_per_s, &gravity);
             }
@@ -166,7 +165,7 @@ impl<const N: usize> State<N> {
         let ramp_nm = ramp.rate_nm_per_s * self.activity_s(config);
         let dry_nm = config.friction[joint].dry_size_nm(0.0);
         let inertia_kg_m2 = self.terms.mass_matrix[(joint, joint)];
-        reference_rad_per_s[joint] = self.plausibility.ramped_rad_per_s(
+        reference_rad_per_s[joint] = self.stuck_encoders.ramped_rad_per_s(
             controller.encoders(),
             joint,
             ramp_nm,
@@ -236,16 +235,14 @@ impl<const N: usize> State<N> {
             Activity::Move { duration_s, .. } => self.activity_s(config) > *duration_s,
             _ => false,
         };
-        let plausibility = &mut self.plausibility;
+        let (plausibility, stuck) = (&mut self.plausibility, &mut self.stuck_encoders);
         if evidence.elapsed_s > 0.0 {
-            let sudden_stop_rad = SUDDEN_STOP_SHARE * config.plausible.stuck_rad;
-            let moving = config.limits.joint_speed_rad_per_s * MOVING_SHARE;
             let velocity = &self.estimator.velocity_rad_per_s;
-            plausibility.check_sudden_stop(
+            stuck.check_sudden_stop(
                 encoders,
-                sudden_stop_rad,
+                &config.plausible,
                 velocity,
-                &moving,
+                &config.limits.joint_speed_rad_per_s,
                 evidence.elapsed_s,
             )?;
             let limits = config.limits.joint_torque_nm * config.plausible.against_share;
@@ -261,11 +258,11 @@ impl<const N: usize> State<N> {
             }
             // In contact, joints may be at rest while their references move, at a few newtons per metre also some while
             // others move. Encoders that are all stuck make a contact themselves: it counts once they have changed in it.
-            if !plausibility.is_contact_plausible(self.latch.in_contact()) {
+            if !stuck.is_contact_plausible(self.latch.in_contact()) {
                 let joint_reference = self.activity.has_joint_reference();
-                plausibility.check_stuck_encoder(
+                stuck.check_reference(
                     encoders,
-                    config.plausible.stuck_rad,
+                    &config.plausible,
                     evidence.reference_rad_per_s,
                     joint_reference,
                     evidence.elapsed_s,
@@ -281,13 +278,13 @@ impl<const N: usize> State<N> {
             (&collision.joint_torque_nm, collision.tip_force_n)
         };
         joint_collision(joint_torque_nm, &external).map_err(|fault| {
-            self.plausibility
+            self.stuck_encoders
                 .as_stuck_encoder(&config.plausible, encoders, fault)
         })?;
         if has_loops {
             let (plausible, threshold_nm) = (&config.plausible, joint_torque_nm);
-            self.plausibility
-                .check_driven_encoder(plausible, encoders, threshold_nm, &external)?;
+            self.stuck_encoders
+                .check_driven(plausible, encoders, threshold_nm, &external)?;
         }
         if !evidence.regular {
             return Ok(());
@@ -302,7 +299,7 @@ impl<const N: usize> State<N> {
                 evidence.elapsed_s,
             )?;
         } else {
-            self.plausibility.no_load();
+            self.plausibility.reset_load();
         }
         Ok(())
     }

@@ -169,7 +169,8 @@ pub fn evaluate(spec: &Spec, metrics: &RowMetrics, refusals: &[String]) -> (Stri
         }
         // While probing or tracking, and with compliant joints, the law itself presses on the block.
         let pressed_n = metrics.pressed_n.unwrap_or(0.0);
-        let allowed_n = MAX_PRESSING_FORCE_N + metrics.law_force_n.unwrap_or(0.0);
+        let own_n = metrics.law_force_n.unwrap_or(0.0) + metrics.weight_n.unwrap_or(0.0);
+        let allowed_n = MAX_PRESSING_FORCE_N + own_n;
         expect(
             pressed_n < allowed_n,
             format!("pressed with {pressed_n:.0} N after 0.5 s, {allowed_n:.0} N allowed"),

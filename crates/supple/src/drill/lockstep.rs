@@ -4,7 +4,7 @@ use super::evaluation::evaluate;
 use super::metrics::{ControllerSample, RowMetrics, angle_is_wrong_ns, stuck_error_rad};
 use super::row::Row;
 use super::spec::{Activation, DriveShutdown, Event, InvalidRequest, Spec, TestTask};
-use super::task::{Script, law_force_n};
+use super::task::{Script, law_force_n, weight_n};
 use super::test_arms::TestArm;
 use super::trace::{self, TraceRow};
 use crate::cli::{PlantKind, UpArgs, UpTrajectory};
@@ -124,6 +124,10 @@ pub fn perform<const N: usize>(spec: &Spec, arm: &TestArm) -> Result<Row, Failur
         let mut metrics = RowMetrics::new(&lines, &samples, task_start_ns, event_ns);
         metrics.observable_at(observable_ns(spec, &config, &lines, event_ns), event_ns);
         metrics.law_force_n = law_force_n(spec.task, &config, &script.start_rad);
+        // An obstacle that stops the joint of a ramp looks like an encoder that sticks: the arm brakes and leans on it.
+        if spec.task == TestTask::Breakaway && metrics.braked_after_ms.is_some() {
+            metrics.weight_n = Some(weight_n(&config, &script.start_rad));
+        }
         if let Event::Injected {
             kind: InjectionKind::MotorDead { .. },
             ..

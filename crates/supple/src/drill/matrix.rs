@@ -30,13 +30,7 @@ const CONTACT_FAULTS: &[&str] = &[
     "joint_tracking_error",
 ];
 /// The same of the joint of a breakaway ramp.
-const RAMP_CONTACT_FAULTS: &[&str] = &[
-    "joint_collision",
-    "tip_collision",
-    "workspace",
-    "joint_tracking_error",
-    "encoder_stuck",
-];
+const RAMP_CONTACT_FAULTS: &[&str] = &extended::<5>(CONTACT_FAULTS, "encoder_stuck");
 /// The same in the pose mode.
 const POSE_CONTACT_FAULTS: &[&str] = &[
     "joint_collision",
@@ -87,21 +81,7 @@ pub const WRONG_DIRECTION_FAULTS: &[&str] = &[
     "singular",
 ];
 /// The same for angles that come late: until the delay has built up, they do not change.
-const LATE_ENCODER_FAULTS: &[&str] = &[
-    "encoder_stuck",
-    "moves_against_torque",
-    "encoder_unreliable",
-    "joint_collision",
-    "tip_collision",
-    "unmodelled_load",
-    "joint_tracking_error",
-    "tracking_error",
-    "joint_speed",
-    "tip_speed",
-    "workspace",
-    "rotation_error",
-    "singular",
-];
+const LATE_ENCODER_FAULTS: &[&str] = &extended::<13>(WRONG_DIRECTION_FAULTS, "encoder_stuck");
 /// Valid faults for lost, jumping or non-finite joint angles.
 pub const ENCODER_LOSS_FAULTS: &[&str] = &[
     "encoder_lost",
@@ -120,13 +100,20 @@ const UNMODELLED_LOAD_FAULTS: &[&str] = &[
 ];
 
 /// The same during tracking, where the tracking error may trip first.
-const UNMODELLED_LOAD_TRACKING_FAULTS: &[&str] = &[
-    "moves_against_torque",
-    "unmodelled_load",
-    "joint_collision",
-    "tip_collision",
-    "tracking_error",
-];
+const UNMODELLED_LOAD_TRACKING_FAULTS: &[&str] =
+    &extended::<5>(UNMODELLED_LOAD_FAULTS, "tracking_error");
+
+/// A list of `N` names: those of another list, and one more.
+const fn extended<const N: usize>(names: &[&'static str], more: &'static str) -> [&'static str; N] {
+    assert!(names.len() + 1 == N);
+    let mut all = [more; N];
+    let mut i = 0;
+    while i < names.len() {
+        all[i] = names[i];
+        i += 1;
+    }
+    all
+}
 
 /// All test cases of a plant.
 pub fn all(plant: PlantKind) -> Vec<Spec> {

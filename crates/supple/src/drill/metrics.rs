@@ -96,6 +96,8 @@ pub struct RowMetrics {
     pub pressed_n: Option<f64>,
     /// Force with which the law itself may press \[N\]; none if the task follows no path.
     pub law_force_n: Option<f64>,
+    /// Force with which the weight of the arm may rest on the block \[N\]; none if it does not brake.
+    pub weight_n: Option<f64>,
     /// Maximum rise of the mechanical energy, kinetic and potential, after the fault \[J\]; where the encoders are right.
     pub energy_gained_j: Option<f64>,
     /// Maximum descent of the tip after the fault \[m\].

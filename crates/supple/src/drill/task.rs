@@ -105,9 +105,7 @@ pub fn pose_start_rad<const N: usize>(config: &Config<N>) -> Result<Vector<N>, F
 }
 
 /// Force with which the law itself may press on a block under the path \[N\]: stiffness times the length of the path, of
-/// the tip or of the springs of the joints as they act downwards at the tip. Under a breakaway ramp the weight of the arm: an
-/// obstacle that stops its joint looks like an encoder that sticks, and an arm that brakes leans on it. None if the task does
-/// not follow a path.
+/// the tip or of the springs of the joints as they act downwards at the tip. None if the task does not follow a path.
 pub fn law_force_n<const N: usize>(
     task: TestTask,
     config: &Config<N>,
@@ -126,12 +124,14 @@ pub fn law_force_n<const N: usize>(
                 .sum();
             Some(DESCENT_M / compliance_m_per_n)
         }
-        TestTask::Breakaway => {
-            let lever_m = jacobian(&config.arm, start_rad)[(2, SHOULDER)];
-            Some((gravity(&config.arm, start_rad)[SHOULDER] / lever_m).abs())
-        }
         _ => None,
     }
+}
+
+/// Force with which the weight of an arm without torque rests on a block under its tip \[N\], if the shoulder alone gives way.
+pub fn weight_n<const N: usize>(config: &Config<N>, start_rad: &Vector<N>) -> f64 {
+    let lever_m = jacobian(&config.arm, start_rad)[(2, SHOULDER)];
+    (gravity(&config.arm, start_rad)[SHOULDER] / lever_m).abs()
 }
 
 /// The downward path of the joint impedance task, slower, while the tip turns about the vertical.

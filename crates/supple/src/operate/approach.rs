@@ -35,7 +35,7 @@ impl<const N: usize> Approach<N> {
     }
 
     /// The approach to a trajectory from a measured pose that puts the tip at its start; held joints go to their own angles,
-    /// from which a measured one may differ by a value of its encoder.
+    /// from which a measured one may differ by a count of its encoder.
     pub fn from_pose(config: &Config<N>, trajectory: Trajectory, start_rad: Vector<N>) -> Self {
         Approach {
             trajectory,

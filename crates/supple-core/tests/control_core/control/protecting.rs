@@ -1,6 +1,7 @@
 //! Protection of people and the arm before and during motion: idle drives, collisions, loads,
 //! borders, and checks of requests.
 
+use super::workspace::bordered;
 use crate::support::configs::{four, three};
 use crate::support::plant::{Plant, push};
 use crate::support::rig::{Rig, bent};
@@ -156,18 +157,10 @@ fn a_load_that_falls_while_tracking_faults() {
 }
 
 fn floor_below(rig: &Rig<4>, by_m: f64) -> Workspace {
-    let mut borders = [None; supple_core::workspace::MAX_BOUNDARIES];
-    borders[0] = Some(Border::Wall {
+    bordered(Border::Wall {
         normal: Vector3::new(0.0, 0.0, -1.0),
         offset_m: by_m - rig.tip().z,
-    });
-    Workspace {
-        borders,
-        margin_m: 0.05,
-        stiffness_n_per_m: 400.0,
-        damping_n_s_per_m: 20.0,
-        ..Workspace::UNBOUNDED
-    }
+    })
 }
 
 /// The margin pushes the tip back; beyond the border, motion further outwards faults.
@@ -350,7 +343,7 @@ fn an_impact_is_no_stuck_encoder() {
         config.plausible.stuck_rad = 0.1;
         config.collision = Collision::disabled();
         let mut rig = Rig::holding(config, bent());
-        // Slower than a fifth of the speed limit: the joint does not count as fast. Its first step is one value.
+        // Slower than a fifth of the speed limit: the joint does not count as fast. Its first step is one count.
         for k in 0..300 {
             rig.q[0] += if k == 0 { 5e-5 } else { 3e-4 };
             assert_eq!(rig.cycle().fault, None);

@@ -15,7 +15,8 @@ fn tip() -> Vector3<f64> {
     Rig::new(four(), bent()).tip()
 }
 
-fn bordered(border: Border) -> Workspace {
+/// A workspace with this border, which pushes with 400 N/m and 20 N s/m over 50 mm.
+pub(super) fn bordered(border: Border) -> Workspace {
     let mut borders = [None; MAX_BOUNDARIES];
     borders[0] = Some(border);
     Workspace {
