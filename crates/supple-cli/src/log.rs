@@ -9,7 +9,7 @@ use std::io::{BufWriter, ErrorKind, Write};
 use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
 use supple_files::{check_output, create_output, with_suffix};
-use supple_log::{LogError, export_csv, info, recover, replay};
+use supple_log::{LogError, export_csv, info, recover, refuse_overwriting, replay};
 
 /// File extension of a log that is being written, or whose writer died.
 const PART: &str = "part";
@@ -127,6 +127,7 @@ fn export_to_file(
     every: NonZeroU64,
     out: &Path,
 ) -> Result<u64, Failure> {
+    refuse_overwriting(file, out, PART_SUFFIX).map_err(|error| failure(file, error))?;
     let part = with_suffix(out, PART_SUFFIX);
     let failed = |action, error| Failure::file(action, out, error);
     let created = check_output(out).and_then(|()| create_output(&part));

@@ -72,8 +72,8 @@ pub enum LogError {
         /// Length of the file.
         bytes: u64,
     },
-    /// The recovered file would replace its source.
-    #[error("{file} cannot be recovered onto itself; give the result another name")]
+    /// The result would replace the log that it is made from.
+    #[error("{file} would be replaced by what is made from it; give the result another name")]
     SameFile {
         /// File.
         file: String,

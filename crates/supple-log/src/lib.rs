@@ -55,7 +55,7 @@ pub use info::{AttachmentInfo, ChannelInfo, FaultInfo, Info, ModeChange, info};
 pub use live::{LiveChannel, LiveEncoder, LiveMessage};
 pub use messages::{CycleTiming, PlantTruth};
 pub use reader::{About, Messages, Reader, Timed};
-pub use recover::{Recovery, recover};
+pub use recover::{Recovery, recover, refuse_overwriting};
 pub use replay::{Difference, Replay, replay};
 pub use writer::{RunInfo, Writer};
 

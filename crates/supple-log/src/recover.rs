@@ -69,7 +69,7 @@ pub fn recover(from: impl AsRef<Path>, to: impl AsRef<Path>) -> Result<Recovery,
         source,
     };
     let source_bytes = std::fs::metadata(from).map_err(read_error)?.len();
-    refuse_same_file(from, to)?;
+    refuse_overwriting(from, to, PARTIAL_SUFFIX)?;
     let mut writer = RecoveryWriter {
         file: LogFile::create(to, PARTIAL_SUFFIX)?,
         channel_ids: BTreeMap::new(),
@@ -101,15 +101,18 @@ pub fn recover(from: impl AsRef<Path>, to: impl AsRef<Path>) -> Result<Recovery,
     })
 }
 
-/// Returns an error if `to`, or the temporary name it is written under, is the file `from`.
-fn refuse_same_file(from: &Path, to: &Path) -> Result<(), LogError> {
+/// Checks that writing `to`, under a temporary name with `partial_suffix` first, leaves the log `from` as it is.
+///
+/// # Errors
+/// [`LogError::SameFile`]; [`LogError::Read`] if `from` does not exist.
+pub fn refuse_overwriting(from: &Path, to: &Path, partial_suffix: &str) -> Result<(), LogError> {
     let read_error = |source| LogError::Read {
         file: from.display().to_string(),
         source,
     };
     let source = from.canonicalize().map_err(read_error)?;
     let is_source = |path: &Path| path.canonicalize().is_ok_and(|path| path == source);
-    if is_source(to) || is_source(&with_suffix(to, PARTIAL_SUFFIX)) {
+    if is_source(to) || is_source(&with_suffix(to, partial_suffix)) {
         return Err(LogError::SameFile {
             file: from.display().to_string(),
         });

@@ -166,6 +166,28 @@ fn a_tip_that_a_urdf_does_not_have_is_code_3() {
     }
 }
 
+/// The log, under its own name, through a link, or as the part of a run that was ended, is what it was.
+#[test]
+fn a_table_is_not_written_over_its_log() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for name in ["run.mcap", "cut.mcap.part"] {
+        std::fs::write(folder.path().join(name), "a log").expect("written");
+    }
+    std::os::unix::fs::symlink("run.mcap", folder.path().join("link.csv")).expect("linked");
+    for (log, out) in [
+        ("run.mcap", "run.mcap"),
+        ("run.mcap", "./run.mcap"),
+        ("run.mcap", "link.csv"),
+        ("cut.mcap.part", "cut.mcap"),
+    ] {
+        let answer = run_in(folder.path(), &["log", "export", log, "--out", out]);
+        assert_ne!(answer.code, Some(0), "{log} to {out}");
+        assert_one_clear_line(&answer, &[log, "another name"]);
+        let kept = std::fs::read_to_string(folder.path().join(log)).expect("still there");
+        assert_eq!(kept, "a log", "{log} to {out}");
+    }
+}
+
 #[test]
 fn with_json_errors_of_operator_commands_are_objects_on_standard_output() {
     let folder = tempfile::tempdir().expect("a folder");
