@@ -6,7 +6,7 @@
 //!   active --(loss, or the controller requests none)--> lowering --(drives idle, or 100 ms)--> resting
 //! arms that fall without torque:
 //!   active --(the same)--> holding --(a time)--> stowing --(the arm lies)--> lowering --> resting
-//!   holding or stowing --(that torque drives the arm)--> damping --(rest, or 10 s)--> lowering --> resting
+//!   holding or stowing --(that torque drives the arm)--> damping --(rest, 10 s, or damping drives it)--> lowering --> resting
 //! ```
 //!
 //! Torques are sent in the active stage and also in the resting stage, in which idle motors ignore them, so that
@@ -15,7 +15,8 @@
 //! the fallback continues until they do, for at most [`FALLBACK_NS`], because the arm would drop without torque before
 //! the motors brake. What a loss permits is in [`LossReason::safe_action`]. An arm that falls is first held by gravity
 //! compensation and the damping of its motors, then laid down, then disabled. If that torque drives the arm, because an
-//! angle is wrong, the motors damp without any torque: what they do then takes energy from the arm. With a motor that has
+//! angle is wrong, the motors damp without any torque: what they do then takes energy from the arm; if it does not, as of a motor
+//! that turns the wrong way altogether, they are disabled. With a motor that has
 //! no torque the arm is held in any case: its joint falls, and moves the others. The machine never activates the arm. It
 //! has no access to bus or clock: time is an argument.
 
@@ -167,7 +168,7 @@ impl SafeActionMachine {
         }
     }
 
-    /// Runs one cycle. `lies` is whether an arm that is being laid down has arrived, or one that is damped is at rest.
+    /// Runs one cycle. `lies` is whether an arm that is being laid down has arrived, or one that is damped is at rest or is not slowed.
     pub fn cycle(&mut self, input: &GuardInput, lies: bool) -> Action {
         let loss = self.watch(input);
         let active = input.drives == Drives::Active;

@@ -3,7 +3,8 @@
 //! The torque of holding is gravity at the measured pose. If an angle is wrong, as with a zero that moved, that torque
 //! drives the arm instead. Nothing that the loop does moves a joint at its speed limit, and damping slows what moved
 //! before: a joint that exceeds its limit for [`FAST_S`], and is faster than when holding began or exceeds the limit
-//! [`STOP_S`] later, is driven.
+//! [`STOP_S`] later, is driven. Damping motors let an arm fall at the speed at which they carry its weight; a joint that is faster
+//! than [`RUNAWAY_SHARE`] of its limit for [`FAST_S`] is driven by its damping itself.
 
 use supple_core::Vector;
 
@@ -15,6 +16,8 @@ const SETTLING_S: f64 = 0.02;
 const SPEED_GROWTH: f64 = 1.25;
 /// Time after which no joint may exceed its limit, whatever its speed at the beginning \[s\].
 const STOP_S: f64 = 0.25;
+/// Ratio to a joint's speed limit that no joint reaches that damping motors let fall.
+const RUNAWAY_SHARE: f64 = 3.0;
 /// Fraction of a joint's speed limit below which it rests.
 const REST_SHARE: f64 = 0.05;
 /// Time for which all joints rest before the arm lies \[s\].
@@ -32,6 +35,8 @@ pub(crate) struct HoldCheck<const N: usize> {
     fast: Option<(usize, f64)>,
     /// Time for which all joints have rested \[s\].
     rest_s: f64,
+    /// Time for which a joint has been faster than damping motors let it fall \[s\].
+    runaway_s: f64,
 }
 
 impl<const N: usize> HoldCheck<N> {
@@ -42,6 +47,7 @@ impl<const N: usize> HoldCheck<N> {
             fastest_rad_per_s: 0.0,
             fast: None,
             rest_s: 0.0,
+            runaway_s: 0.0,
         }
     }
 
@@ -67,12 +73,24 @@ impl<const N: usize> HoldCheck<N> {
         self.fast = found.map(|joint| (joint, before_s + period_s));
         let rests = (0..N).all(|joint| speed[joint] < REST_SHARE * self.limit_rad_per_s[joint]);
         self.rest_s = if rests { self.rest_s + period_s } else { 0.0 };
+        let runs_away =
+            (0..N).any(|joint| speed[joint] > RUNAWAY_SHARE * self.limit_rad_per_s[joint]);
+        self.runaway_s = if runs_away {
+            self.runaway_s + period_s
+        } else {
+            0.0
+        };
     }
 
     /// Joint that the torque of holding drives.
     pub(crate) fn driven(&self) -> Option<usize> {
         let (joint, fast_s) = self.fast?;
         (fast_s > FAST_S).then_some(joint)
+    }
+
+    /// Whether damping does not slow the arm.
+    pub(crate) fn runs_away(&self) -> bool {
+        self.runaway_s > FAST_S
     }
 
     /// Whether the arm lies.
@@ -110,6 +128,22 @@ mod tests {
     fn a_motion_that_does_not_decay_is_driven_after_a_quarter_of_a_second() {
         let after_s = driven_after_s(|_| 4.0).expect("driven");
         assert!((0.25..0.27).contains(&after_s), "{after_s}");
+    }
+
+    /// Damping that drives the joint makes it ever faster; a fall against damping ends at a speed.
+    #[test]
+    fn a_joint_that_damping_drives_runs_away() {
+        let after_s = |speed: &dyn Fn(f64) -> f64| {
+            let mut check = HoldCheck::<2>::new(Vector::repeat(2.0));
+            (1..2000).map(|k| f64::from(k) * MS).find(|time_s| {
+                check.observe(&Vector::from([0.0, speed(*time_s)]), MS);
+                check.runs_away()
+            })
+        };
+        assert_eq!(after_s(&|time_s| 5.9 * (1.0 - (-time_s / 0.1).exp())), None);
+        let found_s = after_s(&|time_s| (time_s / 0.1).exp()).expect("it runs away");
+        // 6 rad/s after 0.179 s, and 10 ms.
+        assert!((0.187..0.193).contains(&found_s), "{found_s}");
     }
 
     #[test]

@@ -312,14 +312,14 @@ impl<const N: usize, D: Drive<N>, L: Link<N>> PlantLoop<N, D, L> {
         Ok(command)
     }
 
-    /// Whether an arm that is being laid down has arrived, or one that is damped is at rest.
+    /// Whether an arm that is being laid down has arrived, or one that is damped is at rest or is not slowed.
     fn has_stowed(&self, now_ns: u64) -> bool {
         match (self.guard.stage(), &self.stowing) {
             (Stage::Stowing(_, since_ns), Some(stowing)) => {
                 stowing.has_ended((now_ns - since_ns) as f64 * 1e-9)
             }
             (Stage::Stowing(..), None) => true,
-            (Stage::Damping(..), _) => self.hold_check.rests(),
+            (Stage::Damping(..), _) => self.hold_check.rests() || self.hold_check.runs_away(),
             _ => false,
         }
     }

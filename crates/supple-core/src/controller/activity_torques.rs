@@ -362,7 +362,11 @@ impl<const N: usize> State<N> {
         if !config.workspace.is_unbounded() {
             let jacobian = self.terms.jacobian.fixed_rows::<3>(0);
             let tip = self.terms.base_from_tip.translation;
-            let force = config.workspace.soft_force(&tip, &(jacobian * velocity));
+            let margin_from_m = &self.position_limits.margin_from_m;
+            let tip_velocity = jacobian * velocity;
+            let force = config
+                .workspace
+                .soft_force(&tip, &tip_velocity, margin_from_m);
             torques.soft_stop += jacobian.tr_mul(&force);
         }
     }

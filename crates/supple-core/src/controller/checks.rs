@@ -2,6 +2,7 @@
 //! counts as exceeding a speed limit or a tracking limit.
 
 use super::fault::Fault;
+use super::position_limits::PositionLimits;
 use crate::config::Limits;
 use crate::law::impedance::Torques;
 use crate::math::{Vector, Vector3, abs, all_finite, sqrt};
@@ -24,6 +25,7 @@ pub(super) const DAMPING_MARGIN: f64 = core::f64::consts::FRAC_PI_4;
 /// Checks joint positions, joint speeds and tip speed; `speed_share` of the speed limits applies.
 pub(super) fn motion<const N: usize>(
     limits: &Limits<N>,
+    positions: &PositionLimits<N>,
     speed_share: f64,
     position_rad: &Vector<N>,
     velocity_rad_per_s: &Vector<N>,
@@ -33,12 +35,12 @@ pub(super) fn motion<const N: usize>(
         let value_rad = position_rad[joint];
         for (limit_rad, outside) in [
             (
-                limits.position_lower_rad[joint],
-                value_rad < limits.position_lower_rad[joint],
+                positions.lower_rad[joint],
+                value_rad < positions.lower_rad[joint],
             ),
             (
-                limits.position_upper_rad[joint],
-                value_rad > limits.position_upper_rad[joint],
+                positions.upper_rad[joint],
+                value_rad > positions.upper_rad[joint],
             ),
         ] {
             if outside {
@@ -124,36 +126,11 @@ pub(super) fn total<const N: usize>(torques: &Torques<N>) -> Result<Vector<N>, F
     Err(Fault::TorqueNotFinite { term })
 }
 
-/// Depth of each joint into its soft zone as a share of it, from 0 outside to 1 or -1 at the hard stop and beyond, with
-/// the sign of the torque that pushes the joint back; `None` outside all soft zones.
-#[inline(always)]
-pub(super) fn soft_zone_depths<const N: usize>(
-    limits: &Limits<N>,
-    position_rad: &Vector<N>,
-) -> Option<Vector<N>> {
-    let mut inside = false;
-    let depths = Vector::from_fn(|joint, _| {
-        let q = position_rad[joint];
-        let below = limits.position_lower_rad[joint] + limits.soft_zone_rad - q;
-        let above = q - (limits.position_upper_rad[joint] - limits.soft_zone_rad);
-        if below > 0.0 {
-            inside = true;
-            (below / limits.soft_zone_rad).min(1.0)
-        } else if above > 0.0 {
-            inside = true;
-            -(above / limits.soft_zone_rad).min(1.0)
-        } else {
-            0.0
-        }
-    });
-    inside.then_some(depths)
-}
-
 /// Spring-dampers over the last `soft_zone_rad` before each hard stop. The damping coefficient grows from zero with the
 /// depth into this range, and only motion towards the stop is damped, so that the torque is continuous and never
 /// pulls towards the stop. Beyond the hard stop the spring torque stays constant.
 pub(super) struct SoftStop<const N: usize> {
-    /// Of [`soft_zone_depths`]: its sign is the direction away from the stop.
+    /// Its sign is the direction away from the stop.
     depth: Vector<N>,
     /// Torque of the springs.
     pub spring_nm: Vector<N>,
@@ -162,7 +139,7 @@ pub(super) struct SoftStop<const N: usize> {
 }
 
 impl<const N: usize> SoftStop<N> {
-    /// The soft stops of the configuration at these depths of [`soft_zone_depths`].
+    /// The soft stops of the configuration at these depths in their zones.
     pub fn new(limits: &Limits<N>, depth: &Vector<N>) -> SoftStop<N> {
         SoftStop {
             depth: *depth,

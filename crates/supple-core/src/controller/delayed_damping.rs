@@ -8,7 +8,7 @@
 
 use super::Controller;
 use super::activity::Activity;
-use super::checks::{SoftStop, soft_zone_depths};
+use super::checks::SoftStop;
 use super::state::State;
 use crate::config::{Config, JointGains, Role};
 use crate::math::linalg::Cholesky;
@@ -62,7 +62,10 @@ impl<const N: usize> State<N> {
     /// with that of the joint's own loop. `None` outside all soft zones, the common case.
     #[inline(always)]
     pub(super) fn soft_stops(&self, controller: &Controller<N>) -> Option<SoftStop<N>> {
-        let depth = soft_zone_depths(&controller.config().limits, &self.position)?;
+        let zone_rad = controller.config().limits.soft_zone_rad;
+        let depth = self
+            .position_limits
+            .soft_zone_depths(zone_rad, &self.position)?;
         Some(self.allowed_soft_stops(controller, &depth))
     }
 

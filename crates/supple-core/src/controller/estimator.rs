@@ -37,6 +37,16 @@ impl EstimatorGains {
         }
     }
 
+    /// The accelerations by which an estimate changes that is this much behind the positions after its update \[rad\], as after a
+    /// stroke.
+    pub(super) fn acceleration_rad_per_s2<const N: usize>(
+        &self,
+        behind_rad: &Vector<N>,
+    ) -> Vector<N> {
+        let innovation_share = 1.0 - self.position;
+        behind_rad * (self.velocity_per_s / (self.elapsed_s * innovation_share))
+    }
+
     /// Time between the measurements \[s\].
     pub fn elapsed_s(&self) -> f64 {
         self.elapsed_s

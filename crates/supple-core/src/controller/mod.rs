@@ -23,6 +23,7 @@ pub mod observer;
 mod output;
 mod plausibility;
 mod pose_task;
+mod position_limits;
 mod prepared;
 mod presliding;
 mod requests;

@@ -52,7 +52,7 @@ const STOP_TORQUE_S: f64 = 0.005;
 const STOP_TIME_CONSTANT_DELAYS: f64 = 4.0;
 /// Fraction of a joint's torque limit above which an external torque pushes an arm that follows a reference: its friction is
 /// known better than this.
-const PUSH_SHARE: f64 = 0.05;
+pub(super) const PUSH_SHARE: f64 = 0.05;
 
 impl<const N: usize> Controller<N> {
     /// Validates a configuration and builds its controller.

@@ -7,6 +7,8 @@ use super::handover::{Handover, HandoverFrom, REPEATED_CYCLES};
 use super::mode::Mode;
 use super::output::Input;
 use super::plausibility::Plausibility;
+use super::position_limits::PositionLimits;
+use super::stop::StoppingMotion;
 use super::stuck_encoder::StuckEncoders;
 use crate::config::{Config, Gains, JointGains, Role, RotationalGains};
 use crate::controller::estimator::{Estimator, EstimatorGains};
@@ -149,6 +151,7 @@ pub struct State<const N: usize> {
     pub(super) gains: GainRamp<Gains>,
     pub(super) joint_gains: GainRamp<JointGains<N>>,
     pub(super) rotational_gains: GainRamp<RotationalGains>,
+    pub(super) position_limits: PositionLimits<N>,
     /// Set-points of held joints.
     pub(super) held_setpoint_rad: Vector<N>,
     /// Whether gravity hold keeps the pose, see [`Config::hold_pose`].
@@ -169,6 +172,7 @@ pub struct State<const N: usize> {
     pub(super) stuck_encoders: StuckEncoders<N>,
     /// Recent peak of the kinetic energy, with decay; in a fault the peak before it \[J\].
     pub(super) peak_energy_j: f64,
+    pub(super) stopping_motion: StoppingMotion<N>,
     /// Time for which an unexplained torque has acted in a fault \[s\].
     pub(super) unexplained_s: f64,
     /// What is learned of the model.
@@ -195,6 +199,7 @@ impl<const N: usize> State<N> {
             gains: GainRamp::at_rest(config.law.gains),
             joint_gains: GainRamp::at_rest(config.joint_gains),
             rotational_gains: GainRamp::at_rest(config.pose.gains),
+            position_limits: PositionLimits::new(&config.limits),
             held_setpoint_rad: Vector::zeros(),
             hold_pose: config.hold_pose,
             has_held_loops: config.hold_pose
@@ -209,6 +214,7 @@ impl<const N: usize> State<N> {
             plausibility: Plausibility::default(),
             stuck_encoders: StuckEncoders::default(),
             peak_energy_j: 0.0,
+            stopping_motion: StoppingMotion::new(0.0, false),
             unexplained_s: 0.0,
             learned: Learned::new(&config.learned),
         }
@@ -368,8 +374,9 @@ impl<const N: usize> State<N> {
 
     /// Latches a fault. The first fault is kept; the safe action can only change from gravity hold
     /// to idle, and an arm without torque stays without torque.
-    pub(super) fn latch_fault(&mut self, fault: Fault) {
-        let action = self.action_of(&fault);
+    pub(super) fn latch_fault(&mut self, controller: &Controller<N>, fault: Fault) {
+        let action = self.action_of(controller, &fault);
+        let motion = StoppingMotion::new(self.peak_energy_j, self.follows_reference());
         match self.activity {
             Activity::Fault(_) if action == SafeAction::Idle => {
                 self.activity = Activity::Fault(SafeAction::Idle);
@@ -379,6 +386,7 @@ impl<const N: usize> State<N> {
                 self.fault = Some(fault);
                 self.enter(Activity::Fault(action));
                 self.handover = Handover::none();
+                self.stopping_motion = motion;
             }
         }
     }

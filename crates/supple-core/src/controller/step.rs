@@ -26,7 +26,7 @@ pub fn step<const N: usize>(
     let (elapsed_s, state_valid) = match state.receive(controller, input) {
         Ok(elapsed_s) => (elapsed_s, true),
         Err(fault) => {
-            state.latch_fault(fault);
+            state.latch_fault(controller, fault);
             (0.0, false)
         }
     };
@@ -34,9 +34,10 @@ pub fn step<const N: usize>(
     terms(&config.arm, &state.position, &velocity, &mut state.terms);
     let task = Task::with_count(&state.terms, &config.roles, controller.active_joints());
     if task.is_none() {
-        state.latch_fault(Fault::MassMatrix);
+        state.latch_fault(controller, Fault::MassMatrix);
     }
     state.update_drives(input.drives_active);
+    state.update_position_limits(config, elapsed_s);
     let refusal = input.request.as_ref().and_then(|request| match request {
         // A fault is not cleared in a cycle that would raise it again.
         Request::Reset if !state_valid || task.is_none() => {
@@ -49,20 +50,20 @@ pub fn step<const N: usize>(
     state.rotational_gains.elapsed_s += elapsed_s;
     state.update_held_setpoints(controller, elapsed_s);
     if let Err(fault) = state.end_breakaway(config) {
-        state.latch_fault(fault);
+        state.latch_fault(controller, fault);
     }
 
     let tip_position = state.terms.base_from_tip.translation;
     let tip_velocity = state.terms.jacobian.fixed_rows::<3>(0) * velocity;
     let mut reference = state.reference(config);
     if let Err(fault) = state.check(config, &tip_velocity, reference.as_ref()) {
-        state.latch_fault(fault);
+        state.latch_fault(controller, fault);
         reference = None;
     }
     let pose = state
         .pose_cycle(config, reference.as_ref())
         .unwrap_or_else(|fault| {
-            state.latch_fault(fault);
+            state.latch_fault(controller, fault);
             reference = None;
             None
         });
@@ -78,14 +79,14 @@ pub fn step<const N: usize>(
     let external_force = match observed {
         Ok(force_n) => force_n,
         Err((force_n, fault)) => {
-            state.latch_fault(fault);
+            state.latch_fault(controller, fault);
             reference = None;
             force_n
         }
     };
     if let Err(fault) = state.check_workspace(config, task.as_ref(), &tip_velocity, &external_force)
     {
-        state.latch_fault(fault);
+        state.latch_fault(controller, fault);
         reference = None;
     }
     state.supervise_stop(controller, &tip_velocity, elapsed_s);
@@ -125,7 +126,7 @@ pub fn step<const N: usize>(
     }
     state.blend_torque(controller, &mut torques);
     let total = checks::total(&torques).unwrap_or_else(|fault| {
-        state.latch_fault(fault);
+        state.latch_fault(controller, fault);
         reference = None;
         torques = state.safe_torques(controller);
         checks::total(&torques).unwrap_or_else(|_| {
@@ -148,7 +149,7 @@ pub fn step<const N: usize>(
         controller.torque_step_nm(state.fault.is_some()),
     );
     if !limited.finite {
-        state.latch_fault(Fault::TorqueNotFinite { term: "total" });
+        state.latch_fault(controller, Fault::TorqueNotFinite { term: "total" });
     }
     state.torque = limited.torque_nm;
     state.ripple = torques.ripple;

@@ -18,36 +18,130 @@
 //!
 //! **Braking replaces it** (no torque, drives that short their motors) if the arm does not come to
 //! rest because of a defective encoder, a defective motor or a wrong model. "Moving" means faster
-//! than a fifth of the speed limit of a joint or of the tip. The drives brake if (1) the arm moves
-//! with over 1.25 times its kinetic energy before the fault; (2) the arm still moves 0.2 s after
-//! the fault; (3) an external torque above a tenth of a joint's limit acts for 50 ms, either later
-//! than 0.15 s after the fault or at a joint whose encoder is unchanged and may be stuck; (4) the
-//! external torques, each divided by a twentieth of its joint's limit, had a root of the sum of
-//! squares above one for 50 ms before a speed limit was exceeded, while the arm followed a
-//! reference out of contact.
+//! than a fifth of the speed limit of a joint or of the tip; external torques are strong if, each
+//! divided by a twentieth of its joint's limit, the root of the sum of their squares is above one.
+//! The drives brake
+//!
+//! 1. at once or as soon as it shows, if the arm has left its path or its limits and is driven along its weight: the external torques give it power,
+//!    and each is opposite to the gravity compensation of its joint, larger, and at most three times as large. So do reversed
+//!    and dead motors and reversed gravity; an obstacle takes power from the arm, and a stroke shows larger torques;
+//! 2. if the arm moves with over 1.2 times its kinetic energy at the fault and before, see `StoppingMotion`;
+//! 3. if the arm still moves 0.2 s after the fault;
+//! 4. if an external torque above a tenth of a joint's limit acts for 50 ms, either later than 0.15 s after the fault or at a
+//!    joint whose encoder is unchanged and may be stuck;
+//! 5. at once, if strong external torques acted for 50 ms before a speed limit was exceeded, while the arm followed a
+//!    reference out of contact.
 
 use super::Controller;
 use super::activity::Activity;
 use super::checks::MOVING_SHARE;
 use super::fault::{Fault, SafeAction};
+use super::prepared::PUSH_SHARE;
 use super::state::State;
+use crate::config::{Config, Limits};
+use crate::dynamics::Terms;
 use crate::law::impedance::Torques;
 use crate::math::{Vector, Vector3, abs};
 
 /// Settling time of the velocity estimate after a step in speed, as a multiple of the delay.
 const ESTIMATOR_SETTLING_DELAYS: f64 = 2.0;
+/// Greatest number of cycles over which the speed of a stopping arm is averaged.
+const MAX_WINDOW: usize = 16;
 /// Time within which the arm must come to rest \[s\].
 pub(crate) const STOP_TIMEOUT_S: f64 = 0.2;
-/// Ratio to the kinetic energy before the fault above which the arm counts as accelerating.
-pub(crate) const ENERGY_GROWTH_LIMIT: f64 = 1.25;
+/// Ratio to the kinetic energy at the fault and before above which the arm counts as accelerating: twice the error of the
+/// energy from encoders that resolve a twentieth of the speed at which an arm counts as moving.
+pub(crate) const ENERGY_GROWTH_LIMIT: f64 = 1.2;
 /// Fraction of a joint's torque limit above which an external torque would move a joint at rest.
 const UNEXPLAINED_SHARE: f64 = 0.1;
 /// Time for which such a torque may act \[s\].
 const UNEXPLAINED_S: f64 = 0.05;
 /// Time after which an impact and the observer's response to it have decayed \[s\].
 const IMPACT_S: f64 = 0.15;
+/// Ratio of the torque of an acceleration to the greatest one that reversed motors show, above which the arm has been struck:
+/// a motor before an elastic cable has a part of the joint's inertia.
+const STRUCK_RATIO: f64 = 4.0;
+/// Fraction of the speed limits from which on external torques drive the arm.
+const DRIVEN_SPEED_SHARE: f64 = 0.05;
+/// Greatest ratio of the external torque to gravity compensation at which that one acts the wrong way: twice, and as much for
+/// what a loop adds.
+const REVERSED_SHARE: f64 = 3.0;
+/// The smallest such ratio at which the arm is driven, and not led slowly away from its path.
+const DRIVING_SHARE: f64 = 1.1;
+/// The same where somebody is expected to lead the arm.
+const LED_SHARE: f64 = 1.4;
 /// Decay time of the peak kinetic energy \[s\].
 const ENERGY_PEAK_DECAY_S: f64 = 0.2;
+
+/// Motion of a stopping arm, from its angles alone. The velocity estimate needs several times the lag of its filter until it
+/// shows the speed of an arm that somebody has struck; the mean over as long as the lag, `2 / w`, is exact after that time.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct StoppingMotion<const N: usize> {
+    /// Angles of the last cycles \[rad\] and their times since the fault \[s\], the latest at `count - 1`, modulo the length.
+    angles: [(Vector<N>, f64); MAX_WINDOW],
+    count: usize,
+    /// Greatest kinetic energy before the fault, and over the first window \[J\].
+    allowed_j: f64,
+    /// Whether nobody was expected to move the arm.
+    follows_reference: bool,
+}
+
+impl<const N: usize> StoppingMotion<N> {
+    /// The motion of an arm that had this kinetic energy \[J\] before its fault, and may have followed a reference.
+    pub fn new(before_j: f64, follows_reference: bool) -> StoppingMotion<N> {
+        StoppingMotion {
+            angles: [(Vector::zeros(), 0.0); MAX_WINDOW],
+            count: 0,
+            allowed_j: before_j,
+            follows_reference,
+        }
+    }
+
+    /// Adds the angles of a cycle. Returns whether the arm moves and has gained energy since the first window.
+    fn gains_energy(
+        &mut self,
+        config: &Config<N>,
+        position_rad: &Vector<N>,
+        terms: &Terms<N>,
+        since_fault_s: f64,
+    ) -> bool {
+        let window = (1.0 / (config.estimator_rad_per_s * config.period_s)) as usize + 1;
+        let window = window.min(MAX_WINDOW - 1);
+        self.angles[self.count % MAX_WINDOW] = (*position_rad, since_fault_s);
+        self.count += 1;
+        if self.count <= window {
+            return false;
+        }
+        let (from_rad, from_s) = self.angles[(self.count - 1 - window) % MAX_WINDOW];
+        let elapsed_s = since_fault_s - from_s;
+        if elapsed_s <= 0.0 {
+            return false;
+        }
+        let velocity = (position_rad - from_rad) / elapsed_s;
+        let energy_j = 0.5 * velocity.dot(&(terms.mass_matrix * velocity));
+        if self.count == window + 1 {
+            self.allowed_j = self.allowed_j.max(energy_j);
+        }
+        let tip_velocity = terms.jacobian.fixed_rows::<3>(0) * velocity;
+        is_moving(&config.limits, &velocity, &tip_velocity)
+            && energy_j > ENERGY_GROWTH_LIMIT * self.allowed_j
+    }
+}
+
+/// Whether a joint or the tip is faster than a fifth of its speed limit.
+fn is_moving<const N: usize>(
+    limits: &Limits<N>,
+    velocity_rad_per_s: &Vector<N>,
+    tip_velocity: &Vector3<f64>,
+) -> bool {
+    let tip_limit = MOVING_SHARE * limits.tip_speed_m_per_s;
+    let mut moving = tip_velocity.dot(tip_velocity) > tip_limit * tip_limit;
+    for joint in 0..N {
+        let limit = MOVING_SHARE * limits.joint_speed_rad_per_s[joint];
+        moving |= abs(velocity_rad_per_s[joint]) > limit;
+    }
+    moving
+}
 
 impl<const N: usize> State<N> {
     /// Gravity compensation and damping of the momentum within the limits.
@@ -78,8 +172,8 @@ impl<const N: usize> State<N> {
         tip_velocity: &Vector3<f64>,
         elapsed_s: f64,
     ) {
-        let velocity = &self.estimator.velocity_rad_per_s;
-        let energy_j = 0.5 * self.terms.momentum.dot(velocity);
+        let velocity = self.estimator.velocity_rad_per_s;
+        let energy_j = 0.5 * self.terms.momentum.dot(&velocity);
         let config = controller.config();
         if !matches!(self.activity, Activity::Fault(SafeAction::GravityHold)) {
             let kept = (1.0 - elapsed_s / ENERGY_PEAK_DECAY_S).max(0.0);
@@ -91,35 +185,36 @@ impl<const N: usize> State<N> {
             }
             return;
         }
-        if self.activity_s(config) <= ESTIMATOR_SETTLING_DELAYS * controller.delay_s() {
-            // The velocity estimate has not yet settled to the speed at the time of the fault.
-            self.peak_energy_j = energy_j.max(self.peak_energy_j);
-            return;
-        }
-        let limits = &config.limits;
-        let tip_limit = MOVING_SHARE * limits.tip_speed_m_per_s;
-        let mut moving = tip_velocity.dot(tip_velocity) > tip_limit * tip_limit;
-        for joint in 0..N {
-            moving |= abs(velocity[joint]) > MOVING_SHARE * limits.joint_speed_rad_per_s[joint];
-        }
+        self.relax_position_limits(config);
         let time_s = self.activity_s(config);
-        let late = time_s > STOP_TIMEOUT_S;
-        let accelerates = energy_j > ENERGY_GROWTH_LIMIT * self.peak_energy_j;
-        self.unexplained_s = if self.has_unexplained_torque(controller) {
+        let motion = &mut self.stopping_motion;
+        let accelerates = motion.gains_energy(config, &self.position, &self.terms, time_s);
+        let late = time_s > STOP_TIMEOUT_S && is_moving(&config.limits, &velocity, tip_velocity);
+        // The observer follows the velocity estimate.
+        let settling_s = ESTIMATOR_SETTLING_DELAYS * controller.delay_s();
+        self.unexplained_s = if time_s > settling_s && self.has_unexplained_torque(controller) {
             self.unexplained_s + elapsed_s
         } else {
             0.0
         };
-        if moving && (late || accelerates) || self.unexplained_s > UNEXPLAINED_S {
+        let driven = time_s <= controller.delay_s()
+            && self.fault.is_some_and(|fault| is_of_motion(&fault))
+            && self.is_driven_along_weight(controller, self.stopping_motion.follows_reference);
+        if accelerates || late || driven || self.unexplained_s > UNEXPLAINED_S {
             self.activity = Activity::Fault(SafeAction::Idle);
         }
     }
 
-    /// The action of a fault: braking without delay if the arm is too fast because of a torque that acted for some time
-    /// before, out of contact. A dead motor gives it; damping by motors of which one is dead might drive the arm.
-    pub(super) fn action_of(&self, fault: &Fault) -> SafeAction {
+    /// The action of a fault: braking without delay if the arm is driven against its motors, or is too fast because of a
+    /// torque that acted for some time before, out of contact. A dead motor gives it; damping by motors of which one is dead
+    /// might drive the arm.
+    pub(super) fn action_of(&self, controller: &Controller<N>, fault: &Fault) -> SafeAction {
         let too_fast = matches!(fault, Fault::JointSpeed { .. } | Fault::TipSpeed { .. });
-        if self.activity.is_torque_off() || too_fast && self.unexplained_s > UNEXPLAINED_S {
+        if self.activity.is_torque_off()
+            || too_fast && self.unexplained_s > UNEXPLAINED_S
+            || is_of_motion(fault)
+                && self.is_driven_along_weight(controller, self.follows_reference())
+        {
             SafeAction::Idle
         } else {
             fault.safe_action()
@@ -127,7 +222,7 @@ impl<const N: usize> State<N> {
     }
 
     /// Whether the arm follows a reference out of contact, so that nobody is expected to move it.
-    fn follows_reference(&self) -> bool {
+    pub(super) fn follows_reference(&self) -> bool {
         let may_be_led = matches!(
             self.activity,
             Activity::GravityHold | Activity::Float | Activity::JointImpedance { .. }
@@ -140,6 +235,41 @@ impl<const N: usize> State<N> {
         let external_nm = self.observer.external_torque_nm();
         let squares = external_nm.component_mul(&external_nm);
         squares.dot(&controller.push_weight_per_nm2) > 1.0
+    }
+
+    /// Whether the arm is driven along its weight: the external torques give it power, and each that is strong is opposite to the
+    /// gravity compensation of its joint, larger, and at most [`REVERSED_SHARE`] times as large; and it gathers speed. So it
+    /// looks if gravity compensation acts the wrong way, or not at all. A stroke has torques and accelerations that are larger than that.
+    #[cold]
+    #[inline(never)]
+    fn is_driven_along_weight(&self, controller: &Controller<N>, follows_reference: bool) -> bool {
+        let config = controller.config();
+        let external_nm = self.observer.external_torque_nm();
+        let slow = config.limits.joint_speed_rad_per_s * DRIVEN_SPEED_SHARE;
+        let power_w = external_nm.dot(&self.estimator.velocity_rad_per_s);
+        if !(self.is_pushed(controller) && power_w > external_nm.abs().dot(&slow)) {
+            return false;
+        }
+        let behind_rad = self.position + self.sag_rad - self.estimator.position_rad;
+        let gains = controller.estimator_gains(1);
+        let accelerating_nm = self.terms.mass_matrix * gains.acceleration_rad_per_s2(&behind_rad);
+        if accelerating_nm.dot(&self.estimator.velocity_rad_per_s) <= 0.0 {
+            return false;
+        }
+        let least = match follows_reference {
+            true => DRIVING_SHARE,
+            false => LED_SHARE,
+        };
+        (0..N).all(|joint| {
+            let (external, gravity) = (external_nm[joint], self.terms.gravity[joint]);
+            let strong_nm = PUSH_SHARE * config.limits.joint_torque_nm[joint];
+            let reversed_nm = REVERSED_SHARE * abs(gravity);
+            let struck = abs(accelerating_nm[joint]) > STRUCK_RATIO * (reversed_nm + strong_nm);
+            let weak = abs(external) <= strong_nm;
+            let along = external * gravity < 0.0
+                && (least * abs(gravity)..=reversed_nm).contains(&abs(external));
+            (weak || along) && !struck
+        })
     }
 
     /// Whether an external torque acts that should move the arm: on a joint with an unchanged
@@ -155,6 +285,22 @@ impl<const N: usize> State<N> {
             torque_nm > strong && (settled || self.stuck_encoders.any_unchanged(encoders, joint))
         })
     }
+}
+
+/// Whether the fault is one of the arm's motion, and not of its sensors or states.
+fn is_of_motion(fault: &Fault) -> bool {
+    matches!(
+        fault,
+        Fault::JointPosition { .. }
+            | Fault::JointSpeed { .. }
+            | Fault::TipSpeed { .. }
+            | Fault::TrackingError { .. }
+            | Fault::RotationError { .. }
+            | Fault::JointTrackingError { .. }
+            | Fault::JointCollision { .. }
+            | Fault::TipCollision { .. }
+            | Fault::Workspace { .. }
+    )
 }
 
 /// Largest fraction of `more`, 0 to 1, that keeps `base` plus this fraction within `limit`.

@@ -39,6 +39,7 @@ impl<const N: usize> State<N> {
         };
         checks::motion(
             &config.limits,
+            &self.position_limits,
             speed_share,
             &self.position,
             velocity,
@@ -76,6 +77,7 @@ impl<const N: usize> State<N> {
             self.observer.reset();
             self.plausibility.suspend(&self.terms.momentum);
             self.stuck_encoders.suspend();
+            self.relax_position_limits(config);
             return Ok(Vector3::zeros());
         }
         let mut net_torque = Vector::zeros();

@@ -181,21 +181,31 @@ impl Workspace {
         None
     }
 
-    /// Spring-damper force of the border margins, and damping in zones \[N\], base axes.
+    /// Depth of a point in the margin of a border, more than the margin beyond the border, and zero outside \[m\]; and the
+    /// direction towards the border.
+    pub fn margin_depth_m(&self, border: &Border, tip_m: &Vector3<f64>) -> (f64, Vector3<f64>) {
+        let (distance_m, towards) = border.distance(tip_m);
+        ((self.margin_m - distance_m).max(0.0), towards)
+    }
+
+    /// Spring-damper force of the border margins, and damping in zones \[N\], base axes. The spring of each border pushes
+    /// from this depth in its margin on \[m\].
     pub fn soft_force(
         &self,
         tip_m: &Vector3<f64>,
         velocity_m_per_s: &Vector3<f64>,
+        margin_from_m: &[f64; MAX_BOUNDARIES],
     ) -> Vector3<f64> {
         let mut force = Vector3::zeros();
-        for border in self.borders.iter().flatten() {
-            let (distance_m, towards) = border.distance(tip_m);
-            let depth_m = (self.margin_m - distance_m).clamp(0.0, self.margin_m);
+        for (border, from_m) in self.borders.iter().flatten().zip(margin_from_m) {
+            let (depth_m, towards) = self.margin_depth_m(border, tip_m);
             if depth_m > 0.0 {
                 let closing = velocity_m_per_s.dot(&towards).max(0.0);
-                let share = depth_m / self.margin_m;
+                let share = (depth_m / self.margin_m).min(1.0);
+                let pressed_m = (depth_m - from_m).clamp(0.0, self.margin_m);
                 force -= towards
-                    * (self.stiffness_n_per_m * depth_m + self.damping_n_s_per_m * share * closing);
+                    * (self.stiffness_n_per_m * pressed_m
+                        + self.damping_n_s_per_m * share * closing);
             }
         }
         let speed = sqrt(velocity_m_per_s.dot(velocity_m_per_s));

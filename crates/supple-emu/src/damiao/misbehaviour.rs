@@ -19,6 +19,7 @@ arm has the fault from the start.
   same-id:with=J       the ids of motor J
   first-write-ignored  the first write of a register has no effect
   no-watchdog          TIMEOUT keeps its value
+  torque-sign          the torque that it is sent acts the wrong way, as of a wrong sign in the set-up; its damping is right
   reply-lost:every=N   one of N replies is missing
   late:delay-us=D      replies come later
   enabled              already enabled at the start
@@ -77,6 +78,8 @@ pub enum MisbehaviourKind {
     FirstWriteIgnored,
     /// TIMEOUT cannot be set.
     NoWatchdog,
+    /// The torque that it is sent acts the wrong way.
+    TorqueSign,
     /// One of so many replies is missing.
     ReplyLost {
         /// Period.
@@ -122,6 +125,7 @@ impl fmt::Display for Misbehaviour {
             }
             MisbehaviourKind::FirstWriteIgnored => f.write_str("ignores the next write"),
             MisbehaviourKind::NoWatchdog => f.write_str("keeps its watchdog setting"),
+            MisbehaviourKind::TorqueSign => f.write_str("turns its torque the wrong way"),
             MisbehaviourKind::ReplyLost { every } => write!(f, "loses one of {every} replies"),
             MisbehaviourKind::Late { delay_ns } => {
                 write!(f, "replies {} us later", delay_ns / 1000)
@@ -239,6 +243,7 @@ fn parse(text: &str) -> Result<Misbehaviour, String> {
         },
         "first-write-ignored" => MisbehaviourKind::FirstWriteIgnored,
         "no-watchdog" => MisbehaviourKind::NoWatchdog,
+        "torque-sign" => MisbehaviourKind::TorqueSign,
         "reply-lost" => MisbehaviourKind::ReplyLost {
             every: keys.number::<u32>("every")?.max(1),
         },

@@ -58,6 +58,8 @@ pub struct Motor {
     /// Writes that are still ignored.
     ignored_writes: u32,
     watchdog_stuck: bool,
+    /// Sign of the torque that is fed forward: -1 if the host has it wrong.
+    torque_sign: f64,
     /// Every how many replies one is dropped; 0 for none.
     drop_every: u32,
     replies: u32,
@@ -83,6 +85,7 @@ impl Motor {
             silent: false,
             ignored_writes: 0,
             watchdog_stuck: false,
+            torque_sign: 1.0,
             drop_every: 0,
             replies: 0,
             late_ns: 0,
@@ -147,7 +150,7 @@ impl Motor {
         let torque_nm = command.kp_nm_per_rad
             * (command.position_rad - self.reported_position_rad())
             + command.kd_nm_s_per_rad * (command.velocity_rad_per_s - self.velocity_rad_per_s)
-            + command.torque_nm;
+            + self.torque_sign * command.torque_nm;
         let limit_nm = ranges.torque().max().min(self.config.peak_torque_nm);
         torque_nm.clamp(-limit_nm, limit_nm)
     }
@@ -325,6 +328,7 @@ impl Motor {
             MisbehaviourKind::Zero { offset_rad } => self.shift_rad += offset_rad,
             MisbehaviourKind::FirstWriteIgnored => self.ignored_writes = 1,
             MisbehaviourKind::NoWatchdog => self.watchdog_stuck = true,
+            MisbehaviourKind::TorqueSign => self.torque_sign = -1.0,
             MisbehaviourKind::ReplyLost { every } => self.drop_every = every,
             MisbehaviourKind::Late { delay_ns } => self.late_ns = delay_ns,
             MisbehaviourKind::Enabled => self.status = Status::Enabled,

@@ -1,9 +1,10 @@
 //! Runs a test case in virtual time. All requests are queued before the first cycle, so every run is bit-identical.
 
 use super::evaluation::evaluate;
-use super::metrics::{ControllerSample, RowMetrics, angle_is_wrong_ns, stuck_error_rad};
+use super::metrics::{ControllerSample, RowMetrics};
+use super::observable::observable_ns;
 use super::row::Row;
-use super::spec::{Activation, DriveShutdown, Event, InvalidRequest, Spec, TestTask};
+use super::spec::{Activation, DriveShutdown, Event, InvalidRequest, Spec, TestTask, When};
 use super::task::{Script, law_force_n, weight_n};
 use super::test_arms::TestArm;
 use super::trace::{self, TraceRow};
@@ -34,151 +35,221 @@ const OBSERVED_S: f64 = 1.5;
 /// Time from disabling the drives until the operator activates them again; second value: with an emergency stop in
 /// between \[s\].
 const REENABLE_S: (f64, f64) = (1.0, 3.0);
+/// Time in which an arm with idle drives sinks from its home pose onto its stops \[s\].
+const SUNK_S: f64 = 4.5;
 /// Timeout of a run in wall-clock time; the longest run takes seconds.
 const TIMEOUT: Duration = Duration::from_secs(120);
 /// Speed at which a pushed tip hits a block \[m/s\].
 const PUSHED_M_PER_S: f64 = 0.25;
 
+/// Runs without an event, for comparison: one of each plant and task.
+#[derive(Default)]
+pub struct Undisturbed {
+    runs: Vec<((PlantKind, TestTask, bool), Vec<TraceRow>)>,
+}
+
+impl Undisturbed {
+    /// The trace of a task without an event, which is run if it has not been yet.
+    fn lines<const N: usize>(
+        &mut self,
+        spec: &Spec,
+        arm: &TestArm,
+    ) -> Result<&[TraceRow], Failure> {
+        let key = (spec.plant, spec.task, spec.realistic);
+        let index = match self.runs.iter().position(|(of, _)| *of == key) {
+            Some(index) => index,
+            None => {
+                let event = Event::Nothing { wall: false };
+                let lines = Run::<N>::perform(&Spec { event, ..*spec }, arm)?.lines;
+                self.runs.push((key, lines));
+                self.runs.len() - 1
+            }
+        };
+        Ok(&self.runs[index].1)
+    }
+}
+
 /// Runs a test case in virtual time.
 ///
 /// # Errors
 /// If the system cannot be started, or one of its processes exits.
-pub fn perform<const N: usize>(spec: &Spec, arm: &TestArm) -> Result<Row, Failure> {
-    let description = &match arm.rate_hz {
-        Some(rate_hz) => arm.description.clone().at_rate(f64::from(rate_hz))?,
-        None => arm.description.clone(),
-    };
-    let config = description.config::<N>()?;
-    let home_rad = description.home::<N>()?;
-    let script = Script::new(spec, &config, description, &home_rad)?;
-    let prefix = format!("drill-{}", std::process::id());
-    let domain = Domain::new(Some(&prefix)).map_err(Failure::system)?;
-    let file = domain.folder().join(format!("{prefix}.csv"));
-    let cap_m = description.tool().map_or(CAP_M, |tool| tool.cap_radius_m);
-    let start_s = START_S[usize::from(spec.plant == PlantKind::Emu)];
-    let event_s = start_s + script.event_cycle as f64 * config.period_s;
-    let back_s = match spec.event {
-        Event::Drives(DriveShutdown::EStop) => REENABLE_S.1,
-        Event::Drives(_) | Event::Activation(Activation::InFault) => REENABLE_S.0,
-        _ => 0.0,
-    };
-    let at_rest = matches!(spec.task, TestTask::GravityHold | TestTask::Float);
-    let pushed = spec.event == Event::Obstacle && at_rest;
-    let push_rad_per_s = -PUSHED_M_PER_S / jacobian(&config.arm, &script.start_rad)[(2, 1)];
-    let up = UpArgs {
-        urdf: UrdfArgs::default(),
-        plant: spec.plant,
-        arm: arm.name.clone(),
-        strict: arm.strict,
-        track: UpTrajectory::Sinusoid,
-        bus: None,
-        budget: false,
-        zero_at_home: false,
-        learn: false,
-        tare: false,
-        block_m: (spec.event == Event::Obstacle).then_some(match spec.task {
-            TestTask::Probe => 0.0,
-            // The ramp moves the tip by some millimetres only.
-            TestTask::Breakaway => -(RAMPED_BLOCK_CLEARANCE_M + cap_m),
-            _ if at_rest => -(PUSHED_BLOCK_CLEARANCE_M + cap_m),
-            _ => -(BLOCK_CLEARANCE_M + cap_m),
-        }),
-        inject: injections(spec, event_s, back_s, pushed.then_some(push_rad_per_s)),
-        misbehave: Vec::new(),
-        plant_options: PlantArgs::default(),
-        trace: Some(file.clone()),
-        rate_hz: arm.rate_hz,
-        for_s: Some(event_s + back_s + OBSERVED_S),
-        virtual_time: true,
-        log: PathBuf::new(),
-        no_log: true,
-        view: false,
-        prefix: Some(prefix),
-        no_realtime: true,
-        json: true,
-    };
-    let performed = run::<N>(spec, &up, &script, description, &domain, event_s, back_s);
-    let row = performed.and_then(|(samples, refusals)| {
-        // Samples after the end of the run belong to the shutdown.
-        let end_ns = samples.last().map_or(0, |sample| sample.time_ns);
-        let mut lines = trace::read(&file)?;
-        lines.retain(|line| line.time_ns <= end_ns);
-        let at = |cycles: u64| {
-            let cycle = (start_s / config.period_s).round() as u64 + cycles;
-            let found = samples.iter().find(|sample| sample.cycle >= cycle);
-            found.map_or(u64::MAX, |sample| sample.time_ns)
-        };
-        let task_start_ns = at(script.task_start_cycle);
-        let event_ns = match spec.event {
-            Event::Injected { at_once: true, .. } => {
-                let active = lines.iter().find(|line| line.active);
-                active.map_or(u64::MAX, |line| line.time_ns)
-            }
-            Event::Injected { .. } => {
-                let begun = lines.iter().find(|line| line.injections > 0);
-                begun.map_or(u64::MAX, |line| line.time_ns)
-            }
-            Event::Obstacle => task_start_ns,
-            _ => at(script.event_cycle),
-        };
-        let mut metrics = RowMetrics::new(&lines, &samples, task_start_ns, event_ns);
-        metrics.observable_at(observable_ns(spec, &config, &lines, event_ns), event_ns);
-        metrics.law_force_n = law_force_n(spec.task, &config, &script.start_rad);
-        // An obstacle that stops the joint of a ramp looks like an encoder that sticks: the arm brakes and leans on it.
-        if spec.task == TestTask::Breakaway && metrics.braked_after_ms.is_some() {
-            metrics.weight_n = Some(weight_n(&config, &script.start_rad));
-        }
-        if let Event::Injected {
-            kind: InjectionKind::MotorDead { .. },
-            ..
-        } = spec.event
-        {
-            metrics.energy_since_fault(&lines, &samples, event_ns, |position_rad| {
-                potential_energy(&config.arm, &Vector::from_fn(|i, _| position_rad[i]))
-            });
-        }
-        let (outcome, deviations) = evaluate(spec, &metrics, &refusals);
-        Ok(Row::lockstep(spec, metrics, outcome, deviations))
-    });
-    // The trace file belongs to this test case only.
-    let _ = std::fs::remove_file(&file);
-    row
+pub fn perform<const N: usize>(
+    spec: &Spec,
+    arm: &TestArm,
+    undisturbed: &mut Undisturbed,
+) -> Result<Row, Failure> {
+    let run = Run::<N>::perform(spec, arm)?;
+    let (config, script) = (&run.config, &run.script);
+    let event_ns = run.event_ns(spec);
+    let mut metrics = RowMetrics::new(
+        &run.lines,
+        &run.samples,
+        run.at(script.task_start_cycle),
+        event_ns,
+    );
+    if let Event::Injected { kind, .. } = spec.event {
+        let undisturbed = undisturbed.lines::<N>(spec, arm)?;
+        let at_ns = observable_ns(kind, config, &run.lines, undisturbed, event_ns);
+        metrics.observable_at(at_ns, event_ns);
+    }
+    metrics.law_force_n = law_force_n(spec.task, config, &script.start_rad);
+    // An obstacle that stops the joint of a ramp looks like an encoder that sticks: the arm brakes and leans on it.
+    if spec.task == TestTask::Breakaway && metrics.braked_after_ms.is_some() {
+        metrics.weight_n = Some(weight_n(config, &script.start_rad));
+    }
+    if let Event::Injected {
+        kind: InjectionKind::MotorDead { .. },
+        ..
+    } = spec.event
+    {
+        metrics.energy_since_fault(&run.lines, &run.samples, event_ns, |position_rad| {
+            potential_energy(&config.arm, &Vector::from_fn(|i, _| position_rad[i]))
+        });
+    }
+    let (outcome, deviations) = evaluate(spec, &metrics, &run.refusals);
+    Ok(Row::lockstep(spec, metrics, outcome, deviations))
 }
 
-/// When the fault of a sensor could be observed \[ns\]; none where that cannot be computed from the trace.
-fn observable_ns<const N: usize>(
-    spec: &Spec,
-    config: &Config<N>,
-    lines: &[TraceRow],
-    event_ns: u64,
-) -> Option<u64> {
-    let resolution_rad = config.plausible.stuck_rad;
-    let Event::Injected { kind, .. } = spec.event else {
-        return None;
-    };
-    match kind {
-        InjectionKind::EncoderStuck { joint } => {
-            angle_is_wrong_ns(lines, event_ns, resolution_rad, |turned_rad| {
-                stuck_error_rad(turned_rad, joint)
+/// A run in virtual time.
+struct Run<const N: usize> {
+    config: Config<N>,
+    script: Script<N>,
+    /// Start of the script \[s\].
+    start_s: f64,
+    lines: Vec<TraceRow>,
+    samples: Vec<ControllerSample>,
+    refusals: Vec<String>,
+}
+
+impl<const N: usize> Run<N> {
+    fn perform(spec: &Spec, arm: &TestArm) -> Result<Run<N>, Failure> {
+        let description = &match arm.rate_hz {
+            Some(rate_hz) => arm.description.clone().at_rate(f64::from(rate_hz))?,
+            None => arm.description.clone(),
+        };
+        let config = description.config::<N>()?;
+        let home_rad = description.home::<N>()?;
+        let script = Script::new(spec, &config, description, &home_rad)?;
+        let prefix = format!("drill-{}", std::process::id());
+        let domain = Domain::new(Some(&prefix)).map_err(Failure::system)?;
+        let file = domain.folder().join(format!("{prefix}.csv"));
+        let start_s = START_S[usize::from(spec.plant == PlantKind::Emu)];
+        let times = Times {
+            event_s: start_s + script.event_cycle as f64 * config.period_s,
+            back_s: match spec.event {
+                Event::Drives(DriveShutdown::EStop) => REENABLE_S.1,
+                Event::Drives(DriveShutdown::IdleAtHome) => SUNK_S,
+                Event::Drives(_) | Event::Activation(Activation::InFault) => REENABLE_S.0,
+                _ => 0.0,
+            },
+        };
+        let cap_m = description.tool().map_or(CAP_M, |tool| tool.cap_radius_m);
+        let push_rad_per_s = -PUSHED_M_PER_S / jacobian(&config.arm, &script.start_rad)[(2, 1)];
+        let up = UpArgs {
+            trace: Some(file.clone()),
+            prefix: Some(prefix),
+            ..times.up(spec, arm, cap_m, push_rad_per_s)
+        };
+        let performed = run::<N>(spec, &up, &script, description, &domain, &times);
+        let run = performed.and_then(|(samples, refusals)| {
+            // Samples after the end of the run belong to the shutdown.
+            let end_ns = samples.last().map_or(0, |sample| sample.time_ns);
+            let mut lines = trace::read(&file)?;
+            lines.retain(|line| line.time_ns <= end_ns);
+            Ok(Run {
+                config,
+                script,
+                start_s,
+                lines,
+                samples,
+                refusals,
             })
+        });
+        // The trace file belongs to this run only.
+        let _ = std::fs::remove_file(&file);
+        run
+    }
+
+    /// Time of a cycle of the script on the arm's clock \[ns\].
+    fn at(&self, cycles: u64) -> u64 {
+        let cycle = (self.start_s / self.config.period_s).round() as u64 + cycles;
+        let found = self.samples.iter().find(|sample| sample.cycle >= cycle);
+        found.map_or(u64::MAX, |sample| sample.time_ns)
+    }
+
+    fn event_ns(&self, spec: &Spec) -> u64 {
+        let first = |begun: fn(&&TraceRow) -> bool| {
+            self.lines
+                .iter()
+                .find(begun)
+                .map_or(u64::MAX, |line| line.time_ns)
+        };
+        match spec.event {
+            Event::Injected {
+                when: When::FromTheStart,
+                ..
+            } => first(|line| line.active),
+            Event::Injected { .. } => first(|line| line.injections > 0),
+            Event::Obstacle => self.at(self.script.task_start_cycle),
+            _ => self.at(self.script.event_cycle),
         }
-        InjectionKind::MotorEncoderStuck { motor } => {
-            let joint_from_motor = config.joint_from_motor;
-            let motor_from_joint = joint_from_motor.try_inverse()?;
-            angle_is_wrong_ns(lines, event_ns, resolution_rad, |turned_rad| {
-                let turned = motor_from_joint * Vector::<N>::from_column_slice(turned_rad);
-                (joint_from_motor.column(motor) * turned[motor]).amax()
-            })
+    }
+}
+
+/// Times of a run \[s\].
+struct Times {
+    /// Of the event, from the start.
+    event_s: f64,
+    /// From the event until drives are activated again.
+    back_s: f64,
+}
+
+impl Times {
+    /// Arguments of the system of a test case.
+    fn up(&self, spec: &Spec, arm: &TestArm, cap_m: f64, push_rad_per_s: f64) -> UpArgs {
+        let at_rest = matches!(spec.task, TestTask::GravityHold | TestTask::Float);
+        let pushed = spec.event == Event::Obstacle && at_rest;
+        UpArgs {
+            urdf: UrdfArgs::default(),
+            plant: spec.plant,
+            arm: arm.name.clone(),
+            strict: arm.strict,
+            track: UpTrajectory::Sinusoid,
+            bus: None,
+            budget: false,
+            zero_at_home: false,
+            learn: false,
+            tare: false,
+            block_m: (spec.event == Event::Obstacle).then_some(match spec.task {
+                TestTask::Probe => 0.0,
+                // The ramp moves the tip by some millimetres only.
+                TestTask::Breakaway => -(RAMPED_BLOCK_CLEARANCE_M + cap_m),
+                _ if at_rest => -(PUSHED_BLOCK_CLEARANCE_M + cap_m),
+                _ => -(BLOCK_CLEARANCE_M + cap_m),
+            }),
+            inject: injections(spec, self, pushed.then_some(push_rad_per_s)),
+            misbehave: Vec::new(),
+            plant_options: PlantArgs {
+                realistic: spec.realistic,
+                ..PlantArgs::default()
+            },
+            trace: None,
+            rate_hz: arm.rate_hz,
+            for_s: Some(self.event_s + self.back_s + OBSERVED_S),
+            virtual_time: true,
+            log: PathBuf::new(),
+            no_log: true,
+            view: false,
+            prefix: None,
+            no_realtime: true,
+            json: true,
         }
-        InjectionKind::EncoderOffset { .. }
-        | InjectionKind::EncoderNan { .. }
-        | InjectionKind::ReplyLost { .. } => Some(event_ns),
-        _ => None,
     }
 }
 
 /// Faults to inject, with their times counted from active drives.
-fn injections(spec: &Spec, event_s: f64, back_s: f64, push: Option<f64>) -> Vec<Injection> {
+fn injections(spec: &Spec, times: &Times, push: Option<f64>) -> Vec<Injection> {
+    let Times { event_s, back_s } = *times;
     let active_s = match spec.plant {
         PlantKind::Emu => crate::up::GRAVITY_HOLD_S,
         _ => 0.0,
@@ -197,7 +268,7 @@ fn injections(spec: &Spec, event_s: f64, back_s: f64, push: Option<f64>) -> Vec<
     match spec.event {
         Event::Injected {
             kind,
-            at_once: true,
+            when: When::FromTheStart,
         } => vec![at_once(kind)],
         Event::Injected { kind, .. } => vec![at(kind)],
         Event::Activation(Activation::InFault) => vec![at(InjectionKind::EncoderOffset {
@@ -223,10 +294,13 @@ fn injections(spec: &Spec, event_s: f64, back_s: f64, push: Option<f64>) -> Vec<
 }
 
 /// Buttons that an operator presses on the pendant of an emulated arm.
-fn presses(spec: &Spec, event_s: f64, back_s: f64) -> Vec<String> {
+fn presses(spec: &Spec, times: &Times) -> Vec<String> {
+    let Times { event_s, back_s } = *times;
     let at = |button: &str, after_s: f64| format!("{button}@held+{:.4}", event_s + after_s);
     match spec.event {
-        Event::Drives(DriveShutdown::Idle | DriveShutdown::IdleWhenStiff) => {
+        Event::Drives(
+            DriveShutdown::Idle | DriveShutdown::IdleWhenStiff | DriveShutdown::IdleAtHome,
+        ) => {
             vec![at("idle", 0.0), at("activate", back_s)]
         }
         Event::Drives(DriveShutdown::EStop) => vec![
@@ -246,12 +320,11 @@ fn run<const N: usize>(
     script: &Script<N>,
     description: &Description,
     domain: &Domain,
-    event_s: f64,
-    back_s: f64,
+    times: &Times,
 ) -> Result<(Vec<ControllerSample>, Vec<String>), Failure> {
     let mut system = System::<N>::new(up, description, domain)?;
     let activate = spec.event != Event::Request(InvalidRequest::WhileIdle);
-    let presses = presses(spec, event_s, back_s);
+    let presses = presses(spec, times);
     let mut refusals = system.start_scripted(&script.requests, activate, &presses)?;
     let (mut samples, begin) = (Vec::new(), Instant::now());
     loop {

@@ -2,7 +2,7 @@
 
 use super::spec::{
     Activation, DriveShutdown, Event, Expected, Hindrance, InvalidRequest, ProcessFailure, Spec,
-    TestTask, UP,
+    TestTask, UP, When,
 };
 use crate::cli::PlantKind;
 use crate::up::CONTROLLER;
@@ -154,6 +154,7 @@ fn wall_clock_cases(plant: PlantKind) -> Vec<Spec> {
         event,
         expected,
         within_ms: FAULT_AND_STOP_MS,
+        realistic: false,
     };
     let nothing = Event::Nothing { wall: true };
     let mut cases = vec![row(TestTask::Track, nothing, Expected::KeepsRunning)];
@@ -206,15 +207,16 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
             event,
             expected,
             within_ms,
+            realistic: false,
         }));
     };
     let injected = |kind| Event::Injected {
         kind,
-        at_once: false,
+        when: When::InTheTask(0),
     };
     let from_the_start = |kind| Event::Injected {
         kind,
-        at_once: true,
+        when: When::FromTheStart,
     };
     let (stops, runs_or_faults) = (Expected::FaultAndRest, Expected::KeepsRunningOrFault);
     let one = Some(1);
@@ -366,6 +368,13 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         stops(WRONG_DIRECTION_FAULTS),
         LATE_FAULT_AND_STOP_MS,
     );
+    // The move to the start pose shows it.
+    add(
+        &[GravityHold],
+        from_the_start(Kind::EncoderSign { joint: one }),
+        stops(WRONG_DIRECTION_FAULTS),
+        LATE_FAULT_AND_STOP_MS,
+    );
     let second = injected(Kind::ReplyLost {
         joint: one,
         every: 2,
@@ -425,6 +434,8 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
     add(
         &[
             GravityHold,
+            Move,
+            Excite,
             Track,
             Float,
             JointImpedance,
@@ -435,6 +446,19 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         stops(WRONG_DIRECTION_FAULTS),
         FAULT_AND_STOP_MS,
     );
+    // Slow and fast, upwards and downwards: what the torque drives differs.
+    for after_ms in [-600, -300, 300, 600, 1200] {
+        let reversed = Event::Injected {
+            kind: Kind::TorqueSign { joint: 1 },
+            when: When::InTheTask(after_ms),
+        };
+        add(
+            &[Track],
+            reversed,
+            stops(WRONG_DIRECTION_FAULTS),
+            LATE_FAULT_AND_STOP_MS,
+        );
+    }
     let later = injected(Kind::TorqueLate { cycles: 3 });
     add(
         &[
@@ -525,6 +549,13 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         Expected::ReturnsToGravityHold,
         FAULT_AND_STOP_MS,
     );
+    let at_home = Event::Drives(DriveShutdown::IdleAtHome);
+    add(
+        &[GravityHold, TrackPose],
+        at_home,
+        Expected::ReturnsToGravityHold,
+        FAULT_AND_STOP_MS,
+    );
     let stiff = Event::Drives(DriveShutdown::IdleWhenStiff);
     add(
         &[Track],
@@ -574,7 +605,37 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         Expected::Refused,
         0.0,
     );
+    cases.extend(realistic_cases(&cases));
     cases
+}
+
+/// The faults of motors and model again, with the effects of a real arm.
+fn realistic_cases(cases: &[Spec]) -> Vec<Spec> {
+    let of_motors = |spec: &&Spec| {
+        matches!(
+            spec.event,
+            Event::Nothing { .. }
+                | Event::Injected {
+                    kind: InjectionKind::TorqueSign { .. }
+                        | InjectionKind::MotorDead { .. }
+                        | InjectionKind::GravityReversed,
+                    ..
+                }
+        )
+    };
+    let moving = |spec: &&Spec| {
+        matches!(
+            spec.task,
+            TestTask::Move | TestTask::Track | TestTask::TrackPose
+        )
+    };
+    let chosen = cases.iter().filter(of_motors).filter(moving);
+    chosen
+        .map(|spec| Spec {
+            realistic: true,
+            ..*spec
+        })
+        .collect()
 }
 
 #[cfg(test)]

@@ -10,6 +10,8 @@ use supple_ipc::message::{Drives, MAX_DOF, Telemetry};
 const STOPPED_NS: u64 = 500_000_000;
 /// Time after a fault from which the kinetic energy may not exceed that at the fault \[ns\].
 const ENERGY_CHECK_NS: u64 = 200_000_000;
+/// Time within which braking motors have their effect \[ns\].
+const BRAKING_NS: u64 = 10_000_000;
 /// Time within which a safe action takes effect \[ns\].
 const SAFE_ACTION_NS: u64 = 20_000_000;
 /// Tip speed above which an arm counts as moving \[m/s\].
@@ -61,8 +63,7 @@ pub struct RowMetrics {
     pub fault_before: Option<&'static str>,
     /// Time from the event to that fault \[ms\].
     pub fault_after_ms: Option<f64>,
-    /// Time from the event until the fault of a sensor can be observed \[ms\], if that can be computed: an angle is wrong
-    /// by more than the check resolves, or a reply is missing.
+    /// Time from an injection until it can be observed \[ms\], see [`super::observable`].
     pub observable_after_ms: Option<f64>,
     /// Time from then to the fault, zero if the fault came first \[ms\].
     pub detected_after_ms: Option<f64>,
@@ -70,8 +71,12 @@ pub struct RowMetrics {
     pub braked_after_ms: Option<f64>,
     /// Last time at which the tip was faster than 0.25 m/s while the motors did not brake; 0 if never \[ms\].
     pub moving_until_ms: f64,
+    /// Maximum kinetic energy from the start of the task to the event \[J\].
+    pub energy_before_j: f64,
     /// Kinetic energy at the fault, or when braking began \[J\].
     pub energy_at_fault_j: Option<f64>,
+    /// Maximum kinetic energy from that time until 10 ms after braking began \[J\], and the time from the one to the other \[ms\].
+    pub energy_peak: Option<(f64, f64)>,
     /// Maximum kinetic energy from 0.2 s after that time \[J\].
     pub energy_later_j: Option<f64>,
     /// Maximum tip speed from the start of the task to the event \[m/s\].
@@ -155,6 +160,10 @@ impl RowMetrics {
                 .iter()
                 .filter(|line| (task_start_ns..event_ns).contains(&line.time_ns))
                 .map(|line| line.tip_speed_m_per_s)),
+            energy_before_j: max(lines
+                .iter()
+                .filter(|line| (task_start_ns..event_ns).contains(&line.time_ns))
+                .map(|line| line.kinetic_energy_j)),
             tip_after_m_per_s: max(after.iter().map(|line| line.tip_speed_m_per_s)),
             tip_moved_m: event_tip_m.map_or(0.0, |event_tip_m| {
                 max(after.iter().map(|line| distance(&line.tip_m, &event_tip_m)))
@@ -170,6 +179,12 @@ impl RowMetrics {
             metrics.energy_at_fault_j = stop.map(|line| line.kinetic_energy_j);
             let at_fault = from(stop_ns).take_while(|line| line.time_ns < stop_ns + SAFE_ACTION_NS);
             metrics.tip_at_fault_m_per_s = Some(max(at_fault.map(|l| l.tip_speed_m_per_s)));
+            let peak =
+                from(stop_ns).max_by(|a, b| a.kinetic_energy_j.total_cmp(&b.kinetic_energy_j));
+            metrics.energy_peak = peak.map(|line| {
+                let after_ms = (line.time_ns - stop_ns) as f64 * 1e-6;
+                (line.kinetic_energy_j, after_ms)
+            });
             let later = from(stop_ns + ENERGY_CHECK_NS).map(|line| line.kinetic_energy_j);
             metrics.energy_later_j = Some(max(later));
             let later = from(stop_ns + STOPPED_NS).filter(|line| line.active);
@@ -221,7 +236,7 @@ impl RowMetrics {
         metrics
     }
 
-    /// Adds when the fault of a sensor could be observed: `at_ns` on the arm's clock, with the event at `event_ns`.
+    /// Adds when the fault could be observed: `at_ns` on the arm's clock, with the event at `event_ns`.
     pub fn observable_at(&mut self, at_ns: Option<u64>, event_ns: u64) {
         self.observable_after_ms = at_ns.map(|at_ns| at_ns.saturating_sub(event_ns) as f64 * 1e-6);
         if let (Some(from_ms), Some(fault_ms)) = (self.observable_after_ms, self.fault_after_ms) {
@@ -251,36 +266,6 @@ impl RowMetrics {
             self.energy_gained_j = Some(energies_j.fold(0.0, |gained, j| gained.max(j - first_j)));
         }
     }
-}
-
-/// Largest error of the angles if the encoder of `joint`, or of every joint, sticks while the joints turn by `turned_rad`.
-pub fn stuck_error_rad(turned_rad: &[f64], joint: Option<usize>) -> f64 {
-    let stuck = |(index, _): &(usize, &f64)| joint.is_none_or(|joint| joint == *index);
-    let turned_rad = turned_rad.iter().enumerate().filter(stuck);
-    max(turned_rad.map(|(_, angle)| angle.abs()))
-}
-
-/// First time from `event_ns` on at which the measured angles are wrong by more than `resolution_rad` \[ns\]; `error_rad`
-/// is their error once the joints have turned by these angles since the event.
-pub fn angle_is_wrong_ns(
-    lines: &[TraceRow],
-    event_ns: u64,
-    resolution_rad: f64,
-    error_rad: impl Fn(&[f64]) -> f64,
-) -> Option<u64> {
-    let mut turned_rad: Vec<f64> = Vec::new();
-    let after = lines.windows(2).filter(|pair| pair[0].time_ns >= event_ns);
-    for pair in after {
-        let period_s = (pair[1].time_ns - pair[0].time_ns) as f64 * 1e-9;
-        turned_rad.resize(pair[0].joint_rad_per_s.len(), 0.0);
-        for (turned_rad, speed) in turned_rad.iter_mut().zip(&pair[0].joint_rad_per_s) {
-            *turned_rad += speed * period_s;
-        }
-        if error_rad(&turned_rad) > resolution_rad {
-            return Some(pair[1].time_ns);
-        }
-    }
-    None
 }
 
 fn max(values: impl Iterator<Item = f64>) -> f64 {

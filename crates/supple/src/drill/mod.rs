@@ -19,6 +19,7 @@ mod lockstep;
 mod matrix;
 mod metrics;
 mod motors;
+mod observable;
 mod perform;
 mod row;
 mod spec;
@@ -27,6 +28,7 @@ mod test_arms;
 mod trace;
 mod up_process;
 
+use lockstep::Undisturbed;
 use test_arms::{TestArm, TestArms};
 
 use crate::cli::{DrillArgs, PlantKind};
@@ -64,13 +66,13 @@ pub fn run(args: &DrillArgs) -> Result<(), Failure> {
         return print_line(&lines.join("\n"));
     }
     let stop = interrupt::shutdown_on_interrupt();
-    let mut rows: Vec<Row> = Vec::new();
+    let (mut rows, mut undisturbed): (Vec<Row>, _) = (Vec::new(), Undisturbed::default());
     for (index, spec) in specs.iter().enumerate() {
         if stop.shutdown_requested() {
             break;
         }
         print_status(&format!("{}/{}: {}", index + 1, specs.len(), spec.name()));
-        rows.push(perform(spec, args, arms.of(spec))?);
+        rows.push(perform(spec, args, arms.of(spec), &mut undisturbed)?);
     }
     match args.json {
         true => print_json(&rows)?,
@@ -133,10 +135,15 @@ fn chosen(args: &DrillArgs) -> Result<Vec<Spec>, Failure> {
 }
 
 /// Runs a test case. A case that cannot be run counts as failed; the others continue.
-fn perform(spec: &Spec, args: &DrillArgs, arm: &TestArm) -> Result<Row, Failure> {
+fn perform(
+    spec: &Spec,
+    args: &DrillArgs,
+    arm: &TestArm,
+    undisturbed: &mut Undisturbed,
+) -> Result<Row, Failure> {
     let result = with_dof!(arm.description.dof(), N => match spec.runs_in_wall_clock_time() {
         true => perform::perform::<N>(spec, args, arm),
-        false => lockstep::perform::<N>(spec, arm),
+        false => lockstep::perform::<N>(spec, arm, undisturbed),
     })?;
     match result {
         Ok(row) => Ok(row),

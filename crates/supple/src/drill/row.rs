@@ -194,8 +194,14 @@ impl Row {
             self.expected.clone(),
             self.outcome.clone(),
             or_dash((stops && lockstep).then_some(metrics.moving_until_ms), 0),
-            match (metrics.energy_at_fault_j, metrics.energy_later_j) {
-                (Some(at), Some(later)) => format!("{at:.2} / {later:.2}"),
+            match (
+                metrics.energy_at_fault_j,
+                metrics.energy_peak,
+                metrics.energy_later_j,
+            ) {
+                (Some(at), Some((peak, _)), Some(later)) => {
+                    format!("{at:.2} / {peak:.2} / {later:.2}")
+                }
                 _ => "-".to_owned(),
             },
             or_dash(metrics.tip_later_m_per_s, 2),
@@ -214,7 +220,7 @@ const COLUMN_TITLES: [&str; 9] = [
     "expected",
     "outcome",
     "moving until [ms]",
-    "energy at fault / 0.2 s later [J]",
+    "energy at fault / peak / 0.2 s later [J]",
     "tip 0.5 s later [m/s]",
     "force [N]",
     "pressing force [N]",
@@ -243,11 +249,15 @@ or emulated (`emu`) arm that performs a task, and one event. The expected result
 (`crates/supple/src/drill/matrix.rs`); the metrics are measured on the plant, not by the controller.
 
 - **moving until**: last time after the event at which the tip was faster than 0.25 m/s while the motors did not brake.
-- **energy at fault / 0.2 s later**: kinetic energy at the fault, or when braking began, and its maximum from 0.2 s
-  later. An arm that descends on shorted motors has up to 0.05 J.
+- **energy at fault / peak / 0.2 s later**: kinetic energy at the fault, or when braking began; its maximum from then until
+  10 ms after braking began, at most half as much again as at the fault or before the event, or 0.12 J (0.25 m/s); and its
+  maximum from 0.2 s later, at most that at the fault. An arm that descends on shorted motors has up to 0.05 J, the 7-joint
+  arm 0.08 J.
 - **tip 0.5 s later**: maximum tip speed from 0.5 s after the fault, while the motors do not brake.
-- **after it was observable**: for an encoder that sticks, from the moment at which an angle is wrong by more than the
-  check resolves (`stuck_rad`); for lost or jumping angles, from the event. At most 100 ms are allowed.
+- **after it was observable**: from the moment at which an angle is wrong by more than the checks resolve (`stuck_rad`), or a
+  joint has turned by that much otherwise than in the same run without the fault; for lost or jumping angles, from the event.
+  At most 100 ms are allowed of every fault that must stop the arm, and of every fault of an encoder. Not stated where the fault
+  was named before it was observable in this sense.
 - After a dead motor, whose joint nothing brakes, kinetic and potential energy together may not grow, and the tip may be
   as fast as that of a rod that falls by the same descent.
 - **force**: maximum force on the block after the first 20 ms of contact; in wall-clock time, the overall maximum.

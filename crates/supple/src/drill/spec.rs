@@ -43,6 +43,15 @@ pub enum ProcessFailure {
     Interrupt,
 }
 
+/// When a fault is injected.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum When {
+    /// Before the first cycle.
+    FromTheStart,
+    /// At the usual time of the task, near its highest speed, or this much later or earlier \[ms\].
+    InTheTask(i16),
+}
+
 /// How the drives are disabled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DriveShutdown {
@@ -52,6 +61,8 @@ pub enum DriveShutdown {
     IdleWhenStiff,
     /// By the emergency stop.
     EStop,
+    /// To idle, in the home pose, until the arm has sunk onto its stops.
+    IdleAtHome,
 }
 
 /// When an operator presses the pendant's activate button although the controller is not in gravity hold.
@@ -102,12 +113,12 @@ pub enum Event {
     },
     /// Idle is requested in spite of a hindrance; in wall-clock time.
     Hindered(Hindrance),
-    /// A fault in the arm, during the task or, with `at_once`, from the start.
+    /// A fault in the arm.
     Injected {
         /// The injected fault.
         kind: InjectionKind,
-        /// Whether it acts from before the first cycle.
-        at_once: bool,
+        /// When it begins.
+        when: When,
     },
     /// A block of wood is in the way.
     Obstacle,
@@ -155,6 +166,8 @@ pub struct Spec {
     pub expected: Expected,
     /// Time limit from the event to rest or braking \[ms\].
     pub within_ms: f64,
+    /// Whether the simulated arm has the effects of a real one.
+    pub realistic: bool,
 }
 
 /// Name of this program, which runs `supple up`.
@@ -172,7 +185,8 @@ impl Spec {
     /// Name of the test case, as used by `--only` and `--list`.
     pub fn name(&self) -> String {
         let plant = format!("{:?}", self.plant).to_lowercase();
-        format!("{plant}/{}/{}", self.task, self.event)
+        let realistic = if self.realistic { "-realistic" } else { "" };
+        format!("{plant}/{}/{}{realistic}", self.task, self.event)
     }
 }
 
@@ -211,13 +225,16 @@ impl fmt::Display for Event {
                 Hindrance::LogDiskFull => "log-disk-full",
                 Hindrance::StandardErrorFull => "standard-error-full",
             }),
-            Event::Injected { kind, at_once } => {
+            Event::Injected { kind, when } => {
                 let injection = supple_plant::Injection {
                     kind: *kind,
                     trigger: supple_plant::Trigger::AtStart,
                 };
-                let from = if *at_once { "-from-the-start" } else { "" };
-                write!(f, "{injection}{from}")
+                match when {
+                    When::FromTheStart => write!(f, "{injection}-from-the-start"),
+                    When::InTheTask(0) => write!(f, "{injection}"),
+                    When::InTheTask(after_ms) => write!(f, "{injection}{after_ms:+}-ms"),
+                }
             }
             Event::Obstacle => f.write_str("block-in-the-way"),
             Event::Drives(DriveShutdown::Idle) => f.write_str("drives-idle-and-back"),
@@ -225,6 +242,7 @@ impl fmt::Display for Event {
                 f.write_str("stiff-drives-idle-and-back")
             }
             Event::Drives(DriveShutdown::EStop) => f.write_str("e-stop-and-back"),
+            Event::Drives(DriveShutdown::IdleAtHome) => f.write_str("drives-idle-at-home-and-back"),
             Event::Activation(Activation::InFault) => f.write_str("activated-in-a-fault"),
             Event::Activation(Activation::InWork) => f.write_str("activated-in-work"),
             Event::Request(InvalidRequest::TooFast) => f.write_str("too-fast-request"),

@@ -1,7 +1,7 @@
 //! Requests that move the arm to its start pose and start the task. Cycles are counted from the first one in which the
 //! controller accepts requests.
 
-use super::spec::{DriveShutdown, Event, InvalidRequest, Spec, TestTask};
+use super::spec::{DriveShutdown, Event, InvalidRequest, Spec, TestTask, When};
 use crate::cli::UpTrajectory;
 use crate::operate::{Approach, trajectory_for};
 use supple_cli::exit::Failure;
@@ -192,6 +192,22 @@ impl<const N: usize> Script<N> {
                 }),
             start_rad: approach.start_rad(),
         };
+        if let Event::Injected {
+            when: When::InTheTask(after_ms),
+            ..
+        } = spec.event
+        {
+            let event_s = script.event_cycle as f64 * config.period_s + f64::from(after_ms) * 1e-3;
+            script.event_cycle = cycles(event_s);
+        }
+        if spec.event == Event::Drives(DriveShutdown::IdleAtHome) {
+            return Ok(Script {
+                requests: vec![(0, Request::GravityHold)],
+                task_start_cycle: 0,
+                event_cycle: cycles(0.3),
+                start_rad: *home_rad,
+            });
+        }
         if let Event::Request(wrong) = spec.event {
             let request = match wrong {
                 InvalidRequest::TooFast => Request::Track(scenario::sinusoid(1000.0).0),

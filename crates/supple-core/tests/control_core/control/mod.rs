@@ -1,6 +1,7 @@
 //! The complete control step: modes, faults, limits, and invariants under arbitrary input.
 
 mod arrivals;
+mod beyond_limits;
 mod bumpless;
 mod closed_loop;
 mod compliant;

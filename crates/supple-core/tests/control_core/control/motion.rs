@@ -15,10 +15,16 @@ fn joint_position() {
             limits.position_upper_rad[joint],
         ] {
             let mut q = bent::<4>();
-            q[joint] = limit_rad;
+            q[joint] = limit_rad - 0.03 * limit_rad.signum();
             let mut config = four();
             config.limits.joint_tracking_error_rad = f64::MAX;
             let mut rig = Rig::holding(config, q);
+            for _ in 0..299 {
+                rig.q[joint] += 1e-4 * limit_rad.signum();
+                rig.cycle();
+            }
+            rig.q[joint] = limit_rad;
+            rig.rest();
             assert_eq!(
                 rig.state.mode(),
                 Mode::GravityHold,

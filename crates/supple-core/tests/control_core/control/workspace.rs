@@ -79,7 +79,7 @@ fn the_margin_is_a_spring_and_a_damper_towards_the_border() {
         let closing = (-velocity[axis] * away).max(0.0);
         let mut expected = Vector3::zeros();
         expected[axis] = away * (400.0 * depth_m + 20.0 * depth_m / 0.05 * closing);
-        let found = workspace.soft_force(&point, &velocity);
+        let found = workspace.soft_force(&point, &velocity, &[0.0; MAX_BOUNDARIES]);
         prop_assert!((found - expected).norm() < 1e-9, "{found} {expected}");
         prop_assert_eq!(
             workspace.violated_border(&point).is_some(),
@@ -202,11 +202,21 @@ fn a_zone_bounds_the_speed() {
         ..zoned(0.1, f64::MAX)
     };
     let along = |speed: f64| Vector3::new(0.0, speed, 0.0);
-    assert_eq!(workspace.soft_force(&tip(), &along(0.079)).norm(), 0.0);
-    let slowed = workspace.soft_force(&tip(), &along(0.09));
+    assert_eq!(
+        workspace
+            .soft_force(&tip(), &along(0.079), &[0.0; MAX_BOUNDARIES])
+            .norm(),
+        0.0
+    );
+    let slowed = workspace.soft_force(&tip(), &along(0.09), &[0.0; MAX_BOUNDARIES]);
     assert!((slowed - along(-20.0 * 0.01)).norm() < 1e-12, "{slowed}");
     let outside = tip() + Vector3::repeat(0.6);
-    assert_eq!(workspace.soft_force(&outside, &along(0.09)).norm(), 0.0);
+    assert_eq!(
+        workspace
+            .soft_force(&outside, &along(0.09), &[0.0; MAX_BOUNDARIES])
+            .norm(),
+        0.0
+    );
 
     let mut rig = Rig::holding(only(workspace), bent());
     let fault = (0..400).find_map(|_| {

@@ -5,6 +5,8 @@ use super::course::{Course, Stage};
 use super::metrics::Metrics;
 
 /// Speed that no joint with a motor may exceed while the arm is held and laid down, if it was slower before
+/// Speed of a joint that nothing but damping motors exceed: three times its limit \[rad/s\].
+const FALL_RAD_PER_S: f64 = 6.0;
 /// \[rad/s\].
 const SLOW_RAD_PER_S: f64 = 0.5;
 /// Share by which a joint that was faster may exceed its speed.
@@ -90,6 +92,14 @@ pub fn evaluate(
             expect(
                 laid_down || case.is_without_carrier() && stages == DAMPED,
                 format!("stages {stages:?}"),
+            );
+            expect(
+                metrics.fastest_rad_per_s <= FALL_RAD_PER_S,
+                format!(
+                    "joint {} at {:.2} rad/s",
+                    metrics.fastest_joint + 1,
+                    metrics.fastest_rad_per_s
+                ),
             );
         }
         Expected::TorqueGone {

@@ -136,6 +136,15 @@ pub fn all(joints: usize, period_s: f64) -> Vec<Case> {
             },
         ));
     }
+    // A wrong sign in the set-up: holding drives the arm, damping does not.
+    events.push((
+        misbehaves(format!("torque-sign:motor={shoulder}"), None),
+        Expected::Fault {
+            reason: Some("drives".to_owned()),
+            names: WRONG_DIRECTION_FAULTS,
+            within_ms: MOTION_MS,
+        },
+    ));
     events.push((
         misbehaves(
             format!("same-id:motor={wrist},with={}", wrist - 1),

@@ -1,0 +1,170 @@
+//! An arm that rests beyond a position limit, as one that has sunk with idle drives: it is not thrown off, and it is let
+//! out.
+//!
+//! Criterion, fixed before the first run: from gravity hold, a reset or drives that come back, at any angle of the soft
+//! zone and up to 0.1 rad beyond the limit, no joint is faster than 0.15 rad/s, no fault latches, and within 8 s the joint
+//! is back at the edge of its zone, where its limit is that of the configuration.
+
+use super::workspace::bordered;
+use crate::support::configs::{four, three};
+use crate::support::plant::{Plant, nothing};
+use crate::support::property::{Outcome, check};
+use crate::support::rig::{Rig, bent};
+use proptest::prelude::*;
+use supple_core::config::{Border, Collision, Config};
+use supple_core::controller::{Fault, Mode, Request, SafeAction};
+use supple_core::math::Vector3;
+use supple_core::{Input, Vector};
+
+const MAX_JOINT_RAD_PER_S: f64 = 0.15;
+const CYCLES: usize = 8000;
+
+/// How the limits come into force.
+#[derive(Clone, Copy, Debug)]
+enum Entry {
+    GravityHold,
+    Reset,
+    DrivesBack,
+}
+
+/// An arm that rests at `q`, held by its brakes or by gravity compensation, with this request in the next cycle.
+fn resting<const N: usize>(
+    config: Config<N>,
+    q: Vector<N>,
+    entry: Entry,
+) -> (Rig<N>, Option<Request<N>>) {
+    let mut rig = Rig::new(config, q);
+    rig.drives_active = false;
+    rig.cycle();
+    rig.accept(Request::GravityHold);
+    if let Entry::DrivesBack = entry {
+        rig.rest();
+    }
+    rig.drives_active = true;
+    match entry {
+        Entry::GravityHold | Entry::DrivesBack => (rig, None),
+        Entry::Reset => {
+            let output = rig.step(&Input {
+                tip_force_n: Some(Vector3::repeat(f64::NAN)),
+                ..rig.input()
+            });
+            assert_eq!(output.safe_action, Some(SafeAction::GravityHold));
+            rig.rest();
+            (rig, Some(Request::Reset))
+        }
+    }
+}
+
+fn beyond<const N: usize>(
+    config: Config<N>,
+    joint: usize,
+    side: f64,
+    beyond_rad: f64,
+    entry: Entry,
+) -> Outcome {
+    let limit_rad = side * config.limits.position_upper_rad[joint];
+    let edge_rad = limit_rad - side * config.limits.soft_zone_rad;
+    let mut q = bent::<N>();
+    q[joint] = limit_rad + side * beyond_rad;
+    let (mut rig, mut request) = resting(config, q, entry);
+    let mut plant = Plant::at_rest(config.arm, q);
+    for cycle in 0..CYCLES {
+        let output = rig.drive(&mut plant, request.take(), nothing);
+        prop_assert_eq!(output.refusal, None);
+        prop_assert_eq!(output.fault, None, "cycle {}", cycle);
+        prop_assert!(
+            plant.qd.amax() <= MAX_JOINT_RAD_PER_S,
+            "{} rad/s in cycle {cycle}",
+            plant.qd.amax()
+        );
+    }
+    let left_rad = side * (plant.q[joint] - edge_rad);
+    prop_assert!(left_rad < 0.02, "{left_rad} rad in the zone at the end");
+    // From here on the limit is the configuration's.
+    rig.q = plant.q;
+    while side * rig.q[joint] <= side * limit_rad {
+        rig.q[joint] += side * 1e-4;
+        let output = rig.cycle();
+        let within = side * rig.q[joint] <= side * limit_rad;
+        let named = matches!(
+            output.fault,
+            Some(Fault::JointPosition { joint: named, limit_rad: at_rad, .. })
+                if named == joint && at_rad == limit_rad
+        );
+        prop_assert!(
+            if within {
+                output.fault.is_none()
+            } else {
+                named
+            },
+            "{:?} at {}",
+            output.fault,
+            rig.q[joint]
+        );
+    }
+    Ok(())
+}
+
+#[test]
+fn a_joint_beyond_its_limit_comes_back_slowly() {
+    let entries = prop_oneof![
+        Just(Entry::GravityHold),
+        Just(Entry::Reset),
+        Just(Entry::DrivesBack)
+    ];
+    let case = (0..3_usize, any::<bool>(), -0.1..0.1_f64, entries);
+    check(60, case, |(joint, above, beyond_rad, entry)| {
+        let side = if above { 1.0 } else { -1.0 };
+        beyond::<3>(three(), joint, side, beyond_rad, entry)?;
+        // The shoulder roll is held elsewhere.
+        beyond::<4>(four(), [0, 1, 3][joint], side, beyond_rad, entry)
+    });
+}
+
+/// What pushes the joint further out is a fault, as any joint beyond its limit.
+#[test]
+fn a_joint_beyond_its_limit_may_not_move_on() {
+    for side in [1.0, -1.0] {
+        let config = four();
+        let mut q = bent::<4>();
+        q[1] = side * (config.limits.position_upper_rad[1] + 0.01);
+        let (mut rig, _) = resting(config, q, Entry::GravityHold);
+        for k in 1..=199 {
+            rig.q[1] = q[1] + side * 1e-4 * f64::from(k);
+            assert_eq!(rig.cycle().fault, None, "{k}");
+        }
+        rig.q[1] = q[1] + side * 0.0201;
+        let output = rig.cycle();
+        assert!(
+            matches!(output.fault, Some(Fault::JointPosition { joint: 1, .. })),
+            "{:?}",
+            output.fault
+        );
+        assert_eq!(output.mode, Mode::Fault);
+    }
+}
+
+/// A tip that rests in the margin of a wall or beyond it is not thrown back.
+#[test]
+fn a_tip_beyond_a_border_comes_back_slowly() {
+    for beyond_m in [-0.03, 0.0, 0.04, 0.2] {
+        let mut config = four();
+        config.collision = Collision::disabled();
+        let tip_m = Rig::new(config, bent()).tip();
+        config.workspace = bordered(Border::Wall {
+            normal: Vector3::new(0.0, 0.0, -1.0),
+            offset_m: -beyond_m - tip_m.z,
+        });
+        let (mut rig, mut request) = resting(config, bent(), Entry::GravityHold);
+        let mut plant = Plant::at_rest(config.arm, bent());
+        for cycle in 0..CYCLES {
+            let output = rig.drive(&mut plant, request.take(), nothing);
+            assert_eq!(output.fault, None, "{beyond_m} m, cycle {cycle}");
+            let m_per_s = output.tip_velocity_m_per_s.norm();
+            assert!(m_per_s < 0.15, "{beyond_m} m: {m_per_s} m/s in {cycle}");
+        }
+        let wanted_m = beyond_m + config.workspace.margin_m;
+        let moved_m = rig.tip().z - tip_m.z;
+        assert!(moved_m > wanted_m - 0.01, "{moved_m} of {wanted_m} m");
+    }
+}
