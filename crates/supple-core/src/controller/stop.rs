@@ -74,7 +74,7 @@ const LED_SHARE: f64 = 1.4;
 const ENERGY_PEAK_DECAY_S: f64 = 0.2;
 
 /// Motion of a stopping arm, from its angles alone. The velocity estimate needs several times the lag of its filter until it
-/// shows the speed of an arm that somebody has struck; the mean over as long as the lag, `2 / w`, is exact after that time.
+/// shows the speed of an arm that somebody has struck; the mean over half of the lag, `1 / w`, is exact after that time.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StoppingMotion<const N: usize> {
     /// Angles of the last cycles \[rad\] and their times since the fault \[s\], the latest at `count - 1`, modulo the length.

@@ -179,8 +179,9 @@ impl RowMetrics {
             metrics.energy_at_fault_j = stop.map(|line| line.kinetic_energy_j);
             let at_fault = from(stop_ns).take_while(|line| line.time_ns < stop_ns + SAFE_ACTION_NS);
             metrics.tip_at_fault_m_per_s = Some(max(at_fault.map(|l| l.tip_speed_m_per_s)));
-            let peak =
-                from(stop_ns).max_by(|a, b| a.kinetic_energy_j.total_cmp(&b.kinetic_energy_j));
+            let until_ns = braked.map_or(u64::MAX, |line| line.time_ns + BRAKING_NS);
+            let driven = from(stop_ns).take_while(|line| line.time_ns <= until_ns);
+            let peak = driven.max_by(|a, b| a.kinetic_energy_j.total_cmp(&b.kinetic_energy_j));
             metrics.energy_peak = peak.map(|line| {
                 let after_ms = (line.time_ns - stop_ns) as f64 * 1e-6;
                 (line.kinetic_energy_j, after_ms)
