@@ -15,5 +15,6 @@ mod motors;
 mod operator;
 mod regressions;
 mod running;
+mod start_up;
 mod teaching;
 mod up;

@@ -79,6 +79,15 @@ pub enum Failure {
     /// The operator or a signal interrupted a calibration, whose logs are complete.
     #[error("interrupted; all logs are complete, go on with --resume")]
     Interrupted,
+    /// Somebody requested another mode during a calibration, whose logs are complete.
+    #[error(
+        "somebody else requested mode {mode}: the calibration ends and requests nothing more; all logs are complete, go on \
+         with --resume"
+    )]
+    OtherMode {
+        /// Name of the mode.
+        mode: &'static str,
+    },
     /// The drives did not become active.
     #[error(
         "the drives did not become active: release the emergency stop, press Shift-Idle and then Shift-Activate on the \
@@ -425,7 +434,7 @@ impl Failure {
             Failure::Experiment(error) => experiment_code(error),
             Failure::Procedure(error) => procedure_code(error),
             Failure::NeedsSupple { .. } | Failure::VirtualTimeNeedsEmu => 2,
-            Failure::Interrupted => 130,
+            Failure::Interrupted | Failure::OtherMode { .. } => 130,
             Failure::DrivesNotActive | Failure::OtherModelNeeded { .. } => 10,
             Failure::Fault { .. } | Failure::RunFault { .. } | Failure::SystemInFault => 5,
             Failure::Log(error) => log_code(error),
@@ -617,6 +626,7 @@ mod tests {
                 "the arm cannot perform",
             ),
             (Failure::Interrupted, "interrupted"),
+            (Failure::OtherMode { mode: "idle" }, "interrupted"),
             (Failure::DrivesNotActive, system),
             (file(), disk),
             (Failure::Exists { path: path() }, disk),

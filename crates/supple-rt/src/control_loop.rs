@@ -9,8 +9,8 @@
 //! stale state. On shutdown the loop enters gravity hold and requests idle drives, in which the motors brake; it ends
 //! when the drives are idle.
 //!
-//! Idle requests take priority over all others and are never queued behind them. States of another arm are discarded
-//! and counted.
+//! Idle requests take priority over all others and are never queued behind them. A request for a cycle that is not after
+//! the last accepted idle is refused, however late it arrives. States of another arm are discarded and counted.
 
 use crate::error::RtError;
 use crate::queues::{LoopIdleChannel, LoopQueues};
@@ -56,6 +56,8 @@ pub struct ControlLoop<const N: usize> {
     idle_channel: Option<LoopIdleChannel>,
     /// Idle requests from the request queue.
     queued_idle: RequestQueue,
+    /// Cycle in which idle was last accepted; 0 before the first state.
+    last_idle: Option<u64>,
     /// Number of arm states discarded here, and by the link.
     states_dropped: (u64, u64),
     /// Cycles since the shutdown began.
@@ -104,6 +106,7 @@ impl<const N: usize> ControlLoop<N> {
             telemetry_pending: false,
             idle_channel: None,
             queued_idle: RequestQueue::default(),
+            last_idle: None,
             states_dropped: (0, 0),
             shutting_down: None,
         }
@@ -240,13 +243,13 @@ impl<const N: usize> ControlLoop<N> {
                 self.cycle(&arm)?;
             }
             Some(_) => {}
-            // No cycle has run yet, so the controller is idle already: confirm the idle request.
+            // No cycle has run yet, so the controller is idle already: confirm the idle request, which ends what was
+            // requested before it.
             None => {
-                if let Some(number) = self
-                    .idle_channel
-                    .as_ref()
-                    .and_then(LoopIdleChannel::pending_request)
-                {
+                if let Some(number) = self.pending_idle() {
+                    self.last_idle = Some(0);
+                    self.receive_requests(0);
+                    self.refuse_queued(self.queued.len(), 0, Mode::Idle);
                     self.answer_idle(number, 0, Outcome::Accepted, Text::EMPTY);
                 }
             }
@@ -277,6 +280,10 @@ impl<const N: usize> ControlLoop<N> {
     fn step(&mut self, arm: &ArmState) -> Result<&StepRecord<N>, RtError> {
         self.flush_telemetry();
         let begin_ns = monotonic_ns();
+        // A plant that was started anew counts from zero.
+        if self.last_idle.is_some_and(|idle| arm.cycle < idle) {
+            self.last_idle = Some(0);
+        }
         let received = self.next_request(arm.cycle);
         let input = arm.input::<N>(received.as_ref().map(|(_, request)| *request))?;
         let had_fault = self.state.fault().is_some();
@@ -284,6 +291,9 @@ impl<const N: usize> ControlLoop<N> {
         let step_ns = monotonic_ns() - begin_ns;
         if let Some((source, _)) = &received {
             self.answer(source, &output);
+        }
+        if matches!(input.request, Some(Request::Idle)) && output.refusal.is_none() {
+            self.last_idle = Some(arm.cycle);
         }
         // Requests that were queued before this one, in their number.
         let ended = match (&received, input.request) {
@@ -316,12 +326,15 @@ impl<const N: usize> ControlLoop<N> {
         }))
     }
 
-    /// The request of this cycle, if there is one; idle requests come first.
-    fn next_request(&mut self, cycle: u64) -> Option<(RequestSource, Request<N>)> {
-        let number = self
-            .idle_channel
+    /// Number of the last request on the idle channel, if it was not answered yet.
+    fn pending_idle(&self) -> Option<u64> {
+        self.idle_channel
             .as_ref()
-            .and_then(LoopIdleChannel::pending_request);
+            .and_then(LoopIdleChannel::pending_request)
+    }
+
+    /// Takes the requests that have arrived into the loop's own queues.
+    fn receive_requests(&mut self, cycle: u64) {
         while let Ok(&request) = self.queues.requests.peek() {
             if request.requests_idle_now() {
                 // If `queued_idle` is full, the request stays in the request queue until the next cycle; all idle
@@ -335,6 +348,12 @@ impl<const N: usize> ControlLoop<N> {
             }
             let _ = self.queues.requests.pop();
         }
+    }
+
+    /// The request of this cycle, if there is one; idle requests come first.
+    fn next_request(&mut self, cycle: u64) -> Option<(RequestSource, Request<N>)> {
+        let number = self.pending_idle();
+        self.receive_requests(cycle);
         if number.is_some() || !self.queued_idle.is_empty() {
             return Some((RequestSource::Idle(number), Request::Idle));
         }
@@ -344,6 +363,14 @@ impl<const N: usize> ControlLoop<N> {
         let Some((earlier, message)) = self.queued.pop_due(cycle) else {
             return self.next_learned(cycle);
         };
+        if let Some(idle) = self.last_idle.filter(|idle| message.is_before(*idle)) {
+            let text = Text::of(&format_args!(
+                "refused: it is for cycle {}, and idle was accepted since then, in cycle {idle}",
+                message.at_cycle
+            ));
+            self.reply(&message, cycle, self.state.mode(), Outcome::Refused, text);
+            return None;
+        }
         match message.request::<N>() {
             Ok(request) => request.map(|request| {
                 let source = RequestSource::Operator(earlier, message);

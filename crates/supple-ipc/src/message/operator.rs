@@ -91,6 +91,11 @@ impl OperatorRequest {
         self.kind == request_kind::IDLE
     }
 
+    /// Whether it is for a cycle that is not after `idle`, in which idle was accepted, which then overrides it.
+    pub fn is_before(&self, idle: u64) -> bool {
+        self.is_scheduled() && !self.requests_idle() && self.at_cycle <= idle
+    }
+
     /// Whether it may take effect in this cycle.
     pub fn is_due(&self, cycle: u64) -> bool {
         !self.is_scheduled() || cycle >= self.at_cycle

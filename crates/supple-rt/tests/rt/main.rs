@@ -3,6 +3,7 @@
 #[path = "../support/mod.rs"]
 mod support;
 
+mod earlier_idle;
 mod fault_files;
 mod heartbeat;
 mod idle_requests;

@@ -58,6 +58,8 @@ pub struct RunningArm<const N: usize> {
     stop: Stop,
     recorder: Option<Recorder<N>>,
     last: Option<Telemetry>,
+    /// Cycle since which the arm is held.
+    held_cycle: u64,
 }
 
 impl<const N: usize> RunningArm<N> {
@@ -91,6 +93,7 @@ impl<const N: usize> RunningArm<N> {
             stop,
             recorder: None,
             last: None,
+            held_cycle: 0,
         })
     }
 
@@ -99,7 +102,14 @@ impl<const N: usize> RunningArm<N> {
     /// # Errors
     /// A process that cannot be waited for; a log that cannot be completed.
     pub fn end(&mut self) -> Result<(), Failure> {
-        if !self.starts && self.launched {
+        while let Some(telemetry) = self.reader.receive().map_err(Failure::system)? {
+            self.last = Some(telemetry);
+        }
+        let idle = self
+            .last
+            .as_ref()
+            .is_some_and(|last| last.record().mode() == Some(Mode::Idle));
+        if !self.starts && self.launched && !idle {
             // Nobody ends these processes: what was requested must not go on. The controller may have gone.
             let _ = self.session.begin_request(&Request::GravityHold, None);
         }
@@ -192,9 +202,45 @@ impl<const N: usize> RunningArm<N> {
         }
     }
 
-    fn request(&mut self, request: &Request<N>) -> Result<(), Failure> {
-        let sequence = self.begin(request, None)?;
-        self.carried_out(sequence, &mut VecDeque::new()).map(|_| ())
+    fn request(&mut self, request: &Request<N>) -> Result<OperatorReply, Failure> {
+        self.request_at(request, None)
+    }
+
+    fn request_at(
+        &mut self,
+        request: &Request<N>,
+        at_cycle: Option<u64>,
+    ) -> Result<OperatorReply, Failure> {
+        let sequence = self.begin(request, at_cycle)?;
+        self.carried_out(sequence, &mut VecDeque::new())
+    }
+
+    /// Requests gravity hold, which is refused if somebody requested idle in the cycle `unless_idle_since` or after it.
+    fn hold(&mut self, unless_idle_since: Option<u64>) -> Result<(), Failure> {
+        let reply = self.request_at(&Request::GravityHold, unless_idle_since)?;
+        self.held_cycle = reply.cycle;
+        Ok(())
+    }
+
+    /// As [`RunningArm::wait_for`], and fails if somebody requests another mode.
+    fn wait_while_held(
+        &mut self,
+        within: Duration,
+        mut condition: impl FnMut(&Telemetry) -> bool,
+    ) -> Result<bool, Failure> {
+        let (held_cycle, mut other) = (self.held_cycle, None);
+        let ended = self.wait_for(within, |telemetry| {
+            let mode = telemetry.record().mode();
+            let is_other = !matches!(mode, None | Some(Mode::GravityHold | Mode::Fault));
+            if is_other && telemetry.state.cycle >= held_cycle {
+                other = mode;
+            }
+            other.is_some() || condition(telemetry)
+        })?;
+        match other {
+            Some(mode) => Err(Failure::OtherMode { mode: mode.name() }),
+            None => Ok(ended),
+        }
     }
 
     fn not_running(&self) -> Failure {
@@ -236,13 +282,13 @@ impl<const N: usize> RunningArm<N> {
 
     /// An arm without a pendant is active soon after gravity hold wants torque. After a loss, as of the controller, it is
     /// laid down first, and its motors are enabled only if idle was requested since.
-    fn enable(&mut self) -> Result<(), Failure> {
+    fn enable(&mut self, mut unless_idle_since: Option<u64>) -> Result<(), Failure> {
         let period_s = self.model.settings().period_s;
         let cycles = |time_s: f64| (time_s / period_s) as u64;
         for _ in 0..ENABLING_ATTEMPTS {
-            self.request(&Request::GravityHold)?;
+            self.hold(unless_idle_since)?;
             let since = self.last.as_ref().map_or(0, |last| last.state.cycle);
-            self.wait_for(TIMEOUT, |telemetry| {
+            self.wait_while_held(TIMEOUT, |telemetry| {
                 telemetry.state.drives() == Drives::Active
                     || telemetry.state.cycle >= since + cycles(ENABLING_S)
             })?;
@@ -257,7 +303,7 @@ impl<const N: usize> RunningArm<N> {
             if active || fault {
                 return Ok(());
             }
-            self.request(&Request::Idle)?;
+            unless_idle_since = Some(self.request(&Request::Idle)?.cycle + 1);
             let since = self.last.as_ref().map_or(0, |last| last.state.cycle);
             self.wait_for(TIMEOUT, |telemetry| {
                 telemetry.state.cycle >= since + cycles(HOLD_S)
@@ -266,18 +312,18 @@ impl<const N: usize> RunningArm<N> {
         Err(Failure::DrivesNotActive)
     }
 
-    /// Active drives in gravity hold.
-    fn activate(&mut self) -> Result<(), Failure> {
+    /// Active drives in gravity hold, unless somebody requested idle in the given cycle or after it.
+    fn activate(&mut self, unless_idle_since: Option<u64>) -> Result<(), Failure> {
         if self.plan.lays_down {
-            self.enable()?;
+            self.enable(unless_idle_since)?;
         } else {
-            self.request(&Request::GravityHold)?;
+            self.hold(unless_idle_since)?;
         }
         let since = self.last.as_ref().map_or(0, |last| last.state.cycle);
         let period_s = self.model.settings().period_s;
         let held = since + (HOLD_S / period_s) as u64;
         let active = |telemetry: &Telemetry| telemetry.state.drives() == Drives::Active;
-        self.wait_for(TIMEOUT, |telemetry| {
+        self.wait_while_held(TIMEOUT, |telemetry| {
             telemetry.state.cycle >= held || active(telemetry)
         })?;
         let mut within = TIMEOUT;
@@ -294,7 +340,7 @@ impl<const N: usize> RunningArm<N> {
             within = ACTIVATION_TIMEOUT;
         }
         let mut fault = None;
-        let up = self.wait_for(within, |telemetry| {
+        let up = self.wait_while_held(within, |telemetry| {
             let record = telemetry.record();
             fault = (record.fault != 0).then(|| record.fault_text.to_string());
             fault.is_some() || active(telemetry)
@@ -302,7 +348,7 @@ impl<const N: usize> RunningArm<N> {
         let settled = self.last.as_ref().map_or(0, |last| last.state.cycle);
         let settled = settled + (HOLD_S / period_s) as u64;
         if up && fault.is_none() {
-            self.wait_for(TIMEOUT, |telemetry| {
+            self.wait_while_held(TIMEOUT, |telemetry| {
                 let record = telemetry.record();
                 fault = (record.fault != 0).then(|| record.fault_text.to_string());
                 fault.is_some() || telemetry.state.cycle >= settled
@@ -363,6 +409,12 @@ impl<const N: usize> RunningArm<N> {
                 if mode.is_some_and(moves_joints) {
                     performed.moved_s += period_s;
                 }
+                // No step requests it: somebody else did.
+                if mode == Some(Mode::Idle) {
+                    return Err(Failure::OtherMode {
+                        mode: Mode::Idle.name(),
+                    });
+                }
                 if step.until_done && mode != reply.mode() {
                     break;
                 }
@@ -412,6 +464,8 @@ impl<const N: usize> MotionArm<N> for RunningArm<N> {
     fn load(&mut self, model: &Description) -> Result<(), Failure> {
         model.save(&self.folder)?;
         self.model = model.clone();
+        // An operator who requested idle of a controller that was just started has the last word.
+        let unless_idle_since = self.starts.then_some(0);
         if self.starts {
             self.launch()?;
         } else if self.launched {
@@ -420,7 +474,7 @@ impl<const N: usize> MotionArm<N> for RunningArm<N> {
             });
         }
         self.launched = true;
-        self.activate()
+        self.activate(unless_idle_since)
     }
 
     fn position_rad(&mut self) -> Result<Vector<N>, Failure> {
@@ -469,7 +523,7 @@ impl<const N: usize> MotionArm<N> for RunningArm<N> {
             Ok(_) | Err(Failure::Refused { .. }) => {}
             Err(failure) => return Err(failure),
         }
-        self.activate()
+        self.activate(Some(from))
     }
 
     fn meanwhile<T: Send>(&mut self, work: impl FnOnce() -> T + Send) -> Result<T, Failure> {

@@ -95,6 +95,24 @@ impl<const N: usize> OperatorSession<N> {
         Ok(None)
     }
 
+    /// Sends a request that no idle request may precede: it is for the first cycle, and the controller refuses it if idle was
+    /// accepted in that cycle or since. Waits until it is carried out.
+    ///
+    /// # Errors
+    /// As [`OperatorSession::send_request`].
+    pub fn send_first_request(&mut self, request: &Request<N>) -> Result<OperatorReply, Failure> {
+        let sequence = self.begin_request(request, Some(0))?;
+        let sequence = sequence.ok_or_else(|| self.not_running())?;
+        let start = Instant::now();
+        while start.elapsed() < ANSWER_TIMEOUT {
+            if let Some(reply) = self.reply_to(sequence)? {
+                return Ok(reply);
+            }
+            pause(POLL_INTERVAL);
+        }
+        Err(self.not_running())
+    }
+
     /// As [`OperatorSession::send_request`], but waits for a controller that may still be starting; `check` fails if
     /// it cannot start any more.
     ///

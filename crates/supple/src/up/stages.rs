@@ -4,10 +4,14 @@
 //! joining --first state--> gravity hold --drives active--> following
 //!                              |
 //!                              +-- an arm on a bus waits here for its pendant
+//! any of them --mode of somebody else, or a fault--> ended
 //! ```
+//!
+//! Whoever requests another mode meanwhile has the last word: nothing is requested or pressed after it. The controller
+//! itself refuses the first gravity hold if idle was accepted before, and the approach once the arm is idle.
 
 use super::plan::Plan;
-use crate::cli::{PlantKind, UpArgs};
+use crate::cli::{PlantKind, UpArgs, UpTrajectory};
 use crate::operate::{Approach, OperatorSession, Pendant};
 use supple_cli::console::print_status;
 use supple_cli::exit::Failure;
@@ -35,6 +39,51 @@ enum Stage {
     ActivationRequested,
     /// The approach and the trajectory were requested.
     Following,
+    /// The arm tracks, or everything was scheduled in advance.
+    Done,
+    /// Somebody else requested a mode, or a fault was latched.
+    Ended,
+}
+
+/// What the start-up does in a cycle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Action {
+    None,
+    /// Requests gravity hold.
+    Hold,
+    /// Presses the pendant, or asks the operator to do so.
+    Activate,
+    /// Requests approach and trajectory.
+    Follow,
+    /// Requests nothing any more.
+    End,
+}
+
+impl Stage {
+    /// Action in a cycle with this mode and these drives.
+    fn action(self, cycle: u64, mode: Option<Mode>, active: bool, period_s: f64) -> Action {
+        let is_foreign = match self {
+            // A fault is reported by the refusal.
+            Stage::Joining => !matches!(
+                mode,
+                None | Some(Mode::Idle | Mode::GravityHold | Mode::Fault)
+            ),
+            // Telemetry of cycles before the request.
+            Stage::GravityHold(since) if cycle < since => return Action::None,
+            Stage::GravityHold(_) | Stage::ActivationRequested => mode != Some(Mode::GravityHold),
+            Stage::Following => !matches!(mode, Some(Mode::GravityHold | Mode::Move | Mode::Track)),
+            Stage::Done | Stage::Ended => return Action::None,
+        };
+        match self {
+            _ if is_foreign => Action::End,
+            Stage::Joining => Action::Hold,
+            Stage::GravityHold(_) | Stage::ActivationRequested if active => Action::Follow,
+            Stage::GravityHold(since) if cycle >= since + cycles_of(GRAVITY_HOLD_S, period_s) => {
+                Action::Activate
+            }
+            _ => Action::None,
+        }
+    }
 }
 
 /// Start-up sequence of a system.
@@ -43,6 +92,9 @@ pub struct Stages {
     stage: Stage,
     pendant: Option<Pendant>,
     plant: PlantKind,
+    track: UpTrajectory,
+    /// A process was started anew: what was requested before does not count.
+    anew: bool,
     /// The arm has no pendant: its drives become active when gravity hold requests torque.
     without_pendant: bool,
     /// Learning begins with gravity hold.
@@ -66,12 +118,53 @@ impl Stages {
             stage: Stage::Joining,
             pendant: plan.pendant.clone(),
             plant: args.plant,
+            track: args.track,
+            anew: false,
             without_pendant: plan.lays_down,
             learn: args.learn,
             period_s,
             was_active: false,
             was_off: true,
         }
+    }
+
+    /// The same after a process was started anew: idle was requested before, by the caller.
+    pub fn anew(plan: &Plan, args: &UpArgs, period_s: f64) -> Stages {
+        Stages {
+            anew: true,
+            ..Stages::new(plan, args, period_s)
+        }
+    }
+
+    /// Whether somebody else requested a mode, or a fault was latched, before the arm tracked.
+    pub fn is_ended(&self) -> bool {
+        self.stage == Stage::Ended
+    }
+
+    /// Whether nothing of the sequence is left to do, or all was scheduled in advance.
+    pub fn is_done(&self) -> bool {
+        self.stage == Stage::Done
+    }
+
+    /// Ends the sequence and says how to go on.
+    fn end(&mut self, cause: &str, in_fault: bool) {
+        self.stage = Stage::Ended;
+        let track = match self.track {
+            UpTrajectory::Sinusoid => "track sinusoid",
+            UpTrajectory::Arc => "track arc",
+            UpTrajectory::Quadrant => "track quadrant",
+            UpTrajectory::Probe => "probe",
+        };
+        let reset = if in_fault { "`supple reset`, " } else { "" };
+        let activate = match (&self.pendant, self.plant) {
+            (Some(_), _) => "`supple pendant activate`, ",
+            (None, PlantKind::Can) if !self.without_pendant => "Shift-Activate on the pendant, ",
+            _ => "",
+        };
+        print_status(&format!(
+            "start-up ends here, {cause}. The system goes on running; `supple up` requests nothing more. To go on: \
+             {reset}`supple mode gravity-hold`, {activate}then `supple {track}`"
+        ));
     }
 
     /// What the operator sees when the drives have become idle although the controller wants torque, as after a stall of
@@ -127,7 +220,7 @@ impl Stages {
         if let Some(pendant) = &self.pendant {
             pendant.press(&format!("activate@held+{GRAVITY_HOLD_S}"))?;
         }
-        self.stage = Stage::Following;
+        self.stage = Stage::Done;
         Ok(cycles_of(start_s, self.period_s))
     }
 
@@ -146,24 +239,15 @@ impl Stages {
         if let Some(text) = self.lost_drives(telemetry) {
             print_status(text);
         }
-        match self.stage {
-            Stage::Joining => {
-                session.send_request(&Request::GravityHold, None)?;
-                if self.learn {
-                    let learn = Request::Learning(LearningSwitch::On);
-                    session.send_request(&learn, None)?;
-                }
-                self.stage = Stage::GravityHold(cycle);
-            }
-            Stage::GravityHold(_) | Stage::ActivationRequested if active => {
-                let position = core::array::from_fn(|i| telemetry.record().position_rad[i]);
-                let start = cycle + cycles_of(SETTLE_S, self.period_s);
-                session.follow(approach, &position.into(), Some(start))?;
-                self.stage = Stage::Following;
-            }
-            Stage::GravityHold(since)
-                if cycle >= since + cycles_of(GRAVITY_HOLD_S, self.period_s) =>
-            {
+        let record = telemetry.record();
+        let mode = record.mode();
+        if self.stage == Stage::Following && mode == Some(Mode::Track) {
+            self.stage = Stage::Done;
+        }
+        match self.stage.action(cycle, mode, active, self.period_s) {
+            Action::None => {}
+            Action::Hold => self.hold(record.fault != 0, session)?,
+            Action::Activate => {
                 match &self.pendant {
                     Some(pendant) => pendant.press("activate")?,
                     None if self.plant == PlantKind::Can && !self.without_pendant => {
@@ -175,8 +259,103 @@ impl Stages {
                 }
                 self.stage = Stage::ActivationRequested;
             }
-            Stage::GravityHold(_) | Stage::ActivationRequested | Stage::Following => {}
+            Action::Follow => {
+                let position = core::array::from_fn(|i| record.position_rad[i]);
+                let start = cycle + cycles_of(SETTLE_S, self.period_s);
+                self.stage = Stage::Following;
+                session.follow(approach, &position.into(), Some(start))?;
+            }
+            Action::End if record.fault != 0 => {
+                self.end(&format!("with a fault: {}", record.fault_text), true);
+            }
+            Action::End => {
+                let name = mode.map_or("unknown", |mode| mode.name());
+                let cause = format!("because mode {name} was requested meanwhile");
+                self.end(&cause, false);
+            }
         }
         Ok(())
+    }
+
+    /// Requests gravity hold, and learning.
+    fn hold<const N: usize>(
+        &mut self,
+        in_fault: bool,
+        session: &mut OperatorSession<N>,
+    ) -> Result<(), Failure> {
+        let held = match self.anew {
+            true => session.send_request(&Request::GravityHold, None),
+            false => session.send_first_request(&Request::GravityHold),
+        };
+        match held {
+            Ok(reply) => self.stage = Stage::GravityHold(reply.cycle),
+            Err(Failure::Refused { reason }) if !in_fault => {
+                self.end(&format!("because gravity hold was {reason}"), false);
+                return Ok(());
+            }
+            Err(failure) => return Err(failure),
+        }
+        if self.learn {
+            let learn = Request::Learning(LearningSwitch::On);
+            session.send_request(&learn, None)?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PERIOD_S: f64 = 1e-3;
+
+    fn action(stage: Stage, cycle: u64, mode: Mode, active: bool) -> Action {
+        stage.action(cycle, Some(mode), active, PERIOD_S)
+    }
+
+    #[test]
+    fn the_arm_is_held_activated_and_moved() {
+        let held = Stage::GravityHold(10);
+        assert_eq!(action(Stage::Joining, 3, Mode::Idle, false), Action::Hold);
+        assert_eq!(action(held, 9, Mode::Idle, false), Action::None);
+        assert_eq!(action(held, 10, Mode::GravityHold, false), Action::None);
+        assert_eq!(
+            action(held, 210, Mode::GravityHold, false),
+            Action::Activate
+        );
+        for stage in [held, Stage::ActivationRequested] {
+            assert_eq!(action(stage, 211, Mode::GravityHold, true), Action::Follow);
+        }
+        for mode in [Mode::GravityHold, Mode::Move, Mode::Track] {
+            assert_eq!(action(Stage::Following, 300, mode, true), Action::None);
+        }
+    }
+
+    /// Whatever else is requested meanwhile, and a fault, end the sequence before anything is pressed or requested.
+    #[test]
+    fn another_mode_ends_the_start_up() {
+        for mode in [
+            Mode::Idle,
+            Mode::Fault,
+            Mode::Float,
+            Mode::JointImpedance,
+            Mode::Breakaway,
+        ] {
+            for active in [false, true] {
+                for stage in [
+                    Stage::GravityHold(10),
+                    Stage::ActivationRequested,
+                    Stage::Following,
+                ] {
+                    for cycle in [10, 500] {
+                        assert_eq!(action(stage, cycle, mode, active), Action::End);
+                    }
+                }
+                for stage in [Stage::Done, Stage::Ended] {
+                    assert_eq!(action(stage, 500, mode, active), Action::None);
+                }
+            }
+        }
+        assert_eq!(action(Stage::Joining, 3, Mode::Float, false), Action::End);
     }
 }

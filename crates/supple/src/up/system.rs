@@ -24,6 +24,8 @@ use supple_realtime::Stop;
 const JOIN_TIMEOUT_S: u64 = 20;
 /// Cycle in which learning begins in virtual time, after the request for gravity hold.
 const LEARN_CYCLE: u64 = 1;
+/// Cycles after a refusal within which its cause is in the telemetry.
+const REFUSAL_CYCLES: u32 = 200;
 /// Maximum duration of one wait for telemetry.
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
@@ -216,7 +218,14 @@ impl<'a, const N: usize> System<'a, N> {
     fn watch_on(&mut self, stop: &Stop) -> Result<(), Failure> {
         let mut fault_seen = false;
         while !stop.shutdown_requested() {
-            match self.poll_and_advance()? {
+            let polled = match self.poll_and_advance() {
+                Err(Failure::Refused { reason }) if self.start_up_is_ended()? => {
+                    print_status(&reason);
+                    continue;
+                }
+                polled => polled?,
+            };
+            match polled {
                 Some(telemetry) => fault_seen |= telemetry.record().fault != 0,
                 None if self.args.virtual_time
                     && self
@@ -229,7 +238,11 @@ impl<'a, const N: usize> System<'a, N> {
             }
             match self.session.check() {
                 // An operator has sent other requests; that is not an error.
-                Err(Failure::Refused { reason }) if self.limit.is_none() => print_status(&reason),
+                Err(Failure::Refused { reason })
+                    if self.limit.is_none() || self.start_up_is_ended()? =>
+                {
+                    print_status(&reason);
+                }
                 checked => {
                     checked?;
                 }
@@ -242,6 +255,17 @@ impl<'a, const N: usize> System<'a, N> {
                 .check_running(self.args.virtual_time, self.plan.clock_owner.name)?;
         }
         Ok(())
+    }
+
+    /// Whether the start-up ends early within the next cycles: a refusal may arrive before the telemetry with its cause.
+    fn start_up_is_ended(&mut self) -> Result<bool, Failure> {
+        for _ in 0..REFUSAL_CYCLES {
+            if self.stages.is_ended() || self.stages.is_done() {
+                break;
+            }
+            self.poll_and_advance()?;
+        }
+        Ok(self.stages.is_ended())
     }
 
     /// Waits briefly for the next cycle, processes it and sends the requests that are due.
@@ -363,7 +387,7 @@ impl<'a, const N: usize> System<'a, N> {
 
     /// Restarts the start-up sequence.
     pub fn restart_stages(&mut self) {
-        self.stages = Stages::new(&self.plan, self.args, self.period_s);
+        self.stages = Stages::anew(&self.plan, self.args, self.period_s);
     }
 
     /// Sends a request to the controller.
