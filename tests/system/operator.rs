@@ -10,7 +10,8 @@ use std::path::Path;
 use std::process::{Child, Command, Output};
 use supple_core::controller::{Mode, Request};
 use supple_ipc::message::Outcome;
-use supple_ipc::{Domain, OperatorClient, TelemetryReader, request_idle};
+use supple_ipc::{Domain, OperatorClient, TelemetryReader, idle_socket, request_idle};
+use supple_realtime::pause;
 
 /// Maximum number of cycles until idle is accepted, at 1 kHz.
 const IDLE_WITHIN_CYCLES: u64 = 20;
@@ -135,6 +136,46 @@ fn a_system_in_a_fault_is_code_5() {
     );
     let output = up.end();
     assert_eq!(output.status.code(), Some(5), "{}", stderr_of(&output));
+}
+
+/// Something has put another file in the place of the socket: idle is requested as any other mode.
+#[test]
+fn idle_is_heard_without_its_socket() {
+    let (up, domain, mut reader) = tracking();
+    let socket = idle_socket(&domain);
+    std::fs::remove_file(&socket).expect("removed");
+    std::fs::write(&socket, "other").expect("written");
+    let output = up.run(&["mode", "idle"]);
+    let words = stderr_of(&output);
+    assert!(output.status.success(), "{words}");
+    for part in ["warning", ".idle.socket", "nobody answers"] {
+        assert!(words.contains(part), "{part}: {words}");
+    }
+    wait_for_mode(&mut reader, Mode::Idle);
+}
+
+/// A program that cleans /tmp has removed the files through which the system is stopped: they are created anew.
+#[test]
+fn the_files_of_a_running_system_are_created_anew() {
+    let (mut up, domain, _) = tracking();
+    let pidfile = domain.folder().join(format!("{PREFIX}.pid"));
+    let files = [idle_socket(&domain), pidfile];
+    for file in &files {
+        std::fs::remove_file(file).expect("removed");
+    }
+    for _ in 0..6000 {
+        if files.iter().all(|file| file.exists()) {
+            break;
+        }
+        pause(Duration::from_millis(5));
+    }
+    let answer = request_idle(&domain, TIMEOUT).expect("requested");
+    assert_eq!(answer.expect("an answer").outcome, Outcome::Accepted);
+    let stopped = up.run(&["stop"]);
+    assert!(stopped.status.success(), "{}", stderr_of(&stopped));
+    let output = up.ended();
+    assert!(output.status.success(), "{}", stderr_of(&output));
+    assert!(files.iter().all(|file| !file.exists()), "nothing is left");
 }
 
 #[test]

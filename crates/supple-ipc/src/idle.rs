@@ -17,7 +17,7 @@ use std::io::{self, ErrorKind};
 use std::os::linux::net::SocketAddrExt;
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::{SocketAddr, UnixDatagram};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 use supple_core::codes;
 use supple_core::controller::Mode;
@@ -36,7 +36,8 @@ const RETRY_INTERVAL: Duration = Duration::from_millis(100);
 /// Time between attempts to send while the controller's receive buffer is full.
 const SEND_RETRY_INTERVAL: Duration = Duration::from_millis(1);
 
-fn path(domain: &Domain) -> PathBuf {
+/// Path of the socket of idle requests.
+pub fn idle_socket(domain: &Domain) -> PathBuf {
     let name = format!("{}.idle.socket", domain.prefix());
     domain.folder().join(name)
 }
@@ -77,19 +78,12 @@ impl IdleServer {
     /// # Errors
     /// [`IpcError::Folder`] if the socket cannot be created.
     pub fn new(domain: &Domain) -> Result<IdleServer, IpcError> {
-        let path = path(domain);
-        let bind = || -> io::Result<UnixDatagram> {
-            match fs::remove_file(&path) {
-                Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
-                _ => {}
-            }
-            let socket = UnixDatagram::bind(&path)?;
-            fs::set_permissions(&path, Permissions::from_mode(0o600))?;
-            // Non-blocking: a client that does not read its reply must not delay the others.
-            socket.set_nonblocking(true)?;
-            Ok(socket)
+        let path = idle_socket(domain);
+        let replaced = match fs::remove_file(&path) {
+            Err(error) if error.kind() != ErrorKind::NotFound => Err(error),
+            _ => bind(&path),
         };
-        let socket = bind().map_err(|error| IpcError::Folder {
+        let socket = replaced.map_err(|error| IpcError::Folder {
             folder: domain.folder().to_owned(),
             cause: format!("{}: {error}", path.display()),
             remedy: "set XDG_RUNTIME_DIR to a folder with a short path that can be written",
@@ -99,6 +93,23 @@ impl IdleServer {
             path,
             pending: Vec::with_capacity(MAX_PENDING_CLIENTS),
         })
+    }
+
+    /// Creates the socket anew if something has removed its file, such as a program that cleans /tmp: nobody could reach the
+    /// old one any more. Returns whether it did.
+    pub fn restore(&mut self) -> bool {
+        let is_gone = |error: io::Error| error.kind() == ErrorKind::NotFound;
+        if !fs::symlink_metadata(&self.path).is_err_and(is_gone) {
+            return false;
+        }
+        // If this fails, as without the folder, the next call tries again.
+        match bind(&self.path) {
+            Ok(socket) => {
+                self.socket = socket;
+                true
+            }
+            Err(_) => false,
+        }
     }
 
     /// Waits for requests for at most `timeout`, reads all pending ones, and labels them with the batch number `batch`.
@@ -167,6 +178,14 @@ impl IdleServer {
     }
 }
 
+fn bind(path: &Path) -> io::Result<UnixDatagram> {
+    let socket = UnixDatagram::bind(path)?;
+    fs::set_permissions(path, Permissions::from_mode(0o600))?;
+    // Non-blocking: a client that does not read its reply must not delay the others.
+    socket.set_nonblocking(true)?;
+    Ok(socket)
+}
+
 impl Drop for IdleServer {
     fn drop(&mut self) {
         // If this fails, the next server removes the file.
@@ -180,10 +199,10 @@ impl Drop for IdleServer {
 /// # Errors
 /// [`IpcError::Service`] if no socket can be created.
 pub fn request_idle(domain: &Domain, timeout: Duration) -> Result<Option<IdleAnswer>, IpcError> {
-    request_idle_at(&path(domain), timeout).map_err(|error| failed("idle", &error))
+    request_idle_at(&idle_socket(domain), timeout).map_err(|error| failed("idle", &error))
 }
 
-fn request_idle_at(path: &std::path::Path, timeout: Duration) -> io::Result<Option<IdleAnswer>> {
+fn request_idle_at(path: &Path, timeout: Duration) -> io::Result<Option<IdleAnswer>> {
     let start = Instant::now();
     let request_id = random_id()?;
     // An abstract address: it needs no disk space and cannot be guessed. A connected socket receives from its peer
@@ -216,6 +235,11 @@ fn request_idle_at(path: &std::path::Path, timeout: Duration) -> io::Result<Opti
             return Ok(None);
         }
     }
+}
+
+/// Whether a process receives idle requests, even if it does not answer them.
+pub fn idle_socket_is_open(domain: &Domain) -> bool {
+    UnixDatagram::unbound().is_ok_and(|socket| socket.connect(idle_socket(domain)).is_ok())
 }
 
 /// Waits for the reply to a request.
@@ -351,7 +375,7 @@ mod tests {
         let mut server = IdleServer::new(&domain).expect("a server");
         let sender = UnixDatagram::unbound().expect("a socket");
         for bytes in [&b""[..], b"idle", &[0xff; 16], &[b'i'; 400]] {
-            sender.send_to(bytes, path(&domain)).expect("sent");
+            sender.send_to(bytes, idle_socket(&domain)).expect("sent");
         }
         assert!(!server.receive_requests(1, TIMEOUT).expect("read"));
         assert!(!server.has_pending());
@@ -366,10 +390,39 @@ mod tests {
     }
 
     #[test]
+    fn a_socket_whose_file_is_removed_is_created_anew() {
+        let (_folder, domain) = system();
+        let mut server = IdleServer::new(&domain).expect("a server");
+        assert!(!server.restore(), "it is there");
+        fs::remove_file(idle_socket(&domain)).expect("removed");
+        assert!(!idle_socket_is_open(&domain));
+        assert!(server.restore());
+        assert!(idle_socket_is_open(&domain));
+        let metadata = fs::metadata(idle_socket(&domain)).expect("there");
+        assert_eq!(metadata.permissions().mode() & 0o777, 0o600);
+        assert!(!server.restore());
+        let without_answer = request_idle(&domain, Duration::from_millis(1));
+        assert_eq!(without_answer.expect("requested"), None);
+        assert!(server.receive_requests(1, TIMEOUT).expect("read"));
+    }
+
+    /// What somebody else has put there is not replaced.
+    #[test]
+    fn another_file_in_its_place_stays() {
+        let (_folder, domain) = system();
+        let mut server = IdleServer::new(&domain).expect("a server");
+        fs::remove_file(idle_socket(&domain)).expect("removed");
+        fs::write(idle_socket(&domain), "other").expect("written");
+        assert!(!server.restore());
+        assert!(!idle_socket_is_open(&domain));
+        assert_eq!(request_idle(&domain, TIMEOUT).expect("requested"), None);
+    }
+
+    #[test]
     fn only_the_owner_can_open_the_socket() {
         let (_folder, domain) = system();
         let _server = IdleServer::new(&domain).expect("a server");
-        let metadata = fs::metadata(path(&domain)).expect("there");
+        let metadata = fs::metadata(idle_socket(&domain)).expect("there");
         assert_eq!(metadata.permissions().mode() & 0o777, 0o600);
     }
 }

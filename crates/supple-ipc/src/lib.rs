@@ -53,7 +53,9 @@ mod writer_identity;
 
 pub use domain::{DEFAULT_PREFIX, Domain, PREFIX_VARIABLE};
 pub use error::IpcError;
-pub use idle::{IdleAnswer, IdleServer, idle_reply, request_idle};
+pub use idle::{
+    IdleAnswer, IdleServer, idle_reply, idle_socket, idle_socket_is_open, request_idle,
+};
 pub use link::{ControllerLink, PlantLink, ReceivedAnswer, WakeEvent};
 pub use operator_link::{
     CommandSlot, OperatorClient, OperatorServer, TELEMETRY_DEPTH, TelemetryReader,

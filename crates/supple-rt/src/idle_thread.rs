@@ -1,15 +1,18 @@
 //! The thread that receives idle requests. It uses no shared-memory port, no disk and no standard error, so nothing can
-//! block it.
+//! block it; the file of its socket is looked for twice a second, and created anew if something has removed it.
 
 use crate::error::RtError;
 use crate::queues::IdleThreadChannel;
 use core::time::Duration;
 use std::thread::{Builder, JoinHandle};
+use std::time::Instant;
 use supple_ipc::{Domain, IdleServer, IpcError};
-use supple_realtime::{Settings, apply_realtime_settings};
+use supple_realtime::{Settings, apply_realtime_settings, diagnostics};
 
 /// Poll interval while no request is pending.
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
+/// Interval at which the socket's file is looked for.
+const RESTORE_INTERVAL: Duration = Duration::from_millis(500);
 /// Poll interval for the loop's reply while a request is pending.
 const REPLY_POLL_INTERVAL: Duration = Duration::from_micros(500);
 /// Priority relative to the loop's: lower by this much.
@@ -66,7 +69,17 @@ impl IdleRequestThread {
 
 fn work(mut server: IdleServer, mut channel: IdleThreadChannel) -> Result<(), IpcError> {
     let mut batch = 1;
+    let mut looked = Instant::now();
     while !channel.ended() {
+        if looked.elapsed() >= RESTORE_INTERVAL {
+            looked = Instant::now();
+            if server.restore() {
+                diagnostics::post(
+                    "supple-rt: warning: the socket of idle requests was removed and is created anew; keep other programs \
+                     from removing files of a running system",
+                );
+            }
+        }
         let wait = match server.has_pending() {
             true => REPLY_POLL_INTERVAL,
             false => POLL_INTERVAL,

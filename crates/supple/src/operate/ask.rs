@@ -48,6 +48,7 @@ pub(super) const COMPLY_S: f64 = 0.5;
 
 /// What a command requests of a running system, for an arm of any number of joints.
 pub(super) enum SystemRequest<'a> {
+    Idle,
     GravityHold,
     Float,
     JointImpedance(&'a ModeArgs),
@@ -66,6 +67,7 @@ impl SystemRequest<'_> {
     ) -> Result<Request<N>, Failure> {
         let now = telemetry.record();
         Ok(match self {
+            SystemRequest::Idle => Request::Idle,
             SystemRequest::GravityHold => Request::GravityHold,
             SystemRequest::Float => Request::Float,
             SystemRequest::Reset => Request::Reset,

@@ -26,18 +26,24 @@ use crate::cli::{
     UpTrajectory,
 };
 use crate::up::stop_running;
+use core::time::Duration;
 use serde::Serialize;
+use std::time::Instant;
 use supple_cli::arms;
-use supple_cli::console::print_json;
+use supple_cli::console::{print_json, print_status};
 use supple_cli::exit::Failure;
 use supple_core::Trajectory;
 use supple_experiment::scenario;
 use supple_ipc::message::{OperatorReply, Outcome, Telemetry};
-use supple_ipc::{Domain, request_idle};
+use supple_ipc::{Domain, IpcError, idle_socket, idle_socket_is_open, request_idle};
 use supple_model::{Description, with_dof};
+use supple_realtime::pause;
 
 /// Cap radius of an arm without a tool \[m\].
 const CAP_M: f64 = 0.02;
+
+/// Interval at which the pidfile of a running system is looked for.
+const PIDFILE_INTERVAL: Duration = Duration::from_millis(20);
 
 /// Result of `supple stop`, as `--json` prints it: the prefix of the system whose shutdown was requested.
 #[derive(Serialize)]
@@ -62,15 +68,36 @@ pub fn mode(args: &ModeArgs) -> Result<(), Failure> {
 /// Requests idle over a separate socket that needs no reader or operator slot, no shared memory and no lock.
 fn idle(system: &SystemArgs) -> Result<(), Failure> {
     let domain = Domain::new(system.prefix.as_deref()).map_err(Failure::system)?;
-    match request_idle(&domain, TELEMETRY_TIMEOUT).map_err(Failure::system)? {
-        Some(answer) if answer.outcome == Outcome::Refused => Err(Failure::Refused {
+    match request_idle(&domain, TELEMETRY_TIMEOUT) {
+        Ok(Some(answer)) if answer.outcome == Outcome::Refused => Err(Failure::Refused {
             reason: answer.text,
         }),
-        Some(answer) => print_mode(system, answer.mode, answer.cycle),
-        None => Err(Failure::NotRunning {
-            prefix: domain.prefix().to_owned(),
-        }),
+        Ok(Some(answer)) => print_mode(system, answer.mode, answer.cycle),
+        Ok(None) => idle_as_any_request(system, &domain, None),
+        Err(error) => idle_as_any_request(system, &domain, Some(error)),
     }
+}
+
+/// Requests idle as any other request if its socket does not exist or nobody answers there.
+fn idle_as_any_request(
+    system: &SystemArgs,
+    domain: &Domain,
+    error: Option<IpcError>,
+) -> Result<(), Failure> {
+    if running(system).is_err() {
+        return Err(match error {
+            Some(error) => Failure::system(error),
+            None => Failure::NotRunning {
+                prefix: domain.prefix().to_owned(),
+            },
+        });
+    }
+    let cause = error.map_or("nobody answers there".to_owned(), |error| error.to_string());
+    print_status(&format!(
+        "warning: the socket of idle requests, {}, cannot be used: {cause}; idle is requested as any other mode",
+        idle_socket(domain).display()
+    ));
+    ask(system, &SystemRequest::Idle)
 }
 
 /// Runs `supple reset`: clears the latched fault.
@@ -199,17 +226,22 @@ fn follow(
 /// [`Failure::NotRunning`].
 pub fn stop(system: &SystemArgs) -> Result<(), Failure> {
     let domain = Domain::new(system.prefix.as_deref()).map_err(Failure::system)?;
-    if stop_running(&domain)? {
-        return match system.json {
-            true => print_json(&Stopping {
-                stopping: domain.prefix(),
-            }),
-            false => Ok(()),
-        };
+    let start = Instant::now();
+    while !stop_running(&domain)? {
+        // `supple up` creates a pidfile that something has removed anew.
+        if !idle_socket_is_open(&domain) || start.elapsed() > TELEMETRY_TIMEOUT {
+            return Err(Failure::NotRunning {
+                prefix: domain.prefix().to_owned(),
+            });
+        }
+        pause(PIDFILE_INTERVAL);
     }
-    Err(Failure::NotRunning {
-        prefix: domain.prefix().to_owned(),
-    })
+    match system.json {
+        true => print_json(&Stopping {
+            stopping: domain.prefix(),
+        }),
+        false => Ok(()),
+    }
 }
 
 #[cfg(test)]

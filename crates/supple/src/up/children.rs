@@ -225,8 +225,9 @@ fn ended(name: &'static str, status: ExitStatus) -> Failure {
 /// File with the PID of the process that runs the system, for `supple stop`; a lock on it excludes a second process.
 #[derive(Debug)]
 pub struct Pidfile {
+    domain: Domain,
     path: PathBuf,
-    _locked: File,
+    locked: File,
 }
 
 impl Pidfile {
@@ -269,9 +270,25 @@ impl Pidfile {
             file.write_all(std::process::id().to_string().as_bytes())
                 .map_err(failed)?;
             return Ok(Pidfile {
+                domain: domain.clone(),
                 path,
-                _locked: file,
+                locked: file,
             });
+        }
+    }
+}
+
+impl Pidfile {
+    /// Creates the file anew if something has removed it, such as a program that cleans /tmp: nobody could end the system.
+    /// Without the folder nothing changes; the next call tries again.
+    pub fn restore(&mut self) {
+        let is_gone = |error: io::Error| error.kind() == io::ErrorKind::NotFound;
+        if fs::symlink_metadata(&self.path).is_err_and(is_gone)
+            && let Ok(mut anew) = Pidfile::create(&self.domain)
+        {
+            // The old lock ends with `anew`, which must not remove the file.
+            std::mem::swap(&mut self.locked, &mut anew.locked);
+            anew.path = PathBuf::new();
         }
     }
 }
@@ -307,4 +324,25 @@ fn running(path: &Path) -> Option<Pid> {
     let process = Pid::from_raw(text.trim().parse().ok()?)?;
     let name = fs::read_to_string(format!("/proc/{}/comm", text.trim())).ok()?;
     (name.trim() == "supple").then_some(process)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_removed_pidfile_is_created_anew_and_locked() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let domain = Domain::in_folder(&folder.path().join("run"), "pid").expect("a domain");
+        let mut pidfile = Pidfile::create(&domain).expect("created");
+        let path = pidfile_path(&domain);
+        fs::remove_file(&path).expect("removed");
+        pidfile.restore();
+        let text = fs::read_to_string(&path).expect("there again");
+        assert_eq!(text, std::process::id().to_string());
+        let second = Pidfile::create(&domain);
+        assert!(matches!(second, Err(Failure::AlreadyRunning { .. })));
+        drop(pidfile);
+        assert!(!path.exists());
+    }
 }

@@ -74,7 +74,7 @@ fn sized<const N: usize>(args: &UpArgs, description: &Description) -> Result<(),
     let domain = Domain::new(args.prefix.as_deref()).map_err(Failure::system)?;
     write_stderr_in_background();
     let stop = interrupt::shutdown_on_interrupt();
-    let _pidfile = Pidfile::create(&domain)?;
+    let mut pidfile = Pidfile::create(&domain)?;
     let mut system = System::<N>::new(args, description, &domain)?;
     let started = system.start(description);
     let viewer = match (&started, args.view) {
@@ -84,7 +84,7 @@ fn sized<const N: usize>(args: &UpArgs, description: &Description) -> Result<(),
     if let Err(failure) = &viewer {
         print_status(&format!("the arm runs without its page: {failure}"));
     }
-    let result = started.and_then(|()| system.watch(&stop));
+    let result = started.and_then(|()| system.watch(&stop, &mut pidfile));
     drop(viewer);
     let shut_down = system.end();
     let mut summary = system.finish();

@@ -1,6 +1,6 @@
 //! A running system: its processes, telemetry and log.
 
-use super::children::ChildProcesses;
+use super::children::{ChildProcesses, Pidfile};
 use super::plan::{Plan, SHUTDOWN_TIMEOUT};
 use super::recorder::{Recorder, RunLog};
 use super::stages::{GRAVITY_HOLD_S, START_S, Stages, cycles_of};
@@ -24,6 +24,8 @@ use supple_realtime::Stop;
 const JOIN_TIMEOUT_S: u64 = 20;
 /// Cycle in which learning begins in virtual time, after the request for gravity hold.
 const LEARN_CYCLE: u64 = 1;
+/// Interval at which the pidfile is looked for.
+const RESTORE_INTERVAL: Duration = Duration::from_millis(500);
 /// Cycles after a refusal within which its cause is in the telemetry.
 const REFUSAL_CYCLES: u32 = 200;
 /// Maximum duration of one wait for telemetry.
@@ -203,8 +205,8 @@ impl<'a, const N: usize> System<'a, N> {
     ///
     /// # Errors
     /// If a process exits or a request is refused. A log that cannot be written is only reported.
-    pub fn watch(&mut self, stop: &Stop) -> Result<(), Failure> {
-        match self.watch_on(stop) {
+    pub fn watch(&mut self, stop: &Stop, pidfile: &mut Pidfile) -> Result<(), Failure> {
+        match self.watch_on(stop, pidfile) {
             // The same signal also ends the controller, which may exit first.
             Err(Failure::ProcessEnded { .. } | Failure::NotRunning { .. })
                 if stop.shutdown_requested() =>
@@ -215,9 +217,13 @@ impl<'a, const N: usize> System<'a, N> {
         }
     }
 
-    fn watch_on(&mut self, stop: &Stop) -> Result<(), Failure> {
-        let mut fault_seen = false;
+    fn watch_on(&mut self, stop: &Stop, pidfile: &mut Pidfile) -> Result<(), Failure> {
+        let (mut fault_seen, mut looked) = (false, Instant::now());
         while !stop.shutdown_requested() {
+            if looked.elapsed() >= RESTORE_INTERVAL {
+                looked = Instant::now();
+                pidfile.restore();
+            }
             let polled = match self.poll_and_advance() {
                 Err(Failure::Refused { reason }) if self.start_up_is_ended()? => {
                     print_status(&reason);
