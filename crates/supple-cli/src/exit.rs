@@ -359,6 +359,28 @@ pub enum Failure {
         /// Path of the file.
         path: PathBuf,
     },
+    /// Two outputs of a run have the same name.
+    #[error(
+        "--trace {} is the file of --log {}: the log would replace the trace; give them two names", trace.display(),
+        log.display()
+    )]
+    SameOutput {
+        /// The trace.
+        trace: PathBuf,
+        /// The log.
+        log: PathBuf,
+    },
+    /// Another run writes a log of this name.
+    #[error(
+        "--trace {}: another run writes its log {} and would replace the trace; give another file", trace.display(),
+        log.display()
+    )]
+    OutputInUse {
+        /// The trace.
+        trace: PathBuf,
+        /// The log that is being written.
+        log: PathBuf,
+    },
     /// A figure cannot be drawn.
     #[error("{0}; this is a bug, please report it")]
     Figure(String),
@@ -440,6 +462,8 @@ impl Failure {
             Failure::Log(error) => log_code(error),
             Failure::File { .. }
             | Failure::Exists { .. }
+            | Failure::SameOutput { .. }
+            | Failure::OutputInUse { .. }
             | Failure::LogEnded { .. }
             | Failure::TraceEnded { .. } => 6,
             Failure::ReplayMismatch { .. } => 7,
@@ -630,6 +654,20 @@ mod tests {
             (Failure::DrivesNotActive, system),
             (file(), disk),
             (Failure::Exists { path: path() }, disk),
+            (
+                Failure::SameOutput {
+                    trace: path(),
+                    log: path(),
+                },
+                disk,
+            ),
+            (
+                Failure::OutputInUse {
+                    trace: path(),
+                    log: path(),
+                },
+                disk,
+            ),
             (Failure::Log(mcap()), disk),
             (Failure::Read(ReadError::Mcap(mcap())), disk),
             (

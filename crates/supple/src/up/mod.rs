@@ -8,6 +8,7 @@
 //! the emulated pendant; an operator presses a real one.
 
 mod children;
+mod outputs;
 mod plan;
 mod recorder;
 mod stages;
@@ -66,11 +67,7 @@ fn show_budget(args: &UpArgs) -> Result<(), Failure> {
 }
 
 fn sized<const N: usize>(args: &UpArgs, description: &Description) -> Result<(), Failure> {
-    // Check the outputs before any process or file is created.
-    for output in args.log_file().iter().chain(&args.trace) {
-        let checked = supple_files::check_output(output);
-        checked.map_err(|error| Failure::file("write", output, error))?;
-    }
+    outputs::check(args.log_file().as_deref(), args.trace.as_deref())?;
     let domain = Domain::new(args.prefix.as_deref()).map_err(Failure::system)?;
     write_stderr_in_background();
     let stop = interrupt::shutdown_on_interrupt();

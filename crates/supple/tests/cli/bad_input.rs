@@ -188,6 +188,30 @@ fn a_table_is_not_written_over_its_log() {
     }
 }
 
+/// A run whose log would replace its trace is not started.
+#[test]
+fn outputs_of_a_run_that_replace_one_another_are_code_6_before_anything_is_written() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("old.mcap"), "an older log").expect("written");
+    std::os::unix::fs::symlink("old.mcap", folder.path().join("link")).expect("linked");
+    let before = tree(folder.path());
+    let up = ["up", "--plant", "sim", "--virtual-time", "--for", "0.1"];
+    for (log, trace) in [
+        ("same.x", "same.x"),
+        ("same.x", "./same.x"),
+        ("same.x", "same.x.part"),
+        ("old.mcap", "link"),
+    ] {
+        let answer = run_in(
+            folder.path(),
+            &[&up[..], &["--log", log, "--trace", trace]].concat(),
+        );
+        assert_eq!(answer.code, Some(6), "{log} {trace}: {}", answer.stderr);
+        assert_one_clear_line(&answer, &[trace, log, "--trace", "--log", "two names"]);
+    }
+    assert_eq!(tree(folder.path()), before, "no additional files");
+}
+
 #[test]
 fn with_json_errors_of_operator_commands_are_objects_on_standard_output() {
     let folder = tempfile::tempdir().expect("a folder");
