@@ -1,7 +1,7 @@
 //! Complete systems with all client resources exhausted: the operator is still served, and a second operator gets an
 //! orderly error.
 
-use crate::running::{PREFIX, Up, stderr_of, supple, temporary_folder};
+use crate::running::{PREFIX, Up, json, stderr_of, supple, temporary_folder};
 use crate::support::programs;
 use core::time::Duration;
 use rustix::fs::{FlockOperation, flock};
@@ -126,6 +126,11 @@ fn a_system_in_a_fault_is_code_5() {
     kill_process(sim, Signal::STOP).expect("it runs");
     wait_for_mode(&mut reader, Mode::Fault);
     kill_process(sim, Signal::CONT).expect("it runs");
+    let status = up.run(&["status", "--json"]);
+    assert_eq!(status.status.code(), Some(5), "{}", stderr_of(&status));
+    let status = json(&status);
+    assert_eq!(status["mode"], "fault", "{status}");
+    assert!(status["fault"].is_string(), "{status}");
     let output = up.run(&["mode", "idle"]);
     assert_eq!(output.status.code(), Some(5), "{}", stderr_of(&output));
     assert!(String::from_utf8_lossy(&output.stdout).contains("mode fault"));

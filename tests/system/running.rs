@@ -114,7 +114,8 @@ impl Up {
         let mut last = String::new();
         for _ in 0..400 {
             let output = self.run(&["status", "--json"]);
-            if output.status.success() {
+            // With a latched fault the status is printed, too, with code 5.
+            if matches!(output.status.code(), Some(0 | 5)) {
                 let status = json(&output);
                 if condition(&status) {
                     return status;

@@ -120,8 +120,7 @@ pub enum Failure {
     },
     /// The request was accepted, but the system has a latched fault.
     #[error(
-        "the system is in a fault: `supple status` shows it; remove the cause, then clear it with \
-         `supple reset`"
+        "a fault is latched, which `supple status` shows: remove the cause, then clear it with `supple reset`"
     )]
     SystemInFault,
     /// The log ended before the end of the run.

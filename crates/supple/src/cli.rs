@@ -29,7 +29,7 @@ pub enum Command {
     /// Run a system: controller and plant as processes, tracking the sinusoid at 5 N/m, with a log.
     #[command(after_help = CODES)]
     Up(UpArgs),
-    /// Show the state of a running system.
+    /// Show the state of a running system; the exit code is 5 if a fault is latched.
     Status(SystemArgs),
     /// Show a running system, or a log, on a page in the browser; viewers of the Foxglove protocol can connect too.
     #[command(after_help = CODES)]

@@ -132,7 +132,7 @@ impl fmt::Display for LearningStatus {
 /// Reads telemetry for half a second and prints the status.
 ///
 /// # Errors
-/// [`Failure::NotRunning`] if no system is running.
+/// [`Failure::NotRunning`] if no system is running; [`Failure::SystemInFault`] after it is printed, if a fault is latched.
 pub fn status(system: &SystemArgs) -> Result<(), Failure> {
     let (_, mut reader, mut last) = running(system)?;
     let mut statistics = RunStatistics::default();
@@ -145,8 +145,12 @@ pub fn status(system: &SystemArgs) -> Result<(), Failure> {
     }
     let status = Status::new(&last, &statistics);
     match system.json {
-        true => print_json(&status),
-        false => print_line(&status.to_string()),
+        true => print_json(&status)?,
+        false => print_line(&status.to_string())?,
+    }
+    match status.fault {
+        Some(_) => Err(Failure::SystemInFault),
+        None => Ok(()),
     }
 }
 
