@@ -376,7 +376,7 @@ pub struct UpArgs {
     /// Run in virtual time: all processes in lockstep, as fast as possible. Requires --for.
     #[arg(long, requires = "for_s")]
     pub virtual_time: bool,
-    /// The log; an existing file is replaced.
+    /// The log; an existing file is replaced, a missing folder is created.
     #[arg(long, value_name = "FILE", default_value = "out/up.mcap")]
     pub log: PathBuf,
     /// Write no log.

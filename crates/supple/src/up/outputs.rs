@@ -3,14 +3,15 @@
 //! A log is written as `NAME.part` and takes its name at the end: a trace of either name would be lost without a word.
 
 use std::fs::{File, TryLockError};
+use std::io;
 use std::path::{Path, PathBuf};
 use supple_cli::exit::Failure;
-use supple_files::{check_output, with_suffix};
+use supple_files::{check_output, open_output, with_suffix};
 
 /// Suffix of a log that is being written.
 const PART: &str = ".part";
 
-/// Checks that both are regular files, if they exist, and that no log replaces the trace.
+/// Checks that both files can be written and that no log replaces the trace.
 ///
 /// # Errors
 /// [`Failure::File`], [`Failure::SameOutput`], [`Failure::OutputInUse`].
@@ -40,7 +41,12 @@ pub fn check(log: Option<&Path>, trace: Option<&Path>) -> Result<(), Failure> {
             });
         }
     }
-    Ok(())
+    check_writable(trace).map_err(|error| Failure::File {
+        action: "create",
+        path: trace.to_owned(),
+        error,
+        remedy: "give --trace a file in a folder that exists and can be written",
+    })
 }
 
 /// Whether both paths name one file, which need not exist.
@@ -68,6 +74,16 @@ fn is_being_written(path: &Path) -> bool {
     check_output(path).is_ok()
         && File::open(path)
             .is_ok_and(|file| matches!(file.try_lock(), Err(TryLockError::WouldBlock)))
+}
+
+/// Opens the file as its writer will, and leaves the folder as it was.
+fn check_writable(path: &Path) -> io::Result<()> {
+    let exists = path.symlink_metadata().is_ok();
+    open_output(path)?;
+    match exists {
+        true => Ok(()),
+        false => std::fs::remove_file(path),
+    }
 }
 
 #[cfg(test)]
@@ -124,5 +140,16 @@ mod tests {
             let words = message(None, &at(trace));
             assert!(words.contains("run.mcap.part"), "{words}");
         }
+    }
+
+    #[test]
+    fn a_trace_that_cannot_be_written_is_refused() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let trace = folder.path().join("none/trace.csv");
+        let words = message(None, &trace);
+        for part in ["none/trace.csv", "a folder that exists"] {
+            assert!(words.contains(part), "{words}");
+        }
+        assert!(!trace.parent().expect("a folder").exists());
     }
 }

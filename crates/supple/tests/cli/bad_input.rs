@@ -188,7 +188,7 @@ fn a_table_is_not_written_over_its_log() {
     }
 }
 
-/// A run whose log would replace its trace is not started.
+/// A run whose log would replace its trace, or whose trace cannot be written, is not started.
 #[test]
 fn outputs_of_a_run_that_replace_one_another_are_code_6_before_anything_is_written() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -208,6 +208,14 @@ fn outputs_of_a_run_that_replace_one_another_are_code_6_before_anything_is_writt
         );
         assert_eq!(answer.code, Some(6), "{log} {trace}: {}", answer.stderr);
         assert_one_clear_line(&answer, &[trace, log, "--trace", "--log", "two names"]);
+    }
+    for trace in ["/proc/self/x", "none/trace.csv"] {
+        let answer = run_in(
+            folder.path(),
+            &[&up[..], &["--no-log", "--trace", trace]].concat(),
+        );
+        assert_eq!(answer.code, Some(6), "{trace}: {}", answer.stderr);
+        assert_one_clear_line(&answer, &[trace, "a folder that exists"]);
     }
     assert_eq!(tree(folder.path()), before, "no additional files");
 }
