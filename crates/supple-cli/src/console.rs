@@ -85,14 +85,34 @@ struct JsonError {
     message: String,
 }
 
+/// Longest message, and what is kept of a longer one from its beginning and its end \[characters\].
+const MESSAGE_CHARACTERS: usize = 4000;
+const KEPT_CHARACTERS: (usize, usize) = (2000, 500);
+
+/// A message that quotes no more of a file than somebody can read.
+fn shortened(message: String) -> String {
+    let characters = message.chars().count();
+    if characters <= MESSAGE_CHARACTERS {
+        return message;
+    }
+    let (head, tail) = KEPT_CHARACTERS;
+    let at = |character: usize| {
+        let found = message.char_indices().nth(character);
+        found.map_or(message.len(), |(byte, _)| byte)
+    };
+    let (begin, end) = (&message[..at(head)], &message[at(characters - tail)..]);
+    format!("{begin} ... ({characters} characters) ... {end}")
+}
+
 /// Reports a failure: one line on standard error and, in JSON mode, an object on standard output.
 fn report_error(failure: &Failure, as_json: bool) {
-    print_status(&format!("error: {failure}"));
+    let message = shortened(failure.to_string());
+    print_status(&format!("error: {message}"));
     if as_json && !failure.comes_with_results() {
         let error = JsonError {
             kind: failure.kind(),
             exit_code: failure.code(),
-            message: failure.to_string(),
+            message,
         };
         let _ = print_json(&JsonFailure { error });
     }
@@ -109,4 +129,21 @@ pub fn exit_code(result: Result<(), Failure>, as_json: bool) -> ExitCode {
     };
     flush();
     code
+}
+
+#[cfg(test)]
+mod tests {
+    use super::shortened;
+
+    #[test]
+    fn a_long_message_keeps_its_beginning_its_end_and_its_length() {
+        let short = "ä".repeat(4000);
+        assert_eq!(shortened(short.clone()), short);
+        let long = format!("cannot read {}: correct it", "ä".repeat(50_000_000));
+        let message = shortened(long);
+        assert!(message.chars().count() < 2600, "{} bytes", message.len());
+        for part in ["cannot read ä", "(50000024 characters)", "ä: correct it"] {
+            assert!(message.contains(part), "{part}: {message}");
+        }
+    }
 }

@@ -7,6 +7,7 @@
 
 #![forbid(unsafe_code)]
 
+use std::borrow::Cow;
 use std::fs::{File, FileType, Metadata, OpenOptions};
 use std::io::{Error, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
@@ -110,6 +111,20 @@ pub fn read_text(path: &Path, max_bytes: u64) -> Result<String, Error> {
     match read > max_bytes {
         true => Err(too_large(read)),
         false => Ok(text),
+    }
+}
+
+/// Characters of a value that a message quotes.
+pub const EXCERPT_CHARACTERS: usize = 80;
+
+/// A value of a file as a message quotes it: at most its first [`EXCERPT_CHARACTERS`] characters, and then its length.
+pub fn excerpt(value: &str) -> Cow<'_, str> {
+    match value.char_indices().nth(EXCERPT_CHARACTERS) {
+        None => value.into(),
+        Some((end, _)) => {
+            let characters = value.chars().count();
+            format!("{}... ({characters} characters)", &value[..end]).into()
+        }
     }
 }
 

@@ -185,8 +185,10 @@ fn parse_csv(text: &str, dof: usize) -> Result<Log, (String, &'static str)> {
                     let name = names.get(column).map_or("?", String::as_str);
                     (
                         format!(
-                            "line {}, column {name}: `{cell}` is not a number",
-                            number + 1
+                            "line {}, column {}: `{}` is not a number",
+                            number + 1,
+                            supple_files::excerpt(name),
+                            supple_files::excerpt(cell)
                         ),
                         "correct the cell, or remove the line",
                     )

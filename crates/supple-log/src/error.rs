@@ -53,6 +53,12 @@ pub enum LogError {
         /// Valid bytes before it.
         kept_bytes: u64,
     },
+    /// The file has no bytes.
+    #[error("{file} is empty: no log was written to it; give another file, or repeat the run")]
+    Empty {
+        /// File.
+        file: String,
+    },
     /// Not a log of this crate, or a log of another version.
     #[error("{file}: {message}; it is not a log of supple, or one of another version")]
     Format {

@@ -64,6 +64,9 @@ impl Scan {
             Ok((source, bytes)) => (BufReader::new(source), bytes),
             Err(source) => return Err(LogError::Read { file, source }),
         };
+        if bytes == 0 {
+            return Err(LogError::Empty { file });
+        }
         let options = LinearReaderOptions::default()
             .with_emit_chunks(true)
             .with_record_length_limit(usize::try_from(bytes.min(RECORD_LIMIT_BYTES)).unwrap_or(0));
@@ -71,7 +74,7 @@ impl Scan {
             file,
             source,
             reader: LinearReader::new_with_options(options),
-            complete_bytes: mcap::MAGIC.len() as u64,
+            complete_bytes: bytes.min(mcap::MAGIC.len() as u64),
             chunk: VecDeque::new(),
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),

@@ -132,7 +132,7 @@ impl Reporter<'_> {
             file: self.file.to_owned(),
             element: element.into(),
             problem: problem.into(),
-            value: value.to_string(),
+            value: supple_files::excerpt(&value.to_string()).into_owned(),
             remedy: remedy.into(),
         }))
     }

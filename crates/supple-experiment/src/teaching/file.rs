@@ -222,7 +222,7 @@ fn parse(text: &str, file: &str) -> Result<Points, PointsError> {
                 file: file.to_owned(),
                 line: index + 1,
                 column: names[column].to_owned(),
-                value: value.to_owned(),
+                value: supple_files::excerpt(value).into_owned(),
             })
         };
         let tip_m = Vector3::new(number(axes[0])?, number(axes[1])?, number(axes[2])?);

@@ -1,3 +1,4 @@
 //! Files that a user names.
 
+mod excerpts;
 mod special_files;

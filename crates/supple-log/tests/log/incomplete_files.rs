@@ -28,6 +28,29 @@ fn a_log_has_its_final_name_only_when_it_is_complete() {
     assert!(fs::read(&path).expect("read").starts_with(mcap::MAGIC));
 }
 
+/// No byte of an empty file is valid, and there is nothing to recover.
+#[test]
+fn an_empty_file_is_called_empty() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("empty.mcap");
+    fs::write(&path, "").expect("written");
+    let Err(error) = supple_log::Reader::open(&path) else {
+        panic!("nothing was read");
+    };
+    let words = error.to_string();
+    assert!(
+        words.contains("empty.mcap is empty") && !words.contains("bytes"),
+        "{words}"
+    );
+    // Of a file that ends within the first eight bytes no more are valid than there are.
+    fs::write(&path, &mcap::MAGIC[..3]).expect("written");
+    let Err(error) = supple_log::Reader::open(&path) else {
+        panic!("nothing was read");
+    };
+    let words = error.to_string();
+    assert!(words.contains("after 3 valid bytes"), "{words}");
+}
+
 #[test]
 fn a_second_writer_of_the_same_name_is_rejected() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -220,6 +220,22 @@ fn outputs_of_a_run_that_replace_one_another_are_code_6_before_anything_is_writt
     assert_eq!(tree(folder.path()), before, "no additional files");
 }
 
+/// A value of megabytes is not repeated whole.
+#[test]
+fn a_long_value_is_cut_in_the_message() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let value = "x".repeat(2_000_000);
+    let csv = format!("time_s,x_m,y_m,z_m\n0,{value},1,2\n");
+    fs::write(folder.path().join("long.csv"), csv).expect("written");
+    let answer = run_in(folder.path(), &["play", "long.csv"]);
+    assert_eq!(answer.code, Some(3));
+    assert!(answer.stderr.len() < 300, "{} bytes", answer.stderr.len());
+    assert_one_clear_line(
+        &answer,
+        &["long.csv", "line 2", "x_m", "2000000 characters"],
+    );
+}
+
 #[test]
 fn with_json_errors_of_operator_commands_are_objects_on_standard_output() {
     let folder = tempfile::tempdir().expect("a folder");
