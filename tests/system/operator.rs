@@ -183,6 +183,28 @@ fn the_files_of_a_running_system_are_created_anew() {
     assert!(files.iter().all(|file| !file.exists()), "nothing is left");
 }
 
+/// A controller that is stopped hears nobody: the message says what the arm does, and what to do.
+#[test]
+fn idle_of_a_stopped_controller_says_what_the_drives_do() {
+    let (up, ..) = tracking();
+    let controller = up.child("supple-rt");
+    kill_process(controller, Signal::STOP).expect("it runs");
+    let output = up.run(&["mode", "idle"]);
+    kill_process(controller, Signal::CONT).expect("it runs");
+    let words = stderr_of(&output);
+    assert_eq!(output.status.code(), Some(10), "{words}");
+    for part in [
+        "does not answer",
+        "10 ms",
+        "brake",
+        "emergency stop",
+        "supple stop",
+    ] {
+        assert!(words.contains(part), "{part}: {words}");
+    }
+    assert!(!words.contains("start one"), "{words}");
+}
+
 #[test]
 fn a_killed_controller_ends_the_system_with_code_10() {
     let (mut up, ..) = tracking();

@@ -252,6 +252,16 @@ pub enum Failure {
         /// The prefix.
         prefix: String,
     },
+    /// The process of the controller is there, but it does not answer.
+    #[error(
+        "the controller under the prefix `{prefix}` runs but does not answer: it was stopped, or hangs. Its plant sets the \
+         drives to idle 10 ms after the last answer: motors brake, an arm without brakes is laid down. If the arm moves, \
+         press the emergency stop; end the system with `supple stop`"
+    )]
+    ControllerHangs {
+        /// The prefix.
+        prefix: String,
+    },
     /// Learned terms are to be saved, but there are none.
     #[error(
         "nothing is learned yet: begin with `supple learning on`, let the arm move freely for some seconds, and save \
@@ -485,6 +495,7 @@ impl Failure {
             | Failure::AlreadyRunning { .. }
             | Failure::MissingProgram { .. }
             | Failure::ProcessEnded { .. }
+            | Failure::ControllerHangs { .. }
             | Failure::NotRunning { .. } => 10,
             Failure::Refused { .. } | Failure::NothingLearned => 11,
             Failure::Points(error) => match **error {
@@ -702,6 +713,7 @@ mod tests {
                 "no model can be identified",
             ),
             (Failure::NotRunning { prefix: text() }, system),
+            (Failure::ControllerHangs { prefix: text() }, system),
             (
                 Failure::ProcessEnded {
                     name: "",

@@ -87,6 +87,9 @@ fn idle_as_any_request(
     if running(system).is_err() {
         return Err(match error {
             Some(error) => Failure::system(error),
+            None if idle_socket_is_open(domain) => Failure::ControllerHangs {
+                prefix: domain.prefix().to_owned(),
+            },
             None => Failure::NotRunning {
                 prefix: domain.prefix().to_owned(),
             },
