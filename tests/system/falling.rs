@@ -113,3 +113,33 @@ fn a_signal_in_motion_lays_the_arm_down_before_its_motors_are_disabled() {
     assert_eq!(json(&output)["faults"], serde_json::json!([]));
     assert_laid_down(&stderr, &up.folder.path().join("trace.csv"));
 }
+
+/// Gravity hold does not end the laying down, and says so; afterwards the arm can be enabled again.
+#[test]
+fn gravity_hold_is_refused_while_the_arm_is_laid_down() {
+    let how = [
+        "--plant",
+        "emu",
+        "--arm",
+        "yam",
+        "--no-log",
+        "--no-realtime",
+    ];
+    let up = Up::start(&how);
+    up.wait_until("active drives", |status| status["drives"] == "active");
+    let idle = up.run(&["mode", "idle"]);
+    assert!(idle.status.success(), "{}", stderr_of(&idle));
+    up.wait_until("held", |status| status["drives"] == "held");
+    let refused = up.run(&["mode", "gravity-hold"]);
+    let words = stderr_of(&refused);
+    assert_eq!(refused.status.code(), Some(11), "{words}");
+    for part in ["laid down", "drives idle", "`supple mode idle`"] {
+        assert!(words.contains(part), "{part}: {words}");
+    }
+    up.wait_until("a lying arm", |status| status["drives"] == "idle");
+    for mode in ["idle", "gravity-hold"] {
+        let output = up.run(&["mode", mode]);
+        assert!(output.status.success(), "{}", stderr_of(&output));
+    }
+    up.wait_until("active drives", |status| status["drives"] == "active");
+}

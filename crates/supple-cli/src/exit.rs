@@ -252,6 +252,12 @@ pub enum Failure {
         /// The prefix.
         prefix: String,
     },
+    /// The plant holds an arm without brakes and lays it down.
+    #[error(
+        "the arm is being held and laid down, which gravity hold does not end: wait until `supple status` says `drives idle`, \
+         then `supple reset` after a fault, `supple mode idle`, `supple mode gravity-hold`"
+    )]
+    ArmIsLaidDown,
     /// The process of the controller is there, but it does not answer.
     #[error(
         "the controller under the prefix `{prefix}` runs but does not answer: it was stopped, or hangs. Its plant sets the \
@@ -497,7 +503,7 @@ impl Failure {
             | Failure::ProcessEnded { .. }
             | Failure::ControllerHangs { .. }
             | Failure::NotRunning { .. } => 10,
-            Failure::Refused { .. } | Failure::NothingLearned => 11,
+            Failure::Refused { .. } | Failure::NothingLearned | Failure::ArmIsLaidDown => 11,
             Failure::Points(error) => match **error {
                 PointsError::File { .. } => 6,
                 _ => 3,
@@ -744,6 +750,7 @@ mod tests {
             ),
             (Failure::Motors { problem: text() }, system),
             (Failure::Refused { reason: text() }, "refused a request"),
+            (Failure::ArmIsLaidDown, "refused a request"),
             (Failure::DidNotReachTracking, "supple drill"),
             (Failure::Drill { rows: text() }, "supple drill"),
             (

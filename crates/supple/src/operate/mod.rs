@@ -34,7 +34,7 @@ use supple_cli::console::{print_json, print_status};
 use supple_cli::exit::Failure;
 use supple_core::Trajectory;
 use supple_experiment::scenario;
-use supple_ipc::message::{OperatorReply, Outcome, Telemetry};
+use supple_ipc::message::{Drives, OperatorReply, Outcome, Telemetry};
 use supple_ipc::{Domain, IpcError, idle_socket, idle_socket_is_open, request_idle};
 use supple_model::{Description, with_dof};
 use supple_realtime::pause;
@@ -59,9 +59,19 @@ pub fn mode(args: &ModeArgs) -> Result<(), Failure> {
     let system = &args.system;
     match args.mode {
         ModeName::Idle => idle(system),
-        ModeName::GravityHold => ask(system, &SystemRequest::GravityHold),
+        ModeName::GravityHold => gravity_hold(system),
         ModeName::Float => ask(system, &SystemRequest::Float),
         ModeName::JointImpedance => ask(system, &SystemRequest::JointImpedance(args)),
+    }
+}
+
+/// Requests gravity hold, unless the plant itself holds an arm without brakes and lays it down: the controller would accept
+/// the request, and the arm would go on sinking.
+fn gravity_hold(system: &SystemArgs) -> Result<(), Failure> {
+    let (.., telemetry) = running(system)?;
+    match telemetry.state.drives() {
+        Drives::Held => Err(Failure::ArmIsLaidDown),
+        _ => ask(system, &SystemRequest::GravityHold),
     }
 }
 
