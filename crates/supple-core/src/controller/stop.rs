@@ -22,9 +22,10 @@
 //! divided by a twentieth of its joint's limit, the root of the sum of their squares is above one.
 //! The drives brake
 //!
-//! 1. at once or as soon as it shows, if the arm has left its path or its limits and is driven along its weight: the external torques give it power,
-//!    and each is opposite to the gravity compensation of its joint, larger, and at most three times as large. So do reversed
-//!    and dead motors and reversed gravity; an obstacle takes power from the arm, and a stroke shows larger torques;
+//! 1. at once or as soon as it shows, if the arm has left its path or its limits and is driven along its weight: the
+//!    external torques give it power, and each is opposite to the gravity compensation of its joint, larger, and at most
+//!    three times as large. So do reversed and dead motors and reversed gravity; an obstacle takes power from the arm, and
+//!    a stroke shows larger torques;
 //! 2. if the arm moves with over 1.2 times its kinetic energy at the fault and before, see `StoppingMotion`;
 //! 3. if the arm still moves 0.2 s after the fault;
 //! 4. if an external torque above a tenth of a joint's limit acts for 50 ms, either later than 0.15 s after the fault or at a
@@ -49,8 +50,7 @@ const ESTIMATOR_SETTLING_DELAYS: f64 = 2.0;
 const MAX_WINDOW: usize = 16;
 /// Time within which the arm must come to rest \[s\].
 pub(crate) const STOP_TIMEOUT_S: f64 = 0.2;
-/// Ratio to the kinetic energy at the fault and before above which the arm counts as accelerating: twice the error of the
-/// energy from encoders that resolve a twentieth of the speed at which an arm counts as moving.
+/// Ratio to the kinetic energy at the fault and before above which the arm counts as accelerating.
 pub(crate) const ENERGY_GROWTH_LIMIT: f64 = 1.2;
 /// Fraction of a joint's torque limit above which an external torque would move a joint at rest.
 const UNEXPLAINED_SHARE: f64 = 0.1;
@@ -97,11 +97,13 @@ impl<const N: usize> StoppingMotion<N> {
         }
     }
 
-    /// Adds the angles of a cycle. Returns whether the arm moves and has gained energy since the first window.
+    /// Adds the angles of a cycle, which change in steps of `resolution_rad`. Returns whether the arm moves and has gained energy
+    /// since the first window, for certain.
     fn gains_energy(
         &mut self,
         config: &Config<N>,
         position_rad: &Vector<N>,
+        resolution_rad: &Vector<N>,
         terms: &Terms<N>,
         since_fault_s: f64,
     ) -> bool {
@@ -117,14 +119,18 @@ impl<const N: usize> StoppingMotion<N> {
         if elapsed_s <= 0.0 {
             return false;
         }
-        let velocity = (position_rad - from_rad) / elapsed_s;
-        let energy_j = 0.5 * velocity.dot(&(terms.mass_matrix * velocity));
+        let turned_rad = position_rad - from_rad;
+        let energy_j = |velocity: &Vector<N>| 0.5 * velocity.dot(&(terms.mass_matrix * velocity));
         if self.count == window + 1 {
-            self.allowed_j = self.allowed_j.max(energy_j);
+            self.allowed_j = self.allowed_j.max(energy_j(&(turned_rad / elapsed_s)));
         }
+        let certain_rad = turned_rad.zip_map(resolution_rad, |turned, resolution| {
+            turned - turned.clamp(-resolution, resolution)
+        });
+        let velocity = certain_rad / elapsed_s;
         let tip_velocity = terms.jacobian.fixed_rows::<3>(0) * velocity;
         is_moving(&config.limits, &velocity, &tip_velocity)
-            && energy_j > ENERGY_GROWTH_LIMIT * self.allowed_j
+            && energy_j(&velocity) > ENERGY_GROWTH_LIMIT * self.allowed_j
     }
 }
 
@@ -188,7 +194,9 @@ impl<const N: usize> State<N> {
         self.relax_position_limits(config);
         let time_s = self.activity_s(config);
         let motion = &mut self.stopping_motion;
-        let accelerates = motion.gains_energy(config, &self.position, &self.terms, time_s);
+        let resolution_rad = self.stuck_encoders.resolution_rad(controller.encoders());
+        let accelerates =
+            motion.gains_energy(config, &self.position, &resolution_rad, &self.terms, time_s);
         let late = time_s > STOP_TIMEOUT_S && is_moving(&config.limits, &velocity, tip_velocity);
         // The observer follows the velocity estimate.
         let settling_s = ESTIMATOR_SETTLING_DELAYS * controller.delay_s();

@@ -49,6 +49,8 @@ const MOVED_SHARE: f64 = 0.75;
 /// Fraction of the dry friction up to which a ramp may not yet show in such an encoder: presliding has then turned the joint by
 /// two counts or more.
 const UNSEEN_FRICTION_SHARE: f64 = 0.4;
+/// Coarsest resolution of an encoder; one that has not changed has shown none \[rad\].
+const MAX_RESOLUTION_RAD: f64 = 1e-3;
 /// Change of an angle that is none \[rad\].
 const NO_CHANGE_RAD: f64 = 1e-10;
 
@@ -120,6 +122,15 @@ impl<const N: usize> StuckEncoders<N> {
                 self.min_change_rad[encoder] = self.min_change_rad[encoder].min(change_rad);
             }
         }
+    }
+
+    /// Steps in which the angles of the joints change, as far as their encoders have shown: the smallest change of each, at most
+    /// [`MAX_RESOLUTION_RAD`] \[rad\].
+    pub fn resolution_rad(&self, encoders: &Encoders<N>) -> Vector<N> {
+        Vector::from_fn(|joint, _| {
+            let changes = encoders.of(joint).map(|of| self.min_change_rad[of]);
+            changes.fold(0.0, f64::max).min(MAX_RESOLUTION_RAD)
+        })
     }
 
     /// Whether an encoder of a joint is unchanged since the last cycle.
