@@ -40,6 +40,8 @@ enum Defect {
     Late,
     /// The motor of a joint produces no torque.
     Dead(usize),
+    /// The torque of a joint has the wrong sign.
+    Reversed(usize),
     /// Gravity has the opposite sign.
     UpsideDown,
     /// A mass at the tip \[kg\].
@@ -66,6 +68,7 @@ fn case(joints: usize) -> impl Strategy<Value = Case> {
         1 => (0..joints).prop_map(Defect::Sign),
         1 => Just(Defect::Late),
         1 => (0..joints).prop_map(Defect::Dead),
+        1 => (0..joints).prop_map(Defect::Reversed),
         1 => Just(Defect::UpsideDown),
         1 => (0.2..2.0).prop_map(Defect::Load),
     ];
@@ -236,6 +239,9 @@ impl<const N: usize> SimulatedArm<N> {
         if let Some(Defect::Dead(joint)) = self.defect {
             torque[joint] = 0.0;
         }
+        if let Some(Defect::Reversed(joint)) = self.defect {
+            torque[joint] = -torque[joint];
+        }
         let load = match self.defect {
             Some(Defect::Load(mass_kg)) => Vector3::new(0.0, 0.0, -9.81 * mass_kg),
             _ => Vector3::zeros(),
@@ -388,7 +394,7 @@ fn stops<const N: usize>(case: &Case) -> Outcome {
         };
         prop_assert_eq!(output.mode, Mode::Fault);
         let after = since - *begun;
-        if after <= 30 {
+        if after <= 15 {
             *at_j = at_j.max(energy_j);
         }
         prop_assert!(
