@@ -32,6 +32,7 @@ mod set_point;
 mod state;
 mod step;
 mod stop;
+mod stopping_motion;
 mod stuck_encoder;
 mod supervision;
 mod validate;

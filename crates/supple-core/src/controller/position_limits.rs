@@ -8,8 +8,7 @@
 //! [`EDGE_RAD_PER_S`], so that the joint follows it at that speed; and it faults where it moves out by more than
 //! [`OUTWARD_RAD`], or leaves its limit again once it has come back. The margins of the workspace likewise.
 
-use super::state::State;
-use crate::config::{Config, Limits};
+use crate::config::Limits;
 use crate::math::{Vector, Vector3};
 use crate::model::workspace::{MAX_BOUNDARIES, Workspace};
 
@@ -33,7 +32,7 @@ pub(super) struct PositionLimits<const N: usize> {
     /// Depth in the margin of each border from which its spring pushes \[m\]: zero or more.
     pub margin_from_m: [f64; MAX_BOUNDARIES],
     /// Some limit is not that of the configuration.
-    relaxed: bool,
+    pub relaxed: bool,
 }
 
 impl<const N: usize> PositionLimits<N> {
@@ -80,7 +79,7 @@ impl<const N: usize> PositionLimits<N> {
     }
 
     /// The limits that begin where the arm is.
-    fn around(
+    pub fn around(
         limits: &Limits<N>,
         workspace: &Workspace,
         position_rad: &Vector<N>,
@@ -110,7 +109,7 @@ impl<const N: usize> PositionLimits<N> {
     /// Brings the limits back: the edges with their speed, the others as far as the arm has followed.
     #[cold]
     #[inline(never)]
-    fn restore(&mut self, limits: &Limits<N>, position_rad: &Vector<N>, elapsed_s: f64) {
+    pub fn restore(&mut self, limits: &Limits<N>, position_rad: &Vector<N>, elapsed_s: f64) {
         let configured = PositionLimits::new(limits);
         let step_rad = EDGE_RAD_PER_S * elapsed_s;
         let lower_rad = position_rad
@@ -133,26 +132,5 @@ impl<const N: usize> PositionLimits<N> {
             ..*self
         };
         self.relaxed = unflagged != configured;
-    }
-}
-
-impl<const N: usize> State<N> {
-    /// Brings limits that began where the arm was back to those of the configuration.
-    #[inline(always)]
-    pub(super) fn update_position_limits(&mut self, config: &Config<N>, elapsed_s: f64) {
-        let limits = &mut self.position_limits;
-        if limits.relaxed {
-            limits.restore(&config.limits, &self.position, elapsed_s);
-        }
-    }
-
-    /// Lets the limits begin where the arm is. Called in every cycle in which they are not in force: with idle drives,
-    /// without torque, in a fault.
-    #[cold]
-    #[inline(never)]
-    pub(super) fn relax_position_limits(&mut self, config: &Config<N>) {
-        let tip_m = &self.terms.base_from_tip.translation;
-        self.position_limits =
-            PositionLimits::around(&config.limits, &config.workspace, &self.position, tip_m);
     }
 }

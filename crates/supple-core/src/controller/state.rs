@@ -8,7 +8,7 @@ use super::mode::Mode;
 use super::output::Input;
 use super::plausibility::Plausibility;
 use super::position_limits::PositionLimits;
-use super::stop::StoppingMotion;
+use super::stopping_motion::StoppingMotion;
 use super::stuck_encoder::StuckEncoders;
 use crate::config::{Config, Gains, JointGains, Role, RotationalGains};
 use crate::controller::estimator::{Estimator, EstimatorGains};

@@ -8,6 +8,7 @@ use super::fault::Fault;
 use super::latch::Evidence;
 use super::plausibility::{PlausibilityInput, falls, joint_collision, tip_collision};
 use super::pose_task::PoseCycle;
+use super::position_limits::PositionLimits;
 use super::state::State;
 use crate::config::Config;
 use crate::law::impedance::{SINGULAR_BELOW_M, Task};
@@ -22,6 +23,25 @@ fn is_regular<const N: usize>(task: &Task<N>) -> bool {
 }
 
 impl<const N: usize> State<N> {
+    /// Brings limits that began where the arm was back to those of the configuration.
+    #[inline(always)]
+    pub(super) fn update_position_limits(&mut self, config: &Config<N>, elapsed_s: f64) {
+        let limits = &mut self.position_limits;
+        if limits.relaxed {
+            limits.restore(&config.limits, &self.position, elapsed_s);
+        }
+    }
+
+    /// Lets the limits begin where the arm is. Called in every cycle in which they are not in force: with idle drives,
+    /// without torque, in a fault.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn relax_position_limits(&mut self, config: &Config<N>) {
+        let tip_m = &self.terms.base_from_tip.translation;
+        self.position_limits =
+            PositionLimits::around(&config.limits, &config.workspace, &self.position, tip_m);
+    }
+
     #[inline(always)]
     pub(super) fn check(
         &self,

@@ -461,7 +461,28 @@ mod tests {
         let deviations = evaluate(&stuck(NAMED), &metrics, &[]).1;
         assert_eq!(
             deviations,
-            ["0.20 J 0.2 s after the fault, 0.01 J at the fault"]
+            [
+                "0.20 J 1949 ms after the fault, 0.01 J at the fault",
+                "0.20 J 0.2 s after the fault, 0.01 J at the fault"
+            ]
+        );
+    }
+
+    #[test]
+    fn energy_that_grows_until_the_motors_brake_fails() {
+        let peak = |energy_j: f64| {
+            let metrics = run(15, |ms, line| {
+                line.active = ms < 1075;
+                if (1060..1080).contains(&ms) {
+                    line.kinetic_energy_j = energy_j;
+                }
+            });
+            evaluate(&stuck(NAMED), &metrics, &[]).1
+        };
+        assert_eq!(peak(0.11), [""; 0]);
+        assert_eq!(
+            peak(0.13),
+            ["0.13 J 29 ms after the fault, 0.01 J at the fault"]
         );
     }
 

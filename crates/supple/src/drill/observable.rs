@@ -162,7 +162,7 @@ mod tests {
     ) -> Option<u64> {
         let arm = Description::asset("wam4").expect("built in");
         let mut config = arm.config::<4>().expect("four joints");
-        config.plausible.stuck_rad = 0.1001;
+        config.plausible.stuck_rad = 0.10005;
         let at_ns = observable_ns(kind, &config, lines, undisturbed, EVENT_NS);
         at_ns.map(|ns| (ns - EVENT_NS) / MS)
     }
@@ -172,11 +172,11 @@ mod tests {
         let lines = turning(0.5, 0.05);
         let stuck = |joint| InjectionKind::EncoderStuck { joint };
         let after = |kind| observable_ms(kind, &lines, &lines);
-        assert_eq!(after(stuck(Some(1))), Some(2003));
+        assert_eq!(after(stuck(Some(1))), Some(2002));
         assert_eq!(after(stuck(None)), Some(201));
         assert_eq!(after(stuck(Some(3))), None);
         let reversed = InjectionKind::EncoderSign { joint: Some(1) };
-        assert_eq!(after(reversed), Some(1002));
+        assert_eq!(after(reversed), Some(1001));
     }
 
     #[test]

@@ -1,0 +1,87 @@
+//! Motion of a stopping arm: whether it gathers energy.
+
+use super::checks::MOVING_SHARE;
+use crate::config::{Config, Limits};
+use crate::dynamics::Terms;
+use crate::math::{Vector, Vector3, abs};
+
+/// Greatest number of cycles over which the speed of a stopping arm is averaged.
+const MAX_WINDOW: usize = 16;
+/// Ratio to the kinetic energy at the fault and before above which the arm counts as accelerating.
+const ENERGY_GROWTH_LIMIT: f64 = 1.2;
+
+/// Motion of a stopping arm, from its angles alone. The velocity estimate needs several times the lag of its filter until it
+/// shows the speed of an arm that somebody has struck; the mean over half of the lag, `1 / w`, is exact after that time.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct StoppingMotion<const N: usize> {
+    /// Angles of the last cycles \[rad\] and their times since the fault \[s\], the latest at `count - 1`, modulo the length.
+    angles: [(Vector<N>, f64); MAX_WINDOW],
+    count: usize,
+    /// Greatest kinetic energy before the fault, and over the first window \[J\].
+    allowed_j: f64,
+    /// Whether nobody was expected to move the arm.
+    pub follows_reference: bool,
+}
+
+impl<const N: usize> StoppingMotion<N> {
+    /// The motion of an arm that had this kinetic energy \[J\] before its fault, and may have followed a reference.
+    pub fn new(before_j: f64, follows_reference: bool) -> StoppingMotion<N> {
+        StoppingMotion {
+            angles: [(Vector::zeros(), 0.0); MAX_WINDOW],
+            count: 0,
+            allowed_j: before_j,
+            follows_reference,
+        }
+    }
+
+    /// Adds the angles of a cycle, which change in steps of `resolution_rad`. Returns whether the arm moves and has gained energy
+    /// since the first window, for certain.
+    pub fn gains_energy(
+        &mut self,
+        config: &Config<N>,
+        position_rad: &Vector<N>,
+        resolution_rad: &Vector<N>,
+        terms: &Terms<N>,
+        since_fault_s: f64,
+    ) -> bool {
+        let window = (1.0 / (config.estimator_rad_per_s * config.period_s)) as usize + 1;
+        let window = window.min(MAX_WINDOW - 1);
+        self.angles[self.count % MAX_WINDOW] = (*position_rad, since_fault_s);
+        self.count += 1;
+        if self.count <= window {
+            return false;
+        }
+        let (from_rad, from_s) = self.angles[(self.count - 1 - window) % MAX_WINDOW];
+        let elapsed_s = since_fault_s - from_s;
+        if elapsed_s <= 0.0 {
+            return false;
+        }
+        let turned_rad = position_rad - from_rad;
+        let energy_j = |velocity: &Vector<N>| 0.5 * velocity.dot(&(terms.mass_matrix * velocity));
+        if self.count == window + 1 {
+            self.allowed_j = self.allowed_j.max(energy_j(&(turned_rad / elapsed_s)));
+        }
+        let certain_rad = turned_rad.zip_map(resolution_rad, |turned, resolution| {
+            turned - turned.clamp(-resolution, resolution)
+        });
+        let velocity = certain_rad / elapsed_s;
+        let tip_velocity = terms.jacobian.fixed_rows::<3>(0) * velocity;
+        is_moving(&config.limits, &velocity, &tip_velocity)
+            && energy_j(&velocity) > ENERGY_GROWTH_LIMIT * self.allowed_j
+    }
+}
+
+/// Whether a joint or the tip is faster than a fifth of its speed limit.
+pub(super) fn is_moving<const N: usize>(
+    limits: &Limits<N>,
+    velocity_rad_per_s: &Vector<N>,
+    tip_velocity: &Vector3<f64>,
+) -> bool {
+    let tip_limit = MOVING_SHARE * limits.tip_speed_m_per_s;
+    let mut moving = tip_velocity.dot(tip_velocity) > tip_limit * tip_limit;
+    for joint in 0..N {
+        let limit = MOVING_SHARE * limits.joint_speed_rad_per_s[joint];
+        moving |= abs(velocity_rad_per_s[joint]) > limit;
+    }
+    moving
+}
