@@ -34,11 +34,11 @@ fn faults_collisions_and_invalid_requests_give_the_expected_results() {
     let page_name = page.display().to_string();
     let mut arguments = vec!["--markdown", &page_name];
     let wanted = [
-        "sim/track/nothing",
+        "sim/probe/nothing",
         "sim/gravity_hold/bump:joint=3",
         "sim/move/block-in-the-way",
         "sim/track/reply-lost",
-        "sim/track/encoder-sign",
+        "sim/move/encoder-sign",
         "sim/track/stiff-drives-idle-and-back",
         "sim/track/too-fast-request",
         "emu/move/bump:joint=3",
@@ -68,7 +68,7 @@ fn faults_collisions_and_invalid_requests_give_the_expected_results() {
         "{page}"
     );
     assert!(
-        page.contains("| sim/track/encoder-sign:joint=1 |"),
+        page.contains("| sim/move/encoder-sign:joint=1 |"),
         "{page}"
     );
 }
