@@ -67,10 +67,7 @@ fn faults_collisions_and_invalid_requests_give_the_expected_results() {
         page.contains("9 of 9 test cases gave the expected result"),
         "{page}"
     );
-    assert!(
-        page.contains("| sim/move/encoder-sign:joint=1 |"),
-        "{page}"
-    );
+    assert!(page.contains("| sim/move/encoder-sign:joint=1 |"), "{page}");
 }
 
 /// Two runs of a test case in virtual time give the same result.
