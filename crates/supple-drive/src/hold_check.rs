@@ -88,6 +88,11 @@ impl<const N: usize> HoldCheck<N> {
         (fast_s > FAST_S).then_some(joint)
     }
 
+    /// The motors do not damp without torque in this cycle.
+    pub(crate) fn is_not_damping(&mut self) {
+        self.runaway_s = 0.0;
+    }
+
     /// Whether damping does not slow the arm.
     pub(crate) fn runs_away(&self) -> bool {
         self.runaway_s > FAST_S

@@ -173,6 +173,9 @@ impl<const N: usize, D: Drive<N>, L: Link<N>> PlantLoop<N, D, L> {
             Some(velocity) if self.guard.holds() => {
                 let elapsed_s = periods as f64 * self.period_s;
                 self.hold_check.observe(&velocity, elapsed_s);
+                if !matches!(self.guard.stage(), Stage::Damping(..)) {
+                    self.hold_check.is_not_damping();
+                }
             }
             _ => self.hold_check.reset(),
         }

@@ -9,7 +9,7 @@
 //! [`OUTWARD_RAD`], or leaves its limit again once it has come back. The margins of the workspace likewise.
 
 use crate::config::Limits;
-use crate::math::{Vector, Vector3};
+use crate::math::{Vector, Vector3, abs};
 use crate::model::workspace::{MAX_BOUNDARIES, Workspace};
 
 /// Speed at which the edge of a soft zone returns to its place \[rad/s\]: 50 mm/s at 1 m.
@@ -19,6 +19,11 @@ const EDGE_M_PER_S: f64 = 0.05;
 /// Angle by which a joint that is beyond its limit, or just before it, may move further out when its motors take over
 /// its weight \[rad\].
 const OUTWARD_RAD: f64 = 0.02;
+
+/// Fraction of its speed limit up to which a joint rests: a braked one sinks.
+const REST_SHARE: f64 = 0.1;
+/// Angle beyond its limit at which a joint is let out \[rad\]; further out its angle is more likely wrong, and it faults.
+const MAX_BEYOND_RAD: f64 = 0.1;
 
 /// Limits of positions that are in force.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -78,14 +83,26 @@ impl<const N: usize> PositionLimits<N> {
         })
     }
 
-    /// The limits that begin where the arm is.
+    /// The limits that begin where the arm is. Those of the configuration hold for a joint that moves, or is further out than
+    /// [`MAX_BEYOND_RAD`].
     pub fn around(
         limits: &Limits<N>,
         workspace: &Workspace,
         position_rad: &Vector<N>,
+        velocity_rad_per_s: &Vector<N>,
         tip_m: &Vector3<f64>,
     ) -> PositionLimits<N> {
         let configured = PositionLimits::new(limits);
+        let position_rad = &Vector::<N>::from_fn(|joint, _| {
+            let angle = position_rad[joint];
+            let (lower, upper) = (configured.lower_rad[joint], configured.upper_rad[joint]);
+            let near = angle >= lower - MAX_BEYOND_RAD && angle <= upper + MAX_BEYOND_RAD;
+            let slow = REST_SHARE * limits.joint_speed_rad_per_s[joint];
+            match near && abs(velocity_rad_per_s[joint]) <= slow {
+                true => angle,
+                false => 0.5 * (lower + upper),
+            }
+        });
         let mut around = PositionLimits {
             lower_rad: position_rad
                 .add_scalar(-OUTWARD_RAD)

@@ -375,18 +375,19 @@ impl<const N: usize> State<N> {
     /// Latches a fault. The first fault is kept; the safe action can only change from gravity hold
     /// to idle, and an arm without torque stays without torque.
     pub(super) fn latch_fault(&mut self, controller: &Controller<N>, fault: Fault) {
-        let action = self.action_of(controller, &fault);
-        let motion = StoppingMotion::new(self.peak_energy_j, self.follows_reference());
         match self.activity {
-            Activity::Fault(_) if action == SafeAction::Idle => {
+            // `stop.rs` supervises the stop.
+            Activity::Fault(_) if fault.safe_action() == SafeAction::Idle => {
                 self.activity = Activity::Fault(SafeAction::Idle);
             }
             Activity::Fault(_) => {}
             _ => {
+                let action = self.action_of(controller, &fault);
+                self.stopping_motion =
+                    StoppingMotion::new(self.peak_energy_j, self.follows_reference());
                 self.fault = Some(fault);
                 self.enter(Activity::Fault(action));
                 self.handover = Handover::none();
-                self.stopping_motion = motion;
             }
         }
     }

@@ -186,7 +186,8 @@ impl<const N: usize> State<N> {
             true => DRIVING_SHARE,
             false => LED_SHARE,
         };
-        (0..N).all(|joint| {
+        let mut driven = false;
+        let others_fit = (0..N).all(|joint| {
             let (external, gravity) = (external_nm[joint], self.terms.gravity[joint]);
             let strong_nm = PUSH_SHARE * config.limits.joint_torque_nm[joint];
             let reversed_nm = REVERSED_SHARE * abs(gravity);
@@ -194,8 +195,10 @@ impl<const N: usize> State<N> {
             let weak = abs(external) <= strong_nm;
             let along = external * gravity < 0.0
                 && (least * abs(gravity)..=reversed_nm).contains(&abs(external));
+            driven |= !weak && along;
             (weak || along) && !struck
-        })
+        });
+        driven && others_fit
     }
 
     /// Whether an external torque acts that should move the arm: on a joint with an unchanged

@@ -44,10 +44,14 @@ impl<const N: usize> StoppingMotion<N> {
         terms: &Terms<N>,
         since_fault_s: f64,
     ) -> bool {
-        let window = (1.0 / (config.estimator_rad_per_s * config.period_s)) as usize + 1;
-        let window = window.min(MAX_WINDOW - 1);
+        let cycles = 1.0 / (config.estimator_rad_per_s * config.period_s);
+        let window = cycles.min((MAX_WINDOW - 2) as f64) as usize + 1;
         self.angles[self.count % MAX_WINDOW] = (*position_rad, since_fault_s);
-        self.count += 1;
+        // Far beyond any window, with the same place in the ring.
+        self.count = match self.count {
+            usize::MAX => usize::MAX - MAX_WINDOW + 1,
+            count => count + 1,
+        };
         if self.count <= window {
             return false;
         }

@@ -38,8 +38,13 @@ impl<const N: usize> State<N> {
     #[inline(never)]
     pub(super) fn relax_position_limits(&mut self, config: &Config<N>) {
         let tip_m = &self.terms.base_from_tip.translation;
-        self.position_limits =
-            PositionLimits::around(&config.limits, &config.workspace, &self.position, tip_m);
+        self.position_limits = PositionLimits::around(
+            &config.limits,
+            &config.workspace,
+            &self.position,
+            &self.estimator.velocity_rad_per_s,
+            tip_m,
+        );
     }
 
     #[inline(always)]

@@ -71,7 +71,10 @@ impl Stage {
             // Telemetry of cycles before the request.
             Stage::GravityHold(since) if cycle < since => return Action::None,
             Stage::GravityHold(_) | Stage::ActivationRequested => mode != Some(Mode::GravityHold),
-            Stage::Following => !matches!(mode, Some(Mode::GravityHold | Mode::Move | Mode::Track)),
+            Stage::Following => !matches!(
+                mode,
+                Some(Mode::GravityHold | Mode::Move | Mode::Track | Mode::Probe)
+            ),
             Stage::Done | Stage::Ended => return Action::None,
         };
         match self {
@@ -241,7 +244,7 @@ impl Stages {
         }
         let record = telemetry.record();
         let mode = record.mode();
-        if self.stage == Stage::Following && mode == Some(Mode::Track) {
+        if self.stage == Stage::Following && matches!(mode, Some(Mode::Track | Mode::Probe)) {
             self.stage = Stage::Done;
         }
         match self.stage.action(cycle, mode, active, self.period_s) {
@@ -326,7 +329,7 @@ mod tests {
         for stage in [held, Stage::ActivationRequested] {
             assert_eq!(action(stage, 211, Mode::GravityHold, true), Action::Follow);
         }
-        for mode in [Mode::GravityHold, Mode::Move, Mode::Track] {
+        for mode in [Mode::GravityHold, Mode::Move, Mode::Track, Mode::Probe] {
             assert_eq!(action(Stage::Following, 300, mode, true), Action::None);
         }
     }

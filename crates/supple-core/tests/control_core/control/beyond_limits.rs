@@ -168,3 +168,32 @@ fn a_tip_beyond_a_border_comes_back_slowly() {
         assert!(moved_m > wanted_m - 0.01, "{moved_m} of {wanted_m} m");
     }
 }
+
+/// Written before the run: a joint that is further beyond its limit than an arm can sink has a wrong angle, and faults; so does
+/// one that moves beyond its limit while its drives drop out for a cycle.
+#[test]
+fn what_is_far_beyond_its_limit_or_moves_there_faults() {
+    for (beyond_rad, faults) in [(0.09, false), (0.11, true), (1.0, true)] {
+        let config = four();
+        let mut q = bent::<4>();
+        q[1] = config.limits.position_upper_rad[1] + beyond_rad;
+        let (mut rig, _) = resting(config, q, Entry::GravityHold);
+        let fault = rig.cycle().fault;
+        assert_eq!(fault.is_some(), faults, "{beyond_rad} rad: {fault:?}");
+    }
+    let config = four();
+    let limit_rad = config.limits.position_upper_rad[1];
+    let mut q = bent::<4>();
+    q[1] = limit_rad - 0.3;
+    let mut rig = Rig::holding(config, q);
+    let fault = (0..400).find_map(|k| {
+        rig.q[1] += 1e-3;
+        // At 1 rad/s, 0.03 rad before the limit.
+        rig.drives_active = k != 270;
+        rig.cycle().fault.map(|fault| (fault, rig.q[1]))
+    });
+    assert!(
+        matches!(fault, Some((Fault::JointPosition { joint: 1, .. }, at_rad)) if at_rad < limit_rad + 0.0015),
+        "{fault:?}"
+    );
+}
