@@ -3,7 +3,7 @@
 //!
 //! They are those of the configuration, except after a time without them: the drives were idle, or a fault has ended
 //! the motion, and a joint has come to rest in its soft zone or beyond its limit. The whole spring of its soft stop
-//! would throw it off, and the fault beyond the limit would never let it leave. Therefore the limits begin where the
+//! would accelerate it, and the fault beyond the limit would recur at every reset. Therefore the limits begin where the
 //! joint is: its soft stop pushes only beyond an edge that starts at the joint and returns to its place at
 //! [`EDGE_RAD_PER_S`], so that the joint follows it at that speed; and it faults where it moves out by more than
 //! [`OUTWARD_RAD`], or leaves its limit again once it has come back. The margins of the workspace likewise.
@@ -22,7 +22,8 @@ const OUTWARD_RAD: f64 = 0.02;
 
 /// Fraction of its speed limit up to which a joint rests: a braked one sinks.
 const REST_SHARE: f64 = 0.1;
-/// Angle beyond its limit at which a joint is let out \[rad\]; further out its angle is more likely wrong, and it faults.
+/// Angle beyond its limit up to which a resting joint may return \[rad\]; further out its angle is more likely wrong, and it
+/// faults.
 const MAX_BEYOND_RAD: f64 = 0.1;
 
 /// Limits of positions that are in force.

@@ -25,7 +25,7 @@
 //! 1. at once or as soon as it shows, if the arm has left its path or its limits and is driven along its weight: the
 //!    external torques give it power, and each is opposite to the gravity compensation of its joint, larger, and at most
 //!    three times as large. So do reversed and dead motors and reversed gravity; an obstacle takes power from the arm, and
-//!    a stroke shows larger torques;
+//!    an impact shows larger torques;
 //! 2. if the arm moves with over 1.2 times its kinetic energy at the fault and before, see `stopping_motion.rs`;
 //! 3. if the arm still moves 0.2 s after the fault;
 //! 4. if an external torque above a tenth of a joint's limit acts for 50 ms, either later than 0.15 s after the fault or at a
@@ -165,7 +165,7 @@ impl<const N: usize> State<N> {
 
     /// Whether the arm is driven along its weight: the external torques give it power, and each that is strong is opposite to the
     /// gravity compensation of its joint, larger, and at most [`REVERSED_SHARE`] times as large; and it gathers speed. So it
-    /// looks if gravity compensation acts the wrong way, or not at all. A stroke has torques and accelerations that are larger than that.
+    /// looks if gravity compensation acts the wrong way, or not at all. An impact has torques and accelerations that are larger than that.
     #[cold]
     #[inline(never)]
     fn is_driven_along_weight(&self, controller: &Controller<N>, follows_reference: bool) -> bool {
@@ -182,7 +182,7 @@ impl<const N: usize> State<N> {
         if accelerating_nm.dot(&self.estimator.velocity_rad_per_s) <= 0.0 {
             return false;
         }
-        let least = match follows_reference {
+        let min_share = match follows_reference {
             true => DRIVING_SHARE,
             false => LED_SHARE,
         };
@@ -194,7 +194,7 @@ impl<const N: usize> State<N> {
             let struck = abs(accelerating_nm[joint]) > STRUCK_RATIO * (reversed_nm + strong_nm);
             let weak = abs(external) <= strong_nm;
             let along = external * gravity < 0.0
-                && (least * abs(gravity)..=reversed_nm).contains(&abs(external));
+                && (min_share * abs(gravity)..=reversed_nm).contains(&abs(external));
             driven |= !weak && along;
             (weak || along) && !struck
         });

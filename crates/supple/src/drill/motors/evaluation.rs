@@ -5,10 +5,10 @@ use super::course::{Course, Stage};
 use super::metrics::Metrics;
 
 /// Speed that no joint with a motor may exceed while the arm is held and laid down, if it was slower before
-/// Speed of a joint that nothing but damping motors exceed: three times its limit \[rad/s\].
-const FALL_RAD_PER_S: f64 = 6.0;
 /// \[rad/s\].
 const SLOW_RAD_PER_S: f64 = 0.5;
+/// Speed that no joint reaches that damping motors let fall: three times the limit of the joints of OpenArm and YAM \[rad/s\].
+const FALL_RAD_PER_S: f64 = 6.0;
 /// Share by which a joint that was faster may exceed its speed.
 const FASTER: f64 = 1.1;
 /// Distance by which the tip may sink while the arm is held \[mm\].
