@@ -71,8 +71,8 @@ impl Default for ForceSensor {
 /// Torque of hoses and wires along the arm: a spring over each joint angle, `-(k q + preload)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hose<const N: usize> {
-    /// `k` of every joint \[N m/rad\], zero or more; it is relaxed at the joint's zero but for the preload.
-    pub stiffness_nm_per_rad: f64,
+    /// `k` of each joint \[N m/rad\], zero or more; it is relaxed at the joint's zero but for the preload.
+    pub stiffness_nm_per_rad: Vector<N>,
     /// Torque against positive motion at the joint's zero \[N m\].
     pub preload_nm: Vector<N>,
 }
@@ -81,7 +81,7 @@ impl<const N: usize> Hose<N> {
     /// No hose.
     pub fn none() -> Hose<N> {
         Hose {
-            stiffness_nm_per_rad: 0.0,
+            stiffness_nm_per_rad: Vector::zeros(),
             preload_nm: Vector::zeros(),
         }
     }
@@ -103,6 +103,9 @@ pub struct PlantConfig<const N: usize> {
     pub elasticity: Option<Elasticity<N>>,
     /// Hoses along the arm.
     pub hose: Hose<N>,
+    /// Torque limit of each joint \[N m\], by which [`small_joint_fraction`](crate::PlantOptions::small_joint_fraction)
+    /// bounds effects; the plant itself limits no torque.
+    pub joint_torque_nm: Vector<N>,
     /// Motors, encoders, amplifiers.
     pub actuators: ActuatorModel<N>,
     /// Hard stops, if any.
@@ -140,6 +143,7 @@ impl<const N: usize> PlantConfig<N> {
             friction_variation: FrictionVariation::none(),
             elasticity: None,
             hose: Hose::none(),
+            joint_torque_nm: Vector::repeat(f64::INFINITY),
             actuators: ActuatorModel::direct(),
             stops: None,
             tip_radius_m: 0.02,
@@ -173,7 +177,9 @@ impl<const N: usize> PlantConfig<N> {
         if let Some(elasticity) = &self.elasticity {
             elasticity.validate()?;
         }
-        not_negative("hose.stiffness_nm_per_rad", self.hose.stiffness_nm_per_rad)?;
+        for stiffness in &self.hose.stiffness_nm_per_rad {
+            not_negative("hose.stiffness_nm_per_rad", *stiffness)?;
+        }
         for (joint, preload) in self.hose.preload_nm.iter().enumerate() {
             let name = format!("hose.preload_nm of joint {joint}");
             entry(preload.is_finite(), name, *preload, "finite")?;

@@ -58,6 +58,7 @@ impl<const N: usize> PlantConfig<N> {
             friction: control
                 .friction
                 .map(|friction| LuGre::from_friction(&friction)),
+            joint_torque_nm: control.limits.joint_torque_nm,
             actuators: ActuatorModel {
                 joint_from_motor: control.joint_from_motor,
                 counts_per_motor_revolution: Vector::repeat(counts),

@@ -325,7 +325,7 @@ impl<const N: usize> Plant<N> {
         }
         let hose = &self.config.hose;
         if *hose != Hose::none() {
-            torque -= q * hose.stiffness_nm_per_rad + hose.preload_nm;
+            torque -= q.component_mul(&hose.stiffness_nm_per_rad) + hose.preload_nm;
         }
         let tip = self.tip_motion();
         let mut contact = self.world.compute_tip_contact(&tip, dt_s);

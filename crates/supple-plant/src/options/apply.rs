@@ -95,15 +95,26 @@ impl PlantOptions {
                 backlash_rad: self.backlash_rad.unwrap_or(0.0),
             });
         }
-        config.hose.stiffness_nm_per_rad = self.hose_stiffness_nm_per_rad.unwrap_or(0.0);
+        let bound_nm = self.small_joint_fraction.map_or_else(
+            || Vector::repeat(f64::INFINITY),
+            |fraction| config.joint_torque_nm * fraction,
+        );
+        let bounded = |size: f64| bound_nm.map(|bound| size.min(bound));
+        config.hose.stiffness_nm_per_rad = bounded(self.hose_stiffness_nm_per_rad.unwrap_or(0.0));
         if let Some(preload_nm) = self.hose_preload_nm {
-            config.hose.preload_nm = signs(Draw::HosePreload, preload_nm);
+            let sign = signs(Draw::HosePreload, 1.0);
+            config.hose.preload_nm = bounded(preload_nm).component_mul(&sign);
         }
         config.cycle_jitter = self.cycle_jitter_fraction.unwrap_or(0.0);
 
         let actuators = &mut config.actuators;
         if let Some(size_nm) = self.ripple_nm {
-            let cogging = cogging(&actuators.joint_from_motor, size_nm, noise(Draw::Cogging));
+            let sizes_nm = bounded(size_nm);
+            let cogging = cogging(
+                &actuators.joint_from_motor,
+                &sizes_nm,
+                noise(Draw::Cogging),
+            );
             actuators.ripple.extend(cogging);
         }
         if let Some(fraction) = self.torque_ripple_fraction {
@@ -174,21 +185,22 @@ impl PlantOptions {
     }
 }
 
-/// Cogging of all motors whose amplitudes at the joint add up to `size_nm`, with random phases.
+/// Cogging of all motors whose amplitudes at the joint add up to `size_nm` of that joint, with random phases.
 pub(crate) fn cogging<const N: usize>(
     joint_from_motor: &Matrix<N, N>,
-    size_nm: f64,
+    size_nm: &Vector<N>,
     mut noise: Noise,
 ) -> Vec<Ripple> {
     let mut lines = Vec::new();
     for motor in 0..N {
         // A torque of 1 N m at the motor is the inverse of the largest ratio at the joints.
-        let per_joint = joint_from_motor.column(motor).amax();
+        let ratios = joint_from_motor.column(motor).abs();
+        let (joint, per_joint) = (ratios.imax(), ratios.max());
         for (harmonic, share) in COGGING {
             lines.push(Ripple {
                 motor,
                 harmonic,
-                amplitude_nm: size_nm * share * per_joint,
+                amplitude_nm: size_nm[joint] * share * per_joint,
                 phase_rad: TAU * noise.uniform(),
             });
         }

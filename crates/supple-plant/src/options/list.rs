@@ -166,6 +166,9 @@ plant_options! {
     hose_preload_nm: "N m", 0.0..=100.0,
         "Preload of that spring; sign by joint.",
         "assumption.";
+    small_joint_fraction: "1", 0.0..=1.0,
+        "Bound of ripple_nm, hose_preload_nm and the hose's torque per radian at each joint, as a fraction of the joint's torque limit: small joints have small motors and thin wires.",
+        "assumption; cogging of brushless motors is some per cent of their rated torque or less.";
     tool_extra_kg: "kg", 0.0..=100.0,
         "Mass at the tip that the description lacks.",
         "assumption: a tool that was weighed badly, or its cable.";

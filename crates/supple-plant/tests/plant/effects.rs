@@ -99,7 +99,7 @@ fn the_encoder_is_biased_by_a_constant() {
 fn a_hose_is_a_pendulum_about_its_preloaded_rest_angle() {
     let config = PlantConfig {
         hose: Hose {
-            stiffness_nm_per_rad: 2.0,
+            stiffness_nm_per_rad: Vector::repeat(2.0),
             preload_nm: Vector::from([0.4]),
         },
         ..PlantConfig::ideal(wheel(0.0, 0.05))

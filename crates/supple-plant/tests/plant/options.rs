@@ -2,6 +2,7 @@
 
 use crate::common::{wam4, wam4_at};
 use supple_core::{Friction, Vector};
+use supple_model::Description;
 use supple_plant::options::{OPTIONS, REALISTIC};
 use supple_plant::{ActuatorModel, LuGre, Plant, PlantConfig, PlantOptions};
 
@@ -38,6 +39,9 @@ fn alone(name: &str, value: f64) -> PlantOptions {
     *options.value_mut(name).unwrap() = Some(value);
     if ["cable_damping_ratio", "backlash_rad"].contains(&name) {
         options.cable_stiffness_nm_per_rad = Some(3000.0);
+    }
+    if name == "small_joint_fraction" {
+        options.ripple_nm = Some(0.1);
     }
     if ["warm_up_s", "warmed_s"].contains(&name) {
         options.warm_up_dry_fraction = Some(0.5);
@@ -88,6 +92,33 @@ fn the_set_of_geared_motors_has_what_users_report() {
             .iter()
             .all(|d| d.abs() == 0.1)
     );
+}
+
+/// Sizes in N m that a shoulder hardly notices would be a large part of the torque of a wrist's motor.
+#[test]
+fn a_small_joint_has_small_effects() {
+    let arm = Description::asset("wam7").unwrap();
+    let config = PlantConfig::<7>::from_description(&arm).unwrap();
+    let limits_nm = config.joint_torque_nm;
+    let realistic = PlantOptions::realistic();
+    let config = realistic.apply(config).unwrap();
+    let mut ripple_nm = Vector::<7>::zeros();
+    for line in &config.actuators.ripple {
+        let ratio = config.actuators.joint_from_motor.column(line.motor).amax();
+        ripple_nm[line.motor] += line.amplitude_nm / ratio;
+    }
+    let (hose, fraction) = (config.hose, realistic.small_joint_fraction.unwrap());
+    for joint in 0..4 {
+        assert!((ripple_nm[joint] - 0.1).abs() < 1e-12, "{ripple_nm}");
+        assert_eq!(hose.preload_nm[joint].abs(), 0.05);
+        assert_eq!(hose.stiffness_nm_per_rad[joint], 0.1);
+    }
+    for joint in 4..7 {
+        let bound_nm = fraction * limits_nm[joint];
+        assert!((ripple_nm[joint] - bound_nm).abs() < 1e-12, "{ripple_nm}");
+        assert_eq!(hose.preload_nm[joint].abs(), bound_nm.min(0.05));
+        assert_eq!(hose.stiffness_nm_per_rad[joint], bound_nm);
+    }
 }
 
 /// Breakaway against gravity: the motor must give gravity, dry friction, and a tenth of what it transmits.
