@@ -22,10 +22,11 @@
 //! divided by a twentieth of its joint's limit, the root of the sum of their squares is above one.
 //! The drives brake
 //!
-//! 1. at once or as soon as it shows, if the arm has left its path or its limits and is driven along its weight: the
-//!    external torques give it power, and each is opposite to the gravity compensation of its joint, larger, and at most
-//!    three times as large. So do reversed and dead motors and reversed gravity; an obstacle takes power from the arm, and
-//!    an impact shows larger torques;
+//! 1. at once or as soon as it shows, if the arm has left its path or its limits and a multiple of its weight drives it:
+//!    the external torques give it power, all of them along the weight or all against it, each larger than the gravity
+//!    compensation of its joint and at most three times as large. Reversed and dead motors drive it along the weight,
+//!    gravity compensation of the wrong sign against it; an obstacle takes power from the arm, and an impact shows larger
+//!    torques;
 //! 2. if the arm moves with over 1.2 times its kinetic energy at the fault and before, see `stopping_motion.rs`;
 //! 3. if the arm still moves 0.2 s after the fault;
 //! 4. if an external torque above a tenth of a joint's limit acts for 50 ms, either later than 0.15 s after the fault or at a
@@ -125,7 +126,7 @@ impl<const N: usize> State<N> {
         };
         let driven = time_s <= controller.delay_s()
             && self.fault.is_some_and(|fault| is_of_motion(&fault))
-            && self.is_driven_along_weight(controller, self.stopping_motion.follows_reference);
+            && self.is_driven_by_weight(controller, self.stopping_motion.follows_reference);
         if accelerates || late || driven || self.unexplained_s > UNEXPLAINED_S {
             self.activity = Activity::Fault(SafeAction::Idle);
         }
@@ -139,7 +140,7 @@ impl<const N: usize> State<N> {
         if self.activity.is_torque_off()
             || too_fast && self.unexplained_s > UNEXPLAINED_S
             || is_of_motion(fault)
-                && self.is_driven_along_weight(controller, self.follows_reference())
+                && self.is_driven_by_weight(controller, self.follows_reference())
         {
             SafeAction::Idle
         } else {
@@ -163,12 +164,13 @@ impl<const N: usize> State<N> {
         squares.dot(&controller.push_weight_per_nm2) > 1.0
     }
 
-    /// Whether the arm is driven along its weight: the external torques give it power, and each that is strong is opposite to the
-    /// gravity compensation of its joint, larger, and at most [`REVERSED_SHARE`] times as large; and it gathers speed. So it
-    /// looks if gravity compensation acts the wrong way, or not at all. An impact has torques and accelerations that are larger than that.
+    /// Whether a multiple of its weight drives the arm: the external torques give it power, and it gathers speed; those that are
+    /// strong act along the weight, or all against it, and each is larger than the gravity compensation of its joint, at most
+    /// [`REVERSED_SHARE`] times. So it looks if gravity compensation is missing, or if its sign or that of the motors is wrong.
+    /// An impact has torques and accelerations that are larger than that.
     #[cold]
     #[inline(never)]
-    fn is_driven_along_weight(&self, controller: &Controller<N>, follows_reference: bool) -> bool {
+    fn is_driven_by_weight(&self, controller: &Controller<N>, follows_reference: bool) -> bool {
         let config = controller.config();
         let external_nm = self.observer.external_torque_nm();
         let slow = config.limits.joint_speed_rad_per_s * DRIVEN_SPEED_SHARE;
@@ -186,6 +188,7 @@ impl<const N: usize> State<N> {
             true => DRIVING_SHARE,
             false => LED_SHARE,
         };
+        let against_weight = external_nm.dot(&self.terms.gravity) > 0.0;
         let mut driven = false;
         let others_fit = (0..N).all(|joint| {
             let (external, gravity) = (external_nm[joint], self.terms.gravity[joint]);
@@ -193,10 +196,10 @@ impl<const N: usize> State<N> {
             let reversed_nm = REVERSED_SHARE * abs(gravity);
             let struck = abs(accelerating_nm[joint]) > STRUCK_RATIO * (reversed_nm + strong_nm);
             let weak = abs(external) <= strong_nm;
-            let along = external * gravity < 0.0
+            let multiple = (external * gravity > 0.0) == against_weight
                 && (min_share * abs(gravity)..=reversed_nm).contains(&abs(external));
-            driven |= !weak && along;
-            (weak || along) && !struck
+            driven |= !weak && multiple;
+            (weak || multiple) && !struck
         });
         driven && others_fit
     }
