@@ -28,6 +28,7 @@ mod prepared;
 mod presliding;
 mod requests;
 pub mod residual;
+mod reversed_encoder;
 mod set_point;
 mod state;
 mod step;

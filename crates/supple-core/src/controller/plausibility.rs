@@ -4,16 +4,21 @@
 //! |---|---|
 //! | replies lost too often | each lost reply counts as eight received ones; the balance exceeds its limit |
 //! | encoder stuck | see `stuck_encoder.rs` |
-//! | moves against its torque | 20 cycles in which a joint's momentum grows against its net torque; or a joint that moves against its breakaway ramp |
+//! | moves against its torque | 20 cycles in which a joint's momentum grows against its net torque; a joint that moves against its breakaway ramp; or see `reversed_encoder.rs` |
 //! | unmodelled load | a force along gravity for 50 ms, in gravity hold or after the end of a move, or while the tip falls away from its reference |
 //! | collision | the observed external torque or force exceeds its threshold |
 
 use super::fault::Fault;
-use crate::config::PlausibilityLimits;
+use super::reversed_encoder::{Evidence, SuddenReversal};
+use crate::config::{Config, PlausibilityLimits};
 use crate::math::{Vector, Vector3, abs, sqrt};
 
 const LOSS_WEIGHT: u32 = 8;
 const AGAINST_CYCLES: u32 = 20;
+/// Torque that a sudden reversal of a joint needs, as a multiple of the limit of what may oppose its motion.
+const REVERSING_RATIO: f64 = 6.0;
+/// Lags `1 / w` of the velocity estimate within which it follows such a reversal to some hundredths.
+const SETTLING_LAGS: f64 = 5.0;
 const LOAD_S: f64 = 0.05;
 /// Maximum ratio of the force perpendicular to gravity to the force along it, for a load.
 const MAX_LATERAL_SHARE: f64 = 0.5;
@@ -25,6 +30,7 @@ pub(super) struct Plausibility<const N: usize> {
     losses: [u32; N],
     opposed_cycles: [u32; N],
     last_momentum: Vector<N>,
+    reversal: Option<SuddenReversal>,
     load_s: f64,
 }
 
@@ -34,9 +40,46 @@ impl<const N: usize> Default for Plausibility<N> {
             losses: [0; N],
             opposed_cycles: [0; N],
             last_momentum: Vector::zeros(),
+            reversal: None,
             load_s: 0.0,
         }
     }
+}
+
+/// Limits of a motion against its torque.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct AgainstLimits<const N: usize> {
+    /// Torque that may oppose a joint's acceleration \[N m\].
+    torque_nm: Vector<N>,
+    /// Sum of the squared changes of the momentum within a period below which no joint has turned round suddenly
+    /// \[(N m s)^2\].
+    sudden_momentum_squared: f64,
+    /// Cycles within which the velocity estimate follows a sudden reversal.
+    settling_cycles: u32,
+}
+
+impl<const N: usize> AgainstLimits<N> {
+    pub fn new(config: &Config<N>) -> AgainstLimits<N> {
+        let torque_nm = config.limits.joint_torque_nm * config.plausible.against_share;
+        let least_nm_s = REVERSING_RATIO * torque_nm.min() * config.period_s;
+        AgainstLimits {
+            torque_nm,
+            sudden_momentum_squared: least_nm_s * least_nm_s,
+            settling_cycles: (SETTLING_LAGS / (config.estimator_rad_per_s * config.period_s))
+                as u32
+                + 1,
+        }
+    }
+}
+
+/// Motion of the joints in a cycle.
+pub(super) struct JointMotion<'a, const N: usize> {
+    /// Generalised momentum \[N m s\].
+    pub momentum: &'a Vector<N>,
+    /// Of the joints \[rad/s\].
+    pub velocity_rad_per_s: &'a Vector<N>,
+    /// Of their references \[rad/s\].
+    pub reference_rad_per_s: &'a Vector<N>,
 }
 
 impl<const N: usize> Plausibility<N> {
@@ -76,6 +119,7 @@ impl<const N: usize> Plausibility<N> {
     /// Resets the accumulated evidence at a change of activity.
     pub fn begin(&mut self) {
         self.opposed_cycles = [0; N];
+        self.reversal = None;
         self.load_s = 0.0;
     }
 
@@ -84,17 +128,28 @@ impl<const N: usize> Plausibility<N> {
         self.last_momentum = *momentum;
     }
 
-    /// `net_torque` is the rate of change of the momentum without external torque \[N m\].
+    /// Checks that no joint moves against its torque. `net_torque` is the rate of change of the momentum without external
+    /// torque \[N m\], the velocities are those of the joints and of their references \[rad/s\].
+    #[inline(always)]
     pub fn check_against_torque(
         &mut self,
-        momentum: &Vector<N>,
+        limits: &AgainstLimits<N>,
+        motion: &JointMotion<'_, N>,
         net_torque: &Vector<N>,
-        limit_nm: &Vector<N>,
+        elapsed_s: f64,
     ) -> Result<(), Fault> {
+        let momentum = motion.momentum;
         let last = core::mem::replace(&mut self.last_momentum, *momentum);
+        let change = momentum - last;
+        if change.dot(&change) > limits.sudden_momentum_squared {
+            self.note_reversal(limits, motion, &change, elapsed_s);
+        }
+        if self.reversal.is_some() {
+            self.check_reversal(limits, motion)?;
+        }
         for joint in 0..N {
-            let limit_nm = limit_nm[joint];
-            let accelerates = (momentum[joint] - last[joint]) * momentum[joint] > 0.0;
+            let limit_nm = limits.torque_nm[joint];
+            let accelerates = change[joint] * momentum[joint] > 0.0;
             let opposed =
                 net_torque[joint] * momentum[joint] < 0.0 && abs(net_torque[joint]) > limit_nm;
             if accelerates && opposed {
@@ -111,6 +166,59 @@ impl<const N: usize> Plausibility<N> {
             }
         }
         Ok(())
+    }
+
+    /// Notes a joint that has turned against its reference suddenly. `change` is that of the momentum \[N m s\].
+    #[cold]
+    #[inline(never)]
+    fn note_reversal(
+        &mut self,
+        limits: &AgainstLimits<N>,
+        motion: &JointMotion<'_, N>,
+        change: &Vector<N>,
+        elapsed_s: f64,
+    ) {
+        if self.reversal.is_some() {
+            return;
+        }
+        for joint in 0..N {
+            let turned_round =
+                motion.velocity_rad_per_s[joint] * motion.reference_rad_per_s[joint] < 0.0;
+            let torque_nm = abs(change[joint]) / elapsed_s;
+            if turned_round && torque_nm > REVERSING_RATIO * limits.torque_nm[joint] {
+                self.reversal = Some(SuddenReversal::new(joint, torque_nm));
+            }
+        }
+    }
+
+    /// Follows a joint that has turned round suddenly.
+    #[cold]
+    #[inline(never)]
+    fn check_reversal(
+        &mut self,
+        limits: &AgainstLimits<N>,
+        motion: &JointMotion<'_, N>,
+    ) -> Result<(), Fault> {
+        let Some(reversal) = &mut self.reversal else {
+            return Ok(());
+        };
+        let joint = reversal.joint;
+        let (velocity, reference) = (
+            motion.velocity_rad_per_s[joint],
+            motion.reference_rad_per_s[joint],
+        );
+        match reversal.follow(velocity, reference, limits.settling_cycles) {
+            Evidence::Open => Ok(()),
+            Evidence::Refuted => {
+                self.reversal = None;
+                Ok(())
+            }
+            Evidence::Reversed => Err(Fault::MotionAgainstTorque {
+                joint,
+                value_nm: reversal.torque_nm,
+                limit_nm: REVERSING_RATIO * limits.torque_nm[joint],
+            }),
+        }
     }
 
     /// Discards the evidence of a load.

@@ -5,7 +5,8 @@
 //! the motion, and a joint has come to rest in its soft zone or beyond its limit. The whole spring of its soft stop
 //! would accelerate it, and the fault beyond the limit would recur at every reset. Therefore the limits begin where the
 //! joint is: its soft stop pushes only beyond an edge that starts at the joint and returns to its place at
-//! [`EDGE_RAD_PER_S`], so that the joint follows it at that speed; and it faults where it moves out by more than
+//! [`EDGE_RAD_PER_S`], or at once as far as somebody moves the joint back, so that the joint follows it at that speed; and it
+//! faults where it moves out by more than
 //! [`OUTWARD_RAD`], or leaves its limit again once it has come back. The margins of the workspace likewise.
 
 use crate::config::Limits;
@@ -124,10 +125,15 @@ impl<const N: usize> PositionLimits<N> {
         around
     }
 
-    /// Brings the limits back: the edges with their speed, the others as far as the arm has followed.
-    #[cold]
-    #[inline(never)]
-    pub fn restore(&mut self, limits: &Limits<N>, position_rad: &Vector<N>, elapsed_s: f64) {
+    /// Brings the limits back: the edges with their speed, all of them as far as the arm has come back.
+    pub fn restore(
+        &mut self,
+        limits: &Limits<N>,
+        workspace: &Workspace,
+        position_rad: &Vector<N>,
+        tip_m: &Vector3<f64>,
+        elapsed_s: f64,
+    ) {
         let configured = PositionLimits::new(limits);
         let step_rad = EDGE_RAD_PER_S * elapsed_s;
         let lower_rad = position_rad
@@ -140,10 +146,17 @@ impl<const N: usize> PositionLimits<N> {
         self.upper_rad = self.upper_rad.inf(&upper_rad);
         let soft_lower_rad = self.soft_lower_rad.add_scalar(step_rad);
         let soft_upper_rad = self.soft_upper_rad.add_scalar(-step_rad);
-        self.soft_lower_rad = soft_lower_rad.inf(&configured.soft_lower_rad);
-        self.soft_upper_rad = soft_upper_rad.sup(&configured.soft_upper_rad);
-        for from_m in &mut self.margin_from_m {
-            *from_m = (*from_m - EDGE_M_PER_S * elapsed_s).max(0.0);
+        self.soft_lower_rad = soft_lower_rad
+            .sup(position_rad)
+            .inf(&configured.soft_lower_rad);
+        self.soft_upper_rad = soft_upper_rad
+            .inf(position_rad)
+            .sup(&configured.soft_upper_rad);
+        for (from_m, border) in self.margin_from_m.iter_mut().zip(&workspace.borders) {
+            let depth_m = border
+                .as_ref()
+                .map_or(0.0, |border| workspace.margin_depth_m(border, tip_m).0);
+            *from_m = (*from_m - EDGE_M_PER_S * elapsed_s).min(depth_m).max(0.0);
         }
         let unflagged = PositionLimits {
             relaxed: configured.relaxed,

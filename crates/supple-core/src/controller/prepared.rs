@@ -4,6 +4,7 @@ use super::encoders::Encoders;
 use super::estimator::EstimatorGains;
 use super::limiter::MotorGroups;
 use super::nullspace::nullspace_damping_nm_s_per_rad;
+use super::plausibility::AgainstLimits;
 use super::validate::{self, ConfigError};
 use crate::config::{Config, RippleTable};
 use crate::law::task::count_active;
@@ -37,6 +38,7 @@ pub struct Controller<const N: usize> {
     pub(super) push_weight_per_nm2: Vector<N>,
     /// Force of an unmodelled load times gravity \[N m/s^2\].
     load_n_m_per_s2: f64,
+    against: AgainstLimits<N>,
     pub(super) stop_step_nm: Vector<N>,
     pub(super) nullspace_damping_nm_s_per_rad: Vector<N>,
     pub(super) learned_bounds: LearnedBounds<N>,
@@ -94,6 +96,7 @@ impl<const N: usize> Controller<N> {
                 let gravity = config.arm.gravity();
                 config.plausible.load_n * sqrt(gravity.dot(&gravity))
             },
+            against: AgainstLimits::new(&config),
             stop_step_nm: Vector::from_fn(|i, _| {
                 let slow = config.limits.torque_rate_nm_per_s[i];
                 let fast = config.limits.joint_torque_nm[i] / STOP_TORQUE_S;
@@ -179,6 +182,11 @@ impl<const N: usize> Controller<N> {
     /// Scalar product of force and gravity above which a force on the tip may be an unmodelled load \[N m/s^2\].
     pub(super) fn load_n_m_per_s2(&self) -> f64 {
         self.load_n_m_per_s2
+    }
+
+    /// Limits of a motion against its torque.
+    pub(super) fn against_limits(&self) -> &AgainstLimits<N> {
+        &self.against
     }
 
     /// What the encoders see.

@@ -117,6 +117,7 @@ impl<G: Interpolate> GainRamp<G> {
     }
 
     /// The gains in force.
+    #[inline(always)]
     pub fn current(&self) -> G {
         if self.elapsed_s >= self.ramp_s {
             return self.to;
@@ -374,6 +375,8 @@ impl<const N: usize> State<N> {
 
     /// Latches a fault. The first fault is kept; the safe action can only change from gravity hold
     /// to idle, and an arm without torque stays without torque.
+    #[cold]
+    #[inline(never)]
     pub(super) fn latch_fault(&mut self, controller: &Controller<N>, fault: Fault) {
         match self.activity {
             // `stop.rs` supervises the stop.

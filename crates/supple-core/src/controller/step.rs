@@ -126,15 +126,8 @@ pub fn step<const N: usize>(
     }
     state.blend_torque(controller, &mut torques);
     let total = checks::total(&torques).unwrap_or_else(|fault| {
-        state.latch_fault(controller, fault);
         reference = None;
-        torques = state.safe_torques(controller);
-        checks::total(&torques).unwrap_or_else(|_| {
-            // Not even the safe action can be computed.
-            state.activity = Activity::Fault(SafeAction::Idle);
-            torques = Torques::zeros();
-            Vector::zeros()
-        })
+        state.replace_torques(controller, fault, &mut torques)
     });
     if !state.drives_active {
         // The drives are idle: reset the rate limiter, so that gravity compensation is complete
@@ -165,7 +158,6 @@ pub fn step<const N: usize>(
         fault: state.fault,
         safe_action: state.safe_action(),
         refusal,
-        torques,
         torque_limited: limited.torque_limited,
         rate_limited: limited.rate_limited,
         position_rad: state.position,
@@ -186,5 +178,28 @@ pub fn step<const N: usize>(
         in_contact: state.latch.in_contact(),
         friction_share: state.latch.friction_share(),
         min_singular_value_m: task.map_or(0.0, |task| task.min_singular_value_m),
+        // Last, so that they are copied once.
+        torques,
+    }
+}
+
+impl<const N: usize> State<N> {
+    /// Latches the fault of torques that are not finite and replaces them by those of the safe action; returns their sum.
+    #[cold]
+    #[inline(never)]
+    fn replace_torques(
+        &mut self,
+        controller: &Controller<N>,
+        fault: Fault,
+        torques: &mut Torques<N>,
+    ) -> Vector<N> {
+        self.latch_fault(controller, fault);
+        *torques = self.safe_torques(controller);
+        checks::total(torques).unwrap_or_else(|_| {
+            // Not even the safe action can be computed.
+            self.activity = Activity::Fault(SafeAction::Idle);
+            *torques = Torques::zeros();
+            Vector::zeros()
+        })
     }
 }

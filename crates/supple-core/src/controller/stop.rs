@@ -139,8 +139,7 @@ impl<const N: usize> State<N> {
         let too_fast = matches!(fault, Fault::JointSpeed { .. } | Fault::TipSpeed { .. });
         if self.activity.is_torque_off()
             || too_fast && self.unexplained_s > UNEXPLAINED_S
-            || is_of_motion(fault)
-                && self.is_driven_by_weight(controller, self.follows_reference())
+            || is_of_motion(fault) && self.is_driven_by_weight(controller, self.follows_reference())
         {
             SafeAction::Idle
         } else {

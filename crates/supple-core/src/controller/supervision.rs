@@ -6,7 +6,7 @@ use super::checks;
 use super::checks::COMPLIANT_SPEED_SHARE;
 use super::fault::Fault;
 use super::latch::Evidence;
-use super::plausibility::{PlausibilityInput, falls, joint_collision, tip_collision};
+use super::plausibility::{JointMotion, PlausibilityInput, falls, joint_collision, tip_collision};
 use super::pose_task::PoseCycle;
 use super::position_limits::PositionLimits;
 use super::state::State;
@@ -26,9 +26,28 @@ impl<const N: usize> State<N> {
     /// Brings limits that began where the arm was back to those of the configuration.
     #[inline(always)]
     pub(super) fn update_position_limits(&mut self, config: &Config<N>, elapsed_s: f64) {
-        let limits = &mut self.position_limits;
-        if limits.relaxed {
-            limits.restore(&config.limits, &self.position, elapsed_s);
+        if self.position_limits.relaxed {
+            self.restore_position_limits(config, elapsed_s);
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn restore_position_limits(&mut self, config: &Config<N>, elapsed_s: f64) {
+        let tip_m = &self.terms.base_from_tip.translation;
+        self.position_limits.restore(
+            &config.limits,
+            &config.workspace,
+            &self.position,
+            tip_m,
+            elapsed_s,
+        );
+        if self.holds_pose() {
+            let limits = &self.position_limits;
+            self.held_setpoint_rad = self
+                .held_setpoint_rad
+                .sup(&limits.soft_lower_rad)
+                .inf(&limits.soft_upper_rad);
         }
     }
 
@@ -208,6 +227,15 @@ impl<const N: usize> State<N> {
             && reference_rad_per_s.iter().all(|speed| *speed == 0.0)
     }
 
+    /// Whether the arm holds a pose: in gravity hold, or after the end of a move.
+    fn holds_still(&self, config: &Config<N>) -> bool {
+        match &self.activity {
+            Activity::GravityHold => true,
+            Activity::Move { duration_s, .. } => self.activity_s(config) > *duration_s,
+            _ => false,
+        }
+    }
+
     /// Checks the borders and zones of the workspace.
     pub(super) fn check_workspace(
         &self,
@@ -257,11 +285,6 @@ impl<const N: usize> State<N> {
         evidence: &PlausibilityInput<'_, N>,
     ) -> Result<(), Fault> {
         let (config, encoders) = (controller.config(), controller.encoders());
-        let resting = match &self.activity {
-            Activity::GravityHold => true,
-            Activity::Move { duration_s, .. } => self.activity_s(config) > *duration_s,
-            _ => false,
-        };
         let (plausibility, stuck) = (&mut self.plausibility, &mut self.stuck_encoders);
         if evidence.elapsed_s > 0.0 {
             let velocity = &self.estimator.velocity_rad_per_s;
@@ -272,11 +295,16 @@ impl<const N: usize> State<N> {
                 &config.limits.joint_speed_rad_per_s,
                 evidence.elapsed_s,
             )?;
-            let limits = config.limits.joint_torque_nm * config.plausible.against_share;
+            let motion = JointMotion {
+                momentum: &self.terms.momentum,
+                velocity_rad_per_s: velocity,
+                reference_rad_per_s: evidence.reference_rad_per_s,
+            };
             let against = plausibility.check_against_torque(
-                &self.terms.momentum,
+                controller.against_limits(),
+                &motion,
                 evidence.net_torque_nm,
-                &limits,
+                evidence.elapsed_s,
             );
             // Not checked in a fault: a stopping arm may be pushed back, and `stop.rs` supervises
             // the stop.
@@ -317,7 +345,7 @@ impl<const N: usize> State<N> {
             return Ok(());
         }
         tip_collision(tip_force_n, evidence.force_n)?;
-        if resting || evidence.falls {
+        if evidence.falls || self.holds_still(config) {
             let (gravity, limit_n) = (config.arm.gravity(), config.plausible.load_n);
             self.plausibility.check_unmodelled_load(
                 evidence.force_n,

@@ -197,7 +197,10 @@ impl Workspace {
         margin_from_m: &[f64; MAX_BOUNDARIES],
     ) -> Vector3<f64> {
         let mut force = Vector3::zeros();
-        for (border, from_m) in self.borders.iter().flatten().zip(margin_from_m) {
+        for (border, from_m) in self.borders.iter().zip(margin_from_m) {
+            let Some(border) = border else {
+                continue;
+            };
             let (depth_m, towards) = self.margin_depth_m(border, tip_m);
             if depth_m > 0.0 {
                 let closing = velocity_m_per_s.dot(&towards).max(0.0);

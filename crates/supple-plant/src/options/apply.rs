@@ -110,11 +110,7 @@ impl PlantOptions {
         let actuators = &mut config.actuators;
         if let Some(size_nm) = self.ripple_nm {
             let sizes_nm = bounded(size_nm);
-            let cogging = cogging(
-                &actuators.joint_from_motor,
-                &sizes_nm,
-                noise(Draw::Cogging),
-            );
+            let cogging = cogging(&actuators.joint_from_motor, &sizes_nm, noise(Draw::Cogging));
             actuators.ripple.extend(cogging);
         }
         if let Some(fraction) = self.torque_ripple_fraction {

@@ -8,7 +8,8 @@ use supple_ipc::message::{Drives, MAX_DOF, Telemetry};
 
 /// Time after a fault from which the tip must be slow \[ns\].
 const STOPPED_NS: u64 = 500_000_000;
-/// Time after a fault from which the kinetic energy may not exceed that at the fault \[ns\].
+/// Time after a fault from which the kinetic energy may not exceed that at the fault, and time before an event in which the
+/// energy of the undisturbed motion is measured \[ns\].
 const ENERGY_CHECK_NS: u64 = 200_000_000;
 /// Time within which braking motors have their effect \[ns\].
 const BRAKING_NS: u64 = 10_000_000;
@@ -71,7 +72,7 @@ pub struct RowMetrics {
     pub braked_after_ms: Option<f64>,
     /// Last time at which the tip was faster than 0.25 m/s while the motors did not brake; 0 if never \[ms\].
     pub moving_until_ms: f64,
-    /// Maximum kinetic energy from the start of the task to the event \[J\].
+    /// Maximum kinetic energy in the 0.2 s before the event \[J\].
     pub energy_before_j: f64,
     /// Kinetic energy at the fault, or when braking began \[J\].
     pub energy_at_fault_j: Option<f64>,
@@ -162,7 +163,9 @@ impl RowMetrics {
                 .map(|line| line.tip_speed_m_per_s)),
             energy_before_j: max(lines
                 .iter()
-                .filter(|line| (task_start_ns..event_ns).contains(&line.time_ns))
+                .filter(|line| {
+                    (event_ns.saturating_sub(ENERGY_CHECK_NS)..event_ns).contains(&line.time_ns)
+                })
                 .map(|line| line.kinetic_energy_j)),
             tip_after_m_per_s: max(after.iter().map(|line| line.tip_speed_m_per_s)),
             tip_moved_m: event_tip_m.map_or(0.0, |event_tip_m| {

@@ -250,7 +250,7 @@ or emulated (`emu`) arm that performs a task, and one event. The expected result
 
 - **moving until**: last time after the event at which the tip was faster than 0.25 m/s while the motors did not brake.
 - **energy at fault / peak / 0.2 s later**: kinetic energy at the fault, or when braking began; its maximum from then until
-  10 ms after braking began, at most half as much again as at the fault or before the event, or 0.12 J (0.25 m/s); and its
+  10 ms after braking began, at most half as much again as at the fault or in the 0.2 s before the event, or 0.12 J (0.25 m/s); and its
   maximum from 0.2 s later, at most that at the fault. An arm that descends on shorted motors has up to 0.05 J, the 7-joint
   arm 0.08 J.
 - **tip 0.5 s later**: maximum tip speed from 0.5 s after the fault, while the motors do not brake.

@@ -13,6 +13,7 @@ use crate::support::rig::{Rig, bent};
 use proptest::prelude::*;
 use supple_core::config::{Border, Collision, Config};
 use supple_core::controller::{Fault, Mode, Request, SafeAction};
+use supple_core::dynamics::tip_pose;
 use supple_core::math::Vector3;
 use supple_core::{Input, Vector};
 
@@ -117,7 +118,14 @@ fn a_joint_beyond_its_limit_comes_back_slowly() {
         let side = if above { 1.0 } else { -1.0 };
         beyond::<3>(three(), joint, side, beyond_rad, entry)?;
         // The shoulder roll is held elsewhere.
-        beyond::<4>(four(), [0, 1, 3][joint], side, beyond_rad, entry)
+        let joint = [0, 1, 3][joint];
+        beyond::<4>(four(), joint, side, beyond_rad, entry)?;
+        // A gravity hold that keeps the pose takes it along.
+        let config = Config {
+            hold_pose: true,
+            ..four()
+        };
+        beyond::<4>(config, joint, side, beyond_rad, entry)
     });
 }
 
@@ -195,5 +203,49 @@ fn what_is_far_beyond_its_limit_or_moves_there_faults() {
     assert!(
         matches!(fault, Some((Fault::JointPosition { joint: 1, .. }, at_rad)) if at_rad < limit_rad + 0.0015),
         "{fault:?}"
+    );
+}
+
+/// Written before the run: a hand moves a joint out of its zone and the tip out of a margin within half a second, long before
+/// the edges would have returned. From then on they are those of the configuration.
+#[test]
+fn limits_follow_an_arm_that_somebody_moves_back() {
+    let mut config = four();
+    config.collision = Collision::disabled();
+    let upper_rad = config.limits.position_upper_rad[1];
+    let edge_rad = upper_rad - config.limits.soft_zone_rad;
+    let mut q = bent::<4>();
+    q[1] = upper_rad + 0.05;
+    let mut back = q;
+    back[1] = edge_rad - 0.05;
+    let at_m = |q| tip_pose(&config.arm, &q).translation;
+    let towards = (at_m(q) - at_m(back)).normalize();
+    config.workspace = bordered(Border::Wall {
+        normal: towards,
+        offset_m: at_m(back).dot(&towards) + 0.06,
+    });
+    let (mut rig, _) = resting(config, q, Entry::GravityHold);
+    let torques = |rig: &mut Rig<4>| {
+        let output = rig.cycle();
+        assert_eq!(output.fault, None, "{}", rig.q[1]);
+        output.torques.soft_stop
+    };
+    assert!(torques(&mut rig).norm() < 1.0, "thrown");
+    for k in 0..=500 {
+        rig.q = q + (back - q) * (f64::from(k) / 500.0);
+        torques(&mut rig);
+    }
+    rig.rest();
+    // Into the zone again, by a fifth of it.
+    let depth_rad = 0.2 * config.limits.soft_zone_rad;
+    for k in 0..=500 {
+        rig.q[1] = back[1] + (edge_rad + depth_rad - back[1]) * f64::from(k) / 500.0;
+        torques(&mut rig);
+    }
+    let pushed_nm = -torques(&mut rig)[1];
+    let spring_nm = config.limits.soft_stiffness_nm_per_rad[1] * depth_rad;
+    assert!(
+        pushed_nm > 0.9 * spring_nm,
+        "{pushed_nm} of {spring_nm} N m"
     );
 }
