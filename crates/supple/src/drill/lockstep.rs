@@ -8,12 +8,11 @@ use super::spec::{Activation, DriveShutdown, Event, InvalidRequest, Spec, TestTa
 use super::task::{Script, law_force_n, weight_n};
 use super::test_arms::TestArm;
 use super::trace::{self, TraceRow};
-use crate::cli::{PlantKind, UpArgs, UpTrajectory};
+use crate::cli::{PlantKind, UpArgs};
 use crate::up::{START_S, System};
 use core::time::Duration;
-use std::path::PathBuf;
 use std::time::Instant;
-use supple_cli::arguments::{PlantArgs, UrdfArgs};
+use supple_cli::arguments::PlantArgs;
 use supple_cli::exit::Failure;
 use supple_core::dynamics::{jacobian, potential_energy};
 use supple_core::{Config, Vector};
@@ -210,16 +209,7 @@ impl Times {
         let at_rest = matches!(spec.task, TestTask::GravityHold | TestTask::Float);
         let pushed = spec.event == Event::Obstacle && at_rest;
         UpArgs {
-            urdf: UrdfArgs::default(),
-            plant: spec.plant,
-            arm: arm.name.clone(),
             strict: arm.strict,
-            track: UpTrajectory::Sinusoid,
-            bus: None,
-            budget: false,
-            zero_at_home: false,
-            learn: false,
-            tare: false,
             block_m: (spec.event == Event::Obstacle).then_some(match spec.task {
                 TestTask::Probe => 0.0,
                 // The ramp moves the tip by some millimetres only.
@@ -228,21 +218,15 @@ impl Times {
                 _ => -(BLOCK_CLEARANCE_M + cap_m),
             }),
             inject: injections(spec, self, pushed.then_some(push_rad_per_s)),
-            misbehave: Vec::new(),
             plant_options: PlantArgs {
                 realistic: spec.realistic,
                 ..PlantArgs::default()
             },
-            trace: None,
             rate_hz: arm.rate_hz,
             for_s: Some(self.event_s + self.back_s + OBSERVED_S),
             virtual_time: true,
-            log: PathBuf::new(),
-            no_log: true,
-            view: false,
-            prefix: None,
             no_realtime: true,
-            json: true,
+            ..UpArgs::bare(spec.plant, arm.name.clone())
         }
     }
 }

@@ -12,9 +12,7 @@ use crate::operate::OperatorSession;
 use crate::up::System;
 use core::time::Duration;
 use rustix::process::Signal;
-use std::path::PathBuf;
 use std::time::Instant;
-use supple_cli::arguments::{PlantArgs, UrdfArgs};
 use supple_cli::console::print_status;
 use supple_cli::exit::Failure;
 use supple_core::controller::{Mode, Request};
@@ -60,37 +58,21 @@ pub fn perform<const N: usize>(
     let trace = domain.folder().join(format!("{prefix}.csv"));
     let cap_m = description.tool().map_or(CAP_M, |tool| tool.cap_radius_m);
     let up = UpArgs {
-        urdf: UrdfArgs::default(),
-        plant: spec.plant,
-        arm: arm.name.clone(),
         strict: arm.strict,
         track: match spec.task {
             TestTask::Probe => UpTrajectory::Probe,
             _ => UpTrajectory::Sinusoid,
         },
-        bus: None,
-        budget: false,
-        zero_at_home: false,
-        learn: false,
-        tare: false,
         // Tasks that move the arm down would hit the block.
         block_m: match spec.task {
             TestTask::Move | TestTask::Excite | TestTask::TrackPose => None,
             _ => Some(-(BLOCK_CLEARANCE_M + cap_m)),
         },
-        inject: Vec::new(),
-        misbehave: Vec::new(),
-        plant_options: PlantArgs::default(),
         trace: Some(trace.clone()),
         rate_hz: arm.rate_hz,
-        for_s: None,
-        virtual_time: false,
-        log: PathBuf::new(),
-        no_log: true,
-        view: false,
         prefix: Some(prefix),
         no_realtime: args.no_realtime,
-        json: true,
+        ..UpArgs::bare(spec.plant, arm.name.clone())
     };
     let lose = || match spec.event {
         Event::Process { name: UP, .. } => lose_up_process::<N>(spec, &up, description, &domain),

@@ -5,6 +5,7 @@ use crate::operate::pendant::Pendant;
 use core::time::Duration;
 use std::path::PathBuf;
 use supple_bus::Address;
+use supple_cli::arguments::{PlantArgs, UrdfArgs};
 use supple_cli::exit::Failure;
 use supple_ipc::Domain;
 use supple_model::{Description, ModelError};
@@ -155,6 +156,36 @@ impl PlantKind {
 }
 
 impl UpArgs {
+    /// A system without log and page that prints JSON, everything else as without options on the command line.
+    pub fn bare(plant: PlantKind, arm: String) -> UpArgs {
+        UpArgs {
+            urdf: UrdfArgs::default(),
+            plant,
+            arm,
+            strict: false,
+            track: UpTrajectory::Sinusoid,
+            bus: None,
+            budget: false,
+            zero_at_home: false,
+            learn: false,
+            tare: false,
+            block_m: None,
+            inject: Vec::new(),
+            misbehave: Vec::new(),
+            plant_options: PlantArgs::default(),
+            trace: None,
+            rate_hz: None,
+            for_s: None,
+            virtual_time: false,
+            log: PathBuf::new(),
+            no_log: true,
+            view: false,
+            prefix: None,
+            no_realtime: false,
+            json: true,
+        }
+    }
+
     /// Path of the log; `None` without a log.
     pub fn log_file(&self) -> Option<PathBuf> {
         (!self.no_log).then(|| self.log.clone())

@@ -13,9 +13,8 @@ use crate::operate::{Approach, OperatorSession, trajectory_for};
 use crate::up::{CONTROLLER, START_S, System};
 use core::time::Duration;
 use rustix::process::Signal;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Instant;
-use supple_cli::arguments::{PlantArgs, UrdfArgs};
 use supple_cli::exit::Failure;
 use supple_core::codes::fault_name;
 use supple_core::controller::{Mode, Request};
@@ -131,30 +130,11 @@ fn row<const N: usize>(case: &Case, left: &Left, course: &Course, rows: &[TraceR
 
 fn up_args(args: &DrillArgs, prefix: &str, trace: &Path) -> UpArgs {
     UpArgs {
-        urdf: UrdfArgs::default(),
-        plant: PlantKind::Emu,
-        arm: args.urdf.name(&args.arm),
         strict: args.strict,
-        track: UpTrajectory::Sinusoid,
-        bus: None,
-        budget: false,
-        zero_at_home: false,
-        learn: false,
-        tare: false,
-        block_m: None,
-        inject: Vec::new(),
-        misbehave: Vec::new(),
-        plant_options: PlantArgs::default(),
         trace: Some(trace.to_owned()),
-        rate_hz: None,
-        for_s: None,
-        virtual_time: false,
-        log: PathBuf::new(),
-        no_log: true,
-        view: false,
         prefix: Some(prefix.to_owned()),
         no_realtime: args.no_realtime,
-        json: true,
+        ..UpArgs::bare(PlantKind::Emu, args.urdf.name(&args.arm))
     }
 }
 
