@@ -1,4 +1,4 @@
-//! Logs of the procedure's motions, and the fits of them.
+//! Reads the logs of the calibration's motions, and fits models to them.
 
 use super::error::ProcedureError;
 use super::progress::FitQuality;
@@ -13,29 +13,30 @@ use supple_ident::{Fit, FrictionColumns, Log, Motion, ReadError};
 use supple_log::Reader;
 use supple_model::{Description, IdentifiedModel, WideThresholds};
 
-/// Last part of the first pass that its fit does not see.
-const HELD_OUT: f64 = 0.25;
-/// Time in the mode by which a series is seen to begin; its first cycles may be lost \[s\].
-const BEGIN_S: f64 = 0.1;
-/// Least range of each joint in a motion that is fitted \[rad\].
-const ALL_MOVE_RAD: f64 = 0.05;
-/// Least collision threshold of a joint, as a fraction of that of the description.
-const MIN_THRESHOLD: f64 = 0.5;
-/// Range of the factor between measured and given breakaway torque by which dry friction is scaled.
-const FACTOR: (f64, f64) = (0.2, 5.0);
+/// Fraction of the first excitation, at its end, that is held out from the fit and validates it.
+const HELD_OUT_FRACTION: f64 = 0.25;
+/// Time in the excite mode up to which the start of an excitation counts as logged; its first cycles may be missing \[s\].
+const MAX_START_TIME_S: f64 = 0.1;
+/// Minimum range of angles of each joint in a motion that is fitted \[rad\].
+const MIN_RANGE_RAD: f64 = 0.05;
+/// Minimum collision threshold of a joint, as a fraction of the one in the description.
+const MIN_THRESHOLD_FRACTION: f64 = 0.5;
+/// Minimum and maximum ratio of measured to described breakaway torque by which the dry friction is scaled.
+const BREAKAWAY_RATIO_RANGE: (f64, f64) = (0.2, 5.0);
 
-/// Margin of the limit that dry friction must not reach.
-const DRY_MARGIN: f64 = 1.3;
-/// Weight of the links of the model where inertia adds little to the torque, in equivalent samples.
+/// Ratio of the limit for torque against a joint's acceleration to the dry friction, for geared motors.
+const AGAINST_TO_DRY_FRICTION: f64 = 1.3;
+/// Prior weight of the described link parameters for geared motors, whose motions show little of the inertia, in equivalent
+/// samples.
 const LINKS_WEIGHT: f64 = 100.0;
-/// Standard deviation of rotor inertias there, relative to those of the model.
+/// Prior standard deviation of their rotor inertias, relative to the described ones.
 const ROTOR_DEVIATION: f64 = 1.0;
-/// Share of the largest speed of the slowest joint above which samples are fitted.
-const FAST_SHARE: f64 = 0.3;
+/// Minimum speed of the samples that are fitted, as a fraction of the peak speed of the slowest joint.
+const MIN_SPEED_FRACTION: f64 = 0.3;
 /// Time over which the speed of a joint is averaged \[s\].
-const SPEED_S: f64 = 0.1;
+const SPEED_AVERAGING_S: f64 = 0.1;
 
-/// The motions along series in a log, in order.
+/// The excitations in a log, in order, one log each.
 ///
 /// # Errors
 /// A log that cannot be read.
@@ -54,8 +55,8 @@ pub fn excitations<const N: usize>(file: &Path) -> Result<Vec<Log>, ProcedureErr
         if excited_s.is_infinite() || excited_s < last_s {
             logs.extend(log_of(&mut rows));
         }
-        // A log may begin while the arm rests at the end of an earlier series.
-        let begins = excited_s < BEGIN_S && excited_s < last_s;
+        // A log may begin while the arm rests at the end of an earlier excitation.
+        let begins = excited_s < MAX_START_TIME_S && excited_s < last_s;
         if begins || (excited_s.is_finite() && !rows.is_empty()) {
             let torque_nm = value.torque_nm - value.torques.ripple;
             rows.push((record.time_ns as f64 * 1e-9, value.position_rad, torque_nm));
@@ -91,9 +92,10 @@ pub fn with_breakaway<const N: usize>(
         if let Some(found) = breakaway.get(joint)
             && friction.breakaway_nm > 0.0
         {
-            let factor = (found.breakaway_nm() / friction.breakaway_nm).clamp(FACTOR.0, FACTOR.1);
-            friction.breakaway_nm *= factor;
-            friction.coulomb_nm *= factor;
+            let (min, max) = BREAKAWAY_RATIO_RANGE;
+            let ratio = (found.breakaway_nm() / friction.breakaway_nm).clamp(min, max);
+            friction.breakaway_nm *= ratio;
+            friction.coulomb_nm *= ratio;
         }
         friction
     });
@@ -105,7 +107,7 @@ pub fn with_breakaway<const N: usize>(
     })?)
 }
 
-/// All motion with position loops in a log, moves and series; none if all of it is short.
+/// All motions with position control in a log, moves and excitations; empty if no motion is long enough.
 ///
 /// # Errors
 /// A log that cannot be read.
@@ -120,26 +122,26 @@ pub fn all_motion<const N: usize>(file: &Path) -> Result<Vec<Log>, ProcedureErro
     }
 }
 
-/// Whether every joint moves: another motion cannot be fitted.
+/// Whether every joint moves: only such motions can be fitted.
 fn all_move(log: &Log) -> bool {
     let mut columns = log.q_rad.column_iter();
-    columns.all(|q| q.max() - q.min() > ALL_MOVE_RAD)
+    columns.all(|q| q.max() - q.min() > MIN_RANGE_RAD)
 }
 
-/// Fits `others` and the first pass without its last part, on which it is compared with `model`. The model is `None` if
-/// the fit is not better there.
+/// Fits `others` and the first excitation without its end, which validates the fit. `None` if the fit predicts the torques there
+/// no better than `model`.
 ///
 /// # Errors
 /// A log that cannot be used.
 pub fn fit_first<const N: usize>(
     model: &Description,
-    pass: &Log,
+    excitation: &Log,
     others: &[Log],
 ) -> Result<Option<(Description, FitQuality)>, ProcedureError> {
     let config = model.config::<N>()?;
-    let rows = pass.t_s.len();
-    let cut = ((1.0 - HELD_OUT) * rows as f64) as usize;
-    let (fitted, unseen) = (part(pass, 0, cut), part(pass, cut, rows - cut));
+    let rows = excitation.t_s.len();
+    let cut = ((1.0 - HELD_OUT_FRACTION) * rows as f64) as usize;
+    let (fitted, unseen) = (part(excitation, 0, cut), part(excitation, cut, rows - cut));
     let mut logs = vec![fitted];
     logs.extend_from_slice(others);
     let (fit, _) = identify_with(
@@ -147,17 +149,19 @@ pub fn fit_first<const N: usize>(
         &logs,
         &[],
         &knowledge(model),
-        fast_rad_per_s(&logs),
+        min_fitted_rad_per_s(&logs),
     )?;
     let unseen = prepared(&unseen, &fit)?;
     let quality = quality(&config, &fit, &unseen)?;
-    let better = quality.unseen_relative < quality.unseen_relative_before;
-    let found = || Ok::<_, ProcedureError>((fit.description(model, None)?, quality));
-    better.then(found).transpose()
+    let is_better = quality.unseen_relative < quality.unseen_relative_before;
+    if !is_better {
+        return Ok(None);
+    }
+    Ok(Some((fit.description(model, None)?, quality)))
 }
 
-/// Fits all motions: the full pass, slow motion and runs at constant speed, and validates on `unseen`. The collision
-/// thresholds come from the residual on these and on `others`, such as moves.
+/// Fits the excitation, the slow motions and the runs at constant speed, and validates the fit on `unseen`. The collision
+/// thresholds come from the residuals on these and on `others`, such as moves.
 ///
 /// # Errors
 /// A log that cannot be used.
@@ -169,8 +173,8 @@ pub fn fit_all<const N: usize>(
     others: &[Log],
 ) -> Result<(Description, FitQuality), ProcedureError> {
     let config = model.config::<N>()?;
-    let (known, fast_rad_per_s) = (knowledge(model), fast_rad_per_s(logs));
-    let (fit, ripple) = identify_with(&config, logs, constant_speed, &known, fast_rad_per_s)?;
+    let (known, min_rad_per_s) = (knowledge(model), min_fitted_rad_per_s(logs));
+    let (fit, ripple) = identify_with(&config, logs, constant_speed, &known, min_rad_per_s)?;
     let motor_from_joint = *supple_core::Controller::new(config)?.motor_from_joint();
     let unseen = without_ripple(unseen, &ripple, &motor_from_joint);
     let unseen = prepared(&unseen, &fit)?;
@@ -185,7 +189,7 @@ pub fn fit_all<const N: usize>(
     let mut thresholds = fit.move_collision_nm(&validations, &config);
     for (joint, threshold_nm) in thresholds.iter_mut().enumerate() {
         // The observer is faster than the filter of the residuals.
-        let min_nm = MIN_THRESHOLD * present_nm[joint];
+        let min_nm = MIN_THRESHOLD_FRACTION * present_nm[joint];
         *threshold_nm = threshold_nm.map(|nm| nm.max(min_nm));
     }
     let described = match model.bus() {
@@ -195,8 +199,8 @@ pub fn fit_all<const N: usize>(
     Ok((described.with_move_collision(&thresholds)?, quality))
 }
 
-/// `model` with a limit of the torque against the acceleration of a joint that dry friction at rest, which may act either
-/// way, does not reach.
+/// `model` with a limit for torque against a joint's acceleration that is above the dry friction: at rest this acts in either
+/// direction.
 fn with_friction_either_way<const N: usize>(
     model: &Description,
 ) -> Result<Description, ProcedureError> {
@@ -209,14 +213,14 @@ fn with_friction_either_way<const N: usize>(
         tip_force_n: 0.0,
         hold_pose: false,
         load_n: 0.0,
-        against_share: DRY_MARGIN * dry.max(),
+        against_share: AGAINST_TO_DRY_FRICTION * dry.max(),
     };
     Ok(model.with_wide_thresholds(&wide)?)
 }
 
-/// What is known of an arm before it moves. The gears of motors on a bus rub more under load. Such arms move slowly within
-/// the torque that gravity leaves, so that inertia adds little to it: rotors and links stay near those of the model where
-/// errors of friction would move them.
+/// Prior knowledge of an arm. The friction of geared motors (those on a bus) grows with their load. Gravity leaves them
+/// little torque, so that they move slowly and their torques show little of the inertia: without a prior, errors of the friction
+/// model would appear as inertias of rotors and links.
 fn knowledge(model: &Description) -> Knowledge {
     match model.bus() {
         None => Knowledge::of(FrictionColumns::OFFSET),
@@ -231,25 +235,25 @@ fn knowledge(model: &Description) -> Knowledge {
     }
 }
 
-/// Speed above which samples are fitted: less than usual if a joint is always slow.
-fn fast_rad_per_s(logs: &[Log]) -> f64 {
+/// Minimum speed of the samples that are fitted \[rad/s\]: lower than usual if a joint is always slow.
+fn min_fitted_rad_per_s(logs: &[Log]) -> f64 {
     let joints = logs.first().map_or(0, |log| log.q_rad.ncols());
     let slowest = (0..joints).map(|joint| {
         let of_log = |log: &Log| peak_rad_per_s(log, joint);
         logs.iter().map(of_log).fold(0.0, f64::max)
     });
-    SLOW_RAD_PER_S.min(FAST_SHARE * slowest.fold(f64::INFINITY, f64::min))
+    SLOW_RAD_PER_S.min(MIN_SPEED_FRACTION * slowest.fold(f64::INFINITY, f64::min))
 }
 
-/// Greatest speed of a joint in a log.
+/// Peak speed of a joint in a log, averaged over [`SPEED_AVERAGING_S`].
 fn peak_rad_per_s(log: &Log, joint: usize) -> f64 {
     let mut first = 0;
     let mut peak: f64 = 0.0;
     for (last, t_s) in log.t_s.iter().enumerate() {
-        let over_s = t_s - log.t_s[first];
-        if over_s >= SPEED_S {
+        let elapsed_s = t_s - log.t_s[first];
+        if elapsed_s >= SPEED_AVERAGING_S {
             let travel_rad = log.q_rad[(last, joint)] - log.q_rad[(first, joint)];
-            peak = peak.max(travel_rad.abs() / over_s);
+            peak = peak.max(travel_rad.abs() / elapsed_s);
             first = last;
         }
     }
