@@ -1,16 +1,15 @@
 //! Checks of a log against the physics of the given arm, before a fit.
 //!
-//! Three groups, in this order; each finds only what the one before lets it see:
-//! - `sampling`: what the columns show by themselves. An encoder cannot stop within a sample, time cannot jump for all
-//!   joints at once, a torque does not rest on its largest value.
-//! - `remedies`: what would be right if a column had another sign, unit, order, zero or clock. The torques of an arm
-//!   whose links may have any inertia are computed for the log as given and for the log with each remedy. If the remedy
-//!   explains them far better, the log has that error. Gravity fixes the time scale and the zeros, the friction that must
-//!   dissipate power fixes the signs.
-//! - `excess`: what the arm does not explain at some times (contact), or at all poses (torques in another unit, a
-//!   payload, an offset).
+//! Three groups of checks, in this order; an error that one of them finds can hide errors from the next:
+//! - `sampling`: checks of single columns, without a model. An encoder cannot stop within a sample, time cannot jump for all
+//!   joints at once, a torque does not stay at its largest value.
+//! - `remedies`: whether a column has the wrong sign, unit, order, zero or clock. A model of the arm with free link inertias is
+//!   fitted to the log as given, and to the log with each error corrected. If a correction reduces the residual by far, the
+//!   log has that error. Gravity determines the time scale and the zeros of the angles; friction, which only dissipates power,
+//!   determines the signs.
+//! - `excess`: residual torques at some times (contact), or in all poses (torques in another unit, a payload, an offset).
 //!
-//! Nothing here depends on an arm: every threshold is a ratio to what the log itself shows, or to the gravity of the given arm.
+//! No threshold depends on the arm: each is relative to what the log itself shows, or to the gravity torques of the given arm.
 
 mod excess;
 pub(crate) mod explained;
@@ -29,14 +28,14 @@ use crate::log::{Log, MAX_ANGLE_RAD};
 use crate::motion::{Motion, Preparation};
 use supple_core::Arm;
 
-/// Number of samples of a log that are used to compare remedies.
-const SAMPLES: f64 = 300.0;
-/// Least number of reversals of every joint in a motion that is compared with the arm.
-const REVERSALS: usize = 3;
-/// Speed, as a fraction of the greatest, above which a joint has a direction.
-const REVERSING_SHARE: f64 = 0.1;
-/// Highest cutoff of the filter for these checks \[Hz\].
-const CUTOFF_HZ: f64 = 8.0;
+/// Number of samples of a log to which the corrections of `remedies` are fitted.
+const REMEDY_SAMPLES: f64 = 300.0;
+/// Minimum number of reversals of each moving joint in a log that is compared with a model.
+const MIN_REVERSALS: usize = 3;
+/// Minimum speed, as a fraction of the joint's peak speed, at which its direction counts.
+const DIRECTION_SPEED_FRACTION: f64 = 0.1;
+/// Maximum cutoff frequency of the filter for these checks, and the one of `sampling` if none is given \[Hz\].
+const MAX_CUTOFF_HZ: f64 = 8.0;
 
 /// Checks `log` against `arm`, of which `moving` joints move. `couplings` and the torque's delay are those of the fit.
 ///
@@ -50,7 +49,7 @@ pub fn check_log<const N: usize>(
     preparation: &Preparation,
 ) -> Result<Vec<Finding>, IdentError> {
     log.check_table(N, moving)?;
-    let cutoff_hz = preparation.cutoff_hz.unwrap_or(CUTOFF_HZ);
+    let cutoff_hz = preparation.cutoff_hz.unwrap_or(MAX_CUTOFF_HZ);
     let mut findings = sampling::check(log, moving, cutoff_hz);
     if findings.iter().any(|f| f.problem == Problem::TimeUnit) {
         return Ok(findings);
@@ -67,24 +66,24 @@ pub fn check_log<const N: usize>(
     }
     let whole = fine(log, preparation)?;
     if moving.iter().any(|&joint| !turns_around(&whole, joint)) {
-        findings.extend(turns(log, &findings));
+        findings.extend(many_revolutions(log, &findings));
         return Ok(findings);
     }
     let motion = coarse(log, preparation)?;
     let context = explained::Context::new(arm, moving, couplings)?;
     findings.extend(remedies::check(&context, &motion)?);
-    findings.extend(turns(log, &findings));
+    findings.extend(many_revolutions(log, &findings));
     if !stopped(&findings) {
         findings.extend(excess::check(&context, &whole)?);
     }
     Ok(findings)
 }
 
-/// Whether a joint reverses its direction at least [`REVERSALS`] times: in a motion to one side an offset looks like dry
-/// friction, and much else explains the torques as well.
+/// Whether a joint reverses its direction at least [`MIN_REVERSALS`] times. In a motion in one direction an offset cannot be told
+/// from dry friction.
 fn turns_around(motion: &Motion, joint: usize) -> bool {
     let speeds = motion.qd.column(joint);
-    let min = REVERSING_SHARE * speeds.amax();
+    let min = DIRECTION_SPEED_FRACTION * speeds.amax();
     let mut reversals = 0;
     let mut forward = None;
     for &speed in speeds.iter().filter(|speed| speed.abs() > min) {
@@ -92,11 +91,11 @@ fn turns_around(motion: &Motion, joint: usize) -> bool {
         reversals += usize::from(forward.is_some_and(|before| before != now));
         forward = Some(now);
     }
-    reversals >= REVERSALS
+    reversals >= MIN_REVERSALS
 }
 
-/// Angles of many turns that no remedy explains.
-fn turns(log: &Log, findings: &[Finding]) -> Vec<Finding> {
+/// Reports angles of several revolutions, unless another finding explains them.
+fn many_revolutions(log: &Log, findings: &[Finding]) -> Vec<Finding> {
     let mut found = Vec::new();
     for (joint, column) in log.q_rad.column_iter().enumerate() {
         let largest = column.amax();
@@ -114,26 +113,26 @@ fn turns(log: &Log, findings: &[Finding]) -> Vec<Finding> {
     found
 }
 
-/// The log at a rate of a few samples per period of the cutoff, at most [`SAMPLES`] from its middle.
+/// The log resampled at 20 Hz to 100 Hz, at most [`REMEDY_SAMPLES`] from its middle.
 fn coarse(log: &Log, preparation: &Preparation) -> Result<Motion, IdentError> {
     let span_s = log.t_s[log.t_s.len() - 1] - log.t_s[0];
     let own_hz = (log.t_s.len() - 1) as f64 / span_s;
-    let rate_hz = (SAMPLES / span_s).clamp(20.0, 100.0).min(own_hz);
+    let rate_hz = (REMEDY_SAMPLES / span_s).clamp(20.0, 100.0).min(own_hz);
     let motion = at_rate(log, preparation, rate_hz)?;
     let samples = motion.samples();
-    let kept = samples.min(SAMPLES as usize);
+    let kept = samples.min(REMEDY_SAMPLES as usize);
     let first = (samples - kept) / 2;
     Ok(motion.part(first..first + kept))
 }
 
-/// The whole log at some 50 samples per second.
+/// The whole log resampled at 50 Hz at most.
 fn fine(log: &Log, preparation: &Preparation) -> Result<Motion, IdentError> {
     let span_s = log.t_s[log.t_s.len() - 1] - log.t_s[0];
     let own_hz = (log.t_s.len() - 1) as f64 / span_s;
     at_rate(log, preparation, own_hz.min(50.0))
 }
 
-/// The whole log at 30 samples per second, or more if it is short.
+/// The whole log resampled to about 800 samples, at 20 Hz to 100 Hz.
 pub(crate) fn reduced(log: &Log, preparation: &Preparation) -> Result<Motion, IdentError> {
     let span_s = log.t_s[log.t_s.len() - 1] - log.t_s[0];
     at_rate(log, preparation, (800.0 / span_s).clamp(20.0, 100.0))
@@ -144,7 +143,7 @@ fn at_rate(log: &Log, preparation: &Preparation, rate_hz: f64) -> Result<Motion,
     let span_s = log.t_s[log.t_s.len() - 1] - log.t_s[0];
     let own_hz = (log.t_s.len() - 1) as f64 / span_s;
     let keep_every = (own_hz / rate_hz).floor().max(1.0) as usize;
-    let cutoff_hz = CUTOFF_HZ.min(0.4 * own_hz / keep_every as f64);
+    let cutoff_hz = MAX_CUTOFF_HZ.min(0.4 * own_hz / keep_every as f64);
     LowPass::butterworth4(cutoff_hz, own_hz)?;
     let preparation = Preparation {
         rate_hz: None,
