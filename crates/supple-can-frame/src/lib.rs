@@ -1,8 +1,8 @@
 //! Frames of classic CAN and CAN FD, and their durations on the bus.
 //!
-//! [`CanFrame`] holds any data frame of either format; [`timing`] counts its bits, exactly or as bounds for its
-//! length, and [`BitRates`] turns them into time. No protocol of a vendor is known here, and nothing is sent.
-//! Remote requests do not exist as frames: no arm uses them.
+//! [`CanFrame`] holds any data frame of either format; [`timing`] counts its bits, exactly for its content or as bounds for
+//! its payload length, and [`BitRates`] gives their duration. This crate knows no vendor's protocol and accesses no bus.
+//! Remote frames are not supported: no supported arm uses them.
 //!
 //! ```
 //! use supple_can_frame::{BitRates, CanFrame, CanId};

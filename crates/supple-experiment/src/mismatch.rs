@@ -1,4 +1,4 @@
-//! Model errors of a controller relative to the plant, as they remain after an identification.
+//! Parameter errors of the controller's model relative to the plant, of the size that remains after an identification.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -6,19 +6,20 @@ use serde::Serialize;
 use supple_core::nalgebra::Vector3;
 use supple_core::{Arm, ArmError, Body, Config, Friction, Joint};
 
-/// Relative errors of a model. Each parameter has the full error, with a random sign that `seed` determines.
+/// Relative parameter errors of a model. Every parameter is wrong by exactly this fraction; only the sign is random, drawn from
+/// `seed`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Mismatch {
-    /// Error of the gravity parameters: every mass and every component of every centre of mass.
+    /// Error of the parameters of gravity torques: the mass of every link and every component of its centre of mass.
     pub gravity: f64,
     /// Error of the viscous, Coulomb and breakaway friction of every joint.
     pub friction: f64,
-    /// Seed of the signs.
+    /// Seed of the random signs.
     pub seed: u64,
 }
 
 impl Mismatch {
-    /// Errors after a good identification: 0.1 % of gravity, 3 % of friction.
+    /// Typical errors after a good identification: masses and centres of mass 0.1 %, friction 3 %.
     pub fn identified(seed: u64) -> Mismatch {
         Mismatch {
             gravity: 1e-3,
@@ -30,7 +31,7 @@ impl Mismatch {
     /// Applies these errors to the model in a controller configuration.
     ///
     /// # Errors
-    /// If the changed arm is physically inconsistent.
+    /// If the changed inertial parameters are not physically consistent.
     pub fn apply<const N: usize>(&self, exact: &Config<N>) -> Result<Config<N>, ArmError> {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
         let mut factor = |amount: f64| {
@@ -57,12 +58,12 @@ impl Mismatch {
             }
         });
         let friction = exact.friction.map(|friction| {
-            let viscous_factor = factor(self.friction);
-            let dry_factor = factor(self.friction);
+            let viscous_friction_factor = factor(self.friction);
+            let dry_friction_factor = factor(self.friction);
             Friction {
-                viscous_nm_s_per_rad: friction.viscous_nm_s_per_rad * viscous_factor,
-                coulomb_nm: friction.coulomb_nm * dry_factor,
-                breakaway_nm: friction.breakaway_nm * dry_factor,
+                viscous_nm_s_per_rad: friction.viscous_nm_s_per_rad * viscous_friction_factor,
+                coulomb_nm: friction.coulomb_nm * dry_friction_factor,
+                breakaway_nm: friction.breakaway_nm * dry_friction_factor,
                 ..friction
             }
         });

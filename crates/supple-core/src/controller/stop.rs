@@ -1,37 +1,32 @@
 //! The safe action: how a fault stops the motion, and when the drives brake instead.
 //!
 //! ```text
-//! tau = G - s p / t_s        p = H qd        0 <= s <= 1        t_s = 4 delay
+//! tau = G - k p / t_stop        p = H qd        0 <= k <= 1        t_stop = 4 delay
 //! ```
 //!
-//! **It cannot excite the arm.** Its power `-s qd^T H qd / t_s` takes energy from any motion, as
-//! Coriolis torques have zero power; if a joint or motor limit applies, `s` scales all joints
-//! alike, so that this remains true. Without delay every motion decays with the single time
-//! constant `t_s`, independent of the arm, its pose and its inertia. With a delay `d`, each of the
-//! arm's independent motions obeys `v' = -v(t - d) / t_s`, which decays without overshoot up to `d
-//! / t_s = 1/e` and is stable up to `pi/2`. With `delay` for `d` ([`super::Controller::delay_s`]:
-//! 3.5 cycles and the estimator's lag) the ratio is 1/4, so that an error of the inertia or of the
-//! delay by half is tolerated before there is overshoot, and by a factor of six before it is
-//! unstable. A rate limit lags behind a torque that changes faster: this one changes by no more
-//! than the joint's limit in `t_s`, which is slower than the rate limit of the safe action (the
-//! joint's limit in 5 ms) at any speed.
+//! with the gravity compensation `G`, the generalised momentum `p`, and a scale `k` that keeps the torque limits.
 //!
-//! **Braking replaces it** (no torque, drives that short their motors) if the arm does not come to
-//! rest because of a defective encoder, a defective motor or a wrong model. "Moving" means faster
-//! than a fifth of the speed limit of a joint or of the tip; external torques are strong if, each
-//! divided by a twentieth of its joint's limit, the root of the sum of their squares is above one.
-//! The drives brake
+//! **It cannot excite the arm.** Its power `-k qd^T H qd / t_stop` takes energy from any motion, as Coriolis torques have
+//! zero power; if a joint or motor limit applies, `k` scales all joints alike, so that this remains true. Without delay every
+//! motion decays with the single time constant `t_stop`, independent of the arm, its pose and its inertia. With a delay `d`,
+//! each mode of the arm obeys `v' = -v(t - d) / t_stop`, which decays without overshoot up to `d / t_stop = 1/e` and is stable
+//! up to `pi/2`. With `delay` for `d` ([`super::Controller::delay_s`]: 3.5 cycles and the estimator's lag) the ratio is 1/4:
+//! inertia or delay may be wrong by a factor of 1.5 without overshoot, and by a factor of six without instability. The rate
+//! limit adds no lag: the damping torque changes by at most a joint's torque limit within `t_stop`, and the rate limit of
+//! the safe action allows that change within 5 ms.
 //!
-//! 1. at once or as soon as it shows, if the arm has left its path or its limits and a multiple of its weight drives it:
-//!    the external torques give it power, all of them along the weight or all against it, each larger than the gravity
-//!    compensation of its joint and at most three times as large. Reversed and dead motors drive it along the weight,
-//!    gravity compensation of the wrong sign against it; an obstacle takes power from the arm, and an impact shows larger
-//!    torques;
-//! 2. if the arm moves with over 1.2 times its kinetic energy at the fault and before, see `stopping_motion.rs`;
+//! **Braking replaces it** (no torque, drives that short their motors) if the arm does not come to rest because of a defective
+//! encoder, a defective motor or a wrong model. The arm *moves* if a joint or the tip is faster than a fifth of its speed limit;
+//! external torques are *strong* if the norm of `tau_i / limit_i` over the joints exceeds a twentieth. The drives brake
+//!
+//! 1. at the fault or in the first milliseconds after it, if the external torques look like those of a missing or reversed
+//!    gravity compensation, see `is_driven_by_weight`. Dead motors, reversed motors and gravity of the wrong sign cause them.
+//!    Excluded are an obstacle, which takes power from the arm, and an impact, which causes larger torques;
+//! 2. if the arm moves and its kinetic energy exceeds 1.2 times its peak up to the fault, see `stopping_motion.rs`;
 //! 3. if the arm still moves 0.2 s after the fault;
 //! 4. if an external torque above a tenth of a joint's limit acts for 50 ms, either later than 0.15 s after the fault or at a
 //!    joint whose encoder is unchanged and may be stuck;
-//! 5. at once, if strong external torques acted for 50 ms before a speed limit was exceeded, while the arm followed a
+//! 5. at once, if a speed limit was exceeded after strong external torques had acted for 50 ms, while the arm followed a
 //!    reference out of contact.
 
 use super::Controller;
@@ -53,18 +48,18 @@ const UNEXPLAINED_SHARE: f64 = 0.1;
 const UNEXPLAINED_S: f64 = 0.05;
 /// Time after which an impact and the observer's response to it have decayed \[s\].
 const IMPACT_S: f64 = 0.15;
-/// Ratio of the torque of an acceleration to the greatest one that reversed motors show, above which the arm has been struck:
-/// a motor before an elastic cable has a part of the joint's inertia.
-const STRUCK_RATIO: f64 = 4.0;
-/// Fraction of the speed limits from which on external torques drive the arm.
-const DRIVEN_SPEED_SHARE: f64 = 0.05;
-/// Greatest ratio of the external torque to gravity compensation at which that one acts the wrong way: twice, and as much for
-/// what a loop adds.
-const REVERSED_SHARE: f64 = 3.0;
-/// The smallest such ratio at which the arm is driven, and not led slowly away from its path.
-const DRIVING_SHARE: f64 = 1.1;
-/// The same where somebody is expected to lead the arm.
-const LED_SHARE: f64 = 1.4;
+/// Ratio of an inertial torque to the largest that reversed motors cause above which it shows an impact. Greater than one,
+/// because a motor before an elastic cable has only a part of the joint's inertia and accelerates faster.
+const IMPACT_RATIO: f64 = 4.0;
+/// Minimum speed of an arm that its weight drives, as a fraction of the speed limits.
+const MIN_SPEED_FRACTION: f64 = 0.05;
+/// Maximum ratio of the external torque to the gravity compensation if that is missing or reversed: two for a reversed one, and
+/// one for the torque that a position loop adds.
+const MAX_GRAVITY_RATIO: f64 = 3.0;
+/// Minimum of this ratio.
+const MIN_GRAVITY_RATIO: f64 = 1.1;
+/// Minimum of this ratio where a hand may guide the arm.
+const MIN_GRAVITY_RATIO_GUIDED: f64 = 1.4;
 /// Decay time of the peak kinetic energy \[s\].
 const ENERGY_PEAK_DECAY_S: f64 = 0.2;
 
@@ -132,9 +127,9 @@ impl<const N: usize> State<N> {
         }
     }
 
-    /// The action of a fault: braking without delay if the arm is driven against its motors, or is too fast because of a
-    /// torque that acted for some time before, out of contact. A dead motor gives it; damping by motors of which one is dead
-    /// might drive the arm.
+    /// The safe action of a fault. The drives brake at once if gravity compensation has failed, or if a speed limit was exceeded
+    /// after strong external torques had acted while the arm followed a reference out of contact: a dead motor causes such
+    /// torques, and damping by the other motors could accelerate the arm.
     pub(super) fn action_of(&self, controller: &Controller<N>, fault: &Fault) -> SafeAction {
         let too_fast = matches!(fault, Fault::JointSpeed { .. } | Fault::TipSpeed { .. });
         if self.activity.is_torque_off()
@@ -156,51 +151,54 @@ impl<const N: usize> State<N> {
         !(may_be_led || self.latch.in_contact())
     }
 
-    /// Whether the external torques, each as a share of what counts as strong, exceed one together.
+    /// Whether the external torques are strong.
     fn is_pushed(&self, controller: &Controller<N>) -> bool {
         let external_nm = self.observer.external_torque_nm();
         let squares = external_nm.component_mul(&external_nm);
         squares.dot(&controller.push_weight_per_nm2) > 1.0
     }
 
-    /// Whether a multiple of its weight drives the arm: the external torques give it power, and it gathers speed; those that are
-    /// strong act along the weight, or all against it, and each is larger than the gravity compensation of its joint, at most
-    /// [`REVERSED_SHARE`] times. So it looks if gravity compensation is missing, or if its sign or that of the motors is wrong.
-    /// An impact has torques and accelerations that are larger than that.
+    /// Whether the external torques look like those of a missing or reversed gravity compensation:
+    ///
+    /// - they are strong, their power is positive, and the arm accelerates;
+    /// - at every joint where they are strong, their ratio to the gravity compensation is within the limits, with the same sign
+    ///   at all joints;
+    /// - no joint accelerates as in an impact.
     #[cold]
     #[inline(never)]
     fn is_driven_by_weight(&self, controller: &Controller<N>, follows_reference: bool) -> bool {
         let config = controller.config();
         let external_nm = self.observer.external_torque_nm();
-        let slow = config.limits.joint_speed_rad_per_s * DRIVEN_SPEED_SHARE;
+        let slow = config.limits.joint_speed_rad_per_s * MIN_SPEED_FRACTION;
         let power_w = external_nm.dot(&self.estimator.velocity_rad_per_s);
         if !(self.is_pushed(controller) && power_w > external_nm.abs().dot(&slow)) {
             return false;
         }
-        let behind_rad = self.position + self.sag_rad - self.estimator.position_rad;
+        let innovation_rad = self.position + self.sag_rad - self.estimator.position_rad;
         let gains = controller.estimator_gains(1);
-        let accelerating_nm = self.terms.mass_matrix * gains.acceleration_rad_per_s2(&behind_rad);
-        if accelerating_nm.dot(&self.estimator.velocity_rad_per_s) <= 0.0 {
+        let inertial_torque_nm =
+            self.terms.mass_matrix * gains.acceleration_rad_per_s2(&innovation_rad);
+        if inertial_torque_nm.dot(&self.estimator.velocity_rad_per_s) <= 0.0 {
             return false;
         }
-        let min_share = match follows_reference {
-            true => DRIVING_SHARE,
-            false => LED_SHARE,
+        let min_ratio = match follows_reference {
+            true => MIN_GRAVITY_RATIO,
+            false => MIN_GRAVITY_RATIO_GUIDED,
         };
         let against_weight = external_nm.dot(&self.terms.gravity) > 0.0;
         let mut driven = false;
-        let others_fit = (0..N).all(|joint| {
+        let all_consistent = (0..N).all(|joint| {
             let (external, gravity) = (external_nm[joint], self.terms.gravity[joint]);
             let strong_nm = PUSH_SHARE * config.limits.joint_torque_nm[joint];
-            let reversed_nm = REVERSED_SHARE * abs(gravity);
-            let struck = abs(accelerating_nm[joint]) > STRUCK_RATIO * (reversed_nm + strong_nm);
+            let reversed_nm = MAX_GRAVITY_RATIO * abs(gravity);
+            let struck = abs(inertial_torque_nm[joint]) > IMPACT_RATIO * (reversed_nm + strong_nm);
             let weak = abs(external) <= strong_nm;
             let multiple = (external * gravity > 0.0) == against_weight
-                && (min_share * abs(gravity)..=reversed_nm).contains(&abs(external));
+                && (min_ratio * abs(gravity)..=reversed_nm).contains(&abs(external));
             driven |= !weak && multiple;
             (weak || multiple) && !struck
         });
-        driven && others_fit
+        driven && all_consistent
     }
 
     /// Whether an external torque acts that should move the arm: on a joint with an unchanged
@@ -218,7 +216,7 @@ impl<const N: usize> State<N> {
     }
 }
 
-/// Whether the fault is one of the arm's motion, and not of its sensors or states.
+/// Whether the fault reports an abnormal motion: a limit of position, speed, workspace or tracking, or a collision.
 fn is_of_motion(fault: &Fault) -> bool {
     matches!(
         fault,

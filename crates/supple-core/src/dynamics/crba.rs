@@ -1,8 +1,8 @@
-//! Mass matrix by the composite-rigid-body algorithm, `H_ij = S_i . I_j S_j` with `I_j` the inertia
-//! of all that joint `j` carries; for up to three joints link by link.
+//! Mass matrix by the composite-rigid-body algorithm, `H_ij = S_i . I_j S_j` for `i <= j`, with `I_j` the composite
+//! inertia of the links from `j` to the tip. With at most three joints, the contributions of the links are added up instead.
 #![allow(
     clippy::needless_range_loop,
-    reason = "joints, groups and lanes are counted: each index goes into several arrays"
+    reason = "the same index of a joint, group or lane is used for several arrays"
 )]
 
 use super::chain::Chain;
@@ -16,7 +16,7 @@ use crate::math::vec3::{add, cross, dot, dot6, rotate, rotate_back, scale, sub};
 use crate::math::{Matrix, Vector};
 use crate::model::arm::Arm;
 
-/// Mass matrix `H(q)`, symmetric, rotor inertias on the diagonal \[kg m^2\]. `q` \[rad\].
+/// Symmetric mass matrix `H(q)`, with the rotor inertias added to its diagonal \[kg m^2\]. `q` \[rad\].
 #[inline]
 pub fn crba<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> Matrix<N, N> {
     match N {
@@ -33,10 +33,10 @@ fn of_position<const N: usize, const G: usize>(arm: &Arm<N>, q: &Vector<N>) -> M
     symmetric(&mass_columns(arm, &joint_motions(&chain, last), &carried))
 }
 
-/// Mass matrix of up to three joints, with each link's contribution to every entry computed at
-/// once: `H_ij = sum over k of m_k v_ik . v_jk + w_ik . I_k w_jk`, with `v_ik` and `w_ik` the
-/// velocity of the centre of mass and the angular velocity of link `k` for unit speed of joint `i`
-/// alone. `v` is in the axes of the first joint, `w` in the link's own.
+/// Mass matrix of up to three joints; each lane computes the contribution of one link to
+/// `H_ij = sum over k >= max(i, j) of (m_k v_ik . v_jk + w_ik . I_k w_jk)`, with `v_ik` and `w_ik` the velocity of the centre
+/// of mass and the angular velocity of link `k` for unit speed of joint `i` alone. `v` is in the frame of the first joint, `w`
+/// in that of link `k`. Lanes of links that joint `j` does not move have meaningless values, which are not added.
 #[inline]
 fn link_by_link<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> Matrix<N, N> {
     let chain = Chain::<1>::from_first_joint(arm, q);
@@ -46,19 +46,19 @@ fn link_by_link<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> Matrix<N, N> {
     );
     let [mass] = load_group(&arm.rows.masses::<1>(), 0);
     let [cx, cy, cz, xx, xy, yy, xz, yz, zz] = load_group(&arm.rows.central::<1>(), 0);
-    let lever = rotate(&r, [cx, cy, cz]);
-    let com = add(origin, lever);
+    let com_from_link_origin = rotate(&r, [cx, cy, cz]);
+    let com = add(origin, com_from_link_origin);
     let (mut v, mut w) = ([[Lanes::ZERO; 3]; N], [[Lanes::ZERO; 3]; N]);
     for joint in 0..N {
         let axis = match joint {
             0 => {
-                // The first joint rotates about the z axis of these axes.
+                // The first joint rotates about the z axis of its own frame, which is the one used here.
                 (v[0], w[0]) = ([-com[1], com[0], Lanes::ZERO], [r[2], r[5], r[8]]);
                 continue;
             }
-            // The last joint moves the last link alone, about that link's z axis.
+            // The last joint moves the last link alone, about that link's z axis; its `w` is not used: `I w` is a column of `I`.
             last if last == N - 1 => {
-                v[last] = cross([r[6], r[7], r[8]], lever);
+                v[last] = cross([r[6], r[7], r[8]], com_from_link_origin);
                 continue;
             }
             _ => splat(chain.frame(joint).axis()),
@@ -66,42 +66,40 @@ fn link_by_link<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> Matrix<N, N> {
         v[joint] = cross(axis, sub(com, splat(joint_values(&chain.origins, joint))));
         w[joint] = rotate_back(&r, axis);
     }
-    let mut whole = Matrix::<N, N>::zeros();
+    let mut mass_matrix = Matrix::<N, N>::zeros();
     for j in 0..N {
         let momentum = scale(v[j], mass);
-        let angular_velocity = match j {
+        let angular_momentum = match j {
             last if last > 0 && last == N - 1 => [xz, yz, zz],
             _ => inertia_times([xx, xy, yy, xz, yz, zz], w[j]),
         };
         for i in 0..=j {
-            let turning = match i {
+            let rotational = match i {
                 last if last > 0 && last == N - 1 => zz,
-                _ => dot(w[i], angular_velocity),
+                _ => dot(w[i], angular_momentum),
             };
-            let shares = (dot(v[i], momentum) + turning).to_array();
+            let contributions = (dot(v[i], momentum) + rotational).to_array();
             // Joint `j` moves its own link and those after it.
-            let mut sum = shares[j];
+            let mut sum = contributions[j];
             for link in j + 1..N {
-                sum += shares[link];
+                sum += contributions[link];
             }
-            whole.data.0[j][i] = sum;
-            whole.data.0[i][j] = sum;
+            mass_matrix.data.0[j][i] = sum;
+            mass_matrix.data.0[i][j] = sum;
         }
-        whole.data.0[j][j] += arm.armature[j];
+        mass_matrix.data.0[j][j] += arm.armature[j];
     }
-    whole
+    mass_matrix
 }
 
-/// Columns of the mass matrix from the joint motions and the carried bodies; valid from the
-/// diagonal downwards.
+/// Columns of the mass matrix from the joint motions and the composite inertias; only the lower triangle is valid.
 #[inline(always)]
 pub(super) fn mass_columns<const N: usize, const G: usize>(
     arm: &Arm<N>,
     motions: &Rows<6, G>,
     carried: &Rows<10, G>,
 ) -> Columns<N, G> {
-    // The force is that of all the bodies that a joint carries: valid for this joint and those
-    // before it.
+    // `I_j S_j`, the force that accelerates the composite body of joint `j`: used for joints `i <= j` only.
     let forces = for_each_joint!(axis in motions, body in carried => times(body, axis));
     let mut columns = [[Lanes::ZERO; G]; N];
     for j in 0..N {
@@ -124,13 +122,13 @@ pub(super) fn mass_columns<const N: usize, const G: usize>(
 /// Full symmetric matrix from its lower triangle.
 #[inline(always)]
 pub(super) fn symmetric<const N: usize, const G: usize>(columns: &Columns<N, G>) -> Matrix<N, N> {
-    let mut whole = Matrix::<N, N>::zeros();
+    let mut mass_matrix = Matrix::<N, N>::zeros();
     for j in 0..N {
         for i in j..N {
             let x = entry(&columns[j], i);
-            whole.data.0[j][i] = x;
-            whole.data.0[i][j] = x;
+            mass_matrix.data.0[j][i] = x;
+            mass_matrix.data.0[i][j] = x;
         }
     }
-    whole
+    mass_matrix
 }

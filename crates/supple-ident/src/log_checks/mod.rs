@@ -1,8 +1,9 @@
 //! Checks of a log against the physics of the given arm, before a fit.
 //!
-//! Three groups of checks, in this order; an error that one of them finds can hide errors from the next:
+//! Four groups of checks, in this order; an error that one of them finds can hide errors from the next:
 //! - `sampling`: checks of single columns, without a model. An encoder cannot stop within a sample, time cannot jump for all
 //!   joints at once, a torque does not stay at its largest value.
+//! - `velocity`: measured velocities against the slopes of the angles, without a model.
 //! - `remedies`: whether a column has the wrong sign, unit, order, zero or clock. A model of the arm with free link inertias is
 //!   fitted to the log as given, and to the log with each error corrected. If a correction reduces the residual by far, the
 //!   log has that error. Gravity determines the time scale and the zeros of the angles; friction, which only dissipates power,
@@ -28,7 +29,7 @@ use crate::log::{Log, MAX_ANGLE_RAD};
 use crate::motion::{Motion, Preparation};
 use supple_core::Arm;
 
-/// Number of samples of a log to which the corrections of `remedies` are fitted.
+/// Maximum number of samples of a log to which the corrections of `remedies` are fitted.
 const REMEDY_SAMPLES: f64 = 300.0;
 /// Minimum number of reversals of each moving joint in a log that is compared with a model.
 const MIN_REVERSALS: usize = 3;
@@ -113,7 +114,7 @@ fn many_revolutions(log: &Log, findings: &[Finding]) -> Vec<Finding> {
     found
 }
 
-/// The log resampled at 20 Hz to 100 Hz, at most [`REMEDY_SAMPLES`] from its middle.
+/// The log resampled at 20 Hz to 100 Hz, but not above its own rate; at most [`REMEDY_SAMPLES`] from its middle.
 fn coarse(log: &Log, preparation: &Preparation) -> Result<Motion, IdentError> {
     let span_s = log.t_s[log.t_s.len() - 1] - log.t_s[0];
     let own_hz = (log.t_s.len() - 1) as f64 / span_s;

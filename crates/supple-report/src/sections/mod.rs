@@ -24,19 +24,19 @@ pub fn sections(summary: &Summary) -> Vec<Section> {
     ]
 }
 
-/// Runs that ended with an unexpected fault. Equation (3.6) as printed is excluded: its instability is a result; so is the
-/// realistic plant for an arm whose settings are derived.
+/// Runs that ended with an unexpected fault. Excluded are those in which a fault is a result: runs with equation (3.6) exactly as
+/// printed, and, for an arm whose gains and limits were derived from its model, those on the realistic plant.
 pub fn faults(summary: &Summary) -> Vec<(String, &FaultEnd)> {
     let mut runs: Vec<(String, &Option<FaultEnd>)> = Vec::new();
-    for at in &summary.sinusoid_by_speed {
+    for run in &summary.sinusoid_by_speed {
         runs.push((
-            format!("sinusoid at {} times the speed", at.speed),
-            &at.tracking.ended,
+            format!("sinusoid at {} times the paper's speed", run.speed),
+            &run.tracking.ended,
         ));
     }
-    let found = summary.realistic.iter().flat_map(|found| &found.ended);
-    let found = found.filter(|_| summary.derived.is_none());
-    let realistic = found.map(|ended| {
+    let of_realistic = summary.realistic.iter().flat_map(|runs| &runs.ended);
+    let of_realistic = of_realistic.filter(|_| summary.derived.is_none());
+    let realistic = of_realistic.map(|ended| {
         let name = format!("realistic plant, seed {}", ended.seed);
         (name, &ended.fault)
     });
@@ -52,16 +52,22 @@ pub fn faults(summary: &Summary) -> Vec<(String, &FaultEnd)> {
     for (name, tracking) in [("Coulomb", &exact.coulomb), ("Stribeck", &exact.stribeck)] {
         runs.push((format!("sinusoid, exact model, {name}"), &tracking.ended));
     }
-    for (kind, lines) in [
-        ("fade on", &summary.exploration),
-        ("fade off", &summary.exploration_fade_off),
+    for (kind, runs_by_stiffness) in [
+        (
+            "friction feed-forward reduced in contact",
+            &summary.exploration,
+        ),
+        (
+            "friction feed-forward kept in contact",
+            &summary.exploration_fade_off,
+        ),
         ("exact model", &summary.exploration_exact_model),
         ("rubber", &summary.exploration_rubber),
         ("apparent inertia", &summary.exploration_apparent_inertia),
     ] {
-        for line in lines {
-            let name = format!("probing at {} N/m, {kind}", line.stiffness_n_per_m);
-            runs.push((name, &line.ended));
+        for run in runs_by_stiffness {
+            let name = format!("probing at {} N/m, {kind}", run.stiffness_n_per_m);
+            runs.push((name, &run.ended));
         }
     }
     let apparent = &summary.sinusoid_apparent_inertia;

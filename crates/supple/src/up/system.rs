@@ -22,11 +22,11 @@ use supple_realtime::Stop;
 
 /// Timeout for a process to join the system \[s\].
 const JOIN_TIMEOUT_S: u64 = 20;
-/// Cycle in which learning begins in virtual time, after the request for gravity hold.
+/// Cycle in which learning begins in virtual time: the one after that of the request for gravity hold.
 const LEARN_CYCLE: u64 = 1;
-/// Interval at which the pidfile is looked for.
-const RESTORE_INTERVAL: Duration = Duration::from_millis(500);
-/// Cycles after a refusal within which its cause is in the telemetry.
+/// Interval at which a deleted pidfile is recreated.
+const PIDFILE_CHECK_INTERVAL: Duration = Duration::from_millis(500);
+/// Number of cycles after a refusal within which the telemetry shows its cause.
 const REFUSAL_CYCLES: u32 = 200;
 /// Maximum duration of one wait for telemetry.
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
@@ -87,7 +87,7 @@ impl<'a, const N: usize> System<'a, N> {
         })
     }
 
-    /// The processes write what they report to a file instead of standard error.
+    /// Redirects the standard error of the processes to a file.
     ///
     /// # Errors
     /// [`Failure::File`].
@@ -204,7 +204,7 @@ impl<'a, const N: usize> System<'a, N> {
     /// Runs until the end of the run, a shutdown request or an error.
     ///
     /// # Errors
-    /// If a process exits or a request is refused. A log that cannot be written is only reported.
+    /// If a process exits or a request is refused. An error of writing the log does not end the run; it is printed.
     pub fn watch(&mut self, stop: &Stop, pidfile: &mut Pidfile) -> Result<(), Failure> {
         match self.watch_on(stop, pidfile) {
             // The same signal also ends the controller, which may exit first.
@@ -220,12 +220,12 @@ impl<'a, const N: usize> System<'a, N> {
     fn watch_on(&mut self, stop: &Stop, pidfile: &mut Pidfile) -> Result<(), Failure> {
         let (mut fault_seen, mut looked) = (false, Instant::now());
         while !stop.shutdown_requested() {
-            if looked.elapsed() >= RESTORE_INTERVAL {
+            if looked.elapsed() >= PIDFILE_CHECK_INTERVAL {
                 looked = Instant::now();
                 pidfile.restore();
             }
             let polled = match self.poll_and_advance() {
-                Err(Failure::Refused { reason }) if self.start_up_is_ended()? => {
+                Err(Failure::Refused { reason }) if self.wait_whether_start_up_aborts()? => {
                     print_status(&reason);
                     continue;
                 }
@@ -243,9 +243,9 @@ impl<'a, const N: usize> System<'a, N> {
                 None => {}
             }
             match self.session.check() {
-                // An operator has sent other requests; that is not an error.
+                // Refused because an operator has requested another mode meanwhile: not an error.
                 Err(Failure::Refused { reason })
-                    if self.limit.is_none() || self.start_up_is_ended()? =>
+                    if self.limit.is_none() || self.wait_whether_start_up_aborts()? =>
                 {
                     print_status(&reason);
                 }
@@ -263,8 +263,9 @@ impl<'a, const N: usize> System<'a, N> {
         Ok(())
     }
 
-    /// Whether the start-up ends early within the next cycles: a refusal may arrive before the telemetry with its cause.
-    fn start_up_is_ended(&mut self) -> Result<bool, Failure> {
+    /// Processes the next cycles; returns whether the start-up was aborted. A refusal may arrive before the telemetry that shows
+    /// its cause.
+    fn wait_whether_start_up_aborts(&mut self) -> Result<bool, Failure> {
         for _ in 0..REFUSAL_CYCLES {
             if self.stages.is_ended() || self.stages.is_done() {
                 break;

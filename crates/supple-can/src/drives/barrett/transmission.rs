@@ -1,5 +1,5 @@
-//! Transmission between motors and joints: `q = m2jp p` from the motor angles, `m2jp^T tau` for the motor
-//! torques.
+//! Transmission between motors and joints: joint angles `q = J theta` from motor angles `theta`, motor torques `J^T tau` from
+//! joint torques, with `J` = `joint_from_motor` (libbarrett's `m2jp`).
 
 use supple_core::{Matrix, Vector};
 use supple_model::Description;
@@ -7,7 +7,7 @@ use supple_puck::position::CountsError;
 use supple_puck::torque::TorqueError;
 use supple_puck::{Counts, PositionScale, PuckTorque, TorqueScale};
 
-/// Transmission, encoders and torque units of an arm.
+/// Transmission matrix, encoder scales and torque scales of an arm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Transmission<const N: usize> {
     joint_from_motor: Matrix<N, N>,
@@ -51,10 +51,10 @@ impl<const N: usize> Transmission<N> {
         })
     }
 
-    /// Motor counts at joint angles \[rad\].
+    /// Encoder counts of the motors at these joint angles \[rad\].
     ///
     /// # Errors
-    /// An angle that is not finite, or outside the range of a position.
+    /// A motor angle that is not finite or exceeds the range of the counts.
     pub fn counts(&self, joint_rad: &Vector<N>) -> Result<[Counts; N], CountsError> {
         let motor_rad = self.motor_from_joint * joint_rad;
         let mut counts = [Counts::new(0)?; N];
@@ -64,7 +64,7 @@ impl<const N: usize> Transmission<N> {
         Ok(counts)
     }
 
-    /// Motor torques in puck units from joint torques \[N m\], rounded to the nearest.
+    /// Motor torques in the pucks' integer unit, rounded to the nearest integer, from joint torques \[N m\].
     ///
     /// # Errors
     /// A torque that is not finite.
