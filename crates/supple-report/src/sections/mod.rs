@@ -53,14 +53,8 @@ pub fn faults(summary: &Summary) -> Vec<(String, &FaultEnd)> {
         runs.push((format!("sinusoid, exact model, {name}"), &tracking.ended));
     }
     for (kind, runs_by_stiffness) in [
-        (
-            "friction feed-forward reduced in contact",
-            &summary.exploration,
-        ),
-        (
-            "friction feed-forward kept in contact",
-            &summary.exploration_fade_off,
-        ),
+        ("fade on", &summary.exploration),
+        ("fade off", &summary.exploration_fade_off),
         ("exact model", &summary.exploration_exact_model),
         ("rubber", &summary.exploration_rubber),
         ("apparent inertia", &summary.exploration_apparent_inertia),
