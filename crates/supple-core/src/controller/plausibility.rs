@@ -76,9 +76,9 @@ impl<const N: usize> AgainstLimits<N> {
 pub(super) struct JointMotion<'a, const N: usize> {
     /// Generalised momentum \[N m s\].
     pub momentum: &'a Vector<N>,
-    /// Of the joints \[rad/s\].
+    /// Velocities of the joints \[rad/s\].
     pub velocity_rad_per_s: &'a Vector<N>,
-    /// Of their references \[rad/s\].
+    /// Velocities of their references \[rad/s\].
     pub reference_rad_per_s: &'a Vector<N>,
 }
 

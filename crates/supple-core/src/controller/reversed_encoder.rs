@@ -50,9 +50,11 @@ impl SuddenReversal {
     ) -> Evidence {
         self.cycles += 1;
         let difference = abs(velocity_rad_per_s + reference_rad_per_s);
+        // False for a reference at rest, which says nothing, and for values that are not finite.
+        let mirrors_reference = difference < DIFFERENCE_SHARE * abs(reference_rad_per_s);
         if self.cycles <= settling_cycles {
             Evidence::Open
-        } else if difference > DIFFERENCE_SHARE * abs(reference_rad_per_s) {
+        } else if !mirrors_reference {
             Evidence::Refuted
         } else if self.cycles < settling_cycles + CONFIRMING_CYCLES {
             Evidence::Open
