@@ -1,19 +1,22 @@
 //! An encoder whose sign is wrong from the middle of a motion on: the arm comes to rest or its drives brake.
 
 use crate::support::configs::four;
-use crate::support::plant::{Plant, nothing};
+use crate::support::plant::{Plant, nothing, push};
 use crate::support::rig::{Rig, bent};
 use supple_core::controller::{Fault, Request};
 use supple_core::dynamics::inverse_kinematics::inverse_kinematics;
-use supple_core::dynamics::jacobian;
+use supple_core::dynamics::{jacobian, tip_pose};
+use supple_core::math::Vector3;
 use supple_core::trajectory::{Sinusoid, Trajectory};
-use supple_core::{Output, Vector};
+use supple_core::{Arm, Output, Vector};
 
 /// Time at which the sign changes, and from when on the arm must be slow after the fault \[cycles\].
 const REVERSED: u64 = 500;
 const SLOW_AFTER: u64 = 500;
 /// Tip speed of an arm at rest \[m/s\].
 const SLOW_M_PER_S: f64 = 0.25;
+/// Ratio of damping to stiffness of a wall \[s\]: the tip keeps most of its speed.
+const WALL_DAMPING_S: f64 = 2e-4;
 
 /// Output, tip speed \[m/s\] and cycles since the fault, for each cycle of a move of the joint and two seconds more.
 fn reversed(joint: usize) -> Vec<(Output<4>, f64, Option<u64>)> {
@@ -67,9 +70,16 @@ fn the_arm_comes_to_rest() {
     }
 }
 
-/// Cycles from the reversal until the fault while the tip follows the paper's sinusoid, if there is one within 0.15 s, for a
-/// reversal `before` cycles before the joint is fastest; what the encoder shows from then on, of the true angle since then.
-fn named_after(joint: usize, before: u64, shown: impl Fn(f64) -> f64) -> Option<(Fault, u64)> {
+/// Fault while the tip follows the paper's sinusoid, and cycles from the event until then; `None` if there is no fault within
+/// 0.15 s. The event is `before` cycles before the tip passes its centre, fastest. From then on the encoder of `joint` shows
+/// `shown` of the angle by which the joint has turned since, and `wall_n_per_m` is the stiffness of a wall at the centre.
+/// The second value says whether the joint seemed to turn round.
+fn fault_after(
+    joint: usize,
+    before: u64,
+    shown: impl Fn(f64) -> f64,
+    wall_n_per_m: f64,
+) -> (Option<(Fault, u64)>, bool) {
     let mut config = four();
     config.plausible.against_share = 0.05;
     config.estimator_rad_per_s = 500.0;
@@ -87,29 +97,41 @@ fn named_after(joint: usize, before: u64, shown: impl Fn(f64) -> f64) -> Option<
     rig.accept(Request::Track(Trajectory::Sinusoid(sinusoid)));
     // With its ramp it passes its centre, fastest, after 4.5 s.
     let reversed = 4500 - before;
-    let mut at_rad = 0.0;
+    let (mut at_rad, mut before_rad_per_s, mut turned_round) = (0.0, 0.0, false);
     for cycle in 0..reversed + 150 {
         rig.q = plant.q;
         if cycle == reversed {
-            at_rad = plant.q[joint];
+            (at_rad, before_rad_per_s) = (plant.q[joint], plant.qd[joint]);
         }
         if cycle >= reversed {
             rig.q[joint] = at_rad + shown(plant.q[joint] - at_rad);
         }
         let output = rig.cycle();
+        turned_round |= output.velocity_rad_per_s[joint] * before_rad_per_s < 0.0;
         if let Some(fault) = output.fault {
-            return Some((fault, cycle - reversed));
+            return (Some((fault, cycle - reversed)), turned_round);
         }
-        plant.advance(&output.torque_nm, nothing, 1e-3, 4);
+        let wall = |arm: &Arm<4>, q: &Vector<4>, qd: &Vector<4>| {
+            let depth_m = sinusoid.centre_m.x - tip_pose(arm, q).translation.x;
+            let closing_m_per_s = -(jacobian(arm, q).fixed_rows::<3>(0) * qd).x;
+            let force_n = wall_n_per_m * (depth_m + WALL_DAMPING_S * closing_m_per_s);
+            let touches = depth_m > 0.0 && force_n > 0.0;
+            push(
+                arm,
+                q,
+                &Vector3::new(if touches { force_n } else { 0.0 }, 0.0, 0.0),
+            )
+        };
+        plant.advance(&output.torque_nm, wall, 1e-3, 8);
     }
-    None
+    (None, turned_round)
 }
 
 #[test]
 fn a_reversal_while_tracking_is_named_soon() {
     for joint in [1, 3] {
         for before in [0, 100, 200] {
-            let found = named_after(joint, before, |turned_rad| -turned_rad);
+            let (found, _) = fault_after(joint, before, |turned_rad| -turned_rad, 0.0);
             assert!(
                 matches!(found, Some((Fault::MotionAgainstTorque { joint: named, .. }, after))
                     if named == joint && after <= 60),
@@ -119,15 +141,27 @@ fn a_reversal_while_tracking_is_named_soon() {
     }
 }
 
-/// What bounces has less than its speed afterwards. That an encoder which goes on so is wrong shows later, by another rule with a
-/// lower limit.
+/// Whether the rule of sudden reversals has found the fault: its limit is six times that of the other rule, 4 N m here.
+fn is_sudden_reversal(found: Option<(Fault, u64)>) -> bool {
+    matches!(found, Some((Fault::MotionAgainstTorque { limit_nm, .. }, _)) if limit_nm > 5.0)
+}
+
+/// An encoder that goes on with the opposite sign and half of the speed is found later, by the other rule.
 #[test]
-fn a_rebound_is_no_reversed_encoder() {
+fn a_joint_that_returns_with_half_of_its_speed_has_no_reversed_encoder() {
     for joint in [1, 3] {
-        let found = named_after(joint, 0, |turned_rad| -0.5 * turned_rad);
-        assert!(
-            !matches!(found, Some((Fault::MotionAgainstTorque { limit_nm, .. }, _)) if limit_nm > 5.0),
-            "joint {joint}: {found:?}"
-        );
+        let (found, turned_round) = fault_after(joint, 0, |turned_rad| -0.5 * turned_rad, 0.0);
+        assert!(turned_round, "joint {joint}");
+        assert!(!is_sudden_reversal(found), "joint {joint}: {found:?}");
+    }
+}
+
+/// Written before the run: a tip that hits a hard wall at its highest speed and rebounds with most of it shows no reversed encoder.
+#[test]
+fn a_rebound_from_a_wall_is_no_reversed_encoder() {
+    for wall_n_per_m in [5e3, 2e4, 1e5] {
+        let (found, turned_round) = fault_after(3, 20, |turned_rad| turned_rad, wall_n_per_m);
+        assert!(turned_round, "no contact");
+        assert!(!is_sudden_reversal(found), "{wall_n_per_m} N/m: {found:?}");
     }
 }
