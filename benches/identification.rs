@@ -54,7 +54,8 @@ fn main() {
         torque_delay_s: 0.0,
         masks: Vec::new(),
     };
-    let columns = Columns::new(7, &JOINTS, true, FrictionColumns::OFFSET, &[]).expect("columns");
+    let columns =
+        Columns::new(7, &JOINTS, true, FrictionColumns::COULOMB_AND_OFFSET, &[]).expect("columns");
     let before = Instant::now();
     let mut block = ReducedSystem::empty(columns.len());
     for joint in joint_rows(&arm, &columns, &motion).expect("rows") {

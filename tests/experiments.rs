@@ -122,7 +122,7 @@ fn an_exact_model_tracks_better() {
 #[test]
 fn the_law_as_printed_diverges_and_ends_in_a_fault() {
     let run = sinusoid(&Variant {
-        paper_letter: true,
+        law_as_printed: true,
         stribeck: false,
         ..perturbed(0)
     });

@@ -414,7 +414,7 @@ fn a_realistic_arm_is_calibrated_step_by_step() {
     let ratio = progress.moved_s / progress.stated_s;
     assert!((0.85..1.05).contains(&ratio), "{ratio} of the stated time");
     let fit = progress.fit.expect("fitted");
-    assert!(fit.unseen_relative < 0.08, "{fit:?}");
+    assert!(fit.validation_relative < 0.08, "{fit:?}");
     let sinusoid = progress.sinusoid.expect("in reach");
     assert_eq!(sinusoid.ended, None);
     assert!(

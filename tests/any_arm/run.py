@@ -83,7 +83,7 @@ def demo(programs: Path, case: Case, out: Path, _number: int) -> str:
         + ["--realistic-seeds", "0", "--no-logs", "--out", str(out / "demo")]
     )
     summary = json.loads(done.stdout)
-    seeds, allowed_m, adapted = summary["seeds"], summary["allowed_error_m"], summary.get("adapted", [])
+    seeds, allowed_m, adapted = summary["perturbed_rms_m"], summary["allowed_error_m"], summary.get("adapted", [])
     gone = [row for row in adapted if is_the_sinusoid(row["run"])]
     if gone or not seeds or None in seeds:
         raise Failed(f"the sinusoid was made smaller or left out: {gone or seeds}")

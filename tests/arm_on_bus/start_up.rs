@@ -184,7 +184,10 @@ fn mixed_firmware_is_rejected() {
     let mut config = EmulatorConfig::wam(4);
     config.pucks[3].version = 60;
     let error = startup_error(config);
-    assert!(error.contains("node 4 has torque at id"), "{error}");
+    assert!(
+        error.contains("node 4 has the torque under property id"),
+        "{error}"
+    );
 }
 
 #[test]

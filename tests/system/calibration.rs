@@ -90,7 +90,7 @@ fn an_emulated_arm_is_calibrated_across_an_interrupt() {
             .expect("a better model than the wrong one")
     };
     assert!(
-        unexplained("unseen_relative") < unexplained("unseen_relative_before"),
+        unexplained("validation_relative") < unexplained("validation_relative_before"),
         "{fit}"
     );
     for breakaway in found["breakaway"].as_array().expect("a list") {

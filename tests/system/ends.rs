@@ -32,7 +32,7 @@ fn a_full_disk_ends_the_log_and_not_the_arm() {
     let summary = json(&output);
     for message in [
         &stderr_of(&output),
-        summary["cut_short"].as_str().expect("why"),
+        summary["incomplete_output"].as_str().expect("why"),
     ] {
         for word in ["the log ends", "run.mcap.part", "File too large"] {
             assert!(message.contains(word), "{word} in {message}");
@@ -105,7 +105,7 @@ fn a_run_that_ends_with_a_fault_is_code_5_with_its_summary() {
     let summary = json(&output);
     let faults = summary["faults"].as_array().expect("a list");
     assert_eq!(faults.len(), 1, "{summary}");
-    assert!(summary["cut_short"].is_null(), "{summary}");
+    assert!(summary["incomplete_output"].is_null(), "{summary}");
     assert!(folder.path().join("run.mcap").exists());
 }
 

@@ -25,29 +25,29 @@ const BIT_RATE_SWITCH: u8 = 0x01;
 const FD_FORMAT: u8 = 0x04;
 const HEAD_BYTES: usize = FD_FRAME_BYTES - MAX_FD_BYTES;
 
-/// Error classes in the id of an error frame, with the corresponding faults.
-const CLASSES: [(u32, BusFault); 8] = [
-    (0x001, BusFault::TransmitTimeout),
-    (0x002, BusFault::ArbitrationLost),
-    (0x008, BusFault::Protocol),
-    (0x010, BusFault::Transceiver),
-    (0x020, BusFault::NoAcknowledge),
-    (0x040, BusFault::BusOff),
-    (0x080, BusFault::Protocol),
-    (0x100, BusFault::Restarted),
+/// Error classes (`CAN_ERR_...`) in the id of an error frame, with the corresponding faults.
+const ERROR_CLASSES: [(u32, BusFault); 8] = [
+    (0x001, BusFault::TransmitTimeout), // TX_TIMEOUT
+    (0x002, BusFault::ArbitrationLost), // LOSTARB
+    (0x008, BusFault::Protocol),        // PROT
+    (0x010, BusFault::Transceiver),     // TRX
+    (0x020, BusFault::NoAcknowledge),   // ACK
+    (0x040, BusFault::BusOff),          // BUSOFF
+    (0x080, BusFault::Protocol),        // BUSERROR
+    (0x100, BusFault::Restarted),       // RESTARTED
 ];
-/// The class whose second data byte reports the state of the controller.
+/// `CAN_ERR_CRTL`: the second data byte has flags of the CAN controller's state.
 const CONTROLLER: u32 = 0x004;
-/// Flags of that byte.
+/// Flags of that byte (`CAN_ERR_CRTL_...`), those of reception and transmission together.
 const CONTROLLER_FLAGS: [(u8, BusFault); 3] = [
-    (0x03, BusFault::Overrun),
-    (0x0c, BusFault::Warning),
-    (0x30, BusFault::Passive),
+    (0x03, BusFault::Overrun), // RX_OVERFLOW, TX_OVERFLOW
+    (0x0c, BusFault::Warning), // RX_WARNING, TX_WARNING
+    (0x30, BusFault::Passive), // RX_PASSIVE, TX_PASSIVE
 ];
 
-/// A parsed raw frame.
+/// A frame as read from a socket.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum WireFrame {
+pub enum DecodedFrame {
     /// A data frame.
     Data(CanFrame),
     /// An error frame.
@@ -57,14 +57,14 @@ pub enum WireFrame {
     Unsupported,
 }
 
-/// A raw frame to be written: 16 or 72 bytes.
+/// A frame as written to a socket: 16 or 72 bytes.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub struct RawFrame {
+pub struct EncodedFrame {
     bytes: [u8; FD_FRAME_BYTES],
     fd: bool,
 }
 
-impl Deref for RawFrame {
+impl Deref for EncodedFrame {
     type Target = [u8];
 
     fn deref(&self) -> &[u8] {
@@ -77,30 +77,31 @@ impl Deref for RawFrame {
     }
 }
 
-impl fmt::Debug for RawFrame {
+impl fmt::Debug for EncodedFrame {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:02x?}", &self[..])
     }
 }
 
-impl WireFrame {
-    /// Parses a raw frame of 16 or 72 bytes; other lengths are unsupported.
-    pub fn parse(raw: &[u8]) -> WireFrame {
+impl DecodedFrame {
+    /// Decodes a frame of 16 or 72 bytes; other lengths are unsupported.
+    pub fn decode(raw: &[u8]) -> DecodedFrame {
         let fd = match raw.len() {
             CAN_FRAME_BYTES => false,
             FD_FRAME_BYTES => true,
-            _ => return WireFrame::Unsupported,
+            _ => return DecodedFrame::Unsupported,
         };
         let (head, data) = raw.split_at(HEAD_BYTES);
         let &[a, b, c, d, length, flags, ..] = head else {
-            return WireFrame::Unsupported;
+            return DecodedFrame::Unsupported;
         };
         let raw_id = u32::from_ne_bytes([a, b, c, d]);
         if raw_id & ERROR != 0 {
-            return fault(raw_id, data).map_or(WireFrame::Unsupported, WireFrame::Fault);
+            return most_severe_fault(raw_id, data)
+                .map_or(DecodedFrame::Unsupported, DecodedFrame::Fault);
         }
         if raw_id & REMOTE != 0 {
-            return WireFrame::Unsupported;
+            return DecodedFrame::Unsupported;
         }
         let format = if fd {
             FrameFormat::Fd {
@@ -118,11 +119,13 @@ impl WireFrame {
             (Ok(id), Some(payload)) => CanFrame::of_format(id, format, payload).ok(),
             _ => None,
         };
-        frame.map_or(WireFrame::Unsupported, WireFrame::Data)
+        frame.map_or(DecodedFrame::Unsupported, DecodedFrame::Data)
     }
+}
 
-    /// The raw form of a data frame.
-    pub fn data(frame: &CanFrame) -> RawFrame {
+impl EncodedFrame {
+    /// Encodes a data frame.
+    pub fn of_data(frame: &CanFrame) -> EncodedFrame {
         let mut bytes = [0; FD_FRAME_BYTES];
         let id = frame.id();
         let flag = if id.is_extended() { EXTENDED } else { 0 };
@@ -136,29 +139,29 @@ impl WireFrame {
             }
         };
         bytes[HEAD_BYTES..HEAD_BYTES + payload.len()].copy_from_slice(payload);
-        RawFrame {
+        EncodedFrame {
             bytes,
             fd: frame.is_fd(),
         }
     }
 
-    /// The raw form of an error frame.
-    pub fn fault(fault: BusFault) -> RawFrame {
+    /// Encodes an error frame.
+    pub fn of_fault(fault: BusFault) -> EncodedFrame {
         let mut bytes = [0; FD_FRAME_BYTES];
         bytes[4] = 8;
-        let class = CLASSES.iter().find(|(_, of)| *of == fault);
+        let class = ERROR_CLASSES.iter().find(|(_, of)| *of == fault);
         let flags = CONTROLLER_FLAGS.iter().find(|(_, of)| *of == fault);
         let class = class.map_or(CONTROLLER, |&(class, _)| class);
         bytes[..4].copy_from_slice(&(ERROR | class).to_ne_bytes());
         bytes[9] = flags.map_or(0, |&(flags, _)| flags);
-        RawFrame { bytes, fd: false }
+        EncodedFrame { bytes, fd: false }
     }
 }
 
 /// The most severe fault in an error frame.
-fn fault(id: u32, data: &[u8]) -> Option<BusFault> {
+fn most_severe_fault(id: u32, data: &[u8]) -> Option<BusFault> {
     let controller = data.get(1).copied().unwrap_or(0);
-    let classes = CLASSES.iter().filter(|(class, _)| id & class != 0);
+    let classes = ERROR_CLASSES.iter().filter(|(class, _)| id & class != 0);
     let flags = CONTROLLER_FLAGS
         .iter()
         .filter(|(flags, _)| id & CONTROLLER != 0 && controller & flags != 0);

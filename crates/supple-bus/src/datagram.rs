@@ -5,7 +5,7 @@
 //! peer frames are not acknowledged, as on a real bus without an arm. No data leave the machine.
 
 use crate::bus::{Bus, BusFault, Event};
-use crate::can_frame::{FD_FRAME_BYTES, WireFrame};
+use crate::can_frame::{DecodedFrame, EncodedFrame, FD_FRAME_BYTES};
 use crate::endpoint::{Delivery, Endpoint};
 use crate::error::BusError;
 use crate::folder::OwnerFolder;
@@ -62,7 +62,9 @@ impl DatagramBus {
     /// # Errors
     /// If the socket fails.
     pub fn send_fault(&mut self, fault: BusFault) -> Result<(), BusError> {
-        self.endpoint.send(&WireFrame::fault(fault)).map(|_| ())
+        self.endpoint
+            .send(&EncodedFrame::of_fault(fault))
+            .map(|_| ())
     }
 
     fn read_event(&mut self) -> Result<Option<Event>, BusError> {
@@ -71,10 +73,10 @@ impl DatagramBus {
         }
         let mut buffer = [0; FD_FRAME_BYTES + 1];
         while let Some(raw) = self.endpoint.receive_into(&mut buffer)? {
-            match WireFrame::parse(raw) {
-                WireFrame::Data(frame) => return Ok(Some(Event::Frame(frame))),
-                WireFrame::Fault(fault) => return Ok(Some(Event::Fault(fault))),
-                WireFrame::Unsupported => {}
+            match DecodedFrame::decode(raw) {
+                DecodedFrame::Data(frame) => return Ok(Some(Event::Frame(frame))),
+                DecodedFrame::Fault(fault) => return Ok(Some(Event::Fault(fault))),
+                DecodedFrame::Unsupported => {}
             }
         }
         Ok(None)
@@ -90,7 +92,7 @@ impl Bus for DatagramBus {
         if self.confirmations.len() == CONFIRMATIONS {
             return Err(BusError::Full);
         }
-        let event = match self.endpoint.send(&WireFrame::data(frame))? {
+        let event = match self.endpoint.send(&EncodedFrame::of_data(frame))? {
             Delivery::Delivered => Event::Sent(*frame),
             Delivery::NoPeer => Event::Fault(BusFault::NoAcknowledge),
             Delivery::Full => return Err(BusError::Full),

@@ -40,7 +40,7 @@ mod wait;
 
 pub use address::{Address, AddressError};
 pub use bus::{Bus, BusFault, Event};
-pub use can_frame::{CAN_FRAME_BYTES, FD_FRAME_BYTES, RawFrame, WireFrame};
+pub use can_frame::{CAN_FRAME_BYTES, DecodedFrame, EncodedFrame, FD_FRAME_BYTES};
 pub use datagram::{DatagramBus, Side};
 pub use error::BusError;
 pub use fault::{FaultInjector, FaultKind, FaultRule, Traffic};

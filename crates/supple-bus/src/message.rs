@@ -14,7 +14,7 @@
 //! monotonic clock from the arm's time, and "sent" is the time of sending by that clock.
 
 use crate::bus::Event;
-use crate::can_frame::{CAN_FRAME_BYTES, FD_FRAME_BYTES, WireFrame};
+use crate::can_frame::{CAN_FRAME_BYTES, DecodedFrame, EncodedFrame, FD_FRAME_BYTES};
 use supple_can_frame::CanFrame;
 
 /// Maximum number of entries in a datagram. A bus at 1 Mbit/s carries no more frames in three milliseconds.
@@ -139,9 +139,9 @@ impl Message {
         let mut end = HEAD_BYTES;
         for entry in self.entries() {
             let (kind, raw) = match &entry.event {
-                Event::Frame(frame) => (FRAME, WireFrame::data(frame)),
-                Event::Sent(frame) => (SENT, WireFrame::data(frame)),
-                Event::Fault(fault) => (FAULT, WireFrame::fault(*fault)),
+                Event::Frame(frame) => (FRAME, EncodedFrame::of_data(frame)),
+                Event::Sent(frame) => (SENT, EncodedFrame::of_data(frame)),
+                Event::Fault(fault) => (FAULT, EncodedFrame::of_fault(*fault)),
             };
             let fd = if raw.len() == FD_FRAME_BYTES { FD } else { 0 };
             let slot = &mut bytes[end..end + ENTRY_HEAD_BYTES + raw.len()];
@@ -178,10 +178,10 @@ impl Message {
                 _ => FD_FRAME_BYTES,
             };
             let (slot, after) = rest.split_at_checked(ENTRY_HEAD_BYTES + raw_bytes)?;
-            let event = match (kind & !FD, WireFrame::parse(&slot[ENTRY_HEAD_BYTES..])) {
-                (FRAME, WireFrame::Data(frame)) => Event::Frame(frame),
-                (SENT, WireFrame::Data(frame)) => Event::Sent(frame),
-                (FAULT, WireFrame::Fault(fault)) => Event::Fault(fault),
+            let event = match (kind & !FD, DecodedFrame::decode(&slot[ENTRY_HEAD_BYTES..])) {
+                (FRAME, DecodedFrame::Data(frame)) => Event::Frame(frame),
+                (SENT, DecodedFrame::Data(frame)) => Event::Sent(frame),
+                (FAULT, DecodedFrame::Fault(fault)) => Event::Fault(fault),
                 _ => return None,
             };
             message.push(u64_at(slot, 8)?, event);

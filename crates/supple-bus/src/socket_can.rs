@@ -7,7 +7,7 @@
 //! `ip link set can0 up type can bitrate 1000000 restart-ms 100`, for CAN FD with `dbitrate 5000000 fd on`.
 
 use crate::bus::{Bus, BusFault, Event};
-use crate::can_frame::{FD_FRAME_BYTES, WireFrame};
+use crate::can_frame::{DecodedFrame, EncodedFrame, FD_FRAME_BYTES};
 use crate::error::BusError;
 use crate::wait::wait_readable_until;
 use nix::sys::socket::{self as kernel, ControlMessageOwned, MsgFlags, setsockopt};
@@ -86,7 +86,7 @@ impl SocketCan {
     /// # Errors
     /// If the kernel rejects it.
     pub fn send_fault(&mut self, fault: BusFault) -> Result<(), BusError> {
-        let sent = rustix::io::write(&self.socket, &WireFrame::fault(fault));
+        let sent = rustix::io::write(&self.socket, &EncodedFrame::of_fault(fault));
         sent.map(|_| ())
             .map_err(BusError::io("sending an error frame to the CAN interface"))
     }
@@ -141,13 +141,13 @@ impl SocketCan {
             };
             // This read had no buffer for the counter; it is read with the next frame.
             self.overrun_counting |= message.flags.contains(ReturnFlags::CTRUNC);
-            match WireFrame::parse(&raw[..message.bytes]) {
-                WireFrame::Data(frame) if message.flags.bits() & CONFIRM != 0 => {
+            match DecodedFrame::decode(&raw[..message.bytes]) {
+                DecodedFrame::Data(frame) if message.flags.bits() & CONFIRM != 0 => {
                     return Ok(Some(Event::Sent(frame)));
                 }
-                WireFrame::Data(frame) => return Ok(Some(Event::Frame(frame))),
-                WireFrame::Fault(fault) => return Ok(Some(Event::Fault(fault))),
-                WireFrame::Unsupported => {}
+                DecodedFrame::Data(frame) => return Ok(Some(Event::Frame(frame))),
+                DecodedFrame::Fault(fault) => return Ok(Some(Event::Fault(fault))),
+                DecodedFrame::Unsupported => {}
             }
         }
     }
@@ -168,7 +168,7 @@ impl Bus for SocketCan {
                 interface: self.interface.clone(),
             });
         }
-        match rustix::io::write(&self.socket, &WireFrame::data(frame)) {
+        match rustix::io::write(&self.socket, &EncodedFrame::of_data(frame)) {
             Ok(_) => Ok(()),
             Err(Errno::AGAIN | Errno::NOBUFS) => Err(BusError::Full),
             Err(errno) => Err(BusError::io("sending to the CAN interface")(errno)),

@@ -93,7 +93,10 @@ fn calibrated(
     let progress = &found.progress;
     let mm = |error: Option<f64>| error.map_or("fault".to_owned(), |m| format!("{:.1}", 1e3 * m));
     let sinusoid = progress.sinusoid.clone().unwrap_or_default();
-    let unexplained = progress.fit.as_ref().map_or(1.0, |fit| fit.unseen_relative);
+    let unexplained = progress
+        .fit
+        .as_ref()
+        .map_or(1.0, |fit| fit.validation_relative);
     Ok(format!(
         "| {seed} | {:.2} (stated {:.2}) | {:.2} | {} | {} | {} | {:.2} |",
         progress.moved_s / 60.0,

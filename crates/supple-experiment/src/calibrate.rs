@@ -306,33 +306,33 @@ pub fn identify<const N: usize>(
     logs: &[Log],
     runs: &[Log],
 ) -> Result<(Fit<N>, [RippleTable; N]), ExperimentError> {
-    let known = Knowledge::of(FrictionColumns::OFFSET);
-    identify_with(start, logs, runs, &known, SLOW_RAD_PER_S)
+    let options = FitOptions::new(FrictionColumns::COULOMB_AND_OFFSET);
+    identify_with(start, logs, runs, &options, SLOW_RAD_PER_S)
 }
 
-/// What is known of an arm before it moves.
+/// Friction terms and priors of a fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Knowledge {
-    /// Columns of friction.
+pub struct FitOptions {
+    /// Friction terms that are fitted.
     pub friction: FrictionColumns,
-    /// Weight of the model's links, see [`supple_ident::consistent::Constraints::prior_weight`].
-    pub links_weight: f64,
-    /// Standard deviation of the rotor inertias relative to those of the model; `None`: unknown.
+    /// Weight of the link parameters of the starting model as a prior, see [`supple_ident::consistent::Constraints::prior_weight`].
+    pub prior_weight: f64,
+    /// Prior standard deviation of the rotor inertias relative to those of the starting model; `None`: no prior.
     pub rotor_deviation: Option<f64>,
 }
 
-impl Knowledge {
-    /// These columns of friction; the motion identifies links and rotors.
-    pub fn of(friction: FrictionColumns) -> Knowledge {
-        Knowledge {
+impl FitOptions {
+    /// With these friction terms, a small prior weight, and no prior of the rotor inertias.
+    pub fn new(friction: FrictionColumns) -> FitOptions {
+        FitOptions {
             friction,
-            links_weight: 1e-2,
+            prior_weight: 1e-2,
             rotor_deviation: None,
         }
     }
 }
 
-/// As [`identify`], with what is known of the arm; samples of a joint slower than `slow_rad_per_s` are excluded.
+/// As [`identify`], with friction terms and priors; samples of a joint slower than `slow_rad_per_s` are excluded.
 ///
 /// # Errors
 /// [`ExperimentError::Ident`].
@@ -340,17 +340,17 @@ pub fn identify_with<const N: usize>(
     start: &Config<N>,
     logs: &[Log],
     runs: &[Log],
-    knowledge: &Knowledge,
+    options: &FitOptions,
     slow_rad_per_s: f64,
 ) -> Result<(Fit<N>, [RippleTable; N]), ExperimentError> {
     let joints: Vec<usize> = (0..N).collect();
     let motor_from_joint = *supple_core::Controller::new(*start)?.motor_from_joint();
     let procedure = Procedure {
         preparation: preparation(start.period_s, CUTOFF_HZ.0),
-        friction: FrictionChoice::Columns(knowledge.friction),
+        friction: FrictionChoice::Columns(options.friction),
         slow_rad_per_s,
-        prior_weight: Some(knowledge.links_weight),
-        rotor_deviation: knowledge.rotor_deviation,
+        prior_weight: Some(options.prior_weight),
+        rotor_deviation: options.rotor_deviation,
         effects: Effects::all(&motor_from_joint),
         ..Procedure::default()
     };

@@ -40,7 +40,7 @@ pub struct ProbingRun {
     /// Contact of each stroke.
     pub strokes: Vec<Stroke>,
     /// Its entry in the summary.
-    pub exploration: ProbingSummary,
+    pub summary: ProbingSummary,
 }
 
 /// Results of the demo.
@@ -62,7 +62,7 @@ pub struct Demo {
     /// Probing on rubber, at 5 and 125 N/m.
     pub probing_rubber: Vec<ProbingRun>,
     /// Equation (3.6) exactly as printed.
-    pub paper_letter: Run,
+    pub law_as_printed: Run,
 }
 
 /// Runs everything, on all cores.
@@ -146,7 +146,7 @@ fn tracking(run: &Run) -> TrackingError {
     }
 }
 
-fn exploration(stiffness_n_per_m: f64, done: &JobResult) -> ProbingSummary {
+fn probing_summary(stiffness_n_per_m: f64, done: &JobResult) -> ProbingSummary {
     let contact = median_stroke(&done.strokes);
     ProbingSummary {
         stiffness_n_per_m,
@@ -161,10 +161,9 @@ fn exploration(stiffness_n_per_m: f64, done: &JobResult) -> ProbingSummary {
     }
 }
 
-fn contact(explorations: &[ProbingSummary]) -> ContactStatistics {
+fn contact(runs: &[ProbingSummary]) -> ContactStatistics {
     let from_five = || {
-        explorations
-            .iter()
+        runs.iter()
             .filter(|e| e.stiffness_n_per_m >= scenario::STIFFNESS_N_PER_M)
     };
     let points: Vec<_> = from_five()
@@ -176,14 +175,14 @@ fn contact(explorations: &[ProbingSummary]) -> ContactStatistics {
         .collect();
     ContactStatistics {
         impulse_fit: LineFit::new(&points),
-        impulse_slopes: slopes(explorations),
+        impulse_slopes: slopes(runs),
         peak_spread: spread(&peaks),
         peak_over_speed_spread: spread(&over_speed),
     }
 }
 
-fn slopes(explorations: &[ProbingSummary]) -> Vec<ImpulseSlope> {
-    let pairs = explorations.windows(2);
+fn slopes(runs: &[ProbingSummary]) -> Vec<ImpulseSlope> {
+    let pairs = runs.windows(2);
     pairs
         .map(|pair| {
             let (low, high) = (&pair[0], &pair[1]);
@@ -220,7 +219,7 @@ impl Results {
                 kind,
             });
             (!done.run.is_left_out()).then(|| ProbingRun {
-                exploration: exploration(stiffness_n_per_m, &done),
+                summary: probing_summary(stiffness_n_per_m, &done),
                 run: done.run,
                 strokes: done.strokes,
             })
@@ -270,15 +269,15 @@ fn assemble(
     let [probing_exact, probing_rubber, probing_apparent] =
         Probing::AT_TWO.map(|kind| results.probing(two, kind));
     let apparent_inertia = results.take(Job::ApparentInertia).run;
-    let lines = |runs: &[ProbingRun]| -> Vec<ProbingSummary> {
-        runs.iter().map(|run| run.exploration.clone()).collect()
+    let summaries = |runs: &[ProbingRun]| -> Vec<ProbingSummary> {
+        runs.iter().map(|run| run.summary.clone()).collect()
     };
-    let exploration = lines(&probing);
-    let exploration_fade_off = lines(&probing_fade_off);
-    let paper_letter = results.take(Job::PaperLetter).run;
+    let fade_on = summaries(&probing);
+    let fade_off = summaries(&probing_fade_off);
+    let law_as_printed = results.take(Job::LawAsPrinted).run;
     let exact =
         |results: &mut Results, stribeck| tracking(&results.take(Job::Exact { stribeck }).run);
-    let seed_runs: Vec<TrackingError> = (0..SEEDS)
+    let perturbed_runs: Vec<TrackingError> = (0..SEEDS)
         .map(|seed| tracking(&results.take(Job::Seed(seed)).run))
         .collect();
     let summary = Summary {
@@ -308,13 +307,13 @@ fn assemble(
         quadrant,
         quadrant_perturbed,
         quadrant_at_paper_speed,
-        contact: contact(&exploration),
-        exploration,
-        fade_off: contact(&exploration_fade_off),
-        exploration_fade_off,
-        exploration_exact_model: lines(&probing_exact),
-        exploration_rubber: lines(&probing_rubber),
-        exploration_apparent_inertia: lines(&probing_apparent),
+        contact: contact(&fade_on),
+        probing: fade_on,
+        fade_off: contact(&fade_off),
+        probing_fade_off: fade_off,
+        probing_exact_model: summaries(&probing_exact),
+        probing_rubber: summaries(&probing_rubber),
+        probing_apparent_inertia: summaries(&probing_apparent),
         sinusoid_apparent_inertia: tracking(&apparent_inertia),
         quadrant_damped,
         quadrant_corner_ramp,
@@ -322,13 +321,13 @@ fn assemble(
             coulomb: exact(&mut results, false),
             stribeck: exact(&mut results, true),
         },
-        paper_letter: tracking(&paper_letter),
-        seeds: seed_runs
+        law_as_printed: tracking(&law_as_printed),
+        perturbed_rms_m: perturbed_runs
             .iter()
             .map(|run| run.rms_error_m)
             .filter(|error_m| error_m.is_finite())
             .collect(),
-        seed_runs,
+        perturbed_runs,
         adapted: Vec::new(),
         derived: None,
     };
@@ -340,6 +339,6 @@ fn assemble(
         probing,
         probing_fade_off,
         probing_rubber,
-        paper_letter,
+        law_as_printed,
     }
 }

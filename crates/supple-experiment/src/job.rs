@@ -44,7 +44,7 @@ pub(crate) enum Job {
     Exact {
         stribeck: bool,
     },
-    PaperLetter,
+    LawAsPrinted,
     Probing {
         stiffness_n_per_m: f64,
         kind: Probing,
@@ -155,14 +155,14 @@ pub(crate) fn jobs() -> Vec<Job> {
     jobs.extend([QUADRANT, QUADRANT_PERTURBED, QUADRANT_FAST]);
     jobs.extend([Job::QuadrantDamped, Job::QuadrantCornerRamp]);
     jobs.push(Job::ApparentInertia);
-    jobs.push(Job::PaperLetter);
+    jobs.push(Job::LawAsPrinted);
     jobs
 }
 
 impl Job {
     /// Whether a fault is the expected result: of the equation as printed.
     pub fn may_fault(&self) -> bool {
-        *self == Job::PaperLetter
+        *self == Job::LawAsPrinted
     }
 
     pub fn name(&self) -> String {
@@ -179,7 +179,7 @@ impl Job {
             Job::Seed(seed) => format!("sinusoid_model_{seed}"),
             Job::Exact { stribeck: true } => "sinusoid_exact_stribeck".to_owned(),
             Job::Exact { stribeck: false } => "sinusoid_exact_coulomb".to_owned(),
-            Job::PaperLetter => "sinusoid_paper_letter".to_owned(),
+            Job::LawAsPrinted => "sinusoid_law_as_printed".to_owned(),
             Job::Probing {
                 stiffness_n_per_m,
                 kind,
@@ -204,8 +204,8 @@ impl Job {
                 Variant::EXACT
             }
             Job::Seed(offset) => perturbed(offset),
-            Job::PaperLetter => Variant {
-                paper_letter: true,
+            Job::LawAsPrinted => Variant {
+                law_as_printed: true,
                 stribeck: false,
                 ..perturbed(0)
             },
@@ -227,7 +227,7 @@ impl Job {
     fn trajectory(&self, paths: &Paths, tip_radius_m: f64) -> (Trajectory, f64) {
         match *self {
             Job::Sinusoid { speed } => paths.sinusoid(speed),
-            Job::Seed(_) | Job::Exact { .. } | Job::PaperLetter | Job::ApparentInertia => {
+            Job::Seed(_) | Job::Exact { .. } | Job::LawAsPrinted | Job::ApparentInertia => {
                 paths.sinusoid(1.0)
             }
             Job::Arc => paths.arc(1.0),

@@ -36,7 +36,7 @@ pub fn identify_ripple<const N: usize>(
         motions.collect::<Result<Vec<_>, _>>()
     };
     let procedure = Procedure {
-        friction: FrictionChoice::Columns(FrictionColumns::OFFSET),
+        friction: FrictionChoice::Columns(FrictionColumns::COULOMB_AND_OFFSET),
         rotor: false,
         prior_weight: Some(1.0),
         ..Procedure::default()

@@ -22,7 +22,7 @@ pub struct Variant {
     /// Whether the contact latch fades the friction feed-forward.
     pub fade: bool,
     /// Whether the law is equation (3.6) exactly as printed.
-    pub paper_letter: bool,
+    pub law_as_printed: bool,
 }
 
 impl Variant {
@@ -33,7 +33,7 @@ impl Variant {
         stribeck: true,
         load: true,
         fade: true,
-        paper_letter: false,
+        law_as_printed: false,
     };
 }
 
@@ -130,7 +130,7 @@ impl<const N: usize> Setup<N> {
             config = mismatch.apply(&config)?;
         }
         config.latch.fade = variant.fade;
-        if variant.paper_letter {
+        if variant.law_as_printed {
             config.law = Law::as_published(config.law.gains);
             config.latch.fade = false;
         }

@@ -147,20 +147,20 @@ pub struct Summary {
     /// Figure 3b at the paper's maximum speed, with the unperturbed model.
     pub quadrant_at_paper_speed: QuadrantSummary,
     /// Figures 5 and 6, with the perturbed model.
-    pub exploration: Vec<ProbingSummary>,
+    pub probing: Vec<ProbingSummary>,
     /// Statistics over these runs.
     #[serde(flatten)]
     pub contact: ContactStatistics,
     /// Probing with the friction feed-forward left on in contact.
-    pub exploration_fade_off: Vec<ProbingSummary>,
+    pub probing_fade_off: Vec<ProbingSummary>,
     /// Statistics over these runs.
     pub fade_off: ContactStatistics,
     /// Probing at 5 and 125 N/m with the plant's own parameters in the model: without the model error.
-    pub exploration_exact_model: Vec<ProbingSummary>,
+    pub probing_exact_model: Vec<ProbingSummary>,
     /// Probing at 5 and 125 N/m on a block with a sheet of rubber, perturbed model.
-    pub exploration_rubber: Vec<ProbingSummary>,
+    pub probing_rubber: Vec<ProbingSummary>,
     /// Probing at 5 and 125 N/m with an apparent inertia of 1 kg by the force sensor, (3.6) whole; perturbed model.
-    pub exploration_apparent_inertia: Vec<ProbingSummary>,
+    pub probing_apparent_inertia: Vec<ProbingSummary>,
     /// Figure 3a with that apparent inertia, perturbed model.
     pub sinusoid_apparent_inertia: TrackingError,
     /// Figure 3b at the paper's maximum speed with the damping raised to [`crate::scenario::CORNER_DAMPING_N_S_PER_M`].
@@ -171,11 +171,11 @@ pub struct Summary {
     /// Sinusoid with the plant's own parameters in the model.
     pub sinusoid_exact_model: ExactModel,
     /// Sinusoid with equation (3.6) exactly as printed.
-    pub paper_letter: TrackingError,
+    pub law_as_printed: TrackingError,
     /// Root mean square error of the sinusoid for ten perturbed models \[m\].
-    pub seeds: Vec<f64>,
+    pub perturbed_rms_m: Vec<f64>,
     /// The same runs with their maximum errors and faults.
-    pub seed_runs: Vec<TrackingError>,
+    pub perturbed_runs: Vec<TrackingError>,
     /// Runs that the arm cannot perform at the size of its paths, with the size at which it can, or left out: their errors
     /// are `null`, and probing runs are not in their list. Only for arms whose settings are derived from the URDF.
     #[serde(skip_serializing_if = "Vec::is_empty")]

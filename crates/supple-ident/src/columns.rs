@@ -57,7 +57,7 @@ impl FrictionColumns {
         ..FrictionColumns::NONE
     };
     /// `V`, `S` and `o`.
-    pub const OFFSET: FrictionColumns = FrictionColumns {
+    pub const COULOMB_AND_OFFSET: FrictionColumns = FrictionColumns {
         offset: true,
         ..FrictionColumns::COULOMB
     };

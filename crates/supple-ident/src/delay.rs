@@ -6,8 +6,8 @@
 
 use crate::error::IdentError;
 use crate::log::Log;
-use crate::log_checks::explained::{Context, Grams};
-use crate::log_checks::reduced;
+use crate::log_checks::resample_to_800;
+use crate::log_checks::weighted_fit::{FitContext, GramMatrices};
 use crate::motion::Preparation;
 use supple_core::Arm;
 
@@ -42,7 +42,7 @@ pub fn estimate_delay<const N: usize>(
     couplings: &[(usize, usize)],
     preparation: &Preparation,
 ) -> Result<DelayEstimate, IdentError> {
-    let context = Context::new(nominal, moving, couplings)?;
+    let context = FitContext::new(nominal, moving, couplings)?;
     let mut known: Vec<(f64, f64)> = Vec::new();
     let mut score = |delay_s: f64| -> Result<f64, IdentError> {
         let same = |(d, _): &&(f64, f64)| (d - delay_s).abs() < 1e-9;
@@ -53,8 +53,8 @@ pub fn estimate_delay<const N: usize>(
             torque_delay_s: delay_s,
             ..*preparation
         };
-        let motion = reduced(log, &shifted)?;
-        let parts: Vec<Grams> = (0..PARTS)
+        let motion = resample_to_800(log, &shifted)?;
+        let parts: Vec<GramMatrices> = (0..PARTS)
             .map(|p| {
                 let n = motion.samples();
                 context.grams(&motion.part(p * n / PARTS..(p + 1) * n / PARTS))
@@ -99,12 +99,15 @@ pub fn estimate_delay<const N: usize>(
 }
 
 /// Mean over the joints of the logarithm of the held-out error.
-fn held_out<const N: usize>(context: &Context<'_, N>, parts: &[Grams]) -> f64 {
+fn held_out<const N: usize>(context: &FitContext<'_, N>, parts: &[GramMatrices]) -> f64 {
     let joints = context.columns.moving().len();
     let mut errors = vec![[0.0, 0.0]; joints];
     for (p, part) in parts.iter().enumerate() {
         let others = parts.iter().enumerate().filter(|(other, _)| *other != p);
-        let Some(sum) = others.map(|(_, grams)| grams.clone()).reduce(Grams::plus) else {
+        let Some(sum) = others
+            .map(|(_, grams)| grams.clone())
+            .reduce(GramMatrices::plus)
+        else {
             continue;
         };
         let fitted = context.solve(&sum);

@@ -48,7 +48,7 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             rotor: true,
-            friction: FrictionColumns::OFFSET,
+            friction: FrictionColumns::COULOMB_AND_OFFSET,
             couplings: Vec::new(),
             effects: Effects::default(),
             slow_rad_per_s: 0.15,

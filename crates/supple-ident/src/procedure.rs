@@ -178,8 +178,8 @@ impl Procedure {
         let preparation = &self.preparation;
         let mut warnings = log.check_for_fit(N, moving, preparation.cutoff_hz)?;
         let findings = check_log(nominal, log, moving, &self.couplings, preparation)?;
-        let stops = |f: &Finding| f.consequence == Consequence::Stop;
-        if findings.iter().any(stops) && !self.accept_wrong_logs {
+        let rejects = |f: &Finding| f.consequence == Consequence::Reject;
+        if findings.iter().any(rejects) && !self.accept_wrong_logs {
             return Err(IdentError::WrongLog(findings));
         }
         self.cancellation.check()?;
@@ -255,7 +255,7 @@ impl Procedure {
         let mut options = Options {
             rotor: self.rotor,
             friction: match self.friction {
-                FrictionChoice::Auto => FrictionColumns::OFFSET,
+                FrictionChoice::Auto => FrictionColumns::COULOMB_AND_OFFSET,
                 FrictionChoice::Columns(columns) => columns,
             },
             couplings: self.couplings.clone(),

@@ -25,7 +25,7 @@ pub fn friction_candidates(base: &Options) -> Vec<Candidate> {
     };
     let asymmetric = FrictionColumns {
         asymmetry: true,
-        ..FrictionColumns::OFFSET
+        ..FrictionColumns::COULOMB_AND_OFFSET
     };
     let mut shapes = vec![
         ("no friction".to_owned(), FrictionColumns::NONE),
@@ -33,7 +33,7 @@ pub fn friction_candidates(base: &Options) -> Vec<Candidate> {
         ("viscous, Coulomb".to_owned(), FrictionColumns::COULOMB),
         (
             "viscous, Coulomb, offset".to_owned(),
-            FrictionColumns::OFFSET,
+            FrictionColumns::COULOMB_AND_OFFSET,
         ),
         (
             "viscous by direction, Coulomb, offset".to_owned(),

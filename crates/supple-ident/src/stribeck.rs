@@ -32,7 +32,7 @@ pub fn fit_with_stribeck<const N: usize>(
     let mut best: Option<(Fit<N>, f64)> = None;
     for speed in SPEEDS_RAD_PER_S {
         let columns = match procedure.friction {
-            FrictionChoice::Auto => FrictionColumns::OFFSET,
+            FrictionChoice::Auto => FrictionColumns::COULOMB_AND_OFFSET,
             FrictionChoice::Columns(columns) => columns,
         };
         let candidate = Procedure {

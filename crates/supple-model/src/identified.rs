@@ -31,21 +31,20 @@ pub struct IdentifiedModel<'a, const N: usize> {
     pub source: &'a str,
 }
 
-/// Thresholds for a model that is not identified yet.
+/// Minimum thresholds while the model is not identified; a zero keeps the value of the description.
 #[derive(Clone, Debug, PartialEq)]
-pub struct WideThresholds {
-    /// Collision thresholds in the modes with stiff joint loops, as a share of `collision_torque_nm` and of the tip's
-    /// threshold.
+pub struct MinimumThresholds {
+    /// `collision.move_share`: collision thresholds in the modes with stiff joint loops, as a fraction of those of the other modes.
     pub move_share: f64,
     /// `collision_torque_nm` of each joint \[N m\]; `None` keeps those of the description.
     pub joint_torque_nm: Option<Vec<f64>>,
-    /// Force at the tip \[N\].
+    /// `collision.tip_force_n`: threshold of the force at the tip \[N\].
     pub tip_force_n: f64,
-    /// Whether gravity hold keeps the pose by position loops.
+    /// Whether gravity hold keeps the pose by position loops; `false` keeps the description's choice.
     pub hold_pose: bool,
-    /// Unmodelled load at the tip \[N\].
+    /// `plausible.load_n`: threshold of an unmodelled load at the tip \[N\].
     pub load_n: f64,
-    /// Torque that may oppose the acceleration of a joint, as a share of its torque limit.
+    /// `plausible.against_share`: torque that may oppose the acceleration of a joint, as a fraction of its torque limit.
     pub against_share: f64,
 }
 
@@ -136,33 +135,37 @@ impl Description {
         Description::from_text(&document.to_string(), self.urdf())
     }
 
-    /// Returns the same arm with thresholds for a model that is not identified yet. Greater values of the description stay.
+    /// Returns the same arm with thresholds of at least `minimum`; greater ones of the description stay. `joint_torque_nm`
+    /// replaces the collision thresholds of the joints.
     ///
     /// # Errors
     /// Any [`ModelError`] of the edited text.
-    pub fn with_wide_thresholds(&self, wide: &WideThresholds) -> Result<Description, ModelError> {
+    pub fn with_minimum_thresholds(
+        &self,
+        minimum: &MinimumThresholds,
+    ) -> Result<Description, ModelError> {
         let mut document = self.document()?;
         let settings = self.settings();
         for (key, entry, threshold) in [
             (
                 "collision",
                 "move_share",
-                wide.move_share.max(settings.collision.move_share),
+                minimum.move_share.max(settings.collision.move_share),
             ),
             (
                 "collision",
                 "tip_force_n",
-                wide.tip_force_n.max(settings.collision.tip_force_n),
+                minimum.tip_force_n.max(settings.collision.tip_force_n),
             ),
             (
                 "plausible",
                 "load_n",
-                wide.load_n.max(settings.plausible.load_n),
+                minimum.load_n.max(settings.plausible.load_n),
             ),
             (
                 "plausible",
                 "against_share",
-                wide.against_share.max(settings.plausible.against_share),
+                minimum.against_share.max(settings.plausible.against_share),
             ),
         ] {
             let section = document.entry(key).or_insert_with(toml_edit::table);
@@ -171,12 +174,15 @@ impl Description {
         for joint in 0..self.dof() {
             let table = self.joint_table(&mut document, joint)?;
             table.remove("move_collision_torque_nm");
-            let given_nm = wide.joint_torque_nm.as_deref().and_then(|nm| nm.get(joint));
+            let given_nm = minimum
+                .joint_torque_nm
+                .as_deref()
+                .and_then(|nm| nm.get(joint));
             if let Some(torque_nm) = given_nm {
                 put(table, "collision_torque_nm", (*torque_nm).into());
             }
         }
-        if wide.hold_pose {
+        if minimum.hold_pose {
             document["hold_pose"] = value(true);
         }
         Description::from_text(&document.to_string(), self.urdf())

@@ -41,7 +41,7 @@ pub use const_generic::Parts;
 pub use derive::{Completed, Derived, tip_weight_n};
 pub use description::Description;
 pub use error::{Finding, ModelError};
-pub use identified::{IdentifiedModel, WideThresholds};
+pub use identified::{IdentifiedModel, MinimumThresholds};
 pub use paths::{PROBE_DWELL_S, Paths};
 pub use resolve::{BusDescription, BusMotor, Motors, Tool};
 pub use settings::{LearnedSettings, Settings, schema_json};

@@ -73,25 +73,16 @@ pub fn html(
         adapted: adapted_lines(summary),
         parts: parts.collect(),
         stiffness_tables: [
-            stiffness_table(
-                "Friction feed-forward fades in contact",
-                &summary.exploration,
-            ),
-            stiffness_table(
-                "Friction feed-forward stays on",
-                &summary.exploration_fade_off,
-            ),
+            stiffness_table("Friction feed-forward fades in contact", &summary.probing),
+            stiffness_table("Friction feed-forward stays on", &summary.probing_fade_off),
             stiffness_table(
                 "The plant's own parameters in the model",
-                &summary.exploration_exact_model,
+                &summary.probing_exact_model,
             ),
-            stiffness_table(
-                "A sheet of rubber on the block",
-                &summary.exploration_rubber,
-            ),
+            stiffness_table("A sheet of rubber on the block", &summary.probing_rubber),
             stiffness_table(
                 "Apparent inertia of 1 kg by the force sensor",
-                &summary.exploration_apparent_inertia,
+                &summary.probing_apparent_inertia,
             ),
         ],
         gravity_off: percent(off.gravity),

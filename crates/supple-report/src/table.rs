@@ -24,7 +24,7 @@ pub fn table(summary: &Summary) -> String {
 pub fn adapted_lines(summary: &Summary) -> Vec<String> {
     let mut lines = Vec::new();
     if let Some(derived) = &summary.derived {
-        let worst = summary.seeds.iter().copied().fold(0.0, f64::max);
+        let worst = summary.perturbed_rms_m.iter().copied().fold(0.0, f64::max);
         lines.push(format!(
             "this arm weighs {} at the tip: a model 0.1 % and 3 % off may cost {} at 5 N/m (15 mm up to 23 N, then in \
              proportion); worst here: {}",
@@ -73,7 +73,7 @@ fn free_motion(summary: &Summary) -> Vec<Line> {
         .map(|at| format!("{} \u{d7}", at.speed))
         .collect();
     let exact = &summary.sinusoid_exact_model;
-    let worst = summary.seeds.iter().copied().fold(0.0, f64::max);
+    let worst = summary.perturbed_rms_m.iter().copied().fold(0.0, f64::max);
     let torque = |t: &JointTorque| {
         let terms = [t.gravity, t.friction, t.feedback].map(figures);
         format!("{} N m", terms.join(", "))
@@ -96,8 +96,11 @@ fn free_motion(summary: &Summary) -> Vec<Line> {
             "essentially unchanged",
         ),
         line(
-            &format!("  {} perturbed models: median, worst", summary.seeds.len()),
-            millimetres(&[median(&summary.seeds).unwrap_or(0.0), worst]),
+            &format!(
+                "  {} perturbed models: median, worst",
+                summary.perturbed_rms_m.len()
+            ),
+            millimetres(&[median(&summary.perturbed_rms_m).unwrap_or(0.0), worst]),
             "",
         ),
         line(
@@ -112,7 +115,7 @@ fn free_motion(summary: &Summary) -> Vec<Line> {
         ),
         line(
             "  (3.6) exactly as printed",
-            paper_law(&summary.paper_letter),
+            paper_law(&summary.law_as_printed),
             "the law of the paper",
         ),
         line(
@@ -207,7 +210,7 @@ fn realistic(found: &Realistic, imperfect: &str) -> Vec<Line> {
 }
 
 fn contact(summary: &Summary) -> Vec<Line> {
-    let lines = &summary.exploration;
+    let lines = &summary.probing;
     let from_five = || lines.iter().filter(|e| e.stiffness_n_per_m >= 5.0);
     let peaks: Vec<_> = from_five().map(|e| e.contact.peak_filtered_n).collect();
     let first: Vec<_> = lines
@@ -257,9 +260,9 @@ fn contact(summary: &Summary) -> Vec<Line> {
         line(
             "  at 5 N/m: no model error, rubber, 1 kg",
             [
-                &summary.exploration_exact_model,
-                &summary.exploration_rubber,
-                &summary.exploration_apparent_inertia,
+                &summary.probing_exact_model,
+                &summary.probing_rubber,
+                &summary.probing_apparent_inertia,
             ]
             .map(|lines| peak_at_five(lines))
             .join(", "),

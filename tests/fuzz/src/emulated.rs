@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 use supple_bus::virtual_time::Peer;
-use supple_bus::{CAN_FRAME_BYTES, WireFrame};
+use supple_bus::{CAN_FRAME_BYTES, DecodedFrame, EncodedFrame};
 use supple_core::Vector;
 use supple_emu::{Emulator, EmulatorConfig, answer_pendant};
 use supple_model::Description;
@@ -47,21 +47,21 @@ pub fn pendant_line(data: &[u8]) {
 pub fn arm_bus(data: &[u8]) {
     let mut emulator = emulator();
     for raw in data.chunks_exact(CAN_FRAME_BYTES).take(FRAMES) {
-        match WireFrame::parse(raw) {
-            WireFrame::Data(frame) => {
+        match DecodedFrame::decode(raw) {
+            DecodedFrame::Data(frame) => {
                 assert_eq!(
-                    WireFrame::parse(&WireFrame::data(&frame)),
-                    WireFrame::Data(frame)
+                    DecodedFrame::decode(&EncodedFrame::of_data(&frame)),
+                    DecodedFrame::Data(frame)
                 );
                 emulator.host_sends(&frame);
             }
-            WireFrame::Fault(fault) => {
+            DecodedFrame::Fault(fault) => {
                 assert_eq!(
-                    WireFrame::parse(&WireFrame::fault(fault)),
-                    WireFrame::Fault(fault)
+                    DecodedFrame::decode(&EncodedFrame::of_fault(fault)),
+                    DecodedFrame::Fault(fault)
                 );
             }
-            WireFrame::Unsupported => {}
+            DecodedFrame::Unsupported => {}
         }
         run(&mut emulator, FRAME_NS);
         let torque_nm = emulator.motor_torque_nm();

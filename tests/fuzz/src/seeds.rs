@@ -9,7 +9,7 @@ use crate::arms;
 use crate::bytes::bytes_of;
 use crate::logs;
 use crate::requests::{at_rest, controller};
-use supple_bus::WireFrame;
+use supple_bus::EncodedFrame;
 use supple_can_frame::CanFrame;
 use supple_core::config::Gains;
 use supple_core::controller::{Breakaway, Request};
@@ -271,7 +271,7 @@ fn bus() -> Vec<Seed> {
     let raw = |frames: &[&[u8]]| -> Vec<u8> {
         let raw = frames.iter().map(|bytes| {
             let id = u32::from(u16::from_le_bytes([bytes[0], bytes[1]]));
-            WireFrame::data(&CanFrame::from_raw(id, &bytes[2..]).expect("a frame"))
+            EncodedFrame::of_data(&CanFrame::from_raw(id, &bytes[2..]).expect("a frame"))
         });
         raw.flat_map(|raw| raw.to_vec()).collect()
     };

@@ -2,7 +2,7 @@
 
 use crate::property::config;
 use proptest::prelude::*;
-use supple_bus::{BusFault, WireFrame};
+use supple_bus::{BusFault, DecodedFrame, EncodedFrame};
 use supple_can_frame::{CanFrame, CanId};
 
 proptest! {
@@ -11,7 +11,7 @@ proptest! {
     #[test]
     fn data_frames_round_trip(id in 0u32..0x800, payload in proptest::collection::vec(any::<u8>(), 0..=8)) {
         let frame = CanFrame::from_raw(id, &payload).unwrap();
-        prop_assert_eq!(WireFrame::parse(&WireFrame::data(&frame)), WireFrame::Data(frame));
+        prop_assert_eq!(DecodedFrame::decode(&EncodedFrame::of_data(&frame)), DecodedFrame::Data(frame));
     }
 
     #[test]
@@ -26,10 +26,10 @@ proptest! {
         let length = [0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64][dlc];
         let payload = [bytes, bytes].concat();
         let frame = CanFrame::fd(id.unwrap(), bit_rate_switch, &payload[..length]).unwrap();
-        let raw = WireFrame::data(&frame);
+        let raw = EncodedFrame::of_data(&frame);
         prop_assert_eq!(raw.len(), 72);
-        prop_assert_eq!(WireFrame::parse(&raw), WireFrame::Data(frame));
-        prop_assert_eq!(WireFrame::parse(&raw[..71]), WireFrame::Unsupported);
+        prop_assert_eq!(DecodedFrame::decode(&raw), DecodedFrame::Data(frame));
+        prop_assert_eq!(DecodedFrame::decode(&raw[..71]), DecodedFrame::Unsupported);
     }
 
     #[test]
@@ -40,8 +40,8 @@ proptest! {
         bytes in any::<[u8; 32]>(),
     ) {
         let raw = if fd { [&head[..], &bytes, &bytes].concat() } else { raw.to_vec() };
-        if let WireFrame::Data(frame) = WireFrame::parse(&raw) {
-            prop_assert_eq!(WireFrame::parse(&WireFrame::data(&frame)), WireFrame::Data(frame));
+        if let DecodedFrame::Data(frame) = DecodedFrame::decode(&raw) {
+            prop_assert_eq!(DecodedFrame::decode(&EncodedFrame::of_data(&frame)), DecodedFrame::Data(frame));
         }
     }
 
@@ -50,7 +50,7 @@ proptest! {
     fn remote_requests_are_unsupported(id in 0u32..0x800) {
         let mut raw = [0; 16];
         raw[..4].copy_from_slice(&(id | 0x4000_0000u32).to_ne_bytes());
-        prop_assert_eq!(WireFrame::parse(&raw), WireFrame::Unsupported);
+        prop_assert_eq!(DecodedFrame::decode(&raw), DecodedFrame::Unsupported);
     }
 }
 
@@ -62,14 +62,14 @@ fn layout_matches_the_kernel() {
     expected[..4].copy_from_slice(&0x423u32.to_ne_bytes());
     expected[4] = 3;
     expected[8..11].copy_from_slice(&[0x00, 0x10, 0x00]);
-    assert_eq!(WireFrame::data(&frame)[..], expected);
+    assert_eq!(EncodedFrame::of_data(&frame)[..], expected);
 
     let error = |class: u32, controller: u8| {
         let mut raw = [0; 16];
         raw[..4].copy_from_slice(&(0x2000_0000 | class).to_ne_bytes());
         raw[4] = 8;
         raw[9] = controller;
-        WireFrame::parse(&raw)
+        DecodedFrame::decode(&raw)
     };
     for (class, controller, fault) in [
         (0x040, 0, BusFault::BusOff),
@@ -81,7 +81,7 @@ fn layout_matches_the_kernel() {
         // The most severe of several: bus-off over a missing acknowledgement.
         (0x060, 0, BusFault::BusOff),
     ] {
-        assert_eq!(error(class, controller), WireFrame::Fault(fault));
+        assert_eq!(error(class, controller), DecodedFrame::Fault(fault));
     }
-    assert_eq!(error(0, 0), WireFrame::Unsupported);
+    assert_eq!(error(0, 0), DecodedFrame::Unsupported);
 }

@@ -114,10 +114,10 @@ impl From<FrictionArg> for FrictionChoice {
                 ..FrictionColumns::NONE
             },
             FrictionArg::Coulomb => FrictionColumns::COULOMB,
-            FrictionArg::Offset => FrictionColumns::OFFSET,
+            FrictionArg::Offset => FrictionColumns::COULOMB_AND_OFFSET,
             FrictionArg::Asymmetric => FrictionColumns {
                 asymmetry: true,
-                ..FrictionColumns::OFFSET
+                ..FrictionColumns::COULOMB_AND_OFFSET
             },
             FrictionArg::Load => FrictionColumns {
                 load: true,
@@ -368,7 +368,7 @@ pub struct CalibrateArgs {
     /// Go on after the last finished step of the calibration in --out.
     #[arg(long, requires = "on")]
     pub resume: bool,
-    /// Perform no step after this one, for example wiring, breakaway or unseen_motion.
+    /// Perform no step after this one, for example wiring, breakaway or validation_motion.
     #[arg(long, value_name = "STEP", requires = "on")]
     pub until: Option<StepName>,
     /// Duration of the warm-up (s).

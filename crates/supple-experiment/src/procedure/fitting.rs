@@ -3,7 +3,7 @@
 use super::error::ProcedureError;
 use super::progress::FitQuality;
 use crate::breakaway::JointBreakaway;
-use crate::calibrate::{Knowledge, SLOW_RAD_PER_S, identify_with, without_ripple};
+use crate::calibrate::{FitOptions, SLOW_RAD_PER_S, identify_with, without_ripple};
 use nalgebra::DMatrix;
 use std::path::Path;
 use supple_core::controller::Mode;
@@ -11,11 +11,11 @@ use supple_core::dynamics::rnea;
 use supple_core::{Config, Vector};
 use supple_ident::{Fit, FrictionColumns, Log, Motion, ReadError};
 use supple_log::Reader;
-use supple_model::{Description, IdentifiedModel, WideThresholds};
+use supple_model::{Description, IdentifiedModel, MinimumThresholds};
 
-/// Fraction of the first excitation, at its end, that is held out from the fit and validates it.
+/// Fraction of the first excitation, at its end, that is excluded from the fit and validates it.
 const HELD_OUT_FRACTION: f64 = 0.25;
-/// Time in the excite mode up to which the start of an excitation counts as logged; its first cycles may be missing \[s\].
+/// Maximum time in the excite mode at the first record of an excitation \[s\]: the log may lack its first cycles, but not more.
 const MAX_START_TIME_S: f64 = 0.1;
 /// Minimum range of angles of each joint in a motion that is fitted \[rad\].
 const MIN_RANGE_RAD: f64 = 0.05;
@@ -24,40 +24,44 @@ const MIN_THRESHOLD_FRACTION: f64 = 0.5;
 /// Minimum and maximum ratio of measured to described breakaway torque by which the dry friction is scaled.
 const BREAKAWAY_RATIO_RANGE: (f64, f64) = (0.2, 5.0);
 
-/// Ratio of the limit for torque against a joint's acceleration to the dry friction, for geared motors.
+/// Ratio of `plausible.against_share` to the dry friction as a fraction of the torque limit, for arms with `[bus]`.
 const AGAINST_TO_DRY_FRICTION: f64 = 1.3;
-/// Prior weight of the described link parameters for geared motors, whose motions show little of the inertia, in equivalent
-/// samples.
-const LINKS_WEIGHT: f64 = 100.0;
-/// Prior standard deviation of their rotor inertias, relative to the described ones.
-const ROTOR_DEVIATION: f64 = 1.0;
+/// Weight of the link parameters in the description as a prior, for arms with `[bus]`, in equivalent samples. The motions of
+/// their geared motors contain little information about the inertia.
+const GEARED_PRIOR_WEIGHT: f64 = 100.0;
+/// Prior standard deviation of their rotor inertias, relative to those in the description.
+const GEARED_ROTOR_DEVIATION: f64 = 1.0;
 /// Minimum speed of the samples that are fitted, as a fraction of the peak speed of the slowest joint.
 const MIN_SPEED_FRACTION: f64 = 0.3;
 /// Time over which the speed of a joint is averaged \[s\].
 const SPEED_AVERAGING_S: f64 = 0.1;
 
-/// The excitations in a log, in order, one log each.
+/// Reads the excitations in a log: one [`Log`] for each, in order of time.
 ///
 /// # Errors
 /// A log that cannot be read.
-pub fn excitations<const N: usize>(file: &Path) -> Result<Vec<Log>, ProcedureError> {
+pub fn read_excitations<const N: usize>(file: &Path) -> Result<Vec<Log>, ProcedureError> {
     let reader = Reader::open(file)?;
     let mut logs = Vec::new();
     let mut rows: Vec<(f64, Vector<N>, Vector<N>)> = Vec::new();
-    let mut last_s = f64::INFINITY;
+    let mut last_s = None;
     for record in reader.records::<N>()? {
         let record = record?;
         let value = record.value;
         let excited_s = match value.mode() {
-            Some(Mode::Excite) => value.mode_time_s,
-            _ => f64::INFINITY,
+            Some(Mode::Excite) => Some(value.mode_time_s),
+            _ => None,
         };
-        if excited_s.is_infinite() || excited_s < last_s {
+        let continues = match (excited_s, last_s) {
+            (Some(now_s), Some(last_s)) => now_s >= last_s,
+            _ => false,
+        };
+        if !continues {
             logs.extend(log_of(&mut rows));
         }
-        // A log may begin while the arm rests at the end of an earlier excitation.
-        let begins = excited_s < MAX_START_TIME_S && excited_s < last_s;
-        if begins || (excited_s.is_finite() && !rows.is_empty()) {
+        // A log may begin while the arm rests at the end of an earlier excitation: such a rest is not an excitation.
+        let begins = !continues && excited_s.is_some_and(|time_s| time_s < MAX_START_TIME_S);
+        if begins || (continues && !rows.is_empty()) {
             let torque_nm = value.torque_nm - value.torques.ripple;
             rows.push((record.time_ns as f64 * 1e-9, value.position_rad, torque_nm));
         }
@@ -82,7 +86,7 @@ fn log_of<const N: usize>(rows: &mut Vec<(f64, Vector<N>, Vector<N>)>) -> Option
 ///
 /// # Errors
 /// If the description cannot be edited.
-pub fn with_breakaway<const N: usize>(
+pub fn scale_dry_friction<const N: usize>(
     model: &Description,
     breakaway: &[JointBreakaway],
 ) -> Result<Description, ProcedureError> {
@@ -107,13 +111,15 @@ pub fn with_breakaway<const N: usize>(
     })?)
 }
 
-/// All motions with position control in a log, moves and excitations; empty if no motion is long enough.
+/// Reads the motions of a log in the modes `move` and `excite` in which every joint moves; empty if none is long enough.
 ///
 /// # Errors
 /// A log that cannot be read.
-pub fn all_motion<const N: usize>(file: &Path) -> Result<Vec<Log>, ProcedureError> {
+pub fn read_position_controlled_motions<const N: usize>(
+    file: &Path,
+) -> Result<Vec<Log>, ProcedureError> {
     match supple_ident::read_mcap::<N>(file) {
-        Ok(logs) => Ok(logs.into_iter().filter(all_move).collect()),
+        Ok(logs) => Ok(logs.into_iter().filter(every_joint_moves).collect()),
         Err(ReadError::Table { .. }) => Ok(Vec::new()),
         Err(error) => Err(ProcedureError::Resume {
             file: file.to_owned(),
@@ -122,14 +128,14 @@ pub fn all_motion<const N: usize>(file: &Path) -> Result<Vec<Log>, ProcedureErro
     }
 }
 
-/// Whether every joint moves: only such motions can be fitted.
-fn all_move(log: &Log) -> bool {
+/// Whether every joint moves by [`MIN_RANGE_RAD`] or more: only such motions can be fitted.
+fn every_joint_moves(log: &Log) -> bool {
     let mut columns = log.q_rad.column_iter();
     columns.all(|q| q.max() - q.min() > MIN_RANGE_RAD)
 }
 
-/// Fits `others` and the first excitation without its end, which validates the fit. `None` if the fit predicts the torques there
-/// no better than `model`.
+/// Fits a model to `others` and to the excitation without its end, which validates the fit. `None` if the fit predicts the
+/// torques of that end no better than `model`.
 ///
 /// # Errors
 /// A log that cannot be used.
@@ -141,27 +147,26 @@ pub fn fit_first<const N: usize>(
     let config = model.config::<N>()?;
     let rows = excitation.t_s.len();
     let cut = ((1.0 - HELD_OUT_FRACTION) * rows as f64) as usize;
-    let (fitted, unseen) = (part(excitation, 0, cut), part(excitation, cut, rows - cut));
+    let (fitted, held_out) = (part(excitation, 0, cut), part(excitation, cut, rows - cut));
     let mut logs = vec![fitted];
     logs.extend_from_slice(others);
     let (fit, _) = identify_with(
         &config,
         &logs,
         &[],
-        &knowledge(model),
+        &fit_options(model),
         min_fitted_rad_per_s(&logs),
     )?;
-    let unseen = prepared(&unseen, &fit)?;
-    let quality = quality(&config, &fit, &unseen)?;
-    let is_better = quality.unseen_relative < quality.unseen_relative_before;
+    let quality = quality(&config, &fit, &prepared(&held_out, &fit)?)?;
+    let is_better = quality.validation_relative < quality.validation_relative_before;
     if !is_better {
         return Ok(None);
     }
     Ok(Some((fit.description(model, None)?, quality)))
 }
 
-/// Fits the excitation, the slow motions and the runs at constant speed, and validates the fit on `unseen`. The collision
-/// thresholds come from the residuals on these and on `others`, such as moves.
+/// Fits a model to `logs` (excitations and slow motions) and the torque ripple to `constant_speed`, and validates both on the
+/// motion `validation`. The collision thresholds come from the residuals of `logs`, `validation` and `others`, such as moves.
 ///
 /// # Errors
 /// A log that cannot be used.
@@ -169,18 +174,18 @@ pub fn fit_all<const N: usize>(
     model: &Description,
     logs: &[Log],
     constant_speed: &[Log],
-    unseen: &Log,
+    validation: &Log,
     others: &[Log],
 ) -> Result<(Description, FitQuality), ProcedureError> {
     let config = model.config::<N>()?;
-    let (known, min_rad_per_s) = (knowledge(model), min_fitted_rad_per_s(logs));
-    let (fit, ripple) = identify_with(&config, logs, constant_speed, &known, min_rad_per_s)?;
+    let (options, min_rad_per_s) = (fit_options(model), min_fitted_rad_per_s(logs));
+    let (fit, ripple) = identify_with(&config, logs, constant_speed, &options, min_rad_per_s)?;
     let motor_from_joint = *supple_core::Controller::new(config)?.motor_from_joint();
-    let unseen = without_ripple(unseen, &ripple, &motor_from_joint);
-    let unseen = prepared(&unseen, &fit)?;
-    let quality = quality(&config, &fit, &unseen)?;
+    let validation = without_ripple(validation, &ripple, &motor_from_joint);
+    let validation = prepared(&validation, &fit)?;
+    let quality = quality(&config, &fit, &validation)?;
     let described = fit.description(model, Some(&ripple))?;
-    let mut validations = vec![fit.validate_motion(&unseen)?];
+    let mut validations = vec![fit.validate_motion(&validation)?];
     for log in logs.iter().chain(others) {
         let log = without_ripple(log, &ripple, &motor_from_joint);
         validations.push(fit.validate_motion(&prepared(&log, &fit)?)?);
@@ -193,21 +198,19 @@ pub fn fit_all<const N: usize>(
         *threshold_nm = threshold_nm.map(|nm| nm.max(min_nm));
     }
     let described = match model.bus() {
-        Some(_) => with_friction_either_way::<N>(&described)?,
+        Some(_) => raise_against_share::<N>(&described)?,
         None => described,
     };
     Ok((described.with_move_collision(&thresholds)?, quality))
 }
 
-/// `model` with a limit for torque against a joint's acceleration that is above the dry friction: at rest this acts in either
-/// direction.
-fn with_friction_either_way<const N: usize>(
-    model: &Description,
-) -> Result<Description, ProcedureError> {
+/// `model` with `plausible.against_share`, the limit for torque against a joint's acceleration, above the dry friction: when a
+/// joint begins to move, the torque may still have the other sign by that much.
+fn raise_against_share<const N: usize>(model: &Description) -> Result<Description, ProcedureError> {
     let config = model.config::<N>()?;
     let limits_nm = &config.limits.joint_torque_nm;
     let dry = Vector::<N>::from_fn(|j, _| config.friction[j].breakaway_nm / limits_nm[j]);
-    let wide = WideThresholds {
+    let minimum = MinimumThresholds {
         move_share: 0.0,
         joint_torque_nm: None,
         tip_force_n: 0.0,
@@ -215,27 +218,27 @@ fn with_friction_either_way<const N: usize>(
         load_n: 0.0,
         against_share: AGAINST_TO_DRY_FRICTION * dry.max(),
     };
-    Ok(model.with_wide_thresholds(&wide)?)
+    Ok(model.with_minimum_thresholds(&minimum)?)
 }
 
-/// Prior knowledge of an arm. The friction of geared motors (those on a bus) grows with their load. Gravity leaves them
-/// little torque, so that they move slowly and their torques show little of the inertia: without a prior, errors of the friction
-/// model would appear as inertias of rotors and links.
-fn knowledge(model: &Description) -> Knowledge {
+/// Friction terms and priors of the fit. Arms with `[bus]` have geared motors, whose friction grows with their load. Gravity
+/// leaves them little torque, so that they move slowly and their torques contain little information about the inertia: without a
+/// prior, errors of the friction model would be fitted as inertias of rotors and links.
+fn fit_options(model: &Description) -> FitOptions {
     match model.bus() {
-        None => Knowledge::of(FrictionColumns::OFFSET),
-        Some(_) => Knowledge {
+        None => FitOptions::new(FrictionColumns::COULOMB_AND_OFFSET),
+        Some(_) => FitOptions {
             friction: FrictionColumns {
                 load: true,
-                ..FrictionColumns::OFFSET
+                ..FrictionColumns::COULOMB_AND_OFFSET
             },
-            links_weight: LINKS_WEIGHT,
-            rotor_deviation: Some(ROTOR_DEVIATION),
+            prior_weight: GEARED_PRIOR_WEIGHT,
+            rotor_deviation: Some(GEARED_ROTOR_DEVIATION),
         },
     }
 }
 
-/// Minimum speed of the samples that are fitted \[rad/s\]: lower than usual if a joint is always slow.
+/// Minimum speed of the samples that are fitted \[rad/s\]: [`SLOW_RAD_PER_S`], or less if a joint never reaches that speed.
 fn min_fitted_rad_per_s(logs: &[Log]) -> f64 {
     let joints = logs.first().map_or(0, |log| log.q_rad.ncols());
     let slowest = (0..joints).map(|joint| {
@@ -277,17 +280,17 @@ fn prepared<const N: usize>(log: &Log, fit: &Fit<N>) -> Result<Motion, Procedure
 fn quality<const N: usize>(
     before: &Config<N>,
     fit: &Fit<N>,
-    unseen: &Motion,
+    motion: &Motion,
 ) -> Result<FitQuality, ProcedureError> {
-    let validation = fit.validate_motion(unseen)?;
+    let validation = fit.validate_motion(motion)?;
     let (mut error, mut torque) = (0.0, 0.0);
-    for row in 0..unseen.samples() {
+    for row in 0..motion.samples() {
         let at = |m: &DMatrix<f64>| Vector::<N>::from_fn(|j, _| m[(row, j)]);
         let (q, qd, qdd, tau) = (
-            at(&unseen.q),
-            at(&unseen.qd),
-            at(&unseen.qdd),
-            at(&unseen.tau),
+            at(&motion.q),
+            at(&motion.qd),
+            at(&motion.qdd),
+            at(&motion.tau),
         );
         let friction = Vector::from_fn(|j, _| before.friction[j].torque_nm(qd[j]));
         error += (rnea(&before.arm, &q, &qd, &qdd) + friction - tau).norm_squared();
@@ -295,9 +298,9 @@ fn quality<const N: usize>(
     }
     Ok(FitQuality {
         training_relative: fit.training_relative,
-        unseen_relative: validation.total_relative,
-        unseen_relative_before: (error / torque.max(f64::MIN_POSITIVE)).sqrt(),
-        unseen_rms_nm: validation.rms_nm.clone(),
+        validation_relative: validation.total_relative,
+        validation_relative_before: (error / torque.max(f64::MIN_POSITIVE)).sqrt(),
+        validation_rms_nm: validation.rms_nm.clone(),
         verdict: validation.verdict(),
     })
 }

@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! wiring -> swept space confirmed -> warm-up -> breakaway -> first pass -> first fit (loaded)
-//!        -> full pass -> slow -> constant speed -> unseen motion -> identification (loaded) -> float -> sinusoid
+//!        -> full pass -> slow -> constant speed -> validation motion -> identification (loaded) -> float -> sinusoid
 //! ```
 //!
 //! A finished step is never repeated: [`Progress`] is written after each. The model of the first fit is loaded before the
@@ -26,7 +26,7 @@ pub use options::{DRAWING, FIRST_MODEL, LEARNING_S, LOGS, Operator, ProcedureOpt
 
 pub use arm::{Collector, Motion, MotionArm, Performed, Stopped};
 pub use error::ProcedureError;
-pub use fitting::excitations;
+pub use fitting::read_excitations;
 pub use in_process::{InProcessArm, moves_joints};
 pub use motions::Motions;
 pub use progress::{FILE, FinishedStep, FitQuality, Progress, STEPS, SinusoidResult, StepName};

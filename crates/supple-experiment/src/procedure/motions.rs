@@ -11,7 +11,7 @@ use supple_core::{Config, Controller, Vector};
 use supple_ident::IdentError;
 use supple_ident::design::{DesignOptions, constant_speed_series, design, slow_series};
 
-/// Period of the excitations \[s\], and the number of periods of each and of the unseen motion.
+/// Period of the excitations \[s\], and the number of periods of each and of the validation motion.
 const EXCITATION: (f64, f64, f64) = (12.0, 1.0, 1.25);
 /// Number of excitations: other poses give more information than repetitions.
 const EXCITATIONS: u64 = 3;
@@ -33,7 +33,7 @@ const POSES: usize = 400;
 const SLOW: (f64, f64) = (0.1, 40.0);
 /// Speeds of the runs at constant speed \[rad/s\], and the period of each \[s\].
 const CONSTANT: ([f64; 2], f64) = ([0.06, 0.12], 25.0);
-/// Seed of the unseen motion, relative to that of the excitation.
+/// Seed of the validation motion, relative to that of the excitation.
 const UNSEEN_SEED: u64 = 1000;
 
 /// Slope of the torque ramps that show which joint a motor moves \[N m/s\], and motion at which they stop \[rad\].
@@ -61,7 +61,7 @@ pub struct Motions<const N: usize> {
     /// Motion at constant speeds, for torque ripple.
     pub constant: Vec<Fourier<N>>,
     /// Another excitation, for validation.
-    pub unseen: Fourier<N>,
+    pub validation: Fourier<N>,
     /// The pose of the excitations in which gravity needs the smallest share of the torque limits.
     pub light_rad: Vector<N>,
 }
@@ -96,7 +96,7 @@ impl<const N: usize> Motions<N> {
         let config = &config;
         let (seed, candidates) = (plan.seed, plan.candidates);
         let joints: Vec<usize> = (0..N).collect();
-        let (period_s, periods, unseen_periods) = EXCITATION;
+        let (period_s, periods, validation_periods) = EXCITATION;
         let search = |seed, periods, candidates| {
             let options = DesignOptions {
                 seed,
@@ -109,9 +109,9 @@ impl<const N: usize> Motions<N> {
         };
         let full = (0..EXCITATIONS).map(|k| search(seed.wrapping_add(k), periods, candidates));
         let full = full.collect::<Result<Vec<_>, _>>()?;
-        let unseen = search(
+        let validation = search(
             seed.wrapping_add(UNSEEN_SEED),
-            unseen_periods,
+            validation_periods,
             (candidates / 10).max(20),
         )?;
         let light_rad = light_pose(config, &full);
@@ -139,7 +139,7 @@ impl<const N: usize> Motions<N> {
             slow: fitting(slow),
             constant: constant?.into_iter().map(fitting).collect(),
             full,
-            unseen,
+            validation,
             light_rad,
         })
     }
@@ -150,7 +150,7 @@ impl<const N: usize> Motions<N> {
         all.extend(&self.full);
         all.push(self.slow);
         all.extend(&self.constant);
-        all.push(self.unseen);
+        all.push(self.validation);
         all
     }
 }

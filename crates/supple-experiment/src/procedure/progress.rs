@@ -36,7 +36,7 @@ pub enum StepName {
     /// Motion at constant speeds.
     ConstantSpeed,
     /// Motion for validation.
-    UnseenMotion,
+    ValidationMotion,
     /// Fit, validation and saving of the model.
     Identification,
     /// Float.
@@ -56,7 +56,7 @@ pub const STEPS: [(&str, StepName); 13] = [
     ("full_pass", StepName::FullPass),
     ("slow_motion", StepName::SlowMotion),
     ("constant_speed", StepName::ConstantSpeed),
-    ("unseen_motion", StepName::UnseenMotion),
+    ("validation_motion", StepName::ValidationMotion),
     ("identification", StepName::Identification),
     ("float", StepName::Float),
     ("sinusoid", StepName::Sinusoid),
@@ -93,12 +93,12 @@ pub struct FinishedStep {
 pub struct FitQuality {
     /// Torque left unexplained in the fitted motion, relative.
     pub training_relative: f64,
-    /// Torque left unexplained in the unseen motion, relative, over all joints.
-    pub unseen_relative: f64,
+    /// Torque left unexplained in the validation motion, relative, over all joints.
+    pub validation_relative: f64,
     /// The same for the model that the fit started from.
-    pub unseen_relative_before: f64,
-    /// Unexplained torque of each joint in the unseen motion, RMS \[N m\].
-    pub unseen_rms_nm: Vec<f64>,
+    pub validation_relative_before: f64,
+    /// Unexplained torque of each joint in the validation motion, RMS \[N m\].
+    pub validation_rms_nm: Vec<f64>,
     /// Verdict of the identification.
     pub verdict: String,
 }
@@ -135,7 +135,7 @@ pub struct Progress {
     pub sweep: Option<Sweep>,
     /// Breakaway torque of each joint.
     pub breakaway: Vec<JointBreakaway>,
-    /// The fit of the first pass; `None` if the model before it predicted unseen motion better.
+    /// The fit of the first pass; `None` if the model before it predicted the validation motion better.
     pub first_fit: Option<FitQuality>,
     /// The fit of all motions.
     pub fit: Option<FitQuality>,

@@ -49,7 +49,7 @@ pub enum Problem {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Consequence {
     /// The log is not fitted.
-    Stop,
+    Reject,
     /// The log is fitted without the samples concerned.
     Mask,
     /// The log is fitted; the report names the finding.
@@ -69,7 +69,7 @@ pub struct Finding {
     pub column: String,
     /// What was found, with numbers.
     pub evidence: String,
-    /// Remedy.
+    /// Correction.
     pub remedy: String,
     /// Intervals to leave out, from and to (s of the log's own time).
     pub intervals_s: Vec<(f64, f64)>,
@@ -82,7 +82,7 @@ impl fmt::Display for Finding {
 }
 
 impl Finding {
-    pub(super) fn stop(
+    pub(super) fn reject(
         problem: Problem,
         joints: &[usize],
         column: &str,
@@ -96,7 +96,7 @@ impl Finding {
         };
         Finding {
             problem,
-            consequence: Consequence::Stop,
+            consequence: Consequence::Reject,
             joints: joints.to_vec(),
             column,
             evidence,

@@ -1,32 +1,33 @@
-//! Gravity that the log's torques hold, against that of the given arm: unit of the torques, zeros of the angles, payload.
+//! Comparison of the gravity torques fitted to a log with those of the given arm: unit of the torques, zeros of the angles,
+//! payload.
 
-use super::explained::{Context, Explained};
+use super::equal_values::median;
 use super::finding::{Consequence, Finding, Problem};
-use super::runs::median;
+use super::weighted_fit::{FitContext, FitResult};
 use crate::motion::Motion;
 use nalgebra::{Matrix2, Vector2};
 use supple_core::Vector;
 use supple_core::dynamics::{regressor, regressor_times};
 
-/// Ratio of the gravity found to that of the given arm beyond which the torques have another unit.
-const OTHER_UNIT: f64 = 3.0;
-/// Smallest share of gravity in a joint's torque, squared, for the joint to count.
-const SHARE: f64 = 0.04;
-/// Correlation of the gravity found with that of the given arm below which a zero may be wrong, and above which it is
-/// right.
-const ALIKE: (f64, f64) = (0.985, 0.985);
-/// Smallest zero offset that is named \[rad\].
+/// Maximum ratio of fitted to given gravity torques, or its reciprocal; beyond it the torques have another unit.
+const MAX_RATIO: f64 = 3.0;
+/// Minimum ratio of the sums of squares of gravity and measured torque at which a joint is compared.
+const MIN_GRAVITY_RATIO: f64 = 0.04;
+/// Correlation of the fitted gravity torques with the given ones below which a zero of an angle may be wrong; with the right
+/// zero it is above.
+const MIN_CORRELATION: f64 = 0.985;
+/// Minimum zero offset that is reported \[rad\].
 const MIN_OFFSET_RAD: f64 = 0.08;
-/// Smallest payload that is named, as a fraction of the arm's mass.
+/// Minimum payload that is reported, as a fraction of the arm's mass.
 const MIN_PAYLOAD: f64 = 0.11;
 
 /// Gravity torques of moving joints at the poses of a log.
 pub(super) struct Gravities<'a, const N: usize> {
-    context: &'a Context<'a, N>,
+    context: &'a FitContext<'a, N>,
     poses: Vec<Vector<N>>,
     found: Vec<Vector<N>>,
     given: Vec<Vector<N>>,
-    /// Joints whose torques mainly hold weight.
+    /// Joints with enough gravity torque to be compared.
     heavy: Vec<usize>,
 }
 
@@ -35,18 +36,18 @@ fn product<const N: usize>(a: &[Vector<N>], b: &[Vector<N>], joint: usize) -> f6
     a.iter().zip(b).map(|(a, b)| a[joint] * b[joint]).sum()
 }
 
-fn alike<const N: usize>(a: &[Vector<N>], b: &[Vector<N>], joint: usize) -> f64 {
+fn correlation<const N: usize>(a: &[Vector<N>], b: &[Vector<N>], joint: usize) -> f64 {
     let squares = product(a, a, joint) * product(b, b, joint);
     product(a, b, joint) / squares.sqrt().max(f64::MIN_POSITIVE)
 }
 
 impl<'a, const N: usize> Gravities<'a, N> {
-    pub fn new(context: &'a Context<'a, N>, motion: &Motion, explained: &Explained) -> Self {
+    pub fn new(context: &'a FitContext<'a, N>, motion: &Motion, fit: &FitResult) -> Self {
         let every = (motion.samples() / 200).max(1);
         let rows = (0..motion.samples()).step_by(every);
         let at = |i: usize| Vector::<N>::from_fn(|j, _| motion.q[(i, j)]);
         let poses: Vec<Vector<N>> = rows.clone().map(at).collect();
-        let pairs = poses.iter().map(|q| context.gravities(&explained.x, q));
+        let pairs = poses.iter().map(|q| context.gravities(&fit.x, q));
         let (found, given): (Vec<_>, Vec<_>) = pairs.map(|[found, given]| (found, given)).unzip();
         let torque = |j: usize| {
             rows.clone()
@@ -60,7 +61,7 @@ impl<'a, const N: usize> Gravities<'a, N> {
             .fold(0.0, f64::max);
         let holds = |j: &usize| {
             let weight = product(&given, &given, *j);
-            weight > SHARE * torque(*j) && weight > 0.01 * heaviest
+            weight > MIN_GRAVITY_RATIO * torque(*j) && weight > 0.01 * heaviest
         };
         let heavy = moving.iter().copied().filter(holds).collect();
         Gravities {
@@ -79,18 +80,18 @@ impl<'a, const N: usize> Gravities<'a, N> {
         self.heavy.iter().map(ratio).collect()
     }
 
-    /// Torques in another unit: all of the arm's weight is held by a small part of the torque, or by a multiple.
+    /// Torques in another unit: the fitted gravity torques are a small fraction, or a multiple, of the given ones.
     pub fn unit(&self) -> Option<Finding> {
         let ratios = self.ratios();
         if ratios.is_empty() {
             return None;
         }
         let middle = median(ratios.clone());
-        if (1.0 / OTHER_UNIT..=OTHER_UNIT).contains(&middle) || middle <= 0.0 {
+        if (1.0 / MAX_RATIO..=MAX_RATIO).contains(&middle) || middle <= 0.0 {
             return None;
         }
         let all: Vec<String> = ratios.iter().map(|r| format!("{r:.3}")).collect();
-        Some(Finding::stop(
+        Some(Finding::reject(
             Problem::NotJointTorques,
             &self.heavy,
             "tau",
@@ -104,13 +105,16 @@ impl<'a, const N: usize> Gravities<'a, N> {
         ))
     }
 
-    /// Least correlation over the heavy joints, with the angle of one joint changed.
+    /// Minimum correlation over the heavy joints; `change`: joint and the change of its angle \[rad\].
     fn min_correlation(&self, change: Option<(usize, f64)>) -> f64 {
         let given = match change {
             None => self.given.clone(),
             Some((joint, by)) => self.given_at(joint, by),
         };
-        let all = self.heavy.iter().map(|j| alike(&self.found, &given, *j));
+        let all = self
+            .heavy
+            .iter()
+            .map(|j| correlation(&self.found, &given, *j));
         all.fold(1.0, f64::min)
     }
 
@@ -123,10 +127,11 @@ impl<'a, const N: usize> Gravities<'a, N> {
         moved.collect()
     }
 
-    /// A zero: with one angle changed, the weight is held as the given arm would, and with none it is not.
+    /// A wrong zero: joint, change of its angle \[rad\] with which the fitted gravity torques agree with the given ones, and the
+    /// correlations without and with it.
     pub fn zero(&self) -> Option<(usize, f64, f64, f64)> {
         let before = self.min_correlation(None);
-        if self.heavy.is_empty() || before > ALIKE.0 {
+        if self.heavy.is_empty() || before > MIN_CORRELATION {
             return None;
         }
         let mut best = (0, 0.0, before);
@@ -147,11 +152,11 @@ impl<'a, const N: usize> Gravities<'a, N> {
             }
         }
         let (joint, by, after) = best;
-        let enough = after > ALIKE.1 && 1.0 - after < 0.5 * (1.0 - before);
+        let enough = after > MIN_CORRELATION && 1.0 - after < 0.5 * (1.0 - before);
         (enough && by.abs() >= MIN_OFFSET_RAD).then_some((joint, by, before, after))
     }
 
-    /// A point mass at the tip explains the weight that the given arm lacks.
+    /// A point mass at the tip that accounts for the difference from the given gravity torques.
     pub fn payload(&self) -> Option<Finding> {
         let arm = self.context.arm;
         let tip = arm.link_from_joint(N - 1) * arm.joint_from_tip().translation;
@@ -165,7 +170,7 @@ impl<'a, const N: usize> Gravities<'a, N> {
             .iter()
             .map(|q| regressor_times(&regressor(arm, q, &still, &still), &point))
             .collect();
-        // Joints are weighted by their own weight, so that those of the wrist count.
+        // Each joint is divided by its own gravity torque; otherwise those of the wrist would have no influence.
         let (mut normal, mut right, mut alone, mut total) =
             (Matrix2::zeros(), Vector2::zeros(), [0.0; 2], 0.0);
         for &j in &self.heavy {
@@ -197,7 +202,7 @@ impl<'a, const N: usize> Gravities<'a, N> {
         if !explains || payload_kg < MIN_PAYLOAD * mass || !(0.5..2.0).contains(&scale) {
             return None;
         }
-        let finding = Finding::stop(
+        let finding = Finding::reject(
             Problem::Payload,
             &[],
             "tau",

@@ -1,25 +1,25 @@
 //! Checks of a log against the physics of the given arm, before a fit.
 //!
 //! Four groups of checks, in this order; an error that one of them finds can hide errors from the next:
-//! - `sampling`: checks of single columns, without a model. An encoder cannot stop within a sample, time cannot jump for all
-//!   joints at once, a torque does not stay at its largest value.
+//! - `sampling`: checks of single columns, without a model. Errors are: a moving joint whose angle stops
+//!   within one sample, all joints that jump at once, a torque that stays at its maximum.
 //! - `velocity`: measured velocities against the slopes of the angles, without a model.
-//! - `remedies`: whether a column has the wrong sign, unit, order, zero or clock. A model of the arm with free link inertias is
+//! - `corrections`: whether a column has the wrong sign, unit, order, zero or clock. A model of the arm with free link inertias is
 //!   fitted to the log as given, and to the log with each error corrected. If a correction reduces the residual by far, the
 //!   log has that error. Gravity determines the time scale and the zeros of the angles; friction, which only dissipates power,
 //!   determines the signs.
-//! - `excess`: residual torques at some times (contact), or in all poses (torques in another unit, a payload, an offset).
+//! - `unexplained_torque`: residual torques at some times (contact), or in all poses (torques in another unit, a payload, an offset).
 //!
 //! No threshold depends on the arm: each is relative to what the log itself shows, or to the gravity torques of the given arm.
 
-mod excess;
-pub(crate) mod explained;
+mod corrections;
+mod equal_values;
 pub(crate) mod finding;
 mod gravity;
-mod remedies;
-mod runs;
 mod sampling;
+mod unexplained_torque;
 mod velocity;
+pub(crate) mod weighted_fit;
 
 pub use finding::{Consequence, Finding, Problem};
 
@@ -29,8 +29,8 @@ use crate::log::{Log, MAX_ANGLE_RAD};
 use crate::motion::{Motion, Preparation};
 use supple_core::Arm;
 
-/// Maximum number of samples of a log to which the corrections of `remedies` are fitted.
-const REMEDY_SAMPLES: f64 = 300.0;
+/// Maximum number of samples of a log to which the corrections are fitted.
+const CORRECTION_SAMPLES: f64 = 300.0;
 /// Minimum number of reversals of each moving joint in a log that is compared with a model.
 const MIN_REVERSALS: usize = 3;
 /// Minimum speed, as a fraction of the joint's peak speed, at which its direction counts.
@@ -55,27 +55,30 @@ pub fn check_log<const N: usize>(
     if findings.iter().any(|f| f.problem == Problem::TimeUnit) {
         return Ok(findings);
     }
-    if findings.iter().all(|f| f.consequence != Consequence::Stop) {
+    if findings
+        .iter()
+        .all(|f| f.consequence != Consequence::Reject)
+    {
         findings.extend(velocity::check(log, moving));
     }
-    let stopped = |findings: &[Finding]| {
-        let stops = |f: &Finding| f.consequence == Consequence::Stop;
-        findings.iter().any(stops)
+    let rejected = |findings: &[Finding]| {
+        let rejects = |f: &Finding| f.consequence == Consequence::Reject;
+        findings.iter().any(rejects)
     };
-    if stopped(&findings) {
+    if rejected(&findings) {
         return Ok(findings);
     }
-    let whole = fine(log, preparation)?;
+    let whole = resample_whole(log, preparation)?;
     if moving.iter().any(|&joint| !turns_around(&whole, joint)) {
         findings.extend(many_revolutions(log, &findings));
         return Ok(findings);
     }
-    let motion = coarse(log, preparation)?;
-    let context = explained::Context::new(arm, moving, couplings)?;
-    findings.extend(remedies::check(&context, &motion)?);
+    let middle = resample_middle(log, preparation)?;
+    let context = weighted_fit::FitContext::new(arm, moving, couplings)?;
+    findings.extend(corrections::check(&context, &middle)?);
     findings.extend(many_revolutions(log, &findings));
-    if !stopped(&findings) {
-        findings.extend(excess::check(&context, &whole)?);
+    if !rejected(&findings) {
+        findings.extend(unexplained_torque::check(&context, &whole)?);
     }
     Ok(findings)
 }
@@ -95,14 +98,14 @@ fn turns_around(motion: &Motion, joint: usize) -> bool {
     reversals >= MIN_REVERSALS
 }
 
-/// Reports angles of several revolutions, unless another finding explains them.
+/// Reports angles of several revolutions at joints without another finding, which may be their cause.
 fn many_revolutions(log: &Log, findings: &[Finding]) -> Vec<Finding> {
     let mut found = Vec::new();
     for (joint, column) in log.q_rad.column_iter().enumerate() {
         let largest = column.amax();
-        let named = |f: &Finding| f.joints.is_empty() || f.joints.contains(&joint);
-        if largest > MAX_ANGLE_RAD && !findings.iter().any(named) {
-            found.push(Finding::stop(
+        let concerned = |f: &Finding| f.joints.is_empty() || f.joints.contains(&joint);
+        if largest > MAX_ANGLE_RAD && !findings.iter().any(concerned) {
+            found.push(Finding::reject(
                 Problem::Degrees,
                 &[joint],
                 "q",
@@ -114,37 +117,38 @@ fn many_revolutions(log: &Log, findings: &[Finding]) -> Vec<Finding> {
     found
 }
 
-/// The log resampled at 20 Hz to 100 Hz, but not above its own rate; at most [`REMEDY_SAMPLES`] from its middle.
-fn coarse(log: &Log, preparation: &Preparation) -> Result<Motion, IdentError> {
+/// The middle of the log, at most [`CORRECTION_SAMPLES`] samples, resampled at 20 Hz to 100 Hz but not above its own rate.
+fn resample_middle(log: &Log, preparation: &Preparation) -> Result<Motion, IdentError> {
     let span_s = log.t_s[log.t_s.len() - 1] - log.t_s[0];
     let own_hz = (log.t_s.len() - 1) as f64 / span_s;
-    let rate_hz = (REMEDY_SAMPLES / span_s).clamp(20.0, 100.0).min(own_hz);
-    let motion = at_rate(log, preparation, rate_hz)?;
+    let rate_hz = (CORRECTION_SAMPLES / span_s).clamp(20.0, 100.0).min(own_hz);
+    let motion = resample(log, preparation, rate_hz)?;
     let samples = motion.samples();
-    let kept = samples.min(REMEDY_SAMPLES as usize);
+    let kept = samples.min(CORRECTION_SAMPLES as usize);
     let first = (samples - kept) / 2;
     Ok(motion.part(first..first + kept))
 }
 
 /// The whole log resampled at 50 Hz at most.
-fn fine(log: &Log, preparation: &Preparation) -> Result<Motion, IdentError> {
+fn resample_whole(log: &Log, preparation: &Preparation) -> Result<Motion, IdentError> {
     let span_s = log.t_s[log.t_s.len() - 1] - log.t_s[0];
     let own_hz = (log.t_s.len() - 1) as f64 / span_s;
-    at_rate(log, preparation, own_hz.min(50.0))
+    resample(log, preparation, own_hz.min(50.0))
 }
 
 /// The whole log resampled to about 800 samples, at 20 Hz to 100 Hz.
-pub(crate) fn reduced(log: &Log, preparation: &Preparation) -> Result<Motion, IdentError> {
+pub(crate) fn resample_to_800(log: &Log, preparation: &Preparation) -> Result<Motion, IdentError> {
     let span_s = log.t_s[log.t_s.len() - 1] - log.t_s[0];
-    at_rate(log, preparation, (800.0 / span_s).clamp(20.0, 100.0))
+    resample(log, preparation, (800.0 / span_s).clamp(20.0, 100.0))
 }
 
-fn at_rate(log: &Log, preparation: &Preparation, rate_hz: f64) -> Result<Motion, IdentError> {
+fn resample(log: &Log, preparation: &Preparation, rate_hz: f64) -> Result<Motion, IdentError> {
     // The filter acts at the log's own rate; at the reduced rate its cutoff must stay below half of it.
     let span_s = log.t_s[log.t_s.len() - 1] - log.t_s[0];
     let own_hz = (log.t_s.len() - 1) as f64 / span_s;
     let keep_every = (own_hz / rate_hz).floor().max(1.0) as usize;
     let cutoff_hz = MAX_CUTOFF_HZ.min(0.4 * own_hz / keep_every as f64);
+    // Reports a cutoff that is not possible at this rate before the log is filtered.
     LowPass::butterworth4(cutoff_hz, own_hz)?;
     let preparation = Preparation {
         rate_hz: None,

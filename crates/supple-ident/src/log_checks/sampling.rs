@@ -1,17 +1,18 @@
-//! Errors that the columns show by themselves: unit of time, lost samples, frozen or held values, saturation.
+//! Checks of single columns without a model: unit of time, lost samples, frozen or held values, saturation.
 
+use super::equal_values::{Run, median, quantum, runs};
 use super::finding::{Consequence, Finding, Problem};
-use super::runs::{Run, median, quantum, runs};
 use crate::log::Log;
 
-/// Rates of logs of arms in any unit of time \[Hz\].
+/// Plausible sampling rates; a rate outside means that the time is not in seconds \[Hz\].
 const RATES_HZ: std::ops::RangeInclusive<f64> = 8.0..=30_000.0;
-/// Shortest time for which a column must stand to count as frozen \[s\].
-const FROZEN_S: f64 = 0.1;
-/// A held column is refreshed less than this often per period of the cutoff: the steps are then in the band of the fit.
+/// Minimum time without a change at which a column is frozen \[s\].
+const MIN_FROZEN_S: f64 = 0.1;
+/// Minimum number of changes of a column per period of the cutoff frequency: with fewer, its steps are within the frequencies
+/// that are fitted, and it counts as held.
 const REFRESHES_PER_PERIOD: f64 = 6.0;
-/// A sample step that is this many times as long as its neighbours, for all joints alike, contains lost samples.
-const LOST: f64 = 1.6;
+/// Minimum ratio of a step, equal for all joints, to its neighbours at which samples were lost.
+const MIN_LOST_RATIO: f64 = 1.6;
 
 pub(super) fn check(log: &Log, moving: &[usize], cutoff_hz: f64) -> Vec<Finding> {
     let steps: Vec<f64> = log.t_s.windows(2).map(|w| w[1] - w[0]).collect();
@@ -54,7 +55,7 @@ fn time_unit(step_s: f64) -> Option<Finding> {
     ];
     let fits = |(_, per_s): &&(&str, f64)| RATES_HZ.contains(&(rate_hz * per_s));
     let (unit, per_s) = *units.iter().find(fits)?;
-    Some(Finding::stop(
+    Some(Finding::reject(
         Problem::TimeUnit,
         &[],
         "t",
@@ -73,12 +74,12 @@ fn slope_before(log: &Log, angles: &[f64], i: usize, step_s: f64) -> Option<f64>
     Some((angles[i] - angles[from]) / (log.t_s[i] - log.t_s[from]))
 }
 
-/// A joint that stands from one sample to the next, though it was moving, and then is elsewhere.
+/// An angle that stops changing within one sample while the joint moves, and later jumps to the true angle.
 fn frozen_angle(log: &Log, angles: &[f64], joint: usize, step_s: f64) -> Option<Finding> {
     let quantum = quantum(angles);
     let column = log.q_rad.column(joint);
     let range = column.max() - column.min();
-    let stands = |run: &Run| {
+    let is_frozen = |run: &Run| {
         let span_s = log.t_s[run.end - 1] - log.t_s[run.first];
         let speed = slope_before(log, angles, run.first, step_s)?;
         let missed = speed.abs() * span_s;
@@ -89,15 +90,15 @@ fn frozen_angle(log: &Log, angles: &[f64], joint: usize, step_s: f64) -> Option<
         let jump = angles
             .get(run.end)
             .map(|next| (next - angles[run.first]).abs());
-        // A joint that stops and rests leaves its angle as slowly as it came.
+        // The angle of a joint that really stopped does not jump afterwards.
         let leaps = jump.is_none_or(|jump| jump > 0.3 * missed);
         let long =
-            span_s >= FROZEN_S && run.len() >= 5 && missed > (10.0 * quantum).max(0.01 * range);
+            span_s >= MIN_FROZEN_S && run.len() >= 5 && missed > (10.0 * quantum).max(0.01 * range);
         (long && leaps && (sudden || (coarse && jump.is_some()))).then_some((span_s, speed))
     };
     let all = runs(angles);
-    let (run, (span_s, speed)) = all.iter().find_map(|run| Some((run, stands(run)?)))?;
-    Some(Finding::stop(
+    let (run, (span_s, speed)) = all.iter().find_map(|run| Some((run, is_frozen(run)?)))?;
+    Some(Finding::reject(
         Problem::FrozenAngle,
         &[joint],
         "q",
@@ -110,8 +111,8 @@ fn frozen_angle(log: &Log, angles: &[f64], joint: usize, step_s: f64) -> Option<
     ))
 }
 
-/// Samples of the run in which an average sample is.
-fn usual_run(all: &[Run]) -> f64 {
+/// Mean length of a run, weighted with its length.
+fn mean_run_length(all: &[Run]) -> f64 {
     let (mut squares, mut total) = (0.0, 0.0);
     for run in all {
         squares += (run.len() as f64).powi(2);
@@ -120,10 +121,10 @@ fn usual_run(all: &[Run]) -> f64 {
     squares / total
 }
 
-/// A column that changes by large steps, rarely and at a constant rhythm.
+/// A column that changes by large steps, rarely and at a constant rate.
 fn held(values: &[f64], name: &str, joint: usize, step_s: f64, cutoff_hz: f64) -> Option<Finding> {
     let all = runs(values);
-    // Rests are no holds: only runs shorter than half a second.
+    // Longer runs are rests of the arm.
     let short: Vec<Run> = all
         .iter()
         .filter(|run| (run.len() as f64) * step_s < 0.5)
@@ -149,7 +150,7 @@ fn held(values: &[f64], name: &str, joint: usize, step_s: f64, cutoff_hz: f64) -
     if coarse || !rare || regular * 2 < lengths.len() {
         return None;
     }
-    Some(Finding::stop(
+    Some(Finding::reject(
         Problem::Held,
         &[joint],
         name,
@@ -188,7 +189,7 @@ fn held_or_frozen_torque(
         travel.max() - travel.min()
     };
     let whole = log.q_rad.column(joint).max() - log.q_rad.column(joint).min();
-    let usual = usual_run(&all[..all.len().min(all.len() - 1).max(1)]);
+    let usual = mean_run_length(&all[..all.len().min(all.len() - 1).max(1)]);
     let longest = all.iter().max_by_key(|run| run.len())?;
     let span_s = log.t_s[longest.end - 1] - log.t_s[longest.first];
     let (low, high) = (
@@ -198,14 +199,14 @@ fn held_or_frozen_torque(
     let value = torques[longest.first];
     let at_limit = value == low || value == high;
     let fine = quantum < 0.02 * range;
-    let others = usual_run_without(&all, longest);
-    if at_limit || !fine || span_s < 3.0 * FROZEN_S || moves(longest) < 0.02 * whole {
+    let others = mean_run_length_without(&all, longest);
+    if at_limit || !fine || span_s < 3.0 * MIN_FROZEN_S || moves(longest) < 0.02 * whole {
         return None;
     }
     if (longest.len() as f64) < 30.0 * others.max(1.0) || usual < others {
         return None;
     }
-    Some(Finding::stop(
+    Some(Finding::reject(
         Problem::FrozenTorque,
         &[joint],
         "tau",
@@ -217,12 +218,12 @@ fn held_or_frozen_torque(
     ))
 }
 
-fn usual_run_without(all: &[Run], left_out: &Run) -> f64 {
+fn mean_run_length_without(all: &[Run], left_out: &Run) -> f64 {
     let rest: Vec<Run> = all.iter().filter(|run| *run != left_out).copied().collect();
     if rest.is_empty() {
         1.0
     } else {
-        usual_run(&rest)
+        mean_run_length(&rest)
     }
 }
 
@@ -264,7 +265,7 @@ fn saturated(log: &Log, torques: &[f64], joint: usize) -> Option<Finding> {
     if count == 0 {
         return None;
     }
-    let mut finding = Finding::stop(
+    let mut finding = Finding::reject(
         Problem::Saturated,
         &[joint],
         "tau",
@@ -330,7 +331,7 @@ fn lost_samples(log: &Log, moving: &[usize], step_s: f64) -> Option<Finding> {
         }
         let ratio = median(ratios.clone());
         let alike = ratios.iter().all(|r| (r / ratio - 1.0).abs() < 0.25);
-        if ratio > LOST && alike {
+        if ratio > MIN_LOST_RATIO && alike {
             places += 1;
             lost_s += (ratio - 1.0) * span(i);
             first_s = first_s.or(Some(log.t_s[i]));
@@ -338,7 +339,7 @@ fn lost_samples(log: &Log, moving: &[usize], step_s: f64) -> Option<Finding> {
     }
     let remedy = "log the time of each sample, not its number times the period; split the log where samples are missing";
     if jumps > 0 && places < 3 {
-        return Some(Finding::stop(
+        return Some(Finding::reject(
             Problem::LostSamples,
             &[],
             "t",
@@ -353,7 +354,7 @@ fn lost_samples(log: &Log, moving: &[usize], step_s: f64) -> Option<Finding> {
     if !enough || lost_s < 5e-4 * (log.t_s[n - 1] - log.t_s[0]) {
         return None;
     }
-    Some(Finding::stop(
+    Some(Finding::reject(
         Problem::LostSamples,
         &[],
         "t",

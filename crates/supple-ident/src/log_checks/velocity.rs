@@ -50,7 +50,7 @@ pub(super) fn check(log: &Log, moving: &[usize]) -> Vec<Finding> {
                     .all(|r| r.is_some_and(|(r, c)| c > 0.9 && (r - 1.0).abs() < 0.3))
         });
         match partner {
-            Some(k) if j < k => findings.push(Finding::stop(
+            Some(k) if j < k => findings.push(Finding::reject(
                 Problem::Swapped,
                 &[j, k],
                 "q",
@@ -107,7 +107,7 @@ pub(super) fn check(log: &Log, moving: &[usize]) -> Vec<Finding> {
                 ),
             )
         };
-        findings.push(Finding::stop(problem, &[j], "qd", evidence, remedy));
+        findings.push(Finding::reject(problem, &[j], "qd", evidence, remedy));
     }
     findings
 }
@@ -116,7 +116,7 @@ pub(super) fn check(log: &Log, moving: &[usize]) -> Vec<Finding> {
 fn common(ratio: f64) -> Finding {
     let degrees = 180.0 / std::f64::consts::PI;
     if (ratio * degrees - 1.0).abs() < 0.1 {
-        return Finding::stop(
+        return Finding::reject(
             Problem::Degrees,
             &[],
             "q",
@@ -127,7 +127,7 @@ fn common(ratio: f64) -> Finding {
         );
     }
     if (ratio / degrees - 1.0).abs() < 0.1 {
-        return Finding::stop(
+        return Finding::reject(
             Problem::Degrees,
             &[],
             "qd",
@@ -137,7 +137,7 @@ fn common(ratio: f64) -> Finding {
             "give rad/s: multiply qd by pi / 180",
         );
     }
-    Finding::stop(
+    Finding::reject(
         Problem::TimeScale,
         &[],
         "t",

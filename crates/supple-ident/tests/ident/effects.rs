@@ -23,7 +23,7 @@ fn all_effects(config: &Config<4>) -> Effects {
 }
 
 fn columns(config: &Config<4>) -> Columns {
-    let columns = Columns::new(4, &ALL, true, FrictionColumns::OFFSET, &[]).unwrap();
+    let columns = Columns::new(4, &ALL, true, FrictionColumns::COULOMB_AND_OFFSET, &[]).unwrap();
     columns.with_effects(&all_effects(config))
 }
 

@@ -259,7 +259,7 @@ fn load_dependent_friction_is_identified() {
     let options = Options {
         friction: FrictionColumns {
             load: true,
-            ..FrictionColumns::OFFSET
+            ..FrictionColumns::COULOMB_AND_OFFSET
         },
         consistent_prior_weight: Some(1e-6),
         ..Options::default()

@@ -13,7 +13,7 @@ use supple_experiment::{Demo, Sample};
 /// Runs of the sinusoid.
 pub struct SinusoidRuns<'a> {
     /// Run at the paper's speed.
-    pub paper: &'a [Sample],
+    pub at_paper_speed: &'a [Sample],
     /// All runs, with their speed factors.
     pub all: Vec<(f64, &'a [Sample])>,
 }
@@ -28,7 +28,7 @@ impl<'a> SinusoidRuns<'a> {
             .collect();
         let paper = all.iter().find(|(speed, _)| *speed == 1.0);
         SinusoidRuns {
-            paper: paper.map_or(&[], |(_, samples)| samples),
+            at_paper_speed: paper.map_or(&[], |(_, samples)| samples),
             all,
         }
     }
@@ -41,10 +41,10 @@ pub fn draw(runs: &SinusoidRuns<'_>) -> Result<String, FigureError> {
     draw_canvas((760, 640), alt_text, |area| {
         let (position, rest) = area.split_vertically(super::style::px(235.0));
         let (components, by_speed) = rest.split_vertically(super::style::px(195.0));
-        let time = time_ticks(runs.paper);
+        let time = time_ticks(runs.at_paper_speed);
 
         let x = |s: &Sample| [s.reference_m[0], s.tip_m[0]];
-        let y_ticks = Ticks::around(extent(runs.paper.iter().flat_map(x)), 5);
+        let y_ticks = Ticks::around(extent(runs.at_paper_speed.iter().flat_map(x)), 5);
         let mut panel = Panel::new(
             &position,
             "(i)  reference and actual tip, K = 5 N/m, B = 1.5 N s/m",
@@ -53,11 +53,17 @@ pub fn draw(runs: &SinusoidRuns<'_>) -> Result<String, FigureError> {
             &Axis::new("x [m]", y_ticks),
         )?;
         panel.line(
-            runs.paper.iter().map(|s| (s.time_s, s.reference_m[0])),
+            runs.at_paper_speed
+                .iter()
+                .map(|s| (s.time_s, s.reference_m[0])),
             REFERENCE,
             5.0,
         )?;
-        panel.line(runs.paper.iter().map(|s| (s.time_s, s.tip_m[0])), BLUE, 1.6)?;
+        panel.line(
+            runs.at_paper_speed.iter().map(|s| (s.time_s, s.tip_m[0])),
+            BLUE,
+            1.6,
+        )?;
         legend(
             &position,
             (560.0, 14.0),
@@ -69,7 +75,7 @@ pub fn draw(runs: &SinusoidRuns<'_>) -> Result<String, FigureError> {
 
         let error = |s: &Sample, axis: usize| mm(s.tip_m[axis] - s.reference_m[axis]);
         let all = runs
-            .paper
+            .at_paper_speed
             .iter()
             .flat_map(|s| [0, 1, 2].map(|axis| error(s, axis)));
         let mut panel = Panel::new(
@@ -81,7 +87,9 @@ pub fn draw(runs: &SinusoidRuns<'_>) -> Result<String, FigureError> {
         )?;
         for (axis, colour) in [(1, GREEN), (2, VERMILION), (0, BLUE)] {
             panel.line(
-                runs.paper.iter().map(|s| (s.time_s, error(s, axis))),
+                runs.at_paper_speed
+                    .iter()
+                    .map(|s| (s.time_s, error(s, axis))),
                 colour,
                 1.4,
             )?;

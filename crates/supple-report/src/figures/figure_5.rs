@@ -54,9 +54,9 @@ pub fn probings(demo: &Demo) -> Vec<Probing> {
     let shown = demo
         .probing
         .iter()
-        .filter(|run| SHOWN_N_PER_M.contains(&run.exploration.stiffness_n_per_m));
+        .filter(|run| SHOWN_N_PER_M.contains(&run.summary.stiffness_n_per_m));
     shown
-        .map(|run| Probing::new(run.exploration.stiffness_n_per_m, &run.run.trace.samples))
+        .map(|run| Probing::new(run.summary.stiffness_n_per_m, &run.run.trace.samples))
         .collect()
 }
 

@@ -43,8 +43,8 @@ impl Impulses {
             fit,
         };
         Impulses {
-            fade_on: series(&summary.exploration, summary.contact.impulse_fit),
-            fade_off: series(&summary.exploration_fade_off, summary.fade_off.impulse_fit),
+            fade_on: series(&summary.probing, summary.contact.impulse_fit),
+            fade_off: series(&summary.probing_fade_off, summary.fade_off.impulse_fit),
         }
     }
 }

@@ -11,11 +11,11 @@ mod figure_4;
 mod figure_5;
 mod figure_6;
 pub mod identification;
+mod law_as_printed;
 pub mod log;
 mod panel;
-mod paper_letter;
+mod perturbed_models;
 mod png;
-mod seeds;
 mod style;
 mod ticks;
 mod trade_off;
@@ -72,14 +72,14 @@ pub fn all(demo: &Demo) -> Result<Vec<Figure>, FigureError> {
             Box::new(|| trade_off::draw(&trade_off::points(demo))),
         ),
         (
-            "paper_letter",
-            sinusoids && !demo.paper_letter.is_left_out(),
-            Box::new(|| paper_letter::draw(&paper_letter::PaperLawRuns::of(demo))),
+            "law_as_printed",
+            sinusoids && !demo.law_as_printed.is_left_out(),
+            Box::new(|| law_as_printed::draw(&law_as_printed::PaperLawRuns::of(demo))),
         ),
         (
-            "seeds",
-            exact && !summary.seeds.is_empty(),
-            Box::new(|| seeds::draw(&seeds::Seeds::of(demo))),
+            "perturbed_models",
+            exact && !summary.perturbed_rms_m.is_empty(),
+            Box::new(|| perturbed_models::draw(&perturbed_models::PerturbedModels::of(demo))),
         ),
         (
             "arc",

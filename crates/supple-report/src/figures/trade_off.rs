@@ -21,7 +21,7 @@ pub struct Point {
 
 /// Collects the points of a demo, with the fade on.
 pub fn points(demo: &Demo) -> Vec<Point> {
-    let lines = demo.summary.exploration.iter();
+    let lines = demo.summary.probing.iter();
     lines
         .map(|e| Point {
             stiffness_n_per_m: e.stiffness_n_per_m,

@@ -6,7 +6,7 @@ use supple_experiment::metrics::{LineFit, median};
 use supple_experiment::summary::{ContactStatistics, ProbingSummary, Summary};
 
 pub(super) fn force(summary: &Summary) -> Section {
-    let lines = &summary.exploration;
+    let lines = &summary.probing;
     let from_five: Vec<f64> = lines
         .iter()
         .filter(|line| line.stiffness_n_per_m >= 5.0)
@@ -38,19 +38,19 @@ pub(super) fn force(summary: &Summary) -> Section {
         ),
         row(
             "first transient without model error",
-            values(&summary.exploration_exact_model, &[5.0, 125.0], |e| {
+            values(&summary.probing_exact_model, &[5.0, 125.0], |e| {
                 newtons(e.contact.peak_filtered_n)
             }),
         ),
         row(
             "first transient on a sheet of rubber",
-            values(&summary.exploration_rubber, &[5.0, 125.0], |e| {
+            values(&summary.probing_rubber, &[5.0, 125.0], |e| {
                 newtons(e.contact.peak_filtered_n)
             }),
         ),
         row(
             "first transient with an apparent inertia of 1 kg",
-            values(&summary.exploration_apparent_inertia, &[5.0, 125.0], |e| {
+            values(&summary.probing_apparent_inertia, &[5.0, 125.0], |e| {
                 newtons(e.contact.peak_filtered_n)
             }),
         ),
@@ -93,7 +93,7 @@ fn values(
 
 pub(super) fn impulse(summary: &Summary) -> Section {
     let first: Vec<f64> = summary
-        .exploration
+        .probing
         .iter()
         .map(|e| e.contact.impulse_first_50ms_newton_s)
         .collect();
@@ -113,19 +113,19 @@ pub(super) fn impulse(summary: &Summary) -> Section {
         rows: vec![
             row(
                 "impulse at 0.5, 1 and 2 N/m, fade on",
-                values(&summary.exploration, &[0.5, 1.0, 2.0], |e| {
+                values(&summary.probing, &[0.5, 1.0, 2.0], |e| {
                     newton_seconds(e.contact.impulse_newton_s)
                 }),
             ),
             row(
                 "first impact at 0.5, 5 and 125 N/m",
-                values(&summary.exploration, &[0.5, 5.0, 125.0], |e| {
+                values(&summary.probing, &[0.5, 5.0, 125.0], |e| {
                     newton_seconds(e.contact.impact_newton_s)
                 }),
             ),
             row(
                 "m v (1 + e) at 0.5, 5 and 125 N/m",
-                values(&summary.exploration, &[0.5, 5.0, 125.0], |e| {
+                values(&summary.probing, &[0.5, 5.0, 125.0], |e| {
                     newton_seconds(e.impact_theory_newton_s)
                 }),
             ),
@@ -167,7 +167,7 @@ fn line(contact: &ContactStatistics) -> String {
 }
 
 pub(super) fn trade_off(summary: &Summary) -> Section {
-    let rows = summary.exploration.iter().map(|e| {
+    let rows = summary.probing.iter().map(|e| {
         row(
             format!("{} N/m: free error, impulse", e.stiffness_n_per_m),
             format!(

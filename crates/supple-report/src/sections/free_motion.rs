@@ -175,11 +175,15 @@ pub(super) fn arc(summary: &Summary) -> Section {
     }
 }
 
-pub(super) fn seeds(summary: &Summary) -> Section {
-    let worst = summary.seeds.iter().copied().fold(f64::NAN, f64::max);
+pub(super) fn perturbed_models(summary: &Summary) -> Section {
+    let worst = summary
+        .perturbed_rms_m
+        .iter()
+        .copied()
+        .fold(f64::NAN, f64::max);
     let exact = &summary.sinusoid_exact_model;
     Section {
-        figure: "seeds",
+        figure: "perturbed_models",
         title: "Required model accuracy",
         paper_reference: "Section 3.2",
         paper: "Inertial and viscous parameters come from 1600 samples, Coulomb friction from breakaway \
@@ -190,10 +194,13 @@ pub(super) fn seeds(summary: &Summary) -> Section {
                (3.2), once with the Stribeck effect that the plant has.",
         rows: vec![
             row(
-                format!("{} perturbed models: median, worst", summary.seeds.len()),
+                format!(
+                    "{} perturbed models: median, worst",
+                    summary.perturbed_rms_m.len()
+                ),
                 format!(
                     "{}, {}",
-                    mm(median(&summary.seeds).unwrap_or(f64::NAN)),
+                    mm(median(&summary.perturbed_rms_m).unwrap_or(f64::NAN)),
                     mm(worst)
                 ),
             ),
@@ -209,14 +216,14 @@ pub(super) fn seeds(summary: &Summary) -> Section {
     }
 }
 
-pub(super) fn paper_letter(summary: &Summary) -> Section {
-    let paper_law = &summary.paper_letter;
+pub(super) fn law_as_printed(summary: &Summary) -> Section {
+    let paper_law = &summary.law_as_printed;
     let measured = match &paper_law.ended {
         None => error(paper_law),
         Some(ended) => format!("ended at {}: {}", seconds(ended.ended_s), ended.fault),
     };
     Section {
-        figure: "paper_letter",
+        figure: "law_as_printed",
         title: "The law exactly as printed",
         paper_reference: "Equations (3.2), (3.3) and (3.6)",
         paper: "In (3.6) friction is compensated at the arm's own joint velocity, D(q\u{307}), and the \

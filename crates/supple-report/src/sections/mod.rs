@@ -19,8 +19,8 @@ pub fn sections(summary: &Summary) -> Vec<Section> {
         contact::force(summary),
         contact::impulse(summary),
         contact::trade_off(summary),
-        free_motion::seeds(summary),
-        free_motion::paper_letter(summary),
+        free_motion::perturbed_models(summary),
+        free_motion::law_as_printed(summary),
     ]
 }
 
@@ -40,7 +40,7 @@ pub fn faults(summary: &Summary) -> Vec<(String, &FaultEnd)> {
         let name = format!("realistic plant, seed {}", ended.seed);
         (name, &ended.fault)
     });
-    for (k, run) in summary.seed_runs.iter().enumerate() {
+    for (k, run) in summary.perturbed_runs.iter().enumerate() {
         runs.push((format!("sinusoid, perturbed model {k}"), &run.ended));
     }
     runs.push(("arc".to_owned(), &summary.arc.ended));
@@ -53,11 +53,11 @@ pub fn faults(summary: &Summary) -> Vec<(String, &FaultEnd)> {
         runs.push((format!("sinusoid, exact model, {name}"), &tracking.ended));
     }
     for (kind, runs_by_stiffness) in [
-        ("fade on", &summary.exploration),
-        ("fade off", &summary.exploration_fade_off),
-        ("exact model", &summary.exploration_exact_model),
-        ("rubber", &summary.exploration_rubber),
-        ("apparent inertia", &summary.exploration_apparent_inertia),
+        ("fade on", &summary.probing),
+        ("fade off", &summary.probing_fade_off),
+        ("exact model", &summary.probing_exact_model),
+        ("rubber", &summary.probing_rubber),
+        ("apparent inertia", &summary.probing_apparent_inertia),
     ] {
         for run in runs_by_stiffness {
             let name = format!("probing at {} N/m, {kind}", run.stiffness_n_per_m);

@@ -15,13 +15,13 @@ const FIGURES: [&str; 9] = [
     "figure_4",
     "figure_5",
     "figure_6",
-    "paper_letter",
-    "seeds",
+    "law_as_printed",
+    "perturbed_models",
     "trade_off",
 ];
 
 /// The log that the tests read; the other logs have half a gigabyte and are not kept.
-const LOG: &str = "logs/sinusoid_paper_letter.mcap";
+const LOG: &str = "logs/sinusoid_law_as_printed.mcap";
 
 struct Ran {
     out: PathBuf,
@@ -140,22 +140,22 @@ fn the_summary_has_every_promised_number() {
         "realistic.warm_rms_m.1",
         "realistic.soft_rms_m.1",
         "realistic.false_latches",
-        "exploration.6.stiffness_n_per_m",
-        "exploration.6.approach_m_per_s",
-        "exploration.6.peak_filtered_n",
-        "exploration.6.contact_s",
-        "exploration.6.impulse_newton_s",
-        "exploration.6.impulse_first_50ms_newton_s",
-        "exploration.6.rest_force_n",
-        "exploration.6.free_rms_m",
-        "exploration.8.pressing_force_n",
-        "exploration.8.spring_force_n",
-        "exploration.8.impact_newton_s",
-        "exploration.8.impact_theory_newton_s",
-        "exploration.8.spring_impulse_newton_s",
-        "exploration_exact_model.1.pressing_force_n",
-        "exploration_rubber.1.peak_filtered_n",
-        "exploration_apparent_inertia.1.peak_filtered_n",
+        "probing.6.stiffness_n_per_m",
+        "probing.6.approach_m_per_s",
+        "probing.6.peak_filtered_n",
+        "probing.6.contact_s",
+        "probing.6.impulse_newton_s",
+        "probing.6.impulse_first_50ms_newton_s",
+        "probing.6.rest_force_n",
+        "probing.6.free_rms_m",
+        "probing.8.pressing_force_n",
+        "probing.8.spring_force_n",
+        "probing.8.impact_newton_s",
+        "probing.8.impact_theory_newton_s",
+        "probing.8.spring_impulse_newton_s",
+        "probing_exact_model.1.pressing_force_n",
+        "probing_rubber.1.peak_filtered_n",
+        "probing_apparent_inertia.1.peak_filtered_n",
         "sinusoid_apparent_inertia.rms_error_m",
         "quadrant_damped.rms_error_m",
         "quadrant_corner_ramp.rms_error_m",
@@ -172,8 +172,8 @@ fn the_summary_has_every_promised_number() {
         "fade_off.peak_over_speed_spread",
         "sinusoid_exact_model.coulomb.rms_error_m",
         "sinusoid_exact_model.stribeck.rms_error_m",
-        "paper_letter.rms_error_m",
-        "seeds.9",
+        "law_as_printed.rms_error_m",
+        "perturbed_rms_m.9",
     ];
     for name in numbers {
         let found = name
@@ -187,9 +187,9 @@ fn the_summary_has_every_promised_number() {
             "{name} is {found}"
         );
     }
-    let letter = &summary["paper_letter"];
+    let letter = &summary["law_as_printed"];
     assert_eq!(letter["ended_s"].is_number(), letter["fault"].is_string());
-    let stiffnesses: Vec<_> = summary["exploration"]
+    let stiffnesses: Vec<_> = summary["probing"]
         .as_array()
         .expect("a list")
         .iter()
@@ -231,7 +231,7 @@ fn the_report_contains_the_measured_values_and_their_source() {
         let error = mm(&summary[error]["rms_error_m"]);
         assert!(report.contains(&error), "{error}");
     }
-    for line in summary["exploration"].as_array().expect("a list") {
+    for line in summary["probing"].as_array().expect("a list") {
         let impulse = line["impulse_newton_s"].as_f64().expect("a number");
         assert!(
             report.contains(&format!("<td>{impulse:.3}</td>")),

@@ -30,8 +30,8 @@ pub fn print(found: &CalibratedArm, out: &Path, json: bool) -> Result<(), Failur
     }
     if let Some(fit) = &progress.fit {
         print_line(&format!(
-            "unseen motion: {:.2} % of the torque unexplained; {}",
-            100.0 * fit.unseen_relative,
+            "validation motion: {:.2} % of the torque unexplained; {}",
+            100.0 * fit.validation_relative,
             fit.verdict
         ))?;
     }

@@ -262,7 +262,7 @@ fn recover_after_restart<const N: usize>(
     plant: PlantKind,
 ) -> Result<bool, Failure> {
     // Discard states that were queued before the restart.
-    system.restart_stages();
+    system.restart_start_up();
     let start = Instant::now();
     while start.elapsed() < TIMEOUT {
         if let Some(pendant) = system.pendant()
@@ -281,7 +281,7 @@ fn recover_after_restart<const N: usize>(
             return Ok(false);
         }
     }
-    system.restart_stages();
+    system.restart_start_up();
     Ok(poll_until(
         || system.poll_and_advance(),
         TIMEOUT,

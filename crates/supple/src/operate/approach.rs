@@ -9,7 +9,8 @@ use supple_experiment::{PoseMotion, approach_s, pose_start, start_pose};
 
 /// Rest in the start pose before the trajectory \[s\].
 const REST_S: f64 = 0.4;
-/// A trajectory with its start pose.
+
+/// A trajectory with its start pose, to which the arm moves before it follows the trajectory.
 #[derive(Clone, Debug)]
 pub struct Approach<const N: usize> {
     trajectory: Trajectory,

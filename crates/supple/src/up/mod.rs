@@ -11,7 +11,7 @@ mod children;
 mod outputs;
 mod plan;
 mod recorder;
-mod stages;
+mod start_up;
 mod statistics;
 mod status_line;
 mod system;
@@ -20,7 +20,7 @@ mod viewer;
 pub use children::{ChildProcesses, Pidfile, stop_running};
 pub use plan::{CONTROLLER, Plan, SHUTDOWN_TIMEOUT};
 pub use recorder::Recorder;
-pub use stages::{GRAVITY_HOLD_S, START_S};
+pub use start_up::{GRAVITY_HOLD_S, START_S};
 pub use statistics::{Percentiles, RunStatistics};
 pub use system::System;
 
@@ -81,12 +81,12 @@ fn sized<const N: usize>(args: &UpArgs, description: &Description) -> Result<(),
     if let Err(failure) = &viewer {
         print_status(&format!("the arm runs without its page: {failure}"));
     }
-    let result = started.and_then(|()| system.watch(&stop, &mut pidfile));
+    let result = started.and_then(|()| system.run_until_end(&stop, &mut pidfile));
     drop(viewer);
     let shut_down = system.end();
     let mut summary = system.finish();
-    let cut_short = system.cut_short();
-    summary.cut_short = cut_short.as_ref().map(ToString::to_string);
+    let incomplete = system.incomplete_output();
+    summary.incomplete_output = incomplete.as_ref().map(ToString::to_string);
     let fault = (!summary.faults.is_empty()).then(|| Failure::RunFault {
         faults: summary.faults.join("; "),
     });
@@ -105,9 +105,9 @@ fn sized<const N: usize>(args: &UpArgs, description: &Description) -> Result<(),
         print_json(&summary)?;
     } else {
         print_line(&summary.to_string())?;
-        if let (Some(log), None) = (args.log_file(), &cut_short) {
+        if let (Some(log), None) = (args.log_file(), &incomplete) {
             print_status(&format!("log: {}", log.display()));
         }
     }
-    fault.or(cut_short).map_or(Ok(()), Err)
+    fault.or(incomplete).map_or(Ok(()), Err)
 }

@@ -75,7 +75,7 @@ pub struct UpSummary {
     /// Descriptions of the faults that latched.
     pub faults: Vec<String>,
     /// Why the log or the trace is incomplete; none if both are complete.
-    pub cut_short: Option<String>,
+    pub incomplete_output: Option<String>,
     /// Real-time factor: simulated time over wall-clock time; none in real time.
     pub times_real_time: Option<f64>,
 }
@@ -162,7 +162,7 @@ impl RunStatistics {
             rms_error_m: mean(self.squared_error_m2, self.tracked).map(f64::sqrt),
             tracked_cycles: self.tracked,
             faults: self.faults.clone(),
-            cut_short: None,
+            incomplete_output: None,
             times_real_time: None,
         }
     }

@@ -3,7 +3,7 @@
 use super::children::{ChildProcesses, Pidfile};
 use super::plan::{Plan, SHUTDOWN_TIMEOUT};
 use super::recorder::{Recorder, RunLog};
-use super::stages::{GRAVITY_HOLD_S, START_S, Stages, cycles_of};
+use super::start_up::{GRAVITY_HOLD_S, START_S, StartUp, cycles_of};
 use super::statistics::{RunStatistics, UpSummary};
 use super::status_line::StatusLine;
 use crate::cli::UpArgs;
@@ -39,7 +39,7 @@ pub struct System<'a, const N: usize> {
     /// Number of cycles after which the run ends.
     limit: Option<u64>,
     approach: Approach<N>,
-    stages: Stages,
+    start_up: StartUp,
     run_log: RunLog<N>,
     reader: TelemetryReader,
     session: OperatorSession<N>,
@@ -70,7 +70,7 @@ impl<'a, const N: usize> System<'a, N> {
             .log_file()
             .map(|file| Recorder::create(&file, description, &config, args.virtual_time, &options));
         Ok(System {
-            stages: Stages::new(&plan, args, period_s),
+            start_up: StartUp::new(&plan, args, period_s),
             approach: Approach::new(&config, trajectory, duration_s)?,
             run_log: RunLog::new(recorder.transpose()?),
             // Create readers before writers, so that no message is missed.
@@ -108,7 +108,7 @@ impl<'a, const N: usize> System<'a, N> {
         if self.args.virtual_time {
             let home = description.home::<N>()?;
             self.hold_first()?;
-            let start = self.stages.plan()?;
+            let start = self.start_up.plan()?;
             if self.args.learn {
                 let learn = Request::Learning(LearningSwitch::On);
                 self.session.queue(&learn, LEARN_CYCLE)?;
@@ -205,8 +205,8 @@ impl<'a, const N: usize> System<'a, N> {
     ///
     /// # Errors
     /// If a process exits or a request is refused. An error of writing the log does not end the run; it is printed.
-    pub fn watch(&mut self, stop: &Stop, pidfile: &mut Pidfile) -> Result<(), Failure> {
-        match self.watch_on(stop, pidfile) {
+    pub fn run_until_end(&mut self, stop: &Stop, pidfile: &mut Pidfile) -> Result<(), Failure> {
+        match self.poll_until_end(stop, pidfile) {
             // The same signal also ends the controller, which may exit first.
             Err(Failure::ProcessEnded { .. } | Failure::NotRunning { .. })
                 if stop.shutdown_requested() =>
@@ -217,11 +217,11 @@ impl<'a, const N: usize> System<'a, N> {
         }
     }
 
-    fn watch_on(&mut self, stop: &Stop, pidfile: &mut Pidfile) -> Result<(), Failure> {
-        let (mut fault_seen, mut looked) = (false, Instant::now());
+    fn poll_until_end(&mut self, stop: &Stop, pidfile: &mut Pidfile) -> Result<(), Failure> {
+        let (mut fault_seen, mut pidfile_checked) = (false, Instant::now());
         while !stop.shutdown_requested() {
-            if looked.elapsed() >= PIDFILE_CHECK_INTERVAL {
-                looked = Instant::now();
+            if pidfile_checked.elapsed() >= PIDFILE_CHECK_INTERVAL {
+                pidfile_checked = Instant::now();
                 pidfile.restore();
             }
             let polled = match self.poll_and_advance() {
@@ -267,18 +267,18 @@ impl<'a, const N: usize> System<'a, N> {
     /// its cause.
     fn wait_whether_start_up_aborts(&mut self) -> Result<bool, Failure> {
         for _ in 0..REFUSAL_CYCLES {
-            if self.stages.is_ended() || self.stages.is_done() {
+            if self.start_up.is_ended() || self.start_up.is_done() {
                 break;
             }
             self.poll_and_advance()?;
         }
-        Ok(self.stages.is_ended())
+        Ok(self.start_up.is_ended())
     }
 
     /// Waits briefly for the next cycle, processes it and sends the requests that are due.
     ///
     /// # Errors
-    /// As [`System::watch`].
+    /// As [`System::run_until_end`].
     pub fn poll_and_advance(&mut self) -> Result<Option<Telemetry>, Failure> {
         let Some(telemetry) = self.reader.wait(POLL_INTERVAL).map_err(Failure::system)? else {
             return Ok(None);
@@ -287,7 +287,7 @@ impl<'a, const N: usize> System<'a, N> {
         self.line.show(&telemetry, &self.statistics);
         if !self.args.virtual_time {
             let session = &mut self.session;
-            self.stages.advance(&telemetry, session, &self.approach)?;
+            self.start_up.advance(&telemetry, session, &self.approach)?;
         }
         Ok(Some(telemetry))
     }
@@ -362,7 +362,7 @@ impl<'a, const N: usize> System<'a, N> {
     }
 
     /// The error of an incomplete output file, if any.
-    pub fn cut_short(&mut self) -> Option<Failure> {
+    pub fn incomplete_output(&mut self) -> Option<Failure> {
         let cause = self.run_log.ended().map(Box::new);
         let log = cause.map(|cause| Failure::LogEnded { cause });
         let trace = || self.children.trace_ended();
@@ -393,8 +393,8 @@ impl<'a, const N: usize> System<'a, N> {
     }
 
     /// Restarts the start-up sequence.
-    pub fn restart_stages(&mut self) {
-        self.stages = Stages::anew(&self.plan, self.args, self.period_s);
+    pub fn restart_start_up(&mut self) {
+        self.start_up = StartUp::after_restart(&self.plan, self.args, self.period_s);
     }
 
     /// Sends a request to the controller.

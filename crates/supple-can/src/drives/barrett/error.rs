@@ -101,16 +101,19 @@ pub enum CanError {
         /// Property.
         property: Property,
     },
-    /// Pucks of one torque frame with different torque ids.
+    /// Pucks whose firmware has torque or position under different property ids.
     #[error(
-        "node {node} has torque at id {found}, its group at {expected}: give all pucks of a group one firmware"
+        "node {node} has the {property} under property id {found}, the first motor puck under {expected}: give all motor pucks the \
+         same firmware"
     )]
-    MixedTorqueIds {
+    MixedPropertyIds {
         /// Number of the node.
         node: u8,
+        /// The property: torque or position.
+        property: &'static str,
         /// Id found.
         found: u8,
-        /// Id of the first puck of the group.
+        /// Id of the first motor puck.
         expected: u8,
     },
     /// A puck that does not wake up.

@@ -48,7 +48,7 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
     /// The remaining motions within the torque limits by the model of the first fit, if the arm falls without torque. A
     /// space that they sweep beyond what was confirmed is confirmed anew.
     pub(super) fn redesign(&mut self, motions: Motions<N>) -> Result<Motions<N>, A::Error> {
-        if !self.falls() || self.progress.finished(StepName::UnseenMotion).is_some() {
+        if !self.falls() || self.progress.finished(StepName::ValidationMotion).is_some() {
             return Ok(motions);
         }
         let motions = self.design(Stage::First)?;

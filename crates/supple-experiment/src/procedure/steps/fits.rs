@@ -22,7 +22,7 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
             return Ok(());
         }
         let model = self.model(Stage::Start)?;
-        let scaled = fitting::with_breakaway::<N>(&model, &self.progress.breakaway)?;
+        let scaled = fitting::scale_dry_friction::<N>(&model, &self.progress.breakaway)?;
         let pass = self.log_file(StepName::FirstPass);
         // The moves from the home pose reach where the pass does not.
         let logs = self.options.out.join(LOGS);
@@ -32,9 +32,9 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         let fit = self.arm.meanwhile(move || {
             let mut others = Vec::new();
             for file in moves.iter().filter(|file| file.exists()) {
-                others.extend(fitting::all_motion::<N>(file)?);
+                others.extend(fitting::read_position_controlled_motions::<N>(file)?);
             }
-            let pass = only(&fitting::excitations::<N>(&pass)?, "first-pass")?.clone();
+            let pass = only(&fitting::read_excitations::<N>(&pass)?, "first-pass")?.clone();
             fitting::fit_first::<N>(&of, &pass, &others)
         })??;
         let (found, quality) = match fit {
@@ -43,9 +43,9 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         };
         match &quality {
             Some(quality) => self.say(&format!(
-                "unseen part of the first pass: {:.1} % of the torque unexplained, {:.1} % before",
-                100.0 * quality.unseen_relative,
-                100.0 * quality.unseen_relative_before
+                "end of the first pass, which was not fitted: {:.1} % of the torque unexplained, {:.1} % before",
+                100.0 * quality.validation_relative,
+                100.0 * quality.validation_relative_before
             )),
             None => self.say("the first fit is no better than the model before it, which stays"),
         }
@@ -63,19 +63,23 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         let file = |step| self.log_file(step);
         let [full, slow] = [StepName::FullPass, StepName::SlowMotion].map(file);
         let [first, constant] = [StepName::FirstPass, StepName::ConstantSpeed].map(file);
-        let unseen = self.log_file(StepName::UnseenMotion);
+        let validation = self.log_file(StepName::ValidationMotion);
         // Reading takes as long as fitting; the arm's telemetry must be read meanwhile.
         let (found, quality) = self.arm.meanwhile(move || {
             let (mut logs, mut others) = (Vec::new(), Vec::new());
             for file in [&full, &slow, &first] {
-                logs.extend(fitting::excitations::<N>(file)?);
+                logs.extend(fitting::read_excitations::<N>(file)?);
             }
-            for file in [&full, &slow, &unseen] {
-                others.extend(fitting::all_motion::<N>(file)?);
+            for file in [&full, &slow, &validation] {
+                others.extend(fitting::read_position_controlled_motions::<N>(file)?);
             }
-            let constant = fitting::excitations::<N>(&constant)?;
-            let unseen = only(&fitting::excitations::<N>(&unseen)?, "unseen-motion")?.clone();
-            fitting::fit_all::<N>(&model, &logs, &constant, &unseen, &others)
+            let constant = fitting::read_excitations::<N>(&constant)?;
+            let validation = only(
+                &fitting::read_excitations::<N>(&validation)?,
+                "validation-motion",
+            )?
+            .clone();
+            fitting::fit_all::<N>(&model, &logs, &constant, &validation, &others)
         })??;
         self.say(&summary(&quality));
         let found = found
@@ -99,9 +103,9 @@ fn only<'a>(logs: &'a [Log], name: &str) -> Result<&'a Log, ProcedureError> {
 
 fn summary(quality: &FitQuality) -> String {
     format!(
-        "unseen motion: {:.2} % of the torque unexplained, {:.2} % before; {}",
-        100.0 * quality.unseen_relative,
-        100.0 * quality.unseen_relative_before,
+        "validation motion: {:.2} % of the torque unexplained, {:.2} % before; {}",
+        100.0 * quality.validation_relative,
+        100.0 * quality.validation_relative_before,
         quality.verdict
     )
 }

@@ -10,7 +10,7 @@ use crate::excite::move_to;
 use crate::procedure::arm::{Motion, MotionArm};
 use crate::procedure::error::ProcedureError;
 use crate::procedure::progress::{FinishedStep, Progress, StepName};
-use crate::procedure::thresholds::wide_thresholds;
+use crate::procedure::thresholds::minimum_thresholds;
 use crate::procedure::{FIRST_MODEL, HOLD_REMEDY, Operator, ProcedureOptions};
 use crate::request_sequence::Step;
 use std::path::PathBuf;
@@ -163,7 +163,11 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
             (StepName::FullPass, "full-pass", &motions.full[..]),
             (StepName::SlowMotion, "slow-motion", &[motions.slow]),
             (StepName::ConstantSpeed, "constant-speed", &motions.constant),
-            (StepName::UnseenMotion, "unseen-motion", &[motions.unseen]),
+            (
+                StepName::ValidationMotion,
+                "validation-motion",
+                &[motions.validation],
+            ),
         ] {
             self.series(step, name, Stage::First, series)?;
             if self.is_over() {
@@ -211,9 +215,9 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
         let mut model = self.model(stage)?;
         if stage != Stage::Identified {
             let unknown = stage == Stage::Start || self.progress.first_fit.is_none();
-            let wide = wide_thresholds::<N>(&model, unknown)?;
+            let minimum = minimum_thresholds::<N>(&model, unknown)?;
             model = model
-                .with_wide_thresholds(&wide)
+                .with_minimum_thresholds(&minimum)
                 .map_err(ProcedureError::from)?;
         }
         if let Some(gains) = self.first_gains.filter(|_| stage == Stage::First) {

@@ -15,8 +15,8 @@ pub const ARM_GROUPS: [[GroupId; 3]; 2] = [
     [GroupId::ACTUATORS, GroupId::LOWER_TORQUES, GroupId::ARM],
     [GroupId::ACTUATORS, GroupId::UPPER_TORQUES, GroupId::ARM],
 ];
-/// Rounds of requests to a node that answered before. An emulated node may be delayed by its host.
-const ROUNDS: u32 = 4;
+/// Number of requests to a node before it counts as missing. An emulated node may be delayed by its host.
+const ATTEMPTS: u32 = 4;
 /// Relative tolerance of a puck's torque units: the rounding of the torque quantum in the description.
 const UNITS_TOLERANCE: f64 = 1e-3;
 
@@ -40,11 +40,14 @@ pub struct MotorPuck {
 }
 
 /// Rejects an arm with a missing or an additional motor puck.
-pub fn check_nodes(stats: &[Option<i32>; 32], description: &Description) -> Result<(), CanError> {
+pub fn check_nodes(
+    status_by_node: &[Option<i32>; 32],
+    description: &Description,
+) -> Result<(), CanError> {
     let joints = description.dof();
-    for (number, stat) in stats.iter().enumerate().take(8).skip(1) {
+    for (number, status) in status_by_node.iter().enumerate().take(8).skip(1) {
         let node = number as u8;
-        match stat {
+        match status {
             None if number <= joints => {
                 return Err(CanError::Missing {
                     what: "a motor puck",
@@ -109,10 +112,15 @@ pub fn identify<B: Bus>(host: &mut Host<'_, B>, node: NodeId) -> Result<MotorPuc
 pub fn check_same_ids(pucks: &[MotorPuck]) -> Result<(), CanError> {
     for puck in pucks {
         let first = pucks[0];
-        for (found, expected) in [(puck.torque, first.torque), (puck.position, first.position)] {
+        let pairs = [
+            ("torque", puck.torque, first.torque),
+            ("position", puck.position, first.position),
+        ];
+        for (property, found, expected) in pairs {
             if found != expected {
-                return Err(CanError::MixedTorqueIds {
+                return Err(CanError::MixedPropertyIds {
                     node: puck.node.number(),
+                    property,
                     found: found.number(),
                     expected: expected.number(),
                 });
@@ -137,7 +145,7 @@ pub fn get_required<B: Bus>(
     node: NodeId,
     property: PropertyId,
 ) -> Result<i32, CanError> {
-    for _ in 0..ROUNDS {
+    for _ in 0..ATTEMPTS {
         if let Some(value) = host.get_property(node, property)? {
             return Ok(value);
         }
@@ -191,8 +199,8 @@ pub fn configure<B: Bus>(
     Ok(())
 }
 
-/// Compares counts, torque units, motor and temperature with the description, and sets the torque limit to
-/// the description's. Returns the scales of its counts and torque units.
+/// Compares counts per revolution and torque units with the description, rejects a puck that is too hot, and sets its torque
+/// limit to the description's. Returns the scales of its counts and torque units.
 pub fn check_and_limit<B: Bus>(
     host: &mut Host<'_, B>,
     puck: &MotorPuck,
@@ -201,13 +209,13 @@ pub fn check_and_limit<B: Bus>(
 ) -> Result<(PositionScale, TorqueScale), CanError> {
     let node = puck.node.number();
     let motors = description.motors();
-    let described = |key| CanError::MissingKey {
+    let missing_key = |key| CanError::MissingKey {
         arm: description.name().to_owned(),
         key,
     };
     let counts_per_revolution = get_required(host, puck.node, property_id(puck, Property::CTS)?)?;
     let expected = motors.counts_per_revolution;
-    let expected = expected.ok_or_else(|| described("counts_per_revolution"))?;
+    let expected = expected.ok_or_else(|| missing_key("counts_per_revolution"))?;
     if i64::from(counts_per_revolution) != i64::from(expected) {
         return Err(CanError::Contradiction {
             property: Property::CTS,
@@ -219,7 +227,7 @@ pub fn check_and_limit<B: Bus>(
     }
     let units_per_nm = get_required(host, puck.node, property_id(puck, Property::IPNM)?)?;
     let quanta = motors.torque_quantum_nm.as_ref();
-    let quanta = quanta.ok_or_else(|| described("torque_quantum_nm"))?;
+    let quanta = quanta.ok_or_else(|| missing_key("torque_quantum_nm"))?;
     let expected = 1.0 / quanta[index];
     if (f64::from(units_per_nm) - expected).abs() > UNITS_TOLERANCE * expected {
         return Err(CanError::Contradiction {

@@ -91,13 +91,13 @@ impl Stage {
 
 /// Start-up sequence of a system.
 #[derive(Debug)]
-pub struct Stages {
+pub struct StartUp {
     stage: Stage,
     pendant: Option<Pendant>,
     plant: PlantKind,
     track: UpTrajectory,
-    /// A process was started anew: what was requested before does not count.
-    anew: bool,
+    /// A process was restarted: requests before the restart do not count.
+    is_restart: bool,
     /// The arm has no pendant: its drives become active when gravity hold requests torque.
     without_pendant: bool,
     /// Learning begins with gravity hold.
@@ -105,7 +105,7 @@ pub struct Stages {
     period_s: f64,
     /// The drives were active while torque was wanted.
     was_active: bool,
-    /// The drives had no power; so it is at the start.
+    /// The drives had no power; true at the start.
     was_off: bool,
 }
 
@@ -114,15 +114,15 @@ pub fn cycles_of(time_s: f64, period_s: f64) -> u64 {
     (time_s / period_s).round() as u64
 }
 
-impl Stages {
+impl StartUp {
     /// Starts the sequence of these processes.
-    pub fn new(plan: &Plan, args: &UpArgs, period_s: f64) -> Stages {
-        Stages {
+    pub fn new(plan: &Plan, args: &UpArgs, period_s: f64) -> StartUp {
+        StartUp {
             stage: Stage::Joining,
             pendant: plan.pendant.clone(),
             plant: args.plant,
             track: args.track,
-            anew: false,
+            is_restart: false,
             without_pendant: plan.lays_down,
             learn: args.learn,
             period_s,
@@ -131,11 +131,11 @@ impl Stages {
         }
     }
 
-    /// The same after a process was started anew: idle was requested before, by the caller.
-    pub fn anew(plan: &Plan, args: &UpArgs, period_s: f64) -> Stages {
-        Stages {
-            anew: true,
-            ..Stages::new(plan, args, period_s)
+    /// The sequence after the restart of a process: the caller has requested idle before.
+    pub fn after_restart(plan: &Plan, args: &UpArgs, period_s: f64) -> StartUp {
+        StartUp {
+            is_restart: true,
+            ..StartUp::new(plan, args, period_s)
         }
     }
 
@@ -286,7 +286,7 @@ impl Stages {
         in_fault: bool,
         session: &mut OperatorSession<N>,
     ) -> Result<(), Failure> {
-        let held = match self.anew {
+        let held = match self.is_restart {
             true => session.send_request(&Request::GravityHold, None),
             false => session.send_first_request(&Request::GravityHold),
         };

@@ -1,15 +1,15 @@
-//! Remedies of a log's columns, compared by how well the arm explains the log with each.
+//! Corrections of a log's columns (sign, unit, order, zero, clock), compared by the residual of the fit to the corrected log.
 
-use super::explained::{Context, Explained, Grams};
 use super::finding::{Finding, Problem};
 use super::gravity::Gravities;
+use super::weighted_fit::{FitContext, FitResult, GramMatrices};
 use crate::error::IdentError;
 use crate::motion::Motion;
 use core::f64::consts::{FRAC_PI_2, PI};
 
-/// A change of a motion's columns that would undo an error.
+/// A change of a motion's columns that corrects one kind of error.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Remedy {
+pub(super) enum Correction {
     /// Multiplies the angle of one joint, or of all.
     Angle(Option<usize>, f64),
     /// Adds to the angle of a joint \[rad\].
@@ -28,43 +28,43 @@ pub(super) enum Remedy {
     Time(f64),
 }
 
-impl Remedy {
+impl Correction {
     pub fn apply(&self, motion: &Motion) -> Motion {
         let mut m = motion.clone();
         let joints = m.q.ncols();
         match *self {
-            Remedy::Angle(joint, factor) => {
+            Correction::Angle(joint, factor) => {
                 for j in joint.map_or(0..joints, |j| j..j + 1) {
                     for signal in [&mut m.q, &mut m.qd, &mut m.qdd] {
                         signal.column_mut(j).scale_mut(factor);
                     }
                 }
             }
-            Remedy::Zero(j, change) => m.q.column_mut(j).add_scalar_mut(change),
-            Remedy::Torque(joint, factor) => {
+            Correction::Zero(j, change) => m.q.column_mut(j).add_scalar_mut(change),
+            Correction::Torque(joint, factor) => {
                 for j in joint.map_or(0..joints, |j| j..j + 1) {
                     m.tau.column_mut(j).scale_mut(factor);
                 }
             }
-            Remedy::SwapAngles(a, b) => {
+            Correction::SwapAngles(a, b) => {
                 for signal in [&mut m.q, &mut m.qd, &mut m.qdd] {
                     signal.swap_columns(a, b);
                 }
             }
-            Remedy::SwapTorques(a, b) => m.tau.swap_columns(a, b),
-            Remedy::SwapJoints(a, b) => {
+            Correction::SwapTorques(a, b) => m.tau.swap_columns(a, b),
+            Correction::SwapJoints(a, b) => {
                 for signal in [&mut m.q, &mut m.qd, &mut m.qdd, &mut m.tau] {
                     signal.swap_columns(a, b);
                 }
             }
-            Remedy::Reverse => {
+            Correction::Reverse => {
                 for signal in [&mut m.q, &mut m.qd, &mut m.qdd, &mut m.tau] {
                     for j in 0..joints / 2 {
                         signal.swap_columns(j, joints - 1 - j);
                     }
                 }
             }
-            Remedy::Time(factor) => {
+            Correction::Time(factor) => {
                 m.qd /= factor;
                 m.qdd /= factor * factor;
             }
@@ -72,87 +72,90 @@ impl Remedy {
         m
     }
 
-    /// Smallest gain in the score at which the remedy is accepted: small changes of a column may also make up for what
-    /// the arm's model lacks.
+    /// Minimum gain of the score at which the correction is accepted. It is not zero: a small change of a column can also
+    /// compensate an error of the model.
     fn threshold(&self) -> f64 {
         match self {
-            Remedy::Angle(_, f) if *f < 0.0 => 0.10,
-            Remedy::Torque(_, f) if *f < 0.0 => 0.10,
-            Remedy::SwapAngles(..) | Remedy::SwapTorques(..) | Remedy::SwapJoints(..) => 0.12,
-            Remedy::Reverse | Remedy::Angle(None, _) => 0.12,
-            Remedy::Time(_) => 0.04,
-            Remedy::Zero(..) => 0.06,
-            Remedy::Angle(..) => 0.04,
-            Remedy::Torque(..) => 0.06,
+            Correction::Angle(_, f) if *f < 0.0 => 0.10,
+            Correction::Torque(_, f) if *f < 0.0 => 0.10,
+            Correction::SwapAngles(..)
+            | Correction::SwapTorques(..)
+            | Correction::SwapJoints(..) => 0.12,
+            Correction::Reverse | Correction::Angle(None, _) => 0.12,
+            Correction::Time(_) => 0.04,
+            Correction::Zero(..) => 0.06,
+            Correction::Angle(..) => 0.04,
+            Correction::Torque(..) => 0.06,
         }
     }
 }
 
-/// A remedy with what it gains.
+/// A correction, the fit with it, and the score that it gains over the fit to the log as given.
 #[derive(Clone, Debug)]
-pub(super) struct Tried {
-    pub remedy: Remedy,
-    pub after: Explained,
+pub(super) struct Trial {
+    pub correction: Correction,
+    pub after: FitResult,
     pub gain: f64,
 }
 
-/// All remedies of the first round: those that need no search.
-fn discrete(moving: &[usize]) -> Vec<Remedy> {
+/// All corrections without a continuous parameter.
+fn discrete(moving: &[usize]) -> Vec<Correction> {
     let degrees = std::f64::consts::PI / 180.0;
     let mut all = vec![
-        Remedy::Angle(None, degrees),
-        Remedy::Angle(None, -1.0),
-        Remedy::Torque(None, -1.0),
-        Remedy::Reverse,
+        Correction::Angle(None, degrees),
+        Correction::Angle(None, -1.0),
+        Correction::Torque(None, -1.0),
+        Correction::Reverse,
     ];
     for (i, &a) in moving.iter().enumerate() {
-        all.push(Remedy::Angle(Some(a), -1.0));
-        all.push(Remedy::Torque(Some(a), -1.0));
-        all.push(Remedy::Angle(Some(a), degrees));
+        all.push(Correction::Angle(Some(a), -1.0));
+        all.push(Correction::Torque(Some(a), -1.0));
+        all.push(Correction::Angle(Some(a), degrees));
         for &b in &moving[i + 1..] {
-            all.push(Remedy::SwapAngles(a, b));
-            all.push(Remedy::SwapTorques(a, b));
-            all.push(Remedy::SwapJoints(a, b));
+            all.push(Correction::SwapAngles(a, b));
+            all.push(Correction::SwapTorques(a, b));
+            all.push(Correction::SwapJoints(a, b));
         }
     }
     all
 }
 
-/// A remedy of one continuous quantity: start values and the step to refine them.
-type Family = (fn(usize, f64) -> Remedy, &'static [f64], bool);
+/// A correction with a continuous parameter: constructor from joint and value, start values, and whether the search is
+/// logarithmic.
+type SearchedCorrection = (fn(usize, f64) -> Correction, &'static [f64], bool);
 
-/// Families of remedies of a joint: the value is a factor (searched on a logarithmic scale) or an offset.
-const FAMILIES: [Family; 3] = [
+/// Corrections of a joint with a continuous parameter: a factor (searched on a logarithmic scale) or an offset \[rad\].
+const SEARCHED_CORRECTIONS: [SearchedCorrection; 3] = [
     (
-        |j, f| Remedy::Angle(Some(j), f),
+        |j, f| Correction::Angle(Some(j), f),
         &[0.01, 0.03, 0.1, 0.5, 0.8, 1.25, 2.0],
         true,
     ),
     (
-        |j, f| Remedy::Torque(Some(j), f),
+        |j, f| Correction::Torque(Some(j), f),
         &[0.01, 0.1, 0.4, 0.7, 1.5, 2.5, 10.0, 100.0],
         true,
     ),
     (
-        |j, c| Remedy::Zero(j, c),
+        |j, c| Correction::Zero(j, c),
         &[-FRAC_PI_2, -0.5, -0.15, 0.15, 0.5, FRAC_PI_2, PI],
         false,
     ),
 ];
 
 pub(super) struct Search<'a, const N: usize> {
-    context: &'a Context<'a, N>,
+    context: &'a FitContext<'a, N>,
     motion: &'a Motion,
-    grams: Grams,
-    given: Explained,
+    grams: GramMatrices,
+    given: FitResult,
     before: f64,
 }
 
 impl<'a, const N: usize> Search<'a, N> {
     pub fn new(
-        context: &'a Context<'a, N>,
+        context: &'a FitContext<'a, N>,
         motion: &'a Motion,
-    ) -> Result<(Self, Explained), IdentError> {
+    ) -> Result<(Self, FitResult), IdentError> {
         let grams = context.grams(motion)?;
         let given = context.solve(&grams);
         let before = given.score();
@@ -166,46 +169,47 @@ impl<'a, const N: usize> Search<'a, N> {
         Ok((search, given))
     }
 
-    pub fn try_one(&self, remedy: Remedy) -> Result<Tried, IdentError> {
+    pub fn try_one(&self, correction: Correction) -> Result<Trial, IdentError> {
         let moving = self.context.columns.moving();
-        let after = match remedy {
-            Remedy::Torque(Some(joint), factor) => {
+        let after = match correction {
+            Correction::Torque(Some(joint), factor) => {
                 let row = moving.binary_search(&joint).unwrap_or(0);
                 self.context.solve(&self.grams.scaled(row, factor))
             }
-            _ => self.context.explain(&remedy.apply(self.motion))?,
+            _ => self.context.fit(&correction.apply(self.motion))?,
         };
-        Ok(Tried {
-            remedy,
+        Ok(Trial {
+            correction,
             gain: self.before - after.score(),
             after,
         })
     }
 
-    /// Whether a factor is determined from both sides. A torque times zero, or an angle times zero, frees the fit of a
-    /// joint and so always helps a little; a true factor is better than half and twice of it.
-    fn is_a_peak(&self, tried: &Tried) -> Result<bool, IdentError> {
-        // A joint's angle and torque also act on its neighbours: one that only trades one residual for another is no error.
-        let pairs = || self.given.relative.iter().zip(&tried.after.relative);
+    /// Whether the gain has a maximum at the correction's factor: it must be greater than at half and at twice the factor. Without
+    /// this check a factor near zero would be accepted: it removes a joint from the fit, which always reduces the residual.
+    fn is_a_maximum(&self, trial: &Trial) -> Result<bool, IdentError> {
+        // A joint's angle and torque also affect its neighbours: a correction that reduces one residual and increases another
+        // corrects no error.
+        let pairs = || self.given.relative.iter().zip(&trial.after.relative);
         let better = pairs()
             .filter(|(before, after)| **after < 0.96 * **before)
             .count();
         let worse = pairs().any(|(before, after)| *after > 1.05 * *before);
-        let small = tried.gain < 0.15;
-        if matches!(tried.remedy, Remedy::Time(_)) {
+        let small = trial.gain < 0.15;
+        if matches!(trial.correction, Correction::Time(_)) {
             let half = 2 * better >= self.given.relative.len();
             return Ok(half && !worse);
         }
-        if small && (worse || better < 2) && !matches!(tried.remedy, Remedy::Zero(..)) {
+        if small && (worse || better < 2) && !matches!(trial.correction, Correction::Zero(..)) {
             return Ok(false);
         }
-        let beside = match tried.remedy {
-            Remedy::Torque(joint, f) => [0.5, 2.0].map(|k| Remedy::Torque(joint, k * f)),
-            Remedy::Angle(joint, f) => [0.5, 2.0].map(|k| Remedy::Angle(joint, k * f)),
+        let beside = match trial.correction {
+            Correction::Torque(joint, f) => [0.5, 2.0].map(|k| Correction::Torque(joint, k * f)),
+            Correction::Angle(joint, f) => [0.5, 2.0].map(|k| Correction::Angle(joint, k * f)),
             _ => return Ok(true),
         };
-        for remedy in beside {
-            if self.try_one(remedy)?.gain > 0.6 * tried.gain {
+        for correction in beside {
+            if self.try_one(correction)?.gain > 0.6 * trial.gain {
                 return Ok(false);
             }
         }
@@ -215,11 +219,11 @@ impl<'a, const N: usize> Search<'a, N> {
     /// Golden-section search between the neighbours of the best start value.
     fn refine(
         &self,
-        make: &dyn Fn(f64) -> Remedy,
+        make: &dyn Fn(f64) -> Correction,
         low: f64,
         high: f64,
         logarithmic: bool,
-    ) -> Result<Tried, IdentError> {
+    ) -> Result<Trial, IdentError> {
         let value = |u: f64| if logarithmic { u.exp() } else { u };
         let (mut a, mut b) = if logarithmic {
             (low.ln(), high.ln())
@@ -227,7 +231,7 @@ impl<'a, const N: usize> Search<'a, N> {
             (low, high)
         };
         let ratio = 0.5 * (5.0_f64.sqrt() - 1.0);
-        let mut best: Option<Tried> = None;
+        let mut best: Option<Trial> = None;
         let (mut c, mut d) = (b - ratio * (b - a), a + ratio * (b - a));
         let (mut at_c, mut at_d) = (self.try_one(make(value(c)))?, self.try_one(make(value(d)))?);
         for _ in 0..6 {
@@ -244,38 +248,38 @@ impl<'a, const N: usize> Search<'a, N> {
                 d = a + ratio * (b - a);
                 at_d = self.try_one(make(value(d)))?;
             }
-            for tried in [&at_c, &at_d] {
-                if best.as_ref().is_none_or(|best| tried.gain > best.gain) {
-                    best = Some(tried.clone());
+            for trial in [&at_c, &at_d] {
+                if best.as_ref().is_none_or(|best| trial.gain > best.gain) {
+                    best = Some(trial.clone());
                 }
             }
         }
         Ok(best.unwrap_or(at_c))
     }
 
-    /// The factor common to all angles: degrees, or the ratio of the gears if it is the same for all.
-    fn common_factor(&self, degrees: &Tried) -> Result<Tried, IdentError> {
-        let refined = self.refine(&|f| Remedy::Angle(None, f), 0.004, 0.08, true)?;
+    /// The factor common to all angles: that of degrees, or a gear ratio that all joints share.
+    fn common_factor(&self, degrees: &Trial) -> Result<Trial, IdentError> {
+        let refined = self.refine(&|f| Correction::Angle(None, f), 0.004, 0.08, true)?;
         let better = refined.gain > degrees.gain + 0.02;
         Ok(if better { refined } else { degrees.clone() })
     }
 
-    /// The best remedy among all, and the best of each other kind for comparison.
-    pub fn best(&self, moving: &[usize]) -> Result<Vec<Tried>, IdentError> {
+    /// All corrections without a continuous parameter, and the best of each kind with one; best first.
+    pub fn best(&self, moving: &[usize]) -> Result<Vec<Trial>, IdentError> {
         let mut all = Vec::new();
-        for remedy in discrete(moving) {
-            all.push(self.try_one(remedy)?);
+        for correction in discrete(moving) {
+            all.push(self.try_one(correction)?);
         }
         for &joint in moving {
-            for (make, starts, logarithmic) in FAMILIES {
+            for (make, starts, logarithmic) in SEARCHED_CORRECTIONS {
                 let make = |value: f64| make(joint, value);
-                let tried = starts.iter().map(|v| self.try_one(make(*v)));
-                let tried = tried.collect::<Result<Vec<_>, _>>()?;
-                let gains = tried.iter().map(|t| t.gain);
+                let trial = starts.iter().map(|v| self.try_one(make(*v)));
+                let trial = trial.collect::<Result<Vec<_>, _>>()?;
+                let gains = trial.iter().map(|t| t.gain);
                 let (at, gain) = gains.enumerate().fold((0, f64::MIN), |best, (i, gain)| {
                     if gain > best.1 { (i, gain) } else { best }
                 });
-                // A remedy that is far off can be refined only if it already helps.
+                // The search refines a start value only if the residual is smaller with it.
                 if gain <= 0.004 {
                     continue;
                 }
@@ -289,29 +293,29 @@ impl<'a, const N: usize> Search<'a, N> {
                 let better = if refined.gain > gain {
                     refined
                 } else {
-                    tried[at].clone()
+                    trial[at].clone()
                 };
-                if self.is_a_peak(&better)? {
+                if self.is_a_maximum(&better)? {
                     all.push(better);
                 }
             }
         }
         for (low, high) in [(0.4, 1.0), (1.0, 2.5)] {
-            let tried = self.refine(&|f| Remedy::Time(f), low, high, true)?;
-            if self.is_a_peak(&tried)? {
-                all.push(tried);
+            let trial = self.refine(&|f| Correction::Time(f), low, high, true)?;
+            if self.is_a_maximum(&trial)? {
+                all.push(trial);
             }
         }
         all.sort_by(|a, b| {
-            (b.gain - b.remedy.threshold()).total_cmp(&(a.gain - a.remedy.threshold()))
+            (b.gain - b.correction.threshold()).total_cmp(&(a.gain - a.correction.threshold()))
         });
         Ok(all)
     }
 }
 
-/// Looks for remedies until none explains the log much better.
+/// Finds corrections that reduce the residual beyond their thresholds: one, or two in sequence.
 pub(super) fn check<const N: usize>(
-    context: &Context<'_, N>,
+    context: &FitContext<'_, N>,
     motion: &Motion,
 ) -> Result<Vec<Finding>, IdentError> {
     let moving = context.columns.moving().to_vec();
@@ -319,43 +323,43 @@ pub(super) fn check<const N: usize>(
     let mut findings = Vec::new();
     for _ in 0..2 {
         let (search, given) = Search::new(context, &motion)?;
-        let tried = search.best(&moving)?;
-        let Some(best) = tried.first() else { break };
-        if best.gain < best.remedy.threshold() {
+        let trial = search.best(&moving)?;
+        let Some(best) = trial.first() else { break };
+        if best.gain < best.correction.threshold() {
             findings.extend(zero(context, &motion)?);
             break;
         }
-        let best = match best.remedy {
-            Remedy::Angle(None, f) if f > 0.0 => search.common_factor(best)?,
+        let best = match best.correction {
+            Correction::Angle(None, f) if f > 0.0 => search.common_factor(best)?,
             _ => best.clone(),
         };
-        findings.push(finding(&best.remedy, &given, &best.after));
-        motion = best.remedy.apply(&motion);
+        findings.push(finding(&best.correction, &given, &best.after));
+        motion = best.correction.apply(&motion);
     }
     Ok(findings)
 }
 
-/// A zero that the weight of the given arm shows: a constant error of an angle changes few torques, but it turns the arm
-/// about that joint.
+/// A wrong zero of an angle, found by comparing the fitted gravity torques with those of the given arm: a constant error of an
+/// angle changes the residual little, but rotates the arm beyond that joint.
 fn zero<const N: usize>(
-    context: &Context<'_, N>,
+    context: &FitContext<'_, N>,
     motion: &Motion,
 ) -> Result<Option<Finding>, IdentError> {
-    let context = context.believing_the_arm()?;
+    let context = context.with_tight_prior()?;
     let (search, given) = Search::new(&context, motion)?;
     let given = &given;
     let gravities = Gravities::new(&context, motion, given);
     let Some((joint, by, before, after)) = gravities.zero() else {
         return Ok(None);
     };
-    let tried = search.try_one(Remedy::Zero(joint, by))?;
-    if tried.gain < 0.01 {
+    let trial = search.try_one(Correction::Zero(joint, by))?;
+    if trial.gain < 0.01 {
         return Ok(None);
     }
-    let mut finding = finding(&tried.remedy, given, &tried.after);
+    let mut finding = finding(&trial.correction, given, &trial.after);
     finding.evidence += &format!(
-        "; the correlation of the weight that is held with that of the given arm is {before:.3} at least, and {after:.3} with \
-         it"
+        "; the correlation of the fitted gravity torques with those of the given arm is at least {before:.3}, and {after:.3} with \
+         this correction"
     );
     Ok(Some(finding))
 }
@@ -368,17 +372,17 @@ fn percent(relative: &[f64]) -> String {
     all.join(", ")
 }
 
-fn finding(remedy: &Remedy, given: &Explained, after: &Explained) -> Finding {
+fn finding(correction: &Correction, given: &FitResult, after: &FitResult) -> Finding {
     let better = format!(
-        "the arm leaves {} % of the joints' torques unexplained, and {} % with this remedy",
+        "the arm leaves {} % of the joints' torques unexplained, and {} % with this correction",
         percent(&given.relative),
         percent(&after.relative)
     );
     let degrees = (std::f64::consts::PI / 180.0).ln();
-    match *remedy {
-        Remedy::Angle(joint, f) if f < 0.0 => {
+    match *correction {
+        Correction::Angle(joint, f) if f < 0.0 => {
             let joints: Vec<usize> = joint.into_iter().collect();
-            Finding::stop(
+            Finding::reject(
                 Problem::AngleSign,
                 &joints,
                 "q",
@@ -386,9 +390,9 @@ fn finding(remedy: &Remedy, given: &Explained, after: &Explained) -> Finding {
                 "change the sign of this angle (and of its velocity)",
             )
         }
-        Remedy::Angle(joint, f) if (f.ln() - degrees).abs() < 0.1 => {
+        Correction::Angle(joint, f) if (f.ln() - degrees).abs() < 0.1 => {
             let joints: Vec<usize> = joint.into_iter().collect();
-            Finding::stop(
+            Finding::reject(
                 Problem::Degrees,
                 &joints,
                 "q",
@@ -396,9 +400,9 @@ fn finding(remedy: &Remedy, given: &Explained, after: &Explained) -> Finding {
                 "give radians: multiply by pi / 180",
             )
         }
-        Remedy::Angle(joint, f) => {
+        Correction::Angle(joint, f) => {
             let joints: Vec<usize> = joint.into_iter().collect();
-            Finding::stop(
+            Finding::reject(
                 match joint {
                     None => Problem::MotorAngles,
                     Some(_) => Problem::AngleScale,
@@ -412,16 +416,16 @@ fn finding(remedy: &Remedy, given: &Explained, after: &Explained) -> Finding {
                 format!("give the angle of the joint: multiply by {f:.3}"),
             )
         }
-        Remedy::Zero(j, c) => Finding::stop(
+        Correction::Zero(j, c) => Finding::reject(
             Problem::ZeroOffset,
             &[j],
             "q",
             format!("has another zero than the arm, {:.3} rad off: {better}", -c),
             format!("add {c:.3} rad, or correct the zero of the joint in the arm's URDF"),
         ),
-        Remedy::Torque(joint, f) if f < 0.0 => {
+        Correction::Torque(joint, f) if f < 0.0 => {
             let joints: Vec<usize> = joint.into_iter().collect();
-            Finding::stop(
+            Finding::reject(
                 Problem::TorqueSign,
                 &joints,
                 "tau",
@@ -429,9 +433,9 @@ fn finding(remedy: &Remedy, given: &Explained, after: &Explained) -> Finding {
                 "change the sign of this torque",
             )
         }
-        Remedy::Torque(joint, f) => {
+        Correction::Torque(joint, f) => {
             let joints: Vec<usize> = joint.into_iter().collect();
-            Finding::stop(
+            Finding::reject(
                 Problem::TorqueScale,
                 &joints,
                 "tau",
@@ -442,35 +446,35 @@ fn finding(remedy: &Remedy, given: &Explained, after: &Explained) -> Finding {
                 format!("give N m at the joint: multiply by {f:.3}"),
             )
         }
-        Remedy::SwapAngles(a, b) => Finding::stop(
+        Correction::SwapAngles(a, b) => Finding::reject(
             Problem::Swapped,
             &[a, b],
             "q",
             format!("these angles are exchanged: {better}"),
             "exchange the two columns",
         ),
-        Remedy::SwapTorques(a, b) => Finding::stop(
+        Correction::SwapTorques(a, b) => Finding::reject(
             Problem::Swapped,
             &[a, b],
             "tau",
             format!("these torques are exchanged: {better}"),
             "exchange the two columns",
         ),
-        Remedy::SwapJoints(a, b) => Finding::stop(
+        Correction::SwapJoints(a, b) => Finding::reject(
             Problem::Swapped,
             &[a, b],
             "q and tau",
             format!("these joints are exchanged: {better}"),
             "give the joints in the order of the arm",
         ),
-        Remedy::Reverse => Finding::stop(
+        Correction::Reverse => Finding::reject(
             Problem::Swapped,
             &[],
             "q and tau",
             format!("the joints are in reverse order: {better}"),
             "give the joints in the order of the arm",
         ),
-        Remedy::Time(f) => Finding::stop(
+        Correction::Time(f) => Finding::reject(
             Problem::TimeScale,
             &[],
             "t",

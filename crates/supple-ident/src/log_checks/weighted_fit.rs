@@ -1,7 +1,8 @@
-//! How much of a motion's torques an arm of the given kinematics explains, whatever its links weigh.
+//! Quick fit of a model with free link parameters, which the checks of a log compare with and without corrections.
 //!
-//! Weighted least squares over all joints with viscous and Coulomb friction, offset and rotor inertia, none of them
-//! negative; the parameters of the links have a wide prior about the given arm. It is not the fit: it takes milliseconds.
+//! Weighted least squares over all joints. Unknown are viscous and Coulomb friction and rotor inertia, not negative, torque
+//! offsets, and the parameters of the links, with a wide prior about those of the given arm. It takes milliseconds; the
+//! identified model comes from [`crate::procedure`].
 
 use crate::columns::{Column, Columns, FrictionColumns};
 use crate::error::IdentError;
@@ -14,17 +15,17 @@ use supple_core::{Arm, Vector};
 /// Standard deviation of the prior of a link's parameters, relative to the mass of the link or, if greater, to a tenth of
 /// the mean mass.
 const PRIOR: f64 = 0.7;
-/// The same where the weights of the given arm are compared with those found: a short log determines them badly.
+/// The same for the comparison of the fitted gravity torques with those of the given arm: a short log determines them badly.
 const TIGHT_PRIOR: f64 = 0.1;
 /// Length by which first moments are scaled, as a fraction of the arm's reach.
 const LENGTH: f64 = 0.15;
-/// Rounds of weighting.
-const ROUNDS: usize = 4;
-/// Smallest relative residual of a joint that counts; below it, residuals are rounding.
-const FLOOR: f64 = 2e-3;
+/// Number of iterations of the weights.
+const ITERATIONS: usize = 4;
+/// Minimum relative residual of a joint; smaller ones are replaced by it, as they are rounding.
+const MIN_RELATIVE_RESIDUAL: f64 = 2e-3;
 
 /// Arm, columns and prior.
-pub(crate) struct Context<'a, const N: usize> {
+pub(crate) struct FitContext<'a, const N: usize> {
     pub arm: &'a Arm<N>,
     pub columns: Columns,
     couplings: Vec<(usize, usize)>,
@@ -33,33 +34,37 @@ pub(crate) struct Context<'a, const N: usize> {
     stiffness: DVector<f64>,
 }
 
-/// What is left of a motion's torques.
+/// Result of the fit to a motion.
 #[derive(Clone, Debug)]
-pub(crate) struct Explained {
+pub(crate) struct FitResult {
     /// RMS residual of each moving joint over the deviation of its torque.
     pub relative: Vec<f64>,
     /// Parameters.
     pub x: DVector<f64>,
 }
 
-impl Explained {
-    /// Mean over the joints of the logarithm of the relative residual: what remedies are compared by.
+impl FitResult {
+    /// Mean over the joints of the logarithm of the relative residual, by which corrections are compared.
     pub fn score(&self) -> f64 {
-        let sum: f64 = self.relative.iter().map(|e| e.max(FLOOR).ln()).sum();
+        let sum: f64 = self
+            .relative
+            .iter()
+            .map(|e| e.max(MIN_RELATIVE_RESIDUAL).ln())
+            .sum();
         sum / self.relative.len() as f64
     }
 }
 
 /// `[A b]' [A b]` of each moving joint, with the deviation of its torque and the number of samples.
 #[derive(Clone)]
-pub(crate) struct Grams {
+pub(crate) struct GramMatrices {
     of_joint: Vec<(DMatrix<f64>, f64)>,
     samples: usize,
 }
 
-impl Grams {
-    /// The sums over the samples of both.
-    pub fn plus(mut self, other: Grams) -> Grams {
+impl GramMatrices {
+    /// The matrices of the samples of both motions together.
+    pub fn plus(mut self, other: GramMatrices) -> GramMatrices {
         for ((gram, deviation), (added, other_deviation)) in
             self.of_joint.iter_mut().zip(other.of_joint)
         {
@@ -82,22 +87,22 @@ impl Grams {
         self.of_joint.iter().map(of_joint).collect()
     }
 
-    /// With the torque of one joint multiplied by a factor; rotors are unknown, so that nothing else changes.
-    pub fn scaled(&self, row: usize, factor: f64) -> Grams {
+    /// The matrices of the same motion with the torque of one joint multiplied by a factor.
+    pub fn scaled(&self, row: usize, factor: f64) -> GramMatrices {
         let mut of_joint = self.of_joint.clone();
         let (gram, deviation) = &mut of_joint[row];
         let last = gram.nrows() - 1;
         gram.row_mut(last).scale_mut(factor);
         gram.column_mut(last).scale_mut(factor);
         *deviation *= factor.abs();
-        Grams {
+        GramMatrices {
             of_joint,
             samples: self.samples,
         }
     }
 }
 
-impl<'a, const N: usize> Context<'a, N> {
+impl<'a, const N: usize> FitContext<'a, N> {
     pub fn new(
         arm: &'a Arm<N>,
         moving: &[usize],
@@ -106,14 +111,20 @@ impl<'a, const N: usize> Context<'a, N> {
         Self::with_prior(arm, moving, couplings, PRIOR)
     }
 
-    /// As [`Context::new`], with another relative deviation of the links' parameters.
-    pub fn with_prior(
+    /// As [`FitContext::new`], with another relative deviation of the links' parameters.
+    fn with_prior(
         arm: &'a Arm<N>,
         moving: &[usize],
         couplings: &[(usize, usize)],
         prior_deviation: f64,
     ) -> Result<Self, IdentError> {
-        let columns = Columns::new(N, moving, true, FrictionColumns::OFFSET, couplings)?;
+        let columns = Columns::new(
+            N,
+            moving,
+            true,
+            FrictionColumns::COULOMB_AND_OFFSET,
+            couplings,
+        )?;
         let prior = model::prior(arm, &columns);
         let mass = |k: usize| prior[10 * k];
         let mean_mass = (0..N).map(mass).sum::<f64>() / N as f64;
@@ -135,7 +146,7 @@ impl<'a, const N: usize> Context<'a, N> {
             _ => 0.0,
         });
         let stiffness = DVector::from_iterator(columns.len(), stiffness);
-        Ok(Context {
+        Ok(FitContext {
             arm,
             columns,
             couplings: couplings.to_vec(),
@@ -144,8 +155,8 @@ impl<'a, const N: usize> Context<'a, N> {
         })
     }
 
-    /// The same with more weight on the given arm.
-    pub fn believing_the_arm(&self) -> Result<Self, IdentError> {
+    /// The same arm and columns with a narrow prior about the given arm.
+    pub fn with_tight_prior(&self) -> Result<Self, IdentError> {
         Self::with_prior(
             self.arm,
             self.columns.moving(),
@@ -154,7 +165,7 @@ impl<'a, const N: usize> Context<'a, N> {
         )
     }
 
-    pub fn grams(&self, motion: &Motion) -> Result<Grams, IdentError> {
+    pub fn grams(&self, motion: &Motion) -> Result<GramMatrices, IdentError> {
         let joints = joint_rows(self.arm, &self.columns, motion)?;
         let width = self.columns.len();
         let of_joint = joints.iter().map(|rows| {
@@ -165,18 +176,18 @@ impl<'a, const N: usize> Context<'a, N> {
             let deviation = rows.b.map(|b| (b - mean).powi(2)).mean().sqrt();
             (all.tr_mul(&all), deviation.max(f64::MIN_POSITIVE))
         });
-        Ok(Grams {
+        Ok(GramMatrices {
             of_joint: of_joint.collect(),
             samples: motion.samples(),
         })
     }
 
-    pub fn explain(&self, motion: &Motion) -> Result<Explained, IdentError> {
+    pub fn fit(&self, motion: &Motion) -> Result<FitResult, IdentError> {
         Ok(self.solve(&self.grams(motion)?))
     }
 
-    /// As [`Context::explain`], from sums.
-    pub fn solve(&self, grams: &Grams) -> Explained {
+    /// As [`FitContext::fit`], from Gram matrices.
+    pub fn solve(&self, grams: &GramMatrices) -> FitResult {
         let width = self.columns.len();
         let joints = grams.of_joint.len();
         let rows = grams.samples as f64;
@@ -194,7 +205,7 @@ impl<'a, const N: usize> Context<'a, N> {
             )
         };
         let mut relative = vec![1.0; joints];
-        for _ in 0..ROUNDS {
+        for _ in 0..ITERATIONS {
             let mut normal = DMatrix::zeros(width, width);
             let mut right = DVector::zeros(width);
             for ((gram, _), noise) in grams.of_joint.iter().zip(&noise) {
@@ -230,10 +241,10 @@ impl<'a, const N: usize> Context<'a, N> {
                 let error = (gram * &full).dot(&full).max(0.0);
                 let rms = (error / rows).sqrt();
                 relative[row] = rms / deviation;
-                noise[row] = rms.max(FLOOR * deviation);
+                noise[row] = rms.max(MIN_RELATIVE_RESIDUAL * deviation);
             }
         }
-        Explained { relative, x }
+        FitResult { relative, x }
     }
 
     /// Gravity torques of the parameters `x` and of the given arm at a pose.

@@ -26,8 +26,8 @@ impl<'a> PaperLawRuns<'a> {
     /// Collects the runs of a demo.
     pub fn of(demo: &'a Demo) -> PaperLawRuns<'a> {
         PaperLawRuns {
-            paper_law: &demo.paper_letter.trace.samples,
-            ended: demo.paper_letter.ended.as_ref(),
+            paper_law: &demo.law_as_printed.trace.samples,
+            ended: demo.law_as_printed.ended.as_ref(),
             used_law: super::figure_4::samples(demo),
         }
     }

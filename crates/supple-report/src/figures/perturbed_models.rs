@@ -13,7 +13,7 @@ use supple_experiment::metrics::median;
 const SIZE_PX: (u32, u32) = (760, 330);
 
 /// Root mean square errors \[m\].
-pub struct Seeds {
+pub struct PerturbedModels {
     /// Perturbed models.
     pub perturbed_m: Vec<f64>,
     /// Exact model, Coulomb feed-forward.
@@ -22,12 +22,12 @@ pub struct Seeds {
     pub stribeck_m: f64,
 }
 
-impl Seeds {
+impl PerturbedModels {
     /// Collects the errors of a demo.
-    pub fn of(demo: &Demo) -> Seeds {
+    pub fn of(demo: &Demo) -> PerturbedModels {
         let exact = &demo.summary.sinusoid_exact_model;
-        Seeds {
-            perturbed_m: demo.summary.seeds.clone(),
+        PerturbedModels {
+            perturbed_m: demo.summary.perturbed_rms_m.clone(),
             coulomb_m: exact.coulomb.rms_error_m,
             stribeck_m: exact.stribeck.rms_error_m,
         }
@@ -35,16 +35,16 @@ impl Seeds {
 }
 
 /// Draws the figure as SVG.
-pub fn draw(seeds: &Seeds) -> Result<String, FigureError> {
+pub fn draw(errors: &PerturbedModels) -> Result<String, FigureError> {
     let alt_text = "Root mean square error of the sinusoid for each perturbed model, their median, \
                  and that of an exact model";
-    draw_canvas(SIZE_PX, alt_text, |area| draw_on(area, seeds))
+    draw_canvas(SIZE_PX, alt_text, |area| draw_on(area, errors))
 }
 
-fn draw_on(area: &Area<'_>, seeds: &Seeds) -> Result<(), FigureError> {
-    let mut sorted = seeds.perturbed_m.clone();
+fn draw_on(area: &Area<'_>, errors: &PerturbedModels) -> Result<(), FigureError> {
+    let mut sorted = errors.perturbed_m.clone();
     sorted.sort_by(f64::total_cmp);
-    let exact = [seeds.coulomb_m, seeds.stribeck_m];
+    let exact = [errors.coulomb_m, errors.stribeck_m];
     let max = mm(extent(sorted.iter().chain(&exact).copied()).end);
     let count = sorted.len() as f64;
     let ranks = Ticks {
@@ -67,8 +67,8 @@ fn draw_on(area: &Area<'_>, seeds: &Seeds) -> Result<(), FigureError> {
         panel.bar(at - 0.32..at + 0.32, mm(*rms_m), BLUE)?;
     }
     let mut lines = vec![
-        (seeds.coulomb_m, "exact model, Coulomb", VERMILION),
-        (seeds.stribeck_m, "exact model, Stribeck", GREEN),
+        (errors.coulomb_m, "exact model, Coulomb", VERMILION),
+        (errors.stribeck_m, "exact model, Stribeck", GREEN),
     ];
     lines.extend(median(&sorted).map(|middle| (middle, "median", TEXT_COLOUR)));
     lines.sort_by(|a, b| a.0.total_cmp(&b.0));

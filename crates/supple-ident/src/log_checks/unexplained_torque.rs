@@ -1,54 +1,54 @@
-//! What the arm does not explain at some times, or explains only with other weights than its own.
+//! Torques that the given arm does not explain: at some times (contact), or in all poses (another unit, a payload, an offset).
 
-use super::explained::{Context, Explained};
+use super::equal_values::median;
 use super::finding::{Consequence, Finding, Problem};
 use super::gravity::Gravities;
-use super::runs::median;
+use super::weighted_fit::{FitContext, FitResult};
 use crate::columns::Column;
 use crate::error::IdentError;
 use crate::motion::Motion;
 use crate::regressor::joint_rows;
 use nalgebra::DVector;
 
-/// A contact's torque over the usual residual.
+/// Minimum torque of a contact, relative to the median residual.
 const CONTACT_OVER_NOISE: f64 = 8.0;
-/// A contact's torque over the deviation of the joint's torque.
+/// Minimum torque of a contact, relative to the standard deviation of the joint's torque.
 const CONTACT_OVER_TORQUE: f64 = 0.15;
-/// Longest contact \[s\].
-const CONTACT_S: f64 = 5.0;
+/// Maximum duration of a contact \[s\].
+const MAX_CONTACT_S: f64 = 5.0;
 
 pub(super) fn check<const N: usize>(
-    context: &Context<'_, N>,
+    context: &FitContext<'_, N>,
     motion: &Motion,
 ) -> Result<Vec<Finding>, IdentError> {
-    let explained = context.explain(motion)?;
+    let fit = context.fit(motion)?;
     let mut findings = Vec::new();
-    let residuals = residuals(context, motion, &explained)?;
-    findings.extend(contacts(context, motion, &explained, &residuals));
-    let gravities = Gravities::new(context, motion, &explained);
+    let residuals = residuals(context, motion, &fit)?;
+    findings.extend(contacts(context, motion, &fit, &residuals));
+    let gravities = Gravities::new(context, motion, &fit);
     findings.extend(gravities.unit());
     findings.extend(gravities.payload());
-    findings.extend(offsets(context, motion, &explained));
+    findings.extend(offsets(context, motion, &fit));
     Ok(findings)
 }
 
 fn residuals<const N: usize>(
-    context: &Context<'_, N>,
+    context: &FitContext<'_, N>,
     motion: &Motion,
-    explained: &Explained,
+    fit: &FitResult,
 ) -> Result<Vec<DVector<f64>>, IdentError> {
     let joints = joint_rows(context.arm, &context.columns, motion)?;
     Ok(joints
         .iter()
-        .map(|rows| &rows.b - &rows.a * &explained.x)
+        .map(|rows| &rows.b - &rows.a * &fit.x)
         .collect())
 }
 
-/// Intervals in which the residual of some joint is far beyond what it usually is.
+/// Intervals in which the residual of a joint is far above its median.
 fn contacts<const N: usize>(
-    context: &Context<'_, N>,
+    context: &FitContext<'_, N>,
     motion: &Motion,
-    explained: &Explained,
+    fit: &FitResult,
     residuals: &[DVector<f64>],
 ) -> Vec<Finding> {
     let mut findings: Vec<Finding> = Vec::new();
@@ -57,9 +57,9 @@ fn contacts<const N: usize>(
         let torque = motion.tau.column(joint);
         let mean = torque.mean();
         let deviation = torque.map(|t| (t - mean).powi(2)).mean().sqrt();
-        // Where a joint turns around, its dry friction may be wrong by itself, either way.
+        // Where a joint reverses, the model of dry friction alone may be wrong by this much.
         let dry = context.columns.position(Column::Coulomb(joint));
-        let dry_nm = dry.map_or(0.0, |i| explained.x[i]);
+        let dry_nm = dry.map_or(0.0, |i| fit.x[i]);
         let bound = (CONTACT_OVER_NOISE * usual)
             .max(CONTACT_OVER_TORQUE * deviation)
             .max(1.5 * dry_nm + 3.0 * usual);
@@ -83,11 +83,11 @@ fn contacts<const N: usize>(
             end += 1;
         }
         let span_s = (end - first) as f64 / motion.rate_hz;
-        if span_s > CONTACT_S {
+        if span_s > MAX_CONTACT_S {
             continue;
         }
         let (from_s, to_s) = (motion.time_s(first), motion.time_s(end - 1));
-        let mut finding = Finding::stop(
+        let mut finding = Finding::reject(
             Problem::Contact,
             &[joint],
             "tau",
@@ -108,25 +108,20 @@ fn contacts<const N: usize>(
 
 /// Offsets beyond the dry friction: in one direction the joint would be driven by its friction.
 fn offsets<const N: usize>(
-    context: &Context<'_, N>,
+    context: &FitContext<'_, N>,
     motion: &Motion,
-    explained: &Explained,
+    fit: &FitResult,
 ) -> Vec<Finding> {
     let mut findings = Vec::new();
     for &joint in context.columns.moving() {
-        let value = |column: Column| {
-            context
-                .columns
-                .position(column)
-                .map_or(0.0, |i| explained.x[i])
-        };
+        let value = |column: Column| context.columns.position(column).map_or(0.0, |i| fit.x[i]);
         let (offset, dry) = (value(Column::Offset(joint)), value(Column::Coulomb(joint)));
         let torque = motion.tau.column(joint);
         let mean = torque.mean();
         let deviation = torque.map(|t| (t - mean).powi(2)).mean().sqrt();
         if offset.abs() > 1.5 * dry && offset.abs() > 0.4 * deviation {
             findings.push(
-                Finding::stop(
+                Finding::reject(
                     Problem::TorqueOffset,
                     &[joint],
                     "tau",
@@ -136,7 +131,7 @@ fn offsets<const N: usize>(
                     ),
                     format!("subtract {offset:.2} N m, or zero the torque sensor or the current"),
                 )
-                .with(Consequence::Stop),
+                .with(Consequence::Reject),
             );
         }
     }
