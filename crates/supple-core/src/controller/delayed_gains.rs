@@ -5,7 +5,7 @@ use super::checks::DAMPING_MARGIN;
 use super::mode::Refusal;
 use super::pose_task::DIRECTIONS;
 use super::state::State;
-use crate::config::{Gains, JointGains, Role, RotationalGains};
+use crate::config::{Gains, JointGains, Role};
 use crate::law::impedance::Task;
 use crate::math::linalg::Cholesky;
 use crate::math::{Matrix, Matrix3, Vector, sqrt};
@@ -32,33 +32,39 @@ impl<const N: usize> State<N> {
         )
     }
 
-    /// The same for linear and rotational damping together.
+    /// The same for linear and rotational damping together, each pair of matrices about the base axes.
     pub(super) fn check_pose_damping(
         &self,
         controller: &Controller<N>,
-        gains: &Gains,
-        rotational: &RotationalGains,
+        linear: &[Matrix3<f64>],
+        rotational: &[Matrix3<f64>],
     ) -> Result<(), Refusal> {
         let Some(mass) = Cholesky::new(&self.terms.mass_matrix) else {
             return Ok(());
         };
         let roles = &controller.config().roles;
-        let damping = |k: usize| match k {
-            0..3 => gains.damping_n_s_per_m[k],
-            _ => rotational.damping_nm_s_per_rad[k - 3],
-        };
-        // The Jacobian of the active joints, each direction weighted by the root of its damping.
-        let weighted = Matrix::<DIRECTIONS, N>::from_fn(|k, joint| match roles[joint] {
-            Role::Active => sqrt(damping(k)) * self.terms.jacobian[(k, joint)],
+        let active = Matrix::<DIRECTIONS, N>::from_fn(|k, joint| match roles[joint] {
+            Role::Active => self.terms.jacobian[(k, joint)],
             Role::Held { .. } => 0.0,
         });
-        // Upper bound of the fastest damping rate, at most sqrt(6) times too large.
-        let rate_per_s = sqrt((weighted * mass.solve(&weighted.transpose())).norm_squared());
-        within_delay(
-            "rotational damping_nm_s_per_rad, with damping_n_s_per_m, at the delay of this loop",
-            rotational.damping_nm_s_per_rad.max(),
-            rate_per_s * controller.delay_s(),
-        )
+        let mobility = active * mass.solve(&active.transpose());
+        for linear in linear {
+            for rotational in rotational {
+                let mut damping = Matrix::<DIRECTIONS, DIRECTIONS>::zeros();
+                damping.fixed_view_mut::<3, 3>(0, 0).copy_from(linear);
+                damping.fixed_view_mut::<3, 3>(3, 3).copy_from(rotational);
+                // Root of the sum of the squared eigenvalues of both: an upper bound of the fastest damping rate, at most
+                // sqrt(6) times too large.
+                let rates = damping * mobility;
+                let rate_per_s = sqrt((rates * rates).trace().max(0.0));
+                within_delay(
+                    "rotational damping_nm_s_per_rad, with damping_n_s_per_m, at the delay of this loop",
+                    rotational.diagonal().max(),
+                    rate_per_s * controller.delay_s(),
+                )?;
+            }
+        }
+        Ok(())
     }
 
     /// The same for damping at the active joints.

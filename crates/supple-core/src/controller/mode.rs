@@ -1,5 +1,6 @@
 //! Modes, the requests that change them, and why a request is refused.
 
+use super::pose_gains::{GainAxes, GainMatrices, GainPart};
 use super::words::{JointLabel, NamesJoints};
 use crate::config::{Gains, JointGains, RotationalGains};
 use crate::math::{Vector, Vector3};
@@ -127,7 +128,7 @@ pub enum Request<const N: usize> {
     Excite(Fourier<N>),
     /// Measures the breakaway torque of a joint.
     Breakaway(Breakaway),
-    /// Changes the gains linearly over `ramp_s`.
+    /// Changes the gains linearly over `ramp_s`, those of the pose mode to the same diagonal matrices about the base axes.
     Gains {
         /// Final gains.
         gains: Gains,
@@ -160,10 +161,22 @@ pub enum Request<const N: usize> {
         /// Of its orientation.
         rotation: Rotation,
     },
-    /// Changes the gains of the tip's orientation linearly over `ramp_s`.
+    /// Changes the gains of the tip's orientation linearly over `ramp_s` to diagonal matrices about the base axes.
     RotationalGains {
         /// Final gains.
         gains: RotationalGains,
+        /// Ramp time \[s\], zero or more.
+        ramp_s: f64,
+    },
+    /// Changes the gains of the pose mode linearly over `ramp_s`, to matrices about the axes of the base or of the tip. Linear
+    /// gains of the other modes are not changed. Only for arms with six or more active joints.
+    GainMatrices {
+        /// Directions that change.
+        part: GainPart,
+        /// Final gains: symmetric, positive semi-definite, the eigenvalues within the limits of stiffness and damping.
+        gains: GainMatrices,
+        /// Axes of the matrices.
+        axes: GainAxes,
         /// Ramp time \[s\], zero or more.
         ramp_s: f64,
     },

@@ -178,6 +178,8 @@ cycle! {
         /// breakaway joint, rate_nm_per_s, stop_rad, limit_nm
         /// track_pose  axis, angle_rad, duration_s of the rotation, then the values of the trajectory
         /// rotational_gains  stiffness_nm_per_rad, damping_nm_s_per_rad, ramp_s
+        /// gain_matrices  part (0 linear, 1 rotational), stiffness and damping as xx, yy, zz, yz, zx, xy,
+        ///           axes (0 base, 1 tip), ramp_s
         /// gains     stiffness_n_per_m, damping_n_s_per_m, ramp_s
         /// learning  0 off, 1 on, 2 reset
         /// learned_parameters  viscous_nm_s_per_rad (N), coulomb_nm (N), offset_nm (N), torque_scale (N), payload_kg,
@@ -213,17 +215,17 @@ cycle! {
             of_orientation(output, |orientation| rotation_vector(&orientation.base_from_tip));
         /// Rotation from the tip to that reference: axis times angle, base axes \[rad\].
         vector rotation_error_rad = of_orientation(output, |orientation| orientation.error_rad);
-        /// Stiffness `K` in force \[N/m\].
+        /// Stiffness `K` in force \[N/m\]; in the pose mode the diagonal of its matrix, in the axes of the request.
         vector stiffness_n_per_m = output.gains.stiffness_n_per_m.into();
-        /// Damping `B` in force \[N s/m\].
+        /// Damping `B` in force \[N s/m\]; as the stiffness.
         vector damping_n_s_per_m = output.gains.damping_n_s_per_m.into();
         /// Stiffness of the joint impedance mode in force \[N m/rad\].
         joints joint_stiffness_nm_per_rad = output.joint_gains.stiffness_nm_per_rad;
         /// Damping of the joint impedance mode in force \[N m s/rad\].
         joints joint_damping_nm_s_per_rad = output.joint_gains.damping_nm_s_per_rad;
-        /// Rotational stiffness of the pose mode in force \[N m/rad\].
+        /// Rotational stiffness of the pose mode in force \[N m/rad\]: the diagonal of its matrix, in the axes of the request.
         vector rotational_stiffness_nm_per_rad = output.rotational_gains.stiffness_nm_per_rad.into();
-        /// Rotational damping of the pose mode in force \[N m s/rad\].
+        /// Rotational damping of the pose mode in force \[N m s/rad\]; as the stiffness.
         vector rotational_damping_nm_s_per_rad = output.rotational_gains.damping_nm_s_per_rad.into();
         /// Learned change of the viscous friction \[N m s/rad\].
         joints learned_viscous_nm_s_per_rad = output.learned.viscous_nm_s_per_rad;

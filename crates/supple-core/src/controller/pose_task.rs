@@ -7,9 +7,9 @@ use super::checks::DAMPING_MARGIN;
 use super::fault::Fault;
 use super::state::State;
 use super::{Controller, checks};
-use crate::config::Config;
+use crate::config::{Config, Gains, RotationalGains};
 use crate::law::impedance::{LawInput, Task, Torques, impedance};
-use crate::law::target::{PoseGains, PoseReference, PoseTarget, Posture};
+use crate::law::target::{PoseReference, PoseTarget, Posture};
 use crate::math::{Matrix, Matrix3, Vector, Vector3, sqrt};
 use crate::model::pose::{Pose, rotation_vector};
 use crate::trajectory::{OrientationReference, Reference, Rotation};
@@ -101,6 +101,48 @@ impl<const N: usize> State<N> {
         })
     }
 
+    /// Orientation of the tip's reference; where it has none, of the tip.
+    pub(super) fn reference_orientation(&self, config: &Config<N>) -> Matrix3<f64> {
+        match &self.activity {
+            Activity::TrackPose {
+                rotation,
+                from_base_from_tip,
+                ..
+            } => {
+                let orientation = rotation.at(from_base_from_tip, self.activity_s(config));
+                orientation.base_from_tip
+            }
+            _ => self.terms.base_from_tip.rotation,
+        }
+    }
+
+    /// Advances the ramps of the pose mode's gains; arms of fewer than six joints have none.
+    #[inline(always)]
+    pub(super) fn advance_pose_gains(&mut self, elapsed_s: f64) {
+        if const { N >= DIRECTIONS } {
+            self.pose_gains.advance(elapsed_s);
+        }
+    }
+
+    /// Rotational gains in force: the diagonals of their matrices. Arms of fewer than six joints have no pose mode, and report
+    /// those of the configuration.
+    #[inline(always)]
+    pub(super) fn rotational_gains(&self, config: &Config<N>) -> RotationalGains {
+        match const { N >= DIRECTIONS } {
+            true => self.pose_gains.rotational_diagonal(),
+            false => config.pose.gains,
+        }
+    }
+
+    /// Gains of the tip's position in force; in the pose mode the diagonals of its matrices.
+    #[inline(always)]
+    pub(super) fn tip_gains(&self) -> Gains {
+        if const { N >= DIRECTIONS } && matches!(self.activity, Activity::TrackPose { .. }) {
+            return self.pose_gains.linear_diagonal();
+        }
+        self.gains.current()
+    }
+
     /// Greatest mobility of the null space \[1/(kg m^2)\]: where the axes of the wrist align, its joints can turn
     /// against each other, and little inertia resists. With one joint more than directions it is exact.
     fn nullspace_mobility(&self, task: &Task<N, DIRECTIONS>) -> f64 {
@@ -114,8 +156,7 @@ impl<const N: usize> State<N> {
             .fold(0.0, f64::max)
     }
 
-    /// The law of the pose: linear gains as for the position, rotational ones, and damping and posture in the null
-    /// space, both weakened together where the delay of the loop does not allow that much damping.
+    /// The law of the pose: linear and rotational gains, and damping and posture in the null space, both weakened together where the delay of the loop does not allow that much damping.
     #[inline(never)]
     pub(super) fn pose_torques(
         &self,
@@ -126,12 +167,7 @@ impl<const N: usize> State<N> {
         let Activity::TrackPose { posture_rad, .. } = &self.activity else {
             return self.safe_torques(controller);
         };
-        let rotational = self.rotational_gains.current();
-        let mut gains = PoseGains::diagonal(
-            &self.gains.current(),
-            &rotational.stiffness_nm_per_rad,
-            &rotational.damping_nm_s_per_rad,
-        );
+        let mut gains = self.pose_gains.in_base(&pose.base_from_tip());
         let tip = self.terms.base_from_tip.translation;
         let limit_n = config.workspace.spring_limit_n(&tip);
         let pull = gains.stiffness_n_per_m * (pose.reference.base_from_tip.translation - tip);

@@ -8,6 +8,7 @@ use super::activity::Activity;
 use super::checks::COMPLIANT_SPEED_SHARE;
 use super::fault::SafeAction;
 use super::mode::{Breakaway, Mode, Refusal, Request};
+use super::pose_gains::{GainAxes, GainMatrices, GainPart, eigenvalue_range, in_base};
 use super::pose_task::DIRECTIONS;
 use super::state::State;
 use super::validate;
@@ -26,6 +27,8 @@ const HELD_TOLERANCE_RAD: f64 = 1e-6;
 const EXCITE_START_RAD: f64 = 0.02;
 /// Fraction of a joint's speed limit up to which an arm counts as stopped at a reset.
 const RESET_SPEED_SHARE: f64 = 0.05;
+/// Rounding of the minimum eigenvalue of a gain matrix, relative to its maximum.
+const MAX_EIGENVALUE_ERROR: f64 = 1e-8;
 /// Longest ramp of gains \[s\].
 const MAX_RAMP_S: f64 = 3600.0;
 /// Maximum joint damping that may be requested, whatever the delay allows \[N m s/rad\].
@@ -59,9 +62,17 @@ impl<const N: usize> State<N> {
             Request::Gains { gains, ramp_s } => {
                 check_gains(config, &gains, ramp_s)?;
                 self.check_damping(controller, task, &gains)?;
-                if mode == Mode::TrackPose {
-                    self.check_pose_damping(controller, &gains, &self.rotational_gains.bound())?;
-                }
+                let matrices =
+                    GainMatrices::diagonal(&gains.stiffness_n_per_m, &gains.damping_n_s_per_m);
+                let enforced = mode == Mode::TrackPose;
+                self.change_matrices(
+                    controller,
+                    GainPart::Linear,
+                    &matrices,
+                    GainAxes::Base,
+                    ramp_s,
+                    enforced,
+                )?;
                 self.gains.change(gains, ramp_s);
             }
             Request::JointGains { gains, ramp_s } => {
@@ -71,8 +82,28 @@ impl<const N: usize> State<N> {
             }
             Request::RotationalGains { gains, ramp_s } => {
                 check_rotational_gains(config, &gains, ramp_s)?;
-                self.check_pose_damping(controller, &self.gains.bound(), &gains)?;
-                self.rotational_gains.change(gains, ramp_s);
+                let matrices = GainMatrices::diagonal(
+                    &gains.stiffness_nm_per_rad,
+                    &gains.damping_nm_s_per_rad,
+                );
+                self.change_matrices(
+                    controller,
+                    GainPart::Rotational,
+                    &matrices,
+                    GainAxes::Base,
+                    ramp_s,
+                    true,
+                )?;
+            }
+            Request::GainMatrices {
+                part,
+                gains,
+                axes,
+                ramp_s,
+            } => {
+                check_pose_joints(config)?;
+                check_gain_matrices(config, part, &gains, ramp_s)?;
+                self.change_matrices(controller, part, &gains, axes, ramp_s, true)?;
             }
             Request::Learning(switch) => self.switch_learning(config, switch),
             Request::LearnedParameters(ref parameters) => {
@@ -118,10 +149,11 @@ impl<const N: usize> State<N> {
                 check_pose_joints(config)?;
                 self.check_trajectory(controller, task, &trajectory)?;
                 check_rotation(config, &rotation)?;
+                let base_from_tip = &self.terms.base_from_tip.rotation;
                 self.check_pose_damping(
                     controller,
-                    &self.gains.bound(),
-                    &self.rotational_gains.bound(),
+                    &self.pose_gains.linear.damping_at_ends(base_from_tip),
+                    &self.pose_gains.rotational.damping_at_ends(base_from_tip),
                 )?;
                 self.check_regular(config)?;
                 self.enter(Activity::TrackPose {
@@ -165,6 +197,37 @@ impl<const N: usize> State<N> {
                 self.enter(self.breakaway_from(controller, ramp));
             }
         }
+        Ok(())
+    }
+
+    /// Starts a ramp of gain matrices; with `check_delay` unless the delay of the loop forbids their damping in this pose.
+    #[inline(never)]
+    fn change_matrices(
+        &mut self,
+        controller: &Controller<N>,
+        part: GainPart,
+        gains: &GainMatrices,
+        axes: GainAxes,
+        ramp_s: f64,
+        check_delay: bool,
+    ) -> Result<(), Refusal> {
+        let base_from_tip = self.reference_orientation(controller.config());
+        if check_delay {
+            let new = [in_base(gains, axes, &base_from_tip).damping];
+            let ramps = &self.pose_gains;
+            match part {
+                GainPart::Linear => {
+                    let rotational = ramps.rotational.damping_at_ends(&base_from_tip);
+                    self.check_pose_damping(controller, &new, &rotational)?;
+                }
+                GainPart::Rotational => {
+                    let linear = ramps.linear.damping_at_ends(&base_from_tip);
+                    self.check_pose_damping(controller, &linear, &new)?;
+                }
+            }
+        }
+        let ramp = self.pose_gains.of(part);
+        ramp.change(gains, axes, ramp_s, &base_from_tip);
         Ok(())
     }
 
@@ -312,6 +375,59 @@ fn check_rotational_gains<const N: usize>(
                     limit: if value < 0.0 { 0.0 } else { limit },
                 });
             }
+        }
+    }
+    check_ramp(ramp_s)
+}
+
+fn check_gain_matrices<const N: usize>(
+    config: &Config<N>,
+    part: GainPart,
+    gains: &GainMatrices,
+    ramp_s: f64,
+) -> Result<(), Refusal> {
+    let (stiffness_limit, damping_limit) = match part {
+        GainPart::Linear => (
+            config.limits.stiffness_n_per_m,
+            config.limits.damping_n_s_per_m,
+        ),
+        GainPart::Rotational => (
+            config.pose.max_stiffness_nm_per_rad,
+            config.pose.max_damping_nm_s_per_rad,
+        ),
+    };
+    for (matrix, entry, limit) in [
+        (
+            &gains.stiffness,
+            "eigenvalue of the stiffness matrix",
+            stiffness_limit,
+        ),
+        (
+            &gains.damping,
+            "eigenvalue of the damping matrix",
+            damping_limit,
+        ),
+    ] {
+        let Some((min, max)) = eigenvalue_range(matrix) else {
+            return Err(Refusal::Value {
+                entry: "asymmetry of a gain matrix",
+                value: (matrix - matrix.transpose()).amax(),
+                limit: 0.0,
+            });
+        };
+        if min < -MAX_EIGENVALUE_ERROR * max {
+            return Err(Refusal::Value {
+                entry,
+                value: min,
+                limit: 0.0,
+            });
+        }
+        if max > limit {
+            return Err(Refusal::Value {
+                entry,
+                value: max,
+                limit,
+            });
         }
     }
     check_ramp(ramp_s)

@@ -3,14 +3,16 @@
 use super::Controller;
 use super::activity::Activity;
 use super::fault::{Fault, SafeAction};
+use super::gain_ramp::GainRamp;
 use super::handover::{Handover, HandoverFrom, REPEATED_CYCLES};
 use super::mode::Mode;
 use super::output::Input;
 use super::plausibility::Plausibility;
+use super::pose_gains::PoseGainRamps;
 use super::position_limits::PositionLimits;
 use super::stopping_motion::StoppingMotion;
 use super::stuck_encoder::StuckEncoders;
-use crate::config::{Config, Gains, JointGains, Role, RotationalGains};
+use crate::config::{Config, Gains, JointGains, Role};
 use crate::controller::estimator::{Estimator, EstimatorGains};
 use crate::controller::latch::Latch;
 use crate::controller::learned_ramp::Learned;
@@ -24,107 +26,6 @@ const HELD_APPROACH_RAD_PER_S: f64 = 0.25;
 /// Plausible deviation of an angle from its prediction, as a multiple of the joint's speed limit:
 /// far above what a joint can move in a cycle, far below the error of a corrupted reply.
 const JUMP_OVER_SPEED_LIMIT: f64 = 20.0;
-
-/// Linear transition between two sets of gains.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct GainRamp<G> {
-    from: G,
-    pub to: G,
-    pub elapsed_s: f64,
-    ramp_s: f64,
-}
-
-/// Gains between which a ramp interpolates.
-pub(super) trait Interpolate: Copy {
-    /// `self` at 0, `to` at 1.
-    fn between(&self, to: &Self, x: f64) -> Self;
-
-    /// The greater of the two, entry by entry.
-    fn max(&self, other: &Self) -> Self;
-}
-
-impl Interpolate for Gains {
-    fn between(&self, to: &Self, x: f64) -> Self {
-        Gains {
-            stiffness_n_per_m: self.stiffness_n_per_m.lerp(&to.stiffness_n_per_m, x),
-            damping_n_s_per_m: self.damping_n_s_per_m.lerp(&to.damping_n_s_per_m, x),
-        }
-    }
-
-    fn max(&self, other: &Self) -> Self {
-        Gains {
-            stiffness_n_per_m: self.stiffness_n_per_m.sup(&other.stiffness_n_per_m),
-            damping_n_s_per_m: self.damping_n_s_per_m.sup(&other.damping_n_s_per_m),
-        }
-    }
-}
-
-impl<const N: usize> Interpolate for JointGains<N> {
-    fn between(&self, to: &Self, x: f64) -> Self {
-        JointGains {
-            stiffness_nm_per_rad: self.stiffness_nm_per_rad.lerp(&to.stiffness_nm_per_rad, x),
-            damping_nm_s_per_rad: self.damping_nm_s_per_rad.lerp(&to.damping_nm_s_per_rad, x),
-        }
-    }
-
-    fn max(&self, other: &Self) -> Self {
-        JointGains {
-            stiffness_nm_per_rad: self.stiffness_nm_per_rad.sup(&other.stiffness_nm_per_rad),
-            damping_nm_s_per_rad: self.damping_nm_s_per_rad.sup(&other.damping_nm_s_per_rad),
-        }
-    }
-}
-
-impl Interpolate for RotationalGains {
-    fn between(&self, to: &Self, x: f64) -> Self {
-        RotationalGains {
-            stiffness_nm_per_rad: self.stiffness_nm_per_rad.lerp(&to.stiffness_nm_per_rad, x),
-            damping_nm_s_per_rad: self.damping_nm_s_per_rad.lerp(&to.damping_nm_s_per_rad, x),
-        }
-    }
-
-    fn max(&self, other: &Self) -> Self {
-        RotationalGains {
-            stiffness_nm_per_rad: self.stiffness_nm_per_rad.sup(&other.stiffness_nm_per_rad),
-            damping_nm_s_per_rad: self.damping_nm_s_per_rad.sup(&other.damping_nm_s_per_rad),
-        }
-    }
-}
-
-impl<G: Interpolate> GainRamp<G> {
-    fn at_rest(gains: G) -> GainRamp<G> {
-        GainRamp {
-            from: gains,
-            to: gains,
-            elapsed_s: 0.0,
-            ramp_s: 0.0,
-        }
-    }
-
-    /// Starts a ramp from the gains in force.
-    pub fn change(&mut self, to: G, ramp_s: f64) {
-        *self = GainRamp {
-            from: self.current(),
-            to,
-            elapsed_s: 0.0,
-            ramp_s,
-        };
-    }
-
-    /// Upper bound, entry by entry, of the gains in force from now on.
-    pub fn bound(&self) -> G {
-        self.current().max(&self.to)
-    }
-
-    /// The gains in force.
-    #[inline(always)]
-    pub fn current(&self) -> G {
-        if self.elapsed_s >= self.ramp_s {
-            return self.to;
-        }
-        self.from.between(&self.to, self.elapsed_s / self.ramp_s)
-    }
-}
 
 /// The complete variable state of a controller. [`State::new`] is idle and has received no arm
 /// state.
@@ -151,7 +52,7 @@ pub struct State<const N: usize> {
     pub(super) dry_direction: Option<Vector<N>>,
     pub(super) gains: GainRamp<Gains>,
     pub(super) joint_gains: GainRamp<JointGains<N>>,
-    pub(super) rotational_gains: GainRamp<RotationalGains>,
+    pub(super) pose_gains: PoseGainRamps,
     pub(super) position_limits: PositionLimits<N>,
     /// Set-points of held joints.
     pub(super) held_setpoint_rad: Vector<N>,
@@ -199,7 +100,7 @@ impl<const N: usize> State<N> {
             dry_direction: None,
             gains: GainRamp::at_rest(config.law.gains),
             joint_gains: GainRamp::at_rest(config.joint_gains),
-            rotational_gains: GainRamp::at_rest(config.pose.gains),
+            pose_gains: PoseGainRamps::at_rest(&config.law.gains, &config.pose.gains),
             position_limits: PositionLimits::new(&config.limits),
             held_setpoint_rad: Vector::zeros(),
             hold_pose: config.hold_pose,

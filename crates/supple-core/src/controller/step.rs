@@ -47,7 +47,7 @@ pub fn step<const N: usize>(
     });
     state.gains.elapsed_s += elapsed_s;
     state.joint_gains.elapsed_s += elapsed_s;
-    state.rotational_gains.elapsed_s += elapsed_s;
+    state.advance_pose_gains(elapsed_s);
     state.update_held_setpoints(controller, elapsed_s);
     if let Err(fault) = state.end_breakaway(config) {
         state.latch_fault(controller, fault);
@@ -166,9 +166,9 @@ pub fn step<const N: usize>(
         tip_velocity_m_per_s: tip_velocity,
         reference,
         orientation: reference.and(pose.as_ref().map(Orientation::new)),
-        gains: state.gains.current(),
+        gains: state.tip_gains(),
         joint_gains: state.joint_gains.current(),
-        rotational_gains: state.rotational_gains.current(),
+        rotational_gains: state.rotational_gains(config),
         learned: state.learned.current.parameters,
         learning: state.learned.on,
         external_torque_nm: state.observer.external_torque_nm(),

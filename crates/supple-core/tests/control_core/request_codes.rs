@@ -6,9 +6,11 @@ use proptest::prelude::*;
 use proptest::strategy::Union;
 use supple_core::codes::{RequestCode, RequestCodeError, VALUES};
 use supple_core::config::{Gains, JointGains, RotationalGains};
-use supple_core::controller::{Breakaway, LearningSwitch, Request, SetPoint};
+use supple_core::controller::{
+    Breakaway, GainAxes, GainMatrices, GainPart, LearningSwitch, Request, SetPoint,
+};
 use supple_core::learned::{JointMap, LearnedParameters, MAP_KNOTS};
-use supple_core::math::Vector3;
+use supple_core::math::{Matrix3, Vector3};
 use supple_core::trajectory::{Arc, Fourier, Line, Probe, Quadrant, Rotation, Sinusoid};
 use supple_core::{Trajectory, Vector};
 
@@ -155,6 +157,30 @@ fn request() -> impl Strategy<Value = Numbered> {
                 ((13, 0), Some(Request::RotationalGains { gains, ramp_s }))
             })
             .boxed(),
+        (
+            prop::array::uniform12(-1e3..1e3),
+            any::<[bool; 2]>(),
+            0.0..9.0,
+        )
+            .prop_map(|(numbers, [rotational, of_tip], ramp_s)| {
+                let [stiffness, damping] = [0, 6].map(|first| symmetric(&numbers[first..]));
+                let request = Request::GainMatrices {
+                    part: if rotational {
+                        GainPart::Rotational
+                    } else {
+                        GainPart::Linear
+                    },
+                    gains: GainMatrices { stiffness, damping },
+                    axes: if of_tip {
+                        GainAxes::Tip
+                    } else {
+                        GainAxes::Base
+                    },
+                    ramp_s,
+                };
+                ((18, 0), Some(request))
+            })
+            .boxed(),
         (0_usize..3)
             .prop_map(|value| {
                 let switches = [
@@ -228,6 +254,14 @@ proptest! {
     }
 }
 
+/// From xx, yy, zz, yz, zx, xy.
+fn symmetric(numbers: &[f64]) -> Matrix3<f64> {
+    let &[xx, yy, zz, yz, zx, xy, ..] = numbers else {
+        panic!("six numbers")
+    };
+    Matrix3::new(xx, xy, zx, xy, yy, yz, zx, yz, zz)
+}
+
 fn decode(
     kind: u8,
     trajectory: u8,
@@ -238,7 +272,12 @@ fn decode(
 
 #[test]
 fn unknown_and_incomplete_codes_are_rejected() {
-    assert_eq!(decode(18, 0, &[]), Err(RequestCodeError::Kind(18)));
+    assert_eq!(decode(19, 0, &[]), Err(RequestCodeError::Kind(19)));
+    for (place, number) in [(0, 2.0), (13, 2.0), (13, 0.5)] {
+        let mut values = [0.0; 15];
+        values[place] = number;
+        assert_eq!(decode(18, 0, &values), Err(RequestCodeError::Whole(number)));
+    }
     for cycle in [-1.0, 0.5, 9.1e15, f64::NAN] {
         let mut values = [0.0; 10];
         values[9] = cycle;

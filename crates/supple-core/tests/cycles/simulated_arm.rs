@@ -3,10 +3,12 @@
 use crate::support::random::{Draws, Random};
 use crate::support::rig::{Rig, probe_at, ramp};
 use supple_core::config::{Gains, JointGains, Role, RotationalGains};
-use supple_core::controller::{Breakaway, LearningSwitch, Mode, Request, SetPoint};
+use supple_core::controller::{
+    Breakaway, GainAxes, GainMatrices, GainPart, LearningSwitch, Mode, Request, SetPoint,
+};
 use supple_core::dynamics::aba;
 use supple_core::learned::{JointMap, LearnedParameters};
-use supple_core::math::Vector3;
+use supple_core::math::{Matrix3, Vector3};
 use supple_core::trajectory::{Arc, Fourier, Line, Quadrant, Rotation, Sinusoid};
 use supple_core::{Config, Input, Output, Trajectory, Vector};
 
@@ -159,6 +161,15 @@ impl<const N: usize> SimulatedArm<N> {
                 },
                 ramp_s: random.number(),
             },
+            21 => Request::GainMatrices {
+                part: [GainPart::Linear, GainPart::Rotational][random.below(2) as usize],
+                gains: GainMatrices {
+                    stiffness: random_matrix(random),
+                    damping: random_matrix(random) * 0.1,
+                },
+                axes: [GainAxes::Base, GainAxes::Tip][random.below(2) as usize],
+                ramp_s: random.number(),
+            },
             26..29 => Request::SetPoint(SetPoint {
                 position_m: tip + Vector3::from(random.joints::<3>(0.02)),
                 velocity_m_per_s: Vector3::from(random.joints::<3>(0.1)),
@@ -238,6 +249,12 @@ fn held_at<const N: usize>(config: &Config<N>, joint: usize) -> Option<f64> {
         Role::Held { position_rad, .. } => Some(position_rad),
         Role::Active => None,
     }
+}
+
+/// Symmetric and mostly positive semi-definite.
+fn random_matrix(random: &mut Random) -> Matrix3<f64> {
+    let root = Matrix3::from_columns(&[random.point(), random.point(), random.point()]);
+    root * root.transpose() - Matrix3::from_diagonal_element(0.01 * random.signed())
 }
 
 fn any_trajectory(random: &mut Random) -> Trajectory {

@@ -2,8 +2,8 @@
 
 use super::values::{RequestCode, RequestCodeError, Rest};
 use crate::config::{Gains, JointGains, RotationalGains};
-use crate::controller::{Breakaway, LearningSwitch, SetPoint};
-use crate::math::Vector;
+use crate::controller::{Breakaway, GainAxes, GainMatrices, GainPart, LearningSwitch, SetPoint};
+use crate::math::{Matrix3, Vector};
 use crate::model::learned::{JointMap, LearnedParameters};
 use crate::trajectory::{Arc, Fourier, Line, Probe, Quadrant, Rotation, Sinusoid};
 
@@ -39,6 +39,7 @@ coded! {
     Gains { stiffness_n_per_m, damping_n_s_per_m }
     JointGains<const N> { stiffness_nm_per_rad, damping_nm_s_per_rad }
     RotationalGains { stiffness_nm_per_rad, damping_nm_s_per_rad }
+    GainMatrices { stiffness, damping }
     Breakaway { joint, rate_nm_per_s, stop_rad, limit_nm }
     SetPoint { position_m, velocity_m_per_s, acceleration_m_per_s2, at_cycle }
     Rotation { axis, angle_rad, duration_s }
@@ -154,22 +155,47 @@ impl Coded for u64 {
     }
 }
 
-/// At the places of their numbers.
-const SWITCHES: [LearningSwitch; 3] = [
-    LearningSwitch::Off,
-    LearningSwitch::On,
-    LearningSwitch::Reset,
-];
+/// Enums without fields: each variant is sent as its place in this list.
+macro_rules! coded_choices {
+    ($($name:ident { $($variant:ident),+ })+) => {$(
+        impl Coded for $name {
+            fn put(&self, to: &mut RequestCode) {
+                const ALL: &[$name] = &[$($name::$variant),+];
+                let place = ALL.iter().position(|choice| choice == self);
+                place.unwrap_or_default().put(to);
+            }
 
-impl Coded for LearningSwitch {
+            fn take(from: &mut Rest<'_>) -> Result<Self, RequestCodeError> {
+                const ALL: &[$name] = &[$($name::$variant),+];
+                let number = u32::take(from)?;
+                let found = ALL.get(number as usize).copied();
+                found.ok_or(RequestCodeError::Whole(f64::from(number)))
+            }
+        }
+    )+};
+}
+
+coded_choices! {
+    LearningSwitch { Off, On, Reset }
+    GainPart { Linear, Rotational }
+    GainAxes { Base, Tip }
+}
+
+/// A symmetric matrix: xx, yy, zz, yz, zx, xy.
+impl Coded for Matrix3<f64> {
     fn put(&self, to: &mut RequestCode) {
-        let place = SWITCHES.iter().position(|switch| switch == self);
-        place.unwrap_or_default().put(to);
+        to.numbers(&[
+            self[(0, 0)],
+            self[(1, 1)],
+            self[(2, 2)],
+            self[(1, 2)],
+            self[(2, 0)],
+            self[(0, 1)],
+        ]);
     }
 
     fn take(from: &mut Rest<'_>) -> Result<Self, RequestCodeError> {
-        let number = u32::take(from)?;
-        let found = SWITCHES.get(number as usize).copied();
-        found.ok_or(RequestCodeError::Whole(f64::from(number)))
+        let [xx, yy, zz, yz, zx, xy] = Coded::take(from)?;
+        Ok(Matrix3::new(xx, xy, zx, xy, yy, yz, zx, yz, zz))
     }
 }

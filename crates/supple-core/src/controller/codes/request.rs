@@ -12,6 +12,7 @@
 //! | joint_gains | `stiffness_nm_per_rad` (N), `damping_nm_s_per_rad` (N), `ramp_s` |
 //! | track_pose | `axis`, `angle_rad`, `duration_s` of the rotation, then those of the trajectory |
 //! | rotational_gains | `stiffness_nm_per_rad`, `damping_nm_s_per_rad`, `ramp_s` |
+//! | gain_matrices | `part` (0 linear, 1 rotational), `stiffness` and `damping` as xx, yy, zz, yz, zx, xy, `axes` (0 base, 1 tip), `ramp_s` |
 //! | learning | 0 off, 1 on, 2 reset |
 //! | learned_parameters | `viscous_nm_s_per_rad` (N), `coulomb_nm` (N), `offset_nm` (N), `torque_scale` (N), `payload_kg`, `payload_moment_kg_m`, `tilt_rad` |
 //! | learned_map | `joint`, `torque_nm` (16 coefficients), `dry_nm` (16) |
@@ -71,6 +72,8 @@ carried_variants! {
     LEARNED_MAP = 16 "learned_map": LearnedMap { joint, map },
     /// Brings the reference of the tip to a point at a given cycle.
     SET_POINT = 17 "set_point": SetPoint(point),
+    /// Changes the gains of the pose mode to matrices.
+    GAIN_MATRICES = 18 "gain_matrices": GainMatrices { part, gains, axes, ramp_s },
 }
 
 carried_variants! {

@@ -6,7 +6,9 @@ use crate::support::property::{check, per_joint};
 use crate::support::rig::{Rig, bent, probe_at};
 use proptest::prelude::*;
 use supple_core::config::{ApparentInertia, Gains, JointGains, RotationalGains};
-use supple_core::controller::{LearningSwitch, Mode, Request, SetPoint};
+use supple_core::controller::{
+    GainAxes, GainMatrices, GainPart, LearningSwitch, Mode, Request, SetPoint,
+};
 use supple_core::learned::{JointMap, LearnedParameters, MAP_KNOTS};
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::trajectory::{Arc, Line, Quadrant, Rotation, Sinusoid};
@@ -146,6 +148,34 @@ fn request_kind<const N: usize>() -> impl Strategy<Value = RequestKind<N>> {
             },
             ramp_s,
         }),
+        (
+            prop::array::uniform9(number()),
+            any::<[bool; 3]>(),
+            number()
+        )
+            .prop_map(|(numbers, [rotational, of_tip, is_symmetric], ramp_s)| {
+                let mut matrix = Matrix3::from_column_slice(&numbers);
+                if is_symmetric {
+                    matrix = matrix * matrix.transpose();
+                }
+                Request::GainMatrices {
+                    part: if rotational {
+                        GainPart::Rotational
+                    } else {
+                        GainPart::Linear
+                    },
+                    gains: GainMatrices {
+                        stiffness: matrix,
+                        damping: matrix,
+                    },
+                    axes: if of_tip {
+                        GainAxes::Tip
+                    } else {
+                        GainAxes::Base
+                    },
+                    ramp_s,
+                }
+            }),
         (prop::collection::vec(number(), N), number()).prop_map(|(target, duration_s)| {
             Request::Move {
                 target_rad: Vector::from_column_slice(&target),

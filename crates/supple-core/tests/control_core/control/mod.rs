@@ -10,6 +10,7 @@ mod delayed_damping;
 mod determinism;
 mod exciting;
 mod faults;
+mod gain_matrices;
 mod gains;
 mod garbage;
 mod holding;

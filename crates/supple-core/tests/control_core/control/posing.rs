@@ -20,7 +20,7 @@ use supple_core::{Arm, Input, Output, Vector};
 
 const AXIS: [f64; 3] = [0.48, -0.6, 0.64];
 
-fn turn(angle_rad: f64, duration_s: f64) -> Rotation {
+pub(super) fn turn(angle_rad: f64, duration_s: f64) -> Rotation {
     Rotation {
         axis: Vector3::from(AXIS),
         angle_rad,
@@ -28,7 +28,7 @@ fn turn(angle_rad: f64, duration_s: f64) -> Rotation {
     }
 }
 
-fn pose(trajectory: Trajectory, rotation: Rotation) -> Request<7> {
+pub(super) fn pose(trajectory: Trajectory, rotation: Rotation) -> Request<7> {
     Request::TrackPose {
         trajectory,
         rotation,
@@ -36,7 +36,7 @@ fn pose(trajectory: Trajectory, rotation: Rotation) -> Request<7> {
 }
 
 /// Without limits that a large error reaches, and with a loop that is fast beside the motions of the arm.
-fn free() -> Config<7> {
+pub(super) fn free() -> Config<7> {
     let mut config = seven_active();
     unlimited(&mut config);
     config.limits.joint_speed_rad_per_s.fill(50.0);
@@ -49,7 +49,7 @@ fn free() -> Config<7> {
     config
 }
 
-fn in_mode(config: Config<7>, q: Vector<7>, request: Request<7>) -> (Rig<7>, Plant<7>) {
+pub(super) fn in_mode(config: Config<7>, q: Vector<7>, request: Request<7>) -> (Rig<7>, Plant<7>) {
     let mut rig = Rig::holding(config, q);
     let mut plant = Plant::at_rest(config.arm, q);
     let output = rig.drive(&mut plant, Some(request), nothing);
@@ -57,7 +57,7 @@ fn in_mode(config: Config<7>, q: Vector<7>, request: Request<7>) -> (Rig<7>, Pla
     (rig, plant)
 }
 
-fn run(
+pub(super) fn run(
     rig: &mut Rig<7>,
     plant: &mut Plant<7>,
     cycles: usize,
