@@ -25,6 +25,9 @@ use crate::trajectory::{
 const HELD_TOLERANCE_RAD: f64 = 1e-6;
 /// Maximum distance of a joint from the start of an excitation \[rad\].
 const EXCITE_START_RAD: f64 = 0.02;
+/// Fraction of a joint's speed limit up to which an arm that falls or sinks with idle drives may be held again: more than
+/// shorted motors let it sink with.
+const ENTRY_SPEED_SHARE: f64 = 0.25;
 /// Fraction of a joint's speed limit up to which an arm counts as stopped at a reset.
 const RESET_SPEED_SHARE: f64 = 0.05;
 /// Rounding of the minimum eigenvalue of a gain matrix, relative to its maximum.
@@ -50,8 +53,11 @@ impl<const N: usize> State<N> {
                 let Activity::Fault(action) = self.activity else {
                     return Err(Refusal::Mode { mode });
                 };
-                if action == SafeAction::GravityHold && self.drives_active {
-                    self.check_at_rest(config)?;
+                match action {
+                    SafeAction::GravityHold if self.drives_active => {
+                        self.check_speed(config, RESET_SPEED_SHARE)?;
+                    }
+                    _ => self.check_speed(config, ENTRY_SPEED_SHARE)?,
                 }
                 self.fault = None;
                 self.enter(match action {
@@ -116,7 +122,12 @@ impl<const N: usize> State<N> {
             Request::Idle if mode == Mode::Fault => self.enter(Activity::Fault(SafeAction::Idle)),
             _ if mode == Mode::Fault => return Err(Refusal::Mode { mode }),
             Request::Idle => self.enter(Activity::Idle),
-            Request::GravityHold => self.enter(Activity::GravityHold),
+            Request::GravityHold => {
+                if mode == Mode::Idle {
+                    self.check_speed(config, ENTRY_SPEED_SHARE)?;
+                }
+                self.enter(Activity::GravityHold);
+            }
             _ if !has_torque => return Err(Refusal::Mode { mode }),
             _ if !self.drives_active => return Err(Refusal::DrivesIdle),
             Request::Move {
@@ -231,14 +242,14 @@ impl<const N: usize> State<N> {
         Ok(())
     }
 
-    /// Refuses to leave the safe action before it has stopped the arm.
-    fn check_at_rest(&self, config: &Config<N>) -> Result<(), Refusal> {
+    /// Refuses to leave a safe action or idle while a joint is faster than this fraction of its speed limit.
+    fn check_speed(&self, config: &Config<N>, share: f64) -> Result<(), Refusal> {
         let velocity = &self.estimator.velocity_rad_per_s;
         for joint in 0..N {
-            let limit = RESET_SPEED_SHARE * config.limits.joint_speed_rad_per_s[joint];
+            let limit = share * config.limits.joint_speed_rad_per_s[joint];
             if abs(velocity[joint]) > limit {
                 return Err(Refusal::Value {
-                    entry: "speed of a joint at a reset [rad/s]",
+                    entry: "speed of a joint before the arm is held [rad/s]",
                     value: abs(velocity[joint]),
                     limit,
                 });

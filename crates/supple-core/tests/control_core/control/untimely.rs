@@ -108,6 +108,51 @@ fn a_reset_of_a_moving_arm_is_refused_with_its_speed() {
 }
 
 /// The torque of a loaded spring must be gone after five times `handover_s` although the same request comes in every cycle.
+/// An arm that falls with idle drives is not caught at speed: neither by gravity hold nor by a reset of a fault that brakes. It is
+/// held again where it is as slow as one that sinks on shorted motors.
+#[test]
+fn an_arm_is_not_held_while_it_falls() {
+    let config = four();
+    let limit = 0.25 * config.limits.joint_speed_rad_per_s[1];
+    for faulty in [false, true] {
+        let (mut rig, mut plant) = struck(config, &Vector::zeros());
+        let request = match faulty {
+            false => rig.drive(&mut plant, Some(Request::Reset), nothing),
+            true => rig.drive(&mut plant, Some(Request::Idle), nothing),
+        };
+        assert_eq!(request.refusal, None);
+        if !faulty {
+            rig.drive(&mut plant, Some(Request::Idle), nothing);
+        }
+        let hold = match faulty {
+            false => Request::GravityHold,
+            true => Request::Reset,
+        };
+        for (speed, accepted) in [(1.2 * limit, false), (0.8 * limit, true)] {
+            for _ in 0..60 {
+                plant.qd = Vector::from([0.0, speed, 0.0, 0.0]);
+                rig.run(&mut plant);
+            }
+            plant.qd = Vector::from([0.0, speed, 0.0, 0.0]);
+            let output = rig.drive(&mut plant, Some(hold), nothing);
+            match output.refusal {
+                None => assert!(accepted, "held at {speed} rad/s"),
+                Some(Refusal::Value {
+                    value,
+                    limit: bound,
+                    ..
+                }) => {
+                    assert!(
+                        !accepted && value > bound && bound == limit,
+                        "{value}, {bound}"
+                    );
+                }
+                other => panic!("{other:?}"),
+            }
+        }
+    }
+}
+
 #[test]
 fn repeated_requests_do_not_keep_the_last_torque() {
     let requests: [fn(&Rig<3>) -> Request<3>; 4] = [
