@@ -399,11 +399,11 @@ pub struct UpArgs {
 /// Arguments of `gains`.
 #[derive(Clone, Debug, Args)]
 pub struct GainsArgs {
-    /// Stiffness for all axes, or X,Y,Z. Default: unchanged.
-    #[arg(long, value_name = "N/M", value_delimiter = ',', value_parser = between(0.0, 1e6))]
+    /// Stiffness for all axes, X,Y,Z, or of the pose mode as a matrix XX,YY,ZZ,YZ,ZX,XY. Default: unchanged.
+    #[arg(long, value_name = "N/M", value_delimiter = ',', allow_hyphen_values = true, value_parser = between(-1e6, 1e6))]
     pub stiffness: Vec<f64>,
-    /// Damping for all axes, or X,Y,Z. Default: unchanged.
-    #[arg(long, value_name = "N S/M", value_delimiter = ',', value_parser = between(0.0, 1e6))]
+    /// Damping for all axes, X,Y,Z, or of the pose mode as a matrix XX,YY,ZZ,YZ,ZX,XY. Default: unchanged.
+    #[arg(long, value_name = "N S/M", value_delimiter = ',', allow_hyphen_values = true, value_parser = between(-1e6, 1e6))]
     pub damping: Vec<f64>,
     /// Stiffness of the joint-impedance mode for all joints, or one value per joint. Default: unchanged.
     #[arg(long, conflicts_with_all = ["stiffness", "damping"], value_name = "N M/RAD", value_delimiter = ',', value_parser = between(0.0, 1e6))]
@@ -411,18 +411,33 @@ pub struct GainsArgs {
     /// Damping of the joint-impedance mode for all joints, or one value per joint. Default: unchanged.
     #[arg(long, conflicts_with_all = ["stiffness", "damping"], value_name = "N M S/RAD", value_delimiter = ',', value_parser = between(0.0, 1e5))]
     pub joint_damping: Vec<f64>,
-    /// Stiffness of the tip's orientation in the pose mode about all axes, or X,Y,Z. Default: unchanged.
-    #[arg(long, conflicts_with_all = ["stiffness", "damping", "joint_stiffness", "joint_damping"], value_name = "N M/RAD", value_delimiter = ',', value_parser = between(0.0, 1e4))]
+    /// Stiffness of the tip's orientation in the pose mode about all axes, X,Y,Z, or as a matrix XX,YY,ZZ,YZ,ZX,XY. Default:
+    /// unchanged.
+    #[arg(long, conflicts_with_all = ["stiffness", "damping", "joint_stiffness", "joint_damping"], value_name = "N M/RAD", value_delimiter = ',', allow_hyphen_values = true, value_parser = between(-1e4, 1e4))]
     pub rotational: Vec<f64>,
-    /// Damping of the tip's orientation in the pose mode about all axes, or X,Y,Z. Default: unchanged.
-    #[arg(long, conflicts_with_all = ["stiffness", "damping", "joint_stiffness", "joint_damping"], value_name = "N M S/RAD", value_delimiter = ',', value_parser = between(0.0, 1e3))]
+    /// Damping of the tip's orientation in the pose mode about all axes, X,Y,Z, or as a matrix XX,YY,ZZ,YZ,ZX,XY. Default:
+    /// unchanged.
+    #[arg(long, conflicts_with_all = ["stiffness", "damping", "joint_stiffness", "joint_damping"], value_name = "N M S/RAD", value_delimiter = ',', allow_hyphen_values = true, value_parser = between(-1e3, 1e3))]
     pub rotational_damping: Vec<f64>,
+    /// Axes of the pose mode's stiffness and damping: of the base, or of the tip, with which the matrices turn. Both must be given.
+    /// Default with a matrix: base.
+    #[arg(long, value_enum, conflicts_with_all = ["joint_stiffness", "joint_damping"])]
+    pub axes: Option<GainAxesName>,
     /// Duration of the ramp to the new gains.
     #[arg(long = "ramp", value_name = "SECONDS", default_value_t = 1.0, value_parser = between(0.0, 3600.0))]
     pub ramp_s: f64,
     /// System to use.
     #[command(flatten)]
     pub system: SystemArgs,
+}
+
+/// Axes of gain matrices.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum GainAxesName {
+    /// Axes of the base.
+    Base,
+    /// Axes of the tip's reference.
+    Tip,
 }
 
 /// What `track` follows.

@@ -1,14 +1,14 @@
 //! What a command requests of a running system, and its reply.
 
 use super::session::OperatorSession;
-use crate::cli::{GainsArgs, ModeArgs, SystemArgs, TrackArgs};
+use crate::cli::{GainAxesName, GainsArgs, ModeArgs, SystemArgs, TrackArgs};
 use core::time::Duration;
 use serde::Serialize;
 use supple_cli::console::{print_json, print_line};
 use supple_cli::exit::Failure;
 use supple_core::config::{Gains, JointGains, RotationalGains};
-use supple_core::controller::{LearningSwitch, Mode, Request};
-use supple_core::math::Vector3;
+use supple_core::controller::{GainAxes, GainMatrices, GainPart, LearningSwitch, Mode, Request};
+use supple_core::math::{Matrix3, Vector3};
 use supple_core::trajectory::Rotation;
 use supple_core::{Trajectory, Vector};
 use supple_ipc::message::{OperatorReply, Telemetry};
@@ -57,6 +57,7 @@ pub(super) enum SystemRequest<'a> {
     Gains(&'a GainsArgs),
     JointGains(&'a GainsArgs),
     RotationalGains(&'a GainsArgs),
+    GainMatrices(&'a GainsArgs),
     Pose(&'a TrackArgs),
 }
 
@@ -111,6 +112,30 @@ impl SystemRequest<'_> {
                 },
                 ramp_s: args.ramp_s,
             },
+            SystemRequest::GainMatrices(args) => {
+                let linear = args.rotational.is_empty() && args.rotational_damping.is_empty();
+                let (part, stiffness, damping) = match linear {
+                    true => (
+                        GainPart::Linear,
+                        matrix("--stiffness", &args.stiffness)?,
+                        matrix("--damping", &args.damping)?,
+                    ),
+                    false => (
+                        GainPart::Rotational,
+                        matrix("--rotational", &args.rotational)?,
+                        matrix("--rotational-damping", &args.rotational_damping)?,
+                    ),
+                };
+                Request::GainMatrices {
+                    part,
+                    gains: GainMatrices { stiffness, damping },
+                    axes: match args.axes {
+                        Some(GainAxesName::Tip) => GainAxes::Tip,
+                        Some(GainAxesName::Base) | None => GainAxes::Base,
+                    },
+                    ramp_s: args.ramp_s,
+                }
+            }
             SystemRequest::Pose(args) => Request::TrackPose {
                 trajectory: Trajectory::Hold(Vector3::from(now.tip_position_m)),
                 rotation: Rotation {
@@ -172,6 +197,19 @@ pub(super) fn axes(
         [all] => Ok(Vector3::repeat(all)),
         [x, y, z] => Ok(Vector3::new(x, y, z)),
         _ => Err(value_count(option, given.len(), "1 or 3, X,Y,Z".to_owned())),
+    }
+}
+
+/// A symmetric matrix of the pose mode: one value for all axes, X,Y,Z, or XX,YY,ZZ,YZ,ZX,XY.
+pub(super) fn matrix(option: &'static str, given: &[f64]) -> Result<Matrix3<f64>, Failure> {
+    match *given {
+        [all] => Ok(Matrix3::from_diagonal_element(all)),
+        [x, y, z] => Ok(Matrix3::from_diagonal(&Vector3::new(x, y, z))),
+        [xx, yy, zz, yz, zx, xy] => Ok(Matrix3::new(xx, xy, zx, xy, yy, yz, zx, yz, zz)),
+        _ => {
+            let expected = "1, 3 or 6, XX,YY,ZZ,YZ,ZX,XY, for stiffness and damping";
+            Err(value_count(option, given.len(), expected.to_owned()))
+        }
     }
 }
 

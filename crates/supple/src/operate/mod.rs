@@ -122,14 +122,22 @@ pub fn reset(system: &SystemArgs) -> Result<(), Failure> {
 }
 
 /// Runs `supple gains`: changes stiffness and damping along a ramp, of the tip, or of the joints or the tip's orientation
-/// where their gains are given. Gains that are not given are unchanged.
+/// where their gains are given. Gains that are not given are unchanged; matrices are given as pairs of stiffness and damping.
 ///
 /// # Errors
 /// [`Failure`].
 pub fn gains(args: &GainsArgs) -> Result<(), Failure> {
     let of_joints = !(args.joint_stiffness.is_empty() && args.joint_damping.is_empty());
     let of_orientation = !(args.rotational.is_empty() && args.rotational_damping.is_empty());
+    let of_tip = [
+        &args.stiffness,
+        &args.damping,
+        &args.rotational,
+        &args.rotational_damping,
+    ];
+    let as_matrices = args.axes.is_some() || of_tip.iter().any(|values| values.len() == 6);
     let request = match (of_joints, of_orientation) {
+        (false, _) if as_matrices => SystemRequest::GainMatrices(args),
         (true, _) => SystemRequest::JointGains(args),
         (false, true) => SystemRequest::RotationalGains(args),
         (false, false) => SystemRequest::Gains(args),
@@ -259,10 +267,31 @@ pub fn stop(system: &SystemArgs) -> Result<(), Failure> {
 
 #[cfg(test)]
 mod tests {
-    use super::axes;
+    use super::ask::{axes, matrix};
     use supple_cli::exit::Failure;
 
     const NOW: [f64; 3] = [1.0, 2.0, 3.0];
+
+    #[test]
+    fn matrices_are_symmetric_and_need_both_parts() {
+        let of_six = matrix("--stiffness", &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]).expect("a matrix");
+        assert_eq!(of_six, of_six.transpose());
+        assert_eq!(
+            [of_six[(1, 2)], of_six[(0, 2)], of_six[(0, 1)]],
+            [4.0, 5.0, 6.0]
+        );
+        assert_eq!(
+            matrix("--damping", &[2.0])
+                .expect("all axes")
+                .diagonal()
+                .min(),
+            2.0
+        );
+        for given in [&[][..], &[1.0, 2.0], &[1.0; 9]] {
+            let refused = matrix("--damping", given).expect_err("no matrix");
+            assert!(refused.to_string().contains("--damping"), "{refused}");
+        }
+    }
 
     #[test]
     fn gains_are_one_value_or_one_per_axis() {
