@@ -23,9 +23,8 @@ pub trait Bus {
     /// If the interface or socket fails. Faults that the CAN controller reports are [`Event::Fault`].
     fn receive_until(&mut self, until_ns: u64) -> Result<Option<Event>, BusError>;
 
-    /// As [`Bus::receive_until`], with lookahead: the host promises to send nothing until `frames` more frames
-    /// of other nodes have arrived or `until_ns` is reached. A bus in another process then needs only one
-    /// exchange.
+    /// As [`Bus::receive_until`], with lookahead: the caller must not send until `frames` more frames of other nodes have arrived
+    /// or `until_ns` is reached. An emulated arm in another process can then return all these events in one datagram.
     ///
     /// # Errors
     /// As [`Bus::receive_until`].
@@ -43,13 +42,13 @@ pub trait Bus {
         true
     }
 
-    /// Total time for which the clock of this bus was fallen behind CLOCK_MONOTONIC \[ns\].
+    /// Total time for which the clock of this bus has been paused relative to CLOCK_MONOTONIC since the bus was opened, because the
+    /// machine of an emulated arm stalled \[ns\].
     fn clock_stall_ns(&self) -> u64 {
         0
     }
 
-    /// The machine's monotonic clock at a time of this bus \[ns\]. They differ only for an emulated bus that is
-    /// synchronised to the wall clock.
+    /// CLOCK_MONOTONIC at a time of this bus \[ns\]; in virtual time, which has no such relation, the argument.
     fn monotonic_ns(&self, time_ns: u64) -> u64 {
         time_ns
     }
@@ -100,7 +99,8 @@ pub enum Event {
     Fault(BusFault),
 }
 
-/// The most severe fault that a CAN controller reports in an error frame.
+/// A condition that a CAN controller reports, in ascending order of severity; of several in one error frame the most severe
+/// counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum BusFault {
     /// The controller was restarted after a bus-off.
@@ -111,13 +111,13 @@ pub enum BusFault {
     Warning,
     /// Protocol violation: bit, stuffing or checksum error.
     Protocol,
-    /// The error counters passed the passive limit: The node is error-passive: it no longer sends active error flags.
+    /// The error counters passed the passive limit: the node is error-passive: it no longer sends active error flags.
     Passive,
     /// Frames were lost because they were not read in time.
     Overrun,
     /// Transceiver fault: a wire is open or shorted.
     Transceiver,
-    /// No node acknowledged a frame: there is no other node.
+    /// No node acknowledged a frame: none is powered, connected and at this bit rate, or an emulated bus has no peer process.
     NoAcknowledge,
     /// A frame was not sent in time.
     TransmitTimeout,

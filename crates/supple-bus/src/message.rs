@@ -7,17 +7,17 @@
 //! ```
 //!
 //! A request gives the time to run until, and the frames that the host has sent since the last request, each
-//! with its time. The answer contains the events up to its own time: that of the last event, or the requested
+//! with its time as an entry of the kind [`Event::Sent`]; in an answer this kind confirms a transmission. The answer contains the events up to its own time: that of the last event, or the requested
 //! time if it was reached. `frames` is 0 if the arm must answer at the first event; otherwise the arm answers
-//! after that many frames of other nodes (the host promises to send nothing before). An answer has the sequence
+//! after that many frames of other nodes (the host sends nothing before), or when the datagram is full. An answer has the sequence
 //! number of its request. If the arm is synchronised to the wall clock, the offset is that of the machine's
-//! monotonic clock from the arm's time, and "sent" is the time of sending by that clock.
+//! monotonic clock from the arm's time, and "sent" is the time by that clock at which the datagram was sent.
 
 use crate::bus::Event;
 use crate::can_frame::{CAN_FRAME_BYTES, DecodedFrame, EncodedFrame, FD_FRAME_BYTES};
 use supple_can_frame::CanFrame;
 
-/// Maximum number of entries in a datagram. A bus at 1 Mbit/s carries no more frames in three milliseconds.
+/// Maximum number of entries in a datagram. A classic bus at 1 Mbit/s carries no more frames in three milliseconds.
 pub(crate) const ENTRIES: usize = 64;
 /// Maximum size of a datagram.
 pub(crate) const MAX_BYTES: usize = HEAD_BYTES + ENTRIES * MAX_ENTRY_BYTES;
@@ -42,11 +42,11 @@ pub(crate) enum Kind {
     RunUntil,
     /// Answer: the arm has reached the requested time.
     Reached,
-    /// Answer: the arm has stopped at the last event.
+    /// Answer: the emulated time paused at the last event, before the requested time.
     Stopped,
 }
 
-/// An event on the bus with its time \[ns\]; [`Event::Sent`] in a request is a frame of the host.
+/// An event on the bus with its time \[ns\].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Entry {
     pub time_ns: u64,

@@ -6,8 +6,8 @@ use core::fmt;
 
 const NS_PER_S: u64 = 1_000_000_000;
 
-/// Bit rates of a bus: that of classic frames and of the arbitration, and that of the payload of FD frames with a
-/// bit rate switch.
+/// Bit rates of a bus: the nominal rate (arbitration phase, and classic frames as a whole) and the rate of the data phase (from ESI
+/// to the delimiter of the checksum) of FD frames with a bit rate switch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BitRates {
     /// Nominal rate \[bit/s\], not zero.
@@ -33,7 +33,7 @@ impl BitRates {
         self.data_bit_per_s.is_some()
     }
 
-    /// Format of the frames that use both rates of this bus.
+    /// The fastest format on this bus: FD with a bit rate switch if it has a data rate, else classic.
     pub const fn format(&self) -> FrameFormat {
         if self.has_fd() {
             FrameFormat::Fd {
@@ -44,7 +44,7 @@ impl BitRates {
         }
     }
 
-    /// Duration of these bits \[ns\], rounded up.
+    /// Duration of these bits \[ns\]; each phase is rounded up.
     pub const fn bits_ns(&self, bits: Bits) -> u64 {
         let data_bit_per_s = match self.data_bit_per_s {
             Some(rate) => rate,

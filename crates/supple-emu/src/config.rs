@@ -1,5 +1,5 @@
-//! Configuration of an emulated arm: the factory settings of a real one, each with its default and the source of
-//! that default.
+//! Configuration of an emulated WAM: settings of its pucks and safety module, by default those of Barrett's programs, and
+//! parameters of the emulation.
 
 use supple_puck::status::Role;
 
@@ -9,7 +9,7 @@ pub(crate) const MS: u64 = 1_000_000;
 /// Configuration of a motor puck.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PuckConfig {
-    /// Firmware version; 175 by default, the newest list of property ids.
+    /// Firmware version; 175 by default, which has the newest table of property ids.
     pub version: i32,
     /// Role; a WAM motor with a magnetic encoder by default.
     pub role: Role,
@@ -21,7 +21,7 @@ pub struct PuckConfig {
     pub poles: i32,
     /// Encoder counts per revolution.
     pub counts_per_revolution: i32,
-    /// Groups of the puck, as stored in its EEPROM.
+    /// Multicast groups to which the puck listens, as stored in its EEPROM.
     pub groups: [u8; 3],
     /// Slot in the packed torque frame, from 1.
     pub slot: i32,
@@ -66,8 +66,8 @@ impl PuckConfig {
 pub struct SafetyConfig {
     /// Firmware version; 175 by default.
     pub version: i32,
-    /// Silence of an arm puck after which its positions count as missing \[ns\]; 100 ms by default, the longest
-    /// wait of OWD. The real value is not published.
+    /// If an arm puck sends no position for this long, the safety module makes all motors idle \[ns\]; 100 ms by default, the longest
+    /// receive timeout of OWD (OpenWAM's driver). The real value is not published.
     pub heartbeat_ns: u64,
     /// Time within which the arm must slow down after a velocity fault to avoid an emergency stop \[ns\]; 0.5 s
     /// as documented.
@@ -90,8 +90,7 @@ pub struct EmulatorConfig {
     /// Whether the positions are already known, as after a run of another program: the counts match the joint
     /// angles and ZERO is 1. False by default: the counts start at 0 in any pose.
     pub zeroed: bool,
-    /// Whether a cradle holds the arm in its start pose until the motors first enter torque mode; true by
-    /// default. Otherwise the arm descends against the braking motors from the start.
+    /// Whether a cradle holds the arm in its start pose until any motor enters torque mode; true by default. Otherwise the arm descends against the braking motors from the start.
     pub cradle: bool,
     /// Time between a frame's end and a node's answer to it \[ns\]; 10 us by default, an assumption.
     pub latency_ns: u64,
@@ -100,8 +99,8 @@ pub struct EmulatorConfig {
     /// Time from "set STAT" until a puck is ready \[ns\]; 0.8 s by default, within the 1 s that libbarrett
     /// waits.
     pub wake_ns: u64,
-    /// From this time after "set STAT" until the puck is ready, its transceiver switches off and on, and a frame
-    /// of the host makes the host's controller go bus-off \[ns\]; 0.2 s by default, an assumption.
+    /// From this time after "set STAT" until the puck is ready, its transceiver switches off and on, and every frame of the host in
+    /// this interval makes the host's controller go bus-off \[ns\]; 0.2 s by default, an assumption.
     pub wake_quiet_from_ns: u64,
     /// Time of the bus-off recovery, the interface's `restart-ms` \[ns\]; 100 ms by default.
     pub restart_ns: u64,

@@ -6,11 +6,12 @@ use serde::Serialize;
 use supple_core::nalgebra::Vector3;
 use supple_core::{Arm, ArmError, Body, Config, Friction, Joint};
 
-/// Relative parameter errors of a model. Every parameter is wrong by exactly this fraction; only the sign is random, drawn from
-/// `seed`.
+/// Relative parameter errors of a model. Masses, centres of mass, viscous and dry friction are multiplied by one plus or minus
+/// the fraction; the signs are random, drawn from `seed`, that of Coulomb and breakaway friction of a joint is the same. All other
+/// parameters are exact.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Mismatch {
-    /// Error of the parameters of gravity torques: the mass of every link and every component of its centre of mass.
+    /// Error of the parameters on which gravity torques depend: the mass of every link and every component of its centre of mass.
     pub gravity: f64,
     /// Error of the viscous, Coulomb and breakaway friction of every joint.
     pub friction: f64,

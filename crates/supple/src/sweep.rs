@@ -1,7 +1,7 @@
-//! `supple sweep`: many experiments, run by the Python package, which has the cluster.
+//! `supple sweep`: many experiments, run by the Python package, which distributes them with Dask.
 //!
-//! This process replaces itself with the interpreter (exec). It computes nothing; it is here so that help, completions and
-//! manual pages have the command.
+//! This process replaces itself with the interpreter (exec). [`SweepArgs`] is parsed for validation, help, completions and manual
+//! pages; the Python program parses the same arguments again.
 
 use clap::Args;
 use std::os::unix::process::CommandExt;
@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use supple_cli::exit::Failure;
 use supple_cli::sibling::python;
 
-/// Starts the package's command with the arguments after `sweep`; without the package it reports that, with exit code 10.
+/// Starts the package's command with all arguments, `sweep` included; without the package it reports that, with exit code 10.
 const START: &str = "import sys
 try:
     from supple.__main__ import main
@@ -29,7 +29,7 @@ pub struct SweepArgs {
     /// Number of worker processes on this machine. Default: one per processor.
     #[arg(long, value_name = "N", conflicts_with = "scheduler", value_parser = clap::value_parser!(u16).range(1..))]
     pub workers: Option<u16>,
-    /// Address of the Dask scheduler of a cluster, such as tcp://host:8786. Default: a cluster of this machine, on loopback.
+    /// Address of the Dask scheduler of a cluster, such as tcp://host:8786. Default: a local Dask cluster, on loopback.
     #[arg(long, value_name = "ADDRESS")]
     pub scheduler: Option<String>,
     /// Print the summary as JSON.

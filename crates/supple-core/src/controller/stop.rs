@@ -19,8 +19,8 @@
 //! encoder, a defective motor or a wrong model. The arm *moves* if a joint or the tip is faster than a fifth of its speed limit;
 //! external torques are *strong* if the norm of `tau_i / limit_i` over the joints exceeds a twentieth. The drives brake
 //!
-//! 1. at the fault or in the first milliseconds after it, if the external torques look like those of a missing or reversed
-//!    gravity compensation, see `is_driven_by_weight`. Dead motors, reversed motors and gravity of the wrong sign cause them.
+//! 1. if the fault is one of motion and, at the fault or within the delay of the loop after it, the external torques look like
+//!    those of a missing or reversed gravity compensation, see `is_driven_by_weight`. Dead motors, reversed motors and gravity of the wrong sign cause them.
 //!    Excluded are an obstacle, which takes power from the arm, and an impact, which causes larger torques;
 //! 2. if the arm moves and its kinetic energy exceeds 1.2 times its peak up to the fault, see `stopping_motion.rs`;
 //! 3. if the arm still moves 0.2 s after the fault;
@@ -40,7 +40,7 @@ use crate::math::{Vector, Vector3, abs};
 
 /// Settling time of the velocity estimate after a step in speed, as a multiple of the delay.
 const ESTIMATOR_SETTLING_DELAYS: f64 = 2.0;
-/// Time within which the arm must come to rest \[s\].
+/// Time within which the arm must become slower than a fifth of its speed limits \[s\].
 pub(crate) const STOP_TIMEOUT_S: f64 = 0.2;
 /// Fraction of a joint's torque limit above which an external torque would move a joint at rest.
 const UNEXPLAINED_SHARE: f64 = 0.1;
@@ -48,10 +48,11 @@ const UNEXPLAINED_SHARE: f64 = 0.1;
 const UNEXPLAINED_S: f64 = 0.05;
 /// Time after which an impact and the observer's response to it have decayed \[s\].
 const IMPACT_S: f64 = 0.15;
-/// Ratio of an inertial torque to the largest that reversed motors cause above which it shows an impact. Greater than one,
-/// because a motor before an elastic cable has only a part of the joint's inertia and accelerates faster.
+/// Ratio of an estimated inertial torque to the largest that reversed motors cause above which it is that of an impact. Greater
+/// than one, because a motor behind an elastic cable has only a part of the joint's inertia and accelerates faster.
 const IMPACT_RATIO: f64 = 4.0;
-/// Minimum speed of an arm that its weight drives, as a fraction of the speed limits.
+/// Minimum speed of an arm that its weight drives: the mean over the joints, weighted with the external torques, of the speed as a
+/// fraction of its limit.
 const MIN_SPEED_FRACTION: f64 = 0.05;
 /// Maximum ratio of the external torque to the gravity compensation if that is missing or reversed: two for a reversed one, and
 /// one for the torque that a position loop adds.

@@ -3,7 +3,7 @@
 use supple_can_frame::BitRates;
 use supple_model::{BusDescription, BusFormat, BusMotor};
 
-/// One motor as it left its factory and was set up for the arm.
+/// Registers, mechanical data and initial state of one motor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MotorConfig {
     /// Id that it listens to.
@@ -22,7 +22,7 @@ pub struct MotorConfig {
     pub velocity_range_rad_per_s: f64,
     /// TMAX \[N m\].
     pub torque_range_nm: f64,
-    /// Torque at the greatest current \[N m\]; half of TMAX by default, about the peak torque of the data sheets.
+    /// Torque at the greatest current \[N m\]; 0.7 TMAX by default, about the peak torque of the data sheets.
     pub peak_torque_nm: f64,
     /// Pole pairs.
     pub pole_pairs: u32,
@@ -44,7 +44,7 @@ pub struct MotorConfig {
 }
 
 impl MotorConfig {
-    /// The motor that an arm's file expects.
+    /// A motor that passes the comparison of the start-up with `[bus]`; what the file does not give is assumed.
     pub fn expected(motor: &BusMotor, fd: bool) -> MotorConfig {
         let series = motor.firmware_series.as_deref();
         let series = series.unwrap_or(match &motor.model {
@@ -101,7 +101,7 @@ pub struct DamiaoConfig {
     pub restart_ns: u64,
     /// Step of the physics \[ns\]; 0.2 ms by default.
     pub step_ns: u64,
-    /// Whether frames that write flash are obeyed. False by default: they end the emulation.
+    /// Whether frames that write flash are executed. False by default: such a frame ends the emulation with an error.
     pub allow_flash: bool,
     /// Seed of the jitter.
     pub seed: u64,

@@ -19,7 +19,7 @@ const HELD_OUT_FRACTION: f64 = 0.25;
 const MAX_START_TIME_S: f64 = 0.1;
 /// Minimum range of angles of each joint in a motion that is fitted \[rad\].
 const MIN_RANGE_RAD: f64 = 0.05;
-/// Minimum collision threshold of a joint, as a fraction of the one in the description.
+/// Minimum collision threshold of a joint in the modes with stiff joint loops, as a fraction of the one in the description.
 const MIN_THRESHOLD_FRACTION: f64 = 0.5;
 /// Minimum and maximum ratio of measured to described breakaway torque by which the dry friction is scaled.
 const BREAKAWAY_RATIO_RANGE: (f64, f64) = (0.2, 5.0);
@@ -29,7 +29,7 @@ const AGAINST_TO_DRY_FRICTION: f64 = 1.3;
 /// Weight of the link parameters in the description as a prior, for arms with `[bus]`, in equivalent samples. The motions of
 /// their geared motors contain little information about the inertia.
 const GEARED_PRIOR_WEIGHT: f64 = 100.0;
-/// Prior standard deviation of their rotor inertias, relative to those in the description.
+/// Prior standard deviation of the rotor inertias of such arms, relative to those in the description.
 const GEARED_ROTOR_DEVIATION: f64 = 1.0;
 /// Minimum speed of the samples that are fitted, as a fraction of the peak speed of the slowest joint.
 const MIN_SPEED_FRACTION: f64 = 0.3;
@@ -62,6 +62,7 @@ pub fn read_excitations<const N: usize>(file: &Path) -> Result<Vec<Log>, Procedu
         // A log may begin while the arm rests at the end of an earlier excitation: such a rest is not an excitation.
         let begins = !continues && excited_s.is_some_and(|time_s| time_s < MAX_START_TIME_S);
         if begins || (continues && !rows.is_empty()) {
+            // The compensation of the ripple cancels that of the motor: the joint gets the rest.
             let torque_nm = value.torque_nm - value.torques.ripple;
             rows.push((record.time_ns as f64 * 1e-9, value.position_rad, torque_nm));
         }
@@ -111,7 +112,8 @@ pub fn scale_dry_friction<const N: usize>(
     })?)
 }
 
-/// Reads the motions of a log in the modes `move` and `excite` in which every joint moves; empty if none is long enough.
+/// Reads the motions of a log without contact, of at least 2 s in a mode with a reference, in which every joint moves; empty if
+/// there is none.
 ///
 /// # Errors
 /// A log that cannot be read.
@@ -193,7 +195,7 @@ pub fn fit_all<const N: usize>(
     let present_nm = config.collision.move_joint_torque_nm;
     let mut thresholds = fit.move_collision_nm(&validations, &config);
     for (joint, threshold_nm) in thresholds.iter_mut().enumerate() {
-        // The observer is faster than the filter of the residuals.
+        // The residuals are filtered more than the torques of the collision observer, and do not show its peaks.
         let min_nm = MIN_THRESHOLD_FRACTION * present_nm[joint];
         *threshold_nm = threshold_nm.map(|nm| nm.max(min_nm));
     }

@@ -1,4 +1,4 @@
-//! The thresholds at which the arm stops while its model is unknown.
+//! Lower bounds of the collision and plausibility thresholds during a calibration, so that errors of the model cause no faults.
 //!
 //! Motors that give only a fraction of the commanded torque, and wrong masses, cause an error proportional to gravity. Arms
 //! without brakes also hold their pose by position loops in gravity hold: with a wrong model alone they would sink.
