@@ -419,8 +419,8 @@ pub struct GainsArgs {
     /// unchanged.
     #[arg(long, conflicts_with_all = ["stiffness", "damping", "joint_stiffness", "joint_damping"], value_name = "N M S/RAD", value_delimiter = ',', allow_hyphen_values = true, value_parser = between(-1e3, 1e3))]
     pub rotational_damping: Vec<f64>,
-    /// Axes of the pose mode's stiffness and damping: of the base, or of the tip, with which the matrices turn. Both must be given.
-    /// Default with a matrix: base.
+    /// Axes of the pose mode's stiffness and damping: of the base, or of the tip's reference, with which the matrices turn. Give
+    /// stiffness and damping together. Default with a matrix: base.
     #[arg(long, value_enum, conflicts_with_all = ["joint_stiffness", "joint_damping"])]
     pub axes: Option<GainAxesName>,
     /// Duration of the ramp to the new gains.

@@ -53,8 +53,8 @@ impl<const N: usize> State<N> {
                 let mut damping = Matrix::<DIRECTIONS, DIRECTIONS>::zeros();
                 damping.fixed_view_mut::<3, 3>(0, 0).copy_from(linear);
                 damping.fixed_view_mut::<3, 3>(3, 3).copy_from(rotational);
-                // Root of the sum of the squared eigenvalues of both: an upper bound of the fastest damping rate, at most
-                // sqrt(6) times too large.
+                // Root of the sum of the squared eigenvalues, which are real and not negative: an upper bound of the fastest
+                // damping rate, at most sqrt(6) times too large.
                 let rates = damping * mobility;
                 let rate_per_s = sqrt((rates * rates).trace().max(0.0));
                 within_delay(

@@ -1,12 +1,11 @@
 //! Gains of the pose mode: matrices about the axes of the base or of the tip, with ramps between them.
 //!
-//! Matrices are positive semi-definite, and so is every matrix on the straight line between two of them: the law is passive at
-//! every time of a ramp, while the reference rests.
+//! Matrices are positive semi-definite, and so is every matrix on the straight line between two of them: at no time of a ramp is
+//! a stiffness or a damping negative. A ramp that raises the stiffness adds energy, as with any gains.
 
 use super::gain_ramp::{GainRamp, Interpolate};
 use crate::config::{Gains, RotationalGains};
 use crate::law::target::PoseGains;
-use crate::math::linalg::symmetric_eigenvalues;
 use crate::math::{Matrix3, Vector3};
 
 /// Axes about which the matrices of [`GainMatrices`] are given.
@@ -46,20 +45,18 @@ impl GainMatrices {
         }
     }
 
-    /// The same gains about other axes; `rotation` from the present axes to those.
+    /// The symmetric matrix with the entries xx, yy, zz, yz, zx, xy.
+    pub fn symmetric([xx, yy, zz, yz, zx, xy]: [f64; 6]) -> Matrix3<f64> {
+        Matrix3::new(xx, xy, zx, xy, yy, yz, zx, yz, zz)
+    }
+
+    /// The same gains about other axes; `rotation` maps coordinates in the present axes to coordinates in those.
     fn turned(&self, rotation: &Matrix3<f64>) -> GainMatrices {
         GainMatrices {
             stiffness: rotation * self.stiffness * rotation.transpose(),
             damping: rotation * self.damping * rotation.transpose(),
         }
     }
-}
-
-/// Minimum and maximum eigenvalue of a symmetric matrix; `None` if it is not symmetric or not finite.
-pub(super) fn eigenvalue_range(matrix: &Matrix3<f64>) -> Option<(f64, f64)> {
-    let [min, _, max] = symmetric_eigenvalues(matrix);
-    let usable = *matrix == matrix.transpose() && min.is_finite() && max.is_finite();
-    usable.then_some((min, max))
 }
 
 impl Interpolate for GainMatrices {

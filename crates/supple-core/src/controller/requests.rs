@@ -8,12 +8,13 @@ use super::activity::Activity;
 use super::checks::COMPLIANT_SPEED_SHARE;
 use super::fault::SafeAction;
 use super::mode::{Breakaway, Mode, Refusal, Request};
-use super::pose_gains::{GainAxes, GainMatrices, GainPart, eigenvalue_range, in_base};
+use super::pose_gains::{GainAxes, GainMatrices, GainPart, in_base};
 use super::pose_task::DIRECTIONS;
 use super::state::State;
 use super::validate;
 use crate::config::{Config, Gains, JointGains, Role, RotationalGains};
 use crate::law::impedance::Task;
+use crate::law::target::{EIGENVALUE_ROUNDING, eigenvalue_range};
 use crate::law::task::count_active;
 use crate::math::{Vector, abs, sqrt};
 use crate::trajectory::{
@@ -30,8 +31,6 @@ const EXCITE_START_RAD: f64 = 0.02;
 const ENTRY_SPEED_SHARE: f64 = 0.25;
 /// Fraction of a joint's speed limit up to which an arm counts as stopped at a reset.
 const RESET_SPEED_SHARE: f64 = 0.05;
-/// Rounding of the minimum eigenvalue of a gain matrix, relative to its maximum.
-const MAX_EIGENVALUE_ERROR: f64 = 1e-8;
 /// Longest ramp of gains \[s\].
 const MAX_RAMP_S: f64 = 3600.0;
 /// Maximum joint damping that may be requested, whatever the delay allows \[N m s/rad\].
@@ -419,6 +418,13 @@ fn check_gain_matrices<const N: usize>(
             damping_limit,
         ),
     ] {
+        if let Some(value) = matrix.iter().find(|value| !value.is_finite()) {
+            return Err(Refusal::Value {
+                entry: "entry of a gain matrix",
+                value: *value,
+                limit,
+            });
+        }
         let Some((min, max)) = eigenvalue_range(matrix) else {
             return Err(Refusal::Value {
                 entry: "asymmetry of a gain matrix",
@@ -426,7 +432,7 @@ fn check_gain_matrices<const N: usize>(
                 limit: 0.0,
             });
         };
-        if min < -MAX_EIGENVALUE_ERROR * max {
+        if min < -EIGENVALUE_ROUNDING * max {
             return Err(Refusal::Value {
                 entry,
                 value: min,

@@ -20,8 +20,8 @@
 //! external torques are *strong* if the norm of `tau_i / limit_i` over the joints exceeds a twentieth. The drives brake
 //!
 //! 1. if the fault is one of motion and, at the fault or within the delay of the loop after it, the external torques look like
-//!    those of a missing or reversed gravity compensation, see `is_driven_by_weight`. Dead motors, reversed motors and gravity of the wrong sign cause them.
-//!    Excluded are an obstacle, which takes power from the arm, and an impact, which causes larger torques;
+//!    those of a missing or reversed gravity compensation, see `is_driven_by_weight`. Dead motors, reversed motors and gravity
+//!    of the wrong sign cause them. Excluded are an obstacle, which takes power from the arm, and an impact, which causes larger torques;
 //! 2. if the arm moves and its kinetic energy exceeds 1.2 times its peak up to the fault, see `stopping_motion.rs`;
 //! 3. if the arm still moves 0.2 s after the fault;
 //! 4. if an external torque above a tenth of a joint's limit acts for 50 ms, either later than 0.15 s after the fault or at a

@@ -152,10 +152,19 @@ impl PoseGains {
         ]
         .into_iter()
         .all(|gain| {
-            let [min, _, max] = symmetric_eigenvalues(gain);
-            max.is_finite() && *gain == gain.transpose() && min >= -1e-8 * max
+            eigenvalue_range(gain).is_some_and(|(min, max)| min >= -EIGENVALUE_ROUNDING * max)
         })
     }
+}
+
+/// Rounding of the minimum eigenvalue of a gain matrix, relative to its maximum.
+pub(crate) const EIGENVALUE_ROUNDING: f64 = 1e-8;
+
+/// Minimum and maximum eigenvalue of a symmetric matrix; `None` if it is not symmetric or not finite.
+pub(crate) fn eigenvalue_range(matrix: &Matrix3<f64>) -> Option<(f64, f64)> {
+    let [min, _, max] = symmetric_eigenvalues(matrix);
+    let usable = *matrix == matrix.transpose() && min.is_finite() && max.is_finite();
+    usable.then_some((min, max))
 }
 
 /// Target of the tip's pose.

@@ -205,7 +205,7 @@ pub(super) fn matrix(option: &'static str, given: &[f64]) -> Result<Matrix3<f64>
     match *given {
         [all] => Ok(Matrix3::from_diagonal_element(all)),
         [x, y, z] => Ok(Matrix3::from_diagonal(&Vector3::new(x, y, z))),
-        [xx, yy, zz, yz, zx, xy] => Ok(Matrix3::new(xx, xy, zx, xy, yy, yz, zx, yz, zz)),
+        [xx, yy, zz, yz, zx, xy] => Ok(GainMatrices::symmetric([xx, yy, zz, yz, zx, xy])),
         _ => {
             let expected = "1, 3 or 6, XX,YY,ZZ,YZ,ZX,XY, for stiffness and damping";
             Err(value_count(option, given.len(), expected.to_owned()))

@@ -195,7 +195,6 @@ impl Coded for Matrix3<f64> {
     }
 
     fn take(from: &mut Rest<'_>) -> Result<Self, RequestCodeError> {
-        let [xx, yy, zz, yz, zx, xy] = Coded::take(from)?;
-        Ok(Matrix3::new(xx, xy, zx, xy, yy, yz, zx, yz, zz))
+        Coded::take(from).map(GainMatrices::symmetric)
     }
 }

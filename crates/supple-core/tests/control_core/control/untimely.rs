@@ -116,11 +116,12 @@ fn an_arm_is_not_held_while_it_falls() {
     let limit = 0.25 * config.limits.joint_speed_rad_per_s[1];
     for faulty in [false, true] {
         let (mut rig, mut plant) = struck(config, &Vector::zeros());
-        let request = match faulty {
-            false => rig.drive(&mut plant, Some(Request::Reset), nothing),
-            true => rig.drive(&mut plant, Some(Request::Idle), nothing),
+        let first = match faulty {
+            false => Request::Reset,
+            true => Request::Idle,
         };
-        assert_eq!(request.refusal, None);
+        let output = rig.drive(&mut plant, Some(first), nothing);
+        assert_eq!(output.refusal, None);
         if !faulty {
             rig.drive(&mut plant, Some(Request::Idle), nothing);
         }
