@@ -18,6 +18,7 @@ pub(super) trait Interpolate: Copy {
 }
 
 impl Interpolate for Gains {
+    #[inline(always)]
     fn between(&self, to: &Self, x: f64) -> Self {
         Gains {
             stiffness_n_per_m: self.stiffness_n_per_m.lerp(&to.stiffness_n_per_m, x),
@@ -27,6 +28,7 @@ impl Interpolate for Gains {
 }
 
 impl<const N: usize> Interpolate for JointGains<N> {
+    #[inline(always)]
     fn between(&self, to: &Self, x: f64) -> Self {
         JointGains {
             stiffness_nm_per_rad: self.stiffness_nm_per_rad.lerp(&to.stiffness_nm_per_rad, x),

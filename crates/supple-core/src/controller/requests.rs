@@ -38,6 +38,7 @@ const MAX_JOINT_DAMPING_NM_S_PER_RAD: f64 = 1e5;
 
 impl<const N: usize> State<N> {
     /// Carries out a request, or returns why it is refused.
+    #[inline(never)]
     pub(super) fn request(
         &mut self,
         controller: &Controller<N>,
@@ -242,6 +243,8 @@ impl<const N: usize> State<N> {
     }
 
     /// Refuses to leave a safe action or idle while a joint is faster than this fraction of its speed limit.
+    #[cold]
+    #[inline(never)]
     fn check_speed(&self, config: &Config<N>, share: f64) -> Result<(), Refusal> {
         let velocity = &self.estimator.velocity_rad_per_s;
         for joint in 0..N {
@@ -390,6 +393,8 @@ fn check_rotational_gains<const N: usize>(
     check_ramp(ramp_s)
 }
 
+#[cold]
+#[inline(never)]
 fn check_gain_matrices<const N: usize>(
     config: &Config<N>,
     part: GainPart,
