@@ -32,7 +32,10 @@ pub fn remedy(kind: u8) -> &'static str {
         fault::TORQUE_NOT_FINITE => {
             "This is a bug in supple, or an invalid description: keep the log and report it."
         }
-        fault::ENCODER_JUMP | fault::ENCODER_STUCK | fault::ENCODER_UNRELIABLE => {
+        fault::ENCODER_JUMP
+        | fault::ENCODER_STUCK
+        | fault::ENCODER_UNMOVED
+        | fault::ENCODER_UNRELIABLE => {
             "Check the encoder of this joint and its cable before the arm moves again, then reset."
         }
         fault::JOINT_TRACKING_ERROR => {

@@ -1,6 +1,12 @@
 //! Where the encoders are: on the motors. One that sticks shows wrong angles of all joints that its motor drives.
 
-use crate::math::{Matrix, Vector};
+use crate::config::Config;
+use crate::math::{Matrix, Vector, abs};
+
+/// Dry friction that may hold a motor at rest, as a multiple of what the model knows.
+const DRY_FRICTION_RATIO: f64 = 1.5;
+/// Error of the model at rest, as a fraction of a motor's torque limit.
+const MODEL_ERROR_SHARE: f64 = 0.03;
 
 /// The angles that the encoders see, each in radians of the joint that turns its motor most.
 #[derive(Clone, Copy, Debug)]
@@ -12,6 +18,8 @@ pub struct Encoders<const N: usize> {
     joint: [usize; N],
     /// Whether a motor (second index) drives a joint.
     drives: [[bool; N]; N],
+    /// The angles of the joints from those of the encoders.
+    to_joint: Matrix<N, N>,
 }
 
 impl<const N: usize> Encoders<N> {
@@ -30,6 +38,7 @@ impl<const N: usize> Encoders<N> {
                 coupled,
                 joint: core::array::from_fn(|i| i),
                 drives: core::array::from_fn(|joint| core::array::from_fn(|i| i == joint)),
+                to_joint: Matrix::identity(),
             };
         }
         let joint: [usize; N] =
@@ -37,6 +46,9 @@ impl<const N: usize> Encoders<N> {
         Encoders {
             from_joint: Matrix::from_fn(|motor, i| {
                 motor_from_joint[(motor, i)] / motor_from_joint[(motor, joint[motor])]
+            }),
+            to_joint: Matrix::from_fn(|i, motor| {
+                joint_from_motor[(i, motor)] * motor_from_joint[(motor, joint[motor])]
             }),
             coupled,
             joint,
@@ -56,6 +68,27 @@ impl<const N: usize> Encoders<N> {
     /// The same of one encoder.
     pub(super) fn of_joints_at(&self, encoder: usize, joints: &Vector<N>) -> f64 {
         (self.from_joint.row(encoder) * joints)[0]
+    }
+
+    /// Torque on the motor of an encoder, which does the same work on its angle as the torques on the joints on theirs.
+    pub(super) fn torque_at(&self, encoder: usize, joints_nm: &Vector<N>) -> f64 {
+        self.to_joint.column(encoder).dot(joints_nm)
+    }
+
+    /// External torque on the motor of each encoder, as of [`Encoders::torque_at`], above which dry friction does not hold it
+    /// \[N m\]. It includes an error of the model.
+    pub(super) fn held_nm(&self, config: &Config<N>, motor_from_joint: &Matrix<N, N>) -> Vector<N> {
+        let dry_nm = Vector::from_fn(|joint, _| config.friction[joint].dry_size_nm(0.0));
+        let limits = &config.limits;
+        Vector::from_fn(|encoder, _| {
+            let joint = self.joint[encoder];
+            let limit_nm = match self.coupled {
+                true => limits.motor_torque_nm[encoder] * abs(motor_from_joint[(encoder, joint)]),
+                false => limits.joint_torque_nm[joint],
+            };
+            let dry_nm = self.to_joint.column(encoder).abs().dot(&dry_nm);
+            DRY_FRICTION_RATIO * dry_nm + MODEL_ERROR_SHARE * limit_nm
+        })
     }
 
     /// The joint that turns the motor of an encoder most.

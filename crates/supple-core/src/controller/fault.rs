@@ -115,6 +115,16 @@ pub enum Fault {
         /// Limit \[rad\].
         limit_rad: f64,
     },
+    /// The encoder of a joint's motor does not change although the external torque on the motor, as observed, is more than dry
+    /// friction holds, or that of a collision.
+    EncoderUnmoved {
+        /// Joint index.
+        joint: usize,
+        /// Magnitude of the torque, at the joint that the motor turns most \[N m\].
+        value_nm: f64,
+        /// Limit \[N m\].
+        limit_nm: f64,
+    },
     /// Encoder replies of a joint are lost too often, though never twice in a row.
     EncoderUnreliable {
         /// Joint index.
@@ -185,6 +195,7 @@ impl Fault {
             Fault::EncoderLost { .. }
             | Fault::EncoderJump { .. }
             | Fault::EncoderStuck { .. }
+            | Fault::EncoderUnmoved { .. }
             | Fault::EncoderUnreliable { .. }
             | Fault::MotionAgainstTorque { .. }
             | Fault::UnmodelledLoad { .. }
@@ -284,6 +295,15 @@ impl NamesJoints for Fault {
                 f,
                 "encoder of {} is unchanged while the joint should have moved {value_rad:.4} rad, \
                  limit {limit_rad:.4} rad",
+                label(joint)
+            ),
+            Fault::EncoderUnmoved {
+                joint,
+                value_nm,
+                limit_nm,
+            } => write!(
+                f,
+                "encoder of {} is unchanged under an external torque of {value_nm:.2} N m, limit {limit_nm:.2} N m",
                 label(joint)
             ),
             Fault::EncoderUnreliable { joint } => write!(

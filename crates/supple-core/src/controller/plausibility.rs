@@ -4,7 +4,7 @@
 //! |---|---|
 //! | replies lost too often | each lost reply counts as eight received ones; the balance exceeds its limit |
 //! | encoder stuck | see `stuck_encoder.rs` |
-//! | moves against its torque | 20 cycles in which a joint's momentum grows against its net torque; a joint that moves against its breakaway ramp; or see `reversed_encoder.rs` |
+//! | moves against its torque | 20 cycles in which a joint's momentum grows against its net torque, by at least a tenth of what the torque would cause in its own direction; a joint that moves against its breakaway ramp; or see `reversed_encoder.rs` |
 //! | unmodelled load | a force along gravity for 50 ms, in gravity hold or after the end of a move, or while the tip falls away from its reference |
 //! | collision | the observed external torque or force exceeds its threshold |
 
@@ -15,6 +15,9 @@ use crate::math::{Vector, Vector3, abs, sqrt};
 
 const LOSS_WEIGHT: u32 = 8;
 const AGAINST_CYCLES: u32 = 20;
+/// Smallest growth of a joint's momentum against its net torque, as a fraction of what the torque would cause in its own direction.
+/// A reversed encoder shows all of it; a hand that guides a joint against its friction shows little.
+const GROWTH_SHARE: f64 = 0.1;
 /// Torque that a sudden reversal of a joint needs, as a multiple of the limit of what may oppose its motion.
 const REVERSING_RATIO: f64 = 6.0;
 /// Lags `1 / w` of the velocity estimate within which it follows such a reversal to some hundredths.
@@ -149,9 +152,11 @@ impl<const N: usize> Plausibility<N> {
         }
         for joint in 0..N {
             let limit_nm = limits.torque_nm[joint];
-            let accelerates = change[joint] * momentum[joint] > 0.0;
-            let opposed =
-                net_torque[joint] * momentum[joint] < 0.0 && abs(net_torque[joint]) > limit_nm;
+            let opposing = -net_torque[joint] * momentum[joint];
+            let opposed = opposing > 0.0 && abs(net_torque[joint]) > limit_nm;
+            // By the change of momentum that the net torque would cause.
+            let accelerates =
+                change[joint] * momentum[joint] > GROWTH_SHARE * opposing * elapsed_s;
             if accelerates && opposed {
                 self.opposed_cycles[joint] += 1;
             } else {

@@ -20,6 +20,8 @@ pub struct Controller<const N: usize> {
     /// `j2mp`.
     pub(super) motor_from_joint: Matrix<N, N>,
     encoders: Encoders<N>,
+    /// External torque on the motor of each encoder above which dry friction does not hold it \[N m\].
+    held_nm: Vector<N>,
     pub(super) delay_s: f64,
     /// Number of active joints.
     pub(super) active_joints: usize,
@@ -71,10 +73,12 @@ impl<const N: usize> Controller<N> {
             });
         let delay_s = DELAY_CYCLES * config.period_s + 2.0 / config.estimator_rad_per_s;
         let limits = &config.limits;
+        let encoders = Encoders::new(to_joint, &motor_from_joint);
         Ok(Controller {
+            held_nm: encoders.held_nm(&config, &motor_from_joint),
             learned_bounds: LearnedBounds::new(&config.friction, &limits.joint_torque_nm),
             nullspace_damping_nm_s_per_rad: nullspace_damping_nm_s_per_rad(&config, delay_s),
-            encoders: Encoders::new(to_joint, &motor_from_joint),
+            encoders,
             motor_from_joint,
             groups: MotorGroups::new(&config.joint_from_motor),
             delay_s,
@@ -192,6 +196,11 @@ impl<const N: usize> Controller<N> {
     /// What the encoders see.
     pub(super) fn encoders(&self) -> &Encoders<N> {
         &self.encoders
+    }
+
+    /// External torque on the motor of each encoder above which dry friction does not hold it \[N m\].
+    pub(super) fn held_nm(&self) -> &Vector<N> {
+        &self.held_nm
     }
 
     /// Coupling between motors and joints.

@@ -212,7 +212,7 @@ impl<const N: usize> State<N> {
         (0..N).any(|joint| {
             let torque_nm = abs(external_nm[joint]);
             let strong = UNEXPLAINED_SHARE * limits.joint_torque_nm[joint];
-            torque_nm > strong && (settled || self.stuck_encoders.any_unchanged(encoders, joint))
+            torque_nm > strong && (settled || self.stuck_encoders.any_unchanged_of(encoders, joint))
         })
     }
 }

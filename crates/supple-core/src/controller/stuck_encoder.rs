@@ -4,7 +4,9 @@
 //!
 //! - while the reference of a joint that its motor drives moves, out of contact; less far in modes of joint references if
 //!   the encoder is fine, or all are unchanged;
-//! - while a stiff loop or, by the model, a breakaway ramp would move the joint;
+//! - while the external torque on its motor, as observed, grows beyond what dry friction holds: an encoder that works shows
+//!   what the elasticity of drive, arm and obstacle gives;
+//! - while, by the model, a breakaway ramp would move the joint;
 //! - after it stopped between two cycles: it was fast, or turned with its whole speed in the cycle before.
 
 use super::checks::MOVING_SHARE;
@@ -30,10 +32,9 @@ const SUDDEN_STOP_S: f64 = 0.02;
 const SUDDEN_STOP_SPEED_SHARE: f64 = 0.2;
 /// Cycles with motion that make a contact plausible; encoders that stop one after the other show some.
 const CONTACT_CYCLES: u32 = 5;
-/// Time for which the encoder of a joint in a collision may stay unchanged before it counts as stuck \[s\]; with a stiff
-/// loop that follows a reference, already at this fraction of the threshold of a collision.
+/// Time for which the encoder of a joint may stay unchanged under such a torque, or in a collision, before it counts as stuck
+/// \[s\].
 const UNCHANGED_LIMIT_S: f64 = 0.03;
-const UNCHANGED_TORQUE_SHARE: f64 = 0.5;
 /// Fraction of `stuck_rad` that a joint's reference may travel while its encoder, or none, changes, in modes of joint
 /// references: if all are unchanged, and if it is fine enough to show presliding, as under the torque of a breakaway ramp. At
 /// a few newtons per metre of tip stiffness dry friction may hold all joints at once, or one while others move; the springs
@@ -70,6 +71,8 @@ pub(super) struct StuckEncoders<const N: usize> {
     /// Speed at the last change \[rad/s\], and time since then \[s\].
     speed_rad_per_s: [f64; N],
     unchanged_s: [f64; N],
+    /// External torque on its motor when it stopped \[N m\].
+    external_nm: [f64; N],
     /// Travel of the reference since the last change \[rad\].
     travel_rad: [f64; N],
     /// Speed at which a breakaway ramp would move its joint by the model, since an encoder last changed \[rad/s\].
@@ -93,6 +96,7 @@ impl<const N: usize> Default for StuckEncoders<N> {
             unchanged: [false; N],
             speed_rad_per_s: [0.0; N],
             unchanged_s: [0.0; N],
+            external_nm: [0.0; N],
             travel_rad: [0.0; N],
             ramped_rad_per_s: 0.0,
             ramp_nm: 0.0,
@@ -133,8 +137,13 @@ impl<const N: usize> StuckEncoders<N> {
         })
     }
 
+    /// Whether an encoder is unchanged since the last cycle.
+    pub fn any_unchanged(&self) -> bool {
+        self.unchanged.contains(&true)
+    }
+
     /// Whether an encoder of a joint is unchanged since the last cycle.
-    pub fn any_unchanged(&self, encoders: &Encoders<N>, joint: usize) -> bool {
+    pub fn any_unchanged_of(&self, encoders: &Encoders<N>, joint: usize) -> bool {
         encoders.of(joint).any(|encoder| self.unchanged[encoder])
     }
 
@@ -175,7 +184,7 @@ impl<const N: usize> StuckEncoders<N> {
         if of_joint.any(|encoder| self.min_change_rad[encoder] > FINE_ENCODER_RAD) {
             return 0.0;
         }
-        if self.any_unchanged(encoders, joint) {
+        if self.any_unchanged_of(encoders, joint) {
             let excess_nm = abs(ramp_nm) - (UNSEEN_FRICTION_SHARE * dry_nm).max(self.ramp_nm);
             let moved = |encoder: usize| {
                 abs(self.angle_rad[encoder] - self.begin_rad[encoder]) > PRESLIDING_RAD
@@ -205,7 +214,7 @@ impl<const N: usize> StuckEncoders<N> {
         let limit_rad = FAST_STOP_SHARE * plausible.stuck_rad;
         let last_rad_per_s =
             core::mem::replace(&mut self.last_velocity_rad_per_s, *velocity_rad_per_s);
-        if !self.unchanged.contains(&true) {
+        if !self.any_unchanged() {
             self.unchanged_s = [0.0; N];
             self.travel_rad = [0.0; N];
             return Ok(());
@@ -254,6 +263,42 @@ impl<const N: usize> StuckEncoders<N> {
         }
     }
 
+    /// Reports a stuck encoder if it is unchanged for some time, while the external torque on its motor grows beyond
+    /// `held_nm`, what dry friction holds. A torque that was that large when the encoder stopped may be that of an obstacle.
+    /// After [`StuckEncoders::check_sudden_stop`] of the same cycle.
+    #[inline(never)]
+    pub fn check_torque(
+        &mut self,
+        encoders: &Encoders<N>,
+        plausible: &PlausibilityLimits,
+        external_nm: &Vector<N>,
+        held_nm: &Vector<N>,
+        elapsed_s: f64,
+    ) -> Result<(), Fault> {
+        for encoder in (0..N).filter(|encoder| self.unchanged[*encoder]) {
+            let torque_nm = encoders.torque_at(encoder, external_nm);
+            if self.unchanged_s[encoder] <= elapsed_s {
+                self.external_nm[encoder] = torque_nm;
+            }
+            let stopped_at_nm = self.external_nm[encoder];
+            let (value_nm, limit_nm) = (abs(torque_nm), held_nm[encoder]);
+            let grows = value_nm > limit_nm.max(abs(stopped_at_nm))
+                && abs(torque_nm - stopped_at_nm) > limit_nm;
+            if grows
+                && self.unchanged_s[encoder] > UNCHANGED_LIMIT_S
+                && plausible.stuck_rad < f64::MAX
+            {
+                let joint = encoders.joint(encoder);
+                return Err(Fault::EncoderUnmoved {
+                    joint,
+                    value_nm,
+                    limit_nm,
+                });
+            }
+        }
+        Ok(())
+    }
+
     /// Reports a joint collision as a stuck encoder if no encoder of the joint has changed for some time: both are equally
     /// likely, and gravity compensation from a wrong angle would not hold the arm.
     pub fn as_stuck_encoder(
@@ -262,43 +307,23 @@ impl<const N: usize> StuckEncoders<N> {
         encoders: &Encoders<N>,
         fault: Fault,
     ) -> Fault {
-        let Fault::JointCollision { joint, .. } = fault else {
+        let Fault::JointCollision {
+            joint,
+            value_nm,
+            limit_nm,
+        } = fault
+        else {
             return fault;
         };
         let rests = |encoder: usize| self.unchanged_s[encoder] > UNCHANGED_LIMIT_S;
         if !encoders.of(joint).all(rests) || plausible.stuck_rad == f64::MAX {
             return fault;
         }
-        let travel_rad = encoders.of(joint).map(|encoder| self.travel_rad[encoder]);
-        Fault::EncoderStuck {
+        Fault::EncoderUnmoved {
             joint,
-            value_rad: travel_rad.fold(0.0, f64::max),
-            limit_rad: plausible.stuck_rad,
+            value_nm,
+            limit_nm,
         }
-    }
-
-    /// Reports a stuck encoder if a stiff loop drives a joint whose encoder has been unchanged for some time.
-    pub fn check_driven(
-        &self,
-        plausible: &PlausibilityLimits,
-        encoders: &Encoders<N>,
-        threshold_nm: &Vector<N>,
-        external_nm: &Vector<N>,
-    ) -> Result<(), Fault> {
-        let limit_rad = plausible.stuck_rad;
-        for encoder in 0..N {
-            let (joint, value_rad) = (encoders.joint(encoder), self.travel_rad[encoder]);
-            let driven = value_rad > 0.0 && self.unchanged_s[encoder] > UNCHANGED_LIMIT_S;
-            let strong_nm = UNCHANGED_TORQUE_SHARE * threshold_nm[joint];
-            if driven && abs(external_nm[joint]) > strong_nm && limit_rad < f64::MAX {
-                return Err(Fault::EncoderStuck {
-                    joint,
-                    value_rad,
-                    limit_rad,
-                });
-            }
-        }
-        Ok(())
     }
 
     /// Whether the latched contact is one: encoders have changed in [`CONTACT_CYCLES`] of its cycles.
@@ -321,7 +346,7 @@ impl<const N: usize> StuckEncoders<N> {
         joint_reference: bool,
         elapsed_s: f64,
     ) -> Result<(), Fault> {
-        if !self.unchanged.contains(&true) {
+        if !self.any_unchanged() {
             return Ok(());
         }
         let reference_rad_per_s = encoders.of_joints(reference_rad_per_s);

@@ -295,6 +295,16 @@ impl<const N: usize> State<N> {
                 &config.limits.joint_speed_rad_per_s,
                 evidence.elapsed_s,
             )?;
+            let external_nm = self.observer.external_torque_nm();
+            if stuck.any_unchanged() {
+                stuck.check_torque(
+                    encoders,
+                    &config.plausible,
+                    &external_nm,
+                    controller.held_nm(),
+                    evidence.elapsed_s,
+                )?;
+            }
             let motion = JointMotion {
                 momentum: &self.terms.momentum,
                 velocity_rad_per_s: velocity,
@@ -336,11 +346,6 @@ impl<const N: usize> State<N> {
             self.stuck_encoders
                 .as_stuck_encoder(&config.plausible, encoders, fault)
         })?;
-        if has_loops {
-            let (plausible, threshold_nm) = (&config.plausible, joint_torque_nm);
-            self.stuck_encoders
-                .check_driven(plausible, encoders, threshold_nm, &external)?;
-        }
         if !evidence.regular {
             return Ok(());
         }

@@ -30,7 +30,10 @@ const CONTACT_FAULTS: &[&str] = &[
     "joint_tracking_error",
 ];
 /// The same of the joint of a breakaway ramp.
-const RAMP_CONTACT_FAULTS: &[&str] = &extended::<5>(CONTACT_FAULTS, "encoder_stuck");
+const RAMP_CONTACT_FAULTS: &[&str] = &extended::<6>(
+    &extended::<5>(CONTACT_FAULTS, "encoder_stuck"),
+    "encoder_unmoved",
+);
 /// The same in the pose mode.
 const POSE_CONTACT_FAULTS: &[&str] = &[
     "joint_collision",
@@ -56,6 +59,7 @@ const DISTURBANCE_FAULTS: &[&str] = &[
 /// Valid faults for a stuck encoder.
 const STUCK_ENCODER_FAULTS: &[&str] = &[
     "encoder_stuck",
+    "encoder_unmoved",
     "encoder_unreliable",
     "moves_against_torque",
     "joint_tracking_error",
@@ -81,7 +85,10 @@ pub const WRONG_DIRECTION_FAULTS: &[&str] = &[
     "singular",
 ];
 /// The same for angles that come late: until the delay has built up, they do not change.
-const LATE_ENCODER_FAULTS: &[&str] = &extended::<13>(WRONG_DIRECTION_FAULTS, "encoder_stuck");
+const LATE_ENCODER_FAULTS: &[&str] = &extended::<14>(
+    &extended::<13>(WRONG_DIRECTION_FAULTS, "encoder_stuck"),
+    "encoder_unmoved",
+);
 /// Valid faults for lost, jumping or non-finite joint angles.
 pub const ENCODER_LOSS_FAULTS: &[&str] = &[
     "encoder_lost",
@@ -198,6 +205,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
     use InjectionKind as Kind;
     use TestTask::{
         Breakaway, Excite, Float, GravityHold, JointImpedance, Move, Probe, Track, TrackPose,
+        TrackStiff,
     };
     let mut cases = Vec::new();
     let mut add = |tasks: &[TestTask], event, expected, within_ms| {
@@ -222,7 +230,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
     let one = Some(1);
     let all: Vec<TestTask> = ALL_TASKS
         .into_iter()
-        .chain([TrackPose, Breakaway])
+        .chain([TrackStiff, TrackPose, Breakaway])
         .collect();
     add(
         &all,
@@ -247,7 +255,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         speed_rad_per_s: -1.5,
     });
     add(
-        &[GravityHold, Move, Track],
+        &[GravityHold, Move, Track, TrackStiff],
         bump_back,
         runs_or_faults(DISTURBANCE_FAULTS),
         FAULT_AND_STOP_MS,
@@ -298,7 +306,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         FAULT_AND_STOP_MS,
     );
     add(
-        &[Track, JointImpedance, TrackPose],
+        &[Track, TrackStiff, JointImpedance, TrackPose],
         stuck,
         stops(STUCK_ENCODER_FAULTS),
         LATE_FAULT_AND_STOP_MS,
@@ -317,7 +325,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         FAULT_AND_STOP_MS,
     );
     add(
-        &[Move, Track, JointImpedance, TrackPose],
+        &[Move, Track, TrackStiff, JointImpedance, TrackPose],
         all_stuck,
         stops(STUCK_ENCODER_FAULTS),
         LATE_FAULT_AND_STOP_MS,
@@ -331,11 +339,26 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         FAULT_AND_STOP_MS,
     );
     add(
-        &[Move, Excite, Track, JointImpedance, TrackPose],
+        &[Move, Excite, Track, TrackStiff, JointImpedance, TrackPose],
         motor_stuck,
         stops(STUCK_ENCODER_FAULTS),
         LATE_FAULT_AND_STOP_MS,
     );
+    // Slow, fast and near a reversal: a stiff law drives what it does not see.
+    for motor in [0, 1, 2, 3] {
+        for after_ms in [-600, 300, 700, 1700] {
+            let stuck = Event::Injected {
+                kind: Kind::MotorEncoderStuck { motor },
+                when: When::InTheTask(after_ms),
+            };
+            add(
+                &[TrackStiff],
+                stuck,
+                runs_or_faults(STUCK_ENCODER_FAULTS),
+                LATE_FAULT_AND_STOP_MS,
+            );
+        }
+    }
     let late = injected(Kind::EncoderLate {
         joint: None,
         cycles: 20,
@@ -345,6 +368,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
             GravityHold,
             Move,
             Track,
+            TrackStiff,
             Excite,
             Float,
             JointImpedance,
@@ -363,7 +387,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         LATE_FAULT_AND_STOP_MS,
     );
     add(
-        &[Move, Track, JointImpedance, TrackPose],
+        &[Move, Track, TrackStiff, JointImpedance, TrackPose],
         sign,
         stops(WRONG_DIRECTION_FAULTS),
         LATE_FAULT_AND_STOP_MS,
@@ -383,6 +407,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         &[
             GravityHold,
             Track,
+            TrackStiff,
             Float,
             JointImpedance,
             TrackPose,
@@ -400,6 +425,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         &[
             GravityHold,
             Track,
+            TrackStiff,
             Float,
             JointImpedance,
             TrackPose,
@@ -421,6 +447,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
             GravityHold,
             Move,
             Track,
+            TrackStiff,
             Float,
             JointImpedance,
             TrackPose,
@@ -437,6 +464,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
             Move,
             Excite,
             Track,
+            TrackStiff,
             Float,
             JointImpedance,
             TrackPose,
@@ -465,6 +493,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
             GravityHold,
             Move,
             Track,
+            TrackStiff,
             Float,
             JointImpedance,
             TrackPose,
@@ -482,6 +511,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
             GravityHold,
             Move,
             Track,
+            TrackStiff,
             Float,
             JointImpedance,
             TrackPose,
@@ -512,7 +542,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         LATE_FAULT_AND_STOP_MS,
     );
     add(
-        &[Track],
+        &[Track, TrackStiff],
         injected(payload),
         stops(UNMODELLED_LOAD_TRACKING_FAULTS),
         LATE_FAULT_AND_STOP_MS,
@@ -626,7 +656,7 @@ fn realistic_cases(cases: &[Spec]) -> Vec<Spec> {
     let moving = |spec: &&Spec| {
         matches!(
             spec.task,
-            TestTask::Move | TestTask::Track | TestTask::TrackPose
+            TestTask::Move | TestTask::Track | TestTask::TrackStiff | TestTask::TrackPose
         )
     };
     let chosen = cases.iter().filter(of_motors).filter(moving);

@@ -112,7 +112,7 @@ fn mode_of(task: TestTask) -> Mode {
     match task {
         TestTask::GravityHold => Mode::GravityHold,
         TestTask::Move => Mode::Move,
-        TestTask::Track => Mode::Track,
+        TestTask::Track | TestTask::TrackStiff => Mode::Track,
         TestTask::Probe => Mode::Probe,
         TestTask::Excite => Mode::Excite,
         TestTask::Float => Mode::Float,

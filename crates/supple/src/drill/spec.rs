@@ -15,6 +15,8 @@ pub enum TestTask {
     Move,
     /// The sinusoid of the paper; a downward line if a block is in the way.
     Track,
+    /// The sinusoid at a tip stiffness of 1000 N/m.
+    TrackStiff,
     /// The probing cycle.
     Probe,
     /// A stiff oscillation of the shoulder, with the tip at up to 0.25 m/s.
@@ -196,6 +198,7 @@ impl fmt::Display for TestTask {
             TestTask::GravityHold => "gravity_hold",
             TestTask::Move => "move",
             TestTask::Track => "track",
+            TestTask::TrackStiff => "track_stiff",
             TestTask::Probe => "probe",
             TestTask::Excite => "excite",
             TestTask::Float => "float",

@@ -27,6 +27,8 @@ const TURN_RAD: f64 = 0.4;
 /// Amplitude and angular frequency of the shoulder's oscillation: 0.25 m/s at the tip, which is 0.6 m away.
 const SWING_RAD: f64 = 0.15;
 const SWING_RAD_PER_S: f64 = 2.8;
+/// Stiffness of the stiff track \[N/m\], if the arm allows it: the most that the built-in WAMs do.
+const STIFF_N_PER_M: f64 = 1000.0;
 /// Torque ramp of the breakaway task: its joint still rests at the event \[N m/s\], \[rad\], \[N m\].
 const RAMP_NM_PER_S: f64 = 0.5;
 const RAMP_STOP_RAD: f64 = 0.03;
@@ -76,7 +78,7 @@ pub fn request<const N: usize>(
                 duration_s: DESCENT_S,
             }))
         }
-        TestTask::Track => Request::Track(sinusoid),
+        TestTask::Track | TestTask::TrackStiff => Request::Track(sinusoid),
         TestTask::Probe => Request::Track(trajectory_for(UpTrajectory::Probe, description).0),
         TestTask::TrackPose => pose_motion().request(),
         TestTask::Breakaway => Request::Breakaway(Breakaway {
@@ -115,6 +117,7 @@ pub fn law_force_n<const N: usize>(
         TestTask::Track | TestTask::Probe | TestTask::TrackPose => {
             Some(config.law.gains.stiffness_n_per_m.z * DESCENT_M)
         }
+        TestTask::TrackStiff => Some(stiff_n_per_m(config) * DESCENT_M),
         TestTask::JointImpedance => {
             let down = jacobian(&config.arm, start_rad);
             let springs = &config.joint_gains.stiffness_nm_per_rad;
@@ -126,6 +129,11 @@ pub fn law_force_n<const N: usize>(
         }
         _ => None,
     }
+}
+
+/// Stiffness of the stiff track \[N/m\].
+fn stiff_n_per_m<const N: usize>(config: &Config<N>) -> f64 {
+    STIFF_N_PER_M.min(config.limits.stiffness_n_per_m)
 }
 
 /// Force with which the weight of an arm without torque rests on a block under its tip \[N\], if the shoulder alone gives way.
@@ -186,7 +194,7 @@ impl<const N: usize> Script<N> {
                     TestTask::Move => 0.6,
                     TestTask::JointImpedance => 0.8,
                     TestTask::TrackPose => 1.0,
-                    TestTask::Track | TestTask::Probe => 0.8,
+                    TestTask::Track | TestTask::TrackStiff | TestTask::Probe => 0.8,
                     TestTask::Excite => 0.7,
                     TestTask::Breakaway => 0.5,
                 }),
@@ -229,6 +237,12 @@ impl<const N: usize> Script<N> {
             }
             script.requests.push((script.event_cycle, request));
             return Ok(script);
+        }
+        if spec.task == TestTask::TrackStiff {
+            let gains = scenario::gains_like(&config.law.gains, stiff_n_per_m(config));
+            let request = Request::Gains { gains, ramp_s: 0.0 };
+            // Before the request of the task, of which a cycle takes one.
+            script.requests.push((task_start_cycle - 1, request));
         }
         script
             .requests

@@ -115,6 +115,8 @@ numbered_variants! {
     ROTATION_ERROR = 22 "rotation_error": Fault::RotationError { value_rad, limit_rad } => [NO_JOINT, value_rad, limit_rad],
     /// The pose mode came near a singular pose.
     SINGULAR = 23 "singular": Fault::Singular => [NO_JOINT, 0.0, 0.0],
+    /// The encoder of a joint's motor stays unchanged under a torque that should move it.
+    ENCODER_UNMOVED = 24 "encoder_unmoved": Fault::EncoderUnmoved { joint, value_nm, limit_nm } => [index(joint), value_nm, limit_nm],
 }
 
 numbered_variants! {

@@ -31,5 +31,6 @@ mod set_points;
 mod settings;
 mod stiffness;
 mod stopping;
+mod stuck_encoder;
 mod untimely;
 mod workspace;

@@ -165,3 +165,32 @@ fn a_rebound_from_a_wall_is_no_reversed_encoder() {
         assert!(!is_sudden_reversal(found), "{wall_n_per_m} N/m: {found:?}");
     }
 }
+
+/// Fault if friction opposes joint 1 with `friction_nm` \[N m\] while it speeds up by this much
+/// \[rad/s^2\] for half a second, guided by somebody.
+fn guided(friction_nm: f64, acceleration_rad_per_s2: f64) -> Option<Fault> {
+    let mut config = four();
+    config.plausible.against_share = 0.05;
+    for friction in &mut config.friction {
+        (friction.coulomb_nm, friction.breakaway_nm) = (friction_nm, friction_nm);
+    }
+    let mut rig = Rig::holding(config, bent());
+    let mut speed_rad_per_s = 0.0;
+    (0..500).find_map(|_| {
+        speed_rad_per_s += acceleration_rad_per_s2 * 1e-3;
+        rig.q[0] += speed_rad_per_s * 1e-3;
+        rig.cycle().fault
+    })
+}
+
+/// A hand that guides a joint slowly overcomes its friction; what turns it faster than that, against its torque, is no hand.
+#[test]
+fn a_hand_that_guides_against_friction_is_no_reversed_encoder() {
+    let limit_nm = 0.05 * four().limits.joint_torque_nm[0];
+    assert_eq!(guided(2.0 * limit_nm, 0.1), None);
+    let fault = guided(2.0 * limit_nm, 10.0);
+    assert!(
+        matches!(fault, Some(Fault::MotionAgainstTorque { joint: 0, .. })),
+        "{fault:?}"
+    );
+}
