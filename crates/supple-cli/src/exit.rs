@@ -530,7 +530,8 @@ fn experiment_code(error: &ExperimentError) -> u8 {
         ExperimentError::Model(_)
         | ExperimentError::Arm(_)
         | ExperimentError::Config(_)
-        | ExperimentError::Plant(_) => 3,
+        | ExperimentError::Plant(_)
+        | ExperimentError::Injection(_) => 3,
         ExperimentError::BeyondJointStop { .. }
         | ExperimentError::Refused { .. }
         | ExperimentError::FaultAtStart { .. }

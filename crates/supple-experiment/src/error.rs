@@ -19,6 +19,9 @@ pub enum ExperimentError {
     /// The plant rejects its configuration.
     #[error("the plant: {0}")]
     Plant(#[from] PlantError),
+    /// The simulated arm cannot have an injected fault.
+    #[error("the injected fault: {0}")]
+    Injection(#[from] supple_plant::InjectionError),
     /// The identification failed.
     #[error(transparent)]
     Ident(#[from] supple_ident::IdentError),

@@ -221,6 +221,16 @@ pub struct DrillArgs {
     /// Run only the test cases in virtual time; their results do not depend on the load of the machine.
     #[arg(long)]
     pub virtual_time: bool,
+    /// Instead of the test cases, run this many random ones on a simulated arm: faults of random kinds at random times in
+    /// random tasks and poses, judged by energy and speed alone.
+    #[arg(long, value_name = "COUNT", conflicts_with_all = ["plant", "only", "list", "virtual_time"])]
+    pub random: Option<u64>,
+    /// Seed of the first random case.
+    #[arg(long, value_name = "SEED", default_value_t = 1, requires = "random")]
+    pub seed: u64,
+    /// Random cases with the held joints released, as in the pose mode.
+    #[arg(long, requires = "random")]
+    pub all_joints_active: bool,
     /// Also write the result table as Markdown.
     #[arg(long, value_name = "FILE")]
     pub markdown: Option<PathBuf>,

@@ -6,7 +6,7 @@ use crate::math::{Matrix, Vector, abs};
 /// Dry friction that may hold a motor at rest, as a multiple of what the model knows.
 const DRY_FRICTION_RATIO: f64 = 1.5;
 /// Error of the model at rest, as a fraction of a motor's torque limit.
-const MODEL_ERROR_SHARE: f64 = 0.025;
+const MODEL_ERROR_SHARE: f64 = 0.02;
 
 /// The angles that the encoders see, each in radians of the joint that turns its motor most.
 #[derive(Clone, Copy, Debug)]

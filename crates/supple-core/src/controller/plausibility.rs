@@ -155,8 +155,7 @@ impl<const N: usize> Plausibility<N> {
             let opposing = -net_torque[joint] * momentum[joint];
             let opposed = opposing > 0.0 && abs(net_torque[joint]) > limit_nm;
             // By the change of momentum that the net torque would cause.
-            let accelerates =
-                change[joint] * momentum[joint] > GROWTH_SHARE * opposing * elapsed_s;
+            let accelerates = change[joint] * momentum[joint] > GROWTH_SHARE * opposing * elapsed_s;
             if accelerates && opposed {
                 self.opposed_cycles[joint] += 1;
             } else {

@@ -32,9 +32,10 @@ const SUDDEN_STOP_S: f64 = 0.02;
 const SUDDEN_STOP_SPEED_SHARE: f64 = 0.2;
 /// Cycles with motion that make a contact plausible; encoders that stop one after the other show some.
 const CONTACT_CYCLES: u32 = 5;
-/// Time for which the encoder of a joint may stay unchanged under such a torque, or in a collision, before it counts as stuck
-/// \[s\].
+/// Time for which the encoder of a joint in a collision may stay unchanged before it counts as stuck \[s\].
 const UNCHANGED_LIMIT_S: f64 = 0.03;
+/// The same under a torque that dry friction does not hold: longer than a blow takes to turn the joint by a count.
+const LOADED_LIMIT_S: f64 = 0.02;
 /// Fraction of `stuck_rad` that a joint's reference may travel while its encoder, or none, changes, in modes of joint
 /// references: if all are unchanged, and if it is fine enough to show presliding, as under the torque of a breakaway ramp. At
 /// a few newtons per metre of tip stiffness dry friction may hold all joints at once, or one while others move; the springs
@@ -71,8 +72,9 @@ pub(super) struct StuckEncoders<const N: usize> {
     /// Speed at the last change \[rad/s\], and time since then \[s\].
     speed_rad_per_s: [f64; N],
     unchanged_s: [f64; N],
-    /// External torque on its motor when it stopped \[N m\].
+    /// External torque on its motor when it stopped \[N m\], and time for which it has since been more than friction holds \[s\].
     external_nm: [f64; N],
+    loaded_s: [f64; N],
     /// Travel of the reference since the last change \[rad\].
     travel_rad: [f64; N],
     /// Speed at which a breakaway ramp would move its joint by the model, since an encoder last changed \[rad/s\].
@@ -97,6 +99,7 @@ impl<const N: usize> Default for StuckEncoders<N> {
             speed_rad_per_s: [0.0; N],
             unchanged_s: [0.0; N],
             external_nm: [0.0; N],
+            loaded_s: [0.0; N],
             travel_rad: [0.0; N],
             ramped_rad_per_s: 0.0,
             ramp_nm: 0.0,
@@ -263,8 +266,8 @@ impl<const N: usize> StuckEncoders<N> {
         }
     }
 
-    /// Reports a stuck encoder if it is unchanged for some time, while the external torque on its motor grows beyond
-    /// `held_nm`, what dry friction holds. A torque that was that large when the encoder stopped may be that of an obstacle.
+    /// Reports a stuck encoder if it is unchanged although the external torque on its motor has grown beyond `held_nm`, what dry
+    /// friction holds, for some time. A torque that was that large when the encoder stopped may be that of an obstacle.
     /// After [`StuckEncoders::check_sudden_stop`] of the same cycle.
     #[inline(never)]
     pub fn check_torque(
@@ -278,16 +281,17 @@ impl<const N: usize> StuckEncoders<N> {
         for encoder in (0..N).filter(|encoder| self.unchanged[*encoder]) {
             let torque_nm = encoders.torque_at(encoder, external_nm);
             if self.unchanged_s[encoder] <= elapsed_s {
-                self.external_nm[encoder] = torque_nm;
+                (self.external_nm[encoder], self.loaded_s[encoder]) = (torque_nm, 0.0);
             }
             let stopped_at_nm = self.external_nm[encoder];
             let (value_nm, limit_nm) = (abs(torque_nm), held_nm[encoder]);
             let grows = value_nm > limit_nm.max(abs(stopped_at_nm))
                 && abs(torque_nm - stopped_at_nm) > limit_nm;
-            if grows
-                && self.unchanged_s[encoder] > UNCHANGED_LIMIT_S
-                && plausible.stuck_rad < f64::MAX
-            {
+            self.loaded_s[encoder] = match grows {
+                true => self.loaded_s[encoder] + elapsed_s,
+                false => 0.0,
+            };
+            if self.loaded_s[encoder] > LOADED_LIMIT_S && plausible.stuck_rad < f64::MAX {
                 let joint = encoders.joint(encoder);
                 return Err(Fault::EncoderUnmoved {
                     joint,

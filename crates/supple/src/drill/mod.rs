@@ -5,6 +5,7 @@
 //! |---|---|
 //! | a process is killed or stopped; request queue, disk or standard error is full | in wall-clock time ([`perform`]), above a block |
 //! | everything else | in virtual time ([`lockstep`]): runs are bit-identical and faster than real time |
+//! | random cases instead of chosen ones | in this process ([`random`]) |
 //!
 //! Measurements come from the plant process, which keeps running when the controller fails.
 //!
@@ -21,6 +22,7 @@ mod metrics;
 mod motors;
 mod observable;
 mod perform;
+mod random;
 mod row;
 mod spec;
 mod task;
@@ -53,6 +55,13 @@ pub fn run(args: &DrillArgs) -> Result<(), Failure> {
         supple_files::check_output(file).map_err(|error| Failure::file("write", file, error))?;
     }
     let description = arms::find(&args.urdf.name(&args.arm), args.strict)?;
+    if let Some(count) = args.random {
+        let description = match args.all_joints_active {
+            true => description.with_all_joints_active()?,
+            false => description,
+        };
+        return random::run(args, &description, count);
+    }
     if description.bus().is_some() {
         return motors::run(args, &description);
     }
@@ -101,6 +110,14 @@ impl DrillArgs {
         }
         if let Some(plant) = self.plant {
             parts.push(format!("--plant {plant:?}").to_lowercase());
+        }
+        if let Some(count) = self.random {
+            parts.push(format!("--random {count}"));
+            parts.extend((self.seed != 1).then(|| format!("--seed {}", self.seed)));
+            parts.extend(
+                self.all_joints_active
+                    .then(|| "--all-joints-active".to_owned()),
+            );
         }
         parts.extend(self.only.iter().map(|part| format!("--only {part}")));
         parts.extend(self.virtual_time.then(|| "--virtual-time".to_owned()));

@@ -350,4 +350,3 @@ fn a_push_before_too_much_speed_brakes_only_where_a_reference_is_followed() {
         pushed_nm(300, 3000, 6.0)
     ));
 }
-

@@ -1,0 +1,213 @@
+//! A random case: arm, task, fault and time, all from one seed.
+
+use super::tasks::{self, Task};
+use supple_core::config::Role;
+use supple_core::controller::Request;
+use supple_core::{Config, Controller, Vector};
+use supple_experiment::ExperimentError;
+use supple_model::Description;
+use supple_plant::{Injection, InjectionKind, PlantConfig, PlantOptions, Trigger};
+use supple_random::Random;
+
+/// Share of the cases in which the simulated arm has the effects of a real one, another request follows, and a second fault occurs.
+const REALISTIC_SHARE: f64 = 0.3;
+const HANDOVER_SHARE: f64 = 0.25;
+const SECOND_SHARE: f64 = 0.1;
+/// Time of the task's request, and range of the time of the fault, from active drives \[s\].
+const TASK_S: f64 = 0.5;
+const FAULT_S: (f64, f64) = (0.6, 3.0);
+/// Time for which the arm is observed after the fault \[s\].
+const OBSERVED_S: f64 = 2.0;
+
+/// What all cases of an arm have in common.
+pub(super) struct Arm<const N: usize> {
+    pub(super) name: String,
+    pub(super) controller: Controller<N>,
+    ideal: PlantConfig<N>,
+    realistic: PlantConfig<N>,
+}
+
+impl<const N: usize> Arm<N> {
+    /// An arm and its simulations.
+    pub(super) fn new(description: &Description) -> Result<Arm<N>, ExperimentError> {
+        let config = description.config::<N>()?;
+        let controller = Controller::new(config)?;
+        let ideal = PlantConfig::from_description(description)?;
+        let realistic = PlantOptions::realistic_of(description).apply(ideal.clone())?;
+        Ok(Arm {
+            name: description.name().to_owned(),
+            controller,
+            ideal,
+            realistic,
+        })
+    }
+
+    pub(super) fn config(&self) -> &Config<N> {
+        self.controller.config()
+    }
+
+    /// A pose within the soft stops; held joints are where they are held.
+    pub(super) fn pose(&self, random: &mut Random) -> Vector<N> {
+        let config = self.config();
+        let limits = &config.limits;
+        Vector::from_fn(|joint, _| match config.roles[joint] {
+            Role::Held { position_rad, .. } => position_rad,
+            Role::Active => {
+                let margin = 1.5 * limits.soft_zone_rad;
+                between(
+                    random,
+                    limits.position_lower_rad[joint] + margin,
+                    limits.position_upper_rad[joint] - margin,
+                )
+            }
+        })
+    }
+
+    /// Whether a motor turns this joint alone, so that a fault of its encoder is one of the joint.
+    fn has_own_motor(&self, joint: usize) -> bool {
+        let row = self.config().joint_from_motor.row(joint).into_owned();
+        row.iter().filter(|ratio| **ratio != 0.0).count() == 1
+    }
+}
+
+/// A random case.
+pub(super) struct Case<const N: usize> {
+    pub(super) task: Task,
+    /// The request that replaces the task's, if any.
+    pub(super) handover: Option<&'static str>,
+    pub(super) realistic: bool,
+    pub(super) plant: PlantConfig<N>,
+    pub(super) start_rad: Vector<N>,
+    /// With their times from the first cycle \[s\].
+    pub(super) requests: Vec<(f64, Request<N>)>,
+    pub(super) injections: Vec<Injection>,
+    pub(super) duration_s: f64,
+}
+
+/// The case of a seed; `None` if the arm cannot perform the task that was drawn.
+pub(super) fn case<const N: usize>(arm: &Arm<N>, seed: u64) -> Option<Case<N>> {
+    let random = &mut Random::new(seed);
+    let realistic = random.uniform() < REALISTIC_SHARE;
+    let plan = tasks::draw(arm, random)?;
+    let mut requests = vec![(0.0, Request::GravityHold)];
+    requests.extend(
+        plan.requests
+            .into_iter()
+            .map(|(at_s, request)| (TASK_S + at_s, request)),
+    );
+    let mut fault_s = between(random, FAULT_S.0, FAULT_S.1);
+    let mut handover = None;
+    if random.uniform() < HANDOVER_SHARE {
+        let at_s = between(random, FAULT_S.0, FAULT_S.1);
+        let (name, request) = match random.index(4) {
+            0 => ("gravity_hold", Request::GravityHold),
+            1 => ("float", Request::Float),
+            2 => ("idle", Request::Idle),
+            _ => {
+                let target_rad = plan.start_rad;
+                let duration_s = 4.0;
+                let request = Request::JointImpedance {
+                    target_rad,
+                    duration_s,
+                };
+                ("joint_impedance", request)
+            }
+        };
+        handover = Some(name);
+        requests.retain(|(time_s, _)| *time_s < at_s);
+        requests.push((at_s, request));
+        if name == "idle" {
+            requests.push((at_s + 0.03, Request::GravityHold));
+        }
+        // Most often soon after it, when the torque is handed over.
+        if random.uniform() < 0.7 {
+            fault_s = at_s + between(random, -0.02, 0.25);
+        }
+    }
+    let trigger = Trigger::Active { at_s: fault_s };
+    let mut injections = vec![Injection {
+        kind: fault(arm, random),
+        trigger,
+    }];
+    if random.uniform() < SECOND_SHARE {
+        let at_s = fault_s + between(random, 0.0, 0.3);
+        injections.push(Injection {
+            kind: fault(arm, random),
+            trigger: Trigger::Active { at_s },
+        });
+    }
+    let mut plant = match realistic {
+        true => arm.realistic.clone(),
+        false => arm.ideal.clone(),
+    };
+    plant.seed = seed;
+    Some(Case {
+        task: plan.task,
+        handover,
+        realistic,
+        plant,
+        start_rad: plan.start_rad,
+        requests,
+        injections,
+        duration_s: fault_s + OBSERVED_S,
+    })
+}
+
+/// A fault of an encoder, a motor, a bus or the load.
+fn fault<const N: usize>(arm: &Arm<N>, random: &mut Random) -> InjectionKind {
+    use InjectionKind as Kind;
+    let index = random.index(N);
+    loop {
+        // Of all joints in a fifth of the draws.
+        let joint = random.index(N);
+        let one = arm.has_own_motor(joint).then_some(joint);
+        let (joint, of_some) = match random.uniform() < 0.2 {
+            true => (None, true),
+            false => (one, one.is_some()),
+        };
+        let kind = match random.index(12) {
+            0 | 1 => Kind::MotorEncoderStuck { motor: index },
+            2 if of_some => Kind::EncoderStuck { joint },
+            3 if of_some => Kind::EncoderLate {
+                joint,
+                cycles: *pick(random, &[2, 5, 10, 20, 50, 100]),
+            },
+            4 if of_some => Kind::EncoderSign { joint },
+            5 if of_some => Kind::EncoderOffset {
+                joint,
+                offset_rad: random.signed() * *pick(random, &[0.003, 0.01, 0.02, 0.2]),
+            },
+            6 => Kind::ReplyLost {
+                joint,
+                every: *pick(random, &[2, 5, 8, 9, 10, 20]),
+            },
+            7 => Kind::MotorDead { motor: index },
+            8 => Kind::TorqueSign { joint: index },
+            9 => Kind::GravityReversed,
+            10 => Kind::TorqueLate {
+                cycles: *pick(random, &[2, 5, 10, 20, 50]),
+            },
+            11 => match random.uniform() < 0.5 {
+                true => Kind::Payload {
+                    mass_kg: between(random, 0.3, 3.0),
+                },
+                false => Kind::Bump {
+                    joint: index,
+                    speed_rad_per_s: 3.0 * random.signed(),
+                },
+            },
+            _ => continue,
+        };
+        return kind;
+    }
+}
+
+/// Uniform between two numbers.
+pub(super) fn between(random: &mut Random, from: f64, to: f64) -> f64 {
+    from + (to - from) * random.uniform()
+}
+
+/// One of some items.
+pub(super) fn pick<'a, T>(random: &mut Random, items: &'a [T]) -> &'a T {
+    &items[random.index(items.len())]
+}
