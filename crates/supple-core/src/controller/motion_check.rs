@@ -27,6 +27,8 @@ const NEWTON_STEPS: u32 = 20;
 /// Fraction of the torque limits available to the feed-forward of a motion; the rest is for
 /// feedback.
 const TORQUE_SHARE: f64 = 0.9;
+/// Fraction of the speed limits available to the reference of a motion: an arm that has lagged behind is faster where it catches up.
+const SPEED_SHARE: f64 = 0.95;
 
 /// Checks a requested motion from the current pose. Requests without a motion pass.
 ///
@@ -259,7 +261,7 @@ fn check_joint_motion<const N: usize>(
             return Err(Refusal::Workspace { border, value_m });
         }
         let tip_velocity = dynamics.jacobian.fixed_rows::<3>(0) * qd;
-        let limit = speed_share * config.limits.tip_speed_m_per_s;
+        let limit = SPEED_SHARE * speed_share * config.limits.tip_speed_m_per_s;
         let value = tip_velocity.norm();
         if value > limit {
             return Err(Refusal::Value {
@@ -284,7 +286,8 @@ fn check_joints<const N: usize>(
 ) -> Result<(), Refusal> {
     let torque = dynamics.coriolis_gravity + dynamics.mass_matrix * qdd;
     for joint in 0..N {
-        let limit_rad_per_s = speed_share * config.limits.joint_speed_rad_per_s[joint];
+        let limit_rad_per_s =
+            SPEED_SHARE * speed_share * config.limits.joint_speed_rad_per_s[joint];
         let value_rad_per_s = abs(qd[joint]);
         if value_rad_per_s > limit_rad_per_s {
             return Err(Refusal::TooFast {

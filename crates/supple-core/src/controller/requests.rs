@@ -174,11 +174,15 @@ impl<const N: usize> State<N> {
                     posture_rad: self.position,
                 });
             }
-            Request::Float => self.enter(Activity::Float),
+            Request::Float => {
+                self.check_compliant_speed(config)?;
+                self.enter(Activity::Float);
+            }
             Request::JointImpedance {
                 target_rad,
                 duration_s,
             } => {
+                self.check_compliant_speed(config)?;
                 let target_rad = active_target(config, &self.position, &target_rad);
                 check_stops(config, &target_rad)?;
                 check_line(
@@ -242,7 +246,25 @@ impl<const N: usize> State<N> {
         Ok(())
     }
 
-    /// Refuses to leave a safe action or idle while a joint is faster than this fraction of its speed limit.
+    /// Refuses a compliant mode while the arm is faster than it may be there: its first cycle would be a fault.
+    fn check_compliant_speed(&self, config: &Config<N>) -> Result<(), Refusal> {
+        self.check_speed(config, COMPLIANT_SPEED_SHARE)?;
+        let tip = self.terms.jacobian.fixed_rows::<3>(0) * self.estimator.velocity_rad_per_s;
+        let (value, limit) = (
+            sqrt(tip.dot(&tip)),
+            COMPLIANT_SPEED_SHARE * config.limits.tip_speed_m_per_s,
+        );
+        if value > limit {
+            return Err(Refusal::Value {
+                entry: "speed of the tip at the request [m/s]",
+                value,
+                limit,
+            });
+        }
+        Ok(())
+    }
+
+    /// Refuses a request while a joint is faster than this fraction of its speed limit.
     #[cold]
     #[inline(never)]
     fn check_speed(&self, config: &Config<N>, share: f64) -> Result<(), Refusal> {
@@ -251,7 +273,7 @@ impl<const N: usize> State<N> {
             let limit = share * config.limits.joint_speed_rad_per_s[joint];
             if abs(velocity[joint]) > limit {
                 return Err(Refusal::Value {
-                    entry: "speed of a joint before the arm is held [rad/s]",
+                    entry: "speed of a joint at the request [rad/s]",
                     value: abs(velocity[joint]),
                     limit,
                 });

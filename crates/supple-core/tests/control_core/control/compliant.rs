@@ -207,6 +207,41 @@ fn the_spring_has_a_bound() {
     assert_eq!(output.torques.stiffness[1], -10.0);
 }
 
+/// An arm that is faster than a compliant mode allows is not switched to it, and goes on; a slower one is.
+#[test]
+fn compliant_modes_begin_below_their_speed_limits() {
+    let config = four();
+    let half = 0.5 * config.limits.joint_speed_rad_per_s[0];
+    for share in [1.2, 0.8] {
+        for compliant in 0..2 {
+            let mut rig = Rig::holding(free_of_collisions(config), bent());
+            for _ in 0..300 {
+                rig.q[0] += share * half * config.period_s;
+                assert_eq!(rig.cycle().fault, None);
+            }
+            let request = match compliant {
+                0 => Request::Float,
+                _ => Request::JointImpedance {
+                    target_rad: rig.q,
+                    duration_s: 1.0,
+                },
+            };
+            rig.q[0] += share * half * config.period_s;
+            let output = rig.request(request);
+            match output.refusal {
+                Some(Refusal::Value { value, limit, .. }) => {
+                    assert!(
+                        share > 1.0 && value > limit && limit == half,
+                        "{value}, {limit}"
+                    );
+                    assert_eq!((output.mode, output.fault), (Mode::GravityHold, None));
+                }
+                other => assert!(share < 1.0 && other.is_none(), "{share}: {other:?}"),
+            }
+        }
+    }
+}
+
 /// Half of the speed limits: a request that would reach more is refused, a joint that is faster is a fault.
 #[test]
 fn compliant_joints_have_half_of_the_speed_limits() {
