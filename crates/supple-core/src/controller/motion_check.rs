@@ -10,7 +10,7 @@ use crate::config::{Config, Role};
 use crate::dynamics::inverse_kinematics::inverse_kinematics;
 use crate::dynamics::{Terms, terms};
 use crate::law::impedance::Task;
-use crate::math::{Vector, abs, smooth_step};
+use crate::math::{Vector, Vector3, abs, smooth_step};
 use crate::model::pose::{Pose, rotation_vector};
 use crate::trajectory::{JointReference, Reference, Rotation, Trajectory};
 
@@ -22,8 +22,10 @@ const MAX_PERIODS: f64 = 1000.0;
 const REACHED_M: f64 = 1e-3;
 /// Maximum angle at which an orientation counts as reached \[rad\].
 const REACHED_RAD: f64 = 1e-3;
-/// Newton steps from one point to the next.
+/// Newton steps from one pose to the next.
 const NEWTON_STEPS: u32 = 20;
+/// The same for a point of the tip.
+const POINT_STEPS: u32 = 5;
 /// Fraction of the torque limits available to the feed-forward of a motion; the rest is for
 /// feedback.
 const TORQUE_SHARE: f64 = 0.9;
@@ -135,21 +137,26 @@ fn check_point<const N: usize>(
     if let Some((border, value_m)) = config.workspace.violated_border(&reference.position) {
         return Err(Refusal::Workspace { border, value_m });
     }
-    let found = inverse_kinematics(
-        &config.arm,
-        &config.roles,
-        &config.limits,
-        q,
-        &reference.position,
-    );
-    if found.distance_m > REACHED_M {
-        return Err(Refusal::OutOfReach {
-            time_s,
-            distance_m: found.distance_m,
-        });
-    }
-    *q = found.position_rad;
     let mut dynamics = Terms::default();
+    match follow_point(config, q, &reference.position, &mut dynamics) {
+        Some(position_rad) => *q = position_rad,
+        None => {
+            let found = inverse_kinematics(
+                &config.arm,
+                &config.roles,
+                &config.limits,
+                q,
+                &reference.position,
+            );
+            if found.distance_m > REACHED_M {
+                return Err(Refusal::OutOfReach {
+                    time_s,
+                    distance_m: found.distance_m,
+                });
+            }
+            *q = found.position_rad;
+        }
+    }
     terms(&config.arm, q, &Vector::zeros(), &mut dynamics);
     let Some(task) = Task::new(&dynamics, &config.roles) else {
         // The mass matrix is not positive definite: only reach and borders are checked.
@@ -160,6 +167,27 @@ fn check_point<const N: usize>(
     let bias_acceleration = dynamics.jacobian_dot_qd.fixed_rows::<3>(0);
     let qdd = task.inverse * (reference.acceleration - bias_acceleration);
     check_joints(config, 1.0, &dynamics, &qd, &qdd)
+}
+
+/// Moves the joints from a pose that is near to one with the tip at `position`, as the law does: a redundant arm turns its light
+/// joints most. `None` if that does not lead there within a few steps, or beyond the soft stops.
+fn follow_point<const N: usize>(
+    config: &Config<N>,
+    from_rad: &Vector<N>,
+    position: &Vector3<f64>,
+    state: &mut Terms<N>,
+) -> Option<Vector<N>> {
+    let mut q = *from_rad;
+    for _ in 0..POINT_STEPS {
+        terms(&config.arm, &q, &Vector::zeros(), state);
+        let error = position - state.base_from_tip.translation;
+        if error.norm() <= REACHED_M {
+            return check_stops(config, &q).is_ok().then_some(q);
+        }
+        let task = Task::new(state, &config.roles)?;
+        q += task.inverse * error;
+    }
+    None
 }
 
 /// Follows position and orientation with the joints' motion that the task gives, starting from rest.

@@ -15,7 +15,7 @@ const SLOW_AFTER_S: f64 = 0.5;
 /// Time after which energy that braking motors take no longer counts \[s\].
 const BRAKED_S: f64 = 0.01;
 
-/// What the arm did. "Stop" is the fault that the controller reports, or that the drives became idle, whichever is first.
+/// What the arm did. "Stop" is the fault that the controller reports, or that the guard ends the torque, whichever is first.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Course {
     /// Time of the injected fault \[s\].
@@ -141,7 +141,7 @@ pub(super) fn run<const N: usize>(arm: &Arm<N>, case: &Case<N>) -> Result<Course
                 if let (Some(fault), None) = (output.fault, &course.reported) {
                     course.reported = Some((time_s, fault.to_string()));
                 }
-                if course.stopped_s.is_none() && (output.fault.is_some() || !drives.active) {
+                if course.stopped_s.is_none() && (output.fault.is_some() || drives.latched) {
                     course.stopped_s = Some(time_s);
                     (course.stop_j, stop_total_j) = (kinetic_j, total_j);
                 }

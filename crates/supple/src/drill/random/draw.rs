@@ -16,6 +16,8 @@ const SECOND_SHARE: f64 = 0.1;
 /// Time of the task's request, and range of the time of the fault, from active drives \[s\].
 const TASK_S: f64 = 0.5;
 const FAULT_S: (f64, f64) = (0.6, 3.0);
+/// Range of the time for which the drives stay idle \[s\].
+const IDLE_S: (f64, f64) = (0.03, 1.0);
 /// Time for which the arm is observed after the fault \[s\].
 const OBSERVED_S: f64 = 2.0;
 
@@ -117,7 +119,8 @@ pub(super) fn case<const N: usize>(arm: &Arm<N>, seed: u64) -> Option<Case<N>> {
         requests.retain(|(time_s, _)| *time_s < at_s);
         requests.push((at_s, request));
         if name == "idle" {
-            requests.push((at_s + 0.03, Request::GravityHold));
+            let held_s = at_s + between(random, IDLE_S.0, IDLE_S.1);
+            requests.push((held_s, Request::GravityHold));
         }
         // Most often soon after it, when the torque is handed over.
         if random.uniform() < 0.7 {

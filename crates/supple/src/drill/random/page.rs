@@ -198,7 +198,7 @@ simulated arm run in one process. `supple drill --random 1 --seed SEED` repeats 
 Nobody chose the cases, and the rules do not depend on them:
 
 - **false fault**: a fault is reported before one is injected.
-- **not stopped**, **stopped late**: until the stop (the reported fault, or idle drives) the kinetic energy exceeds three times that
+- **not stopped**, **stopped late**: until the stop (the reported fault, or the drive guard's) the kinetic energy exceeds three times that
   of the task, and 0.5 J; \"not stopped\" within two seconds.
 - **gains energy**: after the stop it exceeds 1.5 times what it was at the stop or in the 0.2 s before the fault, and 0.12 J. With a dead
   motor, whose joint falls: the sum of kinetic, potential and elastic energy rises by more than 0.1 J.
