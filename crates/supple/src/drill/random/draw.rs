@@ -127,13 +127,14 @@ pub(super) fn case<const N: usize>(arm: &Arm<N>, seed: u64) -> Option<Case<N>> {
             fault_s = at_s + between(random, -0.02, 0.25);
         }
     }
+    let fault_s = rounded(fault_s, 1e-3);
     let trigger = Trigger::Active { at_s: fault_s };
     let mut injections = vec![Injection {
         kind: fault(arm, random),
         trigger,
     }];
     if random.uniform() < SECOND_SHARE {
-        let at_s = fault_s + between(random, 0.0, 0.3);
+        let at_s = rounded(fault_s + between(random, 0.0, 0.3), 1e-3);
         injections.push(Injection {
             kind: fault(arm, random),
             trigger: Trigger::Active { at_s },
@@ -178,7 +179,10 @@ fn fault<const N: usize>(arm: &Arm<N>, random: &mut Random) -> InjectionKind {
             4 if of_some => Kind::EncoderSign { joint },
             5 if of_some => Kind::EncoderOffset {
                 joint,
-                offset_rad: random.signed() * *pick(random, &[0.003, 0.01, 0.02, 0.2]),
+                offset_rad: rounded(
+                    signed(random, 1.0) * *pick(random, &[0.003, 0.01, 0.02, 0.2]),
+                    1e-4,
+                ),
             },
             6 => Kind::ReplyLost {
                 joint,
@@ -192,11 +196,11 @@ fn fault<const N: usize>(arm: &Arm<N>, random: &mut Random) -> InjectionKind {
             },
             11 => match random.uniform() < 0.5 {
                 true => Kind::Payload {
-                    mass_kg: between(random, 0.3, 3.0),
+                    mass_kg: rounded(between(random, 0.3, 3.0), 0.01),
                 },
                 false => Kind::Bump {
                     joint: index,
-                    speed_rad_per_s: 3.0 * random.signed(),
+                    speed_rad_per_s: rounded(signed(random, 3.0), 0.01),
                 },
             },
             _ => continue,
@@ -208,6 +212,18 @@ fn fault<const N: usize>(arm: &Arm<N>, random: &mut Random) -> InjectionKind {
 /// Uniform between two numbers.
 pub(super) fn between(random: &mut Random, from: f64, to: f64) -> f64 {
     from + (to - from) * random.uniform()
+}
+
+/// A tenth of `most` to all of it, with either sign.
+fn signed(random: &mut Random, most: f64) -> f64 {
+    let size = between(random, 0.1 * most, most);
+    size * random.signed().signum()
+}
+
+/// The nearest multiple of `1 / round(1 / step)`, so that it is short in print.
+fn rounded(value: f64, step: f64) -> f64 {
+    let per_step = (1.0 / step).round();
+    (value * per_step).round() / per_step
 }
 
 /// One of some items.

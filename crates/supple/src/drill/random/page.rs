@@ -47,7 +47,7 @@ impl Row {
         case: &Case<N>,
         course: &Course,
     ) -> Row {
-        let after_ms = |at_s: Option<f64>| Some((at_s? - course.fault_s?) * 1e3).map(f64::round);
+        let after_ms = |at_s: Option<f64>| Some(((at_s? - course.fault_s?) * 1e3).round());
         let mut kinds = case.injections.iter().map(|of| of.kind.name());
         let kind = match (kinds.next(), kinds.next()) {
             (Some(kind), None) => kind,
@@ -207,37 +207,40 @@ Nobody chose the cases, and the rules do not depend on them:
 
 What is left out: obstacles, hands, processes and buses that fail (the [fault tests](drill.md) have them), and what the
 operator does after the stop.
+
 ";
 
 /// The page.
 pub(super) fn page(rows: &[Row], command: &str) -> String {
     let mut text = PAGE.replace("{command}", command);
-    let mut line = |cells: &[String]| {
-        writeln!(text, "| {} |", cells.join(" | ")).expect("a string takes any text");
-    };
-    let rule = |columns: usize| vec!["---".to_owned(); columns];
-    line(&[]);
-    let titles = kind_titles();
-    line(&titles);
-    line(&rule(titles.len()));
-    for (name, kind) in &kinds(rows) {
-        line(&kind_cells(name, kind));
-    }
+    let kinds = kinds(rows);
+    let cells = kinds.iter().map(|(name, kind)| kind_cells(name, kind));
+    add_table(&mut text, &kind_titles(), cells);
     let worst = worst(rows);
-    let intro = format!(
-        "\n{}. The {} with the greatest kinetic energy (energy: peak before the fault, and after it):\n",
+    write!(
+        text,
+        "\n{}. The {} with the greatest kinetic energy (energy: peak before the fault, and after it):\n\n",
         summary(rows),
         worst.len()
-    );
-    text.push_str(&intro);
+    )
+    .expect("a string takes any text");
+    let titles = WORST_TITLES.map(ToOwned::to_owned);
+    add_table(&mut text, &titles, worst.iter().map(|row| row.cells()));
+    text
+}
+
+/// Adds a table in Markdown.
+fn add_table<R: AsRef<[String]>>(
+    text: &mut String,
+    titles: &[String],
+    rows: impl Iterator<Item = R>,
+) {
     let mut line = |cells: &[String]| {
         writeln!(text, "| {} |", cells.join(" | ")).expect("a string takes any text");
     };
-    line(&[]);
-    line(&WORST_TITLES.map(ToOwned::to_owned));
-    line(&rule(WORST_TITLES.len()));
-    for row in worst {
-        line(&row.cells());
+    line(titles);
+    line(&vec!["---".to_owned(); titles.len()]);
+    for row in rows {
+        line(row.as_ref());
     }
-    text
 }
