@@ -7,6 +7,7 @@ use std::os::unix::fs::chown;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Instant;
+use supple_core::config::Role;
 use supple_core::controller::{Mode, Request};
 use supple_core::{Controller, Vector};
 use supple_ipc::message::{Drives, Outcome};
@@ -219,7 +220,11 @@ fn a_move_that_waits_is_checked_from_the_pose_in_which_it_begins() {
     // A move from home that is refused for the speed of the tip alone: each joint turns by one radian, or not, and slower
     // than it may.
     let to = |code: u32| {
-        let way = |joint: usize| f64::from(code / 3_u32.pow(joint as u32) % 3) - 1.0;
+        let way = |joint: usize| match config.roles[joint] {
+            Role::Active => f64::from(code / 3_u32.pow(joint as u32) % 3) - 1.0,
+            // Its loop would move it back, which this arm does not show.
+            Role::Held { .. } => 0.0,
+        };
         Request::Move {
             target_rad: home + Vector::from_fn(|joint, _| way(joint)),
             duration_s: 1.1,

@@ -1,6 +1,7 @@
 //! Runs a case: controller, drive guard and simulated arm in one loop, without processes.
 
-use super::draw::{Arm, Case};
+use super::arm::Arm;
+use super::draw::Case;
 use supple_core::controller::{Mode, Request};
 use supple_core::drive_guard::{DriveCommand, DriveGuard};
 use supple_core::dynamics::potential_energy;

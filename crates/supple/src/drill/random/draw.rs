@@ -1,12 +1,10 @@
-//! A random case: arm, task, fault and time, all from one seed.
+//! A random case: task, fault and time, all from one seed.
 
+use super::arm::{Arm, between, pick};
 use super::tasks::{self, Task};
-use supple_core::config::Role;
+use supple_core::Vector;
 use supple_core::controller::Request;
-use supple_core::{Config, Controller, Vector};
-use supple_experiment::ExperimentError;
-use supple_model::Description;
-use supple_plant::{Injection, InjectionKind, PlantConfig, PlantOptions, Trigger};
+use supple_plant::{Injection, InjectionKind, PlantConfig, Trigger};
 use supple_random::Random;
 
 /// Share of the cases in which the simulated arm has the effects of a real one, another request follows, and a second fault occurs.
@@ -20,57 +18,6 @@ const FAULT_S: (f64, f64) = (0.6, 3.0);
 const IDLE_S: (f64, f64) = (0.03, 1.0);
 /// Time for which the arm is observed after the fault \[s\].
 const OBSERVED_S: f64 = 2.0;
-
-/// What all cases of an arm have in common.
-pub(super) struct Arm<const N: usize> {
-    pub(super) name: String,
-    pub(super) controller: Controller<N>,
-    ideal: PlantConfig<N>,
-    realistic: PlantConfig<N>,
-}
-
-impl<const N: usize> Arm<N> {
-    /// An arm and its simulations.
-    pub(super) fn new(description: &Description) -> Result<Arm<N>, ExperimentError> {
-        let config = description.config::<N>()?;
-        let controller = Controller::new(config)?;
-        let ideal = PlantConfig::from_description(description)?;
-        let realistic = PlantOptions::realistic_of(description).apply(ideal.clone())?;
-        Ok(Arm {
-            name: description.name().to_owned(),
-            controller,
-            ideal,
-            realistic,
-        })
-    }
-
-    pub(super) fn config(&self) -> &Config<N> {
-        self.controller.config()
-    }
-
-    /// A pose within the soft stops; held joints are where they are held.
-    pub(super) fn pose(&self, random: &mut Random) -> Vector<N> {
-        let config = self.config();
-        let limits = &config.limits;
-        Vector::from_fn(|joint, _| match config.roles[joint] {
-            Role::Held { position_rad, .. } => position_rad,
-            Role::Active => {
-                let margin = 1.5 * limits.soft_zone_rad;
-                between(
-                    random,
-                    limits.position_lower_rad[joint] + margin,
-                    limits.position_upper_rad[joint] - margin,
-                )
-            }
-        })
-    }
-
-    /// Whether a motor turns this joint alone, so that a fault of its encoder is one of the joint.
-    fn has_own_motor(&self, joint: usize) -> bool {
-        let row = self.config().joint_from_motor.row(joint).into_owned();
-        row.iter().filter(|ratio| **ratio != 0.0).count() == 1
-    }
-}
 
 /// A random case.
 pub(super) struct Case<const N: usize> {
@@ -209,11 +156,6 @@ fn fault<const N: usize>(arm: &Arm<N>, random: &mut Random) -> InjectionKind {
     }
 }
 
-/// Uniform between two numbers.
-pub(super) fn between(random: &mut Random, from: f64, to: f64) -> f64 {
-    from + (to - from) * random.uniform()
-}
-
 /// A tenth of `most` to all of it, with either sign.
 fn signed(random: &mut Random, most: f64) -> f64 {
     let size = between(random, 0.1 * most, most);
@@ -224,9 +166,4 @@ fn signed(random: &mut Random, most: f64) -> f64 {
 fn rounded(value: f64, step: f64) -> f64 {
     let per_step = (1.0 / step).round();
     (value * per_step).round() / per_step
-}
-
-/// One of some items.
-pub(super) fn pick<'a, T>(random: &mut Random, items: &'a [T]) -> &'a T {
-    &items[random.index(items.len())]
 }

@@ -3,6 +3,7 @@
 //! The cases of [`super::matrix`] say what must happen in each; here nobody chose the case, and the rules ([`verdict`]) hold
 //! for all. Controller, drive guard and simulated arm run in one process, so that thousands of cases take minutes.
 
+mod arm;
 mod course;
 mod draw;
 mod page;
@@ -10,7 +11,7 @@ mod tasks;
 mod verdict;
 
 use crate::cli::DrillArgs;
-use draw::Arm;
+use arm::Arm;
 use page::Row;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};

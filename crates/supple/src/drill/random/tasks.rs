@@ -1,6 +1,6 @@
 //! Random tasks: each a start pose and the requests that start it.
 
-use super::draw::{Arm, between, pick};
+use super::arm::{Arm, between, pick};
 use core::fmt;
 use serde::Serialize;
 use supple_core::config::Role;
