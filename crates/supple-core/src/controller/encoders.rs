@@ -77,7 +77,11 @@ impl<const N: usize> Encoders<N> {
 
     /// External torque on the motor of each encoder, as of [`Encoders::torque_at`], above which dry friction does not hold it
     /// \[N m\]. It includes an error of the model.
-    pub(super) fn held_nm(&self, config: &Config<N>, motor_from_joint: &Matrix<N, N>) -> Vector<N> {
+    pub(super) fn stiction_limit_nm(
+        &self,
+        config: &Config<N>,
+        motor_from_joint: &Matrix<N, N>,
+    ) -> Vector<N> {
         let dry_nm = Vector::from_fn(|joint, _| config.friction[joint].dry_size_nm(0.0));
         let limits = &config.limits;
         Vector::from_fn(|encoder, _| {

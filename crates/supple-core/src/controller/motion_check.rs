@@ -155,9 +155,9 @@ fn check_point<const N: usize>(
                 });
             }
             *q = found.position_rad;
+            terms(&config.arm, q, &Vector::zeros(), &mut dynamics);
         }
     }
-    terms(&config.arm, q, &Vector::zeros(), &mut dynamics);
     let Some(task) = Task::new(&dynamics, &config.roles) else {
         // The mass matrix is not positive definite: only reach and borders are checked.
         return Ok(());
@@ -170,7 +170,7 @@ fn check_point<const N: usize>(
 }
 
 /// Moves the joints from a pose that is near to one with the tip at `position`, as the law does: a redundant arm turns its light
-/// joints most. `None` if that does not lead there within a few steps, or beyond the soft stops.
+/// joints most. `state` is that of the pose found. `None` if that does not lead there within a few steps, or beyond the soft stops.
 fn follow_point<const N: usize>(
     config: &Config<N>,
     from_rad: &Vector<N>,

@@ -21,7 +21,7 @@ pub struct Controller<const N: usize> {
     pub(super) motor_from_joint: Matrix<N, N>,
     encoders: Encoders<N>,
     /// External torque on the motor of each encoder above which dry friction does not hold it \[N m\].
-    held_nm: Vector<N>,
+    stiction_limit_nm: Vector<N>,
     pub(super) delay_s: f64,
     /// Number of active joints.
     pub(super) active_joints: usize,
@@ -75,7 +75,7 @@ impl<const N: usize> Controller<N> {
         let limits = &config.limits;
         let encoders = Encoders::new(to_joint, &motor_from_joint);
         Ok(Controller {
-            held_nm: encoders.held_nm(&config, &motor_from_joint),
+            stiction_limit_nm: encoders.stiction_limit_nm(&config, &motor_from_joint),
             learned_bounds: LearnedBounds::new(&config.friction, &limits.joint_torque_nm),
             nullspace_damping_nm_s_per_rad: nullspace_damping_nm_s_per_rad(&config, delay_s),
             encoders,
@@ -199,8 +199,8 @@ impl<const N: usize> Controller<N> {
     }
 
     /// External torque on the motor of each encoder above which dry friction does not hold it \[N m\].
-    pub(super) fn held_nm(&self) -> &Vector<N> {
-        &self.held_nm
+    pub(super) fn stiction_limit_nm(&self) -> &Vector<N> {
+        &self.stiction_limit_nm
     }
 
     /// Coupling between motors and joints.

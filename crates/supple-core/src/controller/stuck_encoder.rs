@@ -266,16 +266,16 @@ impl<const N: usize> StuckEncoders<N> {
         }
     }
 
-    /// Reports a stuck encoder if it is unchanged although the external torque on its motor has grown beyond `held_nm`, what dry
-    /// friction holds, for some time. A torque that was that large when the encoder stopped may be that of an obstacle.
-    /// After [`StuckEncoders::check_sudden_stop`] of the same cycle.
+    /// Reports a stuck encoder if it is unchanged although the external torque on its motor has grown beyond
+    /// `stiction_limit_nm`, what dry friction holds, for some time. A torque that was that large when the encoder stopped may be
+    /// that of an obstacle. After [`StuckEncoders::check_sudden_stop`] of the same cycle.
     #[inline(never)]
     pub fn check_torque(
         &mut self,
         encoders: &Encoders<N>,
         plausible: &PlausibilityLimits,
         external_nm: &Vector<N>,
-        held_nm: &Vector<N>,
+        stiction_limit_nm: &Vector<N>,
         elapsed_s: f64,
     ) -> Result<(), Fault> {
         for encoder in (0..N).filter(|encoder| self.unchanged[*encoder]) {
@@ -284,7 +284,7 @@ impl<const N: usize> StuckEncoders<N> {
                 (self.external_nm[encoder], self.loaded_s[encoder]) = (torque_nm, 0.0);
             }
             let stopped_at_nm = self.external_nm[encoder];
-            let (value_nm, limit_nm) = (abs(torque_nm), held_nm[encoder]);
+            let (value_nm, limit_nm) = (abs(torque_nm), stiction_limit_nm[encoder]);
             let grows = value_nm > limit_nm.max(abs(stopped_at_nm))
                 && abs(torque_nm - stopped_at_nm) > limit_nm;
             self.loaded_s[encoder] = match grows {

@@ -301,7 +301,7 @@ impl<const N: usize> State<N> {
                     encoders,
                     &config.plausible,
                     &external_nm,
-                    controller.held_nm(),
+                    controller.stiction_limit_nm(),
                     evidence.elapsed_s,
                 )?;
             }

@@ -9,7 +9,6 @@ use supple_random::Random;
 
 /// What all cases of an arm have in common.
 pub(super) struct Arm<const N: usize> {
-    pub(super) name: String,
     pub(super) controller: Controller<N>,
     pub(super) ideal: PlantConfig<N>,
     pub(super) realistic: PlantConfig<N>,
@@ -23,7 +22,6 @@ impl<const N: usize> Arm<N> {
         let ideal = PlantConfig::from_description(description)?;
         let realistic = PlantOptions::realistic_of(description).apply(ideal.clone())?;
         Ok(Arm {
-            name: description.name().to_owned(),
             controller,
             ideal,
             realistic,

@@ -30,15 +30,23 @@ const NAMED_SEEDS: usize = 10;
 /// Runs `count` cases from the seed of the command line on.
 ///
 /// # Errors
-/// [`Failure::Drill`] if a case exceeds what is allowed.
+/// [`Failure::Drill`] if a case exceeds what is allowed; [`Failure::NoSuchTestCase`] for an arm whose drives do not brake.
 pub(super) fn run(args: &DrillArgs, description: &Description, count: u64) -> Result<(), Failure> {
+    if description.bus().is_some() {
+        return Err(Failure::NoSuchTestCase {
+            patterns: format!(
+                "--random of {}: random cases are for arms whose idle drives brake",
+                description.name()
+            ),
+        });
+    }
     let rows = with_dof!(description.dof(), N => search::<N>(args, description, count))??;
     match args.json {
         true => print_json(&rows)?,
         false => print_line(&page::terminal(&rows))?,
     }
     if let Some(file) = &args.markdown {
-        let text = page::page(&rows, &args.command_line());
+        let text = page::page(&rows, args, description);
         supple_files::write_atomic(file, text.as_bytes())
             .map_err(|error| Failure::file("write", file, error))?;
     }
@@ -78,12 +86,12 @@ fn search<const N: usize>(
             if index % PROGRESS == 0 && count > PROGRESS {
                 print_status(&format!("{index}/{count} cases"));
             }
-            let seed = args.seed + index;
+            let seed = args.seed.wrapping_add(index);
             let Some(case) = draw::case(&arm, seed) else {
                 continue;
             };
             let course = course::run(&arm, &case)?;
-            let row = Row::new(&arm.name, seed, &case, &course);
+            let row = Row::new(seed, &case, &course);
             rows.lock()
                 .unwrap_or_else(|poisoned| poisoned.into_inner())
                 .push(row);
@@ -102,6 +110,6 @@ fn search<const N: usize>(
     let mut rows = rows
         .into_inner()
         .unwrap_or_else(|poisoned| poisoned.into_inner());
-    rows.sort_by_key(|row| row.seed);
+    rows.sort_by_key(|row| row.seed.wrapping_sub(args.seed));
     Ok(rows)
 }

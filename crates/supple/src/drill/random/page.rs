@@ -3,10 +3,12 @@
 use super::course::Course;
 use super::draw::Case;
 use super::verdict::{Excess, excesses};
+use crate::cli::DrillArgs;
 use comfy_table::{ContentArrangement, Table, presets};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write;
+use supple_model::Description;
 
 /// Cases in the list of the worst.
 const WORST: usize = 25;
@@ -16,7 +18,6 @@ const WORST: usize = 25;
 pub(super) struct Row {
     /// Repeats the case: `supple drill --random 1 --seed SEED`.
     pub(super) seed: u64,
-    arm: String,
     task: String,
     realistic: bool,
     handover: Option<&'static str>,
@@ -34,19 +35,14 @@ pub(super) struct Row {
     braked_after_ms: Option<f64>,
     /// Peak of the kinetic energy before the fault \[J\].
     task_j: f64,
-    /// Peak of the kinetic energy from the fault on \[J\].
+    /// Peak of the kinetic energy from the fault until 10 ms after the motors brake \[J\].
     peak_j: f64,
     /// Peak of the speed of the tip from the fault on \[m/s\].
     tip_m_per_s: f64,
 }
 
 impl Row {
-    pub(super) fn new<const N: usize>(
-        arm: &str,
-        seed: u64,
-        case: &Case<N>,
-        course: &Course,
-    ) -> Row {
+    pub(super) fn new<const N: usize>(seed: u64, case: &Case<N>, course: &Course) -> Row {
         let after_ms = |at_s: Option<f64>| Some(((at_s? - course.fault_s?) * 1e3).round());
         let mut kinds = case.injections.iter().map(|of| of.kind.name());
         let kind = match (kinds.next(), kinds.next()) {
@@ -56,7 +52,6 @@ impl Row {
         let (reported_s, reported) = course.reported.clone().unzip();
         Row {
             seed,
-            arm: arm.to_owned(),
             task: case.task.to_string(),
             realistic: case.realistic,
             handover: case.handover,
@@ -185,17 +180,19 @@ pub(super) fn terminal(rows: &[Row]) -> String {
     )
 }
 
-/// Text above the tables of the page; `{command}` is replaced by the command line.
+/// Text above the tables of the page; `{arm}` and `{command}` are replaced.
 const PAGE: &str = "\
-# Random faults
+# Random faults: {arm}
 
-Written by `{command}`. Each case is drawn from its seed: a pose within the joints' range, a task (gravity hold, float, move, joint
+Written by `{command}`.
+
+Each case is drawn from its seed: a pose within the joints' range, a task (gravity hold, float, move, joint
 impedance, track at 5 to 1000 N/m, excite, set-points, breakaway) with random parameters that the controller accepts, in
 a quarter of the cases another request in between, and one fault (in a tenth of the cases two) 0.6 to 3.3 s after the drives
 became active. In 30 % of the cases the simulated arm has the effects of a real one (`realistic`). Controller, drive guard and
 simulated arm run in one process. `supple drill --random 1 --seed SEED` repeats a case.
 
-Nobody chose the cases, and the rules do not depend on them:
+Nobody chose the cases. The rules are the same for all, but for a dead motor:
 
 - **false fault**: a fault is reported before one is injected.
 - **not stopped**, **stopped late**: until the stop (the reported fault, or the drive guard's) the kinetic energy exceeds three times that
@@ -211,15 +208,21 @@ operator does after the stop.
 ";
 
 /// The page.
-pub(super) fn page(rows: &[Row], command: &str) -> String {
-    let mut text = PAGE.replace("{command}", command);
+pub(super) fn page(rows: &[Row], args: &DrillArgs, description: &Description) -> String {
+    let joints = match args.all_joints_active {
+        true => ", all joints active",
+        false => "",
+    };
+    let mut text = PAGE
+        .replace("{arm}", &format!("{}{joints}", description.name()))
+        .replace("{command}", &args.command_line());
     let kinds = kinds(rows);
     let cells = kinds.iter().map(|(name, kind)| kind_cells(name, kind));
     add_table(&mut text, &kind_titles(), cells);
     let worst = worst(rows);
     write!(
         text,
-        "\n{}. The {} with the greatest kinetic energy (energy: peak before the fault, and after it):\n\n",
+        "\n{}. The {} with the greatest kinetic energy (energy: peak before the fault; peak from then until 10 ms after the motors brake):\n\n",
         summary(rows),
         worst.len()
     )

@@ -1,4 +1,5 @@
-//! What of a course is worse than allowed. The rules were written before the first search; they name no fault and no mode.
+//! What of a course is worse than allowed. No rule depends on the task or, but for a dead motor, on the fault. The bounds were
+//! written before the first search; after it, what a blow adds counts as motion before the fault, and idle by request is no stop.
 
 use super::course::Course;
 use super::draw::Case;
