@@ -115,13 +115,15 @@ impl<const N: usize> ActuatorModel<N> {
 pub(crate) struct ActuatorState<const N: usize> {
     model: ActuatorModel<N>,
     motor_from_joint: Matrix<N, N>,
-    pending: VecDeque<Vector<N>>,
+    /// Commands that do not act yet, with the motors that were to be shorted meanwhile.
+    pending: VecDeque<(Vector<N>, [bool; N])>,
     last_command: Vector<N>,
     /// Rounding error of each motor's torque that the next cycle adds \[N m\].
     remainder: Vector<N>,
     /// Whether motor torques differ from commands.
     amplifiers_err: bool,
-    /// Shorted motors.
+    /// Motors to be shorted, and those that are: a motor stays shorted until its first torque acts.
+    to_short: [bool; N],
     shorted: [bool; N],
     /// Resulting joint-space damping matrix \[N m s/rad\].
     braking: Matrix<N, N>,
@@ -183,6 +185,7 @@ impl<const N: usize> ActuatorState<N> {
             pending: VecDeque::new(),
             last_command: Vector::zeros(),
             remainder: Vector::zeros(),
+            to_short: [false; N],
             shorted: [false; N],
             braking: Matrix::zeros(),
         };
@@ -196,7 +199,7 @@ impl<const N: usize> ActuatorState<N> {
         self.remainder = Vector::zeros();
         self.pending.clear();
         for _ in 0..self.model.torque_delay_cycles {
-            self.pending.push_back(*held);
+            self.pending.push_back((*held, [false; N]));
         }
     }
 
@@ -206,8 +209,13 @@ impl<const N: usize> ActuatorState<N> {
         if torque_nm.iter().all(|t| t.is_finite()) {
             self.last_command = self.rounded(torque_nm);
         }
-        self.pending.push_back(self.last_command);
-        self.pending.pop_front().unwrap_or(self.last_command)
+        let command = (self.last_command, self.to_short);
+        self.pending.push_back(command);
+        let (acting, were_shorted) = self.pending.pop_front().unwrap_or(command);
+        self.set_shorted(core::array::from_fn(|i| {
+            self.to_short[i] || were_shorted[i]
+        }));
+        acting
     }
 
     fn rounded(&mut self, torque_nm: &Vector<N>) -> Vector<N> {
@@ -228,8 +236,12 @@ impl<const N: usize> ActuatorState<N> {
         self.motor_from_joint.transpose() * motor
     }
 
-    /// Shorts exactly these motors.
+    /// Shorts these motors at the next command, and releases the others when the torque of that command acts.
     pub fn short_motors(&mut self, motors: [bool; N]) {
+        self.to_short = motors;
+    }
+
+    fn set_shorted(&mut self, motors: [bool; N]) {
         if motors == self.shorted {
             return;
         }

@@ -153,8 +153,8 @@ impl<const N: usize> Plant<N> {
         }
     }
 
-    /// Shorts exactly these motors from this call on: they brake in addition to any commanded torque. Initially none
-    /// is shorted.
+    /// Shorts exactly these motors from the next cycle on: they brake in addition to any commanded torque. A motor that was
+    /// shorted brakes until its first torque acts, after the actuators' delay. Initially none is shorted.
     pub fn short_motors(&mut self, motors: [bool; N]) {
         self.actuators.short_motors(motors);
     }

@@ -47,6 +47,9 @@ pub fn remedy(kind: u8) -> &'static str {
         fault::MOVES_AGAINST_TORQUE => {
             "The joint moves against its torque: check the sign of its torque and of its encoder."
         }
+        fault::OSCILLATION => {
+            "The loop is unstable: lower the gains, or measure the delay of the loop and enter it; then reset."
+        }
         fault::UNMODELLED_LOAD => {
             "The arm carries a load that its model lacks: remove it or describe it; then reset."
         }

@@ -168,6 +168,15 @@ pub enum Fault {
         /// Limit \[N\].
         limit_n: f64,
     },
+    /// A joint swings to and fro ever faster: torques or angles come later than configured, or the model is wrong.
+    Oscillation {
+        /// Joint index.
+        joint: usize,
+        /// Speed in the last swing \[rad/s\].
+        value_rad_per_s: f64,
+        /// Peak from which growing swings are a fault \[rad/s\].
+        limit_rad_per_s: f64,
+    },
     /// The mass matrix of the active joints is not positive definite.
     MassMatrix,
     /// A term of the law, or the torque itself, is not finite.
@@ -199,6 +208,7 @@ impl Fault {
             | Fault::EncoderUnreliable { .. }
             | Fault::MotionAgainstTorque { .. }
             | Fault::UnmodelledLoad { .. }
+            | Fault::Oscillation { .. }
             | Fault::MassMatrix
             | Fault::MeasurementNotFinite { joint: Some(_) } => SafeAction::Idle,
             _ => SafeAction::GravityHold,
@@ -351,6 +361,16 @@ impl NamesJoints for Fault {
             Fault::Singular => write!(
                 f,
                 "near a singular pose the tip cannot move and turn in every direction; move the arm away from it"
+            ),
+            Fault::Oscillation {
+                joint,
+                value_rad_per_s,
+                limit_rad_per_s,
+            } => write!(
+                f,
+                "{} oscillates ever faster, at {value_rad_per_s:.3} rad/s, limit {limit_rad_per_s:.3} rad/s: torques or \
+                 angles come late, or the gains are too high",
+                label(joint)
             ),
             Fault::MassMatrix => write!(f, "mass matrix is not positive definite"),
             Fault::TorqueNotFinite { term } => {

@@ -21,6 +21,7 @@ mod mode;
 mod motion_check;
 mod nullspace;
 pub mod observer;
+mod oscillation;
 mod output;
 mod plausibility;
 mod pose_gains;

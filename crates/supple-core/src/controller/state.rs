@@ -6,6 +6,7 @@ use super::fault::{Fault, SafeAction};
 use super::gain_ramp::GainRamp;
 use super::handover::{Handover, HandoverFrom, REPEATED_CYCLES};
 use super::mode::Mode;
+use super::oscillation::Oscillation;
 use super::output::Input;
 use super::plausibility::Plausibility;
 use super::pose_gains::PoseGainRamps;
@@ -72,6 +73,7 @@ pub struct State<const N: usize> {
     pub(super) drives_active: bool,
     pub(super) plausibility: Plausibility<N>,
     pub(super) stuck_encoders: StuckEncoders<N>,
+    pub(super) oscillation: Oscillation<N>,
     /// Recent peak of the kinetic energy, with decay; in a fault the peak before it \[J\].
     pub(super) peak_energy_j: f64,
     pub(super) stopping_motion: StoppingMotion<N>,
@@ -115,6 +117,7 @@ impl<const N: usize> State<N> {
             drives_active: false,
             plausibility: Plausibility::default(),
             stuck_encoders: StuckEncoders::default(),
+            oscillation: Oscillation::default(),
             peak_energy_j: 0.0,
             stopping_motion: StoppingMotion::new(0.0, false),
             unexplained_s: 0.0,

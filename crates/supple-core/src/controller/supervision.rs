@@ -6,6 +6,7 @@ use super::checks;
 use super::checks::COMPLIANT_SPEED_SHARE;
 use super::fault::Fault;
 use super::latch::Evidence;
+use super::oscillation::Oscillation;
 use super::plausibility::{JointMotion, PlausibilityInput, falls, joint_collision, tip_collision};
 use super::pose_task::PoseCycle;
 use super::position_limits::PositionLimits;
@@ -121,6 +122,7 @@ impl<const N: usize> State<N> {
             self.observer.reset();
             self.plausibility.suspend(&self.terms.momentum);
             self.stuck_encoders.suspend();
+            self.oscillation = Oscillation::default();
             self.relax_position_limits(config);
             return Ok(Vector3::zeros());
         }
@@ -316,10 +318,15 @@ impl<const N: usize> State<N> {
                 evidence.net_torque_nm,
                 evidence.elapsed_s,
             );
+            let limits_rad_per_s = &config.limits.joint_speed_rad_per_s;
+            let steady = self
+                .oscillation
+                .check(velocity, limits_rad_per_s, evidence.elapsed_s);
             // Not checked in a fault: a stopping arm may be pushed back, and `stop.rs` supervises
             // the stop.
             if !matches!(self.activity, Activity::Fault(_)) {
                 against?;
+                steady?;
             }
             // In contact, joints may be at rest while their references move, at a few newtons per metre also some while
             // others move. Encoders that are all stuck make a contact themselves: it counts once they have changed in it.

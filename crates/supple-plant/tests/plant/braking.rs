@@ -42,6 +42,38 @@ fn a_shorted_motor_stops_its_rotor_with_its_time_constant() {
     }
 }
 
+/// Until its first torque acts a motor brakes: a weight never hangs on nothing while the drives become active.
+#[test]
+fn a_released_motor_brakes_until_its_torque_acts() {
+    let joint = Joint {
+        parent_from_link: Pose::IDENTITY,
+        axis: Vector3::z(),
+        body: Body::ball(1e-6, 1e-3, Vector3::zeros()),
+        armature_kg_m2: 200.0,
+    };
+    let arm = Arm::new(&[joint], Pose::IDENTITY, None, Vector3::zeros()).expect("valid");
+    let (delay_cycles, braking, command_nm) = (3, 5.0, 2.0);
+    let mut config = PlantConfig::ideal(arm);
+    config.actuators.torque_delay_cycles = delay_cycles;
+    config.actuators.braking_nm_s_per_rad = Vector::from([braking]);
+    let mut plant = Plant::new(config, Vector::zeros(), Vector::from([1.0])).expect("valid");
+    for cycle in 0..20 {
+        let is_active = (5..15).contains(&cycle);
+        plant.short_motors([!is_active]);
+        plant.cycle(&Vector::from([if is_active { command_nm } else { 0.0 }]));
+        let torque_nm = plant.truth().motor_torque_nm[0];
+        let acts = (5 + delay_cycles..15 + delay_cycles).contains(&cycle);
+        let brakes = !(5 + delay_cycles..15).contains(&cycle);
+        let speed = plant.truth().velocity_rad_per_s[0];
+        let expected =
+            if acts { command_nm } else { 0.0 } - if brakes { braking * speed } else { 0.0 };
+        assert!(
+            (torque_nm - expected).abs() < 0.02,
+            "{cycle}: {torque_nm} {expected}"
+        );
+    }
+}
+
 /// Through a transmission that couples joints, each shorted motor dissipates `b p'^2`, and the others nothing.
 #[test]
 fn energy_lost_by_the_arm_equals_energy_dissipated_by_the_motors() {

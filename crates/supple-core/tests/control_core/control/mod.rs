@@ -23,6 +23,7 @@ mod motion;
 mod moving;
 mod nullspace;
 mod observing;
+mod oscillation;
 mod posing;
 mod protecting;
 mod refusals;

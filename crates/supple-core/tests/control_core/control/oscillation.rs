@@ -1,0 +1,89 @@
+//! A joint that swings to and fro ever faster is a fault, before it is fast; one that swings otherwise is none.
+
+use crate::support::configs::four;
+use crate::support::plant::{Plant, nothing};
+use crate::support::rig::{Rig, bent};
+use std::collections::VecDeque;
+use std::f64::consts::TAU;
+use supple_core::controller::{Fault, SafeAction};
+use supple_core::{Output, Vector};
+
+/// The arm in gravity hold, with torques that come this much later than the configuration says, after a blow of 0.02 rad/s.
+/// Its output at the first fault within 4 s, with the kinetic energy \[J\].
+fn late(cycles: usize) -> Option<(Output<4>, f64)> {
+    let config = four();
+    let mut rig = Rig::holding(config, bent());
+    let mut plant = Plant::at_rest(config.arm, bent());
+    let mut pending = VecDeque::from(vec![rig.cycle().torque_nm; cycles]);
+    plant.qd[2] += 0.02;
+    for _ in 0..4000 {
+        rig.q = plant.q;
+        let output = rig.cycle();
+        if output.fault.is_some() {
+            let mass_matrix = supple_core::dynamics::crba(&config.arm, &plant.q);
+            return Some((output, 0.5 * plant.qd.dot(&(mass_matrix * plant.qd))));
+        }
+        pending.push_back(output.torque_nm);
+        let acting = pending.pop_front().expect("a torque for each cycle");
+        plant.advance(&acting, nothing, 1e-3, 4);
+    }
+    None
+}
+
+#[test]
+fn torques_that_come_late_are_a_fault_before_the_arm_is_fast() {
+    let most = four().limits.joint_speed_rad_per_s;
+    for cycles in [8, 10, 12] {
+        let (output, energy_j) = late(cycles).expect("a fault");
+        let fault = output.fault.expect("a fault");
+        let Fault::Oscillation {
+            joint,
+            value_rad_per_s,
+            limit_rad_per_s,
+        } = fault
+        else {
+            panic!("{cycles}: {fault}");
+        };
+        assert!(value_rad_per_s > limit_rad_per_s && value_rad_per_s < 0.6 * most[joint]);
+        assert!(energy_j < 0.1, "{cycles}: {energy_j} J");
+        assert_eq!(fault.safe_action(), SafeAction::Idle);
+    }
+    assert!(late(0).is_none());
+}
+
+/// Whether swings of joint 3 with this frequency and first peak, which grow by this factor in each, are a fault.
+fn is_fault(frequency_hz: f64, peak_rad_per_s: f64, growth: f64) -> bool {
+    let mut rig = Rig::holding(four(), bent());
+    let start_s = 20e-3;
+    for cycle in 0..800 {
+        let time_s = 1e-3 * f64::from(cycle);
+        let swings = 2.0 * frequency_hz * (time_s - start_s).max(0.0);
+        let amplitude_rad = peak_rad_per_s * growth.powf(swings) / (TAU * frequency_hz);
+        if amplitude_rad * TAU * frequency_hz > 0.6 {
+            break;
+        }
+        let phase = TAU * frequency_hz * (time_s - start_s).max(0.0);
+        rig.q = bent() + Vector::from([0.0, 0.0, 0.0, amplitude_rad * (1.0 - phase.cos())]);
+        match rig.cycle().fault {
+            None => {}
+            Some(Fault::Oscillation { joint: 3, .. }) => return true,
+            Some(other) => panic!("{frequency_hz} Hz, {growth}: {other}"),
+        }
+    }
+    false
+}
+
+#[test]
+fn only_quick_swings_that_grow_are_a_fault() {
+    for frequency_hz in [8.0, 10.0, 14.0] {
+        assert!(is_fault(frequency_hz, 0.1, 1.15), "{frequency_hz} Hz");
+        assert!(!is_fault(frequency_hz, 0.4, 0.9), "{frequency_hz} Hz");
+        assert!(
+            !is_fault(frequency_hz, 0.05, 1.01),
+            "{frequency_hz} Hz, slow"
+        );
+    }
+    for frequency_hz in [2.0, 4.0, 6.0] {
+        assert!(!is_fault(frequency_hz, 0.1, 1.15), "{frequency_hz} Hz");
+    }
+}
