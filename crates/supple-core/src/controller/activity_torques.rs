@@ -13,6 +13,8 @@ use crate::trajectory::{JointReference, Reference};
 
 /// Share of a joint's torque limit that the spring of the joint impedance mode may use.
 const JOINT_SPRING_SHARE: f64 = 0.25;
+/// Share of the breakaway torque below which a ramp does not move its joint.
+const MOVING_SHARE_OF_BREAKAWAY: f64 = 0.5;
 
 impl<const N: usize> State<N> {
     pub(super) fn reference(&self, config: &Config<N>) -> Option<Reference> {
@@ -307,11 +309,15 @@ impl<const N: usize> State<N> {
             return Ok(());
         }
         self.enter(Activity::GravityHold);
-        if moved_rad * torque_nm < 0.0 && abs(moved_rad) >= ramp.stop_rad {
+        // A smaller torque is not what moves the joint: its gravity torque is wrong, or somebody pushes it.
+        let limit_nm = MOVING_SHARE_OF_BREAKAWAY * config.friction[joint].dry_size_nm(0.0);
+        let value_nm = abs(torque_nm);
+        let is_against = moved_rad * torque_nm < 0.0 && abs(moved_rad) >= ramp.stop_rad;
+        if is_against && value_nm >= limit_nm {
             return Err(Fault::MotionAgainstTorque {
                 joint,
-                value_nm: abs(torque_nm),
-                limit_nm: 0.0,
+                value_nm,
+                limit_nm,
             });
         }
         Ok(())

@@ -137,7 +137,7 @@ pub enum Fault {
         joint: usize,
         /// Net torque on the joint, without gravity and friction \[N m\].
         value_nm: f64,
-        /// Torque above which this is a fault; zero for a breakaway ramp \[N m\].
+        /// Torque above which this is a fault \[N m\].
         limit_nm: f64,
     },
     /// A force along gravity acts on the tip: the model lacks a load, or its gravity is wrong.

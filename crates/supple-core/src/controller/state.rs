@@ -71,6 +71,8 @@ pub struct State<const N: usize> {
     pub(super) terms: Terms<N>,
     /// The motors apply torques.
     pub(super) drives_active: bool,
+    /// Cycle in which the drives became active last.
+    activated_cycle: u64,
     pub(super) plausibility: Plausibility<N>,
     pub(super) stuck_encoders: StuckEncoders<N>,
     pub(super) oscillation: Oscillation<N>,
@@ -115,6 +117,7 @@ impl<const N: usize> State<N> {
             fault: None,
             terms: Terms::default(),
             drives_active: false,
+            activated_cycle: 0,
             plausibility: Plausibility::default(),
             stuck_encoders: StuckEncoders::default(),
             oscillation: Oscillation::default(),
@@ -329,6 +332,9 @@ impl<const N: usize> State<N> {
     pub(super) fn update_drives(&mut self, active: bool) {
         let came_back = active && !self.drives_active;
         self.drives_active = active;
+        if came_back {
+            self.activated_cycle = self.cycle.unwrap_or(0);
+        }
         match self.activity {
             Activity::Idle | Activity::Fault(_) => {}
             Activity::GravityHold if !came_back => {}
@@ -351,6 +357,14 @@ impl<const N: usize> State<N> {
     fn activity_cycles(&self) -> u64 {
         self.cycle
             .map_or(0, |cycle| cycle.wrapping_sub(self.activity_start))
+    }
+
+    /// Whether the drives became active within this time \[s\].
+    pub(super) fn activated_within(&self, config: &Config<N>, time_s: f64) -> bool {
+        let cycles = self
+            .cycle
+            .map_or(0, |cycle| cycle.wrapping_sub(self.activated_cycle));
+        cycles as f64 * config.period_s < time_s
     }
 
     /// Whether the last state is older than tolerated: then only gravity may still be computed from

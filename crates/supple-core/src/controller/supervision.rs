@@ -18,6 +18,12 @@ use crate::math::{Vector, Vector3, abs};
 use crate::model::workspace::WorkspaceViolation;
 use crate::trajectory::Reference;
 
+/// Time for which the elasticity of an arm swings after its drives have become active \[s\]. A motor then accelerates without its
+/// link, and the observer takes it for up to twice the gravity torque.
+const ACTIVATION_S: f64 = 0.05;
+/// Factor of the collision thresholds within it.
+const ACTIVATION_RATIO: f64 = 2.0;
+
 /// Whether the pose is regular, so that the tip force can be estimated from the joint torques.
 fn is_regular<const N: usize>(task: &Task<N>) -> bool {
     task.min_singular_value_m >= SINGULAR_BELOW_M
@@ -280,6 +286,21 @@ impl<const N: usize> State<N> {
         }
     }
 
+    /// A collision, judged again with raised thresholds if the drives have just become active.
+    #[cold]
+    #[inline(never)]
+    fn unless_activated(
+        &self,
+        config: &Config<N>,
+        fault: Fault,
+        check: impl FnOnce(f64) -> Result<(), Fault>,
+    ) -> Result<(), Fault> {
+        match self.activated_within(config, ACTIVATION_S) {
+            true => check(ACTIVATION_RATIO),
+            false => Err(fault),
+        }
+    }
+
     /// Runs the plausibility and collision checks of one cycle.
     fn check_plausibility(
         &mut self,
@@ -349,14 +370,24 @@ impl<const N: usize> State<N> {
         } else {
             (&collision.joint_torque_nm, collision.tip_force_n)
         };
-        joint_collision(joint_torque_nm, &external).map_err(|fault| {
-            self.stuck_encoders
-                .as_stuck_encoder(&config.plausible, encoders, fault)
-        })?;
+        joint_collision(joint_torque_nm, &external)
+            .or_else(|fault| {
+                self.unless_activated(config, fault, |ratio| {
+                    joint_collision(&(joint_torque_nm * ratio), &external)
+                })
+            })
+            .map_err(|fault| {
+                self.stuck_encoders
+                    .as_stuck_encoder(&config.plausible, encoders, fault)
+            })?;
         if !evidence.regular {
             return Ok(());
         }
-        tip_collision(tip_force_n, evidence.force_n)?;
+        tip_collision(tip_force_n, evidence.force_n).or_else(|fault| {
+            self.unless_activated(config, fault, |ratio| {
+                tip_collision(tip_force_n * ratio, evidence.force_n)
+            })
+        })?;
         if evidence.falls || self.holds_still(config) {
             let (gravity, limit_n) = (config.arm.gravity(), config.plausible.load_n);
             self.plausibility.check_unmodelled_load(

@@ -639,12 +639,13 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
     cases
 }
 
-/// The faults of motors and model again, with the effects of a real arm.
+/// Drives that are lost, and the faults of motors and model, again with the effects of a real arm.
 fn realistic_cases(cases: &[Spec]) -> Vec<Spec> {
-    let of_motors = |spec: &&Spec| {
+    let of_drives = |spec: &&Spec| {
         matches!(
             spec.event,
             Event::Nothing { .. }
+                | Event::Drives(DriveShutdown::Idle | DriveShutdown::IdleAtHome)
                 | Event::Injected {
                     kind: InjectionKind::TorqueSign { .. }
                         | InjectionKind::MotorDead { .. }
@@ -659,7 +660,10 @@ fn realistic_cases(cases: &[Spec]) -> Vec<Spec> {
             TestTask::Move | TestTask::Track | TestTask::TrackStiff | TestTask::TrackPose
         )
     };
-    let chosen = cases.iter().filter(of_motors).filter(moving);
+    let lost = |spec: &&Spec| matches!(spec.event, Event::Drives(_));
+    let chosen = cases
+        .iter()
+        .filter(|spec| of_drives(spec) && (moving(spec) || lost(spec)));
     chosen
         .map(|spec| Spec {
             realistic: true,

@@ -95,6 +95,39 @@ fn a_blocked_move_faults_within_20_ms() {
     assert_eq!(output.torques.joint_pd, Vector::<4>::zeros());
 }
 
+/// Time of the collision after a torque begins to act on joint 1, as a multiple of its threshold \[cycles\]. The drives become
+/// active `before` cycles earlier.
+fn collision_after(before: usize, multiple: f64) -> Option<usize> {
+    let config = guarded();
+    let mut plant = Plant::at_rest(config.arm, bent());
+    let mut rig = Rig::holding(config, bent());
+    rig.drives_active = false;
+    rig.rest();
+    rig.drives_active = true;
+    for _ in 0..before {
+        assert_eq!(rig.run(&mut plant).fault, None);
+    }
+    let external_nm = Vector::from([
+        0.0,
+        multiple * config.collision.joint_torque_nm[1],
+        0.0,
+        0.0,
+    ]);
+    (0..100).find(|_| {
+        let output = rig.drive(&mut plant, None, |_, _, _| external_nm);
+        output.fault.is_some()
+    })
+}
+
+/// Cables that swing as the drives become active look like a torque of up to twice what the motors hold.
+#[test]
+fn collision_thresholds_are_doubled_for_50_ms_after_activation() {
+    let later = collision_after(200, 1.5).expect("a collision");
+    assert_eq!(collision_after(5, 1.5), Some(45), "when the 50 ms are over");
+    assert!(later < 45, "{later}");
+    assert!(collision_after(5, 4.0).is_some_and(|cycles| cycles < 40));
+}
+
 /// An unmodelled kilogram in gravity hold.
 #[test]
 fn an_unmodelled_load_faults_within_100_ms() {

@@ -11,7 +11,7 @@ use crate::support::rig::{Rig, bent, ramp};
 use crate::support::size;
 use proptest::prelude::*;
 use supple_core::config::Gains;
-use supple_core::controller::{Fault, Mode, Refusal, Request, SafeAction, check_motion};
+use supple_core::controller::{Breakaway, Fault, Mode, Refusal, Request, SafeAction, check_motion};
 use supple_core::dynamics::kinetic_energy;
 use supple_core::math::Vector3;
 use supple_core::trajectory::Fourier;
@@ -427,4 +427,37 @@ fn a_ramp_ends_with_a_wrong_encoder() {
     assert!(speed < 0.25, "{speed} m/s");
     let (fault, _, mode) = ramped(|true_rad, _| true_rad);
     assert_eq!((fault, mode), (None, Mode::GravityHold));
+}
+
+/// A joint that turns against a ramp of less than half of what makes it slide is pushed, or its gravity torque is wrong; one
+/// that turns against more has a wrong sign.
+#[test]
+fn a_push_against_a_weak_ramp_ends_it_without_a_fault() {
+    for (share, is_fault) in [(0.3, false), (0.7, true)] {
+        let mut config = four();
+        (
+            config.friction[1].coulomb_nm,
+            config.friction[1].breakaway_nm,
+        ) = (2.0, 2.0);
+        let mut rig = Rig::holding(config, bent());
+        let rate_nm_per_s = 1.0;
+        rig.accept(Request::Breakaway(Breakaway {
+            joint: 1,
+            rate_nm_per_s,
+            stop_rad: 0.035,
+            limit_nm: 4.0,
+        }));
+        let cycles = (1e3 * share * 2.0 / rate_nm_per_s) as u32;
+        let fault = (0..cycles + 200).find_map(|cycle| {
+            rig.q[1] -= if cycle > cycles { 4e-4 } else { 0.0 };
+            rig.cycle().fault
+        });
+        assert_eq!(fault.is_some(), is_fault, "{share}: {fault:?}");
+        let expected = if is_fault {
+            Mode::Fault
+        } else {
+            Mode::GravityHold
+        };
+        assert_eq!(rig.cycle().mode, expected);
+    }
 }
