@@ -84,11 +84,16 @@ pub const WRONG_DIRECTION_FAULTS: &[&str] = &[
     "rotation_error",
     "singular",
 ];
-/// The same for angles that come late: until the delay has built up, they do not change.
-const LATE_ENCODER_FAULTS: &[&str] = &extended::<14>(
-    &extended::<13>(WRONG_DIRECTION_FAULTS, "encoder_stuck"),
-    "encoder_unmoved",
+/// The same for angles that come late: until the delay has built up, they do not change; then they make the loop unstable.
+const LATE_ENCODER_FAULTS: &[&str] = &extended::<15>(
+    &extended::<14>(
+        &extended::<13>(WRONG_DIRECTION_FAULTS, "encoder_stuck"),
+        "encoder_unmoved",
+    ),
+    "oscillation",
 );
+/// Valid faults for torques that come so late that the loop is unstable.
+const LATE_TORQUE_FAULTS: &[&str] = &["oscillation", "joint_speed", "joint_collision"];
 /// Valid faults for lost, jumping or non-finite joint angles.
 pub const ENCODER_LOSS_FAULTS: &[&str] = &[
     "encoder_lost",
@@ -503,6 +508,24 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         runs_or_faults(DISTURBANCE_FAULTS),
         LATE_FAULT_AND_STOP_MS,
     );
+    for cycles in [10, 20] {
+        let far_later = injected(Kind::TorqueLate { cycles });
+        add(
+            &[
+                GravityHold,
+                Move,
+                Track,
+                TrackStiff,
+                Float,
+                JointImpedance,
+                TrackPose,
+                Breakaway,
+            ],
+            far_later,
+            runs_or_faults(LATE_TORQUE_FAULTS),
+            LATE_FAULT_AND_STOP_MS,
+        );
+    }
 
     // Unmodelled effects.
     let gravity = Kind::GravityReversed;
