@@ -75,6 +75,6 @@ impl<const N: usize> Activity<N> {
 
     /// Whether the activity commands no torque at all.
     pub fn is_torque_off(&self) -> bool {
-        matches!(self, Activity::Idle | Activity::Fault(SafeAction::Idle))
+        matches!(self, Activity::Idle | Activity::Fault(SafeAction::Brake))
     }
 }

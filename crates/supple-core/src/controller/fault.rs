@@ -190,11 +190,11 @@ pub enum Fault {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SafeAction {
     /// Gravity compensation and damping of the momentum, without any position loop (see `stop.rs`).
-    /// Replaced by [`SafeAction::Idle`] if the arm does not come to rest.
-    GravityHold = 1,
+    /// Replaced by [`SafeAction::Brake`] if the arm does not come to rest.
+    Stop = 1,
     /// No torque, braking drives: the angles or the model cannot be trusted, so the gravity torque
     /// computed from them cannot be either.
-    Idle = 2,
+    Brake = 2,
 }
 
 impl Fault {
@@ -210,8 +210,8 @@ impl Fault {
             | Fault::UnmodelledLoad { .. }
             | Fault::Oscillation { .. }
             | Fault::MassMatrix
-            | Fault::MeasurementNotFinite { joint: Some(_) } => SafeAction::Idle,
-            _ => SafeAction::GravityHold,
+            | Fault::MeasurementNotFinite { joint: Some(_) } => SafeAction::Brake,
+            _ => SafeAction::Stop,
         }
     }
 }

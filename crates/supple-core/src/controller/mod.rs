@@ -29,6 +29,7 @@ mod pose_task;
 mod position_limits;
 mod prepared;
 mod presliding;
+mod request_checks;
 mod requests;
 pub mod residual;
 mod reversed_encoder;

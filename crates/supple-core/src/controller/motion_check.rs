@@ -5,7 +5,7 @@ use super::Controller;
 use super::checks::COMPLIANT_SPEED_SHARE;
 use super::mode::{Refusal, Request};
 use super::pose_task::{DIRECTIONS, pose_reference};
-use super::requests::{active_target, check_pose_joints, check_stops};
+use super::request_checks::{active_target, check_pose_joints, check_stops};
 use crate::config::{Config, Role};
 use crate::dynamics::inverse_kinematics::inverse_kinematics;
 use crate::dynamics::{Terms, terms};

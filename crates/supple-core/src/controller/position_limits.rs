@@ -11,7 +11,7 @@
 
 use crate::config::Limits;
 use crate::math::{Vector, Vector3, abs};
-use crate::model::workspace::{MAX_BOUNDARIES, Workspace};
+use crate::model::workspace::{MAX_BORDERS_OR_ZONES, Workspace};
 
 /// Speed at which the edge of a soft zone returns to its place \[rad/s\]: 50 mm/s at 1 m.
 const EDGE_RAD_PER_S: f64 = 0.05;
@@ -37,7 +37,7 @@ pub(super) struct PositionLimits<const N: usize> {
     pub soft_lower_rad: Vector<N>,
     pub soft_upper_rad: Vector<N>,
     /// Depth in the margin of each border from which its spring pushes \[m\]: zero or more.
-    pub margin_from_m: [f64; MAX_BOUNDARIES],
+    pub margin_from_m: [f64; MAX_BORDERS_OR_ZONES],
     /// Some limit is not that of the configuration.
     pub relaxed: bool,
 }
@@ -50,7 +50,7 @@ impl<const N: usize> PositionLimits<N> {
             upper_rad: limits.position_upper_rad,
             soft_lower_rad: limits.position_lower_rad.add_scalar(limits.soft_zone_rad),
             soft_upper_rad: limits.position_upper_rad.add_scalar(-limits.soft_zone_rad),
-            margin_from_m: [0.0; MAX_BOUNDARIES],
+            margin_from_m: [0.0; MAX_BORDERS_OR_ZONES],
             relaxed: false,
         }
     }

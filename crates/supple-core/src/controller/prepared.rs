@@ -37,7 +37,7 @@ pub struct Controller<const N: usize> {
     pub(super) one_period: EstimatorGains,
     pub(super) torque_step_nm: Vector<N>,
     /// Weights of squared external torques whose sum exceeds one where something pushes the arm \[1/(N m)^2\].
-    pub(super) push_weight_per_nm2: Vector<N>,
+    pub(super) large_torque_weight_per_nm2: Vector<N>,
     /// Force of an unmodelled load times gravity \[N m/s^2\].
     load_n_m_per_s2: f64,
     against: AgainstLimits<N>,
@@ -54,9 +54,8 @@ const DELAY_CYCLES: f64 = 3.5;
 const STOP_TORQUE_S: f64 = 0.005;
 /// Time constant `t_s` with which the safe action stops a motion, as a multiple of the delay.
 const STOP_TIME_CONSTANT_DELAYS: f64 = 4.0;
-/// Fraction of a joint's torque limit above which an external torque pushes an arm that follows a reference: its friction is
-/// known better than this.
-pub(super) const PUSH_SHARE: f64 = 0.05;
+/// Fraction of a joint's torque limit above which an external torque is large: errors of the friction model are smaller.
+pub(super) const LARGE_TORQUE_SHARE: f64 = 0.05;
 
 impl<const N: usize> Controller<N> {
     /// Validates a configuration and builds its controller.
@@ -92,9 +91,9 @@ impl<const N: usize> Controller<N> {
             has_compliance: config.compliance_rad_per_nm != Vector::<N>::zeros(),
             one_period: EstimatorGains::new(config.period_s, config.estimator_rad_per_s),
             torque_step_nm: config.limits.torque_rate_nm_per_s * config.period_s,
-            push_weight_per_nm2: limits.joint_torque_nm.map(|limit_nm| {
-                let strong_nm = PUSH_SHARE * limit_nm;
-                1.0 / (strong_nm * strong_nm)
+            large_torque_weight_per_nm2: limits.joint_torque_nm.map(|limit_nm| {
+                let large_nm = LARGE_TORQUE_SHARE * limit_nm;
+                1.0 / (large_nm * large_nm)
             }),
             load_n_m_per_s2: {
                 let gravity = config.arm.gravity();

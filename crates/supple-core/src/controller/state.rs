@@ -40,10 +40,10 @@ pub struct State<const N: usize> {
     pub(super) stale: u32,
     /// Consecutive lost replies of each encoder.
     pub(super) missing: [u32; N],
-    /// Angles of the links: those of the encoders less the sag.
+    /// Angles of the links: those of the encoders less the elastic deflection.
     pub(super) position: Vector<N>,
     /// What the compliance of the joints makes of gravity \[rad\].
-    pub(super) sag_rad: Vector<N>,
+    pub(super) elastic_deflection_rad: Vector<N>,
     pub(super) estimator: Estimator<N>,
     pub(super) observer: MomentumObserver<N>,
     pub(super) latch: Latch,
@@ -79,8 +79,8 @@ pub struct State<const N: usize> {
     /// Recent peak of the kinetic energy, with decay; in a fault the peak before it \[J\].
     pub(super) peak_energy_j: f64,
     pub(super) stopping_motion: StoppingMotion<N>,
-    /// Time for which an unexplained torque has acted in a fault \[s\].
-    pub(super) unexplained_s: f64,
+    /// Time for which large external torques have acted while the arm follows a reference \[s\].
+    pub(super) large_torque_s: f64,
     /// What is learned of the model.
     pub(super) learned: Learned<N>,
 }
@@ -96,7 +96,7 @@ impl<const N: usize> State<N> {
             stale: 0,
             missing: [0; N],
             position: Vector::zeros(),
-            sag_rad: Vector::zeros(),
+            elastic_deflection_rad: Vector::zeros(),
             estimator: Estimator::at_rest(Vector::zeros()),
             observer: MomentumObserver::default(),
             latch: Latch::new(&config.latch, config.estimator_rad_per_s),
@@ -123,7 +123,7 @@ impl<const N: usize> State<N> {
             oscillation: Oscillation::default(),
             peak_energy_j: 0.0,
             stopping_motion: StoppingMotion::new(0.0, false),
-            unexplained_s: 0.0,
+            large_torque_s: 0.0,
             learned: Learned::new(&config.learned),
         }
     }
@@ -230,7 +230,7 @@ impl<const N: usize> State<N> {
             return Ok(());
         }
         let velocity = self.estimator.velocity_rad_per_s;
-        let expected = self.position + self.sag_rad + velocity * elapsed_s;
+        let expected = self.position + self.elastic_deflection_rad + velocity * elapsed_s;
         let allowed_s = JUMP_OVER_SPEED_LIMIT * elapsed_s;
         for (joint, measured) in measured_rad.iter().enumerate() {
             let limit_rad = config.limits.joint_speed_rad_per_s[joint] * allowed_s;
@@ -274,10 +274,10 @@ impl<const N: usize> State<N> {
     /// From the encoders' angles to those of the links, with gravity at the last angles.
     #[inline(never)]
     fn subtract_sag(&mut self, config: &Config<N>) {
-        self.sag_rad = config
+        self.elastic_deflection_rad = config
             .compliance_rad_per_nm
             .component_mul(&self.terms.gravity);
-        self.position -= self.sag_rad;
+        self.position -= self.elastic_deflection_rad;
     }
 
     /// Latches a fault. The first fault is kept; the safe action can only change from gravity hold
@@ -287,8 +287,8 @@ impl<const N: usize> State<N> {
     pub(super) fn latch_fault(&mut self, controller: &Controller<N>, fault: Fault) {
         match self.activity {
             // `stop.rs` supervises the stop.
-            Activity::Fault(_) if fault.safe_action() == SafeAction::Idle => {
-                self.activity = Activity::Fault(SafeAction::Idle);
+            Activity::Fault(_) if fault.safe_action() == SafeAction::Brake => {
+                self.activity = Activity::Fault(SafeAction::Brake);
             }
             Activity::Fault(_) => {}
             _ => {
@@ -324,7 +324,7 @@ impl<const N: usize> State<N> {
         self.latch = self.latch.restarted();
         self.plausibility.begin();
         self.stuck_encoders.begin();
-        self.unexplained_s = 0.0;
+        self.large_torque_s = 0.0;
     }
 
     /// While the drives are idle, every activity with torque is replaced by gravity hold; when they

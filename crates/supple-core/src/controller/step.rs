@@ -197,7 +197,7 @@ impl<const N: usize> State<N> {
         *torques = self.safe_torques(controller);
         checks::total(torques).unwrap_or_else(|_| {
             // Not even the safe action can be computed.
-            self.activity = Activity::Fault(SafeAction::Idle);
+            self.activity = Activity::Fault(SafeAction::Brake);
             *torques = Torques::zeros();
             Vector::zeros()
         })

@@ -4,7 +4,8 @@
 //! tau = G - k p / t_stop        p = H qd        0 <= k <= 1        t_stop = 4 delay
 //! ```
 //!
-//! with the gravity compensation `G`, the generalised momentum `p`, and a scale `k` that keeps the torque limits.
+//! with the gravity compensation `G`, the generalised momentum `p`, and a scale `k` that keeps the torque limits. A joint whose gravity
+//! compensation alone exceeds its limit does not reduce `k`; its torque is limited alone.
 //!
 //! **It cannot excite the arm.** Its power `-k qd^T H qd / t_stop` takes energy from any motion, as Coriolis torques have
 //! zero power; if a joint or motor limit applies, `k` scales all joints alike, so that this remains true. Without delay every
@@ -17,22 +18,23 @@
 //!
 //! **Braking replaces it** (no torque, drives that short their motors) if the arm does not come to rest because of a defective
 //! encoder, a defective motor or a wrong model. The arm *moves* if a joint or the tip is faster than a fifth of its speed limit;
-//! external torques are *strong* if the norm of `tau_i / limit_i` over the joints exceeds a twentieth. The drives brake
+//! external torques are *large* if the norm of `tau_i / limit_i` over the joints exceeds a twentieth. The drives brake
 //!
 //! 1. if the fault is one of motion and, at the fault or within the delay of the loop after it, the external torques look like
-//!    those of a missing or reversed gravity compensation, see `is_driven_by_weight`. Dead motors, reversed motors and gravity
+//!    those of a missing or reversed gravity compensation, see `resembles_gravity_failure`. Dead motors, reversed motors and gravity
 //!    of the wrong sign cause them. Excluded are an obstacle, which takes power from the arm, and an impact, which causes larger torques;
-//! 2. if the arm moves and its kinetic energy exceeds 1.2 times its peak up to the fault, see `stopping_motion.rs`;
+//! 2. if the arm moves and its kinetic energy exceeds 1.2 times its recent peak (decaying within 0.2 s, and including the first
+//!    averaging window after the fault), see `stopping_motion.rs`;
 //! 3. if the arm still moves 0.2 s after the fault;
 //! 4. if an external torque above a tenth of a joint's limit acts for 50 ms, either later than 0.15 s after the fault or at a
 //!    joint whose encoder is unchanged and may be stuck;
-//! 5. at once, if a speed limit was exceeded after strong external torques had acted for 50 ms, while the arm followed a
+//! 5. at once, if a speed limit was exceeded after large external torques had acted for 50 ms, while the arm followed a
 //!    reference out of contact.
 
 use super::Controller;
 use super::activity::Activity;
 use super::fault::{Fault, SafeAction};
-use super::prepared::PUSH_SHARE;
+use super::prepared::LARGE_TORQUE_SHARE;
 use super::state::State;
 use super::stopping_motion::is_moving;
 use crate::law::impedance::Torques;
@@ -42,17 +44,19 @@ use crate::math::{Vector, Vector3, abs};
 const ESTIMATOR_SETTLING_DELAYS: f64 = 2.0;
 /// Time within which the arm must become slower than a fifth of its speed limits \[s\].
 pub(crate) const STOP_TIMEOUT_S: f64 = 0.2;
-/// Fraction of a joint's torque limit above which an external torque would move a joint at rest.
-const UNEXPLAINED_SHARE: f64 = 0.1;
+/// Fraction of a joint's torque limit above which an external torque in a fault would move a joint at rest.
+const RESIDUAL_TORQUE_SHARE: f64 = 0.1;
 /// Time for which such a torque may act \[s\].
-const UNEXPLAINED_S: f64 = 0.05;
+const RESIDUAL_TORQUE_S: f64 = 0.05;
+/// Time for which large external torques act before a speed limit is exceeded, where the drives brake at once \[s\].
+const LARGE_TORQUE_S: f64 = 0.05;
 /// Time after which an impact and the observer's response to it have decayed \[s\].
 const IMPACT_S: f64 = 0.15;
-/// Ratio of an estimated inertial torque to the largest that reversed motors cause above which it is that of an impact. Greater
-/// than one, because a motor behind an elastic cable has only a part of the joint's inertia and accelerates faster.
+/// Ratio of the estimated inertial torque to the largest that reversed motors can cause, above which an impact is assumed. Greater
+/// than one, because a motor that drives through an elastic cable accelerates against its rotor's inertia alone.
 const IMPACT_RATIO: f64 = 4.0;
-/// Minimum speed of an arm that its weight drives: the mean over the joints, weighted with the external torques, of the speed as a
-/// fraction of its limit.
+/// Minimum power of the external torques where gravity compensation fails, as a fraction of what they would have with every joint at
+/// its speed limit in their direction.
 const MIN_SPEED_FRACTION: f64 = 0.05;
 /// Maximum ratio of the external torque to the gravity compensation if that is missing or reversed: two for a reversed one, and
 /// one for the torque that a position loop adds.
@@ -96,13 +100,13 @@ impl<const N: usize> State<N> {
         let velocity = self.estimator.velocity_rad_per_s;
         let energy_j = 0.5 * self.terms.momentum.dot(&velocity);
         let config = controller.config();
-        if !matches!(self.activity, Activity::Fault(SafeAction::GravityHold)) {
+        if !matches!(self.activity, Activity::Fault(SafeAction::Stop)) {
             let kept = (1.0 - elapsed_s / ENERGY_PEAK_DECAY_S).max(0.0);
             self.peak_energy_j = energy_j.max(self.peak_energy_j * kept);
-            if self.is_pushed(controller) && self.follows_reference() {
-                self.unexplained_s += elapsed_s;
+            if self.has_large_external_torque(controller) && self.follows_reference() {
+                self.large_torque_s += elapsed_s;
             } else {
-                self.unexplained_s = 0.0;
+                self.large_torque_s = 0.0;
             }
             return;
         }
@@ -115,29 +119,35 @@ impl<const N: usize> State<N> {
         let late = time_s > STOP_TIMEOUT_S && is_moving(&config.limits, &velocity, tip_velocity);
         // The observer follows the velocity estimate.
         let settling_s = ESTIMATOR_SETTLING_DELAYS * controller.delay_s();
-        self.unexplained_s = if time_s > settling_s && self.has_unexplained_torque(controller) {
-            self.unexplained_s + elapsed_s
-        } else {
-            0.0
+        let residual = time_s > settling_s && self.has_residual_torque(controller);
+        let motion = &mut self.stopping_motion;
+        motion.residual_torque_s = match residual {
+            true => motion.residual_torque_s + elapsed_s,
+            false => 0.0,
         };
-        let driven = time_s <= controller.delay_s()
+        let gravity_fails = time_s <= controller.delay_s()
             && self.fault.is_some_and(|fault| is_of_motion(&fault))
-            && self.is_driven_by_weight(controller, self.stopping_motion.follows_reference);
-        if accelerates || late || driven || self.unexplained_s > UNEXPLAINED_S {
-            self.activity = Activity::Fault(SafeAction::Idle);
+            && self.resembles_gravity_failure(controller, self.stopping_motion.follows_reference);
+        if accelerates
+            || late
+            || gravity_fails
+            || self.stopping_motion.residual_torque_s > RESIDUAL_TORQUE_S
+        {
+            self.activity = Activity::Fault(SafeAction::Brake);
         }
     }
 
     /// The safe action of a fault. The drives brake at once if gravity compensation has failed, or if a speed limit was exceeded
-    /// after strong external torques had acted while the arm followed a reference out of contact: a dead motor causes such
+    /// after large external torques had acted while the arm followed a reference out of contact: a dead motor causes such
     /// torques, and damping by the other motors could accelerate the arm.
     pub(super) fn action_of(&self, controller: &Controller<N>, fault: &Fault) -> SafeAction {
         let too_fast = matches!(fault, Fault::JointSpeed { .. } | Fault::TipSpeed { .. });
         if self.activity.is_torque_off()
-            || too_fast && self.unexplained_s > UNEXPLAINED_S
-            || is_of_motion(fault) && self.is_driven_by_weight(controller, self.follows_reference())
+            || too_fast && self.large_torque_s > LARGE_TORQUE_S
+            || is_of_motion(fault)
+                && self.resembles_gravity_failure(controller, self.follows_reference())
         {
-            SafeAction::Idle
+            SafeAction::Brake
         } else {
             fault.safe_action()
         }
@@ -152,30 +162,35 @@ impl<const N: usize> State<N> {
         !(may_be_led || self.latch.in_contact())
     }
 
-    /// Whether the external torques are strong.
-    fn is_pushed(&self, controller: &Controller<N>) -> bool {
+    /// Whether the external torques are large.
+    fn has_large_external_torque(&self, controller: &Controller<N>) -> bool {
         let external_nm = self.observer.external_torque_nm();
         let squares = external_nm.component_mul(&external_nm);
-        squares.dot(&controller.push_weight_per_nm2) > 1.0
+        squares.dot(&controller.large_torque_weight_per_nm2) > 1.0
     }
 
     /// Whether the external torques look like those of a missing or reversed gravity compensation:
     ///
-    /// - they are strong, their power is positive, and the arm accelerates;
-    /// - at every joint where they are strong, their ratio to the gravity compensation is within the limits, with the same sign
+    /// - they are large, their power is positive, and the arm accelerates;
+    /// - at every joint where they are large, their ratio to the gravity compensation is within the limits, with the same sign
     ///   at all joints;
     /// - no joint accelerates as in an impact.
     #[cold]
     #[inline(never)]
-    fn is_driven_by_weight(&self, controller: &Controller<N>, follows_reference: bool) -> bool {
+    fn resembles_gravity_failure(
+        &self,
+        controller: &Controller<N>,
+        follows_reference: bool,
+    ) -> bool {
         let config = controller.config();
         let external_nm = self.observer.external_torque_nm();
         let slow = config.limits.joint_speed_rad_per_s * MIN_SPEED_FRACTION;
         let power_w = external_nm.dot(&self.estimator.velocity_rad_per_s);
-        if !(self.is_pushed(controller) && power_w > external_nm.abs().dot(&slow)) {
+        if !(self.has_large_external_torque(controller) && power_w > external_nm.abs().dot(&slow)) {
             return false;
         }
-        let innovation_rad = self.position + self.sag_rad - self.estimator.position_rad;
+        let innovation_rad =
+            self.position + self.elastic_deflection_rad - self.estimator.position_rad;
         let gains = controller.estimator_gains(1);
         let inertial_torque_nm =
             self.terms.mass_matrix * gains.acceleration_rad_per_s2(&innovation_rad);
@@ -187,32 +202,33 @@ impl<const N: usize> State<N> {
             false => MIN_GRAVITY_RATIO_GUIDED,
         };
         let against_weight = external_nm.dot(&self.terms.gravity) > 0.0;
-        let mut driven = false;
+        let mut any_multiple = false;
         let all_consistent = (0..N).all(|joint| {
             let (external, gravity) = (external_nm[joint], self.terms.gravity[joint]);
-            let strong_nm = PUSH_SHARE * config.limits.joint_torque_nm[joint];
+            let large_nm = LARGE_TORQUE_SHARE * config.limits.joint_torque_nm[joint];
             let reversed_nm = MAX_GRAVITY_RATIO * abs(gravity);
-            let struck = abs(inertial_torque_nm[joint]) > IMPACT_RATIO * (reversed_nm + strong_nm);
-            let weak = abs(external) <= strong_nm;
+            let struck = abs(inertial_torque_nm[joint]) > IMPACT_RATIO * (reversed_nm + large_nm);
+            let small = abs(external) <= large_nm;
             let multiple = (external * gravity > 0.0) == against_weight
                 && (min_ratio * abs(gravity)..=reversed_nm).contains(&abs(external));
-            driven |= !weak && multiple;
-            (weak || multiple) && !struck
+            any_multiple |= !small && multiple;
+            (small || multiple) && !struck
         });
-        driven && all_consistent
+        any_multiple && all_consistent
     }
 
     /// Whether an external torque acts that should move the arm: on a joint with an unchanged
     /// encoder, or on any joint after an impact has decayed.
-    fn has_unexplained_torque(&self, controller: &Controller<N>) -> bool {
+    fn has_residual_torque(&self, controller: &Controller<N>) -> bool {
         let (config, encoders) = (controller.config(), controller.encoders());
         let external_nm = self.observer.external_torque_nm();
         let limits = &config.limits;
         let settled = self.activity_s(config) > IMPACT_S;
         (0..N).any(|joint| {
             let torque_nm = abs(external_nm[joint]);
-            let strong = UNEXPLAINED_SHARE * limits.joint_torque_nm[joint];
-            torque_nm > strong && (settled || self.stuck_encoders.any_unchanged_of(encoders, joint))
+            let threshold_nm = RESIDUAL_TORQUE_SHARE * limits.joint_torque_nm[joint];
+            torque_nm > threshold_nm
+                && (settled || self.stuck_encoders.any_unchanged_of(encoders, joint))
         })
     }
 }

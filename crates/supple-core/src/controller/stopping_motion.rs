@@ -21,6 +21,8 @@ pub(super) struct StoppingMotion<const N: usize> {
     allowed_j: f64,
     /// Whether nobody was expected to move the arm.
     pub follows_reference: bool,
+    /// Time for which an external torque that would move a joint at rest has acted in the fault \[s\].
+    pub residual_torque_s: f64,
 }
 
 impl<const N: usize> StoppingMotion<N> {
@@ -31,6 +33,7 @@ impl<const N: usize> StoppingMotion<N> {
             count: 0,
             allowed_j: before_j,
             follows_reference,
+            residual_torque_s: 0.0,
         }
     }
 

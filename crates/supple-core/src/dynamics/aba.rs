@@ -127,7 +127,7 @@ fn forward_dynamics<const N: usize, const G: usize>(
 /// Articulated body of link `i` alone.
 #[inline(always)]
 fn link<const N: usize>(arm: &Arm<N>, i: usize, angular_velocity: V3) -> Articulated {
-    let body = |k: usize| arm.rows.body(k, i);
+    let body = |k: usize| arm.rows.inertial_parameter(k, i);
     let (mass, h) = (body(0), [body(1), body(2), body(3)]);
     let a = core::array::from_fn(|k| body(4 + k));
     Articulated {

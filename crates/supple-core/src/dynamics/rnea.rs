@@ -4,7 +4,7 @@
 //! from the base.
 #![allow(
     clippy::needless_range_loop,
-    reason = "joints, groups and lanes are counted: each index goes into several arrays"
+    reason = "each index is used in several arrays"
 )]
 
 use super::body_motion::body_motions;
@@ -40,26 +40,26 @@ fn inverse_dynamics<const N: usize, const G: usize>(
     let (mut force, mut moment) = ([0.0; 3], [0.0; 3]);
     for i in (0..N).rev() {
         let motion = &motions[i];
-        let body = |k: usize| arm.rows.body(k, i);
-        let h = [body(1), body(2), body(3)];
-        let inertia = |v: V3| -> V3 {
+        let body = |k: usize| arm.rows.inertial_parameter(k, i);
+        let mass_moment = [body(1), body(2), body(3)];
+        let inertia_times = |v: V3| -> V3 {
             [
                 dot([body(4), body(5), body(7)], v),
                 dot([body(5), body(6), body(8)], v),
                 dot([body(7), body(8), body(9)], v),
             ]
         };
-        moment = add(moment, inertia(motion.angular_acceleration));
-        moment = add_cross(moment, h, motion.accel);
+        moment = add(moment, inertia_times(motion.angular_acceleration));
+        moment = add_cross(moment, mass_moment, motion.accel);
         moment = add_cross(
             moment,
             motion.angular_velocity,
-            inertia(motion.angular_velocity),
+            inertia_times(motion.angular_velocity),
         );
         tau[i] = arm.armature[i].multiply_add(qdd[i], moment[2]);
         if i > 0 {
             force = add_scaled(force, motion.accel, body(0));
-            force = add_rotated(force, &motion.acceleration_gradient, h);
+            force = add_rotated(force, &motion.acceleration_gradient, mass_moment);
             let r = joint_values(&rotations, i);
             let origin = arm.links[i].parent_from_joint.translation.data.0[0];
             force = rotate(&r, force);
@@ -72,28 +72,35 @@ fn inverse_dynamics<const N: usize, const G: usize>(
 /// Joint torques that hold the arm still against gravity, `G(q)` \[N m\].
 #[inline]
 pub fn gravity<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> Vector<N> {
-    in_groups!(N, weights(arm, q))
+    in_groups!(N, gravity_torques(arm, q))
 }
 
 #[inline]
-fn weights<const N: usize, const G: usize>(arm: &Arm<N>, q: &Vector<N>) -> Vector<N> {
+fn gravity_torques<const N: usize, const G: usize>(arm: &Arm<N>, q: &Vector<N>) -> Vector<N> {
     let rotations = parent_rotations::<N, G>(arm, q);
-    let mut falls = [[0.0; 3]; N];
-    let mut fall = arm.gravity.data.0[0];
+    let mut gravity_in_joints = [[0.0; 3]; N];
+    let mut gravity_in_joint = arm.gravity.data.0[0];
     for i in 0..N {
-        fall = rotate_back(&joint_values(&rotations, i), fall);
-        falls[i] = fall;
+        gravity_in_joint = rotate_back(&joint_values(&rotations, i), gravity_in_joint);
+        gravity_in_joints[i] = gravity_in_joint;
     }
-    let (mut mass, mut moment) = (0.0, [0.0; 3]);
+    let (mut outboard_mass, mut mass_moment) = (0.0, [0.0; 3]);
     let mut tau = Vector::zeros();
     for i in (0..N).rev() {
-        let body = |k: usize| arm.rows.body(k, i);
-        mass += body(0);
-        moment = add(moment, [body(1), body(2), body(3)]);
-        tau[i] = moment[1].multiply_add(falls[i][0], -(moment[0] * falls[i][1]));
+        let body = |k: usize| arm.rows.inertial_parameter(k, i);
+        outboard_mass += body(0);
+        mass_moment = add(mass_moment, [body(1), body(2), body(3)]);
+        tau[i] = mass_moment[1].multiply_add(
+            gravity_in_joints[i][0],
+            -(mass_moment[0] * gravity_in_joints[i][1]),
+        );
         if i > 0 {
             let origin = arm.links[i].parent_from_joint.translation.data.0[0];
-            moment = add_scaled(rotate(&joint_values(&rotations, i), moment), origin, mass);
+            mass_moment = add_scaled(
+                rotate(&joint_values(&rotations, i), mass_moment),
+                origin,
+                outboard_mass,
+            );
         }
     }
     tau

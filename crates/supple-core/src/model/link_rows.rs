@@ -86,9 +86,10 @@ impl<const N: usize> LinkRows<N> {
         only_joints::<9, N, G>(self.groups(CENTRAL))
     }
 
-    /// Number `k` of the body of link `i`.
+    /// Inertial parameter `k` of link `i`: 0 its mass, 1 to 3 its first moment, 4 to 9 its inertia `xx, xy, yy, xz, yz, zz`
+    /// about the origin of the joint frame.
     #[inline(always)]
-    pub fn body(&self, k: usize, i: usize) -> f64 {
+    pub fn inertial_parameter(&self, k: usize, i: usize) -> f64 {
         self.rows[BODY + k][i]
     }
 

@@ -8,7 +8,7 @@
 use crate::math::{Vector3, abs, sqrt};
 
 /// Maximum number of borders, and of zones.
-pub const MAX_BOUNDARIES: usize = 8;
+pub const MAX_BORDERS_OR_ZONES: usize = 8;
 
 /// Speed beyond a border that counts as moving outwards \[m/s\].
 const OUTWARD_SPEED_M_PER_S: f64 = 0.01;
@@ -52,9 +52,9 @@ pub struct Zone {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Workspace {
     /// Borders, the used entries first.
-    pub borders: [Option<Border>; MAX_BOUNDARIES],
+    pub borders: [Option<Border>; MAX_BORDERS_OR_ZONES],
     /// Zones, the used entries first.
-    pub zones: [Option<Zone>; MAX_BOUNDARIES],
+    pub zones: [Option<Zone>; MAX_BORDERS_OR_ZONES],
     /// Width of the margin before each border \[m\], positive.
     pub margin_m: f64,
     /// Stiffness in the margin \[N/m\], zero or more.
@@ -127,8 +127,8 @@ impl Zone {
 impl Workspace {
     /// No border and no zone.
     pub const UNBOUNDED: Workspace = Workspace {
-        borders: [None; MAX_BOUNDARIES],
-        zones: [None; MAX_BOUNDARIES],
+        borders: [None; MAX_BORDERS_OR_ZONES],
+        zones: [None; MAX_BORDERS_OR_ZONES],
         margin_m: 0.05,
         stiffness_n_per_m: 0.0,
         damping_n_s_per_m: 0.0,
@@ -194,7 +194,7 @@ impl Workspace {
         &self,
         tip_m: &Vector3<f64>,
         velocity_m_per_s: &Vector3<f64>,
-        margin_from_m: &[f64; MAX_BOUNDARIES],
+        margin_from_m: &[f64; MAX_BORDERS_OR_ZONES],
     ) -> Vector3<f64> {
         let mut force = Vector3::zeros();
         for (border, from_m) in self.borders.iter().zip(margin_from_m) {

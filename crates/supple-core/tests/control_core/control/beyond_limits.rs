@@ -49,7 +49,7 @@ fn resting<const N: usize>(
                 tip_force_n: Some(Vector3::repeat(f64::NAN)),
                 ..rig.input()
             });
-            assert_eq!(output.safe_action, Some(SafeAction::GravityHold));
+            assert_eq!(output.safe_action, Some(SafeAction::Stop));
             rig.rest();
             (rig, Some(Request::Reset))
         }

@@ -25,12 +25,12 @@ pub fn latched(mut rig: Rig<4>, first: &Output<4>, action: SafeAction) {
     let output = rig.rest();
     assert_eq!((output.mode, output.fault), (Mode::Fault, Some(fault)));
     match action {
-        SafeAction::Idle => {
+        SafeAction::Brake => {
             assert_eq!(output.torque_nm, Vector::<4>::zeros());
             assert_eq!(first.fallback_torque_nm, Vector::<4>::zeros());
             assert_eq!(output.fallback_torque_nm, Vector::<4>::zeros());
         }
-        SafeAction::GravityHold => {
+        SafeAction::Stop => {
             let config = rig.controller.config();
             let held = gravity(&config.arm, &rig.q);
             let total = output.torques.total();
@@ -48,8 +48,8 @@ pub fn latched(mut rig: Rig<4>, first: &Output<4>, action: SafeAction) {
     });
     assert_eq!((output.mode, output.fault), (Mode::Fault, Some(fault)));
     let expected = match action {
-        SafeAction::GravityHold => Mode::GravityHold,
-        SafeAction::Idle => Mode::Idle,
+        SafeAction::Stop => Mode::GravityHold,
+        SafeAction::Brake => Mode::Idle,
     };
     let output = rig.request(Request::Reset);
     assert_eq!((output.mode, output.fault), (expected, None));
@@ -67,7 +67,7 @@ fn measurements_that_are_not_finite_fault() {
             let output = rig.step(&input);
             let expected = Fault::MeasurementNotFinite { joint: Some(joint) };
             assert_eq!(output.fault, Some(expected));
-            latched(rig, &output, SafeAction::Idle);
+            latched(rig, &output, SafeAction::Brake);
         }
         for axis in 0..3 {
             let mut rig = Rig::holding(four(), bent());
@@ -78,7 +78,7 @@ fn measurements_that_are_not_finite_fault() {
             let output = rig.step(&input);
             let expected = Fault::MeasurementNotFinite { joint: None };
             assert_eq!(output.fault, Some(expected));
-            latched(rig, &output, SafeAction::GravityHold);
+            latched(rig, &output, SafeAction::Stop);
         }
     }
 }
@@ -113,7 +113,7 @@ fn an_infinite_term_is_a_fault_and_not_a_clamp() {
     );
     let weight = gravity(&rig.controller.config().arm, &rig.q);
     assert!((output.torque_nm - weight).norm() < 1e-6);
-    latched(rig, &output, SafeAction::GravityHold);
+    latched(rig, &output, SafeAction::Stop);
 }
 
 /// Finite terms with an infinite sum: the safe action contains none of them.

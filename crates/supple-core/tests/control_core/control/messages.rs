@@ -4,23 +4,23 @@ use std::collections::BTreeSet;
 use supple_core::controller::{Fault, SafeAction};
 
 /// Faults, the fragments that their messages must contain, and their safe actions.
-fn faults() -> [(Fault, &'static [&'static str], SafeAction); 13] {
-    use SafeAction::{GravityHold, Idle};
+fn faults() -> [(Fault, &'static [&'static str], SafeAction); 14] {
+    use SafeAction::{Brake, Stop};
     [
         (
             Fault::MeasurementNotFinite { joint: Some(2) },
             &["joint 2", "not a finite number"],
-            Idle,
+            Brake,
         ),
         (
             Fault::MeasurementNotFinite { joint: None },
             &["tip force", "not a finite number"],
-            GravityHold,
+            Stop,
         ),
         (
             Fault::EncoderLost { joint: 3 },
             &["joint 3", "encoder"],
-            Idle,
+            Brake,
         ),
         (
             Fault::StateStale {
@@ -28,7 +28,7 @@ fn faults() -> [(Fault, &'static [&'static str], SafeAction); 13] {
                 limit: 2,
             },
             &["7 cycles", "2 are tolerated"],
-            GravityHold,
+            Stop,
         ),
         (
             Fault::StateOutOfOrder {
@@ -36,7 +36,7 @@ fn faults() -> [(Fault, &'static [&'static str], SafeAction); 13] {
                 received: 12,
             },
             &["12 came after 41"],
-            GravityHold,
+            Stop,
         ),
         (
             Fault::JointPosition {
@@ -45,7 +45,7 @@ fn faults() -> [(Fault, &'static [&'static str], SafeAction); 13] {
                 limit_rad: 2.0,
             },
             &["joint 1", "2.0625 rad", "2.0000 rad"],
-            GravityHold,
+            Stop,
         ),
         (
             Fault::JointSpeed {
@@ -54,7 +54,7 @@ fn faults() -> [(Fault, &'static [&'static str], SafeAction); 13] {
                 limit_rad_per_s: 2.0,
             },
             &["joint 0", "2.250 rad/s", "2.000 rad/s"],
-            GravityHold,
+            Stop,
         ),
         (
             Fault::TipSpeed {
@@ -62,7 +62,7 @@ fn faults() -> [(Fault, &'static [&'static str], SafeAction); 13] {
                 limit_m_per_s: 1.0,
             },
             &["1.250 m/s", "1.000 m/s"],
-            GravityHold,
+            Stop,
         ),
         (
             Fault::TrackingError {
@@ -70,7 +70,7 @@ fn faults() -> [(Fault, &'static [&'static str], SafeAction); 13] {
                 limit_m: 0.25,
             },
             &["0.375 m", "0.250 m"],
-            GravityHold,
+            Stop,
         ),
         (
             Fault::EncoderJump {
@@ -79,7 +79,7 @@ fn faults() -> [(Fault, &'static [&'static str], SafeAction); 13] {
                 limit_rad: 0.0625,
             },
             &["joint 3", "0.5000 rad", "0.0625 rad"],
-            Idle,
+            Brake,
         ),
         (
             Fault::JointTrackingError {
@@ -88,13 +88,22 @@ fn faults() -> [(Fault, &'static [&'static str], SafeAction); 13] {
                 limit_rad: 0.125,
             },
             &["joint 2", "0.2500 rad", "0.1250 rad"],
-            GravityHold,
+            Stop,
         ),
-        (Fault::MassMatrix, &["mass matrix"], Idle),
+        (Fault::MassMatrix, &["mass matrix"], Brake),
+        (
+            Fault::Oscillation {
+                joint: 2,
+                value_rad_per_s: 0.375,
+                limit_rad_per_s: 0.25,
+            },
+            &["joint 2", "0.375 rad/s", "0.250 rad/s", "late"],
+            Brake,
+        ),
         (
             Fault::TorqueNotFinite { term: "damping" },
             &["damping", "not a finite number"],
-            GravityHold,
+            Stop,
         ),
     ]
 }

@@ -43,7 +43,7 @@ fn joint_position() {
             };
             assert_eq!(output.fault, Some(expected));
             rig.q[joint] = limit_rad;
-            latched(rig, &output, SafeAction::GravityHold);
+            latched(rig, &output, SafeAction::Stop);
         }
     }
 }
@@ -91,7 +91,7 @@ fn joint_speed() {
             };
             assert_eq!(output.fault, Some(expected));
             assert!(limit_kept && value_rad_per_s > 0.6 && value_rad_per_s < 0.601);
-            latched(rig, &output, SafeAction::GravityHold);
+            latched(rig, &output, SafeAction::Stop);
         }
     }
 }
@@ -119,7 +119,7 @@ fn tip_speed() {
     };
     assert!((value - value_m_per_s).abs() < 1e-15 && limit_m_per_s == 0.3);
     assert!(limit_kept && value > 0.3 && value < 0.301);
-    latched(rig, &output, SafeAction::GravityHold);
+    latched(rig, &output, SafeAction::Stop);
 }
 
 #[test]
@@ -142,7 +142,7 @@ fn tracking_error() {
             panic!("{:?}", output.fault);
         };
         assert!(limit_m == 0.1 && value_m > 0.1 && value_m < last + 1e-3);
-        latched(rig, &output, SafeAction::GravityHold);
+        latched(rig, &output, SafeAction::Stop);
     }
 }
 
@@ -167,7 +167,7 @@ fn joint_tracking_error_of_a_held_joint() {
             };
             assert_eq!(output.fault, Some(expected));
             go_back(&mut rig);
-            latched(rig, &output, SafeAction::GravityHold);
+            latched(rig, &output, SafeAction::Stop);
         }
     }
 }
@@ -207,7 +207,7 @@ fn joint_tracking_error_on_a_move() {
         };
         assert_eq!((named, limit_rad), (joint, 0.1));
         assert!(value_rad > 0.1 && value_rad < last + 2e-3);
-        latched(rig, &output, SafeAction::GravityHold);
+        latched(rig, &output, SafeAction::Stop);
     }
 }
 
@@ -251,7 +251,7 @@ fn encoder_jump() {
                 assert!((limit_rad - limit).abs() < 1e-12);
                 assert!((value_rad - 1.001 * limit).abs() < 1e-9);
                 rig.q = bent();
-                latched(rig, &output, SafeAction::Idle);
+                latched(rig, &output, SafeAction::Brake);
             }
         }
     }

@@ -46,7 +46,7 @@ fn torques_that_come_late_are_a_fault_before_the_arm_is_fast() {
         };
         assert!(value_rad_per_s > limit_rad_per_s && value_rad_per_s < 0.6 * most[joint]);
         assert!(energy_j < 0.1, "{cycles}: {energy_j} J");
-        assert_eq!(fault.safe_action(), SafeAction::Idle);
+        assert_eq!(fault.safe_action(), SafeAction::Brake);
     }
     assert!(late(0).is_none());
 }

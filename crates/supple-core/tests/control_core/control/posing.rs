@@ -299,7 +299,7 @@ fn energy_stays_bounded_into_a_singular_pose() {
             };
             now = of_arm + pulled_j(&plant.q);
             max = now.max(max);
-            if output.safe_action == Some(SafeAction::Idle) {
+            if output.safe_action == Some(SafeAction::Brake) {
                 break;
             }
         }

@@ -382,7 +382,7 @@ fn stops<const N: usize>(case: &Case) -> Outcome {
         let hidden = matches!(case.defect, Defect::Stuck(joint) if seen[joint] < 0.8);
         prop_assert!(simulated.qd.iter().all(|v| v.is_finite()));
         if output.torque_off {
-            prop_assert_eq!(output.safe_action, Some(SafeAction::Idle));
+            prop_assert_eq!(output.safe_action, Some(SafeAction::Brake));
             return Ok(());
         }
         let energy_j = simulated.energy_j();

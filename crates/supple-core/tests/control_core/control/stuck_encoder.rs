@@ -29,7 +29,7 @@ fn a_stuck_encoder_faults() {
     }
     let found = (0..100).find(|_| rig.cycle().fault.is_some());
     assert!(found.is_some(), "0.6 rad/s to nothing at once");
-    assert_eq!(rig.state.safe_action(), Some(SafeAction::Idle));
+    assert_eq!(rig.state.safe_action(), Some(SafeAction::Brake));
 }
 
 /// Two motors drive joints 1 and 2 together, as the differential of a WAM: with the encoder of one stuck, the angles of both

@@ -27,7 +27,7 @@ fn struck<const N: usize>(config: Config<N>, speed: &Vector<N>) -> (Rig<N>, Plan
     }
     rig.force_n = Some(Vector3::repeat(f64::NAN));
     let output = rig.run(&mut plant);
-    assert_eq!(output.safe_action, Some(SafeAction::GravityHold));
+    assert_eq!(output.safe_action, Some(SafeAction::Stop));
     rig.force_n = None;
     (rig, plant)
 }

@@ -9,7 +9,7 @@ use supple_core::config::{Border, Collision, Config, Gains, Workspace, Zone};
 use supple_core::controller::{Fault, Mode, Refusal, Request};
 use supple_core::math::Vector3;
 use supple_core::trajectory::{Line, Trajectory};
-use supple_core::workspace::MAX_BOUNDARIES;
+use supple_core::workspace::MAX_BORDERS_OR_ZONES;
 
 fn tip() -> Vector3<f64> {
     Rig::new(four(), bent()).tip()
@@ -17,7 +17,7 @@ fn tip() -> Vector3<f64> {
 
 /// A workspace with this border, which pushes with 400 N/m and 20 N s/m over 50 mm.
 pub(super) fn bordered(border: Border) -> Workspace {
-    let mut borders = [None; MAX_BOUNDARIES];
+    let mut borders = [None; MAX_BORDERS_OR_ZONES];
     borders[0] = Some(border);
     Workspace {
         borders,
@@ -30,7 +30,7 @@ pub(super) fn bordered(border: Border) -> Workspace {
 
 /// A zone around the tip.
 fn zoned(tip_speed_m_per_s: f64, tip_force_n: f64) -> Workspace {
-    let mut zones = [None; MAX_BOUNDARIES];
+    let mut zones = [None; MAX_BORDERS_OR_ZONES];
     zones[0] = Some(Zone {
         lower_m: tip() - Vector3::repeat(0.5),
         upper_m: tip() + Vector3::repeat(0.5),
@@ -79,7 +79,7 @@ fn the_margin_is_a_spring_and_a_damper_towards_the_border() {
         let closing = (-velocity[axis] * away).max(0.0);
         let mut expected = Vector3::zeros();
         expected[axis] = away * (400.0 * depth_m + 20.0 * depth_m / 0.05 * closing);
-        let found = workspace.soft_force(&point, &velocity, &[0.0; MAX_BOUNDARIES]);
+        let found = workspace.soft_force(&point, &velocity, &[0.0; MAX_BORDERS_OR_ZONES]);
         prop_assert!((found - expected).norm() < 1e-9, "{found} {expected}");
         prop_assert_eq!(
             workspace.violated_border(&point).is_some(),
@@ -204,16 +204,16 @@ fn a_zone_bounds_the_speed() {
     let along = |speed: f64| Vector3::new(0.0, speed, 0.0);
     assert_eq!(
         workspace
-            .soft_force(&tip(), &along(0.079), &[0.0; MAX_BOUNDARIES])
+            .soft_force(&tip(), &along(0.079), &[0.0; MAX_BORDERS_OR_ZONES])
             .norm(),
         0.0
     );
-    let slowed = workspace.soft_force(&tip(), &along(0.09), &[0.0; MAX_BOUNDARIES]);
+    let slowed = workspace.soft_force(&tip(), &along(0.09), &[0.0; MAX_BORDERS_OR_ZONES]);
     assert!((slowed - along(-20.0 * 0.01)).norm() < 1e-12, "{slowed}");
     let outside = tip() + Vector3::repeat(0.6);
     assert_eq!(
         workspace
-            .soft_force(&outside, &along(0.09), &[0.0; MAX_BOUNDARIES])
+            .soft_force(&outside, &along(0.09), &[0.0; MAX_BORDERS_OR_ZONES])
             .norm(),
         0.0
     );
