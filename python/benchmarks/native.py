@@ -1,9 +1,9 @@
 """Overhead of batched calls from Python relative to the same loop in Rust.
 
-    python benchmarks/native.py [--samples 2000] [--rounds 60] [--json FILE]
+    python benchmarks/native.py [--arm wam7] [--samples 2000] [--rounds 60] [--json FILE]
 
-Rounds alternate; each takes the minimum of three passes over states that fit in the cache. The result is
-the median of the ratios. Exits with 1 if one is above 1.3.
+Each round times Rust and Python in turn and takes the minimum of three passes over states that fit in the cache. The
+result is the median of the ratios. Exits with 1 if any median is above 1.3.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 //! stiffer.
 
 use crate::rig::{MS, Rig, TestBus};
-use supple_bus::virtual_time::Peer;
+use supple_bus::virtual_time::EmulatedNodes;
 use supple_bus::{FaultKind, FaultRule, Traffic};
 use supple_can_frame::CanId;
 use supple_core::Vector;

@@ -1,7 +1,7 @@
 //! Normal operation: activation, trajectory tracking, and the load of the bus.
 
 use crate::rig::{MS, PERIOD_NS, Rig};
-use supple_bus::virtual_time::Peer;
+use supple_bus::virtual_time::EmulatedNodes;
 use supple_can::BusTime;
 use supple_core::Vector;
 use supple_core::controller::{Mode, Request};

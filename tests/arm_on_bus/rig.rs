@@ -2,7 +2,7 @@
 
 use crate::link::InProcessLink;
 use supple_bus::FaultInjector;
-use supple_bus::virtual_time::{DirectBus, Peer};
+use supple_bus::virtual_time::{DirectBus, EmulatedNodes};
 use supple_can::{CanError, Cycle, Ready, StartupConfig, start_up};
 use supple_core::controller::Request;
 use supple_core::{Controller, Vector};

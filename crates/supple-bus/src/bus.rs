@@ -23,8 +23,8 @@ pub trait Bus {
     /// If the interface or socket fails. Faults that the CAN controller reports are [`Event::Fault`].
     fn receive_until(&mut self, until_ns: u64) -> Result<Option<Event>, BusError>;
 
-    /// As [`Bus::receive_until`], with lookahead: the caller must not send until `frames` more frames of other nodes have arrived
-    /// or `until_ns` is reached. An emulated arm in another process can then return all these events in one datagram.
+    /// As [`Bus::receive_until`], with lookahead: the caller promises not to send before `frames` more frames of other nodes have
+    /// arrived or `until_ns` is reached. An emulated arm in another process can then return all these events in one datagram.
     ///
     /// # Errors
     /// As [`Bus::receive_until`].
@@ -42,8 +42,8 @@ pub trait Bus {
         true
     }
 
-    /// Total time for which the clock of this bus has been paused relative to CLOCK_MONOTONIC since the bus was opened, because the
-    /// machine of an emulated arm stalled \[ns\].
+    /// Total time for which the clock of this bus has been paused relative to CLOCK_MONOTONIC since the bus was opened, because a
+    /// process of an emulated bus stalled \[ns\].
     fn clock_stall_ns(&self) -> u64 {
         0
     }
@@ -113,7 +113,7 @@ pub enum BusFault {
     Protocol,
     /// The error counters passed the passive limit: the node is error-passive: it no longer sends active error flags.
     Passive,
-    /// Frames were lost because they were not read in time.
+    /// A receive or transmit buffer overflowed, and frames were lost.
     Overrun,
     /// Transceiver fault: a wire is open or shorted.
     Transceiver,
@@ -133,7 +133,7 @@ impl fmt::Display for BusFault {
             BusFault::Warning => "the error counters passed the warning limit",
             BusFault::Protocol => "a frame violated the protocol; check bit rate and termination",
             BusFault::Passive => "the error counters passed the passive limit",
-            BusFault::Overrun => "received frames were lost because they were not read in time",
+            BusFault::Overrun => "a receive or transmit buffer overflowed, and frames were lost",
             BusFault::Transceiver => "the transceiver reports an open or shorted wire",
             BusFault::NoAcknowledge => "no node acknowledged a frame; is the arm on and connected?",
             BusFault::TransmitTimeout => "a frame was not sent in time",

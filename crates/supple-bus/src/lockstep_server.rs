@@ -1,8 +1,8 @@
 //! Server side of the lockstep protocol: one request of the host in progress.
 
 use crate::bus::Event;
+use crate::emulated_nodes::EmulatedNodes;
 use crate::message::{Kind, Message};
-use crate::peer::Peer;
 
 /// A request in progress, with its partial answer.
 #[derive(Debug)]
@@ -27,27 +27,27 @@ impl LockstepServer {
     }
 
     /// Advances the arm by at most `max_ns` of its time; returns the answer once it is complete.
-    pub fn run(&mut self, peer: &mut impl Peer, max_ns: u64) -> Option<&mut Message> {
-        let end_ns = peer.now_ns().saturating_add(max_ns);
+    pub fn run(&mut self, nodes: &mut impl EmulatedNodes, max_ns: u64) -> Option<&mut Message> {
+        let end_ns = nodes.now_ns().saturating_add(max_ns);
         loop {
             // All frames of the request are delivered before the answer.
             let frame = self.request.host_frame(self.delivered);
             if frame.is_none() && self.is_complete() {
-                return Some(self.ended(Kind::Stopped, peer.now_ns()));
+                return Some(self.ended(Kind::Stopped, nodes.now_ns()));
             }
             let until_ns = frame.map_or(self.request.time_ns, |(time_ns, _)| time_ns);
-            let until_ns = until_ns.max(peer.now_ns());
-            match (peer.run_until(until_ns.min(end_ns)), frame) {
+            let until_ns = until_ns.max(nodes.now_ns());
+            match (nodes.run_until(until_ns.min(end_ns)), frame) {
                 (Some(event), _) => {
-                    self.answer.push(peer.now_ns(), event);
+                    self.answer.push(nodes.now_ns(), event);
                     self.frames += u32::from(matches!(event, Event::Frame(_)));
                 }
-                (None, _) if peer.now_ns() < until_ns => return None,
+                (None, _) if nodes.now_ns() < until_ns => return None,
                 (None, Some((_, frame))) => {
-                    peer.host_sends(&frame);
+                    nodes.host_sends(&frame);
                     self.delivered += 1;
                 }
-                (None, None) => return Some(self.ended(Kind::Reached, peer.now_ns())),
+                (None, None) => return Some(self.ended(Kind::Reached, nodes.now_ns())),
             }
         }
     }

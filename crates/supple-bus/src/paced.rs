@@ -1,23 +1,22 @@
-//! An emulated bus in real time: the arm's process owns the time, and the host synchronises it to the wall
-//! clock.
+//! An emulated bus in real time: the arm's process owns the bus time, and the host synchronises it to CLOCK_MONOTONIC.
 //!
 //! A real bus answers within microseconds whatever the load of the machine; an emulating process may not. The
 //! host therefore sends requests as in virtual time ([`LockstepBus`](crate::virtual_time::LockstepBus)), the arm
-//! computes the answer at once, and the host delivers its events when the wall clock reaches their time. If the
-//! arm's process stalls, emulated time pauses for both sides, so that no reply is lost. If the host stalls, it
-//! is late by at most [`MAX_HOST_LATENESS_NS`]; the rest pauses the time too. If the host is silent for
-//! [`PEER_TIMEOUT_NS`], the arm continues without it; if the arm is silent for as long, it counts as powered
-//! off.
+//! computes the answer at once, and the host delivers the events of an answer once the clock reaches the answer's time. If the
+//! arm's process stalls, bus time pauses for both sides, so that no reply is lost. If the host stalls by up to 20 ms, bus time
+//! pauses by what exceeds [`MAX_HOST_LATENESS_NS`]; after a longer stall it does not, because the arm may have continued: if the
+//! host is silent for [`PEER_TIMEOUT_NS`], the arm continues without it. If the arm is silent for as long, it counts as
+//! powered off.
 
 use crate::bus::{Bus, Event};
 use crate::datagram::Side;
+use crate::emulated_nodes::EmulatedNodes;
 use crate::endpoint::{Delivery, Endpoint};
 use crate::error::BusError;
 use crate::folder::OwnerFolder;
 use crate::lockstep_client::{LockstepClient, Next};
 use crate::lockstep_server::LockstepServer;
 use crate::message::{Kind, MAX_BYTES, Message};
-use crate::peer::Peer;
 use crate::wait::wait_readable_until;
 use supple_can_frame::CanFrame;
 use supple_realtime::{monotonic_ns, sleep_until_ns};
@@ -28,14 +27,15 @@ pub const MAX_HOST_LATENESS_NS: u64 = 250_000;
 const STALL_THRESHOLD_NS: u64 = 100_000;
 /// Silence of one side after which the other continues without it \[ns\].
 pub const PEER_TIMEOUT_NS: u64 = 30_000_000;
-/// Stall of the host above which the arm continued without it, so that no time is paused \[ns\].
+/// Stall of the host above which no time is paused, because the arm may have continued without it \[ns\].
 const MAX_HOST_STALL_NS: u64 = 20_000_000;
 
 /// Timeout for the first answer of the arm \[ns\].
 const FIRST_ANSWER_TIMEOUT_NS: u64 = 1_000_000_000;
-/// Maximum time that the arm's side runs or waits before it returns \[ns\].
+/// Maximum bus time that the arm's side runs for a request, and maximum time that it waits for one, before it returns \[ns\].
 const SLICE_NS: u64 = 1_000_000;
-/// Maximum lead of the arm's time over the wall clock \[ns\]; a button press is delayed by at most this.
+/// Maximum lead of bus time over CLOCK_MONOTONIC when a slice begins \[ns\]; a button press is delayed by at most this and a
+/// slice.
 const MAX_LEAD_NS: u64 = 2_000_000;
 
 /// The host's bus.
@@ -43,9 +43,9 @@ const MAX_LEAD_NS: u64 = 2_000_000;
 pub struct PacedBus {
     endpoint: Endpoint,
     client: LockstepClient,
-    /// Last known time of the arm \[ns\].
-    base_ns: u64,
-    /// Offset of the monotonic clock from the arm's time \[ns\].
+    /// Latest bus time that the arm has answered \[ns\].
+    last_answer_ns: u64,
+    /// CLOCK_MONOTONIC less bus time \[ns\].
     offset_ns: u64,
     /// Offset at the start \[ns\]; its growth since then is the paused time.
     first_offset_ns: u64,
@@ -63,7 +63,7 @@ impl PacedBus {
         let mut bus = PacedBus {
             endpoint: Endpoint::new(folder, own, peer)?,
             client: LockstepClient::new(),
-            base_ns: 0,
+            last_answer_ns: 0,
             offset_ns: 0,
             first_offset_ns: 0,
             lost: false,
@@ -76,7 +76,7 @@ impl PacedBus {
             Some(answer) => {
                 bus.offset_ns = answer.offset_ns;
                 bus.first_offset_ns = answer.offset_ns;
-                bus.base_ns = answer.time_ns;
+                bus.last_answer_ns = answer.time_ns;
                 Ok(bus)
             }
             None => Err(bus.no_peer()),
@@ -102,20 +102,23 @@ impl PacedBus {
         }
     }
 
-    /// The wall clock in the arm's time \[ns\].
-    fn wall_ns(&self) -> u64 {
+    /// CLOCK_MONOTONIC as bus time \[ns\].
+    fn clock_as_bus_time_ns(&self) -> u64 {
         monotonic_ns().saturating_sub(self.offset_ns)
     }
 
     /// Pause of emulated time due to the current stall of the host \[ns\].
     fn host_stall_ns(&self) -> u64 {
-        match self.wall_ns().saturating_sub(self.base_ns) {
+        match self
+            .clock_as_bus_time_ns()
+            .saturating_sub(self.last_answer_ns)
+        {
             since if self.lost || since > MAX_HOST_STALL_NS => 0,
             since => since.saturating_sub(MAX_HOST_LATENESS_NS),
         }
     }
 
-    /// Advances the arm to `until_ns`, and waits until the wall clock reaches the answer's time.
+    /// Advances the arm to `until_ns`, and waits until the clock reaches the answer's time.
     fn exchange(&mut self, until_ns: u64, frames: u32) -> Result<(), BusError> {
         self.offset_ns += self.host_stall_ns();
         let until_ns = until_ns.max(self.now_ns());
@@ -126,22 +129,22 @@ impl PacedBus {
         let delivered = self.client.send_request(&self.endpoint)?;
         // Cleared even if not delivered: a frame without a receiver is never confirmed.
         self.client.clear_request();
-        let wall_ns = until_ns + self.offset_ns;
+        let until_monotonic_ns = until_ns + self.offset_ns;
         let deadline_ns = match delivered {
-            Delivery::Delivered if !self.lost => wall_ns + PEER_TIMEOUT_NS,
-            _ => wall_ns,
+            Delivery::Delivered if !self.lost => until_monotonic_ns + PEER_TIMEOUT_NS,
+            _ => until_monotonic_ns,
         };
         let answer = self.answer(deadline_ns)?;
         self.lost = answer.is_none();
         match answer {
             Some(answer) => {
                 self.offset_ns = self.offset_ns.max(answer.offset_ns);
-                self.base_ns = self.base_ns.max(answer.time_ns);
+                self.last_answer_ns = self.last_answer_ns.max(answer.time_ns);
                 let due_ns = requested_ns.max(answer.time_ns + self.offset_ns);
                 self.add_stall(answer.sent_ns.saturating_sub(due_ns));
                 self.sleep_until(answer.time_ns);
             }
-            None => self.base_ns = self.base_ns.max(until_ns),
+            None => self.last_answer_ns = self.last_answer_ns.max(until_ns),
         }
         Ok(())
     }
@@ -154,7 +157,7 @@ impl PacedBus {
     }
 
     fn sleep_until(&self, time_ns: u64) {
-        while self.wall_ns() < time_ns {
+        while self.clock_as_bus_time_ns() < time_ns {
             sleep_until_ns(time_ns + self.offset_ns);
         }
     }
@@ -162,8 +165,8 @@ impl PacedBus {
 
 impl Bus for PacedBus {
     fn now_ns(&self) -> u64 {
-        let wall_ns = self.wall_ns() - self.host_stall_ns();
-        wall_ns.max(self.base_ns)
+        let unpaused_ns = self.clock_as_bus_time_ns() - self.host_stall_ns();
+        unpaused_ns.max(self.last_answer_ns)
     }
 
     fn monotonic_ns(&self, time_ns: u64) -> u64 {
@@ -205,7 +208,7 @@ impl Bus for PacedBus {
 pub struct PacedResponder {
     endpoint: Endpoint,
     offset_ns: u64,
-    /// Time of the host's last request or its answer \[ns\].
+    /// CLOCK_MONOTONIC at the last request received or answer sent \[ns\].
     last_seen_ns: u64,
     /// The host's request in progress.
     server: Option<LockstepServer>,
@@ -226,24 +229,25 @@ impl PacedResponder {
         })
     }
 
-    /// The wall clock in the arm's time \[ns\].
-    fn wall_ns(&self) -> u64 {
+    /// CLOCK_MONOTONIC as bus time \[ns\].
+    fn clock_as_bus_time_ns(&self) -> u64 {
         monotonic_ns().saturating_sub(self.offset_ns)
     }
 
-    /// Serves one slice: advances the arm by up to a millisecond of its time, or waits that long for a request.
+    /// Serves one slice: advances the arm by up to a millisecond of bus time, or waits that long for a request. Without a host it
+    /// advances the arm to the present.
     ///
     /// # Errors
     /// If the socket fails. A missing host is not an error; another may connect.
-    pub fn serve(&mut self, peer: &mut impl Peer) -> Result<(), BusError> {
+    pub fn serve(&mut self, nodes: &mut impl EmulatedNodes) -> Result<(), BusError> {
         let mut bytes = [0; MAX_BYTES];
         if self.server.is_none() {
             self.server = self.next(&mut bytes)?;
         }
         if let Some(server) = &mut self.server {
-            let not_before_ns = peer.now_ns().saturating_sub(MAX_LEAD_NS) + self.offset_ns;
+            let not_before_ns = nodes.now_ns().saturating_sub(MAX_LEAD_NS) + self.offset_ns;
             sleep_until_ns(not_before_ns);
-            if let Some(answer) = server.run(peer, SLICE_NS) {
+            if let Some(answer) = server.run(nodes, SLICE_NS) {
                 answer.offset_ns = self.offset_ns;
                 answer.sent_ns = monotonic_ns();
                 self.last_seen_ns = answer.sent_ns;
@@ -251,8 +255,8 @@ impl PacedResponder {
                 self.server = None;
             }
         } else if monotonic_ns() > self.last_seen_ns + PEER_TIMEOUT_NS {
-            let wall_ns = self.wall_ns();
-            while peer.run_until(wall_ns.max(peer.now_ns())).is_some() {}
+            let present_ns = self.clock_as_bus_time_ns();
+            while nodes.run_until(present_ns.max(nodes.now_ns())).is_some() {}
         }
         Ok(())
     }
@@ -273,7 +277,7 @@ impl PacedResponder {
         }))
     }
 
-    /// Offset of the machine's monotonic clock from the arm's time \[ns\].
+    /// CLOCK_MONOTONIC less bus time \[ns\].
     pub fn offset_ns(&self) -> u64 {
         self.offset_ns
     }

@@ -1,6 +1,6 @@
 //! A bus in virtual time: the arm's side owns the time, which advances only while the host waits.
 //!
-//! In one process the arm is a [`Peer`] inside a [`DirectBus`]. Between processes the host has a
+//! In one process the arm is a [`EmulatedNodes`] inside a [`DirectBus`]. Between processes the host has a
 //! [`LockstepBus`], the arm's process a [`LockstepResponder`]; the two exchange datagrams in the folder of
 //! [`DatagramBus`](crate::DatagramBus).
 //!
@@ -11,23 +11,23 @@
 
 use crate::bus::{Bus, Event};
 use crate::datagram::Side;
+pub use crate::emulated_nodes::EmulatedNodes;
 use crate::endpoint::{Delivery, Endpoint};
 use crate::error::BusError;
 use crate::folder::OwnerFolder;
 use crate::lockstep_client::{LockstepClient, Next};
 use crate::lockstep_server::LockstepServer;
 use crate::message::{Kind, MAX_BYTES, Message};
-pub use crate::peer::Peer;
 use crate::wait::wait_readable_until;
 use rustix::fd::{AsFd, BorrowedFd};
 use supple_can_frame::CanFrame;
 use supple_realtime::monotonic_ns;
 
-/// The host's bus, with the peer in the same process.
+/// The host's bus, with the emulated nodes in the same process.
 #[derive(Debug)]
 pub struct DirectBus<P>(pub P);
 
-impl<P: Peer> Bus for DirectBus<P> {
+impl<P: EmulatedNodes> Bus for DirectBus<P> {
     fn now_ns(&self) -> u64 {
         self.0.now_ns()
     }
@@ -157,7 +157,11 @@ impl LockstepResponder {
     ///
     /// # Errors
     /// If the socket fails. A host that has ended is not an error; another may connect.
-    pub fn serve(&mut self, peer: &mut impl Peer, timeout_ns: u64) -> Result<bool, BusError> {
+    pub fn serve(
+        &mut self,
+        nodes: &mut impl EmulatedNodes,
+        timeout_ns: u64,
+    ) -> Result<bool, BusError> {
         let mut bytes = [0; MAX_BYTES];
         let Some(length) = self.receive_message(&mut bytes, timeout_ns)? else {
             return Ok(false);
@@ -165,7 +169,7 @@ impl LockstepResponder {
         let message = Message::parse(&bytes[..length]);
         // With no limit on the arm's time, one call completes the request.
         if let Some(request) = message.filter(|m| m.kind == Kind::RunUntil)
-            && let Some(answer) = LockstepServer::new(request).run(peer, u64::MAX)
+            && let Some(answer) = LockstepServer::new(request).run(nodes, u64::MAX)
         {
             self.endpoint.send(answer.emit(&mut bytes))?;
         }

@@ -1,7 +1,7 @@
 //! Bit rates of a bus.
 
 use crate::frame::{CanFrame, FrameFormat};
-use crate::timing::{Bits, Shape};
+use crate::timing::{Bits, FrameLayout};
 use core::fmt;
 
 const NS_PER_S: u64 = 1_000_000_000;
@@ -34,7 +34,7 @@ impl BitRates {
     }
 
     /// The fastest format on this bus: FD with a bit rate switch if it has a data rate, else classic.
-    pub const fn format(&self) -> FrameFormat {
+    pub const fn fastest_format(&self) -> FrameFormat {
         if self.has_fd() {
             FrameFormat::Fd {
                 bit_rate_switch: true,
@@ -61,14 +61,14 @@ impl BitRates {
         self.bits_ns(Bits::of(frame))
     }
 
-    /// Shortest duration of a frame of this shape \[ns\].
-    pub const fn min_ns(&self, shape: Shape) -> u64 {
-        self.bits_ns(shape.min_bits())
+    /// Shortest duration of a frame of this layout \[ns\].
+    pub const fn min_ns(&self, layout: FrameLayout) -> u64 {
+        self.bits_ns(layout.min_bits())
     }
 
-    /// Longest duration of a frame of this shape \[ns\], with all possible stuff bits.
-    pub const fn max_ns(&self, shape: Shape) -> u64 {
-        self.bits_ns(shape.max_bits())
+    /// Longest duration of a frame of this layout \[ns\], with all possible stuff bits.
+    pub const fn max_ns(&self, layout: FrameLayout) -> u64 {
+        self.bits_ns(layout.max_bits())
     }
 }
 

@@ -43,7 +43,7 @@ pub struct Bits {
 
 /// What determines the number of bits of a frame besides its contents.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Shape {
+pub struct FrameLayout {
     /// Format.
     pub format: FrameFormat,
     /// The id has 29 bits.
@@ -52,19 +52,19 @@ pub struct Shape {
     pub dlc: u8,
 }
 
-impl Shape {
-    /// Shape of a frame with a standard id.
-    pub const fn standard(format: FrameFormat, dlc: u8) -> Shape {
-        Shape {
+impl FrameLayout {
+    /// Layout of a frame with a standard id.
+    pub const fn standard(format: FrameFormat, dlc: u8) -> FrameLayout {
+        FrameLayout {
             format,
             extended: false,
             dlc,
         }
     }
 
-    /// Shape of this frame.
-    pub const fn of(frame: &CanFrame) -> Shape {
-        Shape {
+    /// Layout of this frame.
+    pub const fn of(frame: &CanFrame) -> FrameLayout {
+        FrameLayout {
             format: frame.format(),
             extended: frame.id().is_extended(),
             dlc: frame.dlc(),
@@ -148,18 +148,18 @@ impl Shape {
 impl Bits {
     /// Bits of this frame, including stuffing and the interframe space.
     pub fn of(frame: &CanFrame) -> Bits {
-        let shape = Shape::of(frame);
+        let layout = FrameLayout::of(frame);
         let mut stream = Stream::default();
         match frame.format() {
             FrameFormat::Classic => {
                 let dlc = u64::from(frame.dlc());
                 stream.push_id(frame);
                 // Reserved bits are zero.
-                stream.push(dlc, if shape.extended { 6 } else { 5 });
+                stream.push(dlc, if layout.extended { 6 } else { 5 });
                 stream.push_payload(frame);
                 stream.push(u64::from(stream.check), CHECK_BITS);
                 Bits {
-                    nominal: shape.min_bits().nominal + stream.stuffing,
+                    nominal: layout.min_bits().nominal + stream.stuffing,
                     data: 0,
                 }
             }
@@ -173,7 +173,7 @@ impl Bits {
                 stream.push_payload(frame);
                 // A stuff bit after the payload is the first fixed one.
                 let data = stream.stuffing - nominal - u32::from(stream.ended_with_stuffing);
-                shape.fd_bits(bit_rate_switch, nominal, data)
+                layout.fd_bits(bit_rate_switch, nominal, data)
             }
         }
     }
@@ -186,14 +186,14 @@ impl Bits {
 
 /// Bits of a classic frame of `dlc` bytes with a standard id, without any stuffing.
 pub const fn min_bits(dlc: u8) -> u32 {
-    Shape::standard(FrameFormat::Classic, dlc)
+    FrameLayout::standard(FrameFormat::Classic, dlc)
         .min_bits()
         .nominal
 }
 
 /// Bits of a classic frame of `dlc` bytes with a standard id, with maximum stuffing.
 pub const fn max_bits(dlc: u8) -> u32 {
-    Shape::standard(FrameFormat::Classic, dlc)
+    FrameLayout::standard(FrameFormat::Classic, dlc)
         .max_bits()
         .nominal
 }

@@ -1,6 +1,6 @@
 //! Runs an arm's CAN bus and owns the clock.
 //!
-//! Each make of drives is a folder of [`drives`] and a line of [`registry`]. Its start-up prepares an arm after
+//! Each type of drives is a folder of [`drives`] and a line of [`registry`]. Its start-up prepares an arm after
 //! power-up and rejects one that does not match its description; then it is a [`supple_drive::Drive`], and the plant
 //! loop of that crate polls positions, publishes the arm's state, waits a bounded time for the controller's torques,
 //! sends them and checks that they were sent. What happens after a loss is the same for all drives.
@@ -13,17 +13,17 @@
 pub mod drives;
 pub mod registry;
 
-mod make;
+mod backend;
 mod options;
 mod program;
 mod serve;
 
+pub use backend::{DriveBackend, RunError};
 pub use drives::barrett::bus_time::{Budget, BusTime, Overload};
 pub use drives::barrett::start_up::{
     ARM_GROUPS, MotorPuck, Progress, Ready, StartupConfig, start_up,
 };
 pub use drives::barrett::transmission::{self, Transmission};
 pub use drives::barrett::{Barrett, CanError, Cycle, cycle};
-pub use make::{Make, RunError};
 pub use options::Options;
 pub use program::main;

@@ -1,8 +1,8 @@
-//! The process: its options, the make of the arm's drives, and its exit code.
+//! The process: its options, the backend of the arm's drives, and its exit code.
 
-use crate::make::RunError;
+use crate::backend::RunError;
 use crate::options::Options;
-use crate::registry::MAKES;
+use crate::registry::BACKENDS;
 use clap::Parser;
 use std::process::ExitCode;
 use supple_drive::Counters;
@@ -38,7 +38,7 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// Runs the process; returns the counters if start-up succeeded.
+/// Runs the process and returns the counters of the run; `None` if only the budget of the bus was requested.
 fn start(options: &Options) -> Result<Option<Counters>, RunError> {
     let stop = Stop::on_signals().map_err(|error| RunError::new(10, error))?;
     if options.supervised() {
@@ -54,13 +54,13 @@ fn start(options: &Options) -> Result<Option<Counters>, RunError> {
     {
         eprintln!("supple-can: warning: {warning}");
     }
-    let mut makes = MAKES.iter();
-    match makes.find(|make| (make.is_of)(&description)) {
-        Some(make) => (make.run)(&description, options, &stop),
+    let mut backends = BACKENDS.iter();
+    match backends.find(|backend| (backend.supports)(&description)) {
+        Some(backend) => (backend.run)(&description, options, &stop),
         None => Err(RunError::new(
             3,
             format!(
-                "arm `{}`: [bus] kind names no make of drives that this program supports",
+                "arm `{}`: [bus] kind names no type of drives that this program supports",
                 description.name()
             ),
         )),

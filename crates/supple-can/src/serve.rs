@@ -1,4 +1,4 @@
-//! Opening the bus and running cycles, for every make of drives.
+//! Opening the bus and running cycles, for every type of drives.
 
 use core::time::Duration;
 use supple_bus::virtual_time::LockstepBus;

@@ -520,7 +520,9 @@ fn procedure_code(error: &ProcedureError) -> u8 {
         ProcedureError::Experiment(error) => experiment_code(error),
         ProcedureError::Wiring { .. } | ProcedureError::NotConfirmed { .. } => 4,
         ProcedureError::Stopped { .. } => 5,
-        ProcedureError::Resume { .. } | ProcedureError::Write { .. } => 6,
+        ProcedureError::Resume { .. }
+        | ProcedureError::ReadLog { .. }
+        | ProcedureError::Write { .. } => 6,
     }
 }
 

@@ -11,17 +11,18 @@ pub struct Firmware {
     pub version: u8,
 }
 
-/// Series whose behaviour is documented: 4310, 4340, 6006, 8006, 8009, 3507, boards of 2025.
+/// Series with documented behaviour, of the motor types 4310, 4340, 6006, 8006, 8009 and 3507, and of the boards of 2025.
 pub const KNOWN_SERIES: [u8; 16] = [
     31, 32, 33, 34, 50, 51, 57, 60, 61, 62, 63, 64, 65, 70, 71, 73,
 ];
-/// First version with registers, the 8-bit id filter and a watchdog that counts only while enabled.
+/// First version with registers, the 8-bit id filter and a watchdog that runs only while the motor is enabled. The version itself
+/// is read from register 14: an older one that answers there is refused.
 pub const MIN_VERSION: u8 = 13;
 /// First version with CAN FD.
 pub const FD_VERSION: u8 = 15;
-/// First version that answers registers between commands without mixing up replies.
-pub const REGISTERS_WHILE_CYCLING_VERSION: u8 = 17;
-/// Version for four motors on one board, in which a write to register 80 stores a zero.
+/// First version that answers register reads between the cyclic commands without mixing up replies.
+pub const REGISTERS_IN_OPERATION_VERSION: u8 = 17;
+/// Version for four motors on one board, in which a write to register 80 saves the present position as the zero.
 pub const FOUR_MOTORS_VERSION: u8 = 41;
 
 /// Why a firmware is refused.
@@ -87,7 +88,7 @@ impl Firmware {
         })
     }
 
-    /// Checks that this firmware can carry an arm, on CAN FD if `fd`.
+    /// Checks that this firmware is supported for the motors of an arm, on CAN FD if `fd`.
     ///
     /// # Errors
     /// [`FirmwareError`].
@@ -107,8 +108,8 @@ impl Firmware {
         Ok(())
     }
 
-    /// Whether registers may be read between commands.
-    pub fn registers_while_cycling(self) -> bool {
-        self.version >= REGISTERS_WHILE_CYCLING_VERSION
+    /// Whether registers may be read between the cyclic commands.
+    pub fn reads_registers_in_operation(self) -> bool {
+        self.version >= REGISTERS_IN_OPERATION_VERSION
     }
 }

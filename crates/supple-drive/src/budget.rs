@@ -2,7 +2,7 @@
 
 use core::fmt;
 use supple_can_frame::BitRates;
-use supple_can_frame::timing::Shape;
+use supple_can_frame::timing::FrameLayout;
 
 /// Share of a period that a default rate leaves free.
 pub const SPARE_SHARE: f64 = 0.2;
@@ -51,9 +51,9 @@ impl Budget {
         }
     }
 
-    /// Adds `count` frames of this shape, each with the maximum bit stuffing of its length.
-    pub fn frames(self, what: &'static str, count: usize, shape: Shape) -> Budget {
-        let each_ns = self.rates.max_ns(shape);
+    /// Adds `count` frames of this layout, each with the maximum bit stuffing of its length.
+    pub fn frames(self, what: &'static str, count: usize, layout: FrameLayout) -> Budget {
+        let each_ns = self.rates.max_ns(layout);
         self.line(BudgetLine {
             what,
             count: count as u32,

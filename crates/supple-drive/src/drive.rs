@@ -1,4 +1,4 @@
-//! What a make of drives implements.
+//! What a type of drives implements.
 //!
 //! ```text
 //! request -> collect -> (published, answered, checked) -> operate -> send_torques -> lower -> poll -> drain
@@ -8,7 +8,7 @@
 //! once), and "the torque is the question" (the request sends the torques of the previous cycle, whose replies carry
 //! the state; the torques given in this cycle wait for the next one).
 //!
-//! Start-up is not part of the trait, because each make needs its own settings: it ends with a value that
+//! Start-up is not part of the trait, because each type of drives needs its own settings: it ends with a value that
 //! implements the trait.
 
 use crate::budget::Budget;
@@ -89,7 +89,7 @@ pub enum Lower {
     Forced,
 }
 
-/// A make of drives with its bus, ready for the cycle. Nothing in it may allocate, lock or log.
+/// A type of drives with its bus, ready for the cycle. Nothing in it may allocate, lock or log.
 pub trait Drive<const N: usize> {
     /// Time of the drives \[ns\]: monotonic, with an arbitrary origin.
     fn now_ns(&self) -> u64;

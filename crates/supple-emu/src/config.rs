@@ -101,7 +101,7 @@ pub struct EmulatorConfig {
     pub wake_ns: u64,
     /// From this time after "set STAT" until the puck is ready, its transceiver switches off and on, and every frame of the host in
     /// this interval makes the host's controller go bus-off \[ns\]; 0.2 s by default, an assumption.
-    pub wake_quiet_from_ns: u64,
+    pub transceiver_reset_ns: u64,
     /// Time of the bus-off recovery, the interface's `restart-ms` \[ns\]; 100 ms by default.
     pub restart_ns: u64,
     /// Step of the physics \[ns\]; 0.2 ms by default. Encoders are read and torques act on this grid.
@@ -128,7 +128,7 @@ impl EmulatorConfig {
             latency_ns: 10_000,
             jitter_ns: 5_000,
             wake_ns: 800 * MS,
-            wake_quiet_from_ns: 200 * MS,
+            transceiver_reset_ns: 200 * MS,
             restart_ns: 100 * MS,
             step_ns: MS / 5,
             seed: 0,

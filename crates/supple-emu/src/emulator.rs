@@ -7,7 +7,7 @@ use crate::safety::{ButtonPress, SafetyModule};
 use crate::sensor::ForceSensor;
 use crate::wire::Wire;
 use std::collections::VecDeque;
-use supple_bus::virtual_time::Peer;
+use supple_bus::virtual_time::EmulatedNodes;
 use supple_bus::{BusFault, Event};
 use supple_can_frame::{BitRates, CanFrame};
 use supple_core::dynamics::tip_pose;
@@ -401,7 +401,7 @@ impl<const N: usize> Emulator<N> {
     /// Whether a puck's transceiver is switching off and on, so that the host must not send.
     fn any_transceiver_off(&self) -> bool {
         self.pucks.iter().any(|puck| match puck.power() {
-            Power::Waking(since_ns) => self.now_ns >= since_ns + self.config.wake_quiet_from_ns,
+            Power::Waking(since_ns) => self.now_ns >= since_ns + self.config.transceiver_reset_ns,
             _ => false,
         })
     }
@@ -492,7 +492,7 @@ fn commands_torque(frame: &CanFrame) -> bool {
     to_motors && torques.is_ok_and(|torques| torques.slots.iter().any(|t| t.units() != 0))
 }
 
-impl<const N: usize> Peer for Emulator<N> {
+impl<const N: usize> EmulatedNodes for Emulator<N> {
     fn now_ns(&self) -> u64 {
         self.now_ns
     }

@@ -35,7 +35,7 @@ pub enum EmulatorError {
         /// Version found.
         version: i32,
     },
-    /// Motors of a make that drives each joint directly do not.
+    /// Motors of a type that drives each joint directly do not.
     #[error("motors of this bus drive each joint directly: remove joint_from_motor of [motors]")]
     NotDirect,
     /// A motor that the arm does not have.

@@ -1,7 +1,7 @@
-//! Client connections of the pendant socket: reads lines from all clients without blocking on any.
+//! Client connections of the pendant socket: reads a line from each client without blocking on any, and answers it.
 //!
-//! A silent client stays connected until its slot is needed; one that does not read its answer is dropped after
-//! a timeout. Both numbers are bounded.
+//! A client that sends nothing stays connected until its slot is needed; every other one is disconnected after its answer, or
+//! after a timeout if it does not read it. The numbers of clients of either kind are bounded.
 
 use core::time::Duration;
 use rustix::event::{PollFd, PollFlags, poll};
@@ -12,9 +12,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Sender, SyncSender, sync_channel};
 
 /// Maximum number of clients that have not sent their line yet; beyond it the oldest is disconnected.
-const MAX_WAITING_CLIENTS: usize = 16;
+const MAX_CLIENTS_WITHOUT_REQUEST: usize = 16;
 /// Maximum number of clients with a pending answer; beyond it commands are carried out without an answer.
-const MAX_ANSWERING_CLIENTS: usize = 32;
+const MAX_CLIENTS_AWAITING_ANSWER: usize = 32;
 /// Maximum length of a line \[bytes\].
 const LINE_BYTES: usize = 256;
 /// Timeout for an answer, and for writing it to the client.
@@ -39,45 +39,52 @@ struct Client {
 enum ReadResult {
     /// No complete line yet.
     Incomplete,
-    /// A complete line.
+    /// A line, or what a client sent before it ended its side.
     Line(String),
+    /// More bytes than a line may have.
+    TooLong,
     /// The client has disconnected.
     Disconnected,
 }
 
-/// Accepts connections and forwards their lines until the receiver is gone.
+/// Accepts connections and forwards one line of each until the receiver is gone.
 pub(crate) fn serve(listener: &UnixListener, requests: &Sender<PendantRequest>) {
-    let answering = Arc::new(AtomicUsize::new(0));
-    let mut waiting: Vec<Client> = Vec::with_capacity(MAX_WAITING_CLIENTS);
+    let awaiting_answer = Arc::new(AtomicUsize::new(0));
+    let mut without_request: Vec<Client> = Vec::with_capacity(MAX_CLIENTS_WITHOUT_REQUEST);
     loop {
-        wait(listener, &waiting);
+        wait(listener, &without_request);
         match listener.accept() {
             Ok((stream, _)) if stream.set_nonblocking(true).is_ok() => {
-                if waiting.len() == MAX_WAITING_CLIENTS {
-                    waiting.remove(0);
+                if without_request.len() == MAX_CLIENTS_WITHOUT_REQUEST {
+                    without_request.remove(0);
                 }
-                waiting.push(Client {
+                without_request.push(Client {
                     stream,
                     line: Vec::with_capacity(LINE_BYTES),
                 });
             }
             Err(error) if error.kind() != ErrorKind::WouldBlock => {
-                // No file descriptor is left: close the oldest client.
-                if !waiting.is_empty() {
-                    waiting.remove(0);
+                // Most often no file descriptor is left: close the oldest client.
+                if !without_request.is_empty() {
+                    without_request.remove(0);
                 }
                 std::thread::park_timeout(ACCEPT_RETRY_INTERVAL);
             }
             _ => {}
         }
         let mut index = 0;
-        while let Some(client) = waiting.get_mut(index) {
+        while let Some(client) = without_request.get_mut(index) {
             match client.read_line() {
                 ReadResult::Incomplete => index += 1,
-                ReadResult::Disconnected => drop(waiting.remove(index)),
+                ReadResult::Disconnected => drop(without_request.remove(index)),
+                ReadResult::TooLong => {
+                    let stream = without_request.remove(index).stream;
+                    let text = format!("refused: a request has at most {LINE_BYTES} bytes");
+                    write_with_timeout(stream, &text);
+                }
                 ReadResult::Line(line) => {
-                    let stream = waiting.remove(index).stream;
-                    if !dispatch(stream, line, requests, &answering) {
+                    let stream = without_request.remove(index).stream;
+                    if !dispatch(stream, line, requests, &awaiting_answer) {
                         return;
                     }
                 }
@@ -87,10 +94,10 @@ pub(crate) fn serve(listener: &UnixListener, requests: &Sender<PendantRequest>) 
 }
 
 /// Waits until a client connects or sends data.
-fn wait(listener: &UnixListener, waiting: &[Client]) {
+fn wait(listener: &UnixListener, without_request: &[Client]) {
     let mut polled = vec![PollFd::new(listener, PollFlags::IN)];
     polled.extend(
-        waiting
+        without_request
             .iter()
             .map(|client| PollFd::new(&client.stream, PollFlags::IN)),
     );
@@ -106,7 +113,11 @@ impl Client {
             Ok(0) if self.line.is_empty() => return ReadResult::Disconnected,
             Ok(length) => {
                 self.line.extend(&bytes[..length]);
-                length == 0 || self.line.contains(&b'\n') || self.line.len() == LINE_BYTES
+                let has_end = length == 0 || self.line.contains(&b'\n');
+                if !has_end && self.line.len() == LINE_BYTES {
+                    return ReadResult::TooLong;
+                }
+                has_end
             }
             Err(error) => match error.kind() {
                 ErrorKind::WouldBlock | ErrorKind::Interrupted => false,
@@ -128,17 +139,17 @@ fn dispatch(
     stream: UnixStream,
     line: String,
     requests: &Sender<PendantRequest>,
-    answering: &Arc<AtomicUsize>,
+    awaiting_answer: &Arc<AtomicUsize>,
 ) -> bool {
     let (answer, receiver) = sync_channel(1);
     if requests.send(PendantRequest { line, answer }).is_err() {
         return false;
     }
-    if answering.load(Ordering::Relaxed) >= MAX_ANSWERING_CLIENTS {
+    if awaiting_answer.load(Ordering::Relaxed) >= MAX_CLIENTS_AWAITING_ANSWER {
         return true;
     }
-    answering.fetch_add(1, Ordering::Relaxed);
-    let done = answering.clone();
+    awaiting_answer.fetch_add(1, Ordering::Relaxed);
+    let done = awaiting_answer.clone();
     let started = std::thread::Builder::new()
         .name("pendant-answer".to_owned())
         .spawn(move || {
@@ -148,7 +159,7 @@ fn dispatch(
             done.fetch_sub(1, Ordering::Relaxed);
         });
     if started.is_err() {
-        answering.fetch_sub(1, Ordering::Relaxed);
+        awaiting_answer.fetch_sub(1, Ordering::Relaxed);
     }
     true
 }

@@ -9,7 +9,7 @@ use crate::puck::Puck;
 use crate::real_time::{ArmBus, EmulatedArm, advance_to_bus_time, receive_host_frame};
 use clap::Parser;
 use std::process::ExitCode;
-use supple_bus::virtual_time::{LockstepResponder, Peer};
+use supple_bus::virtual_time::{EmulatedNodes, LockstepResponder};
 use supple_bus::{Address, OwnerFolder, PacedResponder, SocketCan};
 use supple_can_frame::CanFrame;
 use supple_model::{Description, with_dof};

@@ -1,6 +1,6 @@
-//! An emulated arm of any make on a bus in real time.
+//! An emulated arm with any type of drives on a bus in real time.
 
-use supple_bus::virtual_time::Peer;
+use supple_bus::virtual_time::EmulatedNodes;
 use supple_bus::{Bus, BusError, BusFault, DatagramBus, Event, SocketCan};
 use supple_can_frame::CanFrame;
 
@@ -31,7 +31,7 @@ impl ArmBus for SocketCan {
 }
 
 /// An emulated arm that runs in real time.
-pub trait EmulatedArm: Peer {
+pub trait EmulatedArm: EmulatedNodes {
     /// Time of the next event that does not depend on the host \[ns\].
     fn next_ns(&self) -> u64;
 

@@ -11,7 +11,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-use supple_experiment::calibrate::{plant_of, without_ripple};
+use supple_experiment::calibrate::{plant_of, with_ripple_torque};
 use supple_experiment::{
     Calibration, calibrate, predict_tracking_error, track_with_identified_model,
 };
@@ -98,7 +98,7 @@ fn one(seed: u64, folder: &Path) -> Result<String, Box<dyn std::error::Error>> {
     let stretches = read_mcap::<4>(&file)?;
     // Excitation, slow motion, held-out excitation.
     for (name, index) in [("slow", 1), ("held", 2)] {
-        let log = without_ripple(&stretches[index], &found.ripple, &motor_from_joint);
+        let log = with_ripple_torque(&stretches[index], &found.ripple, &motor_from_joint);
         let preparation: Preparation = found.fit.preparation;
         let (motion, _) = Motion::prepare(&log, 4, &[0, 1, 2, 3], &preparation)?;
         let predicted = found.fit.predict_motion(&motion)?;

@@ -1,7 +1,7 @@
 //! Complete identification of the simulated arm: breakaway, excitation, fit, validation.
 //!
-//! The controller starts with data-sheet errors in its model; the fit uses only what the arm logs: noisy,
-//! quantised angles and commanded torques. The ground truth is used once, at the end, to report the error. This
+//! The controller starts with data-sheet errors in its model. The fit has this model as a weak prior, and else only what the arm
+//! logs: noisy, quantised angles and commanded torques. The ground truth is used only to report errors. This
 //! is simulation: on real arms of this kind the best published models leave 6.7 to 8.4 % of the torque
 //! unexplained.
 
@@ -113,7 +113,7 @@ pub struct Calibrated<const N: usize> {
     pub description: Description,
     /// Validation on a held-out motion.
     pub validation: Validation,
-    /// The held-out motion with the ripple removed, for figures.
+    /// The held-out motion, with the identified ripple in its torques, for figures.
     pub held_out: Motion,
     /// Accuracy against the ground truth.
     pub truth: ModelAccuracy,
@@ -139,13 +139,14 @@ pub fn plant_of<const N: usize>(
     Ok(calibration.plant.apply(plant)?)
 }
 
-/// Two harmonics for each motor, with seeded phases; their amplitudes at the joint add up to `ripple_nm`.
+/// Two harmonics for each motor, with seeded phases. Where a motor drives one joint alone, their amplitudes at the joint add up to
+/// `ripple_nm`; at a differential each of two motors adds less.
 fn ripple<const N: usize>(plant: &PlantConfig<N>, calibration: &Calibration) -> Vec<Ripple> {
     let mut random = ChaCha8Rng::seed_from_u64(calibration.seed ^ 0x7269);
     let to_joint = &plant.actuators.joint_from_motor;
     let mut lines = Vec::new();
     for motor in 0..N {
-        // A torque of 1 N m at the motor is the inverse of the largest ratio at the joints.
+        // Motor torque of 1 N m at the joint, if the motor drives that joint alone.
         let per_joint = to_joint.column(motor).amax();
         for (harmonic, fraction) in [(2, 0.4), (6, 0.6)] {
             lines.push(Ripple {
@@ -214,17 +215,17 @@ pub fn calibrate<const N: usize>(
         candidates,
         ..DesignOptions::of(&joints)
     };
-    let wanted = search(calibration.seed, calibration.candidates);
-    let designed = design(&free, &home, &wanted, &mut |_, _| {})?;
-    let other = search(
+    let excitation_options = search(calibration.seed, calibration.candidates);
+    let designed = design(&free, &home, &excitation_options, &mut |_, _| {})?;
+    let validation_options = search(
         calibration.seed.wrapping_add(1000),
         (calibration.candidates / 10).max(20),
     );
-    let mut other = design(&free, &home, &other, &mut |_, _| {})?.series;
-    other.duration_s = 2.0 * other.period_s() + other.ramp_s;
+    let mut validation_series = design(&free, &home, &validation_options, &mut |_, _| {})?.series;
+    validation_series.duration_s = 2.0 * validation_series.period_s() + validation_series.ramp_s;
 
     progress("excitation");
-    let mut series = vec![designed.series, slow, other];
+    let mut series = vec![designed.series, slow, validation_series];
     if calibration.ripples() {
         series.extend(constant_speed_runs(&free, &home, &joints)?);
     }
@@ -241,8 +242,8 @@ pub fn calibrate<const N: usize>(
     progress("identification");
     let (fit, ripple) = identify(&start, &logs[..2], &logs[3..])?;
     let motor_from_joint = *supple_core::Controller::new(nominal)?.motor_from_joint();
-    let unrippled = without_ripple(&logs[2], &ripple, &motor_from_joint);
-    let (held_out, _) = Motion::prepare(&unrippled, N, &joints, &fit.preparation)?;
+    let actual = with_ripple_torque(&logs[2], &ripple, &motor_from_joint);
+    let (held_out, _) = Motion::prepare(&actual, N, &joints, &fit.preparation)?;
     let validation = fit.validate_motion(&held_out)?;
     let described = fit.description(description, Some(&ripple))?;
     let described = described.with_compliance(&fit.compliance_rad_per_nm())?;
@@ -263,21 +264,21 @@ pub fn calibrate<const N: usize>(
     })
 }
 
-/// A pose with little gravity torque: all joints at zero, or as close to it as their limits permit.
+/// All joints at zero, or as close to it as their limits permit: upright for a WAM, with little gravity torque.
 pub(crate) fn upright<const N: usize>(config: &Config<N>) -> Vector<N> {
     let limits = &config.limits;
     Vector::from_fn(|i, _| {
-        let zone = 2.0 * limits.soft_zone_rad;
+        let margin = 2.0 * limits.soft_zone_rad;
         let (lower, upper) = (
-            limits.position_lower_rad[i] + zone,
-            limits.position_upper_rad[i] - zone,
+            limits.position_lower_rad[i] + margin,
+            limits.position_upper_rad[i] - margin,
         );
         0.0_f64.clamp(lower.min(upper), upper.max(lower))
     })
 }
 
-/// The log with the torques that the joints received: commanded torques plus ripple.
-pub fn without_ripple<const N: usize>(
+/// The log with the torques that the motors gave by these tables: commanded torques plus ripple.
+pub fn with_ripple_torque<const N: usize>(
     log: &Log,
     tables: &[RippleTable; N],
     motor_from_joint: &supple_core::Matrix<N, N>,
@@ -361,7 +362,7 @@ pub fn identify_with<const N: usize>(
         let prepare = |logs: &[Log], preparation: &Preparation, tables: &[RippleTable; N]| {
             logs.iter()
                 .map(|log| {
-                    let log = without_ripple(log, tables, &motor_from_joint);
+                    let log = with_ripple_torque(log, tables, &motor_from_joint);
                     Motion::prepare(&log, N, &joints, preparation).map(|(motion, _)| motion)
                 })
                 .collect::<Result<Vec<_>, _>>()

@@ -24,9 +24,9 @@ use supple_plant::PlantOptions;
 /// Progress of the demo.
 #[derive(Clone, Debug)]
 pub struct Progress {
-    /// Simulated time completed \[s\].
+    /// Planned simulated time of the completed runs \[s\].
     pub done_s: f64,
-    /// Total simulated time \[s\].
+    /// Planned simulated time of all runs \[s\].
     pub total_s: f64,
     /// Name of the run that has just ended.
     pub finished: String,
@@ -87,7 +87,7 @@ fn sized<const N: usize>(
         None => Setup::<N>::new(description, options.seed)?,
     };
     let setup = setup.with_plant_options(&options.plant)?;
-    let imperfect = match options.plant.is_none() {
+    let realistic_plant = match options.plant.is_none() {
         true => PlantOptions::realistic_of(description),
         false => options.plant.clone(),
     };
@@ -120,7 +120,8 @@ fn sized<const N: usize>(
     let results = results.into_iter().map(|done| done.result).collect();
     let realistic = (0..seeds).into_par_iter().map(|offset| {
         let seed = options.seed.wrapping_add(offset);
-        let done = realistic_seed::<N>(description, options.model.as_ref(), &imperfect, seed)?;
+        let done =
+            realistic_seed::<N>(description, options.model.as_ref(), &realistic_plant, seed)?;
         report(REALISTIC_S, format!("realistic, seed {seed}"));
         Ok(done)
     });
@@ -162,22 +163,24 @@ fn probing_summary(stiffness_n_per_m: f64, done: &JobResult) -> ProbingSummary {
 }
 
 fn contact(runs: &[ProbingSummary]) -> ContactStatistics {
-    let from_five = || {
+    let from_paper_stiffness = || {
         runs.iter()
             .filter(|e| e.stiffness_n_per_m >= scenario::STIFFNESS_N_PER_M)
     };
-    let points: Vec<_> = from_five()
+    let points: Vec<_> = from_paper_stiffness()
         .map(|e| (e.stiffness_n_per_m, e.contact.impulse_newton_s))
         .collect();
-    let peaks: Vec<_> = from_five().map(|e| e.contact.peak_filtered_n).collect();
-    let over_speed: Vec<_> = from_five()
+    let peaks: Vec<_> = from_paper_stiffness()
+        .map(|e| e.contact.peak_filtered_n)
+        .collect();
+    let per_approach_speed: Vec<_> = from_paper_stiffness()
         .map(|e| e.contact.peak_filtered_n / e.contact.approach_m_per_s)
         .collect();
     ContactStatistics {
         impulse_fit: LineFit::new(&points),
         impulse_slopes: slopes(runs),
         peak_spread: spread(&peaks),
-        peak_over_speed_spread: spread(&over_speed),
+        peak_per_approach_speed_spread: spread(&per_approach_speed),
     }
 }
 

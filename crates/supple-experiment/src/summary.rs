@@ -99,7 +99,7 @@ pub struct ContactStatistics {
     /// (max - min) / median of the peak force of the first transient.
     pub peak_spread: Option<f64>,
     /// (max - min) / median of that peak force divided by the approach speed.
-    pub peak_over_speed_spread: Option<f64>,
+    pub peak_per_approach_speed_spread: Option<f64>,
 }
 
 /// Sinusoid with an exact model.

@@ -8,7 +8,7 @@ use supple_core::config::{
 };
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::ripple::Harmonic;
-use supple_core::workspace::MAX_BOUNDARIES;
+use supple_core::workspace::MAX_BORDERS_OR_ZONES;
 use supple_core::{Friction, Link, Pose, RippleTable, Vector};
 
 #[derive(Serialize, Deserialize)]
@@ -374,8 +374,10 @@ impl WorkspaceDef {
     /// # Errors
     /// Description of too many boundaries or zones.
     pub fn workspace(&self) -> Result<Workspace, String> {
-        if self.borders.len().max(self.zones.len()) > MAX_BOUNDARIES {
-            return Err(format!("more than {MAX_BOUNDARIES} boundaries or zones"));
+        if self.borders.len().max(self.zones.len()) > MAX_BORDERS_OR_ZONES {
+            return Err(format!(
+                "more than {MAX_BORDERS_OR_ZONES} boundaries or zones"
+            ));
         }
         let border = |border: &BorderDef| match border {
             BorderDef::Wall { normal, offset_m } => Border::Wall {

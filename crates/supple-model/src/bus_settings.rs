@@ -12,7 +12,7 @@ use serde::Deserialize;
 pub struct BusSettings {
     /// Source of these numbers.
     pub source: Option<String>,
-    /// Make of the drives.
+    /// Type of the drives.
     pub kind: BusKind,
     /// Frames that the drives are set to. Classic and FD frames are never mixed on one bus.
     pub format: BusFormat,
@@ -39,7 +39,7 @@ pub struct BusSettings {
     pub motors: Vec<BusMotorSettings>,
 }
 
-/// Make of the drives.
+/// Type of the drives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum BusKind {

@@ -5,10 +5,10 @@ use crate::error::{ModelError, Reporter};
 use crate::settings::{BoxSettings, WallSettings};
 use supple_core::config::{Border, Workspace, Zone};
 use supple_core::math::Vector3;
-use supple_core::workspace::MAX_BOUNDARIES;
+use supple_core::workspace::MAX_BORDERS_OR_ZONES;
 
 impl Description {
-    /// Boundaries and zones of the tip.
+    /// Borders and zones of the tip, and the margin, stiffness and damping of the borders.
     ///
     /// # Errors
     /// [`ModelError`] if there are too many, or if the normal of a wall is zero or not finite.
@@ -19,7 +19,7 @@ impl Description {
         };
         let mut borders = Vec::new();
         for wall in &given.wall {
-            borders.push(plane(report, wall)?);
+            borders.push(border_of(report, wall)?);
         }
         if let Some(BoxSettings { lower_m, upper_m }) = &given.keep_in {
             for axis in 0..3 {
@@ -43,8 +43,13 @@ impl Description {
             tip_force_n: zone.tip_force_n.unwrap_or(f64::MAX),
         });
         Ok(Workspace {
-            borders: into_fixed_array(report, "[workspace] borders", borders)?,
-            zones: into_fixed_array(report, "[[workspace.zone]]", zones.collect())?,
+            borders: into_fixed_array(
+                report,
+                "[workspace] wall, keep_in and keep_out",
+                borders,
+                "; keep_in counts as six",
+            )?,
+            zones: into_fixed_array(report, "[[workspace.zone]]", zones.collect(), "")?,
             margin_m: given.margin_m,
             stiffness_n_per_m: given.stiffness_n_per_m,
             damping_n_s_per_m: given.damping_n_s_per_m,
@@ -52,7 +57,7 @@ impl Description {
     }
 }
 
-fn plane(report: Reporter<'_>, wall: &WallSettings) -> Result<Border, ModelError> {
+fn border_of(report: Reporter<'_>, wall: &WallSettings) -> Result<Border, ModelError> {
     let normal = Vector3::from(wall.normal);
     let length = normal.norm();
     if length > 0.0 && length.is_finite() {
@@ -63,7 +68,7 @@ fn plane(report: Reporter<'_>, wall: &WallSettings) -> Result<Border, ModelError
     }
     Err(report.invalid(
         "[[workspace.wall]] normal",
-        "must have a direction",
+        "must be finite and not zero",
         format!("{:?}", wall.normal),
         "give a vector that points out of the allowed side, such as [0.0, 0.0, -1.0] for a floor",
     ))
@@ -73,13 +78,14 @@ fn into_fixed_array<T: Copy>(
     report: Reporter<'_>,
     element: &str,
     found: Vec<T>,
-) -> Result<[Option<T>; MAX_BOUNDARIES], ModelError> {
-    if found.len() > MAX_BOUNDARIES {
+    note: &str,
+) -> Result<[Option<T>; MAX_BORDERS_OR_ZONES], ModelError> {
+    if found.len() > MAX_BORDERS_OR_ZONES {
         return Err(report.invalid(
             element,
             "are too many",
             found.len(),
-            format!("remove some: the limit is {MAX_BOUNDARIES}; a keep_in box counts as six"),
+            format!("remove some: the limit is {MAX_BORDERS_OR_ZONES}{note}"),
         ));
     }
     Ok(core::array::from_fn(|i| found.get(i).copied()))

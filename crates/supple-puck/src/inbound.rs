@@ -17,8 +17,8 @@ pub enum Inbound {
     Reply(Reply),
     /// A reading of the force/torque sensor.
     Sensor(SensorReading),
-    /// A frame to a group that the host does not read, such as the safety module's frames to the motors (0x540)
-    /// and tactile reports.
+    /// A frame to a node, or to a group that the host does not read, such as the safety module's frames to the motors (CAN id
+    /// 0x540) and tactile reports.
     Other,
 }
 

@@ -1,4 +1,4 @@
-//! The commands that need no running system.
+//! Entry point of `supple-report`: the commands that need no running controller.
 
 fn main() -> std::process::ExitCode {
     supple_report::run()

@@ -19,9 +19,9 @@ pub enum ReplyTo {
     /// A call of a service, by the ids of both.
     Call {
         /// The service.
-        service: u32,
+        service_id: u32,
         /// The call.
-        call: u32,
+        call_id: u32,
     },
     /// Parameters that were set, under the id of the message.
     Parameters(Option<String>),
@@ -142,7 +142,10 @@ mod tests {
         let hub = Hub::new(Vec::new());
         let commands = hub.accept_commands();
         let mut calls = Calls::default();
-        let call = |call| ReplyTo::Call { service: 1, call };
+        let call = |call| ReplyTo::Call {
+            service_id: 1,
+            call_id: call,
+        };
         for number in 0..=MAX_WAITING as u32 {
             calls.start(&hub, None, Command::Reset, call(number));
         }

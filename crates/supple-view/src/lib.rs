@@ -1,7 +1,7 @@
 //! The live page of a running system or of a log, and a server of the Foxglove WebSocket protocol.
 //!
 //! A process of its own, which `supple view` and `supple up --view` start: it reads telemetry like any other client and
-//! sends requests like any other operator. It runs at the lowest priority, polls shared memory and never makes the
+//! sends requests like any other operator. It runs at a lower priority (nice 10), polls shared memory and never makes the
 //! controller wait; without it, or with a browser that hangs, the loop is the same.
 //!
 //! The page is embedded and asks no other server for anything. Everything is served on 127.0.0.1 alone, and only to
@@ -46,7 +46,7 @@ use supple_model::{Description, with_dof};
 use supple_realtime::{Stop, pause};
 use token::Token;
 
-/// Steps of niceness that the process takes: whatever else wants the processor comes first.
+/// Increment of the niceness of the process.
 const NICENESS: i32 = 10;
 /// Time between two looks for a shutdown.
 const POLL_INTERVAL: core::time::Duration = core::time::Duration::from_millis(20);
@@ -74,7 +74,7 @@ pub struct Options {
     pub port: u16,
     /// Accept no requests.
     pub read_only: bool,
-    /// Pages of other viewers that may connect if they have the URL, such as `http://localhost:8080`.
+    /// Origins of other web viewers that may connect if they have the URL, such as `http://localhost:8080`.
     pub allow_origin: Vec<String>,
 }
 
@@ -97,7 +97,7 @@ pub fn run(
     stop: &Stop,
     announce: impl FnOnce(&Addresses),
 ) -> Result<(), ViewError> {
-    // Without the permission it runs as it is.
+    // If this fails, the process keeps its priority.
     let _ = rustix::process::nice(NICENESS);
     match source {
         Source::Log(log) => {

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 /// Subprotocols that viewers ask for: the protocol's own name, and that of newer clients for the same messages.
 pub const SUBPROTOCOLS: [&str; 2] = ["foxglove.websocket.v1", "foxglove.sdk.v1"];
 /// Id of the service that takes commands.
-pub const SERVICE: u32 = 1;
+pub const SERVICE_ID: u32 = 1;
 /// Name of this service.
 pub const SERVICE_NAME: &str = "/request";
 
@@ -67,7 +67,7 @@ pub enum ClientMessage {
         /// To be repeated in the answer.
         id: Option<String>,
     },
-    /// Asks for the values of parameters whenever they change.
+    /// Asks for the values of parameters whenever they change: of all, whatever the names.
     SubscribeParameterUpdates {},
     /// Ends that.
     UnsubscribeParameterUpdates {},
@@ -99,15 +99,15 @@ pub struct Parameter {
 /// A request to a service.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ServiceCall<'a> {
-    /// The service.
-    pub service: u32,
+    /// Id of the service.
+    pub service_id: u32,
     /// Id of the call, chosen by the viewer.
-    pub call: u32,
+    pub call_id: u32,
     /// Its data.
     pub payload: &'a [u8],
 }
 
-/// The first message to a viewer.
+/// The message `serverInfo`, the first to a viewer.
 pub fn server_info(name: &str, session: &str, accepts_commands: bool) -> String {
     let capabilities: &[&str] = match accepts_commands {
         true => &["parameters", "parametersSubscribe", "services"],
@@ -118,7 +118,7 @@ pub fn server_info(name: &str, session: &str, accepts_commands: bool) -> String 
     .to_string()
 }
 
-/// The channels.
+/// The message `advertise`, with the channels.
 pub fn advertise(channels: &[Channel]) -> String {
     let channels: Vec<Value> = channels
         .iter()
@@ -132,18 +132,18 @@ pub fn advertise(channels: &[Channel]) -> String {
     json!({"op": "advertise", "channels": channels}).to_string()
 }
 
-/// The service that takes commands.
+/// The message `advertiseServices`, with the service that takes commands.
 pub fn advertise_services() -> String {
     let described = |name: &str, schema: &str| json!({"encoding": "json", "schemaName": name, "schemaEncoding": "jsonschema", "schema": schema});
     json!({"op": "advertiseServices", "services": [{
-        "id": SERVICE, "name": SERVICE_NAME, "type": "supple/Request",
+        "id": SERVICE_ID, "name": SERVICE_NAME, "type": "supple/Request",
         "request": described("supple.Request", SCHEMA),
         "response": described("supple.Reply", r#"{"type":"object"}"#),
     }]})
     .to_string()
 }
 
-/// The parameters of this name, or all without any.
+/// The message `parameterValues`, for these names, or for all parameters if there are none.
 pub fn parameter_values(frame: Option<&Frame>, names: &[String], id: Option<&str>) -> String {
     let wanted = |name: &&&str| names.is_empty() || names.iter().any(|other| other == **name);
     let value = |name: &&str| {
@@ -165,7 +165,7 @@ pub fn status(level: u8, message: &str) -> String {
 
 /// A failed call of a service.
 pub fn call_failure(call: &ServiceCall<'_>, message: &str) -> String {
-    json!({"op": "serviceCallFailure", "serviceId": call.service, "callId": call.call, "message": message})
+    json!({"op": "serviceCallFailure", "serviceId": call.service_id, "callId": call.call_id, "message": message})
         .to_string()
 }
 
@@ -182,8 +182,8 @@ pub fn message_data(subscription: u32, time_ns: u64, payload: &[u8]) -> Vec<u8> 
 /// The response to a call of a service, in JSON.
 pub fn call_response(call: &ServiceCall<'_>, payload: &[u8]) -> Vec<u8> {
     let mut bytes = vec![SERVICE_CALL_RESPONSE];
-    bytes.extend_from_slice(&call.service.to_le_bytes());
-    bytes.extend_from_slice(&call.call.to_le_bytes());
+    bytes.extend_from_slice(&call.service_id.to_le_bytes());
+    bytes.extend_from_slice(&call.call_id.to_le_bytes());
     bytes.extend_from_slice(&4_u32.to_le_bytes());
     bytes.extend_from_slice(b"json");
     bytes.extend_from_slice(payload);
@@ -201,8 +201,8 @@ pub fn service_call(bytes: &[u8]) -> Option<ServiceCall<'_>> {
     let length = usize::try_from(u32::from_le_bytes(*length)).ok()?;
     let (encoding, payload) = rest.split_at_checked(length)?;
     (encoding == b"json").then_some(ServiceCall {
-        service: u32::from_le_bytes(*service),
-        call: u32::from_le_bytes(*call),
+        service_id: u32::from_le_bytes(*service),
+        call_id: u32::from_le_bytes(*call),
         payload,
     })
 }
@@ -218,7 +218,10 @@ mod tests {
         assert_eq!(message, [1, 2, 1, 0, 0, 4, 3, 0, 0, 0, 0, 0, 0, b'a', b'b']);
         let bytes = [&[2, 1, 0, 0, 0, 9, 0, 0, 0, 4, 0, 0, 0][..], b"json{}"].concat();
         let call = service_call(&bytes).expect("a call");
-        assert_eq!((call.service, call.call, call.payload), (1, 9, &b"{}"[..]));
+        assert_eq!(
+            (call.service_id, call.call_id, call.payload),
+            (1, 9, &b"{}"[..])
+        );
         let response = call_response(&call, b"{}");
         assert_eq!(response[1..], bytes[1..]);
         assert_eq!(response[0], 3);

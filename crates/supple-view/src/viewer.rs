@@ -4,7 +4,7 @@ use crate::calls::{Calls, ReplyTo};
 use crate::command::{Command, set_parameters};
 use crate::hub::{Answer, Hub, Viewer};
 use crate::protocol::{
-    ClientMessage, SERVICE, ServiceCall, advertise, advertise_services, call_failure,
+    ClientMessage, SERVICE_ID, ServiceCall, advertise, advertise_services, call_failure,
     call_response, parameter_values, server_info, service_call, status,
 };
 use core::time::Duration;
@@ -186,15 +186,15 @@ fn text_message(
 /// Handles binary data of the viewer, which can only be a call of the service; returns an answer that needs no waiting.
 fn binary_message(context: &Context<'_>, calls: &mut Calls, bytes: &[u8]) -> Option<Message> {
     let call = service_call(bytes)?;
-    if call.service != SERVICE {
+    if call.service_id != SERVICE_ID {
         let reason = "there is no such service";
         return Some(Message::text(call_failure(&call, reason)));
     }
     match Command::parse(call.payload) {
         Ok(command) => {
             let reply_to = ReplyTo::Call {
-                service: call.service,
-                call: call.call,
+                service_id: call.service_id,
+                call_id: call.call_id,
             };
             calls.start(context.hub, context.domain, command, reply_to);
             None
@@ -210,10 +210,13 @@ fn replies(hub: &Hub, reply_to: ReplyTo, answer: Answer) -> Vec<Message> {
             let texts = parameter_reply(hub, id.as_deref(), answer.err().as_deref());
             texts.into_iter().map(Message::text).collect()
         }
-        ReplyTo::Call { service, call } => {
+        ReplyTo::Call {
+            service_id,
+            call_id,
+        } => {
             let call = ServiceCall {
-                service,
-                call,
+                service_id,
+                call_id,
                 payload: &[],
             };
             vec![match answer {

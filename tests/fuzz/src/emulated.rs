@@ -1,7 +1,7 @@
 //! Inputs of an emulated arm: lines at its pendant's socket, and frames on its bus.
 
 use std::sync::OnceLock;
-use supple_bus::virtual_time::Peer;
+use supple_bus::virtual_time::EmulatedNodes;
 use supple_bus::{CAN_FRAME_BYTES, DecodedFrame, EncodedFrame};
 use supple_core::Vector;
 use supple_emu::{Emulator, EmulatorConfig, answer_pendant};

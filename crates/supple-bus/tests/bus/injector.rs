@@ -1,19 +1,19 @@
 //! Effect of each injected fault on frames, in virtual time.
 
 use std::collections::VecDeque;
-use supple_bus::virtual_time::{DirectBus, Peer};
+use supple_bus::virtual_time::{DirectBus, EmulatedNodes};
 use supple_bus::{Bus, BusFault, Event, FaultInjector, FaultKind, FaultRule, Traffic};
 use supple_can_frame::{CanFrame, CanId};
 
 /// Records the frames that the host sends, and gives the host its scripted events.
 #[derive(Default)]
-struct ScriptedPeer {
+struct ScriptedNodes {
     now_ns: u64,
     received: Vec<(u64, CanFrame)>,
     events: VecDeque<(u64, Event)>,
 }
 
-impl Peer for ScriptedPeer {
+impl EmulatedNodes for ScriptedNodes {
     fn now_ns(&self) -> u64 {
         self.now_ns
     }
@@ -43,11 +43,11 @@ fn frame(id: u32, payload: &[u8]) -> CanFrame {
 }
 
 /// A bus with this rule and with frames for the host at 10, 20, 30 and 40 ns, numbered 1 to 4.
-fn bus_with_four_frames(rule: FaultRule) -> FaultInjector<DirectBus<ScriptedPeer>> {
+fn bus_with_four_frames(rule: FaultRule) -> FaultInjector<DirectBus<ScriptedNodes>> {
     let events = (1..=4u8).map(|i| (u64::from(i) * 10, Event::Frame(frame(0x423, &[0, 0, i]))));
-    let script = ScriptedPeer {
+    let script = ScriptedNodes {
         events: events.collect(),
-        ..ScriptedPeer::default()
+        ..ScriptedNodes::default()
     };
     let mut bus = FaultInjector::new(DirectBus(script), 7);
     bus.add(rule);
@@ -122,7 +122,7 @@ fn corruption_inverts_one_bit() {
 #[test]
 fn a_lost_frame_is_confirmed_and_a_silently_lost_one_is_not() {
     for (kind, confirmed) in [(FaultKind::Loss, true), (FaultKind::SilentLoss, false)] {
-        let mut bus = FaultInjector::new(DirectBus(ScriptedPeer::default()), 1);
+        let mut bus = FaultInjector::new(DirectBus(ScriptedNodes::default()), 1);
         bus.add(FaultRule::always(Traffic::Sent, kind));
         let sent = frame(0x401, &[0xaa; 8]);
         bus.send(&sent).unwrap();
@@ -134,7 +134,7 @@ fn a_lost_frame_is_confirmed_and_a_silently_lost_one_is_not() {
 
 #[test]
 fn a_delayed_frame_is_confirmed_when_it_is_sent() {
-    let mut bus = FaultInjector::new(DirectBus(ScriptedPeer::default()), 1);
+    let mut bus = FaultInjector::new(DirectBus(ScriptedNodes::default()), 1);
     bus.add(FaultRule::always(Traffic::Sent, FaultKind::Delay(30)));
     let sent = frame(0x401, &[0xaa; 8]);
     bus.send(&sent).unwrap();
@@ -169,7 +169,7 @@ fn bus_off_blocks_all_frames_and_reports_start_and_end() {
 
 #[test]
 fn rules_affect_only_their_frames() {
-    let mut bus = FaultInjector::new(DirectBus(ScriptedPeer::default()), 1);
+    let mut bus = FaultInjector::new(DirectBus(ScriptedNodes::default()), 1);
     let torques = |id: CanId| id.raw() == 0x401;
     bus.add(FaultRule::always(Traffic::Sent, FaultKind::SilentLoss).only(torques));
     bus.send(&frame(0x401, &[0xaa; 8])).unwrap();
@@ -187,7 +187,7 @@ fn rules_affect_only_their_frames() {
 #[test]
 fn losses_follow_the_probability_and_repeat_with_the_seed() {
     let received_with_seed = |seed| {
-        let mut bus = FaultInjector::new(DirectBus(ScriptedPeer::default()), seed);
+        let mut bus = FaultInjector::new(DirectBus(ScriptedNodes::default()), seed);
         let rule = FaultRule::always(Traffic::Sent, FaultKind::SilentLoss);
         bus.add(rule.with_probability(0.25));
         for i in 0..4000u32 {

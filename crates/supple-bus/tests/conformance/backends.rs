@@ -1,6 +1,6 @@
 //! Every backend with an echo node on the arm's side; the first element of the pair keeps that node running.
 
-use crate::echo::{EchoPeer, EchoThread};
+use crate::echo::{EchoNodes, EchoThread};
 use supple_bus::virtual_time::{DirectBus, LockstepBus, LockstepResponder};
 use supple_bus::{
     Bus, BusError, DatagramBus, FaultInjector, OwnerFolder, PacedBus, PacedResponder, Side,
@@ -23,7 +23,7 @@ fn folder() -> (TempDir, OwnerFolder) {
 }
 
 pub fn direct() -> Opened {
-    Some(((None, None), Box::new(DirectBus(EchoPeer::default()))))
+    Some(((None, None), Box::new(DirectBus(EchoNodes::default()))))
 }
 
 pub fn lockstep() -> Opened {
@@ -73,7 +73,7 @@ pub fn socket_can() -> Opened {
 }
 
 pub fn injected_direct() -> Opened {
-    let bus = FaultInjector::new(DirectBus(EchoPeer::default()), 1);
+    let bus = FaultInjector::new(DirectBus(EchoNodes::default()), 1);
     Some(((None, None), Box::new(bus)))
 }
 

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
-use supple_bus::virtual_time::{LockstepResponder, Peer};
+use supple_bus::virtual_time::{EmulatedNodes, LockstepResponder};
 use supple_bus::{Bus, Event, PacedResponder};
 use supple_can_frame::{CanFrame, CanId};
 
@@ -22,13 +22,13 @@ pub fn echo_of(frame: &CanFrame) -> CanFrame {
 }
 
 #[derive(Default)]
-pub struct EchoPeer {
+pub struct EchoNodes {
     now_ns: u64,
     busy_until_ns: u64,
     events: VecDeque<(u64, Event)>,
 }
 
-impl Peer for EchoPeer {
+impl EmulatedNodes for EchoNodes {
     fn now_ns(&self) -> u64 {
         self.now_ns
     }
@@ -85,7 +85,7 @@ impl EchoThread {
     }
 
     pub fn responder(responder: LockstepResponder) -> EchoThread {
-        let responder = std::sync::Mutex::new((responder, EchoPeer::default()));
+        let responder = std::sync::Mutex::new((responder, EchoNodes::default()));
         EchoThread::run(move |stop| {
             let (responder, peer) = &mut *responder.lock().unwrap();
             while !stop.load(Ordering::Relaxed) {
@@ -95,7 +95,7 @@ impl EchoThread {
     }
 
     pub fn paced(responder: PacedResponder) -> EchoThread {
-        let shared = std::sync::Mutex::new((responder, EchoPeer::default()));
+        let shared = std::sync::Mutex::new((responder, EchoNodes::default()));
         EchoThread::run(move |stop| {
             let (responder, peer) = &mut *shared.lock().unwrap();
             while !stop.load(Ordering::Relaxed) {

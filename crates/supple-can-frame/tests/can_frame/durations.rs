@@ -1,15 +1,15 @@
 //! Bits and durations: published bounds, and a second count that writes every bit down.
 
 use proptest::prelude::*;
-use supple_can_frame::timing::{Bits, Shape, bits, max_bits, min_bits};
+use supple_can_frame::timing::{Bits, FrameLayout, bits, max_bits, min_bits};
 use supple_can_frame::{BitRates, CanFrame, CanId, FrameFormat};
 
 const FD: FrameFormat = FrameFormat::Fd {
     bit_rate_switch: true,
 };
 
-fn extended(dlc: u8) -> Shape {
-    Shape {
+fn extended(dlc: u8) -> FrameLayout {
+    FrameLayout {
         format: FD,
         extended: true,
         dlc,
@@ -20,13 +20,13 @@ fn extended(dlc: u8) -> Shape {
 fn bounds_are_those_of_the_standard() {
     // 8 bytes: 111 to 135 bits with a standard id, 131 to 160 with an extended one.
     assert_eq!((min_bits(8), max_bits(8)), (111, 135));
-    let extended = Shape {
+    let extended = FrameLayout {
         extended: true,
-        ..Shape::standard(FrameFormat::Classic, 8)
+        ..FrameLayout::standard(FrameFormat::Classic, 8)
     };
     assert_eq!(extended.min_bits().nominal, 131);
     assert_eq!(extended.max_bits().nominal, 160);
-    let fd = Shape::standard(FD, 8);
+    let fd = FrameLayout::standard(FD, 8);
     let [min, max] = [fd.min_bits(), fd.max_bits()].map(|b| (b.nominal, b.data));
     assert_eq!((min, max), ((29, 97), (33, 114)));
 }
@@ -35,19 +35,20 @@ fn bounds_are_those_of_the_standard() {
 /// command; 20 and 16 bytes.
 #[test]
 fn cycles_of_seven_motors_take_their_known_times() {
-    let us = |rates: BitRates, shapes: [Shape; 2]| {
-        let sum = |ns: fn(&BitRates, Shape) -> u64| shapes.map(|s| ns(&rates, s)).iter().sum();
+    let us = |rates: BitRates, shapes: [FrameLayout; 2]| {
+        let sum =
+            |ns: fn(&BitRates, FrameLayout) -> u64| shapes.map(|s| ns(&rates, s)).iter().sum();
         let round = |ns: u64| (7.0 * ns as f64 * 1e-3).round() as u64;
         (
-            round(sum(|rates, shape| rates.min_ns(shape))),
-            round(sum(|rates, shape| rates.max_ns(shape))),
+            round(sum(|rates, layout| rates.min_ns(layout))),
+            round(sum(|rates, layout| rates.max_ns(layout))),
         )
     };
     let (classic, fd) = (BitRates::CLASSIC_1M, BitRates::FD_1M_5M);
-    let eight = |format| [Shape::standard(format, 8); 2];
+    let eight = |format| [FrameLayout::standard(format, 8); 2];
     assert_eq!(us(classic, eight(FrameFormat::Classic)), (1554, 1890));
     assert_eq!(us(fd, eight(FD)), (678, 781));
-    let lengths = |command, reply| [extended(command), Shape::standard(FD, reply)];
+    let lengths = |command, reply| [extended(command), FrameLayout::standard(FD, reply)];
     assert_eq!(us(fd, lengths(14, 12)), (1452, 1742));
     assert_eq!(us(fd, lengths(11, 10)), (1042, 1231));
 }
@@ -128,12 +129,12 @@ proptest! {
         let check = if length <= 16 { 4 + 17 + 6 } else { 4 + 21 + 7 };
         let expected = stuffed(&fd_head(&frame, bit_rate_switch)) + check + 13;
         prop_assert_eq!(bits(&frame) as usize, expected);
-        let (found, shape) = (Bits::of(&frame), Shape::of(&frame));
-        let (min, max) = (shape.min_bits(), shape.max_bits());
+        let (found, layout) = (Bits::of(&frame), FrameLayout::of(&frame));
+        let (min, max) = (layout.min_bits(), layout.max_bits());
         prop_assert!(min.nominal <= found.nominal && min.data <= found.data);
         prop_assert!(found.nominal <= max.nominal && found.total() <= max.total());
         let rates = BitRates::FD_1M_5M;
-        prop_assert!((rates.min_ns(shape)..=rates.max_ns(shape)).contains(&rates.duration_ns(&frame)));
+        prop_assert!((rates.min_ns(layout)..=rates.max_ns(layout)).contains(&rates.duration_ns(&frame)));
     }
 
     #[test]
@@ -144,8 +145,8 @@ proptest! {
     ) {
         let id = if is_extended { CanId::extended(raw) } else { CanId::standard(raw >> 18) };
         let frame = CanFrame::new(id.unwrap(), &bytes).unwrap();
-        let shape = Shape::of(&frame);
-        let range = shape.min_bits().nominal..=shape.max_bits().nominal;
+        let layout = FrameLayout::of(&frame);
+        let range = layout.min_bits().nominal..=layout.max_bits().nominal;
         prop_assert!(range.contains(&bits(&frame)));
     }
 }

@@ -1,4 +1,4 @@
-//! Makes of drives on a bus: a folder each. [`registry`](crate::registry) names them.
+//! Types of drives on a bus: a folder each. [`registry`](crate::registry) names them.
 
 pub mod barrett;
 pub mod damiao;

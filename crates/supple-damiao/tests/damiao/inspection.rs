@@ -51,7 +51,7 @@ fn a_motor_that_fits_is_accepted() {
     let found = expectation().check(&readings(None), Some(0.251)).unwrap();
     assert_eq!(found.ranges.torque().max(), 28.0);
     assert_eq!((found.write_mode, found.write_timeout), (false, None));
-    assert!(found.firmware.registers_while_cycling());
+    assert!(found.firmware.reads_registers_in_operation());
 }
 
 #[test]

@@ -71,6 +71,14 @@ fn firmware_for_an_arm() {
         Firmware::parse([1, 2, 3, 4]),
         Err(FirmwareError::NotDigits([1, 2, 3, 4]))
     );
-    assert!(!Firmware::parse(*b"5016").unwrap().registers_while_cycling());
-    assert!(Firmware::parse(*b"5017").unwrap().registers_while_cycling());
+    assert!(
+        !Firmware::parse(*b"5016")
+            .unwrap()
+            .reads_registers_in_operation()
+    );
+    assert!(
+        Firmware::parse(*b"5017")
+            .unwrap()
+            .reads_registers_in_operation()
+    );
 }

@@ -5,7 +5,7 @@ use super::misbehaviour::{Misbehaviour, MisbehaviourKind};
 use super::motor::Motor;
 use crate::error::EmulatorError;
 use crate::wire::Wire;
-use supple_bus::virtual_time::Peer;
+use supple_bus::virtual_time::EmulatedNodes;
 use supple_bus::{BusFault, Event};
 use supple_can_frame::CanFrame;
 use supple_core::Vector;
@@ -354,7 +354,7 @@ fn rest_on_stops<const N: usize>(stops: &mut HardStops<N>, stow_rad: &Vector<N>,
     }
 }
 
-impl<const N: usize> Peer for DamiaoArm<N> {
+impl<const N: usize> EmulatedNodes for DamiaoArm<N> {
     fn now_ns(&self) -> u64 {
         self.now_ns
     }

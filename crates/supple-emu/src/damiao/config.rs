@@ -37,7 +37,7 @@ pub struct MotorConfig {
     /// Whether it answers in FD frames (register can_br).
     pub fd: bool,
     /// Whether a disabled motor brakes through shorted phases. False by default: what they do is not published, and arms
-    /// of this make are reported to fall.
+    /// of this type are reported to fall.
     pub brakes_when_disabled: bool,
     /// Temperature at the start \[degrees Celsius\]; 30 by default.
     pub celsius: f64,

@@ -5,7 +5,7 @@ use super::config::DamiaoConfig;
 use crate::error::EmulatorError;
 use crate::options::{Options, StartPose};
 use crate::real_time::{EmulatedArm, advance_to_bus_time, receive_host_frame};
-use supple_bus::virtual_time::{LockstepResponder, Peer};
+use supple_bus::virtual_time::{EmulatedNodes, LockstepResponder};
 use supple_bus::{Address, OwnerFolder, PacedResponder, SocketCan};
 use supple_can_frame::CanFrame;
 use supple_core::Vector;

@@ -44,6 +44,14 @@ pub enum ProcedureError {
         /// Problem.
         problem: String,
     },
+    /// A log of the procedure cannot be read.
+    #[error("cannot read {}: {problem}; start again without --resume, or with another --out", file.display())]
+    ReadLog {
+        /// The file.
+        file: PathBuf,
+        /// Problem.
+        problem: String,
+    },
     /// A result cannot be written.
     #[error("cannot write {}: {error}; choose a writable folder with --out", file.display())]
     Write {

@@ -3,7 +3,7 @@
 use super::error::ProcedureError;
 use super::progress::FitQuality;
 use crate::breakaway::JointBreakaway;
-use crate::calibrate::{FitOptions, SLOW_RAD_PER_S, identify_with, without_ripple};
+use crate::calibrate::{FitOptions, SLOW_RAD_PER_S, identify_with, with_ripple_torque};
 use nalgebra::DMatrix;
 use std::path::Path;
 use supple_core::controller::Mode;
@@ -123,7 +123,7 @@ pub fn read_position_controlled_motions<const N: usize>(
     match supple_ident::read_mcap::<N>(file) {
         Ok(logs) => Ok(logs.into_iter().filter(every_joint_moves).collect()),
         Err(ReadError::Table { .. }) => Ok(Vec::new()),
-        Err(error) => Err(ProcedureError::Resume {
+        Err(error) => Err(ProcedureError::ReadLog {
             file: file.to_owned(),
             problem: error.to_string(),
         }),
@@ -183,13 +183,13 @@ pub fn fit_all<const N: usize>(
     let (options, min_rad_per_s) = (fit_options(model), min_fitted_rad_per_s(logs));
     let (fit, ripple) = identify_with(&config, logs, constant_speed, &options, min_rad_per_s)?;
     let motor_from_joint = *supple_core::Controller::new(config)?.motor_from_joint();
-    let validation = without_ripple(validation, &ripple, &motor_from_joint);
+    let validation = with_ripple_torque(validation, &ripple, &motor_from_joint);
     let validation = prepared(&validation, &fit)?;
     let quality = quality(&config, &fit, &validation)?;
     let described = fit.description(model, Some(&ripple))?;
     let mut validations = vec![fit.validate_motion(&validation)?];
     for log in logs.iter().chain(others) {
-        let log = without_ripple(log, &ripple, &motor_from_joint);
+        let log = with_ripple_torque(log, &ripple, &motor_from_joint);
         validations.push(fit.validate_motion(&prepared(&log, &fit)?)?);
     }
     let present_nm = config.collision.move_joint_torque_nm;

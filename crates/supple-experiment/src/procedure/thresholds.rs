@@ -15,44 +15,44 @@ const LOAD_N: f64 = 40.0;
 const UNCHECKED_N: f64 = 1e4;
 /// Error of the model, as a fraction of its gravity: with an error of 30 % in a joint's gravity, and motors that give 1/1.5 of
 /// the commanded torque, the true gravity takes 2.0 to 2.1 times the model's torque.
-const GRAVITY_ERROR: f64 = 1.1;
+const GRAVITY_ERROR_SHARE: f64 = 1.1;
 /// Error by friction, in breakaway torques: friction acts in either direction.
-const FRICTION_ERROR: f64 = 2.0;
+const FRICTION_ERROR_RATIO: f64 = 2.0;
 /// Error by inertia and other terms \[N m\].
 const MARGIN_NM: f64 = 1.0;
 /// Maximum threshold as a fraction of the joint's torque limit.
 const MAX_LIMIT_FRACTION: f64 = 0.9;
 /// With the model of the first fit, in which the torque scales of the motors may still differ: `collision.move_share` and
 /// `plausible.against_share`.
-const FIRST_MODEL_SHARE: f64 = 2.0;
-const FIRST_MODEL_AGAINST: f64 = 0.35;
+const FIRST_FIT_MOVE_SHARE: f64 = 2.0;
+const FIRST_FIT_AGAINST_SHARE: f64 = 0.35;
 /// Number of angles per joint of the grid of poses at which gravity is evaluated.
 const ANGLES_PER_JOINT: usize = 5;
 
-/// Minimum thresholds for `model`. `unknown`: the model is that of the description; otherwise it is that of the first fit.
+/// Minimum thresholds for `model`: that of the description, `before_first_fit`, or that of the first fit.
 ///
 /// # Errors
 /// A description that is not valid.
 pub fn minimum_thresholds<const N: usize>(
     model: &Description,
-    unknown: bool,
+    before_first_fit: bool,
 ) -> Result<MinimumThresholds, ProcedureError> {
-    let falls = model.bus().is_some();
+    let has_no_brakes = model.bus().is_some();
     let minimum = MinimumThresholds {
         move_share: 1.0,
         joint_torque_nm: None,
         tip_force_n: 0.0,
-        hold_pose: falls,
+        hold_pose: has_no_brakes,
         load_n: LOAD_N,
         // Not raised: motion against its torque is how a motor of the wrong sign is detected.
         against_share: 0.0,
     };
-    match (falls, unknown) {
+    match (has_no_brakes, before_first_fit) {
         (false, _) => return Ok(minimum),
         (true, false) => {
             return Ok(MinimumThresholds {
-                move_share: FIRST_MODEL_SHARE,
-                against_share: FIRST_MODEL_AGAINST,
+                move_share: FIRST_FIT_MOVE_SHARE,
+                against_share: FIRST_FIT_AGAINST_SHARE,
                 ..minimum
             });
         }
@@ -62,8 +62,8 @@ pub fn minimum_thresholds<const N: usize>(
     let max_nm = max_gravity_nm(&config);
     let limits_nm = &config.limits.joint_torque_nm;
     let threshold_nm = Vector::<N>::from_fn(|joint, _| {
-        let error_nm = GRAVITY_ERROR * max_nm[joint]
-            + FRICTION_ERROR * config.friction[joint].breakaway_nm
+        let error_nm = GRAVITY_ERROR_SHARE * max_nm[joint]
+            + FRICTION_ERROR_RATIO * config.friction[joint].breakaway_nm
             + RAMP_LIMIT_NM.min(limits_nm[joint])
             + MARGIN_NM;
         error_nm.min(MAX_LIMIT_FRACTION * limits_nm[joint])

@@ -18,7 +18,7 @@ const CELSIUS: core::ops::RangeInclusive<f64> = 0.0..=150.0;
 /// Drives of an arm as its bus addresses them, in the order of the joints.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BusDescription {
-    /// Make of the drives.
+    /// Type of the drives.
     pub kind: BusKind,
     /// Frames of the bus.
     pub format: BusFormat,

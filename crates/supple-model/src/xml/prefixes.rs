@@ -4,7 +4,7 @@
 use std::collections::BTreeSet;
 
 /// Adds `xmlns:PREFIX` to the root element for every undeclared prefix of an element or an attribute. A word in a
-/// quoted value that looks like one is declared too, which changes nothing.
+/// quoted value or a comment that looks like one is declared too, which changes nothing.
 pub(crate) fn declare_prefixes(urdf: String) -> String {
     let Some(root) = urdf.find("<robot") else {
         return urdf;
@@ -17,7 +17,7 @@ pub(crate) fn declare_prefixes(urdf: String) -> String {
     }
     // A prefix declared anywhere is left to the parser.
     let undeclared = |prefix: &&&str| {
-        !matches!(**prefix, "xml" | "xmlns") && !urdf.contains(&format!("xmlns:{prefix}"))
+        !matches!(**prefix, "xml" | "xmlns") && !urdf.contains(&format!("xmlns:{prefix}="))
     };
     let declarations: String = prefixes
         .iter()
@@ -55,7 +55,10 @@ mod tests {
         assert!(attribute.contains("xmlns:drake"), "{attribute}");
         let plain = "<robot name=\"a\"><link name=\"b\"/></robot>".to_owned();
         assert_eq!(declare_prefixes(plain.clone()), plain);
-        // xacro stays an error that states the remedy.
+        // A prefix whose name begins like that of a declared one.
+        let similar = declare_prefixes("<robot xmlns:gazebo=\"u\"><g:b/></robot>".to_owned());
+        assert_eq!(similar.matches("xmlns:g=").count(), 1, "{similar}");
+        // Readers know xacro by this name, and refuse it with the remedy.
         let xacro = declare_prefixes("<robot><xacro:arm/></robot>".to_owned());
         assert!(xacro.contains("undeclared:xacro"));
     }

@@ -24,7 +24,7 @@ pub(super) fn force(summary: &Summary) -> Section {
         ),
         row(
             "the same for the ratio of peak to approach speed",
-            fraction(summary.contact.peak_over_speed_spread),
+            fraction(summary.contact.peak_per_approach_speed_spread),
         ),
         row(
             "force while pressing at 5 and 125 N/m",

@@ -1,4 +1,4 @@
-//! Text of the report: results of the paper and measured results, figure by figure.
+//! Text of the report: results of the paper and of the simulation, figure by figure.
 
 mod contact;
 mod free_motion;
@@ -53,10 +53,13 @@ pub fn faults(summary: &Summary) -> Vec<(String, &FaultEnd)> {
         runs.push((format!("sinusoid, exact model, {name}"), &tracking.ended));
     }
     for (kind, runs_by_stiffness) in [
-        ("fade on", &summary.probing),
-        ("fade off", &summary.probing_fade_off),
+        ("friction feed-forward faded in contact", &summary.probing),
+        (
+            "friction feed-forward kept in contact",
+            &summary.probing_fade_off,
+        ),
         ("exact model", &summary.probing_exact_model),
-        ("rubber", &summary.probing_rubber),
+        ("block of rubber", &summary.probing_rubber),
         ("apparent inertia", &summary.probing_apparent_inertia),
     ] {
         for run in runs_by_stiffness {

@@ -21,7 +21,7 @@ const ARPHRD_CAN: i64 = 280;
 pub enum Verdict {
     /// Requirement met.
     Pass,
-    /// Cycles may be late; the arm stays safe.
+    /// Not ideal, or not determined: cycles may be late, or a CAN bus cannot be used.
     Warn,
     /// The real-time requirements are not met.
     Fail,
@@ -143,7 +143,9 @@ fn throttling(machine: &Machine) -> Check {
         ),
         Some(runtime_us) => Check::pass(
             NAME,
-            format!("after {runtime_us} us of each second; the control thread sleeps far more"),
+            format!(
+                "after {runtime_us} us of each scheduler period; the control thread idles for much longer than the rest"
+            ),
         ),
         None => Check::warn(
             NAME,
@@ -187,7 +189,7 @@ fn governor(machine: &Machine) -> Check {
     match (governors.len(), slow.first()) {
         (0, _) => Check::warn(
             NAME,
-            "the kernel does not scale the clock of this machine, or its host does",
+            "no frequency governor: the frequency is fixed, or the host of a virtual machine scales it",
             "on a virtual machine, set the governor of the host to performance",
         ),
         (_, None) => Check::pass(NAME, "performance"),
@@ -222,7 +224,7 @@ fn clock(machine: &Machine) -> Check {
         Some(source) => Check::warn(
             NAME,
             format!("{source}: reading it takes microseconds"),
-            "boot with clocksource=tsc where the processor's counter is constant",
+            "boot with clocksource=tsc where the processor has an invariant TSC",
         ),
         None => Check::warn(
             NAME,

@@ -5,14 +5,14 @@ use super::observable::is_of_sensors;
 use super::spec::{DriveShutdown, Event, Expected, Spec, TestTask};
 use supple_plant::InjectionKind;
 
-/// Ratio to the kinetic energy at the fault and before it above which the arm counts as driven, until its motors brake: what a
-/// reversed or dead motor gives until it is known.
+/// Maximum ratio of the peak kinetic energy from the fault until 10 ms after braking began to that at the fault, or before it if that
+/// was more. The excess is what a reversed or dead motor can add before it is detected.
 const ENERGY_INCREASE_RATIO: f64 = 1.5;
-/// Kinetic energy of an arm at [`SLOW_M_PER_S`], of which the same counts \[J\].
-const SLOW_ENERGY_J: f64 = 0.12;
+/// Kinetic energy of an arm at [`SLOW_M_PER_S`]: an increase to less is no failure \[J\].
+const MIN_ENERGY_BOUND_J: f64 = 0.12;
 
 /// Maximum motion of an arm that descends on shorted motors.
-struct BrakedSink {
+struct BrakedDescentLimits {
     /// Kinetic energy \[J\].
     energy_j: f64,
     /// Tip travel after the drives are re-enabled \[m\].
@@ -21,35 +21,36 @@ struct BrakedSink {
     tip_m_per_s: f64,
 }
 
-/// The 4-joint arm, 0.1 m/s at the tip.
-const BRAKED_SINK: BrakedSink = BrakedSink {
+/// The 4-joint arm, which descends at 0.1 m/s at the tip.
+const BRAKED_DESCENT: BrakedDescentLimits = BrakedDescentLimits {
     energy_j: 0.05,
     reenabled_m: 0.02,
     tip_m_per_s: 0.12,
 };
 /// The 7-joint arm, whose wrist is heavier and brakes less.
-const POSE_BRAKED_SINK: BrakedSink = BrakedSink {
+const POSE_BRAKED_DESCENT: BrakedDescentLimits = BrakedDescentLimits {
     energy_j: 0.08,
     reenabled_m: 0.03,
     tip_m_per_s: 0.16,
 };
-/// The same with the effects of a real arm, whose friction is not that of the model: gravity hold lets it glide to rest. It had
-/// the bound of the arm without them until the first run, which gave 45 mm.
-const REAL_POSE_BRAKED_SINK: BrakedSink = BrakedSink {
+/// The same with the effects of a real arm, whose friction is not that of the model, so that it glides further in gravity hold.
+/// The travel was raised from 30 mm to 50 mm after the first run gave 45 mm.
+const REAL_POSE_BRAKED_DESCENT: BrakedDescentLimits = BrakedDescentLimits {
     reenabled_m: 0.05,
-    ..POSE_BRAKED_SINK
+    ..POSE_BRAKED_DESCENT
 };
-/// Way of the tip in the observed 1.5 s from where the arm has sunk onto its stops, at 0.05 rad/s \[m\].
-const RETURNS_M: f64 = 0.1;
+/// Maximum travel of the tip in the observed 1.5 s after the drives are re-enabled, while joints that sank onto their stops are moved
+/// back at 0.05 rad/s \[m\].
+const MAX_RETURN_TRAVEL_M: f64 = 0.1;
 /// Maximum contact force after the first impact, for an approach at 0.25 m/s \[N\].
 const MAX_FORCE_AFTER_IMPACT_N: f64 = 65.0;
-/// Maximum time from contact to collision fault and gravity compensation \[ms\].
+/// Maximum time from contact to collision fault \[ms\].
 const MAX_COLLISION_DETECTION_MS: f64 = 20.0;
-/// Maximum time from the moment at which a fault can be observed \[ms\].
+/// Maximum time from the moment at which a fault can be observed until it is detected \[ms\].
 const MAX_DETECTION_MS: f64 = 100.0;
-/// Rise of the mechanical energy that is the error of its computation from angles of the last cycle \[J\].
-const ENERGY_ERROR_J: f64 = 0.1;
-/// Square of the tip speed per descent of a rod that turns about its end, over the acceleration of gravity.
+/// Tolerance of the mechanical energy, which is computed from angles that are one cycle old \[J\].
+const ENERGY_TOLERANCE_J: f64 = 0.1;
+/// `v^2 / (g h)` at the tip of a uniform rod that falls by `h` about its end.
 const FALLING_ROD: f64 = 3.0;
 const GRAVITY_M_PER_S2: f64 = 9.81;
 /// Maximum time for which drives that were activated in a fault are active \[ms\].
@@ -65,9 +66,9 @@ const BRAKING_SPEED_INCREASE_RATIO: f64 = 1.15;
 /// torque or of twice the weight \[m/s\].
 const MAX_UNDETECTED_M_PER_S: f64 = 0.6;
 /// Maximum speed at which an arm with 1 kg of unmodelled payload descends on shorted motors \[m/s\].
-const MAX_LOADED_SINK_M_PER_S: f64 = 0.35;
+const MAX_LOADED_DESCENT_M_PER_S: f64 = 0.35;
 /// Maximum tip drop caused by an unmodelled load in the observed 1.5 s, with braking motors \[m\].
-const MAX_SINK_M: f64 = 0.2;
+const MAX_DESCENT_M: f64 = 0.2;
 /// Tip displacement below which the tip counts as stationary \[m\].
 const STATIONARY_M: f64 = 0.005;
 
@@ -103,7 +104,7 @@ pub fn evaluate(spec: &Spec, metrics: &RowMetrics, refusals: &[String]) -> (Stri
                 keeps_running || stopped_by(metrics, names),
                 "it neither keeps running nor stops with an expected fault".to_owned(),
             );
-            // What yields to a disturbance or to a load, as to a hand, need not name it.
+            // Only the faults of sensors have this deadline: a compliant arm may yield to a load or a push without a fault.
             if metrics.observable_after_ms.is_some() && fault_of_sensors(spec) {
                 expect_detection(metrics, names, &mut expect);
             }
@@ -142,15 +143,15 @@ pub fn evaluate(spec: &Spec, metrics: &RowMetrics, refusals: &[String]) -> (Stri
                     active(metrics)
                 ),
             );
-            let sink = braked_sink(spec);
-            let (moved_m, speed) = (metrics.back_moved_m, metrics.back_tip_m_per_s);
+            let descent = braked_descent(spec);
+            let (moved_m, speed) = (metrics.reenabled_travel_m, metrics.reenabled_tip_m_per_s);
             let max_moved_m = match spec.event {
-                Event::Drives(DriveShutdown::IdleAtHome) => RETURNS_M,
-                _ => sink.reenabled_m,
+                Event::Drives(DriveShutdown::IdleAtHome) => MAX_RETURN_TRAVEL_M,
+                _ => descent.reenabled_m,
             };
             expect(
                 moved_m.is_some_and(|m| m < max_moved_m)
-                    && speed.is_some_and(|s| s < sink.tip_m_per_s),
+                    && speed.is_some_and(|s| s < descent.tip_m_per_s),
                 format!(
                     "after activation the tip moved {:.0} mm at up to {:.2} m/s",
                     moved_m.unwrap_or(f64::NAN) * 1e3,
@@ -160,19 +161,19 @@ pub fn evaluate(spec: &Spec, metrics: &RowMetrics, refusals: &[String]) -> (Stri
         }
         Expected::StaysIdle(names) => {
             expect(stopped_by(metrics, names), "no expected fault".to_owned());
-            let active_ms = metrics.back_active_ms.unwrap_or(0.0);
+            let active_ms = metrics.reenabled_active_ms.unwrap_or(0.0);
             expect(
                 !metrics.end_active && active_ms <= MAX_ACTIVATED_MS,
                 format!("the activated drives had torque for {active_ms:.0} ms"),
             );
-            let speed = metrics.back_tip_m_per_s.unwrap_or(0.0);
-            let bound = braked_sink(spec).tip_m_per_s;
+            let speed = metrics.reenabled_tip_m_per_s.unwrap_or(0.0);
+            let bound = braked_descent(spec).tip_m_per_s;
             expect(
                 speed <= bound,
                 format!("tip at {speed:.2} m/s after activation"),
             );
         }
-        // Evaluated from wall-clock metrics elsewhere.
+        // Evaluated from wall-clock metrics, see `Row::wall_clock`.
         Expected::Brakes(..) | Expected::ControllerFault | Expected::IdleAccepted => {}
     }
     if spec.event == Event::Obstacle {
@@ -189,8 +190,8 @@ pub fn evaluate(spec: &Spec, metrics: &RowMetrics, refusals: &[String]) -> (Stri
         }
         // While probing or tracking, and with compliant joints, the law itself presses on the block.
         let pressed_n = metrics.pressed_n.unwrap_or(0.0);
-        let own_n = metrics.law_force_n.unwrap_or(0.0) + metrics.weight_n.unwrap_or(0.0);
-        let allowed_n = MAX_PRESSING_FORCE_N + own_n;
+        let expected_n = metrics.law_force_n.unwrap_or(0.0) + metrics.weight_n.unwrap_or(0.0);
+        let allowed_n = MAX_PRESSING_FORCE_N + expected_n;
         expect(
             pressed_n < allowed_n,
             format!("pressed with {pressed_n:.0} N after 0.5 s, {allowed_n:.0} N allowed"),
@@ -199,11 +200,11 @@ pub fn evaluate(spec: &Spec, metrics: &RowMetrics, refusals: &[String]) -> (Stri
     (outcome(metrics, keeps_running, refusals), deviations)
 }
 
-fn braked_sink(spec: &Spec) -> BrakedSink {
+fn braked_descent(spec: &Spec) -> BrakedDescentLimits {
     match spec.task {
-        TestTask::TrackPose if spec.realistic => REAL_POSE_BRAKED_SINK,
-        TestTask::TrackPose => POSE_BRAKED_SINK,
-        _ => BRAKED_SINK,
+        TestTask::TrackPose if spec.realistic => REAL_POSE_BRAKED_DESCENT,
+        TestTask::TrackPose => POSE_BRAKED_DESCENT,
+        _ => BRAKED_DESCENT,
     }
 }
 
@@ -253,12 +254,12 @@ fn check_safe_stop(spec: &Spec, metrics: &RowMetrics, expect: &mut impl FnMut(bo
         // nothing adds energy to what the descent releases.
         let gained_j = metrics.energy_gained_j.unwrap_or(f64::INFINITY);
         expect(
-            gained_j <= ENERGY_ERROR_J,
+            gained_j <= ENERGY_TOLERANCE_J,
             format!("{gained_j:.2} J more than at the fault, kinetic and potential"),
         );
         let at_fault = metrics.tip_at_fault_m_per_s.unwrap_or(0.0);
-        let released = FALLING_ROD * GRAVITY_M_PER_S2 * metrics.descent_m;
-        let bound = (at_fault * at_fault + released).sqrt();
+        let speed_squared = FALLING_ROD * GRAVITY_M_PER_S2 * metrics.descent_m;
+        let bound = (at_fault * at_fault + speed_squared).sqrt();
         expect(
             metrics.tip_after_m_per_s <= bound,
             format!(
@@ -269,8 +270,8 @@ fn check_safe_stop(spec: &Spec, metrics: &RowMetrics, expect: &mut impl FnMut(bo
         return;
     }
     if let (Some(at_j), Some(peak)) = (metrics.energy_at_fault_j, metrics.energy_peak) {
-        let moved_j = at_j.max(metrics.energy_before_j);
-        let bound_j = (ENERGY_INCREASE_RATIO * moved_j).max(SLOW_ENERGY_J);
+        let reference_j = at_j.max(metrics.energy_before_j);
+        let bound_j = (ENERGY_INCREASE_RATIO * reference_j).max(MIN_ENERGY_BOUND_J);
         let (peak_j, after_ms) = peak;
         expect(
             peak_j <= bound_j,
@@ -279,7 +280,7 @@ fn check_safe_stop(spec: &Spec, metrics: &RowMetrics, expect: &mut impl FnMut(bo
     }
     if let (Some(at_j), Some(later_j)) = (metrics.energy_at_fault_j, metrics.energy_later_j) {
         expect(
-            later_j <= at_j.max(braked_sink(spec).energy_j),
+            later_j <= at_j.max(braked_descent(spec).energy_j),
             format!("{later_j:.2} J 0.2 s after the fault, {at_j:.2} J at the fault"),
         );
     }
@@ -289,7 +290,7 @@ fn check_safe_stop(spec: &Spec, metrics: &RowMetrics, expect: &mut impl FnMut(bo
                 InjectionKind::EncoderLate { .. } | InjectionKind::GravityReversed => {
                     MAX_UNDETECTED_M_PER_S
                 }
-                InjectionKind::Payload { .. } => MAX_LOADED_SINK_M_PER_S,
+                InjectionKind::Payload { .. } => MAX_LOADED_DESCENT_M_PER_S,
                 _ => SLOW_M_PER_S,
             },
             _ => SLOW_M_PER_S,
@@ -313,7 +314,7 @@ fn check_safe_stop(spec: &Spec, metrics: &RowMetrics, expect: &mut impl FnMut(bo
     } = spec.event
     {
         expect(
-            metrics.tip_moved_m < MAX_SINK_M || spec.task != TestTask::GravityHold,
+            metrics.tip_moved_m < MAX_DESCENT_M || spec.task != TestTask::GravityHold,
             format!("the tip descended {:.0} mm", metrics.tip_moved_m * 1e3),
         );
     }
@@ -564,7 +565,7 @@ mod tests {
 
     #[test]
     fn pressing_on_a_block_after_the_impact_fails() {
-        let met = |later_n: f64| {
+        let contact_run = |later_n: f64| {
             run(14, move |ms, line| match ms {
                 1040..1044 => line.force_n = 700.0,
                 1044.. => line.force_n = later_n,
@@ -573,32 +574,32 @@ mod tests {
         };
         let mut obstacle = spec(Event::Obstacle, Expected::FaultAndRest(&["tip_collision"]));
         obstacle.task = TestTask::Move;
-        assert!(evaluate(&obstacle, &met(2.0), &[]).1.is_empty());
+        assert!(evaluate(&obstacle, &contact_run(2.0), &[]).1.is_empty());
         assert_eq!(
-            evaluate(&obstacle, &met(60.0), &[]).1,
+            evaluate(&obstacle, &contact_run(60.0), &[]).1,
             ["pressed with 60 N after 0.5 s, 5 N allowed"]
         );
-        assert_eq!(evaluate(&obstacle, &met(90.0), &[]).1.len(), 2);
+        assert_eq!(evaluate(&obstacle, &contact_run(90.0), &[]).1.len(), 2);
     }
 
     #[test]
     fn an_accepted_invalid_request_or_a_moving_tip_fails() {
-        let deviations = spec(
+        let invalid_request = spec(
             Event::Request(super::super::spec::InvalidRequest::TooFast),
             Expected::Refused,
         );
         let metrics = run(0, |_, _| {});
         assert!(
-            evaluate(&deviations, &metrics, &["too fast".to_owned()])
+            evaluate(&invalid_request, &metrics, &["too fast".to_owned()])
                 .1
                 .is_empty()
         );
-        assert_eq!(evaluate(&deviations, &metrics, &[]).1, ["accepted"]);
+        assert_eq!(evaluate(&invalid_request, &metrics, &[]).1, ["accepted"]);
         let moved = run(0, |ms, line| {
             line.tip_m[0] = if ms > 1500 { 0.1 } else { 0.0 }
         });
         assert_eq!(
-            evaluate(&deviations, &moved, &["too fast".to_owned()])
+            evaluate(&invalid_request, &moved, &["too fast".to_owned()])
                 .1
                 .len(),
             1

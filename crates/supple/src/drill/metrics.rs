@@ -113,11 +113,11 @@ pub struct RowMetrics {
     /// Whether the drives are active at the end.
     pub end_active: bool,
     /// Maximum tip speed after the drives are re-enabled \[m/s\].
-    pub back_tip_m_per_s: Option<f64>,
+    pub reenabled_tip_m_per_s: Option<f64>,
     /// Maximum tip displacement after the drives are re-enabled \[m\].
-    pub back_moved_m: Option<f64>,
+    pub reenabled_travel_m: Option<f64>,
     /// Total time for which the re-enabled drives were active \[ms\].
-    pub back_active_ms: Option<f64>,
+    pub reenabled_active_ms: Option<f64>,
 }
 
 impl RowMetrics {
@@ -223,15 +223,16 @@ impl RowMetrics {
                 .find(|line| line.active && line.time_ns > braked.time_ns)
         });
         if let Some(back) = back {
-            metrics.back_tip_m_per_s = Some(max(from(back.time_ns).map(|l| l.tip_speed_m_per_s)));
+            metrics.reenabled_tip_m_per_s =
+                Some(max(from(back.time_ns).map(|l| l.tip_speed_m_per_s)));
             let distances_m = from(back.time_ns).map(|line| distance(&line.tip_m, &back.tip_m));
-            metrics.back_moved_m = Some(max(distances_m));
+            metrics.reenabled_travel_m = Some(max(distances_m));
             let pairs = after
                 .windows(2)
                 .filter(|pair| pair[0].time_ns >= back.time_ns);
             let active = pairs.filter(|pair| pair[0].active);
             let active_ns: u64 = active.map(|pair| pair[1].time_ns - pair[0].time_ns).sum();
-            metrics.back_active_ms = Some(active_ns as f64 * 1e-6);
+            metrics.reenabled_active_ms = Some(active_ns as f64 * 1e-6);
         }
         if let Some(stop) = stop_ns.and_then(at) {
             let lowest_m = from(stop.time_ns).map(|line| line.tip_m[2]);

@@ -6,7 +6,7 @@ use super::error::CanError;
 use super::sensor::Readings;
 use super::start_up::Ready;
 use supple_bus::Bus;
-use supple_can_frame::timing::Shape;
+use supple_can_frame::timing::FrameLayout;
 use supple_can_frame::{BitRates, FrameFormat};
 use supple_core::Vector;
 use supple_drive::{
@@ -343,16 +343,16 @@ impl<const N: usize, B: Bus> Drive<N> for Barrett<N, B> {
 
 /// Frames of a period.
 fn budget(time: &BusTime) -> Budget {
-    let shape = |dlc| Shape::standard(FrameFormat::Classic, dlc);
+    let layout = |dlc| FrameLayout::standard(FrameFormat::Classic, dlc);
     let motor_only = time.joints - time.joint_encoders;
     let budget = Budget::new(BitRates::CLASSIC_1M, time.joints)
-        .frames("request for the positions", 1, shape(1))
-        .frames("replies", motor_only, shape(3))
+        .frames("request for the positions", 1, layout(1))
+        .frames("replies", motor_only, layout(3))
         .frames(
             "replies with a joint encoder",
             time.joint_encoders,
-            shape(6),
+            layout(6),
         )
-        .frames("torques", time.joints.div_ceil(4), shape(8));
+        .frames("torques", time.joints.div_ceil(4), layout(8));
     budget.bus_time("one auxiliary poll", time.auxiliary_poll_ns)
 }

@@ -16,12 +16,12 @@ pub use cycle::{Cycle, cycle};
 pub use drive::Barrett;
 pub use error::CanError;
 
-use crate::make::{Make, RunError};
+use crate::backend::{DriveBackend, RunError};
 
 /// Line of the registry: every arm without another make.
-pub const MAKE: Make = Make {
+pub const BACKEND: DriveBackend = DriveBackend {
     name: "barrett",
-    is_of: |_| true,
+    supports: |_| true,
     run: |description, options, stop| match program::run(description, options, stop) {
         Err(CanError::Stopped) => Err(RunError::Stopped),
         Err(error) => Err(RunError::new(error.code(), error)),

@@ -11,7 +11,7 @@
 
 use super::motor::{Motor, Running};
 use supple_bus::Bus;
-use supple_can_frame::timing::Shape;
+use supple_can_frame::timing::FrameLayout;
 use supple_can_frame::{BitRates, FrameFormat};
 use supple_core::Vector;
 use supple_core::controller::Mode;
@@ -54,7 +54,7 @@ impl<const N: usize, B: Bus> Damiao<N, B> {
     pub fn new(bus: B, rates: BitRates, motors: [Motor; N], period_s: f64) -> Damiao<N, B> {
         Damiao {
             port: BusPort::new(bus, rates),
-            format: rates.format(),
+            format: rates.fastest_format(),
             motors: motors.map(|motor| Running::new(motor, period_s)),
             power: Power::Disabled,
             torque_nm: Vector::zeros(),
@@ -148,10 +148,10 @@ impl<const N: usize, B: Bus> Damiao<N, B> {
 
 /// Frames of a period: a command and a reply of each motor.
 pub fn budget(rates: BitRates, joints: usize) -> Budget {
-    let shape = Shape::standard(rates.format(), BYTES);
+    let layout = FrameLayout::standard(rates.fastest_format(), BYTES);
     Budget::new(rates, joints)
-        .frames("commands", joints, shape)
-        .frames("replies", joints, shape)
+        .frames("commands", joints, layout)
+        .frames("replies", joints, layout)
 }
 
 impl<const N: usize, B: Bus> Drive<N> for Damiao<N, B> {

@@ -16,13 +16,13 @@ pub use motor::Motor;
 pub use program::{DamiaoLoop, stow_config, with_drive};
 pub use start_up::{rates, start_up};
 
-use crate::make::{Make, RunError};
+use crate::backend::{DriveBackend, RunError};
 use supple_model::BusKind;
 
 /// Line of the registry.
-pub const MAKE: Make = Make {
+pub const BACKEND: DriveBackend = DriveBackend {
     name: "damiao",
-    is_of: |description| {
+    supports: |description| {
         description
             .bus()
             .is_some_and(|bus| bus.kind == BusKind::Damiao)

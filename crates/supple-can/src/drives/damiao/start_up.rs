@@ -1,11 +1,11 @@
-//! Start-up: every motor is asked, compared with the arm's file and set, before any of them gets torque.
+//! Start-up: the registers of every motor are read, compared with the arm's file and set, before any motor is enabled.
 //!
 //! ```text
 //! feedback of each motor -> registers -> compared -> mode and watchdog set in RAM and read back -> turns unwrapped
 //! ```
 //!
-//! Nothing is stored in flash and no zero is set. A motor whose last host was lost reports that until the error is
-//! cleared, after a start of the program or of an arm that was lost: only that error is cleared, the motor stays disabled.
+//! Nothing is stored in flash and no zero is set. A motor whose watchdog has tripped reports lost communication until the error is
+//! cleared. Start-up, also that after a loss of the arm, clears this error and no other; the motor stays disabled.
 
 use super::error::DamiaoError;
 use super::host::{Host, MS};
@@ -22,7 +22,7 @@ use supple_model::{BusDescription, BusFormat, BusMotor, Description};
 
 /// Silence before the first question: replies to an earlier host have passed \[ns\].
 const QUIET_NS: u64 = 5 * MS;
-/// Angle beyond a joint's limits that is allowed at the start, as on a stop \[rad\].
+/// Angle beyond a joint's limits that is allowed at the start, where the joint rests on its hard stop \[rad\].
 const SLACK_RAD: f64 = 0.1;
 
 /// Bit rates of an arm's bus.
@@ -33,10 +33,11 @@ pub fn rates(bus: &BusDescription) -> BitRates {
     }
 }
 
-/// Asks all motors of an arm; they are disabled at the end.
+/// Reads and checks the registers of every motor, writes control mode and watchdog timeout to RAM, and returns the motors. No
+/// motor is enabled; one that is enabled is refused.
 ///
 /// # Errors
-/// [`DamiaoError`] with register, found, expected and remedy.
+/// [`DamiaoError`]; [`DamiaoError::Refused`] has register, value found, value expected and remedy.
 pub fn start_up<const N: usize, B: Bus>(
     bus: &mut B,
     description: &Description,
@@ -45,9 +46,9 @@ pub fn start_up<const N: usize, B: Bus>(
     let no_motors = || DamiaoError::NoMotors {
         arm: description.name().to_owned(),
     };
-    let of_bus = description.bus().ok_or_else(no_motors)?;
+    let bus_description = description.bus().ok_or_else(no_motors)?;
     let config = description.config::<N>()?;
-    let format = rates(of_bus).format();
+    let format = rates(bus_description).fastest_format();
     let fd = matches!(format, FrameFormat::Fd { .. });
     if fd && !bus.carries_fd() {
         return Err(DamiaoError::NoFd {
@@ -55,41 +56,38 @@ pub fn start_up<const N: usize, B: Bus>(
         });
     }
     let thermal = Thermal::new(
-        of_bus.warning_celsius,
-        of_bus.derating_celsius,
-        of_bus.fault_celsius,
+        bus_description.warning_celsius,
+        bus_description.derating_celsius,
+        bus_description.fault_celsius,
     );
     let thermal = thermal.ok_or_else(no_motors)?;
     let mut host = Host { bus, format, stop };
     host.discard(QUIET_NS)?;
     let mut motors = Vec::with_capacity(N);
-    for (joint, motor) in of_bus.motors.iter().enumerate() {
-        let expectation = expectation(of_bus, motor, fd);
-        let refused = |problem| DamiaoError::Refused {
+    for (joint, motor) in bus_description.motors.iter().enumerate() {
+        let expectation = expectation(bus_description, motor, fd);
+        let refused_for = |problem| DamiaoError::Refused {
             joint: motor.joint.clone(),
             refusal: expectation.refuse(problem),
         };
-        let feedback = disabled(&mut host, &expectation)?.map_err(refused)?;
+        let feedback = feedback_of_disabled(&mut host, &expectation)?.map_err(refused_for)?;
         let mut readings = Readings::new();
         for register in TO_READ {
             let bytes = host.read(expectation.id, expectation.reply_id, register)?;
             readings.note(
                 register,
-                bytes.ok_or_else(|| refused(Problem::NotRead(register)))?,
+                bytes.ok_or_else(|| refused_for(Problem::NotRead(register)))?,
             );
         }
-        let of_refusal = |refusal| DamiaoError::Refused {
+        let refused = |refusal| DamiaoError::Refused {
             joint: motor.joint.clone(),
             refusal,
         };
-        let ranges = expectation
-            .check(&readings, None)
-            .map_err(of_refusal)?
-            .ranges;
+        let ranges = expectation.check(&readings, None).map_err(refused)?.ranges;
         let motor_rad = feedback.position_rad(&ranges);
         let inspected = expectation
             .check(&readings, Some(motor_rad))
-            .map_err(of_refusal)?;
+            .map_err(refused)?;
         let mode = inspected.write_mode.then_some(MIT_MODE);
         for (register, value) in [
             (Register::MODE, mode),
@@ -101,10 +99,10 @@ pub fn start_up<const N: usize, B: Bus>(
             let (id, reply_id) = (expectation.id, expectation.reply_id);
             host.write(id, reply_id, register, value)?;
             let bytes = host.read(id, reply_id, register)?;
-            let bytes = bytes.ok_or_else(|| refused(Problem::NotRead(register)))?;
+            let bytes = bytes.ok_or_else(|| refused_for(Problem::NotRead(register)))?;
             let found = u32::from_le_bytes(bytes);
             let written = expectation.check_written(register, value, found);
-            written.map_err(of_refusal)?;
+            written.map_err(refused)?;
         }
         let limits = &config.limits;
         let angle = JointAngle::new(motor.direction, motor.zero_offset_rad).unwrapped(
@@ -144,8 +142,8 @@ fn expectation<'a>(bus: &BusDescription, motor: &'a BusMotor, fd: bool) -> Expec
     }
 }
 
-/// The feedback of a motor that is disabled and without an error.
-fn disabled<B: Bus>(
+/// Requests the feedback of a motor, which must be disabled and without an error but for lost communication, which is cleared.
+fn feedback_of_disabled<B: Bus>(
     host: &mut Host<'_, B>,
     of: &Expectation<'_>,
 ) -> Result<Result<Feedback, Problem>, DamiaoError> {

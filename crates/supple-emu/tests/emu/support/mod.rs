@@ -1,6 +1,6 @@
 //! A host that exchanges frames with the emulated arm as raw ids and bytes, without the codec of `supple-puck`.
 
-use supple_bus::virtual_time::{DirectBus, Peer};
+use supple_bus::virtual_time::{DirectBus, EmulatedNodes};
 use supple_bus::{Bus, Event};
 use supple_can_frame::CanFrame;
 use supple_emu::{ButtonPress, Emulator, EmulatorConfig};

@@ -189,7 +189,10 @@ pub fn all(joints: usize, period_s: f64) -> Vec<Case> {
         ));
     }
     // By the wall clock: from the signal, which all processes get.
-    events.push((Event::KillUp, laid_down("the".to_owned(), 1000.0)));
+    events.push((
+        Event::KillUp,
+        laid_down("the program is shutting down".to_owned(), 1000.0),
+    ));
 
     let of_tasks = TASKS.iter().flat_map(|task| {
         let of_task = events.iter().map(|(event, expected)| Case {

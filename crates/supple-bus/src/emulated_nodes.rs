@@ -4,7 +4,7 @@ use crate::bus::Event;
 use supple_can_frame::CanFrame;
 
 /// All nodes on the bus except the host.
-pub trait Peer {
+pub trait EmulatedNodes {
     /// Time of the bus \[ns\].
     fn now_ns(&self) -> u64;
 

@@ -6,7 +6,7 @@ use moteus_protocol::command::{PositionCommand, PositionFormat, StopCommand};
 use moteus_protocol::query::{QueryFormat, QueryResult};
 use moteus_protocol::{CanFdFrame, Mode, Resolution, calculate_arbitration_id};
 use supple_bus::{Bus, Event};
-use supple_can_frame::timing::Shape;
+use supple_can_frame::timing::FrameLayout;
 use supple_can_frame::{BitRates, CanFrame, CanId};
 use supple_core::Vector;
 use supple_core::controller::Mode::GravityHold;
@@ -157,14 +157,14 @@ impl<const N: usize, B: Bus> Drive<N> for Moteus<N, B> {
     }
 
     fn budget(&self) -> Budget {
-        let format = self.port.rates().format();
-        let command = Shape {
+        let format = self.port.rates().fastest_format();
+        let command = FrameLayout {
             extended: true,
-            ..Shape::standard(format, COMMAND_DLC)
+            ..FrameLayout::standard(format, COMMAND_DLC)
         };
         Budget::new(self.port.rates(), N)
             .frames("commands", N, command)
-            .frames("replies", N, Shape::standard(format, REPLY_DLC))
+            .frames("replies", N, FrameLayout::standard(format, REPLY_DLC))
     }
 
     fn request(&mut self) -> Result<(), LoopError> {

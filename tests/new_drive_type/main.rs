@@ -1,4 +1,4 @@
-//! A make of drives that the project does not ship, written against its public interfaces alone: mjbots moteus, through
+//! A type of drives that the project does not ship, written against its public interfaces alone: mjbots moteus, through
 //! its published codec, on emulated motors. Codec glue, emulated motors, drive and tests are this folder; nothing else
 //! depends on them.
 

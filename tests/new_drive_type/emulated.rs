@@ -4,7 +4,7 @@ use core::f64::consts::TAU;
 use moteus_protocol::Mode;
 use std::collections::VecDeque;
 use supple_bus::Event;
-use supple_bus::virtual_time::Peer;
+use supple_bus::virtual_time::EmulatedNodes;
 use supple_can_frame::{BitRates, CanFrame, CanId};
 use supple_core::Vector;
 use supple_model::Description;
@@ -168,7 +168,7 @@ impl EmulatedMoteus {
     }
 }
 
-impl Peer for EmulatedMoteus {
+impl EmulatedNodes for EmulatedMoteus {
     fn now_ns(&self) -> u64 {
         self.now_ns
     }
